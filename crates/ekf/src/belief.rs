@@ -1,0 +1,32 @@
+use nalgebra::SVector;
+use ohmstrain_model::{Scalar, SwitchedModel, Symmetric};
+
+/// What is known of the state: mean and covariance of a Gaussian. `L = N (N + 1) / 2`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Belief<T, const N: usize, const L: usize> {
+    /// Mean x̂.
+    pub mean: SVector<T, N>,
+    /// Covariance P.
+    pub covariance: Symmetric<T, N, L>,
+}
+
+impl<T: Scalar, const N: usize, const L: usize> Belief<T, N, L> {
+    /// Independent components with the given means and variances; a variance of zero means exactly known.
+    #[must_use]
+    pub fn independent(mean: SVector<T, N>, variance: &[T; N]) -> Self {
+        Self { mean, covariance: Symmetric::from_diagonal(variance) }
+    }
+
+    /// Before any reading: the model's long-run distribution.
+    #[must_use]
+    pub fn initial<const M: usize, const B: usize>(model: &SwitchedModel<T, M, B, N>) -> Self {
+        let (mean, variance) = model.initial_distribution();
+        Self::independent(mean, &variance)
+    }
+
+    /// Whether every number is finite.
+    #[must_use]
+    pub fn is_finite(&self) -> bool {
+        self.mean.iter().all(|x| x.is_finite()) && self.covariance.is_finite()
+    }
+}

@@ -1,0 +1,191 @@
+use nalgebra::SVector;
+use ohmstrain_model::{Direction, Observation, Scalar, Symmetric, Transition};
+
+use crate::{Belief, Channel, Dynamics, Reading, StepError};
+
+/// Extended Kalman filter: one Gaussian, linearised at its mean.
+///
+/// The smallest estimator. It takes the direction of motion from its own prediction, so where stretching and releasing
+/// both raise the reading it can lock onto the wrong one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ekf<T, M> {
+    model: M,
+    direction: Direction<T>,
+}
+
+/// Everything one step computed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Step<T, const N: usize, const L: usize> {
+    /// The transition from the old belief, as a smoother needs it.
+    pub transition: Transition<T, N, L>,
+    /// The belief before the reading.
+    pub prior: Belief<T, N, L>,
+    /// The belief after it; the prior if the reading was missing.
+    pub posterior: Belief<T, N, L>,
+    /// What the reading did; `None` if it was missing.
+    pub update: Option<Update<T, N>>,
+}
+
+/// What a reading did to a belief.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Update<T, const N: usize> {
+    /// The expected reading, its gradient H and noise variance R (the reading's own included).
+    pub observation: Observation<T, N>,
+    /// Reading minus expected reading, ν.
+    pub innovation: T,
+    /// Its variance `S = H P Hᵀ + R`.
+    pub innovation_variance: T,
+    /// Normalised innovation squared ν²/S: χ² with one degree of freedom if the filter is consistent.
+    pub nis: T,
+    /// Log density of the reading before it was seen, constant included.
+    pub log_likelihood: T,
+    /// Kalman gain K.
+    pub gain: SVector<T, N>,
+}
+
+impl<T: Scalar, M> Ekf<T, M> {
+    /// `direction`: how a step chooses between the law's gains. Models of one phase ignore it.
+    pub const fn new(model: M, direction: Direction<T>) -> Self {
+        Self { model, direction }
+    }
+
+    /// The model.
+    pub const fn model(&self) -> &M {
+        &self.model
+    }
+
+    /// Predicts `dt_s ≥ 0` seconds ahead, then takes the reading.
+    ///
+    /// # Errors
+    /// See [`StepError`]; the belief passed in is untouched.
+    pub fn step<const N: usize, const L: usize>(
+        &self,
+        belief: &Belief<T, N, L>,
+        dt_s: T,
+        reading: Option<Reading<T>>,
+    ) -> Result<Step<T, N, L>, StepError>
+    where
+        M: Dynamics<T, N, L> + Channel<T, N>,
+    {
+        if !dt_s.is_finite() {
+            return Err(StepError::NonFiniteTimeStep);
+        }
+        if dt_s < T::zero() {
+            return Err(StepError::NegativeTimeStep);
+        }
+        let (transition, prior) = if dt_s.is_zero() {
+            (stand_still(belief), *belief)
+        } else {
+            self.predict(belief, &self.model.prepare(dt_s))
+        };
+        self.finish(transition, prior, reading)
+    }
+
+    /// The same with a step that was prepared before, for sensors read at a fixed rate.
+    ///
+    /// # Errors
+    /// See [`StepError`]; the belief passed in is untouched.
+    pub fn step_prepared<const N: usize, const L: usize>(
+        &self,
+        belief: &Belief<T, N, L>,
+        prepared: &M::Prepared,
+        reading: Option<Reading<T>>,
+    ) -> Result<Step<T, N, L>, StepError>
+    where
+        M: Dynamics<T, N, L> + Channel<T, N>,
+    {
+        let (transition, prior) = self.predict(belief, prepared);
+        self.finish(transition, prior, reading)
+    }
+
+    /// The belief a prepared step later, and how it got there.
+    fn predict<const N: usize, const L: usize>(
+        &self,
+        belief: &Belief<T, N, L>,
+        prepared: &M::Prepared,
+    ) -> (Transition<T, N, L>, Belief<T, N, L>)
+    where
+        M: Dynamics<T, N, L>,
+    {
+        let transition = self.model.transition(prepared, &belief.mean, self.direction);
+        let covariance = self.model.propagate(&belief.covariance, &transition);
+        (transition, Belief { mean: transition.mean, covariance })
+    }
+
+    fn finish<const N: usize, const L: usize>(
+        &self,
+        transition: Transition<T, N, L>,
+        prior: Belief<T, N, L>,
+        reading: Option<Reading<T>>,
+    ) -> Result<Step<T, N, L>, StepError>
+    where
+        M: Channel<T, N>,
+    {
+        let (posterior, update) = match reading {
+            None => (prior, None),
+            Some(reading) => {
+                let observation = self.model.observe(&prior.mean, self.direction);
+                let (posterior, update) = update(&prior, observation, reading)?;
+                (posterior, Some(update))
+            }
+        };
+        if !posterior.is_finite() {
+            return Err(StepError::NonFiniteState);
+        }
+        Ok(Step { transition, prior, posterior, update })
+    }
+}
+
+/// A step of zero seconds.
+fn stand_still<T: Scalar, const N: usize, const L: usize>(belief: &Belief<T, N, L>) -> Transition<T, N, L> {
+    Transition { mean: belief.mean, jacobian: nalgebra::SMatrix::identity(), noise: Symmetric::zeros() }
+}
+
+/// Kalman's update with one scalar reading; the covariance in Joseph's form `(I - K H) P (I - K H)ᵀ + K R Kᵀ`, which
+/// stays positive semi-definite under rounding where `P - K S Kᵀ` does not.
+#[allow(non_snake_case, reason = "H, P, S, K are the letters of every textbook; NOTATION.md has the table")]
+fn update<T: Scalar, const N: usize, const L: usize>(
+    prior: &Belief<T, N, L>,
+    mut observation: Observation<T, N>,
+    reading: Reading<T>,
+) -> Result<(Belief<T, N, L>, Update<T, N>), StepError> {
+    if !(reading.value.is_finite() && reading.extra_variance.is_finite()) {
+        return Err(StepError::NonFiniteReading);
+    }
+    observation.variance += reading.extra_variance;
+    let (H, R) = (&observation.gradient, observation.variance);
+    let P = &prior.covariance;
+    let PHt = P.mul(H);
+    let S = H.dot(&PHt) + R;
+    if !(S > T::zero() && S.is_finite()) {
+        return Err(StepError::NonPositiveInnovationVariance);
+    }
+    let K = PHt / S;
+    let innovation = reading.value - observation.value;
+    let mean = prior.mean + K * innovation;
+    let covariance = joseph(P, &PHt, &K, H, R);
+    let nis = innovation * innovation / S;
+    let log_likelihood = T::of(-0.5) * (nis + S.ln() + T::two_pi().ln());
+    let update = Update { observation, innovation, innovation_variance: S, nis, log_likelihood, gain: K };
+    Ok((Belief { mean, covariance }, update))
+}
+
+/// `A - (A Hᵀ) Kᵀ + K R Kᵀ` with `A = (I - K H) P`, in the lower triangle.
+#[allow(non_snake_case, reason = "as in `update`")]
+fn joseph<T: Scalar, const N: usize, const L: usize>(
+    P: &Symmetric<T, N, L>,
+    PHt: &SVector<T, N>,
+    K: &SVector<T, N>,
+    H: &SVector<T, N>,
+    R: T,
+) -> Symmetric<T, N, L> {
+    let A = |i: usize, j: usize| P[(i, j)] - K[i] * PHt[j];
+    let AHt = SVector::<T, N>::from_fn(|i, _| (0..N).fold(T::zero(), |sum, j| sum + A(i, j) * H[j]));
+    let mut out = Symmetric::zeros();
+    for i in 0..N {
+        for j in 0..=i {
+            out[(i, j)] = A(i, j) + (R * K[i] - AHt[i]) * K[j];
+        }
+    }
+    out
+}

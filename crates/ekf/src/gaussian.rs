@@ -1,0 +1,98 @@
+use ohmstrain_model::{Scalar, StrainRange};
+
+/// `f32` or `f64`: scalars that know the complementary error function.
+pub trait Real: Scalar {
+    /// `erfc(x) = 1 - erf(x)`, accurate in the far tail.
+    #[must_use]
+    fn erfc(self) -> Self;
+}
+
+impl Real for f32 {
+    fn erfc(self) -> Self {
+        libm::erfcf(self)
+    }
+}
+
+impl Real for f64 {
+    fn erfc(self) -> Self {
+        libm::erfc(self)
+    }
+}
+
+/// A Gaussian in one dimension.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Gaussian<T> {
+    /// Mean.
+    pub mean: T,
+    /// Variance, not negative.
+    pub variance: T,
+}
+
+/// Mass and first two moments of a Gaussian restricted to an interval.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TruncatedGaussian<T> {
+    /// Probability of the interval before the restriction.
+    pub mass: T,
+    /// Mean after it.
+    pub mean: T,
+    /// Variance after it.
+    pub variance: T,
+}
+
+impl<T: Real> Gaussian<T> {
+    /// Probability of a value above `x`.
+    #[must_use]
+    pub fn probability_above(&self, x: T) -> T {
+        if self.variance <= T::zero() {
+            return if self.mean > x { T::one() } else { T::zero() };
+        }
+        upper_tail((x - self.mean) / self.variance.sqrt())
+    }
+
+    /// The Gaussian restricted to a range.
+    ///
+    /// Where next to nothing of it lies inside, the limit is taken: an exponential that falls off from the near end.
+    #[must_use]
+    pub fn restricted(&self, range: &StrainRange<T>) -> TruncatedGaussian<T> {
+        let inside = TruncatedGaussian { mass: T::one(), mean: self.mean, variance: self.variance };
+        if self.variance <= T::zero() {
+            return TruncatedGaussian { mean: range.clamp(self.mean), ..inside };
+        }
+        let sd = self.variance.sqrt();
+        let (a, b) = ((range.lower - self.mean) / sd, (range.upper - self.mean) / sd);
+        // Work on the side where the interval lies in the upper tail, where erfc keeps its digits.
+        let (a, b, side) = if a + b < T::zero() { (-b, -a, -T::one()) } else { (a, b, T::one()) };
+        let mass = upper_tail(a) - upper_tail(b);
+        if !(mass > T::of(FAR_TAIL)) {
+            let slope = T::one() / a;
+            let shift = (a + slope).min(b);
+            return TruncatedGaussian {
+                mass: mass.max(T::zero()),
+                mean: self.mean + side * sd * shift,
+                variance: self.variance * slope * slope,
+            };
+        }
+        let (at_a, at_b) = (density(a), density(b));
+        let shift = (at_a - at_b) / mass;
+        let edge = |x: T, at_x: T| if at_x.is_zero() { T::zero() } else { x * at_x };
+        let narrowed = T::one() + (edge(a, at_a) - edge(b, at_b)) / mass - shift * shift;
+        TruncatedGaussian {
+            mass,
+            mean: self.mean + side * sd * shift,
+            variance: self.variance * narrowed.max(T::zero()).min(T::one()),
+        }
+    }
+}
+
+/// Below this mass the moments of a truncated Gaussian are taken from the tail's asymptote; about 5.6 deviations out.
+const FAR_TAIL: f64 = 1e-8;
+
+/// Probability of a standard normal above `x`.
+fn upper_tail<T: Real>(x: T) -> T {
+    T::of(0.5) * (x * T::of(core::f64::consts::FRAC_1_SQRT_2)).erfc()
+}
+
+/// Density of the standard normal.
+fn density<T: Real>(x: T) -> T {
+    (T::of(-0.5) * x * x).exp() / T::two_pi().sqrt()
+}

@@ -1,0 +1,66 @@
+//! Kalman-type filters and smoothers for a scalar reading of a hidden state.
+//!
+//! Configuration and state are apart: an estimator ([`Ekf`]) holds the model, a [`Belief`] goes in and a [`Step`] with
+//! a new belief comes out. An error leaves the caller's belief as it was, and one estimator serves many sensors.
+//!
+//! Models are anything that implements [`Dynamics`] and [`Channel`];
+//! [`SwitchedModel`](ohmstrain_model::SwitchedModel) does.
+//!
+//! # Policy
+//! - `no_std`, no heap (the `std` feature adds helpers that return a `Vec`), no unsafe code, no panic.
+//! - A missing reading is a prediction. A step of zero seconds is an update without a prediction. A NaN or infinite
+//!   reading, a negative step and a variance that is not positive are [`StepError`]s.
+//! - Everything computed is returned: prior, innovation, its variance, log-likelihood, gain.
+//! - Covariances are packed symmetric, so they are symmetric by construction, and are updated in Joseph's form.
+//!
+//! ```
+//! use ohmstrain_ekf::{Belief, Ekf, Reading};
+//! use ohmstrain_model::*;
+//! # let law = SensorLaw {
+//! #     gauge: Gauge::Polynomial { coefficients: [1.9, -2.8, 0.0] },
+//! #     extend_viscosity_s: 0.02, retract_viscosity_s: -0.01,
+//! #     branches: [Branch {
+//! #         tau_s: 20.0, extend_gain: 0.6, retract_gain: -0.4, extend_gain_slope: 0.0, retract_gain_slope: 0.0,
+//! #     }],
+//! #     range: StrainRange { lower: 0.0, upper: 0.33 },
+//! # };
+//! # let motion = Motion::ornstein_uhlenbeck(1.0, 0.1, 0.15, 0.1)?;
+//! # let noise = ModelNoise { reading_sd: 2e-3, branch_sd: 5e-3, baseline_sd: 0.02, baseline_time_s: 30.0 };
+//! let model = SwitchedModel::<f64, 2, 1, 4>::new(law, motion, noise)?;
+//! let ekf = Ekf::new(model, Direction::ByRate { rate_scale: 0.02 });
+//! let mut belief: Belief<f64, 4, 10> = Belief::initial(ekf.model());
+//! for rho in [0.01, 0.03, 0.06] {
+//!     let step = ekf.step(&belief, 0.05, Some(Reading::from(rho)))?;
+//!     belief = step.posterior;
+//! }
+//! assert!(belief.mean[0] > 0.0 && belief.covariance[(0, 0)] > 0.0);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+#![no_std]
+#![deny(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+#[cfg(feature = "std")]
+extern crate std;
+
+#[cfg(feature = "adskalman")]
+mod adskalman_bridge;
+mod belief;
+mod clock;
+mod ekf;
+mod error;
+mod gaussian;
+mod psd;
+mod smoother;
+mod traits;
+
+#[cfg(feature = "adskalman")]
+pub use adskalman_bridge::LinearStep;
+pub use belief::Belief;
+pub use clock::seconds_between;
+pub use ekf::{Ekf, Step, Update};
+pub use error::StepError;
+pub use gaussian::{Gaussian, Real, TruncatedGaussian};
+#[cfg(feature = "std")]
+pub use smoother::rts_smooth_vec;
+pub use smoother::{rts_smooth, rts_step};
+pub use traits::{Channel, Dynamics, Reading};

@@ -1,0 +1,59 @@
+use nalgebra::{SMatrix, SVector};
+use ohmstrain_model::{Scalar, Symmetric};
+
+/// `P = L D Lᵀ` of a positive semi-definite matrix: unit lower triangle and diagonal.
+///
+/// A direction without variance has a zero pivot. It is skipped in the factor and in [`Self::solve`], which makes
+/// exactly known states ordinary input. Pivots count as zero relative to their own diagonal entry, so that units do not
+/// matter.
+pub(crate) struct SemiDefinite<T, const N: usize> {
+    lower: SMatrix<T, N, N>,
+    pivots: SVector<T, N>,
+}
+
+impl<T: Scalar, const N: usize> SemiDefinite<T, N> {
+    pub(crate) fn factor<const L: usize>(matrix: &Symmetric<T, N, L>) -> Self {
+        let mut lower = SMatrix::<T, N, N>::identity();
+        let mut pivots = SVector::<T, N>::zeros();
+        for j in 0..N {
+            let mut pivot = matrix[(j, j)];
+            for k in 0..j {
+                pivot -= lower[(j, k)] * lower[(j, k)] * pivots[k];
+            }
+            let negligible = matrix[(j, j)].abs() * T::default_epsilon() * T::of(N as f64);
+            if pivot <= negligible {
+                continue;
+            }
+            pivots[j] = pivot;
+            for i in j + 1..N {
+                let mut entry = matrix[(i, j)];
+                for k in 0..j {
+                    entry -= lower[(i, k)] * lower[(j, k)] * pivots[k];
+                }
+                lower[(i, j)] = entry / pivot;
+            }
+        }
+        Self { lower, pivots }
+    }
+
+    /// A solution x of `P x = rhs` for a right-hand side in the range of P.
+    pub(crate) fn solve(&self, rhs: &SVector<T, N>) -> SVector<T, N> {
+        let mut x = *rhs;
+        for i in 0..N {
+            for k in 0..i {
+                let below = self.lower[(i, k)] * x[k];
+                x[i] -= below;
+            }
+        }
+        for i in 0..N {
+            x[i] = if self.pivots[i] > T::zero() { x[i] / self.pivots[i] } else { T::zero() };
+        }
+        for i in (0..N).rev() {
+            for k in i + 1..N {
+                let above = self.lower[(k, i)] * x[k];
+                x[i] -= above;
+            }
+        }
+        x
+    }
+}

@@ -1,0 +1,64 @@
+use nalgebra::SMatrix;
+use ohmstrain_model::{Scalar, Transition};
+
+use crate::psd::SemiDefinite;
+use crate::{Belief, Step};
+
+/// One step backwards of the Rauch-Tung-Striebel smoother.
+///
+/// - `filtered`: belief at time k from the readings up to k.
+/// - `transition`, `prior`: how it led to time k+1 and what it predicted there; the stored linearisation, not a new one.
+/// - `smoothed_next`: belief at k+1 from all readings.
+///
+/// Returns the belief at k from all readings. The covariance is the sum `(I - G F) P (I - G F)ᵀ + G (Q + Pˢ) Gᵀ`, positive
+/// semi-definite under rounding. Exactly known states (a singular prior) are fine.
+///
+/// Source: Rauch, Tung, Striebel, *AIAA J.* 3 (1965) 1445.
+#[allow(non_snake_case, reason = "F, P, G, Q are the letters of every textbook; NOTATION.md has the table")]
+#[must_use]
+pub fn rts_step<T: Scalar, const N: usize, const L: usize>(
+    filtered: &Belief<T, N, L>,
+    transition: &Transition<T, N, L>,
+    prior: &Belief<T, N, L>,
+    smoothed_next: &Belief<T, N, L>,
+) -> Belief<T, N, L> {
+    let F = &transition.jacobian;
+    let FP = F * filtered.covariance.to_matrix();
+    let factor = SemiDefinite::factor(&prior.covariance);
+    let mut G = SMatrix::<T, N, N>::zeros();
+    for i in 0..N {
+        G.set_row(i, &factor.solve(&FP.column(i).into_owned()).transpose());
+    }
+    let mean = filtered.mean + G * (smoothed_next.mean - prior.mean);
+    let I_GF = SMatrix::identity() - G * F;
+    let ahead = transition.noise.plus(&smoothed_next.covariance).congruence(&G);
+    Belief { mean, covariance: filtered.covariance.congruence(&I_GF).plus(&ahead) }
+}
+
+/// Smooths a recording: `smoothed[k]` becomes the belief at the time of `steps[k]` given all readings.
+///
+/// Writes as many beliefs as the shorter of both slices has; the last step of `steps` must be the last reading.
+pub fn rts_smooth<T: Scalar, const N: usize, const L: usize>(
+    steps: &[Step<T, N, L>],
+    smoothed: &mut [Belief<T, N, L>],
+) {
+    let mut next: Option<(&Step<T, N, L>, Belief<T, N, L>)> = None;
+    for (step, out) in steps.iter().zip(smoothed).rev() {
+        *out = match &next {
+            None => step.posterior,
+            Some((later, belief)) => rts_step(&step.posterior, &later.transition, &later.prior, belief),
+        };
+        next = Some((step, *out));
+    }
+}
+
+/// [`rts_smooth`] into a new `Vec`.
+#[cfg(feature = "std")]
+#[must_use]
+pub fn rts_smooth_vec<T: Scalar, const N: usize, const L: usize>(
+    steps: &[Step<T, N, L>],
+) -> std::vec::Vec<Belief<T, N, L>> {
+    let mut smoothed: std::vec::Vec<_> = steps.iter().map(|step| step.posterior).collect();
+    rts_smooth(steps, &mut smoothed);
+    smoothed
+}

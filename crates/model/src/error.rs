@@ -1,0 +1,45 @@
+use core::fmt;
+
+/// A parameter that no model can have, by name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct ParameterError {
+    /// The parameter, as it is called in code and in files.
+    pub parameter: &'static str,
+    /// What is wrong with it.
+    pub problem: Problem,
+}
+
+/// What is wrong with a parameter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Problem {
+    /// NaN, or infinite where only a number will do.
+    NotFinite,
+    /// Zero or below where only a positive number will do.
+    NotPositive,
+    /// Below zero.
+    Negative,
+    /// Outside the interval in which the formula holds.
+    OutOfRange,
+}
+
+impl fmt::Display for ParameterError {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let must = match self.problem {
+            Problem::NotFinite => "must be a finite number",
+            Problem::NotPositive => "must be positive",
+            Problem::Negative => "must not be negative",
+            Problem::OutOfRange => "is outside the range in which the model holds",
+        };
+        write!(out, "{} {must}", self.parameter)
+    }
+}
+
+impl core::error::Error for ParameterError {}
+
+impl ParameterError {
+    pub(crate) const fn new(parameter: &'static str, problem: Problem) -> Self {
+        Self { parameter, problem }
+    }
+}

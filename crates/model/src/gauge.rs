@@ -1,0 +1,107 @@
+use crate::Scalar;
+use crate::error::{ParameterError, Problem};
+
+/// The quasi-static curve g(ε): relative change of resistance after everything has relaxed, with g(0) = 0.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Gauge<T> {
+    /// `a₁ ε + a₂ ε² + a₃ ε³`.
+    Polynomial {
+        /// Coefficients a₁, a₂, a₃.
+        coefficients: [T; 3],
+    },
+    /// `G ε exp(-ε/ε₀)`: rises, peaks at ε₀, falls.
+    DecayingExponential {
+        /// Slope G at zero strain.
+        slope: T,
+        /// Strain ε₀ of the peak.
+        decay_strain: T,
+    },
+    /// `(1 + C ε) exp(A ε + W ε²) - 1`: tunnelling between particles whose gap grows with strain
+    /// (Zhang, Pan, Zheng, Yi, *J. Appl. Polym. Sci.* 2000, with the exponent in powers of strain).
+    Tunnelling {
+        /// Growth C of the gap, 1 + C ε > 0.
+        gap: T,
+        /// Barrier term A.
+        barrier: T,
+        /// Loss of conducting paths W.
+        path_loss: T,
+    },
+}
+
+impl<T: Scalar> Gauge<T> {
+    /// Checks that every coefficient is finite, and that ε₀ is not zero.
+    ///
+    /// # Errors
+    /// Names the coefficient.
+    pub fn validate(&self) -> Result<(), ParameterError> {
+        let finite = |name, value: T| {
+            if value.is_finite() { Ok(()) } else { Err(ParameterError::new(name, Problem::NotFinite)) }
+        };
+        match *self {
+            Self::Polynomial { coefficients } => coefficients.iter().try_for_each(|a| finite("gauge.coefficients", *a)),
+            Self::DecayingExponential { slope, decay_strain } => {
+                finite("gauge.slope", slope)?;
+                finite("gauge.decay_strain", decay_strain)?;
+                if decay_strain.is_zero() {
+                    return Err(ParameterError::new("gauge.decay_strain", Problem::OutOfRange));
+                }
+                Ok(())
+            }
+            Self::Tunnelling { gap, barrier, path_loss } => {
+                finite("gauge.gap", gap)?;
+                finite("gauge.barrier", barrier)?;
+                finite("gauge.path_loss", path_loss)
+            }
+        }
+    }
+
+    /// g(ε) and its slope g′(ε).
+    #[must_use]
+    pub fn value_and_slope(&self, strain: T) -> (T, T) {
+        match *self {
+            Self::Polynomial { coefficients: [a1, a2, a3] } => (
+                strain * (a1 + strain * (a2 + strain * a3)),
+                a1 + strain * (T::of(2.0) * a2 + strain * T::of(3.0) * a3),
+            ),
+            Self::DecayingExponential { slope, decay_strain } => {
+                let x = strain / decay_strain;
+                let decay = (-x).exp();
+                (slope * strain * decay, slope * (T::one() - x) * decay)
+            }
+            Self::Tunnelling { gap, barrier, path_loss } => {
+                let growth = (strain * (barrier + strain * path_loss)).exp();
+                let width = T::one() + gap * strain;
+                let slope = (gap + width * (barrier + T::of(2.0) * path_loss * strain)) * growth;
+                (width * growth - T::one(), slope)
+            }
+        }
+    }
+
+    /// The strains at which g′ = 0, ascending: beyond the first one strain is ambiguous.
+    #[must_use]
+    pub fn static_borders(&self) -> [Option<T>; 2] {
+        match *self {
+            Self::Polynomial { coefficients: [a1, a2, a3] } => quadratic_roots(T::of(3.0) * a3, T::of(2.0) * a2, a1),
+            Self::DecayingExponential { decay_strain, .. } => [Some(decay_strain), None],
+            Self::Tunnelling { gap, barrier, path_loss } => {
+                let twice_loss = T::of(2.0) * path_loss;
+                quadratic_roots(twice_loss * gap, barrier * gap + twice_loss, barrier + gap)
+            }
+        }
+    }
+}
+
+/// Real roots of `a x² + b x + c`, ascending, without cancellation.
+fn quadratic_roots<T: Scalar>(a: T, b: T, c: T) -> [Option<T>; 2] {
+    if a.is_zero() {
+        return [if b.is_zero() { None } else { Some(-c / b) }, None];
+    }
+    let discriminant = b * b - T::of(4.0) * a * c;
+    if discriminant < T::zero() {
+        return [None, None];
+    }
+    let sign = if b < T::zero() { -T::one() } else { T::one() };
+    let q = -(b + sign * discriminant.sqrt()) / T::of(2.0);
+    let (x, y) = (q / a, if q.is_zero() { T::zero() } else { c / q });
+    if x <= y { [Some(x), Some(y)] } else { [Some(y), Some(x)] }
+}

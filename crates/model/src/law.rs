@@ -1,0 +1,145 @@
+use crate::error::{ParameterError, Problem};
+use crate::{Gauge, Phase, Scalar};
+
+/// One relaxing contribution to the resistance: `ċ = -c/τ + (k + κ ε) v`, with gains of their own for stretching and
+/// releasing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Branch<T> {
+    /// Time constant τ, s.
+    pub tau_s: T,
+    /// Gain k⁺ while stretching.
+    pub extend_gain: T,
+    /// Gain k⁻ while releasing.
+    pub retract_gain: T,
+    /// Growth κ⁺ of the stretching gain with strain.
+    pub extend_gain_slope: T,
+    /// Growth κ⁻ of the releasing gain with strain.
+    pub retract_gain_slope: T,
+}
+
+/// The strains for which a law was made.
+///
+/// Outside of it the gauge curve goes on along its tangent and the gains keep their border values, because a
+/// polynomial extrapolates to nonsense and a filter must still find its way back.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StrainRange<T> {
+    /// Lower end.
+    pub lower: T,
+    /// Upper end.
+    pub upper: T,
+}
+
+impl<T: Scalar> StrainRange<T> {
+    /// `strain`, moved to the nearer end if it lies outside.
+    #[must_use]
+    pub fn clamp(&self, strain: T) -> T {
+        strain.max(self.lower).min(self.upper)
+    }
+
+    /// Whether `strain` lies in the range, ends included.
+    #[must_use]
+    pub fn contains(&self, strain: T) -> bool {
+        strain >= self.lower && strain <= self.upper
+    }
+
+    /// Length of the range.
+    #[must_use]
+    pub fn span(&self) -> T {
+        self.upper - self.lower
+    }
+}
+
+/// The switched Kelvin-Voigt law with `B` branches:
+///
+/// `ρ = R/R₀ - 1 = g(ε) + ηᵖ v + Σ cᵢ + b`, `ċᵢ = -cᵢ/τᵢ + (kᵢᵖ + κᵢᵖ ε) v`, p = extend, hold or retract.
+///
+/// With `k⁺ = k⁻` and `κ = 0` it is linear viscoelasticity; with no branch it is the Kelvin-Voigt element.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SensorLaw<T, const B: usize> {
+    /// Quasi-static curve g.
+    pub gauge: Gauge<T>,
+    /// Dash-pot term η⁺ while stretching, s.
+    pub extend_viscosity_s: T,
+    /// Dash-pot term η⁻ while releasing, s.
+    pub retract_viscosity_s: T,
+    /// The branches, fastest first by convention.
+    pub branches: [Branch<T>; B],
+    /// Where the law holds.
+    pub range: StrainRange<T>,
+}
+
+impl<T: Scalar, const B: usize> SensorLaw<T, B> {
+    /// Checks every parameter.
+    ///
+    /// # Errors
+    /// Names the parameter that no law can have.
+    pub fn validate(&self) -> Result<(), ParameterError> {
+        self.gauge.validate()?;
+        if !(self.extend_viscosity_s.is_finite() && self.retract_viscosity_s.is_finite()) {
+            return Err(ParameterError::new("viscosity_s", Problem::NotFinite));
+        }
+        for branch in &self.branches {
+            if !(branch.tau_s.is_finite() && branch.tau_s > T::zero()) {
+                return Err(ParameterError::new("tau_s", Problem::NotPositive));
+            }
+            let gains = [branch.extend_gain, branch.retract_gain, branch.extend_gain_slope, branch.retract_gain_slope];
+            if !gains.iter().all(|gain| gain.is_finite()) {
+                return Err(ParameterError::new("branch gain", Problem::NotFinite));
+            }
+        }
+        if !(self.range.lower < self.range.upper) {
+            return Err(ParameterError::new("range", Problem::OutOfRange));
+        }
+        Ok(())
+    }
+
+    /// g(ε) and g′(ε), continued along the tangent outside the range.
+    #[must_use]
+    pub fn gauge_value_and_slope(&self, strain: T) -> (T, T) {
+        let inside = self.range.clamp(strain);
+        let (value, slope) = self.gauge.value_and_slope(inside);
+        (value + slope * (strain - inside), slope)
+    }
+
+    /// Dash-pot term of a phase, s; zero in a hold.
+    #[must_use]
+    pub fn viscosity_s(&self, phase: Phase) -> T {
+        match phase {
+            Phase::Extend => self.extend_viscosity_s,
+            Phase::Hold => T::zero(),
+            Phase::Retract => self.retract_viscosity_s,
+        }
+    }
+
+    /// Gain of branch `i` at `strain` and its growth with strain, in a phase; zero in a hold.
+    #[must_use]
+    pub fn gain(&self, i: usize, strain: T, phase: Phase) -> (T, T) {
+        let Some(branch) = self.branches.get(i) else { return (T::zero(), T::zero()) };
+        let (gain, slope) = match phase {
+            Phase::Extend => (branch.extend_gain, branch.extend_gain_slope),
+            Phase::Hold => (T::zero(), T::zero()),
+            Phase::Retract => (branch.retract_gain, branch.retract_gain_slope),
+        };
+        let slope_here = if self.range.contains(strain) { slope } else { T::zero() };
+        (gain + slope * self.range.clamp(strain), slope_here)
+    }
+
+    /// ρ = R/R₀ - 1 from strain, rate (1/s), relaxation states and baseline.
+    #[must_use]
+    pub fn relative_change(&self, strain: T, rate: T, relaxation: &[T; B], baseline: T, phase: Phase) -> T {
+        let (gauge, _) = self.gauge_value_and_slope(strain);
+        let relaxing = relaxation.iter().fold(T::zero(), |sum, c| sum + *c);
+        gauge + self.viscosity_s(phase) * rate + relaxing + baseline
+    }
+
+    /// Where ρ will be `horizon_s` seconds on if the strain is held: `g(ε) + Σ cᵢ exp(-h/τᵢ)`, without the baseline.
+    /// Its limit for h → ∞ is the settled value g(ε).
+    #[must_use]
+    pub fn held_relative_change(&self, strain: T, relaxation: &[T; B], horizon_s: T) -> T {
+        let (gauge, _) = self.gauge_value_and_slope(strain);
+        self.branches
+            .iter()
+            .zip(relaxation)
+            .fold(gauge, |sum, (branch, c)| sum + *c * (-horizon_s / branch.tau_s).exp())
+    }
+}

@@ -1,0 +1,43 @@
+//! The resistance of a soft, stretchable strain sensor as a state-space model.
+//!
+//! The default law is the *switched Kelvin-Voigt* law ([`SensorLaw`]): a quasi-static gauge curve, a dash-pot term and
+//! relaxing branches that stretching and releasing drive with different gains. [`SwitchedModel`] joins it with a
+//! prior on how the body moves ([`Motion`]) and with drift ([`ModelNoise`]), and gives the transition, process noise
+//! and measurement gradient that a Kalman-type filter needs. [`RelaxingModulus`] is the published law taken literally.
+//!
+//! # Policy
+//! - `no_std`, no heap, no unsafe code, no panic: constructors validate and return [`ParameterError`]; evaluation of a
+//!   validated model on finite input is finite.
+//! - Generic over [`Scalar`]: `f32`, `f64`, and dual numbers where exact gradients are wanted.
+//! - Units are in the names: `_s` seconds, `_ohm` ohms, `_rad` radians, `_mm` millimetres; strains and relative
+//!   changes of resistance are dimensionless.
+#![no_std]
+#![deny(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod error;
+mod front_end;
+mod gauge;
+mod joint;
+mod law;
+mod motion;
+mod noise;
+mod phase;
+mod relaxing_modulus;
+mod response;
+mod scalar;
+mod switched;
+mod symmetric;
+
+pub use error::{ParameterError, Problem};
+pub use front_end::{AdcCode, ConstantCurrent, Divider, FrontEnd, Ohms, SensorSide};
+pub use gauge::Gauge;
+pub use joint::Joint;
+pub use law::{Branch, SensorLaw, StrainRange};
+pub use motion::Motion;
+pub use noise::ModelNoise;
+pub use phase::{Direction, Phase};
+pub use relaxing_modulus::{Modulus, PhaseStart, RelaxingModulus, ResistanceGradient};
+pub use response::Response;
+pub use scalar::Scalar;
+pub use switched::{Observation, SwitchedModel, SwitchedStep, Transition};
+pub use symmetric::Symmetric;

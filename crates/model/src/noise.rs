@@ -1,0 +1,41 @@
+use crate::Scalar;
+use crate::error::{ParameterError, Problem};
+
+/// What the law does not explain, in units of ρ = R/R₀ - 1.
+///
+/// Sensor noise is a small part of it: model error, slowly varying, is ten to a hundred times larger. Putting it into
+/// `reading_sd` as white noise makes a filter overconfident; it belongs into the baseline and the branches.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ModelNoise<T> {
+    /// White noise of one reading.
+    pub reading_sd: T,
+    /// Long-run standard deviation of each branch around its law.
+    pub branch_sd: T,
+    /// Long-run standard deviation of the baseline.
+    pub baseline_sd: T,
+    /// Correlation time of the baseline, s.
+    pub baseline_time_s: T,
+}
+
+impl<T: Scalar> ModelNoise<T> {
+    /// Checks every parameter.
+    ///
+    /// # Errors
+    /// Names the parameter that is negative, not finite, or a time that is not positive.
+    pub fn validate(&self) -> Result<(), ParameterError> {
+        for (name, value) in
+            [("reading_sd", self.reading_sd), ("branch_sd", self.branch_sd), ("baseline_sd", self.baseline_sd)]
+        {
+            if !value.is_finite() {
+                return Err(ParameterError::new(name, Problem::NotFinite));
+            }
+            if value < T::zero() {
+                return Err(ParameterError::new(name, Problem::Negative));
+            }
+        }
+        if !(self.baseline_time_s > T::zero()) {
+            return Err(ParameterError::new("baseline_time_s", Problem::NotPositive));
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,290 @@
+use nalgebra::{SMatrix, SVector};
+
+use crate::error::{ParameterError, Problem};
+use crate::phase::Direction;
+use crate::{ModelNoise, Motion, Phase, Response, Scalar, SensorLaw, Symmetric};
+
+/// The state after a time step, given the state before it: `x' = mean + jacobian · (x - x̂) + noise`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Transition<T, const N: usize, const L: usize> {
+    /// Where the linearisation point x̂ goes.
+    pub mean: SVector<T, N>,
+    /// ∂x'/∂x at x̂.
+    pub jacobian: SMatrix<T, N, N>,
+    /// Covariance Q of the process noise.
+    pub noise: Symmetric<T, N, L>,
+}
+
+/// A scalar reading as a function of the state, at one state.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Observation<T, const N: usize> {
+    /// The reading expected.
+    pub value: T,
+    /// ∂(reading)/∂x.
+    pub gradient: SVector<T, N>,
+    /// Variance of the reading's own noise.
+    pub variance: T,
+}
+
+/// The switched Kelvin-Voigt law as a state-space model with state `x = [ε, v, (a), c₁ … c_B, (b)]`.
+///
+/// `M` motion states (2: strain and rate; 3: acceleration too), `B` branches, and a baseline if `N = M + B + 1`; with
+/// `N = M + B` there is none. Anything else does not compile. `L` in the methods is `N (N + 1) / 2`.
+///
+/// ```
+/// use ohmstrain_model::*;
+/// let law = SensorLaw {
+///     gauge: Gauge::Polynomial { coefficients: [1.9, -2.8, 0.0] },
+///     extend_viscosity_s: 0.02,
+///     retract_viscosity_s: -0.01,
+///     branches: [Branch {
+///         tau_s: 20.0, extend_gain: 0.6, retract_gain: -0.4, extend_gain_slope: 0.0, retract_gain_slope: 0.0,
+///     }],
+///     range: StrainRange { lower: 0.0, upper: 0.33 },
+/// };
+/// let motion = Motion::ornstein_uhlenbeck(1.0, 0.1, 0.15, 0.1)?;
+/// let noise = ModelNoise { reading_sd: 2e-3, branch_sd: 5e-3, baseline_sd: 0.02, baseline_time_s: 30.0 };
+/// let model = SwitchedModel::<f64, 2, 1, 4>::new(law, motion, noise)?;
+/// let step = model.prepare(0.01);
+/// let state = nalgebra::vector![0.1, 0.05, 0.02, 0.0];
+/// let next: Transition<f64, 4, 10> = model.transition(&step, &state, Direction::Known(Phase::Extend));
+/// assert!(next.mean[0] > 0.1);
+/// # Ok::<(), ParameterError>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SwitchedModel<T, const M: usize, const B: usize, const N: usize> {
+    law: SensorLaw<T, B>,
+    motion: Motion<T, M>,
+    noise: ModelNoise<T>,
+}
+
+/// What [`SwitchedModel::transition`] needs of the step's length: computed once where the step is fixed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SwitchedStep<T, const M: usize, const B: usize> {
+    response: Response<T, M, B>,
+    branch_variance: [T; B],
+    baseline_change: T,
+    baseline_variance: T,
+}
+
+impl<T: Scalar, const M: usize, const B: usize, const N: usize> SwitchedModel<T, M, B, N> {
+    const SIZES_FIT: () =
+        assert!((M == 2 || M == 3) && (N == M + B || N == M + B + 1), "N must be M + B or M + B + 1, M 2 or 3");
+
+    const HAS_BASELINE: bool = N == M + B + 1;
+
+    /// Joins law, motion and noise.
+    ///
+    /// # Errors
+    /// Names the parameter that no model can have.
+    pub fn new(law: SensorLaw<T, B>, motion: Motion<T, M>, noise: ModelNoise<T>) -> Result<Self, ParameterError> {
+        let () = Self::SIZES_FIT;
+        law.validate()?;
+        noise.validate()?;
+        if !Self::HAS_BASELINE && !noise.baseline_sd.is_zero() {
+            return Err(ParameterError::new("baseline_sd", Problem::OutOfRange));
+        }
+        Ok(Self { law, motion, noise })
+    }
+
+    /// The sensor's law.
+    #[must_use]
+    pub const fn law(&self) -> &SensorLaw<T, B> {
+        &self.law
+    }
+
+    /// The motion prior.
+    #[must_use]
+    pub const fn motion(&self) -> &Motion<T, M> {
+        &self.motion
+    }
+
+    /// What the law does not explain.
+    #[must_use]
+    pub const fn noise(&self) -> &ModelNoise<T> {
+        &self.noise
+    }
+
+    /// Mean and variances before any reading: motion in its long-run distribution (an infinite variance of strain is
+    /// replaced by the law's range), branches relaxed, baseline in its long-run distribution.
+    #[must_use]
+    pub fn initial_distribution(&self) -> (SVector<T, N>, [T; N]) {
+        let (mut mean, mut variance) = (SVector::zeros(), [T::zero(); N]);
+        mean[0] = self.motion.rest_strain();
+        variance[..M].copy_from_slice(self.motion.stationary_variance());
+        if !variance[0].is_finite() {
+            variance[0] = self.law.range.span() * self.law.range.span();
+        }
+        for spread in &mut variance[M..M + B] {
+            *spread = self.noise.branch_sd * self.noise.branch_sd;
+        }
+        if Self::HAS_BASELINE {
+            variance[N - 1] = self.noise.baseline_sd * self.noise.baseline_sd;
+        }
+        (mean, variance)
+    }
+
+    /// What a step of `dt_s ≥ 0` seconds does, whatever the state.
+    #[must_use]
+    pub fn prepare(&self, dt_s: T) -> SwitchedStep<T, M, B> {
+        let growth = |sd: T, time_s: T| -(T::of(-2.0) * dt_s / time_s).exp_m1() * sd * sd;
+        SwitchedStep {
+            response: Response::new(&self.motion, &self.law.branches, dt_s),
+            branch_variance: self.law.branches.map(|branch| growth(self.noise.branch_sd, branch.tau_s)),
+            baseline_change: (-dt_s / self.noise.baseline_time_s).exp_m1(),
+            baseline_variance: growth(self.noise.baseline_sd, self.noise.baseline_time_s),
+        }
+    }
+
+    /// The transition over a prepared step from `state`, linearised there.
+    ///
+    /// Given the phase and constant gains it is exact. Gains affine in strain are taken at mid-strain, and the
+    /// uncertainty of that strain goes into `jacobian` and `noise`.
+    #[must_use]
+    pub fn transition<const L: usize>(
+        &self,
+        step: &SwitchedStep<T, M, B>,
+        state: &SVector<T, N>,
+        direction: Direction<T>,
+    ) -> Transition<T, N, L> {
+        let mut out = Transition { mean: SVector::zeros(), jacobian: SMatrix::zeros(), noise: Symmetric::zeros() };
+        if direction == Direction::Known(Phase::Hold) {
+            out.mean[0] = state[0];
+            out.jacobian[(0, 0)] = T::one();
+            self.relax(step, state, &mut out);
+        } else {
+            self.move_body(step, state, direction, &mut out);
+            self.relax(step, state, &mut out);
+            self.drive_branches(step, state, direction, &mut out);
+        }
+        out
+    }
+
+    /// The reading ρ = R/R₀ - 1 expected at `state`.
+    #[must_use]
+    pub fn observe(&self, state: &SVector<T, N>, direction: Direction<T>) -> Observation<T, N> {
+        let (gauge, slope) = self.law.gauge_value_and_slope(state[0]);
+        let blend = direction.blend(state[1]);
+        let viscosity = blend.mix(self.law.extend_viscosity_s, self.law.retract_viscosity_s);
+        let viscosity_slope = blend.extend_weight_slope * (self.law.extend_viscosity_s - self.law.retract_viscosity_s);
+        let mut value = gauge + viscosity * state[1];
+        let mut gradient = SVector::zeros();
+        gradient[0] = slope;
+        gradient[1] = viscosity + viscosity_slope * state[1];
+        for i in M..N {
+            value += state[i];
+            gradient[i] = T::one();
+        }
+        Observation { value, gradient, variance: self.noise.reading_sd * self.noise.reading_sd }
+    }
+
+    /// Strain and its derivatives: linear, whatever the gains.
+    fn move_body<const L: usize>(
+        &self,
+        step: &SwitchedStep<T, M, B>,
+        state: &SVector<T, N>,
+        direction: Direction<T>,
+        out: &mut Transition<T, N, L>,
+    ) {
+        let push = self.push(direction);
+        for i in 0..M {
+            let mut change = step.response.input[i] * push;
+            for j in 0..M {
+                change += step.response.motion_change[i][j] * state[j];
+                out.jacobian[(i, j)] = step.response.motion_change[i][j];
+            }
+            out.mean[i] = state[i] + change;
+            out.jacobian[(i, i)] += T::one();
+            for j in 0..=i {
+                out.noise[(i, j)] = step.response.motion_noise[i][j];
+            }
+        }
+    }
+
+    /// The constant push on the highest derivative: toward the mean strain and the phase's mean rate.
+    fn push(&self, direction: Direction<T>) -> T {
+        let toward_strain = self.motion.restoring()[0] * self.motion.rest_strain();
+        let toward_rate = match direction {
+            Direction::Known(Phase::Extend) => self.motion.phase_rate(),
+            Direction::Known(Phase::Retract) => -self.motion.phase_rate(),
+            _ => T::zero(),
+        };
+        toward_strain + self.motion.restoring()[1] * toward_rate
+    }
+
+    /// Branches and baseline decay, and wander around their law.
+    fn relax<const L: usize>(
+        &self,
+        step: &SwitchedStep<T, M, B>,
+        state: &SVector<T, N>,
+        out: &mut Transition<T, N, L>,
+    ) {
+        for i in 0..B {
+            let (c, change) = (M + i, step.response.decay_change[i]);
+            out.mean[c] = state[c] + change * state[c];
+            out.jacobian[(c, c)] = T::one() + change;
+            out.noise[(c, c)] = step.branch_variance[i];
+        }
+        if Self::HAS_BASELINE {
+            let b = N - 1;
+            out.mean[b] = state[b] + step.baseline_change * state[b];
+            out.jacobian[(b, b)] = T::one() + step.baseline_change;
+            out.noise[(b, b)] = step.baseline_variance;
+        }
+    }
+
+    /// What the motion does to the branches: `γᵢ (driveᵢ · m + noise)` with the gain γᵢ at mid-strain and end rate.
+    ///
+    /// Noise of branch i is `γᵢ wᵢ + strain_pull · n_ε + rate_pull · n_v`, because the gain itself depends on where the
+    /// motion goes.
+    fn drive_branches<const L: usize>(
+        &self,
+        step: &SwitchedStep<T, M, B>,
+        state: &SVector<T, N>,
+        direction: Direction<T>,
+        out: &mut Transition<T, N, L>,
+    ) {
+        let response = &step.response;
+        let mid_strain = (state[0] + out.mean[0]) / T::of(2.0);
+        let blend = direction.blend(out.mean[1]);
+        let push = self.push(direction);
+        let (mut gain, mut strain_pull, mut rate_pull) = ([T::zero(); B], [T::zero(); B], [T::zero(); B]);
+        for i in 0..B {
+            let mut unit_drive = response.drive_input[i] * push;
+            for j in 0..M {
+                unit_drive += response.drive[i][j] * state[j];
+            }
+            let (extend, extend_slope) = self.law.gain(i, mid_strain, Phase::Extend);
+            let (retract, retract_slope) = self.law.gain(i, mid_strain, Phase::Retract);
+            gain[i] = blend.mix(extend, retract);
+            strain_pull[i] = blend.mix(extend_slope, retract_slope) * unit_drive / T::of(2.0);
+            rate_pull[i] = blend.extend_weight_slope * (extend - retract) * unit_drive;
+            let c = M + i;
+            out.mean[c] += gain[i] * unit_drive;
+            for j in 0..M {
+                out.jacobian[(c, j)] = gain[i] * response.drive[i][j]
+                    + strain_pull[i] * out.jacobian[(0, j)]
+                    + rate_pull[i] * out.jacobian[(1, j)];
+            }
+            out.jacobian[(c, 0)] += strain_pull[i];
+        }
+        for i in 0..B {
+            let cross = |j: usize| {
+                gain[i] * response.cross_noise[i][j]
+                    + strain_pull[i] * response.motion_noise[0][j]
+                    + rate_pull[i] * response.motion_noise[1][j]
+            };
+            for j in 0..M {
+                out.noise[(M + i, j)] += cross(j);
+            }
+            for k in 0..=i {
+                out.noise[(M + i, M + k)] += strain_pull[k] * cross(0)
+                    + rate_pull[k] * cross(1)
+                    + gain[k]
+                        * (gain[i] * response.branch_noise[i][k]
+                            + strain_pull[i] * response.cross_noise[k][0]
+                            + rate_pull[i] * response.cross_noise[k][1]);
+            }
+        }
+    }
+}

@@ -1,0 +1,168 @@
+//! Numbers that other programs made: see `made_by` in the fixtures.
+
+use nalgebra::{SMatrix, SVector, matrix, vector};
+use ohmstrain_ekf::{Belief, Channel, Dynamics, Ekf, Reading, Step, rts_smooth_vec};
+use ohmstrain_model::{
+    Branch, Direction, Gauge, ModelNoise, Motion, Observation, Phase, SensorLaw, StrainRange, SwitchedModel, Symmetric,
+    Transition,
+};
+use serde_json::Value;
+
+const DIRECTION: Direction<f64> = Direction::Known(Phase::Extend);
+
+fn json(text: &str) -> Value {
+    serde_json::from_str(text).unwrap()
+}
+
+fn numbers(value: &Value) -> Vec<f64> {
+    value.as_array().unwrap().iter().map(|x| x.as_f64().unwrap_or(f64::NAN)).collect()
+}
+
+/// The oracle's state is (strain, rate, q) with `q̇ = (ε - q)/τ`, `y = g ε + g₂ ε² + h q`. Ours is (strain, rate, c)
+/// with `c = -h (ε - q)`: gain k = -h, gauge slope g + h, branch noise h² times q's.
+fn viscoelastic(oracle: &Value, curvature: f64) -> (SwitchedModel<f64, 2, 1, 3>, SMatrix<f64, 3, 3>) {
+    let p = |name: &str| oracle["params"][name].as_f64().unwrap();
+    let (h, tau_s) = (p("h"), p("tau"));
+    let law = SensorLaw {
+        gauge: Gauge::Polynomial { coefficients: [p("g") + h, curvature, 0.0] },
+        extend_viscosity_s: 0.0,
+        retract_viscosity_s: 0.0,
+        branches: [Branch {
+            tau_s,
+            extend_gain: -h,
+            retract_gain: -h,
+            extend_gain_slope: 0.0,
+            retract_gain_slope: 0.0,
+        }],
+        range: StrainRange { lower: f64::NEG_INFINITY, upper: f64::INFINITY },
+    };
+    let noise = ModelNoise {
+        reading_sd: p("R").sqrt(),
+        branch_sd: (h * h * p("sq") * tau_s / 2.0).sqrt(),
+        baseline_sd: 0.0,
+        baseline_time_s: 1.0,
+    };
+    let motion = Motion::random_walk(p("sa"), 1.0).unwrap();
+    let to_ours = matrix![1.0, 0.0, 0.0; 0.0, 1.0, 0.0; -h, 0.0, h];
+    (SwitchedModel::new(law, motion, noise).unwrap(), to_ours)
+}
+
+/// Filters the record; the first reading is an update without a prediction. Returns steps and log-likelihood.
+fn filter(
+    linear: &Value,
+    record: &Value,
+    model: SwitchedModel<f64, 2, 1, 3>,
+    to_ours: SMatrix<f64, 3, 3>,
+) -> (Vec<Step<f64, 3, 6>>, f64) {
+    let ekf = Ekf::new(model, DIRECTION);
+    let start = SVector::<f64, 3>::from_column_slice(&numbers(&linear["m0"]));
+    let spread: [f64; 3] = numbers(&linear["P0diag"]).try_into().unwrap();
+    let mut belief = Belief {
+        mean: to_ours * start,
+        covariance: Symmetric::<f64, 3, 6>::from_diagonal(&spread).congruence(&to_ours),
+    };
+    let (times, readings) = (numbers(&record["t"]), numbers(&record["y"]));
+    let (mut steps, mut log_likelihood, mut before) = (Vec::new(), 0.0, times[0]);
+    for (t, y) in times.iter().zip(readings) {
+        let step = ekf.step(&belief, t - before, y.is_finite().then(|| Reading::from(y))).unwrap();
+        log_likelihood += step.update.map_or(0.0, |update| update.log_likelihood);
+        (belief, before) = (step.posterior, *t);
+        steps.push(step);
+    }
+    (steps, log_likelihood)
+}
+
+fn assert_state(got: &Belief<f64, 3, 6>, to_ours: &SMatrix<f64, 3, 3>, mean: &Value, covariance: Option<&Value>) {
+    let back = to_ours.try_inverse().unwrap();
+    let (state, expected) = (back * got.mean, numbers(mean));
+    for i in 0..3 {
+        assert!((state[i] - expected[i]).abs() < 1e-10, "state[{i}] {} vs {}", state[i], expected[i]);
+    }
+    let Some(covariance) = covariance else { return };
+    let ours = got.covariance.congruence(&back);
+    for (i, row) in covariance.as_array().unwrap().iter().enumerate() {
+        for (j, expected) in numbers(row).into_iter().enumerate() {
+            assert!((ours[(i, j)] - expected).abs() < 1e-11, "P[{i}][{j}] {} vs {expected}", ours[(i, j)]);
+        }
+    }
+}
+
+#[test]
+fn linear_sensor_with_irregular_steps_and_missing_samples() {
+    let oracle = json(include_str!("../fixtures/kv_linear.json"));
+    let (model, to_ours) = viscoelastic(&oracle, 0.0);
+    let (steps, log_likelihood) = filter(&oracle, &oracle, model, to_ours);
+    assert!((log_likelihood - oracle["loglik"].as_f64().unwrap()).abs() < 1e-9, "{log_likelihood}");
+    assert_state(&steps[59].posterior, &to_ours, &oracle["filtered_last"], Some(&oracle["filtered_cov_last"]));
+    assert_state(&steps[10].posterior, &to_ours, &oracle["filtered_10"], None);
+    let smoothed = rts_smooth_vec(&steps);
+    assert_state(&smoothed[0], &to_ours, &oracle["smoothed_0"], Some(&oracle["smoothed_cov_0"]));
+    assert_state(&smoothed[8], &to_ours, &oracle["smoothed_8_missing"], Some(&oracle["smoothed_cov_8"]));
+}
+
+#[test]
+fn transition_and_noise_of_the_linear_sensor() {
+    let oracle = json(include_str!("../fixtures/kv_linear.json"));
+    let (model, to_ours) = viscoelastic(&oracle, 0.0);
+    let back = to_ours.try_inverse().unwrap();
+    let transition = model.transition::<6>(&model.prepare(0.02), &vector![0.1, 0.2, 0.0], DIRECTION);
+    let f = back * transition.jacobian * to_ours;
+    let q = transition.noise.congruence(&back);
+    for i in 0..3 {
+        let (f_row, q_row) = (numbers(&oracle["F_dt0p02"][i]), numbers(&oracle["Q_dt0p02"][i]));
+        for j in 0..3 {
+            assert!((f[(i, j)] - f_row[j]).abs() < 1e-15, "F[{i}][{j}]");
+            // The branch noise is exact here and first order there for cross terms: equal to rounding.
+            assert!((q[(i, j)] - q_row[j]).abs() < 1e-15, "Q[{i}][{j}] {} vs {}", q[(i, j)], q_row[j]);
+        }
+    }
+}
+
+#[test]
+fn quadratic_gauge_with_the_extended_filter() {
+    let linear = json(include_str!("../fixtures/kv_linear.json"));
+    let oracle = json(include_str!("../fixtures/kv_nonlinear.json"));
+    let (model, to_ours) = viscoelastic(&linear, oracle["g2"].as_f64().unwrap());
+    let (steps, log_likelihood) = filter(&linear, &oracle, model, to_ours);
+    assert!((log_likelihood - oracle["ekf"]["loglik"].as_f64().unwrap()).abs() < 1e-9, "{log_likelihood}");
+    assert_state(&steps[59].posterior, &to_ours, &oracle["ekf"]["last"], Some(&oracle["ekf"]["cov_last"]));
+}
+
+/// rednose's kinematic example: position and velocity, Q = dt · diag(0.01, 4), the position measured.
+struct Kinematic;
+
+impl Dynamics<f64, 2, 3> for Kinematic {
+    type Prepared = f64;
+
+    fn prepare(&self, dt_s: f64) -> f64 {
+        dt_s
+    }
+
+    fn transition(&self, dt_s: &f64, state: &SVector<f64, 2>, _: Direction<f64>) -> Transition<f64, 2, 3> {
+        let jacobian = matrix![1.0, *dt_s; 0.0, 1.0];
+        Transition { mean: jacobian * state, jacobian, noise: Symmetric::from_diagonal(&[dt_s * 0.01, dt_s * 4.0]) }
+    }
+}
+
+impl Channel<f64, 2> for Kinematic {
+    fn observe(&self, state: &SVector<f64, 2>, _: Direction<f64>) -> Observation<f64, 2> {
+        Observation { value: state[0], gradient: vector![1.0, 0.0], variance: 0.01 }
+    }
+}
+
+#[test]
+fn five_hundred_kinematic_steps() {
+    let ekf = Ekf::new(Kinematic, DIRECTION);
+    let mut belief: Belief<f64, 2, 3> = Belief::independent(vector![0.5, 0.0], &[1.0, 1.0]);
+    let mut before = 0.0;
+    for row in include_str!("../fixtures/kinematic.csv").lines().skip(2) {
+        let cells: Vec<f64> = row.split(',').map(|cell| cell.parse().unwrap()).collect();
+        belief = ekf.step(&belief, cells[0] - before, Some(Reading::from(cells[1]))).unwrap().posterior;
+        before = cells[0];
+    }
+    let expected = [-0.010866289677966417, 0.04477103863330089, -0.8553720537261753, 0.6695762270974388];
+    let got = [belief.mean[0], belief.covariance[(0, 0)].sqrt(), belief.mean[1], belief.covariance[(1, 1)].sqrt()];
+    for (got, expected) in got.iter().zip(expected) {
+        assert!((got - expected).abs() <= 1e-14 * expected.abs(), "{got} vs {expected}");
+    }
+}
