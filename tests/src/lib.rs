@@ -1,8 +1,11 @@
 //! Models that several tests share. The oracles stand in the tests themselves.
 
 use nalgebra::{SMatrix, SVector};
-use ohmstrain_ekf::{Channel, Dynamics};
-use ohmstrain_model::{Direction, Observation, Scalar, Symmetric, Transition};
+use ohmstrain_ekf::{Belief, Channel, Dynamics};
+use ohmstrain_model::{
+    Branch, Gauge, ModelNoise, Motion, Observation, Phase, Scalar, SensorLaw, StrainRange, SwitchedModel, Symmetric,
+    Transition,
+};
 
 /// A linear model with fixed matrices, the same for every step: `x' = F x + n`, `y = H x + w`.
 #[derive(Clone, Copy, Debug)]
@@ -22,17 +25,48 @@ impl<T: Scalar, const N: usize, const L: usize> Dynamics<T, N, L> for Linear<T, 
 
     fn prepare(&self, _dt_s: T) {}
 
-    fn transition(&self, (): &(), state: &SVector<T, N>, _: Direction<T>) -> Transition<T, N, L> {
+    fn transition(&self, (): &(), from: &Belief<T, N, L>, _: Option<Phase>) -> Transition<T, N, L> {
         Transition {
-            mean: self.transition * state,
+            mean: self.transition * from.mean,
             jacobian: self.transition,
             noise: Symmetric::from_lower(&self.noise),
         }
     }
 }
 
-impl<T: Scalar, const N: usize> Channel<T, N> for Linear<T, N> {
-    fn observe(&self, state: &SVector<T, N>, _: Direction<T>) -> Observation<T, N> {
-        Observation { value: self.gradient.dot(state), gradient: self.gradient, variance: self.variance }
+impl<T: Scalar, const N: usize, const L: usize> Channel<T, N, L> for Linear<T, N> {
+    fn observe(&self, at: &Belief<T, N, L>, _: Option<Phase>) -> Observation<T, N> {
+        Observation { value: self.gradient.dot(&at.mean), gradient: self.gradient, variance: self.variance }
     }
+}
+
+/// A plausible sensor with `B` branches and Ornstein-Uhlenbeck motion; with a baseline if `N = B + 3`.
+///
+/// # Panics
+/// Never: the parameters are valid.
+#[must_use]
+pub fn sensor<const B: usize, const N: usize>() -> SwitchedModel<f64, 2, B, N> {
+    let branch = |i: usize| Branch {
+        tau_s: 4.0 * 8_f64.powi(i as i32),
+        extend_gain: 0.8,
+        retract_gain: -0.5,
+        extend_gain_slope: -0.6,
+        retract_gain_slope: -0.4,
+    };
+    let law = SensorLaw {
+        gauge: Gauge::Polynomial { coefficients: [1.6, -1.2, 0.5] },
+        extend_viscosity_s: 0.02,
+        retract_viscosity_s: -0.01,
+        branches: std::array::from_fn(branch),
+        range: StrainRange { lower: -0.02, upper: 0.35 },
+    };
+    let noise = ModelNoise {
+        reading_sd: 2e-3,
+        branch_sd: 5e-3,
+        baseline_sd: if N == B + 3 { 0.02 } else { 0.0 },
+        baseline_time_s: 30.0,
+    };
+    Motion::ornstein_uhlenbeck(1.5, 0.05, 0.15, 0.1)
+        .and_then(|motion| SwitchedModel::new(law, motion, noise))
+        .unwrap_or_else(|error| unreachable!("{error}"))
 }

@@ -54,7 +54,7 @@ fn filter(
     model: SwitchedModel<f64, 2, 1, 3>,
     to_ours: SMatrix<f64, 3, 3>,
 ) -> (Vec<Step<f64, 3, 6>>, f64) {
-    let ekf = Ekf::new(model, DIRECTION);
+    let ekf = Ekf::new(model);
     let start = SVector::<f64, 3>::from_column_slice(&numbers(&linear["m0"]));
     let spread: [f64; 3] = numbers(&linear["P0diag"]).try_into().unwrap();
     let mut belief = Belief {
@@ -138,21 +138,21 @@ impl Dynamics<f64, 2, 3> for Kinematic {
         dt_s
     }
 
-    fn transition(&self, dt_s: &f64, state: &SVector<f64, 2>, _: Direction<f64>) -> Transition<f64, 2, 3> {
+    fn transition(&self, dt_s: &f64, from: &Belief<f64, 2, 3>, _: Option<Phase>) -> Transition<f64, 2, 3> {
         let jacobian = matrix![1.0, *dt_s; 0.0, 1.0];
-        Transition { mean: jacobian * state, jacobian, noise: Symmetric::from_diagonal(&[dt_s * 0.01, dt_s * 4.0]) }
+        Transition { mean: jacobian * from.mean, jacobian, noise: Symmetric::from_diagonal(&[dt_s * 0.01, dt_s * 4.0]) }
     }
 }
 
-impl Channel<f64, 2> for Kinematic {
-    fn observe(&self, state: &SVector<f64, 2>, _: Direction<f64>) -> Observation<f64, 2> {
-        Observation { value: state[0], gradient: vector![1.0, 0.0], variance: 0.01 }
+impl Channel<f64, 2, 3> for Kinematic {
+    fn observe(&self, at: &Belief<f64, 2, 3>, _: Option<Phase>) -> Observation<f64, 2> {
+        Observation { value: at.mean[0], gradient: vector![1.0, 0.0], variance: 0.01 }
     }
 }
 
 #[test]
 fn five_hundred_kinematic_steps() {
-    let ekf = Ekf::new(Kinematic, DIRECTION);
+    let ekf = Ekf::new(Kinematic);
     let mut belief: Belief<f64, 2, 3> = Belief::independent(vector![0.5, 0.0], &[1.0, 1.0]);
     let mut before = 0.0;
     for row in include_str!("../fixtures/kinematic.csv").lines().skip(2) {

@@ -1,5 +1,5 @@
 use nalgebra::SVector;
-use ohmstrain_model::{Direction, Observation, Scalar, Symmetric, Transition};
+use ohmstrain_model::{Observation, Scalar, Symmetric, Transition};
 
 use crate::{Belief, Channel, Dynamics, Reading, StepError};
 
@@ -8,9 +8,8 @@ use crate::{Belief, Channel, Dynamics, Reading, StepError};
 /// The smallest estimator. It takes the direction of motion from its own prediction, so where stretching and releasing
 /// both raise the reading it can lock onto the wrong one.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Ekf<T, M> {
+pub struct Ekf<M> {
     model: M,
-    direction: Direction<T>,
 }
 
 /// Everything one step computed.
@@ -43,10 +42,10 @@ pub struct Update<T, const N: usize> {
     pub gain: SVector<T, N>,
 }
 
-impl<T: Scalar, M> Ekf<T, M> {
-    /// `direction`: how a step chooses between the law's gains. Models of one phase ignore it.
-    pub const fn new(model: M, direction: Direction<T>) -> Self {
-        Self { model, direction }
+impl<M> Ekf<M> {
+    /// A filter for `model`.
+    pub const fn new(model: M) -> Self {
+        Self { model }
     }
 
     /// The model.
@@ -58,14 +57,14 @@ impl<T: Scalar, M> Ekf<T, M> {
     ///
     /// # Errors
     /// See [`StepError`]; the belief passed in is untouched.
-    pub fn step<const N: usize, const L: usize>(
+    pub fn step<T: Scalar, const N: usize, const L: usize>(
         &self,
         belief: &Belief<T, N, L>,
         dt_s: T,
         reading: Option<Reading<T>>,
     ) -> Result<Step<T, N, L>, StepError>
     where
-        M: Dynamics<T, N, L> + Channel<T, N>,
+        M: Dynamics<T, N, L> + Channel<T, N, L>,
     {
         if !dt_s.is_finite() {
             return Err(StepError::NonFiniteTimeStep);
@@ -85,21 +84,21 @@ impl<T: Scalar, M> Ekf<T, M> {
     ///
     /// # Errors
     /// See [`StepError`]; the belief passed in is untouched.
-    pub fn step_prepared<const N: usize, const L: usize>(
+    pub fn step_prepared<T: Scalar, const N: usize, const L: usize>(
         &self,
         belief: &Belief<T, N, L>,
         prepared: &M::Prepared,
         reading: Option<Reading<T>>,
     ) -> Result<Step<T, N, L>, StepError>
     where
-        M: Dynamics<T, N, L> + Channel<T, N>,
+        M: Dynamics<T, N, L> + Channel<T, N, L>,
     {
         let (transition, prior) = self.predict(belief, prepared);
         self.finish(transition, prior, reading)
     }
 
     /// The belief a prepared step later, and how it got there.
-    fn predict<const N: usize, const L: usize>(
+    fn predict<T: Scalar, const N: usize, const L: usize>(
         &self,
         belief: &Belief<T, N, L>,
         prepared: &M::Prepared,
@@ -107,24 +106,24 @@ impl<T: Scalar, M> Ekf<T, M> {
     where
         M: Dynamics<T, N, L>,
     {
-        let transition = self.model.transition(prepared, &belief.mean, self.direction);
+        let transition = self.model.transition(prepared, belief, None);
         let covariance = self.model.propagate(&belief.covariance, &transition);
         (transition, Belief { mean: transition.mean, covariance })
     }
 
-    fn finish<const N: usize, const L: usize>(
+    fn finish<T: Scalar, const N: usize, const L: usize>(
         &self,
         transition: Transition<T, N, L>,
         prior: Belief<T, N, L>,
         reading: Option<Reading<T>>,
     ) -> Result<Step<T, N, L>, StepError>
     where
-        M: Channel<T, N>,
+        M: Channel<T, N, L>,
     {
         let (posterior, update) = match reading {
             None => (prior, None),
             Some(reading) => {
-                let observation = self.model.observe(&prior.mean, self.direction);
+                let observation = self.model.observe(&prior, None);
                 let (posterior, update) = update(&prior, observation, reading)?;
                 (posterior, Some(update))
             }

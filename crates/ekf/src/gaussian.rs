@@ -49,6 +49,14 @@ impl<T: Real> Gaussian<T> {
         upper_tail((x - self.mean) / self.variance.sqrt())
     }
 
+    /// The same Gaussian with its mean moved into a range.
+    ///
+    /// For reports: the moments of the restricted Gaussian are drawn off the limit, which at rest on a limit is a bias.
+    #[must_use]
+    pub fn clamped(&self, range: &StrainRange<T>) -> Self {
+        Self { mean: range.clamp(self.mean), variance: self.variance }
+    }
+
     /// The Gaussian restricted to a range.
     ///
     /// Where next to nothing of it lies inside, the limit is taken: an exponential that falls off from the near end.

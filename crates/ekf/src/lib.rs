@@ -27,7 +27,7 @@
 //! # let motion = Motion::ornstein_uhlenbeck(1.0, 0.1, 0.15, 0.1)?;
 //! # let noise = ModelNoise { reading_sd: 2e-3, branch_sd: 5e-3, baseline_sd: 0.02, baseline_time_s: 30.0 };
 //! let model = SwitchedModel::<f64, 2, 1, 4>::new(law, motion, noise)?;
-//! let ekf = Ekf::new(model, Direction::ByRate { rate_scale: 0.02 });
+//! let ekf = Ekf::new(model);
 //! let mut belief: Belief<f64, 4, 10> = Belief::initial(ekf.model());
 //! for rho in [0.01, 0.03, 0.06] {
 //!     let step = ekf.step(&belief, 0.05, Some(Reading::from(rho)))?;
@@ -48,6 +48,7 @@ mod belief;
 mod clock;
 mod ekf;
 mod error;
+mod estimate;
 mod gaussian;
 mod psd;
 mod smoother;
@@ -59,6 +60,7 @@ pub use belief::Belief;
 pub use clock::seconds_between;
 pub use ekf::{Ekf, Step, Update};
 pub use error::StepError;
+pub use estimate::Estimate;
 pub use gaussian::{Gaussian, Real, TruncatedGaussian};
 #[cfg(feature = "std")]
 pub use smoother::rts_smooth_vec;

@@ -1,16 +1,18 @@
-use nalgebra::SVector;
-use ohmstrain_model::{Direction, Observation, Scalar, SwitchedModel, SwitchedStep, Symmetric, Transition};
+use ohmstrain_model::{Direction, Observation, Phase, Scalar, SwitchedModel, SwitchedStep, Symmetric, Transition};
+
+use crate::Belief;
 
 /// How the state moves in time. `L = N (N + 1) / 2`.
 pub trait Dynamics<T: Scalar, const N: usize, const L: usize> {
     /// What depends on the length of a step only.
     type Prepared: Copy;
 
-    /// Prepares steps of `dt_s ≥ 0` seconds.
+    /// Prepares steps of `dt_s > 0` seconds.
     fn prepare(&self, dt_s: T) -> Self::Prepared;
 
-    /// The transition over a prepared step, linearised at `state`. Models of one phase ignore the direction.
-    fn transition(&self, step: &Self::Prepared, state: &SVector<T, N>, direction: Direction<T>) -> Transition<T, N, L>;
+    /// The transition over a prepared step, linearised at the belief's mean. `phase` is a hypothesis; with `None` the
+    /// model makes the best of the belief. Models of one phase ignore it.
+    fn transition(&self, step: &Self::Prepared, from: &Belief<T, N, L>, phase: Option<Phase>) -> Transition<T, N, L>;
 
     /// `F P Fᵀ + Q`. The default multiplies full matrices; a model that knows where its zeros are can do better.
     fn propagate(&self, covariance: &Symmetric<T, N, L>, transition: &Transition<T, N, L>) -> Symmetric<T, N, L> {
@@ -19,9 +21,10 @@ pub trait Dynamics<T: Scalar, const N: usize, const L: usize> {
 }
 
 /// How a scalar reading depends on the state.
-pub trait Channel<T: Scalar, const N: usize> {
-    /// The reading expected at `state`, its gradient and the variance of its noise.
-    fn observe(&self, state: &SVector<T, N>, direction: Direction<T>) -> Observation<T, N>;
+pub trait Channel<T: Scalar, const N: usize, const L: usize> {
+    /// The reading expected at the belief's mean, its gradient and the variance of its noise; `phase` as for
+    /// [`Dynamics::transition`].
+    fn observe(&self, at: &Belief<T, N, L>, phase: Option<Phase>) -> Observation<T, N>;
 }
 
 impl<T: Scalar, const M: usize, const B: usize, const N: usize, const L: usize> Dynamics<T, N, L>
@@ -33,14 +36,24 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize, const L: usize> 
         self.prepare(dt_s)
     }
 
-    fn transition(&self, step: &Self::Prepared, state: &SVector<T, N>, direction: Direction<T>) -> Transition<T, N, L> {
-        self.transition(step, state, direction)
+    fn transition(&self, step: &Self::Prepared, from: &Belief<T, N, L>, phase: Option<Phase>) -> Transition<T, N, L> {
+        let direction = match phase {
+            Some(phase) => Direction::Known(phase),
+            None => Direction::Uncertain { rate_sd: self.rate_variance(step, &from.covariance).sqrt() },
+        };
+        self.transition(step, &from.mean, direction)
     }
 }
 
-impl<T: Scalar, const M: usize, const B: usize, const N: usize> Channel<T, N> for SwitchedModel<T, M, B, N> {
-    fn observe(&self, state: &SVector<T, N>, direction: Direction<T>) -> Observation<T, N> {
-        self.observe(state, direction)
+impl<T: Scalar, const M: usize, const B: usize, const N: usize, const L: usize> Channel<T, N, L>
+    for SwitchedModel<T, M, B, N>
+{
+    fn observe(&self, at: &Belief<T, N, L>, phase: Option<Phase>) -> Observation<T, N> {
+        let direction = match phase {
+            Some(phase) => Direction::Known(phase),
+            None => Direction::Uncertain { rate_sd: at.covariance[(1, 1)].max(T::zero()).sqrt() },
+        };
+        self.observe(&at.mean, direction)
     }
 }
 

@@ -142,4 +142,16 @@ impl<T: Scalar, const B: usize> SensorLaw<T, B> {
             .zip(relaxation)
             .fold(gauge, |sum, (branch, c)| sum + *c * (-horizon_s / branch.tau_s).exp())
     }
+
+    /// The static border: the smallest strain of the range at which the gauge curve peaks, g′ = 0 from above. Beyond it
+    /// one reading belongs to two strains.
+    #[must_use]
+    pub fn static_border(&self) -> Option<T> {
+        let nudge = T::of(1e-3) * self.range.span();
+        self.gauge.static_borders().into_iter().flatten().find(|&border| {
+            let (_, before) = self.gauge.value_and_slope(border - nudge);
+            let (_, after) = self.gauge.value_and_slope(border + nudge);
+            self.range.contains(border) && before > T::zero() && after < T::zero()
+        })
+    }
 }

@@ -31,50 +31,75 @@ impl Phase {
 pub enum Direction<T> {
     /// The phase is given: a hypothesis, or known from elsewhere.
     Known(Phase),
-    /// The phase is read off the predicted rate, softly: the weight of the stretching gains is
-    /// `(1 + tanh(v/rate_scale)) / 2`. A rate well below the scale, jitter for instance, drives the branches with the
-    /// mean of both gains, which for gains of opposite sign is next to nothing: a dead band without corners.
-    ByRate {
-        /// The rate that counts as clearly moving, 1/s, positive.
-        rate_scale: T,
+    /// The phase is not known, only that the rate is Gaussian around its prediction. Each set of gains is driven by the
+    /// rate it is expected to see, `E[max(v, 0)]` or `E[min(v, 0)]`, and weighted in the Jacobian with the probability
+    /// of its direction: statistical linearisation of the switch, smooth where a sign would jump.
+    Uncertain {
+        /// Standard deviation of the rate, 1/s.
+        rate_sd: T,
     },
 }
 
+/// How a rate splits between stretching and releasing.
+#[derive(Clone, Copy)]
+pub(crate) struct SplitRate<T> {
+    /// Expected stretching rate, not negative.
+    pub extend: T,
+    /// Expected releasing rate, not positive.
+    pub retract: T,
+    /// Probability of stretching, the slope of `extend`.
+    pub extend_probability: T,
+    /// Probability of releasing, the slope of `retract`.
+    pub retract_probability: T,
+}
+
 impl<T: Scalar> Direction<T> {
-    /// The weight of the stretching gains at rate `v`, and its slope.
-    pub(crate) fn blend(self, rate: T) -> Blend<T> {
+    /// Splits a mean rate.
+    ///
+    /// The normal distribution is replaced by the logistic one, `Φ(r) ≈ 1/(1 + exp(-1.702 r))`, off by at most 0.0095
+    /// (Bowling et al., *J. Ind. Eng. Manag.* 2 (2009) 114): its integral has a closed form, and neither needs an error
+    /// function.
+    pub(crate) fn split(self, rate: T) -> SplitRate<T> {
+        let (zero, one) = (T::zero(), T::one());
         match self {
             Self::Known(Phase::Extend) => {
-                Blend { extend: T::one(), retract: T::zero(), extend_weight_slope: T::zero() }
+                SplitRate { extend: rate, retract: zero, extend_probability: one, retract_probability: zero }
             }
-            Self::Known(Phase::Hold) => Blend { extend: T::zero(), retract: T::zero(), extend_weight_slope: T::zero() },
             Self::Known(Phase::Retract) => {
-                Blend { extend: T::zero(), retract: T::one(), extend_weight_slope: T::zero() }
+                SplitRate { extend: zero, retract: rate, extend_probability: zero, retract_probability: one }
             }
-            Self::ByRate { rate_scale } => {
-                let lean = (rate / rate_scale).tanh();
-                let half = T::of(0.5);
-                Blend {
-                    extend: half * (T::one() + lean),
-                    retract: half * (T::one() - lean),
-                    extend_weight_slope: half * (T::one() - lean * lean) / rate_scale,
+            Self::Known(Phase::Hold) => {
+                SplitRate { extend: zero, retract: zero, extend_probability: zero, retract_probability: zero }
+            }
+            Self::Uncertain { rate_sd } => {
+                // Below this share of the rate the deviation makes no difference, and 0/0 is avoided.
+                let scale = (rate_sd.max(rate.abs() * T::of(0.01)) + T::of(1e-30)) / T::of(1.702);
+                let lean = rate / scale;
+                // ln(1 + exp(x)) = max(x, 0) + ln(1 + exp(-|x|)), which cannot overflow.
+                let tail = (-lean.abs()).exp();
+                let spread = scale * tail.ln_1p();
+                let larger = one / (one + tail);
+                let (extend_probability, retract_probability) =
+                    if rate < zero { (one - larger, larger) } else { (larger, one - larger) };
+                SplitRate {
+                    extend: rate.max(zero) + spread,
+                    retract: rate.min(zero) - spread,
+                    extend_probability,
+                    retract_probability,
                 }
             }
         }
     }
 }
 
-/// Weights of the two sets of gains.
-#[derive(Clone, Copy)]
-pub(crate) struct Blend<T> {
-    extend: T,
-    retract: T,
-    /// Derivative of `extend` with respect to the rate; `retract` has the opposite one.
-    pub(crate) extend_weight_slope: T,
-}
+impl<T: Scalar> SplitRate<T> {
+    /// Expected product of gain and rate.
+    pub(crate) fn drive(&self, extend_gain: T, retract_gain: T) -> T {
+        extend_gain * self.extend + retract_gain * self.retract
+    }
 
-impl<T: Scalar> Blend<T> {
-    pub(crate) fn mix(&self, extend: T, retract: T) -> T {
-        self.extend * extend + self.retract * retract
+    /// Its derivative with respect to the rate.
+    pub(crate) fn slope(&self, extend_gain: T, retract_gain: T) -> T {
+        extend_gain * self.extend_probability + retract_gain * self.retract_probability
     }
 }

@@ -139,7 +139,7 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize> SwitchedModel<T,
     /// The transition over a prepared step from `state`, linearised there.
     ///
     /// Given the phase and constant gains it is exact. Gains affine in strain are taken at mid-strain, and the
-    /// uncertainty of that strain goes into `jacobian` and `noise`.
+    /// uncertainty of that strain goes into `jacobian` and `noise`. `dt_s` of the step must be positive.
     #[must_use]
     pub fn transition<const L: usize>(
         &self,
@@ -164,13 +164,12 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize> SwitchedModel<T,
     #[must_use]
     pub fn observe(&self, state: &SVector<T, N>, direction: Direction<T>) -> Observation<T, N> {
         let (gauge, slope) = self.law.gauge_value_and_slope(state[0]);
-        let blend = direction.blend(state[1]);
-        let viscosity = blend.mix(self.law.extend_viscosity_s, self.law.retract_viscosity_s);
-        let viscosity_slope = blend.extend_weight_slope * (self.law.extend_viscosity_s - self.law.retract_viscosity_s);
-        let mut value = gauge + viscosity * state[1];
+        let rate = direction.split(state[1]);
+        let viscosities = (self.law.extend_viscosity_s, self.law.retract_viscosity_s);
+        let mut value = gauge + rate.drive(viscosities.0, viscosities.1);
         let mut gradient = SVector::zeros();
         gradient[0] = slope;
-        gradient[1] = viscosity + viscosity_slope * state[1];
+        gradient[1] = rate.slope(viscosities.0, viscosities.1);
         for i in M..N {
             value += state[i];
             gradient[i] = T::one();
@@ -233,10 +232,23 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize> SwitchedModel<T,
         }
     }
 
-    /// What the motion does to the branches: `γᵢ (driveᵢ · m + noise)` with the gain γᵢ at mid-strain and end rate.
+    /// Variance of the rate at the end of a step, from the covariance at its start.
+    #[must_use]
+    pub fn rate_variance<const L: usize>(&self, step: &SwitchedStep<T, M, B>, covariance: &Symmetric<T, N, L>) -> T {
+        let mut row = step.response.motion_change[1];
+        row[1] += T::one();
+        let mut variance = step.response.motion_noise[1][1];
+        for i in 0..M {
+            for j in 0..M {
+                variance += row[i] * row[j] * covariance[(i, j)];
+            }
+        }
+        variance.max(T::zero())
+    }
+
+    /// What the motion does to the branches: gain at mid-strain times mean rate over the step.
     ///
-    /// Noise of branch i is `γᵢ wᵢ + strain_pull · n_ε + rate_pull · n_v`, because the gain itself depends on where the
-    /// motion goes.
+    /// Noise of branch i is `γᵢ wᵢ + strain_pull · n_ε`: its gain depends on where the motion goes.
     fn drive_branches<const L: usize>(
         &self,
         step: &SwitchedStep<T, M, B>,
@@ -246,44 +258,35 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize> SwitchedModel<T,
     ) {
         let response = &step.response;
         let mid_strain = (state[0] + out.mean[0]) / T::of(2.0);
-        let blend = direction.blend(out.mean[1]);
         let push = self.push(direction);
-        let (mut gain, mut strain_pull, mut rate_pull) = ([T::zero(); B], [T::zero(); B], [T::zero(); B]);
+        let (mut gain, mut strain_pull) = ([T::zero(); B], [T::zero(); B]);
         for i in 0..B {
             let mut unit_drive = response.drive_input[i] * push;
             for j in 0..M {
                 unit_drive += response.drive[i][j] * state[j];
             }
+            // The rate that, held over the step, drives the branch as much as the motion does.
+            let reach_s = -response.decay_change[i] * self.law.branches[i].tau_s;
+            let rate = direction.split(unit_drive / reach_s);
             let (extend, extend_slope) = self.law.gain(i, mid_strain, Phase::Extend);
             let (retract, retract_slope) = self.law.gain(i, mid_strain, Phase::Retract);
-            gain[i] = blend.mix(extend, retract);
-            strain_pull[i] = blend.mix(extend_slope, retract_slope) * unit_drive / T::of(2.0);
-            rate_pull[i] = blend.extend_weight_slope * (extend - retract) * unit_drive;
+            gain[i] = rate.slope(extend, retract);
+            strain_pull[i] = reach_s * rate.drive(extend_slope, retract_slope) / T::of(2.0);
             let c = M + i;
-            out.mean[c] += gain[i] * unit_drive;
+            out.mean[c] += reach_s * rate.drive(extend, retract);
             for j in 0..M {
-                out.jacobian[(c, j)] = gain[i] * response.drive[i][j]
-                    + strain_pull[i] * out.jacobian[(0, j)]
-                    + rate_pull[i] * out.jacobian[(1, j)];
+                out.jacobian[(c, j)] = gain[i] * response.drive[i][j] + strain_pull[i] * out.jacobian[(0, j)];
             }
             out.jacobian[(c, 0)] += strain_pull[i];
         }
         for i in 0..B {
-            let cross = |j: usize| {
-                gain[i] * response.cross_noise[i][j]
-                    + strain_pull[i] * response.motion_noise[0][j]
-                    + rate_pull[i] * response.motion_noise[1][j]
-            };
+            let cross = |j: usize| gain[i] * response.cross_noise[i][j] + strain_pull[i] * response.motion_noise[0][j];
             for j in 0..M {
                 out.noise[(M + i, j)] += cross(j);
             }
             for k in 0..=i {
                 out.noise[(M + i, M + k)] += strain_pull[k] * cross(0)
-                    + rate_pull[k] * cross(1)
-                    + gain[k]
-                        * (gain[i] * response.branch_noise[i][k]
-                            + strain_pull[i] * response.cross_noise[k][0]
-                            + rate_pull[i] * response.cross_noise[k][1]);
+                    + gain[k] * (gain[i] * response.branch_noise[i][k] + strain_pull[i] * response.cross_noise[k][0]);
             }
         }
     }

@@ -92,7 +92,10 @@ fn check<T: Scalar, const M: usize, const N: usize>(
     }
 }
 
-fn fixture() -> Vec<(Vec<f64>, [f64; 2], f64, Vec<f64>)> {
+/// Restoring coefficients, time constants, step, reference numbers.
+type Case = (Vec<f64>, [f64; 2], f64, Vec<f64>);
+
+fn fixture() -> Vec<Case> {
     include_str!("fixtures/response.csv")
         .lines()
         .filter(|line| !line.starts_with('#'))

@@ -1,0 +1,97 @@
+use csv::StringRecord;
+
+use crate::error::{Fault, quote};
+
+/// The columns that mean something here.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Column {
+    TimeS,
+    TimeUs,
+    ResistanceOhm,
+    ResistanceRatio,
+    Adc,
+    Strain,
+    DisplacementMm,
+    AngleDeg,
+    TemperatureC,
+}
+
+impl Column {
+    const TIMES: [Self; 2] = [Self::TimeS, Self::TimeUs];
+    const READINGS: [Self; 3] = [Self::ResistanceOhm, Self::ResistanceRatio, Self::Adc];
+    const REFERENCES: [Self; 3] = [Self::Strain, Self::DisplacementMm, Self::AngleDeg];
+    const TEMPERATURES: [Self; 1] = [Self::TemperatureC];
+
+    pub(crate) const fn name(self) -> &'static str {
+        match self {
+            Self::TimeS => "time_s",
+            Self::TimeUs => "time_us",
+            Self::ResistanceOhm => "resistance_ohm",
+            Self::ResistanceRatio => "resistance_ratio",
+            Self::Adc => "adc",
+            Self::Strain => "strain",
+            Self::DisplacementMm => "displacement_mm",
+            Self::AngleDeg => "angle_deg",
+            Self::TemperatureC => "temperature_c",
+        }
+    }
+}
+
+/// A column and its place in a row.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Place {
+    pub column: Column,
+    index: usize,
+}
+
+impl Place {
+    pub(crate) fn cell<'a>(&self, record: &'a StringRecord) -> &'a str {
+        record.get(self.index).unwrap_or_default().trim()
+    }
+}
+
+/// Where a file keeps what.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Columns {
+    pub time: Place,
+    pub reading: Place,
+    pub reference: Option<Place>,
+    pub temperature: Option<Place>,
+    pub width: usize,
+}
+
+impl Columns {
+    pub(crate) fn of_header(header: &StringRecord) -> Result<Self, Fault> {
+        let at_most_one = |group: &[Column]| one_of(header, group);
+        let exactly_one = |group: &[Column]| {
+            let found = || quote(&header.iter().collect::<Vec<_>>().join(","));
+            one_of(header, group)?
+                .ok_or_else(|| Fault::new(format!("a header with the column {}", names(group, " or ")), found()))
+        };
+        Ok(Self {
+            time: exactly_one(&Column::TIMES)?,
+            reading: exactly_one(&Column::READINGS)?,
+            reference: at_most_one(&Column::REFERENCES)?,
+            temperature: at_most_one(&Column::TEMPERATURES)?,
+            width: header.len(),
+        })
+    }
+}
+
+/// The one column of a group, or none.
+fn one_of(header: &StringRecord, group: &[Column]) -> Result<Option<Place>, Fault> {
+    let mut seen: Option<Place> = None;
+    for (index, name) in header.iter().enumerate() {
+        let Some(column) = group.iter().copied().find(|column| column.name() == name.trim()) else { continue };
+        if let Some(first) = seen {
+            let found = format!("{} and {}", quote(first.column.name()), quote(column.name()));
+            return Err(Fault::in_column(column.name(), format!("one column {}", names(group, " or ")), found));
+        }
+        seen = Some(Place { column, index });
+    }
+    Ok(seen)
+}
+
+fn names(group: &[Column], between: &str) -> String {
+    group.iter().map(|column| format!("`{}`", column.name())).collect::<Vec<_>>().join(between)
+}

@@ -1,0 +1,134 @@
+use std::fmt;
+use std::io;
+
+/// Why a trace could not be read.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum TraceError {
+    /// The contents are not a trace.
+    #[error(transparent)]
+    Content(#[from] BadContent),
+    /// The source itself failed: the contents are not to blame.
+    #[error("{file}:{line}: cannot be read: {source}")]
+    Io {
+        /// Name of the source.
+        file: String,
+        /// The line that was being read, counted from 1.
+        line: u64,
+        /// What the operating system said.
+        source: io::Error,
+    },
+}
+
+/// Contents that are not a trace: where they stand, what was expected, what was found.
+///
+/// Displayed as one line, `file:line: column `x`: expected …, found …`.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub struct BadContent {
+    /// Name of the source; `stdin` for `-`.
+    pub file: String,
+    /// Physical line, counted from 1.
+    pub line: u64,
+    /// The column, where there is one to blame.
+    pub column: Option<String>,
+    /// What a trace has there.
+    pub expected: String,
+    /// What stands there, shortened, with control characters escaped.
+    pub found: String,
+}
+
+impl fmt::Display for BadContent {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(out, "{}:{}: ", self.file, self.line)?;
+        if let Some(column) = &self.column {
+            write!(out, "column `{column}`: ")?;
+        }
+        write!(out, "expected {}, found {}", self.expected, self.found)
+    }
+}
+
+/// A front end or a joint that cannot be understood; its place in a file is known elsewhere.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("expected {expected}, found {found}")]
+#[non_exhaustive]
+pub struct SpecError {
+    /// What is wanted.
+    pub expected: String,
+    /// What stands there, shortened, with control characters escaped.
+    pub found: String,
+}
+
+impl SpecError {
+    pub(crate) fn new(expected: impl Into<String>, found: impl Into<String>) -> Self {
+        Self { expected: expected.into(), found: found.into() }
+    }
+}
+
+/// What is wrong within a line, before file and line number are known.
+#[derive(Debug)]
+pub(crate) struct Fault {
+    pub column: Option<&'static str>,
+    pub expected: String,
+    pub found: String,
+}
+
+impl Fault {
+    pub(crate) fn new(expected: impl Into<String>, found: impl Into<String>) -> Self {
+        Self { column: None, expected: expected.into(), found: found.into() }
+    }
+
+    pub(crate) fn in_column(column: &'static str, expected: impl Into<String>, found: impl Into<String>) -> Self {
+        Self { column: Some(column), ..Self::new(expected, found) }
+    }
+
+    pub(crate) fn at(self, file: &str, line: u64) -> BadContent {
+        BadContent {
+            file: file.to_owned(),
+            line,
+            column: self.column.map(str::to_owned),
+            expected: self.expected,
+            found: self.found,
+        }
+    }
+}
+
+impl From<SpecError> for Fault {
+    fn from(error: SpecError) -> Self {
+        Self::new(error.expected, error.found)
+    }
+}
+
+const LONGEST_QUOTE: usize = 40;
+
+/// Foreign text as it may stand in a message: in backticks, one line, at most 40 characters.
+pub(crate) fn quote(text: &str) -> String {
+    let text = text.trim();
+    if text.is_empty() {
+        return "nothing".to_owned();
+    }
+    let mut out = String::from("`");
+    for (i, c) in text.chars().enumerate() {
+        if i == LONGEST_QUOTE {
+            out.push('…');
+            break;
+        }
+        // The replacement character and controls would garble a terminal; everything else is readable as it is.
+        if c.is_control() { out.extend(c.escape_default()) } else { out.push(c) }
+    }
+    out.push('`');
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::quote;
+
+    #[test]
+    fn foreign_text_is_short_and_on_one_line() {
+        assert_eq!(quote("abc"), "`abc`");
+        assert_eq!(quote("  "), "nothing");
+        assert_eq!(quote("a\u{1b}[2Jb\tc"), "`a\\u{1b}[2Jb\\tc`");
+        assert_eq!(quote(&"x".repeat(100)), format!("`{}…`", "x".repeat(40)));
+    }
+}

@@ -1,0 +1,158 @@
+use std::io::{self, BufRead, BufReader, Read};
+
+use crate::error::{Fault, quote};
+
+/// Longest line that is taken for text: a bound on memory, and far above what a trace needs.
+const LONGEST_LINE: u64 = 64 * 1024;
+
+/// Why no line could be delivered.
+pub(crate) enum LineFault {
+    Io(io::Error),
+    Content(Fault),
+}
+
+/// Physical lines of text, counted, each as soon as it is complete.
+pub(crate) struct Lines<R> {
+    source: BufReader<R>,
+    buffer: Vec<u8>,
+    /// Number of the line delivered last, counted from 1.
+    number: u64,
+}
+
+impl<R: Read> Lines<R> {
+    pub(crate) fn new(source: R) -> Self {
+        Self { source: BufReader::new(source), buffer: Vec::new(), number: 0 }
+    }
+
+    pub(crate) const fn number(&self) -> u64 {
+        self.number
+    }
+
+    /// The next line that is not blank, without its end; `None` at the end of the source.
+    pub(crate) fn next(&mut self) -> Result<Option<&str>, LineFault> {
+        loop {
+            self.buffer.clear();
+            let mut bounded = (&mut self.source).take(LONGEST_LINE);
+            if bounded.read_until(b'\n', &mut self.buffer).map_err(LineFault::Io)? == 0 {
+                return Ok(None);
+            }
+            self.number += 1;
+            check_bytes(&self.buffer, self.number).map_err(LineFault::Content)?;
+            if !content(&self.buffer, self.number).trim_ascii().is_empty() {
+                break;
+            }
+        }
+        let invalid = |_| LineFault::Content(Fault::new("UTF-8 text", "binary data (bytes that are not UTF-8)"));
+        std::str::from_utf8(content(&self.buffer, self.number)).map(Some).map_err(invalid)
+    }
+}
+
+/// Refuses what is not text at all.
+fn check_bytes(bytes: &[u8], number: u64) -> Result<(), Fault> {
+    const TEXT: &str = "UTF-8 text";
+    if number == 1 && (bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff])) {
+        return Err(Fault::new(TEXT, "UTF-16 text"));
+    }
+    if bytes.contains(&0) {
+        return Err(Fault::new(TEXT, "binary data (a NUL byte)"));
+    }
+    if bytes.len() as u64 == LONGEST_LINE && !bytes.ends_with(b"\n") {
+        return Err(Fault::new(format!("a line of at most {LONGEST_LINE} bytes"), "a longer one"));
+    }
+    Ok(())
+}
+
+/// The line without byte-order mark and end of line.
+fn content(bytes: &[u8], number: u64) -> &[u8] {
+    let bytes = bytes.strip_suffix(b"\n").unwrap_or(bytes);
+    let bytes = bytes.strip_suffix(b"\r").unwrap_or(bytes);
+    if number == 1 { bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes) } else { bytes }
+}
+
+/// Hands [`Lines`] to the csv crate, one line per call of `read`, so that a record is delivered when its line is
+/// complete and [`Lines::number`] is the number of that line.
+pub(crate) struct LineFeed<R> {
+    lines: Lines<R>,
+    pending: Vec<u8>,
+    taken: usize,
+    record_has_line: bool,
+    fault: Option<LineFault>,
+}
+
+impl<R: Read> LineFeed<R> {
+    /// `first` was already taken out of `lines` and is delivered again.
+    pub(crate) fn new(lines: Lines<R>, first: &str) -> Self {
+        Self { lines, pending: format!("{first}\n").into_bytes(), taken: 0, record_has_line: true, fault: None }
+    }
+
+    pub(crate) const fn line(&self) -> u64 {
+        self.lines.number()
+    }
+
+    /// Allows one more line to be taken. A record that asks for a second one has an open quotation mark, and would
+    /// swallow the rest of the source.
+    pub(crate) const fn begin_record(&mut self) {
+        self.record_has_line = false;
+    }
+
+    fn next_line(&mut self) -> Result<Option<()>, LineFault> {
+        if self.record_has_line {
+            let found = quote(&String::from_utf8_lossy(&self.pending));
+            return Err(LineFault::Content(Fault::new("quotation marks in pairs", found)));
+        }
+        let Some(line) = self.lines.next()? else { return Ok(None) };
+        self.record_has_line = true;
+        self.taken = 0;
+        self.pending.clear();
+        self.pending.extend_from_slice(line.as_bytes());
+        self.pending.push(b'\n');
+        Ok(Some(()))
+    }
+
+    /// What made `read` fail.
+    pub(crate) const fn take_fault(&mut self) -> Option<LineFault> {
+        self.fault.take()
+    }
+}
+
+impl<R: Read> Read for LineFeed<R> {
+    fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
+        if self.taken == self.pending.len() {
+            match self.next_line() {
+                Ok(None) => return Ok(0),
+                Ok(Some(())) => {}
+                Err(fault) => {
+                    self.fault = Some(fault);
+                    return Err(io::Error::other("not a line of a trace"));
+                }
+            }
+        }
+        let count = out.len().min(self.pending.len() - self.taken);
+        out[..count].copy_from_slice(&self.pending[self.taken..self.taken + count]);
+        self.taken += count;
+        Ok(count)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_are_counted_physically() {
+        let mut lines = Lines::new("\u{feff}a\r\n\r\n\nb".as_bytes());
+        let mut seen = Vec::new();
+        while let Ok(Some(line)) = lines.next() {
+            let line = line.to_owned();
+            seen.push((lines.number(), line));
+        }
+        assert_eq!(seen, [(1, "a".to_owned()), (4, "b".to_owned())]);
+    }
+
+    #[test]
+    fn a_line_without_end_does_not_fill_the_memory() {
+        let mut lines = Lines::new(io::repeat(b'x'));
+        assert!(matches!(lines.next(), Err(LineFault::Content(_))));
+        assert_eq!(lines.buffer.len() as u64, LONGEST_LINE);
+    }
+}

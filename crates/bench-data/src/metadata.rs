@@ -1,0 +1,91 @@
+use std::fmt;
+
+use crate::error::{Fault, quote};
+use crate::spec::{FrontEndSpec, JointSpec};
+
+/// What a trace says about itself, one `# key = value` line each, above the header.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Metadata {
+    /// `material`: what the sensor is made of.
+    pub material: Option<String>,
+    /// `gauge_length_mm`: length of the unstretched sensor, mm, positive.
+    pub gauge_length_mm: Option<f64>,
+    /// `front_end`: the electronics between sensor and number.
+    pub front_end: Option<FrontEndSpec>,
+    /// `joint`: the joint that the sensor spans.
+    pub joint: Option<JointSpec>,
+    /// Every other key and its value, in the file's order.
+    pub other: Vec<(String, String)>,
+}
+
+impl Metadata {
+    /// Takes what `overrides` knows, keeps the rest.
+    pub fn override_with(&mut self, overrides: &Self) {
+        fn take<T: Clone>(mine: &mut Option<T>, theirs: &Option<T>) {
+            if theirs.is_some() {
+                mine.clone_from(theirs);
+            }
+        }
+        take(&mut self.material, &overrides.material);
+        take(&mut self.gauge_length_mm, &overrides.gauge_length_mm);
+        take(&mut self.front_end, &overrides.front_end);
+        take(&mut self.joint, &overrides.joint);
+        for (key, value) in &overrides.other {
+            self.other.retain(|(mine, _)| mine != key);
+            self.other.push((key.clone(), value.clone()));
+        }
+    }
+
+    /// Takes a line that starts with `#`. One without `=` is a remark and is passed over.
+    pub(crate) fn take_line(&mut self, line: &str) -> Result<(), Fault> {
+        let Some((key, value)) = line.trim_start_matches('#').split_once('=') else { return Ok(()) };
+        let (key, value) = (key.trim(), value.trim());
+        match key {
+            "material" => once(&mut self.material, key, value.to_owned()),
+            "gauge_length_mm" => once(&mut self.gauge_length_mm, key, length_mm(value)?),
+            "front_end" => once(&mut self.front_end, key, value.parse()?),
+            "joint" => once(&mut self.joint, key, value.parse()?),
+            _ => {
+                self.other.push((key.to_owned(), value.to_owned()));
+                Ok(())
+            }
+        }
+    }
+}
+
+fn once<T>(place: &mut Option<T>, key: &str, value: T) -> Result<(), Fault> {
+    if place.replace(value).is_some() {
+        return Err(Fault::new(format!("`# {key} = …` once"), "it a second time"));
+    }
+    Ok(())
+}
+
+fn length_mm(text: &str) -> Result<f64, Fault> {
+    match text.parse::<f64>() {
+        Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
+        _ => Err(Fault::new("`gauge_length_mm` to be a positive number of millimetres", quote(text))),
+    }
+}
+
+/// The lines as they stand above a header, each with its end.
+impl fmt::Display for Metadata {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut line = |key: &str, value: &dyn fmt::Display| {
+            // A line break in a value would end the comment and become a row.
+            writeln!(out, "# {key} = {}", value.to_string().replace(char::is_control, " "))
+        };
+        if let Some(material) = &self.material {
+            line("material", material)?;
+        }
+        if let Some(length) = &self.gauge_length_mm {
+            line("gauge_length_mm", length)?;
+        }
+        if let Some(front_end) = &self.front_end {
+            line("front_end", front_end)?;
+        }
+        if let Some(joint) = &self.joint {
+            line("joint", joint)?;
+        }
+        self.other.iter().try_for_each(|(key, value)| line(key, value))
+    }
+}

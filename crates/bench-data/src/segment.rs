@@ -1,0 +1,229 @@
+use std::ops::Range;
+
+use ohmstrain_model::Phase;
+
+/// A stretch of rows in one phase.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Segment {
+    /// What the body does.
+    pub phase: Phase,
+    /// The rows, end excluded.
+    pub rows: Range<usize>,
+}
+
+/// A rate counts as moving above this share of the typical one, if the reference is quiet enough to tell …
+const QUIET_SHARE: f64 = 0.02;
+/// … and above at most this share otherwise.
+const NOISY_SHARE: f64 = 0.08;
+/// The noise of the rate must stay below the threshold by this factor.
+const NOISE_MARGIN: f64 = 3.0;
+/// A segment must last this share of the time that a full stretch takes at the typical rate.
+const SHORTEST_SHARE: f64 = 0.12;
+/// A movement must go this share of a full stretch.
+const SMALLEST_SHARE: f64 = 0.01;
+/// Widest window of the rate, rows to each side.
+const WIDEST: usize = 128;
+
+/// Cuts a reference into phases. The segments cover all rows, in order, and neighbours differ in phase.
+///
+/// The rate is the slope of a straight line through a window of rows, which is widened until the reference's own noise
+/// no longer reaches the threshold. The threshold is 2 to 8 % of the *typical* rate, the one at which half the way is
+/// travelled, so that long holds do not count; the noise decides where between. What is shorter than the window, or
+/// than 12 % of the time of a full stretch, is no phase of its own and goes to its neighbours; a movement of less than
+/// 1 % of a full stretch is a hold. Missing values (NaN) are bridged by straight lines.
+///
+/// ```
+/// use ohmstrain_bench_data::segment;
+/// use ohmstrain_model::Phase;
+/// let time_s: Vec<f64> = (0..300).map(|i| f64::from(i) * 0.1).collect();
+/// let strain: Vec<f64> = time_s.iter().map(|t| (t - 10.0).clamp(0.0, 10.0) * 0.03).collect();
+/// let phases: Vec<Phase> = segment(&time_s, &strain).iter().map(|segment| segment.phase).collect();
+/// assert_eq!(phases, [Phase::Hold, Phase::Extend, Phase::Hold]);
+/// ```
+#[must_use]
+pub fn segment(time_s: &[f64], strain: &[f64]) -> Vec<Segment> {
+    let rows = time_s.len().min(strain.len());
+    let (time_s, strain) = (&time_s[..rows], &bridge(&time_s[..rows], &strain[..rows]));
+    if rows == 0 {
+        return Vec::new();
+    }
+    let motion = Motion::estimate(time_s, strain);
+    let phase = |rate: &f64| match *rate {
+        rate if rate > motion.threshold => Phase::Extend,
+        rate if rate < -motion.threshold => Phase::Retract,
+        _ => Phase::Hold,
+    };
+    let mut segments = runs(motion.rate.iter().map(phase));
+    merge_short(&mut segments, time_s, motion.shortest_s);
+    still_small(&mut segments, strain);
+    merge_short(&mut segments, time_s, motion.shortest_s);
+    segments
+}
+
+/// How the body moves, as far as the noise lets it be seen.
+struct Motion {
+    rate: Vec<f64>,
+    threshold: f64,
+    shortest_s: f64,
+}
+
+impl Motion {
+    fn estimate(time_s: &[f64], strain: &[f64]) -> Self {
+        let noise = noise_sd(time_s, strain);
+        let step_s = median(time_s.windows(2).map(|pair| pair[1] - pair[0]).collect()).unwrap_or(1.0);
+        let mut half = 1;
+        loop {
+            let rate = slopes(time_s, strain, half);
+            let typical = typical_rate(time_s, &rate);
+            let threshold = (NOISE_MARGIN * slope_sd(noise, half, step_s)).max(QUIET_SHARE * typical);
+            if half >= WIDEST || threshold <= NOISY_SHARE * typical {
+                let window_s = 2.0 * half as f64 * step_s;
+                let shortest_s = window_s.max(SHORTEST_SHARE * span(strain) / typical);
+                // What never moves has a typical rate of zero; the share is then NaN, which `max` passes over.
+                return Self { rate, threshold, shortest_s };
+            }
+            half *= 2;
+        }
+    }
+}
+
+/// Values with gaps filled by straight lines; zeros if there is no value at all.
+fn bridge(time_s: &[f64], values: &[f64]) -> Vec<f64> {
+    let known: Vec<usize> = (0..values.len()).filter(|i| values[*i].is_finite()).collect();
+    let mut out = values.to_vec();
+    let (Some(first), Some(last)) = (known.first(), known.last()) else { return vec![0.0; values.len()] };
+    out[..*first].fill(values[*first]);
+    out[*last..].fill(values[*last]);
+    for pair in known.windows(2) {
+        let (a, b) = (pair[0], pair[1]);
+        for i in a + 1..b {
+            out[i] = values[a] + (values[b] - values[a]) * (time_s[i] - time_s[a]) / (time_s[b] - time_s[a]);
+        }
+    }
+    out
+}
+
+/// Standard deviation of the reference's noise, from how far each value lies off the line between its neighbours.
+///
+/// The median leaves corners and steps out, and is scaled to a normal distribution. A resolution coarser than the noise
+/// makes most of them zero: then the mean of what is left of the lower nine tenths is taken.
+fn noise_sd(time_s: &[f64], values: &[f64]) -> f64 {
+    let mut deviations: Vec<f64> = (1..values.len().saturating_sub(1))
+        .map(|i| {
+            let share = (time_s[i] - time_s[i - 1]) / (time_s[i + 1] - time_s[i - 1]);
+            let line = values[i - 1] + share * (values[i + 1] - values[i - 1]);
+            (values[i] - line).abs() / (1.0 + share * share + (1.0 - share) * (1.0 - share)).sqrt()
+        })
+        .collect();
+    deviations.sort_by(f64::total_cmp);
+    let kept = &deviations[..deviations.len() * 9 / 10];
+    if kept.is_empty() {
+        return 0.0;
+    }
+    let mean = kept.iter().sum::<f64>() / kept.len() as f64;
+    (deviations[deviations.len() / 2] / 0.6745).max(mean)
+}
+
+/// Standard deviation of the slope of a line through `2 half + 1` values: `σ √(12 / n(n²-1)) / Δt`.
+fn slope_sd(noise_sd: f64, half: usize, step_s: f64) -> f64 {
+    let n = (2 * half + 1) as f64;
+    noise_sd * (12.0 / (n * (n * n - 1.0))).sqrt() / step_s
+}
+
+/// Slope of the line through each row and `half` rows to both sides, fewer at the ends.
+fn slopes(time_s: &[f64], values: &[f64], half: usize) -> Vec<f64> {
+    (0..values.len())
+        .map(|i| {
+            let window = i.saturating_sub(half)..(i + half + 1).min(values.len());
+            let n = window.len() as f64;
+            let mean_time = window.clone().map(|j| time_s[j] - time_s[i]).sum::<f64>() / n;
+            let (mut product, mut square) = (0.0, 0.0);
+            for j in window {
+                let t = time_s[j] - time_s[i] - mean_time;
+                product += t * (values[j] - values[i]);
+                square += t * t;
+            }
+            if square > 0.0 { product / square } else { 0.0 }
+        })
+        .collect()
+}
+
+/// The rate at which half the way is travelled.
+fn typical_rate(time_s: &[f64], rate: &[f64]) -> f64 {
+    let mut ways: Vec<(f64, f64)> =
+        (1..rate.len()).map(|i| (rate[i].abs(), rate[i].abs() * (time_s[i] - time_s[i - 1]))).collect();
+    ways.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let half = ways.iter().map(|(_, way)| way).sum::<f64>() / 2.0;
+    let mut travelled = 0.0;
+    for (rate, way) in ways {
+        travelled += way;
+        if travelled >= half {
+            return rate;
+        }
+    }
+    0.0
+}
+
+fn runs(phases: impl Iterator<Item = Phase>) -> Vec<Segment> {
+    let mut out: Vec<Segment> = Vec::new();
+    for (row, phase) in phases.enumerate() {
+        match out.last_mut() {
+            Some(last) if last.phase == phase => last.rows.end = row + 1,
+            _ => out.push(Segment { phase, rows: row..row + 1 }),
+        }
+    }
+    out
+}
+
+/// Makes holds of movements that go nowhere, such as the sway of a body at rest, and joins them to holds beside them.
+fn still_small(segments: &mut Vec<Segment>, strain: &[f64]) {
+    let smallest = SMALLEST_SHARE * span(strain);
+    for segment in segments.iter_mut() {
+        if (strain[segment.rows.end - 1] - strain[segment.rows.start]).abs() < smallest {
+            segment.phase = Phase::Hold;
+        }
+    }
+    segments.dedup_by(|next, last| {
+        let same = next.phase == last.phase;
+        if same {
+            last.rows.end = next.rows.end;
+        }
+        same
+    });
+}
+
+/// Gives segments that are too short to their neighbours, the shortest first; between two phases it is split.
+fn merge_short(segments: &mut Vec<Segment>, time_s: &[f64], shortest_s: f64) {
+    let end_s = |row: usize| time_s[row.min(time_s.len() - 1)];
+    let duration = |segment: &Segment| end_s(segment.rows.end) - time_s[segment.rows.start];
+    while segments.len() > 1 {
+        let shortest = (0..segments.len()).min_by(|a, b| duration(&segments[*a]).total_cmp(&duration(&segments[*b])));
+        let Some(i) = shortest.filter(|i| duration(&segments[*i]) < shortest_s) else { break };
+        let gone = segments.remove(i);
+        let middle = match i {
+            0 => gone.rows.start,
+            i if i == segments.len() => gone.rows.end,
+            _ => usize::midpoint(gone.rows.start, gone.rows.end),
+        };
+        if i > 0 {
+            segments[i - 1].rows.end = middle;
+        }
+        if i < segments.len() {
+            segments[i].rows.start = middle;
+        }
+        if i > 0 && i < segments.len() && segments[i - 1].phase == segments[i].phase {
+            segments[i - 1].rows.end = segments[i].rows.end;
+            segments.remove(i);
+        }
+    }
+}
+
+fn span(values: &[f64]) -> f64 {
+    let (low, high) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
+    high - low
+}
+
+fn median(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied()
+}

@@ -1,0 +1,197 @@
+use ohmstrain_model::{AdcCode, FrontEnd, Phase};
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::SeedableRng;
+
+use super::matched::Matched;
+use super::mismatched::Mismatched;
+use super::noise::{Drift, conditioning, normal};
+use super::profile::Profile;
+use super::{GAUGE_LENGTH_MM, SettingsError, SimulationSettings};
+use crate::metadata::Metadata;
+use crate::spec::FrontEndSpec;
+use crate::trace::{ConverterReadings, Quantity, ReadingKind, Readings, Reference, Trace};
+
+/// Longest step of the integration, s, whatever the rate of the recording.
+const LONGEST_STEP_S: f64 = 0.01;
+
+/// A short movement at constant rate.
+pub(super) struct Movement {
+    pub from_strain: f64,
+    pub to_strain: f64,
+    /// Strain rate, 1/s.
+    pub rate: f64,
+    pub duration_s: f64,
+}
+
+impl Movement {
+    pub(super) fn phase(&self) -> Phase {
+        match self.rate {
+            rate if rate > 0.0 => Phase::Extend,
+            rate if rate < 0.0 => Phase::Retract,
+            _ => Phase::Hold,
+        }
+    }
+
+    pub(super) fn mid_strain(&self) -> f64 {
+        f64::midpoint(self.from_strain, self.to_strain)
+    }
+}
+
+/// What the bench stretches.
+pub(super) trait Sensor {
+    /// Goes through a movement.
+    fn advance(&mut self, movement: &Movement);
+
+    /// R/R₀ - 1 at the end of the movement it went through last.
+    fn relative_change(&self, movement: &Movement) -> f64;
+}
+
+/// Simulates a recording: resistance (codes, too, with a front end) and the exact strain, rounded to 1e-5.
+///
+/// # Errors
+/// Names the setting that no bench can have.
+pub fn simulate(settings: &SimulationSettings) -> Result<Trace, SettingsError> {
+    settings.validate()?;
+    let profile = Profile::new(settings, &mut random(settings.seed, Stream::Profile));
+    settings.check_rows(profile.duration_s())?;
+    let truth = if settings.mismatched {
+        run(&profile, settings.sample_rate_hz, &mut Mismatched::new(settings.material))
+    } else {
+        run(&profile, settings.sample_rate_hz, &mut Matched::new(settings.material))
+    };
+    let resistance_ohm = disturbed(settings, &profile, &truth);
+    Ok(Trace {
+        metadata: metadata(settings),
+        time_s: truth.iter().map(|sample| round(sample.time_s, 1e6)).collect(),
+        readings: readings(settings, resistance_ohm)?,
+        reference: Some(Reference {
+            quantity: Quantity::Strain,
+            values: truth.iter().map(|sample| round(sample.strain, 1e5)).collect(),
+        }),
+        temperature_c: None,
+    })
+}
+
+/// The sensor at one moment, undisturbed.
+struct Sample {
+    time_s: f64,
+    strain: f64,
+    relative_change: f64,
+    /// Way travelled so far, in units of strain.
+    travel: f64,
+}
+
+/// Leads the sensor through the profile, sampling at a fixed rate from time zero to the end.
+fn run(profile: &Profile, rate_hz: f64, sensor: &mut impl Sensor) -> Vec<Sample> {
+    let at_rest = Sample { time_s: 0.0, strain: 0.0, relative_change: 0.0, travel: 0.0 };
+    let mut samples = vec![at_rest];
+    let (mut now_s, mut travel) = (0.0, 0.0);
+    for [(start_s, start), (end_s, end)] in profile.segments() {
+        let rate = (end - start) / (end_s - start_s);
+        let strain_at = |time_s: f64| start + rate * (time_s - start_s);
+        while now_s < end_s {
+            let next_sample_s = samples.len() as f64 / rate_hz;
+            let then_s = end_s.min(next_sample_s).min(now_s + LONGEST_STEP_S);
+            let movement = Movement {
+                from_strain: strain_at(now_s),
+                to_strain: if then_s < end_s { strain_at(then_s) } else { end },
+                rate,
+                duration_s: then_s - now_s,
+            };
+            sensor.advance(&movement);
+            travel += rate.abs() * movement.duration_s;
+            now_s = then_s;
+            if now_s >= next_sample_s {
+                let relative_change = sensor.relative_change(&movement);
+                samples.push(Sample { time_s: now_s, strain: movement.to_strain, relative_change, travel });
+            }
+        }
+    }
+    samples
+}
+
+/// Resistance with conditioning, drift and white noise, Ω.
+fn disturbed(settings: &SimulationSettings, profile: &Profile, truth: &[Sample]) -> Vec<f64> {
+    let disturbances = &settings.disturbances;
+    let rest_ohm = settings.material.rest_resistance_ohm();
+    let mut white = random(settings.seed, Stream::White);
+    let mut drifting = random(settings.seed, Stream::Drift);
+    let mut drift = Drift::new(disturbances.drift_density, &mut drifting);
+    let cycle = 2.0 * profile.peak_strain();
+    let resistance = |sample: &Sample| {
+        let conditioned = if disturbances.conditioning { conditioning(sample.travel / cycle) } else { 0.0 };
+        let drifted = drift.advance(1.0 / settings.sample_rate_hz, &mut drifting);
+        let noise = disturbances.white_sd * normal(&mut white);
+        let relative = (1.0 + sample.relative_change) * (1.0 + conditioned) * (1.0 + drifted) + noise;
+        // Noise large enough to make a resistance negative is legal to ask for, a negative resistance is not.
+        rest_ohm * relative.max(1e-3)
+    };
+    truth.iter().map(resistance).collect()
+}
+
+/// What is recorded of the resistance: itself, to 1 mΩ, or what a front end makes of it.
+fn readings(settings: &SimulationSettings, resistance_ohm: Vec<f64>) -> Result<Readings, SettingsError> {
+    let Some(spec) = &settings.front_end else {
+        let values = resistance_ohm.iter().map(|ohm| round(*ohm, 1e3)).collect();
+        return Ok(Readings { kind: ReadingKind::Ohm, values, converter: None });
+    };
+    let front_end = spec.build().map_err(|error| SettingsError::FrontEnd(error.to_string()))?;
+    let mut noise = random(settings.seed, Stream::Converter);
+    let mut values = Vec::with_capacity(resistance_ohm.len());
+    let mut converter = ConverterReadings::default();
+    for ohm in resistance_ohm {
+        let code = convert(spec, &front_end, ohm, normal(&mut noise));
+        let (value, sd_ohm) = match front_end.read(code) {
+            AdcCode::Reading(reading) => (reading.resistance_ohm, reading.sd_ohm),
+            AdcCode::Saturated => (f64::NAN, f64::NAN),
+        };
+        values.push(value);
+        converter.codes.push(Some(code));
+        converter.sd_ohm.push(sd_ohm);
+        converter.saturated.push(value.is_nan());
+    }
+    Ok(Readings { kind: ReadingKind::Ohm, values, converter: Some(converter) })
+}
+
+fn convert(spec: &FrontEndSpec, front_end: &FrontEnd<f64>, ohm: f64, noise: f64) -> u32 {
+    let largest = f64::from((1_u32 << spec.bits()) - 1);
+    let code = front_end.code(ohm) + spec.noise_codes() * noise;
+    code.round().clamp(0.0, largest) as u32
+}
+
+fn metadata(settings: &SimulationSettings) -> Metadata {
+    let other = [
+        ("source", if settings.mismatched { "simulated-mismatched" } else { "simulated" }.to_owned()),
+        ("protocol", settings.protocol.to_string()),
+        ("elongation_mm", settings.elongation_mm.to_string()),
+        ("speed_mm_s", settings.speed_mm_s.to_string()),
+        ("seed", settings.seed.to_string()),
+    ];
+    Metadata {
+        material: Some(settings.material.to_string()),
+        gauge_length_mm: Some(GAUGE_LENGTH_MM),
+        front_end: settings.front_end,
+        joint: None,
+        other: other.map(|(key, value)| (key.to_owned(), value)).into(),
+    }
+}
+
+/// Independent random numbers for each use, so that switching one off leaves the others as they are.
+#[derive(Clone, Copy)]
+enum Stream {
+    Profile = 1,
+    White,
+    Drift,
+    Converter,
+}
+
+fn random(seed: u64, stream: Stream) -> ChaCha8Rng {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    random.set_stream(stream as u64);
+    random
+}
+
+/// Rounds to a decimal resolution, `per_unit` of it to one, so that files hold short numbers.
+fn round(value: f64, per_unit: f64) -> f64 {
+    (value * per_unit).round() / per_unit
+}

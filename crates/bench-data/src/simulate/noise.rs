@@ -1,0 +1,113 @@
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+use super::settings::{SettingsError, within};
+
+/// What disturbs the reading besides the sensor's own behaviour.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Disturbances {
+    /// Standard deviation of the white noise, share of R₀; usually 2e-4.
+    pub white_sd: f64,
+    /// Power spectral density of the 1/f drift of R at 1 Hz, 1/Hz, relative to R; usually 1e-8.
+    pub drift_density: f64,
+    /// Whether the first cycles lower the resistance for good: by 1.9, 1.5, 1.0 and 0.3 %.
+    pub conditioning: bool,
+}
+
+impl Disturbances {
+    /// As measured on a bench.
+    pub const BENCH: Self = Self { white_sd: 2e-4, drift_density: 1e-8, conditioning: true };
+    /// Nothing at all.
+    pub const NONE: Self = Self { white_sd: 0.0, drift_density: 0.0, conditioning: false };
+
+    pub(super) fn validate(&self) -> Result<(), SettingsError> {
+        within("white_sd", self.white_sd, 0.0, 1.0)?;
+        within("drift_density", self.drift_density, 0.0, 1.0)
+    }
+}
+
+/// Processes per decade of frequency: two keep the sum within 3 % of 1/f.
+const PER_DECADE: i32 = 2;
+/// Time constants, s, as powers of ten: 0.01 s to 10 000 s.
+const DECADES: std::ops::RangeInclusive<i32> = -2..=4;
+
+/// Drift with a spectrum of 1/f: a sum of Ornstein-Uhlenbeck processes with log-spaced time constants.
+///
+/// Each has the power that 1/f has in its share of a decade, so that no long record needs to be filtered at once.
+pub(super) struct Drift {
+    processes: Vec<Process>,
+}
+
+struct Process {
+    tau_s: f64,
+    sd: f64,
+    state: f64,
+}
+
+impl Drift {
+    pub(super) fn new(density: f64, random: &mut ChaCha8Rng) -> Self {
+        let sd = (density * std::f64::consts::LN_10 / f64::from(PER_DECADE)).sqrt();
+        let processes = (DECADES.start() * PER_DECADE..=DECADES.end() * PER_DECADE)
+            .map(|i| {
+                let tau_s = 10_f64.powf(f64::from(i) / f64::from(PER_DECADE));
+                Process { tau_s, sd, state: sd * normal(random) }
+            })
+            .collect();
+        Self { processes }
+    }
+
+    /// The drift `step_s` later.
+    pub(super) fn advance(&mut self, step_s: f64, random: &mut ChaCha8Rng) -> f64 {
+        for process in &mut self.processes {
+            let kept = (-step_s / process.tau_s).exp();
+            let fresh = process.sd * (-(-2.0 * step_s / process.tau_s).exp_m1()).sqrt();
+            process.state = kept * process.state + fresh * normal(random);
+        }
+        self.processes.iter().map(|process| process.state).sum()
+    }
+}
+
+pub(super) fn normal(random: &mut ChaCha8Rng) -> f64 {
+    StandardNormal.sample(random)
+}
+
+/// What cycles have changed for good, relative to R, after each of them.
+const CONDITIONED: [f64; 5] = [0.0, -0.019, -0.034, -0.044, -0.047];
+
+/// The change after a number of full cycles, between which it goes in straight lines.
+pub(super) fn conditioning(cycles: f64) -> f64 {
+    let last = CONDITIONED.len() - 1;
+    let done = (cycles.floor() as usize).min(last);
+    let next = (done + 1).min(last);
+    CONDITIONED[done] + (cycles - cycles.floor()) * (CONDITIONED[next] - CONDITIONED[done])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand_chacha::rand_core::SeedableRng;
+
+    #[test]
+    fn conditioning_follows_the_cycles() {
+        assert_eq!(conditioning(0.0), 0.0);
+        assert!((conditioning(0.5) + 0.0095).abs() < 1e-12);
+        assert!((conditioning(3.0) + 0.044).abs() < 1e-12);
+        assert_eq!(conditioning(100.0), -0.047);
+    }
+
+    /// The variance of differences of averages over a second is `2 ln 2 · density` for 1/f noise (Allan variance
+    /// `2 ln 2 · h` is half the mean square difference), at any averaging time.
+    #[test]
+    fn drift_has_the_density_asked_for() {
+        let mut random = ChaCha8Rng::seed_from_u64(3);
+        let mut drift = Drift::new(1e-8, &mut random);
+        let (averages, per_average) = (4000, 50);
+        let means: Vec<f64> = (0..averages)
+            .map(|_| (0..per_average).map(|_| drift.advance(0.02, &mut random)).sum::<f64>() / f64::from(per_average))
+            .collect();
+        let allan = means.windows(2).map(|pair| (pair[1] - pair[0]).powi(2)).sum::<f64>() / (2.0 * means.len() as f64);
+        // 4000 squares of correlated differences scatter by some 3 %; two processes per decade add a ripple of 3 %.
+        let ratio = allan / (2.0 * std::f64::consts::LN_2 * 1e-8);
+        assert!((ratio - 1.0).abs() < 0.12, "{ratio}");
+    }
+}

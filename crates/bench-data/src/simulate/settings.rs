@@ -1,0 +1,118 @@
+use super::{Disturbances, GAUGE_LENGTH_MM, Material, Protocol};
+use crate::spec::FrontEndSpec;
+
+/// Longest simulated recording, rows: a slip of a digit must not fill the memory.
+const MOST_ROWS: f64 = 1e7;
+
+/// What to simulate.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SimulationSettings {
+    /// What the sensor is made of.
+    pub material: Material,
+    /// What the bench does with it.
+    pub protocol: Protocol,
+    /// Full stretch, mm on 30 mm, above 0 and at most 15; default 10.
+    pub elongation_mm: f64,
+    /// Speed of the machine, mm/s, 0.01 to 100; default 1. In [`Protocol::Mixed`] the fastest.
+    pub speed_mm_s: f64,
+    /// Readings per second, 0.1 to 10 000; default 20.
+    pub sample_rate_hz: f64,
+    /// Whether the sensor follows a law outside of the family that is fitted; default no.
+    pub mismatched: bool,
+    /// What disturbs the reading; default all of it.
+    pub disturbances: Disturbances,
+    /// The electronics that turn the resistance into codes; default none: the resistance itself is recorded.
+    pub front_end: Option<FrontEndSpec>,
+    /// Equal seeds give equal recordings; default 1.
+    pub seed: u64,
+}
+
+impl SimulationSettings {
+    /// Defaults for a material and a protocol.
+    #[must_use]
+    pub const fn new(material: Material, protocol: Protocol) -> Self {
+        Self {
+            material,
+            protocol,
+            elongation_mm: 10.0,
+            speed_mm_s: 1.0,
+            sample_rate_hz: 20.0,
+            mismatched: false,
+            disturbances: Disturbances::BENCH,
+            front_end: None,
+            seed: 1,
+        }
+    }
+
+    /// Checks every setting.
+    ///
+    /// # Errors
+    /// Names the setting, its range and what was found.
+    pub fn validate(&self) -> Result<(), SettingsError> {
+        within("elongation_mm", self.elongation_mm, 1e-3, 15.0)?;
+        within("speed_mm_s", self.speed_mm_s, 0.01, 100.0)?;
+        within("sample_rate_hz", self.sample_rate_hz, 0.1, 1e4)?;
+        self.disturbances.validate()?;
+        if let Some(front_end) = &self.front_end {
+            front_end.build().map_err(|error| SettingsError::FrontEnd(error.to_string()))?;
+        }
+        match self.protocol {
+            Protocol::ExtendRetract { cycles, rest_s } => {
+                within("cycles", f64::from(cycles), 1.0, 1e4)?;
+                within("rest_s", rest_s, 0.0, 1e6)
+            }
+            Protocol::ExtendHold { cycles, hold_s, rest_s } => {
+                within("cycles", f64::from(cycles), 1.0, 1e4)?;
+                within("hold_s", hold_s, 0.0, 1e6)?;
+                within("rest_s", rest_s, 0.0, 1e6)
+            }
+            Protocol::LoadSteps { step_g, hold_s } => {
+                within("step_g", step_g, 0.1, Protocol::HEAVIEST_LOAD_G)?;
+                within("hold_s", hold_s, 0.0, 1e6)
+            }
+            Protocol::Mixed { duration_s } => within("duration_s", duration_s, 1.0, 1e6),
+        }
+    }
+
+    /// Refuses recordings that no memory holds.
+    pub(super) fn check_rows(&self, duration_s: f64) -> Result<(), SettingsError> {
+        within("number of rows", duration_s * self.sample_rate_hz, 0.0, MOST_ROWS)
+    }
+
+    pub(super) fn full_strain(&self) -> f64 {
+        self.elongation_mm / GAUGE_LENGTH_MM
+    }
+
+    pub(super) fn strain_rate(&self) -> f64 {
+        self.speed_mm_s / GAUGE_LENGTH_MM
+    }
+}
+
+/// Settings that no bench can have.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum SettingsError {
+    /// A number outside of its range.
+    #[error("{setting}: expected {lowest} to {highest}, found {found}")]
+    OutOfRange {
+        /// The setting.
+        setting: &'static str,
+        /// Its smallest value.
+        lowest: f64,
+        /// Its largest value.
+        highest: f64,
+        /// What it was.
+        found: f64,
+    },
+    /// A front end that cannot be.
+    #[error("front_end: {0}")]
+    FrontEnd(String),
+}
+
+pub(super) fn within(setting: &'static str, found: f64, lowest: f64, highest: f64) -> Result<(), SettingsError> {
+    if found >= lowest && found <= highest {
+        Ok(())
+    } else {
+        Err(SettingsError::OutOfRange { setting, lowest, highest, found })
+    }
+}

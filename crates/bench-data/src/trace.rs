@@ -1,0 +1,177 @@
+use std::io::Read;
+use std::ops::Range;
+
+use crate::error::{Fault, TraceError};
+use crate::metadata::Metadata;
+use crate::reader::{Row, TraceReader};
+
+/// What the readings of a trace are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum ReadingKind {
+    /// Resistance, Ω.
+    Ohm,
+    /// Resistance over resistance at rest, R/R₀.
+    Ratio,
+}
+
+/// What the reference of a trace is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Quantity {
+    /// Engineering strain.
+    Strain,
+    /// Angle of a joint of unknown geometry, degrees.
+    AngleDeg,
+}
+
+/// The sensor's readings, one per row.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Readings {
+    /// What they are.
+    pub kind: ReadingKind,
+    /// The values; NaN is a missing one.
+    pub values: Vec<f64>,
+    /// What is known besides if they came from a converter.
+    pub converter: Option<ConverterReadings>,
+}
+
+/// What a converter's codes tell beyond the resistance, one entry per row.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ConverterReadings {
+    /// The codes; `None` is a missing one.
+    pub codes: Vec<Option<u32>>,
+    /// Standard deviation of the reading, Ω; NaN where the reading is missing.
+    pub sd_ohm: Vec<f64>,
+    /// Whether the code stood at an end of the scale; the reading is then missing.
+    pub saturated: Vec<bool>,
+}
+
+/// What the sensor is to be judged by, one value per row.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Reference {
+    /// What the values are.
+    pub quantity: Quantity,
+    /// The values; NaN is a missing one.
+    pub values: Vec<f64>,
+}
+
+/// A recording: readings over time, perhaps with a reference. All vectors have the same length.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Trace {
+    /// What the recording says about itself.
+    pub metadata: Metadata,
+    /// Times on the recording's own clock, s, strictly increasing.
+    pub time_s: Vec<f64>,
+    /// The sensor.
+    pub readings: Readings,
+    /// The truth, if it was recorded.
+    pub reference: Option<Reference>,
+    /// Temperatures, °C, if they were recorded; NaN is a missing one.
+    pub temperature_c: Option<Vec<f64>>,
+}
+
+impl Trace {
+    /// Reads a whole recording. `name` is what messages call the source.
+    ///
+    /// # Errors
+    /// [`TraceError`] if the source fails, or is not a trace with at least one row.
+    pub fn read(source: impl Read, name: &str) -> Result<Self, TraceError> {
+        Self::collect(TraceReader::new(source, name)?)
+    }
+
+    /// Reads what is left in `rows`.
+    ///
+    /// # Errors
+    /// The first error of `rows`, or [`TraceError::Content`] if there is no row.
+    pub fn collect<R: Read>(mut rows: TraceReader<R>) -> Result<Self, TraceError> {
+        let mut trace = Self::empty(&rows);
+        for row in rows.by_ref() {
+            trace.push(&row?);
+        }
+        if trace.is_empty() {
+            let fault = Fault::new("at least one row of data", "the end of the file");
+            return Err(fault.at(rows.file(), rows.line() + 1).into());
+        }
+        Ok(trace)
+    }
+
+    fn empty<R: Read>(rows: &TraceReader<R>) -> Self {
+        Self {
+            metadata: rows.metadata().clone(),
+            time_s: Vec::new(),
+            readings: Readings {
+                kind: rows.reading_kind(),
+                values: Vec::new(),
+                converter: rows.has_codes().then(ConverterReadings::default),
+            },
+            reference: rows.reference_quantity().map(|quantity| Reference { quantity, values: Vec::new() }),
+            temperature_c: rows.has_temperature().then(Vec::new),
+        }
+    }
+
+    fn push(&mut self, row: &Row) {
+        self.time_s.push(row.time_s);
+        self.readings.values.push(row.reading.value);
+        if let Some(converter) = &mut self.readings.converter {
+            converter.codes.push(row.reading.code);
+            converter.sd_ohm.push(row.reading.sd_ohm.unwrap_or(f64::NAN));
+            converter.saturated.push(row.reading.saturated);
+        }
+        if let Some(reference) = &mut self.reference {
+            reference.values.push(row.reference);
+        }
+        if let Some(temperature) = &mut self.temperature_c {
+            temperature.push(row.temperature_c);
+        }
+    }
+
+    /// Number of rows.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.time_s.len()
+    }
+
+    /// Whether there is no row.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.time_s.is_empty()
+    }
+
+    /// The rows with `time_s < end_s`.
+    #[must_use]
+    pub fn until(&self, end_s: f64) -> Self {
+        self.rows(0..self.time_s.partition_point(|time| *time < end_s))
+    }
+
+    /// The rows with `time_s >= start_s`.
+    #[must_use]
+    pub fn since(&self, start_s: f64) -> Self {
+        self.rows(self.time_s.partition_point(|time| *time < start_s)..self.len())
+    }
+
+    /// Some of the rows; what lies beyond the last row is passed over.
+    #[must_use]
+    pub fn rows(&self, range: Range<usize>) -> Self {
+        fn cut<T: Clone>(values: &[T], range: &Range<usize>) -> Vec<T> {
+            let end = range.end.min(values.len());
+            values[range.start.min(end)..end].to_vec()
+        }
+        Self {
+            metadata: self.metadata.clone(),
+            time_s: cut(&self.time_s, &range),
+            readings: Readings {
+                kind: self.readings.kind,
+                values: cut(&self.readings.values, &range),
+                converter: self.readings.converter.as_ref().map(|converter| ConverterReadings {
+                    codes: cut(&converter.codes, &range),
+                    sd_ohm: cut(&converter.sd_ohm, &range),
+                    saturated: cut(&converter.saturated, &range),
+                }),
+            },
+            reference: self
+                .reference
+                .as_ref()
+                .map(|reference| Reference { quantity: reference.quantity, values: cut(&reference.values, &range) }),
+            temperature_c: self.temperature_c.as_ref().map(|values| cut(values, &range)),
+        }
+    }
+}

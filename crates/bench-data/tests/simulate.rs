@@ -1,0 +1,190 @@
+//! Seeds, settings, disturbances and what the recordings look like.
+
+use ohmstrain_bench_data::simulate::{Disturbances, Material, Protocol, SimulationSettings, simulate};
+use ohmstrain_bench_data::{FrontEndSpec, Quantity, ReadingKind, Trace, segment};
+use ohmstrain_model::Phase::{self, Extend, Hold, Retract};
+
+fn settings(protocol: Protocol) -> SimulationSettings {
+    SimulationSettings::new(Material::Ecoflex0030, protocol)
+}
+
+fn bytes(settings: &SimulationSettings) -> Vec<u8> {
+    let mut file = Vec::new();
+    simulate(settings).unwrap().write(&mut file).unwrap();
+    file
+}
+
+fn strain(trace: &Trace) -> &[f64] {
+    &trace.reference.as_ref().unwrap().values
+}
+
+const SHORT_HOLD: Protocol = Protocol::ExtendHold { cycles: 1, hold_s: 20.0, rest_s: 5.0 };
+
+#[test]
+fn the_same_seed_gives_the_same_bytes_and_another_seed_does_not() {
+    for protocol in [SHORT_HOLD, Protocol::Mixed { duration_s: 60.0 }] {
+        for mismatched in [false, true] {
+            let first = SimulationSettings { mismatched, ..settings(protocol) };
+            assert_eq!(bytes(&first), bytes(&first.clone()));
+            assert_ne!(bytes(&first), bytes(&SimulationSettings { seed: 2, ..first.clone() }));
+        }
+    }
+}
+
+#[test]
+fn a_recording_survives_its_file() {
+    let front_end: FrontEndSpec = "divider reference_ohm=2000 side=high bits=12 noise_codes=0.5".parse().unwrap();
+    for front_end in [None, Some(front_end)] {
+        let trace = simulate(&SimulationSettings { front_end, ..settings(SHORT_HOLD) }).unwrap();
+        let mut file = Vec::new();
+        trace.write(&mut file).unwrap();
+        assert_eq!(Trace::read(file.as_slice(), "t.csv").unwrap(), trace);
+    }
+}
+
+#[test]
+fn recordings_say_what_they_are() {
+    let trace = simulate(&settings(SHORT_HOLD)).unwrap();
+    assert_eq!(trace.metadata.material.as_deref(), Some("ecoflex-00-30"));
+    assert_eq!(trace.metadata.gauge_length_mm, Some(30.0));
+    assert_eq!((trace.readings.kind, trace.reference.as_ref().unwrap().quantity), (ReadingKind::Ohm, Quantity::Strain));
+    // 2 s of rest, 10 s of ramp, 20 s of hold, 10 s of release, 5 s of rest at 20 Hz, both ends included.
+    assert_eq!((trace.len(), trace.time_s[940]), (941, 47.0));
+    assert_eq!(strain(&trace)[240], 0.33333);
+}
+
+#[test]
+fn protocols_have_the_phases_they_promise() {
+    let cycles = Protocol::ExtendRetract { cycles: 2, rest_s: 10.0 };
+    let hold = Protocol::ExtendHold { cycles: 1, hold_s: 60.0, rest_s: 10.0 };
+    let loads = Protocol::LoadSteps { step_g: 25.0, hold_s: 20.0 };
+    let expected: [(Protocol, &[Phase]); 3] = [
+        (cycles, &[Hold, Extend, Retract, Extend, Retract, Hold]),
+        (hold, &[Hold, Extend, Hold, Retract, Hold]),
+        (loads, &[Hold, Extend, Hold, Extend, Hold, Extend, Hold]),
+    ];
+    for (protocol, expected) in expected {
+        let trace = simulate(&settings(protocol)).unwrap();
+        let found: Vec<Phase> = segment(&trace.time_s, strain(&trace)).iter().map(|segment| segment.phase).collect();
+        assert_eq!(found, expected, "{protocol}");
+    }
+}
+
+#[test]
+fn the_mixed_protocol_shows_each_half_the_whole_range_and_every_phase() {
+    for speed_mm_s in [1.0, 5.0] {
+        let trace = simulate(&SimulationSettings { speed_mm_s, ..settings(Protocol::MIXED) }).unwrap();
+        assert_eq!(trace.time_s.last(), Some(&400.0));
+        for half in [trace.until(200.0), trace.since(200.0)] {
+            let largest = strain(&half).iter().copied().fold(0.0, f64::max);
+            assert!(largest > 0.33);
+            let segments = segment(&half.time_s, strain(&half));
+            for phase in Phase::ALL {
+                let rows: usize = segments.iter().filter(|s| s.phase == phase).map(|s| s.rows.len()).sum();
+                assert!(rows * 10 > half.len(), "{phase:?} {rows}");
+            }
+        }
+    }
+}
+
+#[test]
+fn the_sensor_does_not_depend_on_the_rate_of_the_recording() {
+    for mismatched in [false, true] {
+        let at = |sample_rate_hz: f64| {
+            let disturbances = Disturbances::NONE;
+            simulate(&SimulationSettings { sample_rate_hz, disturbances, mismatched, ..settings(SHORT_HOLD) }).unwrap()
+        };
+        let (coarse, fine) = (at(4.0), at(1000.0));
+        for i in 0..coarse.len() {
+            let difference = coarse.readings.values[i] - fine.readings.values[250 * i];
+            // Two roundings to 1 mΩ, and gains at mid-strain over 10 ms steps: 1e-6 of R.
+            assert!(difference.abs() < 4e-3, "{i} {difference}");
+        }
+    }
+}
+
+#[test]
+fn disturbances_have_the_sizes_they_are_asked_for() {
+    let quiet = SimulationSettings { disturbances: Disturbances::NONE, ..settings(SHORT_HOLD) };
+    let clean = simulate(&quiet).unwrap().readings.values;
+    let white_sd = 2e-4;
+    let noisy = SimulationSettings { disturbances: Disturbances { white_sd, ..Disturbances::NONE }, ..quiet.clone() };
+    let noisy = simulate(&noisy).unwrap().readings.values;
+    let square: f64 = clean.iter().zip(&noisy).map(|(a, b)| ((a - b) / 1600.0).powi(2)).sum();
+    // 941 samples: their standard deviation scatters by 1/√1882 = 2.3 %.
+    assert!(((square / clean.len() as f64).sqrt() / white_sd - 1.0).abs() < 0.08);
+
+    let cycles = settings(Protocol::ExtendRetract { cycles: 5, rest_s: 0.0 });
+    let of = |conditioning: bool| {
+        let disturbances = Disturbances { conditioning, ..Disturbances::NONE };
+        simulate(&SimulationSettings { disturbances, ..cycles.clone() }).unwrap().readings.values
+    };
+    let (with, without) = (of(true), of(false));
+    for (cycle, change) in [(0, 0.0), (1, -0.019), (2, -0.034), (3, -0.044), (4, -0.047), (5, -0.047)] {
+        let row = 40 + 400 * cycle;
+        assert!((with[row] / without[row] - 1.0 - change).abs() < 1e-5, "{cycle}");
+    }
+}
+
+#[test]
+fn a_front_end_quantises_and_saturates() {
+    let spec = |text: &str| Some(text.parse::<FrontEndSpec>().unwrap());
+    let coarse = SimulationSettings {
+        front_end: spec("divider reference_ohm=2000 side=low bits=10"),
+        disturbances: Disturbances::NONE,
+        ..settings(SHORT_HOLD)
+    };
+    let trace = simulate(&coarse).unwrap();
+    let exact = simulate(&SimulationSettings { front_end: None, ..coarse.clone() }).unwrap();
+    let converter = trace.readings.converter.unwrap();
+    for i in 0..exact.len() {
+        let error = (trace.readings.values[i] - exact.readings.values[i]) / converter.sd_ohm[i];
+        // Rounding is wrong by half a code at most, √3 of its standard deviation, and the divider bends by 0.1 %.
+        assert!(error.abs() < 1.75, "{error}");
+    }
+    let narrow = spec("constant-current current_a=1e-4 gain=10 full_scale_v=2.0 bits=12 noise_codes=0.5");
+    let trace = simulate(&SimulationSettings { front_end: narrow, ..settings(SHORT_HOLD) }).unwrap();
+    let saturated = trace.readings.converter.unwrap().saturated;
+    assert!(saturated[240] && !saturated[0] && trace.readings.values[240].is_nan());
+}
+
+#[test]
+fn loads_and_strains_are_inverse_to_each_other() {
+    for material in Material::ALL {
+        for load_g in [0.0, 1.0, 40.0, 75.0, 300.0] {
+            let strain = material.strain_under_load(load_g);
+            assert!((material.load_g(strain) - load_g).abs() < 1e-9 * (1.0 + load_g));
+        }
+        // The 100 % modulus is the stress at ε = 1, on 17.5 mm².
+        let newton = material.modulus_100_mpa() * 17.5;
+        assert!((material.load_g(1.0) * 9.80665e-3 / newton - 1.0).abs() < 1e-12);
+    }
+}
+
+#[test]
+fn impossible_settings_are_named() {
+    let message = |change: fn(&mut SimulationSettings)| {
+        let mut settings = settings(SHORT_HOLD);
+        change(&mut settings);
+        simulate(&settings).unwrap_err().to_string()
+    };
+    assert_eq!(message(|s| s.speed_mm_s = f64::NAN), "speed_mm_s: expected 0.01 to 100, found NaN");
+    assert_eq!(message(|s| s.elongation_mm = 40.0), "elongation_mm: expected 0.001 to 15, found 40");
+    assert_eq!(message(|s| s.sample_rate_hz = 0.0), "sample_rate_hz: expected 0.1 to 10000, found 0");
+    assert_eq!(
+        message(|s| s.protocol = Protocol::ExtendRetract { cycles: 0, rest_s: 1.0 }),
+        "cycles: expected 1 to 10000, found 0"
+    );
+    assert!(message(|s| s.protocol = Protocol::Mixed { duration_s: 1e6 }).starts_with("number of rows"));
+}
+
+#[test]
+fn names_are_read_back() {
+    for material in Material::ALL {
+        assert_eq!(material.name().parse::<Material>(), Ok(material));
+    }
+    for protocol in [Protocol::EXTEND_RETRACT, Protocol::EXTEND_HOLD, Protocol::LOAD_STEPS, Protocol::MIXED] {
+        assert_eq!(protocol.name().parse::<Protocol>(), Ok(protocol));
+    }
+    assert!("latex".parse::<Material>().is_err() && "wiggle".parse::<Protocol>().is_err());
+}

@@ -1,0 +1,55 @@
+use nalgebra::{DMatrix, DVector};
+use serde::{Deserialize, Serialize};
+
+use crate::CalibrationError;
+use crate::params::RangeParams;
+use crate::samples::Samples;
+
+/// What people use today: strain as a cubic polynomial of the reading, clipped to the range it was fitted on.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StaticCubic {
+    /// Centre of the readings it was fitted on.
+    pub reading_centre: f64,
+    /// Half their range.
+    pub reading_scale: f64,
+    /// Coefficients of 1, z, z², z³ with `z = (reading - centre)/scale`.
+    pub coefficients: [f64; 4],
+    /// The strains it was fitted on.
+    pub range: RangeParams,
+}
+
+impl StaticCubic {
+    /// Least squares over all rows with reading and strain.
+    ///
+    /// # Errors
+    /// If the readings do not vary.
+    pub fn fit(recordings: &[Samples], range: RangeParams) -> Result<Self, CalibrationError> {
+        let rows: Vec<(f64, f64)> = recordings
+            .iter()
+            .flat_map(|samples| samples.complete_rows().map(|k| (samples.reading[k], samples.strain[k])))
+            .collect();
+        let (low, high) = rows
+            .iter()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), (reading, _)| (l.min(*reading), h.max(*reading)));
+        let (reading_centre, reading_scale) = (0.5 * (low + high), 0.5 * (high - low));
+        if !(reading_scale > 0.0) {
+            return Err(CalibrationError::Singular);
+        }
+        let design = DMatrix::from_fn(rows.len(), 4, |k, power| {
+            ((rows[k].0 - reading_centre) / reading_scale).powi(power as i32)
+        });
+        let strain = DVector::from_iterator(rows.len(), rows.iter().map(|(_, strain)| *strain));
+        let solution = design.svd(true, true).solve(&strain, 1e-12).map_err(|_| CalibrationError::Singular)?;
+        let coefficients = [solution[0], solution[1], solution[2], solution[3]];
+        Ok(Self { reading_centre, reading_scale, coefficients, range })
+    }
+
+    /// The strain that a reading stands for.
+    #[must_use]
+    pub fn strain(&self, reading: f64) -> f64 {
+        let z = (reading - self.reading_centre) / self.reading_scale;
+        let [a, b, c, d] = self.coefficients;
+        (a + z * (b + z * (c + z * d))).clamp(self.range.lower, self.range.upper)
+    }
+}

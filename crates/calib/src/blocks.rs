@@ -1,0 +1,86 @@
+use nalgebra::{Cholesky, DMatrix, DVector};
+
+/// Normal equations of a regression, block by block of the recording, so that any subset of columns can be fitted and
+/// cross-validated without touching the rows again.
+///
+/// Column 0 is the constant; the first `free` columns are not penalised. The last row and column of each block's matrix
+/// belong to the response.
+pub(crate) struct BlockedNormal {
+    free: usize,
+    blocks: Vec<DMatrix<f64>>,
+    total: DMatrix<f64>,
+    scale: Vec<f64>,
+}
+
+impl BlockedNormal {
+    /// `columns` (the constant first) and `response` over all rows; `blocks` are row ranges that partition them.
+    pub(crate) fn new(
+        columns: &[DVector<f64>],
+        free: usize,
+        response: &DVector<f64>,
+        blocks: &[std::ops::Range<usize>],
+    ) -> Self {
+        let size = columns.len() + 1;
+        let gram = |rows: &std::ops::Range<usize>| {
+            let mut design = DMatrix::zeros(rows.len(), size);
+            for (j, column) in columns.iter().chain([response]).enumerate() {
+                design.column_mut(j).copy_from(&column.rows(rows.start, rows.len()));
+            }
+            design.tr_mul(&design)
+        };
+        let blocks: Vec<_> = blocks.iter().map(gram).collect();
+        let total = blocks.iter().fold(DMatrix::zeros(size, size), |sum, block| sum + block);
+        let rows = total[(0, 0)];
+        let variance = |j: usize| (total[(j, j)] / rows - (total[(0, j)] / rows).powi(2)).max(0.0);
+        let scale = (0..size).map(|j| if j == 0 { 0.0 } else { variance(j).sqrt() }).collect();
+        Self { free, blocks, total, scale }
+    }
+
+    /// Ridge regression on `columns`, without the blocks of `left_out`; one weight per column. `ridge` is relative to
+    /// each column's variance.
+    pub(crate) fn fit(&self, columns: &[usize], ridge: f64, left_out: &[usize]) -> Option<DVector<f64>> {
+        let gram = left_out.iter().fold(self.total.clone(), |rest, &block| rest - &self.blocks[block]);
+        self.solve(&gram, columns, ridge)
+    }
+
+    /// Mean squared error on blocks left out in turn, each block's mean removed.
+    pub(crate) fn cross_validate(&self, columns: &[usize], ridge: f64) -> Option<f64> {
+        let mut sum = 0.0;
+        for (b, block) in self.blocks.iter().enumerate() {
+            sum += self.block_error(block, columns, &self.fit(columns, ridge, &[b])?);
+        }
+        Some(sum / self.blocks.len() as f64)
+    }
+
+    /// Variance of the residual in a block: a constant offset is what the filter's baseline is there for.
+    fn block_error(&self, block: &DMatrix<f64>, columns: &[usize], weights: &DVector<f64>) -> f64 {
+        let response = block.ncols() - 1;
+        let rows = block[(0, 0)];
+        let (mut sum, mut squares) = (block[(0, response)], block[(response, response)]);
+        for (a, &i) in columns.iter().enumerate() {
+            sum -= weights[a] * block[(0, i)];
+            squares -= 2.0 * weights[a] * block[(i, response)];
+            for (b, &j) in columns.iter().enumerate() {
+                squares += weights[a] * weights[b] * block[(i, j)];
+            }
+        }
+        (squares / rows - (sum / rows).powi(2)).max(0.0)
+    }
+
+    fn solve(&self, gram: &DMatrix<f64>, columns: &[usize], ridge: f64) -> Option<DVector<f64>> {
+        let rows = gram[(0, 0)];
+        let response = gram.ncols() - 1;
+        let size = |i: usize| if self.scale[i] > 0.0 { self.scale[i] } else { 1.0 };
+        let mut normal = DMatrix::from_fn(columns.len(), columns.len(), |a, b| {
+            gram[(columns[a], columns[b])] / (size(columns[a]) * size(columns[b]))
+        });
+        for (a, &i) in columns.iter().enumerate() {
+            if i >= self.free {
+                normal[(a, a)] += ridge * rows;
+            }
+        }
+        let right = DVector::from_iterator(columns.len(), columns.iter().map(|&i| gram[(i, response)] / size(i)));
+        let solution = Cholesky::new(normal)?.solve(&right);
+        Some(DVector::from_iterator(columns.len(), columns.iter().zip(solution.iter()).map(|(&i, w)| w / size(i))))
+    }
+}

@@ -1,0 +1,54 @@
+use ohmstrain_ekf::StepError;
+use ohmstrain_model::ParameterError;
+use thiserror::Error;
+
+/// Why a calibration was not made.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum CalibrationError {
+    /// Nothing to calibrate on.
+    #[error("no recording with a known strain was given")]
+    NoRecording,
+    /// A recording is too short.
+    #[error(
+        "recording {} has {complete} rows with reading and reference, at least {needed} are needed",
+        recording + 1
+    )]
+    TooFewRows {
+        /// Index of the recording.
+        recording: usize,
+        /// Rows with both reading and reference.
+        complete: usize,
+        /// Rows needed.
+        needed: usize,
+    },
+    /// The reference never moves.
+    #[error("the reference is constant: nothing can be learned from it")]
+    ConstantStrain,
+    /// The least-squares problem has no unique solution.
+    #[error("the law cannot be fitted: its equations are singular")]
+    Singular,
+    /// The resistance at zero strain comes out at zero or below.
+    #[error("the reading at zero strain comes out as {value:.4} of the median reading; record nearer to zero strain")]
+    RestResistance {
+        /// Rest resistance over the median reading.
+        value: f64,
+    },
+    /// A fitted parameter is out of range.
+    #[error("fitted parameter: {0}")]
+    Parameter(#[from] ParameterError),
+    /// The filter failed on the recording.
+    #[error("the filter fails on the recording at {time_s} s: {error}")]
+    Filter {
+        /// Time of the failing row, s.
+        time_s: f64,
+        /// What it said.
+        error: StepError,
+    },
+    /// The optimiser failed.
+    #[error("optimiser: {0}")]
+    Optimiser(String),
+    /// A parameter file asks for what this version does not have.
+    #[error("{0}")]
+    Unsupported(String),
+}

@@ -1,0 +1,186 @@
+use crate::CalibrationError;
+use crate::design::BRANCH_COLUMNS;
+use crate::law_regression::{BLOCKS, LawRegression};
+use crate::law_structure::LawStructure;
+use crate::law_uncertainty::law_uncertainty;
+use crate::optimise;
+use crate::params::{LawParams, Uncertainty};
+use crate::samples::Samples;
+
+/// What the fit of the law may choose from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LawOptions {
+    /// Number of branches, 0 to 4.
+    pub branches: usize,
+    /// Family of the gauge curve.
+    pub gauge: GaugeFamily,
+}
+
+/// Families of gauge curves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum GaugeFamily {
+    /// Cubic polynomial.
+    Polynomial,
+    /// `G ε exp(-ε/ε₀)`.
+    DecayingExponential,
+    /// `(1 + C ε) exp(A ε + W ε²) - 1`.
+    Tunnelling,
+}
+
+/// A law fitted to recordings with known strain.
+#[derive(Clone, Debug)]
+pub struct LawFit {
+    /// The law.
+    pub law: LawParams,
+    /// R₀ of each recording.
+    pub rest_readings: Vec<f64>,
+    /// Reading over R₀ minus 1 minus the law, row by row of each recording; NaN where the reading is missing.
+    pub residuals: Vec<Vec<f64>>,
+    /// Root mean squared error on blocks left out, relative to R₀.
+    pub cross_validated_error: f64,
+    /// The ridge that cross-validation chose.
+    pub ridge: f64,
+}
+
+impl Default for LawOptions {
+    fn default() -> Self {
+        Self { branches: DEFAULT_BRANCHES, gauge: DEFAULT_GAUGE }
+    }
+}
+
+/// A law, and the same law fitted again without each block of the recordings: what the law is worth where it was not
+/// fitted.
+#[derive(Clone, Debug)]
+pub struct CrossFit {
+    /// Fitted to everything.
+    pub law: LawFit,
+    /// Fitted without block k of every recording.
+    pub without_block: Vec<LawFit>,
+    /// Standard errors of the law's parameters.
+    pub uncertainty: Uncertainty,
+    /// Rows of the blocks, `blocks[recording][k]`.
+    pub blocks: Vec<Vec<std::ops::Range<usize>>>,
+}
+
+/// Branches unless somebody asks for another number. The error of the law alone often prefers one; the filter, which
+/// must tell stretching from releasing by how the resistance relaxes, is better off with two and gains nothing from a
+/// third.
+const DEFAULT_BRANCHES: usize = 2;
+/// Family unless somebody asks for another. Others sometimes follow the resistance a little better; only the polynomial
+/// is linear in its coefficients, so that the ridge keeps it tame and the filter from taking one direction for the other.
+const DEFAULT_GAUGE: GaugeFamily = GaugeFamily::Polynomial;
+/// Most branches.
+pub(crate) const MOST_BRANCHES: usize = 4;
+/// Time constants tried.
+const GRID: usize = 12;
+/// Ridges tried, relative to the variance of each column. Cross-validation of the law alone would go far lower, where a
+/// filter's belief in the law makes it lock onto the wrong direction.
+const RIDGES: [f64; 2] = [0.03, 0.1];
+/// Steps of the polish of the time constants, and the side of its first simplex in ln τ.
+const POLISH_STEPS: u64 = 40;
+const POLISH_SIDE: f64 = 0.3;
+/// Smallest distance between time constants, in ln τ, where there is room: closer ones trade their gains off against
+/// each other.
+const LEAST_SPACING: f64 = 1.6;
+
+/// Fits the switched Kelvin-Voigt law with gains affine in strain: separable least squares, searching the time
+/// constants on a grid and then locally, everything else by ridge regression.
+///
+/// Time constants and ridge come from cross-validation on contiguous blocks.
+///
+/// # Errors
+/// If the recordings are too short, the strain is constant or no law fits.
+pub fn fit_law(recordings: &[Samples], options: LawOptions) -> Result<CrossFit, CalibrationError> {
+    if options.branches > MOST_BRANCHES {
+        let message = format!("{} branches; at most {MOST_BRANCHES} are supported", options.branches);
+        return Err(CalibrationError::Unsupported(message));
+    }
+    let regression = LawRegression::new(recordings)?;
+    let (ln_taus, ridge) = search_taus(&regression, options.branches)?;
+    let mut structure = polish(&regression, options.gauge, &ln_taus, ridge)?;
+    structure.sort_branches();
+    let without_block = (0..BLOCKS).map(|block| structure.fit(&regression, Some(block))).collect::<Result<_, _>>()?;
+    Ok(CrossFit {
+        law: structure.fit(&regression, None)?,
+        without_block,
+        uncertainty: law_uncertainty(&structure, &regression)?,
+        blocks: regression.block_rows(),
+    })
+}
+
+/// The best logarithms of time constants on a grid with a cubic gauge, and the ridge, by cross-validation.
+fn search_taus(regression: &LawRegression, branches: usize) -> Result<(Vec<f64>, f64), CalibrationError> {
+    let grid = log_grid(regression.tau_bounds, GRID);
+    let everything =
+        LawStructure { family: GaugeFamily::Polynomial, nonlinear: grid.clone(), taus: GRID, ridge: RIDGES[0] };
+    let design = everything.design(regression);
+    let normal = regression.normal(&design, &regression.median_readings());
+    let first_branch = design.columns.len() - GRID * BRANCH_COLUMNS;
+    let spacing = LEAST_SPACING.min((grid[GRID - 1] - grid[0]) / (branches.max(2) - 1) as f64);
+    let too_close = |subset: &Vec<usize>| subset.windows(2).any(|pair| grid[pair[1]] - grid[pair[0]] < spacing - 1e-9);
+    let mut best: Option<(f64, Vec<usize>, f64)> = None;
+    for subset in subsets(GRID, branches).into_iter().filter(|subset| !too_close(subset)) {
+        let mut columns: Vec<usize> = (0..first_branch).collect();
+        for &i in &subset {
+            columns.extend((0..BRANCH_COLUMNS).map(|j| first_branch + i * BRANCH_COLUMNS + j));
+        }
+        for ridge in RIDGES {
+            let Some(score) = normal.cross_validate(&columns, ridge) else { continue };
+            if best.as_ref().is_none_or(|(error, _, _)| score < *error) {
+                best = Some((score, subset.clone(), ridge));
+            }
+        }
+    }
+    let (_, subset, ridge) = best.ok_or(CalibrationError::Singular)?;
+    Ok((subset.into_iter().map(|i| grid[i]).collect(), ridge))
+}
+
+/// Moves time constants and gauge parameters to where cross-validation is best.
+fn polish(
+    regression: &LawRegression,
+    family: GaugeFamily,
+    ln_taus: &[f64],
+    ridge: f64,
+) -> Result<LawStructure, CalibrationError> {
+    let mut start = ln_taus.to_vec();
+    start.extend(match family {
+        GaugeFamily::Polynomial => vec![],
+        GaugeFamily::DecayingExponential => vec![0.0],
+        GaugeFamily::Tunnelling => vec![0.5, 0.0, 0.0],
+    });
+    let structure =
+        |nonlinear: &[f64]| LawStructure { family, nonlinear: nonlinear.to_vec(), taus: ln_taus.len(), ridge };
+    // The grid ends on the bounds, give or take a rounding.
+    let (low, high) = (regression.tau_bounds.0.ln() - 1e-9, regression.tau_bounds.1.ln() + 1e-9);
+    let score = |nonlinear: &[f64]| {
+        let inside = nonlinear[..ln_taus.len()].iter().all(|ln_tau| (low..=high).contains(ln_tau));
+        let design = inside.then(|| structure(nonlinear).design(regression))?;
+        regression.solve(&design, ridge, None).map(|solution| solution.cross_validated.ln())
+    };
+    let cost = |nonlinear: &[f64]| score(nonlinear).unwrap_or(f64::INFINITY);
+    let point = if start.is_empty() { start } else { optimise::polish(cost, &start, POLISH_SIDE, POLISH_STEPS)? };
+    Ok(structure(&point))
+}
+
+/// `count` logarithms, evenly spaced between the logarithms of the bounds.
+fn log_grid(bounds: (f64, f64), count: usize) -> Vec<f64> {
+    let (low, high) = (bounds.0.ln(), bounds.1.ln());
+    (0..count).map(|i| low + (high - low) * i as f64 / (count - 1) as f64).collect()
+}
+
+/// All ascending choices of `count` out of `0..size`.
+fn subsets(size: usize, count: usize) -> Vec<Vec<usize>> {
+    if count == 0 {
+        return vec![vec![]];
+    }
+    let mut out = Vec::new();
+    for mut smaller in subsets(size, count - 1) {
+        let first = smaller.last().map_or(0, |last| last + 1);
+        for i in first..size {
+            smaller.push(i);
+            out.push(smaller.clone());
+            smaller.pop();
+        }
+    }
+    out
+}

@@ -1,0 +1,38 @@
+//! Calibration of soft strain sensors: from bench recordings with known strain to the parameters a filter needs.
+//!
+//! [`calibrate`] fits the law ([`fit_law`]) and then noise and motion so that the filter's own posterior is right on the
+//! known strain. [`SensorParams`] is what is written down; [`build_filter`] makes a running filter of it.
+//!
+//! # Policy
+//! - Knows samples ([`Samples`]), not files.
+//! - Deterministic: the same samples give the same parameters. Nothing is random, no clock is read.
+//! - A calibration that cannot be made is a [`CalibrationError`]; nothing panics on recorded data.
+
+mod baseline;
+mod blocks;
+mod calibrate;
+mod design;
+mod error;
+mod filter;
+mod law_fit;
+mod law_regression;
+mod law_structure;
+mod law_uncertainty;
+mod motion_stats;
+mod noise_fit;
+mod optimise;
+mod params;
+mod samples;
+mod scores;
+
+pub use baseline::StaticCubic;
+pub use calibrate::{Calibration, Stage, calibrate};
+pub use error::CalibrationError;
+pub use filter::{Filter, Output, Start, build_filter};
+pub use law_fit::{CrossFit, GaugeFamily, LawFit, LawOptions, fit_law};
+pub use params::{
+    BranchParams, EstimatorKind, EstimatorParams, FORMAT, GaugeParams, JointParams, LawParams, MotionParams,
+    NoiseParams, Quantity, RangeParams, ReadingUnit, RecordingInfo, SensorParams, Uncertainty, Validity,
+};
+pub use samples::Samples;
+pub use scores::{ScoredRow, Scores};

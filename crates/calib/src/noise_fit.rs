@@ -1,0 +1,150 @@
+use ohmstrain_ekf::Reading;
+
+use crate::CalibrationError;
+use crate::calibrate::Stage;
+use crate::filter::{Start, filter_from_parts};
+use crate::law_fit::CrossFit;
+use crate::motion_stats::{MotionStats, root_mean_square};
+use crate::optimise;
+use crate::params::{EstimatorParams, LawParams, MotionParams, NoiseParams, RangeParams};
+use crate::samples::Samples;
+
+/// Standard deviation that every reference has of its own, as a share of the strain's range: no score can be had from
+/// being more precise.
+pub(crate) const REFERENCE_SD: f64 = 0.005;
+/// Pull toward the starting values, per squared step of a log-parameter: a score from one recording must not run away.
+const REGULARISATION: f64 = 1e-2;
+/// Local searches: the side of the first simplex in log-parameters, and the number of steps.
+const SEARCHES: [(f64, u64); 2] = [(0.7, 150), (0.5, 150)];
+/// First guess of the baseline's correlation time, s.
+const BASELINE_TIME_S: f64 = 8.0;
+/// First guess of white noise and branch noise, as a share of the law's residual.
+const SHARE_OF_RESIDUAL: f64 = 0.3;
+
+/// The filter's score on the known strain as a function of noise and motion.
+///
+/// Each block of the recordings is scored with the law that was fitted without it. With a law that has seen the block
+/// the residuals are too small, and a filter tuned on them believes its law more than it may elsewhere.
+pub(crate) struct NoiseProblem<'a> {
+    samples: &'a [Samples<'a>],
+    fit: &'a CrossFit,
+    /// Readings relative to the R₀ of each law, `[block][recording]`.
+    readings: Vec<Vec<Vec<Option<Reading<f64>>>>>,
+    limits: RangeParams,
+    stats: MotionStats,
+}
+
+impl<'a> NoiseProblem<'a> {
+    pub(crate) fn new(samples: &'a [Samples<'a>], fit: &'a CrossFit, limits: RangeParams) -> Self {
+        let relative = |rests: &[f64]| {
+            samples.iter().zip(rests).map(|(samples, rest)| relative_changes(samples.reading, *rest)).collect()
+        };
+        let readings = fit.without_block.iter().map(|law| relative(&law.rest_readings)).collect();
+        Self { samples, fit, readings, limits, stats: MotionStats::new(samples) }
+    }
+
+    /// Fits noise and motion.
+    pub(crate) fn fit(&self, progress: &mut impl FnMut(Stage)) -> Result<EstimatorParams, CalibrationError> {
+        let start = self.start();
+        // A step of the simplex evaluates one or two points.
+        let expected = SEARCHES.iter().map(|(_, steps)| steps * 3 / 2).sum();
+        let mut done = 0;
+        let mut cost = |point: &[f64]| {
+            done += 1;
+            progress(Stage::Noise { done, expected });
+            let pull: f64 = point.iter().zip(&start).map(|(x, s)| (x - s).powi(2)).sum();
+            self.score(&self.params(point)) + REGULARISATION * pull
+        };
+        let mut point = start.clone();
+        for (side, steps) in SEARCHES {
+            point = optimise::polish(&mut cost, &point, side, steps)?;
+        }
+        let mut params = self.params(&point);
+        params.score = self.score(&params);
+        Ok(params)
+    }
+
+    /// Logarithms of the parameters that the law's residuals and the motion of the strain suggest.
+    fn start(&self) -> Vec<f64> {
+        let mut left_out = Vec::new();
+        for (block, law) in self.fit.without_block.iter().enumerate() {
+            for (rows, residuals) in self.fit.blocks.iter().zip(&law.residuals) {
+                left_out.extend(residuals[rows[block].clone()].iter().filter(|r| r.is_finite()));
+            }
+        }
+        let known: Vec<f64> = self.fit.law.residuals.iter().flatten().copied().filter(|r| r.is_finite()).collect();
+        let fine = SHARE_OF_RESIDUAL * root_mean_square(&known).max(1e-9);
+        let stats = &self.stats;
+        [
+            root_mean_square(&left_out).max(1e-9),
+            BASELINE_TIME_S,
+            fine,
+            fine,
+            stats.rate_sd,
+            stats.rate_time_s,
+            stats.strain_sd,
+        ]
+        .map(f64::ln)
+        .to_vec()
+    }
+
+    fn params(&self, point: &[f64]) -> EstimatorParams {
+        let p: Vec<f64> = point.iter().map(|x| x.clamp(-25.0, 15.0).exp()).collect();
+        EstimatorParams {
+            score: f64::NAN,
+            motion: MotionParams::OrnsteinUhlenbeck {
+                rate_sd_per_s: p[4],
+                rate_time_s: p[5],
+                strain_mean: self.stats.strain_mean,
+                strain_sd: p[6],
+            },
+            noise: NoiseParams { baseline_sd: p[0], baseline_time_s: p[1], reading_sd: p[2], branch_sd: p[3] },
+        }
+    }
+
+    /// Mean negative log density of the true strain under the filter, strain in units of its range. Infinite if the
+    /// filter fails.
+    fn score(&self, params: &EstimatorParams) -> f64 {
+        let (mut sum, mut count) = (0.0, 0_usize);
+        for (block, law) in self.fit.without_block.iter().enumerate() {
+            for recording in 0..self.samples.len() {
+                match self.score_block(params, &law.law, block, recording) {
+                    Some((block_sum, rows)) => (sum, count) = (sum + block_sum, count + rows),
+                    None => return f64::INFINITY,
+                }
+            }
+        }
+        sum / count.max(1) as f64
+    }
+
+    /// Runs from the first row to the end of a block and scores the block. Sum and number of scores.
+    fn score_block(
+        &self,
+        params: &EstimatorParams,
+        law: &LawParams,
+        block: usize,
+        recording: usize,
+    ) -> Option<(f64, usize)> {
+        let samples = &self.samples[recording];
+        let rows = &self.fit.blocks[recording][block];
+        let span = self.limits.span();
+        let mut filter = filter_from_parts(law, params, self.limits, Start::Unknown).ok()?;
+        let (mut sum, mut count) = (0.0, 0);
+        for (k, reading) in self.readings[block][recording][..rows.end].iter().enumerate() {
+            filter.step(samples.time_s[k], *reading).ok()?;
+            if k >= rows.start && samples.strain[k].is_finite() {
+                let strain = filter.strain();
+                let variance = strain.variance / (span * span) + REFERENCE_SD * REFERENCE_SD;
+                let error = (strain.mean - samples.strain[k]) / span;
+                sum += 0.5 * (error * error / variance + variance.ln());
+                count += 1;
+            }
+        }
+        Some((sum, count))
+    }
+}
+
+/// Readings over R₀ minus 1; `None` where missing.
+pub(crate) fn relative_changes(reading: &[f64], rest_reading: f64) -> Vec<Option<Reading<f64>>> {
+    reading.iter().map(|r| r.is_finite().then(|| Reading::from(r / rest_reading - 1.0))).collect()
+}

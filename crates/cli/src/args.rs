@@ -1,0 +1,325 @@
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use clap::{Args as ClapArgs, Parser, Subcommand, ValueEnum};
+use ohmstrain_bench_data::simulate::{Material, Protocol};
+use ohmstrain_bench_data::{FrontEndSpec, JointSpec, Metadata};
+use ohmstrain_calib::{EstimatorKind, GaugeFamily};
+
+/// From the resistance of a soft strain sensor to strain, with an honest error bar.
+#[derive(Debug, Parser)]
+#[command(version, about, propagate_version = true)]
+pub struct Args {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// The commands.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Simulate a bench session, calibrate on its first half, filter, smooth and report; needs no input
+    Demo(DemoArgs),
+    /// Simulate a recording of the bench
+    Simulate(SimulateArgs),
+    /// Fit law, noise and motion to recordings with a known strain
+    Calibrate(CalibrateArgs),
+    /// Turn readings into strain, row by row
+    Filter(FilterArgs),
+    /// Turn a whole recording into strain, every estimate from all readings
+    Smooth(SmoothArgs),
+    /// Compare estimates with a known strain
+    Evaluate(EvaluateArgs),
+}
+
+/// Flags of `demo`.
+#[derive(Debug, ClapArgs)]
+pub struct DemoArgs {
+    /// Folder for trace.csv, sensor.toml, estimates.csv, smoothed.csv and report.html
+    #[arg(long, default_value = "ohmstrain-demo")]
+    pub out: PathBuf,
+    /// Seed of the simulated bench
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+}
+
+/// Flags of `simulate`.
+#[derive(Debug, ClapArgs)]
+pub struct SimulateArgs {
+    /// Illustrative material: ecoflex-00-30, ecoflex-00-50 or vytaflex-10
+    #[arg(long, default_value = "ecoflex-00-30")]
+    pub material: Material,
+    /// What the bench does: extend-retract, extend-hold, load-steps or mixed
+    #[arg(long, default_value = "extend-hold")]
+    pub protocol: Protocol,
+    /// Largest elongation of the 30 mm sensor, mm
+    #[arg(long, default_value_t = 10.0)]
+    pub elongation_mm: f64,
+    /// Speed of stretching, mm/s
+    #[arg(long, default_value_t = 1.0)]
+    pub speed_mm_s: f64,
+    /// Readings per second
+    #[arg(long, default_value_t = 20.0)]
+    pub sample_rate_hz: f64,
+    /// A sensor outside the family of laws that calibration fits: release peaks, more branches, other nonlinearity
+    #[arg(long)]
+    pub mismatched: bool,
+    /// Read through electronics: the trace then holds `adc` codes
+    #[arg(long, value_name = "SPEC")]
+    pub front_end: Option<FrontEndSpec>,
+    /// Seed of noise, drift and random protocols
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// File to write instead of stdout
+    #[arg(short, long)]
+    pub output: Option<PathBuf>,
+}
+
+/// What a trace's metadata lines leave unsaid, or say wrongly.
+#[derive(Debug, Default, ClapArgs)]
+pub struct TraceArgs {
+    /// Length of the unstretched sensor, mm
+    #[arg(long, value_name = "MM")]
+    pub gauge_length_mm: Option<f64>,
+    /// Electronics, as in `# front_end = …`
+    #[arg(long, value_name = "SPEC")]
+    pub front_end: Option<FrontEndSpec>,
+    /// Joint, as in `# joint = …`
+    #[arg(long, value_name = "SPEC")]
+    pub joint: Option<JointSpec>,
+}
+
+impl TraceArgs {
+    /// As metadata that overrides the file's.
+    pub fn metadata(&self) -> Metadata {
+        Metadata {
+            gauge_length_mm: self.gauge_length_mm,
+            front_end: self.front_end,
+            joint: self.joint,
+            ..Metadata::default()
+        }
+    }
+}
+
+/// Flags of `calibrate`.
+#[derive(Debug, ClapArgs)]
+pub struct CalibrateArgs {
+    /// Recordings with a reference
+    #[arg(required = true)]
+    pub traces: Vec<PathBuf>,
+    /// Where to write the sensor's parameters
+    #[arg(short, long, value_name = "sensor.toml")]
+    pub output: PathBuf,
+    /// Use rows with time_s >= T only
+    #[arg(long, value_name = "T")]
+    pub from: Option<f64>,
+    /// Use rows with time_s < T only
+    #[arg(long, value_name = "T")]
+    pub until: Option<f64>,
+    /// Relaxing branches: auto (2) or 0 to 4
+    #[arg(long, default_value = "auto")]
+    pub branches: Auto<Branches>,
+    /// Family of the gauge curve: auto (polynomial), polynomial, decaying-exponential or tunnelling
+    #[arg(long, default_value = "auto")]
+    pub gauge: Auto<Gauge>,
+    /// Estimator to calibrate for: auto or ekf
+    #[arg(long, default_value = "auto")]
+    pub estimator: Auto<Estimator>,
+    /// Accepted for scripts; the calibration is deterministic and draws nothing
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// Also write a report of the first recording
+    #[arg(long, value_name = "report.html")]
+    pub report: Option<PathBuf>,
+    /// Overrides of the recordings' metadata
+    #[command(flatten)]
+    pub trace: TraceArgs,
+}
+
+/// Flags that `filter` and `smooth` share.
+#[derive(Debug, ClapArgs)]
+pub struct EstimateArgs {
+    /// The sensor's parameters
+    #[arg(long, value_name = "sensor.toml")]
+    pub sensor: PathBuf,
+    /// Estimator: auto (the sensor file's choice) or ekf
+    #[arg(long, default_value = "auto")]
+    pub estimator: Auto<Estimator>,
+    /// Strain (or angle) at the first row, if it is known; the body is at rest there
+    #[arg(long, value_name = "X", allow_negative_numbers = true)]
+    pub initial_strain: Option<f64>,
+    /// Resistance at rest instead of the sensor file's: a number in the readings' unit, or first:N for the median of
+    /// the first N readings
+    #[arg(long, value_name = "OHM|first:N")]
+    pub rest_resistance: Option<RestResistance>,
+    /// Columns to write, separated by commas; all by default
+    #[arg(long, value_delimiter = ',')]
+    pub columns: Vec<String>,
+    /// Overrides of the recording's metadata
+    #[command(flatten)]
+    pub trace: TraceArgs,
+}
+
+/// Flags of `filter`.
+#[derive(Debug, ClapArgs)]
+pub struct FilterArgs {
+    /// Recording, or - for stdin
+    #[arg(default_value = "-")]
+    pub trace_file: PathBuf,
+    /// How to estimate
+    #[command(flatten)]
+    pub estimate: EstimateArgs,
+}
+
+/// Flags of `smooth`.
+#[derive(Debug, ClapArgs)]
+pub struct SmoothArgs {
+    /// Recording, or - for stdin
+    pub trace_file: PathBuf,
+    /// How to estimate
+    #[command(flatten)]
+    pub estimate: EstimateArgs,
+}
+
+/// Flags of `evaluate`.
+#[derive(Debug, ClapArgs)]
+pub struct EvaluateArgs {
+    /// Recordings with a reference
+    #[arg(required = true)]
+    pub traces: Vec<PathBuf>,
+    /// The sensor's parameters
+    #[arg(long, value_name = "sensor.toml")]
+    pub sensor: PathBuf,
+    /// Estimator: auto (the sensor file's choice) or ekf
+    #[arg(long, default_value = "auto")]
+    pub estimator: Auto<Estimator>,
+    /// Score rows with time_s >= T only; the filter still starts at the first row
+    #[arg(long, value_name = "T")]
+    pub from: Option<f64>,
+    /// Exit with code 3 unless every recording is estimated better than by the static cubic and its 95 % interval covers
+    /// 80 % or more
+    #[arg(long)]
+    pub check: bool,
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
+    /// Overrides of the recordings' metadata
+    #[command(flatten)]
+    pub trace: TraceArgs,
+}
+
+/// `auto`, or a value.
+#[derive(Clone, Copy, Debug)]
+pub enum Auto<T> {
+    /// Let the program choose.
+    Auto,
+    /// Chosen.
+    Chosen(T),
+}
+
+impl<T> Auto<T> {
+    /// The choice, if one was made.
+    pub fn chosen(self) -> Option<T> {
+        match self {
+            Self::Auto => None,
+            Self::Chosen(value) => Some(value),
+        }
+    }
+}
+
+impl<T: FromStr<Err = String>> FromStr for Auto<T> {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        if text == "auto" { Ok(Self::Auto) } else { text.parse().map(Self::Chosen) }
+    }
+}
+
+/// A number of branches.
+#[derive(Clone, Copy, Debug)]
+pub struct Branches(pub usize);
+
+impl FromStr for Branches {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text.parse() {
+            Ok(count @ 0..=4) => Ok(Self(count)),
+            _ => Err("expected auto or 0 to 4".into()),
+        }
+    }
+}
+
+/// A family of gauge curves.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum Gauge {
+    /// Cubic polynomial.
+    Polynomial,
+    /// Rises to a peak and falls.
+    DecayingExponential,
+    /// Tunnelling between particles.
+    Tunnelling,
+}
+
+impl FromStr for Gauge {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        <Self as ValueEnum>::from_str(text, false)
+            .map_err(|_| "expected auto, polynomial, decaying-exponential or tunnelling".into())
+    }
+}
+
+impl From<Gauge> for GaugeFamily {
+    fn from(gauge: Gauge) -> Self {
+        match gauge {
+            Gauge::Polynomial => Self::Polynomial,
+            Gauge::DecayingExponential => Self::DecayingExponential,
+            Gauge::Tunnelling => Self::Tunnelling,
+        }
+    }
+}
+
+/// An estimator.
+#[derive(Clone, Copy, Debug)]
+pub struct Estimator(pub EstimatorKind);
+
+impl FromStr for Estimator {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let names: Vec<&str> = EstimatorKind::ALL.iter().map(|kind| kind.name()).collect();
+        EstimatorKind::ALL
+            .into_iter()
+            .find(|kind| kind.name() == text)
+            .map(Self)
+            .ok_or_else(|| format!("expected auto or {}", names.join(", ")))
+    }
+}
+
+/// Where R₀ comes from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum RestResistance {
+    /// Given.
+    Value(f64),
+    /// Median of the first readings.
+    First(usize),
+}
+
+impl FromStr for RestResistance {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let expected = || "expected a positive number or first:N".to_string();
+        if let Some(count) = text.strip_prefix("first:") {
+            return match count.parse() {
+                Ok(count @ 1..) => Ok(Self::First(count)),
+                _ => Err(expected()),
+            };
+        }
+        match text.parse::<f64>() {
+            Ok(value) if value > 0.0 && value.is_finite() => Ok(Self::Value(value)),
+            _ => Err(expected()),
+        }
+    }
+}

@@ -1,0 +1,142 @@
+use std::path::Path;
+
+use ohmstrain_calib::{
+    EstimatorKind, FORMAT, LawOptions, Quantity, ReadingUnit, RecordingInfo, Samples, SensorParams, calibrate,
+};
+
+use super::scoring;
+use crate::args::CalibrateArgs;
+use crate::error::CliError;
+use crate::input::{self, Recording, unit};
+use crate::output::write_file;
+use crate::progress::Progress;
+use crate::report::{ReportInput, ScoreRow, render};
+use crate::run::estimate;
+use crate::sensor_file::{self, MADE_BY};
+
+/// Calibrates a sensor on recordings and writes its parameters.
+pub fn run(args: &CalibrateArgs) -> Result<(), CliError> {
+    let overrides = args.trace.metadata();
+    let mut recordings = Vec::new();
+    for path in &args.traces {
+        let mut recording = input::read(path, &overrides)?;
+        if let Some(until) = args.until {
+            recording.trace = recording.trace.until(until);
+        }
+        if let Some(from) = args.from {
+            recording.trace = recording.trace.since(from);
+        }
+        recordings.push(recording);
+    }
+    let mut options = LawOptions::default();
+    if let Some(branches) = args.branches.chosen() {
+        options.branches = branches.0;
+    }
+    if let Some(gauge) = args.gauge.chosen() {
+        options.gauge = gauge.into();
+    }
+    let params = calibrate_recordings(&recordings, options, &Progress::new("calibrating"))?;
+    if let Some(path) = &args.report {
+        write_report(path, &recordings[0], &params, None)?;
+    }
+    sensor_file::write(&args.output, &params)
+}
+
+/// The parameters of the sensor behind `recordings`.
+pub fn calibrate_recordings(
+    recordings: &[Recording],
+    options: LawOptions,
+    progress: &Progress,
+) -> Result<SensorParams, CliError> {
+    let samples: Vec<Samples> = recordings.iter().map(Recording::samples).collect::<Result<_, _>>()?;
+    let (quantity, reading) = common_units(recordings)?;
+    let names: Vec<&str> = recordings.iter().map(|recording| recording.name.as_str()).collect();
+    let calibration = calibrate(&samples, options, |stage| progress.calibrating(stage))
+        .map_err(|error| CliError::calibration(&names.join(", "), &error))?;
+    let infos = recordings.iter().zip(&calibration.rest_readings).map(|(recording, rest_reading)| RecordingInfo {
+        file: file_name(&recording.name),
+        sha256: recording.sha256.clone(),
+        rows: recording.trace.len(),
+        rest_reading: *rest_reading,
+    });
+    let mut rests = calibration.rest_readings.clone();
+    rests.sort_by(f64::total_cmp);
+    Ok(SensorParams {
+        format: FORMAT,
+        made_by: MADE_BY.into(),
+        quantity,
+        reading,
+        rest_reading: rests[rests.len() / 2],
+        default_estimator: EstimatorKind::Ekf,
+        limits: calibration.limits,
+        validity: calibration.validity,
+        static_cubic: calibration.static_cubic,
+        joint: recordings.iter().find_map(Recording::joint),
+        law: calibration.law,
+        estimators: calibration.estimators,
+        recordings: infos.collect(),
+        uncertainty: Some(calibration.uncertainty),
+    })
+}
+
+/// Paths are the machine's own business; the name says which recording it was.
+fn file_name(path: &str) -> String {
+    Path::new(path).file_name().map_or_else(|| path.to_string(), |name| name.to_string_lossy().into_owned())
+}
+
+/// Quantity and unit that all recordings share.
+fn common_units(recordings: &[Recording]) -> Result<(Quantity, ReadingUnit), CliError> {
+    let first = &recordings[0];
+    let (quantity, reading) = (first.quantity().unwrap_or(Quantity::Strain), unit(first.trace.readings.kind));
+    for recording in recordings {
+        input::check_unit(&recording.name, recording.trace.readings.kind, reading)?;
+        if recording.quantity() != Some(quantity) {
+            return Err(CliError::Input(format!(
+                "{}:1: expected the reference `{}` as in {}, found another one",
+                recording.name,
+                quantity.name(),
+                first.name
+            )));
+        }
+    }
+    Ok((quantity, reading))
+}
+
+/// Writes a report of a recording; scores are about the rows from `scored_from_s` on.
+pub fn write_report(
+    path: &Path,
+    recording: &Recording,
+    params: &SensorParams,
+    scored_from_s: Option<f64>,
+) -> Result<(), CliError> {
+    let estimated = estimate(recording, params, None)?;
+    let filter = scoring::of_outputs(recording, &estimated.filtered, scored_from_s);
+    let smoother = scoring::of_outputs(recording, &estimated.smoothed, scored_from_s);
+    let cubic = scoring::of_static_cubic(recording, &params.static_cubic, scored_from_s);
+    let scores: Vec<ScoreRow> = [("filter", filter), ("smoother", smoother), ("static cubic", cubic)]
+        .into_iter()
+        .filter_map(|(name, scores)| {
+            scores.map(|scores| ScoreRow {
+                name,
+                rmse: scores.rmse,
+                rmse_percent_fs: scores.rmse_percent_fs,
+                coverage_95: scores.coverage_95,
+            })
+        })
+        .collect();
+    let input = ReportInput {
+        title: &file_name(&recording.name),
+        made_by: MADE_BY,
+        time_s: &recording.trace.time_s,
+        reading: &recording.trace.readings.values,
+        truth: recording.trace.reference.as_ref().map(|reference| reference.values.as_slice()),
+        filtered: &estimated.filtered,
+        smoothed: &estimated.smoothed,
+        params,
+        rest_reading: params.rest_reading,
+        scored_from_s,
+        scores: &scores,
+    };
+    let html = render(&input).map_err(|error| CliError::Other(error.to_string()))?;
+    write_file(path, |out| Ok(out.write_all(html.as_bytes())?))
+}

@@ -1,0 +1,24 @@
+//! One file per command.
+
+mod calibrate;
+mod demo;
+mod evaluate;
+mod filter;
+mod scoring;
+mod simulate;
+mod smooth;
+
+use crate::args::Command;
+use crate::error::CliError;
+
+/// Runs a command.
+pub fn dispatch(command: &Command) -> Result<(), CliError> {
+    match command {
+        Command::Demo(args) => demo::run(args),
+        Command::Simulate(args) => simulate::run(args),
+        Command::Calibrate(args) => calibrate::run(args),
+        Command::Filter(args) => filter::run(args),
+        Command::Smooth(args) => smooth::run(args),
+        Command::Evaluate(args) => evaluate::run(args),
+    }
+}

@@ -1,0 +1,75 @@
+use std::io;
+use std::path::Path;
+use std::process::ExitCode;
+
+use ohmstrain_bench_data::TraceError;
+use ohmstrain_calib::CalibrationError;
+use thiserror::Error;
+
+/// Why a command stopped; each kind has its exit code.
+#[derive(Debug, Error)]
+pub enum CliError {
+    /// The arguments contradict each other or the sensor file.
+    #[error("{0}")]
+    Arguments(String),
+    /// The contents of an input.
+    #[error("{0}")]
+    Input(String),
+    /// `evaluate --check` found the estimates wanting.
+    #[error("{0}")]
+    Check(String),
+    /// Whoever read our output has left.
+    #[error("the pipe is closed")]
+    ClosedPipe,
+    /// Anything else.
+    #[error("{0}")]
+    Other(String),
+}
+
+impl CliError {
+    /// Says what happened on stderr, unless it is nobody's business.
+    pub fn report(&self) -> ExitCode {
+        let code = match self {
+            Self::ClosedPipe => return ExitCode::SUCCESS,
+            Self::Other(_) => 1,
+            Self::Arguments(_) => 2,
+            Self::Check(_) => 3,
+            Self::Input(_) => 4,
+        };
+        eprintln!("ohmstrain: {self}");
+        ExitCode::from(code)
+    }
+
+    /// Calibration failed on the contents of `files`.
+    pub fn calibration(files: &str, error: &CalibrationError) -> Self {
+        match error {
+            CalibrationError::Optimiser(_) => Self::Other(error.to_string()),
+            _ => Self::Input(format!("{files}: {error}")),
+        }
+    }
+
+    /// `path` cannot be read or written.
+    pub fn file(doing: &str, path: &Path, error: &io::Error) -> Self {
+        Self::Other(format!("cannot {doing} {}: {error}", path.display()))
+    }
+}
+
+impl From<TraceError> for CliError {
+    fn from(error: TraceError) -> Self {
+        match error {
+            TraceError::Content(_) => Self::Input(error.to_string()),
+            _ => Self::Other(error.to_string()),
+        }
+    }
+}
+
+/// Errors of writing to stdout.
+impl From<io::Error> for CliError {
+    fn from(error: io::Error) -> Self {
+        if error.kind() == io::ErrorKind::BrokenPipe {
+            Self::ClosedPipe
+        } else {
+            Self::Other(format!("cannot write: {error}"))
+        }
+    }
+}

@@ -1,0 +1,109 @@
+use std::fs::File;
+use std::io::{self, BufReader, Read};
+use std::path::Path;
+
+use ohmstrain_bench_data::{Metadata, ReadingKind, Trace, TraceReader};
+use ohmstrain_calib::{JointParams, Quantity, ReadingUnit, Samples};
+use sha2::{Digest, Sha256};
+
+use crate::error::CliError;
+
+/// A recording in memory.
+pub struct Recording {
+    /// What messages call it.
+    pub name: String,
+    /// SHA-256 of its bytes, hexadecimal.
+    pub sha256: String,
+    /// Its contents.
+    pub trace: Trace,
+}
+
+/// Opens a recording for reading row by row; `-` is stdin.
+pub fn open(path: &Path, overrides: &Metadata) -> Result<TraceReader<Box<dyn Read>>, CliError> {
+    let source: Box<dyn Read> = if is_stdin(path) {
+        Box::new(io::stdin().lock())
+    } else {
+        Box::new(BufReader::new(File::open(path).map_err(|error| CliError::file("read", path, &error))?))
+    };
+    Ok(TraceReader::with_overrides(source, &path.display().to_string(), overrides)?)
+}
+
+/// Whether a path means stdin.
+pub fn is_stdin(path: &Path) -> bool {
+    path == Path::new("-")
+}
+
+/// Reads a whole recording.
+pub fn read(path: &Path, overrides: &Metadata) -> Result<Recording, CliError> {
+    let mut bytes = Vec::new();
+    if is_stdin(path) {
+        io::stdin().lock().read_to_end(&mut bytes)
+    } else {
+        File::open(path).and_then(|mut file| file.read_to_end(&mut bytes))
+    }
+    .map_err(|error| CliError::file("read", path, &error))?;
+    let name = path.display().to_string();
+    let sha256 = Sha256::digest(&bytes).iter().map(|byte| format!("{byte:02x}")).collect();
+    let trace = Trace::collect(TraceReader::with_overrides(bytes.as_slice(), &name, overrides)?)?;
+    Ok(Recording { name, sha256, trace })
+}
+
+impl Recording {
+    /// As calibration wants it.
+    pub fn samples(&self) -> Result<Samples<'_>, CliError> {
+        let Some(reference) = &self.trace.reference else {
+            return Err(CliError::Input(format!(
+                "{}:1: column `strain`: expected a reference (strain, displacement_mm or angle_deg), found none",
+                self.name
+            )));
+        };
+        Ok(Samples { time_s: &self.trace.time_s, reading: &self.trace.readings.values, strain: &reference.values })
+    }
+
+    /// What its reference measures.
+    pub fn quantity(&self) -> Option<Quantity> {
+        self.trace.reference.as_ref().map(|reference| match reference.quantity {
+            ohmstrain_bench_data::Quantity::Strain => Quantity::Strain,
+            ohmstrain_bench_data::Quantity::AngleDeg => Quantity::AngleDeg,
+        })
+    }
+
+    /// The joint that its metadata describe.
+    pub fn joint(&self) -> Option<JointParams> {
+        self.trace.metadata.joint.map(|joint| JointParams {
+            prestrain: joint.prestrain,
+            moment_arm_mm: joint.moment_arm_mm,
+            gauge_length_mm: joint.gauge_length_mm,
+        })
+    }
+}
+
+/// Unit of the readings.
+pub fn unit(kind: ReadingKind) -> ReadingUnit {
+    match kind {
+        ReadingKind::Ohm => ReadingUnit::Ohm,
+        ReadingKind::Ratio => ReadingUnit::Ratio,
+    }
+}
+
+/// The column that readings of a unit stand in.
+pub const fn reading_column(unit: ReadingUnit) -> &'static str {
+    match unit {
+        ReadingUnit::Ohm => "resistance_ohm",
+        ReadingUnit::Ratio => "resistance_ratio",
+    }
+}
+
+/// Refuses readings in another unit than the sensor's.
+pub fn check_unit(file: &str, found: ReadingKind, expected: ReadingUnit) -> Result<(), CliError> {
+    let found = unit(found);
+    if found == expected {
+        return Ok(());
+    }
+    Err(CliError::Input(format!(
+        "{file}:1: column `{}`: expected `{}` as in the sensor's calibration, found `{}`",
+        reading_column(found),
+        reading_column(expected),
+        reading_column(found)
+    )))
+}

@@ -1,0 +1,161 @@
+//! A recording with what the plots derive from it.
+
+use ohmstrain_calib::{Output, Quantity, ReadingUnit, SensorParams};
+
+use super::ReportInput;
+use super::axis::extent;
+use super::law::{Driven, Law};
+use super::motion::{self, Hold, Motion};
+use super::number::plain;
+
+/// Shortest hold whose relaxation is worth a plot, s.
+pub const SHORTEST_HOLD_S: f64 = 5.0;
+/// Holds that are plotted.
+const PLOTTED_HOLDS: usize = 4;
+/// Points of a gauge curve.
+const CURVE_POINTS: u32 = 200;
+
+/// The report's input and what follows from it.
+pub struct Recording<'a> {
+    /// Times, s.
+    pub time_s: &'a [f64],
+    /// Readings; NaN where missing.
+    pub reading: &'a [f64],
+    /// Reference, if it is known anywhere.
+    pub truth: Option<&'a [f64]>,
+    /// The filter's outputs.
+    pub filtered: &'a [Output],
+    /// The smoother's outputs.
+    pub smoothed: &'a [Output],
+    /// The sensor.
+    pub params: &'a SensorParams,
+    /// R₀.
+    pub rest_reading: f64,
+    /// Start of the part that is scored.
+    pub scored_from_s: Option<f64>,
+    /// The sensor's law.
+    pub law: Law<'a>,
+    /// What the strain does, row by row.
+    pub motions: Vec<Motion>,
+    /// The law driven by the reference.
+    pub driven: Option<Driven>,
+    strain: Vec<f64>,
+    held: Vec<Hold>,
+    held_driven: Driven,
+}
+
+impl<'a> Recording<'a> {
+    /// Everything that more than one plot needs.
+    pub fn new(input: &ReportInput<'a>) -> Self {
+        let truth = input.truth.filter(|truth| truth.iter().any(|x| x.is_finite()));
+        let estimates = if input.smoothed.is_empty() { input.filtered } else { input.smoothed };
+        let strain =
+            truth.map_or_else(|| estimates.iter().map(|output| output.estimate.strain.mean).collect(), <[f64]>::to_vec);
+        let law = Law::new(input.params, input.rest_reading);
+        let mut held = motion::holds(input.time_s, &strain, SHORTEST_HOLD_S);
+        if truth.is_none() {
+            held.retain(|hold| is_free(hold.strain, input.params));
+        }
+        let starts: Vec<usize> = held.iter().take(PLOTTED_HOLDS).map(|hold| hold.first).collect();
+        let driven = law.driven(input.time_s, &strain, &starts);
+        let (driven, held_driven) = if truth.is_some() {
+            let branches = driven.branches.clone();
+            (Some(driven), Driven { reading: vec![], branches })
+        } else {
+            (None, driven)
+        };
+        Self {
+            time_s: input.time_s,
+            reading: input.reading,
+            truth,
+            filtered: input.filtered,
+            smoothed: input.smoothed,
+            params: input.params,
+            rest_reading: input.rest_reading,
+            scored_from_s: input.scored_from_s,
+            motions: motion::motions(input.time_s, &strain, &held),
+            law,
+            driven,
+            strain,
+            held,
+            held_driven,
+        }
+    }
+
+    /// The reference, or the estimate where there is none.
+    pub fn known_strain(&self) -> &[f64] {
+        &self.strain
+    }
+
+    /// The longest holds, at most four, longest first.
+    pub fn longest_holds(&self) -> &[Hold] {
+        self.held.get(..PLOTTED_HOLDS).unwrap_or(&self.held)
+    }
+
+    /// The law's branches at the start of one of the longest holds.
+    pub fn branches_at(&self, row: usize) -> Option<&[f64]> {
+        self.held_driven.branches.get(&row).map(Vec::as_slice)
+    }
+
+    /// Points (strain, g) of the gauge curve over a range.
+    pub fn gauge_curve(&self, range: Option<(f64, f64)>) -> Vec<(f64, f64)> {
+        let Some((low, high)) = range else { return vec![] };
+        let at = |i: u32| low + f64::from(i) / f64::from(CURVE_POINTS) * (high - low);
+        (0..=CURVE_POINTS).map(|i| (at(i), self.law.gauge(at(i)))).collect()
+    }
+
+    /// Points (strain, reading) of the static calibration over the readings.
+    pub fn static_curve(&self) -> Vec<(f64, f64)> {
+        let Some((low, high)) = extent(self.reading.iter().copied()) else { return vec![] };
+        let at = |i: u32| low + f64::from(i) / f64::from(CURVE_POINTS) * (high - low);
+        (0..=CURVE_POINTS).map(|i| (self.params.static_cubic.strain(at(i)), at(i))).collect()
+    }
+
+    /// Axis label of the readings.
+    pub fn reading_label(&self) -> &'static str {
+        match self.params.reading {
+            ReadingUnit::Ohm => "Resistance, Ω",
+            ReadingUnit::Ratio => "Resistance ratio",
+        }
+    }
+
+    /// The estimated quantity.
+    pub fn quantity_name(&self) -> &'static str {
+        match self.params.quantity {
+            Quantity::Strain => "Strain",
+            Quantity::AngleDeg => "Angle",
+        }
+    }
+
+    /// Axis label of the estimated quantity.
+    pub fn quantity_label(&self) -> &'static str {
+        match self.params.quantity {
+            Quantity::Strain => "Strain",
+            Quantity::AngleDeg => "Angle, °",
+        }
+    }
+
+    /// Axis label of the reference, or of the estimate that stands for it.
+    pub fn known_strain_label(&self) -> String {
+        let source = if self.truth.is_some() { "reference" } else { "estimated" };
+        format!("{} ({source})", self.quantity_label())
+    }
+
+    /// A value of the estimated quantity.
+    pub fn with_unit(&self, value: f64) -> String {
+        match self.params.quantity {
+            Quantity::Strain => format!("strain {}", plain(value)),
+            Quantity::AngleDeg => format!("{}°", plain(value)),
+        }
+    }
+}
+
+/// Share of the limits' span within which an estimate leans on them.
+const AT_LIMIT: f64 = 0.02;
+
+/// Whether an estimated strain is away from the limits: one that they hold back does not mean that the body stands
+/// still.
+fn is_free(strain: f64, params: &SensorParams) -> bool {
+    let (limits, margin) = (params.limits, AT_LIMIT * params.limits.span());
+    strain > limits.lower + margin && strain < limits.upper - margin
+}

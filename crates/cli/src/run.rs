@@ -1,0 +1,88 @@
+use ohmstrain_bench_data::{Reading as TraceReading, Trace};
+use ohmstrain_calib::{EstimatorKind, Output, SensorParams, Start, build_filter};
+use ohmstrain_ekf::{Reading, StepError};
+
+use crate::args::{EstimateArgs, RestResistance};
+use crate::error::CliError;
+use crate::input::Recording;
+
+/// A reading relative to R₀, with what the electronics add to its variance.
+pub fn relative(value: f64, sd_ohm: Option<f64>, rest_reading: f64) -> Option<Reading<f64>> {
+    if !value.is_finite() {
+        return None;
+    }
+    let sd = sd_ohm.filter(|sd| sd.is_finite()).unwrap_or(0.0) / rest_reading;
+    Some(Reading { value: value / rest_reading - 1.0, extra_variance: sd * sd })
+}
+
+/// One streamed row relative to R₀.
+pub fn relative_row(reading: &TraceReading, rest_reading: f64) -> Option<Reading<f64>> {
+    relative(reading.value, reading.sd_ohm, rest_reading)
+}
+
+/// All readings of a trace relative to R₀.
+pub fn relative_trace(trace: &Trace, rest_reading: f64) -> Vec<Option<Reading<f64>>> {
+    let converter = trace.readings.converter.as_ref();
+    let sd = |k: usize| converter.and_then(|converter| converter.sd_ohm.get(k).copied());
+    trace.readings.values.iter().enumerate().map(|(k, &value)| relative(value, sd(k), rest_reading)).collect()
+}
+
+/// Where the filter starts.
+pub fn start(args: &EstimateArgs) -> Start {
+    args.initial_strain.map_or(Start::Unknown, Start::Strain)
+}
+
+/// R₀ for a recording whose first readings are `first`.
+pub fn rest_reading(
+    wanted: Option<RestResistance>,
+    params: &SensorParams,
+    first: impl Iterator<Item = f64>,
+    file: &str,
+) -> Result<f64, CliError> {
+    match wanted {
+        None => Ok(params.rest_reading),
+        Some(RestResistance::Value(value)) => Ok(value),
+        Some(RestResistance::First(count)) => {
+            let mut known: Vec<f64> = first.filter(|value| value.is_finite()).take(count).collect();
+            known.sort_by(f64::total_cmp);
+            match known.len() {
+                0 => Err(CliError::Input(format!("{file}: expected a reading among the first rows, found none"))),
+                n if n % 2 == 1 => Ok(known[n / 2]),
+                n => Ok(0.5 * (known[n / 2 - 1] + known[n / 2])),
+            }
+        }
+    }
+}
+
+/// Both passes over a recording.
+pub struct Estimated {
+    /// The filter's outputs, row by row.
+    pub filtered: Vec<Output>,
+    /// The smoother's.
+    pub smoothed: Vec<Output>,
+}
+
+/// Filters and smooths a recording.
+pub fn estimate(
+    recording: &Recording,
+    params: &SensorParams,
+    kind: Option<EstimatorKind>,
+) -> Result<Estimated, CliError> {
+    let trace = &recording.trace;
+    let readings = relative_trace(trace, params.rest_reading);
+    let build = || build_filter(params, kind, Start::Unknown).map_err(|error| CliError::Input(error.to_string()));
+    let mut filter = build()?;
+    let mut filtered = Vec::with_capacity(trace.time_s.len());
+    for (k, (&time_s, &reading)) in trace.time_s.iter().zip(&readings).enumerate() {
+        filter.step(time_s, reading).map_err(|error| step_error(&recording.name, k, error))?;
+        filtered.push(filter.output());
+    }
+    let smoothed =
+        build()?.smooth(&trace.time_s, &readings).map_err(|(k, error)| step_error(&recording.name, k, error))?;
+    Ok(Estimated { filtered, smoothed })
+}
+
+/// A filter's refusal as an error about the input.
+pub fn step_error(file: &str, row: usize, error: StepError) -> CliError {
+    CliError::Input(format!("{file}: data row {}: {error}", row + 1))
+}

@@ -1,0 +1,163 @@
+//! Gauge curves, front ends, the joint map and the relaxing-modulus law.
+
+use num_dual::Dual64;
+use ohmstrain_model::{
+    AdcCode, ConstantCurrent, Divider, Gauge, Joint, Modulus, Phase, PhaseStart, RelaxingModulus, SensorLaw,
+    SensorSide, StrainRange,
+};
+use proptest::prelude::*;
+
+#[test]
+fn gauge_curves_start_at_zero_and_know_their_borders() {
+    let peak = Gauge::DecayingExponential { slope: 3.0_f64, decay_strain: 0.23 };
+    assert_eq!(peak.static_borders(), [Some(0.23), None]);
+    let cubic = Gauge::Polynomial { coefficients: [1.2, -3.0, 1.0] };
+    let tunnel = Gauge::Tunnelling { gap: 1.0, barrier: 2.0, path_loss: -8.0 };
+    let straight = Gauge::Polynomial { coefficients: [1.2, 0.0, 0.0] };
+    assert_eq!(straight.static_borders(), [None, None]);
+    for gauge in [peak, cubic, tunnel, straight] {
+        assert_eq!(gauge.value_and_slope(0.0).0, 0.0);
+        for border in gauge.static_borders().into_iter().flatten() {
+            assert!(gauge.value_and_slope(border).1.abs() < 1e-13, "{gauge:?} at {border}");
+        }
+    }
+}
+
+#[test]
+fn a_law_goes_on_along_its_tangent() {
+    let law = SensorLaw::<f64, 0> {
+        gauge: Gauge::DecayingExponential { slope: 3.0, decay_strain: 0.23 },
+        extend_viscosity_s: 0.0,
+        retract_viscosity_s: 0.0,
+        branches: [],
+        range: StrainRange { lower: 0.0, upper: 0.3 },
+    };
+    assert_eq!(law.static_border(), Some(0.23));
+    let (edge, slope) = law.gauge_value_and_slope(0.3);
+    let (beyond, beyond_slope) = law.gauge_value_and_slope(0.5);
+    assert!((beyond - (edge + 0.2 * slope)).abs() < 1e-15);
+    assert_eq!(beyond_slope, slope);
+    assert_eq!(law.held_relative_change(0.1, &[], 10.0), law.relative_change(0.1, 0.0, &[], 0.0, Phase::Hold));
+}
+
+proptest! {
+    #[test]
+    fn angle_and_strain_are_inverse(pre in -0.1..0.3_f64, arm in 1.0..20.0_f64, length in 5.0..100.0_f64, angle in -2.0..2.0_f64) {
+        for arm in [arm, -arm] {
+            let joint = Joint::new(pre, arm, length).unwrap();
+            let (back, sd) = joint.angle_rad(joint.strain(angle), 0.01);
+            prop_assert!((back - angle).abs() < 1e-12);
+            // dε/dθ = r/L₀.
+            prop_assert!((sd - 0.01 * length / arm.abs()).abs() < 1e-12);
+        }
+    }
+
+    /// A code stands for the resistances that round to it: half a code to each side, which is √12/2 deviations.
+    #[test]
+    fn a_divider_reads_back_what_it_converted(ohm in 200.0..50_000.0_f64, low in any::<bool>(), bits in 8..=16_u32) {
+        let side = if low { SensorSide::Low } else { SensorSide::High };
+        let divider = Divider::new(4_700.0, side, bits, 0.0).unwrap();
+        let code = divider.code(ohm).round() as u32;
+        if let AdcCode::Reading(reading) = divider.read(code) {
+            // Second order: the curve bends over half a code by at most the share of a code in the ratio.
+            let bend = 1.0 + 4.0 * reading.sd_ohm / reading.resistance_ohm * 12_f64.sqrt();
+            prop_assert!((reading.resistance_ohm - ohm).abs() <= 0.5 * 12_f64.sqrt() * reading.sd_ohm * bend);
+        } else {
+            prop_assert!(code == 0 || code >= (1 << bits) - 1);
+        }
+    }
+}
+
+/// At mid-scale a 10-bit divider resolves 0.39 % of R, a 12-bit one 0.098 %.
+#[test]
+fn resolution_of_a_divider_at_mid_scale() {
+    for (bits, percent) in [(10, 0.39), (12, 0.098)] {
+        let divider = Divider::new(1_000.0_f64, SensorSide::Low, bits, 0.0).unwrap();
+        let AdcCode::Reading(reading) = divider.read(1 << (bits - 1)) else { panic!("saturated") };
+        let step_percent = 100.0 * 12_f64.sqrt() * reading.sd_ohm / reading.resistance_ohm;
+        assert!((step_percent / percent - 1.0).abs() < 0.01, "{bits} bits: {step_percent} %");
+    }
+}
+
+#[test]
+fn converters_saturate_at_both_ends() {
+    let source = ConstantCurrent::new(1e-4_f64, 10.0, 3.3, 12, 0.5).unwrap();
+    assert_eq!(source.read(0), AdcCode::Saturated);
+    assert_eq!(source.read(4095), AdcCode::Saturated);
+    let AdcCode::Reading(reading) = source.read(2048) else { panic!("saturated") };
+    assert!((reading.resistance_ohm - 2048.0 * 3.3 / 4095.0 / 1e-3).abs() < 1e-9);
+    assert!(Divider::new(-1.0, SensorSide::Low, 12, 0.0).is_err());
+    assert!(ConstantCurrent::new(1e-4, 10.0, 3.3, 0, 0.5).is_err());
+}
+
+fn relaxing() -> RelaxingModulus<f64, 0> {
+    RelaxingModulus::new(9_000.0, 150.0, 0.12, Modulus::Single { tau_s: 20.0 }).unwrap()
+}
+
+/// Equation 8 while stretching from rest at a constant speed: R = r₀ e^(-t/τ₀) v t + v η + r₁.
+#[test]
+fn relaxing_modulus_is_equation_8_while_stretching() {
+    let (law, v, r1) = (relaxing(), 0.03, 5_500.0);
+    let start = law.begin(Phase::Extend, 0.0, 0.0, r1);
+    for t in [0.0, 1.0, 5.0, 11.0] {
+        let (ohm, [slope, viscosity]) = law.resistance_ohm(&start, t, v * t, v);
+        let expected = 9_000.0 * (-t / 20.0_f64).exp() * v * t + v * 150.0 + r1;
+        assert!((ohm - expected).abs() < 1e-9);
+        assert!((slope - 9_000.0 * (-t / 20.0_f64).exp()).abs() < 1e-9);
+        assert_eq!(viscosity, 150.0);
+    }
+}
+
+/// Equation 9 in a hold, R′ = r₀′ R₀ e^(-t/τ₀) + r₁′, where R₀ is the resistance at the start of the hold and continuity
+/// asks r₁′ = R₀ (1 - r₀′).
+#[test]
+fn relaxing_modulus_is_equation_9_in_a_hold() {
+    let law = relaxing();
+    let at_stop = law.resistance_ohm(&law.begin(Phase::Extend, 0.0, 0.0, 5_500.0), 11.0, 0.33, 0.03).0;
+    let start = law.begin(Phase::Hold, 0.33, 0.0, at_stop);
+    assert_eq!(law.resistance_ohm(&start, 0.0, 0.33, 0.0).0, at_stop);
+    for t in [1.0, 30.0, 300.0] {
+        let (ohm, gradient) = law.resistance_ohm(&start, t, 0.33, 0.0);
+        let expected = 0.12 * at_stop * (-t / 20.0_f64).exp() + at_stop * (1.0 - 0.12);
+        assert!((ohm - expected).abs() < 1e-9);
+        assert_eq!(gradient, [0.0, 0.0]);
+    }
+}
+
+/// For a ramp from zero strain equation 8 is a decaying-exponential gauge curve with ε₀ = v τ₀.
+#[test]
+fn on_a_ramp_equation_8_is_a_gauge_curve() {
+    let (law, v) = (relaxing(), 0.03);
+    let gauge = Gauge::DecayingExponential { slope: 9_000.0, decay_strain: v * 20.0 };
+    let start = PhaseStart { phase: Phase::Extend, strain: 0.0, resistance_ohm: 0.0 };
+    for t in [0.5, 3.0, 8.0] {
+        let (ohm, _) = law.resistance_ohm(&start, t, v * t, v);
+        assert!((ohm - (gauge.value_and_slope(v * t).0 + 150.0 * v)).abs() < 1e-9);
+    }
+}
+
+/// Its gradient against dual numbers, with the Prony modulus of equation 7.
+#[test]
+fn relaxing_modulus_gradient_equals_dual_numbers() {
+    let exact = RelaxingModulus::new(
+        9_000.0,
+        150.0,
+        0.12,
+        Modulus::Prony { floor: 0.4, weights: [0.4, 0.2], taus_s: [2.0, 40.0] },
+    )
+    .unwrap();
+    let dual = RelaxingModulus::<Dual64, 2>::new(
+        9_000.0.into(),
+        150.0.into(),
+        0.12.into(),
+        Modulus::Prony { floor: 0.4.into(), weights: [0.4.into(), 0.2.into()], taus_s: [2.0.into(), 40.0.into()] },
+    )
+    .unwrap();
+    let start = exact.begin(Phase::Retract, 0.3, 0.02, 7_000.0);
+    let dual_start = dual.begin(Phase::Retract, 0.3.into(), 0.02.into(), 7_000.0.into());
+    let (_, [by_strain, by_rate]) = exact.resistance_ohm(&start, 3.0, 0.25, -0.02);
+    let strain = Dual64::from(0.25).derivative();
+    let rate = Dual64::from(-0.02).derivative();
+    assert!((dual.resistance_ohm(&dual_start, 3.0.into(), strain, (-0.02).into()).0.eps - by_strain).abs() < 1e-9);
+    assert!((dual.resistance_ohm(&dual_start, 3.0.into(), 0.25.into(), rate).0.eps - by_rate).abs() < 1e-9);
+}

@@ -1,0 +1,235 @@
+//! The state-space model against derivatives from dual numbers, against itself in two halves, and at its corners.
+
+use nalgebra::{SMatrix, SVector};
+use num_dual::Dual64;
+use ohmstrain_model::{
+    Branch, Direction, Gauge, ModelNoise, Motion, Phase, Scalar, SensorLaw, StrainRange, SwitchedModel, Transition,
+};
+use proptest::prelude::*;
+
+const DIRECTIONS: [Direction<f64>; 4] = [
+    Direction::Known(Phase::Extend),
+    Direction::Known(Phase::Hold),
+    Direction::Known(Phase::Retract),
+    Direction::Uncertain { rate_sd: 0.03 },
+];
+
+fn in_duals(direction: Direction<f64>) -> Direction<Dual64> {
+    match direction {
+        Direction::Known(phase) => Direction::Known(phase),
+        Direction::Uncertain { rate_sd } => Direction::Uncertain { rate_sd: rate_sd.into() },
+    }
+}
+
+fn law<T: Scalar>(gauge: Gauge<T>, slope: f64) -> SensorLaw<T, 2> {
+    let branch = |tau_s: f64, sign: f64| Branch {
+        tau_s: T::of(tau_s),
+        extend_gain: T::of(0.9),
+        retract_gain: T::of(-0.6 * sign),
+        extend_gain_slope: T::of(-0.8 * slope),
+        retract_gain_slope: T::of(0.5 * slope),
+    };
+    SensorLaw {
+        gauge,
+        extend_viscosity_s: T::of(0.03),
+        retract_viscosity_s: T::of(-0.02),
+        branches: [branch(2.0, 1.0), branch(40.0, -1.0)],
+        range: StrainRange { lower: T::of(-0.5), upper: T::of(0.5) },
+    }
+}
+
+fn noise<T: Scalar>() -> ModelNoise<T> {
+    ModelNoise {
+        reading_sd: T::of(1e-3),
+        branch_sd: T::of(4e-3),
+        baseline_sd: T::of(0.02),
+        baseline_time_s: T::of(30.0),
+    }
+}
+
+fn polynomial<T: Scalar>() -> Gauge<T> {
+    Gauge::Polynomial { coefficients: [T::of(1.4), T::of(-2.0), T::of(0.7)] }
+}
+
+fn model<T: Scalar>(gauge: Gauge<T>, slope: f64) -> SwitchedModel<T, 3, 2, 6> {
+    let motion = Motion::smooth(T::of(0.05), T::of(0.08), T::of(0.1), T::of(0.12)).unwrap();
+    SwitchedModel::new(law(gauge, slope), motion, noise()).unwrap()
+}
+
+fn state() -> impl Strategy<Value = SVector<f64, 6>> {
+    let wide = -0.2..0.2_f64;
+    (0.0..0.3_f64, -0.1..0.1_f64, wide.clone(), wide.clone(), wide.clone(), wide)
+        .prop_map(|(e, v, a, c1, c2, b)| SVector::from([e, v, a, c1, c2, b]))
+}
+
+/// The state with a unit derivative in component `j`.
+fn seeded(state: &SVector<f64, 6>, j: usize) -> SVector<Dual64, 6> {
+    SVector::from_fn(|i, _| if i == j { Dual64::from(state[i]).derivative() } else { state[i].into() })
+}
+
+proptest! {
+    /// Dual numbers are exact; the analytic Jacobian sums a dozen products, so a dozen ε of the largest one.
+    #[test]
+    fn jacobian_equals_dual_numbers(state in state(), dt in 0.01..3.0_f64) {
+        let exact = model::<f64>(polynomial(), 1.0);
+        let dual = model::<Dual64>(polynomial(), 1.0);
+        for direction in DIRECTIONS {
+            let at: Transition<f64, 6, 21> = exact.transition(&exact.prepare(dt), &state, direction);
+            for j in 0..6 {
+                let moved: Transition<Dual64, 6, 21> =
+                    dual.transition(&dual.prepare(dt.into()), &seeded(&state, j), in_duals(direction));
+                for i in 0..6 {
+                    let expected = moved.mean[i].eps;
+                    prop_assert!(
+                        (at.jacobian[(i, j)] - expected).abs() < 1e-13 * (1.0 + expected.abs()),
+                        "{direction:?} ∂x{i}/∂x{j}: {} vs {expected}", at.jacobian[(i, j)]
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn gradient_of_the_reading_equals_dual_numbers(state in state()) {
+        let families: [(Gauge<f64>, Gauge<Dual64>); 3] = [
+            (polynomial(), polynomial()),
+            (
+                Gauge::DecayingExponential { slope: 3.0, decay_strain: 0.2 },
+                Gauge::DecayingExponential { slope: 3.0.into(), decay_strain: 0.2.into() },
+            ),
+            (
+                Gauge::Tunnelling { gap: 2.0, barrier: 1.5, path_loss: -4.0 },
+                Gauge::Tunnelling { gap: 2.0.into(), barrier: 1.5.into(), path_loss: (-4.0).into() },
+            ),
+        ];
+        for (gauge, dual_gauge) in families {
+            let (exact, dual) = (model(gauge, 1.0), model(dual_gauge, 1.0));
+            for direction in DIRECTIONS {
+                let at = exact.observe(&state, direction);
+                for j in 0..6 {
+                    let expected = dual.observe(&seeded(&state, j), in_duals(direction)).value.eps;
+                    prop_assert!((at.gradient[j] - expected).abs() < 1e-13 * (1.0 + expected.abs()));
+                }
+            }
+        }
+    }
+
+    /// With constant gains and a given phase one step is two: exact in mean, Jacobian and noise.
+    #[test]
+    fn splitting_a_step_changes_nothing(state in state(), first in 0.001..2.0_f64, second in 0.001..2.0_f64) {
+        let model = model::<f64>(polynomial(), 0.0);
+        for phase in Phase::ALL {
+            let direction = Direction::Known(phase);
+            let over = |dt: f64, from: &SVector<f64, 6>| -> Transition<f64, 6, 21> {
+                model.transition(&model.prepare(dt), from, direction)
+            };
+            let whole = over(first + second, &state);
+            let a = over(first, &state);
+            let b = over(second, &a.mean);
+            let noise = a.noise.congruence(&b.jacobian).plus(&b.noise);
+            prop_assert!((whole.mean - b.mean).amax() < 1e-13);
+            prop_assert!((whole.jacobian - b.jacobian * a.jacobian).amax() < 1e-13);
+            for i in 0..6 {
+                for j in 0..6 {
+                    let scale = (whole.noise[(i, i)] * whole.noise[(j, j)]).sqrt();
+                    prop_assert!((whole.noise[(i, j)] - noise[(i, j)]).abs() <= 1e-12 * scale);
+                }
+            }
+        }
+    }
+
+    /// The noise of a linearised step is a covariance even where the gain depends on the noisy strain.
+    #[test]
+    fn noise_is_positive_semi_definite(state in state(), dt in 0.001..20.0_f64) {
+        let model = model::<f64>(polynomial(), 3.0);
+        for direction in DIRECTIONS {
+            let step: Transition<f64, 6, 21> = model.transition(&model.prepare(dt), &state, direction);
+            let q: SMatrix<f64, 6, 6> = step.noise.to_matrix();
+            let eigenvalues = q.symmetric_eigenvalues();
+            prop_assert!(eigenvalues.min() >= -1e-15 * eigenvalues.max());
+        }
+    }
+}
+
+/// Known moments of |v|: for v ~ N(0, s²) both halves see s/√(2π), within the 0.0095 · s · few of the logistic normal.
+#[test]
+fn an_uncertain_direction_drives_both_gains() {
+    let mut only_extend = law::<f64>(polynomial(), 0.0);
+    for branch in &mut only_extend.branches {
+        branch.retract_gain = 0.0;
+    }
+    let motion = Motion::ornstein_uhlenbeck(1e6, 0.05, 0.0, f64::INFINITY).unwrap();
+    let model = SwitchedModel::<f64, 2, 2, 5>::new(only_extend, motion, noise()).unwrap();
+    let dt = 1e-3;
+    let rest = SVector::from([0.1, 0.0, 0.0, 0.0, 0.0]);
+    let step: Transition<f64, 5, 15> =
+        model.transition(&model.prepare(dt), &rest, Direction::Uncertain { rate_sd: 0.05 });
+    let expected = 0.9 * dt * 0.05 / std::f64::consts::TAU.sqrt();
+    // ln 2/1.702 = 0.4073 stands for 1/√(2π) = 0.3989.
+    assert!((step.mean[2] / expected - 1.0).abs() < 0.022, "{} vs {expected}", step.mean[2]);
+    // Where the direction is certain, the split is the sign.
+    let moving = SVector::from([0.1, 0.5, 0.0, 0.0, 0.0]);
+    let certain: Transition<f64, 5, 15> =
+        model.transition(&model.prepare(dt), &moving, Direction::Uncertain { rate_sd: 0.01 });
+    let known: Transition<f64, 5, 15> = model.transition(&model.prepare(dt), &moving, Direction::Known(Phase::Extend));
+    assert!((certain.mean - known.mean).amax() < 1e-15);
+}
+
+#[test]
+fn a_hold_holds() {
+    let model = model::<f64>(polynomial(), 1.0);
+    let state = SVector::from([0.2, 0.05, 0.01, 0.3, -0.1, 0.02]);
+    let step: Transition<f64, 6, 21> = model.transition(&model.prepare(10.0), &state, Direction::Known(Phase::Hold));
+    assert_eq!(step.mean[0], 0.2);
+    assert_eq!((step.mean[1], step.mean[2]), (0.0, 0.0));
+    assert!((step.mean[3] - 0.3 * (-5.0_f64).exp()).abs() < 1e-16);
+    assert!((step.mean[4] + 0.1 * (-0.25_f64).exp()).abs() < 1e-16);
+    assert_eq!(step.noise[(0, 0)], 0.0);
+}
+
+/// Long-run variances stay what they are: P = F P Fᵀ + Q.
+#[test]
+fn the_initial_distribution_is_stationary() {
+    let motion = Motion::smooth(0.05, 0.08, 0.1, 0.12).unwrap();
+    let mut relaxed = law::<f64>(polynomial(), 0.0);
+    for branch in &mut relaxed.branches {
+        (branch.extend_gain, branch.retract_gain) = (0.0, 0.0);
+    }
+    let model = SwitchedModel::<f64, 3, 2, 6>::new(relaxed, motion, noise()).unwrap();
+    let (mean, variance) = model.initial_distribution();
+    let step: Transition<f64, 6, 21> = model.transition(&model.prepare(0.7), &mean, Direction::Known(Phase::Extend));
+    // Smooth motion correlates strain with acceleration; compare what the diagonal start determines in the long run.
+    let mut covariance = ohmstrain_model::Symmetric::<f64, 6, 21>::from_diagonal(&variance);
+    for _ in 0..2000 {
+        covariance = covariance.congruence(&step.jacobian).plus(&step.noise);
+    }
+    for (i, variance) in variance.iter().enumerate() {
+        assert!((covariance[(i, i)] / variance - 1.0).abs() < 1e-9, "{i}: {} vs {variance}", covariance[(i, i)]);
+    }
+    assert!((step.mean - mean).amax() < 1e-15);
+}
+
+#[test]
+fn wrong_parameters_are_named() {
+    let motion = Motion::ornstein_uhlenbeck(1.0, 0.05, 0.0, 0.1).unwrap();
+    let refuse = |law: SensorLaw<f64, 2>, noise: ModelNoise<f64>| {
+        SwitchedModel::<f64, 2, 2, 5>::new(law, motion, noise).unwrap_err().parameter
+    };
+    let good = law::<f64>(polynomial(), 1.0);
+    let mut bad = good;
+    bad.branches[1].tau_s = 0.0;
+    assert_eq!(refuse(bad, noise()), "tau_s");
+    assert_eq!(
+        refuse(SensorLaw { gauge: Gauge::DecayingExponential { slope: 1.0, decay_strain: 0.0 }, ..good }, noise()),
+        "gauge.decay_strain"
+    );
+    assert_eq!(refuse(SensorLaw { extend_viscosity_s: f64::NAN, ..good }, noise()), "viscosity_s");
+    assert_eq!(refuse(SensorLaw { range: StrainRange { lower: 1.0, upper: 1.0 }, ..good }, noise()), "range");
+    assert_eq!(refuse(good, ModelNoise { branch_sd: -1.0, ..noise() }), "branch_sd");
+    assert_eq!(refuse(good, ModelNoise { reading_sd: f64::NAN, ..noise() }), "reading_sd");
+    assert_eq!(refuse(good, ModelNoise { baseline_time_s: 0.0, ..noise() }), "baseline_time_s");
+    assert_eq!(Motion::<f64, 2>::ornstein_uhlenbeck(1.0, -0.05, 0.0, 0.1).unwrap_err().parameter, "rate_sd");
+    assert_eq!(Motion::<f64, 2>::ornstein_uhlenbeck(f64::NAN, 0.05, 0.0, 0.1).unwrap_err().parameter, "rate_time_s");
+    // σ_v² = σ_ε σ_a is the limit of what can be stationary.
+    assert_eq!(Motion::<f64, 3>::smooth(0.1, 0.1, 0.0, 0.1).unwrap_err().parameter, "acceleration_sd");
+}
