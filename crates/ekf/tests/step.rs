@@ -1,0 +1,140 @@
+//! What every step must keep, whatever the model.
+
+use nalgebra::SVector;
+use ohmstrain_ekf::{Belief, Ekf, Reading, StepError};
+use ohmstrain_model::{Branch, Gauge, ModelNoise, Motion, Scalar, SensorLaw, StrainRange, SwitchedModel, Symmetric};
+use proptest::prelude::*;
+
+/// A sensor whose strains are counted in units of `1/unit` and whose readings are relative to R₀.
+fn sensor<T: Scalar>(unit: f64) -> SwitchedModel<T, 2, 2, 5> {
+    let of = |x: f64| T::of(x);
+    let branch = |tau_s: f64| Branch {
+        tau_s: of(tau_s),
+        extend_gain: of(0.8 / unit),
+        retract_gain: of(-0.5 / unit),
+        extend_gain_slope: of(-0.6 / unit / unit),
+        retract_gain_slope: of(-0.4 / unit / unit),
+    };
+    let law = SensorLaw {
+        gauge: Gauge::Polynomial { coefficients: [of(1.6 / unit), of(-1.2 / unit.powi(2)), of(0.5 / unit.powi(3))] },
+        extend_viscosity_s: of(0.02 / unit),
+        retract_viscosity_s: of(-0.01 / unit),
+        branches: [branch(3.0), branch(40.0)],
+        range: StrainRange { lower: of(-0.02 * unit), upper: of(0.35 * unit) },
+    };
+    let motion = Motion::ornstein_uhlenbeck(of(1.5), of(0.05 * unit), of(0.15 * unit), of(0.1 * unit)).unwrap();
+    let noise =
+        ModelNoise { reading_sd: of(2e-3), branch_sd: of(5e-3), baseline_sd: of(0.02), baseline_time_s: of(30.0) };
+    SwitchedModel::new(law, motion, noise).unwrap()
+}
+
+fn readings() -> impl Strategy<Value = Vec<(f64, Option<f64>)>> {
+    prop::collection::vec((0.0..0.4_f64, prop::option::weighted(0.8, -0.1..0.6_f64)), 1..60)
+}
+
+fn run<T: Scalar>(
+    model: SwitchedModel<T, 2, 2, 5>,
+    rows: &[(f64, Option<f64>)],
+) -> Result<(Belief<T, 5, 15>, T), StepError> {
+    let ekf = Ekf::new(model);
+    let mut belief = Belief::initial(&model);
+    let mut log_likelihood = T::zero();
+    for (dt_s, reading) in rows {
+        let step = ekf.step(&belief, T::of(*dt_s), reading.map(|y| Reading::from(T::of(y))))?;
+        belief = step.posterior;
+        log_likelihood += step.update.map_or(T::zero(), |update| update.log_likelihood);
+    }
+    Ok((belief, log_likelihood))
+}
+
+proptest! {
+    /// Strain in another unit changes nothing but scale: nothing in a step has an absolute size. Units are powers of two
+    /// (2⁻³⁰ is about 1e-9), which scale every number without rounding, so the results are equal to the last bit. The
+    /// branches and the baseline are in units of R₀ and stay.
+    #[test]
+    fn units_do_not_matter(rows in readings()) {
+        let (plain, log_likelihood) = run(sensor::<f64>(1.0), &rows).unwrap();
+        for unit in [2_f64.powi(-30), 64.0, 2_f64.powi(20)] {
+            let (scaled, scaled_likelihood) = run(sensor::<f64>(unit), &rows).unwrap();
+            let scale = [unit, unit, 1.0, 1.0, 1.0];
+            for i in 0..5 {
+                prop_assert_eq!(scaled.mean[i] / scale[i], plain.mean[i]);
+                for j in 0..5 {
+                    prop_assert_eq!(scaled.covariance[(i, j)] / scale[i] / scale[j], plain.covariance[(i, j)]);
+                }
+            }
+            prop_assert_eq!(scaled_likelihood, log_likelihood);
+        }
+    }
+
+    /// Without readings a step is the model's transition and nothing else, and steps of zero seconds do nothing.
+    #[test]
+    fn missing_readings_are_predictions(rows in readings()) {
+        let model = sensor::<f64>(1.0);
+        let ekf = Ekf::new(model);
+        let mut belief: Belief<f64, 5, 15> = Belief::initial(&model);
+        for (dt_s, _) in rows {
+            let step = ekf.step(&belief, dt_s, None).unwrap();
+            prop_assert_eq!(step.prior, step.posterior);
+            prop_assert!(step.update.is_none());
+            prop_assert_eq!(step.prior.mean, step.transition.mean);
+            let stood = ekf.step(&step.posterior, 0.0, None).unwrap();
+            prop_assert_eq!(stood.posterior, step.posterior);
+            belief = step.posterior;
+        }
+    }
+
+    #[test]
+    fn covariances_stay_positive_semi_definite_in_f32(rows in readings()) {
+        let (belief, _) = run(sensor::<f32>(1.0), &rows).unwrap();
+        let eigenvalues = belief.covariance.to_matrix().symmetric_eigenvalues();
+        prop_assert!(eigenvalues.min() >= -1e-6 * eigenvalues.max());
+        for i in 0..5 {
+            prop_assert!(belief.covariance[(i, i)] >= 0.0);
+        }
+    }
+
+    /// A prepared step is the step.
+    #[test]
+    fn prepared_steps_are_steps(dt_s in 0.001..2.0_f64, y in 0.0..0.5_f64) {
+        let model = sensor::<f64>(1.0);
+        let ekf = Ekf::new(model);
+        let belief: Belief<f64, 5, 15> = Belief::initial(&model);
+        let prepared = model.prepare(dt_s);
+        let reading = Some(Reading::from(y));
+        prop_assert_eq!(ekf.step(&belief, dt_s, reading).unwrap(), ekf.step_prepared(&belief, &prepared, reading).unwrap());
+    }
+}
+
+#[test]
+fn bad_input_is_refused_by_name() {
+    let model = sensor::<f64>(1.0);
+    let ekf = Ekf::new(model);
+    let belief: Belief<f64, 5, 15> = Belief::initial(&model);
+    let step = |dt_s: f64, y: f64| ekf.step(&belief, dt_s, Some(Reading::from(y))).unwrap_err();
+    assert_eq!(step(-1e-3, 0.1), StepError::NegativeTimeStep);
+    assert_eq!(step(f64::NAN, 0.1), StepError::NonFiniteTimeStep);
+    assert_eq!(step(f64::INFINITY, 0.1), StepError::NonFiniteTimeStep);
+    assert_eq!(step(0.1, f64::NAN), StepError::NonFiniteReading);
+    assert_eq!(step(0.1, f64::NEG_INFINITY), StepError::NonFiniteReading);
+    let broken = Belief { covariance: Symmetric::from_diagonal(&[-1.0; 5]), ..belief };
+    let refused = ekf.step(&broken, 0.0, Some(Reading::from(0.1))).unwrap_err();
+    assert_eq!(refused, StepError::NonPositiveInnovationVariance);
+    let lost = Belief { mean: SVector::repeat(f64::NAN), ..belief };
+    assert!(ekf.step(&lost, 0.1, None).is_err());
+    // A gap of a day is a prediction, not an overflow.
+    assert!(ekf.step(&belief, 86_400.0, Some(Reading::from(0.1))).unwrap().posterior.is_finite());
+}
+
+/// What the electronics add to a reading's variance makes it count for less.
+#[test]
+fn a_coarser_reading_moves_the_belief_less() {
+    let model = sensor::<f64>(1.0);
+    let ekf = Ekf::new(model);
+    let belief: Belief<f64, 5, 15> = Belief::initial(&model);
+    let moved = |extra_variance: f64| {
+        let step = ekf.step(&belief, 0.1, Some(Reading { value: 0.5, extra_variance })).unwrap();
+        (step.posterior.mean - step.prior.mean).norm()
+    };
+    assert!(moved(0.0) > moved(1e-3) && moved(1e-3) > moved(1.0));
+}
