@@ -116,7 +116,7 @@ fn search_taus(regression: &LawRegression, branches: usize) -> Result<(Vec<f64>,
     let design = everything.design(regression);
     let normal = regression.normal(&design, &regression.median_readings());
     let first_branch = design.columns.len() - GRID * BRANCH_COLUMNS;
-    let spacing = LEAST_SPACING.min((grid[GRID - 1] - grid[0]) / (branches.max(2) - 1) as f64);
+    let spacing = LEAST_SPACING.min(0.7 * (grid[GRID - 1] - grid[0]) / (branches.max(2) - 1) as f64);
     let too_close = |subset: &Vec<usize>| subset.windows(2).any(|pair| grid[pair[1]] - grid[pair[0]] < spacing - 1e-9);
     let mut best: Option<(f64, Vec<usize>, f64)> = None;
     for subset in subsets(GRID, branches).into_iter().filter(|subset| !too_close(subset)) {

@@ -1,0 +1,253 @@
+//! Calibration on sensors whose law is known because the test wrote it down.
+
+use std::f64::consts::TAU;
+
+use ohmstrain_calib::{
+    CalibrationError, EstimatorKind, FORMAT, GaugeFamily, LawOptions, Quantity, RangeParams, ReadingUnit, Samples,
+    ScoredRow, Scores, SensorParams, Start, StaticCubic, build_filter, calibrate, fit_law,
+};
+use ohmstrain_ekf::Reading;
+
+/// A recording with known strain, as owned vectors.
+#[derive(Clone)]
+struct Bench {
+    time_s: Vec<f64>,
+    reading: Vec<f64>,
+    strain: Vec<f64>,
+}
+
+impl Bench {
+    fn samples(&self) -> Samples<'_> {
+        Samples { time_s: &self.time_s, reading: &self.reading, strain: &self.strain }
+    }
+}
+
+/// A small deterministic noise: the fractional parts of multiples of the golden ratio, roughly uniform in ±1.
+fn jitter(k: usize) -> f64 {
+    2.0 * (k as f64 * 0.618_033_988_749_895).fract() - 1.0
+}
+
+/// The switched law written out naively, one explicit Euler step of a millisecond at a time.
+fn record(rest_ohm: f64, phase: f64, noise: f64) -> Bench {
+    let strain_at = |t: f64| 0.15 + 0.08 * (TAU * t / 17.0 + phase).sin() + 0.06 * (TAU * t / 7.3).sin();
+    let mut bench = Bench { time_s: vec![], reading: vec![], strain: vec![] };
+    let (mut fast, mut slow) = (0.0, 0.0);
+    let inner = 1e-3;
+    for step in 0..150_000_usize {
+        let t = step as f64 * inner;
+        let (strain, rate) = (strain_at(t), (strain_at(t + inner) - strain_at(t)) / inner);
+        if step % 100 == 0 {
+            let viscosity = if rate > 0.0 { 0.02 } else { -0.01 };
+            let rho = 1.8 * strain - 1.1 * strain * strain + viscosity * rate + fast + slow;
+            bench.time_s.push(t);
+            bench.reading.push(rest_ohm * (1.0 + rho + noise * jitter(step / 100)));
+            bench.strain.push(strain);
+        }
+        let (k_fast, k_slow) = if rate > 0.0 { (0.5 - 0.4 * strain, 0.3) } else { (-0.3, -0.2 + 0.3 * strain) };
+        fast += inner * (-fast / 4.0 + k_fast * rate);
+        slow += inner * (-slow / 30.0 + k_slow * rate);
+    }
+    bench
+}
+
+#[test]
+fn the_law_explains_a_sensor_of_its_own_kind() {
+    let bench = record(1500.0, 0.0, 1e-3);
+    let fit = fit_law(&[bench.samples()], LawOptions::default()).unwrap();
+    let rms = |rows: &[f64]| (rows.iter().map(|r| r * r).sum::<f64>() / rows.len() as f64).sqrt();
+    // The readings span 0.5 R₀. The ridge costs a few per cent of that, on blocks left out a little more.
+    assert!(rms(&fit.law.residuals[0]) < 0.015, "{}", rms(&fit.law.residuals[0]));
+    assert!(fit.law.cross_validated_error < 0.02, "{}", fit.law.cross_validated_error);
+    // Nothing was recorded at zero strain for long: the ridge moves R₀ and the gauge's slope together, and only what
+    // they make of the recorded strains is determined.
+    let taus: Vec<f64> = fit.law.law.branches.iter().map(|branch| branch.tau_s).collect();
+    assert!(taus.len() == 2 && taus[0] < taus[1], "{taus:?}");
+}
+
+#[test]
+fn standard_errors_shrink_with_noise_and_form_a_covariance() {
+    let errors =
+        |noise: f64| fit_law(&[record(1500.0, 0.0, noise).samples()], LawOptions::default()).unwrap().uncertainty;
+    let (quiet, noisy) = (errors(1e-4), errors(0.1));
+    assert_eq!(quiet.names[0], "rest_reading");
+    assert!(quiet.standard_errors[0] > 0.0 && quiet.standard_errors[0] < noisy.standard_errors[0]);
+    for (i, row) in quiet.covariance.iter().enumerate() {
+        assert!((row[i].sqrt() - quiet.standard_errors[i]).abs() <= 1e-12 * quiet.standard_errors[i]);
+        for (j, value) in row.iter().enumerate() {
+            let limit = quiet.standard_errors[i] * quiet.standard_errors[j];
+            assert!(value.abs() <= limit * (1.0 + 1e-9), "correlation above one");
+        }
+    }
+}
+
+#[test]
+fn recordings_keep_their_own_rest_resistance() {
+    let (a, b) = (record(1500.0, 0.0, 1e-3), record(2100.0, 1.0, 1e-3));
+    let fit = fit_law(&[a.samples(), b.samples()], LawOptions::default()).unwrap();
+    let ratio = fit.law.rest_readings[1] / fit.law.rest_readings[0];
+    assert!((ratio / 1.4 - 1.0).abs() < 0.01, "{ratio}");
+}
+
+#[test]
+fn every_gauge_family_and_number_of_branches_can_be_fitted() {
+    let bench = record(1500.0, 0.0, 1e-3);
+    for gauge in [GaugeFamily::Polynomial, GaugeFamily::DecayingExponential, GaugeFamily::Tunnelling] {
+        let fit = fit_law(&[bench.samples()], LawOptions { gauge, ..LawOptions::default() }).unwrap();
+        assert!(fit.law.cross_validated_error < 0.05, "{gauge:?}: {}", fit.law.cross_validated_error);
+    }
+    for branches in 0..=4 {
+        let fit = fit_law(&[bench.samples()], LawOptions { branches, ..LawOptions::default() }).unwrap();
+        assert_eq!(fit.law.law.branches.len(), branches);
+    }
+}
+
+#[test]
+fn calibration_makes_a_filter_that_beats_the_static_inverse_and_knows_how_far() {
+    let bench = record(1500.0, 0.0, 2e-3);
+    let half = bench.time_s.len() / 2;
+    let training = bench.samples().head(half);
+    let calibration = calibrate(&[training], LawOptions::default(), |_| ()).unwrap();
+    let params = SensorParams {
+        format: FORMAT,
+        made_by: "test".into(),
+        quantity: Quantity::Strain,
+        reading: ReadingUnit::Ohm,
+        rest_reading: calibration.rest_readings[0],
+        default_estimator: EstimatorKind::Ekf,
+        limits: calibration.limits,
+        validity: calibration.validity,
+        static_cubic: calibration.static_cubic,
+        joint: None,
+        law: calibration.law.clone(),
+        estimators: calibration.estimators.clone(),
+        recordings: vec![],
+        uncertainty: Some(calibration.uncertainty.clone()),
+    };
+    let mut filter = build_filter(&params, None, Start::Unknown).unwrap();
+    let (mut filtered, mut cubic) = (Vec::new(), Vec::new());
+    for k in 0..bench.time_s.len() {
+        let reading = bench.reading[k] / params.rest_reading - 1.0;
+        filter.step(bench.time_s[k], Some(Reading::from(reading))).unwrap();
+        if k >= half {
+            let strain = filter.strain();
+            filtered.push(ScoredRow { truth: bench.strain[k], strain: strain.mean, sd: Some(strain.sd()) });
+            let strain = params.static_cubic.strain(bench.reading[k]);
+            cubic.push(ScoredRow { truth: bench.strain[k], strain, sd: None });
+        }
+    }
+    let (filtered, cubic) = (Scores::new(&filtered).unwrap(), Scores::new(&cubic).unwrap());
+    assert!(filtered.rmse < 0.5 * cubic.rmse, "{filtered:?} {cubic:?}");
+    assert!(filtered.coverage_95.unwrap() > 0.85, "{filtered:?}");
+    // The file format holds everything, to the last bit.
+    let text = toml::to_string(&params).unwrap();
+    assert_eq!(toml::from_str::<SensorParams>(&text).unwrap(), params);
+    // Same samples, same parameters.
+    let again = calibrate(&[training], LawOptions::default(), |_| ()).unwrap();
+    assert_eq!((again.law, again.estimators), (calibration.law, calibration.estimators));
+}
+
+/// A refused row leaves the filter as it was, to the last bit.
+#[test]
+fn a_refused_row_changes_nothing() {
+    let bench = record(1500.0, 0.0, 2e-3);
+    let calibration = calibrate(&[bench.samples().head(700)], LawOptions::default(), |_| ()).unwrap();
+    let text = format!(
+        "format = 1\nmade_by = 'test'\nquantity = 'strain'\nreading = 'ohm'\nrest_reading = {}\ndefault_estimator = 'ekf'\n",
+        calibration.rest_readings[0]
+    );
+    assert!(toml::from_str::<SensorParams>(&text).is_err(), "a file without a law must be refused");
+    let params = SensorParams {
+        format: FORMAT,
+        made_by: String::new(),
+        quantity: Quantity::Strain,
+        reading: ReadingUnit::Ohm,
+        rest_reading: calibration.rest_readings[0],
+        default_estimator: EstimatorKind::Ekf,
+        limits: calibration.limits,
+        validity: calibration.validity,
+        static_cubic: calibration.static_cubic,
+        joint: None,
+        law: calibration.law,
+        estimators: calibration.estimators,
+        recordings: vec![],
+        uncertainty: None,
+    };
+    let mut filter = build_filter(&params, None, Start::Strain(0.15)).unwrap();
+    filter.step(0.0, Some(Reading::from(0.2))).unwrap();
+    filter.step(0.1, Some(Reading::from(0.22))).unwrap();
+    let before = filter.output();
+    for (time_s, reading) in [(0.2, f64::NAN), (0.05, 0.2), (f64::NAN, 0.2), (0.2, f64::INFINITY)] {
+        assert!(filter.step(time_s, Some(Reading::from(reading))).is_err());
+        assert_eq!(filter.output(), before);
+    }
+    filter.step(0.2, Some(Reading::from(0.23))).unwrap();
+    assert_ne!(filter.output(), before);
+}
+
+#[test]
+fn what_cannot_be_calibrated_is_refused() {
+    let bench = record(1500.0, 0.0, 1e-3);
+    let refuse = |samples: Samples, options: LawOptions| fit_law(&[samples], options).unwrap_err();
+    let constant = Bench { strain: vec![0.1; bench.strain.len()], ..bench.clone() };
+    assert_eq!(refuse(constant.samples(), LawOptions::default()), CalibrationError::ConstantStrain);
+    assert!(matches!(
+        refuse(bench.samples().head(20), LawOptions::default()),
+        CalibrationError::TooFewRows { recording: 0, complete: 20, .. }
+    ));
+    let unknown = Bench { strain: vec![f64::NAN; bench.strain.len()], ..bench.clone() };
+    assert!(matches!(refuse(unknown.samples(), LawOptions::default()), CalibrationError::TooFewRows { .. }));
+    let many = LawOptions { branches: 5, ..LawOptions::default() };
+    assert!(matches!(refuse(bench.samples(), many), CalibrationError::Unsupported(_)));
+    assert_eq!(fit_law(&[], LawOptions::default()).unwrap_err(), CalibrationError::NoRecording);
+}
+
+/// Missing readings and gaps in the reference are left out, not filled with zeros.
+#[test]
+fn gaps_do_not_bend_the_law() {
+    let whole = record(1500.0, 0.0, 1e-3);
+    let mut gappy = whole.clone();
+    for k in (0..gappy.reading.len()).step_by(7) {
+        gappy.reading[k] = f64::NAN;
+    }
+    for k in (3..gappy.strain.len()).step_by(11) {
+        gappy.strain[k] = f64::NAN;
+    }
+    let fit = |bench: &Bench| fit_law(&[bench.samples()], LawOptions::default()).unwrap();
+    let (a, b) = (fit(&whole), fit(&gappy));
+    assert!((a.law.rest_readings[0] / b.law.rest_readings[0] - 1.0).abs() < 0.01);
+    assert!((a.law.cross_validated_error - b.law.cross_validated_error).abs() < 0.003);
+    assert!(b.law.residuals[0][7].is_nan() && b.law.residuals[0][8].is_finite());
+}
+
+#[test]
+fn a_static_cubic_is_a_cubic() {
+    let reading: Vec<f64> = (0..50).map(|k| 1000.0 + 20.0 * f64::from(k)).collect();
+    let strain: Vec<f64> = reading.iter().map(|r| 1e-4 * (r - 1000.0) + 2e-10 * (r - 1000.0_f64).powi(3)).collect();
+    let time_s: Vec<f64> = (0..50).map(f64::from).collect();
+    let samples = Samples { time_s: &time_s, reading: &reading, strain: &strain };
+    let cubic = StaticCubic::fit(&[samples], RangeParams { lower: 0.0, upper: 0.2 }).unwrap();
+    for (r, s) in reading.iter().zip(&strain) {
+        assert!((cubic.strain(*r) - s.min(0.2)).abs() < 1e-12);
+    }
+    assert_eq!(cubic.strain(1e6), 0.2);
+}
+
+#[test]
+fn scores_are_what_their_names_say() {
+    let row = |truth: f64, strain: f64| ScoredRow { truth, strain, sd: Some(0.1) };
+    // Errors of 0, 0.1, -0.15 and 0.3 with a deviation of 0.1: 50 % intervals reach 0.067, 90 % 0.164, 95 % 0.196.
+    let rows = [row(0.0, 0.0), row(1.0, 1.1), row(2.0, 1.85), row(2.0, 2.3), row(f64::NAN, 5.0)];
+    let scores = Scores::new(&rows).unwrap();
+    assert_eq!(scores.n, 4);
+    assert!((scores.rmse - ((0.01 + 0.0225 + 0.09) / 4.0_f64).sqrt()).abs() < 1e-12);
+    assert!((scores.rmse_percent_fs - 50.0 * scores.rmse).abs() < 1e-12);
+    assert!((scores.bias - 0.0625).abs() < 1e-12);
+    assert_eq!((scores.coverage_50, scores.coverage_90, scores.coverage_95), (Some(0.25), Some(0.75), Some(0.75)));
+    // Full scale is 2, so the variance is 0.05² + 0.005² in units of it.
+    let variance = 0.0025 + 0.000_025;
+    let squares = (0.0 + 0.05_f64.powi(2) + 0.075_f64.powi(2) + 0.15_f64.powi(2)) / 4.0;
+    let expected = -0.5 * (squares / variance + (TAU * variance).ln());
+    assert!((scores.log_score.unwrap() - expected).abs() < 1e-12);
+    assert!(Scores::new(&[]).is_none());
+    assert!(Scores::new(&[ScoredRow { truth: 1.0, strain: 1.0, sd: None }]).unwrap().coverage_95.is_none());
+}
