@@ -70,3 +70,13 @@ pub fn sensor<const B: usize, const N: usize>() -> SwitchedModel<f64, 2, B, N> {
         .and_then(|motion| SwitchedModel::new(law, motion, noise))
         .unwrap_or_else(|error| unreachable!("{error}"))
 }
+
+/// The code in the README compiles and runs.
+#[cfg(doctest)]
+#[doc = include_str!("../../README.md")]
+struct Readme;
+
+/// So does the code in the architecture document.
+#[cfg(doctest)]
+#[doc = include_str!("../../ARCHITECTURE.md")]
+struct Architecture;

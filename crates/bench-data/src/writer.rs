@@ -14,11 +14,11 @@ impl Trace {
     pub fn write(&self, out: &mut impl Write) -> io::Result<()> {
         write!(out, "{}", self.metadata)?;
         let mut rows = csv::WriterBuilder::new().from_writer(out);
-        rows.write_record(self.header().iter().map(|column| column.name()))?;
+        rows.write_record(self.header().iter().map(|column| column.name())).map_err(io_error)?;
         let mut cells = Vec::new();
         for row in 0..self.len() {
             self.row_cells(row, &mut cells);
-            rows.write_record(&cells)?;
+            rows.write_record(&cells).map_err(io_error)?;
         }
         rows.flush()
     }
@@ -46,6 +46,14 @@ impl Trace {
         });
         cells.extend(self.reference.iter().map(|reference| number(reference.values[row])));
         cells.extend(self.temperature_c.iter().map(|temperature| number(temperature[row])));
+    }
+}
+
+/// What `out` said; the csv crate's own conversion forgets the kind, and with it that a pipe is closed.
+fn io_error(error: csv::Error) -> io::Error {
+    match error.into_kind() {
+        csv::ErrorKind::Io(error) => error,
+        kind => io::Error::other(format!("{kind:?}")),
     }
 }
 

@@ -79,7 +79,7 @@ pub struct SimulateArgs {
 #[derive(Debug, Default, ClapArgs)]
 pub struct TraceArgs {
     /// Length of the unstretched sensor, mm
-    #[arg(long, value_name = "MM")]
+    #[arg(long, value_name = "MM", value_parser = positive)]
     pub gauge_length_mm: Option<f64>,
     /// Electronics, as in `# front_end = …`
     #[arg(long, value_name = "SPEC")]
@@ -111,10 +111,10 @@ pub struct CalibrateArgs {
     #[arg(short, long, value_name = "sensor.toml")]
     pub output: PathBuf,
     /// Use rows with time_s >= T only
-    #[arg(long, value_name = "T")]
+    #[arg(long, value_name = "T", allow_negative_numbers = true, value_parser = finite)]
     pub from: Option<f64>,
     /// Use rows with time_s < T only
-    #[arg(long, value_name = "T")]
+    #[arg(long, value_name = "T", allow_negative_numbers = true, value_parser = finite)]
     pub until: Option<f64>,
     /// Relaxing branches: auto (2) or 0 to 4
     #[arg(long, default_value = "auto")]
@@ -146,7 +146,7 @@ pub struct EstimateArgs {
     #[arg(long, default_value = "auto")]
     pub estimator: Auto<Estimator>,
     /// Strain (or angle) at the first row, if it is known; the body is at rest there
-    #[arg(long, value_name = "X", allow_negative_numbers = true)]
+    #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = finite)]
     pub initial_strain: Option<f64>,
     /// Resistance at rest instead of the sensor file's: a number in the readings' unit, or first:N for the median of
     /// the first N readings
@@ -194,7 +194,7 @@ pub struct EvaluateArgs {
     #[arg(long, default_value = "auto")]
     pub estimator: Auto<Estimator>,
     /// Score rows with time_s >= T only; the filter still starts at the first row
-    #[arg(long, value_name = "T")]
+    #[arg(long, value_name = "T", allow_negative_numbers = true, value_parser = finite)]
     pub from: Option<f64>,
     /// Exit with code 3 unless every recording is estimated better than by the static cubic and its 95 % interval covers
     /// 80 % or more
@@ -206,6 +206,16 @@ pub struct EvaluateArgs {
     /// Overrides of the recordings' metadata
     #[command(flatten)]
     pub trace: TraceArgs,
+}
+
+/// A number that is neither NaN nor infinite.
+fn finite(text: &str) -> Result<f64, String> {
+    text.parse().ok().filter(|value: &f64| value.is_finite()).ok_or_else(|| "expected a finite number".into())
+}
+
+/// A finite number above zero.
+fn positive(text: &str) -> Result<f64, String> {
+    finite(text).ok().filter(|value| *value > 0.0).ok_or_else(|| "expected a positive number".into())
 }
 
 /// `auto`, or a value.
@@ -317,9 +327,6 @@ impl FromStr for RestResistance {
                 _ => Err(expected()),
             };
         }
-        match text.parse::<f64>() {
-            Ok(value) if value > 0.0 && value.is_finite() => Ok(Self::Value(value)),
-            _ => Err(expected()),
-        }
+        positive(text).map(Self::Value).map_err(|_| expected())
     }
 }

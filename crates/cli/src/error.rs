@@ -1,4 +1,4 @@
-use std::io;
+use std::io::{self, Write};
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -36,15 +36,17 @@ impl CliError {
             Self::Check(_) => 3,
             Self::Input(_) => 4,
         };
-        eprintln!("ohmstrain: {self}");
+        // `eprintln!` would panic if whoever read stderr has left.
+        let _ = writeln!(io::stderr(), "ohmstrain: {self}");
         ExitCode::from(code)
     }
 
     /// Calibration failed on the contents of `files`.
-    pub fn calibration(files: &str, error: &CalibrationError) -> Self {
+    pub fn calibration(files: &[&str], error: &CalibrationError) -> Self {
         match error {
             CalibrationError::Optimiser(_) => Self::Other(error.to_string()),
-            _ => Self::Input(format!("{files}: {error}")),
+            CalibrationError::TooFewRows { recording, .. } => Self::Input(format!("{}: {error}", files[*recording])),
+            _ => Self::Input(format!("{}: {error}", files.join(", "))),
         }
     }
 

@@ -3,7 +3,7 @@ use std::io::{self, BufReader, Read};
 use std::path::Path;
 
 use ohmstrain_bench_data::{Metadata, ReadingKind, Trace, TraceReader};
-use ohmstrain_calib::{JointParams, Quantity, ReadingUnit, Samples};
+use ohmstrain_calib::{JointParams, Quantity, ReadingUnit, Samples, SensorParams};
 use sha2::{Digest, Sha256};
 
 use crate::error::CliError;
@@ -12,6 +12,8 @@ use crate::error::CliError;
 pub struct Recording {
     /// What messages call it.
     pub name: String,
+    /// What messages call its header: name and line.
+    pub header: String,
     /// SHA-256 of its bytes, hexadecimal.
     pub sha256: String,
     /// Its contents.
@@ -42,10 +44,14 @@ pub fn read(path: &Path, overrides: &Metadata) -> Result<Recording, CliError> {
         File::open(path).and_then(|mut file| file.read_to_end(&mut bytes))
     }
     .map_err(|error| CliError::file("read", path, &error))?;
-    let name = path.display().to_string();
     let sha256 = Sha256::digest(&bytes).iter().map(|byte| format!("{byte:02x}")).collect();
-    let trace = Trace::collect(TraceReader::with_overrides(bytes.as_slice(), &name, overrides)?)?;
-    Ok(Recording { name, sha256, trace })
+    let rows = TraceReader::with_overrides(bytes.as_slice(), &path.display().to_string(), overrides)?;
+    Ok(Recording { name: rows.file().to_string(), header: header(&rows), sha256, trace: Trace::collect(rows)? })
+}
+
+/// What messages call the header of a recording of which no row has been read yet.
+pub fn header<R: Read>(rows: &TraceReader<R>) -> String {
+    format!("{}:{}", rows.file(), rows.line())
 }
 
 impl Recording {
@@ -53,8 +59,8 @@ impl Recording {
     pub fn samples(&self) -> Result<Samples<'_>, CliError> {
         let Some(reference) = &self.trace.reference else {
             return Err(CliError::Input(format!(
-                "{}:1: column `strain`: expected a reference (strain, displacement_mm or angle_deg), found none",
-                self.name
+                "{}: column `strain`: expected a reference (strain, displacement_mm or angle_deg), found none",
+                self.header
             )));
         };
         Ok(Samples { time_s: &self.trace.time_s, reading: &self.trace.readings.values, strain: &reference.values })
@@ -68,13 +74,39 @@ impl Recording {
         })
     }
 
+    /// Refuses a reference that measures another quantity than the sensor's.
+    pub fn check_quantity(&self, expected: Quantity) -> Result<(), CliError> {
+        match self.quantity() {
+            Some(found) if found != expected => Err(CliError::Input(format!(
+                "{}: column `{}`: expected a reference in `{}`, as the calibration has it, found `{}`",
+                self.header,
+                found.name(),
+                expected.name(),
+                found.name()
+            ))),
+            _ => Ok(()),
+        }
+    }
+
     /// The joint that its metadata describe.
     pub fn joint(&self) -> Option<JointParams> {
-        self.trace.metadata.joint.map(|joint| JointParams {
-            prestrain: joint.prestrain,
-            moment_arm_mm: joint.moment_arm_mm,
-            gauge_length_mm: joint.gauge_length_mm,
-        })
+        joint(&self.trace.metadata)
+    }
+}
+
+/// The joint that metadata describe.
+fn joint(metadata: &Metadata) -> Option<JointParams> {
+    metadata.joint.map(|joint| JointParams {
+        prestrain: joint.prestrain,
+        moment_arm_mm: joint.moment_arm_mm,
+        gauge_length_mm: joint.gauge_length_mm,
+    })
+}
+
+/// Takes the joint that a recording, or a flag, puts the sensor on. A sensor calibrated in degrees needs none.
+pub fn take_joint(params: &mut SensorParams, metadata: &Metadata) {
+    if params.quantity == Quantity::Strain {
+        params.joint = joint(metadata).or(params.joint);
     }
 }
 
@@ -95,13 +127,13 @@ pub const fn reading_column(unit: ReadingUnit) -> &'static str {
 }
 
 /// Refuses readings in another unit than the sensor's.
-pub fn check_unit(file: &str, found: ReadingKind, expected: ReadingUnit) -> Result<(), CliError> {
+pub fn check_unit(header: &str, found: ReadingKind, expected: ReadingUnit) -> Result<(), CliError> {
     let found = unit(found);
     if found == expected {
         return Ok(());
     }
     Err(CliError::Input(format!(
-        "{file}:1: column `{}`: expected `{}` as in the sensor's calibration, found `{}`",
+        "{header}: column `{}`: expected `{}` as in the sensor's calibration, found `{}`",
         reading_column(found),
         reading_column(expected),
         reading_column(found)

@@ -13,7 +13,8 @@ pub fn write_file(path: &Path, fill: impl FnOnce(&mut dyn Write) -> Result<(), C
         _ => PathBuf::from("."),
     };
     let failed = |error: &std::io::Error| CliError::file("write", path, error);
-    let mut file = NamedTempFile::new_in(folder).map_err(|error| failed(&error))?;
+    // The kind alone: the full text names the temporary neighbour, which nobody asked for.
+    let mut file = NamedTempFile::new_in(folder).map_err(|error| failed(&error.kind().into()))?;
     {
         let mut buffer = std::io::BufWriter::new(&mut file);
         fill(&mut buffer)?;

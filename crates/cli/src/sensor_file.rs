@@ -1,7 +1,8 @@
 use std::fs;
 use std::path::Path;
 
-use ohmstrain_calib::{FORMAT, SensorParams, Start, build_filter};
+use ohmstrain_calib::{FORMAT, RangeParams, SensorParams, Start, build_filter};
+use ohmstrain_model::Joint;
 use serde::Deserialize;
 
 use crate::error::CliError;
@@ -32,13 +33,21 @@ pub fn read(path: &Path) -> Result<SensorParams, CliError> {
         )));
     }
     let params: SensorParams = toml::from_str(&text).map_err(|error| located(&error))?;
+    let wrong = |what: String| CliError::Input(format!("{name}: {what}"));
     if !(params.rest_reading > 0.0 && params.rest_reading.is_finite()) {
-        return Err(CliError::Input(format!(
-            "{name}: field `rest_reading`: expected a positive number, found {}",
-            params.rest_reading
+        return Err(wrong(format!("field `rest_reading`: expected a positive number, found {}", params.rest_reading)));
+    }
+    let RangeParams { lower, upper } = params.limits;
+    if !(lower < upper) {
+        return Err(wrong(format!(
+            "field `limits`: expected a lower end below the upper one, found {lower} and {upper}"
         )));
     }
-    build_filter(&params, None, Start::Unknown).map_err(|error| CliError::Input(format!("{name}: {error}")))?;
+    if let Some(joint) = params.joint {
+        Joint::new(joint.prestrain, joint.moment_arm_mm, joint.gauge_length_mm)
+            .map_err(|error| wrong(format!("field `joint`: {error}")))?;
+    }
+    build_filter(&params, None, Start::Unknown).map_err(|error| wrong(error.to_string()))?;
     Ok(params)
 }
 

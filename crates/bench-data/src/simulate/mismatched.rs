@@ -61,15 +61,28 @@ impl Mismatched {
     }
 }
 
+impl Mismatched {
+    /// Drive of the branches, 1/s, with the branches where they are.
+    fn drive(&self, movement: &Movement, relaxation: &[f64; BRANCHES]) -> f64 {
+        let left_to_break = (1.0 - relaxation.iter().sum::<f64>() / CEILING).max(0.0);
+        let gain = left_to_break * gain(movement.mid_strain(), movement.phase());
+        gain * (movement.rate.abs() / DRIVE_RATE).powf(DRIVE_POWER) * DRIVE_RATE
+    }
+
+    /// The branches after a share of the movement under a constant drive.
+    fn relaxed(&self, movement: &Movement, share: f64, drive: f64) -> [f64; BRANCHES] {
+        std::array::from_fn(|i| {
+            let gone = -(-share * movement.duration_s / self.tau_s[i]).exp_m1();
+            self.relaxation[i] + gone * (self.weight[i] * drive * self.tau_s[i] - self.relaxation[i])
+        })
+    }
+}
+
 impl Sensor for Mismatched {
     fn advance(&mut self, movement: &Movement) {
-        let left_to_break = (1.0 - self.relaxation.iter().sum::<f64>() / CEILING).max(0.0);
-        let gain = left_to_break * gain(movement.mid_strain(), movement.phase());
-        let drive = gain * (movement.rate.abs() / DRIVE_RATE).powf(DRIVE_POWER) * DRIVE_RATE;
-        for i in 0..BRANCHES {
-            let gone = -(-movement.duration_s / self.tau_s[i]).exp_m1();
-            self.relaxation[i] += gone * (self.weight[i] * drive * self.tau_s[i] - self.relaxation[i]);
-        }
+        // The drive fades with what it has driven: evaluate it in the middle of the step, which is of second order.
+        let half = self.relaxed(movement, 0.5, self.drive(movement, &self.relaxation));
+        self.relaxation = self.relaxed(movement, 1.0, self.drive(movement, &half));
         for (play, half_width) in self.play.iter_mut().zip(PLAY_STRAINS) {
             *play = play.clamp(movement.to_strain - half_width, movement.to_strain + half_width);
         }

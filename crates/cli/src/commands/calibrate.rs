@@ -52,7 +52,7 @@ pub fn calibrate_recordings(
     let (quantity, reading) = common_units(recordings)?;
     let names: Vec<&str> = recordings.iter().map(|recording| recording.name.as_str()).collect();
     let calibration = calibrate(&samples, options, |stage| progress.calibrating(stage))
-        .map_err(|error| CliError::calibration(&names.join(", "), &error))?;
+        .map_err(|error| CliError::calibration(&names, &error))?;
     let infos = recordings.iter().zip(&calibration.rest_readings).map(|(recording, rest_reading)| RecordingInfo {
         file: file_name(&recording.name),
         sha256: recording.sha256.clone(),
@@ -89,15 +89,8 @@ fn common_units(recordings: &[Recording]) -> Result<(Quantity, ReadingUnit), Cli
     let first = &recordings[0];
     let (quantity, reading) = (first.quantity().unwrap_or(Quantity::Strain), unit(first.trace.readings.kind));
     for recording in recordings {
-        input::check_unit(&recording.name, recording.trace.readings.kind, reading)?;
-        if recording.quantity() != Some(quantity) {
-            return Err(CliError::Input(format!(
-                "{}:1: expected the reference `{}` as in {}, found another one",
-                recording.name,
-                quantity.name(),
-                first.name
-            )));
-        }
+        input::check_unit(&recording.header, recording.trace.readings.kind, reading)?;
+        recording.check_quantity(quantity)?;
     }
     Ok((quantity, reading))
 }

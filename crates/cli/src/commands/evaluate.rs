@@ -23,6 +23,8 @@ struct RecordingScores {
     estimator: &'static str,
     #[serde(flatten)]
     filter: Scores,
+    /// For the table; the JSON is about one estimator.
+    #[serde(skip)]
     smoother: Scores,
     baselines: Baselines,
 }
@@ -43,8 +45,9 @@ pub fn run(args: &EvaluateArgs) -> Result<(), CliError> {
     let mut recordings = Vec::new();
     for path in &args.traces {
         let recording = input::read(path, &overrides)?;
-        check_unit(&recording.name, recording.trace.readings.kind, params.reading)?;
+        check_unit(&recording.header, recording.trace.readings.kind, params.reading)?;
         recording.samples()?;
+        recording.check_quantity(params.quantity)?;
         recordings.push(score(&recording, &params, kind, args.from)?);
     }
     let evaluation = Evaluation { recordings };

@@ -11,9 +11,10 @@ use crate::sensor_file;
 
 /// Smooths a recording and writes its estimates.
 pub fn run(args: &SmoothArgs) -> Result<(), CliError> {
-    let params = sensor_file::read(&args.estimate.sensor)?;
+    let mut params = sensor_file::read(&args.estimate.sensor)?;
     let recording = input::read(&args.trace_file, &args.estimate.trace.metadata())?;
-    check_unit(&recording.name, recording.trace.readings.kind, params.reading)?;
+    check_unit(&recording.header, recording.trace.readings.kind, params.reading)?;
+    input::take_joint(&mut params, &recording.trace.metadata);
     let values = recording.trace.readings.values.iter().copied();
     let rest_reading = rest_reading(args.estimate.rest_resistance, &params, values, &recording.name)?;
     let kind = args.estimate.estimator.chosen().map(|estimator| estimator.0);

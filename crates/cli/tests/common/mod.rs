@@ -1,0 +1,192 @@
+//! A folder of its own for each test, the program started in it, and what it prints taken apart.
+
+use std::fs;
+use std::path::PathBuf;
+use std::process::Output;
+use std::sync::OnceLock;
+
+use assert_cmd::cargo::cargo_bin_cmd;
+use tempfile::TempDir;
+
+/// Columns of the estimates of a sensor calibrated in ohm and strain: what scripts rely on.
+pub const ESTIMATES_HEADER: &str = "time_s,resistance_ohm,strain,strain_sd,strain_rate,strain_rate_sd,relaxation,\
+     relaxation_sd,baseline,settled_resistance_ohm,settled_resistance_sd_ohm,p_extend,p_hold,p_retract,p_beyond_border,\
+     nis,flags";
+
+/// Five readings per second are enough for a calibration of a second.
+pub const SIMULATE: [&str; 8] =
+    ["simulate", "--protocol", "mixed", "--speed-mm-s", "5", "--sample-rate-hz", "5", "--mismatched"];
+
+/// Three quarters of the 400 s that `SIMULATE` records.
+pub const CALIBRATED_UNTIL: &str = "300";
+
+/// A temporary folder in which the program runs, so that messages name files without their folder.
+pub struct Bench {
+    folder: TempDir,
+}
+
+impl Bench {
+    /// An empty folder.
+    pub fn new() -> Self {
+        Self { folder: TempDir::new().unwrap() }
+    }
+
+    /// A folder with `trace.csv`, a simulated recording, and `sensor.toml`, calibrated on three quarters of it.
+    pub fn calibrated() -> Self {
+        static FILES: OnceLock<(String, String)> = OnceLock::new();
+        let (trace, sensor) = FILES.get_or_init(|| {
+            let bench = Self::new();
+            bench.run(&[&SIMULATE[..], &["-o", "trace.csv"]].concat()).ok();
+            bench.run(&["calibrate", "trace.csv", "--until", CALIBRATED_UNTIL, "-o", "sensor.toml"]).ok();
+            (bench.read("trace.csv"), bench.read("sensor.toml"))
+        });
+        let bench = Self::new();
+        bench.write("trace.csv", trace);
+        bench.write("sensor.toml", sensor);
+        bench
+    }
+
+    /// Where a file of the folder is.
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    /// Writes a file.
+    pub fn write(&self, name: &str, content: impl AsRef<[u8]>) {
+        fs::write(self.path(name), content).unwrap();
+    }
+
+    /// Reads a file.
+    pub fn read(&self, name: &str) -> String {
+        fs::read_to_string(self.path(name)).unwrap()
+    }
+
+    /// Names of all files, sorted.
+    pub fn files(&self) -> Vec<String> {
+        files_in(self.folder.path())
+    }
+
+    /// Runs the program to its end, with nothing on stdin.
+    pub fn run(&self, arguments: &[&str]) -> Run {
+        self.feed(arguments, "")
+    }
+
+    /// Runs the program to its end, with this on stdin.
+    pub fn feed(&self, arguments: &[&str], stdin: impl Into<Vec<u8>>) -> Run {
+        let output =
+            cargo_bin_cmd!("ohmstrain").current_dir(self.folder.path()).args(arguments).write_stdin(stdin).output();
+        Run::new(arguments, output.unwrap())
+    }
+}
+
+/// Names of the files in a folder, sorted.
+pub fn files_in(folder: &std::path::Path) -> Vec<String> {
+    let name = |entry: std::io::Result<fs::DirEntry>| entry.unwrap().file_name().into_string().unwrap();
+    let mut names: Vec<String> = fs::read_dir(folder).unwrap().map(name).collect();
+    names.sort();
+    names
+}
+
+/// What the program left behind.
+pub struct Run {
+    /// The arguments it was started with.
+    pub command: String,
+    /// Exit code.
+    pub code: Option<i32>,
+    /// What it printed.
+    pub stdout: String,
+    /// What it said.
+    pub stderr: String,
+}
+
+impl Run {
+    /// Takes what a process left behind.
+    pub fn new(arguments: &[&str], output: Output) -> Self {
+        Self {
+            command: arguments.join(" "),
+            code: output.status.code(),
+            stdout: String::from_utf8(output.stdout).unwrap(),
+            stderr: String::from_utf8(output.stderr).unwrap(),
+        }
+    }
+
+    /// Success without a word on stderr; what was printed.
+    #[track_caller]
+    pub fn ok(self) -> String {
+        assert_eq!((self.code, self.stderr.as_str()), (Some(0), ""), "{}", self.command);
+        self.stdout
+    }
+
+    /// Failure with this exit code and this one line on stderr; on stdout nothing but whole rows.
+    #[track_caller]
+    pub fn fails(&self, code: i32, message: &str) {
+        assert_eq!(self.stderr, format!("ohmstrain: {message}\n"), "{}", self.command);
+        assert_eq!(self.code, Some(code), "{}", self.command);
+        self.printed_whole_rows();
+    }
+
+    /// Nothing on stdout, or lines that all have as many cells as the first one and an end.
+    #[track_caller]
+    pub fn printed_whole_rows(&self) {
+        let cells = |line: &str| line.split(',').count();
+        assert!(self.stdout.is_empty() || self.stdout.ends_with('\n'), "{}: {}", self.command, self.stdout);
+        let mut widths = self.stdout.lines().map(cells);
+        let first = widths.next();
+        assert!(widths.all(|width| Some(width) == first), "{}: {}", self.command, self.stdout);
+    }
+}
+
+/// A CSV file taken apart; metadata lines are passed over.
+pub struct Csv {
+    /// The line with the names.
+    pub header: String,
+    rows: Vec<Vec<String>>,
+}
+
+impl Csv {
+    /// Takes a file apart. No cell of this program's has a quotation mark.
+    #[track_caller]
+    pub fn new(text: &str) -> Self {
+        let mut lines = text.lines().filter(|line| !line.starts_with('#'));
+        let header = lines.next().unwrap().to_owned();
+        let rows: Vec<Vec<String>> = lines.map(|line| line.split(',').map(str::to_owned).collect()).collect();
+        assert!(rows.iter().all(|row| row.len() == header.split(',').count()));
+        Self { header, rows }
+    }
+
+    /// Number of rows.
+    pub fn len(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// The cells of a column.
+    #[track_caller]
+    pub fn cells(&self, column: &str) -> Vec<&str> {
+        let index = self.header.split(',').position(|name| name == column);
+        let index = index.unwrap_or_else(|| panic!("no column {column} in {}", self.header));
+        self.rows.iter().map(|row| row[index].as_str()).collect()
+    }
+
+    /// The numbers of a column.
+    #[track_caller]
+    pub fn numbers(&self, column: &str) -> Vec<f64> {
+        self.cells(column).iter().map(|cell| cell.parse().unwrap()).collect()
+    }
+}
+
+/// A recording with some of its rows changed: `change` gets a row's number, from 0, and its cells.
+pub fn change_rows(trace: &str, mut change: impl FnMut(usize, &mut Vec<String>)) -> String {
+    let mut rows = 0;
+    let mut changed = String::new();
+    for line in trace.lines() {
+        let is_row = line.starts_with(|first: char| first.is_ascii_digit());
+        let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+        if is_row {
+            change(rows, &mut cells);
+            rows += 1;
+        }
+        changed += &cells.join(",");
+        changed.push('\n');
+    }
+    changed
+}

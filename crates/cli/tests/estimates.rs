@@ -1,0 +1,236 @@
+//! What `filter` and `smooth` print: columns, units, flags, and what the flags of the command line change.
+
+#[allow(dead_code, reason = "each test program uses its own share")]
+mod common;
+
+use common::{Bench, Csv, ESTIMATES_HEADER, SIMULATE, change_rows};
+use serde_json::Value;
+
+#[test]
+fn filter_reads_stdin_as_it_reads_a_file() {
+    let bench = Bench::calibrated();
+    let from_file = bench.run(&["filter", "trace.csv", "--sensor", "sensor.toml"]).ok();
+    let trace = bench.read("trace.csv");
+    assert_eq!(bench.feed(&["filter", "-", "--sensor", "sensor.toml"], trace.as_str()).ok(), from_file);
+    assert_eq!(bench.feed(&["filter", "--sensor", "sensor.toml"], trace.as_str()).ok(), from_file);
+    let with_carriage_returns = trace.replace('\n', "\r\n");
+    assert_eq!(bench.feed(&["filter", "--sensor", "sensor.toml"], with_carriage_returns).ok(), from_file);
+}
+
+#[test]
+fn filter_never_reads_the_reference() {
+    let bench = Bench::calibrated();
+    let with = bench.run(&["filter", "trace.csv", "--sensor", "sensor.toml"]).ok();
+    let blind = bench.read("trace.csv").lines().fold(String::new(), |blind, line| {
+        let kept = if line.starts_with('#') { line } else { line.rsplit_once(',').unwrap().0 };
+        blind + kept + "\n"
+    });
+    assert_eq!(bench.feed(&["filter", "--sensor", "sensor.toml"], blind).ok(), with);
+}
+
+#[test]
+fn smoother_and_filter_share_header_and_last_row_and_nothing_in_between() {
+    let bench = Bench::calibrated();
+    let filtered = Csv::new(&bench.run(&["filter", "trace.csv", "--sensor", "sensor.toml"]).ok());
+    let smoothed = Csv::new(&bench.run(&["smooth", "trace.csv", "--sensor", "sensor.toml"]).ok());
+    assert_eq!(filtered.header, ESTIMATES_HEADER);
+    assert_eq!(smoothed.header, ESTIMATES_HEADER);
+    assert_eq!(smoothed.cells("time_s"), filtered.cells("time_s"));
+    for column in ["strain", "strain_sd", "strain_rate", "relaxation", "flags"] {
+        assert_eq!(smoothed.cells(column).last(), filtered.cells(column).last(), "{column}");
+    }
+    // All readings say more than those so far; a linearisation may break this in single rows, not on the whole.
+    let mean = |csv: &Csv| csv.numbers("strain_sd").iter().sum::<f64>() / csv.len() as f64;
+    assert!(mean(&smoothed) < mean(&filtered));
+}
+
+#[test]
+fn columns_are_chosen_and_ordered_by_name() {
+    let bench = Bench::calibrated();
+    let all = Csv::new(&bench.run(&["filter", "trace.csv", "--sensor", "sensor.toml"]).ok());
+    for command in ["filter", "smooth"] {
+        let columns = ["--columns", "flags,strain_sd,time_s"];
+        let run = bench.run(&[&[command, "trace.csv", "--sensor", "sensor.toml"], &columns[..]].concat());
+        let chosen = Csv::new(&run.ok());
+        assert_eq!(chosen.header, "flags,strain_sd,time_s");
+        assert_eq!(chosen.cells("time_s"), all.cells("time_s"));
+        assert!(command == "smooth" || chosen.cells("strain_sd") == all.cells("strain_sd"));
+    }
+}
+
+/// `trace.csv` with other columns, calibrated and filtered.
+fn estimates_of(bench: &Bench, trace: &str) -> Csv {
+    bench.write("other.csv", trace);
+    bench.run(&["calibrate", "other.csv", "--until", "60", "--branches", "1", "-o", "other.toml"]).ok();
+    Csv::new(&bench.run(&["filter", "other.csv", "--sensor", "other.toml"]).ok())
+}
+
+#[test]
+fn ratios_give_columns_of_ratios() {
+    let bench = Bench::calibrated();
+    let ratio = |_: usize, cells: &mut Vec<String>| cells[1] = (cells[1].parse::<f64>().unwrap() / 1600.0).to_string();
+    let trace = change_rows(&bench.read("trace.csv"), ratio).replace("resistance_ohm", "resistance_ratio");
+    let estimates = estimates_of(&bench, &trace);
+    let expected = ESTIMATES_HEADER
+        .replace("resistance_ohm", "resistance_ratio")
+        .replace("settled_resistance_sd_ohm", "settled_resistance_sd_ratio");
+    assert_eq!(estimates.header, expected);
+    assert_eq!(estimates.cells("resistance_ratio"), Csv::new(&trace).cells("resistance_ratio"));
+    let settled = estimates.numbers("settled_resistance_ratio");
+    assert!(settled.iter().all(|ratio| (0.1..10.0).contains(ratio)));
+}
+
+#[test]
+fn an_angle_without_a_joint_is_estimated_in_degrees() {
+    let bench = Bench::calibrated();
+    let degrees = |_: usize, cells: &mut Vec<String>| cells[2] = (cells[2].parse::<f64>().unwrap() * 270.0).to_string();
+    let trace = change_rows(&bench.read("trace.csv"), degrees).replace(",strain", ",angle_deg");
+    let estimates = estimates_of(&bench, &trace);
+    let expected = ESTIMATES_HEADER
+        .replace("strain_rate_sd", "angle_rate_sd")
+        .replace("strain_rate", "angle_rate")
+        .replace("strain_sd", "angle_sd")
+        .replace(",strain,", ",angle_deg,");
+    assert_eq!(estimates.header, expected);
+    let angles = estimates.numbers("angle_deg");
+    assert!(angles.iter().all(|angle| (-0.1..90.1).contains(angle)));
+    assert!(angles.iter().any(|angle| *angle > 45.0));
+    let json = bench.run(&["evaluate", "other.csv", "--sensor", "other.toml", "--json"]).ok();
+    let scores: Value = serde_json::from_str(&json).unwrap();
+    assert!(scores["recordings"][0]["rmse"].as_f64().unwrap() > 1.0, "in degrees, not in strain: {json}");
+}
+
+/// ε = prestrain + r θ / L.
+#[track_caller]
+fn assert_angles(estimates: &Csv, prestrain: f64, arm_over_length: f64) {
+    assert_eq!(estimates.header, format!("{ESTIMATES_HEADER},angle_deg,angle_sd"));
+    let (strain, sd) = (estimates.numbers("strain"), estimates.numbers("strain_sd"));
+    let (angle, angle_sd) = (estimates.numbers("angle_deg"), estimates.numbers("angle_sd"));
+    for k in 0..estimates.len() {
+        // A subtraction of numbers below 1, a division and a conversion: a few 2⁻⁵³ of 100 degrees.
+        assert!((angle[k] - ((strain[k] - prestrain) / arm_over_length).to_degrees()).abs() < 1e-12);
+        assert!((angle_sd[k] - (sd[k] / arm_over_length.abs()).to_degrees()).abs() < 1e-12);
+    }
+}
+
+#[test]
+fn a_joint_appends_its_angle() {
+    const JOINT: &str = "prestrain=0.02 moment_arm_mm=6 gauge_length_mm=30";
+    let bench = Bench::calibrated();
+    let with_joint = format!("# joint = {JOINT}\n{}", bench.read("trace.csv"));
+    // Known to the sensor since its calibration.
+    assert_angles(&estimates_of(&bench, &with_joint), 0.02, 0.2);
+    // Told by the recording, or by a flag, which overrides it.
+    for command in ["filter", "smooth"] {
+        assert_angles(&Csv::new(&bench.run(&[command, "other.csv", "--sensor", "sensor.toml"]).ok()), 0.02, 0.2);
+        let flag = ["--joint", "prestrain=0 moment_arm_mm=-3 gauge_length_mm=30"];
+        let run = bench.run(&[&[command, "other.csv", "--sensor", "other.toml"], &flag[..]].concat());
+        assert_angles(&Csv::new(&run.ok()), 0.0, -0.1);
+    }
+}
+
+#[test]
+fn an_angle_with_a_joint_calibrates_strain() {
+    let bench = Bench::calibrated();
+    let degrees = |_: usize, cells: &mut Vec<String>| {
+        cells[2] = (cells[2].parse::<f64>().unwrap() / 0.2).to_degrees().to_string();
+    };
+    let trace = change_rows(&bench.read("trace.csv"), degrees).replace(",strain", ",angle_deg");
+    let joint = "# joint = prestrain=0 moment_arm_mm=6 gauge_length_mm=30";
+    assert_angles(&estimates_of(&bench, &format!("{joint}\n{trace}")), 0.0, 0.2);
+}
+
+#[test]
+fn converter_codes_become_ohms_and_saturated_ones_are_flagged() {
+    let bench = Bench::new();
+    let front_end = ["--front-end", "divider reference_ohm=4000 side=low bits=12 noise_codes=0.5"];
+    bench.run(&[&SIMULATE[..], &front_end, &["-o", "codes.csv"]].concat()).ok();
+    let saturate = |row: usize, cells: &mut Vec<String>| match row {
+        7 => cells[1] = "4095".into(),
+        8 => cells[1] = "0".into(),
+        9 => cells[1] = "NaN".into(),
+        _ => {}
+    };
+    let trace = change_rows(&bench.read("codes.csv"), saturate);
+    let estimates = estimates_of(&bench, &trace);
+    assert_eq!(estimates.header, ESTIMATES_HEADER);
+    let flags = estimates.cells("flags");
+    let flagged = |word: &str| -> Vec<usize> {
+        (0..flags.len()).filter(|&k| flags[k].split('|').any(|flag| flag == word)).collect()
+    };
+    assert_eq!(flagged("saturated"), [7, 8]);
+    assert_eq!(flagged("missing"), [9]);
+    for row in 7..10 {
+        assert_eq!((estimates.cells("resistance_ohm")[row], estimates.cells("nis")[row]), ("", ""));
+    }
+    // Code c of 4095 says R = 4000 c / (4095 - c), to half a code or so.
+    let code: f64 = Csv::new(&trace).numbers("adc")[100];
+    let ohm: f64 = estimates.cells("resistance_ohm")[100].parse().unwrap();
+    assert!((ohm / (4000.0 * code / (4095.0 - code)) - 1.0).abs() < 2e-3, "{ohm} for code {code}");
+    let smoothed = Csv::new(&bench.run(&["smooth", "other.csv", "--sensor", "other.toml"]).ok());
+    assert_eq!(smoothed.cells("flags")[7].split('|').next(), Some("saturated"));
+}
+
+#[test]
+fn a_known_initial_strain_starts_there() {
+    let bench = Bench::calibrated();
+    for command in ["filter", "smooth"] {
+        let first = |flags: &[&str]| {
+            let run = bench.run(&[&[command, "trace.csv", "--sensor", "sensor.toml"], flags].concat());
+            let estimates = Csv::new(&run.ok());
+            (estimates.numbers("strain")[0], estimates.numbers("strain_sd")[0])
+        };
+        let ((_, unknown_sd), (zero, zero_sd)) = (first(&[]), first(&["--initial-strain", "0"]));
+        // It is believed to a thousandth of the range, 3.3e-4, before the first reading says something.
+        assert!(
+            zero.abs() < 2e-3 && zero_sd <= 3.34e-4 && unknown_sd > 10.0 * zero_sd,
+            "{zero} {zero_sd} {unknown_sd}"
+        );
+    }
+    let far = bench.run(&["filter", "trace.csv", "--sensor", "sensor.toml", "--initial-strain", "0.2"]).ok();
+    assert!((Csv::new(&far).numbers("strain")[0] - 0.2).abs() < 2e-3);
+}
+
+#[test]
+fn the_rest_resistance_is_the_sensors_or_given_or_that_of_the_first_readings() {
+    let bench = Bench::calibrated();
+    // One of the first rows has no reading: it does not count.
+    let gap = |row: usize, cells: &mut Vec<String>| cells[1] = if row == 2 { String::new() } else { cells[1].clone() };
+    let trace = change_rows(&bench.read("trace.csv"), gap);
+    bench.write("trace.csv", &trace);
+    let mut first: Vec<f64> =
+        [0, 1, 3, 4, 5].map(|row| Csv::new(&trace).cells("resistance_ohm")[row].parse().unwrap()).into();
+    first.sort_by(f64::total_cmp);
+    let (median, mean_of_four) = (first[2].to_string(), {
+        let mut four: Vec<f64> =
+            [0, 1, 3, 4].map(|row| Csv::new(&trace).cells("resistance_ohm")[row].parse().unwrap()).into();
+        four.sort_by(f64::total_cmp);
+        (0.5 * (four[1] + four[2])).to_string()
+    });
+    let sensor: toml::Table = toml::from_str(&bench.read("sensor.toml")).unwrap();
+    let calibrated = sensor["rest_reading"].as_float().unwrap().to_string();
+    for command in ["filter", "smooth"] {
+        let estimates =
+            |rest: &str| bench.run(&[command, "trace.csv", "--sensor", "sensor.toml", "--rest-resistance", rest]).ok();
+        let by_default = bench.run(&[command, "trace.csv", "--sensor", "sensor.toml"]).ok();
+        assert_eq!(estimates(&calibrated), by_default);
+        assert_eq!(estimates("first:5"), estimates(&median));
+        assert_eq!(estimates("first:4"), estimates(&mean_of_four));
+        assert_ne!(estimates("first:5"), by_default);
+        assert_ne!(estimates("1234"), by_default);
+    }
+    // The scale of the readings and of R₀ is the same thing twice.
+    let scaled = change_rows(&trace, |_, cells| {
+        if let Ok(ohm) = cells[1].parse::<f64>() {
+            cells[1] = (ohm * 1024.0).to_string();
+        }
+    });
+    let rest = (1234.0 * 1024.0).to_string();
+    let columns = ["--columns", "strain,strain_sd,nis"];
+    let one = ["filter", "--sensor", "sensor.toml", "--rest-resistance", "1234"];
+    let other = ["filter", "--sensor", "sensor.toml", "--rest-resistance", &rest];
+    assert_eq!(
+        bench.feed(&[&one[..], &columns].concat(), trace).ok(),
+        bench.feed(&[&other[..], &columns].concat(), scaled).ok()
+    );
+}
