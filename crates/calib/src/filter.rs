@@ -1,7 +1,7 @@
 use std::collections::HashMap;
 
 use ohmstrain_ekf::{Belief, Dynamics, Ekf, Estimate, Gaussian, Reading, Step, StepError, rts_smooth_vec};
-use ohmstrain_model::{Motion, StrainRange, SwitchedModel, SwitchedStep};
+use ohmstrain_model::{Motion, Phase, StrainRange, SwitchedModel, SwitchedStep};
 
 use crate::CalibrationError;
 use crate::params::{AnyMotion, EstimatorKind, EstimatorParams, LawParams, RangeParams, SensorParams};
@@ -25,7 +25,11 @@ pub trait Filter {
     ///
     /// # Errors
     /// The row at which a step failed, and why.
-    fn smooth(&mut self, time_s: &[f64], readings: &[Option<Reading<f64>>]) -> Result<Vec<Output>, (usize, StepError)>;
+    fn smooth(
+        &mut self,
+        time_s: &[f64],
+        readings: &[Option<Reading<f64>>],
+    ) -> Result<Option<Vec<Output>>, (usize, StepError)>;
 }
 
 /// What a filter or smoother says at one row.

@@ -143,7 +143,7 @@ fn stand_still<T: Scalar, const N: usize, const L: usize>(belief: &Belief<T, N, 
 /// Kalman's update with one scalar reading; the covariance in Joseph's form `(I - K H) P (I - K H)ᵀ + K R Kᵀ`, which
 /// stays positive semi-definite under rounding where `P - K S Kᵀ` does not.
 #[allow(non_snake_case, reason = "H, P, S, K are the letters of every textbook; NOTATION.md has the table")]
-fn update<T: Scalar, const N: usize, const L: usize>(
+pub(crate) fn update<T: Scalar, const N: usize, const L: usize>(
     prior: &Belief<T, N, L>,
     mut observation: Observation<T, N>,
     reading: Reading<T>,
