@@ -59,6 +59,7 @@ mod sign_split;
 mod smoother;
 mod switching;
 mod traits;
+mod unscented;
 
 #[cfg(feature = "adskalman")]
 pub use adskalman_bridge::LinearStep;
@@ -78,3 +79,4 @@ pub use smoother::rts_smooth_vec;
 pub use smoother::{rts_smooth, rts_step};
 pub use switching::{Dwell, Phased};
 pub use traits::{Channel, Dynamics, Reading};
+pub use unscented::{Ukf, Unscented};
