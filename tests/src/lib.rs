@@ -1,7 +1,7 @@
 //! Models that several tests share. The oracles stand in the tests themselves.
 
 use nalgebra::{SMatrix, SVector};
-use ohmstrain_ekf::{Belief, Channel, Dynamics};
+use ohmstrain_ekf::{Belief, Channel, Dynamics, Phased};
 use ohmstrain_model::{
     Branch, Gauge, ModelNoise, Motion, Observation, Phase, Scalar, SensorLaw, StrainRange, SwitchedModel, Symmetric,
     Transition,
@@ -37,6 +37,13 @@ impl<T: Scalar, const N: usize, const L: usize> Dynamics<T, N, L> for Linear<T, 
 impl<T: Scalar, const N: usize, const L: usize> Channel<T, N, L> for Linear<T, N> {
     fn observe(&self, at: &Belief<T, N, L>, _: Option<Phase>) -> Observation<T, N> {
         Observation { value: self.gradient.dot(&at.mean), gradient: self.gradient, variance: self.variance }
+    }
+}
+
+/// One phase, so nothing begins.
+impl<T: Scalar, const N: usize, const L: usize> Phased<T, N, L> for Linear<T, N> {
+    fn enter(&self, from: &Belief<T, N, L>, _: Phase) -> Belief<T, N, L> {
+        *from
     }
 }
 

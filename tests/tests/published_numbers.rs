@@ -1,11 +1,12 @@
 //! Numbers that other programs made: see `made_by` in the fixtures.
 
 use nalgebra::{SMatrix, SVector, matrix, vector};
-use ohmstrain_ekf::{Belief, Channel, Dynamics, Ekf, Reading, Step, rts_smooth_vec};
+use ohmstrain_ekf::{Belief, Channel, Dynamics, Ekf, Reading, Step, Ukf, Unscented, rts_smooth_vec};
 use ohmstrain_model::{
     Branch, Direction, Gauge, ModelNoise, Motion, Observation, Phase, SensorLaw, StrainRange, SwitchedModel, Symmetric,
     Transition,
 };
+use ohmstrain_tests::Linear;
 use serde_json::Value;
 
 const DIRECTION: Direction<f64> = Direction::Known(Phase::Extend);
@@ -48,13 +49,12 @@ fn viscoelastic(oracle: &Value, curvature: f64) -> (SwitchedModel<f64, 2, 1, 3>,
 }
 
 /// Filters the record; the first reading is an update without a prediction. Returns steps and log-likelihood.
-fn filter(
+fn filter<M: Dynamics<f64, 3, 6> + Channel<f64, 3, 6>>(
     linear: &Value,
     record: &Value,
-    model: SwitchedModel<f64, 2, 1, 3>,
+    ekf: &Ekf<M>,
     to_ours: SMatrix<f64, 3, 3>,
 ) -> (Vec<Step<f64, 3, 6>>, f64) {
-    let ekf = Ekf::new(model);
     let start = SVector::<f64, 3>::from_column_slice(&numbers(&linear["m0"]));
     let spread: [f64; 3] = numbers(&linear["P0diag"]).try_into().unwrap();
     let mut belief = Belief {
@@ -91,7 +91,7 @@ fn assert_state(got: &Belief<f64, 3, 6>, to_ours: &SMatrix<f64, 3, 3>, mean: &Va
 fn linear_sensor_with_irregular_steps_and_missing_samples() {
     let oracle = json(include_str!("../fixtures/kv_linear.json"));
     let (model, to_ours) = viscoelastic(&oracle, 0.0);
-    let (steps, log_likelihood) = filter(&oracle, &oracle, model, to_ours);
+    let (steps, log_likelihood) = filter(&oracle, &oracle, &Ekf::new(model), to_ours);
     assert!((log_likelihood - oracle["loglik"].as_f64().unwrap()).abs() < 1e-9, "{log_likelihood}");
     assert_state(&steps[59].posterior, &to_ours, &oracle["filtered_last"], Some(&oracle["filtered_cov_last"]));
     assert_state(&steps[10].posterior, &to_ours, &oracle["filtered_10"], None);
@@ -123,9 +123,76 @@ fn quadratic_gauge_with_the_extended_filter() {
     let linear = json(include_str!("../fixtures/kv_linear.json"));
     let oracle = json(include_str!("../fixtures/kv_nonlinear.json"));
     let (model, to_ours) = viscoelastic(&linear, oracle["g2"].as_f64().unwrap());
-    let (steps, log_likelihood) = filter(&linear, &oracle, model, to_ours);
+    let (steps, log_likelihood) = filter(&linear, &oracle, &Ekf::new(model), to_ours);
     assert!((log_likelihood - oracle["ekf"]["loglik"].as_f64().unwrap()).abs() < 1e-9, "{log_likelihood}");
     assert_state(&steps[59].posterior, &to_ours, &oracle["ekf"]["last"], Some(&oracle["ekf"]["cov_last"]));
+}
+
+#[test]
+fn quadratic_gauge_with_the_unscented_filter() {
+    let linear = json(include_str!("../fixtures/kv_linear.json"));
+    let oracle = json(include_str!("../fixtures/kv_nonlinear.json"));
+    let (model, to_ours) = viscoelastic(&linear, oracle["g2"].as_f64().unwrap());
+    let (steps, log_likelihood) = filter(&linear, &oracle, &Ukf::new(Unscented::new(model)), to_ours);
+    let expected = &oracle["ukf_a1_b2_k0_redraw"];
+    assert!((log_likelihood - expected["loglik"].as_f64().unwrap()).abs() < 1e-9, "{log_likelihood}");
+    assert_state(&steps[59].posterior, &to_ours, &expected["last"], Some(&expected["cov_last"]));
+}
+
+/// Where the iteration ends is the maximum of the posterior density: its gradient there is zero. Besides, it is where
+/// another program's iterated filter ends.
+#[test]
+fn quadratic_gauge_with_the_iterated_filter() {
+    let linear = json(include_str!("../fixtures/kv_linear.json"));
+    let oracle = json(include_str!("../fixtures/kv_nonlinear.json"));
+    let (model, to_ours) = viscoelastic(&linear, oracle["g2"].as_f64().unwrap());
+    let (steps, _) = filter(&linear, &oracle, &Ekf::new(model).iterated(30), to_ours);
+    assert_state(&steps[59].posterior, &to_ours, &oracle["iekf"]["last"], None);
+    assert_state(&steps[0].posterior, &to_ours, &oracle["iekf"]["idx0"], None);
+    let (first, reading) = (steps[0], numbers(&oracle["y"])[0]);
+    let at = model.observe(&first.posterior.mean, Direction::Known(Phase::Extend));
+    let inverse = first.prior.covariance.to_matrix().try_inverse();
+    let pull = inverse.map(|inverse| inverse * (first.posterior.mean - first.prior.mean));
+    if let Some(pull) = pull {
+        let push = at.gradient * ((reading - at.value) / at.variance);
+        assert!((pull - push).amax() < 1e-8 * push.amax(), "{pull} {push}");
+    }
+}
+
+/// Särkkä's toolbox: unscented filter and smoother on a linear model, the first sample missing.
+#[test]
+fn sarkkas_unscented_filter_and_smoother() {
+    let oracle = json(include_str!("../fixtures/sarkka_ukf_urts.json"));
+    let model = Linear {
+        transition: matrix![1.0, 1.0; 0.0, 1.0],
+        noise: matrix![2.0, 0.0; 0.0, 2.0],
+        gradient: vector![0.5, -0.3],
+        variance: 0.5,
+    };
+    let ukf = Ukf::new(Unscented::new(model));
+    let covariance = Symmetric::from_lower(&matrix![1.0, 0.1; 0.1, 1.0]);
+    let mut belief: Belief<f64, 2, 3> = Belief { mean: vector![1.0, 1.0], covariance };
+    let mut steps = Vec::new();
+    // Their first sample is missing and has no prediction before it: it is the start.
+    for z in [1.0, 2.0, 3.0] {
+        let step = ukf.step(&belief, 1.0, Some(Reading::from(z))).unwrap();
+        belief = step.posterior;
+        steps.push(step);
+    }
+    let check = |got: &Belief<f64, 2, 3>, mean: &Value, covariance: &Value| {
+        for i in 0..2 {
+            // The toolbox's own rounding through sigma points is 4e-11 relative in the smoother.
+            let (expected, row) = (numbers(mean)[i], numbers(&covariance[i]));
+            assert!((got.mean[i] - expected).abs() < 1e-10 * expected.abs(), "{} vs {expected}", got.mean[i]);
+            for j in 0..2 {
+                assert!((got.covariance[(i, j)] - row[j]).abs() < 1e-10 * row[j].abs());
+            }
+        }
+    };
+    for (k, (step, smoothed)) in steps.iter().zip(rts_smooth_vec(&steps)).enumerate() {
+        check(&step.posterior, &oracle["filt_mu"][k], &oracle["filt_P"][k]);
+        check(&smoothed, &oracle["smooth_mu"][k], &oracle["smooth_P"][k]);
+    }
 }
 
 /// rednose's kinematic example: position and velocity, Q = dt · diag(0.01, 4), the position measured.

@@ -50,15 +50,20 @@ pub struct Calibration {
 pub fn calibrate(
     recordings: &[Samples],
     options: LawOptions,
+    kinds: &[EstimatorKind],
     mut progress: impl FnMut(Stage),
 ) -> Result<Calibration, CalibrationError> {
     progress(Stage::Law);
     let fit: CrossFit = fit_law(recordings, options)?;
     let limits = fit.law.law.range;
-    let ekf = NoiseProblem::new(recordings, &fit, limits).fit(&mut progress)?;
+    let problem = NoiseProblem::new(recordings, &fit, limits);
+    let mut estimators = BTreeMap::new();
+    for &kind in kinds {
+        estimators.insert(kind, problem.fit(kind, &mut progress)?);
+    }
     let stats = MotionStats::new(recordings);
     Ok(Calibration {
-        estimators: BTreeMap::from([(EstimatorKind::Ekf, ekf)]),
+        estimators,
         static_cubic: StaticCubic::fit(recordings, limits)?,
         validity: Validity {
             lower: limits.lower,

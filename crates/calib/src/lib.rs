@@ -32,7 +32,7 @@ pub use filter::{Filter, Output, Start, build_filter};
 pub use law_fit::{CrossFit, GaugeFamily, LawFit, LawOptions, fit_law};
 pub use params::{
     BranchParams, EstimatorKind, EstimatorParams, FORMAT, GaugeParams, JointParams, LawParams, MotionParams,
-    NoiseParams, Quantity, RangeParams, ReadingUnit, RecordingInfo, SensorParams, Uncertainty, Validity,
+    NoiseParams, PhaseParams, Quantity, RangeParams, ReadingUnit, RecordingInfo, SensorParams, Uncertainty, Validity,
 };
 pub use samples::Samples;
 pub use scores::{ScoredRow, Scores};

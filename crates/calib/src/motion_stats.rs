@@ -9,6 +9,14 @@ pub(crate) struct MotionStats {
     pub rate_sd: f64,
     /// Time after which the rate's autocorrelation has fallen to 1/e.
     pub rate_time_s: f64,
+    pub acceleration_sd: f64,
+    /// Mean durations of holds and of movements in one direction; `None` for a body that never rests.
+    pub hold_s: Option<f64>,
+    pub move_s: f64,
+    /// Share of movements that another one follows without a hold.
+    pub reversal: f64,
+    /// Median speed of movements.
+    pub speed: f64,
     /// 99th percentile of the speed.
     pub fastest_rate: f64,
     pub longest_s: f64,
@@ -20,13 +28,16 @@ const HALF_WINDOW: usize = 2;
 
 impl MotionStats {
     pub(crate) fn new(recordings: &[Samples]) -> Self {
-        let (mut strains, mut rates) = (Vec::new(), Vec::new());
+        let (mut strains, mut rates, mut accelerations) = (Vec::new(), Vec::new(), Vec::new());
+        let mut phases = PhaseDurations::default();
         let mut times = Vec::new();
         let mut longest_s = 0.0_f64;
         for samples in recordings {
             let strain = filled_strain(samples);
             let rate = moving_mean(&central_rate(samples.time_s, &strain));
             times.push(correlation_time(samples.time_s, &rate));
+            accelerations.extend(moving_mean(&central_rate(samples.time_s, &rate)));
+            phases.add(samples.time_s, &rate);
             rates.extend(rate);
             strains.extend(strain);
             longest_s = longest_s.max(samples.time_s[samples.len() - 1] - samples.time_s[0]);
@@ -40,9 +51,59 @@ impl MotionStats {
             strain_sd: root_mean_square(&deviations),
             rate_sd: root_mean_square(&rates),
             rate_time_s: mean(&times),
+            acceleration_sd: root_mean_square(&accelerations),
+            hold_s: (!phases.holds.is_empty()).then(|| mean(&phases.holds)),
+            move_s: if phases.moves.is_empty() { longest_s } else { mean(&phases.moves) },
+            reversal: phases.reversal(),
+            speed: phases.median_speed(),
             fastest_rate: speeds[(speeds.len() - 1) * 99 / 100],
             longest_s,
         }
+    }
+}
+
+/// Durations of holds and movements.
+#[derive(Default)]
+struct PhaseDurations {
+    holds: Vec<f64>,
+    moves: Vec<f64>,
+    speeds: Vec<f64>,
+}
+
+/// Below this share of the fast rates (90th percentile) a body is at rest.
+const REST_SHARE: f64 = 0.05;
+/// A phase of fewer rows is a flicker.
+const FEWEST_PHASE_ROWS: usize = 2;
+
+impl PhaseDurations {
+    fn add(&mut self, time_s: &[f64], rate: &[f64]) {
+        let mut speeds: Vec<f64> = rate.iter().map(|v| v.abs()).collect();
+        speeds.sort_by(f64::total_cmp);
+        let rest = REST_SHARE * speeds[(speeds.len() - 1) * 9 / 10];
+        let phase = |v: f64| i8::from(v > rest) - i8::from(v < -rest);
+        let mut start = 0;
+        for k in 1..=rate.len() {
+            if k < rate.len() && phase(rate[k]) == phase(rate[start]) {
+                continue;
+            }
+            if k - start >= FEWEST_PHASE_ROWS {
+                let duration = time_s[k.min(rate.len() - 1)] - time_s[start];
+                if phase(rate[start]) == 0 { self.holds.push(duration) } else { self.moves.push(duration) }
+            }
+            start = k;
+        }
+        self.speeds.extend(rate.iter().filter(|v| phase(**v) != 0).map(|v| v.abs()));
+    }
+
+    /// Every hold ends one movement; the movements beyond that turned around.
+    fn reversal(&self) -> f64 {
+        (1.0 - self.holds.len() as f64 / self.moves.len().max(1) as f64).clamp(0.05, 0.95)
+    }
+
+    fn median_speed(&self) -> f64 {
+        let mut speeds = self.speeds.clone();
+        speeds.sort_by(f64::total_cmp);
+        speeds.get(speeds.len() / 2).copied().unwrap_or(0.0)
     }
 }
 

@@ -6,7 +6,9 @@ use crate::filter::{Start, filter_from_parts};
 use crate::law_fit::CrossFit;
 use crate::motion_stats::{MotionStats, root_mean_square};
 use crate::optimise;
-use crate::params::{EstimatorParams, LawParams, MotionParams, NoiseParams, RangeParams};
+use crate::params::{
+    EstimatorKind, EstimatorParams, LawParams, MotionParams, NoiseParams, PhaseParams, RangeParams,
+};
 use crate::samples::Samples;
 
 /// Standard deviation that every reference has of its own, as a share of the strain's range: no score can be had from
@@ -20,6 +22,8 @@ const SEARCHES: [(f64, u64); 2] = [(0.7, 150), (0.5, 150)];
 const BASELINE_TIME_S: f64 = 8.0;
 /// First guess of white noise and branch noise, as a share of the law's residual.
 const SHARE_OF_RESIDUAL: f64 = 0.3;
+/// First guess of the tempering: model error is correlated from reading to reading.
+const TEMPERING: f64 = 0.7;
 
 /// The filter's score on the known strain as a function of noise and motion.
 ///
@@ -44,8 +48,12 @@ impl<'a> NoiseProblem<'a> {
     }
 
     /// Fits noise and motion.
-    pub(crate) fn fit(&self, progress: &mut impl FnMut(Stage)) -> Result<EstimatorParams, CalibrationError> {
-        let start = self.start();
+    pub(crate) fn fit(
+        &self,
+        kind: EstimatorKind,
+        progress: &mut impl FnMut(Stage),
+    ) -> Result<EstimatorParams, CalibrationError> {
+        let start = self.start(kind);
         // A step of the simplex evaluates one or two points.
         let expected = SEARCHES.iter().map(|(_, steps)| steps * 3 / 2).sum();
         let mut done = 0;
@@ -53,19 +61,20 @@ impl<'a> NoiseProblem<'a> {
             done += 1;
             progress(Stage::Noise { done, expected });
             let pull: f64 = point.iter().zip(&start).map(|(x, s)| (x - s).powi(2)).sum();
-            self.score(&self.params(point)) + REGULARISATION * pull
+            self.score(kind, &self.params(kind, point)) + REGULARISATION * pull
         };
         let mut point = start.clone();
         for (side, steps) in SEARCHES {
             point = optimise::polish(&mut cost, &point, side, steps)?;
         }
-        let mut params = self.params(&point);
-        params.score = self.score(&params);
+        let mut params = self.params(kind, &point);
+        params.score = self.score(kind, &params);
         Ok(params)
     }
 
-    /// Logarithms of the parameters that the law's residuals and the motion of the strain suggest.
-    fn start(&self) -> Vec<f64> {
+    /// Logarithms of the parameters that the law's residuals and the motion of the strain suggest: noise (4), motion (3)
+    /// and, for filters of phases, durations, speed and tempering (4).
+    fn start(&self, kind: EstimatorKind) -> Vec<f64> {
         let mut left_out = Vec::new();
         for (block, law) in self.fit.without_block.iter().enumerate() {
             for (rows, residuals) in self.fit.blocks.iter().zip(&law.residuals) {
@@ -75,40 +84,59 @@ impl<'a> NoiseProblem<'a> {
         let known: Vec<f64> = self.fit.law.residuals.iter().flatten().copied().filter(|r| r.is_finite()).collect();
         let fine = SHARE_OF_RESIDUAL * root_mean_square(&known).max(1e-9);
         let stats = &self.stats;
-        [
-            root_mean_square(&left_out).max(1e-9),
-            BASELINE_TIME_S,
-            fine,
-            fine,
-            stats.rate_sd,
-            stats.rate_time_s,
-            stats.strain_sd,
-        ]
-        .map(f64::ln)
-        .to_vec()
+        let mut start = vec![root_mean_square(&left_out).max(1e-9), BASELINE_TIME_S, fine, fine];
+        start.extend(match kind {
+            EstimatorKind::Ekf => [stats.rate_sd, stats.rate_time_s, stats.strain_sd],
+            EstimatorKind::SignSplit => [stats.rate_sd, stats.acceleration_sd, stats.strain_sd],
+            EstimatorKind::Imm | EstimatorKind::Hypotheses => {
+                [0.5 * stats.speed, stats.rate_time_s, 3.0 * stats.strain_sd]
+            }
+        });
+        if kind != EstimatorKind::Ekf {
+            start.extend([stats.hold_s.unwrap_or(0.5), stats.move_s, stats.speed.max(1e-12), TEMPERING]);
+        }
+        start.iter().map(|x| x.ln()).collect()
     }
 
-    fn params(&self, point: &[f64]) -> EstimatorParams {
+    fn params(&self, kind: EstimatorKind, point: &[f64]) -> EstimatorParams {
         let p: Vec<f64> = point.iter().map(|x| x.clamp(-25.0, 15.0).exp()).collect();
+        let strain_mean = self.stats.strain_mean;
+        let motion = if kind == EstimatorKind::SignSplit {
+            MotionParams::Smooth {
+                rate_sd_per_s: p[4],
+                // A stationary motion has σ_v² < σ_ε σ_a.
+                acceleration_sd_per_s2: p[5].max(1.2 * p[4] * p[4] / p[6]),
+                strain_mean,
+                strain_sd: p[6],
+            }
+        } else {
+            MotionParams::OrnsteinUhlenbeck { rate_sd_per_s: p[4], rate_time_s: p[5], strain_mean, strain_sd: p[6] }
+        };
+        let phases = (kind != EstimatorKind::Ekf).then(|| PhaseParams {
+            hold_time_s: p[7],
+            move_time_s: p[8],
+            reversal: match (kind, self.stats.hold_s) {
+                (EstimatorKind::SignSplit, None) => 1.0,
+                _ => self.stats.reversal,
+            },
+            speed_per_s: if kind == EstimatorKind::SignSplit { 0.0 } else { p[9] },
+            tempering: p[10].min(1.0),
+        });
         EstimatorParams {
             score: f64::NAN,
-            motion: MotionParams::OrnsteinUhlenbeck {
-                rate_sd_per_s: p[4],
-                rate_time_s: p[5],
-                strain_mean: self.stats.strain_mean,
-                strain_sd: p[6],
-            },
+            motion,
             noise: NoiseParams { baseline_sd: p[0], baseline_time_s: p[1], reading_sd: p[2], branch_sd: p[3] },
+            phases,
         }
     }
 
     /// Mean negative log density of the true strain under the filter, strain in units of its range. Infinite if the
     /// filter fails.
-    fn score(&self, params: &EstimatorParams) -> f64 {
+    fn score(&self, kind: EstimatorKind, params: &EstimatorParams) -> f64 {
         let (mut sum, mut count) = (0.0, 0_usize);
         for (block, law) in self.fit.without_block.iter().enumerate() {
             for recording in 0..self.samples.len() {
-                match self.score_block(params, &law.law, block, recording) {
+                match self.score_block(kind, params, &law.law, block, recording) {
                     Some((block_sum, rows)) => (sum, count) = (sum + block_sum, count + rows),
                     None => return f64::INFINITY,
                 }
@@ -120,6 +148,7 @@ impl<'a> NoiseProblem<'a> {
     /// Runs from the first row to the end of a block and scores the block. Sum and number of scores.
     fn score_block(
         &self,
+        kind: EstimatorKind,
         params: &EstimatorParams,
         law: &LawParams,
         block: usize,
@@ -128,7 +157,7 @@ impl<'a> NoiseProblem<'a> {
         let samples = &self.samples[recording];
         let rows = &self.fit.blocks[recording][block];
         let span = self.limits.span();
-        let mut filter = filter_from_parts(law, params, self.limits, Start::Unknown).ok()?;
+        let mut filter = filter_from_parts(kind, law, params, self.limits, Start::Unknown).ok()?;
         let (mut sum, mut count) = (0.0, 0);
         for (k, reading) in self.readings[block][recording][..rows.end].iter().enumerate() {
             filter.step(samples.time_s[k], *reading).ok()?;

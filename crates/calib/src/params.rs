@@ -85,17 +85,26 @@ pub enum ReadingUnit {
 pub enum EstimatorKind {
     /// Extended Kalman filter.
     Ekf,
+    /// Interacting multiple models over extend, hold and retract.
+    Imm,
+    /// Gaussian hypotheses split by the sign of the rate.
+    SignSplit,
+    /// Best phase histories.
+    Hypotheses,
 }
 
 impl EstimatorKind {
     /// All estimators.
-    pub const ALL: [Self; 1] = [Self::Ekf];
+    pub const ALL: [Self; 4] = [Self::Ekf, Self::Imm, Self::SignSplit, Self::Hypotheses];
 
     /// Its name on the command line and in files.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::Ekf => "ekf",
+            Self::Imm => "imm",
+            Self::SignSplit => "sign-split",
+            Self::Hypotheses => "hypotheses",
         }
     }
 }
@@ -257,6 +266,25 @@ pub struct EstimatorParams {
     pub motion: MotionParams,
     /// What the law does not explain.
     pub noise: NoiseParams,
+    /// How phases follow each other, for estimators that keep phase hypotheses.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub phases: Option<PhaseParams>,
+}
+
+/// How phases follow each other.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PhaseParams {
+    /// Mean duration of a hold, s.
+    pub hold_time_s: f64,
+    /// Mean duration of a movement in one direction, s.
+    pub move_time_s: f64,
+    /// Probability that a movement turns around without a hold; 1 for a body that never rests.
+    pub reversal: f64,
+    /// Mean speed of a movement, per second; 0 where the rate has no preferred value.
+    pub speed_per_s: f64,
+    /// Power to which a reading's likelihood enters the weights of the hypotheses.
+    pub tempering: f64,
 }
 
 /// Noise of the law, relative to R₀.

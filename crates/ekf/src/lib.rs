@@ -50,9 +50,16 @@ mod ekf;
 mod error;
 mod estimate;
 mod gaussian;
+mod hypotheses;
+mod imm;
+mod mixture;
+mod mixture_step;
 mod psd;
+mod sign_split;
 mod smoother;
+mod switching;
 mod traits;
+mod unscented;
 
 #[cfg(feature = "adskalman")]
 pub use adskalman_bridge::LinearStep;
@@ -62,7 +69,14 @@ pub use ekf::{Ekf, Step, Update};
 pub use error::StepError;
 pub use estimate::Estimate;
 pub use gaussian::{Gaussian, Real, TruncatedGaussian};
+pub use hypotheses::Hypotheses;
+pub use imm::Imm;
+pub use mixture::{Component, Mixture};
+pub use mixture_step::MixtureStep;
+pub use sign_split::SignSplit;
 #[cfg(feature = "std")]
 pub use smoother::rts_smooth_vec;
 pub use smoother::{rts_smooth, rts_step};
+pub use switching::{Dwell, Phased};
 pub use traits::{Channel, Dynamics, Reading};
+pub use unscented::{Ukf, Unscented};

@@ -36,6 +36,11 @@ impl<T: Scalar, const N: usize> SemiDefinite<T, N> {
         Self { lower, pivots }
     }
 
+    /// Column `i` of a square root `L √D`.
+    pub(crate) fn column(&self, i: usize) -> SVector<T, N> {
+        self.lower.column(i) * self.pivots[i].sqrt()
+    }
+
     /// A solution x of `P x = rhs` for a right-hand side in the range of P.
     pub(crate) fn solve(&self, rhs: &SVector<T, N>) -> SVector<T, N> {
         let mut x = *rhs;

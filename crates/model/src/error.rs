@@ -39,7 +39,9 @@ impl fmt::Display for ParameterError {
 impl core::error::Error for ParameterError {}
 
 impl ParameterError {
-    pub(crate) const fn new(parameter: &'static str, problem: Problem) -> Self {
+    /// Names a parameter and what is wrong with it.
+    #[must_use]
+    pub const fn new(parameter: &'static str, problem: Problem) -> Self {
         Self { parameter, problem }
     }
 }

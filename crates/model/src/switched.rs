@@ -67,6 +67,14 @@ pub struct SwitchedStep<T, const M: usize, const B: usize> {
     baseline_variance: T,
 }
 
+impl<T: Scalar, const M: usize, const B: usize> SwitchedStep<T, M, B> {
+    /// Length of the step, s.
+    #[must_use]
+    pub fn dt_s(&self) -> T {
+        self.response.dt_s
+    }
+}
+
 impl<T: Scalar, const M: usize, const B: usize, const N: usize> SwitchedModel<T, M, B, N> {
     const SIZES_FIT: () =
         assert!((M == 2 || M == 3) && (N == M + B || N == M + B + 1), "N must be M + B or M + B + 1, M 2 or 3");
@@ -139,7 +147,7 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize> SwitchedModel<T,
     /// The transition over a prepared step from `state`, linearised there.
     ///
     /// Given the phase and constant gains it is exact. Gains affine in strain are taken at mid-strain, and the
-    /// uncertainty of that strain goes into `jacobian` and `noise`. `dt_s` of the step must be positive.
+    /// uncertainty of that strain goes into `jacobian` and `noise`.
     #[must_use]
     pub fn transition<const L: usize>(
         &self,
@@ -267,6 +275,9 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize> SwitchedModel<T,
             }
             // The rate that, held over the step, drives the branch as much as the motion does.
             let reach_s = -response.decay_change[i] * self.law.branches[i].tau_s;
+            if !(reach_s > T::zero()) {
+                continue; // a step of zero seconds
+            }
             let rate = direction.split(unit_drive / reach_s);
             let (extend, extend_slope) = self.law.gain(i, mid_strain, Phase::Extend);
             let (retract, retract_slope) = self.law.gain(i, mid_strain, Phase::Retract);

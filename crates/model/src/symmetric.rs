@@ -111,6 +111,15 @@ impl<T: Scalar, const N: usize, const L: usize> Symmetric<T, N, L> {
         self
     }
 
+    /// `factor · self`.
+    #[must_use]
+    pub fn scaled(mut self, factor: T) -> Self {
+        for entry in &mut self.0 {
+            *entry *= factor;
+        }
+        self
+    }
+
     /// Whether every entry is finite.
     #[must_use]
     pub fn is_finite(&self) -> bool {

@@ -1,0 +1,190 @@
+use nalgebra::SVector;
+use ohmstrain_model::{Phase, Scalar, StrainRange, Symmetric};
+
+use crate::gaussian::{Gaussian, Real};
+use crate::{Belief, StepError};
+
+/// One hypothesis: a phase and what is known of the state if it is the right one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Component<T, const N: usize, const L: usize> {
+    /// Natural logarithm of its probability.
+    pub log_weight: T,
+    /// The phase it believes in.
+    pub phase: Phase,
+    /// The state, given the hypothesis.
+    pub belief: Belief<T, N, L>,
+    /// Logarithm of the probability of the strain's limits under `belief`. Only its changes enter the weight: evidence
+    /// that was counted once is not counted again at every step of a rest on a limit.
+    pub(crate) log_inside: T,
+}
+
+/// At most `K` weighted hypotheses about the state, in fixed memory.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Mixture<T, const N: usize, const L: usize, const K: usize> {
+    components: [Component<T, N, L>; K],
+    len: usize,
+}
+
+/// When two hypotheses of one phase count as one: squared distance of their strains plus that of their rates, each in
+/// units of the larger variance.
+const ALIKE: f64 = 0.5;
+/// Hypotheses lighter than the heaviest by this factor, e⁻¹², are dropped.
+const NEGLIGIBLE: f64 = 12.0;
+/// A hypothesis that has left the limits altogether is no less likely than this.
+const LEAST_INSIDE: f64 = 1e-9;
+
+impl<T: Real, const N: usize, const L: usize, const K: usize> Mixture<T, N, L, K> {
+    const CAPACITY: () = assert!(K >= 1 && N >= 2, "a mixture holds at least one component of strain and rate");
+
+    /// One hypothesis that has all the weight.
+    #[must_use]
+    pub fn single(belief: Belief<T, N, L>, phase: Phase) -> Self {
+        let mut mixture = Self::empty();
+        mixture.push(Component { log_weight: T::zero(), phase, belief, log_inside: T::zero() });
+        mixture
+    }
+
+    pub(crate) fn empty() -> Self {
+        let () = Self::CAPACITY;
+        let nothing = Belief { mean: SVector::zeros(), covariance: Symmetric::zeros() };
+        let vacant = Component { log_weight: T::zero(), phase: Phase::Hold, belief: nothing, log_inside: T::zero() };
+        Self { components: [vacant; K], len: 0 }
+    }
+
+    /// The hypotheses.
+    #[must_use]
+    pub fn components(&self) -> &[Component<T, N, L>] {
+        self.components.get(..self.len).unwrap_or(&[])
+    }
+
+    fn components_mut(&mut self) -> &mut [Component<T, N, L>] {
+        self.components.get_mut(..self.len).unwrap_or(&mut [])
+    }
+
+    /// Adds a hypothesis: merged with one that says the same, in a free place, or in the place of the lightest.
+    pub(crate) fn add(&mut self, candidate: Component<T, N, L>) {
+        if let Some(like) = self.components_mut().iter_mut().find(|known| known.is_like(&candidate)) {
+            *like = like.merged(&candidate);
+            return;
+        }
+        if self.len < K {
+            self.push(candidate);
+            return;
+        }
+        let lightest =
+            self.components_mut().iter_mut().reduce(|a, b| if b.log_weight < a.log_weight { b } else { a });
+        if let Some(lightest) = lightest.filter(|lightest| lightest.log_weight < candidate.log_weight) {
+            *lightest = candidate;
+        }
+    }
+
+    /// Adds a hypothesis as it is, if there is room.
+    pub(crate) fn push(&mut self, component: Component<T, N, L>) {
+        if let Some(place) = self.components.get_mut(self.len) {
+            *place = component;
+            self.len += 1;
+        }
+    }
+
+    /// Makes the probabilities sum to one and drops what is negligible; the logarithm of the sum before.
+    pub(crate) fn normalise(&mut self) -> Result<T, StepError> {
+        let heaviest = self.components().iter().map(|c| c.log_weight).reduce(|a, b| a.max(b));
+        let Some(heaviest) = heaviest.filter(|weight| weight.is_finite()) else {
+            return Err(StepError::NonFiniteState);
+        };
+        let mut kept = Self::empty();
+        let mut sum = T::zero();
+        for component in self.components() {
+            if component.log_weight > heaviest - T::of(NEGLIGIBLE) {
+                sum += (component.log_weight - heaviest).exp();
+                kept.push(*component);
+            }
+        }
+        let log_sum = heaviest + sum.ln();
+        for component in kept.components_mut() {
+            component.log_weight -= log_sum;
+        }
+        *self = kept;
+        Ok(log_sum)
+    }
+
+    /// Probability of each phase, in the order of [`Phase::ALL`].
+    #[must_use]
+    pub fn phase_probabilities(&self) -> [T; 3] {
+        let mut probabilities = [T::zero(); 3];
+        for component in self.components() {
+            if let Some(probability) = probabilities.get_mut(component.phase.index()) {
+                *probability += component.log_weight.exp();
+            }
+        }
+        probabilities
+    }
+
+    /// The Gaussian with the mixture's mean and covariance.
+    #[must_use]
+    pub fn moments(&self) -> Belief<T, N, L> {
+        moment_match(self.components().iter().map(|c| (c.log_weight.exp(), &c.belief)))
+    }
+}
+
+impl<T: Real, const N: usize, const L: usize> Component<T, N, L> {
+    fn is_like(&self, other: &Self) -> bool {
+        let distance = |i: usize| {
+            let apart = self.belief.mean[i] - other.belief.mean[i];
+            let variance = self.belief.covariance[(i, i)].max(other.belief.covariance[(i, i)]);
+            if variance > T::zero() { apart * apart / variance } else { apart * apart }
+        };
+        self.phase == other.phase && distance(0) + distance(1) < T::of(ALIKE)
+    }
+
+    /// Both in one, with the mean and covariance of the pair.
+    fn merged(&self, other: &Self) -> Self {
+        let heavier = self.log_weight.max(other.log_weight);
+        let (mine, theirs) = ((self.log_weight - heavier).exp(), (other.log_weight - heavier).exp());
+        let total = mine + theirs;
+        let (mine, theirs) = (mine / total, theirs / total);
+        Self {
+            log_weight: heavier + total.ln(),
+            phase: self.phase,
+            belief: moment_match([(mine, &self.belief), (theirs, &other.belief)].into_iter()),
+            log_inside: mine * self.log_inside + theirs * other.log_inside,
+        }
+    }
+
+    /// Takes in how much more, or less, probability its belief now gives to the limits.
+    pub(crate) fn weigh_limits(&mut self, limits: &StrainRange<T>) {
+        let strain = Gaussian { mean: self.belief.mean[0], variance: self.belief.covariance[(0, 0)] };
+        let log_inside = strain.restricted(limits).mass.max(T::of(LEAST_INSIDE)).ln();
+        self.log_weight += log_inside - self.log_inside;
+        self.log_inside = log_inside;
+    }
+}
+
+/// Mean and covariance of a mixture of Gaussians whose weights sum to one.
+pub(crate) fn moment_match<'a, T: Scalar, const N: usize, const L: usize>(
+    weighted: impl Iterator<Item = (T, &'a Belief<T, N, L>)> + Clone,
+) -> Belief<T, N, L> {
+    let mean = weighted.clone().fold(SVector::zeros(), |sum, (weight, belief)| sum + belief.mean * weight);
+    let mut covariance = Symmetric::zeros();
+    for (weight, belief) in weighted {
+        covariance = covariance.plus(&belief.covariance.scaled(weight));
+        covariance.add_outer(&(belief.mean - mean), weight);
+    }
+    Belief { mean, covariance }
+}
+
+/// A belief restricted to rates of one sign, and the probability of that sign.
+pub(crate) fn with_rate_in<T: Real, const N: usize, const L: usize>(
+    belief: &Belief<T, N, L>,
+    rates: &StrainRange<T>,
+) -> (Belief<T, N, L>, T) {
+    let rate = Gaussian { mean: belief.mean[1], variance: belief.covariance[(1, 1)] };
+    if rate.variance <= T::zero() {
+        return (*belief, if rates.contains(rate.mean) { T::one() } else { T::zero() });
+    }
+    let cut = rate.restricted(rates);
+    let regression = SVector::from_fn(|i, _| belief.covariance[(i, 1)]) / rate.variance;
+    let mut covariance = belief.covariance;
+    covariance.add_outer(&regression, cut.variance - rate.variance);
+    (Belief { mean: belief.mean + regression * (cut.mean - rate.mean), covariance }, cut.mass)
+}

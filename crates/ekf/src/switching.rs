@@ -1,0 +1,94 @@
+use ohmstrain_model::{ParameterError, Phase, Problem, Scalar, SwitchedModel};
+
+use crate::gaussian::Gaussian;
+use crate::{Belief, Channel, Dynamics};
+
+/// A model whose dynamics depend on the phase: what a filter of phase hypotheses needs besides.
+pub trait Phased<T: Scalar, const N: usize, const L: usize>: Dynamics<T, N, L> + Channel<T, N, L> {
+    /// The same belief at the moment a moving phase begins: rate (and acceleration) drawn anew from the phase's prior,
+    /// independent of everything else.
+    fn enter(&self, from: &Belief<T, N, L>, phase: Phase) -> Belief<T, N, L>;
+}
+
+/// Mean and variance of |x| for a standard normal x: √(2/π) and 1 - 2/π.
+const HALF_NORMAL: (f64, f64) = (0.797_884_560_802_865_4, 0.363_380_227_632_418_6);
+
+impl<T: Scalar, const M: usize, const B: usize, const N: usize, const L: usize> Phased<T, N, L>
+    for SwitchedModel<T, M, B, N>
+{
+    fn enter(&self, from: &Belief<T, N, L>, phase: Phase) -> Belief<T, N, L> {
+        let motion = self.motion();
+        let sign = if phase == Phase::Retract { -T::one() } else { T::one() };
+        let rate_variance = motion.stationary_variance()[1];
+        let rate = if motion.phase_rate() > T::zero() {
+            Gaussian { mean: motion.phase_rate(), variance: rate_variance }
+        } else {
+            Gaussian {
+                mean: T::of(HALF_NORMAL.0) * rate_variance.sqrt(),
+                variance: T::of(HALF_NORMAL.1) * rate_variance,
+            }
+        };
+        let mut out = *from;
+        for i in 1..M {
+            for j in 0..N {
+                out.covariance[(i, j)] = T::zero();
+            }
+            out.mean[i] = T::zero();
+            out.covariance[(i, i)] = motion.stationary_variance()[i];
+        }
+        out.mean[1] = sign * rate.mean;
+        out.covariance[(1, 1)] = rate.variance;
+        out
+    }
+}
+
+/// How long phases last and what follows them: a Markov chain in continuous time over extend, hold and retract.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Dwell<T> {
+    hold_s: T,
+    move_s: T,
+    reversal: T,
+}
+
+impl<T: Scalar> Dwell<T> {
+    /// - `hold_s`, `move_s`: mean duration of a hold and of a stretching or releasing phase, s.
+    /// - `reversal`: probability that a moving phase turns around without a hold, 0 to 1.
+    ///
+    /// # Errors
+    /// Names the parameter that is out of range.
+    pub fn new(hold_s: T, move_s: T, reversal: T) -> Result<Self, ParameterError> {
+        if !(hold_s > T::zero()) {
+            return Err(ParameterError::new("hold_s", Problem::NotPositive));
+        }
+        if !(move_s > T::zero()) {
+            return Err(ParameterError::new("move_s", Problem::NotPositive));
+        }
+        if !(reversal >= T::zero() && reversal <= T::one()) {
+            return Err(ParameterError::new("reversal", Problem::OutOfRange));
+        }
+        Ok(Self { hold_s, move_s, reversal })
+    }
+
+    /// Transition probabilities over `dt_s`, `[from][to]` in the order of [`Phase::ALL`]: the exponential of generator
+    /// times dt in closed form, so that one step equals two halves.
+    ///
+    /// The sum of both moving phases and the hold form a chain of two states; their difference decays by itself.
+    #[must_use]
+    pub fn probabilities(&self, dt_s: T) -> [[T; 3]; 3] {
+        let (one, half) = (T::one(), T::of(0.5));
+        let (stop, start) = ((one - self.reversal) / self.move_s, one / self.hold_s);
+        let total = stop + start;
+        let mixed = -(-total * dt_s).exp_m1();
+        let moving_stops = stop / total * mixed;
+        let hold_ends = start / total * mixed;
+        let difference = (-(one + self.reversal) / self.move_s * dt_s).exp();
+        let stays_moving = one - moving_stops;
+        let same = half * (stays_moving + difference);
+        let other = half * (stays_moving - difference);
+        [
+            [same, moving_stops, other],
+            [half * hold_ends, one - hold_ends, half * hold_ends],
+            [other, moving_stops, same],
+        ]
+    }
+}
