@@ -1,19 +1,21 @@
 #!/usr/bin/env bash
 # What the filter reaches on real recordings, as a Markdown table on stdout.
 #
-#   real-recordings.sh FOLDER
+#   real-recordings.sh FOLDER [ESTIMATOR]
 #
 # FOLDER holds trace CSVs with a reference (`NAME.csv`). Each one is calibrated on its first half (the rows before its
 # middle row) and scored on its second half. The recordings are public but not part of this repository; a name that is
-# listed below is described by its source and protocol, any other by itself. Progress goes to stderr.
+# listed below is described by its source and protocol, any other by itself. ESTIMATOR is ekf unless given; filters of phase
+# hypotheses take minutes on long recordings. Progress goes to stderr.
 set -euo pipefail
 shopt -s nullglob
 
-if [[ $# -ne 1 || ! -d $1 ]]; then
-    echo "usage: $(basename "$0") FOLDER" >&2
+if [[ $# -lt 1 || $# -gt 2 || ! -d $1 ]]; then
+    echo "usage: $(basename "$0") FOLDER [ESTIMATOR]" >&2
     exit 2
 fi
 folder=$1
+estimator=${2:-ekf}
 root=$(cd "$(dirname "$0")/.." && pwd)
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
@@ -52,7 +54,7 @@ middle_time() {
 scores() {
     awk -F'|' -v estimate="$1" '
         { for (i = 1; i <= NF; i++) gsub(/^ +| +$/, "", $i) }
-        $3 == estimate { printf "%.1f", $5; if ($7 != "") { sub(/ %/, "", $7); printf " (%.0f)", $7 } }
+        $3 ~ "^" estimate { printf "%.1f", $5; if ($7 != "") { sub(/ %/, "", $7); printf " (%.0f)", $7 } }
     ' "$work/scores"
 }
 
@@ -62,7 +64,7 @@ for trace in "$folder"/*.csv; do
     name=$(basename "$trace" .csv)
     echo "$name" >&2
     middle=$(middle_time "$trace") || { echo "$trace: no column time_s" >&2; exit 1; }
-    ohmstrain calibrate "$trace" --until "$middle" --output "$work/sensor.toml"
+    ohmstrain calibrate "$trace" --until "$middle" --estimator "$estimator" --output "$work/sensor.toml"
     ohmstrain evaluate "$trace" --sensor "$work/sensor.toml" --from "$middle" >"$work/scores"
-    echo "| $(describe "$name") | $(scores "static cubic") | $(scores ekf) | $(scores smoother) |"
+    echo "| $(describe "$name") | $(scores "static cubic") | $(scores "$estimator") | $(scores smoother) |"
 done

@@ -3,7 +3,9 @@
 //! probabilities mean what they say.
 
 use nalgebra::{Matrix3, SMatrix, SVector};
-use ohmstrain_ekf::{Belief, Dwell, Dynamics, Ekf, Hypotheses, Imm, Mixture, Phased, Reading, SignSplit, Ukf, Unscented};
+use ohmstrain_ekf::{
+    Belief, Dwell, Dynamics, Ekf, Hypotheses, Imm, Mixture, Phased, Reading, SignSplit, Ukf, Unscented,
+};
 use ohmstrain_model::{
     Branch, Direction, Gauge, ModelNoise, Motion, Phase, SensorLaw, StrainRange, SwitchedModel, Symmetric, Transition,
 };
@@ -144,11 +146,13 @@ impl Process {
     fn step(&mut self) -> (Phase, f64) {
         let mut draw = uniform(&mut self.rng);
         let row = self.dwell.probabilities(DT_S)[self.phase.index()];
-        let next = *Phase::ALL.iter().find(|phase| {
-            draw -= row[phase.index()];
-            draw < 0.0
-        })
-        .unwrap_or(&self.phase);
+        let next = *Phase::ALL
+            .iter()
+            .find(|phase| {
+                draw -= row[phase.index()];
+                draw < 0.0
+            })
+            .unwrap_or(&self.phase);
         if next != Phase::Hold && next != self.phase {
             let known: Belief<f64, 3, 6> = Belief::independent(self.state, &[0.0; 3]);
             let entered = self.model.enter(&known, next);
@@ -208,8 +212,7 @@ fn phase_probabilities_mean_what_they_say() {
         (0..50)
             .map(|_| {
                 let (phase, reading) = process.step();
-                mixture =
-                    imm.step_prepared(&mixture, &prepared, DT_S, Some(Reading::from(reading))).unwrap().posterior;
+                mixture = imm.step_prepared(&mixture, &prepared, DT_S, Some(Reading::from(reading))).unwrap().posterior;
                 (phase, mixture.phase_probabilities())
             })
             .collect()

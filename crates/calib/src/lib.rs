@@ -22,6 +22,7 @@ mod motion_stats;
 mod noise_fit;
 mod optimise;
 mod params;
+mod running;
 mod samples;
 mod scores;
 

@@ -6,9 +6,7 @@ use crate::filter::{Start, filter_from_parts};
 use crate::law_fit::CrossFit;
 use crate::motion_stats::{MotionStats, root_mean_square};
 use crate::optimise;
-use crate::params::{
-    EstimatorKind, EstimatorParams, LawParams, MotionParams, NoiseParams, PhaseParams, RangeParams,
-};
+use crate::params::{EstimatorKind, EstimatorParams, LawParams, MotionParams, NoiseParams, PhaseParams, RangeParams};
 use crate::samples::Samples;
 
 /// Standard deviation that every reference has of its own, as a share of the strain's range: no score can be had from
@@ -86,13 +84,13 @@ impl<'a> NoiseProblem<'a> {
         let stats = &self.stats;
         let mut start = vec![root_mean_square(&left_out).max(1e-9), BASELINE_TIME_S, fine, fine];
         start.extend(match kind {
-            EstimatorKind::Ekf => [stats.rate_sd, stats.rate_time_s, stats.strain_sd],
+            EstimatorKind::Ekf | EstimatorKind::Ukf => [stats.rate_sd, stats.rate_time_s, stats.strain_sd],
             EstimatorKind::SignSplit => [stats.rate_sd, stats.acceleration_sd, stats.strain_sd],
             EstimatorKind::Imm | EstimatorKind::Hypotheses => {
                 [0.5 * stats.speed, stats.rate_time_s, 3.0 * stats.strain_sd]
             }
         });
-        if kind != EstimatorKind::Ekf {
+        if kind.has_phases() {
             start.extend([stats.hold_s.unwrap_or(0.5), stats.move_s, stats.speed.max(1e-12), TEMPERING]);
         }
         start.iter().map(|x| x.ln()).collect()
@@ -112,7 +110,7 @@ impl<'a> NoiseProblem<'a> {
         } else {
             MotionParams::OrnsteinUhlenbeck { rate_sd_per_s: p[4], rate_time_s: p[5], strain_mean, strain_sd: p[6] }
         };
-        let phases = (kind != EstimatorKind::Ekf).then(|| PhaseParams {
+        let phases = kind.has_phases().then(|| PhaseParams {
             hold_time_s: p[7],
             move_time_s: p[8],
             reversal: match (kind, self.stats.hold_s) {

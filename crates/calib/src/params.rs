@@ -85,6 +85,8 @@ pub enum ReadingUnit {
 pub enum EstimatorKind {
     /// Extended Kalman filter.
     Ekf,
+    /// Unscented Kalman filter.
+    Ukf,
     /// Interacting multiple models over extend, hold and retract.
     Imm,
     /// Gaussian hypotheses split by the sign of the rate.
@@ -95,13 +97,20 @@ pub enum EstimatorKind {
 
 impl EstimatorKind {
     /// All estimators.
-    pub const ALL: [Self; 4] = [Self::Ekf, Self::Imm, Self::SignSplit, Self::Hypotheses];
+    pub const ALL: [Self; 5] = [Self::Ekf, Self::Ukf, Self::Imm, Self::SignSplit, Self::Hypotheses];
+
+    /// Whether it keeps hypotheses about the phase; the others are one Gaussian and have a smoother.
+    #[must_use]
+    pub const fn has_phases(self) -> bool {
+        matches!(self, Self::Imm | Self::SignSplit | Self::Hypotheses)
+    }
 
     /// Its name on the command line and in files.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::Ekf => "ekf",
+            Self::Ukf => "ukf",
             Self::Imm => "imm",
             Self::SignSplit => "sign-split",
             Self::Hypotheses => "hypotheses",

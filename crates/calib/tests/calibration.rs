@@ -106,7 +106,7 @@ fn calibration_makes_a_filter_that_beats_the_static_inverse_and_knows_how_far() 
     let bench = record(1500.0, 0.0, 2e-3);
     let half = bench.time_s.len() / 2;
     let training = bench.samples().head(half);
-    let calibration = calibrate(&[training], LawOptions::default(), |_| ()).unwrap();
+    let calibration = calibrate(&[training], LawOptions::default(), &[EstimatorKind::Ekf], |_| ()).unwrap();
     let params = SensorParams {
         format: FORMAT,
         made_by: "test".into(),
@@ -142,7 +142,7 @@ fn calibration_makes_a_filter_that_beats_the_static_inverse_and_knows_how_far() 
     let text = toml::to_string(&params).unwrap();
     assert_eq!(toml::from_str::<SensorParams>(&text).unwrap(), params);
     // Same samples, same parameters.
-    let again = calibrate(&[training], LawOptions::default(), |_| ()).unwrap();
+    let again = calibrate(&[training], LawOptions::default(), &[EstimatorKind::Ekf], |_| ()).unwrap();
     assert_eq!((again.law, again.estimators), (calibration.law, calibration.estimators));
 }
 
@@ -150,7 +150,8 @@ fn calibration_makes_a_filter_that_beats_the_static_inverse_and_knows_how_far() 
 #[test]
 fn a_refused_row_changes_nothing() {
     let bench = record(1500.0, 0.0, 2e-3);
-    let calibration = calibrate(&[bench.samples().head(700)], LawOptions::default(), |_| ()).unwrap();
+    let calibration =
+        calibrate(&[bench.samples().head(700)], LawOptions::default(), &[EstimatorKind::Ekf], |_| ()).unwrap();
     let text = format!(
         "format = 1\nmade_by = 'test'\nquantity = 'strain'\nreading = 'ohm'\nrest_reading = {}\ndefault_estimator = 'ekf'\n",
         calibration.rest_readings[0]

@@ -122,7 +122,8 @@ pub struct CalibrateArgs {
     /// Family of the gauge curve: auto (polynomial), polynomial, decaying-exponential or tunnelling
     #[arg(long, default_value = "auto")]
     pub gauge: Auto<Gauge>,
-    /// Estimator to calibrate for: auto or ekf
+    /// Estimator to calibrate and to make the default: auto (ekf), ekf, ukf, imm, sign-split or hypotheses; ekf is
+    /// calibrated in any case
     #[arg(long, default_value = "auto")]
     pub estimator: Auto<Estimator>,
     /// Accepted for scripts; the calibration is deterministic and draws nothing
@@ -142,7 +143,7 @@ pub struct EstimateArgs {
     /// The sensor's parameters
     #[arg(long, value_name = "sensor.toml")]
     pub sensor: PathBuf,
-    /// Estimator: auto (the sensor file's choice) or ekf
+    /// Estimator: auto (the sensor file's choice), ekf, ukf, imm, sign-split or hypotheses
     #[arg(long, default_value = "auto")]
     pub estimator: Auto<Estimator>,
     /// Strain (or angle) at the first row, if it is known; the body is at rest there
@@ -190,7 +191,7 @@ pub struct EvaluateArgs {
     /// The sensor's parameters
     #[arg(long, value_name = "sensor.toml")]
     pub sensor: PathBuf,
-    /// Estimator: auto (the sensor file's choice) or ekf
+    /// Estimator: auto (the sensor file's choice), ekf, ukf, imm, sign-split or hypotheses
     #[arg(long, default_value = "auto")]
     pub estimator: Auto<Estimator>,
     /// Score rows with time_s >= T only; the filter still starts at the first row

@@ -70,16 +70,32 @@ pub fn estimate(
 ) -> Result<Estimated, CliError> {
     let trace = &recording.trace;
     let readings = relative_trace(trace, params.rest_reading);
-    let build = || build_filter(params, kind, Start::Unknown).map_err(|error| CliError::Input(error.to_string()));
-    let mut filter = build()?;
+    let mut filter = build_filter(params, kind, Start::Unknown).map_err(|error| CliError::Input(error.to_string()))?;
     let mut filtered = Vec::with_capacity(trace.time_s.len());
     for (k, (&time_s, &reading)) in trace.time_s.iter().zip(&readings).enumerate() {
         filter.step(time_s, reading).map_err(|error| step_error(&recording.name, k, error))?;
         filtered.push(filter.output());
     }
-    let smoothed =
-        build()?.smooth(&trace.time_s, &readings).map_err(|(k, error)| step_error(&recording.name, k, error))?;
+    let smoothed = smooth(recording, params, kind, Start::Unknown, &readings)?;
     Ok(Estimated { filtered, smoothed })
+}
+
+/// Smooths a recording with the estimator that is asked for, or with the extended Kalman filter if that one has no
+/// smoother.
+pub fn smooth(
+    recording: &Recording,
+    params: &SensorParams,
+    kind: Option<EstimatorKind>,
+    start: Start,
+    readings: &[Option<Reading<f64>>],
+) -> Result<Vec<Output>, CliError> {
+    let wanted = kind.unwrap_or(params.default_estimator);
+    let kind = if wanted.has_phases() { EstimatorKind::Ekf } else { wanted };
+    let smoothed = build_filter(params, Some(kind), start)
+        .map_err(|error| CliError::Input(error.to_string()))?
+        .smooth(&recording.trace.time_s, readings)
+        .map_err(|(k, error)| step_error(&recording.name, k, error))?;
+    smoothed.ok_or_else(|| CliError::Other(format!("`{}` has no smoother", kind.name())))
 }
 
 /// A filter's refusal as an error about the input.

@@ -1,7 +1,7 @@
 use std::fs;
 use std::path::Path;
 
-use ohmstrain_calib::{FORMAT, RangeParams, SensorParams, Start, build_filter};
+use ohmstrain_calib::{EstimatorKind, FORMAT, RangeParams, SensorParams, Start, build_filter};
 use ohmstrain_model::Joint;
 use serde::Deserialize;
 
@@ -17,8 +17,8 @@ struct Version {
     format: u32,
 }
 
-/// Reads a sensor's parameters and checks that a filter can be made of them.
-pub fn read(path: &Path) -> Result<SensorParams, CliError> {
+/// Reads a sensor's parameters and checks that the estimator (or the file's choice) can be made of them.
+pub fn read(path: &Path, estimator: Option<EstimatorKind>) -> Result<SensorParams, CliError> {
     let name = path.display();
     let bytes = fs::read(path).map_err(|error| CliError::file("read", path, &error))?;
     let text = String::from_utf8(bytes)
@@ -47,7 +47,7 @@ pub fn read(path: &Path) -> Result<SensorParams, CliError> {
         Joint::new(joint.prestrain, joint.moment_arm_mm, joint.gauge_length_mm)
             .map_err(|error| wrong(format!("field `joint`: {error}")))?;
     }
-    build_filter(&params, None, Start::Unknown).map_err(|error| wrong(error.to_string()))?;
+    build_filter(&params, estimator, Start::Unknown).map_err(|error| wrong(error.to_string()))?;
     Ok(params)
 }
 

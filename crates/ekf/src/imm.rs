@@ -62,8 +62,7 @@ impl<T: Real, M> Imm<T, M> {
     where
         M: Phased<T, N, L>,
     {
-        let comes_from =
-            |from: &Component<T, N, L>| chain[from.phase.index()][phase.index()] * from.log_weight.exp();
+        let comes_from = |from: &Component<T, N, L>| chain[from.phase.index()][phase.index()] * from.log_weight.exp();
         let total = mixture.components().iter().fold(T::zero(), |sum, from| sum + comes_from(from));
         if !(total > T::zero()) {
             return None;

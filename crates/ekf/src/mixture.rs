@@ -71,8 +71,7 @@ impl<T: Real, const N: usize, const L: usize, const K: usize> Mixture<T, N, L, K
             self.push(candidate);
             return;
         }
-        let lightest =
-            self.components_mut().iter_mut().reduce(|a, b| if b.log_weight < a.log_weight { b } else { a });
+        let lightest = self.components_mut().iter_mut().reduce(|a, b| if b.log_weight < a.log_weight { b } else { a });
         if let Some(lightest) = lightest.filter(|lightest| lightest.log_weight < candidate.log_weight) {
             *lightest = candidate;
         }

@@ -1,7 +1,7 @@
 use std::path::Path;
 
 use ohmstrain_bench_data::simulate::{Material, Protocol, SimulationSettings, simulate};
-use ohmstrain_calib::{LawOptions, Output, SensorParams};
+use ohmstrain_calib::{EstimatorKind, LawOptions, Output, SensorParams};
 
 use super::calibrate::{calibrate_recordings, write_report};
 use super::evaluate::{add_scores, score_table};
@@ -30,7 +30,8 @@ pub fn run(args: &DemoArgs) -> Result<(), CliError> {
 
     let training =
         Recording { trace: recording.trace.until(test_from), ..input::read(&trace_path, &Default::default())? };
-    let params = calibrate_recordings(std::slice::from_ref(&training), LawOptions::default(), &progress)?;
+    let params =
+        calibrate_recordings(std::slice::from_ref(&training), LawOptions::default(), EstimatorKind::Ekf, &progress)?;
     sensor_file::write(&args.out.join("sensor.toml"), &params)?;
 
     progress.doing("filtering and smoothing");

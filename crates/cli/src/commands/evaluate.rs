@@ -26,6 +26,8 @@ struct RecordingScores {
     /// For the table; the JSON is about one estimator.
     #[serde(skip)]
     smoother: Scores,
+    #[serde(skip)]
+    smoother_name: &'static str,
     baselines: Baselines,
 }
 
@@ -39,8 +41,8 @@ const LEAST_COVERAGE: f64 = 0.8;
 
 /// Compares estimates with the reference of each recording.
 pub fn run(args: &EvaluateArgs) -> Result<(), CliError> {
-    let params = sensor_file::read(&args.sensor)?;
     let kind = args.estimator.chosen().map(|estimator| estimator.0);
+    let params = sensor_file::read(&args.sensor, kind)?;
     let overrides = args.trace.metadata();
     let mut recordings = Vec::new();
     for path in &args.traces {
@@ -68,6 +70,7 @@ fn score(
     kind: Option<EstimatorKind>,
     from: Option<f64>,
 ) -> Result<RecordingScores, CliError> {
+    let wanted = kind.unwrap_or(params.default_estimator);
     let estimated = estimate(recording, params, kind)?;
     let nothing = || {
         let rows = from.map_or_else(|| "any row".into(), |from| format!("time_s >= {from}"));
@@ -75,7 +78,9 @@ fn score(
     };
     Ok(RecordingScores {
         file: recording.name.clone(),
-        estimator: kind.unwrap_or(params.default_estimator).name(),
+        estimator: wanted.name(),
+        // A filter of hypotheses has no smoother of its own.
+        smoother_name: if wanted.has_phases() { "smoother (ekf)" } else { "smoother" },
         filter: scoring::of_outputs(recording, &estimated.filtered, from).ok_or_else(nothing)?,
         smoother: scoring::of_outputs(recording, &estimated.smoothed, from).ok_or_else(nothing)?,
         baselines: Baselines {
@@ -88,7 +93,7 @@ fn table(evaluation: &Evaluation, quantity: &str) -> Table {
     let mut table = score_table(quantity);
     for recording in &evaluation.recordings {
         add_scores(&mut table, &recording.file, recording.estimator, &recording.filter);
-        add_scores(&mut table, "", "smoother", &recording.smoother);
+        add_scores(&mut table, "", recording.smoother_name, &recording.smoother);
         add_scores(&mut table, "", "static cubic", &recording.baselines.static_cubic);
     }
     table

@@ -12,8 +12,8 @@ use crate::sensor_file;
 
 /// Turns readings into strain as they arrive. Memory does not grow with the recording.
 pub fn run(args: &FilterArgs) -> Result<(), CliError> {
-    let mut params = sensor_file::read(&args.estimate.sensor)?;
     let kind = args.estimate.estimator.chosen().map(|estimator| estimator.0);
+    let mut params = sensor_file::read(&args.estimate.sensor, kind)?;
     let filter =
         build_filter(&params, kind, start(&args.estimate)).map_err(|error| CliError::Input(error.to_string()))?;
     let rows = input::open(&args.trace_file, &args.estimate.trace.metadata())?;

@@ -1,27 +1,28 @@
 use std::io;
 
-use ohmstrain_calib::{Output, SensorParams, build_filter};
+use ohmstrain_calib::{Output, SensorParams};
 
 use crate::args::SmoothArgs;
 use crate::error::CliError;
 use crate::estimates::{EstimateRow, EstimateWriter};
 use crate::input::{self, Recording, check_unit};
-use crate::run::{relative_trace, rest_reading, start, step_error};
+use crate::run::{relative_trace, rest_reading, smooth, start};
 use crate::sensor_file;
 
 /// Smooths a recording and writes its estimates.
 pub fn run(args: &SmoothArgs) -> Result<(), CliError> {
-    let mut params = sensor_file::read(&args.estimate.sensor)?;
+    let kind = args.estimate.estimator.chosen().map(|estimator| estimator.0);
+    if let Some(kind) = kind.filter(|kind| kind.has_phases()) {
+        return Err(CliError::Arguments(format!("--estimator: `{}` has no smoother, use ekf or ukf", kind.name())));
+    }
+    let mut params = sensor_file::read(&args.estimate.sensor, kind)?;
     let recording = input::read(&args.trace_file, &args.estimate.trace.metadata())?;
     check_unit(&recording.header, recording.trace.readings.kind, params.reading)?;
     input::take_joint(&mut params, &recording.trace.metadata);
     let values = recording.trace.readings.values.iter().copied();
     let rest_reading = rest_reading(args.estimate.rest_resistance, &params, values, &recording.name)?;
-    let kind = args.estimate.estimator.chosen().map(|estimator| estimator.0);
-    let outputs = build_filter(&params, kind, start(&args.estimate))
-        .map_err(|error| CliError::Input(error.to_string()))?
-        .smooth(&recording.trace.time_s, &relative_trace(&recording.trace, rest_reading))
-        .map_err(|(row, error)| step_error(&recording.name, row, error))?;
+    let readings = relative_trace(&recording.trace, rest_reading);
+    let outputs = smooth(&recording, &params, kind, start(&args.estimate), &readings)?;
     let out = io::BufWriter::new(io::stdout().lock());
     write_estimates(out, &recording, &params, rest_reading, &outputs, &args.estimate.columns)
 }

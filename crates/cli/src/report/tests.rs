@@ -18,6 +18,7 @@ fn sensor() -> SensorParams {
         retract_gain_slope: 0.0,
     };
     let estimator = EstimatorParams {
+        phases: None,
         score: 0.0,
         motion: MotionParams::OrnsteinUhlenbeck {
             rate_time_s: 2.0,
@@ -66,7 +67,7 @@ fn output(strain: f64, nis: Option<f64>) -> Output {
         settled: known(2.0 * strain),
         beyond_border: 0.0,
     };
-    Output { estimate, nis }
+    Output { estimate, nis, phases: None }
 }
 
 fn page(params: &SensorParams, time_s: &[f64], reading: &[f64], truth: Option<&[f64]>, outputs: &[Output]) -> String {
