@@ -2,10 +2,12 @@ use std::collections::BTreeMap;
 
 use crate::CalibrationError;
 use crate::baseline::StaticCubic;
+use crate::estimator_params::{EstimatorKind, EstimatorParams};
 use crate::law_fit::{CrossFit, LawOptions, fit_law};
+use crate::law_params::LawParams;
 use crate::motion_stats::MotionStats;
 use crate::noise_fit::NoiseProblem;
-use crate::params::{EstimatorKind, EstimatorParams, LawParams, RangeParams, Uncertainty, Validity};
+use crate::params::{RangeParams, Uncertainty, Validity};
 use crate::samples::Samples;
 
 /// What calibration is doing, for a progress bar.

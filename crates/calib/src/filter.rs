@@ -4,8 +4,10 @@ use ohmstrain_ekf::{
 use ohmstrain_model::{Motion, Phase, SwitchedModel};
 
 use crate::CalibrationError;
-use crate::params::{AnyMotion, EstimatorKind, EstimatorParams, LawParams, RangeParams, SensorParams};
-use crate::running::Running;
+use crate::estimator_params::{AnyMotion, EstimatorKind, EstimatorParams};
+use crate::law_params::LawParams;
+use crate::params::{RangeParams, SensorParams};
+use crate::running::{Interval, Running};
 
 /// A filter for a sensor whose number of branches and kind of motion are known at run time only.
 pub trait Filter {
@@ -111,10 +113,15 @@ fn build_sized<const M: usize, const B: usize, const N: usize, const L: usize>(
     let model = SwitchedModel::<f64, M, B, N>::new(law, motion, estimator.noise.to_model())?;
     let belief = initial_belief(&model, limits, start);
     let limits = limits.to_model();
+    let interval = Interval {
+        limits,
+        filtered_scale: estimator.strain_sd_scale,
+        smoothed_scale: estimator.smoothed_sd_scale.unwrap_or(1.0),
+    };
     match kind {
-        EstimatorKind::Ekf => return Ok(Box::new(Running::new(Ekf::new(model), belief, model, limits))),
+        EstimatorKind::Ekf => return Ok(Box::new(Running::new(Ekf::new(model), belief, model, interval))),
         EstimatorKind::Ukf => {
-            return Ok(Box::new(Running::new(Ukf::new(Unscented::new(model)), belief, model, limits)));
+            return Ok(Box::new(Running::new(Ukf::new(Unscented::new(model)), belief, model, interval)));
         }
         _ => {}
     }
@@ -126,16 +133,16 @@ fn build_sized<const M: usize, const B: usize, const N: usize, const L: usize>(
     Ok(match kind {
         EstimatorKind::Imm => {
             let start = Mixture::single(belief, Phase::Hold);
-            Box::new(Running::new(Imm::new(model, dwell, limits, tempering), start, model, limits))
+            Box::new(Running::new(Imm::new(model, dwell, limits, tempering), start, model, interval))
         }
         EstimatorKind::SignSplit => {
             let start = Mixture::<f64, N, L, HYPOTHESES>::single(belief, Phase::Extend);
             let hold = (phases.hold_time_s > 0.0 && phases.reversal < 1.0).then_some(dwell);
-            Box::new(Running::new(SignSplit::new(model, hold, limits, tempering), start, model, limits))
+            Box::new(Running::new(SignSplit::new(model, hold, limits, tempering), start, model, interval))
         }
         _ => {
             let start = Mixture::<f64, N, L, HISTORIES>::single(belief, Phase::Hold);
-            Box::new(Running::new(Hypotheses::new(model, dwell, limits, tempering), start, model, limits))
+            Box::new(Running::new(Hypotheses::new(model, dwell, limits, tempering), start, model, interval))
         }
     })
 }

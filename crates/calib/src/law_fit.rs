@@ -1,10 +1,11 @@
 use crate::CalibrationError;
 use crate::design::BRANCH_COLUMNS;
+use crate::law_params::LawParams;
 use crate::law_regression::{BLOCKS, LawRegression};
 use crate::law_structure::LawStructure;
 use crate::law_uncertainty::law_uncertainty;
 use crate::optimise;
-use crate::params::{LawParams, Uncertainty};
+use crate::params::Uncertainty;
 use crate::samples::Samples;
 
 /// What the fit of the law may choose from.

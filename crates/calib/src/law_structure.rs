@@ -3,8 +3,8 @@ use nalgebra::DVector;
 use crate::CalibrationError;
 use crate::design::{BRANCH_COLUMNS, StrainScale};
 use crate::law_fit::{GaugeFamily, LawFit};
+use crate::law_params::{BranchParams, GaugeParams, LawParams};
 use crate::law_regression::{Design, LawRegression};
-use crate::params::{BranchParams, GaugeParams, LawParams};
 
 /// Smallest R₀ that is believed, relative to the median reading.
 const LEAST_REST_SHARE: f64 = 0.05;

@@ -1,9 +1,10 @@
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 use crate::CalibrationError;
+use crate::law_params::{GaugeParams, LawParams};
 use crate::law_regression::LawRegression;
 use crate::law_structure::LawStructure;
-use crate::params::{GaugeParams, LawParams, Uncertainty};
+use crate::params::Uncertainty;
 
 /// Contiguous blocks over which residuals may be correlated as they like.
 const BLOCKS: usize = 40;

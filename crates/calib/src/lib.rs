@@ -13,8 +13,10 @@ mod blocks;
 mod calibrate;
 mod design;
 mod error;
+mod estimator_params;
 mod filter;
 mod law_fit;
+mod law_params;
 mod law_regression;
 mod law_structure;
 mod law_uncertainty;
@@ -29,11 +31,12 @@ mod scores;
 pub use baseline::StaticCubic;
 pub use calibrate::{Calibration, Stage, calibrate};
 pub use error::CalibrationError;
+pub use estimator_params::{EstimatorKind, EstimatorParams, MotionParams, NoiseParams, PhaseParams};
 pub use filter::{Filter, Output, Start, build_filter};
 pub use law_fit::{CrossFit, GaugeFamily, LawFit, LawOptions, fit_law};
+pub use law_params::{BranchParams, GaugeParams, LawParams};
 pub use params::{
-    BranchParams, EstimatorKind, EstimatorParams, FORMAT, GaugeParams, JointParams, LawParams, MotionParams,
-    NoiseParams, PhaseParams, Quantity, RangeParams, ReadingUnit, RecordingInfo, SensorParams, Uncertainty, Validity,
+    FORMAT, JointParams, Quantity, RangeParams, ReadingUnit, RecordingInfo, SensorParams, Uncertainty, Validity,
 };
 pub use samples::Samples;
 pub use scores::{ScoredRow, Scores};

@@ -1,12 +1,13 @@
-use ohmstrain_ekf::Reading;
+use ohmstrain_ekf::{Gaussian, Reading};
 
 use crate::CalibrationError;
 use crate::calibrate::Stage;
+use crate::estimator_params::{EstimatorKind, EstimatorParams, MotionParams, NoiseParams, PhaseParams};
 use crate::filter::{Start, filter_from_parts};
 use crate::law_fit::CrossFit;
 use crate::motion_stats::{MotionStats, root_mean_square};
 use crate::optimise;
-use crate::params::{EstimatorKind, EstimatorParams, LawParams, MotionParams, NoiseParams, PhaseParams, RangeParams};
+use crate::params::RangeParams;
 use crate::samples::Samples;
 
 /// Standard deviation that every reference has of its own, as a share of the strain's range: no score can be had from
@@ -67,6 +68,8 @@ impl<'a> NoiseProblem<'a> {
         }
         let mut params = self.params(kind, &point);
         params.score = self.score(kind, &params);
+        params.strain_sd_scale = self.strain_sd_scale(kind, &params);
+        params.smoothed_sd_scale = self.smoothed_sd_scale(kind, &params);
         Ok(params)
     }
 
@@ -122,6 +125,8 @@ impl<'a> NoiseProblem<'a> {
         });
         EstimatorParams {
             score: f64::NAN,
+            strain_sd_scale: 1.0,
+            smoothed_sd_scale: None,
             motion,
             noise: NoiseParams { baseline_sd: p[0], baseline_time_s: p[1], reading_sd: p[2], branch_sd: p[3] },
             phases,
@@ -131,47 +136,102 @@ impl<'a> NoiseProblem<'a> {
     /// Mean negative log density of the true strain under the filter, strain in units of its range. Infinite if the
     /// filter fails.
     fn score(&self, kind: EstimatorKind, params: &EstimatorParams) -> f64 {
+        let span = self.limits.span();
         let (mut sum, mut count) = (0.0, 0_usize);
+        let finished = self.each_left_out_row(kind, params, |strain, truth| {
+            let variance = strain.variance / (span * span) + REFERENCE_SD * REFERENCE_SD;
+            let error = (strain.mean - truth) / span;
+            sum += 0.5 * (error * error / variance + variance.ln());
+            count += 1;
+        });
+        if finished.is_some() { sum / count.max(1) as f64 } else { f64::INFINITY }
+    }
+
+    fn strain_sd_scale(&self, kind: EstimatorKind, params: &EstimatorParams) -> f64 {
+        let mut deviations = Vec::new();
+        let finished = self.each_left_out_row(kind, params, |strain, truth| {
+            deviations.push((strain.mean - truth).abs() / strain.sd());
+        });
+        finished.map_or(1.0, |()| sd_scale(deviations))
+    }
+
+    /// Smooths whole recordings with the law that has not seen a block and looks at the block.
+    fn smoothed_sd_scale(&self, kind: EstimatorKind, params: &EstimatorParams) -> Option<f64> {
+        let mut deviations = Vec::new();
         for (block, law) in self.fit.without_block.iter().enumerate() {
-            for recording in 0..self.samples.len() {
-                match self.score_block(kind, params, &law.law, block, recording) {
-                    Some((block_sum, rows)) => (sum, count) = (sum + block_sum, count + rows),
-                    None => return f64::INFINITY,
+            for (recording, samples) in self.samples.iter().enumerate() {
+                let mut filter = filter_from_parts(kind, &law.law, params, self.limits, Start::Unknown).ok()?;
+                let smoothed = filter.smooth(samples.time_s, &self.readings[block][recording]).ok()??;
+                for k in self.fit.blocks[recording][block].clone().filter(|&k| samples.strain[k].is_finite()) {
+                    let strain = smoothed[k].estimate.strain;
+                    deviations.push((strain.mean - samples.strain[k]).abs() / strain.sd());
                 }
             }
         }
-        sum / count.max(1) as f64
+        Some(sd_scale(deviations))
     }
 
-    /// Runs from the first row to the end of a block and scores the block. Sum and number of scores.
-    fn score_block(
+    /// Visits estimate and true strain in every row of every block, under the law that was fitted without the block: the
+    /// filter runs from the first row to the end of the block. `None` if it fails.
+    fn each_left_out_row(
         &self,
         kind: EstimatorKind,
         params: &EstimatorParams,
-        law: &LawParams,
-        block: usize,
-        recording: usize,
-    ) -> Option<(f64, usize)> {
-        let samples = &self.samples[recording];
-        let rows = &self.fit.blocks[recording][block];
-        let span = self.limits.span();
-        let mut filter = filter_from_parts(kind, law, params, self.limits, Start::Unknown).ok()?;
-        let (mut sum, mut count) = (0.0, 0);
-        for (k, reading) in self.readings[block][recording][..rows.end].iter().enumerate() {
-            filter.step(samples.time_s[k], *reading).ok()?;
-            if k >= rows.start && samples.strain[k].is_finite() {
-                let strain = filter.strain();
-                let variance = strain.variance / (span * span) + REFERENCE_SD * REFERENCE_SD;
-                let error = (strain.mean - samples.strain[k]) / span;
-                sum += 0.5 * (error * error / variance + variance.ln());
-                count += 1;
+        mut visit: impl FnMut(Gaussian<f64>, f64),
+    ) -> Option<()> {
+        for (block, law) in self.fit.without_block.iter().enumerate() {
+            for (recording, samples) in self.samples.iter().enumerate() {
+                let rows = &self.fit.blocks[recording][block];
+                let mut filter = filter_from_parts(kind, &law.law, params, self.limits, Start::Unknown).ok()?;
+                for (k, reading) in self.readings[block][recording][..rows.end].iter().enumerate() {
+                    filter.step(samples.time_s[k], *reading).ok()?;
+                    if k >= rows.start && samples.strain[k].is_finite() {
+                        visit(filter.strain(), samples.strain[k]);
+                    }
+                }
             }
         }
-        Some((sum, count))
+        Some(())
     }
+}
+
+/// Factors beyond these say that something else is wrong.
+const SD_SCALES: std::ops::RangeInclusive<f64> = 0.5..=5.0;
+/// Half-width of the 95 % interval of a standard normal.
+const Z_95: f64 = 1.959_963_984_540_054;
+
+/// What the standard deviations are multiplied with so that 95 % of the errors lie in the 95 % interval, from errors in
+/// units of their deviations: split conformal prediction (Papadopoulos et al., *ECML* 2002) with the blocks left out.
+///
+/// Widening is taken whole, narrowing by its square root only: an easy recording is no promise for the next one.
+fn sd_scale(mut deviations: Vec<f64>) -> f64 {
+    deviations.sort_by(f64::total_cmp);
+    let rank = (deviations.len().saturating_sub(1) * 95).div_ceil(100);
+    let Some(deviation) = deviations.get(rank) else { return 1.0 };
+    let factor = deviation / Z_95;
+    let cautious = if factor < 1.0 { factor.sqrt() } else { factor };
+    cautious.clamp(*SD_SCALES.start(), *SD_SCALES.end())
 }
 
 /// Readings over R₀ minus 1; `None` where missing.
 pub(crate) fn relative_changes(reading: &[f64], rest_reading: f64) -> Vec<Option<Reading<f64>>> {
     reading.iter().map(|r| r.is_finite().then(|| Reading::from(r / rest_reading - 1.0))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Z_95, sd_scale};
+
+    /// Deviations 1/100, 2/100, … 1 in units of `factor` interval widths: the 95 % quantile is 0.95 of them.
+    fn deviations(factor: f64) -> Vec<f64> {
+        (1..=100).rev().map(|k| factor * Z_95 * f64::from(k) / 95.0).collect()
+    }
+
+    #[test]
+    fn the_interval_is_widened_whole_and_narrowed_by_half() {
+        assert!((sd_scale(deviations(2.0)) - 2.0 * 96.0 / 95.0).abs() < 1e-12);
+        assert!((sd_scale(deviations(0.64)) - (0.64 * 96.0 / 95.0_f64).sqrt()).abs() < 1e-12);
+        assert_eq!((sd_scale(deviations(100.0)), sd_scale(deviations(1e-3))), (5.0, 0.5));
+        assert_eq!(sd_scale(vec![]), 1.0);
+    }
 }

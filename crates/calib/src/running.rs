@@ -106,23 +106,26 @@ pub(crate) struct Running<E: Estimator<M, B, N, L>, const M: usize, const B: usi
     estimator: E,
     state: E::State,
     model: SwitchedModel<f64, M, B, N>,
-    limits: StrainRange<f64>,
+    interval: Interval,
     last_time_s: Option<f64>,
     nis: Option<f64>,
     prepared: HashMap<u64, SwitchedStep<f64, M, B>>,
+}
+
+/// How strain is reported: within limits, its standard deviation times a calibrated factor.
+#[derive(Clone, Copy)]
+pub(crate) struct Interval {
+    pub limits: StrainRange<f64>,
+    pub filtered_scale: f64,
+    pub smoothed_scale: f64,
 }
 
 /// Recordings repeat a few hundred step lengths; a stream whose steps never repeat must not fill the memory.
 const MOST_PREPARED: usize = 4096;
 
 impl<E: Estimator<M, B, N, L>, const M: usize, const B: usize, const N: usize, const L: usize> Running<E, M, B, N, L> {
-    pub(crate) fn new(
-        estimator: E,
-        state: E::State,
-        model: SwitchedModel<f64, M, B, N>,
-        limits: StrainRange<f64>,
-    ) -> Self {
-        Self { estimator, state, model, limits, last_time_s: None, nis: None, prepared: HashMap::new() }
+    pub(crate) fn new(estimator: E, state: E::State, model: SwitchedModel<f64, M, B, N>, interval: Interval) -> Self {
+        Self { estimator, state, model, interval, last_time_s: None, nis: None, prepared: HashMap::new() }
     }
 
     /// One step; the filter changes only if it succeeds.
@@ -150,8 +153,10 @@ impl<E: Estimator<M, B, N, L>, const M: usize, const B: usize, const N: usize, c
         *self.prepared.entry(nanoseconds as u64).or_insert_with(|| model.prepare(nanoseconds * 1e-9))
     }
 
-    fn output_of(&self, belief: &Belief<f64, N, L>, nis: Option<f64>, phases: Option<[f64; 3]>) -> Output {
-        Output { estimate: Estimate::new(&self.model, belief, &self.limits), nis, phases }
+    fn estimate(&self, belief: &Belief<f64, N, L>, sd_scale: f64) -> Estimate<f64> {
+        let mut estimate = Estimate::new(&self.model, belief, &self.interval.limits);
+        estimate.strain.variance *= sd_scale * sd_scale;
+        estimate
     }
 }
 
@@ -164,11 +169,13 @@ impl<E: Estimator<M, B, N, L>, const M: usize, const B: usize, const N: usize, c
 
     fn strain(&self) -> Gaussian<f64> {
         let belief = E::belief(&self.state);
-        Gaussian { mean: belief.mean[0], variance: belief.covariance[(0, 0)] }.clamped(&self.limits)
+        let variance = belief.covariance[(0, 0)] * self.interval.filtered_scale.powi(2);
+        Gaussian { mean: belief.mean[0], variance }.clamped(&self.interval.limits)
     }
 
     fn output(&self) -> Output {
-        self.output_of(&E::belief(&self.state), self.nis, E::phases(&self.state))
+        let estimate = self.estimate(&E::belief(&self.state), self.interval.filtered_scale);
+        Output { estimate, nis: self.nis, phases: E::phases(&self.state) }
     }
 
     fn smooth(
@@ -183,6 +190,8 @@ impl<E: Estimator<M, B, N, L>, const M: usize, const B: usize, const N: usize, c
             nis.push(self.nis);
         }
         let Some(smoothed) = E::smoothed(&kept) else { return Ok(None) };
-        Ok(Some(smoothed.iter().zip(nis).map(|(belief, nis)| self.output_of(belief, nis, None)).collect()))
+        let output =
+            |(belief, nis)| Output { estimate: self.estimate(belief, self.interval.smoothed_scale), nis, phases: None };
+        Ok(Some(smoothed.iter().zip(nis).map(output).collect()))
     }
 }

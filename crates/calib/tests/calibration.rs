@@ -3,8 +3,8 @@
 use std::f64::consts::TAU;
 
 use ohmstrain_calib::{
-    CalibrationError, EstimatorKind, FORMAT, GaugeFamily, LawOptions, Quantity, RangeParams, ReadingUnit, Samples,
-    ScoredRow, Scores, SensorParams, Start, StaticCubic, build_filter, calibrate, fit_law,
+    Calibration, CalibrationError, EstimatorKind, FORMAT, GaugeFamily, LawOptions, Quantity, RangeParams, ReadingUnit,
+    Samples, ScoredRow, Scores, SensorParams, Start, StaticCubic, build_filter, calibrate, fit_law,
 };
 use ohmstrain_ekf::Reading;
 
@@ -101,13 +101,9 @@ fn every_gauge_family_and_number_of_branches_can_be_fitted() {
     }
 }
 
-#[test]
-fn calibration_makes_a_filter_that_beats_the_static_inverse_and_knows_how_far() {
-    let bench = record(1500.0, 0.0, 2e-3);
-    let half = bench.time_s.len() / 2;
-    let training = bench.samples().head(half);
-    let calibration = calibrate(&[training], LawOptions::default(), &[EstimatorKind::Ekf], |_| ()).unwrap();
-    let params = SensorParams {
+/// A calibration as the parameters of a sensor.
+fn sensor(calibration: &Calibration) -> SensorParams {
+    SensorParams {
         format: FORMAT,
         made_by: "test".into(),
         quantity: Quantity::Strain,
@@ -122,7 +118,16 @@ fn calibration_makes_a_filter_that_beats_the_static_inverse_and_knows_how_far() 
         estimators: calibration.estimators.clone(),
         recordings: vec![],
         uncertainty: Some(calibration.uncertainty.clone()),
-    };
+    }
+}
+
+#[test]
+fn calibration_makes_a_filter_that_beats_the_static_inverse_and_knows_how_far() {
+    let bench = record(1500.0, 0.0, 2e-3);
+    let half = bench.time_s.len() / 2;
+    let training = bench.samples().head(half);
+    let calibration = calibrate(&[training], LawOptions::default(), &[EstimatorKind::Ekf], |_| ()).unwrap();
+    let params = sensor(&calibration);
     let mut filter = build_filter(&params, None, Start::Unknown).unwrap();
     let (mut filtered, mut cubic) = (Vec::new(), Vec::new());
     for k in 0..bench.time_s.len() {
@@ -157,22 +162,7 @@ fn a_refused_row_changes_nothing() {
         calibration.rest_readings[0]
     );
     assert!(toml::from_str::<SensorParams>(&text).is_err(), "a file without a law must be refused");
-    let params = SensorParams {
-        format: FORMAT,
-        made_by: String::new(),
-        quantity: Quantity::Strain,
-        reading: ReadingUnit::Ohm,
-        rest_reading: calibration.rest_readings[0],
-        default_estimator: EstimatorKind::Ekf,
-        limits: calibration.limits,
-        validity: calibration.validity,
-        static_cubic: calibration.static_cubic,
-        joint: None,
-        law: calibration.law,
-        estimators: calibration.estimators,
-        recordings: vec![],
-        uncertainty: None,
-    };
+    let params = sensor(&calibration);
     let mut filter = build_filter(&params, None, Start::Strain(0.15)).unwrap();
     filter.step(0.0, Some(Reading::from(0.2))).unwrap();
     filter.step(0.1, Some(Reading::from(0.22))).unwrap();

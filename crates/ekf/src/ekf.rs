@@ -181,6 +181,9 @@ pub(crate) fn update<T: Scalar, const N: usize, const L: usize>(
     let mean = prior.mean + K * innovation;
     let covariance = joseph(P, &PHt, &K, H, R);
     let nis = innovation * innovation / S;
+    if !nis.is_finite() {
+        return Err(StepError::NonFiniteState);
+    }
     let log_likelihood = T::of(-0.5) * (nis + S.ln() + T::two_pi().ln());
     let update = Update { observation, innovation, innovation_variance: S, nis, log_likelihood, gain: K };
     Ok((Belief { mean, covariance }, update))

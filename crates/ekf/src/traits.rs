@@ -7,7 +7,7 @@ pub trait Dynamics<T: Scalar, const N: usize, const L: usize> {
     /// What depends on the length of a step only.
     type Prepared: Copy;
 
-    /// Prepares steps of `dt_s > 0` seconds.
+    /// Prepares steps of `dt_s ≥ 0` seconds.
     fn prepare(&self, dt_s: T) -> Self::Prepared;
 
     /// The transition over a prepared step, linearised at the belief's mean. `phase` is a hypothesis; with `None` the

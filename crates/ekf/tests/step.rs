@@ -120,6 +120,8 @@ fn bad_input_is_refused_by_name() {
     let broken = Belief { covariance: Symmetric::from_diagonal(&[-1.0; 5]), ..belief };
     let refused = ekf.step(&broken, 0.0, Some(Reading::from(0.1))).unwrap_err();
     assert_eq!(refused, StepError::NonPositiveInnovationVariance);
+    // So far out that its square is beyond the largest number.
+    assert_eq!(step(0.1, 1e300), StepError::NonFiniteState);
     let lost = Belief { mean: SVector::repeat(f64::NAN), ..belief };
     assert!(ekf.step(&lost, 0.1, None).is_err());
     // A gap of a day is a prediction, not an overflow.

@@ -20,6 +20,8 @@ fn sensor() -> SensorParams {
     let estimator = EstimatorParams {
         phases: None,
         score: 0.0,
+        strain_sd_scale: 1.0,
+        smoothed_sd_scale: None,
         motion: MotionParams::OrnsteinUhlenbeck {
             rate_time_s: 2.0,
             rate_sd_per_s: 0.05,

@@ -1,0 +1,159 @@
+use ohmstrain_model::{ModelNoise, Motion, ParameterError};
+use serde::{Deserialize, Serialize};
+
+/// The estimators, by the names used on the command line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum EstimatorKind {
+    /// Extended Kalman filter.
+    Ekf,
+    /// Unscented Kalman filter.
+    Ukf,
+    /// Interacting multiple models over extend, hold and retract.
+    Imm,
+    /// Gaussian hypotheses split by the sign of the rate.
+    SignSplit,
+    /// Best phase histories.
+    Hypotheses,
+}
+
+impl EstimatorKind {
+    /// All estimators.
+    pub const ALL: [Self; 5] = [Self::Ekf, Self::Ukf, Self::Imm, Self::SignSplit, Self::Hypotheses];
+
+    /// Whether it keeps hypotheses about the phase; the others are one Gaussian and have a smoother.
+    #[must_use]
+    pub const fn has_phases(self) -> bool {
+        matches!(self, Self::Imm | Self::SignSplit | Self::Hypotheses)
+    }
+
+    /// Its name on the command line and in files.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Ekf => "ekf",
+            Self::Ukf => "ukf",
+            Self::Imm => "imm",
+            Self::SignSplit => "sign-split",
+            Self::Hypotheses => "hypotheses",
+        }
+    }
+}
+
+/// Noise and motion as one estimator needs them.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct EstimatorParams {
+    /// Mean negative log density of the true strain that the fit reached, in spans; smaller is better.
+    pub score: f64,
+    /// Factor on the filter's standard deviation of strain, from how its 95 % interval covered the calibration, every
+    /// block with the law that had not seen it.
+    pub strain_sd_scale: f64,
+    /// The same for the smoother, where there is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub smoothed_sd_scale: Option<f64>,
+    /// How the body moves.
+    pub motion: MotionParams,
+    /// What the law does not explain.
+    pub noise: NoiseParams,
+    /// How phases follow each other, for estimators that keep phase hypotheses.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub phases: Option<PhaseParams>,
+}
+
+/// How phases follow each other.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PhaseParams {
+    /// Mean duration of a hold, s.
+    pub hold_time_s: f64,
+    /// Mean duration of a movement in one direction, s.
+    pub move_time_s: f64,
+    /// Probability that a movement turns around without a hold; 1 for a body that never rests.
+    pub reversal: f64,
+    /// Mean speed of a movement, per second; 0 where the rate has no preferred value.
+    pub speed_per_s: f64,
+    /// Power to which a reading's likelihood enters the weights of the hypotheses.
+    pub tempering: f64,
+}
+
+/// Noise of the law, relative to R₀.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct NoiseParams {
+    /// White noise of a reading.
+    pub reading_sd: f64,
+    /// Wander of each branch.
+    pub branch_sd: f64,
+    /// Wander of the baseline.
+    pub baseline_sd: f64,
+    /// Correlation time of the baseline, s.
+    pub baseline_time_s: f64,
+}
+
+impl NoiseParams {
+    /// As the model has it.
+    #[must_use]
+    pub const fn to_model(self) -> ModelNoise<f64> {
+        ModelNoise {
+            reading_sd: self.reading_sd,
+            branch_sd: self.branch_sd,
+            baseline_sd: self.baseline_sd,
+            baseline_time_s: self.baseline_time_s,
+        }
+    }
+}
+
+/// How the body moves: standard deviations of strain and its derivatives.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "family", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum MotionParams {
+    /// Velocity forgets itself exponentially.
+    OrnsteinUhlenbeck {
+        /// Correlation time of the rate, s.
+        rate_time_s: f64,
+        /// Standard deviation of the rate, per second.
+        rate_sd_per_s: f64,
+        /// Mean strain.
+        strain_mean: f64,
+        /// Standard deviation of the strain.
+        strain_sd: f64,
+    },
+    /// Acceleration is a state.
+    Smooth {
+        /// Standard deviation of the rate, per second.
+        rate_sd_per_s: f64,
+        /// Standard deviation of the acceleration, per second squared.
+        acceleration_sd_per_s2: f64,
+        /// Mean strain.
+        strain_mean: f64,
+        /// Standard deviation of the strain.
+        strain_sd: f64,
+    },
+}
+
+/// A motion prior with its number of states.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum AnyMotion {
+    /// Strain and rate.
+    Two(Motion<f64, 2>),
+    /// Strain, rate and acceleration.
+    Three(Motion<f64, 3>),
+}
+
+impl MotionParams {
+    /// As the model has it.
+    ///
+    /// # Errors
+    /// Names the parameter that no motion can have.
+    pub fn to_model(self) -> Result<AnyMotion, ParameterError> {
+        Ok(match self {
+            Self::OrnsteinUhlenbeck { rate_time_s, rate_sd_per_s, strain_mean, strain_sd } => {
+                AnyMotion::Two(Motion::ornstein_uhlenbeck(rate_time_s, rate_sd_per_s, strain_mean, strain_sd)?)
+            }
+            Self::Smooth { rate_sd_per_s, acceleration_sd_per_s2, strain_mean, strain_sd } => {
+                AnyMotion::Three(Motion::smooth(rate_sd_per_s, acceleration_sd_per_s2, strain_mean, strain_sd)?)
+            }
+        })
+    }
+}
