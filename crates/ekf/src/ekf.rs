@@ -94,6 +94,7 @@ impl<M> Ekf<M> {
     ///
     /// # Errors
     /// See [`StepError`]; the belief passed in is untouched.
+    #[inline]
     pub fn step_prepared<T: Scalar, const N: usize, const L: usize>(
         &self,
         belief: &Belief<T, N, L>,
@@ -108,6 +109,7 @@ impl<M> Ekf<M> {
     }
 
     /// The belief a prepared step later, and how it got there.
+    #[inline]
     fn predict<T: Scalar, const N: usize, const L: usize>(
         &self,
         belief: &Belief<T, N, L>,
@@ -121,6 +123,7 @@ impl<M> Ekf<M> {
         (transition, Belief { mean: transition.mean, covariance })
     }
 
+    #[inline]
     fn finish<T: Scalar, const N: usize, const L: usize>(
         &self,
         transition: Transition<T, N, L>,
@@ -133,14 +136,9 @@ impl<M> Ekf<M> {
         let (posterior, update) = match reading {
             None => (prior, None),
             Some(reading) => {
-                let mut observation = self.model.observe(&prior, None);
-                let mut updated = update(&prior, observation, reading)?;
+                let mut updated = update(&prior, self.model.observe(&prior, None), reading)?;
                 for _ in 1..self.iterations {
-                    let at = Belief { mean: updated.0.mean, ..prior };
-                    observation = self.model.observe(&at, None);
-                    // The tangent there, read off at the prior's mean.
-                    observation.value += observation.gradient.dot(&(prior.mean - at.mean));
-                    updated = update(&prior, observation, reading)?;
+                    updated = self.update_at(&prior, updated.0.mean, reading)?;
                 }
                 (updated.0, Some(updated.1))
             }
@@ -149,6 +147,22 @@ impl<M> Ekf<M> {
             return Err(StepError::NonFiniteState);
         }
         Ok(Step { transition, prior, posterior, update })
+    }
+
+    /// The update with the channel linearised at another state than the prior's mean.
+    fn update_at<T: Scalar, const N: usize, const L: usize>(
+        &self,
+        prior: &Belief<T, N, L>,
+        at: SVector<T, N>,
+        reading: Reading<T>,
+    ) -> Result<(Belief<T, N, L>, Update<T, N>), StepError>
+    where
+        M: Channel<T, N, L>,
+    {
+        let mut observation = self.model.observe(&Belief { mean: at, ..*prior }, None);
+        // The tangent there, read off at the prior's mean.
+        observation.value += observation.gradient.dot(&(prior.mean - at));
+        update(prior, observation, reading)
     }
 }
 
@@ -159,6 +173,7 @@ fn stand_still<T: Scalar, const N: usize, const L: usize>(belief: &Belief<T, N, 
 
 /// Kalman's update with one scalar reading; the covariance in Joseph's form `(I - K H) P (I - K H)ᵀ + K R Kᵀ`, which
 /// stays positive semi-definite under rounding where `P - K S Kᵀ` does not.
+#[inline]
 #[allow(non_snake_case, reason = "H, P, S, K are the letters of every textbook; NOTATION.md has the table")]
 pub(crate) fn update<T: Scalar, const N: usize, const L: usize>(
     prior: &Belief<T, N, L>,

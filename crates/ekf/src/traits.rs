@@ -43,6 +43,10 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize, const L: usize> 
         };
         self.transition(step, &from.mean, direction)
     }
+
+    fn propagate(&self, covariance: &Symmetric<T, N, L>, transition: &Transition<T, N, L>) -> Symmetric<T, N, L> {
+        self.propagate(covariance, transition)
+    }
 }
 
 impl<T: Scalar, const M: usize, const B: usize, const N: usize, const L: usize> Channel<T, N, L>

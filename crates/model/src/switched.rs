@@ -168,6 +168,40 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize> SwitchedModel<T,
         out
     }
 
+    /// `F P Fᵀ + Q` of a transition of this model, without touching its zeros: motion moves by itself, a branch by the
+    /// motion and itself, the baseline by itself.
+    #[must_use]
+    pub fn propagate<const L: usize>(
+        &self,
+        covariance: &Symmetric<T, N, L>,
+        transition: &Transition<T, N, L>,
+    ) -> Symmetric<T, N, L> {
+        let jacobian = &transition.jacobian;
+        let mut out = transition.noise;
+        for i in 0..N {
+            let mut row = [T::zero(); N];
+            for k in 0..=i.max(M - 1) {
+                row[k] = Self::sparse_dot(i, |l| jacobian[(i, l)], |l| covariance[(l, k)]);
+            }
+            for j in 0..=i {
+                out[(i, j)] += Self::sparse_dot(j, |k| jacobian[(j, k)], |k| row[k]);
+            }
+        }
+        out
+    }
+
+    /// Row `i` of the Jacobian, of which only these entries can differ from zero, times a column.
+    #[inline]
+    fn sparse_dot(i: usize, row: impl Fn(usize) -> T, column: impl Fn(usize) -> T) -> T {
+        let mut sum = if i < M { T::zero() } else { row(i) * column(i) };
+        if i < M + B {
+            for k in 0..M {
+                sum += row(k) * column(k);
+            }
+        }
+        sum
+    }
+
     /// The reading ρ = R/R₀ - 1 expected at `state`.
     #[must_use]
     pub fn observe(&self, state: &SVector<T, N>, direction: Direction<T>) -> Observation<T, N> {

@@ -3,7 +3,8 @@
 use nalgebra::{SMatrix, SVector};
 use num_dual::Dual64;
 use ohmstrain_model::{
-    Branch, Direction, Gauge, ModelNoise, Motion, Phase, Scalar, SensorLaw, StrainRange, SwitchedModel, Transition,
+    Branch, Direction, Gauge, ModelNoise, Motion, Phase, Scalar, SensorLaw, StrainRange, SwitchedModel, Symmetric,
+    Transition,
 };
 use proptest::prelude::*;
 
@@ -138,6 +139,21 @@ proptest! {
         }
     }
 
+    /// The sparse path and the full matrices say the same: both sum at most N² products per entry.
+    #[test]
+    fn sparse_propagation_equals_the_matrix_formula(state in state(), dt in 0.001..20.0_f64, raw in prop::array::uniform32(-1.0..1.0_f64)) {
+        let root = SMatrix::<f64, 6, 6>::from_fn(|i, j| raw[(5 * i + 7 * j) % 32]);
+        let covariance = Symmetric::<f64, 6, 21>::from_lower(&(root * root.transpose()));
+        let model = model::<f64>(polynomial(), 1.0);
+        for direction in DIRECTIONS {
+            let step: Transition<f64, 6, 21> = model.transition(&model.prepare(dt), &state, direction);
+            let full = covariance.congruence(&step.jacobian).plus(&step.noise);
+            let sparse = model.propagate(&covariance, &step);
+            let size = full.to_matrix().amax();
+            prop_assert!((full.to_matrix() - sparse.to_matrix()).amax() < 36.0 * f64::EPSILON * size);
+        }
+    }
+
     /// The noise of a linearised step is a covariance even where the gain depends on the noisy strain.
     #[test]
     fn noise_is_positive_semi_definite(state in state(), dt in 0.001..20.0_f64) {
@@ -199,7 +215,7 @@ fn the_initial_distribution_is_stationary() {
     let (mean, variance) = model.initial_distribution();
     let step: Transition<f64, 6, 21> = model.transition(&model.prepare(0.7), &mean, Direction::Known(Phase::Extend));
     // Smooth motion correlates strain with acceleration; compare what the diagonal start determines in the long run.
-    let mut covariance = ohmstrain_model::Symmetric::<f64, 6, 21>::from_diagonal(&variance);
+    let mut covariance = Symmetric::<f64, 6, 21>::from_diagonal(&variance);
     for _ in 0..2000 {
         covariance = covariance.congruence(&step.jacobian).plus(&step.noise);
     }
