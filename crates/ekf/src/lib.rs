@@ -3,6 +3,9 @@
 //! Configuration and state are apart: an estimator ([`Ekf`]) holds the model, a [`Belief`] goes in and a [`Step`] with
 //! a new belief comes out. An error leaves the caller's belief as it was, and one estimator serves many sensors.
 //!
+//! [`Ekf`] (plain, iterated, or unscented as [`Ukf`]) keeps one Gaussian and has a smoother. [`Imm`], [`SignSplit`] and
+//! [`Hypotheses`] keep a [`Mixture`] of hypotheses about the phase, because stretching and releasing look alike.
+//!
 //! Models are anything that implements [`Dynamics`] and [`Channel`];
 //! [`SwitchedModel`](ohmstrain_model::SwitchedModel) does.
 //!
