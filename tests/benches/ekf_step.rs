@@ -66,7 +66,7 @@ fn adskalman(criterion: &mut Criterion, model: &SwitchedModel<f64, 2, 1, 3>) {
 }
 
 fn benchmarks(criterion: &mut Criterion) {
-    let model = sensor::<1, 3>();
+    let model = sensor::<f64, 1, 3>();
     ekf(criterion, &model);
     adskalman(criterion, &model);
 }

@@ -52,28 +52,28 @@ impl<T: Scalar, const N: usize, const L: usize> Phased<T, N, L> for Linear<T, N>
 /// # Panics
 /// Never: the parameters are valid.
 #[must_use]
-pub fn sensor<const B: usize, const N: usize>() -> SwitchedModel<f64, 2, B, N> {
+pub fn sensor<T: Scalar, const B: usize, const N: usize>() -> SwitchedModel<T, 2, B, N> {
     let branch = |i: usize| Branch {
-        tau_s: 4.0 * 8_f64.powi(i as i32),
-        extend_gain: 0.8,
-        retract_gain: -0.5,
-        extend_gain_slope: -0.6,
-        retract_gain_slope: -0.4,
+        tau_s: T::of(4.0 * 8_f64.powi(i as i32)),
+        extend_gain: T::of(0.8),
+        retract_gain: T::of(-0.5),
+        extend_gain_slope: T::of(-0.6),
+        retract_gain_slope: T::of(-0.4),
     };
     let law = SensorLaw {
-        gauge: Gauge::Polynomial { coefficients: [1.6, -1.2, 0.5] },
-        extend_viscosity_s: 0.02,
-        retract_viscosity_s: -0.01,
+        gauge: Gauge::Polynomial { coefficients: [1.6, -1.2, 0.5].map(T::of) },
+        extend_viscosity_s: T::of(0.02),
+        retract_viscosity_s: T::of(-0.01),
         branches: std::array::from_fn(branch),
-        range: StrainRange { lower: -0.02, upper: 0.35 },
+        range: StrainRange { lower: T::of(-0.02), upper: T::of(0.35) },
     };
     let noise = ModelNoise {
-        reading_sd: 2e-3,
-        branch_sd: 5e-3,
-        baseline_sd: if N == B + 3 { 0.02 } else { 0.0 },
-        baseline_time_s: 30.0,
+        reading_sd: T::of(2e-3),
+        branch_sd: T::of(5e-3),
+        baseline_sd: T::of(if N == B + 3 { 0.02 } else { 0.0 }),
+        baseline_time_s: T::of(30.0),
     };
-    Motion::ornstein_uhlenbeck(1.5, 0.05, 0.15, 0.1)
+    Motion::ornstein_uhlenbeck(T::of(1.5), T::of(0.05), T::of(0.15), T::of(0.1))
         .and_then(|motion| SwitchedModel::new(law, motion, noise))
         .unwrap_or_else(|error| unreachable!("{error}"))
 }

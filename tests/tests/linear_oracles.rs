@@ -180,7 +180,7 @@ type Linearised = (Transition<f64, 5, 15>, Observation<f64, 5>);
 
 /// One linearised step of the sensor's own law.
 fn linearised() -> (Belief<f64, 5, 15>, Linearised) {
-    let model = sensor::<2, 5>();
+    let model = sensor::<f64, 2, 5>();
     let start = Belief::<f64, 5, 15>::initial(&model);
     let prepared = Dynamics::<f64, 5, 15>::prepare(&model, 0.05);
     let transition = Dynamics::transition(&model, &prepared, &start, Some(Phase::Extend));

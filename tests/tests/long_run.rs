@@ -1,29 +1,10 @@
 //! Ten million steps in f32: a day of a sensor read at a hundred hertz, and more.
 
 use ohmstrain_ekf::{Belief, Dynamics, Ekf, Reading};
-use ohmstrain_model::{Branch, Gauge, ModelNoise, Motion, SensorLaw, StrainRange, SwitchedModel};
+use ohmstrain_tests::sensor;
 
 const STEPS: u32 = 10_000_000;
 const DT_S: f32 = 0.01;
-
-fn sensor() -> SwitchedModel<f32, 2, 2, 5> {
-    let branch = |tau_s: f32| Branch {
-        tau_s,
-        extend_gain: 0.8,
-        retract_gain: -0.5,
-        extend_gain_slope: -0.6,
-        retract_gain_slope: -0.4,
-    };
-    let law = SensorLaw {
-        gauge: Gauge::Polynomial { coefficients: [1.6, -1.2, 0.5] },
-        extend_viscosity_s: 0.02,
-        retract_viscosity_s: -0.01,
-        branches: [branch(4.0), branch(60.0)],
-        range: StrainRange { lower: -0.02, upper: 0.35 },
-    };
-    let noise = ModelNoise { reading_sd: 2e-3, branch_sd: 5e-3, baseline_sd: 0.02, baseline_time_s: 30.0 };
-    SwitchedModel::new(law, Motion::ornstein_uhlenbeck(1.5, 0.05, 0.15, 0.1).unwrap(), noise).unwrap()
-}
 
 /// The smallest eigenvalue of the correlation matrix: what is left where everything known is taken out.
 fn smallest_correlation_eigenvalue(belief: &Belief<f32, 5, 15>) -> f64 {
@@ -34,7 +15,7 @@ fn smallest_correlation_eigenvalue(belief: &Belief<f32, 5, 15>) -> f64 {
 
 #[test]
 fn ten_million_steps_keep_the_covariance_positive_semi_definite() {
-    let model = sensor();
+    let model = sensor::<f32, 2, 5>();
     let ekf = Ekf::new(model);
     let prepared = Dynamics::<f32, 5, 15>::prepare(&model, DT_S);
     let mut belief: Belief<f32, 5, 15> = Belief::initial(&model);

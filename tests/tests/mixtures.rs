@@ -4,7 +4,7 @@
 
 use nalgebra::{Matrix3, SMatrix, SVector};
 use ohmstrain_ekf::{
-    Belief, Dwell, Dynamics, Ekf, Hypotheses, Imm, Mixture, Phased, Reading, SignSplit, Ukf, Unscented,
+    Belief, Dwell, Dynamics, Ekf, Evidence, Hypotheses, Imm, Mixture, Phased, Reading, SignSplit, Ukf, Unscented,
 };
 use ohmstrain_model::{
     Branch, Direction, Gauge, ModelNoise, Motion, Phase, SensorLaw, StrainRange, SwitchedModel, Symmetric, Transition,
@@ -15,7 +15,11 @@ use rand_chacha::ChaCha12Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 
-const ANYWHERE: StrainRange<f64> = StrainRange { lower: f64::NEG_INFINITY, upper: f64::INFINITY };
+const ANYWHERE: Evidence<f64> = within(f64::NEG_INFINITY, f64::INFINITY);
+
+const fn within(lower: f64, upper: f64) -> Evidence<f64> {
+    Evidence { limits: StrainRange { lower, upper }, tempering: 1.0 }
+}
 
 fn normal(rng: &mut ChaCha12Rng) -> f64 {
     StandardNormal.sample(rng)
@@ -41,9 +45,9 @@ fn check_one_phase<const N: usize, const L: usize>(seed: u64) {
     let mut rng = ChaCha12Rng::seed_from_u64(seed);
     let model = random_model::<N>(&mut rng);
     let dwell = Dwell::new(1.0, 2.0, 0.3).unwrap();
-    let (ekf, imm) = (Ekf::new(model), Imm::new(model, dwell, ANYWHERE, 1.0));
+    let (ekf, imm) = (Ekf::new(model), Imm::new(model, dwell, ANYWHERE));
     let (iterated, ukf) = (ekf.iterated(3), Ukf::new(Unscented::new(model)));
-    let histories = Hypotheses::new(model, dwell, ANYWHERE, 1.0);
+    let histories = Hypotheses::new(model, dwell, ANYWHERE);
     let mut belief: Belief<f64, N, L> = Belief::independent(SVector::from_fn(|_, _| normal(&mut rng)), &[1.0; N]);
     let mut modes = Mixture::<f64, N, L, 3>::single(belief, Phase::Hold);
     let mut single = Mixture::<f64, N, L, 1>::single(belief, Phase::Hold);
@@ -204,9 +208,9 @@ fn phase_probabilities_mean_what_they_say() {
     let dwell = Dwell::new(2.0, 2.0, 0.3).unwrap();
     let start: Belief<f64, 3, 6> = Belief::independent(SVector::zeros(), &[1e-8, 1e-8, 1e-8]);
     let prepared = Dynamics::<f64, 3, 6>::prepare(&sensor(), DT_S);
-    let limits = StrainRange { lower: -100.0, upper: 100.0 };
+    let evidence = within(-100.0, 100.0);
     check_reliability("imm", |seed| {
-        let imm = Imm::new(sensor(), dwell, limits, 1.0);
+        let imm = Imm::new(sensor(), dwell, evidence);
         let mut mixture = Mixture::<f64, 3, 6, 3>::single(start, Phase::Hold);
         let mut process = Process::new(dwell, seed);
         (0..50)
@@ -218,7 +222,7 @@ fn phase_probabilities_mean_what_they_say() {
             .collect()
     });
     check_reliability("hypotheses", |seed| {
-        let filter = Hypotheses::new(sensor(), dwell, limits, 1.0);
+        let filter = Hypotheses::new(sensor(), dwell, evidence);
         let mut mixture = Mixture::<f64, 3, 6, 24>::single(start, Phase::Hold);
         let mut process = Process::new(dwell, seed);
         (0..50)
@@ -235,11 +239,11 @@ fn phase_probabilities_mean_what_they_say() {
 /// A body at rest on a limit: the evidence of the limit counts once, not at each of a thousand steps.
 #[test]
 fn a_thousand_steps_at_rest_on_a_limit_change_nothing() {
-    let limits = StrainRange { lower: 0.0, upper: 0.3 };
+    let evidence = within(0.0, 0.3);
     let dwell = Dwell::new(1e9, 1.0, 0.3).unwrap();
     let prepared = Dynamics::<f64, 3, 6>::prepare(&sensor(), DT_S);
     let start: Belief<f64, 3, 6> = Belief::independent(SVector::zeros(), &[1e-4, 0.0, 0.0]);
-    let filter = Hypotheses::new(sensor(), dwell, limits, 1.0);
+    let filter = Hypotheses::new(sensor(), dwell, evidence);
     let mut mixture = Mixture::<f64, 3, 6, 8>::single(start, Phase::Hold);
     let first = filter.step_prepared(&mixture, &prepared, DT_S, None).unwrap().posterior.moments();
     for _ in 0..1000 {
@@ -257,7 +261,7 @@ fn sign_split_tells_stretching_from_releasing() {
     let law = *sensor().law();
     let noise = *sensor().noise();
     let model = SwitchedModel::<f64, 3, 1, 4>::new(law, motion, noise).unwrap();
-    let filter = SignSplit::new(model, None, StrainRange { lower: -0.2, upper: 0.5 }, 1.0);
+    let filter = SignSplit::new(model, None, within(-0.2, 0.5));
     let prepared = Dynamics::<f64, 4, 10>::prepare(&model, 0.05);
     let start: Belief<f64, 4, 10> = Belief::initial(&model);
     let mut mixture = Mixture::<f64, 4, 10, 8>::single(start, Phase::Extend);

@@ -1,5 +1,6 @@
 use ohmstrain_ekf::{
-    Belief, Dwell, Ekf, Estimate, Gaussian, Hypotheses, Imm, Mixture, Reading, SignSplit, StepError, Ukf, Unscented,
+    Belief, Dwell, Ekf, Estimate, Evidence, Gaussian, Hypotheses, Imm, Mixture, Reading, SignSplit, StepError, Ukf,
+    Unscented,
 };
 use ohmstrain_model::{Motion, Phase, SwitchedModel};
 
@@ -129,20 +130,20 @@ fn build_sized<const M: usize, const B: usize, const N: usize, const L: usize>(
         .phases
         .ok_or_else(|| CalibrationError::Unsupported(format!("`{}` needs `phases` in its parameters", kind.name())))?;
     let dwell = Dwell::new(phases.hold_time_s, phases.move_time_s, phases.reversal)?;
-    let tempering = phases.tempering;
+    let evidence = Evidence { limits, tempering: phases.tempering };
     Ok(match kind {
         EstimatorKind::Imm => {
             let start = Mixture::single(belief, Phase::Hold);
-            Box::new(Running::new(Imm::new(model, dwell, limits, tempering), start, model, interval))
+            Box::new(Running::new(Imm::new(model, dwell, evidence), start, model, interval))
         }
         EstimatorKind::SignSplit => {
             let start = Mixture::<f64, N, L, HYPOTHESES>::single(belief, Phase::Extend);
             let hold = (phases.hold_time_s > 0.0 && phases.reversal < 1.0).then_some(dwell);
-            Box::new(Running::new(SignSplit::new(model, hold, limits, tempering), start, model, interval))
+            Box::new(Running::new(SignSplit::new(model, hold, evidence), start, model, interval))
         }
         _ => {
             let start = Mixture::<f64, N, L, HISTORIES>::single(belief, Phase::Hold);
-            Box::new(Running::new(Hypotheses::new(model, dwell, limits, tempering), start, model, interval))
+            Box::new(Running::new(Hypotheses::new(model, dwell, evidence), start, model, interval))
         }
     })
 }

@@ -1,8 +1,8 @@
-use ohmstrain_model::{Phase, StrainRange};
+use ohmstrain_model::Phase;
 
 use crate::gaussian::Real;
 use crate::mixture::{Component, Mixture};
-use crate::mixture_step::{Candidates, MixtureStep};
+use crate::mixture_step::{Candidates, Evidence, MixtureStep};
 use crate::{Dwell, Phased, Reading, StepError};
 
 /// Interacting multiple models: one Gaussian per phase (extend, hold, retract), mixed before every step by the
@@ -13,14 +13,14 @@ use crate::{Dwell, Phased, Reading, StepError};
 pub struct Imm<T, M> {
     model: M,
     dwell: Dwell<T>,
-    limits: StrainRange<T>,
-    tempering: T,
+    evidence: Evidence<T>,
 }
 
 impl<T: Real, M> Imm<T, M> {
-    /// `limits` and `tempering` as for [`SignSplit`](crate::SignSplit).
-    pub const fn new(model: M, dwell: Dwell<T>, limits: StrainRange<T>, tempering: T) -> Self {
-        Self { model, dwell, limits, tempering }
+    /// - `dwell`: how long phases last and what follows them.
+    /// - `evidence`: what weighs the hypotheses.
+    pub const fn new(model: M, dwell: Dwell<T>, evidence: Evidence<T>) -> Self {
+        Self { model, dwell, evidence }
     }
 
     /// The model.
@@ -43,7 +43,7 @@ impl<T: Real, M> Imm<T, M> {
         M: Phased<T, N, L>,
     {
         let chain = self.dwell.probabilities(dt_s);
-        let mut candidates = Candidates::new(&self.model, &self.limits, self.tempering, reading);
+        let mut candidates = Candidates::new(&self.model, &self.evidence, reading);
         for phase in Phase::ALL {
             if let Some(mixed) = self.mix(mixture, &chain, phase) {
                 candidates.add(&mixed, &mixed.belief, prepared, phase, T::one(), |prior| (prior, T::one()))?;

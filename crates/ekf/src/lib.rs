@@ -75,7 +75,7 @@ pub use gaussian::{Gaussian, Real, TruncatedGaussian};
 pub use hypotheses::Hypotheses;
 pub use imm::Imm;
 pub use mixture::{Component, Mixture};
-pub use mixture_step::MixtureStep;
+pub use mixture_step::{Evidence, MixtureStep};
 pub use sign_split::SignSplit;
 #[cfg(feature = "std")]
 pub use smoother::rts_smooth_vec;

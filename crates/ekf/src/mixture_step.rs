@@ -5,6 +5,16 @@ use crate::gaussian::Real;
 use crate::mixture::{Component, Mixture};
 use crate::{Belief, Phased, Reading, StepError};
 
+/// What weighs hypotheses, in every filter that keeps some.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Evidence<T> {
+    /// Strains beyond these limits are unlikely.
+    pub limits: StrainRange<T>,
+    /// Power, 0 to 1, to which the likelihood of a reading enters the weights; below 1 it allows for model error that is
+    /// correlated from reading to reading.
+    pub tempering: T,
+}
+
 /// What one step of a filter of hypotheses computed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MixtureStep<T, const N: usize, const L: usize, const K: usize> {
@@ -19,8 +29,7 @@ pub struct MixtureStep<T, const N: usize, const L: usize, const K: usize> {
 /// Collects the children of all hypotheses: predicts, updates, weighs and merges them one by one.
 pub(crate) struct Candidates<'a, T, M, const N: usize, const L: usize, const K: usize> {
     model: &'a M,
-    limits: &'a StrainRange<T>,
-    tempering: T,
+    evidence: &'a Evidence<T>,
     reading: Option<Reading<T>>,
     children: Mixture<T, N, L, K>,
     /// Moments of the predicted reading: sum of probabilities, of values, of squares and variances.
@@ -31,8 +40,8 @@ pub(crate) struct Candidates<'a, T, M, const N: usize, const L: usize, const K: 
 const LEAST_MASS: f64 = 1e-3;
 
 impl<'a, T: Real, M: Phased<T, N, L>, const N: usize, const L: usize, const K: usize> Candidates<'a, T, M, N, L, K> {
-    pub(crate) fn new(model: &'a M, limits: &'a StrainRange<T>, tempering: T, reading: Option<Reading<T>>) -> Self {
-        Self { model, limits, tempering, reading, children: Mixture::empty(), predicted: [T::zero(); 3] }
+    pub(crate) fn new(model: &'a M, evidence: &'a Evidence<T>, reading: Option<Reading<T>>) -> Self {
+        Self { model, evidence, reading, children: Mixture::empty(), predicted: [T::zero(); 3] }
     }
 
     /// The child of `parent` that starts at `from` and moves in `phase`; `cut` restricts its prediction and says how
@@ -67,12 +76,12 @@ impl<'a, T: Real, M: Phased<T, N, L>, const N: usize, const L: usize, const K: u
             self.predicted[1] += weight * expected;
             self.predicted[2] += weight * (update.innovation_variance + expected * expected);
             child.belief = posterior;
-            child.log_weight += self.tempering * update.log_likelihood;
+            child.log_weight += self.evidence.tempering * update.log_likelihood;
         }
         if !child.belief.is_finite() {
             return Err(StepError::NonFiniteState);
         }
-        child.weigh_limits(self.limits);
+        child.weigh_limits(&self.evidence.limits);
         self.children.add(child);
         Ok(())
     }

@@ -2,7 +2,7 @@ use ohmstrain_model::{Phase, StrainRange};
 
 use crate::gaussian::Real;
 use crate::mixture::{Component, Mixture, with_rate_in};
-use crate::mixture_step::{Candidates, MixtureStep};
+use crate::mixture_step::{Candidates, Evidence, MixtureStep};
 use crate::{Belief, Dwell, Phased, Reading, StepError};
 
 /// Gaussian hypotheses split by the sign of the rate.
@@ -14,17 +14,14 @@ use crate::{Belief, Dwell, Phased, Reading, StepError};
 pub struct SignSplit<T, M> {
     model: M,
     hold: Option<Dwell<T>>,
-    limits: StrainRange<T>,
-    tempering: T,
+    evidence: Evidence<T>,
 }
 
 impl<T: Real, M> SignSplit<T, M> {
     /// - `hold`: how long holds and movements last; `None` for a body that never rests.
-    /// - `limits`: strains beyond them are unlikely.
-    /// - `tempering`: power, 0 to 1, to which the likelihood of a reading enters the weights; below 1 it allows for
-    ///   model error that is correlated from reading to reading.
-    pub const fn new(model: M, hold: Option<Dwell<T>>, limits: StrainRange<T>, tempering: T) -> Self {
-        Self { model, hold, limits, tempering }
+    /// - `evidence`: what weighs the hypotheses.
+    pub const fn new(model: M, hold: Option<Dwell<T>>, evidence: Evidence<T>) -> Self {
+        Self { model, hold, evidence }
     }
 
     /// The model.
@@ -46,7 +43,7 @@ impl<T: Real, M> SignSplit<T, M> {
     where
         M: Phased<T, N, L>,
     {
-        let mut candidates = Candidates::new(&self.model, &self.limits, self.tempering, reading);
+        let mut candidates = Candidates::new(&self.model, &self.evidence, reading);
         let chain = self.hold.map(|dwell| dwell.probabilities(dt_s));
         for parent in mixture.components() {
             let [extends, holds, retracts] = match (&chain, parent.phase) {
