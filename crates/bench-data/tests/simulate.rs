@@ -71,6 +71,20 @@ fn protocols_have_the_phases_they_promise() {
 }
 
 #[test]
+fn long_holds_begin_at_full_stretch_and_vary() {
+    let long = Protocol::LongHolds { cycles: 4, hold_s: 100.0, rest_s: 50.0 };
+    let trace = simulate(&settings(long)).unwrap();
+    let segments = segment(&trace.time_s, strain(&trace));
+    let phases: Vec<Phase> = segments.iter().map(|segment| segment.phase).collect();
+    assert_eq!(phases, [vec![Hold], [Extend, Hold, Retract, Hold].repeat(4)].concat());
+    let held: Vec<f64> = (0..4).map(|cycle| strain(&trace)[segments[2 + 4 * cycle].rows.start + 5]).collect();
+    // 10 mm on 30 mm, to the reference's 1e-5; then 40 % of it or more.
+    assert!((held[0] - 1.0 / 3.0).abs() <= 1e-5, "{held:?}");
+    assert!(held[1..].iter().all(|held| (0.4 / 3.0..1.0 / 3.0).contains(held)), "{held:?}");
+    assert!(held.windows(2).all(|pair| (pair[0] - pair[1]).abs() > 1e-3), "{held:?}");
+}
+
+#[test]
 fn the_mixed_protocol_shows_each_half_the_whole_range_and_every_phase() {
     for speed_mm_s in [1.0, 5.0] {
         let trace = simulate(&SimulationSettings { speed_mm_s, ..settings(Protocol::MIXED) }).unwrap();
@@ -183,7 +197,8 @@ fn names_are_read_back() {
     for material in Material::ALL {
         assert_eq!(material.name().parse::<Material>(), Ok(material));
     }
-    for protocol in [Protocol::EXTEND_RETRACT, Protocol::EXTEND_HOLD, Protocol::LOAD_STEPS, Protocol::MIXED] {
+    let holds = [Protocol::EXTEND_HOLD, Protocol::LONG_HOLDS];
+    for protocol in holds.into_iter().chain([Protocol::EXTEND_RETRACT, Protocol::LOAD_STEPS, Protocol::MIXED]) {
         assert_eq!(protocol.name().parse::<Protocol>(), Ok(protocol));
     }
     assert!("latex".parse::<Material>().is_err() && "wiggle".parse::<Protocol>().is_err());

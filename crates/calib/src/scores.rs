@@ -22,11 +22,18 @@ pub struct Scores {
     pub coverage_95: Option<f64>,
     /// Mean log density of the truth, strain in units of full scale; a reference is given a deviation of 0.5 % of it.
     pub log_score: Option<f64>,
+    /// Share of the time on the wrong branch: the error is above 20 % of full scale for 2 s or longer.
+    pub wrong_branch: f64,
 }
+
+/// Errors above this share of full scale, for this long, s, are no inaccuracy: the estimate follows another solution.
+const WRONG_BRANCH: (f64, f64) = (0.2, 2.0);
 
 /// One scored row.
 #[derive(Clone, Copy, Debug)]
 pub struct ScoredRow {
+    /// Time, s.
+    pub time_s: f64,
     /// True strain.
     pub truth: f64,
     /// Estimate.
@@ -62,8 +69,28 @@ impl Scores {
             coverage_90: covered(0.9),
             coverage_95: covered(0.95),
             log_score: has_sd.then(|| mean(&|row| row.log_density(full_scale))),
+            wrong_branch: wrong_branch(&rows, full_scale),
         })
     }
+}
+
+/// Share of the time between the first and the last row.
+fn wrong_branch(rows: &[&ScoredRow], full_scale: f64) -> f64 {
+    let wrong = |row: &ScoredRow| (row.strain - row.truth).abs() > WRONG_BRANCH.0 * full_scale;
+    let (mut total, mut since) = (0.0, None);
+    for (k, row) in rows.iter().enumerate() {
+        let last = k + 1 == rows.len();
+        match (since, wrong(row) && !last) {
+            (None, true) => since = Some(row.time_s),
+            (Some(start), false) => {
+                total += Some(row.time_s - start).filter(|duration| *duration >= WRONG_BRANCH.1).unwrap_or(0.0);
+                since = None;
+            }
+            _ => {}
+        }
+    }
+    let (first, last) = (rows.first().map_or(0.0, |row| row.time_s), rows.last().map_or(0.0, |row| row.time_s));
+    if last > first { total / (last - first) } else { 0.0 }
 }
 
 impl ScoredRow {
@@ -76,5 +103,26 @@ impl ScoredRow {
         let variance = (self.sd.unwrap_or(0.0) / full_scale).powi(2) + REFERENCE_SD.powi(2);
         let error = (self.strain - self.truth) / full_scale;
         -0.5 * (error * error / variance + (std::f64::consts::TAU * variance).ln())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{ScoredRow, Scores};
+
+    #[test]
+    fn short_excursions_are_no_wrong_branch() {
+        // One row a second, full scale 1: errors of 0.3 in rows 10 to 11 (until 12, 2 s), in row 30, and of 0.1 before.
+        let row = |k: u32| {
+            let error = match k {
+                10 | 11 | 30 => 0.3,
+                0..10 => 0.1,
+                _ => 0.0,
+            };
+            let truth = f64::from(k % 2);
+            ScoredRow { time_s: f64::from(k), truth, strain: truth + error, sd: None }
+        };
+        let rows: Vec<ScoredRow> = (0..=40).map(row).collect();
+        assert_eq!(Scores::new(&rows).unwrap().wrong_branch, 2.0 / 40.0);
     }
 }

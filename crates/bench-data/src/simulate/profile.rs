@@ -11,7 +11,7 @@ pub(super) struct Profile {
 }
 
 impl Profile {
-    /// What a protocol does. `random` is used by [`Protocol::Mixed`] only.
+    /// What a protocol does. `random` is used by [`Protocol::LongHolds`] and [`Protocol::Mixed`] only.
     pub(super) fn new(settings: &SimulationSettings, random: &mut ChaCha8Rng) -> Self {
         let (full, rate) = (settings.full_strain(), settings.strain_rate());
         let mut profile = Self { time_s: vec![0.0], strain: vec![0.0] };
@@ -37,6 +37,15 @@ impl Profile {
                 for step in 1..=steps {
                     profile.ramp(settings.material.strain_under_load(f64::from(step) * step_g), rate);
                     profile.hold(hold_s);
+                }
+            }
+            Protocol::LongHolds { cycles, hold_s, rest_s } => {
+                let mut share = |low: f64| low + (1.0 - low) * unit(random);
+                for cycle in 0..cycles {
+                    profile.ramp(if cycle == 0 { full } else { full * share(0.4) }, rate * share(0.2));
+                    profile.hold(hold_s);
+                    profile.ramp(0.0, rate * share(0.2));
+                    profile.hold(rest_s * share(0.2));
                 }
             }
             Protocol::Mixed { duration_s } => {

@@ -31,6 +31,15 @@ pub enum Protocol {
         /// Time at each load, s.
         hold_s: f64,
     },
+    /// Stretch, hold for long, release, rest: the first time to full stretch, then to random strains at random speeds.
+    LongHolds {
+        /// How often, at least once.
+        cycles: u32,
+        /// Time at each stretch, s.
+        hold_s: f64,
+        /// Longest time at rest after a release, s; the shortest is a fifth of it.
+        rest_s: f64,
+    },
     /// Triangles at several speeds, holds at several strains and a random walk, in turn: what a calibration should see.
     Mixed {
         /// How long, s.
@@ -45,6 +54,8 @@ impl Protocol {
     pub const EXTEND_HOLD: Self = Self::ExtendHold { cycles: 2, hold_s: 90.0, rest_s: 60.0 };
     /// 5 g every 15 s.
     pub const LOAD_STEPS: Self = Self::LoadSteps { step_g: 5.0, hold_s: 15.0 };
+    /// Six holds of 300 s with up to 300 s of rest after each.
+    pub const LONG_HOLDS: Self = Self::LongHolds { cycles: 6, hold_s: 300.0, rest_s: 300.0 };
     /// 400 s.
     pub const MIXED: Self = Self::Mixed { duration_s: 400.0 };
 
@@ -58,6 +69,7 @@ impl Protocol {
             Self::ExtendRetract { .. } => "extend-retract",
             Self::ExtendHold { .. } => "extend-hold",
             Self::LoadSteps { .. } => "load-steps",
+            Self::LongHolds { .. } => "long-holds",
             Self::Mixed { .. } => "mixed",
         }
     }
@@ -71,7 +83,7 @@ impl fmt::Display for Protocol {
 
 /// No protocol has this name.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("no protocol `{0}`: expected extend-retract, extend-hold, load-steps or mixed")]
+#[error("no protocol `{0}`: expected extend-retract, extend-hold, load-steps, long-holds or mixed")]
 pub struct UnknownProtocol(String);
 
 /// The protocol of that name with its usual counts and times.
@@ -79,7 +91,7 @@ impl FromStr for Protocol {
     type Err = UnknownProtocol;
 
     fn from_str(name: &str) -> Result<Self, UnknownProtocol> {
-        [Self::EXTEND_RETRACT, Self::EXTEND_HOLD, Self::LOAD_STEPS, Self::MIXED]
+        [Self::EXTEND_RETRACT, Self::EXTEND_HOLD, Self::LOAD_STEPS, Self::LONG_HOLDS, Self::MIXED]
             .into_iter()
             .find(|protocol| protocol.name() == name)
             .ok_or_else(|| UnknownProtocol(name.to_owned()))

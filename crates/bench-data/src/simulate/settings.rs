@@ -13,7 +13,8 @@ pub struct SimulationSettings {
     pub protocol: Protocol,
     /// Full stretch, mm on 30 mm, above 0 and at most 15; default 10.
     pub elongation_mm: f64,
-    /// Speed of the machine, mm/s, 0.01 to 100; default 1. In [`Protocol::Mixed`] the fastest.
+    /// Speed of the machine, mm/s, 0.01 to 100; default 1. In [`Protocol::LongHolds`] and [`Protocol::Mixed`] the
+    /// fastest.
     pub speed_mm_s: f64,
     /// Readings per second, 0.1 to 10 000; default 20.
     pub sample_rate_hz: f64,
@@ -61,7 +62,7 @@ impl SimulationSettings {
                 within("cycles", f64::from(cycles), 1.0, 1e4)?;
                 within("rest_s", rest_s, 0.0, 1e6)
             }
-            Protocol::ExtendHold { cycles, hold_s, rest_s } => {
+            Protocol::ExtendHold { cycles, hold_s, rest_s } | Protocol::LongHolds { cycles, hold_s, rest_s } => {
                 within("cycles", f64::from(cycles), 1.0, 1e4)?;
                 within("hold_s", hold_s, 0.0, 1e6)?;
                 within("rest_s", rest_s, 0.0, 1e6)

@@ -17,7 +17,12 @@ pub fn of_outputs(recording: &Recording, outputs: &[Output], from: Option<f64>) 
     let rows: Vec<ScoredRow> = scored_rows(recording, from)
         .map(|k| {
             let strain = outputs[k].estimate.strain;
-            ScoredRow { truth: truth(recording, k), strain: strain.mean, sd: Some(strain.sd()) }
+            ScoredRow {
+                time_s: recording.trace.time_s[k],
+                truth: truth(recording, k),
+                strain: strain.mean,
+                sd: Some(strain.sd()),
+            }
         })
         .collect();
     Scores::new(&rows)
@@ -39,7 +44,12 @@ pub fn of_static_cubic(recording: &Recording, cubic: &StaticCubic, from: Option<
         })
         .collect();
     let rows: Vec<ScoredRow> = scored_rows(recording, from)
-        .map(|k| ScoredRow { truth: truth(recording, k), strain: strains[k], sd: None })
+        .map(|k| ScoredRow {
+            time_s: recording.trace.time_s[k],
+            truth: truth(recording, k),
+            strain: strains[k],
+            sd: None,
+        })
         .collect();
     Scores::new(&rows)
 }
