@@ -45,6 +45,10 @@ impl<T: Scalar, const N: usize, const L: usize> Phased<T, N, L> for Linear<T, N>
     fn enter(&self, from: &Belief<T, N, L>, _: Phase) -> Belief<T, N, L> {
         *from
     }
+
+    fn renewed(&self) -> std::ops::Range<usize> {
+        0..0
+    }
 }
 
 /// A plausible sensor with `B` branches and Ornstein-Uhlenbeck motion; with a baseline if `N = B + 3`.

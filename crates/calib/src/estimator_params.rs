@@ -21,7 +21,7 @@ impl EstimatorKind {
     /// All estimators.
     pub const ALL: [Self; 5] = [Self::Ekf, Self::Ukf, Self::Imm, Self::SignSplit, Self::Hypotheses];
 
-    /// Whether it keeps hypotheses about the phase; the others are one Gaussian and have a smoother.
+    /// Whether it keeps hypotheses about the phase; the others are one Gaussian.
     #[must_use]
     pub const fn has_phases(self) -> bool {
         matches!(self, Self::Imm | Self::SignSplit | Self::Hypotheses)

@@ -1,6 +1,6 @@
 use ohmstrain_ekf::{
-    Belief, Dwell, Ekf, Estimate, Evidence, Gaussian, Hypotheses, Imm, Mixture, Reading, SignSplit, StepError, Ukf,
-    Unscented,
+    Belief, Dwell, Ekf, Estimate, Evidence, Gaussian, Guard, Hypotheses, Imm, Mixture, Reading, SignSplit, StepError,
+    Ukf, Unscented, Verdict,
 };
 use ohmstrain_model::{Motion, Phase, SwitchedModel};
 
@@ -25,6 +25,28 @@ pub trait Filter {
     /// Everything that is reported.
     fn output(&self) -> Output;
 
+    /// Protects the filter from outliers from now on.
+    fn guard(&mut self, guard: Guard<f64>);
+
+    /// Like [`Self::step`], but every row is estimated from the readings up to `lag_s` seconds after it; `out` gets the
+    /// rows that have become due, in order. The cost of a step grows with the rows within the lag, not with time.
+    ///
+    /// # Errors
+    /// See [`StepError`]. The filter stays as it was.
+    fn step_lagged(
+        &mut self,
+        time_s: f64,
+        reading: Option<Reading<f64>>,
+        lag_s: f64,
+        out: &mut dyn FnMut(Output),
+    ) -> Result<(), StepError>;
+
+    /// The rows that still wait, from all readings there are.
+    ///
+    /// # Errors
+    /// See [`StepError`].
+    fn flush_lagged(&mut self, out: &mut dyn FnMut(Output)) -> Result<(), StepError>;
+
     /// Smooths a whole recording, from the state the filter is in; `None` if the estimator has no smoother.
     ///
     /// # Errors
@@ -43,6 +65,8 @@ pub struct Output {
     pub estimate: Estimate<f64>,
     /// Normalised innovation squared of the row's reading; `None` if it was missing.
     pub nis: Option<f64>,
+    /// What became of the reading.
+    pub verdict: Verdict,
     /// Probabilities of extend, hold and retract; `None` if the estimator has no phases.
     pub phases: Option<[f64; 3]>,
 }
@@ -112,7 +136,7 @@ fn build_sized<const M: usize, const B: usize, const N: usize, const L: usize>(
 ) -> Result<Box<dyn Filter>, CalibrationError> {
     let law = law.to_model().ok_or_else(|| CalibrationError::Unsupported("number of branches".into()))?;
     let model = SwitchedModel::<f64, M, B, N>::new(law, motion, estimator.noise.to_model())?;
-    let belief = initial_belief(&model, limits, start);
+    let belief: Belief<f64, N, L> = initial_belief(&model, limits, start);
     let limits = limits.to_model();
     let interval = Interval {
         limits,
@@ -137,13 +161,15 @@ fn build_sized<const M: usize, const B: usize, const N: usize, const L: usize>(
             Box::new(Running::new(Imm::new(model, dwell, evidence), start, model, interval))
         }
         EstimatorKind::SignSplit => {
-            let start = Mixture::<f64, N, L, HYPOTHESES>::single(belief, Phase::Extend);
+            let start = Mixture::single(belief, Phase::Extend);
             let hold = (phases.hold_time_s > 0.0 && phases.reversal < 1.0).then_some(dwell);
-            Box::new(Running::new(SignSplit::new(model, hold, evidence), start, model, interval))
+            let filter = SignSplit::<_, _, HYPOTHESES>::new(model, hold, evidence);
+            Box::new(Running::new(filter, start, model, interval))
         }
         _ => {
-            let start = Mixture::<f64, N, L, HISTORIES>::single(belief, Phase::Hold);
-            Box::new(Running::new(Hypotheses::new(model, dwell, evidence), start, model, interval))
+            let start = Mixture::single(belief, Phase::Hold);
+            let filter = Hypotheses::<_, _, HISTORIES>::new(model, dwell, evidence);
+            Box::new(Running::new(filter, start, model, interval))
         }
     })
 }

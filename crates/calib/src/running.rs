@@ -1,115 +1,22 @@
-use std::collections::HashMap;
+use std::collections::{HashMap, VecDeque};
 
 use ohmstrain_ekf::{
-    Belief, Channel, Dynamics, Ekf, Estimate, Gaussian, Hypotheses, Imm, Mixture, Reading, SignSplit, Step, StepError,
-    rts_smooth_vec,
+    Advanced, Belief, Estimate, Estimator, Gaussian, Guard, Guarded, Innovation, PastStep, Reading, State, StepError,
+    Streak, Verdict, smooth_back_through,
 };
-use ohmstrain_model::{StrainRange, SwitchedModel, SwitchedStep};
+use ohmstrain_model::{StrainRange, SwitchedModel};
 
-use crate::filter::{Filter, HISTORIES, HYPOTHESES, Output};
-
-/// What one step of an estimator leaves behind.
-pub(crate) struct Advanced<State, Kept> {
-    state: State,
-    nis: Option<f64>,
-    kept: Kept,
-}
-
-/// What the estimators have in common: a state that a prepared step turns into another one.
-pub(crate) trait Estimator<const M: usize, const B: usize, const N: usize, const L: usize> {
-    /// What is carried from step to step.
-    type State: Clone;
-    /// What a smoother keeps of a step.
-    type Kept;
-
-    fn advance(
-        &self,
-        state: &Self::State,
-        prepared: &SwitchedStep<f64, M, B>,
-        reading: Option<Reading<f64>>,
-    ) -> Result<Advanced<Self::State, Self::Kept>, StepError>;
-
-    fn belief(state: &Self::State) -> Belief<f64, N, L>;
-
-    fn phases(_: &Self::State) -> Option<[f64; 3]> {
-        None
-    }
-
-    /// Beliefs given all readings; `None` if the estimator has no smoother.
-    fn smoothed(_: &[Self::Kept]) -> Option<Vec<Belief<f64, N, L>>> {
-        None
-    }
-}
-
-impl<Mo, const M: usize, const B: usize, const N: usize, const L: usize> Estimator<M, B, N, L> for Ekf<Mo>
-where
-    Mo: Dynamics<f64, N, L, Prepared = SwitchedStep<f64, M, B>> + Channel<f64, N, L>,
-{
-    type State = Belief<f64, N, L>;
-    type Kept = Step<f64, N, L>;
-
-    fn advance(
-        &self,
-        state: &Self::State,
-        prepared: &SwitchedStep<f64, M, B>,
-        reading: Option<Reading<f64>>,
-    ) -> Result<Advanced<Self::State, Self::Kept>, StepError> {
-        let step = self.step_prepared(state, prepared, reading)?;
-        Ok(Advanced { state: step.posterior, nis: step.update.map(|update| update.nis), kept: step })
-    }
-
-    fn belief(state: &Self::State) -> Belief<f64, N, L> {
-        *state
-    }
-
-    fn smoothed(kept: &[Self::Kept]) -> Option<Vec<Belief<f64, N, L>>> {
-        Some(rts_smooth_vec(kept))
-    }
-}
-
-/// The three filters of phase hypotheses differ in their type only.
-macro_rules! mixture_estimator {
-    ($estimator:ident, $capacity:expr) => {
-        impl<const M: usize, const B: usize, const N: usize, const L: usize> Estimator<M, B, N, L>
-            for $estimator<f64, SwitchedModel<f64, M, B, N>>
-        {
-            type State = Mixture<f64, N, L, { $capacity }>;
-            type Kept = ();
-
-            fn advance(
-                &self,
-                state: &Self::State,
-                prepared: &SwitchedStep<f64, M, B>,
-                reading: Option<Reading<f64>>,
-            ) -> Result<Advanced<Self::State, ()>, StepError> {
-                let step = self.step_prepared(state, prepared, prepared.dt_s(), reading)?;
-                Ok(Advanced { state: step.posterior, nis: step.nis, kept: () })
-            }
-
-            fn belief(state: &Self::State) -> Belief<f64, N, L> {
-                state.moments()
-            }
-
-            fn phases(state: &Self::State) -> Option<[f64; 3]> {
-                Some(state.phase_probabilities())
-            }
-        }
-    };
-}
-
-mixture_estimator!(Imm, 3);
-mixture_estimator!(SignSplit, HYPOTHESES);
-mixture_estimator!(Hypotheses, HISTORIES);
+use crate::filter::{Filter, Output};
 
 /// An estimator with its state and the steps it has prepared.
-pub(crate) struct Running<E: Estimator<M, B, N, L>, const M: usize, const B: usize, const N: usize, const L: usize> {
+pub(crate) struct Running<E: Estimator<f64, N, L>, const M: usize, const B: usize, const N: usize, const L: usize> {
     estimator: E,
-    state: E::State,
     model: SwitchedModel<f64, M, B, N>,
     interval: Interval,
-    last_time_s: Option<f64>,
-    nis: Option<f64>,
-    prepared: HashMap<u64, SwitchedStep<f64, M, B>>,
+    guard: Guard<f64>,
+    now: Moment<E::State>,
+    prepared: HashMap<u64, E::Prepared>,
+    pending: VecDeque<Pending<E::State, E::Prepared>>,
 }
 
 /// How strain is reported: within limits, its standard deviation times a calibrated factor.
@@ -120,17 +27,50 @@ pub(crate) struct Interval {
     pub smoothed_scale: f64,
 }
 
+/// Where a filter is.
+#[derive(Clone)]
+struct Moment<S> {
+    time_s: Option<f64>,
+    state: S,
+    streak: Streak,
+    seen: Seen,
+}
+
+/// What a row's reading said.
+#[derive(Clone, Copy)]
+struct Seen {
+    innovation: Option<Innovation<f64>>,
+    verdict: Verdict,
+}
+
+/// A row whose estimate waits for later readings.
+struct Pending<S, P> {
+    time_s: f64,
+    seen: Seen,
+    /// The step that leads to the next row, once there is one.
+    onward: Option<PastStep<S, P, f64>>,
+}
+
 /// Recordings repeat a few hundred step lengths; a stream whose steps never repeat must not fill the memory.
 const MOST_PREPARED: usize = 4096;
+/// Rows of a recording whose states are in memory at once while it is smoothed; the others are computed again.
+const SMOOTHED_AT_ONCE: usize = 4096;
 
-impl<E: Estimator<M, B, N, L>, const M: usize, const B: usize, const N: usize, const L: usize> Running<E, M, B, N, L> {
+impl<E: Estimator<f64, N, L>, const M: usize, const B: usize, const N: usize, const L: usize> Running<E, M, B, N, L> {
     pub(crate) fn new(estimator: E, state: E::State, model: SwitchedModel<f64, M, B, N>, interval: Interval) -> Self {
-        Self { estimator, state, model, interval, last_time_s: None, nis: None, prepared: HashMap::new() }
+        let seen = Seen { innovation: None, verdict: Verdict::Missing };
+        let now = Moment { time_s: None, state, streak: Streak::default(), seen };
+        let (guard, prepared, pending) = (Guard::none(), HashMap::new(), VecDeque::new());
+        Self { estimator, model, interval, guard, now, prepared, pending }
     }
 
     /// One step; the filter changes only if it succeeds.
-    fn advance(&mut self, time_s: f64, reading: Option<Reading<f64>>) -> Result<E::Kept, StepError> {
-        let dt_s = time_s - self.last_time_s.unwrap_or(time_s);
+    fn advance(
+        &mut self,
+        time_s: f64,
+        reading: Option<Reading<f64>>,
+    ) -> Result<PastStep<E::State, E::Prepared, f64>, StepError> {
+        let dt_s = time_s - self.now.time_s.unwrap_or(time_s);
         if !dt_s.is_finite() {
             return Err(StepError::NonFiniteTimeStep);
         }
@@ -138,44 +78,118 @@ impl<E: Estimator<M, B, N, L>, const M: usize, const B: usize, const N: usize, c
             return Err(StepError::NegativeTimeStep);
         }
         let prepared = self.prepare(dt_s);
-        let advanced = self.estimator.advance(&self.state, &prepared, reading)?;
-        (self.state, self.nis, self.last_time_s) = (advanced.state, advanced.nis, Some(time_s));
-        Ok(advanced.kept)
+        let Moment { state, streak, .. } = &self.now;
+        let Guarded { advanced, from, used, verdict, streak } =
+            self.guard.advance(&self.estimator, state, *streak, &prepared, reading)?;
+        let Advanced { state, innovation } = advanced;
+        self.now = Moment { time_s: Some(time_s), state, streak, seen: Seen { innovation, verdict } };
+        Ok(PastStep { from, prepared, reading: used })
     }
 
     /// The prepared step, remembered by its length in nanoseconds: differences of decimal times repeat to rounding only.
-    fn prepare(&mut self, dt_s: f64) -> SwitchedStep<f64, M, B> {
+    fn prepare(&mut self, dt_s: f64) -> E::Prepared {
         let nanoseconds = (dt_s * 1e9).round();
         if self.prepared.len() >= MOST_PREPARED {
             self.prepared.clear();
         }
-        let model = &self.model;
-        *self.prepared.entry(nanoseconds as u64).or_insert_with(|| model.prepare(nanoseconds * 1e-9))
+        let estimator = &self.estimator;
+        *self.prepared.entry(nanoseconds as u64).or_insert_with(|| estimator.prepare(nanoseconds * 1e-9))
     }
 
-    fn estimate(&self, belief: &Belief<f64, N, L>, sd_scale: f64) -> Estimate<f64> {
-        let mut estimate = Estimate::new(&self.model, belief, &self.interval.limits);
-        estimate.strain.variance *= sd_scale * sd_scale;
-        estimate
+    fn output(&self, state: &E::State, seen: Seen, sd_scale: f64) -> Output {
+        Output {
+            estimate: Estimate::new(&self.model, state, &self.interval.limits, sd_scale),
+            nis: seen.innovation.map(|innovation| innovation.nis()),
+            verdict: seen.verdict,
+            phases: state.phases(),
+        }
+    }
+
+    /// Goes through rows forward from `start` and hands each step, and what was seen at its end, to `visit`.
+    fn replay(
+        &mut self,
+        start: &Moment<E::State>,
+        rows: impl Iterator<Item = (usize, (f64, Option<Reading<f64>>))>,
+        mut visit: impl FnMut(&Self, PastStep<E::State, E::Prepared, f64>),
+    ) -> Result<(), (usize, StepError)> {
+        self.now = start.clone();
+        for (row, (time_s, reading)) in rows {
+            let step = self.advance(time_s, reading).map_err(|error| (row, error))?;
+            visit(self, step);
+        }
+        Ok(())
+    }
+
+    /// Hands out the first `count` of the rows that wait, given everything up to now.
+    fn emit(&mut self, count: usize, out: &mut dyn FnMut(Output)) -> Result<(), StepError> {
+        if count == 0 {
+            return Ok(());
+        }
+        let scale = self.interval.filtered_scale.max(self.interval.smoothed_scale);
+        let mut earlier = Vec::new();
+        let waiting = self.pending.len();
+        let mut row = waiting - 1;
+        let steps = self.pending.iter().rev().filter_map(|pending| pending.onward.as_ref());
+        smooth_back_through(&self.estimator, &self.now.state, steps, |state| {
+            row -= 1;
+            if row < count {
+                earlier.push(self.output(state, self.pending[row].seen, scale));
+            }
+            row > 0
+        })?;
+        for output in earlier.into_iter().rev() {
+            out(output);
+        }
+        if count == waiting {
+            out(self.output(&self.now.state, self.now.seen, scale));
+        }
+        self.pending.drain(..count);
+        Ok(())
     }
 }
 
-impl<E: Estimator<M, B, N, L>, const M: usize, const B: usize, const N: usize, const L: usize> Filter
+impl<E: Estimator<f64, N, L>, const M: usize, const B: usize, const N: usize, const L: usize> Filter
     for Running<E, M, B, N, L>
 {
+    fn guard(&mut self, guard: Guard<f64>) {
+        self.guard = guard;
+    }
+
     fn step(&mut self, time_s: f64, reading: Option<Reading<f64>>) -> Result<(), StepError> {
         self.advance(time_s, reading).map(|_| ())
     }
 
     fn strain(&self) -> Gaussian<f64> {
-        let belief = E::belief(&self.state);
+        let belief: Belief<f64, N, L> = self.now.state.moments();
         let variance = belief.covariance[(0, 0)] * self.interval.filtered_scale.powi(2);
         Gaussian { mean: belief.mean[0], variance }.clamped(&self.interval.limits)
     }
 
     fn output(&self) -> Output {
-        let estimate = self.estimate(&E::belief(&self.state), self.interval.filtered_scale);
-        Output { estimate, nis: self.nis, phases: E::phases(&self.state) }
+        self.output(&self.now.state, self.now.seen, self.interval.filtered_scale)
+    }
+
+    fn step_lagged(
+        &mut self,
+        time_s: f64,
+        reading: Option<Reading<f64>>,
+        lag_s: f64,
+        out: &mut dyn FnMut(Output),
+    ) -> Result<(), StepError> {
+        // Rows that fall due before this reading was taken do not get to see it.
+        let overdue = self.pending.partition_point(|row| row.time_s + lag_s < time_s);
+        self.emit(overdue, out)?;
+        let step = self.advance(time_s, reading)?;
+        if let Some(before) = self.pending.back_mut() {
+            before.onward = Some(step);
+        }
+        self.pending.push_back(Pending { time_s, seen: self.now.seen, onward: None });
+        let due = self.pending.partition_point(|row| row.time_s + lag_s <= time_s);
+        self.emit(due, out)
+    }
+
+    fn flush_lagged(&mut self, out: &mut dyn FnMut(Output)) -> Result<(), StepError> {
+        self.emit(self.pending.len(), out)
     }
 
     fn smooth(
@@ -183,15 +197,33 @@ impl<E: Estimator<M, B, N, L>, const M: usize, const B: usize, const N: usize, c
         time_s: &[f64],
         readings: &[Option<Reading<f64>>],
     ) -> Result<Option<Vec<Output>>, (usize, StepError)> {
-        let mut kept = Vec::with_capacity(time_s.len());
-        let mut nis = Vec::with_capacity(time_s.len());
-        for (row, (&time_s, &reading)) in time_s.iter().zip(readings).enumerate() {
-            kept.push(self.advance(time_s, reading).map_err(|error| (row, error))?);
-            nis.push(self.nis);
+        let rows = || time_s.iter().copied().zip(readings.iter().copied()).enumerate();
+        let mut checkpoints = vec![self.now.clone()];
+        let mut seen = Vec::with_capacity(time_s.len());
+        self.replay(&self.now.clone(), rows(), |running, _| {
+            seen.push(running.now.seen);
+            if seen.len() % SMOOTHED_AT_ONCE == 0 {
+                checkpoints.push(running.now.clone());
+            }
+        })?;
+        let end = self.now.clone();
+        let mut smoothed = end.state.clone();
+        let mut outputs = Vec::with_capacity(time_s.len());
+        for (chunk, start) in checkpoints.iter().enumerate().rev() {
+            let first = chunk * SMOOTHED_AT_ONCE;
+            let mut steps = Vec::new();
+            let of_chunk = rows().skip(first).take(SMOOTHED_AT_ONCE);
+            self.replay(start, of_chunk, |_, step| steps.push(step))?;
+            for (k, step) in steps.iter().enumerate().rev() {
+                let row = first + k;
+                outputs.push(self.output(&smoothed, seen[row], self.interval.smoothed_scale));
+                let back = self.estimator.smooth_back(&step.from, &step.prepared, step.reading, &smoothed);
+                let Some(earlier) = back.map_err(|error| (row, error))? else { return Ok(None) };
+                smoothed = earlier;
+            }
         }
-        let Some(smoothed) = E::smoothed(&kept) else { return Ok(None) };
-        let output =
-            |(belief, nis)| Output { estimate: self.estimate(belief, self.interval.smoothed_scale), nis, phases: None };
-        Ok(Some(smoothed.iter().zip(nis).map(output).collect()))
+        self.now = end;
+        outputs.reverse();
+        Ok(Some(outputs))
     }
 }

@@ -135,9 +135,14 @@ fn calibration_makes_a_filter_that_beats_the_static_inverse_and_knows_how_far() 
         filter.step(bench.time_s[k], Some(Reading::from(reading))).unwrap();
         if k >= half {
             let strain = filter.strain();
-            filtered.push(ScoredRow { truth: bench.strain[k], strain: strain.mean, sd: Some(strain.sd()) });
+            filtered.push(ScoredRow {
+                time_s: bench.time_s[k],
+                truth: bench.strain[k],
+                strain: strain.mean,
+                sd: Some(strain.sd()),
+            });
             let strain = params.static_cubic.strain(bench.reading[k]);
-            cubic.push(ScoredRow { truth: bench.strain[k], strain, sd: None });
+            cubic.push(ScoredRow { time_s: bench.time_s[k], truth: bench.strain[k], strain, sd: None });
         }
     }
     let (filtered, cubic) = (Scores::new(&filtered).unwrap(), Scores::new(&cubic).unwrap());
@@ -225,7 +230,7 @@ fn a_static_cubic_is_a_cubic() {
 
 #[test]
 fn scores_are_what_their_names_say() {
-    let row = |truth: f64, strain: f64| ScoredRow { truth, strain, sd: Some(0.1) };
+    let row = |truth: f64, strain: f64| ScoredRow { time_s: 0.0, truth, strain, sd: Some(0.1) };
     // Errors of 0, 0.1, -0.15 and 0.3 with a deviation of 0.1: 50 % intervals reach 0.067, 90 % 0.164, 95 % 0.196.
     let rows = [row(0.0, 0.0), row(1.0, 1.1), row(2.0, 1.85), row(2.0, 2.3), row(f64::NAN, 5.0)];
     let scores = Scores::new(&rows).unwrap();
@@ -240,5 +245,7 @@ fn scores_are_what_their_names_say() {
     let expected = -0.5 * (squares / variance + (TAU * variance).ln());
     assert!((scores.log_score.unwrap() - expected).abs() < 1e-12);
     assert!(Scores::new(&[]).is_none());
-    assert!(Scores::new(&[ScoredRow { truth: 1.0, strain: 1.0, sd: None }]).unwrap().coverage_95.is_none());
+    assert!(
+        Scores::new(&[ScoredRow { time_s: 0.0, truth: 1.0, strain: 1.0, sd: None }]).unwrap().coverage_95.is_none()
+    );
 }

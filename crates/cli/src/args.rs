@@ -5,6 +5,7 @@ use clap::{Args as ClapArgs, Parser, Subcommand, ValueEnum};
 use ohmstrain_bench_data::simulate::{Material, Protocol};
 use ohmstrain_bench_data::{FrontEndSpec, JointSpec, Metadata};
 use ohmstrain_calib::{EstimatorKind, GaugeFamily};
+use ohmstrain_ekf::Influence;
 
 /// From the resistance of a soft strain sensor to strain, with an honest error bar.
 #[derive(Debug, Parser)]
@@ -153,6 +154,12 @@ pub struct EstimateArgs {
     /// the first N readings
     #[arg(long, value_name = "OHM|first:N")]
     pub rest_resistance: Option<RestResistance>,
+    /// Turn down readings whose normalised innovation squared (column nis) is above X, ten in a row at most
+    #[arg(long, value_name = "X", value_parser = positive)]
+    pub gate: Option<f64>,
+    /// Bound the influence of surprising readings: huber:K (in standard deviations) or student-t:DOF
+    #[arg(long, value_name = "huber:K|student-t:DOF")]
+    pub influence: Option<BoundedInfluence>,
     /// Columns to write, separated by commas; all by default
     #[arg(long, value_delimiter = ',')]
     pub columns: Vec<String>,
@@ -167,6 +174,9 @@ pub struct FilterArgs {
     /// Recording, or - for stdin
     #[arg(default_value = "-")]
     pub trace_file: PathBuf,
+    /// Estimate every row from the readings up to S seconds after it; rows come out that much later
+    #[arg(long, value_name = "S", value_parser = positive)]
+    pub lag_s: Option<f64>,
     /// How to estimate
     #[command(flatten)]
     pub estimate: EstimateArgs,
@@ -305,6 +315,25 @@ impl FromStr for Estimator {
             .find(|kind| kind.name() == text)
             .map(Self)
             .ok_or_else(|| format!("expected auto or {}", names.join(", ")))
+    }
+}
+
+/// How the influence of a surprising reading is bounded.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BoundedInfluence(pub Influence<f64>);
+
+impl FromStr for BoundedInfluence {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let expected = || "expected huber:K or student-t:DOF with a positive number".to_string();
+        let (kind, number) = text.split_once(':').ok_or_else(expected)?;
+        let number = positive(number).map_err(|_| expected())?;
+        match kind {
+            "huber" => Ok(Self(Influence::Huber { threshold: number })),
+            "student-t" => Ok(Self(Influence::StudentT { degrees_of_freedom: number })),
+            _ => Err(expected()),
+        }
     }
 }
 

@@ -1,6 +1,6 @@
 use ohmstrain_bench_data::{Reading as TraceReading, Trace};
-use ohmstrain_calib::{EstimatorKind, Output, SensorParams, Start, build_filter};
-use ohmstrain_ekf::{Reading, StepError};
+use ohmstrain_calib::{EstimatorKind, Filter, Output, SensorParams, Start, build_filter};
+use ohmstrain_ekf::{Guard, Reading, StepError};
 
 use crate::args::{EstimateArgs, RestResistance};
 use crate::error::CliError;
@@ -27,9 +27,28 @@ pub fn relative_trace(trace: &Trace, rest_reading: f64) -> Vec<Option<Reading<f6
     trace.readings.values.iter().enumerate().map(|(k, &value)| relative(value, sd(k), rest_reading)).collect()
 }
 
-/// Where the filter starts.
-pub fn start(args: &EstimateArgs) -> Start {
-    args.initial_strain.map_or(Start::Unknown, Start::Strain)
+/// How many readings in a row a gate turns down before it is the state that is doubted.
+const PATIENCE: u32 = 10;
+
+/// What protects the filter from outliers.
+pub fn guard(args: &EstimateArgs) -> Guard<f64> {
+    let mut guard = Guard::none();
+    if let Some(nis) = args.gate {
+        guard = guard.with_gate(nis, PATIENCE);
+    }
+    if let Some(influence) = args.influence {
+        guard = guard.with_influence(influence.0);
+    }
+    guard
+}
+
+/// The estimator that is asked for, or the sensor file's choice, as the flags want it.
+pub fn filter(params: &SensorParams, args: &EstimateArgs) -> Result<Box<dyn Filter>, CliError> {
+    let kind = args.estimator.chosen().map(|estimator| estimator.0);
+    let start = args.initial_strain.map_or(Start::Unknown, Start::Strain);
+    let mut filter = build_filter(params, kind, start).map_err(|error| CliError::Input(error.to_string()))?;
+    filter.guard(guard(args));
+    Ok(filter)
 }
 
 /// R₀ for a recording whose first readings are `first`.
@@ -70,32 +89,31 @@ pub fn estimate(
 ) -> Result<Estimated, CliError> {
     let trace = &recording.trace;
     let readings = relative_trace(trace, params.rest_reading);
-    let mut filter = build_filter(params, kind, Start::Unknown).map_err(|error| CliError::Input(error.to_string()))?;
+    let build = || build_filter(params, kind, Start::Unknown).map_err(|error| CliError::Input(error.to_string()));
+    let mut filter = build()?;
     let mut filtered = Vec::with_capacity(trace.time_s.len());
     for (k, (&time_s, &reading)) in trace.time_s.iter().zip(&readings).enumerate() {
         filter.step(time_s, reading).map_err(|error| step_error(&recording.name, k, error))?;
         filtered.push(filter.output());
     }
-    let smoothed = smooth(recording, params, kind, Start::Unknown, &readings)?;
+    let smoothed = smooth(recording, build()?, &readings)?;
     Ok(Estimated { filtered, smoothed })
 }
 
-/// Smooths a recording with the estimator that is asked for, or with the extended Kalman filter if that one has no
-/// smoother.
+/// Smooths a recording.
 pub fn smooth(
     recording: &Recording,
-    params: &SensorParams,
-    kind: Option<EstimatorKind>,
-    start: Start,
+    mut filter: Box<dyn Filter>,
     readings: &[Option<Reading<f64>>],
 ) -> Result<Vec<Output>, CliError> {
-    let wanted = kind.unwrap_or(params.default_estimator);
-    let kind = if wanted.has_phases() { EstimatorKind::Ekf } else { wanted };
-    let smoothed = build_filter(params, Some(kind), start)
-        .map_err(|error| CliError::Input(error.to_string()))?
-        .smooth(&recording.trace.time_s, readings)
-        .map_err(|(k, error)| step_error(&recording.name, k, error))?;
-    smoothed.ok_or_else(|| CliError::Other(format!("`{}` has no smoother", kind.name())))
+    let smoothed =
+        filter.smooth(&recording.trace.time_s, readings).map_err(|(k, error)| step_error(&recording.name, k, error))?;
+    smoothed.ok_or_else(|| CliError::Arguments("--estimator: this one has no smoother".into()))
+}
+
+/// A filter's refusal as an error about a line of the input.
+pub fn step_error_at(file: &str, line: u64) -> impl Fn(StepError) -> CliError {
+    move |error| CliError::Input(format!("{file}:{line}: {error}"))
 }
 
 /// A filter's refusal as an error about the input.

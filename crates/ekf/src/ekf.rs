@@ -1,7 +1,8 @@
 use nalgebra::SVector;
 use ohmstrain_model::{Observation, Scalar, Symmetric, Transition};
 
-use crate::{Belief, Channel, Dynamics, Reading, StepError};
+use crate::smoother::rts_step;
+use crate::{Advanced, Belief, Channel, Dynamics, Estimator, Gaussian, Innovation, Reading, StepError};
 
 /// Extended Kalman filter: one Gaussian, linearised at its mean.
 ///
@@ -166,8 +167,58 @@ impl<M> Ekf<M> {
     }
 }
 
+impl<T, M, const N: usize, const L: usize> Estimator<T, N, L> for Ekf<M>
+where
+    T: Scalar,
+    M: Dynamics<T, N, L> + Channel<T, N, L>,
+{
+    type State = Belief<T, N, L>;
+    type Prepared = M::Prepared;
+
+    fn prepare(&self, dt_s: T) -> M::Prepared {
+        self.model.prepare(dt_s)
+    }
+
+    fn advance(
+        &self,
+        state: &Belief<T, N, L>,
+        prepared: &M::Prepared,
+        reading: Option<Reading<T>>,
+    ) -> Result<Advanced<Belief<T, N, L>, T>, StepError> {
+        let step = self.step_prepared(state, prepared, reading)?;
+        let innovation = step.update.map(|update| Innovation {
+            value: update.innovation,
+            variance: update.innovation_variance,
+            log_likelihood: update.log_likelihood,
+        });
+        Ok(Advanced { state: step.posterior, innovation })
+    }
+
+    fn smooth_back(
+        &self,
+        filtered: &Belief<T, N, L>,
+        prepared: &M::Prepared,
+        _: Option<Reading<T>>,
+        next: &Belief<T, N, L>,
+    ) -> Result<Option<Belief<T, N, L>>, StepError> {
+        let (transition, prior) = self.predict(filtered, prepared);
+        Ok(Some(rts_step(filtered, &transition, &prior, next)))
+    }
+}
+
+/// Kalman's update with the knowledge that component `index` of the state is `known`.
+pub(crate) fn pinned<T: Scalar, const N: usize, const L: usize>(
+    belief: &Belief<T, N, L>,
+    index: usize,
+    known: &Gaussian<T>,
+) -> Result<(Belief<T, N, L>, Update<T, N>), StepError> {
+    let gradient = SVector::<T, N>::from_fn(|i, _| if i == index { T::one() } else { T::zero() });
+    let observation = Observation { value: gradient.dot(&belief.mean), gradient, variance: known.variance };
+    update(belief, observation, Reading::from(known.mean))
+}
+
 /// A step of zero seconds.
-fn stand_still<T: Scalar, const N: usize, const L: usize>(belief: &Belief<T, N, L>) -> Transition<T, N, L> {
+pub(crate) fn stand_still<T: Scalar, const N: usize, const L: usize>(belief: &Belief<T, N, L>) -> Transition<T, N, L> {
     Transition { mean: belief.mean, jacobian: nalgebra::SMatrix::identity(), noise: Symmetric::zeros() }
 }
 

@@ -1,22 +1,24 @@
 use ohmstrain_model::Phase;
 
 use crate::gaussian::Real;
+use crate::lineage::{Lineage, Recorder};
 use crate::mixture::Mixture;
-use crate::mixture_step::{Candidates, Evidence, MixtureStep};
+use crate::mixture_step::{Candidates, Evidence, MixtureStep, Origin, mixture_estimator, smooth_step};
+use crate::switching::enter;
 use crate::{Dwell, Phased, Reading, StepError};
 
-/// The best phase histories, each with a Kalman filter of its own: for protocols of ramps and long holds.
+/// The best `K` phase histories, each with a Kalman filter of its own: for protocols of ramps and long holds.
 ///
 /// Unlike [`Imm`](crate::Imm) it does not mix histories before a step; it keeps those that explain the readings and
 /// merges the ones that have become alike.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Hypotheses<T, M> {
+pub struct Hypotheses<T, M, const K: usize> {
     model: M,
     dwell: Dwell<T>,
     evidence: Evidence<T>,
 }
 
-impl<T: Real, M> Hypotheses<T, M> {
+impl<T: Real, M, const K: usize> Hypotheses<T, M, K> {
     /// - `dwell`: how long phases last and what follows them.
     /// - `evidence`: what weighs the hypotheses.
     pub const fn new(model: M, dwell: Dwell<T>, evidence: Evidence<T>) -> Self {
@@ -32,7 +34,7 @@ impl<T: Real, M> Hypotheses<T, M> {
     ///
     /// # Errors
     /// See [`StepError`]; the mixture passed in is untouched.
-    pub fn step_prepared<const N: usize, const L: usize, const K: usize>(
+    pub fn step_prepared<const N: usize, const L: usize>(
         &self,
         mixture: &Mixture<T, N, L, K>,
         prepared: &M::Prepared,
@@ -42,16 +44,33 @@ impl<T: Real, M> Hypotheses<T, M> {
     where
         M: Phased<T, N, L>,
     {
-        let chain = self.dwell.probabilities(dt_s);
-        let mut candidates = Candidates::new(&self.model, &self.evidence, reading);
-        for parent in mixture.components() {
+        self.step_recorded(mixture, &(*prepared, dt_s), reading, &mut ())
+    }
+
+    fn step_recorded<R: Recorder<T, N, L>, const N: usize, const L: usize>(
+        &self,
+        mixture: &Mixture<T, N, L, K>,
+        (prepared, dt_s): &(M::Prepared, T),
+        reading: Option<Reading<T>>,
+        recorder: &mut R,
+    ) -> Result<MixtureStep<T, N, L, K>, StepError>
+    where
+        M: Phased<T, N, L>,
+    {
+        let chain = self.dwell.probabilities(*dt_s);
+        let mut candidates = Candidates::new(&self.model, &self.evidence, reading, recorder);
+        for parent in mixture.components().iter().enumerate() {
             for phase in Phase::ALL {
-                let begins = phase != Phase::Hold && parent.phase != phase;
-                let from = if begins { self.model.enter(&parent.belief, phase) } else { parent.belief };
-                let probability = chain[parent.phase.index()][phase.index()];
-                candidates.add(parent, &from, prepared, phase, probability, |prior| (prior, T::one()))?;
+                let (from, begins) = &enter(&self.model, parent.1, phase);
+                let probability = chain[parent.1.phase.index()][phase.index()];
+                let origin = Origin { parent, from, begins: *begins, phase, probability };
+                candidates.add(&origin, prepared, |prior| (*prior, T::one()))?;
             }
         }
         candidates.finish()
     }
+
+    smooth_step!();
 }
+
+mixture_estimator!(Hypotheses<T, M, K>, K);

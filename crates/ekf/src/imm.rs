@@ -1,8 +1,11 @@
 use ohmstrain_model::Phase;
 
+use crate::ekf::stand_still;
 use crate::gaussian::Real;
+use crate::lineage::{Birth, Lineage, Recorder};
 use crate::mixture::{Component, Mixture};
-use crate::mixture_step::{Candidates, Evidence, MixtureStep};
+use crate::mixture_step::{Candidates, Evidence, MixtureStep, Origin, mixture_estimator};
+use crate::switching::enter;
 use crate::{Dwell, Phased, Reading, StepError};
 
 /// Interacting multiple models: one Gaussian per phase (extend, hold, retract), mixed before every step by the
@@ -42,14 +45,75 @@ impl<T: Real, M> Imm<T, M> {
     where
         M: Phased<T, N, L>,
     {
-        let chain = self.dwell.probabilities(dt_s);
-        let mut candidates = Candidates::new(&self.model, &self.evidence, reading);
-        for phase in Phase::ALL {
-            if let Some(mixed) = self.mix(mixture, &chain, phase) {
-                candidates.add(&mixed, &mixed.belief, prepared, phase, T::one(), |prior| (prior, T::one()))?;
-            }
+        self.step_recorded(mixture, &(*prepared, dt_s), reading, &mut ())
+    }
+
+    fn step_recorded<R: Recorder<T, N, L>, const N: usize, const L: usize>(
+        &self,
+        mixture: &Mixture<T, N, L, 3>,
+        (prepared, dt_s): &(M::Prepared, T),
+        reading: Option<Reading<T>>,
+        recorder: &mut R,
+    ) -> Result<MixtureStep<T, N, L, 3>, StepError>
+    where
+        M: Phased<T, N, L>,
+    {
+        let chain = self.dwell.probabilities(*dt_s);
+        let mut candidates = Candidates::new(&self.model, &self.evidence, reading, recorder);
+        for parent in self.mix_all(mixture, &chain).components().iter().enumerate() {
+            let (from, phase) = (&parent.1.belief, parent.1.phase);
+            let origin = Origin { parent, from, begins: false, phase, probability: T::one() };
+            candidates.add(&origin, prepared, |prior| (*prior, T::one()))?;
         }
         candidates.finish()
+    }
+
+    /// One step backwards: along the three filters to the mixed beliefs they started from, then through the mixing.
+    fn smooth_step<const N: usize, const L: usize>(
+        &self,
+        filtered: &Mixture<T, N, L, 3>,
+        prepared: &(M::Prepared, T),
+        reading: Option<Reading<T>>,
+        next: &Mixture<T, N, L, 3>,
+    ) -> Result<Mixture<T, N, L, 3>, StepError>
+    where
+        M: Phased<T, N, L>,
+    {
+        let chain = self.dwell.probabilities(prepared.1);
+        let mixed = self.mix_all(filtered, &chain);
+        let mut lineage = Lineage::new(&self.model);
+        let step = self.step_recorded(filtered, prepared, reading, &mut lineage)?;
+        let smoothed = lineage.smooth(&mixed, &step.posterior, next);
+        let mut mixing = Lineage::new(&self.model);
+        for (heir, phase) in mixed.components().iter().map(|component| component.phase).enumerate() {
+            for (parent, component) in filtered.components().iter().enumerate() {
+                let (entered, begins) = &enter(&self.model, component, phase);
+                let transition = &stand_still(entered);
+                let log_weight = comes_from(&chain, component, phase).ln();
+                let (from, predicted, posterior, begins) = (entered, entered, entered, *begins);
+                let birth = Birth { parent, phase, from, begins, transition, predicted, posterior, log_weight };
+                mixing.born(&birth, heir);
+            }
+        }
+        Ok(mixing.smooth(filtered, &mixed, &smoothed))
+    }
+
+    /// What is known of the state at the beginning of a step, for every phase that the step may have.
+    fn mix_all<const N: usize, const L: usize>(
+        &self,
+        mixture: &Mixture<T, N, L, 3>,
+        chain: &[[T; 3]; 3],
+    ) -> Mixture<T, N, L, 3>
+    where
+        M: Phased<T, N, L>,
+    {
+        let mut mixed = Mixture::empty();
+        for phase in Phase::ALL {
+            if let Some(component) = self.mix(mixture, chain, phase) {
+                mixed.push(component);
+            }
+        }
+        mixed
     }
 
     /// What is known of the state if `phase` begins or goes on now.
@@ -62,20 +126,29 @@ impl<T: Real, M> Imm<T, M> {
     where
         M: Phased<T, N, L>,
     {
-        let comes_from = |from: &Component<T, N, L>| chain[from.phase.index()][phase.index()] * from.log_weight.exp();
-        let total = mixture.components().iter().fold(T::zero(), |sum, from| sum + comes_from(from));
+        let total = mixture.components().iter().fold(T::zero(), |sum, from| sum + comes_from(chain, from, phase));
         if !(total > T::zero()) {
             return None;
         }
         let mut entered = Mixture::<T, N, L, 3>::empty();
         let mut log_inside = T::zero();
         for from in mixture.components() {
-            let weight = comes_from(from) / total;
-            let begins = phase != Phase::Hold && from.phase != phase;
-            let belief = if begins { self.model.enter(&from.belief, phase) } else { from.belief };
+            let weight = comes_from(chain, from, phase) / total;
+            let (belief, _) = enter(&self.model, from, phase);
             entered.push(Component { log_weight: weight.ln(), belief, ..*from });
             log_inside += weight * from.log_inside;
         }
         Some(Component { log_weight: total.ln(), phase, belief: entered.moments(), log_inside })
     }
 }
+
+/// Probability that `phase` follows and that it follows this hypothesis.
+fn comes_from<T: Real, const N: usize, const L: usize>(
+    chain: &[[T; 3]; 3],
+    from: &Component<T, N, L>,
+    phase: Phase,
+) -> T {
+    chain[from.phase.index()][phase.index()] * from.log_weight.exp()
+}
+
+mixture_estimator!(Imm<T, M>, 3);

@@ -1,8 +1,10 @@
 use nalgebra::SVector;
 use ohmstrain_model::{Phase, Scalar, StrainRange, Symmetric};
 
+use crate::ekf::pinned;
 use crate::gaussian::{Gaussian, Real};
-use crate::{Belief, StepError};
+use crate::lineage::Recorder;
+use crate::{Belief, State, StepError};
 
 /// One hypothesis: a phase and what is known of the state if it is the right one.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,6 +25,16 @@ pub struct Component<T, const N: usize, const L: usize> {
 pub struct Mixture<T, const N: usize, const L: usize, const K: usize> {
     components: [Component<T, N, L>; K],
     len: usize,
+}
+
+/// Where a hypothesis went.
+pub(crate) enum Added {
+    /// Into this place, alone or merged with what was there.
+    To(usize),
+    /// Into this place, from which another one was dropped.
+    InsteadOf(usize),
+    /// It is lighter than everything there is room for.
+    Nowhere,
 }
 
 /// When two hypotheses of one phase count as one: squared distance of their strains plus that of their rates, each in
@@ -61,19 +73,27 @@ impl<T: Real, const N: usize, const L: usize, const K: usize> Mixture<T, N, L, K
         self.components.get_mut(..self.len).unwrap_or(&mut [])
     }
 
-    /// Adds a hypothesis: merged with one that says the same, in a free place, or in the place of the lightest.
-    pub(crate) fn add(&mut self, candidate: Component<T, N, L>) {
-        if let Some(like) = self.components_mut().iter_mut().find(|known| known.is_like(&candidate)) {
+    /// Adds a hypothesis: merged with one that says the same, in a free place, or in the place of the lightest, which is
+    /// dropped. Says where it went.
+    pub(crate) fn add(&mut self, candidate: Component<T, N, L>) -> Added {
+        let alike = self.components_mut().iter_mut().enumerate().find(|(_, known)| known.is_like(&candidate));
+        if let Some((place, like)) = alike {
             *like = like.merged(&candidate);
-            return;
+            return Added::To(place);
         }
         if self.len < K {
             self.push(candidate);
-            return;
+            return Added::To(self.len - 1);
         }
-        let lightest = self.components_mut().iter_mut().reduce(|a, b| if b.log_weight < a.log_weight { b } else { a });
-        if let Some(lightest) = lightest.filter(|lightest| lightest.log_weight < candidate.log_weight) {
-            *lightest = candidate;
+        let lighter = |a: (usize, T), b: (usize, T)| if b.1 < a.1 { b } else { a };
+        let weights = self.components().iter().map(|component| component.log_weight).enumerate();
+        let lightest = weights.reduce(lighter).filter(|(_, weight)| *weight < candidate.log_weight);
+        match lightest.and_then(|(place, _)| Some((place, self.components.get_mut(place)?))) {
+            None => Added::Nowhere,
+            Some((place, lightest)) => {
+                *lightest = candidate;
+                Added::InsteadOf(place)
+            }
         }
     }
 
@@ -86,18 +106,22 @@ impl<T: Real, const N: usize, const L: usize, const K: usize> Mixture<T, N, L, K
     }
 
     /// Makes the probabilities sum to one and drops what is negligible; the logarithm of the sum before.
-    pub(crate) fn normalise(&mut self) -> Result<T, StepError> {
+    pub(crate) fn normalise(&mut self, recorder: &mut impl Recorder<T, N, L>) -> Result<T, StepError> {
         let heaviest = self.components().iter().map(|c| c.log_weight).reduce(|a, b| a.max(b));
         let Some(heaviest) = heaviest.filter(|weight| weight.is_finite()) else {
             return Err(StepError::NonFiniteState);
         };
+        let counts = |component: &Component<T, N, L>| component.log_weight > heaviest - T::of(NEGLIGIBLE);
+        recorder.renumbered(|place| {
+            let (before, from_here) = self.components().split_at_checked(place)?;
+            let lighter = before.iter().filter(|component| !counts(component)).count();
+            from_here.first().is_some_and(counts).then_some(place - lighter)
+        });
         let mut kept = Self::empty();
         let mut sum = T::zero();
-        for component in self.components() {
-            if component.log_weight > heaviest - T::of(NEGLIGIBLE) {
-                sum += (component.log_weight - heaviest).exp();
-                kept.push(*component);
-            }
+        for component in self.components().iter().filter(|component| counts(component)) {
+            sum += (component.log_weight - heaviest).exp();
+            kept.push(*component);
         }
         let log_sum = heaviest + sum.ln();
         for component in kept.components_mut() {
@@ -105,6 +129,27 @@ impl<T: Real, const N: usize, const L: usize, const K: usize> Mixture<T, N, L, K
         }
         *self = kept;
         Ok(log_sum)
+    }
+
+    /// The same hypotheses with probabilities that sum to one; none is dropped, not even one without any weight.
+    pub(crate) fn with_sum_one(mut self) -> Self {
+        let total = self.components().iter().fold(T::zero(), |sum, component| sum + component.log_weight.exp());
+        for component in self.components_mut() {
+            component.log_weight -= total.ln();
+        }
+        self
+    }
+
+    /// Every hypothesis changed in the same way; what an error leaves behind is the caller's old mixture.
+    pub(crate) fn try_map(
+        &self,
+        mut change: impl FnMut(&Component<T, N, L>) -> Result<Component<T, N, L>, StepError>,
+    ) -> Result<Self, StepError> {
+        let mut changed = Self::empty();
+        for component in self.components() {
+            changed.push(change(component)?);
+        }
+        Ok(changed)
     }
 
     /// Probability of each phase, in the order of [`Phase::ALL`].
@@ -123,6 +168,39 @@ impl<T: Real, const N: usize, const L: usize, const K: usize> Mixture<T, N, L, K
     #[must_use]
     pub fn moments(&self) -> Belief<T, N, L> {
         moment_match(self.components().iter().map(|c| (c.log_weight.exp(), &c.belief)))
+    }
+}
+
+impl<T: Real, const N: usize, const L: usize, const K: usize> State<T, N, L> for Mixture<T, N, L, K> {
+    fn moments(&self) -> Belief<T, N, L> {
+        self.moments()
+    }
+
+    fn each(&self, visit: &mut dyn FnMut(T, &Belief<T, N, L>)) {
+        for component in self.components() {
+            visit(component.log_weight.exp(), &component.belief);
+        }
+    }
+
+    fn phases(&self) -> Option<[T; 3]> {
+        Some(self.phase_probabilities())
+    }
+
+    fn inflated(&self, factor: T) -> Self {
+        let mut inflated = *self;
+        for component in inflated.components_mut() {
+            component.belief = component.belief.inflated(factor);
+        }
+        inflated
+    }
+
+    fn pinned(&self, index: usize, known: &Gaussian<T>) -> Result<Self, StepError> {
+        let mut pinned = self.try_map(|component| {
+            let (belief, update) = pinned(&component.belief, index, known)?;
+            Ok(Component { belief, log_weight: component.log_weight + update.log_likelihood, ..*component })
+        })?;
+        pinned.normalise(&mut ())?;
+        Ok(pinned)
     }
 }
 

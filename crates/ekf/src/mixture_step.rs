@@ -1,8 +1,10 @@
 use ohmstrain_model::{Phase, StrainRange};
 
 use crate::ekf::update;
+use crate::estimator::Innovation;
 use crate::gaussian::Real;
-use crate::mixture::{Component, Mixture};
+use crate::lineage::{Birth, Recorder};
+use crate::mixture::{Added, Component, Mixture};
 use crate::{Belief, Phased, Reading, StepError};
 
 /// What weighs hypotheses, in every filter that keeps some.
@@ -24,76 +26,177 @@ pub struct MixtureStep<T, const N: usize, const L: usize, const K: usize> {
     pub log_likelihood: T,
     /// Squared innovation over its variance under the mixture's mean and variance; `None` if the reading was missing.
     pub nis: Option<T>,
+    /// The reading compared with the mixture's mean and variance of it; `None` if it was missing.
+    pub innovation: Option<Innovation<T>>,
 }
 
 /// Collects the children of all hypotheses: predicts, updates, weighs and merges them one by one.
-pub(crate) struct Candidates<'a, T, M, const N: usize, const L: usize, const K: usize> {
+pub(crate) struct Candidates<'a, T, M, R, const N: usize, const L: usize, const K: usize> {
     model: &'a M,
     evidence: &'a Evidence<T>,
     reading: Option<Reading<T>>,
+    recorder: R,
     children: Mixture<T, N, L, K>,
     /// Moments of the predicted reading: sum of probabilities, of values, of squares and variances.
     predicted: [T; 3],
 }
 
+/// What a child is made of.
+pub(crate) struct Origin<'a, T, const N: usize, const L: usize> {
+    /// The parent and its place.
+    pub parent: (usize, &'a Component<T, N, L>),
+    /// The belief it starts from: the parent's, with rates drawn anew if a phase begins.
+    pub from: &'a Belief<T, N, L>,
+    pub begins: bool,
+    pub phase: Phase,
+    /// Probability that the parent has this child.
+    pub probability: T,
+}
+
 /// A cut that leaves less than this of a prediction is not followed: its moments would be those of a far tail.
 const LEAST_MASS: f64 = 1e-3;
 
-impl<'a, T: Real, M: Phased<T, N, L>, const N: usize, const L: usize, const K: usize> Candidates<'a, T, M, N, L, K> {
-    pub(crate) fn new(model: &'a M, evidence: &'a Evidence<T>, reading: Option<Reading<T>>) -> Self {
-        Self { model, evidence, reading, children: Mixture::empty(), predicted: [T::zero(); 3] }
+impl<'a, T, M, R, const N: usize, const L: usize, const K: usize> Candidates<'a, T, M, R, N, L, K>
+where
+    T: Real,
+    M: Phased<T, N, L>,
+    R: Recorder<T, N, L>,
+{
+    pub(crate) fn new(model: &'a M, evidence: &'a Evidence<T>, reading: Option<Reading<T>>, recorder: R) -> Self {
+        Self { model, evidence, reading, recorder, children: Mixture::empty(), predicted: [T::zero(); 3] }
     }
 
-    /// The child of `parent` that starts at `from` and moves in `phase`; `cut` restricts its prediction and says how
-    /// much of it that leaves.
+    /// A child; `cut` restricts its prediction and says how much of it that leaves.
     pub(crate) fn add(
         &mut self,
-        parent: &Component<T, N, L>,
-        from: &Belief<T, N, L>,
+        origin: &Origin<'_, T, N, L>,
         prepared: &M::Prepared,
-        phase: Phase,
-        probability: T,
-        cut: impl FnOnce(Belief<T, N, L>) -> (Belief<T, N, L>, T),
+        cut: impl FnOnce(&Belief<T, N, L>) -> (Belief<T, N, L>, T),
     ) -> Result<(), StepError> {
-        let transition = self.model.transition(prepared, from, Some(phase));
-        let covariance = self.model.propagate(&from.covariance, &transition);
-        let (prior, mass) = cut(Belief { mean: transition.mean, covariance });
-        if !(mass > T::of(LEAST_MASS) && probability > T::zero()) {
+        let Origin { parent: (place, parent), from, begins, phase, probability } = *origin;
+        if !(probability > T::zero()) {
             return Ok(());
         }
-        let mut child = Component {
-            log_weight: parent.log_weight + (probability * mass).ln(),
-            phase,
-            belief: prior,
-            log_inside: parent.log_inside,
-        };
+        let transition = self.model.transition(prepared, from, Some(phase));
+        let covariance = self.model.propagate(&from.covariance, &transition);
+        let predicted = Belief { mean: transition.mean, covariance };
+        let (prior, mass) = cut(&predicted);
+        if !(mass > T::of(LEAST_MASS)) {
+            return Ok(());
+        }
+        let log_weight = parent.log_weight + (probability * mass).ln();
+        let mut child = Component { log_weight, phase, belief: prior, log_inside: parent.log_inside };
         if let Some(reading) = self.reading {
-            let observation = self.model.observe(&prior, Some(phase));
-            let (posterior, update) = update(&prior, observation, reading)?;
-            let weight = child.log_weight.exp();
-            let expected = update.observation.value;
-            self.predicted[0] += weight;
-            self.predicted[1] += weight * expected;
-            self.predicted[2] += weight * (update.innovation_variance + expected * expected);
-            child.belief = posterior;
-            child.log_weight += self.evidence.tempering * update.log_likelihood;
+            self.update(&mut child, reading)?;
         }
         if !child.belief.is_finite() {
             return Err(StepError::NonFiniteState);
         }
         child.weigh_limits(&self.evidence.limits);
-        self.children.add(child);
+        let birth = Birth {
+            parent: place,
+            phase,
+            from,
+            begins,
+            transition: &transition,
+            predicted: &predicted,
+            posterior: &child.belief.clone(),
+            log_weight: child.log_weight,
+        };
+        match self.children.add(child) {
+            Added::To(heir) => self.recorder.born(&birth, heir),
+            Added::InsteadOf(heir) => {
+                self.recorder.dropped(heir);
+                self.recorder.born(&birth, heir);
+            }
+            Added::Nowhere => {}
+        }
+        Ok(())
+    }
+
+    fn update(&mut self, child: &mut Component<T, N, L>, reading: Reading<T>) -> Result<(), StepError> {
+        let observation = self.model.observe(&child.belief, Some(child.phase));
+        let (posterior, update) = update(&child.belief, observation, reading)?;
+        let weight = child.log_weight.exp();
+        let expected = update.observation.value;
+        self.predicted[0] += weight;
+        self.predicted[1] += weight * expected;
+        self.predicted[2] += weight * (update.innovation_variance + expected * expected);
+        child.belief = posterior;
+        child.log_weight += self.evidence.tempering * update.log_likelihood;
         Ok(())
     }
 
     pub(crate) fn finish(mut self) -> Result<MixtureStep<T, N, L, K>, StepError> {
-        let log_likelihood = self.children.normalise()?;
+        let log_likelihood = self.children.normalise(&mut self.recorder)?;
         let [total, first, second] = self.predicted;
-        let nis = self.reading.map(|reading| {
+        let innovation = self.reading.map(|reading| {
             let mean = first / total;
-            let variance = second / total - mean * mean;
-            (reading.value - mean) * (reading.value - mean) / variance
+            Innovation { value: reading.value - mean, variance: second / total - mean * mean, log_likelihood }
         });
-        Ok(MixtureStep { posterior: self.children, log_likelihood, nis })
+        let nis = innovation.map(|innovation| innovation.nis());
+        Ok(MixtureStep { posterior: self.children, log_likelihood, nis, innovation })
     }
 }
+
+/// [`Estimator`](crate::Estimator) for a filter of hypotheses: they differ in their type and capacity only.
+macro_rules! mixture_estimator {
+    ($filter:ident<T, M $(, $k:ident)?>, $capacity:expr) => {
+        impl<T, M, $(const $k: usize,)? const N: usize, const L: usize> $crate::Estimator<T, N, L>
+            for $filter<T, M $(, $k)?>
+        where
+            T: $crate::Real,
+            M: $crate::Phased<T, N, L>,
+        {
+            type State = $crate::Mixture<T, N, L, { $capacity }>;
+            /// The model's step, and its length for the chain of phases.
+            type Prepared = (M::Prepared, T);
+
+            fn prepare(&self, dt_s: T) -> Self::Prepared {
+                (self.model.prepare(dt_s), dt_s)
+            }
+
+            fn advance(
+                &self,
+                state: &Self::State,
+                prepared: &Self::Prepared,
+                reading: Option<$crate::Reading<T>>,
+            ) -> Result<$crate::Advanced<Self::State, T>, $crate::StepError> {
+                let step = self.step_recorded(state, prepared, reading, &mut ())?;
+                Ok($crate::Advanced { state: step.posterior, innovation: step.innovation })
+            }
+
+            fn smooth_back(
+                &self,
+                filtered: &Self::State,
+                prepared: &Self::Prepared,
+                reading: Option<$crate::Reading<T>>,
+                next: &Self::State,
+            ) -> Result<Option<Self::State>, $crate::StepError> {
+                self.smooth_step(filtered, prepared, reading, next).map(Some)
+            }
+        }
+    };
+}
+pub(crate) use mixture_estimator;
+
+/// One step backwards of a filter that does not mix before a step.
+macro_rules! smooth_step {
+    () => {
+        fn smooth_step<const N: usize, const L: usize>(
+            &self,
+            filtered: &Mixture<T, N, L, K>,
+            prepared: &(M::Prepared, T),
+            reading: Option<Reading<T>>,
+            next: &Mixture<T, N, L, K>,
+        ) -> Result<Mixture<T, N, L, K>, StepError>
+        where
+            M: Phased<T, N, L>,
+        {
+            let mut lineage = Lineage::new(&self.model);
+            let step = self.step_recorded(filtered, prepared, reading, &mut lineage)?;
+            Ok(lineage.smooth(filtered, &step.posterior, next))
+        }
+    };
+}
+pub(crate) use smooth_step;

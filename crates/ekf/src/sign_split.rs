@@ -1,23 +1,24 @@
 use ohmstrain_model::{Phase, StrainRange};
 
 use crate::gaussian::Real;
-use crate::mixture::{Component, Mixture, with_rate_in};
-use crate::mixture_step::{Candidates, Evidence, MixtureStep};
-use crate::{Belief, Dwell, Phased, Reading, StepError};
+use crate::lineage::{Lineage, Recorder};
+use crate::mixture::{Mixture, with_rate_in};
+use crate::mixture_step::{Candidates, Evidence, MixtureStep, Origin, mixture_estimator, smooth_step};
+use crate::{Dwell, Phased, Reading, StepError};
 
-/// Gaussian hypotheses split by the sign of the rate.
+/// At most `K` Gaussian hypotheses split by the sign of the rate.
 ///
 /// Each predicted Gaussian is cut at rate zero. The masses of the halves are the probabilities of stretching and
 /// releasing, and each half drives the branches with its own gains. With a [`Dwell`] there is a hold phase besides,
 /// entered and left by the chain's probabilities; its moving phases turn around by crossing rate zero, not by the chain.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SignSplit<T, M> {
+pub struct SignSplit<T, M, const K: usize> {
     model: M,
     hold: Option<Dwell<T>>,
     evidence: Evidence<T>,
 }
 
-impl<T: Real, M> SignSplit<T, M> {
+impl<T: Real, M, const K: usize> SignSplit<T, M, K> {
     /// - `hold`: how long holds and movements last; `None` for a body that never rests.
     /// - `evidence`: what weighs the hypotheses.
     pub const fn new(model: M, hold: Option<Dwell<T>>, evidence: Evidence<T>) -> Self {
@@ -33,7 +34,7 @@ impl<T: Real, M> SignSplit<T, M> {
     ///
     /// # Errors
     /// See [`StepError`]; the mixture passed in is untouched.
-    pub fn step_prepared<const N: usize, const L: usize, const K: usize>(
+    pub fn step_prepared<const N: usize, const L: usize>(
         &self,
         mixture: &Mixture<T, N, L, K>,
         prepared: &M::Prepared,
@@ -43,46 +44,59 @@ impl<T: Real, M> SignSplit<T, M> {
     where
         M: Phased<T, N, L>,
     {
-        let mut candidates = Candidates::new(&self.model, &self.evidence, reading);
-        let chain = self.hold.map(|dwell| dwell.probabilities(dt_s));
-        for parent in mixture.components() {
-            let [extends, holds, retracts] = match (&chain, parent.phase) {
-                (None, _) => [T::one(), T::zero(), T::one()],
-                (Some(chain), Phase::Hold) => chain[1],
-                // Whether a moving body stretches or releases is for the cut to say.
-                (Some(chain), _) => [T::one() - chain[0][1], chain[0][1], T::one() - chain[0][1]],
-            };
-            self.spawn(parent, prepared, Phase::Extend, extends, &mut candidates)?;
-            self.spawn(parent, prepared, Phase::Retract, retracts, &mut candidates)?;
-            if holds > T::zero() {
-                candidates.add(parent, &parent.belief, prepared, Phase::Hold, holds, |prior| (prior, T::one()))?;
+        self.step_recorded(mixture, &(*prepared, dt_s), reading, &mut ())
+    }
+
+    fn step_recorded<R: Recorder<T, N, L>, const N: usize, const L: usize>(
+        &self,
+        mixture: &Mixture<T, N, L, K>,
+        (prepared, dt_s): &(M::Prepared, T),
+        reading: Option<Reading<T>>,
+        recorder: &mut R,
+    ) -> Result<MixtureStep<T, N, L, K>, StepError>
+    where
+        M: Phased<T, N, L>,
+    {
+        let mut candidates = Candidates::new(&self.model, &self.evidence, reading, recorder);
+        let chain = self.hold.map(|dwell| dwell.probabilities(*dt_s));
+        for parent in mixture.components().iter().enumerate() {
+            for (phase, probability) in Phase::ALL.into_iter().zip(follows(chain.as_ref(), parent.1.phase)) {
+                // A body without a hold phase goes on moving, whatever it was called before.
+                let rests = self.hold.is_some() && parent.1.phase == Phase::Hold && phase != Phase::Hold;
+                let from = &if rests { self.model.enter(&parent.1.belief, phase) } else { parent.1.belief };
+                let origin = Origin { parent, from, begins: rests, phase, probability };
+                candidates.add(&origin, prepared, |prior| match rates_of(phase) {
+                    None => (*prior, T::one()),
+                    // The chain has said how likely this direction is; nothing goes to the other one.
+                    Some(rates) if rests => (with_rate_in(prior, &rates).0, T::one()),
+                    Some(rates) => with_rate_in(prior, &rates),
+                })?;
             }
         }
         candidates.finish()
     }
 
-    /// One child of a hypothesis, moving in one direction.
-    fn spawn<const N: usize, const L: usize, const K: usize>(
-        &self,
-        parent: &Component<T, N, L>,
-        prepared: &M::Prepared,
-        phase: Phase,
-        probability: T,
-        candidates: &mut Candidates<'_, T, M, N, L, K>,
-    ) -> Result<(), StepError>
-    where
-        M: Phased<T, N, L>,
-    {
-        let infinite = T::one() / T::zero();
-        let rates = match phase {
-            Phase::Retract => StrainRange { lower: -infinite, upper: T::zero() },
-            _ => StrainRange { lower: T::zero(), upper: infinite },
-        };
-        let from: Belief<T, N, L> = if parent.phase == Phase::Hold && self.hold.is_some() {
-            self.model.enter(&parent.belief, phase)
-        } else {
-            parent.belief
-        };
-        candidates.add(parent, &from, prepared, phase, probability, |prior| with_rate_in(&prior, &rates))
+    smooth_step!();
+}
+
+/// Probabilities of the phases that follow `phase`, in the order of [`Phase::ALL`]. Whether a moving body stretches or
+/// releases is for the cut to say.
+fn follows<T: Real>(chain: Option<&[[T; 3]; 3]>, phase: Phase) -> [T; 3] {
+    match (chain, phase) {
+        (None, _) => [T::one(), T::zero(), T::one()],
+        (Some(chain), Phase::Hold) => chain[1],
+        (Some(chain), _) => [T::one() - chain[0][1], chain[0][1], T::one() - chain[0][1]],
     }
 }
+
+/// The rates that belong to a moving phase.
+fn rates_of<T: Real>(phase: Phase) -> Option<StrainRange<T>> {
+    let (zero, infinite) = (T::zero(), T::one() / T::zero());
+    match phase {
+        Phase::Extend => Some(StrainRange { lower: zero, upper: infinite }),
+        Phase::Hold => None,
+        Phase::Retract => Some(StrainRange { lower: -infinite, upper: zero }),
+    }
+}
+
+mixture_estimator!(SignSplit<T, M, K>, K);

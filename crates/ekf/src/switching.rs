@@ -1,13 +1,28 @@
+use core::ops::Range;
+
 use ohmstrain_model::{ParameterError, Phase, Problem, Scalar, SwitchedModel};
 
 use crate::gaussian::Gaussian;
-use crate::{Belief, Channel, Dynamics};
+use crate::{Belief, Channel, Component, Dynamics};
 
 /// A model whose dynamics depend on the phase: what a filter of phase hypotheses needs besides.
 pub trait Phased<T: Scalar, const N: usize, const L: usize>: Dynamics<T, N, L> + Channel<T, N, L> {
     /// The same belief at the moment a moving phase begins: rate (and acceleration) drawn anew from the phase's prior,
     /// independent of everything else.
     fn enter(&self, from: &Belief<T, N, L>, phase: Phase) -> Belief<T, N, L>;
+
+    /// The components of the state that [`Self::enter`] draws anew; it leaves the others as they are.
+    fn renewed(&self) -> Range<usize>;
+}
+
+/// The belief that a hypothesis goes into `phase` with, and whether a moving phase begins.
+pub(crate) fn enter<T: Scalar, M: Phased<T, N, L>, const N: usize, const L: usize>(
+    model: &M,
+    from: &Component<T, N, L>,
+    phase: Phase,
+) -> (Belief<T, N, L>, bool) {
+    let begins = phase != Phase::Hold && from.phase != phase;
+    (if begins { model.enter(&from.belief, phase) } else { from.belief }, begins)
 }
 
 /// Mean and variance of |x| for a standard normal x: √(2/π) and 1 - 2/π.
@@ -39,6 +54,10 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize, const L: usize> 
         out.mean[1] = sign * rate.mean;
         out.covariance[(1, 1)] = rate.variance;
         out
+    }
+
+    fn renewed(&self) -> Range<usize> {
+        1..M
     }
 }
 

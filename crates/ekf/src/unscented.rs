@@ -72,6 +72,10 @@ impl<T: Scalar, M: Phased<T, N, L>, const N: usize, const L: usize> Phased<T, N,
     fn enter(&self, from: &Belief<T, N, L>, phase: Phase) -> Belief<T, N, L> {
         self.model.enter(from, phase)
     }
+
+    fn renewed(&self) -> core::ops::Range<usize> {
+        self.model.renewed()
+    }
 }
 
 impl<T: Scalar, M: Channel<T, N, L>, const N: usize, const L: usize> Channel<T, N, L> for Unscented<M> {

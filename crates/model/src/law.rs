@@ -143,6 +143,17 @@ impl<T: Scalar, const B: usize> SensorLaw<T, B> {
             .fold(gauge, |sum, (branch, c)| sum + *c * (-horizon_s / branch.tau_s).exp())
     }
 
+    /// dρ/dt over v on a ramp of constant rate v: how much the reading changes per strain *along the movement*, relaxation
+    /// included: `g′(ε) + Σ (kᵢᵖ + κᵢᵖ ε) - Σ cᵢ/(τᵢ v)`. It vanishes at the ramp border ε*(v).
+    #[must_use]
+    pub fn ramp_slope(&self, strain: T, rate: T, relaxation: &[T; B], phase: Phase) -> T {
+        let (_, slope) = self.gauge_value_and_slope(strain);
+        self.branches.iter().zip(relaxation).enumerate().fold(slope, |sum, (i, (branch, c))| {
+            let (gain, _) = self.gain(i, strain, phase);
+            sum + gain - *c / (branch.tau_s * rate)
+        })
+    }
+
     /// The static border: the smallest strain of the range at which the gauge curve peaks, g′ = 0 from above. Beyond it
     /// one reading belongs to two strains.
     #[must_use]

@@ -26,8 +26,6 @@ struct RecordingScores {
     /// For the table; the JSON is about one estimator.
     #[serde(skip)]
     smoother: Scores,
-    #[serde(skip)]
-    smoother_name: &'static str,
     baselines: Baselines,
 }
 
@@ -79,8 +77,6 @@ fn score(
     Ok(RecordingScores {
         file: recording.name.clone(),
         estimator: wanted.name(),
-        // A filter of hypotheses has no smoother of its own.
-        smoother_name: if wanted.has_phases() { "smoother (ekf)" } else { "smoother" },
         filter: scoring::of_outputs(recording, &estimated.filtered, from).ok_or_else(nothing)?,
         smoother: scoring::of_outputs(recording, &estimated.smoothed, from).ok_or_else(nothing)?,
         baselines: Baselines {
@@ -93,7 +89,7 @@ fn table(evaluation: &Evaluation, quantity: &str) -> Table {
     let mut table = score_table(quantity);
     for recording in &evaluation.recordings {
         add_scores(&mut table, &recording.file, recording.estimator, &recording.filter);
-        add_scores(&mut table, "", recording.smoother_name, &recording.smoother);
+        add_scores(&mut table, "", "smoother", &recording.smoother);
         add_scores(&mut table, "", "static cubic", &recording.baselines.static_cubic);
     }
     table

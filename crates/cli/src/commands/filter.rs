@@ -1,29 +1,28 @@
+use std::collections::VecDeque;
 use std::io::{self, Read};
 
 use ohmstrain_bench_data::{Row, TraceReader};
-use ohmstrain_calib::{Filter, SensorParams, build_filter};
+use ohmstrain_calib::{Filter, Output, SensorParams};
 
 use crate::args::{FilterArgs, RestResistance};
 use crate::error::CliError;
 use crate::estimates::{EstimateRow, EstimateWriter};
 use crate::input::{self, check_unit, is_stdin};
-use crate::run::{relative_row, rest_reading, start};
+use crate::run::{filter, relative_row, rest_reading, step_error_at};
 use crate::sensor_file;
 
 /// Turns readings into strain as they arrive. Memory does not grow with the recording.
 pub fn run(args: &FilterArgs) -> Result<(), CliError> {
     let kind = args.estimate.estimator.chosen().map(|estimator| estimator.0);
     let mut params = sensor_file::read(&args.estimate.sensor, kind)?;
-    let filter =
-        build_filter(&params, kind, start(&args.estimate)).map_err(|error| CliError::Input(error.to_string()))?;
+    let filter = filter(&params, &args.estimate)?;
     let rows = input::open(&args.trace_file, &args.estimate.trace.metadata())?;
     check_unit(&input::header(&rows), rows.reading_kind(), params.reading)?;
     input::take_joint(&mut params, rows.metadata());
     let out = io::BufWriter::new(io::stdout().lock());
     let mut writer = EstimateWriter::new(out, &params, &args.estimate.columns)?;
-    let streamed =
-        Stream { params: &params, args, filter, live: is_stdin(&args.trace_file) || !args.trace_file.is_file() }
-            .run(rows, &mut writer);
+    let live = is_stdin(&args.trace_file) || !args.trace_file.is_file();
+    let streamed = Stream { params: &params, args, filter, live, waiting: VecDeque::new() }.run(rows, &mut writer);
     // What was estimated before an error is still good.
     writer.flush().and(streamed)
 }
@@ -34,6 +33,8 @@ struct Stream<'a> {
     filter: Box<dyn Filter>,
     /// Not a file but standard input or a pipe: somebody waits for each row.
     live: bool,
+    /// Rows whose estimates wait for later readings.
+    waiting: VecDeque<Row>,
 }
 
 impl Stream<'_> {
@@ -59,29 +60,62 @@ impl Stream<'_> {
             return Err(CliError::Input(format!("{file}:{line}: {none}")));
         }
         let rest_reading = rest_reading(wanted, self.params, first.iter().map(|row| row.reading.value), &file)?;
+        let mut streamed = Ok(());
         for row in first.into_iter().map(Ok).chain(rows) {
-            self.step(&row?, rest_reading, &file, writer)?;
+            streamed = row.map_err(CliError::from).and_then(|row| self.step(row, rest_reading, &file, writer));
+            if streamed.is_err() {
+                break;
+            }
         }
-        Ok(())
+        // The rows that still wait get their estimates, whatever stopped the stream.
+        let mut outputs = Vec::new();
+        let flushed = self.filter.flush_lagged(&mut |output| outputs.push(output));
+        self.write_waiting(&outputs, rest_reading, writer)?;
+        streamed.and(flushed.map_err(|error| CliError::Input(format!("{file}: {error}"))))
     }
 
     fn step<W: io::Write>(
         &mut self,
-        row: &Row,
+        row: Row,
         rest_reading: f64,
         file: &str,
         writer: &mut EstimateWriter<W>,
     ) -> Result<(), CliError> {
-        self.filter
-            .step(row.time_s, relative_row(&row.reading, rest_reading))
-            .map_err(|error| CliError::Input(format!("{file}:{}: {error}", row.line)))?;
-        writer.write(&EstimateRow {
-            time_s: row.time_s,
-            reading: row.reading.value,
-            saturated: row.reading.saturated,
-            rest_reading,
-            output: self.filter.output(),
-        })?;
+        let (time_s, reading) = (row.time_s, relative_row(&row.reading, rest_reading));
+        let refused = step_error_at(file, row.line);
+        match self.args.lag_s {
+            None => {
+                self.filter.step(time_s, reading).map_err(refused)?;
+                writer.write(&estimate_row(&row, rest_reading, self.filter.output()))?;
+            }
+            Some(lag_s) => {
+                let mut outputs = Vec::new();
+                let taken = self.filter.step_lagged(time_s, reading, lag_s, &mut |output| outputs.push(output));
+                if taken.is_ok() {
+                    self.waiting.push_back(row);
+                }
+                self.write_waiting(&outputs, rest_reading, writer)?;
+                taken.map_err(refused)?;
+            }
+        }
         if self.live { writer.flush() } else { Ok(()) }
     }
+
+    /// Writes the rows that have waited longest, with their estimates.
+    fn write_waiting<W: io::Write>(
+        &mut self,
+        outputs: &[Output],
+        rest_reading: f64,
+        writer: &mut EstimateWriter<W>,
+    ) -> Result<(), CliError> {
+        for (row, output) in self.waiting.drain(..outputs.len()).zip(outputs) {
+            writer.write(&estimate_row(&row, rest_reading, *output))?;
+        }
+        Ok(())
+    }
+}
+
+fn estimate_row(row: &Row, rest_reading: f64, output: Output) -> EstimateRow {
+    let (time_s, reading, saturated) = (row.time_s, row.reading.value, row.reading.saturated);
+    EstimateRow { time_s, reading, saturated, rest_reading, output }
 }

@@ -6,15 +6,12 @@ use crate::args::SmoothArgs;
 use crate::error::CliError;
 use crate::estimates::{EstimateRow, EstimateWriter};
 use crate::input::{self, Recording, check_unit};
-use crate::run::{relative_trace, rest_reading, smooth, start};
+use crate::run::{filter, relative_trace, rest_reading, smooth};
 use crate::sensor_file;
 
 /// Smooths a recording and writes its estimates.
 pub fn run(args: &SmoothArgs) -> Result<(), CliError> {
     let kind = args.estimate.estimator.chosen().map(|estimator| estimator.0);
-    if let Some(kind) = kind.filter(|kind| kind.has_phases()) {
-        return Err(CliError::Arguments(format!("--estimator: `{}` has no smoother, use ekf or ukf", kind.name())));
-    }
     let mut params = sensor_file::read(&args.estimate.sensor, kind)?;
     let recording = input::read(&args.trace_file, &args.estimate.trace.metadata())?;
     check_unit(&recording.header, recording.trace.readings.kind, params.reading)?;
@@ -22,7 +19,7 @@ pub fn run(args: &SmoothArgs) -> Result<(), CliError> {
     let values = recording.trace.readings.values.iter().copied();
     let rest_reading = rest_reading(args.estimate.rest_resistance, &params, values, &recording.name)?;
     let readings = relative_trace(&recording.trace, rest_reading);
-    let outputs = smooth(&recording, &params, kind, start(&args.estimate), &readings)?;
+    let outputs = smooth(&recording, filter(&params, &args.estimate)?, &readings)?;
     let out = io::BufWriter::new(io::stdout().lock());
     write_estimates(out, &recording, &params, rest_reading, &outputs, &args.estimate.columns)
 }

@@ -1,0 +1,103 @@
+use ohmstrain_model::Scalar;
+
+use crate::{Belief, Gaussian, Reading, StepError};
+
+/// What every estimator has in common: a state that a prepared step turns into the next one.
+///
+/// The estimator is configuration, the state is the caller's; an error leaves it as it was. Outlier guards
+/// ([`Guard`](crate::Guard)), windows for fixed lag and late readings ([`Window`](crate::Window)) and smoothing of whole
+/// recordings work on any of them.
+pub trait Estimator<T: Scalar, const N: usize, const L: usize> {
+    /// What is carried from step to step.
+    type State: State<T, N, L>;
+    /// What depends on the length of a step only.
+    type Prepared: Copy;
+
+    /// Prepares steps of `dt_s ≥ 0` seconds.
+    fn prepare(&self, dt_s: T) -> Self::Prepared;
+
+    /// Predicts over a prepared step, then takes the reading; without one it is a prediction.
+    ///
+    /// # Errors
+    /// See [`StepError`].
+    fn advance(
+        &self,
+        state: &Self::State,
+        prepared: &Self::Prepared,
+        reading: Option<Reading<T>>,
+    ) -> Result<Advanced<Self::State, T>, StepError>;
+
+    /// One step backwards: the state at time k given all readings, from `filtered` at k, the step that led from there to
+    /// k+1, and `next`, the state at k+1 given all readings. `None` if the estimator has no smoother.
+    ///
+    /// # Errors
+    /// See [`StepError`]; a step that went forward goes backward.
+    fn smooth_back(
+        &self,
+        filtered: &Self::State,
+        prepared: &Self::Prepared,
+        reading: Option<Reading<T>>,
+        next: &Self::State,
+    ) -> Result<Option<Self::State>, StepError>;
+}
+
+/// What an estimator carries from step to step.
+pub trait State<T: Scalar, const N: usize, const L: usize>: Clone {
+    /// The Gaussian with its mean and covariance.
+    fn moments(&self) -> Belief<T, N, L>;
+
+    /// Visits what the state is a mixture of: weights that sum to one, and Gaussians.
+    fn each(&self, visit: &mut dyn FnMut(T, &Belief<T, N, L>));
+
+    /// Probability of each phase, in the order of [`Phase::ALL`](ohmstrain_model::Phase::ALL); `None` if the estimator
+    /// has no phases.
+    fn phases(&self) -> Option<[T; 3]>;
+
+    /// The same state with less confidence: covariances times `factor`.
+    #[must_use]
+    fn inflated(&self, factor: T) -> Self;
+
+    /// Takes in that component `index` of the state is known from elsewhere, to be `known`: a reference strain, a rate
+    /// of zero, a joint on its stop. Everything that is correlated with it follows.
+    ///
+    /// # Errors
+    /// If `known` is not finite, or has no variance where the state has none.
+    fn pinned(&self, index: usize, known: &Gaussian<T>) -> Result<Self, StepError>;
+
+    /// Re-zero: the body is at rest at a known strain. Strain and rate are pinned; the baseline takes the difference to
+    /// what the reading says.
+    ///
+    /// # Errors
+    /// See [`Self::pinned`].
+    fn at_rest(&self, strain: &Gaussian<T>, rate_sd: T) -> Result<Self, StepError> {
+        self.pinned(0, strain)?.pinned(1, &Gaussian { mean: T::zero(), variance: rate_sd * rate_sd })
+    }
+}
+
+/// What one step of any estimator says.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Advanced<S, T> {
+    /// The state after the reading.
+    pub state: S,
+    /// How the reading compares with its prediction; `None` if it was missing.
+    pub innovation: Option<Innovation<T>>,
+}
+
+/// A reading compared with its prediction.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Innovation<T> {
+    /// Reading minus expected reading.
+    pub value: T,
+    /// Its variance.
+    pub variance: T,
+    /// Log density of the reading before it was seen, constant included.
+    pub log_likelihood: T,
+}
+
+impl<T: Scalar> Innovation<T> {
+    /// Normalised innovation squared: χ² with one degree of freedom if the estimator is consistent.
+    #[must_use]
+    pub fn nis(&self) -> T {
+        self.value * self.value / self.variance
+    }
+}

@@ -1,0 +1,216 @@
+//! Fixed lag, late readings, outliers and re-zeroing, on any estimator: checked against the plain filter run differently.
+
+use nalgebra::SVector;
+use ohmstrain_ekf::{
+    Belief, Dwell, Ekf, Estimator, Evidence, Gaussian, Guard, Guarded, Influence, Mixture, Reading, SignSplit, State,
+    StepError, Streak, Verdict, Window, rts_smooth_vec,
+};
+use ohmstrain_model::{Phase, StrainRange, SwitchedModel};
+use ohmstrain_tests::sensor;
+
+type Model = SwitchedModel<f64, 2, 1, 4>;
+type Kalman = Belief<f64, 4, 10>;
+const DT_S: f64 = 0.1;
+
+fn ekf() -> Ekf<Model> {
+    Ekf::new(sensor())
+}
+
+fn start() -> Kalman {
+    Belief::initial(ekf().model())
+}
+
+fn sign_split() -> SignSplit<f64, Model, 4> {
+    let evidence = Evidence { limits: StrainRange { lower: -0.05, upper: 0.4 }, tempering: 0.8 };
+    SignSplit::new(sensor(), Some(Dwell::new(2.0, 3.0, 0.5).unwrap()), evidence)
+}
+
+/// A reading every step but every seventh.
+fn reading(k: u32) -> Option<Reading<f64>> {
+    (k % 7 != 3).then(|| Reading::from(0.15 + 0.1 * (0.3 * f64::from(k)).sin()))
+}
+
+/// The lagged estimate is what smoothing the record up to now says.
+#[test]
+fn a_window_smooths_the_record_so_far() {
+    let ekf = ekf();
+    let mut window: Window<Kalman, _, f64, 16> = Window::new(start());
+    let (mut belief, mut steps) = (start(), Vec::new());
+    for k in 0..40 {
+        window.step(&ekf, DT_S, reading(k)).unwrap();
+        let step = ekf.step(&belief, DT_S, reading(k)).unwrap();
+        belief = step.posterior;
+        steps.push(step);
+        assert_eq!(window.newest(), &belief);
+        let smoothed = rts_smooth_vec(&steps);
+        for back in [0, 1, 7, 15] {
+            let lagged = window.lagged(&ekf, back).unwrap();
+            let expected = (back < steps.len()).then(|| smoothed[steps.len() - 1 - back]);
+            // The very start is one step further back than the first smoothed row.
+            let reaches = back <= 16.min(steps.len());
+            assert_eq!(lagged.is_some(), reaches, "row {k}, {back} back");
+            if let (Some(lagged), Some(expected)) = (lagged, expected) {
+                assert_eq!(lagged, expected, "row {k}, {back} back");
+            }
+        }
+    }
+    assert_eq!(window.lagged(&ekf, 17).unwrap(), None);
+}
+
+/// Steps at 0, 0.1, 0.15, 0.2 …: with the reading at 0.15 in its turn, or arriving three steps late.
+fn check_late<E: Estimator<f64, 4, 10>>(estimator: &E, start: E::State)
+where
+    E::State: PartialEq + std::fmt::Debug,
+{
+    let mut in_turn: Window<E::State, E::Prepared, f64, 8> = Window::new(start.clone());
+    let mut late = Window::<_, _, _, 8>::new(start);
+    for k in 0..20 {
+        in_turn.step(estimator, DT_S, reading(k)).unwrap();
+        late.step(estimator, DT_S, reading(k)).unwrap();
+    }
+    let between = Reading::from(0.2);
+    in_turn.step(estimator, 0.0625, Some(between)).unwrap();
+    in_turn.step(estimator, 0.0625, reading(20)).unwrap();
+    late.step(estimator, 0.125, reading(20)).unwrap();
+    for k in 21..23 {
+        in_turn.step(estimator, 0.125, reading(k)).unwrap();
+        late.step(estimator, 0.125, reading(k)).unwrap();
+    }
+    // Binary fractions: 0.3125 s before the newest reading is exactly in the middle of the long step.
+    late.insert_late(estimator, 0.3125, between).unwrap();
+    assert_eq!(late.newest(), in_turn.newest());
+    assert_eq!(late.lagged(estimator, 3).unwrap(), in_turn.lagged(estimator, 3).unwrap());
+
+    let before = late.newest().clone();
+    assert_eq!(late.insert_late(estimator, 60.0, between), Err(StepError::ReadingTooOld));
+    assert_eq!(late.insert_late(estimator, 0.2, Reading::from(f64::NAN)), Err(StepError::NonFiniteReading));
+    assert_eq!(late.step(estimator, -1.0, None), Err(StepError::NegativeTimeStep));
+    assert_eq!(late.newest(), &before);
+}
+
+#[test]
+fn a_late_reading_counts_as_if_it_had_come_in_time() {
+    check_late(&ekf(), start());
+    check_late(&sign_split(), Mixture::single(start(), Phase::Extend));
+}
+
+/// Runs a guard over readings; states and verdicts.
+fn guarded<E: Estimator<f64, 4, 10>>(
+    guard: Guard<f64>,
+    estimator: &E,
+    start: E::State,
+    readings: impl Iterator<Item = Option<f64>>,
+) -> (E::State, Vec<Verdict>) {
+    let prepared = estimator.prepare(DT_S);
+    let (mut state, mut streak, mut verdicts) = (start, Streak::default(), Vec::new());
+    for reading in readings {
+        let reading = reading.map(Reading::from);
+        let step: Guarded<E::State, f64> = guard.advance(estimator, &state, streak, &prepared, reading).unwrap();
+        (state, streak) = (step.advanced.state, step.streak);
+        verdicts.push(step.verdict);
+    }
+    (state, verdicts)
+}
+
+fn check_spike<E: Estimator<f64, 4, 10>>(estimator: &E, start: E::State)
+where
+    E::State: PartialEq + std::fmt::Debug,
+{
+    let spiked = |spike: Option<f64>| (0..30).map(move |k| if k == 20 { spike } else { Some(0.2) });
+    let gate = Guard::none().with_gate(30.0, 3);
+    let (with_spike, verdicts) = guarded(gate, estimator, start.clone(), spiked(Some(5.0)));
+    let (without, _) = guarded(Guard::none(), estimator, start.clone(), spiked(None));
+    assert_eq!(with_spike, without);
+    assert_eq!(verdicts[20], Verdict::Rejected);
+    assert_eq!(verdicts.iter().filter(|verdict| **verdict == Verdict::Accepted).count(), 29);
+}
+
+#[test]
+fn a_rejected_reading_is_a_missing_one() {
+    check_spike(&ekf(), start());
+    check_spike(&sign_split(), Mixture::single(start(), Phase::Extend));
+}
+
+/// After 3 s at one level the readings jump by far more than the state allows: a connector was moved, say. Rejected for
+/// ever without patience; with it the state follows once it is the state that is doubted.
+#[test]
+fn a_gate_cannot_lock_the_filter_out() {
+    let jump = || (0..80).map(|k| Some(if k < 30 { 0.1 } else { 3.0 }));
+    let predicted = |state: &Kalman| ekf().model().observe(&state.mean, ohmstrain_model::Direction::Known(Phase::Hold));
+    let (locked, verdicts) = guarded(Guard::none().with_gate(10.8, u32::MAX), &ekf(), start(), jump());
+    assert!(verdicts[30..].iter().all(|verdict| *verdict == Verdict::Rejected));
+    assert!((predicted(&locked).value - 3.0).abs() > 1.0);
+    let (recovered, verdicts) = guarded(Guard::none().with_gate(10.8, 5), &ekf(), start(), jump());
+    assert_eq!(verdicts[30..35], [Verdict::Rejected; 5]);
+    assert_eq!(verdicts[35], Verdict::Readmitted);
+    assert_eq!(verdicts[60..], [Verdict::Accepted; 20]);
+    assert!((predicted(&recovered).value - 3.0).abs() < 0.1);
+}
+
+/// Huber's ψ: beyond the threshold the state moves as far as at the threshold.
+#[test]
+fn huber_bounds_the_influence() {
+    let ekf = ekf();
+    let prepared = Estimator::<f64, 4, 10>::prepare(&ekf, DT_S);
+    let step = |reading: f64, influence: Influence<f64>| {
+        let guard = Guard::none().with_influence(influence);
+        guard.advance(&ekf, &start(), Streak::default(), &prepared, Some(Reading::from(reading))).unwrap()
+    };
+    let missing = Estimator::<f64, 4, 10>::advance(&ekf, &start(), &prepared, None).unwrap().state;
+    let huber = Influence::Huber { threshold: 2.0 };
+    let plain = step(1.0, Influence::Full).advanced.innovation.unwrap();
+    let sd = plain.variance.sqrt();
+    let expected = 1.0 - plain.value;
+    let moved = |reading: f64| step(reading, huber).advanced.state.mean - missing.mean;
+    let (at_threshold, far) = (moved(expected + 2.0 * sd), moved(expected + 50.0 * sd));
+    // The same division in another order.
+    assert!((at_threshold - far).amax() <= 1e-12 * at_threshold.amax());
+    let inside = step(expected + 1.9 * sd, huber);
+    assert_eq!((inside.verdict, inside.advanced.state), {
+        let full = step(expected + 1.9 * sd, Influence::Full);
+        (Verdict::Accepted, full.advanced.state)
+    });
+    // Student's t with ν = 4: weight 5 / (4 + 16) at four deviations, 5 / (4 + 2500) at fifty, and full weight at one.
+    let student = Influence::StudentT { degrees_of_freedom: 4.0 };
+    let gain = at_threshold / (2.0 * sd);
+    for (deviations, weight) in [(1.0, 1.0), (4.0, 0.25), (50.0, 5.0 / 2504.0)] {
+        let moved = step(expected + deviations * sd, student).advanced.state.mean - missing.mean;
+        assert!((moved - gain * (weight * deviations * sd)).amax() < 1e-12, "{deviations}");
+    }
+}
+
+/// Knowing a component is conditioning on it: dense formulas, written out.
+#[test]
+fn re_zeroing_conditions_on_what_is_known() {
+    let ekf = ekf();
+    let mut belief = start();
+    for k in 0..20 {
+        belief = ekf.step(&belief, DT_S, reading(k)).unwrap().posterior;
+    }
+    let known = Gaussian { mean: 0.05, variance: 1e-6 };
+    let pinned = belief.at_rest(&known, 1e-3).unwrap();
+    let (mut mean, mut covariance) = (belief.mean, belief.covariance.to_matrix());
+    for (index, value, variance) in [(0, 0.05, 1e-6), (1, 0.0, 1e-6)] {
+        let column: SVector<f64, 4> = covariance.column(index).into_owned();
+        let total = covariance[(index, index)] + variance;
+        mean += column * ((value - mean[index]) / total);
+        covariance -= column * column.transpose() / total;
+    }
+    assert!((pinned.mean - mean).amax() < 1e-13);
+    assert!((pinned.covariance.to_matrix() - covariance).amax() < 1e-13);
+    assert!((pinned.mean[0] - 0.05).abs() < 1e-3 && pinned.covariance[(0, 0)] < 1e-6);
+
+    // A mixture weighs its hypotheses by how well they agree.
+    let filter = sign_split();
+    let prepared = Estimator::<f64, 4, 10>::prepare(&filter, DT_S);
+    let mut mixture = Mixture::single(start(), Phase::Extend);
+    for k in 0..20 {
+        mixture = filter.advance(&mixture, &prepared, reading(k)).unwrap().state;
+    }
+    let pinned = State::at_rest(&mixture, &known, 1e-3).unwrap();
+    assert!((pinned.moments().mean[0] - 0.05).abs() < 2e-3);
+    let sum: f64 = pinned.phase_probabilities().iter().sum();
+    assert!((sum - 1.0).abs() < 1e-12);
+    let nowhere = Gaussian { mean: f64::NAN, variance: 1.0 };
+    assert_eq!(State::pinned(&mixture, 0, &nowhere), Err(StepError::NonFiniteReading));
+}
