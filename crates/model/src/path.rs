@@ -27,7 +27,7 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize> SwitchedModel<T,
         out
     }
 
-    /// The state after a step whose motion is given, and the direction that the step went: the sign of its last rate.
+    /// The state after a step whose motion is given, and the direction in which the body then moves: the sign of its rate.
     ///
     /// - `state`: strain and its derivatives as they are, means of branches and baseline given the path so far.
     /// - `phase`: what the body is about; it decides what the rate reverts to and whether the body moves at all.
@@ -35,7 +35,8 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize> SwitchedModel<T,
     /// - `stops`: strains at which the body is stopped for good, without a rebound: rate and acceleration outward are
     ///   lost, and the branches are driven by that share of the step's path that the body has gone.
     ///
-    /// Branches see their gain at the middle of the strains at both ends.
+    /// Branches see the gain at the middle of the strains at both ends, and of the direction in which the strain went: the
+    /// rate at the end is that of an instant, and a step that turns around there has mostly gone the other way.
     #[must_use]
     pub fn along_path(
         &self,
@@ -64,7 +65,8 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize> SwitchedModel<T,
         for i in 0..M {
             out[i] += answer(&response.motion_change[i], response.input[i]) + chance[i];
         }
-        let went = if out[1] < T::zero() { Phase::Retract } else { Phase::Extend };
+        let ends = if out[1] < T::zero() { Phase::Retract } else { Phase::Extend };
+        let went = if out[0] < state[0] { Phase::Retract } else { Phase::Extend };
         let share = Self::stop(state[0], &mut out, stops);
         let mid_strain = (state[0] + out[0]) / T::of(2.0);
         for i in 0..B {
@@ -72,7 +74,7 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize> SwitchedModel<T,
             let unit_drive = answer(&response.drive[i], response.drive_input[i]) + chance[M + i];
             out[M + i] += gain * share * unit_drive;
         }
-        (out, went)
+        (out, ends)
     }
 
     /// Stops a body that went from strain `start` to `state` where it left `stops`; the share of the way that it went.
