@@ -53,7 +53,9 @@ pub struct ParticleStep<T, const N: usize, const L: usize> {
 impl<T: Scalar, M> Particles<T, M> {
     /// - `hold`: how long holds and movements last; `None` for a body that never rests.
     /// - `evidence`: where the body is stopped, and the power of a reading's likelihood.
-    /// - `count`: number of particles, at least 1; errors fall with its square root.
+    /// - `count`: number of particles, at least 1. Chance moves the means by a share of the deviation that falls with the
+    ///   square root of `count`; with 4000 it is about a fifth while the strain is moving, so the intervals of a few
+    ///   hundred are too narrow.
     /// - `seed`: of the random numbers.
     pub const fn new(model: M, hold: Option<Dwell<T>>, evidence: Evidence<T>, count: usize, seed: u64) -> Self {
         Self { model, hold, evidence, count, seed }
@@ -132,12 +134,7 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize> Particles<T, Swi
     }
 
     /// Leads every path a step on.
-    fn predict<const L: usize>(
-        &self,
-        cloud: &mut ParticleCloud<T, N, L>,
-        prepared: &SwitchedStep<T, M, B>,
-        dt_s: T,
-    ) {
+    fn predict<const L: usize>(&self, cloud: &mut ParticleCloud<T, N, L>, prepared: &SwitchedStep<T, M, B>, dt_s: T) {
         let root = SemiDefinite::factor(&self.model.path_noise::<L>(prepared));
         let columns: [SVector<T, N>; N] = core::array::from_fn(|i| root.column(i));
         let (moved, _) = columns.split_at(M + B);
