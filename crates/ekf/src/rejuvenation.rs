@@ -20,7 +20,8 @@ const REACH: f64 = 0.1;
 ///
 /// which keeps what the group is worth: `E[x'] = m + a (E[x] - m) = m` and `Cov[x'] = a² V + h² V = V`.
 /// V is the covariance of the whole state, so branches and baseline move with the strain the way the readings have tied
-/// them to it: in a hold, their means given the strain are linear in g(ε), and V has no extent across that line.
+/// them to it: their means fall as g(ε) rises by the same gains in every particle, and V has little extent across that
+/// line.
 ///
 /// A group is the resting particles on one side of `border`, the static border. One mean for both sides would pull the
 /// two strains that a reading belongs to toward the strain between them, to which it does not.
