@@ -5,12 +5,13 @@
 //!
 //! [`Ekf`] (plain, iterated, or unscented as [`Ukf`]) keeps one Gaussian and has a smoother. [`Imm`], [`SignSplit`] and
 //! [`Hypotheses`] keep a [`Mixture`] of hypotheses about the phase, because stretching and releasing look alike.
+//! `Particles` (feature `std`) samples the motion instead: slow, and the reference for all of them.
 //!
 //! Models are anything that implements [`Dynamics`] and [`Channel`];
 //! [`SwitchedModel`](ohmstrain_model::SwitchedModel) does.
 //!
 //! # Policy
-//! - `no_std`, no heap (the `std` feature adds helpers that return a `Vec`), no unsafe code, no panic.
+//! - `no_std`, no heap (the `std` feature adds helpers that return a `Vec`, and the particle filter), no unsafe code, no panic.
 //! - A missing reading is a prediction. A step of zero seconds is an update without a prediction. A NaN or infinite
 //!   reading, a negative step and a variance that is not positive are [`StepError`]s.
 //! - Everything computed is returned: prior, innovation, its variance, log-likelihood, gain.
@@ -60,7 +61,13 @@ mod imm;
 mod lineage;
 mod mixture;
 mod mixture_step;
+#[cfg(feature = "std")]
+mod particle_cloud;
+#[cfg(feature = "std")]
+mod particles;
 mod psd;
+#[cfg(feature = "std")]
+mod rejuvenation;
 mod sign_split;
 mod smoother;
 mod smoothing;
@@ -83,6 +90,10 @@ pub use hypotheses::Hypotheses;
 pub use imm::Imm;
 pub use mixture::{Component, Mixture};
 pub use mixture_step::{Evidence, MixtureStep};
+#[cfg(feature = "std")]
+pub use particle_cloud::{Particle, ParticleCloud};
+#[cfg(feature = "std")]
+pub use particles::{ParticleStep, Particles};
 pub use sign_split::SignSplit;
 #[cfg(feature = "std")]
 pub use smoother::rts_smooth_vec;

@@ -21,6 +21,7 @@ mod joint;
 mod law;
 mod motion;
 mod noise;
+mod path;
 mod phase;
 mod relaxing_modulus;
 mod response;

@@ -61,9 +61,9 @@ pub struct SwitchedModel<T, const M: usize, const B: usize, const N: usize> {
 /// What [`SwitchedModel::transition`] needs of the step's length: computed once where the step is fixed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SwitchedStep<T, const M: usize, const B: usize> {
-    response: Response<T, M, B>,
+    pub(crate) response: Response<T, M, B>,
     branch_variance: [T; B],
-    baseline_change: T,
+    pub(crate) baseline_change: T,
     baseline_variance: T,
 }
 
@@ -79,7 +79,7 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize> SwitchedModel<T,
     const SIZES_FIT: () =
         assert!((M == 2 || M == 3) && (N == M + B || N == M + B + 1), "N must be M + B or M + B + 1, M 2 or 3");
 
-    const HAS_BASELINE: bool = N == M + B + 1;
+    pub(crate) const HAS_BASELINE: bool = N == M + B + 1;
 
     /// Joins law, motion and noise.
     ///
@@ -243,7 +243,7 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize> SwitchedModel<T,
     }
 
     /// The constant push on the highest derivative: toward the mean strain and the phase's mean rate.
-    fn push(&self, direction: Direction<T>) -> T {
+    pub(crate) fn push(&self, direction: Direction<T>) -> T {
         let toward_strain = self.motion.restoring()[0] * self.motion.rest_strain();
         let toward_rate = match direction {
             Direction::Known(Phase::Extend) => self.motion.phase_rate(),

@@ -1,0 +1,128 @@
+use std::vec::Vec;
+
+use nalgebra::SVector;
+use ohmstrain_model::{Phase, Scalar, Symmetric};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal, StandardUniform};
+
+use crate::Belief;
+
+/// One path of the motion, as far as it has come.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Particle<T, const N: usize> {
+    /// Its probability; those of a cloud sum to one.
+    pub weight: T,
+    /// The phase it is in; in motion the sign of its rate.
+    pub phase: Phase,
+    /// Strain and its derivatives as sampled; branches and baseline: their means given the path and the readings.
+    pub state: SVector<T, N>,
+}
+
+/// Weighted paths of the motion, and what is known of branches and baseline given a path.
+///
+/// It carries its random numbers along: from equal clouds equal steps follow.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ParticleCloud<T, const N: usize, const L: usize> {
+    pub(crate) particles: Vec<Particle<T, N>>,
+    /// Covariance of branches and baseline given the path: the same for every path, because neither the dynamics of
+    /// that part of the state nor its share in a reading depends on the path. Rows of the motion are zero.
+    pub(crate) covariance: Symmetric<T, N, L>,
+    pub(crate) chance: Chance,
+}
+
+impl<T: Scalar, const N: usize, const L: usize> ParticleCloud<T, N, L> {
+    /// The particles.
+    #[must_use]
+    pub fn particles(&self) -> &[Particle<T, N>] {
+        &self.particles
+    }
+
+    /// The Gaussian with the cloud's mean and covariance: spread of the particles and what each leaves open.
+    #[must_use]
+    pub fn moments(&self) -> Belief<T, N, L> {
+        let (mean, spread) = weighted_moments(self.particles.iter().map(|p| (p.weight, &p.state)));
+        Belief { mean, covariance: self.covariance.plus(&spread) }
+    }
+
+    /// Probability of each phase, in the order of [`Phase::ALL`].
+    #[must_use]
+    pub fn phase_probabilities(&self) -> [T; 3] {
+        let mut probabilities = [T::zero(); 3];
+        for particle in &self.particles {
+            if let Some(probability) = probabilities.get_mut(particle.phase.index()) {
+                *probability += particle.weight;
+            }
+        }
+        probabilities
+    }
+
+    /// Effective sample size `1 / Σ w²`: how many particles of equal weight the cloud is worth.
+    #[must_use]
+    pub fn effective_count(&self) -> T {
+        T::one() / self.particles.iter().fold(T::zero(), |sum, p| sum + p.weight * p.weight)
+    }
+
+    pub(crate) fn is_finite(&self) -> bool {
+        self.covariance.is_finite()
+            && self.particles.iter().all(|p| p.weight.is_finite() && p.state.iter().all(|x| x.is_finite()))
+    }
+
+    /// Replaces the particles by as many of equal weight. One random number places a comb of equal spacing on the
+    /// weights laid end to end: each particle is taken as often as its weight says, give or take one.
+    ///
+    /// Source: Kitagawa, *J. Comput. Graph. Stat.* 5 (1996) 1.
+    pub(crate) fn resample(&mut self) {
+        let count = T::of(self.particles.len() as f64);
+        let mut kept = Vec::with_capacity(self.particles.len());
+        let mut tooth: T = self.chance.uniform();
+        let mut reached = T::zero();
+        for particle in &self.particles {
+            reached += particle.weight * count;
+            while tooth < reached && kept.len() < self.particles.len() {
+                kept.push(Particle { weight: T::one() / count, ..*particle });
+                tooth += T::one();
+            }
+        }
+        // Rounding may have left the sum of the weights short of the last tooth.
+        while let (Some(last), true) = (kept.last().copied(), kept.len() < self.particles.len()) {
+            kept.push(last);
+        }
+        self.particles = kept;
+    }
+}
+
+/// Mean and covariance of weighted points; the weights sum to one.
+pub(crate) fn weighted_moments<'a, T: Scalar, const N: usize, const L: usize>(
+    points: impl Iterator<Item = (T, &'a SVector<T, N>)> + Clone,
+) -> (SVector<T, N>, Symmetric<T, N, L>) {
+    let mean = points.clone().fold(SVector::zeros(), |sum, (weight, point)| sum + point * weight);
+    let mut covariance = Symmetric::zeros();
+    for (weight, point) in points {
+        covariance.add_outer(&(point - mean), weight);
+    }
+    (mean, covariance)
+}
+
+/// Where random numbers come from: ChaCha with eight rounds, the same on every machine.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Chance(pub(crate) ChaCha8Rng);
+
+impl Chance {
+    /// From the standard normal distribution.
+    pub(crate) fn normal<T: Scalar>(&mut self) -> T {
+        let draw: f64 = StandardNormal.sample(&mut self.0);
+        T::of(draw)
+    }
+
+    /// From 0 to 1.
+    pub(crate) fn uniform<T: Scalar>(&mut self) -> T {
+        let draw: f64 = StandardUniform.sample(&mut self.0);
+        T::of(draw)
+    }
+
+    /// The sum of these columns, each times a standard normal number: with the columns of a square root of a
+    /// covariance, a draw that has it.
+    pub(crate) fn combine<T: Scalar, const N: usize>(&mut self, columns: &[SVector<T, N>]) -> SVector<T, N> {
+        columns.iter().fold(SVector::zeros(), |sum, column| sum + column * self.normal::<T>())
+    }
+}

@@ -1,0 +1,226 @@
+use nalgebra::SVector;
+use ohmstrain_model::{Direction, Phase, Scalar, SwitchedModel, SwitchedStep, Symmetric};
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::SeedableRng;
+
+use crate::ekf::update;
+use crate::particle_cloud::{Chance, Particle, ParticleCloud};
+use crate::psd::SemiDefinite;
+use crate::rejuvenation::rejuvenate;
+use crate::{Belief, Dwell, Evidence, Reading, StepError};
+
+/// Rao-Blackwellised particle filter: paths of motion and phase are sampled, branches and baseline are not.
+///
+/// The slow reference for a desktop. Its only approximation besides the model's own is a finite number of paths (and, in
+/// holds, the kernel that keeps them apart), so where it is no better than [`SignSplit`](crate::SignSplit), the law
+/// limits and not the estimator.
+///
+/// A particle is a strain, its derivatives and a phase. Given their path, branches and baseline are linear and Gaussian:
+/// each particle has a Kalman mean of them, and one covariance and one gain serve all particles. Paths follow the
+/// model's own dynamics, are weighted by the likelihood of the reading, and are resampled when the effective sample size
+/// falls below half their number.
+///
+/// The direction is the sign of a path's rate. With a [`Dwell`] there is a hold phase besides, entered and left by the
+/// chain's probabilities; leaving it draws the rate anew from the moving phase's prior. The limits of the [`Evidence`]
+/// are stops: a path that runs into one ends its step there, at rest. That is a property of the motion and no evidence,
+/// so a rest on a limit does not weigh the same evidence again at every step.
+///
+/// Needs the feature `std`: it allocates. Same seed and same readings, same result, on every machine.
+///
+/// Source: Doucet, de Freitas, Murphy & Russell, *Proc. UAI* (2000) 176.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Particles<T, M> {
+    model: M,
+    hold: Option<Dwell<T>>,
+    evidence: Evidence<T>,
+    count: usize,
+    seed: u64,
+}
+
+/// What one step of the particle filter computed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ParticleStep<T, const N: usize, const L: usize> {
+    /// The particles after the reading.
+    pub posterior: ParticleCloud<T, N, L>,
+    /// Log density of the reading under the cloud, tempered if the filter tempers; zero if it was missing.
+    pub log_likelihood: T,
+    /// Squared innovation over its variance under the cloud's mean and variance; `None` if the reading was missing.
+    pub nis: Option<T>,
+    /// Effective sample size after the reading, before resampling; few means that the result is a matter of chance.
+    pub effective_count: T,
+}
+
+impl<T: Scalar, M> Particles<T, M> {
+    /// - `hold`: how long holds and movements last; `None` for a body that never rests.
+    /// - `evidence`: where the body is stopped, and the power of a reading's likelihood.
+    /// - `count`: number of particles, at least 1. Chance moves the means by a share of the deviation that falls with the
+    ///   square root of `count`; with 4000 it is about a fifth while the strain is moving, so the intervals of a few
+    ///   hundred are too narrow.
+    /// - `seed`: of the random numbers.
+    pub const fn new(model: M, hold: Option<Dwell<T>>, evidence: Evidence<T>, count: usize, seed: u64) -> Self {
+        Self { model, hold, evidence, count, seed }
+    }
+
+    /// The model.
+    pub const fn model(&self) -> &M {
+        &self.model
+    }
+}
+
+impl<T: Scalar, const M: usize, const B: usize, const N: usize> Particles<T, SwitchedModel<T, M, B, N>> {
+    /// A cloud with the given moments, in `phase`: at rest in a hold (if the filter knows holds), otherwise moving, each
+    /// path in the direction of its own rate.
+    ///
+    /// Strains beyond the limits are moved to the limit.
+    #[must_use]
+    pub fn start<const L: usize>(&self, belief: &Belief<T, N, L>, phase: Phase) -> ParticleCloud<T, N, L> {
+        let mut chance = Chance(ChaCha8Rng::seed_from_u64(self.seed));
+        // With the motion first, the columns of the motion carry the regression of the rest on it, and the remaining
+        // columns are the covariance of the rest given the motion.
+        let root = SemiDefinite::factor(&belief.covariance);
+        let columns: [SVector<T, N>; N] = core::array::from_fn(|i| root.column(i));
+        let (motion, rest) = columns.split_at(M);
+        let mut covariance = Symmetric::zeros();
+        for column in rest {
+            covariance.add_outer(column, T::one());
+        }
+        let count = self.count.max(1);
+        let rests = phase == Phase::Hold && self.hold.is_some();
+        let draw = |_| {
+            let mut state = belief.mean + chance.combine(motion);
+            state[0] = self.evidence.limits.clamp(state[0]);
+            let phase = match phase {
+                Phase::Hold if rests => phase,
+                _ if state[1] < T::zero() => Phase::Retract,
+                _ => Phase::Extend,
+            };
+            Particle { weight: T::one() / T::of(count as f64), phase, state }
+        };
+        ParticleCloud { particles: (0..count).map(draw).collect(), covariance, chance }
+    }
+
+    /// Predicts over a prepared step of `dt_s ≥ 0` seconds, then takes the reading.
+    ///
+    /// # Errors
+    /// See [`StepError`]; the cloud passed in is untouched.
+    pub fn step_prepared<const L: usize>(
+        &self,
+        cloud: &ParticleCloud<T, N, L>,
+        prepared: &SwitchedStep<T, M, B>,
+        dt_s: T,
+        reading: Option<Reading<T>>,
+    ) -> Result<ParticleStep<T, N, L>, StepError> {
+        let mut next = cloud.clone();
+        self.predict(&mut next, prepared, dt_s);
+        let (log_likelihood, nis) = match reading {
+            None => (T::zero(), None),
+            Some(reading) => {
+                let (log_likelihood, nis) = self.take(&mut next, reading)?;
+                (log_likelihood, Some(nis))
+            }
+        };
+        if !next.is_finite() {
+            return Err(StepError::NonFiniteState);
+        }
+        let effective_count = next.effective_count();
+        if effective_count < T::of(0.5 * next.particles.len() as f64) {
+            next.resample();
+            rejuvenate::<T, N, L>(&mut next.particles, self.model.law().static_border(), &mut next.chance);
+            for particle in &mut next.particles {
+                particle.state[0] = self.evidence.limits.clamp(particle.state[0]);
+            }
+        }
+        Ok(ParticleStep { posterior: next, log_likelihood, nis, effective_count })
+    }
+
+    /// Leads every path a step on.
+    fn predict<const L: usize>(&self, cloud: &mut ParticleCloud<T, N, L>, prepared: &SwitchedStep<T, M, B>, dt_s: T) {
+        let root = SemiDefinite::factor(&self.model.path_noise::<L>(prepared));
+        let columns: [SVector<T, N>; N] = core::array::from_fn(|i| root.column(i));
+        let (moved, _) = columns.split_at(M + B);
+        let chain = self.hold.map(|dwell| dwell.probabilities(dt_s));
+        for particle in &mut cloud.particles {
+            if let Some(chain) = &chain {
+                self.switch(particle, chain, &mut cloud.chance);
+            }
+            let chance = match particle.phase {
+                Phase::Hold => SVector::zeros(),
+                _ => cloud.chance.combine(moved),
+            };
+            let limits = &self.evidence.limits;
+            (particle.state, particle.phase) =
+                self.model.along_path(prepared, &particle.state, particle.phase, &chance, limits);
+        }
+        let rest = self.model.transition(prepared, &SVector::zeros(), Direction::Known(Phase::Hold));
+        cloud.covariance = self.model.propagate(&cloud.covariance, &rest);
+    }
+
+    /// Begins and ends holds.
+    fn switch(&self, particle: &mut Particle<T, N>, chain: &[[T; 3]; 3], chance: &mut Chance) {
+        let draw: T = chance.uniform();
+        let [extends, stays, _] = chain[1];
+        if particle.phase != Phase::Hold {
+            if draw < chain[0][1] {
+                particle.phase = Phase::Hold;
+            }
+        } else if draw >= stays {
+            particle.phase = if draw < stays + extends { Phase::Extend } else { Phase::Retract };
+            self.set_off(particle, chance);
+        }
+    }
+
+    /// Draws rate and acceleration from the prior of the phase that begins.
+    fn set_off(&self, particle: &mut Particle<T, N>, chance: &mut Chance) {
+        let motion = self.model.motion();
+        for i in 1..M {
+            particle.state[i] = motion.stationary_variance()[i].sqrt() * chance.normal();
+        }
+        let speed = if motion.phase_rate() > T::zero() {
+            motion.phase_rate() + particle.state[1]
+        } else {
+            particle.state[1].abs()
+        };
+        particle.state[1] = if particle.phase == Phase::Retract { -speed } else { speed };
+    }
+
+    /// Updates every particle's branches and baseline, and weighs it; log-likelihood and NIS of the reading.
+    fn take<const L: usize>(
+        &self,
+        cloud: &mut ParticleCloud<T, N, L>,
+        reading: Reading<T>,
+    ) -> Result<(T, T), StepError> {
+        // Gain and covariance do not depend on the path: any state stands for all.
+        let any = Belief { mean: SVector::zeros(), covariance: cloud.covariance };
+        let gradient = self.model.observe(&any.mean, Direction::Known(Phase::Hold));
+        let (posterior, shared) = update(&any, gradient, reading)?;
+        let (half, variance) = (T::of(0.5), shared.innovation_variance);
+        let (mut first, mut second) = (T::zero(), T::zero());
+        let mut most = -T::one() / T::zero();
+        for particle in &mut cloud.particles {
+            let expected = self.model.observe(&particle.state, Direction::Known(particle.phase)).value;
+            let innovation = reading.value - expected;
+            particle.state += shared.gain * innovation;
+            first += particle.weight * innovation;
+            second += particle.weight * innovation * innovation;
+            let exponent = -half * innovation * innovation / variance;
+            particle.weight = particle.weight.ln() + self.evidence.tempering * exponent;
+            most = most.max(particle.weight);
+        }
+        if !most.is_finite() {
+            return Err(StepError::NonFiniteState);
+        }
+        let mut sum = T::zero();
+        for particle in &mut cloud.particles {
+            particle.weight = (particle.weight - most).exp();
+            sum += particle.weight;
+        }
+        for particle in &mut cloud.particles {
+            particle.weight /= sum;
+        }
+        cloud.covariance = posterior.covariance;
+        let height = -half * (variance.ln() + T::two_pi().ln());
+        let log_likelihood = most + sum.ln() + self.evidence.tempering * height;
+        let nis = first * first / (variance + (second - first * first).max(T::zero()));
+        Ok((log_likelihood, nis))
+    }
+}

@@ -1,0 +1,96 @@
+use nalgebra::SVector;
+
+use crate::{Direction, Phase, Scalar, StrainRange, SwitchedModel, SwitchedStep, Symmetric};
+
+/// The model along one path of the motion, for estimators that sample paths. Given the path, branches and baseline are
+/// linear and Gaussian, with a covariance that depends on neither strain nor phase: that of a hold.
+impl<T: Scalar, const M: usize, const B: usize, const N: usize> SwitchedModel<T, M, B, N> {
+    /// Covariance of what chance adds over a step to the motion, and through it to branches of unit gain, each in its
+    /// place of the state. The branches' own noise is not part of it.
+    #[must_use]
+    pub fn path_noise<const L: usize>(&self, step: &SwitchedStep<T, M, B>) -> Symmetric<T, N, L> {
+        let response = &step.response;
+        let mut out = Symmetric::zeros();
+        for i in 0..M {
+            for j in 0..=i {
+                out[(i, j)] = response.motion_noise[i][j];
+            }
+        }
+        for i in 0..B {
+            for j in 0..M {
+                out[(M + i, j)] = response.cross_noise[i][j];
+            }
+            for k in 0..=i {
+                out[(M + i, M + k)] = response.branch_noise[i][k];
+            }
+        }
+        out
+    }
+
+    /// The state after a step whose motion is given, and the direction in which the body then moves: the sign of its rate.
+    ///
+    /// - `state`: strain and its derivatives as they are, means of branches and baseline given the path so far.
+    /// - `phase`: what the body is about; it decides what the rate reverts to and whether the body moves at all.
+    /// - `chance`: a draw with covariance [`Self::path_noise`].
+    /// - `stops`: strains at which the body is stopped for good, without a rebound: rate and acceleration outward are
+    ///   lost, and the branches are driven by that share of the step's path that the body has gone.
+    ///
+    /// Branches see the gain at the middle of the strains at both ends, and of the direction in which the strain went: the
+    /// rate at the end is that of an instant, and a step that turns around there has mostly gone the other way.
+    #[must_use]
+    pub fn along_path(
+        &self,
+        step: &SwitchedStep<T, M, B>,
+        state: &SVector<T, N>,
+        phase: Phase,
+        chance: &SVector<T, N>,
+        stops: &StrainRange<T>,
+    ) -> (SVector<T, N>, Phase) {
+        let response = &step.response;
+        let mut out = *state;
+        for i in 0..B {
+            out[M + i] += response.decay_change[i] * state[M + i];
+        }
+        if Self::HAS_BASELINE {
+            out[N - 1] += step.baseline_change * state[N - 1];
+        }
+        if phase == Phase::Hold {
+            for i in 1..M {
+                out[i] = T::zero();
+            }
+            return (out, phase);
+        }
+        let push = self.push(Direction::Known(phase));
+        let answer = |to_state: &[T; M], to_push: T| (0..M).fold(to_push * push, |sum, j| sum + to_state[j] * state[j]);
+        for i in 0..M {
+            out[i] += answer(&response.motion_change[i], response.input[i]) + chance[i];
+        }
+        let ends = if out[1] < T::zero() { Phase::Retract } else { Phase::Extend };
+        let went = if out[0] < state[0] { Phase::Retract } else { Phase::Extend };
+        let share = Self::stop(state[0], &mut out, stops);
+        let mid_strain = (state[0] + out[0]) / T::of(2.0);
+        for i in 0..B {
+            let (gain, _) = self.law().gain(i, mid_strain, went);
+            let unit_drive = answer(&response.drive[i], response.drive_input[i]) + chance[M + i];
+            out[M + i] += gain * share * unit_drive;
+        }
+        (out, ends)
+    }
+
+    /// Stops a body that went from strain `start` to `state` where it left `stops`; the share of the way that it went.
+    fn stop(start: T, state: &mut SVector<T, N>, stops: &StrainRange<T>) -> T {
+        let free = state[0];
+        let stopped = stops.clamp(free);
+        if stopped == free {
+            return T::one();
+        }
+        state[0] = stopped;
+        for i in 1..M {
+            if state[i] * (free - stopped) > T::zero() {
+                state[i] = T::zero();
+            }
+        }
+        let way = free - start;
+        if way.is_zero() { T::zero() } else { ((stopped - start) / way).max(T::zero()).min(T::one()) }
+    }
+}
