@@ -105,7 +105,7 @@ fn check_calibration(dwell_s: Option<(f64, f64)>) {
             sum += step.nis.unwrap();
         }
         averages.push(sum / 100.0);
-        let strain = Estimate::new(&model, &cloud.moments(), &StrainRange { lower: -10.0, upper: 10.0 }).strain;
+        let strain = Estimate::new(&model, &cloud.moments(), &StrainRange { lower: -10.0, upper: 10.0 }, 1.0).strain;
         covered += u32::from((strain.mean - process.strain).abs() < 1.96 * strain.sd());
     }
     let mean = averages.iter().sum::<f64>() / 100.0;

@@ -15,16 +15,34 @@ pub enum EstimatorKind {
     SignSplit,
     /// Best phase histories.
     Hypotheses,
+    /// Particles: the reference that shows whether the law or the estimator limits.
+    Particles,
 }
 
 impl EstimatorKind {
     /// All estimators.
-    pub const ALL: [Self; 5] = [Self::Ekf, Self::Ukf, Self::Imm, Self::SignSplit, Self::Hypotheses];
+    pub const ALL: [Self; 6] = [Self::Ekf, Self::Ukf, Self::Imm, Self::SignSplit, Self::Hypotheses, Self::Particles];
 
     /// Whether it keeps hypotheses about the phase; the others are one Gaussian.
     #[must_use]
     pub const fn has_phases(self) -> bool {
-        matches!(self, Self::Imm | Self::SignSplit | Self::Hypotheses)
+        !matches!(self, Self::Ekf | Self::Ukf)
+    }
+
+    /// The estimator whose noise and motion this one runs with. Particles take those of the sign-split filter, so that
+    /// what they do better is the estimator's doing and not the parameters'.
+    #[must_use]
+    pub const fn tuned_as(self) -> Self {
+        match self {
+            Self::Particles => Self::SignSplit,
+            own => own,
+        }
+    }
+
+    /// The estimator that smooths in its place: itself, where it has a smoother.
+    #[must_use]
+    pub const fn smoother(self) -> Self {
+        self.tuned_as()
     }
 
     /// Its name on the command line and in files.
@@ -36,6 +54,7 @@ impl EstimatorKind {
             Self::Imm => "imm",
             Self::SignSplit => "sign-split",
             Self::Hypotheses => "hypotheses",
+            Self::Particles => "particles",
         }
     }
 }

@@ -1,6 +1,6 @@
 use ohmstrain_ekf::{
-    Belief, Dwell, Ekf, Estimate, Evidence, Gaussian, Guard, Hypotheses, Imm, Mixture, Reading, SignSplit, StepError,
-    Ukf, Unscented, Verdict,
+    Belief, Dwell, Ekf, Estimate, Evidence, Gaussian, Guard, Hypotheses, Imm, Mixture, Particles, Reading, SignSplit,
+    StepError, Ukf, Unscented, Verdict,
 };
 use ohmstrain_model::{Motion, Phase, SwitchedModel};
 
@@ -166,6 +166,12 @@ fn build_sized<const M: usize, const B: usize, const N: usize, const L: usize>(
             let filter = SignSplit::<_, _, HYPOTHESES>::new(model, hold, evidence);
             Box::new(Running::new(filter, start, model, interval))
         }
+        EstimatorKind::Particles => {
+            let hold = (phases.hold_time_s > 0.0 && phases.reversal < 1.0).then_some(dwell);
+            let filter = Particles::new(model, hold, evidence, PARTICLES, PARTICLE_SEED);
+            let start = filter.start(&belief, Phase::Extend);
+            Box::new(Running::new(filter, start, model, interval))
+        }
         _ => {
             let start = Mixture::single(belief, Phase::Hold);
             let filter = Hypotheses::<_, _, HISTORIES>::new(model, dwell, evidence);
@@ -178,6 +184,9 @@ fn build_sized<const M: usize, const B: usize, const N: usize, const L: usize>(
 pub(crate) const HYPOTHESES: usize = 8;
 /// Capacity of the filter of phase histories.
 pub(crate) const HISTORIES: usize = 16;
+/// Particles, and the seed of their paths: the same readings give the same estimates.
+const PARTICLES: usize = 4000;
+const PARTICLE_SEED: u64 = 1;
 
 fn initial_belief<const M: usize, const B: usize, const N: usize, const L: usize>(
     model: &SwitchedModel<f64, M, B, N>,

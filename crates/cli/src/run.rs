@@ -42,11 +42,10 @@ pub fn guard(args: &EstimateArgs) -> Guard<f64> {
     guard
 }
 
-/// The estimator that is asked for, or the sensor file's choice, as the flags want it.
-pub fn filter(params: &SensorParams, args: &EstimateArgs) -> Result<Box<dyn Filter>, CliError> {
-    let kind = args.estimator.chosen().map(|estimator| estimator.0);
+/// The filter of an estimator, as the flags want it.
+pub fn filter(params: &SensorParams, kind: EstimatorKind, args: &EstimateArgs) -> Result<Box<dyn Filter>, CliError> {
     let start = args.initial_strain.map_or(Start::Unknown, Start::Strain);
-    let mut filter = build_filter(params, kind, start).map_err(|error| CliError::Input(error.to_string()))?;
+    let mut filter = build_filter(params, Some(kind), start).map_err(|error| CliError::Input(error.to_string()))?;
     filter.guard(guard(args));
     Ok(filter)
 }
@@ -89,14 +88,15 @@ pub fn estimate(
 ) -> Result<Estimated, CliError> {
     let trace = &recording.trace;
     let readings = relative_trace(trace, params.rest_reading);
-    let build = || build_filter(params, kind, Start::Unknown).map_err(|error| CliError::Input(error.to_string()));
-    let mut filter = build()?;
+    let build = |kind| build_filter(params, Some(kind), Start::Unknown).map_err(|e| CliError::Input(e.to_string()));
+    let kind = kind.unwrap_or(params.default_estimator);
+    let mut filter = build(kind)?;
     let mut filtered = Vec::with_capacity(trace.time_s.len());
     for (k, (&time_s, &reading)) in trace.time_s.iter().zip(&readings).enumerate() {
         filter.step(time_s, reading).map_err(|error| step_error(&recording.name, k, error))?;
         filtered.push(filter.output());
     }
-    let smoothed = smooth(recording, build()?, &readings)?;
+    let smoothed = smooth(recording, build(kind.smoother())?, &readings)?;
     Ok(Estimated { filtered, smoothed })
 }
 

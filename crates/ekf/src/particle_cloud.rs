@@ -5,7 +5,8 @@ use ohmstrain_model::{Phase, Scalar, Symmetric};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal, StandardUniform};
 
-use crate::Belief;
+use crate::ekf::pinned;
+use crate::{Belief, Gaussian, State, StepError};
 
 /// One path of the motion, as far as it has come.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -88,6 +89,56 @@ impl<T: Scalar, const N: usize, const L: usize> ParticleCloud<T, N, L> {
             kept.push(last);
         }
         self.particles = kept;
+    }
+}
+
+impl<T: Scalar, const N: usize, const L: usize> State<T, N, L> for ParticleCloud<T, N, L> {
+    fn moments(&self) -> Belief<T, N, L> {
+        self.moments()
+    }
+
+    fn each(&self, visit: &mut dyn FnMut(T, &Belief<T, N, L>)) {
+        for particle in &self.particles {
+            visit(particle.weight, &Belief { mean: particle.state, covariance: self.covariance });
+        }
+    }
+
+    fn phases(&self) -> Option<[T; 3]> {
+        Some(self.phase_probabilities())
+    }
+
+    /// Moves the particles away from their mean: every deviation grows by the square root of `factor`.
+    fn inflated(&self, factor: T) -> Self {
+        let mean = self.moments().mean;
+        let mut inflated = self.clone();
+        for particle in &mut inflated.particles {
+            particle.state = mean + (particle.state - mean) * factor.sqrt();
+        }
+        inflated.covariance = inflated.covariance.scaled(factor);
+        inflated
+    }
+
+    /// Shifts every particle along the regression of the state on the known component and draws them together, so that
+    /// the cloud's moments become those of the conditioned Gaussian.
+    fn pinned(&self, index: usize, known: &Gaussian<T>) -> Result<Self, StepError> {
+        let before = self.moments();
+        let (after, _) = pinned(&before, index, known)?;
+        let variance = before.covariance[(index, index)];
+        if variance.is_zero() {
+            return Ok(self.clone());
+        }
+        let narrowed = (after.covariance[(index, index)] / variance).max(T::zero()).sqrt();
+        let regression = SVector::<T, N>::from_fn(|i, _| before.covariance[(i, index)]) / variance;
+        let mut conditioned = self.clone();
+        for particle in &mut conditioned.particles {
+            let deviation = particle.state[index] - before.mean[index];
+            let target = after.mean[index] + narrowed * deviation;
+            particle.state += regression * (target - particle.state[index]);
+        }
+        // What paths leave open shrinks along the same direction.
+        let own = conditioned.covariance[(index, index)];
+        conditioned.covariance.add_outer(&regression, own * (narrowed * narrowed - T::one()));
+        Ok(conditioned)
     }
 }
 

@@ -7,7 +7,7 @@ use crate::ekf::update;
 use crate::particle_cloud::{Chance, Particle, ParticleCloud};
 use crate::psd::SemiDefinite;
 use crate::rejuvenation::rejuvenate;
-use crate::{Belief, Dwell, Evidence, Reading, StepError};
+use crate::{Advanced, Belief, Dwell, Estimator, Evidence, Innovation, Reading, StepError};
 
 /// Rao-Blackwellised particle filter: paths of motion and phase are sampled, branches and baseline are not.
 ///
@@ -46,6 +46,8 @@ pub struct ParticleStep<T, const N: usize, const L: usize> {
     pub log_likelihood: T,
     /// Squared innovation over its variance under the cloud's mean and variance; `None` if the reading was missing.
     pub nis: Option<T>,
+    /// The reading compared with the cloud's mean and variance of it; `None` if it was missing.
+    pub innovation: Option<Innovation<T>>,
     /// Effective sample size after the reading, before resampling; few means that the result is a matter of chance.
     pub effective_count: T,
 }
@@ -112,13 +114,9 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize> Particles<T, Swi
     ) -> Result<ParticleStep<T, N, L>, StepError> {
         let mut next = cloud.clone();
         self.predict(&mut next, prepared, dt_s);
-        let (log_likelihood, nis) = match reading {
-            None => (T::zero(), None),
-            Some(reading) => {
-                let (log_likelihood, nis) = self.take(&mut next, reading)?;
-                (log_likelihood, Some(nis))
-            }
-        };
+        let innovation = reading.map(|reading| self.take(&mut next, reading)).transpose()?;
+        let log_likelihood = innovation.map_or(T::zero(), |innovation| innovation.log_likelihood);
+        let nis = innovation.map(|innovation| innovation.nis());
         if !next.is_finite() {
             return Err(StepError::NonFiniteState);
         }
@@ -130,7 +128,7 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize> Particles<T, Swi
                 particle.state[0] = self.evidence.limits.clamp(particle.state[0]);
             }
         }
-        Ok(ParticleStep { posterior: next, log_likelihood, nis, effective_count })
+        Ok(ParticleStep { posterior: next, log_likelihood, nis, innovation, effective_count })
     }
 
     /// Leads every path a step on.
@@ -183,12 +181,12 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize> Particles<T, Swi
         particle.state[1] = if particle.phase == Phase::Retract { -speed } else { speed };
     }
 
-    /// Updates every particle's branches and baseline, and weighs it; log-likelihood and NIS of the reading.
+    /// Updates every particle's branches and baseline, and weighs it.
     fn take<const L: usize>(
         &self,
         cloud: &mut ParticleCloud<T, N, L>,
         reading: Reading<T>,
-    ) -> Result<(T, T), StepError> {
+    ) -> Result<Innovation<T>, StepError> {
         // Gain and covariance do not depend on the path: any state stands for all.
         let any = Belief { mean: SVector::zeros(), covariance: cloud.covariance };
         let gradient = self.model.observe(&any.mean, Direction::Known(Phase::Hold));
@@ -220,7 +218,40 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize> Particles<T, Swi
         cloud.covariance = posterior.covariance;
         let height = -half * (variance.ln() + T::two_pi().ln());
         let log_likelihood = most + sum.ln() + self.evidence.tempering * height;
-        let nis = first * first / (variance + (second - first * first).max(T::zero()));
-        Ok((log_likelihood, nis))
+        let spread = (second - first * first).max(T::zero());
+        Ok(Innovation { value: first, variance: variance + spread, log_likelihood })
+    }
+}
+
+impl<T: Scalar, const M: usize, const B: usize, const N: usize, const L: usize> Estimator<T, N, L>
+    for Particles<T, SwitchedModel<T, M, B, N>>
+{
+    type State = ParticleCloud<T, N, L>;
+    /// The model's step, and its length for the chain of phases.
+    type Prepared = (SwitchedStep<T, M, B>, T);
+
+    fn prepare(&self, dt_s: T) -> Self::Prepared {
+        (self.model.prepare(dt_s), dt_s)
+    }
+
+    fn advance(
+        &self,
+        state: &Self::State,
+        (prepared, dt_s): &Self::Prepared,
+        reading: Option<Reading<T>>,
+    ) -> Result<Advanced<Self::State, T>, StepError> {
+        let step = self.step_prepared(state, prepared, *dt_s, reading)?;
+        Ok(Advanced { state: step.posterior, innovation: step.innovation })
+    }
+
+    /// There is none: the filters of Gaussian hypotheses smooth.
+    fn smooth_back(
+        &self,
+        _: &Self::State,
+        _: &Self::Prepared,
+        _: Option<Reading<T>>,
+        _: &Self::State,
+    ) -> Result<Option<Self::State>, StepError> {
+        Ok(None)
     }
 }

@@ -15,7 +15,7 @@ use crate::sensor_file;
 pub fn run(args: &FilterArgs) -> Result<(), CliError> {
     let kind = args.estimate.estimator.chosen().map(|estimator| estimator.0);
     let mut params = sensor_file::read(&args.estimate.sensor, kind)?;
-    let filter = filter(&params, &args.estimate)?;
+    let filter = filter(&params, kind.unwrap_or(params.default_estimator), &args.estimate)?;
     let rows = input::open(&args.trace_file, &args.estimate.trace.metadata())?;
     check_unit(&input::header(&rows), rows.reading_kind(), params.reading)?;
     input::take_joint(&mut params, rows.metadata());

@@ -11,15 +11,16 @@ use crate::sensor_file;
 
 /// Smooths a recording and writes its estimates.
 pub fn run(args: &SmoothArgs) -> Result<(), CliError> {
-    let kind = args.estimate.estimator.chosen().map(|estimator| estimator.0);
-    let mut params = sensor_file::read(&args.estimate.sensor, kind)?;
+    let wanted = args.estimate.estimator.chosen().map(|estimator| estimator.0);
+    let mut params = sensor_file::read(&args.estimate.sensor, wanted)?;
+    let kind = wanted.unwrap_or(params.default_estimator);
     let recording = input::read(&args.trace_file, &args.estimate.trace.metadata())?;
     check_unit(&recording.header, recording.trace.readings.kind, params.reading)?;
     input::take_joint(&mut params, &recording.trace.metadata);
     let values = recording.trace.readings.values.iter().copied();
     let rest_reading = rest_reading(args.estimate.rest_resistance, &params, values, &recording.name)?;
     let readings = relative_trace(&recording.trace, rest_reading);
-    let outputs = smooth(&recording, filter(&params, &args.estimate)?, &readings)?;
+    let outputs = smooth(&recording, filter(&params, kind.smoother(), &args.estimate)?, &readings)?;
     let out = io::BufWriter::new(io::stdout().lock());
     write_estimates(out, &recording, &params, rest_reading, &outputs, &args.estimate.columns)
 }
