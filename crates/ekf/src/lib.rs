@@ -5,6 +5,7 @@
 //!
 //! [`Ekf`] (plain, iterated, or unscented as [`Ukf`]) keeps one Gaussian and has a smoother. [`Imm`], [`SignSplit`] and
 //! [`Hypotheses`] keep a [`Mixture`] of hypotheses about the phase, because stretching and releasing look alike.
+//! [`DiffuseEkf`] starts where parts of the state are not known at all.
 //!
 //! Models are anything that implements [`Dynamics`] and [`Channel`];
 //! [`SwitchedModel`](ohmstrain_model::SwitchedModel) does.
@@ -49,6 +50,9 @@ extern crate std;
 mod adskalman_bridge;
 mod belief;
 mod clock;
+mod diffuse;
+mod diffuse_belief;
+mod diffuse_smoother;
 mod ekf;
 mod error;
 mod estimate;
@@ -68,6 +72,9 @@ mod unscented;
 pub use adskalman_bridge::LinearStep;
 pub use belief::Belief;
 pub use clock::seconds_between;
+pub use diffuse::{DiffuseEkf, DiffuseStep, DiffuseUpdate};
+pub use diffuse_belief::DiffuseBelief;
+pub use diffuse_smoother::{Undetermined, diffuse_rts_step, diffuse_smooth};
 pub use ekf::{Ekf, Step, Update};
 pub use error::StepError;
 pub use estimate::Estimate;
