@@ -5,7 +5,8 @@
 //!
 //! [`Ekf`] (plain, iterated, or unscented as [`Ukf`]) keeps one Gaussian and has a smoother. [`Imm`], [`SignSplit`] and
 //! [`Hypotheses`] keep a [`Mixture`] of hypotheses about the phase, because stretching and releasing look alike.
-//! [`DiffuseEkf`] starts where parts of the state are not known at all.
+//! [`DiffuseEkf`] starts where parts of the state are not known at all. [`ConsistencyTest`] judges a running filter by its
+//! innovations.
 //!
 //! Models are anything that implements [`Dynamics`] and [`Channel`];
 //! [`SwitchedModel`](ohmstrain_model::SwitchedModel) does.
@@ -49,7 +50,9 @@ extern crate std;
 #[cfg(feature = "adskalman")]
 mod adskalman_bridge;
 mod belief;
+mod chi_square;
 mod clock;
+mod consistency;
 mod diffuse;
 mod diffuse_belief;
 mod diffuse_smoother;
@@ -59,6 +62,7 @@ mod estimate;
 mod gaussian;
 mod hypotheses;
 mod imm;
+mod lags;
 mod mixture;
 mod mixture_step;
 mod psd;
@@ -71,7 +75,9 @@ mod unscented;
 #[cfg(feature = "adskalman")]
 pub use adskalman_bridge::LinearStep;
 pub use belief::Belief;
+pub use chi_square::ChiSquare;
 pub use clock::seconds_between;
+pub use consistency::{ConsistencyRecord, ConsistencyReport, ConsistencyTest, MeanTest, Verdict, Whiteness};
 pub use diffuse::{DiffuseEkf, DiffuseStep, DiffuseUpdate};
 pub use diffuse_belief::DiffuseBelief;
 pub use diffuse_smoother::{Undetermined, diffuse_rts_step, diffuse_smooth};
