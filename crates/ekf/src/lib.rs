@@ -6,7 +6,7 @@
 //! [`Ekf`] (plain, iterated, or unscented as [`Ukf`]) keeps one Gaussian and has a smoother. [`Imm`], [`SignSplit`] and
 //! [`Hypotheses`] keep a [`Mixture`] of hypotheses about the phase, because stretching and releasing look alike.
 //! [`DiffuseEkf`] starts where parts of the state are not known at all. [`ConsistencyTest`] judges a running filter by its
-//! innovations.
+//! innovations. [`FixedGain`] stops computing the gain of a model that does not change once it has settled.
 //!
 //! Models are anything that implements [`Dynamics`] and [`Channel`];
 //! [`SwitchedModel`](ohmstrain_model::SwitchedModel) does.
@@ -59,6 +59,7 @@ mod diffuse_smoother;
 mod ekf;
 mod error;
 mod estimate;
+mod fixed_gain;
 mod gaussian;
 mod hypotheses;
 mod imm;
@@ -84,6 +85,7 @@ pub use diffuse_smoother::{Undetermined, diffuse_rts_step, diffuse_smooth};
 pub use ekf::{Ekf, Step, Update};
 pub use error::StepError;
 pub use estimate::Estimate;
+pub use fixed_gain::{FixedGain, FixedGainState, FixedGainStep};
 pub use gaussian::{Gaussian, Real, TruncatedGaussian};
 pub use hypotheses::Hypotheses;
 pub use imm::Imm;
