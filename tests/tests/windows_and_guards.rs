@@ -2,8 +2,8 @@
 
 use nalgebra::SVector;
 use ohmstrain_ekf::{
-    Belief, Dwell, Ekf, Estimator, Evidence, Gaussian, Guard, Guarded, Influence, Mixture, Reading, SignSplit, State,
-    StepError, Streak, Verdict, Window, rts_smooth_vec,
+    Belief, Dwell, Ekf, Estimator, Evidence, Gaussian, Guard, Guarded, Influence, Mixture, Reading, ReadingVerdict,
+    SignSplit, State, StepError, Streak, Window, rts_smooth_vec,
 };
 use ohmstrain_model::{Phase, StrainRange, SwitchedModel};
 use ohmstrain_tests::sensor;
@@ -100,7 +100,7 @@ fn guarded<E: Estimator<f64, 4, 10>>(
     estimator: &E,
     start: E::State,
     readings: impl Iterator<Item = Option<f64>>,
-) -> (E::State, Vec<Verdict>) {
+) -> (E::State, Vec<ReadingVerdict>) {
     let prepared = estimator.prepare(DT_S);
     let (mut state, mut streak, mut verdicts) = (start, Streak::default(), Vec::new());
     for reading in readings {
@@ -121,8 +121,8 @@ where
     let (with_spike, verdicts) = guarded(gate, estimator, start.clone(), spiked(Some(5.0)));
     let (without, _) = guarded(Guard::none(), estimator, start.clone(), spiked(None));
     assert_eq!(with_spike, without);
-    assert_eq!(verdicts[20], Verdict::Rejected);
-    assert_eq!(verdicts.iter().filter(|verdict| **verdict == Verdict::Accepted).count(), 29);
+    assert_eq!(verdicts[20], ReadingVerdict::Rejected);
+    assert_eq!(verdicts.iter().filter(|verdict| **verdict == ReadingVerdict::Accepted).count(), 29);
 }
 
 #[test]
@@ -138,12 +138,12 @@ fn a_gate_cannot_lock_the_filter_out() {
     let jump = || (0..80).map(|k| Some(if k < 30 { 0.1 } else { 3.0 }));
     let predicted = |state: &Kalman| ekf().model().observe(&state.mean, ohmstrain_model::Direction::Known(Phase::Hold));
     let (locked, verdicts) = guarded(Guard::none().with_gate(10.8, u32::MAX), &ekf(), start(), jump());
-    assert!(verdicts[30..].iter().all(|verdict| *verdict == Verdict::Rejected));
+    assert!(verdicts[30..].iter().all(|verdict| *verdict == ReadingVerdict::Rejected));
     assert!((predicted(&locked).value - 3.0).abs() > 1.0);
     let (recovered, verdicts) = guarded(Guard::none().with_gate(10.8, 5), &ekf(), start(), jump());
-    assert_eq!(verdicts[30..35], [Verdict::Rejected; 5]);
-    assert_eq!(verdicts[35], Verdict::Readmitted);
-    assert_eq!(verdicts[60..], [Verdict::Accepted; 20]);
+    assert_eq!(verdicts[30..35], [ReadingVerdict::Rejected; 5]);
+    assert_eq!(verdicts[35], ReadingVerdict::Readmitted);
+    assert_eq!(verdicts[60..], [ReadingVerdict::Accepted; 20]);
     assert!((predicted(&recovered).value - 3.0).abs() < 0.1);
 }
 
@@ -168,7 +168,7 @@ fn huber_bounds_the_influence() {
     let inside = step(expected + 1.9 * sd, huber);
     assert_eq!((inside.verdict, inside.advanced.state), {
         let full = step(expected + 1.9 * sd, Influence::Full);
-        (Verdict::Accepted, full.advanced.state)
+        (ReadingVerdict::Accepted, full.advanced.state)
     });
     // Student's t with ν = 4: weight 5 / (4 + 16) at four deviations, 5 / (4 + 2500) at fifty, and full weight at one.
     let student = Influence::StudentT { degrees_of_freedom: 4.0 };

@@ -1,6 +1,6 @@
 use ohmstrain_ekf::{
-    Belief, Dwell, Ekf, Estimate, Evidence, Gaussian, Guard, Hypotheses, Imm, Mixture, Particles, Reading, SignSplit,
-    StepError, Ukf, Unscented, Verdict,
+    Belief, Dwell, Ekf, Estimate, Evidence, Gaussian, Guard, Hypotheses, Imm, Mixture, Particles, Reading,
+    ReadingVerdict, SignSplit, StepError, Ukf, Unscented,
 };
 use ohmstrain_model::{Motion, Phase, SwitchedModel};
 
@@ -66,7 +66,7 @@ pub struct Output {
     /// Normalised innovation squared of the row's reading; `None` if it was missing.
     pub nis: Option<f64>,
     /// What became of the reading.
-    pub verdict: Verdict,
+    pub verdict: ReadingVerdict,
     /// Probabilities of extend, hold and retract; `None` if the estimator has no phases.
     pub phases: Option<[f64; 3]>,
 }

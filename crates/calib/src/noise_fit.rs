@@ -88,7 +88,9 @@ impl<'a> NoiseProblem<'a> {
         let mut start = vec![root_mean_square(&left_out).max(1e-9), BASELINE_TIME_S, fine, fine];
         start.extend(match kind {
             EstimatorKind::Ekf | EstimatorKind::Ukf => [stats.rate_sd, stats.rate_time_s, stats.strain_sd],
-            EstimatorKind::SignSplit | EstimatorKind::Particles => [stats.rate_sd, stats.acceleration_sd, stats.strain_sd],
+            EstimatorKind::SignSplit | EstimatorKind::Particles => {
+                [stats.rate_sd, stats.acceleration_sd, stats.strain_sd]
+            }
             EstimatorKind::Imm | EstimatorKind::Hypotheses => {
                 [0.5 * stats.speed, stats.rate_time_s, 3.0 * stats.strain_sd]
             }

@@ -1,8 +1,8 @@
 use std::collections::{HashMap, VecDeque};
 
 use ohmstrain_ekf::{
-    Advanced, Belief, Estimate, Estimator, Gaussian, Guard, Guarded, Innovation, PastStep, Reading, State, StepError,
-    Streak, Verdict, smooth_back_through,
+    Advanced, Belief, Estimate, Estimator, Gaussian, Guard, Guarded, Innovation, PastStep, Reading, ReadingVerdict,
+    State, StepError, Streak, smooth_back_through,
 };
 use ohmstrain_model::{StrainRange, SwitchedModel};
 
@@ -40,7 +40,7 @@ struct Moment<S> {
 #[derive(Clone, Copy)]
 struct Seen {
     innovation: Option<Innovation<f64>>,
-    verdict: Verdict,
+    verdict: ReadingVerdict,
 }
 
 /// A row whose estimate waits for later readings.
@@ -58,7 +58,7 @@ const SMOOTHED_AT_ONCE: usize = 4096;
 
 impl<E: Estimator<f64, N, L>, const M: usize, const B: usize, const N: usize, const L: usize> Running<E, M, B, N, L> {
     pub(crate) fn new(estimator: E, state: E::State, model: SwitchedModel<f64, M, B, N>, interval: Interval) -> Self {
-        let seen = Seen { innovation: None, verdict: Verdict::Missing };
+        let seen = Seen { innovation: None, verdict: ReadingVerdict::Missing };
         let now = Moment { time_s: None, state, streak: Streak::default(), seen };
         let (guard, prepared, pending) = (Guard::none(), HashMap::new(), VecDeque::new());
         Self { estimator, model, interval, guard, now, prepared, pending }

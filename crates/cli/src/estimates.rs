@@ -1,7 +1,7 @@
 use std::io::Write;
 
 use ohmstrain_calib::{Output, Quantity, ReadingUnit, SensorParams};
-use ohmstrain_ekf::Verdict;
+use ohmstrain_ekf::ReadingVerdict;
 use ohmstrain_model::Joint;
 
 use crate::error::CliError;
@@ -133,9 +133,9 @@ impl<W: Write> EstimateWriter<W> {
         [
             ("missing", row.reading.is_nan() && !row.saturated),
             ("saturated", row.saturated),
-            ("rejected", row.output.verdict == Verdict::Rejected),
-            ("downweighted", row.output.verdict == Verdict::Downweighted),
-            ("readmitted", row.output.verdict == Verdict::Readmitted),
+            ("rejected", row.output.verdict == ReadingVerdict::Rejected),
+            ("downweighted", row.output.verdict == ReadingVerdict::Downweighted),
+            ("readmitted", row.output.verdict == ReadingVerdict::Readmitted),
             ("ramp_border", row.output.estimate.near_ramp_border),
             ("at_limit", strain <= self.limits.0 || strain >= self.limits.1),
         ]

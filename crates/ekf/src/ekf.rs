@@ -77,12 +77,7 @@ impl<M> Ekf<M> {
     where
         M: Dynamics<T, N, L> + Channel<T, N, L>,
     {
-        if !dt_s.is_finite() {
-            return Err(StepError::NonFiniteTimeStep);
-        }
-        if dt_s < T::zero() {
-            return Err(StepError::NegativeTimeStep);
-        }
+        check_time_step(dt_s)?;
         let (transition, prior) = if dt_s.is_zero() {
             (stand_still(belief), *belief)
         } else {
@@ -217,6 +212,14 @@ pub(crate) fn pinned<T: Scalar, const N: usize, const L: usize>(
     update(belief, observation, Reading::from(known.mean))
 }
 
+/// Refuses a step that is no length of time.
+pub(crate) fn check_time_step<T: Scalar>(dt_s: T) -> Result<(), StepError> {
+    if !dt_s.is_finite() {
+        return Err(StepError::NonFiniteTimeStep);
+    }
+    if dt_s < T::zero() { Err(StepError::NegativeTimeStep) } else { Ok(()) }
+}
+
 /// A step of zero seconds.
 pub(crate) fn stand_still<T: Scalar, const N: usize, const L: usize>(belief: &Belief<T, N, L>) -> Transition<T, N, L> {
     Transition { mean: belief.mean, jacobian: nalgebra::SMatrix::identity(), noise: Symmetric::zeros() }
@@ -255,9 +258,9 @@ pub(crate) fn update<T: Scalar, const N: usize, const L: usize>(
     Ok((Belief { mean, covariance }, update))
 }
 
-/// `A - (A Hᵀ) Kᵀ + K R Kᵀ` with `A = (I - K H) P`, in the lower triangle.
+/// `A - (A Hᵀ) Kᵀ + K R Kᵀ` with `A = (I - K H) P`, in the lower triangle; right for any K, the best or not.
 #[allow(non_snake_case, reason = "as in `update`")]
-fn joseph<T: Scalar, const N: usize, const L: usize>(
+pub(crate) fn joseph<T: Scalar, const N: usize, const L: usize>(
     P: &Symmetric<T, N, L>,
     PHt: &SVector<T, N>,
     K: &SVector<T, N>,

@@ -96,11 +96,11 @@ impl<T: Real> Gaussian<T> {
 const FAR_TAIL: f64 = 1e-8;
 
 /// Probability of a standard normal above `x`.
-fn upper_tail<T: Real>(x: T) -> T {
+pub(crate) fn upper_tail<T: Real>(x: T) -> T {
     T::of(0.5) * (x * T::of(core::f64::consts::FRAC_1_SQRT_2)).erfc()
 }
 
 /// Density of the standard normal.
-fn density<T: Real>(x: T) -> T {
+pub(crate) fn density<T: Real>(x: T) -> T {
     (T::of(-0.5) * x * x).exp() / T::two_pi().sqrt()
 }

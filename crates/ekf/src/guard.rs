@@ -33,7 +33,7 @@ pub enum Influence<T> {
 
 /// What became of a reading.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Verdict {
+pub enum ReadingVerdict {
     /// There was none.
     Missing,
     /// Taken as it is.
@@ -60,7 +60,7 @@ pub struct Guarded<S, T> {
     /// The reading as it was used.
     pub used: Option<Reading<T>>,
     /// What became of the reading.
-    pub verdict: Verdict,
+    pub verdict: ReadingVerdict,
     /// Rejections in a row, this one included.
     pub streak: Streak,
 }
@@ -102,7 +102,13 @@ impl<T: Scalar> Guard<T> {
     ) -> Result<Guarded<E::State, T>, StepError> {
         let plain = estimator.advance(state, prepared, reading)?;
         let (Some(reading), Some(innovation)) = (reading, plain.innovation) else {
-            return Ok(Guarded { advanced: plain, from: state.clone(), used: None, verdict: Verdict::Missing, streak });
+            return Ok(Guarded {
+                advanced: plain,
+                from: state.clone(),
+                used: None,
+                verdict: ReadingVerdict::Missing,
+                streak,
+            });
         };
         let nis = innovation.nis();
         // A NIS that is not a number must not pass.
@@ -115,18 +121,18 @@ impl<T: Scalar> Guard<T> {
                     advanced: plain,
                     from: state.clone(),
                     used,
-                    verdict: Verdict::Accepted,
+                    verdict: ReadingVerdict::Accepted,
                     streak: Streak(0),
                 });
             }
             // S / w instead of S: the gain, and with it the step, is w times as large.
             let extra_variance = reading.extra_variance + innovation.variance * (T::one() / weight - T::one());
-            (Verdict::Downweighted, state.clone(), Some(Reading { extra_variance, ..reading }), Streak(0))
+            (ReadingVerdict::Downweighted, state.clone(), Some(Reading { extra_variance, ..reading }), Streak(0))
         } else if streak.0 < self.patience {
-            (Verdict::Rejected, state.clone(), None, Streak(streak.0 + 1))
+            (ReadingVerdict::Rejected, state.clone(), None, Streak(streak.0 + 1))
         } else {
             let inflated = state.inflated(nis.min(T::of(MOST_INFLATION)));
-            (Verdict::Readmitted, inflated, Some(reading), streak)
+            (ReadingVerdict::Readmitted, inflated, Some(reading), streak)
         };
         let taken = estimator.advance(&from, prepared, used)?;
         let advanced = Advanced { innovation: Some(innovation), ..taken };

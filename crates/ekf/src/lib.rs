@@ -6,6 +6,8 @@
 //! [`Ekf`] (plain, iterated, or unscented as [`Ukf`]) keeps one Gaussian and has a smoother. [`Imm`], [`SignSplit`] and
 //! [`Hypotheses`] keep a [`Mixture`] of hypotheses about the phase, because stretching and releasing look alike.
 //! `Particles` (feature `std`) samples the motion instead: slow, and the reference for all of them.
+//! [`DiffuseEkf`] starts where parts of the state are not known at all. [`ConsistencyTest`] judges a running filter by its
+//! innovations. [`FixedGain`] stops computing the gain of a model that does not change once it has settled.
 //!
 //! Models are anything that implements [`Dynamics`] and [`Channel`];
 //! [`SwitchedModel`](ohmstrain_model::SwitchedModel) does.
@@ -49,15 +51,22 @@ extern crate std;
 #[cfg(feature = "adskalman")]
 mod adskalman_bridge;
 mod belief;
+mod chi_square;
 mod clock;
+mod consistency;
+mod diffuse;
+mod diffuse_belief;
+mod diffuse_smoother;
 mod ekf;
 mod error;
 mod estimate;
 mod estimator;
+mod fixed_gain;
 mod gaussian;
 mod guard;
 mod hypotheses;
 mod imm;
+mod lags;
 mod lineage;
 mod mixture;
 mod mixture_step;
@@ -79,13 +88,19 @@ mod window;
 #[cfg(feature = "adskalman")]
 pub use adskalman_bridge::LinearStep;
 pub use belief::Belief;
+pub use chi_square::ChiSquare;
 pub use clock::seconds_between;
+pub use consistency::{ConsistencyRecord, ConsistencyReport, ConsistencyTest, MeanTest, Verdict, Whiteness};
+pub use diffuse::{DiffuseEkf, DiffuseStep, DiffuseUpdate};
+pub use diffuse_belief::DiffuseBelief;
+pub use diffuse_smoother::{Undetermined, diffuse_rts_step, diffuse_smooth};
 pub use ekf::{Ekf, Step, Update};
 pub use error::StepError;
 pub use estimate::Estimate;
 pub use estimator::{Advanced, Estimator, Innovation, State};
+pub use fixed_gain::{FixedGain, FixedGainState, FixedGainStep};
 pub use gaussian::{Gaussian, Real, TruncatedGaussian};
-pub use guard::{Guard, Guarded, Influence, Streak, Verdict};
+pub use guard::{Guard, Guarded, Influence, ReadingVerdict, Streak};
 pub use hypotheses::Hypotheses;
 pub use imm::Imm;
 pub use mixture::{Component, Mixture};

@@ -1,5 +1,6 @@
 use ohmstrain_model::Scalar;
 
+use crate::ekf::check_time_step;
 use crate::{Estimator, PastStep, Reading, StepError, smooth_back_through};
 
 /// The last `D` steps in fixed memory: for estimates with a fixed lag, and for readings that arrive late.
@@ -69,12 +70,7 @@ impl<S: Clone, P: Copy, T: Scalar, const D: usize> Window<S, P, T, D> {
     where
         E: Estimator<T, N, L, State = S, Prepared = P>,
     {
-        if !dt_s.is_finite() {
-            return Err(StepError::NonFiniteTimeStep);
-        }
-        if dt_s < T::zero() {
-            return Err(StepError::NegativeTimeStep);
-        }
+        check_time_step(dt_s)?;
         let prepared = estimator.prepare(dt_s);
         let advanced = estimator.advance(&self.newest, &prepared, reading)?;
         let from = core::mem::replace(&mut self.newest, advanced.state);
@@ -121,12 +117,7 @@ impl<S: Clone, P: Copy, T: Scalar, const D: usize> Window<S, P, T, D> {
     where
         E: Estimator<T, N, L, State = S, Prepared = P>,
     {
-        if !age_s.is_finite() {
-            return Err(StepError::NonFiniteTimeStep);
-        }
-        if age_s < T::zero() {
-            return Err(StepError::NegativeTimeStep);
-        }
+        check_time_step(age_s)?;
         let mut end_age_s = T::zero();
         let mut back = 0;
         for (dt_s, _) in self.newest_first() {

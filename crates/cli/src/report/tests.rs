@@ -4,7 +4,7 @@ use ohmstrain_calib::{
     BranchParams, EstimatorKind, EstimatorParams, GaugeParams, LawParams, MotionParams, NoiseParams, Output, Quantity,
     RangeParams, ReadingUnit, SensorParams, StaticCubic, Validity,
 };
-use ohmstrain_ekf::{Estimate, Gaussian, Verdict};
+use ohmstrain_ekf::{Estimate, Gaussian, ReadingVerdict};
 
 use super::{ReportInput, ScoreRow, render};
 
@@ -70,7 +70,7 @@ fn output(strain: f64, nis: Option<f64>) -> Output {
         beyond_border: 0.0,
         near_ramp_border: false,
     };
-    Output { estimate, nis, verdict: Verdict::Accepted, phases: None }
+    Output { estimate, nis, verdict: ReadingVerdict::Accepted, phases: None }
 }
 
 fn page(params: &SensorParams, time_s: &[f64], reading: &[f64], truth: Option<&[f64]>, outputs: &[Output]) -> String {
