@@ -3,10 +3,10 @@ use std::collections::BTreeMap;
 use crate::CalibrationError;
 use crate::baseline::StaticCubic;
 use crate::estimator_params::{EstimatorKind, EstimatorParams};
-use crate::law_fit::{CrossFit, LawOptions, fit_law};
+use crate::law_fit::{LawOptions, fit_laws};
 use crate::law_params::LawParams;
 use crate::motion_stats::MotionStats;
-use crate::noise_fit::NoiseProblem;
+use crate::noise_fit::{NoiseProblem, REFINEMENT, SURVEY, Search};
 use crate::params::{RangeParams, Uncertainty, Validity};
 use crate::samples::Samples;
 
@@ -35,6 +35,8 @@ pub struct Calibration {
     pub uncertainty: Uncertainty,
     /// Root mean squared error of the law on blocks left out, relative to R₀.
     pub law_error: f64,
+    /// The estimator that did best.
+    pub default_estimator: EstimatorKind,
     /// Noise and motion, per estimator.
     pub estimators: BTreeMap<EstimatorKind, EstimatorParams>,
     /// The range of the reference.
@@ -47,8 +49,12 @@ pub struct Calibration {
 
 /// Calibrates law, noise and motion on recordings with known strain. Deterministic: same samples, same result.
 ///
+/// Every estimator of `kinds` is tried with a law per strength of ridge. The pair with the best score on blocks that the
+/// law has not seen gives the law and the default estimator; the other estimators, and the extended Kalman filter in any
+/// case, are then fitted to that law.
+///
 /// # Errors
-/// If the recordings are too short or too plain to learn a law from.
+/// If the recordings are too short or too plain to learn a law from, or `kinds` is empty.
 pub fn calibrate(
     recordings: &[Samples],
     options: LawOptions,
@@ -56,15 +62,45 @@ pub fn calibrate(
     mut progress: impl FnMut(Stage),
 ) -> Result<Calibration, CalibrationError> {
     progress(Stage::Law);
-    let fit: CrossFit = fit_law(recordings, options)?;
-    let limits = fit.law.law.range;
-    let problem = NoiseProblem::new(recordings, &fit, limits);
-    let mut estimators = BTreeMap::new();
-    for &kind in kinds {
-        estimators.insert(kind, problem.fit(kind, &mut progress)?);
-    }
+    let laws = fit_laws(recordings, options)?;
     let stats = MotionStats::new(recordings);
+    let mut all_kinds: Vec<EstimatorKind> = kinds.to_vec();
+    if !kinds.contains(&EstimatorKind::Ekf) {
+        all_kinds.push(EstimatorKind::Ekf);
+    }
+    let searches = |search: Search, count: usize| search.evaluations() * count as u64;
+    let expected = searches(SURVEY, kinds.len() * laws.len() + all_kinds.len() - kinds.len())
+        + searches(REFINEMENT, all_kinds.len());
+    let mut done = 0;
+    let mut evaluated = || {
+        done += 1;
+        progress(Stage::Noise { done, expected });
+    };
+    let mut surveyed = Vec::new();
+    for &kind in kinds {
+        for law in &laws {
+            let tuned = NoiseProblem::new(recordings, law, stats, kind).search(None, SURVEY, &mut evaluated)?;
+            surveyed.push((kind, law, tuned));
+        }
+    }
+    let best = surveyed.iter().min_by(|a, b| a.2.cost.total_cmp(&b.2.cost));
+    let Some(&(default_estimator, fit, _)) = best else {
+        return Err(CalibrationError::Unsupported("a calibration without an estimator".into()));
+    };
+    let mut estimators = BTreeMap::new();
+    for kind in all_kinds {
+        let problem = NoiseProblem::new(recordings, fit, stats, kind);
+        let known = surveyed.iter().find(|(k, law, _)| *k == kind && std::ptr::eq(*law, fit));
+        let from = match known {
+            Some((_, _, tuned)) => tuned.clone(),
+            None => problem.search(None, SURVEY, &mut evaluated)?,
+        };
+        let tuned = problem.search(Some(&from), REFINEMENT, &mut evaluated)?;
+        estimators.insert(kind, problem.finish(&tuned));
+    }
+    let limits = fit.law.law.range;
     Ok(Calibration {
+        default_estimator,
         estimators,
         static_cubic: StaticCubic::fit(recordings, limits)?,
         validity: Validity {
@@ -75,8 +111,8 @@ pub fn calibrate(
         },
         limits,
         law_error: fit.law.cross_validated_error,
-        uncertainty: fit.uncertainty,
-        rest_readings: fit.law.rest_readings,
-        law: fit.law.law,
+        uncertainty: fit.uncertainty.clone(),
+        rest_readings: fit.law.rest_readings.clone(),
+        law: fit.law.law.clone(),
     })
 }
