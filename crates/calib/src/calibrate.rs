@@ -6,7 +6,7 @@ use crate::estimator_params::{EstimatorKind, EstimatorParams};
 use crate::law_fit::{LawOptions, fit_laws};
 use crate::law_params::LawParams;
 use crate::motion_stats::MotionStats;
-use crate::noise_fit::{NoiseProblem, REFINEMENT, SURVEY, Search};
+use crate::noise_fit::{NoiseProblem, REFINEMENT, RESURVEY, SURVEY, Tuned};
 use crate::params::{RangeParams, Uncertainty, Validity};
 use crate::samples::Samples;
 
@@ -49,9 +49,9 @@ pub struct Calibration {
 
 /// Calibrates law, noise and motion on recordings with known strain. Deterministic: same samples, same result.
 ///
-/// Every estimator of `kinds` is tried with a law per strength of ridge. The pair with the best score on blocks that the
-/// law has not seen gives the law and the default estimator; the other estimators, and the extended Kalman filter in any
-/// case, are then fitted to that law.
+/// Every estimator of `kinds` is tried with a law per strength of ridge; the pair with the best score on blocks that the
+/// law has not seen gives the law. To that law every one of them, and the extended Kalman filter in any case, is then
+/// fitted, and the best of `kinds` becomes the default.
 ///
 /// # Errors
 /// If the recordings are too short or too plain to learn a law from, or `kinds` is empty.
@@ -68,9 +68,10 @@ pub fn calibrate(
     if !kinds.contains(&EstimatorKind::Ekf) {
         all_kinds.push(EstimatorKind::Ekf);
     }
-    let searches = |search: Search, count: usize| search.evaluations() * count as u64;
-    let expected = searches(SURVEY, kinds.len() * laws.len() + all_kinds.len() - kinds.len())
-        + searches(REFINEMENT, all_kinds.len());
+    let surveys = SURVEY.evaluations() + (laws.len() as u64 - 1) * RESURVEY.evaluations();
+    let expected = kinds.len() as u64 * surveys
+        + (all_kinds.len() - kinds.len()) as u64 * SURVEY.evaluations()
+        + all_kinds.len() as u64 * REFINEMENT.evaluations();
     let mut done = 0;
     let mut evaluated = || {
         done += 1;
@@ -78,13 +79,17 @@ pub fn calibrate(
     };
     let mut surveyed = Vec::new();
     for &kind in kinds {
+        let mut before: Option<Tuned> = None;
         for law in &laws {
-            let tuned = NoiseProblem::new(recordings, law, stats, kind).search(None, SURVEY, &mut evaluated)?;
+            let problem = NoiseProblem::new(recordings, law, stats, kind);
+            let search = if before.is_none() { SURVEY } else { RESURVEY };
+            let tuned = problem.search(before.as_ref(), search, &mut evaluated)?;
+            before = Some(tuned.clone());
             surveyed.push((kind, law, tuned));
         }
     }
     let best = surveyed.iter().min_by(|a, b| a.2.cost.total_cmp(&b.2.cost));
-    let Some(&(default_estimator, fit, _)) = best else {
+    let Some(&(_, fit, _)) = best else {
         return Err(CalibrationError::Unsupported("a calibration without an estimator".into()));
     };
     let mut estimators = BTreeMap::new();
@@ -98,9 +103,11 @@ pub fn calibrate(
         let tuned = problem.search(Some(&from), REFINEMENT, &mut evaluated)?;
         estimators.insert(kind, problem.finish(&tuned));
     }
+    let score = |kind: &EstimatorKind| estimators.get(kind).map_or(f64::INFINITY, |params| params.score);
+    let default_estimator = kinds.iter().copied().min_by(|a, b| score(a).total_cmp(&score(b)));
     let limits = fit.law.law.range;
     Ok(Calibration {
-        default_estimator,
+        default_estimator: default_estimator.unwrap_or(EstimatorKind::Ekf),
         estimators,
         static_cubic: StaticCubic::fit(recordings, limits)?,
         validity: Validity {

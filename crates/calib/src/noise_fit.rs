@@ -19,8 +19,10 @@ pub(crate) struct Search {
     rows: usize,
 }
 
-/// Says which law an estimator stands.
+/// Says how well an estimator does with a law.
 pub(crate) const SURVEY: Search = Search { side: 0.7, steps: 100, rows: 500 };
+/// The same, from what another law has led to.
+pub(crate) const RESURVEY: Search = Search { side: 0.4, steps: 40, rows: 500 };
 /// Goes on from the best survey.
 pub(crate) const REFINEMENT: Search = Search { side: 0.3, steps: 60, rows: 1500 };
 
@@ -58,12 +60,7 @@ pub(crate) struct NoiseProblem<'a> {
 }
 
 impl<'a> NoiseProblem<'a> {
-    pub(crate) fn new(
-        samples: &'a [Samples<'a>],
-        fit: &'a CrossFit,
-        stats: MotionStats,
-        kind: EstimatorKind,
-    ) -> Self {
+    pub(crate) fn new(samples: &'a [Samples<'a>], fit: &'a CrossFit, stats: MotionStats, kind: EstimatorKind) -> Self {
         Self { samples, fit, limits: fit.law.law.range, stats, kind }
     }
 
@@ -89,11 +86,35 @@ impl<'a> NoiseProblem<'a> {
     /// The parameters, scored on every row.
     pub(crate) fn finish(&self, tuned: &Tuned) -> EstimatorParams {
         let left_out = self.left_out(1);
-        let mut params = self.params(&tuned.point);
-        params.score = left_out.score(self.kind, &params);
+        let score = |mut params: EstimatorParams| {
+            params.score = left_out.score(self.kind, &params);
+            params
+        };
+        let candidates = self.at_every_row(self.params(&tuned.point), self.stride(REFINEMENT.rows));
+        let best = candidates.into_iter().map(score).reduce(|a, b| if b.score < a.score { b } else { a });
+        let mut params = best.unwrap_or_else(|| self.params(&tuned.point));
         params.strain_sd_scale = left_out.filtered_deviations(self.kind, &params).map_or(1.0, |d| sd_scale(&d));
         params.smoothed_sd_scale = left_out.smoothed_deviations(self.kind, &params).map(|d| sd_scale(&d));
         params
+    }
+
+    /// What parameters that were found on every `stride`-th row may mean for every row. White noise stays what it is; if
+    /// it stands for model error that is correlated over `stride` rows, it is that much larger, or the likelihood of a
+    /// row counts that much less.
+    fn at_every_row(&self, params: EstimatorParams, stride: usize) -> Vec<EstimatorParams> {
+        let mut candidates = vec![params];
+        if stride > 1 {
+            let mut noisier = params;
+            noisier.noise.reading_sd *= (stride as f64).sqrt();
+            candidates.push(noisier);
+            for mut candidate in candidates.clone() {
+                if let Some(phases) = &mut candidate.phases {
+                    phases.tempering /= stride as f64;
+                    candidates.push(candidate);
+                }
+            }
+        }
+        candidates
     }
 
     fn left_out(&self, stride: usize) -> LeftOut<'a> {
