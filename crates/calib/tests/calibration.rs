@@ -164,7 +164,9 @@ fn the_estimator_that_does_best_becomes_the_default() {
     let calibration = calibrate(&[bench.samples().head(600)], LawOptions::default(), &kinds, count).unwrap();
     let best = calibration.estimators[&calibration.default_estimator].score;
     for kind in kinds {
-        assert!(calibration.estimators[&kind].score >= best, "{kind:?}");
+        // A single Gaussian has to be better by 0.1.
+        let handicap = if kind == EstimatorKind::Ekf { 0.1 } else { 0.0 };
+        assert!(calibration.estimators[&kind].score + handicap >= best, "{kind:?}");
     }
     // A step of Nelder-Mead evaluates one or two points, and a shrunken simplex all of its corners.
     assert!(calls > announced / 2 && calls < 2 * announced, "{calls} of {announced}");
