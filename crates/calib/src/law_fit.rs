@@ -1,4 +1,5 @@
 use crate::CalibrationError;
+use crate::blocks::BlockedNormal;
 use crate::design::BRANCH_COLUMNS;
 use crate::law_params::LawParams;
 use crate::law_regression::{BLOCKS, LawRegression};
@@ -74,9 +75,11 @@ const DEFAULT_GAUGE: GaugeFamily = GaugeFamily::Polynomial;
 pub(crate) const MOST_BRANCHES: usize = 4;
 /// Time constants tried.
 const GRID: usize = 12;
-/// Ridges tried, relative to the variance of each column. Cross-validation of the law alone would go far lower, where a
-/// filter's belief in the law makes it lock onto the wrong direction.
-const RIDGES: [f64; 2] = [0.03, 0.1];
+/// Ridges tried, relative to the variance of each column. The least one explains most and often makes a filter lock onto
+/// the wrong direction; which one an estimator stands is for its own score to say.
+const RIDGES: [f64; 5] = [0.1, 0.03, 0.01, 0.003, 0.001];
+/// Rows that a regression uses at most: its residuals are correlated over seconds, and more rows tell nothing new.
+pub(crate) const MOST_ROWS: usize = 6000;
 /// Steps of the polish of the time constants, and the side of its first simplex in ln τ.
 const POLISH_STEPS: u64 = 40;
 const POLISH_SIDE: f64 = 0.3;
@@ -92,48 +95,81 @@ const LEAST_SPACING: f64 = 1.6;
 /// # Errors
 /// If the recordings are too short, the strain is constant or no law fits.
 pub fn fit_law(recordings: &[Samples], options: LawOptions) -> Result<CrossFit, CalibrationError> {
+    let laws = fit_laws(recordings, options)?;
+    let least = |a: &CrossFit, b: &CrossFit| a.law.cross_validated_error.total_cmp(&b.law.cross_validated_error);
+    laws.into_iter().min_by(least).ok_or(CalibrationError::Singular)
+}
+
+/// The best law for each ridge, strongest ridge first; at least one.
+pub(crate) fn fit_laws(recordings: &[Samples], options: LawOptions) -> Result<Vec<CrossFit>, CalibrationError> {
     if options.branches > MOST_BRANCHES {
         let message = format!("{} branches; at most {MOST_BRANCHES} are supported", options.branches);
         return Err(CalibrationError::Unsupported(message));
     }
     let regression = LawRegression::new(recordings)?;
-    let (ln_taus, ridge) = search_taus(&regression, options.branches)?;
-    let mut structure = polish(&regression, options.gauge, &ln_taus, ridge)?;
+    let grid = TauGrid::new(&regression, options.branches);
+    let fits = RIDGES.map(|ridge| cross_fit(&regression, &grid, options.gauge, ridge));
+    if fits.iter().all(Result::is_err) {
+        return fits.into_iter().collect();
+    }
+    Ok(fits.into_iter().flatten().collect())
+}
+
+fn cross_fit(
+    regression: &LawRegression,
+    grid: &TauGrid,
+    gauge: GaugeFamily,
+    ridge: f64,
+) -> Result<CrossFit, CalibrationError> {
+    let mut structure = polish(regression, gauge, &grid.best(ridge)?, ridge)?;
     structure.sort_branches();
-    let without_block = (0..BLOCKS).map(|block| structure.fit(&regression, Some(block))).collect::<Result<_, _>>()?;
+    let without_block = (0..BLOCKS).map(|block| structure.fit(regression, Some(block))).collect::<Result<_, _>>()?;
     Ok(CrossFit {
-        law: structure.fit(&regression, None)?,
+        law: structure.fit(regression, None)?,
         without_block,
-        uncertainty: law_uncertainty(&structure, &regression)?,
+        uncertainty: law_uncertainty(&structure, regression)?,
         blocks: regression.block_rows(),
     })
 }
 
-/// The best logarithms of time constants on a grid with a cubic gauge, and the ridge, by cross-validation.
-fn search_taus(regression: &LawRegression, branches: usize) -> Result<(Vec<f64>, f64), CalibrationError> {
-    let grid = log_grid(regression.tau_bounds, GRID);
-    let everything =
-        LawStructure { family: GaugeFamily::Polynomial, nonlinear: grid.clone(), taus: GRID, ridge: RIDGES[0] };
-    let design = everything.design(regression);
-    let normal = regression.normal(&design, &regression.median_readings());
-    let first_branch = design.columns.len() - GRID * BRANCH_COLUMNS;
-    let spacing = LEAST_SPACING.min(0.7 * (grid[GRID - 1] - grid[0]) / (branches.max(2) - 1) as f64);
-    let too_close = |subset: &Vec<usize>| subset.windows(2).any(|pair| grid[pair[1]] - grid[pair[0]] < spacing - 1e-9);
-    let mut best: Option<(f64, Vec<usize>, f64)> = None;
-    for subset in subsets(GRID, branches).into_iter().filter(|subset| !too_close(subset)) {
-        let mut columns: Vec<usize> = (0..first_branch).collect();
-        for &i in &subset {
-            columns.extend((0..BRANCH_COLUMNS).map(|j| first_branch + i * BRANCH_COLUMNS + j));
-        }
-        for ridge in RIDGES {
-            let Some(score) = normal.cross_validate(&columns, ridge) else { continue };
-            if best.as_ref().is_none_or(|(error, _, _)| score < *error) {
-                best = Some((score, subset.clone(), ridge));
-            }
+/// A cubic gauge with branches of all time constants of a grid, ready to be fitted with any few of them.
+struct TauGrid {
+    ln_taus: Vec<f64>,
+    normal: BlockedNormal,
+    first_branch: usize,
+    subsets: Vec<Vec<usize>>,
+}
+
+impl TauGrid {
+    fn new(regression: &LawRegression, branches: usize) -> Self {
+        let ln_taus = log_grid(regression.tau_bounds, GRID);
+        let everything =
+            LawStructure { family: GaugeFamily::Polynomial, nonlinear: ln_taus.clone(), taus: GRID, ridge: RIDGES[0] };
+        let design = everything.design(regression);
+        let spacing = LEAST_SPACING.min(0.7 * (ln_taus[GRID - 1] - ln_taus[0]) / (branches.max(2) - 1) as f64);
+        let mut subsets = subsets(GRID, branches);
+        subsets.retain(|subset| subset.windows(2).all(|pair| ln_taus[pair[1]] - ln_taus[pair[0]] >= spacing - 1e-9));
+        Self {
+            normal: regression.normal(&design, &regression.median_readings()),
+            first_branch: design.columns.len() - GRID * BRANCH_COLUMNS,
+            ln_taus,
+            subsets,
         }
     }
-    let (_, subset, ridge) = best.ok_or(CalibrationError::Singular)?;
-    Ok((subset.into_iter().map(|i| grid[i]).collect(), ridge))
+
+    /// The best logarithms of time constants by cross-validation.
+    fn best(&self, ridge: f64) -> Result<Vec<f64>, CalibrationError> {
+        let score = |subset: &Vec<usize>| {
+            let mut columns: Vec<usize> = (0..self.first_branch).collect();
+            for &i in subset {
+                columns.extend((0..BRANCH_COLUMNS).map(|j| self.first_branch + i * BRANCH_COLUMNS + j));
+            }
+            self.normal.cross_validate(&columns, ridge)
+        };
+        let scored = self.subsets.iter().filter_map(|subset| Some((score(subset)?, subset)));
+        let (_, subset) = scored.min_by(|a, b| a.0.total_cmp(&b.0)).ok_or(CalibrationError::Singular)?;
+        Ok(subset.iter().map(|&i| self.ln_taus[i]).collect())
+    }
 }
 
 /// Moves time constants and gauge parameters to where cross-validation is best.

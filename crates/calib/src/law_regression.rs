@@ -5,6 +5,7 @@ use nalgebra::DVector;
 use crate::CalibrationError;
 use crate::blocks::BlockedNormal;
 use crate::design::{Regressors, StrainScale};
+use crate::law_fit::MOST_ROWS;
 use crate::motion_stats::MotionStats;
 use crate::params::RangeParams;
 use crate::samples::{Samples, check};
@@ -25,7 +26,7 @@ pub(crate) struct LawRegression {
 
 pub(crate) struct Recording {
     pub regressors: Regressors,
-    /// Rows with reading and strain.
+    /// Rows with reading and strain, thinned to at most [`MOST_ROWS`] over all recordings.
     pub complete: Vec<usize>,
     reading: Vec<f64>,
 }
@@ -48,11 +49,12 @@ impl LawRegression {
     pub(crate) fn new(samples: &[Samples]) -> Result<Self, CalibrationError> {
         let (lower, upper) = check(samples)?;
         let scale = StrainScale { centre: 0.5 * (lower + upper), span: upper - lower };
+        let stride = samples.iter().map(Samples::len).sum::<usize>().div_ceil(MOST_ROWS);
         let recordings: Vec<Recording> = samples
             .iter()
             .map(|samples| Recording {
                 regressors: Regressors::new(samples, &scale),
-                complete: samples.complete_rows().collect(),
+                complete: samples.complete_rows().step_by(stride).collect(),
                 reading: samples.reading.to_vec(),
             })
             .collect();

@@ -1,7 +1,8 @@
 //! Calibration of soft strain sensors: from bench recordings with known strain to the parameters a filter needs.
 //!
-//! [`calibrate`] fits the law ([`fit_law`]) and then noise and motion so that the filter's own posterior is right on the
-//! known strain. [`SensorParams`] is what is written down; [`build_filter`] makes a running filter of it.
+//! [`calibrate`] fits a law per strength of ridge, and to each of them noise and motion so that the filter's own posterior
+//! is right on the known strain; the law with which the filter does best is taken. [`fit_law`] fits a law by itself.
+//! [`SensorParams`] is what is written down; [`build_filter`] makes a running filter of it.
 //!
 //! # Policy
 //! - Knows samples ([`Samples`]), not files.
@@ -20,6 +21,7 @@ mod law_params;
 mod law_regression;
 mod law_structure;
 mod law_uncertainty;
+mod left_out;
 mod motion_stats;
 mod noise_fit;
 mod optimise;
@@ -27,6 +29,7 @@ mod params;
 mod running;
 mod samples;
 mod scores;
+mod sd_scale;
 
 pub use baseline::StaticCubic;
 pub use calibrate::{Calibration, Stage, calibrate};

@@ -1,7 +1,7 @@
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, Normal};
 
-use crate::noise_fit::REFERENCE_SD;
+use crate::left_out::REFERENCE_SD;
 
 /// How good estimates are against a known strain.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use ohmstrain_calib::{
     Calibration, CalibrationError, EstimatorKind, FORMAT, GaugeFamily, LawOptions, Quantity, RangeParams, ReadingUnit,
-    Samples, ScoredRow, Scores, SensorParams, Start, StaticCubic, build_filter, calibrate, fit_law,
+    Samples, ScoredRow, Scores, SensorParams, Stage, Start, StaticCubic, build_filter, calibrate, fit_law,
 };
 use ohmstrain_ekf::Reading;
 
@@ -109,7 +109,7 @@ fn sensor(calibration: &Calibration) -> SensorParams {
         quantity: Quantity::Strain,
         reading: ReadingUnit::Ohm,
         rest_reading: calibration.rest_readings[0],
-        default_estimator: EstimatorKind::Ekf,
+        default_estimator: calibration.default_estimator,
         limits: calibration.limits,
         validity: calibration.validity,
         static_cubic: calibration.static_cubic,
@@ -154,6 +154,53 @@ fn calibration_makes_a_filter_that_beats_the_static_inverse_and_knows_how_far() 
     // Same samples, same parameters.
     let again = calibrate(&[training], LawOptions::default(), &[EstimatorKind::Ekf], |_| ()).unwrap();
     assert_eq!((again.law, again.estimators), (calibration.law, calibration.estimators));
+}
+
+#[test]
+fn the_estimator_that_does_best_becomes_the_default() {
+    let bench = record(1500.0, 0.0, 2e-3);
+    let kinds = [EstimatorKind::Ekf, EstimatorKind::SignSplit];
+    let (mut calls, mut announced) = (0, 0);
+    let count = |stage| {
+        if let Stage::Noise { done, expected } = stage {
+            (calls, announced) = (done, expected);
+        }
+    };
+    let calibration = calibrate(&[bench.samples().head(600)], LawOptions::default(), &kinds, count).unwrap();
+    let best = calibration.estimators[&calibration.default_estimator].score;
+    for kind in kinds {
+        // A single Gaussian has to be better by 0.1.
+        let handicap = if kind == EstimatorKind::Ekf { 0.1 } else { 0.0 };
+        assert!(calibration.estimators[&kind].score + handicap >= best, "{kind:?}");
+    }
+    // A step of Nelder-Mead evaluates one or two points, and a shrunken simplex all of its corners.
+    assert!(calls > announced / 2 && calls < 2 * announced, "{calls} of {announced}");
+    let nobody = calibrate(&[bench.samples()], LawOptions::default(), &[], |_| ());
+    assert!(matches!(nobody.unwrap_err(), CalibrationError::Unsupported(_)));
+}
+
+/// The model is continuous in time: a recording with five times the rows, thinned for the search, says the same.
+#[test]
+fn a_finer_recording_gives_the_same_filter() {
+    let coarse = record(1500.0, 0.0, 2e-3);
+    let between = |values: &[f64]| -> Vec<f64> {
+        let last = values.len() - 1;
+        (0..5 * last).map(|k| values[k / 5] + (values[k / 5 + 1] - values[k / 5]) * (k % 5) as f64 / 5.0).collect()
+    };
+    let fine =
+        Bench { time_s: between(&coarse.time_s), reading: between(&coarse.reading), strain: between(&coarse.strain) };
+    let of = |bench: &Bench| {
+        let kinds = [EstimatorKind::Ekf];
+        let calibration = calibrate(&[bench.samples()], LawOptions::default(), &kinds, |_| ()).unwrap();
+        (calibration.law, calibration.estimators[&EstimatorKind::Ekf])
+    };
+    let ((coarse_law, coarse), (fine_law, fine)) = (of(&coarse), of(&fine));
+    for (a, b) in coarse_law.branches.iter().zip(&fine_law.branches) {
+        // The polish of the time constants stops after a number of steps.
+        assert!((a.tau_s / b.tau_s).ln().abs() < 0.2, "{a:?} {b:?}");
+    }
+    // Readings between readings add little: the log densities agree to a few per cent in the deviation of strain.
+    assert!((coarse.score - fine.score).abs() < 0.2, "{coarse:?} {fine:?}");
 }
 
 /// A refused row leaves the filter as it was, to the last bit.

@@ -123,8 +123,8 @@ pub struct CalibrateArgs {
     /// Family of the gauge curve: auto (polynomial), polynomial, decaying-exponential or tunnelling
     #[arg(long, default_value = "auto")]
     pub gauge: Auto<Gauge>,
-    /// Estimator to calibrate and to make the default: auto (ekf), ekf, ukf, imm, sign-split or hypotheses; ekf is
-    /// calibrated in any case
+    /// Estimator to calibrate and to make the default: auto (the better of ekf and sign-split), ekf, ukf, imm,
+    /// sign-split or hypotheses; ekf is calibrated in any case
     #[arg(long, default_value = "auto")]
     pub estimator: Auto<Estimator>,
     /// Accepted for scripts; the calibration is deterministic and draws nothing

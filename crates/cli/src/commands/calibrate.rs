@@ -35,7 +35,7 @@ pub fn run(args: &CalibrateArgs) -> Result<(), CliError> {
     if let Some(gauge) = args.gauge.chosen() {
         options.gauge = gauge.into();
     }
-    let estimator = args.estimator.chosen().map_or(EstimatorKind::Ekf, |estimator| estimator.0);
+    let estimator = args.estimator.chosen().map(|estimator| estimator.0);
     let params = calibrate_recordings(&recordings, options, estimator, &Progress::new("calibrating"))?;
     if let Some(path) = &args.report {
         write_report(path, &recordings[0], &params, None)?;
@@ -43,19 +43,20 @@ pub fn run(args: &CalibrateArgs) -> Result<(), CliError> {
     sensor_file::write(&args.output, &params)
 }
 
-/// The parameters of the sensor behind `recordings`, with `estimator` as the default one.
+/// Estimators to choose from unless one is asked for: the small one, and the one for whatever moves.
+const CANDIDATES: [EstimatorKind; 2] = [EstimatorKind::Ekf, EstimatorKind::SignSplit];
+
+/// The parameters of the sensor behind `recordings`, with `estimator`, or else the one that does best, as the default.
 pub fn calibrate_recordings(
     recordings: &[Recording],
     options: LawOptions,
-    estimator: EstimatorKind,
+    estimator: Option<EstimatorKind>,
     progress: &Progress,
 ) -> Result<SensorParams, CliError> {
     let samples: Vec<Samples> = recordings.iter().map(Recording::samples).collect::<Result<_, _>>()?;
     let (quantity, reading) = common_units(recordings)?;
     let names: Vec<&str> = recordings.iter().map(|recording| recording.name.as_str()).collect();
-    // The one that is cheap to calibrate and has a smoother is always there.
-    let mut kinds = vec![EstimatorKind::Ekf];
-    kinds.extend((estimator != EstimatorKind::Ekf).then_some(estimator));
+    let kinds = estimator.map_or_else(|| CANDIDATES.to_vec(), |estimator| vec![estimator]);
     let calibration = calibrate(&samples, options, &kinds, |stage| progress.calibrating(stage))
         .map_err(|error| CliError::calibration(&names, &error))?;
     let infos = recordings.iter().zip(&calibration.rest_readings).map(|(recording, rest_reading)| RecordingInfo {
@@ -72,7 +73,7 @@ pub fn calibrate_recordings(
         quantity,
         reading,
         rest_reading: rests[rests.len() / 2],
-        default_estimator: estimator,
+        default_estimator: calibration.default_estimator,
         limits: calibration.limits,
         validity: calibration.validity,
         static_cubic: calibration.static_cubic,

@@ -30,8 +30,12 @@ pub fn run(args: &DemoArgs) -> Result<(), CliError> {
 
     let training =
         Recording { trace: recording.trace.until(test_from), ..input::read(&trace_path, &Default::default())? };
-    let params =
-        calibrate_recordings(std::slice::from_ref(&training), LawOptions::default(), EstimatorKind::Ekf, &progress)?;
+    let params = calibrate_recordings(
+        std::slice::from_ref(&training),
+        LawOptions::default(),
+        Some(EstimatorKind::Ekf),
+        &progress,
+    )?;
     sensor_file::write(&args.out.join("sensor.toml"), &params)?;
 
     progress.doing("filtering and smoothing");
