@@ -46,7 +46,7 @@ fn adskalman(criterion: &mut Criterion, model: &SwitchedModel<f64, 2, 1, 3>) {
     let prepared = Dynamics::<f64, 3, 6>::prepare(model, DT_S);
     let transition = Dynamics::<f64, 3, 6>::transition(model, &prepared, &start, Some(Phase::Extend));
     let observation = Channel::<f64, 3, 6>::observe(model, &start, Some(Phase::Extend));
-    let step = LinearStep::new(start.mean, &transition, transition.mean, &observation);
+    let step = LinearStep::new(start.mean, &transition, transition.mean, &[observation]);
     let readings: Vec<SVector<f64, 1>> = readings().into_iter().map(|y| SVector::from([y])).collect();
     criterion.bench_function("adskalman, n = 3, 512 steps", |bencher| {
         bencher.iter_batched(

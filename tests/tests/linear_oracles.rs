@@ -216,7 +216,7 @@ impl Channel<f64, 5, 15> for Frozen {
 #[test]
 fn filter_and_smoother_agree_with_adskalman() {
     let (start, step) = linearised();
-    let bridge = LinearStep::new(start.mean, &step.0, step.0.mean, &step.1);
+    let bridge = LinearStep::new(start.mean, &step.0, step.0.mean, &[step.1]);
     let mut draws = Draws(ChaCha12Rng::seed_from_u64(9));
     let readings: Vec<Option<f64>> =
         (0..40).map(|k| (k % 5 != 3).then(|| step.1.value + 0.05 * draws.normal())).collect();
@@ -250,7 +250,7 @@ fn filter_without_offset(
     filtered: &[StateAndCovariance<f64, nalgebra::Const<5>>],
 ) -> Vec<StateAndCovariance<f64, nalgebra::Const<5>>> {
     let homogeneous = Transition { mean: SVector::zeros(), ..step.0 };
-    let bridge = LinearStep::new(SVector::zeros(), &homogeneous, SVector::zeros(), &step.1);
+    let bridge = LinearStep::new(SVector::zeros(), &homogeneous, SVector::zeros(), &[step.1]);
     KalmanFilterNoControl::new(&bridge, &bridge).smooth_from_filtered(filtered.to_vec()).unwrap()
 }
 

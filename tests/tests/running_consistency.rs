@@ -214,7 +214,7 @@ fn a_filter_with_a_wide_gate_is_consistent() {
 }
 
 /// Four times too much or too little process or reading noise. The mean NIS of 273 readings has a deviation of 0.086 in a
-/// consistent filter. Here it is 0.45, 0.47, 1.6 (gated) or more, at least six deviations off: found nearly always.
+/// consistent filter. Here it is 0.45, 0.47, 1.57 (gated) or more, at least six deviations off: found nearly always.
 #[test]
 fn wrong_noise_is_detected() {
     let times = |q: f64, r: f64| Linear { noise: truth().noise * q, variance: truth().variance * r, ..truth() };
