@@ -1,12 +1,16 @@
 use rmpfit::{MPConfig, MPError, MPFitter, MPPar, MPResult, MPSide, MPSuccess};
 
 use super::law::{ClosedFormError, Datum, SeparableLaw};
-use super::projection::Projection;
+use super::projection::{Projection, least_squares};
 use super::search::{Extent, Search, starts};
 use super::statistics::ClosedFormFit;
 
 /// Starts that are followed to their minimum.
 const FOLLOWED: usize = 5;
+/// Gauss-Newton steps at the end, at most.
+const MOST_POLISHES: usize = 20;
+/// Largest step of those in units of the residual's norm.
+const SMALL_STEP: f64 = 1e-3;
 
 /// Fits a law to readings by least squares; the starts are found on a grid of the nonlinear parameters, and the best of
 /// several minima is taken.
@@ -94,7 +98,35 @@ impl<'a> Problem<'a> {
         let mut descent = Descent::new(self);
         let status = descent.mpfit(&mut point).map_err(|error| ClosedFormError::Optimiser(reason(&error)))?;
         let converged = !matches!(status.success, MPSuccess::NotDone | MPSuccess::MaxIter);
-        Ok(End { cost: status.best_norm, theta: self.theta(&point), converged })
+        self.polish(&mut point);
+        let theta = self.theta(&point);
+        let cost = self.at(&theta).ok_or(ClosedFormError::NotFinite)?.cost();
+        Ok(End { cost, theta, converged })
+    }
+
+    /// Gauss-Newton steps as long as they shrink. The descent stops where the *cost* is flat to rounding, half the digits
+    /// short of where its gradient is.
+    fn polish(&self, point: &mut [f64]) {
+        let mut last = f64::INFINITY;
+        for _ in 0..MOST_POLISHES {
+            let theta = self.theta(point);
+            let inside = theta.iter().zip(&self.searches).all(|(value, search)| !search.at_limit(*value));
+            let Some(projection) = self.at(&theta).filter(|_| inside) else { return };
+            let mut jacobian = projection.jacobian();
+            for ((mut column, search), x) in jacobian.column_iter_mut().zip(&self.searches).zip(point.iter()) {
+                column *= search.value_and_slope(*x).1;
+            }
+            let Some((_, step)) = least_squares(&jacobian, &projection.residual) else { return };
+            let size = (jacobian * &step).norm();
+            // The first step is small against the residual, or the descent has not ended in a minimum.
+            if !(size < 0.5 * last && size <= SMALL_STEP * projection.residual.norm()) {
+                return;
+            }
+            last = size;
+            for (x, step) in point.iter_mut().zip(step.iter()) {
+                *x -= step;
+            }
+        }
     }
 
     fn theta(&self, point: &[f64]) -> Vec<f64> {

@@ -66,7 +66,7 @@ impl Projection {
 
 /// Orthonormal columns that span the basis, and the weights. QR first, so that the SVD is of a small matrix; columns are
 /// scaled to length one, so that units do not decide about the rank.
-fn least_squares(basis: &DMatrix<f64>, response: &DVector<f64>) -> Option<(DMatrix<f64>, DVector<f64>)> {
+pub(super) fn least_squares(basis: &DMatrix<f64>, response: &DVector<f64>) -> Option<(DMatrix<f64>, DVector<f64>)> {
     let length = |column: f64| if column > 0.0 { column } else { 1.0 };
     let scale = DVector::from_iterator(basis.ncols(), basis.column_iter().map(|column| length(column.norm())));
     let mut scaled = basis.clone();
