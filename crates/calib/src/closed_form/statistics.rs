@@ -34,6 +34,8 @@ pub struct ClosedFormFit {
     pub covariance: DMatrix<f64>,
     /// Readings fitted.
     pub readings: usize,
+    /// Reading minus law, one per reading.
+    pub residuals: Vec<f64>,
     /// Sum of squared residuals.
     pub residual_sum: f64,
     /// Residual standard deviation σ, `√(sum / (n - p))`, in the unit of the reading.
@@ -109,6 +111,7 @@ impl ClosedFormFit {
             derived: derived.collect(),
             covariance,
             readings: data.len(),
+            residuals: projection.residual.as_slice().to_vec(),
             residual_sum,
             residual_sd: variance.sqrt(),
             r_squared: r_squared(data, residual_sum),
