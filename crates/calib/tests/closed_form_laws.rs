@@ -1,7 +1,7 @@
 //! The closed forms against the formulas as they are printed, and their gradients against finite differences.
 
 use ohmstrain_calib::closed_form::{
-    Burgers, Exponentials, Hold, ModulusShape, Moment, Movement, Moving, MovingHold, SeparableLaw,
+    Burgers, Datum, Exponentials, Hold, ModulusShape, Moment, Movement, Moving, MovingHold, SeparableLaw,
     StretchedExponential, TunnellingCurve, tunnelling_path, value_and_gradient,
 };
 use ohmstrain_model::{Modulus, Phase, PhaseStart, RelaxingModulus};
@@ -18,7 +18,8 @@ fn holding(elapsed_s: f64) -> Moment {
     Moment { elapsed_s, travel: 0.0, rate: 0.02, strain: 0.19, before }
 }
 
-/// A law, its weights, its θ, a moment and the reading as printed.
+/// A law, its weights, its θ, a moment and the reading as printed. A modulus with a floor has κ = r₀/r₀′ = 900/0.1 and
+/// r₀ E∞ as weights, r₀′ Eᵢ among the θ.
 type Case = (Box<dyn SeparableLaw>, Vec<f64>, Vec<f64>, Moment, f64);
 
 fn cases() -> Vec<Case> {
@@ -93,22 +94,22 @@ fn cases() -> Vec<Case> {
         ),
         (
             Box::new(MovingHold { modulus: WITH_FLOOR, several_speeds: true }),
-            vec![900.0, 40.0, 1500.0],
-            vec![5.0, 0.7, 0.1],
+            vec![9000.0, 270.0, 40.0, 1500.0],
+            vec![5.0, 0.07],
             held,
             start_floor * (0.9 + 0.1 * (0.3 + 0.7 * e(5.0))),
         ),
         (
             Box::new(MovingHold { modulus: TWO_TERMS, several_speeds: false }),
-            vec![900.0, 1500.0],
-            vec![2.0, 11.0, 0.5, 0.3, 0.1],
+            vec![9000.0, 180.0, 1500.0],
+            vec![2.0, 11.0, 0.05, 0.03],
             held,
             start_two * (0.9 + 0.1 * (0.5 * e(2.0) + 0.3 * e(11.0) + 0.2)),
         ),
         (
             Box::new(MovingHold { modulus: TWO_TERMS, several_speeds: false }),
-            vec![900.0, 1500.0],
-            vec![2.0, 11.0, 0.5, 0.3, 0.1],
+            vec![9000.0, 180.0, 1500.0],
+            vec![2.0, 11.0, 0.05, 0.03],
             at,
             900.0 * (0.5 * e(2.0) + 0.3 * e(11.0) + 0.2) * travel + 1500.0,
         ),
@@ -156,7 +157,7 @@ fn one_movement_and_hold_are_the_relaxing_modulus() {
     let model =
         RelaxingModulus::new(900.0, 40.0, 0.1, Modulus::<f64, 1>::WithFloor { tau_s: 5.0, floor: 0.3 / 0.7 }).unwrap();
     let law = MovingHold { modulus: WITH_FLOOR, several_speeds: true };
-    let read = |at: &Moment| value_and_gradient(&law, &[900.0, 40.0, 1500.0], &[5.0, 0.7, 0.1], at).0;
+    let read = |at: &Moment| value_and_gradient(&law, &[9000.0, 270.0, 40.0, 1500.0], &[5.0, 0.07], at).0;
     let start = PhaseStart { phase: Phase::Extend, strain: 0.05, resistance_ohm: 1500.0 };
     for elapsed_s in [0.0, 0.4, 3.0, 7.0] {
         let at = moving(elapsed_s);
@@ -168,6 +169,76 @@ fn one_movement_and_hold_are_the_relaxing_modulus() {
     for elapsed_s in [0.0, 0.4, 3.0, 70.0] {
         let (expected, _) = model.resistance_ohm(&hold, elapsed_s, 0.19, 0.0);
         assert!((read(&holding(elapsed_s)) - expected).abs() <= 1e-14 * expected);
+    }
+}
+
+/// Derived quantities against their definitions, and their gradients against finite differences, through standard errors:
+/// what a parameter's derivative is off by shows in them.
+#[test]
+fn derived_quantities_are_slopes_too() {
+    let data = [moving(1.0), holding(2.0), holding(9.0)].map(|at| Datum { at, reading: 0.0 });
+    let cases: Vec<(Box<dyn SeparableLaw>, Vec<f64>, usize)> = vec![
+        (Box::new(Exponentials::floor_share()), vec![1400.0, 70.0, 2.0], 2),
+        (
+            Box::new(Moving { modulus: TWO_TERMS, several_speeds: false }),
+            vec![300.0, 200.0, 100.0, 1500.0, 2.0, 11.0],
+            4,
+        ),
+        (Box::new(Hold { modulus: ModulusShape::SINGLE }), vec![1500.0, 150.0, 5.0], 2),
+        (Box::new(Hold { modulus: TWO_TERMS }), vec![1500.0, 150.0, 70.0, 5.0, 30.0], 3),
+        (
+            Box::new(MovingHold { modulus: ModulusShape::SINGLE, several_speeds: true }),
+            vec![900.0, 40.0, 1500.0, 5.0, 0.1],
+            3,
+        ),
+        (
+            Box::new(MovingHold { modulus: TWO_TERMS, several_speeds: true }),
+            vec![9000.0, 180.0, 40.0, 1500.0, 2.0, 11.0, 0.05, 0.03],
+            4,
+        ),
+    ];
+    for (law, parameters, split) in cases {
+        let derive = |parameters: &[f64]| law.derived(&parameters[..split], &parameters[split..], &data);
+        let derived = derive(&parameters);
+        assert!(!derived.is_empty());
+        for (i, own) in derived.iter().enumerate() {
+            for (k, slope) in own.gradient.iter().enumerate() {
+                let step = 1e-4 * parameters[k].abs();
+                let moved = |sign: f64| {
+                    let mut parameters = parameters.clone();
+                    parameters[k] += sign * step;
+                    derive(&parameters)[i].value
+                };
+                let difference = (moved(1.0) - moved(-1.0)) / (2.0 * step);
+                // h²/6 = 1.7e-9 p² of a third derivative of at most (10/p)³ of the value.
+                let tolerance = 2e-6 * own.value.abs() / parameters[k].abs();
+                assert!(
+                    (slope - difference).abs() <= tolerance,
+                    "{}, {k}: {slope} for {difference}",
+                    own.parameter.name
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn products_are_taken_apart() {
+    let law = MovingHold { modulus: TWO_TERMS, several_speeds: false };
+    let data = [Datum { at: holding(2.0), reading: 0.0 }];
+    let derived = law.derived(&[9000.0, 180.0, 1500.0], &[2.0, 11.0, 0.05, 0.03], &data);
+    let start = 900.0 * (0.5 * (-3.5_f64).exp() + 0.3 * (-7.0_f64 / 11.0).exp() + 0.2) * 0.14 + 1500.0;
+    for (name, expected) in [
+        ("r0", 900.0),
+        ("r0_hold", 0.1),
+        ("e1", 0.5),
+        ("e2", 0.3),
+        ("r_start", start),
+        ("r1_hold", 0.9 * start),
+        ("r_settled", start * (0.9 + 0.1 * 0.2)),
+    ] {
+        let found = derived.iter().find(|own| own.parameter.name == name).unwrap().value;
+        assert!((found - expected).abs() <= 1e-14 * expected, "{name}: {found}");
     }
 }
 

@@ -57,6 +57,17 @@ impl ModulusShape {
     pub const SINGLE: Self = Self { terms: 1, floor: false };
 }
 
+/// The name that [`FromStr`] reads; `single` for the exponential that equations 8 and 9 are printed with.
+impl fmt::Display for ModulusShape {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self { floor: false, .. } => out.write_str("single"),
+            Self { terms: 1, .. } => out.write_str("eq6"),
+            Self { terms, .. } => write!(out, "eq7:{terms}"),
+        }
+    }
+}
+
 impl ClosedForm {
     /// Whether the law has a modulus that can be chosen.
     #[must_use]
@@ -126,15 +137,16 @@ impl FromStr for ClosedForm {
     }
 }
 
-/// `eq6`, or `eq7:N` with two terms if N is left out.
+/// `single`, `eq6`, or `eq7:N` with two terms if N is left out.
 impl FromStr for ModulusShape {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
         match with_terms(text) {
+            Some(("single", None)) => Ok(Self::SINGLE),
             Some(("eq6", None)) => Ok(Self { terms: 1, floor: true }),
             Some(("eq7", terms)) => Ok(Self { terms: terms.unwrap_or(2), floor: true }),
-            _ => Err(format!("expected eq6 or eq7:N, N from 1 to {MOST_TERMS}")),
+            _ => Err(format!("expected single, eq6 or eq7:N, N from 1 to {MOST_TERMS}")),
         }
     }
 }

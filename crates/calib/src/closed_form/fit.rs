@@ -6,7 +6,7 @@ use super::search::{Extent, Search, starts};
 use super::statistics::ClosedFormFit;
 
 /// Starts that are followed to their minimum.
-const FOLLOWED: usize = 5;
+const FOLLOWED: usize = 12;
 /// Gauss-Newton steps at the end, at most.
 const MOST_POLISHES: usize = 20;
 /// Largest step of those in units of the residual's norm.

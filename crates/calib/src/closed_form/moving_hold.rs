@@ -1,6 +1,6 @@
 use super::catalogue::ModulusShape;
 use super::exponentials::decay;
-use super::law::{Datum, Derived, Moment, Parameter, SeparableLaw, Unit, value_and_gradient};
+use super::law::{Datum, Derived, Moment, Parameter, SeparableLaw, Unit, sort_terms, value_and_gradient};
 use super::moving::{intercept, time_constants};
 use super::search::{Extent, Search};
 
@@ -8,7 +8,10 @@ use super::search::{Extent, Search};
 /// ends: `R′ = R_s (1 - r₀′ + r₀′ E(t))` with `R_s = r₀ E(t_s) v t_s + v η + r₁`, t_s the movement's duration.
 ///
 /// A [`Moment`] with a movement before it is in the hold. For one movement and hold this is
-/// `ohmstrain_model::RelaxingModulus`, which also jumps by `v η` from rest into the movement and keeps that in the hold.
+/// `ohmstrain_model::RelaxingModulus`.
+///
+/// A modulus with a floor, `E = E∞ + Σ Eᵢ exp(-t/τᵢ)` with E(0) = 1, is fitted by `bᵢ = r₀′ Eᵢ`, `κ = r₀/r₀′` and
+/// `r₀ E∞`, which stay finite where the stiffness changes its sign on the way; r₀, r₀′ and Eᵢ are derived from them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MovingHold {
     /// The modulus E(t), shared.
@@ -17,30 +20,32 @@ pub struct MovingHold {
     pub several_speeds: bool,
 }
 
-/// E(t), relative to its start, and its derivatives with respect to the time constants, then to the shares.
-struct Modulus {
+/// `Σ bᵢ exp(-t/τᵢ)` and the fall of it since the start, with derivatives with respect to τ, then to b.
+struct Relaxed {
     value: f64,
-    slopes: Vec<f64>,
+    value_slopes: Vec<f64>,
+    fall: f64,
+    fall_slopes: Vec<f64>,
 }
 
 impl MovingHold {
-    /// With a floor, each term has a share and the floor the rest.
-    fn shares(&self) -> usize {
-        if self.modulus.floor { self.modulus.terms } else { 0 }
-    }
-
-    /// `E(t) = 1 + Σ wᵢ (exp(-t/τᵢ) - 1)`.
-    fn relaxed(&self, theta: &[f64], elapsed_s: f64) -> Modulus {
+    fn relaxed(&self, theta: &[f64], elapsed_s: f64) -> Relaxed {
         let terms = self.modulus.terms;
-        let mut out = Modulus { value: 1.0, slopes: vec![0.0; terms + self.shares()] };
+        let zeros = vec![0.0; theta.len()];
+        let mut out = Relaxed { value: 0.0, value_slopes: zeros.clone(), fall: 0.0, fall_slopes: zeros };
         for i in 0..terms {
-            let fall = (-elapsed_s / theta[i]).exp_m1();
-            let share = if self.modulus.floor { theta[terms + i] } else { 1.0 };
-            out.value += share * fall;
-            out.slopes[i] = share * decay(elapsed_s, theta[i]).1;
-            if self.modulus.floor {
-                out.slopes[terms + i] = fall;
-            }
+            let (left, slope) = decay(elapsed_s, theta[i]);
+            let gone = (-elapsed_s / theta[i]).exp_m1();
+            let weight = theta[terms + i];
+            out.value += weight * left;
+            out.fall += weight * gone;
+            (out.value_slopes[i], out.fall_slopes[i]) = (weight * slope, weight * slope);
+            (out.value_slopes[terms + i], out.fall_slopes[terms + i]) = (left, gone);
+        }
+        if !self.modulus.floor {
+            // The stiffness is r₀ itself: one exponential without r₀′.
+            let (left, slope) = decay(elapsed_s, theta[0]);
+            (out.value, out.value_slopes[0], out.value_slopes[1]) = (left, slope, 0.0);
         }
         out
     }
@@ -48,81 +53,116 @@ impl MovingHold {
 
 impl SeparableLaw for MovingHold {
     fn linear(&self) -> Vec<Parameter> {
-        let mut out = vec![Parameter::new("r0", Unit::ReadingPerStrain)];
+        let names: &[&str] = if self.modulus.floor { &["r0/r0_hold", "r0*e_inf"] } else { &["r0"] };
+        let mut out: Vec<Parameter> = names.iter().map(|name| Parameter::new(*name, Unit::ReadingPerStrain)).collect();
         out.extend(intercept(self.several_speeds));
         out
     }
 
     fn nonlinear(&self) -> Vec<Parameter> {
         let mut out = time_constants(self.modulus.terms);
-        out.extend((1..=self.shares()).map(|i| Parameter::new(format!("e{i}"), Unit::One)));
-        out.push(Parameter::new("r0_hold", Unit::One));
+        let name = |i| if self.modulus.floor { format!("r0_hold*e{i}") } else { "r0_hold".into() };
+        out.extend((1..=self.modulus.terms).map(|i| Parameter::new(name(i), Unit::One)));
         out
     }
 
     fn search(&self, extent: &Extent) -> Vec<Search> {
-        let mut out = extent.time_constants(self.modulus.terms);
-        let even = 0.8 / self.modulus.terms as f64;
-        out.extend((0..self.shares()).map(|_| Search::between(-20.0, 20.0, &[even])));
-        // r₀′ of 1 and more would have the resistance relax to nothing.
-        out.push(Search::between(-10.0, 1.0, &[0.1]));
+        let terms = self.modulus.terms;
+        let mut out = extent.time_constants(terms);
+        // A share of 1 and more would have the resistance relax to nothing.
+        out.extend((0..terms).map(|_| Search::between(-10.0, 1.0, &[0.1 / terms as f64])));
         out
     }
 
     fn basis(&self, theta: &[f64], at: &Moment, values: &mut [f64], slopes: &mut [f64]) {
-        let size = theta.len();
-        let last = values.len() - 1;
+        let (size, last) = (theta.len(), values.len() - 1);
         let (elapsed_s, travel) = at.before.map_or((at.elapsed_s, at.travel), |move_| (move_.duration_s, move_.travel));
         let moved = self.relaxed(theta, elapsed_s);
         values[0] = moved.value * travel;
-        if self.several_speeds {
-            values[1] = at.rate;
-        }
-        values[last] = 1.0;
-        for (slope, own) in slopes.iter_mut().zip(&moved.slopes) {
+        for (slope, own) in slopes.iter_mut().zip(&moved.value_slopes) {
             *slope = own * travel;
         }
+        if self.modulus.floor {
+            values[1] = travel;
+        }
+        if self.several_speeds {
+            values[last - 1] = at.rate;
+        }
+        values[last] = 1.0;
         if at.before.is_none() {
             return;
         }
         let held = self.relaxed(theta, at.elapsed_s);
-        let fraction = theta[size - 1];
-        let share = 1.0 + fraction * (held.value - 1.0);
+        let left = 1.0 + held.fall;
         for (j, value) in values.iter_mut().enumerate() {
-            for k in 0..size - 1 {
-                slopes[j * size + k] = slopes[j * size + k] * share + *value * fraction * held.slopes[k];
+            for k in 0..size {
+                slopes[j * size + k] = slopes[j * size + k] * left + *value * held.fall_slopes[k];
             }
-            slopes[j * size + size - 1] = *value * (held.value - 1.0);
-            *value *= share;
+            *value *= left;
         }
     }
 
     fn order(&self, _weights: &mut [f64], theta: &mut [f64]) {
-        let terms = self.modulus.terms;
-        if !self.modulus.floor {
-            return;
-        }
-        let (taus, shares) = theta.split_at_mut(terms);
-        super::law::sort_terms(&mut shares[..terms], taus);
+        let (taus, shares) = theta.split_at_mut(self.modulus.terms);
+        sort_terms(shares, taus);
     }
 
-    /// The reading at the start of the hold, and r₁′, if there is but one hold.
+    /// r₀, r₀′ and Eᵢ where the fit has them in products; the reading at the start of the hold, where it settles, and r₁′,
+    /// if there is but one hold.
     fn derived(&self, weights: &[f64], theta: &[f64], data: &[Datum]) -> Vec<Derived> {
-        let mut holds = data.iter().map(|datum| datum.at).filter(|at| at.before.is_some());
-        let Some(first) = holds.next() else { return Vec::new() };
-        if holds.any(|at| at.before != first.before) {
-            return Vec::new();
+        let terms = self.modulus.terms;
+        let (linear, size) = (weights.len(), weights.len() + theta.len());
+        let shares = linear + terms..size;
+        let sum: f64 = theta[terms..].iter().sum();
+        // r₀′ and its gradient: 1 · b without a floor, (κ Σ b + r₀ E∞) / κ with one.
+        let (fraction, fraction_slope) = {
+            let mut slope = vec![0.0; size];
+            slope[shares.clone()].fill(1.0);
+            let rest = if self.modulus.floor { weights[1] / weights[0] } else { 0.0 };
+            if self.modulus.floor {
+                (slope[0], slope[1]) = (-rest / weights[0], 1.0 / weights[0]);
+            }
+            (sum + rest, slope)
+        };
+        let mut out = Vec::new();
+        let mut push = |name: String, unit, value, gradient| {
+            out.push(Derived { parameter: Parameter::new(name, unit), value, gradient });
+        };
+        if self.modulus.floor {
+            let mut slope: Vec<f64> = fraction_slope.iter().map(|slope| slope * weights[0]).collect();
+            slope[0] += fraction;
+            push("r0".into(), Unit::ReadingPerStrain, weights[0] * fraction, slope);
+            push("r0_hold".into(), Unit::One, fraction, fraction_slope.clone());
+            for i in 0..terms {
+                let share = theta[terms + i] / fraction;
+                let mut slope: Vec<f64> = fraction_slope.iter().map(|slope| -share * slope / fraction).collect();
+                slope[shares.start + i] += 1.0 / fraction;
+                push(format!("e{}", i + 1), Unit::One, share, slope);
+            }
         }
-        let (start, slope) = value_and_gradient(self, weights, theta, &Moment { elapsed_s: 0.0, ..first });
-        let rest = 1.0 - theta[theta.len() - 1];
-        let mut gradient: Vec<f64> = slope.iter().map(|slope| slope * rest).collect();
-        if let Some(last) = gradient.last_mut() {
-            *last -= start;
+        let Some(first) = only_hold(data) else { return out };
+        let (start, start_slope) = value_and_gradient(self, weights, theta, &Moment { elapsed_s: 0.0, ..first });
+        let left_of_start = |gone: f64, gone_slope: &[f64]| -> Vec<f64> {
+            start_slope
+                .iter()
+                .zip(gone_slope)
+                .map(|(own, gone_slope)| own * (1.0 - gone) - start * gone_slope)
+                .collect()
+        };
+        push("r1_hold".into(), Unit::Reading, start * (1.0 - fraction), left_of_start(fraction, &fraction_slope));
+        if self.modulus.floor {
+            let mut slope = vec![0.0; size];
+            slope[shares].fill(1.0);
+            push("r_settled".into(), Unit::Reading, start * (1.0 - sum), left_of_start(sum, &slope));
         }
-        let parameter = |name| Parameter::new(name, Unit::Reading);
-        vec![
-            Derived { parameter: parameter("r_start"), value: start, gradient: slope },
-            Derived { parameter: parameter("r1_hold"), value: start * rest, gradient },
-        ]
+        push("r_start".into(), Unit::Reading, start, start_slope);
+        out
     }
+}
+
+/// A moment in the hold, if all holds follow the same movement.
+fn only_hold(data: &[Datum]) -> Option<Moment> {
+    let mut holds = data.iter().map(|datum| datum.at).filter(|at| at.before.is_some());
+    let first = holds.next()?;
+    holds.all(|at| at.before == first.before).then_some(first)
 }

@@ -18,8 +18,8 @@ pub struct FitLawArgs {
     /// The law: eq1, eq2, eq5:N, eq6, eq7:N, eq8, eq9, eq8+eq9, kww, prony:N or tunnelling
     #[arg(long, default_value = "eq8+eq9")]
     pub law: ClosedForm,
-    /// Modulus in equations 8 and 9 instead of one exponential: eq6 or eq7:N
-    #[arg(long)]
+    /// Modulus in equations 8 and 9: single (one exponential, as printed), eq6 or eq7:N
+    #[arg(long, value_name = "MODULUS")]
     pub modulus: Option<ModulusShape>,
     /// Segments to fit, separated by commas: extend, hold or retract, the N-th of them as in hold:2, or whole for the
     /// recording without a cut; by default all that the law is about
@@ -62,7 +62,7 @@ residuals: near 1 the errors are several times too small. A hold before the firs
 asked for.
 
 --table: a row is the mean over the segments of that material, speed (within 10 %) and phase. With two or more, ± is the
-standard error from their scatter. A movement without a hold after it is fitted by eq8 alone, and R^2 is that of the phase.
+standard error from their scatter. A movement without a hold after it is fitted by eq8 alone. R^2 is that of the phase, the smallest of the row's segments.
 `rest` is a hold after a release.";
 
 /// Which segments to fit.

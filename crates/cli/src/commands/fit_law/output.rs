@@ -1,5 +1,5 @@
 use comfy_table::{Table, presets};
-use ohmstrain_calib::closed_form::Estimated;
+use ohmstrain_calib::closed_form::{Estimated, ModulusShape};
 use serde::Serialize;
 
 use super::{Fits, Fitted, phase_of};
@@ -21,8 +21,8 @@ struct FitReport<'a> {
     segment: &'a str,
     phase: &'static str,
     law: String,
-    /// Whether equations 8 and 9 have a modulus with a floor, and of how many terms.
-    modulus_terms: Option<usize>,
+    /// In equations 8 and 9.
+    modulus: Option<String>,
     from_s: f64,
     until_s: f64,
     speed_per_s: Option<f64>,
@@ -72,7 +72,7 @@ fn fit_report<'a>(recording: &'a Fits, Fitted { piece, fit }: &'a Fitted, args: 
         segment: &piece.label,
         phase: phase_of(piece),
         law: piece.law.to_string(),
-        modulus_terms: args.modulus.map(|modulus| modulus.terms),
+        modulus: piece.law.has_modulus().then(|| args.modulus.unwrap_or(ModulusShape::SINGLE).to_string()),
         from_s: piece.from_s,
         until_s: piece.until_s,
         speed_per_s: piece.speed_per_s,

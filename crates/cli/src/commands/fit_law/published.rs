@@ -1,11 +1,11 @@
 use comfy_table::{Table, presets};
-use ohmstrain_calib::closed_form::{ClosedForm, Datum};
+use ohmstrain_calib::closed_form::{ClosedForm, Datum, Estimated};
 use ohmstrain_model::Phase;
 
 use super::{Fits, Fitted, SAME_SPEED, output};
 use crate::error::CliError;
 use crate::output::write_to;
-use crate::report::number::{plain, with_error};
+use crate::report::number::{fixed, plain, with_error};
 
 /// What one phase of one fit contributes.
 struct Entry<'a> {
@@ -27,12 +27,11 @@ pub fn table(recordings: &[Fits]) -> Result<(), CliError> {
     let speed = |entry: &Entry| entry.speed.unwrap_or(f64::INFINITY);
     entries.sort_by(|a, b| a.material.cmp(b.material).then(speed(a).total_cmp(&speed(b))));
     let names = output::names(entries.iter().map(|entry| entry.fitted));
-    let names: Vec<&String> = names.iter().filter(|name| PHASES.iter().any(|phase| belongs(name, phase))).collect();
     let mut table = Table::new();
     table.load_style(presets::ASCII_MARKDOWN);
     let unit = if in_mm { "speed, mm/s" } else { "speed, 1/s" };
     let header = ["material", unit, "phase", "segments"].map(String::from).into_iter();
-    table.set_header(header.chain(names.iter().map(|name| (*name).clone())).chain(["R^2".into()]));
+    table.set_header(header.chain(names.iter().cloned()).chain(["R^2".into()]));
     for group in entries.chunk_by_mut(|a, b| a.material == b.material && is_same_speed(a.speed, b.speed)) {
         group.sort_by_key(order);
         for phase in group.chunk_by(|a, b| a.phase == b.phase) {
@@ -66,7 +65,7 @@ fn entries(recording: &Fits, in_mm: bool) -> Vec<Entry<'_>> {
         let is_pair = piece.law == ClosedForm::Eq8And9;
         let mut push = |phase, is_in: &dyn Fn(&Datum) -> bool| {
             out.push(Entry {
-                material: recording.material.as_deref().unwrap_or(&recording.name),
+                material: recording.material.as_deref().unwrap_or_else(|| file_name(&recording.name)),
                 speed: piece.speed_per_s.map(|speed| speed * scale),
                 phase,
                 fitted,
@@ -83,6 +82,11 @@ fn entries(recording: &Fits, in_mm: bool) -> Vec<Entry<'_>> {
     out
 }
 
+/// A recording that does not say its material stands for itself.
+fn file_name(path: &str) -> &str {
+    path.rsplit(['/', '\\']).next().unwrap_or(path)
+}
+
 /// R² of the readings of one phase about their own mean.
 fn r_squared(fitted: &Fitted, is_in: impl Fn(&Datum) -> bool) -> f64 {
     let both = || fitted.piece.data.iter().zip(&fitted.fit.residuals).filter(|(datum, _)| is_in(datum));
@@ -95,7 +99,11 @@ fn r_squared(fitted: &Fitted, is_in: impl Fn(&Datum) -> bool) -> f64 {
 /// Whether a parameter is about a phase: what belongs to the hold stands in its row, time constants and shares in both.
 fn belongs(name: &str, phase: &str) -> bool {
     let of_hold = ["r0_hold", "r1_hold", "r_start", "r_settled"].iter().any(|start| name.starts_with(start));
-    let of_movement = name == "r0" || name == "r1" || name == "eta" || name == "v*eta+r1" || name.starts_with("r0*");
+    let of_movement = name == "r0"
+        || name == "r1"
+        || name == "eta"
+        || name == "v*eta+r1"
+        || ["r0*", "r0/"].iter().any(|start| name.starts_with(start));
     match phase {
         "extend" | "retract" => !of_hold,
         _ => !of_movement,
@@ -103,7 +111,7 @@ fn belongs(name: &str, phase: &str) -> bool {
 }
 
 /// Means over the fits of a group, with their standard errors.
-fn row(group: &[Entry], names: &[&String]) -> Vec<String> {
+fn row(group: &[Entry], names: &[String]) -> Vec<String> {
     let first = &group[0];
     let speeds: Vec<f64> = group.iter().filter_map(|entry| entry.speed).collect();
     let mut out = vec![first.material.to_string()];
@@ -111,15 +119,14 @@ fn row(group: &[Entry], names: &[&String]) -> Vec<String> {
     out.extend([first.phase.to_string(), group.len().to_string()]);
     for name in names {
         let is_here = belongs(name, first.phase);
-        let found: Vec<(f64, f64)> = group
-            .iter()
-            .filter_map(|entry| entry.fitted.fit.get(name).filter(|_| is_here))
-            .filter_map(|estimated| Some((estimated.value, estimated.standard_error?)))
-            .collect();
-        out.push(mean(&found));
+        let own: Vec<&Estimated> =
+            group.iter().filter_map(|entry| entry.fitted.fit.get(name).filter(|_| is_here)).collect();
+        let told: Vec<(f64, f64)> =
+            own.iter().filter_map(|estimated| Some((estimated.value, estimated.standard_error?))).collect();
+        out.push(if told.is_empty() && !own.is_empty() { "not told".into() } else { mean(&told) });
     }
     let worst = group.iter().map(|entry| entry.r_squared).fold(f64::INFINITY, f64::min);
-    out.push(format!("{worst:.4}"));
+    out.push(fixed(worst, 4));
     out
 }
 
