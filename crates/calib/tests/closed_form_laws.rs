@@ -172,8 +172,7 @@ fn one_movement_and_hold_are_the_relaxing_modulus() {
     }
 }
 
-/// Derived quantities against their definitions, and their gradients against finite differences, through standard errors:
-/// what a parameter's derivative is off by shows in them.
+/// Standard errors of derived quantities are carried over by these gradients.
 #[test]
 fn derived_quantities_are_slopes_too() {
     let data = [moving(1.0), holding(2.0), holding(9.0)].map(|at| Datum { at, reading: 0.0 });
