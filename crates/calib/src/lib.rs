@@ -12,6 +12,7 @@
 mod baseline;
 mod blocks;
 mod calibrate;
+pub mod closed_form;
 mod design;
 mod error;
 mod estimator_params;

@@ -1,3 +1,5 @@
+mod fit_law;
+
 use std::path::PathBuf;
 use std::str::FromStr;
 
@@ -6,6 +8,8 @@ use ohmstrain_bench_data::simulate::{Material, Protocol};
 use ohmstrain_bench_data::{FrontEndSpec, JointSpec, Metadata};
 use ohmstrain_calib::{EstimatorKind, GaugeFamily};
 use ohmstrain_ekf::Influence;
+
+pub use fit_law::{FitLawArgs, SegmentChoice, phase_name};
 
 /// From the resistance of a soft strain sensor to strain, with an honest error bar.
 #[derive(Debug, Parser)]
@@ -25,6 +29,8 @@ pub enum Command {
     Simulate(SimulateArgs),
     /// Fit law, noise and motion to recordings with a known strain
     Calibrate(CalibrateArgs),
+    /// Fit the source paper's closed-form laws to stretches, holds and releases
+    FitLaw(FitLawArgs),
     /// Turn readings into strain, row by row
     Filter(FilterArgs),
     /// Turn a whole recording into strain, every estimate from all readings

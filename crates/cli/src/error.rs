@@ -41,6 +41,11 @@ impl CliError {
         ExitCode::from(code)
     }
 
+    /// Says on stderr what did not stop the command.
+    pub fn remark(text: &str) {
+        let _ = writeln!(io::stderr(), "ohmstrain: {text}");
+    }
+
     /// Calibration failed on the contents of `files`.
     pub fn calibration(files: &[&str], error: &CalibrationError) -> Self {
         match error {

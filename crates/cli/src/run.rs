@@ -60,15 +60,18 @@ pub fn rest_reading(
     match wanted {
         None => Ok(params.rest_reading),
         Some(RestResistance::Value(value)) => Ok(value),
-        Some(RestResistance::First(count)) => {
-            let mut known: Vec<f64> = first.filter(|value| value.is_finite()).take(count).collect();
-            known.sort_by(f64::total_cmp);
-            match known.len() {
-                0 => Err(CliError::Input(format!("{file}: expected a reading among the first rows, found none"))),
-                n if n % 2 == 1 => Ok(known[n / 2]),
-                n => Ok(0.5 * (known[n / 2 - 1] + known[n / 2])),
-            }
-        }
+        Some(RestResistance::First(count)) => median_of_first(count, first, file),
+    }
+}
+
+/// Median of the first `count` known readings.
+pub fn median_of_first(count: usize, first: impl Iterator<Item = f64>, file: &str) -> Result<f64, CliError> {
+    let mut known: Vec<f64> = first.filter(|value| value.is_finite()).take(count).collect();
+    known.sort_by(f64::total_cmp);
+    match known.len() {
+        0 => Err(CliError::Input(format!("{file}: expected a reading among the first rows, found none"))),
+        n if n % 2 == 1 => Ok(known[n / 2]),
+        n => Ok(0.5 * (known[n / 2 - 1] + known[n / 2])),
     }
 }
 

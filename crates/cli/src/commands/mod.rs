@@ -4,6 +4,7 @@ mod calibrate;
 mod demo;
 mod evaluate;
 mod filter;
+mod fit_law;
 mod scoring;
 mod simulate;
 mod smooth;
@@ -17,6 +18,7 @@ pub fn dispatch(command: &Command) -> Result<(), CliError> {
         Command::Demo(args) => demo::run(args),
         Command::Simulate(args) => simulate::run(args),
         Command::Calibrate(args) => calibrate::run(args),
+        Command::FitLaw(args) => fit_law::run(args),
         Command::Filter(args) => filter::run(args),
         Command::Smooth(args) => smooth::run(args),
         Command::Evaluate(args) => evaluate::run(args),

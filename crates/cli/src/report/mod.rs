@@ -11,7 +11,7 @@ mod ink;
 mod innovations;
 mod law;
 mod motion;
-mod number;
+pub mod number;
 mod recording;
 mod summary;
 mod tables;

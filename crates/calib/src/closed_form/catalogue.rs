@@ -1,0 +1,159 @@
+use std::fmt;
+use std::str::FromStr;
+
+use super::exponentials::{Burgers, Exponentials};
+use super::law::SeparableLaw;
+use super::moving::{Hold, Moving};
+use super::moving_hold::MovingHold;
+use super::stretched::StretchedExponential;
+use super::tunnelling::TunnellingCurve;
+
+/// Most terms of a sum of exponentials: beyond four no recording tells them apart.
+const MOST_TERMS: usize = 4;
+
+/// The laws by name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum ClosedForm {
+    /// `eq1`: [`Exponentials::two_rates`].
+    Eq1,
+    /// `eq2`: [`Burgers`].
+    Eq2,
+    /// `eq5:N`: [`Exponentials::without_floor`]; two terms if N is left out.
+    Eq5 {
+        /// Number of exponentials.
+        terms: usize,
+    },
+    /// `eq6`: [`Exponentials::floor_share`].
+    Eq6,
+    /// `eq7:N` and `prony:N`: [`Exponentials::prony`]; two terms if N is left out.
+    Eq7 {
+        /// Number of exponentials.
+        terms: usize,
+    },
+    /// `eq8`: [`Moving`].
+    Eq8,
+    /// `eq9`: [`Hold`].
+    Eq9,
+    /// `eq8+eq9`: [`MovingHold`].
+    Eq8And9,
+    /// `kww`: [`StretchedExponential`].
+    Kww,
+    /// `tunnelling`: [`TunnellingCurve`].
+    Tunnelling,
+}
+
+/// The modulus in equations 8 and 9, relative to its start.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ModulusShape {
+    /// Number of exponentials, at least 1.
+    pub terms: usize,
+    /// Whether it relaxes to a floor instead of to nothing; more than one term always has one.
+    pub floor: bool,
+}
+
+impl ModulusShape {
+    /// `exp(-t/τ₀)`, as equations 8 and 9 are printed.
+    pub const SINGLE: Self = Self { terms: 1, floor: false };
+}
+
+/// The name that [`FromStr`] reads; `single` for the exponential that equations 8 and 9 are printed with.
+impl fmt::Display for ModulusShape {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self { floor: false, .. } => out.write_str("single"),
+            Self { terms: 1, .. } => out.write_str("eq6"),
+            Self { terms, .. } => write!(out, "eq7:{terms}"),
+        }
+    }
+}
+
+impl ClosedForm {
+    /// Whether the law has a modulus that can be chosen.
+    #[must_use]
+    pub const fn has_modulus(self) -> bool {
+        matches!(self, Self::Eq8 | Self::Eq9 | Self::Eq8And9)
+    }
+
+    /// The law, with a modulus for equations 8 and 9, whether the data have several speeds, and the reading at rest for
+    /// equation 2.
+    #[must_use]
+    pub fn law(self, modulus: ModulusShape, several_speeds: bool, rest_reading: f64) -> Box<dyn SeparableLaw> {
+        match self {
+            Self::Eq1 => Box::new(Exponentials::two_rates()),
+            Self::Eq2 => Box::new(Burgers { rest_reading }),
+            Self::Eq5 { terms } => Box::new(Exponentials::without_floor(terms)),
+            Self::Eq6 => Box::new(Exponentials::floor_share()),
+            Self::Eq7 { terms } => Box::new(Exponentials::prony(terms)),
+            Self::Eq8 => Box::new(Moving { modulus, several_speeds }),
+            Self::Eq9 => Box::new(Hold { modulus }),
+            Self::Eq8And9 => Box::new(MovingHold { modulus, several_speeds }),
+            Self::Kww => Box::new(StretchedExponential),
+            Self::Tunnelling => Box::new(TunnellingCurve),
+        }
+    }
+}
+
+/// The name that [`FromStr`] reads.
+impl fmt::Display for ClosedForm {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Eq1 => out.write_str("eq1"),
+            Self::Eq2 => out.write_str("eq2"),
+            Self::Eq5 { terms } => write!(out, "eq5:{terms}"),
+            Self::Eq6 => out.write_str("eq6"),
+            Self::Eq7 { terms } => write!(out, "prony:{terms}"),
+            Self::Eq8 => out.write_str("eq8"),
+            Self::Eq9 => out.write_str("eq9"),
+            Self::Eq8And9 => out.write_str("eq8+eq9"),
+            Self::Kww => out.write_str("kww"),
+            Self::Tunnelling => out.write_str("tunnelling"),
+        }
+    }
+}
+
+impl FromStr for ClosedForm {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let expected = || {
+            let names = "eq1, eq2, eq5:N, eq6, eq7:N, eq8, eq9, eq8+eq9, kww, prony:N or tunnelling";
+            format!("expected {names}, N from 1 to {MOST_TERMS}")
+        };
+        let (name, terms) = with_terms(text).ok_or_else(expected)?;
+        match (name, terms) {
+            ("eq1", None) => Ok(Self::Eq1),
+            ("eq2", None) => Ok(Self::Eq2),
+            ("eq5", terms) => Ok(Self::Eq5 { terms: terms.unwrap_or(2) }),
+            ("eq6", None) => Ok(Self::Eq6),
+            ("eq7" | "prony", terms) => Ok(Self::Eq7 { terms: terms.unwrap_or(2) }),
+            ("eq8", None) => Ok(Self::Eq8),
+            ("eq9", None) => Ok(Self::Eq9),
+            ("eq8+eq9", None) => Ok(Self::Eq8And9),
+            ("kww", None) => Ok(Self::Kww),
+            ("tunnelling", None) => Ok(Self::Tunnelling),
+            _ => Err(expected()),
+        }
+    }
+}
+
+/// `single`, `eq6`, or `eq7:N` with two terms if N is left out.
+impl FromStr for ModulusShape {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match with_terms(text) {
+            Some(("single", None)) => Ok(Self::SINGLE),
+            Some(("eq6", None)) => Ok(Self { terms: 1, floor: true }),
+            Some(("eq7", terms)) => Ok(Self { terms: terms.unwrap_or(2), floor: true }),
+            _ => Err(format!("expected single, eq6 or eq7:N, N from 1 to {MOST_TERMS}")),
+        }
+    }
+}
+
+/// A name and the N behind its colon; `None` if that is no number of terms.
+fn with_terms(text: &str) -> Option<(&str, Option<usize>)> {
+    let Some((name, terms)) = text.split_once(':') else { return Some((text, None)) };
+    let terms = terms.parse().ok().filter(|terms| (1..=MOST_TERMS).contains(terms))?;
+    Some((name, Some(terms)))
+}

@@ -1,0 +1,35 @@
+//! Closed-form laws of the source paper, and of its field, fitted to single phases of a recording.
+//!
+//! A filter needs a law that holds over a whole session; these hold over one stretch, one hold or one release, and are
+//! what publications report. [`ClosedForm`] names them, [`fit_closed_form`] fits them without a start by hand.
+//!
+//! # Policy
+//! - Every law is a weighted sum of functions that have few parameters of their own ([`SeparableLaw`]). The weights are
+//!   eliminated, so only time constants and their like are searched.
+//! - A parameter that the data do not tell has no standard error (`None`) instead of an enormous or a tiny one.
+//! - Standard errors take residuals for white. [`ClosedFormFit::residual_autocorrelation`] says how far they are from it.
+
+mod catalogue;
+mod exponentials;
+mod fit;
+mod law;
+mod moving;
+mod moving_hold;
+mod pieces;
+mod projection;
+mod search;
+mod statistics;
+mod stretched;
+mod tunnelling;
+
+pub use catalogue::{ClosedForm, ModulusShape};
+pub use exponentials::{Burgers, Exponentials};
+pub use fit::{fit_closed_form, fit_closed_form_from};
+pub use law::{ClosedFormError, Datum, Derived, Moment, Movement, Parameter, SeparableLaw, Unit, value_and_gradient};
+pub use moving::{Hold, Moving};
+pub use moving_hold::MovingHold;
+pub use pieces::{hold_data, moving_data, whole_data};
+pub use search::{Extent, Search};
+pub use statistics::{ClosedFormFit, Estimated};
+pub use stretched::StretchedExponential;
+pub use tunnelling::{TunnellingCurve, tunnelling_path};

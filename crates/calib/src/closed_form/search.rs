@@ -1,0 +1,118 @@
+use super::law::Datum;
+
+/// Points per time constant on the grid of starts.
+const GRID: usize = 8;
+/// Shortest time constant, in steps between readings: after three steps nothing of it is left.
+const SHORTEST_STEPS: f64 = 0.3;
+/// Longest time constant, in durations: the bend of the exponential is then 1/60 of its fall.
+const LONGEST_DURATIONS: f64 = 30.0;
+
+/// What the data span.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Extent {
+    /// Typical time between readings, s.
+    pub step_s: f64,
+    /// Longest time since the start of a phase, s.
+    pub duration_s: f64,
+    /// Largest strain in magnitude.
+    pub strain: f64,
+}
+
+impl Extent {
+    /// Of data in the order of their times.
+    pub(super) fn of(data: &[Datum]) -> Self {
+        let mut steps: Vec<f64> = data.windows(2).map(|pair| pair[1].at.elapsed_s - pair[0].at.elapsed_s).collect();
+        steps.retain(|step| *step > 0.0);
+        steps.sort_by(f64::total_cmp);
+        let largest = |value: fn(&Datum) -> f64| data.iter().map(value).fold(0.0, f64::max);
+        let duration_s = largest(|datum| datum.at.elapsed_s).max(f64::MIN_POSITIVE);
+        let strain = largest(|datum| datum.at.strain.abs());
+        Self {
+            step_s: steps.get(steps.len() / 2).copied().unwrap_or(duration_s),
+            duration_s,
+            strain: if strain > 0.0 { strain } else { 1.0 },
+        }
+    }
+
+    /// Where to look for `count` time constants, s, that may change places.
+    #[must_use]
+    pub fn time_constants(&self, count: usize) -> Vec<Search> {
+        // A start beyond the duration or below the step would begin where the data say little.
+        let (first, last) = (self.step_s.ln(), self.duration_s.max(2.0 * self.step_s).ln());
+        let starts: Vec<f64> =
+            (0..GRID).map(|i| (first + (last - first) * (i as f64 + 0.5) / GRID as f64).exp()).collect();
+        let search = Search {
+            low: SHORTEST_STEPS * self.step_s,
+            high: LONGEST_DURATIONS * self.duration_s,
+            logarithmic: true,
+            starts,
+            above_previous: false,
+        };
+        (0..count).map(|i| Search { above_previous: i > 0, ..search.clone() }).collect()
+    }
+
+    /// The same as rates, 1/s.
+    #[must_use]
+    pub fn rates(&self, count: usize) -> Vec<Search> {
+        let inverse = |search: Search| Search {
+            low: 1.0 / search.high,
+            high: 1.0 / search.low,
+            starts: search.starts.iter().rev().map(|tau| 1.0 / tau).collect(),
+            ..search
+        };
+        self.time_constants(count).into_iter().map(inverse).collect()
+    }
+}
+
+/// Where to look for one nonlinear parameter.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Search {
+    /// Smallest value.
+    pub low: f64,
+    /// Largest value.
+    pub high: f64,
+    /// Whether to step in its logarithm; the limits are then positive.
+    pub logarithmic: bool,
+    /// Values to start from, ascending.
+    pub starts: Vec<f64>,
+    /// Whether it may change places with the parameter before, so that only starts above that one's are tried.
+    pub above_previous: bool,
+}
+
+impl Search {
+    /// A parameter that may have either sign.
+    #[must_use]
+    pub fn between(low: f64, high: f64, starts: &[f64]) -> Self {
+        Self { low, high, logarithmic: false, starts: starts.to_vec(), above_previous: false }
+    }
+
+    /// The coordinate that the optimiser moves.
+    pub(super) fn coordinate(&self, value: f64) -> f64 {
+        if self.logarithmic { value.ln() } else { value }
+    }
+
+    /// The value at a coordinate, and its derivative.
+    pub(super) fn value_and_slope(&self, coordinate: f64) -> (f64, f64) {
+        if self.logarithmic { (coordinate.exp(), coordinate.exp()) } else { (coordinate, 1.0) }
+    }
+
+    /// Whether a value stands at a limit, as far as the optimiser's steps resolve it.
+    pub(super) fn at_limit(&self, value: f64) -> bool {
+        let (low, high, x) = (self.coordinate(self.low), self.coordinate(self.high), self.coordinate(value));
+        (x - low).min(high - x) <= 1e-6 * (high - low)
+    }
+}
+
+/// Every combination of starts.
+pub(super) fn starts(searches: &[Search]) -> Vec<Vec<f64>> {
+    let mut out = vec![Vec::new()];
+    for search in searches {
+        let extend = |start: &Vec<f64>| {
+            let last = if search.above_previous { start.last().copied() } else { None };
+            let above = search.starts.iter().filter(|value| last.is_none_or(|last| **value > last));
+            above.map(|value| [start.as_slice(), &[*value]].concat()).collect::<Vec<_>>()
+        };
+        out = out.iter().flat_map(extend).collect();
+    }
+    out
+}

@@ -1,0 +1,122 @@
+//! `fit-law`: closed-form laws fitted to the segments of recordings.
+
+mod output;
+mod pieces;
+mod published;
+
+use ohmstrain_bench_data::ReadingKind;
+use ohmstrain_calib::closed_form::{ClosedForm, ClosedFormFit, ModulusShape, fit_closed_form};
+
+use crate::args::{FitLawArgs, RestResistance, phase_name};
+use crate::error::CliError;
+use crate::input::{self, Recording};
+use crate::run::median_of_first;
+use pieces::{Piece, pieces};
+
+/// A fitted piece of a recording.
+pub struct Fitted {
+    /// What was fitted to.
+    pub piece: Piece,
+    /// The fit.
+    pub fit: ClosedFormFit,
+}
+
+/// A recording and what was fitted to it.
+pub struct Fits {
+    /// What messages call it.
+    pub name: String,
+    /// What its metadata say it is made of.
+    pub material: Option<String>,
+    /// Length of the unstretched sensor, mm, where the metadata say it.
+    pub gauge_length_mm: Option<f64>,
+    /// Unit of the readings, `1` for a ratio.
+    pub reading_unit: &'static str,
+    /// Unit of the reference, `1` for strain.
+    pub strain_unit: &'static str,
+    /// The fits in the order of their times.
+    pub fits: Vec<Fitted>,
+}
+
+/// Speeds that differ by more than this share of the largest are several.
+pub const SAME_SPEED: f64 = 0.1;
+
+/// Fits the law to the chosen segments of each recording.
+pub fn run(args: &FitLawArgs) -> Result<(), CliError> {
+    if args.modulus.is_some() && !args.law.has_modulus() {
+        return Err(CliError::Arguments(format!("--modulus is for eq8, eq9 and eq8+eq9, not for {}", args.law)));
+    }
+    let overrides = args.trace.metadata();
+    let mut recordings = Vec::new();
+    for path in &args.traces {
+        recordings.push(fit_recording(&input::read(path, &overrides)?, args)?);
+    }
+    if args.json {
+        output::json(&recordings, args)
+    } else if args.table {
+        published::table(&recordings)
+    } else {
+        output::table(&recordings)
+    }
+}
+
+fn fit_recording(recording: &Recording, args: &FitLawArgs) -> Result<Fits, CliError> {
+    let trace = &recording.trace;
+    let rest_reading = match args.rest_resistance {
+        RestResistance::Value(value) => value,
+        RestResistance::First(count) => median_of_first(count, trace.readings.values.iter().copied(), &recording.name)?,
+    };
+    let mut pieces = pieces(recording, args)?;
+    if args.pool {
+        pieces = pooled(pieces);
+    }
+    let modulus = args.modulus.unwrap_or(ModulusShape::SINGLE);
+    let mut fits = Vec::new();
+    let mut refused = Vec::new();
+    for piece in pieces {
+        let law = piece.law.law(modulus, has_several_speeds(&piece), rest_reading);
+        match fit_closed_form(law.as_ref(), &piece.data) {
+            Ok(fit) => fits.push(Fitted { piece, fit }),
+            Err(error) => refused.push(format!("{}: {}: {error}", recording.name, piece.label)),
+        }
+    }
+    if fits.is_empty() {
+        return Err(CliError::Input(refused.swap_remove(0)));
+    }
+    for message in refused {
+        CliError::remark(&format!("{message}: not fitted"));
+    }
+    Ok(Fits {
+        name: recording.name.clone(),
+        material: trace.metadata.material.clone(),
+        gauge_length_mm: trace.metadata.gauge_length_mm,
+        reading_unit: if trace.readings.kind == ReadingKind::Ohm { "ohm" } else { "1" },
+        strain_unit: match recording.quantity() {
+            Some(ohmstrain_calib::Quantity::AngleDeg) => "deg",
+            _ => "1",
+        },
+        fits,
+    })
+}
+
+/// Pieces of the same law and phase become one.
+fn pooled(pieces: Vec<Piece>) -> Vec<Piece> {
+    let mut out: Vec<Piece> = Vec::new();
+    for piece in pieces {
+        match out.iter_mut().find(|other| (other.law, other.phase) == (piece.law, piece.phase)) {
+            Some(other) => other.join(piece),
+            None => out.push(piece),
+        }
+    }
+    out
+}
+
+fn has_several_speeds(piece: &Piece) -> bool {
+    let speeds = || piece.data.iter().map(|datum| datum.at.rate.abs());
+    let (low, high) = (speeds().fold(f64::INFINITY, f64::min), speeds().fold(0.0, f64::max));
+    matches!(piece.law, ClosedForm::Eq8 | ClosedForm::Eq8And9) && high - low > SAME_SPEED * high
+}
+
+/// Name of a piece's phase in output.
+fn phase_of(piece: &Piece) -> &'static str {
+    piece.phase.map_or("whole", phase_name)
+}

@@ -1,0 +1,137 @@
+use comfy_table::{Table, presets};
+use ohmstrain_calib::closed_form::{Estimated, ModulusShape};
+use serde::Serialize;
+
+use super::{Fits, Fitted, phase_of};
+use crate::args::FitLawArgs;
+use crate::error::CliError;
+use crate::output::write_to;
+use crate::report::number::{plain, with_error};
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Report<'a> {
+    fits: Vec<FitReport<'a>>,
+}
+
+#[derive(Serialize)]
+struct FitReport<'a> {
+    recording: &'a str,
+    material: Option<&'a str>,
+    segment: &'a str,
+    phase: &'static str,
+    law: String,
+    /// In equations 8 and 9.
+    modulus: Option<String>,
+    from_s: f64,
+    until_s: f64,
+    speed_per_s: Option<f64>,
+    n: usize,
+    parameters: Vec<ParameterReport<'a>>,
+    derived: Vec<ParameterReport<'a>>,
+    r2: f64,
+    aic: f64,
+    aicc: f64,
+    bic: f64,
+    residual_sd: f64,
+    residual_autocorrelation: f64,
+    condition: f64,
+    converged: bool,
+}
+
+#[derive(Serialize)]
+struct ParameterReport<'a> {
+    name: &'a str,
+    value: f64,
+    standard_error: Option<f64>,
+    unit: String,
+    at_limit: bool,
+}
+
+/// Prints everything that was computed.
+pub fn json(recordings: &[Fits], args: &FitLawArgs) -> Result<(), CliError> {
+    let of = |recording| move |fitted| fit_report(recording, fitted, args);
+    let fits = recordings.iter().flat_map(|recording| recording.fits.iter().map(of(recording))).collect();
+    write_to(None, |out| {
+        serde_json::to_writer_pretty(&mut *out, &Report { fits }).map_err(std::io::Error::from)?;
+        Ok(writeln!(out)?)
+    })
+}
+
+fn fit_report<'a>(recording: &'a Fits, Fitted { piece, fit }: &'a Fitted, args: &FitLawArgs) -> FitReport<'a> {
+    let report = |estimated: &'a Estimated| ParameterReport {
+        name: &estimated.parameter.name,
+        value: estimated.value,
+        standard_error: estimated.standard_error,
+        unit: estimated.parameter.unit.text(recording.reading_unit, recording.strain_unit),
+        at_limit: estimated.at_limit,
+    };
+    FitReport {
+        recording: &recording.name,
+        material: recording.material.as_deref(),
+        segment: &piece.label,
+        phase: phase_of(piece),
+        law: piece.law.to_string(),
+        modulus: piece.law.has_modulus().then(|| args.modulus.unwrap_or(ModulusShape::SINGLE).to_string()),
+        from_s: piece.from_s,
+        until_s: piece.until_s,
+        speed_per_s: piece.speed_per_s,
+        n: fit.readings,
+        parameters: fit.parameters.iter().map(report).collect(),
+        derived: fit.derived.iter().map(report).collect(),
+        r2: fit.r_squared,
+        aic: fit.aic,
+        aicc: fit.aicc,
+        bic: fit.bic,
+        residual_sd: fit.residual_sd,
+        residual_autocorrelation: fit.residual_autocorrelation,
+        condition: fit.condition,
+        converged: fit.converged,
+    }
+}
+
+/// Prints one row per fit.
+pub fn table(recordings: &[Fits]) -> Result<(), CliError> {
+    let fits = || recordings.iter().flat_map(|recording| recording.fits.iter().map(move |fitted| (recording, fitted)));
+    let names = names(fits().map(|(_, fitted)| fitted));
+    let mut table = Table::new();
+    table.load_style(presets::ASCII_MARKDOWN);
+    let header = ["recording", "segment", "speed, 1/s"].map(String::from).into_iter();
+    let quality = ["R^2", "AIC", "n", "neighbours"].map(String::from);
+    table.set_header(header.chain(names.iter().cloned()).chain(quality));
+    for (recording, Fitted { piece, fit }) in fits() {
+        let mut row = vec![recording.name.clone(), piece.label.clone()];
+        row.push(piece.speed_per_s.map_or_else(String::new, plain));
+        row.extend(names.iter().map(|name| fit.get(name).map_or_else(String::new, cell)));
+        row.extend([
+            format!("{:.5}", fit.r_squared),
+            format!("{:.1}", fit.aic),
+            fit.readings.to_string(),
+            format!("{:.2}", fit.residual_autocorrelation),
+        ]);
+        table.add_row(row);
+    }
+    write_to(None, |out| Ok(writeln!(out, "{table}")?))
+}
+
+/// Names of all parameters and derived quantities, each once.
+pub fn names<'a>(fits: impl Iterator<Item = &'a Fitted>) -> Vec<String> {
+    let mut out: Vec<String> = Vec::new();
+    for fitted in fits {
+        for estimated in fitted.fit.parameters.iter().chain(&fitted.fit.derived) {
+            if !out.contains(&estimated.parameter.name) {
+                out.push(estimated.parameter.name.clone());
+            }
+        }
+    }
+    out
+}
+
+/// A value with its standard error, or what there is to say instead.
+fn cell(estimated: &Estimated) -> String {
+    match estimated.standard_error {
+        Some(error) => with_error(estimated.value, error),
+        None if estimated.at_limit => format!("{} (limit)", plain(estimated.value)),
+        None => "not told".into(),
+    }
+}
