@@ -58,8 +58,8 @@ fn handicap(kind: EstimatorKind) -> f64 {
 /// Calibrates law, noise and motion on recordings with known strain. Deterministic: same samples, same result.
 ///
 /// Every estimator of `kinds` is tried with a law per strength of ridge; the pair with the best score on blocks that the
-/// law has not seen gives the law. To that law every one of them, and the extended Kalman filter in any case, is then
-/// fitted, and the best of `kinds` becomes the default. Near ties go to the one that keeps hypotheses.
+/// law has not seen gives the law. To that law every one of them, what smooths in its place, and the extended Kalman filter
+/// in any case, is then fitted, and the best of `kinds` becomes the default. Near ties go to the one that keeps hypotheses.
 ///
 /// # Errors
 /// If the recordings are too short or too plain to learn a law from, or `kinds` is empty.
@@ -73,8 +73,10 @@ pub fn calibrate(
     let laws = fit_laws(recordings, options)?;
     let stats = MotionStats::new(recordings);
     let mut all_kinds: Vec<EstimatorKind> = kinds.to_vec();
-    if !kinds.contains(&EstimatorKind::Ekf) {
-        all_kinds.push(EstimatorKind::Ekf);
+    for needed in kinds.iter().map(|kind| kind.smoother()).chain([EstimatorKind::Ekf]) {
+        if !all_kinds.contains(&needed) {
+            all_kinds.push(needed);
+        }
     }
     let surveys = SURVEY.evaluations() + (laws.len() as u64 - 1) * RESURVEY.evaluations();
     let expected = kinds.len() as u64 * surveys

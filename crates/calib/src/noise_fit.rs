@@ -76,7 +76,7 @@ impl<'a> NoiseProblem<'a> {
         let mut cost = |point: &[f64]| {
             evaluated();
             let pull: f64 = point.iter().zip(&start).map(|(x, s)| (x - s).powi(2)).sum();
-            left_out.score(self.kind, &self.params(point)) + REGULARISATION * pull
+            left_out.score(self.kind.tuned_as(), &self.params(point)) + REGULARISATION * pull
         };
         let from = from.map_or(&start, |tuned| &tuned.point);
         let point = optimise::polish(&mut cost, from, search.side, search.steps)?;
@@ -138,7 +138,7 @@ impl<'a> NoiseProblem<'a> {
         let fine = SHARE_OF_RESIDUAL * root_mean_square(&known).max(1e-9);
         let stats = &self.stats;
         let mut start = vec![root_mean_square(&left_out).max(1e-9), BASELINE_TIME_S, fine, fine];
-        start.extend(match self.kind {
+        start.extend(match self.kind.tuned_as() {
             EstimatorKind::Ekf | EstimatorKind::Ukf => [stats.rate_sd, stats.rate_time_s, stats.strain_sd],
             EstimatorKind::SignSplit | EstimatorKind::Particles => {
                 [stats.rate_sd, stats.acceleration_sd, stats.strain_sd]
@@ -156,7 +156,8 @@ impl<'a> NoiseProblem<'a> {
     fn params(&self, point: &[f64]) -> EstimatorParams {
         let p: Vec<f64> = point.iter().map(|x| x.clamp(-25.0, 15.0).exp()).collect();
         let strain_mean = self.stats.strain_mean;
-        let motion = if self.kind == EstimatorKind::SignSplit {
+        let kind = self.kind.tuned_as();
+        let motion = if kind == EstimatorKind::SignSplit {
             MotionParams::Smooth {
                 rate_sd_per_s: p[4],
                 // A stationary motion has σ_v² < σ_ε σ_a.
@@ -167,14 +168,14 @@ impl<'a> NoiseProblem<'a> {
         } else {
             MotionParams::OrnsteinUhlenbeck { rate_sd_per_s: p[4], rate_time_s: p[5], strain_mean, strain_sd: p[6] }
         };
-        let phases = self.kind.has_phases().then(|| PhaseParams {
+        let phases = kind.has_phases().then(|| PhaseParams {
             hold_time_s: p[7],
             move_time_s: p[8],
-            reversal: match (self.kind, self.stats.hold_s) {
+            reversal: match (kind, self.stats.hold_s) {
                 (EstimatorKind::SignSplit, None) => 1.0,
                 _ => self.stats.reversal,
             },
-            speed_per_s: if self.kind == EstimatorKind::SignSplit { 0.0 } else { p[9] },
+            speed_per_s: if kind == EstimatorKind::SignSplit { 0.0 } else { p[9] },
             tempering: p[10].min(1.0),
         });
         EstimatorParams {
