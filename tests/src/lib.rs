@@ -1,5 +1,10 @@
-//! Models that several tests share. The oracles stand in the tests themselves.
+//! Models and random numbers that several tests share. The oracles stand in the tests themselves.
 
+mod draws;
+mod flow;
+
+pub use draws::{Draws, square_root};
+pub use flow::Flow;
 use nalgebra::{SMatrix, SVector};
 use ohmstrain_ekf::{Belief, Channel, Dynamics, Phased};
 use ohmstrain_model::{
@@ -51,6 +56,37 @@ impl<T: Scalar, const N: usize, const L: usize> Phased<T, N, L> for Linear<T, N>
     }
 }
 
+/// A model whose phase is known: the filter is told, and has nothing to guess.
+#[derive(Clone, Copy, Debug)]
+pub struct KnownPhase<M> {
+    /// The model.
+    pub model: M,
+    /// The phase it is in.
+    pub phase: Phase,
+}
+
+impl<T: Scalar, M: Dynamics<T, N, L>, const N: usize, const L: usize> Dynamics<T, N, L> for KnownPhase<M> {
+    type Prepared = M::Prepared;
+
+    fn prepare(&self, dt_s: T) -> Self::Prepared {
+        self.model.prepare(dt_s)
+    }
+
+    fn transition(&self, step: &Self::Prepared, from: &Belief<T, N, L>, _: Option<Phase>) -> Transition<T, N, L> {
+        self.model.transition(step, from, Some(self.phase))
+    }
+
+    fn propagate(&self, covariance: &Symmetric<T, N, L>, transition: &Transition<T, N, L>) -> Symmetric<T, N, L> {
+        self.model.propagate(covariance, transition)
+    }
+}
+
+impl<T: Scalar, M: Channel<T, N, L>, const N: usize, const L: usize> Channel<T, N, L> for KnownPhase<M> {
+    fn observe(&self, at: &Belief<T, N, L>, _: Option<Phase>) -> Observation<T, N> {
+        self.model.observe(at, Some(self.phase))
+    }
+}
+
 /// A plausible sensor with `B` branches and Ornstein-Uhlenbeck motion; with a baseline if `N = B + 3`.
 ///
 /// # Panics
@@ -79,6 +115,31 @@ pub fn sensor<T: Scalar, const B: usize, const N: usize>() -> SwitchedModel<T, 2
     };
     Motion::ornstein_uhlenbeck(T::of(1.5), T::of(0.05), T::of(0.15), T::of(0.1))
         .and_then(|motion| SwitchedModel::new(law, motion, noise))
+        .unwrap_or_else(|error| unreachable!("{error}"))
+}
+
+/// A linear sensor that stretches, rests and releases at 10 %/s, and whose branch tells stretching from releasing.
+///
+/// # Panics
+/// Never: the parameters are valid.
+#[must_use]
+pub fn switching_sensor() -> SwitchedModel<f64, 2, 1, 3> {
+    let law = SensorLaw {
+        gauge: Gauge::Polynomial { coefficients: [1.5, 0.0, 0.0] },
+        extend_viscosity_s: 0.0,
+        retract_viscosity_s: 0.0,
+        branches: [Branch {
+            tau_s: 3.0,
+            extend_gain: 1.0,
+            retract_gain: -0.8,
+            extend_gain_slope: 0.0,
+            retract_gain_slope: 0.0,
+        }],
+        range: StrainRange { lower: -10.0, upper: 10.0 },
+    };
+    let noise = ModelNoise { reading_sd: 0.02, branch_sd: 0.01, baseline_sd: 0.0, baseline_time_s: 1.0 };
+    Motion::ornstein_uhlenbeck(2.0, 0.03, 0.0, f64::INFINITY)
+        .and_then(|motion| SwitchedModel::new(law, motion.with_phase_rate(0.1), noise))
         .unwrap_or_else(|error| unreachable!("{error}"))
 }
 

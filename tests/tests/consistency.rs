@@ -1,83 +1,134 @@
 //! Is the filter's own uncertainty right? On a linear sensor with a known phase, simulated from its own model, NIS and
-//! NEES are χ²; the bounds below are those of their mean over all runs at 99.9 %. The same statistics must leave the
-//! bounds when the filter is told a wrong Q or R: a test that cannot fail would prove nothing.
+//! NEES are χ² exactly, and so are their sums over independent terms; the bounds are quantiles of those sums at 99.9 %.
+//! The same statistics must leave the bounds when the filter is told a wrong Q or R: a test that cannot fail would prove
+//! nothing.
 
-use nalgebra::{Cholesky, SMatrix, SVector};
-use ohmstrain_ekf::{Belief, Ekf, Reading};
-use ohmstrain_tests::Linear;
-use rand_chacha::ChaCha12Rng;
-use rand_chacha::rand_core::SeedableRng;
-use rand_distr::{Distribution, StandardNormal};
+use nalgebra::{Cholesky, SVector};
+use ohmstrain_ekf::{Belief, Channel, Dynamics, Ekf, Reading, rts_smooth_vec};
+use ohmstrain_model::{Observation, Phase, SwitchedModel, Symmetric, Transition};
+use ohmstrain_tests::{Draws, KnownPhase, square_root, switching_sensor};
+use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-const RUNS: u64 = 200;
-const STEPS: usize = 60;
-/// Two-sided 99.9 % of the standard normal: sums of this many χ² are normal to three digits.
-const Z_999: f64 = 3.2905;
+const RUNS: u64 = 400;
+const ROWS: usize = 60;
+const DT_S: f64 = 0.2;
 
-fn model() -> Linear<f64, 3> {
-    // Strain, rate and one relaxing branch at steps of 0.1 s, rounded; any stable matrices would do.
-    Linear {
-        transition: SMatrix::<f64, 3, 3>::new(0.97, 0.09, 0.0, -0.2, 0.85, 0.0, 0.03, 0.08, 0.9),
-        noise: SMatrix::<f64, 3, 3>::new(0.02, 0.01, 0.005, 0.01, 0.08, 0.01, 0.005, 0.01, 0.03),
-        gradient: SVector::from([1.4, 0.2, 1.0]),
-        variance: 0.05,
+/// A sensor that is known to stretch, as the filter is told it is.
+#[derive(Clone, Copy)]
+struct Told {
+    sensor: KnownPhase<SwitchedModel<f64, 2, 1, 3>>,
+    /// What the filter's Q is multiplied with.
+    process: f64,
+    /// What its R is multiplied with.
+    reading: f64,
+}
+
+impl Dynamics<f64, 3, 6> for Told {
+    type Prepared = <SwitchedModel<f64, 2, 1, 3> as Dynamics<f64, 3, 6>>::Prepared;
+
+    fn prepare(&self, dt_s: f64) -> Self::Prepared {
+        Dynamics::<f64, 3, 6>::prepare(&self.sensor, dt_s)
+    }
+
+    fn transition(
+        &self,
+        step: &Self::Prepared,
+        from: &Belief<f64, 3, 6>,
+        phase: Option<Phase>,
+    ) -> Transition<f64, 3, 6> {
+        let right = self.sensor.transition(step, from, phase);
+        Transition { noise: right.noise.scaled(self.process), ..right }
     }
 }
 
-fn normal(rng: &mut ChaCha12Rng) -> SVector<f64, 3> {
-    SVector::from_fn(|_, _| StandardNormal.sample(rng))
+impl Channel<f64, 3, 6> for Told {
+    fn observe(&self, at: &Belief<f64, 3, 6>, phase: Option<Phase>) -> Observation<f64, 3> {
+        let right = self.sensor.observe(at, phase);
+        Observation { variance: right.variance * self.reading, ..right }
+    }
 }
 
-/// Mean NIS and mean NEES of `assumed` on data from [`model`].
-fn statistics(assumed: Linear<f64, 3>) -> (f64, f64) {
-    let truth = model();
-    let root = Cholesky::new(truth.noise).unwrap().l();
+fn told(process: f64, reading: f64) -> Told {
+    Told { sensor: KnownPhase { model: switching_sensor(), phase: Phase::Extend }, process, reading }
+}
+
+/// Sums of χ² terms that are independent of each other.
+#[derive(Debug, Default)]
+struct Statistics {
+    /// Over all rows of all runs: innovations of different rows are independent.
+    nis: f64,
+    /// The last row of each run.
+    filtered: f64,
+    /// The middle row of each run.
+    smoothed: f64,
+}
+
+/// Squared distance of truth and belief in units of the belief's covariance.
+fn nees(truth: &SVector<f64, 3>, belief: &Belief<f64, 3, 6>) -> f64 {
+    let error = truth - belief.mean;
+    error.dot(&Cholesky::new(belief.covariance.to_matrix()).unwrap().solve(&error))
+}
+
+/// What a filter that is told `assumed` says of data from the sensor as it is.
+fn statistics(assumed: Told) -> Statistics {
+    let truth = told(1.0, 1.0);
+    let spread = [1e-3, 1e-3, 1e-3];
+    let start: Belief<f64, 3, 6> = Belief::independent(SVector::from([0.1, 0.1, 0.0]), &spread);
+    let prepared = truth.prepare(DT_S);
+    let move_on = |state: &SVector<f64, 3>| {
+        truth.transition(&prepared, &Belief { mean: *state, covariance: Symmetric::zeros() }, None)
+    };
+    let root = square_root(&move_on(&start.mean).noise);
     let ekf = Ekf::new(assumed);
-    let (mut nis, mut nees) = (0.0, 0.0);
+    let mut sums = Statistics::default();
     for seed in 0..RUNS {
-        let mut rng = ChaCha12Rng::seed_from_u64(seed);
-        let mut state = normal(&mut rng);
-        let mut belief: Belief<f64, 3, 6> = Belief::independent(SVector::zeros(), &[1.0; 3]);
-        for _ in 0..STEPS {
-            state = truth.transition * state + root * normal(&mut rng);
-            let white: f64 = StandardNormal.sample(&mut rng);
-            let reading = truth.gradient.dot(&state) + truth.variance.sqrt() * white;
-            let step = ekf.step(&belief, 0.1, Some(Reading::from(reading))).unwrap();
-            nis += step.update.unwrap().nis;
-            let error = state - step.posterior.mean;
-            nees += error.dot(&Cholesky::new(step.posterior.covariance.to_matrix()).unwrap().solve(&error));
+        let mut draws = Draws::new(seed);
+        let mut state = start.mean + SVector::from(spread.map(f64::sqrt)).component_mul(&draws.vector());
+        let (mut belief, mut states, mut steps) = (start, Vec::new(), Vec::new());
+        for _ in 0..ROWS {
+            state = move_on(&state).mean + root * draws.vector::<3>();
+            let seen = truth.observe(&Belief { mean: state, covariance: Symmetric::zeros() }, None);
+            let reading = seen.value + seen.variance.sqrt() * draws.normal();
+            let step = ekf.step_prepared(&belief, &prepared, Some(Reading::from(reading))).unwrap();
+            sums.nis += step.update.unwrap().nis;
             belief = step.posterior;
+            states.push(state);
+            steps.push(step);
         }
+        sums.filtered += nees(&state, &belief);
+        sums.smoothed += nees(&states[ROWS / 2], &rts_smooth_vec(&steps)[ROWS / 2]);
     }
-    let count = (RUNS as usize * STEPS) as f64;
-    (nis / count, nees / count)
+    sums
 }
 
-/// Half-width of the interval of a mean of χ²_d: NIS of different steps are independent.
-fn nis_bound() -> f64 {
-    Z_999 * (2.0 / (RUNS as usize * STEPS) as f64).sqrt()
+/// Whether a sum of χ² terms with so many degrees of freedom in all is below, inside or above 99.9 %.
+fn place(sum: f64, freedom: u64) -> std::cmp::Ordering {
+    let chi_squared = ChiSquared::new(freedom as f64).unwrap();
+    match sum {
+        sum if sum < chi_squared.inverse_cdf(0.0005) => std::cmp::Ordering::Less,
+        sum if sum > chi_squared.inverse_cdf(0.9995) => std::cmp::Ordering::Greater,
+        _ => std::cmp::Ordering::Equal,
+    }
 }
 
-/// NEES of one run are correlated over steps; runs are independent. The variance of a run's mean is at most that of
-/// one step, 2 d, which makes this bound wide and safe.
-fn nees_bound() -> f64 {
-    Z_999 * (2.0 * 3.0 / RUNS as f64).sqrt()
+fn places(sums: &Statistics) -> [std::cmp::Ordering; 3] {
+    [place(sums.nis, RUNS * ROWS as u64), place(sums.filtered, 3 * RUNS), place(sums.smoothed, 3 * RUNS)]
 }
 
 #[test]
-fn a_matched_filter_is_consistent() {
-    let (nis, nees) = statistics(model());
-    assert!((nis - 1.0).abs() < nis_bound(), "NIS {nis}");
-    assert!((nees - 3.0).abs() < nees_bound(), "NEES {nees}");
+fn a_matched_filter_and_smoother_are_consistent() {
+    let sums = statistics(told(1.0, 1.0));
+    assert_eq!(places(&sums), [std::cmp::Ordering::Equal; 3], "{sums:?}");
 }
 
+/// Noise that is believed too large makes every statistic too small, and the other way round.
 #[test]
 fn a_wrong_filter_is_found_out() {
-    for factor in [4.0, 0.25] {
-        let (nis, nees) = statistics(Linear { noise: model().noise * factor, ..model() });
-        assert!((nis - 1.0).abs() > nis_bound(), "Q × {factor}: NIS {nis}");
-        assert!((nees - 3.0).abs() > nees_bound(), "Q × {factor}: NEES {nees}");
-        let (nis, _) = statistics(Linear { variance: model().variance * factor, ..model() });
-        assert!((nis - 1.0).abs() > nis_bound(), "R × {factor}: NIS {nis}");
+    for (factor, side) in [(4.0, std::cmp::Ordering::Less), (0.25, std::cmp::Ordering::Greater)] {
+        for (what, assumed) in [("Q", told(factor, 1.0)), ("R", told(1.0, factor))] {
+            let sums = statistics(assumed);
+            println!("{what} × {factor}: {sums:?}");
+            assert_eq!(places(&sums), [side; 3], "{what} × {factor}: {sums:?}");
+        }
     }
 }

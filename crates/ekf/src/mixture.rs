@@ -209,7 +209,8 @@ impl<T: Real, const N: usize, const L: usize> Component<T, N, L> {
         let distance = |i: usize| {
             let apart = self.belief.mean[i] - other.belief.mean[i];
             let variance = self.belief.covariance[(i, i)].max(other.belief.covariance[(i, i)]);
-            if variance > T::zero() { apart * apart / variance } else { apart * apart }
+            // What is known exactly is the same or is not; a difference has no size without a unit.
+            if apart.is_zero() { T::zero() } else { apart * apart / variance.max(T::zero()) }
         };
         self.phase == other.phase && distance(0) + distance(1) < T::of(ALIKE)
     }
@@ -265,3 +266,6 @@ pub(crate) fn with_rate_in<T: Real, const N: usize, const L: usize>(
     covariance.add_outer(&regression, cut.variance - rate.variance);
     (Belief { mean: belief.mean + regression * (cut.mean - rate.mean), covariance }, cut.mass)
 }
+
+#[cfg(test)]
+mod tests;

@@ -5,7 +5,7 @@ use ohmstrain_model::{Scalar, Symmetric};
 ///
 /// A direction without variance has a zero pivot. It is skipped in the factor and in [`Self::solve`], which makes
 /// exactly known states ordinary input. Pivots count as zero relative to their own diagonal entry, so that units do not
-/// matter.
+/// matter: below N ε, what rounding leaves of a zero, or below a share that the caller knows.
 pub(crate) struct SemiDefinite<T, const N: usize> {
     lower: SMatrix<T, N, N>,
     pivots: SVector<T, N>,
@@ -13,6 +13,11 @@ pub(crate) struct SemiDefinite<T, const N: usize> {
 
 impl<T: Scalar, const N: usize> SemiDefinite<T, N> {
     pub(crate) fn factor<const L: usize>(matrix: &Symmetric<T, N, L>) -> Self {
+        Self::factor_without(matrix, T::default_epsilon() * T::of(N as f64))
+    }
+
+    /// The factor without the pivots that are no larger than `negligible` times their diagonal entry.
+    pub(crate) fn factor_without<const L: usize>(matrix: &Symmetric<T, N, L>, negligible: T) -> Self {
         let mut lower = SMatrix::<T, N, N>::identity();
         let mut pivots = SVector::<T, N>::zeros();
         for j in 0..N {
@@ -20,8 +25,7 @@ impl<T: Scalar, const N: usize> SemiDefinite<T, N> {
             for k in 0..j {
                 pivot -= lower[(j, k)] * lower[(j, k)] * pivots[k];
             }
-            let negligible = matrix[(j, j)].abs() * T::default_epsilon() * T::of(N as f64);
-            if pivot <= negligible {
+            if pivot <= matrix[(j, j)].abs() * negligible {
                 continue;
             }
             pivots[j] = pivot;

@@ -67,9 +67,11 @@ impl<T: Real, M, const K: usize> SignSplit<T, M, K> {
                 let origin = Origin { parent, from, begins: rests, phase, probability };
                 candidates.add(&origin, prepared, |prior| match rates_of(phase) {
                     None => (*prior, T::one()),
-                    // The chain has said how likely this direction is; nothing goes to the other one.
-                    Some(rates) if rests => (with_rate_in(prior, &rates).0, T::one()),
-                    Some(rates) => with_rate_in(prior, &rates),
+                    Some(rates) => {
+                        let (half, mass) = with_rate_in(prior, &rates);
+                        // After a hold the chain has said how likely this direction is; none of it goes to the other.
+                        (half, if rests && mass > T::of(0.5) { T::one() } else { mass })
+                    }
                 })?;
             }
         }

@@ -1,0 +1,108 @@
+//! A filter that runs through a recording with broken rows says, bit for bit, what it says of the recording without them.
+
+use std::collections::BTreeMap;
+
+use ohmstrain_calib::{
+    BranchParams, EstimatorKind, EstimatorParams, FORMAT, Filter, GaugeParams, LawParams, MotionParams, NoiseParams,
+    PhaseParams, Quantity, RangeParams, ReadingUnit, SensorParams, Start, StaticCubic, Validity, build_filter,
+};
+use ohmstrain_ekf::{Reading, StepError};
+use proptest::prelude::*;
+
+/// A sensor with parameters for every estimator.
+fn sensor() -> SensorParams {
+    let limits = RangeParams { lower: 0.0, upper: 0.3 };
+    let branch = |tau_s: f64| BranchParams {
+        tau_s,
+        extend_gain: 0.8,
+        retract_gain: -0.5,
+        extend_gain_slope: -0.6,
+        retract_gain_slope: 0.4,
+    };
+    let estimator = EstimatorParams {
+        score: 0.0,
+        strain_sd_scale: 1.1,
+        smoothed_sd_scale: None,
+        motion: MotionParams::OrnsteinUhlenbeck {
+            rate_time_s: 1.5,
+            rate_sd_per_s: 0.05,
+            strain_mean: 0.15,
+            strain_sd: 0.1,
+        },
+        noise: NoiseParams { reading_sd: 2e-3, branch_sd: 5e-3, baseline_sd: 0.02, baseline_time_s: 30.0 },
+        phases: Some(PhaseParams {
+            hold_time_s: 2.0,
+            move_time_s: 2.0,
+            reversal: 0.3,
+            speed_per_s: 0.05,
+            tempering: 0.7,
+        }),
+    };
+    SensorParams {
+        format: FORMAT,
+        made_by: "test".into(),
+        quantity: Quantity::Strain,
+        reading: ReadingUnit::Ratio,
+        rest_reading: 1.0,
+        default_estimator: EstimatorKind::Ekf,
+        limits,
+        validity: Validity { lower: 0.0, upper: 0.3, fastest_rate_per_s: 0.2, duration_s: 100.0 },
+        static_cubic: StaticCubic { reading_centre: 0.0, reading_scale: 1.0, coefficients: [0.0; 4], range: limits },
+        joint: None,
+        law: LawParams {
+            extend_viscosity_s: 0.02,
+            retract_viscosity_s: -0.01,
+            range: limits,
+            gauge: GaugeParams::Polynomial { coefficients: [1.6, -1.2, 0.5] },
+            branches: vec![branch(4.0), branch(32.0)],
+        },
+        estimators: EstimatorKind::ALL.map(|kind| (kind, estimator)).into_iter().collect::<BTreeMap<_, _>>(),
+        recordings: vec![],
+        uncertainty: None,
+    }
+}
+
+/// Everything a filter shows; Rust prints numbers to the last bit.
+fn shown(filter: &dyn Filter) -> String {
+    format!("{:?}", filter.output())
+}
+
+/// A row no filter can take: a time and a reading, and why it is refused.
+fn broken(kind: usize, now_s: f64) -> (f64, f64, StepError) {
+    match kind {
+        0 => (now_s - 0.1, 0.1, StepError::NegativeTimeStep),
+        1 => (f64::NAN, 0.1, StepError::NonFiniteTimeStep),
+        2 => (now_s + 0.1, f64::NAN, StepError::NonFiniteReading),
+        3 => (now_s + 0.1, f64::INFINITY, StepError::NonFiniteReading),
+        _ => (now_s + 0.1, 1e300, StepError::NonFiniteState),
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    #[test]
+    fn an_error_leaves_no_trace(
+        rows in prop::collection::vec(
+            (0.0..0.4_f64, prop::option::weighted(0.8, -0.1..0.6_f64), prop::option::weighted(0.3, 0..5_usize)), 1..40,
+        ),
+    ) {
+        let params = sensor();
+        for kind in EstimatorKind::ALL {
+            let mut disturbed = build_filter(&params, Some(kind), Start::Unknown).unwrap();
+            let mut calm = build_filter(&params, Some(kind), Start::Unknown).unwrap();
+            let mut now_s = 0.0;
+            for (dt_s, reading, trouble) in &rows {
+                now_s += dt_s;
+                let reading = reading.map(Reading::from);
+                prop_assert_eq!(disturbed.step(now_s, reading), Ok(()));
+                prop_assert_eq!(calm.step(now_s, reading), Ok(()));
+                if let Some(trouble) = trouble {
+                    let (time_s, reading, why) = broken(*trouble, now_s);
+                    prop_assert_eq!(disturbed.step(time_s, Some(Reading::from(reading))), Err(why), "{}", kind.name());
+                }
+                prop_assert_eq!(shown(&*disturbed), shown(&*calm), "{}", kind.name());
+            }
+        }
+    }
+}
