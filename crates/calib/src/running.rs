@@ -70,14 +70,7 @@ impl<E: Estimator<f64, N, L>, const M: usize, const B: usize, const N: usize, co
         time_s: f64,
         reading: Option<Reading<f64>>,
     ) -> Result<PastStep<E::State, E::Prepared, f64>, StepError> {
-        let dt_s = time_s - self.now.time_s.unwrap_or(time_s);
-        if !dt_s.is_finite() {
-            return Err(StepError::NonFiniteTimeStep);
-        }
-        if dt_s < 0.0 {
-            return Err(StepError::NegativeTimeStep);
-        }
-        let prepared = self.prepare(dt_s);
+        let prepared = self.prepare_until(time_s)?;
         let Moment { state, streak, .. } = &self.now;
         let Guarded { advanced, from, used, verdict, streak } =
             self.guard.advance(&self.estimator, state, *streak, &prepared, reading)?;
@@ -86,14 +79,23 @@ impl<E: Estimator<f64, N, L>, const M: usize, const B: usize, const N: usize, co
         Ok(PastStep { from, prepared, reading: used })
     }
 
-    /// The prepared step, remembered by its length in nanoseconds: differences of decimal times repeat to rounding only.
-    fn prepare(&mut self, dt_s: f64) -> E::Prepared {
+    /// The prepared step to a time, remembered by its length in nanoseconds: differences of decimal times repeat to
+    /// rounding only.
+    fn prepare_until(&mut self, time_s: f64) -> Result<E::Prepared, StepError> {
+        let dt_s = time_s - self.now.time_s.unwrap_or(time_s);
+        if !dt_s.is_finite() {
+            return Err(StepError::NonFiniteTimeStep);
+        }
+        if dt_s < 0.0 {
+            return Err(StepError::NegativeTimeStep);
+        }
         let nanoseconds = (dt_s * 1e9).round();
         if self.prepared.len() >= MOST_PREPARED {
             self.prepared.clear();
         }
         let estimator = &self.estimator;
-        *self.prepared.entry(nanoseconds as u64).or_insert_with(|| estimator.prepare(nanoseconds * 1e-9))
+        let remembered = self.prepared.entry(nanoseconds as u64);
+        Ok(*remembered.or_insert_with(|| estimator.prepare(nanoseconds * 1e-9)))
     }
 
     fn output(&self, state: &E::State, seen: Seen, sd_scale: f64) -> Output {
@@ -156,7 +158,17 @@ impl<E: Estimator<f64, N, L>, const M: usize, const B: usize, const N: usize, co
     }
 
     fn step(&mut self, time_s: f64, reading: Option<Reading<f64>>) -> Result<(), StepError> {
-        self.advance(time_s, reading).map(|_| ())
+        if !self.guard.is_none() {
+            return self.advance(time_s, reading).map(|_| ());
+        }
+        // Nothing is turned down and nobody goes back: no state needs to be kept.
+        let prepared = self.prepare_until(time_s)?;
+        let Advanced { state, innovation } = self.estimator.advance(&self.now.state, &prepared, reading)?;
+        let verdict = if innovation.is_some() { ReadingVerdict::Accepted } else { ReadingVerdict::Missing };
+        self.now.time_s = Some(time_s);
+        self.now.state = state;
+        self.now.seen = Seen { innovation, verdict };
+        Ok(())
     }
 
     fn strain(&self) -> Gaussian<f64> {

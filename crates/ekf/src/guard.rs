@@ -88,6 +88,12 @@ impl<T: Scalar> Guard<T> {
         Self { influence, ..self }
     }
 
+    /// Whether everything passes as it is.
+    #[must_use]
+    pub fn is_none(&self) -> bool {
+        !self.gate.is_finite() && self.influence == Influence::Full
+    }
+
     /// A step of `estimator` under guard.
     ///
     /// # Errors

@@ -117,17 +117,21 @@ impl<T: Real, const N: usize, const L: usize, const K: usize> Mixture<T, N, L, K
             let lighter = before.iter().filter(|component| !counts(component)).count();
             from_here.first().is_some_and(counts).then_some(place - lighter)
         });
-        let mut kept = Self::empty();
         let mut sum = T::zero();
-        for component in self.components().iter().filter(|component| counts(component)) {
+        let mut kept = 0;
+        for place in 0..self.len {
+            let Some(component) = self.components.get(place).filter(|component| counts(component)) else { continue };
             sum += (component.log_weight - heaviest).exp();
-            kept.push(*component);
+            if kept < place {
+                self.components.copy_within(place..=place, kept);
+            }
+            kept += 1;
         }
+        self.len = kept;
         let log_sum = heaviest + sum.ln();
-        for component in kept.components_mut() {
+        for component in self.components_mut() {
             component.log_weight -= log_sum;
         }
-        *self = kept;
         Ok(log_sum)
     }
 

@@ -4,7 +4,7 @@ use crate::gaussian::Real;
 use crate::lineage::{Lineage, Recorder};
 use crate::mixture::{Mixture, with_rate_in};
 use crate::mixture_step::{Candidates, Evidence, MixtureStep, Origin, mixture_estimator, smooth_step};
-use crate::{Dwell, Phased, Reading, StepError};
+use crate::{Dwell, Gaussian, Phased, Reading, StepError};
 
 /// At most `K` Gaussian hypotheses split by the sign of the rate.
 ///
@@ -64,6 +64,13 @@ impl<T: Real, M, const K: usize> SignSplit<T, M, K> {
                 // A body without a hold phase goes on moving, whatever it was called before.
                 let rests = self.hold.is_some() && parent.1.phase == Phase::Hold && phase != Phase::Hold;
                 let from = &if rests { self.model.enter(&parent.1.belief, phase) } else { parent.1.belief };
+                let hopeless = |rate: Gaussian<T>| {
+                    let toward = if phase == Phase::Retract { -rate.mean } else { rate.mean };
+                    toward < -T::of(HOPELESS) * rate.sd()
+                };
+                if phase != Phase::Hold && self.model.rate_ahead(prepared, from, phase).is_some_and(hopeless) {
+                    continue;
+                }
                 let origin = Origin { parent, from, begins: rests, phase, probability };
                 candidates.add(&origin, prepared, |prior| match rates_of(phase) {
                     None => (*prior, T::one()),
@@ -80,6 +87,9 @@ impl<T: Real, M, const K: usize> SignSplit<T, M, K> {
 
     smooth_step!();
 }
+
+/// Deviations of the rate beyond zero at which less than a thousandth of the prediction is left, too little to follow.
+const HOPELESS: f64 = 3.090_232_306_167_813_5;
 
 /// Probabilities of the phases that follow `phase`, in the order of [`Phase::ALL`]. Whether a moving body stretches or
 /// releases is for the cut to say.

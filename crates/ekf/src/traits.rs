@@ -1,6 +1,6 @@
 use ohmstrain_model::{Direction, Observation, Phase, Scalar, SwitchedModel, SwitchedStep, Symmetric, Transition};
 
-use crate::Belief;
+use crate::{Belief, Gaussian};
 
 /// How the state moves in time. `L = N (N + 1) / 2`.
 pub trait Dynamics<T: Scalar, const N: usize, const L: usize> {
@@ -13,6 +13,12 @@ pub trait Dynamics<T: Scalar, const N: usize, const L: usize> {
     /// The transition over a prepared step, linearised at the belief's mean. `phase` is a hypothesis; with `None` the
     /// model makes the best of the belief. Models of one phase ignore it.
     fn transition(&self, step: &Self::Prepared, from: &Belief<T, N, L>, phase: Option<Phase>) -> Transition<T, N, L>;
+
+    /// The rate at the end of a prepared step while moving, if it can be had without the whole transition: a filter of
+    /// directions then knows which are worth following.
+    fn rate_ahead(&self, _step: &Self::Prepared, _from: &Belief<T, N, L>, _phase: Phase) -> Option<Gaussian<T>> {
+        None
+    }
 
     /// `F P Fᵀ + Q`. The default multiplies full matrices; a model that knows where its zeros are can do better.
     fn propagate(&self, covariance: &Symmetric<T, N, L>, transition: &Transition<T, N, L>) -> Symmetric<T, N, L> {
@@ -42,6 +48,11 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize, const L: usize> 
             None => Direction::Uncertain { rate_sd: self.rate_variance(step, &from.covariance).sqrt() },
         };
         self.transition(step, &from.mean, direction)
+    }
+
+    fn rate_ahead(&self, step: &Self::Prepared, from: &Belief<T, N, L>, phase: Phase) -> Option<Gaussian<T>> {
+        let mean = self.rate_mean(step, &from.mean, Direction::Known(phase));
+        Some(Gaussian { mean, variance: self.rate_variance(step, &from.covariance) })
     }
 
     fn propagate(&self, covariance: &Symmetric<T, N, L>, transition: &Transition<T, N, L>) -> Symmetric<T, N, L> {
