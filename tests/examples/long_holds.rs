@@ -72,6 +72,7 @@ fn parameters(calibration: Calibration) -> SensorParams {
         joint: None,
         law: calibration.law,
         estimators: calibration.estimators,
+        ensemble: calibration.ensemble,
         recordings: vec![],
         uncertainty: None,
     }

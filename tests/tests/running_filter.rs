@@ -3,8 +3,9 @@
 use std::collections::BTreeMap;
 
 use ohmstrain_calib::{
-    BranchParams, EstimatorKind, EstimatorParams, FORMAT, Filter, GaugeParams, LawParams, MotionParams, NoiseParams,
-    PhaseParams, Quantity, RangeParams, ReadingUnit, SensorParams, Start, StaticCubic, Validity, build_filter,
+    BranchParams, EnsembleParams, EstimatorKind, EstimatorParams, FORMAT, Filter, GaugeParams, LawParams, MotionParams,
+    NoiseParams, PhaseParams, Quantity, RangeParams, ReadingUnit, SensorParams, Start, StaticCubic, Validity,
+    build_filter,
 };
 use ohmstrain_ekf::{Reading, StepError};
 use proptest::prelude::*;
@@ -57,6 +58,12 @@ fn sensor() -> SensorParams {
             branches: vec![branch(4.0), branch(32.0)],
         },
         estimators: EstimatorKind::ALL.map(|kind| (kind, estimator)).into_iter().collect::<BTreeMap<_, _>>(),
+        ensemble: Some(EnsembleParams {
+            score: 0.0,
+            strain_sd_scale: 1.1,
+            smoothed_sd_scale: None,
+            weights: EstimatorKind::Ensemble.members().iter().map(|kind| (*kind, 1.0 / 3.0)).collect(),
+        }),
         recordings: vec![],
         uncertainty: None,
     }

@@ -2,13 +2,17 @@ use std::collections::BTreeMap;
 
 use crate::CalibrationError;
 use crate::baseline::StaticCubic;
+use crate::ensemble::{self, Ensemble, EnsembleParams};
 use crate::estimator_params::{EstimatorKind, EstimatorParams};
+use crate::filter::{Filter, Start, filter_from_parts};
 use crate::law_fit::{CrossFit, LawOptions, fit_laws};
 use crate::law_params::LawParams;
+use crate::left_out::LeftOut;
 use crate::motion_stats::MotionStats;
 use crate::noise_fit::{NoiseProblem, REFINEMENT, RESURVEY, SURVEY, Tuned};
 use crate::params::{RangeParams, Uncertainty, Validity};
 use crate::samples::Samples;
+use crate::sd_scale::sd_scale;
 
 /// What calibration is doing, for a progress bar.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,6 +43,8 @@ pub struct Calibration {
     pub default_estimator: EstimatorKind,
     /// Noise and motion, per estimator.
     pub estimators: BTreeMap<EstimatorKind, EstimatorParams>,
+    /// How they are pooled, if that was asked for.
+    pub ensemble: Option<EnsembleParams>,
     /// The range of the reference.
     pub limits: RangeParams,
     /// What was seen.
@@ -72,15 +78,12 @@ pub fn calibrate(
     progress(Stage::Law);
     let laws = fit_laws(recordings, options)?;
     let stats = MotionStats::new(recordings);
-    let mut all_kinds: Vec<EstimatorKind> = kinds.to_vec();
-    for needed in kinds.iter().map(|kind| kind.smoother()).chain([EstimatorKind::Ekf]) {
-        if !all_kinds.contains(&needed) {
-            all_kinds.push(needed);
-        }
-    }
+    let candidates = distinct(kinds.iter().flat_map(EstimatorKind::members).copied());
+    let smoothers = candidates.iter().map(|kind| kind.smoother());
+    let all_kinds = distinct(candidates.iter().copied().chain(smoothers).chain([EstimatorKind::Ekf]));
     let surveys = SURVEY.evaluations() + (laws.len() as u64 - 1) * RESURVEY.evaluations();
-    let expected = kinds.len() as u64 * surveys
-        + (all_kinds.len() - kinds.len()) as u64 * SURVEY.evaluations()
+    let expected = candidates.len() as u64 * surveys
+        + (all_kinds.len() - candidates.len()) as u64 * SURVEY.evaluations()
         + all_kinds.len() as u64 * REFINEMENT.evaluations();
     let mut done = 0;
     let mut evaluated = || {
@@ -88,7 +91,7 @@ pub fn calibrate(
         progress(Stage::Noise { done, expected });
     };
     let mut surveyed = Vec::new();
-    for &kind in kinds {
+    for &kind in &candidates {
         let mut before: Option<Tuned> = None;
         for law in &laws {
             let problem = NoiseProblem::new(recordings, law, stats, kind);
@@ -116,11 +119,15 @@ pub fn calibrate(
     }
     let score =
         |kind: &EstimatorKind| estimators.get(kind).map_or(f64::INFINITY, |params| params.score + handicap(*kind));
-    let default_estimator = kinds.iter().copied().min_by(|a, b| score(a).total_cmp(&score(b)));
+    let best = candidates.iter().copied().min_by(|a, b| score(a).total_cmp(&score(b)));
+    let pools = kinds.contains(&EstimatorKind::Ensemble);
+    let default_estimator = if pools { Some(EstimatorKind::Ensemble) } else { best };
+    let ensemble = pools.then(|| fit_ensemble(recordings, fit, &estimators));
     let limits = fit.law.law.range;
     Ok(Calibration {
         default_estimator: default_estimator.unwrap_or(EstimatorKind::Ekf),
         estimators,
+        ensemble,
         static_cubic: StaticCubic::fit(recordings, limits)?,
         validity: Validity {
             lower: limits.lower,
@@ -134,4 +141,38 @@ pub fn calibrate(
         rest_readings: fit.law.rest_readings.clone(),
         law: fit.law.law.clone(),
     })
+}
+
+/// Weighs the members of the ensemble by their scores and scales its deviations as those of a single estimator.
+fn fit_ensemble(
+    recordings: &[Samples],
+    fit: &CrossFit,
+    estimators: &BTreeMap<EstimatorKind, EstimatorParams>,
+) -> EnsembleParams {
+    let members =
+        EstimatorKind::Ensemble.members().iter().filter_map(|kind| Some((*kind, estimators.get(kind)?.score)));
+    let weights = ensemble::weights(&members.collect::<Vec<_>>());
+    let limits = fit.law.law.range;
+    let build = |law: &LawParams| -> Result<Box<dyn Filter>, CalibrationError> {
+        let members = weights.iter().filter_map(|(kind, weight)| {
+            let filter = filter_from_parts(*kind, law, estimators.get(kind)?, limits, Start::Unknown);
+            Some(filter.map(|filter| (filter, *weight)))
+        });
+        Ok(Box::new(Ensemble::new(members.collect::<Result<_, _>>()?, 1.0, 1.0)))
+    };
+    let left_out = LeftOut::new(recordings, fit, limits, 1);
+    let score = left_out.score(&build);
+    let strain_sd_scale = left_out.filtered_deviations(&build).map_or(1.0, |deviations| sd_scale(&deviations));
+    let smoothed_sd_scale = left_out.smoothed_deviations(&build).map(|deviations| sd_scale(&deviations));
+    EnsembleParams { score, strain_sd_scale, smoothed_sd_scale, weights }
+}
+
+fn distinct(kinds: impl Iterator<Item = EstimatorKind>) -> Vec<EstimatorKind> {
+    let mut seen = Vec::new();
+    for kind in kinds {
+        if !seen.contains(&kind) {
+            seen.push(kind);
+        }
+    }
+    seen
 }

@@ -1,3 +1,4 @@
+use crate::estimator_params::EstimatorKind;
 use ohmstrain_ekf::StepError;
 use ohmstrain_model::ParameterError;
 use thiserror::Error;
@@ -51,4 +52,10 @@ pub enum CalibrationError {
     /// A parameter file asks for what this version does not have.
     #[error("{0}")]
     Unsupported(String),
+}
+
+impl CalibrationError {
+    pub(crate) fn no_parameters(kind: EstimatorKind) -> Self {
+        Self::Unsupported(format!("the sensor file has no parameters for `{}`", kind.name()))
+    }
 }

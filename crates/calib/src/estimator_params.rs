@@ -17,11 +17,24 @@ pub enum EstimatorKind {
     Hypotheses,
     /// Particles: the reference that shows whether the law or the estimator limits.
     Particles,
+    /// Several of the others side by side, their posteriors pooled.
+    Ensemble,
 }
 
 impl EstimatorKind {
     /// All estimators.
-    pub const ALL: [Self; 6] = [Self::Ekf, Self::Ukf, Self::Imm, Self::SignSplit, Self::Hypotheses, Self::Particles];
+    pub const ALL: [Self; 7] =
+        [Self::Ekf, Self::Ukf, Self::Imm, Self::SignSplit, Self::Hypotheses, Self::Particles, Self::Ensemble];
+
+    /// The estimators that run: itself, or those of the ensemble. They err in different ways: one Gaussian, one direction
+    /// per step, one history of phases.
+    #[must_use]
+    pub const fn members(&self) -> &[Self] {
+        match self {
+            Self::Ensemble => &[Self::Ekf, Self::SignSplit, Self::Hypotheses],
+            _ => std::slice::from_ref(self),
+        }
+    }
 
     /// Whether it keeps hypotheses about the phase; the others are one Gaussian.
     #[must_use]
@@ -55,6 +68,7 @@ impl EstimatorKind {
             Self::SignSplit => "sign-split",
             Self::Hypotheses => "hypotheses",
             Self::Particles => "particles",
+            Self::Ensemble => "ensemble",
         }
     }
 }

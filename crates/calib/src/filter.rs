@@ -5,6 +5,7 @@ use ohmstrain_ekf::{
 use ohmstrain_model::{Motion, Phase, SwitchedModel};
 
 use crate::CalibrationError;
+use crate::ensemble::Ensemble;
 use crate::estimator_params::{AnyMotion, EstimatorKind, EstimatorParams};
 use crate::law_params::LawParams;
 use crate::params::{RangeParams, SensorParams};
@@ -92,8 +93,16 @@ pub fn build_filter(
     kind: Option<EstimatorKind>,
     start: Start,
 ) -> Result<Box<dyn Filter>, CalibrationError> {
-    let estimator = params.estimator(kind)?;
-    filter_from_parts(kind.unwrap_or(params.default_estimator), &params.law, estimator, params.limits, start)
+    let kind = kind.unwrap_or(params.default_estimator);
+    let single = |kind| filter_from_parts(kind, &params.law, params.estimator(kind)?, params.limits, start);
+    if kind != EstimatorKind::Ensemble {
+        return single(kind);
+    }
+    let ensemble = params.ensemble.as_ref().ok_or_else(|| CalibrationError::no_parameters(kind))?;
+    let members = ensemble.weights.iter().map(|(kind, weight)| Ok((single(*kind)?, *weight)));
+    let members = members.collect::<Result<_, CalibrationError>>()?;
+    let smoothed_scale = ensemble.smoothed_sd_scale.unwrap_or(1.0);
+    Ok(Box::new(Ensemble::new(members, ensemble.strain_sd_scale, smoothed_scale)))
 }
 
 pub(crate) fn filter_from_parts(
@@ -148,6 +157,7 @@ fn build_sized<const M: usize, const B: usize, const N: usize, const L: usize>(
         EstimatorKind::Ukf => {
             return Ok(Box::new(Running::new(Ukf::new(Unscented::new(model)), belief, model, interval)));
         }
+        EstimatorKind::Ensemble => return Err(CalibrationError::no_parameters(kind)),
         _ => {}
     }
     let phases = estimator

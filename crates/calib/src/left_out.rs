@@ -2,8 +2,8 @@ use std::ops::Range;
 
 use ohmstrain_ekf::{Gaussian, Reading};
 
-use crate::estimator_params::{EstimatorKind, EstimatorParams};
-use crate::filter::{Start, filter_from_parts};
+use crate::CalibrationError;
+use crate::filter::Filter;
 use crate::law_fit::CrossFit;
 use crate::law_params::LawParams;
 use crate::params::RangeParams;
@@ -21,6 +21,9 @@ pub(crate) struct LeftOut<'a> {
     runs: Vec<Run<'a>>,
     limits: RangeParams,
 }
+
+/// Makes a filter for a law.
+pub(crate) type Build<'a> = dyn Fn(&LawParams) -> Result<Box<dyn Filter>, CalibrationError> + 'a;
 
 /// One recording up to the end of the block that its law has not seen.
 struct Run<'a> {
@@ -54,10 +57,10 @@ impl<'a> LeftOut<'a> {
 
     /// Mean negative log density of the true strain under the filter, strain in units of its range. Infinite if the
     /// filter fails.
-    pub(crate) fn score(&self, kind: EstimatorKind, params: &EstimatorParams) -> f64 {
+    pub(crate) fn score(&self, build: &Build) -> f64 {
         let span = self.limits.span();
         let (mut sum, mut count) = (0.0, 0_usize);
-        let finished = self.each_row(kind, params, |_, strain, truth| {
+        let finished = self.each_row(build, |_, strain, truth| {
             let variance = strain.variance / (span * span) + REFERENCE_SD * REFERENCE_SD;
             let error = (strain.mean - truth) / span;
             sum += 0.5 * (error * error / variance + variance.ln());
@@ -67,18 +70,18 @@ impl<'a> LeftOut<'a> {
     }
 
     /// Errors of the filter in units of its deviation, block by block; `None` if it fails.
-    pub(crate) fn filtered_deviations(&self, kind: EstimatorKind, params: &EstimatorParams) -> Option<Vec<Vec<f64>>> {
+    pub(crate) fn filtered_deviations(&self, build: &Build) -> Option<Vec<Vec<f64>>> {
         let mut deviations = vec![Vec::new(); self.runs.len()];
-        self.each_row(kind, params, |run, strain, truth| {
+        self.each_row(build, |run, strain, truth| {
             deviations[run].push((strain.mean - truth).abs() / strain.sd());
         })?;
         Some(deviations)
     }
 
     /// The same for the smoother of whole recordings; `None` if the estimator has none.
-    pub(crate) fn smoothed_deviations(&self, kind: EstimatorKind, params: &EstimatorParams) -> Option<Vec<Vec<f64>>> {
+    pub(crate) fn smoothed_deviations(&self, build: &Build) -> Option<Vec<Vec<f64>>> {
         let of_run = |run: &Run| {
-            let mut filter = filter_from_parts(kind, run.law, params, self.limits, Start::Unknown).ok()?;
+            let mut filter = build(run.law).ok()?;
             let smoothed = filter.smooth(&run.time_s, &run.reading).ok()??;
             let known = run.block.clone().filter(|&k| run.strain[k].is_finite());
             Some(
@@ -95,14 +98,9 @@ impl<'a> LeftOut<'a> {
 
     /// Visits run, estimate and true strain in every row of every block: the filter runs from the first row to the end
     /// of the block. `None` if it fails.
-    fn each_row(
-        &self,
-        kind: EstimatorKind,
-        params: &EstimatorParams,
-        mut visit: impl FnMut(usize, Gaussian<f64>, f64),
-    ) -> Option<()> {
+    fn each_row(&self, build: &Build, mut visit: impl FnMut(usize, Gaussian<f64>, f64)) -> Option<()> {
         for (index, run) in self.runs.iter().enumerate() {
-            let mut filter = filter_from_parts(kind, run.law, params, self.limits, Start::Unknown).ok()?;
+            let mut filter = build(run.law).ok()?;
             for k in 0..run.block.end {
                 filter.step(run.time_s[k], run.reading[k]).ok()?;
                 if k >= run.block.start && run.strain[k].is_finite() {

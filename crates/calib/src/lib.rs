@@ -14,6 +14,7 @@ mod blocks;
 mod calibrate;
 pub mod closed_form;
 mod design;
+mod ensemble;
 mod error;
 mod estimator_params;
 mod filter;
@@ -34,6 +35,7 @@ mod sd_scale;
 
 pub use baseline::StaticCubic;
 pub use calibrate::{Calibration, Stage, calibrate};
+pub use ensemble::EnsembleParams;
 pub use error::CalibrationError;
 pub use estimator_params::{EstimatorKind, EstimatorParams, MotionParams, NoiseParams, PhaseParams};
 pub use filter::{Filter, Output, Start, build_filter};

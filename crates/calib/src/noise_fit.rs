@@ -1,6 +1,8 @@
 use crate::CalibrationError;
 use crate::estimator_params::{EstimatorKind, EstimatorParams, MotionParams, NoiseParams, PhaseParams};
+use crate::filter::{Filter, Start, filter_from_parts};
 use crate::law_fit::CrossFit;
+use crate::law_params::LawParams;
 use crate::left_out::LeftOut;
 use crate::motion_stats::{MotionStats, root_mean_square};
 use crate::optimise;
@@ -76,7 +78,8 @@ impl<'a> NoiseProblem<'a> {
         let mut cost = |point: &[f64]| {
             evaluated();
             let pull: f64 = point.iter().zip(&start).map(|(x, s)| (x - s).powi(2)).sum();
-            left_out.score(self.kind.tuned_as(), &self.params(point)) + REGULARISATION * pull
+            let params = self.params(point);
+            left_out.score(&|law| self.build(self.kind.tuned_as(), law, &params)) + REGULARISATION * pull
         };
         let from = from.map_or(&start, |tuned| &tuned.point);
         let point = optimise::polish(&mut cost, from, search.side, search.steps)?;
@@ -87,15 +90,26 @@ impl<'a> NoiseProblem<'a> {
     pub(crate) fn finish(&self, tuned: &Tuned) -> EstimatorParams {
         let left_out = self.left_out(1);
         let score = |mut params: EstimatorParams| {
-            params.score = left_out.score(self.kind, &params);
+            params.score = left_out.score(&|law| self.build(self.kind, law, &params));
             params
         };
         let candidates = self.at_every_row(self.params(&tuned.point), self.stride(REFINEMENT.rows));
         let best = candidates.into_iter().map(score).reduce(|a, b| if b.score < a.score { b } else { a });
         let mut params = best.unwrap_or_else(|| self.params(&tuned.point));
-        params.strain_sd_scale = left_out.filtered_deviations(self.kind, &params).map_or(1.0, |d| sd_scale(&d));
-        params.smoothed_sd_scale = left_out.smoothed_deviations(self.kind, &params).map(|d| sd_scale(&d));
+        let build = |law: &LawParams| self.build(self.kind, law, &params);
+        let (filtered, smoothed) = (left_out.filtered_deviations(&build), left_out.smoothed_deviations(&build));
+        params.strain_sd_scale = filtered.map_or(1.0, |deviations| sd_scale(&deviations));
+        params.smoothed_sd_scale = smoothed.map(|deviations| sd_scale(&deviations));
         params
+    }
+
+    fn build(
+        &self,
+        kind: EstimatorKind,
+        law: &LawParams,
+        params: &EstimatorParams,
+    ) -> Result<Box<dyn Filter>, CalibrationError> {
+        filter_from_parts(kind, law, params, self.limits, Start::Unknown)
     }
 
     /// What parameters that were found on every `stride`-th row may mean for every row. White noise stays what it is; if
@@ -140,7 +154,7 @@ impl<'a> NoiseProblem<'a> {
         let mut start = vec![root_mean_square(&left_out).max(1e-9), BASELINE_TIME_S, fine, fine];
         start.extend(match self.kind.tuned_as() {
             EstimatorKind::Ekf | EstimatorKind::Ukf => [stats.rate_sd, stats.rate_time_s, stats.strain_sd],
-            EstimatorKind::SignSplit | EstimatorKind::Particles => {
+            EstimatorKind::SignSplit | EstimatorKind::Particles | EstimatorKind::Ensemble => {
                 [stats.rate_sd, stats.acceleration_sd, stats.strain_sd]
             }
             EstimatorKind::Imm | EstimatorKind::Hypotheses => {

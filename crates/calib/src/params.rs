@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::CalibrationError;
 use crate::baseline::StaticCubic;
+use crate::ensemble::EnsembleParams;
 use crate::estimator_params::{EstimatorKind, EstimatorParams};
 use crate::law_params::LawParams;
 
@@ -42,6 +43,9 @@ pub struct SensorParams {
     pub law: LawParams,
     /// Noise and motion, per estimator.
     pub estimators: BTreeMap<EstimatorKind, EstimatorParams>,
+    /// How estimators are pooled, if they are.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ensemble: Option<EnsembleParams>,
     /// The recordings it was calibrated on.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub recordings: Vec<RecordingInfo>,
@@ -160,14 +164,21 @@ pub struct Uncertainty {
 }
 
 impl SensorParams {
-    /// The parameters of an estimator, or of the default one.
+    /// The parameters of an estimator.
     ///
     /// # Errors
     /// If the file has none for it.
-    pub fn estimator(&self, kind: Option<EstimatorKind>) -> Result<&EstimatorParams, CalibrationError> {
-        let kind = kind.unwrap_or(self.default_estimator);
-        self.estimators.get(&kind).ok_or_else(|| {
-            CalibrationError::Unsupported(format!("the sensor file has no parameters for `{}`", kind.name()))
-        })
+    pub fn estimator(&self, kind: EstimatorKind) -> Result<&EstimatorParams, CalibrationError> {
+        self.estimators.get(&kind).ok_or_else(|| CalibrationError::no_parameters(kind))
+    }
+
+    /// The default estimator, or the member of the ensemble that is listened to most.
+    #[must_use]
+    pub fn leading_estimator(&self) -> EstimatorKind {
+        let weights = self.ensemble.iter().flat_map(|ensemble| &ensemble.weights);
+        match (self.default_estimator, weights.max_by(|a, b| a.1.total_cmp(b.1))) {
+            (EstimatorKind::Ensemble, Some((kind, _))) => *kind,
+            (kind, _) => kind,
+        }
     }
 }

@@ -43,10 +43,7 @@ pub fn run(args: &CalibrateArgs) -> Result<(), CliError> {
     sensor_file::write(&args.output, &params)
 }
 
-/// Estimators to choose from unless one is asked for: the small one, and the one for whatever moves.
-const CANDIDATES: [EstimatorKind; 2] = [EstimatorKind::Ekf, EstimatorKind::SignSplit];
-
-/// The parameters of the sensor behind `recordings`, with `estimator`, or else the one that does best, as the default.
+/// The parameters of the sensor behind `recordings`, with `estimator`, or else the ensemble, as the default.
 pub fn calibrate_recordings(
     recordings: &[Recording],
     options: LawOptions,
@@ -56,8 +53,8 @@ pub fn calibrate_recordings(
     let samples: Vec<Samples> = recordings.iter().map(Recording::samples).collect::<Result<_, _>>()?;
     let (quantity, reading) = common_units(recordings)?;
     let names: Vec<&str> = recordings.iter().map(|recording| recording.name.as_str()).collect();
-    let kinds = estimator.map_or_else(|| CANDIDATES.to_vec(), |estimator| vec![estimator]);
-    let calibration = calibrate(&samples, options, &kinds, |stage| progress.calibrating(stage))
+    let kind = estimator.unwrap_or(EstimatorKind::Ensemble);
+    let calibration = calibrate(&samples, options, &[kind], |stage| progress.calibrating(stage))
         .map_err(|error| CliError::calibration(&names, &error))?;
     let infos = recordings.iter().zip(&calibration.rest_readings).map(|(recording, rest_reading)| RecordingInfo {
         file: file_name(&recording.name),
@@ -80,6 +77,7 @@ pub fn calibrate_recordings(
         joint: recordings.iter().find_map(Recording::joint),
         law: calibration.law,
         estimators: calibration.estimators,
+        ensemble: calibration.ensemble,
         recordings: infos.collect(),
         uncertainty: Some(calibration.uncertainty),
     })

@@ -33,7 +33,12 @@ impl<'a> Law<'a> {
             branches: [],
             range: law.range.to_model(),
         };
-        Self { quasi_static, branches: &law.branches, estimator: params.estimator(None).ok(), rest_reading }
+        Self {
+            quasi_static,
+            branches: &law.branches,
+            estimator: params.estimator(params.leading_estimator()).ok(),
+            rest_reading,
+        }
     }
 
     /// g(ε).

@@ -161,7 +161,8 @@ fn gauge(rows: &mut Rows, gauge: &GaugeParams, quantity: Quantity) {
 }
 
 fn estimator(params: &SensorParams) -> Option<Table> {
-    let estimator = params.estimator(None).ok()?;
+    let kind = params.leading_estimator();
+    let estimator = params.estimator(kind).ok()?;
     let (noise, own) = (&estimator.noise, unit(params.quantity));
     let (rate, acceleration) = (per_time(params.quantity, 1), per_time(params.quantity, 2));
     let row = |name: &str, value: f64, unit: &str| [name.to_owned(), plain(value), unit.to_owned()];
@@ -184,7 +185,7 @@ fn estimator(params: &SensorParams) -> Option<Table> {
     rows.push(row("Motion: sd of the rate", rate_sd, &rate));
     rows.push(row("Motion: mean", mean, own));
     rows.push(row("Motion: sd", sd, own));
-    let caption = format!("Noise and motion for the estimator “{}”", params.default_estimator.name());
+    let caption = format!("Noise and motion for the estimator “{}”", kind.name());
     Some(Table::new(&caption, ["Parameter", "Value", "Unit"], rows))
 }
 

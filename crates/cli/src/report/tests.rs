@@ -54,6 +54,7 @@ fn sensor() -> SensorParams {
             branches: vec![branch],
         },
         estimators: BTreeMap::from([(EstimatorKind::Ekf, estimator)]),
+        ensemble: None,
         recordings: vec![],
         uncertainty: None,
     }

@@ -1,0 +1,213 @@
+use std::collections::BTreeMap;
+
+use ohmstrain_ekf::{Estimate, Gaussian, Guard, Reading, ReadingVerdict, StepError};
+use serde::{Deserialize, Serialize};
+
+use crate::estimator_params::EstimatorKind;
+use crate::filter::{Filter, Output};
+
+/// Estimators that run side by side, and how much each is listened to.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct EnsembleParams {
+    /// As for a single estimator.
+    pub score: f64,
+    /// As for a single estimator, on top of the members' own factors.
+    pub strain_sd_scale: f64,
+    /// The same for the smoother.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub smoothed_sd_scale: Option<f64>,
+    /// Weights of the members; they sum to one.
+    pub weights: BTreeMap<EstimatorKind, f64>,
+}
+
+/// How many independent rows the mean score stands for. Errors hang together for as long as a movement lasts, so a mean
+/// over a thousand rows is worth a handful of them, and a better score is a hint rather than a proof.
+const INDEPENDENT_ROWS: f64 = 2.0;
+
+/// Weights `∝ exp(-n · score)` of estimators with these mean negative log densities: pseudo-Bayesian model averaging
+/// (Geisser & Eddy, *J. Am. Stat. Assoc.* 74 (1979) 153) on the blocks left out.
+pub(crate) fn weights(scores: &[(EstimatorKind, f64)]) -> BTreeMap<EstimatorKind, f64> {
+    let best = scores.iter().map(|(_, score)| *score).fold(f64::INFINITY, f64::min);
+    let raw = |score: f64| if score.is_finite() { (INDEPENDENT_ROWS * (best - score)).exp() } else { 0.0 };
+    let total: f64 = scores.iter().map(|(_, score)| raw(*score)).sum();
+    scores.iter().map(|(kind, score)| (*kind, raw(*score) / total)).collect()
+}
+
+/// Filters that run side by side. Their posteriors are pooled: where they disagree the deviation grows.
+pub(crate) struct Ensemble {
+    members: Vec<Member>,
+    filtered_scale: f64,
+    smoothed_scale: f64,
+}
+
+struct Member {
+    filter: Box<dyn Filter>,
+    weight: f64,
+}
+
+impl Ensemble {
+    pub(crate) fn new(members: Vec<(Box<dyn Filter>, f64)>, filtered_scale: f64, smoothed_scale: f64) -> Self {
+        let members = members.into_iter().map(|(filter, weight)| Member { filter, weight }).collect();
+        Self { members, filtered_scale, smoothed_scale }
+    }
+
+    /// Lets every member do something and pools what each of them says, call by call.
+    fn pool_each(
+        &mut self,
+        scale: f64,
+        out: &mut dyn FnMut(Output),
+        mut act: impl FnMut(&mut dyn Filter, &mut dyn FnMut(Output)) -> Result<(), StepError>,
+    ) -> Result<(), StepError> {
+        let mut said: Vec<Vec<(f64, Output)>> = Vec::new();
+        let mut acted = Ok(());
+        for member in &mut self.members {
+            let mut row = 0;
+            let result = act(member.filter.as_mut(), &mut |output| {
+                if said.len() == row {
+                    said.push(Vec::new());
+                }
+                said[row].push((member.weight, output));
+                row += 1;
+            });
+            acted = acted.and(result);
+        }
+        for outputs in said {
+            out(pooled(&outputs, scale));
+        }
+        acted
+    }
+}
+
+impl Filter for Ensemble {
+    fn guard(&mut self, guard: Guard<f64>) {
+        for member in &mut self.members {
+            member.filter.guard(guard);
+        }
+    }
+
+    fn step(&mut self, time_s: f64, reading: Option<Reading<f64>>) -> Result<(), StepError> {
+        // What a step is refused for lies in time and reading, which are the same for all: none goes ahead of the others.
+        self.members.iter_mut().try_for_each(|member| member.filter.step(time_s, reading))
+    }
+
+    fn strain(&self) -> Gaussian<f64> {
+        let strains = self.members.iter().map(|member| (member.weight, member.filter.strain()));
+        scaled(pooled_gaussian(strains), self.filtered_scale)
+    }
+
+    fn output(&self) -> Output {
+        let outputs: Vec<(f64, Output)> = self.members.iter().map(|m| (m.weight, m.filter.output())).collect();
+        pooled(&outputs, self.filtered_scale)
+    }
+
+    fn step_lagged(
+        &mut self,
+        time_s: f64,
+        reading: Option<Reading<f64>>,
+        lag_s: f64,
+        out: &mut dyn FnMut(Output),
+    ) -> Result<(), StepError> {
+        let scale = self.filtered_scale.max(self.smoothed_scale);
+        self.pool_each(scale, out, |filter, out| filter.step_lagged(time_s, reading, lag_s, out))
+    }
+
+    fn flush_lagged(&mut self, out: &mut dyn FnMut(Output)) -> Result<(), StepError> {
+        let scale = self.filtered_scale.max(self.smoothed_scale);
+        self.pool_each(scale, out, |filter, out| filter.flush_lagged(out))
+    }
+
+    fn smooth(
+        &mut self,
+        time_s: &[f64],
+        readings: &[Option<Reading<f64>>],
+    ) -> Result<Option<Vec<Output>>, (usize, StepError)> {
+        let mut said = Vec::new();
+        for member in &mut self.members {
+            let Some(outputs) = member.filter.smooth(time_s, readings)? else { return Ok(None) };
+            said.push((member.weight, outputs));
+        }
+        let row = |k: usize| {
+            let outputs: Vec<(f64, Output)> = said.iter().map(|(weight, outputs)| (*weight, outputs[k])).collect();
+            pooled(&outputs, self.smoothed_scale)
+        };
+        Ok(Some((0..time_s.len()).map(row).collect()))
+    }
+}
+
+fn scaled(gaussian: Gaussian<f64>, sd_scale: f64) -> Gaussian<f64> {
+    Gaussian { variance: gaussian.variance * sd_scale * sd_scale, ..gaussian }
+}
+
+/// Mean and variance of a mixture of Gaussians whose weights sum to one.
+fn pooled_gaussian(weighted: impl Iterator<Item = (f64, Gaussian<f64>)> + Clone) -> Gaussian<f64> {
+    let mean: f64 = weighted.clone().map(|(weight, gaussian)| weight * gaussian.mean).sum();
+    let variance = weighted.map(|(weight, g)| weight * (g.variance + (g.mean - mean).powi(2))).sum();
+    Gaussian { mean, variance }
+}
+
+/// What the members say together.
+fn pooled(outputs: &[(f64, Output)], strain_sd_scale: f64) -> Output {
+    let gaussian = |of: fn(&Estimate<f64>) -> Gaussian<f64>| {
+        pooled_gaussian(outputs.iter().map(|(weight, output)| (*weight, of(&output.estimate))))
+    };
+    let mean = |of: &dyn Fn(&Output) -> f64| outputs.iter().map(|(weight, output)| weight * of(output)).sum::<f64>();
+    let share = |holds: &dyn Fn(&Output) -> bool| mean(&|output| f64::from(u8::from(holds(output)))) > 0.5;
+    Output {
+        estimate: Estimate {
+            strain: scaled(gaussian(|estimate| estimate.strain), strain_sd_scale),
+            rate: gaussian(|estimate| estimate.rate),
+            relaxation: gaussian(|estimate| estimate.relaxation),
+            baseline: mean(&|output| output.estimate.baseline),
+            settled: gaussian(|estimate| estimate.settled),
+            beyond_border: mean(&|output| output.estimate.beyond_border),
+            near_ramp_border: share(&|output| output.estimate.near_ramp_border),
+        },
+        nis: outputs.iter().map(|(weight, output)| Some(weight * output.nis?)).sum(),
+        verdict: majority(outputs),
+        phases: pooled_phases(outputs),
+    }
+}
+
+/// The verdict with the most weight behind it.
+fn majority(outputs: &[(f64, Output)]) -> ReadingVerdict {
+    let weight_of = |verdict: ReadingVerdict| {
+        outputs.iter().filter(|(_, output)| output.verdict == verdict).map(|(weight, _)| weight).sum::<f64>()
+    };
+    let verdicts = outputs.iter().map(|(_, output)| output.verdict);
+    verdicts.max_by(|a, b| weight_of(*a).total_cmp(&weight_of(*b))).unwrap_or(ReadingVerdict::Missing)
+}
+
+/// Phase probabilities of the members that have phases.
+fn pooled_phases(outputs: &[(f64, Output)]) -> Option<[f64; 3]> {
+    let known = || outputs.iter().filter_map(|(weight, output)| Some((weight, output.phases?)));
+    let total: f64 = known().map(|(weight, _)| weight).sum();
+    let probability = |phase: usize| known().map(|(weight, phases)| weight * phases[phase]).sum::<f64>() / total;
+    (total > 0.0).then(|| std::array::from_fn(probability))
+}
+
+#[cfg(test)]
+mod tests {
+    use ohmstrain_ekf::Gaussian;
+
+    use super::{pooled_gaussian, weights};
+    use crate::estimator_params::EstimatorKind;
+
+    #[test]
+    fn disagreement_widens() {
+        // Two of ±1 with equal weights: variance 1 between them on top of their own.
+        let at = |mean: f64| (0.5, Gaussian { mean, variance: 0.25 });
+        let pooled = pooled_gaussian([at(-1.0), at(1.0)].into_iter());
+        assert_eq!((pooled.mean, pooled.variance), (0.0, 1.25));
+    }
+
+    #[test]
+    fn weights_follow_the_scores() {
+        let weights =
+            weights(&[(EstimatorKind::Ekf, -2.0), (EstimatorKind::Imm, f64::INFINITY), (EstimatorKind::Ukf, -2.5)]);
+        let of = |kind| weights[&kind];
+        assert!((of(EstimatorKind::Ekf) + of(EstimatorKind::Ukf) - 1.0).abs() < 1e-15);
+        assert!((of(EstimatorKind::Ukf) / of(EstimatorKind::Ekf) - 1.0_f64.exp()).abs() < 1e-12);
+        assert_eq!(of(EstimatorKind::Imm), 0.0);
+    }
+}
