@@ -1,7 +1,7 @@
 use std::collections::BTreeMap;
 
 use crate::CalibrationError;
-use crate::baseline::StaticCubic;
+use crate::baselines::StaticCubic;
 use crate::estimator_params::{EstimatorKind, EstimatorParams};
 use crate::law_fit::{CrossFit, LawOptions, fit_laws};
 use crate::law_params::LawParams;

@@ -9,7 +9,7 @@
 //! - Deterministic: the same samples give the same parameters. Nothing is random, no clock is read.
 //! - A calibration that cannot be made is a [`CalibrationError`]; nothing panics on recorded data.
 
-mod baseline;
+mod baselines;
 mod blocks;
 mod calibrate;
 pub mod closed_form;
@@ -17,6 +17,7 @@ mod design;
 mod error;
 mod estimator_params;
 mod filter;
+mod lag;
 mod law_fit;
 mod law_params;
 mod law_regression;
@@ -32,11 +33,12 @@ mod samples;
 mod scores;
 mod sd_scale;
 
-pub use baseline::StaticCubic;
+pub use baselines::{Baseline, Baselines, Features, Fir, LeakyBank, LowPassMode, Regression, StaticCubic};
 pub use calibrate::{Calibration, Stage, calibrate};
 pub use error::CalibrationError;
 pub use estimator_params::{EstimatorKind, EstimatorParams, MotionParams, NoiseParams, PhaseParams};
 pub use filter::{Filter, Output, Start, build_filter};
+pub use lag::reference_lag;
 pub use law_fit::{CrossFit, GaugeFamily, LawFit, LawOptions, fit_law};
 pub use law_params::{BranchParams, GaugeParams, LawParams};
 pub use params::{
