@@ -1,15 +1,19 @@
-use crate::blocks::BlockedNormal;
+use nalgebra::DVector;
+
 use crate::design::BRANCH_COLUMNS;
 use crate::law_fit::GaugeFamily;
 use crate::law_params::LawParams;
 use crate::law_regression::LawRegression;
 use crate::law_structure::LawStructure;
+use crate::low_pass::LowPass;
 use crate::samples::Samples;
 
 /// Lags tried reach this far to both sides, s.
 const FARTHEST_S: f64 = 1.0;
 /// Lags tried to each side.
 const STEPS: usize = 20;
+/// Time constant of the high-pass, s: as long as the lags reach from one side to the other.
+const HIGH_PASS_S: f64 = 2.0 * FARTHEST_S;
 /// Ridge of the law, in the middle of those that calibration tries.
 const RIDGE: f64 = 0.01;
 /// Dash-pots: the two columns between gauge and branches.
@@ -20,8 +24,11 @@ const GAUGE: usize = 3;
 /// How far the reference lags behind the reading, s: positive if what the reading shows now stands in the reference later.
 ///
 /// The lag, within ±1 s, at which a law with the time constants of `law`, a cubic gauge and no dash-pots explains the
-/// readings best, on blocks left out. A dash-pot is left out because it looks like a lag: what a sensor has of one is part
-/// of the answer. `None` if no lag within ±1 s is best, or the recording is too short or too plain to tell.
+/// readings best, on blocks left out. Law and readings are compared through a high-pass: a lag shows where the movement
+/// changes, and slow errors of the law, which are larger, would move it by half a second and more. A dash-pot is left out
+/// because it looks like a lag: what a sensor has of one is part of the answer.
+///
+/// `None` if no lag within ±1 s is best, or the recording is too short or too plain to tell.
 #[must_use]
 pub fn reference_lag(samples: &Samples, law: &LawParams) -> Option<f64> {
     let step_s = FARTHEST_S / STEPS as f64;
@@ -35,7 +42,7 @@ pub fn reference_lag(samples: &Samples, law: &LawParams) -> Option<f64> {
     Some(lag_s(best) + offset * step_s)
 }
 
-/// Mean squared error of the law, on blocks left out, if the reference is read `lag_s` later.
+/// Mean squared error of the law behind the high-pass, on blocks left out, if the reference is read `lag_s` later.
 fn left_out_error(samples: &Samples, law: &LawParams, lag_s: f64) -> Option<f64> {
     let strain = advanced(samples, lag_s);
     // Every lag is judged by the same rows: those that have a reference within reach on both sides.
@@ -46,10 +53,28 @@ fn left_out_error(samples: &Samples, law: &LawParams, lag_s: f64) -> Option<f64>
     let regression = LawRegression::new(&[shifted]).ok()?;
     let taus: Vec<f64> = law.branches.iter().map(|branch| branch.tau_s.ln()).collect();
     let structure = LawStructure { family: GaugeFamily::Polynomial, taus: taus.len(), nonlinear: taus, ridge: RIDGE };
-    let normal: BlockedNormal = regression.normal(&structure.design(&regression), &regression.median_readings());
+    let mut design = structure.design(&regression);
+    let times: Vec<f64> = regression.recordings[0].complete.iter().map(|&k| samples.time_s[k]).collect();
+    let rest_readings = regression.median_readings();
+    let response = regression.response(&rest_readings);
+    design.offset = &response - high_pass(&times, &response);
+    // The constant stays: it is the regression's own.
+    for column in design.columns.iter_mut().skip(1) {
+        *column = high_pass(&times, column);
+    }
+    let normal = regression.normal(&design, &rest_readings);
     let branches = 1 + GAUGE + DASH_POTS;
     let columns: Vec<usize> = (0..=GAUGE).chain(branches..branches + structure.taus * BRANCH_COLUMNS).collect();
     normal.cross_validate(&columns, structure.ridge)
+}
+
+/// What of a column is faster than [`HIGH_PASS_S`].
+fn high_pass(time_s: &[f64], column: &DVector<f64>) -> DVector<f64> {
+    let mut low_pass = LowPass::new(HIGH_PASS_S);
+    DVector::from_iterator(
+        column.len(),
+        time_s.iter().zip(column.iter()).map(|(&time_s, &value)| value - low_pass.next(time_s, value)),
+    )
 }
 
 /// The reference `lag_s` later than each row, interpolated between known values, the ends held.

@@ -24,6 +24,7 @@ mod law_regression;
 mod law_structure;
 mod law_uncertainty;
 mod left_out;
+mod low_pass;
 mod motion_stats;
 mod noise_fit;
 mod optimise;

@@ -1,5 +1,4 @@
 use ohmstrain_calib::{SensorParams, Validity};
-use ohmstrain_ekf::Gaussian;
 
 use crate::error::CliError;
 use crate::input::reading_column;
@@ -30,8 +29,6 @@ struct Outside {
 /// Rows outside are a matter of chance up to this number and this share: by definition 1 % of the calibration's own rows
 /// are faster than its 99th percentile.
 const CHANCE: (usize, f64) = (10, 0.02);
-/// Deviations by which a rate must be too high: 97.5 % sure.
-const SURE: f64 = 1.96;
 
 impl Outside {
     /// Whether it is time to say so.
@@ -64,15 +61,16 @@ impl ValidityWatch {
         }
     }
 
-    /// Takes a row: the reading as recorded, the estimated rate, and the true strain; NaN for what is missing.
-    pub fn see(&mut self, time_s: f64, reading: f64, rate: Gaussian<f64>, truth: f64) {
+    /// Takes a row: the reading as recorded, the estimated rate, and the true strain; NaN for what is missing. An
+    /// uncertain rate is estimated near zero, so that a high one means something.
+    pub fn see(&mut self, time_s: f64, reading: f64, rate: f64, truth: f64) {
         let Validity { lower, upper, fastest_rate_per_s: fastest, duration_s } = self.validity;
         let start_s = *self.start_s.get_or_insert(time_s);
         if !self.long && time_s - start_s > duration_s {
             self.long = true;
             self.warn(time_s, &format!("longer than the {duration_s:.1} s of the calibration"));
         }
-        if self.fast.see(rate.mean.abs() - SURE * rate.sd() > fastest) {
+        if self.fast.see(rate.abs() > fastest) {
             let quantity = self.quantity;
             self.warn(time_s, &format!("{quantity} changes faster than the calibration's {fastest:.4} per second"));
         }

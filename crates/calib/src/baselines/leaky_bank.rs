@@ -1,6 +1,6 @@
-use super::low_pass::LowPass;
 use super::regression::{Features, RIDGES, Regression};
 use crate::CalibrationError;
+use crate::low_pass::LowPass;
 use crate::samples::Samples;
 
 /// The reading, its distances from four low-passes of it, and all products of two of them.

@@ -1,7 +1,7 @@
-use super::low_pass::LowPass;
 use super::regression::{Features, Regression};
 use super::sampling_interval_s;
 use crate::CalibrationError;
+use crate::low_pass::LowPass;
 use crate::samples::Samples;
 
 /// The reading, squared and cubed, and its distance from one low-pass of it: a static cubic that knows one relaxation.

@@ -6,7 +6,6 @@
 
 mod fir;
 mod leaky_bank;
-mod low_pass;
 mod low_pass_mode;
 mod reading_scale;
 mod regression;

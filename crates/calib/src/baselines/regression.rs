@@ -30,7 +30,7 @@ pub struct Regression<F> {
 }
 
 /// Ridges tried, for regressions with more features than the data need.
-pub(super) const RIDGES: [f64; 7] = [1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0];
+pub(super) const RIDGES: [f64; 9] = [1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0, 100.0];
 
 impl<F: Features> Regression<F> {
     /// The candidate and ridge with the least error on blocks left out. The first `free` features are not penalised.

@@ -16,7 +16,7 @@ pub struct EvaluateArgs {
     #[command(flatten)]
     pub calibration: CalibrationSource,
     /// Test on this recording what was calibrated with --train; may be given several times
-    #[arg(long, value_name = "TRACE", requires = "train")]
+    #[arg(long, value_name = "TRACE", requires = "train", conflicts_with_all = ["sensor", "split"])]
     pub test: Vec<PathBuf>,
     /// Estimator: auto (the sensor file's choice, or the one that calibrate would choose), ekf, ukf, imm, sign-split,
     /// hypotheses, particles, or all

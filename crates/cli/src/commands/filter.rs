@@ -129,7 +129,7 @@ impl Stream<'_> {
         writer: &mut EstimateWriter<W>,
     ) -> Result<(), CliError> {
         if let Some(watch) = &mut self.watch {
-            watch.see(row.time_s, row.reading.value, output.estimate.rate, f64::NAN);
+            watch.see(row.time_s, row.reading.value, output.estimate.rate.mean, f64::NAN);
         }
         writer.write(&estimate_row(row, rest_reading, output))
     }

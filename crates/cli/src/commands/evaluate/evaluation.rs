@@ -32,7 +32,7 @@ pub struct RecordingScores {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lag_s: Option<Option<f64>>,
     pub baselines: BaselineScores,
-    /// For the table's header.
+    /// What the errors are errors of, for the table's header.
     #[serde(skip)]
     pub quantity: Quantity,
 }
@@ -100,7 +100,10 @@ impl Evaluation {
         let timed = first.calibration_s.map(|_| "calibration, s");
         let lagged = first.lag_s.map(|_| "lag, s");
         let more: Vec<&str> = timed.into_iter().chain(lagged).collect();
-        let mut table = score_table(first.quantity.name(), &more);
+        let mut quantities: Vec<&str> = self.recordings().map(|scores| scores.quantity.name()).collect();
+        quantities.sort_unstable();
+        quantities.dedup();
+        let mut table = score_table(&quantities.join(" or "), &more);
         for scores in &self.recordings {
             for (k, of) in scores.iter().enumerate() {
                 let file = if k == 0 { of.file.as_str() } else { "" };

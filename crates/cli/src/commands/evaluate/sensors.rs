@@ -76,7 +76,7 @@ impl Sensor {
             let trace = &recording.trace;
             let mut watch = ValidityWatch::new(&recording.name, &self.params, self.params.rest_reading);
             for (k, output) in estimated.filtered.iter().enumerate() {
-                watch.see(trace.time_s[k], trace.readings.values[k], output.estimate.rate, recording.truth(k));
+                watch.see(trace.time_s[k], trace.readings.values[k], output.estimate.rate.mean, recording.truth(k));
             }
         }
         let scores = |outputs| scoring::of_outputs(recording, outputs, from);

@@ -1,7 +1,7 @@
 /// Exponential low-pass, τ L′ = y − L, exact for readings that move linearly from one known row to the next, however
 /// long the step. It starts settled on the first reading.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct LowPass {
+pub(crate) struct LowPass {
     tau_s: f64,
     /// Time and value of the last reading.
     last: Option<(f64, f64)>,
@@ -9,16 +9,16 @@ pub(super) struct LowPass {
 }
 
 impl LowPass {
-    pub(super) const fn new(tau_s: f64) -> Self {
+    pub(crate) const fn new(tau_s: f64) -> Self {
         Self { tau_s, last: None, value: 0.0 }
     }
 
-    pub(super) const fn tau_s(&self) -> f64 {
+    pub(crate) const fn tau_s(&self) -> f64 {
         self.tau_s
     }
 
     /// Takes a reading and returns the low-pass at its time.
-    pub(super) fn next(&mut self, time_s: f64, reading: f64) -> f64 {
+    pub(crate) fn next(&mut self, time_s: f64, reading: f64) -> f64 {
         self.value = match self.last {
             None => reading,
             Some((last_s, last)) => {
