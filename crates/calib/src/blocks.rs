@@ -47,24 +47,19 @@ impl BlockedNormal {
     pub(crate) fn cross_validate(&self, columns: &[usize], ridge: f64) -> Option<f64> {
         let mut sum = 0.0;
         for (b, block) in self.blocks.iter().enumerate() {
-            sum += self.block_error(block, columns, &self.fit(columns, ridge, &[b])?);
+            sum += block_error(block, columns, &self.fit(columns, ridge, &[b])?);
         }
         Some(sum / self.blocks.len() as f64)
     }
 
-    /// Variance of the residual in a block: a constant offset is what the filter's baseline is there for.
-    fn block_error(&self, block: &DMatrix<f64>, columns: &[usize], weights: &DVector<f64>) -> f64 {
-        let response = block.ncols() - 1;
-        let rows = block[(0, 0)];
-        let (mut sum, mut squares) = (block[(0, response)], block[(response, response)]);
-        for (a, &i) in columns.iter().enumerate() {
-            sum -= weights[a] * block[(0, i)];
-            squares -= 2.0 * weights[a] * block[(i, response)];
-            for (b, &j) in columns.iter().enumerate() {
-                squares += weights[a] * weights[b] * block[(i, j)];
-            }
+    /// Mean squared error over the rows of all blocks, left out in turn, offsets and all: for regressions that have
+    /// nothing to catch an offset with.
+    pub(crate) fn left_out_error(&self, columns: &[usize], ridge: f64) -> Option<f64> {
+        let mut sum = 0.0;
+        for (b, block) in self.blocks.iter().enumerate() {
+            sum += residual_sums(block, columns, &self.fit(columns, ridge, &[b])?).1.max(0.0);
         }
-        (squares / rows - (sum / rows).powi(2)).max(0.0)
+        Some(sum / self.total[(0, 0)])
     }
 
     fn solve(&self, gram: &DMatrix<f64>, columns: &[usize], ridge: f64) -> Option<DVector<f64>> {
@@ -83,4 +78,25 @@ impl BlockedNormal {
         let solution = Cholesky::new(normal)?.solve(&right);
         Some(DVector::from_iterator(columns.len(), columns.iter().zip(solution.iter()).map(|(&i, w)| w / size(i))))
     }
+}
+
+/// Variance of the residual in a block: a constant offset is what the filter's baseline is there for.
+fn block_error(block: &DMatrix<f64>, columns: &[usize], weights: &DVector<f64>) -> f64 {
+    let rows = block[(0, 0)];
+    let (sum, squares) = residual_sums(block, columns, weights);
+    (squares / rows - (sum / rows).powi(2)).max(0.0)
+}
+
+/// Sum of the residuals in a block, and of their squares.
+fn residual_sums(block: &DMatrix<f64>, columns: &[usize], weights: &DVector<f64>) -> (f64, f64) {
+    let response = block.ncols() - 1;
+    let (mut sum, mut squares) = (block[(0, response)], block[(response, response)]);
+    for (a, &i) in columns.iter().enumerate() {
+        sum -= weights[a] * block[(0, i)];
+        squares -= 2.0 * weights[a] * block[(i, response)];
+        for (b, &j) in columns.iter().enumerate() {
+            squares += weights[a] * weights[b] * block[(i, j)];
+        }
+    }
+    (sum, squares)
 }

@@ -1,7 +1,7 @@
 use std::collections::BTreeMap;
 
 use crate::CalibrationError;
-use crate::baseline::StaticCubic;
+use crate::baselines::StaticCubic;
 use crate::ensemble::{self, Ensemble, EnsembleParams};
 use crate::estimator_params::{EstimatorKind, EstimatorParams};
 use crate::filter::{Filter, Start, filter_from_parts};
@@ -9,7 +9,7 @@ use crate::law_fit::{CrossFit, LawOptions, fit_laws};
 use crate::law_params::LawParams;
 use crate::left_out::LeftOut;
 use crate::motion_stats::MotionStats;
-use crate::noise_fit::{NoiseProblem, REFINEMENT, RESURVEY, SURVEY, Tuned};
+use crate::noise_fit::{NoiseProblem, REFINEMENT, RESURVEY, SMOOTHED_ROWS, SURVEY, Tuned, stride};
 use crate::params::{RangeParams, Uncertainty, Validity};
 use crate::samples::Samples;
 use crate::sd_scale::sd_scale;
@@ -57,15 +57,19 @@ pub struct Calibration {
 /// wrong direction it does not come back, and a short recording may not show that. Ten per cent in the deviation.
 const LOCK_IN: f64 = 0.1;
 
+/// Which members of an ensemble choose its law. Phase histories make any law look good on the blocks left out by finding
+/// the history that suits it, and the law they choose serves the others badly.
+const LAW_CHOOSERS: [EstimatorKind; 2] = [EstimatorKind::Ekf, EstimatorKind::SignSplit];
+
 fn handicap(kind: EstimatorKind) -> f64 {
     if kind.has_phases() { 0.0 } else { LOCK_IN }
 }
 
 /// Calibrates law, noise and motion on recordings with known strain. Deterministic: same samples, same result.
 ///
-/// Every estimator of `kinds` is tried with a law per strength of ridge; the pair with the best score on blocks that the
-/// law has not seen gives the law. To that law every one of them, what smooths in its place, and the extended Kalman filter
-/// in any case, is then fitted, and the best of `kinds` becomes the default. Near ties go to the one that keeps hypotheses.
+/// Estimators are tried with a law per strength of ridge; the pair with the best score on blocks that the law has not seen
+/// gives the law. Where an ensemble is asked for these are the EKF and the sign-split filter, otherwise all of `kinds`. To that law every
+/// one of them, what smooths in its place, and the extended Kalman filter in any case, is then fitted, and the best of `kinds` becomes the default. Near ties go to the one that keeps hypotheses.
 ///
 /// # Errors
 /// If the recordings are too short or too plain to learn a law from, or `kinds` is empty.
@@ -81,9 +85,11 @@ pub fn calibrate(
     let candidates = distinct(kinds.iter().flat_map(EstimatorKind::members).copied());
     let smoothers = candidates.iter().map(|kind| kind.smoother());
     let all_kinds = distinct(candidates.iter().copied().chain(smoothers).chain([EstimatorKind::Ekf]));
+    let pools = kinds.contains(&EstimatorKind::Ensemble);
+    let choosers: &[EstimatorKind] = if pools { &LAW_CHOOSERS } else { &candidates };
     let surveys = SURVEY.evaluations() + (laws.len() as u64 - 1) * RESURVEY.evaluations();
-    let expected = candidates.len() as u64 * surveys
-        + (all_kinds.len() - candidates.len()) as u64 * SURVEY.evaluations()
+    let expected = choosers.len() as u64 * surveys
+        + (all_kinds.len() - choosers.len()) as u64 * SURVEY.evaluations()
         + all_kinds.len() as u64 * REFINEMENT.evaluations();
     let mut done = 0;
     let mut evaluated = || {
@@ -91,7 +97,7 @@ pub fn calibrate(
         progress(Stage::Noise { done, expected });
     };
     let mut surveyed = Vec::new();
-    for &kind in &candidates {
+    for &kind in choosers {
         let mut before: Option<Tuned> = None;
         for law in &laws {
             let problem = NoiseProblem::new(recordings, law, stats, kind);
@@ -120,7 +126,6 @@ pub fn calibrate(
     let score =
         |kind: &EstimatorKind| estimators.get(kind).map_or(f64::INFINITY, |params| params.score + handicap(*kind));
     let best = candidates.iter().copied().min_by(|a, b| score(a).total_cmp(&score(b)));
-    let pools = kinds.contains(&EstimatorKind::Ensemble);
     let default_estimator = if pools { Some(EstimatorKind::Ensemble) } else { best };
     let ensemble = pools.then(|| fit_ensemble(recordings, fit, &estimators));
     let limits = fit.law.law.range;
@@ -163,7 +168,8 @@ fn fit_ensemble(
     let left_out = LeftOut::new(recordings, fit, limits, 1);
     let score = left_out.score(&build);
     let strain_sd_scale = left_out.filtered_deviations(&build).map_or(1.0, |deviations| sd_scale(&deviations));
-    let smoothed_sd_scale = left_out.smoothed_deviations(&build).map(|deviations| sd_scale(&deviations));
+    let thinned = LeftOut::new(recordings, fit, limits, stride(recordings, SMOOTHED_ROWS));
+    let smoothed_sd_scale = thinned.smoothed_deviations(&build).map(|deviations| sd_scale(&deviations));
     EnsembleParams { score, strain_sd_scale, smoothed_sd_scale, weights }
 }
 

@@ -9,7 +9,7 @@
 //! - Deterministic: the same samples give the same parameters. Nothing is random, no clock is read.
 //! - A calibration that cannot be made is a [`CalibrationError`]; nothing panics on recorded data.
 
-mod baseline;
+mod baselines;
 mod blocks;
 mod calibrate;
 pub mod closed_form;
@@ -18,12 +18,14 @@ mod ensemble;
 mod error;
 mod estimator_params;
 mod filter;
+mod lag;
 mod law_fit;
 mod law_params;
 mod law_regression;
 mod law_structure;
 mod law_uncertainty;
 mod left_out;
+mod low_pass;
 mod motion_stats;
 mod noise_fit;
 mod optimise;
@@ -33,12 +35,13 @@ mod samples;
 mod scores;
 mod sd_scale;
 
-pub use baseline::StaticCubic;
+pub use baselines::{Baseline, Baselines, Features, Fir, LeakyBank, LowPassMode, Regression, StaticCubic};
 pub use calibrate::{Calibration, Stage, calibrate};
 pub use ensemble::EnsembleParams;
 pub use error::CalibrationError;
 pub use estimator_params::{EstimatorKind, EstimatorParams, MotionParams, NoiseParams, PhaseParams};
 pub use filter::{Filter, Output, Start, build_filter};
+pub use lag::reference_lag;
 pub use law_fit::{CrossFit, GaugeFamily, LawFit, LawOptions, fit_law};
 pub use law_params::{BranchParams, GaugeParams, LawParams};
 pub use params::{

@@ -35,6 +35,8 @@ impl Search {
     }
 }
 
+/// Rows on which the smoother's intervals are looked at; smoothing costs ten times as much as filtering.
+pub(crate) const SMOOTHED_ROWS: usize = 2000;
 /// First guess of the baseline's correlation time, s.
 const BASELINE_TIME_S: f64 = 8.0;
 /// First guess of white noise and branch noise, as a share of the law's residual.
@@ -97,7 +99,8 @@ impl<'a> NoiseProblem<'a> {
         let best = candidates.into_iter().map(score).reduce(|a, b| if b.score < a.score { b } else { a });
         let mut params = best.unwrap_or_else(|| self.params(&tuned.point));
         let build = |law: &LawParams| self.build(self.kind, law, &params);
-        let (filtered, smoothed) = (left_out.filtered_deviations(&build), left_out.smoothed_deviations(&build));
+        let filtered = left_out.filtered_deviations(&build);
+        let smoothed = self.left_out(self.stride(SMOOTHED_ROWS)).smoothed_deviations(&build);
         params.strain_sd_scale = filtered.map_or(1.0, |deviations| sd_scale(&deviations));
         params.smoothed_sd_scale = smoothed.map(|deviations| sd_scale(&deviations));
         params
@@ -136,7 +139,7 @@ impl<'a> NoiseProblem<'a> {
     }
 
     fn stride(&self, rows: usize) -> usize {
-        self.samples.iter().map(Samples::len).sum::<usize>().div_ceil(rows)
+        stride(self.samples, rows)
     }
 
     /// Logarithms of the parameters that the law's residuals and the motion of the strain suggest: noise (4), motion (3)
@@ -201,4 +204,9 @@ impl<'a> NoiseProblem<'a> {
             phases,
         }
     }
+}
+
+/// Every how manieth row to take so that no more than `rows` are left.
+pub(crate) fn stride(samples: &[Samples], rows: usize) -> usize {
+    samples.iter().map(Samples::len).sum::<usize>().div_ceil(rows)
 }

@@ -4,7 +4,7 @@ use ohmstrain_model::StrainRange;
 use serde::{Deserialize, Serialize};
 
 use crate::CalibrationError;
-use crate::baseline::StaticCubic;
+use crate::baselines::StaticCubic;
 use crate::ensemble::EnsembleParams;
 use crate::estimator_params::{EstimatorKind, EstimatorParams};
 use crate::law_params::LawParams;

@@ -12,6 +12,8 @@ pub struct Scores {
     pub rmse: f64,
     /// The same in percent of full scale: the reference's range in the rows scored.
     pub rmse_percent_fs: f64,
+    /// Mean absolute error, in the unit of strain.
+    pub mae: f64,
     /// Mean error.
     pub bias: f64,
     /// Share of rows whose 50 % interval holds the truth; empty for estimates without a deviation.
@@ -64,6 +66,7 @@ impl Scores {
             n,
             rmse,
             rmse_percent_fs: 100.0 * rmse / full_scale,
+            mae: mean(&|row| (row.strain - row.truth).abs()),
             bias: mean(&|row| row.strain - row.truth),
             coverage_50: covered(0.5),
             coverage_90: covered(0.9),

@@ -116,6 +116,7 @@ fn sensor(calibration: &Calibration) -> SensorParams {
         joint: None,
         law: calibration.law.clone(),
         estimators: calibration.estimators.clone(),
+        ensemble: calibration.ensemble.clone(),
         recordings: vec![],
         uncertainty: Some(calibration.uncertainty.clone()),
     }

@@ -1,3 +1,4 @@
+mod evaluate;
 mod fit_law;
 
 use std::path::PathBuf;
@@ -9,6 +10,7 @@ use ohmstrain_bench_data::{FrontEndSpec, JointSpec, Metadata};
 use ohmstrain_calib::{EstimatorKind, GaugeFamily};
 use ohmstrain_ekf::Influence;
 
+pub use evaluate::{Estimators, EvaluateArgs};
 pub use fit_law::{FitLawArgs, SegmentChoice, phase_name};
 
 /// From the resistance of a soft strain sensor to strain, with an honest error bar.
@@ -196,33 +198,6 @@ pub struct SmoothArgs {
     /// How to estimate
     #[command(flatten)]
     pub estimate: EstimateArgs,
-}
-
-/// Flags of `evaluate`.
-#[derive(Debug, ClapArgs)]
-pub struct EvaluateArgs {
-    /// Recordings with a reference
-    #[arg(required = true)]
-    pub traces: Vec<PathBuf>,
-    /// The sensor's parameters
-    #[arg(long, value_name = "sensor.toml")]
-    pub sensor: PathBuf,
-    /// Estimator: auto (the sensor file's choice), ekf, ukf, imm, sign-split or hypotheses
-    #[arg(long, default_value = "auto")]
-    pub estimator: Auto<Estimator>,
-    /// Score rows with time_s >= T only; the filter still starts at the first row
-    #[arg(long, value_name = "T", allow_negative_numbers = true, value_parser = finite)]
-    pub from: Option<f64>,
-    /// Exit with code 3 unless every recording is estimated better than by the static cubic and its 95 % interval covers
-    /// 80 % or more
-    #[arg(long)]
-    pub check: bool,
-    /// Print JSON
-    #[arg(long)]
-    pub json: bool,
-    /// Overrides of the recordings' metadata
-    #[command(flatten)]
-    pub trace: TraceArgs,
 }
 
 /// A number that is neither NaN nor infinite.

@@ -46,6 +46,11 @@ impl CliError {
         let _ = writeln!(io::stderr(), "ohmstrain: {text}");
     }
 
+    /// Says on stderr what casts doubt on a result.
+    pub fn warning(text: &str) {
+        Self::remark(&format!("warning: {text}"));
+    }
+
     /// Calibration failed on the contents of `files`.
     pub fn calibration(files: &[&str], error: &CalibrationError) -> Self {
         match error {

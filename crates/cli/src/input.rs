@@ -55,6 +55,12 @@ pub fn header<R: Read>(rows: &TraceReader<R>) -> String {
 }
 
 impl Recording {
+    /// Its first rows, under the same name.
+    pub fn head(&self, rows: usize) -> Self {
+        let (name, header, sha256) = (self.name.clone(), self.header.clone(), self.sha256.clone());
+        Self { name, header, sha256, trace: self.trace.rows(0..rows) }
+    }
+
     /// As calibration wants it.
     pub fn samples(&self) -> Result<Samples<'_>, CliError> {
         let Some(reference) = &self.trace.reference else {
@@ -64,6 +70,12 @@ impl Recording {
             )));
         };
         Ok(Samples { time_s: &self.trace.time_s, reading: &self.trace.readings.values, strain: &reference.values })
+    }
+
+    /// The reference in a row; NaN where it is missing.
+    pub fn truth(&self, row: usize) -> f64 {
+        let value = self.trace.reference.as_ref().and_then(|reference| reference.values.get(row));
+        value.copied().unwrap_or(f64::NAN)
     }
 
     /// What its reference measures.

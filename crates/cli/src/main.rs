@@ -13,6 +13,7 @@ mod progress;
 mod report;
 mod run;
 mod sensor_file;
+mod validity;
 
 use std::process::ExitCode;
 

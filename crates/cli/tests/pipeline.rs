@@ -92,17 +92,33 @@ fn the_json_of_evaluate_has_the_fields_that_scripts_rely_on() {
     let bench = Bench::calibrated();
     let printed = bench.run(&["evaluate", "trace.csv", "trace.csv", "--sensor", "sensor.toml", "--json"]).ok();
     let json: Value = serde_json::from_str(&printed).unwrap();
+    let sensor: toml::Table = toml::from_str(&bench.read("sensor.toml")).unwrap();
     let fields = |value: &Value| value.as_object().unwrap().keys().cloned().collect::<Vec<_>>();
     assert_eq!(fields(&json), ["recordings"]);
     assert_eq!(json["recordings"].as_array().unwrap().len(), 2);
     // In the order of the alphabet, as the parsed object has them.
-    let scores = ["bias", "coverage_50", "coverage_90", "coverage_95", "log_score", "n", "rmse", "rmse_percent_fs"]
-        .map(String::from);
+    let scores = [
+        "bias",
+        "coverage_50",
+        "coverage_90",
+        "coverage_95",
+        "log_score",
+        "mae",
+        "n",
+        "rmse",
+        "rmse_percent_fs",
+        "wrong_branch",
+    ]
+    .map(String::from);
     for recording in json["recordings"].as_array().unwrap() {
-        let mut expected = [&scores[..], &["baselines", "estimator", "file"].map(String::from)].concat();
+        let mut expected =
+            [&scores[..], &["baselines", "calibration_s", "estimator", "file", "smoother"].map(String::from)].concat();
         expected.sort();
         assert_eq!(fields(recording), expected);
-        assert_eq!((recording["file"].as_str(), recording["estimator"].as_str()), (Some("trace.csv"), Some("ekf")));
+        assert_eq!(recording["file"], "trace.csv");
+        assert_eq!(recording["estimator"].as_str(), sensor["default_estimator"].as_str());
+        assert_eq!(fields(&recording["smoother"]), scores);
+        assert!(recording["calibration_s"].is_null());
         assert_eq!(fields(&recording["baselines"]), ["static_cubic"]);
         assert_eq!(fields(&recording["baselines"]["static_cubic"]), scores);
     }

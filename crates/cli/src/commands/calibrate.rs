@@ -109,7 +109,7 @@ pub fn write_report(
     let estimated = estimate(recording, params, None)?;
     let filter = scoring::of_outputs(recording, &estimated.filtered, scored_from_s);
     let smoother = scoring::of_outputs(recording, &estimated.smoothed, scored_from_s);
-    let cubic = scoring::of_static_cubic(recording, &params.static_cubic, scored_from_s);
+    let cubic = scoring::of_baseline(recording, params.static_cubic.start(), scored_from_s);
     let scores: Vec<ScoreRow> = [("filter", filter), ("smoother", smoother), ("static cubic", cubic)]
         .into_iter()
         .filter_map(|(name, scores)| {

@@ -4,7 +4,7 @@ use ohmstrain_bench_data::simulate::{Material, Protocol, SimulationSettings, sim
 use ohmstrain_calib::{EstimatorKind, LawOptions, Output, SensorParams};
 
 use super::calibrate::{calibrate_recordings, write_report};
-use super::evaluate::{add_scores, score_table};
+use super::score_table::{add_scores, score_table};
 use super::scoring;
 use super::smooth::write_estimates;
 use crate::args::DemoArgs;
@@ -28,8 +28,7 @@ pub fn run(args: &DemoArgs) -> Result<(), CliError> {
     let middle = (recording.trace.len() as f64 * CALIBRATION_SHARE) as usize;
     let test_from = recording.trace.time_s[middle];
 
-    let training =
-        Recording { trace: recording.trace.until(test_from), ..input::read(&trace_path, &Default::default())? };
+    let training = recording.head(middle);
     let params = calibrate_recordings(
         std::slice::from_ref(&training),
         LawOptions::default(),
@@ -46,15 +45,15 @@ pub fn run(args: &DemoArgs) -> Result<(), CliError> {
     write_report(&args.out.join("report.html"), &recording, &params, Some(test_from))?;
     drop(progress);
 
-    let mut table = score_table(params.quantity.name());
+    let mut table = score_table(params.quantity.name(), &[]);
     let scores = [
         ("filter", scoring::of_outputs(&recording, &estimated.filtered, Some(test_from))),
         ("smoother", scoring::of_outputs(&recording, &estimated.smoothed, Some(test_from))),
-        ("static cubic", scoring::of_static_cubic(&recording, &params.static_cubic, Some(test_from))),
+        ("static cubic", scoring::of_baseline(&recording, params.static_cubic.start(), Some(test_from))),
     ];
     for (name, scores) in scores {
         if let Some(scores) = scores {
-            add_scores(&mut table, "second half", name, &scores);
+            add_scores(&mut table, "second half", name, &scores, &[]);
         }
     }
     write_to(None, |out| {

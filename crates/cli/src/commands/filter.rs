@@ -10,6 +10,7 @@ use crate::estimates::{EstimateRow, EstimateWriter};
 use crate::input::{self, check_unit, is_stdin};
 use crate::run::{filter, relative_row, rest_reading, step_error_at};
 use crate::sensor_file;
+use crate::validity::ValidityWatch;
 
 /// Turns readings into strain as they arrive. Memory does not grow with the recording.
 pub fn run(args: &FilterArgs) -> Result<(), CliError> {
@@ -22,7 +23,8 @@ pub fn run(args: &FilterArgs) -> Result<(), CliError> {
     let out = io::BufWriter::new(io::stdout().lock());
     let mut writer = EstimateWriter::new(out, &params, &args.estimate.columns)?;
     let live = is_stdin(&args.trace_file) || !args.trace_file.is_file();
-    let streamed = Stream { params: &params, args, filter, live, waiting: VecDeque::new() }.run(rows, &mut writer);
+    let streamed =
+        Stream { params: &params, args, filter, live, waiting: VecDeque::new(), watch: None }.run(rows, &mut writer);
     // What was estimated before an error is still good.
     writer.flush().and(streamed)
 }
@@ -35,6 +37,8 @@ struct Stream<'a> {
     live: bool,
     /// Rows whose estimates wait for later readings.
     waiting: VecDeque<Row>,
+    /// Says when the calibration does not reach; there once R₀ is known.
+    watch: Option<ValidityWatch>,
 }
 
 impl Stream<'_> {
@@ -60,6 +64,7 @@ impl Stream<'_> {
             return Err(CliError::Input(format!("{file}:{line}: {none}")));
         }
         let rest_reading = rest_reading(wanted, self.params, first.iter().map(|row| row.reading.value), &file)?;
+        self.watch = Some(ValidityWatch::new(&file, self.params, rest_reading));
         let mut streamed = Ok(());
         for row in first.into_iter().map(Ok).chain(rows) {
             streamed = row.map_err(CliError::from).and_then(|row| self.step(row, rest_reading, &file, writer));
@@ -86,7 +91,7 @@ impl Stream<'_> {
         match self.args.lag_s {
             None => {
                 self.filter.step(time_s, reading).map_err(refused)?;
-                writer.write(&estimate_row(&row, rest_reading, self.filter.output()))?;
+                self.write(&row, rest_reading, self.filter.output(), writer)?;
             }
             Some(lag_s) => {
                 let mut outputs = Vec::new();
@@ -108,10 +113,25 @@ impl Stream<'_> {
         rest_reading: f64,
         writer: &mut EstimateWriter<W>,
     ) -> Result<(), CliError> {
-        for (row, output) in self.waiting.drain(..outputs.len()).zip(outputs) {
-            writer.write(&estimate_row(&row, rest_reading, *output))?;
+        for output in outputs {
+            if let Some(row) = self.waiting.pop_front() {
+                self.write(&row, rest_reading, *output, writer)?;
+            }
         }
         Ok(())
+    }
+
+    fn write<W: io::Write>(
+        &mut self,
+        row: &Row,
+        rest_reading: f64,
+        output: Output,
+        writer: &mut EstimateWriter<W>,
+    ) -> Result<(), CliError> {
+        if let Some(watch) = &mut self.watch {
+            watch.see(row.time_s, row.reading.value, output.estimate.rate.mean, f64::NAN);
+        }
+        writer.write(&estimate_row(row, rest_reading, output))
     }
 }
 

@@ -5,6 +5,7 @@ mod demo;
 mod evaluate;
 mod filter;
 mod fit_law;
+mod score_table;
 mod scoring;
 mod simulate;
 mod smooth;

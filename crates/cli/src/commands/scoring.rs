@@ -1,55 +1,32 @@
-use ohmstrain_calib::{Output, ScoredRow, Scores, StaticCubic};
+use ohmstrain_calib::{Baseline, Output, ScoredRow, Scores};
 
 use crate::input::Recording;
 
-/// The rows of a recording that are scored: those from `from` on.
-fn scored_rows(recording: &Recording, from: Option<f64>) -> impl Iterator<Item = usize> + '_ {
+/// Scores of the rows from `from` on, of which `estimate` gives strain and deviation; `None` without a reference.
+fn scores(recording: &Recording, from: Option<f64>, estimate: impl Fn(usize) -> (f64, Option<f64>)) -> Option<Scores> {
     let times = &recording.trace.time_s;
-    (0..times.len()).filter(move |&k| from.is_none_or(|from| times[k] >= from))
-}
-
-fn truth(recording: &Recording, row: usize) -> f64 {
-    recording.trace.reference.as_ref().and_then(|reference| reference.values.get(row).copied()).unwrap_or(f64::NAN)
+    let rows: Vec<ScoredRow> = (0..times.len())
+        .filter(|&k| from.is_none_or(|from| times[k] >= from))
+        .map(|k| {
+            let (strain, sd) = estimate(k);
+            ScoredRow { time_s: times[k], truth: recording.truth(k), strain, sd }
+        })
+        .collect();
+    Scores::new(&rows)
 }
 
 /// Scores of an estimator's outputs; `None` without a reference.
 pub fn of_outputs(recording: &Recording, outputs: &[Output], from: Option<f64>) -> Option<Scores> {
-    let rows: Vec<ScoredRow> = scored_rows(recording, from)
-        .map(|k| {
-            let strain = outputs[k].estimate.strain;
-            ScoredRow {
-                time_s: recording.trace.time_s[k],
-                truth: truth(recording, k),
-                strain: strain.mean,
-                sd: Some(strain.sd()),
-            }
-        })
-        .collect();
-    Scores::new(&rows)
+    scores(recording, from, |k| {
+        let strain = outputs[k].estimate.strain;
+        (strain.mean, Some(strain.sd()))
+    })
 }
 
-/// Scores of the static inverse, which keeps its last value where a reading is missing.
-pub fn of_static_cubic(recording: &Recording, cubic: &StaticCubic, from: Option<f64>) -> Option<Scores> {
-    let mut last = 0.5 * (cubic.range.lower + cubic.range.upper);
-    let strains: Vec<f64> = recording
-        .trace
-        .readings
-        .values
-        .iter()
-        .map(|&reading| {
-            if reading.is_finite() {
-                last = cubic.strain(reading);
-            }
-            last
-        })
-        .collect();
-    let rows: Vec<ScoredRow> = scored_rows(recording, from)
-        .map(|k| ScoredRow {
-            time_s: recording.trace.time_s[k],
-            truth: truth(recording, k),
-            strain: strains[k],
-            sd: None,
-        })
-        .collect();
-    Scores::new(&rows)
+/// Scores of a baseline, which runs over the whole recording too.
+pub fn of_baseline(recording: &Recording, mut baseline: impl Baseline, from: Option<f64>) -> Option<Scores> {
+    let trace = &recording.trace;
+    let rows = trace.time_s.iter().zip(&trace.readings.values);
+    let strains: Vec<f64> = rows.map(|(&time_s, &reading)| baseline.strain(time_s, reading)).collect();
+    scores(recording, from, |k| (strains[k], None))
 }

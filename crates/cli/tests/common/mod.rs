@@ -95,22 +95,28 @@ pub struct Run {
     pub code: Option<i32>,
     /// What it printed.
     pub stdout: String,
-    /// What it said.
+    /// What it said, without warnings.
     pub stderr: String,
+    /// What it warned of.
+    pub warnings: Vec<String>,
 }
 
 impl Run {
     /// Takes what a process left behind.
     pub fn new(arguments: &[&str], output: Output) -> Self {
+        let said = String::from_utf8(output.stderr).unwrap();
+        let is_warning = |line: &&str| line.starts_with("ohmstrain: warning: ");
+        let (warnings, stderr): (Vec<&str>, Vec<&str>) = said.split_inclusive('\n').partition(is_warning);
         Self {
             command: arguments.join(" "),
             code: output.status.code(),
             stdout: String::from_utf8(output.stdout).unwrap(),
-            stderr: String::from_utf8(output.stderr).unwrap(),
+            stderr: stderr.concat(),
+            warnings: warnings.into_iter().map(str::to_owned).collect(),
         }
     }
 
-    /// Success without a word on stderr; what was printed.
+    /// Success without a word on stderr but warnings; what was printed.
     #[track_caller]
     pub fn ok(self) -> String {
         assert_eq!((self.code, self.stderr.as_str()), (Some(0), ""), "{}", self.command);

@@ -1,6 +1,8 @@
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
+use super::reading_scale::ReadingScale;
+use super::{Baseline, Held};
 use crate::CalibrationError;
 use crate::params::RangeParams;
 use crate::samples::Samples;
@@ -29,13 +31,7 @@ impl StaticCubic {
             .iter()
             .flat_map(|samples| samples.complete_rows().map(|k| (samples.reading[k], samples.strain[k])))
             .collect();
-        let (low, high) = rows
-            .iter()
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), (reading, _)| (l.min(*reading), h.max(*reading)));
-        let (reading_centre, reading_scale) = (0.5 * (low + high), 0.5 * (high - low));
-        if !(reading_scale > 0.0) {
-            return Err(CalibrationError::Singular);
-        }
+        let ReadingScale { centre: reading_centre, half_range: reading_scale } = ReadingScale::of(recordings)?;
         let design = DMatrix::from_fn(rows.len(), 4, |k, power| {
             ((rows[k].0 - reading_centre) / reading_scale).powi(power as i32)
         });
@@ -51,5 +47,24 @@ impl StaticCubic {
         let z = (reading - self.reading_centre) / self.reading_scale;
         let [a, b, c, d] = self.coefficients;
         (a + z * (b + z * (c + z * d))).clamp(self.range.lower, self.range.upper)
+    }
+}
+
+impl StaticCubic {
+    /// The same, row by row.
+    #[must_use]
+    pub fn start(&self) -> impl Baseline + use<> {
+        Running { cubic: *self, held: Held::new(self.range) }
+    }
+}
+
+struct Running {
+    cubic: StaticCubic,
+    held: Held,
+}
+
+impl Baseline for Running {
+    fn strain(&mut self, _: f64, reading: f64) -> f64 {
+        self.held.next(reading.is_finite().then(|| self.cubic.strain(reading)))
     }
 }

@@ -1,0 +1,88 @@
+//! Inverses without a model of the sensor, to compare the filter with.
+//!
+//! [`Baselines::fit`] fits all of them to recordings with known strain; each one then runs over readings row by row, as a
+//! filter does. What they say is clipped to the strains they were fitted on. Ridge and time constant come from
+//! cross-validation on contiguous blocks, on the same normal equations as the law's.
+
+mod fir;
+mod leaky_bank;
+mod low_pass_mode;
+mod reading_scale;
+mod regression;
+mod static_cubic;
+
+pub use fir::Fir;
+pub use leaky_bank::LeakyBank;
+pub use low_pass_mode::LowPassMode;
+pub use regression::{Features, Regression};
+pub use static_cubic::StaticCubic;
+
+use crate::CalibrationError;
+use crate::params::RangeParams;
+use crate::samples::{Samples, check};
+
+/// An inverse at work on one recording.
+pub trait Baseline {
+    /// Strain at `time_s` from this reading and those before, within the range it was fitted on. A missing reading (NaN)
+    /// keeps the last value; before the first reading that is the middle of the range. Times increase.
+    fn strain(&mut self, time_s: f64, reading: f64) -> f64;
+}
+
+/// All of them, fitted to the same rows.
+#[derive(Clone, Debug)]
+pub struct Baselines {
+    /// Cubic polynomial of the reading.
+    pub static_cubic: StaticCubic,
+    /// The readings of the last 20 s.
+    pub fir: Regression<Fir>,
+    /// The reading and one low-pass of it.
+    pub low_pass_mode: Regression<LowPassMode>,
+    /// Products of the reading and four low-passes of it.
+    pub leaky_bank: Regression<LeakyBank>,
+}
+
+impl Baselines {
+    /// Fits all of them to the rows with reading and strain.
+    ///
+    /// # Errors
+    /// If a recording is too short, the strain is constant or the readings do not vary.
+    pub fn fit(recordings: &[Samples]) -> Result<Self, CalibrationError> {
+        let (lower, upper) = check(recordings)?;
+        Ok(Self {
+            static_cubic: StaticCubic::fit(recordings, RangeParams { lower, upper })?,
+            fir: Fir::fit(recordings)?,
+            low_pass_mode: LowPassMode::fit(recordings)?,
+            leaky_bank: LeakyBank::fit(recordings)?,
+        })
+    }
+}
+
+/// Clips estimates to a range and keeps the last one where there is none.
+#[derive(Clone, Copy, Debug)]
+struct Held {
+    range: RangeParams,
+    last: f64,
+}
+
+impl Held {
+    fn new(range: RangeParams) -> Self {
+        Self { range, last: 0.5 * (range.lower + range.upper) }
+    }
+
+    fn next(&mut self, strain: Option<f64>) -> f64 {
+        if let Some(strain) = strain {
+            self.last = strain.clamp(self.range.lower, self.range.upper);
+        }
+        self.last
+    }
+}
+
+/// Largest of the recordings' median steps, s: what all of them can resolve.
+fn sampling_interval_s(recordings: &[Samples]) -> f64 {
+    let median = |samples: &Samples| {
+        let mut steps: Vec<f64> = samples.time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        steps.sort_by(f64::total_cmp);
+        steps.get(steps.len() / 2).copied().unwrap_or(0.0)
+    };
+    recordings.iter().map(median).fold(0.0, f64::max)
+}

@@ -1,0 +1,26 @@
+use crate::CalibrationError;
+use crate::samples::Samples;
+
+/// Centre and half the range of the readings, so that what regressions see is between -1 and 1 where they were fitted.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct ReadingScale {
+    pub centre: f64,
+    pub half_range: f64,
+}
+
+impl ReadingScale {
+    /// Over all rows with reading and strain. Readings that do not vary are an error.
+    pub(super) fn of(recordings: &[Samples]) -> Result<Self, CalibrationError> {
+        let readings = recordings.iter().flat_map(|samples| samples.complete_rows().map(|k| samples.reading[k]));
+        let (low, high) = readings
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), reading| (low.min(reading), high.max(reading)));
+        if !(high > low) {
+            return Err(CalibrationError::Singular);
+        }
+        Ok(Self { centre: 0.5 * (low + high), half_range: 0.5 * (high - low) })
+    }
+
+    pub(super) fn scaled(&self, reading: f64) -> f64 {
+        (reading - self.centre) / self.half_range
+    }
+}

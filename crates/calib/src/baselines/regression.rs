@@ -1,0 +1,113 @@
+use nalgebra::DVector;
+
+use super::reading_scale::ReadingScale;
+use super::{Baseline, Held};
+use crate::CalibrationError;
+use crate::blocks::BlockedNormal;
+use crate::law_regression::BLOCKS;
+use crate::params::RangeParams;
+use crate::samples::{Samples, check};
+
+/// What a linear regression of strain sees of the readings up to now.
+pub trait Features: Clone {
+    /// The regressors at `time_s`, the constant 1 first. `reading` is known, and scaled to be within ±1 where the
+    /// regression was fitted. Times increase.
+    fn next(&mut self, time_s: f64, reading: f64) -> Vec<f64>;
+}
+
+/// Strain as a weighted sum of features, fitted by least squares.
+#[derive(Clone, Debug)]
+pub struct Regression<F> {
+    /// The features before the first reading.
+    pub features: F,
+    /// Weight of a squared coefficient, relative to the variance of its feature and the number of rows.
+    pub ridge: f64,
+    /// Root mean squared error on blocks left out, in the unit of strain.
+    pub cross_validated_rmse: f64,
+    scale: ReadingScale,
+    weights: DVector<f64>,
+    range: RangeParams,
+}
+
+/// Ridges tried, for regressions with more features than the data need.
+pub(super) const RIDGES: [f64; 9] = [1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0, 100.0];
+
+impl<F: Features> Regression<F> {
+    /// The candidate and ridge with the least error on blocks left out. The first `free` features are not penalised.
+    pub(super) fn fit(
+        recordings: &[Samples],
+        candidates: impl IntoIterator<Item = F>,
+        free: usize,
+        ridges: &[f64],
+    ) -> Result<Self, CalibrationError> {
+        let (lower, upper) = check(recordings)?;
+        let scale = ReadingScale::of(recordings)?;
+        let mut best: Option<Self> = None;
+        for features in candidates {
+            let (normal, columns) = normal_equations(recordings, &features, scale, free);
+            for &ridge in ridges {
+                let Some(error) = normal.left_out_error(&columns, ridge) else { continue };
+                let cross_validated_rmse = error.sqrt();
+                if best.as_ref().is_some_and(|best| best.cross_validated_rmse <= cross_validated_rmse) {
+                    continue;
+                }
+                if let Some(weights) = normal.fit(&columns, ridge, &[]) {
+                    let (features, range) = (features.clone(), RangeParams { lower, upper });
+                    best = Some(Self { features, ridge, cross_validated_rmse, scale, weights, range });
+                }
+            }
+        }
+        best.ok_or(CalibrationError::Singular)
+    }
+
+    /// The regression before the first reading of a recording.
+    #[must_use]
+    pub fn start(&self) -> impl Baseline + use<F> {
+        let Self { features, scale, weights, range, .. } = self.clone();
+        Running { features, scale, weights, held: Held::new(range) }
+    }
+}
+
+/// Normal equations over the rows with reading and strain, and the indices of the features.
+fn normal_equations<F: Features>(
+    recordings: &[Samples],
+    features: &F,
+    scale: ReadingScale,
+    free: usize,
+) -> (BlockedNormal, Vec<usize>) {
+    let (mut columns, mut strain, mut blocks) = (Vec::new(), Vec::new(), Vec::new());
+    for samples in recordings {
+        let start = strain.len();
+        let mut features = features.clone();
+        for k in (0..samples.len()).filter(|&k| samples.reading[k].is_finite()) {
+            let row = features.next(samples.time_s[k], scale.scaled(samples.reading[k]));
+            if samples.strain[k].is_finite() {
+                columns.resize_with(row.len(), Vec::new);
+                columns.iter_mut().zip(row).for_each(|(column, value)| column.push(value));
+                strain.push(samples.strain[k]);
+            }
+        }
+        let edge = |b: usize| start + b * (strain.len() - start) / BLOCKS;
+        blocks.extend((0..BLOCKS).map(|b| edge(b)..edge(b + 1)));
+    }
+    let columns: Vec<DVector<f64>> = columns.into_iter().map(DVector::from_vec).collect();
+    let normal = BlockedNormal::new(&columns, free, &DVector::from_vec(strain), &blocks);
+    (normal, (0..columns.len()).collect())
+}
+
+struct Running<F> {
+    features: F,
+    scale: ReadingScale,
+    weights: DVector<f64>,
+    held: Held,
+}
+
+impl<F: Features> Baseline for Running<F> {
+    fn strain(&mut self, time_s: f64, reading: f64) -> f64 {
+        let strain = reading.is_finite().then(|| {
+            let row = self.features.next(time_s, self.scale.scaled(reading));
+            row.iter().zip(self.weights.iter()).map(|(value, weight)| value * weight).sum()
+        });
+        self.held.next(strain)
+    }
+}

@@ -1,0 +1,45 @@
+//! The lag of a reference, on sensors whose reference was moved.
+
+use std::f64::consts::TAU;
+
+use ohmstrain_calib::{LawOptions, Samples, fit_law, reference_lag};
+
+/// A polynomial gauge and two branches with gains of their own for stretching and releasing, no dash-pot, in explicit
+/// Euler steps of a millisecond; ten rows a second for 150 s. The reference comes `lag_s` late.
+fn lag_found(lag_s: f64) -> Option<f64> {
+    let strain_at = |t: f64| 0.15 + 0.08 * (TAU * t / 17.0).sin() + 0.06 * (TAU * t / 7.3).sin();
+    let (mut time_s, mut reading, mut strain) = (vec![], vec![], vec![]);
+    let (mut fast, mut slow) = (0.0, 0.0);
+    let inner = 1e-3;
+    for step in 0..150_000_usize {
+        let t = step as f64 * inner;
+        let (x, rate) = (strain_at(t), (strain_at(t + inner) - strain_at(t)) / inner);
+        if step % 100 == 0 {
+            // Roughly uniform in ±1e-3: fractional parts of multiples of the golden ratio.
+            let noise = 1e-3 * (2.0 * (step as f64 / 100.0 * 0.618_033_988_749_895).fract() - 1.0);
+            time_s.push(t);
+            reading.push(1500.0 * (1.0 + 1.8 * x - 1.1 * x * x + fast + slow + noise));
+            strain.push(strain_at(t - lag_s));
+        }
+        let (k_fast, k_slow) = if rate > 0.0 { (0.5 - 0.4 * x, 0.3) } else { (-0.3, -0.2 + 0.3 * x) };
+        fast += inner * (-fast / 4.0 + k_fast * rate);
+        slow += inner * (-slow / 30.0 + k_slow * rate);
+    }
+    let samples = Samples { time_s: &time_s, reading: &reading, strain: &strain };
+    let law = fit_law(&[samples], LawOptions::default()).unwrap().law.law;
+    reference_lag(&samples, &law)
+}
+
+#[test]
+fn a_moved_reference_is_found_out() {
+    let found: Vec<f64> = [-0.4, 0.0, 0.15, 0.6].iter().map(|&lag_s| lag_found(lag_s).unwrap()).collect();
+    // Found as measured: -0.410, -0.011, 0.140, 0.584. One row, 0.1 s, is what a recording can show.
+    for (found, lag_s) in found.iter().zip([-0.4, 0.0, 0.15, 0.6]) {
+        assert!((found - lag_s).abs() < 0.1, "{found} for {lag_s}");
+    }
+}
+
+#[test]
+fn a_lag_out_of_reach_is_not_guessed() {
+    assert_eq!(lag_found(3.0), None);
+}

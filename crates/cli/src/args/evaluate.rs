@@ -1,0 +1,83 @@
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use clap::Args as ClapArgs;
+use ohmstrain_calib::EstimatorKind;
+
+use super::{Estimator, TraceArgs, finite};
+
+/// Flags of `evaluate`.
+#[derive(Debug, ClapArgs)]
+pub struct EvaluateArgs {
+    /// Recordings with a reference
+    #[arg(required_unless_present = "test", conflicts_with = "test")]
+    pub traces: Vec<PathBuf>,
+    /// Where the calibration comes from
+    #[command(flatten)]
+    pub calibration: CalibrationSource,
+    /// Test on this recording what was calibrated with --train; may be given several times
+    #[arg(long, value_name = "TRACE", requires = "train", conflicts_with_all = ["sensor", "split"])]
+    pub test: Vec<PathBuf>,
+    /// Estimator: auto (the sensor file's choice, or the one that calibrate would choose), ekf, ukf, imm, sign-split,
+    /// hypotheses, particles, or all
+    #[arg(long, default_value = "auto")]
+    pub estimator: Estimators,
+    /// Score rows with time_s >= T only; the filter still starts at the first row
+    #[arg(long, value_name = "T", allow_negative_numbers = true, value_parser = finite, conflicts_with = "split")]
+    pub from: Option<f64>,
+    /// Exit with code 3 unless every recording is estimated better than by the static cubic and its 95 % interval covers
+    /// 80 % or more
+    #[arg(long)]
+    pub check: bool,
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
+    /// Overrides of the recordings' metadata
+    #[command(flatten)]
+    pub trace: TraceArgs,
+}
+
+/// Where `evaluate` takes the calibration from: exactly one of these.
+#[derive(Debug, ClapArgs)]
+#[group(required = true, multiple = false)]
+pub struct CalibrationSource {
+    /// The sensor's parameters
+    #[arg(long, value_name = "sensor.toml")]
+    pub sensor: Option<PathBuf>,
+    /// Calibrate on this share of the rows of each recording, the first ones, and score the rest; the filter still starts
+    /// at the first row
+    #[arg(long, value_name = "SHARE", value_parser = share)]
+    pub split: Option<f64>,
+    /// Calibrate on this recording; may be given several times
+    #[arg(long, value_name = "TRACE", requires = "test")]
+    pub train: Vec<PathBuf>,
+}
+
+/// A number between zero and one, neither of them.
+fn share(text: &str) -> Result<f64, String> {
+    let between = finite(text).ok().filter(|share| *share > 0.0 && *share < 1.0);
+    between.ok_or_else(|| "expected a share between 0 and 1".into())
+}
+
+/// The estimators to evaluate.
+#[derive(Clone, Copy, Debug)]
+pub enum Estimators {
+    /// The one that calibration chooses.
+    Auto,
+    /// Every one there is; of a sensor file, every one it has parameters for.
+    All,
+    /// This one.
+    One(EstimatorKind),
+}
+
+impl FromStr for Estimators {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "auto" => Ok(Self::Auto),
+            "all" => Ok(Self::All),
+            name => name.parse().map(|Estimator(kind)| Self::One(kind)).map_err(|expected| expected + " or all"),
+        }
+    }
+}

@@ -1,0 +1,127 @@
+use std::io::{Error, Write};
+
+use ohmstrain_calib::{Quantity, Scores};
+use serde::Serialize;
+
+use crate::commands::score_table::{add_scores, score_table};
+use crate::error::CliError;
+
+/// All scores, recording by recording.
+#[derive(Default)]
+pub struct Evaluation {
+    recordings: Vec<Vec<RecordingScores>>,
+}
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Json<'a> {
+    recordings: Vec<&'a RecordingScores>,
+}
+
+/// One recording and one estimator: the filter's scores, the smoother's, and those they are compared with.
+#[derive(Serialize)]
+pub struct RecordingScores {
+    pub file: String,
+    pub estimator: &'static str,
+    #[serde(flatten)]
+    pub filter: Scores,
+    pub smoother: Scores,
+    /// Wall-clock time of the calibration, s; `None` if it was read from a file.
+    pub calibration_s: Option<f64>,
+    /// Lag of the reference, where it was looked for; `None` inside if it cannot be told.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lag_s: Option<Option<f64>>,
+    pub baselines: BaselineScores,
+    /// What the errors are errors of, for the table's header.
+    #[serde(skip)]
+    pub quantity: Quantity,
+}
+
+/// Scores of the baselines; a sensor file holds the first one only.
+#[derive(Clone, Copy, Serialize)]
+pub struct BaselineScores {
+    pub static_cubic: Scores,
+    #[serde(flatten)]
+    pub learned: Option<LearnedScores>,
+}
+
+/// Scores of what is fitted for comparison and written nowhere.
+#[derive(Clone, Copy, Serialize)]
+pub struct LearnedScores {
+    pub fir_20s: Scores,
+    pub low_pass_mode: Scores,
+    pub leaky_bank: Scores,
+}
+
+impl BaselineScores {
+    /// With the names of the table.
+    fn named(&self) -> impl Iterator<Item = (&'static str, Scores)> {
+        let learned = self.learned.map(|learned| {
+            [
+                ("20 s FIR", learned.fir_20s),
+                ("low-pass mode", learned.low_pass_mode),
+                ("leaky bank", learned.leaky_bank),
+            ]
+        });
+        std::iter::once(("static cubic", self.static_cubic)).chain(learned.into_iter().flatten())
+    }
+}
+
+impl Evaluation {
+    /// Adds the scores of one recording.
+    pub fn add(&mut self, scores: Vec<RecordingScores>) {
+        self.recordings.push(scores);
+    }
+
+    /// Whether nothing was scored.
+    pub fn is_empty(&self) -> bool {
+        self.recordings.is_empty()
+    }
+
+    /// All scores in a row.
+    pub fn recordings(&self) -> impl Iterator<Item = &RecordingScores> {
+        self.recordings.iter().flatten()
+    }
+
+    /// Writes JSON or a table.
+    pub fn write(&self, out: &mut dyn Write, json: bool) -> Result<(), CliError> {
+        if json {
+            let json = Json { recordings: self.recordings().collect() };
+            serde_json::to_writer_pretty(&mut *out, &json).map_err(Error::from)?;
+            Ok(writeln!(out)?)
+        } else {
+            self.write_table(out)
+        }
+    }
+
+    /// One table: filter and smoother of every estimator, then what they are compared with.
+    fn write_table(&self, out: &mut dyn Write) -> Result<(), CliError> {
+        let Some(first) = self.recordings().next() else { return Ok(()) };
+        let timed = first.calibration_s.map(|_| "calibration, s");
+        let lagged = first.lag_s.map(|_| "lag, s");
+        let more: Vec<&str> = timed.into_iter().chain(lagged).collect();
+        let mut quantities: Vec<&str> = self.recordings().map(|scores| scores.quantity.name()).collect();
+        quantities.sort_unstable();
+        quantities.dedup();
+        let mut table = score_table(&quantities.join(" or "), &more);
+        for scores in &self.recordings {
+            for (k, of) in scores.iter().enumerate() {
+                let file = if k == 0 { of.file.as_str() } else { "" };
+                add_scores(&mut table, file, of.estimator, &of.filter, &of.more());
+                add_scores(&mut table, "", "smoother", &of.smoother, &[]);
+            }
+            for (name, of) in scores.iter().take(1).flat_map(|scores| scores.baselines.named()) {
+                add_scores(&mut table, "", name, &of, &[]);
+            }
+        }
+        Ok(writeln!(out, "{table}")?)
+    }
+}
+
+impl RecordingScores {
+    /// The cells beyond the scores.
+    fn more(&self) -> Vec<String> {
+        let lag = self.lag_s.map(|lag| lag.map_or_else(|| "unknown".into(), |lag_s| format!("{lag_s:+.2}")));
+        self.calibration_s.map(|seconds| format!("{seconds:.1}")).into_iter().chain(lag).collect()
+    }
+}

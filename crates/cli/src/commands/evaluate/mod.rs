@@ -1,0 +1,135 @@
+mod evaluation;
+mod sensors;
+
+use std::path::Path;
+
+use evaluation::{Evaluation, RecordingScores};
+use ohmstrain_calib::{Baselines, Samples, reference_lag};
+use sensors::{Rivals, Sensor};
+
+use crate::args::{Estimators, EvaluateArgs};
+use crate::error::CliError;
+use crate::input::{self, Recording, check_unit};
+use crate::output::write_to;
+use crate::progress::Progress;
+
+/// Smallest coverage of the 95 % interval that `--check` accepts.
+const LEAST_COVERAGE: f64 = 0.8;
+
+/// Compares estimates with the reference of each recording.
+pub fn run(args: &EvaluateArgs) -> Result<(), CliError> {
+    let mut evaluation = Evaluation::default();
+    let source = &args.calibration;
+    let judged = match (&source.sensor, source.split) {
+        (Some(sensor), _) => with_sensor_file(args, sensor, &mut evaluation),
+        (None, Some(share)) => with_split(args, share, &mut evaluation),
+        (None, None) => with_training(args, &mut evaluation),
+    };
+    // Calibrations take long: what was scored before an error is still good.
+    if judged.is_ok() || !evaluation.is_empty() {
+        write_to(None, |out| evaluation.write(out, args.json))?;
+    }
+    judged?;
+    if args.check { check(&evaluation) } else { Ok(()) }
+}
+
+/// Every recording with the parameters of a file.
+fn with_sensor_file(args: &EvaluateArgs, path: &Path, evaluation: &mut Evaluation) -> Result<(), CliError> {
+    let sensors = Sensor::from_file(path, args.estimator)?;
+    let rivals = Rivals { static_cubic: sensors[0].params.static_cubic, learned: None };
+    for path in &args.traces {
+        let recording = read(args, path)?;
+        evaluation.add(judge(&recording, args.from, &sensors, &rivals)?);
+    }
+    Ok(())
+}
+
+/// Every recording with parameters from its first rows.
+fn with_split(args: &EvaluateArgs, share: f64, evaluation: &mut Evaluation) -> Result<(), CliError> {
+    let progress = Progress::new("calibrating");
+    for path in &args.traces {
+        let recording = read(args, path)?;
+        let rows = (recording.trace.len() as f64 * share) as usize;
+        let training = [recording.head(rows)];
+        let (sensors, rivals) = calibrated(&training, args.estimator, &progress)?;
+        progress.doing("scoring");
+        let lag_s = reference_lag(&recording.samples()?, &sensors[0].params.law);
+        let mut scores = judge(&recording, recording.trace.time_s.get(rows).copied(), &sensors, &rivals)?;
+        scores.iter_mut().for_each(|scores| scores.lag_s = Some(lag_s));
+        evaluation.add(scores);
+    }
+    Ok(())
+}
+
+/// Some recordings with parameters from others.
+fn with_training(args: &EvaluateArgs, evaluation: &mut Evaluation) -> Result<(), CliError> {
+    let progress = Progress::new("calibrating");
+    let read = |path| read(args, path);
+    let training: Vec<Recording> = args.calibration.train.iter().map(|path| read(path)).collect::<Result<_, _>>()?;
+    // All are read before anything is calibrated, so that a wrong name costs no time.
+    let tests: Vec<Recording> = args.test.iter().map(|path| read(path)).collect::<Result<_, _>>()?;
+    let (sensors, rivals) = calibrated(&training, args.estimator, &progress)?;
+    progress.doing("scoring");
+    for recording in &tests {
+        evaluation.add(judge(recording, args.from, &sensors, &rivals)?);
+    }
+    Ok(())
+}
+
+fn read(args: &EvaluateArgs, path: &Path) -> Result<Recording, CliError> {
+    input::read(path, &args.trace.metadata())
+}
+
+/// One sensor per estimator, and the baselines, from the same rows.
+fn calibrated(
+    training: &[Recording],
+    estimators: Estimators,
+    progress: &Progress,
+) -> Result<(Vec<Sensor>, Rivals), CliError> {
+    let sensors = Sensor::calibrated(training, estimators, progress)?;
+    let samples: Vec<Samples> = training.iter().map(Recording::samples).collect::<Result<_, _>>()?;
+    let names: Vec<&str> = training.iter().map(|recording| recording.name.as_str()).collect();
+    let baselines = Baselines::fit(&samples).map_err(|error| CliError::calibration(&names, &error))?;
+    Ok((sensors, Rivals { static_cubic: baselines.static_cubic, learned: Some(baselines) }))
+}
+
+/// Scores of every sensor on the rows of a recording from `from` on.
+fn judge(
+    recording: &Recording,
+    from: Option<f64>,
+    sensors: &[Sensor],
+    rivals: &Rivals,
+) -> Result<Vec<RecordingScores>, CliError> {
+    let Some(first) = sensors.first() else { return Ok(vec![]) };
+    check_unit(&recording.header, recording.trace.readings.kind, first.params.reading)?;
+    recording.samples()?;
+    recording.check_quantity(first.params.quantity)?;
+    let nothing = || {
+        let rows = from.map_or_else(|| "any row".into(), |from| format!("time_s >= {from}"));
+        CliError::Input(format!("{}: expected a reference at {rows}, found none", recording.name))
+    };
+    let baselines = rivals.scores(recording, from).ok_or_else(nothing)?;
+    sensors.iter().map(|sensor| sensor.judge(recording, from, baselines)?.ok_or_else(nothing)).collect()
+}
+
+fn check(evaluation: &Evaluation) -> Result<(), CliError> {
+    for recording in evaluation.recordings() {
+        let baseline = recording.baselines.static_cubic.rmse;
+        if recording.filter.rmse >= baseline {
+            return Err(CliError::Check(format!(
+                "{}: RMSE {:.4} is not below the static cubic's {baseline:.4}",
+                recording.file, recording.filter.rmse
+            )));
+        }
+        let coverage = recording.filter.coverage_95.unwrap_or(0.0);
+        if coverage < LEAST_COVERAGE {
+            return Err(CliError::Check(format!(
+                "{}: the 95 % interval covers {:.1} %, less than {:.0} %",
+                recording.file,
+                100.0 * coverage,
+                100.0 * LEAST_COVERAGE
+            )));
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,113 @@
+use std::path::Path;
+use std::time::Instant;
+
+use ohmstrain_calib::{Baselines, EstimatorKind, LawOptions, SensorParams, Start, StaticCubic, build_filter};
+
+use super::evaluation::{BaselineScores, LearnedScores, RecordingScores};
+use crate::args::Estimators;
+use crate::commands::calibrate::calibrate_recordings;
+use crate::commands::scoring;
+use crate::error::CliError;
+use crate::input::Recording;
+use crate::progress::Progress;
+use crate::run::estimate;
+use crate::sensor_file;
+use crate::validity::ValidityWatch;
+
+/// A calibrated sensor and the estimator that it is judged with.
+pub struct Sensor {
+    pub params: SensorParams,
+    kind: EstimatorKind,
+    /// Wall-clock time of the calibration, s; `None` if it was read from a file.
+    calibration_s: Option<f64>,
+}
+
+/// What the sensor is compared with.
+pub struct Rivals {
+    pub static_cubic: StaticCubic,
+    /// The others, where there are rows to fit them to.
+    pub learned: Option<Baselines>,
+}
+
+impl Sensor {
+    /// One per estimator asked for, with the parameters of a file; at least one.
+    pub fn from_file(path: &Path, estimators: Estimators) -> Result<Vec<Self>, CliError> {
+        let wanted = if let Estimators::One(kind) = estimators { Some(kind) } else { None };
+        let params = sensor_file::read(path, wanted)?;
+        let kinds = match estimators {
+            Estimators::All => EstimatorKind::ALL
+                .into_iter()
+                .filter(|kind| build_filter(&params, Some(*kind), Start::Unknown).is_ok())
+                .collect(),
+            _ => vec![wanted.unwrap_or(params.default_estimator)],
+        };
+        Ok(kinds.into_iter().map(|kind| Self { params: params.clone(), kind, calibration_s: None }).collect())
+    }
+
+    /// One per estimator asked for, each calibrated as `calibrate --estimator` does; at least one.
+    pub fn calibrated(
+        training: &[Recording],
+        estimators: Estimators,
+        progress: &Progress,
+    ) -> Result<Vec<Self>, CliError> {
+        let wanted = match estimators {
+            Estimators::Auto => vec![None],
+            Estimators::All => EstimatorKind::ALL.map(Some).to_vec(),
+            Estimators::One(kind) => vec![Some(kind)],
+        };
+        let calibrate = |kind| {
+            let start = Instant::now();
+            let params = calibrate_recordings(training, LawOptions::default(), kind, progress)?;
+            let calibration_s = Some(start.elapsed().as_secs_f64());
+            Ok(Self { kind: params.default_estimator, params, calibration_s })
+        };
+        wanted.into_iter().map(calibrate).collect()
+    }
+
+    /// Scores on the rows of a recording from `from` on, the filter started at the first; `None` without a reference.
+    pub fn judge(
+        &self,
+        recording: &Recording,
+        from: Option<f64>,
+        baselines: BaselineScores,
+    ) -> Result<Option<RecordingScores>, CliError> {
+        let estimated = estimate(recording, &self.params, Some(self.kind))?;
+        if self.calibration_s.is_none() {
+            let trace = &recording.trace;
+            let mut watch = ValidityWatch::new(&recording.name, &self.params, self.params.rest_reading);
+            for (k, output) in estimated.filtered.iter().enumerate() {
+                watch.see(trace.time_s[k], trace.readings.values[k], output.estimate.rate.mean, recording.truth(k));
+            }
+        }
+        let scores = |outputs| scoring::of_outputs(recording, outputs, from);
+        let (Some(filter), Some(smoother)) = (scores(&estimated.filtered), scores(&estimated.smoothed)) else {
+            return Ok(None);
+        };
+        Ok(Some(RecordingScores {
+            file: recording.name.clone(),
+            estimator: self.kind.name(),
+            filter,
+            smoother,
+            calibration_s: self.calibration_s,
+            lag_s: None,
+            baselines,
+            quantity: self.params.quantity,
+        }))
+    }
+}
+
+impl Rivals {
+    /// Scores on the rows of a recording from `from` on; `None` without a reference.
+    pub fn scores(&self, recording: &Recording, from: Option<f64>) -> Option<BaselineScores> {
+        let learned = match &self.learned {
+            None => None,
+            Some(learned) => Some(LearnedScores {
+                fir_20s: scoring::of_baseline(recording, learned.fir.start(), from)?,
+                low_pass_mode: scoring::of_baseline(recording, learned.low_pass_mode.start(), from)?,
+                leaky_bank: scoring::of_baseline(recording, learned.leaky_bank.start(), from)?,
+            }),
+        };
+        let static_cubic = scoring::of_baseline(recording, self.static_cubic.start(), from)?;
+        Some(BaselineScores { static_cubic, learned })
+    }
+}

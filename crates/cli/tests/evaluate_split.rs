@@ -1,0 +1,186 @@
+//! `evaluate` that calibrates by itself: on the first rows of a recording, or on other recordings.
+
+#[allow(dead_code, reason = "each test program uses its own share")]
+mod common;
+
+use common::{Bench, CALIBRATED_UNTIL, Csv, SIMULATE, change_rows};
+use serde_json::Value;
+
+/// The names of the baselines in JSON, sorted.
+const BASELINES: [&str; 4] = ["fir_20s", "leaky_bank", "low_pass_mode", "static_cubic"];
+
+/// A folder with a simulated recording per seed: `1.csv`, `2.csv` and so on.
+fn simulated(seeds: &[&str]) -> Bench {
+    let bench = Bench::new();
+    for seed in seeds {
+        bench.run(&[&SIMULATE[..], &["--seed", seed, "-o", &format!("{seed}.csv")]].concat()).ok();
+    }
+    bench
+}
+
+/// `recordings` of the JSON that `evaluate` prints.
+fn evaluate(bench: &Bench, arguments: &[&str]) -> Vec<Value> {
+    let run = bench.run(&[&["evaluate", "--json"], arguments].concat());
+    assert!(run.warnings.is_empty() || arguments.contains(&"--sensor"), "{:?}", run.warnings);
+    let json: Value = serde_json::from_str(&run.ok()).unwrap();
+    json["recordings"].as_array().unwrap().clone()
+}
+
+fn number(value: &Value, name: &str) -> f64 {
+    value[name].as_f64().unwrap_or_else(|| panic!("{name} in {value}"))
+}
+
+/// The same estimates scored on the same rows, but for what only one of the two ways reports.
+#[track_caller]
+fn assert_same_scores(a: &Value, b: &Value) {
+    let scores = ["n", "rmse", "mae", "bias", "coverage_50", "coverage_90", "coverage_95", "log_score", "wrong_branch"];
+    for name in scores {
+        assert_eq!(a[name], b[name], "{name}");
+        assert_eq!(a["smoother"][name], b["smoother"][name], "smoother {name}");
+    }
+    assert_eq!(a["baselines"]["static_cubic"], b["baselines"]["static_cubic"]);
+}
+
+#[test]
+fn a_split_is_a_calibration_on_the_first_rows_and_scores_of_the_rest() {
+    let bench = simulated(&["1"]);
+    let trace = Csv::new(&bench.read("1.csv"));
+    // 30 % of 2001 rows are 600.3.
+    let (rows, from) = (600, trace.cells("time_s")[600].to_owned());
+    assert_eq!(trace.len(), 2001);
+    let split = evaluate(&bench, &["--split", "0.3", "--estimator", "ekf", "1.csv"]);
+    bench.run(&["calibrate", "1.csv", "--until", &from, "--estimator", "ekf", "-o", "sensor.toml"]).ok();
+    let by_hand = evaluate(&bench, &["1.csv", "--sensor", "sensor.toml", "--from", &from]);
+    assert_eq!(split.len(), 1);
+    assert_eq!(split[0]["n"], trace.len() - rows);
+    assert_eq!(split[0]["estimator"], "ekf");
+    assert_same_scores(&split[0], &by_hand[0]);
+
+    let baselines = split[0]["baselines"].as_object().unwrap();
+    assert_eq!(baselines.keys().collect::<Vec<_>>(), BASELINES);
+    assert!(number(&split[0], "calibration_s") > 0.0);
+    assert!(number(&split[0], "lag_s").abs() <= 1.0);
+    assert!(by_hand[0]["calibration_s"].is_null() && by_hand[0].get("lag_s").is_none());
+}
+
+#[test]
+fn nothing_but_the_scores_depends_on_the_reference_of_the_test_rows() {
+    let bench = simulated(&["1"]);
+    let shift = 0.01;
+    let moved = change_rows(&bench.read("1.csv"), |row, cells| {
+        if row >= 1000 {
+            cells[2] = (cells[2].parse::<f64>().unwrap() + shift).to_string();
+        }
+    });
+    bench.write("moved.csv", moved);
+    let scores = evaluate(&bench, &["--split", "0.5", "--estimator", "ekf", "1.csv", "moved.csv"]);
+    // The mean of 1001 differences of rounded numbers of order 0.1.
+    let shifted = |plain: &Value, moved: &Value| {
+        assert!((number(plain, "bias") - shift - number(moved, "bias")).abs() < 1e-12, "{plain} {moved}");
+    };
+    shifted(&scores[0], &scores[1]);
+    shifted(&scores[0]["smoother"], &scores[1]["smoother"]);
+    for name in BASELINES {
+        shifted(&scores[0]["baselines"][name], &scores[1]["baselines"][name]);
+    }
+}
+
+#[test]
+fn some_recordings_train_and_others_test() {
+    let bench = simulated(&["1", "2", "3"]);
+    let train = ["--train", "1.csv", "--train", "2.csv", "--estimator", "ekf"];
+    let tested = evaluate(&bench, &[&train[..], &["--test", "3.csv", "--test", "1.csv"]].concat());
+    bench.run(&["calibrate", "1.csv", "2.csv", "--estimator", "ekf", "-o", "sensor.toml"]).ok();
+    let by_hand = evaluate(&bench, &["3.csv", "1.csv", "--sensor", "sensor.toml"]);
+    assert_eq!(tested.iter().map(|scores| &scores["file"]).collect::<Vec<_>>(), ["3.csv", "1.csv"]);
+    for (tested, by_hand) in tested.iter().zip(&by_hand) {
+        assert_eq!(tested["n"], 2001);
+        assert_same_scores(tested, by_hand);
+        assert_eq!(tested["baselines"].as_object().unwrap().len(), BASELINES.len());
+        assert!(number(tested, "calibration_s") > 0.0 && tested.get("lag_s").is_none());
+    }
+    // Scoring from a time on is scoring of fewer rows, not another run.
+    let later = evaluate(&bench, &[&train[..], &["--test", "3.csv", "--from", "200"]].concat());
+    let by_hand = evaluate(&bench, &["3.csv", "--sensor", "sensor.toml", "--from", "200"]);
+    assert_same_scores(&later[0], &by_hand[0]);
+}
+
+#[test]
+fn the_table_has_filter_smoother_and_four_baselines_per_recording() {
+    let bench = simulated(&["1", "2"]);
+    let printed = bench.run(&["evaluate", "--split", "0.5", "--estimator", "ekf", "1.csv", "2.csv"]).ok();
+    let cells = |line: &str| -> Vec<String> { line.split('|').map(|cell| cell.trim().to_owned()).collect() };
+    let header = cells(printed.lines().next().unwrap());
+    let columns =
+        ["RMSE, strain", "MAE, strain", "%FS", "bias", "50 % covers", "90 % covers", "95 % covers", "log score"];
+    for column in columns.iter().chain(&["wrong branch", "calibration, s", "lag, s"]) {
+        assert!(header.iter().any(|name| name == column), "{column}: {printed}");
+    }
+    let rows: Vec<Vec<String>> = printed.lines().skip(2).map(cells).collect();
+    let names = ["ekf", "smoother", "static cubic", "20 s FIR", "low-pass mode", "leaky bank"];
+    assert_eq!(rows.len(), 2 * names.len());
+    for (k, row) in rows.iter().enumerate() {
+        assert_eq!(row.len(), header.len(), "{printed}");
+        assert_eq!(row[1], ["1.csv", "2.csv"].map(|file| if k % 6 == 0 { file } else { "" })[k / 6]);
+        assert_eq!(row[2], names[k % 6]);
+    }
+}
+
+#[test]
+fn all_estimators_of_a_sensor_file_are_those_it_has_parameters_for() {
+    let bench = simulated(&["1"]);
+    bench.run(&["calibrate", "1.csv", "--until", CALIBRATED_UNTIL, "--estimator", "ukf", "-o", "sensor.toml"]).ok();
+    let scores = evaluate(&bench, &["1.csv", "--sensor", "sensor.toml", "--estimator", "all"]);
+    assert_eq!(scores.iter().map(|scores| &scores["estimator"]).collect::<Vec<_>>(), ["ekf", "ukf"]);
+    let alone = evaluate(&bench, &["1.csv", "--sensor", "sensor.toml", "--estimator", "ekf"]);
+    assert_same_scores(&scores[0], &alone[0]);
+}
+
+#[test]
+fn what_was_scored_before_an_error_is_printed() {
+    let bench = simulated(&["1"]);
+    let run = bench.run(&["evaluate", "--split", "0.5", "--estimator", "ekf", "1.csv", "none.csv"]);
+    assert_eq!(run.code, Some(1));
+    assert!(run.stderr.starts_with("ohmstrain: cannot read none.csv"), "{}", run.stderr);
+    assert!(run.stdout.contains("1.csv") && run.stdout.contains("leaky bank"), "{}", run.stdout);
+}
+
+#[test]
+fn check_holds_a_split_to_the_same_promise() {
+    let bench = simulated(&["1"]);
+    // Strains that the sensor never had, several deviations away from those it had.
+    let other = change_rows(&bench.read("1.csv"), |row, cells| {
+        if row >= 1000 {
+            cells[2] = (cells[2].parse::<f64>().unwrap() + 1.0).to_string();
+        }
+    });
+    bench.write("other.csv", other);
+    let run = bench.run(&["evaluate", "--split", "0.5", "--estimator", "ekf", "--check", "other.csv"]);
+    assert_eq!(run.code, Some(3), "{}", run.stderr);
+    assert!(run.stderr.starts_with("ohmstrain: other.csv: "), "{}", run.stderr);
+    assert!(run.stdout.contains("static cubic"));
+}
+
+#[test]
+fn arguments_that_contradict_each_other_are_refused() {
+    let bench = Bench::new();
+    let cases: &[(&[&str], &str)] = &[
+        (&["1.csv"], "--sensor"),
+        (&["--split", "0.5"], "TRACES"),
+        (&["1.csv", "--split", "0"], "'0' for '--split"),
+        (&["1.csv", "--split", "1"], "'1' for '--split"),
+        (&["1.csv", "--split", "NaN"], "'NaN' for '--split"),
+        (&["1.csv", "--split", "0.5", "--sensor", "s.toml"], "cannot be used with"),
+        (&["1.csv", "--split", "0.5", "--from", "3"], "cannot be used with"),
+        (&["--train", "1.csv"], "--test"),
+        (&["--test", "1.csv"], "--train"),
+        (&["1.csv", "--train", "1.csv", "--test", "2.csv"], "cannot be used with"),
+        (&["--test", "1.csv", "--sensor", "s.toml"], "cannot be used with"),
+        (&["1.csv", "--split", "0.5", "--estimator", "tarot"], "'tarot' for '--estimator"),
+    ];
+    for (arguments, culprit) in cases {
+        let run = bench.run(&[&["evaluate"], *arguments].concat());
+        assert_eq!((run.code, run.stdout.as_str()), (Some(2), ""), "{}: {}", run.command, run.stderr);
+        assert!(run.stderr.contains(culprit), "{}: {}", run.command, run.stderr);
+    }
+}
