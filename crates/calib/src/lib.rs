@@ -38,7 +38,7 @@ pub use error::CalibrationError;
 pub use estimator_params::{EstimatorKind, EstimatorParams, MotionParams, NoiseParams, PhaseParams};
 pub use filter::{Filter, Output, Start, build_filter};
 pub use law_fit::{CrossFit, GaugeFamily, LawFit, LawOptions, fit_law};
-pub use law_params::{BranchParams, GaugeParams, LawParams};
+pub use law_params::{BranchParams, GaugeParams, LawParams, PlayParams};
 pub use params::{
     FORMAT, JointParams, Quantity, RangeParams, ReadingUnit, RecordingInfo, SensorParams, Uncertainty, Validity,
 };
