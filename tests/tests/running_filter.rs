@@ -56,6 +56,7 @@ fn sensor() -> SensorParams {
             range: limits,
             gauge: GaugeParams::Polynomial { coefficients: [1.6, -1.2, 0.5] },
             branches: vec![branch(4.0), branch(32.0)],
+            plays: vec![],
         },
         estimators: EstimatorKind::ALL.map(|kind| (kind, estimator)).into_iter().collect::<BTreeMap<_, _>>(),
         ensemble: Some(EnsembleParams {

@@ -1,8 +1,8 @@
 use ohmstrain_ekf::{
-    Belief, Dwell, Ekf, Estimate, Evidence, Gaussian, Guard, Hypotheses, Imm, Mixture, Particles, Reading,
-    ReadingVerdict, SignSplit, StepError, Ukf, Unscented,
+    Belief, Dwell, Ekf, Estimate, Evidence, Gaussian, Guard, Hypotheses, Imm, Mixture, Particles, Phased, Reading,
+    ReadingVerdict, SignSplit, StepError, StrainSensor, Ukf, Unscented,
 };
-use ohmstrain_model::{Motion, Phase, SwitchedModel};
+use ohmstrain_model::{Motion, Phase, SwitchedModel, WithPlays};
 
 use crate::CalibrationError;
 use crate::ensemble::Ensemble;
@@ -87,7 +87,7 @@ const START_SD: f64 = 1e-3;
 /// Builds the filter for a sensor.
 ///
 /// # Errors
-/// If the sensor has no parameters for the estimator, or more branches than four.
+/// If the sensor has no parameters for the estimator, or a number of branches and plays that no filter is built for.
 pub fn build_filter(
     params: &SensorParams,
     kind: Option<EstimatorKind>,
@@ -112,12 +112,22 @@ pub(crate) fn filter_from_parts(
     limits: RangeParams,
     start: Start,
 ) -> Result<Box<dyn Filter>, CalibrationError> {
-    /// One instance per number of motion states and branches; N = M + B + 1, L = N (N + 1) / 2.
+    /// One instance per number of motion states and branches, N = M + B + 1 and L = N (N + 1) / 2, and another one of N + 3
+    /// states where plays are supported.
     macro_rules! build {
-        ($motion:expr, $m:literal, $([$b:literal, $n:literal, $l:literal]),+) => {
-            match law.branches.len() {
-                $($b => build_sized::<$m, $b, $n, $l>(kind, $motion, law, estimator, limits, start),)+
-                many => Err(CalibrationError::Unsupported(format!("a law with {many} branches; at most 4 are supported"))),
+        ($motion:expr, $m:literal, $([$b:literal, $n:literal, $l:literal $(, $with:literal, $l_with:literal)?]),+) => {
+            match (law.branches.len(), law.plays.len()) {
+                $(($b, 0) => plain::<$m, $b, $n, $l>(kind, $motion, law, estimator, limits, start),)+
+                $($(($b, PLAYS) => {
+                    let inner = switched::<$m, $b, $n>($motion, law, estimator)?;
+                    let plays: [_; PLAYS] = std::array::from_fn(|i| law.plays[i].to_model());
+                    let model = WithPlays::<_, $m, $b, $n, PLAYS, $with>::new(inner, plays)?;
+                    gaussian::<_, $m, $b, $with, $l_with>(kind, model, estimator, limits, start)
+                })?)+
+                (branches, plays) => Err(CalibrationError::Unsupported(format!(
+                    "a law with {branches} branches and {plays} plays; at most 4 branches without plays, or 1 to 3 with \
+                     {PLAYS} plays, are supported"
+                ))),
             }
         };
     }
@@ -126,16 +136,26 @@ pub(crate) fn filter_from_parts(
             if let Some(phases) = estimator.phases {
                 motion = motion.with_phase_rate(phases.speed_per_s);
             }
-            build!(motion, 2, [0, 3, 6], [1, 4, 10], [2, 5, 15], [3, 6, 21], [4, 7, 28])
+            build!(motion, 2, [0, 3, 6], [1, 4, 10, 7, 28], [2, 5, 15, 8, 36], [3, 6, 21, 9, 45], [4, 7, 28])
         }
         AnyMotion::Three(motion) => {
-            build!(motion, 3, [0, 4, 10], [1, 5, 15], [2, 6, 21], [3, 7, 28], [4, 8, 36])
+            build!(motion, 3, [0, 4, 10], [1, 5, 15, 8, 36], [2, 6, 21, 9, 45], [3, 7, 28, 10, 55], [4, 8, 36])
         }
     }
 }
 
-/// The model of a law, and the filter around it.
-fn build_sized<const M: usize, const B: usize, const N: usize, const L: usize>(
+/// The model of a law, plays aside.
+fn switched<const M: usize, const B: usize, const N: usize>(
+    motion: Motion<f64, M>,
+    law: &LawParams,
+    estimator: &EstimatorParams,
+) -> Result<SwitchedModel<f64, M, B, N>, CalibrationError> {
+    let law = law.to_model().ok_or_else(|| CalibrationError::Unsupported("number of branches".into()))?;
+    Ok(SwitchedModel::new(law, motion, estimator.noise.to_model())?)
+}
+
+/// The filter of a law without plays, with particles if they are asked for.
+fn plain<const M: usize, const B: usize, const N: usize, const L: usize>(
     kind: EstimatorKind,
     motion: Motion<f64, M>,
     law: &LawParams,
@@ -143,15 +163,29 @@ fn build_sized<const M: usize, const B: usize, const N: usize, const L: usize>(
     limits: RangeParams,
     start: Start,
 ) -> Result<Box<dyn Filter>, CalibrationError> {
-    let law = law.to_model().ok_or_else(|| CalibrationError::Unsupported("number of branches".into()))?;
-    let model = SwitchedModel::<f64, M, B, N>::new(law, motion, estimator.noise.to_model())?;
+    let model = switched::<M, B, N>(motion, law, estimator)?;
+    if kind != EstimatorKind::Particles {
+        return gaussian::<_, M, B, N, L>(kind, model, estimator, limits, start);
+    }
+    let PhaseFilter { hold, evidence, .. } = PhaseFilter::new(kind, estimator, limits)?;
+    let filter = Particles::new(model, hold, evidence, PARTICLES, PARTICLE_SEED);
+    let start = filter.start(&initial_belief::<_, M, B, N, L>(&model, limits, start), Phase::Extend);
+    Ok(Box::new(Running::new(filter, start, model, interval(estimator, limits))))
+}
+
+/// A filter of one Gaussian or several around any model.
+fn gaussian<S, const M: usize, const B: usize, const N: usize, const L: usize>(
+    kind: EstimatorKind,
+    model: S,
+    estimator: &EstimatorParams,
+    limits: RangeParams,
+    start: Start,
+) -> Result<Box<dyn Filter>, CalibrationError>
+where
+    S: Phased<f64, N, L> + StrainSensor<f64, M, B, N> + Copy + 'static,
+{
     let belief: Belief<f64, N, L> = initial_belief(&model, limits, start);
-    let limits = limits.to_model();
-    let interval = Interval {
-        limits,
-        filtered_scale: estimator.strain_sd_scale,
-        smoothed_scale: estimator.smoothed_sd_scale.unwrap_or(1.0),
-    };
+    let interval = interval(estimator, limits);
     match kind {
         EstimatorKind::Ekf => return Ok(Box::new(Running::new(Ekf::new(model), belief, model, interval))),
         EstimatorKind::Ukf => {
@@ -160,11 +194,7 @@ fn build_sized<const M: usize, const B: usize, const N: usize, const L: usize>(
         EstimatorKind::Ensemble => return Err(CalibrationError::no_parameters(kind)),
         _ => {}
     }
-    let phases = estimator
-        .phases
-        .ok_or_else(|| CalibrationError::Unsupported(format!("`{}` needs `phases` in its parameters", kind.name())))?;
-    let dwell = Dwell::new(phases.hold_time_s, phases.move_time_s, phases.reversal)?;
-    let evidence = Evidence { limits, tempering: phases.tempering };
+    let PhaseFilter { dwell, hold, evidence } = PhaseFilter::new(kind, estimator, limits)?;
     Ok(match kind {
         EstimatorKind::Imm => {
             let start = Mixture::single(belief, Phase::Hold);
@@ -172,15 +202,11 @@ fn build_sized<const M: usize, const B: usize, const N: usize, const L: usize>(
         }
         EstimatorKind::SignSplit => {
             let start = Mixture::single(belief, Phase::Extend);
-            let hold = (phases.hold_time_s > 0.0 && phases.reversal < 1.0).then_some(dwell);
             let filter = SignSplit::<_, _, HYPOTHESES>::new(model, hold, evidence);
             Box::new(Running::new(filter, start, model, interval))
         }
         EstimatorKind::Particles => {
-            let hold = (phases.hold_time_s > 0.0 && phases.reversal < 1.0).then_some(dwell);
-            let filter = Particles::new(model, hold, evidence, PARTICLES, PARTICLE_SEED);
-            let start = filter.start(&belief, Phase::Extend);
-            Box::new(Running::new(filter, start, model, interval))
+            return Err(CalibrationError::Unsupported("`particles` for a law with plays".into()));
         }
         _ => {
             let start = Mixture::single(belief, Phase::Hold);
@@ -190,6 +216,35 @@ fn build_sized<const M: usize, const B: usize, const N: usize, const L: usize>(
     })
 }
 
+/// What filters of phases need besides a model.
+struct PhaseFilter {
+    dwell: Dwell<f64>,
+    /// The same for a body that rests at times.
+    hold: Option<Dwell<f64>>,
+    evidence: Evidence<f64>,
+}
+
+impl PhaseFilter {
+    fn new(kind: EstimatorKind, estimator: &EstimatorParams, limits: RangeParams) -> Result<Self, CalibrationError> {
+        let phases = estimator.phases.ok_or_else(|| {
+            CalibrationError::Unsupported(format!("`{}` needs `phases` in its parameters", kind.name()))
+        })?;
+        let dwell = Dwell::new(phases.hold_time_s, phases.move_time_s, phases.reversal)?;
+        let hold = (phases.hold_time_s > 0.0 && phases.reversal < 1.0).then_some(dwell);
+        Ok(Self { dwell, hold, evidence: Evidence { limits: limits.to_model(), tempering: phases.tempering } })
+    }
+}
+
+fn interval(estimator: &EstimatorParams, limits: RangeParams) -> Interval {
+    Interval {
+        limits: limits.to_model(),
+        filtered_scale: estimator.strain_sd_scale,
+        smoothed_scale: estimator.smoothed_sd_scale.unwrap_or(1.0),
+    }
+}
+
+/// Plays that filters are built for: every further number would compile every filter once more.
+const PLAYS: usize = 3;
 /// Capacity of the sign-split filter.
 pub(crate) const HYPOTHESES: usize = 8;
 /// Capacity of the filter of phase histories.
@@ -198,8 +253,8 @@ pub(crate) const HISTORIES: usize = 16;
 const PARTICLES: usize = 4000;
 const PARTICLE_SEED: u64 = 1;
 
-fn initial_belief<const M: usize, const B: usize, const N: usize, const L: usize>(
-    model: &SwitchedModel<f64, M, B, N>,
+fn initial_belief<S: StrainSensor<f64, M, B, N>, const M: usize, const B: usize, const N: usize, const L: usize>(
+    model: &S,
     limits: RangeParams,
     start: Start,
 ) -> Belief<f64, N, L> {

@@ -52,7 +52,8 @@ fn left_out_error(samples: &Samples, law: &LawParams, lag_s: f64) -> Option<f64>
     let shifted = Samples { time_s: samples.time_s, reading: &reading, strain: &strain };
     let regression = LawRegression::new(&[shifted]).ok()?;
     let taus: Vec<f64> = law.branches.iter().map(|branch| branch.tau_s.ln()).collect();
-    let structure = LawStructure { family: GaugeFamily::Polynomial, taus: taus.len(), nonlinear: taus, ridge: RIDGE };
+    let family = GaugeFamily::Polynomial;
+    let structure = LawStructure { family, taus: taus.len(), nonlinear: taus, plays: &[], ridge: RIDGE };
     let mut design = structure.design(&regression);
     let times: Vec<f64> = regression.recordings[0].complete.iter().map(|&k| samples.time_s[k]).collect();
     let rest_readings = regression.median_readings();

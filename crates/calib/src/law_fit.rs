@@ -16,6 +16,8 @@ pub struct LawOptions {
     pub branches: usize,
     /// Family of the gauge curve.
     pub gauge: GaugeFamily,
+    /// Number of plays, 0 or 3; plays need 1 to 3 branches.
+    pub plays: usize,
 }
 
 /// Families of gauge curves.
@@ -46,7 +48,7 @@ pub struct LawFit {
 
 impl Default for LawOptions {
     fn default() -> Self {
-        Self { branches: DEFAULT_BRANCHES, gauge: DEFAULT_GAUGE }
+        Self { branches: DEFAULT_BRANCHES, gauge: DEFAULT_GAUGE, plays: DEFAULT_PLAYS }
     }
 }
 
@@ -71,6 +73,11 @@ const DEFAULT_BRANCHES: usize = 2;
 /// Family unless somebody asks for another. Others sometimes follow the resistance a little better; only the polynomial
 /// is linear in its coefficients, so that the ridge keeps it tame and the filter from taking one direction for the other.
 const DEFAULT_GAUGE: GaugeFamily = GaugeFamily::Polynomial;
+/// Plays unless somebody asks for some.
+const DEFAULT_PLAYS: usize = 0;
+/// Half-widths of plays, in spans of the strain: small loops, loops of a usual turn-around, and nearly the whole span. The
+/// weights are fitted, so that it matters little where between them a loop of the sensor lies.
+const HALF_WIDTHS: [f64; 3] = [0.05, 0.15, 0.35];
 /// Most branches.
 pub(crate) const MOST_BRANCHES: usize = 4;
 /// Time constants tried.
@@ -106,13 +113,26 @@ pub(crate) fn fit_laws(recordings: &[Samples], options: LawOptions) -> Result<Ve
         let message = format!("{} branches; at most {MOST_BRANCHES} are supported", options.branches);
         return Err(CalibrationError::Unsupported(message));
     }
+    let plays = half_widths(options)?;
     let regression = LawRegression::new(recordings)?;
-    let grid = TauGrid::new(&regression, options.branches);
+    let grid = TauGrid::new(&regression, options.branches, plays);
     let fits = RIDGES.map(|ridge| cross_fit(&regression, &grid, options.gauge, ridge));
     if fits.iter().all(Result::is_err) {
         return fits.into_iter().collect();
     }
     Ok(fits.into_iter().flatten().collect())
+}
+
+/// The plays that are asked for, if a filter for them exists.
+fn half_widths(options: LawOptions) -> Result<&'static [f64], CalibrationError> {
+    match (options.plays, options.branches) {
+        (0, _) => Ok(&[]),
+        (3, 1..=3) => Ok(&HALF_WIDTHS),
+        (plays, branches) => {
+            let message = format!("{plays} plays with {branches} branches; 0 plays, or 3 with 1 to 3 branches, are");
+            Err(CalibrationError::Unsupported(message + " supported"))
+        }
+    }
 }
 
 fn cross_fit(
@@ -121,7 +141,7 @@ fn cross_fit(
     gauge: GaugeFamily,
     ridge: f64,
 ) -> Result<CrossFit, CalibrationError> {
-    let mut structure = polish(regression, gauge, &grid.best(ridge)?, ridge)?;
+    let mut structure = polish(regression, gauge, &grid.best(ridge)?, grid.plays, ridge)?;
     structure.sort_branches();
     let without_block = (0..BLOCKS).map(|block| structure.fit(regression, Some(block))).collect::<Result<_, _>>()?;
     Ok(CrossFit {
@@ -135,16 +155,17 @@ fn cross_fit(
 /// A cubic gauge with branches of all time constants of a grid, ready to be fitted with any few of them.
 struct TauGrid {
     ln_taus: Vec<f64>,
+    plays: &'static [f64],
     normal: BlockedNormal,
     first_branch: usize,
     subsets: Vec<Vec<usize>>,
 }
 
 impl TauGrid {
-    fn new(regression: &LawRegression, branches: usize) -> Self {
+    fn new(regression: &LawRegression, branches: usize, plays: &'static [f64]) -> Self {
         let ln_taus = log_grid(regression.tau_bounds, GRID);
-        let everything =
-            LawStructure { family: GaugeFamily::Polynomial, nonlinear: ln_taus.clone(), taus: GRID, ridge: RIDGES[0] };
+        let (family, nonlinear, ridge) = (GaugeFamily::Polynomial, ln_taus.clone(), RIDGES[0]);
+        let everything = LawStructure { family, nonlinear, taus: GRID, plays, ridge };
         let design = everything.design(regression);
         let spacing = LEAST_SPACING.min(0.7 * (ln_taus[GRID - 1] - ln_taus[0]) / (branches.max(2) - 1) as f64);
         let mut subsets = subsets(GRID, branches);
@@ -153,6 +174,7 @@ impl TauGrid {
             normal: regression.normal(&design, &regression.median_readings()),
             first_branch: design.columns.len() - GRID * BRANCH_COLUMNS,
             ln_taus,
+            plays,
             subsets,
         }
     }
@@ -177,6 +199,7 @@ fn polish(
     regression: &LawRegression,
     family: GaugeFamily,
     ln_taus: &[f64],
+    plays: &'static [f64],
     ridge: f64,
 ) -> Result<LawStructure, CalibrationError> {
     let mut start = ln_taus.to_vec();
@@ -186,7 +209,7 @@ fn polish(
         GaugeFamily::Tunnelling => vec![0.5, 0.0, 0.0],
     });
     let structure =
-        |nonlinear: &[f64]| LawStructure { family, nonlinear: nonlinear.to_vec(), taus: ln_taus.len(), ridge };
+        |nonlinear: &[f64]| LawStructure { family, nonlinear: nonlinear.to_vec(), taus: ln_taus.len(), plays, ridge };
     // The grid ends on the bounds, give or take a rounding.
     let (low, high) = (regression.tau_bounds.0.ln() - 1e-9, regression.tau_bounds.1.ln() + 1e-9);
     let score = |nonlinear: &[f64]| {

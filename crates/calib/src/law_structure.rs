@@ -3,7 +3,7 @@ use nalgebra::DVector;
 use crate::CalibrationError;
 use crate::design::{BRANCH_COLUMNS, StrainScale};
 use crate::law_fit::{GaugeFamily, LawFit};
-use crate::law_params::{BranchParams, GaugeParams, LawParams};
+use crate::law_params::{BranchParams, GaugeParams, LawParams, PlayParams};
 use crate::law_regression::{Design, LawRegression};
 
 /// Smallest R₀ that is believed, relative to the median reading.
@@ -16,11 +16,13 @@ pub(crate) struct LawStructure {
     /// ln τ, then the gauge's own nonlinear parameters.
     pub nonlinear: Vec<f64>,
     pub taus: usize,
+    /// Half-widths of plays, in spans of the strain.
+    pub plays: &'static [f64],
     pub ridge: f64,
 }
 
 impl LawStructure {
-    /// Constant, one more constant per further recording, gauge, dash-pots, branches.
+    /// Constant, one more constant per further recording, gauge, dash-pots, plays, branches.
     pub(crate) fn design(&self, regression: &LawRegression) -> Design {
         let mut columns: Vec<DVector<f64>> =
             (0..regression.recordings.len()).map(|r| regression.own_constant(r)).collect();
@@ -42,6 +44,7 @@ impl LawStructure {
             }
         }
         columns.extend(regression.columns(|recording| recording.regressors.viscosity()));
+        columns.extend(self.plays.iter().map(|&half_width| regression.column(|r| r.regressors.lag(half_width))));
         for ln_tau in &self.nonlinear[..self.taus] {
             columns.extend(regression.columns::<BRANCH_COLUMNS>(|recording| recording.regressors.branch(ln_tau.exp())));
         }
@@ -93,6 +96,8 @@ impl LawStructure {
             GaugeFamily::Tunnelling => tunnelling(&self.nonlinear[self.taus..], span),
         };
         let (extend_viscosity_s, retract_viscosity_s) = (next() / span, next() / span);
+        let play = |&share: &f64| PlayParams { half_width: share * span, weight: next() / span };
+        let plays = self.plays.iter().map(play).collect();
         let branches = self.nonlinear[..self.taus]
             .iter()
             .map(|ln_tau| {
@@ -106,7 +111,7 @@ impl LawStructure {
                 }
             })
             .collect();
-        LawParams { extend_viscosity_s, retract_viscosity_s, range: regression.range, gauge, branches }
+        LawParams { extend_viscosity_s, retract_viscosity_s, range: regression.range, gauge, branches, plays }
     }
 }
 

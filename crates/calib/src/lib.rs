@@ -43,7 +43,7 @@ pub use estimator_params::{EstimatorKind, EstimatorParams, MotionParams, NoisePa
 pub use filter::{Filter, Output, Start, build_filter};
 pub use lag::reference_lag;
 pub use law_fit::{CrossFit, GaugeFamily, LawFit, LawOptions, fit_law};
-pub use law_params::{BranchParams, GaugeParams, LawParams};
+pub use law_params::{BranchParams, GaugeParams, LawParams, PlayParams};
 pub use params::{
     FORMAT, JointParams, Quantity, RangeParams, ReadingUnit, RecordingInfo, SensorParams, Uncertainty, Validity,
 };

@@ -2,16 +2,16 @@ use std::collections::{HashMap, VecDeque};
 
 use ohmstrain_ekf::{
     Advanced, Belief, Estimate, Estimator, Gaussian, Guard, Guarded, Innovation, PastStep, Reading, ReadingVerdict,
-    State, StepError, Streak, smooth_back_through,
+    State, StepError, StrainSensor, Streak, smooth_back_through,
 };
-use ohmstrain_model::{StrainRange, SwitchedModel};
+use ohmstrain_model::StrainRange;
 
 use crate::filter::{Filter, Output};
 
 /// An estimator with its state and the steps it has prepared.
-pub(crate) struct Running<E: Estimator<f64, N, L>, const M: usize, const B: usize, const N: usize, const L: usize> {
+pub(crate) struct Running<E: Estimator<f64, N, L>, S, const M: usize, const B: usize, const N: usize, const L: usize> {
     estimator: E,
-    model: SwitchedModel<f64, M, B, N>,
+    model: S,
     interval: Interval,
     guard: Guard<f64>,
     now: Moment<E::State>,
@@ -56,8 +56,12 @@ const MOST_PREPARED: usize = 4096;
 /// Rows of a recording whose states are in memory at once while it is smoothed; the others are computed again.
 const SMOOTHED_AT_ONCE: usize = 4096;
 
-impl<E: Estimator<f64, N, L>, const M: usize, const B: usize, const N: usize, const L: usize> Running<E, M, B, N, L> {
-    pub(crate) fn new(estimator: E, state: E::State, model: SwitchedModel<f64, M, B, N>, interval: Interval) -> Self {
+impl<E, S, const M: usize, const B: usize, const N: usize, const L: usize> Running<E, S, M, B, N, L>
+where
+    E: Estimator<f64, N, L>,
+    S: StrainSensor<f64, M, B, N>,
+{
+    pub(crate) fn new(estimator: E, state: E::State, model: S, interval: Interval) -> Self {
         let seen = Seen { innovation: None, verdict: ReadingVerdict::Missing };
         let now = Moment { time_s: None, state, streak: Streak::default(), seen };
         let (guard, prepared, pending) = (Guard::none(), HashMap::new(), VecDeque::new());
@@ -150,8 +154,10 @@ impl<E: Estimator<f64, N, L>, const M: usize, const B: usize, const N: usize, co
     }
 }
 
-impl<E: Estimator<f64, N, L>, const M: usize, const B: usize, const N: usize, const L: usize> Filter
-    for Running<E, M, B, N, L>
+impl<E, S, const M: usize, const B: usize, const N: usize, const L: usize> Filter for Running<E, S, M, B, N, L>
+where
+    E: Estimator<f64, N, L>,
+    S: StrainSensor<f64, M, B, N>,
 {
     fn guard(&mut self, guard: Guard<f64>) {
         self.guard = guard;

@@ -1,8 +1,8 @@
 use nalgebra::SVector;
-use ohmstrain_model::{Scalar, SwitchedModel, Symmetric};
+use ohmstrain_model::{Scalar, Symmetric};
 
 use crate::ekf::pinned;
-use crate::{Gaussian, State, StepError};
+use crate::{Gaussian, State, StepError, StrainSensor};
 
 /// What is known of the state: mean and covariance of a Gaussian. `L = N (N + 1) / 2`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,7 +22,7 @@ impl<T: Scalar, const N: usize, const L: usize> Belief<T, N, L> {
 
     /// Before any reading: the model's long-run distribution.
     #[must_use]
-    pub fn initial<const M: usize, const B: usize>(model: &SwitchedModel<T, M, B, N>) -> Self {
+    pub fn initial<const M: usize, const B: usize>(model: &impl StrainSensor<T, M, B, N>) -> Self {
         let (mean, variance) = model.initial_distribution();
         Self::independent(mean, &variance)
     }

@@ -10,7 +10,8 @@
 //! innovations. [`FixedGain`] stops computing the gain of a model that does not change once it has settled.
 //!
 //! Models are anything that implements [`Dynamics`] and [`Channel`];
-//! [`SwitchedModel`](ohmstrain_model::SwitchedModel) does.
+//! [`SwitchedModel`](ohmstrain_model::SwitchedModel) does, and so does [`WithPlays`](ohmstrain_model::WithPlays), whose
+//! hysteresis is a part of the state: every hypothesis carries its own.
 //!
 //! # Policy
 //! - `no_std`, no heap (the `std` feature adds helpers that return a `Vec`, and the particle filter), no unsafe code, no panic.
@@ -77,6 +78,7 @@ mod particles;
 mod psd;
 #[cfg(feature = "std")]
 mod rejuvenation;
+mod sensor;
 mod sign_split;
 mod smoother;
 mod smoothing;
@@ -109,6 +111,7 @@ pub use mixture_step::{Evidence, MixtureStep};
 pub use particle_cloud::{Particle, ParticleCloud};
 #[cfg(feature = "std")]
 pub use particles::{ParticleStep, Particles};
+pub use sensor::StrainSensor;
 pub use sign_split::SignSplit;
 #[cfg(feature = "std")]
 pub use smoother::rts_smooth_vec;

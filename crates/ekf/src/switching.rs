@@ -1,6 +1,6 @@
 use core::ops::Range;
 
-use ohmstrain_model::{ParameterError, Phase, Problem, Scalar, SwitchedModel};
+use ohmstrain_model::{Motion, ParameterError, Phase, Problem, Scalar, SwitchedModel, WithPlays};
 
 use crate::gaussian::Gaussian;
 use crate::{Belief, Channel, Component, Dynamics};
@@ -28,32 +28,49 @@ pub(crate) fn enter<T: Scalar, M: Phased<T, N, L>, const N: usize, const L: usiz
 /// Mean and variance of |x| for a standard normal x: √(2/π) and 1 - 2/π.
 const HALF_NORMAL: (f64, f64) = (0.797_884_560_802_865_4, 0.363_380_227_632_418_6);
 
+/// Draws rate and acceleration anew from the motion's prior of a phase.
+fn renew<T: Scalar, const M: usize, const N: usize, const L: usize>(
+    motion: &Motion<T, M>,
+    from: &Belief<T, N, L>,
+    phase: Phase,
+) -> Belief<T, N, L> {
+    let sign = if phase == Phase::Retract { -T::one() } else { T::one() };
+    let rate_variance = motion.stationary_variance()[1];
+    let rate = if motion.phase_rate() > T::zero() {
+        Gaussian { mean: motion.phase_rate(), variance: rate_variance }
+    } else {
+        Gaussian { mean: T::of(HALF_NORMAL.0) * rate_variance.sqrt(), variance: T::of(HALF_NORMAL.1) * rate_variance }
+    };
+    let mut out = *from;
+    for i in 1..M {
+        for j in 0..N {
+            out.covariance[(i, j)] = T::zero();
+        }
+        out.mean[i] = T::zero();
+        out.covariance[(i, i)] = motion.stationary_variance()[i];
+    }
+    out.mean[1] = sign * rate.mean;
+    out.covariance[(1, 1)] = rate.variance;
+    out
+}
+
 impl<T: Scalar, const M: usize, const B: usize, const N: usize, const L: usize> Phased<T, N, L>
     for SwitchedModel<T, M, B, N>
 {
     fn enter(&self, from: &Belief<T, N, L>, phase: Phase) -> Belief<T, N, L> {
-        let motion = self.motion();
-        let sign = if phase == Phase::Retract { -T::one() } else { T::one() };
-        let rate_variance = motion.stationary_variance()[1];
-        let rate = if motion.phase_rate() > T::zero() {
-            Gaussian { mean: motion.phase_rate(), variance: rate_variance }
-        } else {
-            Gaussian {
-                mean: T::of(HALF_NORMAL.0) * rate_variance.sqrt(),
-                variance: T::of(HALF_NORMAL.1) * rate_variance,
-            }
-        };
-        let mut out = *from;
-        for i in 1..M {
-            for j in 0..N {
-                out.covariance[(i, j)] = T::zero();
-            }
-            out.mean[i] = T::zero();
-            out.covariance[(i, i)] = motion.stationary_variance()[i];
-        }
-        out.mean[1] = sign * rate.mean;
-        out.covariance[(1, 1)] = rate.variance;
-        out
+        renew(self.motion(), from, phase)
+    }
+
+    fn renewed(&self) -> Range<usize> {
+        1..M
+    }
+}
+
+impl<T: Scalar, const M: usize, const B: usize, const N0: usize, const P: usize, const N: usize, const L: usize>
+    Phased<T, N, L> for WithPlays<T, M, B, N0, P, N>
+{
+    fn enter(&self, from: &Belief<T, N, L>, phase: Phase) -> Belief<T, N, L> {
+        renew(self.inner().motion(), from, phase)
     }
 
     fn renewed(&self) -> Range<usize> {

@@ -3,7 +3,8 @@
 //! The default law is the *switched Kelvin-Voigt* law ([`SensorLaw`]): a quasi-static gauge curve, a dash-pot term and
 //! relaxing branches that stretching and releasing drive with different gains. [`SwitchedModel`] joins it with a
 //! prior on how the body moves ([`Motion`]) and with drift ([`ModelNoise`]), and gives the transition, process noise
-//! and measurement gradient that a Kalman-type filter needs. [`RelaxingModulus`] is the published law taken literally.
+//! and measurement gradient that a Kalman-type filter needs. [`WithPlays`] adds hysteresis that does not relax.
+//! [`RelaxingModulus`] is the published law taken literally.
 //!
 //! # Policy
 //! - `no_std`, no heap, no unsafe code, no panic: constructors validate and return [`ParameterError`]; evaluation of a
@@ -23,11 +24,13 @@ mod motion;
 mod noise;
 mod path;
 mod phase;
+mod play;
 mod relaxing_modulus;
 mod response;
 mod scalar;
 mod switched;
 mod symmetric;
+mod with_plays;
 
 pub use error::{ParameterError, Problem};
 pub use front_end::{AdcCode, ConstantCurrent, Divider, FrontEnd, Ohms, SensorSide};
@@ -37,8 +40,10 @@ pub use law::{Branch, SensorLaw, StrainRange};
 pub use motion::Motion;
 pub use noise::ModelNoise;
 pub use phase::{Direction, Phase};
+pub use play::Play;
 pub use relaxing_modulus::{Modulus, PhaseStart, RelaxingModulus, ResistanceGradient};
 pub use response::Response;
 pub use scalar::Scalar;
 pub use switched::{Observation, SwitchedModel, SwitchedStep, Transition};
 pub use symmetric::Symmetric;
+pub use with_plays::WithPlays;

@@ -40,6 +40,9 @@ pub enum Direction<T> {
     },
 }
 
+/// Steepness of the logistic distribution that stands for the normal one: `Φ(r) ≈ 1/(1 + exp(-1.702 r))`.
+pub(crate) const STEEPNESS: f64 = 1.702;
+
 /// How a rate splits between stretching and releasing.
 #[derive(Clone, Copy)]
 pub(crate) struct SplitRate<T> {
@@ -73,7 +76,7 @@ impl<T: Scalar> Direction<T> {
             }
             Self::Uncertain { rate_sd } => {
                 // Below this share of the rate the deviation makes no difference, and 0/0 is avoided.
-                let scale = (rate_sd.max(rate.abs() * T::of(0.01)) + T::of(1e-30)) / T::of(1.702);
+                let scale = (rate_sd.max(rate.abs() * T::of(0.01)) + T::of(1e-30)) / T::of(STEEPNESS);
                 let lean = rate / scale;
                 // ln(1 + exp(x)) = max(x, 0) + ln(1 + exp(-|x|)), which cannot overflow.
                 let tail = (-lean.abs()).exp();

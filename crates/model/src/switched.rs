@@ -155,6 +155,16 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize> SwitchedModel<T,
         state: &SVector<T, N>,
         direction: Direction<T>,
     ) -> Transition<T, N, L> {
+        self.transition_in(step, state, direction)
+    }
+
+    /// [`Self::transition`] in a state that begins with this model's and has more; what it has more is left zero.
+    pub(crate) fn transition_in<const W: usize, const L: usize>(
+        &self,
+        step: &SwitchedStep<T, M, B>,
+        state: &SVector<T, W>,
+        direction: Direction<T>,
+    ) -> Transition<T, W, L> {
         let mut out = Transition { mean: SVector::zeros(), jacobian: SMatrix::zeros(), noise: Symmetric::zeros() };
         if direction == Direction::Known(Phase::Hold) {
             out.mean[0] = state[0];
@@ -176,15 +186,25 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize> SwitchedModel<T,
         covariance: &Symmetric<T, N, L>,
         transition: &Transition<T, N, L>,
     ) -> Symmetric<T, N, L> {
+        Self::propagate_in(covariance, transition, |i| i < M + B)
+    }
+
+    /// [`Self::propagate`] in a state that begins with this model's; `moved` says which components the motion moves.
+    #[inline]
+    pub(crate) fn propagate_in<const W: usize, const L: usize>(
+        covariance: &Symmetric<T, W, L>,
+        transition: &Transition<T, W, L>,
+        moved: impl Fn(usize) -> bool,
+    ) -> Symmetric<T, W, L> {
         let jacobian = &transition.jacobian;
         let mut out = transition.noise;
-        for i in 0..N {
-            let mut row = [T::zero(); N];
+        for i in 0..W {
+            let mut row = [T::zero(); W];
             for k in 0..=i.max(M - 1) {
-                row[k] = Self::sparse_dot(i, |l| jacobian[(i, l)], |l| covariance[(l, k)]);
+                row[k] = Self::sparse_dot(i, moved(i), |l| jacobian[(i, l)], |l| covariance[(l, k)]);
             }
             for j in 0..=i {
-                out[(i, j)] += Self::sparse_dot(j, |k| jacobian[(j, k)], |k| row[k]);
+                out[(i, j)] += Self::sparse_dot(j, moved(j), |k| jacobian[(j, k)], |k| row[k]);
             }
         }
         out
@@ -192,9 +212,9 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize> SwitchedModel<T,
 
     /// Row `i` of the Jacobian, of which only these entries can differ from zero, times a column.
     #[inline]
-    fn sparse_dot(i: usize, row: impl Fn(usize) -> T, column: impl Fn(usize) -> T) -> T {
+    fn sparse_dot(i: usize, moved: bool, row: impl Fn(usize) -> T, column: impl Fn(usize) -> T) -> T {
         let mut sum = if i < M { T::zero() } else { row(i) * column(i) };
-        if i < M + B {
+        if moved {
             for k in 0..M {
                 sum += row(k) * column(k);
             }
@@ -220,12 +240,12 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize> SwitchedModel<T,
     }
 
     /// Strain and its derivatives: linear, whatever the gains.
-    fn move_body<const L: usize>(
+    fn move_body<const W: usize, const L: usize>(
         &self,
         step: &SwitchedStep<T, M, B>,
-        state: &SVector<T, N>,
+        state: &SVector<T, W>,
         direction: Direction<T>,
-        out: &mut Transition<T, N, L>,
+        out: &mut Transition<T, W, L>,
     ) {
         let push = self.push(direction);
         for i in 0..M {
@@ -254,11 +274,11 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize> SwitchedModel<T,
     }
 
     /// Branches and baseline decay, and wander around their law.
-    fn relax<const L: usize>(
+    fn relax<const W: usize, const L: usize>(
         &self,
         step: &SwitchedStep<T, M, B>,
-        state: &SVector<T, N>,
-        out: &mut Transition<T, N, L>,
+        state: &SVector<T, W>,
+        out: &mut Transition<T, W, L>,
     ) {
         for i in 0..B {
             let (c, change) = (M + i, step.response.decay_change[i]);
@@ -267,7 +287,7 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize> SwitchedModel<T,
             out.noise[(c, c)] = step.branch_variance[i];
         }
         if Self::HAS_BASELINE {
-            let b = N - 1;
+            let b = M + B;
             out.mean[b] = state[b] + step.baseline_change * state[b];
             out.jacobian[(b, b)] = T::one() + step.baseline_change;
             out.noise[(b, b)] = step.baseline_variance;
@@ -281,9 +301,14 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize> SwitchedModel<T,
         (0..M).fold(state[1] + change, |sum, j| sum + step.response.motion_change[1][j] * state[j])
     }
 
-    /// Variance of the rate at the end of a step, from the covariance at its start.
+    /// Variance of the rate at the end of a step, from the covariance at its start of a state that begins with the
+    /// motion.
     #[must_use]
-    pub fn rate_variance<const L: usize>(&self, step: &SwitchedStep<T, M, B>, covariance: &Symmetric<T, N, L>) -> T {
+    pub fn rate_variance<const W: usize, const L: usize>(
+        &self,
+        step: &SwitchedStep<T, M, B>,
+        covariance: &Symmetric<T, W, L>,
+    ) -> T {
         let mut row = step.response.motion_change[1];
         row[1] += T::one();
         let mut variance = step.response.motion_noise[1][1];
@@ -298,12 +323,12 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize> SwitchedModel<T,
     /// What the motion does to the branches: gain at mid-strain times mean rate over the step.
     ///
     /// Noise of branch i is `γᵢ wᵢ + strain_pull · n_ε`: its gain depends on where the motion goes.
-    fn drive_branches<const L: usize>(
+    fn drive_branches<const W: usize, const L: usize>(
         &self,
         step: &SwitchedStep<T, M, B>,
-        state: &SVector<T, N>,
+        state: &SVector<T, W>,
         direction: Direction<T>,
-        out: &mut Transition<T, N, L>,
+        out: &mut Transition<T, W, L>,
     ) {
         let response = &step.response;
         let mid_strain = (state[0] + out.mean[0]) / T::of(2.0);

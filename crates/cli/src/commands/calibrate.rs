@@ -32,6 +32,9 @@ pub fn run(args: &CalibrateArgs) -> Result<(), CliError> {
     if let Some(branches) = args.branches.chosen() {
         options.branches = branches.0;
     }
+    if let Some(plays) = args.plays.chosen() {
+        options.plays = plays.0;
+    }
     if let Some(gauge) = args.gauge.chosen() {
         options.gauge = gauge.into();
     }

@@ -181,8 +181,8 @@ impl Curve {
         let start_s = *recording.time_s.get(hold.first)?;
         let rows = || recording.time_s.iter().zip(recording.reading).take(hold.last + 1).skip(hold.first);
         let (first_time, first_reading) = rows().find(|(_, reading)| reading.is_finite())?;
-        let branches = recording.branches_at(hold.first)?;
-        let law = |time_s: f64| recording.law.held(hold.strain, branches, time_s - start_s);
+        let memory = recording.memory_at(hold.first)?;
+        let law = |time_s: f64| recording.law.held(hold.strain, memory, time_s - start_s);
         let first_law = law(*first_time);
         let later = || rows().filter(|(time, _)| **time > start_s);
         Some(Self {

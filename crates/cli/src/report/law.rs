@@ -2,14 +2,15 @@
 
 use std::collections::BTreeMap;
 
-use ohmstrain_calib::{BranchParams, EstimatorParams, Output, SensorParams};
+use ohmstrain_calib::{BranchParams, EstimatorParams, Output, PlayParams, SensorParams};
 use ohmstrain_model::SensorLaw;
 
-/// A sensor's law, with its branches in a slice.
+/// A sensor's law, with its branches and plays in slices.
 pub struct Law<'a> {
     /// Gauge curve, dash-pots and range.
     quasi_static: SensorLaw<f64, 0>,
     branches: &'a [BranchParams],
+    plays: &'a [PlayParams],
     estimator: Option<&'a EstimatorParams>,
     rest_reading: f64,
 }
@@ -18,8 +19,8 @@ pub struct Law<'a> {
 pub struct Driven {
     /// Readings, row by row; NaN where the strain is missing.
     pub reading: Vec<f64>,
-    /// The branches at the rows that were asked for.
-    pub branches: BTreeMap<usize, Vec<f64>>,
+    /// What the law remembers at the rows that were asked for: branches, then lags of plays.
+    pub memories: BTreeMap<usize, Vec<f64>>,
 }
 
 impl<'a> Law<'a> {
@@ -33,12 +34,8 @@ impl<'a> Law<'a> {
             branches: [],
             range: law.range.to_model(),
         };
-        Self {
-            quasi_static,
-            branches: &law.branches,
-            estimator: params.estimator(params.leading_estimator()).ok(),
-            rest_reading,
-        }
+        let estimator = params.estimator(params.leading_estimator()).ok();
+        Self { quasi_static, branches: &law.branches, plays: &law.plays, estimator, rest_reading }
     }
 
     /// g(ε).
@@ -56,7 +53,9 @@ impl<'a> Law<'a> {
         let estimate = &output.estimate;
         let (rising, falling) = split(estimate.rate.mean, estimate.rate.sd());
         let dash_pot = self.quasi_static.extend_viscosity_s * rising + self.quasi_static.retract_viscosity_s * falling;
-        self.reading(self.gauge(estimate.strain.mean) + dash_pot + estimate.relaxation.mean + estimate.baseline)
+        // With plays the settled reading is the gauge curve and what they have kept.
+        let at_rest = if self.plays.is_empty() { self.gauge(estimate.strain.mean) } else { estimate.settled.mean };
+        self.reading(at_rest + dash_pot + estimate.relaxation.mean + estimate.baseline)
     }
 
     /// Standard deviation of a reading around the law driven by the true strain: branches, baseline and white noise.
@@ -74,7 +73,7 @@ impl<'a> Law<'a> {
     }
 
     /// The law driven by a known strain from rest, exactly for strain that moves linearly from row to row. Rows without
-    /// strain are stepped over. `remember` are the rows at which the branches are wanted.
+    /// strain are stepped over. `remember` are the rows at which branches and lags are wanted.
     pub fn driven(&self, time_s: &[f64], strain: &[f64], remember: &[usize]) -> Driven {
         let known: Vec<(usize, f64, f64)> = time_s
             .iter()
@@ -83,34 +82,35 @@ impl<'a> Law<'a> {
             .filter(|(_, (time, strain))| time.is_finite() && strain.is_finite())
             .map(|(row, (time, strain))| (row, *time, *strain))
             .collect();
-        let mut driven = Driven { reading: vec![f64::NAN; time_s.len()], branches: BTreeMap::new() };
-        let mut branches = vec![0.0; self.branches.len()];
+        let mut driven = Driven { reading: vec![f64::NAN; time_s.len()], memories: BTreeMap::new() };
+        let mut memory = vec![0.0; self.branches.len() + self.plays.len()];
         for (place, &(row, time, strain)) in known.iter().enumerate() {
             let before =
                 place.checked_sub(1).and_then(|place| known.get(place)).copied().unwrap_or((row, time, strain));
             let after = known.get(place + 1).copied().unwrap_or((row, time, strain));
-            self.drive(&mut branches, time - before.1, before.2, strain);
+            self.drive(&mut memory, time - before.1, before.2, strain);
             let rate = if after.1 > before.1 { (after.2 - before.2) / (after.1 - before.1) } else { 0.0 };
             let dash_pot =
                 if rate > 0.0 { self.quasi_static.extend_viscosity_s } else { self.quasi_static.retract_viscosity_s };
-            let change = self.gauge(strain) + dash_pot * rate + branches.iter().sum::<f64>();
+            let change = self.gauge(strain) + dash_pot * rate + self.remembered(&memory, 0.0);
             if let Some(reading) = driven.reading.get_mut(row) {
                 *reading = self.reading(change);
             }
             if remember.contains(&row) {
-                driven.branches.insert(row, branches.clone());
+                driven.memories.insert(row, memory.clone());
             }
         }
         driven
     }
 
-    /// The branches after `dt_s` seconds in which the strain goes from `from` to `to`.
+    /// Branches and lags after `dt_s` seconds in which the strain goes from `from` to `to`.
     fn drive(&self, state: &mut [f64], dt_s: f64, from: f64, to: f64) {
         if !(dt_s > 0.0) {
             return;
         }
         let middle = self.quasi_static.range.clamp(0.5 * (from + to));
-        for (c, branch) in state.iter_mut().zip(self.branches) {
+        let (branches, lags) = state.split_at_mut(self.branches.len());
+        for (c, branch) in branches.iter_mut().zip(self.branches) {
             let x = dt_s / branch.tau_s;
             let gain = if to > from {
                 branch.extend_gain + branch.extend_gain_slope * middle
@@ -119,13 +119,21 @@ impl<'a> Law<'a> {
             };
             *c = *c * (-x).exp() + gain * (to - from) * (-(-x).exp_m1() / x);
         }
+        for (lag, play) in lags.iter_mut().zip(self.plays) {
+            *lag = (*lag - (to - from)).max(-play.half_width).min(play.half_width);
+        }
     }
 
-    /// The reading `elapsed_s` seconds into a hold at `strain` that began with these branches.
-    pub fn held(&self, strain: f64, branches: &[f64], elapsed_s: f64) -> f64 {
-        let relaxing: f64 =
-            self.branches.iter().zip(branches).map(|(branch, c)| c * (-elapsed_s / branch.tau_s).exp()).sum();
-        self.reading(self.gauge(strain) + relaxing)
+    /// The reading `elapsed_s` seconds into a hold at `strain` that began with this memory.
+    pub fn held(&self, strain: f64, memory: &[f64], elapsed_s: f64) -> f64 {
+        self.reading(self.gauge(strain) + self.remembered(memory, elapsed_s))
+    }
+
+    /// What branches and plays add to the reading after `elapsed_s` seconds of rest.
+    fn remembered(&self, memory: &[f64], elapsed_s: f64) -> f64 {
+        let relaxing = self.branches.iter().map(|branch| (-elapsed_s / branch.tau_s).exp());
+        let factors = relaxing.chain(self.plays.iter().map(|play| play.weight));
+        factors.zip(memory).map(|(factor, value)| factor * value).sum()
     }
 
     fn reading(&self, relative_change: f64) -> f64 {

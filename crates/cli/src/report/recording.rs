@@ -59,8 +59,8 @@ impl<'a> Recording<'a> {
         let starts: Vec<usize> = held.iter().take(PLOTTED_HOLDS).map(|hold| hold.first).collect();
         let driven = law.driven(input.time_s, &strain, &starts);
         let (driven, held_driven) = if truth.is_some() {
-            let branches = driven.branches.clone();
-            (Some(driven), Driven { reading: vec![], branches })
+            let memories = driven.memories.clone();
+            (Some(driven), Driven { reading: vec![], memories })
         } else {
             (None, driven)
         };
@@ -92,9 +92,9 @@ impl<'a> Recording<'a> {
         self.held.get(..PLOTTED_HOLDS).unwrap_or(&self.held)
     }
 
-    /// The law's branches at the start of one of the longest holds.
-    pub fn branches_at(&self, row: usize) -> Option<&[f64]> {
-        self.held_driven.branches.get(&row).map(Vec::as_slice)
+    /// What the law remembers at the start of one of the longest holds.
+    pub fn memory_at(&self, row: usize) -> Option<&[f64]> {
+        self.held_driven.memories.get(&row).map(Vec::as_slice)
     }
 
     /// Points (strain, g) of the gauge curve over a range.
