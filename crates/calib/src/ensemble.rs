@@ -21,20 +21,28 @@ pub struct EnsembleParams {
     pub weights: BTreeMap<EstimatorKind, f64>,
 }
 
-/// How many independent rows the mean score stands for. Errors hang together for as long as a movement lasts, so a mean
-/// over a thousand rows is worth a handful of them, and a better score is a hint rather than a proof.
-const INDEPENDENT_ROWS: f64 = 2.0;
+/// How many independent rows the mean score stands for: one. Errors hang together for as long as a movement lasts and the
+/// score of one recording's blocks is a hint rather than a proof; a larger number lets a lucky member drown the others.
+const INDEPENDENT_ROWS: f64 = 1.0;
 
-/// Weights `∝ exp(-n · score)` of estimators with these mean negative log densities: pseudo-Bayesian model averaging
-/// (Geisser & Eddy, *J. Am. Stat. Assoc.* 74 (1979) 153) on the blocks left out.
-pub(crate) fn weights(scores: &[(EstimatorKind, f64)]) -> BTreeMap<EstimatorKind, f64> {
-    let best = scores.iter().map(|(_, score)| *score).fold(f64::INFINITY, f64::min);
-    let raw = |score: f64| if score.is_finite() { (INDEPENDENT_ROWS * (best - score)).exp() } else { 0.0 };
-    let total: f64 = scores.iter().map(|(_, score)| raw(*score)).sum();
-    scores.iter().map(|(kind, score)| (*kind, raw(*score) / total)).collect()
+/// What an estimator is worth before anything is scored: the one that errs least on most recordings counts twice.
+fn prior(kind: EstimatorKind) -> f64 {
+    if kind == EstimatorKind::SignSplit { 2.0 } else { 1.0 }
 }
 
-/// Filters that run side by side. Their posteriors are pooled: where they disagree the deviation grows.
+/// Weights `∝ prior · exp(-n · score)` of estimators with these mean negative log densities: pseudo-Bayesian model
+/// averaging (Geisser & Eddy, *J. Am. Stat. Assoc.* 74 (1979) 153) on the blocks left out.
+pub(crate) fn weights(scores: &[(EstimatorKind, f64)]) -> BTreeMap<EstimatorKind, f64> {
+    let best = scores.iter().map(|(_, score)| *score).fold(f64::INFINITY, f64::min);
+    let raw = |(kind, score): &(EstimatorKind, f64)| {
+        if score.is_finite() { prior(*kind) * (INDEPENDENT_ROWS * (best - score)).exp() } else { 0.0 }
+    };
+    let total: f64 = scores.iter().map(raw).sum();
+    scores.iter().map(|scored| (scored.0, raw(scored) / total)).collect()
+}
+
+/// Filters that run side by side. Their posteriors are pooled: where they disagree the deviation grows. A member that is
+/// surer than the others at the moment is listened to more, in proportion to 1/deviation.
 pub(crate) struct Ensemble {
     members: Vec<Member>,
     filtered_scale: f64,
@@ -73,7 +81,7 @@ impl Ensemble {
             acted = acted.and(result);
         }
         for outputs in said {
-            out(pooled(&outputs, scale));
+            out(pooled(outputs, scale));
         }
         acted
     }
@@ -92,13 +100,12 @@ impl Filter for Ensemble {
     }
 
     fn strain(&self) -> Gaussian<f64> {
-        let strains = self.members.iter().map(|member| (member.weight, member.filter.strain()));
-        scaled(pooled_gaussian(strains), self.filtered_scale)
+        let strains: Vec<_> = self.members.iter().map(|member| (member.weight, member.filter.strain())).collect();
+        scaled(pooled_gaussian(&sure(strains, |strain| strain.sd()), |strain| *strain), self.filtered_scale)
     }
 
     fn output(&self) -> Output {
-        let outputs: Vec<(f64, Output)> = self.members.iter().map(|m| (m.weight, m.filter.output())).collect();
-        pooled(&outputs, self.filtered_scale)
+        pooled(self.members.iter().map(|m| (m.weight, m.filter.output())).collect(), self.filtered_scale)
     }
 
     fn step_lagged(
@@ -128,8 +135,7 @@ impl Filter for Ensemble {
             said.push((member.weight, outputs));
         }
         let row = |k: usize| {
-            let outputs: Vec<(f64, Output)> = said.iter().map(|(weight, outputs)| (*weight, outputs[k])).collect();
-            pooled(&outputs, self.smoothed_scale)
+            pooled(said.iter().map(|(weight, outputs)| (*weight, outputs[k])).collect(), self.smoothed_scale)
         };
         Ok(Some((0..time_s.len()).map(row).collect()))
     }
@@ -139,18 +145,25 @@ fn scaled(gaussian: Gaussian<f64>, sd_scale: f64) -> Gaussian<f64> {
     Gaussian { variance: gaussian.variance * sd_scale * sd_scale, ..gaussian }
 }
 
+/// The same with every weight divided by a deviation, and a sum of one.
+fn sure<X>(weighted: Vec<(f64, X)>, sd: impl Fn(&X) -> f64) -> Vec<(f64, X)> {
+    let smallest = weighted.iter().map(|(_, x)| sd(x)).fold(f64::INFINITY, f64::min);
+    let share = |x: &X| if sd(x) > 0.0 { smallest / sd(x) } else { 1.0 };
+    let total: f64 = weighted.iter().map(|(weight, x)| weight * share(x)).sum();
+    weighted.into_iter().map(|(weight, x)| (weight * share(&x) / total, x)).collect()
+}
+
 /// Mean and variance of a mixture of Gaussians whose weights sum to one.
-fn pooled_gaussian(weighted: impl Iterator<Item = (f64, Gaussian<f64>)> + Clone) -> Gaussian<f64> {
-    let mean: f64 = weighted.clone().map(|(weight, gaussian)| weight * gaussian.mean).sum();
-    let variance = weighted.map(|(weight, g)| weight * (g.variance + (g.mean - mean).powi(2))).sum();
-    Gaussian { mean, variance }
+fn pooled_gaussian<X>(weighted: &[(f64, X)], of: impl Fn(&X) -> Gaussian<f64>) -> Gaussian<f64> {
+    let mean: f64 = weighted.iter().map(|(weight, x)| weight * of(x).mean).sum();
+    let spread = |x: &X| of(x).variance + (of(x).mean - mean).powi(2);
+    Gaussian { mean, variance: weighted.iter().map(|(weight, x)| weight * spread(x)).sum() }
 }
 
 /// What the members say together.
-fn pooled(outputs: &[(f64, Output)], strain_sd_scale: f64) -> Output {
-    let gaussian = |of: fn(&Estimate<f64>) -> Gaussian<f64>| {
-        pooled_gaussian(outputs.iter().map(|(weight, output)| (*weight, of(&output.estimate))))
-    };
+fn pooled(outputs: Vec<(f64, Output)>, strain_sd_scale: f64) -> Output {
+    let outputs = &sure(outputs, |output| output.estimate.strain.sd());
+    let gaussian = |of: fn(&Estimate<f64>) -> Gaussian<f64>| pooled_gaussian(outputs, |output| of(&output.estimate));
     let mean = |of: &dyn Fn(&Output) -> f64| outputs.iter().map(|(weight, output)| weight * of(output)).sum::<f64>();
     let share = |holds: &dyn Fn(&Output) -> bool| mean(&|output| f64::from(u8::from(holds(output)))) > 0.5;
     Output {
@@ -190,15 +203,26 @@ fn pooled_phases(outputs: &[(f64, Output)]) -> Option<[f64; 3]> {
 mod tests {
     use ohmstrain_ekf::Gaussian;
 
-    use super::{pooled_gaussian, weights};
+    use super::{pooled_gaussian, sure, weights};
     use crate::estimator_params::EstimatorKind;
 
     #[test]
     fn disagreement_widens() {
         // Two of ±1 with equal weights: variance 1 between them on top of their own.
         let at = |mean: f64| (0.5, Gaussian { mean, variance: 0.25 });
-        let pooled = pooled_gaussian([at(-1.0), at(1.0)].into_iter());
+        let pooled = pooled_gaussian(&[at(-1.0), at(1.0)], |gaussian| *gaussian);
         assert_eq!((pooled.mean, pooled.variance), (0.0, 1.25));
+    }
+
+    #[test]
+    fn the_surer_member_counts_more() {
+        let at = |sd: f64| (0.5, Gaussian { mean: 0.0, variance: sd * sd });
+        let weights = |members: Vec<(f64, Gaussian<f64>)>| {
+            sure(members, |gaussian| gaussian.sd()).iter().map(|(weight, _)| *weight).collect::<Vec<f64>>()
+        };
+        assert_eq!(weights(vec![at(1.0), at(3.0)]), [0.75, 0.25]);
+        // Exact knowledge drowns the rest.
+        assert_eq!(weights(vec![at(0.0), at(3.0)]), [1.0, 0.0]);
     }
 
     #[test]
@@ -207,7 +231,7 @@ mod tests {
             weights(&[(EstimatorKind::Ekf, -2.0), (EstimatorKind::Imm, f64::INFINITY), (EstimatorKind::Ukf, -2.5)]);
         let of = |kind| weights[&kind];
         assert!((of(EstimatorKind::Ekf) + of(EstimatorKind::Ukf) - 1.0).abs() < 1e-15);
-        assert!((of(EstimatorKind::Ukf) / of(EstimatorKind::Ekf) - 1.0_f64.exp()).abs() < 1e-12);
+        assert!((of(EstimatorKind::Ukf) / of(EstimatorKind::Ekf) - 0.5_f64.exp()).abs() < 1e-12);
         assert_eq!(of(EstimatorKind::Imm), 0.0);
     }
 }
