@@ -36,7 +36,7 @@ pub use joint::Joint;
 pub use law::{Branch, SensorLaw, StrainRange};
 pub use motion::Motion;
 pub use noise::ModelNoise;
-pub use phase::{Direction, Phase};
+pub use phase::{Direction, Phase, SplitRate};
 pub use relaxing_modulus::{Modulus, PhaseStart, RelaxingModulus, ResistanceGradient};
 pub use response::Response;
 pub use scalar::Scalar;

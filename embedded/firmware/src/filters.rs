@@ -2,8 +2,8 @@
 
 use core::hint::black_box;
 
-use ohmstrain_ekf::{Belief, Dwell, Ekf, Evidence, Imm, Mixture, Reading, Real, SignSplit};
-use ohmstrain_model::{ParameterError, Phase, Scalar, SwitchedModel, SwitchedStep};
+use ohmstrain_ekf::{Belief, Compact, Dwell, Ekf, Evidence, Imm, Mixture, Reading, Real, SignSplit, SparseEkf};
+use ohmstrain_model::{ParameterError, Phase, Problem, Scalar, SwitchedModel, SwitchedStep};
 
 use crate::{DT_S, limits, sensor};
 
@@ -172,5 +172,37 @@ impl<T: Real> Filter<T> for SplitFour<T> {
 
     fn state_bytes() -> usize {
         size_of::<Mixture<T, 6, 21, 4>>()
+    }
+}
+
+/// The EKF that leaves out the zeros, at a fixed rate.
+#[derive(Clone, Copy)]
+pub struct FastEkf<T, const B: usize, const N: usize, const L: usize> {
+    ekf: SparseEkf<T, Compact, B, N>,
+    belief: Belief<T, N, L>,
+}
+
+/// Strain, rate, one branch.
+pub type Fast3<T> = FastEkf<T, 1, 3, 6>;
+/// Strain, rate, three branches, baseline.
+pub type Fast6<T> = FastEkf<T, 3, 6, 21>;
+
+impl<T: Scalar, const B: usize, const N: usize, const L: usize> Filter<T> for FastEkf<T, B, N, L> {
+    fn start() -> Result<Self, ParameterError> {
+        let model = black_box(sensor()?);
+        let step = SparseEkf::new(model, T::of(DT_S)).map_err(|_| ParameterError::new("dt_s", Problem::NotPositive))?;
+        Ok(Self { ekf: step, belief: Belief::initial(&model) })
+    }
+
+    fn step(&mut self, reading: Reading<T>) -> bool {
+        self.ekf.step(&mut self.belief, Some(reading)).is_ok()
+    }
+
+    fn strain(&self) -> T {
+        self.belief.mean[0]
+    }
+
+    fn state_bytes() -> usize {
+        size_of::<Belief<T, N, L>>()
     }
 }

@@ -5,15 +5,22 @@ use std::fmt::Write;
 use std::fs;
 use std::path::Path;
 
-use ohmstrain_firmware::{Ekf3, Ekf6, Filter, Imm6, SplitFour, VaryingEkf3, front_end, to_reading};
+use ohmstrain_firmware::{Ekf3, Ekf6, Fast3, Fast6, Filter, Imm6, SplitFour, VaryingEkf3, front_end, to_reading};
 
 use crate::codes::{SEED, codes};
 
 /// Programs, in the order of the table, and the filter of the library whose `f64` strain is the reference of each.
-pub const PROGRAMS: [(&str, &str); 5] =
-    [("ekf3", "ekf3"), ("ekf3_varying", "ekf3_varying"), ("ekf6", "ekf6"), ("imm6", "imm6"), ("split6", "split6")];
+pub const PROGRAMS: [(&str, &str); 7] = [
+    ("ekf3", "ekf3"),
+    ("ekf3_varying", "ekf3_varying"),
+    ("fast3", "fast3"),
+    ("ekf6", "ekf6"),
+    ("fast6", "fast6"),
+    ("imm6", "imm6"),
+    ("split6", "split6"),
+];
 
-const REFERENCES: [&str; 5] = ["ekf3", "ekf3_varying", "ekf6", "imm6", "split6"];
+const REFERENCES: [&str; 7] = ["ekf3", "ekf3_varying", "fast3", "ekf6", "fast6", "imm6", "split6"];
 
 /// Strains after every code.
 fn strains<F: Filter<f64>>(codes: &[u16]) -> Result<Vec<f64>, Box<dyn Error>> {
@@ -36,7 +43,9 @@ fn generate() -> Result<[(&'static str, String); 2], Box<dyn Error>> {
     let columns = [
         strains::<Ekf3<f64>>(&codes)?,
         strains::<VaryingEkf3<f64>>(&codes)?,
+        strains::<Fast3<f64>>(&codes)?,
         strains::<Ekf6<f64>>(&codes)?,
+        strains::<Fast6<f64>>(&codes)?,
         strains::<Imm6<f64>>(&codes)?,
         strains::<SplitFour<f64>>(&codes)?,
     ];
