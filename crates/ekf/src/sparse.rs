@@ -244,7 +244,9 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize> SparseEkf<T, S, B,
     #[inline(always)]
     fn update(&self, x: &mut [T; N], p: &mut [[T; N]; N], reading: Reading<T>) -> Result<Residual<T>, StepError> {
         let law = self.model.law();
-        let (mut expected, slope) = law.gauge_value_and_slope(x[0]);
+        let inside = clamped(&law.range, x[0]);
+        let (gauge, slope) = law.gauge.value_and_slope(inside);
+        let mut expected = gauge + slope * (x[0] - inside);
         let rate = Splitter::new(p[1][1]).split::<S>(x[1]);
         let (extend, retract) = (law.viscosity_s(Phase::Extend), law.viscosity_s(Phase::Retract));
         expected += rate.drive(extend, retract);
