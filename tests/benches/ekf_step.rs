@@ -7,7 +7,7 @@ use std::hint::black_box;
 use adskalman::{KalmanFilterNoControl, StateAndCovariance};
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
 use nalgebra::SVector;
-use ohmstrain_ekf::{Belief, Channel, Dynamics, Ekf, LinearStep, Reading};
+use ohmstrain_ekf::{Belief, Channel, Compact, Dynamics, Ekf, LinearStep, Reading, SparseEkf};
 use ohmstrain_model::{Phase, SwitchedModel};
 use ohmstrain_tests::sensor;
 
@@ -32,6 +32,26 @@ fn ekf(criterion: &mut Criterion, model: &SwitchedModel<f64, 2, 1, 3>) {
                     if let Ok(step) = ekf.step_prepared(&belief, &prepared, Some(Reading::from(black_box(reading)))) {
                         belief = step.posterior;
                     }
+                }
+                belief
+            },
+            BatchSize::SmallInput,
+        );
+    });
+}
+
+/// The same filter without a multiplication by zero, and without an exponential.
+fn sparse(criterion: &mut Criterion, model: &SwitchedModel<f64, 2, 1, 3>) {
+    let Ok(ekf) = SparseEkf::<f64, Compact, 1, 3>::new(*model, DT_S) else { return };
+    let start = Belief::<f64, 3, 6>::initial(model);
+    let readings = readings();
+    criterion.bench_function("ohmstrain sparse EKF, n = 3, 512 steps", |bencher| {
+        bencher.iter_batched(
+            || start,
+            |mut belief| {
+                for &reading in &readings {
+                    // An error would leave the belief as it was.
+                    let _ = ekf.step(&mut belief, Some(Reading::from(black_box(reading))));
                 }
                 belief
             },
@@ -68,6 +88,7 @@ fn adskalman(criterion: &mut Criterion, model: &SwitchedModel<f64, 2, 1, 3>) {
 fn benchmarks(criterion: &mut Criterion) {
     let model = sensor::<f64, 1, 3>();
     ekf(criterion, &model);
+    sparse(criterion, &model);
     adskalman(criterion, &model);
 }
 

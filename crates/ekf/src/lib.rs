@@ -78,10 +78,13 @@ mod particles;
 mod psd;
 #[cfg(feature = "std")]
 mod rejuvenation;
+mod residual;
 mod sensor;
 mod sign_split;
 mod smoother;
 mod smoothing;
+mod sparse;
+mod switch;
 mod switching;
 mod traits;
 mod unscented;
@@ -111,12 +114,15 @@ pub use mixture_step::{Evidence, MixtureStep};
 pub use particle_cloud::{Particle, ParticleCloud};
 #[cfg(feature = "std")]
 pub use particles::{ParticleStep, Particles};
+pub use residual::{LogLikelihood, Residual};
 pub use sensor::StrainSensor;
 pub use sign_split::SignSplit;
 #[cfg(feature = "std")]
 pub use smoother::rts_smooth_vec;
 pub use smoother::{rts_smooth, rts_step};
 pub use smoothing::{PastStep, smooth_back_through};
+pub use sparse::SparseEkf;
+pub use switch::{Compact, Logistic, Switch};
 pub use switching::{Dwell, Phased};
 pub use traits::{Channel, Dynamics, Reading};
 pub use unscented::{Ukf, Unscented};

@@ -58,6 +58,12 @@ struct Converter<T> {
     code_sd: T,
 }
 
+/// A code as a number. Through `f32`, which holds 24 bits exactly: through `f64` a microcontroller without double precision
+/// would call software for every reading.
+fn count<T: Scalar>(code: u32) -> T {
+    nalgebra::convert(code as f32)
+}
+
 impl<T: Scalar> Converter<T> {
     /// `noise_codes`: standard deviation of the converter's own noise; rounding to a code adds 1/12.
     fn new(bits: u32, noise_codes: T) -> Result<Self, ParameterError> {
@@ -97,8 +103,8 @@ impl<T: Scalar> Divider<T> {
         if self.converter.is_saturated(code) {
             return AdcCode::Saturated;
         }
-        let full_scale = T::of(f64::from(self.converter.full_scale));
-        let x = T::of(f64::from(code)) / full_scale;
+        let full_scale = count(self.converter.full_scale);
+        let x = count::<T>(code) / full_scale;
         let rest = T::one() - x;
         let (ratio, slope) = match self.side {
             SensorSide::Low => (x / rest, T::one() / (rest * rest)),
@@ -115,7 +121,7 @@ impl<T: Scalar> Divider<T> {
     pub fn code(&self, resistance_ohm: T) -> T {
         let share = resistance_ohm / (resistance_ohm + self.reference_ohm);
         let x = if self.side == SensorSide::Low { share } else { T::one() - share };
-        x * T::of(f64::from(self.converter.full_scale))
+        x * count::<T>(self.converter.full_scale)
     }
 }
 
@@ -132,7 +138,7 @@ impl<T: Scalar> ConstantCurrent<T> {
             }
         }
         let converter = Converter::new(bits, noise_codes)?;
-        let volts_per_code = full_scale_v / T::of(f64::from(converter.full_scale));
+        let volts_per_code = full_scale_v / count(converter.full_scale);
         Ok(Self { ohm_per_code: volts_per_code / (current_a * gain), converter })
     }
 
@@ -143,7 +149,7 @@ impl<T: Scalar> ConstantCurrent<T> {
             return AdcCode::Saturated;
         }
         AdcCode::Reading(Ohms {
-            resistance_ohm: self.ohm_per_code * T::of(f64::from(code)),
+            resistance_ohm: self.ohm_per_code * count::<T>(code),
             sd_ohm: self.ohm_per_code * self.converter.code_sd,
         })
     }

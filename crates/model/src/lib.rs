@@ -39,7 +39,7 @@ pub use joint::Joint;
 pub use law::{Branch, SensorLaw, StrainRange};
 pub use motion::Motion;
 pub use noise::ModelNoise;
-pub use phase::{Direction, Phase};
+pub use phase::{Direction, Phase, SplitRate};
 pub use play::Play;
 pub use relaxing_modulus::{Modulus, PhaseStart, RelaxingModulus, ResistanceGradient};
 pub use response::Response;

@@ -137,7 +137,8 @@ impl<T: Scalar, const M: usize> Motion<T, M> {
             let root = match j {
                 0 => coefficient.abs(),
                 1 => coefficient.abs().sqrt(),
-                _ => coefficient.abs().cbrt(),
+                // Not `cbrt`: for f32 that is software in double precision on a microcontroller.
+                _ => coefficient.abs().powf(T::of(1.0 / 3.0)),
             };
             fastest = fastest.max(root);
         }

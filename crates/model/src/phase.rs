@@ -44,8 +44,8 @@ pub enum Direction<T> {
 pub(crate) const STEEPNESS: f64 = 1.702;
 
 /// How a rate splits between stretching and releasing.
-#[derive(Clone, Copy)]
-pub(crate) struct SplitRate<T> {
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SplitRate<T> {
     /// Expected stretching rate, not negative.
     pub extend: T,
     /// Expected releasing rate, not positive.
@@ -57,12 +57,13 @@ pub(crate) struct SplitRate<T> {
 }
 
 impl<T: Scalar> Direction<T> {
-    /// Splits a mean rate.
+    /// Splits a mean rate, 1/s.
     ///
     /// The normal distribution is replaced by the logistic one, `Φ(r) ≈ 1/(1 + exp(-1.702 r))`, off by at most 0.0095
     /// (Bowling et al., *J. Ind. Eng. Manag.* 2 (2009) 114): its integral has a closed form, and neither needs an error
     /// function.
-    pub(crate) fn split(self, rate: T) -> SplitRate<T> {
+    #[must_use]
+    pub fn split(self, rate: T) -> SplitRate<T> {
         let (zero, one) = (T::zero(), T::one());
         match self {
             Self::Known(Phase::Extend) => {
@@ -97,12 +98,14 @@ impl<T: Scalar> Direction<T> {
 
 impl<T: Scalar> SplitRate<T> {
     /// Expected product of gain and rate.
-    pub(crate) fn drive(&self, extend_gain: T, retract_gain: T) -> T {
+    #[must_use]
+    pub fn drive(&self, extend_gain: T, retract_gain: T) -> T {
         extend_gain * self.extend + retract_gain * self.retract
     }
 
     /// Its derivative with respect to the rate.
-    pub(crate) fn slope(&self, extend_gain: T, retract_gain: T) -> T {
+    #[must_use]
+    pub fn slope(&self, extend_gain: T, retract_gain: T) -> T {
         extend_gain * self.extend_probability + retract_gain * self.retract_probability
     }
 }

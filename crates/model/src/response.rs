@@ -42,15 +42,20 @@ const TERMS: usize = 14;
 
 /// Gauss-Legendre nodes and weights on [0, 1] (Abramowitz & Stegun, table 25.4). Seven points leave an error below
 /// 1e-17 of the integral of `s⁴ exp(2 λ s)`, the worst integrand here, at `|λ h| ≤ 1/4`.
-const NODES: [(f64, f64); 7] = [
-    (0.0254460438286207, 0.06474248308443487),
-    (0.12923440720030277, 0.13985269574463843),
-    (0.2970774243113014, 0.19091502525255935),
-    (0.5, 0.20897959183673465),
-    (0.7029225756886985, 0.19091502525255935),
-    (0.8707655927996972, 0.13985269574463843),
-    (0.9745539561713793, 0.06474248308443487),
-];
+///
+/// Literals one by one, which become `T` while compiling: a table of `f64` would be converted at run time, in software on
+/// a microcontroller.
+fn nodes<T: Scalar>() -> [(T, T); 7] {
+    [
+        (T::of(0.0254460438286207), T::of(0.06474248308443487)),
+        (T::of(0.12923440720030277), T::of(0.13985269574463843)),
+        (T::of(0.2970774243113014), T::of(0.19091502525255935)),
+        (T::of(0.5), T::of(0.20897959183673465)),
+        (T::of(0.7029225756886985), T::of(0.19091502525255935)),
+        (T::of(0.8707655927996972), T::of(0.13985269574463843)),
+        (T::of(0.9745539561713793), T::of(0.06474248308443487)),
+    ]
+}
 
 /// Doublings allowed: enough for a step 10¹⁵ times longer than the fastest time constant.
 const MOST_DOUBLINGS: u32 = 52;
@@ -100,8 +105,8 @@ impl<T: Scalar, const M: usize, const B: usize> Response<T, M, B> {
         }
         let impulse = Series::from_unit(M - 1, motion, branches);
         (out.input, out.drive_input) = impulse.integral(h);
-        for (node, weight) in NODES {
-            out.add_noise(&impulse.at(h * T::of(node)), motion.noise_density() * h * T::of(weight));
+        for (node, weight) in nodes() {
+            out.add_noise(&impulse.at(h * node), motion.noise_density() * h * weight);
         }
         out
     }
@@ -187,9 +192,10 @@ impl<T: Scalar, const M: usize, const B: usize> Series<T, M, B> {
     fn from_unit(start: usize, motion: &Motion<T, M>, branches: &[Branch<T>; B]) -> Self {
         let mut series = Self { motion: [[T::zero(); M]; TERMS], branches: [[T::zero(); B]; TERMS] };
         series.motion[0][start] = T::one();
+        let mut order = T::zero();
         for n in 1..TERMS {
             let (state, relaxation) = (series.motion[n - 1], series.branches[n - 1]);
-            let order = T::of(n as f64);
+            order += T::one();
             for j in 1..M {
                 series.motion[n][j - 1] = state[j] / order;
             }
@@ -220,10 +226,11 @@ impl<T: Scalar, const M: usize, const B: usize> Series<T, M, B> {
     /// Their integrals from 0 to `h`.
     fn integral(&self, h: T) -> ([T; M], [T; B]) {
         let mut out = ([T::zero(); M], [T::zero(); B]);
+        let mut order = T::of(TERMS as f64);
         for n in (0..TERMS).rev() {
-            let order = T::of((n + 1) as f64);
             out.0 = core::array::from_fn(|i| out.0[i] * h + self.motion[n][i] / order);
             out.1 = core::array::from_fn(|i| out.1[i] * h + self.branches[n][i] / order);
+            order -= T::one();
         }
         (out.0.map(|x| x * h), out.1.map(|x| x * h))
     }

@@ -73,6 +73,30 @@ impl<T: Scalar, const M: usize, const B: usize> SwitchedStep<T, M, B> {
     pub fn dt_s(&self) -> T {
         self.response.dt_s
     }
+
+    /// How motion and branches of unit gain answer.
+    #[must_use]
+    pub const fn response(&self) -> &Response<T, M, B> {
+        &self.response
+    }
+
+    /// Variance that each branch gathers around its law, relative to R₀, squared.
+    #[must_use]
+    pub const fn branch_variance(&self) -> &[T; B] {
+        &self.branch_variance
+    }
+
+    /// `exp(-dt/T_b) - 1` of the baseline.
+    #[must_use]
+    pub fn baseline_change(&self) -> T {
+        self.baseline_change
+    }
+
+    /// Variance that the baseline gathers, relative to R₀, squared.
+    #[must_use]
+    pub fn baseline_variance(&self) -> T {
+        self.baseline_variance
+    }
 }
 
 impl<T: Scalar, const M: usize, const B: usize, const N: usize> SwitchedModel<T, M, B, N> {

@@ -1,0 +1,76 @@
+use ohmstrain_model::Scalar;
+
+/// A reading compared with its prediction, without the logarithm that its density needs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Residual<T> {
+    /// Reading minus expected reading ν.
+    pub innovation: T,
+    /// Its variance S.
+    pub variance: T,
+}
+
+impl<T: Scalar> Residual<T> {
+    /// Normalised innovation squared ν²/S.
+    #[must_use]
+    pub fn nis(&self) -> T {
+        self.innovation * self.innovation / self.variance
+    }
+
+    /// Log density of the reading before it was seen, constant included.
+    #[must_use]
+    pub fn log_likelihood(&self) -> T {
+        T::of(-0.5) * (self.nis() + self.variance.ln() + T::two_pi().ln())
+    }
+}
+
+/// The log-likelihood of many readings with a logarithm now and then: variances are multiplied, and the logarithm of the
+/// product is taken before it leaves the range of `f32`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LogLikelihood<T> {
+    settled: T,
+    nis: T,
+    product: T,
+    readings: u32,
+}
+
+/// The product is kept between 10⁻¹⁶ and 10¹⁶: one more variance in that range cannot leave `f32`, which ends at 10±³⁸.
+const LARGEST: f64 = 1e16;
+
+impl<T: Scalar> LogLikelihood<T> {
+    /// Of no reading.
+    #[must_use]
+    pub fn new() -> Self {
+        Self { settled: T::zero(), nis: T::zero(), product: T::one(), readings: 0 }
+    }
+
+    /// One reading more.
+    #[inline]
+    pub fn add(&mut self, residual: &Residual<T>) {
+        self.nis += residual.nis();
+        self.product *= residual.variance;
+        self.readings += 1;
+        if !(self.product > T::of(1.0 / LARGEST) && self.product < T::of(LARGEST)) {
+            self.settle();
+        }
+    }
+
+    #[cold]
+    fn settle(&mut self) {
+        self.settled -= T::of(0.5) * self.product.ln();
+        self.product = T::one();
+    }
+
+    /// The sum of the log densities, constants included.
+    #[must_use]
+    pub fn value(&self) -> T {
+        // Counted in `f32` steps: exact up to 2²⁴ readings, and without double precision on a microcontroller.
+        let readings: T = nalgebra::convert(self.readings as f32);
+        self.settled - T::of(0.5) * (self.nis + self.product.ln() + readings * T::two_pi().ln())
+    }
+}
+
+impl<T: Scalar> Default for LogLikelihood<T> {
+    fn default() -> Self {
+        Self::new()
+    }
+}

@@ -1,0 +1,11 @@
+//! EKF of strain, rate and one branch at a fixed rate.
+#![no_std]
+#![no_main]
+
+use cortex_m_rt::entry;
+use ohmstrain_firmware::{Ekf3, frame};
+
+#[entry]
+fn main() -> ! {
+    frame::run::<Ekf3<f32>>()
+}

@@ -1,0 +1,11 @@
+//! EKF of strain, rate and one branch, the step prepared anew for every reading.
+#![no_std]
+#![no_main]
+
+use cortex_m_rt::entry;
+use ohmstrain_firmware::{VaryingEkf3, frame};
+
+#[entry]
+fn main() -> ! {
+    frame::run::<VaryingEkf3<f32>>()
+}

@@ -1,0 +1,11 @@
+//! EKF of strain, rate, three branches and baseline at a fixed rate.
+#![no_std]
+#![no_main]
+
+use cortex_m_rt::entry;
+use ohmstrain_firmware::{Ekf6, frame};
+
+#[entry]
+fn main() -> ! {
+    frame::run::<Ekf6<f32>>()
+}

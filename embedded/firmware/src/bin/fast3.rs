@@ -1,0 +1,11 @@
+//! EKF without the zeros, three states, at a fixed rate.
+#![no_std]
+#![no_main]
+
+use cortex_m_rt::entry;
+use ohmstrain_firmware::{Fast3, frame};
+
+#[entry]
+fn main() -> ! {
+    frame::run::<Fast3<f32>>()
+}

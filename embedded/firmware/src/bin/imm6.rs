@@ -1,0 +1,11 @@
+//! Interacting multiple models, six states each, at a fixed rate.
+#![no_std]
+#![no_main]
+
+use cortex_m_rt::entry;
+use ohmstrain_firmware::{Imm6, frame};
+
+#[entry]
+fn main() -> ! {
+    frame::run::<Imm6<f32>>()
+}

@@ -1,0 +1,15 @@
+//! Converter code → ohm → filter → strain, as a microcontroller runs it.
+//!
+//! The filters are generic over the scalar: `f32` on the target, `f64` on the host, where the reference comes from.
+//! Each program in `src/bin` runs one of them over the same recorded codes and reports what that cost.
+#![no_std]
+
+mod codes;
+mod filters;
+#[cfg(target_os = "none")]
+pub mod frame;
+mod sensors;
+
+pub use codes::CODES;
+pub use filters::{Ekf3, Ekf6, Fast3, Fast6, Filter, Imm6, PreparedEkf, SplitFour, VaryingEkf3};
+pub use sensors::{DT_S, REST_OHM, front_end, limits, sensor, to_reading};

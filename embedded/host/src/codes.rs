@@ -1,0 +1,69 @@
+//! Codes of a 12-bit converter in front of a simulated sensor that obeys the law the filters assume. How well a filter
+//! follows is not the question here, that it does the same everywhere is.
+
+use ohmstrain_firmware::{DT_S, REST_OHM, front_end, sensor};
+use ohmstrain_model::{ParameterError, Phase};
+
+/// Readings: six seconds.
+pub const READINGS: usize = 600;
+
+/// Seed of the converter's noise.
+pub const SEED: u64 = 20_240_611;
+
+/// Substeps of one reading for the law's differential equation.
+const SUBSTEPS: usize = 20;
+
+/// Rest, two cycles of 2 s to 20 % and back, a ramp to 15 % and a hold.
+fn strain(time_s: f64) -> f64 {
+    match time_s {
+        t if t < 0.5 => 0.0,
+        t if t < 4.5 => 0.1 - 0.1 * libm::cos(core::f64::consts::PI * (t - 0.5)),
+        t if t < 5.25 => 0.2 * (t - 4.5),
+        _ => 0.15,
+    }
+}
+
+/// The converter's codes.
+pub fn codes() -> Result<Vec<u16>, ParameterError> {
+    let model = sensor::<f64, 3, 6>()?;
+    let (law, divider, mut noise) = (model.law(), front_end::<f64>()?, Noise(SEED));
+    let h = DT_S / SUBSTEPS as f64;
+    let mut relaxation = [0.0; 3];
+    let mut codes = Vec::with_capacity(READINGS);
+    for k in 1..=READINGS {
+        let (mut phase, mut rate) = (Phase::Hold, 0.0);
+        for s in 0..SUBSTEPS {
+            let time_s = (k - 1) as f64 * DT_S + s as f64 * h;
+            let now = strain(time_s);
+            rate = (strain(time_s + h) - now) / h;
+            phase = if rate > 0.0 {
+                Phase::Extend
+            } else if rate < 0.0 {
+                Phase::Retract
+            } else {
+                Phase::Hold
+            };
+            for (i, c) in relaxation.iter_mut().enumerate() {
+                *c += h * (law.gain(i, now, phase).0 * rate - *c / law.branches[i].tau_s);
+            }
+        }
+        let rho = law.relative_change(strain(k as f64 * DT_S), rate, &relaxation, 0.0, phase);
+        let code = divider.code(REST_OHM * (1.0 + rho)) + noise.next();
+        codes.push(code.round().clamp(0.0, 4095.0) as u16);
+    }
+    Ok(codes)
+}
+
+/// Noise of one code: Knuth's MMIX generator, twelve uniform numbers summed, which is as good as normal here.
+struct Noise(u64);
+
+impl Noise {
+    fn next(&mut self) -> f64 {
+        let mut sum = -6.0;
+        for _ in 0..12 {
+            self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            sum += (self.0 >> 11) as f64 / (1_u64 << 53) as f64;
+        }
+        sum
+    }
+}

@@ -1,0 +1,46 @@
+#!/usr/bin/env bash
+# Builds the firmware, runs it in QEMU, compares with the f64 filters and with budgets.toml, writes README.md.
+#
+#   run.sh           fails also if README.md or the replayed codes are not what is generated
+#   run.sh --update  writes both instead
+#
+# Needs qemu-system-arm and binutils-arm-none-eabi (installed if missing and root).
+set -euo pipefail
+cd "$(dirname "$0")"
+
+readonly programs=(ekf3 ekf3_varying fast3 ekf6 fast6 imm6 split6)
+readonly images=target/images
+update=0
+[[ ${1:-} != --update ]] || update=1
+
+if ! command -v qemu-system-arm >/dev/null || ! command -v arm-none-eabi-nm >/dev/null; then
+    apt-get -q update >/dev/null
+    DEBIAN_FRONTEND=noninteractive apt-get -q install -y --no-install-recommends \
+        qemu-system-arm binutils-arm-none-eabi >/dev/null
+fi
+
+host() { cargo run --quiet --locked -p ohmstrain-embedded-host -- "$@"; }
+
+if ((update)); then host vectors .; else host vectors . --check; fi
+
+mkdir -p "$images"
+for profile in release small; do
+    BARE_METAL_TARGET_DIR=target/bare ../scripts/bare-metal.sh --profile "$profile" --locked \
+        -p ohmstrain-firmware --bins
+    for program in "${programs[@]}"; do
+        elf=target/bare/thumbv7em-none-eabihf/$profile/$program
+        stem=$images/$profile-$program
+        arm-none-eabi-nm -S "$elf" >"$stem.nm"
+        arm-none-eabi-objdump -d "$elf" >"$stem.dis"
+        arm-none-eabi-size -A "$elf" >"$stem.size"
+        timeout 60 qemu-system-arm -M mps2-an386 -icount shift=0 -nographic -monitor none -serial none \
+            -semihosting-config enable=on,target=native -kernel "$elf" </dev/null >"$stem.out"
+    done
+done
+
+before=$(cat README.md 2>/dev/null || true)
+host report . "$images"
+if ((!update)) && [[ $before != "$(cat README.md)" ]]; then
+    echo "README.md was out of date; it is written anew: commit it" >&2
+    exit 1
+fi

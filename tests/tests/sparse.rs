@@ -1,0 +1,132 @@
+//! The sparse path computes what the generic one computes.
+
+use nalgebra::SVector;
+use ohmstrain_ekf::{Belief, Compact, Ekf, LogLikelihood, Logistic, Reading, SparseEkf, StepError, Switch};
+use ohmstrain_model::{Scalar, SwitchedModel, Symmetric};
+use ohmstrain_tests::sensor;
+
+const DT_S: f64 = 0.01;
+
+/// A slow sine with a hold: rates that are clear, uncertain and none.
+fn reading(k: usize) -> f64 {
+    0.15 + 0.12 * (k as f64 * 0.01).sin().clamp(-0.8, 0.8)
+}
+
+/// Largest difference of a step from the generic one over 3000 steps, each from the same belief: of means in deviations, of
+/// covariances relative to their diagonals; and of the log-likelihood of all of them.
+fn differences<T: Scalar, const B: usize, const N: usize, const L: usize>() -> (f64, f64) {
+    let model: SwitchedModel<T, 2, B, N> = sensor();
+    let generic = Ekf::new(model);
+    let prepared = model.prepare(T::of(DT_S));
+    let sparse = SparseEkf::<T, Logistic, B, N>::new(model, T::of(DT_S)).unwrap();
+    let mut belief = Belief::<T, N, L>::initial(&model);
+    let (mut worst, mut sum) = (0.0_f64, 0.0);
+    let mut accumulated = LogLikelihood::new();
+    for k in 0..3000 {
+        let reading = (k % 7 != 3).then(|| Reading { value: T::of(reading(k)), extra_variance: T::of(1e-7) });
+        let step = generic.step_prepared(&belief, &prepared, reading).unwrap();
+        let mut fast = belief;
+        if let Some(residual) = sparse.step(&mut fast, reading).unwrap() {
+            accumulated.add(&residual);
+        }
+        let number = |x: T| x.to_subset().unwrap_or(f64::NAN);
+        sum += step.update.map_or(0.0, |update| number(update.log_likelihood));
+        for i in 0..N {
+            let sd_i = number(step.prior.covariance[(i, i)]).sqrt();
+            worst = worst.max(number(fast.mean[i] - step.posterior.mean[i]).abs() / sd_i);
+            for j in 0..=i {
+                let sd_j = number(step.prior.covariance[(j, j)]).sqrt();
+                let apart = number(fast.covariance[(i, j)] - step.posterior.covariance[(i, j)]).abs();
+                worst = worst.max(apart / (sd_i * sd_j));
+            }
+        }
+        belief = step.posterior;
+    }
+    (worst, (accumulated.value().to_subset().unwrap_or(f64::NAN) - sum).abs())
+}
+
+/// A step is some 30 operations deep, on quantities up to S/R ≈ 100 times larger than what is left: 3000 ε of f64.
+#[test]
+fn agrees_with_the_generic_path_to_rounding() {
+    for (difference, likelihood) in [
+        differences::<f64, 0, 2, 3>(),
+        differences::<f64, 1, 3, 6>(),
+        differences::<f64, 1, 4, 10>(),
+        differences::<f64, 2, 4, 10>(),
+        differences::<f64, 3, 5, 15>(),
+        differences::<f64, 3, 6, 21>(),
+    ] {
+        assert!(difference < 3000.0 * f64::EPSILON, "{difference:e}");
+        // 3000 sums of some units each.
+        assert!(likelihood < 1e4 * 3000.0 * f64::EPSILON, "{likelihood:e}");
+    }
+    let (difference, _) = differences::<f32, 3, 6, 21>();
+    assert!(difference < 3000.0 * f64::from(f32::EPSILON), "{difference:e}");
+}
+
+/// Simpson's rule over the density that the split stands for.
+#[test]
+fn the_compact_split_integrates_its_density() {
+    let density = |u: f64| 35.0 / 96.0 * (1.0 - u * u / 9.0).max(0.0).powi(3);
+    let integral = |f: &dyn Fn(f64) -> f64, from: f64, to: f64| {
+        let (n, h) = (2000, (to - from) / 2000.0);
+        let inner: f64 = (1..n).map(|k| f(from + k as f64 * h) * if k % 2 == 1 { 4.0 } else { 2.0 }).sum();
+        (f(from) + f(to) + inner) * h / 3.0
+    };
+    for rate in [-2.9, -1.0, -0.2, 0.0, 0.7, 2.0, 2.99_f64] {
+        let sd = 0.5;
+        let split = Compact::blend(rate * sd, sd);
+        let probability = integral(&density, -3.0, rate);
+        let mean = integral(&|u| (rate - u) * density(u), -3.0, rate);
+        // Simpson's error with h = 3e-3 on a polynomial of degree 7: below 1e-10.
+        assert!((split.extend_probability - probability).abs() < 1e-10, "{rate}");
+        assert!((split.extend - sd * mean).abs() < 1e-10, "{rate}");
+        assert!((split.extend + split.retract - sd * rate).abs() < 1e-15, "{rate}");
+        assert!((split.extend_probability + split.retract_probability - 1.0).abs() < 1e-15, "{rate}");
+    }
+    // The figure in its documentation, against the normal distribution itself.
+    let normal = |u: f64| (-0.5 * u * u).exp() / (2.0 * std::f64::consts::PI).sqrt();
+    let off = (-400..=400)
+        .map(|k| f64::from(k) * 0.01)
+        .map(|u| (integral(&density, -3.0, u.clamp(-3.0, 3.0)) - integral(&normal, -8.0, u)).abs())
+        .fold(0.0, f64::max);
+    assert!((off - 0.0164).abs() < 5e-5, "{off}");
+}
+
+/// Without Joseph's form: 100,000 steps in `f32`, exact readings, still a covariance.
+#[test]
+fn stays_a_covariance_in_single_precision() {
+    let model: SwitchedModel<f32, 2, 3, 6> = sensor();
+    let ekf = SparseEkf::<f32, Compact, 3, 6>::new(model, DT_S as f32).unwrap();
+    let mut belief = Belief::<f32, 6, 21>::initial(&model);
+    let mut least = f64::INFINITY;
+    for k in 0..100_000 {
+        ekf.step(&mut belief, Some(Reading::from(reading(k) as f32))).unwrap();
+        let sd: [f64; 6] = std::array::from_fn(|i| f64::from(belief.covariance[(i, i)]).sqrt());
+        let correlation =
+            nalgebra::SMatrix::<f64, 6, 6>::from_fn(|i, j| f64::from(belief.covariance[(i, j)]) / (sd[i] * sd[j]));
+        least = least.min(correlation.symmetric_eigenvalues().min());
+    }
+    // An eigenvalue of a 6 × 6 correlation matrix is uncertain by 6 ε; twice that for one step's rounding.
+    assert!(least > -12.0 * f64::from(f32::EPSILON), "{least:e}");
+}
+
+#[test]
+fn an_error_leaves_the_belief() {
+    let model: SwitchedModel<f64, 2, 1, 3> = sensor();
+    let ekf = SparseEkf::<f64, Compact, 1, 3>::new(model, DT_S).unwrap();
+    let start = Belief::<f64, 3, 6>::initial(&model);
+    let mut belief = start;
+    let refused = |belief: &mut Belief<f64, 3, 6>, value, extra_variance| {
+        ekf.step(belief, Some(Reading { value, extra_variance })).unwrap_err()
+    };
+    assert_eq!(refused(&mut belief, f64::NAN, 0.0), StepError::NonFiniteReading);
+    assert_eq!(refused(&mut belief, f64::INFINITY, 0.0), StepError::NonFiniteReading);
+    assert_eq!(refused(&mut belief, 0.1, f64::NAN), StepError::NonFiniteReading);
+    assert_eq!(refused(&mut belief, 0.1, -1e3), StepError::NonPositiveInnovationVariance);
+    assert_eq!(belief, start);
+    let mut lost = Belief { mean: SVector::from([f64::NAN, 0.0, 0.0]), covariance: Symmetric::zeros() };
+    assert_eq!(refused(&mut lost, 0.1, 0.0), StepError::NonFiniteState);
+    assert!(SparseEkf::<f64, Compact, 1, 3>::new(model, 0.0).is_err());
+    assert!(SparseEkf::<f64, Compact, 1, 3>::new(model, f64::NAN).is_err());
+}
