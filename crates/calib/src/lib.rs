@@ -23,6 +23,7 @@ mod law_regression;
 mod law_structure;
 mod law_uncertainty;
 mod left_out;
+pub mod likelihood;
 mod motion_stats;
 mod noise_fit;
 mod optimise;
