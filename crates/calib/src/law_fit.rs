@@ -132,6 +132,18 @@ fn cross_fit(
     })
 }
 
+/// One structure with the least ridge.
+pub(crate) fn fit_structure(
+    regression: &LawRegression,
+    options: LawOptions,
+) -> Result<(LawStructure, LawFit), CalibrationError> {
+    let ridge = RIDGES[RIDGES.len() - 1];
+    let ln_taus = TauGrid::new(regression, options.branches).best(ridge)?;
+    let structure = polish(regression, options.gauge, &ln_taus, ridge)?;
+    let fit = structure.fit(regression, None)?;
+    Ok((structure, fit))
+}
+
 /// A cubic gauge with branches of all time constants of a grid, ready to be fitted with any few of them.
 struct TauGrid {
     ln_taus: Vec<f64>,

@@ -9,19 +9,24 @@
 //! - Deterministic: the same samples give the same parameters. Nothing is random, no clock is read.
 //! - A calibration that cannot be made is a [`CalibrationError`]; nothing panics on recorded data.
 
+mod advice;
 mod baseline;
 mod blocks;
+mod bootstrap;
 mod calibrate;
 pub mod closed_form;
 mod design;
 mod error;
 mod estimator_params;
 mod filter;
+mod identifiability;
 mod law_fit;
 mod law_params;
 mod law_regression;
 mod law_structure;
+mod law_structures;
 mod law_uncertainty;
+mod least_squares;
 mod left_out;
 pub mod likelihood;
 mod motion_stats;
@@ -34,12 +39,15 @@ mod scores;
 mod sd_scale;
 
 pub use baseline::StaticCubic;
+pub use bootstrap::{Bootstrap, bootstrap_law};
 pub use calibrate::{Calibration, Stage, calibrate};
 pub use error::CalibrationError;
 pub use estimator_params::{EstimatorKind, EstimatorParams, MotionParams, NoiseParams, PhaseParams};
 pub use filter::{Filter, Output, Start, build_filter};
+pub use identifiability::{Identifiability, OnBound, identifiability};
 pub use law_fit::{CrossFit, GaugeFamily, LawFit, LawOptions, fit_law};
 pub use law_params::{BranchParams, GaugeParams, LawParams};
+pub use law_structures::{StructureScore, compare_structures};
 pub use params::{
     FORMAT, JointParams, Quantity, RangeParams, ReadingUnit, RecordingInfo, SensorParams, Uncertainty, Validity,
 };

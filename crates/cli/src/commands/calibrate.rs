@@ -4,7 +4,7 @@ use ohmstrain_calib::{
     EstimatorKind, FORMAT, LawOptions, Quantity, ReadingUnit, RecordingInfo, Samples, SensorParams, calibrate,
 };
 
-use super::scoring;
+use super::{explain, scoring};
 use crate::args::CalibrateArgs;
 use crate::error::CliError;
 use crate::input::{self, Recording, unit};
@@ -40,7 +40,8 @@ pub fn run(args: &CalibrateArgs) -> Result<(), CliError> {
     if let Some(path) = &args.report {
         write_report(path, &recordings[0], &params, None)?;
     }
-    sensor_file::write(&args.output, &params)
+    sensor_file::write(&args.output, &params)?;
+    explain::print(args, &recordings, &params.law)
 }
 
 /// Estimators to choose from unless one is asked for: the small one, and the one for whatever moves.
