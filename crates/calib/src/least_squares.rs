@@ -30,11 +30,9 @@ pub(crate) fn settle(
 ) -> Result<LawStructure, CalibrationError> {
     keep_within_bounds(&mut structure, regression);
     for _ in 0..MOST_STEPS {
-        let fit = Linearised::new(&structure, regression)?;
+        let mut fit = Linearised::new(&structure, regression)?;
         let error = regression.in_readings(&fit.residual, fit.rest_readings()).norm_squared();
-        let factor = Cholesky::new(fit.normal()).ok_or(CalibrationError::Singular)?;
-        let all = factor.solve(&fit.jacobian.tr_mul(&fit.residual));
-        let step: Vec<f64> = all.iter().skip(all.len() - structure.nonlinear.len()).copied().collect();
+        let step = step(&mut fit, &structure, regression)?;
         let Some(next) = descend(&structure, regression, &step, error) else { break };
         let moved = |(a, b): (&f64, &f64)| (a - b).abs();
         let change = structure.nonlinear.iter().zip(&next.nonlinear).map(moved).fold(0.0, f64::max);
@@ -45,6 +43,27 @@ pub(crate) fn settle(
     }
     structure.sort_branches();
     Ok(structure)
+}
+
+/// Gauss-Newton's step of the nonlinear parameters. A time constant that presses against a bound is left out: the step of
+/// the others counts on it to move.
+fn step(
+    fit: &mut Linearised,
+    structure: &LawStructure,
+    regression: &LawRegression,
+) -> Result<Vec<f64>, CalibrationError> {
+    loop {
+        let factor = Cholesky::new(fit.normal()).ok_or(CalibrationError::Singular)?;
+        let all = factor.solve(&fit.jacobian.tr_mul(&fit.residual));
+        let first = all.len() - structure.nonlinear.len();
+        let step: Vec<f64> = all.iter().skip(first).copied().collect();
+        let mut moved = structure.clone();
+        moved.nonlinear.iter_mut().zip(&step).for_each(|(x, step)| *x += step);
+        keep_within_bounds(&mut moved, regression);
+        let pressed = |j: &usize| step[*j] != 0.0 && moved.nonlinear[*j] == structure.nonlinear[*j];
+        let Some(j) = (0..structure.taus).find(pressed) else { return Ok(step) };
+        fit.jacobian.column_mut(first + j).fill(0.0);
+    }
 }
 
 /// The longest halved step that lowers the squared error.

@@ -193,3 +193,21 @@ fn the_bootstrap_repeats_with_its_seed_and_agrees_with_the_jackknife() {
         assert!((0.5..=1.75).contains(&width), "{name}: {width}");
     }
 }
+
+#[test]
+fn a_time_constant_on_its_bound_does_not_hold_up_the_other() {
+    let mut slow = law(4.0);
+    slow.branches.push(BranchParams { tau_s: 400.0, ..slow.branches[0] });
+    // A quarter of the recording is less than 400 s, so the second time constant ends on its bound.
+    let bench = wandering();
+    let from = |tau_s: f64| {
+        let mut start = slow.clone();
+        start.branches[0].tau_s = tau_s;
+        identifiability(&[bench.samples()], &start).unwrap()
+    };
+    let (near, far) = (from(4.0), from(9.0));
+    let tau = near.parameters.names.iter().position(|name| name == "branches[0].tau_s").unwrap();
+    let (value, error) = (near.parameters.values[tau], near.parameters.standard_errors[tau]);
+    // The same minimum from both starts, to a small part of its standard error.
+    assert!((value - far.parameters.values[tau]).abs() < 0.05 * error, "{near}{far}");
+}
