@@ -77,7 +77,7 @@ const DEFAULT_GAUGE: GaugeFamily = GaugeFamily::Polynomial;
 const DEFAULT_PLAYS: usize = 0;
 /// Half-widths of plays, in spans of the strain: small loops, loops of a usual turn-around, and nearly the whole span. The
 /// weights are fitted, so that it matters little where between them a loop of the sensor lies.
-const HALF_WIDTHS: [f64; 3] = [0.05, 0.15, 0.35];
+pub(crate) const HALF_WIDTHS: [f64; 3] = [0.05, 0.15, 0.35];
 /// Most branches.
 pub(crate) const MOST_BRANCHES: usize = 4;
 /// Time constants tried.
@@ -150,6 +150,19 @@ fn cross_fit(
         uncertainty: law_uncertainty(&structure, regression)?,
         blocks: regression.block_rows(),
     })
+}
+
+/// One structure with the least ridge.
+pub(crate) fn fit_structure(
+    regression: &LawRegression,
+    options: LawOptions,
+) -> Result<(LawStructure, LawFit), CalibrationError> {
+    let ridge = RIDGES[RIDGES.len() - 1];
+    let plays = half_widths(options)?;
+    let ln_taus = TauGrid::new(regression, options.branches, plays).best(ridge)?;
+    let structure = polish(regression, options.gauge, &ln_taus, plays, ridge)?;
+    let fit = structure.fit(regression, None)?;
+    Ok((structure, fit))
 }
 
 /// A cubic gauge with branches of all time constants of a grid, ready to be fitted with any few of them.

@@ -38,6 +38,14 @@ pub(crate) struct Design {
     pub offset: DVector<f64>,
 }
 
+impl Design {
+    /// What the design makes of these weights.
+    pub(crate) fn fitted(&self, weights: &DVector<f64>) -> DVector<f64> {
+        let weighted = self.columns.iter().zip(weights.iter());
+        weighted.fold(self.offset.clone(), |sum, (column, weight)| sum + column * *weight)
+    }
+}
+
 /// Weights of a fitted design, and R₀ of each recording.
 pub(crate) struct Solution {
     pub weights: DVector<f64>,
@@ -123,6 +131,16 @@ impl LawRegression {
             let rest = rests.next().copied().unwrap_or(1.0);
             DVector::from_iterator(recording.reading.len(), recording.reading.iter().map(|r| r / rest))
         })
+    }
+
+    /// Values relative to the R₀ of each recording, back in units of its median reading.
+    pub(crate) fn in_readings(&self, relative: &DVector<f64>, rest_readings: &[f64]) -> DVector<f64> {
+        let mut rests = rest_readings.iter();
+        let scale = self.column(|recording| {
+            let share = rests.next().copied().unwrap_or(1.0) / recording.median_reading();
+            DVector::from_element(recording.reading.len(), share)
+        });
+        relative.component_mul(&scale)
     }
 
     /// Normal equations of a design.

@@ -2,7 +2,7 @@ use nalgebra::DVector;
 
 use crate::CalibrationError;
 use crate::design::{BRANCH_COLUMNS, StrainScale};
-use crate::law_fit::{GaugeFamily, LawFit};
+use crate::law_fit::{GaugeFamily, HALF_WIDTHS, LawFit};
 use crate::law_params::{BranchParams, GaugeParams, LawParams, PlayParams};
 use crate::law_regression::{Design, LawRegression};
 
@@ -22,6 +22,24 @@ pub(crate) struct LawStructure {
 }
 
 impl LawStructure {
+    /// The structure of a fitted law.
+    pub(crate) fn of_law(law: &LawParams, span: f64, ridge: f64) -> Self {
+        let mut nonlinear: Vec<f64> = law.branches.iter().map(|branch| branch.tau_s.ln()).collect();
+        let family = match law.gauge {
+            GaugeParams::Polynomial { .. } => GaugeFamily::Polynomial,
+            GaugeParams::DecayingExponential { decay_strain, .. } => {
+                nonlinear.push((decay_strain / span).ln());
+                GaugeFamily::DecayingExponential
+            }
+            GaugeParams::Tunnelling { gap, barrier, path_loss } => {
+                nonlinear.extend([(1.0 + gap * span).ln(), barrier * span, path_loss * span * span]);
+                GaugeFamily::Tunnelling
+            }
+        };
+        let plays: &[f64] = if law.plays.is_empty() { &[] } else { &HALF_WIDTHS };
+        Self { family, taus: law.branches.len(), nonlinear, plays, ridge }
+    }
+
     /// Constant, one more constant per further recording, gauge, dash-pots, plays, branches.
     pub(crate) fn design(&self, regression: &LawRegression) -> Design {
         let mut columns: Vec<DVector<f64>> =
@@ -61,12 +79,7 @@ impl LawStructure {
                 return Err(CalibrationError::RestResistance { value: share });
             }
         }
-        let fitted: DVector<f64> = design
-            .columns
-            .iter()
-            .zip(solution.weights.iter())
-            .fold(design.offset.clone(), |sum, (column, weight)| sum + column * *weight);
-        let residual = regression.response(&solution.rest_readings) - fitted;
+        let residual = regression.response(&solution.rest_readings) - design.fitted(&solution.weights);
         Ok(LawFit {
             law: self.law(regression, solution.weights.as_slice()),
             rest_readings: solution.rest_readings,

@@ -9,8 +9,10 @@
 //! - Deterministic: the same samples give the same parameters. Nothing is random, no clock is read.
 //! - A calibration that cannot be made is a [`CalibrationError`]; nothing panics on recorded data.
 
+mod advice;
 mod baselines;
 mod blocks;
+mod bootstrap;
 mod calibrate;
 pub mod closed_form;
 mod design;
@@ -18,13 +20,17 @@ mod ensemble;
 mod error;
 mod estimator_params;
 mod filter;
+mod identifiability;
 mod lag;
 mod law_fit;
 mod law_params;
 mod law_regression;
 mod law_structure;
+mod law_structures;
 mod law_uncertainty;
+mod least_squares;
 mod left_out;
+pub mod likelihood;
 mod low_pass;
 mod motion_stats;
 mod noise_fit;
@@ -36,14 +42,17 @@ mod scores;
 mod sd_scale;
 
 pub use baselines::{Baseline, Baselines, Features, Fir, LeakyBank, LowPassMode, Regression, StaticCubic};
+pub use bootstrap::{Bootstrap, bootstrap_law};
 pub use calibrate::{Calibration, Stage, calibrate};
 pub use ensemble::EnsembleParams;
 pub use error::CalibrationError;
 pub use estimator_params::{EstimatorKind, EstimatorParams, MotionParams, NoiseParams, PhaseParams};
 pub use filter::{Filter, Output, Start, build_filter};
+pub use identifiability::{Identifiability, OnBound, identifiability};
 pub use lag::reference_lag;
 pub use law_fit::{CrossFit, GaugeFamily, LawFit, LawOptions, fit_law};
 pub use law_params::{BranchParams, GaugeParams, LawParams, PlayParams};
+pub use law_structures::{StructureScore, compare_structures};
 pub use params::{
     FORMAT, JointParams, Quantity, RangeParams, ReadingUnit, RecordingInfo, SensorParams, Uncertainty, Validity,
 };

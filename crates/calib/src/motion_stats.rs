@@ -17,6 +17,10 @@ pub(crate) struct MotionStats {
     pub reversal: f64,
     /// Median speed of movements.
     pub speed: f64,
+    /// Speeds that a quarter of the moving rows is below, and above.
+    pub quartile_speeds: (f64, f64),
+    /// Longest hold, s; zero for a body that never rests.
+    pub longest_hold_s: f64,
     /// 99th percentile of the speed.
     pub fastest_rate: f64,
     pub longest_s: f64,
@@ -55,7 +59,9 @@ impl MotionStats {
             hold_s: (!phases.holds.is_empty()).then(|| mean(&phases.holds)),
             move_s: if phases.moves.is_empty() { longest_s } else { mean(&phases.moves) },
             reversal: phases.reversal(),
-            speed: phases.median_speed(),
+            speed: phases.speed_at(1, 2),
+            quartile_speeds: (phases.speed_at(1, 4), phases.speed_at(3, 4)),
+            longest_hold_s: phases.holds.iter().copied().fold(0.0, f64::max),
             fastest_rate: speeds[(speeds.len() - 1) * 99 / 100],
             longest_s,
         }
@@ -100,10 +106,11 @@ impl PhaseDurations {
         (1.0 - self.holds.len() as f64 / self.moves.len().max(1) as f64).clamp(0.05, 0.95)
     }
 
-    fn median_speed(&self) -> f64 {
+    /// The speed that `share / of` of the moving rows are below.
+    fn speed_at(&self, share: usize, of: usize) -> f64 {
         let mut speeds = self.speeds.clone();
         speeds.sort_by(f64::total_cmp);
-        speeds.get(speeds.len() / 2).copied().unwrap_or(0.0)
+        speeds.get(speeds.len() * share / of).copied().unwrap_or(0.0)
     }
 }
 

@@ -163,6 +163,22 @@ pub struct Uncertainty {
     pub covariance: Vec<Vec<f64>>,
 }
 
+impl Uncertainty {
+    /// Correlations of the parameters, row by row; zero where a parameter has no variance.
+    #[must_use]
+    pub fn correlation(&self) -> Vec<Vec<f64>> {
+        let errors = &self.standard_errors;
+        let entry = |i: usize, j: usize| {
+            if i == j {
+                return 1.0;
+            }
+            let scale = errors[i] * errors[j];
+            if scale > 0.0 { self.covariance[i][j] / scale } else { 0.0 }
+        };
+        (0..errors.len()).map(|i| (0..errors.len()).map(|j| entry(i, j)).collect()).collect()
+    }
+}
+
 impl SensorParams {
     /// The parameters of an estimator.
     ///

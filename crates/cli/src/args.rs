@@ -138,9 +138,15 @@ pub struct CalibrateArgs {
     /// sign-split or hypotheses; ekf is calibrated in any case
     #[arg(long, default_value = "auto")]
     pub estimator: Auto<Estimator>,
-    /// Accepted for scripts; the calibration is deterministic and draws nothing
+    /// Seed of --bootstrap; the calibration itself draws nothing
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
+    /// Print what the recordings say about the law's parameters, which structures explain them, and what to record next
+    #[arg(long)]
+    pub explain: bool,
+    /// Print 95 % intervals of the law's parameters from N fits to blocks of the recordings drawn anew
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=100_000))]
+    pub bootstrap: Option<u32>,
     /// Also write a report of the first recording
     #[arg(long, value_name = "report.html")]
     pub report: Option<PathBuf>,

@@ -4,7 +4,7 @@ use ohmstrain_calib::{
     EstimatorKind, FORMAT, LawOptions, Quantity, ReadingUnit, RecordingInfo, Samples, SensorParams, calibrate,
 };
 
-use super::scoring;
+use super::{explain, scoring};
 use crate::args::CalibrateArgs;
 use crate::error::CliError;
 use crate::input::{self, Recording, unit};
@@ -43,7 +43,8 @@ pub fn run(args: &CalibrateArgs) -> Result<(), CliError> {
     if let Some(path) = &args.report {
         write_report(path, &recordings[0], &params, None)?;
     }
-    sensor_file::write(&args.output, &params)
+    sensor_file::write(&args.output, &params)?;
+    explain::print(args, &recordings, &params.law)
 }
 
 /// The parameters of the sensor behind `recordings`, with `estimator`, or else the ensemble, as the default.

@@ -3,6 +3,7 @@
 mod calibrate;
 mod demo;
 mod evaluate;
+mod explain;
 mod filter;
 mod fit_law;
 mod score_table;

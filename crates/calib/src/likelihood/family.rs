@@ -1,0 +1,38 @@
+use ohmstrain_ekf::{Channel, DiffuseBelief, Dynamics};
+use ohmstrain_model::{ParameterError, Scalar};
+
+/// Models that differ in a few positive parameters. `L = N (N + 1) / 2`.
+pub trait ModelFamily<const N: usize, const L: usize> {
+    /// A model with numbers of type `T`; `Unscented` models make the likelihood the one of the unscented filter.
+    type Model<T: Scalar>: Dynamics<T, N, L> + Channel<T, N, L>;
+
+    /// The model with these parameters, on their natural scale.
+    ///
+    /// # Errors
+    /// Names the parameter that no model can have.
+    fn model<T: Scalar>(&self, parameters: &[T]) -> Result<Self::Model<T>, ParameterError>;
+
+    /// What is known before the first reading, which is an update without a prediction.
+    fn start<T: Scalar>(&self, model: &Self::Model<T>) -> DiffuseBelief<T, N, L>;
+}
+
+/// A parameter to be found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Parameter {
+    /// Its name.
+    pub name: &'static str,
+    /// Where the search starts, in the parameter's unit.
+    pub start: f64,
+    /// Smallest value allowed, positive.
+    pub lower: f64,
+    /// Largest value allowed.
+    pub upper: f64,
+}
+
+impl Parameter {
+    /// A parameter that may be a million times smaller or larger than where the search starts.
+    #[must_use]
+    pub const fn around(name: &'static str, start: f64) -> Self {
+        Self { name, start, lower: start * 1e-6, upper: start * 1e6 }
+    }
+}

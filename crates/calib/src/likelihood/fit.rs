@@ -1,0 +1,163 @@
+use nalgebra::DMatrix;
+
+use super::derivatives::derivatives;
+use super::log_likelihood::log_likelihood;
+use super::newton::{Objective, Optimum, covariance, maximise};
+use super::{Derivatives, LogLikelihood, ModelFamily, Parameter, Readings};
+use crate::CalibrationError;
+
+/// The likelihood of recordings under a family of models. `L = N (N + 1) / 2`.
+#[derive(Clone, Copy, Debug)]
+pub struct Likelihood<'a, F, const N: usize, const L: usize> {
+    /// The models.
+    pub family: &'a F,
+    /// Their parameters, in the order in which the family takes them.
+    pub parameters: &'a [Parameter],
+    /// Recordings; each starts anew.
+    pub recordings: &'a [Readings<'a>],
+}
+
+/// A bound of a parameter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Bound {
+    /// The smallest value allowed.
+    Lower,
+    /// The largest value allowed.
+    Upper,
+}
+
+impl Bound {
+    /// `lower` or `upper`.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Lower => "lower",
+            Self::Upper => "upper",
+        }
+    }
+}
+
+/// A parameter at the maximum of the likelihood.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FittedParameter {
+    /// Its name.
+    pub name: &'static str,
+    /// Its value.
+    pub value: f64,
+    /// Standard error of its logarithm, from the Hessian; `None` on a bound and where the likelihood is no maximum.
+    pub ln_standard_error: Option<f64>,
+    /// Standard error on its natural scale. At the maximum the gradient is zero, so the Hessian on that scale gives the
+    /// same.
+    pub standard_error: Option<f64>,
+    /// The bound on which it ended. The likelihood would go on rising beyond.
+    pub bound: Option<Bound>,
+}
+
+/// The maximum of a likelihood.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LikelihoodFit {
+    /// The parameters, in the family's order.
+    pub parameters: Vec<FittedParameter>,
+    /// The log-likelihood there.
+    pub log_likelihood: LogLikelihood<f64>,
+    /// Euclidean norm of the gradient with respect to the logarithms of the parameters that are not on a bound.
+    pub gradient_norm: f64,
+    /// Covariance of the logarithms of the parameters, zero in rows and columns of those on a bound; `None` where the
+    /// likelihood is no maximum.
+    pub ln_covariance: Option<DMatrix<f64>>,
+    /// Steps tried.
+    pub iterations: usize,
+    /// Whether the last step was shorter than 1e-8 standard errors, at a maximum.
+    pub converged: bool,
+}
+
+impl<F: ModelFamily<N, L>, const N: usize, const L: usize> Likelihood<'_, F, N, L> {
+    /// The log-likelihood at `values`, on the parameters' natural scale.
+    ///
+    /// # Errors
+    /// A parameter that no model can have, or the time at which the filter fails.
+    pub fn log_likelihood(&self, values: &[f64]) -> Result<LogLikelihood<f64>, CalibrationError> {
+        log_likelihood(self.family, values, self.recordings)
+    }
+
+    /// The same with exact derivatives with respect to the logarithms.
+    ///
+    /// # Errors
+    /// As [`Self::log_likelihood`], or a value that is not positive, or a derivative that does not exist.
+    pub fn derivatives(&self, values: &[f64]) -> Result<Derivatives, CalibrationError> {
+        let ln: Vec<f64> = values.iter().map(|value| value.ln()).collect();
+        derivatives(self.family, &ln, self.recordings)
+    }
+
+    /// The parameters that make the readings most likely.
+    ///
+    /// # Errors
+    /// A start that is not within positive bounds, or at which the filter fails.
+    pub fn fit(&self) -> Result<LikelihoodFit, CalibrationError> {
+        for Parameter { name, start, lower, upper } in self.parameters {
+            if !(0.0 < *lower && lower <= start && start <= upper && upper.is_finite()) {
+                let message = format!("{name} starts at {start}, which is not within positive bounds");
+                return Err(CalibrationError::Unsupported(message));
+            }
+        }
+        let start: Vec<f64> = self.parameters.iter().map(|parameter| parameter.start.ln()).collect();
+        Ok(self.report(&self.maximise(&start, None)?))
+    }
+
+    /// The maximum over all parameters but the one that is held where it starts. Logarithms.
+    pub(super) fn maximise(&self, start: &[f64], held: Option<usize>) -> Result<Optimum, CalibrationError> {
+        maximise(self, start, &self.ln_bounds(), held)
+    }
+
+    pub(super) fn ln_bounds(&self) -> Vec<(f64, f64)> {
+        self.parameters.iter().map(|parameter| (parameter.lower.ln(), parameter.upper.ln())).collect()
+    }
+
+    fn report(&self, optimum: &Optimum) -> LikelihoodFit {
+        let size = self.parameters.len();
+        let free = &optimum.free;
+        let ln_covariance = covariance(optimum).map(|small| {
+            let mut full = DMatrix::zeros(size, size);
+            for (a, &i) in free.iter().enumerate() {
+                for (b, &j) in free.iter().enumerate() {
+                    full[(i, j)] = small[(a, b)];
+                }
+            }
+            full
+        });
+        let fitted = |(i, parameter): (usize, &Parameter)| {
+            let value = optimum.point[i].exp();
+            let is_free = free.contains(&i);
+            let middle = 0.5 * (parameter.lower.ln() + parameter.upper.ln());
+            let nearest = if optimum.point[i] < middle { Bound::Lower } else { Bound::Upper };
+            let variance = ln_covariance.as_ref().filter(|_| is_free).map(|covariance| covariance[(i, i)]);
+            let ln_standard_error = variance.map(f64::sqrt);
+            FittedParameter {
+                name: parameter.name,
+                value,
+                ln_standard_error,
+                standard_error: ln_standard_error.map(|error| error * value),
+                bound: (!is_free).then_some(nearest),
+            }
+        };
+        LikelihoodFit {
+            parameters: self.parameters.iter().enumerate().map(fitted).collect(),
+            log_likelihood: optimum.derivatives.log_likelihood,
+            gradient_norm: free.iter().map(|&i| optimum.derivatives.gradient[i].powi(2)).sum::<f64>().sqrt(),
+            ln_covariance,
+            iterations: optimum.iterations,
+            converged: optimum.converged,
+        }
+    }
+}
+
+impl<F: ModelFamily<N, L>, const N: usize, const L: usize> Objective for Likelihood<'_, F, N, L> {
+    fn value(&self, at: &[f64]) -> f64 {
+        let values: Vec<f64> = at.iter().map(|ln| ln.exp()).collect();
+        self.log_likelihood(&values).map_or(f64::NAN, |log_likelihood| log_likelihood.value)
+    }
+
+    fn derivatives(&self, at: &[f64]) -> Result<Derivatives, CalibrationError> {
+        derivatives(self.family, at, self.recordings)
+    }
+}

@@ -1,0 +1,114 @@
+use std::collections::HashMap;
+
+use ohmstrain_ekf::{Channel, DiffuseBelief, DiffuseEkf, Dynamics, Ekf, Reading, StepError};
+use ohmstrain_model::Scalar;
+
+use super::ModelFamily;
+use crate::CalibrationError;
+
+/// Readings without a reference. The shorter slice counts.
+#[derive(Clone, Copy, Debug)]
+pub struct Readings<'a> {
+    /// Times, s, not decreasing.
+    pub time_s: &'a [f64],
+    /// Readings in the channel's unit; NaN where missing.
+    pub value: &'a [f64],
+}
+
+/// Log density of readings under a model.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LogLikelihood<T> {
+    /// Every constant counted.
+    pub value: T,
+    /// Without ½ ln 2π for readings that fixed an unknown direction of the start, as the R package KFAS counts.
+    pub without_constant: T,
+    /// Readings that were not missing.
+    pub readings: usize,
+}
+
+/// The log-likelihood of recordings that start anew each. Parameters are on their natural scale.
+pub(super) fn log_likelihood<T, F, const N: usize, const L: usize>(
+    family: &F,
+    parameters: &[T],
+    recordings: &[Readings],
+) -> Result<LogLikelihood<T>, CalibrationError>
+where
+    T: Scalar,
+    F: ModelFamily<N, L>,
+{
+    let model = family.model(parameters)?;
+    let start = family.start(&model);
+    let mut run = Run {
+        start: DiffuseEkf::new(model),
+        onward: Ekf::new(family.model(parameters)?),
+        prepared: HashMap::new(),
+        sum: LogLikelihood { value: T::zero(), without_constant: T::zero(), readings: 0 },
+    };
+    for recording in recordings {
+        let mut belief = start;
+        let mut previous_s = None;
+        for (&time_s, &value) in recording.time_s.iter().zip(recording.value) {
+            let dt_s = previous_s.map_or(0.0, |previous_s| time_s - previous_s);
+            let reading = (!value.is_nan()).then(|| Reading::from(T::of(value)));
+            belief = run.step(&belief, dt_s, reading).map_err(|error| CalibrationError::Filter { time_s, error })?;
+            previous_s = Some(time_s);
+        }
+    }
+    Ok(run.sum)
+}
+
+/// A filter on its way through recordings.
+struct Run<M, P, T> {
+    start: DiffuseEkf<M>,
+    onward: Ekf<M>,
+    /// Prepared steps by their length in nanoseconds: differences of decimal times repeat to rounding only.
+    prepared: HashMap<u64, P>,
+    sum: LogLikelihood<T>,
+}
+
+/// A recording whose steps never repeat must not fill the memory.
+const MOST_PREPARED: usize = 4096;
+
+impl<M, T: Scalar, P: Copy> Run<M, P, T> {
+    fn step<const N: usize, const L: usize>(
+        &mut self,
+        belief: &DiffuseBelief<T, N, L>,
+        dt_s: f64,
+        reading: Option<Reading<T>>,
+    ) -> Result<DiffuseBelief<T, N, L>, StepError>
+    where
+        M: Dynamics<T, N, L, Prepared = P> + Channel<T, N, L>,
+    {
+        let (posterior, value, without_constant) = match belief.settled() {
+            Some(known) if dt_s > 0.0 && dt_s.is_finite() => {
+                let prepared = self.prepare(dt_s);
+                let step = self.onward.step_prepared(&known, &prepared, reading)?;
+                let value = step.update.map(|update| update.log_likelihood);
+                (DiffuseBelief::from(step.posterior), value, value)
+            }
+            _ => {
+                let step = self.start.step(belief, T::of(dt_s), reading)?;
+                let value = step.update.map(|update| update.log_likelihood());
+                (step.posterior, value, step.update.map(|update| update.log_likelihood_without_constant()))
+            }
+        };
+        if let (Some(value), Some(without_constant)) = (value, without_constant) {
+            self.sum.value += value;
+            self.sum.without_constant += without_constant;
+            self.sum.readings += 1;
+        }
+        Ok(posterior)
+    }
+
+    fn prepare<const N: usize, const L: usize>(&mut self, dt_s: f64) -> P
+    where
+        M: Dynamics<T, N, L, Prepared = P>,
+    {
+        let nanoseconds = (dt_s * 1e9).round();
+        if self.prepared.len() >= MOST_PREPARED {
+            self.prepared.clear();
+        }
+        let model = self.onward.model();
+        *self.prepared.entry(nanoseconds as u64).or_insert_with(|| model.prepare(T::of(nanoseconds * 1e-9)))
+    }
+}

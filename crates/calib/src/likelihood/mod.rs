@@ -1,0 +1,36 @@
+//! Maximum likelihood on the readings alone, for recordings whose strain nobody measured.
+//!
+//! [`Likelihood`] joins a family of models ([`ModelFamily`]), parameters and recordings. It gives the log-likelihood of
+//! the Kalman filter's innovations with exact gradient and Hessian on the logarithms of the parameters (hyper-dual
+//! numbers run through the same filter), the maximum, standard errors and profile intervals. [`expectation_maximisation`]
+//! is a second opinion on linear models. [`fit_noise_without_reference`] does it for a sensor whose law is known.
+//!
+//! The likelihood trusts the model. A law that is wrong by more than its noise says makes a filter overconfident, which
+//! readings alone do not show: where a reference exists, [`calibrate`](crate::calibrate) is better.
+//!
+//! # Policy
+//! - Parameters are positive and live between bounds; one that ends on a bound is reported as such and has no standard
+//!   error.
+//! - NaN is a missing reading; an infinite one, or time that runs backwards, is an error that names the time.
+//! - Deterministic; the cost of a Hessian is P (P + 1)/2 filter runs in hyper-dual numbers.
+
+mod derivatives;
+mod em;
+mod family;
+mod fit;
+mod linear;
+mod log_likelihood;
+mod newton;
+mod profile;
+mod sensor;
+mod sensor_family;
+
+pub use derivatives::Derivatives;
+pub use em::{EmIteration, EmStart, expectation_maximisation};
+pub use family::{ModelFamily, Parameter};
+pub use fit::{Bound, FittedParameter, Likelihood, LikelihoodFit};
+pub use linear::LinearModel;
+pub use log_likelihood::{LogLikelihood, Readings};
+pub use profile::ProfileInterval;
+pub use sensor::{NoiseFit, NoiseStart, fit_noise_without_reference};
+pub use sensor_family::NoiseParameter;

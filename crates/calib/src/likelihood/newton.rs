@@ -1,0 +1,130 @@
+use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
+
+use super::Derivatives;
+use crate::CalibrationError;
+
+/// What is maximised, as a function of the logarithms of the parameters.
+pub(super) trait Objective {
+    /// The value; not finite counts as impossible.
+    fn value(&self, at: &[f64]) -> f64;
+    /// Value, gradient and Hessian.
+    fn derivatives(&self, at: &[f64]) -> Result<Derivatives, CalibrationError>;
+}
+
+/// Where the search ended.
+pub(super) struct Optimum {
+    pub point: Vec<f64>,
+    pub derivatives: Derivatives,
+    /// Parameters that were free at the end: neither held nor pressed against a bound.
+    pub free: Vec<usize>,
+    pub iterations: usize,
+    pub converged: bool,
+}
+
+/// Iterations allowed; a dozen is usual.
+const MOST_ITERATIONS: usize = 200;
+/// First and largest length of a step, in the logarithm of a parameter.
+const FIRST_RADIUS: f64 = 1.0;
+const LARGEST_RADIUS: f64 = 4.0;
+/// A step shorter than this many standard errors is the last one.
+const TOLERANCE: f64 = 1e-8;
+/// A gain below this share of the value is lost in the rounding of the value; the step is taken without asking.
+const ROUNDING: f64 = 1e-11;
+/// Curvatures below this share of the largest one count as that share.
+const FLATTEST: f64 = 1e-10;
+
+/// Newton's method between bounds, with the exact Hessian.
+///
+/// Negative curvatures are turned around, steps are cut to a radius that grows and shrinks with success, and parameters
+/// that press against a bound are left out of the step. The last steps are Newton's own, taken on the gradient alone.
+/// Written out because the trust region and Newton solvers of argmin know neither bounds nor an end.
+///
+/// Source: Bertsekas, *SIAM J. Control Optim.* 20 (1982) 221 for the bounds.
+pub(super) fn maximise(
+    objective: &impl Objective,
+    start: &[f64],
+    bounds: &[(f64, f64)],
+    held: Option<usize>,
+) -> Result<Optimum, CalibrationError> {
+    let inside = |point: &DVector<f64>| -> Vec<f64> {
+        point.iter().zip(bounds).map(|(x, (lower, upper))| x.max(*lower).min(*upper)).collect()
+    };
+    let mut point = inside(&DVector::from_column_slice(start));
+    let mut now = objective.derivatives(&point)?;
+    let (mut radius, mut iterations) = (FIRST_RADIUS, 0);
+    loop {
+        let free = free(&point, &now.gradient, bounds, held);
+        let step = Step::new(&now, &free);
+        if step.concave && step.decrement <= TOLERANCE * TOLERANCE {
+            return Ok(Optimum { point, derivatives: now, free, iterations, converged: true });
+        }
+        if iterations >= MOST_ITERATIONS || radius < TOLERANCE {
+            return Ok(Optimum { point, derivatives: now, free, iterations, converged: false });
+        }
+        iterations += 1;
+        let value = now.log_likelihood.value;
+        let length = step.direction.amax();
+        let next = inside(&(DVector::from_column_slice(&point) + &step.direction * (radius / length).min(1.0)));
+        let tiny = step.concave && step.decrement <= ROUNDING * (1.0 + value.abs());
+        if !tiny && !(objective.value(&next) > value) {
+            radius = 0.25 * radius.min(length);
+            continue;
+        }
+        radius = (2.0 * radius).min(LARGEST_RADIUS);
+        match objective.derivatives(&next) {
+            Ok(derivatives) => (point, now) = (next, derivatives),
+            Err(_) => radius *= 0.1,
+        }
+    }
+}
+
+/// Parameters that a step may move: those that do not press against a bound.
+fn free(point: &[f64], gradient: &DVector<f64>, bounds: &[(f64, f64)], held: Option<usize>) -> Vec<usize> {
+    let moves = |i: &usize| {
+        let (lower, upper) = bounds[*i];
+        let pressed = (point[*i] <= lower && gradient[*i] <= 0.0) || (point[*i] >= upper && gradient[*i] >= 0.0);
+        Some(*i) != held && !pressed
+    };
+    (0..point.len()).filter(moves).collect()
+}
+
+/// A Newton step with every curvature made a maximum's.
+struct Step {
+    direction: DVector<f64>,
+    /// gᵀ |H|⁻¹ g: twice the gain expected, and the squared length of the step in standard errors.
+    decrement: f64,
+    /// Whether all curvatures were those of a maximum.
+    concave: bool,
+}
+
+impl Step {
+    fn new(at: &Derivatives, free: &[usize]) -> Self {
+        let mut step = Self { direction: DVector::zeros(at.gradient.len()), decrement: 0.0, concave: true };
+        if free.is_empty() {
+            return step;
+        }
+        let gradient = DVector::from_iterator(free.len(), free.iter().map(|&i| at.gradient[i]));
+        let eigen = SymmetricEigen::new(-sub_matrix(&at.hessian, free));
+        let flattest = eigen.eigenvalues.amax() * FLATTEST;
+        for (value, vector) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
+            step.concave &= *value > 0.0;
+            let along = vector.dot(&gradient);
+            let length = along / value.abs().max(flattest).max(f64::MIN_POSITIVE);
+            step.decrement += along * length;
+            for (k, &i) in free.iter().enumerate() {
+                step.direction[i] += length * vector[k];
+            }
+        }
+        step
+    }
+}
+
+/// Rows and columns of a symmetric matrix.
+pub(super) fn sub_matrix(matrix: &DMatrix<f64>, kept: &[usize]) -> DMatrix<f64> {
+    DMatrix::from_fn(kept.len(), kept.len(), |a, b| matrix[(kept[a], kept[b])])
+}
+
+/// Inverse of the negative Hessian among the free parameters; `None` unless it is a maximum's.
+pub(super) fn covariance(optimum: &Optimum) -> Option<DMatrix<f64>> {
+    Some(Cholesky::new(-sub_matrix(&optimum.derivatives.hessian, &optimum.free))?.inverse())
+}

@@ -1,0 +1,164 @@
+use ohmstrain_ekf::{Belief, DiffuseBelief};
+use ohmstrain_model::{
+    Branch, Gauge, ModelNoise, Motion, ParameterError, Scalar, SensorLaw, StrainRange, SwitchedModel,
+};
+
+use super::ModelFamily;
+use crate::estimator_params::{MotionParams, NoiseParams};
+
+/// A parameter of noise or motion that readings alone may tell something about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum NoiseParameter {
+    /// White noise of a reading, relative to R₀.
+    ReadingSd,
+    /// Wander of each branch, relative to R₀.
+    BranchSd,
+    /// Wander of the baseline, relative to R₀.
+    BaselineSd,
+    /// Correlation time of the baseline, s.
+    BaselineTime,
+    /// Standard deviation of the rate, 1/s.
+    RateSd,
+    /// Time scale of the rate, s: correlation time of an Ornstein-Uhlenbeck rate; σ_v/σ_a = 1/ω of a smooth motion.
+    RateTime,
+}
+
+impl NoiseParameter {
+    /// All of them.
+    pub const ALL: [Self; 6] =
+        [Self::ReadingSd, Self::BranchSd, Self::BaselineSd, Self::BaselineTime, Self::RateSd, Self::RateTime];
+
+    /// Its name in reports.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::ReadingSd => "reading_sd",
+            Self::BranchSd => "branch_sd",
+            Self::BaselineSd => "baseline_sd",
+            Self::BaselineTime => "baseline_time_s",
+            Self::RateSd => "rate_sd_per_s",
+            Self::RateTime => "rate_time_s",
+        }
+    }
+
+    /// Its value in a pair of noise and motion.
+    pub(super) fn get(self, noise: &NoiseParams, motion: &MotionParams) -> f64 {
+        let (rate_sd, rate_time_s) = match *motion {
+            MotionParams::OrnsteinUhlenbeck { rate_sd_per_s, rate_time_s, .. } => (rate_sd_per_s, rate_time_s),
+            MotionParams::Smooth { rate_sd_per_s, acceleration_sd_per_s2, .. } => {
+                (rate_sd_per_s, rate_sd_per_s / acceleration_sd_per_s2)
+            }
+        };
+        match self {
+            Self::ReadingSd => noise.reading_sd,
+            Self::BranchSd => noise.branch_sd,
+            Self::BaselineSd => noise.baseline_sd,
+            Self::BaselineTime => noise.baseline_time_s,
+            Self::RateSd => rate_sd,
+            Self::RateTime => rate_time_s,
+        }
+    }
+}
+
+/// Noise and motion around a known law; `free` are the parameters that the likelihood moves.
+pub(super) struct SensorFamily<'a, const B: usize> {
+    pub law: SensorLaw<f64, B>,
+    pub noise: NoiseParams,
+    pub motion: MotionParams,
+    pub free: &'a [NoiseParameter],
+}
+
+impl<const B: usize> SensorFamily<'_, B> {
+    fn value<T: Scalar>(&self, parameter: NoiseParameter, values: &[T]) -> T {
+        let mut found = self.free.iter().zip(values).filter(|(free, _)| **free == parameter);
+        found.next().map_or_else(|| T::of(parameter.get(&self.noise, &self.motion)), |(_, value)| *value)
+    }
+
+    fn noise<T: Scalar>(&self, values: &[T]) -> ModelNoise<T> {
+        ModelNoise {
+            reading_sd: self.value(NoiseParameter::ReadingSd, values),
+            branch_sd: self.value(NoiseParameter::BranchSd, values),
+            baseline_sd: self.value(NoiseParameter::BaselineSd, values),
+            baseline_time_s: self.value(NoiseParameter::BaselineTime, values),
+        }
+    }
+
+    fn law<T: Scalar>(&self) -> SensorLaw<T, B> {
+        let law = &self.law;
+        SensorLaw {
+            gauge: in_numbers(&law.gauge),
+            extend_viscosity_s: T::of(law.extend_viscosity_s),
+            retract_viscosity_s: T::of(law.retract_viscosity_s),
+            branches: law.branches.map(|branch| Branch {
+                tau_s: T::of(branch.tau_s),
+                extend_gain: T::of(branch.extend_gain),
+                retract_gain: T::of(branch.retract_gain),
+                extend_gain_slope: T::of(branch.extend_gain_slope),
+                retract_gain_slope: T::of(branch.retract_gain_slope),
+            }),
+            range: StrainRange { lower: T::of(law.range.lower), upper: T::of(law.range.upper) },
+        }
+    }
+
+    fn rate<T: Scalar>(&self, values: &[T]) -> (T, T) {
+        (self.value(NoiseParameter::RateSd, values), self.value(NoiseParameter::RateTime, values))
+    }
+
+    /// Mean and standard deviation of strain, which the readings' scale is judged by and which therefore stay.
+    fn strain<T: Scalar>(&self) -> (T, T) {
+        let (MotionParams::OrnsteinUhlenbeck { strain_mean, strain_sd, .. }
+        | MotionParams::Smooth { strain_mean, strain_sd, .. }) = self.motion;
+        (T::of(strain_mean), T::of(strain_sd))
+    }
+}
+
+fn in_numbers<T: Scalar>(gauge: &Gauge<f64>) -> Gauge<T> {
+    match *gauge {
+        Gauge::Polynomial { coefficients } => Gauge::Polynomial { coefficients: coefficients.map(T::of) },
+        Gauge::DecayingExponential { slope, decay_strain } => {
+            Gauge::DecayingExponential { slope: T::of(slope), decay_strain: T::of(decay_strain) }
+        }
+        Gauge::Tunnelling { gap, barrier, path_loss } => {
+            Gauge::Tunnelling { gap: T::of(gap), barrier: T::of(barrier), path_loss: T::of(path_loss) }
+        }
+    }
+}
+
+/// The families with two and three motion states: N = M + B + 1.
+pub(super) struct TwoStates<'a, const B: usize>(pub SensorFamily<'a, B>);
+/// See [`TwoStates`].
+pub(super) struct ThreeStates<'a, const B: usize>(pub SensorFamily<'a, B>);
+
+impl<const B: usize, const N: usize, const L: usize> ModelFamily<N, L> for TwoStates<'_, B> {
+    type Model<T: Scalar> = SwitchedModel<T, 2, B, N>;
+
+    fn model<T: Scalar>(&self, values: &[T]) -> Result<Self::Model<T>, ParameterError> {
+        let ((rate_sd, rate_time_s), (mean, sd)) = (self.0.rate(values), self.0.strain());
+        SwitchedModel::new(
+            self.0.law(),
+            Motion::ornstein_uhlenbeck(rate_time_s, rate_sd, mean, sd)?,
+            self.0.noise(values),
+        )
+    }
+
+    fn start<T: Scalar>(&self, model: &Self::Model<T>) -> DiffuseBelief<T, N, L> {
+        Belief::initial(model).into()
+    }
+}
+
+impl<const B: usize, const N: usize, const L: usize> ModelFamily<N, L> for ThreeStates<'_, B> {
+    type Model<T: Scalar> = SwitchedModel<T, 3, B, N>;
+
+    fn model<T: Scalar>(&self, values: &[T]) -> Result<Self::Model<T>, ParameterError> {
+        let ((rate_sd, rate_time_s), (mean, sd)) = (self.0.rate(values), self.0.strain());
+        SwitchedModel::new(
+            self.0.law(),
+            Motion::smooth(rate_sd, rate_sd / rate_time_s, mean, sd)?,
+            self.0.noise(values),
+        )
+    }
+
+    fn start<T: Scalar>(&self, model: &Self::Model<T>) -> DiffuseBelief<T, N, L> {
+        Belief::initial(model).into()
+    }
+}

@@ -1,0 +1,66 @@
+use comfy_table::{Table, presets};
+use ohmstrain_calib::{
+    GaugeFamily, LawParams, Samples, StructureScore, bootstrap_law, compare_structures, identifiability,
+};
+
+use crate::args::CalibrateArgs;
+use crate::error::CliError;
+use crate::input::Recording;
+use crate::output::write_to;
+
+/// Prints what `calibrate --explain` and `--bootstrap` ask for.
+pub fn print(args: &CalibrateArgs, recordings: &[Recording], law: &LawParams) -> Result<(), CliError> {
+    let samples: Vec<Samples> = recordings.iter().map(Recording::samples).collect::<Result<_, _>>()?;
+    let names: Vec<&str> = recordings.iter().map(|recording| recording.name.as_str()).collect();
+    let failed = |error| CliError::calibration(&names, &error);
+    if args.explain {
+        let found = identifiability(&samples, law).map_err(failed)?;
+        let structures = structures(&compare_structures(&samples).map_err(failed)?);
+        write_to(None, |out| Ok(writeln!(out, "{found}\n{structures}")?))?;
+    }
+    if let Some(replicates) = args.bootstrap {
+        let found = bootstrap_law(&samples, law, replicates as usize, args.seed).map_err(failed)?;
+        let mut table = table(["parameter", "without ridge", "2.5 %", "97.5 %"]);
+        for (i, name) in found.names.iter().enumerate() {
+            let cells = [found.values[i], found.lower[i], found.upper[i]].map(|x| format!("{x:.4e}"));
+            table.add_row([name.clone()].into_iter().chain(cells));
+        }
+        write_to(None, |out| Ok(writeln!(out, "{table}")?))?;
+    }
+    Ok(())
+}
+
+/// One row per structure, criteria as differences from the best.
+fn structures(scores: &[StructureScore]) -> Table {
+    let least = |of: fn(&StructureScore) -> f64| scores.iter().map(of).fold(f64::INFINITY, f64::min);
+    let (aic, bic) = (least(|score| score.aic), least(|score| score.bic));
+    let mut table = table(["gauge", "branches", "parameters", "error, % of R0", "left out, %", "AIC", "BIC"]);
+    for score in scores {
+        table.add_row([
+            family(score.options.gauge).to_string(),
+            score.options.branches.to_string(),
+            score.parameters.to_string(),
+            format!("{:.3}", 100.0 * score.error),
+            format!("{:.3}", 100.0 * score.cross_validated_error),
+            format!("{:+.1}", score.aic - aic),
+            format!("{:+.1}", score.bic - bic),
+        ]);
+    }
+    table
+}
+
+fn table<const N: usize>(header: [&str; N]) -> Table {
+    let mut table = Table::new();
+    table.load_style(presets::ASCII_MARKDOWN);
+    table.set_header(header);
+    table
+}
+
+/// Its name on the command line.
+const fn family(gauge: GaugeFamily) -> &'static str {
+    match gauge {
+        GaugeFamily::Polynomial => "polynomial",
+        GaugeFamily::DecayingExponential => "decaying-exponential",
+        GaugeFamily::Tunnelling => "tunnelling",
+    }
+}
