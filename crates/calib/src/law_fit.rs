@@ -73,7 +73,11 @@ const DEFAULT_BRANCHES: usize = 2;
 /// Family unless somebody asks for another. Others sometimes follow the resistance a little better; only the polynomial
 /// is linear in its coefficients, so that the ridge keeps it tame and the filter from taking one direction for the other.
 const DEFAULT_GAUGE: GaugeFamily = GaugeFamily::Polynomial;
-/// Plays unless somebody asks for some.
+/// Plays unless somebody asks for some. With plays the law follows the resistance better, but the filters do not do better:
+/// on three recordings of a carbon-black sensor (sawtooth, triangles, multisine; halves either way round, and two thirds
+/// to one) the sign-split filter's error fell in five of nine and rose from 7.4 to 8.4 % of the range on average, the
+/// extended Kalman filter's rose from 7.5 to 16 %. Loops are one more explanation of a reading that the wrong direction
+/// can have. Nor does the calibration's own score on blocks left out tell when they help, so nothing is chosen by it.
 const DEFAULT_PLAYS: usize = 0;
 /// Half-widths of plays, in spans of the strain: small loops, loops of a usual turn-around, and nearly the whole span. The
 /// weights are fitted, so that it matters little where between them a loop of the sensor lies.
