@@ -29,6 +29,7 @@ fn law() -> LawParams {
         retract_gain: -0.3,
         extend_gain_slope: -0.4,
         retract_gain_slope: 0.3,
+        plays: vec![],
     };
     LawParams {
         extend_viscosity_s: 0.05,
@@ -158,7 +159,7 @@ fn intervals_without_the_ridge_hold_the_truth() {
 #[ignore = "makes docs/parameter-coverage.md; minutes in a debug build"]
 fn table_of_coverage() {
     const RECORDINGS: u64 = 300;
-    let options = LawOptions { branches: 1, gauge: GaugeFamily::Polynomial };
+    let options = LawOptions { branches: 1, gauge: GaugeFamily::Polynomial, plays: 0 };
     let (mut without, mut with) = (Tally::default(), Tally::default());
     for_each_recording(RECORDINGS, |samples| {
         let fit = fit_law(&[*samples], options).unwrap();
