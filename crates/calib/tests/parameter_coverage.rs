@@ -29,7 +29,6 @@ fn law() -> LawParams {
         retract_gain: -0.3,
         extend_gain_slope: -0.4,
         retract_gain_slope: 0.3,
-        plays: vec![],
     };
     LawParams {
         extend_viscosity_s: 0.05,
@@ -37,6 +36,7 @@ fn law() -> LawParams {
         range: RangeParams { lower: 0.0, upper: 0.32 },
         gauge: GaugeParams::Polynomial { coefficients: [1.8, -1.1, 0.4] },
         branches: vec![branch],
+        plays: vec![],
     }
 }
 
