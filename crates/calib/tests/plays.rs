@@ -92,6 +92,7 @@ fn every_estimator_runs_a_law_with_plays() {
             joint: None,
             law: calibration.law,
             estimators: calibration.estimators,
+            ensemble: None,
             recordings: vec![],
             uncertainty: Some(calibration.uncertainty),
         };
