@@ -128,6 +128,12 @@ fn every_estimator_runs_a_law_with_plays() {
         tempering: 1.0,
     });
     sensor.estimators = EstimatorKind::ALL.map(|kind| (kind, params)).into();
+    sensor.ensemble = Some(ohmstrain_calib::EnsembleParams {
+        score: 0.0,
+        strain_sd_scale: 1.0,
+        smoothed_sd_scale: None,
+        weights: EstimatorKind::Ensemble.members().iter().map(|kind| (*kind, 1.0 / 3.0)).collect(),
+    });
     for kind in EstimatorKind::ALL {
         let filter = build_filter(&sensor, Some(kind), Start::Strain(bench.strain[0]));
         if kind == EstimatorKind::Particles {
