@@ -13,8 +13,8 @@ use comfy_table::{Table, presets};
 use ohmstrain_bench_data::Trace;
 use ohmstrain_bench_data::simulate::{Material, Protocol, SimulationSettings, simulate};
 use ohmstrain_calib::{
-    Calibration, EstimatorKind, FORMAT, LawOptions, Quantity, ReadingUnit, Samples, ScoredRow, Scores, SensorParams,
-    Start, build_filter, calibrate,
+    EstimatorKind, LawOptions, Quantity, ReadingUnit, Samples, ScoredRow, Scores, SensorParams, Start, build_filter,
+    calibrate,
 };
 use ohmstrain_ekf::Reading;
 
@@ -42,7 +42,7 @@ fn samples(trace: &Trace) -> Samples<'_> {
 fn main() -> Result<(), Box<dyn Error>> {
     let training = session(CALIBRATION_SEED)?;
     let calibration = calibrate(&[samples(&training)], LawOptions::default(), &EstimatorKind::ALL, |_| ())?;
-    let params = parameters(calibration);
+    let params = calibration.into_sensor("", Quantity::Strain, ReadingUnit::Ohm);
     let tests = TEST_SEEDS.map(session).collect::<Result<Vec<_>, _>>()?;
     let mut table = Table::new();
     table.load_style(presets::ASCII_MARKDOWN);
@@ -56,26 +56,6 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("{}", include_str!("long_holds.md").trim_end());
     println!("\n{table}");
     Ok(())
-}
-
-fn parameters(calibration: Calibration) -> SensorParams {
-    SensorParams {
-        format: FORMAT,
-        made_by: String::new(),
-        quantity: Quantity::Strain,
-        reading: ReadingUnit::Ohm,
-        rest_reading: calibration.rest_readings[0],
-        default_estimator: EstimatorKind::Ekf,
-        limits: calibration.limits,
-        validity: calibration.validity,
-        static_cubic: calibration.static_cubic,
-        joint: None,
-        law: calibration.law,
-        estimators: calibration.estimators,
-        ensemble: calibration.ensemble,
-        recordings: vec![],
-        uncertainty: None,
-    }
 }
 
 fn score_estimator(params: &SensorParams, kind: EstimatorKind, test: &Trace) -> Result<Scores, Box<dyn Error>> {

@@ -10,7 +10,7 @@ use crate::law_params::LawParams;
 use crate::left_out::LeftOut;
 use crate::motion_stats::MotionStats;
 use crate::noise_fit::{NoiseProblem, REFINEMENT, RESURVEY, SMOOTHED_ROWS, SURVEY, Tuned, stride};
-use crate::params::{RangeParams, Uncertainty, Validity};
+use crate::params::{FORMAT, Quantity, RangeParams, ReadingUnit, SensorParams, Uncertainty, Validity};
 use crate::samples::Samples;
 use crate::sd_scale::sd_scale;
 
@@ -51,6 +51,33 @@ pub struct Calibration {
     pub validity: Validity,
     /// The static inverse fitted to the same rows.
     pub static_cubic: StaticCubic,
+}
+
+impl Calibration {
+    /// The parameters of the sensor, in these units: R₀ is the median of the recordings', and what calibration does not
+    /// know (a joint, names and hashes of recordings) is left empty.
+    #[must_use]
+    pub fn into_sensor(self, made_by: &str, quantity: Quantity, reading: ReadingUnit) -> SensorParams {
+        let mut rests = self.rest_readings;
+        rests.sort_by(f64::total_cmp);
+        SensorParams {
+            format: FORMAT,
+            made_by: made_by.into(),
+            quantity,
+            reading,
+            rest_reading: rests[rests.len() / 2],
+            default_estimator: self.default_estimator,
+            limits: self.limits,
+            validity: self.validity,
+            static_cubic: self.static_cubic,
+            joint: None,
+            law: self.law,
+            estimators: self.estimators,
+            ensemble: self.ensemble,
+            recordings: vec![],
+            uncertainty: Some(self.uncertainty),
+        }
+    }
 }
 
 /// How much better, in mean log density of the strain, a single Gaussian must be than hypotheses: once it has taken the

@@ -3,8 +3,8 @@
 use std::f64::consts::TAU;
 
 use ohmstrain_calib::{
-    Calibration, CalibrationError, EstimatorKind, FORMAT, GaugeFamily, LawOptions, Quantity, RangeParams, ReadingUnit,
-    Samples, ScoredRow, Scores, SensorParams, Stage, Start, StaticCubic, build_filter, calibrate, fit_law,
+    Calibration, CalibrationError, EstimatorKind, GaugeFamily, LawOptions, Quantity, RangeParams, ReadingUnit, Samples,
+    ScoredRow, Scores, SensorParams, Stage, Start, StaticCubic, build_filter, calibrate, fit_law,
 };
 use ohmstrain_ekf::Reading;
 
@@ -103,23 +103,7 @@ fn every_gauge_family_and_number_of_branches_can_be_fitted() {
 
 /// A calibration as the parameters of a sensor.
 fn sensor(calibration: &Calibration) -> SensorParams {
-    SensorParams {
-        format: FORMAT,
-        made_by: "test".into(),
-        quantity: Quantity::Strain,
-        reading: ReadingUnit::Ohm,
-        rest_reading: calibration.rest_readings[0],
-        default_estimator: calibration.default_estimator,
-        limits: calibration.limits,
-        validity: calibration.validity,
-        static_cubic: calibration.static_cubic,
-        joint: None,
-        law: calibration.law.clone(),
-        estimators: calibration.estimators.clone(),
-        ensemble: calibration.ensemble.clone(),
-        recordings: vec![],
-        uncertainty: Some(calibration.uncertainty.clone()),
-    }
+    calibration.clone().into_sensor("test", Quantity::Strain, ReadingUnit::Ohm)
 }
 
 #[test]

@@ -3,8 +3,8 @@
 use std::f64::consts::TAU;
 
 use ohmstrain_calib::{
-    CalibrationError, EstimatorKind, FORMAT, LawOptions, Quantity, ReadingUnit, Samples, SensorParams, Start,
-    build_filter, calibrate, fit_law,
+    CalibrationError, EstimatorKind, LawOptions, Quantity, ReadingUnit, Samples, SensorParams, Start, build_filter,
+    calibrate, fit_law,
 };
 use ohmstrain_ekf::Reading;
 
@@ -79,23 +79,7 @@ fn every_estimator_runs_a_law_with_plays() {
     let kinds = [EstimatorKind::Ekf];
     let error = |plays: usize| {
         let calibration = calibrate(&[training], LawOptions { plays, ..PLAYFUL }, &kinds, |_| ()).unwrap();
-        let sensor = SensorParams {
-            format: FORMAT,
-            made_by: String::new(),
-            quantity: Quantity::Strain,
-            reading: ReadingUnit::Ohm,
-            rest_reading: calibration.rest_readings[0],
-            default_estimator: EstimatorKind::Ekf,
-            limits: calibration.limits,
-            validity: calibration.validity,
-            static_cubic: calibration.static_cubic,
-            joint: None,
-            law: calibration.law,
-            estimators: calibration.estimators,
-            ensemble: None,
-            recordings: vec![],
-            uncertainty: Some(calibration.uncertainty),
-        };
+        let sensor = calibration.into_sensor("", Quantity::Strain, ReadingUnit::Ohm);
         let readings: Vec<_> =
             bench.reading.iter().map(|r| Some(Reading::from(r / sensor.rest_reading - 1.0))).collect();
         let mut filter = build_filter(&sensor, None, Start::Unknown).unwrap();

@@ -1,7 +1,7 @@
 use std::path::Path;
 
 use ohmstrain_calib::{
-    EstimatorKind, FORMAT, LawOptions, Quantity, ReadingUnit, RecordingInfo, Samples, SensorParams, calibrate,
+    EstimatorKind, LawOptions, Quantity, ReadingUnit, RecordingInfo, Samples, SensorParams, calibrate,
 };
 
 use super::{explain, scoring};
@@ -60,31 +60,15 @@ pub fn calibrate_recordings(
     let kind = estimator.unwrap_or(EstimatorKind::Ensemble);
     let calibration = calibrate(&samples, options, &[kind], |stage| progress.calibrating(stage))
         .map_err(|error| CliError::calibration(&names, &error))?;
-    let infos = recordings.iter().zip(&calibration.rest_readings).map(|(recording, rest_reading)| RecordingInfo {
+    let info = |(recording, rest_reading): (&Recording, &f64)| RecordingInfo {
         file: file_name(&recording.name),
         sha256: recording.sha256.clone(),
         rows: recording.trace.len(),
         rest_reading: *rest_reading,
-    });
-    let mut rests = calibration.rest_readings.clone();
-    rests.sort_by(f64::total_cmp);
-    Ok(SensorParams {
-        format: FORMAT,
-        made_by: MADE_BY.into(),
-        quantity,
-        reading,
-        rest_reading: rests[rests.len() / 2],
-        default_estimator: calibration.default_estimator,
-        limits: calibration.limits,
-        validity: calibration.validity,
-        static_cubic: calibration.static_cubic,
-        joint: recordings.iter().find_map(Recording::joint),
-        law: calibration.law,
-        estimators: calibration.estimators,
-        ensemble: calibration.ensemble,
-        recordings: infos.collect(),
-        uncertainty: Some(calibration.uncertainty),
-    })
+    };
+    let infos = recordings.iter().zip(&calibration.rest_readings).map(info).collect();
+    let sensor = calibration.into_sensor(MADE_BY, quantity, reading);
+    Ok(SensorParams { joint: recordings.iter().find_map(Recording::joint), recordings: infos, ..sensor })
 }
 
 /// Paths are the machine's own business; the name says which recording it was.
