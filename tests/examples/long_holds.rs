@@ -7,32 +7,18 @@
 //!
 //! The scenario and its seeds were fixed before anything was tuned on them, and nothing has been tuned on them since.
 
+mod scenario;
+
 use std::error::Error;
 
 use comfy_table::{Table, presets};
 use ohmstrain_bench_data::Trace;
-use ohmstrain_bench_data::simulate::{Material, Protocol, SimulationSettings, simulate};
 use ohmstrain_calib::{
     EstimatorKind, LawOptions, Quantity, ReadingUnit, Samples, ScoredRow, Scores, SensorParams, Start, build_filter,
     calibrate,
 };
 use ohmstrain_ekf::Reading;
-
-/// The session that calibrates; the tests are other sessions with the same sensor.
-const CALIBRATION_SEED: u64 = 0;
-const TEST_SEEDS: std::ops::RangeInclusive<u64> = 1..=20;
-
-/// Six holds of 300 s at random strains and speeds; 10 mm on 30 mm, up to 5 mm/s, 5 readings per second.
-fn session(seed: u64) -> Result<Trace, Box<dyn Error>> {
-    let settings = SimulationSettings {
-        speed_mm_s: 5.0,
-        sample_rate_hz: 5.0,
-        mismatched: true,
-        seed,
-        ..SimulationSettings::new(Material::Ecoflex0030, Protocol::LONG_HOLDS)
-    };
-    Ok(simulate(&settings)?)
-}
+use scenario::{CALIBRATION_SEED, TEST_SEEDS, session};
 
 fn samples(trace: &Trace) -> Samples<'_> {
     let strain = trace.reference.as_ref().map_or(&[][..], |reference| &reference.values);

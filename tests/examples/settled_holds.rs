@@ -7,15 +7,17 @@
 //!
 //! With trace CSVs as arguments it prints the same for each of them, calibrated on its first half.
 
+mod scenario;
+
 use std::error::Error;
 use std::fs::File;
 
 use comfy_table::{Table, presets};
-use ohmstrain_bench_data::simulate::{Material, Protocol, SimulationSettings, simulate};
 use ohmstrain_bench_data::{Trace, segment};
 use ohmstrain_calib::{EstimatorKind, LawOptions, Quantity, ReadingUnit, Samples, Start, build_filter, calibrate};
 use ohmstrain_ekf::Reading;
 use ohmstrain_model::Phase;
+use scenario::{CALIBRATION_SEED, TEST_SEEDS, session};
 
 /// Shortest hold that counts, s: it must come near to where it ends.
 const SHORTEST_HOLD_S: f64 = 100.0;
@@ -34,8 +36,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     );
     let files: Vec<String> = std::env::args().skip(1).collect();
     if files.is_empty() {
-        let sessions = (0..=20).map(session).collect::<Result<Vec<_>, _>>()?;
-        let holds = study(&sessions[0], &sessions[1..], 0)?;
+        let tests = TEST_SEEDS.map(session).collect::<Result<Vec<_>, _>>()?;
+        let holds = study(&session(CALIBRATION_SEED)?, &tests, 0)?;
         table.add_row(row("simulated, mismatched", &holds));
         println!("{}", include_str!("settled_holds.md").trim_end());
         println!();
@@ -48,17 +50,6 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     println!("{table}");
     Ok(())
-}
-
-fn session(seed: u64) -> Result<Trace, Box<dyn Error>> {
-    let settings = SimulationSettings {
-        speed_mm_s: 5.0,
-        sample_rate_hz: 5.0,
-        mismatched: true,
-        seed,
-        ..SimulationSettings::new(Material::Ecoflex0030, Protocol::LONG_HOLDS)
-    };
-    Ok(simulate(&settings)?)
 }
 
 /// One hold: predictions at each row, relative to the span of the reading.

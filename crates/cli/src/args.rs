@@ -134,8 +134,8 @@ pub struct CalibrateArgs {
     /// Family of the gauge curve: auto (polynomial), polynomial, decaying-exponential or tunnelling
     #[arg(long, default_value = "auto")]
     pub gauge: Auto<Gauge>,
-    /// Estimator to calibrate and to make the default: auto (the better of ekf and sign-split), ekf, ukf, imm,
-    /// sign-split or hypotheses; ekf is calibrated in any case
+    /// Estimator to calibrate and to make the default: auto (ensemble), ensemble, ekf, ukf, imm, sign-split,
+    /// hypotheses or particles; ekf is calibrated in any case
     #[arg(long, default_value = "auto")]
     pub estimator: Auto<Estimator>,
     /// Seed of --bootstrap; the calibration itself draws nothing
@@ -161,7 +161,8 @@ pub struct EstimateArgs {
     /// The sensor's parameters
     #[arg(long, value_name = "sensor.toml")]
     pub sensor: PathBuf,
-    /// Estimator: auto (the sensor file's choice), ekf, ukf, imm, sign-split or hypotheses
+    /// Estimator: auto (the sensor file's choice), ensemble, ekf, ukf, imm, sign-split, hypotheses or
+    /// particles, which smooth with sign-split
     #[arg(long, default_value = "auto")]
     pub estimator: Auto<Estimator>,
     /// Strain (or angle) at the first row, if it is known; the body is at rest there

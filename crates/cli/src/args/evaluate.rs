@@ -18,8 +18,8 @@ pub struct EvaluateArgs {
     /// Test on this recording what was calibrated with --train; may be given several times
     #[arg(long, value_name = "TRACE", requires = "train", conflicts_with_all = ["sensor", "split"])]
     pub test: Vec<PathBuf>,
-    /// Estimator: auto (the sensor file's choice, or the one that calibrate would choose), ekf, ukf, imm, sign-split,
-    /// hypotheses, particles, or all
+    /// Estimator: auto (the sensor file's choice, or the one that calibrate would choose), ensemble, ekf, ukf, imm,
+    /// sign-split, hypotheses, particles, or all
     #[arg(long, default_value = "auto")]
     pub estimator: Estimators,
     /// Score rows with time_s >= T only; the filter still starts at the first row
