@@ -1,5 +1,7 @@
 use std::io::{self, BufRead, BufReader, Read};
 
+use csv::StringRecord;
+
 use crate::error::{Fault, quote};
 
 /// Longest line that is taken for text: a bound on memory, and far above what a trace needs.
@@ -95,17 +97,28 @@ impl<R: Read> LineFeed<R> {
         self.record_has_line = false;
     }
 
+    /// Takes the next line apart at its commas, which is all that most traces need; `None` at the end of the source. A
+    /// line that needs more is left for `read`, and `false` says so; so is whatever comes after it.
+    pub(crate) fn next_plain(&mut self, cells: &mut StringRecord) -> Result<Option<bool>, LineFault> {
+        let Some(line) = self.lines.next()? else { return Ok(None) };
+        if is_plain(line) {
+            cells.clear();
+            line.split(',').for_each(|cell| cells.push_field(cell));
+            return Ok(Some(true));
+        }
+        deliver(line, &mut self.pending);
+        (self.taken, self.record_has_line) = (0, true);
+        Ok(Some(false))
+    }
+
     fn next_line(&mut self) -> Result<Option<()>, LineFault> {
         if self.record_has_line {
             let found = quote(&String::from_utf8_lossy(&self.pending));
             return Err(LineFault::Content(Fault::new("quotation marks in pairs", found)));
         }
         let Some(line) = self.lines.next()? else { return Ok(None) };
-        self.record_has_line = true;
-        self.taken = 0;
-        self.pending.clear();
-        self.pending.extend_from_slice(line.as_bytes());
-        self.pending.push(b'\n');
+        deliver(line, &mut self.pending);
+        (self.taken, self.record_has_line) = (0, true);
         Ok(Some(()))
     }
 
@@ -113,6 +126,17 @@ impl<R: Read> LineFeed<R> {
     pub(crate) const fn take_fault(&mut self) -> Option<LineFault> {
         self.fault.take()
     }
+}
+
+/// Whether a line is one record whose cells are what stands between its commas: no quotation mark, no end of line.
+pub(crate) fn is_plain(line: &str) -> bool {
+    !line.bytes().any(|byte| byte == b'"' || byte == b'\r')
+}
+
+fn deliver(line: &str, pending: &mut Vec<u8>) {
+    pending.clear();
+    pending.extend_from_slice(line.as_bytes());
+    pending.push(b'\n');
 }
 
 impl<R: Read> Read for LineFeed<R> {

@@ -7,7 +7,7 @@ use crate::cell;
 use crate::clock::Clock;
 use crate::columns::{Column, Columns, Place};
 use crate::error::{Fault, TraceError};
-use crate::lines::{LineFault, LineFeed, Lines};
+use crate::lines::{LineFault, LineFeed, Lines, is_plain};
 use crate::metadata::Metadata;
 use crate::trace::{Quantity, ReadingKind};
 
@@ -62,6 +62,8 @@ pub struct TraceReader<R> {
     clock: Clock,
     records: csv::Reader<LineFeed<R>>,
     record: StringRecord,
+    /// Every line up to now was plain; after the first that was not, the csv crate reads them all.
+    plain: bool,
     done: bool,
 }
 
@@ -90,6 +92,7 @@ impl<R: Read> TraceReader<R> {
         let mut lines = Lines::new(source);
         let (mut metadata, header) = read_prelude(&mut lines).map_err(|fault| placed(fault, &file, lines.number()))?;
         metadata.override_with(overrides);
+        let plain = is_plain(&header);
         let mut records =
             csv::ReaderBuilder::new().has_headers(false).flexible(true).from_reader(LineFeed::new(lines, &header));
         let mut record = StringRecord::new();
@@ -98,7 +101,7 @@ impl<R: Read> TraceReader<R> {
         let columns = Columns::of_header(&record).map_err(at_header)?;
         let conversion = Conversion::new(&columns, &metadata).map_err(at_header)?;
         let clock = Clock::new(columns.time.column);
-        Ok(Self { file, metadata, columns, conversion, clock, records, record, done: false })
+        Ok(Self { file, metadata, columns, conversion, clock, records, record, plain, done: false })
     }
 
     /// Name of the source, as messages call it.
@@ -145,15 +148,26 @@ impl<R: Read> TraceReader<R> {
     }
 
     fn next_row(&mut self) -> Result<Option<Row>, TraceError> {
-        self.records.get_mut().begin_record();
-        match self.records.read_record(&mut self.record) {
-            Ok(false) => Ok(None),
-            Ok(true) => match self.parse_row() {
-                Ok(row) => Ok(Some(row)),
-                Err(fault) => Err(fault.at(&self.file, self.line()).into()),
-            },
-            Err(error) => Err(feed_error(error, &mut self.records, &self.file)),
+        if !self.next_record()? {
+            return Ok(None);
         }
+        self.parse_row().map(Some).map_err(|fault| fault.at(&self.file, self.line()).into())
+    }
+
+    /// Reads the cells of the next row; `false` at the end of the source.
+    fn next_record(&mut self) -> Result<bool, TraceError> {
+        let feed = self.records.get_mut();
+        feed.begin_record();
+        if self.plain {
+            let plain = feed.next_plain(&mut self.record);
+            match plain.map_err(|fault| placed(fault, &self.file, self.records.get_ref().line()))? {
+                None => return Ok(false),
+                Some(true) => return Ok(true),
+                Some(false) => self.plain = false,
+            }
+        }
+        let record = self.records.read_record(&mut self.record);
+        record.map_err(|error| feed_error(error, &mut self.records, &self.file))
     }
 
     fn parse_row(&mut self) -> Result<Row, Fault> {

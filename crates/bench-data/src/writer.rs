@@ -1,6 +1,7 @@
 use std::io::{self, Write};
 
 use crate::columns::Column;
+use crate::rows::RowWriter;
 use crate::trace::{Quantity, ReadingKind, Trace};
 
 impl Trace {
@@ -13,12 +14,13 @@ impl Trace {
     /// What `out` says.
     pub fn write(&self, out: &mut impl Write) -> io::Result<()> {
         write!(out, "{}", self.metadata)?;
-        let mut rows = csv::WriterBuilder::new().from_writer(out);
-        rows.write_record(self.header().iter().map(|column| column.name())).map_err(io_error)?;
-        let mut cells = Vec::new();
+        let mut rows = RowWriter::new(io::BufWriter::new(out));
+        for column in self.header() {
+            rows.text(column.name());
+        }
+        rows.end()?;
         for row in 0..self.len() {
-            self.row_cells(row, &mut cells);
-            rows.write_record(&cells).map_err(io_error)?;
+            self.write_row(row, &mut rows)?;
         }
         rows.flush()
     }
@@ -37,29 +39,27 @@ impl Trace {
         [Some(Column::TimeS), Some(reading), reference, temperature].into_iter().flatten().collect()
     }
 
-    fn row_cells(&self, row: usize, cells: &mut Vec<String>) {
-        cells.clear();
-        cells.push(self.time_s[row].to_string());
-        cells.push(match &self.readings.converter {
-            Some(converter) => converter.codes[row].map_or_else(|| MISSING.to_owned(), |code| code.to_string()),
-            None => number(self.readings.values[row]),
-        });
-        cells.extend(self.reference.iter().map(|reference| number(reference.values[row])));
-        cells.extend(self.temperature_c.iter().map(|temperature| number(temperature[row])));
-    }
-}
-
-/// What `out` said; the csv crate's own conversion forgets the kind, and with it that a pipe is closed.
-fn io_error(error: csv::Error) -> io::Error {
-    match error.into_kind() {
-        csv::ErrorKind::Io(error) => error,
-        kind => io::Error::other(format!("{kind:?}")),
+    fn write_row(&self, row: usize, rows: &mut RowWriter<impl Write>) -> io::Result<()> {
+        rows.number(self.time_s[row]);
+        number(
+            rows,
+            match &self.readings.converter {
+                Some(converter) => converter.codes[row].map_or(f64::NAN, f64::from),
+                None => self.readings.values[row],
+            },
+        );
+        for column in [self.reference.as_ref().map(|reference| &reference.values), self.temperature_c.as_ref()] {
+            if let Some(values) = column {
+                number(rows, values[row]);
+            }
+        }
+        rows.end()
     }
 }
 
 /// A word rather than nothing, so that no row looks short.
 const MISSING: &str = "NaN";
 
-fn number(value: f64) -> String {
-    if value.is_nan() { MISSING.to_owned() } else { value.to_string() }
+fn number(rows: &mut RowWriter<impl Write>, value: f64) {
+    if value.is_nan() { rows.text(MISSING) } else { rows.number(value) }
 }

@@ -1,10 +1,12 @@
 use std::collections::BTreeMap;
+use std::ops::Range;
 
+use arrayvec::ArrayVec;
 use ohmstrain_ekf::{Estimate, Gaussian, Guard, Reading, ReadingVerdict, StepError};
 use serde::{Deserialize, Serialize};
 
 use crate::estimator_params::EstimatorKind;
-use crate::filter::{Filter, Output};
+use crate::filter::{Filter, Output, Rows, WayBack};
 
 /// Estimators that run side by side, and how much each is listened to.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -52,11 +54,16 @@ pub(crate) struct Ensemble {
 struct Member {
     filter: Box<dyn Filter>,
     weight: f64,
+    /// What it says at the moment, row by row.
+    said: Vec<Output>,
 }
+
+/// What each member says, with its weight; no estimator is a member twice.
+type Few<X> = ArrayVec<(f64, X), { EstimatorKind::ALL.len() }>;
 
 impl Ensemble {
     pub(crate) fn new(members: Vec<(Box<dyn Filter>, f64)>, filtered_scale: f64, smoothed_scale: f64) -> Self {
-        let members = members.into_iter().map(|(filter, weight)| Member { filter, weight }).collect();
+        let members = members.into_iter().map(|(filter, weight)| Member { filter, weight, said: Vec::new() }).collect();
         Self { members, filtered_scale, smoothed_scale }
     }
 
@@ -67,21 +74,15 @@ impl Ensemble {
         out: &mut dyn FnMut(Output),
         mut act: impl FnMut(&mut dyn Filter, &mut dyn FnMut(Output)) -> Result<(), StepError>,
     ) -> Result<(), StepError> {
-        let mut said: Vec<Vec<(f64, Output)>> = Vec::new();
         let mut acted = Ok(());
         for member in &mut self.members {
-            let mut row = 0;
-            let result = act(member.filter.as_mut(), &mut |output| {
-                if said.len() == row {
-                    said.push(Vec::new());
-                }
-                said[row].push((member.weight, output));
-                row += 1;
-            });
-            acted = acted.and(result);
+            member.said.clear();
+            acted = acted.and(act(member.filter.as_mut(), &mut |output| member.said.push(output)));
         }
-        for outputs in said {
-            out(pooled(outputs, scale));
+        let rows = self.members.iter().map(|member| member.said.len()).max().unwrap_or(0);
+        for row in 0..rows {
+            let said = |member: &Member| Some((member.weight, *member.said.get(row)?));
+            out(pooled(self.members.iter().filter_map(said).collect(), scale));
         }
         acted
     }
@@ -100,7 +101,7 @@ impl Filter for Ensemble {
     }
 
     fn strain(&self) -> Gaussian<f64> {
-        let strains: Vec<_> = self.members.iter().map(|member| (member.weight, member.filter.strain())).collect();
+        let strains: Few<_> = self.members.iter().map(|member| (member.weight, member.filter.strain())).collect();
         scaled(pooled_gaussian(&sure(strains, |strain| strain.sd()), |strain| *strain), self.filtered_scale)
     }
 
@@ -124,20 +125,31 @@ impl Filter for Ensemble {
         self.pool_each(scale, out, |filter, out| filter.flush_lagged(out))
     }
 
-    fn smooth(
-        &mut self,
-        time_s: &[f64],
-        readings: &[Option<Reading<f64>>],
-    ) -> Result<Option<Vec<Output>>, (usize, StepError)> {
-        let mut said = Vec::new();
-        for member in &mut self.members {
-            let Some(outputs) = member.filter.smooth(time_s, readings)? else { return Ok(None) };
-            said.push((member.weight, outputs));
+    fn way_back<'a>(&'a mut self, rows: Rows<'a>) -> Result<Box<dyn WayBack + 'a>, (usize, StepError)> {
+        let back = |member: &'a mut Member| Ok((member.weight, member.filter.way_back(rows)?, Vec::new()));
+        let members = self.members.iter_mut().map(back).collect::<Result<_, _>>()?;
+        Ok(Box::new(SideBySide { members, scale: self.smoothed_scale }))
+    }
+}
+
+/// Members on their way back, segment by segment in step.
+struct SideBySide<'a> {
+    members: Vec<(f64, Box<dyn WayBack + 'a>, Vec<Output>)>,
+    scale: f64,
+}
+
+impl WayBack for SideBySide<'_> {
+    fn next_segment(&mut self, out: &mut Vec<Output>) -> Result<Option<Range<usize>>, (usize, StepError)> {
+        out.clear();
+        let mut rows = None;
+        for (_, back, said) in &mut self.members {
+            let Some(segment) = back.next_segment(said)? else { return Ok(None) };
+            rows = Some(segment);
         }
-        let row = |k: usize| {
-            pooled(said.iter().map(|(weight, outputs)| (*weight, outputs[k])).collect(), self.smoothed_scale)
-        };
-        Ok(Some((0..time_s.len()).map(row).collect()))
+        for k in 0..rows.as_ref().map_or(0, Range::len) {
+            out.push(pooled(self.members.iter().map(|(weight, _, said)| (*weight, said[k])).collect(), self.scale));
+        }
+        Ok(rows)
     }
 }
 
@@ -146,11 +158,14 @@ fn scaled(gaussian: Gaussian<f64>, sd_scale: f64) -> Gaussian<f64> {
 }
 
 /// The same with every weight divided by a deviation, and a sum of one.
-fn sure<X>(weighted: Vec<(f64, X)>, sd: impl Fn(&X) -> f64) -> Vec<(f64, X)> {
+fn sure<X>(mut weighted: Few<X>, sd: impl Fn(&X) -> f64) -> Few<X> {
     let smallest = weighted.iter().map(|(_, x)| sd(x)).fold(f64::INFINITY, f64::min);
     let share = |x: &X| if sd(x) > 0.0 { smallest / sd(x) } else { 1.0 };
     let total: f64 = weighted.iter().map(|(weight, x)| weight * share(x)).sum();
-    weighted.into_iter().map(|(weight, x)| (weight * share(&x) / total, x)).collect()
+    for (weight, x) in &mut weighted {
+        *weight = *weight * share(x) / total;
+    }
+    weighted
 }
 
 /// Mean and variance of a mixture of Gaussians whose weights sum to one.
@@ -161,7 +176,7 @@ fn pooled_gaussian<X>(weighted: &[(f64, X)], of: impl Fn(&X) -> Gaussian<f64>) -
 }
 
 /// What the members say together.
-fn pooled(outputs: Vec<(f64, Output)>, strain_sd_scale: f64) -> Output {
+fn pooled(outputs: Few<Output>, strain_sd_scale: f64) -> Output {
     let outputs = &sure(outputs, |output| output.estimate.strain.sd());
     let gaussian = |of: fn(&Estimate<f64>) -> Gaussian<f64>| pooled_gaussian(outputs, |output| of(&output.estimate));
     let mean = |of: &dyn Fn(&Output) -> f64| outputs.iter().map(|(weight, output)| weight * of(output)).sum::<f64>();
@@ -217,12 +232,15 @@ mod tests {
     #[test]
     fn the_surer_member_counts_more() {
         let at = |sd: f64| (0.5, Gaussian { mean: 0.0, variance: sd * sd });
-        let weights = |members: Vec<(f64, Gaussian<f64>)>| {
-            sure(members, |gaussian| gaussian.sd()).iter().map(|(weight, _)| *weight).collect::<Vec<f64>>()
+        let weights = |members: [(f64, Gaussian<f64>); 2]| {
+            sure(members.into_iter().collect(), |gaussian| gaussian.sd())
+                .iter()
+                .map(|(weight, _)| *weight)
+                .collect::<Vec<f64>>()
         };
-        assert_eq!(weights(vec![at(1.0), at(3.0)]), [0.75, 0.25]);
+        assert_eq!(weights([at(1.0), at(3.0)]), [0.75, 0.25]);
         // Exact knowledge drowns the rest.
-        assert_eq!(weights(vec![at(0.0), at(3.0)]), [1.0, 0.0]);
+        assert_eq!(weights([at(0.0), at(3.0)]), [1.0, 0.0]);
     }
 
     #[test]

@@ -1,3 +1,5 @@
+use std::ops::Range;
+
 use ohmstrain_ekf::{
     Belief, Dwell, Ekf, Estimate, Evidence, Gaussian, Guard, Hypotheses, Imm, Mixture, Particles, Phased, Reading,
     ReadingVerdict, SignSplit, StepError, StrainSensor, Ukf, Unscented,
@@ -48,6 +50,13 @@ pub trait Filter {
     /// See [`StepError`].
     fn flush_lagged(&mut self, out: &mut dyn FnMut(Output)) -> Result<(), StepError>;
 
+    /// Filters a recording, from the state the filter is in, and goes back through it segment by segment: the way to smooth
+    /// recordings that are too long to hold their states, or their estimates, in memory.
+    ///
+    /// # Errors
+    /// The row at which a step failed, and why; the filter stays as it was.
+    fn way_back<'a>(&'a mut self, rows: Rows<'a>) -> Result<Box<dyn WayBack + 'a>, (usize, StepError)>;
+
     /// Smooths a whole recording, from the state the filter is in; `None` if the estimator has no smoother.
     ///
     /// # Errors
@@ -56,7 +65,62 @@ pub trait Filter {
         &mut self,
         time_s: &[f64],
         readings: &[Option<Reading<f64>>],
-    ) -> Result<Option<Vec<Output>>, (usize, StepError)>;
+    ) -> Result<Option<Vec<Output>>, (usize, StepError)> {
+        let len = time_s.len().min(readings.len());
+        let row = |row: usize| (time_s[row], readings[row]);
+        let mut back = self.way_back(Rows::new(len, &row))?;
+        let (mut segment, mut outputs, mut first) = (Vec::new(), Vec::with_capacity(len), len);
+        while let Some(rows) = back.next_segment(&mut segment)? {
+            outputs.extend(segment.iter().rev());
+            first = rows.start;
+        }
+        outputs.reverse();
+        Ok((first == 0).then_some(outputs))
+    }
+}
+
+/// Rows of a recording, wherever they are kept.
+#[derive(Clone, Copy)]
+pub struct Rows<'a> {
+    len: usize,
+    row: &'a dyn Fn(usize) -> (f64, Option<Reading<f64>>),
+}
+
+impl<'a> Rows<'a> {
+    /// `len` rows; `row` gives time, s, and the reading `R/R₀ - 1` of each, `None` where it is missing.
+    #[must_use]
+    pub fn new(len: usize, row: &'a dyn Fn(usize) -> (f64, Option<Reading<f64>>)) -> Self {
+        Self { len, row }
+    }
+
+    /// How many.
+    #[must_use]
+    pub const fn len(&self) -> usize {
+        self.len
+    }
+
+    /// Whether there is none.
+    #[must_use]
+    pub const fn is_empty(&self) -> bool {
+        self.len == 0
+    }
+
+    /// One of them.
+    #[must_use]
+    pub fn get(&self, row: usize) -> (f64, Option<Reading<f64>>) {
+        (self.row)(row)
+    }
+}
+
+/// Goes back through a recording. What it holds in memory are the states of one segment, and a state for each of those
+/// before it.
+pub trait WayBack {
+    /// Smooths the last segment that has not been smoothed yet. `out` then holds its estimates in order of time; what is
+    /// returned are its rows, or `None` once the first row has been smoothed, or if the estimator has no smoother.
+    ///
+    /// # Errors
+    /// The row at which a step failed, and why.
+    fn next_segment(&mut self, out: &mut Vec<Output>) -> Result<Option<Range<usize>>, (usize, StepError)>;
 }
 
 /// What a filter or smoother says at one row.

@@ -40,6 +40,8 @@ mod running;
 mod samples;
 mod scores;
 mod sd_scale;
+mod stepper;
+mod way_back;
 
 pub use baselines::{Baseline, Baselines, Features, Fir, LeakyBank, LowPassMode, Regression, StaticCubic};
 pub use bootstrap::{Bootstrap, bootstrap_law};
@@ -47,7 +49,7 @@ pub use calibrate::{Calibration, Stage, calibrate};
 pub use ensemble::EnsembleParams;
 pub use error::CalibrationError;
 pub use estimator_params::{EstimatorKind, EstimatorParams, MotionParams, NoiseParams, PhaseParams};
-pub use filter::{Filter, Output, Start, build_filter};
+pub use filter::{Filter, Output, Rows, Start, WayBack, build_filter};
 pub use identifiability::{Identifiability, OnBound, identifiability};
 pub use lag::reference_lag;
 pub use law_fit::{CrossFit, GaugeFamily, LawFit, LawOptions, fit_law};

@@ -1,22 +1,25 @@
-use std::collections::{HashMap, VecDeque};
+use std::collections::VecDeque;
+use std::mem;
 
 use ohmstrain_ekf::{
-    Advanced, Belief, Estimate, Estimator, Gaussian, Guard, Guarded, Innovation, PastStep, Reading, ReadingVerdict,
-    State, StepError, StrainSensor, Streak, smooth_back_through,
+    Belief, Estimate, Estimator, Gaussian, Guard, PastStep, Reading, State, StepError, StrainSensor,
+    smooth_back_through,
 };
 use ohmstrain_model::StrainRange;
 
-use crate::filter::{Filter, Output};
+use crate::filter::{Filter, Output, Rows, WayBack};
+use crate::stepper::{Moment, Seen, Stepper};
+use crate::way_back::Segments;
 
-/// An estimator with its state and the steps it has prepared.
+/// An estimator with its state.
 pub(crate) struct Running<E: Estimator<f64, N, L>, S, const M: usize, const B: usize, const N: usize, const L: usize> {
-    estimator: E,
+    pub stepper: Stepper<E, N, L>,
     model: S,
     interval: Interval,
-    guard: Guard<f64>,
-    now: Moment<E::State>,
-    prepared: HashMap<u64, E::Prepared>,
+    pub now: Moment<E::State>,
     pending: VecDeque<Pending<E::State, E::Prepared>>,
+    /// Estimates on their way out, newest first.
+    due: Vec<Output>,
 }
 
 /// How strain is reported: within limits, its standard deviation times a calibrated factor.
@@ -27,22 +30,6 @@ pub(crate) struct Interval {
     pub smoothed_scale: f64,
 }
 
-/// Where a filter is.
-#[derive(Clone)]
-struct Moment<S> {
-    time_s: Option<f64>,
-    state: S,
-    streak: Streak,
-    seen: Seen,
-}
-
-/// What a row's reading said.
-#[derive(Clone, Copy)]
-struct Seen {
-    innovation: Option<Innovation<f64>>,
-    verdict: ReadingVerdict,
-}
-
 /// A row whose estimate waits for later readings.
 struct Pending<S, P> {
     time_s: f64,
@@ -51,55 +38,14 @@ struct Pending<S, P> {
     onward: Option<PastStep<S, P, f64>>,
 }
 
-/// Recordings repeat a few hundred step lengths; a stream whose steps never repeat must not fill the memory.
-const MOST_PREPARED: usize = 4096;
-/// Rows of a recording whose states are in memory at once while it is smoothed; the others are computed again.
-const SMOOTHED_AT_ONCE: usize = 4096;
-
 impl<E, S, const M: usize, const B: usize, const N: usize, const L: usize> Running<E, S, M, B, N, L>
 where
     E: Estimator<f64, N, L>,
     S: StrainSensor<f64, M, B, N>,
 {
     pub(crate) fn new(estimator: E, state: E::State, model: S, interval: Interval) -> Self {
-        let seen = Seen { innovation: None, verdict: ReadingVerdict::Missing };
-        let now = Moment { time_s: None, state, streak: Streak::default(), seen };
-        let (guard, prepared, pending) = (Guard::none(), HashMap::new(), VecDeque::new());
-        Self { estimator, model, interval, guard, now, prepared, pending }
-    }
-
-    /// One step; the filter changes only if it succeeds.
-    fn advance(
-        &mut self,
-        time_s: f64,
-        reading: Option<Reading<f64>>,
-    ) -> Result<PastStep<E::State, E::Prepared, f64>, StepError> {
-        let prepared = self.prepare_until(time_s)?;
-        let Moment { state, streak, .. } = &self.now;
-        let Guarded { advanced, from, used, verdict, streak } =
-            self.guard.advance(&self.estimator, state, *streak, &prepared, reading)?;
-        let Advanced { state, innovation } = advanced;
-        self.now = Moment { time_s: Some(time_s), state, streak, seen: Seen { innovation, verdict } };
-        Ok(PastStep { from, prepared, reading: used })
-    }
-
-    /// The prepared step to a time, remembered by its length in nanoseconds: differences of decimal times repeat to
-    /// rounding only.
-    fn prepare_until(&mut self, time_s: f64) -> Result<E::Prepared, StepError> {
-        let dt_s = time_s - self.now.time_s.unwrap_or(time_s);
-        if !dt_s.is_finite() {
-            return Err(StepError::NonFiniteTimeStep);
-        }
-        if dt_s < 0.0 {
-            return Err(StepError::NegativeTimeStep);
-        }
-        let nanoseconds = (dt_s * 1e9).round();
-        if self.prepared.len() >= MOST_PREPARED {
-            self.prepared.clear();
-        }
-        let estimator = &self.estimator;
-        let remembered = self.prepared.entry(nanoseconds as u64);
-        Ok(*remembered.or_insert_with(|| estimator.prepare(nanoseconds * 1e-9)))
+        let (pending, due) = (VecDeque::new(), Vec::new());
+        Self { stepper: Stepper::new(estimator), model, interval, now: Moment::start(state), pending, due }
     }
 
     fn output(&self, state: &E::State, seen: Seen, sd_scale: f64) -> Output {
@@ -111,19 +57,9 @@ where
         }
     }
 
-    /// Goes through rows forward from `start` and hands each step, and what was seen at its end, to `visit`.
-    fn replay(
-        &mut self,
-        start: &Moment<E::State>,
-        rows: impl Iterator<Item = (usize, (f64, Option<Reading<f64>>))>,
-        mut visit: impl FnMut(&Self, PastStep<E::State, E::Prepared, f64>),
-    ) -> Result<(), (usize, StepError)> {
-        self.now = start.clone();
-        for (row, (time_s, reading)) in rows {
-            let step = self.advance(time_s, reading).map_err(|error| (row, error))?;
-            visit(self, step);
-        }
-        Ok(())
+    /// What a smoother says at a row.
+    pub(crate) fn smoothed_output(&self, state: &E::State, seen: Seen) -> Output {
+        self.output(state, seen, self.interval.smoothed_scale)
     }
 
     /// Hands out the first `count` of the rows that wait, given everything up to now.
@@ -132,20 +68,23 @@ where
             return Ok(());
         }
         let scale = self.interval.filtered_scale.max(self.interval.smoothed_scale);
-        let mut earlier = Vec::new();
+        let mut due = mem::take(&mut self.due);
         let waiting = self.pending.len();
         let mut row = waiting - 1;
         let steps = self.pending.iter().rev().filter_map(|pending| pending.onward.as_ref());
-        smooth_back_through(&self.estimator, &self.now.state, steps, |state| {
+        let smoothed = smooth_back_through(&self.stepper.estimator, &self.now.state, steps, |state| {
             row -= 1;
             if row < count {
-                earlier.push(self.output(state, self.pending[row].seen, scale));
+                due.push(self.output(state, self.pending[row].seen, scale));
             }
             row > 0
-        })?;
-        for output in earlier.into_iter().rev() {
-            out(output);
+        });
+        if smoothed.is_ok() {
+            due.iter().rev().for_each(|output| out(*output));
         }
+        due.clear();
+        self.due = due;
+        smoothed?;
         if count == waiting {
             out(self.output(&self.now.state, self.now.seen, scale));
         }
@@ -160,21 +99,11 @@ where
     S: StrainSensor<f64, M, B, N>,
 {
     fn guard(&mut self, guard: Guard<f64>) {
-        self.guard = guard;
+        self.stepper.guard = guard;
     }
 
     fn step(&mut self, time_s: f64, reading: Option<Reading<f64>>) -> Result<(), StepError> {
-        if !self.guard.is_none() {
-            return self.advance(time_s, reading).map(|_| ());
-        }
-        // Nothing is turned down and nobody goes back: no state needs to be kept.
-        let prepared = self.prepare_until(time_s)?;
-        let Advanced { state, innovation } = self.estimator.advance(&self.now.state, &prepared, reading)?;
-        let verdict = if innovation.is_some() { ReadingVerdict::Accepted } else { ReadingVerdict::Missing };
-        self.now.time_s = Some(time_s);
-        self.now.state = state;
-        self.now.seen = Seen { innovation, verdict };
-        Ok(())
+        self.stepper.advance_only(&mut self.now, time_s, reading)
     }
 
     fn strain(&self) -> Gaussian<f64> {
@@ -197,7 +126,8 @@ where
         // Rows that fall due before this reading was taken do not get to see it.
         let overdue = self.pending.partition_point(|row| row.time_s + lag_s < time_s);
         self.emit(overdue, out)?;
-        let step = self.advance(time_s, reading)?;
+        let (now, step) = self.stepper.advance(&self.now, time_s, reading)?;
+        self.now = now;
         if let Some(before) = self.pending.back_mut() {
             before.onward = Some(step);
         }
@@ -210,38 +140,7 @@ where
         self.emit(self.pending.len(), out)
     }
 
-    fn smooth(
-        &mut self,
-        time_s: &[f64],
-        readings: &[Option<Reading<f64>>],
-    ) -> Result<Option<Vec<Output>>, (usize, StepError)> {
-        let rows = || time_s.iter().copied().zip(readings.iter().copied()).enumerate();
-        let mut checkpoints = vec![self.now.clone()];
-        let mut seen = Vec::with_capacity(time_s.len());
-        self.replay(&self.now.clone(), rows(), |running, _| {
-            seen.push(running.now.seen);
-            if seen.len() % SMOOTHED_AT_ONCE == 0 {
-                checkpoints.push(running.now.clone());
-            }
-        })?;
-        let end = self.now.clone();
-        let mut smoothed = end.state.clone();
-        let mut outputs = Vec::with_capacity(time_s.len());
-        for (chunk, start) in checkpoints.iter().enumerate().rev() {
-            let first = chunk * SMOOTHED_AT_ONCE;
-            let mut steps = Vec::new();
-            let of_chunk = rows().skip(first).take(SMOOTHED_AT_ONCE);
-            self.replay(start, of_chunk, |_, step| steps.push(step))?;
-            for (k, step) in steps.iter().enumerate().rev() {
-                let row = first + k;
-                outputs.push(self.output(&smoothed, seen[row], self.interval.smoothed_scale));
-                let back = self.estimator.smooth_back(&step.from, &step.prepared, step.reading, &smoothed);
-                let Some(earlier) = back.map_err(|error| (row, error))? else { return Ok(None) };
-                smoothed = earlier;
-            }
-        }
-        self.now = end;
-        outputs.reverse();
-        Ok(Some(outputs))
+    fn way_back<'a>(&'a mut self, rows: Rows<'a>) -> Result<Box<dyn WayBack + 'a>, (usize, StepError)> {
+        Ok(Box::new(Segments::new(self, rows)?))
     }
 }

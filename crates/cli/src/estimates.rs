@@ -1,5 +1,6 @@
 use std::io::Write;
 
+use ohmstrain_bench_data::RowWriter;
 use ohmstrain_calib::{Output, Quantity, ReadingUnit, SensorParams};
 use ohmstrain_ekf::ReadingVerdict;
 use ohmstrain_model::Joint;
@@ -8,7 +9,7 @@ use crate::error::CliError;
 
 /// Writes `estimates.csv`: one row per reading, cells that are not known left empty.
 pub struct EstimateWriter<W: Write> {
-    csv: csv::Writer<W>,
+    rows: RowWriter<W>,
     columns: Vec<Column>,
     limits: (f64, f64),
     joint: Option<Joint<f64>>,
@@ -76,10 +77,11 @@ impl<W: Write> EstimateWriter<W> {
                 }
             }
         }
-        let mut csv = csv::Writer::from_writer(out);
-        csv.write_record(selected.iter().map(|(name, _)| *name)).map_err(csv_error)?;
+        let mut rows = RowWriter::new(out);
+        selected.iter().for_each(|(name, _)| rows.text(name));
+        rows.end()?;
         Ok(Self {
-            csv,
+            rows,
             columns: selected.into_iter().map(|(_, column)| column).collect(),
             limits: (params.limits.lower, params.limits.upper),
             joint,
@@ -88,62 +90,70 @@ impl<W: Write> EstimateWriter<W> {
 
     /// Writes one row.
     pub fn write(&mut self, row: &EstimateRow) -> Result<(), CliError> {
-        for i in 0..self.columns.len() {
-            let cell = self.cell(self.columns[i], row);
-            self.csv.write_field(cell).map_err(csv_error)?;
+        for column in &self.columns {
+            match column {
+                Column::Flags => self.rows.words(flags(row, self.limits)),
+                _ => self.rows.number(value(*column, row, self.joint.as_ref())),
+            }
         }
-        self.csv.write_record(None::<&[u8]>).map_err(csv_error)
+        Ok(self.rows.end()?)
     }
 
     /// Hands everything written so far on to the reader.
     pub fn flush(&mut self) -> Result<(), CliError> {
-        Ok(self.csv.flush()?)
+        Ok(self.rows.flush()?)
     }
 
-    fn cell(&self, column: Column, row: &EstimateRow) -> String {
-        let estimate = &row.output.estimate;
-        let angle = || {
-            let (angle, sd) = self.joint.as_ref()?.angle_rad(estimate.strain.mean, estimate.strain.sd());
-            Some((angle.to_degrees(), sd.to_degrees()))
-        };
-        let value = match column {
-            Column::Time => row.time_s,
-            Column::Reading => row.reading,
-            Column::Strain => estimate.strain.mean,
-            Column::StrainSd => estimate.strain.sd(),
-            Column::Rate => estimate.rate.mean,
-            Column::RateSd => estimate.rate.sd(),
-            Column::Relaxation => estimate.relaxation.mean,
-            Column::RelaxationSd => estimate.relaxation.sd(),
-            Column::Baseline => estimate.baseline,
-            Column::Settled => row.rest_reading * (1.0 + estimate.settled.mean),
-            Column::SettledSd => row.rest_reading * estimate.settled.sd(),
-            Column::Phase(index) => row.output.phases.map_or(f64::NAN, |phases| phases[index]),
-            Column::BeyondBorder => estimate.beyond_border,
-            Column::Nis => row.output.nis.unwrap_or(f64::NAN),
-            Column::Angle => angle().map_or(f64::NAN, |(angle, _)| angle),
-            Column::AngleSd => angle().map_or(f64::NAN, |(_, sd)| sd),
-            Column::Flags => return self.flags(row),
-        };
-        if value.is_nan() { String::new() } else { value.to_string() }
+    /// What is written to.
+    pub const fn get_mut(&mut self) -> &mut W {
+        self.rows.get_mut()
     }
 
-    fn flags(&self, row: &EstimateRow) -> String {
-        let strain = row.output.estimate.strain.mean;
-        [
-            ("missing", row.reading.is_nan() && !row.saturated),
-            ("saturated", row.saturated),
-            ("rejected", row.output.verdict == ReadingVerdict::Rejected),
-            ("downweighted", row.output.verdict == ReadingVerdict::Downweighted),
-            ("readmitted", row.output.verdict == ReadingVerdict::Readmitted),
-            ("ramp_border", row.output.estimate.near_ramp_border),
-            ("at_limit", strain <= self.limits.0 || strain >= self.limits.1),
-        ]
-        .into_iter()
-        .filter_map(|(name, raised)| raised.then_some(name))
-        .collect::<Vec<_>>()
-        .join("|")
+    /// What was written to, without a flush.
+    pub fn into_inner(self) -> W {
+        self.rows.into_inner()
     }
+}
+
+/// A cell's number; NaN where it is not known.
+fn value(column: Column, row: &EstimateRow, joint: Option<&Joint<f64>>) -> f64 {
+    let estimate = &row.output.estimate;
+    let angle = || joint.map(|joint| joint.angle_rad(estimate.strain.mean, estimate.strain.sd()));
+    match column {
+        Column::Time => row.time_s,
+        Column::Reading => row.reading,
+        Column::Strain => estimate.strain.mean,
+        Column::StrainSd => estimate.strain.sd(),
+        Column::Rate => estimate.rate.mean,
+        Column::RateSd => estimate.rate.sd(),
+        Column::Relaxation => estimate.relaxation.mean,
+        Column::RelaxationSd => estimate.relaxation.sd(),
+        Column::Baseline => estimate.baseline,
+        Column::Settled => row.rest_reading * (1.0 + estimate.settled.mean),
+        Column::SettledSd => row.rest_reading * estimate.settled.sd(),
+        Column::Phase(index) => row.output.phases.map_or(f64::NAN, |phases| phases[index]),
+        Column::BeyondBorder => estimate.beyond_border,
+        Column::Nis => row.output.nis.unwrap_or(f64::NAN),
+        Column::Angle => angle().map_or(f64::NAN, |(angle, _)| angle.to_degrees()),
+        Column::AngleSd => angle().map_or(f64::NAN, |(_, sd)| sd.to_degrees()),
+        Column::Flags => f64::NAN,
+    }
+}
+
+/// Names of the flags that are raised.
+fn flags(row: &EstimateRow, limits: (f64, f64)) -> impl Iterator<Item = &'static str> {
+    let strain = row.output.estimate.strain.mean;
+    [
+        ("missing", row.reading.is_nan() && !row.saturated),
+        ("saturated", row.saturated),
+        ("rejected", row.output.verdict == ReadingVerdict::Rejected),
+        ("downweighted", row.output.verdict == ReadingVerdict::Downweighted),
+        ("readmitted", row.output.verdict == ReadingVerdict::Readmitted),
+        ("ramp_border", row.output.estimate.near_ramp_border),
+        ("at_limit", strain <= limits.0 || strain >= limits.1),
+    ]
+    .into_iter()
+    .filter_map(|(name, raised)| raised.then_some(name))
 }
 
 /// All columns of a sensor, in order.
@@ -179,11 +189,4 @@ fn columns(params: &SensorParams) -> Vec<(&'static str, Column)> {
         columns.extend([("angle_deg", Column::Angle), ("angle_sd", Column::AngleSd)]);
     }
     columns
-}
-
-fn csv_error(error: csv::Error) -> CliError {
-    match error.into_kind() {
-        csv::ErrorKind::Io(error) => error.into(),
-        kind => CliError::Other(format!("cannot write CSV: {kind:?}")),
-    }
 }

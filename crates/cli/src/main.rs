@@ -10,6 +10,7 @@ mod estimates;
 mod input;
 mod output;
 mod progress;
+mod readings;
 mod report;
 mod run;
 mod sensor_file;

@@ -111,7 +111,12 @@ pub fn smooth(
 ) -> Result<Vec<Output>, CliError> {
     let smoothed =
         filter.smooth(&recording.trace.time_s, readings).map_err(|(k, error)| step_error(&recording.name, k, error))?;
-    smoothed.ok_or_else(|| CliError::Arguments("--estimator: this one has no smoother".into()))
+    smoothed.ok_or_else(no_smoother)
+}
+
+/// The estimator has no smoother.
+pub fn no_smoother() -> CliError {
+    CliError::Arguments("--estimator: this one has no smoother".into())
 }
 
 /// A filter's refusal as an error about a line of the input.

@@ -1,9 +1,8 @@
 use ohmstrain_calib::{SensorParams, Validity};
 
-use crate::error::CliError;
 use crate::input::reading_column;
 
-/// Says on stderr, once for each, that a sensor is used outside of what its calibration has seen.
+/// Says, once for each, that a sensor is used outside of what its calibration has seen.
 pub struct ValidityWatch {
     file: String,
     validity: Validity,
@@ -61,31 +60,32 @@ impl ValidityWatch {
         }
     }
 
-    /// Takes a row: the reading as recorded, the estimated rate, and the true strain; NaN for what is missing. An
+    /// Takes a row and says what there is to `say`: the reading as recorded, the estimated rate, and the true strain; NaN for what is missing. An
     /// uncertain rate is estimated near zero, so that a high one means something.
-    pub fn see(&mut self, time_s: f64, reading: f64, rate: f64, truth: f64) {
+    pub fn see(&mut self, time_s: f64, reading: f64, rate: f64, truth: f64, say: &mut dyn FnMut(String)) {
         let Validity { lower, upper, fastest_rate_per_s: fastest, duration_s } = self.validity;
         let start_s = *self.start_s.get_or_insert(time_s);
         if !self.long && time_s - start_s > duration_s {
             self.long = true;
-            self.warn(time_s, &format!("longer than the {duration_s:.1} s of the calibration"));
+            say(self.warning(time_s, &format!("longer than the {duration_s:.1} s of the calibration")));
         }
         if self.fast.see(rate.abs() > fastest) {
             let quantity = self.quantity;
-            self.warn(time_s, &format!("{quantity} changes faster than the calibration's {fastest:.4} per second"));
+            say(self
+                .warning(time_s, &format!("{quantity} changes faster than the calibration's {fastest:.4} per second")));
         }
         let (low, high) = self.readings;
         if reading.is_finite() && self.beyond_readings.see(!(low..=high).contains(&reading)) {
             let column = self.reading;
-            self.warn(time_s, &format!("{column} is outside of the calibration's {low:.5} to {high:.5}"));
+            say(self.warning(time_s, &format!("{column} is outside of the calibration's {low:.5} to {high:.5}")));
         }
         if truth.is_finite() && self.beyond_strains.see(!(lower..=upper).contains(&truth)) {
             let quantity = self.quantity;
-            self.warn(time_s, &format!("{quantity} is outside of the calibration's {lower:.4} to {upper:.4}"));
+            say(self.warning(time_s, &format!("{quantity} is outside of the calibration's {lower:.4} to {upper:.4}")));
         }
     }
 
-    fn warn(&self, time_s: f64, what: &str) {
-        CliError::warning(&format!("{}: at {time_s} s: {what}; estimates are extrapolations", self.file));
+    fn warning(&self, time_s: f64, what: &str) -> String {
+        format!("{}: at {time_s} s: {what}; estimates are extrapolations", self.file)
     }
 }

@@ -8,9 +8,13 @@ use crate::args::{FilterArgs, RestResistance};
 use crate::error::CliError;
 use crate::estimates::{EstimateRow, EstimateWriter};
 use crate::input::{self, check_unit, is_stdin};
+use crate::readings::no_row;
 use crate::run::{filter, relative_row, rest_reading, step_error_at};
 use crate::sensor_file;
 use crate::validity::ValidityWatch;
+
+/// Bytes handed to standard output at once, unless somebody waits for them.
+const WRITTEN_AT_ONCE: usize = 1 << 16;
 
 /// Turns readings into strain as they arrive. Memory does not grow with the recording.
 pub fn run(args: &FilterArgs) -> Result<(), CliError> {
@@ -20,11 +24,12 @@ pub fn run(args: &FilterArgs) -> Result<(), CliError> {
     let rows = input::open(&args.trace_file, &args.estimate.trace.metadata())?;
     check_unit(&input::header(&rows), rows.reading_kind(), params.reading)?;
     input::take_joint(&mut params, rows.metadata());
-    let out = io::BufWriter::new(io::stdout().lock());
+    let out = io::BufWriter::with_capacity(WRITTEN_AT_ONCE, io::stdout().lock());
     let mut writer = EstimateWriter::new(out, &params, &args.estimate.columns)?;
     let live = is_stdin(&args.trace_file) || !args.trace_file.is_file();
-    let streamed =
-        Stream { params: &params, args, filter, live, waiting: VecDeque::new(), watch: None }.run(rows, &mut writer);
+    let (waiting, outputs) = (VecDeque::new(), Vec::new());
+    let stream = Stream { params: &params, args, filter, live, waiting, outputs, watch: None };
+    let streamed = stream.run(rows, &mut writer);
     // What was estimated before an error is still good.
     writer.flush().and(streamed)
 }
@@ -37,6 +42,8 @@ struct Stream<'a> {
     live: bool,
     /// Rows whose estimates wait for later readings.
     waiting: VecDeque<Row>,
+    /// Estimates that have just become due.
+    outputs: Vec<Output>,
     /// Says when the calibration does not reach; there once R₀ is known.
     watch: Option<ValidityWatch>,
 }
@@ -59,9 +66,7 @@ impl Stream<'_> {
             }
         }
         if first.is_empty() {
-            let line = rows.line() + 1;
-            let none = "expected at least one row of data, found the end of the file";
-            return Err(CliError::Input(format!("{file}:{line}: {none}")));
+            return Err(no_row(&rows));
         }
         let rest_reading = rest_reading(wanted, self.params, first.iter().map(|row| row.reading.value), &file)?;
         self.watch = Some(ValidityWatch::new(&file, self.params, rest_reading));
@@ -73,9 +78,8 @@ impl Stream<'_> {
             }
         }
         // The rows that still wait get their estimates, whatever stopped the stream.
-        let mut outputs = Vec::new();
-        let flushed = self.filter.flush_lagged(&mut |output| outputs.push(output));
-        self.write_waiting(&outputs, rest_reading, writer)?;
+        let flushed = self.filter.flush_lagged(&mut |output| self.outputs.push(output));
+        self.write_waiting(rest_reading, writer)?;
         streamed.and(flushed.map_err(|error| CliError::Input(format!("{file}: {error}"))))
     }
 
@@ -94,30 +98,30 @@ impl Stream<'_> {
                 self.write(&row, rest_reading, self.filter.output(), writer)?;
             }
             Some(lag_s) => {
-                let mut outputs = Vec::new();
+                let outputs = &mut self.outputs;
                 let taken = self.filter.step_lagged(time_s, reading, lag_s, &mut |output| outputs.push(output));
                 if taken.is_ok() {
                     self.waiting.push_back(row);
                 }
-                self.write_waiting(&outputs, rest_reading, writer)?;
+                self.write_waiting(rest_reading, writer)?;
                 taken.map_err(refused)?;
             }
         }
         if self.live { writer.flush() } else { Ok(()) }
     }
 
-    /// Writes the rows that have waited longest, with their estimates.
+    /// Writes the rows that have waited longest, with the estimates that have become due.
     fn write_waiting<W: io::Write>(
         &mut self,
-        outputs: &[Output],
         rest_reading: f64,
         writer: &mut EstimateWriter<W>,
     ) -> Result<(), CliError> {
-        for output in outputs {
+        for k in 0..self.outputs.len() {
             if let Some(row) = self.waiting.pop_front() {
-                self.write(&row, rest_reading, *output, writer)?;
+                self.write(&row, rest_reading, self.outputs[k], writer)?;
             }
         }
+        self.outputs.clear();
         Ok(())
     }
 
@@ -129,7 +133,8 @@ impl Stream<'_> {
         writer: &mut EstimateWriter<W>,
     ) -> Result<(), CliError> {
         if let Some(watch) = &mut self.watch {
-            watch.see(row.time_s, row.reading.value, output.estimate.rate.mean, f64::NAN);
+            let rate = output.estimate.rate.mean;
+            watch.see(row.time_s, row.reading.value, rate, f64::NAN, &mut |warning| CliError::warning(&warning));
         }
         writer.write(&estimate_row(row, rest_reading, output))
     }

@@ -1,10 +1,11 @@
 mod evaluation;
 mod sensors;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use evaluation::{Evaluation, RecordingScores};
 use ohmstrain_calib::{Baselines, Samples, reference_lag};
+use rayon::prelude::*;
 use sensors::{Rivals, Sensor};
 
 use crate::args::{Estimators, EvaluateArgs};
@@ -37,11 +38,8 @@ pub fn run(args: &EvaluateArgs) -> Result<(), CliError> {
 fn with_sensor_file(args: &EvaluateArgs, path: &Path, evaluation: &mut Evaluation) -> Result<(), CliError> {
     let sensors = Sensor::from_file(path, args.estimator)?;
     let rivals = Rivals { static_cubic: sensors[0].params.static_cubic, learned: None };
-    for path in &args.traces {
-        let recording = read(args, path)?;
-        evaluation.add(judge(&recording, args.from, &sensors, &rivals)?);
-    }
-    Ok(())
+    let judged = |path: &PathBuf| judge(&read(args, path)?, args.from, &sensors, &rivals);
+    add_until_error(evaluation, args.traces.par_iter().map(judged).collect())
 }
 
 /// Every recording with parameters from its first rows.
@@ -54,7 +52,8 @@ fn with_split(args: &EvaluateArgs, share: f64, evaluation: &mut Evaluation) -> R
         let (sensors, rivals) = calibrated(&training, args.estimator, &progress)?;
         progress.doing("scoring");
         let lag_s = reference_lag(&recording.samples()?, &sensors[0].params.law);
-        let mut scores = judge(&recording, recording.trace.time_s.get(rows).copied(), &sensors, &rivals)?;
+        let Judged { mut scores, .. } =
+            judge(&recording, recording.trace.time_s.get(rows).copied(), &sensors, &rivals)?;
         scores.iter_mut().for_each(|scores| scores.lag_s = Some(lag_s));
         evaluation.add(scores);
     }
@@ -70,8 +69,17 @@ fn with_training(args: &EvaluateArgs, evaluation: &mut Evaluation) -> Result<(),
     let tests: Vec<Recording> = args.test.iter().map(|path| read(path)).collect::<Result<_, _>>()?;
     let (sensors, rivals) = calibrated(&training, args.estimator, &progress)?;
     progress.doing("scoring");
-    for recording in &tests {
-        evaluation.add(judge(recording, args.from, &sensors, &rivals)?);
+    let judged = |recording: &Recording| judge(recording, args.from, &sensors, &rivals);
+    add_until_error(evaluation, tests.par_iter().map(judged).collect())
+}
+
+/// Adds scores in the order of the recordings, whichever was done first, up to the first that has none. Warnings wait
+/// until then, so that they come in order, too.
+fn add_until_error(evaluation: &mut Evaluation, judged: Vec<Result<Judged, CliError>>) -> Result<(), CliError> {
+    for judged in judged {
+        let Judged { scores, warnings } = judged?;
+        warnings.iter().for_each(|warning| CliError::warning(warning));
+        evaluation.add(scores);
     }
     Ok(())
 }
@@ -93,14 +101,17 @@ fn calibrated(
     Ok((sensors, Rivals { static_cubic: baselines.static_cubic, learned: Some(baselines) }))
 }
 
+/// What comes of a recording.
+#[derive(Default)]
+struct Judged {
+    scores: Vec<RecordingScores>,
+    warnings: Vec<String>,
+}
+
 /// Scores of every sensor on the rows of a recording from `from` on.
-fn judge(
-    recording: &Recording,
-    from: Option<f64>,
-    sensors: &[Sensor],
-    rivals: &Rivals,
-) -> Result<Vec<RecordingScores>, CliError> {
-    let Some(first) = sensors.first() else { return Ok(vec![]) };
+fn judge(recording: &Recording, from: Option<f64>, sensors: &[Sensor], rivals: &Rivals) -> Result<Judged, CliError> {
+    let mut judged = Judged::default();
+    let Some(first) = sensors.first() else { return Ok(judged) };
     check_unit(&recording.header, recording.trace.readings.kind, first.params.reading)?;
     recording.samples()?;
     recording.check_quantity(first.params.quantity)?;
@@ -109,7 +120,11 @@ fn judge(
         CliError::Input(format!("{}: expected a reference at {rows}, found none", recording.name))
     };
     let baselines = rivals.scores(recording, from).ok_or_else(nothing)?;
-    sensors.iter().map(|sensor| sensor.judge(recording, from, baselines)?.ok_or_else(nothing)).collect()
+    for sensor in sensors {
+        let scores = sensor.judge(recording, from, baselines, &mut judged.warnings)?;
+        judged.scores.push(scores.ok_or_else(nothing)?);
+    }
+    Ok(judged)
 }
 
 fn check(evaluation: &Evaluation) -> Result<(), CliError> {

@@ -64,19 +64,23 @@ impl Sensor {
         wanted.into_iter().map(calibrate).collect()
     }
 
-    /// Scores on the rows of a recording from `from` on, the filter started at the first; `None` without a reference.
+    /// Scores on the rows of a recording from `from` on, the filter started at the first; `None` without a reference. What
+    /// casts doubt on them is added to `warnings`.
     pub fn judge(
         &self,
         recording: &Recording,
         from: Option<f64>,
         baselines: BaselineScores,
+        warnings: &mut Vec<String>,
     ) -> Result<Option<RecordingScores>, CliError> {
         let estimated = estimate(recording, &self.params, Some(self.kind))?;
         if self.calibration_s.is_none() {
             let trace = &recording.trace;
             let mut watch = ValidityWatch::new(&recording.name, &self.params, self.params.rest_reading);
             for (k, output) in estimated.filtered.iter().enumerate() {
-                watch.see(trace.time_s[k], trace.readings.values[k], output.estimate.rate.mean, recording.truth(k));
+                let rate = output.estimate.rate.mean;
+                let mut keep = |warning: String| warnings.push(warning);
+                watch.see(trace.time_s[k], trace.readings.values[k], rate, recording.truth(k), &mut keep);
             }
         }
         let scores = |outputs| scoring::of_outputs(recording, outputs, from);

@@ -1,0 +1,186 @@
+use std::io::{self, Write};
+
+/// Writes rows of numbers as CSV, one at a time, without an allocation per cell.
+///
+/// Numbers are the shortest that read back as the same `f64`, without exponents, as `f64`'s `Display` has them; a cell
+/// without a number stays empty. Nothing that is written here needs quotation marks.
+///
+/// ```
+/// use ohmstrain_bench_data::RowWriter;
+/// let mut rows = RowWriter::new(Vec::new());
+/// for cell in ["time_s", "strain", "flags"] {
+///     rows.text(cell);
+/// }
+/// rows.end()?;
+/// rows.number(0.5);
+/// rows.number(1e-7);
+/// rows.words(["missing", "at_limit"].into_iter());
+/// rows.end()?;
+/// assert_eq!(rows.into_inner(), b"time_s,strain,flags\n0.5,0.0000001,missing|at_limit\n");
+/// # Ok::<(), std::io::Error>(())
+/// ```
+#[derive(Debug)]
+pub struct RowWriter<W> {
+    out: W,
+    /// The row so far, a comma behind every cell.
+    row: Vec<u8>,
+}
+
+impl<W: Write> RowWriter<W> {
+    /// Writes to `out` once per row: hand over something with a buffer.
+    pub const fn new(out: W) -> Self {
+        Self { out, row: Vec::new() }
+    }
+
+    /// A cell of text, which contains no comma, quotation mark or line end.
+    pub fn text(&mut self, text: &str) {
+        debug_assert!(!text.contains([',', '"', '\n', '\r']));
+        self.row.extend_from_slice(text.as_bytes());
+        self.row.push(b',');
+    }
+
+    /// A cell with a number; an empty one for NaN.
+    pub fn number(&mut self, value: f64) {
+        if !value.is_nan() {
+            append_number(&mut self.row, value);
+        }
+        self.row.push(b',');
+    }
+
+    /// A cell with words between which stands `|`.
+    pub fn words<'a>(&mut self, words: impl Iterator<Item = &'a str>) {
+        let start = self.row.len();
+        for word in words {
+            if self.row.len() > start {
+                self.row.push(b'|');
+            }
+            self.row.extend_from_slice(word.as_bytes());
+        }
+        self.row.push(b',');
+    }
+
+    /// Ends the row.
+    ///
+    /// # Errors
+    /// What `out` says.
+    pub fn end(&mut self) -> io::Result<()> {
+        if self.row == b"," {
+            // A row of one empty cell would be a blank line, which readers pass over.
+            self.row.splice(.., *b"\"\",");
+        }
+        if let Some(last) = self.row.last_mut() {
+            *last = b'\n';
+        }
+        let written = self.out.write_all(&self.row);
+        self.row.clear();
+        written
+    }
+
+    /// Hands everything written so far on.
+    ///
+    /// # Errors
+    /// What the writer says.
+    pub fn flush(&mut self) -> io::Result<()> {
+        self.out.flush()
+    }
+
+    /// What is written to.
+    pub const fn get_mut(&mut self) -> &mut W {
+        &mut self.out
+    }
+
+    /// What was written to, without a flush.
+    pub fn into_inner(self) -> W {
+        self.out
+    }
+}
+
+/// A number that is not NaN as `f64`'s `Display` has it, several times faster.
+#[inline]
+fn append_number(out: &mut Vec<u8>, value: f64) {
+    if value.is_infinite() {
+        out.extend_from_slice(if value > 0.0 { b"inf" } else { b"-inf" });
+        return;
+    }
+    let mut buffer = zmij::Buffer::new();
+    let text = buffer.format_finite(value).as_bytes();
+    match text.iter().rposition(|byte| *byte == b'e') {
+        Some(at) => append_without_exponent(out, &text[..at], &text[at + 1..]),
+        None => out.extend_from_slice(text.strip_suffix(b".0").unwrap_or(text)),
+    }
+}
+
+/// `-1.25`, `-7` become `-0.000000125`: spreadsheets and scripts read numbers without exponents everywhere.
+#[cold]
+fn append_without_exponent(out: &mut Vec<u8>, mantissa: &[u8], exponent: &[u8]) {
+    let (negative, mantissa) = match mantissa.strip_prefix(b"-") {
+        Some(rest) => (true, rest),
+        None => (false, mantissa),
+    };
+    let (down, exponent) = match exponent.strip_prefix(b"-") {
+        Some(rest) => (true, rest),
+        None => (false, exponent.strip_prefix(b"+").unwrap_or(exponent)),
+    };
+    let power = exponent.iter().fold(0, |sum, digit| 10 * sum + usize::from(digit - b'0'));
+    let digits = || mantissa.iter().copied().filter(|byte| *byte != b'.');
+    if negative {
+        out.push(b'-');
+    }
+    if down {
+        out.extend_from_slice(b"0.");
+        out.extend(std::iter::repeat_n(b'0', power.saturating_sub(1)));
+        out.extend(digits());
+    } else {
+        // A mantissa has one digit before its point and at most 16 behind it; exponents are at least 16.
+        out.extend(digits());
+        out.extend(std::iter::repeat_n(b'0', (power + 1).saturating_sub(digits().count())));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn text(value: f64) -> String {
+        let mut out = Vec::new();
+        append_number(&mut out, value);
+        String::from_utf8(out).unwrap()
+    }
+
+    #[test]
+    fn numbers_look_as_they_always_have() {
+        for value in [0.0, -0.0, 1.0, -400.0, 0.1, 1e-5, 9.9e-6, 1e-7, -1.25e-7, 1e15, 1e16, 1.5e16, 1e17, 1e22] {
+            assert_eq!(text(value), value.to_string());
+        }
+        for value in [f64::MAX, f64::MIN_POSITIVE, 5e-324, f64::INFINITY, f64::NEG_INFINITY, 123456789012345680.0] {
+            assert_eq!(text(value), value.to_string());
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(20_000))]
+
+        #[test]
+        fn any_number_reads_back_and_looks_as_displayed(bits: u64, moderate in -1e4..1e4_f64) {
+            for value in [f64::from_bits(bits), moderate, moderate * 1e-9] {
+                if !value.is_nan() {
+                    prop_assert_eq!(text(value), value.to_string());
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn an_empty_row_of_one_cell_is_no_blank_line() {
+        let mut rows = RowWriter::new(Vec::new());
+        rows.number(f64::NAN);
+        rows.end().unwrap();
+        rows.number(f64::NAN);
+        rows.number(2.0);
+        rows.end().unwrap();
+        rows.words(std::iter::empty());
+        rows.end().unwrap();
+        assert_eq!(String::from_utf8(rows.into_inner()).unwrap(), "\"\"\n,2\n\"\"\n");
+    }
+}
