@@ -2,17 +2,15 @@ use std::collections::BTreeMap;
 
 use crate::CalibrationError;
 use crate::baselines::StaticCubic;
-use crate::ensemble::{self, Ensemble, EnsembleParams};
+use crate::ensemble::EnsembleParams;
+use crate::ensemble_fit::{RICHER, candidates, fit_ensemble, richer_evaluations, richer_laws, richer_member};
 use crate::estimator_params::{EstimatorKind, EstimatorParams};
-use crate::filter::{Filter, Start, filter_from_parts};
 use crate::law_fit::{CrossFit, LawOptions, fit_laws};
 use crate::law_params::LawParams;
-use crate::left_out::LeftOut;
 use crate::motion_stats::MotionStats;
-use crate::noise_fit::{NoiseProblem, REFINEMENT, RESURVEY, SMOOTHED_ROWS, SURVEY, Tuned, stride};
+use crate::noise_fit::{NoiseProblem, REFINEMENT, RESURVEY, SURVEY, Tuned};
 use crate::params::{FORMAT, Quantity, RangeParams, ReadingUnit, SensorParams, Uncertainty, Validity};
 use crate::samples::Samples;
-use crate::sd_scale::sd_scale;
 
 /// What calibration is doing, for a progress bar.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -109,15 +107,17 @@ pub fn calibrate(
     progress(Stage::Law);
     let laws = fit_laws(recordings, options)?;
     let stats = MotionStats::new(recordings);
-    let candidates = distinct(kinds.iter().flat_map(EstimatorKind::members).copied());
-    let smoothers = candidates.iter().map(|kind| kind.smoother());
-    let all_kinds = distinct(candidates.iter().copied().chain(smoothers).chain([EstimatorKind::Ekf]));
+    let wanted = distinct(kinds.iter().flat_map(EstimatorKind::members).copied());
+    let smoothers = wanted.iter().map(|kind| kind.smoother());
+    let all_kinds = distinct(wanted.iter().copied().chain(smoothers).chain([EstimatorKind::Ekf]));
     let pools = kinds.contains(&EstimatorKind::Ensemble);
-    let choosers: &[EstimatorKind] = if pools { &LAW_CHOOSERS } else { &candidates };
+    let richer_laws = if pools { richer_laws(recordings, options) } else { Vec::new() };
+    let choosers: &[EstimatorKind] = if pools { &LAW_CHOOSERS } else { &wanted };
     let surveys = SURVEY.evaluations() + (laws.len() as u64 - 1) * RESURVEY.evaluations();
     let expected = choosers.len() as u64 * surveys
         + (all_kinds.len() - choosers.len()) as u64 * SURVEY.evaluations()
-        + all_kinds.len() as u64 * REFINEMENT.evaluations();
+        + all_kinds.len() as u64 * REFINEMENT.evaluations()
+        + richer_evaluations(richer_laws.len());
     let mut done = 0;
     let mut evaluated = || {
         done += 1;
@@ -140,6 +140,7 @@ pub fn calibrate(
         return Err(CalibrationError::Unsupported("a calibration without an estimator".into()));
     };
     let mut estimators = BTreeMap::new();
+    let mut richer = None;
     for kind in all_kinds {
         let problem = NoiseProblem::new(recordings, fit, stats, kind);
         let known = surveyed.iter().find(|(k, law, _)| *k == kind && std::ptr::eq(*law, fit));
@@ -149,12 +150,15 @@ pub fn calibrate(
         };
         let tuned = problem.search(Some(&from), REFINEMENT, &mut evaluated)?;
         estimators.insert(kind, problem.finish(&tuned));
+        if pools && kind == RICHER {
+            richer = richer_member(recordings, &richer_laws, stats, &tuned, &mut evaluated)?;
+        }
     }
     let score =
         |kind: &EstimatorKind| estimators.get(kind).map_or(f64::INFINITY, |params| params.score + handicap(*kind));
-    let best = candidates.iter().copied().min_by(|a, b| score(a).total_cmp(&score(b)));
+    let best = wanted.iter().copied().min_by(|a, b| score(a).total_cmp(&score(b)));
     let default_estimator = if pools { Some(EstimatorKind::Ensemble) } else { best };
-    let ensemble = pools.then(|| fit_ensemble(recordings, fit, &estimators));
+    let ensemble = pools.then(|| fit_ensemble(recordings, fit, &candidates(&estimators, richer.as_ref())));
     let limits = fit.law.law.range;
     Ok(Calibration {
         default_estimator: default_estimator.unwrap_or(EstimatorKind::Ekf),
@@ -173,31 +177,6 @@ pub fn calibrate(
         rest_readings: fit.law.rest_readings.clone(),
         law: fit.law.law.clone(),
     })
-}
-
-/// Weighs the members of the ensemble by their scores and scales its deviations as those of a single estimator.
-fn fit_ensemble(
-    recordings: &[Samples],
-    fit: &CrossFit,
-    estimators: &BTreeMap<EstimatorKind, EstimatorParams>,
-) -> EnsembleParams {
-    let members =
-        EstimatorKind::Ensemble.members().iter().filter_map(|kind| Some((*kind, estimators.get(kind)?.score)));
-    let weights = ensemble::weights(&members.collect::<Vec<_>>());
-    let limits = fit.law.law.range;
-    let build = |law: &LawParams| -> Result<Box<dyn Filter>, CalibrationError> {
-        let members = weights.iter().filter_map(|(kind, weight)| {
-            let filter = filter_from_parts(*kind, law, estimators.get(kind)?, limits, Start::Unknown);
-            Some(filter.map(|filter| (filter, *weight)))
-        });
-        Ok(Box::new(Ensemble::new(members.collect::<Result<_, _>>()?, 1.0, 1.0)))
-    };
-    let left_out = LeftOut::new(recordings, fit, limits, 1);
-    let score = left_out.score(&build);
-    let strain_sd_scale = left_out.filtered_deviations(&build).map_or(1.0, |deviations| sd_scale(&deviations));
-    let thinned = LeftOut::new(recordings, fit, limits, stride(recordings, SMOOTHED_ROWS));
-    let smoothed_sd_scale = thinned.smoothed_deviations(&build).map(|deviations| sd_scale(&deviations));
-    EnsembleParams { score, strain_sd_scale, smoothed_sd_scale, weights }
 }
 
 fn distinct(kinds: impl Iterator<Item = EstimatorKind>) -> Vec<EstimatorKind> {

@@ -1,12 +1,13 @@
-use std::collections::BTreeMap;
 use std::ops::Range;
 
 use arrayvec::ArrayVec;
 use ohmstrain_ekf::{Estimate, Gaussian, Guard, Reading, ReadingVerdict, StepError};
 use serde::{Deserialize, Serialize};
 
-use crate::estimator_params::EstimatorKind;
+use crate::CalibrationError;
+use crate::estimator_params::{EstimatorKind, EstimatorParams};
 use crate::filter::{Filter, Output, Rows, WayBack};
+use crate::law_params::LawParams;
 
 /// Estimators that run side by side, and how much each is listened to.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -19,8 +20,33 @@ pub struct EnsembleParams {
     /// The same for the smoother.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub smoothed_sd_scale: Option<f64>,
-    /// Weights of the members; they sum to one.
-    pub weights: BTreeMap<EstimatorKind, f64>,
+    /// The members; their weights sum to one.
+    pub members: Vec<MemberParams>,
+}
+
+/// A member of an ensemble.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MemberParams {
+    /// What it is.
+    pub estimator: EstimatorKind,
+    /// How much it is listened to.
+    pub weight: f64,
+    /// A law of its own; without one it has the sensor's law, and the parameters that the sensor has for the estimator.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub own: Option<OwnLaw>,
+}
+
+/// A law that differs from the sensor's, with what was fitted to it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct OwnLaw {
+    /// R₀ of this law over the sensor's R₀.
+    pub rest_ratio: f64,
+    /// The law.
+    pub law: LawParams,
+    /// Noise and motion.
+    pub parameters: EstimatorParams,
 }
 
 /// How many independent rows the mean score stands for: one. Errors hang together for as long as a movement lasts and the
@@ -34,13 +60,13 @@ fn prior(kind: EstimatorKind) -> f64 {
 
 /// Weights `∝ prior · exp(-n · score)` of estimators with these mean negative log densities: pseudo-Bayesian model
 /// averaging (Geisser & Eddy, *J. Am. Stat. Assoc.* 74 (1979) 153) on the blocks left out.
-pub(crate) fn weights(scores: &[(EstimatorKind, f64)]) -> BTreeMap<EstimatorKind, f64> {
+pub(crate) fn weights(scores: &[(EstimatorKind, f64)]) -> Vec<f64> {
     let best = scores.iter().map(|(_, score)| *score).fold(f64::INFINITY, f64::min);
     let raw = |(kind, score): &(EstimatorKind, f64)| {
         if score.is_finite() { prior(*kind) * (INDEPENDENT_ROWS * (best - score)).exp() } else { 0.0 }
     };
     let total: f64 = scores.iter().map(raw).sum();
-    scores.iter().map(|scored| (scored.0, raw(scored) / total)).collect()
+    scores.iter().map(|scored| raw(scored) / total).collect()
 }
 
 /// Filters that run side by side. Their posteriors are pooled: where they disagree the deviation grows. A member that is
@@ -58,13 +84,23 @@ struct Member {
     said: Vec<Output>,
 }
 
-/// What each member says, with its weight; no estimator is a member twice.
-type Few<X> = ArrayVec<(f64, X), { EstimatorKind::ALL.len() }>;
+/// Most members of an ensemble.
+const MOST_MEMBERS: usize = 8;
+/// What each member says, with its weight.
+type Few<X> = ArrayVec<(f64, X), MOST_MEMBERS>;
 
 impl Ensemble {
-    pub(crate) fn new(members: Vec<(Box<dyn Filter>, f64)>, filtered_scale: f64, smoothed_scale: f64) -> Self {
+    pub(crate) fn new(
+        members: Vec<(Box<dyn Filter>, f64)>,
+        filtered_scale: f64,
+        smoothed_scale: f64,
+    ) -> Result<Self, CalibrationError> {
+        if !(1..=MOST_MEMBERS).contains(&members.len()) {
+            let message = format!("an ensemble of {} members; 1 to {MOST_MEMBERS} are supported", members.len());
+            return Err(CalibrationError::Unsupported(message));
+        }
         let members = members.into_iter().map(|(filter, weight)| Member { filter, weight, said: Vec::new() }).collect();
-        Self { members, filtered_scale, smoothed_scale }
+        Ok(Self { members, filtered_scale, smoothed_scale })
     }
 
     /// Lets every member do something and pools what each of them says, call by call.
@@ -247,9 +283,8 @@ mod tests {
     fn weights_follow_the_scores() {
         let weights =
             weights(&[(EstimatorKind::Ekf, -2.0), (EstimatorKind::Imm, f64::INFINITY), (EstimatorKind::Ukf, -2.5)]);
-        let of = |kind| weights[&kind];
-        assert!((of(EstimatorKind::Ekf) + of(EstimatorKind::Ukf) - 1.0).abs() < 1e-15);
-        assert!((of(EstimatorKind::Ukf) / of(EstimatorKind::Ekf) - 0.5_f64.exp()).abs() < 1e-12);
-        assert_eq!(of(EstimatorKind::Imm), 0.0);
+        assert!((weights[0] + weights[2] - 1.0).abs() < 1e-15);
+        assert!((weights[2] / weights[0] - 0.5_f64.exp()).abs() < 1e-12);
+        assert_eq!(weights[1], 0.0);
     }
 }

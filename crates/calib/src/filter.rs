@@ -7,9 +7,10 @@ use ohmstrain_ekf::{
 use ohmstrain_model::{Motion, Phase, SwitchedModel, WithPlays};
 
 use crate::CalibrationError;
-use crate::ensemble::Ensemble;
+use crate::ensemble::{Ensemble, MemberParams, OwnLaw};
 use crate::estimator_params::{AnyMotion, EstimatorKind, EstimatorParams};
 use crate::law_params::LawParams;
+use crate::own_rest::OwnRest;
 use crate::params::{RangeParams, SensorParams};
 use crate::running::{Interval, Running};
 
@@ -158,35 +159,51 @@ pub fn build_filter(
     start: Start,
 ) -> Result<Box<dyn Filter>, CalibrationError> {
     let kind = kind.unwrap_or(params.default_estimator);
-    let single = |kind| filter_from_parts(kind, &params.law, params.estimator(kind)?, params.limits, start);
+    let setting = Setting { limits: params.limits, start, own_rest: OwnRest::SHARED };
+    let single = |kind| filter_from_parts(kind, &params.law, params.estimator(kind)?, setting);
     if kind != EstimatorKind::Ensemble {
         return single(kind);
     }
     let ensemble = params.ensemble.as_ref().ok_or_else(|| CalibrationError::no_parameters(kind))?;
-    let members = ensemble.weights.iter().map(|(kind, weight)| Ok((single(*kind)?, *weight)));
-    let members = members.collect::<Result<_, CalibrationError>>()?;
-    let smoothed_scale = ensemble.smoothed_sd_scale.unwrap_or(1.0);
-    Ok(Box::new(Ensemble::new(members, ensemble.strain_sd_scale, smoothed_scale)))
+    let member = |member: &MemberParams| {
+        let filter = match &member.own {
+            None => single(member.estimator),
+            Some(OwnLaw { rest_ratio, law, parameters }) => {
+                let setting = Setting { own_rest: OwnRest::new(*rest_ratio), ..setting };
+                filter_from_parts(member.estimator, law, parameters, setting)
+            }
+        };
+        Ok((filter?, member.weight))
+    };
+    let members = ensemble.members.iter().map(member).collect::<Result<Vec<_>, CalibrationError>>()?;
+    Ok(Box::new(Ensemble::new(members, ensemble.strain_sd_scale, ensemble.smoothed_sd_scale.unwrap_or(1.0))?))
+}
+
+/// What a filter needs besides law, noise and motion.
+#[derive(Clone, Copy)]
+pub(crate) struct Setting {
+    pub limits: RangeParams,
+    pub start: Start,
+    pub own_rest: OwnRest,
 }
 
 pub(crate) fn filter_from_parts(
     kind: EstimatorKind,
     law: &LawParams,
     estimator: &EstimatorParams,
-    limits: RangeParams,
-    start: Start,
+    setting: Setting,
 ) -> Result<Box<dyn Filter>, CalibrationError> {
     /// One instance per number of motion states and branches, N = M + B + 1 and L = N (N + 1) / 2, and another one of N + 3
     /// states where plays are supported.
     macro_rules! build {
         ($motion:expr, $m:literal, $([$b:literal, $n:literal, $l:literal $(, $with:literal, $l_with:literal)?]),+) => {
             match (law.branches.len(), law.plays.len()) {
-                $(($b, 0) => plain::<$m, $b, $n, $l>(kind, $motion, law, estimator, limits, start),)+
+                $(($b, 0) => plain::<$m, $b, $n, $l>(kind, $motion, law, estimator, setting),)+
                 $($(($b, PLAYS) => {
                     let inner = switched::<$m, $b, $n>($motion, law, estimator)?;
                     let plays: [_; PLAYS] = std::array::from_fn(|i| law.plays[i].to_model());
                     let model = WithPlays::<_, $m, $b, $n, PLAYS, $with>::new(inner, plays)?;
-                    gaussian::<_, $m, $b, $with, $l_with>(kind, model, estimator, limits, start)
+                    gaussian::<_, $m, $b, $with, $l_with>(kind, model, estimator, setting)
                 })?)+
                 (branches, plays) => Err(CalibrationError::Unsupported(format!(
                     "a law with {branches} branches and {plays} plays; at most 4 branches without plays, or 1 to 3 with \
@@ -224,17 +241,16 @@ fn plain<const M: usize, const B: usize, const N: usize, const L: usize>(
     motion: Motion<f64, M>,
     law: &LawParams,
     estimator: &EstimatorParams,
-    limits: RangeParams,
-    start: Start,
+    setting: Setting,
 ) -> Result<Box<dyn Filter>, CalibrationError> {
     let model = switched::<M, B, N>(motion, law, estimator)?;
     if kind != EstimatorKind::Particles {
-        return gaussian::<_, M, B, N, L>(kind, model, estimator, limits, start);
+        return gaussian::<_, M, B, N, L>(kind, model, estimator, setting);
     }
-    let PhaseFilter { hold, evidence, .. } = PhaseFilter::new(kind, estimator, limits)?;
+    let PhaseFilter { hold, evidence, .. } = PhaseFilter::new(kind, estimator, setting.limits)?;
     let filter = Particles::new(model, hold, evidence, PARTICLES, PARTICLE_SEED);
-    let start = filter.start(&initial_belief::<_, M, B, N, L>(&model, limits, start), Phase::Extend);
-    Ok(Box::new(Running::new(filter, start, model, interval(estimator, limits))))
+    let start = filter.start(&initial_belief::<_, M, B, N, L>(&model, setting), Phase::Extend);
+    Ok(Box::new(Running::new(filter, start, model, interval(estimator, setting))))
 }
 
 /// A filter of one Gaussian or several around any model.
@@ -242,14 +258,13 @@ fn gaussian<S, const M: usize, const B: usize, const N: usize, const L: usize>(
     kind: EstimatorKind,
     model: S,
     estimator: &EstimatorParams,
-    limits: RangeParams,
-    start: Start,
+    setting: Setting,
 ) -> Result<Box<dyn Filter>, CalibrationError>
 where
     S: Phased<f64, N, L> + StrainSensor<f64, M, B, N> + Copy + 'static,
 {
-    let belief: Belief<f64, N, L> = initial_belief(&model, limits, start);
-    let interval = interval(estimator, limits);
+    let belief: Belief<f64, N, L> = initial_belief(&model, setting);
+    let interval = interval(estimator, setting);
     match kind {
         EstimatorKind::Ekf => return Ok(Box::new(Running::new(Ekf::new(model), belief, model, interval))),
         EstimatorKind::Ukf => {
@@ -258,7 +273,7 @@ where
         EstimatorKind::Ensemble => return Err(CalibrationError::no_parameters(kind)),
         _ => {}
     }
-    let PhaseFilter { dwell, hold, evidence } = PhaseFilter::new(kind, estimator, limits)?;
+    let PhaseFilter { dwell, hold, evidence } = PhaseFilter::new(kind, estimator, setting.limits)?;
     Ok(match kind {
         EstimatorKind::Imm => {
             let start = Mixture::single(belief, Phase::Hold);
@@ -299,11 +314,12 @@ impl PhaseFilter {
     }
 }
 
-fn interval(estimator: &EstimatorParams, limits: RangeParams) -> Interval {
+fn interval(estimator: &EstimatorParams, setting: Setting) -> Interval {
     Interval {
-        limits: limits.to_model(),
+        limits: setting.limits.to_model(),
         filtered_scale: estimator.strain_sd_scale,
         smoothed_scale: estimator.smoothed_sd_scale.unwrap_or(1.0),
+        own_rest: setting.own_rest,
     }
 }
 
@@ -319,11 +335,10 @@ const PARTICLE_SEED: u64 = 1;
 
 fn initial_belief<S: StrainSensor<f64, M, B, N>, const M: usize, const B: usize, const N: usize, const L: usize>(
     model: &S,
-    limits: RangeParams,
-    start: Start,
+    setting: Setting,
 ) -> Belief<f64, N, L> {
-    let Start::Strain(strain) = start else { return Belief::initial(model) };
+    let Start::Strain(strain) = setting.start else { return Belief::initial(model) };
     let (mut mean, mut variance) = model.initial_distribution();
-    (mean[0], variance[0]) = (strain, (START_SD * limits.span()).powi(2));
+    (mean[0], variance[0]) = (strain, (START_SD * setting.limits.span()).powi(2));
     Belief::independent(mean, &variance)
 }

@@ -22,12 +22,22 @@ pub(crate) struct LeftOut<'a> {
     limits: RangeParams,
 }
 
-/// Makes a filter for a law.
-pub(crate) type Build<'a> = dyn Fn(&LawParams) -> Result<Box<dyn Filter>, CalibrationError> + 'a;
+/// Makes a filter for a law that was fitted without a block.
+pub(crate) type Build<'a> = dyn Fn(Fold) -> Result<Box<dyn Filter>, CalibrationError> + 'a;
+
+/// A law that was fitted without a block, in a recording.
+#[derive(Clone, Copy)]
+pub(crate) struct Fold<'a> {
+    pub law: &'a LawParams,
+    pub recording: usize,
+    pub block: usize,
+    /// R₀ of that law in the recording, which readings are relative to.
+    pub rest_reading: f64,
+}
 
 /// One recording up to the end of the block that its law has not seen.
 struct Run<'a> {
-    law: &'a LawParams,
+    fold: Fold<'a>,
     time_s: Vec<f64>,
     /// Relative to the R₀ of that law.
     reading: Vec<Option<Reading<f64>>>,
@@ -39,16 +49,17 @@ impl<'a> LeftOut<'a> {
     /// Takes every `stride`-th row. The model is continuous in time, so that the same parameters fit any sampling.
     pub(crate) fn new(samples: &[Samples], fit: &'a CrossFit, limits: RangeParams, stride: usize) -> Self {
         let mut runs = Vec::new();
-        for (b, law) in fit.without_block.iter().enumerate() {
-            for (r, samples) in samples.iter().enumerate() {
+        for (block, law) in fit.without_block.iter().enumerate() {
+            for (recording, samples) in samples.iter().enumerate() {
                 let pick = |values: &[f64]| values.iter().copied().step_by(stride).collect::<Vec<f64>>();
-                let block = &fit.blocks[r][b];
+                let rows = &fit.blocks[recording][block];
+                let fold = Fold { law: &law.law, recording, block, rest_reading: law.rest_readings[recording] };
                 runs.push(Run {
-                    law: &law.law,
+                    fold,
                     time_s: pick(samples.time_s),
-                    reading: relative_changes(&pick(samples.reading), law.rest_readings[r]),
+                    reading: relative_changes(&pick(samples.reading), fold.rest_reading),
                     strain: pick(samples.strain),
-                    block: block.start.div_ceil(stride)..block.end.div_ceil(stride),
+                    block: rows.start.div_ceil(stride)..rows.end.div_ceil(stride),
                 });
             }
         }
@@ -81,7 +92,7 @@ impl<'a> LeftOut<'a> {
     /// The same for the smoother of whole recordings; `None` if the estimator has none.
     pub(crate) fn smoothed_deviations(&self, build: &Build) -> Option<Vec<Vec<f64>>> {
         let of_run = |run: &Run| {
-            let mut filter = build(run.law).ok()?;
+            let mut filter = build(run.fold).ok()?;
             let smoothed = filter.smooth(&run.time_s, &run.reading).ok()??;
             let known = run.block.clone().filter(|&k| run.strain[k].is_finite());
             Some(
@@ -100,7 +111,7 @@ impl<'a> LeftOut<'a> {
     /// of the block. `None` if it fails.
     fn each_row(&self, build: &Build, mut visit: impl FnMut(usize, Gaussian<f64>, f64)) -> Option<()> {
         for (index, run) in self.runs.iter().enumerate() {
-            let mut filter = build(run.law).ok()?;
+            let mut filter = build(run.fold).ok()?;
             for k in 0..run.block.end {
                 filter.step(run.time_s[k], run.reading[k]).ok()?;
                 if k >= run.block.start && run.strain[k].is_finite() {

@@ -1,11 +1,11 @@
 use crate::CalibrationError;
 use crate::estimator_params::{EstimatorKind, EstimatorParams, MotionParams, NoiseParams, PhaseParams};
-use crate::filter::{Filter, Start, filter_from_parts};
+use crate::filter::{Filter, Setting, Start, filter_from_parts};
 use crate::law_fit::CrossFit;
-use crate::law_params::LawParams;
-use crate::left_out::LeftOut;
+use crate::left_out::{Fold, LeftOut};
 use crate::motion_stats::{MotionStats, root_mean_square};
 use crate::optimise;
+use crate::own_rest::OwnRest;
 use crate::params::RangeParams;
 use crate::samples::Samples;
 use crate::sd_scale::sd_scale;
@@ -81,7 +81,7 @@ impl<'a> NoiseProblem<'a> {
             evaluated();
             let pull: f64 = point.iter().zip(&start).map(|(x, s)| (x - s).powi(2)).sum();
             let params = self.params(point);
-            left_out.score(&|law| self.build(self.kind.tuned_as(), law, &params)) + REGULARISATION * pull
+            left_out.score(&|fold| self.build(self.kind.tuned_as(), fold, &params)) + REGULARISATION * pull
         };
         let from = from.map_or(&start, |tuned| &tuned.point);
         let point = optimise::polish(&mut cost, from, search.side, search.steps)?;
@@ -92,13 +92,13 @@ impl<'a> NoiseProblem<'a> {
     pub(crate) fn finish(&self, tuned: &Tuned) -> EstimatorParams {
         let left_out = self.left_out(1);
         let score = |mut params: EstimatorParams| {
-            params.score = left_out.score(&|law| self.build(self.kind, law, &params));
+            params.score = left_out.score(&|fold| self.build(self.kind, fold, &params));
             params
         };
         let candidates = self.at_every_row(self.params(&tuned.point), self.stride(REFINEMENT.rows));
         let best = candidates.into_iter().map(score).reduce(|a, b| if b.score < a.score { b } else { a });
         let mut params = best.unwrap_or_else(|| self.params(&tuned.point));
-        let build = |law: &LawParams| self.build(self.kind, law, &params);
+        let build = |fold: Fold| self.build(self.kind, fold, &params);
         let filtered = left_out.filtered_deviations(&build);
         let smoothed = self.left_out(self.stride(SMOOTHED_ROWS)).smoothed_deviations(&build);
         params.strain_sd_scale = filtered.map_or(1.0, |deviations| sd_scale(&deviations));
@@ -109,10 +109,11 @@ impl<'a> NoiseProblem<'a> {
     fn build(
         &self,
         kind: EstimatorKind,
-        law: &LawParams,
+        fold: Fold,
         params: &EstimatorParams,
     ) -> Result<Box<dyn Filter>, CalibrationError> {
-        filter_from_parts(kind, law, params, self.limits, Start::Unknown)
+        let setting = Setting { limits: self.limits, start: Start::Unknown, own_rest: OwnRest::SHARED };
+        filter_from_parts(kind, fold.law, params, setting)
     }
 
     /// What parameters that were found on every `stride`-th row may mean for every row. White noise stays what it is; if

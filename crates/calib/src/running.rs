@@ -8,6 +8,7 @@ use ohmstrain_ekf::{
 use ohmstrain_model::StrainRange;
 
 use crate::filter::{Filter, Output, Rows, WayBack};
+use crate::own_rest::OwnRest;
 use crate::stepper::{Moment, Seen, Stepper};
 use crate::way_back::Segments;
 
@@ -22,12 +23,15 @@ pub(crate) struct Running<E: Estimator<f64, N, L>, S, const M: usize, const B: u
     due: Vec<Output>,
 }
 
-/// How strain is reported: within limits, its standard deviation times a calibrated factor.
+/// How estimates are reported: strain within limits, its standard deviation times a calibrated factor, resistances relative
+/// to the R₀ of the readings.
 #[derive(Clone, Copy)]
 pub(crate) struct Interval {
     pub limits: StrainRange<f64>,
     pub filtered_scale: f64,
     pub smoothed_scale: f64,
+    /// R₀ of the law.
+    pub own_rest: OwnRest,
 }
 
 /// A row whose estimate waits for later readings.
@@ -45,12 +49,20 @@ where
 {
     pub(crate) fn new(estimator: E, state: E::State, model: S, interval: Interval) -> Self {
         let (pending, due) = (VecDeque::new(), Vec::new());
-        Self { stepper: Stepper::new(estimator), model, interval, now: Moment::start(state), pending, due }
+        Self {
+            stepper: Stepper::new(estimator, interval.own_rest),
+            model,
+            interval,
+            now: Moment::start(state),
+            pending,
+            due,
+        }
     }
 
     fn output(&self, state: &E::State, seen: Seen, sd_scale: f64) -> Output {
+        let estimate = Estimate::new(&self.model, state, &self.interval.limits, sd_scale);
         Output {
-            estimate: Estimate::new(&self.model, state, &self.interval.limits, sd_scale),
+            estimate: self.interval.own_rest.estimate(estimate),
             nis: seen.innovation.map(|innovation| innovation.nis()),
             verdict: seen.verdict,
             phases: state.phases(),

@@ -4,10 +4,13 @@ use ohmstrain_ekf::{
     Advanced, Estimator, Guard, Guarded, Innovation, PastStep, Reading, ReadingVerdict, StepError, Streak,
 };
 
+use crate::own_rest::OwnRest;
+
 /// An estimator under guard, and the steps it has prepared.
 pub(crate) struct Stepper<E: Estimator<f64, N, L>, const N: usize, const L: usize> {
     pub estimator: E,
     pub guard: Guard<f64>,
+    own_rest: OwnRest,
     prepared: PreparedSteps<E::Prepared>,
 }
 
@@ -40,8 +43,8 @@ impl<S> Moment<S> {
 }
 
 impl<E: Estimator<f64, N, L>, const N: usize, const L: usize> Stepper<E, N, L> {
-    pub(crate) fn new(estimator: E) -> Self {
-        Self { estimator, guard: Guard::none(), prepared: PreparedSteps::new() }
+    pub(crate) fn new(estimator: E, own_rest: OwnRest) -> Self {
+        Self { estimator, guard: Guard::none(), own_rest, prepared: PreparedSteps::new() }
     }
 
     /// One step from `now`: where it leads, and what a smoother needs of it.
@@ -52,6 +55,7 @@ impl<E: Estimator<f64, N, L>, const N: usize, const L: usize> Stepper<E, N, L> {
         time_s: f64,
         reading: Option<Reading<f64>>,
     ) -> Result<(Moment<E::State>, PastStep<E::State, E::Prepared, f64>), StepError> {
+        let reading = reading.map(|reading| self.own_rest.reading(reading));
         let prepared = self.prepared.of(now.seconds_until(time_s), |dt_s| self.estimator.prepare(dt_s))?;
         let Guarded { advanced, from, used, verdict, streak } =
             self.guard.advance(&self.estimator, &now.state, now.streak, prepared, reading)?;
@@ -71,6 +75,7 @@ impl<E: Estimator<f64, N, L>, const N: usize, const L: usize> Stepper<E, N, L> {
             (*now, _) = self.advance(now, time_s, reading)?;
             return Ok(());
         }
+        let reading = reading.map(|reading| self.own_rest.reading(reading));
         let prepared = self.prepared.of(now.seconds_until(time_s), |dt_s| self.estimator.prepare(dt_s))?;
         let Advanced { state, innovation } = self.estimator.advance(&now.state, prepared, reading)?;
         let verdict = if innovation.is_some() { ReadingVerdict::Accepted } else { ReadingVerdict::Missing };

@@ -3,8 +3,8 @@
 use std::f64::consts::TAU;
 
 use ohmstrain_calib::{
-    CalibrationError, EstimatorKind, LawOptions, Quantity, ReadingUnit, Samples, SensorParams, Start, build_filter,
-    calibrate, fit_law,
+    CalibrationError, EnsembleParams, EstimatorKind, LawOptions, MemberParams, Quantity, ReadingUnit, Samples,
+    SensorParams, Start, build_filter, calibrate, fit_law,
 };
 use ohmstrain_ekf::Reading;
 
@@ -112,11 +112,15 @@ fn every_estimator_runs_a_law_with_plays() {
         tempering: 1.0,
     });
     sensor.estimators = EstimatorKind::ALL.map(|kind| (kind, params)).into();
-    sensor.ensemble = Some(ohmstrain_calib::EnsembleParams {
+    sensor.ensemble = Some(EnsembleParams {
         score: 0.0,
         strain_sd_scale: 1.0,
         smoothed_sd_scale: None,
-        weights: EstimatorKind::Ensemble.members().iter().map(|kind| (*kind, 1.0 / 3.0)).collect(),
+        members: EstimatorKind::Ensemble
+            .members()
+            .iter()
+            .map(|&estimator| MemberParams { estimator, weight: 1.0 / 3.0, own: None })
+            .collect(),
     });
     for kind in EstimatorKind::ALL {
         let filter = build_filter(&sensor, Some(kind), Start::Strain(bench.strain[0]));

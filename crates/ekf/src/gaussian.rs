@@ -49,6 +49,16 @@ impl<T: Real> Gaussian<T> {
         upper_tail((x - self.mean) / self.variance.sqrt())
     }
 
+    /// Probability of a range; 1 where the value is known exactly.
+    #[must_use]
+    pub fn mass_within(&self, range: &StrainRange<T>) -> T {
+        if self.variance <= T::zero() {
+            return T::one();
+        }
+        let sd = self.variance.sqrt();
+        mass_between((range.lower - self.mean) / sd, (range.upper - self.mean) / sd)
+    }
+
     /// The same Gaussian with its mean moved into a range.
     ///
     /// For reports: the moments of the restricted Gaussian are drawn off the limit, which at rest on a limit is a bias.
@@ -73,7 +83,7 @@ impl<T: Real> Gaussian<T> {
         if a < -T::of(WHOLLY_INSIDE) && b > T::of(WHOLLY_INSIDE) {
             return inside;
         }
-        let mass = upper_tail(a) - upper_tail(b);
+        let mass = mass_between(a, b);
         if !(mass > T::of(FAR_TAIL)) {
             let slope = T::one() / a;
             let shift = (a + slope).min(b);
@@ -99,6 +109,20 @@ impl<T: Real> Gaussian<T> {
 const WHOLLY_INSIDE: f64 = 9.0;
 /// Below this mass the moments of a truncated Gaussian are taken from the tail's asymptote; about 5.6 deviations out.
 const FAR_TAIL: f64 = 1e-8;
+
+/// Probability of a standard normal between `a` and `b`.
+fn mass_between<T: Real>(a: T, b: T) -> T {
+    // Work on the side where the interval lies in the upper tail, where erfc keeps its digits.
+    let (a, b) = if a + b < T::zero() { (-b, -a) } else { (a, b) };
+    let whole = T::of(WHOLLY_INSIDE);
+    if a < -whole {
+        return T::one(); // then b is further away still
+    }
+    if a < T::zero() && b > whole {
+        return upper_tail(a);
+    }
+    upper_tail(a) - upper_tail(b)
+}
 
 /// Probability of a standard normal above `x`.
 pub(crate) fn upper_tail<T: Real>(x: T) -> T {

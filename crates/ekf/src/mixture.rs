@@ -236,7 +236,9 @@ impl<T: Real, const N: usize, const L: usize> Component<T, N, L> {
     /// Takes in how much more, or less, probability its belief now gives to the limits.
     pub(crate) fn weigh_limits(&mut self, limits: &StrainRange<T>) {
         let strain = Gaussian { mean: self.belief.mean[0], variance: self.belief.covariance[(0, 0)] };
-        let log_inside = strain.restricted(limits).mass.max(T::of(LEAST_INSIDE)).ln();
+        let inside = strain.mass_within(limits);
+        // Mostly nothing is near a limit.
+        let log_inside = if inside < T::one() { inside.max(T::of(LEAST_INSIDE)).ln() } else { T::zero() };
         self.log_weight += log_inside - self.log_inside;
         self.log_inside = log_inside;
     }

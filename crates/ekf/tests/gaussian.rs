@@ -41,6 +41,7 @@ proptest! {
         let got = Gaussian { mean, variance }.restricted(&range);
         let (mass, expected_mean, expected_variance) = by_simpson(mean, variance, lower, lower + width);
         prop_assert!((got.mass - mass).abs() < 1e-9);
+        prop_assert_eq!(Gaussian { mean, variance }.mass_within(&range), got.mass);
         let sd = variance.sqrt();
         // In the far tail the asymptote is used; its relative error is 2/z² of the distance from the edge.
         let tolerance = if mass < 1e-8 { 0.2 } else { 1e-6 };
