@@ -12,6 +12,7 @@ use crate::estimator_params::{AnyMotion, EstimatorKind, EstimatorParams};
 use crate::law_params::LawParams;
 use crate::params::{RangeParams, SensorParams};
 use crate::running::{Interval, Running};
+use crate::sparse_estimator::SparseEstimator;
 
 /// A filter for a sensor whose number of branches and kind of motion are known at run time only.
 pub trait Filter {
@@ -158,7 +159,12 @@ pub fn build_filter(
     start: Start,
 ) -> Result<Box<dyn Filter>, CalibrationError> {
     let kind = kind.unwrap_or(params.default_estimator);
-    let single = |kind| filter_from_parts(kind, &params.law, params.estimator(kind)?, params.limits, start);
+    let single = |kind| {
+        let estimator = params.estimator(kind)?;
+        let sparse =
+            if kind == EstimatorKind::Ekf { sparse_ekf(&params.law, estimator, params.limits, start)? } else { None };
+        sparse.map_or_else(|| filter_from_parts(kind, &params.law, estimator, params.limits, start), Ok)
+    };
     if kind != EstimatorKind::Ensemble {
         return single(kind);
     }
@@ -206,6 +212,34 @@ pub(crate) fn filter_from_parts(
             build!(motion, 3, [0, 4, 10], [1, 5, 15, 8, 36], [2, 6, 21, 9, 45], [3, 7, 28, 10, 55], [4, 8, 36])
         }
     }
+}
+
+/// The EKF of a law without plays on Ornstein-Uhlenbeck motion; `None` for any other.
+fn sparse_ekf(
+    law: &LawParams,
+    estimator: &EstimatorParams,
+    limits: RangeParams,
+    start: Start,
+) -> Result<Option<Box<dyn Filter>>, CalibrationError> {
+    fn build<const B: usize, const N: usize, const L: usize>(
+        model: SwitchedModel<f64, 2, B, N>,
+        interval: Interval,
+        limits: RangeParams,
+        start: Start,
+    ) -> Box<dyn Filter> {
+        let belief: Belief<f64, N, L> = initial_belief(&model, limits, start);
+        Box::new(Running::new(SparseEstimator::new(model), belief, model, interval))
+    }
+    let AnyMotion::Two(motion) = estimator.motion.to_model()? else { return Ok(None) };
+    let interval = interval(estimator, limits);
+    Ok(Some(match (law.branches.len(), law.plays.len()) {
+        (0, 0) => build::<0, 3, 6>(switched(motion, law, estimator)?, interval, limits, start),
+        (1, 0) => build::<1, 4, 10>(switched(motion, law, estimator)?, interval, limits, start),
+        (2, 0) => build::<2, 5, 15>(switched(motion, law, estimator)?, interval, limits, start),
+        (3, 0) => build::<3, 6, 21>(switched(motion, law, estimator)?, interval, limits, start),
+        (4, 0) => build::<4, 7, 28>(switched(motion, law, estimator)?, interval, limits, start),
+        _ => return Ok(None),
+    }))
 }
 
 /// The model of a law, plays aside.
