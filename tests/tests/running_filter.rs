@@ -1,13 +1,14 @@
 //! A filter that runs through a recording with broken rows says, bit for bit, what it says of the recording without them.
+//! A smoother that computes states again says, bit for bit, what one says that has kept them all.
 
 use std::collections::BTreeMap;
 
 use ohmstrain_calib::{
     BranchParams, EnsembleParams, EstimatorKind, EstimatorParams, FORMAT, Filter, GaugeParams, LawParams, MotionParams,
-    NoiseParams, PhaseParams, Quantity, RangeParams, ReadingUnit, SensorParams, Start, StaticCubic, Validity,
+    NoiseParams, PhaseParams, Quantity, RangeParams, ReadingUnit, Rows, SensorParams, Start, StaticCubic, Validity,
     build_filter,
 };
-use ohmstrain_ekf::{Reading, StepError};
+use ohmstrain_ekf::{Guard, Reading, StepError};
 use proptest::prelude::*;
 
 /// A sensor with parameters for every estimator.
@@ -113,4 +114,59 @@ proptest! {
             }
         }
     }
+}
+
+/// A slow sine through a polynomial, with a reading missing now and then, at times that jitter in their last digits.
+fn recording(rows: usize) -> (Vec<f64>, Vec<Option<Reading<f64>>>) {
+    let reading = |k: usize| {
+        let strain = 0.15 + 0.12 * (k as f64 * 0.01).sin();
+        (k % 7 != 3).then(|| Reading::from(1.6 * strain - 1.2 * strain * strain + 1e-3 * (k as f64 * 1.7).sin()))
+    };
+    (0..rows).map(|k| (k as f64 * 0.05, reading(k))).unzip()
+}
+
+/// Several segments, the last one short; the oracle waits with every row until the last reading is in.
+#[test]
+fn a_long_recording_is_smoothed_as_if_all_states_were_kept() {
+    let (time_s, readings) = recording(10_000);
+    let mut params = sensor();
+    // Rows that wait are reported with the wider of two intervals: make them the same.
+    params.estimators.values_mut().for_each(|estimator| estimator.strain_sd_scale = 1.0);
+    params.ensemble.iter_mut().for_each(|ensemble| ensemble.strain_sd_scale = 1.0);
+    for kind in [EstimatorKind::Ekf, EstimatorKind::SignSplit, EstimatorKind::Ensemble] {
+        for guard in [Guard::none(), Guard::none().with_gate(3.0, 5)] {
+            let build = || {
+                let mut filter = build_filter(&params, Some(kind), Start::Unknown).unwrap();
+                filter.guard(guard);
+                filter
+            };
+            let (mut kept, mut expected) = (build(), Vec::new());
+            for (&time_s, &reading) in time_s.iter().zip(&readings) {
+                kept.step_lagged(time_s, reading, 1e9, &mut |output| expected.push(output)).unwrap();
+            }
+            assert!(expected.is_empty());
+            kept.flush_lagged(&mut |output| expected.push(output)).unwrap();
+
+            let (mut filter, mut first, mut segment) = (build(), time_s.len(), Vec::new());
+            let row = |row: usize| (time_s[row], readings[row]);
+            let mut back = filter.way_back(Rows::new(time_s.len(), &row)).unwrap();
+            while let Some(rows) = back.next_segment(&mut segment).unwrap() {
+                assert_eq!(rows.end, first);
+                assert!(segment.len() < 5000 && segment.as_slice() == &expected[rows.clone()], "{kind:?} {rows:?}");
+                first = rows.start;
+            }
+            drop(back);
+            assert_eq!(first, 0, "{kind:?}");
+            // The filter stands where one stands that went forward only.
+            let mut forward = build();
+            time_s.iter().zip(&readings).for_each(|(&time_s, &reading)| forward.step(time_s, reading).unwrap());
+            assert_eq!(shown(&*filter), shown(&*forward));
+        }
+    }
+}
+
+#[test]
+fn no_row_is_smoothed_to_nothing() {
+    let mut filter = build_filter(&sensor(), None, Start::Unknown).unwrap();
+    assert_eq!(filter.smooth(&[], &[]), Ok(Some(vec![])));
 }

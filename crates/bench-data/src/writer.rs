@@ -48,10 +48,9 @@ impl Trace {
                 None => self.readings.values[row],
             },
         );
-        for column in [self.reference.as_ref().map(|reference| &reference.values), self.temperature_c.as_ref()] {
-            if let Some(values) = column {
-                number(rows, values[row]);
-            }
+        let reference = self.reference.as_ref().map(|reference| &reference.values);
+        for values in reference.into_iter().chain(&self.temperature_c) {
+            number(rows, values[row]);
         }
         rows.end()
     }

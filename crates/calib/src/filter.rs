@@ -13,6 +13,7 @@ use crate::law_params::LawParams;
 use crate::own_rest::OwnRest;
 use crate::params::{RangeParams, SensorParams};
 use crate::running::{Interval, Running};
+use crate::sparse_estimator::SparseEstimator;
 
 /// A filter for a sensor whose number of branches and kind of motion are known at run time only.
 pub trait Filter {
@@ -160,7 +161,11 @@ pub fn build_filter(
 ) -> Result<Box<dyn Filter>, CalibrationError> {
     let kind = kind.unwrap_or(params.default_estimator);
     let setting = Setting { limits: params.limits, start, own_rest: OwnRest::SHARED };
-    let single = |kind| filter_from_parts(kind, &params.law, params.estimator(kind)?, setting);
+    let single = |kind| {
+        let estimator = params.estimator(kind)?;
+        let sparse = if kind == EstimatorKind::Ekf { sparse_ekf(&params.law, estimator, setting)? } else { None };
+        sparse.map_or_else(|| filter_from_parts(kind, &params.law, estimator, setting), Ok)
+    };
     if kind != EstimatorKind::Ensemble {
         return single(kind);
     }
@@ -223,6 +228,32 @@ pub(crate) fn filter_from_parts(
             build!(motion, 3, [0, 4, 10], [1, 5, 15, 8, 36], [2, 6, 21, 9, 45], [3, 7, 28, 10, 55], [4, 8, 36])
         }
     }
+}
+
+/// The EKF of a law without plays on Ornstein-Uhlenbeck motion; `None` for any other.
+fn sparse_ekf(
+    law: &LawParams,
+    estimator: &EstimatorParams,
+    setting: Setting,
+) -> Result<Option<Box<dyn Filter>>, CalibrationError> {
+    fn build<const B: usize, const N: usize, const L: usize>(
+        model: SwitchedModel<f64, 2, B, N>,
+        interval: Interval,
+        setting: Setting,
+    ) -> Box<dyn Filter> {
+        let belief: Belief<f64, N, L> = initial_belief(&model, setting);
+        Box::new(Running::new(SparseEstimator::new(model), belief, model, interval))
+    }
+    let AnyMotion::Two(motion) = estimator.motion.to_model()? else { return Ok(None) };
+    let interval = interval(estimator, setting);
+    Ok(Some(match (law.branches.len(), law.plays.len()) {
+        (0, 0) => build::<0, 3, 6>(switched(motion, law, estimator)?, interval, setting),
+        (1, 0) => build::<1, 4, 10>(switched(motion, law, estimator)?, interval, setting),
+        (2, 0) => build::<2, 5, 15>(switched(motion, law, estimator)?, interval, setting),
+        (3, 0) => build::<3, 6, 21>(switched(motion, law, estimator)?, interval, setting),
+        (4, 0) => build::<4, 7, 28>(switched(motion, law, estimator)?, interval, setting),
+        _ => return Ok(None),
+    }))
 }
 
 /// The model of a law, plays aside.

@@ -42,6 +42,7 @@ mod running;
 mod samples;
 mod scores;
 mod sd_scale;
+mod sparse_estimator;
 mod stepper;
 mod way_back;
 

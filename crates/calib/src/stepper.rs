@@ -14,6 +14,10 @@ pub(crate) struct Stepper<E: Estimator<f64, N, L>, const N: usize, const L: usiz
     prepared: PreparedSteps<E::Prepared>,
 }
 
+/// A step as a smoother needs it.
+pub(crate) type Taken<E, const N: usize, const L: usize> =
+    PastStep<<E as Estimator<f64, N, L>>::State, <E as Estimator<f64, N, L>>::Prepared, f64>;
+
 /// Where a filter is.
 #[derive(Clone)]
 pub(crate) struct Moment<S> {
@@ -48,13 +52,12 @@ impl<E: Estimator<f64, N, L>, const N: usize, const L: usize> Stepper<E, N, L> {
     }
 
     /// One step from `now`: where it leads, and what a smoother needs of it.
-    #[allow(clippy::type_complexity, reason = "a name for the pair would say less than the pair")]
     pub(crate) fn advance(
         &mut self,
         now: &Moment<E::State>,
         time_s: f64,
         reading: Option<Reading<f64>>,
-    ) -> Result<(Moment<E::State>, PastStep<E::State, E::Prepared, f64>), StepError> {
+    ) -> Result<(Moment<E::State>, Taken<E, N, L>), StepError> {
         let reading = reading.map(|reading| self.own_rest.reading(reading));
         let prepared = self.prepared.of(now.seconds_until(time_s), |dt_s| self.estimator.prepare(dt_s))?;
         let Guarded { advanced, from, used, verdict, streak } =

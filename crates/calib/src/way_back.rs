@@ -1,10 +1,10 @@
 use std::ops::Range;
 
-use ohmstrain_ekf::{Estimator, PastStep, Reading, StepError, StrainSensor};
+use ohmstrain_ekf::{Estimator, Reading, StepError, StrainSensor};
 
 use crate::filter::{Output, Rows, WayBack};
 use crate::running::Running;
-use crate::stepper::{Moment, Seen};
+use crate::stepper::{Moment, Seen, Taken};
 
 /// Rows whose states are in memory at once while a recording is smoothed; the others are computed again. Of a recording of
 /// ten million rows that leaves 2441 states to begin again from, fewer than the rows of one segment.
@@ -27,7 +27,7 @@ pub(crate) struct Segments<
     /// The state after the last of their rows, from all readings.
     smoothed: E::State,
     /// The present segment.
-    steps: Vec<(Seen, PastStep<E::State, E::Prepared, f64>)>,
+    steps: Vec<(Seen, Taken<E, N, L>)>,
 }
 
 impl<'a, E, S, const M: usize, const B: usize, const N: usize, const L: usize> Segments<'a, E, S, M, B, N, L>
