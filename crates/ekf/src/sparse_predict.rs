@@ -60,15 +60,19 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G> SparseEkf<T, S,
         let mut spread = RateSpread::new(parts.rate_variance);
 
         let gains = self.gains.at(strain_sum);
-        let driven: [Driven<T>; B] = core::array::from_fn(|i| {
-            let (branch, gains, part) = (&step.branches[i], &gains[i], &parts.branches[i]);
+        // Two loops: one short enough to be unrolled, and one that holds the choices.
+        let splits: [(T, T, T); B] = core::array::from_fn(|i| {
+            let (branch, gains) = (&step.branches[i], &gains[i]);
             let drive = branch.drive;
             let unit = input(branch.input, branch.phase_input) + drive[0] * strain + drive[1] * rate;
-            let (change, gain, pull) = match phase {
+            match phase {
                 None => split(branch, gains, strain_sum, unit, &mut spread),
                 Some(phase) => known(gains, strain_sum, unit, phase == Phase::Extend),
-            };
-            let row = [pull + gain * drive[0], gain * drive[1]];
+            }
+        });
+        let driven: [Driven<T>; B] = core::array::from_fn(|i| {
+            let (branch, part, (change, gain, pull)) = (&step.branches[i], &parts.branches[i], splits[i]);
+            let row = [pull + gain * branch.drive[0], gain * branch.drive[1]];
             let kept = [branch.decay * part.with_strain, branch.decay * part.with_rate];
             let carried = [
                 kept[0] + row[0] * strain_variance + row[1] * strain_rate,
@@ -148,33 +152,34 @@ fn predict_branches<T: Scalar, const B: usize>(
 ) {
     let [a, b] = step.motion;
     for i in 0..B {
-        let (branch, Driven { change, gain, pull, row, kept, carried }) = (&step.branches[i], driven[i]);
+        let (branch, Driven { change, gain, pull, row, kept, carried }) = (&step.branches[i], &driven[i]);
+        let (gain, pull) = (*gain, *pull);
         // Without the new strain's share in the gain.
         let strain = gain * branch.cross_noise[0] + a[0] * carried[0] + a[1] * carried[1];
         let rate = gain * branch.cross_noise[1] + b[0] * carried[0] + b[1] * carried[1];
         let with_strain = strain + pull * parts.strain_variance;
-        let mut new = parts.branches[i];
         for k in 0..i {
-            let other = &driven[k];
-            new.with[k] = other.gain * (gain * branch.noise[k])
+            let (other, others_strain) = (&driven[k], parts.branches[k].with_strain);
+            let with = &mut parts.branches[i].with[k];
+            *with = other.gain * (gain * branch.noise[k])
                 + other.row[0] * carried[0]
                 + other.row[1] * carried[1]
                 + row[0] * other.kept[0]
                 + row[1] * other.kept[1]
-                + branch.decays[k] * new.with[k]
+                + branch.decays[k] * *with
                 + other.pull * strain
-                + pull * parts.branches[k].with_strain;
+                + pull * others_strain;
         }
-        new.variance = branch.variance
+        let part = &mut parts.branches[i];
+        part.variance = branch.variance
             + gain * (gain * branch.noise[i])
             + row[0] * (carried[0] + kept[0])
             + row[1] * (carried[1] + kept[1])
-            + branch.decays[i] * new.variance
+            + branch.decays[i] * part.variance
             + pull * (strain + with_strain);
-        new.mean = change + branch.decay * new.mean;
-        new.with_strain = with_strain;
-        new.with_rate = rate + pull * parts.strain_rate;
-        parts.branches[i] = new;
+        part.mean = *change + branch.decay * part.mean;
+        part.with_strain = with_strain;
+        part.with_rate = rate + pull * parts.strain_rate;
     }
 }
 

@@ -2,7 +2,9 @@
 
 use core::hint::black_box;
 
-use ohmstrain_ekf::{Belief, Cubic, Dwell, Ekf, Evidence, Imm, Mixture, Reading, Real, SignSplit, SparseEkf, Switch};
+use ohmstrain_ekf::{
+    Belief, Cubic, Dwell, Ekf, Evidence, Imm, LogLikelihood, Mixture, Reading, Real, SignSplit, SparseEkf, Switch,
+};
 use ohmstrain_model::{ParameterError, Phase, Problem, Scalar, SwitchedModel, SwitchedStep};
 
 use crate::fpu::OnFpu;
@@ -208,5 +210,46 @@ where
 
     fn state_bytes() -> usize {
         size_of::<Belief<T, N, L>>()
+    }
+}
+
+/// The same with three states, asked for its step length at every reading, and with the log-likelihood of all readings.
+#[derive(Clone, Copy)]
+pub struct VaryingFast3<T: Scalar> {
+    fast: Fast3<T>,
+    readings: LogLikelihood<T>,
+    dt_s: T,
+}
+
+impl<T: Scalar> Filter<T> for VaryingFast3<T>
+where
+    OnFpu: Switch<T>,
+{
+    fn start() -> Result<Self, ParameterError> {
+        Ok(Self { fast: Fast3::start()?, readings: LogLikelihood::new(), dt_s: T::of(DT_S) })
+    }
+
+    fn step(&mut self, reading: Reading<T>) -> bool {
+        let Self { fast: FastEkf { ekf, belief }, readings, dt_s } = self;
+        if ekf.retime(black_box(*dt_s)).is_err() {
+            return false;
+        }
+        match ekf.step(belief, Some(reading)) {
+            Ok(residual) => {
+                if let Some(residual) = residual {
+                    readings.add(&residual);
+                }
+                true
+            }
+            Err(_) => false,
+        }
+    }
+
+    fn strain(&self) -> T {
+        self.fast.strain()
+    }
+
+    fn state_bytes() -> usize {
+        size_of::<Belief<T, 3, 6>>() + size_of::<LogLikelihood<T>>()
     }
 }
