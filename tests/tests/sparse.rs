@@ -4,7 +4,7 @@ use nalgebra::SVector;
 use ohmstrain_ekf::{
     Belief, Compact, Cubic, Ekf, LogLikelihood, Logistic, Reading, SparseEkf, StepError, Switch, rts_smooth,
 };
-use ohmstrain_model::{Scalar, SwitchedModel, Symmetric};
+use ohmstrain_model::{Gauge, Scalar, SensorLaw, SwitchedModel, Symmetric};
 use ohmstrain_tests::sensor;
 
 const DT_S: f64 = 0.01;
@@ -239,4 +239,51 @@ fn a_retimed_filter_is_a_new_one() {
         let sd = a.covariance[(i, i)].sqrt();
         assert!((a.mean[i] - b.mean[i]).abs() < 300.0 * 1e3 * f64::EPSILON * sd, "{i}");
     }
+}
+
+/// Beliefs that are no covariances, with numbers up to the end of `f32`: a step refuses them or leaves finite numbers, no
+/// negative variance among them. The kernel looks at few of its numbers; this looks at all.
+#[test]
+fn what_a_step_accepts_is_finite() {
+    let model: SwitchedModel<f32, 2, 3, 6> = sensor();
+    let ekf = SparseEkf::<f32, Compact, 3, 6>::new(model, DT_S as f32).unwrap();
+    let mut state = 1_u64;
+    let mut uniform = || {
+        // Knuth's MMIX generator; the upper bits.
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 40) as f32 / (1_u64 << 24) as f32
+    };
+    let mut accepted = 0;
+    for k in 0..200_000 {
+        let reach = [1.0, 10.0, 38.0][k % 3];
+        let mut wild = || (uniform() - 0.5).signum() * 10_f32.powf(reach * (2.0 * uniform() - 1.0));
+        let mut covariance: [f32; 21] = std::array::from_fn(|_| wild());
+        for diagonal in [0, 2, 5, 9, 14, 20] {
+            covariance[diagonal] = covariance[diagonal].abs();
+        }
+        let mut belief = Belief {
+            mean: SVector::<f32, 6>::from_fn(|_, _| wild()),
+            covariance: Symmetric::<f32, 6, 21>::from_packed(covariance),
+        };
+        let before = belief;
+        if ekf.step(&mut belief, Some(Reading::from(wild()))).is_ok() {
+            accepted += 1;
+            assert!(belief.is_finite(), "{before:?} became {belief:?}");
+            assert!((0..6).all(|i| belief.covariance[(i, i)] >= 0.0), "{belief:?}");
+        } else {
+            assert_eq!(belief, before);
+        }
+    }
+    assert!(accepted > 1000, "{accepted} accepted: nothing was tested");
+}
+
+#[test]
+fn a_cubic_refuses_other_gauges() {
+    let model: SwitchedModel<f64, 2, 1, 3> = sensor();
+    let gauge = Gauge::DecayingExponential { slope: 1.5, decay_strain: 0.4 };
+    let law = SensorLaw { gauge, ..*model.law() };
+    let other = SwitchedModel::new(law, *model.motion(), *model.noise()).unwrap();
+    let refused = SparseEkf::<f64, Compact, 1, 3, Cubic<f64>>::new(other, DT_S);
+    assert_eq!(refused.err(), Some(StepError::OtherGauge));
+    assert!(SparseEkf::<f64, Compact, 1, 3>::new(other, DT_S).is_ok());
 }
