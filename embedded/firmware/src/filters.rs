@@ -2,9 +2,12 @@
 
 use core::hint::black_box;
 
-use ohmstrain_ekf::{Belief, Compact, Dwell, Ekf, Evidence, Imm, Mixture, Reading, Real, SignSplit, SparseEkf};
+use ohmstrain_ekf::{
+    Belief, Cubic, Dwell, Ekf, Evidence, Imm, LogLikelihood, Mixture, Reading, Real, SignSplit, SparseEkf, Switch,
+};
 use ohmstrain_model::{ParameterError, Phase, Problem, Scalar, SwitchedModel, SwitchedStep};
 
+use crate::fpu::OnFpu;
 use crate::{DT_S, limits, sensor};
 
 /// A filter with its state.
@@ -177,8 +180,8 @@ impl<T: Real> Filter<T> for SplitFour<T> {
 
 /// The EKF that leaves out the zeros, at a fixed rate.
 #[derive(Clone, Copy)]
-pub struct FastEkf<T, const B: usize, const N: usize, const L: usize> {
-    ekf: SparseEkf<T, Compact, B, N>,
+pub struct FastEkf<T: Scalar, const B: usize, const N: usize, const L: usize> {
+    ekf: SparseEkf<T, OnFpu, B, N, Cubic<T>>,
     belief: Belief<T, N, L>,
 }
 
@@ -187,7 +190,10 @@ pub type Fast3<T> = FastEkf<T, 1, 3, 6>;
 /// Strain, rate, three branches, baseline.
 pub type Fast6<T> = FastEkf<T, 3, 6, 21>;
 
-impl<T: Scalar, const B: usize, const N: usize, const L: usize> Filter<T> for FastEkf<T, B, N, L> {
+impl<T: Scalar, const B: usize, const N: usize, const L: usize> Filter<T> for FastEkf<T, B, N, L>
+where
+    OnFpu: Switch<T>,
+{
     fn start() -> Result<Self, ParameterError> {
         let model = black_box(sensor()?);
         let step = SparseEkf::new(model, T::of(DT_S)).map_err(|_| ParameterError::new("dt_s", Problem::NotPositive))?;
@@ -204,5 +210,46 @@ impl<T: Scalar, const B: usize, const N: usize, const L: usize> Filter<T> for Fa
 
     fn state_bytes() -> usize {
         size_of::<Belief<T, N, L>>()
+    }
+}
+
+/// The same with three states, asked for its step length at every reading, and with the log-likelihood of all readings.
+#[derive(Clone, Copy)]
+pub struct VaryingFast3<T: Scalar> {
+    fast: Fast3<T>,
+    readings: LogLikelihood<T>,
+    dt_s: T,
+}
+
+impl<T: Scalar> Filter<T> for VaryingFast3<T>
+where
+    OnFpu: Switch<T>,
+{
+    fn start() -> Result<Self, ParameterError> {
+        Ok(Self { fast: Fast3::start()?, readings: LogLikelihood::new(), dt_s: T::of(DT_S) })
+    }
+
+    fn step(&mut self, reading: Reading<T>) -> bool {
+        let Self { fast: FastEkf { ekf, belief }, readings, dt_s } = self;
+        if ekf.retime(black_box(*dt_s)).is_err() {
+            return false;
+        }
+        match ekf.step(belief, Some(reading)) {
+            Ok(residual) => {
+                if let Some(residual) = residual {
+                    readings.add(&residual);
+                }
+                true
+            }
+            Err(_) => false,
+        }
+    }
+
+    fn strain(&self) -> T {
+        self.fast.strain()
+    }
+
+    fn state_bytes() -> usize {
+        size_of::<Belief<T, 3, 6>>() + size_of::<LogLikelihood<T>>()
     }
 }

@@ -10,10 +10,11 @@ use ohmstrain_firmware::{Ekf3, Ekf6, Fast3, Fast6, Filter, Imm6, SplitFour, Vary
 use crate::codes::{SEED, codes};
 
 /// Programs, in the order of the table, and the filter of the library whose `f64` strain is the reference of each.
-pub const PROGRAMS: [(&str, &str); 7] = [
+pub const PROGRAMS: [(&str, &str); 8] = [
     ("ekf3", "ekf3"),
     ("ekf3_varying", "ekf3_varying"),
     ("fast3", "fast3"),
+    ("fast3_varying", "fast3"),
     ("ekf6", "ekf6"),
     ("fast6", "fast6"),
     ("imm6", "imm6"),

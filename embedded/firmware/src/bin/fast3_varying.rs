@@ -1,0 +1,11 @@
+//! Sparse EKF of strain, rate and one branch, which may be given another step length at every reading, and its log-likelihood.
+#![no_std]
+#![no_main]
+
+use cortex_m_rt::entry;
+use ohmstrain_firmware::{VaryingFast3, frame};
+
+#[entry]
+fn main() -> ! {
+    frame::run::<VaryingFast3<f32>>()
+}
