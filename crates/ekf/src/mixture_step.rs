@@ -54,7 +54,7 @@ pub(crate) struct Origin<'a, T, const N: usize, const L: usize> {
 }
 
 /// A cut that leaves less than this of a prediction is not followed: its moments would be those of a far tail.
-const LEAST_MASS: f64 = 1e-3;
+pub(crate) const LEAST_MASS: f64 = 1e-3;
 
 impl<'a, T, M, R, const N: usize, const L: usize, const K: usize> Candidates<'a, T, M, R, N, L, K>
 where

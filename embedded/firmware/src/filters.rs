@@ -2,7 +2,10 @@
 
 use core::hint::black_box;
 
-use ohmstrain_ekf::{Belief, Compact, Dwell, Ekf, Evidence, Imm, Mixture, Reading, Real, SignSplit, SparseEkf};
+use ohmstrain_ekf::{
+    Belief, Compact, Dwell, Ekf, Evidence, Imm, Mixture, PhaseMixture, Reading, Real, SignMixture, SignSplit, SparseEkf,
+    SparseImm, SparseSignSplit,
+};
 use ohmstrain_model::{ParameterError, Phase, Problem, Scalar, SwitchedModel, SwitchedStep};
 
 use crate::{DT_S, limits, sensor};
@@ -175,34 +178,66 @@ impl<T: Real> Filter<T> for SplitFour<T> {
     }
 }
 
-/// The EKF that leaves out the zeros, at a fixed rate.
+/// A filter of the sensor's own model that leaves out the zeros, at a fixed rate, and its state, which changes in place.
 #[derive(Clone, Copy)]
-pub struct FastEkf<T, const B: usize, const N: usize, const L: usize> {
-    ekf: SparseEkf<T, Compact, B, N>,
-    belief: Belief<T, N, L>,
+pub struct Fast<F, S> {
+    filter: F,
+    state: S,
 }
 
 /// Strain, rate, one branch.
-pub type Fast3<T> = FastEkf<T, 1, 3, 6>;
+pub type Fast3<T> = Fast<SparseEkf<T, Compact, 1, 3>, Belief<T, 3, 6>>;
 /// Strain, rate, three branches, baseline.
-pub type Fast6<T> = FastEkf<T, 3, 6, 21>;
+pub type Fast6<T> = Fast<SparseEkf<T, Compact, 3, 6>, Belief<T, 6, 21>>;
+/// Three phases of those six states.
+pub type FastImm6<T> = Fast<SparseImm<T, 3, 6>, PhaseMixture<T, 6, 21>>;
+/// Four hypotheses of them, split by the sign of the rate.
+pub type FastSplit6<T> = Fast<SparseSignSplit<T, 3, 6, 4>, SignMixture<T, 6, 21, 4>>;
 
-impl<T: Scalar, const B: usize, const N: usize, const L: usize> Filter<T> for FastEkf<T, B, N, L> {
-    fn start() -> Result<Self, ParameterError> {
-        let model = black_box(sensor()?);
-        let step = SparseEkf::new(model, T::of(DT_S)).map_err(|_| ParameterError::new("dt_s", Problem::NotPositive))?;
-        Ok(Self { ekf: step, belief: Belief::initial(&model) })
-    }
+/// [`Filter`] for these: they differ in how they start and where they keep the strain.
+macro_rules! fast_filter {
+    ($scalar:ident, <$(const $n:ident),*> $filter:ty, $state:ty, |$model:ident| $start:expr, |$of:ident| $strain:expr) => {
+        impl<T: $scalar $(, const $n: usize)*> Filter<T> for Fast<$filter, $state> {
+            fn start() -> Result<Self, ParameterError> {
+                let $model = black_box(sensor()?);
+                let (filter, state) = $start;
+                Ok(Self { filter: filter.map_err(|_| ParameterError::new("dt_s", Problem::NotPositive))?, state })
+            }
 
-    fn step(&mut self, reading: Reading<T>) -> bool {
-        self.ekf.step(&mut self.belief, Some(reading)).is_ok()
-    }
+            fn step(&mut self, reading: Reading<T>) -> bool {
+                self.filter.step(&mut self.state, Some(reading)).is_ok()
+            }
 
-    fn strain(&self) -> T {
-        self.belief.mean[0]
-    }
+            fn strain(&self) -> T {
+                let $of = &self.state;
+                $strain
+            }
 
-    fn state_bytes() -> usize {
-        size_of::<Belief<T, N, L>>()
-    }
+            fn state_bytes() -> usize {
+                size_of::<$state>()
+            }
+        }
+    };
 }
+
+fast_filter!(
+    Scalar, <const B, const N, const L> SparseEkf<T, Compact, B, N>, Belief<T, N, L>,
+    |model| (SparseEkf::new(model, T::of(DT_S)), Belief::initial(&model)),
+    |belief| belief.mean[0]
+);
+fast_filter!(
+    Real, <const B, const N, const L> SparseImm<T, B, N>, PhaseMixture<T, N, L>,
+    |model| (
+        SparseImm::new(model, T::of(DT_S), black_box(dwell()?), black_box(evidence())),
+        PhaseMixture::single(Belief::initial(&model), Phase::Hold)
+    ),
+    |mixture| mixture.marginal(0).mean
+);
+fast_filter!(
+    Real, <const B, const N, const L, const K> SparseSignSplit<T, B, N, K>, SignMixture<T, N, L, K>,
+    |model| (
+        SparseSignSplit::new(model, T::of(DT_S), None, black_box(evidence())),
+        SignMixture::single(Belief::initial(&model), Phase::Extend)
+    ),
+    |mixture| mixture.marginal(0).mean
+);
