@@ -2,10 +2,10 @@ use ohmstrain_model::Phase;
 
 use crate::StepError;
 use crate::gaussian::Real;
-use crate::mixture::{ALIKE, LEAST_WEIGHT};
+use crate::mixture::{ALIKE, LEAST_WEIGHT, moment_match};
 use crate::sparse_evidence::Weight;
-use crate::sparse_gaussian::Working;
 use crate::sparse_mixture::{Share, SignMixture};
+use crate::sparse_parts::Parts;
 
 /// Collects the children of a step: keeps, merges and drops them as [`Mixture`](crate::Mixture) does.
 pub(crate) struct Children<T, const N: usize, const L: usize, const K: usize> {
@@ -22,23 +22,25 @@ impl<T: Real, const N: usize, const L: usize, const K: usize> Children<T, N, L, 
     }
 
     /// Adds a child: merged with one that says the same, in a free place, or in the place of the lightest.
-    pub(crate) fn add(&mut self, child: &Working<T, N>, phase: Phase, weight: Weight<T>, log_inside: T) {
+    pub(crate) fn add<const B: usize>(&mut self, child: &Parts<T, B>, phase: Phase, weight: Weight<T>, log_inside: T) {
         self.raise_to(weight.exponent);
         let weight = weight.relative_to(self.exponent);
         let like = self.kept.iter_mut().find(|(share, known)| **known == phase && share.is_like(child));
         if let Some((like, _)) = like {
             like.merge(child, weight, log_inside);
-            return;
+        } else if let Some((place, of)) = self.room(weight) {
+            (place.weight, place.log_inside, *of) = (weight, log_inside, phase);
+            child.put_into(&mut place.belief);
         }
-        let share = |child: &Working<T, N>| Share { weight, belief: child.belief(), log_inside };
+    }
+
+    /// A free place, or that of the lightest if it is lighter than `weight`.
+    fn room(&mut self, weight: T) -> Option<(&mut Share<T, N, L>, &mut Phase)> {
         if self.kept.shares().len() < K {
-            self.kept.push(share(child), phase);
-            return;
+            return self.kept.one_more();
         }
         let lighter = |a, b| if Self::weight_of(&b) < Self::weight_of(&a) { b } else { a };
-        if let Some((place, of)) = self.kept.iter_mut().reduce(lighter).filter(|lightest| lightest.0.weight < weight) {
-            (*place, *of) = (share(child), phase);
-        }
+        self.kept.iter_mut().reduce(lighter).filter(|lightest| lightest.0.weight < weight)
     }
 
     fn weight_of(place: &(&mut Share<T, N, L>, &mut Phase)) -> T {
@@ -81,36 +83,28 @@ impl<T: Real, const N: usize, const L: usize, const K: usize> Children<T, N, L, 
 impl<T: Real, const N: usize, const L: usize> Share<T, N, L> {
     /// As hypotheses of one phase count as one in a [`Mixture`](crate::Mixture).
     #[inline(always)]
-    fn is_like(&self, other: &Working<T, N>) -> bool {
-        let (mean, covariance) = (&self.belief.mean, &self.belief.covariance);
-        let distance = |i: usize, variance: T| {
-            let apart = mean[i] - other.x[i];
-            let variance = if other.p[i][i] > variance { other.p[i][i] } else { variance };
+    fn is_like<const B: usize>(&self, other: &Parts<T, B>) -> bool {
+        let distance = |i: usize, mean: T, other_variance: T| {
+            let (apart, variance) = (self.belief.mean[i] - mean, self.belief.covariance[(i, i)]);
+            let variance = if other_variance > variance { other_variance } else { variance };
             // What is known exactly is the same or is not; a difference has no size without a unit.
             if apart.is_zero() { T::zero() } else { apart * apart / variance }
         };
-        let strain = distance(0, covariance[(0, 0)]);
-        strain < T::of(ALIKE) && strain + distance(1, covariance[(1, 1)]) < T::of(ALIKE)
+        let strain = distance(0, other.strain, other.strain_variance);
+        strain < T::of(ALIKE) && strain + distance(1, other.rate, other.rate_variance) < T::of(ALIKE)
     }
 
     /// Takes in another one, with the mean and covariance of the pair.
-    fn merge(&mut self, other: &Working<T, N>, weight: T, log_inside: T) {
+    fn merge<const B: usize>(&mut self, other: &Parts<T, B>, weight: T, log_inside: T) {
         let total = self.weight + weight;
         if !(total > T::zero()) {
             return;
         }
-        let theirs = weight / total;
-        let (mine, both) = (self.weight / total, self.weight / total * theirs);
-        let apart: [T; N] = core::array::from_fn(|i| other.x[i] - self.belief.mean[i]);
-        let mut merged = *other;
-        let of_self = Working::of(&self.belief);
-        for i in 0..N {
-            merged.x[i] = of_self.x[i] + theirs * apart[i];
-            for j in 0..=i {
-                merged.p[i][j] = mine * of_self.p[i][j] + theirs * other.p[i][j] + both * apart[i] * apart[j];
-            }
-        }
-        *self =
-            Self { weight: total, belief: merged.belief(), log_inside: mine * self.log_inside + theirs * log_inside };
+        let (mine, theirs) = (self.weight / total, weight / total);
+        let mut belief = self.belief;
+        other.put_into(&mut belief);
+        self.weight = total;
+        self.log_inside = mine * self.log_inside + theirs * log_inside;
+        self.belief = moment_match([(mine, &self.belief), (theirs, &belief)].into_iter());
     }
 }

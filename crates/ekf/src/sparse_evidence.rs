@@ -25,7 +25,7 @@ impl<T: Real> Weight<T> {
     #[inline(always)]
     pub(crate) fn relative_to(&self, exponent: T) -> T {
         let below = self.exponent - exponent;
-        if below.is_zero() { self.factor } else { self.factor * below.exp() }
+        if below.is_zero() || self.factor.is_zero() { self.factor } else { self.factor * below.exp() }
     }
 }
 
@@ -35,16 +35,15 @@ impl<T: Real> Weighing<T> {
         Self { limits: evidence.limits, tempering: evidence.tempering, clear }
     }
 
-    /// Likelihood of a reading to the power of the tempering, without the constant `(2π)^(-tempering/2)`.
+    /// A prior probability times the likelihood of a reading to the power of the tempering, without the constant
+    /// `(2π)^(-tempering/2)`.
     #[inline(always)]
-    pub(crate) fn likelihood(&self, residual: &Residual<T>) -> Weight<T> {
-        let per_variance = T::one() / residual.variance;
-        let nis = residual.innovation * residual.innovation * per_variance;
+    pub(crate) fn likelihood(&self, prior: T, residual: &Residual<T>) -> Weight<T> {
         let half = T::of(-0.5) * self.tempering;
         if self.tempering == T::one() {
-            return Weight { factor: per_variance.sqrt(), exponent: half * nis };
+            return Weight { factor: prior / residual.variance.sqrt(), exponent: half * residual.nis };
         }
-        Weight { factor: T::one(), exponent: half * (nis + residual.variance.ln()) }
+        Weight { factor: prior, exponent: half * (residual.nis + residual.variance.ln()) }
     }
 
     /// Logarithm of the probability that a strain lies within the limits, as the generic filters have it.
@@ -128,6 +127,7 @@ impl<T: Real> Predicted<T> {
         let innovation = self.innovation * per_weight;
         let variance = self.square * per_weight - innovation * innovation;
         let Weight { factor, exponent } = total;
-        MixtureResidual { residual: Residual { innovation, variance }, factor, exponent, tempering }
+        let nis = innovation * innovation / variance;
+        MixtureResidual { residual: Residual { innovation, variance, nis }, factor, exponent, tempering }
     }
 }

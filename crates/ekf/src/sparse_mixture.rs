@@ -87,25 +87,23 @@ impl<T: Real, const N: usize, const L: usize, const K: usize> SignMixture<T, N, 
     /// One Gaussian that has all the weight.
     #[must_use]
     pub fn single(belief: Belief<T, N, L>, phase: Phase) -> Self {
-        let mut mixture = Self::empty();
-        mixture.push(Share { weight: T::one(), belief, log_inside: T::zero() }, phase);
-        mixture
+        let () = Mixture::<T, N, L, K>::CAPACITY;
+        let share = Share { weight: T::one(), belief, log_inside: T::zero() };
+        Self { shares: [share; K], phases: [phase; K], len: 1 }
     }
 
     #[inline(always)]
     pub(crate) fn empty() -> Self {
-        let () = Mixture::<T, N, L, K>::CAPACITY;
         let nothing = Belief { mean: SVector::zeros(), covariance: Symmetric::zeros() };
         let vacant = Share { weight: T::zero(), belief: nothing, log_inside: T::zero() };
         Self { shares: [vacant; K], phases: [Phase::Hold; K], len: 0 }
     }
 
-    /// Adds one, if there is room.
-    pub(crate) fn push(&mut self, share: Share<T, N, L>, phase: Phase) {
-        if let (Some(place), Some(of)) = (self.shares.get_mut(self.len), self.phases.get_mut(self.len)) {
-            (*place, *of) = (share, phase);
-            self.len += 1;
-        }
+    /// One place more, if there is room.
+    pub(crate) fn one_more(&mut self) -> Option<(&mut Share<T, N, L>, &mut Phase)> {
+        let (share, phase) = (self.shares.get_mut(self.len)?, self.phases.get_mut(self.len)?);
+        self.len += 1;
+        Some((share, phase))
     }
 
     /// Drops those that do not count; the others keep their order.

@@ -11,17 +11,16 @@ use crate::mixture_step::LEAST_MASS;
 use crate::sign_split::{HOPELESS, follows};
 use crate::sparse_children::Children;
 use crate::sparse_evidence::{Predicted, Weighing, Weight};
-use crate::sparse_gaussian::Working;
-use crate::sparse_known::KnownStep;
 use crate::sparse_mixture::{Share, SignMixture};
+use crate::sparse_parts::Parts;
 use crate::switching::fresh_rate;
-use crate::{Dwell, Evidence, Gaussian, MixtureResidual, Reading, StepError};
+use crate::{AnyCurve, Compact, Curve, Dwell, Evidence, Gaussian, MixtureResidual, Reading, SparseEkf, StepError};
 
 /// [`SignSplit`](crate::SignSplit) of a [`SwitchedModel`] with Ornstein-Uhlenbeck motion, for steps of one length: the
 /// same to rounding, without multiplying zeros.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SparseSignSplit<T, const B: usize, const N: usize, const K: usize> {
-    kernel: KnownStep<T, B, N>,
+pub struct SparseSignSplit<T, const B: usize, const N: usize, const K: usize, G = AnyCurve<T>> {
+    kernel: SparseEkf<T, Compact, B, N, G>,
     /// Probabilities of a change of phase over a step, `[from][to]`; `None` for a body that never rests.
     chain: Option<[[T; 3]; 3]>,
     weighing: Weighing<T>,
@@ -29,25 +28,24 @@ pub struct SparseSignSplit<T, const B: usize, const N: usize, const K: usize> {
     fresh: [Gaussian<T>; 3],
 }
 
-impl<T: Real, const B: usize, const N: usize, const K: usize> SparseSignSplit<T, B, N, K> {
+impl<T: Real, const B: usize, const N: usize, const K: usize, G: Curve<T>> SparseSignSplit<T, B, N, K, G> {
     /// A filter for steps of `dt_s` seconds.
     /// - `hold`: how long holds and movements last; `None` for a body that never rests.
     /// - `evidence`: what weighs the hypotheses.
     ///
     /// # Errors
-    /// If `dt_s` is not a positive number.
+    /// As for [`SparseEkf::new`].
     pub fn new(
         model: SwitchedModel<T, 2, B, N>,
         dt_s: T,
         hold: Option<Dwell<T>>,
         evidence: Evidence<T>,
     ) -> Result<Self, StepError> {
-        let fresh = Phase::ALL.map(|phase| fresh_rate(model.motion(), phase));
         Ok(Self {
-            kernel: KnownStep::new(model, dt_s)?,
+            kernel: SparseEkf::new(model, dt_s)?,
             chain: hold.map(|dwell| dwell.probabilities(dt_s)),
             weighing: Weighing::new(evidence),
-            fresh,
+            fresh: Phase::ALL.map(|phase| fresh_rate(model.motion(), phase)),
         })
     }
 
@@ -90,22 +88,18 @@ impl<T: Real, const B: usize, const N: usize, const K: usize> SparseSignSplit<T,
         predicted: &mut Predicted<T>,
     ) -> Result<(), StepError> {
         let Origin { parent, from, phase, probability } = *origin;
-        let mut child = Working::of(&parent.belief);
+        let mut child = Parts::of(&parent.belief);
         let rests = self.chain.is_some() && from == Phase::Hold && phase != Phase::Hold;
         if rests {
             child.renew_rate(&self.fresh[phase.index()]);
         }
+        if phase != Phase::Hold && self.is_hopeless(phase, &child) {
+            return Ok(());
+        }
+        let spread = self.kernel.predict(&mut child, Some(phase));
         let mut prior = parent.weight * probability;
-        if phase == Phase::Hold {
-            self.kernel.predict(phase, &mut child);
-        } else {
-            let ahead = self.kernel.rate_ahead(phase, &child);
-            let toward = if phase == Phase::Retract { -ahead.mean } else { ahead.mean };
-            if toward < T::zero() && toward * toward > T::of(HOPELESS * HOPELESS) * ahead.variance {
-                return Ok(());
-            }
-            self.kernel.predict(phase, &mut child);
-            let mass = child.cut_rate(phase, self.weighing.clear());
+        if phase != Phase::Hold {
+            let mass = child.cut_rate::<N>(phase, self.weighing.clear());
             if !(mass > T::of(LEAST_MASS)) {
                 return Ok(());
             }
@@ -116,16 +110,24 @@ impl<T: Real, const B: usize, const N: usize, const K: usize> SparseSignSplit<T,
         }
         let mut weight = Weight { factor: prior, exponent: T::zero() };
         if let Some(reading) = reading {
-            let residual = self.kernel.update(phase, &mut child, reading)?;
-            let likelihood = self.weighing.likelihood(&residual);
-            weight = Weight { factor: prior * likelihood.factor, exponent: likelihood.exponent };
+            let residual = self.kernel.update(&mut child, reading, Some(phase), spread)?;
+            weight = self.weighing.likelihood(prior, &residual);
             predicted.add(prior, &residual);
+        } else if !child.is_sound::<N>(child.variances::<N>()) {
+            return Err(StepError::NonFiniteState);
         }
-        child.check()?;
-        let log_inside = self.weighing.log_inside(child.x[0], child.p[0][0]);
+        let log_inside = self.weighing.log_inside(child.strain, child.strain_variance);
         weight.exponent += log_inside - parent.log_inside;
         children.add(&child, phase, weight, log_inside);
         Ok(())
+    }
+
+    /// Whether next to nothing of a prediction has the sign of a moving phase.
+    #[inline(always)]
+    fn is_hopeless(&self, phase: Phase, from: &Parts<T, B>) -> bool {
+        let ahead = self.kernel.rate_ahead(phase, from);
+        let toward = if phase == Phase::Retract { -ahead.mean } else { ahead.mean };
+        toward < T::zero() && toward * toward > T::of(HOPELESS * HOPELESS) * ahead.variance
     }
 }
 
