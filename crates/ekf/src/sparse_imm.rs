@@ -15,7 +15,9 @@ use crate::sparse_evidence::{Predicted, Weighing, Weight};
 use crate::sparse_mixture::{PhaseMixture, Share};
 use crate::sparse_parts::Parts;
 use crate::switching::fresh_rate;
-use crate::{AnyCurve, Compact, Curve, Dwell, Evidence, Gaussian, MixtureResidual, Reading, SparseEkf, StepError};
+use crate::{
+    AnyCurve, Compact, Curve, Dwell, Evidence, Gaussian, MixtureResidual, Reading, Residual, SparseEkf, StepError,
+};
 
 /// [`Imm`](crate::Imm) of a [`SwitchedModel`] with Ornstein-Uhlenbeck motion, for steps of one length: the same to
 /// rounding, without multiplying zeros. `G` as for [`SparseEkf`].
@@ -36,6 +38,7 @@ struct Mode<T, const B: usize> {
     prior: T,
     weight: Weight<T>,
     log_inside: T,
+    residual: Option<Residual<T>>,
 }
 
 impl<T: Real, const B: usize, const N: usize, G: Curve<T>> SparseImm<T, B, N, G> {
@@ -76,30 +79,34 @@ impl<T: Real, const B: usize, const N: usize, G: Curve<T>> SparseImm<T, B, N, G>
         state: &mut PhaseMixture<T, N, L>,
         reading: Option<Reading<T>>,
     ) -> Result<Option<MixtureResidual<T>>, StepError> {
-        // One by one: an array of modes would be copied around.
+        // Three results that stay where they are: nothing is moved, and a state is written when all of them are there.
+        let extend = self.advanced(state, Phase::Extend, reading);
+        let hold = self.advanced(state, Phase::Hold, reading);
+        let retract = self.advanced(state, Phase::Retract, reading);
+        let modes = [borrowed(&extend)?, borrowed(&hold)?, borrowed(&retract)?];
+        let (shares, total) = shares(modes.map(|mode| mode.weight))?;
         let mut predicted = Predicted::new();
-        let extend = self.advanced(&state.modes, Phase::Extend, reading, &mut predicted)?;
-        let hold = self.advanced(&state.modes, Phase::Hold, reading, &mut predicted)?;
-        let retract = self.advanced(&state.modes, Phase::Retract, reading, &mut predicted)?;
-        let (shares, total) = shares([extend.weight, hold.weight, retract.weight])?;
-        for ((mode, share), weight) in [&extend, &hold, &retract].into_iter().zip(&mut state.modes).zip(shares) {
+        for ((mode, share), weight) in modes.into_iter().zip(&mut state.modes).zip(shares) {
             share.weight = weight;
             share.log_inside = mode.log_inside;
             mode.parts.put_into(&mut share.belief);
+            if let Some(residual) = &mode.residual {
+                predicted.add(mode.prior, residual);
+            }
         }
         Ok(reading.map(|_| predicted.residual(total, self.weighing.tempering())))
     }
 
-    /// A mode after the step: its belief, and what is known of its weight.
-    #[inline(always)]
+    /// A mode after the step: its belief, and what is known of its weight. One function for all phases, so that a program
+    /// has it once.
+    #[inline(never)]
     fn advanced<const L: usize>(
         &self,
-        modes: &[Share<T, N, L>; 3],
+        state: &PhaseMixture<T, N, L>,
         phase: Phase,
         reading: Option<Reading<T>>,
-        predicted: &mut Predicted<T>,
     ) -> Result<Mode<T, B>, StepError> {
-        let mut mode = self.mixed(modes, phase);
+        let mut mode = self.mixed(&state.modes, phase);
         if !(mode.prior > T::zero()) {
             return Ok(mode);
         }
@@ -107,7 +114,7 @@ impl<T: Real, const B: usize, const N: usize, G: Curve<T>> SparseImm<T, B, N, G>
         if let Some(reading) = reading {
             let residual = self.kernel.update(&mut mode.parts, reading, Some(phase), spread)?;
             mode.weight = self.weighing.likelihood(mode.prior, &residual);
-            predicted.add(mode.prior, &residual);
+            mode.residual = Some(residual);
         } else if !mode.parts.is_sound::<N>(mode.parts.variances::<N>()) {
             return Err(StepError::NonFiniteState);
         }
@@ -127,20 +134,24 @@ impl<T: Real, const B: usize, const N: usize, G: Curve<T>> SparseImm<T, B, N, G>
         let prior = joint[0] + joint[1] + joint[2];
         let weight = Weight { factor: prior, exponent: zero };
         if !(prior > zero) {
-            return Mode { parts: Parts::of(&own.belief), prior, weight, log_inside: own.log_inside };
+            return Mode { parts: Parts::of(&own.belief), prior, weight, log_inside: own.log_inside, residual: None };
         }
         let per_prior = T::one() / prior;
         let shares = joint.map(|weight| weight * per_prior);
         let log_inside =
             shares[0] * modes[0].log_inside + shares[1] * modes[1].log_inside + shares[2] * modes[2].log_inside;
         let [a, b, c] = heaviest_first([(shares[0], &modes[0]), (shares[1], &modes[1]), (shares[2], &modes[2])]);
-        let of = [a, b, c].map(|(_, share)| Parts::of(&share.belief));
-        let mut parts = Parts::mixed::<N>([a.0, b.0, c.0], of.each_ref());
+        let mut parts = Parts::mixed([a.0, b.0, c.0], [&a.1.belief, &b.1.belief, &c.1.belief]);
         if phase != Phase::Hold {
-            parts.mix_rate::<N>(shares[to], &Parts::of(&own.belief), &self.fresh[to]);
+            parts.mix_rate(shares[to], &own.belief, &self.fresh[to]);
         }
-        Mode { parts, prior, weight, log_inside }
+        Mode { parts, prior, weight, log_inside, residual: None }
     }
+}
+
+/// What went well, without moving it.
+fn borrowed<T>(result: &Result<T, StepError>) -> Result<&T, StepError> {
+    result.as_ref().map_err(|error| *error)
 }
 
 /// The heaviest in front, by two comparisons.
