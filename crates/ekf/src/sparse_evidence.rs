@@ -2,7 +2,8 @@ use ohmstrain_model::{Scalar, StrainRange};
 
 use crate::gaussian::{Real, upper_tail};
 use crate::mixture::LEAST_INSIDE;
-use crate::{Evidence, Residual};
+use crate::mixture_step::Predicted;
+use crate::{Evidence, Residual, Switch};
 
 /// What weighs the Gaussians of a sparse mixture: as [`Evidence`] does, in factors instead of logarithms.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -11,6 +12,8 @@ pub(crate) struct Weighing<T> {
     tempering: T,
     /// Squared number of deviations beyond which a tail adds less to 1 than rounding: `Q(z) ≤ exp(-z²/2)/2 = ε/2`.
     clear: T,
+    /// Below this, `ln(1 - x) = -x - x²/2` to rounding: the next term is `x³/3 = ε/2`.
+    slight: T,
 }
 
 /// A weight as `factor · exp(exponent)`: factors have the size of probabilities, exponents any.
@@ -31,43 +34,52 @@ impl<T: Real> Weight<T> {
 
 impl<T: Real> Weighing<T> {
     pub(crate) fn new(evidence: Evidence<T>) -> Self {
-        let clear = T::of(-2.0) * T::default_epsilon().ln();
-        Self { limits: evidence.limits, tempering: evidence.tempering, clear }
+        let rounding = T::default_epsilon();
+        let clear = T::of(-2.0) * rounding.ln();
+        let slight = ((T::of(1.5) * rounding).ln() / T::of(3.0)).exp();
+        Self { limits: evidence.limits, tempering: evidence.tempering, clear, slight }
     }
 
     /// A prior probability times the likelihood of a reading to the power of the tempering, without the constant
     /// `(2π)^(-tempering/2)`.
     #[inline(always)]
-    pub(crate) fn likelihood(&self, prior: T, residual: &Residual<T>) -> Weight<T> {
+    pub(crate) fn likelihood<S: Switch<T>>(&self, prior: T, residual: &Residual<T>) -> Weight<T> {
         let half = T::of(-0.5) * self.tempering;
         if self.tempering == T::one() {
-            return Weight { factor: prior / residual.variance.sqrt(), exponent: half * residual.nis };
+            return Weight { factor: prior / S::sd(residual.variance), exponent: half * residual.nis };
         }
         Weight { factor: prior, exponent: half * (residual.nis + residual.variance.ln()) }
     }
 
     /// Logarithm of the probability that a strain lies within the limits, as the generic filters have it.
     #[inline(always)]
-    pub(crate) fn log_inside(&self, strain: T, variance: T) -> T {
+    pub(crate) fn log_inside<S: Switch<T>>(&self, strain: T, variance: T) -> T {
         let (above_lower, below_upper) = (strain - self.limits.lower, self.limits.upper - strain);
         let reach = self.clear * variance;
         let clear = |distance: T| distance > T::zero() && distance * distance > reach;
         if variance <= T::zero() || (clear(above_lower) && clear(below_upper)) {
             return T::zero();
         }
-        self.log_inside_near(above_lower, below_upper, variance)
+        self.log_inside_near::<S>(above_lower, below_upper, variance)
     }
 
     /// The same where a tail counts.
     #[inline(never)]
-    fn log_inside_near(&self, above_lower: T, below_upper: T, variance: T) -> T {
-        let per_sd = T::one() / variance.sqrt();
-        // The end that is nearer, or beyond which the strain lies, decides which side keeps its digits.
+    fn log_inside_near<S: Switch<T>>(&self, above_lower: T, below_upper: T, variance: T) -> T {
+        let per_sd = T::one() / S::sd(variance);
         let (near, far) =
             if above_lower < below_upper { (above_lower, below_upper) } else { (below_upper, above_lower) };
-        let outside =
-            if far > T::zero() && far * far > self.clear * variance { T::zero() } else { upper_tail(far * per_sd) };
-        (upper_tail(-near * per_sd) - outside).max(T::of(LEAST_INSIDE)).ln()
+        let far_is_clear = far > T::zero() && far * far > self.clear * variance;
+        let beyond_far = if far_is_clear { T::zero() } else { upper_tail(far * per_sd) };
+        if near > T::zero() {
+            let outside = upper_tail(near * per_sd) + beyond_far;
+            if outside < self.slight {
+                return -outside - T::of(0.5) * outside * outside;
+            }
+            return log_of_inside(T::one() - outside);
+        }
+        // Beyond the near end the mass inside is the small number, and is to keep its digits.
+        log_of_inside(upper_tail(-near * per_sd) - beyond_far)
     }
 
     pub(crate) fn tempering(&self) -> T {
@@ -80,54 +92,35 @@ impl<T: Real> Weighing<T> {
     }
 }
 
+/// What has left the limits altogether is no less likely than [`LEAST_INSIDE`].
+fn log_of_inside<T: Real>(mass: T) -> T {
+    let least = T::of(LEAST_INSIDE);
+    if mass > least { mass.ln() } else { least.ln() }
+}
+
 /// How a reading compares with the prediction of a whole mixture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MixtureResidual<T> {
     /// Reading minus the mixture's mean of it, and the mixture's variance of it.
     pub residual: Residual<T>,
     /// The density, less what does not depend on the reading, as a weight.
-    pub(crate) factor: T,
-    pub(crate) exponent: T,
-    pub(crate) tempering: T,
+    factor: T,
+    exponent: T,
+    tempering: T,
 }
 
 impl<T: Scalar> MixtureResidual<T> {
+    /// `total`: sum of all weights after the reading.
+    pub(crate) fn new(predicted: &Predicted<T>, total: Weight<T>, tempering: T) -> Self {
+        let (innovation, variance) = predicted.moments();
+        let residual = Residual { innovation, variance, nis: innovation * innovation / variance };
+        Self { residual, factor: total.factor, exponent: total.exponent, tempering }
+    }
+
     /// Log density of the reading under the mixture, limits and tempering included: what
     /// [`MixtureStep`](crate::MixtureStep) calls by this name.
     #[must_use]
     pub fn log_likelihood(&self) -> T {
         self.factor.ln() + self.exponent - T::of(0.5) * self.tempering * T::two_pi().ln()
-    }
-}
-
-/// Gathers the residuals of all predictions. Sums are taken of innovations, not of predicted readings: a variance is not
-/// to be the small difference of two squares.
-#[derive(Clone, Copy)]
-pub(crate) struct Predicted<T> {
-    weight: T,
-    innovation: T,
-    square: T,
-}
-
-impl<T: Real> Predicted<T> {
-    pub(crate) fn new() -> Self {
-        Self { weight: T::zero(), innovation: T::zero(), square: T::zero() }
-    }
-
-    #[inline(always)]
-    pub(crate) fn add(&mut self, weight: T, residual: &Residual<T>) {
-        self.weight += weight;
-        self.innovation += weight * residual.innovation;
-        self.square += weight * (residual.variance + residual.innovation * residual.innovation);
-    }
-
-    /// `total`: sum of all weights after the reading.
-    pub(crate) fn residual(&self, total: Weight<T>, tempering: T) -> MixtureResidual<T> {
-        let per_weight = T::one() / self.weight;
-        let innovation = self.innovation * per_weight;
-        let variance = self.square * per_weight - innovation * innovation;
-        let Weight { factor, exponent } = total;
-        let nis = innovation * innovation / variance;
-        MixtureResidual { residual: Residual { innovation, variance, nis }, factor, exponent, tempering }
     }
 }

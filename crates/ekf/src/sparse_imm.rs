@@ -11,19 +11,21 @@ use ohmstrain_model::{Phase, SwitchedModel};
 
 use crate::gaussian::Real;
 use crate::mixture::LEAST_WEIGHT;
-use crate::sparse_evidence::{Predicted, Weighing, Weight};
+use crate::mixture_step::Predicted;
+use crate::sparse_evidence::{Weighing, Weight};
 use crate::sparse_mixture::{PhaseMixture, Share};
 use crate::sparse_parts::Parts;
 use crate::switching::fresh_rate;
 use crate::{
     AnyCurve, Compact, Curve, Dwell, Evidence, Gaussian, MixtureResidual, Reading, Residual, SparseEkf, StepError,
+    Switch,
 };
 
 /// [`Imm`](crate::Imm) of a [`SwitchedModel`] with Ornstein-Uhlenbeck motion, for steps of one length: the same to
 /// rounding, without multiplying zeros. `G` as for [`SparseEkf`].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SparseImm<T, const B: usize, const N: usize, G = AnyCurve<T>> {
-    kernel: SparseEkf<T, Compact, B, N, G>,
+pub struct SparseImm<T, const B: usize, const N: usize, S = Compact, G = AnyCurve<T>> {
+    kernel: SparseEkf<T, S, B, N, G>,
     /// Probabilities of a change of phase over a step, `[to][from]`.
     chain: [[T; 3]; 3],
     weighing: Weighing<T>,
@@ -41,27 +43,34 @@ struct Mode<T, const B: usize> {
     residual: Option<Residual<T>>,
 }
 
-impl<T: Real, const B: usize, const N: usize, G: Curve<T>> SparseImm<T, B, N, G> {
+impl<T: Real, const B: usize, const N: usize> SparseImm<T, B, N> {
     /// A filter for steps of `dt_s` seconds.
     /// - `dwell`: how long phases last and what follows them.
     /// - `evidence`: what weighs the phases.
     ///
     /// # Errors
-    /// As for [`SparseEkf::new`].
+    /// If `dt_s` is not a positive number.
     pub fn new(
         model: SwitchedModel<T, 2, B, N>,
         dt_s: T,
         dwell: Dwell<T>,
         evidence: Evidence<T>,
     ) -> Result<Self, StepError> {
-        let kernel = SparseEkf::new(model, dt_s)?;
-        let chain = dwell.probabilities(dt_s);
-        Ok(Self {
-            kernel,
+        Ok(Self::around(SparseEkf::new(model, dt_s)?, dwell, evidence))
+    }
+}
+
+impl<T: Real, const B: usize, const N: usize, S: Switch<T>, G: Curve<T>> SparseImm<T, B, N, S, G> {
+    /// A filter whose modes step as `kernel` does; the other arguments as for [`Self::new`]. Of its switch only the square
+    /// root is used.
+    pub fn around(kernel: SparseEkf<T, S, B, N, G>, dwell: Dwell<T>, evidence: Evidence<T>) -> Self {
+        let chain = dwell.probabilities(kernel.dt_s());
+        Self {
             chain: core::array::from_fn(|to| core::array::from_fn(|from| chain[from][to])),
             weighing: Weighing::new(evidence),
-            fresh: Phase::ALL.map(|phase| fresh_rate(model.motion(), phase)),
-        })
+            fresh: Phase::ALL.map(|phase| fresh_rate(kernel.model().motion(), phase)),
+            kernel,
+        }
     }
 
     /// The model.
@@ -91,10 +100,10 @@ impl<T: Real, const B: usize, const N: usize, G: Curve<T>> SparseImm<T, B, N, G>
             share.log_inside = mode.log_inside;
             mode.parts.put_into(&mut share.belief);
             if let Some(residual) = &mode.residual {
-                predicted.add(mode.prior, residual);
+                predicted.add(mode.prior, residual.innovation, residual.variance);
             }
         }
-        Ok(reading.map(|_| predicted.residual(total, self.weighing.tempering())))
+        Ok(reading.map(|_| MixtureResidual::new(&predicted, total, self.weighing.tempering())))
     }
 
     /// A mode after the step: its belief, and what is known of its weight. One function for all phases, so that a program
@@ -113,12 +122,12 @@ impl<T: Real, const B: usize, const N: usize, G: Curve<T>> SparseImm<T, B, N, G>
         let spread = self.kernel.predict(&mut mode.parts, Some(phase));
         if let Some(reading) = reading {
             let residual = self.kernel.update(&mut mode.parts, reading, Some(phase), spread)?;
-            mode.weight = self.weighing.likelihood(mode.prior, &residual);
+            mode.weight = self.weighing.likelihood::<S>(mode.prior, &residual);
             mode.residual = Some(residual);
         } else if !mode.parts.is_sound::<N>(mode.parts.variances::<N>()) {
             return Err(StepError::NonFiniteState);
         }
-        let log_inside = self.weighing.log_inside(mode.parts.strain, mode.parts.strain_variance);
+        let log_inside = self.weighing.log_inside::<S>(mode.parts.strain, mode.parts.strain_variance);
         mode.weight.exponent += log_inside - mode.log_inside;
         mode.log_inside = log_inside;
         Ok(mode)

@@ -34,7 +34,7 @@ impl<T: Real, const B: usize> Parts<T, B> {
     /// Restricts the rate to the sign of a moving phase; what that leaves of the Gaussian. Tails beyond `clear` squared
     /// deviations are not cut off.
     #[inline(always)]
-    pub(crate) fn cut_rate<const N: usize>(&mut self, phase: Phase, clear: T) -> T {
+    pub(crate) fn cut_rate<S: Switch<T>, const N: usize>(&mut self, phase: Phase, clear: T) -> T {
         let variance = self.rate_variance;
         let side = if phase == Phase::Retract { -T::one() } else { T::one() };
         let toward = side * self.rate;
@@ -44,7 +44,7 @@ impl<T: Real, const B: usize> Parts<T, B> {
         if toward > T::zero() && toward * toward > clear * variance {
             return T::one();
         }
-        let per_sd = T::one() / variance.sqrt();
+        let per_sd = T::one() / S::sd(variance);
         let border = -toward * per_sd;
         let mass = upper_tail(border);
         let shift = density(border) / mass;

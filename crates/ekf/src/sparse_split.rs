@@ -7,20 +7,22 @@
 use ohmstrain_model::{Phase, SwitchedModel};
 
 use crate::gaussian::Real;
-use crate::mixture_step::LEAST_MASS;
+use crate::mixture_step::{LEAST_MASS, Predicted};
 use crate::sign_split::{HOPELESS, follows};
 use crate::sparse_children::Children;
-use crate::sparse_evidence::{Predicted, Weighing, Weight};
+use crate::sparse_evidence::{Weighing, Weight};
 use crate::sparse_mixture::{Share, SignMixture};
 use crate::sparse_parts::Parts;
 use crate::switching::fresh_rate;
-use crate::{AnyCurve, Compact, Curve, Dwell, Evidence, Gaussian, MixtureResidual, Reading, SparseEkf, StepError};
+use crate::{
+    AnyCurve, Compact, Curve, Dwell, Evidence, Gaussian, MixtureResidual, Reading, SparseEkf, StepError, Switch,
+};
 
 /// [`SignSplit`](crate::SignSplit) of a [`SwitchedModel`] with Ornstein-Uhlenbeck motion, for steps of one length: the
-/// same to rounding, without multiplying zeros.
+/// same to rounding, without multiplying zeros. `G` as for [`SparseEkf`].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SparseSignSplit<T, const B: usize, const N: usize, const K: usize, G = AnyCurve<T>> {
-    kernel: SparseEkf<T, Compact, B, N, G>,
+pub struct SparseSignSplit<T, const B: usize, const N: usize, const K: usize, S = Compact, G = AnyCurve<T>> {
+    kernel: SparseEkf<T, S, B, N, G>,
     /// Probabilities of a change of phase over a step, `[from][to]`; `None` for a body that never rests.
     chain: Option<[[T; 3]; 3]>,
     weighing: Weighing<T>,
@@ -28,25 +30,35 @@ pub struct SparseSignSplit<T, const B: usize, const N: usize, const K: usize, G 
     fresh: [Gaussian<T>; 3],
 }
 
-impl<T: Real, const B: usize, const N: usize, const K: usize, G: Curve<T>> SparseSignSplit<T, B, N, K, G> {
+impl<T: Real, const B: usize, const N: usize, const K: usize> SparseSignSplit<T, B, N, K> {
     /// A filter for steps of `dt_s` seconds.
     /// - `hold`: how long holds and movements last; `None` for a body that never rests.
     /// - `evidence`: what weighs the hypotheses.
     ///
     /// # Errors
-    /// As for [`SparseEkf::new`].
+    /// If `dt_s` is not a positive number.
     pub fn new(
         model: SwitchedModel<T, 2, B, N>,
         dt_s: T,
         hold: Option<Dwell<T>>,
         evidence: Evidence<T>,
     ) -> Result<Self, StepError> {
-        Ok(Self {
-            kernel: SparseEkf::new(model, dt_s)?,
-            chain: hold.map(|dwell| dwell.probabilities(dt_s)),
+        Ok(Self::around(SparseEkf::new(model, dt_s)?, hold, evidence))
+    }
+}
+
+impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: Curve<T>>
+    SparseSignSplit<T, B, N, K, S, G>
+{
+    /// A filter whose hypotheses step as `kernel` does; the other arguments as for [`Self::new`]. Of its switch only the
+    /// square root is used.
+    pub fn around(kernel: SparseEkf<T, S, B, N, G>, hold: Option<Dwell<T>>, evidence: Evidence<T>) -> Self {
+        Self {
+            chain: hold.map(|dwell| dwell.probabilities(kernel.dt_s())),
             weighing: Weighing::new(evidence),
-            fresh: Phase::ALL.map(|phase| fresh_rate(model.motion(), phase)),
-        })
+            fresh: Phase::ALL.map(|phase| fresh_rate(kernel.model().motion(), phase)),
+            kernel,
+        }
     }
 
     /// The model.
@@ -76,7 +88,7 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, G: Curve<T>> Spars
         }
         let total = children.normalise()?;
         *state = children.into_state();
-        Ok(reading.map(|_| predicted.residual(total, self.weighing.tempering())))
+        Ok(reading.map(|_| MixtureResidual::new(&predicted, total, self.weighing.tempering())))
     }
 
     #[inline(always)]
@@ -99,7 +111,7 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, G: Curve<T>> Spars
         let spread = self.kernel.predict(&mut child, Some(phase));
         let mut prior = parent.weight * probability;
         if phase != Phase::Hold {
-            let mass = child.cut_rate::<N>(phase, self.weighing.clear());
+            let mass = child.cut_rate::<S, N>(phase, self.weighing.clear());
             if !(mass > T::of(LEAST_MASS)) {
                 return Ok(());
             }
@@ -111,12 +123,12 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, G: Curve<T>> Spars
         let mut weight = Weight { factor: prior, exponent: T::zero() };
         if let Some(reading) = reading {
             let residual = self.kernel.update(&mut child, reading, Some(phase), spread)?;
-            weight = self.weighing.likelihood(prior, &residual);
-            predicted.add(prior, &residual);
+            weight = self.weighing.likelihood::<S>(prior, &residual);
+            predicted.add(prior, residual.innovation, residual.variance);
         } else if !child.is_sound::<N>(child.variances::<N>()) {
             return Err(StepError::NonFiniteState);
         }
-        let log_inside = self.weighing.log_inside(child.strain, child.strain_variance);
+        let log_inside = self.weighing.log_inside::<S>(child.strain, child.strain_variance);
         weight.exponent += log_inside - parent.log_inside;
         children.add(&child, phase, weight, log_inside);
         Ok(())
