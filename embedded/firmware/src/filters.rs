@@ -3,11 +3,12 @@
 use core::hint::black_box;
 
 use ohmstrain_ekf::{
-    Belief, Compact, Dwell, Ekf, Evidence, Imm, Mixture, PhaseMixture, Reading, Real, SignMixture, SignSplit, SparseEkf,
-    SparseImm, SparseSignSplit,
+    Belief, Cubic, Dwell, Ekf, Evidence, Imm, Mixture, PhaseMixture, Reading, Real, SignMixture, SignSplit, SparseEkf,
+    SparseImm, SparseSignSplit, Switch,
 };
 use ohmstrain_model::{ParameterError, Phase, Problem, Scalar, SwitchedModel, SwitchedStep};
 
+use crate::fpu::OnFpu;
 use crate::{DT_S, limits, sensor};
 
 /// A filter with its state.
@@ -185,23 +186,41 @@ pub struct Fast<F, S> {
     state: S,
 }
 
+/// The EKF that leaves out the zeros, with the unit's square root and a gauge that is a polynomial.
+type Kernel<T, const B: usize, const N: usize> = SparseEkf<T, OnFpu, B, N, Cubic<T>>;
+type FastImm<T, const B: usize, const N: usize> = SparseImm<T, B, N, OnFpu, Cubic<T>>;
+type FastSplit<T, const B: usize, const N: usize, const K: usize> = SparseSignSplit<T, B, N, K, OnFpu, Cubic<T>>;
+
 /// Strain, rate, one branch.
-pub type Fast3<T> = Fast<SparseEkf<T, Compact, 1, 3>, Belief<T, 3, 6>>;
+pub type Fast3<T> = Fast<Kernel<T, 1, 3>, Belief<T, 3, 6>>;
 /// Strain, rate, three branches, baseline.
-pub type Fast6<T> = Fast<SparseEkf<T, Compact, 3, 6>, Belief<T, 6, 21>>;
+pub type Fast6<T> = Fast<Kernel<T, 3, 6>, Belief<T, 6, 21>>;
 /// Three phases of those six states.
-pub type FastImm6<T> = Fast<SparseImm<T, 3, 6>, PhaseMixture<T, 6, 21>>;
+pub type FastImm6<T> = Fast<FastImm<T, 3, 6>, PhaseMixture<T, 6, 21>>;
 /// Four hypotheses of them, split by the sign of the rate.
-pub type FastSplit6<T> = Fast<SparseSignSplit<T, 3, 6, 4>, SignMixture<T, 6, 21, 4>>;
+pub type FastSplit6<T> = Fast<FastSplit<T, 3, 6, 4>, SignMixture<T, 6, 21, 4>>;
+
+fn kernel<T: Scalar, const B: usize, const N: usize>() -> Result<Kernel<T, B, N>, ParameterError>
+where
+    OnFpu: Switch<T>,
+{
+    SparseEkf::new(black_box(sensor()?), T::of(DT_S)).map_err(|_| ParameterError::new("dt_s", Problem::NotPositive))
+}
 
 /// [`Filter`] for these: they differ in how they start and where they keep the strain.
 macro_rules! fast_filter {
-    ($scalar:ident, <$(const $n:ident),*> $filter:ty, $state:ty, |$model:ident| $start:expr, |$of:ident| $strain:expr) => {
-        impl<T: $scalar $(, const $n: usize)*> Filter<T> for Fast<$filter, $state> {
+    (
+        <T: $scalar:ident $(, const $n:ident)*> $filter:ty, $state:ty,
+        |$kernel:ident| $start:expr, |$of:ident| $strain:expr
+    ) => {
+        impl<T: $scalar $(, const $n: usize)*> Filter<T> for Fast<$filter, $state>
+        where
+            OnFpu: Switch<T>,
+        {
             fn start() -> Result<Self, ParameterError> {
-                let $model = black_box(sensor()?);
-                let (filter, state) = $start;
-                Ok(Self { filter: filter.map_err(|_| ParameterError::new("dt_s", Problem::NotPositive))?, state })
+                let $kernel = kernel()?;
+                let (state, filter) = $start;
+                Ok(Self { filter, state })
             }
 
             fn step(&mut self, reading: Reading<T>) -> bool {
@@ -221,23 +240,23 @@ macro_rules! fast_filter {
 }
 
 fast_filter!(
-    Scalar, <const B, const N, const L> SparseEkf<T, Compact, B, N>, Belief<T, N, L>,
-    |model| (SparseEkf::new(model, T::of(DT_S)), Belief::initial(&model)),
+    <T: Scalar, const B, const N, const L> Kernel<T, B, N>, Belief<T, N, L>,
+    |kernel| (Belief::initial(kernel.model()), kernel),
     |belief| belief.mean[0]
 );
 fast_filter!(
-    Real, <const B, const N, const L> SparseImm<T, B, N>, PhaseMixture<T, N, L>,
-    |model| (
-        SparseImm::new(model, T::of(DT_S), black_box(dwell()?), black_box(evidence())),
-        PhaseMixture::single(Belief::initial(&model), Phase::Hold)
+    <T: Real, const B, const N, const L> FastImm<T, B, N>, PhaseMixture<T, N, L>,
+    |kernel| (
+        PhaseMixture::single(Belief::initial(kernel.model()), Phase::Hold),
+        SparseImm::around(kernel, black_box(dwell()?), black_box(evidence()))
     ),
     |mixture| mixture.marginal(0).mean
 );
 fast_filter!(
-    Real, <const B, const N, const L, const K> SparseSignSplit<T, B, N, K>, SignMixture<T, N, L, K>,
-    |model| (
-        SparseSignSplit::new(model, T::of(DT_S), None, black_box(evidence())),
-        SignMixture::single(Belief::initial(&model), Phase::Extend)
+    <T: Real, const B, const N, const L, const K> FastSplit<T, B, N, K>, SignMixture<T, N, L, K>,
+    |kernel| (
+        SignMixture::single(Belief::initial(kernel.model()), Phase::Extend),
+        SparseSignSplit::around(kernel, None, black_box(evidence()))
     ),
     |mixture| mixture.marginal(0).mean
 );
