@@ -1,8 +1,8 @@
-use ohmstrain_model::Phase;
+use ohmstrain_model::{Phase, Symmetric};
 
-use crate::StepError;
+use crate::{Belief, StepError};
 use crate::gaussian::Real;
-use crate::mixture::{ALIKE, LEAST_WEIGHT, moment_match};
+use crate::mixture::{ALIKE, LEAST_WEIGHT};
 use crate::sparse_evidence::Weight;
 use crate::sparse_mixture::{Share, SignMixture};
 use crate::sparse_parts::Parts;
@@ -101,10 +101,20 @@ impl<T: Real, const N: usize, const L: usize> Share<T, N, L> {
             return;
         }
         let (mine, theirs) = (self.weight / total, weight / total);
-        let mut belief = self.belief;
-        other.put_into(&mut belief);
+        let mut taken = self.belief;
+        other.put_into(&mut taken);
+        let (apart, both) = (taken.mean - self.belief.mean, mine * theirs);
+        // By iterators throughout: an index could panic.
+        let mut covariance = [T::zero(); L];
+        let known = self.belief.covariance.packed().iter().zip(taken.covariance.packed());
+        let mut entries = covariance.iter_mut().zip(known);
+        for (i, a) in apart.iter().enumerate() {
+            for (b, (merged, (p, q))) in apart.iter().take(i + 1).zip(&mut entries) {
+                *merged = mine * *p + theirs * *q + both * *a * *b;
+            }
+        }
+        self.belief = Belief { mean: self.belief.mean + apart * theirs, covariance: Symmetric::from_packed(covariance) };
         self.weight = total;
         self.log_inside = mine * self.log_inside + theirs * log_inside;
-        self.belief = moment_match([(mine, &self.belief), (theirs, &belief)].into_iter());
     }
 }

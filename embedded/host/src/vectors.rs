@@ -6,7 +6,7 @@ use std::fs;
 use std::path::Path;
 
 use ohmstrain_firmware::{
-    Ekf3, Ekf6, Fast3, Fast6, FastImm6, FastSplit6, Filter, Imm6, SplitFour, VaryingEkf3, front_end, to_reading,
+    Ekf3, Ekf6, Fast3, Fast6, Filter, Imm6, SplitFour, VaryingEkf3, front_end, to_reading,
 };
 
 use crate::codes::{SEED, codes};
