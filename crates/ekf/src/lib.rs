@@ -94,6 +94,8 @@ mod sparse_mixture;
 mod sparse_parts;
 mod sparse_predict;
 mod sparse_rate;
+mod sparse_series;
+mod sparse_smoother;
 mod sparse_split;
 mod sparse_update;
 mod switch;

@@ -1,11 +1,11 @@
 use ohmstrain_model::{Phase, Symmetric};
 
-use crate::{Belief, StepError};
 use crate::gaussian::Real;
 use crate::mixture::{ALIKE, LEAST_WEIGHT};
 use crate::sparse_evidence::Weight;
 use crate::sparse_mixture::{Share, SignMixture};
 use crate::sparse_parts::Parts;
+use crate::{Belief, StepError};
 
 /// Collects the children of a step: keeps, merges and drops them as [`Mixture`](crate::Mixture) does.
 pub(crate) struct Children<T, const N: usize, const L: usize, const K: usize> {
@@ -113,7 +113,8 @@ impl<T: Real, const N: usize, const L: usize> Share<T, N, L> {
                 *merged = mine * *p + theirs * *q + both * *a * *b;
             }
         }
-        self.belief = Belief { mean: self.belief.mean + apart * theirs, covariance: Symmetric::from_packed(covariance) };
+        self.belief =
+            Belief { mean: self.belief.mean + apart * theirs, covariance: Symmetric::from_packed(covariance) };
         self.weight = total;
         self.log_inside = mine * self.log_inside + theirs * log_inside;
     }
