@@ -46,7 +46,7 @@ impl<T: Real> Weighing<T> {
     pub(crate) fn likelihood<S: Switch<T>>(&self, prior: T, residual: &Residual<T>) -> Weight<T> {
         let half = T::of(-0.5) * self.tempering;
         if self.tempering == T::one() {
-            return Weight { factor: prior / S::sd(residual.variance), exponent: half * residual.nis };
+            return Weight { factor: prior / S::root(residual.variance), exponent: half * residual.nis };
         }
         Weight { factor: prior, exponent: half * (residual.nis + residual.variance.ln()) }
     }
@@ -66,7 +66,7 @@ impl<T: Real> Weighing<T> {
     /// The same where a tail counts.
     #[inline(never)]
     fn log_inside_near<S: Switch<T>>(&self, above_lower: T, below_upper: T, variance: T) -> T {
-        let per_sd = T::one() / S::sd(variance);
+        let per_sd = T::one() / S::root(variance);
         let (near, far) =
             if above_lower < below_upper { (above_lower, below_upper) } else { (below_upper, above_lower) };
         let far_is_clear = far > T::zero() && far * far > self.clear * variance;

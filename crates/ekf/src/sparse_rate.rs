@@ -44,7 +44,7 @@ impl<T: Real, const B: usize> Parts<T, B> {
         if toward > T::zero() && toward * toward > clear * variance {
             return T::one();
         }
-        let per_sd = T::one() / S::sd(variance);
+        let per_sd = T::one() / S::root(variance);
         let border = -toward * per_sd;
         let mass = upper_tail(border);
         let shift = density(border) / mass;
