@@ -5,9 +5,7 @@ use std::fmt::Write;
 use std::fs;
 use std::path::Path;
 
-use ohmstrain_firmware::{
-    Ekf3, Ekf6, Fast3, Fast6, Filter, Imm6, SplitFour, VaryingEkf3, front_end, to_reading,
-};
+use ohmstrain_firmware::{Ekf3, Ekf6, Fast3, Fast6, Filter, Imm6, SplitFour, VaryingEkf3, front_end, to_reading};
 
 use crate::codes::{SEED, codes};
 
