@@ -51,6 +51,8 @@ extern crate std;
 
 #[cfg(feature = "adskalman")]
 mod adskalman_bridge;
+#[cfg(feature = "simd")]
+mod bank;
 mod belief;
 mod chi_square;
 mod clock;
@@ -92,6 +94,8 @@ mod window;
 
 #[cfg(feature = "adskalman")]
 pub use adskalman_bridge::LinearStep;
+#[cfg(feature = "simd")]
+pub use bank::{Bank, Lane, WrongLength};
 pub use belief::Belief;
 pub use chi_square::ChiSquare;
 pub use clock::seconds_between;
