@@ -274,10 +274,10 @@ fn step_block<T: Lane, S: Simd, const B: usize, const N: usize, const L: usize>(
     variances: &Row<T::Row>,
 ) {
     (block.taken, block.refused) = (0, 0);
-    let width = <T::Native<S> as SimdBase<S>>::LEN;
+    let width = <T::Vector<S> as SimdBase<S>>::LEN;
     let mut from = 0;
     while from < 64 / size_of::<T>() {
-        let (present, accepted) = step_vector::<T, S, T::Native<S>, B, N, L>(simd, ekf, block, values, variances, from);
+        let (present, accepted) = step_vector::<T, S, T::Vector<S>, B, N, L>(simd, ekf, block, values, variances, from);
         block.taken |= (present.to_bitmask() as u32) << from;
         block.refused |= ((!accepted).to_bitmask() as u32) << from;
         from += width;

@@ -1,6 +1,6 @@
 use core::fmt::Debug;
 
-use fearless_simd::SimdFloatElement;
+use fearless_simd::{Simd, SimdFloat, SimdFloatElement, f32x16, f64x8};
 
 use crate::{Real, StepError};
 
@@ -12,8 +12,10 @@ impl Lane for f32 {}
 impl Lane for f64 {}
 
 /// The same number of each sensor of a block, 64 bytes: one vector of 512 bits, two of 256, four of 128.
-pub(super) trait Rows: Copy {
+pub(super) trait Rows: Copy + SimdFloatElement {
     type Row: AsRef<[Self]> + AsMut<[Self]> + Copy + Debug + Send + Sync;
+    /// A row in registers.
+    type Vector<S: Simd>: SimdFloat<S, Element = Self>;
 
     /// A row with one number for all.
     fn row(number: Self) -> Row<Self::Row>;
@@ -21,6 +23,7 @@ pub(super) trait Rows: Copy {
 
 impl Rows for f32 {
     type Row = [Self; 16];
+    type Vector<S: Simd> = f32x16<S>;
 
     fn row(number: Self) -> Row<Self::Row> {
         Row([number; 16])
@@ -29,6 +32,7 @@ impl Rows for f32 {
 
 impl Rows for f64 {
     type Row = [Self; 8];
+    type Vector<S: Simd> = f64x8<S>;
 
     fn row(number: Self) -> Row<Self::Row> {
         Row([number; 8])
