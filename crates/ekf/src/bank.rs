@@ -157,7 +157,10 @@ impl<T: Lane, const B: usize, const N: usize, const L: usize> Bank<T, B, N, L> {
         if block.refused >> lane & 1 == 1 {
             return Some(Err(block.errors[lane]));
         }
-        let residual = || Residual { innovation: number(&block.innovation, lane), variance: number(&block.innovation_variance, lane) };
+        let residual = || {
+            let (innovation, variance) = (number(&block.innovation, lane), number(&block.innovation_variance, lane));
+            Residual { innovation, variance, nis: innovation * (innovation * (T::one() / variance)) }
+        };
         Some(Ok((block.taken >> lane & 1 == 1).then(residual)))
     }
 
@@ -244,25 +247,31 @@ fn step_blocks<T: Lane, S: Simd, const B: usize, const N: usize, const L: usize>
     extra: Option<&[T]>,
 ) -> usize {
     let lanes = 64 / size_of::<T>();
-    let (missing, nothing) = (T::row(T::of(f64::NAN)), T::row(T::zero()));
+    let (mut values, mut variances) = (T::row(T::of(f64::NAN)), T::row(T::zero()));
     let mut refused = 0;
     for (b, block) in blocks.iter_mut().enumerate() {
         let from = b * lanes;
-        let to = readings.len().min(from + lanes);
-        let (mut values, mut variances) = (missing, nothing);
-        values.0.as_mut()[..to - from].copy_from_slice(&readings[from..to]);
-        if let Some(extra) = extra {
-            variances.0.as_mut()[..to - from].copy_from_slice(&extra[from..to]);
-        }
-        step_block(simd, ekf, block, &values, &variances);
-        // Lanes without a sensor never have a reading; what becomes of them concerns nobody.
-        block.refused &= ((1_u64 << (to - from)) - 1) as u32;
-        refused += block.refused.count_ones() as usize;
+        let values = filled(readings, from, &mut values);
+        let variances = extra.map(|extra| filled(extra, from, &mut variances));
+        step_block(simd, ekf, block, values, variances);
         if block.refused != 0 {
-            explain(block, &values, &variances);
+            refused += explain(block, values, variances, readings.len() - from);
         }
     }
     refused
+}
+
+/// The numbers of the block that begins `from` a sensor; the last block is filled up with those in `row`.
+#[inline(always)]
+fn filled<'a, T: Lane>(numbers: &'a [T], from: usize, row: &'a mut Row<T::Row>) -> &'a [T] {
+    let row = row.0.as_mut();
+    if let Some(whole) = numbers.get(from..from + row.len()) {
+        return whole;
+    }
+    for (place, number) in row.iter_mut().zip(numbers.iter().skip(from)) {
+        *place = *number;
+    }
+    row
 }
 
 #[inline(always)]
@@ -270,17 +279,16 @@ fn step_block<T: Lane, S: Simd, const B: usize, const N: usize, const L: usize>(
     simd: S,
     ekf: &SparseEkf<T, Compact, B, N>,
     block: &mut Block<T, N, L>,
-    values: &Row<T::Row>,
-    variances: &Row<T::Row>,
+    values: &[T],
+    variances: Option<&[T]>,
 ) {
     (block.taken, block.refused) = (0, 0);
-    let width = <T::Vector<S> as SimdBase<S>>::LEN;
     let mut from = 0;
     while from < 64 / size_of::<T>() {
         let (present, accepted) = step_vector::<T, S, T::Vector<S>, B, N, L>(simd, ekf, block, values, variances, from);
         block.taken |= (present.to_bitmask() as u32) << from;
         block.refused |= ((!accepted).to_bitmask() as u32) << from;
-        from += width;
+        from += <T::Vector<S> as SimdBase<S>>::LEN;
     }
 }
 
@@ -290,75 +298,74 @@ fn step_vector<T: Lane, S: Simd, V: SimdFloat<S, Element = T>, const B: usize, c
     simd: S,
     ekf: &SparseEkf<T, Compact, B, N>,
     block: &mut Block<T, N, L>,
-    values: &Row<T::Row>,
-    variances: &Row<T::Row>,
+    values: &[T],
+    variances: Option<&[T]>,
     from: usize,
 ) -> (V::Mask, V::Mask) {
     let load = |row: &Row<T::Row>| V::from_slice(simd, &row.0.as_ref()[from..from + V::LEN]);
     let store = |row: &mut Row<T::Row>, value: V| value.store_slice(&mut row.0.as_mut()[from..from + V::LEN]);
 
     let zero = V::splat(simd, T::zero());
-    let mut beliefs = Beliefs { mean: [zero; N], covariance: [[zero; N]; N] };
+    let mut beliefs = Beliefs { mean: [zero; N], covariance: [zero; L] };
     for i in 0..N {
         beliefs.mean[i] = load(&block.mean[i]);
-        for j in 0..=i {
-            beliefs.covariance[i][j] = load(&block.covariance[i * (i + 1) / 2 + j]);
-        }
     }
-    kernel::predict(simd, ekf, &mut beliefs);
-    let reading = load(values);
+    for i in 0..L {
+        beliefs.covariance[i] = load(&block.covariance[i]);
+    }
+    let spread = kernel::predict(simd, ekf, &mut beliefs);
+    let extra = variances.map_or(zero, |variances| V::from_slice(simd, &variances[from..from + V::LEN]));
+    let reading = V::from_slice(simd, &values[from..from + V::LEN]);
     let present = reading.simd_eq(reading);
-    let Compared { innovation, variance } = kernel::update(simd, ekf, &mut beliefs, (reading, load(variances)), present);
+    let Compared { innovation, variance, nis } =
+        kernel::update(simd, ekf, &mut beliefs, (reading, extra), present, &spread);
     store(&mut block.innovation, innovation);
     store(&mut block.innovation_variance, variance);
 
-    let usable = variance.simd_gt(T::zero()) & variance.is_finite() & innovation.is_finite();
-    let mut accepted = usable | !present;
     // Whatever is not finite makes this sum not finite, or a comparison false.
-    let mut sum = zero;
+    let mut sum = present.select(variance + nis, zero);
+    let mut accepted = variance.simd_gt(T::zero()) | !present;
     for i in 0..N {
-        accepted &= beliefs.covariance[i][i].simd_ge(T::zero());
-        sum += beliefs.mean[i] + beliefs.covariance[i][i];
+        let variance = beliefs.covariance[kernel::at(i, i)];
+        accepted &= variance.simd_ge(T::zero());
+        sum += beliefs.mean[i] + variance;
     }
     accepted &= sum.is_finite();
-    let all = accepted.all_true();
     for i in 0..N {
-        let row = &mut block.mean[i];
-        let kept = if all { beliefs.mean[i] } else { accepted.select(beliefs.mean[i], load(row)) };
-        store(row, kept);
-        for j in 0..=i {
-            let row = &mut block.covariance[i * (i + 1) / 2 + j];
-            let new = beliefs.covariance[i][j];
-            let kept = if all { new } else { accepted.select(new, load(row)) };
-            store(row, kept);
-        }
+        let kept = accepted.select(beliefs.mean[i], load(&block.mean[i]));
+        store(&mut block.mean[i], kept);
+    }
+    for i in 0..L {
+        let kept = accepted.select(beliefs.covariance[i], load(&block.covariance[i]));
+        store(&mut block.covariance[i], kept);
     }
     (present, accepted)
 }
 
-/// Why sensors were refused, in the order in which [`SparseEkf::step`] finds out.
+/// Counts the refused among the first `sensors` of a block, and says why in the order in which [`SparseEkf::step`] finds
+/// out. Lanes without a sensor never have a reading; what becomes of them concerns nobody.
 #[cold]
 fn explain<T: Lane, const N: usize, const L: usize>(
     block: &mut Block<T, N, L>,
-    values: &Row<T::Row>,
-    variances: &Row<T::Row>,
-) {
-    for lane in (0..64 / size_of::<T>()).filter(|lane| block.refused >> lane & 1 == 1) {
-        let innovation = number::<T, _>(&block.innovation, lane);
-        let variance = number::<T, _>(&block.innovation_variance, lane);
-        let finite = |row: &Row<T::Row>| num_finite(number::<T, _>(row, lane));
+    values: &[T],
+    variances: Option<&[T]>,
+    sensors: usize,
+) -> usize {
+    let mut refused = 0;
+    for lane in (0..sensors.min(values.len())).filter(|lane| block.refused >> lane & 1 == 1) {
+        refused += 1;
+        let innovation: T = number(&block.innovation, lane);
+        let variance: T = number(&block.innovation_variance, lane);
+        let extra = variances.map_or(T::zero(), |variances| variances[lane]);
         block.errors[lane] = if block.taken >> lane & 1 == 0 {
             StepError::NonFiniteState
-        } else if !(finite(values) && finite(variances)) {
+        } else if !(values[lane].is_finite() && extra.is_finite()) {
             StepError::NonFiniteReading
-        } else if num_finite(innovation) && !(variance > T::zero() && num_finite(variance)) {
+        } else if innovation.is_finite() && !(variance > T::zero() && variance.is_finite()) {
             StepError::NonPositiveInnovationVariance
         } else {
             StepError::NonFiniteState
         };
     }
-}
-
-fn num_finite<T: Lane>(number: T) -> bool {
-    number.is_finite()
+    refused
 }

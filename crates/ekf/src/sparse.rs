@@ -20,34 +20,34 @@ use crate::{Belief, Reading, Residual, StepError};
 /// or, to agree with [`Ekf`](crate::Ekf) to rounding, [`Logistic`](crate::Logistic).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SparseEkf<T, S, const B: usize, const N: usize> {
-    pub(crate) model: SwitchedModel<T, 2, B, N>,
+    model: SwitchedModel<T, 2, B, N>,
     /// Transition of the motion, and what the pull toward the mean strain adds.
-    pub(crate) motion: [[T; 2]; 2],
-    pub(crate) motion_input: [T; 2],
+    motion: [[T; 2]; 2],
+    motion_input: [T; 2],
     /// Covariances of ε with ε, v with ε, v with v.
-    pub(crate) motion_noise: [T; 3],
-    pub(crate) branches: [BranchStep<T, B>; B],
-    pub(crate) baseline_decay: T,
-    pub(crate) baseline_variance: T,
-    pub(crate) reading_variance: T,
+    motion_noise: [T; 3],
+    branches: [BranchStep<T, B>; B],
+    baseline_decay: T,
+    baseline_variance: T,
+    reading_variance: T,
     switch: PhantomData<S>,
 }
 
 /// A branch over one step.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct BranchStep<T, const B: usize> {
-    pub(crate) decay: T,
+struct BranchStep<T, const B: usize> {
+    decay: T,
     /// Answer to ε and v, and to the pull toward the mean strain.
-    pub(crate) drive: [T; 2],
-    pub(crate) drive_input: T,
+    drive: [T; 2],
+    drive_input: T,
     /// Time over which a rate acts, s, and its inverse.
-    pub(crate) reach_s: T,
-    pub(crate) per_reach: T,
-    pub(crate) cross_noise: [T; 2],
-    pub(crate) branch_noise: [T; B],
-    pub(crate) variance: T,
-    pub(crate) extend: [T; 2],
-    pub(crate) retract: [T; 2],
+    reach_s: T,
+    per_reach: T,
+    cross_noise: [T; 2],
+    branch_noise: [T; B],
+    variance: T,
+    extend: [T; 2],
+    retract: [T; 2],
 }
 
 /// What a step does to one branch, and with which gain it was driven.

@@ -1,187 +1,49 @@
-//! [`SparseEkf::step`] on vectors: the same operations on the same numbers in the same order, and where it branches, both
-//! results and a choice. No multiplication is fused with an addition, so every instruction set gives the same numbers.
+//! [`SparseEkf::step`] on vectors: the same operations on the same numbers in the same order. Where it branches, both results
+//! and a choice; where it adds a product and the processor has an instruction for that, one rounding instead of two.
 
 use fearless_simd::{Select, Simd, SimdFloat, SimdInto};
-use ohmstrain_model::{Gauge, SplitRate, StrainRange};
+use ohmstrain_model::{Branch, Gauge, SplitRate, StrainRange};
 
 use super::Lane;
-use crate::sparse::BranchStep;
+use crate::sparse_constants::{BranchConstants, StepConstants};
 use crate::{Compact, SparseEkf, Switch};
 
-/// Beliefs of as many sensors as a vector has lanes; of the covariance the lower triangle.
-pub(super) struct Beliefs<V, const N: usize> {
+/// Beliefs of as many sensors as a vector has lanes; of the covariance the lower triangle, row by row.
+pub(super) struct Beliefs<V, const N: usize, const L: usize> {
     pub(super) mean: [V; N],
-    pub(super) covariance: [[V; N]; N],
+    pub(super) covariance: [V; L],
 }
 
-/// What an update compared, for every lane.
+/// Where a triangle, row by row, has row `i`, column `j ≤ i`.
+#[inline(always)]
+pub(super) const fn at(i: usize, j: usize) -> usize {
+    i * (i + 1) / 2 + j
+}
+
+/// A variance that all rates of a step share, and where [`Compact`] ends for it.
+#[derive(Clone, Copy)]
+pub(super) struct RateSpread<V> {
+    variance: V,
+    width: V,
+    per_width: V,
+}
+
+/// Readings compared with their predictions.
 pub(super) struct Compared<V> {
     pub(super) innovation: V,
     pub(super) variance: V,
+    pub(super) nis: V,
 }
 
 /// What a step does to one branch, and with which gain it was driven.
 #[derive(Clone, Copy)]
 struct Driven<V> {
+    change: V,
     gain: V,
+    /// Growth of the change with the sum of old and new strain.
     pull: V,
+    /// Row of the Jacobian: strain and rate.
     row: [V; 2],
-}
-
-#[inline(always)]
-pub(super) fn predict<T: Lane, S: Simd, V: SimdFloat<S, Element = T>, const B: usize, const N: usize>(
-    simd: S,
-    ekf: &SparseEkf<T, Compact, B, N>,
-    Beliefs { mean: x, covariance: p }: &mut Beliefs<V, N>,
-) {
-    let [a, b] = ekf.motion;
-    let (strain, rate) = (x[0], x[1]);
-    x[0] = dot([strain, rate], a) + ekf.motion_input[0];
-    x[1] = dot([strain, rate], b) + ekf.motion_input[1];
-    let from_strain = [dot([p[0][0], p[1][0]], a), dot([p[1][0], p[1][1]], a)];
-    let from_rate = [dot([p[0][0], p[1][0]], b), dot([p[1][0], p[1][1]], b)];
-    let rate_variance = dot(from_rate, b) + ekf.motion_noise[2];
-
-    let mid_strain = (strain + x[0]) * T::of(0.5);
-    let rate_sd = rate_variance.sqrt();
-    let zero = V::splat(simd, T::zero());
-    let mut driven = [Driven { gain: zero, pull: zero, row: [zero; 2] }; B];
-    for i in 0..B {
-        let branch = &ekf.branches[i];
-        let unit_drive = dot([strain, rate], branch.drive) + branch.drive_input;
-        let split = split(simd, unit_drive * branch.per_reach, rate_variance, rate_sd);
-        let change;
-        (driven[i], change) = drive(simd, ekf, branch, mid_strain, &split);
-        x[2 + i] = x[2 + i].mul_add(branch.decay, change);
-    }
-
-    predict_baseline(ekf, x, p, &driven);
-    predict_branches(ekf, p, &driven);
-    p[0][0] = dot(from_strain, a) + ekf.motion_noise[0];
-    p[1][0] = dot(from_rate, a) + ekf.motion_noise[1];
-    p[1][1] = rate_variance;
-}
-
-/// What the motion does to a branch, and by how much it changes it.
-#[inline(always)]
-fn drive<T: Lane, S: Simd, V: SimdFloat<S, Element = T>, const B: usize, const N: usize>(
-    simd: S,
-    ekf: &SparseEkf<T, Compact, B, N>,
-    branch: &BranchStep<T, B>,
-    mid_strain: V,
-    split: &SplitRate<V>,
-) -> (Driven<V>, V) {
-    let range = &ekf.model.law().range;
-    let at = clamped(range, mid_strain);
-    let inside = mid_strain.simd_ge(range.lower) & mid_strain.simd_le(range.upper);
-    let (extend, retract) = (at.mul_add(branch.extend[1], branch.extend[0]), at.mul_add(branch.retract[1], branch.retract[0]));
-    let gain = dot([split.extend_probability, split.retract_probability], [extend, retract]);
-    let change = dot([split.extend, split.retract], [extend, retract]) * branch.reach_s;
-    let growth = dot([split.extend, split.retract], [branch.extend[1], branch.retract[1]]);
-    let pull = inside.select(growth * (branch.reach_s * T::of(0.5)), V::splat(simd, T::zero()));
-    let a = &ekf.motion[0];
-    let row = [dot([gain, pull], [branch.drive[0], a[0]]) + pull, dot([gain, pull], [branch.drive[1], a[1]])];
-    (Driven { gain, pull, row }, change)
-}
-
-/// The baseline's row, from the others' old values.
-#[inline(always)]
-fn predict_baseline<T: Lane, S: Simd, V: SimdFloat<S, Element = T>, const B: usize, const N: usize>(
-    ekf: &SparseEkf<T, Compact, B, N>,
-    x: &mut [V; N],
-    p: &mut [[V; N]; N],
-    driven: &[Driven<V>; B],
-) {
-    if N != B + 3 {
-        return;
-    }
-    let (last, decay) = (N - 1, ekf.baseline_decay);
-    let (with_strain, with_rate) = (p[last][0] * decay, p[last][1] * decay);
-    for i in 0..B {
-        let row = &driven[i].row;
-        p[last][2 + i] =
-            p[last][2 + i].mul_add(decay * ekf.branches[i].decay, dot(*row, [with_strain, with_rate]));
-    }
-    let [a, b] = ekf.motion;
-    p[last][0] = dot([with_strain, with_rate], a);
-    p[last][1] = dot([with_strain, with_rate], b);
-    p[last][last] = p[last][last].mul_add(decay * decay, ekf.baseline_variance);
-    x[last] = x[last] * decay;
-}
-
-/// The branches' rows, the last one first: each needs the old values of those before it and of the motion.
-#[inline(always)]
-fn predict_branches<T: Lane, S: Simd, V: SimdFloat<S, Element = T>, const B: usize, const N: usize>(
-    ekf: &SparseEkf<T, Compact, B, N>,
-    p: &mut [[V; N]; N],
-    driven: &[Driven<V>; B],
-) {
-    let [a, b] = ekf.motion;
-    for i in (0..B).rev() {
-        let (c, branch, Driven { gain, pull, row }) = (2 + i, &ekf.branches[i], driven[i]);
-        let carried = [
-            p[c][0].mul_add(branch.decay, dot(row, [p[0][0], p[1][0]])),
-            p[c][1].mul_add(branch.decay, dot(row, [p[1][0], p[1][1]])),
-        ];
-        let cross = [
-            dot([gain, pull], [branch.cross_noise[0], ekf.motion_noise[0]]),
-            dot([gain, pull], [branch.cross_noise[1], ekf.motion_noise[1]]),
-        ];
-        for k in 0..=i {
-            let (other, to) = (&ekf.branches[k], &driven[k]);
-            let kept = p[c][2 + k].mul_add(branch.decay, dot(row, [p[2 + k][0], p[2 + k][1]]));
-            let noise = dot([to.pull, to.gain], [cross[0], dot([gain, pull], [branch.branch_noise[k], other.cross_noise[0]])]);
-            p[c][2 + k] = kept.mul_add(other.decay, dot(carried, to.row)) + noise;
-        }
-        p[c][c] = p[c][c] + branch.variance;
-        p[c][0] = dot(carried, a) + cross[0];
-        p[c][1] = dot(carried, b) + cross[1];
-    }
-}
-
-/// Takes the readings of the lanes in `present`, and leaves the others as they are.
-#[inline(always)]
-pub(super) fn update<T: Lane, S: Simd, V: SimdFloat<S, Element = T>, const B: usize, const N: usize>(
-    simd: S,
-    ekf: &SparseEkf<T, Compact, B, N>,
-    Beliefs { mean: x, covariance: p }: &mut Beliefs<V, N>,
-    (reading, extra_variance): (V, V),
-    present: V::Mask,
-) -> Compared<V> {
-    let law = ekf.model.law();
-    let inside = clamped(&law.range, x[0]);
-    let (gauge, slope) = value_and_slope(simd, &law.gauge, inside);
-    let mut expected = slope.mul_add(x[0] - inside, gauge);
-    let rate = split(simd, x[1], p[1][1], p[1][1].sqrt());
-    let (extend, retract) = (law.extend_viscosity_s, law.retract_viscosity_s);
-    expected += dot([rate.extend, rate.retract], [extend, retract]);
-    let viscosity = dot([rate.extend_probability, rate.retract_probability], [extend, retract]);
-    for c in &x[2..] {
-        expected += *c;
-    }
-    let mut spread = [expected; N];
-    for i in 0..N {
-        spread[i] = dot([slope, viscosity], [p[i][0], if i == 0 { p[1][0] } else { p[i][1] }]);
-        for k in 2..N {
-            spread[i] += if k <= i { p[i][k] } else { p[k][i] };
-        }
-    }
-    let mut variance = dot([slope, viscosity], [spread[0], spread[1]]) + ekf.reading_variance + extra_variance;
-    for s in &spread[2..] {
-        variance += *s;
-    }
-    let innovation = reading - expected;
-    let zero = V::splat(simd, T::zero());
-    let per_variance = present.select(V::splat(simd, T::one()) / variance, zero);
-    let surprise = present.select(innovation, zero);
-    for i in 0..N {
-        let gain = spread[i] * per_variance;
-        x[i] = gain.mul_add(surprise, x[i]);
-        for j in 0..=i {
-            p[i][j] = (-gain).mul_add(spread[j], p[i][j]);
-        }
-    }
-    Compared { innovation, variance }
 }
 
 /// `a₀ b₀ + a₁ b₁`.
@@ -190,51 +52,270 @@ fn dot<S: Simd, V: SimdFloat<S>>([a0, a1]: [V; 2], [b0, b1]: [impl SimdInto<V, S
     a1.mul_add(b1, a0 * b0.simd_into(a0.token()))
 }
 
-/// [`Compact`] on every lane, and one direction where the rate is clear.
+/// `start + a₀ b₀ + a₁ b₁`.
 #[inline(always)]
-fn split<T: Lane, S: Simd, V: SimdFloat<S, Element = T>>(simd: S, rate: V, variance: V, sd: V) -> SplitRate<V> {
-    let half = V::splat(simd, T::of(0.5));
-    let width = sd * T::of(3.0);
-    let u = rate / width;
-    let w = u * u;
-    let polynomial = |coefficients: [f64; 4]| {
-        let [c0, c1, c2, c3] = coefficients.map(T::of);
-        let minus = -w;
-        minus.mul_add(minus.mul_add(minus.mul_add(c3, c2), c1), c0)
-    };
-    let lean = u * polynomial([1.09375, 1.09375, 0.65625, 0.15625]);
-    let both = width * w.mul_add(polynomial([0.546875, 0.2734375, 0.109375, 0.01953125]), T::of(0.13671875));
-    // One direction in the same form: half the rate, and half its size more or less.
-    let uncertain = (rate * rate).simd_lt(variance * T::of(CLEAR * CLEAR));
-    let half_rate = rate * half;
-    let clear_lean = rate.simd_gt(T::zero()).select(half, V::splat(simd, T::of(-0.5)));
-    let (lean, both) = (uncertain.select(lean, clear_lean), uncertain.select(both, half_rate.abs()));
-    SplitRate {
-        extend: half_rate + both,
-        retract: half_rate - both,
-        extend_probability: half + lean,
-        retract_probability: half - lean,
+fn sum<S: Simd, V: SimdFloat<S>>(
+    start: impl SimdInto<V, S>,
+    [a0, a1]: [V; 2],
+    [b0, b1]: [impl SimdInto<V, S>; 2],
+) -> V {
+    a1.mul_add(b1, a0.mul_add(b0, start))
+}
+
+#[inline(always)]
+pub(super) fn predict<T: Lane, S: Simd, V: SimdFloat<S, Element = T>, const B: usize, const N: usize, const L: usize>(
+    simd: S,
+    ekf: &SparseEkf<T, Compact, B, N>,
+    Beliefs { mean: x, covariance: p }: &mut Beliefs<V, N, L>,
+) -> RateSpread<V> {
+    let (step, law) = (&ekf.step, ekf.model().law());
+    let [a, b] = step.motion;
+    let (strain, rate) = (x[0], x[1]);
+    x[0] = sum(step.input[0], [strain, rate], a);
+    x[1] = sum(step.input[1], [strain, rate], b);
+    let strain_sum = strain + x[0];
+    let from_strain = [dot([p[at(0, 0)], p[at(1, 0)]], a), dot([p[at(1, 0)], p[at(1, 1)]], a)];
+    let from_rate = [dot([p[at(0, 0)], p[at(1, 0)]], b), dot([p[at(1, 0)], p[at(1, 1)]], b)];
+    let spread = RateSpread::new(simd, sum(step.noise[2], from_rate, b));
+
+    let zero = V::splat(simd, T::zero());
+    let mut driven = [Driven { change: zero, gain: zero, pull: zero, row: [zero; 2] }; B];
+    for i in 0..B {
+        let constants = &step.branches[i];
+        let unit = sum(constants.input, [strain, rate], constants.drive);
+        driven[i] = drive(simd, step, constants, (&law.branches[i], &law.range), strain_sum, unit, &spread);
     }
+    predict_baseline(step, x, p, &driven);
+    predict_branches(step, x, p, &driven);
+    p[at(0, 0)] = sum(step.noise[0], from_strain, a);
+    p[at(1, 0)] = sum(step.noise[1], from_strain, b);
+    p[at(1, 1)] = spread.variance;
+    spread
+}
+
+/// What the motion does to a branch.
+#[inline(always)]
+fn drive<T: Lane, S: Simd, V: SimdFloat<S, Element = T>, const B: usize>(
+    simd: S,
+    step: &StepConstants<T, B>,
+    constants: &BranchConstants<T, B>,
+    (law, range): (&Branch<T>, &StrainRange<T>),
+    strain_sum: V,
+    unit: V,
+    spread: &RateSpread<V>,
+) -> Driven<V> {
+    // Gains as functions of the sum of old and new strain, constant beyond the range.
+    let (lower, upper) = (range.lower + range.lower, range.upper + range.upper);
+    let inside = strain_sum.simd_ge(lower) & strain_sum.simd_le(upper);
+    let within = strain_sum.max(lower).min(upper);
+    let growth = [law.extend_gain_slope, law.retract_gain_slope].map(|slope| T::of(0.5) * slope);
+    let gains = [within.mul_add(growth[0], law.extend_gain), within.mul_add(growth[1], law.retract_gain)];
+
+    let uncertain = (unit * unit).simd_lt(spread.variance * constants.clear);
+    let split = spread.split(simd, unit * constants.per_reach);
+    let extends = unit.simd_gt(T::zero());
+    let here = extends.select(gains[0], gains[1]);
+    let growth_here = extends.select(V::splat(simd, growth[0]), V::splat(simd, growth[1]));
+
+    let rates = [split.extend, split.retract];
+    let change = uncertain.select(dot(rates, gains) * constants.reach, here * unit);
+    let gain = uncertain.select(dot([split.extend_probability, split.retract_probability], gains), here);
+    let pull = uncertain.select(dot(rates, growth) * constants.reach, growth_here * unit);
+    let pull = inside.select(pull, V::splat(simd, T::zero()));
+    let [on_strain, on_rate] = constants.drive;
+    let row = [dot([gain, pull], [on_strain, step.strain_sum]), dot([gain, pull], [on_rate, step.motion[0][1]])];
+    Driven { change, gain, pull, row }
+}
+
+/// The baseline's row, from the others' old values.
+#[inline(always)]
+fn predict_baseline<T: Lane, S: Simd, V: SimdFloat<S, Element = T>, const B: usize, const N: usize, const L: usize>(
+    step: &StepConstants<T, B>,
+    x: &mut [V; N],
+    p: &mut [V; L],
+    driven: &[Driven<V>; B],
+) {
+    if N != B + 3 {
+        return;
+    }
+    let ([a, b], decay, last) = (step.motion, step.baseline_decay, N - 1);
+    let old = [p[at(last, 0)] * decay, p[at(last, 1)] * decay];
+    for i in 0..B {
+        let kept = p[at(last, 2 + i)] * decay;
+        p[at(last, 2 + i)] = kept.mul_add(step.branches[i].decay, dot(driven[i].row, old));
+    }
+    x[last] *= decay;
+    p[at(last, 0)] = dot(old, a);
+    p[at(last, 1)] = dot(old, b);
+    p[at(last, last)] = (p[at(last, last)] * decay).mul_add(decay, step.baseline_variance);
+}
+
+/// The branches' rows, the last one first: each needs the old values of those before it and of the motion.
+#[inline(always)]
+fn predict_branches<T: Lane, S: Simd, V: SimdFloat<S, Element = T>, const B: usize, const N: usize, const L: usize>(
+    step: &StepConstants<T, B>,
+    x: &mut [V; N],
+    p: &mut [V; L],
+    driven: &[Driven<V>; B],
+) {
+    let [a, b] = step.motion;
+    for i in (0..B).rev() {
+        let (c, constants, Driven { change, gain, pull, row }) = (2 + i, &step.branches[i], driven[i]);
+        // Row of F P: covariances of the new branch with the old motion.
+        let carried = [
+            p[at(c, 0)].mul_add(constants.decay, dot(row, [p[at(0, 0)], p[at(1, 0)]])),
+            p[at(c, 1)].mul_add(constants.decay, dot(row, [p[at(1, 0)], p[at(1, 1)]])),
+        ];
+        let cross = [
+            dot([gain, pull], [constants.cross_noise[0], step.noise[0]]),
+            dot([gain, pull], [constants.cross_noise[1], step.noise[1]]),
+        ];
+        for k in 0..=i {
+            let (other, to) = (&step.branches[k], &driven[k]);
+            let kept = p[at(c, 2 + k)].mul_add(constants.decay, dot(row, [p[at(2 + k, 0)], p[at(2 + k, 1)]]));
+            let noise = dot([gain, pull], [constants.noise[k], other.cross_noise[0]]);
+            let start = if k == i { to.gain.mul_add(noise, constants.variance) } else { to.gain * noise };
+            let driven = sum(to.pull.mul_add(cross[0], start), to.row, carried);
+            p[at(c, 2 + k)] = kept.mul_add(other.decay, driven);
+        }
+        x[c] = x[c].mul_add(constants.decay, change);
+        p[at(c, 0)] = sum(cross[0], carried, a);
+        p[at(c, 1)] = sum(cross[1], carried, b);
+    }
+}
+
+/// Takes the readings of the lanes in `present`, and leaves the others as they are.
+#[inline(always)]
+pub(super) fn update<T: Lane, S: Simd, V: SimdFloat<S, Element = T>, const B: usize, const N: usize, const L: usize>(
+    simd: S,
+    ekf: &SparseEkf<T, Compact, B, N>,
+    Beliefs { mean: x, covariance: p }: &mut Beliefs<V, N, L>,
+    (reading, extra_variance): (V, V),
+    present: V::Mask,
+    spread: &RateSpread<V>,
+) -> Compared<V> {
+    let law = ekf.model().law();
+    let (gauge, slope) = curve(simd, &law.gauge, &law.range, x[0]);
+    let (drag, viscosity) = dash_pot(simd, [law.extend_viscosity_s, law.retract_viscosity_s], x[1], spread);
+    let mut expected = gauge + drag;
+
+    // P Hᵀ, and S = H P Hᵀ + R.
+    let mut ph = [expected; N];
+    for i in 0..N {
+        ph[i] = dot([slope, viscosity], [p[at(i, 0)], if i == 0 { p[at(1, 0)] } else { p[at(i, 1)] }]);
+    }
+    for i in 2..N {
+        ph[i] += p[at(i, i)];
+    }
+    for i in 2..N {
+        expected += x[i];
+        ph[0] += p[at(i, 0)];
+        ph[1] += p[at(i, 1)];
+        for k in 2..i {
+            ph[i] += p[at(i, k)];
+            ph[k] += p[at(i, k)];
+        }
+    }
+    let mut variance = sum(extra_variance + ekf.reading.variance, [ph[0], ph[1]], [slope, viscosity]);
+    for ph in &ph[2..] {
+        variance += *ph;
+    }
+
+    let innovation = reading - expected;
+    let zero = V::splat(simd, T::zero());
+    let per_variance = present.select(V::splat(simd, T::one()) / variance, zero);
+    let scaled = present.select(innovation * per_variance, zero);
+    for i in 0..N {
+        x[i] = ph[i].mul_add(scaled, x[i]);
+        let minus_gain = -(ph[i] * per_variance);
+        for j in 0..=i {
+            p[at(i, j)] = minus_gain.mul_add(ph[j], p[at(i, j)]);
+        }
+    }
+    Compared { innovation, variance, nis: innovation * scaled }
+}
+
+/// The dash-pot's part of the reading, and its derivative by the rate.
+#[inline(always)]
+fn dash_pot<T: Lane, S: Simd, V: SimdFloat<S, Element = T>>(
+    simd: S,
+    viscosities: [T; 2],
+    rate: V,
+    spread: &RateSpread<V>,
+) -> (V, V) {
+    let uncertain = (rate * rate).simd_lt(spread.variance * T::of(CLEAR * CLEAR));
+    let split = spread.split(simd, rate);
+    let [extend, retract] = viscosities.map(|viscosity| V::splat(simd, viscosity));
+    let here = rate.simd_gt(T::zero()).select(extend, retract);
+    let drag = dot([split.extend, split.retract], viscosities);
+    let slope = dot([split.extend_probability, split.retract_probability], viscosities);
+    (uncertain.select(drag, here * rate), uncertain.select(slope, here))
 }
 
 const CLEAR: f64 = <Compact as Switch<f64>>::CLEAR;
 
-#[inline(always)]
-fn clamped<T: Lane, S: Simd, V: SimdFloat<S, Element = T>>(range: &StrainRange<T>, strain: V) -> V {
-    strain.max(range.lower).min(range.upper)
+impl<V> RateSpread<V> {
+    #[inline(always)]
+    fn new<T: Lane, S: Simd>(simd: S, variance: V) -> Self
+    where
+        V: SimdFloat<S, Element = T>,
+    {
+        let width = variance.sqrt() * T::of(3.0);
+        Self { variance, width, per_width: V::splat(simd, T::one()) / width }
+    }
+
+    /// [`Compact`]; means nothing where the rate is clear.
+    #[inline(always)]
+    fn split<T: Lane, S: Simd>(&self, simd: S, rate: V) -> SplitRate<V>
+    where
+        V: SimdFloat<S, Element = T>,
+    {
+        let half = V::splat(simd, T::of(0.5));
+        let u = rate * self.per_width;
+        let minus_w = -(u * u);
+        let lean = cubic(simd, minus_w, [1.09375, 1.09375, 0.65625, 0.15625]);
+        let both = cubic(simd, minus_w, [0.546875, 0.2734375, 0.109375, 0.01953125]);
+        let spread = (u * u).mul_add(both, T::of(0.13671875));
+        let mean = rate * half;
+        SplitRate {
+            extend: self.width.mul_add(spread, mean),
+            retract: (-self.width).mul_add(spread, mean),
+            extend_probability: u.mul_add(lean, half),
+            retract_probability: (-u).mul_add(lean, half),
+        }
+    }
 }
 
-/// [`Gauge::value_and_slope`]: a polynomial in vectors, what needs an exponential sensor by sensor.
 #[inline(always)]
-fn value_and_slope<T: Lane, S: Simd, V: SimdFloat<S, Element = T>>(simd: S, gauge: &Gauge<T>, strain: V) -> (V, V) {
-    if let Gauge::Polynomial { coefficients: [a1, a2, a3] } = *gauge {
-        let value = strain * strain.mul_add(strain.mul_add(a3, a2), a1);
-        let slope = strain.mul_add((strain * T::of(3.0)).mul_add(a3, T::of(2.0) * a2), a1);
-        return (value, slope);
-    }
-    let (mut value, mut slope) = (strain, V::splat(simd, T::zero()));
-    let each = value.as_mut_slice().iter_mut().zip(slope.as_mut_slice());
-    for (value, slope) in each {
+fn cubic<T: Lane, S: Simd, V: SimdFloat<S, Element = T>>(simd: S, x: V, [c0, c1, c2, c3]: [f64; 4]) -> V {
+    let highest = V::splat(simd, T::of(c3));
+    x.mul_add(x.mul_add(x.mul_add(highest, T::of(c2)), T::of(c1)), T::of(c0))
+}
+
+/// The gauge within the range and its tangent outside, and the slope: a polynomial in vectors, what needs an exponential
+/// sensor by sensor.
+#[inline(always)]
+fn curve<T: Lane, S: Simd, V: SimdFloat<S, Element = T>>(
+    simd: S,
+    gauge: &Gauge<T>,
+    range: &StrainRange<T>,
+    strain: V,
+) -> (V, V) {
+    let inside = strain.max(range.lower).min(range.upper);
+    let (value, slope) = if let Gauge::Polynomial { coefficients: [a1, a2, a3] } = *gauge {
+        let value = inside * inside.mul_add(inside.mul_add(V::splat(simd, a3), a2), a1);
+        (value, inside.mul_add((inside * T::of(3.0)).mul_add(a3, T::of(2.0) * a2), a1))
+    } else {
+        one_by_one(gauge, inside)
+    };
+    (slope.mul_add(strain - inside, value), slope)
+}
+
+#[cold]
+#[inline(always)]
+fn one_by_one<T: Lane, S: Simd, V: SimdFloat<S, Element = T>>(gauge: &Gauge<T>, strain: V) -> (V, V) {
+    let (mut value, mut slope) = (strain, strain);
+    for (value, slope) in value.as_mut_slice().iter_mut().zip(slope.as_mut_slice()) {
         (*value, *slope) = gauge.value_and_slope(*value);
     }
     (value, slope)
