@@ -26,6 +26,7 @@ pub(super) struct RateSpread<V> {
     variance: V,
     width: V,
     per_width: V,
+    per_square: V,
 }
 
 /// Readings compared with their predictions.
@@ -35,15 +36,15 @@ pub(super) struct Compared<V> {
     pub(super) nis: V,
 }
 
-/// What a step does to one branch, and with which gain it was driven.
+/// What a step does to one branch, as the sparse filter's prediction has it.
 #[derive(Clone, Copy)]
 struct Driven<V> {
     change: V,
     gain: V,
-    /// Growth of the change with the sum of old and new strain.
     pull: V,
-    /// Row of the Jacobian: strain and rate.
     row: [V; 2],
+    kept: [V; 2],
+    carried: [V; 2],
 }
 
 /// `a₀ b₀ + a₁ b₁`.
@@ -63,7 +64,14 @@ fn sum<S: Simd, V: SimdFloat<S>>(
 }
 
 #[inline(always)]
-pub(super) fn predict<T: Lane, S: Simd, V: SimdFloat<S, Element = T>, const B: usize, const N: usize, const L: usize>(
+pub(super) fn predict<
+    T: Lane,
+    S: Simd,
+    V: SimdFloat<S, Element = T>,
+    const B: usize,
+    const N: usize,
+    const L: usize,
+>(
     simd: S,
     ekf: &SparseEkf<T, Compact, B, N>,
     Beliefs { mean: x, covariance: p }: &mut Beliefs<V, N, L>,
@@ -74,42 +82,50 @@ pub(super) fn predict<T: Lane, S: Simd, V: SimdFloat<S, Element = T>, const B: u
     x[0] = sum(step.input[0], [strain, rate], a);
     x[1] = sum(step.input[1], [strain, rate], b);
     let strain_sum = strain + x[0];
-    let from_strain = [dot([p[at(0, 0)], p[at(1, 0)]], a), dot([p[at(1, 0)], p[at(1, 1)]], a)];
-    let from_rate = [dot([p[at(0, 0)], p[at(1, 0)]], b), dot([p[at(1, 0)], p[at(1, 1)]], b)];
-    let spread = RateSpread::new(simd, sum(step.noise[2], from_rate, b));
+    let [strain_variance, strain_rate, rate_variance] = [p[0], p[1], p[2]];
+    let from_strain = [dot([strain_variance, strain_rate], a), dot([strain_rate, rate_variance], a)];
+    let squares = step.rate_squares;
+    p[0] = sum(step.noise[0], from_strain, a);
+    p[1] = sum(step.noise[1], from_strain, b);
+    let from_old = sum(step.noise[2], [strain_variance, strain_rate], [squares[0], squares[1]]);
+    p[2] = rate_variance.mul_add(squares[2], from_old);
+    let spread = RateSpread::new(simd, p[2]);
 
     let zero = V::splat(simd, T::zero());
-    let mut driven = [Driven { change: zero, gain: zero, pull: zero, row: [zero; 2] }; B];
+    let mut driven =
+        [Driven { change: zero, gain: zero, pull: zero, row: [zero; 2], kept: [zero; 2], carried: [zero; 2] }; B];
     for i in 0..B {
         let constants = &step.branches[i];
         let unit = sum(constants.input, [strain, rate], constants.drive);
-        driven[i] = drive(simd, step, constants, (&law.branches[i], &law.range), strain_sum, unit, &spread);
+        let (change, gain, pull) = drive(simd, constants, &law.branches[i], &law.range, strain_sum, unit, &spread);
+        let row = [gain.mul_add(constants.drive[0], pull), gain * constants.drive[1]];
+        let kept = [p[at(2 + i, 0)] * constants.decay, p[at(2 + i, 1)] * constants.decay];
+        let carried =
+            [sum(kept[0], row, [strain_variance, strain_rate]), sum(kept[1], row, [strain_rate, rate_variance])];
+        driven[i] = Driven { change, gain, pull, row, kept, carried };
     }
-    predict_baseline(step, x, p, &driven);
     predict_branches(step, x, p, &driven);
-    p[at(0, 0)] = sum(step.noise[0], from_strain, a);
-    p[at(1, 0)] = sum(step.noise[1], from_strain, b);
-    p[at(1, 1)] = spread.variance;
+    predict_baseline(step, x, p, &driven);
     spread
 }
 
-/// What the motion does to a branch.
+/// Change, gain and pull of a branch.
 #[inline(always)]
 fn drive<T: Lane, S: Simd, V: SimdFloat<S, Element = T>, const B: usize>(
     simd: S,
-    step: &StepConstants<T, B>,
     constants: &BranchConstants<T, B>,
-    (law, range): (&Branch<T>, &StrainRange<T>),
+    law: &Branch<T>,
+    range: &StrainRange<T>,
     strain_sum: V,
     unit: V,
     spread: &RateSpread<V>,
-) -> Driven<V> {
+) -> (V, V, V) {
     // Gains as functions of the sum of old and new strain, constant beyond the range.
     let (lower, upper) = (range.lower + range.lower, range.upper + range.upper);
     let inside = strain_sum.simd_ge(lower) & strain_sum.simd_le(upper);
-    let within = strain_sum.max(lower).min(upper);
+    let clamped = strain_sum.max(lower).min(upper);
     let growth = [law.extend_gain_slope, law.retract_gain_slope].map(|slope| T::of(0.5) * slope);
-    let gains = [within.mul_add(growth[0], law.extend_gain), within.mul_add(growth[1], law.retract_gain)];
+    let gains = [clamped.mul_add(growth[0], law.extend_gain), clamped.mul_add(growth[1], law.retract_gain)];
 
     let uncertain = (unit * unit).simd_lt(spread.variance * constants.clear);
     let split = spread.split(simd, unit * constants.per_reach);
@@ -121,13 +137,41 @@ fn drive<T: Lane, S: Simd, V: SimdFloat<S, Element = T>, const B: usize>(
     let change = uncertain.select(dot(rates, gains) * constants.reach, here * unit);
     let gain = uncertain.select(dot([split.extend_probability, split.retract_probability], gains), here);
     let pull = uncertain.select(dot(rates, growth) * constants.reach, growth_here * unit);
-    let pull = inside.select(pull, V::splat(simd, T::zero()));
-    let [on_strain, on_rate] = constants.drive;
-    let row = [dot([gain, pull], [on_strain, step.strain_sum]), dot([gain, pull], [on_rate, step.motion[0][1]])];
-    Driven { change, gain, pull, row }
+    (change, gain, inside.select(pull, V::splat(simd, T::zero())))
 }
 
-/// The baseline's row, from the others' old values.
+/// The branches' covariances with the new motion, which is in `p` already, and with each other.
+#[inline(always)]
+fn predict_branches<T: Lane, S: Simd, V: SimdFloat<S, Element = T>, const B: usize, const N: usize, const L: usize>(
+    step: &StepConstants<T, B>,
+    x: &mut [V; N],
+    p: &mut [V; L],
+    driven: &[Driven<V>; B],
+) {
+    let [a, b] = step.motion;
+    for i in 0..B {
+        let (c, branch, Driven { change, gain, pull, row, kept, carried }) = (2 + i, &step.branches[i], driven[i]);
+        let strain = sum(gain * branch.cross_noise[0], carried, a);
+        let rate = sum(gain * branch.cross_noise[1], carried, b);
+        let with_strain = pull.mul_add(p[0], strain);
+        for k in 0..i {
+            let other = &driven[k];
+            let from_motion = sum(other.gain * (gain * branch.noise[k]), other.row, carried);
+            let from_both = sum(from_motion, row, other.kept);
+            let own = p[at(c, 2 + k)].mul_add(branch.decays[k], from_both);
+            p[at(c, 2 + k)] = sum(own, [other.pull, pull], [strain, p[at(2 + k, 0)]]);
+        }
+        let noise = gain.mul_add(gain * branch.noise[i], branch.variance);
+        let from_motion = sum(noise, row, [carried[0] + kept[0], carried[1] + kept[1]]);
+        let own = p[at(c, c)].mul_add(branch.decays[i], from_motion);
+        p[at(c, c)] = pull.mul_add(strain + with_strain, own);
+        x[c] = x[c].mul_add(branch.decay, change);
+        p[at(c, 0)] = with_strain;
+        p[at(c, 1)] = pull.mul_add(p[1], rate);
+    }
+}
+
+/// The baseline's covariances, from its own old ones.
 #[inline(always)]
 fn predict_baseline<T: Lane, S: Simd, V: SimdFloat<S, Element = T>, const B: usize, const N: usize, const L: usize>(
     step: &StepConstants<T, B>,
@@ -139,49 +183,16 @@ fn predict_baseline<T: Lane, S: Simd, V: SimdFloat<S, Element = T>, const B: usi
         return;
     }
     let ([a, b], decay, last) = (step.motion, step.baseline_decay, N - 1);
-    let old = [p[at(last, 0)] * decay, p[at(last, 1)] * decay];
+    let kept = [p[at(last, 0)] * decay, p[at(last, 1)] * decay];
+    p[at(last, 0)] = dot(kept, a);
+    p[at(last, 1)] = dot(kept, b);
     for i in 0..B {
-        let kept = p[at(last, 2 + i)] * decay;
-        p[at(last, 2 + i)] = kept.mul_add(step.branches[i].decay, dot(driven[i].row, old));
+        let Driven { pull, row, .. } = driven[i];
+        let own = p[at(last, 2 + i)].mul_add(step.baseline_decays[i], dot(row, kept));
+        p[at(last, 2 + i)] = pull.mul_add(p[at(last, 0)], own);
     }
     x[last] *= decay;
-    p[at(last, 0)] = dot(old, a);
-    p[at(last, 1)] = dot(old, b);
-    p[at(last, last)] = (p[at(last, last)] * decay).mul_add(decay, step.baseline_variance);
-}
-
-/// The branches' rows, the last one first: each needs the old values of those before it and of the motion.
-#[inline(always)]
-fn predict_branches<T: Lane, S: Simd, V: SimdFloat<S, Element = T>, const B: usize, const N: usize, const L: usize>(
-    step: &StepConstants<T, B>,
-    x: &mut [V; N],
-    p: &mut [V; L],
-    driven: &[Driven<V>; B],
-) {
-    let [a, b] = step.motion;
-    for i in (0..B).rev() {
-        let (c, constants, Driven { change, gain, pull, row }) = (2 + i, &step.branches[i], driven[i]);
-        // Row of F P: covariances of the new branch with the old motion.
-        let carried = [
-            p[at(c, 0)].mul_add(constants.decay, dot(row, [p[at(0, 0)], p[at(1, 0)]])),
-            p[at(c, 1)].mul_add(constants.decay, dot(row, [p[at(1, 0)], p[at(1, 1)]])),
-        ];
-        let cross = [
-            dot([gain, pull], [constants.cross_noise[0], step.noise[0]]),
-            dot([gain, pull], [constants.cross_noise[1], step.noise[1]]),
-        ];
-        for k in 0..=i {
-            let (other, to) = (&step.branches[k], &driven[k]);
-            let kept = p[at(c, 2 + k)].mul_add(constants.decay, dot(row, [p[at(2 + k, 0)], p[at(2 + k, 1)]]));
-            let noise = dot([gain, pull], [constants.noise[k], other.cross_noise[0]]);
-            let start = if k == i { to.gain.mul_add(noise, constants.variance) } else { to.gain * noise };
-            let driven = sum(to.pull.mul_add(cross[0], start), to.row, carried);
-            p[at(c, 2 + k)] = kept.mul_add(other.decay, driven);
-        }
-        x[c] = x[c].mul_add(constants.decay, change);
-        p[at(c, 0)] = sum(cross[0], carried, a);
-        p[at(c, 1)] = sum(cross[1], carried, b);
-    }
+    p[at(last, last)] = p[at(last, last)].mul_add(step.baseline_square, step.baseline_variance);
 }
 
 /// Takes the readings of the lanes in `present`, and leaves the others as they are.
@@ -196,8 +207,8 @@ pub(super) fn update<T: Lane, S: Simd, V: SimdFloat<S, Element = T>, const B: us
 ) -> Compared<V> {
     let law = ekf.model().law();
     let (gauge, slope) = curve(simd, &law.gauge, &law.range, x[0]);
-    let (drag, viscosity) = dash_pot(simd, [law.extend_viscosity_s, law.retract_viscosity_s], x[1], spread);
-    let mut expected = gauge + drag;
+    let viscosities = [law.extend_viscosity_s, law.retract_viscosity_s];
+    let (mut expected, viscosity) = with_dash_pot(simd, gauge, viscosities, x[1], spread);
 
     // P Hᵀ, and S = H P Hᵀ + R.
     let mut ph = [expected; N];
@@ -235,10 +246,11 @@ pub(super) fn update<T: Lane, S: Simd, V: SimdFloat<S, Element = T>, const B: us
     Compared { innovation, variance, nis: innovation * scaled }
 }
 
-/// The dash-pot's part of the reading, and its derivative by the rate.
+/// The expected reading of motion alone, and its derivative by the rate.
 #[inline(always)]
-fn dash_pot<T: Lane, S: Simd, V: SimdFloat<S, Element = T>>(
+fn with_dash_pot<T: Lane, S: Simd, V: SimdFloat<S, Element = T>>(
     simd: S,
+    gauge: V,
     viscosities: [T; 2],
     rate: V,
     spread: &RateSpread<V>,
@@ -247,9 +259,9 @@ fn dash_pot<T: Lane, S: Simd, V: SimdFloat<S, Element = T>>(
     let split = spread.split(simd, rate);
     let [extend, retract] = viscosities.map(|viscosity| V::splat(simd, viscosity));
     let here = rate.simd_gt(T::zero()).select(extend, retract);
-    let drag = dot([split.extend, split.retract], viscosities);
+    let expected = sum(gauge, [split.extend, split.retract], viscosities);
     let slope = dot([split.extend_probability, split.retract_probability], viscosities);
-    (uncertain.select(drag, here * rate), uncertain.select(slope, here))
+    (uncertain.select(expected, here.mul_add(rate, gauge)), uncertain.select(slope, here))
 }
 
 const CLEAR: f64 = <Compact as Switch<f64>>::CLEAR;
@@ -260,8 +272,10 @@ impl<V> RateSpread<V> {
     where
         V: SimdFloat<S, Element = T>,
     {
-        let width = variance.sqrt() * T::of(3.0);
-        Self { variance, width, per_width: V::splat(simd, T::one()) / width }
+        let square = variance * T::of(9.0);
+        let per_square = V::splat(simd, T::one()) / square;
+        let per_width = per_square.sqrt();
+        Self { variance, width: square * per_width, per_width, per_square }
     }
 
     /// [`Compact`]; means nothing where the rate is clear.
@@ -272,10 +286,15 @@ impl<V> RateSpread<V> {
     {
         let half = V::splat(simd, T::of(0.5));
         let u = rate * self.per_width;
-        let minus_w = -(u * u);
-        let lean = cubic(simd, minus_w, [1.09375, 1.09375, 0.65625, 0.15625]);
-        let both = cubic(simd, minus_w, [0.546875, 0.2734375, 0.109375, 0.01953125]);
-        let spread = (u * u).mul_add(both, T::of(0.13671875));
+        let w = rate * rate * self.per_square;
+        let (minus_w, fourth) = (-w, w * w);
+        let number = |number: f64| V::splat(simd, T::of(number));
+        let lean = fourth.mul_add(
+            minus_w.mul_add(number(0.15625), number(0.65625)),
+            minus_w.mul_add(number(1.09375), number(1.09375)),
+        );
+        let outer = fourth.mul_add(number(0.01953125), minus_w.mul_add(number(0.109375), number(0.2734375)));
+        let spread = (-fourth).mul_add(outer, w.mul_add(number(0.546875), number(0.13671875)));
         let mean = rate * half;
         SplitRate {
             extend: self.width.mul_add(spread, mean),
@@ -284,12 +303,6 @@ impl<V> RateSpread<V> {
             retract_probability: (-u).mul_add(lean, half),
         }
     }
-}
-
-#[inline(always)]
-fn cubic<T: Lane, S: Simd, V: SimdFloat<S, Element = T>>(simd: S, x: V, [c0, c1, c2, c3]: [f64; 4]) -> V {
-    let highest = V::splat(simd, T::of(c3));
-    x.mul_add(x.mul_add(x.mul_add(highest, T::of(c2)), T::of(c1)), T::of(c0))
 }
 
 /// The gauge within the range and its tangent outside, and the slope: a polynomial in vectors, what needs an exponential
