@@ -5,6 +5,8 @@ use ohmstrain_model::{Gauge, SwitchedModel};
 use ohmstrain_tests::sensor;
 
 const DT_S: f64 = 0.01;
+/// Bound of one step in ε, derived below.
+const DEEP: f64 = 5000.0;
 const COUNTS: [usize; 5] = [1, 3, 8, 9, 33];
 
 fn number<T: Lane>(x: T) -> f64 {
@@ -67,7 +69,7 @@ fn difference<T: Lane, const B: usize, const N: usize, const L: usize>(bits: usi
         for (sensor, belief) in beliefs.iter_mut().enumerate() {
             let old = deviations(belief);
             let taken = ekf.step(belief, as_option(readings[sensor], extra[sensor])).unwrap();
-            // After a step a deviation is no larger than 1.1 old ones here, but may be much smaller.
+            // Against the deviations before the step: those after it may be much smaller.
             worst = worst.max(apart(&bank.belief(sensor).unwrap(), belief, &old));
             let outcome = bank.outcome(sensor).unwrap().unwrap();
             assert_eq!(outcome.is_some(), taken.is_some());
@@ -95,8 +97,11 @@ fn is_the_sparse_filter_to_the_last_bit_where_nothing_is_fused() {
     }
 }
 
-/// A fused operation leaves out one rounding of a product, half an ε of it. A step is some 30 operations deep, on
-/// quantities up to S/R ≈ 100 times larger than what is left: 3000 ε.
+/// A fused operation leaves out one rounding of a product, half an ε of it.
+///
+/// Covariances: a step is some 30 operations deep, on quantities up to S/R ≈ 100 times larger than what is left: 3000 ε.
+/// Means: the expected reading has eight fused products (five of the gauge, one of its tangent, two of the dash-pot), each
+/// of them below 1, and is seen in deviations of no less than 2e-3: 8 · ½ / 2e-3 = 2000 ε more.
 #[test]
 fn is_the_sparse_filter_to_rounding_in_vectors_of_any_width() {
     for bits in [128, 256, 512] {
@@ -107,15 +112,15 @@ fn is_the_sparse_filter_to_rounding_in_vectors_of_any_width() {
                 difference::<f64, 2, 4, 10>(bits, sensors),
                 difference::<f64, 3, 6, 21>(bits, sensors),
             ];
-            assert!(of_f64.iter().all(|worst| *worst < 3000.0 * f64::EPSILON), "{bits} {sensors} {of_f64:e?}");
+            assert!(of_f64.iter().all(|worst| *worst < DEEP * f64::EPSILON), "{bits} {sensors} {of_f64:?}");
             let of_f32 = [difference::<f32, 1, 3, 6>(bits, sensors), difference::<f32, 3, 6, 21>(bits, sensors)];
-            assert!(of_f32.iter().all(|w| *w < 3000.0 * f64::from(f32::EPSILON)), "{bits} {sensors} {of_f32:e?}");
+            assert!(of_f32.iter().all(|w| *w < DEEP * f64::from(f32::EPSILON)), "{bits} {sensors} {of_f32:?}");
         }
     }
 }
 
 /// Left alone for 3000 steps, rounding is forgotten as fast as anything else: the slowest time constant here, the branch of
-/// 32 s, is 3200 steps, of which each may add 3000 ε.
+/// 32 s, is 3200 steps, of which each may add what one step does.
 #[test]
 fn stays_with_the_sparse_filter_for_thousands_of_steps() {
     let model: SwitchedModel<f64, 2, 2, 5> = sensor();
@@ -128,7 +133,7 @@ fn stays_with_the_sparse_filter_for_thousands_of_steps() {
         for (sensor, belief) in beliefs.iter_mut().enumerate() {
             ekf.step(belief, as_option(readings[sensor], 0.0)).unwrap();
             let worst = apart(&bank.belief(sensor).unwrap(), belief, &deviations(belief));
-            assert!(worst < 3200.0 * 3000.0 * f64::EPSILON, "{k} {sensor} {worst:e}");
+            assert!(worst < 3200.0 * DEEP * f64::EPSILON, "{k} {sensor} {worst:e}");
         }
     }
     let strains: Vec<_> = bank.strains().collect();
@@ -161,7 +166,7 @@ fn knows_the_gauges_with_an_exponential() {
                 let scale = deviations(&belief);
                 ekf.step(&mut belief, as_option(readings[sensor], 0.0)).unwrap();
                 let worst = apart(&bank.belief(sensor).unwrap(), &belief, &scale);
-                assert!(worst < 3000.0 * f64::EPSILON, "{gauge:?} {worst:e}");
+                assert!(worst < DEEP * f64::EPSILON, "{gauge:?} {worst:e}");
             }
         }
     }
