@@ -44,7 +44,8 @@ pub use self::lane::Lane;
 /// # let noise = ModelNoise { reading_sd: 2e-3, branch_sd: 5e-3, baseline_sd: 0.02, baseline_time_s: 30.0 };
 /// let model = SwitchedModel::<f64, 2, 1, 4>::new(law, motion, noise)?;
 /// let mut hand = Bank::<f64, 1, 4, 10>::new(model, 0.01, 3)?;
-/// let refused = hand.step(&[0.05, f64::NAN, 0.20])?;
+/// // At the mean strain before any reading, 0.15, the curve is at 0.222.
+/// let refused = hand.step(&[0.05, f64::NAN, 0.25])?;
 /// assert_eq!(refused, 0);
 /// let strains: Vec<f64> = hand.strains().map(|strain| strain.mean).collect();
 /// assert!(strains[0] < strains[1] && strains[1] < strains[2]);
