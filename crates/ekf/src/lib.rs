@@ -7,7 +7,8 @@
 //! [`Hypotheses`] keep a [`Mixture`] of hypotheses about the phase, because stretching and releasing look alike.
 //! `Particles` (feature `std`) samples the motion instead: slow, and the reference for all of them.
 //! [`DiffuseEkf`] starts where parts of the state are not known at all. [`ConsistencyTest`] judges a running filter by its
-//! innovations. [`FixedGain`] stops computing the gain of a model that does not change once it has settled.
+//! innovations. [`FixedGain`] stops computing the gain of a model that does not change once it has settled. `Bank` (feature
+//! `simd`) steps many sensors at once, in vector registers.
 //!
 //! Models are anything that implements [`Dynamics`] and [`Channel`];
 //! [`SwitchedModel`](ohmstrain_model::SwitchedModel) does, and so does [`WithPlays`](ohmstrain_model::WithPlays), whose
@@ -51,6 +52,8 @@ extern crate std;
 
 #[cfg(feature = "adskalman")]
 mod adskalman_bridge;
+#[cfg(feature = "simd")]
+mod bank;
 mod belief;
 mod chi_square;
 mod clock;
@@ -106,6 +109,8 @@ mod window;
 
 #[cfg(feature = "adskalman")]
 pub use adskalman_bridge::LinearStep;
+#[cfg(feature = "simd")]
+pub use bank::{Bank, Lane, WrongLength};
 pub use belief::Belief;
 pub use chi_square::ChiSquare;
 pub use clock::seconds_between;
