@@ -22,6 +22,12 @@ impl<const B: usize, const N: usize, const L: usize> GatedSparse<B, N, L> {
         let ekf = SparseEkf::new(model, DT_S).expect("the step's length is positive");
         Self { ekf, belief: Belief::initial(&model), log_likelihood: LogLikelihood::new() }
     }
+
+    /// What is known after the last reading.
+    #[must_use]
+    pub const fn belief(&self) -> &Belief<f64, N, L> {
+        &self.belief
+    }
 }
 
 impl<const B: usize, const N: usize, const L: usize> Filter for GatedSparse<B, N, L> {
