@@ -51,10 +51,13 @@ extern crate std;
 
 #[cfg(feature = "adskalman")]
 mod adskalman_bridge;
+#[cfg(feature = "simd")]
+mod bank;
 mod belief;
 mod chi_square;
 mod clock;
 mod consistency;
+mod curve;
 mod diffuse;
 mod diffuse_belief;
 mod diffuse_smoother;
@@ -84,6 +87,10 @@ mod sign_split;
 mod smoother;
 mod smoothing;
 mod sparse;
+mod sparse_constants;
+mod sparse_parts;
+mod sparse_predict;
+mod sparse_update;
 mod switch;
 mod switching;
 mod traits;
@@ -92,10 +99,13 @@ mod window;
 
 #[cfg(feature = "adskalman")]
 pub use adskalman_bridge::LinearStep;
+#[cfg(feature = "simd")]
+pub use bank::{Bank, Lane, WrongLength};
 pub use belief::Belief;
 pub use chi_square::ChiSquare;
 pub use clock::seconds_between;
 pub use consistency::{ConsistencyRecord, ConsistencyReport, ConsistencyTest, MeanTest, Verdict, Whiteness};
+pub use curve::{AnyCurve, Cubic, Curve};
 pub use diffuse::{DiffuseEkf, DiffuseStep, DiffuseUpdate};
 pub use diffuse_belief::DiffuseBelief;
 pub use diffuse_smoother::{Undetermined, diffuse_rts_step, diffuse_smooth};
@@ -122,7 +132,7 @@ pub use smoother::rts_smooth_vec;
 pub use smoother::{rts_smooth, rts_step};
 pub use smoothing::{PastStep, smooth_back_through};
 pub use sparse::SparseEkf;
-pub use switch::{Compact, Logistic, Switch};
+pub use switch::{Compact, CompactWidth, Logistic, Switch};
 pub use switching::{Dwell, Phased};
 pub use traits::{Channel, Dynamics, Reading};
 pub use unscented::{Ukf, Unscented};
