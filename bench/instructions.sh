@@ -18,6 +18,8 @@ fi
 # The same code on every machine, whatever the surroundings ask for.
 export RUSTFLAGS="-C target-cpu=x86-64"
 export CARGO_TARGET_DIR=target/x86-64
+# The C library chooses its exponentials, logarithms and copies by processor.
+export GLIBC_TUNABLES=glibc.cpu.hwcaps=-AVX,-AVX2,-AVX512F,-AVX512VL,-FMA,-FMA4,-ERMS,-FSRM
 cargo build --quiet --locked --profile bench -p ohmstrain-bench-filters --bin instructions
 readonly program=$CARGO_TARGET_DIR/release/instructions
 readonly counts=$CARGO_TARGET_DIR/instructions.txt

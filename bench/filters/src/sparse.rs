@@ -35,7 +35,7 @@ impl<const B: usize, const N: usize, const L: usize> Filter for GatedSparse<B, N
     fn step(&mut self, reading: f64) -> bool {
         let mut next = self.belief;
         match self.ekf.step(&mut next, Some(Reading::from(reading))) {
-            Ok(Some(residual)) if residual.nis() <= GATE => {
+            Ok(Some(residual)) if residual.nis <= GATE => {
                 self.belief = next;
                 self.log_likelihood.add(&residual);
                 true

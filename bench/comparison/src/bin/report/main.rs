@@ -24,6 +24,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         .replace("{machine}", &machine::describe(mode)?)
         .replace("{ratios}", &table::ratios(&builds))
         .replace("{steps}", &table::steps(&builds))
+        .replace("{banks}", &table::banks(&builds))
         .replace("{recordings}", &table::recordings(&builds))
         .replace("{memory}", &table::memory(&builds));
     Ok(std::fs::write(readme, text)?)
