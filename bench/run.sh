@@ -26,8 +26,10 @@ for level in "${levels[@]}"; do
     # A benchmark that no longer exists must not stay in the table.
     rm -rf "$CRITERION_HOME"
     cargo bench --locked -p ohmstrain-bench-comparison --benches -- --noplot "${times[@]}"
+    # One process measures: more than 1 says that it had company.
+    load=$(cut -d' ' -f1 /proc/loadavg)
     cargo run --quiet --locked --profile bench -p ohmstrain-bench-comparison --bin memory >"$CARGO_TARGET_DIR/memory.txt"
     directories+=("$CARGO_TARGET_DIR")
 done
 cargo run --quiet --locked --profile bench -p ohmstrain-bench-comparison --bin report -- \
-    README.md "$mode" "${directories[@]}"
+    README.md "$mode; load average at the end $load" "${directories[@]}"
