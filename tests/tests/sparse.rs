@@ -1,7 +1,9 @@
 //! The sparse path computes what the generic one computes.
 
 use nalgebra::SVector;
-use ohmstrain_ekf::{Belief, Compact, Ekf, LogLikelihood, Logistic, Reading, SparseEkf, StepError, Switch};
+use ohmstrain_ekf::{
+    Belief, Compact, Cubic, Ekf, LogLikelihood, Logistic, Reading, SparseEkf, StepError, Switch, rts_smooth,
+};
 use ohmstrain_model::{Scalar, SwitchedModel, Symmetric};
 use ohmstrain_tests::sensor;
 
@@ -129,4 +131,112 @@ fn an_error_leaves_the_belief() {
     assert_eq!(refused(&mut lost, 0.1, 0.0), StepError::NonFiniteState);
     assert!(SparseEkf::<f64, Compact, 1, 3>::new(model, 0.0).is_err());
     assert!(SparseEkf::<f64, Compact, 1, 3>::new(model, f64::NAN).is_err());
+}
+
+/// Largest difference of smoothed beliefs from [`rts_smooth`] over the generic filter's steps: means in filtered deviations,
+/// covariances relative to the filtered diagonals.
+fn smoothed_differences<const B: usize, const N: usize, const L: usize>() -> f64 {
+    let model: SwitchedModel<f64, 2, B, N> = sensor();
+    let readings: Vec<_> =
+        (0..1500).map(|k| (k % 7 != 3).then(|| Reading { value: reading(k), extra_variance: 1e-7 })).collect();
+    let start = Belief::<f64, N, L>::initial(&model);
+
+    let (generic, prepared) = (Ekf::new(model), model.prepare(DT_S));
+    let mut belief = start;
+    let steps: Vec<_> = readings
+        .iter()
+        .map(|reading| {
+            let step = generic.step_prepared(&belief, &prepared, *reading).unwrap();
+            belief = step.posterior;
+            step
+        })
+        .collect();
+    let mut expected = vec![start; steps.len()];
+    rts_smooth(&steps, &mut expected);
+
+    let sparse = SparseEkf::<f64, Logistic, B, N>::new(model, DT_S).unwrap();
+    let mut beliefs = vec![start; readings.len()];
+    sparse.filter(&start, readings.iter().copied(), &mut beliefs).unwrap();
+    let filtered = beliefs.clone();
+    sparse.smooth(&readings, &mut beliefs).unwrap();
+    assert_eq!(beliefs.last(), filtered.last());
+    let mut worst = 0.0_f64;
+    for ((smoothed, expected), filtered) in beliefs.iter().zip(&expected).zip(&filtered) {
+        let sd = |i: usize| filtered.covariance[(i, i)].sqrt();
+        for i in 0..N {
+            worst = worst.max((smoothed.mean[i] - expected.mean[i]).abs() / sd(i));
+            for j in 0..=i {
+                let apart = (smoothed.covariance[(i, j)] - expected.covariance[(i, j)]).abs();
+                worst = worst.max(apart / (sd(i) * sd(j)));
+            }
+        }
+    }
+    worst
+}
+
+/// 1500 steps, each as far from the generic one as in the test above: 3000 ε. (No direction of these priors is so certain that
+/// `rts_step` leaves it out.)
+#[test]
+fn smooths_as_rauch_tung_and_striebel_do() {
+    for (n, difference) in [
+        (2, smoothed_differences::<0, 2, 3>()),
+        (3, smoothed_differences::<1, 3, 6>()),
+        (4, smoothed_differences::<1, 4, 10>()),
+        (6, smoothed_differences::<3, 6, 21>()),
+    ] {
+        assert!(difference < 1500.0 * 3000.0 * f64::EPSILON, "{n} states: {difference:e}");
+    }
+}
+
+#[test]
+fn series_are_the_steps_one_after_another() {
+    let model: SwitchedModel<f64, 2, 3, 6> = sensor();
+    let ekf = SparseEkf::<f64, Compact, 3, 6>::new(model, DT_S).unwrap();
+    let start = Belief::<f64, 6, 21>::initial(&model);
+    let readings: Vec<_> = (0..300).map(|k| (k % 5 != 2).then(|| Reading::from(reading(k)))).collect();
+    let (mut belief, mut sum) = (start, LogLikelihood::new());
+    let mut beliefs = Vec::new();
+    for reading in &readings {
+        if let Some(residual) = ekf.step(&mut belief, *reading).unwrap() {
+            sum.add(&residual);
+        }
+        beliefs.push(belief);
+    }
+    let mut filtered = vec![start; readings.len()];
+    assert_eq!(ekf.filter(&start, readings.iter().copied(), &mut filtered).unwrap(), sum.value());
+    assert_eq!(ekf.log_likelihood(&start, readings.iter().copied()).unwrap(), sum.value());
+    assert_eq!(filtered, beliefs);
+
+    let bad = [None, Some(Reading::from(f64::NAN))];
+    assert_eq!(ekf.log_likelihood(&start, bad), Err(StepError::NonFiniteReading));
+}
+
+/// A filter for another step length is the filter made for it; a cubic by itself is the cubic among other gauges.
+#[test]
+fn a_retimed_filter_is_a_new_one() {
+    let model: SwitchedModel<f64, 2, 3, 6> = sensor();
+    let mut ekf = SparseEkf::<f64, Compact, 3, 6, Cubic<f64>>::new(model, DT_S).unwrap();
+    let fresh = SparseEkf::<f64, Compact, 3, 6, Cubic<f64>>::new(model, 3.0 * DT_S).unwrap();
+    let same = ekf;
+    ekf.retime(DT_S).unwrap();
+    assert_eq!(ekf, same);
+    assert_eq!(ekf.retime(-DT_S), Err(StepError::NegativeTimeStep));
+    assert_eq!(ekf.retime(f64::NAN), Err(StepError::NonFiniteTimeStep));
+    assert_eq!(ekf, same);
+    ekf.retime(3.0 * DT_S).unwrap();
+    assert_eq!(ekf, fresh);
+
+    let any = SparseEkf::<f64, Compact, 3, 6>::new(model, DT_S).unwrap();
+    let (mut a, mut b) = (Belief::<f64, 6, 21>::initial(&model), Belief::<f64, 6, 21>::initial(&model));
+    for k in 0..300 {
+        // Beyond the range too, where both go on along the tangent.
+        let reading = Some(Reading::from(reading(k) + 0.002 * k as f64));
+        any.step(&mut a, reading).unwrap();
+        same.step(&mut b, reading).unwrap();
+    }
+    for i in 0..6 {
+        // 300 steps, each off by some roundings of numbers up to 1/sd ≈ 1e3 larger than what a deviation resolves.
+        let sd = a.covariance[(i, i)].sqrt();
+        assert!((a.mean[i] - b.mean[i]).abs() < 300.0 * 1e3 * f64::EPSILON * sd, "{i}");
+    }
 }

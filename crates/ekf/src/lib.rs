@@ -90,6 +90,8 @@ mod sparse;
 mod sparse_constants;
 mod sparse_parts;
 mod sparse_predict;
+mod sparse_series;
+mod sparse_smoother;
 mod sparse_update;
 mod switch;
 mod switching;

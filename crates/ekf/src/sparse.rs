@@ -41,10 +41,7 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
     /// # Errors
     /// If `dt_s` is not a positive number, or the model's gauge is of another family than `G`.
     pub fn new(model: SwitchedModel<T, 2, B, N>, dt_s: T) -> Result<Self, StepError> {
-        crate::ekf::check_time_step(dt_s)?;
-        if dt_s.is_zero() {
-            return Err(StepError::NegativeTimeStep);
-        }
+        check_step_length(dt_s)?;
         Ok(Self {
             step: StepConstants::new(&model, dt_s, RateSpread::<T, S>::clear()),
             gains: Gains::by_region(model.law()),
@@ -61,11 +58,26 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
     }
 
     /// Length of a step, s.
-    pub const fn dt_s(&self) -> T
-    where
-        T: Copy,
-    {
+    pub const fn dt_s(&self) -> T {
         self.dt_s
+    }
+
+    /// Goes on with steps of another length. The length it has costs a comparison; another one as much as a new filter.
+    ///
+    /// # Errors
+    /// If `dt_s` is not a positive number; the filter stays as it was.
+    #[inline]
+    pub fn retime(&mut self, dt_s: T) -> Result<(), StepError> {
+        if dt_s == self.dt_s { Ok(()) } else { self.set_time_step(dt_s) }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn set_time_step(&mut self, dt_s: T) -> Result<(), StepError> {
+        check_step_length(dt_s)?;
+        self.step = StepConstants::new(&self.model, dt_s, RateSpread::<T, S>::clear());
+        self.dt_s = dt_s;
+        Ok(())
     }
 
     /// Predicts one step ahead and takes the reading; without one it is a prediction and returns `None`.
@@ -79,13 +91,29 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
         reading: Option<Reading<T>>,
     ) -> Result<Option<Residual<T>>, StepError> {
         let mut parts = Parts::of(belief);
-        let spread = self.predict(&mut parts, None);
-        let residual = match reading {
-            Some(reading) => Some(self.update(&mut parts, reading, None, spread)?),
-            None if parts.is_sound::<N>(parts.variances::<N>()) => None,
-            None => return Err(StepError::NonFiniteState),
-        };
+        let residual = self.advance(&mut parts, reading)?;
         parts.put_into(belief);
         Ok(residual)
     }
+
+    /// [`Self::step`] of a belief taken apart; after an error `parts` means nothing.
+    #[inline(always)]
+    pub(crate) fn advance(
+        &self,
+        parts: &mut Parts<T, B>,
+        reading: Option<Reading<T>>,
+    ) -> Result<Option<Residual<T>>, StepError> {
+        let spread = self.predict(parts, None);
+        match reading {
+            Some(reading) => self.update(parts, reading, None, spread).map(Some),
+            None if parts.is_sound::<N>(parts.variances::<N>()) => Ok(None),
+            None => Err(StepError::NonFiniteState),
+        }
+    }
+}
+
+/// Refuses what is no length of a step that moves.
+fn check_step_length<T: Scalar>(dt_s: T) -> Result<(), StepError> {
+    crate::ekf::check_time_step(dt_s)?;
+    if dt_s.is_zero() { Err(StepError::NegativeTimeStep) } else { Ok(()) }
 }

@@ -132,6 +132,7 @@ impl<T: Scalar, const B: usize> Parts<T, B> {
 
     /// Whether a step has left numbers: no variance is negative and nothing is infinite or not a number. `extra` is a number
     /// that shall be finite too.
+    #[allow(clippy::eq_op, reason = "a number minus itself is zero only if it is finite")]
     #[inline(always)]
     pub(crate) fn is_sound<const N: usize>(&self, extra: T) -> bool {
         let zero = T::zero();

@@ -10,13 +10,13 @@ use crate::{SparseEkf, Switch};
 /// What a step does to one branch. The gain grows with the sum of old and new strain: the old one's share is in `row`, the
 /// new one's is added when its covariances are known.
 #[derive(Clone, Copy)]
-struct Driven<T> {
+pub(crate) struct Driven<T> {
     change: T,
     gain: T,
     /// Growth of the change with old or new strain.
-    pull: T,
+    pub pull: T,
     /// Answer to old strain and rate.
-    row: [T; 2],
+    pub row: [T; 2],
     /// What is left of the covariances with old strain and rate, and these with what the motion adds.
     kept: [T; 2],
     carried: [T; 2],
@@ -33,6 +33,12 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G> SparseEkf<T, S,
             self.hold(parts);
             return RateSpread::new(T::zero());
         }
+        self.move_on(parts, phase).0
+    }
+
+    /// The prediction of a step that moves, and what it did to the branches.
+    #[inline(always)]
+    pub(crate) fn move_on(&self, parts: &mut Parts<T, B>, phase: Option<Phase>) -> (RateSpread<T, S>, [Driven<T>; B]) {
         let step = &self.step;
         let [a, b] = step.motion;
         let Parts { strain, rate, strain_variance, strain_rate, rate_variance, .. } = *parts;
@@ -74,7 +80,7 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G> SparseEkf<T, S,
         if Self::HAS_BASELINE {
             predict_baseline(step, &mut parts.baseline, &driven);
         }
-        spread
+        (spread, driven)
     }
 
     /// Predicts one step of a hold: strain stays, there is no rate, branches and baseline relax.

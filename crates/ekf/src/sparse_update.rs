@@ -6,6 +6,22 @@ use crate::sparse_parts::{Part, Parts};
 use crate::switch::RateSpread;
 use crate::{Curve, Reading, Residual, SparseEkf, StepError, Switch};
 
+/// A reading beside its prediction.
+#[derive(Clone, Copy)]
+pub(crate) struct Compared<T, const B: usize> {
+    /// Derivatives of the reading by strain and rate; those by branches and baseline are one.
+    pub slope: T,
+    pub viscosity: T,
+    /// Covariances of the state with the reading.
+    pub strain: T,
+    pub rate: T,
+    pub branches: [T; B],
+    pub baseline: T,
+    /// Variance S of the innovation.
+    pub variance: T,
+    pub innovation: T,
+}
+
 /// How the reading depends on the state.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ReadingLaw<T, G> {
@@ -39,8 +55,8 @@ impl<T: Scalar, G: Curve<T>> ReadingLaw<T, G> {
         let (extend, retract) = (self.extend_viscosity_s, self.retract_viscosity_s);
         let viscosity = match phase {
             Some(Phase::Hold) => return (gauge, slope, T::zero()),
-            Some(phase) if phase == Phase::Extend => extend,
-            Some(_) => retract,
+            Some(Phase::Extend) => extend,
+            Some(Phase::Retract) => retract,
             None if rate * rate < RateSpread::<T, S>::clear() * spread.variance => {
                 let split: SplitRate<T> = spread.blend(rate);
                 let expected = gauge + extend * split.extend + retract * split.retract;
@@ -62,8 +78,54 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
         parts: &mut Parts<T, B>,
         reading: Reading<T>,
         phase: Option<Phase>,
-        mut spread: RateSpread<T, S>,
+        spread: RateSpread<T, S>,
     ) -> Result<Residual<T>, StepError> {
+        let Compared { strain, rate, branches, baseline, variance, innovation, .. } =
+            self.compare(parts, reading, phase, spread);
+        let per_variance = T::one() / variance;
+        let scaled = innovation * per_variance;
+        let nis = innovation * scaled;
+        let (strain_gain, rate_gain) = (strain * per_variance, rate * per_variance);
+        let take = |part: &mut Part<T, B>, own: T, others: usize| {
+            let gain = own * per_variance;
+            part.mean += own * scaled;
+            part.with_strain -= gain * strain;
+            part.with_rate -= gain * rate;
+            for (with, other) in part.with.iter_mut().zip(&branches).take(others) {
+                *with -= gain * *other;
+            }
+            part.variance -= gain * own;
+        };
+        parts.strain += strain * scaled;
+        parts.rate += rate * scaled;
+        parts.strain_variance -= strain_gain * strain;
+        parts.strain_rate -= rate_gain * strain;
+        parts.rate_variance -= rate_gain * rate;
+        for i in 0..B {
+            take(&mut parts.branches[i], branches[i], i);
+        }
+        if Self::HAS_BASELINE {
+            take(&mut parts.baseline, baseline, B);
+        }
+
+        // S and ν²/S finite, S above zero: then everything before was finite. No variance below zero: then no gain can have
+        // left the range of the numbers (Cauchy-Schwarz), and the means are all that is left to look at.
+        if variance > T::zero() && parts.is_sound::<N>(variance + nis) {
+            Ok(Residual { innovation, variance, nis })
+        } else {
+            Err(refusal(reading, innovation, variance))
+        }
+    }
+
+    /// Compares a reading with its prediction.
+    #[inline(always)]
+    pub(crate) fn compare(
+        &self,
+        parts: &Parts<T, B>,
+        reading: Reading<T>,
+        phase: Option<Phase>,
+        mut spread: RateSpread<T, S>,
+    ) -> Compared<T, B> {
         let law = &self.reading;
         let (mut expected, slope, viscosity) = law.of_motion(parts.strain, parts.rate, phase, &mut spread);
 
@@ -103,39 +165,7 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
         }
 
         let innovation = reading.value - expected;
-        let per_variance = T::one() / variance;
-        let scaled = innovation * per_variance;
-        let nis = innovation * scaled;
-        let (strain_gain, rate_gain) = (strain * per_variance, rate * per_variance);
-        let take = |part: &mut Part<T, B>, own: T, others: usize| {
-            let gain = own * per_variance;
-            part.mean += own * scaled;
-            part.with_strain -= gain * strain;
-            part.with_rate -= gain * rate;
-            for (with, other) in part.with.iter_mut().zip(&branches).take(others) {
-                *with -= gain * *other;
-            }
-            part.variance -= gain * own;
-        };
-        parts.strain += strain * scaled;
-        parts.rate += rate * scaled;
-        parts.strain_variance -= strain_gain * strain;
-        parts.strain_rate -= rate_gain * strain;
-        parts.rate_variance -= rate_gain * rate;
-        for i in 0..B {
-            take(&mut parts.branches[i], branches[i], i);
-        }
-        if Self::HAS_BASELINE {
-            take(&mut parts.baseline, baseline, B);
-        }
-
-        // S and ν²/S finite, S above zero: then everything before was finite. No variance below zero: then no gain can have
-        // left the range of the numbers (Cauchy-Schwarz), and the means are all that is left to look at.
-        if variance > T::zero() && parts.is_sound::<N>(variance + nis) {
-            Ok(Residual { innovation, variance, nis })
-        } else {
-            Err(refusal(reading, innovation, variance))
-        }
+        Compared { slope, viscosity, strain, rate, branches, baseline, variance, innovation }
     }
 }
 

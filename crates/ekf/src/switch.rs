@@ -72,7 +72,7 @@ impl<T: Scalar> Switch<T> for Compact {
         CompactWidth::new(rate_variance, |square| square.sqrt())
     }
 
-    #[inline(always)]
+    #[inline]
     fn blend(rate: T, CompactWidth { width, per_width, per_square }: CompactWidth<T>) -> SplitRate<T> {
         let half = T::of(0.5);
         // Polynomials in u² do not wait for the root.

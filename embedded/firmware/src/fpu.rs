@@ -18,7 +18,7 @@ impl Switch<f32> for OnFpu {
         CompactWidth::new(rate_variance, root)
     }
 
-    #[inline(always)]
+    #[inline]
     fn blend(rate: f32, width: CompactWidth<f32>) -> SplitRate<f32> {
         Compact::blend(rate, width)
     }
