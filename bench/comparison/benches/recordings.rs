@@ -6,8 +6,8 @@ use std::hint::black_box;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use nalgebra::SVector;
 use ohmstrain_bench_comparison::{RecordingPass, adskalman_smoother, simulated_recording, typed_kalman_smoother};
-use ohmstrain_bench_filters::{DT_S, linearised, log_likelihood, readings, sensor, smoother};
-use ohmstrain_ekf::{Belief, SparseEkf};
+use ohmstrain_bench_filters::{DT_S, linearised, log_likelihood, readings, sensor, smoother, sparse_smooth};
+use ohmstrain_ekf::{Belief, Reading, SparseEkf};
 
 const ROWS: usize = 10_000;
 
@@ -25,6 +25,10 @@ fn recordings(criterion: &mut Criterion) {
     group.bench_function("smoother_3_steps_kept", |bencher| bencher.iter(|| ours.with_steps(black_box(&rows))));
     let ekf = SparseEkf::new(model, DT_S).expect("the step's length is positive");
     let start = Belief::initial(&model);
+    let taken: Vec<_> = rows.iter().map(|y| Some(Reading::from(*y))).collect();
+    group.bench_function("sparse_smoother_3", |bencher| {
+        bencher.iter(|| sparse_smooth(black_box(&ekf), &start, black_box(&taken)));
+    });
     group.bench_function("log_likelihood_3", |bencher| {
         bencher.iter(|| log_likelihood(black_box(&ekf), &start, black_box(&rows)));
     });

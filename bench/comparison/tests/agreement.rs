@@ -7,9 +7,9 @@ use ohmstrain_bench_comparison::{
 };
 use ohmstrain_bench_filters::{
     DT_S, Filter, Freezing, Gated, GatedSparse, LinearModel, PackedReference, RANGE, STEPS, Visitor, ekf, every_filter,
-    linear_sensor, linearised, log_likelihood, readings, sensor, smoother, strain_at,
+    linear_sensor, linearised, log_likelihood, readings, sensor, smoother, sparse_smooth, strain_at,
 };
-use ohmstrain_ekf::{Belief, Ekf, SparseEkf, Unscented};
+use ohmstrain_ekf::{Belief, Ekf, Reading, SparseEkf, Unscented};
 
 /// A filter forgets its rounding in some hundred steps; a step leaves some 30 ε of quantities that are up to 10⁴ times
 /// larger than what the difference P - K S Kᵀ leaves of them: 10² · 30 · 10⁴ ε = 7e-9 of a strain of 0.1.
@@ -90,7 +90,11 @@ fn all_smoothers_agree_on_the_linear_sensor() {
     // The end is the filter's, the rest is not: a smoother that did nothing would not pass.
     assert!((expected[STEPS - 1] - filtered[STEPS - 1]).abs() < TOLERANCE);
     assert!(expected.iter().zip(&filtered).any(|(a, b)| (a - b).abs() > 1e-3));
+    let sparse = SparseEkf::new(linear_sensor(), DT_S).unwrap();
+    let taken: Vec<_> = readings.iter().map(|y| Some(Reading::from(*y))).collect();
+    let smoothed = sparse_smooth(&sparse, &Belief::initial(&linear_sensor()), &taken);
     for (name, strains) in [
+        ("sparse", smoothed.iter().map(|belief| belief.mean[0]).collect()),
         ("in place", ours.in_place(&readings).iter().map(|belief| belief.mean[0]).collect::<Vec<_>>()),
         ("steps kept", ours.with_steps(&readings).iter().map(|belief| belief.mean[0]).collect()),
         ("typed-kalman", typed_kalman_smoother(&model)(&readings).unwrap().iter().map(|s| s.x[0]).collect()),

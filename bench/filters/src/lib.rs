@@ -10,7 +10,7 @@ mod sparse;
 
 pub use estimators::{Freezing, Gated, STEPS, ekf, every_filter};
 pub use readings::{readings, strain_at};
-pub use recordings::{Smoother, log_likelihood, smoother};
+pub use recordings::{Smoother, log_likelihood, smoother, sparse_smooth};
 pub use reference::PackedReference;
 pub use sensor::{DT_S, LinearModel, RANGE, linear_sensor, linearised, phased_sensor, sensor};
 pub use sparse::GatedSparse;

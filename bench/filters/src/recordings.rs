@@ -1,6 +1,6 @@
 //! What is done with a whole recording at a fixed rate.
 
-use ohmstrain_ekf::{Belief, Compact, Dynamics, Ekf, Estimator, LogLikelihood, Reading, SparseEkf, rts_smooth_vec};
+use ohmstrain_ekf::{Belief, Compact, Dynamics, Ekf, Estimator, Reading, SparseEkf, rts_smooth_vec};
 use ohmstrain_model::{SwitchedModel, SwitchedStep};
 
 use crate::DT_S;
@@ -60,15 +60,24 @@ impl Smoother {
     }
 }
 
+/// Filter and smoother without multiplications by zero, in place.
+///
+/// # Panics
+/// If a step fails.
+#[must_use]
+pub fn sparse_smooth(
+    ekf: &SparseEkf<f64, Compact, 1, 3>,
+    start: &Belief<f64, 3, 6>,
+    readings: &[Option<Reading<f64>>],
+) -> Vec<Belief<f64, 3, 6>> {
+    let mut beliefs = vec![*start; readings.len()];
+    ekf.filter(start, readings.iter().copied(), &mut beliefs).expect("the readings are finite");
+    ekf.smooth(readings, &mut beliefs).expect("the filtered beliefs are sound");
+    beliefs
+}
+
 /// The log-likelihood of a recording under the EKF of three states; NaN if a step fails.
 #[must_use]
 pub fn log_likelihood(ekf: &SparseEkf<f64, Compact, 1, 3>, start: &Belief<f64, 3, 6>, readings: &[f64]) -> f64 {
-    let (mut belief, mut sum) = (*start, LogLikelihood::new());
-    for reading in readings {
-        match ekf.step(&mut belief, Some(Reading::from(*reading))) {
-            Ok(Some(residual)) => sum.add(&residual),
-            _ => return f64::NAN,
-        }
-    }
-    sum.value()
+    ekf.log_likelihood(start, readings.iter().map(|y| Some(Reading::from(*y)))).unwrap_or(f64::NAN)
 }

@@ -2,7 +2,8 @@
 
 use nalgebra::SVector;
 use ohmstrain_bench_comparison::{adskalman_smoother, typed_kalman_smoother};
-use ohmstrain_bench_filters::{linearised, readings, sensor, smoother};
+use ohmstrain_bench_filters::{DT_S, linearised, readings, sensor, smoother, sparse_smooth};
+use ohmstrain_ekf::{Belief, Reading, SparseEkf};
 use peak_alloc::PeakAlloc;
 
 #[global_allocator]
@@ -16,6 +17,10 @@ fn main() {
     let ours = smoother(sensor::<1, 3>());
     peak("smoother_3", || ours.in_place(&rows));
     peak("smoother_3_steps_kept", || ours.with_steps(&rows));
+    let model = sensor::<1, 3>();
+    let ekf = SparseEkf::new(model, DT_S).expect("the step's length is positive");
+    let taken: Vec<_> = rows.iter().map(|y| Some(Reading::from(*y))).collect();
+    peak("sparse_smoother_3", || sparse_smooth(&ekf, &Belief::initial(&model), &taken));
     let theirs = adskalman_smoother(&linearised());
     peak("adskalman_smoother_3", || theirs(&vectors));
     let theirs = typed_kalman_smoother(&linearised());

@@ -15,8 +15,10 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use budget::{Budget, Counts};
-use ohmstrain_bench_filters::{DT_S, Filter, STEPS, Visitor, every_filter, log_likelihood, readings, sensor, smoother};
-use ohmstrain_ekf::{Belief, SparseEkf};
+use ohmstrain_bench_filters::{
+    DT_S, Filter, STEPS, Visitor, every_filter, log_likelihood, readings, sensor, smoother, sparse_smooth,
+};
+use ohmstrain_ekf::{Belief, Reading, SparseEkf};
 
 fn main() -> Result<ExitCode, Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -72,6 +74,10 @@ fn each(see: &mut dyn FnMut(&'static str, &mut dyn FnMut())) {
     });
     let ekf = SparseEkf::new(model, DT_S).expect("the step's length is positive");
     let start = Belief::initial(&model);
+    let taken: Vec<_> = recording.iter().map(|y| Some(Reading::from(*y))).collect();
+    see("sparse_smoother_3", &mut || {
+        black_box(counted(|| sparse_smooth(black_box(&ekf), &start, black_box(&taken))));
+    });
     see("log_likelihood_3", &mut || {
         black_box(counted(|| log_likelihood(black_box(&ekf), &start, black_box(&recording))));
     });
