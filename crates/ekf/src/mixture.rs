@@ -39,14 +39,17 @@ pub(crate) enum Added {
 
 /// When two hypotheses of one phase count as one: squared distance of their strains plus that of their rates, each in
 /// units of the larger variance.
-const ALIKE: f64 = 0.5;
+pub(crate) const ALIKE: f64 = 0.5;
 /// Hypotheses lighter than the heaviest by this factor, e⁻¹², are dropped.
 const NEGLIGIBLE: f64 = 12.0;
+/// The same factor as a number.
+pub(crate) const LEAST_WEIGHT: f64 = 6.144_212_353_328_21e-6;
 /// A hypothesis that has left the limits altogether is no less likely than this.
-const LEAST_INSIDE: f64 = 1e-9;
+pub(crate) const LEAST_INSIDE: f64 = 1e-9;
 
 impl<T: Real, const N: usize, const L: usize, const K: usize> Mixture<T, N, L, K> {
-    const CAPACITY: () = assert!(K >= 1 && N >= 2, "a mixture holds at least one component of strain and rate");
+    pub(crate) const CAPACITY: () =
+        assert!(K >= 1 && N >= 2, "a mixture holds at least one component of strain and rate");
 
     /// One hypothesis that has all the weight.
     #[must_use]

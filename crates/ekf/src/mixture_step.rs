@@ -1,4 +1,4 @@
-use ohmstrain_model::{Phase, StrainRange};
+use ohmstrain_model::{Phase, Scalar, StrainRange};
 
 use crate::ekf::update;
 use crate::estimator::Innovation;
@@ -37,8 +37,37 @@ pub(crate) struct Candidates<'a, T, M, R, const N: usize, const L: usize, const 
     reading: Option<Reading<T>>,
     recorder: R,
     children: Mixture<T, N, L, K>,
-    /// Moments of the predicted reading: sum of probabilities, of values, of squares and variances.
-    predicted: [T; 3],
+    predicted: Predicted<T>,
+}
+
+/// The reading compared with all predictions of it. Sums are taken of innovations, not of predicted readings: the variance
+/// shall not be the small difference of two squares of the whole reading.
+#[derive(Clone, Copy)]
+pub(crate) struct Predicted<T> {
+    weight: T,
+    innovation: T,
+    square: T,
+}
+
+impl<T: Scalar> Predicted<T> {
+    #[inline(always)]
+    pub(crate) fn new() -> Self {
+        Self { weight: T::zero(), innovation: T::zero(), square: T::zero() }
+    }
+
+    /// One hypothesis of probability `weight`: its innovation, and the variance of that.
+    #[inline(always)]
+    pub(crate) fn add(&mut self, weight: T, innovation: T, variance: T) {
+        self.weight += weight;
+        self.innovation += weight * innovation;
+        self.square += weight * (variance + innovation * innovation);
+    }
+
+    /// Mean and variance of the innovation.
+    pub(crate) fn moments(&self) -> (T, T) {
+        let innovation = self.innovation / self.weight;
+        (innovation, self.square / self.weight - innovation * innovation)
+    }
 }
 
 /// What a child is made of.
@@ -54,7 +83,7 @@ pub(crate) struct Origin<'a, T, const N: usize, const L: usize> {
 }
 
 /// A cut that leaves less than this of a prediction is not followed: its moments would be those of a far tail.
-const LEAST_MASS: f64 = 1e-3;
+pub(crate) const LEAST_MASS: f64 = 1e-3;
 
 impl<'a, T, M, R, const N: usize, const L: usize, const K: usize> Candidates<'a, T, M, R, N, L, K>
 where
@@ -63,7 +92,7 @@ where
     R: Recorder<T, N, L>,
 {
     pub(crate) fn new(model: &'a M, evidence: &'a Evidence<T>, reading: Option<Reading<T>>, recorder: R) -> Self {
-        Self { model, evidence, reading, recorder, children: Mixture::empty(), predicted: [T::zero(); 3] }
+        Self { model, evidence, reading, recorder, children: Mixture::empty(), predicted: Predicted::new() }
     }
 
     /// A child; `cut` restricts its prediction and says how much of it that leaves.
@@ -117,11 +146,7 @@ where
     fn update(&mut self, child: &mut Component<T, N, L>, reading: Reading<T>) -> Result<(), StepError> {
         let observation = self.model.observe(&child.belief, Some(child.phase));
         let (posterior, update) = update(&child.belief, observation, reading)?;
-        let weight = child.log_weight.exp();
-        let expected = update.observation.value;
-        self.predicted[0] += weight;
-        self.predicted[1] += weight * expected;
-        self.predicted[2] += weight * (update.innovation_variance + expected * expected);
+        self.predicted.add(child.log_weight.exp(), update.innovation, update.innovation_variance);
         child.belief = posterior;
         child.log_weight += self.evidence.tempering * update.log_likelihood;
         Ok(())
@@ -129,10 +154,9 @@ where
 
     pub(crate) fn finish(mut self) -> Result<MixtureStep<T, N, L, K>, StepError> {
         let log_likelihood = self.children.normalise(&mut self.recorder)?;
-        let [total, first, second] = self.predicted;
-        let innovation = self.reading.map(|reading| {
-            let mean = first / total;
-            Innovation { value: reading.value - mean, variance: second / total - mean * mean, log_likelihood }
+        let innovation = self.reading.map(|_| {
+            let (value, variance) = self.predicted.moments();
+            Innovation { value, variance, log_likelihood }
         });
         let nis = innovation.map(|innovation| innovation.nis());
         Ok(MixtureStep { posterior: self.children, log_likelihood, nis, innovation })

@@ -89,11 +89,11 @@ impl<T: Real, M, const K: usize> SignSplit<T, M, K> {
 }
 
 /// Deviations of the rate beyond zero at which less than a thousandth of the prediction is left, too little to follow.
-const HOPELESS: f64 = 3.090_232_306_167_813_5;
+pub(crate) const HOPELESS: f64 = 3.090_232_306_167_813_5;
 
 /// Probabilities of the phases that follow `phase`, in the order of [`Phase::ALL`]. Whether a moving body stretches or
 /// releases is for the cut to say.
-fn follows<T: Real>(chain: Option<&[[T; 3]; 3]>, phase: Phase) -> [T; 3] {
+pub(crate) fn follows<T: Real>(chain: Option<&[[T; 3]; 3]>, phase: Phase) -> [T; 3] {
     match (chain, phase) {
         (None, _) => [T::one(), T::zero(), T::one()],
         (Some(chain), Phase::Hold) => chain[1],

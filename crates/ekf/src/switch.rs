@@ -13,6 +13,12 @@ pub trait Switch<T: Scalar> {
 
     /// Splits a rate that is not clear, 1/s.
     fn blend(rate: T, width: Self::Width) -> SplitRate<T>;
+
+    /// The square root that filters of hypotheses take of variances; as for [`CompactWidth::new`].
+    #[inline(always)]
+    fn root(square: T) -> T {
+        square.sqrt()
+    }
 }
 
 /// The logistic distribution, as the generic path has it ([`Direction::Uncertain`]): an exponential and a logarithm for

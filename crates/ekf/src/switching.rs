@@ -28,19 +28,22 @@ pub(crate) fn enter<T: Scalar, M: Phased<T, N, L>, const N: usize, const L: usiz
 /// Mean and variance of |x| for a standard normal x: √(2/π) and 1 - 2/π.
 const HALF_NORMAL: (f64, f64) = (0.797_884_560_802_865_4, 0.363_380_227_632_418_6);
 
+/// The rate that a moving phase begins with; of no meaning for a hold.
+pub(crate) fn fresh_rate<T: Scalar, const M: usize>(motion: &Motion<T, M>, phase: Phase) -> Gaussian<T> {
+    let sign = if phase == Phase::Retract { -T::one() } else { T::one() };
+    let variance = motion.stationary_variance()[1];
+    if motion.phase_rate() > T::zero() {
+        return Gaussian { mean: sign * motion.phase_rate(), variance };
+    }
+    Gaussian { mean: sign * T::of(HALF_NORMAL.0) * variance.sqrt(), variance: T::of(HALF_NORMAL.1) * variance }
+}
+
 /// Draws rate and acceleration anew from the motion's prior of a phase.
 fn renew<T: Scalar, const M: usize, const N: usize, const L: usize>(
     motion: &Motion<T, M>,
     from: &Belief<T, N, L>,
     phase: Phase,
 ) -> Belief<T, N, L> {
-    let sign = if phase == Phase::Retract { -T::one() } else { T::one() };
-    let rate_variance = motion.stationary_variance()[1];
-    let rate = if motion.phase_rate() > T::zero() {
-        Gaussian { mean: motion.phase_rate(), variance: rate_variance }
-    } else {
-        Gaussian { mean: T::of(HALF_NORMAL.0) * rate_variance.sqrt(), variance: T::of(HALF_NORMAL.1) * rate_variance }
-    };
     let mut out = *from;
     for i in 1..M {
         for j in 0..N {
@@ -49,7 +52,8 @@ fn renew<T: Scalar, const M: usize, const N: usize, const L: usize>(
         out.mean[i] = T::zero();
         out.covariance[(i, i)] = motion.stationary_variance()[i];
     }
-    out.mean[1] = sign * rate.mean;
+    let rate = fresh_rate(motion, phase);
+    out.mean[1] = rate.mean;
     out.covariance[(1, 1)] = rate.variance;
     out
 }

@@ -2,7 +2,10 @@
 
 use core::hint::black_box;
 
-use ohmstrain_ekf::{Belief, Cubic, Dwell, Ekf, Evidence, Imm, Mixture, Reading, Real, SignSplit, SparseEkf, Switch};
+use ohmstrain_ekf::{
+    Belief, Cubic, Dwell, Ekf, Evidence, Imm, Mixture, PhaseMixture, Reading, Real, SignMixture, SignSplit, SparseEkf,
+    SparseImm, SparseSignSplit, Switch,
+};
 use ohmstrain_model::{ParameterError, Phase, Problem, Scalar, SwitchedModel, SwitchedStep};
 
 use crate::fpu::OnFpu;
@@ -176,37 +179,84 @@ impl<T: Real> Filter<T> for SplitFour<T> {
     }
 }
 
-/// The EKF that leaves out the zeros, at a fixed rate.
+/// A filter of the sensor's own model that leaves out the zeros, at a fixed rate, and its state, which changes in place.
 #[derive(Clone, Copy)]
-pub struct FastEkf<T: Scalar, const B: usize, const N: usize, const L: usize> {
-    ekf: SparseEkf<T, OnFpu, B, N, Cubic<T>>,
-    belief: Belief<T, N, L>,
+pub struct Fast<F, S> {
+    filter: F,
+    state: S,
 }
 
-/// Strain, rate, one branch.
-pub type Fast3<T> = FastEkf<T, 1, 3, 6>;
-/// Strain, rate, three branches, baseline.
-pub type Fast6<T> = FastEkf<T, 3, 6, 21>;
+/// The EKF that leaves out the zeros, with the unit's square root and a gauge that is a polynomial.
+type Kernel<T, const B: usize, const N: usize> = SparseEkf<T, OnFpu, B, N, Cubic<T>>;
+type FastImm<T, const B: usize, const N: usize> = SparseImm<T, B, N, OnFpu, Cubic<T>>;
+type FastSplit<T, const B: usize, const N: usize, const K: usize> = SparseSignSplit<T, B, N, K, OnFpu, Cubic<T>>;
 
-impl<T: Scalar, const B: usize, const N: usize, const L: usize> Filter<T> for FastEkf<T, B, N, L>
+/// Strain, rate, one branch.
+pub type Fast3<T> = Fast<Kernel<T, 1, 3>, Belief<T, 3, 6>>;
+/// Strain, rate, three branches, baseline.
+pub type Fast6<T> = Fast<Kernel<T, 3, 6>, Belief<T, 6, 21>>;
+/// Three phases of those six states.
+pub type FastImm6<T> = Fast<FastImm<T, 3, 6>, PhaseMixture<T, 6, 21>>;
+/// Four hypotheses of them, split by the sign of the rate.
+pub type FastSplit6<T> = Fast<FastSplit<T, 3, 6, 4>, SignMixture<T, 6, 21, 4>>;
+
+fn kernel<T: Scalar, const B: usize, const N: usize>() -> Result<Kernel<T, B, N>, ParameterError>
 where
     OnFpu: Switch<T>,
 {
-    fn start() -> Result<Self, ParameterError> {
-        let model = black_box(sensor()?);
-        let step = SparseEkf::new(model, T::of(DT_S)).map_err(|_| ParameterError::new("dt_s", Problem::NotPositive))?;
-        Ok(Self { ekf: step, belief: Belief::initial(&model) })
-    }
-
-    fn step(&mut self, reading: Reading<T>) -> bool {
-        self.ekf.step(&mut self.belief, Some(reading)).is_ok()
-    }
-
-    fn strain(&self) -> T {
-        self.belief.mean[0]
-    }
-
-    fn state_bytes() -> usize {
-        size_of::<Belief<T, N, L>>()
-    }
+    SparseEkf::new(black_box(sensor()?), T::of(DT_S)).map_err(|_| ParameterError::new("dt_s", Problem::NotPositive))
 }
+
+/// [`Filter`] for these: they differ in how they start and where they keep the strain.
+macro_rules! fast_filter {
+    (
+        <T: $scalar:ident $(, const $n:ident)*> $filter:ty, $state:ty,
+        |$kernel:ident| $start:expr, |$of:ident| $strain:expr
+    ) => {
+        impl<T: $scalar $(, const $n: usize)*> Filter<T> for Fast<$filter, $state>
+        where
+            OnFpu: Switch<T>,
+        {
+            fn start() -> Result<Self, ParameterError> {
+                let $kernel = kernel()?;
+                let (state, filter) = $start;
+                Ok(Self { filter, state })
+            }
+
+            fn step(&mut self, reading: Reading<T>) -> bool {
+                self.filter.step(&mut self.state, Some(reading)).is_ok()
+            }
+
+            fn strain(&self) -> T {
+                let $of = &self.state;
+                $strain
+            }
+
+            fn state_bytes() -> usize {
+                size_of::<$state>()
+            }
+        }
+    };
+}
+
+fast_filter!(
+    <T: Scalar, const B, const N, const L> Kernel<T, B, N>, Belief<T, N, L>,
+    |kernel| (Belief::initial(kernel.model()), kernel),
+    |belief| belief.mean[0]
+);
+fast_filter!(
+    <T: Real, const B, const N, const L> FastImm<T, B, N>, PhaseMixture<T, N, L>,
+    |kernel| (
+        PhaseMixture::single(Belief::initial(kernel.model()), Phase::Hold),
+        SparseImm::around(kernel, black_box(dwell()?), black_box(evidence()))
+    ),
+    |mixture| mixture.marginal(0).mean
+);
+fast_filter!(
+    <T: Real, const B, const N, const L, const K> FastSplit<T, B, N, K>, SignMixture<T, N, L, K>,
+    |kernel| (
+        SignMixture::single(Belief::initial(kernel.model()), Phase::Extend),
+        SparseSignSplit::around(kernel, None, black_box(evidence()))
+    ),
+    |mixture| mixture.marginal(0).mean
+);

@@ -22,6 +22,11 @@ impl Switch<f32> for OnFpu {
     fn blend(rate: f32, width: CompactWidth<f32>) -> SplitRate<f32> {
         Compact::blend(rate, width)
     }
+
+    #[inline(always)]
+    fn root(square: f32) -> f32 {
+        root(square)
+    }
 }
 
 /// The reference on the host.

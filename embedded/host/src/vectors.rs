@@ -5,19 +5,23 @@ use std::fmt::Write;
 use std::fs;
 use std::path::Path;
 
-use ohmstrain_firmware::{Ekf3, Ekf6, Fast3, Fast6, Filter, Imm6, SplitFour, VaryingEkf3, front_end, to_reading};
+use ohmstrain_firmware::{
+    Ekf3, Ekf6, Fast3, Fast6, Filter, Imm6, SplitFour, VaryingEkf3, front_end, to_reading,
+};
 
 use crate::codes::{SEED, codes};
 
 /// Programs, in the order of the table, and the filter of the library whose `f64` strain is the reference of each.
-pub const PROGRAMS: [(&str, &str); 7] = [
+pub const PROGRAMS: [(&str, &str); 9] = [
     ("ekf3", "ekf3"),
     ("ekf3_varying", "ekf3_varying"),
     ("fast3", "fast3"),
     ("ekf6", "ekf6"),
     ("fast6", "fast6"),
     ("imm6", "imm6"),
+    ("fast_imm6", "imm6"),
     ("split6", "split6"),
+    ("fast_split6", "split6"),
 ];
 
 const REFERENCES: [&str; 7] = ["ekf3", "ekf3_varying", "fast3", "ekf6", "fast6", "imm6", "split6"];

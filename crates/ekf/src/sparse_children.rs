@@ -1,0 +1,121 @@
+use ohmstrain_model::{Phase, Symmetric};
+
+use crate::gaussian::Real;
+use crate::mixture::{ALIKE, LEAST_WEIGHT};
+use crate::sparse_evidence::Weight;
+use crate::sparse_mixture::{Share, SignMixture};
+use crate::sparse_parts::Parts;
+use crate::{Belief, StepError};
+
+/// Collects the children of a step: keeps, merges and drops them as [`Mixture`](crate::Mixture) does.
+pub(crate) struct Children<T, const N: usize, const L: usize, const K: usize> {
+    kept: SignMixture<T, N, L, K>,
+    /// The largest exponent so far; weights are in units of its exponential. What is so much lighter that it has become
+    /// zero would be dropped in the end.
+    exponent: T,
+}
+
+impl<T: Real, const N: usize, const L: usize, const K: usize> Children<T, N, L, K> {
+    #[inline(always)]
+    pub(crate) fn new() -> Self {
+        Self { kept: SignMixture::empty(), exponent: T::zero() }
+    }
+
+    /// Adds a child: merged with one that says the same, in a free place, or in the place of the lightest.
+    pub(crate) fn add<const B: usize>(&mut self, child: &Parts<T, B>, phase: Phase, weight: Weight<T>, log_inside: T) {
+        self.raise_to(weight.exponent);
+        let weight = weight.relative_to(self.exponent);
+        let like = self.kept.iter_mut().find(|(share, known)| **known == phase && share.is_like(child));
+        if let Some((like, _)) = like {
+            like.merge(child, weight, log_inside);
+        } else if let Some((place, of)) = self.room(weight) {
+            (place.weight, place.log_inside, *of) = (weight, log_inside, phase);
+            child.put_into(&mut place.belief);
+        }
+    }
+
+    /// A free place, or that of the lightest if it is lighter than `weight`.
+    fn room(&mut self, weight: T) -> Option<(&mut Share<T, N, L>, &mut Phase)> {
+        if self.kept.shares().len() < K {
+            return self.kept.one_more();
+        }
+        let lighter = |a, b| if Self::weight_of(&b) < Self::weight_of(&a) { b } else { a };
+        self.kept.iter_mut().reduce(lighter).filter(|lightest| lightest.0.weight < weight)
+    }
+
+    fn weight_of(place: &(&mut Share<T, N, L>, &mut Phase)) -> T {
+        place.0.weight
+    }
+
+    /// Makes room for a larger exponent: the weights so far are given in units of its exponential.
+    fn raise_to(&mut self, exponent: T) {
+        let first = self.kept.shares().is_empty();
+        if first || exponent > self.exponent {
+            let fewer = if first { T::one() } else { (self.exponent - exponent).exp() };
+            for (share, _) in self.kept.iter_mut() {
+                share.weight *= fewer;
+            }
+            self.exponent = exponent;
+        }
+    }
+
+    /// Makes the probabilities sum to one and drops what is negligible; the sum before.
+    pub(crate) fn normalise(&mut self) -> Result<Weight<T>, StepError> {
+        let heaviest = self.kept.shares().iter().fold(T::zero(), |a, b| if b.weight > a { b.weight } else { a });
+        let least = heaviest * T::of(LEAST_WEIGHT);
+        self.kept.retain(|share| share.weight > least);
+        let factor = self.kept.shares().iter().fold(T::zero(), |sum, share| sum + share.weight);
+        if !(factor > T::zero() && factor.is_finite()) {
+            return Err(StepError::NonFiniteState);
+        }
+        let per_sum = T::one() / factor;
+        for (share, _) in self.kept.iter_mut() {
+            share.weight *= per_sum;
+        }
+        Ok(Weight { factor, exponent: self.exponent })
+    }
+
+    pub(crate) fn into_state(self) -> SignMixture<T, N, L, K> {
+        self.kept
+    }
+}
+
+impl<T: Real, const N: usize, const L: usize> Share<T, N, L> {
+    /// As hypotheses of one phase count as one in a [`Mixture`](crate::Mixture).
+    #[inline(always)]
+    fn is_like<const B: usize>(&self, other: &Parts<T, B>) -> bool {
+        let distance = |i: usize, mean: T, other_variance: T| {
+            let (apart, variance) = (self.belief.mean[i] - mean, self.belief.covariance[(i, i)]);
+            let variance = if other_variance > variance { other_variance } else { variance };
+            // What is known exactly is the same or is not; a difference has no size without a unit.
+            if apart.is_zero() { T::zero() } else { apart * apart / variance }
+        };
+        let strain = distance(0, other.strain, other.strain_variance);
+        strain < T::of(ALIKE) && strain + distance(1, other.rate, other.rate_variance) < T::of(ALIKE)
+    }
+
+    /// Takes in another one, with the mean and covariance of the pair.
+    fn merge<const B: usize>(&mut self, other: &Parts<T, B>, weight: T, log_inside: T) {
+        let total = self.weight + weight;
+        if !(total > T::zero()) {
+            return;
+        }
+        let (mine, theirs) = (self.weight / total, weight / total);
+        let mut taken = self.belief;
+        other.put_into(&mut taken);
+        let (apart, both) = (taken.mean - self.belief.mean, mine * theirs);
+        // By iterators throughout: an index could panic.
+        let mut covariance = [T::zero(); L];
+        let known = self.belief.covariance.packed().iter().zip(taken.covariance.packed());
+        let mut entries = covariance.iter_mut().zip(known);
+        for (i, a) in apart.iter().enumerate() {
+            for (b, (merged, (p, q))) in apart.iter().take(i + 1).zip(&mut entries) {
+                *merged = mine * *p + theirs * *q + both * *a * *b;
+            }
+        }
+        self.belief =
+            Belief { mean: self.belief.mean + apart * theirs, covariance: Symmetric::from_packed(covariance) };
+        self.weight = total;
+        self.log_inside = mine * self.log_inside + theirs * log_inside;
+    }
+}

@@ -1,0 +1,194 @@
+//! The IMM of the sensor's own model at a fixed rate.
+//!
+//! Given its phase, a mode's direction is certain: nothing is split, no root is taken. A hold has no rate, and a phase that
+//! begins draws its rate anew, so the rate takes no part in the mixing but through the mode's own.
+//!
+//! # Policy
+//! As [`SparseEkf`](crate::SparseEkf): the state is changed in place, an error leaves it as it was, and nothing takes a
+//! logarithm unless asked or unless the strain is near a limit.
+
+use ohmstrain_model::{Phase, SwitchedModel};
+
+use crate::gaussian::Real;
+use crate::mixture::LEAST_WEIGHT;
+use crate::mixture_step::Predicted;
+use crate::sparse_evidence::{Weighing, Weight};
+use crate::sparse_mixture::{PhaseMixture, Share};
+use crate::sparse_parts::Parts;
+use crate::switching::fresh_rate;
+use crate::{
+    AnyCurve, Compact, Curve, Dwell, Evidence, Gaussian, MixtureResidual, Reading, Residual, SparseEkf, StepError,
+    Switch,
+};
+
+/// [`Imm`](crate::Imm) of a [`SwitchedModel`] with Ornstein-Uhlenbeck motion, for steps of one length: the same to
+/// rounding, without multiplying zeros. `G` as for [`SparseEkf`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SparseImm<T, const B: usize, const N: usize, S = Compact, G = AnyCurve<T>> {
+    kernel: SparseEkf<T, S, B, N, G>,
+    /// Probabilities of a change of phase over a step, `[to][from]`.
+    chain: [[T; 3]; 3],
+    weighing: Weighing<T>,
+    /// Rate of a moving phase that begins.
+    fresh: [Gaussian<T>; 3],
+}
+
+/// A mode while a step works on it.
+struct Mode<T, const B: usize> {
+    parts: Parts<T, B>,
+    /// Its probability before the reading; what the reading and the limits make of it.
+    prior: T,
+    weight: Weight<T>,
+    log_inside: T,
+    residual: Option<Residual<T>>,
+}
+
+impl<T: Real, const B: usize, const N: usize> SparseImm<T, B, N> {
+    /// A filter for steps of `dt_s` seconds.
+    /// - `dwell`: how long phases last and what follows them.
+    /// - `evidence`: what weighs the phases.
+    ///
+    /// # Errors
+    /// If `dt_s` is not a positive number.
+    pub fn new(
+        model: SwitchedModel<T, 2, B, N>,
+        dt_s: T,
+        dwell: Dwell<T>,
+        evidence: Evidence<T>,
+    ) -> Result<Self, StepError> {
+        Ok(Self::around(SparseEkf::new(model, dt_s)?, dwell, evidence))
+    }
+}
+
+impl<T: Real, const B: usize, const N: usize, S: Switch<T>, G: Curve<T>> SparseImm<T, B, N, S, G> {
+    /// A filter whose modes step as `kernel` does; the other arguments as for [`Self::new`]. Of its switch only the square
+    /// root is used.
+    pub fn around(kernel: SparseEkf<T, S, B, N, G>, dwell: Dwell<T>, evidence: Evidence<T>) -> Self {
+        let chain = dwell.probabilities(kernel.dt_s());
+        Self {
+            chain: core::array::from_fn(|to| core::array::from_fn(|from| chain[from][to])),
+            weighing: Weighing::new(evidence),
+            fresh: Phase::ALL.map(|phase| fresh_rate(kernel.model().motion(), phase)),
+            kernel,
+        }
+    }
+
+    /// The model.
+    pub const fn model(&self) -> &SwitchedModel<T, 2, B, N> {
+        self.kernel.model()
+    }
+
+    /// Predicts one step ahead and takes the reading; without one it is a prediction and returns `None`.
+    ///
+    /// # Errors
+    /// See [`StepError`]; the state is untouched.
+    #[inline]
+    pub fn step<const L: usize>(
+        &self,
+        state: &mut PhaseMixture<T, N, L>,
+        reading: Option<Reading<T>>,
+    ) -> Result<Option<MixtureResidual<T>>, StepError> {
+        // Three results that stay where they are: nothing is moved, and a state is written when all of them are there.
+        let extend = self.advanced(state, Phase::Extend, reading);
+        let hold = self.advanced(state, Phase::Hold, reading);
+        let retract = self.advanced(state, Phase::Retract, reading);
+        let modes = [borrowed(&extend)?, borrowed(&hold)?, borrowed(&retract)?];
+        let (shares, total) = shares(modes.map(|mode| mode.weight))?;
+        let mut predicted = Predicted::new();
+        for ((mode, share), weight) in modes.into_iter().zip(&mut state.modes).zip(shares) {
+            share.weight = weight;
+            share.log_inside = mode.log_inside;
+            mode.parts.put_into(&mut share.belief);
+            if let Some(residual) = &mode.residual {
+                predicted.add(mode.prior, residual.innovation, residual.variance);
+            }
+        }
+        Ok(reading.map(|_| MixtureResidual::new(&predicted, total, self.weighing.tempering())))
+    }
+
+    /// A mode after the step: its belief, and what is known of its weight. One function for all phases, so that a program
+    /// has it once.
+    #[inline(never)]
+    fn advanced<const L: usize>(
+        &self,
+        state: &PhaseMixture<T, N, L>,
+        phase: Phase,
+        reading: Option<Reading<T>>,
+    ) -> Result<Mode<T, B>, StepError> {
+        let mut mode = self.mixed(&state.modes, phase);
+        if !(mode.prior > T::zero()) {
+            return Ok(mode);
+        }
+        let spread = self.kernel.predict(&mut mode.parts, Some(phase));
+        if let Some(reading) = reading {
+            let residual = self.kernel.update(&mut mode.parts, reading, Some(phase), spread)?;
+            mode.weight = self.weighing.likelihood::<S>(mode.prior, &residual);
+            mode.residual = Some(residual);
+        } else if !mode.parts.is_sound::<N>(mode.parts.variances::<N>()) {
+            return Err(StepError::NonFiniteState);
+        }
+        let log_inside = self.weighing.log_inside::<S>(mode.parts.strain, mode.parts.strain_variance);
+        mode.weight.exponent += log_inside - mode.log_inside;
+        mode.log_inside = log_inside;
+        Ok(mode)
+    }
+
+    /// What is known of the state if `phase` begins or goes on now; if it cannot, what was known of the phase. The rate of
+    /// a hold is left out: its prediction does not look at it.
+    #[inline(always)]
+    fn mixed<const L: usize>(&self, modes: &[Share<T, N, L>; 3], phase: Phase) -> Mode<T, B> {
+        let (zero, to) = (T::zero(), phase.index());
+        let own = &modes[to];
+        let joint: [T; 3] = core::array::from_fn(|from| self.chain[to][from] * modes[from].weight);
+        let prior = joint[0] + joint[1] + joint[2];
+        let weight = Weight { factor: prior, exponent: zero };
+        if !(prior > zero) {
+            return Mode { parts: Parts::of(&own.belief), prior, weight, log_inside: own.log_inside, residual: None };
+        }
+        let per_prior = T::one() / prior;
+        let shares = joint.map(|weight| weight * per_prior);
+        let log_inside =
+            shares[0] * modes[0].log_inside + shares[1] * modes[1].log_inside + shares[2] * modes[2].log_inside;
+        let [a, b, c] = heaviest_first([(shares[0], &modes[0]), (shares[1], &modes[1]), (shares[2], &modes[2])]);
+        let mut parts = Parts::mixed([a.0, b.0, c.0], [&a.1.belief, &b.1.belief, &c.1.belief]);
+        if phase != Phase::Hold {
+            parts.mix_rate(shares[to], &own.belief, &self.fresh[to]);
+        }
+        Mode { parts, prior, weight, log_inside, residual: None }
+    }
+}
+
+/// What went well, without moving it.
+fn borrowed<T>(result: &Result<T, StepError>) -> Result<&T, StepError> {
+    result.as_ref().map_err(|error| *error)
+}
+
+/// The heaviest in front, by two comparisons.
+#[inline(always)]
+fn heaviest_first<T: Real, S>([a, b, c]: [(T, S); 3]) -> [(T, S); 3] {
+    let [a, b] = if b.0 > a.0 { [b, a] } else { [a, b] };
+    if c.0 > a.0 { [c, b, a] } else { [a, b, c] }
+}
+
+/// Probabilities from weights, and the weights' sum. What is lighter than the heaviest by e⁻¹² gets none.
+#[inline(always)]
+fn shares<T: Real>(weights: [Weight<T>; 3]) -> Result<([T; 3], Weight<T>), StepError> {
+    let followed = weights.iter().filter(|weight| weight.factor > T::zero());
+    let Some(exponent) = followed.map(|weight| weight.exponent).reduce(|a, b| if b > a { b } else { a }) else {
+        return Err(StepError::NonFiniteState);
+    };
+    let mut weights = weights.map(|weight| weight.relative_to(exponent));
+    let heaviest = weights.iter().fold(T::zero(), |a, b| if *b > a { *b } else { a });
+    let mut factor = T::zero();
+    for weight in &mut weights {
+        if !(*weight > heaviest * T::of(LEAST_WEIGHT)) {
+            *weight = T::zero();
+        }
+        factor += *weight;
+    }
+    if !(factor > T::zero() && factor.is_finite()) {
+        return Err(StepError::NonFiniteState);
+    }
+    let per_sum = T::one() / factor;
+    Ok((weights.map(|weight| weight * per_sum), Weight { factor, exponent }))
+}

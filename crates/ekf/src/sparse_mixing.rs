@@ -1,0 +1,123 @@
+use ohmstrain_model::Scalar;
+
+use crate::sparse_parts::{Part, Parts};
+use crate::{Belief, Gaussian};
+
+/// Where a mixture's mean of one component of the state lies, and its parts around it.
+#[derive(Clone, Copy)]
+struct Shift<T> {
+    /// Which component.
+    i: usize,
+    mean: T,
+    /// Deviations of the lighter parts from the heaviest one, with their weights.
+    weighted: [T; 2],
+    /// Deviations of the lighter parts from the mixture.
+    off: [T; 2],
+}
+
+/// A mixture of three beliefs, the heaviest first.
+struct Mixing<'a, T, const N: usize, const L: usize> {
+    weights: [T; 3],
+    of: [&'a Belief<T, N, L>; 3],
+}
+
+/// Component `i` of a mean. An index that is known while compiling is tested while compiling; if it is not, the test shall
+/// bring no panic.
+#[inline(always)]
+fn mean<T: Scalar, const N: usize, const L: usize>(belief: &Belief<T, N, L>, i: usize) -> T {
+    belief.mean.as_slice().get(i).copied().unwrap_or_else(T::zero)
+}
+
+/// Entry `i`, `j ≤ i` of a covariance; as for [`mean`].
+#[inline(always)]
+fn covariance<T: Scalar, const N: usize, const L: usize>(belief: &Belief<T, N, L>, i: usize, j: usize) -> T {
+    belief.covariance.packed().get(i * (i + 1) / 2 + j).copied().unwrap_or_else(T::zero)
+}
+
+impl<T: Scalar, const N: usize, const L: usize> Mixing<'_, T, N, L> {
+    #[inline(always)]
+    fn shift(&self, i: usize) -> Shift<T> {
+        let [_, w1, w2] = self.weights;
+        let [a, b, c] = self.of;
+        let heaviest = mean(a, i);
+        let (b, c) = (mean(b, i) - heaviest, mean(c, i) - heaviest);
+        let weighted = [w1 * b, w2 * c];
+        let shift = weighted[0] + weighted[1];
+        Shift { i, mean: heaviest + shift, weighted, off: [b - shift, c - shift] }
+    }
+
+    /// With deviations d from the heaviest part's mean and s the mixture's own, `Σ w (d - s)(d - s)ᵀ = Σ w d (d - s)ᵀ`, and
+    /// the heaviest part has d = 0. As its weight is a third at least, s is no more than √3 deviations of the mixture, and
+    /// nothing cancels.
+    #[inline(always)]
+    fn entry(&self, i: &Shift<T>, j: &Shift<T>) -> T {
+        let [w0, w1, w2] = self.weights;
+        let [a, b, c] = self.of;
+        w0 * covariance(a, i.i, j.i)
+            + w1 * covariance(b, i.i, j.i)
+            + w2 * covariance(c, i.i, j.i)
+            + i.weighted[0] * j.off[0]
+            + i.weighted[1] * j.off[1]
+    }
+
+    #[inline(always)]
+    fn part<const B: usize>(&self, own: &Shift<T>, strain: &Shift<T>, others: &[Shift<T>]) -> Part<T, B> {
+        let mut with = [T::zero(); B];
+        for (with, other) in with.iter_mut().zip(others) {
+            *with = self.entry(own, other);
+        }
+        let (with_strain, variance) = (self.entry(own, strain), self.entry(own, own));
+        Part { mean: own.mean, with_strain, with_rate: T::zero(), with, variance }
+    }
+}
+
+impl<T: Scalar, const B: usize> Parts<T, B> {
+    /// Mean and covariance of a mixture of three, the heaviest first, but for the rate, which is left zero.
+    #[inline(always)]
+    pub(crate) fn mixed<const N: usize, const L: usize>(weights: [T; 3], of: [&Belief<T, N, L>; 3]) -> Self {
+        let (mixing, zero) = (Mixing { weights, of }, T::zero());
+        let strain = mixing.shift(0);
+        let shifts: [Shift<T>; B] = core::array::from_fn(|i| mixing.shift(2 + i));
+        let nothing = Part { mean: zero, with_strain: zero, with_rate: zero, with: [zero; B], variance: zero };
+        let mut branches = [nothing; B];
+        for (i, (branch, own)) in branches.iter_mut().zip(&shifts).enumerate() {
+            *branch = mixing.part(own, &strain, shifts.get(..i).unwrap_or(&[]));
+        }
+        let baseline =
+            if Self::has_baseline(N) { mixing.part(&mixing.shift(N - 1), &strain, &shifts) } else { nothing };
+        let strain_variance = mixing.entry(&strain, &strain);
+        Self {
+            strain: strain.mean,
+            rate: zero,
+            strain_variance,
+            strain_rate: zero,
+            rate_variance: zero,
+            branches,
+            baseline,
+        }
+    }
+
+    /// Puts the rate of a moving phase into a mixture: the phase's own with the share `kept`, with the rest one that is
+    /// drawn anew, independent of everything else.
+    #[inline(always)]
+    pub(crate) fn mix_rate<const N: usize, const L: usize>(
+        &mut self,
+        kept: T,
+        own: &Belief<T, N, L>,
+        fresh: &Gaussian<T>,
+    ) {
+        let renewed = T::one() - kept;
+        let apart = mean(own, 1) - fresh.mean;
+        let weighted = kept * apart;
+        self.rate = fresh.mean + weighted;
+        self.rate_variance = kept * covariance(own, 1, 1) + renewed * (fresh.variance + weighted * apart);
+        let with_rate = |of_own: T, i: usize, mixed: T| kept * of_own + weighted * (mean(own, i) - mixed);
+        self.strain_rate = with_rate(covariance(own, 1, 0), 0, self.strain);
+        for (i, mixed) in self.branches.iter_mut().enumerate() {
+            mixed.with_rate = with_rate(covariance(own, 2 + i, 1), 2 + i, mixed.mean);
+        }
+        if Self::has_baseline(N) {
+            self.baseline.with_rate = with_rate(covariance(own, N - 1, 1), N - 1, self.baseline.mean);
+        }
+    }
+}

@@ -1,0 +1,153 @@
+//! The sign-split filter of the sensor's own model at a fixed rate.
+//!
+//! # Policy
+//! As [`SparseEkf`](crate::SparseEkf): the state is changed in place, an error leaves it as it was, and nothing takes a
+//! logarithm unless asked or unless the strain is near a limit.
+
+use ohmstrain_model::{Phase, SwitchedModel};
+
+use crate::gaussian::Real;
+use crate::mixture_step::{LEAST_MASS, Predicted};
+use crate::sign_split::{HOPELESS, follows};
+use crate::sparse_children::Children;
+use crate::sparse_evidence::{Weighing, Weight};
+use crate::sparse_mixture::{Share, SignMixture};
+use crate::sparse_parts::Parts;
+use crate::switching::fresh_rate;
+use crate::{
+    AnyCurve, Compact, Curve, Dwell, Evidence, Gaussian, MixtureResidual, Reading, SparseEkf, StepError, Switch,
+};
+
+/// [`SignSplit`](crate::SignSplit) of a [`SwitchedModel`] with Ornstein-Uhlenbeck motion, for steps of one length: the
+/// same to rounding, without multiplying zeros. `G` as for [`SparseEkf`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SparseSignSplit<T, const B: usize, const N: usize, const K: usize, S = Compact, G = AnyCurve<T>> {
+    kernel: SparseEkf<T, S, B, N, G>,
+    /// Probabilities of a change of phase over a step, `[from][to]`; `None` for a body that never rests.
+    chain: Option<[[T; 3]; 3]>,
+    weighing: Weighing<T>,
+    /// Rate of a moving phase after a hold.
+    fresh: [Gaussian<T>; 3],
+}
+
+impl<T: Real, const B: usize, const N: usize, const K: usize> SparseSignSplit<T, B, N, K> {
+    /// A filter for steps of `dt_s` seconds.
+    /// - `hold`: how long holds and movements last; `None` for a body that never rests.
+    /// - `evidence`: what weighs the hypotheses.
+    ///
+    /// # Errors
+    /// If `dt_s` is not a positive number.
+    pub fn new(
+        model: SwitchedModel<T, 2, B, N>,
+        dt_s: T,
+        hold: Option<Dwell<T>>,
+        evidence: Evidence<T>,
+    ) -> Result<Self, StepError> {
+        Ok(Self::around(SparseEkf::new(model, dt_s)?, hold, evidence))
+    }
+}
+
+impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: Curve<T>>
+    SparseSignSplit<T, B, N, K, S, G>
+{
+    /// A filter whose hypotheses step as `kernel` does; the other arguments as for [`Self::new`]. Of its switch only the
+    /// square root is used.
+    pub fn around(kernel: SparseEkf<T, S, B, N, G>, hold: Option<Dwell<T>>, evidence: Evidence<T>) -> Self {
+        Self {
+            chain: hold.map(|dwell| dwell.probabilities(kernel.dt_s())),
+            weighing: Weighing::new(evidence),
+            fresh: Phase::ALL.map(|phase| fresh_rate(kernel.model().motion(), phase)),
+            kernel,
+        }
+    }
+
+    /// The model.
+    pub const fn model(&self) -> &SwitchedModel<T, 2, B, N> {
+        self.kernel.model()
+    }
+
+    /// Predicts one step ahead and takes the reading; without one it is a prediction and returns `None`.
+    ///
+    /// # Errors
+    /// See [`StepError`]; the state is untouched.
+    #[inline]
+    pub fn step<const L: usize>(
+        &self,
+        state: &mut SignMixture<T, N, L, K>,
+        reading: Option<Reading<T>>,
+    ) -> Result<Option<MixtureResidual<T>>, StepError> {
+        let mut children = Children::new();
+        let mut predicted = Predicted::new();
+        for (parent, from) in state.shares().iter().zip(state.phases()) {
+            for (phase, probability) in Phase::ALL.into_iter().zip(follows(self.chain.as_ref(), *from)) {
+                if probability > T::zero() {
+                    let origin = Origin { parent, from: *from, phase, probability };
+                    self.add_child(&origin, reading, &mut children, &mut predicted)?;
+                }
+            }
+        }
+        let total = children.normalise()?;
+        *state = children.into_state();
+        Ok(reading.map(|_| MixtureResidual::new(&predicted, total, self.weighing.tempering())))
+    }
+
+    #[inline(always)]
+    fn add_child<const L: usize>(
+        &self,
+        origin: &Origin<'_, T, N, L>,
+        reading: Option<Reading<T>>,
+        children: &mut Children<T, N, L, K>,
+        predicted: &mut Predicted<T>,
+    ) -> Result<(), StepError> {
+        let Origin { parent, from, phase, probability } = *origin;
+        let mut child = Parts::of(&parent.belief);
+        let rests = self.chain.is_some() && from == Phase::Hold && phase != Phase::Hold;
+        if rests {
+            child.renew_rate(&self.fresh[phase.index()]);
+        }
+        if phase != Phase::Hold && self.is_hopeless(phase, &child) {
+            return Ok(());
+        }
+        let spread = self.kernel.predict(&mut child, Some(phase));
+        let mut prior = parent.weight * probability;
+        if phase != Phase::Hold {
+            let mass = child.cut_rate::<S, N>(phase, self.weighing.clear());
+            if !(mass > T::of(LEAST_MASS)) {
+                return Ok(());
+            }
+            // After a hold the chain has said how likely this direction is; none of it goes to the other.
+            if !(rests && mass > T::of(0.5)) {
+                prior *= mass;
+            }
+        }
+        let mut weight = Weight { factor: prior, exponent: T::zero() };
+        if let Some(reading) = reading {
+            let residual = self.kernel.update(&mut child, reading, Some(phase), spread)?;
+            weight = self.weighing.likelihood::<S>(prior, &residual);
+            predicted.add(prior, residual.innovation, residual.variance);
+        } else if !child.is_sound::<N>(child.variances::<N>()) {
+            return Err(StepError::NonFiniteState);
+        }
+        let log_inside = self.weighing.log_inside::<S>(child.strain, child.strain_variance);
+        weight.exponent += log_inside - parent.log_inside;
+        children.add(&child, phase, weight, log_inside);
+        Ok(())
+    }
+
+    /// Whether next to nothing of a prediction has the sign of a moving phase.
+    #[inline(always)]
+    fn is_hopeless(&self, phase: Phase, from: &Parts<T, B>) -> bool {
+        let ahead = self.kernel.rate_ahead(phase, from);
+        let toward = if phase == Phase::Retract { -ahead.mean } else { ahead.mean };
+        toward < T::zero() && toward * toward > T::of(HOPELESS * HOPELESS) * ahead.variance
+    }
+}
+
+/// What a child is made of.
+struct Origin<'a, T, const N: usize, const L: usize> {
+    parent: &'a Share<T, N, L>,
+    from: Phase,
+    phase: Phase,
+    /// Probability that the parent has this child.
+    probability: T,
+}

@@ -1,0 +1,11 @@
+//! IMM without the zeros, six states each, at a fixed rate.
+#![no_std]
+#![no_main]
+
+use cortex_m_rt::entry;
+use ohmstrain_firmware::{FastImm6, frame};
+
+#[entry]
+fn main() -> ! {
+    frame::run::<FastImm6<f32>>()
+}

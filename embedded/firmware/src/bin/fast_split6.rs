@@ -1,0 +1,11 @@
+//! Sign-split filter without the zeros, four hypotheses of six states, at a fixed rate.
+#![no_std]
+#![no_main]
+
+use cortex_m_rt::entry;
+use ohmstrain_firmware::{FastSplit6, frame};
+
+#[entry]
+fn main() -> ! {
+    frame::run::<FastSplit6<f32>>()
+}
