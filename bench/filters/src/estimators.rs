@@ -1,9 +1,10 @@
 use ohmstrain_ekf::{
-    Belief, Dwell, Ekf, Estimator, Evidence, FixedGain, FixedGainState, Hypotheses, Imm, Mixture, Reading, SignSplit,
-    State, Unscented,
+    Belief, Dwell, Ekf, Estimator, Evidence, FixedGain, FixedGainState, Hypotheses, Imm, Mixture, PhaseMixture,
+    Reading, SignMixture, SignSplit, SparseImm, SparseSignSplit, State, Unscented,
 };
 use ohmstrain_model::{Phase, SwitchedModel, SwitchedStep};
 
+use crate::sparse_mixtures::GatedMixture;
 use crate::{
     DT_S, Filter, GatedSparse, PackedReference, RANGE, Visitor, linear_sensor, linearised, phased_sensor, readings,
     sensor,
@@ -150,6 +151,11 @@ fn every_large_filter(visitor: &mut impl Visitor) {
     visitor.visit("imm_6", &readings, Gated::<_, 6, 21>::new(Imm::new(phased, dwell, evidence), mixture));
     let split = SignSplit::<_, _, 8>::new(six, Some(dwell), evidence);
     visitor.visit("sign_split_6", &readings, Gated::<_, 6, 21>::new(split, Mixture::single(start, Phase::Hold)));
+    let imm = SparseImm::new(phased, DT_S, dwell, evidence).expect("the step's length is positive");
+    visitor.visit("sparse_imm_6", &readings, GatedMixture::new(imm, PhaseMixture::single(start, Phase::Hold)));
+    let split = SparseSignSplit::<_, 3, 6, 8>::new(six, DT_S, Some(dwell), evidence);
+    let split = split.expect("the step's length is positive");
+    visitor.visit("sparse_sign_split_6", &readings, GatedMixture::new(split, SignMixture::single(start, Phase::Hold)));
     let best = Hypotheses::<_, _, 8>::new(phased, dwell, evidence);
     visitor.visit("hypotheses_6", &readings, Gated::<_, 6, 21>::new(best, Mixture::single(start, Phase::Hold)));
 }

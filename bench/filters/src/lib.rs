@@ -7,6 +7,7 @@ mod recordings;
 mod reference;
 mod sensor;
 mod sparse;
+mod sparse_mixtures;
 
 pub use estimators::{Freezing, Gated, STEPS, ekf, every_filter};
 pub use readings::{readings, strain_at};
