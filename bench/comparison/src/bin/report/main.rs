@@ -1,0 +1,31 @@
+//! Writes `../README.md` from what criterion, the memory program and callgrind have measured. `../run.sh` runs it.
+//!
+//! ```text
+//! report README MODE TARGET_DIR…     one directory per build, named after the processor it was built for
+//! ```
+
+mod figures;
+mod machine;
+mod table;
+
+use std::error::Error;
+use std::path::Path;
+
+use figures::Build;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let [readme, mode, directories @ ..] = &arguments[..] else {
+        return Err("expected README MODE TARGET_DIR…".into());
+    };
+    let builds =
+        directories.iter().map(|directory| Build::read(Path::new(directory))).collect::<Result<Vec<_>, _>>()?;
+    let text = include_str!("introduction.md")
+        .replace("{machine}", &machine::describe(mode)?)
+        .replace("{ratios}", &table::ratios(&builds))
+        .replace("{steps}", &table::steps(&builds))
+        .replace("{banks}", &table::banks(&builds))
+        .replace("{recordings}", &table::recordings(&builds))
+        .replace("{memory}", &table::memory(&builds));
+    Ok(std::fs::write(readme, text)?)
+}

@@ -1,0 +1,182 @@
+//! The tables, and the targets beside the figures.
+
+use std::fmt::Write;
+
+use crate::figures::Build;
+
+/// What a ratio should be.
+enum Target {
+    AtMost(f64),
+    AtLeast(f64),
+}
+
+use Target::{AtLeast, AtMost};
+
+/// A ratio of two times, and what it should be.
+struct Ratio {
+    words: &'static str,
+    over: &'static str,
+    under: &'static str,
+    target: Target,
+}
+
+const fn ratio(words: &'static str, over: &'static str, under: &'static str, target: Target) -> Ratio {
+    Ratio { words, over, under, target }
+}
+
+const RATIOS: [Ratio; 16] = [
+    ratio("hand-written reference ÷ adskalman", "step/reference_3", "step/adskalman_3", AtMost(0.45)),
+    ratio("EKF ÷ hand-written reference", "step/sparse_ekf_3", "step/reference_3", AtMost(1.3)),
+    ratio("EKF ÷ adskalman", "step/sparse_ekf_3", "step/adskalman_3", AtMost(0.6)),
+    ratio("EKF ÷ typed-kalman", "step/sparse_ekf_3", "step/typed_kalman_3", AtMost(0.6)),
+    ratio("EKF of six states ÷ of three", "step/sparse_ekf_6", "step/sparse_ekf_3", AtMost(1.8)),
+    ratio("UKF ÷ kfilter's", "step/ukf_3", "step/kfilter_ukf_3", AtMost(0.6)),
+    ratio("UKF ÷ typed-kalman's", "step/ukf_3", "step/typed_kalman_ukf_3", AtMost(0.6)),
+    ratio("IMM ÷ EKF, six states", "step/imm_6", "step/sparse_ekf_6", AtMost(4.0)),
+    ratio("sign-split of 8 ÷ EKF, six states", "step/sign_split_6", "step/sparse_ekf_6", AtMost(14.0)),
+    ratio("sparse IMM ÷ EKF, six states", "step/sparse_imm_6", "step/sparse_ekf_6", AtMost(4.0)),
+    ratio("sparse sign-split of 8 ÷ EKF, six states", "step/sparse_sign_split_6", "step/sparse_ekf_6", AtMost(14.0)),
+    ratio(
+        "samples a second of the smoother ÷ adskalman's",
+        "recording/adskalman_smoother_3",
+        "recording/smoother_3",
+        AtLeast(2.5),
+    ),
+    ratio(
+        "samples a second of the sparse smoother ÷ adskalman's",
+        "recording/adskalman_smoother_3",
+        "recording/sparse_smoother_3",
+        AtLeast(2.5),
+    ),
+    ratio("row of a log-likelihood ÷ EKF", "recording/log_likelihood_3", "step/sparse_ekf_3", AtMost(1.1)),
+    ratio("64 sensors one at a time ÷ bank with AVX2", "bank/one_at_a_time_3", "bank/bank_3_256_bits", AtLeast(8.0)),
+    ratio("generic EKF ÷ sparse EKF, three states", "step/ekf_3", "step/sparse_ekf_3", AtLeast(1.0)),
+];
+
+/// Ratios first: they travel further than nanoseconds.
+pub fn ratios(builds: &[Build]) -> String {
+    let mut out = header("ratio | target", builds);
+    for Ratio { words, over, under, target } in &RATIOS {
+        let (sign, bound) = match target {
+            AtMost(bound) => ('≤', bound),
+            AtLeast(bound) => ('≥', bound),
+        };
+        let cells = builds.iter().map(|build| {
+            let Some((over, under)) = build.ns(over).zip(build.ns(under)) else { return "not measured".into() };
+            let value = over / under;
+            let met = match target {
+                AtMost(bound) => value <= *bound,
+                AtLeast(bound) => value >= *bound,
+            };
+            format!("{value:.2} {}", if met { "✓" } else { "✗" })
+        });
+        row(&mut out, &format!("{words} | {sign} {bound}"), cells);
+    }
+    out
+}
+
+const STEPS: [(&str, &str); 22] = [
+    ("hand-written reference, linear, without checks", "reference_3"),
+    ("**EKF, sparse**", "sparse_ekf_3"),
+    ("EKF, sparse, four states", "sparse_ekf_4"),
+    ("EKF, sparse, six states", "sparse_ekf_6"),
+    ("EKF, generic", "ekf_3"),
+    ("EKF, generic, four states", "ekf_4"),
+    ("EKF, generic, six states", "ekf_6"),
+    ("iterated EKF, three linearisations", "iterated_ekf_3"),
+    ("UKF", "ukf_3"),
+    ("fixed gain, frozen, linear sensor", "fixed_gain_3"),
+    ("IMM, six states", "imm_6"),
+    ("IMM, sparse, six states", "sparse_imm_6"),
+    ("sign-split of 8, six states", "sign_split_6"),
+    ("sign-split of 8, sparse, six states", "sparse_sign_split_6"),
+    ("best 8 hypotheses, six states", "hypotheses_6"),
+    ("nalgebra written straight, linear, without checks", "nalgebra_3"),
+    ("adskalman 0.18, linear", "adskalman_3"),
+    ("typed-kalman 0.1, linear", "typed_kalman_3"),
+    ("kfilter 0.5, linear", "kfilter_3"),
+    ("minikalman 0.8, linear", "minikalman_3"),
+    ("typed-kalman UKF, linear", "typed_kalman_ukf_3"),
+    ("kfilter UKF, linear", "kfilter_ukf_3"),
+];
+
+/// Nanoseconds of one step; what is not measured is left out.
+pub fn steps(builds: &[Build]) -> String {
+    let mut out = header("one step (three states unless said), ns", builds);
+    for (words, name) in STEPS {
+        let name = format!("step/{name}");
+        if builds.iter().any(|build| build.ns(&name).is_some()) {
+            row(&mut out, words, builds.iter().map(|build| cell(build.ns(&name), 1)));
+        }
+    }
+    out
+}
+
+const BANKS: [(&str, &str); 3] = [
+    ("one at a time, without gate", "bank/one_at_a_time_3"),
+    ("bank, vectors of 256 bits (AVX2)", "bank/bank_3_256_bits"),
+    ("bank, the widest vectors there are", "bank/bank_3"),
+];
+
+/// Nanoseconds for each of many sensors.
+pub fn banks(builds: &[Build]) -> String {
+    let mut out = header("one step of each of 64 sensors, ns per sensor", builds);
+    for (words, name) in BANKS {
+        row(&mut out, words, builds.iter().map(|build| cell(build.ns(name), 1)));
+    }
+    out
+}
+
+const SMOOTHERS: [(&str, &str); 5] = [
+    ("smoother, in place", "smoother_3"),
+    ("smoother, steps kept", "smoother_3_steps_kept"),
+    ("smoother, sparse", "sparse_smoother_3"),
+    ("adskalman 0.18's", "adskalman_smoother_3"),
+    ("typed-kalman 0.1's", "typed_kalman_smoother_3"),
+];
+
+/// Rows and passes a second.
+pub fn recordings(builds: &[Build]) -> String {
+    let mut out = header("filter and smoother over 10 000 rows, million rows a second", builds);
+    let per_second = |build: &Build, name: &str, scale: f64| build.ns(name).map(|ns| 1e9 / ns / scale);
+    for (words, name) in SMOOTHERS.into_iter().chain([("log-likelihood alone", "log_likelihood_3")]) {
+        let name = format!("recording/{name}");
+        if builds.iter().any(|build| build.ns(&name).is_some()) {
+            row(&mut out, words, builds.iter().map(|build| cell(per_second(build, &name, 1e6), 2)));
+        }
+    }
+    out.push('\n');
+    out += &header("one EKF pass over 3000 simulated rows, five states, passes a second", builds);
+    for (words, name) in [("generic", "pass/generic_5"), ("sparse", "pass/sparse_5")] {
+        row(&mut out, words, builds.iter().map(|build| cell(per_second(build, name, 1.0), 0)));
+    }
+    out
+}
+
+/// Bytes; the same in all builds, so the first one's.
+pub fn memory(builds: &[Build]) -> String {
+    let mut out = "| smoother, three states | peak heap, B a row (target) |\n|---|--:|\n".to_owned();
+    for (words, name) in SMOOTHERS {
+        if let Some(bytes) = builds.first().and_then(|build| build.bytes(name)) {
+            let target = if name == "smoother_3" || name == "sparse_smoother_3" { " (≤ 80)" } else { "" };
+            row(&mut out, words, [format!("{bytes:.0}{target}")].into_iter());
+        }
+    }
+    out
+}
+
+fn header(first: &str, builds: &[Build]) -> String {
+    let levels: Vec<&str> = builds.iter().map(|build| build.level.as_str()).collect();
+    let columns = first.split('|').count();
+    let rule = "---|".repeat(columns) + &"--:|".repeat(levels.len());
+    format!("| {first} | {} |\n|{rule}\n", levels.join(" | "))
+}
+
+fn row(out: &mut String, first: &str, cells: impl Iterator<Item = String>) {
+    // Writing into a string does not fail.
+    let _ = writeln!(out, "| {first} | {} |", cells.collect::<Vec<_>>().join(" | "));
+}
+
+fn cell(value: Option<f64>, digits: usize) -> String {
+    value.map_or_else(|| "not measured".to_owned(), |value| format!("{value:.digits$}"))
+}

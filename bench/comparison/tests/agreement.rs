@@ -1,0 +1,157 @@
+//! A benchmark of a wrong filter is worth nothing: on the linear sensor all filters are the Kalman filter, and all
+//! smoothers the Rauch-Tung-Striebel smoother.
+
+use nalgebra::SVector;
+use ohmstrain_bench_comparison::{
+    RecordingPass, adskalman_smoother, every_rival, simulated_recording, typed_kalman_smoother,
+};
+use ohmstrain_bench_filters::{
+    DT_S, Filter, Freezing, Gated, GatedSparse, LinearModel, PackedReference, RANGE, STEPS, Visitor, ekf, every_filter,
+    linear_sensor, linearised, log_likelihood, readings, sensor, smoother, sparse_smooth, strain_at,
+};
+use ohmstrain_ekf::{Belief, Ekf, Reading, SparseEkf, Unscented};
+
+/// A filter forgets its rounding in some hundred steps; a step leaves some 30 ε of quantities that are up to 10⁴ times
+/// larger than what the difference P - K S Kᵀ leaves of them: 10² · 30 · 10⁴ ε = 7e-9 of a strain of 0.1.
+const TOLERANCE: f64 = 1e-9;
+
+/// The textbook filter by loops over full matrices, covariance in Joseph's form; strain after every reading.
+fn textbook(model: &LinearModel, readings: &[f64]) -> Vec<f64> {
+    type Matrix = [[f64; 3]; 3];
+    let matrix = |entry: &dyn Fn(usize, usize) -> f64| -> Matrix {
+        std::array::from_fn(|i| std::array::from_fn(|j| entry(i, j)))
+    };
+    let sandwich = |a: &Matrix, p: &Matrix| {
+        matrix(&|i, j| (0..3).map(|k| (0..3).map(|l| a[i][k] * p[k][l] * a[j][l]).sum::<f64>()).sum())
+    };
+    let (f, h) = (&model.transition, &model.gradient);
+    let mut x = [0.0; 3];
+    let mut p = matrix(&|i, j| if i == j { model.start[i] } else { 0.0 });
+    let mut strains = Vec::new();
+    for reading in readings {
+        x = std::array::from_fn(|i| (0..3).map(|j| f[i][j] * x[j]).sum());
+        let carried = sandwich(f, &p);
+        p = matrix(&|i, j| carried[i][j] + model.noise[i][j]);
+        let spread: [f64; 3] = std::array::from_fn(|i| (0..3).map(|j| p[i][j] * h[j]).sum());
+        let variance = (0..3).map(|i| h[i] * spread[i]).sum::<f64>() + model.variance;
+        let gain = spread.map(|s| s / variance);
+        let innovation = reading - (0..3).map(|i| h[i] * x[i]).sum::<f64>();
+        x = std::array::from_fn(|i| x[i] + gain[i] * innovation);
+        let left = matrix(&|i, j| if i == j { 1.0 } else { 0.0 } - gain[i] * h[j]);
+        let kept = sandwich(&left, &p);
+        p = matrix(&|i, j| kept[i][j] + gain[i] * model.variance * gain[j]);
+        strains.push(x[0]);
+    }
+    strains
+}
+
+struct Compared {
+    expected: Vec<f64>,
+    seen: Vec<&'static str>,
+}
+
+impl Visitor for Compared {
+    fn visit(&mut self, name: &'static str, readings: &[f64], mut filter: impl Filter) {
+        self.seen.push(name);
+        assert_eq!(readings.len(), self.expected.len());
+        for (k, (reading, expected)) in readings.iter().zip(&self.expected).enumerate() {
+            assert!(filter.step(*reading), "{name}: step {k} failed");
+            let apart = (filter.strain() - expected).abs();
+            assert!(apart < TOLERANCE, "{name}: {apart:e} apart at step {k}");
+        }
+    }
+}
+
+#[test]
+fn all_filters_agree_on_the_linear_sensor() {
+    let (model, y) = (linearised(), readings::<1>(STEPS));
+    let mut compared = Compared { expected: textbook(&model, &y), seen: Vec::new() };
+    every_rival(&model, &mut compared);
+    let sensor = linear_sensor();
+    let start = Belief::<f64, 3, 6>::initial(&sensor);
+    compared.visit("hand-written", &y, PackedReference::new(&model));
+    compared.visit("ours, sparse", &y, GatedSparse::<1, 3, 6>::new(sensor));
+    compared.visit("ours, generic", &y, ekf::<1, 3, 6>(sensor, 1));
+    compared.visit("ours, iterated", &y, ekf::<1, 3, 6>(sensor, 3));
+    compared.visit("ours, unscented", &y, Gated::<_, 3, 6>::new(Ekf::new(Unscented::new(sensor)), start));
+    assert_eq!(compared.seen.len(), 12);
+    // The strain moves, so that agreement says something.
+    let (least, most) = compared.expected.iter().fold((1.0_f64, -1.0_f64), |(a, b), x| (a.min(*x), b.max(*x)));
+    assert!(most - least > 0.05, "{least} to {most}");
+}
+
+#[test]
+fn all_smoothers_agree_on_the_linear_sensor() {
+    let (model, readings) = (linearised(), readings::<1>(STEPS));
+    let vectors: Vec<SVector<f64, 1>> = readings.iter().map(|y| SVector::from([*y])).collect();
+    let ours = smoother(linear_sensor());
+    let expected: Vec<_> = adskalman_smoother(&model)(&vectors).unwrap().iter().map(|s| s.state()[0]).collect();
+    let filtered = textbook(&model, &readings);
+    // The end is the filter's, the rest is not: a smoother that did nothing would not pass.
+    assert!((expected[STEPS - 1] - filtered[STEPS - 1]).abs() < TOLERANCE);
+    assert!(expected.iter().zip(&filtered).any(|(a, b)| (a - b).abs() > 1e-3));
+    let sparse = SparseEkf::new(linear_sensor(), DT_S).unwrap();
+    let taken: Vec<_> = readings.iter().map(|y| Some(Reading::from(*y))).collect();
+    let smoothed = sparse_smooth(&sparse, &Belief::initial(&linear_sensor()), &taken);
+    for (name, strains) in [
+        ("sparse", smoothed.iter().map(|belief| belief.mean[0]).collect()),
+        ("in place", ours.in_place(&readings).iter().map(|belief| belief.mean[0]).collect::<Vec<_>>()),
+        ("steps kept", ours.with_steps(&readings).iter().map(|belief| belief.mean[0]).collect()),
+        ("typed-kalman", typed_kalman_smoother(&model)(&readings).unwrap().iter().map(|s| s.x[0]).collect()),
+    ] {
+        let apart = strains.iter().zip(&expected).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(apart < TOLERANCE, "{name}: {apart:e}");
+    }
+}
+
+/// What is timed on the sensor that is not linear takes every reading, and its strain stays where the law holds.
+#[test]
+fn every_filter_takes_every_reading() {
+    struct Runs;
+    impl Visitor for Runs {
+        fn visit(&mut self, name: &'static str, readings: &[f64], mut filter: impl Filter) {
+            for reading in readings.iter().cycle().take(5 * STEPS) {
+                assert!(filter.step(*reading), "{name}");
+                assert!(RANGE.contains(filter.strain()), "{name}: {}", filter.strain());
+            }
+        }
+    }
+    every_filter(&mut Runs);
+}
+
+/// The filter of the sensor's own model follows the strain, whose deviation is 0.076. Once the start is forgotten its own
+/// deviation says 0.004; an error of twice that would belong to another sensor.
+#[test]
+fn the_readings_are_those_of_the_sensor() {
+    let mut filter = GatedSparse::<1, 3, 6>::new(sensor());
+    let (mut squares, mut counted) = (0.0, 0.0);
+    for (k, reading) in readings::<1>(5 * STEPS).into_iter().enumerate() {
+        assert!(filter.step(reading));
+        if k >= STEPS {
+            squares += (filter.strain() - strain_at(k)).powi(2);
+            counted += 1.0;
+        }
+    }
+    let error = f64::sqrt(squares / counted);
+    let sd = filter.belief().covariance[(0, 0)].sqrt();
+    assert!(error < 2.0 * sd, "error {error}, deviation {sd}");
+}
+
+#[test]
+fn the_gain_that_is_timed_as_frozen_is_frozen() {
+    let mut filter = Freezing::new();
+    let steps_until_frozen =
+        readings::<1>(STEPS).iter().take_while(|y| filter.step(**y) && !filter.is_frozen()).count();
+    assert!(steps_until_frozen < STEPS / 2, "{steps_until_frozen}");
+}
+
+#[test]
+fn recordings_are_taken_to_their_end() {
+    let sensor = linear_sensor();
+    let sparse = SparseEkf::new(sensor, DT_S).unwrap();
+    assert!(log_likelihood(&sparse, &Belief::initial(&sensor), &readings::<1>(STEPS)).is_finite());
+    let (recording, pass) = (simulated_recording(), RecordingPass::new());
+    // The two paths split an uncertain rate by different densities, so their strains are close and not equal.
+    let apart = (pass.generic(&recording) - pass.sparse(&recording)).abs();
+    assert!(apart < 0.02, "{apart}");
+}

@@ -1,0 +1,161 @@
+use ohmstrain_ekf::{
+    Belief, Dwell, Ekf, Estimator, Evidence, FixedGain, FixedGainState, Hypotheses, Imm, Mixture, PhaseMixture,
+    Reading, SignMixture, SignSplit, SparseImm, SparseSignSplit, State, Unscented,
+};
+use ohmstrain_model::{Phase, SwitchedModel, SwitchedStep};
+
+use crate::sparse_mixtures::GatedMixture;
+use crate::{
+    DT_S, Filter, GatedSparse, PackedReference, RANGE, Visitor, linear_sensor, linearised, phased_sensor, readings,
+    sensor,
+};
+
+/// Two periods of the readings, so that they can be repeated.
+pub const STEPS: usize = 1000;
+
+/// Readings with a larger normalised innovation squared are turned down: one in a thousand if the model is right.
+pub(crate) const GATE: f64 = 10.8;
+
+/// Any estimator with a gate on the normalised innovation squared and a log-likelihood.
+#[derive(Clone, Copy, Debug)]
+pub struct Gated<E: Estimator<f64, N, L>, const N: usize, const L: usize> {
+    estimator: E,
+    prepared: E::Prepared,
+    state: E::State,
+    log_likelihood: f64,
+}
+
+impl<E: Estimator<f64, N, L>, const N: usize, const L: usize> Gated<E, N, L> {
+    /// From a state before any reading.
+    pub fn new(estimator: E, state: E::State) -> Self {
+        Self { prepared: estimator.prepare(DT_S), estimator, state, log_likelihood: 0.0 }
+    }
+}
+
+impl<E: Estimator<f64, N, L>, const N: usize, const L: usize> Filter for Gated<E, N, L> {
+    #[inline]
+    fn step(&mut self, reading: f64) -> bool {
+        let Ok(taken) = self.estimator.advance(&self.state, &self.prepared, Some(Reading::from(reading))) else {
+            return false;
+        };
+        match taken.innovation {
+            Some(innovation) if innovation.nis() <= GATE => {
+                self.log_likelihood += innovation.log_likelihood;
+                self.state = taken.state;
+                true
+            }
+            _ => match self.estimator.advance(&self.state, &self.prepared, None) {
+                Ok(predicted) => {
+                    self.state = predicted.state;
+                    true
+                }
+                Err(_) => false,
+            },
+        }
+    }
+
+    fn strain(&self) -> f64 {
+        self.state.moments().mean[0]
+    }
+}
+
+/// The generic EKF from the model's long-run distribution; the reading is linearised `iterations` times.
+#[must_use]
+pub fn ekf<const B: usize, const N: usize, const L: usize>(
+    model: SwitchedModel<f64, 2, B, N>,
+    iterations: usize,
+) -> Gated<Ekf<SwitchedModel<f64, 2, B, N>>, N, L> {
+    Gated::new(Ekf::new(model).iterated(iterations), Belief::initial(&model))
+}
+
+/// The filter that freezes its gain, on the linear sensor, where the gain settles.
+#[derive(Clone, Copy, Debug)]
+pub struct Freezing {
+    filter: FixedGain<SwitchedModel<f64, 2, 1, 3>, f64, SwitchedStep<f64, 2, 1>>,
+    state: FixedGainState<f64, 3, 6>,
+    log_likelihood: f64,
+}
+
+/// How close to its limit the covariance is when the gain freezes.
+const FREEZE_TOLERANCE: f64 = 0.01;
+
+impl Freezing {
+    /// From the long-run distribution of the linear sensor.
+    ///
+    /// # Panics
+    /// Never: step and tolerance are valid.
+    #[must_use]
+    pub fn new() -> Self {
+        let model = linear_sensor();
+        let filter = FixedGain::new::<3, 6>(model, DT_S, FREEZE_TOLERANCE).expect("step and tolerance are valid");
+        Self { filter, state: Belief::initial(&model).into(), log_likelihood: 0.0 }
+    }
+
+    /// Whether the gain has settled.
+    #[must_use]
+    pub fn is_frozen(&self) -> bool {
+        self.state.is_frozen()
+    }
+}
+
+impl Default for Freezing {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// Without a gate: a reading that is turned down would end the freeze, and another filter would be measured.
+impl Filter for Freezing {
+    #[inline]
+    fn step(&mut self, reading: f64) -> bool {
+        let Ok(step) = self.filter.step(&self.state, DT_S, Some(Reading::from(reading))) else { return false };
+        self.log_likelihood += step.step.update.map_or(0.0, |update| update.log_likelihood);
+        self.state = step.next;
+        true
+    }
+
+    fn strain(&self) -> f64 {
+        self.state.belief().mean[0]
+    }
+}
+
+/// Shows every filter with a thousand readings of the sensor it is for; all but the linear ones are for [`sensor`].
+///
+/// # Panics
+/// Never: the parameters are valid.
+pub fn every_filter(visitor: &mut impl Visitor) {
+    let readings = readings::<1>(STEPS);
+    let three = sensor::<1, 3>();
+    visitor.visit("reference_3", &readings, PackedReference::new(&linearised()));
+    visitor.visit("sparse_ekf_3", &readings, GatedSparse::<1, 3, 6>::new(three));
+    visitor.visit("sparse_ekf_4", &readings, GatedSparse::<1, 4, 10>::new(sensor()));
+    visitor.visit("ekf_3", &readings, ekf::<1, 3, 6>(three, 1));
+    visitor.visit("ekf_4", &readings, ekf::<1, 4, 10>(sensor(), 1));
+    visitor.visit("iterated_ekf_3", &readings, ekf::<1, 3, 6>(three, 3));
+    let ukf = Ekf::new(Unscented::new(three));
+    visitor.visit("ukf_3", &readings, Gated::<_, 3, 6>::new(ukf, Belief::initial(&three)));
+    visitor.visit("fixed_gain_3", &readings, Freezing::new());
+    every_large_filter(visitor);
+}
+
+/// Those of six states: strain, rate, three branches, baseline.
+fn every_large_filter(visitor: &mut impl Visitor) {
+    let readings = readings::<3>(STEPS);
+    let (six, phased) = (sensor::<3, 6>(), phased_sensor::<3, 6>());
+    visitor.visit("sparse_ekf_6", &readings, GatedSparse::<3, 6, 21>::new(six));
+    visitor.visit("ekf_6", &readings, ekf::<3, 6, 21>(six, 1));
+    let evidence = Evidence { limits: RANGE, tempering: 1.0 };
+    let dwell = Dwell::new(0.7, 1.5, 0.3).expect("the durations are valid");
+    let start = Belief::<f64, 6, 21>::initial(&six);
+    let mixture = Mixture::single(start, Phase::Hold);
+    visitor.visit("imm_6", &readings, Gated::<_, 6, 21>::new(Imm::new(phased, dwell, evidence), mixture));
+    let split = SignSplit::<_, _, 8>::new(six, Some(dwell), evidence);
+    visitor.visit("sign_split_6", &readings, Gated::<_, 6, 21>::new(split, Mixture::single(start, Phase::Hold)));
+    let imm = SparseImm::new(phased, DT_S, dwell, evidence).expect("the step's length is positive");
+    visitor.visit("sparse_imm_6", &readings, GatedMixture::new(imm, PhaseMixture::single(start, Phase::Hold)));
+    let split = SparseSignSplit::<_, 3, 6, 8>::new(six, DT_S, Some(dwell), evidence);
+    let split = split.expect("the step's length is positive");
+    visitor.visit("sparse_sign_split_6", &readings, GatedMixture::new(split, SignMixture::single(start, Phase::Hold)));
+    let best = Hypotheses::<_, _, 8>::new(phased, dwell, evidence);
+    visitor.visit("hypotheses_6", &readings, Gated::<_, 6, 21>::new(best, Mixture::single(start, Phase::Hold)));
+}

@@ -1,0 +1,32 @@
+//! What is measured of ohmstrain: its estimators at a fixed rate, each with its state, one reading at a time; and a
+//! hand-written filter without checks to measure them by.
+
+mod estimators;
+mod readings;
+mod recordings;
+mod reference;
+mod sensor;
+mod sparse;
+mod sparse_mixtures;
+
+pub use estimators::{Freezing, Gated, STEPS, ekf, every_filter};
+pub use readings::{readings, strain_at};
+pub use recordings::{Smoother, log_likelihood, smoother, sparse_smooth};
+pub use reference::PackedReference;
+pub use sensor::{DT_S, LinearModel, RANGE, linear_sensor, linearised, phased_sensor, sensor};
+pub use sparse::GatedSparse;
+
+/// A filter with its state.
+pub trait Filter {
+    /// Takes the next reading; whether the step went well.
+    fn step(&mut self, reading: f64) -> bool;
+
+    /// Mean strain.
+    fn strain(&self) -> f64;
+}
+
+/// Whoever wants to see filters of many types.
+pub trait Visitor {
+    /// Sees a filter that has not taken a reading yet, and the readings it is for.
+    fn visit(&mut self, name: &'static str, readings: &[f64], filter: impl Filter);
+}

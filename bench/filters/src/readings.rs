@@ -1,0 +1,56 @@
+//! What the sensor is read.
+
+use crate::DT_S;
+use crate::sensor::{READING_SD, law};
+
+/// Readings after which they repeat.
+const PERIOD: usize = 500;
+
+/// Strain of a body that goes to and fro with rests at both ends, a period of 5 s.
+#[must_use]
+pub fn strain_at(k: usize) -> f64 {
+    let turn = 2.0 * std::f64::consts::PI * (k % PERIOD) as f64 / PERIOD as f64;
+    0.15 + 0.12 * turn.sin().clamp(-0.8, 0.8)
+}
+
+/// Any number of readings of a sensor with `B` branches and without a baseline that follows [`strain_at`]; with noise, which
+/// repeats too.
+#[must_use]
+pub fn readings<const B: usize>(count: usize) -> Vec<f64> {
+    let law = law::<B>();
+    let mut noise = Noise(1);
+    let mut relaxation = [0.0; B];
+    let mut period = Vec::new();
+    // Until the slowest branch repeats: 8 time constants of 64 s leave a third of a thousandth.
+    const WARM_UP: usize = 100;
+    for k in 0..(WARM_UP + 1) * PERIOD {
+        let (strain, rate) = (strain_at(k), (strain_at(k) - strain_at(k + PERIOD - 1)) / DT_S);
+        let extends = rate > 0.0;
+        for (relaxation, branch) in relaxation.iter_mut().zip(&law.branches) {
+            let gain = if extends {
+                branch.extend_gain + branch.extend_gain_slope * strain
+            } else {
+                branch.retract_gain + branch.retract_gain_slope * strain
+            };
+            *relaxation += DT_S * (gain * rate - *relaxation / branch.tau_s);
+        }
+        if k >= WARM_UP * PERIOD {
+            let viscosity_s = if extends { law.extend_viscosity_s } else { law.retract_viscosity_s };
+            let clean = law.gauge.value_and_slope(strain).0 + viscosity_s * rate + relaxation.iter().sum::<f64>();
+            period.push(clean + READING_SD * noise.next());
+        }
+    }
+    period.into_iter().cycle().take(count).collect()
+}
+
+/// Noise of mean 0 and deviation 1.
+struct Noise(u32);
+
+impl Noise {
+    /// Numerical Recipes' generator. The sum of its upper and lower half is triangular; its deviation is 1/√6 of its reach.
+    fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        let triangular = (f64::from(self.0 >> 16) + f64::from(self.0 & 0xffff)) / 65_536.0 - 1.0;
+        6_f64.sqrt() * triangular
+    }
+}
