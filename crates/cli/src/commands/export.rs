@@ -8,7 +8,8 @@ use crate::sensor_file;
 
 /// Writes a sensor's filter as source code. Every file is made before the first one is written.
 pub fn run(args: &ExportArgs) -> Result<(), CliError> {
-    if let Some(other) = args.estimator.chosen().map(|estimator| estimator.0).filter(|kind| *kind != EstimatorKind::Ekf) {
+    if let Some(other) = args.estimator.chosen().map(|estimator| estimator.0).filter(|kind| *kind != EstimatorKind::Ekf)
+    {
         let name = other.name();
         return Err(CliError::Arguments(format!("--estimator: expected ekf, the only one to export, found {name}")));
     }

@@ -1,7 +1,7 @@
 //! What the templates show: the model in `f32`, prepared for steps of one length as `SparseEkf` prepares it.
 
 use ohmstrain_calib::{EstimatorKind, MotionParams, Quantity, ReadingUnit, SensorParams};
-use ohmstrain_ekf::Belief;
+use ohmstrain_ekf::{Belief, Compact, Switch};
 use ohmstrain_model::{Branch, Gauge, ModelNoise, Motion, SensorLaw, StrainRange, SwitchedModel};
 use serde::Serialize;
 
@@ -33,6 +33,10 @@ pub struct Exported {
     motion: [[Literal; 2]; 2],
     motion_input: [Literal; 2],
     motion_noise: [Literal; 3],
+    /// Derivative of the sum of old and new strain by the old one.
+    strain_sum: Literal,
+    /// Below, within and above the law's range.
+    gain_regions: [Vec<GainConstants>; 3],
     branches: Vec<BranchConstants>,
     baseline_decay: Literal,
     baseline_variance: Literal,
@@ -58,9 +62,18 @@ struct BranchConstants {
     drive_input: Literal,
     reach_s: Literal,
     per_reach: Literal,
+    clear: Literal,
     cross_noise: [Literal; 2],
     branch_noise: Vec<Literal>,
     variance: Literal,
+    /// Gain and its growth with strain, as they were calibrated.
+    extend: [Literal; 2],
+    retract: [Literal; 2],
+}
+
+/// The gains of a branch: at zero, and their growth with the sum of old and new strain.
+#[derive(Debug, Serialize)]
+struct GainConstants {
     extend: [Literal; 2],
     retract: [Literal; 2],
 }
@@ -203,10 +216,13 @@ impl Exported {
             states: N,
             start_mean: literals(start.mean.iter()),
             start_variance: (0..N).map(|i| Literal(start.covariance[(i, i)])).collect(),
-            motion: [[1.0 + change[0][0], change[0][1]], [change[1][0], 1.0 + change[1][1]]].map(|row| row.map(Literal)),
+            motion: [[1.0 + change[0][0], change[0][1]], [change[1][0], 1.0 + change[1][1]]]
+                .map(|row| row.map(Literal)),
             motion_input: response.input.map(|answer| Literal(answer * push)),
             motion_noise: [response.motion_noise[0][0], response.motion_noise[1][0], response.motion_noise[1][1]]
                 .map(Literal),
+            strain_sum: Literal(2.0 + change[0][0]),
+            gain_regions: [Some(law.range.lower), None, Some(law.range.upper)].map(|border| gains(law, border)),
             branches: (0..B).map(|i| branch(&sensor, i)).collect(),
             baseline_decay: Literal(1.0 + step.baseline_change()),
             baseline_variance: Literal(step.baseline_variance()),
@@ -244,7 +260,23 @@ impl Exported {
     }
 }
 
-/// As `SparseEkf::new` computes it.
+/// The gains within the range, or at one of its borders and beyond, as `SparseEkf` keeps them.
+fn gains<const B: usize>(law: &SensorLaw<f32, B>, border: Option<f32>) -> Vec<GainConstants> {
+    let gain = |at_zero: f32, growth: f32| match border {
+        None => [Literal(at_zero), Literal(0.5 * growth)],
+        Some(border) => [Literal(at_zero + growth * border), Literal(0.0)],
+    };
+    let gains = |branch: &Branch<f32>| GainConstants {
+        extend: gain(branch.extend_gain, branch.extend_gain_slope),
+        retract: gain(branch.retract_gain, branch.retract_gain_slope),
+    };
+    law.branches.iter().map(gains).collect()
+}
+
+/// Deviations from which on a rate has one direction.
+const CLEAR: f32 = <Compact as Switch<f32>>::CLEAR as f32;
+
+/// As `SparseEkf` prepares it.
 fn branch<const B: usize, const N: usize>(sensor: &FixedRate<B, N>, i: usize) -> BranchConstants {
     let step = sensor.model.prepare(sensor.dt_s);
     let (response, law) = (step.response(), &sensor.model.law().branches[i]);
@@ -257,6 +289,7 @@ fn branch<const B: usize, const N: usize>(sensor: &FixedRate<B, N>, i: usize) ->
         drive_input: Literal(response.drive_input[i] * push),
         reach_s: Literal(reach_s),
         per_reach: Literal(1.0 / reach_s),
+        clear: Literal(CLEAR * CLEAR * reach_s * reach_s),
         cross_noise: response.cross_noise[i].map(Literal),
         branch_noise: literals(&response.branch_noise[i]),
         variance: Literal(step.branch_variance()[i]),
@@ -282,12 +315,8 @@ fn prior(motion: &MotionParams) -> Result<PriorConstants, ExportError> {
 
 impl PriorConstants {
     fn to_model(self) -> Result<Motion<f32, 2>, ExportError> {
-        let motion = Motion::ornstein_uhlenbeck(
-            self.rate_time_s.0,
-            self.rate_sd_per_s.0,
-            self.strain_mean.0,
-            self.strain_sd.0,
-        );
+        let motion =
+            Motion::ornstein_uhlenbeck(self.rate_time_s.0, self.rate_sd_per_s.0, self.strain_mean.0, self.strain_sd.0);
         motion.map_err(|error| ExportError::Parameter(error.to_string()))
     }
 }

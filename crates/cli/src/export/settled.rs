@@ -6,7 +6,7 @@
 
 use nalgebra::SVector;
 use ohmstrain_ekf::{Belief, Channel, Compact, Dynamics, FixedGain, FixedGainState, Reading, SparseEkf, Switch};
-use ohmstrain_model::{Direction, Observation, Phase, SplitRate, SwitchedModel, SwitchedStep, Symmetric, Transition};
+use ohmstrain_model::{Direction, Observation, Phase, SwitchedModel, SwitchedStep, Symmetric, Transition};
 use serde::Serialize;
 
 use super::ExportError;
@@ -31,8 +31,8 @@ struct SettledPhase<const B: usize, const N: usize, const L: usize> {
 #[derive(Debug, Serialize)]
 pub struct SettledGain {
     gain: Vec<Literal>,
-    drive_rate_variance: Literal,
-    rate_variance: Literal,
+    drive: [Literal; 3],
+    rate: [Literal; 3],
     strain_sd: Literal,
     rate_sd: Literal,
 }
@@ -92,8 +92,7 @@ impl<const B: usize, const N: usize, const L: usize> SettledPhase<B, N, L> {
             for _ in 0..MOST_STEPS {
                 // What the filter expects, so that its mean stays where the law takes it.
                 let expected = model.observe(&model.predicted(state.belief()), None).value;
-                let taken =
-                    filter.step(&state, dt_s, Some(Reading::from(expected))).map_err(|error| wrong(&error))?;
+                let taken = filter.step(&state, dt_s, Some(Reading::from(expected))).map_err(|error| wrong(&error))?;
                 state = taken.next;
                 if let (true, Some(update)) = (state.is_frozen(), taken.step.update) {
                     let prior_covariance = taken.step.prior.covariance;
@@ -123,8 +122,8 @@ impl<const B: usize, const N: usize, const L: usize> SettledPhase<B, N, L> {
         let from = Belief { mean: self.model.point.mean, covariance: self.covariance };
         SettledGain {
             gain: literals(self.gain.iter()),
-            drive_rate_variance: Literal(self.model.predicted(&from).covariance[(1, 1)]),
-            rate_variance: Literal(self.prior_covariance[(1, 1)]),
+            drive: spread(self.model.predicted(&from).covariance[(1, 1)]),
+            rate: spread(self.prior_covariance[(1, 1)]),
             strain_sd: Literal(self.covariance[(0, 0)].sqrt()),
             rate_sd: Literal(self.covariance[(1, 1)].sqrt()),
         }
@@ -185,7 +184,14 @@ impl<const B: usize, const N: usize, const L: usize> Channel<f32, N, L> for Line
     fn observe(&self, at: &Belief<f32, N, L>, _phase: Option<Phase>) -> Observation<f32, N> {
         let (law, variance) = (self.model().law(), at.covariance[(1, 1)]);
         let (gauge, _) = law.gauge_value_and_slope(at.mean[0]);
-        let mut value = gauge + split(at.mean[1], variance).drive(law.extend_viscosity_s, law.retract_viscosity_s);
+        let (rate, extend, retract) = (at.mean[1], law.extend_viscosity_s, law.retract_viscosity_s);
+        let clear = <Compact as Switch<f32>>::CLEAR as f32;
+        let mut value = if rate * rate < clear * clear * variance {
+            let split = Compact::blend(rate, Compact::width(variance.sqrt()));
+            gauge + extend * split.extend + retract * split.retract
+        } else {
+            gauge + if rate > 0.0 { extend } else { retract } * rate
+        };
         for i in 2..N {
             value += at.mean[i];
         }
@@ -193,14 +199,10 @@ impl<const B: usize, const N: usize, const L: usize> Channel<f32, N, L> for Line
     }
 }
 
-/// The rate as `SparseEkf` splits it.
-fn split(rate: f32, variance: f32) -> SplitRate<f32> {
-    let clear = <Compact as Switch<f32>>::CLEAR as f32;
-    if rate * rate < clear * clear * variance {
-        return Compact::blend(rate, variance.sqrt());
-    }
-    let phase = if rate > 0.0 { Phase::Extend } else { Phase::Retract };
-    Direction::Known(phase).split(rate)
+/// A rate's variance, three deviations and their inverse, as the splits of a step share them.
+fn spread(variance: f32) -> [Literal; 3] {
+    let width = 3.0 * variance.sqrt();
+    [variance, width, 1.0 / width].map(Literal)
 }
 
 #[cfg(test)]

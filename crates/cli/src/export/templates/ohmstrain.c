@@ -38,19 +38,20 @@ static const float MOTION_INPUT[2] = {<< motion_input[0] >>f, << motion_input[1]
 static const float MOTION_NOISE[3] = {<< motion_noise[0] >>f, << motion_noise[1] >>f, << motion_noise[2] >>f};
 
 {% if branches %}
-/* A relaxing branch over one interval: c' = decay c + gain (drive . [strain, rate] + drive_input) + noise. The gain is
- * another one for stretching than for releasing, and grows with strain: gain[0] + gain[1] strain. */
+/* Derivative of the sum of old and new strain by the old strain. */
+static const float STRAIN_SUM = << strain_sum >>f;
+
+/* A relaxing branch over one interval: c' = decay c + gain (drive . [strain, rate] + drive_input) + noise. */
 typedef struct branch {
     float decay;
     float drive[2];
     float drive_input;
     float reach_s;   /* time over which a rate acts, s */
     float per_reach; /* 1 / reach_s */
+    float clear;     /* the drive's direction is clear if its square is not less than this times the rate's variance */
     float cross_noise[2];
     float branch_noise[BRANCHES];
     float variance;
-    float extend[2];
-    float retract[2];
 } branch;
 
 static const branch BRANCH[BRANCHES] = {
@@ -61,11 +62,32 @@ static const branch BRANCH[BRANCHES] = {
         .drive_input = << b.drive_input >>f,
         .reach_s = << b.reach_s >>f,
         .per_reach = << b.per_reach >>f,
+        .clear = << b.clear >>f,
         .cross_noise = {<< b.cross_noise[0] >>f, << b.cross_noise[1] >>f},
         .branch_noise = {{% for x in b.branch_noise %}<< x >>f<< ", " if not loop.last >>{% endfor %}},
         .variance = << b.variance >>f,
-        .extend = {<< b.extend[0] >>f, << b.extend[1] >>f},
-        .retract = {<< b.retract[0] >>f, << b.retract[1] >>f},
+    },
+{% endfor %}
+};
+
+/* The gains of a branch, other ones for stretching than for releasing: at_zero + growth (old strain + new strain). */
+typedef struct gain {
+    float at_zero;
+    float growth;
+} gain;
+
+typedef struct gains {
+    gain extend;
+    gain retract;
+} gains;
+
+/* Below the law's range, within it, and above it: outside gains keep their border values. */
+static const gains GAINS[3][BRANCHES] = {
+{% for region in gain_regions %}
+    {
+{% for g in region %}
+        { {<< g.extend[0] >>f, << g.extend[1] >>f}, {<< g.retract[0] >>f, << g.retract[1] >>f} },
+{% endfor %}
     },
 {% endfor %}
 };
@@ -88,21 +110,28 @@ static const float STRAIN_SD_SCALE = << strain_sd_scale >>f;
 /* Two-sided normal quantile of 95 %. */
 static const float NORMAL_95 = 1.959964f;
 
+/* How far an uncertain rate spreads, 1/s: what the splits of one interval share. */
+typedef struct rate_spread {
+    float variance;
+    float width; /* three deviations; 0 if it has not been computed yet */
+    float per_width;
+} rate_spread;
+
 /* The settled filter of each phase, in the order of ohmstrain_phase. */
 typedef struct fixed_gain {
     float gain[STATES];
-    float drive_rate_variance; /* of the rate at the end of an interval, where branches are driven, 1/s^2 */
-    float rate_variance;       /* of the rate when a reading comes, 1/s^2 */
+    rate_spread drive; /* of the rate that drives the branches */
+    rate_spread rate;  /* of the rate when a reading comes */
     float strain_sd;
-    float rate_sd;
+    float rate_sd; /* 1/s */
 } fixed_gain;
 
 static const fixed_gain FIXED_GAIN[3] = {
 {% for g in gains %}
     {
         .gain = {{% for x in g.gain %}<< x >>f<< ", " if not loop.last >>{% endfor %}},
-        .drive_rate_variance = << g.drive_rate_variance >>f,
-        .rate_variance = << g.rate_variance >>f,
+        .drive = {<< g.drive[0] >>f, << g.drive[1] >>f, << g.drive[2] >>f},
+        .rate = {<< g.rate[0] >>f, << g.rate[1] >>f, << g.rate[2] >>f},
         .strain_sd = << g.strain_sd >>f,
         .rate_sd = << g.rate_sd >>f,
     },
@@ -146,35 +175,37 @@ typedef struct split {
 } split;
 
 /* The density 35/32 (1 - u^2)^3 at u deviations / 3 stands for the normal one: its integrals are polynomials, and from
- * three deviations on the direction is certain. */
-static split split_rate(float rate, float variance)
+ * three deviations on the direction is clear and there is nothing to split. */
+static split split_rate(float rate, rate_spread *spread)
 {
-    if (rate * rate < 9.0f * variance) {
-        const float width = 3.0f * sqrtf(variance);
-        const float u = rate / width;
-        const float w = u * u;
-        const float lean = u * (1.09375f - w * (1.09375f - w * (0.65625f - w * 0.15625f)));
-        const float spread = w * (0.546875f - w * (0.2734375f - w * (0.109375f - w * 0.01953125f)));
-        const float both = width * (0.13671875f + spread);
-        const split out = {0.5f * rate + both, 0.5f * rate - both, 0.5f + lean, 0.5f - lean};
-        return out;
+    float u, w, lean, both, mean;
+    split out;
+
+    if (!(spread->width > 0.0f)) {
+        spread->width = 3.0f * sqrtf(spread->variance);
+        spread->per_width = 1.0f / spread->width;
     }
-    if (rate > 0.0f) {
-        const split out = {rate, 0.0f, 1.0f, 0.0f};
-        return out;
-    } else {
-        const split out = {0.0f, rate, 0.0f, 1.0f};
-        return out;
-    }
+    u = rate * spread->per_width;
+    w = u * u;
+    lean = u * (1.09375f - w * (1.09375f - w * (0.65625f - w * 0.15625f)));
+    both = spread->width * (0.13671875f + w * (0.546875f - w * (0.2734375f - w * (0.109375f - w * 0.01953125f))));
+    mean = 0.5f * rate;
+    out.extend = mean + both;
+    out.retract = mean - both;
+    out.extend_probability = 0.5f + lean;
+    out.retract_probability = 0.5f - lean;
+    return out;
 }
 
+{% if branches %}
 /* Expected product of a gain and the rate. */
 static float split_drive(const split *rate, float extend, float retract)
 {
     return extend * rate->extend + retract * rate->retract;
 }
 
-/* Its derivative with respect to the rate. */
+{% endif %}
+/* Derivative of the expected product of a gain and the rate with respect to the rate. */
 static float split_slope(const split *rate, float extend, float retract)
 {
     return extend * rate->extend_probability + retract * rate->retract_probability;
@@ -183,74 +214,90 @@ static float split_slope(const split *rate, float extend, float retract)
 /* ---- Mean: what both filters share ----------------------------------------------------------------------------- */
 
 {% if branches %}
-/* What an interval does to one branch: with which gain it was driven, how the gain's growth with strain pulls it, and its
- * row of the Jacobian with respect to strain and rate. */
+/* What an interval does to one branch. */
 typedef struct driven {
-    float gain;
-    float pull;
-    float row[2];
+    float change; /* what the motion adds to it */
+    float gain;   /* with which it was driven */
+    float pull;   /* growth of the change with the sum of old and new strain */
+    float row[2]; /* of the Jacobian: derivatives with respect to old strain and rate */
 } driven;
 
-/* Drives one branch; what it gains is added to *change. */
-static driven drive_branch(const branch *b, float mid_strain, float unit_drive, float rate_variance, float *change)
+static float gain_at(gain g, float strain_sum)
 {
-    const split rate = split_rate(unit_drive * b->per_reach, rate_variance);
-    const float at = clamped(mid_strain, RANGE_LOWER, RANGE_UPPER);
-    const float extend = b->extend[0] + b->extend[1] * at;
-    const float retract = b->retract[0] + b->retract[1] * at;
+    return g.at_zero + g.growth * strain_sum;
+}
+
+/* Drives one branch; `unit` is what one of gain 1 would be driven by. */
+static driven drive_branch(const branch *b, const gains *g, float strain_sum, float unit, rate_spread *spread)
+{
     driven out;
-    out.gain = split_slope(&rate, extend, retract);
-    *change = b->reach_s * split_drive(&rate, extend, retract);
-    if (!(mid_strain >= RANGE_LOWER && mid_strain <= RANGE_UPPER)) {
-        out.pull = 0.0f;
-        out.row[0] = out.gain * b->drive[0];
-        out.row[1] = out.gain * b->drive[1];
-        return out;
+
+    if (unit * unit < b->clear * spread->variance) {
+        const split rate = split_rate(unit * b->per_reach, spread);
+        const float extend = gain_at(g->extend, strain_sum), retract = gain_at(g->retract, strain_sum);
+        out.change = b->reach_s * split_drive(&rate, extend, retract);
+        out.gain = split_slope(&rate, extend, retract);
+        out.pull = b->reach_s * split_drive(&rate, g->extend.growth, g->retract.growth);
+    } else {
+        const gain known = unit > 0.0f ? g->extend : g->retract;
+        out.gain = gain_at(known, strain_sum);
+        out.change = out.gain * unit;
+        out.pull = known.growth * unit;
     }
-    out.pull = 0.5f * b->reach_s * split_drive(&rate, b->extend[1], b->retract[1]);
-    out.row[0] = out.gain * b->drive[0] + out.pull * MOTION[0][0] + out.pull;
+    out.row[0] = out.gain * b->drive[0] + out.pull * STRAIN_SUM;
     out.row[1] = out.gain * b->drive[1] + out.pull * MOTION[0][1];
     return out;
 }
 
+/* The gains that hold at a sum of old and new strain. */
+static const gains *gains_at(float strain_sum)
+{
+    if (strain_sum < RANGE_LOWER + RANGE_LOWER) {
+        return GAINS[0];
+    }
+    return strain_sum > RANGE_UPPER + RANGE_UPPER ? GAINS[2] : GAINS[1];
+}
+
 {% endif %}
-/* The mean one interval on; rate_variance is that of the rate at its end. */
-static void predict_mean(float x[STATES], float rate_variance{% if branches %}, driven by[BRANCHES]{% endif %})
+/* The mean one interval on; `spread` is that of the rate at its end. */
+static void predict_mean(float x[STATES]{% if branches %}, rate_spread *spread, driven by[BRANCHES]{% endif %})
 {
     const float strain = x[0], rate = x[1];
 {% if branches %}
-    float mid_strain;
+    const gains *g;
     int i;
 {% endif %}
 
-    x[0] = MOTION[0][0] * strain + MOTION[0][1] * rate + MOTION_INPUT[0];
-    x[1] = MOTION[1][0] * strain + MOTION[1][1] * rate + MOTION_INPUT[1];
+    x[0] = MOTION_INPUT[0] + MOTION[0][0] * strain + MOTION[0][1] * rate;
+    x[1] = MOTION_INPUT[1] + MOTION[1][0] * strain + MOTION[1][1] * rate;
 {% if branches %}
-    mid_strain = 0.5f * (strain + x[0]);
+    g = gains_at(strain + x[0]);
     for (i = 0; i < BRANCHES; i++) {
         const branch *b = &BRANCH[i];
-        const float unit_drive = b->drive[0] * strain + b->drive[1] * rate + b->drive_input;
-        float change;
-        by[i] = drive_branch(b, mid_strain, unit_drive, rate_variance, &change);
-        x[2 + i] = b->decay * x[2 + i] + change;
+        const float unit = b->drive_input + b->drive[0] * strain + b->drive[1] * rate;
+        by[i] = drive_branch(b, &g[i], strain + x[0], unit, spread);
+        x[2 + i] = by[i].change + b->decay * x[2 + i];
     }
-{% else %}
-    (void)rate_variance;
 {% endif %}
     x[LAST] *= BASELINE_DECAY;
 }
 
 /* The reading expected at x, relative; its derivatives with respect to strain and rate go to slope[]. */
-static float expected_reading(const float x[STATES], float rate_variance, float slope[2])
+static float expected_reading(const float x[STATES], rate_spread *spread, float slope[2])
 {
     const float inside = clamped(x[0], RANGE_LOWER, RANGE_UPPER);
-    const split rate = split_rate(x[1], rate_variance);
     float expected = gauge(inside, &slope[0]);
     int i;
 
     expected = expected + slope[0] * (x[0] - inside);
-    expected += split_drive(&rate, EXTEND_VISCOSITY_S, RETRACT_VISCOSITY_S);
-    slope[1] = split_slope(&rate, EXTEND_VISCOSITY_S, RETRACT_VISCOSITY_S);
+    if (x[1] * x[1] < 9.0f * spread->variance) {
+        const split rate = split_rate(x[1], spread);
+        expected = expected + EXTEND_VISCOSITY_S * rate.extend + RETRACT_VISCOSITY_S * rate.retract;
+        slope[1] = split_slope(&rate, EXTEND_VISCOSITY_S, RETRACT_VISCOSITY_S);
+    } else {
+        slope[1] = x[1] > 0.0f ? EXTEND_VISCOSITY_S : RETRACT_VISCOSITY_S;
+        expected = expected + slope[1] * x[1];
+    }
     for (i = 2; i < STATES; i++) {
         expected += x[i];
     }
@@ -279,13 +326,13 @@ static void predict_baseline(float p[ENTRIES]{% if branches %}, const driven by[
 
     for (i = 0; i < BRANCHES; i++) {
         const float *row = by[i].row;
-        p[AT(LAST, 2 + i)] =
-            row[0] * with_strain + row[1] * with_rate + BASELINE_DECAY * BRANCH[i].decay * p[AT(LAST, 2 + i)];
+        const float kept = BASELINE_DECAY * p[AT(LAST, 2 + i)];
+        p[AT(LAST, 2 + i)] = row[0] * with_strain + row[1] * with_rate + BRANCH[i].decay * kept;
     }
 {% endif %}
     p[AT(LAST, 0)] = MOTION[0][0] * with_strain + MOTION[0][1] * with_rate;
     p[AT(LAST, 1)] = MOTION[1][0] * with_strain + MOTION[1][1] * with_rate;
-    p[AT(LAST, LAST)] = BASELINE_DECAY * BASELINE_DECAY * p[AT(LAST, LAST)] + BASELINE_VARIANCE;
+    p[AT(LAST, LAST)] = BASELINE_VARIANCE + BASELINE_DECAY * (BASELINE_DECAY * p[AT(LAST, LAST)]);
 }
 
 {% if branches %}
@@ -293,15 +340,15 @@ static void predict_baseline(float p[ENTRIES]{% if branches %}, const driven by[
 static void predict_branch(float p[ENTRIES], const driven by[BRANCHES], int i)
 {
     const branch *b = &BRANCH[i];
-    const float gain = by[i].gain, pull = by[i].pull, *row = by[i].row;
+    const float drive = by[i].gain, pull = by[i].pull, *row = by[i].row;
     const int c = 2 + i;
-    const float carried[2] = {
-        row[0] * p[AT(0, 0)] + row[1] * p[AT(1, 0)] + b->decay * p[AT(c, 0)],
-        row[0] * p[AT(1, 0)] + row[1] * p[AT(1, 1)] + b->decay * p[AT(c, 1)],
-    };
+    /* Covariances of the new branch with the old strain and rate. */
+    const float strain = row[0] * p[AT(0, 0)] + row[1] * p[AT(1, 0)] + b->decay * p[AT(c, 0)];
+    const float rate = row[0] * p[AT(1, 0)] + row[1] * p[AT(1, 1)] + b->decay * p[AT(c, 1)];
+    /* Covariances of its noise with that of strain and rate. */
     const float cross[2] = {
-        gain * b->cross_noise[0] + pull * MOTION_NOISE[0],
-        gain * b->cross_noise[1] + pull * MOTION_NOISE[1],
+        drive * b->cross_noise[0] + pull * MOTION_NOISE[0],
+        drive * b->cross_noise[1] + pull * MOTION_NOISE[1],
     };
     int k;
 
@@ -309,18 +356,18 @@ static void predict_branch(float p[ENTRIES], const driven by[BRANCHES], int i)
         const branch *other = &BRANCH[k];
         const driven *to = &by[k];
         const float kept = row[0] * p[AT(2 + k, 0)] + row[1] * p[AT(2 + k, 1)] + b->decay * p[AT(c, 2 + k)];
-        const float noise =
-            to->pull * cross[0] + to->gain * (gain * b->branch_noise[k] + pull * other->cross_noise[0]);
-        p[AT(c, 2 + k)] = carried[0] * to->row[0] + carried[1] * to->row[1] + other->decay * kept + noise;
+        const float noise = drive * b->branch_noise[k] + pull * other->cross_noise[0];
+        const float own = k == i ? b->variance : 0.0f;
+        p[AT(c, 2 + k)] = own + to->gain * noise + to->pull * cross[0] + to->row[0] * strain + to->row[1] * rate +
+                          other->decay * kept;
     }
-    p[AT(c, c)] += b->variance;
-    p[AT(c, 0)] = carried[0] * MOTION[0][0] + carried[1] * MOTION[0][1] + cross[0];
-    p[AT(c, 1)] = carried[0] * MOTION[1][0] + carried[1] * MOTION[1][1] + cross[1];
+    p[AT(c, 0)] = cross[0] + MOTION[0][0] * strain + MOTION[0][1] * rate;
+    p[AT(c, 1)] = cross[1] + MOTION[1][0] * strain + MOTION[1][1] * rate;
 }
 
 {% endif %}
 /* Mean and covariance one interval on. Rows go from the last to the first: each needs the old values before it. */
-static void predict(float x[STATES], float p[ENTRIES])
+static rate_spread predict(float x[STATES], float p[ENTRIES])
 {
     const float from_strain[2] = {
         MOTION[0][0] * p[AT(0, 0)] + MOTION[0][1] * p[AT(1, 0)],
@@ -330,66 +377,89 @@ static void predict(float x[STATES], float p[ENTRIES])
         MOTION[1][0] * p[AT(0, 0)] + MOTION[1][1] * p[AT(1, 0)],
         MOTION[1][0] * p[AT(1, 0)] + MOTION[1][1] * p[AT(1, 1)],
     };
-    const float rate_variance = from_rate[0] * MOTION[1][0] + from_rate[1] * MOTION[1][1] + MOTION_NOISE[2];
+    rate_spread spread = {0.0f, 0.0f, 0.0f};
 {% if branches %}
     driven by[BRANCHES];
     int i;
+{% endif %}
 
-    predict_mean(x, rate_variance, by);
+    spread.variance = MOTION_NOISE[2] + MOTION[1][0] * from_rate[0] + MOTION[1][1] * from_rate[1];
+{% if branches %}
+    predict_mean(x, &spread, by);
     predict_baseline(p, by);
     for (i = BRANCHES - 1; i >= 0; i--) {
         predict_branch(p, by, i);
     }
 {% else %}
-
-    predict_mean(x, rate_variance);
+    predict_mean(x);
     predict_baseline(p);
 {% endif %}
-    p[AT(0, 0)] = from_strain[0] * MOTION[0][0] + from_strain[1] * MOTION[0][1] + MOTION_NOISE[0];
-    p[AT(1, 0)] = from_rate[0] * MOTION[0][0] + from_rate[1] * MOTION[0][1] + MOTION_NOISE[1];
-    p[AT(1, 1)] = rate_variance;
+    p[AT(0, 0)] = MOTION_NOISE[0] + MOTION[0][0] * from_strain[0] + MOTION[0][1] * from_strain[1];
+    p[AT(1, 0)] = MOTION_NOISE[1] + MOTION[1][0] * from_strain[0] + MOTION[1][1] * from_strain[1];
+    p[AT(1, 1)] = spread.variance;
+    return spread;
 }
 
 /* Covariances of the expected reading with each state. */
-static void covariances_with_reading(const float p[ENTRIES], const float slope[2], float spread[STATES])
+static void covariances_with_reading(const float p[ENTRIES], const float slope[2], float with[STATES])
 {
     int i, k;
 
-    for (i = 0; i < STATES; i++) {
-        float sum = slope[0] * p[AT(i, 0)] + slope[1] * (i == 0 ? p[AT(1, 0)] : p[AT(i, 1)]);
-        for (k = 2; k < STATES; k++) {
-            sum += k <= i ? p[AT(i, k)] : p[AT(k, i)];
+    with[0] = slope[0] * p[AT(0, 0)] + slope[1] * p[AT(1, 0)];
+    with[1] = slope[0] * p[AT(1, 0)] + slope[1] * p[AT(1, 1)];
+    for (i = 2; i < STATES; i++) {
+        with[0] += p[AT(i, 0)];
+        with[1] += p[AT(i, 1)];
+        with[i] = slope[0] * p[AT(i, 0)] + slope[1] * p[AT(i, 1)] + p[AT(i, i)];
+        for (k = 2; k < i; k++) {
+            with[i] += p[AT(i, k)];
+            with[k] += p[AT(i, k)];
         }
-        spread[i] = sum;
     }
 }
 
-/* Takes a reading rho, relative, whose noise has `extra_variance` beyond the calibrated one. */
-static ohmstrain_status update(float x[STATES], float p[ENTRIES], float rho, float extra_variance,
-                               ohmstrain_residual *residual)
+/* Whether a step has left numbers: no variance is negative, and nothing is infinite or not a number. `sum` is a number
+ * that shall be finite too. */
+static int is_sound(const float x[STATES], const float p[ENTRIES], float sum)
 {
-    float slope[2], spread[STATES], variance, innovation, per_variance;
+    int i;
+
+    for (i = 0; i < STATES; i++) {
+        if (!(p[AT(i, i)] >= 0.0f)) {
+            return 0;
+        }
+        sum += x[i];
+    }
+    return isfinite(sum);
+}
+
+/* Takes a reading rho, relative, whose noise has `extra_variance` beyond the calibrated one. */
+static ohmstrain_status update(float x[STATES], float p[ENTRIES], rate_spread *spread, float rho,
+                               float extra_variance, ohmstrain_residual *residual)
+{
+    float slope[2], with[STATES], variance, innovation, per_variance, scaled;
     int i, j;
 
-    innovation = rho - expected_reading(x, p[AT(1, 1)], slope);
-    covariances_with_reading(p, slope, spread);
-    variance = slope[0] * spread[0] + slope[1] * spread[1] + READING_VARIANCE + extra_variance;
+    innovation = rho - expected_reading(x, spread, slope);
+    covariances_with_reading(p, slope, with);
+    variance = READING_VARIANCE + extra_variance + slope[0] * with[0] + slope[1] * with[1];
     for (i = 2; i < STATES; i++) {
-        variance += spread[i];
-    }
-    if (!isfinite(innovation)) {
-        return OHMSTRAIN_ERR_STATE;
-    }
-    if (!(variance > 0.0f && isfinite(variance))) {
-        return OHMSTRAIN_ERR_VARIANCE;
+        variance += with[i];
     }
     per_variance = 1.0f / variance;
+    scaled = innovation * per_variance;
     for (i = 0; i < STATES; i++) {
-        const float gain = spread[i] * per_variance;
-        x[i] += gain * innovation;
+        const float share = with[i] * per_variance;
+        x[i] += with[i] * scaled;
         for (j = 0; j <= i; j++) {
-            p[AT(i, j)] -= gain * spread[j];
+            p[AT(i, j)] -= share * with[j];
         }
+    }
+    if (isfinite(innovation) && !(variance > 0.0f && isfinite(variance))) {
+        return OHMSTRAIN_ERR_VARIANCE;
+    }
+    if (!is_sound(x, p, variance + innovation * scaled)) {
+        return OHMSTRAIN_ERR_STATE;
     }
     if (residual) {
         residual->innovation = innovation;
@@ -398,19 +468,16 @@ static ohmstrain_status update(float x[STATES], float p[ENTRIES], float rho, flo
     return OHMSTRAIN_OK;
 }
 
-/* Whether all numbers are finite and no variance is negative: whatever is not finite makes the sum not finite. */
-static int is_sound(const float x[STATES], const float p[ENTRIES])
+/* The sum of all variances, which is finite if they are. */
+static float total_variance(const float p[ENTRIES])
 {
     float sum = 0.0f;
     int i;
 
     for (i = 0; i < STATES; i++) {
-        if (!(p[AT(i, i)] >= 0.0f)) {
-            return 0;
-        }
-        sum += x[i] + p[AT(i, i)];
+        sum += p[AT(i, i)];
     }
-    return isfinite(sum);
+    return sum;
 }
 
 /* One interval on, with a reading or without; *state changes only if everything went well. */
@@ -418,16 +485,14 @@ static ohmstrain_status advance(ohmstrain_state *state, const float *rho, float 
                                 ohmstrain_residual *residual)
 {
     ohmstrain_state next = *state;
-    ohmstrain_status status = OHMSTRAIN_OK;
+    rate_spread spread = predict(next.mean, next.covariance);
 
-    predict(next.mean, next.covariance);
     if (rho) {
-        status = update(next.mean, next.covariance, *rho, extra_variance, residual);
-    }
-    if (status != OHMSTRAIN_OK) {
-        return status;
-    }
-    if (!is_sound(next.mean, next.covariance)) {
+        const ohmstrain_status status = update(next.mean, next.covariance, &spread, *rho, extra_variance, residual);
+        if (status != OHMSTRAIN_OK) {
+            return status;
+        }
+    } else if (!is_sound(next.mean, next.covariance, total_variance(next.covariance))) {
         return OHMSTRAIN_ERR_STATE;
     }
     *state = next;
@@ -503,18 +568,20 @@ static int is_phase(ohmstrain_phase phase)
 static ohmstrain_status fixed_advance(ohmstrain_fixed_state *state, const fixed_gain *settled, const float *rho)
 {
     ohmstrain_fixed_state next = *state;
+    rate_spread spread = settled->rate;
     float slope[2], sum = 0.0f;
     int i;
 {% if branches %}
+    rate_spread drive = settled->drive;
     driven by[BRANCHES];
 
-    predict_mean(next.mean, settled->drive_rate_variance, by);
+    predict_mean(next.mean, &drive, by);
 {% else %}
 
-    predict_mean(next.mean, settled->drive_rate_variance);
+    predict_mean(next.mean);
 {% endif %}
     if (rho) {
-        const float innovation = *rho - expected_reading(next.mean, settled->rate_variance, slope);
+        const float innovation = *rho - expected_reading(next.mean, &spread, slope);
         for (i = 0; i < STATES; i++) {
             next.mean[i] += settled->gain[i] * innovation;
         }
