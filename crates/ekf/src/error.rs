@@ -17,6 +17,8 @@ pub enum StepError {
     ReadingTooOld,
     /// The new state would not be finite: the belief or the model's parameters are far out of range.
     NonFiniteState,
+    /// The model's gauge curve is not of the family that the filter was made for.
+    OtherGauge,
 }
 
 impl fmt::Display for StepError {
@@ -28,6 +30,7 @@ impl fmt::Display for StepError {
             Self::NonPositiveInnovationVariance => "the innovation's variance is not positive",
             Self::ReadingTooOld => "the reading is older than the remembered steps",
             Self::NonFiniteState => "the new state is not finite",
+            Self::OtherGauge => "the gauge curve is of another family than the filter's",
         })
     }
 }

@@ -7,19 +7,15 @@ pub struct Residual<T> {
     pub innovation: T,
     /// Its variance S.
     pub variance: T,
+    /// Normalised innovation squared ν²/S.
+    pub nis: T,
 }
 
 impl<T: Scalar> Residual<T> {
-    /// Normalised innovation squared ν²/S.
-    #[must_use]
-    pub fn nis(&self) -> T {
-        self.innovation * self.innovation / self.variance
-    }
-
     /// Log density of the reading before it was seen, constant included.
     #[must_use]
     pub fn log_likelihood(&self) -> T {
-        T::of(-0.5) * (self.nis() + self.variance.ln() + T::two_pi().ln())
+        T::of(-0.5) * (self.nis + self.variance.ln() + T::two_pi().ln())
     }
 }
 
@@ -46,7 +42,7 @@ impl<T: Scalar> LogLikelihood<T> {
     /// One reading more.
     #[inline]
     pub fn add(&mut self, residual: &Residual<T>) {
-        self.nis += residual.nis();
+        self.nis += residual.nis;
         self.product *= residual.variance;
         self.readings += 1;
         if !(self.product > T::of(1.0 / LARGEST) && self.product < T::of(LARGEST)) {
@@ -55,6 +51,7 @@ impl<T: Scalar> LogLikelihood<T> {
     }
 
     #[cold]
+    #[inline(never)]
     fn settle(&mut self) {
         self.settled -= T::of(0.5) * self.product.ln();
         self.product = T::one();

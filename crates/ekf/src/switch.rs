@@ -5,8 +5,21 @@ pub trait Switch<T: Scalar> {
     /// A rate of at least that many standard deviations has one direction; nothing is computed for it.
     const CLEAR: f64;
 
-    /// Splits a rate that is not clear; `rate_sd > 0`, both in 1/s.
-    fn blend(rate: T, rate_sd: T) -> SplitRate<T>;
+    /// What the splits of one step share.
+    type Width: Copy;
+
+    /// The standard deviation that belongs to a variance. Rust's core has no stable way to the square root of a
+    /// microcontroller's floating-point unit: who has one there wraps a switch and replaces this.
+    #[inline(always)]
+    fn sd(variance: T) -> T {
+        variance.sqrt()
+    }
+
+    /// Prepares splits of rates with the deviation `rate_sd > 0`, 1/s.
+    fn width(rate_sd: T) -> Self::Width;
+
+    /// Splits a rate that is not clear, 1/s.
+    fn blend(rate: T, width: Self::Width) -> SplitRate<T>;
 }
 
 /// The logistic distribution, as the generic path has it ([`Direction::Uncertain`]): an exponential and a logarithm for
@@ -17,6 +30,12 @@ pub struct Logistic;
 impl<T: Scalar> Switch<T> for Logistic {
     /// `exp(-1.702 · 22)` = 5e-17 is less than half of what `f64` adds to 1.
     const CLEAR: f64 = 22.0;
+
+    type Width = T;
+
+    fn width(rate_sd: T) -> T {
+        rate_sd
+    }
 
     fn blend(rate: T, rate_sd: T) -> SplitRate<T> {
         Direction::Uncertain { rate_sd }.split(rate)
@@ -30,51 +49,67 @@ impl<T: Scalar> Switch<T> for Logistic {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Compact;
 
+/// Where the density of [`Compact`] ends, 1/s.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CompactWidth<T> {
+    width: T,
+    per_width: T,
+}
+
 impl<T: Scalar> Switch<T> for Compact {
     const CLEAR: f64 = 3.0;
 
-    fn blend(rate: T, rate_sd: T) -> SplitRate<T> {
-        let half = T::of(0.5);
+    type Width = CompactWidth<T>;
+
+    #[inline(always)]
+    fn width(rate_sd: T) -> CompactWidth<T> {
         let width = T::of(3.0) * rate_sd;
-        let u = rate / width;
+        CompactWidth { width, per_width: T::one() / width }
+    }
+
+    #[inline(always)]
+    fn blend(rate: T, CompactWidth { width, per_width }: CompactWidth<T>) -> SplitRate<T> {
+        let half = T::of(0.5);
+        let u = rate * per_width;
         let w = u * u;
-        // 35/32 ∫ (1 - u²)³ du and its integral, both from 0.
+        // 35/32 ∫ (1 - u²)³ du, from 0.
         let lean = u * (T::of(1.09375) - w * (T::of(1.09375) - w * (T::of(0.65625) - w * T::of(0.15625))));
-        let spread = w * (T::of(0.546875) - w * (T::of(0.2734375) - w * (T::of(0.109375) - w * T::of(0.01953125))));
-        // At u = 1 the whole of the rate is one direction's: 1/2 + this + 0.36328125 = 1.
-        let both = width * (T::of(0.13671875) + spread);
+        // Its integral. At u = 1 the whole of the rate is one direction's: 1/2 + this = 1.
+        let spread = T::of(0.13671875)
+            + w * (T::of(0.546875) - w * (T::of(0.2734375) - w * (T::of(0.109375) - w * T::of(0.01953125))));
+        let both = width * spread;
+        let mean = half * rate;
         SplitRate {
-            extend: half * rate + both,
-            retract: half * rate - both,
+            extend: mean + both,
+            retract: mean - both,
             extend_probability: half + lean,
             retract_probability: half - lean,
         }
     }
 }
 
-/// Splits rates that share a variance; its root is taken at most once, and only if some rate is not clear.
-pub(crate) struct Splitter<T> {
-    variance: T,
-    sd: Option<T>,
+/// The variance that all rates of a step share; its root is taken at most once, and only if some rate is not clear.
+pub(crate) struct RateSpread<T: Scalar, S: Switch<T>> {
+    pub variance: T,
+    width: Option<S::Width>,
 }
 
-impl<T: Scalar> Splitter<T> {
+impl<T: Scalar, S: Switch<T>> RateSpread<T, S> {
+    #[inline(always)]
     pub(crate) const fn new(variance: T) -> Self {
-        Self { variance, sd: None }
+        Self { variance, width: None }
     }
 
+    /// `CLEAR²`: a rate is clear if its square is not less than this times the variance.
     #[inline(always)]
-    pub(crate) fn split<S: Switch<T>>(&mut self, rate: T) -> SplitRate<T> {
-        let (zero, one) = (T::zero(), T::one());
-        if rate * rate < T::of(S::CLEAR * S::CLEAR) * self.variance {
-            let variance = self.variance;
-            return S::blend(rate, *self.sd.get_or_insert_with(|| variance.sqrt()));
-        }
-        // Rate and variance zero: both directions have nothing to drive.
-        if rate > zero {
-            SplitRate { extend: rate, retract: zero, extend_probability: one, retract_probability: zero }
-        } else {
-            SplitRate { extend: zero, retract: rate, extend_probability: zero, retract_probability: one }
-        }
+    pub(crate) fn clear() -> T {
+        T::of(S::CLEAR * S::CLEAR)
+    }
+
+    /// Splits a rate that is not clear.
+    #[inline(always)]
+    pub(crate) fn blend(&mut self, rate: T) -> SplitRate<T> {
+        let variance = self.variance;
+        S::blend(rate, *self.width.get_or_insert_with(|| S::width(S::sd(variance))))
     }
 }

@@ -1,0 +1,120 @@
+use ohmstrain_model::{Branch, Response, Scalar, SensorLaw, StrainRange, SwitchedModel};
+
+use crate::curve::Regions;
+
+/// What a step needs besides the belief and does not change from step to step of one length.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct StepConstants<T, const B: usize> {
+    /// Transition of the motion.
+    pub motion: [[T; 2]; 2],
+    /// What the sum of old and new strain gains per old strain.
+    pub strain_sum: T,
+    /// What the pull toward the mean strain adds.
+    pub input: [T; 2],
+    /// What a moving phase's mean rate adds while stretching.
+    pub phase_input: [T; 2],
+    /// Covariances of ε with ε, v with ε, v with v.
+    pub noise: [T; 3],
+    pub branches: [BranchConstants<T, B>; B],
+    pub baseline_decay: T,
+    pub baseline_variance: T,
+}
+
+/// A branch over one step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct BranchConstants<T, const B: usize> {
+    pub decay: T,
+    /// Answer to ε and v, to the pull toward the mean strain, and to a phase's mean rate.
+    pub drive: [T; 2],
+    pub input: T,
+    pub phase_input: T,
+    /// Time over which a rate acts, s, and its inverse.
+    pub reach: T,
+    pub per_reach: T,
+    /// The drive's direction is clear if its square is not less than this times the rate's variance.
+    pub clear: T,
+    pub cross_noise: [T; 2],
+    /// Covariances with the branches up to this one.
+    pub noise: [T; B],
+    pub variance: T,
+}
+
+impl<T: Scalar, const B: usize> StepConstants<T, B> {
+    /// Of steps of `dt_s > 0` seconds; a rate is clear if its square is not less than `clear` variances.
+    pub(crate) fn new<const N: usize>(model: &SwitchedModel<T, 2, B, N>, dt_s: T, clear: T) -> Self {
+        let step = model.prepare(dt_s);
+        let response: &Response<T, 2, B> = step.response();
+        let motion = model.motion();
+        let push = motion.restoring()[0] * motion.rest_strain();
+        let phase_push = motion.restoring()[1] * motion.phase_rate();
+        let change = &response.motion_change;
+        let branch = |i: usize| {
+            let reach = -response.decay_change[i] * model.law().branches[i].tau_s;
+            BranchConstants {
+                decay: T::one() + response.decay_change[i],
+                drive: response.drive[i],
+                input: response.drive_input[i] * push,
+                phase_input: response.drive_input[i] * phase_push,
+                reach,
+                per_reach: T::one() / reach,
+                clear: clear * reach * reach,
+                cross_noise: response.cross_noise[i],
+                noise: response.branch_noise[i],
+                variance: step.branch_variance()[i],
+            }
+        };
+        Self {
+            motion: [[T::one() + change[0][0], change[0][1]], [change[1][0], T::one() + change[1][1]]],
+            strain_sum: T::of(2.0) + change[0][0],
+            input: response.input.map(|answer| answer * push),
+            phase_input: response.input.map(|answer| answer * phase_push),
+            noise: [response.motion_noise[0][0], response.motion_noise[1][0], response.motion_noise[1][1]],
+            branches: core::array::from_fn(branch),
+            baseline_decay: T::one() + step.baseline_change(),
+            baseline_variance: step.baseline_variance(),
+        }
+    }
+}
+
+/// The gains of all branches.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Gains<T> {
+    pub extend: Gain<T>,
+    pub retract: Gain<T>,
+}
+
+/// A gain as a function of the sum of old and new strain: twice the strain in the middle of the step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Gain<T> {
+    pub at_zero: T,
+    pub growth: T,
+}
+
+impl<T: Scalar> Gain<T> {
+    #[inline(always)]
+    pub(crate) fn at(&self, strain_sum: T) -> T {
+        self.at_zero + self.growth * strain_sum
+    }
+}
+
+impl<T: Scalar> Gains<T> {
+    /// Within the range, where gains are affine in strain, and beyond its ends, where they keep their border values.
+    pub(crate) fn by_region<const B: usize>(law: &SensorLaw<T, B>) -> Regions<T, [Self; B]> {
+        let StrainRange { lower, upper } = law.range;
+        let beyond = |border: T| law.branches.map(|branch| Self::of(&branch, Some(border)));
+        let within = law.branches.map(|branch| Self::of(&branch, None));
+        let sums = StrainRange { lower: lower + lower, upper: upper + upper };
+        Regions::new(&sums, beyond(lower), within, beyond(upper))
+    }
+
+    fn of(branch: &Branch<T>, border: Option<T>) -> Self {
+        let gain = |at_zero: T, growth: T| match border {
+            None => Gain { at_zero, growth: T::of(0.5) * growth },
+            Some(border) => Gain { at_zero: at_zero + growth * border, growth: T::zero() },
+        };
+        Self {
+            extend: gain(branch.extend_gain, branch.extend_gain_slope),
+            retract: gain(branch.retract_gain, branch.retract_gain_slope),
+        }
+    }
+}
