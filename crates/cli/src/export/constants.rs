@@ -33,12 +33,15 @@ pub struct Exported {
     motion: [[Literal; 2]; 2],
     motion_input: [Literal; 2],
     motion_noise: [Literal; 3],
-    /// Derivative of the sum of old and new strain by the old one.
-    strain_sum: Literal,
+    /// What the rate's new variance takes from the old ones of strain, of both, of rate.
+    rate_squares: [Literal; 3],
     /// Below, within and above the law's range.
     gain_regions: [Vec<GainConstants>; 3],
     branches: Vec<BranchConstants>,
     baseline_decay: Literal,
+    /// Times the branches' decays, and times itself.
+    baseline_decays: Vec<Literal>,
+    baseline_square: Literal,
     baseline_variance: Literal,
     reading_variance: Literal,
     range_lower: Literal,
@@ -58,6 +61,8 @@ pub struct Exported {
 struct BranchConstants {
     tau_s: Literal,
     decay: Literal,
+    /// Times the decays of all branches.
+    decays: Vec<Literal>,
     drive: [Literal; 2],
     drive_input: Literal,
     reach_s: Literal,
@@ -198,6 +203,10 @@ impl Exported {
         let response = step.response();
         let push = model.motion().restoring()[0] * model.motion().rest_strain();
         let change = &response.motion_change;
+        let motion = [[1.0 + change[0][0], change[0][1]], [change[1][0], 1.0 + change[1][1]]];
+        let [_, b] = motion;
+        let baseline_decay = 1.0 + step.baseline_change();
+        let decays = response.decay_change.map(|change| 1.0 + change);
         let exported = Self {
             made_by: made_by.into(),
             version: env!("CARGO_PKG_VERSION"),
@@ -216,15 +225,16 @@ impl Exported {
             states: N,
             start_mean: literals(start.mean.iter()),
             start_variance: (0..N).map(|i| Literal(start.covariance[(i, i)])).collect(),
-            motion: [[1.0 + change[0][0], change[0][1]], [change[1][0], 1.0 + change[1][1]]]
-                .map(|row| row.map(Literal)),
+            motion: motion.map(|row| row.map(Literal)),
             motion_input: response.input.map(|answer| Literal(answer * push)),
             motion_noise: [response.motion_noise[0][0], response.motion_noise[1][0], response.motion_noise[1][1]]
                 .map(Literal),
-            strain_sum: Literal(2.0 + change[0][0]),
+            rate_squares: [b[0] * b[0], 2.0 * b[0] * b[1], b[1] * b[1]].map(Literal),
             gain_regions: [Some(law.range.lower), None, Some(law.range.upper)].map(|border| gains(law, border)),
             branches: (0..B).map(|i| branch(&sensor, i)).collect(),
-            baseline_decay: Literal(1.0 + step.baseline_change()),
+            baseline_decay: Literal(baseline_decay),
+            baseline_decays: decays.iter().map(|decay| Literal(baseline_decay * decay)).collect(),
+            baseline_square: Literal(baseline_decay * baseline_decay),
             baseline_variance: Literal(step.baseline_variance()),
             reading_variance: Literal(noise.reading_sd * noise.reading_sd),
             range_lower: Literal(law.range.lower),
@@ -285,6 +295,7 @@ fn branch<const B: usize, const N: usize>(sensor: &FixedRate<B, N>, i: usize) ->
     BranchConstants {
         tau_s: Literal(law.tau_s),
         decay: Literal(1.0 + response.decay_change[i]),
+        decays: response.decay_change.map(|other| Literal((1.0 + response.decay_change[i]) * (1.0 + other))).into(),
         drive: response.drive[i].map(Literal),
         drive_input: Literal(response.drive_input[i] * push),
         reach_s: Literal(reach_s),

@@ -27,15 +27,23 @@ pub struct Row {
     pub extra_sd: f64,
 }
 
-/// The rows of the motion, with white noise of `reading_sd`.
-pub fn rows<const B: usize>(law: &SensorLaw<f64, B>, dt_s: f64, reading_sd: f64) -> Vec<Row> {
+/// How many times slower than the short motion one is that stretches at `speed`, 1/s; no more than a thousand times.
+pub fn slowness<const B: usize>(law: &SensorLaw<f64, B>, dt_s: f64, speed: f64) -> usize {
+    let ((start, from), (end, to)) = (CORNERS[1], CORNERS[2]);
+    let steps = (to - from) * law.range.span() / (speed * dt_s);
+    (steps / (end - start) as f64).ceil().clamp(1.0, 1000.0) as usize
+}
+
+/// The rows of the motion, so many times slower, with white noise of `reading_sd`.
+pub fn rows<const B: usize>(law: &SensorLaw<f64, B>, dt_s: f64, reading_sd: f64, slowness: usize) -> Vec<Row> {
     let mut random = ChaCha8Rng::seed_from_u64(SEED);
     let mut relaxation = [0.0; B];
     let mut rows = Vec::new();
     for corners in CORNERS.windows(2) {
         let ((start, from), (end, to)) = (corners[0], corners[1]);
-        let per_step = (to - from) / (end - start) as f64 * law.range.span();
-        for step in 1..=end - start {
+        let steps = (end - start) * slowness;
+        let per_step = (to - from) / steps as f64 * law.range.span();
+        for step in 1..=steps {
             let strain = law.range.lower + from * law.range.span() + per_step * step as f64;
             let rate = per_step / dt_s;
             let phase = match rate {

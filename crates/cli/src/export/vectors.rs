@@ -18,7 +18,7 @@ pub struct Vectors {
     /// Where only expf may differ, and where products may be contracted.
     tolerance_ulp: u64,
     contracted_tolerance_ulp: u64,
-    /// Root mean squared errors of the strain, both filters.
+    /// Root mean squared errors of the strain in the same motion at the calibration's speed, both filters.
     ekf_error: String,
     fixed_error: String,
     rows: Vec<Vector>,
@@ -57,7 +57,7 @@ impl Vectors {
         sensor: &FixedRate<B, N>,
         settled: &Settled<B, N, L>,
     ) -> Result<Self, ExportError> {
-        let inputs = inputs(sensor);
+        let inputs = inputs(sensor, 1);
         let ekf = |nudged| run_ekf::<B, N, L>(sensor, &inputs, nudged);
         let fixed = |nudged| run_fixed(sensor, settled, &inputs, nudged);
         let strains = |nudged| Ok(ekf(nudged)?.iter().map(|estimate| estimate.0).collect());
@@ -74,20 +74,22 @@ impl Vectors {
             fixed: Literal(*fixed),
         };
         let exact = sensor.is_exact();
+        let speed = sensor.model.motion().stationary_variance()[1].sqrt();
+        let slow = inputs(sensor, motion::slowness(&sensor.law, f64::from(sensor.dt_s), f64::from(speed)));
         Ok(Self {
             seed: motion::SEED,
             ulp: Literal(ulp),
             tolerance_ulp: if exact { 0 } else { tolerance(SPACINGS[0]) },
             contracted_tolerance_ulp: tolerance(SPACINGS[1]),
-            ekf_error: error(&inputs, estimates.iter().map(|estimate| estimate.0)),
-            fixed_error: error(&inputs, fixed.iter().copied()),
+            ekf_error: error(&slow, run_ekf::<B, N, L>(sensor, &slow, None)?.iter().map(|estimate| estimate.0)),
+            fixed_error: error(&slow, run_fixed(sensor, settled, &slow, None)?.iter().copied()),
             rows: inputs.iter().zip(&estimates).zip(&fixed).map(row).collect(),
         })
     }
 }
 
-/// The motion's readings in the sensor's unit.
-fn inputs<const B: usize, const N: usize>(sensor: &FixedRate<B, N>) -> Vec<Input> {
+/// The readings of a motion so many times slower, in the sensor's unit.
+fn inputs<const B: usize, const N: usize>(sensor: &FixedRate<B, N>, slowness: usize) -> Vec<Input> {
     let rest = f64::from(sensor.rest_reading);
     let input = |row: motion::Row| Input {
         true_strain: row.strain,
@@ -95,7 +97,7 @@ fn inputs<const B: usize, const N: usize>(sensor: &FixedRate<B, N>) -> Vec<Input
         reading_sd: (rest * row.extra_sd) as f32,
     };
     let reading_sd = f64::from(sensor.model.noise().reading_sd);
-    motion::rows(&sensor.law, f64::from(sensor.dt_s), reading_sd).into_iter().map(input).collect()
+    motion::rows(&sensor.law, f64::from(sensor.dt_s), reading_sd, slowness).into_iter().map(input).collect()
 }
 
 /// A row relative to R₀, computed as on the microcontroller.

@@ -34,16 +34,16 @@ static const float MOTION[2][2] = {
     {<< motion[1][0] >>f, << motion[1][1] >>f},
 };
 static const float MOTION_INPUT[2] = {<< motion_input[0] >>f, << motion_input[1] >>f};
+/* What the variance of the rate takes from the old one of strain, the old covariance, and its own. */
+static const float RATE_SQUARES[3] = {<< rate_squares[0] >>f, << rate_squares[1] >>f, << rate_squares[2] >>f};
 /* Covariances strain-strain, rate-strain, rate-rate of the noise. */
 static const float MOTION_NOISE[3] = {<< motion_noise[0] >>f, << motion_noise[1] >>f, << motion_noise[2] >>f};
 
 {% if branches %}
-/* Derivative of the sum of old and new strain by the old strain. */
-static const float STRAIN_SUM = << strain_sum >>f;
-
 /* A relaxing branch over one interval: c' = decay c + gain (drive . [strain, rate] + drive_input) + noise. */
 typedef struct branch {
     float decay;
+    float decays[BRANCHES]; /* times the decay of each branch */
     float drive[2];
     float drive_input;
     float reach_s;   /* time over which a rate acts, s */
@@ -58,6 +58,7 @@ static const branch BRANCH[BRANCHES] = {
 {% for b in branches %}
     {
         .decay = << b.decay >>f,
+        .decays = {{% for x in b.decays %}<< x >>f<< ", " if not loop.last >>{% endfor %}},
         .drive = {<< b.drive[0] >>f, << b.drive[1] >>f},
         .drive_input = << b.drive_input >>f,
         .reach_s = << b.reach_s >>f,
@@ -95,6 +96,11 @@ static const gains GAINS[3][BRANCHES] = {
 {% endif %}
 /* The slow drift that the law does not explain. */
 static const float BASELINE_DECAY = << baseline_decay >>f;
+static const float BASELINE_SQUARE = << baseline_square >>f;
+{% if branches %}
+/* Times the decay of each branch. */
+static const float BASELINE_DECAYS[BRANCHES] = {{% for x in baseline_decays %}<< x >>f<< ", " if not loop.last >>{% endfor %}};
+{% endif %}
 static const float BASELINE_VARIANCE = << baseline_variance >>f;
 /* White noise of a reading, relative to the rest reading, squared. */
 static const float READING_VARIANCE = << reading_variance >>f;
@@ -178,7 +184,7 @@ typedef struct split {
  * three deviations on the direction is clear and there is nothing to split. */
 static split split_rate(float rate, rate_spread *spread)
 {
-    float u, w, lean, both, mean;
+    float u, w, fourth, lean, both, mean;
     split out;
 
     if (!(spread->width > 0.0f)) {
@@ -187,8 +193,9 @@ static split split_rate(float rate, rate_spread *spread)
     }
     u = rate * spread->per_width;
     w = u * u;
-    lean = u * (1.09375f - w * (1.09375f - w * (0.65625f - w * 0.15625f)));
-    both = spread->width * (0.13671875f + w * (0.546875f - w * (0.2734375f - w * (0.109375f - w * 0.01953125f))));
+    fourth = w * w;
+    lean = u * ((1.09375f - w * 1.09375f) + fourth * (0.65625f - w * 0.15625f));
+    both = spread->width * ((0.13671875f + w * 0.546875f) - fourth * ((0.2734375f - w * 0.109375f) + fourth * 0.01953125f));
     mean = 0.5f * rate;
     out.extend = mean + both;
     out.retract = mean - both;
@@ -214,12 +221,15 @@ static float split_slope(const split *rate, float extend, float retract)
 /* ---- Mean: what both filters share ----------------------------------------------------------------------------- */
 
 {% if branches %}
-/* What an interval does to one branch. */
+/* What an interval does to one branch. Its gain grows with the sum of old and new strain: the old one's share is in row, the
+ * new one's is added once its covariances are known. */
 typedef struct driven {
-    float change; /* what the motion adds to it */
-    float gain;   /* with which it was driven */
-    float pull;   /* growth of the change with the sum of old and new strain */
-    float row[2]; /* of the Jacobian: derivatives with respect to old strain and rate */
+    float change;     /* what the motion adds to the branch */
+    float gain;       /* with which it was driven */
+    float pull;       /* growth of the change with old or new strain */
+    float row[2];     /* answer to old strain and rate */
+    float kept[2];    /* what is left of the covariances with old strain and rate */
+    float carried[2]; /* the same with what the motion adds */
 } driven;
 
 static float gain_at(gain g, float strain_sum)
@@ -244,8 +254,8 @@ static driven drive_branch(const branch *b, const gains *g, float strain_sum, fl
         out.change = out.gain * unit;
         out.pull = known.growth * unit;
     }
-    out.row[0] = out.gain * b->drive[0] + out.pull * STRAIN_SUM;
-    out.row[1] = out.gain * b->drive[1] + out.pull * MOTION[0][1];
+    out.row[0] = out.pull + out.gain * b->drive[0];
+    out.row[1] = out.gain * b->drive[1];
     return out;
 }
 
@@ -317,86 +327,102 @@ static float relative(float reading, float rest_reading)
 
 /* ---- The extended Kalman filter -------------------------------------------------------------------------------- */
 
-/* The baseline's row of the covariance, from the others' old values. */
-static void predict_baseline(float p[ENTRIES]{% if branches %}, const driven by[BRANCHES]{% endif %})
-{
-    const float with_strain = BASELINE_DECAY * p[AT(LAST, 0)], with_rate = BASELINE_DECAY * p[AT(LAST, 1)];
 {% if branches %}
-    int i;
+/* What the old covariances of branch i bring along; the motion's and the branches' are still the old ones. */
+static void carry_branch(const float p[ENTRIES], driven *by, int i)
+{
+    const float decay = BRANCH[i].decay, *row = by->row;
 
-    for (i = 0; i < BRANCHES; i++) {
-        const float *row = by[i].row;
-        const float kept = BASELINE_DECAY * p[AT(LAST, 2 + i)];
-        p[AT(LAST, 2 + i)] = row[0] * with_strain + row[1] * with_rate + BRANCH[i].decay * kept;
-    }
-{% endif %}
-    p[AT(LAST, 0)] = MOTION[0][0] * with_strain + MOTION[0][1] * with_rate;
-    p[AT(LAST, 1)] = MOTION[1][0] * with_strain + MOTION[1][1] * with_rate;
-    p[AT(LAST, LAST)] = BASELINE_VARIANCE + BASELINE_DECAY * (BASELINE_DECAY * p[AT(LAST, LAST)]);
+    by->kept[0] = decay * p[AT(2 + i, 0)];
+    by->kept[1] = decay * p[AT(2 + i, 1)];
+    by->carried[0] = by->kept[0] + row[0] * p[AT(0, 0)] + row[1] * p[AT(1, 0)];
+    by->carried[1] = by->kept[1] + row[0] * p[AT(1, 0)] + row[1] * p[AT(1, 1)];
 }
 
-{% if branches %}
-/* One branch's row of the covariance; the rows before it still have their old values. */
+/* Row of branch i in the covariance; the motion's rows and those of the branches before it are new. */
 static void predict_branch(float p[ENTRIES], const driven by[BRANCHES], int i)
 {
     const branch *b = &BRANCH[i];
-    const float drive = by[i].gain, pull = by[i].pull, *row = by[i].row;
+    const driven *own = &by[i];
+    const float drive = own->gain, pull = own->pull, *row = own->row, *kept = own->kept, *carried = own->carried;
     const int c = 2 + i;
-    /* Covariances of the new branch with the old strain and rate. */
-    const float strain = row[0] * p[AT(0, 0)] + row[1] * p[AT(1, 0)] + b->decay * p[AT(c, 0)];
-    const float rate = row[0] * p[AT(1, 0)] + row[1] * p[AT(1, 1)] + b->decay * p[AT(c, 1)];
-    /* Covariances of its noise with that of strain and rate. */
-    const float cross[2] = {
-        drive * b->cross_noise[0] + pull * MOTION_NOISE[0],
-        drive * b->cross_noise[1] + pull * MOTION_NOISE[1],
-    };
+    /* With new strain and rate, but for the new strain's share in the gain. */
+    const float strain = drive * b->cross_noise[0] + MOTION[0][0] * carried[0] + MOTION[0][1] * carried[1];
+    const float rate = drive * b->cross_noise[1] + MOTION[1][0] * carried[0] + MOTION[1][1] * carried[1];
+    const float with_strain = strain + pull * p[AT(0, 0)];
     int k;
 
-    for (k = 0; k <= i; k++) {
-        const branch *other = &BRANCH[k];
-        const driven *to = &by[k];
-        const float kept = row[0] * p[AT(2 + k, 0)] + row[1] * p[AT(2 + k, 1)] + b->decay * p[AT(c, 2 + k)];
-        const float noise = drive * b->branch_noise[k] + pull * other->cross_noise[0];
-        const float own = k == i ? b->variance : 0.0f;
-        p[AT(c, 2 + k)] = own + to->gain * noise + to->pull * cross[0] + to->row[0] * strain + to->row[1] * rate +
-                          other->decay * kept;
+    for (k = 0; k < i; k++) {
+        const driven *other = &by[k];
+        p[AT(c, 2 + k)] = other->gain * (drive * b->branch_noise[k]) + other->row[0] * carried[0] +
+                          other->row[1] * carried[1] + row[0] * other->kept[0] + row[1] * other->kept[1] +
+                          b->decays[k] * p[AT(c, 2 + k)] + other->pull * strain + pull * p[AT(2 + k, 0)];
     }
-    p[AT(c, 0)] = cross[0] + MOTION[0][0] * strain + MOTION[0][1] * rate;
-    p[AT(c, 1)] = cross[1] + MOTION[1][0] * strain + MOTION[1][1] * rate;
+    p[AT(c, c)] = b->variance + drive * (drive * b->branch_noise[i]) + row[0] * (carried[0] + kept[0]) +
+                  row[1] * (carried[1] + kept[1]) + b->decays[i] * p[AT(c, c)] + pull * (strain + with_strain);
+    p[AT(c, 0)] = with_strain;
+    p[AT(c, 1)] = rate + pull * p[AT(1, 0)];
 }
 
 {% endif %}
-/* Mean and covariance one interval on. Rows go from the last to the first: each needs the old values before it. */
-static rate_spread predict(float x[STATES], float p[ENTRIES])
+/* The baseline's row of the covariance, from its own old values. */
+static void predict_baseline(float p[ENTRIES]{% if branches %}, const driven by[BRANCHES]{% endif %})
+{
+    const float kept[2] = {BASELINE_DECAY * p[AT(LAST, 0)], BASELINE_DECAY * p[AT(LAST, 1)]};
+{% if branches %}
+    int i;
+{% endif %}
+
+    p[AT(LAST, 0)] = MOTION[0][0] * kept[0] + MOTION[0][1] * kept[1];
+    p[AT(LAST, 1)] = MOTION[1][0] * kept[0] + MOTION[1][1] * kept[1];
+{% if branches %}
+    for (i = 0; i < BRANCHES; i++) {
+        p[AT(LAST, 2 + i)] = by[i].row[0] * kept[0] + by[i].row[1] * kept[1] +
+                             BASELINE_DECAYS[i] * p[AT(LAST, 2 + i)] + by[i].pull * p[AT(LAST, 0)];
+    }
+{% endif %}
+    p[AT(LAST, LAST)] = BASELINE_VARIANCE + BASELINE_SQUARE * p[AT(LAST, LAST)];
+}
+
+/* Strain and rate in the covariance; the rate's new variance is known. */
+static void predict_motion(float p[ENTRIES], float rate_variance)
 {
     const float from_strain[2] = {
         MOTION[0][0] * p[AT(0, 0)] + MOTION[0][1] * p[AT(1, 0)],
         MOTION[0][0] * p[AT(1, 0)] + MOTION[0][1] * p[AT(1, 1)],
     };
-    const float from_rate[2] = {
-        MOTION[1][0] * p[AT(0, 0)] + MOTION[1][1] * p[AT(1, 0)],
-        MOTION[1][0] * p[AT(1, 0)] + MOTION[1][1] * p[AT(1, 1)],
-    };
+
+    p[AT(0, 0)] = MOTION_NOISE[0] + MOTION[0][0] * from_strain[0] + MOTION[0][1] * from_strain[1];
+    p[AT(1, 0)] = MOTION_NOISE[1] + MOTION[1][0] * from_strain[0] + MOTION[1][1] * from_strain[1];
+    p[AT(1, 1)] = rate_variance;
+}
+
+/* Mean and covariance one interval on; returns how far the rate spreads at its end. */
+static rate_spread predict(float x[STATES], float p[ENTRIES])
+{
     rate_spread spread = {0.0f, 0.0f, 0.0f};
 {% if branches %}
     driven by[BRANCHES];
     int i;
 {% endif %}
 
-    spread.variance = MOTION_NOISE[2] + MOTION[1][0] * from_rate[0] + MOTION[1][1] * from_rate[1];
+    spread.variance = MOTION_NOISE[2] + RATE_SQUARES[0] * p[AT(0, 0)] + RATE_SQUARES[1] * p[AT(1, 0)] +
+                      RATE_SQUARES[2] * p[AT(1, 1)];
 {% if branches %}
     predict_mean(x, &spread, by);
-    predict_baseline(p, by);
-    for (i = BRANCHES - 1; i >= 0; i--) {
+    for (i = 0; i < BRANCHES; i++) {
+        carry_branch(p, &by[i], i);
+    }
+    predict_motion(p, spread.variance);
+    for (i = 0; i < BRANCHES; i++) {
         predict_branch(p, by, i);
     }
+    predict_baseline(p, by);
 {% else %}
     predict_mean(x);
+    predict_motion(p, spread.variance);
     predict_baseline(p);
 {% endif %}
-    p[AT(0, 0)] = MOTION_NOISE[0] + MOTION[0][0] * from_strain[0] + MOTION[0][1] * from_strain[1];
-    p[AT(1, 0)] = MOTION_NOISE[1] + MOTION[1][0] * from_strain[0] + MOTION[1][1] * from_strain[1];
-    p[AT(1, 1)] = spread.variance;
     return spread;
 }
 
