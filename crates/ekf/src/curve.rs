@@ -56,7 +56,7 @@ impl<T: Scalar> Curve<T> for Cubic<T> {
 
     #[inline(always)]
     fn value_and_slope(&self, strain: T) -> (T, T) {
-        let [a0, a1, a2, a3] = self.regions.at(strain);
+        let [a0, a1, a2, a3] = *self.regions.at(strain);
         // Horner's scheme; the slope is the scheme applied to its own results.
         let b2 = a2 + strain * a3;
         let b1 = a1 + strain * b2;
@@ -79,17 +79,9 @@ impl<T: Scalar, V> Regions<T, V> {
         Self { lower: range.lower, upper: range.upper, within, below, above }
     }
 
-    #[inline(always)]
-    pub(crate) fn at(&self, place: T) -> V
-    where
-        V: Copy,
-    {
-        *self.of(place)
-    }
-
     /// What holds at `place`; within, if that is not a number.
     #[inline(always)]
-    pub(crate) fn of(&self, place: T) -> &V {
+    pub(crate) fn at(&self, place: T) -> &V {
         if place < self.lower {
             &self.below
         } else if place > self.upper {

@@ -7,8 +7,8 @@ use crate::curve::Regions;
 pub(crate) struct StepConstants<T, const B: usize> {
     /// Transition of the motion.
     pub motion: [[T; 2]; 2],
-    /// What the sum of old and new strain gains per old strain.
-    pub strain_sum: T,
+    /// What the rate's new variance takes from the old ones of strain, of both, of rate.
+    pub rate_squares: [T; 3],
     /// What the pull toward the mean strain adds.
     pub input: [T; 2],
     /// What a moving phase's mean rate adds while stretching.
@@ -17,6 +17,9 @@ pub(crate) struct StepConstants<T, const B: usize> {
     pub noise: [T; 3],
     pub branches: [BranchConstants<T, B>; B],
     pub baseline_decay: T,
+    /// Times the branches' decays, and times itself.
+    pub baseline_decays: [T; B],
+    pub baseline_square: T,
     pub baseline_variance: T,
 }
 
@@ -24,6 +27,8 @@ pub(crate) struct StepConstants<T, const B: usize> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct BranchConstants<T, const B: usize> {
     pub decay: T,
+    /// Times the decays of all branches.
+    pub decays: [T; B],
     /// Answer to ε and v, to the pull toward the mean strain, and to a phase's mean rate.
     pub drive: [T; 2],
     pub input: T,
@@ -48,10 +53,15 @@ impl<T: Scalar, const B: usize> StepConstants<T, B> {
         let push = motion.restoring()[0] * motion.rest_strain();
         let phase_push = motion.restoring()[1] * motion.phase_rate();
         let change = &response.motion_change;
+        let motion = [[T::one() + change[0][0], change[0][1]], [change[1][0], T::one() + change[1][1]]];
+        let [_, b] = motion;
+        let decay = |i: usize| T::one() + response.decay_change[i];
+        let baseline_decay = T::one() + step.baseline_change();
         let branch = |i: usize| {
             let reach = -response.decay_change[i] * model.law().branches[i].tau_s;
             BranchConstants {
-                decay: T::one() + response.decay_change[i],
+                decay: decay(i),
+                decays: core::array::from_fn(|k| decay(i) * decay(k)),
                 drive: response.drive[i],
                 input: response.drive_input[i] * push,
                 phase_input: response.drive_input[i] * phase_push,
@@ -64,13 +74,15 @@ impl<T: Scalar, const B: usize> StepConstants<T, B> {
             }
         };
         Self {
-            motion: [[T::one() + change[0][0], change[0][1]], [change[1][0], T::one() + change[1][1]]],
-            strain_sum: T::of(2.0) + change[0][0],
+            motion,
+            rate_squares: [b[0] * b[0], T::of(2.0) * b[0] * b[1], b[1] * b[1]],
             input: response.input.map(|answer| answer * push),
             phase_input: response.input.map(|answer| answer * phase_push),
             noise: [response.motion_noise[0][0], response.motion_noise[1][0], response.motion_noise[1][1]],
             branches: core::array::from_fn(branch),
-            baseline_decay: T::one() + step.baseline_change(),
+            baseline_decay,
+            baseline_decays: core::array::from_fn(|i| baseline_decay * decay(i)),
+            baseline_square: baseline_decay * baseline_decay,
             baseline_variance: step.baseline_variance(),
         }
     }

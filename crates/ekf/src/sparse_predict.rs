@@ -7,15 +7,19 @@ use crate::sparse_parts::{Part, Parts};
 use crate::switch::RateSpread;
 use crate::{SparseEkf, Switch};
 
-/// What a step does to one branch, and with which gain it was driven.
+/// What a step does to one branch. The gain grows with the sum of old and new strain: the old one's share is in `row`, the
+/// new one's is added when its covariances are known.
 #[derive(Clone, Copy)]
 struct Driven<T> {
     change: T,
     gain: T,
-    /// Growth of the change with the sum of old and new strain.
+    /// Growth of the change with old or new strain.
     pull: T,
-    /// Row of the Jacobian: strain and rate.
+    /// Answer to old strain and rate.
     row: [T; 2],
+    /// What is left of the covariances with old strain and rate, and these with what the motion adds.
+    kept: [T; 2],
+    carried: [T; 2],
 }
 
 impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G> SparseEkf<T, S, B, N, G> {
@@ -32,42 +36,44 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G> SparseEkf<T, S,
         let step = &self.step;
         let [a, b] = step.motion;
         let Parts { strain, rate, strain_variance, strain_rate, rate_variance, .. } = *parts;
-        let toward = match phase {
-            Some(Phase::Extend) => T::one(),
-            Some(_) => -T::one(),
-            None => T::zero(),
-        };
         let input = |toward_strain: T, toward_rate: T| match phase {
             None => toward_strain,
-            Some(_) => toward_strain + toward * toward_rate,
+            Some(Phase::Extend) => toward_strain + toward_rate,
+            Some(_) => toward_strain - toward_rate,
         };
         parts.strain = input(step.input[0], step.phase_input[0]) + a[0] * strain + a[1] * rate;
         parts.rate = input(step.input[1], step.phase_input[1]) + b[0] * strain + b[1] * rate;
         let strain_sum = strain + parts.strain;
 
         let from_strain = [a[0] * strain_variance + a[1] * strain_rate, a[0] * strain_rate + a[1] * rate_variance];
-        let from_rate = [b[0] * strain_variance + b[1] * strain_rate, b[0] * strain_rate + b[1] * rate_variance];
-        let mut spread = RateSpread::new(step.noise[2] + b[0] * from_rate[0] + b[1] * from_rate[1]);
+        let squares = step.rate_squares;
+        parts.strain_variance = step.noise[0] + a[0] * from_strain[0] + a[1] * from_strain[1];
+        parts.strain_rate = step.noise[1] + b[0] * from_strain[0] + b[1] * from_strain[1];
+        parts.rate_variance =
+            step.noise[2] + squares[0] * strain_variance + squares[1] * strain_rate + squares[2] * rate_variance;
+        let mut spread = RateSpread::new(parts.rate_variance);
 
-        let gains = self.gains.of(strain_sum);
+        let gains = self.gains.at(strain_sum);
         let driven: [Driven<T>; B] = core::array::from_fn(|i| {
-            let (branch, gains) = (&step.branches[i], &gains[i]);
-            let unit = input(branch.input, branch.phase_input) + branch.drive[0] * strain + branch.drive[1] * rate;
+            let (branch, gains, part) = (&step.branches[i], &gains[i], &parts.branches[i]);
+            let drive = branch.drive;
+            let unit = input(branch.input, branch.phase_input) + drive[0] * strain + drive[1] * rate;
             let (change, gain, pull) = match phase {
                 None => split(branch, gains, strain_sum, unit, &mut spread),
                 Some(phase) => known(gains, strain_sum, unit, phase == Phase::Extend),
             };
-            let row = [gain * branch.drive[0] + pull * step.strain_sum, gain * branch.drive[1] + pull * a[1]];
-            Driven { change, gain, pull, row }
+            let row = [pull + gain * drive[0], gain * drive[1]];
+            let kept = [branch.decay * part.with_strain, branch.decay * part.with_rate];
+            let carried = [
+                kept[0] + row[0] * strain_variance + row[1] * strain_rate,
+                kept[1] + row[0] * strain_rate + row[1] * rate_variance,
+            ];
+            Driven { change, gain, pull, row, kept, carried }
         });
-
+        predict_branches(step, parts, &driven);
         if Self::HAS_BASELINE {
             predict_baseline(step, &mut parts.baseline, &driven);
         }
-        predict_branches(step, parts, &driven);
-        parts.strain_variance = step.noise[0] + a[0] * from_strain[0] + a[1] * from_strain[1];
-        parts.strain_rate = step.noise[1] + b[0] * from_strain[0] + b[1] * from_strain[1];
-        parts.rate_variance = spread.variance;
         spread
     }
 
@@ -77,20 +83,23 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G> SparseEkf<T, S,
         let zero = T::zero();
         let step = &self.step;
         (parts.rate, parts.strain_rate, parts.rate_variance) = (zero, zero, zero);
-        let relax = |part: &mut Part<T, B>, decay: T, variance: T| {
+        let relax = |part: &mut Part<T, B>, decay: T, decays: &[T; B]| {
             part.mean *= decay;
             part.with_strain *= decay;
             part.with_rate = zero;
-            for (with, other) in part.with.iter_mut().zip(&step.branches) {
-                *with *= decay * other.decay;
+            for (with, decays) in part.with.iter_mut().zip(decays) {
+                *with *= *decays;
             }
-            part.variance = variance + decay * (decay * part.variance);
         };
-        for (part, branch) in parts.branches.iter_mut().zip(&step.branches) {
-            relax(part, branch.decay, branch.variance);
+        for i in 0..B {
+            let (part, branch) = (&mut parts.branches[i], &step.branches[i]);
+            relax(part, branch.decay, &branch.decays);
+            part.variance = branch.variance + branch.decays[i] * part.variance;
         }
         if Self::HAS_BASELINE {
-            relax(&mut parts.baseline, step.baseline_decay, step.baseline_variance);
+            let part = &mut parts.baseline;
+            relax(part, step.baseline_decay, &step.baseline_decays);
+            part.variance = step.baseline_variance + step.baseline_square * part.variance;
         }
     }
 }
@@ -124,7 +133,46 @@ fn split<T: Scalar, S: Switch<T>, const B: usize>(
     )
 }
 
-/// The baseline's row, from the others' old values.
+/// The branches' covariances with the new motion, which is in `parts` already, and with each other.
+#[inline(always)]
+fn predict_branches<T: Scalar, const B: usize>(
+    step: &StepConstants<T, B>,
+    parts: &mut Parts<T, B>,
+    driven: &[Driven<T>; B],
+) {
+    let [a, b] = step.motion;
+    for i in 0..B {
+        let (branch, Driven { change, gain, pull, row, kept, carried }) = (&step.branches[i], driven[i]);
+        // Without the new strain's share in the gain.
+        let strain = gain * branch.cross_noise[0] + a[0] * carried[0] + a[1] * carried[1];
+        let rate = gain * branch.cross_noise[1] + b[0] * carried[0] + b[1] * carried[1];
+        let with_strain = strain + pull * parts.strain_variance;
+        let mut new = parts.branches[i];
+        for k in 0..i {
+            let other = &driven[k];
+            new.with[k] = other.gain * (gain * branch.noise[k])
+                + other.row[0] * carried[0]
+                + other.row[1] * carried[1]
+                + row[0] * other.kept[0]
+                + row[1] * other.kept[1]
+                + branch.decays[k] * new.with[k]
+                + other.pull * strain
+                + pull * parts.branches[k].with_strain;
+        }
+        new.variance = branch.variance
+            + gain * (gain * branch.noise[i])
+            + row[0] * (carried[0] + kept[0])
+            + row[1] * (carried[1] + kept[1])
+            + branch.decays[i] * new.variance
+            + pull * (strain + with_strain);
+        new.mean = change + branch.decay * new.mean;
+        new.with_strain = with_strain;
+        new.with_rate = rate + pull * parts.strain_rate;
+        parts.branches[i] = new;
+    }
+}
+
+/// The baseline's covariances, from its own old ones.
 #[inline(always)]
 fn predict_baseline<T: Scalar, const B: usize>(
     step: &StepConstants<T, B>,
@@ -133,50 +181,14 @@ fn predict_baseline<T: Scalar, const B: usize>(
 ) {
     let [a, b] = step.motion;
     let decay = step.baseline_decay;
-    let (with_strain, with_rate) = (decay * part.with_strain, decay * part.with_rate);
+    let kept = [decay * part.with_strain, decay * part.with_rate];
+    part.with_strain = a[0] * kept[0] + a[1] * kept[1];
+    part.with_rate = b[0] * kept[0] + b[1] * kept[1];
     for i in 0..B {
-        let [on_strain, on_rate] = driven[i].row;
-        let kept = decay * part.with[i];
-        part.with[i] = on_strain * with_strain + on_rate * with_rate + step.branches[i].decay * kept;
+        let Driven { pull, row, .. } = driven[i];
+        part.with[i] =
+            row[0] * kept[0] + row[1] * kept[1] + step.baseline_decays[i] * part.with[i] + pull * part.with_strain;
     }
     part.mean *= decay;
-    part.with_strain = a[0] * with_strain + a[1] * with_rate;
-    part.with_rate = b[0] * with_strain + b[1] * with_rate;
-    part.variance = step.baseline_variance + decay * (decay * part.variance);
-}
-
-/// The branches' rows, the last one first: each needs the old values of those before it and of the motion.
-#[inline(always)]
-fn predict_branches<T: Scalar, const B: usize>(
-    step: &StepConstants<T, B>,
-    parts: &mut Parts<T, B>,
-    driven: &[Driven<T>; B],
-) {
-    let [a, b] = step.motion;
-    for i in (0..B).rev() {
-        let (constants, Driven { change, gain, pull, row }) = (&step.branches[i], driven[i]);
-        let (decay, old) = (constants.decay, parts.branches[i]);
-        // Row of F P: covariances of the new branch with the old motion, and below with the old branches.
-        let strain = row[0] * parts.strain_variance + row[1] * parts.strain_rate + decay * old.with_strain;
-        let rate = row[0] * parts.strain_rate + row[1] * parts.rate_variance + decay * old.with_rate;
-        let cross = [
-            gain * constants.cross_noise[0] + pull * step.noise[0],
-            gain * constants.cross_noise[1] + pull * step.noise[1],
-        ];
-        let entry = |k: usize, start: T, old_pair: T| {
-            let (other, to, with) = (&step.branches[k], &driven[k], &parts.branches[k]);
-            let kept = row[0] * with.with_strain + row[1] * with.with_rate + decay * old_pair;
-            let noise = gain * constants.noise[k] + pull * other.cross_noise[0];
-            start + to.gain * noise + to.pull * cross[0] + to.row[0] * strain + to.row[1] * rate + other.decay * kept
-        };
-        let mut new = old;
-        new.mean = change + decay * old.mean;
-        for k in 0..i {
-            new.with[k] = entry(k, T::zero(), old.with[k]);
-        }
-        new.variance = entry(i, constants.variance, old.variance);
-        new.with_strain = cross[0] + a[0] * strain + a[1] * rate;
-        new.with_rate = cross[1] + b[0] * strain + b[1] * rate;
-        parts.branches[i] = new;
-    }
+    part.variance = step.baseline_variance + step.baseline_square * part.variance;
 }

@@ -26,22 +26,30 @@ impl<T: Scalar, G: Curve<T>> ReadingLaw<T, G> {
         })
     }
 
-    /// The dash-pot's part of the reading, and its derivative by the rate.
+    /// The expected reading of motion alone, and its derivatives by strain and rate.
     #[inline(always)]
-    fn dash_pot<S: Switch<T>>(&self, rate: T, phase: Option<Phase>, spread: &mut RateSpread<T, S>) -> (T, T) {
+    fn of_motion<S: Switch<T>>(
+        &self,
+        strain: T,
+        rate: T,
+        phase: Option<Phase>,
+        spread: &mut RateSpread<T, S>,
+    ) -> (T, T, T) {
+        let (gauge, slope) = self.curve.value_and_slope(strain);
+        let (extend, retract) = (self.extend_viscosity_s, self.retract_viscosity_s);
         let viscosity = match phase {
-            Some(Phase::Extend) => self.extend_viscosity_s,
-            Some(Phase::Retract) => self.retract_viscosity_s,
-            Some(Phase::Hold) => return (T::zero(), T::zero()),
+            Some(Phase::Hold) => return (gauge, slope, T::zero()),
+            Some(phase) if phase == Phase::Extend => extend,
+            Some(_) => retract,
             None if rate * rate < RateSpread::<T, S>::clear() * spread.variance => {
                 let split: SplitRate<T> = spread.blend(rate);
-                let (extend, retract) = (self.extend_viscosity_s, self.retract_viscosity_s);
-                return (split.drive(extend, retract), split.slope(extend, retract));
+                let expected = gauge + extend * split.extend + retract * split.retract;
+                return (expected, slope, split.slope(extend, retract));
             }
-            None if rate > T::zero() => self.extend_viscosity_s,
-            None => self.retract_viscosity_s,
+            None if rate > T::zero() => extend,
+            None => retract,
         };
-        (viscosity * rate, viscosity)
+        (gauge + viscosity * rate, slope, viscosity)
     }
 }
 
@@ -57,9 +65,7 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
         mut spread: RateSpread<T, S>,
     ) -> Result<Residual<T>, StepError> {
         let law = &self.reading;
-        let (gauge, slope) = law.curve.value_and_slope(parts.strain);
-        let (drag, viscosity) = law.dash_pot(parts.rate, phase, &mut spread);
-        let mut expected = gauge + drag;
+        let (mut expected, slope, viscosity) = law.of_motion(parts.strain, parts.rate, phase, &mut spread);
 
         // P Hᵀ, and S = H P Hᵀ + R.
         let mut strain = slope * parts.strain_variance + viscosity * parts.strain_rate;

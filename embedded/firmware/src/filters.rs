@@ -2,9 +2,10 @@
 
 use core::hint::black_box;
 
-use ohmstrain_ekf::{Belief, Compact, Dwell, Ekf, Evidence, Imm, Mixture, Reading, Real, SignSplit, SparseEkf};
+use ohmstrain_ekf::{Belief, Cubic, Dwell, Ekf, Evidence, Imm, Mixture, Reading, Real, SignSplit, SparseEkf, Switch};
 use ohmstrain_model::{ParameterError, Phase, Problem, Scalar, SwitchedModel, SwitchedStep};
 
+use crate::fpu::OnFpu;
 use crate::{DT_S, limits, sensor};
 
 /// A filter with its state.
@@ -177,8 +178,8 @@ impl<T: Real> Filter<T> for SplitFour<T> {
 
 /// The EKF that leaves out the zeros, at a fixed rate.
 #[derive(Clone, Copy)]
-pub struct FastEkf<T, const B: usize, const N: usize, const L: usize> {
-    ekf: SparseEkf<T, Compact, B, N>,
+pub struct FastEkf<T: Scalar, const B: usize, const N: usize, const L: usize> {
+    ekf: SparseEkf<T, OnFpu, B, N, Cubic<T>>,
     belief: Belief<T, N, L>,
 }
 
@@ -187,7 +188,10 @@ pub type Fast3<T> = FastEkf<T, 1, 3, 6>;
 /// Strain, rate, three branches, baseline.
 pub type Fast6<T> = FastEkf<T, 3, 6, 21>;
 
-impl<T: Scalar, const B: usize, const N: usize, const L: usize> Filter<T> for FastEkf<T, B, N, L> {
+impl<T: Scalar, const B: usize, const N: usize, const L: usize> Filter<T> for FastEkf<T, B, N, L>
+where
+    OnFpu: Switch<T>,
+{
     fn start() -> Result<Self, ParameterError> {
         let model = black_box(sensor()?);
         let step = SparseEkf::new(model, T::of(DT_S)).map_err(|_| ParameterError::new("dt_s", Problem::NotPositive))?;

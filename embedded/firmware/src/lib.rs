@@ -6,10 +6,12 @@
 
 mod codes;
 mod filters;
+mod fpu;
 #[cfg(target_os = "none")]
 pub mod frame;
 mod sensors;
 
 pub use codes::CODES;
 pub use filters::{Ekf3, Ekf6, Fast3, Fast6, Filter, Imm6, PreparedEkf, SplitFour, VaryingEkf3};
+pub use fpu::OnFpu;
 pub use sensors::{DT_S, REST_OHM, front_end, limits, sensor, to_reading};

@@ -1,0 +1,60 @@
+//! The square root of the floating-point unit, which Rust's core does not reach on stable.
+
+use ohmstrain_ekf::{Compact, CompactWidth, Switch};
+use ohmstrain_model::SplitRate;
+
+/// [`Compact`] with square roots by `vsqrt`: a few instructions instead of a routine with a table. Both round correctly, so the
+/// result is the same.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct OnFpu;
+
+impl Switch<f32> for OnFpu {
+    const CLEAR: f64 = <Compact as Switch<f32>>::CLEAR;
+
+    type Width = CompactWidth<f32>;
+
+    #[cfg(target_os = "none")]
+    #[inline(always)]
+    fn sd(variance: f32) -> f32 {
+        let mut bits = variance.to_bits();
+        // SAFETY: leaves every register and the stack as they were, except `bits`. Stable Rust does not let a register of
+        // the unit be named, so one is saved and restored.
+        unsafe {
+            core::arch::asm!(
+                "vpush {{s0}}",
+                "vmov s0, {bits}",
+                "vsqrt.f32 s0, s0",
+                "vmov {bits}, s0",
+                "vpop {{s0}}",
+                bits = inout(reg) bits,
+                options(pure, nomem, preserves_flags),
+            );
+        }
+        f32::from_bits(bits)
+    }
+
+    #[inline(always)]
+    fn width(rate_sd: f32) -> CompactWidth<f32> {
+        Compact::width(rate_sd)
+    }
+
+    #[inline(always)]
+    fn blend(rate: f32, width: CompactWidth<f32>) -> SplitRate<f32> {
+        Compact::blend(rate, width)
+    }
+}
+
+/// The reference on the host.
+impl Switch<f64> for OnFpu {
+    const CLEAR: f64 = <Compact as Switch<f64>>::CLEAR;
+
+    type Width = CompactWidth<f64>;
+
+    fn width(rate_sd: f64) -> CompactWidth<f64> {
+        Compact::width(rate_sd)
+    }
+
+    fn blend(rate: f64, width: CompactWidth<f64>) -> SplitRate<f64> {
+        Compact::blend(rate, width)
+    }
+}
