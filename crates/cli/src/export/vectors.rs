@@ -57,7 +57,7 @@ impl Vectors {
         sensor: &FixedRate<B, N>,
         settled: &Settled<B, N, L>,
     ) -> Result<Self, ExportError> {
-        let inputs = inputs(sensor, 1);
+        let inputs = readings(sensor, 1);
         let ekf = |nudged| run_ekf::<B, N, L>(sensor, &inputs, nudged);
         let fixed = |nudged| run_fixed(sensor, settled, &inputs, nudged);
         let strains = |nudged| Ok(ekf(nudged)?.iter().map(|estimate| estimate.0).collect());
@@ -75,7 +75,7 @@ impl Vectors {
         };
         let exact = sensor.is_exact();
         let speed = sensor.model.motion().stationary_variance()[1].sqrt();
-        let slow = inputs(sensor, motion::slowness(&sensor.law, f64::from(sensor.dt_s), f64::from(speed)));
+        let slow = readings(sensor, motion::slowness(&sensor.law, f64::from(sensor.dt_s), f64::from(speed)));
         Ok(Self {
             seed: motion::SEED,
             ulp: Literal(ulp),
@@ -89,7 +89,7 @@ impl Vectors {
 }
 
 /// The readings of a motion so many times slower, in the sensor's unit.
-fn inputs<const B: usize, const N: usize>(sensor: &FixedRate<B, N>, slowness: usize) -> Vec<Input> {
+fn readings<const B: usize, const N: usize>(sensor: &FixedRate<B, N>, slowness: usize) -> Vec<Input> {
     let rest = f64::from(sensor.rest_reading);
     let input = |row: motion::Row| Input {
         true_strain: row.strain,
