@@ -75,7 +75,7 @@ fn the_compact_split_integrates_its_density() {
     };
     for rate in [-2.9, -1.0, -0.2, 0.0, 0.7, 2.0, 2.99_f64] {
         let sd = 0.5;
-        let split = Compact::blend(rate * sd, Compact::width(sd));
+        let split = Compact::blend(rate * sd, Compact::width(sd * sd));
         let probability = integral(&density, -3.0, rate);
         let mean = integral(&|u| (rate - u) * density(u), -3.0, rate);
         // Simpson's error with h = 3e-3 on a polynomial of degree 7: below 1e-10.

@@ -8,15 +8,8 @@ pub trait Switch<T: Scalar> {
     /// What the splits of one step share.
     type Width: Copy;
 
-    /// The standard deviation that belongs to a variance. Rust's core has no stable way to the square root of a
-    /// microcontroller's floating-point unit: who has one there wraps a switch and replaces this.
-    #[inline(always)]
-    fn sd(variance: T) -> T {
-        variance.sqrt()
-    }
-
-    /// Prepares splits of rates with the deviation `rate_sd > 0`, 1/s.
-    fn width(rate_sd: T) -> Self::Width;
+    /// Prepares splits of rates with a variance above zero, 1/s².
+    fn width(rate_variance: T) -> Self::Width;
 
     /// Splits a rate that is not clear, 1/s.
     fn blend(rate: T, width: Self::Width) -> SplitRate<T>;
@@ -33,8 +26,8 @@ impl<T: Scalar> Switch<T> for Logistic {
 
     type Width = T;
 
-    fn width(rate_sd: T) -> T {
-        rate_sd
+    fn width(rate_variance: T) -> T {
+        rate_variance.sqrt()
     }
 
     fn blend(rate: T, rate_sd: T) -> SplitRate<T> {
@@ -49,11 +42,24 @@ impl<T: Scalar> Switch<T> for Logistic {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Compact;
 
-/// Where the density of [`Compact`] ends, 1/s.
+/// Where the density of [`Compact`] ends, 1/s: three deviations.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CompactWidth<T> {
     width: T,
     per_width: T,
+    per_square: T,
+}
+
+impl<T: Scalar> CompactWidth<T> {
+    /// Of a variance above zero, 1/s². Rust's core has no stable way to the square root of a microcontroller's
+    /// floating-point unit: who has one there hands it in as `root`, from a [`Switch`] of their own.
+    #[inline(always)]
+    pub fn new(rate_variance: T, root: impl FnOnce(T) -> T) -> Self {
+        let square = T::of(9.0) * rate_variance;
+        let per_square = T::one() / square;
+        let per_width = root(per_square);
+        Self { width: square * per_width, per_width, per_square }
+    }
 }
 
 impl<T: Scalar> Switch<T> for Compact {
@@ -62,16 +68,16 @@ impl<T: Scalar> Switch<T> for Compact {
     type Width = CompactWidth<T>;
 
     #[inline(always)]
-    fn width(rate_sd: T) -> CompactWidth<T> {
-        let width = T::of(3.0) * rate_sd;
-        CompactWidth { width, per_width: T::one() / width }
+    fn width(rate_variance: T) -> CompactWidth<T> {
+        CompactWidth::new(rate_variance, |square| square.sqrt())
     }
 
     #[inline(always)]
-    fn blend(rate: T, CompactWidth { width, per_width }: CompactWidth<T>) -> SplitRate<T> {
+    fn blend(rate: T, CompactWidth { width, per_width, per_square }: CompactWidth<T>) -> SplitRate<T> {
         let half = T::of(0.5);
+        // Polynomials in u² do not wait for the root.
         let u = rate * per_width;
-        let w = u * u;
+        let w = rate * rate * per_square;
         let fourth = w * w;
         // 35/32 ∫ (1 - u²)³ du from 0, and its integral, which lets the whole of the rate be one direction's at u = 1.
         let lean = u * ((T::of(1.09375) - w * T::of(1.09375)) + fourth * (T::of(0.65625) - w * T::of(0.15625)));
@@ -110,6 +116,6 @@ impl<T: Scalar, S: Switch<T>> RateSpread<T, S> {
     #[inline(always)]
     pub(crate) fn blend(&mut self, rate: T) -> SplitRate<T> {
         let variance = self.variance;
-        S::blend(rate, *self.width.get_or_insert_with(|| S::width(S::sd(variance))))
+        S::blend(rate, *self.width.get_or_insert_with(|| S::width(variance)))
     }
 }

@@ -13,29 +13,9 @@ impl Switch<f32> for OnFpu {
 
     type Width = CompactWidth<f32>;
 
-    #[cfg(target_os = "none")]
     #[inline(always)]
-    fn sd(variance: f32) -> f32 {
-        let mut bits = variance.to_bits();
-        // SAFETY: leaves every register and the stack as they were, except `bits`. Stable Rust does not let a register of
-        // the unit be named, so one is saved and restored.
-        unsafe {
-            core::arch::asm!(
-                "vpush {{s0}}",
-                "vmov s0, {bits}",
-                "vsqrt.f32 s0, s0",
-                "vmov {bits}, s0",
-                "vpop {{s0}}",
-                bits = inout(reg) bits,
-                options(pure, nomem, preserves_flags),
-            );
-        }
-        f32::from_bits(bits)
-    }
-
-    #[inline(always)]
-    fn width(rate_sd: f32) -> CompactWidth<f32> {
-        Compact::width(rate_sd)
+    fn width(rate_variance: f32) -> CompactWidth<f32> {
+        CompactWidth::new(rate_variance, root)
     }
 
     #[inline(always)]
@@ -50,11 +30,36 @@ impl Switch<f64> for OnFpu {
 
     type Width = CompactWidth<f64>;
 
-    fn width(rate_sd: f64) -> CompactWidth<f64> {
-        Compact::width(rate_sd)
+    fn width(rate_variance: f64) -> CompactWidth<f64> {
+        Compact::width(rate_variance)
     }
 
     fn blend(rate: f64, width: CompactWidth<f64>) -> SplitRate<f64> {
         Compact::blend(rate, width)
     }
+}
+
+#[cfg(target_os = "none")]
+#[inline(always)]
+fn root(square: f32) -> f32 {
+    let mut bits = square.to_bits();
+    // SAFETY: leaves every register and the stack as they were, except `bits`. Stable Rust does not let a register of the
+    // unit be named, so one is saved and restored.
+    unsafe {
+        core::arch::asm!(
+            "vpush {{s0}}",
+            "vmov s0, {bits}",
+            "vsqrt.f32 s0, s0",
+            "vmov {bits}, s0",
+            "vpop {{s0}}",
+            bits = inout(reg) bits,
+            options(pure, nomem, preserves_flags),
+        );
+    }
+    f32::from_bits(bits)
+}
+
+#[cfg(not(target_os = "none"))]
+fn root(square: f32) -> f32 {
+    nalgebra::ComplexField::sqrt(square)
 }
