@@ -31,8 +31,8 @@ struct SettledPhase<const B: usize, const N: usize, const L: usize> {
 #[derive(Debug, Serialize)]
 pub struct SettledGain {
     gain: Vec<Literal>,
-    drive: [Literal; 3],
-    rate: [Literal; 3],
+    drive: [Literal; 4],
+    rate: [Literal; 4],
     strain_sd: Literal,
     rate_sd: Literal,
 }
@@ -187,7 +187,7 @@ impl<const B: usize, const N: usize, const L: usize> Channel<f32, N, L> for Line
         let (rate, extend, retract) = (at.mean[1], law.extend_viscosity_s, law.retract_viscosity_s);
         let clear = <Compact as Switch<f32>>::CLEAR as f32;
         let mut value = if rate * rate < clear * clear * variance {
-            let split = Compact::blend(rate, Compact::width(variance.sqrt()));
+            let split = Compact::blend(rate, Compact::width(variance));
             gauge + extend * split.extend + retract * split.retract
         } else {
             gauge + if rate > 0.0 { extend } else { retract } * rate
@@ -199,10 +199,12 @@ impl<const B: usize, const N: usize, const L: usize> Channel<f32, N, L> for Line
     }
 }
 
-/// A rate's variance, three deviations and their inverse, as the splits of a step share them.
-fn spread(variance: f32) -> [Literal; 3] {
-    let width = 3.0 * variance.sqrt();
-    [variance, width, 1.0 / width].map(Literal)
+/// A rate's variance, three deviations, their inverse and the square of that, as the splits of a step share them.
+fn spread(variance: f32) -> [Literal; 4] {
+    let square = 9.0 * variance;
+    let per_square = 1.0 / square;
+    let per_width = per_square.sqrt();
+    [variance, square * per_width, per_width, per_square].map(Literal)
 }
 
 #[cfg(test)]

@@ -121,6 +121,7 @@ typedef struct rate_spread {
     float variance;
     float width; /* three deviations; 0 if it has not been computed yet */
     float per_width;
+    float per_square; /* 1 / width^2 */
 } rate_spread;
 
 /* The settled filter of each phase, in the order of ohmstrain_phase. */
@@ -136,8 +137,8 @@ static const fixed_gain FIXED_GAIN[3] = {
 {% for g in gains %}
     {
         .gain = {{% for x in g.gain %}<< x >>f<< ", " if not loop.last >>{% endfor %}},
-        .drive = {<< g.drive[0] >>f, << g.drive[1] >>f, << g.drive[2] >>f},
-        .rate = {<< g.rate[0] >>f, << g.rate[1] >>f, << g.rate[2] >>f},
+        .drive = {<< g.drive[0] >>f, << g.drive[1] >>f, << g.drive[2] >>f, << g.drive[3] >>f},
+        .rate = {<< g.rate[0] >>f, << g.rate[1] >>f, << g.rate[2] >>f, << g.rate[3] >>f},
         .strain_sd = << g.strain_sd >>f,
         .rate_sd = << g.rate_sd >>f,
     },
@@ -188,11 +189,13 @@ static split split_rate(float rate, rate_spread *spread)
     split out;
 
     if (!(spread->width > 0.0f)) {
-        spread->width = 3.0f * sqrtf(spread->variance);
-        spread->per_width = 1.0f / spread->width;
+        const float square = 9.0f * spread->variance;
+        spread->per_square = 1.0f / square;
+        spread->per_width = sqrtf(spread->per_square);
+        spread->width = square * spread->per_width;
     }
     u = rate * spread->per_width;
-    w = u * u;
+    w = rate * rate * spread->per_square;
     fourth = w * w;
     lean = u * ((1.09375f - w * 1.09375f) + fourth * (0.65625f - w * 0.15625f));
     both = spread->width * ((0.13671875f + w * 0.546875f) - fourth * ((0.2734375f - w * 0.109375f) + fourth * 0.01953125f));
@@ -400,7 +403,7 @@ static void predict_motion(float p[ENTRIES], float rate_variance)
 /* Mean and covariance one interval on; returns how far the rate spreads at its end. */
 static rate_spread predict(float x[STATES], float p[ENTRIES])
 {
-    rate_spread spread = {0.0f, 0.0f, 0.0f};
+    rate_spread spread = {0.0f, 0.0f, 0.0f, 0.0f};
 {% if branches %}
     driven by[BRANCHES];
     int i;
