@@ -2,7 +2,7 @@
 
 use ohmstrain_calib::{EstimatorKind, MotionParams, Quantity, ReadingUnit, SensorParams};
 use ohmstrain_ekf::{Belief, Compact, Switch};
-use ohmstrain_model::{Branch, Gauge, ModelNoise, Motion, SensorLaw, StrainRange, SwitchedModel};
+use ohmstrain_model::{Branch, Gauge, ModelNoise, Motion, ParameterError, SensorLaw, StrainRange, SwitchedModel};
 use serde::Serialize;
 
 use super::ExportError;
@@ -112,8 +112,8 @@ struct PriorConstants {
 
 /// What the numbers of states in a filter's type are made for.
 pub struct FixedRate<const B: usize, const N: usize> {
-    /// The law in double precision, for simulation.
-    pub law: SensorLaw<f64, B>,
+    /// The model in double precision, for simulation and to see what rounding does.
+    pub reference: SwitchedModel<f64, 2, B, N>,
     /// The model in single precision.
     pub model: SwitchedModel<f32, 2, B, N>,
     /// Time between readings, s.
@@ -127,25 +127,33 @@ pub struct FixedRate<const B: usize, const N: usize> {
 }
 
 impl<const B: usize, const N: usize> FixedRate<B, N> {
-    /// A sensor with R₀ = 1, whose deviations are taken as they are.
+    /// A sensor with R₀ = 1, whose deviations are taken as they are. `motion`: correlation time of the rate, its deviation,
+    /// mean and deviation of strain.
     ///
     /// # Errors
     /// Names the parameter that no model can have.
     pub fn new(
         law: SensorLaw<f64, B>,
-        motion: Motion<f32, 2>,
-        noise: ModelNoise<f32>,
+        motion: [f64; 4],
+        noise: ModelNoise<f64>,
         dt_s: f32,
         limits: StrainRange<f32>,
     ) -> Result<Self, ExportError> {
-        let model = SwitchedModel::new(narrow_law(&law), motion, noise)
-            .map_err(|error| ExportError::Parameter(error.to_string()))?;
-        Ok(Self { law, model, dt_s, rest_reading: 1.0, strain_sd_scale: 1.0, limits })
+        let wrong = |error: ParameterError| ExportError::Parameter(error.to_string());
+        let [time, rate_sd, mean, sd] = motion;
+        let reference = Motion::ornstein_uhlenbeck(time, rate_sd, mean, sd)
+            .and_then(|motion| SwitchedModel::new(law, motion, noise))
+            .map_err(wrong)?;
+        let [time, rate_sd, mean, sd] = motion.map(|x| x as f32);
+        let model = Motion::ornstein_uhlenbeck(time, rate_sd, mean, sd)
+            .and_then(|motion| SwitchedModel::new(narrow_law(&law), motion, narrow_noise(noise)))
+            .map_err(wrong)?;
+        Ok(Self { reference, model, dt_s, rest_reading: 1.0, strain_sd_scale: 1.0, limits })
     }
 
     /// Whether the filter uses nothing but operations that are rounded correctly everywhere.
     pub fn is_exact(&self) -> bool {
-        matches!(self.law.gauge, Gauge::Polynomial { .. })
+        matches!(self.model.law().gauge, Gauge::Polynomial { .. })
     }
 }
 
@@ -190,8 +198,9 @@ impl Exported {
         let law = params.law.to_model();
         let law = law.ok_or_else(|| ExportError::Parameter("field `law.branches`: another number of them".into()))?;
         let limits = narrow_range(params.limits.to_model());
-        let (motion, noise) = (prior.to_model()?, narrow_noise(estimator.noise.to_model()));
-        let mut sensor = FixedRate::new(law, motion, noise, dt_s as f32, limits)?;
+        let motion = [prior.rate_time_s, prior.rate_sd_per_s, prior.strain_mean, prior.strain_sd];
+        let motion = motion.map(|literal| f64::from(literal.0));
+        let mut sensor = FixedRate::new(law, motion, estimator.noise.to_model(), dt_s as f32, limits)?;
         sensor.rest_reading = params.rest_reading as f32;
         sensor.strain_sd_scale = estimator.strain_sd_scale as f32;
         let model = sensor.model;
@@ -321,14 +330,6 @@ fn prior(motion: &MotionParams) -> Result<PriorConstants, ExportError> {
             what: "the ekf's motion has an acceleration, which the exported filter has not",
             instead: "calibrate with `--estimator ekf`, which gives it Ornstein-Uhlenbeck motion",
         }),
-    }
-}
-
-impl PriorConstants {
-    fn to_model(self) -> Result<Motion<f32, 2>, ExportError> {
-        let motion =
-            Motion::ornstein_uhlenbeck(self.rate_time_s.0, self.rate_sd_per_s.0, self.strain_mean.0, self.strain_sd.0);
-        motion.map_err(|error| ExportError::Parameter(error.to_string()))
     }
 }
 

@@ -209,7 +209,7 @@ fn spread(variance: f32) -> [Literal; 4] {
 
 #[cfg(test)]
 mod tests {
-    use ohmstrain_model::{Branch, Gauge, ModelNoise, Motion, SensorLaw, StrainRange};
+    use ohmstrain_model::{Branch, Gauge, ModelNoise, SensorLaw, StrainRange};
 
     use super::*;
 
@@ -231,8 +231,7 @@ mod tests {
             range,
         };
         let noise = ModelNoise { reading_sd: 2e-3, branch_sd: 5e-3, baseline_sd: 0.02, baseline_time_s: 30.0 };
-        let motion = Motion::ornstein_uhlenbeck(1.0, 0.1, 0.15, 0.1).unwrap();
-        FixedRate::new(law, motion, noise, 0.02, limits).unwrap()
+        FixedRate::new(law, [1.0, 0.1, 0.15, 0.1], noise, 0.02, limits).unwrap()
     }
 
     /// The library's filter and this module's must give the same bits: what is exported is tested against this one.

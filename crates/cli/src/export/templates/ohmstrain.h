@@ -83,6 +83,9 @@ ohmstrain_status ohmstrain_get(const ohmstrain_state *state, ohmstrain_estimate 
  *
  * There is one settled gain for each phase. Deviations are constant too: those of the settled filter, which is right
  * near the middle of the motion the sensor was calibrated on and too sure of itself elsewhere.
+{% if vectors.fixed_fails %}
+ * NOT FOR THIS SENSOR: on its own law's readings its error is << vectors.fixed_error >>, the extended Kalman filter's << vectors.ekf_error >>.
+{% endif %}
  */
 typedef enum ohmstrain_phase {
     OHMSTRAIN_HOLD = 0,

@@ -14,23 +14,28 @@
 /* The unit of differences: the spacing of float at the largest strain of the limits. */
 #define VECTORS_ULP << vectors.ulp >>f
 
-/* The largest difference allowed, in ulp.
+/* The largest differences allowed, in ulp.
  *
 {% if exact %}
  * Where no product is contracted with a sum (a * b + c in one rounding), every operation is rounded as in Rust: 0.
+ * Elsewhere:
 {% else %}
- * Where no product is contracted with a sum (a * b + c in one rounding), every operation but expf is rounded as in Rust.
- * Two implementations of expf, each off by less than a spacing, move a predicted reading by 2 spacings of float at 1.
+ * Every operation but expf is rounded as in Rust where no product is contracted with a sum (a * b + c in one rounding).
 {% endif %}
- * Contraction moves a predicted reading by 12 spacings: two dozen operations on numbers up to one, half a spacing each.
- * Such moves have no common sign. They move the strain by the root of the sum of the squares of d strain / d reading
- * over all readings, found by moving each reading by itself; six times that is allowed.
+ * - Extended Kalman filter: the Rust filter's own distance from one in double precision is what rounding does. Another rounding
+ *   may be three times as far from it, to the other side: four times that distance.
+ * - Fixed gains: {% if not exact %}two implementations of expf, each off by less than a spacing, move a predicted reading by 2 spacings of
+ *   float at 1, {% endif %}contraction moves {% if exact %}a predicted reading{% else %}it{% endif %} by 12: two dozen operations on numbers up to one, half a spacing each.
+ *   Such moves have no common sign: they move the strain by the root of the sum of the squares of d strain / d reading over all
+ *   readings, found by moving each reading by itself. Six times that.
  */
 #ifndef VECTORS_TOLERANCE_ULP
 #if defined(__STRICT_ANSI__) || !defined(__FP_FAST_FMAF)
 #define VECTORS_TOLERANCE_ULP << vectors.tolerance_ulp >>
+#define VECTORS_FIXED_TOLERANCE_ULP << vectors.fixed_tolerance_ulp >>
 #else
 #define VECTORS_TOLERANCE_ULP << vectors.contracted_tolerance_ulp >>
+#define VECTORS_FIXED_TOLERANCE_ULP << vectors.contracted_fixed_tolerance_ulp >>
 #endif
 #endif
 
