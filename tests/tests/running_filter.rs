@@ -4,9 +4,9 @@
 use std::collections::BTreeMap;
 
 use ohmstrain_calib::{
-    BranchParams, EnsembleParams, EstimatorKind, EstimatorParams, FORMAT, Filter, GaugeParams, LawParams, MotionParams,
-    NoiseParams, PhaseParams, Quantity, RangeParams, ReadingUnit, Rows, SensorParams, Start, StaticCubic, Validity,
-    build_filter,
+    BranchParams, EnsembleParams, EstimatorKind, EstimatorParams, FORMAT, Filter, GaugeParams, LawParams, MemberParams,
+    MotionParams, NoiseParams, OwnLaw, PhaseParams, Quantity, RangeParams, ReadingUnit, Rows, SensorParams, Start,
+    StaticCubic, Validity, build_filter,
 };
 use ohmstrain_ekf::{Guard, Reading, StepError};
 use proptest::prelude::*;
@@ -40,6 +40,17 @@ fn sensor() -> SensorParams {
             tempering: 0.7,
         }),
     };
+    let law = |taus_s: &[f64]| LawParams {
+        extend_viscosity_s: 0.02,
+        retract_viscosity_s: -0.01,
+        range: limits,
+        gauge: GaugeParams::Polynomial { coefficients: [1.6, -1.2, 0.5] },
+        branches: taus_s.iter().map(|tau_s| branch(*tau_s)).collect(),
+        plays: vec![],
+    };
+    let member = |estimator: &EstimatorKind| MemberParams { estimator: *estimator, weight: 0.25, own: None };
+    let own = OwnLaw { rest_ratio: 1.02, law: law(&[4.0, 16.0, 64.0]), parameters: estimator };
+    let other = MemberParams { estimator: EstimatorKind::SignSplit, weight: 0.25, own: Some(own) };
     SensorParams {
         format: FORMAT,
         made_by: "test".into(),
@@ -51,20 +62,13 @@ fn sensor() -> SensorParams {
         validity: Validity { lower: 0.0, upper: 0.3, fastest_rate_per_s: 0.2, duration_s: 100.0 },
         static_cubic: StaticCubic { reading_centre: 0.0, reading_scale: 1.0, coefficients: [0.0; 4], range: limits },
         joint: None,
-        law: LawParams {
-            extend_viscosity_s: 0.02,
-            retract_viscosity_s: -0.01,
-            range: limits,
-            gauge: GaugeParams::Polynomial { coefficients: [1.6, -1.2, 0.5] },
-            branches: vec![branch(4.0), branch(32.0)],
-            plays: vec![],
-        },
+        law: law(&[4.0, 32.0]),
         estimators: EstimatorKind::ALL.map(|kind| (kind, estimator)).into_iter().collect::<BTreeMap<_, _>>(),
         ensemble: Some(EnsembleParams {
             score: 0.0,
             strain_sd_scale: 1.1,
             smoothed_sd_scale: None,
-            weights: EstimatorKind::Ensemble.members().iter().map(|kind| (*kind, 1.0 / 3.0)).collect(),
+            members: EstimatorKind::Ensemble.members().iter().map(member).chain([other]).collect(),
         }),
         recordings: vec![],
         uncertainty: None,

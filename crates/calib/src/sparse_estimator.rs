@@ -43,7 +43,7 @@ impl<const B: usize, const N: usize, const L: usize> Estimator<f64, N, L> for Sp
         let mut next = *state;
         match prepared.sparse.as_ref().map(|sparse| sparse.step(&mut next, reading)) {
             // What overflows a square is no reading, even where the state can take it.
-            Some(Ok(residual)) if residual.is_none_or(|residual| residual.nis().is_finite()) => {
+            Some(Ok(residual)) if residual.is_none_or(|residual| residual.nis.is_finite()) => {
                 let innovation = residual.map(|residual| Innovation {
                     value: residual.innovation,
                     variance: residual.variance,

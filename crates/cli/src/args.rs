@@ -1,4 +1,5 @@
 mod evaluate;
+mod export;
 mod fit_law;
 
 use std::path::PathBuf;
@@ -11,6 +12,7 @@ use ohmstrain_calib::{EstimatorKind, GaugeFamily};
 use ohmstrain_ekf::Influence;
 
 pub use evaluate::{Estimators, EvaluateArgs};
+pub use export::{ExportArgs, ExportTarget};
 pub use fit_law::{FitLawArgs, SegmentChoice, phase_name};
 
 /// From the resistance of a soft strain sensor to strain, with an honest error bar.
@@ -39,6 +41,8 @@ pub enum Command {
     Smooth(SmoothArgs),
     /// Compare estimates with a known strain
     Evaluate(EvaluateArgs),
+    /// Write a calibrated sensor's filter as C or Rust source for a microcontroller
+    Export(ExportArgs),
 }
 
 /// Flags of `demo`.

@@ -7,6 +7,7 @@ mod args;
 mod commands;
 mod error;
 mod estimates;
+mod export;
 mod input;
 mod output;
 mod progress;

@@ -4,6 +4,7 @@ mod calibrate;
 mod demo;
 mod evaluate;
 mod explain;
+mod export;
 mod filter;
 mod fit_law;
 mod score_table;
@@ -24,5 +25,6 @@ pub fn dispatch(command: &Command) -> Result<(), CliError> {
         Command::Filter(args) => filter::run(args),
         Command::Smooth(args) => smooth::run(args),
         Command::Evaluate(args) => evaluate::run(args),
+        Command::Export(args) => export::run(args),
     }
 }

@@ -1,0 +1,31 @@
+use ohmstrain_calib::EstimatorKind;
+
+use crate::args::ExportArgs;
+use crate::error::CliError;
+use crate::export;
+use crate::output::{make_folder, write_file};
+use crate::sensor_file;
+
+/// Writes a sensor's filter as source code. Every file is made before the first one is written.
+pub fn run(args: &ExportArgs) -> Result<(), CliError> {
+    if let Some(other) = args.estimator.chosen().map(|estimator| estimator.0).filter(|kind| *kind != EstimatorKind::Ekf)
+    {
+        let name = other.name();
+        return Err(CliError::Arguments(format!("--estimator: expected ekf, the only one to export, found {name}")));
+    }
+    let params = sensor_file::read(&args.sensor, Some(EstimatorKind::Ekf))?;
+    let files = export::files(&params, args.target, args.dt_s)
+        .map_err(|error| error.into_cli(&args.sensor.display().to_string()))?;
+    if params.default_estimator != EstimatorKind::Ekf && args.estimator.chosen().is_none() {
+        let name = params.default_estimator.name();
+        CliError::remark(&format!("exported is the ekf: the file's default estimator, {name}, has no such form"));
+    }
+    for file in files {
+        let path = args.output.join(file.path);
+        if let Some(folder) = path.parent() {
+            make_folder(folder)?;
+        }
+        write_file(&path, |out| Ok(out.write_all(file.content.as_bytes())?))?;
+    }
+    Ok(())
+}

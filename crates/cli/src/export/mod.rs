@@ -1,0 +1,106 @@
+//! A calibrated sensor's EKF as source code for a microcontroller: C99 with a self-test, or constants in Rust.
+//!
+//! What is exported computes in `f32` and is [`SparseEkf`](ohmstrain_ekf::SparseEkf) at a fixed rate, operation by
+//! operation; the same sensor and interval give the same files.
+
+mod constants;
+mod literal;
+mod motion;
+mod settled;
+mod vectors;
+
+use minijinja::Environment;
+use minijinja::syntax::SyntaxConfig;
+use minijinja::value::Serde;
+use ohmstrain_calib::SensorParams;
+
+use crate::args::ExportTarget;
+use crate::error::CliError;
+use crate::sensor_file::MADE_BY;
+use constants::Exported;
+
+/// A file to write.
+pub struct SourceFile {
+    /// Where it belongs in the folder.
+    pub path: &'static str,
+    /// Its text.
+    pub content: String,
+}
+
+/// Why there is no source code.
+#[derive(Debug, thiserror::Error)]
+pub enum ExportError {
+    /// The sensor has something that the exported filter has no form for.
+    #[error("{what}; {instead}")]
+    Unsupported {
+        /// What it has.
+        what: &'static str,
+        /// How to get a sensor file without it.
+        instead: &'static str,
+    },
+    /// A parameter that `f32`, or the filter, cannot work with.
+    #[error("{0}")]
+    Parameter(String),
+    /// The interval does not go with the sensor.
+    #[error("--dt-s: {0}")]
+    Interval(String),
+    /// The template failed.
+    #[error("cannot fill the template of an exported file: {0}")]
+    Template(#[from] minijinja::Error),
+}
+
+impl ExportError {
+    /// As the program reports it, about the sensor file `name`.
+    pub fn into_cli(self, name: &str) -> CliError {
+        match self {
+            Self::Unsupported { .. } | Self::Parameter(_) => CliError::Input(format!("{name}: {self}")),
+            Self::Interval(_) => CliError::Arguments(self.to_string()),
+            Self::Template(_) => CliError::Other(self.to_string()),
+        }
+    }
+}
+
+/// Name in the exported folder, and template.
+type Template = (&'static str, &'static str);
+
+/// Arduino compiles what lies in a sketch's own folder, named as the sketch, and nothing from folders beside it: the self-test
+/// with its `main` must not be in there.
+const C: [Template; 6] = [
+    ("ohmstrain/ohmstrain.h", include_str!("templates/ohmstrain.h")),
+    ("ohmstrain/ohmstrain.c", include_str!("templates/ohmstrain.c")),
+    ("ohmstrain/ohmstrain.ino", include_str!("templates/ohmstrain.ino")),
+    ("selftest/vectors.h", include_str!("templates/vectors.h")),
+    ("selftest/selftest.c", include_str!("templates/selftest.c")),
+    ("README.md", include_str!("templates/readme_c.md")),
+];
+
+const RUST: [Template; 2] =
+    [("sensor.rs", include_str!("templates/sensor.rs")), ("README.md", include_str!("templates/readme_rust.md"))];
+
+/// The files of a sensor whose readings come every `dt_s` seconds.
+///
+/// # Errors
+/// See [`ExportError`].
+pub fn files(params: &SensorParams, target: ExportTarget, dt_s: f64) -> Result<Vec<SourceFile>, ExportError> {
+    let exported = Exported::new(params, MADE_BY, dt_s)?;
+    let templates: &[Template] = match target {
+        ExportTarget::C => &C,
+        ExportTarget::Rust => &RUST,
+    };
+    let mut environment = Environment::new();
+    // C is full of double braces.
+    let syntax = SyntaxConfig::builder()
+        .variable_delimiters("<<", ">>")
+        .trim_blocks(true)
+        .lstrip_blocks(true)
+        .keep_trailing_newline(true)
+        .build()?;
+    environment.set_syntax(syntax);
+    let mut files = Vec::new();
+    for (path, template) in templates {
+        environment.add_template(path, template)?;
+        let content = environment.get_template(path)?.render(Serde(&exported))?;
+        files.push(SourceFile { path, content });
+    }
+    Ok(files)
+}

@@ -1,0 +1,69 @@
+//! A short motion and the readings that a sensor's law gives for it.
+
+use ohmstrain_model::{Phase, SensorLaw};
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::SeedableRng;
+use rand_distr::{Distribution, StandardNormal};
+
+/// Seed of the noise.
+pub const SEED: u64 = 1;
+
+/// Where the strain is after so many steps in all, as a share of the range: rest, stretch, hold, release, hold, half-way.
+const CORNERS: [(usize, f64); 7] =
+    [(0, 0.02), (20, 0.02), (100, 0.95), (150, 0.95), (230, 0.05), (260, 0.05), (300, 0.5)];
+
+/// Rows without a reading: one alone, and a gap.
+const MISSING: [std::ops::Range<usize>; 2] = [60..61, 170..175];
+/// Rows whose reading brings noise of its own.
+const NOISY: std::ops::Range<usize> = 120..130;
+
+/// One row.
+pub struct Row {
+    /// The true strain.
+    pub strain: f64,
+    /// R/R₀ - 1; `None` if it is missing.
+    pub rho: Option<f64>,
+    /// Standard deviation that the reading brings along, relative to R₀.
+    pub extra_sd: f64,
+}
+
+/// How many times slower than the short motion one is that stretches at `speed`, 1/s; no more than a thousand times.
+pub fn slowness<const B: usize>(law: &SensorLaw<f64, B>, dt_s: f64, speed: f64) -> usize {
+    let ((start, from), (end, to)) = (CORNERS[1], CORNERS[2]);
+    let steps = (to - from) * law.range.span() / (speed * dt_s);
+    (steps / (end - start) as f64).ceil().clamp(1.0, 1000.0) as usize
+}
+
+/// The rows of the motion, so many times slower, with white noise of `reading_sd`.
+pub fn rows<const B: usize>(law: &SensorLaw<f64, B>, dt_s: f64, reading_sd: f64, slowness: usize) -> Vec<Row> {
+    let mut random = ChaCha8Rng::seed_from_u64(SEED);
+    let mut relaxation = [0.0; B];
+    let mut rows = Vec::new();
+    for corners in CORNERS.windows(2) {
+        let ((start, from), (end, to)) = (corners[0], corners[1]);
+        let steps = (end - start) * slowness;
+        let per_step = (to - from) / steps as f64 * law.range.span();
+        for step in 1..=steps {
+            let strain = law.range.lower + from * law.range.span() + per_step * step as f64;
+            let rate = per_step / dt_s;
+            let phase = match rate {
+                rate if rate > 0.0 => Phase::Extend,
+                rate if rate < 0.0 => Phase::Retract,
+                _ => Phase::Hold,
+            };
+            for i in 0..B {
+                let tau_s = law.branches[i].tau_s;
+                let (gain, _) = law.gain(i, strain - 0.5 * per_step, phase);
+                relaxation[i] += -(-dt_s / tau_s).exp_m1() * (gain * rate * tau_s - relaxation[i]);
+            }
+            let row = rows.len();
+            let extra_sd = if NOISY.contains(&row) { 2.0 * reading_sd } else { 0.0 };
+            let noise: f64 = StandardNormal.sample(&mut random);
+            let rho = law.relative_change(strain, rate, &relaxation, 0.0, phase) + (reading_sd + extra_sd) * noise;
+            // Noise can be large enough to make a resistance negative.
+            let rho = (!MISSING.iter().any(|gap| gap.contains(&row))).then_some(rho.max(-0.99));
+            rows.push(Row { strain, rho, extra_sd });
+        }
+    }
+    rows
+}

@@ -1,0 +1,118 @@
+#!/usr/bin/env bash
+# Compiles and runs what `ohmstrain export` writes: C on the host with GCC and Clang, for Cortex-M0+ and -M4F, and there
+# under QEMU; the sketch against a stand-in for Arduino; the Rust module in a no_std crate for Cortex-M4F.
+#
+#   exported-c.sh
+#
+# Installs gcc, clang, gcc-arm-none-eabi, libnewlib-arm-none-eabi and qemu-system-arm by apt where they are missing and this
+# is root. Prints the largest differences, sizes and instructions per step. Needs a minute.
+#
+# Environment:
+#   OHMSTRAIN  the program; default: built by cargo
+set -euo pipefail
+cd "$(dirname "$0")/.."
+readonly here=$PWD/scripts/exported-c
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+
+if ! command -v clang >/dev/null || ! command -v gcc >/dev/null || ! command -v qemu-system-arm >/dev/null ||
+    ! echo '#include <math.h>' | arm-none-eabi-gcc -E - >/dev/null 2>&1; then
+    apt-get -q update >/dev/null
+    DEBIAN_FRONTEND=noninteractive apt-get -q install -y --no-install-recommends \
+        gcc g++ clang libc6-dev gcc-arm-none-eabi libnewlib-arm-none-eabi qemu-system-arm >/dev/null
+fi
+
+ohmstrain=${OHMSTRAIN:-}
+if [[ -z $ohmstrain ]]; then
+    cargo build --quiet --locked -p ohmstrain
+    ohmstrain=$PWD/target/debug/ohmstrain
+fi
+
+readonly strict=(-std=c99 -ffp-contract=off -Wall -Wextra -Werror -pedantic -Wdouble-promotion)
+readonly m0=(-mcpu=cortex-m0plus -mthumb)
+readonly m4f=(-mcpu=cortex-m4 -mthumb -mfpu=fpv4-sp-d16 -mfloat-abi=hard)
+
+say() { printf '%-34s %s\n' "$1" "$2"; }
+
+# report NAME COMMAND...: the first line that a self-test prints; everything, and failure, if it fails.
+report() {
+    local name=$1
+    shift
+    if ! "$@" >"$work/output" 2>&1; then
+        say "$name" FAILED >&2
+        cat "$work/output" >&2
+        return 1
+    fi
+    say "$name" "$(head -n 1 "$work/output")"
+}
+
+# QEMU's semihosting console is its standard error.
+qemu() {
+    timeout 60 qemu-system-arm -M mps2-an386 -icount shift=0 -nographic -monitor none -serial none \
+        -semihosting-config enable=on,target=native -kernel "$1" </dev/null
+}
+
+# on_host FOLDER COMPILER...: compiles and runs the self-test.
+on_host() {
+    local folder=$1
+    shift
+    "$@" "${strict[@]}" -I"$folder/ohmstrain" \
+        "$folder/ohmstrain/ohmstrain.c" "$folder/selftest/selftest.c" -lm -o "$work/selftest"
+    report "${folder##*/}, $*" "$work/selftest"
+}
+
+# on_target FOLDER NAME FLAGS...: the same for a microcontroller, and what a step costs there.
+on_target() {
+    local folder=$1 name=$2 program
+    shift 2
+    local build=(arm-none-eabi-gcc "$@" -O2 -fno-math-errno -ffunction-sections -I"$folder/ohmstrain")
+    "${build[@]}" "${strict[@]}" -c "$folder/ohmstrain/ohmstrain.c" -o "$work/filter.o"
+    for program in "$folder/selftest/selftest.c" "$here/count.c"; do
+        "${build[@]}" -I"$folder/selftest" -std=c99 -ffp-contract=off --specs=nano.specs -nostartfiles \
+            -T"$here/mps2.ld" -Wl,--gc-sections "$work/filter.o" "$program" "$here/board.c" -lm -o "$work/program.elf"
+        report "${folder##*/}, $name" qemu "$work/program.elf"
+    done
+    say "${folder##*/}, $name" "code and constants $(arm-none-eabi-size "$work/filter.o" | awk 'NR == 2 { print $1 }') B"
+}
+
+"$ohmstrain" simulate --protocol mixed --speed-mm-s 5 --sample-rate-hz 5 -o "$work/trace.csv"
+for gauge in polynomial:2 polynomial:0 decaying-exponential:1 tunnelling:3; do
+    name=${gauge%:*}-${gauge#*:}
+    "$ohmstrain" calibrate "$work/trace.csv" --estimator ekf --gauge "${gauge%:*}" --branches "${gauge#*:}" \
+        -o "$work/$name.toml"
+    folder=$work/$name
+    "$ohmstrain" export --sensor "$work/$name.toml" --target c --dt-s 0.02 -o "$folder"
+    "$ohmstrain" export --sensor "$work/$name.toml" --target rust --dt-s 0.02 -o "$folder/rust"
+    on_host "$folder" gcc -O2
+    on_host "$folder" clang -O2
+    on_target "$folder" cortex-m4f "${m4f[@]}"
+    on_target "$folder" cortex-m0+ "${m0[@]}"
+    g++ -std=gnu++11 -fsyntax-only -Wall -Wextra -Werror -I"$here" -include Arduino.h -I"$folder/ohmstrain" \
+        -x c++ "$folder/ohmstrain/ohmstrain.ino"
+    g++ -std=gnu++11 -fsyntax-only -Wall -Wextra -Werror -DARDUINO_ARCH_ESP32 -I"$here" -include Arduino.h \
+        -I"$folder/ohmstrain" -x c++ "$folder/ohmstrain/ohmstrain.ino"
+done
+
+# The Rust modules, all in one crate without std.
+mkdir -p "$work/crate/src"
+cat >"$work/crate/Cargo.toml" <<TOML
+[workspace]
+[package]
+name = "exported"
+version = "0.0.0"
+edition = "2024"
+[dependencies]
+ohmstrain-ekf = { path = "$PWD/crates/ekf", default-features = false }
+ohmstrain-model = { path = "$PWD/crates/model" }
+TOML
+echo '#![no_std]' >"$work/crate/src/lib.rs"
+for module in "$work"/*/rust/sensor.rs; do
+    folder=${module%/rust/sensor.rs}
+    name=$(tr - _ <<<"${folder##*/}")
+    cp "$module" "$work/crate/src/$name.rs"
+    echo "pub mod $name;" >>"$work/crate/src/lib.rs"
+done
+cp Cargo.lock "$work/crate/Cargo.lock"
+readonly scripts=$PWD/scripts target=$PWD/target
+(cd "$work/crate" && RUSTFLAGS="-D warnings" BARE_METAL_TARGET_DIR="$target/exported" "$scripts/bare-metal.sh" --release)
+say "Rust modules" "compile without std for Cortex-M4F"

@@ -1,0 +1,23 @@
+/* As much of Arduino's interface as the exported sketch uses: enough to compile it without an Arduino. */
+#ifndef ARDUINO_H
+#define ARDUINO_H
+
+#include <stdint.h>
+
+#define A0 14
+
+int analogRead(uint8_t pin);
+uint32_t analogReadMilliVolts(uint8_t pin);
+unsigned long micros(void);
+void delay(unsigned long milliseconds);
+
+struct SerialPort {
+  void begin(unsigned long baud);
+  void print(const char *text);
+  void print(double number, int digits);
+  void println(int number);
+  void println(double number, int digits);
+};
+extern SerialPort Serial;
+
+#endif
