@@ -64,7 +64,7 @@ impl<T: Real, M, const K: usize> Hypotheses<T, M, K> {
                 let (from, begins) = &enter(&self.model, parent.1, phase);
                 let probability = chain[parent.1.phase.index()][phase.index()];
                 let origin = Origin { parent, from, begins: *begins, phase, probability };
-                candidates.add(&origin, prepared, |prior| (*prior, T::one()))?;
+                candidates.add(&origin, prepared, |_| T::one())?;
             }
         }
         candidates.finish()

@@ -63,7 +63,7 @@ impl<T: Real, M> Imm<T, M> {
         for parent in self.mix_all(mixture, &chain).components().iter().enumerate() {
             let (from, phase) = (&parent.1.belief, parent.1.phase);
             let origin = Origin { parent, from, begins: false, phase, probability: T::one() };
-            candidates.add(&origin, prepared, |prior| (*prior, T::one()))?;
+            candidates.add(&origin, prepared, |_| T::one())?;
         }
         candidates.finish()
     }

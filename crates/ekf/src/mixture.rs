@@ -78,14 +78,14 @@ impl<T: Real, const N: usize, const L: usize, const K: usize> Mixture<T, N, L, K
 
     /// Adds a hypothesis: merged with one that says the same, in a free place, or in the place of the lightest, which is
     /// dropped. Says where it went.
-    pub(crate) fn add(&mut self, candidate: Component<T, N, L>) -> Added {
-        let alike = self.components_mut().iter_mut().enumerate().find(|(_, known)| known.is_like(&candidate));
+    pub(crate) fn add(&mut self, candidate: &Component<T, N, L>) -> Added {
+        let alike = self.components_mut().iter_mut().enumerate().find(|(_, known)| known.is_like(candidate));
         if let Some((place, like)) = alike {
-            *like = like.merged(&candidate);
+            *like = like.merged(candidate);
             return Added::To(place);
         }
         if self.len < K {
-            self.push(candidate);
+            self.push(*candidate);
             return Added::To(self.len - 1);
         }
         let lighter = |a: (usize, T), b: (usize, T)| if b.1 < a.1 { b } else { a };
@@ -94,7 +94,7 @@ impl<T: Real, const N: usize, const L: usize, const K: usize> Mixture<T, N, L, K
         match lightest.and_then(|(place, _)| Some((place, self.components.get_mut(place)?))) {
             None => Added::Nowhere,
             Some((place, lightest)) => {
-                *lightest = candidate;
+                *lightest = *candidate;
                 Added::InsteadOf(place)
             }
         }
@@ -260,20 +260,20 @@ pub(crate) fn moment_match<'a, T: Scalar, const N: usize, const L: usize>(
     Belief { mean, covariance }
 }
 
-/// A belief restricted to rates of one sign, and the probability of that sign.
-pub(crate) fn with_rate_in<T: Real, const N: usize, const L: usize>(
-    belief: &Belief<T, N, L>,
+/// Restricts a belief to rates of one sign; the probability of that sign.
+pub(crate) fn keep_rate_in<T: Real, const N: usize, const L: usize>(
+    belief: &mut Belief<T, N, L>,
     rates: &StrainRange<T>,
-) -> (Belief<T, N, L>, T) {
+) -> T {
     let rate = Gaussian { mean: belief.mean[1], variance: belief.covariance[(1, 1)] };
     if rate.variance <= T::zero() {
-        return (*belief, if rates.contains(rate.mean) { T::one() } else { T::zero() });
+        return if rates.contains(rate.mean) { T::one() } else { T::zero() };
     }
     let cut = rate.restricted(rates);
     let regression = SVector::from_fn(|i, _| belief.covariance[(i, 1)]) / rate.variance;
-    let mut covariance = belief.covariance;
-    covariance.add_outer(&regression, cut.variance - rate.variance);
-    (Belief { mean: belief.mean + regression * (cut.mean - rate.mean), covariance }, cut.mass)
+    belief.covariance.add_outer(&regression, cut.variance - rate.variance);
+    belief.mean += regression * (cut.mean - rate.mean);
+    cut.mass
 }
 
 #[cfg(test)]

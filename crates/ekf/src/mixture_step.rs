@@ -95,12 +95,12 @@ where
         Self { model, evidence, reading, recorder, children: Mixture::empty(), predicted: Predicted::new() }
     }
 
-    /// A child; `cut` restricts its prediction and says how much of it that leaves.
+    /// A child; `cut` restricts its prediction in place and says how much of it that leaves.
     pub(crate) fn add(
         &mut self,
         origin: &Origin<'_, T, N, L>,
         prepared: &M::Prepared,
-        cut: impl FnOnce(&Belief<T, N, L>) -> (Belief<T, N, L>, T),
+        cut: impl FnOnce(&mut Belief<T, N, L>) -> T,
     ) -> Result<(), StepError> {
         let Origin { parent: (place, parent), from, begins, phase, probability } = *origin;
         if !(probability > T::zero()) {
@@ -109,12 +109,13 @@ where
         let transition = self.model.transition(prepared, from, Some(phase));
         let covariance = self.model.propagate(&from.covariance, &transition);
         let predicted = Belief { mean: transition.mean, covariance };
-        let (prior, mass) = cut(&predicted);
+        let mut child =
+            Component { log_weight: parent.log_weight, phase, belief: predicted, log_inside: parent.log_inside };
+        let mass = cut(&mut child.belief);
         if !(mass > T::of(LEAST_MASS)) {
             return Ok(());
         }
-        let log_weight = parent.log_weight + (probability * mass).ln();
-        let mut child = Component { log_weight, phase, belief: prior, log_inside: parent.log_inside };
+        child.log_weight += (probability * mass).ln();
         if let Some(reading) = self.reading {
             self.update(&mut child, reading)?;
         }
@@ -129,10 +130,10 @@ where
             begins,
             transition: &transition,
             predicted: &predicted,
-            posterior: &child.belief.clone(),
+            posterior: &child.belief,
             log_weight: child.log_weight,
         };
-        match self.children.add(child) {
+        match self.children.add(&child) {
             Added::To(heir) => self.recorder.born(&birth, heir),
             Added::InsteadOf(heir) => {
                 self.recorder.dropped(heir);

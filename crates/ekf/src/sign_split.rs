@@ -2,7 +2,7 @@ use ohmstrain_model::{Phase, StrainRange};
 
 use crate::gaussian::Real;
 use crate::lineage::{Lineage, Recorder};
-use crate::mixture::{Mixture, with_rate_in};
+use crate::mixture::{Mixture, keep_rate_in};
 use crate::mixture_step::{Candidates, Evidence, MixtureStep, Origin, mixture_estimator, smooth_step};
 use crate::{Dwell, Gaussian, Phased, Reading, StepError};
 
@@ -73,11 +73,11 @@ impl<T: Real, M, const K: usize> SignSplit<T, M, K> {
                 }
                 let origin = Origin { parent, from, begins: rests, phase, probability };
                 candidates.add(&origin, prepared, |prior| match rates_of(phase) {
-                    None => (*prior, T::one()),
+                    None => T::one(),
                     Some(rates) => {
-                        let (half, mass) = with_rate_in(prior, &rates);
+                        let mass = keep_rate_in(prior, &rates);
                         // After a hold the chain has said how likely this direction is; none of it goes to the other.
-                        (half, if rests && mass > T::of(0.5) { T::one() } else { mass })
+                        if rests && mass > T::of(0.5) { T::one() } else { mass }
                     }
                 })?;
             }

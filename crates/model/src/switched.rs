@@ -221,11 +221,27 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize> SwitchedModel<T,
         moved: impl Fn(usize) -> bool,
     ) -> Symmetric<T, W, L> {
         let jacobian = &transition.jacobian;
+        // The whole of P: a row is then read without asking which triangle its entries lie in.
+        let mut whole = [[T::zero(); W]; W];
+        let mut entries = covariance.packed().iter();
+        for i in 0..W {
+            for j in 0..=i {
+                if let Some(entry) = entries.next() {
+                    whole[i][j] = *entry;
+                    whole[j][i] = *entry;
+                }
+            }
+        }
         let mut out = transition.noise;
         for i in 0..W {
-            let mut row = [T::zero(); W];
-            for k in 0..=i.max(M - 1) {
-                row[k] = Self::sparse_dot(i, moved(i), |l| jacobian[(i, l)], |l| covariance[(l, k)]);
+            let mut row = if i < M { [T::zero(); W] } else { whole[i].map(|entry| jacobian[(i, i)] * entry) };
+            if moved(i) {
+                for l in 0..M {
+                    let factor = jacobian[(i, l)];
+                    for k in 0..W {
+                        row[k] += factor * whole[l][k];
+                    }
+                }
             }
             for j in 0..=i {
                 out[(i, j)] += Self::sparse_dot(j, moved(j), |k| jacobian[(j, k)], |k| row[k]);

@@ -78,9 +78,11 @@ impl<T: Scalar, const N: usize, const L: usize> Symmetric<T, N, L> {
 
     /// `self += factor · vector · vectorᵀ`.
     pub fn add_outer(&mut self, vector: &SVector<T, N>, factor: T) {
+        let mut entries = self.0.iter_mut();
         for i in 0..N {
-            for j in 0..=i {
-                self[(i, j)] += factor * vector[i] * vector[j];
+            let scaled = factor * vector[i];
+            for (j, entry) in (0..=i).zip(&mut entries) {
+                *entry += scaled * vector[j];
             }
         }
     }

@@ -45,15 +45,15 @@ proptest! {
         let apart = Component { phase: Phase::Hold, ..apart };
         let mut all = std::vec![first, apart];
         let mut mixture = Mixture::<f64, 3, 6, 2>::empty();
-        mixture.add(first);
-        mixture.add(apart);
+        mixture.add(&first);
+        mixture.add(&apart);
         for other in others {
             // Close to what is there already in strain and rate, anywhere in the third state.
             let mut close = other;
             for i in 0..2 {
                 close.belief.mean[i] = mixture.components()[0].belief.mean[i] + 0.04 * other.belief.mean[i];
             }
-            mixture.add(close);
+            mixture.add(&close);
             all.push(close);
         }
         prop_assert_eq!(mixture.components().len(), 2);
@@ -76,7 +76,8 @@ proptest! {
     fn halves_of_a_cut_belief_make_the_whole(whole in component()) {
         let infinite = f64::INFINITY;
         let halves = [(0.0, infinite), (-infinite, 0.0)].map(|(lower, upper)| {
-            let (belief, mass) = with_rate_in(&whole.belief, &StrainRange { lower, upper });
+            let mut belief = whole.belief;
+            let mass = keep_rate_in(&mut belief, &StrainRange { lower, upper });
             Component { log_weight: mass.ln(), belief, ..whole }
         });
         let (total, mean, covariance) = naive_moments(&halves);
@@ -113,7 +114,7 @@ fn the_lightest_makes_room() {
     };
     let mut mixture = Mixture::<f64, 2, 3, 2>::empty();
     for (strain, log_weight) in [(0.1, -1.0), (0.2, -3.0), (0.3, -2.0), (0.4, -4.0)] {
-        mixture.add(far(strain, log_weight));
+        mixture.add(&far(strain, log_weight));
     }
     let kept: Vec<f64> = mixture.components().iter().map(|c| c.belief.mean[0]).collect();
     assert_eq!(kept, [0.1, 0.3]);
