@@ -24,9 +24,9 @@ pub(crate) struct Search {
 /// Says how well an estimator does with a law.
 pub(crate) const SURVEY: Search = Search { side: 0.7, steps: 100, rows: 500 };
 /// The same, from what another law has led to.
-pub(crate) const RESURVEY: Search = Search { side: 0.4, steps: 40, rows: 500 };
+pub(crate) const RESURVEY: Search = Search { side: 0.4, steps: 25, rows: 500 };
 /// Goes on from the best survey.
-pub(crate) const REFINEMENT: Search = Search { side: 0.3, steps: 60, rows: 1500 };
+pub(crate) const REFINEMENT: Search = Search { side: 0.3, steps: 30, rows: 1000 };
 
 impl Search {
     /// Evaluations to expect: a step of the simplex evaluates one or two points.
