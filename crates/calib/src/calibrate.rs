@@ -93,8 +93,10 @@ fn handicap(kind: EstimatorKind) -> f64 {
 /// Calibrates law, noise and motion on recordings with known strain. Deterministic: same samples, same result.
 ///
 /// Estimators are tried with a law per strength of ridge; the pair with the best score on blocks that the law has not seen
-/// gives the law. Where an ensemble is asked for these are the EKF and the sign-split filter, otherwise all of `kinds`. To that law every
-/// one of them, what smooths in its place, and the extended Kalman filter in any case, is then fitted, and the best of `kinds` becomes the default. Near ties go to the one that keeps hypotheses.
+/// gives the law. Where an ensemble is asked for these are the EKF and the sign-split filter, otherwise all of `kinds`. To
+/// that law every one of them, what smooths in its place, and the extended Kalman filter in any case, is then fitted, and the
+/// best of `kinds` becomes the default. Near ties go to the one that keeps hypotheses. An ensemble has one more member, with a
+/// law of its own.
 ///
 /// # Errors
 /// If the recordings are too short or too plain to learn a law from, or `kinds` is empty.

@@ -60,8 +60,8 @@ impl ValidityWatch {
         }
     }
 
-    /// Takes a row and says what there is to `say`: the reading as recorded, the estimated rate, and the true strain; NaN for what is missing. An
-    /// uncertain rate is estimated near zero, so that a high one means something.
+    /// Takes a row and says what there is to `say`: the reading as recorded, the estimated rate, and the true strain; NaN for
+    /// what is missing. An uncertain rate is estimated near zero, so that a high one means something.
     pub fn see(&mut self, time_s: f64, reading: f64, rate: f64, truth: f64, say: &mut dyn FnMut(String)) {
         let Validity { lower, upper, fastest_rate_per_s: fastest, duration_s } = self.validity;
         let start_s = *self.start_s.get_or_insert(time_s);

@@ -1,8 +1,9 @@
 //! Many sensors of one kind, filtered at once: [`SparseEkf`] with a sensor in every lane of a vector register.
 //!
 //! # Policy
-//! - Each sensor's belief is what [`SparseEkf`] with [`Compact`] makes of its readings, to the last bit, whatever the vectors
-//!   of the processor: no multiplication is fused with an addition, and no lane is added to another.
+//! - Each sensor's belief is what [`SparseEkf`] with [`Compact`] makes of its readings: the same operations in the same order,
+//!   no lane added to another. Where the processor can, products are fused with sums, so that results agree to rounding; with
+//!   128-bit vectors on x86 nothing is fused, and they agree to the last bit.
 //! - A reading that is NaN is missing. A sensor whose step is refused keeps its belief, as if it had not been stepped; its
 //!   neighbours do not notice.
 //! - Memory is allocated when a bank is made, and not by a step.

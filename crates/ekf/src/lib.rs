@@ -15,11 +15,13 @@
 //! hysteresis is a part of the state: every hypothesis carries its own.
 //!
 //! # Policy
-//! - `no_std`, no heap (the `std` feature adds helpers that return a `Vec`, and the particle filter), no unsafe code, no panic.
+//! - `no_std`, no heap (the `std` feature adds helpers that return a `Vec`, and the particle filter, `simd` a `Bank` of
+//!   sensors), no unsafe code, no panic.
 //! - A missing reading is a prediction. A step of zero seconds is an update without a prediction. A NaN or infinite
 //!   reading, a negative step and a variance that is not positive are [`StepError`]s.
 //! - Everything computed is returned: prior, innovation, its variance, log-likelihood, gain.
-//! - Covariances are packed symmetric, so they are symmetric by construction, and are updated in Joseph's form.
+//! - Covariances are packed symmetric, so they are symmetric by construction, and are updated in Joseph's form, except in the
+//!   sparse filters, which say so.
 //!
 //! ```
 //! use ohmstrain_ekf::{Belief, Ekf, Reading};
