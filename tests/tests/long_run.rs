@@ -149,7 +149,7 @@ fn day(seconds: impl Fn(Range<u64>) -> f32) -> Day {
         if time_us > DAY_US - BURST_US {
             out.off_sd = out.off_sd.max((state64.mean[0] - movement(time_us).0).abs() / sd);
         }
-        if out.readings % 20 == 0 {
+        if out.readings.is_multiple_of(20) {
             out.smallest_eigenvalue = out.smallest_eigenvalue.min(smallest_correlation_eigenvalue(&state32));
         }
     }
