@@ -22,7 +22,8 @@
 //! - Covariances are packed symmetric, so they are symmetric by construction, and are updated in Joseph's form.
 //!
 //! # Features
-//! `std` (on by default), `simd` and `adskalman` are named above. Off by default and without std:
+//! `std` (on by default) and `simd` are named above; `adskalman` hands linearised steps to that crate. Off by default and
+//! without std:
 //! - `serde`: [`Belief`], [`Estimate`], [`Gaussian`], readings, innovations, verdicts, reports and errors as plain data. A
 //!   belief that comes back is not checked; the step that it cannot take is refused. Mixtures and the states of
 //!   [`FixedGain`] and [`DiffuseEkf`], and what is made by constructors that check, are left out.
