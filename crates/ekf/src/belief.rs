@@ -6,6 +6,12 @@ use crate::{Gaussian, State, StepError, StrainSensor};
 
 /// What is known of the state: mean and covariance of a Gaussian. `L = N (N + 1) / 2`.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    serde(bound(serialize = "T: Scalar + serde::Serialize", deserialize = "T: Scalar + serde::Deserialize<'de>"))
+)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Belief<T, const N: usize, const L: usize> {
     /// Mean x̂.
     pub mean: SVector<T, N>,

@@ -19,6 +19,8 @@ use crate::{Real, Step, Update};
 
 /// What a filter's normalised errors say of its variances.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Verdict {
     /// No contradiction.
     Consistent,
@@ -141,6 +143,8 @@ pub struct ConsistencyTest<T> {
 
 /// A mean of normalised errors squared and where it should lie.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct MeanTest<T> {
     /// Mean per degree of freedom.
     pub mean: T,
@@ -168,6 +172,8 @@ impl<T: Real> MeanTest<T> {
 
 /// Do innovations know of each other? Ljung and Box's test.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Whiteness<T> {
     /// Their statistic, χ² if innovations are white.
     pub statistic: T,
@@ -181,6 +187,8 @@ pub struct Whiteness<T> {
 
 /// All that a record says.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ConsistencyReport<T> {
     /// From NIS, and NEES where there is one. Coloured innovations do not enter: they mean a wrong model, but neither too
     /// much nor too little confidence.

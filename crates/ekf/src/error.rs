@@ -2,6 +2,8 @@ use core::fmt;
 
 /// Why a step was not taken. The belief that was passed in is still the best there is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum StepError {
     /// The reading is NaN or infinite; a missing reading is `None`.

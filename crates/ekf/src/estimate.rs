@@ -4,6 +4,8 @@ use crate::{Belief, Gaussian, Real, State, StrainSensor};
 
 /// What a user wants to know, with standard deviations.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Estimate<T> {
     /// Strain, its mean moved into the limits.
     pub strain: Gaussian<T>,

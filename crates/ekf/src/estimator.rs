@@ -85,6 +85,8 @@ pub struct Advanced<S, T> {
 
 /// A reading compared with its prediction.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Innovation<T> {
     /// Reading minus expected reading.
     pub value: T,

@@ -21,6 +21,8 @@ impl Real for f64 {
 
 /// A Gaussian in one dimension.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Gaussian<T> {
     /// Mean.
     pub mean: T,
@@ -30,6 +32,8 @@ pub struct Gaussian<T> {
 
 /// Mass and first two moments of a Gaussian restricted to an interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct TruncatedGaussian<T> {
     /// Probability of the interval before the restriction.
     pub mass: T,

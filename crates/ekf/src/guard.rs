@@ -15,6 +15,8 @@ pub struct Guard<T> {
 
 /// How much a reading may move the state.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Influence<T> {
     /// As much as the Kalman gain says.
     Full,
@@ -33,6 +35,8 @@ pub enum Influence<T> {
 
 /// What became of a reading.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum ReadingVerdict {
     /// There was none.
     Missing,
@@ -48,6 +52,8 @@ pub enum ReadingVerdict {
 
 /// Rejections in a row; the caller keeps it beside the state.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Streak(u32);
 
 /// A step under guard.

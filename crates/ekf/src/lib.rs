@@ -23,6 +23,14 @@
 //! - Covariances are packed symmetric, so they are symmetric by construction, and are updated in Joseph's form, except in the
 //!   sparse filters, which say so.
 //!
+//! # Features
+//! `std` (on by default) and `simd` are named above; `adskalman` hands linearised steps to that crate. Off by default and
+//! without std:
+//! - `serde`: [`Belief`], [`Estimate`], [`Gaussian`], readings, innovations, verdicts, reports and errors as plain data. A
+//!   belief that comes back is not checked; the step that it cannot take is refused. Mixtures and the states of
+//!   [`FixedGain`] and [`DiffuseEkf`], and what is made by constructors that check, are left out.
+//! - `defmt`: `Format` for the same. It takes no text from the target, only numbers.
+//!
 //! ```
 //! use ohmstrain_ekf::{Belief, Ekf, Reading};
 //! use ohmstrain_model::*;

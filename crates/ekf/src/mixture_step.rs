@@ -9,6 +9,8 @@ use crate::{Belief, Phased, Reading, StepError};
 
 /// What weighs hypotheses, in every filter that keeps some.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Evidence<T> {
     /// Strains beyond these limits are unlikely.
     pub limits: StrainRange<T>,

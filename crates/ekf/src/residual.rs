@@ -2,6 +2,8 @@ use ohmstrain_model::Scalar;
 
 /// A reading compared with its prediction, without the logarithm that its density needs.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Residual<T> {
     /// Reading minus expected reading ν.
     pub innovation: T,

@@ -111,6 +111,8 @@ impl<T: Scalar, const M: usize, const B: usize, const N0: usize, const P: usize,
 /// A reading with the variance that it brings along, from an analogue front end for instance; the channel's own
 /// variance is added to it.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Reading<T> {
     /// The reading, in the channel's unit.
     pub value: T,

@@ -2,6 +2,7 @@ use core::fmt;
 
 /// A parameter that no model can have, by name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub struct ParameterError {
     /// The parameter, as it is called in code and in files.
@@ -12,6 +13,8 @@ pub struct ParameterError {
 
 /// What is wrong with a parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Problem {
     /// NaN, or infinite where only a number will do.

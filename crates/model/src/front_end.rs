@@ -3,6 +3,8 @@ use crate::error::{ParameterError, Problem};
 
 /// A reading in ohms with the standard deviation that the electronics give it.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Ohms<T> {
     /// Resistance, Ω.
     pub resistance_ohm: T,
@@ -12,6 +14,8 @@ pub struct Ohms<T> {
 
 /// What an analogue-to-digital converter delivered.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum AdcCode<T> {
     /// A usable reading.
     Reading(Ohms<T>),
@@ -21,6 +25,8 @@ pub enum AdcCode<T> {
 
 /// Where the sensor sits in a voltage divider.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum SensorSide {
     /// Between the output and ground.
     Low,

@@ -3,6 +3,8 @@ use crate::error::{ParameterError, Problem};
 
 /// The quasi-static curve g(ε): relative change of resistance after everything has relaxed, with g(0) = 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Gauge<T> {
     /// `a₁ ε + a₂ ε² + a₃ ε³`.
     Polynomial {

@@ -4,6 +4,8 @@ use crate::{Gauge, Phase, Scalar};
 /// One relaxing contribution to the resistance: `ċ = -c/τ + (k + κ ε) v`, with gains of their own for stretching and
 /// releasing.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Branch<T> {
     /// Time constant τ, s.
     pub tau_s: T,
@@ -22,6 +24,8 @@ pub struct Branch<T> {
 /// Outside of it the gauge curve goes on along its tangent and the gains keep their border values, because a
 /// polynomial extrapolates to nonsense and a filter must still find its way back.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct StrainRange<T> {
     /// Lower end.
     pub lower: T,
@@ -55,6 +59,8 @@ impl<T: Scalar> StrainRange<T> {
 ///
 /// With `k⁺ = k⁻` and `κ = 0` it is linear viscoelasticity; with no branch it is the Kelvin-Voigt element.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SensorLaw<T, const B: usize> {
     /// Quasi-static curve g.
     pub gauge: Gauge<T>,
@@ -63,6 +69,7 @@ pub struct SensorLaw<T, const B: usize> {
     /// Dash-pot term η⁻ while releasing, s.
     pub retract_viscosity_s: T,
     /// The branches, fastest first by convention.
+    #[cfg_attr(feature = "serde", serde(with = "serde_big_array::BigArray"))]
     pub branches: [Branch<T>; B],
     /// Where the law holds.
     pub range: StrainRange<T>,

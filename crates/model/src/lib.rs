@@ -12,6 +12,14 @@
 //! - Generic over [`Scalar`]: `f32`, `f64`, and dual numbers where exact gradients are wanted.
 //! - Units are in the names: `_s` seconds, `_ohm` ohms, `_rad` radians, `_mm` millimetres; strains and relative
 //!   changes of resistance are dimensionless.
+//!
+//! # Features
+//! Both off by default, both without std.
+//! - `serde`: laws, noise, packed matrices, phases and what a converter delivered as plain data; nothing is checked that the
+//!   constructor of the model does not check anyway. [`Motion`], [`Joint`], front ends and [`Play`] are left out: they are
+//!   made by constructors that check, and an infinite deviation, which a motion may have, does not survive JSON. Store the
+//!   arguments of their constructors. [`ParameterError`] borrows its name from the code and cannot come back.
+//! - `defmt`: `Format` for the same, and for errors.
 #![no_std]
 #![deny(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 

@@ -6,6 +6,8 @@ use crate::error::{ParameterError, Problem};
 /// Sensor noise is a small part of it: model error, slowly varying, is ten to a hundred times larger. Putting it into
 /// `reading_sd` as white noise makes a filter overconfident; it belongs into the baseline and the branches.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ModelNoise<T> {
     /// White noise of one reading.
     pub reading_sd: T,

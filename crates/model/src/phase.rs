@@ -2,6 +2,8 @@ use crate::Scalar;
 
 /// What the body does with the sensor: the law's gains and dash-pot depend on it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Phase {
     /// Stretching, v > 0.
     Extend,

@@ -11,6 +11,7 @@ use crate::Scalar;
 /// let _ = ohmstrain_model::Symmetric::<f64, 3, 5>::zeros();
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Symmetric<T, const N: usize, const L: usize>([T; L]);
 
 impl<T: Scalar, const N: usize, const L: usize> Symmetric<T, N, L> {
@@ -143,5 +144,23 @@ impl<T, const N: usize, const L: usize> IndexMut<(usize, usize)> for Symmetric<T
     fn index_mut(&mut self, (i, j): (usize, usize)) -> &mut T {
         let (i, j) = if i >= j { (i, j) } else { (j, i) };
         &mut self.0[i * (i + 1) / 2 + j]
+    }
+}
+
+/// The packed numbers, in order.
+#[cfg(feature = "serde")]
+impl<T: serde::Serialize, const N: usize, const L: usize> serde::Serialize for Symmetric<T, N, L> {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serde_big_array::BigArray::serialize(&self.0, serializer)
+    }
+}
+
+#[cfg(feature = "serde")]
+impl<'de, T: Scalar + serde::Deserialize<'de>, const N: usize, const L: usize> serde::Deserialize<'de>
+    for Symmetric<T, N, L>
+{
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let () = Self::LENGTH_FITS;
+        serde_big_array::BigArray::deserialize(deserializer).map(Self)
     }
 }

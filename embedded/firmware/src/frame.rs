@@ -13,7 +13,7 @@ use cortex_m_semihosting::debug::{self, EXIT_FAILURE, EXIT_SUCCESS};
 use cortex_m_semihosting::hio;
 use ohmstrain_ekf::Reading;
 
-use crate::{CODES, Filter, front_end, to_reading};
+use crate::{Filter, front_end, to_reading};
 
 /// Instructions per tick of the system timer: QEMU counts one nanosecond per instruction (`-icount shift=0`), the board's
 /// timer has 25 MHz.
@@ -32,16 +32,16 @@ pub fn filter_step<F: Filter<f32>>(filter: &mut F, reading: Reading<f32>) -> boo
     filter.step(reading)
 }
 
-/// Runs a filter over the recorded codes, reports, and ends the program.
-pub fn run<F: Filter<f32>>() -> ! {
-    match measure::<F>() {
+/// Runs a filter over recorded codes, reports, and ends the program.
+pub fn run<F: Filter<f32>, const K: usize>(codes: &[u16; K]) -> ! {
+    match measure::<F, K>(codes) {
         Some(()) => debug::exit(EXIT_SUCCESS),
         None => debug::exit(EXIT_FAILURE),
     }
     halt()
 }
 
-fn measure<F: Filter<f32>>() -> Option<()> {
+fn measure<F: Filter<f32>, const K: usize>(codes: &[u16; K]) -> Option<()> {
     let mut timer = cortex_m::Peripherals::take()?.SYST;
     timer.set_clock_source(SystClkSource::Core);
     timer.set_reload(0x00FF_FFFF);
@@ -49,9 +49,9 @@ fn measure<F: Filter<f32>>() -> Option<()> {
     timer.enable_counter();
 
     let divider = black_box(front_end::<f32>().ok()?);
-    let mut readings = [Reading { value: 0.0, extra_variance: 0.0 }; CODES.len()];
+    let mut readings = [Reading { value: 0.0, extra_variance: 0.0 }; K];
     let start = SYST::get_current();
-    for (reading, code) in readings.iter_mut().zip(black_box(&CODES)) {
+    for (reading, code) in readings.iter_mut().zip(black_box(codes)) {
         *reading = to_reading(&divider, u32::from(*code))?;
     }
     let conversion = since(start);
@@ -62,13 +62,13 @@ fn measure<F: Filter<f32>>() -> Option<()> {
     let stack = worst_stack(fresh, &readings);
 
     let mut refused = 0;
-    let mut strains = [0; CODES.len()];
+    let mut strains = [0; K];
     let mut filter = fresh;
     for (strain, reading) in strains.iter_mut().zip(&readings) {
         refused += u32::from(!filter_step(&mut filter, *reading));
         *strain = filter.strain().to_bits();
     }
-    let counts = [CODES.len() as u32, all_steps, dearest, conversion, stack, F::state_bytes() as u32, refused];
+    let counts = [K as u32, all_steps, dearest, conversion, stack, F::state_bytes() as u32, refused];
     let mut out = hio::hstdout().ok()?;
     for word in counts.iter().chain(&strains) {
         out.write_all(&word.to_le_bytes()).ok()?;

@@ -11,7 +11,7 @@ mod fpu;
 pub mod frame;
 mod sensors;
 
-pub use codes::CODES;
+pub use codes::{CODES_3, CODES_6};
 pub use filters::{
     Ekf3, Ekf6, Fast, Fast3, Fast6, FastImm6, FastSplit6, Filter, Imm6, PreparedEkf, SplitFour, VaryingEkf3,
     VaryingFast3,

@@ -18,11 +18,12 @@ pub fn limits<T: Scalar>() -> StrainRange<T> {
     StrainRange { lower: T::of(-0.02), upper: T::of(0.35) }
 }
 
-/// A sensor with up to three branches, and a baseline if `N = B + 3`.
+/// A sensor with up to three branches that share what relaxes, and a baseline if `N = B + 3`.
 ///
 /// # Errors
 /// None: the parameters are valid.
 pub fn sensor<T: Scalar, const B: usize, const N: usize>() -> Result<SwitchedModel<T, 2, B, N>, ParameterError> {
+    let share = |gain: f64| T::of(gain / B as f64);
     let law = SensorLaw {
         gauge: Gauge::Polynomial { coefficients: [T::of(1.6), T::of(-1.2), T::of(0.5)] },
         extend_viscosity_s: T::of(0.02),
@@ -33,10 +34,10 @@ pub fn sensor<T: Scalar, const B: usize, const N: usize>() -> Result<SwitchedMod
                 1 => T::of(32.0),
                 _ => T::of(256.0),
             },
-            extend_gain: T::of(0.8),
-            retract_gain: T::of(-0.5),
-            extend_gain_slope: T::of(-0.6),
-            retract_gain_slope: T::of(-0.4),
+            extend_gain: share(0.8),
+            retract_gain: share(-0.5),
+            extend_gain_slope: share(-0.6),
+            retract_gain_slope: share(-0.4),
         }),
         range: limits(),
     };
@@ -46,7 +47,7 @@ pub fn sensor<T: Scalar, const B: usize, const N: usize>() -> Result<SwitchedMod
         baseline_sd: if N == B + 3 { T::of(0.02) } else { T::zero() },
         baseline_time_s: T::of(30.0),
     };
-    let motion = Motion::ornstein_uhlenbeck(T::of(1.5), T::of(0.05), T::of(0.15), T::of(0.1))?;
+    let motion = Motion::ornstein_uhlenbeck(T::of(1.5), T::of(0.06), T::of(0.07), T::of(0.06))?;
     SwitchedModel::new(law, motion, noise)
 }
 

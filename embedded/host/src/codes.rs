@@ -1,5 +1,5 @@
-//! Codes of a 12-bit converter in front of a simulated sensor that obeys the law the filters assume. How well a filter
-//! follows is not the question here, that it does the same everywhere is.
+//! Codes of a 12-bit converter in front of simulated sensors that obey the laws the filters assume: one with a single
+//! branch for the filters of three states, one with three for those of six.
 
 use ohmstrain_firmware::{DT_S, REST_OHM, front_end, sensor};
 use ohmstrain_model::{ParameterError, Phase};
@@ -13,22 +13,27 @@ pub const SEED: u64 = 20_240_611;
 /// Substeps of one reading for the law's differential equation.
 const SUBSTEPS: usize = 20;
 
-/// Rest, two cycles of 2 s to 20 % and back, a ramp to 15 % and a hold.
+/// What the body does: rest, a cycle of 4 s to 15 % and back, a ramp to 10 % and a hold.
 fn strain(time_s: f64) -> f64 {
     match time_s {
         t if t < 0.5 => 0.0,
-        t if t < 4.5 => 0.1 - 0.1 * libm::cos(core::f64::consts::PI * (t - 0.5)),
-        t if t < 5.25 => 0.2 * (t - 4.5),
-        _ => 0.15,
+        t if t < 4.5 => 0.075 - 0.075 * libm::cos(0.5 * core::f64::consts::PI * (t - 0.5)),
+        t if t < 5.5 => 0.1 * (t - 4.5),
+        _ => 0.1,
     }
 }
 
-/// The converter's codes.
-pub fn codes() -> Result<Vec<u16>, ParameterError> {
-    let model = sensor::<f64, 3, 6>()?;
+/// The strain at every reading.
+pub fn strains() -> Vec<f64> {
+    (1..=READINGS).map(|k| strain(k as f64 * DT_S)).collect()
+}
+
+/// The converter's codes for a sensor with `B` branches.
+pub fn codes<const B: usize, const N: usize>() -> Result<Vec<u16>, ParameterError> {
+    let model = sensor::<f64, B, N>()?;
     let (law, divider, mut noise) = (model.law(), front_end::<f64>()?, Noise(SEED));
     let h = DT_S / SUBSTEPS as f64;
-    let mut relaxation = [0.0; 3];
+    let mut relaxation = [0.0; B];
     let mut codes = Vec::with_capacity(READINGS);
     for k in 1..=READINGS {
         let (mut phase, mut rate) = (Phase::Hold, 0.0);

@@ -70,7 +70,7 @@ fn symbols(nm: &str) -> Result<(BTreeMap<u64, Function>, u64), Box<dyn Error>> {
                 let address = u64::from_str_radix(address, 16)? & !1;
                 functions.insert(address, Function { name: (*name).into(), size });
             }
-            "r" | "R" if name.contains("CODES") => codes = size,
+            "r" | "R" if name.contains("CODES") => codes += size,
             _ => {}
         }
     }

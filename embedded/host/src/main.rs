@@ -19,7 +19,8 @@ fn main() -> ExitCode {
         ["vectors", root] => vectors::write(Path::new(root)).map(|()| true),
         ["vectors", root, "--check"] => vectors::check(Path::new(root)),
         ["report", root, images] => report::report(Path::new(root), Path::new(images)),
-        _ => Err("usage: vectors ROOT [--check] | report ROOT IMAGES".into()),
+        ["report", root, images, "--update"] => report::update(Path::new(root), Path::new(images)),
+        _ => Err("usage: vectors ROOT [--check] | report ROOT IMAGES [--update]".into()),
     };
     match done {
         Ok(true) => ExitCode::SUCCESS,

@@ -45,6 +45,12 @@ impl Run {
         })
     }
 
+    /// Root mean square of the strains' errors.
+    pub fn rms_error(&self, truth: &[f64]) -> f64 {
+        let squares = self.strains.iter().zip(truth).map(|(a, b)| (f64::from(*a) - b).powi(2));
+        (squares.sum::<f64>() / self.strains.len() as f64).sqrt()
+    }
+
     /// The largest difference of a strain from its reference.
     pub fn difference(&self, reference: &[f64]) -> f64 {
         self.strains.iter().zip(reference).fold(0.0, |most, (a, b)| {

@@ -3,9 +3,9 @@
 #![no_main]
 
 use cortex_m_rt::entry;
-use ohmstrain_firmware::{VaryingEkf3, frame};
+use ohmstrain_firmware::{CODES_3, VaryingEkf3, frame};
 
 #[entry]
 fn main() -> ! {
-    frame::run::<VaryingEkf3<f32>>()
+    frame::run::<VaryingEkf3<f32>, _>(&CODES_3)
 }

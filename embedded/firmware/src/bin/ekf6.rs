@@ -3,9 +3,9 @@
 #![no_main]
 
 use cortex_m_rt::entry;
-use ohmstrain_firmware::{Ekf6, frame};
+use ohmstrain_firmware::{CODES_6, Ekf6, frame};
 
 #[entry]
 fn main() -> ! {
-    frame::run::<Ekf6<f32>>()
+    frame::run::<Ekf6<f32>, _>(&CODES_6)
 }

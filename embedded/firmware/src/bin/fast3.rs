@@ -3,9 +3,9 @@
 #![no_main]
 
 use cortex_m_rt::entry;
-use ohmstrain_firmware::{Fast3, frame};
+use ohmstrain_firmware::{CODES_3, Fast3, frame};
 
 #[entry]
 fn main() -> ! {
-    frame::run::<Fast3<f32>>()
+    frame::run::<Fast3<f32>, _>(&CODES_3)
 }

@@ -3,9 +3,9 @@
 #![no_main]
 
 use cortex_m_rt::entry;
-use ohmstrain_firmware::{VaryingFast3, frame};
+use ohmstrain_firmware::{CODES_3, VaryingFast3, frame};
 
 #[entry]
 fn main() -> ! {
-    frame::run::<VaryingFast3<f32>>()
+    frame::run::<VaryingFast3<f32>, _>(&CODES_3)
 }

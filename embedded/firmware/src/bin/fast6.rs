@@ -3,9 +3,9 @@
 #![no_main]
 
 use cortex_m_rt::entry;
-use ohmstrain_firmware::{Fast6, frame};
+use ohmstrain_firmware::{CODES_6, Fast6, frame};
 
 #[entry]
 fn main() -> ! {
-    frame::run::<Fast6<f32>>()
+    frame::run::<Fast6<f32>, _>(&CODES_6)
 }

@@ -3,9 +3,9 @@
 #![no_main]
 
 use cortex_m_rt::entry;
-use ohmstrain_firmware::{FastImm6, frame};
+use ohmstrain_firmware::{CODES_6, FastImm6, frame};
 
 #[entry]
 fn main() -> ! {
-    frame::run::<FastImm6<f32>>()
+    frame::run::<FastImm6<f32>, _>(&CODES_6)
 }

@@ -3,9 +3,9 @@
 #![no_main]
 
 use cortex_m_rt::entry;
-use ohmstrain_firmware::{FastSplit6, frame};
+use ohmstrain_firmware::{CODES_6, FastSplit6, frame};
 
 #[entry]
 fn main() -> ! {
-    frame::run::<FastSplit6<f32>>()
+    frame::run::<FastSplit6<f32>, _>(&CODES_6)
 }

@@ -3,9 +3,9 @@
 #![no_main]
 
 use cortex_m_rt::entry;
-use ohmstrain_firmware::{Imm6, frame};
+use ohmstrain_firmware::{CODES_6, Imm6, frame};
 
 #[entry]
 fn main() -> ! {
-    frame::run::<Imm6<f32>>()
+    frame::run::<Imm6<f32>, _>(&CODES_6)
 }

@@ -3,9 +3,9 @@
 #![no_main]
 
 use cortex_m_rt::entry;
-use ohmstrain_firmware::{SplitFour, frame};
+use ohmstrain_firmware::{CODES_6, SplitFour, frame};
 
 #[entry]
 fn main() -> ! {
-    frame::run::<SplitFour<f32>>()
+    frame::run::<SplitFour<f32>, _>(&CODES_6)
 }
