@@ -7,7 +7,7 @@ use super::{Likelihood, LikelihoodFit, ModelFamily};
 use crate::CalibrationError;
 
 /// Half the 95 % quantile of χ² with one degree of freedom: how far the profile may fall.
-const FALL: f64 = 1.920_729_410_347_062;
+pub(super) const FALL: f64 = 1.920_729_410_347_062;
 /// Accuracy of the ends, in the logarithm of the parameter.
 const TOLERANCE: f64 = 1e-9;
 /// Each step away from the maximum is this much longer than the one before.
