@@ -68,26 +68,31 @@ impl<'a, F: ModelFamily<N, L>, const N: usize, const L: usize> Walk<'a, F, N, L>
     }
 
     fn end(mut self) -> Option<f64> {
+        let bounds = self.likelihood.ln_bounds();
+        let mut longest = LONGEST;
         for _ in 0..MOST_STEPS {
-            let step = match self.step() {
-                Some(step) => step,
-                None => {
-                    self.exact_hessian()?;
-                    self.step()?
-                }
-            };
-            let step = &step * (LONGEST / step.amax()).min(1.0);
+            let step = self.step().or_else(|| self.exact_hessian().and_then(|()| self.step()))?;
+            let step = &step * (longest / step.amax()).min(1.0);
+            let mut next = self.point.clone();
             for (&i, by) in self.free.iter().zip(step.iter()) {
-                self.point[i] += by;
+                next[i] += by;
             }
             if step.amax() < TOLERANCE {
-                return Some(self.point[self.free[self.about]].exp());
+                return Some(next[self.free[self.about]].exp());
             }
-            let bounds = self.likelihood.ln_bounds();
-            if self.point.iter().zip(bounds).any(|(x, (lower, upper))| !(lower..=upper).contains(&x)) {
+            if next.iter().zip(&bounds).any(|(x, (lower, upper))| !(lower..=upper).contains(&x)) {
                 return None;
             }
-            self.look(&step)?;
+            let (value, all) = gradient(self.likelihood.family, &next, self.likelihood.recordings).ok()?;
+            let slopes = DVector::from_iterator(self.free.len(), self.free.iter().map(|&i| all[i]));
+            // Far below the target the likelihood is no parabola any more.
+            if value < self.target - FALL || !(value + slopes.sum()).is_finite() {
+                longest = 0.5 * step.amax();
+                continue;
+            }
+            longest = LONGEST.min(4.0 * step.amax());
+            self.learn(&step, &slopes);
+            (self.point, self.value, self.gradient) = (next, value, slopes);
         }
         None
     }
@@ -117,20 +122,13 @@ impl<'a, F: ModelFamily<N, L>, const N: usize, const L: usize> Walk<'a, F, N, L>
         step.iter().all(|by| by.is_finite()).then_some(step)
     }
 
-    /// Takes value and gradient at the point that `step` has led to.
-    fn look(&mut self, step: &DVector<f64>) -> Option<()> {
-        let (value, all) = gradient(self.likelihood.family, &self.point, self.likelihood.recordings).ok()?;
-        let slopes = DVector::from_iterator(self.free.len(), self.free.iter().map(|&i| all[i]));
-        if !(value.is_finite() && slopes.iter().all(|slope| slope.is_finite())) {
-            return None;
-        }
-        let unexplained = &slopes - &self.gradient - &self.hessian * step;
+    /// Brings the Hessian up to date with what the gradient has become after a step.
+    fn learn(&mut self, step: &DVector<f64>, slopes: &DVector<f64>) {
+        let unexplained = slopes - &self.gradient - &self.hessian * step;
         let along = unexplained.dot(step);
         if along.abs() > TEACHES * unexplained.norm() * step.norm() {
             self.hessian += &unexplained * unexplained.transpose() / along;
         }
-        (self.value, self.gradient) = (value, slopes);
-        Some(())
     }
 
     /// Computes the Hessian anew where the updates have led astray.

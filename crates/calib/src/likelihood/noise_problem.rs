@@ -7,6 +7,7 @@ use super::{
 use crate::CalibrationError;
 use crate::estimator_params::MotionParams;
 use crate::law_params::LawParams;
+use crate::optimise::polish;
 
 /// The likelihood of readings `R/R₀ - 1` under the extended Kalman filter of a known law, as a function of the parameters
 /// in `free`, each from a thousandth to a thousand times where it starts.
@@ -122,7 +123,30 @@ impl Question for AtStart {
     }
 }
 
+/// Searches across jumps at most, and Newton's steps in each; a dozen or two are usual where nothing jumps.
+const MOST_ROUNDS: usize = 3;
+const MOST_STEPS: usize = 40;
+/// Side of the simplex, in the logarithms, and its steps: a hundred cost what a few of Newton's do.
+const SIMPLEX: (f64, u64) = (0.3, 200);
+
+/// The likelihood jumps where the mean of a filter moves across a border of the law's range, at which the slope of the
+/// gains ends: Newton's method may stop at the edge. A simplex goes on from there, and Newton's method from where that ends.
 struct Maximum;
+
+/// The parameters, starting from the best point that a simplex finds around `from`.
+fn across_jumps<F: ModelFamily<N, L>, const N: usize, const L: usize>(
+    likelihood: &Likelihood<F, N, L>,
+    from: &LikelihoodFit,
+) -> Result<Vec<Parameter>, CalibrationError> {
+    let inside = |ln: &[f64]| -> Vec<f64> {
+        let bounded = |(ln, parameter): (&f64, &Parameter)| ln.exp().max(parameter.lower).min(parameter.upper);
+        ln.iter().zip(likelihood.parameters).map(bounded).collect()
+    };
+    let cost = |ln: &[f64]| likelihood.log_likelihood(&inside(ln)).map_or(f64::INFINITY, |found| -found.value);
+    let from: Vec<f64> = from.parameters.iter().map(|parameter| parameter.value.ln()).collect();
+    let values = inside(&polish(cost, &from, SIMPLEX.0, SIMPLEX.1)?);
+    Ok(likelihood.parameters.iter().zip(values).map(|(parameter, start)| Parameter { start, ..*parameter }).collect())
+}
 
 impl Question for Maximum {
     type Answer = LikelihoodFit;
@@ -131,7 +155,24 @@ impl Question for Maximum {
         self,
         likelihood: &Likelihood<F, N, L>,
     ) -> Result<Self::Answer, CalibrationError> {
-        likelihood.fit()
+        let mut best = likelihood.fit_within(MOST_STEPS)?;
+        for _ in 0..MOST_ROUNDS {
+            if best.converged {
+                break;
+            }
+            let start = across_jumps(likelihood, &best)?;
+            let LikelihoodFit { iterations, .. } = best;
+            let next = Likelihood { parameters: &start, ..*likelihood }.fit_within(MOST_STEPS)?;
+            let risen = next.log_likelihood.value > best.log_likelihood.value;
+            if risen {
+                best = next.clone();
+            }
+            best.iterations = iterations + next.iterations;
+            if !risen {
+                break;
+            }
+        }
+        Ok(best)
     }
 }
 

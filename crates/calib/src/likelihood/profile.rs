@@ -57,7 +57,7 @@ impl<F: ModelFamily<N, L>, const N: usize, const L: usize> Profile<'_, F, N, L> 
     fn excess(&self, ln_value: f64) -> Result<f64, CalibrationError> {
         let mut start = self.at.borrow().clone();
         start[self.index] = ln_value;
-        let optimum = self.likelihood.maximise(&start, Some(self.index))?;
+        let optimum = self.likelihood.maximise_others(&start, self.index)?;
         self.at.replace(optimum.point);
         Ok(optimum.derivatives.log_likelihood.value - self.target)
     }

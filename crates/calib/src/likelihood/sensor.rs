@@ -72,7 +72,8 @@ pub(super) fn found(start: &NoiseStart, free: &[NoiseParameter], fit: &Likelihoo
 pub(super) fn warnings(fit: &LikelihoodFit) -> Vec<String> {
     let mut out = Vec::new();
     if !fit.converged {
-        out.push(format!("no maximum after {} steps: gradient {:.1e}", fit.iterations, fit.gradient_norm));
+        let (steps, norm) = (fit.iterations, fit.gradient_norm);
+        out.push(format!("no maximum after {steps} steps, gradient {norm:.1e}: the likelihood jumps or rises forever"));
     }
     for parameter in &fit.parameters {
         let name = parameter.name;
@@ -82,7 +83,7 @@ pub(super) fn warnings(fit: &LikelihoodFit) -> Vec<String> {
                 bound.name(),
                 parameter.value
             ));
-        } else if parameter.ln_standard_error.is_none_or(|error| error > LEAST_SURE) {
+        } else if fit.converged && parameter.ln_standard_error.is_none_or(|error| error > LEAST_SURE) {
             out.push(format!("{name} is hardly determined by the readings"));
         }
     }
