@@ -143,7 +143,7 @@ fn the_noise_that_was_drawn_is_found_from_a_start_three_times_off() {
         let (lower, upper): (f64, f64) = (lower.parse().unwrap(), upper.parse().unwrap());
         assert!(lower < found && found < upper, "{printed}");
     }
-    assert!(printed.contains("held, without effect in the sensor file: branch_sd"), "{printed}");
+    assert!(printed.contains("held: branch_sd\n"), "{printed}");
     assert!(printed.contains("expectation maximisation"), "{printed}");
 
     // Nothing else has changed, and the file says what the table says.
@@ -234,6 +234,17 @@ fn many_rows_are_thinned_and_that_is_said() {
 }
 
 #[test]
+fn only_the_parameters_asked_for_move() {
+    let bench = Bench::calibrated();
+    let refine = ["refine", "trace.csv", "--sensor", "sensor.toml", "--until", "60", "-o", "refined.toml"];
+    let run = bench.run(&[&refine[..], &["--parameters", "rate_time_s,rate_sd_per_s"]].concat());
+    assert!(done(&run).contains("held: reading_sd, branch_sd, baseline_sd, baseline_time_s\n"), "{}", run.stdout);
+    let (before, after) = (read_sensor(&bench, "sensor.toml"), read_sensor(&bench, "refined.toml"));
+    assert_eq!(ekf_noise(&before), ekf_noise(&after));
+    assert_ne!(before.estimators[&EstimatorKind::Ekf].motion, after.estimators[&EstimatorKind::Ekf].motion);
+}
+
+#[test]
 fn what_cannot_be_refined_is_refused_and_nothing_is_written() {
     let bench = Bench::calibrated();
     let mut with_plays = read_sensor(&bench, "sensor.toml");
@@ -250,7 +261,15 @@ fn what_cannot_be_refined_is_refused_and_nothing_is_written() {
         "ratio.csv:{header}: column `resistance_ratio`: expected `resistance_ohm` as in the sensor's calibration, found \
          `resistance_ratio`"
     );
-    let cases: [(&[&str], i32, &str); 8] = [
+    let mut no_branch = read_sensor(&bench, "sensor.toml");
+    no_branch.law.branches.clear();
+    bench.write("branchless.toml", toml::to_string(&no_branch).unwrap());
+    let cases: [(&[&str], i32, &str); 9] = [
+        (
+            &["trace.csv", "--sensor", "branchless.toml", "--parameters", "reading_sd,branch_sd"],
+            2,
+            "--parameters: branch_sd is without effect in branchless.toml and cannot be moved",
+        ),
         (
             &["trace.csv", "--sensor", "sensor.toml", "--estimator", "ukf"],
             2,
@@ -292,6 +311,9 @@ fn what_cannot_be_refined_is_refused_and_nothing_is_written() {
         assert_eq!((run.stdout.as_str(), bench.files()), ("", before.clone()), "{message}");
         assert_eq!(bench.read("old.toml"), "what was here before");
     }
+    let unknown = ["refine", "trace.csv", "--sensor", "sensor.toml", "--parameters", "colour", "-o", "old.toml"];
+    let run = bench.run(&unknown);
+    assert!(run.stderr.contains("'colour' for '--parameters") && run.code == Some(2), "{}", run.stderr);
     let run = bench.run(&["refine", "trace.csv", "--sensor", "sensor.toml", "--until", "20", "-o", "none/new.toml"]);
     assert_eq!((run.code, run.stdout.as_str()), (Some(1), ""), "{}", run.stderr);
     assert_eq!(bench.files(), before);

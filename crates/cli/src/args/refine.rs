@@ -1,6 +1,8 @@
 use std::path::PathBuf;
+use std::str::FromStr;
 
 use clap::Args as ClapArgs;
+use ohmstrain_calib::likelihood::NoiseParameter;
 
 use super::{Auto, Estimator, RestResistance, TraceArgs, finite};
 
@@ -25,6 +27,10 @@ pub struct RefineArgs {
     /// Estimator to refine: auto (ekf) or ekf, the only one whose likelihood has exact derivatives
     #[arg(long, default_value = "auto")]
     pub estimator: Auto<Estimator>,
+    /// Parameters to move, separated by commas; all by default: reading_sd, branch_sd, baseline_sd, baseline_time_s,
+    /// rate_sd_per_s, rate_time_s
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    pub parameters: Vec<Moved>,
     /// Resistance at rest instead of the sensor file's: a number in the readings' unit, or first:N for the median of
     /// the recording's first N readings; it is not written
     #[arg(long, value_name = "OHM|first:N")]
@@ -32,6 +38,20 @@ pub struct RefineArgs {
     /// Overrides of the recording's metadata
     #[command(flatten)]
     pub trace: TraceArgs,
+}
+
+/// A parameter to move.
+#[derive(Clone, Copy, Debug)]
+pub struct Moved(pub NoiseParameter);
+
+impl FromStr for Moved {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let names = || NoiseParameter::ALL.map(NoiseParameter::name).join(", ");
+        let found = NoiseParameter::ALL.into_iter().find(|parameter| parameter.name() == text);
+        found.map(Self).ok_or_else(|| format!("expected some of {}", names()))
+    }
 }
 
 /// What the long help says after the flags.
@@ -42,5 +62,6 @@ is wrong by more than its noise makes errors of strain that readings do not show
 narrow. Where a reference exists, use calibrate.
 
 The standard error is that of the parameter's logarithm, 0.1 is 10 %; the interval is the profile likelihood's. A parameter
-that is zero in the sensor file stays zero. More than 3000 rows are thinned to every k-th. Law, R0, limits, the factor
+that is zero in the sensor file stays zero. Moving the motion alone, --parameters rate_sd_per_s,rate_time_s, keeps what
+calibrate knows of the law's error. More than 3000 rows are thinned to every k-th. Law, R0, limits, the factor
 strain_sd_scale and the other estimators stay as they are in the sensor file.";

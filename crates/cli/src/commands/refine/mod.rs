@@ -33,7 +33,8 @@ pub fn run(args: &RefineArgs) -> Result<(), CliError> {
     let readings = recording.trace.readings.values.iter().copied();
     let rest_reading = rest_reading(args.rest_resistance, &params, readings, &recording.name)?;
     let rows = RelativeRows::new(&recording, args.from, args.until, rest_reading)?;
-    let refinement = refine(&params, &rows).map_err(|error| named(args, &error))?;
+    let (start, free) = start(args, &params)?;
+    let refinement = refine(&params.law, start, free, &rows).map_err(|error| named(args, &error))?;
     remark_on_input(&recording, &rows, &params);
     replace(&mut params, &refinement);
     sensor_file::write(&args.output, &params)?;
@@ -53,12 +54,14 @@ fn named(args: &RefineArgs, error: &CalibrationError) -> CliError {
 }
 
 /// Maximises the likelihood and looks at its shape around the maximum.
-fn refine(params: &SensorParams, rows: &RelativeRows) -> Result<Refinement, CalibrationError> {
-    let ekf = params.estimator(EstimatorKind::Ekf)?;
-    let start = NoiseStart { noise: ekf.noise, motion: ekf.motion };
-    let free = free(&params.law, &start);
+fn refine(
+    law: &LawParams,
+    start: NoiseStart,
+    free: Vec<NoiseParameter>,
+    rows: &RelativeRows,
+) -> Result<Refinement, CalibrationError> {
     let recordings = [Readings { time_s: &rows.time_s, value: &rows.value, extra_sd: &rows.extra_sd }];
-    let problem = NoiseProblem { recordings: &recordings, law: &params.law, start: &start, free: &free };
+    let problem = NoiseProblem { recordings: &recordings, law, start: &start, free: &free };
     let progress = Progress::new("maximising the likelihood");
     let before = problem.log_likelihood()?;
     let found = problem.fit()?;
@@ -68,18 +71,32 @@ fn refine(params: &SensorParams, rows: &RelativeRows) -> Result<Refinement, Cali
     Ok(Refinement { start, free, before, found, profiles })
 }
 
+/// Where the search starts, and the parameters that it moves.
+fn start(args: &RefineArgs, params: &SensorParams) -> Result<(NoiseStart, Vec<NoiseParameter>), CliError> {
+    let ekf = params.estimator(EstimatorKind::Ekf).map_err(|error| named(args, &error))?;
+    let start = NoiseStart { noise: ekf.noise, motion: ekf.motion };
+    let movable = movable(&params.law, &start);
+    let wanted: Vec<NoiseParameter> = args.parameters.iter().map(|moved| moved.0).collect();
+    if let Some(parameter) = wanted.iter().find(|parameter| !movable.contains(parameter)) {
+        let (name, file) = (parameter.name(), args.sensor.display());
+        return Err(CliError::Arguments(format!(
+            "--parameters: {name} is without effect in {file} and cannot be moved"
+        )));
+    }
+    let is_wanted = |parameter: &NoiseParameter| wanted.is_empty() || wanted.contains(parameter);
+    Ok((start, movable.into_iter().filter(is_wanted).collect()))
+}
+
 /// The parameters that can move: what is zero in the sensor file was left out by whoever made it, and the wander of
 /// branches that are not there tells nothing.
-fn free(law: &LawParams, start: &NoiseStart) -> Vec<NoiseParameter> {
-    let is_free = |parameter: &NoiseParameter| {
-        let value = |parameter: NoiseParameter| parameter.get(&start.noise, &start.motion);
-        match parameter {
-            NoiseParameter::BranchSd => !law.branches.is_empty() && start.noise.branch_sd > 0.0,
-            NoiseParameter::BaselineTime => value(NoiseParameter::BaselineSd) > 0.0,
-            other => value(*other) > 0.0,
-        }
+fn movable(law: &LawParams, start: &NoiseStart) -> Vec<NoiseParameter> {
+    let value = |parameter: NoiseParameter| parameter.get(&start.noise, &start.motion);
+    let is_movable = |parameter: &NoiseParameter| match parameter {
+        NoiseParameter::BranchSd => !law.branches.is_empty() && value(NoiseParameter::BranchSd) > 0.0,
+        NoiseParameter::BaselineTime => value(NoiseParameter::BaselineSd) > 0.0,
+        other => value(*other) > 0.0,
     };
-    NoiseParameter::ALL.into_iter().filter(is_free).collect()
+    NoiseParameter::ALL.into_iter().filter(is_movable).collect()
 }
 
 /// Says what of the recording was left aside.

@@ -59,7 +59,7 @@ pub fn write(out: &mut dyn Write, refinement: &Refinement) -> Result<(), CliErro
     let held: Vec<&str> =
         NoiseParameter::ALL.iter().filter(|each| !free.contains(each)).map(|each| each.name()).collect();
     if !held.is_empty() {
-        writeln!(out, "held, without effect in the sensor file: {}", held.join(", "))?;
+        writeln!(out, "held: {}", held.join(", "))?;
     }
     if let MotionParams::Smooth { .. } = start.motion {
         writeln!(out, "rate_time_s is rate_sd_per_s / acceleration_sd_per_s2")?;
