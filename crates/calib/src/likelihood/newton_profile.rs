@@ -15,9 +15,10 @@ const LONGEST: f64 = 2.0;
 const TEACHES: f64 = 1e-8;
 
 impl<F: ModelFamily<N, L>, const N: usize, const L: usize> Likelihood<'_, F, N, L> {
-    /// The interval of [`Self::profile_interval`], some twenty times faster: Newton's method on the end itself, with
+    /// The interval of [`Self::profile_interval`], faster: Newton's method on the end itself, with
     /// gradients only and the Hessian kept up to date from them. In exchange it gives up, with `None`, an end that lies
-    /// beyond a bound of any parameter, that the method does not reach, or of a parameter that is not free.
+    /// beyond a bound of any parameter, that the method does not reach, or of a parameter that is not free; and both ends
+    /// where `fit` is no maximum.
     ///
     /// Source: Venzon & Moolgavkar, *Appl. Statist.* 37 (1988) 87; the symmetric rank-one update of Nocedal & Wright,
     /// *Numerical Optimization* (2006), section 6.2.
@@ -52,6 +53,9 @@ impl<'a, F: ModelFamily<N, L>, const N: usize, const L: usize> Walk<'a, F, N, L>
         index: usize,
         sign: f64,
     ) -> Option<Self> {
+        if !fit.converged {
+            return None;
+        }
         let free: Vec<usize> = (0..fit.parameters.len()).filter(|&i| fit.parameters[i].bound.is_none()).collect();
         let covariance = sub_matrix(fit.ln_covariance.as_ref()?, &free);
         Some(Self {
@@ -72,12 +76,13 @@ impl<'a, F: ModelFamily<N, L>, const N: usize, const L: usize> Walk<'a, F, N, L>
         let mut longest = LONGEST;
         for _ in 0..MOST_STEPS {
             let step = self.step().or_else(|| self.exact_hessian().and_then(|()| self.step()))?;
-            let step = &step * (longest / step.amax()).min(1.0);
+            let length = step.amax();
+            let step = &step * (longest / length).min(1.0);
             let mut next = self.point.clone();
             for (&i, by) in self.free.iter().zip(step.iter()) {
                 next[i] += by;
             }
-            if step.amax() < TOLERANCE {
+            if length < TOLERANCE {
                 return Some(next[self.free[self.about]].exp());
             }
             if next.iter().zip(&bounds).any(|(x, (lower, upper))| !(lower..=upper).contains(&x)) {
@@ -88,6 +93,10 @@ impl<'a, F: ModelFamily<N, L>, const N: usize, const L: usize> Walk<'a, F, N, L>
             // Far below the target the likelihood is no parabola any more.
             if value < self.target - FALL || !(value + slopes.sum()).is_finite() {
                 longest = 0.5 * step.amax();
+                // It does not fall, it jumps.
+                if longest < TOLERANCE {
+                    return None;
+                }
                 continue;
             }
             longest = LONGEST.min(4.0 * step.amax());

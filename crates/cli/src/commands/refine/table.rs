@@ -36,7 +36,11 @@ pub fn write(out: &mut dyn Write, refinement: &Refinement) -> Result<(), CliErro
             fitted.name.to_string(),
             number(parameter.get(&start.noise, &start.motion)),
             number(fitted.value),
-            fitted.ln_standard_error.map_or_else(|| "-".into(), |error| format!("{error:.3}")),
+            // Away from a maximum the curvature says nothing about the parameter.
+            fitted
+                .ln_standard_error
+                .filter(|_| found.fit.converged)
+                .map_or_else(|| "-".into(), |error| format!("{error:.3}")),
             interval(profile),
             fitted.bound.map_or("", Bound::name).to_string(),
         ]);
