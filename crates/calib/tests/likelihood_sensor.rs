@@ -1,9 +1,12 @@
 //! Noise and motion of a sensor from its readings alone.
 
 use ohmstrain_calib::likelihood::{
-    Likelihood, ModelFamily, NoiseFit, NoiseParameter, NoiseStart, Parameter, Readings, fit_noise_without_reference,
+    Likelihood, ModelFamily, NoiseFit, NoiseParameter, NoiseProblem, NoiseStart, Parameter, Readings,
+    fit_noise_without_reference,
 };
-use ohmstrain_calib::{BranchParams, CalibrationError, GaugeParams, LawParams, MotionParams, NoiseParams, RangeParams};
+use ohmstrain_calib::{
+    BranchParams, CalibrationError, GaugeParams, LawParams, MotionParams, NoiseParams, PlayParams, RangeParams,
+};
 use ohmstrain_ekf::{Belief, DiffuseBelief, StepError, Unscented};
 use ohmstrain_model::{Direction, ModelNoise, Motion, ParameterError, Phase, Scalar, SwitchedModel, Transition};
 use rand_chacha::ChaCha12Rng;
@@ -86,7 +89,7 @@ fn start() -> NoiseStart {
 
 fn fit(seed: u64, rows: usize) -> NoiseFit {
     let (time_s, value) = simulate(seed, rows);
-    let recordings = [Readings { time_s: &time_s, value: &value }];
+    let recordings = [Readings { time_s: &time_s, value: &value, extra_sd: &[] }];
     fit_noise_without_reference(&recordings, &law(0.0), &start(), &FREE).unwrap()
 }
 
@@ -115,9 +118,78 @@ fn known_noise_is_found_within_its_standard_errors() {
 }
 
 #[test]
+fn what_the_electronics_add_is_not_found_again() {
+    let (time_s, value) = simulate(1, 1000);
+    let at = |own: f64, extra_sd: &[f64]| {
+        let mut start = NoiseStart { noise: TRUE_NOISE, motion: TRUE_MOTION };
+        start.noise.reading_sd = own;
+        let recordings = [Readings { time_s: &time_s, value: &value, extra_sd }];
+        let (law, free) = (law(0.0), [NoiseParameter::ReadingSd]);
+        let problem = NoiseProblem { recordings: &recordings, law: &law, start: &start, free: &free };
+        problem.log_likelihood().unwrap().value
+    };
+    // 3² + 4² = 5². Half of the rows say nothing of their electronics, and a missing cell adds nothing.
+    let split = at(3e-3, &vec![4e-3; 1000]);
+    assert!((split - at(5e-3, &[])).abs() < 1e-9 * split.abs());
+    assert_eq!(at(3e-3, &[f64::NAN; 10]), at(3e-3, &[]));
+    assert_ne!(at(3e-3, &[4e-3; 10]), at(3e-3, &[]));
+}
+
+#[test]
+fn both_ways_to_a_profile_interval_agree() {
+    let (time_s, value) = simulate(1, 1000);
+    let recordings = [Readings { time_s: &time_s, value: &value, extra_sd: &[] }];
+    let parameter = |name, start: f64| Parameter { name, start, lower: start * 1e-3, upper: start * 1e3 };
+    let parameters = [parameter("reading", 4e-3), parameter("rate", 0.2), parameter("time", 0.5)];
+    let likelihood = Likelihood::<_, 4, 10> { family: &Linear, parameters: &parameters, recordings: &recordings };
+    let fit = likelihood.fit().unwrap();
+    for index in 0..parameters.len() {
+        let (slow, fast) =
+            (likelihood.profile_interval(&fit, index).unwrap(), likelihood.newton_profile_interval(&fit, index));
+        // Both stop within 1e-6 in the logarithm, and the slow one's points are maxima to far less.
+        assert!((slow.lower.unwrap() / fast.lower.unwrap() - 1.0).abs() < 2e-6, "{slow:?} {fast:?}");
+        assert!((slow.upper.unwrap() / fast.upper.unwrap() - 1.0).abs() < 2e-6, "{slow:?} {fast:?}");
+    }
+}
+
+/// The simulated sensor as a family in white noise and rate.
+struct Linear;
+
+impl ModelFamily<4, 10> for Linear {
+    type Model<T: Scalar> = SwitchedModel<T, 2, 1, 4>;
+    fn model<T: Scalar>(&self, parameters: &[T]) -> Result<Self::Model<T>, ParameterError> {
+        let branch = ohmstrain_model::Branch {
+            tau_s: T::of(4.0),
+            extend_gain: T::of(0.6),
+            retract_gain: T::of(0.6),
+            extend_gain_slope: T::zero(),
+            retract_gain_slope: T::zero(),
+        };
+        let law = ohmstrain_model::SensorLaw {
+            gauge: ohmstrain_model::Gauge::Polynomial { coefficients: [1.8, 0.0, 0.0].map(T::of) },
+            extend_viscosity_s: T::of(0.02),
+            retract_viscosity_s: T::of(0.02),
+            branches: [branch],
+            range: ohmstrain_model::StrainRange { lower: T::of(-1.0), upper: T::of(1.5) },
+        };
+        let motion = Motion::ornstein_uhlenbeck(parameters[2], parameters[1], T::of(0.15), T::of(0.08))?;
+        let noise = ModelNoise {
+            reading_sd: parameters[0],
+            branch_sd: T::zero(),
+            baseline_sd: T::of(TRUE_NOISE.baseline_sd),
+            baseline_time_s: T::of(TRUE_NOISE.baseline_time_s),
+        };
+        SwitchedModel::new(law, motion, noise)
+    }
+    fn start<T: Scalar>(&self, model: &Self::Model<T>) -> DiffuseBelief<T, 4, 10> {
+        Belief::initial(model).into()
+    }
+}
+
+#[test]
 fn what_the_readings_do_not_say_is_warned_of() {
     let (time_s, value) = simulate(1, 1000);
-    let recordings = [Readings { time_s: &time_s, value: &value }];
+    let recordings = [Readings { time_s: &time_s, value: &value, extra_sd: &[] }];
     let mut start = NoiseStart { noise: TRUE_NOISE, motion: TRUE_MOTION };
     // The simulated branch does not wander.
     start.noise.branch_sd = 1e-3;
@@ -185,7 +257,7 @@ const POINT: [f64; 5] = [3e-3, 0.25, 0.4, 0.015, 2.0];
 fn check_derivatives<F: ModelFamily<4, 10>>(family: &F) {
     let (time_s, mut value) = simulate(3, 300);
     value[40..60].fill(f64::NAN);
-    let recordings = [Readings { time_s: &time_s, value: &value }];
+    let recordings = [Readings { time_s: &time_s, value: &value, extra_sd: &[] }];
     let parameters = ["reading", "rate", "time", "baseline", "baseline time"].map(|name| Parameter::around(name, 1.0));
     let likelihood = Likelihood::<_, 4, 10> { family, parameters: &parameters, recordings: &recordings };
     let at = |point: &[f64; 5]| likelihood.log_likelihood(point).unwrap().value;
@@ -223,14 +295,18 @@ fn derivatives_are_exact() {
 fn errors_name_the_culprit() {
     let time_s = [0.0, 0.1, 0.2];
     let value = [0.3, f64::INFINITY, 0.3];
-    let recordings = [Readings { time_s: &time_s, value: &value }];
+    let recordings = [Readings { time_s: &time_s, value: &value, extra_sd: &[] }];
     let at = |recordings: &[Readings], free: &[NoiseParameter]| {
         fit_noise_without_reference(recordings, &law(0.0), &start(), free).unwrap_err()
     };
     let failed = |time_s: f64, error: StepError| CalibrationError::Filter { time_s, error };
     assert_eq!(at(&recordings, &FREE), failed(0.1, StepError::NonFiniteReading));
-    let backwards = [Readings { time_s: &[0.0, 0.2, 0.1], value: &[0.3; 3] }];
+    let backwards = [Readings { time_s: &[0.0, 0.2, 0.1], value: &[0.3; 3], extra_sd: &[] }];
     assert_eq!(at(&backwards, &FREE), failed(0.1, StepError::NegativeTimeStep));
     assert!(at(&recordings, &[]).to_string().contains("no parameter is free"));
     assert!(at(&recordings, &[NoiseParameter::BranchSd]).to_string().contains("branch_sd"));
+    let mut with_plays = law(0.0);
+    with_plays.plays = vec![PlayParams { half_width: 0.01, weight: 0.2 }];
+    let refused = fit_noise_without_reference(&recordings, &with_plays, &start(), &FREE).unwrap_err();
+    assert!(refused.to_string().contains("1 branches and 1 plays"), "{refused}");
 }

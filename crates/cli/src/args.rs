@@ -1,6 +1,7 @@
 mod evaluate;
 mod export;
 mod fit_law;
+mod refine;
 
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -14,6 +15,7 @@ use ohmstrain_ekf::Influence;
 pub use evaluate::{Estimators, EvaluateArgs};
 pub use export::{ExportArgs, ExportTarget};
 pub use fit_law::{FitLawArgs, SegmentChoice, phase_name};
+pub use refine::RefineArgs;
 
 /// From the resistance of a soft strain sensor to strain, with an honest error bar.
 #[derive(Debug, Parser)]
@@ -33,6 +35,8 @@ pub enum Command {
     Simulate(SimulateArgs),
     /// Fit law, noise and motion to recordings with a known strain
     Calibrate(CalibrateArgs),
+    /// Fit the extended Kalman filter's noise to readings alone, where no strain was recorded
+    Refine(RefineArgs),
     /// Fit the source paper's closed-form laws to stretches, holds and releases
     FitLaw(FitLawArgs),
     /// Turn readings into strain, row by row

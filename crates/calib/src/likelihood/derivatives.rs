@@ -33,12 +33,8 @@ pub(super) fn derivatives<F: ModelFamily<N, L>, const N: usize, const L: usize>(
     };
     for i in 0..size {
         for j in 0..=i {
-            let seeded = |(k, ln): (usize, &f64)| {
-                let one_if = |seed: usize| f64::from(u8::from(k == seed));
-                ComplexField::exp(HyperDual64::new(*ln, one_if(i), one_if(j), 0.0))
-            };
-            let parameters: Vec<HyperDual64> = ln_parameters.iter().enumerate().map(seeded).collect();
-            let LogLikelihood { value, without_constant, readings } = log_likelihood(family, &parameters, recordings)?;
+            let LogLikelihood { value, without_constant, readings } =
+                seeded(family, ln_parameters, recordings, [i, j])?;
             out.log_likelihood = LogLikelihood { value: value.re, without_constant: without_constant.re, readings };
             out.gradient[i] = value.eps1;
             out.hessian[(i, j)] = value.eps1eps2;
@@ -50,4 +46,39 @@ pub(super) fn derivatives<F: ModelFamily<N, L>, const N: usize, const L: usize>(
     } else {
         Err(CalibrationError::Optimiser("the likelihood has no derivative here".into()))
     }
+}
+
+/// Value and gradient alone: one filter run per two parameters.
+pub(super) fn gradient<F: ModelFamily<N, L>, const N: usize, const L: usize>(
+    family: &F,
+    ln_parameters: &[f64],
+    recordings: &[Readings],
+) -> Result<(f64, DVector<f64>), CalibrationError> {
+    let size = ln_parameters.len();
+    let (mut log_likelihood, mut slopes) = (f64::NAN, DVector::zeros(size));
+    for i in (0..size).step_by(2) {
+        let value = seeded(family, ln_parameters, recordings, [i, i + 1])?.value;
+        log_likelihood = value.re;
+        slopes[i] = value.eps1;
+        if i + 1 < size {
+            slopes[i + 1] = value.eps2;
+        }
+    }
+    Ok((log_likelihood, slopes))
+}
+
+/// The log-likelihood in numbers that carry the derivatives with respect to two of the logarithms, and the mixed one. A
+/// seed beyond the parameters derives with respect to nothing.
+fn seeded<F: ModelFamily<N, L>, const N: usize, const L: usize>(
+    family: &F,
+    ln_parameters: &[f64],
+    recordings: &[Readings],
+    seeds: [usize; 2],
+) -> Result<LogLikelihood<HyperDual64>, CalibrationError> {
+    let parameter = |(k, ln): (usize, &f64)| {
+        let [first, second] = seeds.map(|seed| f64::from(u8::from(k == seed)));
+        ComplexField::exp(HyperDual64::new(*ln, first, second, 0.0))
+    };
+    let parameters: Vec<HyperDual64> = ln_parameters.iter().enumerate().map(parameter).collect();
+    log_likelihood(family, &parameters, recordings)
 }

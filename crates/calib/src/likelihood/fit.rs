@@ -2,7 +2,7 @@ use nalgebra::DMatrix;
 
 use super::derivatives::derivatives;
 use super::log_likelihood::log_likelihood;
-use super::newton::{Objective, Optimum, covariance, maximise};
+use super::newton::{MOST_ITERATIONS, Objective, Optimum, covariance, maximise};
 use super::{Derivatives, LogLikelihood, ModelFamily, Parameter, Readings};
 use crate::CalibrationError;
 
@@ -94,6 +94,11 @@ impl<F: ModelFamily<N, L>, const N: usize, const L: usize> Likelihood<'_, F, N, 
     /// # Errors
     /// A start that is not within positive bounds, or at which the filter fails.
     pub fn fit(&self) -> Result<LikelihoodFit, CalibrationError> {
+        self.fit_within(MOST_ITERATIONS)
+    }
+
+    /// [`Self::fit`] with a limit of its own to the steps.
+    pub(super) fn fit_within(&self, most_iterations: usize) -> Result<LikelihoodFit, CalibrationError> {
         for Parameter { name, start, lower, upper } in self.parameters {
             if !(0.0 < *lower && lower <= start && start <= upper && upper.is_finite()) {
                 let message = format!("{name} starts at {start}, which is not within positive bounds");
@@ -101,12 +106,12 @@ impl<F: ModelFamily<N, L>, const N: usize, const L: usize> Likelihood<'_, F, N, 
             }
         }
         let start: Vec<f64> = self.parameters.iter().map(|parameter| parameter.start.ln()).collect();
-        Ok(self.report(&self.maximise(&start, None)?))
+        Ok(self.report(&maximise(self, &start, &self.ln_bounds(), None, most_iterations)?))
     }
 
     /// The maximum over all parameters but the one that is held where it starts. Logarithms.
-    pub(super) fn maximise(&self, start: &[f64], held: Option<usize>) -> Result<Optimum, CalibrationError> {
-        maximise(self, start, &self.ln_bounds(), held)
+    pub(super) fn maximise_others(&self, start: &[f64], held: usize) -> Result<Optimum, CalibrationError> {
+        maximise(self, start, &self.ln_bounds(), Some(held), MOST_ITERATIONS)
     }
 
     pub(super) fn ln_bounds(&self) -> Vec<(f64, f64)> {

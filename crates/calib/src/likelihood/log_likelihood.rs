@@ -6,13 +6,25 @@ use ohmstrain_model::Scalar;
 use super::ModelFamily;
 use crate::CalibrationError;
 
-/// Readings without a reference. The shorter slice counts.
-#[derive(Clone, Copy, Debug)]
+/// Readings without a reference. The shorter of times and readings counts.
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Readings<'a> {
     /// Times, s, not decreasing.
     pub time_s: &'a [f64],
     /// Readings in the channel's unit; NaN where missing.
     pub value: &'a [f64],
+    /// Standard deviation that the electronics add to each reading; NaN, or past the slice's end, where nothing is known
+    /// of it.
+    pub extra_sd: &'a [f64],
+}
+
+impl Readings<'_> {
+    /// The reading of a row; `None` where it is missing.
+    fn reading<T: Scalar>(&self, row: usize) -> Option<Reading<T>> {
+        let value = self.value.get(row).filter(|value| !value.is_nan())?;
+        let extra_sd = self.extra_sd.get(row).filter(|sd| !sd.is_nan()).copied().unwrap_or(0.0);
+        Some(Reading { value: T::of(*value), extra_variance: T::of(extra_sd * extra_sd) })
+    }
 }
 
 /// Log density of readings under a model.
@@ -47,10 +59,11 @@ where
     for recording in recordings {
         let mut belief = start;
         let mut previous_s = None;
-        for (&time_s, &value) in recording.time_s.iter().zip(recording.value) {
+        for (row, &time_s) in recording.time_s.iter().enumerate().take(recording.value.len()) {
             let dt_s = previous_s.map_or(0.0, |previous_s| time_s - previous_s);
-            let reading = (!value.is_nan()).then(|| Reading::from(T::of(value)));
-            belief = run.step(&belief, dt_s, reading).map_err(|error| CalibrationError::Filter { time_s, error })?;
+            belief = run
+                .step(&belief, dt_s, recording.reading(row))
+                .map_err(|error| CalibrationError::Filter { time_s, error })?;
             previous_s = Some(time_s);
         }
     }

@@ -22,7 +22,7 @@ pub(super) struct Optimum {
 }
 
 /// Iterations allowed; a dozen is usual.
-const MOST_ITERATIONS: usize = 200;
+pub(super) const MOST_ITERATIONS: usize = 200;
 /// First and largest length of a step, in the logarithm of a parameter.
 const FIRST_RADIUS: f64 = 1.0;
 const LARGEST_RADIUS: f64 = 4.0;
@@ -45,6 +45,7 @@ pub(super) fn maximise(
     start: &[f64],
     bounds: &[(f64, f64)],
     held: Option<usize>,
+    most_iterations: usize,
 ) -> Result<Optimum, CalibrationError> {
     let inside = |point: &DVector<f64>| -> Vec<f64> {
         point.iter().zip(bounds).map(|(x, (lower, upper))| x.max(*lower).min(*upper)).collect()
@@ -58,7 +59,7 @@ pub(super) fn maximise(
         if step.concave && step.decrement <= TOLERANCE * TOLERANCE {
             return Ok(Optimum { point, derivatives: now, free, iterations, converged: true });
         }
-        if iterations >= MOST_ITERATIONS || radius < TOLERANCE {
+        if iterations >= most_iterations || radius < TOLERANCE {
             return Ok(Optimum { point, derivatives: now, free, iterations, converged: false });
         }
         iterations += 1;

@@ -7,7 +7,7 @@ use super::{Likelihood, LikelihoodFit, ModelFamily};
 use crate::CalibrationError;
 
 /// Half the 95 % quantile of χ² with one degree of freedom: how far the profile may fall.
-const FALL: f64 = 1.920_729_410_347_062;
+pub(super) const FALL: f64 = 1.920_729_410_347_062;
 /// Accuracy of the ends, in the logarithm of the parameter.
 const TOLERANCE: f64 = 1e-9;
 /// Each step away from the maximum is this much longer than the one before.
@@ -57,7 +57,7 @@ impl<F: ModelFamily<N, L>, const N: usize, const L: usize> Profile<'_, F, N, L> 
     fn excess(&self, ln_value: f64) -> Result<f64, CalibrationError> {
         let mut start = self.at.borrow().clone();
         start[self.index] = ln_value;
-        let optimum = self.likelihood.maximise(&start, Some(self.index))?;
+        let optimum = self.likelihood.maximise_others(&start, self.index)?;
         self.at.replace(optimum.point);
         Ok(optimum.derivatives.log_likelihood.value - self.target)
     }

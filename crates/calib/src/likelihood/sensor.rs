@@ -1,5 +1,4 @@
-use super::sensor_family::{SensorFamily, ThreeStates, TwoStates};
-use super::{Likelihood, LikelihoodFit, ModelFamily, NoiseParameter, Parameter, Readings};
+use super::{LikelihoodFit, NoiseParameter, NoiseProblem, Readings};
 use crate::CalibrationError;
 use crate::estimator_params::{MotionParams, NoiseParams};
 use crate::law_params::LawParams;
@@ -36,61 +35,17 @@ const LEAST_SURE: f64 = 2.0;
 /// The strain is not needed. In exchange the law is trusted: its error goes into whatever noise fits it best.
 ///
 /// # Errors
-/// If nothing is free, a free parameter starts at zero, the law has more than four branches, or the filter fails.
+/// If nothing is free, a free parameter starts at zero, the law has plays or more than four branches, or the filter fails.
 pub fn fit_noise_without_reference(
     recordings: &[Readings],
     law: &LawParams,
     start: &NoiseStart,
     free: &[NoiseParameter],
 ) -> Result<NoiseFit, CalibrationError> {
-    if free.is_empty() {
-        return Err(CalibrationError::Unsupported("no parameter is free".into()));
-    }
-    /// One instance per number of branches; N = M + B + 1, L = N (N + 1) / 2.
-    macro_rules! sized {
-        ($family:ident, $([$b:literal, $n:literal, $l:literal]),+) => {
-            match law.branches.len() {
-                $($b => maximum::<_, $n, $l>(&$family(family::<$b>(law, start, free)?), recordings, start, free),)+
-                many => Err(CalibrationError::Unsupported(format!("a law with {many} branches; at most 4 are supported"))),
-            }
-        };
-    }
-    let fit = match start.motion {
-        MotionParams::OrnsteinUhlenbeck { .. } => {
-            sized!(TwoStates, [0, 3, 6], [1, 4, 10], [2, 5, 15], [3, 6, 21], [4, 7, 28])
-        }
-        MotionParams::Smooth { .. } => {
-            sized!(ThreeStates, [0, 4, 10], [1, 5, 15], [2, 6, 21], [3, 7, 28], [4, 8, 36])
-        }
-    }?;
-    let (noise, motion) = found(start, free, &fit);
-    Ok(NoiseFit { noise, motion, warnings: warnings(&fit), fit })
+    NoiseProblem { recordings, law, start, free }.fit()
 }
 
-fn family<'a, const B: usize>(
-    law: &LawParams,
-    start: &NoiseStart,
-    free: &'a [NoiseParameter],
-) -> Result<SensorFamily<'a, B>, CalibrationError> {
-    let law = law.to_model().ok_or_else(|| CalibrationError::Unsupported("number of branches".into()))?;
-    Ok(SensorFamily { law, noise: start.noise, motion: start.motion, free })
-}
-
-fn maximum<F: ModelFamily<N, L>, const N: usize, const L: usize>(
-    family: &F,
-    recordings: &[Readings],
-    start: &NoiseStart,
-    free: &[NoiseParameter],
-) -> Result<LikelihoodFit, CalibrationError> {
-    let parameter = |free: &NoiseParameter| {
-        let value = free.get(&start.noise, &start.motion);
-        Parameter { name: free.name(), start: value, lower: value * 1e-3, upper: value * 1e3 }
-    };
-    let parameters: Vec<Parameter> = free.iter().map(parameter).collect();
-    Likelihood::<F, N, L> { family, parameters: &parameters, recordings }.fit()
-}
-
-fn found(start: &NoiseStart, free: &[NoiseParameter], fit: &LikelihoodFit) -> (NoiseParams, MotionParams) {
+pub(super) fn found(start: &NoiseStart, free: &[NoiseParameter], fit: &LikelihoodFit) -> (NoiseParams, MotionParams) {
     let value = |parameter: NoiseParameter| {
         let mut moved = free.iter().zip(&fit.parameters).filter(|(free, _)| **free == parameter);
         moved.next().map_or_else(|| parameter.get(&start.noise, &start.motion), |(_, fitted)| fitted.value)
@@ -114,10 +69,11 @@ fn found(start: &NoiseStart, free: &[NoiseParameter], fit: &LikelihoodFit) -> (N
     (noise, motion)
 }
 
-fn warnings(fit: &LikelihoodFit) -> Vec<String> {
+pub(super) fn warnings(fit: &LikelihoodFit) -> Vec<String> {
     let mut out = Vec::new();
     if !fit.converged {
-        out.push(format!("no maximum after {} steps: gradient {:.1e}", fit.iterations, fit.gradient_norm));
+        let (steps, norm) = (fit.iterations, fit.gradient_norm);
+        out.push(format!("no maximum after {steps} steps, gradient {norm:.1e}: the likelihood jumps or rises forever"));
     }
     for parameter in &fit.parameters {
         let name = parameter.name;
@@ -127,7 +83,7 @@ fn warnings(fit: &LikelihoodFit) -> Vec<String> {
                 bound.name(),
                 parameter.value
             ));
-        } else if parameter.ln_standard_error.is_none_or(|error| error > LEAST_SURE) {
+        } else if fit.converged && parameter.ln_standard_error.is_none_or(|error| error > LEAST_SURE) {
             out.push(format!("{name} is hardly determined by the readings"));
         }
     }

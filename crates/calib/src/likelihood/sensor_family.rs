@@ -42,7 +42,8 @@ impl NoiseParameter {
     }
 
     /// Its value in a pair of noise and motion.
-    pub(super) fn get(self, noise: &NoiseParams, motion: &MotionParams) -> f64 {
+    #[must_use]
+    pub fn get(self, noise: &NoiseParams, motion: &MotionParams) -> f64 {
         let (rate_sd, rate_time_s) = match *motion {
             MotionParams::OrnsteinUhlenbeck { rate_sd_per_s, rate_time_s, .. } => (rate_sd_per_s, rate_time_s),
             MotionParams::Smooth { rate_sd_per_s, acceleration_sd_per_s2, .. } => {

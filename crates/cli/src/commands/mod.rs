@@ -7,6 +7,7 @@ mod explain;
 mod export;
 mod filter;
 mod fit_law;
+mod refine;
 mod score_table;
 mod scoring;
 mod simulate;
@@ -21,6 +22,7 @@ pub fn dispatch(command: &Command) -> Result<(), CliError> {
         Command::Demo(args) => demo::run(args),
         Command::Simulate(args) => simulate::run(args),
         Command::Calibrate(args) => calibrate::run(args),
+        Command::Refine(args) => refine::run(args),
         Command::FitLaw(args) => fit_law::run(args),
         Command::Filter(args) => filter::run(args),
         Command::Smooth(args) => smooth::run(args),

@@ -1,0 +1,193 @@
+use super::sensor::{found, warnings};
+use super::sensor_family::{SensorFamily, ThreeStates, TwoStates};
+use super::{
+    Likelihood, LikelihoodFit, LogLikelihood, ModelFamily, NoiseFit, NoiseParameter, NoiseStart, Parameter,
+    ProfileInterval, Readings,
+};
+use crate::CalibrationError;
+use crate::estimator_params::MotionParams;
+use crate::law_params::LawParams;
+use crate::optimise::polish;
+
+/// The likelihood of readings `R/R₀ - 1` under the extended Kalman filter of a known law, as a function of the parameters
+/// in `free`, each from a thousandth to a thousand times where it starts.
+///
+/// The strain is not needed. In exchange the law is trusted: its error goes into whatever noise fits it best.
+#[derive(Clone, Copy, Debug)]
+pub struct NoiseProblem<'a> {
+    /// Recordings; each starts anew.
+    pub recordings: &'a [Readings<'a>],
+    /// The law; without plays, at most four branches.
+    pub law: &'a LawParams,
+    /// Noise and motion to start from.
+    pub start: &'a NoiseStart,
+    /// The parameters that are looked for; none of them starts at zero.
+    pub free: &'a [NoiseParameter],
+}
+
+impl NoiseProblem<'_> {
+    /// The log-likelihood where the search starts.
+    ///
+    /// # Errors
+    /// As [`Self::fit`].
+    pub fn log_likelihood(&self) -> Result<LogLikelihood<f64>, CalibrationError> {
+        self.ask(AtStart)
+    }
+
+    /// The noise and motion that make the readings most likely.
+    ///
+    /// # Errors
+    /// If nothing is free, a free parameter starts at zero, the law is not supported, or the filter fails.
+    pub fn fit(&self) -> Result<NoiseFit, CalibrationError> {
+        if self.free.is_empty() {
+            return Err(CalibrationError::Unsupported("no parameter is free".into()));
+        }
+        let fit = self.ask(Maximum)?;
+        let (noise, motion) = found(self.start, self.free, &fit);
+        Ok(NoiseFit { noise, motion, warnings: warnings(&fit), fit })
+    }
+
+    /// The profile interval of parameter `index` in `free` around the maximum, by
+    /// [`Likelihood::newton_profile_interval`].
+    ///
+    /// # Errors
+    /// If the law is not supported.
+    pub fn profile_interval(&self, fit: &LikelihoodFit, index: usize) -> Result<ProfileInterval, CalibrationError> {
+        self.ask(Profile { fit, index })
+    }
+
+    /// Makes the likelihood of the law's size and asks it.
+    fn ask<Q: Question>(&self, question: Q) -> Result<Q::Answer, CalibrationError> {
+        /// One instance per number of branches; N = M + B + 1, L = N (N + 1) / 2.
+        macro_rules! sized {
+            ($family:ident, $([$b:literal, $n:literal, $l:literal]),+) => {
+                match (self.law.branches.len(), self.law.plays.len()) {
+                    $(($b, 0) => self.ask_family::<_, Q, $n, $l>(&$family(self.family::<$b>()?), question),)+
+                    (branches, plays) => Err(CalibrationError::Unsupported(format!(
+                        "a law with {branches} branches and {plays} plays; the likelihood of readings has at most 4 branches \
+                         and no plays"
+                    ))),
+                }
+            };
+        }
+        match self.start.motion {
+            MotionParams::OrnsteinUhlenbeck { .. } => {
+                sized!(TwoStates, [0, 3, 6], [1, 4, 10], [2, 5, 15], [3, 6, 21], [4, 7, 28])
+            }
+            MotionParams::Smooth { .. } => {
+                sized!(ThreeStates, [0, 4, 10], [1, 5, 15], [2, 6, 21], [3, 7, 28], [4, 8, 36])
+            }
+        }
+    }
+
+    fn ask_family<F: ModelFamily<N, L>, Q: Question, const N: usize, const L: usize>(
+        &self,
+        family: &F,
+        question: Q,
+    ) -> Result<Q::Answer, CalibrationError> {
+        let parameter = |free: &NoiseParameter| {
+            let value = free.get(&self.start.noise, &self.start.motion);
+            Parameter { name: free.name(), start: value, lower: value * 1e-3, upper: value * 1e3 }
+        };
+        let parameters: Vec<Parameter> = self.free.iter().map(parameter).collect();
+        question.ask(&Likelihood::<F, N, L> { family, parameters: &parameters, recordings: self.recordings })
+    }
+
+    fn family<const B: usize>(&self) -> Result<SensorFamily<'_, B>, CalibrationError> {
+        let law = self.law.to_model().ok_or_else(|| CalibrationError::Unsupported("number of branches".into()))?;
+        Ok(SensorFamily { law, noise: self.start.noise, motion: self.start.motion, free: self.free })
+    }
+}
+
+/// What is asked of a likelihood whose size is known at run time only.
+trait Question {
+    type Answer;
+
+    fn ask<F: ModelFamily<N, L>, const N: usize, const L: usize>(
+        self,
+        likelihood: &Likelihood<F, N, L>,
+    ) -> Result<Self::Answer, CalibrationError>;
+}
+
+struct AtStart;
+
+impl Question for AtStart {
+    type Answer = LogLikelihood<f64>;
+
+    fn ask<F: ModelFamily<N, L>, const N: usize, const L: usize>(
+        self,
+        likelihood: &Likelihood<F, N, L>,
+    ) -> Result<Self::Answer, CalibrationError> {
+        let start: Vec<f64> = likelihood.parameters.iter().map(|parameter| parameter.start).collect();
+        likelihood.log_likelihood(&start)
+    }
+}
+
+/// Searches across jumps at most, and Newton's steps in each; a dozen or two are usual where nothing jumps.
+const MOST_ROUNDS: usize = 3;
+const MOST_STEPS: usize = 40;
+/// Side of the simplex, in the logarithms, and its steps: a hundred cost what a few of Newton's do.
+const SIMPLEX: (f64, u64) = (0.3, 200);
+
+/// The likelihood jumps where the mean of a filter moves across a border of the law's range, at which the slope of the
+/// gains ends: Newton's method may stop at the edge. A simplex goes on from there, and Newton's method from where that ends.
+struct Maximum;
+
+/// The parameters, starting from the best point that a simplex finds around `from`.
+fn across_jumps<F: ModelFamily<N, L>, const N: usize, const L: usize>(
+    likelihood: &Likelihood<F, N, L>,
+    from: &LikelihoodFit,
+) -> Result<Vec<Parameter>, CalibrationError> {
+    let inside = |ln: &[f64]| -> Vec<f64> {
+        let bounded = |(ln, parameter): (&f64, &Parameter)| ln.exp().max(parameter.lower).min(parameter.upper);
+        ln.iter().zip(likelihood.parameters).map(bounded).collect()
+    };
+    let cost = |ln: &[f64]| likelihood.log_likelihood(&inside(ln)).map_or(f64::INFINITY, |found| -found.value);
+    let from: Vec<f64> = from.parameters.iter().map(|parameter| parameter.value.ln()).collect();
+    let values = inside(&polish(cost, &from, SIMPLEX.0, SIMPLEX.1)?);
+    Ok(likelihood.parameters.iter().zip(values).map(|(parameter, start)| Parameter { start, ..*parameter }).collect())
+}
+
+impl Question for Maximum {
+    type Answer = LikelihoodFit;
+
+    fn ask<F: ModelFamily<N, L>, const N: usize, const L: usize>(
+        self,
+        likelihood: &Likelihood<F, N, L>,
+    ) -> Result<Self::Answer, CalibrationError> {
+        let mut best = likelihood.fit_within(MOST_STEPS)?;
+        for _ in 0..MOST_ROUNDS {
+            if best.converged {
+                break;
+            }
+            let start = across_jumps(likelihood, &best)?;
+            let LikelihoodFit { iterations, .. } = best;
+            let next = Likelihood { parameters: &start, ..*likelihood }.fit_within(MOST_STEPS)?;
+            let risen = next.log_likelihood.value > best.log_likelihood.value;
+            if risen {
+                best = next.clone();
+            }
+            best.iterations = iterations + next.iterations;
+            if !risen {
+                break;
+            }
+        }
+        Ok(best)
+    }
+}
+
+struct Profile<'a> {
+    fit: &'a LikelihoodFit,
+    index: usize,
+}
+
+impl Question for Profile<'_> {
+    type Answer = ProfileInterval;
+
+    fn ask<F: ModelFamily<N, L>, const N: usize, const L: usize>(
+        self,
+        likelihood: &Likelihood<F, N, L>,
+    ) -> Result<Self::Answer, CalibrationError> {
+        Ok(likelihood.newton_profile_interval(self.fit, self.index))
+    }
+}

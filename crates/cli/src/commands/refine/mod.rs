@@ -1,0 +1,121 @@
+//! `refine`: noise and motion of the extended Kalman filter from readings alone.
+
+mod rows;
+mod table;
+
+use ohmstrain_calib::likelihood::{NoiseParameter, NoiseProblem, NoiseStart, ProfileInterval, Readings};
+use ohmstrain_calib::{CalibrationError, EstimatorKind, LawParams, SensorParams};
+
+use crate::args::RefineArgs;
+use crate::error::CliError;
+use crate::input::{self, Recording, check_unit, reading_column};
+use crate::output::write_to;
+use crate::progress::Progress;
+use crate::run::rest_reading;
+use crate::sensor_file;
+use rows::RelativeRows;
+use table::Refinement;
+
+/// What nobody must overlook.
+const TRUST: &str = "the likelihood of readings trusts the law: where the law is wrong, intervals of strain are too \
+                     narrow; where a reference exists, use calibrate";
+
+/// Refines a sensor's noise on a recording and writes its parameters.
+pub fn run(args: &RefineArgs) -> Result<(), CliError> {
+    if let Some(other) = args.estimator.chosen().map(|estimator| estimator.0).filter(|kind| *kind != EstimatorKind::Ekf)
+    {
+        let name = other.name();
+        return Err(CliError::Arguments(format!("--estimator: expected ekf, the only one to refine, found {name}")));
+    }
+    let mut params = sensor_file::read(&args.sensor, Some(EstimatorKind::Ekf))?;
+    let recording = input::read(&args.trace_file, &args.trace.metadata())?;
+    check_unit(&recording.header, recording.trace.readings.kind, params.reading)?;
+    let readings = recording.trace.readings.values.iter().copied();
+    let rest_reading = rest_reading(args.rest_resistance, &params, readings, &recording.name)?;
+    let rows = RelativeRows::new(&recording, args.from, args.until, rest_reading)?;
+    let (start, free) = start(args, &params)?;
+    let refinement = refine(&params.law, start, free, &rows).map_err(|error| named(args, &error))?;
+    remark_on_input(&recording, &rows, &params);
+    replace(&mut params, &refinement);
+    sensor_file::write(&args.output, &params)?;
+    write_to(None, |out| table::write(out, &refinement))?;
+    for warning in &refinement.found.warnings {
+        CliError::warning(&format!("{}: {warning}", recording.name));
+    }
+    CliError::warning(TRUST);
+    Ok(())
+}
+
+/// An error of the likelihood with the file that it is about: the law and where the search starts are the sensor's.
+fn named(args: &RefineArgs, error: &CalibrationError) -> CliError {
+    let of_sensor = matches!(error, CalibrationError::Unsupported(_) | CalibrationError::Parameter(_));
+    let culprit = if of_sensor { &args.sensor } else { &args.trace_file };
+    CliError::calibration(&[&culprit.display().to_string()], error)
+}
+
+/// Maximises the likelihood and looks at its shape around the maximum.
+fn refine(
+    law: &LawParams,
+    start: NoiseStart,
+    free: Vec<NoiseParameter>,
+    rows: &RelativeRows,
+) -> Result<Refinement, CalibrationError> {
+    let recordings = [Readings { time_s: &rows.time_s, value: &rows.value, extra_sd: &rows.extra_sd }];
+    let problem = NoiseProblem { recordings: &recordings, law, start: &start, free: &free };
+    let progress = Progress::new("maximising the likelihood");
+    let before = problem.log_likelihood()?;
+    let found = problem.fit()?;
+    progress.doing("profile intervals");
+    let profiles: Vec<ProfileInterval> =
+        (0..free.len()).map(|index| problem.profile_interval(&found.fit, index)).collect::<Result<_, _>>()?;
+    Ok(Refinement { start, free, before, found, profiles })
+}
+
+/// Where the search starts, and the parameters that it moves.
+fn start(args: &RefineArgs, params: &SensorParams) -> Result<(NoiseStart, Vec<NoiseParameter>), CliError> {
+    let ekf = params.estimator(EstimatorKind::Ekf).map_err(|error| named(args, &error))?;
+    let start = NoiseStart { noise: ekf.noise, motion: ekf.motion };
+    let movable = movable(&params.law, &start);
+    let wanted: Vec<NoiseParameter> = args.parameters.iter().map(|moved| moved.0).collect();
+    if let Some(parameter) = wanted.iter().find(|parameter| !movable.contains(parameter)) {
+        let (name, file) = (parameter.name(), args.sensor.display());
+        return Err(CliError::Arguments(format!(
+            "--parameters: {name} is without effect in {file} and cannot be moved"
+        )));
+    }
+    let is_wanted = |parameter: &NoiseParameter| wanted.is_empty() || wanted.contains(parameter);
+    Ok((start, movable.into_iter().filter(is_wanted).collect()))
+}
+
+/// The parameters that can move: what is zero in the sensor file was left out by whoever made it, and the wander of
+/// branches that are not there tells nothing.
+fn movable(law: &LawParams, start: &NoiseStart) -> Vec<NoiseParameter> {
+    let value = |parameter: NoiseParameter| parameter.get(&start.noise, &start.motion);
+    let is_movable = |parameter: &NoiseParameter| match parameter {
+        NoiseParameter::BranchSd => !law.branches.is_empty() && value(NoiseParameter::BranchSd) > 0.0,
+        NoiseParameter::BaselineTime => value(NoiseParameter::BaselineSd) > 0.0,
+        other => value(*other) > 0.0,
+    };
+    NoiseParameter::ALL.into_iter().filter(is_movable).collect()
+}
+
+/// Says what of the recording was left aside.
+fn remark_on_input(recording: &Recording, rows: &RelativeRows, params: &SensorParams) {
+    if let Some(quantity) = recording.quantity() {
+        let (header, name) = (&recording.header, quantity.name());
+        CliError::remark(&format!("{header}: the reference in `{name}` is not used; calibrate would use it"));
+    }
+    if rows.stride > 1 {
+        let (name, all, used) = (&recording.name, rows.all, rows.time_s.len());
+        let column = reading_column(params.reading);
+        CliError::remark(&format!("{name}: column `{column}`: {used} of {all} rows are used, one in {}", rows.stride));
+    }
+}
+
+/// Puts what was found in the place of the extended Kalman filter's noise and motion.
+fn replace(params: &mut SensorParams, refinement: &Refinement) {
+    if let Some(ekf) = params.estimators.get_mut(&EstimatorKind::Ekf) {
+        (ekf.noise, ekf.motion) = (refinement.found.noise, refinement.found.motion);
+    }
+    params.default_estimator = EstimatorKind::Ekf;
+}

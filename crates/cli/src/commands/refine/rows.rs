@@ -1,0 +1,55 @@
+use crate::error::CliError;
+use crate::input::Recording;
+use crate::run::relative_trace;
+
+/// Rows for which a maximum and its intervals take seconds; more of them are thinned, since the model is continuous in
+/// time.
+const MOST_ROWS: usize = 3000;
+/// Fewest readings, as for a calibration: ten for each parameter.
+const FEWEST_READINGS: usize = 60;
+
+/// The rows of a recording that are used, relative to R₀.
+pub struct RelativeRows {
+    /// Times, s.
+    pub time_s: Vec<f64>,
+    /// R/R₀ − 1; NaN where missing.
+    pub value: Vec<f64>,
+    /// What the electronics add to each reading, standard deviation relative to R₀.
+    pub extra_sd: Vec<f64>,
+    /// Rows before thinning.
+    pub all: usize,
+    /// Every how many-th row is used.
+    pub stride: usize,
+}
+
+impl RelativeRows {
+    /// The rows of `recording` with `from <= time_s < until`, thinned if there are many.
+    pub fn new(
+        recording: &Recording,
+        from: Option<f64>,
+        until: Option<f64>,
+        rest_reading: f64,
+    ) -> Result<Self, CliError> {
+        let mut trace = recording.trace.until(until.unwrap_or(f64::INFINITY));
+        if let Some(from) = from {
+            trace = trace.since(from);
+        }
+        let stride = trace.len().div_ceil(MOST_ROWS).max(1);
+        let readings: Vec<_> = relative_trace(&trace, rest_reading).into_iter().step_by(stride).collect();
+        let known = readings.iter().flatten().count();
+        if known < FEWEST_READINGS {
+            let name = &recording.name;
+            let found = if known == 0 { "none".into() } else { known.to_string() };
+            return Err(CliError::Input(format!(
+                "{name}: expected at least {FEWEST_READINGS} readings, found {found}"
+            )));
+        }
+        Ok(Self {
+            time_s: trace.time_s.iter().copied().step_by(stride).collect(),
+            value: readings.iter().map(|reading| reading.map_or(f64::NAN, |reading| reading.value)).collect(),
+            extra_sd: readings.iter().map(|reading| reading.map_or(f64::NAN, |r| r.extra_variance.sqrt())).collect(),
+            all: trace.len(),
+            stride,
+        })
+    }
+}
