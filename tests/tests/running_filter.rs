@@ -136,7 +136,12 @@ fn a_long_recording_is_smoothed_as_if_all_states_were_kept() {
     let mut params = sensor();
     // Rows that wait are reported with the wider of two intervals: make them the same.
     params.estimators.values_mut().for_each(|estimator| estimator.strain_sd_scale = 1.0);
-    params.ensemble.iter_mut().for_each(|ensemble| ensemble.strain_sd_scale = 1.0);
+    params.ensemble.iter_mut().for_each(|ensemble| {
+        ensemble.strain_sd_scale = 1.0;
+        ensemble.members.iter_mut().flat_map(|member| &mut member.own).for_each(|own| {
+            own.parameters.strain_sd_scale = 1.0;
+        });
+    });
     for kind in [EstimatorKind::Ekf, EstimatorKind::SignSplit, EstimatorKind::Ensemble] {
         for guard in [Guard::none(), Guard::none().with_gate(3.0, 5)] {
             let build = || {
