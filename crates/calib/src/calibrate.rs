@@ -8,7 +8,7 @@ use crate::estimator_params::{EstimatorKind, EstimatorParams};
 use crate::law_fit::{CrossFit, LawOptions, fit_laws};
 use crate::law_params::LawParams;
 use crate::motion_stats::MotionStats;
-use crate::noise_fit::{NoiseProblem, REFINEMENT, RESURVEY, SURVEY, Tuned};
+use crate::noise_fit::{Effort, NoiseProblem, SURVEY, Tuned};
 use crate::params::{FORMAT, Quantity, RangeParams, ReadingUnit, SensorParams, Uncertainty, Validity};
 use crate::samples::Samples;
 
@@ -113,12 +113,13 @@ pub fn calibrate(
     let smoothers = wanted.iter().map(|kind| kind.smoother());
     let all_kinds = distinct(wanted.iter().copied().chain(smoothers).chain([EstimatorKind::Ekf]));
     let pools = kinds.contains(&EstimatorKind::Ensemble);
+    let effort = if pools { Effort::SHARED } else { Effort::ALONE };
     let richer_laws = if pools { richer_laws(recordings, options) } else { Vec::new() };
     let choosers: &[EstimatorKind] = if pools { &LAW_CHOOSERS } else { &wanted };
-    let surveys = SURVEY.evaluations() + (laws.len() as u64 - 1) * RESURVEY.evaluations();
+    let surveys = SURVEY.evaluations() + (laws.len() as u64 - 1) * effort.resurvey.evaluations();
     let expected = choosers.len() as u64 * surveys
         + (all_kinds.len() - choosers.len()) as u64 * SURVEY.evaluations()
-        + all_kinds.len() as u64 * REFINEMENT.evaluations()
+        + all_kinds.len() as u64 * effort.refinement.evaluations()
         + richer_evaluations(richer_laws.len());
     let mut done = 0;
     let mut evaluated = || {
@@ -129,8 +130,8 @@ pub fn calibrate(
     for &kind in choosers {
         let mut before: Option<Tuned> = None;
         for law in &laws {
-            let problem = NoiseProblem::new(recordings, law, stats, kind);
-            let search = if before.is_none() { SURVEY } else { RESURVEY };
+            let problem = NoiseProblem::new(recordings, law, stats, kind, effort);
+            let search = if before.is_none() { SURVEY } else { effort.resurvey };
             let tuned = problem.search(before.as_ref(), search, &mut evaluated)?;
             before = Some(tuned.clone());
             surveyed.push((kind, law, tuned));
@@ -144,13 +145,13 @@ pub fn calibrate(
     let mut estimators = BTreeMap::new();
     let mut richer = None;
     for kind in all_kinds {
-        let problem = NoiseProblem::new(recordings, fit, stats, kind);
+        let problem = NoiseProblem::new(recordings, fit, stats, kind, effort);
         let known = surveyed.iter().find(|(k, law, _)| *k == kind && std::ptr::eq(*law, fit));
         let from = match known {
             Some((_, _, tuned)) => tuned.clone(),
             None => problem.search(None, SURVEY, &mut evaluated)?,
         };
-        let tuned = problem.search(Some(&from), REFINEMENT, &mut evaluated)?;
+        let tuned = problem.search(Some(&from), effort.refinement, &mut evaluated)?;
         estimators.insert(kind, problem.finish(&tuned));
         if pools && kind == RICHER {
             richer = richer_member(recordings, &richer_laws, stats, &tuned, &mut evaluated)?;

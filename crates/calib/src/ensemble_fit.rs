@@ -7,13 +7,15 @@ use crate::filter::{Filter, Setting, Start, filter_from_parts};
 use crate::law_fit::{CrossFit, LawFit, LawOptions, MOST_BRANCHES, fit_laws};
 use crate::left_out::{Fold, LeftOut};
 use crate::motion_stats::MotionStats;
-use crate::noise_fit::{NoiseProblem, REFINEMENT, RESURVEY, SMOOTHED_ROWS, Tuned, stride};
+use crate::noise_fit::{Effort, NoiseProblem, SMOOTHED_ROWS, Tuned, stride};
 use crate::own_rest::OwnRest;
 use crate::samples::Samples;
 use crate::sd_scale::sd_scale;
 
 /// The estimator that runs a second time, under a law with one branch more: the one whose law limits it most.
 pub(crate) const RICHER: EstimatorKind = EstimatorKind::SignSplit;
+/// Of every member.
+const EFFORT: Effort = Effort::SHARED;
 
 /// Laws with one branch more than these options ask for, one per strength of ridge; none where no such law fits or no
 /// filter is built for it, which is no reason not to calibrate.
@@ -30,7 +32,7 @@ pub(crate) fn richer_laws(recordings: &[Samples], options: LawOptions) -> Vec<Cr
 
 /// Evaluations to expect of [`richer_member`].
 pub(crate) const fn richer_evaluations(laws: usize) -> u64 {
-    if laws == 0 { 0 } else { laws as u64 * RESURVEY.evaluations() + REFINEMENT.evaluations() }
+    if laws == 0 { 0 } else { laws as u64 * EFFORT.resurvey.evaluations() + EFFORT.refinement.evaluations() }
 }
 
 /// The law of these that the estimator does best with, and noise and motion fitted to it, from where the search under the
@@ -44,14 +46,15 @@ pub(crate) fn richer_member<'a>(
 ) -> Result<Option<(&'a CrossFit, EstimatorParams)>, CalibrationError> {
     let mut best: Option<(&CrossFit, Tuned)> = None;
     for law in laws {
-        let tuned = NoiseProblem::new(recordings, law, stats, RICHER).search(Some(from), RESURVEY, &mut *evaluated)?;
+        let problem = NoiseProblem::new(recordings, law, stats, RICHER, EFFORT);
+        let tuned = problem.search(Some(from), EFFORT.resurvey, &mut *evaluated)?;
         if best.as_ref().is_none_or(|(_, best)| tuned.cost < best.cost) {
             best = Some((law, tuned));
         }
     }
     let Some((law, tuned)) = best else { return Ok(None) };
-    let problem = NoiseProblem::new(recordings, law, stats, RICHER);
-    let tuned = problem.search(Some(&tuned), REFINEMENT, evaluated)?;
+    let problem = NoiseProblem::new(recordings, law, stats, RICHER, EFFORT);
+    let tuned = problem.search(Some(&tuned), EFFORT.refinement, evaluated)?;
     Ok(Some((law, problem.finish(&tuned))))
 }
 

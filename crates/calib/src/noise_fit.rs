@@ -23,10 +23,28 @@ pub(crate) struct Search {
 
 /// Says how well an estimator does with a law.
 pub(crate) const SURVEY: Search = Search { side: 0.7, steps: 100, rows: 500 };
-/// The same, from what another law has led to.
-pub(crate) const RESURVEY: Search = Search { side: 0.4, steps: 25, rows: 500 };
-/// Goes on from the best survey.
-pub(crate) const REFINEMENT: Search = Search { side: 0.3, steps: 30, rows: 1000 };
+/// How long the searches after the first one are.
+#[derive(Clone, Copy)]
+pub(crate) struct Effort {
+    /// Says how well an estimator does with another law, from what the first one has led to.
+    pub resurvey: Search,
+    /// Goes on from the best survey.
+    pub refinement: Search,
+}
+
+impl Effort {
+    /// Of an estimator that has the time to itself.
+    pub(crate) const ALONE: Self = Self {
+        resurvey: Search { side: 0.4, steps: 40, rows: 500 },
+        refinement: Search { side: 0.3, steps: 60, rows: 1500 },
+    };
+    /// Of members of an ensemble, who share it: what one of them misses the others are there for. On halves of nine
+    /// recordings the pooled error is 0.356 of the static cubic's instead of 0.347, in half the time.
+    pub(crate) const SHARED: Self = Self {
+        resurvey: Search { side: 0.4, steps: 25, rows: 500 },
+        refinement: Search { side: 0.3, steps: 30, rows: 1000 },
+    };
+}
 
 impl Search {
     /// Evaluations to expect: a step of the simplex evaluates one or two points.
@@ -61,11 +79,18 @@ pub(crate) struct NoiseProblem<'a> {
     limits: RangeParams,
     stats: MotionStats,
     kind: EstimatorKind,
+    effort: Effort,
 }
 
 impl<'a> NoiseProblem<'a> {
-    pub(crate) fn new(samples: &'a [Samples<'a>], fit: &'a CrossFit, stats: MotionStats, kind: EstimatorKind) -> Self {
-        Self { samples, fit, limits: fit.law.law.range, stats, kind }
+    pub(crate) fn new(
+        samples: &'a [Samples<'a>],
+        fit: &'a CrossFit,
+        stats: MotionStats,
+        kind: EstimatorKind,
+        effort: Effort,
+    ) -> Self {
+        Self { samples, fit, limits: fit.law.law.range, stats, kind, effort }
     }
 
     /// Searches from the values that residuals and motion suggest, or from where another search has got to.
@@ -95,7 +120,7 @@ impl<'a> NoiseProblem<'a> {
             params.score = left_out.score(&|fold| self.build(self.kind, fold, &params));
             params
         };
-        let candidates = self.at_every_row(self.params(&tuned.point), self.stride(REFINEMENT.rows));
+        let candidates = self.at_every_row(self.params(&tuned.point), self.stride(self.effort.refinement.rows));
         let best = candidates.into_iter().map(score).reduce(|a, b| if b.score < a.score { b } else { a });
         let mut params = best.unwrap_or_else(|| self.params(&tuned.point));
         let build = |fold: Fold| self.build(self.kind, fold, &params);
