@@ -21,7 +21,8 @@ const EFFORT: Effort = Effort::SHARED;
 /// filter is built for it, which is no reason not to calibrate.
 ///
 /// Which number of branches is right hardly shows in one recording, and is the law's own error: estimators that agree on it
-/// are wrong together. With members of both kinds the error shows as disagreement, and half of it averages out.
+/// are wrong together. With members of both kinds the error shows as disagreement, and part of it averages out: on halves of
+/// nine recordings the pooled error fell from 0.39 of the static cubic's to 0.35, with the same searches.
 pub(crate) fn richer_laws(recordings: &[Samples], options: LawOptions) -> Vec<CrossFit> {
     let richer = LawOptions { branches: options.branches + 1, ..options };
     if richer.branches > MOST_BRANCHES {

@@ -67,8 +67,8 @@ pub struct CrossFit {
 }
 
 /// Branches unless somebody asks for another number. The error of the law alone often prefers one; the filter, which
-/// must tell stretching from releasing by how the resistance relaxes, is better off with two and gains nothing from a
-/// third.
+/// must tell stretching from releasing by how the resistance relaxes, is better off with two. A third helps on some
+/// recordings and harms on others; the ensemble has a member for it.
 const DEFAULT_BRANCHES: usize = 2;
 /// Family unless somebody asks for another. Others sometimes follow the resistance a little better; only the polynomial
 /// is linear in its coefficients, so that the ridge keeps it tame and the filter from taking one direction for the other.

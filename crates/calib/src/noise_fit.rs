@@ -23,6 +23,7 @@ pub(crate) struct Search {
 
 /// Says how well an estimator does with a law.
 pub(crate) const SURVEY: Search = Search { side: 0.7, steps: 100, rows: 500 };
+
 /// How long the searches after the first one are.
 #[derive(Clone, Copy)]
 pub(crate) struct Effort {
