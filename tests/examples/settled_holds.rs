@@ -63,7 +63,8 @@ fn study(training: &Trace, tests: &[Trace], from: usize) -> Result<Vec<Hold>, Bo
     let strain = |trace: &Trace| trace.reference.as_ref().map_or(vec![], |reference| reference.values.clone());
     let known = strain(training);
     let samples = Samples { time_s: &training.time_s, reading: &training.readings.values, strain: &known };
-    let calibration = calibrate(&[samples], LawOptions::default(), &[EstimatorKind::Ensemble], |_| ())?;
+    let calibration =
+        calibrate(&[samples], LawOptions::candidates(EstimatorKind::Ensemble), &[EstimatorKind::Ensemble], |_| ())?;
     let params = calibration.into_sensor("", Quantity::Strain, ReadingUnit::Ohm);
     let finite = training.readings.values.iter().copied().filter(|r| r.is_finite());
     let (low, high) = finite.fold((f64::MAX, f64::MIN), |(low, high), r| (low.min(r), high.max(r)));

@@ -1,8 +1,8 @@
 //! The sparse filters of hypotheses compute what the generic ones compute.
 
 use ohmstrain_ekf::{
-    Belief, Dwell, Dynamics, Evidence, Gaussian, Imm, Mixture, MixtureResidual, MixtureStep, PhaseMixture, Reading,
-    Real, SignMixture, SignSplit, SparseImm, SparseSignSplit, State, StepError,
+    Belief, Dwell, Dynamics, Evidence, Gaussian, Hypotheses, Imm, Mixture, MixtureResidual, MixtureStep, PhaseMixture,
+    Reading, Real, SignSplit, SparseHypotheses, SparseImm, SparseMixture, SparseSignSplit, State, StepError,
 };
 use ohmstrain_model::{Phase, StrainRange, SwitchedModel};
 use ohmstrain_tests::sensor;
@@ -73,7 +73,35 @@ impl<T: Real, const B: usize, const N: usize, const K: usize> Splits<T, B, N, K>
 }
 
 impl<T: Real, const B: usize, const N: usize, const L: usize, const K: usize> Pair<T, N, L, K> for Splits<T, B, N, K> {
-    type State = SignMixture<T, N, L, K>;
+    type State = SparseMixture<T, N, L, K>;
+
+    fn sparse(&self, state: &mut Self::State, reading: Option<Reading<T>>) -> Option<MixtureResidual<T>> {
+        self.sparse.step(state, reading).unwrap()
+    }
+
+    fn generic(&self, from: &Mixture<T, N, L, K>, reading: Option<Reading<T>>) -> MixtureStep<T, N, L, K> {
+        let prepared = Dynamics::<T, N, L>::prepare(self.generic.model(), T::of(DT_S));
+        self.generic.step_prepared(from, &prepared, T::of(DT_S), reading).unwrap()
+    }
+}
+
+struct Histories<T, const B: usize, const N: usize, const K: usize> {
+    sparse: SparseHypotheses<T, B, N, K>,
+    generic: Hypotheses<T, SwitchedModel<T, 2, B, N>, K>,
+}
+
+impl<T: Real, const B: usize, const N: usize, const K: usize> Histories<T, B, N, K> {
+    fn new(model: SwitchedModel<T, 2, B, N>, tempering: f64) -> Self {
+        let (dt_s, evidence) = (T::of(DT_S), evidence(tempering));
+        let sparse = SparseHypotheses::new(model, dt_s, dwell(), evidence).unwrap();
+        Self { sparse, generic: Hypotheses::new(model, dwell(), evidence) }
+    }
+}
+
+impl<T: Real, const B: usize, const N: usize, const L: usize, const K: usize> Pair<T, N, L, K>
+    for Histories<T, B, N, K>
+{
+    type State = SparseMixture<T, N, L, K>;
 
     fn sparse(&self, state: &mut Self::State, reading: Option<Reading<T>>) -> Option<MixtureResidual<T>> {
         self.sparse.step(state, reading).unwrap()
@@ -207,8 +235,18 @@ fn split<T: Real, const B: usize, const N: usize, const L: usize, const K: usize
     on_its_own: bool,
 ) -> Apart {
     let model = model::<T, B, N>(phase_rate);
-    let start = SignMixture::<T, N, L, K>::single(Belief::initial(&model), Phase::Extend);
+    let start = SparseMixture::<T, N, L, K>::single(Belief::initial(&model), Phase::Extend);
     differences(&Splits::<T, B, N, K>::new(model, hold, tempering), start, on_its_own)
+}
+
+fn histories<T: Real, const B: usize, const N: usize, const L: usize, const K: usize>(
+    phase_rate: f64,
+    tempering: f64,
+    on_its_own: bool,
+) -> Apart {
+    let model = model::<T, B, N>(phase_rate);
+    let start = SparseMixture::<T, N, L, K>::single(Belief::initial(&model), Phase::Hold);
+    differences(&Histories::<T, B, N, K>::new(model, tempering), start, on_its_own)
 }
 
 /// A step is some 50 operations deep: mixing, prediction, cut, update, merging. The generic path subtracts products of a
@@ -230,11 +268,17 @@ fn agree_with_the_generic_filters_to_rounding() {
     let eight = split::<f64, 3, 6, 21, 8>((0.0, None), 1.0, false);
     eight.check(rounding);
     assert_eq!(eight.hypotheses, 8);
+    histories::<f64, 0, 2, 3, 4>(0.0, 1.0, false).check(rounding);
+    histories::<f64, 1, 4, 10, 4>(0.05, 0.5, false).check(rounding);
+    let sixteen = histories::<f64, 3, 6, 21, 16>(0.0, 0.5, false);
+    sixteen.check(rounding);
+    assert_eq!(sixteen.hypotheses, 16);
     let single = ROUNDING * f64::from(f32::EPSILON);
     let phases = imm::<f32, 3, 6, 21>(0.0, 1.0, false);
     phases.check(single);
     assert_eq!(phases.hypotheses, 3);
     split::<f32, 3, 6, 21, 4>((0.0, None), 1.0, false).check(single);
+    histories::<f32, 3, 6, 21, 8>(0.0, 1.0, false).check(single);
 }
 
 /// What one step rounds differently is remembered by later ones, no longer than the run: no more than the sum of all. What
@@ -246,6 +290,7 @@ fn stay_with_the_generic_filters() {
     imm::<f64, 3, 6, 21>(0.0, 1.0, true).check(rounding);
     split::<f64, 3, 6, 21, 4>((0.0, Some(dwell())), 1.0, true).check(rounding);
     split::<f64, 3, 6, 21, 8>((0.0, None), 1.0, true).check(rounding);
+    histories::<f64, 3, 6, 21, 16>(0.0, 0.5, true).check(rounding);
 }
 
 /// The runs above come near the limits: without them the filters would say something else.
@@ -293,13 +338,16 @@ fn an_error_leaves_the_state() {
     let model = sensor::<f64, 1, 3>();
     let imm = SparseImm::new(model, DT_S, dwell(), evidence(1.0)).unwrap();
     let split = SparseSignSplit::<f64, 1, 3, 4>::new(model, DT_S, None, evidence(1.0)).unwrap();
+    let histories = SparseHypotheses::<f64, 1, 3, 8>::new(model, DT_S, dwell(), evidence(1.0)).unwrap();
     let mut phases = PhaseMixture::<f64, 3, 6>::single(Belief::initial(&model), Phase::Hold);
-    let mut signs = SignMixture::<f64, 3, 6, 4>::single(Belief::initial(&model), Phase::Extend);
+    let mut signs = SparseMixture::<f64, 3, 6, 4>::single(Belief::initial(&model), Phase::Extend);
+    let mut known = SparseMixture::<f64, 3, 6, 8>::single(Belief::initial(&model), Phase::Hold);
     for k in 0..100 {
         imm.step(&mut phases, reading(k)).unwrap();
         split.step(&mut signs, reading(k)).unwrap();
+        histories.step(&mut known, reading(k)).unwrap();
     }
-    let before = (phases, signs);
+    let before = (phases, signs, known);
     for (value, extra_variance, error) in [
         (f64::NAN, 0.0, StepError::NonFiniteReading),
         (f64::INFINITY, 0.0, StepError::NonFiniteReading),
@@ -309,8 +357,9 @@ fn an_error_leaves_the_state() {
         let reading = Some(Reading { value, extra_variance });
         assert_eq!(imm.step(&mut phases, reading).unwrap_err(), error);
         assert_eq!(split.step(&mut signs, reading).unwrap_err(), error);
+        assert_eq!(histories.step(&mut known, reading).unwrap_err(), error);
     }
-    assert_eq!(before, (phases, signs));
+    assert_eq!(before, (phases, signs, known));
     assert!(SparseImm::new(model, 0.0, dwell(), evidence(1.0)).is_err());
     assert!(SparseSignSplit::<f64, 1, 3, 4>::new(model, f64::NAN, None, evidence(1.0)).is_err());
 }
@@ -322,7 +371,7 @@ fn go_on_in_single_precision() {
     let imm = SparseImm::new(model, DT_S as f32, dwell(), evidence(1.0)).unwrap();
     let split = SparseSignSplit::<f32, 3, 6, 4>::new(model, DT_S as f32, Some(dwell()), evidence(1.0)).unwrap();
     let mut phases = PhaseMixture::<f32, 6, 21>::single(Belief::initial(&model), Phase::Hold);
-    let mut signs = SignMixture::<f32, 6, 21, 4>::single(Belief::initial(&model), Phase::Extend);
+    let mut signs = SparseMixture::<f32, 6, 21, 4>::single(Belief::initial(&model), Phase::Extend);
     for k in 0..30_000 {
         let reading = Some(Reading::from(0.2 + 0.15 * (k as f32 * 0.003).sin()));
         imm.step(&mut phases, reading).unwrap();

@@ -1,4 +1,4 @@
-use ohmstrain_ekf::{MixtureResidual, PhaseMixture, Reading, SignMixture, SparseImm, SparseSignSplit, StepError};
+use ohmstrain_ekf::{MixtureResidual, PhaseMixture, Reading, SparseMixture, SparseImm, SparseSignSplit, StepError};
 
 use crate::Filter;
 use crate::estimators::GATE;
@@ -26,7 +26,7 @@ impl InPlace for SparseImm<f64, 3, 6> {
 }
 
 impl<const K: usize> InPlace for SparseSignSplit<f64, 3, 6, K> {
-    type State = SignMixture<f64, 6, 21, K>;
+    type State = SparseMixture<f64, 6, 21, K>;
 
     #[inline]
     fn take(&self, state: &mut Self::State, reading: Option<f64>) -> Result<Option<MixtureResidual<f64>>, StepError> {

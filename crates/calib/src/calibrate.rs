@@ -3,12 +3,12 @@ use std::collections::BTreeMap;
 use crate::CalibrationError;
 use crate::baselines::StaticCubic;
 use crate::ensemble::EnsembleParams;
-use crate::ensemble_fit::{RICHER, candidates, fit_ensemble, richer_evaluations, richer_laws, richer_member};
+use crate::ensemble_fit::{candidates, fit_ensemble, richer_evaluations, richer_laws, richer_members};
 use crate::estimator_params::{EstimatorKind, EstimatorParams};
 use crate::law_fit::{CrossFit, LawOptions, fit_laws};
 use crate::law_params::LawParams;
 use crate::motion_stats::MotionStats;
-use crate::noise_fit::{Effort, NoiseProblem, SURVEY, Tuned};
+use crate::noise_fit::{NoiseProblem, REFINEMENT, SURVEY, Surveyed, survey, survey_evaluations};
 use crate::params::{FORMAT, Quantity, RangeParams, ReadingUnit, SensorParams, Uncertainty, Validity};
 use crate::samples::Samples;
 
@@ -82,9 +82,9 @@ impl Calibration {
 /// wrong direction it does not come back, and a short recording may not show that. Ten per cent in the deviation.
 const LOCK_IN: f64 = 0.1;
 
-/// Which members of an ensemble choose its law. Phase histories make any law look good on the blocks left out by finding
-/// the history that suits it, and the law they choose serves the others badly.
-const LAW_CHOOSERS: [EstimatorKind; 2] = [EstimatorKind::Ekf, EstimatorKind::SignSplit];
+/// Who chooses the law of an ensemble. Phase histories make any law look good on the blocks left out by finding the history
+/// that suits it, and the law they choose serves the others badly.
+const LAW_CHOOSERS: [EstimatorKind; 1] = [EstimatorKind::Ekf];
 
 fn handicap(kind: EstimatorKind) -> f64 {
     if kind.has_phases() { 0.0 } else { LOCK_IN }
@@ -92,76 +92,71 @@ fn handicap(kind: EstimatorKind) -> f64 {
 
 /// Calibrates law, noise and motion on recordings with known strain. Deterministic: same samples, same result.
 ///
-/// Estimators are tried with a law per strength of ridge; the pair with the best score on blocks that the law has not seen
-/// gives the law. Where an ensemble is asked for these are the EKF and the sign-split filter, otherwise all of `kinds`. To
-/// that law every one of them, what smooths in its place, and the extended Kalman filter in any case, is then fitted, and the
-/// best of `kinds` becomes the default. Near ties go to the one that keeps hypotheses. An ensemble has one more member, with a
-/// law of its own.
+/// Estimators are tried with a law for each of `structures` and each strength of ridge; the pair with the best score on
+/// blocks that the law has not seen gives the law. Where an ensemble is asked for it is the extended Kalman filter that
+/// chooses, otherwise all of `kinds` do. To that law every one of them, what smooths in its place, and the extended Kalman
+/// filter in any case, is then fitted, with the family of motions that serves it best, and the best of `kinds` becomes the
+/// default. Near ties go to the one that keeps hypotheses. An ensemble has members with laws of their own besides.
 ///
 /// # Errors
-/// If the recordings are too short or too plain to learn a law from, or `kinds` is empty.
+/// If the recordings are too short or too plain to learn a law from, or `structures` or `kinds` is empty.
 pub fn calibrate(
     recordings: &[Samples],
-    options: LawOptions,
+    structures: &[LawOptions],
     kinds: &[EstimatorKind],
     mut progress: impl FnMut(Stage),
 ) -> Result<Calibration, CalibrationError> {
     progress(Stage::Law);
-    let laws = fit_laws(recordings, options)?;
+    let laws = fit_laws(recordings, structures)?;
     let stats = MotionStats::new(recordings);
     let wanted = distinct(kinds.iter().flat_map(EstimatorKind::members).copied());
     let smoothers = wanted.iter().map(|kind| kind.smoother());
     let all_kinds = distinct(wanted.iter().copied().chain(smoothers).chain([EstimatorKind::Ekf]));
     let pools = kinds.contains(&EstimatorKind::Ensemble);
-    let effort = if pools { Effort::SHARED } else { Effort::ALONE };
-    let richer_laws = if pools { richer_laws(recordings, options) } else { Vec::new() };
     let choosers: &[EstimatorKind] = if pools { &LAW_CHOOSERS } else { &wanted };
-    let surveys = SURVEY.evaluations() + (laws.len() as u64 - 1) * effort.resurvey.evaluations();
-    let expected = choosers.len() as u64 * surveys
-        + (all_kinds.len() - choosers.len()) as u64 * SURVEY.evaluations()
-        + all_kinds.len() as u64 * effort.refinement.evaluations()
-        + richer_evaluations(richer_laws.len());
+    let fits = all_kinds.iter().map(|kind| kind.motion_families().len() as u64).sum::<u64>();
+    let surveys = choosers.iter().map(|kind| survey_evaluations(*kind, laws.len(), structures.len())).sum::<u64>();
+    let unsurveyed = all_kinds.iter().filter(|kind| !choosers.contains(*kind)).count() as u64;
+    let expected = surveys
+        + unsurveyed * SURVEY.evaluations()
+        + fits * REFINEMENT.evaluations()
+        + if pools { richer_evaluations(laws.len() / structures.len()) } else { 0 };
     let mut done = 0;
     let mut evaluated = || {
         done += 1;
         progress(Stage::Noise { done, expected });
     };
+    let all_laws: Vec<&CrossFit> = laws.iter().collect();
     let mut surveyed = Vec::new();
     for &kind in choosers {
-        let mut before: Option<Tuned> = None;
-        for law in &laws {
-            let problem = NoiseProblem::new(recordings, law, stats, kind, effort);
-            let search = if before.is_none() { SURVEY } else { effort.resurvey };
-            let tuned = problem.search(before.as_ref(), search, &mut evaluated)?;
-            before = Some(tuned.clone());
-            surveyed.push((kind, law, tuned));
-        }
+        surveyed.extend(survey(recordings, &all_laws, stats, kind, &mut evaluated)?);
     }
-    let cost = |(kind, _, tuned): &(EstimatorKind, &CrossFit, Tuned)| tuned.cost + handicap(*kind);
-    let best = surveyed.iter().min_by(|a, b| cost(a).total_cmp(&cost(b)));
-    let Some(&(_, fit, _)) = best else {
+    let cost = |one: &Surveyed| one.tuned.cost + handicap(one.kind);
+    let Some(fit) = surveyed.iter().min_by(|a, b| cost(a).total_cmp(&cost(b))).map(|best| best.law) else {
         return Err(CalibrationError::Unsupported("a calibration without an estimator".into()));
     };
     let mut estimators = BTreeMap::new();
-    let mut richer = None;
     for kind in all_kinds {
-        let problem = NoiseProblem::new(recordings, fit, stats, kind, effort);
-        let known = surveyed.iter().find(|(k, law, _)| *k == kind && std::ptr::eq(*law, fit));
-        let from = match known {
-            Some((_, _, tuned)) => tuned.clone(),
-            None => problem.search(None, SURVEY, &mut evaluated)?,
-        };
-        let tuned = problem.search(Some(&from), effort.refinement, &mut evaluated)?;
-        estimators.insert(kind, problem.finish(&tuned));
-        if pools && kind == RICHER {
-            richer = richer_member(recordings, &richer_laws, stats, &tuned, &mut evaluated)?;
+        let mut best: Option<EstimatorParams> = None;
+        for &family in kind.motion_families() {
+            let problem = NoiseProblem::new(recordings, fit, stats, (kind, family));
+            let is_this = |one: &&Surveyed| one.kind == kind && one.family == family && std::ptr::eq(one.law, fit);
+            let tuned = match surveyed.iter().find(is_this) {
+                Some(known) => known.tuned.clone(),
+                None => problem.search(None, SURVEY, &mut evaluated)?,
+            };
+            let params = problem.refine(&tuned, &mut evaluated)?;
+            best = best.filter(|best| best.score <= params.score).or(Some(params));
         }
+        estimators.extend(best.map(|best| (kind, best)));
     }
+    let richer_laws = if pools { richer_laws(recordings, structures, fit) } else { Vec::new() };
+    let richer = richer_members(recordings, &richer_laws, stats, &mut evaluated)?;
     let score =
         |kind: &EstimatorKind| estimators.get(kind).map_or(f64::INFINITY, |params| params.score + handicap(*kind));
     let best = wanted.iter().copied().min_by(|a, b| score(a).total_cmp(&score(b)));
     let default_estimator = if pools { Some(EstimatorKind::Ensemble) } else { best };
-    let ensemble = pools.then(|| fit_ensemble(recordings, fit, &candidates(&estimators, richer.as_ref())));
+    let ensemble = pools.then(|| fit_ensemble(recordings, fit, &candidates(&estimators, &richer)));
     let limits = fit.law.law.range;
     Ok(Calibration {
         default_estimator: default_estimator.unwrap_or(EstimatorKind::Ekf),

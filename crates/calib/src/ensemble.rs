@@ -1,3 +1,4 @@
+use std::collections::VecDeque;
 use std::ops::Range;
 
 use arrayvec::ArrayVec;
@@ -7,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use crate::CalibrationError;
 use crate::estimator_params::{EstimatorKind, EstimatorParams};
 use crate::filter::{Filter, Output, Rows, WayBack};
+use crate::inverse::{Inverse, InverseParams, InverseWayBack};
 use crate::law_params::LawParams;
 
 /// Estimators that run side by side, and how much each is listened to.
@@ -22,6 +24,9 @@ pub struct EnsembleParams {
     pub smoothed_sd_scale: Option<f64>,
     /// The members; their weights sum to one.
     pub members: Vec<MemberParams>,
+    /// An inverse without a model, if one is listened to besides.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub inverse: Option<InverseParams>,
 }
 
 /// A member of an ensemble.
@@ -53,26 +58,31 @@ pub struct OwnLaw {
 /// score of one recording's blocks is a hint rather than a proof; a larger number lets a lucky member drown the others.
 const INDEPENDENT_ROWS: f64 = 1.0;
 
-/// What an estimator is worth before anything is scored: the one that errs least on most recordings counts twice.
-fn prior(kind: EstimatorKind) -> f64 {
-    if kind == EstimatorKind::SignSplit { 2.0 } else { 1.0 }
+/// Weights `∝ exp(-n · score)` of estimators with these mean negative log densities: pseudo-Bayesian model averaging
+/// (Geisser & Eddy, *J. Am. Stat. Assoc.* 74 (1979) 153) on the blocks left out.
+pub(crate) fn weights(scores: &[f64]) -> Vec<f64> {
+    let best = scores.iter().copied().fold(f64::INFINITY, f64::min);
+    let total: f64 = scores.iter().map(|score| relative_weight(*score, best)).sum();
+    scores.iter().map(|score| relative_weight(*score, best) / total).collect()
 }
 
-/// Weights `∝ prior · exp(-n · score)` of estimators with these mean negative log densities: pseudo-Bayesian model
-/// averaging (Geisser & Eddy, *J. Am. Stat. Assoc.* 74 (1979) 153) on the blocks left out.
-pub(crate) fn weights(scores: &[(EstimatorKind, f64)]) -> Vec<f64> {
-    let best = scores.iter().map(|(_, score)| *score).fold(f64::INFINITY, f64::min);
-    let raw = |(kind, score): &(EstimatorKind, f64)| {
-        if score.is_finite() { prior(*kind) * (INDEPENDENT_ROWS * (best - score)).exp() } else { 0.0 }
-    };
-    let total: f64 = scores.iter().map(raw).sum();
-    scores.iter().map(|scored| raw(scored) / total).collect()
+/// The same of one more beside them, where their weights sum to one.
+pub(crate) fn weight_beside(scores: &[f64], score: f64) -> f64 {
+    let total: f64 = scores.iter().map(|member| relative_weight(*member, score)).sum();
+    if total > 0.0 { 1.0 / total } else { 1.0 }
 }
 
-/// Filters that run side by side. Their posteriors are pooled: where they disagree the deviation grows. A member that is
-/// surer than the others at the moment is listened to more, in proportion to 1/deviation.
+fn relative_weight(score: f64, to: f64) -> f64 {
+    if score.is_finite() { (INDEPENDENT_ROWS * (to - score)).exp() } else { 0.0 }
+}
+
+/// Filters that run side by side, and an inverse for the strain alone. Their posteriors are pooled: where they disagree the
+/// deviation grows. One that is surer than the others at the moment is listened to more, in proportion to 1/deviation.
 pub(crate) struct Ensemble {
     members: Vec<Member>,
+    inverse: Option<Inverse>,
+    /// What the inverse has said of the rows that wait for a fixed lag.
+    waiting: VecDeque<Option<Gaussian<f64>>>,
     filtered_scale: f64,
     smoothed_scale: f64,
 }
@@ -84,30 +94,40 @@ struct Member {
     said: Vec<Output>,
 }
 
-/// Most members of an ensemble.
-const MOST_MEMBERS: usize = 8;
-/// What each member says, with its weight.
-type Few<X> = ArrayVec<(f64, X), MOST_MEMBERS>;
+/// Most members of an ensemble, with its inverse.
+const MOST_VOICES: usize = 9;
+/// What each of them says, with its weight.
+type Few<X> = ArrayVec<(f64, X), MOST_VOICES>;
 
 impl Ensemble {
     pub(crate) fn new(
         members: Vec<(Box<dyn Filter>, f64)>,
+        inverse: Option<Inverse>,
         filtered_scale: f64,
         smoothed_scale: f64,
     ) -> Result<Self, CalibrationError> {
-        if !(1..=MOST_MEMBERS).contains(&members.len()) {
-            let message = format!("an ensemble of {} members; 1 to {MOST_MEMBERS} are supported", members.len());
+        if !(1..MOST_VOICES).contains(&members.len()) {
+            let message = format!("an ensemble of {} members; 1 to {} are supported", members.len(), MOST_VOICES - 1);
             return Err(CalibrationError::Unsupported(message));
         }
         let members = members.into_iter().map(|(filter, weight)| Member { filter, weight, said: Vec::new() }).collect();
-        Ok(Self { members, filtered_scale, smoothed_scale })
+        Ok(Self { members, inverse, waiting: VecDeque::new(), filtered_scale, smoothed_scale })
     }
 
-    /// Lets every member do something and pools what each of them says, call by call.
-    fn pool_each(
+    /// What the inverse says at the moment, with its weight.
+    fn inverse_now(&self) -> Option<(f64, Gaussian<f64>)> {
+        self.inverse.as_ref().and_then(|inverse| Some((inverse.params.weight, inverse.now?)))
+    }
+
+    fn step_inverse(&mut self, time_s: f64, reading: Option<Reading<f64>>) {
+        if let Some(inverse) = &mut self.inverse {
+            inverse.step(time_s, reading);
+        }
+    }
+
+    /// Lets every member do something; what each of them says is then in its `said`, call by call.
+    fn let_act(
         &mut self,
-        scale: f64,
-        out: &mut dyn FnMut(Output),
         mut act: impl FnMut(&mut dyn Filter, &mut dyn FnMut(Output)) -> Result<(), StepError>,
     ) -> Result<(), StepError> {
         let mut acted = Ok(());
@@ -115,12 +135,19 @@ impl Ensemble {
             member.said.clear();
             acted = acted.and(act(member.filter.as_mut(), &mut |output| member.said.push(output)));
         }
+        acted
+    }
+
+    /// Pools what the members have said, row by row, with what the inverse said of those rows.
+    fn hand_out(&mut self, out: &mut dyn FnMut(Output)) {
+        let scale = self.filtered_scale.max(self.smoothed_scale);
+        let weight = self.inverse.as_ref().map_or(0.0, |inverse| inverse.params.weight);
         let rows = self.members.iter().map(|member| member.said.len()).max().unwrap_or(0);
         for row in 0..rows {
             let said = |member: &Member| Some((member.weight, *member.said.get(row)?));
-            out(pooled(self.members.iter().filter_map(said).collect(), scale));
+            let inverse = self.waiting.pop_front().flatten().map(|strain| (weight, strain));
+            out(pooled(self.members.iter().filter_map(said).collect(), inverse, scale));
         }
-        acted
     }
 }
 
@@ -129,20 +156,26 @@ impl Filter for Ensemble {
         for member in &mut self.members {
             member.filter.guard(guard);
         }
+        // It expects no reading in particular and would take every outlier.
+        self.inverse = if guard.is_none() { self.inverse.take() } else { None };
     }
 
     fn step(&mut self, time_s: f64, reading: Option<Reading<f64>>) -> Result<(), StepError> {
         // What a step is refused for lies in time and reading, which are the same for all: none goes ahead of the others.
-        self.members.iter_mut().try_for_each(|member| member.filter.step(time_s, reading))
+        self.members.iter_mut().try_for_each(|member| member.filter.step(time_s, reading))?;
+        self.step_inverse(time_s, reading);
+        Ok(())
     }
 
     fn strain(&self) -> Gaussian<f64> {
-        let strains: Few<_> = self.members.iter().map(|member| (member.weight, member.filter.strain())).collect();
+        let members = self.members.iter().map(|member| (member.weight, member.filter.strain()));
+        let strains: Few<_> = members.chain(self.inverse_now()).collect();
         scaled(pooled_gaussian(&sure(strains, |strain| strain.sd()), |strain| *strain), self.filtered_scale)
     }
 
     fn output(&self) -> Output {
-        pooled(self.members.iter().map(|m| (m.weight, m.filter.output())).collect(), self.filtered_scale)
+        let outputs = self.members.iter().map(|member| (member.weight, member.filter.output())).collect();
+        pooled(outputs, self.inverse_now(), self.filtered_scale)
     }
 
     fn step_lagged(
@@ -152,25 +185,33 @@ impl Filter for Ensemble {
         lag_s: f64,
         out: &mut dyn FnMut(Output),
     ) -> Result<(), StepError> {
-        let scale = self.filtered_scale.max(self.smoothed_scale);
-        self.pool_each(scale, out, |filter, out| filter.step_lagged(time_s, reading, lag_s, out))
+        let acted = self.let_act(|filter, out| filter.step_lagged(time_s, reading, lag_s, out));
+        if acted.is_ok() {
+            self.step_inverse(time_s, reading);
+            self.waiting.push_back(self.inverse.as_ref().and_then(|inverse| inverse.now));
+        }
+        self.hand_out(out);
+        acted
     }
 
     fn flush_lagged(&mut self, out: &mut dyn FnMut(Output)) -> Result<(), StepError> {
-        let scale = self.filtered_scale.max(self.smoothed_scale);
-        self.pool_each(scale, out, |filter, out| filter.flush_lagged(out))
+        let acted = self.let_act(|filter, out| filter.flush_lagged(out));
+        self.hand_out(out);
+        acted
     }
 
     fn way_back<'a>(&'a mut self, rows: Rows<'a>) -> Result<Box<dyn WayBack + 'a>, (usize, StepError)> {
         let back = |member: &'a mut Member| Ok((member.weight, member.filter.way_back(rows)?, Vec::new()));
         let members = self.members.iter_mut().map(back).collect::<Result<_, _>>()?;
-        Ok(Box::new(SideBySide { members, scale: self.smoothed_scale }))
+        let inverse = self.inverse.as_mut().map(|inverse| (inverse.way_back(rows), Vec::new()));
+        Ok(Box::new(SideBySide { members, inverse, scale: self.smoothed_scale }))
     }
 }
 
 /// Members on their way back, segment by segment in step.
 struct SideBySide<'a> {
     members: Vec<(f64, Box<dyn WayBack + 'a>, Vec<Output>)>,
+    inverse: Option<(InverseWayBack<'a>, Vec<Option<Gaussian<f64>>>)>,
     scale: f64,
 }
 
@@ -182,8 +223,13 @@ impl WayBack for SideBySide<'_> {
             let Some(segment) = back.next_segment(said)? else { return Ok(None) };
             rows = Some(segment);
         }
+        if let Some((back, said)) = &mut self.inverse {
+            back.next_segment(said);
+        }
         for k in 0..rows.as_ref().map_or(0, Range::len) {
-            out.push(pooled(self.members.iter().map(|(weight, _, said)| (*weight, said[k])).collect(), self.scale));
+            let inverse = self.inverse.as_ref().and_then(|(back, said)| Some((back.smoothed_weight(), said[k]?)));
+            let outputs = self.members.iter().map(|(weight, _, said)| (*weight, said[k])).collect();
+            out.push(pooled(outputs, inverse, self.scale));
         }
         Ok(rows)
     }
@@ -211,15 +257,17 @@ fn pooled_gaussian<X>(weighted: &[(f64, X)], of: impl Fn(&X) -> Gaussian<f64>) -
     Gaussian { mean, variance: weighted.iter().map(|(weight, x)| weight * spread(x)).sum() }
 }
 
-/// What the members say together.
-fn pooled(outputs: Few<Output>, strain_sd_scale: f64) -> Output {
+/// What the members say together, and of the strain with the inverse.
+fn pooled(outputs: Few<Output>, inverse: Option<(f64, Gaussian<f64>)>, strain_sd_scale: f64) -> Output {
+    let strains = outputs.iter().map(|(weight, output)| (*weight, output.estimate.strain)).chain(inverse).collect();
+    let strain = pooled_gaussian(&sure(strains, Gaussian::sd), |strain| *strain);
     let outputs = &sure(outputs, |output| output.estimate.strain.sd());
     let gaussian = |of: fn(&Estimate<f64>) -> Gaussian<f64>| pooled_gaussian(outputs, |output| of(&output.estimate));
     let mean = |of: &dyn Fn(&Output) -> f64| outputs.iter().map(|(weight, output)| weight * of(output)).sum::<f64>();
     let share = |holds: &dyn Fn(&Output) -> bool| mean(&|output| f64::from(u8::from(holds(output)))) > 0.5;
     Output {
         estimate: Estimate {
-            strain: scaled(gaussian(|estimate| estimate.strain), strain_sd_scale),
+            strain: scaled(strain, strain_sd_scale),
             rate: gaussian(|estimate| estimate.rate),
             relaxation: gaussian(|estimate| estimate.relaxation),
             baseline: mean(&|output| output.estimate.baseline),
@@ -254,8 +302,7 @@ fn pooled_phases(outputs: &[(f64, Output)]) -> Option<[f64; 3]> {
 mod tests {
     use ohmstrain_ekf::Gaussian;
 
-    use super::{pooled_gaussian, sure, weights};
-    use crate::estimator_params::EstimatorKind;
+    use super::{pooled_gaussian, sure, weight_beside, weights};
 
     #[test]
     fn disagreement_widens() {
@@ -281,10 +328,12 @@ mod tests {
 
     #[test]
     fn weights_follow_the_scores() {
-        let weights =
-            weights(&[(EstimatorKind::Ekf, -2.0), (EstimatorKind::Imm, f64::INFINITY), (EstimatorKind::Ukf, -2.5)]);
+        let scores = [-2.0, f64::INFINITY, -2.5];
+        let weights = weights(&scores);
         assert!((weights[0] + weights[2] - 1.0).abs() < 1e-15);
         assert!((weights[2] / weights[0] - 0.5_f64.exp()).abs() < 1e-12);
         assert_eq!(weights[1], 0.0);
+        // One as good as the first: what that is of the sum.
+        assert!((weight_beside(&scores, -2.0) - 1.0 / (1.0 + 0.5_f64.exp())).abs() < 1e-12);
     }
 }

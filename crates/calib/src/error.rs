@@ -56,6 +56,9 @@ pub enum CalibrationError {
 
 impl CalibrationError {
     pub(crate) fn no_parameters(kind: EstimatorKind) -> Self {
-        Self::Unsupported(format!("the sensor file has no parameters for `{}`", kind.name()))
+        Self::Unsupported(format!(
+            "the sensor file has no parameters for `{0}`; calibrate with `{0}` as the estimator",
+            kind.name()
+        ))
     }
 }

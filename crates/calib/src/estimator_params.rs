@@ -26,12 +26,12 @@ impl EstimatorKind {
     pub const ALL: [Self; 7] =
         [Self::Ekf, Self::Ukf, Self::Imm, Self::SignSplit, Self::Hypotheses, Self::Particles, Self::Ensemble];
 
-    /// The estimators that run: itself, or those of the ensemble. They err in different ways: one Gaussian, one direction
-    /// per step, one history of phases.
+    /// The estimators that run under the sensor's law: itself, or those of the ensemble, which has others under laws of
+    /// their own.
     #[must_use]
     pub const fn members(&self) -> &[Self] {
         match self {
-            Self::Ensemble => &[Self::Ekf, Self::SignSplit, Self::Hypotheses],
+            Self::Ensemble => &[Self::Hypotheses],
             _ => std::slice::from_ref(self),
         }
     }
@@ -69,6 +69,25 @@ impl EstimatorKind {
             Self::Hypotheses => "hypotheses",
             Self::Particles => "particles",
             Self::Ensemble => "ensemble",
+        }
+    }
+}
+
+/// Families of priors on how the body moves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum MotionFamily {
+    OrnsteinUhlenbeck,
+    /// With an acceleration.
+    Smooth,
+}
+
+impl EstimatorKind {
+    /// What an estimator is tried with. The others do not gain from an acceleration: they draw the rate anew when a phase
+    /// begins, or are led astray by it.
+    pub(crate) const fn motion_families(self) -> &'static [MotionFamily] {
+        match self.tuned_as() {
+            Self::SignSplit => &[MotionFamily::OrnsteinUhlenbeck, MotionFamily::Smooth],
+            _ => &[MotionFamily::OrnsteinUhlenbeck],
         }
     }
 }

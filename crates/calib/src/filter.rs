@@ -2,18 +2,19 @@ use std::ops::Range;
 
 use ohmstrain_ekf::{
     Belief, Dwell, Ekf, Estimate, Evidence, Gaussian, Guard, Hypotheses, Imm, Mixture, Particles, Phased, Reading,
-    ReadingVerdict, SignSplit, StepError, StrainSensor, Ukf, Unscented,
+    ReadingVerdict, SignSplit, SparseMixture, StepError, StrainSensor, Ukf, Unscented,
 };
 use ohmstrain_model::{Motion, Phase, SwitchedModel, WithPlays};
 
 use crate::CalibrationError;
 use crate::ensemble::{Ensemble, MemberParams, OwnLaw};
 use crate::estimator_params::{AnyMotion, EstimatorKind, EstimatorParams};
+use crate::inverse::Inverse;
 use crate::law_params::LawParams;
 use crate::own_rest::OwnRest;
 use crate::params::{RangeParams, SensorParams};
 use crate::running::{Interval, Running};
-use crate::sparse_estimator::SparseEstimator;
+use crate::sparse_estimator::{Histories, SparseEstimator, SparsePhases, Splits};
 
 /// A filter for a sensor whose number of branches and kind of motion are known at run time only.
 pub trait Filter {
@@ -161,11 +162,7 @@ pub fn build_filter(
 ) -> Result<Box<dyn Filter>, CalibrationError> {
     let kind = kind.unwrap_or(params.default_estimator);
     let setting = Setting { limits: params.limits, start, own_rest: OwnRest::SHARED };
-    let single = |kind| {
-        let estimator = params.estimator(kind)?;
-        let sparse = if kind == EstimatorKind::Ekf { sparse_ekf(&params.law, estimator, setting)? } else { None };
-        sparse.map_or_else(|| filter_from_parts(kind, &params.law, estimator, setting), Ok)
-    };
+    let single = |kind| filter_from_parts(kind, &params.law, params.estimator(kind)?, setting);
     if kind != EstimatorKind::Ensemble {
         return single(kind);
     }
@@ -181,7 +178,9 @@ pub fn build_filter(
         Ok((filter?, member.weight))
     };
     let members = ensemble.members.iter().map(member).collect::<Result<Vec<_>, CalibrationError>>()?;
-    Ok(Box::new(Ensemble::new(members, ensemble.strain_sd_scale, ensemble.smoothed_sd_scale.unwrap_or(1.0))?))
+    let inverse = ensemble.inverse.clone().map(|inverse| Inverse::new(inverse, params.limits, OwnRest::SHARED));
+    let smoothed_scale = ensemble.smoothed_sd_scale.unwrap_or(1.0);
+    Ok(Box::new(Ensemble::new(members, inverse.transpose()?, ensemble.strain_sd_scale, smoothed_scale)?))
 }
 
 /// What a filter needs besides law, noise and motion.
@@ -222,6 +221,9 @@ pub(crate) fn filter_from_parts(
             if let Some(phases) = estimator.phases {
                 motion = motion.with_phase_rate(phases.speed_per_s);
             }
+            if let Some(sparse) = sparse(kind, motion, law, estimator, setting)? {
+                return Ok(sparse);
+            }
             build!(motion, 2, [0, 3, 6], [1, 4, 10, 7, 28], [2, 5, 15, 8, 36], [3, 6, 21, 9, 45], [4, 7, 28])
         }
         AnyMotion::Three(motion) => {
@@ -230,30 +232,51 @@ pub(crate) fn filter_from_parts(
     }
 }
 
-/// The EKF of a law without plays on Ornstein-Uhlenbeck motion; `None` for any other.
-fn sparse_ekf(
+/// EKF, sign-split or phase histories of a law without plays on Ornstein-Uhlenbeck motion; `None` for any other.
+fn sparse(
+    kind: EstimatorKind,
+    motion: Motion<f64, 2>,
     law: &LawParams,
     estimator: &EstimatorParams,
     setting: Setting,
 ) -> Result<Option<Box<dyn Filter>>, CalibrationError> {
-    fn build<const B: usize, const N: usize, const L: usize>(
-        model: SwitchedModel<f64, 2, B, N>,
-        interval: Interval,
-        setting: Setting,
-    ) -> Box<dyn Filter> {
-        let belief: Belief<f64, N, L> = initial_belief(&model, setting);
-        Box::new(Running::new(SparseEstimator::new(model), belief, model, interval))
+    let supported = matches!(kind, EstimatorKind::Ekf | EstimatorKind::SignSplit | EstimatorKind::Hypotheses);
+    if !supported || !law.plays.is_empty() {
+        return Ok(None);
     }
-    let AnyMotion::Two(motion) = estimator.motion.to_model()? else { return Ok(None) };
-    let interval = interval(estimator, setting);
-    Ok(Some(match (law.branches.len(), law.plays.len()) {
-        (0, 0) => build::<0, 3, 6>(switched(motion, law, estimator)?, interval, setting),
-        (1, 0) => build::<1, 4, 10>(switched(motion, law, estimator)?, interval, setting),
-        (2, 0) => build::<2, 5, 15>(switched(motion, law, estimator)?, interval, setting),
-        (3, 0) => build::<3, 6, 21>(switched(motion, law, estimator)?, interval, setting),
-        (4, 0) => build::<4, 7, 28>(switched(motion, law, estimator)?, interval, setting),
+    Ok(Some(match law.branches.len() {
+        0 => sparse_of::<0, 3, 6>(kind, motion, law, estimator, setting)?,
+        1 => sparse_of::<1, 4, 10>(kind, motion, law, estimator, setting)?,
+        2 => sparse_of::<2, 5, 15>(kind, motion, law, estimator, setting)?,
+        3 => sparse_of::<3, 6, 21>(kind, motion, law, estimator, setting)?,
+        4 => sparse_of::<4, 7, 28>(kind, motion, law, estimator, setting)?,
         _ => return Ok(None),
     }))
+}
+
+fn sparse_of<const B: usize, const N: usize, const L: usize>(
+    kind: EstimatorKind,
+    motion: Motion<f64, 2>,
+    law: &LawParams,
+    estimator: &EstimatorParams,
+    setting: Setting,
+) -> Result<Box<dyn Filter>, CalibrationError> {
+    let model = switched::<2, B, N>(motion, law, estimator)?;
+    let belief: Belief<f64, N, L> = initial_belief(&model, setting);
+    let interval = interval(estimator, setting);
+    if kind == EstimatorKind::Ekf {
+        return Ok(Box::new(Running::new(SparseEstimator::new(model), belief, model, interval)));
+    }
+    let PhaseFilter { dwell, hold, evidence } = PhaseFilter::new(kind, estimator, setting.limits)?;
+    Ok(if kind == EstimatorKind::SignSplit {
+        let start = SparseMixture::single(belief, Phase::Extend);
+        let filter = SparsePhases::<_, HYPOTHESES>(Splits { model, hold, evidence });
+        Box::new(Running::new(filter, start, model, interval))
+    } else {
+        let start = SparseMixture::single(belief, Phase::Hold);
+        let filter = SparsePhases::<_, HISTORIES>(Histories { model, dwell, evidence });
+        Box::new(Running::new(filter, start, model, interval))
+    })
 }
 
 /// The model of a law, plays aside.

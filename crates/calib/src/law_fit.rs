@@ -1,6 +1,7 @@
 use crate::CalibrationError;
 use crate::blocks::BlockedNormal;
 use crate::design::BRANCH_COLUMNS;
+use crate::estimator_params::EstimatorKind;
 use crate::law_params::LawParams;
 use crate::law_regression::{BLOCKS, LawRegression};
 use crate::law_structure::LawStructure;
@@ -48,7 +49,25 @@ pub struct LawFit {
 
 impl Default for LawOptions {
     fn default() -> Self {
-        Self { branches: DEFAULT_BRANCHES, gauge: DEFAULT_GAUGE, plays: DEFAULT_PLAYS }
+        Self::with_branches(DEFAULT_BRANCHES)
+    }
+}
+
+impl LawOptions {
+    /// What a calibration for this estimator chooses from unless somebody asks for one structure: one to three branches for
+    /// those that were seen to gain from the choice, two for the others. An ensemble has members with three besides.
+    #[must_use]
+    pub const fn candidates(kind: EstimatorKind) -> &'static [Self] {
+        const ALL: [LawOptions; 3] =
+            [LawOptions::with_branches(1), LawOptions::with_branches(2), LawOptions::with_branches(3)];
+        match kind.tuned_as() {
+            EstimatorKind::Ekf | EstimatorKind::SignSplit => &ALL,
+            _ => ALL.split_at(1).1.split_at(1).0,
+        }
+    }
+
+    const fn with_branches(branches: usize) -> Self {
+        Self { branches, gauge: DEFAULT_GAUGE, plays: DEFAULT_PLAYS }
     }
 }
 
@@ -66,9 +85,7 @@ pub struct CrossFit {
     pub blocks: Vec<Vec<std::ops::Range<usize>>>,
 }
 
-/// Branches unless somebody asks for another number. The error of the law alone often prefers one; the filter, which
-/// must tell stretching from releasing by how the resistance relaxes, is better off with two. A third helps on some
-/// recordings and harms on others; the ensemble has a member for it.
+/// Branches of a law that is fitted by itself, and of an ensemble's.
 const DEFAULT_BRANCHES: usize = 2;
 /// Family unless somebody asks for another. Others sometimes follow the resistance a little better; only the polynomial
 /// is linear in its coefficients, so that the ridge keeps it tame and the filter from taking one direction for the other.
@@ -94,8 +111,8 @@ pub(crate) const MOST_ROWS: usize = 6000;
 /// Steps of the polish of the time constants, and the side of its first simplex in ln τ.
 const POLISH_STEPS: u64 = 40;
 const POLISH_SIDE: f64 = 0.3;
-/// Smallest distance between time constants, in ln τ, where there is room: closer ones trade their gains off against
-/// each other.
+/// Smallest distance between time constants on the grid, in ln τ, where there is room: closer ones trade their gains off
+/// against each other. The polish may halve it.
 const LEAST_SPACING: f64 = 1.6;
 
 /// Fits the switched Kelvin-Voigt law with gains affine in strain: separable least squares, searching the time
@@ -106,13 +123,31 @@ const LEAST_SPACING: f64 = 1.6;
 /// # Errors
 /// If the recordings are too short, the strain is constant or no law fits.
 pub fn fit_law(recordings: &[Samples], options: LawOptions) -> Result<CrossFit, CalibrationError> {
-    let laws = fit_laws(recordings, options)?;
+    let laws = fit_ridges(recordings, options)?;
     let least = |a: &CrossFit, b: &CrossFit| a.law.cross_validated_error.total_cmp(&b.law.cross_validated_error);
     laws.into_iter().min_by(least).ok_or(CalibrationError::Singular)
 }
 
+impl CrossFit {
+    /// Number of branches.
+    pub(crate) fn branches(&self) -> usize {
+        self.law.law.branches.len()
+    }
+}
+
+/// The best law for each structure and ridge, fewest branches and strongest ridge first; at least one.
+pub(crate) fn fit_laws(recordings: &[Samples], structures: &[LawOptions]) -> Result<Vec<CrossFit>, CalibrationError> {
+    let fits: Vec<_> = structures.iter().map(|structure| fit_ridges(recordings, *structure)).collect();
+    if fits.iter().all(Result::is_err) {
+        return fits.into_iter().next().unwrap_or_else(|| Err(CalibrationError::Unsupported("no structure".into())));
+    }
+    let mut laws: Vec<CrossFit> = fits.into_iter().flatten().flatten().collect();
+    laws.sort_by_key(CrossFit::branches);
+    Ok(laws)
+}
+
 /// The best law for each ridge, strongest ridge first; at least one.
-pub(crate) fn fit_laws(recordings: &[Samples], options: LawOptions) -> Result<Vec<CrossFit>, CalibrationError> {
+fn fit_ridges(recordings: &[Samples], options: LawOptions) -> Result<Vec<CrossFit>, CalibrationError> {
     if options.branches > MOST_BRANCHES {
         let message = format!("{} branches; at most {MOST_BRANCHES} are supported", options.branches);
         return Err(CalibrationError::Unsupported(message));
@@ -229,8 +264,12 @@ fn polish(
         |nonlinear: &[f64]| LawStructure { family, nonlinear: nonlinear.to_vec(), taus: ln_taus.len(), plays, ridge };
     // The grid ends on the bounds, give or take a rounding.
     let (low, high) = (regression.tau_bounds.0.ln() - 1e-9, regression.tau_bounds.1.ln() + 1e-9);
+    let least = ln_taus.windows(2).map(|pair| pair[1] - pair[0]).fold(LEAST_SPACING, f64::min);
+    let spacing = 0.5 * least;
     let score = |nonlinear: &[f64]| {
-        let inside = nonlinear[..ln_taus.len()].iter().all(|ln_tau| (low..=high).contains(ln_tau));
+        let taus = &nonlinear[..ln_taus.len()];
+        let apart = |i: usize| taus[..i].iter().all(|other| (taus[i] - other).abs() >= spacing);
+        let inside = taus.iter().enumerate().all(|(i, ln_tau)| (low..=high).contains(ln_tau) && apart(i));
         let design = inside.then(|| structure(nonlinear).design(regression))?;
         regression.solve(&design, ridge, None).map(|solution| solution.cross_validated.ln())
     };

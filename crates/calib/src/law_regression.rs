@@ -8,6 +8,7 @@ use crate::design::{Regressors, StrainScale};
 use crate::law_fit::MOST_ROWS;
 use crate::motion_stats::MotionStats;
 use crate::params::RangeParams;
+use crate::robust_loss;
 use crate::samples::{Samples, check};
 
 /// Contiguous blocks of each recording that are left out in turn.
@@ -25,6 +26,8 @@ pub(crate) struct LawRegression {
 }
 
 pub(crate) struct Recording {
+    /// Square roots of the rows' weights.
+    root_weights: DVector<f64>,
     pub regressors: Regressors,
     /// Rows with reading and strain, thinned to at most [`MOST_ROWS`] over all recordings.
     pub complete: Vec<usize>,
@@ -61,6 +64,7 @@ impl LawRegression {
         let recordings: Vec<Recording> = samples
             .iter()
             .map(|samples| Recording {
+                root_weights: DVector::from_element(samples.len(), 1.0),
                 regressors: Regressors::new(samples, &scale),
                 complete: samples.complete_rows().step_by(stride).collect(),
                 reading: samples.reading.to_vec(),
@@ -75,7 +79,24 @@ impl LawRegression {
             start += rows;
         }
         let tau_bounds = tau_bounds(samples);
-        Ok(Self { recordings, blocks, scale, range: RangeParams { lower, upper }, tau_bounds })
+        let mut regression = Self { recordings, blocks, scale, range: RangeParams { lower, upper }, tau_bounds };
+        robust_loss::weigh(&mut regression);
+        Ok(regression)
+    }
+
+    /// Sets the weights of the complete rows, in their order.
+    pub(crate) fn set_weights(&mut self, weights: impl IntoIterator<Item = f64>) {
+        let mut weights = weights.into_iter();
+        for recording in &mut self.recordings {
+            for (&k, weight) in recording.complete.iter().zip(&mut weights) {
+                recording.root_weights[k] = weight.sqrt();
+            }
+        }
+    }
+
+    /// Square roots of the weights of the complete rows.
+    pub(crate) fn root_weights(&self) -> DVector<f64> {
+        self.column(|recording| recording.root_weights.clone())
     }
 
     /// Rows of each block in its own recording, from the first complete row on to the next block.
@@ -145,8 +166,11 @@ impl LawRegression {
 
     /// Normal equations of a design.
     pub(crate) fn normal(&self, design: &Design, rest_readings: &[f64]) -> BlockedNormal {
-        let response = self.response(rest_readings) - &design.offset;
-        BlockedNormal::new(&design.columns, design.free, &response, &self.blocks)
+        let root_weights = self.root_weights();
+        let response = (self.response(rest_readings) - &design.offset).component_mul(&root_weights);
+        let columns: Vec<DVector<f64>> =
+            design.columns.iter().map(|column| column.component_mul(&root_weights)).collect();
+        BlockedNormal::new(&columns, design.free, &response, &self.blocks)
     }
 
     pub(crate) fn median_readings(&self) -> Vec<f64> {

@@ -27,7 +27,8 @@ impl<'a> Linearised<'a> {
         let design = structure.design(regression);
         let solution = regression.solve(&design, structure.ridge, None).ok_or(CalibrationError::Singular)?;
         let fitted = |structure: &LawStructure| structure.design(regression).fitted(&solution.weights);
-        let residual = regression.response(&solution.rest_readings) - fitted(structure);
+        let root_weights = regression.root_weights();
+        let residual = (regression.response(&solution.rest_readings) - fitted(structure)).component_mul(&root_weights);
         let (mut columns, free) = (design.columns, design.free);
         for j in 0..structure.nonlinear.len() {
             let at = |step: f64| {
@@ -37,6 +38,7 @@ impl<'a> Linearised<'a> {
             };
             columns.push((at(STEP) - at(-STEP)) / (2.0 * STEP));
         }
+        let columns: Vec<DVector<f64>> = columns.iter().map(|column| column.component_mul(&root_weights)).collect();
         let jacobian = DMatrix::from_columns(&columns);
         Ok(Self { structure, regression, solution, free, residual, jacobian })
     }

@@ -97,5 +97,6 @@ fn squared_error(structure: &LawStructure, regression: &LawRegression) -> Option
     let design = structure.design(regression);
     let solution = regression.solve(&design, structure.ridge, None)?;
     let residual = regression.response(&solution.rest_readings) - design.fitted(&solution.weights);
+    let residual = residual.component_mul(&regression.root_weights());
     Some(regression.in_readings(&residual, &solution.rest_readings).norm_squared())
 }

@@ -1,5 +1,7 @@
+use std::collections::BTreeMap;
+
 use crate::CalibrationError;
-use crate::estimator_params::{EstimatorKind, EstimatorParams, MotionParams, NoiseParams, PhaseParams};
+use crate::estimator_params::{EstimatorKind, EstimatorParams, MotionFamily, MotionParams, NoiseParams, PhaseParams};
 use crate::filter::{Filter, Setting, Start, filter_from_parts};
 use crate::law_fit::CrossFit;
 use crate::left_out::{Fold, LeftOut};
@@ -24,28 +26,10 @@ pub(crate) struct Search {
 /// Says how well an estimator does with a law.
 pub(crate) const SURVEY: Search = Search { side: 0.7, steps: 100, rows: 500 };
 
-/// How long the searches after the first one are.
-#[derive(Clone, Copy)]
-pub(crate) struct Effort {
-    /// Says how well an estimator does with another law, from what the first one has led to.
-    pub resurvey: Search,
-    /// Goes on from the best survey.
-    pub refinement: Search,
-}
-
-impl Effort {
-    /// Of an estimator that has the time to itself.
-    pub(crate) const ALONE: Self = Self {
-        resurvey: Search { side: 0.4, steps: 40, rows: 500 },
-        refinement: Search { side: 0.3, steps: 60, rows: 1500 },
-    };
-    /// Of members of an ensemble, who share it: what one of them misses the others are there for. On halves of nine
-    /// recordings the pooled error is 0.356 of the static cubic's instead of 0.347, in half the time.
-    pub(crate) const SHARED: Self = Self {
-        resurvey: Search { side: 0.4, steps: 25, rows: 500 },
-        refinement: Search { side: 0.3, steps: 30, rows: 1000 },
-    };
-}
+/// Says how well it does with another law, from what the one before has led to.
+const RESURVEY: Search = Search { side: 0.4, steps: 25, rows: 500 };
+/// Goes on from the best survey.
+pub(crate) const REFINEMENT: Search = Search { side: 0.3, steps: 45, rows: 1500 };
 
 impl Search {
     /// Evaluations to expect: a step of the simplex evaluates one or two points.
@@ -53,6 +37,16 @@ impl Search {
         self.steps * 3 / 2
     }
 }
+
+/// Evaluations to expect of a survey under so many laws of so many structures.
+pub(crate) fn survey_evaluations(kind: EstimatorKind, laws: usize, structures: usize) -> u64 {
+    let each = |laws: usize| SURVEY.evaluations() + (laws.max(1) as u64 - 1) * RESURVEY.evaluations();
+    each(laws) + (kind.motion_families().len() as u64 - 1) * each(structures)
+}
+
+/// Places of the white noise and of the tempering among the parameters.
+const READING_SD: usize = 2;
+const TEMPERING_AT: usize = 10;
 
 /// Rows on which the smoother's intervals are looked at; smoothing costs ten times as much as filtering.
 pub(crate) const SMOOTHED_ROWS: usize = 2000;
@@ -62,6 +56,51 @@ const BASELINE_TIME_S: f64 = 8.0;
 const SHARE_OF_RESIDUAL: f64 = 0.3;
 /// First guess of the tempering: model error is correlated from reading to reading.
 const TEMPERING: f64 = 0.7;
+
+/// What an estimator makes of a law, with motions of one family.
+pub(crate) struct Surveyed<'a> {
+    pub kind: EstimatorKind,
+    pub family: MotionFamily,
+    pub law: &'a CrossFit,
+    pub tuned: Tuned,
+}
+
+/// Searches under one law after another, each from where the one before has got to. The first family of motions sees all
+/// laws, the others the best one of each number of branches.
+pub(crate) fn survey<'a>(
+    samples: &[Samples],
+    laws: &[&'a CrossFit],
+    stats: MotionStats,
+    kind: EstimatorKind,
+    evaluated: &mut dyn FnMut(),
+) -> Result<Vec<Surveyed<'a>>, CalibrationError> {
+    let mut surveyed: Vec<Surveyed<'a>> = Vec::new();
+    let mut laws = laws.to_vec();
+    for &family in kind.motion_families() {
+        let mut before: Option<Tuned> = None;
+        for law in laws {
+            let search = if before.is_none() { SURVEY } else { RESURVEY };
+            let problem = NoiseProblem::new(samples, law, stats, (kind, family));
+            let tuned = problem.search(before.as_ref(), search, &mut *evaluated)?;
+            before = Some(tuned.clone());
+            surveyed.push(Surveyed { kind, family, law, tuned });
+        }
+        laws = best_of_each_size(&surveyed);
+    }
+    Ok(surveyed)
+}
+
+/// The best law of each number of branches.
+fn best_of_each_size<'a>(surveyed: &[Surveyed<'a>]) -> Vec<&'a CrossFit> {
+    let mut best: BTreeMap<usize, &Surveyed<'a>> = BTreeMap::new();
+    for one in surveyed {
+        let best = best.entry(one.law.branches()).or_insert(one);
+        if one.tuned.cost < best.tuned.cost {
+            *best = one;
+        }
+    }
+    best.into_values().map(|one| one.law).collect()
+}
 
 /// Where a search has got to.
 #[derive(Clone, Debug)]
@@ -80,7 +119,9 @@ pub(crate) struct NoiseProblem<'a> {
     limits: RangeParams,
     stats: MotionStats,
     kind: EstimatorKind,
-    effort: Effort,
+    family: MotionFamily,
+    /// Logarithms of the parameters that residuals and motion suggest.
+    untuned: Vec<f64>,
 }
 
 impl<'a> NoiseProblem<'a> {
@@ -88,10 +129,11 @@ impl<'a> NoiseProblem<'a> {
         samples: &'a [Samples<'a>],
         fit: &'a CrossFit,
         stats: MotionStats,
-        kind: EstimatorKind,
-        effort: Effort,
+        (kind, family): (EstimatorKind, MotionFamily),
     ) -> Self {
-        Self { samples, fit, limits: fit.law.law.range, stats, kind, effort }
+        let mut problem = Self { samples, fit, limits: fit.law.law.range, stats, kind, family, untuned: Vec::new() };
+        problem.untuned = problem.start();
+        problem
     }
 
     /// Searches from the values that residuals and motion suggest, or from where another search has got to.
@@ -101,29 +143,38 @@ impl<'a> NoiseProblem<'a> {
         search: Search,
         mut evaluated: impl FnMut(),
     ) -> Result<Tuned, CalibrationError> {
-        let start = self.start();
         let left_out = self.left_out(self.stride(search.rows));
         let mut cost = |point: &[f64]| {
             evaluated();
-            let pull: f64 = point.iter().zip(&start).map(|(x, s)| (x - s).powi(2)).sum();
+            let pull: f64 = point.iter().zip(&self.untuned).map(|(x, untuned)| (x - untuned).powi(2)).sum();
             let params = self.params(point);
             left_out.score(&|fold| self.build(self.kind.tuned_as(), fold, &params)) + REGULARISATION * pull
         };
-        let from = from.map_or(&start, |tuned| &tuned.point);
+        let from = from.map_or(&self.untuned, |tuned| &tuned.point);
         let point = optimise::polish(&mut cost, from, search.side, search.steps)?;
         Ok(Tuned { cost: cost(&point), point })
     }
 
-    /// The parameters, scored on every row.
-    pub(crate) fn finish(&self, tuned: &Tuned) -> EstimatorParams {
+    /// Searches on from a survey. What that leads to may mean several things on every row, and what residuals and motion
+    /// suggest without a search competes there: most of these rows the search has not seen.
+    pub(crate) fn refine(&self, from: &Tuned, evaluated: impl FnMut()) -> Result<EstimatorParams, CalibrationError> {
+        let refined = self.search(Some(from), REFINEMENT, evaluated)?.point;
         let left_out = self.left_out(1);
-        let score = |mut params: EstimatorParams| {
-            params.score = left_out.score(&|fold| self.build(self.kind, fold, &params));
-            params
-        };
-        let candidates = self.at_every_row(self.params(&tuned.point), self.stride(self.effort.refinement.rows));
-        let best = candidates.into_iter().map(score).reduce(|a, b| if b.score < a.score { b } else { a });
-        let mut params = best.unwrap_or_else(|| self.params(&tuned.point));
+        let mut best = (f64::INFINITY, &refined);
+        let candidates = self.at_every_row(&refined, self.stride(REFINEMENT.rows));
+        for point in candidates.iter().chain([&self.untuned]) {
+            let params = self.params(point);
+            let score = left_out.score(&|fold| self.build(self.kind, fold, &params));
+            if score < best.0 {
+                best = (score, point);
+            }
+        }
+        Ok(self.finish(&left_out, best.1, best.0))
+    }
+
+    /// The parameters, with the factors that make their intervals cover the blocks left out.
+    fn finish(&self, left_out: &LeftOut, point: &[f64], score: f64) -> EstimatorParams {
+        let mut params = EstimatorParams { score, ..self.params(point) };
         let build = |fold: Fold| self.build(self.kind, fold, &params);
         let filtered = left_out.filtered_deviations(&build);
         let smoothed = self.left_out(self.stride(SMOOTHED_ROWS)).smoothed_deviations(&build);
@@ -145,18 +196,19 @@ impl<'a> NoiseProblem<'a> {
     /// What parameters that were found on every `stride`-th row may mean for every row. White noise stays what it is; if
     /// it stands for model error that is correlated over `stride` rows, it is that much larger, or the likelihood of a
     /// row counts that much less.
-    fn at_every_row(&self, params: EstimatorParams, stride: usize) -> Vec<EstimatorParams> {
-        let mut candidates = vec![params];
-        if stride > 1 {
-            let mut noisier = params;
-            noisier.noise.reading_sd *= (stride as f64).sqrt();
-            candidates.push(noisier);
-            for mut candidate in candidates.clone() {
-                if let Some(phases) = &mut candidate.phases {
-                    phases.tempering /= stride as f64;
-                    candidates.push(candidate);
+    fn at_every_row(&self, point: &[f64], stride: usize) -> Vec<Vec<f64>> {
+        let mut candidates = vec![point.to_vec()];
+        let mut vary = |place: usize, by: f64| {
+            for mut varied in candidates.clone() {
+                if let Some(parameter) = varied.get_mut(place) {
+                    *parameter += by;
+                    candidates.push(varied);
                 }
             }
+        };
+        if stride > 1 {
+            vary(READING_SD, 0.5 * (stride as f64).ln());
+            vary(TEMPERING_AT, -(stride as f64).ln());
         }
         candidates
     }
@@ -183,13 +235,11 @@ impl<'a> NoiseProblem<'a> {
         let stats = &self.stats;
         let mut start = vec![root_mean_square(&left_out).max(1e-9), BASELINE_TIME_S, fine, fine];
         start.extend(match self.kind.tuned_as() {
-            EstimatorKind::Ekf | EstimatorKind::Ukf => [stats.rate_sd, stats.rate_time_s, stats.strain_sd],
-            EstimatorKind::SignSplit | EstimatorKind::Particles | EstimatorKind::Ensemble => {
-                [stats.rate_sd, stats.acceleration_sd, stats.strain_sd]
-            }
             EstimatorKind::Imm | EstimatorKind::Hypotheses => {
                 [0.5 * stats.speed, stats.rate_time_s, 3.0 * stats.strain_sd]
             }
+            _ if self.family == MotionFamily::Smooth => [stats.rate_sd, stats.acceleration_sd, stats.strain_sd],
+            _ => [stats.rate_sd, stats.rate_time_s, stats.strain_sd],
         });
         if self.kind.has_phases() {
             start.extend([stats.hold_s.unwrap_or(0.5), stats.move_s, stats.speed.max(1e-12), TEMPERING]);
@@ -201,7 +251,7 @@ impl<'a> NoiseProblem<'a> {
         let p: Vec<f64> = point.iter().map(|x| x.clamp(-25.0, 15.0).exp()).collect();
         let strain_mean = self.stats.strain_mean;
         let kind = self.kind.tuned_as();
-        let motion = if kind == EstimatorKind::SignSplit {
+        let motion = if self.family == MotionFamily::Smooth {
             MotionParams::Smooth {
                 rate_sd_per_s: p[4],
                 // A stationary motion has σ_v² < σ_ε σ_a.

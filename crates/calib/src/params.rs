@@ -10,7 +10,7 @@ use crate::estimator_params::{EstimatorKind, EstimatorParams};
 use crate::law_params::LawParams;
 
 /// Version of the parameter file this code reads and writes.
-pub const FORMAT: u32 = 2;
+pub const FORMAT: u32 = 3;
 
 /// Everything a filter needs to know of a sensor: the content of `sensor.toml`.
 ///
@@ -188,16 +188,14 @@ impl SensorParams {
         self.estimators.get(&kind).ok_or_else(|| CalibrationError::no_parameters(kind))
     }
 
-    /// The default estimator, or the one among the ensemble's members that is listened to most.
+    /// The default estimator, or the one among the ensemble's members under this law that is listened to most.
     #[must_use]
     pub fn leading_estimator(&self) -> EstimatorKind {
-        let members = || self.ensemble.iter().flat_map(|ensemble| &ensemble.members);
-        let weight = |kind: EstimatorKind| {
-            members().filter(|member| member.estimator == kind).map(|member| member.weight).sum::<f64>()
-        };
-        let kinds = members().map(|member| member.estimator);
-        match (self.default_estimator, kinds.max_by(|a, b| weight(*a).total_cmp(&weight(*b)))) {
-            (EstimatorKind::Ensemble, Some(kind)) => kind,
+        let members = self.ensemble.iter().flat_map(|ensemble| &ensemble.members);
+        let under_this_law = members.filter(|member| member.own.is_none());
+        let heaviest = under_this_law.max_by(|a, b| a.weight.total_cmp(&b.weight));
+        match (self.default_estimator, heaviest) {
+            (EstimatorKind::Ensemble, Some(member)) => member.estimator,
             (kind, _) => kind,
         }
     }

@@ -1,5 +1,10 @@
-use ohmstrain_ekf::{Advanced, Belief, Ekf, Estimator, Innovation, Logistic, Reading, SparseEkf, StepError};
+use ohmstrain_ekf::{
+    Advanced, Belief, Dwell, Ekf, Estimator, Evidence, Hypotheses, Innovation, Logistic, Mixture, MixtureResidual,
+    Reading, SignSplit, SparseEkf, SparseHypotheses, SparseMixture, SparseSignSplit, StepError,
+};
 use ohmstrain_model::{SwitchedModel, SwitchedStep};
+
+use crate::filter::{HISTORIES, HYPOTHESES};
 
 /// The EKF of a sensor without plays on Ornstein-Uhlenbeck motion, stepped forward without multiplying zeros. Agrees with
 /// [`Ekf`] to rounding; where it refuses a step, and on the way back, `Ekf` decides.
@@ -63,5 +68,140 @@ impl<const B: usize, const N: usize, const L: usize> Estimator<f64, N, L> for Sp
         next: &Belief<f64, N, L>,
     ) -> Result<Option<Belief<f64, N, L>>, StepError> {
         self.dense().smooth_back(filtered, &prepared.dense, reading, next)
+    }
+}
+
+/// A filter of hypotheses, with and without the multiplications by zero.
+pub(crate) trait Pair<const N: usize, const L: usize, const K: usize>: Copy {
+    /// Steps of one length.
+    type Sparse: Copy;
+    type Dense: Estimator<f64, N, L, State = Mixture<f64, N, L, K>>;
+
+    fn dense(&self) -> Self::Dense;
+
+    /// # Errors
+    /// If a step of this length does not move.
+    fn sparse(&self, dt_s: f64) -> Result<Self::Sparse, StepError>;
+
+    fn step(
+        sparse: &Self::Sparse,
+        state: &mut SparseMixture<f64, N, L, K>,
+        reading: Option<Reading<f64>>,
+    ) -> Result<Option<MixtureResidual<f64>>, StepError>;
+}
+
+/// Phase histories of a sensor without plays on Ornstein-Uhlenbeck motion.
+#[derive(Clone, Copy)]
+pub(crate) struct Histories<const B: usize, const N: usize> {
+    pub model: SwitchedModel<f64, 2, B, N>,
+    pub dwell: Dwell<f64>,
+    pub evidence: Evidence<f64>,
+}
+
+impl<const B: usize, const N: usize, const L: usize> Pair<N, L, HISTORIES> for Histories<B, N> {
+    type Sparse = SparseHypotheses<f64, B, N, HISTORIES>;
+    type Dense = Hypotheses<f64, SwitchedModel<f64, 2, B, N>, HISTORIES>;
+
+    fn dense(&self) -> Self::Dense {
+        Hypotheses::new(self.model, self.dwell, self.evidence)
+    }
+
+    fn sparse(&self, dt_s: f64) -> Result<Self::Sparse, StepError> {
+        SparseHypotheses::new(self.model, dt_s, self.dwell, self.evidence)
+    }
+
+    fn step(
+        sparse: &Self::Sparse,
+        state: &mut SparseMixture<f64, N, L, HISTORIES>,
+        reading: Option<Reading<f64>>,
+    ) -> Result<Option<MixtureResidual<f64>>, StepError> {
+        sparse.step(state, reading)
+    }
+}
+
+/// The sign-split filter of the same.
+#[derive(Clone, Copy)]
+pub(crate) struct Splits<const B: usize, const N: usize> {
+    pub model: SwitchedModel<f64, 2, B, N>,
+    pub hold: Option<Dwell<f64>>,
+    pub evidence: Evidence<f64>,
+}
+
+impl<const B: usize, const N: usize, const L: usize> Pair<N, L, HYPOTHESES> for Splits<B, N> {
+    type Sparse = SparseSignSplit<f64, B, N, HYPOTHESES>;
+    type Dense = SignSplit<f64, SwitchedModel<f64, 2, B, N>, HYPOTHESES>;
+
+    fn dense(&self) -> Self::Dense {
+        SignSplit::new(self.model, self.hold, self.evidence)
+    }
+
+    fn sparse(&self, dt_s: f64) -> Result<Self::Sparse, StepError> {
+        SparseSignSplit::new(self.model, dt_s, self.hold, self.evidence)
+    }
+
+    fn step(
+        sparse: &Self::Sparse,
+        state: &mut SparseMixture<f64, N, L, HYPOTHESES>,
+        reading: Option<Reading<f64>>,
+    ) -> Result<Option<MixtureResidual<f64>>, StepError> {
+        sparse.step(state, reading)
+    }
+}
+
+/// The sparse filter of a pair forward; where it refuses a step, and on the way back, the dense one decides.
+#[derive(Clone, Copy)]
+pub(crate) struct SparsePhases<P, const K: usize>(pub P);
+
+/// A step of one length; without `sparse` it has none.
+#[derive(Clone, Copy)]
+pub(crate) struct SparsePhasesStep<S> {
+    dt_s: f64,
+    sparse: Option<S>,
+}
+
+impl<P: Pair<N, L, K>, const N: usize, const L: usize, const K: usize> Estimator<f64, N, L> for SparsePhases<P, K> {
+    type State = SparseMixture<f64, N, L, K>;
+    type Prepared = SparsePhasesStep<P::Sparse>;
+
+    fn prepare(&self, dt_s: f64) -> Self::Prepared {
+        SparsePhasesStep { dt_s, sparse: self.0.sparse(dt_s).ok() }
+    }
+
+    fn advance(
+        &self,
+        state: &Self::State,
+        prepared: &Self::Prepared,
+        reading: Option<Reading<f64>>,
+    ) -> Result<Advanced<Self::State, f64>, StepError> {
+        let mut next = *state;
+        match prepared.sparse.as_ref().map(|sparse| P::step(sparse, &mut next, reading)) {
+            Some(Ok(said)) if said.is_none_or(|said| said.residual.nis.is_finite()) => {
+                let innovation = said.map(|said| Innovation {
+                    value: said.residual.innovation,
+                    variance: said.residual.variance,
+                    log_likelihood: said.log_likelihood(),
+                });
+                Ok(Advanced { state: next, innovation })
+            }
+            _ => {
+                let dense = self.0.dense();
+                let Advanced { state, innovation } =
+                    dense.advance(&(*state).into(), &dense.prepare(prepared.dt_s), reading)?;
+                Ok(Advanced { state: (&state).into(), innovation })
+            }
+        }
+    }
+
+    fn smooth_back(
+        &self,
+        filtered: &Self::State,
+        prepared: &Self::Prepared,
+        reading: Option<Reading<f64>>,
+        next: &Self::State,
+    ) -> Result<Option<Self::State>, StepError> {
+        let dense = self.0.dense();
+        let step = dense.prepare(prepared.dt_s);
+        let smoothed = dense.smooth_back(&(*filtered).into(), &step, reading, &(*next).into())?;
+        Ok(smoothed.as_ref().map(Into::into))
     }
 }

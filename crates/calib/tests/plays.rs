@@ -78,7 +78,7 @@ fn every_estimator_runs_a_law_with_plays() {
         Samples { time_s: &bench.time_s[..half], reading: &bench.reading[..half], strain: &bench.strain[..half] };
     let kinds = [EstimatorKind::Ekf];
     let error = |plays: usize| {
-        let calibration = calibrate(&[training], LawOptions { plays, ..PLAYFUL }, &kinds, |_| ()).unwrap();
+        let calibration = calibrate(&[training], &[LawOptions { plays, ..PLAYFUL }], &kinds, |_| ()).unwrap();
         let sensor = calibration.into_sensor("", Quantity::Strain, ReadingUnit::Ohm);
         let readings: Vec<_> =
             bench.reading.iter().map(|r| Some(Reading::from(r / sensor.rest_reading - 1.0))).collect();
@@ -121,6 +121,7 @@ fn every_estimator_runs_a_law_with_plays() {
             .iter()
             .map(|&estimator| MemberParams { estimator, weight: 1.0 / 3.0, own: None })
             .collect(),
+        inverse: None,
     });
     for kind in EstimatorKind::ALL {
         let filter = build_filter(&sensor, Some(kind), Start::Strain(bench.strain[0]));

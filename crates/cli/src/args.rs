@@ -133,7 +133,7 @@ pub struct CalibrateArgs {
     /// Use rows with time_s < T only
     #[arg(long, value_name = "T", allow_negative_numbers = true, value_parser = finite)]
     pub until: Option<f64>,
-    /// Relaxing branches: auto (2) or 0 to 4
+    /// Relaxing branches: auto (1 to 3, what the filter does best with) or 0 to 4
     #[arg(long, default_value = "auto")]
     pub branches: Auto<Branches>,
     /// Play operators, hysteresis that does not relax: auto (0), 0 or 3

@@ -233,7 +233,7 @@ fn a_sensor_file_that_is_none_is_refused_alike_by_every_command() {
     }
     let unknown = swap(&sensor, "made_by = ", "colour = \"black\"");
     let in_table = swap(&sensor, "tau_s = ", "tau_min = 3.0");
-    let newer = swap(&swap(&sensor, "format = ", "format = 3").0, "made_by = ", "colour = \"black\"");
+    let newer = swap(&swap(&sensor, "format = ", "format = 9").0, "made_by = ", "colour = \"black\"");
     let word = swap(&sensor, "rest_reading = ", "rest_reading = \"high\"");
     let negative = swap(&sensor, "rest_reading = ", "rest_reading = -1600.0");
     let nan = swap(&sensor, "rest_reading = ", "rest_reading = nan");
@@ -245,7 +245,7 @@ fn a_sensor_file_that_is_none_is_refused_alike_by_every_command() {
         (unknown.0.into(), format!(":{}: column 1: unknown field `colour`, expected one of `format`, ", unknown.1)),
         (in_table.0.into(), format!(":{}: column 1: unknown field `tau_min`, expected one of `tau_s`, ", in_table.1)),
         // What a newer version has is not unknown but newer.
-        (newer.0.into(), ":1: field `format`: expected version 2, found 3".into()),
+        (newer.0.into(), ":1: field `format`: expected version 3, found 9".into()),
         (word.0.into(), format!(":{}: column 16: invalid type: string \"high\", expected f64", word.1)),
         (negative.0.into(), ": field `rest_reading`: expected a positive number, found -1600".into()),
         (nan.0.into(), ": field `rest_reading`: expected a positive number, found NaN".into()),
@@ -260,7 +260,7 @@ fn a_sensor_file_that_is_none_is_refused_alike_by_every_command() {
         ("hello there\n".into(), ":1: column 7: key with no value, expected `=`".into()),
         ("format = 1\n[law\n".into(), ":2: column 5: unclosed table, expected `]`".into()),
         (Vec::new(), ":1: column 1: missing field `format`".into()),
-        (b"format = 2\n".to_vec(), ":1: column 1: missing field `made_by`".into()),
+        (b"format = 3\n".to_vec(), ":1: column 1: missing field `made_by`".into()),
         (utf_16("format = 1", [0xff, 0xfe], u16::to_le_bytes), ":1: expected a text file in UTF-8, found ".into()),
     ];
     for (content, message) in cases {

@@ -86,6 +86,6 @@ fn what_was_not_calibrated_is_refused() {
     let bench = Bench::calibrated();
     let run = |arguments: &[&str]| bench.run(&[arguments, &["--sensor", "sensor.toml"]].concat());
     run(&["filter", "trace.csv", "--estimator", "imm"])
-        .fails(4, "sensor.toml: the sensor file has no parameters for `imm`");
+        .fails(4, "sensor.toml: the sensor file has no parameters for `imm`; calibrate with `imm` as the estimator");
     assert_eq!(run(&["filter", "trace.csv", "--estimator", "nonsense"]).code, Some(2));
 }

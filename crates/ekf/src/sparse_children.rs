@@ -3,13 +3,13 @@ use ohmstrain_model::{Phase, Symmetric};
 use crate::gaussian::Real;
 use crate::mixture::{ALIKE, LEAST_WEIGHT};
 use crate::sparse_evidence::Weight;
-use crate::sparse_mixture::{Share, SignMixture};
+use crate::sparse_mixture::{Share, SparseMixture};
 use crate::sparse_parts::Parts;
 use crate::{Belief, StepError};
 
 /// Collects the children of a step: keeps, merges and drops them as [`Mixture`](crate::Mixture) does.
 pub(crate) struct Children<T, const N: usize, const L: usize, const K: usize> {
-    kept: SignMixture<T, N, L, K>,
+    kept: SparseMixture<T, N, L, K>,
     /// The largest exponent so far; weights are in units of its exponential. What is so much lighter that it has become
     /// zero would be dropped in the end.
     exponent: T,
@@ -18,7 +18,7 @@ pub(crate) struct Children<T, const N: usize, const L: usize, const K: usize> {
 impl<T: Real, const N: usize, const L: usize, const K: usize> Children<T, N, L, K> {
     #[inline(always)]
     pub(crate) fn new() -> Self {
-        Self { kept: SignMixture::empty(), exponent: T::zero() }
+        Self { kept: SparseMixture::empty(), exponent: T::zero() }
     }
 
     /// Adds a child: merged with one that says the same, in a free place, or in the place of the lightest.
@@ -75,7 +75,7 @@ impl<T: Real, const N: usize, const L: usize, const K: usize> Children<T, N, L, 
         Ok(Weight { factor, exponent: self.exponent })
     }
 
-    pub(crate) fn into_state(self) -> SignMixture<T, N, L, K> {
+    pub(crate) fn into_state(self) -> SparseMixture<T, N, L, K> {
         self.kept
     }
 }

@@ -1,9 +1,11 @@
-use ohmstrain_model::{Scalar, StrainRange};
+use ohmstrain_model::{Phase, Scalar, StrainRange};
 
 use crate::gaussian::{Real, upper_tail};
 use crate::mixture::LEAST_INSIDE;
 use crate::mixture_step::Predicted;
-use crate::{Evidence, Residual, Switch};
+use crate::sparse_parts::Parts;
+use crate::switch::RateSpread;
+use crate::{Curve, Evidence, Reading, Residual, SparseEkf, StepError, Switch};
 
 /// What weighs the Gaussians of a sparse mixture: as [`Evidence`] does, in factors instead of logarithms.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -89,6 +91,42 @@ impl<T: Real> Weighing<T> {
     /// Squared deviations beyond which a tail does not count.
     pub(crate) fn clear(&self) -> T {
         self.clear
+    }
+}
+
+/// A child that has been predicted, before the reading.
+pub(crate) struct Newborn<T: Real, S: Switch<T>> {
+    pub phase: Phase,
+    pub prior: T,
+    /// What its prediction returned.
+    pub spread: RateSpread<T, S>,
+    /// Its parent's.
+    pub log_inside: T,
+}
+
+impl<T: Real, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> SparseEkf<T, S, B, N, G> {
+    /// Gives a child the reading; its weight, and the logarithm of its probability of the limits.
+    #[inline(always)]
+    pub(crate) fn weigh(
+        &self,
+        child: &mut Parts<T, B>,
+        newborn: Newborn<T, S>,
+        reading: Option<Reading<T>>,
+        weighing: &Weighing<T>,
+        predicted: &mut Predicted<T>,
+    ) -> Result<(Weight<T>, T), StepError> {
+        let Newborn { phase, prior, spread, log_inside } = newborn;
+        let mut weight = Weight { factor: prior, exponent: T::zero() };
+        if let Some(reading) = reading {
+            let residual = self.update(child, reading, Some(phase), spread)?;
+            weight = weighing.likelihood::<S>(prior, &residual);
+            predicted.add(prior, residual.innovation, residual.variance);
+        } else if !child.is_sound::<N>(child.variances::<N>()) {
+            return Err(StepError::NonFiniteState);
+        }
+        let inside = weighing.log_inside::<S>(child.strain, child.strain_variance);
+        weight.exponent += inside - log_inside;
+        Ok((weight, inside))
     }
 }
 

@@ -74,16 +74,16 @@ impl<T: Real, const N: usize, const L: usize> PhaseMixture<T, N, L> {
     }
 }
 
-/// At most `K` Gaussians, each stretching, holding or releasing: what [`SparseSignSplit`](crate::SparseSignSplit) carries
-/// from step to step.
+/// At most `K` Gaussians, each stretching, holding or releasing: what [`SparseSignSplit`](crate::SparseSignSplit) and
+/// [`SparseHypotheses`](crate::SparseHypotheses) carry from step to step.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SignMixture<T, const N: usize, const L: usize, const K: usize> {
+pub struct SparseMixture<T, const N: usize, const L: usize, const K: usize> {
     shares: [Share<T, N, L>; K],
     phases: [Phase; K],
     len: usize,
 }
 
-impl<T: Real, const N: usize, const L: usize, const K: usize> SignMixture<T, N, L, K> {
+impl<T: Real, const N: usize, const L: usize, const K: usize> SparseMixture<T, N, L, K> {
     /// One Gaussian that has all the weight.
     #[must_use]
     pub fn single(belief: Belief<T, N, L>, phase: Phase) -> Self {
@@ -173,6 +173,12 @@ impl<T: Real, const N: usize, const L: usize, const K: usize> SignMixture<T, N, 
     }
 }
 
+impl<T: Real, const N: usize, const L: usize, const K: usize> From<&Mixture<T, N, L, K>> for SparseMixture<T, N, L, K> {
+    fn from(mixture: &Mixture<T, N, L, K>) -> Self {
+        Self::empty().refilled(mixture)
+    }
+}
+
 /// What both have in common. Everything that is not done at every step goes through [`Mixture`].
 macro_rules! sparse_state {
     ($state:ident<T, N, L $(, $k:ident)?>, $capacity:expr) => {
@@ -221,7 +227,7 @@ macro_rules! sparse_state {
 }
 
 sparse_state!(PhaseMixture<T, N, L>, 3);
-sparse_state!(SignMixture<T, N, L, K>, K);
+sparse_state!(SparseMixture<T, N, L, K>, K);
 
 fn marginal<T: Scalar, const N: usize, const L: usize>(shares: &[Share<T, N, L>], index: usize) -> Gaussian<T> {
     let mut mean = T::zero();

@@ -10,8 +10,8 @@ use crate::gaussian::Real;
 use crate::mixture_step::{LEAST_MASS, Predicted};
 use crate::sign_split::{HOPELESS, follows};
 use crate::sparse_children::Children;
-use crate::sparse_evidence::{Weighing, Weight};
-use crate::sparse_mixture::{Share, SignMixture};
+use crate::sparse_evidence::{Newborn, Weighing};
+use crate::sparse_mixture::{Share, SparseMixture};
 use crate::sparse_parts::Parts;
 use crate::switching::fresh_rate;
 use crate::{
@@ -73,7 +73,7 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
     #[inline]
     pub fn step<const L: usize>(
         &self,
-        state: &mut SignMixture<T, N, L, K>,
+        state: &mut SparseMixture<T, N, L, K>,
         reading: Option<Reading<T>>,
     ) -> Result<Option<MixtureResidual<T>>, StepError> {
         let mut children = Children::new();
@@ -120,16 +120,8 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
                 prior *= mass;
             }
         }
-        let mut weight = Weight { factor: prior, exponent: T::zero() };
-        if let Some(reading) = reading {
-            let residual = self.kernel.update(&mut child, reading, Some(phase), spread)?;
-            weight = self.weighing.likelihood::<S>(prior, &residual);
-            predicted.add(prior, residual.innovation, residual.variance);
-        } else if !child.is_sound::<N>(child.variances::<N>()) {
-            return Err(StepError::NonFiniteState);
-        }
-        let log_inside = self.weighing.log_inside::<S>(child.strain, child.strain_variance);
-        weight.exponent += log_inside - parent.log_inside;
+        let newborn = Newborn { phase, prior, spread, log_inside: parent.log_inside };
+        let (weight, log_inside) = self.kernel.weigh(&mut child, newborn, reading, &self.weighing, predicted)?;
         children.add(&child, phase, weight, log_inside);
         Ok(())
     }

@@ -3,7 +3,7 @@
 use core::hint::black_box;
 
 use ohmstrain_ekf::{
-    Belief, Cubic, Dwell, Ekf, Evidence, Imm, LogLikelihood, Mixture, PhaseMixture, Reading, Real, SignMixture,
+    Belief, Cubic, Dwell, Ekf, Evidence, Imm, LogLikelihood, Mixture, PhaseMixture, Reading, Real, SparseMixture,
     SignSplit, SparseEkf, SparseImm, SparseSignSplit, Switch,
 };
 use ohmstrain_model::{ParameterError, Phase, Problem, Scalar, SwitchedModel, SwitchedStep};
@@ -198,7 +198,7 @@ pub type Fast6<T> = Fast<Kernel<T, 3, 6>, Belief<T, 6, 21>>;
 /// Three phases of those six states.
 pub type FastImm6<T> = Fast<FastImm<T, 3, 6>, PhaseMixture<T, 6, 21>>;
 /// Four hypotheses of them, split by the sign of the rate.
-pub type FastSplit6<T> = Fast<FastSplit<T, 3, 6, 4>, SignMixture<T, 6, 21, 4>>;
+pub type FastSplit6<T> = Fast<FastSplit<T, 3, 6, 4>, SparseMixture<T, 6, 21, 4>>;
 
 fn kernel<T: Scalar, const B: usize, const N: usize>() -> Result<Kernel<T, B, N>, ParameterError>
 where
@@ -253,9 +253,9 @@ fast_filter!(
     |mixture| mixture.marginal(0).mean
 );
 fast_filter!(
-    <T: Real, const B, const N, const L, const K> FastSplit<T, B, N, K>, SignMixture<T, N, L, K>,
+    <T: Real, const B, const N, const L, const K> FastSplit<T, B, N, K>, SparseMixture<T, N, L, K>,
     |kernel| (
-        SignMixture::single(Belief::initial(kernel.model()), Phase::Extend),
+        SparseMixture::single(Belief::initial(kernel.model()), Phase::Extend),
         SparseSignSplit::around(kernel, None, black_box(evidence()))
     ),
     |mixture| mixture.marginal(0).mean

@@ -28,18 +28,9 @@ pub fn run(args: &CalibrateArgs) -> Result<(), CliError> {
         }
         recordings.push(recording);
     }
-    let mut options = LawOptions::default();
-    if let Some(branches) = args.branches.chosen() {
-        options.branches = branches.0;
-    }
-    if let Some(plays) = args.plays.chosen() {
-        options.plays = plays.0;
-    }
-    if let Some(gauge) = args.gauge.chosen() {
-        options.gauge = gauge.into();
-    }
-    let estimator = args.estimator.chosen().map(|estimator| estimator.0);
-    let params = calibrate_recordings(&recordings, options, estimator, &Progress::new("calibrating"))?;
+    let estimator = args.estimator.chosen().map_or(EstimatorKind::Ensemble, |estimator| estimator.0);
+    let structures = structures(args, estimator);
+    let params = calibrate_recordings(&recordings, &structures, estimator, &Progress::new("calibrating"))?;
     if let Some(path) = &args.report {
         write_report(path, &recordings[0], &params, None)?;
     }
@@ -47,18 +38,34 @@ pub fn run(args: &CalibrateArgs) -> Result<(), CliError> {
     explain::print(args, &recordings, &params.law)
 }
 
-/// The parameters of the sensor behind `recordings`, with `estimator`, or else the ensemble, as the default.
+/// What the flags leave to choose from.
+fn structures(args: &CalibrateArgs, estimator: EstimatorKind) -> Vec<LawOptions> {
+    let mut structures = LawOptions::candidates(estimator).to_vec();
+    for structure in &mut structures {
+        if let Some(plays) = args.plays.chosen() {
+            structure.plays = plays.0;
+        }
+        if let Some(gauge) = args.gauge.chosen() {
+            structure.gauge = gauge.into();
+        }
+    }
+    match args.branches.chosen() {
+        Some(branches) => vec![LawOptions { branches: branches.0, ..structures[0] }],
+        None => structures,
+    }
+}
+
+/// The parameters of the sensor behind `recordings`, with `estimator` as the default.
 pub fn calibrate_recordings(
     recordings: &[Recording],
-    options: LawOptions,
-    estimator: Option<EstimatorKind>,
+    structures: &[LawOptions],
+    estimator: EstimatorKind,
     progress: &Progress,
 ) -> Result<SensorParams, CliError> {
     let samples: Vec<Samples> = recordings.iter().map(Recording::samples).collect::<Result<_, _>>()?;
     let (quantity, reading) = common_units(recordings)?;
     let names: Vec<&str> = recordings.iter().map(|recording| recording.name.as_str()).collect();
-    let kind = estimator.unwrap_or(EstimatorKind::Ensemble);
-    let calibration = calibrate(&samples, options, &[kind], |stage| progress.calibrating(stage))
+    let calibration = calibrate(&samples, structures, &[estimator], |stage| progress.calibrating(stage))
         .map_err(|error| CliError::calibration(&names, &error))?;
     let info = |(recording, rest_reading): (&Recording, &f64)| RecordingInfo {
         file: file_name(&recording.name),

@@ -1,7 +1,7 @@
 use std::path::Path;
 
 use ohmstrain_bench_data::simulate::{Material, Protocol, SimulationSettings, simulate};
-use ohmstrain_calib::{LawOptions, Output, SensorParams};
+use ohmstrain_calib::{EstimatorKind, LawOptions, Output, SensorParams};
 
 use super::calibrate::{calibrate_recordings, write_report};
 use super::score_table::{add_scores, score_table};
@@ -29,7 +29,9 @@ pub fn run(args: &DemoArgs) -> Result<(), CliError> {
     let test_from = recording.trace.time_s[middle];
 
     let training = recording.head(middle);
-    let params = calibrate_recordings(std::slice::from_ref(&training), LawOptions::default(), None, &progress)?;
+    let ensemble = EstimatorKind::Ensemble;
+    let structures = LawOptions::candidates(ensemble);
+    let params = calibrate_recordings(std::slice::from_ref(&training), structures, ensemble, &progress)?;
     sensor_file::write(&args.out.join("sensor.toml"), &params)?;
 
     progress.doing("filtering and smoothing");

@@ -51,13 +51,13 @@ impl Sensor {
         progress: &Progress,
     ) -> Result<Vec<Self>, CliError> {
         let wanted = match estimators {
-            Estimators::Auto => vec![None],
-            Estimators::All => EstimatorKind::ALL.map(Some).to_vec(),
-            Estimators::One(kind) => vec![Some(kind)],
+            Estimators::Auto => vec![EstimatorKind::Ensemble],
+            Estimators::All => EstimatorKind::ALL.to_vec(),
+            Estimators::One(kind) => vec![kind],
         };
         let calibrate = |kind| {
             let start = Instant::now();
-            let params = calibrate_recordings(training, LawOptions::default(), kind, progress)?;
+            let params = calibrate_recordings(training, LawOptions::candidates(kind), kind, progress)?;
             let calibration_s = Some(start.elapsed().as_secs_f64());
             Ok(Self { kind: params.default_estimator, params, calibration_s })
         };
