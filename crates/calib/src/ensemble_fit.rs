@@ -1,9 +1,10 @@
 use std::collections::BTreeMap;
 
 use crate::CalibrationError;
+use crate::build_filter::{Setting, filter_from_parts};
 use crate::ensemble::{self, Ensemble, EnsembleParams, MemberParams, OwnLaw};
 use crate::estimator_params::{EstimatorKind, EstimatorParams};
-use crate::filter::{Filter, Setting, Start, filter_from_parts};
+use crate::filter::{Filter, Start};
 use crate::inverse::Inverse;
 use crate::inverse_fit::{InverseFit, fit_inverse};
 use crate::law_fit::{CrossFit, LawFit, LawOptions, MOST_BRANCHES, fit_laws};

@@ -1,8 +1,9 @@
 use std::collections::BTreeMap;
 
 use crate::CalibrationError;
+use crate::build_filter::{Setting, filter_from_parts};
 use crate::estimator_params::{EstimatorKind, EstimatorParams, MotionFamily, MotionParams, NoiseParams, PhaseParams};
-use crate::filter::{Filter, Setting, Start, filter_from_parts};
+use crate::filter::{Filter, Start};
 use crate::law_fit::CrossFit;
 use crate::left_out::{Fold, LeftOut};
 use crate::motion_stats::{MotionStats, root_mean_square};

@@ -4,7 +4,7 @@ use ohmstrain_ekf::{
 };
 use ohmstrain_model::{SwitchedModel, SwitchedStep};
 
-use crate::filter::{HISTORIES, HYPOTHESES};
+use crate::build_filter::{HISTORIES, HYPOTHESES};
 
 /// The EKF of a sensor without plays on Ornstein-Uhlenbeck motion, stepped forward without multiplying zeros. Agrees with
 /// [`Ekf`] to rounding; where it refuses a step, and on the way back, `Ekf` decides.

@@ -1,0 +1,265 @@
+use ohmstrain_ekf::{
+    Belief, Dwell, Ekf, Evidence, Hypotheses, Imm, Mixture, Particles, Phased, SignSplit, SparseMixture, StrainSensor,
+    Ukf, Unscented,
+};
+use ohmstrain_model::{Motion, Phase, SwitchedModel, WithPlays};
+
+use crate::CalibrationError;
+use crate::ensemble::{Ensemble, MemberParams, OwnLaw};
+use crate::estimator_params::{AnyMotion, EstimatorKind, EstimatorParams};
+use crate::filter::{Filter, Start};
+use crate::inverse::Inverse;
+use crate::law_params::LawParams;
+use crate::own_rest::OwnRest;
+use crate::params::{RangeParams, SensorParams};
+use crate::running::{Interval, Running};
+use crate::sparse_estimator::{Histories, SparseEstimator, SparsePhases, Splits};
+
+/// Share of the limits' span to which a given initial strain is believed.
+const START_SD: f64 = 1e-3;
+
+/// Builds the filter for a sensor.
+///
+/// # Errors
+/// If the sensor has no parameters for the estimator, or a number of branches and plays that no filter is built for.
+pub fn build_filter(
+    params: &SensorParams,
+    kind: Option<EstimatorKind>,
+    start: Start,
+) -> Result<Box<dyn Filter>, CalibrationError> {
+    let kind = kind.unwrap_or(params.default_estimator);
+    let setting = Setting { limits: params.limits, start, own_rest: OwnRest::SHARED };
+    let single = |kind| filter_from_parts(kind, &params.law, params.estimator(kind)?, setting);
+    if kind != EstimatorKind::Ensemble {
+        return single(kind);
+    }
+    let ensemble = params.ensemble.as_ref().ok_or_else(|| CalibrationError::no_parameters(kind))?;
+    let member = |member: &MemberParams| {
+        let filter = match &member.own {
+            None => single(member.estimator),
+            Some(OwnLaw { rest_ratio, law, parameters }) => {
+                let setting = Setting { own_rest: OwnRest::new(*rest_ratio), ..setting };
+                filter_from_parts(member.estimator, law, parameters, setting)
+            }
+        };
+        Ok((filter?, member.weight))
+    };
+    let members = ensemble.members.iter().map(member).collect::<Result<Vec<_>, CalibrationError>>()?;
+    let inverse = ensemble.inverse.clone().map(|inverse| Inverse::new(inverse, params.limits, OwnRest::SHARED));
+    let smoothed_scale = ensemble.smoothed_sd_scale.unwrap_or(1.0);
+    Ok(Box::new(Ensemble::new(members, inverse.transpose()?, ensemble.strain_sd_scale, smoothed_scale)?))
+}
+
+/// What a filter needs besides law, noise and motion.
+#[derive(Clone, Copy)]
+pub(crate) struct Setting {
+    pub limits: RangeParams,
+    pub start: Start,
+    pub own_rest: OwnRest,
+}
+
+pub(crate) fn filter_from_parts(
+    kind: EstimatorKind,
+    law: &LawParams,
+    estimator: &EstimatorParams,
+    setting: Setting,
+) -> Result<Box<dyn Filter>, CalibrationError> {
+    /// One instance per number of motion states and branches, N = M + B + 1 and L = N (N + 1) / 2, and another one of N + 3
+    /// states where plays are supported.
+    macro_rules! build {
+        ($motion:expr, $m:literal, $([$b:literal, $n:literal, $l:literal $(, $with:literal, $l_with:literal)?]),+) => {
+            match (law.branches.len(), law.plays.len()) {
+                $(($b, 0) => plain::<$m, $b, $n, $l>(kind, $motion, law, estimator, setting),)+
+                $($(($b, PLAYS) => {
+                    let inner = switched::<$m, $b, $n>($motion, law, estimator)?;
+                    let plays: [_; PLAYS] = std::array::from_fn(|i| law.plays[i].to_model());
+                    let model = WithPlays::<_, $m, $b, $n, PLAYS, $with>::new(inner, plays)?;
+                    gaussian::<_, $m, $b, $with, $l_with>(kind, model, estimator, setting)
+                })?)+
+                (branches, plays) => Err(CalibrationError::Unsupported(format!(
+                    "a law with {branches} branches and {plays} plays; at most 4 branches without plays, or 1 to 3 with \
+                     {PLAYS} plays, are supported"
+                ))),
+            }
+        };
+    }
+    match estimator.motion.to_model()? {
+        AnyMotion::Two(mut motion) => {
+            if let Some(phases) = estimator.phases {
+                motion = motion.with_phase_rate(phases.speed_per_s);
+            }
+            if let Some(sparse) = sparse(kind, motion, law, estimator, setting)? {
+                return Ok(sparse);
+            }
+            build!(motion, 2, [0, 3, 6], [1, 4, 10, 7, 28], [2, 5, 15, 8, 36], [3, 6, 21, 9, 45], [4, 7, 28])
+        }
+        AnyMotion::Three(motion) => {
+            build!(motion, 3, [0, 4, 10], [1, 5, 15, 8, 36], [2, 6, 21, 9, 45], [3, 7, 28, 10, 55], [4, 8, 36])
+        }
+    }
+}
+
+/// EKF, sign-split or phase histories of a law without plays on Ornstein-Uhlenbeck motion; `None` for any other.
+fn sparse(
+    kind: EstimatorKind,
+    motion: Motion<f64, 2>,
+    law: &LawParams,
+    estimator: &EstimatorParams,
+    setting: Setting,
+) -> Result<Option<Box<dyn Filter>>, CalibrationError> {
+    let supported = matches!(kind, EstimatorKind::Ekf | EstimatorKind::SignSplit | EstimatorKind::Hypotheses);
+    if !supported || !law.plays.is_empty() {
+        return Ok(None);
+    }
+    Ok(Some(match law.branches.len() {
+        0 => sparse_of::<0, 3, 6>(kind, motion, law, estimator, setting)?,
+        1 => sparse_of::<1, 4, 10>(kind, motion, law, estimator, setting)?,
+        2 => sparse_of::<2, 5, 15>(kind, motion, law, estimator, setting)?,
+        3 => sparse_of::<3, 6, 21>(kind, motion, law, estimator, setting)?,
+        4 => sparse_of::<4, 7, 28>(kind, motion, law, estimator, setting)?,
+        _ => return Ok(None),
+    }))
+}
+
+fn sparse_of<const B: usize, const N: usize, const L: usize>(
+    kind: EstimatorKind,
+    motion: Motion<f64, 2>,
+    law: &LawParams,
+    estimator: &EstimatorParams,
+    setting: Setting,
+) -> Result<Box<dyn Filter>, CalibrationError> {
+    let model = switched::<2, B, N>(motion, law, estimator)?;
+    let belief: Belief<f64, N, L> = initial_belief(&model, setting);
+    let interval = interval(estimator, setting);
+    if kind == EstimatorKind::Ekf {
+        return Ok(Box::new(Running::new(SparseEstimator::new(model), belief, model, interval)));
+    }
+    let PhaseFilter { dwell, hold, evidence } = PhaseFilter::new(kind, estimator, setting.limits)?;
+    Ok(if kind == EstimatorKind::SignSplit {
+        let start = SparseMixture::single(belief, Phase::Extend);
+        let filter = SparsePhases::<_, HYPOTHESES>(Splits { model, hold, evidence });
+        Box::new(Running::new(filter, start, model, interval))
+    } else {
+        let start = SparseMixture::single(belief, Phase::Hold);
+        let filter = SparsePhases::<_, HISTORIES>(Histories { model, dwell, evidence });
+        Box::new(Running::new(filter, start, model, interval))
+    })
+}
+
+/// The model of a law, plays aside.
+fn switched<const M: usize, const B: usize, const N: usize>(
+    motion: Motion<f64, M>,
+    law: &LawParams,
+    estimator: &EstimatorParams,
+) -> Result<SwitchedModel<f64, M, B, N>, CalibrationError> {
+    let law = law.to_model().ok_or_else(|| CalibrationError::Unsupported("number of branches".into()))?;
+    Ok(SwitchedModel::new(law, motion, estimator.noise.to_model())?)
+}
+
+/// The filter of a law without plays, with particles if they are asked for.
+fn plain<const M: usize, const B: usize, const N: usize, const L: usize>(
+    kind: EstimatorKind,
+    motion: Motion<f64, M>,
+    law: &LawParams,
+    estimator: &EstimatorParams,
+    setting: Setting,
+) -> Result<Box<dyn Filter>, CalibrationError> {
+    let model = switched::<M, B, N>(motion, law, estimator)?;
+    if kind != EstimatorKind::Particles {
+        return gaussian::<_, M, B, N, L>(kind, model, estimator, setting);
+    }
+    let PhaseFilter { hold, evidence, .. } = PhaseFilter::new(kind, estimator, setting.limits)?;
+    let filter = Particles::new(model, hold, evidence, PARTICLES, PARTICLE_SEED);
+    let start = filter.start(&initial_belief::<_, M, B, N, L>(&model, setting), Phase::Extend);
+    Ok(Box::new(Running::new(filter, start, model, interval(estimator, setting))))
+}
+
+/// A filter of one Gaussian or several around any model.
+fn gaussian<S, const M: usize, const B: usize, const N: usize, const L: usize>(
+    kind: EstimatorKind,
+    model: S,
+    estimator: &EstimatorParams,
+    setting: Setting,
+) -> Result<Box<dyn Filter>, CalibrationError>
+where
+    S: Phased<f64, N, L> + StrainSensor<f64, M, B, N> + Copy + 'static,
+{
+    let belief: Belief<f64, N, L> = initial_belief(&model, setting);
+    let interval = interval(estimator, setting);
+    match kind {
+        EstimatorKind::Ekf => return Ok(Box::new(Running::new(Ekf::new(model), belief, model, interval))),
+        EstimatorKind::Ukf => {
+            return Ok(Box::new(Running::new(Ukf::new(Unscented::new(model)), belief, model, interval)));
+        }
+        EstimatorKind::Ensemble => return Err(CalibrationError::no_parameters(kind)),
+        _ => {}
+    }
+    let PhaseFilter { dwell, hold, evidence } = PhaseFilter::new(kind, estimator, setting.limits)?;
+    Ok(match kind {
+        EstimatorKind::Imm => {
+            let start = Mixture::single(belief, Phase::Hold);
+            Box::new(Running::new(Imm::new(model, dwell, evidence), start, model, interval))
+        }
+        EstimatorKind::SignSplit => {
+            let start = Mixture::single(belief, Phase::Extend);
+            let filter = SignSplit::<_, _, HYPOTHESES>::new(model, hold, evidence);
+            Box::new(Running::new(filter, start, model, interval))
+        }
+        EstimatorKind::Particles => {
+            return Err(CalibrationError::Unsupported("`particles` for a law with plays".into()));
+        }
+        _ => {
+            let start = Mixture::single(belief, Phase::Hold);
+            let filter = Hypotheses::<_, _, HISTORIES>::new(model, dwell, evidence);
+            Box::new(Running::new(filter, start, model, interval))
+        }
+    })
+}
+
+/// What filters of phases need besides a model.
+struct PhaseFilter {
+    dwell: Dwell<f64>,
+    /// The same for a body that rests at times.
+    hold: Option<Dwell<f64>>,
+    evidence: Evidence<f64>,
+}
+
+impl PhaseFilter {
+    fn new(kind: EstimatorKind, estimator: &EstimatorParams, limits: RangeParams) -> Result<Self, CalibrationError> {
+        let phases = estimator.phases.ok_or_else(|| {
+            CalibrationError::Unsupported(format!("`{}` needs `phases` in its parameters", kind.name()))
+        })?;
+        let dwell = Dwell::new(phases.hold_time_s, phases.move_time_s, phases.reversal)?;
+        let hold = (phases.hold_time_s > 0.0 && phases.reversal < 1.0).then_some(dwell);
+        Ok(Self { dwell, hold, evidence: Evidence { limits: limits.to_model(), tempering: phases.tempering } })
+    }
+}
+
+fn interval(estimator: &EstimatorParams, setting: Setting) -> Interval {
+    Interval {
+        limits: setting.limits.to_model(),
+        filtered_scale: estimator.strain_sd_scale,
+        smoothed_scale: estimator.smoothed_sd_scale.unwrap_or(1.0),
+        own_rest: setting.own_rest,
+    }
+}
+
+/// Plays that filters are built for: every further number would compile every filter once more.
+const PLAYS: usize = 3;
+/// Capacity of the sign-split filter.
+pub(crate) const HYPOTHESES: usize = 8;
+/// Capacity of the filter of phase histories.
+pub(crate) const HISTORIES: usize = 16;
+/// Particles, and the seed of their paths: the same readings give the same estimates.
+const PARTICLES: usize = 4000;
+const PARTICLE_SEED: u64 = 1;
+
+fn initial_belief<S: StrainSensor<f64, M, B, N>, const M: usize, const B: usize, const N: usize, const L: usize>(
+    model: &S,
+    setting: Setting,
+) -> Belief<f64, N, L> {
+    let Start::Strain(strain) = setting.start else { return Belief::initial(model) };
+    let (mut mean, mut variance) = model.initial_distribution();
+    (mean[0], variance[0]) = (strain, (START_SD * setting.limits.span()).powi(2));
+    Belief::independent(mean, &variance)
+}
