@@ -1,6 +1,6 @@
 use ohmstrain_ekf::{
     Belief, Dwell, Ekf, Estimator, Evidence, FixedGain, FixedGainState, Hypotheses, Imm, Mixture, PhaseMixture,
-    Reading, SparseMixture, SignSplit, SparseImm, SparseSignSplit, State, Unscented,
+    Reading, SignSplit, SparseImm, SparseMixture, SparseSignSplit, State, Unscented,
 };
 use ohmstrain_model::{Phase, SwitchedModel, SwitchedStep};
 
@@ -155,7 +155,11 @@ fn every_large_filter(visitor: &mut impl Visitor) {
     visitor.visit("sparse_imm_6", &readings, GatedMixture::new(imm, PhaseMixture::single(start, Phase::Hold)));
     let split = SparseSignSplit::<_, 3, 6, 8>::new(six, DT_S, Some(dwell), evidence);
     let split = split.expect("the step's length is positive");
-    visitor.visit("sparse_sign_split_6", &readings, GatedMixture::new(split, SparseMixture::single(start, Phase::Hold)));
+    visitor.visit(
+        "sparse_sign_split_6",
+        &readings,
+        GatedMixture::new(split, SparseMixture::single(start, Phase::Hold)),
+    );
     let best = Hypotheses::<_, _, 8>::new(phased, dwell, evidence);
     visitor.visit("hypotheses_6", &readings, Gated::<_, 6, 21>::new(best, Mixture::single(start, Phase::Hold)));
 }

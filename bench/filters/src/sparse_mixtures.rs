@@ -1,4 +1,4 @@
-use ohmstrain_ekf::{MixtureResidual, PhaseMixture, Reading, SparseMixture, SparseImm, SparseSignSplit, StepError};
+use ohmstrain_ekf::{MixtureResidual, PhaseMixture, Reading, SparseImm, SparseMixture, SparseSignSplit, StepError};
 
 use crate::Filter;
 use crate::estimators::GATE;

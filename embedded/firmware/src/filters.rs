@@ -3,8 +3,8 @@
 use core::hint::black_box;
 
 use ohmstrain_ekf::{
-    Belief, Cubic, Dwell, Ekf, Evidence, Imm, LogLikelihood, Mixture, PhaseMixture, Reading, Real, SparseMixture,
-    SignSplit, SparseEkf, SparseImm, SparseSignSplit, Switch,
+    Belief, Cubic, Dwell, Ekf, Evidence, Imm, LogLikelihood, Mixture, PhaseMixture, Reading, Real, SignSplit,
+    SparseEkf, SparseImm, SparseMixture, SparseSignSplit, Switch,
 };
 use ohmstrain_model::{ParameterError, Phase, Problem, Scalar, SwitchedModel, SwitchedStep};
 
