@@ -1,7 +1,7 @@
 //! What the Rust filters make of a short motion: what the exported filter must make of it too.
 
 use ohmstrain_ekf::{Belief, Compact, Reading, SparseEkf, StepError};
-use ohmstrain_model::{Scalar, SwitchedModel};
+use ohmstrain_model::{Gauge, Scalar, StrainRange, SwitchedModel};
 use serde::Serialize;
 
 use super::ExportError;
@@ -21,6 +21,8 @@ pub struct Vectors {
     fixed_tolerance_ulp: u64,
     contracted_tolerance_ulp: u64,
     contracted_fixed_tolerance_ulp: u64,
+    /// What multiplies expf in the gauge, at most.
+    expf_factor: String,
     /// Root mean squared errors of the strain in the same motion at the calibration's speed, both filters.
     ekf_error: String,
     fixed_error: String,
@@ -56,9 +58,27 @@ const FURTHER: f64 = 3.0;
 const SPACINGS: [f32; 2] = [2.0, 12.0];
 /// Deviations of the sum of all these that are allowed.
 const DEVIATIONS: f32 = 6.0;
+/// Strains at which the gauge is looked at.
+const STRAINS: usize = 64;
 /// By how much a relative reading is moved to see how the strain follows: far above the rounding of `f32`, far below the
 /// law's bends.
 const NUDGE: f32 = 1e-3;
+
+/// What an error of expf of one spacing of `f32` at 1 is multiplied with in the gauge, at most within the limits; no less
+/// than 1.
+fn expf_factor(gauge: &Gauge<f32>, limits: &StrainRange<f32>) -> f32 {
+    let factor = |strain: f32| match *gauge {
+        Gauge::Polynomial { .. } => 0.0,
+        Gauge::DecayingExponential { slope, decay_strain } => {
+            (slope * strain).abs() * (-strain / decay_strain).exp().max(1.0)
+        }
+        Gauge::Tunnelling { gap, barrier, path_loss } => {
+            (1.0 + gap * strain).abs() * (strain * (barrier + strain * path_loss)).exp().max(1.0)
+        }
+    };
+    let strains = (0..=STRAINS).map(|k| limits.lower + limits.span() * (k as f32 / STRAINS as f32));
+    strains.map(factor).fold(1.0, f32::max)
+}
 
 impl Vectors {
     /// Runs the filters.
@@ -80,6 +100,7 @@ impl Vectors {
         let rounding = estimates.iter().zip(&exact).map(off).fold(0.0, f64::max);
         let tolerance = ((FURTHER + 1.0) * rounding / f64::from(ulp)).ceil() as u64;
         let fixed_tolerance = |spacings: f32| (DEVIATIONS * spacings * f32::EPSILON * moved / ulp).ceil() as u64;
+        let factor = expf_factor(&sensor.model.law().gauge, &sensor.limits);
         let rounded = !sensor.is_exact();
 
         let speed = sensor.model.motion().stationary_variance()[1].sqrt();
@@ -98,9 +119,10 @@ impl Vectors {
             seed: motion::SEED,
             ulp: Literal(ulp),
             tolerance_ulp: if rounded { tolerance } else { 0 },
-            fixed_tolerance_ulp: if rounded { fixed_tolerance(SPACINGS[0]) } else { 0 },
+            fixed_tolerance_ulp: if rounded { fixed_tolerance(SPACINGS[0] * factor) } else { 0 },
             contracted_tolerance_ulp: tolerance,
-            contracted_fixed_tolerance_ulp: fixed_tolerance(SPACINGS[1]),
+            contracted_fixed_tolerance_ulp: fixed_tolerance(SPACINGS[1].max(SPACINGS[0] * factor)),
+            expf_factor: number::significant(f64::from(factor), 2),
             ekf_error: number::significant(ekf_error, 2),
             fixed_error: number::significant(fixed_error, 2),
             fixed_fails: !(fixed_error < FAILS * ekf_error),

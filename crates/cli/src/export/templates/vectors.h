@@ -24,8 +24,8 @@
 {% endif %}
  * - Extended Kalman filter: the Rust filter's own distance from one in double precision is what rounding does. Another rounding
  *   may be three times as far from it, to the other side: four times that distance.
- * - Fixed gains: {% if not exact %}two implementations of expf, each off by less than a spacing, move a predicted reading by 2 spacings of
- *   float at 1, {% endif %}contraction moves {% if exact %}a predicted reading{% else %}it{% endif %} by 12: two dozen operations on numbers up to one, half a spacing each.
+ * - Fixed gains: {% if not exact %}two implementations of expf, each off by less than a spacing at 1, move a predicted reading by
+ *   2 of these times the factor of expf in the gauge, << vectors.expf_factor >> at most; {% endif %}contraction moves {% if exact %}a predicted reading{% else %}it{% endif %} by 12: two dozen operations on numbers up to one, half a spacing each.
  *   Such moves have no common sign: they move the strain by the root of the sum of the squares of d strain / d reading over all
  *   readings, found by moving each reading by itself. Six times that.
  */
