@@ -82,8 +82,7 @@ pub(crate) enum MotionFamily {
 }
 
 impl EstimatorKind {
-    /// What an estimator is tried with. The others do not gain from an acceleration: they draw the rate anew when a phase
-    /// begins, or are led astray by it.
+    /// What an estimator is tried with: sign-split with both, which serve different recordings.
     pub(crate) const fn motion_families(self) -> &'static [MotionFamily] {
         match self.tuned_as() {
             Self::SignSplit => &[MotionFamily::OrnsteinUhlenbeck, MotionFamily::Smooth],
