@@ -58,11 +58,11 @@ impl LawOptions {
     /// those that were seen to gain from the choice, two for the others. An ensemble has members with three besides.
     #[must_use]
     pub const fn candidates(kind: EstimatorKind) -> &'static [Self] {
-        const ALL: [LawOptions; 3] =
-            [LawOptions::with_branches(1), LawOptions::with_branches(2), LawOptions::with_branches(3)];
+        const TWO: LawOptions = LawOptions::with_branches(DEFAULT_BRANCHES);
+        const ANY: [LawOptions; 3] = [LawOptions::with_branches(1), TWO, LawOptions::with_branches(3)];
         match kind.tuned_as() {
-            EstimatorKind::Ekf | EstimatorKind::SignSplit => &ALL,
-            _ => ALL.split_at(1).1.split_at(1).0,
+            EstimatorKind::Ekf | EstimatorKind::SignSplit => &ANY,
+            _ => &[TWO],
         }
     }
 
