@@ -28,32 +28,13 @@ static uint32_t ekf_steps(void)
     return since(start);
 }
 
-static uint32_t fixed_steps(void)
-{
-    ohmstrain_fixed_state state;
-    uint32_t start, k;
-    ohmstrain_fixed_gain_start(&state);
-    start = SYST_CVR;
-    for (k = 0; k < VECTORS; k++) {
-        const ohmstrain_phase phase = ohmstrain_fixed_gain_phase(&state);
-        if (VECTOR[k].reading == VECTOR[k].reading) {
-            ohmstrain_fixed_gain_step(&state, phase, VECTOR[k].reading);
-        } else {
-            ohmstrain_fixed_gain_predict(&state, phase);
-        }
-    }
-    return since(start);
-}
-
 int main(void)
 {
-    uint32_t ekf, fixed;
+    uint32_t ekf;
     SYST_RVR = 0x00FFFFFFu;
     SYST_CVR = 0;
     SYST_CSR = 5;
     ekf = ekf_steps();
-    fixed = fixed_steps();
-    printf("instructions a step: ekf %lu, fixed gain %lu\n", (unsigned long)(ekf / VECTORS),
-           (unsigned long)(fixed / VECTORS));
+    printf("instructions a step: %lu\n", (unsigned long)(ekf / VECTORS));
     return 0;
 }

@@ -46,7 +46,6 @@ fn sensor() -> SensorParams {
         range: limits,
         gauge: GaugeParams::Polynomial { coefficients: [1.6, -1.2, 0.5] },
         branches: taus_s.iter().map(|tau_s| branch(*tau_s)).collect(),
-        plays: vec![],
     };
     let member = |estimator: &EstimatorKind| MemberParams { estimator: *estimator, weight: 0.25, own: None };
     let own = OwnLaw { rest_ratio: 1.02, law: law(&[4.0, 16.0, 64.0]), parameters: estimator };

@@ -6,7 +6,7 @@ use ohmstrain_bench_comparison::{
     RecordingPass, adskalman_smoother, every_rival, simulated_recording, typed_kalman_smoother,
 };
 use ohmstrain_bench_filters::{
-    DT_S, Filter, Freezing, Gated, GatedSparse, LinearModel, PackedReference, RANGE, STEPS, Visitor, ekf, every_filter,
+    DT_S, Filter, Gated, GatedSparse, LinearModel, PackedReference, RANGE, STEPS, Visitor, ekf, every_filter,
     linear_sensor, linearised, log_likelihood, readings, sensor, smoother, sparse_smooth, strain_at,
 };
 use ohmstrain_ekf::{Belief, Ekf, Reading, SparseEkf, Unscented};
@@ -135,14 +135,6 @@ fn the_readings_are_those_of_the_sensor() {
     let error = f64::sqrt(squares / counted);
     let sd = filter.belief().covariance[(0, 0)].sqrt();
     assert!(error < 2.0 * sd, "error {error}, deviation {sd}");
-}
-
-#[test]
-fn the_gain_that_is_timed_as_frozen_is_frozen() {
-    let mut filter = Freezing::new();
-    let steps_until_frozen =
-        readings::<1>(STEPS).iter().take_while(|y| filter.step(**y) && !filter.is_frozen()).count();
-    assert!(steps_until_frozen < STEPS / 2, "{steps_until_frozen}");
 }
 
 #[test]

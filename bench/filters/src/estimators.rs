@@ -1,14 +1,11 @@
 use ohmstrain_ekf::{
-    Belief, Dwell, Ekf, Estimator, Evidence, FixedGain, FixedGainState, Hypotheses, Imm, Mixture, PhaseMixture,
-    Reading, SignSplit, SparseImm, SparseMixture, SparseSignSplit, State, Unscented,
+    Belief, Dwell, Ekf, Estimator, Evidence, Hypotheses, Imm, Mixture, PhaseMixture, Reading, SignSplit, SparseImm,
+    SparseMixture, SparseSignSplit, State, Unscented,
 };
-use ohmstrain_model::{Phase, SwitchedModel, SwitchedStep};
+use ohmstrain_model::{Phase, SwitchedModel};
 
 use crate::sparse_mixtures::GatedMixture;
-use crate::{
-    DT_S, Filter, GatedSparse, PackedReference, RANGE, Visitor, linear_sensor, linearised, phased_sensor, readings,
-    sensor,
-};
+use crate::{DT_S, Filter, GatedSparse, PackedReference, RANGE, Visitor, linearised, phased_sensor, readings, sensor};
 
 /// Two periods of the readings, so that they can be repeated.
 pub const STEPS: usize = 1000;
@@ -68,57 +65,6 @@ pub fn ekf<const B: usize, const N: usize, const L: usize>(
     Gated::new(Ekf::new(model).iterated(iterations), Belief::initial(&model))
 }
 
-/// The filter that freezes its gain, on the linear sensor, where the gain settles.
-#[derive(Clone, Copy, Debug)]
-pub struct Freezing {
-    filter: FixedGain<SwitchedModel<f64, 2, 1, 3>, f64, SwitchedStep<f64, 2, 1>>,
-    state: FixedGainState<f64, 3, 6>,
-    log_likelihood: f64,
-}
-
-/// How close to its limit the covariance is when the gain freezes.
-const FREEZE_TOLERANCE: f64 = 0.01;
-
-impl Freezing {
-    /// From the long-run distribution of the linear sensor.
-    ///
-    /// # Panics
-    /// Never: step and tolerance are valid.
-    #[must_use]
-    pub fn new() -> Self {
-        let model = linear_sensor();
-        let filter = FixedGain::new::<3, 6>(model, DT_S, FREEZE_TOLERANCE).expect("step and tolerance are valid");
-        Self { filter, state: Belief::initial(&model).into(), log_likelihood: 0.0 }
-    }
-
-    /// Whether the gain has settled.
-    #[must_use]
-    pub fn is_frozen(&self) -> bool {
-        self.state.is_frozen()
-    }
-}
-
-impl Default for Freezing {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
-/// Without a gate: a reading that is turned down would end the freeze, and another filter would be measured.
-impl Filter for Freezing {
-    #[inline]
-    fn step(&mut self, reading: f64) -> bool {
-        let Ok(step) = self.filter.step(&self.state, DT_S, Some(Reading::from(reading))) else { return false };
-        self.log_likelihood += step.step.update.map_or(0.0, |update| update.log_likelihood);
-        self.state = step.next;
-        true
-    }
-
-    fn strain(&self) -> f64 {
-        self.state.belief().mean[0]
-    }
-}
-
 /// Shows every filter with a thousand readings of the sensor it is for; all but the linear ones are for [`sensor`].
 ///
 /// # Panics
@@ -134,7 +80,6 @@ pub fn every_filter(visitor: &mut impl Visitor) {
     visitor.visit("iterated_ekf_3", &readings, ekf::<1, 3, 6>(three, 3));
     let ukf = Ekf::new(Unscented::new(three));
     visitor.visit("ukf_3", &readings, Gated::<_, 3, 6>::new(ukf, Belief::initial(&three)));
-    visitor.visit("fixed_gain_3", &readings, Freezing::new());
     every_large_filter(visitor);
 }
 

@@ -9,7 +9,7 @@ mod sensor;
 mod sparse;
 mod sparse_mixtures;
 
-pub use estimators::{Freezing, Gated, STEPS, ekf, every_filter};
+pub use estimators::{Gated, STEPS, ekf, every_filter};
 pub use readings::{readings, strain_at};
 pub use recordings::{Smoother, log_likelihood, smoother, sparse_smooth};
 pub use reference::PackedReference;

@@ -1,8 +1,8 @@
 use ohmstrain_ekf::{
-    Belief, Dwell, Ekf, Evidence, Hypotheses, Imm, Mixture, Particles, Phased, SignSplit, SparseMixture, StrainSensor,
-    Ukf, Unscented,
+    Belief, Dwell, Ekf, Evidence, Hypotheses, Imm, Mixture, Particles, SignSplit, SparseMixture, StrainSensor, Ukf,
+    Unscented,
 };
-use ohmstrain_model::{Motion, Phase, SwitchedModel, WithPlays};
+use ohmstrain_model::{Motion, Phase, SwitchedModel};
 
 use crate::CalibrationError;
 use crate::ensemble::{Ensemble, MemberParams, OwnLaw};
@@ -21,7 +21,7 @@ const START_SD: f64 = 1e-3;
 /// Builds the filter for a sensor.
 ///
 /// # Errors
-/// If the sensor has no parameters for the estimator, or a number of branches and plays that no filter is built for.
+/// If the sensor has no parameters for the estimator, or a number of branches that no filter is built for.
 pub fn build_filter(
     params: &SensorParams,
     kind: Option<EstimatorKind>,
@@ -64,21 +64,13 @@ pub(crate) fn filter_from_parts(
     estimator: &EstimatorParams,
     setting: Setting,
 ) -> Result<Box<dyn Filter>, CalibrationError> {
-    /// One instance per number of motion states and branches, N = M + B + 1 and L = N (N + 1) / 2, and another one of N + 3
-    /// states where plays are supported.
+    /// One instance per number of motion states and branches, N = M + B + 1 and L = N (N + 1) / 2.
     macro_rules! build {
-        ($motion:expr, $m:literal, $([$b:literal, $n:literal, $l:literal $(, $with:literal, $l_with:literal)?]),+) => {
-            match (law.branches.len(), law.plays.len()) {
-                $(($b, 0) => plain::<$m, $b, $n, $l>(kind, $motion, law, estimator, setting),)+
-                $($(($b, PLAYS) => {
-                    let inner = switched::<$m, $b, $n>($motion, law, estimator)?;
-                    let plays: [_; PLAYS] = std::array::from_fn(|i| law.plays[i].to_model());
-                    let model = WithPlays::<_, $m, $b, $n, PLAYS, $with>::new(inner, plays)?;
-                    gaussian::<_, $m, $b, $with, $l_with>(kind, model, estimator, setting)
-                })?)+
-                (branches, plays) => Err(CalibrationError::Unsupported(format!(
-                    "a law with {branches} branches and {plays} plays; at most 4 branches without plays, or 1 to 3 with \
-                     {PLAYS} plays, are supported"
+        ($motion:expr, $m:literal, $([$b:literal, $n:literal, $l:literal]),+) => {
+            match law.branches.len() {
+                $($b => of_size::<$m, $b, $n, $l>(kind, $motion, law, estimator, setting),)+
+                branches => Err(CalibrationError::Unsupported(format!(
+                    "a law with {branches} branches; at most 4 are supported"
                 ))),
             }
         };
@@ -91,15 +83,15 @@ pub(crate) fn filter_from_parts(
             if let Some(sparse) = sparse(kind, motion, law, estimator, setting)? {
                 return Ok(sparse);
             }
-            build!(motion, 2, [0, 3, 6], [1, 4, 10, 7, 28], [2, 5, 15, 8, 36], [3, 6, 21, 9, 45], [4, 7, 28])
+            build!(motion, 2, [0, 3, 6], [1, 4, 10], [2, 5, 15], [3, 6, 21], [4, 7, 28])
         }
         AnyMotion::Three(motion) => {
-            build!(motion, 3, [0, 4, 10], [1, 5, 15, 8, 36], [2, 6, 21, 9, 45], [3, 7, 28, 10, 55], [4, 8, 36])
+            build!(motion, 3, [0, 4, 10], [1, 5, 15], [2, 6, 21], [3, 7, 28], [4, 8, 36])
         }
     }
 }
 
-/// EKF, sign-split or phase histories of a law without plays on Ornstein-Uhlenbeck motion; `None` for any other.
+/// EKF, sign-split or phase histories on Ornstein-Uhlenbeck motion; `None` for any other.
 fn sparse(
     kind: EstimatorKind,
     motion: Motion<f64, 2>,
@@ -108,7 +100,7 @@ fn sparse(
     setting: Setting,
 ) -> Result<Option<Box<dyn Filter>>, CalibrationError> {
     let supported = matches!(kind, EstimatorKind::Ekf | EstimatorKind::SignSplit | EstimatorKind::Hypotheses);
-    if !supported || !law.plays.is_empty() {
+    if !supported {
         return Ok(None);
     }
     Ok(Some(match law.branches.len() {
@@ -146,7 +138,7 @@ fn sparse_of<const B: usize, const N: usize, const L: usize>(
     })
 }
 
-/// The model of a law, plays aside.
+/// The model of a law.
 fn switched<const M: usize, const B: usize, const N: usize>(
     motion: Motion<f64, M>,
     law: &LawParams,
@@ -156,8 +148,8 @@ fn switched<const M: usize, const B: usize, const N: usize>(
     Ok(SwitchedModel::new(law, motion, estimator.noise.to_model())?)
 }
 
-/// The filter of a law without plays, with particles if they are asked for.
-fn plain<const M: usize, const B: usize, const N: usize, const L: usize>(
+/// Any filter of a model of known size.
+fn of_size<const M: usize, const B: usize, const N: usize, const L: usize>(
     kind: EstimatorKind,
     motion: Motion<f64, M>,
     law: &LawParams,
@@ -165,25 +157,6 @@ fn plain<const M: usize, const B: usize, const N: usize, const L: usize>(
     setting: Setting,
 ) -> Result<Box<dyn Filter>, CalibrationError> {
     let model = switched::<M, B, N>(motion, law, estimator)?;
-    if kind != EstimatorKind::Particles {
-        return gaussian::<_, M, B, N, L>(kind, model, estimator, setting);
-    }
-    let PhaseFilter { hold, evidence, .. } = PhaseFilter::new(kind, estimator, setting.limits)?;
-    let filter = Particles::new(model, hold, evidence, PARTICLES, PARTICLE_SEED);
-    let start = filter.start(&initial_belief::<_, M, B, N, L>(&model, setting), Phase::Extend);
-    Ok(Box::new(Running::new(filter, start, model, interval(estimator, setting))))
-}
-
-/// A filter of one Gaussian or several around any model.
-fn gaussian<S, const M: usize, const B: usize, const N: usize, const L: usize>(
-    kind: EstimatorKind,
-    model: S,
-    estimator: &EstimatorParams,
-    setting: Setting,
-) -> Result<Box<dyn Filter>, CalibrationError>
-where
-    S: Phased<f64, N, L> + StrainSensor<f64, M, B, N> + Copy + 'static,
-{
     let belief: Belief<f64, N, L> = initial_belief(&model, setting);
     let interval = interval(estimator, setting);
     match kind {
@@ -206,7 +179,9 @@ where
             Box::new(Running::new(filter, start, model, interval))
         }
         EstimatorKind::Particles => {
-            return Err(CalibrationError::Unsupported("`particles` for a law with plays".into()));
+            let filter = Particles::new(model, hold, evidence, PARTICLES, PARTICLE_SEED);
+            let start = filter.start(&belief, Phase::Extend);
+            Box::new(Running::new(filter, start, model, interval))
         }
         _ => {
             let start = Mixture::single(belief, Phase::Hold);
@@ -244,8 +219,6 @@ fn interval(estimator: &EstimatorParams, setting: Setting) -> Interval {
     }
 }
 
-/// Plays that filters are built for: every further number would compile every filter once more.
-const PLAYS: usize = 3;
 /// Capacity of the sign-split filter.
 pub(crate) const HYPOTHESES: usize = 8;
 /// Capacity of the filter of phase histories.

@@ -48,11 +48,6 @@ impl Regressors {
         [column(|v| v.max(0.0)), column(|v| v.min(0.0))]
     }
 
-    /// The lag of a play behind the strain, half-width and lag in spans.
-    pub(crate) fn lag(&self, half_width: f64) -> DVector<f64> {
-        lag_behind(&self.scaled, half_width)
-    }
-
     /// The four columns of a branch of unit gain with time constant `tau_s`: answers to stretching, to releasing, and
     /// both weighted with the scaled mid-strain. Exact for strain that moves linearly between rows.
     pub(crate) fn branch(&self, tau_s: f64) -> [DVector<f64>; BRANCH_COLUMNS] {
@@ -74,17 +69,6 @@ impl Regressors {
         }
         columns
     }
-}
-
-/// Lag of a play of half-width `slack` behind `strain`, from no lag in the first row. Exact for strain that moves in one
-/// direction between rows.
-pub(crate) fn lag_behind(strain: &[f64], slack: f64) -> DVector<f64> {
-    let mut play = strain.first().copied().unwrap_or(0.0);
-    let lags = strain.iter().map(|&strain| {
-        play = play.max(strain - slack).min(strain + slack);
-        play - strain
-    });
-    DVector::from_iterator(strain.len(), lags)
 }
 
 /// Rate by central differences over one row to each side, one-sided at the ends.

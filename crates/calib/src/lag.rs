@@ -53,7 +53,7 @@ fn left_out_error(samples: &Samples, law: &LawParams, lag_s: f64) -> Option<f64>
     let regression = LawRegression::new(&[shifted]).ok()?;
     let taus: Vec<f64> = law.branches.iter().map(|branch| branch.tau_s.ln()).collect();
     let family = GaugeFamily::Polynomial;
-    let structure = LawStructure { family, taus: taus.len(), nonlinear: taus, plays: &[], ridge: RIDGE };
+    let structure = LawStructure { family, taus: taus.len(), nonlinear: taus, ridge: RIDGE };
     let mut design = structure.design(&regression);
     let times: Vec<f64> = regression.recordings[0].complete.iter().map(|&k| samples.time_s[k]).collect();
     let rest_readings = regression.median_readings();

@@ -17,8 +17,6 @@ pub struct LawOptions {
     pub branches: usize,
     /// Family of the gauge curve.
     pub gauge: GaugeFamily,
-    /// Number of plays, 0 or 3; plays need 1 to 3 branches.
-    pub plays: usize,
 }
 
 /// Families of gauge curves.
@@ -67,7 +65,7 @@ impl LawOptions {
     }
 
     const fn with_branches(branches: usize) -> Self {
-        Self { branches, gauge: DEFAULT_GAUGE, plays: DEFAULT_PLAYS }
+        Self { branches, gauge: DEFAULT_GAUGE }
     }
 }
 
@@ -90,15 +88,6 @@ const DEFAULT_BRANCHES: usize = 2;
 /// Family unless somebody asks for another. Others sometimes follow the resistance a little better; only the polynomial
 /// is linear in its coefficients, so that the ridge keeps it tame and the filter from taking one direction for the other.
 const DEFAULT_GAUGE: GaugeFamily = GaugeFamily::Polynomial;
-/// Plays unless somebody asks for some. With plays the law follows the resistance better, but the filters do not do better:
-/// on three recordings of a carbon-black sensor (sawtooth, triangles, multisine; halves either way round, and two thirds
-/// to one) the sign-split filter's error fell in five of nine and rose from 7.4 to 8.4 % of the range on average, the
-/// extended Kalman filter's rose from 7.5 to 16 %. Loops are one more explanation of a reading that the wrong direction
-/// can have. Nor does the calibration's own score on blocks left out tell when they help, so nothing is chosen by it.
-const DEFAULT_PLAYS: usize = 0;
-/// Half-widths of plays, in spans of the strain: small loops, loops of a usual turn-around, and nearly the whole span. The
-/// weights are fitted, so that it matters little where between them a loop of the sensor lies.
-pub(crate) const HALF_WIDTHS: [f64; 3] = [0.05, 0.15, 0.35];
 /// Most branches.
 pub(crate) const MOST_BRANCHES: usize = 4;
 /// Time constants tried.
@@ -152,26 +141,13 @@ fn fit_ridges(recordings: &[Samples], options: LawOptions) -> Result<Vec<CrossFi
         let message = format!("{} branches; at most {MOST_BRANCHES} are supported", options.branches);
         return Err(CalibrationError::Unsupported(message));
     }
-    let plays = half_widths(options)?;
     let regression = LawRegression::new(recordings)?;
-    let grid = TauGrid::new(&regression, options.branches, plays);
+    let grid = TauGrid::new(&regression, options.branches);
     let fits = RIDGES.map(|ridge| cross_fit(&regression, &grid, options.gauge, ridge));
     if fits.iter().all(Result::is_err) {
         return fits.into_iter().collect();
     }
     Ok(fits.into_iter().flatten().collect())
-}
-
-/// The plays that are asked for, if a filter for them exists.
-fn half_widths(options: LawOptions) -> Result<&'static [f64], CalibrationError> {
-    match (options.plays, options.branches) {
-        (0, _) => Ok(&[]),
-        (3, 1..=3) => Ok(&HALF_WIDTHS),
-        (plays, branches) => {
-            let message = format!("{plays} plays with {branches} branches; 0 plays, or 3 with 1 to 3 branches, are");
-            Err(CalibrationError::Unsupported(message + " supported"))
-        }
-    }
 }
 
 fn cross_fit(
@@ -180,7 +156,7 @@ fn cross_fit(
     gauge: GaugeFamily,
     ridge: f64,
 ) -> Result<CrossFit, CalibrationError> {
-    let mut structure = polish(regression, gauge, &grid.best(ridge)?, grid.plays, ridge)?;
+    let mut structure = polish(regression, gauge, &grid.best(ridge)?, ridge)?;
     structure.sort_branches();
     let without_block = (0..BLOCKS).map(|block| structure.fit(regression, Some(block))).collect::<Result<_, _>>()?;
     Ok(CrossFit {
@@ -197,9 +173,8 @@ pub(crate) fn fit_structure(
     options: LawOptions,
 ) -> Result<(LawStructure, LawFit), CalibrationError> {
     let ridge = RIDGES[RIDGES.len() - 1];
-    let plays = half_widths(options)?;
-    let ln_taus = TauGrid::new(regression, options.branches, plays).best(ridge)?;
-    let structure = polish(regression, options.gauge, &ln_taus, plays, ridge)?;
+    let ln_taus = TauGrid::new(regression, options.branches).best(ridge)?;
+    let structure = polish(regression, options.gauge, &ln_taus, ridge)?;
     let fit = structure.fit(regression, None)?;
     Ok((structure, fit))
 }
@@ -207,17 +182,16 @@ pub(crate) fn fit_structure(
 /// A cubic gauge with branches of all time constants of a grid, ready to be fitted with any few of them.
 struct TauGrid {
     ln_taus: Vec<f64>,
-    plays: &'static [f64],
     normal: BlockedNormal,
     first_branch: usize,
     subsets: Vec<Vec<usize>>,
 }
 
 impl TauGrid {
-    fn new(regression: &LawRegression, branches: usize, plays: &'static [f64]) -> Self {
+    fn new(regression: &LawRegression, branches: usize) -> Self {
         let ln_taus = log_grid(regression.tau_bounds, GRID);
         let (family, nonlinear, ridge) = (GaugeFamily::Polynomial, ln_taus.clone(), RIDGES[0]);
-        let everything = LawStructure { family, nonlinear, taus: GRID, plays, ridge };
+        let everything = LawStructure { family, nonlinear, taus: GRID, ridge };
         let design = everything.design(regression);
         let spacing = LEAST_SPACING.min(0.7 * (ln_taus[GRID - 1] - ln_taus[0]) / (branches.max(2) - 1) as f64);
         let mut subsets = subsets(GRID, branches);
@@ -226,7 +200,6 @@ impl TauGrid {
             normal: regression.normal(&design, &regression.median_readings()),
             first_branch: design.columns.len() - GRID * BRANCH_COLUMNS,
             ln_taus,
-            plays,
             subsets,
         }
     }
@@ -251,7 +224,6 @@ fn polish(
     regression: &LawRegression,
     family: GaugeFamily,
     ln_taus: &[f64],
-    plays: &'static [f64],
     ridge: f64,
 ) -> Result<LawStructure, CalibrationError> {
     let mut start = ln_taus.to_vec();
@@ -261,7 +233,7 @@ fn polish(
         GaugeFamily::Tunnelling => vec![0.5, 0.0, 0.0],
     });
     let structure =
-        |nonlinear: &[f64]| LawStructure { family, nonlinear: nonlinear.to_vec(), taus: ln_taus.len(), plays, ridge };
+        |nonlinear: &[f64]| LawStructure { family, nonlinear: nonlinear.to_vec(), taus: ln_taus.len(), ridge };
     // The grid ends on the bounds, give or take a rounding.
     let (low, high) = (regression.tau_bounds.0.ln() - 1e-9, regression.tau_bounds.1.ln() + 1e-9);
     let least = ln_taus.windows(2).map(|pair| pair[1] - pair[0]).fold(LEAST_SPACING, f64::min);

@@ -1,4 +1,4 @@
-use ohmstrain_model::{Branch, Gauge, Play, SensorLaw};
+use ohmstrain_model::{Branch, Gauge, SensorLaw};
 use serde::{Deserialize, Serialize};
 
 use crate::params::RangeParams;
@@ -18,9 +18,6 @@ pub struct LawParams {
     /// Relaxing branches, fastest first.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub branches: Vec<BranchParams>,
-    /// Plays, narrowest first: hysteresis that does not relax.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub plays: Vec<PlayParams>,
 }
 
 /// The quasi-static curve g(ε).
@@ -78,26 +75,8 @@ pub struct BranchParams {
     pub retract_gain_slope: f64,
 }
 
-/// One play operator p, which adds `weight (p - ε)` to R/R₀; see [`Play`].
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct PlayParams {
-    /// Slack to each side, in units of strain.
-    pub half_width: f64,
-    /// Relative change of resistance per strain of lag.
-    pub weight: f64,
-}
-
-impl PlayParams {
-    /// As the model has it.
-    #[must_use]
-    pub const fn to_model(self) -> Play<f64> {
-        Play { half_width: self.half_width, weight: self.weight }
-    }
-}
-
 impl LawParams {
-    /// As the model has it, without plays; `None` unless there are exactly `B` branches.
+    /// As the model has it; `None` unless there are exactly `B` branches.
     #[must_use]
     pub fn to_model<const B: usize>(&self) -> Option<SensorLaw<f64, B>> {
         let branches: Vec<Branch<f64>> = self

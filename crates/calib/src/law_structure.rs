@@ -2,8 +2,8 @@ use nalgebra::DVector;
 
 use crate::CalibrationError;
 use crate::design::{BRANCH_COLUMNS, StrainScale};
-use crate::law_fit::{GaugeFamily, HALF_WIDTHS, LawFit};
-use crate::law_params::{BranchParams, GaugeParams, LawParams, PlayParams};
+use crate::law_fit::{GaugeFamily, LawFit};
+use crate::law_params::{BranchParams, GaugeParams, LawParams};
 use crate::law_regression::{Design, LawRegression};
 
 /// Smallest R₀ that is believed, relative to the median reading.
@@ -16,8 +16,6 @@ pub(crate) struct LawStructure {
     /// ln τ, then the gauge's own nonlinear parameters.
     pub nonlinear: Vec<f64>,
     pub taus: usize,
-    /// Half-widths of plays, in spans of the strain.
-    pub plays: &'static [f64],
     pub ridge: f64,
 }
 
@@ -36,11 +34,10 @@ impl LawStructure {
                 GaugeFamily::Tunnelling
             }
         };
-        let plays: &[f64] = if law.plays.is_empty() { &[] } else { &HALF_WIDTHS };
-        Self { family, taus: law.branches.len(), nonlinear, plays, ridge }
+        Self { family, taus: law.branches.len(), nonlinear, ridge }
     }
 
-    /// Constant, one more constant per further recording, gauge, dash-pots, plays, branches.
+    /// Constant, one more constant per further recording, gauge, dash-pots, branches.
     pub(crate) fn design(&self, regression: &LawRegression) -> Design {
         let mut columns: Vec<DVector<f64>> =
             (0..regression.recordings.len()).map(|r| regression.own_constant(r)).collect();
@@ -62,7 +59,6 @@ impl LawStructure {
             }
         }
         columns.extend(regression.columns(|recording| recording.regressors.viscosity()));
-        columns.extend(self.plays.iter().map(|&half_width| regression.column(|r| r.regressors.lag(half_width))));
         for ln_tau in &self.nonlinear[..self.taus] {
             columns.extend(regression.columns::<BRANCH_COLUMNS>(|recording| recording.regressors.branch(ln_tau.exp())));
         }
@@ -109,8 +105,6 @@ impl LawStructure {
             GaugeFamily::Tunnelling => tunnelling(&self.nonlinear[self.taus..], span),
         };
         let (extend_viscosity_s, retract_viscosity_s) = (next() / span, next() / span);
-        let play = |&share: &f64| PlayParams { half_width: share * span, weight: next() / span };
-        let plays = self.plays.iter().map(play).collect();
         let branches = self.nonlinear[..self.taus]
             .iter()
             .map(|ln_tau| {
@@ -124,7 +118,7 @@ impl LawStructure {
                 }
             })
             .collect();
-        LawParams { extend_viscosity_s, retract_viscosity_s, range: regression.range, gauge, branches, plays }
+        LawParams { extend_viscosity_s, retract_viscosity_s, range: regression.range, gauge, branches }
     }
 }
 

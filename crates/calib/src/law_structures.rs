@@ -39,7 +39,7 @@ pub fn compare_structures(recordings: &[Samples]) -> Result<Vec<StructureScore>,
     let mut fitted = Vec::new();
     for gauge in FAMILIES {
         for branches in 0..=MOST_BRANCHES {
-            let options = LawOptions { branches, gauge, plays: 0 };
+            let options = LawOptions { branches, gauge };
             let Ok((structure, fit)) = fit_structure(&regression, options) else { continue };
             let residuals: Vec<f64> = fit.residuals.into_iter().flatten().filter(|r| r.is_finite()).collect();
             let parameters = count(&structure, &regression);

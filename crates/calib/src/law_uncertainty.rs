@@ -187,9 +187,6 @@ fn in_own_units(law: &LawParams, rest_reading: f64, share: f64) -> Vec<(String, 
     }
     push("extend_viscosity_s".into(), law.extend_viscosity_s / share);
     push("retract_viscosity_s".into(), law.retract_viscosity_s / share);
-    for (i, play) in law.plays.iter().enumerate() {
-        push(format!("plays[{i}].weight"), play.weight / share);
-    }
     for (i, branch) in law.branches.iter().enumerate() {
         push(format!("branches[{i}].tau_s"), branch.tau_s);
         push(format!("branches[{i}].extend_gain"), branch.extend_gain / share);

@@ -62,7 +62,7 @@ pub use identifiability::{Identifiability, OnBound, identifiability};
 pub use inverse::{InverseParams, RegressionParams};
 pub use lag::reference_lag;
 pub use law_fit::{CrossFit, GaugeFamily, LawFit, LawOptions, fit_law};
-pub use law_params::{BranchParams, GaugeParams, LawParams, PlayParams};
+pub use law_params::{BranchParams, GaugeParams, LawParams};
 pub use law_structures::{StructureScore, compare_structures};
 pub use params::{
     FORMAT, JointParams, Quantity, RangeParams, ReadingUnit, RecordingInfo, SensorParams, Uncertainty, Validity,

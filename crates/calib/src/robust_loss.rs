@@ -23,7 +23,6 @@ pub(crate) fn weigh(regression: &mut LawRegression) {
         family: GaugeFamily::Polynomial,
         nonlinear: vec![low + third, high - third],
         taus: 2,
-        plays: &[],
         ridge: RIDGE,
     };
     let design = structure.design(regression);

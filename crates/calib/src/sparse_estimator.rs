@@ -6,7 +6,7 @@ use ohmstrain_model::{SwitchedModel, SwitchedStep};
 
 use crate::build_filter::{HISTORIES, HYPOTHESES};
 
-/// The EKF of a sensor without plays on Ornstein-Uhlenbeck motion, stepped forward without multiplying zeros. Agrees with
+/// The EKF of a sensor on Ornstein-Uhlenbeck motion, stepped forward without multiplying zeros. Agrees with
 /// [`Ekf`] to rounding; where it refuses a step, and on the way back, `Ekf` decides.
 #[derive(Clone, Copy)]
 pub(crate) struct SparseEstimator<const B: usize, const N: usize> {
@@ -90,7 +90,7 @@ pub(crate) trait Pair<const N: usize, const L: usize, const K: usize>: Copy {
     ) -> Result<Option<MixtureResidual<f64>>, StepError>;
 }
 
-/// Phase histories of a sensor without plays on Ornstein-Uhlenbeck motion.
+/// Phase histories of a sensor on Ornstein-Uhlenbeck motion.
 #[derive(Clone, Copy)]
 pub(crate) struct Histories<const B: usize, const N: usize> {
     pub model: SwitchedModel<f64, 2, B, N>,

@@ -36,7 +36,6 @@ fn law() -> LawParams {
         range: RangeParams { lower: 0.0, upper: 0.32 },
         gauge: GaugeParams::Polynomial { coefficients: [1.8, -1.1, 0.4] },
         branches: vec![branch],
-        plays: vec![],
     }
 }
 
@@ -159,7 +158,7 @@ fn intervals_without_the_ridge_hold_the_truth() {
 #[ignore = "makes docs/parameter-coverage.md; minutes in a debug build"]
 fn table_of_coverage() {
     const RECORDINGS: u64 = 300;
-    let options = LawOptions { branches: 1, gauge: GaugeFamily::Polynomial, plays: 0 };
+    let options = LawOptions { branches: 1, gauge: GaugeFamily::Polynomial };
     let (mut without, mut with) = (Tally::default(), Tally::default());
     for_each_recording(RECORDINGS, |samples| {
         let fit = fit_law(&[*samples], options).unwrap();

@@ -136,9 +136,6 @@ pub struct CalibrateArgs {
     /// Relaxing branches: auto (1 to 3, what the filter does best with) or 0 to 4
     #[arg(long, default_value = "auto")]
     pub branches: Auto<Branches>,
-    /// Play operators, hysteresis that does not relax: auto (0), 0 or 3
-    #[arg(long, default_value = "auto")]
-    pub plays: Auto<Plays>,
     /// Family of the gauge curve: auto (polynomial), polynomial, decaying-exponential or tunnelling
     #[arg(long, default_value = "auto")]
     pub gauge: Auto<Gauge>,
@@ -266,21 +263,6 @@ impl FromStr for Branches {
         match text.parse() {
             Ok(count @ 0..=4) => Ok(Self(count)),
             _ => Err("expected auto or 0 to 4".into()),
-        }
-    }
-}
-
-/// A number of play operators.
-#[derive(Clone, Copy, Debug)]
-pub struct Plays(pub usize);
-
-impl FromStr for Plays {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        match text.parse() {
-            Ok(count @ (0 | 3)) => Ok(Self(count)),
-            _ => Err("expected auto, 0 or 3".into()),
         }
     }
 }

@@ -340,7 +340,6 @@ fn an_argument_that_cannot_be_is_named() {
         (&filter, &["--columns", ""], "--columns: expected some of time_s,resistance_ohm,"),
         (&filter, &["--colour"], "'--colour'"),
         (&calibrate, &["--branches", "5"], "'5' for '--branches"),
-        (&calibrate, &["--plays", "2"], "'2' for '--plays"),
         (&calibrate, &["--branches", "two"], "'two' for '--branches"),
         (&calibrate, &["--gauge", "spline"], "'spline' for '--gauge"),
         (&calibrate, &["--until", "noon"], "'noon' for '--until"),

@@ -15,8 +15,8 @@ pub struct Estimate<T> {
     pub relaxation: Gaussian<T>,
     /// Baseline, relative to R₀; zero where the model has none.
     pub baseline: T,
-    /// Where R/R₀ - 1 will settle if the strain is held from now on: g(ε) and what plays have kept, over all hypotheses,
-    /// with the law's long-run uncertainty.
+    /// Where R/R₀ - 1 will settle if the strain is held from now on: g(ε) over all hypotheses, with the law's long-run
+    /// uncertainty.
     pub settled: Gaussian<T>,
     /// Probability that the strain is beyond the static border, where one reading belongs to two strains; zero where
     /// the gauge curve has no peak in its range.
@@ -49,10 +49,8 @@ impl<T: Real> Estimate<T> {
             let strain = strain_of(belief);
             beyond_border += border.map_or(T::zero(), |border| weight * strain.probability_above(border));
             let (gauge, slope) = model.law().gauge_value_and_slope(strain.mean);
-            let kept = kept_by_plays(model, belief, slope);
-            let mean = gauge + kept.mean;
-            settled.0 += weight * mean;
-            settled.1 += weight * (mean * mean + (slope * slope * strain.variance + kept.variance).max(T::zero()));
+            settled.0 += weight * gauge;
+            settled.1 += weight * (gauge * gauge + slope * slope * strain.variance);
         });
         let noise = model.noise();
         let wander = noise.baseline_sd * noise.baseline_sd + T::of(B as f64) * noise.branch_sd * noise.branch_sd;
@@ -67,25 +65,6 @@ impl<T: Real> Estimate<T> {
             near_ramp_border: near_ramp_border(model, belief, &strain, &rate),
         }
     }
-}
-
-/// What the plays add to a reading at rest: its mean, and by how much it changes the reading's variance, which the strain
-/// enters with `slope`.
-fn kept_by_plays<T: Scalar, const M: usize, const B: usize, const N: usize, const L: usize>(
-    model: &impl StrainSensor<T, M, B, N>,
-    belief: &Belief<T, N, L>,
-    slope: T,
-) -> Gaussian<T> {
-    let first = N - model.plays().len();
-    let mut kept = Gaussian { mean: T::zero(), variance: T::zero() };
-    for (i, play) in (first..).zip(model.plays()) {
-        kept.mean += play.weight * belief.mean[i];
-        kept.variance += T::of(2.0) * slope * play.weight * belief.covariance[(i, 0)];
-        for (j, other) in (first..).zip(model.plays()) {
-            kept.variance += play.weight * other.weight * belief.covariance[(i, j)];
-        }
-    }
-    kept
 }
 
 /// Sum of the branches.
@@ -106,8 +85,7 @@ fn relaxation<T: Scalar, const M: usize, const B: usize, const N: usize, const L
 const NEAR: f64 = 2.0;
 
 /// Whether the reading has an extremum along the present movement, dρ/dt = 0, within two deviations of the strain. A body
-/// whose rate cannot be told from zero is on no ramp. A play that still lags on the other side is on its way through its
-/// loop, where the reading changes with the strain by that much less.
+/// whose rate cannot be told from zero is on no ramp.
 fn near_ramp_border<T: Scalar, const M: usize, const B: usize, const N: usize, const L: usize>(
     model: &impl StrainSensor<T, M, B, N>,
     belief: &Belief<T, N, L>,
@@ -119,13 +97,7 @@ fn near_ramp_border<T: Scalar, const M: usize, const B: usize, const N: usize, c
     }
     let phase = if rate.mean > T::zero() { Phase::Extend } else { Phase::Retract };
     let relaxation = core::array::from_fn(|i| belief.mean[M + i]);
-    let mut turning = T::zero();
-    for (i, play) in (N - model.plays().len()..).zip(model.plays()) {
-        if belief.mean[i] * rate.mean > T::zero() {
-            turning += play.weight;
-        }
-    }
-    let slope = |strain: T| model.law().ramp_slope(strain, rate.mean, &relaxation, phase) - turning;
+    let slope = |strain: T| model.law().ramp_slope(strain, rate.mean, &relaxation, phase);
     let reach = T::of(NEAR) * strain.sd();
     let (below, above) = (slope(strain.mean - reach), slope(strain.mean + reach));
     (below > T::zero()) != (above > T::zero())

@@ -6,13 +6,11 @@
 //! [`Ekf`] (plain, iterated, or unscented as [`Ukf`]) keeps one Gaussian and has a smoother. [`Imm`], [`SignSplit`] and
 //! [`Hypotheses`] keep a [`Mixture`] of hypotheses about the phase, because stretching and releasing look alike.
 //! `Particles` (feature `std`) samples the motion instead: slow, and the reference for all of them.
-//! [`DiffuseEkf`] starts where parts of the state are not known at all. [`ConsistencyTest`] judges a running filter by its
-//! innovations. [`FixedGain`] stops computing the gain of a model that does not change once it has settled. `Bank` (feature
-//! `simd`) steps many sensors at once, in vector registers.
+//! [`ConsistencyTest`] judges a running filter by its
+//! innovations. `Bank` (feature `simd`) steps many sensors at once, in vector registers.
 //!
 //! Models are anything that implements [`Dynamics`] and [`Channel`];
-//! [`SwitchedModel`](ohmstrain_model::SwitchedModel) does, and so does [`WithPlays`](ohmstrain_model::WithPlays), whose
-//! hysteresis is a part of the state: every hypothesis carries its own.
+//! [`SwitchedModel`](ohmstrain_model::SwitchedModel) does.
 //!
 //! # Policy
 //! - `no_std`, no heap (the `std` feature adds helpers that return a `Vec`, and the particle filter, `simd` a `Bank` of
@@ -27,8 +25,8 @@
 //! `std` (on by default) and `simd` are named above; `adskalman` hands linearised steps to that crate. Off by default and
 //! without std:
 //! - `serde`: [`Belief`], [`Estimate`], [`Gaussian`], readings, innovations, verdicts, reports and errors as plain data. A
-//!   belief that comes back is not checked; the step that it cannot take is refused. Mixtures and the states of
-//!   [`FixedGain`] and [`DiffuseEkf`], and what is made by constructors that check, are left out.
+//!   belief that comes back is not checked; the step that it cannot take is refused. Mixtures, and what is made
+//!   by constructors that check, are left out.
 //! - `defmt`: `Format` for the same. It takes no text from the target, only numbers.
 //!
 //! ```
@@ -69,14 +67,10 @@ mod chi_square;
 mod clock;
 mod consistency;
 mod curve;
-mod diffuse;
-mod diffuse_belief;
-mod diffuse_smoother;
 mod ekf;
 mod error;
 mod estimate;
 mod estimator;
-mod fixed_gain;
 mod gaussian;
 mod guard;
 mod hypotheses;
@@ -127,14 +121,10 @@ pub use chi_square::ChiSquare;
 pub use clock::seconds_between;
 pub use consistency::{ConsistencyRecord, ConsistencyReport, ConsistencyTest, MeanTest, Verdict, Whiteness};
 pub use curve::{AnyCurve, Cubic, Curve};
-pub use diffuse::{DiffuseEkf, DiffuseStep, DiffuseUpdate};
-pub use diffuse_belief::DiffuseBelief;
-pub use diffuse_smoother::{Undetermined, diffuse_rts_step, diffuse_smooth};
 pub use ekf::{Ekf, Step, Update};
 pub use error::StepError;
 pub use estimate::Estimate;
 pub use estimator::{Advanced, Estimator, Innovation, State};
-pub use fixed_gain::{FixedGain, FixedGainState, FixedGainStep};
 pub use gaussian::{Gaussian, Real, TruncatedGaussian};
 pub use guard::{Guard, Guarded, Influence, ReadingVerdict, Streak};
 pub use hypotheses::Hypotheses;

@@ -45,22 +45,9 @@ impl<T: Scalar, const N: usize> SemiDefinite<T, N> {
         self.lower.column(i) * self.pivots[i].sqrt()
     }
 
-    /// Pivot `i`: the variance of component `i` after [`Self::whiten`].
+    /// Pivot `i`: the variance of component `i` of `L⁻¹ x`.
     pub(crate) fn pivot(&self, i: usize) -> T {
         self.pivots[i]
-    }
-
-    /// `L⁻¹ · matrix`: the components of `L⁻¹ x` are uncorrelated if x has covariance P.
-    pub(crate) fn whiten(&self, matrix: &SMatrix<T, N, N>) -> SMatrix<T, N, N> {
-        let mut out = *matrix;
-        for i in 0..N {
-            for k in 0..i {
-                let above = out.row(k) * self.lower[(i, k)];
-                let mut row = out.row_mut(i);
-                row -= above;
-            }
-        }
-        out
     }
 
     /// A solution x of `P x = rhs` for a right-hand side in the range of P.

@@ -1,7 +1,7 @@
 use nalgebra::SVector;
-use ohmstrain_model::{ModelNoise, Play, Scalar, SensorLaw, SwitchedModel, WithPlays};
+use ohmstrain_model::{ModelNoise, Scalar, SensorLaw, SwitchedModel};
 
-/// A model of a strain sensor with state `[ε, v, (a), c₁ … c_B, (b), u₁ … u_P]`: what initial beliefs and
+/// A model of a strain sensor with state `[ε, v, (a), c₁ … c_B, (b)]`: what initial beliefs and
 /// [`Estimate`](crate::Estimate)s take from it.
 pub trait StrainSensor<T: Scalar, const M: usize, const B: usize, const N: usize> {
     /// The sensor's law.
@@ -12,9 +12,6 @@ pub trait StrainSensor<T: Scalar, const M: usize, const B: usize, const N: usize
 
     /// Whether component `M + B` of the state is a baseline.
     fn has_baseline(&self) -> bool;
-
-    /// Plays, whose lags are the last components of the state.
-    fn plays(&self) -> &[Play<T>];
 
     /// Mean and variances before any reading.
     fn initial_distribution(&self) -> (SVector<T, N>, [T; N]);
@@ -31,34 +28,6 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize> StrainSensor<T, 
 
     fn has_baseline(&self) -> bool {
         N > M + B
-    }
-
-    fn plays(&self) -> &[Play<T>] {
-        &[]
-    }
-
-    fn initial_distribution(&self) -> (SVector<T, N>, [T; N]) {
-        self.initial_distribution()
-    }
-}
-
-impl<T: Scalar, const M: usize, const B: usize, const N0: usize, const P: usize, const N: usize>
-    StrainSensor<T, M, B, N> for WithPlays<T, M, B, N0, P, N>
-{
-    fn law(&self) -> &SensorLaw<T, B> {
-        self.inner().law()
-    }
-
-    fn noise(&self) -> &ModelNoise<T> {
-        self.inner().noise()
-    }
-
-    fn has_baseline(&self) -> bool {
-        N0 > M + B
-    }
-
-    fn plays(&self) -> &[Play<T>] {
-        self.plays()
     }
 
     fn initial_distribution(&self) -> (SVector<T, N>, [T; N]) {

@@ -1,6 +1,6 @@
 use core::ops::Range;
 
-use ohmstrain_model::{Motion, ParameterError, Phase, Problem, Scalar, SwitchedModel, WithPlays};
+use ohmstrain_model::{Motion, ParameterError, Phase, Problem, Scalar, SwitchedModel};
 
 use crate::gaussian::Gaussian;
 use crate::{Belief, Channel, Component, Dynamics};
@@ -63,18 +63,6 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize, const L: usize> 
 {
     fn enter(&self, from: &Belief<T, N, L>, phase: Phase) -> Belief<T, N, L> {
         renew(self.motion(), from, phase)
-    }
-
-    fn renewed(&self) -> Range<usize> {
-        1..M
-    }
-}
-
-impl<T: Scalar, const M: usize, const B: usize, const N0: usize, const P: usize, const N: usize, const L: usize>
-    Phased<T, N, L> for WithPlays<T, M, B, N0, P, N>
-{
-    fn enter(&self, from: &Belief<T, N, L>, phase: Phase) -> Belief<T, N, L> {
-        renew(self.inner().motion(), from, phase)
     }
 
     fn renewed(&self) -> Range<usize> {

@@ -1,6 +1,4 @@
-use ohmstrain_model::{
-    Direction, Observation, Phase, Scalar, SwitchedModel, SwitchedStep, Symmetric, Transition, WithPlays,
-};
+use ohmstrain_model::{Direction, Observation, Phase, Scalar, SwitchedModel, SwitchedStep, Symmetric, Transition};
 
 use crate::{Belief, Gaussian};
 
@@ -64,40 +62,6 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize, const L: usize> 
 
 impl<T: Scalar, const M: usize, const B: usize, const N: usize, const L: usize> Channel<T, N, L>
     for SwitchedModel<T, M, B, N>
-{
-    fn observe(&self, at: &Belief<T, N, L>, phase: Option<Phase>) -> Observation<T, N> {
-        let direction = match phase {
-            Some(phase) => Direction::Known(phase),
-            None => Direction::Uncertain { rate_sd: at.covariance[(1, 1)].max(T::zero()).sqrt() },
-        };
-        self.observe(&at.mean, direction)
-    }
-}
-
-impl<T: Scalar, const M: usize, const B: usize, const N0: usize, const P: usize, const N: usize, const L: usize>
-    Dynamics<T, N, L> for WithPlays<T, M, B, N0, P, N>
-{
-    type Prepared = SwitchedStep<T, M, B>;
-
-    fn prepare(&self, dt_s: T) -> Self::Prepared {
-        self.inner().prepare(dt_s)
-    }
-
-    fn transition(&self, step: &Self::Prepared, from: &Belief<T, N, L>, phase: Option<Phase>) -> Transition<T, N, L> {
-        let direction = match phase {
-            Some(phase) => Direction::Known(phase),
-            None => Direction::Uncertain { rate_sd: self.inner().rate_variance(step, &from.covariance).sqrt() },
-        };
-        self.transition(step, &from.mean, &from.covariance, direction)
-    }
-
-    fn propagate(&self, covariance: &Symmetric<T, N, L>, transition: &Transition<T, N, L>) -> Symmetric<T, N, L> {
-        self.propagate(covariance, transition)
-    }
-}
-
-impl<T: Scalar, const M: usize, const B: usize, const N0: usize, const P: usize, const N: usize, const L: usize>
-    Channel<T, N, L> for WithPlays<T, M, B, N0, P, N>
 {
     fn observe(&self, at: &Belief<T, N, L>, phase: Option<Phase>) -> Observation<T, N> {
         let direction = match phase {

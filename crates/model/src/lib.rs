@@ -3,7 +3,7 @@
 //! The default law is the *switched Kelvin-Voigt* law ([`SensorLaw`]): a quasi-static gauge curve, a dash-pot term and
 //! relaxing branches that stretching and releasing drive with different gains. [`SwitchedModel`] joins it with a
 //! prior on how the body moves ([`Motion`]) and with drift ([`ModelNoise`]), and gives the transition, process noise
-//! and measurement gradient that a Kalman-type filter needs. [`WithPlays`] adds hysteresis that does not relax.
+//! and measurement gradient that a Kalman-type filter needs.
 //! [`RelaxingModulus`] is the published law taken literally.
 //!
 //! # Policy
@@ -16,7 +16,7 @@
 //! # Features
 //! Both off by default, both without std.
 //! - `serde`: laws, noise, packed matrices, phases and what a converter delivered as plain data; nothing is checked that the
-//!   constructor of the model does not check anyway. [`Motion`], [`Joint`], front ends and [`Play`] are left out: they are
+//!   constructor of the model does not check anyway. [`Motion`], [`Joint`] and front ends are left out: they are
 //!   made by constructors that check, and an infinite deviation, which a motion may have, does not survive JSON. Store the
 //!   arguments of their constructors. [`ParameterError`] borrows its name from the code and cannot come back.
 //! - `defmt`: `Format` for the same, and for errors.
@@ -32,13 +32,11 @@ mod motion;
 mod noise;
 mod path;
 mod phase;
-mod play;
 mod relaxing_modulus;
 mod response;
 mod scalar;
 mod switched;
 mod symmetric;
-mod with_plays;
 
 pub use error::{ParameterError, Problem};
 pub use front_end::{AdcCode, ConstantCurrent, Divider, FrontEnd, Ohms, SensorSide};
@@ -48,10 +46,8 @@ pub use law::{Branch, SensorLaw, StrainRange};
 pub use motion::Motion;
 pub use noise::ModelNoise;
 pub use phase::{Direction, Phase, SplitRate};
-pub use play::Play;
 pub use relaxing_modulus::{Modulus, PhaseStart, RelaxingModulus, ResistanceGradient};
 pub use response::Response;
 pub use scalar::Scalar;
 pub use switched::{Observation, SwitchedModel, SwitchedStep, Transition};
 pub use symmetric::Symmetric;
-pub use with_plays::WithPlays;

@@ -27,15 +27,14 @@ pub(super) fn derivatives<F: ModelFamily<N, L>, const N: usize, const L: usize>(
 ) -> Result<Derivatives, CalibrationError> {
     let size = ln_parameters.len();
     let mut out = Derivatives {
-        log_likelihood: LogLikelihood { value: f64::NAN, without_constant: f64::NAN, readings: 0 },
+        log_likelihood: LogLikelihood { value: f64::NAN, readings: 0 },
         gradient: DVector::zeros(size),
         hessian: DMatrix::zeros(size, size),
     };
     for i in 0..size {
         for j in 0..=i {
-            let LogLikelihood { value, without_constant, readings } =
-                seeded(family, ln_parameters, recordings, [i, j])?;
-            out.log_likelihood = LogLikelihood { value: value.re, without_constant: without_constant.re, readings };
+            let LogLikelihood { value, readings } = seeded(family, ln_parameters, recordings, [i, j])?;
+            out.log_likelihood = LogLikelihood { value: value.re, readings };
             out.gradient[i] = value.eps1;
             out.hessian[(i, j)] = value.eps1eps2;
             out.hessian[(j, i)] = value.eps1eps2;

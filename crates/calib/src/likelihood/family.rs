@@ -1,4 +1,4 @@
-use ohmstrain_ekf::{Channel, DiffuseBelief, Dynamics};
+use ohmstrain_ekf::{Belief, Channel, Dynamics};
 use ohmstrain_model::{ParameterError, Scalar};
 
 /// Models that differ in a few positive parameters. `L = N (N + 1) / 2`.
@@ -13,7 +13,7 @@ pub trait ModelFamily<const N: usize, const L: usize> {
     fn model<T: Scalar>(&self, parameters: &[T]) -> Result<Self::Model<T>, ParameterError>;
 
     /// What is known before the first reading, which is an update without a prediction.
-    fn start<T: Scalar>(&self, model: &Self::Model<T>) -> DiffuseBelief<T, N, L>;
+    fn start<T: Scalar>(&self, model: &Self::Model<T>) -> Belief<T, N, L>;
 }
 
 /// A parameter to be found.

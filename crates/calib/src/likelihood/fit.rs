@@ -106,12 +106,7 @@ impl<F: ModelFamily<N, L>, const N: usize, const L: usize> Likelihood<'_, F, N, 
             }
         }
         let start: Vec<f64> = self.parameters.iter().map(|parameter| parameter.start.ln()).collect();
-        Ok(self.report(&maximise(self, &start, &self.ln_bounds(), None, most_iterations)?))
-    }
-
-    /// The maximum over all parameters but the one that is held where it starts. Logarithms.
-    pub(super) fn maximise_others(&self, start: &[f64], held: usize) -> Result<Optimum, CalibrationError> {
-        maximise(self, start, &self.ln_bounds(), Some(held), MOST_ITERATIONS)
+        Ok(self.report(&maximise(self, &start, &self.ln_bounds(), most_iterations)?))
     }
 
     pub(super) fn ln_bounds(&self) -> Vec<(f64, f64)> {

@@ -1,6 +1,6 @@
 use std::collections::HashMap;
 
-use ohmstrain_ekf::{Channel, DiffuseBelief, DiffuseEkf, Dynamics, Ekf, Reading, StepError};
+use ohmstrain_ekf::{Belief, Channel, Dynamics, Ekf, Reading, StepError};
 use ohmstrain_model::Scalar;
 
 use super::ModelFamily;
@@ -32,8 +32,6 @@ impl Readings<'_> {
 pub struct LogLikelihood<T> {
     /// Every constant counted.
     pub value: T,
-    /// Without ½ ln 2π for readings that fixed an unknown direction of the start, as the R package KFAS counts.
-    pub without_constant: T,
     /// Readings that were not missing.
     pub readings: usize,
 }
@@ -50,12 +48,8 @@ where
 {
     let model = family.model(parameters)?;
     let start = family.start(&model);
-    let mut run = Run {
-        start: DiffuseEkf::new(model),
-        onward: Ekf::new(family.model(parameters)?),
-        prepared: HashMap::new(),
-        sum: LogLikelihood { value: T::zero(), without_constant: T::zero(), readings: 0 },
-    };
+    let mut run =
+        Run { filter: Ekf::new(model), prepared: HashMap::new(), sum: LogLikelihood { value: T::zero(), readings: 0 } };
     for recording in recordings {
         let mut belief = start;
         let mut previous_s = None;
@@ -72,8 +66,7 @@ where
 
 /// A filter on its way through recordings.
 struct Run<M, P, T> {
-    start: DiffuseEkf<M>,
-    onward: Ekf<M>,
+    filter: Ekf<M>,
     /// Prepared steps by their length in nanoseconds: differences of decimal times repeat to rounding only.
     prepared: HashMap<u64, P>,
     sum: LogLikelihood<T>,
@@ -85,32 +78,24 @@ const MOST_PREPARED: usize = 4096;
 impl<M, T: Scalar, P: Copy> Run<M, P, T> {
     fn step<const N: usize, const L: usize>(
         &mut self,
-        belief: &DiffuseBelief<T, N, L>,
+        belief: &Belief<T, N, L>,
         dt_s: f64,
         reading: Option<Reading<T>>,
-    ) -> Result<DiffuseBelief<T, N, L>, StepError>
+    ) -> Result<Belief<T, N, L>, StepError>
     where
         M: Dynamics<T, N, L, Prepared = P> + Channel<T, N, L>,
     {
-        let (posterior, value, without_constant) = match belief.settled() {
-            Some(known) if dt_s > 0.0 && dt_s.is_finite() => {
-                let prepared = self.prepare(dt_s);
-                let step = self.onward.step_prepared(&known, &prepared, reading)?;
-                let value = step.update.map(|update| update.log_likelihood);
-                (DiffuseBelief::from(step.posterior), value, value)
-            }
-            _ => {
-                let step = self.start.step(belief, T::of(dt_s), reading)?;
-                let value = step.update.map(|update| update.log_likelihood());
-                (step.posterior, value, step.update.map(|update| update.log_likelihood_without_constant()))
-            }
+        let step = if dt_s > 0.0 && dt_s.is_finite() {
+            let prepared = self.prepare(dt_s);
+            self.filter.step_prepared(belief, &prepared, reading)?
+        } else {
+            self.filter.step(belief, T::of(dt_s), reading)?
         };
-        if let (Some(value), Some(without_constant)) = (value, without_constant) {
-            self.sum.value += value;
-            self.sum.without_constant += without_constant;
+        if let Some(update) = step.update {
+            self.sum.value += update.log_likelihood;
             self.sum.readings += 1;
         }
-        Ok(posterior)
+        Ok(step.posterior)
     }
 
     fn prepare<const N: usize, const L: usize>(&mut self, dt_s: f64) -> P
@@ -121,7 +106,7 @@ impl<M, T: Scalar, P: Copy> Run<M, P, T> {
         if self.prepared.len() >= MOST_PREPARED {
             self.prepared.clear();
         }
-        let model = self.onward.model();
+        let model = self.filter.model();
         *self.prepared.entry(nanoseconds as u64).or_insert_with(|| model.prepare(T::of(nanoseconds * 1e-9)))
     }
 }

@@ -2,8 +2,7 @@
 //!
 //! [`Likelihood`] joins a family of models ([`ModelFamily`]), parameters and recordings. It gives the log-likelihood of
 //! the Kalman filter's innovations with exact gradient and Hessian on the logarithms of the parameters (hyper-dual
-//! numbers run through the same filter), the maximum, standard errors and profile intervals. [`expectation_maximisation`]
-//! is a second opinion on linear models. [`NoiseProblem`] does it for a sensor whose law is known, and
+//! numbers run through the same filter), the maximum, standard errors and profile intervals. [`NoiseProblem`] does it for a sensor whose law is known, and
 //! [`fit_noise_without_reference`] is the short form of it.
 //!
 //! The likelihood trusts the model. A law that is wrong by more than its noise says makes a filter overconfident, which
@@ -16,23 +15,18 @@
 //! - Deterministic; the cost of a Hessian is P (P + 1)/2 filter runs in hyper-dual numbers.
 
 mod derivatives;
-mod em;
 mod family;
 mod fit;
-mod linear;
 mod log_likelihood;
 mod newton;
-mod newton_profile;
 mod noise_problem;
 mod profile;
 mod sensor;
 mod sensor_family;
 
 pub use derivatives::Derivatives;
-pub use em::{EmIteration, EmStart, expectation_maximisation};
 pub use family::{ModelFamily, Parameter};
 pub use fit::{Bound, FittedParameter, Likelihood, LikelihoodFit};
-pub use linear::LinearModel;
 pub use log_likelihood::{LogLikelihood, Readings};
 pub use noise_problem::NoiseProblem;
 pub use profile::ProfileInterval;

@@ -15,7 +15,7 @@ pub(super) trait Objective {
 pub(super) struct Optimum {
     pub point: Vec<f64>,
     pub derivatives: Derivatives,
-    /// Parameters that were free at the end: neither held nor pressed against a bound.
+    /// Parameters that were free at the end: not pressed against a bound.
     pub free: Vec<usize>,
     pub iterations: usize,
     pub converged: bool,
@@ -44,7 +44,6 @@ pub(super) fn maximise(
     objective: &impl Objective,
     start: &[f64],
     bounds: &[(f64, f64)],
-    held: Option<usize>,
     most_iterations: usize,
 ) -> Result<Optimum, CalibrationError> {
     let inside = |point: &DVector<f64>| -> Vec<f64> {
@@ -54,7 +53,7 @@ pub(super) fn maximise(
     let mut now = objective.derivatives(&point)?;
     let (mut radius, mut iterations) = (FIRST_RADIUS, 0);
     loop {
-        let free = free(&point, &now.gradient, bounds, held);
+        let free = free(&point, &now.gradient, bounds);
         let step = Step::new(&now, &free);
         if step.concave && step.decrement <= TOLERANCE * TOLERANCE {
             return Ok(Optimum { point, derivatives: now, free, iterations, converged: true });
@@ -80,11 +79,11 @@ pub(super) fn maximise(
 }
 
 /// Parameters that a step may move: those that do not press against a bound.
-fn free(point: &[f64], gradient: &DVector<f64>, bounds: &[(f64, f64)], held: Option<usize>) -> Vec<usize> {
+fn free(point: &[f64], gradient: &DVector<f64>, bounds: &[(f64, f64)]) -> Vec<usize> {
     let moves = |i: &usize| {
         let (lower, upper) = bounds[*i];
         let pressed = (point[*i] <= lower && gradient[*i] <= 0.0) || (point[*i] >= upper && gradient[*i] >= 0.0);
-        Some(*i) != held && !pressed
+        !pressed
     };
     (0..point.len()).filter(moves).collect()
 }

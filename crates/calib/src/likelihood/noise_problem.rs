@@ -17,7 +17,7 @@ use crate::optimise::polish;
 pub struct NoiseProblem<'a> {
     /// Recordings; each starts anew.
     pub recordings: &'a [Readings<'a>],
-    /// The law; without plays, at most four branches.
+    /// The law; at most four branches.
     pub law: &'a LawParams,
     /// Noise and motion to start from.
     pub start: &'a NoiseStart,
@@ -47,8 +47,7 @@ impl NoiseProblem<'_> {
         Ok(NoiseFit { noise, motion, warnings: warnings(&fit), fit })
     }
 
-    /// The profile interval of parameter `index` in `free` around the maximum, by
-    /// [`Likelihood::newton_profile_interval`].
+    /// [`Likelihood::profile_interval`] of parameter `index` in `free` around the maximum.
     ///
     /// # Errors
     /// If the law is not supported.
@@ -61,11 +60,10 @@ impl NoiseProblem<'_> {
         /// One instance per number of branches; N = M + B + 1, L = N (N + 1) / 2.
         macro_rules! sized {
             ($family:ident, $([$b:literal, $n:literal, $l:literal]),+) => {
-                match (self.law.branches.len(), self.law.plays.len()) {
-                    $(($b, 0) => self.ask_family::<_, Q, $n, $l>(&$family(self.family::<$b>()?), question),)+
-                    (branches, plays) => Err(CalibrationError::Unsupported(format!(
-                        "a law with {branches} branches and {plays} plays; the likelihood of readings has at most 4 branches \
-                         and no plays"
+                match self.law.branches.len() {
+                    $($b => self.ask_family::<_, Q, $n, $l>(&$family(self.family::<$b>()?), question),)+
+                    branches => Err(CalibrationError::Unsupported(format!(
+                        "a law with {branches} branches; the likelihood of readings has at most 4"
                     ))),
                 }
             };
@@ -188,6 +186,6 @@ impl Question for Profile<'_> {
         self,
         likelihood: &Likelihood<F, N, L>,
     ) -> Result<Self::Answer, CalibrationError> {
-        Ok(likelihood.newton_profile_interval(self.fit, self.index))
+        Ok(likelihood.profile_interval(self.fit, self.index))
     }
 }

@@ -1,92 +1,159 @@
-use std::cell::RefCell;
+use nalgebra::{Cholesky, DMatrix, DVector};
 
-use argmin::core::{CostFunction, Error, Executor, State};
-use argmin::solver::brent::BrentRoot;
-
+use super::derivatives::{derivatives, gradient};
+use super::newton::sub_matrix;
 use super::{Likelihood, LikelihoodFit, ModelFamily};
-use crate::CalibrationError;
 
 /// Half the 95 % quantile of χ² with one degree of freedom: how far the profile may fall.
-pub(super) const FALL: f64 = 1.920_729_410_347_062;
-/// Accuracy of the ends, in the logarithm of the parameter.
-const TOLERANCE: f64 = 1e-9;
-/// Each step away from the maximum is this much longer than the one before.
-const GROWTH: f64 = 1.6;
+const FALL: f64 = 1.920_729_410_347_062;
+/// Steps allowed to each end; five to ten are usual.
+const MOST_STEPS: usize = 30;
+/// A step shorter than this, in the logarithms, is the last one.
+const TOLERANCE: f64 = 1e-6;
+/// Longest step, in the logarithm of a parameter.
+const LONGEST: f64 = 2.0;
+/// A change of gradient nearer than this share to what the Hessian says teaches nothing but rounding.
+const TEACHES: f64 = 1e-8;
 
 /// A 95 % interval from the profile likelihood: the values for which the other parameters can make the readings likely
 /// enough. It follows the likelihood where that is no parabola, and does not pass through zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ProfileInterval {
-    /// Lower end; `None` where the likelihood does not fall far enough before the parameter's bound.
+    /// Lower end; `None` where it is not found.
     pub lower: Option<f64>,
     /// Upper end, likewise.
     pub upper: Option<f64>,
 }
 
 impl<F: ModelFamily<N, L>, const N: usize, const L: usize> Likelihood<'_, F, N, L> {
-    /// The profile interval of parameter `index` around the maximum `fit`. Every point of a profile is a maximum over the
-    /// other parameters, ten to twenty of them in all.
+    /// The profile interval of parameter `index` around the maximum `fit`: Newton's method on the end itself, with
+    /// gradients only and the Hessian kept up to date from them. An end is `None` if it lies beyond a bound of any
+    /// parameter, if the method does not reach it, or if the parameter is not free; both are where `fit` is no maximum.
     ///
-    /// # Errors
-    /// As [`Self::fit`]; an index without a parameter is unsupported.
-    pub fn profile_interval(&self, fit: &LikelihoodFit, index: usize) -> Result<ProfileInterval, CalibrationError> {
-        let Some(parameter) = fit.parameters.get(index) else {
-            return Err(CalibrationError::Unsupported(format!("there is no parameter {index}")));
-        };
-        let bounds = self.ln_bounds()[index];
-        let first = parameter.ln_standard_error.unwrap_or(1.0);
-        let end = |bound: f64, step: f64| {
-            // Each maximum starts from the one before.
-            let at: Vec<f64> = fit.parameters.iter().map(|parameter| parameter.value.ln()).collect();
-            let profile = Profile { likelihood: self, index, target: fit.log_likelihood.value - FALL, at: at.into() };
-            profile.crossing(parameter.value.ln(), bound, step)
-        };
-        Ok(ProfileInterval { lower: end(bounds.0, -first)?, upper: end(bounds.1, first)? })
+    /// Source: Venzon & Moolgavkar, *Appl. Statist.* 37 (1988) 87; the symmetric rank-one update of Nocedal & Wright,
+    /// *Numerical Optimization* (2006), section 6.2.
+    #[must_use]
+    pub fn profile_interval(&self, fit: &LikelihoodFit, index: usize) -> ProfileInterval {
+        let end = |sign: f64| Walk::from_maximum(self, fit, index, sign)?.end();
+        ProfileInterval { lower: end(-1.0), upper: end(1.0) }
     }
 }
 
-struct Profile<'a, F, const N: usize, const L: usize> {
+/// On the way from the maximum to an end, where the likelihood has fallen to its target and the gradient of the others is
+/// zero. Logarithms.
+struct Walk<'a, F, const N: usize, const L: usize> {
     likelihood: &'a Likelihood<'a, F, N, L>,
-    index: usize,
+    /// Parameters that move, and which of them the interval is about.
+    free: Vec<usize>,
+    about: usize,
+    /// -1 to the lower end, 1 to the upper one.
+    sign: f64,
     target: f64,
-    at: RefCell<Vec<f64>>,
+    point: Vec<f64>,
+    value: f64,
+    gradient: DVector<f64>,
+    /// Among the free parameters.
+    hessian: DMatrix<f64>,
 }
 
-impl<F: ModelFamily<N, L>, const N: usize, const L: usize> Profile<'_, F, N, L> {
-    /// The profile above its target.
-    fn excess(&self, ln_value: f64) -> Result<f64, CalibrationError> {
-        let mut start = self.at.borrow().clone();
-        start[self.index] = ln_value;
-        let optimum = self.likelihood.maximise_others(&start, self.index)?;
-        self.at.replace(optimum.point);
-        Ok(optimum.derivatives.log_likelihood.value - self.target)
+impl<'a, F: ModelFamily<N, L>, const N: usize, const L: usize> Walk<'a, F, N, L> {
+    fn from_maximum(
+        likelihood: &'a Likelihood<'a, F, N, L>,
+        fit: &LikelihoodFit,
+        index: usize,
+        sign: f64,
+    ) -> Option<Self> {
+        if !fit.converged {
+            return None;
+        }
+        let free: Vec<usize> = (0..fit.parameters.len()).filter(|&i| fit.parameters[i].bound.is_none()).collect();
+        let covariance = sub_matrix(fit.ln_covariance.as_ref()?, &free);
+        Some(Self {
+            likelihood,
+            about: free.iter().position(|&i| i == index)?,
+            sign,
+            target: fit.log_likelihood.value - FALL,
+            point: fit.parameters.iter().map(|parameter| parameter.value.ln()).collect(),
+            value: fit.log_likelihood.value,
+            gradient: DVector::zeros(free.len()),
+            hessian: -Cholesky::new(covariance)?.inverse(),
+            free,
+        })
     }
 
-    /// Where the profile falls to its target, from the maximum on in the direction of `step`.
-    fn crossing(self, from: f64, bound: f64, step: f64) -> Result<Option<f64>, CalibrationError> {
-        let (mut inner, mut step) = (from, step);
-        let outer = loop {
-            let outer = if step < 0.0 { (inner + step).max(bound) } else { (inner + step).min(bound) };
-            if self.excess(outer)? < 0.0 {
-                break outer;
+    fn end(mut self) -> Option<f64> {
+        let bounds = self.likelihood.ln_bounds();
+        let mut longest = LONGEST;
+        for _ in 0..MOST_STEPS {
+            let step = self.step().or_else(|| self.exact_hessian().and_then(|()| self.step()))?;
+            let length = step.amax();
+            let step = &step * (longest / length).min(1.0);
+            let mut next = self.point.clone();
+            for (&i, by) in self.free.iter().zip(step.iter()) {
+                next[i] += by;
             }
-            if outer == bound {
-                return Ok(None);
+            if length < TOLERANCE {
+                return Some(next[self.free[self.about]].exp());
             }
-            (inner, step) = (outer, step * GROWTH);
-        };
-        let failed = |error: Error| CalibrationError::Optimiser(error.to_string());
-        let solver = BrentRoot::new(inner, outer, TOLERANCE);
-        let result = Executor::new(self, solver).configure(|state| state.max_iters(100)).run().map_err(failed)?;
-        Ok(result.state().get_best_param().map(|ln| ln.exp()))
+            if next.iter().zip(&bounds).any(|(x, (lower, upper))| !(lower..=upper).contains(&x)) {
+                return None;
+            }
+            let (value, all) = gradient(self.likelihood.family, &next, self.likelihood.recordings).ok()?;
+            let slopes = DVector::from_iterator(self.free.len(), self.free.iter().map(|&i| all[i]));
+            // Far below the target the likelihood is no parabola any more.
+            if value < self.target - FALL || !(value + slopes.sum()).is_finite() {
+                longest = 0.5 * step.amax();
+                // It does not fall, it jumps.
+                if longest < TOLERANCE {
+                    return None;
+                }
+                continue;
+            }
+            longest = LONGEST.min(4.0 * step.amax());
+            self.learn(&step, &slopes);
+            (self.point, self.value, self.gradient) = (next, value, slopes);
+        }
+        None
     }
-}
 
-impl<F: ModelFamily<N, L>, const N: usize, const L: usize> CostFunction for Profile<'_, F, N, L> {
-    type Param = f64;
-    type Output = f64;
+    /// The step to where the quadratic through here, made as large as the others can make it, has fallen to the target.
+    fn step(&self) -> Option<DVector<f64>> {
+        let others: Vec<usize> = (0..self.free.len()).filter(|&k| k != self.about).collect();
+        let among_others = Cholesky::new(-sub_matrix(&self.hessian, &others))?;
+        let with = DVector::from_iterator(others.len(), others.iter().map(|&k| self.hessian[(k, self.about)]));
+        let slopes = DVector::from_iterator(others.len(), others.iter().map(|&k| self.gradient[k]));
+        // The others' best step is `offset + along · s` for a step s of the parameter itself.
+        let (offset, along) = (among_others.solve(&slopes), among_others.solve(&with));
+        let above = self.value - self.target + 0.5 * slopes.dot(&offset);
+        let slope = self.gradient[self.about] + with.dot(&offset);
+        let curvature = self.hessian[(self.about, self.about)] + with.dot(&along);
+        let discriminant = slope * slope - 2.0 * curvature * above;
+        if !(discriminant > 0.0) {
+            return None;
+        }
+        // The root on the falling side, in the form that subtracts no equal numbers.
+        let own = self.sign * 2.0 * above / (discriminant.sqrt() - self.sign * slope);
+        let mut step = DVector::zeros(self.free.len());
+        step[self.about] = own;
+        for (k, &other) in others.iter().enumerate() {
+            step[other] = offset[k] + along[k] * own;
+        }
+        step.iter().all(|by| by.is_finite()).then_some(step)
+    }
 
-    fn cost(&self, ln_value: &f64) -> Result<f64, Error> {
-        Ok(self.excess(*ln_value)?)
+    /// Brings the Hessian up to date with what the gradient has become after a step.
+    fn learn(&mut self, step: &DVector<f64>, slopes: &DVector<f64>) {
+        let unexplained = slopes - &self.gradient - &self.hessian * step;
+        let along = unexplained.dot(step);
+        if along.abs() > TEACHES * unexplained.norm() * step.norm() {
+            self.hessian += &unexplained * unexplained.transpose() / along;
+        }
+    }
+
+    /// Computes the Hessian anew where the updates have led astray.
+    fn exact_hessian(&mut self) -> Option<()> {
+        let here = derivatives(self.likelihood.family, &self.point, self.likelihood.recordings).ok()?;
+        self.hessian = sub_matrix(&here.hessian, &self.free);
+        Some(())
     }
 }

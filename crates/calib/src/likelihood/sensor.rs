@@ -35,7 +35,7 @@ const LEAST_SURE: f64 = 2.0;
 /// The strain is not needed. In exchange the law is trusted: its error goes into whatever noise fits it best.
 ///
 /// # Errors
-/// If nothing is free, a free parameter starts at zero, the law has plays or more than four branches, or the filter fails.
+/// If nothing is free, a free parameter starts at zero, the law has more than four branches, or the filter fails.
 pub fn fit_noise_without_reference(
     recordings: &[Readings],
     law: &LawParams,

@@ -1,4 +1,4 @@
-use ohmstrain_ekf::{Belief, DiffuseBelief};
+use ohmstrain_ekf::Belief;
 use ohmstrain_model::{
     Branch, Gauge, ModelNoise, Motion, ParameterError, Scalar, SensorLaw, StrainRange, SwitchedModel,
 };
@@ -142,8 +142,8 @@ impl<const B: usize, const N: usize, const L: usize> ModelFamily<N, L> for TwoSt
         )
     }
 
-    fn start<T: Scalar>(&self, model: &Self::Model<T>) -> DiffuseBelief<T, N, L> {
-        Belief::initial(model).into()
+    fn start<T: Scalar>(&self, model: &Self::Model<T>) -> Belief<T, N, L> {
+        Belief::initial(model)
     }
 }
 
@@ -159,7 +159,7 @@ impl<const B: usize, const N: usize, const L: usize> ModelFamily<N, L> for Three
         )
     }
 
-    fn start<T: Scalar>(&self, model: &Self::Model<T>) -> DiffuseBelief<T, N, L> {
-        Belief::initial(model).into()
+    fn start<T: Scalar>(&self, model: &Self::Model<T>) -> Belief<T, N, L> {
+        Belief::initial(model)
     }
 }

@@ -42,9 +42,6 @@ pub fn run(args: &CalibrateArgs) -> Result<(), CliError> {
 fn structures(args: &CalibrateArgs, estimator: EstimatorKind) -> Vec<LawOptions> {
     let mut structures = LawOptions::candidates(estimator).to_vec();
     for structure in &mut structures {
-        if let Some(plays) = args.plays.chosen() {
-            structure.plays = plays.0;
-        }
         if let Some(gauge) = args.gauge.chosen() {
             structure.gauge = gauge.into();
         }

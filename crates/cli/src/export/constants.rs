@@ -7,7 +7,6 @@ use serde::Serialize;
 
 use super::ExportError;
 use super::literal::{Literal, literals};
-use super::settled::{Settled, SettledGain};
 use super::vectors::Vectors;
 
 /// A sensor as the templates have it.
@@ -52,7 +51,6 @@ pub struct Exported {
     exact: bool,
     noise: NoiseConstants,
     prior: PriorConstants,
-    gains: Vec<SettledGain>,
     vectors: Vectors,
 }
 
@@ -163,12 +161,6 @@ impl Exported {
     /// # Errors
     /// See [`ExportError`].
     pub fn new(params: &SensorParams, made_by: &str, dt_s: f64) -> Result<Self, ExportError> {
-        if !params.law.plays.is_empty() {
-            return Err(ExportError::Unsupported {
-                what: "the law has plays, which the exported filter has not",
-                instead: "calibrate with `--plays 0`",
-            });
-        }
         if dt_s * 1e6 < 1.0 || dt_s > params.validity.duration_s {
             return Err(ExportError::Interval(format!(
                 "expected between a microsecond and the longest recording, {} s, found {dt_s}",
@@ -204,8 +196,7 @@ impl Exported {
         sensor.rest_reading = params.rest_reading as f32;
         sensor.strain_sd_scale = estimator.strain_sd_scale as f32;
         let model = sensor.model;
-        let settled = Settled::<B, N, L>::new(&sensor)?;
-        let vectors = Vectors::new(&sensor, &settled)?;
+        let vectors = Vectors::new::<B, N, L>(&sensor)?;
         let (law, noise) = (model.law(), model.noise());
         let start: Belief<f32, N, L> = Belief::initial(&model);
         let step = model.prepare(sensor.dt_s);
@@ -258,7 +249,6 @@ impl Exported {
                 baseline_time_s: Literal(noise.baseline_time_s),
             },
             prior,
-            gains: settled.gains(),
             vectors,
         };
         exported.check_finite()?;

@@ -6,7 +6,6 @@
 mod constants;
 mod literal;
 mod motion;
-mod settled;
 mod vectors;
 
 use minijinja::Environment;

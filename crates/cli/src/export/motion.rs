@@ -19,29 +19,20 @@ const NOISY: std::ops::Range<usize> = 120..130;
 
 /// One row.
 pub struct Row {
-    /// The true strain.
-    pub strain: f64,
     /// R/R₀ - 1; `None` if it is missing.
     pub rho: Option<f64>,
     /// Standard deviation that the reading brings along, relative to R₀.
     pub extra_sd: f64,
 }
 
-/// How many times slower than the short motion one is that stretches at `speed`, 1/s; no more than a thousand times.
-pub fn slowness<const B: usize>(law: &SensorLaw<f64, B>, dt_s: f64, speed: f64) -> usize {
-    let ((start, from), (end, to)) = (CORNERS[1], CORNERS[2]);
-    let steps = (to - from) * law.range.span() / (speed * dt_s);
-    (steps / (end - start) as f64).ceil().clamp(1.0, 1000.0) as usize
-}
-
-/// The rows of the motion, so many times slower, with white noise of `reading_sd`.
-pub fn rows<const B: usize>(law: &SensorLaw<f64, B>, dt_s: f64, reading_sd: f64, slowness: usize) -> Vec<Row> {
+/// The rows of the motion, with white noise of `reading_sd`.
+pub fn rows<const B: usize>(law: &SensorLaw<f64, B>, dt_s: f64, reading_sd: f64) -> Vec<Row> {
     let mut random = ChaCha8Rng::seed_from_u64(SEED);
     let mut relaxation = [0.0; B];
     let mut rows = Vec::new();
     for corners in CORNERS.windows(2) {
         let ((start, from), (end, to)) = (corners[0], corners[1]);
-        let steps = (end - start) * slowness;
+        let steps = end - start;
         let per_step = (to - from) / steps as f64 * law.range.span();
         for step in 1..=steps {
             let strain = law.range.lower + from * law.range.span() + per_step * step as f64;
@@ -62,7 +53,7 @@ pub fn rows<const B: usize>(law: &SensorLaw<f64, B>, dt_s: f64, reading_sd: f64,
             let rho = law.relative_change(strain, rate, &relaxation, 0.0, phase) + (reading_sd + extra_sd) * noise;
             // Noise can be large enough to make a resistance negative.
             let rho = (!MISSING.iter().any(|gap| gap.contains(&row))).then_some(rho.max(-0.99));
-            rows.push(Row { strain, rho, extra_sd });
+            rows.push(Row { rho, extra_sd });
         }
     }
     rows

@@ -2,15 +2,14 @@
 
 use std::collections::BTreeMap;
 
-use ohmstrain_calib::{BranchParams, EstimatorParams, Output, PlayParams, SensorParams};
+use ohmstrain_calib::{BranchParams, EstimatorParams, Output, SensorParams};
 use ohmstrain_model::SensorLaw;
 
-/// A sensor's law, with its branches and plays in slices.
+/// A sensor's law, with its branches in a slice.
 pub struct Law<'a> {
     /// Gauge curve, dash-pots and range.
     quasi_static: SensorLaw<f64, 0>,
     branches: &'a [BranchParams],
-    plays: &'a [PlayParams],
     estimator: Option<&'a EstimatorParams>,
     rest_reading: f64,
 }
@@ -19,7 +18,7 @@ pub struct Law<'a> {
 pub struct Driven {
     /// Readings, row by row; NaN where the strain is missing.
     pub reading: Vec<f64>,
-    /// What the law remembers at the rows that were asked for: branches, then lags of plays.
+    /// What the law remembers at the rows that were asked for: the branches.
     pub memories: BTreeMap<usize, Vec<f64>>,
 }
 
@@ -35,7 +34,7 @@ impl<'a> Law<'a> {
             range: law.range.to_model(),
         };
         let estimator = params.estimator(params.leading_estimator()).ok();
-        Self { quasi_static, branches: &law.branches, plays: &law.plays, estimator, rest_reading }
+        Self { quasi_static, branches: &law.branches, estimator, rest_reading }
     }
 
     /// g(ε).
@@ -53,9 +52,7 @@ impl<'a> Law<'a> {
         let estimate = &output.estimate;
         let (rising, falling) = split(estimate.rate.mean, estimate.rate.sd());
         let dash_pot = self.quasi_static.extend_viscosity_s * rising + self.quasi_static.retract_viscosity_s * falling;
-        // With plays the settled reading is the gauge curve and what they have kept.
-        let at_rest = if self.plays.is_empty() { self.gauge(estimate.strain.mean) } else { estimate.settled.mean };
-        self.reading(at_rest + dash_pot + estimate.relaxation.mean + estimate.baseline)
+        self.reading(self.gauge(estimate.strain.mean) + dash_pot + estimate.relaxation.mean + estimate.baseline)
     }
 
     /// Standard deviation of a reading around the law driven by the true strain: branches, baseline and white noise.
@@ -73,7 +70,7 @@ impl<'a> Law<'a> {
     }
 
     /// The law driven by a known strain from rest, exactly for strain that moves linearly from row to row. Rows without
-    /// strain are stepped over. `remember` are the rows at which branches and lags are wanted.
+    /// strain are stepped over. `remember` are the rows at which branches are wanted.
     pub fn driven(&self, time_s: &[f64], strain: &[f64], remember: &[usize]) -> Driven {
         let known: Vec<(usize, f64, f64)> = time_s
             .iter()
@@ -83,7 +80,7 @@ impl<'a> Law<'a> {
             .map(|(row, (time, strain))| (row, *time, *strain))
             .collect();
         let mut driven = Driven { reading: vec![f64::NAN; time_s.len()], memories: BTreeMap::new() };
-        let mut memory = vec![0.0; self.branches.len() + self.plays.len()];
+        let mut memory = vec![0.0; self.branches.len()];
         for (place, &(row, time, strain)) in known.iter().enumerate() {
             let before =
                 place.checked_sub(1).and_then(|place| known.get(place)).copied().unwrap_or((row, time, strain));
@@ -103,14 +100,13 @@ impl<'a> Law<'a> {
         driven
     }
 
-    /// Branches and lags after `dt_s` seconds in which the strain goes from `from` to `to`.
+    /// Branches after `dt_s` seconds in which the strain goes from `from` to `to`.
     fn drive(&self, state: &mut [f64], dt_s: f64, from: f64, to: f64) {
         if !(dt_s > 0.0) {
             return;
         }
         let middle = self.quasi_static.range.clamp(0.5 * (from + to));
-        let (branches, lags) = state.split_at_mut(self.branches.len());
-        for (c, branch) in branches.iter_mut().zip(self.branches) {
+        for (c, branch) in state.iter_mut().zip(self.branches) {
             let x = dt_s / branch.tau_s;
             let gain = if to > from {
                 branch.extend_gain + branch.extend_gain_slope * middle
@@ -119,9 +115,6 @@ impl<'a> Law<'a> {
             };
             *c = *c * (-x).exp() + gain * (to - from) * (-(-x).exp_m1() / x);
         }
-        for (lag, play) in lags.iter_mut().zip(self.plays) {
-            *lag = (*lag - (to - from)).max(-play.half_width).min(play.half_width);
-        }
     }
 
     /// The reading `elapsed_s` seconds into a hold at `strain` that began with this memory.
@@ -129,10 +122,9 @@ impl<'a> Law<'a> {
         self.reading(self.gauge(strain) + self.remembered(memory, elapsed_s))
     }
 
-    /// What branches and plays add to the reading after `elapsed_s` seconds of rest.
+    /// What branches add to the reading after `elapsed_s` seconds of rest.
     fn remembered(&self, memory: &[f64], elapsed_s: f64) -> f64 {
-        let relaxing = self.branches.iter().map(|branch| (-elapsed_s / branch.tau_s).exp());
-        let factors = relaxing.chain(self.plays.iter().map(|play| play.weight));
+        let factors = self.branches.iter().map(|branch| (-elapsed_s / branch.tau_s).exp());
         factors.zip(memory).map(|(factor, value)| factor * value).sum()
     }
 

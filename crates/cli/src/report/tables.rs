@@ -135,16 +135,6 @@ fn law(params: &SensorParams, rest_reading: f64) -> Table {
             rows.fitted(&format!("Branch {}: {name}", i + 1), &format!("branches[{i}].{field}"), value, unit);
         }
     }
-    for (i, play) in law.plays.iter().enumerate() {
-        let width = if quantity == Quantity::Strain { "–" } else { "°" };
-        rows.fitted(
-            &format!("Play {}: half-width r", i + 1),
-            &format!("plays[{i}].half_width"),
-            play.half_width,
-            width,
-        );
-        rows.fitted(&format!("Play {}: weight w", i + 1), &format!("plays[{i}].weight"), play.weight, &gain);
-    }
     rows.rest();
     let caption = if params.uncertainty.is_some() { "The law, value ± standard error" } else { "The law" };
     Table::new(caption, ["Parameter", "Value", "Unit"], rows.rows)

@@ -52,7 +52,6 @@ fn sensor() -> SensorParams {
             range,
             gauge: GaugeParams::DecayingExponential { slope: 2.0, decay_strain: 0.2 },
             branches: vec![branch],
-            plays: vec![],
         },
         estimators: BTreeMap::from([(EstimatorKind::Ekf, estimator)]),
         ensemble: None,

@@ -75,7 +75,7 @@ pub fn ratios(builds: &[Build]) -> String {
     out
 }
 
-const STEPS: [(&str, &str); 22] = [
+const STEPS: [(&str, &str); 21] = [
     ("hand-written reference, linear, without checks", "reference_3"),
     ("**EKF, sparse**", "sparse_ekf_3"),
     ("EKF, sparse, four states", "sparse_ekf_4"),
@@ -85,7 +85,6 @@ const STEPS: [(&str, &str); 22] = [
     ("EKF, generic, six states", "ekf_6"),
     ("iterated EKF, three linearisations", "iterated_ekf_3"),
     ("UKF", "ukf_3"),
-    ("fixed gain, frozen, linear sensor", "fixed_gain_3"),
     ("IMM, six states", "imm_6"),
     ("IMM, sparse, six states", "sparse_imm_6"),
     ("sign-split of 8, six states", "sign_split_6"),

@@ -20,11 +20,6 @@ pub struct Refinement {
     pub profiles: Vec<ProfileInterval>,
 }
 
-/// What was left out, and why.
-const NO_EM: &str = "\
-expectation maximisation, the second opinion on linear models, is left out: the sensor's law is not linear, and its noise
-has few parameters where expectation maximisation would free every covariance";
-
 /// Prints what was found.
 pub fn write(out: &mut dyn Write, refinement: &Refinement) -> Result<(), CliError> {
     let Refinement { start, free, before, found, profiles } = refinement;
@@ -68,7 +63,6 @@ pub fn write(out: &mut dyn Write, refinement: &Refinement) -> Result<(), CliErro
     if let MotionParams::Smooth { .. } = start.motion {
         writeln!(out, "rate_time_s is rate_sd_per_s / acceleration_sd_per_s2")?;
     }
-    writeln!(out, "{NO_EM}")?;
     Ok(())
 }
 

@@ -124,27 +124,6 @@ typedef struct rate_spread {
     float per_square; /* 1 / width^2 */
 } rate_spread;
 
-/* The settled filter of each phase, in the order of ohmstrain_phase. */
-typedef struct fixed_gain {
-    float gain[STATES];
-    rate_spread drive; /* of the rate that drives the branches */
-    rate_spread rate;  /* of the rate when a reading comes */
-    float strain_sd;
-    float rate_sd; /* 1/s */
-} fixed_gain;
-
-static const fixed_gain FIXED_GAIN[3] = {
-{% for g in gains %}
-    {
-        .gain = {{% for x in g.gain %}<< x >>f<< ", " if not loop.last >>{% endfor %}},
-        .drive = {<< g.drive[0] >>f, << g.drive[1] >>f, << g.drive[2] >>f, << g.drive[3] >>f},
-        .rate = {<< g.rate[0] >>f, << g.rate[1] >>f, << g.rate[2] >>f, << g.rate[3] >>f},
-        .strain_sd = << g.strain_sd >>f,
-        .rate_sd = << g.rate_sd >>f,
-    },
-{% endfor %}
-};
-
 /* ---- The sensor's law ------------------------------------------------------------------------------------------ */
 
 static float clamped(float x, float lower, float upper)
@@ -221,7 +200,7 @@ static float split_slope(const split *rate, float extend, float retract)
     return extend * rate->extend_probability + retract * rate->retract_probability;
 }
 
-/* ---- Mean: what both filters share ----------------------------------------------------------------------------- */
+/* ---- Mean -------------------------------------------------------------------------------------------------------- */
 
 {% if branches %}
 /* What an interval does to one branch. Its gain grows with the sum of old and new strain: the old one's share is in row, the
@@ -583,99 +562,5 @@ ohmstrain_status ohmstrain_get(const ohmstrain_state *state, ohmstrain_estimate 
         return OHMSTRAIN_ERR_ARGUMENT;
     }
     report(state->mean, sqrtf(state->covariance[AT(0, 0)]), sqrtf(state->covariance[AT(1, 1)]), estimate);
-    return OHMSTRAIN_OK;
-}
-
-/* ---- The filter with fixed gains ------------------------------------------------------------------------------- */
-
-static int is_phase(ohmstrain_phase phase)
-{
-    return phase == OHMSTRAIN_HOLD || phase == OHMSTRAIN_EXTEND || phase == OHMSTRAIN_RETRACT;
-}
-
-/* One interval on, with a reading or without. */
-static ohmstrain_status fixed_advance(ohmstrain_fixed_state *state, const fixed_gain *settled, const float *rho)
-{
-    ohmstrain_fixed_state next = *state;
-    rate_spread spread = settled->rate;
-    float slope[2], sum = 0.0f;
-    int i;
-{% if branches %}
-    rate_spread drive = settled->drive;
-    driven by[BRANCHES];
-
-    predict_mean(next.mean, &drive, by);
-{% else %}
-
-    predict_mean(next.mean);
-{% endif %}
-    if (rho) {
-        const float innovation = *rho - expected_reading(next.mean, &spread, slope);
-        for (i = 0; i < STATES; i++) {
-            next.mean[i] += settled->gain[i] * innovation;
-        }
-    }
-    for (i = 0; i < STATES; i++) {
-        sum += next.mean[i];
-    }
-    if (!isfinite(sum)) {
-        return OHMSTRAIN_ERR_STATE;
-    }
-    *state = next;
-    return OHMSTRAIN_OK;
-}
-
-ohmstrain_status ohmstrain_fixed_gain_start(ohmstrain_fixed_state *state)
-{
-    int i;
-
-    if (!state) {
-        return OHMSTRAIN_ERR_ARGUMENT;
-    }
-    for (i = 0; i < STATES; i++) {
-        state->mean[i] = START_MEAN[i];
-    }
-    state->rest_reading = OHMSTRAIN_REST_READING;
-    return OHMSTRAIN_OK;
-}
-
-ohmstrain_phase ohmstrain_fixed_gain_phase(const ohmstrain_fixed_state *state)
-{
-    const float rate = state ? state->mean[1] : 0.0f;
-    /* A rate within its own deviation has no direction. */
-    const float clear = FIXED_GAIN[OHMSTRAIN_HOLD].rate_sd;
-
-    return rate > clear ? OHMSTRAIN_EXTEND : rate < -clear ? OHMSTRAIN_RETRACT : OHMSTRAIN_HOLD;
-}
-
-ohmstrain_status ohmstrain_fixed_gain_step(ohmstrain_fixed_state *state, ohmstrain_phase phase, float reading)
-{
-    float rho;
-
-    if (!state || !is_phase(phase)) {
-        return OHMSTRAIN_ERR_ARGUMENT;
-    }
-    if (!usable(state->rest_reading) || !isfinite(reading)) {
-        return OHMSTRAIN_ERR_NOT_FINITE;
-    }
-    rho = relative(reading, state->rest_reading);
-    return fixed_advance(state, &FIXED_GAIN[phase], &rho);
-}
-
-ohmstrain_status ohmstrain_fixed_gain_predict(ohmstrain_fixed_state *state, ohmstrain_phase phase)
-{
-    if (!state || !is_phase(phase)) {
-        return OHMSTRAIN_ERR_ARGUMENT;
-    }
-    return fixed_advance(state, &FIXED_GAIN[phase], (const float *)0);
-}
-
-ohmstrain_status ohmstrain_fixed_gain_get(const ohmstrain_fixed_state *state, ohmstrain_phase phase,
-                                          ohmstrain_estimate *estimate)
-{
-    if (!state || !estimate || !is_phase(phase)) {
-        return OHMSTRAIN_ERR_ARGUMENT;
-    }
-    report(state->mean, FIXED_GAIN[phase].strain_sd, FIXED_GAIN[phase].rate_sd, estimate);
     return OHMSTRAIN_OK;
 }

@@ -31,7 +31,7 @@ extern "C" {
 /* What a function returns. */
 typedef enum ohmstrain_status {
     OHMSTRAIN_OK = 0,
-    /* A null pointer where a state or a result is needed, or a phase that does not exist. */
+    /* A null pointer where a state or a result is needed. */
     OHMSTRAIN_ERR_ARGUMENT = -1,
     /* The reading or its deviation is NaN or infinite, or the rest reading is not positive. Without a reading, predict. */
     OHMSTRAIN_ERR_NOT_FINITE = -2,
@@ -78,36 +78,6 @@ ohmstrain_status ohmstrain_start(ohmstrain_state *state);
 ohmstrain_status ohmstrain_step(ohmstrain_state *state, float reading, float reading_sd, ohmstrain_residual *residual);
 ohmstrain_status ohmstrain_predict(ohmstrain_state *state);
 ohmstrain_status ohmstrain_get(const ohmstrain_state *state, ohmstrain_estimate *estimate);
-
-/* The filter with fixed gains: cheaper and coarser, for processors without floating-point hardware.
- *
- * There is one settled gain for each phase. Deviations are constant too: those of the settled filter, which is right
- * near the middle of the motion the sensor was calibrated on and too sure of itself elsewhere.
-{% if vectors.fixed_fails %}
- * NOT FOR THIS SENSOR: on its own law's readings its error is << vectors.fixed_error >>, the extended Kalman filter's << vectors.ekf_error >>.
-{% endif %}
- */
-typedef enum ohmstrain_phase {
-    OHMSTRAIN_HOLD = 0,
-    OHMSTRAIN_EXTEND = 1,
-    OHMSTRAIN_RETRACT = 2
-} ohmstrain_phase;
-
-/* What the filter with fixed gains knows. */
-typedef struct ohmstrain_fixed_state {
-    float mean[OHMSTRAIN_STATES];
-    float rest_reading;
-} ohmstrain_fixed_state;
-
-/* ohmstrain_fixed_gain_phase: the phase that the state's own rate suggests; pass it on, or one you know from elsewhere.
- * ohmstrain_fixed_gain_step:  one interval on, with a reading.
- */
-ohmstrain_status ohmstrain_fixed_gain_start(ohmstrain_fixed_state *state);
-ohmstrain_phase ohmstrain_fixed_gain_phase(const ohmstrain_fixed_state *state);
-ohmstrain_status ohmstrain_fixed_gain_step(ohmstrain_fixed_state *state, ohmstrain_phase phase, float reading);
-ohmstrain_status ohmstrain_fixed_gain_predict(ohmstrain_fixed_state *state, ohmstrain_phase phase);
-ohmstrain_status ohmstrain_fixed_gain_get(const ohmstrain_fixed_state *state, ohmstrain_phase phase,
-                                          ohmstrain_estimate *estimate);
 
 #ifdef __cplusplus
 }
