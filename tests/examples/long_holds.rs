@@ -22,7 +22,7 @@ use scenario::{CALIBRATION_SEED, TEST_SEEDS, session};
 
 fn samples(trace: &Trace) -> Samples<'_> {
     let strain = trace.reference.as_ref().map_or(&[][..], |reference| &reference.values);
-    Samples { time_s: &trace.time_s, reading: &trace.readings.values, strain }
+    Samples::new(&trace.time_s, &trace.readings.values, strain).expect("a simulated trace")
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -50,9 +50,9 @@ fn score_estimator(params: &SensorParams, kind: EstimatorKind, test: &Trace) -> 
     let samples = samples(test);
     let mut rows = Vec::with_capacity(samples.len());
     for k in 0..samples.len() {
-        filter.step(samples.time_s[k], Some(Reading::from(samples.reading[k] / params.rest_reading - 1.0)))?;
+        filter.step(samples.time_s()[k], Some(Reading::from(samples.reading()[k] / params.rest_reading - 1.0)))?;
         let strain = filter.strain();
-        let (time_s, truth) = (samples.time_s[k], samples.strain[k]);
+        let (time_s, truth) = (samples.time_s()[k], samples.strain()[k]);
         rows.push(ScoredRow { time_s, truth, strain: strain.mean, sd: Some(strain.sd()) });
     }
     Scores::new(&rows).ok_or_else(|| "nothing to score".into())
@@ -61,8 +61,8 @@ fn score_estimator(params: &SensorParams, kind: EstimatorKind, test: &Trace) -> 
 fn score_static(params: &SensorParams, test: &Trace) -> Result<Scores, Box<dyn Error>> {
     let samples = samples(test);
     let row = |k: usize| {
-        let (time_s, truth) = (samples.time_s[k], samples.strain[k]);
-        ScoredRow { time_s, truth, strain: params.static_cubic.strain(samples.reading[k]), sd: None }
+        let (time_s, truth) = (samples.time_s()[k], samples.strain()[k]);
+        ScoredRow { time_s, truth, strain: params.static_cubic.strain(samples.reading()[k]), sd: None }
     };
     Scores::new(&(0..samples.len()).map(row).collect::<Vec<_>>()).ok_or_else(|| "nothing to score".into())
 }

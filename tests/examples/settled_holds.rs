@@ -62,7 +62,7 @@ struct Hold {
 fn study(training: &Trace, tests: &[Trace], from: usize) -> Result<Vec<Hold>, Box<dyn Error>> {
     let strain = |trace: &Trace| trace.reference.as_ref().map_or(vec![], |reference| reference.values.clone());
     let known = strain(training);
-    let samples = Samples { time_s: &training.time_s, reading: &training.readings.values, strain: &known };
+    let samples = Samples::new(&training.time_s, &training.readings.values, &known)?;
     let calibration =
         calibrate(&[samples], LawOptions::candidates(EstimatorKind::Ensemble), &[EstimatorKind::Ensemble], |_| ())?;
     let params = calibration.into_sensor("", Quantity::Strain, ReadingUnit::Ohm);

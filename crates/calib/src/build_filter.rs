@@ -223,9 +223,10 @@ fn interval(estimator: &EstimatorParams, setting: Setting) -> Interval {
 pub(crate) const HYPOTHESES: usize = 8;
 /// Capacity of the filter of phase histories.
 pub(crate) const HISTORIES: usize = 16;
-/// Particles, and the seed of their paths: the same readings give the same estimates.
+/// Particles.
 const PARTICLES: usize = 4000;
-const PARTICLE_SEED: u64 = 1;
+/// Seed of the particles' paths: the same readings give the same estimates.
+pub const PARTICLE_SEED: u64 = 1;
 
 fn initial_belief<S: StrainSensor<f64, M, B, N>, const M: usize, const B: usize, const N: usize, const L: usize>(
     model: &S,

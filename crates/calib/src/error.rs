@@ -1,4 +1,5 @@
 use crate::estimator_params::EstimatorKind;
+use crate::samples::SamplesError;
 use ohmstrain_ekf::StepError;
 use ohmstrain_model::ParameterError;
 use thiserror::Error;
@@ -23,6 +24,12 @@ pub enum CalibrationError {
         /// Rows needed.
         needed: usize,
     },
+    /// Slices that are no recording.
+    #[error(transparent)]
+    Samples(#[from] SamplesError),
+    /// The readings never change.
+    #[error("the reading is constant: nothing can be learned from it")]
+    ConstantReading,
     /// The reference never moves.
     #[error("the reference is constant: nothing can be learned from it")]
     ConstantStrain,

@@ -52,7 +52,7 @@ mod way_back;
 
 pub use baselines::{Baseline, Baselines, Features, Fir, LeakyBank, LowPassMode, Regression, StaticCubic};
 pub use bootstrap::{Bootstrap, bootstrap_law};
-pub use build_filter::build_filter;
+pub use build_filter::{PARTICLE_SEED, build_filter};
 pub use calibrate::{Calibration, Stage, calibrate};
 pub use ensemble::{EnsembleParams, MemberParams, OwnLaw};
 pub use error::CalibrationError;
@@ -67,5 +67,5 @@ pub use law_structures::{StructureScore, compare_structures};
 pub use params::{
     FORMAT, JointParams, Quantity, RangeParams, ReadingUnit, RecordingInfo, SensorParams, Uncertainty, Validity,
 };
-pub use samples::Samples;
+pub use samples::{Samples, SamplesError};
 pub use scores::{ScoredRow, Scores};

@@ -1,19 +1,118 @@
+use thiserror::Error;
+
 use crate::CalibrationError;
 
-/// One recording: times, readings and, where it is known, the true strain. All slices have the same length.
+/// One recording: times, readings and, where it is known, the true strain.
 ///
 /// "Strain" stands for the reference quantity whatever its unit: an angle in degrees is calibrated in degrees.
 #[derive(Clone, Copy, Debug)]
 pub struct Samples<'a> {
     /// Times, s, strictly increasing.
-    pub time_s: &'a [f64],
+    pub(crate) time_s: &'a [f64],
     /// Readings, Ω or a ratio, positive; NaN where missing.
-    pub reading: &'a [f64],
+    pub(crate) reading: &'a [f64],
     /// True strain; NaN where missing.
-    pub strain: &'a [f64],
+    pub(crate) strain: &'a [f64],
+}
+
+/// Why slices are no recording. Rows count from zero.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum SamplesError {
+    /// The slices have different lengths.
+    #[error("{times} times, {readings} readings and {strains} strains; expected as many of each")]
+    Lengths {
+        /// Number of times.
+        times: usize,
+        /// Number of readings.
+        readings: usize,
+        /// Number of strains.
+        strains: usize,
+    },
+    /// A time is NaN or infinite.
+    #[error("row {row}: expected a finite time, found {time_s}")]
+    Time {
+        /// The row.
+        row: usize,
+        /// Its time, s.
+        time_s: f64,
+    },
+    /// A time is not after the one before.
+    #[error("row {row}: expected a time after {before_s} s, found {time_s} s")]
+    Order {
+        /// The row.
+        row: usize,
+        /// Its time, s.
+        time_s: f64,
+        /// The time before, s.
+        before_s: f64,
+    },
+    /// A reading is infinite, zero or negative.
+    #[error("row {row}: expected a positive reading, or NaN where it is missing, found {reading}")]
+    Reading {
+        /// The row.
+        row: usize,
+        /// Its reading.
+        reading: f64,
+    },
+    /// A strain is infinite.
+    #[error("row {row}: expected a finite strain, or NaN where it is missing, found {strain}")]
+    Strain {
+        /// The row.
+        row: usize,
+        /// Its strain.
+        strain: f64,
+    },
 }
 
 impl<'a> Samples<'a> {
+    /// Times, s, that increase; positive readings, Ω or ratios; and true strains. NaN stands for a missing reading or
+    /// strain.
+    ///
+    /// # Errors
+    /// The first row that is not as it must be, or lengths that differ.
+    pub fn new(time_s: &'a [f64], reading: &'a [f64], strain: &'a [f64]) -> Result<Self, SamplesError> {
+        if reading.len() != time_s.len() || strain.len() != time_s.len() {
+            let (times, readings, strains) = (time_s.len(), reading.len(), strain.len());
+            return Err(SamplesError::Lengths { times, readings, strains });
+        }
+        let mut before = None;
+        for (row, ((&time_s, &reading), &strain)) in time_s.iter().zip(reading).zip(strain).enumerate() {
+            if !time_s.is_finite() {
+                return Err(SamplesError::Time { row, time_s });
+            }
+            if let Some(before_s) = before.filter(|before_s| time_s <= *before_s) {
+                return Err(SamplesError::Order { row, time_s, before_s });
+            }
+            if reading <= 0.0 || reading.is_infinite() {
+                return Err(SamplesError::Reading { row, reading });
+            }
+            if strain.is_infinite() {
+                return Err(SamplesError::Strain { row, strain });
+            }
+            before = Some(time_s);
+        }
+        Ok(Self { time_s, reading, strain })
+    }
+
+    /// Times, s.
+    #[must_use]
+    pub const fn time_s(&self) -> &'a [f64] {
+        self.time_s
+    }
+
+    /// Readings; NaN where missing.
+    #[must_use]
+    pub const fn reading(&self) -> &'a [f64] {
+        self.reading
+    }
+
+    /// True strains; NaN where missing.
+    #[must_use]
+    pub const fn strain(&self) -> &'a [f64] {
+        self.strain
+    }
+
     /// The first `rows` rows.
     #[must_use]
     pub fn head(&self, rows: usize) -> Self {
@@ -63,9 +162,17 @@ pub(crate) fn check(recordings: &[Samples]) -> Result<(f64, f64), CalibrationErr
     }
     match range {
         None => Err(CalibrationError::NoRecording),
-        Some((low, high)) if high > low => Ok((low, high)),
-        Some(_) => Err(CalibrationError::ConstantStrain),
+        Some((low, high)) if !(high > low) => Err(CalibrationError::ConstantStrain),
+        Some(_) if recordings.iter().all(is_frozen) => Err(CalibrationError::ConstantReading),
+        Some(range) => Ok(range),
     }
+}
+
+/// Whether the reading never changes.
+fn is_frozen(samples: &Samples) -> bool {
+    let mut readings = samples.complete_rows().map(|k| samples.reading[k]);
+    let first = readings.next();
+    readings.all(|reading| Some(reading) == first)
 }
 
 /// The known strain without gaps: missing values interpolated in time, the ends held.

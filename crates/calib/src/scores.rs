@@ -1,5 +1,5 @@
 use serde::Serialize;
-use statrs::distribution::{ContinuousCDF, Normal};
+use statrs::distribution::{Continuous, ContinuousCDF, Normal};
 
 use crate::left_out::REFERENCE_SD;
 
@@ -22,6 +22,18 @@ pub struct Scores {
     pub coverage_90: Option<f64>,
     /// The same for 95 %.
     pub coverage_95: Option<f64>,
+    /// Mean width of the 95 % interval, in the unit of strain: what the coverage was bought with.
+    pub width_95: Option<f64>,
+    /// The same in percent of full scale.
+    pub width_95_percent_fs: Option<f64>,
+    /// Mean continuous ranked probability score, in the unit of strain: of a normal distribution with the estimate as its
+    /// mean, as reported (within the limits), and its deviation. Less is better, whether an error is too large or an
+    /// interval too wide; without a deviation it is the absolute error, so that estimates with and without one compare.
+    ///
+    /// Source: Gneiting & Raftery, *J. Am. Stat. Assoc.* 102 (2007) 359, eq. 21.
+    pub crps: f64,
+    /// The same in percent of full scale.
+    pub crps_percent_fs: f64,
     /// Mean log density of the truth, strain in units of full scale; a reference is given a deviation of 0.5 % of it.
     pub log_score: Option<f64>,
     /// Share of the time on the wrong branch: the error is above 20 % of full scale for 2 s or longer.
@@ -62,6 +74,8 @@ impl Scores {
         let rmse = mean(&|row| (row.strain - row.truth).powi(2)).sqrt();
         let has_sd = rows.iter().all(|row| row.sd.is_some());
         let covered = |level: f64| has_sd.then(|| mean(&|row| f64::from(u8::from(row.is_covered(level)))));
+        let width_95 = has_sd.then(|| mean(&|row| 2.0 * row.half_width(0.95)));
+        let crps = mean(&ScoredRow::crps);
         Some(Self {
             n,
             rmse,
@@ -71,6 +85,10 @@ impl Scores {
             coverage_50: covered(0.5),
             coverage_90: covered(0.9),
             coverage_95: covered(0.95),
+            width_95,
+            width_95_percent_fs: width_95.map(|width| 100.0 * width / full_scale),
+            crps,
+            crps_percent_fs: 100.0 * crps / full_scale,
             log_score: has_sd.then(|| mean(&|row| row.log_density(full_scale))),
             wrong_branch: wrong_branch(&rows, full_scale),
         })
@@ -98,8 +116,18 @@ fn wrong_branch(rows: &[&ScoredRow], full_scale: f64) -> f64 {
 
 impl ScoredRow {
     fn is_covered(&self, level: f64) -> bool {
-        let half_width = Normal::standard().inverse_cdf(0.5 + 0.5 * level) * self.sd.unwrap_or(0.0);
-        (self.strain - self.truth).abs() <= half_width
+        (self.strain - self.truth).abs() <= self.half_width(level)
+    }
+
+    fn half_width(&self, level: f64) -> f64 {
+        Normal::standard().inverse_cdf(0.5 + 0.5 * level) * self.sd.unwrap_or(0.0)
+    }
+
+    fn crps(&self) -> f64 {
+        let error = (self.truth - self.strain).abs();
+        let Some(sd) = self.sd.filter(|sd| *sd > 0.0) else { return error };
+        let (normal, z) = (Normal::standard(), error / sd);
+        sd * (z * (2.0 * normal.cdf(z) - 1.0) + 2.0 * normal.pdf(z) - 0.5 * std::f64::consts::FRAC_2_SQRT_PI)
     }
 
     fn log_density(&self, full_scale: f64) -> f64 {

@@ -12,7 +12,7 @@ struct Bench {
 
 impl Bench {
     fn samples(&self) -> Samples<'_> {
-        Samples { time_s: &self.time_s, reading: &self.reading, strain: &self.strain }
+        Samples::new(&self.time_s, &self.reading, &self.strain).unwrap()
     }
 
     /// Times and readings that are known up to a row.

@@ -25,7 +25,7 @@ fn lag_found(lag_s: f64) -> Option<f64> {
         fast += inner * (-fast / 4.0 + k_fast * rate);
         slow += inner * (-slow / 30.0 + k_slow * rate);
     }
-    let samples = Samples { time_s: &time_s, reading: &reading, strain: &strain };
+    let samples = Samples::new(&time_s, &reading, &strain).unwrap();
     let law = fit_law(&[samples], LawOptions::default()).unwrap().law.law;
     reference_lag(&samples, &law)
 }

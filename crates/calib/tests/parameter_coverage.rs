@@ -136,7 +136,7 @@ fn for_each_recording(count: u64, mut visit: impl FnMut(&Samples)) {
             REST_OHM * (ratio + noise)
         };
         let reading: Vec<f64> = ratio.iter().map(noisy).collect();
-        visit(&Samples { time_s: &time_s, reading: &reading, strain: &strain });
+        visit(&Samples::new(&time_s, &reading, &strain).unwrap());
     }
 }
 

@@ -2,6 +2,7 @@ mod evaluate;
 mod export;
 mod fit_law;
 mod refine;
+mod split;
 
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -16,6 +17,7 @@ pub use evaluate::{Estimators, EvaluateArgs};
 pub use export::{ExportArgs, ExportTarget};
 pub use fit_law::{FitLawArgs, SegmentChoice, phase_name};
 pub use refine::RefineArgs;
+pub use split::Split;
 
 /// From the resistance of a soft strain sensor to strain, with an honest error bar.
 #[derive(Debug, Parser)]

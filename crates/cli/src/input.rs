@@ -1,5 +1,6 @@
 use std::fs::File;
 use std::io::{self, BufReader, Read};
+use std::ops::Range;
 use std::path::Path;
 
 use ohmstrain_bench_data::{Metadata, ReadingKind, Trace, TraceReader};
@@ -55,10 +56,10 @@ pub fn header<R: Read>(rows: &TraceReader<R>) -> String {
 }
 
 impl Recording {
-    /// Its first rows, under the same name.
-    pub fn head(&self, rows: usize) -> Self {
+    /// Some of its rows, under the same name.
+    pub fn rows(&self, rows: Range<usize>) -> Self {
         let (name, header, sha256) = (self.name.clone(), self.header.clone(), self.sha256.clone());
-        Self { name, header, sha256, trace: self.trace.rows(0..rows) }
+        Self { name, header, sha256, trace: self.trace.rows(rows) }
     }
 
     /// As calibration wants it.
@@ -69,7 +70,8 @@ impl Recording {
                 self.header
             )));
         };
-        Ok(Samples { time_s: &self.trace.time_s, reading: &self.trace.readings.values, strain: &reference.values })
+        Samples::new(&self.trace.time_s, &self.trace.readings.values, &reference.values)
+            .map_err(|error| CliError::Input(format!("{}: data {error}", self.name)))
     }
 
     /// The reference in a row; NaN where it is missing.

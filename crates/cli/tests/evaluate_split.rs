@@ -63,6 +63,41 @@ fn a_split_is_a_calibration_on_the_first_rows_and_scores_of_the_rest() {
     assert!(by_hand[0]["calibration_s"].is_null() && by_hand[0].get("lag_s").is_none());
 }
 
+/// Two shares and the halves exchanged: the same as each by itself, and what is summed up comes of the cases.
+#[test]
+fn several_splits_are_summed_up() {
+    let bench = simulated(&["1"]);
+    let flags = ["evaluate", "--json", "--estimator", "ekf", "1.csv", "--splits"];
+    let run =
+        |splits: &str| -> Value { serde_json::from_str(&bench.run(&[&flags[..], &[splits]].concat()).ok()).unwrap() };
+    let all = run("0.4,0.6,reversed");
+    assert_eq!((&all["schema"], &all["particle_seed"]), (&Value::from(2), &Value::from(1)));
+    assert!(all["made_by"].as_str().unwrap().starts_with("ohmstrain "));
+    let cases = all["recordings"].as_array().unwrap();
+    assert_eq!(cases.iter().map(|case| &case["split"]).collect::<Vec<_>>(), ["0.4", "0.6", "0.5:reversed"]);
+    assert!(cases.iter().all(|case| case["sha256"].as_str().unwrap().len() == 64));
+    // 40 and 60 % of 2001 rows are 800.4 and 1200.6; the first half ends where the last 1000 rows begin.
+    assert_eq!(cases.iter().map(|case| case["n"].as_u64().unwrap()).collect::<Vec<_>>(), [1201, 801, 1001]);
+    assert_same_scores(&cases[0], &run("0.4")["recordings"][0]);
+
+    let of = |estimate: &str| {
+        let summary = all["summary"].as_array().unwrap();
+        summary.iter().find(|row| row["estimate"] == estimate).unwrap().clone()
+    };
+    let ratios = cases.iter().map(|case| number(case, "rmse") / number(&case["baselines"]["static_cubic"], "rmse"));
+    let ratios: Vec<f64> = ratios.collect();
+    let mean = |name: &str| cases.iter().map(|case| number(case, name)).sum::<f64>() / 3.0;
+    let filter = of("ekf");
+    assert!((number(&filter, "ratio") - ratios.iter().product::<f64>().cbrt()).abs() < 1e-12);
+    assert_eq!(number(&filter, "worst_ratio"), ratios.iter().copied().fold(0.0, f64::max));
+    for name in ["crps_percent_fs", "width_95_percent_fs", "coverage_50", "coverage_90", "coverage_95"] {
+        assert!((number(&filter, name) - mean(name)).abs() < 1e-9, "{name}");
+    }
+    let cubic = of("static cubic");
+    assert!((number(&cubic, "ratio") - 1.0).abs() < 1e-12 && cubic["width_95_percent_fs"].is_null());
+    assert_eq!(of("ekf, smoother")["cases"], 3);
+}
+
 #[test]
 fn nothing_but_the_scores_depends_on_the_reference_of_the_test_rows() {
     let bench = simulated(&["1"]);
@@ -112,16 +147,19 @@ fn the_table_has_filter_smoother_and_four_baselines_per_recording() {
     let cells = |line: &str| -> Vec<String> { line.split('|').map(|cell| cell.trim().to_owned()).collect() };
     let header = cells(printed.lines().next().unwrap());
     let columns =
-        ["RMSE, strain", "MAE, strain", "%FS", "bias", "50 % covers", "90 % covers", "95 % covers", "log score"];
-    for column in columns.iter().chain(&["wrong branch", "calibration, s", "lag, s"]) {
+        ["RMSE, strain", "MAE, strain", "%FS", "bias", "50 % covers", "90 % covers", "95 % covers", "CRPS, %FS"];
+    for column in columns.iter().chain(&["95 % width, %FS", "log score", "wrong branch", "calibration, s", "lag, s"]) {
         assert!(header.iter().any(|name| name == column), "{column}: {printed}");
     }
     let rows: Vec<Vec<String>> = printed.lines().skip(2).map(cells).collect();
     let names = ["ekf", "smoother", "static cubic", "20 s FIR", "low-pass mode", "leaky bank"];
-    assert_eq!(rows.len(), 2 * names.len());
+    // An empty line and the table of all cases follow: its head, a rule and the same estimates.
+    assert_eq!(rows.len(), 2 * names.len() + 3 + names.len());
+    let (rows, summary) = rows.split_at(2 * names.len());
+    assert!(summary[3..].iter().zip(["ekf", "ekf, smoother"]).all(|(row, name)| row[1] == name && row[2] == "2"));
     for (k, row) in rows.iter().enumerate() {
         assert_eq!(row.len(), header.len(), "{printed}");
-        assert_eq!(row[1], ["1.csv", "2.csv"].map(|file| if k % 6 == 0 { file } else { "" })[k / 6]);
+        assert_eq!(row[1], ["1.csv 0.5", "2.csv 0.5"].map(|file| if k % 6 == 0 { file } else { "" })[k / 6]);
         assert_eq!(row[2], names[k % 6]);
     }
 }

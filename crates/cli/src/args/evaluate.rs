@@ -4,7 +4,7 @@ use std::str::FromStr;
 use clap::Args as ClapArgs;
 use ohmstrain_calib::EstimatorKind;
 
-use super::{Estimator, TraceArgs, finite};
+use super::{Estimator, Split, TraceArgs, finite};
 
 /// Flags of `evaluate`.
 #[derive(Debug, ClapArgs)]
@@ -44,19 +44,14 @@ pub struct CalibrationSource {
     /// The sensor's parameters
     #[arg(long, value_name = "sensor.toml")]
     pub sensor: Option<PathBuf>,
-    /// Calibrate on this share of the rows of each recording, the first ones, and score the rest; the filter still starts
-    /// at the first row
-    #[arg(long, value_name = "SHARE", value_parser = share)]
-    pub split: Option<f64>,
+    /// Calibrate on this share of the rows of each recording, the first ones, and score the rest; SHARE:reversed calibrates
+    /// on the last ones and scores those before, reversed stands for 0.5:reversed. The filter still starts at the first
+    /// row. Several, separated by commas, are done one after another and summed up
+    #[arg(long, visible_alias = "splits", value_name = "SHARE", value_delimiter = ',')]
+    pub split: Vec<Split>,
     /// Calibrate on this recording; may be given several times
     #[arg(long, value_name = "TRACE", requires = "test")]
     pub train: Vec<PathBuf>,
-}
-
-/// A number between zero and one, neither of them.
-fn share(text: &str) -> Result<f64, String> {
-    let between = finite(text).ok().filter(|share| *share > 0.0 && *share < 1.0);
-    between.ok_or_else(|| "expected a share between 0 and 1".into())
 }
 
 /// The estimators to evaluate.

@@ -99,9 +99,10 @@ pub fn write_report(
     scored_from_s: Option<f64>,
 ) -> Result<(), CliError> {
     let estimated = estimate(recording, params, None)?;
-    let filter = scoring::of_outputs(recording, &estimated.filtered, scored_from_s);
-    let smoother = scoring::of_outputs(recording, &estimated.smoothed, scored_from_s);
-    let cubic = scoring::of_baseline(recording, params.static_cubic.start(), scored_from_s);
+    let part = scoring::Part::since(scored_from_s);
+    let filter = scoring::of_outputs(recording, &estimated.filtered, part);
+    let smoother = scoring::of_outputs(recording, &estimated.smoothed, part);
+    let cubic = scoring::of_baseline(recording, params.static_cubic.start(), part);
     let scores: Vec<ScoreRow> = [("filter", filter), ("smoother", smoother), ("static cubic", cubic)]
         .into_iter()
         .filter_map(|(name, scores)| {
@@ -110,6 +111,8 @@ pub fn write_report(
                 rmse: scores.rmse,
                 rmse_percent_fs: scores.rmse_percent_fs,
                 coverage_95: scores.coverage_95,
+                width_95_percent_fs: scores.width_95_percent_fs,
+                crps_percent_fs: scores.crps_percent_fs,
             })
         })
         .collect();

@@ -28,7 +28,7 @@ pub fn run(args: &DemoArgs) -> Result<(), CliError> {
     let middle = (recording.trace.len() as f64 * CALIBRATION_SHARE) as usize;
     let test_from = recording.trace.time_s[middle];
 
-    let training = recording.head(middle);
+    let training = recording.rows(0..middle);
     let ensemble = EstimatorKind::Ensemble;
     let structures = LawOptions::candidates(ensemble);
     let params = calibrate_recordings(std::slice::from_ref(&training), structures, ensemble, &progress)?;
@@ -43,10 +43,11 @@ pub fn run(args: &DemoArgs) -> Result<(), CliError> {
     drop(progress);
 
     let mut table = score_table(params.quantity.name(), &[]);
+    let part = scoring::Part::since(Some(test_from));
     let scores = [
-        ("filter", scoring::of_outputs(&recording, &estimated.filtered, Some(test_from))),
-        ("smoother", scoring::of_outputs(&recording, &estimated.smoothed, Some(test_from))),
-        ("static cubic", scoring::of_baseline(&recording, params.static_cubic.start(), Some(test_from))),
+        ("filter", scoring::of_outputs(&recording, &estimated.filtered, part)),
+        ("smoother", scoring::of_outputs(&recording, &estimated.smoothed, part)),
+        ("static cubic", scoring::of_baseline(&recording, params.static_cubic.start(), part)),
     ];
     for (name, scores) in scores {
         if let Some(scores) = scores {

@@ -16,6 +16,8 @@ pub fn score_table(quantity: &str, more: &[&str]) -> Table {
         "50 % covers",
         "90 % covers",
         "95 % covers",
+        "95 % width, %FS",
+        "CRPS, %FS",
         "log score",
         "wrong branch",
     ];
@@ -36,6 +38,8 @@ pub fn add_scores(table: &mut Table, recording: &str, estimate: &str, scores: &S
         percent(scores.coverage_50),
         percent(scores.coverage_90),
         percent(scores.coverage_95),
+        scores.width_95_percent_fs.map_or_else(String::new, |width| format!("{width:.1}")),
+        format!("{:.2}", scores.crps_percent_fs),
         scores.log_score.map_or_else(String::new, |score| format!("{score:.2}")),
         percent(Some(scores.wrong_branch)),
     ];

@@ -2,11 +2,31 @@ use ohmstrain_calib::{Baseline, Output, ScoredRow, Scores};
 
 use crate::input::Recording;
 
-/// Scores of the rows from `from` on, of which `estimate` gives strain and deviation; `None` without a reference.
-fn scores(recording: &Recording, from: Option<f64>, estimate: impl Fn(usize) -> (f64, Option<f64>)) -> Option<Scores> {
+/// The rows that are scored, by their times.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Part {
+    /// Rows at this time, s, or later; all if there is none.
+    pub from_s: Option<f64>,
+    /// Rows before this time, s; all if there is none.
+    pub until_s: Option<f64>,
+}
+
+impl Part {
+    /// Rows from a time on, if there is one.
+    pub const fn since(from_s: Option<f64>) -> Self {
+        Self { from_s, until_s: None }
+    }
+
+    fn holds(self, time_s: f64) -> bool {
+        self.from_s.is_none_or(|from_s| time_s >= from_s) && self.until_s.is_none_or(|until_s| time_s < until_s)
+    }
+}
+
+/// Scores of the rows of `part`, of which `estimate` gives strain and deviation; `None` without a reference.
+fn scores(recording: &Recording, part: Part, estimate: impl Fn(usize) -> (f64, Option<f64>)) -> Option<Scores> {
     let times = &recording.trace.time_s;
     let rows: Vec<ScoredRow> = (0..times.len())
-        .filter(|&k| from.is_none_or(|from| times[k] >= from))
+        .filter(|&k| part.holds(times[k]))
         .map(|k| {
             let (strain, sd) = estimate(k);
             ScoredRow { time_s: times[k], truth: recording.truth(k), strain, sd }
@@ -16,17 +36,17 @@ fn scores(recording: &Recording, from: Option<f64>, estimate: impl Fn(usize) -> 
 }
 
 /// Scores of an estimator's outputs; `None` without a reference.
-pub fn of_outputs(recording: &Recording, outputs: &[Output], from: Option<f64>) -> Option<Scores> {
-    scores(recording, from, |k| {
+pub fn of_outputs(recording: &Recording, outputs: &[Output], part: Part) -> Option<Scores> {
+    scores(recording, part, |k| {
         let strain = outputs[k].estimate.strain;
         (strain.mean, Some(strain.sd()))
     })
 }
 
 /// Scores of a baseline, which runs over the whole recording too.
-pub fn of_baseline(recording: &Recording, mut baseline: impl Baseline, from: Option<f64>) -> Option<Scores> {
+pub fn of_baseline(recording: &Recording, mut baseline: impl Baseline, part: Part) -> Option<Scores> {
     let trace = &recording.trace;
     let rows = trace.time_s.iter().zip(&trace.readings.values);
     let strains: Vec<f64> = rows.map(|(&time_s, &reading)| baseline.strain(time_s, reading)).collect();
-    scores(recording, from, |k| (strains[k], None))
+    scores(recording, part, |k| (strains[k], None))
 }

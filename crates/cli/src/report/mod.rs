@@ -65,6 +65,10 @@ pub struct ScoreRow<'a> {
     pub rmse_percent_fs: f64,
     /// Share of rows, 0 to 1, whose 95 % interval holds the reference; `None` for an estimator without intervals.
     pub coverage_95: Option<f64>,
+    /// Mean width of those intervals in percent of full scale.
+    pub width_95_percent_fs: Option<f64>,
+    /// Mean continuous ranked probability score in percent of full scale.
+    pub crps_percent_fs: f64,
 }
 
 /// Why there is no report.

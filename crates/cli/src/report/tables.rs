@@ -57,12 +57,27 @@ pub fn scores(rows: &[ScoreRow], quantity: Quantity) -> Table {
         Quantity::AngleDeg => "RMSE (°)",
     };
     let cells = |row: &ScoreRow| {
-        let coverage = row.coverage_95.map_or_else(|| "–".into(), percent);
-        [row.name.to_owned(), plain(row.rmse), percent(row.rmse_percent_fs / 100.0), coverage]
+        let share = |share: Option<f64>| share.map_or_else(|| "–".into(), percent);
+        [
+            row.name.to_owned(),
+            plain(row.rmse),
+            percent(row.rmse_percent_fs / 100.0),
+            share(row.coverage_95),
+            share(row.width_95_percent_fs.map(|width| width / 100.0)),
+            percent(row.crps_percent_fs / 100.0),
+        ]
     };
     Table::new(
-        "Error against the reference, and how often the 95 % interval holds it",
-        ["Estimator", rmse, "of full scale", "Coverage of 95 % interval"],
+        "Error against the reference, how often the 95 % interval holds it and how wide it is, and the ranked probability \
+         score (CRPS), which counts both",
+        [
+            "Estimator",
+            rmse,
+            "of full scale",
+            "Coverage of 95 % interval",
+            "Width, of full scale",
+            "CRPS, of full scale",
+        ],
         rows.iter().map(cells).collect(),
     )
 }

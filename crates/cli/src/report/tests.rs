@@ -86,7 +86,14 @@ fn page(params: &SensorParams, time_s: &[f64], reading: &[f64], truth: Option<&[
         params,
         rest_reading: params.rest_reading,
         scored_from_s: time_s.get(time_s.len() / 2).copied(),
-        scores: &[ScoreRow { name: "<filter>", rmse: 0.01, rmse_percent_fs: 3.3, coverage_95: None }],
+        scores: &[ScoreRow {
+            name: "<filter>",
+            rmse: 0.01,
+            rmse_percent_fs: 3.3,
+            coverage_95: None,
+            width_95_percent_fs: None,
+            crps_percent_fs: 2.5,
+        }],
     };
     render(&input).unwrap_or_else(|error| panic!("{error}"))
 }

@@ -1,10 +1,16 @@
 use std::io::{Error, Write};
 
-use ohmstrain_calib::{Quantity, Scores};
+use ohmstrain_calib::{PARTICLE_SEED, Quantity, Scores};
 use serde::Serialize;
 
+use super::summary::{self, Summary, summaries};
 use crate::commands::score_table::{add_scores, score_table};
 use crate::error::CliError;
+use crate::sensor_file::MADE_BY;
+
+/// Version of what `--json` prints. Names are added without another version; one that goes or changes its meaning brings
+/// the next.
+const SCHEMA: u32 = 2;
 
 /// All scores, recording by recording.
 #[derive(Default)]
@@ -15,6 +21,13 @@ pub struct Evaluation {
 /// What `--json` prints.
 #[derive(Serialize)]
 struct Json<'a> {
+    schema: u32,
+    /// Program and version.
+    made_by: &'static str,
+    /// Seed of the particles; nothing else draws, neither in calibration nor in the filters.
+    particle_seed: u64,
+    /// All cases summed up, estimate by estimate.
+    summary: Vec<Summary>,
     recordings: Vec<&'a RecordingScores>,
 }
 
@@ -22,6 +35,11 @@ struct Json<'a> {
 #[derive(Serialize)]
 pub struct RecordingScores {
     pub file: String,
+    /// SHA-256 of the recording's bytes, hexadecimal.
+    pub sha256: String,
+    /// Share of the rows that calibrated, if the rest of them was scored.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub split: Option<String>,
     pub estimator: &'static str,
     #[serde(flatten)]
     pub filter: Scores,
@@ -55,7 +73,7 @@ pub struct LearnedScores {
 
 impl BaselineScores {
     /// With the names of the table.
-    fn named(&self) -> impl Iterator<Item = (&'static str, Scores)> {
+    pub fn named(&self) -> impl Iterator<Item = (&'static str, Scores)> {
         let learned = self.learned.map(|learned| {
             [
                 ("20 s FIR", learned.fir_20s),
@@ -86,12 +104,23 @@ impl Evaluation {
     /// Writes JSON or a table.
     pub fn write(&self, out: &mut dyn Write, json: bool) -> Result<(), CliError> {
         if json {
-            let json = Json { recordings: self.recordings().collect() };
+            let json = Json {
+                schema: SCHEMA,
+                made_by: MADE_BY,
+                particle_seed: PARTICLE_SEED,
+                summary: self.summaries(),
+                recordings: self.recordings().collect(),
+            };
             serde_json::to_writer_pretty(&mut *out, &json).map_err(Error::from)?;
             Ok(writeln!(out)?)
         } else {
-            self.write_table(out)
+            self.write_table(out)?;
+            if self.recordings.len() > 1 { summary::write(&self.summaries(), out) } else { Ok(()) }
         }
+    }
+
+    fn summaries(&self) -> Vec<Summary> {
+        summaries(self.recordings.iter().map(Vec::as_slice))
     }
 
     /// One table: filter and smoother of every estimator, then what they are compared with.
@@ -106,8 +135,8 @@ impl Evaluation {
         let mut table = score_table(&quantities.join(" or "), &more);
         for scores in &self.recordings {
             for (k, of) in scores.iter().enumerate() {
-                let file = if k == 0 { of.file.as_str() } else { "" };
-                add_scores(&mut table, file, of.estimator, &of.filter, &of.more());
+                let case = if k == 0 { of.case() } else { String::new() };
+                add_scores(&mut table, &case, of.estimator, &of.filter, &of.more());
                 add_scores(&mut table, "", "smoother", &of.smoother, &[]);
             }
             for (name, of) in scores.iter().take(1).flat_map(|scores| scores.baselines.named()) {
@@ -119,6 +148,11 @@ impl Evaluation {
 }
 
 impl RecordingScores {
+    /// The recording and, where there is one, the split.
+    pub fn case(&self) -> String {
+        self.split.as_ref().map_or_else(|| self.file.clone(), |split| format!("{} {split}", self.file))
+    }
+
     /// The cells beyond the scores.
     fn more(&self) -> Vec<String> {
         let lag = self.lag_s.map(|lag| lag.map_or_else(|| "unknown".into(), |lag_s| format!("{lag_s:+.2}")));

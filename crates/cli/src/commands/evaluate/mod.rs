@@ -1,5 +1,6 @@
 mod evaluation;
 mod sensors;
+mod summary;
 
 use std::path::{Path, PathBuf};
 
@@ -8,7 +9,8 @@ use ohmstrain_calib::{Baselines, Samples, reference_lag};
 use rayon::prelude::*;
 use sensors::{Rivals, Sensor};
 
-use crate::args::{Estimators, EvaluateArgs};
+use crate::args::{Estimators, EvaluateArgs, Split};
+use crate::commands::scoring::Part;
 use crate::error::CliError;
 use crate::input::{self, Recording, check_unit};
 use crate::output::write_to;
@@ -21,10 +23,10 @@ const LEAST_COVERAGE: f64 = 0.8;
 pub fn run(args: &EvaluateArgs) -> Result<(), CliError> {
     let mut evaluation = Evaluation::default();
     let source = &args.calibration;
-    let judged = match (&source.sensor, source.split) {
+    let judged = match (&source.sensor, source.split.is_empty()) {
         (Some(sensor), _) => with_sensor_file(args, sensor, &mut evaluation),
-        (None, Some(share)) => with_split(args, share, &mut evaluation),
-        (None, None) => with_training(args, &mut evaluation),
+        (None, false) => with_splits(args, &mut evaluation),
+        (None, true) => with_training(args, &mut evaluation),
     };
     // Calibrations take long: what was scored before an error is still good.
     if judged.is_ok() || !evaluation.is_empty() {
@@ -38,26 +40,41 @@ pub fn run(args: &EvaluateArgs) -> Result<(), CliError> {
 fn with_sensor_file(args: &EvaluateArgs, path: &Path, evaluation: &mut Evaluation) -> Result<(), CliError> {
     let sensors = Sensor::from_file(path, args.estimator)?;
     let rivals = Rivals { static_cubic: sensors[0].params.static_cubic, learned: None };
-    let judged = |path: &PathBuf| judge(&read(args, path)?, args.from, &sensors, &rivals);
+    let judged = |path: &PathBuf| judge(&read(args, path)?, Part::since(args.from), &sensors, &rivals);
     add_until_error(evaluation, args.traces.par_iter().map(judged).collect())
 }
 
-/// Every recording with parameters from its first rows.
-fn with_split(args: &EvaluateArgs, share: f64, evaluation: &mut Evaluation) -> Result<(), CliError> {
+/// Every recording with parameters from some of its rows, split by split.
+fn with_splits(args: &EvaluateArgs, evaluation: &mut Evaluation) -> Result<(), CliError> {
     let progress = Progress::new("calibrating");
     for path in &args.traces {
         let recording = read(args, path)?;
-        let rows = (recording.trace.len() as f64 * share) as usize;
-        let training = [recording.head(rows)];
-        let (sensors, rivals) = calibrated(&training, args.estimator, &progress)?;
-        progress.doing("scoring");
-        let lag_s = reference_lag(&recording.samples()?, &sensors[0].params.law);
-        let Judged { mut scores, .. } =
-            judge(&recording, recording.trace.time_s.get(rows).copied(), &sensors, &rivals)?;
-        scores.iter_mut().for_each(|scores| scores.lag_s = Some(lag_s));
-        evaluation.add(scores);
+        for &split in &args.calibration.split {
+            evaluation.add(with_split(&recording, split, args.estimator, &progress)?);
+        }
     }
     Ok(())
+}
+
+/// A recording with parameters from some of its rows, scored on the others.
+fn with_split(
+    recording: &Recording,
+    split: Split,
+    estimators: Estimators,
+    progress: &Progress,
+) -> Result<Vec<RecordingScores>, CliError> {
+    let rows = recording.trace.len();
+    let training = [recording.rows(split.training(rows))];
+    let (sensors, rivals) = calibrated(&training, estimators, progress)?;
+    progress.doing("scoring");
+    let lag_s = reference_lag(&recording.samples()?, &sensors[0].params.law);
+    let (scored, time_at) = (split.scored(rows), |row: usize| recording.trace.time_s.get(row).copied());
+    let part = Part { from_s: time_at(scored.start), until_s: time_at(scored.end) };
+    let Judged { mut scores, .. } = judge(recording, part, &sensors, &rivals)?;
+    for scores in &mut scores {
+        (scores.lag_s, scores.split) = (Some(lag_s), Some(split.to_string()));
+    }
+    Ok(scores)
 }
 
 /// Some recordings with parameters from others.
@@ -69,7 +86,7 @@ fn with_training(args: &EvaluateArgs, evaluation: &mut Evaluation) -> Result<(),
     let tests: Vec<Recording> = args.test.iter().map(|path| read(path)).collect::<Result<_, _>>()?;
     let (sensors, rivals) = calibrated(&training, args.estimator, &progress)?;
     progress.doing("scoring");
-    let judged = |recording: &Recording| judge(recording, args.from, &sensors, &rivals);
+    let judged = |recording: &Recording| judge(recording, Part::since(args.from), &sensors, &rivals);
     add_until_error(evaluation, tests.par_iter().map(judged).collect())
 }
 
@@ -108,39 +125,43 @@ struct Judged {
     warnings: Vec<String>,
 }
 
-/// Scores of every sensor on the rows of a recording from `from` on.
-fn judge(recording: &Recording, from: Option<f64>, sensors: &[Sensor], rivals: &Rivals) -> Result<Judged, CliError> {
+/// Scores of every sensor on some rows of a recording.
+fn judge(recording: &Recording, part: Part, sensors: &[Sensor], rivals: &Rivals) -> Result<Judged, CliError> {
     let mut judged = Judged::default();
     let Some(first) = sensors.first() else { return Ok(judged) };
     check_unit(&recording.header, recording.trace.readings.kind, first.params.reading)?;
     recording.samples()?;
     recording.check_quantity(first.params.quantity)?;
     let nothing = || {
-        let rows = from.map_or_else(|| "any row".into(), |from| format!("time_s >= {from}"));
+        let rows = part.from_s.map_or_else(|| "any row".into(), |from| format!("time_s >= {from}"));
         CliError::Input(format!("{}: expected a reference at {rows}, found none", recording.name))
     };
-    let baselines = rivals.scores(recording, from).ok_or_else(nothing)?;
+    let baselines = rivals.scores(recording, part).ok_or_else(nothing)?;
     for sensor in sensors {
-        let scores = sensor.judge(recording, from, baselines, &mut judged.warnings)?;
+        let scores = sensor.judge(recording, part, baselines, &mut judged.warnings)?;
         judged.scores.push(scores.ok_or_else(nothing)?);
     }
     Ok(judged)
 }
 
 fn check(evaluation: &Evaluation) -> Result<(), CliError> {
+    let split = |of: &RecordingScores| of.split.as_ref().map_or_else(String::new, |split| format!("split {split}: "));
     for recording in evaluation.recordings() {
         let baseline = recording.baselines.static_cubic.rmse;
         if recording.filter.rmse >= baseline {
             return Err(CliError::Check(format!(
-                "{}: RMSE {:.4} is not below the static cubic's {baseline:.4}",
-                recording.file, recording.filter.rmse
+                "{}: {}RMSE {:.4} is not below the static cubic's {baseline:.4}",
+                recording.file,
+                split(recording),
+                recording.filter.rmse
             )));
         }
         let coverage = recording.filter.coverage_95.unwrap_or(0.0);
         if coverage < LEAST_COVERAGE {
             return Err(CliError::Check(format!(
-                "{}: the 95 % interval covers {:.1} %, less than {:.0} %",
+                "{}: {}the 95 % interval covers {:.1} %, less than {:.0} %",
                 recording.file,
+                split(recording),
                 100.0 * coverage,
                 100.0 * LEAST_COVERAGE
             )));

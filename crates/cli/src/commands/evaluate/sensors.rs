@@ -6,7 +6,7 @@ use ohmstrain_calib::{Baselines, EstimatorKind, LawOptions, SensorParams, Start,
 use super::evaluation::{BaselineScores, LearnedScores, RecordingScores};
 use crate::args::Estimators;
 use crate::commands::calibrate::calibrate_recordings;
-use crate::commands::scoring;
+use crate::commands::scoring::{self, Part};
 use crate::error::CliError;
 use crate::input::Recording;
 use crate::progress::Progress;
@@ -64,12 +64,12 @@ impl Sensor {
         wanted.into_iter().map(calibrate).collect()
     }
 
-    /// Scores on the rows of a recording from `from` on, the filter started at the first; `None` without a reference. What
+    /// Scores on some rows of a recording, the filter started at the first; `None` without a reference. What
     /// casts doubt on them is added to `warnings`.
     pub fn judge(
         &self,
         recording: &Recording,
-        from: Option<f64>,
+        part: Part,
         baselines: BaselineScores,
         warnings: &mut Vec<String>,
     ) -> Result<Option<RecordingScores>, CliError> {
@@ -83,12 +83,14 @@ impl Sensor {
                 watch.see(trace.time_s[k], trace.readings.values[k], rate, recording.truth(k), &mut keep);
             }
         }
-        let scores = |outputs| scoring::of_outputs(recording, outputs, from);
+        let scores = |outputs| scoring::of_outputs(recording, outputs, part);
         let (Some(filter), Some(smoother)) = (scores(&estimated.filtered), scores(&estimated.smoothed)) else {
             return Ok(None);
         };
         Ok(Some(RecordingScores {
             file: recording.name.clone(),
+            sha256: recording.sha256.clone(),
+            split: None,
             estimator: self.kind.name(),
             filter,
             smoother,
@@ -101,17 +103,17 @@ impl Sensor {
 }
 
 impl Rivals {
-    /// Scores on the rows of a recording from `from` on; `None` without a reference.
-    pub fn scores(&self, recording: &Recording, from: Option<f64>) -> Option<BaselineScores> {
+    /// Scores on some rows of a recording; `None` without a reference.
+    pub fn scores(&self, recording: &Recording, part: Part) -> Option<BaselineScores> {
         let learned = match &self.learned {
             None => None,
             Some(learned) => Some(LearnedScores {
-                fir_20s: scoring::of_baseline(recording, learned.fir.start(), from)?,
-                low_pass_mode: scoring::of_baseline(recording, learned.low_pass_mode.start(), from)?,
-                leaky_bank: scoring::of_baseline(recording, learned.leaky_bank.start(), from)?,
+                fir_20s: scoring::of_baseline(recording, learned.fir.start(), part)?,
+                low_pass_mode: scoring::of_baseline(recording, learned.low_pass_mode.start(), part)?,
+                leaky_bank: scoring::of_baseline(recording, learned.leaky_bank.start(), part)?,
             }),
         };
-        let static_cubic = scoring::of_baseline(recording, self.static_cubic.start(), from)?;
+        let static_cubic = scoring::of_baseline(recording, self.static_cubic.start(), part)?;
         Some(BaselineScores { static_cubic, learned })
     }
 }

@@ -56,7 +56,7 @@ pub fn pieces(recording: &Recording, args: &FitLawArgs) -> Result<Vec<Piece>, Cl
         check(args.law, *choice)?;
     }
     let samples = recording.samples()?;
-    let segments = numbered(segment(samples.time_s, samples.strain));
+    let segments = numbered(segment(samples.time_s(), samples.strain()));
     let cutter = Cutter { samples, segments: &segments };
     let chosen = if args.law == ClosedForm::Eq8And9 { cutter.pairs(args) } else { cutter.singles(args) };
     if chosen.is_empty() {
@@ -95,7 +95,8 @@ fn whole(recording: &Recording, args: &FitLawArgs) -> Result<Piece, CliError> {
         moving_data(&recording.samples()?, rows)
     } else {
         let reading = &trace.readings.values;
-        whole_data(&Samples { time_s: &trace.time_s, reading, strain: reading }, rows)
+        let samples = Samples::new(&trace.time_s, reading, reading);
+        whole_data(&samples.map_err(|error| CliError::Input(format!("{}: data {error}", recording.name)))?, rows)
     };
     Ok(Piece {
         label: "whole".into(),
@@ -176,7 +177,7 @@ impl Cutter<'_> {
         let mut piece = self.single(i, ClosedForm::Eq8And9);
         let (moved, held) = (self.segments[i].segment.rows.clone(), hold.segment.rows.clone());
         piece.label = format!("{}+{}", piece.label, hold.label());
-        piece.until_s = self.samples.time_s[held.end - 1];
+        piece.until_s = self.samples.time_s()[held.end - 1];
         piece.data.extend(hold_data(&self.samples, held, Some(moved)));
         piece
     }
@@ -197,8 +198,8 @@ impl Cutter<'_> {
             phase: Some(own.segment.phase),
             after: before.map(|before| before.segment.phase),
             speed_per_s: data.first().filter(|_| moves).map(|datum| datum.at.rate.abs()),
-            from_s: self.samples.time_s[start],
-            until_s: self.samples.time_s[end - 1],
+            from_s: self.samples.time_s()[start],
+            until_s: self.samples.time_s()[end - 1],
             data,
         }
     }

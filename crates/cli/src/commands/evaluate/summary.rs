@@ -1,0 +1,130 @@
+use std::io::Write;
+
+use comfy_table::{Table, presets};
+use ohmstrain_calib::Scores;
+use serde::Serialize;
+
+use super::evaluation::RecordingScores;
+use crate::error::CliError;
+
+/// All cases of one estimate in a row of figures. A case is a recording and a split of it.
+#[derive(Debug, Serialize)]
+pub struct Summary {
+    /// The estimate's name.
+    estimate: String,
+    /// Cases.
+    cases: usize,
+    /// Geometric mean of the error over the static cubic's on the same rows.
+    ratio: f64,
+    /// The largest such ratio.
+    worst_ratio: f64,
+    /// The case that it belongs to.
+    worst_case: String,
+    /// Mean of the CRPS, %FS.
+    crps_percent_fs: f64,
+    /// Mean of the 95 % interval's width, %FS; `None` for estimates without a deviation.
+    width_95_percent_fs: Option<f64>,
+    /// Mean coverages.
+    coverage_50: Option<f64>,
+    coverage_90: Option<f64>,
+    coverage_95: Option<f64>,
+    /// The least coverage of the 95 % interval.
+    least_coverage_95: Option<f64>,
+}
+
+/// One case of one estimate: its name, the case's, its scores and those of the static cubic.
+struct Case {
+    estimate: String,
+    name: String,
+    scores: Scores,
+    cubic_rmse: f64,
+}
+
+/// Estimates in the order in which they first appear; the recordings' first estimator brings the baselines.
+pub fn summaries<'a>(recordings: impl Iterator<Item = &'a [RecordingScores]>) -> Vec<Summary> {
+    let mut cases: Vec<Case> = Vec::new();
+    for scores in recordings {
+        let Some(first) = scores.first() else { continue };
+        let cubic_rmse = first.baselines.static_cubic.rmse;
+        let name = first.case();
+        let mut add = |estimate: String, scores: Scores| {
+            cases.push(Case { estimate, name: name.clone(), scores, cubic_rmse });
+        };
+        for of in scores {
+            add(of.estimator.to_string(), of.filter);
+            add(format!("{}, smoother", of.estimator), of.smoother);
+        }
+        for (baseline, scores) in first.baselines.named() {
+            add(baseline.to_string(), scores);
+        }
+    }
+    let mut names: Vec<String> = Vec::new();
+    for case in &cases {
+        if !names.contains(&case.estimate) {
+            names.push(case.estimate.clone());
+        }
+    }
+    let of = |name: &String| summary(name, cases.iter().filter(|case| case.estimate == *name).collect());
+    names.iter().filter_map(of).collect()
+}
+
+/// `None` without a case.
+fn summary(estimate: &str, cases: Vec<&Case>) -> Option<Summary> {
+    let count = cases.len() as f64;
+    let ratio = |case: &Case| case.scores.rmse / case.cubic_rmse;
+    let mean = |of: &dyn Fn(&Scores) -> f64| cases.iter().map(|case| of(&case.scores)).sum::<f64>() / count;
+    let mean_known = |of: &dyn Fn(&Scores) -> Option<f64>| {
+        let known: Option<Vec<f64>> = cases.iter().map(|case| of(&case.scores)).collect();
+        known.map(|known| known.iter().sum::<f64>() / count)
+    };
+    let worst = cases.iter().max_by(|a, b| ratio(a).total_cmp(&ratio(b)))?;
+    Some(Summary {
+        estimate: estimate.into(),
+        cases: cases.len(),
+        ratio: (cases.iter().map(|case| ratio(case).ln()).sum::<f64>() / count).exp(),
+        worst_ratio: ratio(worst),
+        worst_case: worst.name.clone(),
+        crps_percent_fs: mean(&|scores| scores.crps_percent_fs),
+        width_95_percent_fs: mean_known(&|scores| scores.width_95_percent_fs),
+        coverage_50: mean_known(&|scores| scores.coverage_50),
+        coverage_90: mean_known(&|scores| scores.coverage_90),
+        coverage_95: mean_known(&|scores| scores.coverage_95),
+        least_coverage_95: cases.iter().filter_map(|case| case.scores.coverage_95).reduce(f64::min),
+    })
+}
+
+/// A table, one estimate per row.
+pub fn write(summaries: &[Summary], out: &mut dyn Write) -> Result<(), CliError> {
+    let mut table = Table::new();
+    table.load_style(presets::ASCII_MARKDOWN);
+    table.set_header([
+        "estimate",
+        "cases",
+        "error / static cubic",
+        "worst",
+        "in",
+        "CRPS, %FS",
+        "95 % width, %FS",
+        "50 % covers",
+        "90 % covers",
+        "95 % covers",
+        "least",
+    ]);
+    let percent = |share: Option<f64>| share.map_or_else(String::new, |share| format!("{:.1} %", 100.0 * share));
+    for summary in summaries {
+        table.add_row([
+            summary.estimate.clone(),
+            summary.cases.to_string(),
+            format!("{:.3}", summary.ratio),
+            format!("{:.2}", summary.worst_ratio),
+            summary.worst_case.clone(),
+            format!("{:.2}", summary.crps_percent_fs),
+            summary.width_95_percent_fs.map_or_else(String::new, |width| format!("{width:.1}")),
+            percent(summary.coverage_50),
+            percent(summary.coverage_90),
+            percent(summary.coverage_95),
+            percent(summary.least_coverage_95),
+        ]);
+    }
+    Ok(writeln!(out, "\n{table}")?)
+}
