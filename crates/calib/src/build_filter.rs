@@ -21,12 +21,14 @@ const START_SD: f64 = 1e-3;
 /// Builds the filter for a sensor.
 ///
 /// # Errors
-/// If the sensor has no parameters for the estimator, or a number of branches that no filter is built for.
+/// If a number is out of its range, the sensor has no parameters for the estimator, or it has a number of branches that no
+/// filter is built for.
 pub fn build_filter(
     params: &SensorParams,
     kind: Option<EstimatorKind>,
     start: Start,
 ) -> Result<Box<dyn Filter>, CalibrationError> {
+    params.validate()?;
     let kind = kind.unwrap_or(params.default_estimator);
     let setting = Setting { limits: params.limits, start, own_rest: OwnRest::SHARED };
     let single = |kind| filter_from_parts(kind, &params.law, params.estimator(kind)?, setting);

@@ -158,6 +158,7 @@ pub fn calibrate(
     let default_estimator = if pools { Some(EstimatorKind::Ensemble) } else { best };
     let ensemble = pools.then(|| fit_ensemble(recordings, fit, &candidates(&estimators, &richer)));
     let limits = fit.law.law.range;
+    let (reading_lower, reading_upper) = reading_range(recordings);
     Ok(Calibration {
         default_estimator: default_estimator.unwrap_or(EstimatorKind::Ekf),
         estimators,
@@ -166,6 +167,8 @@ pub fn calibrate(
         validity: Validity {
             lower: limits.lower,
             upper: limits.upper,
+            reading_lower,
+            reading_upper,
             fastest_rate_per_s: stats.fastest_rate,
             duration_s: stats.longest_s,
         },
@@ -175,6 +178,12 @@ pub fn calibrate(
         rest_readings: fit.law.rest_readings.clone(),
         law: fit.law.law.clone(),
     })
+}
+
+/// Smallest and largest reading of the rows that were calibrated on.
+fn reading_range(recordings: &[Samples]) -> (f64, f64) {
+    let readings = recordings.iter().flat_map(|samples| samples.complete_rows().map(|k| samples.reading[k]));
+    readings.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), reading| (low.min(reading), high.max(reading)))
 }
 
 fn distinct(kinds: impl Iterator<Item = EstimatorKind>) -> Vec<EstimatorKind> {

@@ -1,5 +1,6 @@
 use crate::estimator_params::EstimatorKind;
 use crate::samples::SamplesError;
+use crate::validate::FieldError;
 use ohmstrain_ekf::StepError;
 use ohmstrain_model::ParameterError;
 use thiserror::Error;
@@ -56,6 +57,9 @@ pub enum CalibrationError {
     /// The optimiser failed.
     #[error("optimiser: {0}")]
     Optimiser(String),
+    /// A parameter file holds a number that no sensor can have.
+    #[error("{0}")]
+    Field(#[from] FieldError),
     /// A parameter file asks for what this version does not have.
     #[error("{0}")]
     Unsupported(String),

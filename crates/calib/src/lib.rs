@@ -48,6 +48,7 @@ mod scores;
 mod sd_scale;
 mod sparse_estimator;
 mod stepper;
+mod validate;
 mod way_back;
 
 pub use baselines::{Baseline, Baselines, Features, Fir, LeakyBank, LowPassMode, Regression, StaticCubic};
@@ -69,3 +70,4 @@ pub use params::{
 };
 pub use samples::{Samples, SamplesError};
 pub use scores::{ScoredRow, Scores};
+pub use validate::FieldError;

@@ -10,7 +10,7 @@ use crate::estimator_params::{EstimatorKind, EstimatorParams};
 use crate::law_params::LawParams;
 
 /// Version of the parameter file this code reads and writes.
-pub const FORMAT: u32 = 3;
+pub const FORMAT: u32 = 4;
 
 /// Everything a filter needs to know of a sensor: the content of `sensor.toml`.
 ///
@@ -117,6 +117,10 @@ pub struct Validity {
     pub lower: f64,
     /// Largest strain.
     pub upper: f64,
+    /// Smallest reading.
+    pub reading_lower: f64,
+    /// Largest reading.
+    pub reading_upper: f64,
     /// Fastest rate (99th percentile), per second.
     pub fastest_rate_per_s: f64,
     /// Longest recording, s.

@@ -60,6 +60,9 @@ pub struct DemoArgs {
     /// Seed of the simulated bench
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
+    /// Replace files that this program did not write, too
+    #[arg(long)]
+    pub force: bool,
 }
 
 /// Flags of `simulate`.
@@ -92,6 +95,9 @@ pub struct SimulateArgs {
     /// File to write instead of stdout
     #[arg(short, long)]
     pub output: Option<PathBuf>,
+    /// Replace files that this program did not write, too
+    #[arg(long)]
+    pub force: bool,
 }
 
 /// What a trace's metadata lines leave unsaid, or say wrongly.
@@ -157,6 +163,9 @@ pub struct CalibrateArgs {
     /// Also write a report of the first recording
     #[arg(long, value_name = "report.html")]
     pub report: Option<PathBuf>,
+    /// Replace files that this program did not write, too
+    #[arg(long)]
+    pub force: bool,
     /// Overrides of the recordings' metadata
     #[command(flatten)]
     pub trace: TraceArgs,

@@ -45,8 +45,13 @@ pub fn read(path: &Path, overrides: &Metadata) -> Result<Recording, CliError> {
         File::open(path).and_then(|mut file| file.read_to_end(&mut bytes))
     }
     .map_err(|error| CliError::file("read", path, &error))?;
-    let sha256 = Sha256::digest(&bytes).iter().map(|byte| format!("{byte:02x}")).collect();
-    let rows = TraceReader::with_overrides(bytes.as_slice(), &path.display().to_string(), overrides)?;
+    parse(&bytes, path, overrides)
+}
+
+/// A whole recording of these bytes.
+pub fn parse(bytes: &[u8], path: &Path, overrides: &Metadata) -> Result<Recording, CliError> {
+    let sha256 = Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect();
+    let rows = TraceReader::with_overrides(bytes, &path.display().to_string(), overrides)?;
     Ok(Recording { name: rows.file().to_string(), header: header(&rows), sha256, trace: Trace::collect(rows)? })
 }
 

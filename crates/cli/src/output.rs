@@ -1,57 +1,134 @@
+//! What commands write: stdout, and files.
+//!
+//! A command claims its files before the work, so that a name that cannot be written costs no time, makes their contents,
+//! and publishes all of them at its end. A command that fails leaves the files as they were.
+
+mod kind;
+mod place;
+
 use std::fs;
-use std::io::Write;
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use tempfile::NamedTempFile;
+pub use kind::Kind;
+use place::{Identity, Place};
 
 use crate::error::CliError;
 
-/// Writes a file whole or not at all: into a temporary neighbour that then takes its place.
-pub fn write_file(path: &Path, fill: impl FnOnce(&mut dyn Write) -> Result<(), CliError>) -> Result<(), CliError> {
-    let folder = match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder.to_path_buf(),
-        _ => PathBuf::from("."),
-    };
-    let failed = |error: &std::io::Error| CliError::file("write", path, error);
-    // The kind alone: the full text names the temporary neighbour, which nobody asked for.
-    let mut file = NamedTempFile::new_in(folder).map_err(|error| failed(&error.kind().into()))?;
-    {
-        let mut buffer = std::io::BufWriter::new(&mut file);
-        fill(&mut buffer)?;
-        buffer.flush().map_err(|error| failed(&error))?;
+/// The files that a command writes.
+pub struct Outputs {
+    force: bool,
+    inputs: Vec<(PathBuf, Identity)>,
+    files: Vec<Claimed>,
+    /// Folders made for them, outermost first.
+    folders: Vec<PathBuf>,
+    published: bool,
+}
+
+/// A file that has been claimed.
+#[derive(Clone, Copy)]
+pub struct Claim(usize);
+
+struct Claimed {
+    /// As the user calls it.
+    path: PathBuf,
+    kind: Kind,
+    place: Place,
+    content: Option<Vec<u8>>,
+}
+
+impl Outputs {
+    /// The outputs of a command that reads `inputs`. With `force` they replace files of another kind, but never an input.
+    pub fn new<'a>(force: bool, inputs: impl IntoIterator<Item = &'a PathBuf>) -> Self {
+        let known = |path: &'a PathBuf| Some((path.clone(), Identity::of(path)?));
+        let inputs = inputs.into_iter().filter_map(known).collect();
+        Self { force, inputs, files: Vec::new(), folders: Vec::new(), published: false }
     }
-    let persisted = file.persist(path).map_err(|error| failed(&error.error))?;
-    readable_by_all(&persisted).map_err(|error| failed(&error))
+
+    /// Makes a folder and the folders above it; those that are new go again, unless something is published.
+    pub fn folder(&mut self, path: &Path) -> Result<(), CliError> {
+        let is_new = |folder: &&Path| !folder.as_os_str().is_empty() && !folder.exists();
+        let mut new: Vec<PathBuf> = path.ancestors().take_while(is_new).map(Path::to_path_buf).collect();
+        new.reverse();
+        self.folders.extend(new);
+        fs::create_dir_all(path).map_err(|error| CliError::file("make the folder", path, &error))
+    }
+
+    /// Claims a file.
+    ///
+    /// # Errors
+    /// If it cannot be written, is an input or another output, or holds something that this program did not write.
+    pub fn claim(&mut self, path: &Path, kind: Kind) -> Result<Claim, CliError> {
+        let place = Place::of(path).map_err(|error| CliError::file("write", path, &error))?;
+        if let Some(identity) = place.identity() {
+            let refused = |what: &str, other: &Path| {
+                let (path, other) = (path.display(), other.display());
+                CliError::Arguments(format!("cannot write {path}: it is {what} {other}; choose another name"))
+            };
+            if let Some((input, _)) = self.inputs.iter().find(|(_, input)| input == identity) {
+                return Err(refused("the input", input));
+            }
+            if let Some(other) = self.files.iter().find(|file| file.place.identity() == Some(identity)) {
+                return Err(refused("the output", &other.path));
+            }
+        }
+        let claimed = Claimed { path: path.to_path_buf(), kind, place, content: None };
+        self.check_kind(&claimed)?;
+        self.files.push(claimed);
+        Ok(Claim(self.files.len() - 1))
+    }
+
+    fn check_kind(&self, file: &Claimed) -> Result<(), CliError> {
+        let foreign =
+            file.place.holds_other_than(file.kind).map_err(|error| CliError::file("read", &file.path, &error))?;
+        if foreign && !self.force {
+            let (path, kind) = (file.path.display(), file.kind.name());
+            return Err(CliError::Arguments(format!(
+                "cannot write {path}: it holds something else than {kind} of this program; choose another name, or \
+                 replace it with --force"
+            )));
+        }
+        Ok(())
+    }
+
+    /// Keeps the content of a file until it is published.
+    pub fn put(&mut self, claim: Claim, content: impl Into<Vec<u8>>) {
+        if let Some(file) = self.files.get_mut(claim.0) {
+            file.content = Some(content.into());
+        }
+    }
+
+    /// Writes all that was put: each file whole, and nothing before everything lies ready beside its place.
+    pub fn publish(mut self) -> Result<(), CliError> {
+        let mut ready = Vec::new();
+        for file in &self.files {
+            let Some(content) = &file.content else { continue };
+            self.check_kind(file)?;
+            let prepared = file.place.prepare(content).map_err(|error| CliError::file("write", &file.path, &error))?;
+            ready.push((file.path.clone(), prepared));
+        }
+        // A device may still fail; taking a place hardly does.
+        ready.sort_by_key(|(_, prepared)| !prepared.may_fail());
+        for (path, prepared) in ready {
+            prepared.publish().map_err(|error| CliError::file("write", &path, &error))?;
+            self.published = true;
+        }
+        Ok(())
+    }
 }
 
-/// A temporary file is private; a result is not.
-#[cfg(unix)]
-fn readable_by_all(file: &fs::File) -> std::io::Result<()> {
-    use std::os::unix::fs::PermissionsExt;
-    file.set_permissions(fs::Permissions::from_mode(0o644))
-}
-
-#[cfg(not(unix))]
-fn readable_by_all(_: &fs::File) -> std::io::Result<()> {
-    Ok(())
-}
-
-/// Writes to a file, or to stdout if there is none.
-pub fn write_to(
-    path: Option<&Path>,
-    fill: impl FnOnce(&mut dyn Write) -> Result<(), CliError>,
-) -> Result<(), CliError> {
-    match path {
-        Some(path) => write_file(path, fill),
-        None => {
-            let mut out = std::io::BufWriter::new(std::io::stdout().lock());
-            fill(&mut out)?;
-            Ok(out.flush()?)
+impl Drop for Outputs {
+    fn drop(&mut self) {
+        if !self.published {
+            // One that somebody has put something into meanwhile stays.
+            self.folders.iter().rev().for_each(|folder| drop(fs::remove_dir(folder)));
         }
     }
 }
 
-/// Makes a folder and the folders above it.
-pub fn make_folder(path: &Path) -> Result<(), CliError> {
-    fs::create_dir_all(path).map_err(|error| CliError::file("make the folder", path, &error))
+/// Writes to stdout.
+pub fn print(fill: impl FnOnce(&mut dyn Write) -> Result<(), CliError>) -> Result<(), CliError> {
+    let mut out = io::BufWriter::new(io::stdout().lock());
+    fill(&mut out)?;
+    Ok(out.flush()?)
 }

@@ -1,12 +1,11 @@
 use std::fs;
 use std::path::Path;
 
-use ohmstrain_calib::{EstimatorKind, FORMAT, RangeParams, SensorParams, Start, build_filter};
-use ohmstrain_model::Joint;
+use ohmstrain_calib::{EstimatorKind, FORMAT, SensorParams, Start, build_filter};
 use serde::Deserialize;
+use toml::de::{DeArray, DeTable};
 
 use crate::error::CliError;
-use crate::output::write_file;
 
 /// Program and version, as written into files.
 pub const MADE_BY: &str = concat!("ohmstrain ", env!("CARGO_PKG_VERSION"));
@@ -33,21 +32,10 @@ pub fn read(path: &Path, estimator: Option<EstimatorKind>) -> Result<SensorParam
         )));
     }
     let params: SensorParams = toml::from_str(&text).map_err(|error| located(&error))?;
-    let wrong = |what: String| CliError::Input(format!("{name}: {what}"));
-    if !(params.rest_reading > 0.0 && params.rest_reading.is_finite()) {
-        return Err(wrong(format!("field `rest_reading`: expected a positive number, found {}", params.rest_reading)));
-    }
-    let RangeParams { lower, upper } = params.limits;
-    if !(lower < upper) {
-        return Err(wrong(format!(
-            "field `limits`: expected a lower end below the upper one, found {lower} and {upper}"
-        )));
-    }
-    if let Some(joint) = params.joint {
-        Joint::new(joint.prestrain, joint.moment_arm_mm, joint.gauge_length_mm)
-            .map_err(|error| wrong(format!("field `joint`: {error}")))?;
-    }
-    build_filter(&params, estimator, Start::Unknown).map_err(|error| wrong(error.to_string()))?;
+    params
+        .validate()
+        .map_err(|error| CliError::Input(format!("{}: {error}", place(&name.to_string(), &text, &error.field))))?;
+    build_filter(&params, estimator, Start::Unknown).map_err(|error| CliError::Input(format!("{name}: {error}")))?;
     Ok(params)
 }
 
@@ -55,18 +43,39 @@ pub fn read(path: &Path, estimator: Option<EstimatorKind>) -> Result<SensorParam
 fn locate(name: &str, text: &str, error: &toml::de::Error) -> String {
     let message = error.message().replace('\n', ", ");
     match error.span() {
-        Some(span) => {
-            let before = text.get(..span.start).unwrap_or("");
-            let line = before.matches('\n').count() + 1;
-            let column = before.rsplit('\n').next().unwrap_or("").chars().count() + 1;
-            format!("{name}:{line}: column {column}: {message}")
-        }
+        Some(span) => format!("{}: {message}", position(name, text, span.start)),
         None => format!("{name}: {message}"),
     }
 }
 
-/// Writes a sensor's parameters.
-pub fn write(path: &Path, params: &SensorParams) -> Result<(), CliError> {
-    let text = toml::to_string(params).map_err(|error| CliError::Other(format!("cannot write parameters: {error}")))?;
-    write_file(path, |out| Ok(out.write_all(text.as_bytes())?))
+/// `file:line: column c` of a field, `law.branches[0].tau_s`, or of the nearest table above it that the text has.
+fn place(name: &str, text: &str, field: &str) -> String {
+    let Ok(document) = DeTable::parse(text) else { return name.to_string() };
+    let mut start = None;
+    let mut table = Some(document.get_ref());
+    let mut array: Option<&DeArray> = None;
+    for step in field.split(['.', '[']) {
+        let found = match step.strip_suffix(']') {
+            Some(index) => array.and_then(|array| array.get(index.parse::<usize>().ok()?)),
+            None => table.and_then(|table| table.get(step)),
+        };
+        let Some(found) = found else { break };
+        start = Some(found.span().start);
+        (table, array) = (found.get_ref().as_table(), found.get_ref().as_array());
+    }
+    start.map_or_else(|| name.to_string(), |start| position(name, text, start))
+}
+
+/// `file:line: column c` of a byte.
+fn position(name: &str, text: &str, start: usize) -> String {
+    let before = text.get(..start).unwrap_or("");
+    let line = before.matches('\n').count() + 1;
+    let column = before.rsplit('\n').next().unwrap_or("").chars().count() + 1;
+    format!("{name}:{line}: column {column}")
+}
+
+/// A sensor's parameters as they are written.
+pub fn text(params: &SensorParams) -> Result<String, CliError> {
+    params.validate().map_err(|error| CliError::Other(format!("cannot write parameters: {error}")))?;
+    toml::to_string(params).map_err(|error| CliError::Other(format!("cannot write parameters: {error}")))
 }

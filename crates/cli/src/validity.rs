@@ -44,14 +44,13 @@ impl Outside {
 impl ValidityWatch {
     /// Watches the use of a sensor on `file` with the R₀ `rest_reading`.
     pub fn new(file: &str, params: &SensorParams, rest_reading: f64) -> Self {
-        let (cubic, moved) = (&params.static_cubic, rest_reading / params.rest_reading);
-        let end = |sign: f64| moved * (cubic.reading_centre + sign * cubic.reading_scale);
+        let (seen, moved) = (&params.validity, rest_reading / params.rest_reading);
         Self {
             file: file.to_string(),
             validity: params.validity,
             quantity: params.quantity.name(),
             reading: reading_column(params.reading),
-            readings: (end(-1.0), end(1.0)),
+            readings: (moved * seen.reading_lower, moved * seen.reading_upper),
             start_s: None,
             long: false,
             fast: Outside::default(),
@@ -63,7 +62,7 @@ impl ValidityWatch {
     /// Takes a row and says what there is to `say`: the reading as recorded, the estimated rate, and the true strain; NaN for
     /// what is missing. An uncertain rate is estimated near zero, so that a high one means something.
     pub fn see(&mut self, time_s: f64, reading: f64, rate: f64, truth: f64, say: &mut dyn FnMut(String)) {
-        let Validity { lower, upper, fastest_rate_per_s: fastest, duration_s } = self.validity;
+        let Validity { lower, upper, fastest_rate_per_s: fastest, duration_s, .. } = self.validity;
         let start_s = *self.start_s.get_or_insert(time_s);
         if !self.long && time_s - start_s > duration_s {
             self.long = true;

@@ -13,6 +13,9 @@ const ARGUMENTS: i32 = 2;
 /// Exit code for the rest: files that cannot be read or written.
 const OTHER: i32 = 1;
 
+/// What was there before: a sensor file that may be replaced.
+const OLD: &str = "format = 4\nmade_by = \"ohmstrain 0.0.1\"\n";
+
 /// The commands that read a recording, each with a file that it would write.
 const READERS: [&[&str]; 4] = [
     &["filter", "bad.csv", "--sensor", "sensor.toml"],
@@ -24,11 +27,11 @@ const READERS: [&[&str]; 4] = [
 /// Runs a command that has to fail, and looks after the files: an old one keeps its content, no new one appears.
 #[track_caller]
 fn fails(bench: &Bench, arguments: &[&str], code: i32, message: &str) {
-    bench.write("old.toml", "what was here before");
+    bench.write("old.toml", OLD);
     let before = bench.files();
     bench.run(arguments).fails(code, message);
     assert_eq!(bench.files(), before, "{arguments:?}");
-    assert_eq!(bench.read("old.toml"), "what was here before");
+    assert_eq!(bench.read("old.toml"), OLD);
 }
 
 /// Three lines above the first row, so that a line number is not a row number.
@@ -240,27 +243,40 @@ fn a_sensor_file_that_is_none_is_refused_alike_by_every_command() {
     let limits = swap(&sensor, "upper = ", "upper = -1.0");
     let tau = swap(&sensor, "tau_s = ", "tau_s = -2.0");
     let family = swap(&sensor, "family = \"polynomial\"", "family = \"spline\"");
+    let line_of = |start: &str| sensor.lines().position(|line| line.starts_with(start)).unwrap();
     let joint = "[joint]\nprestrain = 0.0\nmoment_arm_mm = 0.0\ngauge_length_mm = 30.0\n\n[law]";
     let cases: Vec<(Vec<u8>, String)> = vec![
         (unknown.0.into(), format!(":{}: column 1: unknown field `colour`, expected one of `format`, ", unknown.1)),
         (in_table.0.into(), format!(":{}: column 1: unknown field `tau_min`, expected one of `tau_s`, ", in_table.1)),
         // What a newer version has is not unknown but newer.
-        (newer.0.into(), ":1: field `format`: expected version 3, found 9".into()),
+        (newer.0.into(), ":1: field `format`: expected version 4, found 9".into()),
         (word.0.into(), format!(":{}: column 16: invalid type: string \"high\", expected f64", word.1)),
-        (negative.0.into(), ": field `rest_reading`: expected a positive number, found -1600".into()),
-        (nan.0.into(), ": field `rest_reading`: expected a positive number, found NaN".into()),
-        (limits.0.into(), ": field `limits`: expected a lower end below the upper one, found 0 and -1".into()),
-        (tau.0.into(), ": fitted parameter: tau_s must be positive".into()),
+        (
+            negative.0.into(),
+            format!(":{}: column 16: field `rest_reading`: expected 1e-12 to 1e12, found -1600", negative.1),
+        ),
+        (nan.0.into(), format!(":{}: column 16: field `rest_reading`: expected 1e-12 to 1e12, found NaN", nan.1)),
+        (
+            limits.0.into(),
+            format!(":{}: column 9: field `limits.upper`: expected more than `lower`, 0, found -1", limits.1),
+        ),
+        (
+            tau.0.into(),
+            format!(":{}: column 9: field `law.branches[0].tau_s`: expected 1e-12 to 1e12, found -2", tau.1),
+        ),
         (
             family.0.into(),
             format!(":{}: column 10: unknown variant `spline`, expected one of `polynomial`, ", family.1),
         ),
-        (sensor.replace("[law]", joint).into(), ": field `joint`: moment_arm_mm ".into()),
+        (
+            sensor.replace("[law]", joint).into(),
+            format!(":{}: column 17: field `joint.moment_arm_mm`: expected a length", 3 + line_of("[law]")),
+        ),
         (trace.into(), format!(":{header_line}: column 7: key with no value, expected `=`")),
         ("hello there\n".into(), ":1: column 7: key with no value, expected `=`".into()),
         ("format = 1\n[law\n".into(), ":2: column 5: unclosed table, expected `]`".into()),
         (Vec::new(), ":1: column 1: missing field `format`".into()),
-        (b"format = 3\n".to_vec(), ":1: column 1: missing field `made_by`".into()),
+        (b"format = 4\n".to_vec(), ":1: column 1: missing field `made_by`".into()),
         (utf_16("format = 1", [0xff, 0xfe], u16::to_le_bytes), ":1: expected a text file in UTF-8, found ".into()),
     ];
     for (content, message) in cases {

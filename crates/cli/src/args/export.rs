@@ -16,6 +16,9 @@ pub struct ExportArgs {
     /// Folder to write into; files of an earlier export are replaced
     #[arg(short, long, value_name = "DIR")]
     pub output: PathBuf,
+    /// Replace files that this program did not write, too
+    #[arg(long)]
+    pub force: bool,
     /// Time between two readings on the microcontroller, s
     #[arg(long, value_name = "S", value_parser = positive)]
     pub dt_s: f64,

@@ -18,6 +18,9 @@ pub struct RefineArgs {
     /// Where to write the refined parameters
     #[arg(short, long, value_name = "refined.toml")]
     pub output: PathBuf,
+    /// Replace files that this program did not write, too
+    #[arg(long)]
+    pub force: bool,
     /// Use rows with time_s >= T only
     #[arg(long, value_name = "T", allow_negative_numbers = true, value_parser = finite)]
     pub from: Option<f64>,

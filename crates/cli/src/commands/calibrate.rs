@@ -8,7 +8,7 @@ use super::{explain, scoring};
 use crate::args::CalibrateArgs;
 use crate::error::CliError;
 use crate::input::{self, Recording, unit};
-use crate::output::write_file;
+use crate::output::{Kind, Outputs, print};
 use crate::progress::Progress;
 use crate::report::{ReportInput, ScoreRow, render};
 use crate::run::estimate;
@@ -16,6 +16,9 @@ use crate::sensor_file::{self, MADE_BY};
 
 /// Calibrates a sensor on recordings and writes its parameters.
 pub fn run(args: &CalibrateArgs) -> Result<(), CliError> {
+    let mut outputs = Outputs::new(args.force, &args.traces);
+    let sensor_output = outputs.claim(&args.output, Kind::Sensor)?;
+    let report_output = args.report.as_deref().map(|path| outputs.claim(path, Kind::Report)).transpose()?;
     let overrides = args.trace.metadata();
     let mut recordings = Vec::new();
     for path in &args.traces {
@@ -31,11 +34,13 @@ pub fn run(args: &CalibrateArgs) -> Result<(), CliError> {
     let estimator = args.estimator.chosen().map_or(EstimatorKind::Ensemble, |estimator| estimator.0);
     let structures = structures(args, estimator);
     let params = calibrate_recordings(&recordings, &structures, estimator, &Progress::new("calibrating"))?;
-    if let Some(path) = &args.report {
-        write_report(path, &recordings[0], &params, None)?;
+    outputs.put(sensor_output, sensor_file::text(&params)?);
+    if let Some(output) = report_output {
+        outputs.put(output, report(&recordings[0], &params, None)?);
     }
-    sensor_file::write(&args.output, &params)?;
-    explain::print(args, &recordings, &params.law)
+    let explained = explain::text(args, &recordings, &params.law)?;
+    outputs.publish()?;
+    print(|out| Ok(out.write_all(explained.as_bytes())?))
 }
 
 /// What the flags leave to choose from.
@@ -91,13 +96,8 @@ fn common_units(recordings: &[Recording]) -> Result<(Quantity, ReadingUnit), Cli
     Ok((quantity, reading))
 }
 
-/// Writes a report of a recording; scores are about the rows from `scored_from_s` on.
-pub fn write_report(
-    path: &Path,
-    recording: &Recording,
-    params: &SensorParams,
-    scored_from_s: Option<f64>,
-) -> Result<(), CliError> {
+/// A report of a recording; scores are about the rows from `scored_from_s` on.
+pub fn report(recording: &Recording, params: &SensorParams, scored_from_s: Option<f64>) -> Result<String, CliError> {
     let estimated = estimate(recording, params, None)?;
     let part = scoring::Part::since(scored_from_s);
     let filter = scoring::of_outputs(recording, &estimated.filtered, part);
@@ -129,6 +129,5 @@ pub fn write_report(
         scored_from_s,
         scores: &scores,
     };
-    let html = render(&input).map_err(|error| CliError::Other(error.to_string()))?;
-    write_file(path, |out| Ok(out.write_all(html.as_bytes())?))
+    render(&input).map_err(|error| CliError::Other(error.to_string()))
 }

@@ -1,16 +1,14 @@
-use std::path::Path;
-
-use ohmstrain_bench_data::simulate::{Material, Protocol, SimulationSettings, simulate};
+use ohmstrain_bench_data::simulate::{Material, Protocol, SimulationSettings};
 use ohmstrain_calib::{EstimatorKind, LawOptions, Output, SensorParams};
 
-use super::calibrate::{calibrate_recordings, write_report};
+use super::calibrate::{calibrate_recordings, report};
 use super::score_table::{add_scores, score_table};
-use super::scoring;
 use super::smooth::write_estimates;
+use super::{scoring, simulate};
 use crate::args::DemoArgs;
 use crate::error::CliError;
 use crate::input::{self, Recording};
-use crate::output::{make_folder, write_file, write_to};
+use crate::output::{Kind, Outputs, print};
 use crate::progress::Progress;
 use crate::run::estimate;
 use crate::sensor_file;
@@ -20,11 +18,19 @@ const CALIBRATION_SHARE: f64 = 0.5;
 
 /// The whole chain on a simulated sensor that is not of the fitted model's family.
 pub fn run(args: &DemoArgs) -> Result<(), CliError> {
-    make_folder(&args.out)?;
+    let mut outputs = Outputs::new(args.force, []);
+    outputs.folder(&args.out)?;
+    let mut claim = |name: &str, kind| outputs.claim(&args.out.join(name), kind);
+    let trace_output = claim("trace.csv", Kind::Trace)?;
+    let sensor_output = claim("sensor.toml", Kind::Sensor)?;
+    let filtered_output = claim("estimates.csv", Kind::Estimates)?;
+    let smoothed_output = claim("smoothed.csv", Kind::Estimates)?;
+    let report_output = claim("report.html", Kind::Report)?;
+
     let progress = Progress::new("simulating a bench session");
-    let trace_path = args.out.join("trace.csv");
-    simulate_session(&trace_path, args.seed)?;
-    let recording = input::read(&trace_path, &Default::default())?;
+    let trace = simulate::bytes(&settings(args.seed)).map_err(CliError::Other)?;
+    let recording = input::parse(&trace, &args.out.join("trace.csv"), &Default::default())?;
+    outputs.put(trace_output, trace);
     let middle = (recording.trace.len() as f64 * CALIBRATION_SHARE) as usize;
     let test_from = recording.trace.time_s[middle];
 
@@ -32,14 +38,15 @@ pub fn run(args: &DemoArgs) -> Result<(), CliError> {
     let ensemble = EstimatorKind::Ensemble;
     let structures = LawOptions::candidates(ensemble);
     let params = calibrate_recordings(std::slice::from_ref(&training), structures, ensemble, &progress)?;
-    sensor_file::write(&args.out.join("sensor.toml"), &params)?;
+    outputs.put(sensor_output, sensor_file::text(&params)?);
 
     progress.doing("filtering and smoothing");
     let estimated = estimate(&recording, &params, None)?;
-    write_outputs(&args.out.join("estimates.csv"), &recording, &params, &estimated.filtered)?;
-    write_outputs(&args.out.join("smoothed.csv"), &recording, &params, &estimated.smoothed)?;
+    outputs.put(filtered_output, estimates(&recording, &params, &estimated.filtered)?);
+    outputs.put(smoothed_output, estimates(&recording, &params, &estimated.smoothed)?);
     progress.doing("writing the report");
-    write_report(&args.out.join("report.html"), &recording, &params, Some(test_from))?;
+    outputs.put(report_output, report(&recording, &params, Some(test_from))?);
+    outputs.publish()?;
     drop(progress);
 
     let mut table = score_table(params.quantity.name(), &[]);
@@ -54,28 +61,23 @@ pub fn run(args: &DemoArgs) -> Result<(), CliError> {
             add_scores(&mut table, "second half", name, &scores, &[]);
         }
     }
-    write_to(None, |out| {
+    print(|out| {
         writeln!(out, "{table}")?;
         Ok(writeln!(out, "\nSee {}", args.out.join("report.html").display())?)
     })
 }
 
-fn simulate_session(path: &Path, seed: u64) -> Result<(), CliError> {
-    let settings = SimulationSettings {
+fn settings(seed: u64) -> SimulationSettings {
+    SimulationSettings {
         speed_mm_s: 5.0,
         mismatched: true,
         seed,
         ..SimulationSettings::new(Material::Ecoflex0030, Protocol::MIXED)
-    };
-    let trace = simulate(&settings).map_err(|error| CliError::Other(error.to_string()))?;
-    write_file(path, |mut out| Ok(trace.write(&mut out)?))
+    }
 }
 
-fn write_outputs(
-    path: &Path,
-    recording: &Recording,
-    params: &SensorParams,
-    outputs: &[Output],
-) -> Result<(), CliError> {
-    write_file(path, |out| write_estimates(out, recording, params, params.rest_reading, outputs, &[]))
+fn estimates(recording: &Recording, params: &SensorParams, outputs: &[Output]) -> Result<Vec<u8>, CliError> {
+    let mut bytes = Vec::new();
+    write_estimates(&mut bytes, recording, params, params.rest_reading, outputs, &[])?;
+    Ok(bytes)
 }

@@ -6,17 +6,17 @@ use ohmstrain_calib::{
 use crate::args::CalibrateArgs;
 use crate::error::CliError;
 use crate::input::Recording;
-use crate::output::write_to;
 
-/// Prints what `calibrate --explain` and `--bootstrap` ask for.
-pub fn print(args: &CalibrateArgs, recordings: &[Recording], law: &LawParams) -> Result<(), CliError> {
+/// What `calibrate --explain` and `--bootstrap` print.
+pub fn text(args: &CalibrateArgs, recordings: &[Recording], law: &LawParams) -> Result<String, CliError> {
+    let mut text = String::new();
     let samples: Vec<Samples> = recordings.iter().map(Recording::samples).collect::<Result<_, _>>()?;
     let names: Vec<&str> = recordings.iter().map(|recording| recording.name.as_str()).collect();
     let failed = |error| CliError::calibration(&names, &error);
     if args.explain {
         let found = identifiability(&samples, law).map_err(failed)?;
         let structures = structures(&compare_structures(&samples).map_err(failed)?);
-        write_to(None, |out| Ok(writeln!(out, "{found}\n{structures}")?))?;
+        text += &format!("{found}\n{structures}\n");
     }
     if let Some(replicates) = args.bootstrap {
         let found = bootstrap_law(&samples, law, replicates as usize, args.seed).map_err(failed)?;
@@ -25,9 +25,9 @@ pub fn print(args: &CalibrateArgs, recordings: &[Recording], law: &LawParams) ->
             let cells = [found.values[i], found.lower[i], found.upper[i]].map(|x| format!("{x:.4e}"));
             table.add_row([name.clone()].into_iter().chain(cells));
         }
-        write_to(None, |out| Ok(writeln!(out, "{table}")?))?;
+        text += &format!("{table}\n");
     }
-    Ok(())
+    Ok(text)
 }
 
 /// One row per structure, criteria as differences from the best.

@@ -3,10 +3,10 @@ use ohmstrain_calib::EstimatorKind;
 use crate::args::ExportArgs;
 use crate::error::CliError;
 use crate::export;
-use crate::output::{make_folder, write_file};
+use crate::output::{Kind, Outputs};
 use crate::sensor_file;
 
-/// Writes a sensor's filter as source code. Every file is made before the first one is written.
+/// Writes a sensor's filter as source code.
 pub fn run(args: &ExportArgs) -> Result<(), CliError> {
     if let Some(other) = args.estimator.chosen().map(|estimator| estimator.0).filter(|kind| *kind != EstimatorKind::Ekf)
     {
@@ -20,12 +20,14 @@ pub fn run(args: &ExportArgs) -> Result<(), CliError> {
         let name = params.default_estimator.name();
         CliError::remark(&format!("exported is the ekf: the file's default estimator, {name}, has no such form"));
     }
+    let mut outputs = Outputs::new(args.force, [&args.sensor]);
     for file in files {
         let path = args.output.join(file.path);
         if let Some(folder) = path.parent() {
-            make_folder(folder)?;
+            outputs.folder(folder)?;
         }
-        write_file(&path, |out| Ok(out.write_all(file.content.as_bytes())?))?;
+        let output = outputs.claim(&path, Kind::Source)?;
+        outputs.put(output, file.content);
     }
-    Ok(())
+    outputs.publish()
 }

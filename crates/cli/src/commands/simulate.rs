@@ -1,11 +1,15 @@
+use ohmstrain_bench_data::Trace;
 use ohmstrain_bench_data::simulate::{SimulationSettings, simulate};
 
 use crate::args::SimulateArgs;
 use crate::error::CliError;
-use crate::output::write_to;
+use crate::output::{Kind, Outputs, print};
+use crate::sensor_file::MADE_BY;
 
 /// Simulates a recording and writes it.
 pub fn run(args: &SimulateArgs) -> Result<(), CliError> {
+    let mut outputs = Outputs::new(args.force, []);
+    let output = args.output.as_deref().map(|path| outputs.claim(path, Kind::Trace)).transpose()?;
     let settings = SimulationSettings {
         elongation_mm: args.elongation_mm,
         speed_mm_s: args.speed_mm_s,
@@ -15,6 +19,21 @@ pub fn run(args: &SimulateArgs) -> Result<(), CliError> {
         seed: args.seed,
         ..SimulationSettings::new(args.material, args.protocol)
     };
-    let trace = simulate(&settings).map_err(|error| CliError::Arguments(error.to_string()))?;
-    write_to(args.output.as_deref(), |mut out| Ok(trace.write(&mut out)?))
+    let bytes = bytes(&settings).map_err(CliError::Arguments)?;
+    match output {
+        Some(output) => {
+            outputs.put(output, bytes);
+            outputs.publish()
+        }
+        None => print(|out| Ok(out.write_all(&bytes)?)),
+    }
+}
+
+/// A simulated recording as it is written: it says that it is one, so that it may be replaced by another.
+pub fn bytes(settings: &SimulationSettings) -> Result<Vec<u8>, String> {
+    let mut trace: Trace = simulate(settings).map_err(|error| error.to_string())?;
+    trace.metadata.other.push(("made_by".into(), MADE_BY.into()));
+    let mut bytes = Vec::new();
+    trace.write(&mut bytes).map_err(|error| error.to_string())?;
+    Ok(bytes)
 }

@@ -38,7 +38,14 @@ fn sensor() -> SensorParams {
         rest_reading: 1000.0,
         default_estimator: EstimatorKind::Ekf,
         limits: range,
-        validity: Validity { lower: 0.0, upper: 0.3, fastest_rate_per_s: 0.1, duration_s: 100.0 },
+        validity: Validity {
+            lower: 0.0,
+            upper: 0.3,
+            reading_lower: 1000.0,
+            reading_upper: 1400.0,
+            fastest_rate_per_s: 0.1,
+            duration_s: 100.0,
+        },
         static_cubic: StaticCubic {
             reading_centre: 1200.0,
             reading_scale: 200.0,

@@ -13,7 +13,7 @@ use crate::args::{Estimators, EvaluateArgs, Split};
 use crate::commands::scoring::Part;
 use crate::error::CliError;
 use crate::input::{self, Recording, check_unit};
-use crate::output::write_to;
+use crate::output::print;
 use crate::progress::Progress;
 
 /// Smallest coverage of the 95 % interval that `--check` accepts.
@@ -30,7 +30,7 @@ pub fn run(args: &EvaluateArgs) -> Result<(), CliError> {
     };
     // Calibrations take long: what was scored before an error is still good.
     if judged.is_ok() || !evaluation.is_empty() {
-        write_to(None, |out| evaluation.write(out, args.json))?;
+        print(|out| evaluation.write(out, args.json))?;
     }
     judged?;
     if args.check { check(&evaluation) } else { Ok(()) }

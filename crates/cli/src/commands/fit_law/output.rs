@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::{Fits, Fitted, phase_of};
 use crate::args::FitLawArgs;
 use crate::error::CliError;
-use crate::output::write_to;
+use crate::output::print;
 use crate::report::number::{plain, with_error};
 
 /// What `--json` prints.
@@ -52,7 +52,7 @@ struct ParameterReport<'a> {
 pub fn json(recordings: &[Fits], args: &FitLawArgs) -> Result<(), CliError> {
     let of = |recording| move |fitted| fit_report(recording, fitted, args);
     let fits = recordings.iter().flat_map(|recording| recording.fits.iter().map(of(recording))).collect();
-    write_to(None, |out| {
+    print(|out| {
         serde_json::to_writer_pretty(&mut *out, &Report { fits }).map_err(std::io::Error::from)?;
         Ok(writeln!(out)?)
     })
@@ -111,7 +111,7 @@ pub fn table(recordings: &[Fits]) -> Result<(), CliError> {
         ]);
         table.add_row(row);
     }
-    write_to(None, |out| Ok(writeln!(out, "{table}")?))
+    print(|out| Ok(writeln!(out, "{table}")?))
 }
 
 /// Names of all parameters and derived quantities, each once.

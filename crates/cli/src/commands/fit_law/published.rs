@@ -4,7 +4,7 @@ use ohmstrain_model::Phase;
 
 use super::{Fits, Fitted, SAME_SPEED, output};
 use crate::error::CliError;
-use crate::output::write_to;
+use crate::output::print;
 use crate::report::number::{fixed, plain, with_error};
 
 /// What one phase of one fit contributes.
@@ -38,7 +38,7 @@ pub fn table(recordings: &[Fits]) -> Result<(), CliError> {
             table.add_row(row(phase, &names));
         }
     }
-    write_to(None, |out| Ok(writeln!(out, "{table}")?))
+    print(|out| Ok(writeln!(out, "{table}")?))
 }
 
 /// Neighbours in the order of speeds.

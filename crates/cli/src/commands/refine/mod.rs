@@ -9,7 +9,7 @@ use ohmstrain_calib::{CalibrationError, EstimatorKind, LawParams, SensorParams};
 use crate::args::RefineArgs;
 use crate::error::CliError;
 use crate::input::{self, Recording, check_unit, reading_column};
-use crate::output::write_to;
+use crate::output::{Kind, Outputs, print};
 use crate::progress::Progress;
 use crate::run::rest_reading;
 use crate::sensor_file;
@@ -27,6 +27,8 @@ pub fn run(args: &RefineArgs) -> Result<(), CliError> {
         let name = other.name();
         return Err(CliError::Arguments(format!("--estimator: expected ekf, the only one to refine, found {name}")));
     }
+    let mut outputs = Outputs::new(args.force, [&args.trace_file, &args.sensor]);
+    let output = outputs.claim(&args.output, Kind::Sensor)?;
     let mut params = sensor_file::read(&args.sensor, Some(EstimatorKind::Ekf))?;
     let recording = input::read(&args.trace_file, &args.trace.metadata())?;
     check_unit(&recording.header, recording.trace.readings.kind, params.reading)?;
@@ -37,8 +39,9 @@ pub fn run(args: &RefineArgs) -> Result<(), CliError> {
     let refinement = refine(&params.law, start, free, &rows).map_err(|error| named(args, &error))?;
     remark_on_input(&recording, &rows, &params);
     replace(&mut params, &refinement);
-    sensor_file::write(&args.output, &params)?;
-    write_to(None, |out| table::write(out, &refinement))?;
+    outputs.put(output, sensor_file::text(&params)?);
+    outputs.publish()?;
+    print(|out| table::write(out, &refinement))?;
     for warning in &refinement.found.warnings {
         CliError::warning(&format!("{}: {warning}", recording.name));
     }

@@ -1,0 +1,295 @@
+//! The range of every number in a sensor's parameters, in one place.
+//!
+//! A file that is edited by hand, or was damaged, is refused with the name of the number; it never becomes a filter that
+//! says something else than what it means.
+
+use thiserror::Error;
+
+use crate::baselines::StaticCubic;
+use crate::estimator_params::{EstimatorParams, MotionParams, NoiseParams, PhaseParams};
+use crate::law_params::{GaugeParams, LawParams};
+use crate::params::{JointParams, RangeParams, RecordingInfo, SensorParams, Uncertainty, Validity};
+
+/// A number in a sensor's parameters that no sensor can have.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("field `{field}`: expected {expected}, found {found}")]
+pub struct FieldError {
+    /// Where it stands: names of tables and index in an array, `law.branches[0].tau_s`.
+    pub field: String,
+    /// What it may be.
+    pub expected: String,
+    /// What it is.
+    pub found: String,
+}
+
+/// What a number may be, ends included.
+#[derive(Clone, Copy)]
+struct Allowed {
+    least: f64,
+    most: f64,
+}
+
+/// Strains, degrees, gains, coefficients: far beyond what sensors have, and near enough for squares and products of some
+/// of them to be numbers.
+const SIGNED: Allowed = Allowed { least: -1e9, most: 1e9 };
+/// Resistances, times, rates, lengths. The search for noise and motion ends between `e^-25` and `e^15`.
+const POSITIVE: Allowed = Allowed { least: 1e-12, most: 1e12 };
+/// Deviations of what may be exact.
+const AMOUNT: Allowed = Allowed { least: 0.0, most: 1e6 };
+/// Probabilities and powers.
+const SHARE: Allowed = Allowed { least: 0.0, most: 1.0 };
+/// Factors on standard deviations: what calibration finds lies between 1 and 5.
+const FACTOR: Allowed = Allowed { least: 1e-3, most: 1e3 };
+/// What is told and not used: a score, or a variance of what was not determined.
+const TOLD: Allowed = Allowed { least: -f64::INFINITY, most: f64::INFINITY };
+/// The same for what is no less than zero.
+const TOLD_AMOUNT: Allowed = Allowed { least: 0.0, most: f64::INFINITY };
+
+/// Shortest range of strains, relative to its larger end.
+const SHORTEST_RANGE: f64 = 1e-9;
+/// Largest change of resistance, relative to R₀, that a gauge curve may tell within the law's range.
+const LARGEST_CHANGE: f64 = 1e9;
+/// Strains at which that is looked at.
+const GAUGE_POINTS: u32 = 64;
+
+impl SensorParams {
+    /// Checks every number.
+    ///
+    /// # Errors
+    /// Names the first that is outside of its range.
+    pub fn validate(&self) -> Result<(), FieldError> {
+        let root = Table(String::new());
+        root.number("rest_reading", self.rest_reading, POSITIVE)?;
+        self.limits.validate(&root.table("limits"))?;
+        self.validity.validate(&root.table("validity"))?;
+        self.static_cubic.validate(&root.table("static_cubic"))?;
+        if let Some(joint) = &self.joint {
+            joint.validate(&root.table("joint"))?;
+        }
+        self.law.validate(&root.table("law"))?;
+        for (kind, estimator) in &self.estimators {
+            estimator.validate(&root.table("estimators").table(kind.name()))?;
+        }
+        for (index, recording) in self.recordings.iter().enumerate() {
+            recording.validate(&root.entry("recordings", index))?;
+        }
+        self.uncertainty.as_ref().map_or(Ok(()), |uncertainty| uncertainty.validate(&root.table("uncertainty")))
+    }
+}
+
+/// A table of the file by the path that leads to it.
+struct Table(String);
+
+impl Table {
+    fn table(&self, name: &str) -> Self {
+        Self(self.path(name))
+    }
+
+    fn entry(&self, name: &str, index: usize) -> Self {
+        Self(format!("{}[{index}]", self.path(name)))
+    }
+
+    fn path(&self, name: &str) -> String {
+        if self.0.is_empty() { name.to_string() } else { format!("{}.{name}", self.0) }
+    }
+
+    fn wrong(&self, name: &str, expected: impl Into<String>, found: impl ToString) -> FieldError {
+        FieldError { field: self.path(name), expected: expected.into(), found: found.to_string() }
+    }
+
+    fn number(&self, name: &str, value: f64, allowed: Allowed) -> Result<(), FieldError> {
+        let Allowed { least, most } = allowed;
+        if (least..=most).contains(&value) {
+            return Ok(());
+        }
+        Err(self.wrong(name, format!("{} to {}", short(least), short(most)), short(value)))
+    }
+
+    fn numbers(&self, name: &str, values: &[f64], allowed: Allowed) -> Result<(), FieldError> {
+        let mut numbered = values.iter().enumerate();
+        numbered.try_for_each(|(index, value)| self.number(&format!("{name}[{index}]"), *value, allowed))
+    }
+
+    fn length(&self, name: &str, expected: usize, found: usize) -> Result<(), FieldError> {
+        if found == expected { Ok(()) } else { Err(self.wrong(name, format!("{expected} entries"), found)) }
+    }
+}
+
+/// A number in few characters.
+fn short(value: f64) -> String {
+    let plain = value == 0.0 || !value.is_finite() || (1e-4..1e6).contains(&value.abs());
+    if plain { value.to_string() } else { format!("{value:e}") }
+}
+
+/// Two ends in order, the upper one by more than rounding.
+fn ends(table: &Table, names: [&str; 2], lower: f64, upper: f64, allowed: Allowed) -> Result<(), FieldError> {
+    table.number(names[0], lower, allowed)?;
+    table.number(names[1], upper, allowed)?;
+    if upper - lower > SHORTEST_RANGE * lower.abs().max(upper.abs()) {
+        return Ok(());
+    }
+    Err(table.wrong(names[1], format!("more than `{}`, {}", names[0], short(lower)), short(upper)))
+}
+
+impl RangeParams {
+    fn validate(self, table: &Table) -> Result<(), FieldError> {
+        ends(table, ["lower", "upper"], self.lower, self.upper, SIGNED)
+    }
+}
+
+impl Validity {
+    fn validate(&self, table: &Table) -> Result<(), FieldError> {
+        ends(table, ["lower", "upper"], self.lower, self.upper, SIGNED)?;
+        ends(table, ["reading_lower", "reading_upper"], self.reading_lower, self.reading_upper, POSITIVE)?;
+        table.number("fastest_rate_per_s", self.fastest_rate_per_s, TOLD_AMOUNT)?;
+        table.number("duration_s", self.duration_s, TOLD_AMOUNT)
+    }
+}
+
+impl StaticCubic {
+    fn validate(&self, table: &Table) -> Result<(), FieldError> {
+        table.number("reading_centre", self.reading_centre, POSITIVE)?;
+        table.number("reading_scale", self.reading_scale, POSITIVE)?;
+        table.numbers("coefficients", &self.coefficients, SIGNED)?;
+        self.range.validate(&table.table("range"))
+    }
+}
+
+impl JointParams {
+    fn validate(&self, table: &Table) -> Result<(), FieldError> {
+        table.number("prestrain", self.prestrain, SIGNED)?;
+        let arm = self.moment_arm_mm;
+        if !(POSITIVE.least..=POSITIVE.most).contains(&arm.abs()) {
+            return Err(table.wrong("moment_arm_mm", "a length, or a negative one, but not zero", short(arm)));
+        }
+        table.number("gauge_length_mm", self.gauge_length_mm, POSITIVE)
+    }
+}
+
+impl LawParams {
+    fn validate(&self, table: &Table) -> Result<(), FieldError> {
+        table.number("extend_viscosity_s", self.extend_viscosity_s, SIGNED)?;
+        table.number("retract_viscosity_s", self.retract_viscosity_s, SIGNED)?;
+        self.range.validate(&table.table("range"))?;
+        self.gauge.validate(&table.table("gauge"), self.range)?;
+        for (index, branch) in self.branches.iter().enumerate() {
+            let table = table.entry("branches", index);
+            table.number("tau_s", branch.tau_s, POSITIVE)?;
+            table.number("extend_gain", branch.extend_gain, SIGNED)?;
+            table.number("retract_gain", branch.retract_gain, SIGNED)?;
+            table.number("extend_gain_slope", branch.extend_gain_slope, SIGNED)?;
+            table.number("retract_gain_slope", branch.retract_gain_slope, SIGNED)?;
+        }
+        Ok(())
+    }
+}
+
+impl GaugeParams {
+    /// Every number by itself, and what they make of the strains of the law.
+    fn validate(&self, table: &Table, range: RangeParams) -> Result<(), FieldError> {
+        match self {
+            Self::Polynomial { coefficients } => table.numbers("coefficients", coefficients, SIGNED)?,
+            Self::DecayingExponential { slope, decay_strain } => {
+                table.number("slope", *slope, SIGNED)?;
+                table.number("decay_strain", *decay_strain, SIGNED)?;
+            }
+            Self::Tunnelling { gap, barrier, path_loss } => {
+                table.number("gap", *gap, SIGNED)?;
+                table.number("barrier", *barrier, SIGNED)?;
+                table.number("path_loss", *path_loss, SIGNED)?;
+            }
+        }
+        let gauge = self.to_model();
+        for point in 0..=GAUGE_POINTS {
+            let strain = range.lower + range.span() * f64::from(point) / f64::from(GAUGE_POINTS);
+            let (value, slope) = gauge.value_and_slope(strain);
+            let steepest = LARGEST_CHANGE / range.span();
+            if !(value.abs() <= LARGEST_CHANGE && slope.abs() <= steepest) {
+                let whole = Table(table.0.clone());
+                return Err(FieldError {
+                    field: whole.0,
+                    expected: format!("changes of resistance up to {LARGEST_CHANGE:e} R0 within the law's range"),
+                    found: format!("{} with slope {} at {}", short(value), short(slope), short(strain)),
+                });
+            }
+        }
+        Ok(())
+    }
+}
+
+impl EstimatorParams {
+    fn validate(&self, table: &Table) -> Result<(), FieldError> {
+        table.number("score", self.score, TOLD)?;
+        table.number("strain_sd_scale", self.strain_sd_scale, FACTOR)?;
+        if let Some(scale) = self.smoothed_sd_scale {
+            table.number("smoothed_sd_scale", scale, FACTOR)?;
+        }
+        self.motion.validate(&table.table("motion"))?;
+        self.noise.validate(&table.table("noise"))?;
+        self.phases.map_or(Ok(()), |phases| phases.validate(&table.table("phases")))
+    }
+}
+
+impl MotionParams {
+    fn validate(&self, table: &Table) -> Result<(), FieldError> {
+        let (Self::OrnsteinUhlenbeck { rate_sd_per_s, strain_mean, strain_sd, .. }
+        | Self::Smooth { rate_sd_per_s, strain_mean, strain_sd, .. }) = *self;
+        table.number("rate_sd_per_s", rate_sd_per_s, POSITIVE)?;
+        table.number("strain_mean", strain_mean, SIGNED)?;
+        table.number("strain_sd", strain_sd, POSITIVE)?;
+        match *self {
+            Self::OrnsteinUhlenbeck { rate_time_s, .. } => table.number("rate_time_s", rate_time_s, POSITIVE),
+            Self::Smooth { acceleration_sd_per_s2, .. } => {
+                let least = rate_sd_per_s * rate_sd_per_s / strain_sd;
+                if acceleration_sd_per_s2 > least && acceleration_sd_per_s2 <= POSITIVE.most {
+                    return Ok(());
+                }
+                let expected =
+                    format!("more than rate_sd_per_s²/strain_sd, {}, up to {}", short(least), short(POSITIVE.most));
+                Err(table.wrong("acceleration_sd_per_s2", expected, short(acceleration_sd_per_s2)))
+            }
+        }
+    }
+}
+
+impl NoiseParams {
+    fn validate(&self, table: &Table) -> Result<(), FieldError> {
+        table.number("reading_sd", self.reading_sd, AMOUNT)?;
+        table.number("branch_sd", self.branch_sd, AMOUNT)?;
+        table.number("baseline_sd", self.baseline_sd, AMOUNT)?;
+        table.number("baseline_time_s", self.baseline_time_s, POSITIVE)
+    }
+}
+
+impl PhaseParams {
+    fn validate(&self, table: &Table) -> Result<(), FieldError> {
+        table.number("hold_time_s", self.hold_time_s, POSITIVE)?;
+        table.number("move_time_s", self.move_time_s, POSITIVE)?;
+        table.number("reversal", self.reversal, SHARE)?;
+        table.number("speed_per_s", self.speed_per_s, AMOUNT)?;
+        table.number("tempering", self.tempering, SHARE)
+    }
+}
+
+impl RecordingInfo {
+    fn validate(&self, table: &Table) -> Result<(), FieldError> {
+        table.number("rest_reading", self.rest_reading, POSITIVE)
+    }
+}
+
+impl Uncertainty {
+    fn validate(&self, table: &Table) -> Result<(), FieldError> {
+        let size = self.names.len();
+        table.length("values", size, self.values.len())?;
+        table.numbers("values", &self.values, TOLD)?;
+        table.length("standard_errors", size, self.standard_errors.len())?;
+        table.numbers("standard_errors", &self.standard_errors, TOLD_AMOUNT)?;
+        table.length("covariance", size, self.covariance.len())?;
+        for (index, row) in self.covariance.iter().enumerate() {
+            let name = format!("covariance[{index}]");
+            table.length(&name, size, row.len())?;
+            table.numbers(&name, row, TOLD)?;
+        }
+        Ok(())
+    }
+}
