@@ -44,7 +44,7 @@ mod trace;
 mod writer;
 
 pub use error::{BadContent, SpecError, TraceError};
-pub use metadata::Metadata;
+pub use metadata::{Metadata, ResistanceUnit, StrainUnit};
 pub use reader::{Reading, Row, TraceReader};
 pub use rows::RowWriter;
 pub use segment::{Segment, segment};

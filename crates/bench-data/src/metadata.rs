@@ -1,6 +1,7 @@
 use std::fmt;
+use std::str::FromStr;
 
-use crate::error::{Fault, quote};
+use crate::error::{Fault, SpecError, quote};
 use crate::spec::{FrontEndSpec, JointSpec};
 
 /// What a trace says about itself, one `# key = value` line each, above the header.
@@ -14,11 +15,86 @@ pub struct Metadata {
     pub front_end: Option<FrontEndSpec>,
     /// `joint`: the joint that the sensor spans.
     pub joint: Option<JointSpec>,
+    /// `strain_unit`: what the column `strain` is in; a fraction unless it says otherwise.
+    pub strain_unit: Option<StrainUnit>,
+    /// `resistance_unit`: what the column `resistance_ohm` is in; Ω unless it says otherwise.
+    pub resistance_unit: Option<ResistanceUnit>,
     /// Every other key and its value, in the file's order.
     pub other: Vec<(String, String)>,
 }
 
+/// Unit of the column `strain`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StrainUnit {
+    /// A share of the length, ΔL/L₀.
+    Fraction,
+    /// Hundredths of it.
+    Percent,
+}
+
+/// Unit of the column `resistance_ohm`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ResistanceUnit {
+    /// Ω.
+    Ohm,
+    /// kΩ.
+    Kohm,
+}
+
+impl StrainUnit {
+    /// What a number in the file is multiplied with.
+    pub(crate) const fn factor(self) -> f64 {
+        match self {
+            Self::Fraction => 1.0,
+            Self::Percent => 0.01,
+        }
+    }
+}
+
+impl ResistanceUnit {
+    /// What a number in the file is multiplied with.
+    pub(crate) const fn factor(self) -> f64 {
+        match self {
+            Self::Ohm => 1.0,
+            Self::Kohm => 1000.0,
+        }
+    }
+}
+
+impl FromStr for StrainUnit {
+    type Err = SpecError;
+
+    fn from_str(text: &str) -> Result<Self, SpecError> {
+        match text {
+            "fraction" => Ok(Self::Fraction),
+            "percent" => Ok(Self::Percent),
+            _ => Err(SpecError::new("`strain_unit` to be `fraction` or `percent`", quote(text))),
+        }
+    }
+}
+
+impl FromStr for ResistanceUnit {
+    type Err = SpecError;
+
+    fn from_str(text: &str) -> Result<Self, SpecError> {
+        match text {
+            "ohm" => Ok(Self::Ohm),
+            "kohm" => Ok(Self::Kohm),
+            _ => Err(SpecError::new("`resistance_unit` to be `ohm` or `kohm`", quote(text))),
+        }
+    }
+}
+
 impl Metadata {
+    /// The units that numbers are in once they have been read: where a file names one, this says so.
+    pub(crate) fn in_own_units(&self) -> Self {
+        Self {
+            strain_unit: self.strain_unit.map(|_| StrainUnit::Fraction),
+            resistance_unit: self.resistance_unit.map(|_| ResistanceUnit::Ohm),
+            ..self.clone()
+        }
+    }
+
     /// Takes what `overrides` knows, keeps the rest.
     pub fn override_with(&mut self, overrides: &Self) {
         fn take<T: Clone>(mine: &mut Option<T>, theirs: &Option<T>) {
@@ -30,6 +106,8 @@ impl Metadata {
         take(&mut self.gauge_length_mm, &overrides.gauge_length_mm);
         take(&mut self.front_end, &overrides.front_end);
         take(&mut self.joint, &overrides.joint);
+        take(&mut self.strain_unit, &overrides.strain_unit);
+        take(&mut self.resistance_unit, &overrides.resistance_unit);
         for (key, value) in &overrides.other {
             self.other.retain(|(mine, _)| mine != key);
             self.other.push((key.clone(), value.clone()));
@@ -45,6 +123,8 @@ impl Metadata {
             "gauge_length_mm" => once(&mut self.gauge_length_mm, key, length_mm(value)?),
             "front_end" => once(&mut self.front_end, key, value.parse()?),
             "joint" => once(&mut self.joint, key, value.parse()?),
+            "strain_unit" => once(&mut self.strain_unit, key, value.parse()?),
+            "resistance_unit" => once(&mut self.resistance_unit, key, value.parse()?),
             _ => {
                 self.other.push((key.to_owned(), value.to_owned()));
                 Ok(())
@@ -85,6 +165,16 @@ impl fmt::Display for Metadata {
         }
         if let Some(joint) = &self.joint {
             line("joint", joint)?;
+        }
+        match self.strain_unit {
+            Some(StrainUnit::Fraction) => line("strain_unit", &"fraction")?,
+            Some(StrainUnit::Percent) => line("strain_unit", &"percent")?,
+            None => {}
+        }
+        match self.resistance_unit {
+            Some(ResistanceUnit::Ohm) => line("resistance_unit", &"ohm")?,
+            Some(ResistanceUnit::Kohm) => line("resistance_unit", &"kohm")?,
+            None => {}
         }
         self.other.iter().try_for_each(|(key, value)| line(key, value))
     }

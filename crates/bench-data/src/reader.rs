@@ -8,7 +8,7 @@ use crate::clock::Clock;
 use crate::columns::{Column, Columns, Place};
 use crate::error::{Fault, TraceError};
 use crate::lines::{LineFault, LineFeed, Lines, is_plain};
-use crate::metadata::Metadata;
+use crate::metadata::{Metadata, ResistanceUnit, StrainUnit};
 use crate::trace::{Quantity, ReadingKind};
 
 /// One reading. NaN is a missing one.
@@ -72,6 +72,9 @@ struct Conversion {
     front_end: Option<FrontEnd<f64>>,
     joint: Option<Joint<f64>>,
     gauge_length_mm: f64,
+    /// What a strain and a resistance in the file are multiplied with.
+    strain_factor: f64,
+    ohm_factor: f64,
 }
 
 impl<R: Read> TraceReader<R> {
@@ -101,6 +104,7 @@ impl<R: Read> TraceReader<R> {
         let columns = Columns::of_header(&record).map_err(at_header)?;
         let conversion = Conversion::new(&columns, &metadata).map_err(at_header)?;
         let clock = Clock::new(columns.time.column);
+        let metadata = metadata.in_own_units();
         Ok(Self { file, metadata, columns, conversion, clock, records, record, plain, done: false })
     }
 
@@ -225,6 +229,8 @@ impl Conversion {
             front_end: metadata.front_end.map(|spec| spec.build()).transpose().map_err(impossible)?,
             joint: metadata.joint.map(|spec| spec.build()).transpose().map_err(impossible)?,
             gauge_length_mm: metadata.gauge_length_mm.unwrap_or(f64::NAN),
+            strain_factor: metadata.strain_unit.map_or(1.0, StrainUnit::factor),
+            ohm_factor: metadata.resistance_unit.map_or(1.0, ResistanceUnit::factor),
         })
     }
 
@@ -232,7 +238,8 @@ impl Conversion {
         let cell = place.cell(record);
         let missing = Reading { value: f64::NAN, sd_ohm: None, code: None, saturated: false };
         let (Column::Adc, Some(front_end)) = (place.column, &self.front_end) else {
-            return Ok(Reading { value: cell::positive(place.column.name(), cell)?, ..missing });
+            let factor = if place.column == Column::ResistanceOhm { self.ohm_factor } else { 1.0 };
+            return Ok(Reading { value: factor * cell::positive(place.column.name(), cell)?, ..missing });
         };
         let code = cell::code(place.column.name(), cell)?;
         Ok(match code.map(|code| front_end.read(code)) {
@@ -248,6 +255,7 @@ impl Conversion {
         let value = cell::number(place.column.name(), place.cell(record))?;
         Ok(match (place.column, &self.joint) {
             (Column::DisplacementMm, _) => value / self.gauge_length_mm,
+            (Column::Strain, _) => self.strain_factor * value,
             (Column::AngleDeg, Some(joint)) => joint.strain(value.to_radians()),
             _ => value,
         })

@@ -53,6 +53,7 @@ fn metadata() -> impl Strategy<Value = Metadata> {
             front_end,
             joint,
             other,
+            ..Metadata::default()
         })
 }
 

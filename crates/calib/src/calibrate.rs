@@ -7,10 +7,12 @@ use crate::ensemble_fit::{candidates, fit_ensemble, richer_evaluations, richer_l
 use crate::estimator_params::{EstimatorKind, EstimatorParams};
 use crate::law_fit::{CrossFit, LawOptions, fit_laws};
 use crate::law_params::LawParams;
+use crate::left_out::REFERENCE_SD;
 use crate::motion_stats::MotionStats;
 use crate::noise_fit::{NoiseProblem, REFINEMENT, SURVEY, Surveyed, survey, survey_evaluations};
 use crate::params::{FORMAT, Quantity, RangeParams, ReadingUnit, SensorParams, Uncertainty, Validity};
 use crate::samples::Samples;
+use crate::screen::{Distrusted, screen};
 
 /// What calibration is doing, for a progress bar.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,6 +31,8 @@ pub enum Stage {
 /// A calibrated sensor, before it is written down.
 #[derive(Clone, Debug)]
 pub struct Calibration {
+    /// Rows of the recordings that were left out, for standing far from their neighbours or from the law.
+    pub distrusted: Vec<Distrusted>,
     /// The law.
     pub law: LawParams,
     /// R₀ of each recording.
@@ -90,7 +94,8 @@ fn handicap(kind: EstimatorKind) -> f64 {
     if kind.has_phases() { 0.0 } else { LOCK_IN }
 }
 
-/// Calibrates law, noise and motion on recordings with known strain. Deterministic: same samples, same result.
+/// Calibrates law, noise and motion on recordings with known strain. Deterministic: same samples, same result. Rows that
+/// stand far from their neighbours, or from the law, take no part ([`screen`]).
 ///
 /// Estimators are tried with a law for each of `structures` and each strength of ridge; the pair with the best score on
 /// blocks that the law has not seen gives the law. Where an ensemble is asked for it is the extended Kalman filter that
@@ -99,7 +104,8 @@ fn handicap(kind: EstimatorKind) -> f64 {
 /// default. Near ties go to the one that keeps hypotheses. An ensemble has members with laws of their own besides.
 ///
 /// # Errors
-/// If the recordings are too short or too plain to learn a law from, or `structures` or `kinds` is empty.
+/// If the recordings are too short or too plain to learn a law from, if the law explains nothing or the estimates are no
+/// better than a constant, or `structures` or `kinds` is empty.
 pub fn calibrate(
     recordings: &[Samples],
     structures: &[LawOptions],
@@ -107,6 +113,8 @@ pub fn calibrate(
     mut progress: impl FnMut(Stage),
 ) -> Result<Calibration, CalibrationError> {
     progress(Stage::Law);
+    let screened = screen(recordings)?;
+    let recordings: &[Samples] = &screened.samples();
     let laws = fit_laws(recordings, structures)?;
     let stats = MotionStats::new(recordings);
     let wanted = distinct(kinds.iter().flat_map(EstimatorKind::members).copied());
@@ -150,6 +158,7 @@ pub fn calibrate(
         }
         estimators.extend(best.map(|best| (kind, best)));
     }
+    worth_something(&estimators, &stats, fit.law.law.range)?;
     let richer_laws = if pools { richer_laws(recordings, structures, fit) } else { Vec::new() };
     let richer = richer_members(recordings, &richer_laws, stats, &mut evaluated)?;
     let score =
@@ -160,6 +169,7 @@ pub fn calibrate(
     let limits = fit.law.law.range;
     let (reading_lower, reading_upper) = reading_range(recordings);
     Ok(Calibration {
+        distrusted: screened.distrusted.clone(),
         default_estimator: default_estimator.unwrap_or(EstimatorKind::Ekf),
         estimators,
         ensemble,
@@ -184,6 +194,21 @@ pub fn calibrate(
 fn reading_range(recordings: &[Samples]) -> (f64, f64) {
     let readings = recordings.iter().flat_map(|samples| samples.complete_rows().map(|k| samples.reading[k]));
     readings.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), reading| (low.min(reading), high.max(reading)))
+}
+
+/// How much better, in mean log density, the best estimator must be than a constant strain: 5 % in the deviation.
+const LEAST_GAIN: f64 = 0.05;
+
+/// Refuses estimators that are no better than the reference's mean and deviation.
+fn worth_something(
+    estimators: &BTreeMap<EstimatorKind, EstimatorParams>,
+    stats: &MotionStats,
+    limits: RangeParams,
+) -> Result<(), CalibrationError> {
+    let variance = (stats.strain_sd / limits.span()).powi(2) + REFERENCE_SD * REFERENCE_SD;
+    let constant = 0.5 + 0.5 * variance.ln();
+    let score = estimators.values().map(|params| params.score).fold(f64::INFINITY, f64::min);
+    if score > constant - LEAST_GAIN { Err(CalibrationError::NothingEstimated { score, constant }) } else { Ok(()) }
 }
 
 fn distinct(kinds: impl Iterator<Item = EstimatorKind>) -> Vec<EstimatorKind> {

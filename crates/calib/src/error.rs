@@ -34,6 +34,27 @@ pub enum CalibrationError {
     /// The reference never moves.
     #[error("the reference is constant: nothing can be learned from it")]
     ConstantStrain,
+    /// Readings that the reference does not explain.
+    #[error(
+        "the readings have nothing to do with the reference: on parts that the law has not seen, it leaves {:.0} % of \
+         their variance; are both of the same sensor, on the same clock and in the right columns?",
+        100.0 * unexplained
+    )]
+    NothingExplained {
+        /// Squared error of the law over that of a constant, on blocks left out.
+        unexplained: f64,
+    },
+    /// Estimates that are no better than none.
+    #[error(
+        "the estimates are no better than a constant strain: on parts that the calibration has not seen, their score is \
+         {score:.2}, that of a constant {constant:.2} (less is better)"
+    )]
+    NothingEstimated {
+        /// Mean negative log density of the best estimator.
+        score: f64,
+        /// The same of the reference's mean and deviation.
+        constant: f64,
+    },
     /// The least-squares problem has no unique solution.
     #[error("the law cannot be fitted: its equations are singular")]
     Singular,

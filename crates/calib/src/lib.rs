@@ -45,6 +45,7 @@ mod robust_loss;
 mod running;
 mod samples;
 mod scores;
+mod screen;
 mod sd_scale;
 mod sparse_estimator;
 mod stepper;
@@ -70,4 +71,5 @@ pub use params::{
 };
 pub use samples::{Samples, SamplesError};
 pub use scores::{ScoredRow, Scores};
+pub use screen::{Distrusted, Doubt, Screened, screen};
 pub use validate::FieldError;

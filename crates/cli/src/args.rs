@@ -9,7 +9,7 @@ use std::str::FromStr;
 
 use clap::{Args as ClapArgs, Parser, Subcommand, ValueEnum};
 use ohmstrain_bench_data::simulate::{Material, Protocol};
-use ohmstrain_bench_data::{FrontEndSpec, JointSpec, Metadata};
+use ohmstrain_bench_data::{FrontEndSpec, JointSpec, Metadata, ResistanceUnit, StrainUnit};
 use ohmstrain_calib::{EstimatorKind, GaugeFamily};
 use ohmstrain_ekf::Influence;
 
@@ -112,6 +112,12 @@ pub struct TraceArgs {
     /// Joint, as in `# joint = …`
     #[arg(long, value_name = "SPEC")]
     pub joint: Option<JointSpec>,
+    /// Unit of the column `strain`: fraction or percent
+    #[arg(long, value_name = "UNIT")]
+    pub strain_unit: Option<StrainUnit>,
+    /// Unit of the column `resistance_ohm`: ohm or kohm
+    #[arg(long, value_name = "UNIT")]
+    pub resistance_unit: Option<ResistanceUnit>,
 }
 
 impl TraceArgs {
@@ -121,6 +127,8 @@ impl TraceArgs {
             gauge_length_mm: self.gauge_length_mm,
             front_end: self.front_end,
             joint: self.joint,
+            strain_unit: self.strain_unit,
+            resistance_unit: self.resistance_unit,
             ..Metadata::default()
         }
     }

@@ -17,6 +17,8 @@ pub struct Recording {
     pub header: String,
     /// SHA-256 of its bytes, hexadecimal.
     pub sha256: String,
+    /// Rows of the file before the first one here.
+    pub first_row: usize,
     /// Its contents.
     pub trace: Trace,
 }
@@ -52,7 +54,8 @@ pub fn read(path: &Path, overrides: &Metadata) -> Result<Recording, CliError> {
 pub fn parse(bytes: &[u8], path: &Path, overrides: &Metadata) -> Result<Recording, CliError> {
     let sha256 = Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect();
     let rows = TraceReader::with_overrides(bytes, &path.display().to_string(), overrides)?;
-    Ok(Recording { name: rows.file().to_string(), header: header(&rows), sha256, trace: Trace::collect(rows)? })
+    let (name, header) = (rows.file().to_string(), header(&rows));
+    Ok(Recording { name, header, sha256, first_row: 0, trace: Trace::collect(rows)? })
 }
 
 /// What messages call the header of a recording of which no row has been read yet.
@@ -64,7 +67,7 @@ impl Recording {
     /// Some of its rows, under the same name.
     pub fn rows(&self, rows: Range<usize>) -> Self {
         let (name, header, sha256) = (self.name.clone(), self.header.clone(), self.sha256.clone());
-        Self { name, header, sha256, trace: self.trace.rows(rows) }
+        Self { name, header, sha256, first_row: self.first_row + rows.start, trace: self.trace.rows(rows) }
     }
 
     /// As calibration wants it.

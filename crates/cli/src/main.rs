@@ -10,6 +10,7 @@ mod estimates;
 mod export;
 mod input;
 mod output;
+mod plausible;
 mod progress;
 mod readings;
 mod report;

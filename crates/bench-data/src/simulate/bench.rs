@@ -173,6 +173,7 @@ fn metadata(settings: &SimulationSettings) -> Metadata {
         front_end: settings.front_end,
         joint: None,
         other: other.map(|(key, value)| (key.to_owned(), value)).into(),
+        ..Metadata::default()
     }
 }
 

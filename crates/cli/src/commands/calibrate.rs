@@ -1,7 +1,7 @@
 use std::path::Path;
 
 use ohmstrain_calib::{
-    EstimatorKind, LawOptions, Quantity, ReadingUnit, RecordingInfo, Samples, SensorParams, calibrate,
+    EstimatorKind, LawOptions, Quantity, ReadingUnit, RecordingInfo, Samples, SensorParams, calibrate, screen,
 };
 
 use super::{explain, scoring};
@@ -9,6 +9,7 @@ use crate::args::CalibrateArgs;
 use crate::error::CliError;
 use crate::input::{self, Recording, unit};
 use crate::output::{Kind, Outputs, print};
+use crate::plausible;
 use crate::progress::Progress;
 use crate::report::{ReportInput, ScoreRow, render};
 use crate::run::estimate;
@@ -22,14 +23,10 @@ pub fn run(args: &CalibrateArgs) -> Result<(), CliError> {
     let overrides = args.trace.metadata();
     let mut recordings = Vec::new();
     for path in &args.traces {
-        let mut recording = input::read(path, &overrides)?;
-        if let Some(until) = args.until {
-            recording.trace = recording.trace.until(until);
-        }
-        if let Some(from) = args.from {
-            recording.trace = recording.trace.since(from);
-        }
-        recordings.push(recording);
+        let recording = input::read(path, &overrides)?;
+        let row_at = |time_s: f64| recording.trace.time_s.partition_point(|earlier_s| *earlier_s < time_s);
+        let end = args.until.map_or(recording.trace.len(), row_at);
+        recordings.push(recording.rows(args.from.map_or(0, row_at).min(end)..end));
     }
     let estimator = args.estimator.chosen().map_or(EstimatorKind::Ensemble, |estimator| estimator.0);
     let structures = structures(args, estimator);
@@ -67,7 +64,11 @@ pub fn calibrate_recordings(
     let samples: Vec<Samples> = recordings.iter().map(Recording::samples).collect::<Result<_, _>>()?;
     let (quantity, reading) = common_units(recordings)?;
     let names: Vec<&str> = recordings.iter().map(|recording| recording.name.as_str()).collect();
-    let calibration = calibrate(&samples, structures, &[estimator], |stage| progress.calibrating(stage))
+    let screened = screen(&samples).map_err(|error| CliError::calibration(&names, &error))?;
+    plausible::warn_of_copies(recordings);
+    plausible::check(recordings, &screened)?;
+    plausible::warn_of_distrusted(recordings, &screened.distrusted);
+    let calibration = calibrate(&screened.samples(), structures, &[estimator], |stage| progress.calibrating(stage))
         .map_err(|error| CliError::calibration(&names, &error))?;
     let info = |(recording, rest_reading): (&Recording, &f64)| RecordingInfo {
         file: file_name(&recording.name),
@@ -77,7 +78,9 @@ pub fn calibrate_recordings(
     };
     let infos = recordings.iter().zip(&calibration.rest_readings).map(info).collect();
     let sensor = calibration.into_sensor(MADE_BY, quantity, reading);
-    Ok(SensorParams { joint: recordings.iter().find_map(Recording::joint), recordings: infos, ..sensor })
+    let sensor = SensorParams { joint: recordings.iter().find_map(Recording::joint), recordings: infos, ..sensor };
+    plausible::warn_of_rests(recordings, &sensor);
+    Ok(sensor)
 }
 
 /// Paths are the machine's own business; the name says which recording it was.

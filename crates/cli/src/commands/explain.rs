@@ -1,11 +1,12 @@
 use comfy_table::{Table, presets};
 use ohmstrain_calib::{
-    GaugeFamily, LawParams, Samples, StructureScore, bootstrap_law, compare_structures, identifiability,
+    GaugeFamily, LawParams, Samples, StructureScore, bootstrap_law, compare_structures, identifiability, screen,
 };
 
 use crate::args::CalibrateArgs;
 use crate::error::CliError;
 use crate::input::Recording;
+use crate::plausible;
 
 /// What `calibrate --explain` and `--bootstrap` print.
 pub fn text(args: &CalibrateArgs, recordings: &[Recording], law: &LawParams) -> Result<String, CliError> {
@@ -13,7 +14,12 @@ pub fn text(args: &CalibrateArgs, recordings: &[Recording], law: &LawParams) -> 
     let samples: Vec<Samples> = recordings.iter().map(Recording::samples).collect::<Result<_, _>>()?;
     let names: Vec<&str> = recordings.iter().map(|recording| recording.name.as_str()).collect();
     let failed = |error| CliError::calibration(&names, &error);
+    let screened = screen(&samples).map_err(failed)?;
+    let samples = screened.samples();
     if args.explain {
+        for row in plausible::distrusted(recordings, &screened.distrusted) {
+            text += &(row + "\n");
+        }
         let found = identifiability(&samples, law).map_err(failed)?;
         let structures = structures(&compare_structures(&samples).map_err(failed)?);
         text += &format!("{found}\n{structures}\n");

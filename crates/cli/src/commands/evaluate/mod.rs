@@ -5,7 +5,7 @@ mod summary;
 use std::path::{Path, PathBuf};
 
 use evaluation::{Evaluation, RecordingScores};
-use ohmstrain_calib::{Baselines, Samples, reference_lag};
+use ohmstrain_calib::{Baselines, Samples, reference_lag, screen};
 use rayon::prelude::*;
 use sensors::{Rivals, Sensor};
 
@@ -114,7 +114,8 @@ fn calibrated(
     let sensors = Sensor::calibrated(training, estimators, progress)?;
     let samples: Vec<Samples> = training.iter().map(Recording::samples).collect::<Result<_, _>>()?;
     let names: Vec<&str> = training.iter().map(|recording| recording.name.as_str()).collect();
-    let baselines = Baselines::fit(&samples).map_err(|error| CliError::calibration(&names, &error))?;
+    let failed = |error| CliError::calibration(&names, &error);
+    let baselines = Baselines::fit(&screen(&samples).map_err(failed)?.samples()).map_err(failed)?;
     Ok((sensors, Rivals { static_cubic: baselines.static_cubic, learned: Some(baselines) }))
 }
 

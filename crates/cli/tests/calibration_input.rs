@@ -1,0 +1,174 @@
+//! What `calibrate` makes of recordings that are partly, or wholly, wrong.
+
+#[allow(dead_code, reason = "each test program uses its own share")]
+mod common;
+
+use common::{Bench, Run, SIMULATE, change_rows};
+
+/// Rows before this one calibrate, the others test.
+const HALF: usize = 1000;
+const UNTIL: &str = "200";
+const EKF: [&str; 2] = ["--estimator", "ekf"];
+
+/// A folder with `trace.csv`, a simulated recording of 400 s.
+fn bench() -> Bench {
+    let bench = Bench::new();
+    bench.run(&[&SIMULATE[..], &["-o", "trace.csv"]].concat()).ok();
+    bench
+}
+
+/// Calibrates on the first half of a recording.
+fn calibrate(bench: &Bench, trace: &str, more: &[&str]) -> Run {
+    bench.run(&[&["calibrate", trace, "--until", UNTIL, "-o", "sensor.toml"], &EKF[..], more].concat())
+}
+
+/// Error on the second half of `trace.csv`, %FS.
+fn error_on_the_rest(bench: &Bench) -> f64 {
+    let scores = bench.run(&["evaluate", "trace.csv", "--sensor", "sensor.toml", "--from", UNTIL, "--json"]).ok();
+    let scores: serde_json::Value = serde_json::from_str(&scores).unwrap();
+    scores["recordings"][0]["rmse_percent_fs"].as_f64().unwrap()
+}
+
+/// The recording with one cell of one row changed.
+fn spiked(bench: &Bench, row: usize, column: usize, factor: f64) -> String {
+    change_rows(&bench.read("trace.csv"), |k, cells| {
+        if k == row {
+            cells[column] = (cells[column].parse::<f64>().unwrap() * factor).to_string();
+        }
+    })
+}
+
+#[test]
+fn one_bad_row_is_named_and_changes_nothing() {
+    let bench = bench();
+    calibrate(&bench, "trace.csv", &[]).ok();
+    let clean = error_on_the_rest(&bench);
+    let strain_at = |row: usize| {
+        let mut found = String::new();
+        change_rows(&bench.read("trace.csv"), |k, cells| {
+            if k == row {
+                found.clone_from(&cells[2]);
+            }
+        });
+        found.parse::<f64>().unwrap()
+    };
+    // A row at which a factor of 100 is a jump.
+    let moved = (400..HALF).find(|&row| strain_at(row) > 0.2).unwrap();
+    for (row, column, factor, what) in [(437, 1, 10.0, "reading"), (moved, 2, 100.0, "reference")] {
+        bench.write("spiked.csv", spiked(&bench, row, column, factor));
+        let run = calibrate(&bench, "spiked.csv", &["--explain"]);
+        assert_eq!(run.code, Some(0), "{}", run.stderr);
+        let named = format!("spiked.csv: data row {} (", row + 1);
+        assert!(run.stdout.lines().next().unwrap().starts_with(&named), "{}", run.stdout);
+        let warning = run.warnings.first().unwrap();
+        assert!(run.warnings.len() == 1 && warning.contains(&named) && warning.contains(what), "{:?}", run.warnings);
+        let error = error_on_the_rest(&bench);
+        bench.write("missing.csv", spiked(&bench, row, column, f64::NAN));
+        calibrate(&bench, "missing.csv", &[]).ok();
+        assert_eq!(error, error_on_the_rest(&bench), "{what}: as if it were missing");
+        // One row less of a thousand leads the search elsewhere, by as much as two searches differ.
+        assert!((error / clean - 1.0).abs() < 0.06, "{what}: {error} %FS instead of {clean}");
+    }
+}
+
+#[test]
+fn a_contact_that_fails_for_two_seconds_is_left_out() {
+    let bench = bench();
+    calibrate(&bench, "trace.csv", &[]).ok();
+    let clean = error_on_the_rest(&bench);
+    let failing = change_rows(&bench.read("trace.csv"), |k, cells| {
+        if (500..510).contains(&k) {
+            cells[1] = "90000".into();
+        }
+    });
+    bench.write("failing.csv", failing);
+    let run = calibrate(&bench, "failing.csv", &[]);
+    assert_eq!(run.code, Some(0), "{}", run.stderr);
+    // Five rows by name, and that there are more.
+    assert!(run.warnings.len() == 6 && run.warnings[0].contains("data row 501 ("), "{:?}", run.warnings);
+    assert!(run.warnings[5].contains("5 more rows"), "{:?}", run.warnings);
+    let error = error_on_the_rest(&bench);
+    // Ten rows of a thousand.
+    assert!((error / clean - 1.0).abs() < 0.1, "{error} %FS instead of {clean}");
+}
+
+#[test]
+fn readings_that_have_nothing_to_do_with_the_reference_are_refused() {
+    let bench = bench();
+    let random = change_rows(&bench.read("trace.csv"), |k, cells| {
+        // Roughly uniform: fractional parts of multiples of the golden ratio, squared so that they do not repeat.
+        cells[1] = (1500.0 + 300.0 * (k as f64 * k as f64 * 0.618_033_988_749_895).fract()).to_string();
+    });
+    bench.write("random.csv", random);
+    let run = calibrate(&bench, "random.csv", &[]);
+    assert_eq!(run.code, Some(4), "{}", run.stderr);
+    assert!(run.stderr.starts_with("ohmstrain: random.csv: the readings have nothing to do with"), "{}", run.stderr);
+    assert!(!bench.files().contains(&"sensor.toml".to_owned()));
+}
+
+/// The recording with a column times a factor and a metadata line.
+fn in_unit(bench: &Bench, column: usize, factor: f64, line: &str) -> String {
+    let changed = change_rows(&bench.read("trace.csv"), |_, cells| {
+        cells[column] = (cells[column].parse::<f64>().unwrap() * factor).to_string();
+    });
+    format!("{line}{changed}")
+}
+
+#[test]
+fn another_unit_is_asked_about_and_converted() {
+    let bench = bench();
+    calibrate(&bench, "trace.csv", &[]).ok();
+    let plain = error_on_the_rest(&bench);
+    let cases = [
+        (2, 100.0, "--strain-unit", "percent", "# strain_unit = percent\n"),
+        (1, 0.001, "--resistance-unit", "kohm", "# resistance_unit = kohm\n"),
+    ];
+    for (column, factor, flag, unit, line) in cases {
+        bench.write("other.csv", in_unit(&bench, column, factor, ""));
+        let asked = calibrate(&bench, "other.csv", &[]);
+        assert_eq!(asked.code, Some(4), "{}", asked.stderr);
+        assert!(asked.stderr.contains(&format!("{flag} {unit}")), "{}", asked.stderr);
+        assert!(asked.stderr.contains(line.trim_end()), "{}", asked.stderr);
+        // A thousand roundings in the last place lead the search to within its own resolution.
+        let same = |bench: &Bench| (error_on_the_rest(bench) / plain - 1.0).abs() < 1e-3;
+        calibrate(&bench, "other.csv", &[flag, unit]).ok();
+        assert!(same(&bench), "{flag}");
+        bench.write("said.csv", in_unit(&bench, column, factor, line));
+        calibrate(&bench, "said.csv", &[]).ok();
+        assert!(same(&bench), "{line}");
+    }
+}
+
+#[test]
+fn two_units_in_one_calibration_are_refused() {
+    let bench = bench();
+    // Small strains in percent look like fractions by themselves.
+    let small = |factor: f64| {
+        change_rows(&bench.read("trace.csv"), |_, cells| {
+            cells[2] = (cells[2].parse::<f64>().unwrap() * factor).to_string();
+        })
+    };
+    bench.write("fraction.csv", small(0.02));
+    bench.write("percent.csv", small(2.0));
+    let run = calibrate(&bench, "fraction.csv", &["percent.csv"]);
+    assert_eq!(run.code, Some(4), "{}", run.stderr);
+    let named = "ohmstrain: percent.csv and fraction.csv: ";
+    assert!(run.stderr.starts_with(named) && run.stderr.contains("# strain_unit = percent"), "{}", run.stderr);
+
+    bench.write("kohm.csv", in_unit(&bench, 1, 0.03, ""));
+    let run = calibrate(&bench, "trace.csv", &["kohm.csv"]);
+    assert_eq!(run.code, Some(4), "{}", run.stderr);
+    assert!(run.stderr.contains("33 times as much") && run.stderr.contains("resistance_unit"), "{}", run.stderr);
+}
+
+#[test]
+fn copies_and_other_sensors_are_mentioned() {
+    let bench = bench();
+    bench.write("copy.csv", bench.read("trace.csv"));
+    bench.write("other.csv", in_unit(&bench, 1, 1.5, ""));
+    let run = calibrate(&bench, "trace.csv", &["copy.csv", "other.csv"]);
+    assert_eq!(run.code, Some(0), "{}", run.stderr);
+    assert!(run.warnings[0].contains("copy.csv has the same content as trace.csv"), "{:?}", run.warnings);
+    let rests = run.warnings.iter().find(|warning| warning.contains("R0 comes out as")).unwrap();
+    assert!(rests.contains("50 % more: one sensor?"), "{rests}");
+}
