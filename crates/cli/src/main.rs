@@ -16,6 +16,7 @@ mod readings;
 mod report;
 mod run;
 mod sensor_file;
+mod suits;
 mod validity;
 
 use std::process::ExitCode;

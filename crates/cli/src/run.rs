@@ -5,6 +5,7 @@ use ohmstrain_ekf::{Guard, Reading, StepError};
 use crate::args::{EstimateArgs, RestResistance};
 use crate::error::CliError;
 use crate::input::Recording;
+use crate::suits;
 
 /// A reading relative to R₀, with what the electronics add to its variance.
 pub fn relative(value: f64, sd_ohm: Option<f64>, rest_reading: f64) -> Option<Reading<f64>> {
@@ -44,6 +45,7 @@ pub fn guard(args: &EstimateArgs) -> Guard<f64> {
 
 /// The filter of an estimator, as the flags want it.
 pub fn filter(params: &SensorParams, kind: EstimatorKind, args: &EstimateArgs) -> Result<Box<dyn Filter>, CliError> {
+    suits::check_start(args, params)?;
     let start = args.initial_strain.map_or(Start::Unknown, Start::Strain);
     let mut filter = build_filter(params, Some(kind), start).map_err(|error| CliError::Input(error.to_string()))?;
     filter.guard(guard(args));
@@ -83,14 +85,15 @@ pub struct Estimated {
     pub smoothed: Vec<Output>,
 }
 
-/// Filters and smooths a recording.
+/// Filters and smooths a recording with the R₀ `rest_reading`.
 pub fn estimate(
     recording: &Recording,
     params: &SensorParams,
+    rest_reading: f64,
     kind: Option<EstimatorKind>,
 ) -> Result<Estimated, CliError> {
     let trace = &recording.trace;
-    let readings = relative_trace(trace, params.rest_reading);
+    let readings = relative_trace(trace, rest_reading);
     let build = |kind| build_filter(params, Some(kind), Start::Unknown).map_err(|e| CliError::Input(e.to_string()));
     let kind = kind.unwrap_or(params.default_estimator);
     let mut filter = build(kind)?;

@@ -94,7 +94,7 @@ fn the_json_of_evaluate_has_the_fields_that_scripts_rely_on() {
     let json: Value = serde_json::from_str(&printed).unwrap();
     let sensor: toml::Table = toml::from_str(&bench.read("sensor.toml")).unwrap();
     let fields = |value: &Value| value.as_object().unwrap().keys().cloned().collect::<Vec<_>>();
-    assert_eq!(fields(&json), ["recordings"]);
+    assert_eq!(fields(&json), ["made_by", "particle_seed", "recordings", "schema", "summary"]);
     assert_eq!(json["recordings"].as_array().unwrap().len(), 2);
     // In the order of the alphabet, as the parsed object has them.
     let scores = [
@@ -102,17 +102,22 @@ fn the_json_of_evaluate_has_the_fields_that_scripts_rely_on() {
         "coverage_50",
         "coverage_90",
         "coverage_95",
+        "crps",
+        "crps_percent_fs",
         "log_score",
         "mae",
         "n",
         "rmse",
         "rmse_percent_fs",
+        "width_95",
+        "width_95_percent_fs",
         "wrong_branch",
     ]
     .map(String::from);
     for recording in json["recordings"].as_array().unwrap() {
         let mut expected =
-            [&scores[..], &["baselines", "calibration_s", "estimator", "file", "smoother"].map(String::from)].concat();
+            [&scores[..], &["baselines", "calibration_s", "estimator", "file", "sha256", "smoother"].map(String::from)]
+                .concat();
         expected.sort();
         assert_eq!(fields(recording), expected);
         assert_eq!(recording["file"], "trace.csv");

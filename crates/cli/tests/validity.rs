@@ -31,7 +31,7 @@ fn warned(bench: &Bench, arguments: &[&str]) -> Vec<String> {
 #[test]
 fn the_calibration_itself_is_within_it() {
     let bench = calibrated();
-    for command in ["filter", "evaluate"] {
+    for command in ["filter", "smooth", "evaluate"] {
         assert_eq!(warned(&bench, &[command, "seen.csv"]), [""; 0]);
     }
 }
@@ -39,7 +39,7 @@ fn the_calibration_itself_is_within_it() {
 #[test]
 fn a_longer_recording_is_warned_of_once() {
     let bench = calibrated();
-    for command in [&["filter"][..], &["evaluate"], &["filter", "--lag-s", "1"]] {
+    for command in [&["filter"][..], &["smooth"], &["evaluate"], &["filter", "--lag-s", "1"]] {
         let mut warnings = warned(&bench, &[command, &["trace.csv"]].concat());
         warnings.retain(|line| line.contains("longer"));
         // Five rows a second: the first one left out is as long after the first as the calibration and 0.2 s more.
@@ -84,7 +84,7 @@ fn a_faster_movement_is_warned_of() {
         })
         .collect();
     bench.write("sensor.toml", slow);
-    for command in ["filter", "evaluate"] {
+    for command in ["filter", "smooth", "evaluate"] {
         let warnings = warned(&bench, &[command, "seen.csv"]);
         assert_eq!(warnings.len(), 1);
         assert!(warnings[0].contains("strain changes faster than the calibration's 0.0001 per second"), "{warnings:?}");

@@ -4,7 +4,7 @@ use std::str::FromStr;
 use clap::Args as ClapArgs;
 use ohmstrain_calib::EstimatorKind;
 
-use super::{Estimator, Split, TraceArgs, finite};
+use super::{Estimator, RestResistance, Split, TraceArgs, finite};
 
 /// Flags of `evaluate`.
 #[derive(Debug, ClapArgs)]
@@ -25,6 +25,10 @@ pub struct EvaluateArgs {
     /// Score rows with time_s >= T only; the filter still starts at the first row
     #[arg(long, value_name = "T", allow_negative_numbers = true, value_parser = finite, conflicts_with = "split")]
     pub from: Option<f64>,
+    /// Resistance at rest instead of the calibration's: a number in the readings' unit, or first:N for the median of each
+    /// recording's first N readings; what the estimates are compared with has its readings scaled alike
+    #[arg(long, value_name = "OHM|first:N")]
+    pub rest_resistance: Option<RestResistance>,
     /// Exit with code 3 unless every recording is estimated better than by the static cubic and its 95 % interval covers
     /// 80 % or more
     #[arg(long)]

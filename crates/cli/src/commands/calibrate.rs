@@ -101,11 +101,11 @@ fn common_units(recordings: &[Recording]) -> Result<(Quantity, ReadingUnit), Cli
 
 /// A report of a recording; scores are about the rows from `scored_from_s` on.
 pub fn report(recording: &Recording, params: &SensorParams, scored_from_s: Option<f64>) -> Result<String, CliError> {
-    let estimated = estimate(recording, params, None)?;
+    let estimated = estimate(recording, params, params.rest_reading, None)?;
     let part = scoring::Part::since(scored_from_s);
     let filter = scoring::of_outputs(recording, &estimated.filtered, part);
     let smoother = scoring::of_outputs(recording, &estimated.smoothed, part);
-    let cubic = scoring::of_baseline(recording, params.static_cubic.start(), part);
+    let cubic = scoring::of_baseline(recording, params.static_cubic.start(), part, 1.0);
     let scores: Vec<ScoreRow> = [("filter", filter), ("smoother", smoother), ("static cubic", cubic)]
         .into_iter()
         .filter_map(|(name, scores)| {

@@ -41,7 +41,7 @@ pub fn run(args: &DemoArgs) -> Result<(), CliError> {
     outputs.put(sensor_output, sensor_file::text(&params)?);
 
     progress.doing("filtering and smoothing");
-    let estimated = estimate(&recording, &params, None)?;
+    let estimated = estimate(&recording, &params, params.rest_reading, None)?;
     outputs.put(filtered_output, estimates(&recording, &params, &estimated.filtered)?);
     outputs.put(smoothed_output, estimates(&recording, &params, &estimated.smoothed)?);
     progress.doing("writing the report");
@@ -54,7 +54,7 @@ pub fn run(args: &DemoArgs) -> Result<(), CliError> {
     let scores = [
         ("filter", scoring::of_outputs(&recording, &estimated.filtered, part)),
         ("smoother", scoring::of_outputs(&recording, &estimated.smoothed, part)),
-        ("static cubic", scoring::of_baseline(&recording, params.static_cubic.start(), part)),
+        ("static cubic", scoring::of_baseline(&recording, params.static_cubic.start(), part, 1.0)),
     ];
     for (name, scores) in scores {
         if let Some(scores) = scores {

@@ -1,7 +1,7 @@
 use std::collections::VecDeque;
 use std::io::{self, Read};
 
-use ohmstrain_bench_data::{Row, TraceReader};
+use ohmstrain_bench_data::{Row, TraceError, TraceReader};
 use ohmstrain_calib::{Filter, Output, SensorParams};
 
 use crate::args::{FilterArgs, RestResistance};
@@ -11,6 +11,7 @@ use crate::input::{self, check_unit, is_stdin};
 use crate::readings::no_row;
 use crate::run::{filter, relative_row, rest_reading, step_error_at};
 use crate::sensor_file;
+use crate::suits::{self, FIRST_LIVE_READINGS, FIRST_READINGS, doubt_readings};
 use crate::validity::ValidityWatch;
 
 /// Bytes handed to standard output at once, unless somebody waits for them.
@@ -22,13 +23,15 @@ pub fn run(args: &FilterArgs) -> Result<(), CliError> {
     let mut params = sensor_file::read(&args.estimate.sensor, kind)?;
     let filter = filter(&params, kind.unwrap_or(params.default_estimator), &args.estimate)?;
     let rows = input::open(&args.trace_file, &args.estimate.trace.metadata())?;
-    check_unit(&input::header(&rows), rows.reading_kind(), params.reading)?;
+    let header = input::header(&rows);
+    check_unit(&header, rows.reading_kind(), params.reading)?;
     input::take_joint(&mut params, rows.metadata());
     let out = io::BufWriter::with_capacity(WRITTEN_AT_ONCE, io::stdout().lock());
     let mut writer = EstimateWriter::new(out, &params, &args.estimate.columns)?;
     let live = is_stdin(&args.trace_file) || !args.trace_file.is_file();
     let (waiting, outputs) = (VecDeque::new(), Vec::new());
-    let stream = Stream { params: &params, args, filter, live, waiting, outputs, watch: None };
+    let stream =
+        Stream { params: &params, args, header, filter, live, waiting, outputs, early: Vec::new(), watch: None };
     let streamed = stream.run(rows, &mut writer);
     // What was estimated before an error is still good.
     writer.flush().and(streamed)
@@ -37,6 +40,8 @@ pub fn run(args: &FilterArgs) -> Result<(), CliError> {
 struct Stream<'a> {
     params: &'a SensorParams,
     args: &'a FilterArgs,
+    /// What messages call the recording's header.
+    header: String,
     filter: Box<dyn Filter>,
     /// Not a file but standard input or a pipe: somebody waits for each row.
     live: bool,
@@ -44,6 +49,8 @@ struct Stream<'a> {
     waiting: VecDeque<Row>,
     /// Estimates that have just become due.
     outputs: Vec<Output>,
+    /// The first known readings of a live stream.
+    early: Vec<f64>,
     /// Says when the calibration does not reach; there once R₀ is known.
     watch: Option<ValidityWatch>,
 }
@@ -58,20 +65,18 @@ impl Stream<'_> {
         let wanted = self.args.estimate.rest_resistance;
         // The rows that R₀ is taken from, at least one, are estimated too, once it is known.
         let count = if let Some(RestResistance::First(count)) = wanted { count } else { 0 };
-        let mut first = Vec::new();
-        for row in rows.by_ref() {
-            first.push(row?);
-            if first.iter().filter(|row| row.reading.value.is_finite()).count() >= count {
-                break;
-            }
-        }
+        let first = first_rows(&mut rows, count, if self.live { count } else { count.max(FIRST_READINGS) })?;
         if first.is_empty() {
             return Err(no_row(&rows));
         }
-        let rest_reading = rest_reading(wanted, self.params, first.iter().map(|row| row.reading.value), &file)?;
+        let known = || first.iter().flatten().map(|row| row.reading.value);
+        let rest_reading = rest_reading(wanted, self.params, known(), &file)?;
+        if !self.live {
+            suits::check_readings(&self.header, self.params, rest_reading, known())?;
+        }
         self.watch = Some(ValidityWatch::new(&file, self.params, rest_reading));
         let mut streamed = Ok(());
-        for row in first.into_iter().map(Ok).chain(rows) {
+        for row in first.into_iter().chain(rows) {
             streamed = row.map_err(CliError::from).and_then(|row| self.step(row, rest_reading, &file, writer));
             if streamed.is_err() {
                 break;
@@ -132,12 +137,42 @@ impl Stream<'_> {
         output: Output,
         writer: &mut EstimateWriter<W>,
     ) -> Result<(), CliError> {
+        if self.live && row.reading.value.is_finite() && self.early.len() < FIRST_LIVE_READINGS {
+            self.early.push(row.reading.value);
+            if self.early.len() == FIRST_LIVE_READINGS {
+                let doubt = doubt_readings(self.params, rest_reading, self.early.iter().copied());
+                doubt.iter().for_each(|doubt| CliError::warning(&format!("{}: {doubt}", self.header)));
+            }
+        }
         if let Some(watch) = &mut self.watch {
             let rate = output.estimate.rate.mean;
             watch.see(row.time_s, row.reading.value, rate, f64::NAN, &mut |warning| CliError::warning(&warning));
         }
         writer.write(&estimate_row(row, rest_reading, output))
     }
+}
+
+/// Rows without a reading among which a reading is looked for, where it is not needed.
+const MOST_FIRST_ROWS: usize = 10 * FIRST_READINGS;
+
+/// The first rows: until `wanted` readings are known, or `enough` of them and many rows. An error ends them; it is returned
+/// if fewer readings than that are known.
+fn first_rows<R: Read>(
+    rows: &mut TraceReader<R>,
+    enough: usize,
+    wanted: usize,
+) -> Result<Vec<Result<Row, TraceError>>, CliError> {
+    let (mut first, mut known) = (Vec::new(), 0);
+    for row in rows {
+        let row = if known < enough { Ok(row?) } else { row };
+        known += usize::from(row.as_ref().is_ok_and(|row| row.reading.value.is_finite()));
+        let failed = row.is_err();
+        first.push(row);
+        if failed || known >= wanted || (known >= enough && first.len() >= MOST_FIRST_ROWS) {
+            break;
+        }
+    }
+    Ok(first)
 }
 
 fn estimate_row(row: &Row, rest_reading: f64, output: Output) -> EstimateRow {

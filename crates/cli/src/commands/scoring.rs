@@ -43,10 +43,10 @@ pub fn of_outputs(recording: &Recording, outputs: &[Output], part: Part) -> Opti
     })
 }
 
-/// Scores of a baseline, which runs over the whole recording too.
-pub fn of_baseline(recording: &Recording, mut baseline: impl Baseline, part: Part) -> Option<Scores> {
+/// Scores of a baseline, which runs over the whole recording too; it is given the readings times `moved`.
+pub fn of_baseline(recording: &Recording, mut baseline: impl Baseline, part: Part, moved: f64) -> Option<Scores> {
     let trace = &recording.trace;
     let rows = trace.time_s.iter().zip(&trace.readings.values);
-    let strains: Vec<f64> = rows.map(|(&time_s, &reading)| baseline.strain(time_s, reading)).collect();
+    let strains: Vec<f64> = rows.map(|(&time_s, &reading)| baseline.strain(time_s, moved * reading)).collect();
     scores(recording, part, |k| (strains[k], None))
 }

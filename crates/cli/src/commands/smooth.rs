@@ -10,6 +10,8 @@ use crate::input::{self, Recording, check_unit};
 use crate::readings::Readings;
 use crate::run::{filter, no_smoother, rest_reading, step_error};
 use crate::sensor_file;
+use crate::suits;
+use crate::validity::ValidityWatch;
 
 /// Smooths a recording and writes its estimates, all of them or none. Of a long one, readings are held in memory, and the
 /// states of a few thousand rows; estimates, which come out last segment first, wait in a temporary file.
@@ -18,24 +20,33 @@ pub fn run(args: &SmoothArgs) -> Result<(), CliError> {
     let mut params = sensor_file::read(&args.estimate.sensor, wanted)?;
     let kind = wanted.unwrap_or(params.default_estimator);
     let rows = input::open(&args.trace_file, &args.estimate.trace.metadata())?;
-    check_unit(&input::header(&rows), rows.reading_kind(), params.reading)?;
+    let header = input::header(&rows);
+    check_unit(&header, rows.reading_kind(), params.reading)?;
     input::take_joint(&mut params, rows.metadata());
     let name = rows.file().to_string();
     let readings = Readings::collect(rows)?;
     let rest_reading = rest_reading(args.estimate.rest_resistance, &params, readings.values(), &name)?;
+    suits::check_readings(&header, &params, rest_reading, readings.values())?;
     let mut filter = filter(&params, kind.smoother(), &args.estimate)?;
     let writer = EstimateWriter::new(Segments::new(), &params, &args.estimate.columns)?;
-    let segments = smooth_into(writer, filter.as_mut(), &readings, rest_reading, &name)?;
+    let mut rates = vec![f32::NAN; readings.len()];
+    let segments = smooth_into(writer, filter.as_mut(), &readings, rest_reading, &name, &mut rates)?;
+    let mut watch = ValidityWatch::new(&name, &params, rest_reading);
+    for (row, rate) in rates.into_iter().enumerate() {
+        let (time_s, reading) = readings.recorded(row);
+        watch.see(time_s, reading, rate.into(), f64::NAN, &mut |warning| CliError::warning(&warning));
+    }
     segments.write_in_order(&mut io::stdout().lock())
 }
 
-/// Writes the smoothed rows of a recording, last segment first.
+/// Writes the smoothed rows of a recording, last segment first, and keeps their rates.
 fn smooth_into(
     mut writer: EstimateWriter<Segments>,
     filter: &mut dyn Filter,
     readings: &Readings,
     rest_reading: f64,
     name: &str,
+    rates: &mut [f32],
 ) -> Result<Segments, CliError> {
     let failed = |(row, error)| step_error(name, row, error);
     writer.get_mut().end_segment()?;
@@ -47,6 +58,7 @@ fn smooth_into(
         for (row, output) in rows.zip(&outputs) {
             let (time_s, reading) = readings.recorded(row);
             let saturated = readings.is_saturated(row);
+            rates[row] = output.estimate.rate.mean as f32;
             writer.write(&EstimateRow { time_s, reading, saturated, rest_reading, output: *output })?;
         }
         writer.get_mut().end_segment()?;

@@ -15,6 +15,7 @@ use crate::error::CliError;
 use crate::input::{self, Recording, check_unit};
 use crate::output::print;
 use crate::progress::Progress;
+use crate::suits;
 
 /// Smallest coverage of the 95 % interval that `--check` accepts.
 const LEAST_COVERAGE: f64 = 0.8;
@@ -40,7 +41,7 @@ pub fn run(args: &EvaluateArgs) -> Result<(), CliError> {
 fn with_sensor_file(args: &EvaluateArgs, path: &Path, evaluation: &mut Evaluation) -> Result<(), CliError> {
     let sensors = Sensor::from_file(path, args.estimator)?;
     let rivals = Rivals { static_cubic: sensors[0].params.static_cubic, learned: None };
-    let judged = |path: &PathBuf| judge(&read(args, path)?, Part::since(args.from), &sensors, &rivals);
+    let judged = |path: &PathBuf| judge(args, &read(args, path)?, Part::since(args.from), &sensors, &rivals);
     add_until_error(evaluation, args.traces.par_iter().map(judged).collect())
 }
 
@@ -50,7 +51,7 @@ fn with_splits(args: &EvaluateArgs, evaluation: &mut Evaluation) -> Result<(), C
     for path in &args.traces {
         let recording = read(args, path)?;
         for &split in &args.calibration.split {
-            evaluation.add(with_split(&recording, split, args.estimator, &progress)?);
+            evaluation.add(with_split(args, &recording, split, &progress)?);
         }
     }
     Ok(())
@@ -58,19 +59,19 @@ fn with_splits(args: &EvaluateArgs, evaluation: &mut Evaluation) -> Result<(), C
 
 /// A recording with parameters from some of its rows, scored on the others.
 fn with_split(
+    args: &EvaluateArgs,
     recording: &Recording,
     split: Split,
-    estimators: Estimators,
     progress: &Progress,
 ) -> Result<Vec<RecordingScores>, CliError> {
     let rows = recording.trace.len();
     let training = [recording.rows(split.training(rows))];
-    let (sensors, rivals) = calibrated(&training, estimators, progress)?;
+    let (sensors, rivals) = calibrated(&training, args.estimator, progress)?;
     progress.doing("scoring");
     let lag_s = reference_lag(&recording.samples()?, &sensors[0].params.law);
     let (scored, time_at) = (split.scored(rows), |row: usize| recording.trace.time_s.get(row).copied());
     let part = Part { from_s: time_at(scored.start), until_s: time_at(scored.end) };
-    let Judged { mut scores, .. } = judge(recording, part, &sensors, &rivals)?;
+    let Judged { mut scores, .. } = judge(args, recording, part, &sensors, &rivals)?;
     for scores in &mut scores {
         (scores.lag_s, scores.split) = (Some(lag_s), Some(split.to_string()));
     }
@@ -86,7 +87,7 @@ fn with_training(args: &EvaluateArgs, evaluation: &mut Evaluation) -> Result<(),
     let tests: Vec<Recording> = args.test.iter().map(|path| read(path)).collect::<Result<_, _>>()?;
     let (sensors, rivals) = calibrated(&training, args.estimator, &progress)?;
     progress.doing("scoring");
-    let judged = |recording: &Recording| judge(recording, Part::since(args.from), &sensors, &rivals);
+    let judged = |recording: &Recording| judge(args, recording, Part::since(args.from), &sensors, &rivals);
     add_until_error(evaluation, tests.par_iter().map(judged).collect())
 }
 
@@ -127,19 +128,29 @@ struct Judged {
 }
 
 /// Scores of every sensor on some rows of a recording.
-fn judge(recording: &Recording, part: Part, sensors: &[Sensor], rivals: &Rivals) -> Result<Judged, CliError> {
+fn judge(
+    args: &EvaluateArgs,
+    recording: &Recording,
+    part: Part,
+    sensors: &[Sensor],
+    rivals: &Rivals,
+) -> Result<Judged, CliError> {
     let mut judged = Judged::default();
     let Some(first) = sensors.first() else { return Ok(judged) };
     check_unit(&recording.header, recording.trace.readings.kind, first.params.reading)?;
     recording.samples()?;
     recording.check_quantity(first.params.quantity)?;
+    let rest_reading = first.rest_reading(recording, args.rest_resistance)?;
+    let readings = recording.trace.readings.values.iter().copied();
+    suits::check_readings(&recording.header, &first.params, rest_reading, readings)?;
+    suits::check_reference(recording, &first.params)?;
     let nothing = || {
         let rows = part.from_s.map_or_else(|| "any row".into(), |from| format!("time_s >= {from}"));
         CliError::Input(format!("{}: expected a reference at {rows}, found none", recording.name))
     };
-    let baselines = rivals.scores(recording, part).ok_or_else(nothing)?;
+    let baselines = rivals.scores(recording, part, first.params.rest_reading / rest_reading).ok_or_else(nothing)?;
     for sensor in sensors {
-        let scores = sensor.judge(recording, part, baselines, &mut judged.warnings)?;
+        let scores = sensor.judge(recording, part, args.rest_resistance, baselines, &mut judged.warnings)?;
         judged.scores.push(scores.ok_or_else(nothing)?);
     }
     Ok(judged)

@@ -4,13 +4,13 @@ use std::time::Instant;
 use ohmstrain_calib::{Baselines, EstimatorKind, LawOptions, SensorParams, Start, StaticCubic, build_filter};
 
 use super::evaluation::{BaselineScores, LearnedScores, RecordingScores};
-use crate::args::Estimators;
+use crate::args::{Estimators, RestResistance};
 use crate::commands::calibrate::calibrate_recordings;
 use crate::commands::scoring::{self, Part};
 use crate::error::CliError;
 use crate::input::Recording;
 use crate::progress::Progress;
-use crate::run::estimate;
+use crate::run::{estimate, rest_reading};
 use crate::sensor_file;
 use crate::validity::ValidityWatch;
 
@@ -64,19 +64,27 @@ impl Sensor {
         wanted.into_iter().map(calibrate).collect()
     }
 
+    /// R₀ for a recording.
+    pub fn rest_reading(&self, recording: &Recording, wanted: Option<RestResistance>) -> Result<f64, CliError> {
+        let readings = recording.trace.readings.values.iter().copied();
+        rest_reading(wanted, &self.params, readings, &recording.name)
+    }
+
     /// Scores on some rows of a recording, the filter started at the first; `None` without a reference. What
     /// casts doubt on them is added to `warnings`.
     pub fn judge(
         &self,
         recording: &Recording,
         part: Part,
+        rest_resistance: Option<RestResistance>,
         baselines: BaselineScores,
         warnings: &mut Vec<String>,
     ) -> Result<Option<RecordingScores>, CliError> {
-        let estimated = estimate(recording, &self.params, Some(self.kind))?;
+        let rest_reading = self.rest_reading(recording, rest_resistance)?;
+        let estimated = estimate(recording, &self.params, rest_reading, Some(self.kind))?;
         if self.calibration_s.is_none() {
             let trace = &recording.trace;
-            let mut watch = ValidityWatch::new(&recording.name, &self.params, self.params.rest_reading);
+            let mut watch = ValidityWatch::new(&recording.name, &self.params, rest_reading);
             for (k, output) in estimated.filtered.iter().enumerate() {
                 let rate = output.estimate.rate.mean;
                 let mut keep = |warning: String| warnings.push(warning);
@@ -103,17 +111,18 @@ impl Sensor {
 }
 
 impl Rivals {
-    /// Scores on some rows of a recording; `None` without a reference.
-    pub fn scores(&self, recording: &Recording, part: Part) -> Option<BaselineScores> {
+    /// Scores on some rows of a recording, whose readings times `moved` are as those of the calibration; `None` without a
+    /// reference.
+    pub fn scores(&self, recording: &Recording, part: Part, moved: f64) -> Option<BaselineScores> {
         let learned = match &self.learned {
             None => None,
             Some(learned) => Some(LearnedScores {
-                fir_20s: scoring::of_baseline(recording, learned.fir.start(), part)?,
-                low_pass_mode: scoring::of_baseline(recording, learned.low_pass_mode.start(), part)?,
-                leaky_bank: scoring::of_baseline(recording, learned.leaky_bank.start(), part)?,
+                fir_20s: scoring::of_baseline(recording, learned.fir.start(), part, moved)?,
+                low_pass_mode: scoring::of_baseline(recording, learned.low_pass_mode.start(), part, moved)?,
+                leaky_bank: scoring::of_baseline(recording, learned.leaky_bank.start(), part, moved)?,
             }),
         };
-        let static_cubic = scoring::of_baseline(recording, self.static_cubic.start(), part)?;
+        let static_cubic = scoring::of_baseline(recording, self.static_cubic.start(), part, moved)?;
         Some(BaselineScores { static_cubic, learned })
     }
 }

@@ -13,6 +13,7 @@ use crate::output::{Kind, Outputs, print};
 use crate::progress::Progress;
 use crate::run::rest_reading;
 use crate::sensor_file;
+use crate::suits;
 use rows::RelativeRows;
 use table::Refinement;
 
@@ -34,6 +35,8 @@ pub fn run(args: &RefineArgs) -> Result<(), CliError> {
     check_unit(&recording.header, recording.trace.readings.kind, params.reading)?;
     let readings = recording.trace.readings.values.iter().copied();
     let rest_reading = rest_reading(args.rest_resistance, &params, readings, &recording.name)?;
+    let readings = recording.trace.readings.values.iter().copied();
+    suits::check_readings(&recording.header, &params, rest_reading, readings)?;
     let rows = RelativeRows::new(&recording, args.from, args.until, rest_reading)?;
     let (start, free) = start(args, &params)?;
     let refinement = refine(&params.law, start, free, &rows).map_err(|error| named(args, &error))?;

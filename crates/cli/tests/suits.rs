@@ -1,0 +1,172 @@
+//! Files and arguments that cannot be meant for the sensor: a question that says how to answer it, not an estimate.
+
+#[allow(dead_code, reason = "each test program uses its own share")]
+mod common;
+
+use common::{Bench, CALIBRATED_UNTIL, Csv, change_rows};
+use serde_json::Value;
+
+const SENSOR: [&str; 2] = ["--sensor", "sensor.toml"];
+
+/// The recording with readings, or, in the last column, strains, times a factor.
+fn scaled(bench: &Bench, column: usize, factor: f64) -> String {
+    change_rows(&bench.read("trace.csv"), |_, cells| {
+        cells[column] = (factor * cells[column].parse::<f64>().unwrap()).to_string();
+    })
+}
+
+fn rest_reading(bench: &Bench) -> f64 {
+    let sensor: toml::Table = toml::from_str(&bench.read("sensor.toml")).unwrap();
+    sensor["rest_reading"].as_float().unwrap()
+}
+
+#[track_caller]
+fn asks(bench: &Bench, arguments: &[&str], code: i32, start: &str, question: &str) {
+    let run = bench.run(&[arguments, &SENSOR].concat());
+    assert_eq!(run.code, Some(code), "{}: {}", run.command, run.stderr);
+    // At most a header.
+    assert!(run.stdout.lines().count() <= 1, "{}: {}", run.command, run.stdout);
+    assert_eq!(run.stderr.lines().count(), 1, "{}", run.stderr);
+    assert!(run.stderr.starts_with(&format!("ohmstrain: {start}")), "{}", run.stderr);
+    assert!(run.stderr.contains(question), "{}", run.stderr);
+}
+
+#[test]
+fn readings_in_another_unit_are_asked_about() {
+    let bench = Bench::calibrated();
+    let header = 1 + bench.read("trace.csv").lines().position(|line| line.starts_with("time_s")).unwrap();
+    let start = format!("other.csv:{header}: column `resistance_ohm`: expected readings of ");
+    for (factor, question) in
+        [(1e-3, "in kilo-ohms?"), (1e-6, "in mega-ohms?"), (1e3, "is R0, or the calibration, in kilo-ohms?")]
+    {
+        bench.write("other.csv", scaled(&bench, 1, factor));
+        for command in [&["filter"][..], &["smooth"], &["evaluate"], &["refine", "-o", "new.toml"]] {
+            asks(&bench, &[command, &["other.csv"]].concat(), 4, &start, question);
+        }
+    }
+    assert!(!bench.path("new.toml").exists());
+    // R0 in another unit than the readings is the same mistake.
+    let rest = (1e-3 * rest_reading(&bench)).to_string();
+    let start = start.replace("other", "trace");
+    asks(
+        &bench,
+        &["filter", "trace.csv", "--rest-resistance", &rest],
+        4,
+        &start,
+        "is R0, or the calibration, in kilo-ohms?",
+    );
+}
+
+/// Everything is relative to R0: with it in the readings' unit, or with the readings' unit said, the estimates are those of
+/// the recording in ohms.
+#[test]
+fn the_answer_is_the_unit_or_r0_in_it() {
+    let bench = Bench::calibrated();
+    bench.write("other.csv", scaled(&bench, 1, 1e-3));
+    let rest = (1e-3 * rest_reading(&bench)).to_string();
+    for command in ["filter", "smooth"] {
+        let strains = |arguments: &[&str]| {
+            Csv::new(&bench.run(&[&[command], arguments, &SENSOR].concat()).ok()).numbers("strain")
+        };
+        let in_ohm = strains(&["trace.csv"]);
+        for answer in [["--rest-resistance", &rest], ["--resistance-unit", "kohm"]] {
+            let in_kohm = strains(&[&["other.csv"][..], &answer].concat());
+            // Rounding of the scaled readings, 1e-16, times what a filter makes of it.
+            assert!(in_ohm.iter().zip(&in_kohm).all(|(a, b)| (a - b).abs() < 1e-8), "{command} {answer:?}");
+        }
+    }
+}
+
+/// Somebody waits for the rows of a stream: it goes on, and says what is doubtful.
+#[test]
+fn a_live_stream_is_warned_of() {
+    let bench = Bench::calibrated();
+    let other = scaled(&bench, 1, 1e-3);
+    let rows = other.lines().filter(|line| line.starts_with(|first: char| first.is_ascii_digit())).count();
+    let run = bench.feed(&[&["filter"][..], &SENSOR].concat(), other);
+    let doubts = run.warnings.iter().filter(|line| line.contains("in kilo-ohms?")).count();
+    assert_eq!((run.code, doubts), (Some(0), 1), "{:?}", run.warnings);
+    assert_eq!(Csv::new(&run.stdout).len(), rows);
+}
+
+/// A plug that was not in yet, and a sensor of another size, are no other unit.
+#[test]
+fn what_no_unit_explains_is_no_reason_to_stop() {
+    let bench = Bench::calibrated();
+    let trace = bench.read("trace.csv");
+    bench.write(
+        "open.csv",
+        change_rows(&trace, |row, cells| {
+            if row < 150 {
+                cells[1] = "1e9".into()
+            }
+        }),
+    );
+    bench.write("larger.csv", scaled(&bench, 1, 3.0));
+    for file in ["open.csv", "larger.csv"] {
+        for command in ["filter", "smooth"] {
+            let run = bench.run(&[&[command, file][..], &SENSOR].concat());
+            assert_eq!(run.code, Some(0), "{}: {}", run.command, run.stderr);
+            let outside = run.warnings.iter().any(|line| line.contains("resistance_ohm is outside of"));
+            assert!(outside, "{}: {:?}", run.command, run.warnings);
+        }
+    }
+}
+
+#[test]
+fn a_reference_in_percent_is_asked_about() {
+    let bench = Bench::calibrated();
+    let percent = scaled(&bench, 2, 100.0);
+    bench.write("other.csv", &percent);
+    let header = 1 + percent.lines().position(|line| line.starts_with("time_s")).unwrap();
+    let start = format!("other.csv:{header}: column `strain`: expected strains of up to 0.3333, as in the calibration");
+    asks(&bench, &["evaluate", "other.csv"], 4, &start, "in percent?");
+    // One bad row is a bad row.
+    let outlier = change_rows(&bench.read("trace.csv"), |row, cells| {
+        if row == 700 {
+            cells[2] = "30".into()
+        }
+    });
+    bench.write("other.csv", outlier);
+    bench.run(&[&["evaluate", "other.csv"][..], &SENSOR].concat()).ok();
+}
+
+#[test]
+fn a_strain_to_start_at_lies_within_the_limits() {
+    let bench = Bench::calibrated();
+    for command in ["filter", "smooth"] {
+        for far in ["10", "-0.1"] {
+            let start = format!(
+                "--initial-strain: expected 0.0000 to 0.3333, the limits of the sensor's strain, found {far}; 10 % is 0.1\n"
+            );
+            asks(&bench, &[command, "trace.csv", "--initial-strain", far], 2, &start, "");
+        }
+        let near = bench.run(&[&[command, "trace.csv", "--initial-strain", "0.34"][..], &SENSOR].concat());
+        let warned = near.warnings.iter().filter(|line| line.contains("--initial-strain: 0.34 is outside of")).count();
+        assert_eq!((near.code, warned), (Some(0), 1), "{}", near.stderr);
+    }
+}
+
+/// A sensor with a fifth more resistance, known at rest, is scored as the one that was calibrated; so is what it is
+/// compared with.
+#[test]
+fn evaluate_takes_a_rest_resistance_as_filter_does() {
+    let bench = Bench::calibrated();
+    bench.write("larger.csv", scaled(&bench, 1, 1.2));
+    let rmse = |arguments: &[&str]| {
+        let printed =
+            bench.run(&[&["evaluate", "--json", "--from", CALIBRATED_UNTIL], arguments, &SENSOR].concat()).ok();
+        let scores = serde_json::from_str::<Value>(&printed).unwrap()["recordings"][0].clone();
+        [&scores["rmse"], &scores["smoother"]["rmse"], &scores["baselines"]["static_cubic"]["rmse"]]
+            .map(|rmse| rmse.as_f64().unwrap())
+    };
+    let expected = rmse(&["trace.csv"]);
+    let alike = |found: [f64; 3]| found.iter().zip(&expected).all(|(a, b)| (a - b).abs() < 1e-8);
+    let rest = (1.2 * rest_reading(&bench)).to_string();
+    assert!(alike(rmse(&["larger.csv", "--rest-resistance", &rest])));
+    assert!(!alike(rmse(&["larger.csv"])));
+    // Whatever the first reading is, it is a fifth more in the other recording.
+    let of_first = rmse(&["trace.csv", "--rest-resistance", "first:1"]);
+    let larger = rmse(&["larger.csv", "--rest-resistance", "first:1"]);
+    assert!(of_first.iter().zip(&larger).all(|(a, b)| (a - b).abs() < 1e-8));
+}
