@@ -139,7 +139,7 @@ pub fn switching_sensor() -> SwitchedModel<f64, 2, 1, 3> {
     };
     let noise = ModelNoise { reading_sd: 0.02, branch_sd: 0.01, baseline_sd: 0.0, baseline_time_s: 1.0 };
     Motion::ornstein_uhlenbeck(2.0, 0.03, 0.0, f64::INFINITY)
-        .and_then(|motion| SwitchedModel::new(law, motion.with_phase_rate(0.1), noise))
+        .and_then(|motion| SwitchedModel::new(law, motion.with_phase_rate(0.1).unwrap(), noise))
         .unwrap_or_else(|error| unreachable!("{error}"))
 }
 

@@ -182,7 +182,7 @@ fn a_refused_sensor_keeps_its_belief_and_disturbs_nobody() {
         (f64::INFINITY, 0.0, StepError::NonFiniteReading),
         (f64::NEG_INFINITY, 0.0, StepError::NonFiniteReading),
         (0.1, f64::NAN, StepError::NonFiniteReading),
-        (0.1, -1e3, StepError::NonPositiveInnovationVariance),
+        (0.1, -1e3, StepError::NegativeVariance),
     ];
     for bits in [128, 256, 512] {
         for ill in 0..17 {

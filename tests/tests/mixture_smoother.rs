@@ -47,7 +47,7 @@ fn model(&Scenario { rate_sd, reading_sd, .. }: &Scenario) -> Model {
         }],
         range: StrainRange { lower: -10.0, upper: 10.0 },
     };
-    let motion = Motion::ornstein_uhlenbeck(3.0, rate_sd, 0.0, 2.0).unwrap().with_phase_rate(0.1);
+    let motion = Motion::ornstein_uhlenbeck(3.0, rate_sd, 0.0, 2.0).unwrap().with_phase_rate(0.1).unwrap();
     let noise = ModelNoise { reading_sd, branch_sd: 0.01, baseline_sd: 0.05, baseline_time_s: 5.0 };
     Model::new(law, motion, noise).unwrap()
 }

@@ -83,7 +83,7 @@ impl Units {
     fn sensor(self) -> Sensor {
         let Self { strain, .. } = self;
         let motion = Motion::ornstein_uhlenbeck(1.5, 0.05 * strain, 0.15 * strain, 0.1 * strain).unwrap();
-        SwitchedModel::new(self.law(0.6), motion.with_phase_rate(0.05 * strain), self.noise()).unwrap()
+        SwitchedModel::new(self.law(0.6), motion.with_phase_rate(0.05 * strain).unwrap(), self.noise()).unwrap()
     }
 
     fn evidence(self) -> Evidence<f64> {
@@ -251,7 +251,7 @@ proptest! {
     #[test]
     fn splitting_a_step_changes_nothing(rows in tame(), share in 0.01..0.99_f64) {
         let (law, noise) = (PLAIN.law(0.0), PLAIN.noise());
-        let rough = Motion::ornstein_uhlenbeck(1.5, 0.05, 0.15, 0.1).unwrap().with_phase_rate(0.05);
+        let rough = Motion::ornstein_uhlenbeck(1.5, 0.05, 0.15, 0.1).unwrap().with_phase_rate(0.05).unwrap();
         let smooth = Motion::smooth(0.05, 0.1, 0.15, 0.1).unwrap();
         for phase in Phase::ALL {
             check_split::<2, 5, 15>(&SwitchedModel::new(law, rough, noise).unwrap(), phase, &rows, share)?;

@@ -68,6 +68,7 @@ fn sensor() -> SensorParams {
             reading_upper: 1.6,
             fastest_rate_per_s: 0.2,
             duration_s: 100.0,
+            longest_repeat_s: 0.0,
         },
         static_cubic: StaticCubic { reading_centre: 1.0, reading_scale: 1.0, coefficients: [0.0; 4], range: limits },
         joint: None,
@@ -96,8 +97,7 @@ fn broken(kind: usize, now_s: f64) -> (f64, f64, StepError) {
         0 => (now_s - 0.1, 0.1, StepError::NegativeTimeStep),
         1 => (f64::NAN, 0.1, StepError::NonFiniteTimeStep),
         2 => (now_s + 0.1, f64::NAN, StepError::NonFiniteReading),
-        3 => (now_s + 0.1, f64::INFINITY, StepError::NonFiniteReading),
-        _ => (now_s + 0.1, 1e300, StepError::NonFiniteState),
+        _ => (now_s + 0.1, f64::INFINITY, StepError::NonFiniteReading),
     }
 }
 
@@ -107,7 +107,7 @@ proptest! {
     #[test]
     fn an_error_leaves_no_trace(
         rows in prop::collection::vec(
-            (0.0..0.4_f64, prop::option::weighted(0.8, -0.1..0.6_f64), prop::option::weighted(0.3, 0..5_usize)), 1..40,
+            (0.0..0.4_f64, prop::option::weighted(0.8, -0.1..0.6_f64), prop::option::weighted(0.3, 0..4_usize)), 1..40,
         ),
     ) {
         let params = sensor();
@@ -155,7 +155,7 @@ fn a_long_recording_is_smoothed_as_if_all_states_were_kept() {
         });
     });
     for kind in [EstimatorKind::Ekf, EstimatorKind::SignSplit, EstimatorKind::Ensemble] {
-        for guard in [Guard::none(), Guard::none().with_gate(3.0, 5)] {
+        for guard in [Guard::none(), Guard::none().with_gate(3.0, 5).unwrap()] {
             let build = || {
                 let mut filter = build_filter(&params, Some(kind), Start::Unknown).unwrap();
                 filter.guard(guard);

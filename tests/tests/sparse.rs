@@ -125,7 +125,7 @@ fn an_error_leaves_the_belief() {
     assert_eq!(refused(&mut belief, f64::NAN, 0.0), StepError::NonFiniteReading);
     assert_eq!(refused(&mut belief, f64::INFINITY, 0.0), StepError::NonFiniteReading);
     assert_eq!(refused(&mut belief, 0.1, f64::NAN), StepError::NonFiniteReading);
-    assert_eq!(refused(&mut belief, 0.1, -1e3), StepError::NonPositiveInnovationVariance);
+    assert_eq!(refused(&mut belief, 0.1, -1e3), StepError::NegativeVariance);
     assert_eq!(belief, start);
     let mut lost = Belief { mean: SVector::from([f64::NAN, 0.0, 0.0]), covariance: Symmetric::zeros() };
     assert_eq!(refused(&mut lost, 0.1, 0.0), StepError::NonFiniteState);

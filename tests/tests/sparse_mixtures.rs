@@ -216,7 +216,8 @@ fn differences<T: Real, P: Pair<T, N, L, K>, const N: usize, const L: usize, con
 /// The sensor of all tests; with `phase_rate`, moving phases have a mean rate.
 fn model<T: Real, const B: usize, const N: usize>(phase_rate: f64) -> SwitchedModel<T, 2, B, N> {
     let model = sensor::<T, B, N>();
-    SwitchedModel::new(*model.law(), model.motion().with_phase_rate(T::of(phase_rate)), *model.noise()).unwrap()
+    SwitchedModel::new(*model.law(), model.motion().with_phase_rate(T::of(phase_rate)).unwrap(), *model.noise())
+        .unwrap()
 }
 
 fn imm<T: Real, const B: usize, const N: usize, const L: usize>(
@@ -352,7 +353,7 @@ fn an_error_leaves_the_state() {
         (f64::NAN, 0.0, StepError::NonFiniteReading),
         (f64::INFINITY, 0.0, StepError::NonFiniteReading),
         (0.1, f64::NAN, StepError::NonFiniteReading),
-        (0.1, -1e3, StepError::NonPositiveInnovationVariance),
+        (0.1, -1e3, StepError::NegativeVariance),
     ] {
         let reading = Some(Reading { value, extra_variance });
         assert_eq!(imm.step(&mut phases, reading).unwrap_err(), error);

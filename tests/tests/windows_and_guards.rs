@@ -117,7 +117,7 @@ where
     E::State: PartialEq + std::fmt::Debug,
 {
     let spiked = |spike: Option<f64>| (0..30).map(move |k| if k == 20 { spike } else { Some(0.2) });
-    let gate = Guard::none().with_gate(30.0, 3);
+    let gate = Guard::none().with_gate(30.0, 3).unwrap();
     let (with_spike, verdicts) = guarded(gate, estimator, start.clone(), spiked(Some(5.0)));
     let (without, _) = guarded(Guard::none(), estimator, start.clone(), spiked(None));
     assert_eq!(with_spike, without);
@@ -137,10 +137,10 @@ fn a_rejected_reading_is_a_missing_one() {
 fn a_gate_cannot_lock_the_filter_out() {
     let jump = || (0..80).map(|k| Some(if k < 30 { 0.1 } else { 3.0 }));
     let predicted = |state: &Kalman| ekf().model().observe(&state.mean, ohmstrain_model::Direction::Known(Phase::Hold));
-    let (locked, verdicts) = guarded(Guard::none().with_gate(10.8, u32::MAX), &ekf(), start(), jump());
+    let (locked, verdicts) = guarded(Guard::none().with_gate(10.8, u32::MAX).unwrap(), &ekf(), start(), jump());
     assert!(verdicts[30..].iter().all(|verdict| *verdict == ReadingVerdict::Rejected));
     assert!((predicted(&locked).value - 3.0).abs() > 1.0);
-    let (recovered, verdicts) = guarded(Guard::none().with_gate(10.8, 5), &ekf(), start(), jump());
+    let (recovered, verdicts) = guarded(Guard::none().with_gate(10.8, 5).unwrap(), &ekf(), start(), jump());
     assert_eq!(verdicts[30..35], [ReadingVerdict::Rejected; 5]);
     assert_eq!(verdicts[35], ReadingVerdict::Readmitted);
     assert_eq!(verdicts[60..], [ReadingVerdict::Accepted; 20]);
@@ -153,7 +153,7 @@ fn huber_bounds_the_influence() {
     let ekf = ekf();
     let prepared = Estimator::<f64, 4, 10>::prepare(&ekf, DT_S);
     let step = |reading: f64, influence: Influence<f64>| {
-        let guard = Guard::none().with_influence(influence);
+        let guard = Guard::none().with_influence(influence).unwrap();
         guard.advance(&ekf, &start(), Streak::default(), &prepared, Some(Reading::from(reading))).unwrap()
     };
     let missing = Estimator::<f64, 4, 10>::advance(&ekf, &start(), &prepared, None).unwrap().state;

@@ -45,7 +45,7 @@ pub fn sensor<const B: usize, const N: usize>() -> SwitchedModel<f64, 2, B, N> {
 /// Never: the parameters are valid.
 #[must_use]
 pub fn phased_sensor<const B: usize, const N: usize>() -> SwitchedModel<f64, 2, B, N> {
-    model(law(), motion(0.15).with_phase_rate(0.1))
+    model(law(), motion(0.15).with_phase_rate(0.1).unwrap())
 }
 
 /// A sensor that does not tell stretching from releasing: its law is linear, and so is its motion about strain zero.

@@ -13,6 +13,7 @@ use crate::law_params::LawParams;
 use crate::own_rest::OwnRest;
 use crate::params::{RangeParams, SensorParams};
 use crate::running::{Interval, Running};
+use crate::sieve::Sieve;
 use crate::sparse_estimator::{Histories, SparseEstimator, SparsePhases, Splits};
 
 /// Share of the limits' span to which a given initial strain is believed.
@@ -30,7 +31,7 @@ pub fn build_filter(
 ) -> Result<Box<dyn Filter>, CalibrationError> {
     params.validate()?;
     let kind = kind.unwrap_or(params.default_estimator);
-    let setting = Setting { limits: params.limits, start, own_rest: OwnRest::SHARED };
+    let setting = Setting { limits: params.limits, start, own_rest: OwnRest::SHARED, sieve: Sieve::new(params) };
     let single = |kind| filter_from_parts(kind, &params.law, params.estimator(kind)?, setting);
     if kind != EstimatorKind::Ensemble {
         return single(kind);
@@ -58,6 +59,7 @@ pub(crate) struct Setting {
     pub limits: RangeParams,
     pub start: Start,
     pub own_rest: OwnRest,
+    pub sieve: Sieve,
 }
 
 pub(crate) fn filter_from_parts(
@@ -80,7 +82,7 @@ pub(crate) fn filter_from_parts(
     match estimator.motion.to_model()? {
         AnyMotion::Two(mut motion) => {
             if let Some(phases) = estimator.phases {
-                motion = motion.with_phase_rate(phases.speed_per_s);
+                motion = motion.with_phase_rate(phases.speed_per_s)?;
             }
             if let Some(sparse) = sparse(kind, motion, law, estimator, setting)? {
                 return Ok(sparse);
@@ -208,7 +210,7 @@ impl PhaseFilter {
         })?;
         let dwell = Dwell::new(phases.hold_time_s, phases.move_time_s, phases.reversal)?;
         let hold = (phases.hold_time_s > 0.0 && phases.reversal < 1.0).then_some(dwell);
-        Ok(Self { dwell, hold, evidence: Evidence { limits: limits.to_model(), tempering: phases.tempering } })
+        Ok(Self { dwell, hold, evidence: Evidence::new(limits.to_model(), phases.tempering)? })
     }
 }
 
@@ -218,6 +220,7 @@ fn interval(estimator: &EstimatorParams, setting: Setting) -> Interval {
         filtered_scale: estimator.strain_sd_scale,
         smoothed_scale: estimator.smoothed_sd_scale.unwrap_or(1.0),
         own_rest: setting.own_rest,
+        sieve: setting.sieve,
     }
 }
 

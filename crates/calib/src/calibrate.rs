@@ -13,6 +13,7 @@ use crate::noise_fit::{NoiseProblem, REFINEMENT, SURVEY, Surveyed, survey, surve
 use crate::params::{FORMAT, Quantity, RangeParams, ReadingUnit, SensorParams, Uncertainty, Validity};
 use crate::samples::Samples;
 use crate::screen::{Distrusted, screen};
+use crate::sieve::longest_repeat_s;
 
 /// What calibration is doing, for a progress bar.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -181,6 +182,7 @@ pub fn calibrate(
             reading_upper,
             fastest_rate_per_s: stats.fastest_rate,
             duration_s: stats.longest_s,
+            longest_repeat_s: longest_repeat_s(recordings),
         },
         limits,
         law_error: fit.law.cross_validated_error,

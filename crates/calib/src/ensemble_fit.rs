@@ -14,6 +14,7 @@ use crate::noise_fit::{NoiseProblem, REFINEMENT, SMOOTHED_ROWS, Surveyed, stride
 use crate::own_rest::OwnRest;
 use crate::samples::Samples;
 use crate::sd_scale::sd_scale;
+use crate::sieve::Sieve;
 
 /// The estimator that runs under laws of its own: the one whose law limits it most.
 const RICHER: EstimatorKind = EstimatorKind::SignSplit;
@@ -136,7 +137,7 @@ impl Candidate<'_> {
             None => (fold.law, OwnRest::SHARED),
             Some(own) => (&own.law, OwnRest::new(own.rest_readings[fold.recording] / fold.rest_reading)),
         };
-        let setting = Setting { limits: fold.law.range, start: Start::Unknown, own_rest };
+        let setting = Setting { limits: fold.law.range, start: Start::Unknown, own_rest, sieve: Sieve::OPEN };
         filter_from_parts(self.estimator, law, self.parameters, setting)
     }
 }

@@ -47,6 +47,7 @@ mod samples;
 mod scores;
 mod screen;
 mod sd_scale;
+mod sieve;
 mod sparse_estimator;
 mod stepper;
 mod validate;

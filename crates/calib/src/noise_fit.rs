@@ -12,6 +12,7 @@ use crate::own_rest::OwnRest;
 use crate::params::RangeParams;
 use crate::samples::Samples;
 use crate::sd_scale::sd_scale;
+use crate::sieve::Sieve;
 
 /// Pull toward the starting values, per squared step of a log-parameter: a score from one recording must not run away.
 const REGULARISATION: f64 = 1e-2;
@@ -190,7 +191,8 @@ impl<'a> NoiseProblem<'a> {
         fold: Fold,
         params: &EstimatorParams,
     ) -> Result<Box<dyn Filter>, CalibrationError> {
-        let setting = Setting { limits: self.limits, start: Start::Unknown, own_rest: OwnRest::SHARED };
+        let setting =
+            Setting { limits: self.limits, start: Start::Unknown, own_rest: OwnRest::SHARED, sieve: Sieve::OPEN };
         filter_from_parts(kind, fold.law, params, setting)
     }
 

@@ -125,6 +125,8 @@ pub struct Validity {
     pub fastest_rate_per_s: f64,
     /// Longest recording, s.
     pub duration_s: f64,
+    /// Longest time for which a reading was repeated to the last digit, s.
+    pub longest_repeat_s: f64,
 }
 
 /// Geometry of a joint: `ε = prestrain + moment_arm θ / gauge_length`.

@@ -9,6 +9,7 @@ use ohmstrain_model::StrainRange;
 
 use crate::filter::{Filter, Output, Rows, WayBack};
 use crate::own_rest::OwnRest;
+use crate::sieve::Sieve;
 use crate::stepper::{Moment, Seen, Stepper};
 use crate::way_back::Segments;
 
@@ -32,6 +33,8 @@ pub(crate) struct Interval {
     pub smoothed_scale: f64,
     /// R₀ of the law.
     pub own_rest: OwnRest,
+    /// What a reading must be for the filter to see it.
+    pub sieve: Sieve,
 }
 
 /// A row whose estimate waits for later readings.
@@ -49,8 +52,9 @@ where
 {
     pub(crate) fn new(estimator: E, state: E::State, model: S, interval: Interval) -> Self {
         let (pending, due) = (VecDeque::new(), Vec::new());
+        let reading_variance = model.noise().reading_sd.powi(2);
         Self {
-            stepper: Stepper::new(estimator, interval.own_rest),
+            stepper: Stepper::new(estimator, interval.own_rest, interval.sieve, reading_variance),
             model,
             interval,
             now: Moment::start(state),
@@ -91,12 +95,14 @@ where
             }
             row > 0
         });
-        if smoothed.is_ok() {
+        if smoothed == Ok(true) {
             due.iter().rev().for_each(|output| out(*output));
         }
         due.clear();
         self.due = due;
-        smoothed?;
+        if !smoothed? {
+            return Err(StepError::NoSmoother);
+        }
         if count == waiting {
             out(self.output(&self.now.state, self.now.seen, scale));
         }

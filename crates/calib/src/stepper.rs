@@ -5,12 +5,16 @@ use ohmstrain_ekf::{
 };
 
 use crate::own_rest::OwnRest;
+use crate::sieve::{Repeats, Sieve};
 
 /// An estimator under guard, and the steps it has prepared.
 pub(crate) struct Stepper<E: Estimator<f64, N, L>, const N: usize, const L: usize> {
     pub estimator: E,
     pub guard: Guard<f64>,
     own_rest: OwnRest,
+    sieve: Sieve,
+    /// Of the model's own noise.
+    reading_variance: f64,
     prepared: PreparedSteps<E::Prepared>,
 }
 
@@ -24,6 +28,7 @@ pub(crate) struct Moment<S> {
     pub time_s: Option<f64>,
     pub state: S,
     pub streak: Streak,
+    pub repeats: Option<Repeats>,
     pub seen: Seen,
 }
 
@@ -38,7 +43,7 @@ impl<S> Moment<S> {
     /// Before the first row.
     pub(crate) fn start(state: S) -> Self {
         let seen = Seen { innovation: None, verdict: ReadingVerdict::Missing };
-        Self { time_s: None, state, streak: Streak::default(), seen }
+        Self { time_s: None, state, streak: Streak::default(), repeats: None, seen }
     }
 
     fn seconds_until(&self, time_s: f64) -> f64 {
@@ -47,8 +52,22 @@ impl<S> Moment<S> {
 }
 
 impl<E: Estimator<f64, N, L>, const N: usize, const L: usize> Stepper<E, N, L> {
-    pub(crate) fn new(estimator: E, own_rest: OwnRest) -> Self {
-        Self { estimator, guard: Guard::none(), own_rest, prepared: PreparedSteps::new() }
+    pub(crate) fn new(estimator: E, own_rest: OwnRest, sieve: Sieve, reading_variance: f64) -> Self {
+        Self { estimator, guard: Guard::none(), own_rest, sieve, reading_variance, prepared: PreparedSteps::new() }
+    }
+
+    /// A reading as the estimator is to see it, and what became of it where that is decided already.
+    fn sieved(
+        &self,
+        repeats: &mut Option<Repeats>,
+        time_s: f64,
+        reading: Option<Reading<f64>>,
+    ) -> (Option<Reading<f64>>, Option<ReadingVerdict>) {
+        match reading.map(|reading| self.sieve.pass(repeats, time_s, reading, self.reading_variance)) {
+            None => (None, None),
+            Some(Ok(reading)) => (Some(self.own_rest.reading(reading)), None),
+            Some(Err(verdict)) => (None, Some(verdict)),
+        }
     }
 
     /// One step from `now`: where it leads, and what a smoother needs of it.
@@ -58,12 +77,14 @@ impl<E: Estimator<f64, N, L>, const N: usize, const L: usize> Stepper<E, N, L> {
         time_s: f64,
         reading: Option<Reading<f64>>,
     ) -> Result<(Moment<E::State>, Taken<E, N, L>), StepError> {
-        let reading = reading.map(|reading| self.own_rest.reading(reading));
+        let mut repeats = now.repeats;
+        let (reading, decided) = self.sieved(&mut repeats, time_s, reading);
         let prepared = self.prepared.of(now.seconds_until(time_s), |dt_s| self.estimator.prepare(dt_s))?;
         let Guarded { advanced, from, used, verdict, streak } =
             self.guard.advance(&self.estimator, &now.state, now.streak, prepared, reading)?;
         let Advanced { state, innovation } = advanced;
-        let next = Moment { time_s: Some(time_s), state, streak, seen: Seen { innovation, verdict } };
+        let seen = Seen { innovation, verdict: decided.unwrap_or(verdict) };
+        let next = Moment { time_s: Some(time_s), state, streak, repeats, seen };
         Ok((next, PastStep { from, prepared: *prepared, reading: used }))
     }
 
@@ -78,10 +99,20 @@ impl<E: Estimator<f64, N, L>, const N: usize, const L: usize> Stepper<E, N, L> {
             (*now, _) = self.advance(now, time_s, reading)?;
             return Ok(());
         }
-        let reading = reading.map(|reading| self.own_rest.reading(reading));
+        let mut repeats = now.repeats;
+        let (reading, decided) = self.sieved(&mut repeats, time_s, reading);
         let prepared = self.prepared.of(now.seconds_until(time_s), |dt_s| self.estimator.prepare(dt_s))?;
-        let Advanced { state, innovation } = self.estimator.advance(&now.state, prepared, reading)?;
-        let verdict = if innovation.is_some() { ReadingVerdict::Accepted } else { ReadingVerdict::Missing };
+        let (taken, verdict) = match self.estimator.advance(&now.state, prepared, reading) {
+            Err(error) if reading.is_some() && error.is_of_the_reading() => {
+                (self.estimator.advance(&now.state, prepared, None)?, ReadingVerdict::Rejected)
+            }
+            taken => {
+                let verdict = if reading.is_some() { ReadingVerdict::Accepted } else { ReadingVerdict::Missing };
+                (taken?, decided.unwrap_or(verdict))
+            }
+        };
+        let Advanced { state, innovation } = taken;
+        now.repeats = repeats;
         now.time_s = Some(time_s);
         now.state = state;
         now.seen = Seen { innovation, verdict };

@@ -142,7 +142,8 @@ impl Validity {
         ends(table, ["lower", "upper"], self.lower, self.upper, SIGNED)?;
         ends(table, ["reading_lower", "reading_upper"], self.reading_lower, self.reading_upper, POSITIVE)?;
         table.number("fastest_rate_per_s", self.fastest_rate_per_s, TOLD_AMOUNT)?;
-        table.number("duration_s", self.duration_s, TOLD_AMOUNT)
+        table.number("duration_s", self.duration_s, TOLD_AMOUNT)?;
+        table.number("longest_repeat_s", self.longest_repeat_s, TOLD_AMOUNT)
     }
 }
 

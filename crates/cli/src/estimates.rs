@@ -148,6 +148,8 @@ fn flags(row: &EstimateRow, limits: (f64, f64)) -> impl Iterator<Item = &'static
         ("saturated", row.saturated),
         ("rejected", row.output.verdict == ReadingVerdict::Rejected),
         ("downweighted", row.output.verdict == ReadingVerdict::Downweighted),
+        ("implausible", row.output.verdict == ReadingVerdict::Implausible),
+        ("stuck", row.output.verdict == ReadingVerdict::Stuck),
         ("readmitted", row.output.verdict == ReadingVerdict::Readmitted),
         ("ramp_border", row.output.estimate.near_ramp_border),
         ("at_limit", strain <= limits.0 || strain >= limits.1),

@@ -1,6 +1,7 @@
 use ohmstrain_bench_data::{Reading as TraceReading, Trace};
 use ohmstrain_calib::{EstimatorKind, Filter, Output, SensorParams, Start, build_filter};
 use ohmstrain_ekf::{Guard, Reading, StepError};
+use ohmstrain_model::ParameterError;
 
 use crate::args::{EstimateArgs, RestResistance};
 use crate::error::CliError;
@@ -32,15 +33,15 @@ pub fn relative_trace(trace: &Trace, rest_reading: f64) -> Vec<Option<Reading<f6
 const PATIENCE: u32 = 10;
 
 /// What protects the filter from outliers.
-pub fn guard(args: &EstimateArgs) -> Guard<f64> {
+fn guard(args: &EstimateArgs) -> Result<Guard<f64>, ParameterError> {
     let mut guard = Guard::none();
     if let Some(nis) = args.gate {
-        guard = guard.with_gate(nis, PATIENCE);
+        guard = guard.with_gate(nis, PATIENCE)?;
     }
     if let Some(influence) = args.influence {
-        guard = guard.with_influence(influence.0);
+        guard = guard.with_influence(influence.0)?;
     }
-    guard
+    Ok(guard)
 }
 
 /// The filter of an estimator, as the flags want it.
@@ -48,7 +49,7 @@ pub fn filter(params: &SensorParams, kind: EstimatorKind, args: &EstimateArgs) -
     suits::check_start(args, params)?;
     let start = args.initial_strain.map_or(Start::Unknown, Start::Strain);
     let mut filter = build_filter(params, Some(kind), start).map_err(|error| CliError::Input(error.to_string()))?;
-    filter.guard(guard(args));
+    filter.guard(guard(args).map_err(|error| CliError::Arguments(error.to_string()))?);
     Ok(filter)
 }
 

@@ -292,11 +292,7 @@ fn what_cannot_be_refined_is_refused_and_nothing_is_written() {
             4,
             "word.csv:3: column `resistance_ohm`: expected a number, found `high`",
         ),
-        (
-            &["trace.csv", "--sensor", "five.toml"],
-            4,
-            "five.toml: a law with 5 branches; the likelihood of readings has at most 4",
-        ),
+        (&["trace.csv", "--sensor", "five.toml"], 4, "five.toml: a law with 5 branches; at most 4 are supported"),
         (&["trace.csv", "--sensor", "negative.toml"], 4, &negative),
         (&["trace.csv", "--sensor", "word.csv"], 4, "word.csv:1: column 7: key with no value, expected `=`"),
     ];

@@ -65,6 +65,8 @@ fn readings_and_strains_that_calibration_has_not_seen_are_warned_of() {
     let rest: f64 =
         bench.read("sensor.toml").lines().find_map(|line| line.strip_prefix("rest_reading = ")?.parse().ok()).unwrap();
     assert_eq!(warned(&bench, &["filter", "scaled.csv"]).len(), warnings.len() - 1);
+    let smoothed = warned(&bench, &["smooth", "scaled.csv"]);
+    assert_eq!(smoothed.iter().filter(|line| line.contains(": resistance_ohm is outside of")).count(), 1);
     assert_eq!(warned(&bench, &["filter", "scaled.csv", "--rest-resistance", &(2.0 * rest).to_string()]), [""; 0]);
 }
 

@@ -183,10 +183,7 @@ impl<T: Lane, const B: usize, const N: usize, const L: usize> Bank<T, B, N, L> {
     /// All that is known of a sensor; `None` if there is no such sensor.
     #[must_use]
     pub fn belief(&self, sensor: usize) -> Option<Belief<T, N, L>> {
-        let (block, lane) = self.at(sensor)?;
-        let covariance = core::array::from_fn(|i| number(&block.covariance[i], lane));
-        let mean: [T; N] = core::array::from_fn(|i| number(&block.mean[i], lane));
-        Some(Belief { mean: mean.into(), covariance: Symmetric::from_packed(covariance) })
+        self.at(sensor).map(|(block, lane)| block.belief(lane))
     }
 
     /// Gives a sensor another belief, for example [`Belief::initial`] after it was replaced. Returns whether there is such a
@@ -195,10 +192,7 @@ impl<T: Lane, const B: usize, const N: usize, const L: usize> Bank<T, B, N, L> {
         let (lane, found) = (sensor % Self::LANES, sensor < self.sensors);
         let block = self.blocks.get_mut(sensor / Self::LANES).filter(|_| found);
         if let Some(block) = block {
-            let rows = block.mean.iter_mut().chain(&mut block.covariance);
-            for (row, number) in rows.zip(belief.mean.iter().chain(belief.covariance.packed())) {
-                row.0.as_mut()[lane] = *number;
-            }
+            block.set_belief(lane, belief);
         }
         found
     }
@@ -210,6 +204,19 @@ impl<T: Lane, const B: usize, const N: usize, const L: usize> Bank<T, B, N, L> {
 }
 
 impl<T: Lane, const N: usize, const L: usize> Block<T, N, L> {
+    fn belief(&self, lane: usize) -> Belief<T, N, L> {
+        let covariance = core::array::from_fn(|i| number(&self.covariance[i], lane));
+        let mean: [T; N] = core::array::from_fn(|i| number(&self.mean[i], lane));
+        Belief { mean: mean.into(), covariance: Symmetric::from_packed(covariance) }
+    }
+
+    fn set_belief(&mut self, lane: usize, belief: &Belief<T, N, L>) {
+        let rows = self.mean.iter_mut().chain(&mut self.covariance);
+        for (row, number) in rows.zip(belief.mean.iter().chain(belief.covariance.packed())) {
+            row.0.as_mut()[lane] = *number;
+        }
+    }
+
     fn strain(&self, lane: usize) -> Gaussian<T> {
         Gaussian { mean: number(&self.mean[0], lane), variance: number(&self.covariance[0], lane) }
     }

@@ -237,6 +237,9 @@ pub(crate) fn update<T: Scalar, const N: usize, const L: usize>(
     if !(reading.value.is_finite() && reading.extra_variance.is_finite()) {
         return Err(StepError::NonFiniteReading);
     }
+    if reading.extra_variance < T::zero() {
+        return Err(StepError::NegativeVariance);
+    }
     observation.variance += reading.extra_variance;
     let (H, R) = (&observation.gradient, observation.variance);
     let P = &prior.covariance;

@@ -8,6 +8,8 @@ use core::fmt;
 pub enum StepError {
     /// The reading is NaN or infinite; a missing reading is `None`.
     NonFiniteReading,
+    /// The variance that a reading brings along is below zero.
+    NegativeVariance,
     /// The time step is NaN or infinite.
     NonFiniteTimeStep,
     /// Time went backwards.
@@ -21,18 +23,30 @@ pub enum StepError {
     NonFiniteState,
     /// The model's gauge curve is not of the family that the filter was made for.
     OtherGauge,
+    /// The estimator cannot look back.
+    NoSmoother,
+}
+
+impl StepError {
+    /// Whether the same step without its reading may well succeed: the reading is too far away, or too exact, for the numbers.
+    #[must_use]
+    pub const fn is_of_the_reading(self) -> bool {
+        matches!(self, Self::NonFiniteState | Self::NonPositiveInnovationVariance)
+    }
 }
 
 impl fmt::Display for StepError {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         out.write_str(match self {
             Self::NonFiniteReading => "the reading is not a finite number",
+            Self::NegativeVariance => "the reading's variance is negative",
             Self::NonFiniteTimeStep => "the time step is not a finite number",
             Self::NegativeTimeStep => "the time step is negative",
             Self::NonPositiveInnovationVariance => "the innovation's variance is not positive",
             Self::ReadingTooOld => "the reading is older than the remembered steps",
             Self::NonFiniteState => "the new state is not finite",
             Self::OtherGauge => "the gauge curve is of another family than the filter's",
+            Self::NoSmoother => "the estimator has no smoother",
         })
     }
 }

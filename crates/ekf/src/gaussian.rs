@@ -87,6 +87,10 @@ impl<T: Real> Gaussian<T> {
         if a < -T::of(WHOLLY_INSIDE) && b > T::of(WHOLLY_INSIDE) {
             return inside;
         }
+        let width = b - a;
+        if width * width * width * width * width < T::of(NARROW) * T::default_epsilon() {
+            return self.in_narrow(a, b, side);
+        }
         let mass = mass_between(a, b);
         if !(mass > T::of(FAR_TAIL)) {
             let slope = T::one() / a;
@@ -107,7 +111,35 @@ impl<T: Real> Gaussian<T> {
             variance: self.variance * narrowed.max(T::zero()).min(T::one()),
         }
     }
+
+    /// The Gaussian on an interval of a small part of a deviation, where its density is a plain exponential: differences of
+    /// tails would be all rounding.
+    fn in_narrow(&self, a: T, b: T, side: T) -> TruncatedGaussian<T> {
+        let (sd, width, middle) = (self.variance.sqrt(), b - a, (a + b) / T::of(2.0));
+        // The exponential falls by so many half widths: sinh(x)/x, its mean and its variance, in half widths.
+        let x = middle * width / T::of(2.0);
+        let (area, mean, variance) = if x < T::of(FLAT) {
+            let square = x * x;
+            (T::one() + square / T::of(6.0), -x / T::of(3.0), (T::one() - square / T::of(5.0)) / T::of(3.0))
+        } else {
+            let (tanh, sinh) = (x.tanh(), x.sinh());
+            (sinh / x, T::one() / x - T::one() / tanh, T::one() / (x * x) - T::one() / (sinh * sinh))
+        };
+        let half = width / T::of(2.0);
+        let mass = density(middle) * width * area;
+        TruncatedGaussian {
+            mass: if mass.is_finite() { mass } else { T::zero() },
+            mean: self.mean + side * sd * (middle + half * mean),
+            variance: self.variance * half * half * variance,
+        }
+    }
 }
+
+/// Widths w whose fifth power is below this many rounding errors ε are narrow: an exponential density misses w²/60 of the
+/// variance, a difference of tails 30 ε/w³.
+const NARROW: f64 = 1800.0;
+/// An exponential that changes by less than this over the half width is expanded.
+const FLAT: f64 = 0.1;
 
 /// With both ends this many deviations away nothing is cut off that a double would notice: 2 · 10⁻¹⁹.
 const WHOLLY_INSIDE: f64 = 9.0;

@@ -1,11 +1,15 @@
-use ohmstrain_model::Scalar;
+use ohmstrain_model::{ParameterError, Problem, Scalar};
 
-use crate::{Advanced, Estimator, Reading, State, StepError};
+use crate::{Advanced, Estimator, Innovation, Reading, State, StepError};
 
 /// Protects an estimator from outliers: a gate that turns readings down, and a bounded influence for those it lets pass.
 ///
 /// A gate alone can lock a filter out: one wrong rejection, and every later reading looks wrong too. After `patience`
-/// rejections in a row it is the state that is wrong. Its covariance is inflated until the reading is believed.
+/// rejections in a row it may be the state that is wrong. Its covariance is then inflated just so much that the reading comes
+/// to lie on the gate, tenfold at most and three times at most until one passes by itself: what the filter has learnt of drift
+/// and relaxation shall survive. A reading that is still beyond the gate is taken with Huber's weight.
+///
+/// A reading that the numbers cannot take, far away or overflowing, is turned down and never an error, with a gate or without.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Guard<T> {
     gate: T,
@@ -46,8 +50,13 @@ pub enum ReadingVerdict {
     Downweighted,
     /// Turned down; the step was a prediction.
     Rejected,
-    /// Taken, and the state's confidence lowered, because too many in a row were turned down.
+    /// Taken with the influence of one on the gate, and the state's confidence lowered, because too many in a row were turned
+    /// down.
     Readmitted,
+    /// Nothing that this sensor can read: no reading at all, however often it comes.
+    Implausible,
+    /// The same number for longer than a working sensor repeats itself; it says nothing new.
+    Stuck,
 }
 
 /// Rejections in a row; the caller keeps it beside the state.
@@ -59,7 +68,7 @@ pub struct Streak(u32);
 /// A step under guard.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Guarded<S, T> {
-    /// What the estimator said of the reading as it came: its innovation is that of the unguarded step.
+    /// The step that was taken; its innovation is that of the reading as it came, `None` if that was too far away to have one.
     pub advanced: Advanced<S, T>,
     /// The state from which the step was taken, for a smoother: the caller's, or that one inflated.
     pub from: S,
@@ -71,8 +80,9 @@ pub struct Guarded<S, T> {
     pub streak: Streak,
 }
 
-/// Growth of the covariance per readmission, at most: deviations by a thousand, which no sensible state survives.
-const MOST_INFLATION: f64 = 1e6;
+/// Growth of the covariance per readmission, at most, and how often in a row.
+const MOST_INFLATION: f64 = 10.0;
+const MOST_INFLATIONS: u32 = 3;
 
 impl<T: Scalar> Guard<T> {
     /// A guard that lets everything pass.
@@ -83,15 +93,30 @@ impl<T: Scalar> Guard<T> {
 
     /// Turns down readings with a normalised innovation squared above `nis`, `patience` of them in a row at most.
     /// χ² with one degree of freedom exceeds 10.8 once in a thousand.
-    #[must_use]
-    pub fn with_gate(self, nis: T, patience: u32) -> Self {
-        Self { gate: nis, patience, ..self }
+    ///
+    /// # Errors
+    /// If `nis` is not above zero.
+    pub fn with_gate(self, nis: T, patience: u32) -> Result<Self, ParameterError> {
+        if !(nis > T::zero()) {
+            return Err(ParameterError::new("gate", Problem::NotPositive));
+        }
+        Ok(Self { gate: nis, patience, ..self })
     }
 
     /// Bounds the influence of the readings that pass the gate.
-    #[must_use]
-    pub fn with_influence(self, influence: Influence<T>) -> Self {
-        Self { influence, ..self }
+    ///
+    /// # Errors
+    /// If its parameter is not above zero.
+    pub fn with_influence(self, influence: Influence<T>) -> Result<Self, ParameterError> {
+        let (name, value) = match influence {
+            Influence::Full => return Ok(Self { influence, ..self }),
+            Influence::Huber { threshold } => ("threshold", threshold),
+            Influence::StudentT { degrees_of_freedom } => ("degrees_of_freedom", degrees_of_freedom),
+        };
+        if !(value > T::zero()) {
+            return Err(ParameterError::new(name, Problem::NotPositive));
+        }
+        Ok(Self { influence, ..self })
     }
 
     /// Whether everything passes as it is.
@@ -112,43 +137,70 @@ impl<T: Scalar> Guard<T> {
         prepared: &E::Prepared,
         reading: Option<Reading<T>>,
     ) -> Result<Guarded<E::State, T>, StepError> {
-        let plain = estimator.advance(state, prepared, reading)?;
-        let (Some(reading), Some(innovation)) = (reading, plain.innovation) else {
-            return Ok(Guarded {
-                advanced: plain,
-                from: state.clone(),
-                used: None,
-                verdict: ReadingVerdict::Missing,
-                streak,
-            });
+        let guarded = |advanced, from, used, verdict, streak| {
+            Ok(Guarded { advanced, from, used, verdict, streak: Streak(streak) })
         };
+        let Some(reading) = reading else {
+            let advanced = estimator.advance(state, prepared, None)?;
+            return guarded(advanced, state.clone(), None, ReadingVerdict::Missing, streak.0);
+        };
+        let seen = taken_as(estimator, state, prepared, reading)?;
+        let innovation = seen.as_ref().map(|(_, innovation)| *innovation);
+        let as_it_came = |advanced: Advanced<E::State, T>| Advanced { innovation, ..advanced };
+        let rejected = || {
+            let advanced = estimator.advance(state, prepared, None)?;
+            let streak = streak.0.saturating_add(1);
+            guarded(as_it_came(advanced), state.clone(), None, ReadingVerdict::Rejected, streak)
+        };
+        let Some((plain, innovation)) = seen else { return rejected() };
         let nis = innovation.nis();
-        // A NIS that is not a number must not pass.
-        let passes = nis <= self.gate;
-        let (verdict, from, used, streak) = if passes {
+        // A NIS that is not a number, or below zero, must not pass.
+        if nis >= T::zero() && nis <= self.gate {
             let weight = self.influence.weight(nis);
             if weight >= T::one() {
-                let used = Some(reading);
-                return Ok(Guarded {
-                    advanced: plain,
-                    from: state.clone(),
-                    used,
-                    verdict: ReadingVerdict::Accepted,
-                    streak: Streak(0),
-                });
+                return guarded(plain, state.clone(), Some(reading), ReadingVerdict::Accepted, 0);
             }
-            // S / w instead of S: the gain, and with it the step, is w times as large.
-            let extra_variance = reading.extra_variance + innovation.variance * (T::one() / weight - T::one());
-            (ReadingVerdict::Downweighted, state.clone(), Some(Reading { extra_variance, ..reading }), Streak(0))
-        } else if streak.0 < self.patience {
-            (ReadingVerdict::Rejected, state.clone(), None, Streak(streak.0 + 1))
-        } else {
-            let inflated = state.inflated(nis.min(T::of(MOST_INFLATION)));
-            (ReadingVerdict::Readmitted, inflated, Some(reading), streak)
-        };
-        let taken = estimator.advance(&from, prepared, used)?;
-        let advanced = Advanced { innovation: Some(innovation), ..taken };
-        Ok(Guarded { advanced, from, used, verdict, streak })
+            let used = reading.weighted(weight, innovation.variance);
+            let advanced = estimator.advance(state, prepared, Some(used))?;
+            return guarded(as_it_came(advanced), state.clone(), Some(used), ReadingVerdict::Downweighted, 0);
+        }
+        if streak.0 < self.patience || !(nis >= T::zero() && nis.is_finite()) {
+            return rejected();
+        }
+        let inflates = streak.0 - self.patience < MOST_INFLATIONS;
+        let factor = if inflates { (nis / self.gate).min(T::of(MOST_INFLATION)) } else { T::one() };
+        let from = state.inflated(factor);
+        let Some((_, wider)) = taken_as(estimator, &from, prepared, reading)? else { return rejected() };
+        let weight = (self.gate / wider.nis()).sqrt().min(T::one());
+        let used = reading.weighted(weight, wider.variance);
+        let advanced = estimator.advance(&from, prepared, Some(used))?;
+        let streak = streak.0.saturating_add(1);
+        guarded(as_it_came(advanced), from, Some(used), ReadingVerdict::Readmitted, streak)
+    }
+}
+
+/// The step with a reading as it is, and its innovation; `None` if the numbers cannot take the reading.
+#[allow(clippy::type_complexity, reason = "a state with what it was compared with")]
+fn taken_as<T: Scalar, E: Estimator<T, N, L>, const N: usize, const L: usize>(
+    estimator: &E,
+    state: &E::State,
+    prepared: &E::Prepared,
+    reading: Reading<T>,
+) -> Result<Option<(Advanced<E::State, T>, Innovation<T>)>, StepError> {
+    match estimator.advance(state, prepared, Some(reading)) {
+        Err(error) if error.is_of_the_reading() => Ok(None),
+        taken => {
+            let taken = taken?;
+            Ok(taken.innovation.map(|innovation| (taken, innovation)))
+        }
+    }
+}
+
+impl<T: Scalar> Reading<T> {
+    /// With so much more noise that the innovation's variance S becomes S/w: the gain, and with it the step, is w times as
+    /// large.
+    fn weighted(self, weight: T, variance: T) -> Self {
+        Self { extra_variance: self.extra_variance + variance * (T::one() / weight - T::one()), ..self }
     }
 }
 

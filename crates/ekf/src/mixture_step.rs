@@ -1,4 +1,4 @@
-use ohmstrain_model::{Phase, Scalar, StrainRange};
+use ohmstrain_model::{ParameterError, Phase, Problem, Scalar, StrainRange};
 
 use crate::ekf::update;
 use crate::estimator::Innovation;
@@ -17,6 +17,22 @@ pub struct Evidence<T> {
     /// Power, 0 to 1, to which the likelihood of a reading enters the weights; below 1 it allows for model error that is
     /// correlated from reading to reading.
     pub tempering: T,
+}
+
+impl<T: Scalar> Evidence<T> {
+    /// Limits and tempering, checked.
+    ///
+    /// # Errors
+    /// If the limits are not in order, or the tempering is not a number from 0 to 1.
+    pub fn new(limits: StrainRange<T>, tempering: T) -> Result<Self, ParameterError> {
+        if !(limits.lower < limits.upper) {
+            return Err(ParameterError::new("limits", Problem::OutOfRange));
+        }
+        if !(tempering >= T::zero() && tempering <= T::one()) {
+            return Err(ParameterError::new("tempering", Problem::OutOfRange));
+        }
+        Ok(Self { limits, tempering })
+    }
 }
 
 /// What one step of a filter of hypotheses computed.
@@ -40,35 +56,67 @@ pub(crate) struct Candidates<'a, T, M, R, const N: usize, const L: usize, const 
     recorder: R,
     children: Mixture<T, N, L, K>,
     predicted: Predicted<T>,
+    density: LogSum<T>,
 }
 
-/// The reading compared with all predictions of it. Sums are taken of innovations, not of predicted readings: the variance
-/// shall not be the small difference of two squares of the whole reading.
+/// The reading compared with all predictions of it. Innovations are summed around the first of them: their spread shall not
+/// be the small difference of two squares of the distance to the reading.
 #[derive(Clone, Copy)]
 pub(crate) struct Predicted<T> {
     weight: T,
-    innovation: T,
+    around: T,
+    distance: T,
     square: T,
+    variance: T,
 }
 
 impl<T: Scalar> Predicted<T> {
     #[inline(always)]
     pub(crate) fn new() -> Self {
-        Self { weight: T::zero(), innovation: T::zero(), square: T::zero() }
+        let zero = T::zero();
+        Self { weight: zero, around: zero, distance: zero, square: zero, variance: zero }
     }
 
     /// One hypothesis of probability `weight`: its innovation, and the variance of that.
     #[inline(always)]
     pub(crate) fn add(&mut self, weight: T, innovation: T, variance: T) {
+        if self.weight.is_zero() {
+            self.around = innovation;
+        }
+        let distance = innovation - self.around;
         self.weight += weight;
-        self.innovation += weight * innovation;
-        self.square += weight * (variance + innovation * innovation);
+        self.distance += weight * distance;
+        self.square += weight * distance * distance;
+        self.variance += weight * variance;
+    }
+
+    /// Probability of all of them.
+    pub(crate) const fn weight(&self) -> &T {
+        &self.weight
     }
 
     /// Mean and variance of the innovation.
     pub(crate) fn moments(&self) -> (T, T) {
-        let innovation = self.innovation / self.weight;
-        (innovation, self.square / self.weight - innovation * innovation)
+        let mean = self.distance / self.weight;
+        let spread = (self.square / self.weight - mean * mean).max(T::zero());
+        (self.around + mean, self.variance / self.weight + spread)
+    }
+}
+
+/// A sum of weighted exponentials of which no single one need be a number.
+#[derive(Clone, Copy)]
+struct LogSum<T> {
+    most: T,
+    sum: T,
+}
+
+impl<T: Scalar> LogSum<T> {
+    fn add(&mut self, weight: T, exponent: T) {
+        if self.sum.is_zero() || exponent > self.most {
+            self.sum *= if self.sum.is_zero() { T::one() } else { (self.most - exponent).exp() };
+            self.most = exponent;
+        }
+        self.sum += weight * (exponent - self.most).exp();
     }
 }
 
@@ -94,7 +142,8 @@ where
     R: Recorder<T, N, L>,
 {
     pub(crate) fn new(model: &'a M, evidence: &'a Evidence<T>, reading: Option<Reading<T>>, recorder: R) -> Self {
-        Self { model, evidence, reading, recorder, children: Mixture::empty(), predicted: Predicted::new() }
+        let density = LogSum { most: T::zero(), sum: T::zero() };
+        Self { model, evidence, reading, recorder, children: Mixture::empty(), predicted: Predicted::new(), density }
     }
 
     /// A child; `cut` restricts its prediction in place and says how much of it that leaves.
@@ -149,14 +198,19 @@ where
     fn update(&mut self, child: &mut Component<T, N, L>, reading: Reading<T>) -> Result<(), StepError> {
         let observation = self.model.observe(&child.belief, Some(child.phase));
         let (posterior, update) = update(&child.belief, observation, reading)?;
-        self.predicted.add(child.log_weight.exp(), update.innovation, update.innovation_variance);
+        let (weight, likelihood) = (child.log_weight.exp(), self.evidence.tempering * update.log_likelihood);
+        self.predicted.add(weight, update.innovation, update.innovation_variance);
+        self.density.add(weight, likelihood);
         child.belief = posterior;
-        child.log_weight += self.evidence.tempering * update.log_likelihood;
+        child.log_weight += likelihood;
         Ok(())
     }
 
     pub(crate) fn finish(mut self) -> Result<MixtureStep<T, N, L, K>, StepError> {
-        let log_likelihood = self.children.normalise(&mut self.recorder)?;
+        self.children.normalise(&mut self.recorder)?;
+        // Neither limits nor what there is no room for say anything of the reading.
+        let density = || (self.density.sum / *self.predicted.weight()).ln() + self.density.most;
+        let log_likelihood = if self.reading.is_some() { density() } else { T::zero() };
         let innovation = self.reading.map(|_| {
             let (value, variance) = self.predicted.moments();
             Innovation { value, variance, log_likelihood }

@@ -6,8 +6,9 @@
 //!
 //! # Policy
 //! As [`Ekf`](crate::Ekf), with two differences, both for microcontrollers: the belief is changed in place (an error leaves
-//! it as it was), and the covariance is updated as `P - (P Hᵀ)(P Hᵀ)ᵀ/S`, without Joseph's form; a variance that rounding
-//! has made negative is an error. Only innovation, its variance and the NIS are returned; nothing takes a logarithm unless
+//! it as it was), and the covariance is updated as `P - (P Hᵀ)(P Hᵀ)ᵀ/S`, without Joseph's form. Where rounding makes a
+//! variance negative, the reading is more exact than the numbers: it is taken again with more and more noise until it leaves
+//! none. Only innovation, its variance and the NIS are returned; nothing takes a logarithm unless
 //! asked. Multiplications and additions are rounded one by one, in the order in which they are written.
 
 use core::marker::PhantomData;
@@ -91,26 +92,57 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
         reading: Option<Reading<T>>,
     ) -> Result<Option<Residual<T>>, StepError> {
         let mut parts = Parts::of(belief);
-        let residual = self.advance(&mut parts, reading)?;
+        let residual = self.advance(&mut parts, reading, |parts| *parts = Parts::of(belief))?;
         parts.put_into(belief);
         Ok(residual)
     }
 
-    /// [`Self::step`] of a belief taken apart; after an error `parts` means nothing.
+    /// [`Self::step`] of a belief taken apart, which `restore` brings back; after an error `parts` means nothing.
     #[inline(always)]
     pub(crate) fn advance(
         &self,
         parts: &mut Parts<T, B>,
-        reading: Option<Reading<T>>,
+        mut reading: Option<Reading<T>>,
+        restore: impl Fn(&mut Parts<T, B>),
     ) -> Result<Option<Residual<T>>, StepError> {
-        let spread = self.predict(parts, None);
-        match reading {
-            Some(reading) => self.update(parts, reading, None, spread).map(Some),
-            None if parts.is_sound::<N>(parts.variances::<N>()) => Ok(None),
-            None => Err(StepError::NonFiniteState),
+        let mut tries = 0;
+        loop {
+            let spread = self.predict(parts, None);
+            let refused = match reading {
+                Some(reading) => match self.update(parts, reading, None, spread) {
+                    Ok(residual) => return Ok(Some(residual)),
+                    Err(error) => error,
+                },
+                None if parts.is_sound::<N>(parts.variances::<N>()) => return Ok(None),
+                None => StepError::NonFiniteState,
+            };
+            tries += 1;
+            reading = Some(self.coarser(reading, tries, refused)?);
+            restore(parts);
         }
     }
+
+    /// A refused reading with more noise; the refusal where noise is of no use.
+    #[cold]
+    #[inline(never)]
+    fn coarser(&self, reading: Option<Reading<T>>, tries: u32, refused: StepError) -> Result<Reading<T>, StepError> {
+        let Some(reading) = reading.filter(|_| refused.is_of_the_reading() && tries <= MOST_TRIES) else {
+            return Err(refused);
+        };
+        // A relative reading of order one is not known better than this.
+        let rounding = T::default_epsilon() * T::default_epsilon();
+        let noise = reading.extra_variance + self.reading.variance + rounding;
+        // What is so far away that its square overflows is not too exact.
+        if !(reading.value * reading.value / noise).is_finite() {
+            return Err(refused);
+        }
+        Ok(Reading { extra_variance: T::of(COARSER) * noise, ..reading })
+    }
 }
+
+/// Growth of a reading's variance from one try to the next, and the most tries after the first.
+const COARSER: f64 = 16.0;
+const MOST_TRIES: u32 = 12;
 
 /// Refuses what is no length of a step that moves.
 fn check_step_length<T: Scalar>(dt_s: T) -> Result<(), StepError> {

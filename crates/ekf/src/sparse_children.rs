@@ -2,7 +2,7 @@ use ohmstrain_model::{Phase, Symmetric};
 
 use crate::gaussian::Real;
 use crate::mixture::{ALIKE, LEAST_WEIGHT};
-use crate::sparse_evidence::Weight;
+use crate::sparse_evidence::{Weighed, Weight};
 use crate::sparse_mixture::{Share, SparseMixture};
 use crate::sparse_parts::Parts;
 use crate::{Belief, StepError};
@@ -13,18 +13,25 @@ pub(crate) struct Children<T, const N: usize, const L: usize, const K: usize> {
     /// The largest exponent so far; weights are in units of its exponential. What is so much lighter that it has become
     /// zero would be dropped in the end.
     exponent: T,
+    /// Sum of all weights, limits aside, of those that were dropped too.
+    density: T,
 }
 
 impl<T: Real, const N: usize, const L: usize, const K: usize> Children<T, N, L, K> {
     #[inline(always)]
     pub(crate) fn new() -> Self {
-        Self { kept: SparseMixture::empty(), exponent: T::zero() }
+        Self { kept: SparseMixture::empty(), exponent: T::zero(), density: T::zero() }
     }
 
     /// Adds a child: merged with one that says the same, in a free place, or in the place of the lightest.
-    pub(crate) fn add<const B: usize>(&mut self, child: &Parts<T, B>, phase: Phase, weight: Weight<T>, log_inside: T) {
+    pub(crate) fn add<const B: usize>(&mut self, child: &Parts<T, B>, phase: Phase, weighed: &Weighed<T>) {
+        let Weighed { weight, more_inside, log_inside } = *weighed;
+        let likelihood = weight;
+        let weight = Weight { exponent: weight.exponent + more_inside, ..weight };
         self.raise_to(weight.exponent);
         let weight = weight.relative_to(self.exponent);
+        // Mostly nothing is near a limit.
+        self.density += if more_inside.is_zero() { weight } else { likelihood.relative_to(self.exponent) };
         let like = self.kept.iter_mut().find(|(share, known)| **known == phase && share.is_like(child));
         if let Some((like, _)) = like {
             like.merge(child, weight, log_inside);
@@ -55,12 +62,21 @@ impl<T: Real, const N: usize, const L: usize, const K: usize> Children<T, N, L, 
             for (share, _) in self.kept.iter_mut() {
                 share.weight *= fewer;
             }
+            self.density *= fewer;
             self.exponent = exponent;
         }
     }
 
-    /// Makes the probabilities sum to one and drops what is negligible; the sum before.
-    pub(crate) fn normalise(&mut self) -> Result<Weight<T>, StepError> {
+    /// Sum of all weights that were added, limits aside.
+    pub(crate) const fn density(&self) -> Weight<T>
+    where
+        T: Copy,
+    {
+        Weight { factor: self.density, exponent: self.exponent }
+    }
+
+    /// Makes the probabilities sum to one and drops what is negligible.
+    pub(crate) fn normalise(&mut self) -> Result<(), StepError> {
         let heaviest = self.kept.shares().iter().fold(T::zero(), |a, b| if b.weight > a { b.weight } else { a });
         let least = heaviest * T::of(LEAST_WEIGHT);
         self.kept.retain(|share| share.weight > least);
@@ -72,7 +88,7 @@ impl<T: Real, const N: usize, const L: usize, const K: usize> Children<T, N, L, 
         for (share, _) in self.kept.iter_mut() {
             share.weight *= per_sum;
         }
-        Ok(Weight { factor, exponent: self.exponent })
+        Ok(())
     }
 
     pub(crate) fn into_state(self) -> SparseMixture<T, N, L, K> {

@@ -94,6 +94,16 @@ impl<T: Real> Weighing<T> {
     }
 }
 
+/// What a child counts for.
+pub(crate) struct Weighed<T> {
+    /// Its prior probability times the likelihood of the reading.
+    pub weight: Weight<T>,
+    /// Growth of the logarithm of its probability of the limits, which weighs it too but says nothing of the reading.
+    pub more_inside: T,
+    /// The logarithm itself.
+    pub log_inside: T,
+}
+
 /// A child that has been predicted, before the reading.
 pub(crate) struct Newborn<T: Real, S: Switch<T>> {
     pub phase: Phase,
@@ -105,7 +115,7 @@ pub(crate) struct Newborn<T: Real, S: Switch<T>> {
 }
 
 impl<T: Real, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> SparseEkf<T, S, B, N, G> {
-    /// Gives a child the reading; its weight, and the logarithm of its probability of the limits.
+    /// Gives a child the reading.
     #[inline(always)]
     pub(crate) fn weigh(
         &self,
@@ -114,7 +124,7 @@ impl<T: Real, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> SparseE
         reading: Option<Reading<T>>,
         weighing: &Weighing<T>,
         predicted: &mut Predicted<T>,
-    ) -> Result<(Weight<T>, T), StepError> {
+    ) -> Result<Weighed<T>, StepError> {
         let Newborn { phase, prior, spread, log_inside } = newborn;
         let mut weight = Weight { factor: prior, exponent: T::zero() };
         if let Some(reading) = reading {
@@ -125,8 +135,7 @@ impl<T: Real, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> SparseE
             return Err(StepError::NonFiniteState);
         }
         let inside = weighing.log_inside::<S>(child.strain, child.strain_variance);
-        weight.exponent += inside - log_inside;
-        Ok((weight, inside))
+        Ok(Weighed { weight, more_inside: inside - log_inside, log_inside: inside })
     }
 }
 
@@ -148,14 +157,14 @@ pub struct MixtureResidual<T> {
 }
 
 impl<T: Scalar> MixtureResidual<T> {
-    /// `total`: sum of all weights after the reading.
-    pub(crate) fn new(predicted: &Predicted<T>, total: Weight<T>, tempering: T) -> Self {
+    /// `density`: sum of all prior weights times likelihoods.
+    pub(crate) fn new(predicted: &Predicted<T>, density: Weight<T>, tempering: T) -> Self {
         let (innovation, variance) = predicted.moments();
         let residual = Residual { innovation, variance, nis: innovation * innovation / variance };
-        Self { residual, factor: total.factor, exponent: total.exponent, tempering }
+        Self { residual, factor: density.factor / *predicted.weight(), exponent: density.exponent, tempering }
     }
 
-    /// Log density of the reading under the mixture, limits and tempering included: what
+    /// Log density of the reading under the mixture, tempered if the filter tempers: what
     /// [`MixtureStep`](crate::MixtureStep) calls by this name.
     #[must_use]
     pub fn log_likelihood(&self) -> T {

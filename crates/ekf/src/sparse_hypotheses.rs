@@ -90,11 +90,12 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
                 let prior = parent.weight * probability;
                 let newborn = Newborn { phase, prior, spread, log_inside: parent.log_inside };
                 let weighed = self.kernel.weigh(&mut child, newborn, reading, &self.weighing, &mut predicted)?;
-                children.add(&child, phase, weighed.0, weighed.1);
+                children.add(&child, phase, &weighed);
             }
         }
-        let total = children.normalise()?;
+        let density = children.density();
+        children.normalise()?;
         *state = children.into_state();
-        Ok(reading.map(|_| MixtureResidual::new(&predicted, total, self.weighing.tempering())))
+        Ok(reading.map(|_| MixtureResidual::new(&predicted, density, self.weighing.tempering())))
     }
 }

@@ -36,9 +36,11 @@ pub struct SparseImm<T, const B: usize, const N: usize, S = Compact, G = AnyCurv
 /// A mode while a step works on it.
 struct Mode<T, const B: usize> {
     parts: Parts<T, B>,
-    /// Its probability before the reading; what the reading and the limits make of it.
+    /// Its probability before the reading; what the reading makes of it.
     prior: T,
     weight: Weight<T>,
+    /// Growth of the logarithm of its probability of the limits, and the logarithm itself.
+    more_inside: T,
     log_inside: T,
     residual: Option<Residual<T>>,
 }
@@ -93,7 +95,7 @@ impl<T: Real, const B: usize, const N: usize, S: Switch<T>, G: Curve<T>> SparseI
         let hold = self.advanced(state, Phase::Hold, reading);
         let retract = self.advanced(state, Phase::Retract, reading);
         let modes = [borrowed(&extend)?, borrowed(&hold)?, borrowed(&retract)?];
-        let (shares, total) = shares(modes.map(|mode| mode.weight))?;
+        let (shares, density) = shares(modes.map(|mode| (mode.weight, mode.more_inside)))?;
         let mut predicted = Predicted::new();
         for ((mode, share), weight) in modes.into_iter().zip(&mut state.modes).zip(shares) {
             share.weight = weight;
@@ -103,7 +105,7 @@ impl<T: Real, const B: usize, const N: usize, S: Switch<T>, G: Curve<T>> SparseI
                 predicted.add(mode.prior, residual.innovation, residual.variance);
             }
         }
-        Ok(reading.map(|_| MixtureResidual::new(&predicted, total, self.weighing.tempering())))
+        Ok(reading.map(|_| MixtureResidual::new(&predicted, density, self.weighing.tempering())))
     }
 
     /// A mode after the step: its belief, and what is known of its weight. One function for all phases, so that a program
@@ -128,7 +130,7 @@ impl<T: Real, const B: usize, const N: usize, S: Switch<T>, G: Curve<T>> SparseI
             return Err(StepError::NonFiniteState);
         }
         let log_inside = self.weighing.log_inside::<S>(mode.parts.strain, mode.parts.strain_variance);
-        mode.weight.exponent += log_inside - mode.log_inside;
+        mode.more_inside = log_inside - mode.log_inside;
         mode.log_inside = log_inside;
         Ok(mode)
     }
@@ -143,7 +145,8 @@ impl<T: Real, const B: usize, const N: usize, S: Switch<T>, G: Curve<T>> SparseI
         let prior = joint[0] + joint[1] + joint[2];
         let weight = Weight { factor: prior, exponent: zero };
         if !(prior > zero) {
-            return Mode { parts: Parts::of(&own.belief), prior, weight, log_inside: own.log_inside, residual: None };
+            let (parts, log_inside) = (Parts::of(&own.belief), own.log_inside);
+            return Mode { parts, prior, weight, more_inside: zero, log_inside, residual: None };
         }
         let per_prior = T::one() / prior;
         let shares = joint.map(|weight| weight * per_prior);
@@ -154,7 +157,7 @@ impl<T: Real, const B: usize, const N: usize, S: Switch<T>, G: Curve<T>> SparseI
         if phase != Phase::Hold {
             parts.mix_rate(shares[to], &own.belief, &self.fresh[to]);
         }
-        Mode { parts, prior, weight, log_inside, residual: None }
+        Mode { parts, prior, weight, more_inside: zero, log_inside, residual: None }
     }
 }
 
@@ -170,14 +173,21 @@ fn heaviest_first<T: Real, S>([a, b, c]: [(T, S); 3]) -> [(T, S); 3] {
     if c.0 > a.0 { [c, b, a] } else { [a, b, c] }
 }
 
-/// Probabilities from weights, and the weights' sum. What is lighter than the heaviest by e⁻¹² gets none.
+/// Probabilities from weights and what the limits add to their exponents, and the weights' sum. What is lighter than the
+/// heaviest by e⁻¹² gets none.
 #[inline(always)]
-fn shares<T: Real>(weights: [Weight<T>; 3]) -> Result<([T; 3], Weight<T>), StepError> {
-    let followed = weights.iter().filter(|weight| weight.factor > T::zero());
-    let Some(exponent) = followed.map(|weight| weight.exponent).reduce(|a, b| if b > a { b } else { a }) else {
+fn shares<T: Real>(weights: [(Weight<T>, T); 3]) -> Result<([T; 3], Weight<T>), StepError> {
+    let followed = weights.iter().filter(|(weight, _)| weight.factor > T::zero());
+    let exponents = followed.map(|(weight, more_inside)| weight.exponent + *more_inside);
+    let Some(exponent) = exponents.reduce(|a, b| if b > a { b } else { a }) else {
         return Err(StepError::NonFiniteState);
     };
-    let mut weights = weights.map(|weight| weight.relative_to(exponent));
+    let mut density = T::zero();
+    let mut weights = weights.map(|(likelihood, more_inside)| {
+        let weight = Weight { exponent: likelihood.exponent + more_inside, ..likelihood }.relative_to(exponent);
+        density += if more_inside.is_zero() { weight } else { likelihood.relative_to(exponent) };
+        weight
+    });
     let heaviest = weights.iter().fold(T::zero(), |a, b| if *b > a { *b } else { a });
     let mut factor = T::zero();
     for weight in &mut weights {
@@ -190,5 +200,5 @@ fn shares<T: Real>(weights: [Weight<T>; 3]) -> Result<([T; 3], Weight<T>), StepE
         return Err(StepError::NonFiniteState);
     }
     let per_sum = T::one() / factor;
-    Ok((weights.map(|weight| weight * per_sum), Weight { factor, exponent }))
+    Ok((weights.map(|weight| weight * per_sum), Weight { factor: density, exponent }))
 }

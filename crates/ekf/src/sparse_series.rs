@@ -17,7 +17,8 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
     ) -> Result<T, StepError> {
         let (mut parts, mut sum) = (Parts::of(start), LogLikelihood::new());
         for reading in readings {
-            if let Some(residual) = self.advance(&mut parts, reading)? {
+            let before = parts;
+            if let Some(residual) = self.advance(&mut parts, reading, |parts| *parts = before)? {
                 sum.add(&residual);
             }
         }
@@ -36,7 +37,8 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
     ) -> Result<T, StepError> {
         let (mut parts, mut sum) = (Parts::of(start), LogLikelihood::new());
         for (reading, after) in readings.into_iter().zip(filtered) {
-            if let Some(residual) = self.advance(&mut parts, reading)? {
+            let before = parts;
+            if let Some(residual) = self.advance(&mut parts, reading, |parts| *parts = before)? {
                 sum.add(&residual);
             }
             parts.put_into(after);

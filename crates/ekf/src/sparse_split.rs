@@ -86,9 +86,10 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
                 }
             }
         }
-        let total = children.normalise()?;
+        let density = children.density();
+        children.normalise()?;
         *state = children.into_state();
-        Ok(reading.map(|_| MixtureResidual::new(&predicted, total, self.weighing.tempering())))
+        Ok(reading.map(|_| MixtureResidual::new(&predicted, density, self.weighing.tempering())))
     }
 
     #[inline(always)]
@@ -121,8 +122,8 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
             }
         }
         let newborn = Newborn { phase, prior, spread, log_inside: parent.log_inside };
-        let (weight, log_inside) = self.kernel.weigh(&mut child, newborn, reading, &self.weighing, predicted)?;
-        children.add(&child, phase, weight, log_inside);
+        let weighed = self.kernel.weigh(&mut child, newborn, reading, &self.weighing, predicted)?;
+        children.add(&child, phase, &weighed);
         Ok(())
     }
 

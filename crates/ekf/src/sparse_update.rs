@@ -110,7 +110,7 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
 
         // S and ν²/S finite, S above zero: then everything before was finite. No variance below zero: then no gain can have
         // left the range of the numbers (Cauchy-Schwarz), and the means are all that is left to look at.
-        if variance > T::zero() && parts.is_sound::<N>(variance + nis) {
+        if variance > T::zero() && !(reading.extra_variance < T::zero()) && parts.is_sound::<N>(variance + nis) {
             Ok(Residual { innovation, variance, nis })
         } else {
             Err(refusal(reading, innovation, variance))
@@ -174,6 +174,8 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
 fn refusal<T: Scalar>(reading: Reading<T>, innovation: T, variance: T) -> StepError {
     if !(reading.value.is_finite() && reading.extra_variance.is_finite()) {
         StepError::NonFiniteReading
+    } else if reading.extra_variance < T::zero() {
+        StepError::NegativeVariance
     } else if innovation.is_finite() && !(variance > T::zero() && variance.is_finite()) {
         StepError::NonPositiveInnovationVariance
     } else {

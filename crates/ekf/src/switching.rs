@@ -106,9 +106,9 @@ impl<T: Scalar> Dwell<T> {
         let (one, half) = (T::one(), T::of(0.5));
         let (stop, start) = ((one - self.reversal) / self.move_s, one / self.hold_s);
         let total = stop + start;
-        let mixed = -(-total * dt_s).exp_m1();
-        let moving_stops = stop / total * mixed;
-        let hold_ends = start / total * mixed;
+        // Over the rate: where nothing ever changes that is the time itself.
+        let mixed = if total > T::zero() { -(-total * dt_s).exp_m1() / total } else { dt_s };
+        let (moving_stops, hold_ends) = (stop * mixed, start * mixed);
         let difference = (-(one + self.reversal) / self.move_s * dt_s).exp();
         let stays_moving = one - moving_stops;
         let same = half * (stays_moving + difference);

@@ -57,6 +57,31 @@ impl<T: Scalar> Gauge<T> {
         }
     }
 
+    /// Checks that a gauge with valid coefficients has a value everywhere from `lower` to `upper`, and that particles that
+    /// tunnel never touch.
+    ///
+    /// # Errors
+    /// Says that the range is too wide for the gauge.
+    pub(crate) fn validate_within(&self, lower: T, upper: T) -> Result<(), ParameterError> {
+        let mut ends = [lower, upper, lower];
+        if let Self::Tunnelling { gap, barrier, path_loss } = *self {
+            let touches = |strain: T| !(T::one() + gap * strain > T::zero());
+            if touches(lower) || touches(upper) {
+                return Err(ParameterError::new("gauge.gap", Problem::OutOfRange));
+            }
+            // The exponent is largest here, or at an end.
+            let vertex = -barrier / (T::of(2.0) * path_loss);
+            if vertex > lower && vertex < upper {
+                ends[2] = vertex;
+            }
+        }
+        let finite = |strain: T| {
+            let (value, slope) = self.value_and_slope(strain);
+            value.is_finite() && slope.is_finite()
+        };
+        if ends.into_iter().all(finite) { Ok(()) } else { Err(ParameterError::new("gauge", Problem::OutOfRange)) }
+    }
+
     /// g(ε) and its slope g′(ε).
     #[must_use]
     pub fn value_and_slope(&self, strain: T) -> (T, T) {

@@ -94,10 +94,14 @@ impl<T: Scalar, const B: usize> SensorLaw<T, B> {
                 return Err(ParameterError::new("branch gain", Problem::NotFinite));
             }
         }
-        if !(self.range.lower < self.range.upper) {
+        let StrainRange { lower, upper } = self.range;
+        if !(lower.is_finite() && upper.is_finite()) {
+            return Err(ParameterError::new("range", Problem::NotFinite));
+        }
+        if !(lower < upper) {
             return Err(ParameterError::new("range", Problem::OutOfRange));
         }
-        Ok(())
+        self.gauge.validate_within(lower, upper)
     }
 
     /// g(ε) and g′(ε), continued along the tangent outside the range.
@@ -161,15 +165,21 @@ impl<T: Scalar, const B: usize> SensorLaw<T, B> {
         })
     }
 
-    /// The static border: the smallest strain of the range at which the gauge curve peaks, g′ = 0 from above. Beyond it
-    /// one reading belongs to two strains.
+    /// The static border, beyond which one reading belongs to two strains: the smallest strain of the range at which the
+    /// gauge curve peaks; or, where it has no peak and falls by more than it rises again, its valley. (A curve that mostly
+    /// rises may begin with a dip; what lies beyond that is not ambiguous.)
     #[must_use]
     pub fn static_border(&self) -> Option<T> {
         let nudge = T::of(1e-3) * self.range.span();
-        self.gauge.static_borders().into_iter().flatten().find(|&border| {
-            let (_, before) = self.gauge.value_and_slope(border - nudge);
-            let (_, after) = self.gauge.value_and_slope(border + nudge);
-            self.range.contains(border) && before > T::zero() && after < T::zero()
-        })
+        let turns = |border: &T, down: bool| {
+            let (_, before) = self.gauge.value_and_slope(*border - nudge);
+            let (_, after) = self.gauge.value_and_slope(*border + nudge);
+            let (before, after) = if down { (before, after) } else { (after, before) };
+            self.range.contains(*border) && before > T::zero() && after < T::zero()
+        };
+        let borders = || self.gauge.static_borders().into_iter().flatten();
+        let value = |strain: T| self.gauge.value_and_slope(strain).0;
+        let falls = value(self.range.upper) < value(self.range.lower);
+        borders().find(|border| turns(border, true)).or_else(|| borders().find(|border| falls && turns(border, false)))
     }
 }

@@ -62,11 +62,19 @@ impl<T: Scalar> Motion<T, 2> {
         })
     }
 
-    /// Makes the rate revert to `+phase_rate` while stretching and `-phase_rate` while releasing, 1/s.
-    #[must_use]
-    pub fn with_phase_rate(mut self, phase_rate: T) -> Self {
+    /// Makes the rate revert to `+phase_rate` while stretching and `-phase_rate` while releasing, 1/s; zero for no such rate.
+    ///
+    /// # Errors
+    /// If it is below zero or not finite.
+    pub fn with_phase_rate(mut self, phase_rate: T) -> Result<Self, ParameterError> {
+        if !phase_rate.is_finite() {
+            return Err(ParameterError::new("phase_rate", Problem::NotFinite));
+        }
+        if phase_rate < T::zero() {
+            return Err(ParameterError::new("phase_rate", Problem::Negative));
+        }
         self.phase_rate = phase_rate;
-        self
+        Ok(self)
     }
 }
 

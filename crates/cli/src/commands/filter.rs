@@ -2,14 +2,14 @@ use std::collections::VecDeque;
 use std::io::{self, Read};
 
 use ohmstrain_bench_data::{Row, TraceError, TraceReader};
-use ohmstrain_calib::{Filter, Output, SensorParams};
+use ohmstrain_calib::{EstimatorKind, Filter, Output, SensorParams};
 
 use crate::args::{FilterArgs, RestResistance};
 use crate::error::CliError;
 use crate::estimates::{EstimateRow, EstimateWriter};
 use crate::input::{self, check_unit, is_stdin};
 use crate::readings::no_row;
-use crate::run::{filter, relative_row, rest_reading, step_error_at};
+use crate::run::{filter, no_smoother, relative_row, rest_reading, step_error_at};
 use crate::sensor_file;
 use crate::suits::{self, FIRST_LIVE_READINGS, FIRST_READINGS, doubt_readings};
 use crate::validity::ValidityWatch;
@@ -20,8 +20,16 @@ const WRITTEN_AT_ONCE: usize = 1 << 16;
 /// Turns readings into strain as they arrive. Memory does not grow with the recording.
 pub fn run(args: &FilterArgs) -> Result<(), CliError> {
     let kind = args.estimate.estimator.chosen().map(|estimator| estimator.0);
+    let looks_back = |kind: EstimatorKind| args.lag_s.is_none() || kind.smoother() == kind;
+    if !kind.is_none_or(looks_back) {
+        return Err(no_smoother());
+    }
     let mut params = sensor_file::read(&args.estimate.sensor, kind)?;
-    let filter = filter(&params, kind.unwrap_or(params.default_estimator), &args.estimate)?;
+    let kind = kind.unwrap_or(params.default_estimator);
+    if !looks_back(kind) {
+        return Err(no_smoother());
+    }
+    let filter = filter(&params, kind, &args.estimate)?;
     let rows = input::open(&args.trace_file, &args.estimate.trace.metadata())?;
     let header = input::header(&rows);
     check_unit(&header, rows.reading_kind(), params.reading)?;

@@ -45,6 +45,7 @@ fn sensor() -> SensorParams {
             reading_upper: 1400.0,
             fastest_rate_per_s: 0.1,
             duration_s: 100.0,
+            longest_repeat_s: 0.0,
         },
         static_cubic: StaticCubic {
             reading_centre: 1200.0,

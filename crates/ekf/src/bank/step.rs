@@ -4,9 +4,8 @@ use fearless_simd::{Select, Simd, SimdBase, SimdFloat, SimdMask};
 
 use super::kernel::{self, Beliefs};
 use super::lane::{Block, Lane, Row};
-use super::number;
 use super::reading::{self, Compared};
-use crate::{Compact, SparseEkf, StepError};
+use crate::{Compact, Reading, SparseEkf};
 
 /// Steps all blocks and counts the sensors that were refused.
 #[inline(always)]
@@ -26,7 +25,7 @@ pub(super) fn step_blocks<T: Lane, S: Simd, const B: usize, const N: usize, cons
         let variances = extra.map(|extra| filled(extra, from, &mut variances));
         step_block(simd, ekf, block, values, variances);
         if block.refused != 0 {
-            refused += explain(block, values, variances, readings.len() - from);
+            refused += retry(ekf, block, values, variances, readings.len() - from);
         }
     }
     refused
@@ -95,7 +94,7 @@ fn step_vector<T: Lane, S: Simd, V: SimdFloat<S, Element = T>, const B: usize, c
 
     // Whatever is not finite makes this sum not finite, or a comparison false.
     let mut sum = present.select(variance + nis, zero);
-    let mut accepted = variance.simd_gt(T::zero()) | !present;
+    let mut accepted = (variance.simd_gt(T::zero()) & extra.simd_ge(T::zero())) | !present;
     for i in 0..N {
         let variance = beliefs.covariance[kernel::at(i, i)];
         accepted &= variance.simd_ge(T::zero());
@@ -113,30 +112,36 @@ fn step_vector<T: Lane, S: Simd, V: SimdFloat<S, Element = T>, const B: usize, c
     (present, accepted)
 }
 
-/// Counts the refused among the first `sensors` of a block, and says why in the order in which [`SparseEkf::step`] finds
-/// out. Lanes without a sensor never have a reading; what becomes of them concerns nobody.
+/// Steps those that were refused once more, one by one as [`SparseEkf::step`] does: it has a way on for readings that are too
+/// exact, and says why it refuses the others. Counts these, among the first `sensors` of a block. Lanes without a sensor
+/// never have a reading; what becomes of them concerns nobody.
 #[cold]
-fn explain<T: Lane, const N: usize, const L: usize>(
+fn retry<T: Lane, const B: usize, const N: usize, const L: usize>(
+    ekf: &SparseEkf<T, Compact, B, N>,
     block: &mut Block<T, N, L>,
     values: &[T],
     variances: Option<&[T]>,
     sensors: usize,
 ) -> usize {
-    let mut refused = 0;
-    for lane in (0..sensors.min(values.len())).filter(|lane| block.refused >> lane & 1 == 1) {
-        refused += 1;
-        let innovation: T = number(&block.innovation, lane);
-        let variance: T = number(&block.innovation_variance, lane);
-        let extra = variances.map_or(T::zero(), |variances| variances[lane]);
-        block.errors[lane] = if block.taken >> lane & 1 == 0 {
-            StepError::NonFiniteState
-        } else if !(values[lane].is_finite() && extra.is_finite()) {
-            StepError::NonFiniteReading
-        } else if innovation.is_finite() && !(variance > T::zero() && variance.is_finite()) {
-            StepError::NonPositiveInnovationVariance
-        } else {
-            StepError::NonFiniteState
-        };
+    let (mut refused, doubted) = (0, block.refused);
+    for lane in (0..sensors.min(values.len())).filter(|lane| doubted >> lane & 1 == 1) {
+        let extra_variance = variances.map_or(T::zero(), |variances| variances[lane]);
+        let reading = (block.taken >> lane & 1 == 1).then_some(Reading { value: values[lane], extra_variance });
+        let mut belief = block.belief(lane);
+        match ekf.step(&mut belief, reading) {
+            Ok(residual) => {
+                block.set_belief(lane, &belief);
+                block.refused &= !(1 << lane);
+                if let Some(residual) = residual {
+                    block.innovation.0.as_mut()[lane] = residual.innovation;
+                    block.innovation_variance.0.as_mut()[lane] = residual.variance;
+                }
+            }
+            Err(error) => {
+                refused += 1;
+                block.errors[lane] = error;
+            }
+        }
     }
     refused
 }

@@ -113,6 +113,9 @@ static const float EXTEND_VISCOSITY_S = << viscosity_s[0] >>f;
 static const float RETRACT_VISCOSITY_S = << viscosity_s[1] >>f;
 /* Factor on the standard deviation of strain that the calibration found necessary. */
 static const float STRAIN_SD_SCALE = << strain_sd_scale >>f;
+/* The square of the rounding of a relative reading of order one, and the most tries with more noise after the first. */
+static const float ROUNDING = 1.4210855e-14f;
+enum { MOST_TRIES = 12 };
 /* Two-sided normal quantile of 95 %. */
 static const float NORMAL_95 = 1.959964f;
 
@@ -488,23 +491,36 @@ static float total_variance(const float p[ENTRIES])
     return sum;
 }
 
-/* One interval on, with a reading or without; *state changes only if everything went well. */
+/* One interval on, with a reading or without; *state changes only if everything went well. Where rounding makes a variance
+ * negative, the reading is more exact than the numbers: it is taken again with more and more noise until it leaves none. */
 static ohmstrain_status advance(ohmstrain_state *state, const float *rho, float extra_variance,
                                 ohmstrain_residual *residual)
 {
-    ohmstrain_state next = *state;
-    rate_spread spread = predict(next.mean, next.covariance);
+    int tries;
 
-    if (rho) {
-        const ohmstrain_status status = update(next.mean, next.covariance, &spread, *rho, extra_variance, residual);
-        if (status != OHMSTRAIN_OK) {
+    for (tries = 0;; tries++) {
+        ohmstrain_state next = *state;
+        rate_spread spread = predict(next.mean, next.covariance);
+        ohmstrain_status status = OHMSTRAIN_OK;
+
+        if (rho) {
+            status = update(next.mean, next.covariance, &spread, *rho, extra_variance, residual);
+        } else if (!is_sound(next.mean, next.covariance, total_variance(next.covariance))) {
+            status = OHMSTRAIN_ERR_STATE;
+        }
+        if (status == OHMSTRAIN_OK) {
+            *state = next;
             return status;
         }
-    } else if (!is_sound(next.mean, next.covariance, total_variance(next.covariance))) {
-        return OHMSTRAIN_ERR_STATE;
+        if (!rho || tries == MOST_TRIES) {
+            return status;
+        }
+        extra_variance = extra_variance + READING_VARIANCE + ROUNDING;
+        if (!isfinite(*rho * *rho / extra_variance)) {
+            return status;
+        }
+        extra_variance = 16.0f * extra_variance;
     }
-    *state = next;
-    return OHMSTRAIN_OK;
 }
 
 ohmstrain_status ohmstrain_start(ohmstrain_state *state)

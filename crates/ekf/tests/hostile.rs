@@ -1,0 +1,258 @@
+//! Readings and parameters that nobody should send, in the precision in which they hurt.
+
+use ohmstrain_ekf::{
+    Belief, Compact, Dwell, Ekf, Estimator, Evidence, Gaussian, Guard, Hypotheses, Influence, Mixture, Reading,
+    ReadingVerdict, SignSplit, SparseEkf, SparseMixture, SparseSignSplit, Streak,
+};
+use ohmstrain_model::{Branch, Gauge, ModelNoise, Motion, Phase, Scalar, SensorLaw, StrainRange, SwitchedModel};
+
+const DT_S: f64 = 0.02;
+
+fn model<T: Scalar>(gauge: [f64; 3]) -> SwitchedModel<T, 2, 1, 4> {
+    let of = T::of;
+    let branch = Branch {
+        tau_s: of(20.0),
+        extend_gain: of(0.6),
+        retract_gain: of(-0.4),
+        extend_gain_slope: of(0.0),
+        retract_gain_slope: of(0.0),
+    };
+    let law = SensorLaw {
+        gauge: Gauge::Polynomial { coefficients: gauge.map(of) },
+        extend_viscosity_s: of(0.02),
+        retract_viscosity_s: of(-0.01),
+        branches: [branch],
+        range: StrainRange { lower: of(0.0), upper: of(0.33) },
+    };
+    let motion = Motion::ornstein_uhlenbeck(of(1.0), of(0.1), of(0.15), of(0.1)).unwrap();
+    let noise =
+        ModelNoise { reading_sd: of(2e-3), branch_sd: of(5e-3), baseline_sd: of(0.02), baseline_time_s: of(30.0) };
+    SwitchedModel::new(law, motion, noise).unwrap()
+}
+
+const RISING: [f64; 3] = [1.9, -2.8, 0.0];
+
+fn evidence<T: Scalar>() -> Evidence<T> {
+    Evidence { limits: StrainRange { lower: T::of(0.0), upper: T::of(0.33) }, tempering: T::one() }
+}
+
+fn split<T: ohmstrain_ekf::Real>() -> SignSplit<T, SwitchedModel<T, 2, 1, 4>, 8> {
+    SignSplit::new(model(RISING), None, evidence())
+}
+
+/// After readings that belong to a strain of about 0.15, one far away: the squared innovation over its variance is then
+/// large and positive, in either precision, and a gate turns it down.
+fn check_far_reading<T: ohmstrain_ekf::Real>(far: f64) {
+    let filter = split::<T>();
+    let prepared = Estimator::<T, 4, 10>::prepare(&filter, T::of(DT_S));
+    let guard = Guard::none().with_gate(T::of(10.8), 10).unwrap();
+    let (mut state, mut streak) =
+        (Mixture::<T, 4, 10, 8>::single(Belief::initial(filter.model()), Phase::Extend), Streak::default());
+    for k in 0..60 {
+        // A slow oscillation keeps both directions possible.
+        let reading = T::of(0.2 + 0.02 * (0.3 * f64::from(k)).sin());
+        let taken = guard.advance(&filter, &state, streak, &prepared, Some(Reading::from(reading))).unwrap();
+        (state, streak) = (taken.advanced.state, taken.streak);
+    }
+    let before = state.moments().mean[0];
+    let taken = guard.advance(&filter, &state, streak, &prepared, Some(Reading::from(T::of(far)))).unwrap();
+    assert_eq!(taken.verdict, ReadingVerdict::Rejected, "{far}");
+    let innovation = taken.advanced.innovation.unwrap();
+    // The variance of a reading before it was seen does not depend on how far away the reading is.
+    let near = guard.advance(&filter, &state, streak, &prepared, Some(Reading::from(T::of(0.2)))).unwrap();
+    let near = near.advanced.innovation.unwrap().variance;
+    // Each innovation is rounded by far ε at most, so their standard deviation is too, twice over.
+    let rounding = T::of(2.0 * far) * T::default_epsilon() / near.sqrt();
+    let ratio = innovation.variance / near;
+    assert!((ratio.sqrt() - T::one()).abs() <= rounding, "{far}: {ratio:?} {rounding:?}");
+    assert!((taken.advanced.state.moments().mean[0] - before).abs() < T::of(0.05), "{far}");
+}
+
+#[test]
+fn the_variance_of_a_mixtures_reading_is_not_a_difference_of_squares() {
+    check_far_reading::<f32>(30.0);
+    check_far_reading::<f32>(1e4);
+    check_far_reading::<f64>(30.0);
+    check_far_reading::<f64>(1e8);
+}
+
+#[test]
+fn a_variance_below_zero_is_refused() {
+    let reading = Some(Reading { value: 0.2, extra_variance: -1.0 });
+    let model = model::<f64>(RISING);
+    let start: Belief<f64, 4, 10> = Belief::initial(&model);
+    assert!(Ekf::new(model).step(&start, DT_S, reading).is_err());
+    // Also one that leaves the innovation's variance positive.
+    let slight = Some(Reading { value: 0.2, extra_variance: -1e-9 });
+    assert!(Ekf::new(model).step(&start, DT_S, slight).is_err());
+    let mut belief = start;
+    assert!(SparseEkf::<f64, Compact, 1, 4>::new(model, DT_S).unwrap().step(&mut belief, slight).is_err());
+    assert_eq!(belief, start);
+    let mut mixture = SparseMixture::<f64, 4, 10, 8>::single(start, Phase::Extend);
+    let split = SparseSignSplit::<f64, 1, 4, 8>::new(model, DT_S, None, evidence()).unwrap();
+    assert!(split.step(&mut mixture, slight).is_err());
+}
+
+/// A linear congruential generator (Knuth, MMIX), to draw models from.
+struct Draws(u64);
+
+impl Draws {
+    /// Between 0 and 1.
+    fn uniform(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    /// Between two positive numbers, evenly in the logarithm.
+    fn between(&mut self, low: f64, high: f64) -> f64 {
+        low * (high / low).powf(self.uniform())
+    }
+}
+
+fn random_model(draws: &mut Draws) -> (SwitchedModel<f32, 2, 2, 5>, f32) {
+    let mut branch = |low: f64, high: f64| Branch {
+        tau_s: draws.between(low, high) as f32,
+        extend_gain: draws.between(0.1, 2.0) as f32,
+        retract_gain: -draws.between(0.1, 2.0) as f32,
+        extend_gain_slope: draws.between(0.1, 4.0) as f32,
+        retract_gain_slope: -draws.between(0.1, 4.0) as f32,
+    };
+    let branches = [branch(0.5, 10.0), branch(10.0, 300.0)];
+    let law = SensorLaw {
+        gauge: Gauge::Polynomial {
+            coefficients: [draws.between(0.3, 4.0) as f32, -draws.between(0.3, 8.0) as f32, 0.0],
+        },
+        extend_viscosity_s: draws.between(1e-3, 0.1) as f32,
+        retract_viscosity_s: -draws.between(1e-3, 0.1) as f32,
+        branches,
+        range: StrainRange { lower: 0.0, upper: 0.33 },
+    };
+    let motion = Motion::ornstein_uhlenbeck(
+        draws.between(0.1, 5.0) as f32,
+        draws.between(0.01, 1.0) as f32,
+        0.15,
+        draws.between(0.05, 0.5) as f32,
+    )
+    .unwrap();
+    let noise = ModelNoise {
+        reading_sd: draws.between(1e-6, 1e-3) as f32,
+        branch_sd: draws.between(1e-4, 0.05) as f32,
+        baseline_sd: draws.between(1e-3, 0.1) as f32,
+        baseline_time_s: draws.between(5.0, 500.0) as f32,
+    };
+    (SwitchedModel::new(law, motion, noise).unwrap(), draws.between(2e-3, 0.2) as f32)
+}
+
+/// A reading that single precision cannot take without a variance below zero must not lock the filter out: no reading that
+/// the law itself gives is refused, and the estimate follows.
+#[test]
+fn single_precision_takes_precise_readings() {
+    let mut draws = Draws(1);
+    let (mut refused, mut steps, mut stuck) = (0, 0, 0);
+    for _ in 0..4000 {
+        let (model, dt_s) = random_model(&mut draws);
+        let filter = SparseEkf::<f32, Compact, 2, 5>::new(model, dt_s).unwrap();
+        let mut belief: Belief<f32, 5, 15> = Belief::initial(&model);
+        let mut last_refused = 0;
+        for k in 0..300 {
+            let strain = 0.15 + 0.1 * (0.7 * dt_s * k as f32).sin();
+            let rho = model.law().gauge_value_and_slope(strain).0 + 1e-3 * (draws.uniform() as f32 - 0.5);
+            let taken = filter.step(&mut belief, Some(Reading::from(rho)));
+            steps += 1;
+            if taken.is_err() {
+                refused += 1;
+                last_refused += 1;
+            } else {
+                last_refused = 0;
+            }
+        }
+        stuck += usize::from(last_refused > 100);
+    }
+    assert_eq!((refused, stuck), (0, 0), "of {steps}");
+}
+
+#[test]
+fn what_limits_say_is_no_evidence_of_a_reading() {
+    let model = model::<f64>(RISING);
+    let inside = |limits| Hypotheses::<_, _, 16>::new(model, dwell(), Evidence { limits, tempering: 1.0 });
+    // The start is wider than the limits.
+    let start = Mixture::single(Belief::<f64, 4, 10>::initial(&model), Phase::Hold);
+    let (narrow, wide) = (StrainRange { lower: 0.1, upper: 0.2 }, StrainRange { lower: -1e3, upper: 1e3 });
+    let prepared = ohmstrain_ekf::Dynamics::<f64, 4, 10>::prepare(&model, DT_S);
+    let step = |limits, reading| inside(limits).step_prepared(&start, &prepared, DT_S, reading).unwrap();
+    for limits in [narrow, wide] {
+        assert_eq!(step(limits, None).log_likelihood, 0.0);
+    }
+    let reading = Some(Reading::from(0.3));
+    let (near, far) = (step(narrow, reading).log_likelihood, step(wide, reading).log_likelihood);
+    assert!((near - far).abs() < 1e-12, "{near} {far}");
+    // Nor does it matter how many hypotheses there is room for afterwards.
+    let few = Hypotheses::<_, _, 2>::new(model, dwell(), Evidence { limits: wide, tempering: 1.0 });
+    let start = Mixture::single(Belief::<f64, 4, 10>::initial(&model), Phase::Hold);
+    let crowded = few.step_prepared(&start, &prepared, DT_S, reading).unwrap().log_likelihood;
+    assert!((crowded - far).abs() < 1e-12, "{crowded} {far}");
+}
+
+fn dwell() -> Dwell<f64> {
+    Dwell::new(0.05, 0.05, 0.3).unwrap()
+}
+
+#[test]
+fn a_gaussian_much_wider_than_its_range_is_cut_to_a_uniform_one() {
+    let range = StrainRange { lower: 0.0_f64, upper: 1.0 };
+    for variance in [1e4_f64, 1e8, 1e20, 1e300] {
+        for mean in [0.0_f64, 0.5, 3.0] {
+            let cut = Gaussian { mean, variance }.restricted(&range);
+            // The density changes by less than (|mean| + 1)²/variance over the range.
+            let bound = 16.0 / variance + 1e-9;
+            assert!((cut.mean - 0.5).abs() < bound && (cut.variance - 1.0 / 12.0).abs() < bound, "{mean} {cut:?}");
+            let expected = 1.0 / (std::f64::consts::TAU * variance).sqrt();
+            assert!((cut.mass / expected - 1.0).abs() < bound, "{mean} {cut:?}");
+        }
+    }
+    let single = Gaussian { mean: 0.0_f32, variance: 1e12 }.restricted(&StrainRange { lower: 0.0, upper: 1.0 });
+    assert!((single.mean - 0.5).abs() < 1e-5 && (single.variance - 1.0 / 12.0).abs() < 1e-5, "{single:?}");
+}
+
+#[test]
+fn a_chain_that_never_moves_stays() {
+    for dwell in [Dwell::new(f64::INFINITY, 1.0, 1.0).unwrap(), Dwell::new(f64::INFINITY, f64::INFINITY, 0.3).unwrap()]
+    {
+        let chain = dwell.probabilities(0.1);
+        for row in chain {
+            assert!((row.iter().sum::<f64>() - 1.0).abs() < 1e-15, "{chain:?}");
+        }
+        assert_eq!(chain[1], [0.0, 1.0, 0.0]);
+    }
+}
+
+#[test]
+fn parameters_without_meaning_are_refused() {
+    let limits = StrainRange { lower: 0.0, upper: 0.3 };
+    for tempering in [f64::NAN, -0.1, 1.1] {
+        assert!(Evidence::new(limits, tempering).is_err());
+    }
+    assert!(Evidence::new(StrainRange { lower: 0.3, upper: 0.0 }, 1.0).is_err());
+    assert!(Evidence::new(limits, 0.5).is_ok());
+    for parameter in [f64::NAN, 0.0, -1.0] {
+        assert!(Guard::none().with_gate(parameter, 3).is_err());
+        assert!(Guard::none().with_influence(Influence::Huber { threshold: parameter }).is_err());
+        assert!(Guard::none().with_influence(Influence::StudentT { degrees_of_freedom: parameter }).is_err());
+    }
+}
+
+/// What the numbers cannot take is turned down like any other outlier, without a gate too, and the step is a prediction.
+#[test]
+fn no_reading_ends_a_run() {
+    let model = model::<f64>(RISING);
+    let ekf = Ekf::new(model);
+    let prepared = Estimator::<f64, 4, 10>::prepare(&ekf, DT_S);
+    let start: Belief<f64, 4, 10> = Belief::initial(&model);
+    let ahead = Estimator::advance(&ekf, &start, &prepared, None).unwrap().state;
+    for guard in [Guard::none(), Guard::none().with_gate(10.8, 0).unwrap()] {
+        for far in [1e200, -1e300] {
+            let taken = guard.advance(&ekf, &start, Streak::default(), &prepared, Some(Reading::from(far))).unwrap();
+            assert_eq!((taken.verdict, taken.advanced.state), (ReadingVerdict::Rejected, ahead));
+        }
+    }
+}
