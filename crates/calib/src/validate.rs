@@ -3,31 +3,15 @@
 //! A file that is edited by hand, or was damaged, is refused with the name of the number; it never becomes a filter that
 //! says something else than what it means.
 
-use thiserror::Error;
+mod table;
+
+pub use table::FieldError;
+use table::{Allowed, Table, short};
 
 use crate::baselines::StaticCubic;
 use crate::estimator_params::{EstimatorParams, MotionParams, NoiseParams, PhaseParams};
 use crate::law_params::{GaugeParams, LawParams};
 use crate::params::{JointParams, RangeParams, RecordingInfo, SensorParams, Uncertainty, Validity};
-
-/// A number in a sensor's parameters that no sensor can have.
-#[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[error("field `{field}`: expected {expected}, found {found}")]
-pub struct FieldError {
-    /// Where it stands: names of tables and index in an array, `law.branches[0].tau_s`.
-    pub field: String,
-    /// What it may be.
-    pub expected: String,
-    /// What it is.
-    pub found: String,
-}
-
-/// What a number may be, ends included.
-#[derive(Clone, Copy)]
-struct Allowed {
-    least: f64,
-    most: f64,
-}
 
 /// Strains, degrees, gains, coefficients: far beyond what sensors have, and near enough for squares and products of some
 /// of them to be numbers.
@@ -48,7 +32,11 @@ const TOLD_AMOUNT: Allowed = Allowed { least: 0.0, most: f64::INFINITY };
 /// Shortest range of strains, relative to its larger end.
 const SHORTEST_RANGE: f64 = 1e-9;
 /// Largest change of resistance, relative to R₀, that a gauge curve may tell within the law's range.
-const LARGEST_CHANGE: f64 = 1e9;
+const LARGEST_CHANGE: f64 = 1e6;
+/// How many times the largest reading of the calibration, or the smallest, R₀ may be.
+const REST_BEYOND: f64 = 100.0;
+/// How far beyond the limits the mean strain may lie, in spans.
+const MEAN_BEYOND: f64 = 10.0;
 /// Strains at which that is looked at.
 const GAUGE_POINTS: u32 = 64;
 
@@ -58,17 +46,18 @@ impl SensorParams {
     /// # Errors
     /// Names the first that is outside of its range.
     pub fn validate(&self) -> Result<(), FieldError> {
-        let root = Table(String::new());
+        let root = Table::root();
         root.number("rest_reading", self.rest_reading, POSITIVE)?;
         self.limits.validate(&root.table("limits"))?;
         self.validity.validate(&root.table("validity"))?;
+        self.check_rest(&root)?;
         self.static_cubic.validate(&root.table("static_cubic"))?;
         if let Some(joint) = &self.joint {
             joint.validate(&root.table("joint"))?;
         }
         self.law.validate(&root.table("law"))?;
         for (kind, estimator) in &self.estimators {
-            estimator.validate(&root.table("estimators").table(kind.name()))?;
+            estimator.validate(&root.table("estimators").table(kind.name()), self.limits)?;
         }
         for (index, recording) in self.recordings.iter().enumerate() {
             recording.validate(&root.entry("recordings", index))?;
@@ -77,48 +66,17 @@ impl SensorParams {
     }
 }
 
-/// A table of the file by the path that leads to it.
-struct Table(String);
-
-impl Table {
-    fn table(&self, name: &str) -> Self {
-        Self(self.path(name))
-    }
-
-    fn entry(&self, name: &str, index: usize) -> Self {
-        Self(format!("{}[{index}]", self.path(name)))
-    }
-
-    fn path(&self, name: &str) -> String {
-        if self.0.is_empty() { name.to_string() } else { format!("{}.{name}", self.0) }
-    }
-
-    fn wrong(&self, name: &str, expected: impl Into<String>, found: impl ToString) -> FieldError {
-        FieldError { field: self.path(name), expected: expected.into(), found: found.to_string() }
-    }
-
-    fn number(&self, name: &str, value: f64, allowed: Allowed) -> Result<(), FieldError> {
-        let Allowed { least, most } = allowed;
-        if (least..=most).contains(&value) {
+impl SensorParams {
+    /// R₀ in another unit than the readings, or one digit too many.
+    fn check_rest(&self, root: &Table) -> Result<(), FieldError> {
+        let Validity { reading_lower, reading_upper, .. } = self.validity;
+        let (least, most) = (reading_lower / REST_BEYOND, reading_upper * REST_BEYOND);
+        if (least..=most).contains(&self.rest_reading) {
             return Ok(());
         }
-        Err(self.wrong(name, format!("{} to {}", short(least), short(most)), short(value)))
+        let expected = format!("{} to {}, near the readings of `validity`", short(least), short(most));
+        Err(root.wrong("rest_reading", expected, short(self.rest_reading)))
     }
-
-    fn numbers(&self, name: &str, values: &[f64], allowed: Allowed) -> Result<(), FieldError> {
-        let mut numbered = values.iter().enumerate();
-        numbered.try_for_each(|(index, value)| self.number(&format!("{name}[{index}]"), *value, allowed))
-    }
-
-    fn length(&self, name: &str, expected: usize, found: usize) -> Result<(), FieldError> {
-        if found == expected { Ok(()) } else { Err(self.wrong(name, format!("{expected} entries"), found)) }
-    }
-}
-
-/// A number in few characters.
-fn short(value: f64) -> String {
-    let plain = value == 0.0 || !value.is_finite() || (1e-4..1e6).contains(&value.abs());
-    if plain { value.to_string() } else { format!("{value:e}") }
 }
 
 /// Two ends in order, the upper one by more than rounding.
@@ -206,12 +164,9 @@ impl GaugeParams {
             let (value, slope) = gauge.value_and_slope(strain);
             let steepest = LARGEST_CHANGE / range.span();
             if !(value.abs() <= LARGEST_CHANGE && slope.abs() <= steepest) {
-                let whole = Table(table.0.clone());
-                return Err(FieldError {
-                    field: whole.0,
-                    expected: format!("changes of resistance up to {LARGEST_CHANGE:e} R0 within the law's range"),
-                    found: format!("{} with slope {} at {}", short(value), short(slope), short(strain)),
-                });
+                let expected = format!("changes of resistance up to {LARGEST_CHANGE:e} R0 within `law.range`");
+                let found = format!("{} with slope {} at {}", short(value), short(slope), short(strain));
+                return Err(table.wrong_itself(expected, found));
             }
         }
         Ok(())
@@ -219,24 +174,29 @@ impl GaugeParams {
 }
 
 impl EstimatorParams {
-    fn validate(&self, table: &Table) -> Result<(), FieldError> {
+    fn validate(&self, table: &Table, limits: RangeParams) -> Result<(), FieldError> {
         table.number("score", self.score, TOLD)?;
         table.number("strain_sd_scale", self.strain_sd_scale, FACTOR)?;
         if let Some(scale) = self.smoothed_sd_scale {
             table.number("smoothed_sd_scale", scale, FACTOR)?;
         }
-        self.motion.validate(&table.table("motion"))?;
+        self.motion.validate(&table.table("motion"), limits)?;
         self.noise.validate(&table.table("noise"))?;
         self.phases.map_or(Ok(()), |phases| phases.validate(&table.table("phases")))
     }
 }
 
 impl MotionParams {
-    fn validate(&self, table: &Table) -> Result<(), FieldError> {
+    fn validate(&self, table: &Table, limits: RangeParams) -> Result<(), FieldError> {
         let (Self::OrnsteinUhlenbeck { rate_sd_per_s, strain_mean, strain_sd, .. }
         | Self::Smooth { rate_sd_per_s, strain_mean, strain_sd, .. }) = *self;
         table.number("rate_sd_per_s", rate_sd_per_s, POSITIVE)?;
-        table.number("strain_mean", strain_mean, SIGNED)?;
+        let beyond = MEAN_BEYOND * limits.span();
+        let (least, most) = (limits.lower - beyond, limits.upper + beyond);
+        if !(least..=most).contains(&strain_mean) {
+            let expected = format!("{} to {}, near the `limits`", short(least), short(most));
+            return Err(table.wrong("strain_mean", expected, short(strain_mean)));
+        }
         table.number("strain_sd", strain_sd, POSITIVE)?;
         match *self {
             Self::OrnsteinUhlenbeck { rate_time_s, .. } => table.number("rate_time_s", rate_time_s, POSITIVE),

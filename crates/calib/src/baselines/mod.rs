@@ -72,7 +72,7 @@ impl Held {
 
     fn next(&mut self, strain: Option<f64>) -> f64 {
         if let Some(strain) = strain {
-            self.last = strain.clamp(self.range.lower, self.range.upper);
+            self.last = self.range.to_model().clamp(strain);
         }
         self.last
     }

@@ -46,7 +46,7 @@ impl StaticCubic {
     pub fn strain(&self, reading: f64) -> f64 {
         let z = (reading - self.reading_centre) / self.reading_scale;
         let [a, b, c, d] = self.coefficients;
-        (a + z * (b + z * (c + z * d))).clamp(self.range.lower, self.range.upper)
+        self.range.to_model().clamp(a + z * (b + z * (c + z * d)))
     }
 }
 

@@ -13,8 +13,8 @@ use crate::sensor_file;
 use crate::suits;
 use crate::validity::ValidityWatch;
 
-/// Smooths a recording and writes its estimates, all of them or none. Of a long one, readings are held in memory, and the
-/// states of a few thousand rows; estimates, which come out last segment first, wait in a temporary file.
+/// Smooths a recording and writes its estimates, all of them or none. Of a long one, readings and rates are held in memory, and
+/// the states of a few thousand rows; estimates, which come out last segment first, wait in a temporary file.
 pub fn run(args: &SmoothArgs) -> Result<(), CliError> {
     let wanted = args.estimate.estimator.chosen().map(|estimator| estimator.0);
     let mut params = sensor_file::read(&args.estimate.sensor, wanted)?;

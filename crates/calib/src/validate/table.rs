@@ -1,0 +1,73 @@
+use thiserror::Error;
+
+/// A number in a sensor's parameters that no sensor can have.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("field `{field}`: expected {expected}, found {found}")]
+pub struct FieldError {
+    /// Where it stands: names of tables and index in an array, `law.branches[0].tau_s`.
+    pub field: String,
+    /// What it may be.
+    pub expected: String,
+    /// What it is.
+    pub found: String,
+}
+
+/// What a number may be, ends included.
+#[derive(Clone, Copy)]
+pub(super) struct Allowed {
+    pub least: f64,
+    pub most: f64,
+}
+
+/// A table of the file by the path that leads to it.
+pub(super) struct Table(String);
+
+impl Table {
+    pub(super) const fn root() -> Self {
+        Self(String::new())
+    }
+
+    pub(super) fn table(&self, name: &str) -> Self {
+        Self(self.path(name))
+    }
+
+    pub(super) fn entry(&self, name: &str, index: usize) -> Self {
+        Self(format!("{}[{index}]", self.path(name)))
+    }
+
+    pub(super) fn path(&self, name: &str) -> String {
+        if self.0.is_empty() { name.to_string() } else { format!("{}.{name}", self.0) }
+    }
+
+    pub(super) fn wrong(&self, name: &str, expected: impl Into<String>, found: impl ToString) -> FieldError {
+        FieldError { field: self.path(name), expected: expected.into(), found: found.to_string() }
+    }
+
+    /// What its numbers make together.
+    pub(super) fn wrong_itself(&self, expected: String, found: String) -> FieldError {
+        FieldError { field: self.0.clone(), expected, found }
+    }
+
+    pub(super) fn number(&self, name: &str, value: f64, allowed: Allowed) -> Result<(), FieldError> {
+        let Allowed { least, most } = allowed;
+        if (least..=most).contains(&value) {
+            return Ok(());
+        }
+        Err(self.wrong(name, format!("{} to {}", short(least), short(most)), short(value)))
+    }
+
+    pub(super) fn numbers(&self, name: &str, values: &[f64], allowed: Allowed) -> Result<(), FieldError> {
+        let mut numbered = values.iter().enumerate();
+        numbered.try_for_each(|(index, value)| self.number(&format!("{name}[{index}]"), *value, allowed))
+    }
+
+    pub(super) fn length(&self, name: &str, expected: usize, found: usize) -> Result<(), FieldError> {
+        if found == expected { Ok(()) } else { Err(self.wrong(name, format!("{expected} entries"), found)) }
+    }
+}
+
+/// A number in few characters.
+pub(super) fn short(value: f64) -> String {
+    let plain = value == 0.0 || !value.is_finite() || (1e-4..1e6).contains(&value.abs());
+    if plain { value.to_string() } else { format!("{value:e}") }
+}
