@@ -4,7 +4,7 @@
 #   scripts/million-rows.sh [ROWS OF THE LARGEST RECORDING, 10000000] > docs/long-recordings.md
 #
 # Measures processor time (user + system), so that other work on the machine disturbs little. Every repetition runs all
-# programs once, one after the other; medians are compared. The ensemble, which takes longest, runs in the first only.
+# programs once, one after the other; medians are compared. The default, which takes longest, runs in the first only.
 # SENSOR names a sensor file for `simulate --protocol mixed`; without it, one is calibrated.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -56,8 +56,8 @@ for repetition in $(seq "$repetitions"); do
     for kind in all three; do
         columns=(); [[ $kind = three ]] && columns=("${three[@]}")
         measure $copy_columns "$million" "$folder/$kind.csv" | seconds >> "$folder/copy.$kind"
-        for estimator in ekf ensemble; do
-            [[ $estimator = ensemble && $repetition -gt 1 ]] && continue
+        for estimator in ekf corrected; do
+            [[ $estimator = corrected && $repetition -gt 1 ]] && continue
             filter --estimator $estimator "${columns[@]}" "$million" | seconds >> "$folder/$estimator.$kind"
         done
     done
@@ -78,16 +78,16 @@ Machine: $(awk -F': ' '/model name/ { print $2; exit }' /proc/cpuinfo), $(nproc)
 
 ## Time of \`ohmstrain filter\` on a million rows
 
-Processor time in seconds, medians of $repetitions interleaved repetitions (ensemble: one). *Copy* reads the same recording with the same
+Processor time in seconds, medians of $repetitions interleaved repetitions (corrected: one). *Copy* reads the same recording with the same
 reader and writes as many columns of numbers as long with the same writer (\`crates/bench-data/examples/copy_columns.rs\`),
 without a filter.
 
 | columns | estimator | copy, s | filter, s | ratio |
 |---|---|---|---|---|
 $(row "all" ekf all)
-$(row "all" ensemble all)
+$(row "all" corrected all)
 $(row "time_s, strain, strain_sd" ekf three)
-$(row "time_s, strain, strain_sd" ensemble three)
+$(row "time_s, strain, strain_sd" corrected three)
 
 ## Memory
 
@@ -106,9 +106,9 @@ memory() { # command, estimator, what is measured with the largest recording
     echo "| $1 | $2 | $small | $million_mb | $large |"
 }
 memory filter ekf yes
-memory filter ensemble no
+memory filter corrected no
 memory smooth ekf yes
-memory smooth ensemble no
+memory smooth corrected no
 cat <<END
 
 \`filter\` holds one row. \`smooth\` holds the readings, 16 bytes a row (25 for converter codes), the states of 4096 rows and

@@ -27,8 +27,12 @@ fn samples(trace: &Trace) -> Samples<'_> {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let training = session(CALIBRATION_SEED)?;
-    let calibration =
-        calibrate(&[samples(&training)], LawOptions::candidates(EstimatorKind::Ensemble), &EstimatorKind::ALL, |_| ())?;
+    let calibration = calibrate(
+        &[samples(&training)],
+        LawOptions::candidates(EstimatorKind::Corrected),
+        &EstimatorKind::ALL,
+        |_| (),
+    )?;
     let params = calibration.into_sensor("", Quantity::Strain, ReadingUnit::Ohm);
     let tests = TEST_SEEDS.map(session).collect::<Result<Vec<_>, _>>()?;
     let mut table = Table::new();

@@ -64,7 +64,7 @@ fn study(training: &Trace, tests: &[Trace], from: usize) -> Result<Vec<Hold>, Bo
     let known = strain(training);
     let samples = Samples::new(&training.time_s, &training.readings.values, &known)?;
     let calibration =
-        calibrate(&[samples], LawOptions::candidates(EstimatorKind::Ensemble), &[EstimatorKind::Ensemble], |_| ())?;
+        calibrate(&[samples], LawOptions::candidates(EstimatorKind::Corrected), &[EstimatorKind::Corrected], |_| ())?;
     let params = calibration.into_sensor("", Quantity::Strain, ReadingUnit::Ohm);
     let finite = training.readings.values.iter().copied().filter(|r| r.is_finite());
     let (low, high) = finite.fold((f64::MAX, f64::MIN), |(low, high), r| (low.min(r), high.max(r)));

@@ -4,9 +4,9 @@
 use std::collections::BTreeMap;
 
 use ohmstrain_calib::{
-    BranchParams, EnsembleParams, EstimatorKind, EstimatorParams, FORMAT, Filter, GaugeParams, InverseParams,
-    LawParams, MemberParams, MotionParams, NoiseParams, OwnLaw, PhaseParams, Quantity, RangeParams, ReadingUnit,
-    RegressionParams, Rows, SensorParams, Start, StaticCubic, Validity, build_filter,
+    BranchParams, CorrectionParams, CorrectorParams, EstimatorKind, EstimatorParams, FORMAT, Filter, GaugeParams,
+    LawParams, MotionParams, NoiseParams, PhaseParams, ProcessParams, Quantity, RangeParams, ReadingUnit, Rows,
+    SensorParams, Start, StaticCubic, TrainingRow, Validity, build_filter,
 };
 use ohmstrain_ekf::{Guard, Reading, StepError};
 use proptest::prelude::*;
@@ -47,12 +47,6 @@ fn sensor() -> SensorParams {
         gauge: GaugeParams::Polynomial { coefficients: [1.6, -1.2, 0.5] },
         branches: taus_s.iter().map(|tau_s| branch(*tau_s)).collect(),
     };
-    let member = |estimator: &EstimatorKind| MemberParams { estimator: *estimator, weight: 0.25, own: None };
-    let own = OwnLaw { rest_ratio: 1.02, law: law(&[4.0, 16.0, 64.0]), parameters: estimator };
-    let other = MemberParams { estimator: EstimatorKind::SignSplit, weight: 0.25, own: Some(own) };
-    let regression = |count: usize| RegressionParams { strain_sd: 0.02, coefficients: vec![0.01; count] };
-    let (filter, smoother) = (regression(21), regression(55));
-    let inverse = InverseParams { weight: 0.2, smoothed_weight: 0.2, centre: 0.2, half_range: 0.3, filter, smoother };
     SensorParams {
         format: FORMAT,
         made_by: "test".into(),
@@ -74,15 +68,32 @@ fn sensor() -> SensorParams {
         joint: None,
         law: law(&[4.0, 32.0]),
         estimators: EstimatorKind::ALL.map(|kind| (kind, estimator)).into_iter().collect::<BTreeMap<_, _>>(),
-        ensemble: Some(EnsembleParams {
-            score: 0.0,
-            strain_sd_scale: 1.1,
-            smoothed_sd_scale: None,
-            members: EstimatorKind::Ensemble.members().iter().map(member).chain([other]).collect(),
-            inverse: Some(inverse),
-        }),
         recordings: vec![],
         uncertainty: None,
+        correction: Some(correction()),
+    }
+}
+
+/// A correction that has learned something from rows that no two are alike.
+fn correction() -> CorrectionParams {
+    let process = ProcessParams { length: 4.0, noise: 0.1, noise_time_s: 2.0, sd_scale: 1.1 };
+    let corrector = CorrectorParams { sd_scale: 0.9, direct: process, residual: process };
+    let wave = |k: usize, i: usize| ((0.3 + 0.11 * i as f64) * k as f64 + i as f64).sin();
+    let row = |k: usize| TrainingRow {
+        time_s: k as f64,
+        strain: 0.15 + 0.12 * wave(k, 0),
+        past: std::array::from_fn(|i| wave(k, i)),
+        future: std::array::from_fn(|i| 0.5 * wave(k, 7 + i)),
+        filtered: std::array::from_fn(|i| 0.2 + 0.1 * wave(k, 20 + i)),
+        smoothed: std::array::from_fn(|i| 0.2 + 0.1 * wave(k, 30 + i)),
+    };
+    CorrectionParams {
+        reading_centre: 0.2,
+        reading_half_range: 0.25,
+        rate_scales: [0.02, 0.05],
+        filter: corrector,
+        smoother: corrector,
+        rows: (0..40).map(row).collect(),
     }
 }
 
@@ -146,15 +157,7 @@ fn a_long_recording_is_smoothed_as_if_all_states_were_kept() {
     let mut params = sensor();
     // Rows that wait are reported with the wider of two intervals: make them the same.
     params.estimators.values_mut().for_each(|estimator| estimator.strain_sd_scale = 1.0);
-    params.ensemble.iter_mut().for_each(|ensemble| {
-        ensemble.strain_sd_scale = 1.0;
-        // It looks ahead to the end of a recording, and not at all with a fixed lag.
-        ensemble.inverse = None;
-        ensemble.members.iter_mut().flat_map(|member| &mut member.own).for_each(|own| {
-            own.parameters.strain_sd_scale = 1.0;
-        });
-    });
-    for kind in [EstimatorKind::Ekf, EstimatorKind::SignSplit, EstimatorKind::Ensemble] {
+    for kind in [EstimatorKind::Ekf, EstimatorKind::SignSplit] {
         for guard in [Guard::none(), Guard::none().with_gate(3.0, 5).unwrap()] {
             let build = || {
                 let mut filter = build_filter(&params, Some(kind), Start::Unknown).unwrap();
@@ -184,50 +187,6 @@ fn a_long_recording_is_smoothed_as_if_all_states_were_kept() {
             assert_eq!(shown(&*filter), shown(&*forward));
         }
     }
-}
-
-/// With a fixed lag every row comes out once, in order, and without a lag it is what the filter says; so each is pooled with
-/// what the inverse said of that row, whatever rows were refused in between.
-#[test]
-fn the_inverse_is_asked_of_the_row_that_is_due() {
-    let (time_s, readings) = recording(300);
-    let mut params = sensor();
-    let weight_of_the_inverse = |weight: f64, params: &mut SensorParams| {
-        params
-            .ensemble
-            .iter_mut()
-            .flat_map(|ensemble| &mut ensemble.inverse)
-            .for_each(|inverse| inverse.weight = weight);
-    };
-    // Next to nothing but the inverse counts: what comes out is its strain, which no later reading changes.
-    weight_of_the_inverse(1e9, &mut params);
-    let build = || build_filter(&params, Some(EstimatorKind::Ensemble), Start::Unknown).unwrap();
-    let (mut live, mut now) = (build(), Vec::new());
-    let (mut lagged, mut later) = (build(), Vec::new());
-    for (k, (&time_s, &reading)) in time_s.iter().zip(&readings).enumerate() {
-        live.step(time_s, reading).unwrap();
-        now.push(live.output().estimate.strain.mean);
-        if k % 5 == 2 {
-            let nothing = Some(Reading::from(f64::NAN));
-            let refused =
-                lagged.step_lagged(time_s, nothing, 1.0, &mut |output| later.push(output.estimate.strain.mean));
-            assert_eq!(refused, Err(StepError::NonFiniteReading));
-        }
-        lagged.step_lagged(time_s, reading, 1.0, &mut |output| later.push(output.estimate.strain.mean)).unwrap();
-    }
-    lagged.flush_lagged(&mut |output| later.push(output.estimate.strain.mean)).unwrap();
-    assert_eq!(now.len(), later.len());
-    // Members have a share of 10⁻⁹ of a strain of 0.3 at most; without a reading they alone are asked.
-    let asked = now.iter().zip(&later).zip(&readings).filter(|(_, reading)| reading.is_some());
-    assert!(asked.clone().all(|((now, later), _)| (now - later).abs() < 1e-8));
-    // And the inverse does say something: the members alone would not.
-    weight_of_the_inverse(1e-9, &mut params);
-    let mut without = build_filter(&params, Some(EstimatorKind::Ensemble), Start::Unknown).unwrap();
-    let apart = time_s.iter().zip(&readings).zip(&now).map(|((&time_s, &reading), now)| {
-        without.step(time_s, reading).unwrap();
-        (without.output().estimate.strain.mean - now).abs()
-    });
-    assert!(apart.fold(0.0, f64::max) > 0.05);
 }
 
 #[test]

@@ -5,12 +5,10 @@ use ohmstrain_ekf::{
 use ohmstrain_model::{Motion, Phase, SwitchedModel};
 
 use crate::CalibrationError;
-use crate::ensemble::{Ensemble, MemberParams, OwnLaw};
+use crate::corrected::Corrected;
 use crate::estimator_params::{AnyMotion, EstimatorKind, EstimatorParams};
 use crate::filter::{Filter, Start};
-use crate::inverse::Inverse;
 use crate::law_params::LawParams;
-use crate::own_rest::OwnRest;
 use crate::params::{RangeParams, SensorParams};
 use crate::running::{Interval, Running};
 use crate::sieve::Sieve;
@@ -31,26 +29,13 @@ pub fn build_filter(
 ) -> Result<Box<dyn Filter>, CalibrationError> {
     params.validate()?;
     let kind = kind.unwrap_or(params.default_estimator);
-    let setting = Setting { limits: params.limits, start, own_rest: OwnRest::SHARED, sieve: Sieve::new(params) };
-    let single = |kind| filter_from_parts(kind, &params.law, params.estimator(kind)?, setting);
-    if kind != EstimatorKind::Ensemble {
-        return single(kind);
+    let setting = Setting { limits: params.limits, start, sieve: Sieve::new(params) };
+    let filter = filter_from_parts(kind.filter(), &params.law, params.estimator(kind.filter())?, setting)?;
+    if kind != EstimatorKind::Corrected {
+        return Ok(filter);
     }
-    let ensemble = params.ensemble.as_ref().ok_or_else(|| CalibrationError::no_parameters(kind))?;
-    let member = |member: &MemberParams| {
-        let filter = match &member.own {
-            None => single(member.estimator),
-            Some(OwnLaw { rest_ratio, law, parameters }) => {
-                let setting = Setting { own_rest: OwnRest::new(*rest_ratio), ..setting };
-                filter_from_parts(member.estimator, law, parameters, setting)
-            }
-        };
-        Ok((filter?, member.weight))
-    };
-    let members = ensemble.members.iter().map(member).collect::<Result<Vec<_>, CalibrationError>>()?;
-    let inverse = ensemble.inverse.clone().map(|inverse| Inverse::new(inverse, params.limits, OwnRest::SHARED));
-    let smoothed_scale = ensemble.smoothed_sd_scale.unwrap_or(1.0);
-    Ok(Box::new(Ensemble::new(members, inverse.transpose()?, ensemble.strain_sd_scale, smoothed_scale)?))
+    let correction = params.correction.as_ref().ok_or_else(|| CalibrationError::no_parameters(kind))?;
+    Ok(Box::new(Corrected::new(filter, correction, params.limits)?))
 }
 
 /// What a filter needs besides law, noise and motion.
@@ -58,7 +43,6 @@ pub fn build_filter(
 pub(crate) struct Setting {
     pub limits: RangeParams,
     pub start: Start,
-    pub own_rest: OwnRest,
     pub sieve: Sieve,
 }
 
@@ -168,7 +152,7 @@ fn of_size<const M: usize, const B: usize, const N: usize, const L: usize>(
         EstimatorKind::Ukf => {
             return Ok(Box::new(Running::new(Ukf::new(Unscented::new(model)), belief, model, interval)));
         }
-        EstimatorKind::Ensemble => return Err(CalibrationError::no_parameters(kind)),
+        EstimatorKind::Corrected => return Err(CalibrationError::no_parameters(kind)),
         _ => {}
     }
     let PhaseFilter { dwell, hold, evidence } = PhaseFilter::new(kind, estimator, setting.limits)?;
@@ -219,7 +203,6 @@ fn interval(estimator: &EstimatorParams, setting: Setting) -> Interval {
         limits: setting.limits.to_model(),
         filtered_scale: estimator.strain_sd_scale,
         smoothed_scale: estimator.smoothed_sd_scale.unwrap_or(1.0),
-        own_rest: setting.own_rest,
         sieve: setting.sieve,
     }
 }

@@ -2,9 +2,11 @@ use std::collections::BTreeMap;
 
 use crate::CalibrationError;
 use crate::baselines::StaticCubic;
-use crate::ensemble::EnsembleParams;
-use crate::ensemble_fit::{candidates, fit_ensemble, richer_evaluations, richer_laws, richer_members};
+use crate::build_filter::{Setting, filter_from_parts};
+use crate::correction_fit::fit_correction;
+use crate::correction_params::CorrectionParams;
 use crate::estimator_params::{EstimatorKind, EstimatorParams};
+use crate::filter::Start;
 use crate::law_fit::{CrossFit, LawOptions, fit_laws};
 use crate::law_params::LawParams;
 use crate::left_out::REFERENCE_SD;
@@ -13,7 +15,7 @@ use crate::noise_fit::{NoiseProblem, REFINEMENT, SURVEY, Surveyed, survey, surve
 use crate::params::{FORMAT, Quantity, RangeParams, ReadingUnit, SensorParams, Uncertainty, Validity};
 use crate::samples::Samples;
 use crate::screen::{Distrusted, screen};
-use crate::sieve::longest_repeat_s;
+use crate::sieve::{Sieve, longest_repeat_s};
 
 /// What calibration is doing, for a progress bar.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -46,8 +48,8 @@ pub struct Calibration {
     pub default_estimator: EstimatorKind,
     /// Noise and motion, per estimator.
     pub estimators: BTreeMap<EstimatorKind, EstimatorParams>,
-    /// How they are pooled, if that was asked for.
-    pub ensemble: Option<EnsembleParams>,
+    /// What was learned about the error of the filter that is corrected, if that was asked for.
+    pub correction: Option<CorrectionParams>,
     /// The range of the reference.
     pub limits: RangeParams,
     /// What was seen.
@@ -76,9 +78,9 @@ impl Calibration {
             joint: None,
             law: self.law,
             estimators: self.estimators,
-            ensemble: self.ensemble,
             recordings: vec![],
             uncertainty: Some(self.uncertainty),
+            correction: self.correction,
         }
     }
 }
@@ -86,10 +88,6 @@ impl Calibration {
 /// How much better, in mean log density of the strain, a single Gaussian must be than hypotheses: once it has taken the
 /// wrong direction it does not come back, and a short recording may not show that. Ten per cent in the deviation.
 const LOCK_IN: f64 = 0.1;
-
-/// Who chooses the law of an ensemble. Phase histories make any law look good on the blocks left out by finding the history
-/// that suits it, and the law they choose serves the others badly.
-const LAW_CHOOSERS: [EstimatorKind; 1] = [EstimatorKind::Ekf];
 
 fn handicap(kind: EstimatorKind) -> f64 {
     if kind.has_phases() { 0.0 } else { LOCK_IN }
@@ -99,10 +97,10 @@ fn handicap(kind: EstimatorKind) -> f64 {
 /// stand far from their neighbours, or from the law, take no part ([`screen`]).
 ///
 /// Estimators are tried with a law for each of `structures` and each strength of ridge; the pair with the best score on
-/// blocks that the law has not seen gives the law. Where an ensemble is asked for it is the extended Kalman filter that
-/// chooses, otherwise all of `kinds` do. To that law every one of them, what smooths in its place, and the extended Kalman
-/// filter in any case, is then fitted, with the family of motions that serves it best, and the best of `kinds` becomes the
-/// default. Near ties go to the one that keeps hypotheses. An ensemble has members with laws of their own besides.
+/// blocks that the law has not seen gives the law. To that law every one of them, what smooths in its place, and the extended
+/// Kalman filter in any case, is then fitted, with the family of motions that serves it best, and the best of `kinds` becomes
+/// the default. Near ties go to the one that keeps hypotheses. [`EstimatorKind::Corrected`] is the default where it is asked
+/// for; what it corrects is learned last, from the same rows.
 ///
 /// # Errors
 /// If the recordings are too short or too plain to learn a law from, if the law explains nothing or the estimates are no
@@ -118,18 +116,13 @@ pub fn calibrate(
     let recordings: &[Samples] = &screened.samples();
     let laws = fit_laws(recordings, structures)?;
     let stats = MotionStats::new(recordings);
-    let wanted = distinct(kinds.iter().flat_map(EstimatorKind::members).copied());
+    let wanted = distinct(kinds.iter().map(|kind| kind.filter()));
     let smoothers = wanted.iter().map(|kind| kind.smoother());
     let all_kinds = distinct(wanted.iter().copied().chain(smoothers).chain([EstimatorKind::Ekf]));
-    let pools = kinds.contains(&EstimatorKind::Ensemble);
-    let choosers: &[EstimatorKind] = if pools { &LAW_CHOOSERS } else { &wanted };
     let fits = all_kinds.iter().map(|kind| kind.motion_families().len() as u64).sum::<u64>();
-    let surveys = choosers.iter().map(|kind| survey_evaluations(*kind, laws.len(), structures.len())).sum::<u64>();
-    let unsurveyed = all_kinds.iter().filter(|kind| !choosers.contains(*kind)).count() as u64;
-    let expected = surveys
-        + unsurveyed * SURVEY.evaluations()
-        + fits * REFINEMENT.evaluations()
-        + if pools { richer_evaluations(laws.len() / structures.len()) } else { 0 };
+    let surveys = wanted.iter().map(|kind| survey_evaluations(*kind, laws.len(), structures.len())).sum::<u64>();
+    let unsurveyed = all_kinds.iter().filter(|kind| !wanted.contains(*kind)).count() as u64;
+    let expected = surveys + unsurveyed * SURVEY.evaluations() + fits * REFINEMENT.evaluations();
     let mut done = 0;
     let mut evaluated = || {
         done += 1;
@@ -137,7 +130,7 @@ pub fn calibrate(
     };
     let all_laws: Vec<&CrossFit> = laws.iter().collect();
     let mut surveyed = Vec::new();
-    for &kind in choosers {
+    for &kind in &wanted {
         surveyed.extend(survey(recordings, &all_laws, stats, kind, &mut evaluated)?);
     }
     let cost = |one: &Surveyed| one.tuned.cost + handicap(one.kind);
@@ -160,20 +153,19 @@ pub fn calibrate(
         estimators.extend(best.map(|best| (kind, best)));
     }
     worth_something(&estimators, &stats, fit.law.law.range)?;
-    let richer_laws = if pools { richer_laws(recordings, structures, fit) } else { Vec::new() };
-    let richer = richer_members(recordings, &richer_laws, stats, &mut evaluated)?;
     let score =
         |kind: &EstimatorKind| estimators.get(kind).map_or(f64::INFINITY, |params| params.score + handicap(*kind));
     let best = wanted.iter().copied().min_by(|a, b| score(a).total_cmp(&score(b)));
-    let default_estimator = if pools { Some(EstimatorKind::Ensemble) } else { best };
-    let ensemble = pools.then(|| fit_ensemble(recordings, fit, &candidates(&estimators, &richer)));
+    let corrects = kinds.contains(&EstimatorKind::Corrected);
+    let correction = if corrects { correction(recordings, fit, &estimators)? } else { None };
+    let default_estimator = if correction.is_some() { Some(EstimatorKind::Corrected) } else { best };
     let limits = fit.law.law.range;
     let (reading_lower, reading_upper) = reading_range(recordings);
     Ok(Calibration {
         distrusted: screened.distrusted.clone(),
         default_estimator: default_estimator.unwrap_or(EstimatorKind::Ekf),
         estimators,
-        ensemble,
+        correction,
         static_cubic: StaticCubic::fit(recordings, limits)?,
         validity: Validity {
             lower: limits.lower,
@@ -211,6 +203,19 @@ fn worth_something(
     let constant = 0.5 + 0.5 * variance.ln();
     let score = estimators.values().map(|params| params.score).fold(f64::INFINITY, f64::min);
     if score > constant - LEAST_GAIN { Err(CalibrationError::NothingEstimated { score, constant }) } else { Ok(()) }
+}
+
+/// The correction of the calibrated filter; none if nothing can be learned about it.
+fn correction(
+    recordings: &[Samples],
+    fit: &CrossFit,
+    estimators: &BTreeMap<EstimatorKind, EstimatorParams>,
+) -> Result<Option<CorrectionParams>, CalibrationError> {
+    let (kind, limits) = (EstimatorKind::Corrected.filter(), fit.law.law.range);
+    let Some(params) = estimators.get(&kind) else { return Ok(None) };
+    let setting = Setting { limits, start: Start::Unknown, sieve: Sieve::OPEN };
+    let build = || filter_from_parts(kind, &fit.law.law, params, setting);
+    fit_correction(recordings, &fit.law.rest_readings, limits, &build)
 }
 
 fn distinct(kinds: impl Iterator<Item = EstimatorKind>) -> Vec<EstimatorKind> {

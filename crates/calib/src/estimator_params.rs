@@ -1,6 +1,8 @@
 use ohmstrain_model::{ModelNoise, Motion, ParameterError};
 use serde::{Deserialize, Serialize};
 
+use crate::recipe::RECIPE;
+
 /// The estimators, by the names used on the command line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -17,22 +19,21 @@ pub enum EstimatorKind {
     Hypotheses,
     /// Particles: the reference that shows whether the law or the estimator limits.
     Particles,
-    /// Several of the others side by side, their posteriors pooled.
-    Ensemble,
+    /// The filter of [`RECIPE`](crate::RECIPE) with the learned correction of its strain.
+    Corrected,
 }
 
 impl EstimatorKind {
     /// All estimators.
     pub const ALL: [Self; 7] =
-        [Self::Ekf, Self::Ukf, Self::Imm, Self::SignSplit, Self::Hypotheses, Self::Particles, Self::Ensemble];
+        [Self::Ekf, Self::Ukf, Self::Imm, Self::SignSplit, Self::Hypotheses, Self::Particles, Self::Corrected];
 
-    /// The estimators that run under the sensor's law: itself, or those of the ensemble, which has others under laws of
-    /// their own.
+    /// The filter that runs: itself, or the one whose strain is corrected.
     #[must_use]
-    pub const fn members(&self) -> &[Self] {
+    pub const fn filter(self) -> Self {
         match self {
-            Self::Ensemble => &[Self::Hypotheses],
-            _ => std::slice::from_ref(self),
+            Self::Corrected => RECIPE.filter,
+            own => own,
         }
     }
 
@@ -46,7 +47,7 @@ impl EstimatorKind {
     /// what they do better is the estimator's doing and not the parameters'.
     #[must_use]
     pub const fn tuned_as(self) -> Self {
-        match self {
+        match self.filter() {
             Self::Particles => Self::SignSplit,
             own => own,
         }
@@ -55,7 +56,10 @@ impl EstimatorKind {
     /// The estimator that smooths in its place: itself, where it has a smoother.
     #[must_use]
     pub const fn smoother(self) -> Self {
-        self.tuned_as()
+        match self {
+            Self::Corrected => self,
+            own => own.tuned_as(),
+        }
     }
 
     /// Its name on the command line and in files.
@@ -68,7 +72,7 @@ impl EstimatorKind {
             Self::SignSplit => "sign-split",
             Self::Hypotheses => "hypotheses",
             Self::Particles => "particles",
-            Self::Ensemble => "ensemble",
+            Self::Corrected => "corrected",
         }
     }
 }

@@ -53,7 +53,7 @@ impl Default for LawOptions {
 
 impl LawOptions {
     /// What a calibration for this estimator chooses from unless somebody asks for one structure: one to three branches for
-    /// those that were seen to gain from the choice, two for the others. An ensemble has members with three besides.
+    /// those that were seen to gain from the choice, two for the others.
     #[must_use]
     pub const fn candidates(kind: EstimatorKind) -> &'static [Self] {
         const TWO: LawOptions = LawOptions::with_branches(DEFAULT_BRANCHES);
@@ -83,7 +83,7 @@ pub struct CrossFit {
     pub blocks: Vec<Vec<std::ops::Range<usize>>>,
 }
 
-/// Branches of a law that is fitted by itself, and of an ensemble's.
+/// Branches of a law that is fitted by itself.
 const DEFAULT_BRANCHES: usize = 2;
 /// Family unless somebody asks for another. Others sometimes follow the resistance a little better; only the polynomial
 /// is linear in its coefficients, so that the ridge keeps it tame and the filter from taking one direction for the other.

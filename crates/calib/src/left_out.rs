@@ -25,12 +25,10 @@ pub(crate) struct LeftOut<'a> {
 /// Makes a filter for a law that was fitted without a block.
 pub(crate) type Build<'a> = dyn Fn(Fold) -> Result<Box<dyn Filter>, CalibrationError> + 'a;
 
-/// A law that was fitted without a block, in a recording.
+/// A law that was fitted without a block.
 #[derive(Clone, Copy)]
 pub(crate) struct Fold<'a> {
     pub law: &'a LawParams,
-    pub recording: usize,
-    pub block: usize,
     /// R₀ of that law in the recording, which readings are relative to.
     pub rest_reading: f64,
 }
@@ -53,7 +51,7 @@ impl<'a> LeftOut<'a> {
             for (recording, samples) in samples.iter().enumerate() {
                 let pick = |values: &[f64]| values.iter().copied().step_by(stride).collect::<Vec<f64>>();
                 let rows = &fit.blocks[recording][block];
-                let fold = Fold { law: &law.law, recording, block, rest_reading: law.rest_readings[recording] };
+                let fold = Fold { law: &law.law, rest_reading: law.rest_readings[recording] };
                 runs.push(Run {
                     fold,
                     time_s: pick(samples.time_s),

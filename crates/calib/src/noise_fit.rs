@@ -8,7 +8,6 @@ use crate::law_fit::CrossFit;
 use crate::left_out::{Fold, LeftOut};
 use crate::motion_stats::{MotionStats, root_mean_square};
 use crate::optimise;
-use crate::own_rest::OwnRest;
 use crate::params::RangeParams;
 use crate::samples::Samples;
 use crate::sd_scale::sd_scale;
@@ -191,8 +190,7 @@ impl<'a> NoiseProblem<'a> {
         fold: Fold,
         params: &EstimatorParams,
     ) -> Result<Box<dyn Filter>, CalibrationError> {
-        let setting =
-            Setting { limits: self.limits, start: Start::Unknown, own_rest: OwnRest::SHARED, sieve: Sieve::OPEN };
+        let setting = Setting { limits: self.limits, start: Start::Unknown, sieve: Sieve::OPEN };
         filter_from_parts(kind, fold.law, params, setting)
     }
 

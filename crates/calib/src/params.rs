@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::CalibrationError;
 use crate::baselines::StaticCubic;
-use crate::ensemble::EnsembleParams;
+use crate::correction_params::CorrectionParams;
 use crate::estimator_params::{EstimatorKind, EstimatorParams};
 use crate::law_params::LawParams;
 
@@ -43,15 +43,15 @@ pub struct SensorParams {
     pub law: LawParams,
     /// Noise and motion, per estimator.
     pub estimators: BTreeMap<EstimatorKind, EstimatorParams>,
-    /// How estimators are pooled, if they are.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub ensemble: Option<EnsembleParams>,
     /// The recordings it was calibrated on.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub recordings: Vec<RecordingInfo>,
     /// Standard errors of the law's parameters.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub uncertainty: Option<Uncertainty>,
+    /// What was learned about the filter's error, if that was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub correction: Option<CorrectionParams>,
 }
 
 /// The quantity that the reference measures and the filter estimates.
@@ -192,17 +192,5 @@ impl SensorParams {
     /// If the file has none for it.
     pub fn estimator(&self, kind: EstimatorKind) -> Result<&EstimatorParams, CalibrationError> {
         self.estimators.get(&kind).ok_or_else(|| CalibrationError::no_parameters(kind))
-    }
-
-    /// The default estimator, or the one among the ensemble's members under this law that is listened to most.
-    #[must_use]
-    pub fn leading_estimator(&self) -> EstimatorKind {
-        let members = self.ensemble.iter().flat_map(|ensemble| &ensemble.members);
-        let under_this_law = members.filter(|member| member.own.is_none());
-        let heaviest = under_this_law.max_by(|a, b| a.weight.total_cmp(&b.weight));
-        match (self.default_estimator, heaviest) {
-            (EstimatorKind::Ensemble, Some(member)) => member.estimator,
-            (kind, _) => kind,
-        }
     }
 }

@@ -8,7 +8,6 @@ use ohmstrain_ekf::{
 use ohmstrain_model::StrainRange;
 
 use crate::filter::{Filter, Output, Rows, WayBack};
-use crate::own_rest::OwnRest;
 use crate::sieve::Sieve;
 use crate::stepper::{Moment, Seen, Stepper};
 use crate::way_back::Segments;
@@ -24,15 +23,12 @@ pub(crate) struct Running<E: Estimator<f64, N, L>, S, const M: usize, const B: u
     due: Vec<Output>,
 }
 
-/// How estimates are reported: strain within limits, its standard deviation times a calibrated factor, resistances relative
-/// to the R₀ of the readings.
+/// How estimates are reported: strain within limits, its standard deviation times a calibrated factor.
 #[derive(Clone, Copy)]
 pub(crate) struct Interval {
     pub limits: StrainRange<f64>,
     pub filtered_scale: f64,
     pub smoothed_scale: f64,
-    /// R₀ of the law.
-    pub own_rest: OwnRest,
     /// What a reading must be for the filter to see it.
     pub sieve: Sieve,
 }
@@ -53,20 +49,14 @@ where
     pub(crate) fn new(estimator: E, state: E::State, model: S, interval: Interval) -> Self {
         let (pending, due) = (VecDeque::new(), Vec::new());
         let reading_variance = model.noise().reading_sd.powi(2);
-        Self {
-            stepper: Stepper::new(estimator, interval.own_rest, interval.sieve, reading_variance),
-            model,
-            interval,
-            now: Moment::start(state),
-            pending,
-            due,
-        }
+        let stepper = Stepper::new(estimator, interval.sieve, reading_variance);
+        Self { stepper, model, interval, now: Moment::start(state), pending, due }
     }
 
     fn output(&self, state: &E::State, seen: Seen, sd_scale: f64) -> Output {
         let estimate = Estimate::new(&self.model, state, &self.interval.limits, sd_scale);
         Output {
-            estimate: self.interval.own_rest.estimate(estimate),
+            estimate,
             nis: seen.innovation.map(|innovation| innovation.nis()),
             verdict: seen.verdict,
             phases: state.phases(),

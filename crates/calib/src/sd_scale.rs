@@ -1,6 +1,10 @@
 /// No narrowing: an easy recording is no promise for the next one. A factor beyond the upper end says that something else
 /// is wrong.
 const SCALES: std::ops::RangeInclusive<f64> = 1.0..=5.0;
+/// What has been widened to cover the worst block may be narrowed to cover all of them.
+const JOINT_SCALES: std::ops::RangeInclusive<f64> = 0.5..=3.0;
+/// Half-widths of the 50, 90 and 95 % intervals of a standard normal.
+const LEVELS: [(usize, f64); 3] = [(50, 0.674_489_750_196_081_7), (90, 1.644_853_626_951_472_2), (95, Z_95)];
 /// Half-width of the 95 % interval of a standard normal.
 const Z_95: f64 = 1.959_963_984_540_054;
 
@@ -11,19 +15,34 @@ const Z_95: f64 = 1.959_963_984_540_054;
 /// Errors are correlated over seconds, blocks are as good as independent: one more of them is worse than the worst of
 /// four with a probability of 1/5, while half of them are worse than what covers all rows together.
 pub(crate) fn sd_scale(blocks: &[Vec<f64>]) -> f64 {
-    let worst = blocks.iter().filter_map(|block| quantile_95(block.clone())).reduce(f64::max);
-    worst.map_or(1.0, |deviation| (deviation / Z_95).clamp(*SCALES.start(), *SCALES.end()))
+    sd_scale_up_to(blocks, *SCALES.end())
 }
 
-fn quantile_95(mut deviations: Vec<f64>) -> Option<f64> {
-    deviations.sort_by(f64::total_cmp);
-    let rank = (deviations.len().saturating_sub(1) * 95).div_ceil(100);
-    deviations.get(rank).copied()
+/// The same with another upper end.
+pub(crate) fn sd_scale_up_to(blocks: &[Vec<f64>], widest: f64) -> f64 {
+    let worst = blocks.iter().filter_map(|block| quantile(block, 95)).reduce(f64::max);
+    worst.map_or(1.0, |deviation| (deviation / Z_95).clamp(*SCALES.start(), widest))
+}
+
+/// What the standard deviations are multiplied with so that the 50, 90 and 95 % intervals hold about these shares of all
+/// errors, which are in units of their deviations: the geometric mean of the three factors.
+pub(crate) fn joint_scale(deviations: &[f64]) -> f64 {
+    let factor = |(percent, z): (usize, f64)| Some((quantile(deviations, percent)? / z).ln());
+    let factors: Option<Vec<f64>> = LEVELS.into_iter().map(factor).collect();
+    let mean = factors.map(|factors| factors.iter().sum::<f64>() / LEVELS.len() as f64);
+    mean.map_or(1.0, |mean| mean.exp().clamp(*JOINT_SCALES.start(), *JOINT_SCALES.end()))
+}
+
+fn quantile(deviations: &[f64], percent: usize) -> Option<f64> {
+    let mut sorted = deviations.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let rank = (sorted.len().saturating_sub(1) * percent).div_ceil(100);
+    sorted.get(rank).copied()
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{Z_95, sd_scale};
+    use super::{LEVELS, Z_95, joint_scale, sd_scale};
 
     /// Deviations 1/100, 2/100, … 1 in units of `factor` interval widths: the 95 % quantile is 0.95 of them.
     fn deviations(factor: f64) -> Vec<Vec<f64>> {
@@ -34,6 +53,21 @@ mod tests {
     fn the_worst_block_counts() {
         let blocks = [deviations(0.5), deviations(2.0), deviations(1.0)].concat();
         assert_eq!(sd_scale(&blocks), sd_scale(&deviations(2.0)));
+    }
+
+    /// Quantiles of a normal distribution twice as wide as said.
+    #[test]
+    fn all_levels_count() {
+        let normal = statrs::distribution::Normal::standard();
+        let half =
+            |k: usize| statrs::distribution::ContinuousCDF::inverse_cdf(&normal, 0.5 + 0.5 * (k as f64 + 0.5) / 1e4);
+        let deviations: Vec<f64> = (0..10_000).map(|k| 2.0 * half(k)).collect();
+        // Half a rank of 10 000 at the 95 % level is a share 5e-5, which the density 0.117 there makes 4e-4 / 1.96.
+        assert!((joint_scale(&deviations) - 2.0).abs() < 1e-3);
+        // Right at 50 and 90 %, twice as wide as said at 95 %.
+        let two = |share: f64| if share < 0.925 { 1.0 } else { 2.0 };
+        let uneven: Vec<f64> = (0..10_000).map(|k| two(k as f64 / 1e4) * half(k)).collect();
+        assert!((joint_scale(&uneven) - 2.0_f64.powf(1.0 / LEVELS.len() as f64)).abs() < 1e-3);
     }
 
     #[test]

@@ -4,14 +4,12 @@ use ohmstrain_ekf::{
     Advanced, Estimator, Guard, Guarded, Innovation, PastStep, Reading, ReadingVerdict, StepError, Streak,
 };
 
-use crate::own_rest::OwnRest;
 use crate::sieve::{Repeats, Sieve};
 
 /// An estimator under guard, and the steps it has prepared.
 pub(crate) struct Stepper<E: Estimator<f64, N, L>, const N: usize, const L: usize> {
     pub estimator: E,
     pub guard: Guard<f64>,
-    own_rest: OwnRest,
     sieve: Sieve,
     /// Of the model's own noise.
     reading_variance: f64,
@@ -52,8 +50,8 @@ impl<S> Moment<S> {
 }
 
 impl<E: Estimator<f64, N, L>, const N: usize, const L: usize> Stepper<E, N, L> {
-    pub(crate) fn new(estimator: E, own_rest: OwnRest, sieve: Sieve, reading_variance: f64) -> Self {
-        Self { estimator, guard: Guard::none(), own_rest, sieve, reading_variance, prepared: PreparedSteps::new() }
+    pub(crate) fn new(estimator: E, sieve: Sieve, reading_variance: f64) -> Self {
+        Self { estimator, guard: Guard::none(), sieve, reading_variance, prepared: PreparedSteps::new() }
     }
 
     /// A reading as the estimator is to see it, and what became of it where that is decided already.
@@ -65,7 +63,7 @@ impl<E: Estimator<f64, N, L>, const N: usize, const L: usize> Stepper<E, N, L> {
     ) -> (Option<Reading<f64>>, Option<ReadingVerdict>) {
         match reading.map(|reading| self.sieve.pass(repeats, time_s, reading, self.reading_variance)) {
             None => (None, None),
-            Some(Ok(reading)) => (Some(self.own_rest.reading(reading)), None),
+            Some(Ok(reading)) => (Some(reading), None),
             Some(Err(verdict)) => (None, Some(verdict)),
         }
     }

@@ -3,6 +3,7 @@
 //! A file that is edited by hand, or was damaged, is refused with the name of the number; it never becomes a filter that
 //! says something else than what it means.
 
+mod correction;
 mod table;
 
 pub use table::FieldError;
@@ -62,7 +63,10 @@ impl SensorParams {
         for (index, recording) in self.recordings.iter().enumerate() {
             recording.validate(&root.entry("recordings", index))?;
         }
-        self.uncertainty.as_ref().map_or(Ok(()), |uncertainty| uncertainty.validate(&root.table("uncertainty")))
+        if let Some(uncertainty) = &self.uncertainty {
+            uncertainty.validate(&root.table("uncertainty"))?;
+        }
+        self.correction.as_ref().map_or(Ok(()), |correction| correction.validate(&root.table("correction")))
     }
 }
 

@@ -10,7 +10,7 @@ use std::str::FromStr;
 use clap::{Args as ClapArgs, Parser, Subcommand, ValueEnum};
 use ohmstrain_bench_data::simulate::{Material, Protocol};
 use ohmstrain_bench_data::{FrontEndSpec, JointSpec, Metadata, ResistanceUnit, StrainUnit};
-use ohmstrain_calib::{EstimatorKind, GaugeFamily};
+use ohmstrain_calib::{EstimatorKind, GaugeFamily, SensorParams};
 use ohmstrain_ekf::Influence;
 
 pub use evaluate::{Estimators, EvaluateArgs};
@@ -155,7 +155,7 @@ pub struct CalibrateArgs {
     /// Family of the gauge curve: auto (polynomial), polynomial, decaying-exponential or tunnelling
     #[arg(long, default_value = "auto")]
     pub gauge: Auto<Gauge>,
-    /// Estimator to calibrate and to make the default: auto (ensemble), ensemble, ekf, ukf, imm, sign-split,
+    /// Estimator to calibrate and to make the default: auto (corrected: sign-split and what is learned about its error), corrected, ekf, ukf, imm, sign-split,
     /// hypotheses or particles; ekf is calibrated in any case
     #[arg(long, default_value = "auto")]
     pub estimator: Auto<Estimator>,
@@ -185,10 +185,13 @@ pub struct EstimateArgs {
     /// The sensor's parameters
     #[arg(long, value_name = "sensor.toml")]
     pub sensor: PathBuf,
-    /// Estimator: auto (the sensor file's choice), ensemble, ekf, ukf, imm, sign-split, hypotheses or
+    /// Estimator: auto (the sensor file's choice), corrected, ekf, ukf, imm, sign-split, hypotheses or
     /// particles, which smooth with sign-split
     #[arg(long, default_value = "auto")]
     pub estimator: Auto<Estimator>,
+    /// Do without the learned correction of the strain, to compare
+    #[arg(long)]
+    pub no_correction: bool,
     /// Strain (or angle) at the first row, if it is known; the body is at rest there
     #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = finite)]
     pub initial_strain: Option<f64>,
@@ -208,6 +211,14 @@ pub struct EstimateArgs {
     /// Overrides of the recording's metadata
     #[command(flatten)]
     pub trace: TraceArgs,
+}
+
+impl EstimateArgs {
+    /// The estimator that was asked for.
+    pub fn kind(&self, params: &SensorParams) -> EstimatorKind {
+        let kind = self.estimator.chosen().map_or(params.default_estimator, |estimator| estimator.0);
+        if self.no_correction { kind.filter() } else { kind }
+    }
 }
 
 /// Flags of `filter`.

@@ -192,13 +192,13 @@ fn what_has_no_exported_form_is_refused_and_nothing_is_written() {
 #[test]
 fn a_default_that_has_no_exported_form_is_remarked_on() {
     let bench = Bench::calibrated();
-    let sensor = bench.read("sensor.toml").replace("default_estimator = \"ekf\"", "default_estimator = \"ensemble\"");
-    bench.write("ensemble.toml", sensor);
-    let arguments = ["export", "--sensor", "ensemble.toml", "--target", "c", "--dt-s", DT_S, "-o", "out"];
+    let sensor = bench.read("sensor.toml").replace("default_estimator = \"ekf\"", "default_estimator = \"corrected\"");
+    bench.write("corrected.toml", sensor);
+    let arguments = ["export", "--sensor", "corrected.toml", "--target", "c", "--dt-s", DT_S, "-o", "out"];
     let run = bench.run(&arguments);
     assert_eq!(
         run.stderr,
-        "ohmstrain: exported is the ekf: the file's default estimator, ensemble, has no such form\n"
+        "ohmstrain: exported is the ekf: the file's default estimator, corrected, has no such form\n"
     );
     assert_eq!(run.code, Some(0));
     bench.run(&[&arguments[..], &["--estimator", "ekf"]].concat()).ok();

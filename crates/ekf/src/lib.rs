@@ -6,8 +6,8 @@
 //! [`Ekf`] (plain, iterated, or unscented as [`Ukf`]) keeps one Gaussian and has a smoother. [`Imm`], [`SignSplit`] and
 //! [`Hypotheses`] keep a [`Mixture`] of hypotheses about the phase, because stretching and releasing look alike.
 //! `Particles` (feature `std`) samples the motion instead: slow, and the reference for all of them.
-//! [`ConsistencyTest`] judges a running filter by its
-//! innovations. `Bank` (feature `simd`) steps many sensors at once, in vector registers.
+//! [`ConsistencyTest`] judges a running filter by its innovations. [`correction`] makes a calibrated filter's strain better
+//! by what was learned in calibration. `Bank` (feature `simd`) steps many sensors at once, in vector registers.
 //!
 //! Models are anything that implements [`Dynamics`] and [`Channel`];
 //! [`SwitchedModel`](ohmstrain_model::SwitchedModel) does.
@@ -66,6 +66,7 @@ mod belief;
 mod chi_square;
 mod clock;
 mod consistency;
+pub mod correction;
 mod curve;
 mod ekf;
 mod error;

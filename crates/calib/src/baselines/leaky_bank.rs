@@ -1,6 +1,6 @@
 use super::regression::{Features, RIDGES, Regression};
 use crate::CalibrationError;
-use crate::inverse::{LowPasses, with_products};
+use crate::low_pass::LowPass;
 use crate::samples::Samples;
 
 /// The reading, its distances from four low-passes of it, and all products of two of them.
@@ -8,7 +8,10 @@ use crate::samples::Samples;
 /// Distances span the same as the low-passes themselves, and are much less alike: the ridge penalises what each low-pass
 /// adds, not what all have in common.
 #[derive(Clone, Debug)]
-pub struct LeakyBank(LowPasses);
+pub struct LeakyBank([LowPass; TIME_CONSTANTS_S.len()]);
+
+/// Time constants of the low-passes, s.
+const TIME_CONSTANTS_S: [f64; 4] = [0.5, 2.0, 8.0, 32.0];
 
 impl LeakyBank {
     /// Ridge regression of strain.
@@ -16,13 +19,23 @@ impl LeakyBank {
     /// # Errors
     /// If a recording is too short, the strain is constant or the readings do not vary.
     pub fn fit(recordings: &[Samples]) -> Result<Regression<Self>, CalibrationError> {
-        Regression::fit(recordings, [Self(LowPasses::new())], 1, &RIDGES)
+        Regression::fit(recordings, [Self(TIME_CONSTANTS_S.map(LowPass::new))], 1, &RIDGES)
     }
 }
 
 impl Features for LeakyBank {
     fn next(&mut self, time_s: f64, reading: f64) -> Vec<f64> {
-        let [a, b, c, d] = self.0.distances(time_s, reading);
+        let [a, b, c, d] = self.0.each_mut().map(|low_pass| reading - low_pass.next(time_s, reading));
         with_products(&[reading, a, b, c, d])
     }
+}
+
+/// The constant, the linear regressors and the products of any two of them.
+fn with_products(linear: &[f64]) -> Vec<f64> {
+    let mut regressors = vec![1.0];
+    regressors.extend(linear);
+    for (i, a) in linear.iter().enumerate() {
+        regressors.extend(linear[i..].iter().map(|b| a * b));
+    }
+    regressors
 }

@@ -14,7 +14,6 @@ mod static_cubic;
 pub use fir::Fir;
 pub use leaky_bank::LeakyBank;
 pub use low_pass_mode::LowPassMode;
-pub(crate) use regression::RIDGES;
 pub use regression::{Features, Regression};
 pub use static_cubic::StaticCubic;
 

@@ -1,7 +1,7 @@
 use std::path::Path;
 
 use ohmstrain_calib::{
-    EstimatorKind, LawOptions, Quantity, ReadingUnit, RecordingInfo, Samples, SensorParams, calibrate, screen,
+    EstimatorKind, LawOptions, Quantity, RECIPE, ReadingUnit, RecordingInfo, Samples, SensorParams, calibrate, screen,
 };
 
 use super::{explain, scoring};
@@ -28,7 +28,7 @@ pub fn run(args: &CalibrateArgs) -> Result<(), CliError> {
         let end = args.until.map_or(recording.trace.len(), row_at);
         recordings.push(recording.rows(args.from.map_or(0, row_at).min(end)..end));
     }
-    let estimator = args.estimator.chosen().map_or(EstimatorKind::Ensemble, |estimator| estimator.0);
+    let estimator = args.estimator.chosen().map_or(RECIPE.estimator, |estimator| estimator.0);
     let structures = structures(args, estimator);
     let params = calibrate_recordings(&recordings, &structures, estimator, &Progress::new("calibrating"))?;
     outputs.put(sensor_output, sensor_file::text(&params)?);

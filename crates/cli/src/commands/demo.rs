@@ -1,5 +1,5 @@
 use ohmstrain_bench_data::simulate::{Material, Protocol, SimulationSettings};
-use ohmstrain_calib::{EstimatorKind, LawOptions, Output, SensorParams};
+use ohmstrain_calib::{LawOptions, Output, RECIPE, SensorParams};
 
 use super::calibrate::{calibrate_recordings, report};
 use super::score_table::{add_scores, score_table};
@@ -35,9 +35,9 @@ pub fn run(args: &DemoArgs) -> Result<(), CliError> {
     let test_from = recording.trace.time_s[middle];
 
     let training = recording.rows(0..middle);
-    let ensemble = EstimatorKind::Ensemble;
-    let structures = LawOptions::candidates(ensemble);
-    let params = calibrate_recordings(std::slice::from_ref(&training), structures, ensemble, &progress)?;
+    let estimator = RECIPE.estimator;
+    let structures = LawOptions::candidates(estimator);
+    let params = calibrate_recordings(std::slice::from_ref(&training), structures, estimator, &progress)?;
     outputs.put(sensor_output, sensor_file::text(&params)?);
 
     progress.doing("filtering and smoothing");

@@ -25,7 +25,7 @@ pub fn run(args: &FilterArgs) -> Result<(), CliError> {
         return Err(no_smoother());
     }
     let mut params = sensor_file::read(&args.estimate.sensor, kind)?;
-    let kind = kind.unwrap_or(params.default_estimator);
+    let kind = args.estimate.kind(&params);
     if !looks_back(kind) {
         return Err(no_smoother());
     }

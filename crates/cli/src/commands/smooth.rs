@@ -18,7 +18,7 @@ use crate::validity::ValidityWatch;
 pub fn run(args: &SmoothArgs) -> Result<(), CliError> {
     let wanted = args.estimate.estimator.chosen().map(|estimator| estimator.0);
     let mut params = sensor_file::read(&args.estimate.sensor, wanted)?;
-    let kind = wanted.unwrap_or(params.default_estimator);
+    let kind = args.estimate.kind(&params);
     let rows = input::open(&args.trace_file, &args.estimate.trace.metadata())?;
     let header = input::header(&rows);
     check_unit(&header, rows.reading_kind(), params.reading)?;

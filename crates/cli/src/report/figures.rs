@@ -74,13 +74,13 @@ pub fn reading(recording: &Recording) -> Result<Figure, ReportError> {
     let note = if recording.driven.is_some() {
         chart.band(Ink::LAW_BAND, "law ± 2 sd of the model error that the filter allows for", band);
         chart.curve(Ink::LAW, "law, driven by the reference", against_time(recording, centre.iter().copied()));
-        "The filter's fit is its own estimate put back through the law, baseline included; that of an ensemble, whose \
-         members have other laws besides, need not meet the readings. The dashed line is the law alone, driven by the \
+        "The filter's fit is its own estimate put back through the law, baseline included; where its strain is \
+         corrected the fit need not meet the readings. The dashed line is the law alone, driven by the \
          reference from rest: where readings leave its band, the law is wrong and not the filter."
     } else {
         chart.band(Ink::FILTER_BAND, "fit ± 2 sd of a reading's noise", band);
-        "The filter's fit is its own estimate put back through the law, baseline included; that of an ensemble, whose \
-         members have other laws besides, need not meet the readings."
+        "The filter's fit is its own estimate put back through the law, baseline included; where its strain is \
+         corrected the fit need not meet the readings."
     };
     chart.curve(Ink::FILTER_BELOW, "filter's fit", against_time(recording, fitted.iter().copied()));
     chart.line(Ink::RECORDED, "recorded", against_time(recording, recorded));

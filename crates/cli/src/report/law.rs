@@ -33,7 +33,7 @@ impl<'a> Law<'a> {
             branches: [],
             range: law.range.to_model(),
         };
-        let estimator = params.estimator(params.leading_estimator()).ok();
+        let estimator = params.estimator(params.default_estimator.filter()).ok();
         Self { quasi_static, branches: &law.branches, estimator, rest_reading }
     }
 

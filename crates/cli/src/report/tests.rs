@@ -62,9 +62,9 @@ fn sensor() -> SensorParams {
             branches: vec![branch],
         },
         estimators: BTreeMap::from([(EstimatorKind::Ekf, estimator)]),
-        ensemble: None,
         recordings: vec![],
         uncertainty: None,
+        correction: None,
     }
 }
 

@@ -41,6 +41,9 @@ pub struct RecordingScores {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub split: Option<String>,
     pub estimator: &'static str,
+    /// Whether it is shown to say what the estimator before it is made of.
+    #[serde(skip)]
+    pub is_part: bool,
     #[serde(flatten)]
     pub filter: Scores,
     pub smoother: Scores,

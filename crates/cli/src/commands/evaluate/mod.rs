@@ -9,7 +9,7 @@ use ohmstrain_calib::{Baselines, Samples, reference_lag, screen};
 use rayon::prelude::*;
 use sensors::{Rivals, Sensor};
 
-use crate::args::{Estimators, EvaluateArgs, Split};
+use crate::args::{EvaluateArgs, Split};
 use crate::commands::scoring::Part;
 use crate::error::CliError;
 use crate::input::{self, Recording, check_unit};
@@ -39,7 +39,7 @@ pub fn run(args: &EvaluateArgs) -> Result<(), CliError> {
 
 /// Every recording with the parameters of a file.
 fn with_sensor_file(args: &EvaluateArgs, path: &Path, evaluation: &mut Evaluation) -> Result<(), CliError> {
-    let sensors = Sensor::from_file(path, args.estimator)?;
+    let sensors = Sensor::from_file(path, args.estimator, !args.no_correction)?;
     let rivals = Rivals { static_cubic: sensors[0].params.static_cubic, learned: None };
     let judged = |path: &PathBuf| judge(args, &read(args, path)?, Part::since(args.from), &sensors, &rivals);
     add_until_error(evaluation, args.traces.par_iter().map(judged).collect())
@@ -66,7 +66,7 @@ fn with_split(
 ) -> Result<Vec<RecordingScores>, CliError> {
     let rows = recording.trace.len();
     let training = [recording.rows(split.training(rows))];
-    let (sensors, rivals) = calibrated(&training, args.estimator, progress)?;
+    let (sensors, rivals) = calibrated(&training, args, progress)?;
     progress.doing("scoring");
     let lag_s = reference_lag(&recording.samples()?, &sensors[0].params.law);
     let (scored, time_at) = (split.scored(rows), |row: usize| recording.trace.time_s.get(row).copied());
@@ -85,7 +85,7 @@ fn with_training(args: &EvaluateArgs, evaluation: &mut Evaluation) -> Result<(),
     let training: Vec<Recording> = args.calibration.train.iter().map(|path| read(path)).collect::<Result<_, _>>()?;
     // All are read before anything is calibrated, so that a wrong name costs no time.
     let tests: Vec<Recording> = args.test.iter().map(|path| read(path)).collect::<Result<_, _>>()?;
-    let (sensors, rivals) = calibrated(&training, args.estimator, &progress)?;
+    let (sensors, rivals) = calibrated(&training, args, &progress)?;
     progress.doing("scoring");
     let judged = |recording: &Recording| judge(args, recording, Part::since(args.from), &sensors, &rivals);
     add_until_error(evaluation, tests.par_iter().map(judged).collect())
@@ -109,10 +109,10 @@ fn read(args: &EvaluateArgs, path: &Path) -> Result<Recording, CliError> {
 /// One sensor per estimator, and the baselines, from the same rows.
 fn calibrated(
     training: &[Recording],
-    estimators: Estimators,
+    args: &EvaluateArgs,
     progress: &Progress,
 ) -> Result<(Vec<Sensor>, Rivals), CliError> {
-    let sensors = Sensor::calibrated(training, estimators, progress)?;
+    let sensors = Sensor::calibrated(training, args.estimator, !args.no_correction, progress)?;
     let samples: Vec<Samples> = training.iter().map(Recording::samples).collect::<Result<_, _>>()?;
     let names: Vec<&str> = training.iter().map(|recording| recording.name.as_str()).collect();
     let failed = |error| CliError::calibration(&names, &error);
@@ -158,7 +158,7 @@ fn judge(
 
 fn check(evaluation: &Evaluation) -> Result<(), CliError> {
     let split = |of: &RecordingScores| of.split.as_ref().map_or_else(String::new, |split| format!("split {split}: "));
-    for recording in evaluation.recordings() {
+    for recording in evaluation.recordings().filter(|scores| !scores.is_part) {
         let baseline = recording.baselines.static_cubic.rmse;
         if recording.filter.rmse >= baseline {
             return Err(CliError::Check(format!(

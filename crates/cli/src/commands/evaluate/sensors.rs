@@ -1,7 +1,7 @@
 use std::path::Path;
 use std::time::Instant;
 
-use ohmstrain_calib::{Baselines, EstimatorKind, LawOptions, SensorParams, Start, StaticCubic, build_filter};
+use ohmstrain_calib::{Baselines, EstimatorKind, LawOptions, RECIPE, SensorParams, Start, StaticCubic, build_filter};
 
 use super::evaluation::{BaselineScores, LearnedScores, RecordingScores};
 use crate::args::{Estimators, RestResistance};
@@ -20,6 +20,8 @@ pub struct Sensor {
     kind: EstimatorKind,
     /// Wall-clock time of the calibration, s; `None` if it was read from a file.
     calibration_s: Option<f64>,
+    /// Whether it is shown to say what another one is made of.
+    is_part: bool,
 }
 
 /// What the sensor is compared with.
@@ -31,7 +33,7 @@ pub struct Rivals {
 
 impl Sensor {
     /// One per estimator asked for, with the parameters of a file; at least one.
-    pub fn from_file(path: &Path, estimators: Estimators) -> Result<Vec<Self>, CliError> {
+    pub fn from_file(path: &Path, estimators: Estimators, corrects: bool) -> Result<Vec<Self>, CliError> {
         let wanted = if let Estimators::One(kind) = estimators { Some(kind) } else { None };
         let params = sensor_file::read(path, wanted)?;
         let kinds = match estimators {
@@ -41,27 +43,39 @@ impl Sensor {
                 .collect(),
             _ => vec![wanted.unwrap_or(params.default_estimator)],
         };
-        Ok(kinds.into_iter().map(|kind| Self { params: params.clone(), kind, calibration_s: None }).collect())
+        let kinds = distinct(kinds.into_iter().map(|kind| if corrects { kind } else { kind.filter() }));
+        let sensor = |kind| Self { params: params.clone(), kind, calibration_s: None, is_part: false };
+        Ok(kinds.into_iter().map(sensor).collect())
     }
 
-    /// One per estimator asked for, each calibrated as `calibrate --estimator` does; at least one.
+    /// One per estimator asked for, each calibrated as `calibrate --estimator` does; at least one. What a correction
+    /// corrects comes after it, as a part.
     pub fn calibrated(
         training: &[Recording],
         estimators: Estimators,
+        corrects: bool,
         progress: &Progress,
     ) -> Result<Vec<Self>, CliError> {
         let wanted = match estimators {
-            Estimators::Auto => vec![EstimatorKind::Ensemble],
+            Estimators::Auto => vec![RECIPE.estimator],
             Estimators::All => EstimatorKind::ALL.to_vec(),
             Estimators::One(kind) => vec![kind],
         };
+        let wanted = distinct(wanted.into_iter().map(|kind| if corrects { kind } else { kind.filter() }));
         let calibrate = |kind| {
             let start = Instant::now();
             let params = calibrate_recordings(training, LawOptions::candidates(kind), kind, progress)?;
             let calibration_s = Some(start.elapsed().as_secs_f64());
-            Ok(Self { kind: params.default_estimator, params, calibration_s })
+            let kind = params.default_estimator;
+            let part = Self { params: params.clone(), kind: kind.filter(), calibration_s, is_part: true };
+            let whole = Self { params, kind, calibration_s, is_part: false };
+            let is_corrected = part.kind != whole.kind;
+            Ok([Some(whole), Some(part).filter(|_| is_corrected)])
         };
-        wanted.into_iter().map(calibrate).collect()
+        let calibrated = wanted.iter().map(|kind| calibrate(*kind)).collect::<Result<Vec<_>, CliError>>()?;
+        let sensors = calibrated.into_iter().flatten().flatten();
+        // A part that was asked for by itself is not shown twice.
+        Ok(sensors.filter(|sensor| !(sensor.is_part && wanted.contains(&sensor.kind))).collect())
     }
 
     /// R₀ for a recording.
@@ -100,6 +114,7 @@ impl Sensor {
             sha256: recording.sha256.clone(),
             split: None,
             estimator: self.kind.name(),
+            is_part: self.is_part,
             filter,
             smoother,
             calibration_s: self.calibration_s,
@@ -108,6 +123,16 @@ impl Sensor {
             quantity: self.params.quantity,
         }))
     }
+}
+
+fn distinct(kinds: impl Iterator<Item = EstimatorKind>) -> Vec<EstimatorKind> {
+    let mut seen = Vec::new();
+    for kind in kinds {
+        if !seen.contains(&kind) {
+            seen.push(kind);
+        }
+    }
+    seen
 }
 
 impl Rivals {

@@ -1,0 +1,263 @@
+use std::collections::VecDeque;
+use std::ops::Range;
+
+use ohmstrain_ekf::correction::{FEATURES, FeatureScale, OUTPUTS, ReadingFeatures, mixture};
+use ohmstrain_ekf::{Gaussian, Guard, Reading, ReadingVerdict, StepError};
+
+use crate::CalibrationError;
+use crate::correction_params::{
+    CorrectionParams, FILTER_INPUTS, FUTURE_FEATURES, SMOOTHER_INPUTS, filter_inputs, smoother_inputs,
+};
+use crate::corrector::{Corrector, Examples};
+use crate::filter::{Filter, Output, Rows, WayBack};
+use crate::params::RangeParams;
+use crate::way_back::SEGMENT;
+
+/// A reading that a guard has weighed down and whose normalised innovation squared is above this is not shown to the
+/// correction, which expects none in particular: three standard deviations.
+const SURPRISING: f64 = 9.0;
+
+/// A filter with the learned correction of its strain. Everything else that it says is the filter's.
+///
+/// Where a reading is missing the correction holds what it has seen last, and its variance grows by as much as the filter's
+/// has grown since. With a fixed lag the strain is the mixture of the filter's corrected strain and the lagged one.
+pub(crate) struct Corrected {
+    filter: Box<dyn Filter>,
+    of_filter: Corrector<FILTER_INPUTS>,
+    of_smoother: Corrector<SMOOTHER_INPUTS>,
+    scale: FeatureScale<f64>,
+    readings: Readings,
+    /// What the filter has said of the last row.
+    said: Option<Output>,
+    /// Corrected strains of the rows that wait for a fixed lag.
+    waiting: VecDeque<Gaussian<f64>>,
+    /// Lagged estimates on their way out.
+    lagged: Vec<Output>,
+}
+
+/// What the correction has seen of the readings.
+#[derive(Clone, Copy)]
+struct Readings {
+    features: ReadingFeatures<f64>,
+    time_s: Option<f64>,
+    now: Option<[f64; FEATURES]>,
+    /// The filter's variance at the last reading, once one has been missing since.
+    known_variance: Option<f64>,
+    missing: bool,
+}
+
+impl Readings {
+    fn new(scale: FeatureScale<f64>) -> Self {
+        let features = ReadingFeatures::new(scale);
+        Self { features, time_s: None, now: None, known_variance: None, missing: false }
+    }
+
+    /// Takes a row in either direction of time.
+    fn step(&mut self, time_s: f64, reading: Option<Reading<f64>>) -> Option<[f64; FEATURES]> {
+        let dt_s = (time_s - self.time_s.unwrap_or(time_s)).abs();
+        self.time_s = Some(time_s);
+        self.missing = reading.is_none();
+        self.now = self.features.step(dt_s, reading.map(|reading| reading.value));
+        self.now
+    }
+}
+
+impl Corrected {
+    pub(crate) fn new(
+        filter: Box<dyn Filter>,
+        params: &CorrectionParams,
+        limits: RangeParams,
+    ) -> Result<Self, CalibrationError> {
+        let rows = &params.rows;
+        let (strain, time_s): (Vec<f64>, Vec<f64>) = rows.iter().map(|row| (row.strain, row.time_s)).unzip();
+        let of_filter: Vec<_> = rows.iter().map(|row| row.filter_inputs()).collect();
+        let of_smoother: Vec<_> = rows.iter().map(|row| row.smoother_inputs()).collect();
+        let singular = || CalibrationError::Unsupported("`correction` of rows that nothing can be learned from".into());
+        let (strain, time_s) = (strain.as_slice(), time_s.as_slice());
+        let filter_examples = Examples { inputs: &of_filter, strain, time_s, limits };
+        let smoother_examples = Examples { inputs: &of_smoother, strain, time_s, limits };
+        let scale = params.feature_scale();
+        Ok(Self {
+            filter,
+            of_filter: Corrector::new(&params.filter, filter_examples).ok_or_else(singular)?,
+            of_smoother: Corrector::new(&params.smoother, smoother_examples).ok_or_else(singular)?,
+            scale,
+            readings: Readings::new(scale),
+            said: None,
+            waiting: VecDeque::new(),
+            lagged: Vec::new(),
+        })
+    }
+
+    /// Lets the correction see a row that the filter has taken.
+    fn see(&mut self, time_s: f64, reading: Option<Reading<f64>>) {
+        let said = self.filter.output();
+        self.readings.step(time_s, seen(&said, reading));
+        if !self.readings.missing {
+            self.readings.known_variance = Some(said.estimate.strain.variance);
+        }
+        self.said = Some(said);
+    }
+
+    /// The filter's strain, corrected; as it is before the first reading.
+    fn corrected(&self, output: &Output) -> Gaussian<f64> {
+        let filtered = output.estimate.strain;
+        let Some(past) = self.readings.now else { return filtered };
+        let inputs = filter_inputs(&outputs(output), &past);
+        let strain = self.of_filter.correction().correct(&inputs, filtered).strain;
+        let grown = self.readings.known_variance.map_or(0.0, |known| (filtered.variance - known).max(0.0));
+        if self.readings.missing { Gaussian { variance: strain.variance + grown, ..strain } } else { strain }
+    }
+
+    /// Mixes lagged estimates with what was said of their rows.
+    fn hand_out(&mut self, out: &mut dyn FnMut(Output)) {
+        for mut output in self.lagged.drain(..) {
+            if let Some(corrected) = self.waiting.pop_front() {
+                output.estimate.strain = mixture(corrected, output.estimate.strain);
+            }
+            out(output);
+        }
+    }
+}
+
+/// The reading of a row, unless it was kept from the filter, or a guard would rather have.
+fn seen(output: &Output, reading: Option<Reading<f64>>) -> Option<Reading<f64>> {
+    let is_seen = match output.verdict {
+        ReadingVerdict::Accepted | ReadingVerdict::Readmitted => true,
+        ReadingVerdict::Downweighted => output.nis.is_none_or(|nis| nis <= SURPRISING),
+        _ => false,
+    };
+    reading.filter(|reading| is_seen && reading.value.is_finite())
+}
+
+/// What a correction sees of a filter's output.
+pub(crate) fn outputs(output: &Output) -> [f64; OUTPUTS] {
+    let estimate = &output.estimate;
+    let [extend, _, retract] = output.phases.unwrap_or_default();
+    [estimate.strain.mean, estimate.rate.mean, estimate.relaxation.mean, estimate.baseline, extend, retract]
+}
+
+impl Filter for Corrected {
+    fn guard(&mut self, guard: Guard<f64>) {
+        self.filter.guard(guard);
+    }
+
+    fn step(&mut self, time_s: f64, reading: Option<Reading<f64>>) -> Result<(), StepError> {
+        self.filter.step(time_s, reading)?;
+        self.see(time_s, reading);
+        Ok(())
+    }
+
+    fn strain(&self) -> Gaussian<f64> {
+        self.output().estimate.strain
+    }
+
+    fn output(&self) -> Output {
+        let mut output = self.said.unwrap_or_else(|| self.filter.output());
+        output.estimate.strain = self.corrected(&output);
+        output
+    }
+
+    fn step_lagged(
+        &mut self,
+        time_s: f64,
+        reading: Option<Reading<f64>>,
+        lag_s: f64,
+        out: &mut dyn FnMut(Output),
+    ) -> Result<(), StepError> {
+        let lagged = &mut self.lagged;
+        let stepped = self.filter.step_lagged(time_s, reading, lag_s, &mut |output| lagged.push(output));
+        if stepped.is_ok() {
+            self.see(time_s, reading);
+            let corrected = self.strain();
+            self.waiting.push_back(corrected);
+        }
+        self.hand_out(out);
+        stepped
+    }
+
+    fn flush_lagged(&mut self, out: &mut dyn FnMut(Output)) -> Result<(), StepError> {
+        let lagged = &mut self.lagged;
+        let flushed = self.filter.flush_lagged(&mut |output| lagged.push(output));
+        self.hand_out(out);
+        flushed
+    }
+
+    fn way_back<'a>(&'a mut self, rows: Rows<'a>) -> Result<Box<dyn WayBack + 'a>, (usize, StepError)> {
+        let mut starts = Vec::with_capacity(rows.len() / SEGMENT + 1);
+        let mut past = self.readings;
+        for row in 0..rows.len() {
+            if row % SEGMENT == 0 {
+                starts.push(past);
+            }
+            let (time_s, reading) = rows.get(row);
+            past.step(time_s, reading);
+        }
+        // The filter says what it says at the end of the recording.
+        (self.readings, self.said) = (past, None);
+        let back = self.filter.way_back(rows)?;
+        let (corrector, ahead) = (&self.of_smoother, Readings::new(self.scale));
+        Ok(Box::new(CorrectedWayBack { back, corrector, rows, starts, ahead }))
+    }
+}
+
+/// A smoother on its way back, corrected segment by segment.
+struct CorrectedWayBack<'a> {
+    back: Box<dyn WayBack + 'a>,
+    corrector: &'a Corrector<SMOOTHER_INPUTS>,
+    rows: Rows<'a>,
+    /// What had been seen of the past before each segment that is still to come. Readings that were kept from the filter
+    /// were seen here, as far as features go: within a segment they are not, and what was before it fades in seconds.
+    starts: Vec<Readings>,
+    /// What has been seen of the future.
+    ahead: Readings,
+}
+
+impl WayBack for CorrectedWayBack<'_> {
+    fn next_segment(&mut self, out: &mut Vec<Output>) -> Result<Option<Range<usize>>, (usize, StepError)> {
+        let Some(rows) = self.back.next_segment(out)? else { return Ok(None) };
+        let Some(mut past) = self.starts.pop() else { return Ok(Some(rows)) };
+        let mut known = past.known_variance;
+        let mut behind = Vec::with_capacity(rows.len());
+        for (row, output) in rows.clone().zip(out.iter()) {
+            let (time_s, reading) = self.rows.get(row);
+            let reading = seen(output, reading);
+            known = if reading.is_some() { Some(output.estimate.strain.variance) } else { known };
+            behind.push((past.step(time_s, reading), known));
+        }
+        for ((row, output), (past, known)) in rows.clone().zip(out.iter_mut()).zip(behind).rev() {
+            let (time_s, reading) = self.rows.get(row);
+            let future = self.ahead.step(time_s, seen(output, reading));
+            let smoothed = output.estimate.strain;
+            if !self.ahead.missing {
+                self.ahead.known_variance = Some(smoothed.variance);
+            }
+            let Some(past) = past else { continue };
+            let mut strain = self.correct(output, &past, future);
+            if self.ahead.missing {
+                // The readings on both sides bound what the smoother knows in between.
+                let least = [known, self.ahead.known_variance].into_iter().flatten().reduce(f64::min).unwrap_or(0.0);
+                strain.variance += (smoothed.variance - least).max(0.0);
+            }
+            output.estimate.strain = strain;
+        }
+        Ok(Some(rows))
+    }
+}
+
+impl CorrectedWayBack<'_> {
+    /// After the last reading the future is as at the last reading: settled.
+    fn correct(&self, output: &Output, past: &[f64; FEATURES], future: Option<[f64; FEATURES]>) -> Gaussian<f64> {
+        let future = future.map_or([0.0; FUTURE_FEATURES], future_features);
+        let inputs = smoother_inputs(&outputs(output), past, &future);
+        self.corrector.correction().correct(&inputs, output.estimate.strain).strain
+    }
+}
+
+/// Features of the readings to come: without the reading itself, which those of the past have.
+pub(crate) fn future_features([_, others @ ..]: [f64; FEATURES]) -> [f64; FUTURE_FEATURES] {
+    others
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,176 @@
+use ohmstrain_ekf::Reading;
+use ohmstrain_ekf::correction::{FEATURES, FeatureScale, ReadingFeatures};
+
+use crate::CalibrationError;
+use crate::corrected::{future_features, outputs};
+use crate::correction_params::{CorrectionParams, CorrectorParams, TrainingRow};
+use crate::corrector::Examples;
+use crate::filter::Filter;
+use crate::params::RangeParams;
+use crate::samples::Samples;
+
+/// Rows that a correction learns from at most. With a hundred errors are a tenth larger, with four hundred no smaller.
+const ROWS: usize = 200;
+/// How much of the choice of rows follows the way that the features go, rather than time: long holds are one row over and
+/// over again.
+const BY_WAY: f64 = 0.8;
+/// Pause between recordings, s: noise that lasts for seconds is not shared by them.
+const PAUSE_S: f64 = 1000.0;
+/// Significant digits of what is written down. The fit sees the same numbers as the reader of the file.
+const DIGITS: usize = 6;
+
+/// Learns the correction of a filter from the recordings that it was calibrated on; `rest_readings` are their R₀, `build`
+/// makes the filter. None if nothing can be learned from them.
+pub(crate) fn fit_correction(
+    recordings: &[Samples],
+    rest_readings: &[f64],
+    limits: RangeParams,
+    build: &dyn Fn() -> Result<Box<dyn Filter>, CalibrationError>,
+) -> Result<Option<CorrectionParams>, CalibrationError> {
+    let relative = |(samples, rest): (&Samples, &f64)| {
+        let relative = |r: &f64| r.is_finite().then(|| Reading::from(r / rest - 1.0));
+        samples.reading.iter().map(relative).collect::<Vec<Option<Reading<f64>>>>()
+    };
+    let readings: Vec<Vec<Option<Reading<f64>>>> = recordings.iter().zip(rest_readings).map(relative).collect();
+    let Some(scale) = feature_scale(recordings, &readings) else { return Ok(None) };
+    let mut candidates = Vec::new();
+    let mut start_s = 0.0;
+    for (samples, readings) in recordings.iter().zip(&readings) {
+        let Some(rows) = candidate_rows(samples, readings, scale, start_s, build)? else { return Ok(None) };
+        start_s = rows.last().map_or(start_s, |row: &TrainingRow| row.time_s + PAUSE_S);
+        candidates.extend(rows);
+    }
+    let rows: Vec<TrainingRow> = chosen(&candidates).into_iter().map(rounded).collect();
+    Ok(learn(scale, rows, limits))
+}
+
+fn learn(scale: FeatureScale<f64>, rows: Vec<TrainingRow>, limits: RangeParams) -> Option<CorrectionParams> {
+    let (strain, time_s): (Vec<f64>, Vec<f64>) = rows.iter().map(|row| (row.strain, row.time_s)).unzip();
+    let (strain, time_s) = (strain.as_slice(), time_s.as_slice());
+    let of_filter: Vec<_> = rows.iter().map(TrainingRow::filter_inputs).collect();
+    let of_smoother: Vec<_> = rows.iter().map(TrainingRow::smoother_inputs).collect();
+    let filter = CorrectorParams::fit(Examples { inputs: &of_filter, strain, time_s, limits })?;
+    let smoother = CorrectorParams::fit(Examples { inputs: &of_smoother, strain, time_s, limits })?;
+    let FeatureScale { centre: reading_centre, half_range: reading_half_range, rates: rate_scales } = scale;
+    Some(CorrectionParams { reading_centre, reading_half_range, rate_scales, filter, smoother, rows })
+}
+
+/// The range of the readings, and the usual size of their rates; none if they do not vary.
+fn feature_scale(recordings: &[Samples], readings: &[Vec<Option<Reading<f64>>>]) -> Option<FeatureScale<f64>> {
+    let known = readings.iter().flatten().flatten().map(|reading| reading.value);
+    let (low, high) = known.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
+    let (centre, half_range) = (digits(0.5 * (low + high)), digits(0.5 * (high - low)));
+    if !(half_range > 0.0) {
+        return None;
+    }
+    let unknown = FeatureScale { centre, half_range, rates: [1.0; 2] };
+    let (mut squares, mut count) = ([0.0; 2], 0.0);
+    for (samples, readings) in recordings.iter().zip(readings) {
+        each_row(samples.time_s, readings, unknown, |_, features, _| {
+            squares.iter_mut().zip(features.rates()).for_each(|(sum, rate)| *sum += rate * rate);
+            count += 1.0;
+        });
+    }
+    let rates = squares.map(|square: f64| digits((square / f64::max(count, 1.0)).sqrt()).max(f64::MIN_POSITIVE));
+    Some(FeatureScale { rates, ..unknown })
+}
+
+/// Visits every row, in order of time, with the features after it.
+fn each_row(
+    time_s: &[f64],
+    readings: &[Option<Reading<f64>>],
+    scale: FeatureScale<f64>,
+    mut visit: impl FnMut(usize, &ReadingFeatures<f64>, Option<[f64; FEATURES]>),
+) {
+    let mut features = ReadingFeatures::new(scale);
+    let mut before_s = time_s.first().copied().unwrap_or(0.0);
+    for (row, (&time_s, reading)) in time_s.iter().zip(readings).enumerate() {
+        let now = features.step((time_s - before_s).abs(), reading.map(|reading| reading.value));
+        before_s = time_s;
+        visit(row, &features, now);
+    }
+}
+
+/// All rows of a recording with reading and strain, as the calibrated filter and smoother see them; none if the estimator
+/// has no smoother.
+fn candidate_rows(
+    samples: &Samples,
+    readings: &[Option<Reading<f64>>],
+    scale: FeatureScale<f64>,
+    start_s: f64,
+    build: &dyn Fn() -> Result<Box<dyn Filter>, CalibrationError>,
+) -> Result<Option<Vec<TrainingRow>>, CalibrationError> {
+    let failed = |row: usize, error| CalibrationError::Filter { time_s: samples.time_s[row], error };
+    let mut filter = build()?;
+    let mut filtered = Vec::with_capacity(readings.len());
+    for (row, (&time_s, &reading)) in samples.time_s.iter().zip(readings).enumerate() {
+        filter.step(time_s, reading).map_err(|error| failed(row, error))?;
+        filtered.push(outputs(&filter.output()));
+    }
+    let smoothed = build()?.smooth(samples.time_s, readings).map_err(|(row, error)| failed(row, error))?;
+    let Some(smoothed) = smoothed else { return Ok(None) };
+    let mut past = Vec::with_capacity(readings.len());
+    each_row(samples.time_s, readings, scale, |_, _, now| past.push(now));
+    let backwards: (Vec<f64>, Vec<Option<Reading<f64>>>) =
+        (samples.time_s.iter().rev().copied().collect(), readings.iter().rev().copied().collect());
+    let mut future = Vec::with_capacity(readings.len());
+    each_row(&backwards.0, &backwards.1, scale, |_, _, now| future.push(now));
+    future.reverse();
+    let first_s = samples.time_s.first().copied().unwrap_or(0.0);
+    let row = |k: usize| {
+        Some(TrainingRow {
+            time_s: start_s + samples.time_s[k] - first_s,
+            strain: samples.strain[k],
+            past: past[k]?,
+            future: future_features(future[k]?),
+            filtered: filtered[k],
+            smoothed: outputs(&smoothed[k]),
+        })
+    };
+    Ok(Some(samples.complete_rows().filter_map(row).collect()))
+}
+
+/// Rows that are spread evenly over time and the way that the features of the past go.
+fn chosen(candidates: &[TrainingRow]) -> Vec<TrainingRow> {
+    let n = candidates.len();
+    let most = ROWS.min(n);
+    let sd = |i: usize| {
+        let mean = candidates.iter().map(|row| row.past[i]).sum::<f64>() / n as f64;
+        (candidates.iter().map(|row| (row.past[i] - mean).powi(2)).sum::<f64>() / n as f64).sqrt()
+    };
+    let sds: [f64; FEATURES] = std::array::from_fn(|i| sd(i).max(f64::MIN_POSITIVE));
+    let step = |pair: &[TrainingRow]| {
+        let square: f64 = (0..FEATURES).map(|i| ((pair[1].past[i] - pair[0].past[i]) / sds[i]).powi(2)).sum();
+        square.sqrt()
+    };
+    let steps: Vec<f64> = candidates.windows(2).map(step).collect();
+    let way = steps.iter().sum::<f64>().max(f64::MIN_POSITIVE);
+    let mut gone = 0.0;
+    let mut rows: Vec<TrainingRow> = candidates.first().copied().into_iter().collect();
+    for (k, (row, step)) in candidates.iter().skip(1).zip(&steps).enumerate() {
+        gone += BY_WAY * step / way + (1.0 - BY_WAY) / (n - 1) as f64;
+        // As many as should have been chosen by now, and no more than rows are left for.
+        let due = gone * (most - 1) as f64 + 1.0 + 1e-9 >= (rows.len() + 1) as f64;
+        let needed = most - rows.len() >= n - 1 - k;
+        if rows.len() < most && (due || needed) {
+            rows.push(*row);
+        }
+    }
+    rows
+}
+
+/// With the digits that are written down.
+fn rounded(row: TrainingRow) -> TrainingRow {
+    TrainingRow {
+        time_s: digits(row.time_s),
+        strain: digits(row.strain),
+        past: row.past.map(digits),
+        future: row.future.map(digits),
+        filtered: row.filtered.map(digits),
+        smoothed: row.smoothed.map(digits),
+    }
+}
+
+fn digits(value: f64) -> f64 {
+    format!("{value:.*e}", DIGITS - 1).parse().unwrap_or(value)
+}

@@ -1,0 +1,98 @@
+use ohmstrain_ekf::correction::{FEATURES, FeatureScale, OUTPUTS};
+use serde::{Deserialize, Serialize};
+
+use crate::gaussian_process::ProcessParams;
+
+/// Features of the readings to come: those of the past read backwards, but for the reading itself.
+pub const FUTURE_FEATURES: usize = FEATURES - 1;
+
+/// The learned correction: rows of the calibration, and what was chosen to learn from them. Weights are made of these when
+/// a filter is built.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CorrectionParams {
+    /// The change of resistance `R/R₀ - 1` that counts as zero.
+    pub reading_centre: f64,
+    /// Distance from there that counts as one.
+    pub reading_half_range: f64,
+    /// Usual sizes of the readings' two rates.
+    pub rate_scales: [f64; 2],
+    /// For the filter.
+    pub filter: CorrectorParams,
+    /// For the smoother.
+    pub smoother: CorrectorParams,
+    /// What both learn from, in order of time.
+    pub rows: Vec<TrainingRow>,
+}
+
+/// How one of the two estimates is corrected.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CorrectorParams {
+    /// Factor on the corrected strain's standard deviation, from blocks left out.
+    pub sd_scale: f64,
+    /// Strain from the features of the readings.
+    pub direct: ProcessParams,
+    /// What the filter's strain lacks, from its outputs and the features.
+    pub residual: ProcessParams,
+}
+
+/// A row of a calibration recording.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TrainingRow {
+    /// Time, s; recordings follow each other with a long pause.
+    pub time_s: f64,
+    /// The true strain.
+    pub strain: f64,
+    /// Features of the readings up to this row.
+    pub past: [f64; FEATURES],
+    /// Features of the readings from this row on.
+    pub future: [f64; FUTURE_FEATURES],
+    /// What the filter said: strain, rate, relaxation, baseline, probabilities of stretching and releasing.
+    pub filtered: [f64; OUTPUTS],
+    /// What the smoother said.
+    pub smoothed: [f64; OUTPUTS],
+}
+
+/// Inputs of the filter's correction.
+pub(crate) const FILTER_INPUTS: usize = OUTPUTS + FEATURES;
+/// Inputs of the smoother's.
+pub(crate) const SMOOTHER_INPUTS: usize = FILTER_INPUTS + FUTURE_FEATURES;
+
+impl CorrectionParams {
+    /// The scale of the features.
+    pub(crate) const fn feature_scale(&self) -> FeatureScale<f64> {
+        FeatureScale { centre: self.reading_centre, half_range: self.reading_half_range, rates: self.rate_scales }
+    }
+}
+
+impl TrainingRow {
+    /// Inputs of the filter's correction.
+    pub(crate) fn filter_inputs(&self) -> [f64; FILTER_INPUTS] {
+        filter_inputs(&self.filtered, &self.past)
+    }
+
+    /// Inputs of the smoother's.
+    pub(crate) fn smoother_inputs(&self) -> [f64; SMOOTHER_INPUTS] {
+        smoother_inputs(&self.smoothed, &self.past, &self.future)
+    }
+}
+
+pub(crate) fn filter_inputs(outputs: &[f64; OUTPUTS], past: &[f64; FEATURES]) -> [f64; FILTER_INPUTS] {
+    joined([outputs, past, &[]])
+}
+
+pub(crate) fn smoother_inputs(
+    outputs: &[f64; OUTPUTS],
+    past: &[f64; FEATURES],
+    future: &[f64; FUTURE_FEATURES],
+) -> [f64; SMOOTHER_INPUTS] {
+    joined([outputs, past, future])
+}
+
+fn joined<const D: usize>(parts: [&[f64]; 3]) -> [f64; D] {
+    let mut joined = [0.0; D];
+    joined.iter_mut().zip(parts.into_iter().flatten()).for_each(|(place, value)| *place = *value);
+    joined
+}

@@ -1,0 +1,50 @@
+use super::table::{FieldError, Table};
+use super::{FACTOR, POSITIVE, SIGNED};
+use crate::correction_params::{CorrectionParams, CorrectorParams, TrainingRow};
+use crate::gaussian_process::ProcessParams;
+
+/// Training rows that a file may have: the work grows with their cube.
+const ROWS: std::ops::RangeInclusive<usize> = 2..=1000;
+
+impl CorrectionParams {
+    pub(super) fn validate(&self, table: &Table) -> Result<(), FieldError> {
+        table.number("reading_centre", self.reading_centre, SIGNED)?;
+        table.number("reading_half_range", self.reading_half_range, POSITIVE)?;
+        table.numbers("rate_scales", &self.rate_scales, POSITIVE)?;
+        self.filter.validate(&table.table("filter"))?;
+        self.smoother.validate(&table.table("smoother"))?;
+        if !ROWS.contains(&self.rows.len()) {
+            let expected = format!("{} to {} entries", ROWS.start(), ROWS.end());
+            return Err(table.wrong("rows", expected, self.rows.len()));
+        }
+        self.rows.iter().enumerate().try_for_each(|(index, row)| row.validate(&table.entry("rows", index)))
+    }
+}
+
+impl CorrectorParams {
+    fn validate(&self, table: &Table) -> Result<(), FieldError> {
+        table.number("sd_scale", self.sd_scale, FACTOR)?;
+        self.direct.validate(&table.table("direct"))?;
+        self.residual.validate(&table.table("residual"))
+    }
+}
+
+impl ProcessParams {
+    fn validate(&self, table: &Table) -> Result<(), FieldError> {
+        table.number("length", self.length, FACTOR)?;
+        table.number("noise", self.noise, FACTOR)?;
+        table.number("noise_time_s", self.noise_time_s, POSITIVE)?;
+        table.number("sd_scale", self.sd_scale, FACTOR)
+    }
+}
+
+impl TrainingRow {
+    fn validate(&self, table: &Table) -> Result<(), FieldError> {
+        table.number("time_s", self.time_s, SIGNED)?;
+        table.number("strain", self.strain, SIGNED)?;
+        table.numbers("past", &self.past, SIGNED)?;
+        table.numbers("future", &self.future, SIGNED)?;
+        table.numbers("filtered", &self.filtered, SIGNED)?;
+        table.numbers("smoothed", &self.smoothed, SIGNED)
+    }
+}

@@ -1,0 +1,79 @@
+use super::LowPass;
+use crate::Real;
+
+/// Number of features of the readings up to now.
+pub const FEATURES: usize = 7;
+/// Time constants of the low-passes, s.
+const TIME_CONSTANTS_S: [f64; 6] = [0.25, 0.5, 1.0, 2.0, 8.0, 32.0];
+/// The places among them from which distances are taken.
+const FAR_FROM: [usize; 4] = [1, 3, 4, 5];
+/// The pairs among them whose differences are rates: of time constants τ/2 and τ.
+const RATES: [(usize, usize); 2] = [(0, 1), (2, 3)];
+/// A rate of a third of its usual size is still told apart well from twice that.
+const RATE_GAIN: f64 = 3.0;
+
+/// Readings farther away than this, in half ranges of the calibration's, are taken for this far: one gross error does not
+/// stay in the low-passes for minutes.
+const FARTHEST: f64 = 3.0;
+
+/// The scale on which readings `R/R₀ - 1` are seen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FeatureScale<T> {
+    /// The reading that counts as zero: the middle of the range in calibration.
+    pub centre: T,
+    /// Distance from there that counts as one.
+    pub half_range: T,
+    /// Usual size (standard deviation) of the two rates, in half ranges.
+    pub rates: [T; 2],
+}
+
+/// What a correction sees of the readings up to now: the scaled reading, its distances from low-passes of 0.5, 2, 8 and
+/// 32 s, and two rates, bounded by a tanh.
+///
+/// A missing reading leaves the features as they were; the next one is taken over the whole time since the last.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ReadingFeatures<T> {
+    scale: FeatureScale<T>,
+    low_passes: [LowPass<T>; TIME_CONSTANTS_S.len()],
+    /// Time since the last reading.
+    waited_s: T,
+    now: Option<[T; FEATURES]>,
+}
+
+impl<T: Real> ReadingFeatures<T> {
+    /// Before the first reading.
+    #[must_use]
+    pub fn new(scale: FeatureScale<T>) -> Self {
+        let low_passes = TIME_CONSTANTS_S.map(|tau_s| LowPass::new(T::of(tau_s)));
+        Self { scale, low_passes, waited_s: T::zero(), now: None }
+    }
+
+    /// Takes the reading `R/R₀ - 1` of a row `dt_s` seconds after the one before, at least zero; `None` if it is missing.
+    /// Returns the features: `None` before the first reading.
+    pub fn step(&mut self, dt_s: T, reading: Option<T>) -> Option<[T; FEATURES]> {
+        self.waited_s += dt_s;
+        if let Some(reading) = reading {
+            let scaled = (reading - self.scale.centre) / self.scale.half_range;
+            let scaled = scaled.max(-T::of(FARTHEST)).min(T::of(FARTHEST));
+            let waited_s = self.waited_s;
+            let low = self.low_passes.each_mut().map(|low_pass| low_pass.next(waited_s, scaled));
+            self.waited_s = T::zero();
+            self.now = Some(self.features(scaled, &low));
+        }
+        self.now
+    }
+
+    fn features(&self, scaled: T, low: &[T; TIME_CONSTANTS_S.len()]) -> [T; FEATURES] {
+        let [a, b, c, d] = FAR_FROM.map(|place| scaled - low[place]);
+        let [fast, slow] = RATES.map(|(sooner, later)| low[sooner] - low[later]);
+        let bounded = |rate: T, usual: T| (T::of(RATE_GAIN) * rate / usual).tanh();
+        [scaled, a, b, c, d, bounded(fast, self.scale.rates[0]), bounded(slow, self.scale.rates[1])]
+    }
+
+    /// The two rates before they are bounded, in half ranges, of a row whose reading was the last: what a calibration
+    /// takes [`FeatureScale::rates`] from.
+    #[must_use]
+    pub fn rates(&self) -> [T; 2] {
+        RATES.map(|(sooner, later)| self.low_passes[sooner].value() - self.low_passes[later].value())
+    }
+}

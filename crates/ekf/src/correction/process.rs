@@ -1,0 +1,96 @@
+use super::INDUCING;
+use crate::{Gaussian, Real};
+
+/// Weight of the linear part of the kernel, relative to the squared exponential.
+const LINEAR: f64 = 0.09;
+
+/// A Gaussian process conditioned on training rows, with the kernel `exp(-d²/2ℓ²) + 0.09 (x x' + 1)`: d is the distance of
+/// two inputs, x the first of them, all standardised.
+///
+/// Its mean takes all training rows. Its variance takes their kernels as weighted sums of those of the first few, the
+/// *inducing* rows (Nyström; Quiñonero-Candela & Rasmussen, *J. Mach. Learn. Res.* 6 (2005) 1939): larger than with all
+/// kernels where these rows are far, and much cheaper.
+#[derive(Clone, Copy, Debug)]
+pub struct Process<'a, T> {
+    /// ℓ, in standard deviations of the inputs.
+    pub length: T,
+    /// Mean of the targets.
+    pub mean: T,
+    /// Weight of each training row, in the unit of the target.
+    pub weights: &'a [T],
+    /// The upper triangle of a matrix W, row by row, for kernels k of the inducing rows: |W k|² is what the training rows
+    /// explain of the prior variance.
+    pub explained: &'a [T],
+    /// Prior variance of the process where the kernel is 1.
+    pub variance: T,
+    /// Variance of the noise, white and correlated in time, which is not predicted.
+    pub noise: T,
+    /// Factor on the variance, from training rows left out.
+    pub widening: T,
+    /// The variance of the process where nothing is known is no smaller than this.
+    pub least_variance: T,
+}
+
+/// What a process says at one input.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Said<T> {
+    pub strain: Gaussian<T>,
+    /// Share of the prior variance that the training rows leave, 0 to 1.
+    pub unknown: T,
+}
+
+/// Kernels with the training rows, row by row.
+pub(super) struct Kernels<T> {
+    mean: T,
+    /// With the inducing rows.
+    inducing: [T; INDUCING],
+    rows: usize,
+}
+
+impl<T: Real> Kernels<T> {
+    pub(super) fn new(process: &Process<'_, T>) -> Self {
+        Self { mean: process.mean, inducing: [T::zero(); INDUCING], rows: 0 }
+    }
+
+    /// Adds the next training row; `square` is its squared distance, `product` that of the first inputs.
+    pub(super) fn add(&mut self, process: &Process<'_, T>, square: T, product: T) {
+        let kernel = (T::of(-0.5) * square / (process.length * process.length)).exp() + linear(product);
+        if let Some(weight) = process.weights.get(self.rows) {
+            self.mean += *weight * kernel;
+        }
+        if let Some(place) = self.inducing.get_mut(self.rows) {
+            *place = kernel;
+        }
+        self.rows += 1;
+    }
+
+    /// What the process says; `first` is the first input.
+    pub(super) fn said(&self, process: &Process<'_, T>, first: T) -> Said<T> {
+        let prior = T::one() + linear(first * first);
+        let unknown = ((prior - self.explained(process.explained)) / prior).max(T::zero()).min(T::one());
+        let latent = (prior * process.variance).max(process.least_variance) * unknown;
+        Said { strain: Gaussian { mean: self.mean, variance: latent + process.noise }, unknown }
+    }
+
+    /// |W k|².
+    fn explained(&self, mut triangle: &[T]) -> T {
+        let mut explained = T::zero();
+        // m rows of the triangle are m (m + 1) / 2 numbers.
+        let rows = ((8 * triangle.len() + 1).isqrt() - 1) / 2;
+        let mut kernels = &self.inducing[..rows.min(self.rows).min(INDUCING)];
+        while let Some((row, rest)) = triangle.split_at_checked(kernels.len().min(triangle.len())) {
+            if row.is_empty() {
+                break;
+            }
+            let product = row.iter().zip(kernels).fold(T::zero(), |sum, (w, k)| sum + *w * *k);
+            explained += product * product;
+            triangle = rest;
+            kernels = kernels.get(1..).unwrap_or(&[]);
+        }
+        explained
+    }
+}
+
+fn linear<T: Real>(product: T) -> T {
+    T::of(LINEAR) * (product + T::one())
+}

@@ -1,0 +1,207 @@
+//! The learned correction against sums written out here.
+
+use ohmstrain_ekf::Gaussian;
+use ohmstrain_ekf::correction::{
+    Correction, FEATURES, FeatureScale, InputScale, LowPass, Process, ReadingFeatures, mixture,
+};
+use ohmstrain_model::StrainRange;
+
+const D: usize = 9;
+const ROWS: usize = 12;
+const INDUCING: usize = 5;
+
+/// Numbers between -1 and 1 that look like nothing in particular.
+fn number(seed: usize) -> f64 {
+    let x = (seed as f64 * 12.9898).sin() * 43758.5453;
+    2.0 * (x - x.floor()) - 1.0
+}
+
+struct Numbers {
+    rows: [[f64; D]; ROWS],
+    scales: [InputScale<f64>; D],
+    weights: [[f64; ROWS]; 2],
+    triangles: [[f64; INDUCING * (INDUCING + 1) / 2]; 2],
+}
+
+fn numbers() -> Numbers {
+    Numbers {
+        rows: std::array::from_fn(|k| std::array::from_fn(|i| number(17 * k + i))),
+        scales: std::array::from_fn(|i| InputScale {
+            mean: number(300 + i),
+            sd: 1.5 + number(320 + i),
+            lower: number(300 + i) - 2.0,
+            upper: number(300 + i) + 2.0,
+        }),
+        weights: std::array::from_fn(|p| std::array::from_fn(|k| number(400 + 20 * p + k))),
+        triangles: std::array::from_fn(|p| std::array::from_fn(|k| 0.3 * number(500 + 20 * p + k))),
+    }
+}
+
+const LENGTHS: [f64; 2] = [1.5, 2.5];
+const MEANS: [f64; 2] = [0.2, -0.1];
+const VARIANCES: [f64; 2] = [0.5, 0.3];
+const NOISES: [f64; 2] = [0.02, 0.01];
+const WIDENINGS: [f64; 2] = [1.3, 2.0];
+const LEAST: [f64; 2] = [0.8, 0.1];
+
+/// Direct and residual process by the formulas, and the novelty.
+fn written_out(numbers: &Numbers, input: &[f64; D], filtered: Gaussian<f64>) -> ([Gaussian<f64>; 2], f64) {
+    let inside: Vec<f64> = (0..D).map(|i| input[i].clamp(numbers.scales[i].lower, numbers.scales[i].upper)).collect();
+    let x: Vec<f64> = (0..D).map(|i| (inside[i] - numbers.scales[i].mean) / numbers.scales[i].sd).collect();
+    let outside =
+        |from: usize| -> f64 { (from..D).map(|i| ((input[i] - inside[i]) / numbers.scales[i].sd).powi(2)).sum() };
+    let mut unknown = 0.0;
+    let said = [6, 0].map(|from| {
+        let p = usize::from(from == 0);
+        let kernel = |k: usize| {
+            let square: f64 = (from..D).map(|i| (x[i] - numbers.rows[k][i]).powi(2)).sum();
+            (-0.5 * square / LENGTHS[p].powi(2)).exp() + 0.09 * (1.0 + x[from] * numbers.rows[k][from])
+        };
+        let mean = MEANS[p] + (0..ROWS).map(|k| numbers.weights[p][k] * kernel(k)).sum::<f64>();
+        let mut explained = 0.0;
+        for i in 0..INDUCING {
+            // Row i of the triangle starts after rows of 5, 4, … numbers.
+            let start = (0..i).map(|row| INDUCING - row).sum::<usize>();
+            let product: f64 = (i..INDUCING).map(|j| numbers.triangles[p][start + j - i] * kernel(j)).sum();
+            explained += product * product;
+        }
+        let prior = 1.0 + 0.09 * (1.0 + x[from] * x[from]);
+        unknown = (1.0 - explained / prior).clamp(0.0, 1.0);
+        let least = if p == 1 { LEAST[p].max(filtered.variance) } else { LEAST[p] };
+        let base = if p == 1 { filtered.mean } else { 0.0 };
+        let variance =
+            ((prior * VARIANCES[p]).max(least) * unknown + NOISES[p]) * WIDENINGS[p] + 0.03 * 0.7 * outside(from);
+        Gaussian { mean: (base + mean).clamp(-2.0, 2.0), variance }
+    });
+    (said, 1.0 - (1.0 - unknown) * (-outside(0) / 5.0).exp())
+}
+
+macro_rules! correction {
+    ($t:ty, $numbers:expr, $rows:ident, $scales:ident, $weights:ident, $triangles:ident, $correction:ident) => {
+        let $rows = $numbers.rows.map(|row| row.map(|x| x as $t));
+        let $scales = $numbers.scales.map(|scale| InputScale {
+            mean: scale.mean as $t,
+            sd: scale.sd as $t,
+            lower: scale.lower as $t,
+            upper: scale.upper as $t,
+        });
+        let $weights = $numbers.weights.map(|weights| weights.map(|x| x as $t));
+        let $triangles = $numbers.triangles.map(|triangle| triangle.map(|x| x as $t));
+        let process = |p: usize| Process {
+            length: LENGTHS[p] as $t,
+            mean: MEANS[p] as $t,
+            weights: &$weights[p],
+            explained: &$triangles[p],
+            variance: VARIANCES[p] as $t,
+            noise: NOISES[p] as $t,
+            widening: WIDENINGS[p] as $t,
+            least_variance: LEAST[p] as $t,
+        };
+        let $correction = Correction {
+            rows: &$rows,
+            scales: &$scales,
+            direct: process(0),
+            residual: process(1),
+            limits: StrainRange { lower: -2.0, upper: 2.0 },
+            strain_variance: 0.7,
+            variance_factor: 0.6,
+        };
+    };
+}
+
+#[test]
+fn both_processes_their_mixture_and_novelty() {
+    let numbers = numbers();
+    correction!(f64, numbers, rows, scales, weights, triangles, correction);
+    for trial in 0..50 {
+        let input: [f64; D] = std::array::from_fn(|i| 3.0 * number(1000 + 10 * trial + i));
+        let filtered = Gaussian { mean: input[0], variance: 0.05 * (1.0 + number(9000 + trial)) };
+        let said = correction.correct(&input, filtered);
+        let ([direct, residual], novelty) = written_out(&numbers, &input, filtered);
+        // Tens of sums of products of numbers of order one.
+        let close = |a: f64, b: f64| (a - b).abs() < 1e-12 * (1.0 + b.abs());
+        let same = |a: Gaussian<f64>, b: Gaussian<f64>| close(a.mean, b.mean) && close(a.variance, b.variance);
+        assert!(same(said.direct, direct) && same(said.residual, residual), "{trial}: {said:?}");
+        assert!(close(said.novelty, novelty), "{trial}");
+        let share =
+            |of: Gaussian<f64>| of.variance.powf(-0.75) / (direct.variance.powf(-0.75) + residual.variance.powf(-0.75));
+        let (a, b) = (share(direct), share(residual));
+        let mean = a * direct.mean + b * residual.mean;
+        let second = a * (direct.variance + direct.mean.powi(2)) + b * (residual.variance + residual.mean.powi(2));
+        let variance = 0.6 * (second - mean * mean) + 0.06 * 0.7 * novelty;
+        assert!(close(said.strain.mean, mean) && (said.strain.variance - variance).abs() < 1e-11, "{trial}");
+    }
+}
+
+#[test]
+fn single_precision_says_the_same() {
+    let numbers = numbers();
+    correction!(f64, numbers, rows, scales, weights, triangles, wide);
+    correction!(f32, numbers, rows_32, scales_32, weights_32, triangles_32, narrow);
+    for trial in 0..50 {
+        let input: [f64; D] = std::array::from_fn(|i| 3.0 * number(2000 + 10 * trial + i));
+        let said = wide.correct(&input, Gaussian { mean: input[0], variance: 0.05 });
+        let said_32 = narrow.correct(&input.map(|x| x as f32), Gaussian { mean: input[0] as f32, variance: 0.05 });
+        // Squared distances reach 30, in which 2⁻²⁴ is 2e-6; a dozen rows add up.
+        let close = |a: f32, b: f64| (f64::from(a) - b).abs() < 3e-5 * (1.0 + b.abs());
+        assert!(close(said_32.strain.mean, said.strain.mean), "{trial}: {said:?} {said_32:?}");
+        assert!(close(said_32.strain.variance, said.strain.variance), "{trial}: {said:?} {said_32:?}");
+    }
+}
+
+#[test]
+fn a_mixture_of_any_scale() {
+    let at = |mean: f64, variance: f64| Gaussian { mean, variance };
+    // Equal variances: the middle, and the distance of both from it.
+    assert_eq!(mixture(at(-1.0, 0.25), at(1.0, 0.25)), at(0.0, 1.25));
+    // 16 times the variance: an eighth of the weight.
+    let mixed = mixture(at(0.0, 1.0), at(9.0, 16.0));
+    assert!((mixed.mean - 1.0).abs() < 1e-15);
+    for scale in [1e-30_f64, 1e30] {
+        let scaled = mixture(at(0.0, scale * scale), at(9.0 * scale, 16.0 * scale * scale));
+        assert!(
+            (scaled.mean / scale - 1.0).abs() < 1e-12
+                && (scaled.variance / (scale * scale) / mixed.variance - 1.0).abs() < 1e-12
+        );
+    }
+    // Exact knowledge drowns the rest.
+    assert_eq!(mixture(at(0.3, 0.0), at(0.5, 1.0)), at(0.3, 0.0));
+}
+
+/// A low-pass of a reading that goes straight from one known row to the next, against ten thousand small steps.
+#[test]
+fn low_passes_are_exact_however_long_the_step() {
+    let (readings, steps_s) = ([0.2, 0.9, -0.4, 0.1], [0.3, 5.0, 0.0]);
+    let mut low_pass = LowPass::new(2.0);
+    let mut exact: f64 = low_pass.next(0.0, readings[0]);
+    for (k, dt_s) in steps_s.into_iter().enumerate() {
+        let fine = 10_000;
+        for i in 0..fine {
+            let share = (i as f64 + 0.5) / f64::from(fine);
+            let reading = readings[k] + share * (readings[k + 1] - readings[k]);
+            let decay = (-dt_s / f64::from(fine) / 2.0).exp();
+            exact = decay * exact + (1.0 - decay) * reading;
+        }
+        // The midpoint rule leaves (dt/n)²/24 of a second derivative below one.
+        assert!((low_pass.next(dt_s, readings[k + 1]) - exact).abs() < 1e-7);
+    }
+}
+
+#[test]
+fn a_missing_reading_holds_the_features_and_the_next_one_is_taken_over_the_whole_gap() {
+    let scale = FeatureScale { centre: 0.1, half_range: 0.5, rates: [0.01, 0.02] };
+    let (mut gappy, mut known) = (ReadingFeatures::<f64>::new(scale), ReadingFeatures::<f64>::new(scale));
+    assert_eq!(gappy.step(0.0, None), None);
+    let first = gappy.step(0.4, Some(0.3));
+    // Settled on the first reading: no distances, no rates.
+    let mut expected = [0.0; FEATURES];
+    expected[0] = (0.3 - 0.1) / 0.5;
+    assert_eq!(first, Some(expected));
+    assert_eq!(known.step(0.0, Some(0.3)), first);
+    assert_eq!(gappy.step(0.7, None), first);
+    assert_eq!(gappy.step(0.8, None), first);
+    // The sum of 0.7, 0.8 and 0.5 is rounded.
+    let (gappy, known) = (gappy.step(0.5, Some(0.5)).unwrap(), known.step(2.0, Some(0.5)).unwrap());
+    assert!(gappy.iter().zip(known).all(|(a, b)| (a - b).abs() < 1e-14));
+    assert!(known[1..].iter().all(|x| *x > 0.0) && known[5] < 1.0);
+}
