@@ -65,8 +65,9 @@ impl Columns {
         let at_most_one = |group: &[Column]| one_of(header, group);
         let exactly_one = |group: &[Column]| {
             let found = || quote(&header.iter().collect::<Vec<_>>().join(","));
-            one_of(header, group)?
-                .ok_or_else(|| Fault::new(format!("a header with the column {}", names(group, " or ")), found()))
+            one_of(header, group)?.ok_or_else(|| {
+                Fault::new(format!("a header with the column {}", names(group, " or ")), found()).foreign()
+            })
         };
         Ok(Self {
             time: exactly_one(&Column::TIMES)?,

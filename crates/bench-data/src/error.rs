@@ -36,6 +36,8 @@ pub struct BadContent {
     pub expected: String,
     /// What stands there, shortened, with control characters escaped.
     pub found: String,
+    /// Whether the file is written in another way altogether: no header of a trace, or no UTF-8 text.
+    pub is_foreign: bool,
 }
 
 impl fmt::Display for BadContent {
@@ -71,11 +73,17 @@ pub(crate) struct Fault {
     pub column: Option<&'static str>,
     pub expected: String,
     pub found: String,
+    pub is_foreign: bool,
 }
 
 impl Fault {
     pub(crate) fn new(expected: impl Into<String>, found: impl Into<String>) -> Self {
-        Self { column: None, expected: expected.into(), found: found.into() }
+        Self { column: None, expected: expected.into(), found: found.into(), is_foreign: false }
+    }
+
+    /// What is there is no trace with a fault, but something else.
+    pub(crate) fn foreign(self) -> Self {
+        Self { is_foreign: true, ..self }
     }
 
     pub(crate) fn in_column(column: &'static str, expected: impl Into<String>, found: impl Into<String>) -> Self {
@@ -89,6 +97,7 @@ impl Fault {
             column: self.column.map(str::to_owned),
             expected: self.expected,
             found: self.found,
+            is_foreign: self.is_foreign,
         }
     }
 }

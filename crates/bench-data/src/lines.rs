@@ -44,7 +44,8 @@ impl<R: Read> Lines<R> {
                 break;
             }
         }
-        let invalid = |_| LineFault::Content(Fault::new("UTF-8 text", "binary data (bytes that are not UTF-8)"));
+        let invalid =
+            |_| LineFault::Content(Fault::new("UTF-8 text", "binary data (bytes that are not UTF-8)").foreign());
         std::str::from_utf8(content(&self.buffer, self.number)).map(Some).map_err(invalid)
     }
 }
@@ -53,10 +54,10 @@ impl<R: Read> Lines<R> {
 fn check_bytes(bytes: &[u8], number: u64) -> Result<(), Fault> {
     const TEXT: &str = "UTF-8 text";
     if number == 1 && (bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff])) {
-        return Err(Fault::new(TEXT, "UTF-16 text"));
+        return Err(Fault::new(TEXT, "UTF-16 text").foreign());
     }
     if bytes.contains(&0) {
-        return Err(Fault::new(TEXT, "binary data (a NUL byte)"));
+        return Err(Fault::new(TEXT, "binary data (a NUL byte)").foreign());
     }
     if bytes.len() as u64 == LONGEST_LINE && !bytes.ends_with(b"\n") {
         return Err(Fault::new(format!("a line of at most {LONGEST_LINE} bytes"), "a longer one"));

@@ -60,6 +60,12 @@ pub fn segment(time_s: &[f64], strain: &[f64]) -> Vec<Segment> {
     segments
 }
 
+/// The rate at which half the way is travelled, 1/s, as far as the noise lets it be seen.
+#[cfg(feature = "import")]
+pub(crate) fn typical_rate_of(time_s: &[f64], strain: &[f64]) -> f64 {
+    typical_rate(time_s, &Motion::estimate(time_s, strain).rate)
+}
+
 /// How the body moves, as far as the noise lets it be seen.
 struct Motion {
     rate: Vec<f64>,
@@ -107,7 +113,7 @@ fn bridge(time_s: &[f64], values: &[f64]) -> Vec<f64> {
 ///
 /// The median leaves corners and steps out, and is scaled to a normal distribution. A resolution coarser than the noise
 /// makes most of them zero: then the mean of what is left of the lower nine tenths is taken.
-fn noise_sd(time_s: &[f64], values: &[f64]) -> f64 {
+pub(crate) fn noise_sd(time_s: &[f64], values: &[f64]) -> f64 {
     let mut deviations: Vec<f64> = (1..values.len().saturating_sub(1))
         .map(|i| {
             let share = (time_s[i] - time_s[i - 1]) / (time_s[i + 1] - time_s[i - 1]);

@@ -1,5 +1,6 @@
 mod evaluate;
 mod export;
+mod files;
 mod fit_law;
 mod refine;
 mod split;
@@ -15,6 +16,7 @@ use ohmstrain_ekf::Influence;
 
 pub use evaluate::{Estimators, EvaluateArgs};
 pub use export::{ExportArgs, ExportTarget};
+pub use files::{ImportArgs, InspectArgs};
 pub use fit_law::{FitLawArgs, SegmentChoice, phase_name};
 pub use refine::RefineArgs;
 pub use split::Split;
@@ -33,6 +35,10 @@ pub struct Args {
 pub enum Command {
     /// Simulate a bench session, calibrate on its first half, filter, smooth and report; needs no input
     Demo(DemoArgs),
+    /// Say what stands in a lab's files, and how to import them
+    Inspect(InspectArgs),
+    /// Make a trace of a lab's files
+    Import(ImportArgs),
     /// Simulate a recording of the bench
     Simulate(SimulateArgs),
     /// Fit law, noise and motion to recordings with a known strain

@@ -69,10 +69,18 @@ impl CliError {
 impl From<TraceError> for CliError {
     fn from(error: TraceError) -> Self {
         match error {
+            TraceError::Content(content) if content.is_foreign && content.file != "stdin" => {
+                Self::Input(format!("{content}; see `ohmstrain inspect {}`", shell_word(&content.file)))
+            }
             TraceError::Content(_) => Self::Input(error.to_string()),
             _ => Self::Other(error.to_string()),
         }
     }
+}
+
+/// A word as a shell takes it; one that no shell takes as it is.
+fn shell_word(word: &str) -> String {
+    shlex::try_quote(word).map_or_else(|_| word.to_owned(), Into::into)
 }
 
 /// Errors of writing to stdout.

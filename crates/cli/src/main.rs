@@ -9,6 +9,7 @@ mod error;
 mod estimates;
 mod export;
 mod input;
+mod lab_files;
 mod output;
 mod plausible;
 mod progress;

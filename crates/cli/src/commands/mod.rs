@@ -7,6 +7,10 @@ mod explain;
 mod export;
 mod filter;
 mod fit_law;
+mod import;
+mod inspect;
+mod inspect_json;
+mod inspect_text;
 mod refine;
 mod score_table;
 mod scoring;
@@ -20,6 +24,8 @@ use crate::error::CliError;
 pub fn dispatch(command: &Command) -> Result<(), CliError> {
     match command {
         Command::Demo(args) => demo::run(args),
+        Command::Inspect(args) => inspect::run(args),
+        Command::Import(args) => import::run(args),
         Command::Simulate(args) => simulate::run(args),
         Command::Calibrate(args) => calibrate::run(args),
         Command::Refine(args) => refine::run(args),

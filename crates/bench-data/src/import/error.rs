@@ -1,0 +1,42 @@
+use crate::error::{BadContent, Fault};
+
+/// Why files do not become a trace. Each is one line.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ImportError {
+    /// The contents of a file.
+    #[error(transparent)]
+    Content(#[from] BadContent),
+    /// A container that cannot be read.
+    #[error("{file}: {what}")]
+    Unreadable {
+        /// Name of the file.
+        file: String,
+        /// What is wrong with it.
+        what: String,
+    },
+    /// Something that the files leave open.
+    #[error("{file}: {what}; say {}", answers.join(" or "))]
+    Question {
+        /// Name of the file.
+        file: String,
+        /// What is open.
+        what: String,
+        /// Flags that answer it, as a shell takes them.
+        answers: Vec<String>,
+    },
+}
+
+impl ImportError {
+    pub(crate) fn content(file: &str, line: u64, fault: Fault) -> Self {
+        Self::Content(fault.at(file, line))
+    }
+
+    pub(crate) fn unreadable(file: &str, what: impl Into<String>) -> Self {
+        Self::Unreadable { file: file.to_owned(), what: what.into() }
+    }
+
+    pub(crate) fn question(file: &str, what: impl Into<String>, answers: impl IntoIterator<Item = String>) -> Self {
+        Self::Question { file: file.to_owned(), what: what.into(), answers: answers.into_iter().collect() }
+    }
+}

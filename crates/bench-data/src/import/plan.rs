@@ -1,0 +1,233 @@
+use crate::import::build::{Imported, build};
+use crate::import::candidates::{candidates, choose, find, refer};
+use crate::import::channel::{Channel, name};
+use crate::import::clock::Clock;
+use crate::import::error::ImportError;
+use crate::import::plan_clock::{clock, no_readings};
+use crate::import::plan_units::channel;
+use crate::import::preset::Preset;
+use crate::import::questions::quoted;
+use crate::import::recipe::{Align, PerFile, Recipe};
+use crate::import::roles::Role;
+use crate::import::survey::alternation;
+use crate::import::table::Table;
+
+/// An import with nothing left open.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Plan {
+    pub(crate) recipe: Recipe,
+    pub(crate) given: Recipe,
+    pub(crate) readings: Channel,
+    pub(crate) time: Clock,
+    pub(crate) reference: Option<(Channel, Clock)>,
+    pub(crate) temperature: Option<Channel>,
+    /// What follows from names or numbers, and is not said by a flag.
+    pub remarks: Vec<String>,
+}
+
+impl Plan {
+    /// Decides all that the recipe leaves open, by names, units and numbers.
+    ///
+    /// # Errors
+    /// [`ImportError::Question`] for the first thing that nothing decides.
+    pub fn new(tables: &[Table], given: &Recipe) -> Result<Self, ImportError> {
+        let recipe = given.preset.map_or_else(|| given.clone(), |preset| preset.complete(given));
+        check_decimal(tables)?;
+        let mut remarks = Vec::new();
+        let readings = choose(tables, &recipe, &Role::READINGS, "the readings")?.ok_or_else(|| no_readings(tables))?;
+        let time = clock(tables, &recipe, (Role::Time, readings.1, readings.2), &mut remarks)?;
+        let readings = channel(tables, &recipe, readings, &mut remarks)?;
+        let reference = match choose(tables, &recipe, &Role::REFERENCES, "the reference")? {
+            None => None,
+            Some(place) => {
+                let (_, table, column) = place;
+                // The readings' clock is in other hands where there is a column beside the reference or another file.
+                let own = clock(tables, &recipe, (Role::ReferenceTime, table, column), &mut remarks)?;
+                Some((channel(tables, &recipe, place, &mut remarks)?, own))
+            }
+        };
+        let temperature = temperature(tables, &recipe, readings.table, &mut remarks)?;
+        let plan = Self { recipe, given: given.clone(), readings, time, reference, temperature, remarks };
+        plan.check(tables)?;
+        Ok(plan)
+    }
+
+    /// The plan for what `inspect` proposes: beside what [`new`](Self::new) decides, a preset that fits, signs that are
+    /// arbitrary, polarity that flips, and clocks of two files that the motion brings together.
+    ///
+    /// # Errors
+    /// [`ImportError::Question`] for the first thing that nothing decides.
+    pub fn propose(tables: &[Table], given: &Recipe) -> Result<Self, ImportError> {
+        let mut recipe = given.clone();
+        if recipe.preset.is_none() && recipe.columns.is_empty() && tables.len() == 1 {
+            recipe.preset = Preset::that_fits(&tables[0]);
+        }
+        if recipe.preset.is_some() {
+            return Self::new(tables, &recipe);
+        }
+        if tables.len() > 1 && recipe.align.is_none() {
+            recipe.align = Some(Align::Motion);
+        }
+        let mut plan = Self::new(tables, &recipe)?;
+        let values =
+            crate::import::channel::Values::read(&tables[plan.readings.table], &plan.readings, &recipe.missing)?;
+        let known = || values.values.iter().filter(|value| !value.is_nan());
+        if plan.readings.role == Role::Resistance
+            && known().any(|value| *value < 0.0)
+            && !recipe.magnitude.contains(&Role::Resistance)
+        {
+            recipe.magnitude.push(Role::Resistance);
+            plan = Self::new(tables, &recipe)?;
+        }
+        if alternation(&values.values.iter().map(|value| value.abs()).collect::<Vec<_>>()).is_some()
+            && !recipe.fold_polarity
+        {
+            recipe.fold_polarity = true;
+            plan = Self::new(tables, &recipe)?;
+        }
+        Ok(plan)
+    }
+
+    /// The recipe that says all of this plan by flags.
+    #[must_use]
+    pub fn recipe(&self, tables: &[Table]) -> Recipe {
+        if self.given.preset.is_some() {
+            return self.given.clone();
+        }
+        let mut out = Recipe { columns: Vec::new(), units: Vec::new(), ..self.given.clone() };
+        let mut pin = |channel: &Channel| {
+            out.columns.push((channel.role, refer(tables, (channel.table, channel.column))));
+            out.units.push((channel.role, channel.unit.name.to_owned()));
+        };
+        if let Clock::Column(channel) = &self.time {
+            pin(channel);
+        }
+        pin(&self.readings);
+        if let Some((reference, own)) = &self.reference {
+            if let Clock::Column(channel) = own
+                && !self.is_one_clock()
+            {
+                pin(&Channel { role: Role::ReferenceTime, ..*channel });
+            }
+            pin(reference);
+        }
+        self.temperature.iter().for_each(pin);
+        // What is to be left out stays so.
+        out.columns.extend(self.given.columns.iter().filter(|(_, name)| name.is_none()).cloned());
+        for (index, table) in tables.iter().enumerate() {
+            let file = (tables.len() > 1).then_some(index + 1);
+            let (layout, options) = (&table.layout, self.given.read_options(index));
+            let says_mark = layout.decimal != crate::import::number::DecimalMark::Point || layout.has_groups;
+            if options.decimal.is_none() && says_mark {
+                out.decimal.push(PerFile { file, value: layout.decimal });
+            }
+            if options.skip.is_none() && layout.skip > 0 {
+                out.skip.push(PerFile { file, value: layout.skip });
+            }
+        }
+        out
+    }
+
+    /// The trace, and what was done to get it.
+    ///
+    /// # Errors
+    /// [`ImportError`] for cells that are no numbers, times that go back, and motion that does not tell the clocks apart.
+    pub fn import(&self, tables: &[Table]) -> Result<Imported, ImportError> {
+        build(self, tables)
+    }
+
+    /// Whether readings and reference stand in the same rows with the same times.
+    pub(crate) fn is_one_clock(&self) -> bool {
+        let same = |own: &Clock| match (own, &self.time) {
+            (Clock::Column(a), Clock::Column(b)) => (a.table, a.column) == (b.table, b.column),
+            (a, b) => a == b,
+        };
+        self.reference.as_ref().is_none_or(|(_, own)| same(own))
+    }
+
+    /// The column that a role was given, as messages call it, with its file and unit.
+    #[must_use]
+    pub fn columns(&self, tables: &[Table]) -> Vec<(Role, usize, usize, String, &'static str)> {
+        let mut all: Vec<Channel> = Vec::new();
+        if let Clock::Column(time) = &self.time {
+            all.push(*time);
+        }
+        all.push(self.readings);
+        if let Some((reference, own)) = &self.reference {
+            if let Clock::Column(own) = own
+                && !self.is_one_clock()
+            {
+                all.push(Channel { role: Role::ReferenceTime, ..*own });
+            }
+            all.push(*reference);
+        }
+        all.extend(self.temperature);
+        let describe = |of: &Channel| (of.role, of.table, of.column, name(&tables[of.table], of.column), of.unit.name);
+        all.iter().map(describe).collect()
+    }
+
+    fn check(&self, tables: &[Table]) -> Result<(), ImportError> {
+        let files = || tables.iter().map(|table| table.file.as_str()).collect::<Vec<_>>().join(", ");
+        let Some((reference, own)) = &self.reference else {
+            return self.check_front_end(tables);
+        };
+        if own.table() != self.time.table() && self.recipe.align.is_none() {
+            let what = "two files with two clocks";
+            let answers = ["motion", "none", "SECONDS"].map(|align| format!("--align {align}"));
+            return Err(ImportError::question(&files(), what, answers));
+        }
+        let gauge = self.recipe.gauge_length_mm.or(tables[reference.table].metadata.gauge_length_mm);
+        if reference.role == Role::Displacement && gauge.is_none() {
+            let what = "a displacement becomes strain by the length of the unstretched sensor";
+            let answer = "--gauge-length-mm MM".to_owned();
+            return Err(ImportError::question(&tables[reference.table].file, what, [answer]));
+        }
+        self.check_front_end(tables)
+    }
+
+    fn check_front_end(&self, tables: &[Table]) -> Result<(), ImportError> {
+        let table = &tables[self.readings.table];
+        if self.readings.role == Role::Adc && self.recipe.front_end.or(table.metadata.front_end).is_none() {
+            let spec = quoted("divider reference_ohm=10000 side=low bits=12 noise_codes=0.5");
+            let what = "converter codes become ohms by the electronics";
+            return Err(ImportError::question(&table.file, what, [format!("--front-end {spec} (or what is there)")]));
+        }
+        Ok(())
+    }
+}
+
+/// Point or comma?
+fn check_decimal(tables: &[Table]) -> Result<(), ImportError> {
+    let open = tables.iter().enumerate().find(|(_, table)| table.layout.decimal_is_open);
+    let Some((index, table)) = open else { return Ok(()) };
+    let file = if tables.len() > 1 { format!("{}:", index + 1) } else { String::new() };
+    let what = "commas may be decimal marks or group thousands";
+    Err(ImportError::question(&table.file, what, [",", "."].map(|mark| format!("--decimal {file}{mark}"))))
+}
+
+/// A temperature counts if it stands in the readings' file.
+fn temperature(
+    tables: &[Table],
+    recipe: &Recipe,
+    table: usize,
+    remarks: &mut Vec<String>,
+) -> Result<Option<Channel>, ImportError> {
+    let place = match recipe.column(Role::Temperature) {
+        Some(None) => None,
+        Some(Some(wanted)) => Some(find(tables, Role::Temperature, wanted)?),
+        None => {
+            let mut found = candidates(tables);
+            found.retain(|found| found.role == Role::Temperature && found.table == table && found.is_named);
+            match found[..] {
+                [one] if tables[table].columns[one.column].unit.is_some() => Some((table, one.column)),
+                _ => None,
+            }
+        }
+    };
+    let Some((found, column)) = place else { return Ok(None) };
+    if found != table {
+        let what = "a temperature is taken from the file of the readings";
+        return Err(ImportError::question(&tables[found].file, what, ["--column temperature=none".to_owned()]));
+    }
+    channel(tables, recipe, (Role::Temperature, found, column), remarks).map(Some)
+}

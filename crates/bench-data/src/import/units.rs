@@ -1,0 +1,125 @@
+use crate::import::roles::Role;
+
+/// How numbers in a unit become numbers of the trace.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Scale {
+    /// Times a power of ten: the decimal mark moves, nothing is rounded.
+    Shift(i32),
+    /// Times a factor, plus an offset.
+    Affine(f64, f64),
+    /// As `Shift`, plus one: changes relative to the resistance at rest.
+    ChangeShift(i32),
+    /// Text that is a date or a time of day.
+    Stamp,
+}
+
+/// A unit, under the name that flags give it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Unit {
+    pub name: &'static str,
+    pub scale: Scale,
+}
+
+type Entry = (Role, &'static str, Scale, &'static [&'static str]);
+
+/// Units by quantity: flag name, scale, spellings. Spellings are compared in lower case, except those of resistance that
+/// begin with `m` or `M`.
+const UNITS: &[Entry] = &[
+    (Role::Time, "s", Scale::Shift(0), &["sec", "secs", "second", "seconds", "sek", "sekunden", "secondes"]),
+    (Role::Time, "ms", Scale::Shift(-3), &["msec", "msecs", "millis", "millisecond", "milliseconds"]),
+    (Role::Time, "us", Scale::Shift(-6), &["µs", "μs", "usec", "micros", "microsecond", "microseconds"]),
+    (Role::Time, "ns", Scale::Shift(-9), &["nsec", "nanos", "nanosecond", "nanoseconds"]),
+    (Role::Time, "min", Scale::Affine(60.0, 0.0), &["mins", "minute", "minutes", "minuten"]),
+    (Role::Time, "h", Scale::Affine(3600.0, 0.0), &["hr", "hrs", "hour", "hours"]),
+    (Role::Time, "iso", Scale::Stamp, &["iso8601", "timestamp", "datetime", "hh:mm:ss", "utc"]),
+    (Role::Time, "dmy", Scale::Stamp, &["dd.mm.yyyy", "dd/mm/yyyy"]),
+    (Role::Time, "mdy", Scale::Stamp, &["mm/dd/yyyy"]),
+    (Role::Resistance, "ohm", Scale::Shift(0), &["ω", "Ω", "ohms", "Ohm"]),
+    (Role::Resistance, "kohm", Scale::Shift(3), &["kω", "kΩ", "kohms", "kilohm", "kiloohm", "k"]),
+    (Role::Resistance, "megohm", Scale::Shift(6), &["MΩ", "Mω", "MOhm", "Mohm", "MOHM", "MOhms", "Mohms"]),
+    (Role::Resistance, "milliohm", Scale::Shift(-3), &["mΩ", "mω", "mOhm", "mohm", "mOhms", "mohms"]),
+    (Role::Ratio, "1", Scale::Shift(0), &["-", "–", "r/r0", "ratio", "none"]),
+    (Role::Ratio, "percent", Scale::Shift(-2), &["% of r0"]),
+    (Role::Ratio, "change", Scale::ChangeShift(0), &["dr/r0", "δr/r0", "dr/r"]),
+    (Role::Ratio, "change-percent", Scale::ChangeShift(-2), &["%", "pct"]),
+    (Role::Adc, "1", Scale::Shift(0), &["-", "code", "codes", "count", "counts", "lsb"]),
+    (Role::Strain, "1", Scale::Shift(0), &["-", "–", "mm/mm", "m/m", "strain", "frac", "fraction", "none", "ratio"]),
+    (Role::Strain, "percent", Scale::Shift(-2), &["%", "pct", "perc", "prozent"]),
+    (Role::Strain, "permille", Scale::Shift(-3), &["‰"]),
+    (Role::Strain, "microstrain", Scale::Shift(-6), &["µε", "με", "ustrain", "µstrain", "µm/m", "um/m", "ppm"]),
+    (Role::Displacement, "mm", Scale::Shift(0), &["millimeter", "millimetre", "millimeters", "millimetres"]),
+    (Role::Displacement, "cm", Scale::Shift(1), &["centimeter", "centimetre"]),
+    (Role::Displacement, "m", Scale::Shift(3), &["meter", "metre", "meters", "metres"]),
+    (Role::Displacement, "um", Scale::Shift(-3), &["µm", "μm", "micron", "microns"]),
+    (Role::Displacement, "inch", Scale::Affine(25.4, 0.0), &["in", "inches", "\""]),
+    (Role::Angle, "deg", Scale::Shift(0), &["°", "degree", "degrees", "grad"]),
+    (Role::Angle, "rad", Scale::Affine(180.0 / std::f64::consts::PI, 0.0), &["radian", "radians"]),
+    (Role::Temperature, "celsius", Scale::Shift(0), &["°c", "c", "degc", "deg c", "℃"]),
+    (Role::Temperature, "kelvin", Scale::Affine(1.0, -273.15), &["k"]),
+    (Role::Temperature, "fahrenheit", Scale::Affine(5.0 / 9.0, -160.0 / 9.0), &["°f", "f", "degf"]),
+];
+
+/// The unit of a quantity that a text spells.
+pub(crate) fn unit(role: Role, text: &str) -> Option<Unit> {
+    let text = text.trim().trim_matches(['(', ')', '[', ']', '{', '}', '<', '>']).trim();
+    let text = text.replace('\u{2126}', "Ω");
+    let lower = text.to_lowercase();
+    let of_role = UNITS.iter().filter(|(of, ..)| *of == role.quantity());
+    let mut found = of_role.filter(|(_, name, _, spellings)| {
+        let is_mega_or_milli = role == Role::Resistance && lower.starts_with('m') && *name != lower;
+        let spelled =
+            |spelling: &&str| if is_mega_or_milli { **spelling == text } else { spelling.to_lowercase() == lower };
+        *name == lower || spellings.iter().any(spelled)
+    });
+    found.next().map(|(_, name, scale, _)| Unit { name, scale: *scale })
+}
+
+/// The quantities in which a text is a unit.
+pub(crate) fn quantities(text: &str) -> Vec<Role> {
+    let mut roles: Vec<Role> = Vec::new();
+    for (role, ..) in UNITS {
+        if !roles.contains(role) && unit(*role, text).is_some() {
+            roles.push(*role);
+        }
+    }
+    roles
+}
+
+/// Whether a text is a unit of anything that a lab measures.
+pub(crate) fn is_unit(text: &str) -> bool {
+    const OTHER: [&str; 26] = [
+        "n", "kn", "mn", "g", "kg", "v", "mv", "µv", "uv", "a", "ma", "µa", "ua", "na", "w", "hz", "khz", "pa", "kpa",
+        "mpa", "mm/s", "mm/min", "1/s", "%/s", "s/m", "lbf",
+    ];
+    let bare = text.trim().trim_matches(['(', ')', '[', ']', '{', '}', '<', '>']).trim();
+    !quantities(bare).is_empty() || OTHER.contains(&bare.to_lowercase().as_str())
+}
+
+/// Names of a quantity's units, for answers.
+pub(crate) fn names(role: Role) -> Vec<&'static str> {
+    UNITS.iter().filter(|(of, ..)| *of == role.quantity()).map(|(_, name, ..)| *name).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn mega_is_not_milli() {
+        let name = |text| unit(Role::Resistance, text).map(|unit| unit.name);
+        assert_eq!(name("MOhm"), Some("megohm"));
+        assert_eq!(name("mΩ"), Some("milliohm"));
+        assert_eq!(name("[k\u{2126}]"), Some("kohm"));
+        assert_eq!(name("(Ohm)"), Some("ohm"));
+        assert_eq!(name("N"), None);
+    }
+
+    #[test]
+    fn every_unit_is_found_by_its_own_name() {
+        for (role, name, scale, spellings) in UNITS {
+            for text in [name].into_iter().chain(spellings.iter()) {
+                assert_eq!(unit(*role, text), Some(Unit { name, scale: *scale }), "{text}");
+            }
+        }
+    }
+}

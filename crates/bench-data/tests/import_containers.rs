@@ -1,0 +1,130 @@
+//! Workbooks and Parquet files that the test writes with other people's libraries.
+
+use std::sync::Arc;
+
+use ohmstrain_bench_data::Trace;
+use ohmstrain_bench_data::import::{Plan, Recipe, read_table};
+use parquet::basic::Compression;
+use parquet::data_type::{DoubleType, Int64Type};
+use parquet::file::properties::WriterProperties;
+use parquet::file::writer::SerializedFileWriter;
+use parquet::schema::parser::parse_message_type;
+use rust_xlsxwriter::{ExcelDateTime, Format, Workbook};
+
+const ROWS: usize = 50;
+
+fn time_s(row: usize) -> f64 {
+    row as f64 / 20.0
+}
+
+fn kiloohm(row: usize) -> f64 {
+    1.6 + 0.01 * row as f64
+}
+
+fn strain(row: usize) -> f64 {
+    0.1 * (1.0 - (0.3 * row as f64).cos())
+}
+
+fn import(bytes: Vec<u8>, recipe: &Recipe) -> Trace {
+    let tables = [read_table(bytes.clone(), "lab", &recipe.read_options(0)).unwrap_or_else(|error| panic!("{error}"))];
+    let proposed = Plan::propose(&tables, recipe).unwrap_or_else(|error| panic!("{error}")).recipe(&tables);
+    let tables = [read_table(bytes, "lab", &proposed.read_options(0)).unwrap()];
+    Plan::new(&tables, &proposed).unwrap().import(&tables).unwrap().trace
+}
+
+/// Times to `tolerance_s`; the rest to one rounding, of the unit.
+fn has_the_numbers(trace: &Trace, tolerance_s: f64) {
+    assert_eq!(trace.len(), ROWS);
+    for row in 0..ROWS {
+        assert!((trace.time_s[row] - time_s(row)).abs() <= tolerance_s, "{} {}", trace.time_s[row], time_s(row));
+        assert!((trace.readings.values[row] / (1e3 * kiloohm(row)) - 1.0).abs() <= f64::EPSILON);
+        let reference = &trace.reference.as_ref().unwrap().values;
+        assert!((reference[row] - strain(row)).abs() <= f64::EPSILON);
+    }
+}
+
+fn workbook(dates: bool) -> Vec<u8> {
+    let mut workbook = Workbook::new();
+    workbook.add_worksheet().set_name("Notes").unwrap().write(0, 0, "nothing here").unwrap();
+    let sheet = workbook.add_worksheet().set_name("Data").unwrap();
+    sheet.write(0, 0, "Sensor 3").unwrap();
+    for (column, name) in ["Time (s)", "R (kOhm)", "Strain"].into_iter().enumerate() {
+        sheet.write(2, column as u16, name).unwrap();
+    }
+    let format = Format::new().set_num_format("yyyy-mm-dd hh:mm:ss.000");
+    for row in 0..ROWS {
+        let line = row as u32 + 3;
+        if dates {
+            let moment = ExcelDateTime::from_ymd(2024, 5, 1).unwrap();
+            let moment = moment.and_hms_milli(10, 0, (row / 20) as u8, 50 * (row as u16 % 20)).unwrap();
+            sheet.write_with_format(line, 0, &moment, &format).unwrap();
+        } else {
+            sheet.write(line, 0, time_s(row)).unwrap();
+        }
+        sheet.write(line, 1, kiloohm(row)).unwrap();
+        sheet.write(line, 2, strain(row)).unwrap();
+    }
+    workbook.save_to_buffer().unwrap()
+}
+
+#[test]
+fn a_workbook_with_its_data_on_one_sheet() {
+    has_the_numbers(&import(workbook(false), &Recipe::default()), 0.0);
+    // A date is a number of days: 45 413 of them have steps of 7e-12 d, 0.6 µs, and are read to the microsecond.
+    has_the_numbers(&import(workbook(true), &Recipe::default()), 1.5e-6);
+}
+
+#[test]
+fn two_sheets_of_numbers_are_a_question() {
+    let mut workbook = Workbook::new();
+    for name in ["Run 1", "Run 2"] {
+        let sheet = workbook.add_worksheet().set_name(name).unwrap();
+        for (column, heading) in ["Time (s)", "R (Ohm)"].into_iter().enumerate() {
+            sheet.write(0, column as u16, heading).unwrap();
+            sheet.write(1, column as u16, 1.5).unwrap();
+        }
+    }
+    let bytes = workbook.save_to_buffer().unwrap();
+    let error = read_table(bytes.clone(), "lab.xlsx", &Recipe::default().read_options(0)).unwrap_err().to_string();
+    assert!(error.contains("--sheet 'Run 1' or --sheet 'Run 2'"), "{error}");
+    let known = Recipe { sheet: Some("Run 2".into()), ..Recipe::default() };
+    assert!(read_table(bytes, "lab.xlsx", &known.read_options(0)).is_ok());
+}
+
+#[test]
+fn parquet_as_most_programs_write_it() {
+    let schema = "message lab { REQUIRED INT64 time (TIMESTAMP(MICROS, true)); OPTIONAL DOUBLE R_kohm; OPTIONAL DOUBLE strain; }";
+    for compression in [Compression::UNCOMPRESSED, Compression::SNAPPY, Compression::GZIP(Default::default())] {
+        let schema = Arc::new(parse_message_type(schema).unwrap());
+        let properties = Arc::new(WriterProperties::builder().set_compression(compression).build());
+        let mut writer = SerializedFileWriter::new(Vec::new(), schema, properties).unwrap();
+        let mut group = writer.next_row_group().unwrap();
+        let micros: Vec<i64> = (0..ROWS as i64).map(|row| 50_000 * row).collect();
+        let mut column = group.next_column().unwrap().unwrap();
+        column.typed::<Int64Type>().write_batch(&micros, None, None).unwrap();
+        column.close().unwrap();
+        for of in [kiloohm, strain] {
+            let values: Vec<f64> = (0..ROWS).map(of).collect();
+            let mut column = group.next_column().unwrap().unwrap();
+            column.typed::<DoubleType>().write_batch(&values, Some(&[1; ROWS]), None).unwrap();
+            column.close().unwrap();
+        }
+        group.close().unwrap();
+        has_the_numbers(&import(writer.into_inner().unwrap(), &Recipe::default()), 0.0);
+    }
+}
+
+#[test]
+fn what_is_no_table_is_said_in_one_line() {
+    for bytes in [
+        b"PAR1 is all".to_vec(),
+        b"PK\x03\x04".to_vec(),
+        b"\x1f\x8bno".to_vec(),
+        b"\0\x01\x02\0\0\0".to_vec(),
+        b"words only\n".to_vec(),
+        Vec::new(),
+    ] {
+        let error = read_table(bytes, "lab", &Recipe::default().read_options(0)).unwrap_err().to_string();
+        assert!(error.starts_with("lab") && error.lines().count() == 1, "{error}");
+    }
+}

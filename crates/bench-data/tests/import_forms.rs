@@ -1,0 +1,364 @@
+//! The forms in which labs export recordings: each is proposed an import without a question (or with the one that it
+//! leaves), the import takes the proposal, and the trace has the numbers that the file was made of.
+
+use std::fmt::Write as _;
+use std::io::Write as _;
+
+use ohmstrain_bench_data::Trace;
+use ohmstrain_bench_data::import::{ImportError, Imported, Plan, Preset, Recipe, Table, read_table};
+
+/// Numbers with few decimals, so that every unit writes them exactly.
+struct Truth {
+    time_ms: Vec<i64>,
+    /// Tenths of an ohm.
+    decaohm: Vec<i64>,
+    /// Hundredths of a percent, and of a millimetre on 100 mm.
+    strain: Vec<i64>,
+}
+
+fn truth() -> Truth {
+    let rows = 60;
+    Truth {
+        time_ms: (0..rows).map(|k| 250 + 50 * k + k % 3).collect(),
+        decaohm: (0..rows).map(|k| 16_000 + 13 * k + 7 * (k % 5)).collect(),
+        strain: (0..rows).map(|k| 50 * (k - 30_i64).abs() + 3).collect(),
+    }
+}
+
+impl Truth {
+    fn time_s(&self) -> Vec<f64> {
+        self.time_ms.iter().map(|ms| *ms as f64 / 1e3).collect()
+    }
+
+    fn ohm(&self) -> Vec<f64> {
+        self.decaohm.iter().map(|tenths| *tenths as f64 / 10.0).collect()
+    }
+
+    fn strain(&self) -> Vec<f64> {
+        self.strain.iter().map(|hundredths| *hundredths as f64 / 1e4).collect()
+    }
+}
+
+/// A whole number of 10^-`digits` as text: `1600.1`.
+fn decimal(value: i64, digits: usize, mark: char) -> String {
+    let text = format!("{:0>width$}", value, width = digits + 1);
+    let (whole, fraction) = text.split_at(text.len() - digits);
+    if digits == 0 { text } else { format!("{whole}{mark}{fraction}") }
+}
+
+/// A file with these lines above the rows; a row is made of time in ms, tenths of an ohm, hundredths of a percent.
+fn file(above: &str, row: impl Fn(i64, i64, i64) -> String) -> String {
+    let truth = truth();
+    let mut out = above.to_owned();
+    for k in 0..truth.time_ms.len() {
+        writeln!(out, "{}", row(truth.time_ms[k], truth.decaohm[k], truth.strain[k])).unwrap();
+    }
+    out
+}
+
+fn tables(files: &[(&str, Vec<u8>)], recipe: &Recipe) -> Result<Vec<Table>, ImportError> {
+    let read = |(index, (name, bytes)): (usize, &(&str, Vec<u8>))| {
+        read_table(bytes.clone(), name, &recipe.read_options(index))
+    };
+    files.iter().enumerate().map(read).collect()
+}
+
+/// What is proposed, run as it is proposed.
+fn proposed(files: &[(&str, Vec<u8>)], known: &Recipe) -> Result<(Recipe, Imported), ImportError> {
+    let first = tables(files, known)?;
+    let recipe = Plan::propose(&first, known)?.recipe(&first);
+    let again = tables(files, &recipe)?;
+    let plan = Plan::new(&again, &recipe)?;
+    assert_eq!(plan.recipe(&again), recipe, "a recipe leads to itself");
+    let imported = plan.import(&again)?;
+    let mut written = Vec::new();
+    imported.trace.write(&mut written).unwrap();
+    let read = Trace::read(written.as_slice(), "again").unwrap();
+    assert_eq!(format!("{read:?}"), format!("{:?}", imported.trace), "the trace survives being written");
+    Ok((recipe, imported))
+}
+
+/// The file is imported as proposed, to the last bit of its numbers.
+#[track_caller]
+fn is_imported(name: &str, bytes: impl Into<Vec<u8>>, known: &Recipe) -> Imported {
+    let (_, imported) = proposed(&[(name, bytes.into())], known).unwrap_or_else(|error| panic!("{error}"));
+    let truth = truth();
+    let trace = &imported.trace;
+    assert_eq!(trace.time_s, truth.time_s(), "{name}: time");
+    assert_eq!(trace.readings.values, truth.ohm(), "{name}: readings");
+    let strain = &trace.reference.as_ref().unwrap().values;
+    assert_eq!(strain.len(), truth.strain.len());
+    for (found, expected) in strain.iter().zip(truth.strain()) {
+        // A displacement is rounded when it is read and when it is divided; what is a strain already, once.
+        let roundings =
+            if known.gauge_length_mm.is_some() || trace.metadata.gauge_length_mm.is_some() { 1.0 } else { 0.0 };
+        assert!((found - expected).abs() <= roundings * f64::EPSILON * expected, "{name}: {found} {expected}");
+    }
+    imported
+}
+
+#[track_caller]
+fn asks(files: &[(&str, &str)], known: &Recipe, words: &[&str]) {
+    let files: Vec<(&str, Vec<u8>)> = files.iter().map(|(name, text)| (*name, text.as_bytes().to_vec())).collect();
+    let error = proposed(&files, known).map(|(recipe, _)| recipe.arguments()).unwrap_err().to_string();
+    assert!(words.iter().all(|word| error.contains(word)) && error.lines().count() == 1, "{error}");
+}
+
+fn gauge_100() -> Recipe {
+    Recipe { gauge_length_mm: Some(100.0), ..Recipe::default() }
+}
+
+#[test]
+fn semicolons_with_decimal_commas() {
+    let row = |ms, ohm, strain| format!("{};{};{}", decimal(ms, 3, ','), decimal(ohm, 1, ','), decimal(strain, 2, ','));
+    is_imported("komma.csv", file("Zeit (s);Widerstand (Ohm);Dehnung (%)\n", row), &Recipe::default());
+}
+
+#[test]
+fn tabs_names_with_units_and_kiloohms() {
+    let row =
+        |ms, ohm, strain| format!("{}\t{}\t{}", decimal(ms, 3, '.'), decimal(ohm, 4, '.'), decimal(strain, 2, '.'));
+    let text = file("Time (s)\tR (kOhm)\tDisplacement [mm]\n", row);
+    is_imported("tabs.txt", text, &gauge_100());
+}
+
+#[test]
+fn two_header_lines_and_a_line_of_units_below_a_preamble() {
+    let row = |ms, ohm, strain| format!("{},{},{}", ms, decimal(ohm, 4, '.'), decimal(strain, 2, '.'));
+    let above = "Rig 7\nOperator: N. N.\n\nClock,DMM,Stage\nTime,Resistance,Position\nms,kΩ,mm\n";
+    is_imported("rig.csv", file(above, row), &gauge_100());
+}
+
+#[test]
+fn a_percent_sign_may_be_a_unit_and_a_hash_a_name() {
+    let row = |ms, ohm, strain| format!("{},{},{ms}", decimal(strain, 2, '.'), decimal(ohm, 1, '.'));
+    is_imported("units.csv", file("Strain,R,Time\n%,Ohm,ms\n", row), &Recipe::default());
+    let row = |ms, ohm, strain| format!("{ms},{},{},{ms}", decimal(strain, 2, '.'), decimal(ohm, 1, '.'));
+    is_imported("hash.csv", file("#,Strain,R,Time\n,%,Ohm,ms\n", row), &Recipe::default());
+}
+
+#[test]
+fn twins_are_told_apart_by_the_line_above_them_or_by_number() {
+    let row = |ms, ohm, strain| {
+        let (ms, ohm, strain) = (decimal(ms, 3, '.'), decimal(ohm, 1, '.'), decimal(strain, 2, '.'));
+        format!("{ms},{ohm},{ms},{strain}")
+    };
+    let above = "DMM,,Stage,\nTime,Resistance,Time,Strain\ns,Ohm,s,%\n";
+    is_imported("twins.csv", file(above, row), &Recipe::default());
+}
+
+#[test]
+fn time_stamps() {
+    let clock =
+        |ms: i64| format!("{:02}:{:02}:{:02}.{:03}", ms / 3_600_000 % 24, ms / 60_000 % 60, ms / 1000 % 60, ms % 1000);
+    let rest = |ohm, strain| format!("{},{}", decimal(ohm, 1, '.'), decimal(strain, 2, '.'));
+    let names = "Timestamp,R_ohm,strain_pct\n";
+    // Just before midnight, so that a day goes by.
+    let noon = 86_400_000 - 1000;
+    type Stamp<'a> = (&'a str, &'a dyn Fn(i64) -> String);
+    let forms: [Stamp; 5] = [
+        ("iso", &|ms| format!("2024-02-{}T{}Z", if ms < 1000 { 28 } else { 29 }, clock(ms + noon))),
+        ("zone", &|ms| format!("2024-02-{} {}+01:00", if ms < 1000 { 28 } else { 29 }, clock(ms + noon))),
+        ("points", &|ms| format!("{}.02.2024 {}", if ms < 1000 { 28 } else { 29 }, clock(ms + noon))),
+        ("american", &|ms| format!("02/{}/2024 {}", if ms < 1000 { 28 } else { 29 }, clock(ms + noon))),
+        ("clock", &|ms| clock(ms + noon)),
+    ];
+    let truth = truth();
+    for (name, stamp) in forms {
+        let text = file(names, |ms, ohm, strain| format!("{},{}", stamp(ms), rest(ohm, strain)));
+        let (_, imported) = proposed(&[(name, text.into())], &Recipe::default()).unwrap();
+        let since: Vec<f64> = truth.time_ms.iter().map(|ms| (ms - truth.time_ms[0]) as f64 / 1e3).collect();
+        assert_eq!(imported.trace.time_s, since, "{name}");
+        assert_eq!(imported.trace.readings.values, truth.ohm(), "{name}");
+    }
+    let open = file(names, |ms, ohm, strain| format!("0{}/02/2024 {},{}", 1 + ms / 1500, clock(ms), rest(ohm, strain)));
+    asks(&[("open", &open)], &Recipe::default(), &["day and month", "--unit time=dmy", "--unit time=mdy"]);
+}
+
+#[test]
+fn overload_is_missing_and_unknown_words_are_asked_about() {
+    let row = |word: &'static str| {
+        move |ms, ohm, strain| {
+            let reading = if ms % 7 == 0 { word.to_owned() } else { decimal(ohm, 1, '.') };
+            format!("{},{},{}", decimal(ms, 3, '.'), reading, decimal(strain, 2, '.'))
+        }
+    };
+    let names = "time_s,resistance_ohm,strain_percent\n";
+    for word in ["OVLD", "+OL", "9.9E37", "", "NaN", "####"] {
+        let text = file(names, row(word));
+        let (_, imported) = proposed(&[("dmm.csv", text.into())], &Recipe::default()).unwrap();
+        let truth = truth();
+        let expected = truth.time_ms.iter().filter(|ms| **ms % 7 == 0).count();
+        assert_eq!(imported.trace.readings.values.iter().filter(|value| value.is_nan()).count(), expected, "{word}");
+        assert_eq!(imported.trace.time_s, truth.time_s());
+        assert!(expected > 3 && imported.remarks.iter().any(|remark| remark.contains("missing values")), "{word}");
+    }
+    let text = file(names, row("WAIT"));
+    asks(&[("dmm.csv", &text)], &Recipe::default(), &["dmm.csv:", "`WAIT`", "--missing WAIT"]);
+    let known = Recipe { missing: vec!["WAIT".into()], ..Recipe::default() };
+    assert!(proposed(&[("dmm.csv", text.into())], &known).is_ok());
+}
+
+#[test]
+fn encodings() {
+    let row =
+        |ms, ohm, strain| format!("{};{};{};21,5", decimal(ms, 3, ','), decimal(ohm, 4, ','), decimal(strain, 2, ','));
+    let text = file("Zeit [s];R [kΩ];Dehnung [%];Prüfraum Temperatur [°C]\n", row);
+    let utf_16 = |mark: [u8; 2], order: fn(u16) -> [u8; 2]| -> Vec<u8> {
+        mark.into_iter().chain(text.encode_utf16().flat_map(order)).collect()
+    };
+    is_imported("le.csv", utf_16([0xff, 0xfe], u16::to_le_bytes), &Recipe::default());
+    is_imported("be.csv", utf_16([0xfe, 0xff], u16::to_be_bytes), &Recipe::default());
+    is_imported("bom.csv", [b"\xef\xbb\xbf", text.as_bytes()].concat(), &Recipe::default());
+    // Latin-1 has no Ω, but the degree sign and umlauts.
+    let latin_1: Vec<u8> = text.replace('Ω', "Ohm").chars().map(|c| u8::try_from(u32::from(c)).unwrap()).collect();
+    assert!(std::str::from_utf8(&latin_1).is_err());
+    let imported = is_imported("latin.csv", latin_1, &Recipe::default());
+    assert_eq!(imported.trace.temperature_c.unwrap()[0], 21.5);
+    let old_mac = text.replace('\n', "\r");
+    is_imported("mac.csv", old_mac, &Recipe::default());
+}
+
+#[test]
+fn a_trace_that_names_its_units_is_read_by_them() {
+    let row = |ms, ohm, strain| format!("{},{},{}", decimal(ms, 3, '.'), decimal(ohm, 4, '.'), decimal(strain, 2, '.'));
+    let above = "# strain_unit = percent\n# resistance_unit = kohm\ntime_s,resistance_ohm,strain\n";
+    is_imported("units.csv", file(above, row), &Recipe::default());
+}
+
+#[test]
+fn serial_plotter_lines_and_a_serial_monitor() {
+    let row = |ms, ohm, strain| {
+        format!("millis:{ms}\tR_ohm:{}\tstrain_pct:{}", decimal(ohm, 1, '.'), decimal(strain, 2, '.'))
+    };
+    is_imported("plotter.txt", file("", row), &Recipe::default());
+    let row = |ms, ohm, strain| {
+        format!("10:00:{} -> {ms},{},{}", decimal(ms, 3, '.'), decimal(ohm, 1, '.'), decimal(strain, 2, '.'))
+    };
+    let text = file("", row);
+    let known = Recipe {
+        columns: [("time", "2"), ("resistance", "3"), ("strain", "4")]
+            .map(|(role, column)| (role.parse().unwrap(), column.parse().unwrap()))
+            .to_vec(),
+        units: [("time", "ms"), ("resistance", "ohm"), ("strain", "percent")]
+            .map(|(role, unit)| (role.parse().unwrap(), unit.to_owned()))
+            .to_vec(),
+        ..Recipe::default()
+    };
+    is_imported("monitor.txt", text, &known);
+}
+
+#[test]
+fn a_microsecond_counter_wraps() {
+    let start = (1_i64 << 32) - 1_000_000;
+    let row = |ms: i64, ohm, strain| {
+        let micros = (start + 1000 * ms) % (1 << 32);
+        format!("{micros},{},{}", decimal(ohm, 1, '.'), decimal(strain, 2, '.'))
+    };
+    let text = file("micros,R_ohm,strain_pct\n", row);
+    let (_, imported) = proposed(&[("counter.csv", text.into())], &Recipe::default()).unwrap();
+    let expected: Vec<f64> = truth().time_ms.iter().map(|ms| (start + 1000 * ms) as f64 / 1e6).collect();
+    assert_eq!(imported.trace.time_s, expected);
+    assert!(imported.remarks.iter().any(|remark| remark.contains("started again 1 times")), "{:?}", imported.remarks);
+}
+
+#[test]
+fn gzip_and_spaces_and_comments() {
+    let row =
+        |ms, ohm, strain| format!("  {}  {}   {}", decimal(ms, 3, '.'), decimal(ohm, 1, '.'), decimal(strain, 2, '.'));
+    let text = file("% a remark\n# gauge_length_mm = 100\n# Time (s) R (Ohm) x (mm)\n", row) + "END OF TEST\n";
+    let mut packed = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+    packed.write_all(text.as_bytes()).unwrap();
+    let imported = is_imported("spaces.txt.gz", packed.finish().unwrap(), &Recipe::default());
+    assert_eq!(imported.trace.metadata.gauge_length_mm, Some(100.0));
+}
+
+#[test]
+fn what_nothing_decides_is_asked_with_the_answer() {
+    let nothing = Recipe::default();
+    let row = |ms, ohm, strain| format!("{ms},{},{}", decimal(ohm, 1, '.'), decimal(strain, 2, '.'));
+    let unit = file("time,resistance_ohm,strain_pct\n", row);
+    asks(&[("a.csv", &unit)], &nothing, &["a.csv", "`time`", "--unit time=ms"]);
+    let gauge = file("time_ms,R_ohm,displacement_mm\n", row);
+    asks(&[("a.csv", &gauge)], &nothing, &["--gauge-length-mm MM"]);
+    let names = file("", row);
+    asks(&[("a.csv", &names)], &nothing, &["no header", "--column time=N --column resistance=N"]);
+    let two = file("time_ms,R1 (Ohm),R2 (Ohm)\n", row);
+    asks(&[("a.csv", &two)], &nothing, &["`R1 (Ohm)` and `R2 (Ohm)`", "--column 'resistance=R1 (Ohm)'"]);
+    let thousands =
+        file("time_ms;R_ohm;strain_pct\n", |ms, ohm, _| format!("{ms};{},{:03};1", 1 + ohm % 9, ohm % 1000));
+    asks(&[("a.csv", &thousands)], &nothing, &["--decimal ,", "--decimal ."]);
+    let rate =
+        file("R_ohm,strain_pct\n", |_, ohm, strain| format!("{},{}", decimal(ohm, 1, '.'), decimal(strain, 2, '.')));
+    asks(&[("a.csv", &rate)], &nothing, &["--rate-hz HZ"]);
+    let commas =
+        file("time_s,resistance_ohm\n", |ms, ohm, _| format!("{},{}", decimal(ms, 3, ','), decimal(ohm, 1, ',')));
+    asks(&[("a.csv", &commas)], &nothing, &["cannot be told apart"]);
+    let signs = file("time_ms,R_ohm\n", |ms, ohm, _| format!("{ms},{}", decimal(ohm, 1, '.')));
+    let back = signs.clone() + "3,1600\n";
+    asks(&[("a.csv", &back)], &nothing, &["a.csv:62", "expected a time after"]);
+}
+
+/// The rig's irregular steps, s.
+const STEPS: [f64; 5] = [0.08, 0.08, 0.08, 0.125, 0.19];
+
+/// A file of the rig: resistance rises by 10 Ω a second, the position goes up and down with corners every fifty rows.
+fn rig(rows: usize, spurious: &[usize]) -> String {
+    let mut out = String::new();
+    for (row, time) in times(rows).into_iter().enumerate() {
+        let sign = if row % 2 == 0 { 1.0 } else { -1.0 };
+        let inner = -(1600.0 + 10.0 * time + 12.0 * sign);
+        let position = if spurious.contains(&row) { -0.0 } else { -position(row) };
+        writeln!(out, "39000,{inner},{time},{position},{},0.5,{}", time + 0.03, time + 0.05).unwrap();
+    }
+    out
+}
+
+fn times(rows: usize) -> Vec<f64> {
+    STEPS
+        .iter()
+        .cycle()
+        .take(rows)
+        .scan(0.0, |time, step| {
+            *time += step;
+            Some(*time)
+        })
+        .collect()
+}
+
+/// mm; straight between rows that are multiples of fifty.
+fn position(row: usize) -> f64 {
+    let times = times(row / 50 * 50 + 51);
+    let (from, to) = (row / 50 * 50, row / 50 * 50 + 50);
+    let share = (times[row] - times[from]) / (times[to] - times[from]);
+    12.0 * if (row / 50).is_multiple_of(2) { share } else { 1.0 - share }
+}
+
+#[test]
+fn a_rig_without_header_is_folded_and_interpolated() {
+    let spurious = [20, 31, 77, 78 + 50, 160];
+    let text = rig(200, &spurious);
+    let table = tables(&[("rig.csv", text.clone().into())], &Recipe::default()).unwrap();
+    assert_eq!(Preset::that_fits(&table[0]), Some(Preset::ElectromechStretcher));
+    let imports = Plan::new(&table, &Recipe::default()).unwrap_err().to_string();
+    assert!(imports.contains("--preset electromech-stretcher"), "{imports}");
+    let (recipe, imported) = proposed(&[("rig.csv", text.into())], &Recipe::default()).unwrap();
+    assert_eq!(recipe.arguments(), ["--preset", "electromech-stretcher"]);
+    let trace = &imported.trace;
+    let (times, strain) = (times(200), &trace.reference.as_ref().unwrap().values);
+    assert_eq!(trace.len(), 199);
+    let corner = |k: usize| [0, 49].contains(&(k % 50));
+    for k in 0..199 {
+        let time = 0.5 * (times[k] + times[k + 1]);
+        // Sums of numbers up to 2000 and 30, printed to 17 digits: a few units in the last place.
+        assert!((trace.time_s[k] - time).abs() < 1e-13);
+        assert!((trace.readings.values[k] - (1600.0 + 10.0 * time)).abs() < 2e-12, "row {k}");
+        // The position's clock is 0.03 s late: on one straight it reads what the motion says at its own time.
+        if k > 0 && !corner(k) {
+            let (a, b) = (times[k] + 0.03, times[k + 1] + 0.03);
+            let exact = position(k) + (position(k + 1) - position(k)) * (time - a) / (b - a);
+            assert!((strain[k] - exact / 40.0).abs() < 1e-13, "row {k}: {} {}", strain[k], exact / 40.0);
+        }
+    }
+    assert!(imported.remarks.iter().any(|remark| remark.contains("5 zeros")), "{:?}", imported.remarks);
+}

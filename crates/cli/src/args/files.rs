@@ -1,0 +1,129 @@
+use std::path::PathBuf;
+
+use clap::Args as ClapArgs;
+use ohmstrain_bench_data::import::{Align, ColumnName, DecimalMark, PerFile, Preset, Recipe, Role};
+use ohmstrain_bench_data::{FrontEndSpec, JointSpec};
+
+use super::positive;
+
+/// Flags of `inspect`.
+#[derive(Debug, ClapArgs)]
+#[command(after_help = "Example: ohmstrain inspect rig.csv --gauge-length-mm 40")]
+pub struct InspectArgs {
+    /// Files of one recording: text, XLSX, Parquet, each perhaps in gzip; - for stdin
+    #[arg(required = true)]
+    pub files: Vec<PathBuf>,
+    /// Print the command that imports them, and nothing else
+    #[arg(long, conflicts_with = "json")]
+    pub suggest: bool,
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
+    /// What is known of the files
+    #[command(flatten)]
+    pub known: FilesArgs,
+}
+
+/// Flags of `import`.
+#[derive(Debug, ClapArgs)]
+#[command(after_help = "Example: ohmstrain import rig.csv --gauge-length-mm 40 -o trace.csv\n\
+    `ohmstrain inspect FILE…` prints the command for a file.")]
+pub struct ImportArgs {
+    /// Files of one recording: text, XLSX, Parquet, each perhaps in gzip; - for stdin
+    #[arg(required = true)]
+    pub files: Vec<PathBuf>,
+    /// Where to write the trace; stdout by default
+    #[arg(short, long, value_name = "trace.csv")]
+    pub output: Option<PathBuf>,
+    /// Replace the output even if it is no recording that this program wrote
+    #[arg(long)]
+    pub force: bool,
+    /// What is known of the files
+    #[command(flatten)]
+    pub known: FilesArgs,
+}
+
+/// What is known of a lab's files.
+#[derive(Debug, ClapArgs)]
+pub struct FilesArgs {
+    /// What a column is, by name or number: time='Time (s)', resistance=3, displacement=2:Position in the second file,
+    /// angle=none. Roles: time, reference-time, resistance, ratio, adc, strain, displacement, angle, temperature
+    #[arg(long = "column", value_name = "ROLE=COLUMN", value_parser = column)]
+    pub columns: Vec<(Role, ColumnName)>,
+    /// The unit of a column: time=ms, resistance=kohm, strain=percent, displacement=inch
+    #[arg(long = "unit", value_name = "ROLE=UNIT", value_parser = unit)]
+    pub units: Vec<(Role, String)>,
+    /// Decimal mark: . or , (2:, for the second file alone)
+    #[arg(long, value_name = "[FILE:]MARK")]
+    pub decimal: Vec<PerFile<DecimalMark>>,
+    /// Pass over the first N lines
+    #[arg(long, value_name = "[FILE:]N")]
+    pub skip: Vec<PerFile<usize>>,
+    /// The sheet of a workbook
+    #[arg(long, value_name = "NAME")]
+    pub sheet: Option<String>,
+    /// A text that stands for a missing value, besides the usual ones (OVLD, NaN, N/A, …)
+    #[arg(long, value_name = "TEXT", allow_hyphen_values = true)]
+    pub missing: Vec<String>,
+    /// A role whose sign is arbitrary: its values without their sign
+    #[arg(long, value_name = "ROLE")]
+    pub magnitude: Vec<Role>,
+    /// A role in which a lone 0 between larger values is a missing one
+    #[arg(long, value_name = "ROLE")]
+    pub drop_zeros: Vec<Role>,
+    /// The current's polarity flips with every reading: take means of neighbours
+    #[arg(long)]
+    pub fold_polarity: bool,
+    /// Clocks of readings and reference: motion (find the offset by what both show), none (one clock), or the seconds
+    /// to add to the reference's
+    #[arg(long, value_name = "motion|none|S", allow_hyphen_values = true)]
+    pub align: Option<Align>,
+    /// Rows per second, where no column is a time
+    #[arg(long, value_name = "HZ", value_parser = positive)]
+    pub rate_hz: Option<f64>,
+    /// Length of the unstretched sensor, mm: turns a displacement into strain
+    #[arg(long, value_name = "MM", value_parser = positive)]
+    pub gauge_length_mm: Option<f64>,
+    /// Electronics, as in `# front_end = …`: turns converter codes into ohms
+    #[arg(long, value_name = "SPEC")]
+    pub front_end: Option<FrontEndSpec>,
+    /// Joint, as in `# joint = …`: turns an angle into strain
+    #[arg(long, value_name = "SPEC")]
+    pub joint: Option<JointSpec>,
+    /// A known layout: electromech-stretcher (no header; Ro, Ri, tR, P, tP, F, tF)
+    #[arg(long, value_name = "NAME")]
+    pub preset: Option<Preset>,
+}
+
+impl FilesArgs {
+    /// As the library has it.
+    pub fn recipe(&self) -> Recipe {
+        Recipe {
+            preset: self.preset,
+            columns: self.columns.clone(),
+            units: self.units.clone(),
+            decimal: self.decimal.clone(),
+            skip: self.skip.clone(),
+            sheet: self.sheet.clone(),
+            missing: self.missing.clone(),
+            magnitude: self.magnitude.clone(),
+            drop_zeros: self.drop_zeros.clone(),
+            fold_polarity: self.fold_polarity,
+            align: self.align,
+            rate_hz: self.rate_hz,
+            gauge_length_mm: self.gauge_length_mm,
+            front_end: self.front_end,
+            joint: self.joint,
+        }
+    }
+}
+
+fn column(text: &str) -> Result<(Role, ColumnName), String> {
+    let (role, column) = text.split_once('=').ok_or("expected ROLE=COLUMN")?;
+    Ok((role.parse()?, column.parse().map_err(|error: ohmstrain_bench_data::import::RecipeError| error.to_string())?))
+}
+
+fn unit(text: &str) -> Result<(Role, String), String> {
+    let (role, unit) = text.split_once('=').ok_or("expected ROLE=UNIT")?;
+    Ok((role.parse()?, unit.to_owned()))
+}

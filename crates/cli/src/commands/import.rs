@@ -1,0 +1,41 @@
+use ohmstrain_bench_data::import::{Plan, Table};
+
+use crate::args::ImportArgs;
+use crate::error::CliError;
+use crate::lab_files;
+use crate::output::{Kind, Outputs, print};
+use crate::sensor_file::MADE_BY;
+
+/// Makes a trace of a lab's files. What was taken for what, and what was left out, goes to stderr.
+pub fn run(args: &ImportArgs) -> Result<(), CliError> {
+    let mut outputs = Outputs::new(args.force, &args.files);
+    let output = args.output.as_deref().map(|path| outputs.claim(path, Kind::Trace)).transpose()?;
+    let recipe = args.known.recipe();
+    let tables = lab_files::read(&args.files, &recipe)?;
+    let plan = Plan::new(&tables, &recipe)?;
+    let mut imported = plan.import(&tables)?;
+    let other = &mut imported.trace.metadata.other;
+    other.retain(|(key, _)| key != "made_by");
+    other.push(("made_by".into(), MADE_BY.into()));
+    CliError::remark(&columns(&plan, &tables));
+    imported.remarks.iter().for_each(|remark| CliError::remark(remark));
+    let mut bytes = Vec::new();
+    imported.trace.write(&mut bytes)?;
+    match output {
+        Some(output) => {
+            outputs.put(output, bytes);
+            outputs.publish()
+        }
+        None => print(|out| Ok(out.write_all(&bytes)?)),
+    }
+}
+
+/// What is what, on one line.
+fn columns(plan: &Plan, tables: &[Table]) -> String {
+    let of = |table: usize| if tables.len() > 1 { format!("{}: ", tables[table].file) } else { String::new() };
+    let columns = plan.columns(tables).into_iter();
+    let taken: Vec<String> =
+        columns.map(|(role, table, _, column, unit)| format!("{role} = {}{column} in {unit}", of(table))).collect();
+    let file = if tables.len() == 1 { tables[0].file.as_str() } else { "import" };
+    format!("{file}: {}", taken.join(", "))
+}

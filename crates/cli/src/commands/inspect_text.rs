@@ -1,0 +1,175 @@
+use std::io::Write;
+
+use comfy_table::{Table as TextTable, presets};
+use ohmstrain_bench_data::import::{ChannelSurvey, ClockSurvey, PhaseSurvey, Role, Survey, Table, candidates};
+
+use crate::commands::inspect::{Findings, Proposal};
+use crate::error::CliError;
+
+/// Characters of a cell that are shown.
+const WIDEST: usize = 24;
+
+/// Prints what was found, and the command or the question that follows from it.
+pub fn write(out: &mut dyn Write, findings: &Findings) -> Result<(), CliError> {
+    for (index, table) in findings.tables.iter().enumerate() {
+        writeln!(out, "{}: {}", table.file, layout(table))?;
+        writeln!(out, "{}\n", columns(findings, index))?;
+    }
+    match &findings.plan {
+        Ok(proposal) => write_proposal(out, proposal),
+        Err(question) => Ok(writeln!(out, "before it can be imported: {question}")?),
+    }
+}
+
+fn write_proposal(out: &mut dyn Write, proposal: &Proposal) -> Result<(), CliError> {
+    let Survey { clock, readings, reference, phases, drift, alternation, lag, lag_unknown } = &proposal.survey;
+    writeln!(out, "clock       {}", clock_line(clock))?;
+    writeln!(out, "readings    {}", channel_line(readings))?;
+    if let Some(allan) = allan_line(readings, reference.is_some()) {
+        writeln!(out, "            {allan}")?;
+    }
+    if let Some(share) = alternation {
+        writeln!(out, "polarity    flips with every reading: neighbours differ by {:.2} %", 100.0 * share)?;
+    }
+    if let Some(drift) = drift {
+        let rest = if reference.is_some() { "at rest, from the first to the last time" } else { "from start to end" };
+        writeln!(out, "drift       {:+.2} % {rest}", 100.0 * drift)?;
+    }
+    if let Some(reference) = reference {
+        writeln!(out, "reference   {}", channel_line(reference))?;
+    }
+    if let Some(phases) = phases {
+        writeln!(out, "phases      {}", phases_line(phases))?;
+    }
+    match (lag, lag_unknown) {
+        (Some(lag), _) => {
+            writeln!(out, "lag         the reference lags {:.3} ± {:.3} s behind the readings", lag.seconds, lag.sd_s)?;
+        }
+        (None, Some(why)) => writeln!(out, "lag         not known: {why}")?,
+        (None, None) => {}
+    }
+    for remark in &proposal.remarks {
+        writeln!(out, "note        {remark}")?;
+    }
+    Ok(writeln!(out, "\nimport it with\n{}", proposal.command)?)
+}
+
+/// How a file is written, in words.
+fn layout(table: &Table) -> String {
+    let layout = &table.layout;
+    let mut words = vec![layout.format.clone()];
+    words.extend(layout.encoding.map(str::to_owned));
+    words.extend(layout.separator.map(|separator| format!("separated by {separator}")));
+    if layout.separator.is_some() {
+        words.push(format!("decimal mark `{}`", layout.decimal));
+    }
+    if layout.skip > 0 {
+        words.push(format!("{} lines above the header", layout.skip));
+    }
+    words.push(match layout.header_lines {
+        0 if table.has_names() => "names from the file itself".to_owned(),
+        0 => "no header".to_owned(),
+        1 => "1 header line".to_owned(),
+        lines => format!("{lines} header lines"),
+    });
+    if layout.unit_line {
+        words.push("a line of units".to_owned());
+    }
+    if layout.text_lines > 0 {
+        words.push(format!("{} lines of text passed over", layout.text_lines));
+    }
+    words.push(format!("{} rows", table.len()));
+    words.join(", ")
+}
+
+/// A row for each column: what it may be, or is proposed to be.
+fn columns(findings: &Findings, index: usize) -> TextTable {
+    let table = &findings.tables[index];
+    let mut text = TextTable::new();
+    text.load_style(presets::ASCII_MARKDOWN);
+    text.set_header(["#", "column", "unit", "taken for", "first", "last"]);
+    let taken = findings.plan.as_ref().map(|proposal| proposal.plan.columns(&findings.tables)).unwrap_or_default();
+    let found = candidates(&findings.tables);
+    for (place, column) in table.columns.iter().enumerate() {
+        let is_here =
+            |(_, table, column, ..): &&(Role, usize, usize, String, &str)| (*table, *column) == (index, place);
+        let role = match (taken.iter().find(is_here), found.iter().find(|it| (it.table, it.column) == (index, place))) {
+            (Some((role, _, _, _, unit)), _) => format!("{role}, {unit}"),
+            (None, Some(candidate)) => format!("({}?)", candidate.role),
+            (None, None) => String::new(),
+        };
+        text.add_row([
+            (place + 1).to_string(),
+            short(&column.heading),
+            short(column.unit.as_deref().unwrap_or_default()),
+            role,
+            short(column.cells.get(0)),
+            short(column.cells.get(column.cells.len().saturating_sub(1))),
+        ]);
+    }
+    text
+}
+
+/// Foreign text that fits a cell and cannot garble a terminal.
+fn short(text: &str) -> String {
+    let clean: String = text.chars().take(WIDEST).map(|c| if c.is_control() { '\u{fffd}' } else { c }).collect();
+    if text.chars().count() > WIDEST { clean + "…" } else { clean }
+}
+
+fn clock_line(clock: &ClockSurvey) -> String {
+    let ms = |seconds: f64| number(1e3 * seconds);
+    let mut line = format!(
+        "{} Hz: steps of {} ms, nine in ten from {} to {} ms; {} s",
+        number(1.0 / clock.step_s),
+        ms(clock.step_s),
+        ms(clock.step_range_s.0),
+        ms(clock.step_range_s.1),
+        number(clock.span_s.1 - clock.span_s.0)
+    );
+    if clock.gaps.0 > 0 {
+        line += &format!("; {} gaps, the longest {} s", clock.gaps.0, number(clock.gaps.1));
+    }
+    line + &format!("; {} duplicates", clock.duplicates)
+}
+
+fn channel_line(channel: &ChannelSurvey) -> String {
+    let mut line = format!("{} to {}, {} missing", number(channel.range.0), number(channel.range.1), channel.counts.1);
+    for (count, end) in [(channel.clipped.0, "smallest"), (channel.clipped.1, "largest")] {
+        if count > 0 {
+            line += &format!("; {count} clipped at the {end}");
+        }
+    }
+    format!("{line}; noise {} from row to row", number(channel.noise))
+}
+
+fn allan_line(channel: &ChannelSurvey, has_reference: bool) -> Option<String> {
+    let first = channel.allan.first()?;
+    let least = channel.allan.iter().min_by(|a, b| a.deviation.total_cmp(&b.deviation))?;
+    let at = |deviation: f64, tau_s: f64| format!("{} over {} s", number(deviation), number(tau_s));
+    Some(format!(
+        "Allan deviation{} {}, least {}",
+        if has_reference { " in the longest hold" } else { "" },
+        at(first.deviation, first.tau_s),
+        at(least.deviation, least.tau_s)
+    ))
+}
+
+fn phases_line(survey: &PhaseSurvey) -> String {
+    let names = ["stretches", "holds", "releases"];
+    let phases = survey
+        .phases
+        .iter()
+        .zip(names)
+        .map(|((count, seconds), name)| format!("{count} {name} ({} s)", number(*seconds)));
+    phases.collect::<Vec<_>>().join(", ")
+}
+
+/// Four digits.
+fn number(value: f64) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return value.to_string();
+    }
+    let decimals = (3 - value.abs().log10().floor() as i32).clamp(0, 9) as usize;
+    let text = format!("{value:.decimals$}");
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+}

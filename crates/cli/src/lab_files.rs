@@ -1,0 +1,50 @@
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+use ohmstrain_bench_data::import::{ImportError, Plan, Recipe, Table, read_table};
+
+use crate::error::CliError;
+use crate::input::is_stdin;
+
+/// Reads files as a lab writes them.
+pub fn read(paths: &[PathBuf], recipe: &Recipe) -> Result<Vec<Table>, CliError> {
+    if paths.iter().filter(|path| is_stdin(path)).count() > 1 {
+        return Err(CliError::Arguments("FILE: - may stand there once".into()));
+    }
+    let table = |(index, path): (usize, &PathBuf)| {
+        let name = if is_stdin(path) { "stdin".to_owned() } else { path.display().to_string() };
+        Ok(read_table(bytes(path)?, &name, &recipe.read_options(index))?)
+    };
+    paths.iter().enumerate().map(table).collect()
+}
+
+fn bytes(path: &Path) -> Result<Vec<u8>, CliError> {
+    let mut bytes = Vec::new();
+    let read = if is_stdin(path) {
+        std::io::stdin().lock().read_to_end(&mut bytes).map(|_| bytes)
+    } else {
+        std::fs::read(path)
+    };
+    read.map_err(|error| CliError::file("read", path, &error))
+}
+
+/// The command that imports files as planned, ready for a shell.
+pub fn command(paths: &[PathBuf], tables: &[Table], plan: &Plan) -> Result<String, CliError> {
+    let mut words = vec!["ohmstrain".to_owned(), "import".to_owned()];
+    for path in paths {
+        let path = path.display().to_string();
+        // What begins with a hyphen would be taken for a flag.
+        words.push(if path.starts_with('-') && path != "-" { format!("./{path}") } else { path });
+    }
+    words.extend(plan.recipe(tables).arguments());
+    let is_taken = |name: &str| paths.iter().any(|path| path.file_name().is_some_and(|file| file == name));
+    let output = ["trace.csv", "imported.csv", "imported-trace.csv"].into_iter().find(|name| !is_taken(name));
+    words.extend(["-o".to_owned(), output.unwrap_or("imported-trace-1.csv").to_owned()]);
+    shlex::try_join(words.iter().map(String::as_str)).map_err(|error| CliError::Other(error.to_string()))
+}
+
+impl From<ImportError> for CliError {
+    fn from(error: ImportError) -> Self {
+        Self::Input(error.to_string())
+    }
+}

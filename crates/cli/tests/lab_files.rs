@@ -1,0 +1,163 @@
+//! `inspect` and `import` as a shell runs them.
+
+#[allow(dead_code, reason = "each test program uses its own share")]
+mod common;
+
+use std::fmt::Write as _;
+use std::process::Command;
+
+use assert_cmd::cargo::cargo_bin;
+use common::{Bench, Csv, SIMULATE};
+
+/// Runs a line of shell in the bench's folder, with the program on its path; what was printed.
+#[track_caller]
+fn shell(bench: &Bench, line: &str) -> (Option<i32>, String, String) {
+    let folder = cargo_bin("ohmstrain").parent().unwrap().to_path_buf();
+    let path = format!("{}:{}", folder.display(), std::env::var("PATH").unwrap());
+    let output = Command::new("sh").args(["-c", line]).env("PATH", path).current_dir(bench.path("")).output().unwrap();
+    let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+    (output.status.code(), text(output.stdout), text(output.stderr))
+}
+
+/// A German export with a preamble.
+fn export(rows: usize) -> String {
+    let mut out = "Prüfstand 4\nBediener: x\nZeit (ms);Widerstand (kOhm);Weg (mm)\n".to_owned();
+    for row in 0..rows {
+        // Five seconds of rest before it moves.
+        let phase = 0.1 * (row.max(100) - 100) as f64;
+        let (kiloohm, mm) = (1.6 + 0.1 * phase.sin(), 2.0 - 2.0 * phase.cos());
+        writeln!(
+            out,
+            "{};{};{}",
+            50 * row,
+            format!("{kiloohm:.4}").replace('.', ","),
+            format!("{mm:.3}").replace('.', ",")
+        )
+        .unwrap();
+    }
+    out
+}
+
+#[test]
+fn what_is_suggested_is_ready_for_a_shell() {
+    let bench = Bench::new();
+    bench.write("it's a test; rm.csv", export(200));
+    let inspect = "ohmstrain inspect --suggest *.csv --gauge-length-mm 30";
+    let (code, line, said) = shell(&bench, inspect);
+    assert_eq!((code, said.as_str()), (Some(0), ""));
+    assert_eq!(line.lines().count(), 1);
+    let (code, printed, said) = shell(&bench, &line);
+    assert_eq!((code, printed.as_str()), (Some(0), ""), "{said}");
+    assert!(said.lines().all(|line| line.starts_with("ohmstrain: ")) && said.contains("resistance = "), "{said}");
+    let trace = Csv::new(&bench.read("trace.csv"));
+    assert_eq!(trace.header, "time_s,resistance_ohm,strain");
+    assert_eq!(trace.numbers("time_s")[199], 9.95);
+    assert_eq!(trace.numbers("resistance_ohm")[0], 1600.0);
+    assert_eq!(trace.numbers("strain")[0], 0.0);
+}
+
+#[test]
+fn inspect_says_what_it_found_and_how_to_go_on() {
+    let bench = Bench::new();
+    bench.write("rig.csv", export(400));
+    let known = ["--gauge-length-mm", "30"];
+    let text = bench.run(&[&["inspect", "rig.csv"][..], &known].concat()).ok();
+    for words in [
+        "separated by semicolons",
+        "decimal mark `,`",
+        "UTF-8",
+        "2 lines above the header",
+        "400 rows",
+        "resistance, kohm",
+        "20 Hz",
+        "0 duplicates",
+        "noise",
+        "Allan",
+        "drift",
+        "phases",
+        "lag",
+        "import it with\nohmstrain import rig.csv --column 'time=Zeit (ms)'",
+    ] {
+        assert!(text.contains(words), "{words}: {text}");
+    }
+    let json: serde_json::Value =
+        serde_json::from_str(&bench.run(&[&["inspect", "rig.csv", "--json"][..], &known].concat()).ok()).unwrap();
+    assert_eq!(json["files"][0]["separator"], "semicolons");
+    // A difference of times up to 20 s, each rounded.
+    let step_s = json["recording"]["clock"]["step_s"].as_f64().unwrap();
+    assert!((step_s - 0.05).abs() < 20.0 * f64::EPSILON);
+    assert_eq!(json["columns"][1]["role"], "resistance");
+    let line = bench.run(&[&["inspect", "rig.csv", "--suggest"][..], &known].concat()).ok();
+    assert_eq!(json["command"], line.trim_end());
+}
+
+#[test]
+fn what_is_open_is_asked_on_one_line_with_the_answer() {
+    let bench = Bench::new();
+    bench.write("rig.csv", export(50));
+    let question =
+        "rig.csv: a displacement becomes strain by the length of the unstretched sensor; say --gauge-length-mm MM";
+    bench.run(&["inspect", "--suggest", "rig.csv"]).fails(4, question);
+    bench.run(&["import", "rig.csv", "-o", "trace.csv"]).fails(4, question);
+    assert_eq!(bench.files(), ["rig.csv"]);
+    let text = bench.run(&["inspect", "rig.csv"]).ok();
+    assert!(text.contains(&format!("before it can be imported: {question}")), "{text}");
+    let json = bench.run(&["inspect", "rig.csv", "--json"]).ok();
+    assert_eq!(serde_json::from_str::<serde_json::Value>(&json).unwrap()["question"], question);
+    let run = bench.run(&["import", "rig.csv", "--unit", "resistance=furlong", "-o", "trace.csv"]);
+    assert!(run.code == Some(4) && run.stderr.contains("--unit resistance=kohm"), "{}", run.stderr);
+}
+
+#[test]
+fn an_imported_file_is_a_trace_and_no_input_is_overwritten() {
+    let bench = Bench::new();
+    bench.run(&[&SIMULATE[..], &["-o", "trace.csv"]].concat()).ok();
+    let line = bench.run(&["inspect", "--suggest", "trace.csv"]).ok();
+    assert!(line.ends_with("-o imported.csv\n"), "{line}");
+    let (code, _, said) = shell(&bench, &line);
+    assert_eq!(code, Some(0), "{said}");
+    let rows =
+        |name: &str| bench.read(name).lines().filter(|line| !line.starts_with('#')).collect::<Vec<_>>().join("\n");
+    assert_eq!(rows("imported.csv"), rows("trace.csv"));
+    bench.write("rig.csv", export(50));
+    let run = bench.run(&["import", "rig.csv", "--gauge-length-mm", "30", "-o", "rig.csv"]);
+    assert_eq!((run.code, bench.read("rig.csv")), (Some(2), export(50)), "{}", run.stderr);
+}
+
+#[test]
+fn two_files_are_aligned_and_the_offset_is_printed_with_its_uncertainty() {
+    let bench = Bench::new();
+    bench.run(&[&SIMULATE[..], &["-o", "trace.csv"]].concat()).ok();
+    let trace = Csv::new(&bench.read("trace.csv"));
+    let (mut readings, mut reference) = ("Time (s),R (Ohm)\n".to_owned(), "Time (s),Strain (%)\n".to_owned());
+    let columns = trace.numbers("time_s").into_iter().zip(trace.numbers("resistance_ohm")).zip(trace.numbers("strain"));
+    for ((time, ohm), strain) in columns {
+        writeln!(readings, "{time},{ohm}").unwrap();
+        writeln!(reference, "{},{}", time + 20.0, 100.0 * strain).unwrap();
+    }
+    bench.write("dmm.csv", readings);
+    bench.write("stage.csv", reference);
+    let line = bench.run(&["inspect", "--suggest", "dmm.csv", "stage.csv"]).ok();
+    assert!(line.contains("--align motion") && line.contains("reference-time=2:"), "{line}");
+    let (code, _, said) = shell(&bench, &line.replace("trace.csv", "both.csv"));
+    assert_eq!(code, Some(0), "{said}");
+    let found = said.split_once("the reference's clock plus ").unwrap().1;
+    let mut words = found.split(' ');
+    let offset: f64 = words.next().unwrap().parse().unwrap();
+    let sd: f64 = words.nth(1).unwrap().parse().unwrap();
+    assert!((offset + 20.0).abs() < 3.0 * sd + 0.05 && sd < 0.3, "{said}");
+}
+
+#[test]
+fn a_file_that_is_no_trace_is_sent_to_inspect() {
+    let bench = Bench::calibrated();
+    bench.write("rig file.csv", export(50));
+    for command in ["filter", "smooth", "evaluate"] {
+        let run = bench.run(&[command, "rig file.csv", "--sensor", "sensor.toml"]);
+        assert_eq!(run.code, Some(4));
+        assert!(run.stderr.ends_with("; see `ohmstrain inspect 'rig file.csv'`\n"), "{}", run.stderr);
+        assert_eq!(run.stderr.lines().count(), 1);
+    }
+    let run = bench.feed(&["filter", "--sensor", "sensor.toml"], export(5));
+    assert!(run.code == Some(4) && !run.stderr.contains("inspect"), "{}", run.stderr);
+}
