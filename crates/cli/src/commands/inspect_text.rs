@@ -43,7 +43,8 @@ fn write_proposal(out: &mut dyn Write, proposal: &Proposal) -> Result<(), CliErr
     }
     match (lag, lag_unknown) {
         (Some(lag), _) => {
-            writeln!(out, "lag         the reference lags {:.3} ± {:.3} s behind the readings", lag.seconds, lag.sd_s)?;
+            let (word, seconds) = if lag.seconds < 0.0 { ("leads", -lag.seconds) } else { ("lags", lag.seconds) };
+            writeln!(out, "lag         the reference {word} the readings by {seconds:.3} ± {:.3} s", lag.sd_s)?;
         }
         (None, Some(why)) => writeln!(out, "lag         not known: {why}")?,
         (None, None) => {}
