@@ -53,6 +53,7 @@ fn sensor() -> SensorParams {
         quantity: Quantity::Strain,
         reading: ReadingUnit::Ratio,
         rest_reading: 1.0,
+        measured_rest: None,
         default_estimator: EstimatorKind::Ekf,
         limits,
         validity: Validity {

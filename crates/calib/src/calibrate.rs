@@ -7,12 +7,14 @@ use crate::correction_fit::fit_correction;
 use crate::correction_params::CorrectionParams;
 use crate::estimator_params::{EstimatorKind, EstimatorParams};
 use crate::filter::Start;
+use crate::identifiability::identifiability;
 use crate::law_fit::{CrossFit, LawOptions, fit_laws};
 use crate::law_params::LawParams;
 use crate::left_out::REFERENCE_SD;
 use crate::motion_stats::MotionStats;
 use crate::noise_fit::{NoiseProblem, REFINEMENT, SURVEY, Surveyed, survey, survey_evaluations};
 use crate::params::{FORMAT, Quantity, RangeParams, ReadingUnit, SensorParams, Uncertainty, Validity};
+use crate::rest::rest_share;
 use crate::samples::Samples;
 use crate::screen::{Distrusted, screen};
 use crate::sieve::{Sieve, longest_repeat_s};
@@ -40,8 +42,11 @@ pub struct Calibration {
     pub law: LawParams,
     /// R₀ of each recording.
     pub rest_readings: Vec<f64>,
-    /// Standard errors of the law's parameters.
-    pub uncertainty: Uncertainty,
+    /// What the rested sensor reads over R₀, if a recording begins at rest.
+    pub rest_share: Option<f64>,
+    /// What the recordings tell of the law's parameters: without the ridge, as [`identifiability`] has it; `None` if they
+    /// tell nothing without it.
+    pub uncertainty: Option<Uncertainty>,
     /// Root mean squared error of the law on blocks left out, relative to R₀.
     pub law_error: f64,
     /// The estimator that did best.
@@ -71,6 +76,7 @@ impl Calibration {
             quantity,
             reading,
             rest_reading: rests[rests.len() / 2],
+            measured_rest: self.rest_share.map(|share| share * rests[rests.len() / 2]),
             default_estimator: self.default_estimator,
             limits: self.limits,
             validity: self.validity,
@@ -79,7 +85,7 @@ impl Calibration {
             law: self.law,
             estimators: self.estimators,
             recordings: vec![],
-            uncertainty: Some(self.uncertainty),
+            uncertainty: self.uncertainty,
             correction: self.correction,
         }
     }
@@ -178,7 +184,8 @@ pub fn calibrate(
         },
         limits,
         law_error: fit.law.cross_validated_error,
-        uncertainty: fit.uncertainty.clone(),
+        uncertainty: identifiability(recordings, &fit.law.law).ok().map(|found| found.told()),
+        rest_share: rest_share(recordings, &fit.law.rest_readings, limits.span()),
         rest_readings: fit.law.rest_readings.clone(),
         law: fit.law.law.clone(),
     })

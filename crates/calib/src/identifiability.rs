@@ -86,6 +86,22 @@ fn condition_number(jacobian: &DMatrix<f64>) -> f64 {
 }
 
 impl Identifiability {
+    /// The parameters without the ridge, but for time constants that end on a bound: a recording does not tell those, and
+    /// their standard errors say how well the bound is known.
+    #[must_use]
+    pub fn told(&self) -> Uncertainty {
+        let Uncertainty { names, values, standard_errors, covariance } = &self.parameters;
+        let told = |i: &usize| self.on_bound.iter().all(|on| on.name != names[*i]);
+        let kept: Vec<usize> = (0..names.len()).filter(told).collect();
+        let pick = |values: &[f64]| kept.iter().map(|&i| values[i]).collect::<Vec<f64>>();
+        Uncertainty {
+            names: kept.iter().map(|&i| names[i].clone()).collect(),
+            values: pick(values),
+            standard_errors: pick(standard_errors),
+            covariance: kept.iter().map(|&i| pick(&covariance[i])).collect(),
+        }
+    }
+
     /// The most strongly correlated pairs of parameters, strongest first.
     #[must_use]
     pub fn strongest_correlations(&self) -> Vec<(&str, &str, f64)> {

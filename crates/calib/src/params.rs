@@ -8,6 +8,7 @@ use crate::baselines::StaticCubic;
 use crate::correction_params::CorrectionParams;
 use crate::estimator_params::{EstimatorKind, EstimatorParams};
 use crate::law_params::LawParams;
+use crate::sd_scale::LARGEST_SD_SCALE;
 
 /// Version of the parameter file this code reads and writes.
 pub const FORMAT: u32 = 4;
@@ -26,8 +27,12 @@ pub struct SensorParams {
     pub quantity: Quantity,
     /// What the readings are.
     pub reading: ReadingUnit,
-    /// R₀: the reading at zero strain after everything has relaxed; Ω, or a ratio.
+    /// R₀ of the law, which everything is relative to; Ω, or a ratio. A fitted number: see `measured_rest`.
     pub rest_reading: f64,
+    /// What the rested sensor read in calibration, before it first moved, in the same unit; `None` if no recording begins
+    /// at rest. A resistance measured at rest is compared with this one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub measured_rest: Option<f64>,
     /// The estimator to use unless another is asked for.
     pub default_estimator: EstimatorKind,
     /// Range of the output: the reference's range in calibration, or a joint's stops.
@@ -46,7 +51,8 @@ pub struct SensorParams {
     /// The recordings it was calibrated on.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub recordings: Vec<RecordingInfo>,
-    /// Standard errors of the law's parameters.
+    /// What the recordings tell of the law's parameters by themselves, without the ridge that the filter's law has. What
+    /// they do not tell is missing.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub uncertainty: Option<Uncertainty>,
     /// What was learned about the filter's error, if that was asked for.
@@ -186,6 +192,25 @@ impl Uncertainty {
 }
 
 impl SensorParams {
+    /// Whose intervals were widened as far as they ever are, [`LARGEST_SD_SCALE`](crate::LARGEST_SD_SCALE), when the blocks
+    /// left out may ask for more: the default estimator's, or those of the filter that it corrects, `filter` or `smoother`.
+    #[must_use]
+    pub fn widened_most(&self) -> Vec<&'static str> {
+        let of = |kind: EstimatorKind| self.estimators.get(&kind.filter());
+        let kind = self.default_estimator;
+        let filter = of(kind).map(|params| params.strain_sd_scale);
+        let smoother = of(kind.smoother()).and_then(|params| params.smoothed_sd_scale);
+        let widened = [("filter", filter), ("smoother", smoother)];
+        let at_most = |scale: Option<f64>| scale.is_some_and(|scale| scale >= LARGEST_SD_SCALE);
+        widened.into_iter().filter(|(_, scale)| at_most(*scale)).map(|(name, _)| name).collect()
+    }
+
+    /// R₀ of the law on a day on which the rested sensor reads `measured`, in its unit.
+    #[must_use]
+    pub fn rest_reading_of(&self, measured: f64) -> f64 {
+        self.rest_reading * (measured / self.measured_rest.unwrap_or(self.rest_reading))
+    }
+
     /// The parameters of an estimator.
     ///
     /// # Errors

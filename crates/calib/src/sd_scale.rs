@@ -1,6 +1,7 @@
-/// No narrowing: an easy recording is no promise for the next one. A factor beyond the upper end says that something else
-/// is wrong.
-const SCALES: std::ops::RangeInclusive<f64> = 1.0..=5.0;
+/// A factor beyond this says that something else is wrong: calibrations say so where they reach it.
+pub const LARGEST_SD_SCALE: f64 = 5.0;
+/// No narrowing: an easy recording is no promise for the next one.
+const SCALES: std::ops::RangeInclusive<f64> = 1.0..=LARGEST_SD_SCALE;
 /// What has been widened to cover the worst block may be narrowed to cover all of them.
 const JOINT_SCALES: std::ops::RangeInclusive<f64> = 0.5..=3.0;
 /// Half-widths of the 50, 90 and 95 % intervals of a standard normal.

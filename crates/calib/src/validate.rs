@@ -49,6 +49,7 @@ impl SensorParams {
     pub fn validate(&self) -> Result<(), FieldError> {
         let root = Table::root();
         root.number("rest_reading", self.rest_reading, POSITIVE)?;
+        self.measured_rest.map_or(Ok(()), |measured| root.number("measured_rest", measured, POSITIVE))?;
         self.limits.validate(&root.table("limits"))?;
         self.validity.validate(&root.table("validity"))?;
         self.check_rest(&root)?;

@@ -3,8 +3,9 @@
 use std::f64::consts::TAU;
 
 use ohmstrain_calib::{
-    Calibration, CalibrationError, EstimatorKind, GaugeFamily, LawFit, LawOptions, Quantity, RangeParams, ReadingUnit,
-    Samples, ScoredRow, Scores, SensorParams, Stage, Start, StaticCubic, build_filter, calibrate, fit_law,
+    Calibration, CalibrationError, EstimatorKind, GaugeFamily, LARGEST_SD_SCALE, LawFit, LawOptions, Quantity,
+    RangeParams, ReadingUnit, Samples, ScoredRow, Scores, SensorParams, Stage, Start, StaticCubic, build_filter,
+    calibrate, fit_law,
 };
 use ohmstrain_ekf::Reading;
 
@@ -156,6 +157,15 @@ fn calibration_makes_a_filter_that_beats_the_static_inverse_and_knows_how_far() 
     // The file format holds everything, to the last bit.
     let text = toml::to_string(&params).unwrap();
     assert_eq!(toml::from_str::<SensorParams>(&text).unwrap(), params);
+    // What the rested sensor read is no other R₀ than the law's, and twice of it is twice that.
+    let measured = params.measured_rest.unwrap();
+    assert_eq!(params.rest_reading_of(measured), params.rest_reading);
+    assert_eq!(params.rest_reading_of(2.0 * measured), 2.0 * params.rest_reading);
+    // An interval that is widened as far as can be is told of.
+    assert_eq!(params.widened_most(), [""; 0]);
+    let mut wide = params.clone();
+    wide.estimators.values_mut().for_each(|of| of.strain_sd_scale = LARGEST_SD_SCALE);
+    assert_eq!(wide.widened_most(), ["filter"]);
     // Same samples, same parameters.
     let again = calibrate(&[training], &[LawOptions::default()], &[EstimatorKind::Ekf], |_| ()).unwrap();
     assert_eq!((again.law, again.estimators), (calibration.law, calibration.estimators));

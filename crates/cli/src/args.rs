@@ -165,6 +165,9 @@ pub struct CalibrateArgs {
     /// hypotheses or particles; ekf is calibrated in any case
     #[arg(long, default_value = "auto")]
     pub estimator: Auto<Estimator>,
+    /// Move a reference that is early or late to where the readings say it belongs
+    #[arg(long)]
+    pub align: bool,
     /// Seed of --bootstrap; the calibration itself draws nothing
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
@@ -201,8 +204,8 @@ pub struct EstimateArgs {
     /// Strain (or angle) at the first row, if it is known; the body is at rest there
     #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = finite)]
     pub initial_strain: Option<f64>,
-    /// Resistance at rest instead of the sensor file's: a number in the readings' unit, or first:N for the median of
-    /// the first N readings
+    /// What the rested, unstretched sensor reads now, in place of what it read in calibration: a number in the readings'
+    /// unit, or first:N for the median of the first N readings
     #[arg(long, value_name = "OHM|first:N")]
     pub rest_resistance: Option<RestResistance>,
     /// Turn down readings whose normalised innovation squared (column nis) is above X, ten in a row at most

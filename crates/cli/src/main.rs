@@ -3,6 +3,7 @@
 //! stdout is data, stderr is messages. Exit codes: 0 done (a closed pipe too), 1 anything else, 2 arguments, 3
 //! `evaluate --check` failed, 4 the contents of an input.
 
+mod alignment;
 mod args;
 mod commands;
 mod error;

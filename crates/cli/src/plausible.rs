@@ -1,7 +1,7 @@
 //! What recordings given to a calibration say about their units, and about being of one sensor.
 
 use ohmstrain_bench_data::{Quantity, ReadingKind};
-use ohmstrain_calib::{Distrusted, Screened, SensorParams};
+use ohmstrain_calib::{Distrusted, LARGEST_SD_SCALE, Screened, SensorParams};
 
 use crate::error::CliError;
 use crate::input::Recording;
@@ -138,6 +138,16 @@ pub fn warn_of_rests(recordings: &[Recording], params: &SensorParams) {
             a.name,
             b.name,
             100.0 * (most / least - 1.0)
+        ));
+    }
+}
+
+/// Says whose intervals the law is too wrong for.
+pub fn warn_of_intervals(params: &SensorParams) {
+    for of in params.widened_most() {
+        CliError::warning(&format!(
+            "the {of}'s intervals are widened by {LARGEST_SD_SCALE}, the most there is: on parts of the recordings that it has \
+             not seen, the law is more wrong than they say; another recording, or other branches, may help (--explain)"
         ));
     }
 }

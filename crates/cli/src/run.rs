@@ -53,7 +53,7 @@ pub fn filter(params: &SensorParams, kind: EstimatorKind, args: &EstimateArgs) -
     Ok(filter)
 }
 
-/// R₀ for a recording whose first readings are `first`.
+/// R₀ of the law for a recording whose first readings are `first`.
 pub fn rest_reading(
     wanted: Option<RestResistance>,
     params: &SensorParams,
@@ -62,8 +62,8 @@ pub fn rest_reading(
 ) -> Result<f64, CliError> {
     match wanted {
         None => Ok(params.rest_reading),
-        Some(RestResistance::Value(value)) => Ok(value),
-        Some(RestResistance::First(count)) => median_of_first(count, first, file),
+        Some(RestResistance::Value(value)) => Ok(params.rest_reading_of(value)),
+        Some(RestResistance::First(count)) => Ok(params.rest_reading_of(median_of_first(count, first, file)?)),
     }
 }
 

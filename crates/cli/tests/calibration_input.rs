@@ -172,3 +172,32 @@ fn copies_and_other_sensors_are_mentioned() {
     let rests = run.warnings.iter().find(|warning| warning.contains("R0 comes out as")).unwrap();
     assert!(rests.contains("50 % more: one sensor?"), "{rests}");
 }
+
+#[test]
+fn a_late_reference_is_refused_or_moved() {
+    let bench = bench();
+    calibrate(&bench, "trace.csv", &[]).ok();
+    let plain = error_on_the_rest(&bench);
+    let strains: Vec<String> = {
+        let mut strains = Vec::new();
+        change_rows(&bench.read("trace.csv"), |_, cells| strains.push(cells[2].clone()));
+        strains
+    };
+    // Ten rows are 2 s.
+    let late = change_rows(&bench.read("trace.csv"), |k, cells| cells[2].clone_from(&strains[k.saturating_sub(10)]));
+    bench.write("late.csv", late);
+    let run = calibrate(&bench, "late.csv", &[]);
+    assert_eq!(run.code, Some(4), "{}", run.stderr);
+    let seconds = |text: &str, before: &str| -> f64 {
+        let (_, rest) = text.split_once(before).unwrap_or_else(|| panic!("{before} in {text}"));
+        rest.split_once(" s late").unwrap().0.parse().unwrap()
+    };
+    // One row.
+    assert!((seconds(&run.stderr, "seems to be ") - 2.0).abs() < 0.2, "{}", run.stderr);
+    let run = calibrate(&bench, "late.csv", &["--align"]);
+    assert_eq!(run.code, Some(0), "{}", run.stderr);
+    assert!((seconds(&run.warnings[0], "the reference is ") - 2.0).abs() < 0.2, "{:?}", run.warnings);
+    // Aligned to a fraction of a row, it is no worse than before to the extent that two searches are alike.
+    let moved = error_on_the_rest(&bench);
+    assert!(moved < 1.1 * plain, "{moved} %FS instead of {plain}");
+}

@@ -224,7 +224,7 @@ fn the_rest_resistance_is_the_sensors_or_given_or_that_of_the_first_readings() {
         (0.5 * (four[1] + four[2])).to_string()
     });
     let sensor: toml::Table = toml::from_str(&bench.read("sensor.toml")).unwrap();
-    let calibrated = sensor["rest_reading"].as_float().unwrap().to_string();
+    let calibrated = sensor["measured_rest"].as_float().unwrap().to_string();
     for command in ["filter", "smooth"] {
         let estimates =
             |rest: &str| bench.run(&[command, "trace.csv", "--sensor", "sensor.toml", "--rest-resistance", rest]).ok();

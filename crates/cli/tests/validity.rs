@@ -63,7 +63,7 @@ fn readings_and_strains_that_calibration_has_not_seen_are_warned_of() {
     assert_eq!((of(": resistance_ohm is outside of"), of(": strain is outside of")), (1, 1), "{warnings:?}");
     // The filter has no reference, and no objection to readings if R₀ is as much larger.
     let rest: f64 =
-        bench.read("sensor.toml").lines().find_map(|line| line.strip_prefix("rest_reading = ")?.parse().ok()).unwrap();
+        bench.read("sensor.toml").lines().find_map(|line| line.strip_prefix("measured_rest = ")?.parse().ok()).unwrap();
     assert_eq!(warned(&bench, &["filter", "scaled.csv"]).len(), warnings.len() - 1);
     let smoothed = warned(&bench, &["smooth", "scaled.csv"]);
     assert_eq!(smoothed.iter().filter(|line| line.contains(": resistance_ohm is outside of")).count(), 1);

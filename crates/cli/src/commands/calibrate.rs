@@ -5,6 +5,7 @@ use ohmstrain_calib::{
 };
 
 use super::{explain, scoring};
+use crate::alignment;
 use crate::args::CalibrateArgs;
 use crate::error::CliError;
 use crate::input::{self, Recording, unit};
@@ -27,6 +28,9 @@ pub fn run(args: &CalibrateArgs) -> Result<(), CliError> {
         let row_at = |time_s: f64| recording.trace.time_s.partition_point(|earlier_s| *earlier_s < time_s);
         let end = args.until.map_or(recording.trace.len(), row_at);
         recordings.push(recording.rows(args.from.map_or(0, row_at).min(end)..end));
+    }
+    for recording in &mut recordings {
+        alignment::check(recording, args.align)?;
     }
     let estimator = args.estimator.chosen().map_or(RECIPE.estimator, |estimator| estimator.0);
     let structures = structures(args, estimator);
@@ -80,6 +84,7 @@ pub fn calibrate_recordings(
     let sensor = calibration.into_sensor(MADE_BY, quantity, reading);
     let sensor = SensorParams { joint: recordings.iter().find_map(Recording::joint), recordings: infos, ..sensor };
     plausible::warn_of_rests(recordings, &sensor);
+    plausible::warn_of_intervals(&sensor);
     Ok(sensor)
 }
 

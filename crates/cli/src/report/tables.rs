@@ -93,21 +93,23 @@ pub fn parameters(params: &SensorParams, rest_reading: f64) -> Vec<Table> {
     tables
 }
 
+/// Half-width of the 95 % interval of a standard normal.
+const Z_95: f64 = 1.96;
+
 /// Rows of a parameter table under construction.
 struct Rows<'a> {
-    rows: Vec<[String; 3]>,
+    rows: Vec<[String; 4]>,
     uncertainty: Option<&'a Uncertainty>,
     found: Vec<usize>,
 }
 
 impl Rows<'_> {
-    /// A value with the standard error of its `path` in the sensor's file.
+    /// The value that the filter runs with, and what is told of it under its `path` in the sensor's file.
     fn fitted(&mut self, name: &str, path: &str, value: f64, unit: &str) {
         let place = self.uncertainty.and_then(|known| known.names.iter().position(|name| name == path));
-        let error = place.and_then(|place| self.uncertainty?.standard_errors.get(place).copied());
         self.found.extend(place);
-        let value = error.map_or_else(|| plain(value), |error| with_error(value, error));
-        self.rows.push([name.into(), value, unit.into()]);
+        let told = self.uncertainty.map_or_else(|| "–".into(), |known| told(known, place));
+        self.rows.push([name.into(), plain(value), told, unit.into()]);
     }
 
     /// Errors of whatever has no row of its own.
@@ -116,9 +118,19 @@ impl Rows<'_> {
         let entries = known.names.iter().zip(&known.values).zip(&known.standard_errors).enumerate();
         for (place, ((name, value), error)) in entries {
             if !self.found.contains(&place) {
-                self.rows.push([name.clone(), with_error(*value, *error), String::new()]);
+                self.rows.push([name.clone(), "–".into(), with_error(*value, *error), String::new()]);
             }
         }
+    }
+}
+
+/// What recordings tell of a parameter; an interval that holds zero does not tell it.
+fn told(known: &Uncertainty, place: Option<usize>) -> String {
+    let at = |values: &[f64]| place.and_then(|place| values.get(place).copied());
+    match (at(&known.values), at(&known.standard_errors)) {
+        (Some(value), Some(error)) if value.abs() > Z_95 * error => with_error(value, error),
+        (Some(value), Some(error)) => format!("not told ({})", with_error(value, error)),
+        _ => "not told".into(),
     }
 }
 
@@ -129,7 +141,10 @@ fn law(params: &SensorParams, rest_reading: f64) -> Table {
         ReadingUnit::Ohm => "Ω",
         ReadingUnit::Ratio => "–",
     };
-    rows.fitted("Reading at rest R₀", "rest_reading", rest_reading, reading);
+    rows.fitted("R₀ of the law", "rest_reading", rest_reading, reading);
+    if let Some(measured) = params.measured_rest {
+        rows.rows.push(["Reading of the rested sensor".into(), plain(measured), plain(measured), reading.into()]);
+    }
     gauge(&mut rows, &law.gauge, quantity);
     let seconds = match quantity {
         Quantity::Strain => "s",
@@ -151,8 +166,12 @@ fn law(params: &SensorParams, rest_reading: f64) -> Table {
         }
     }
     rows.rest();
-    let caption = if params.uncertainty.is_some() { "The law, value ± standard error" } else { "The law" };
-    Table::new(caption, ["Parameter", "Value", "Unit"], rows.rows)
+    Table::new(
+        "The law: what the filter runs with, which is held tame by a ridge, and what the recordings tell without it, value ± \
+         standard error",
+        ["Parameter", "In the filter", "Told by the recordings", "Unit"],
+        rows.rows,
+    )
 }
 
 fn gauge(rows: &mut Rows, gauge: &GaugeParams, quantity: Quantity) {

@@ -2,7 +2,7 @@ use std::collections::BTreeMap;
 
 use ohmstrain_calib::{
     BranchParams, EstimatorKind, EstimatorParams, GaugeParams, LawParams, MotionParams, NoiseParams, Output, Quantity,
-    RangeParams, ReadingUnit, SensorParams, StaticCubic, Validity,
+    RangeParams, ReadingUnit, SensorParams, StaticCubic, Uncertainty, Validity,
 };
 use ohmstrain_ekf::{Estimate, Gaussian, ReadingVerdict};
 
@@ -36,6 +36,7 @@ fn sensor() -> SensorParams {
         quantity: Quantity::Strain,
         reading: ReadingUnit::Ohm,
         rest_reading: 1000.0,
+        measured_rest: None,
         default_estimator: EstimatorKind::Ekf,
         limits: range,
         validity: Validity {
@@ -127,6 +128,19 @@ fn names_are_escaped() {
     assert!(page.contains("Relaxation while held"));
     assert!(!page.contains("http://") || !page.replace("http://www.w3.org/2000/svg", "").contains("http"));
     assert!(!page.contains("<script"));
+}
+
+#[test]
+fn parameters_are_what_the_recordings_tell_or_not_told() {
+    let mut sensor = sensor();
+    let names = ["gauge.coefficients[0]", "extend_viscosity_s"].map(String::from).to_vec();
+    let (values, standard_errors) = (vec![1.8, 0.01], vec![0.1, 0.02]);
+    sensor.uncertainty = Some(Uncertainty { names, values, standard_errors, covariance: vec![vec![0.0; 2]; 2] });
+    let page = page(&sensor, &[], &[], None, &[]);
+    assert!(
+        page.contains("1.80 ± 0.10") && page.contains("not told (0.010 ± 0.020)") && page.contains("<td>not told</td>")
+    );
+    assert!(page.contains("Told by the recordings"));
 }
 
 #[test]
