@@ -2,6 +2,7 @@
 
 mod draws;
 mod flow;
+pub mod own_law;
 
 pub use draws::{Draws, square_root};
 pub use flow::Flow;

@@ -52,10 +52,11 @@ const BURST_US: u64 = 1_000_000;
 const WRAP_US: u64 = 1 << 32;
 
 /// How far the strains of f32 and f64 may be apart. A step rounds a strain below 0.35, to 2⁻²⁶ at worst, some ten times on
-/// its way through prediction and update, with either sign. Thirty seconds, the memory of the baseline, hold two thousand
-/// steps of a burst and a hundred others, so that the roundings that are remembered add up to √21 000 · 2⁻²⁶ = 2.2e-6; five
-/// times that is never reached by chance.
-const APART: f64 = 1.1e-5;
+/// its way through prediction and update, with either sign; and its innovation four times as the difference of sums below
+/// one, to 2⁻²⁵ at worst, of which the gain takes half, the gauge's slope being two. Thirty seconds, the memory of the
+/// baseline, hold two thousand steps of a burst and a hundred others, so that the roundings that are remembered add up to
+/// √(2100 · 14) · 2⁻²⁶ = 2.6e-6; five times that is never reached by chance.
+const APART: f64 = 1.28e-5;
 
 /// Whether the sensor is read every millisecond: in the second before and after every quarter of an hour and every wrap.
 fn in_burst(time_us: u64) -> bool {

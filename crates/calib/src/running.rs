@@ -2,7 +2,7 @@ use std::collections::VecDeque;
 use std::mem;
 
 use ohmstrain_ekf::{
-    Belief, Estimate, Estimator, Gaussian, Guard, PastStep, Reading, State, StepError, StrainSensor,
+    Belief, Estimate, Estimator, Gaussian, Guard, PastStep, Reading, Repeated, State, StepError, StrainSensor,
     smooth_back_through,
 };
 use ohmstrain_model::StrainRange;
@@ -18,7 +18,7 @@ pub(crate) struct Running<E: Estimator<f64, N, L>, S, const M: usize, const B: u
     model: S,
     interval: Interval,
     pub now: Moment<E::State>,
-    pending: VecDeque<Pending<E::State, E::Prepared>>,
+    pending: VecDeque<Pending<E::State, Repeated<E::Prepared>>>,
     /// Estimates on their way out, newest first.
     due: Vec<Output>,
 }

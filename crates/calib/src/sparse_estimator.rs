@@ -35,6 +35,10 @@ impl<const B: usize, const N: usize, const L: usize> Estimator<f64, N, L> for Sp
     type State = Belief<f64, N, L>;
     type Prepared = SparseStep<B, N>;
 
+    fn longest_step_s(&self) -> f64 {
+        self.model.longest_step_s()
+    }
+
     fn prepare(&self, dt_s: f64) -> SparseStep<B, N> {
         SparseStep { dense: self.model.prepare(dt_s), sparse: SparseEkf::new(self.model, dt_s).ok() }
     }
@@ -162,6 +166,10 @@ pub(crate) struct SparsePhasesStep<S> {
 impl<P: Pair<N, L, K>, const N: usize, const L: usize, const K: usize> Estimator<f64, N, L> for SparsePhases<P, K> {
     type State = SparseMixture<f64, N, L, K>;
     type Prepared = SparsePhasesStep<P::Sparse>;
+
+    fn longest_step_s(&self) -> f64 {
+        self.0.dense().longest_step_s()
+    }
 
     fn prepare(&self, dt_s: f64) -> Self::Prepared {
         SparsePhasesStep { dt_s, sparse: self.0.sparse(dt_s).ok() }

@@ -1,24 +1,25 @@
 use std::collections::HashMap;
 
 use ohmstrain_ekf::{
-    Advanced, Estimator, Guard, Guarded, Innovation, PastStep, Reading, ReadingVerdict, StepError, Streak,
+    Advanced, Estimator, Guard, Guarded, Innovation, PastStep, Reading, ReadingVerdict, Repeated, StepError, Streak,
+    Substeps,
 };
 
 use crate::sieve::{Repeats, Sieve};
 
 /// An estimator under guard, and the steps it has prepared.
 pub(crate) struct Stepper<E: Estimator<f64, N, L>, const N: usize, const L: usize> {
-    pub estimator: E,
+    pub estimator: Substeps<E>,
     pub guard: Guard<f64>,
     sieve: Sieve,
     /// Of the model's own noise.
     reading_variance: f64,
-    prepared: PreparedSteps<E::Prepared>,
+    prepared: PreparedSteps<Repeated<E::Prepared>>,
 }
 
 /// A step as a smoother needs it.
 pub(crate) type Taken<E, const N: usize, const L: usize> =
-    PastStep<<E as Estimator<f64, N, L>>::State, <E as Estimator<f64, N, L>>::Prepared, f64>;
+    PastStep<<E as Estimator<f64, N, L>>::State, Repeated<<E as Estimator<f64, N, L>>::Prepared>, f64>;
 
 /// Where a filter is.
 #[derive(Clone)]
@@ -51,7 +52,13 @@ impl<S> Moment<S> {
 
 impl<E: Estimator<f64, N, L>, const N: usize, const L: usize> Stepper<E, N, L> {
     pub(crate) fn new(estimator: E, sieve: Sieve, reading_variance: f64) -> Self {
-        Self { estimator, guard: Guard::none(), sieve, reading_variance, prepared: PreparedSteps::new() }
+        Self {
+            estimator: Substeps(estimator),
+            guard: Guard::none(),
+            sieve,
+            reading_variance,
+            prepared: PreparedSteps::new(),
+        }
     }
 
     /// A reading as the estimator is to see it, and what became of it where that is decided already.

@@ -2,6 +2,7 @@ use nalgebra::SVector;
 use ohmstrain_model::{Observation, Scalar, Symmetric, Transition};
 
 use crate::smoother::rts_step;
+use crate::substeps;
 use crate::{Advanced, Belief, Channel, Dynamics, Estimator, Gaussian, Innovation, Reading, StepError};
 
 /// Extended Kalman filter: one Gaussian, linearised at its mean.
@@ -64,7 +65,7 @@ impl<M> Ekf<M> {
         &self.model
     }
 
-    /// Predicts `dt_s ≥ 0` seconds ahead, then takes the reading.
+    /// Predicts `dt_s ≥ 0` seconds ahead, in as many steps as the model asks for, then takes the reading.
     ///
     /// # Errors
     /// See [`StepError`]; the belief passed in is untouched.
@@ -78,11 +79,17 @@ impl<M> Ekf<M> {
         M: Dynamics<T, N, L> + Channel<T, N, L>,
     {
         check_time_step(dt_s)?;
-        let (transition, prior) = if dt_s.is_zero() {
-            (stand_still(belief), *belief)
-        } else {
-            self.predict(belief, &self.model.prepare(dt_s))
-        };
+        if dt_s.is_zero() {
+            return self.finish(stand_still(belief), *belief, reading);
+        }
+        let count = substeps::count(dt_s, self.model.longest_step_s());
+        let prepared = self.model.prepare(dt_s / T::of(f64::from(count)));
+        let (mut transition, mut prior) = self.predict(belief, &prepared);
+        for _ in 1..count {
+            let onward;
+            (onward, prior) = self.predict(&prior, &prepared);
+            transition = followed_by(&transition, &onward);
+        }
         self.finish(transition, prior, reading)
     }
 
@@ -174,6 +181,10 @@ where
         self.model.prepare(dt_s)
     }
 
+    fn longest_step_s(&self) -> T {
+        self.model.longest_step_s()
+    }
+
     fn advance(
         &self,
         state: &Belief<T, N, L>,
@@ -218,6 +229,18 @@ pub(crate) fn check_time_step<T: Scalar>(dt_s: T) -> Result<(), StepError> {
         return Err(StepError::NonFiniteTimeStep);
     }
     if dt_s < T::zero() { Err(StepError::NegativeTimeStep) } else { Ok(()) }
+}
+
+/// One transition after another.
+fn followed_by<T: Scalar, const N: usize, const L: usize>(
+    first: &Transition<T, N, L>,
+    second: &Transition<T, N, L>,
+) -> Transition<T, N, L> {
+    Transition {
+        mean: second.mean,
+        jacobian: second.jacobian * first.jacobian,
+        noise: first.noise.congruence(&second.jacobian).plus(&second.noise),
+    }
 }
 
 /// A step of zero seconds.

@@ -16,6 +16,12 @@ pub trait Estimator<T: Scalar, const N: usize, const L: usize> {
     /// Prepares steps of `dt_s ≥ 0` seconds.
     fn prepare(&self, dt_s: T) -> Self::Prepared;
 
+    /// The longest step, s, over which a prediction is as good as many short ones; [`Substeps`](crate::Substeps) divides longer
+    /// ones. Infinite unless the estimator says otherwise.
+    fn longest_step_s(&self) -> T {
+        T::one() / T::zero()
+    }
+
     /// Predicts over a prepared step, then takes the reading; without one it is a prediction.
     ///
     /// # Errors

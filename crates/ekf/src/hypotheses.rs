@@ -30,6 +30,14 @@ impl<T: Real, M, const K: usize> Hypotheses<T, M, K> {
         &self.model
     }
 
+    /// A phase changes at the beginning of a step: steps are short against phases, and against what the model asks for.
+    fn longest_s<const N: usize, const L: usize>(&self) -> T
+    where
+        M: Phased<T, N, L>,
+    {
+        self.model.longest_step_s().min(self.dwell.longest_step_s())
+    }
+
     /// Predicts over a prepared step of `dt_s ≥ 0` seconds, then takes the reading.
     ///
     /// # Errors
@@ -63,7 +71,7 @@ impl<T: Real, M, const K: usize> Hypotheses<T, M, K> {
             for phase in Phase::ALL {
                 let (from, begins) = &enter(&self.model, parent.1, phase);
                 let probability = chain[parent.1.phase.index()][phase.index()];
-                let origin = Origin { parent, from, begins: *begins, phase, probability };
+                let origin = Origin { parent, from, begins: *begins, before: None, phase, probability };
                 candidates.add(&origin, prepared, |_| T::one())?;
             }
         }

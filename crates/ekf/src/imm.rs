@@ -31,6 +31,14 @@ impl<T: Real, M> Imm<T, M> {
         &self.model
     }
 
+    /// A phase changes at the beginning of a step: steps are short against phases, and against what the model asks for.
+    fn longest_s<const N: usize, const L: usize>(&self) -> T
+    where
+        M: Phased<T, N, L>,
+    {
+        self.model.longest_step_s().min(self.dwell.longest_step_s())
+    }
+
     /// Predicts over a prepared step of `dt_s ≥ 0` seconds, then takes the reading.
     ///
     /// # Errors
@@ -62,7 +70,7 @@ impl<T: Real, M> Imm<T, M> {
         let mut candidates = Candidates::new(&self.model, &self.evidence, reading, recorder);
         for parent in self.mix_all(mixture, &chain).components().iter().enumerate() {
             let (from, phase) = (&parent.1.belief, parent.1.phase);
-            let origin = Origin { parent, from, begins: false, phase, probability: T::one() };
+            let origin = Origin { parent, from, begins: false, before: None, phase, probability: T::one() };
             candidates.add(&origin, prepared, |_| T::one())?;
         }
         candidates.finish()

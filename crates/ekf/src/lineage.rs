@@ -10,8 +10,6 @@ use crate::{Belief, Phased};
 pub(crate) trait Recorder<T, const N: usize, const L: usize> {
     /// A child was put into place `heir` of the new mixture, merged or alone.
     fn born(&mut self, _birth: &Birth<'_, T, N, L>, _heir: usize) {}
-    /// What was in a place so far was dropped.
-    fn dropped(&mut self, _heir: usize) {}
     /// The contents of every place moved to another one, or nowhere.
     fn renumbered(&mut self, _new_place: impl Fn(usize) -> Option<usize>) {}
 }
@@ -21,10 +19,6 @@ impl<T, const N: usize, const L: usize> Recorder<T, N, L> for () {}
 impl<T, R: Recorder<T, N, L>, const N: usize, const L: usize> Recorder<T, N, L> for &mut R {
     fn born(&mut self, birth: &Birth<'_, T, N, L>, heir: usize) {
         (**self).born(birth, heir);
-    }
-
-    fn dropped(&mut self, heir: usize) {
-        (**self).dropped(heir);
     }
 
     fn renumbered(&mut self, new_place: impl Fn(usize) -> Option<usize>) {
@@ -80,10 +74,6 @@ impl<T: Real, const N: usize, const L: usize, const K: usize> Recorder<T, N, L> 
         if let Some(place) = self.children.get_mut(birth.parent).map(|phases| &mut phases[birth.phase.index()]) {
             *place = Some(descent);
         }
-    }
-
-    fn dropped(&mut self, heir: usize) {
-        self.renumbered(|place| (place != heir).then_some(place));
     }
 
     fn renumbered(&mut self, new_place: impl Fn(usize) -> Option<usize>) {

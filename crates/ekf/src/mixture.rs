@@ -31,9 +31,9 @@ pub struct Mixture<T, const N: usize, const L: usize, const K: usize> {
 pub(crate) enum Added {
     /// Into this place, alone or merged with what was there.
     To(usize),
-    /// Into this place, from which another one was dropped.
-    InsteadOf(usize),
-    /// It is lighter than everything there is room for.
+    /// Into this place; what was there was merged into the other one, or dropped if no other is of its phase.
+    InsteadOf(usize, Option<usize>),
+    /// It is lighter than everything there is room for, and none of that is of its phase.
     Nowhere,
 }
 
@@ -44,6 +44,9 @@ pub(crate) const ALIKE: f64 = 0.5;
 const NEGLIGIBLE: f64 = 12.0;
 /// The same factor as a number.
 pub(crate) const LEAST_WEIGHT: f64 = 6.144_212_353_328_21e-6;
+/// Of two hypotheses whose weights differ by no more than this share none is the lighter one: directions after a hold are
+/// equally likely, and rounding is not to choose.
+pub(crate) const LIGHTER: f64 = 1e-4;
 /// A hypothesis that has left the limits altogether is no less likely than this.
 pub(crate) const LEAST_INSIDE: f64 = 1e-9;
 
@@ -76,9 +79,10 @@ impl<T: Real, const N: usize, const L: usize, const K: usize> Mixture<T, N, L, K
         self.components.get_mut(..self.len).unwrap_or(&mut [])
     }
 
-    /// Adds a hypothesis: merged with one that says the same, in a free place, or in the place of the lightest, which is
-    /// dropped. Says where it went.
-    pub(crate) fn add(&mut self, candidate: &Component<T, N, L>) -> Added {
+    /// Adds a hypothesis: merged with one that says the same, or in a free place. Where there is none the lightest of all
+    /// makes room: `unread`, in a step without a reading, it is merged with the nearest of its phase, because nothing speaks
+    /// against it, and dropping it would over many such steps lose what together is likely. Says where it went.
+    pub(crate) fn add(&mut self, candidate: &Component<T, N, L>, unread: bool) -> Added {
         let alike = self.components_mut().iter_mut().enumerate().find(|(_, known)| known.is_like(candidate));
         if let Some((place, like)) = alike {
             *like = like.merged(candidate);
@@ -88,16 +92,35 @@ impl<T: Real, const N: usize, const L: usize, const K: usize> Mixture<T, N, L, K
             self.push(*candidate);
             return Added::To(self.len - 1);
         }
-        let lighter = |a: (usize, T), b: (usize, T)| if b.1 < a.1 { b } else { a };
+        let lighter = |a: (usize, T), b: (usize, T)| if b.1 < a.1 - T::of(LIGHTER) { b } else { a };
         let weights = self.components().iter().map(|component| component.log_weight).enumerate();
-        let lightest = weights.reduce(lighter).filter(|(_, weight)| *weight < candidate.log_weight);
-        match lightest.and_then(|(place, _)| Some((place, self.components.get_mut(place)?))) {
-            None => Added::Nowhere,
-            Some((place, lightest)) => {
-                *lightest = *candidate;
-                Added::InsteadOf(place)
-            }
+        let lightest = weights.reduce(lighter).filter(|(_, weight)| *weight < candidate.log_weight - T::of(LIGHTER));
+        let Some((place, _)) = lightest else {
+            let into = if unread { self.merge_into_nearest(candidate, None) } else { None };
+            return into.map_or(Added::Nowhere, Added::To);
+        };
+        let Some(displaced) = self.components.get(place).copied() else { return Added::Nowhere };
+        let into = if unread { self.merge_into_nearest(&displaced, Some(place)) } else { None };
+        if let Some(component) = self.components.get_mut(place) {
+            *component = *candidate;
         }
+        Added::InsteadOf(place, into)
+    }
+
+    /// Merges a hypothesis into the nearest of its phase, in strain and rate, not counting the one at `but`; where that is.
+    /// One that is negligible is dropped.
+    fn merge_into_nearest(&mut self, component: &Component<T, N, L>, but: Option<usize>) -> Option<usize> {
+        let heaviest = self.components().iter().fold(component.log_weight, |most, other| most.max(other.log_weight));
+        if component.log_weight < heaviest - T::of(NEGLIGIBLE) {
+            return None;
+        }
+        let others = self.components().iter().enumerate();
+        let others = others.filter(|(place, other)| Some(*place) != but && other.phase == component.phase);
+        let nearer = |a: (usize, T), b: (usize, T)| if b.1 < a.1 { b } else { a };
+        let (place, _) = others.map(|(place, other)| (place, other.distance(component))).reduce(nearer)?;
+        let nearest = self.components.get_mut(place)?;
+        *nearest = nearest.merged(component);
+        Some(place)
     }
 
     /// Adds a hypothesis as it is, if there is room.
@@ -213,13 +236,18 @@ impl<T: Real, const N: usize, const L: usize, const K: usize> State<T, N, L> for
 
 impl<T: Real, const N: usize, const L: usize> Component<T, N, L> {
     fn is_like(&self, other: &Self) -> bool {
+        self.phase == other.phase && self.distance(other) < T::of(ALIKE)
+    }
+
+    /// Squared distance of strain and rate, each in units of the larger variance.
+    fn distance(&self, other: &Self) -> T {
         let distance = |i: usize| {
             let apart = self.belief.mean[i] - other.belief.mean[i];
             let variance = self.belief.covariance[(i, i)].max(other.belief.covariance[(i, i)]);
             // What is known exactly is the same or is not; a difference has no size without a unit.
             if apart.is_zero() { T::zero() } else { apart * apart / variance.max(T::zero()) }
         };
-        self.phase == other.phase && distance(0) + distance(1) < T::of(ALIKE)
+        distance(0) + distance(1)
     }
 
     /// Both in one, with the mean and covariance of the pair.

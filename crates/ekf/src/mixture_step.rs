@@ -127,6 +127,8 @@ pub(crate) struct Origin<'a, T, const N: usize, const L: usize> {
     /// The belief it starts from: the parent's, with rates drawn anew if a phase begins.
     pub from: &'a Belief<T, N, L>,
     pub begins: bool,
+    /// The sign of the rate at the start of the step where that is a hypothesis too.
+    pub before: Option<Phase>,
     pub phase: Phase,
     /// Probability that the parent has this child.
     pub probability: T,
@@ -153,11 +155,14 @@ where
         prepared: &M::Prepared,
         cut: impl FnOnce(&mut Belief<T, N, L>) -> T,
     ) -> Result<(), StepError> {
-        let Origin { parent: (place, parent), from, begins, phase, probability } = *origin;
+        let Origin { parent: (place, parent), from, begins, before, phase, probability } = *origin;
         if !(probability > T::zero()) {
             return Ok(());
         }
-        let transition = self.model.transition(prepared, from, Some(phase));
+        let transition = match before {
+            Some(before) => self.model.transition_between(prepared, from, before, phase),
+            None => self.model.transition(prepared, from, Some(phase)),
+        };
         let covariance = self.model.propagate(&from.covariance, &transition);
         let predicted = Belief { mean: transition.mean, covariance };
         let mut child =
@@ -184,10 +189,10 @@ where
             posterior: &child.belief,
             log_weight: child.log_weight,
         };
-        match self.children.add(&child) {
+        match self.children.add(&child, self.reading.is_none()) {
             Added::To(heir) => self.recorder.born(&birth, heir),
-            Added::InsteadOf(heir) => {
-                self.recorder.dropped(heir);
+            Added::InsteadOf(heir, into) => {
+                self.recorder.renumbered(|place| if place == heir { into } else { Some(place) });
                 self.recorder.born(&birth, heir);
             }
             Added::Nowhere => {}
@@ -235,6 +240,10 @@ macro_rules! mixture_estimator {
 
             fn prepare(&self, dt_s: T) -> Self::Prepared {
                 (self.model.prepare(dt_s), dt_s)
+            }
+
+            fn longest_step_s(&self) -> T {
+                self.longest_s::<N, L>()
             }
 
             fn advance(

@@ -230,6 +230,11 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize, const L: usize> 
     /// The model's step, and its length for the chain of phases.
     type Prepared = (SwitchedStep<T, M, B>, T);
 
+    /// A path knows its direction at the ends of a step only: it needs shorter ones than a Gaussian.
+    fn longest_step_s(&self) -> T {
+        self.model.longest_step_s() / T::of(8.0)
+    }
+
     fn prepare(&self, dt_s: T) -> Self::Prepared {
         (self.model.prepare(dt_s), dt_s)
     }

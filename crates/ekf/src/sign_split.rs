@@ -30,6 +30,13 @@ impl<T: Real, M, const K: usize> SignSplit<T, M, K> {
         &self.model
     }
 
+    fn longest_s<const N: usize, const L: usize>(&self) -> T
+    where
+        M: Phased<T, N, L>,
+    {
+        self.model.longest_step_s()
+    }
+
     /// Predicts over a prepared step of `dt_s ≥ 0` seconds, then takes the reading.
     ///
     /// # Errors
@@ -71,7 +78,8 @@ impl<T: Real, M, const K: usize> SignSplit<T, M, K> {
                 if phase != Phase::Hold && self.model.rate_ahead(prepared, from, phase).is_some_and(hopeless) {
                     continue;
                 }
-                let origin = Origin { parent, from, begins: rests, phase, probability };
+                let before = (!rests).then_some(parent.1.phase);
+                let origin = Origin { parent, from, begins: rests, before, phase, probability };
                 candidates.add(&origin, prepared, |prior| match rates_of(phase) {
                     None => T::one(),
                     Some(rates) => {

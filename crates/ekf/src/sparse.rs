@@ -18,6 +18,7 @@ use ohmstrain_model::{Scalar, SwitchedModel};
 use crate::curve::Regions;
 use crate::sparse_constants::{Gains, StepConstants};
 use crate::sparse_parts::Parts;
+use crate::sparse_predict::Course;
 use crate::sparse_update::ReadingLaw;
 use crate::switch::RateSpread;
 use crate::{AnyCurve, Belief, Curve, Reading, Residual, StepError, Switch};
@@ -107,7 +108,7 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
     ) -> Result<Option<Residual<T>>, StepError> {
         let mut tries = 0;
         loop {
-            let spread = self.predict(parts, None);
+            let spread = self.predict(parts, Course::Uncertain);
             let refused = match reading {
                 Some(reading) => match self.update(parts, reading, None, spread) {
                     Ok(residual) => return Ok(Some(residual)),

@@ -1,7 +1,7 @@
 use ohmstrain_model::{Phase, Symmetric};
 
 use crate::gaussian::Real;
-use crate::mixture::{ALIKE, LEAST_WEIGHT};
+use crate::mixture::{ALIKE, LEAST_WEIGHT, LIGHTER};
 use crate::sparse_evidence::{Weighed, Weight};
 use crate::sparse_mixture::{Share, SparseMixture};
 use crate::sparse_parts::Parts;
@@ -15,15 +15,18 @@ pub(crate) struct Children<T, const N: usize, const L: usize, const K: usize> {
     exponent: T,
     /// Sum of all weights, limits aside, of those that were dropped too.
     density: T,
+    /// Whether the step has no reading.
+    unread: bool,
 }
 
 impl<T: Real, const N: usize, const L: usize, const K: usize> Children<T, N, L, K> {
     #[inline(always)]
-    pub(crate) fn new() -> Self {
-        Self { kept: SparseMixture::empty(), exponent: T::zero(), density: T::zero() }
+    pub(crate) fn new(unread: bool) -> Self {
+        Self { kept: SparseMixture::empty(), exponent: T::zero(), density: T::zero(), unread }
     }
 
-    /// Adds a child: merged with one that says the same, in a free place, or in the place of the lightest.
+    /// Adds a child: merged with one that says the same, in a free place, or in the place of the lightest, which in a step
+    /// without a reading is merged with the nearest of its phase.
     pub(crate) fn add<const B: usize>(&mut self, child: &Parts<T, B>, phase: Phase, weighed: &Weighed<T>) {
         let Weighed { weight, more_inside, log_inside } = *weighed;
         let likelihood = weight;
@@ -35,23 +38,56 @@ impl<T: Real, const N: usize, const L: usize, const K: usize> Children<T, N, L, 
         let like = self.kept.iter_mut().find(|(share, known)| **known == phase && share.is_like(child));
         if let Some((like, _)) = like {
             like.merge(child, weight, log_inside);
-        } else if let Some((place, of)) = self.room(weight) {
+            return;
+        }
+        let displaced = if self.kept.shares().len() < K { None } else { self.lightest() };
+        let place = match displaced {
+            None => self.kept.one_more(),
+            Some((at, share, of)) if share.weight < weight * T::of(1.0 - LIGHTER) => {
+                self.merge_into_nearest(
+                    &Parts::<T, B>::of(&share.belief),
+                    of,
+                    (share.weight, share.log_inside),
+                    Some(at),
+                );
+                self.kept.iter_mut().nth(at)
+            }
+            Some(_) => return self.merge_into_nearest(child, phase, (weight, log_inside), None),
+        };
+        if let Some((place, of)) = place {
             (place.weight, place.log_inside, *of) = (weight, log_inside, phase);
             child.put_into(&mut place.belief);
         }
     }
 
-    /// A free place, or that of the lightest if it is lighter than `weight`.
-    fn room(&mut self, weight: T) -> Option<(&mut Share<T, N, L>, &mut Phase)> {
-        if self.kept.shares().len() < K {
-            return self.kept.one_more();
-        }
-        let lighter = |a, b| if Self::weight_of(&b) < Self::weight_of(&a) { b } else { a };
-        self.kept.iter_mut().reduce(lighter).filter(|lightest| lightest.0.weight < weight)
+    fn lightest(&mut self) -> Option<(usize, Share<T, N, L>, Phase)> {
+        let all = self.kept.iter_mut().enumerate().map(|(at, (share, of))| (at, *share, *of));
+        all.reduce(|a, b| if b.1.weight < a.1.weight * T::of(1.0 - LIGHTER) { b } else { a })
     }
 
-    fn weight_of(place: &(&mut Share<T, N, L>, &mut Phase)) -> T {
-        place.0.weight
+    /// Merges a child into the nearest of its phase, not counting the one at `but`; if there is none, it is
+    /// negligible, or there is a reading, it is dropped.
+    #[inline(never)]
+    fn merge_into_nearest<const B: usize>(
+        &mut self,
+        child: &Parts<T, B>,
+        phase: Phase,
+        (weight, log_inside): (T, T),
+        but: Option<usize>,
+    ) {
+        if !self.unread {
+            return;
+        }
+        let heaviest = self.kept.shares().iter().fold(weight, |a, b| if b.weight > a { b.weight } else { a });
+        if weight < heaviest * T::of(LEAST_WEIGHT) {
+            return;
+        }
+        let others = self.kept.iter_mut().enumerate().filter(|(at, (_, of))| Some(*at) != but && **of == phase);
+        let distances = others.map(|(_, (share, _))| (share.distance(child), share));
+        let nearest = distances.reduce(|a, b| if b.0 < a.0 { b } else { a });
+        if let Some((_, share)) = nearest {
+            share.merge(child, weight, log_inside);
+        }
     }
 
     /// Makes room for a larger exponent: the weights so far are given in units of its exponential.
@@ -100,14 +136,21 @@ impl<T: Real, const N: usize, const L: usize> Share<T, N, L> {
     /// As hypotheses of one phase count as one in a [`Mixture`](crate::Mixture).
     #[inline(always)]
     fn is_like<const B: usize>(&self, other: &Parts<T, B>) -> bool {
-        let distance = |i: usize, mean: T, other_variance: T| {
-            let (apart, variance) = (self.belief.mean[i] - mean, self.belief.covariance[(i, i)]);
-            let variance = if other_variance > variance { other_variance } else { variance };
-            // What is known exactly is the same or is not; a difference has no size without a unit.
-            if apart.is_zero() { T::zero() } else { apart * apart / variance }
-        };
-        let strain = distance(0, other.strain, other.strain_variance);
-        strain < T::of(ALIKE) && strain + distance(1, other.rate, other.rate_variance) < T::of(ALIKE)
+        let strain = self.apart(0, other.strain, other.strain_variance);
+        strain < T::of(ALIKE) && strain + self.apart(1, other.rate, other.rate_variance) < T::of(ALIKE)
+    }
+
+    fn distance<const B: usize>(&self, other: &Parts<T, B>) -> T {
+        self.apart(0, other.strain, other.strain_variance) + self.apart(1, other.rate, other.rate_variance)
+    }
+
+    /// Squared distance of a state from another one's, in units of the larger variance.
+    #[inline(always)]
+    fn apart(&self, i: usize, mean: T, other_variance: T) -> T {
+        let (apart, variance) = (self.belief.mean[i] - mean, self.belief.covariance[(i, i)]);
+        let variance = if other_variance > variance { other_variance } else { variance };
+        // What is known exactly is the same or is not; a difference has no size without a unit.
+        if apart.is_zero() { T::zero() } else { apart * apart / variance }
     }
 
     /// Takes in another one, with the mean and covariance of the pair.

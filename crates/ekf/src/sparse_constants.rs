@@ -15,6 +15,10 @@ pub(crate) struct StepConstants<T, const B: usize> {
     pub phase_input: [T; 2],
     /// Covariances of ε with ε, v with ε, v with v.
     pub noise: [T; 3],
+    /// Change of the rate with old strain and rate.
+    pub rate_change: [T; 2],
+    /// As [`SwitchedStep::averaging`](ohmstrain_model::SwitchedStep::averaging).
+    pub averaging: T,
     pub branches: [BranchConstants<T, B>; B],
     pub baseline_decay: T,
     /// Times the branches' decays, and times itself.
@@ -79,6 +83,8 @@ impl<T: Scalar, const B: usize> StepConstants<T, B> {
             input: response.input.map(|answer| answer * push),
             phase_input: response.input.map(|answer| answer * phase_push),
             noise: [response.motion_noise[0][0], response.motion_noise[1][0], response.motion_noise[1][1]],
+            rate_change: change[1],
+            averaging: step.averaging(),
             branches: core::array::from_fn(branch),
             baseline_decay,
             baseline_decays: core::array::from_fn(|i| baseline_decay * decay(i)),

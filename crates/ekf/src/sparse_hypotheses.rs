@@ -12,6 +12,7 @@ use crate::sparse_children::Children;
 use crate::sparse_evidence::{Newborn, Weighing};
 use crate::sparse_mixture::SparseMixture;
 use crate::sparse_parts::Parts;
+use crate::sparse_predict::Course;
 use crate::switching::fresh_rate;
 use crate::{
     AnyCurve, Compact, Curve, Dwell, Evidence, Gaussian, MixtureResidual, Reading, SparseEkf, StepError, Switch,
@@ -75,7 +76,7 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
         state: &mut SparseMixture<T, N, L, K>,
         reading: Option<Reading<T>>,
     ) -> Result<Option<MixtureResidual<T>>, StepError> {
-        let mut children = Children::new();
+        let mut children = Children::new(reading.is_none());
         let mut predicted = Predicted::new();
         for (parent, from) in state.shares().iter().zip(state.phases()) {
             for (phase, probability) in Phase::ALL.into_iter().zip(self.chain[from.index()]) {
@@ -86,7 +87,7 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
                 if phase != Phase::Hold && *from != phase {
                     child.renew_rate(&self.fresh[phase.index()]);
                 }
-                let spread = self.kernel.predict(&mut child, Some(phase));
+                let spread = self.kernel.predict(&mut child, Course::Known(phase));
                 let prior = parent.weight * probability;
                 let newborn = Newborn { phase, prior, spread, log_inside: parent.log_inside };
                 let weighed = self.kernel.weigh(&mut child, newborn, reading, &self.weighing, &mut predicted)?;

@@ -15,6 +15,7 @@ use crate::mixture_step::Predicted;
 use crate::sparse_evidence::{Weighing, Weight};
 use crate::sparse_mixture::{PhaseMixture, Share};
 use crate::sparse_parts::Parts;
+use crate::sparse_predict::Course;
 use crate::switching::fresh_rate;
 use crate::{
     AnyCurve, Compact, Curve, Dwell, Evidence, Gaussian, MixtureResidual, Reading, Residual, SparseEkf, StepError,
@@ -121,7 +122,7 @@ impl<T: Real, const B: usize, const N: usize, S: Switch<T>, G: Curve<T>> SparseI
         if !(mode.prior > T::zero()) {
             return Ok(mode);
         }
-        let spread = self.kernel.predict(&mut mode.parts, Some(phase));
+        let spread = self.kernel.predict(&mut mode.parts, Course::Known(phase));
         if let Some(reading) = reading {
             let residual = self.kernel.update(&mut mode.parts, reading, Some(phase), spread)?;
             mode.weight = self.weighing.likelihood::<S>(mode.prior, &residual);

@@ -1,6 +1,6 @@
 //! What a sign-split filter does to the rate alone.
 
-use ohmstrain_model::{Phase, Scalar};
+use ohmstrain_model::{Phase, RateChange, Scalar, Turning};
 
 use crate::gaussian::{Real, density, upper_tail};
 use crate::sparse_parts::{Part, Parts};
@@ -18,6 +18,28 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
             b[0] * from.strain_rate + b[1] * from.rate_variance,
         ];
         Gaussian { mean, variance: step.noise[2] + b[0] * spread[0] + b[1] * spread[1] }
+    }
+}
+
+impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> SparseEkf<T, S, B, N, G> {
+    /// What a rate of the sign of `before` leaves open over a step, as
+    /// [`SwitchedModel::turning`](ohmstrain_model::SwitchedModel::turning).
+    #[inline(always)]
+    pub(crate) fn turning(&self, before: Phase, from: &Parts<T, B>) -> Turning<T> {
+        let (step, change) = (&self.step, self.step.rate_change);
+        let (side, toward) =
+            if before == Phase::Retract { (-T::one(), -step.phase_input[1]) } else { (T::one(), step.phase_input[1]) };
+        let spread = [
+            change[0] * from.strain_variance + change[1] * from.strain_rate,
+            change[0] * from.strain_rate + change[1] * from.rate_variance,
+        ];
+        let change = RateChange {
+            expected: side * (step.input[1] + toward + change[0] * from.strain + change[1] * from.rate),
+            spread: change[0] * spread[0] + change[1] * spread[1],
+            noise: step.noise[2],
+            is_brownian: true,
+        };
+        Turning::new(side * from.rate, from.rate_variance, &change, S::root)
     }
 }
 

@@ -8,7 +8,7 @@
 use ohmstrain_model::{Scalar, Symmetric};
 
 use crate::sparse_parts::Parts;
-use crate::sparse_predict::Driven;
+use crate::sparse_predict::{Course, Driven};
 use crate::sparse_update::Compared;
 use crate::{Belief, Curve, Reading, SparseEkf, StepError, Switch};
 
@@ -41,7 +41,7 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
         let steps = readings.iter().take(count).skip(1);
         for (reading, belief) in steps.zip(beliefs.iter_mut()).rev() {
             let mut parts = Parts::of(belief);
-            let (spread, driven) = self.move_on(&mut parts, None);
+            let (spread, driven) = self.move_on(&mut parts, Course::Uncertain);
             if let Some(reading) = *reading {
                 ahead.take(&self.compare(&parts, reading, None, spread), Self::HAS_BASELINE);
             }

@@ -4,7 +4,7 @@
 //! As [`SparseEkf`](crate::SparseEkf): the state is changed in place, an error leaves it as it was, and nothing takes a
 //! logarithm unless asked or unless the strain is near a limit.
 
-use ohmstrain_model::{Phase, SwitchedModel};
+use ohmstrain_model::{Phase, SwitchedModel, Turning};
 
 use crate::gaussian::Real;
 use crate::mixture_step::{LEAST_MASS, Predicted};
@@ -13,6 +13,7 @@ use crate::sparse_children::Children;
 use crate::sparse_evidence::{Newborn, Weighing};
 use crate::sparse_mixture::{Share, SparseMixture};
 use crate::sparse_parts::Parts;
+use crate::sparse_predict::Course;
 use crate::switching::fresh_rate;
 use crate::{
     AnyCurve, Compact, Curve, Dwell, Evidence, Gaussian, MixtureResidual, Reading, SparseEkf, StepError, Switch,
@@ -76,12 +77,13 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
         state: &mut SparseMixture<T, N, L, K>,
         reading: Option<Reading<T>>,
     ) -> Result<Option<MixtureResidual<T>>, StepError> {
-        let mut children = Children::new();
+        let mut children = Children::new(reading.is_none());
         let mut predicted = Predicted::new();
         for (parent, from) in state.shares().iter().zip(state.phases()) {
+            let turning = self.kernel.turning(*from, &Parts::of(&parent.belief));
             for (phase, probability) in Phase::ALL.into_iter().zip(follows(self.chain.as_ref(), *from)) {
                 if probability > T::zero() {
-                    let origin = Origin { parent, from: *from, phase, probability };
+                    let origin = Origin { parent, from: *from, turning, phase, probability };
                     self.add_child(&origin, reading, &mut children, &mut predicted)?;
                 }
             }
@@ -100,7 +102,7 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
         children: &mut Children<T, N, L, K>,
         predicted: &mut Predicted<T>,
     ) -> Result<(), StepError> {
-        let Origin { parent, from, phase, probability } = *origin;
+        let Origin { parent, from, turning, phase, probability } = *origin;
         let mut child = Parts::of(&parent.belief);
         let rests = self.chain.is_some() && from == Phase::Hold && phase != Phase::Hold;
         if rests {
@@ -109,7 +111,12 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
         if phase != Phase::Hold && self.is_hopeless(phase, &child) {
             return Ok(());
         }
-        let spread = self.kernel.predict(&mut child, Some(phase));
+        let course = if from == Phase::Hold || phase == Phase::Hold {
+            Course::Known(phase)
+        } else {
+            Course::Within(phase, turning)
+        };
+        let spread = self.kernel.predict(&mut child, course);
         let mut prior = parent.weight * probability;
         if phase != Phase::Hold {
             let mass = child.cut_rate::<S, N>(phase, self.weighing.clear());
@@ -140,6 +147,8 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
 struct Origin<'a, T, const N: usize, const L: usize> {
     parent: &'a Share<T, N, L>,
     from: Phase,
+    /// What its rate leaves open over the step, unless it rests.
+    turning: Turning<T>,
     phase: Phase,
     /// Probability that the parent has this child.
     probability: T,

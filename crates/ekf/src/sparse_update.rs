@@ -42,7 +42,8 @@ impl<T: Scalar, G: Curve<T>> ReadingLaw<T, G> {
         })
     }
 
-    /// The expected reading of motion alone, and its derivatives by strain and rate.
+    /// The expected reading of motion alone, its derivatives by strain and rate, and the variance of what an uncertain direction
+    /// leaves of the dash-pot.
     #[inline(always)]
     fn of_motion<S: Switch<T>>(
         &self,
@@ -50,22 +51,23 @@ impl<T: Scalar, G: Curve<T>> ReadingLaw<T, G> {
         rate: T,
         phase: Option<Phase>,
         spread: &mut RateSpread<T, S>,
-    ) -> (T, T, T) {
+    ) -> (T, T, T, T) {
         let (gauge, slope) = self.curve.value_and_slope(strain);
         let (extend, retract) = (self.extend_viscosity_s, self.retract_viscosity_s);
         let viscosity = match phase {
-            Some(Phase::Hold) => return (gauge, slope, T::zero()),
+            Some(Phase::Hold) => return (gauge, slope, T::zero(), T::zero()),
             Some(Phase::Extend) => extend,
             Some(Phase::Retract) => retract,
             None if rate * rate < RateSpread::<T, S>::clear() * spread.variance => {
                 let split: SplitRate<T> = spread.blend(rate);
                 let expected = gauge + extend * split.extend + retract * split.retract;
-                return (expected, slope, split.slope(extend, retract));
+                let jump = extend - retract;
+                return (expected, slope, split.slope(extend, retract), jump * jump * split.variance);
             }
             None if rate > T::zero() => extend,
             None => retract,
         };
-        (gauge + viscosity * rate, slope, viscosity)
+        (gauge + viscosity * rate, slope, viscosity, T::zero())
     }
 }
 
@@ -127,7 +129,7 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
         mut spread: RateSpread<T, S>,
     ) -> Compared<T, B> {
         let law = &self.reading;
-        let (mut expected, slope, viscosity) = law.of_motion(parts.strain, parts.rate, phase, &mut spread);
+        let (mut expected, slope, viscosity, open) = law.of_motion(parts.strain, parts.rate, phase, &mut spread);
 
         // P Hᵀ, and S = H P Hᵀ + R.
         let mut strain = slope * parts.strain_variance + viscosity * parts.strain_rate;
@@ -156,7 +158,7 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
                 baseline += part.with[i];
             }
         }
-        let mut variance = law.variance + reading.extra_variance + slope * strain + viscosity * rate;
+        let mut variance = law.variance + reading.extra_variance + open + slope * strain + viscosity * rate;
         for branch in &branches {
             variance += *branch;
         }

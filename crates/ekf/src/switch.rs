@@ -1,4 +1,4 @@
-use ohmstrain_model::{Direction, Scalar, SplitRate};
+use ohmstrain_model::{Direction, Scalar, SplitRate, unexplained};
 
 /// How [`SparseEkf`](crate::SparseEkf) splits an uncertain rate between stretching and releasing.
 pub trait Switch<T: Scalar> {
@@ -37,7 +37,7 @@ impl<T: Scalar> Switch<T> for Logistic {
     }
 
     fn blend(rate: T, rate_sd: T) -> SplitRate<T> {
-        Direction::Uncertain { rate_sd }.split(rate)
+        Direction::Uncertain { rate_sd, persistence: T::one() }.split(rate)
     }
 }
 
@@ -91,11 +91,13 @@ impl<T: Scalar> Switch<T> for Compact {
             - fourth * ((T::of(0.2734375) - w * T::of(0.109375)) + fourth * T::of(0.01953125));
         let both = width * spread;
         let mean = half * rate;
+        let (extend_probability, retract_probability) = (half + lean, half - lean);
         SplitRate {
             extend: mean + both,
             retract: mean - both,
-            extend_probability: half + lean,
-            retract_probability: half - lean,
+            extend_probability,
+            retract_probability,
+            variance: unexplained(extend_probability, retract_probability, width * width * T::of(1.0 / 9.0)),
         }
     }
 }

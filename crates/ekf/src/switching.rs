@@ -1,6 +1,8 @@
 use core::ops::Range;
 
-use ohmstrain_model::{Motion, ParameterError, Phase, Problem, Scalar, SwitchedModel};
+use ohmstrain_model::{
+    Direction, Motion, ParameterError, Phase, Problem, Scalar, SwitchedModel, SwitchedStep, Transition,
+};
 
 use crate::gaussian::Gaussian;
 use crate::{Belief, Channel, Component, Dynamics};
@@ -10,6 +12,18 @@ pub trait Phased<T: Scalar, const N: usize, const L: usize>: Dynamics<T, N, L> +
     /// The same belief at the moment a moving phase begins: rate (and acceleration) drawn anew from the phase's prior,
     /// independent of everything else.
     fn enter(&self, from: &Belief<T, N, L>, phase: Phase) -> Belief<T, N, L>;
+
+    /// The transition over a step at whose start the rate had the sign of the moving phase `before`, and at whose end it has
+    /// that of `after`. The default does not ask where the rate was before.
+    fn transition_between(
+        &self,
+        step: &Self::Prepared,
+        from: &Belief<T, N, L>,
+        _before: Phase,
+        after: Phase,
+    ) -> Transition<T, N, L> {
+        self.transition(step, from, Some(after))
+    }
 
     /// The components of the state that [`Self::enter`] draws anew; it leaves the others as they are.
     fn renewed(&self) -> Range<usize>;
@@ -24,6 +38,9 @@ pub(crate) fn enter<T: Scalar, M: Phased<T, N, L>, const N: usize, const L: usiz
     let begins = phase != Phase::Hold && from.phase != phase;
     (if begins { model.enter(&from.belief, phase) } else { from.belief }, begins)
 }
+
+/// Longest step over the mean length of a phase.
+const LONGEST: f64 = 0.02;
 
 /// Mean and variance of |x| for a standard normal x: √(2/π) and 1 - 2/π.
 const HALF_NORMAL: (f64, f64) = (0.797_884_560_802_865_4, 0.363_380_227_632_418_6);
@@ -65,6 +82,21 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize, const L: usize> 
         renew(self.motion(), from, phase)
     }
 
+    fn transition_between(
+        &self,
+        step: &SwitchedStep<T, M, B>,
+        from: &Belief<T, N, L>,
+        before: Phase,
+        after: Phase,
+    ) -> Transition<T, N, L> {
+        let direction = if before == Phase::Hold || after == Phase::Hold {
+            Direction::Known(after)
+        } else {
+            Direction::Within { phase: after, turning: self.turning(step, &from.mean, &from.covariance, before) }
+        };
+        SwitchedModel::transition(self, step, &from.mean, direction)
+    }
+
     fn renewed(&self) -> Range<usize> {
         1..M
     }
@@ -95,6 +127,11 @@ impl<T: Scalar> Dwell<T> {
             return Err(ParameterError::new("reversal", Problem::OutOfRange));
         }
         Ok(Self { hold_s, move_s, reversal })
+    }
+
+    /// The longest step in which a change of phase may be taken for one at its beginning, s.
+    pub(crate) fn longest_step_s(&self) -> T {
+        T::of(LONGEST) * self.hold_s.min(self.move_s)
     }
 
     /// Transition probabilities over `dt_s`, `[from][to]` in the order of [`Phase::ALL`]: the exponential of generator

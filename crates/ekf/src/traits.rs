@@ -1,3 +1,4 @@
+use nalgebra::SVector;
 use ohmstrain_model::{Direction, Observation, Phase, Scalar, SwitchedModel, SwitchedStep, Symmetric, Transition};
 
 use crate::{Belief, Gaussian};
@@ -9,6 +10,12 @@ pub trait Dynamics<T: Scalar, const N: usize, const L: usize> {
 
     /// Prepares steps of `dt_s ≥ 0` seconds.
     fn prepare(&self, dt_s: T) -> Self::Prepared;
+
+    /// The longest step, s, over which [`Self::transition`] is as good as many short ones; infinite unless the model says
+    /// otherwise.
+    fn longest_step_s(&self) -> T {
+        T::one() / T::zero()
+    }
 
     /// The transition over a prepared step, linearised at the belief's mean. `phase` is a hypothesis; with `None` the
     /// model makes the best of the belief. Models of one phase ignore it.
@@ -31,6 +38,12 @@ pub trait Channel<T: Scalar, const N: usize, const L: usize> {
     /// The reading expected at the belief's mean, its gradient and the variance of its noise; `phase` as for
     /// [`Dynamics::transition`].
     fn observe(&self, at: &Belief<T, N, L>, phase: Option<Phase>) -> Observation<T, N>;
+
+    /// The reading expected at a sigma point of the belief. What [`Self::observe`] averages over the belief already is
+    /// linear here: an average is not to be averaged again.
+    fn value_at(&self, point: &SVector<T, N>, belief: &Belief<T, N, L>, phase: Option<Phase>) -> T {
+        self.observe(&Belief { mean: *point, ..*belief }, phase).value
+    }
 }
 
 impl<T: Scalar, const M: usize, const B: usize, const N: usize, const L: usize> Dynamics<T, N, L>
@@ -42,10 +55,14 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize, const L: usize> 
         self.prepare(dt_s)
     }
 
+    fn longest_step_s(&self) -> T {
+        self.longest_step_s()
+    }
+
     fn transition(&self, step: &Self::Prepared, from: &Belief<T, N, L>, phase: Option<Phase>) -> Transition<T, N, L> {
         let direction = match phase {
             Some(phase) => Direction::Known(phase),
-            None => Direction::Uncertain { rate_sd: self.rate_variance(step, &from.covariance).sqrt() },
+            None => self.uncertain_direction(step, &from.covariance),
         };
         self.transition(step, &from.mean, direction)
     }
@@ -60,15 +77,29 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize, const L: usize> 
     }
 }
 
+/// The direction at the instant of a reading.
+fn at_reading<T: Scalar>(rate_variance: T) -> Direction<T> {
+    Direction::Uncertain { rate_sd: rate_variance.max(T::zero()).sqrt(), persistence: T::one() }
+}
+
 impl<T: Scalar, const M: usize, const B: usize, const N: usize, const L: usize> Channel<T, N, L>
     for SwitchedModel<T, M, B, N>
 {
     fn observe(&self, at: &Belief<T, N, L>, phase: Option<Phase>) -> Observation<T, N> {
         let direction = match phase {
             Some(phase) => Direction::Known(phase),
-            None => Direction::Uncertain { rate_sd: at.covariance[(1, 1)].max(T::zero()).sqrt() },
+            None => at_reading(at.covariance[(1, 1)]),
         };
         self.observe(&at.mean, direction)
+    }
+
+    fn value_at(&self, point: &SVector<T, N>, belief: &Belief<T, N, L>, phase: Option<Phase>) -> T {
+        // Of the reading's parts only the gauge is curved and not averaged yet.
+        let at: Observation<T, N> = Channel::observe(self, belief, phase);
+        let ((curve, _), (mean_curve, mean_slope)) =
+            (self.law().gauge_value_and_slope(point[0]), self.law().gauge_value_and_slope(belief.mean[0]));
+        let off = point - belief.mean;
+        at.value + at.gradient.dot(&off) + curve - mean_curve - mean_slope * off[0]
     }
 }
 

@@ -59,6 +59,10 @@ impl<T: Scalar, M: Dynamics<T, N, L>, const N: usize, const L: usize> Dynamics<T
         self.model.prepare(dt_s)
     }
 
+    fn longest_step_s(&self) -> T {
+        self.model.longest_step_s()
+    }
+
     fn transition(&self, step: &Self::Prepared, from: &Belief<T, N, L>, phase: Option<Phase>) -> Transition<T, N, L> {
         self.model.transition(step, from, phase)
     }
@@ -77,6 +81,16 @@ impl<T: Scalar, M: Phased<T, N, L>, const N: usize, const L: usize> Phased<T, N,
         self.model.enter(from, phase)
     }
 
+    fn transition_between(
+        &self,
+        step: &Self::Prepared,
+        from: &Belief<T, N, L>,
+        before: Phase,
+        after: Phase,
+    ) -> Transition<T, N, L> {
+        self.model.transition_between(step, from, before, after)
+    }
+
     fn renewed(&self) -> core::ops::Range<usize> {
         self.model.renewed()
     }
@@ -88,7 +102,7 @@ impl<T: Scalar, M: Channel<T, N, L>, const N: usize, const L: usize> Channel<T, 
         let spread = T::of(N as f64);
         let weight = T::one() / (T::of(2.0) * spread);
         let root = SemiDefinite::factor(&at.covariance);
-        let value_at = |mean: SVector<T, N>| self.model.observe(&Belief { mean, ..*at }, phase).value;
+        let value_at = |point: SVector<T, N>| self.model.value_at(&point, at, phase);
         let centre = self.model.observe(at, phase);
         let pairs: [(SVector<T, N>, T, T); N] = core::array::from_fn(|i| {
             let offset = root.column(i) * spread.sqrt();

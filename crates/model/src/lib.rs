@@ -23,6 +23,7 @@
 #![no_std]
 #![deny(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+mod drive;
 mod error;
 mod front_end;
 mod gauge;
@@ -34,6 +35,7 @@ mod path;
 mod phase;
 mod relaxing_modulus;
 mod response;
+mod reversal;
 mod scalar;
 mod switched;
 mod symmetric;
@@ -45,9 +47,10 @@ pub use joint::Joint;
 pub use law::{Branch, SensorLaw, StrainRange};
 pub use motion::Motion;
 pub use noise::ModelNoise;
-pub use phase::{Direction, Phase, SplitRate};
+pub use phase::{Direction, Phase, SplitRate, Turning, UNEXPLAINED, UNEXPLAINED_SHAPE, unexplained};
 pub use relaxing_modulus::{Modulus, PhaseStart, RelaxingModulus, ResistanceGradient};
 pub use response::Response;
+pub use reversal::{LEAST_LEFT, RateChange, correlated_steps};
 pub use scalar::Scalar;
 pub use switched::{Observation, SwitchedModel, SwitchedStep, Transition};
 pub use symmetric::Symmetric;

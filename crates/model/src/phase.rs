@@ -33,13 +33,46 @@ impl Phase {
 pub enum Direction<T> {
     /// The phase is given: a hypothesis, or known from elsewhere.
     Known(Phase),
+    /// The sign of the rate at the end of the step is a hypothesis, that at its start was one: on the way the rate may have
+    /// turned around, and the body has gone further than its net move.
+    Within {
+        /// A moving phase: the sign at the end.
+        phase: Phase,
+        /// What turning around adds to the path.
+        turning: Turning<T>,
+    },
     /// The phase is not known, only that the rate is Gaussian around its prediction. Each set of gains is driven by the
     /// rate it is expected to see, `E[max(v, 0)]` or `E[min(v, 0)]`, and weighted in the Jacobian with the probability
     /// of its direction: statistical linearisation of the switch, smooth where a sign would jump.
     Uncertain {
-        /// Standard deviation of the rate, 1/s.
+        /// Standard deviation of the rate over the step, 1/s.
         rate_sd: T,
+        /// How many times more variance of what the linearisation leaves adds up, over many steps, than if it were drawn anew
+        /// in each: it lasts as long as the rate's error does, longer than a short step and not as long as a long one.
+        persistence: T,
     },
+}
+
+/// The path that a body goes beyond its net move because its rate turns around within a step, over the step's length.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Turning<T> {
+    /// Expected, 1/s.
+    pub excess: T,
+    /// Its variance, 1/s².
+    pub variance: T,
+}
+
+/// Var(max(v, 0)) of a centred v of unit variance, less what the line ½ v explains: ¼ - 1/(2π).
+pub const UNEXPLAINED: f64 = 0.090_845_056_908_105_33;
+/// Shape of the same for any mean, in powers of 4 Φ (1 - Φ).
+pub const UNEXPLAINED_SHAPE: (f64, f64) = (0.77, 0.23);
+
+/// The variance of max(v, 0) that its statistical linearisation leaves, v normal with probability `extends` of a positive
+/// sign and the given variance: Var(max(v, 0)) - Φ² Var(v), by a fit that is off by at most 3 % of its maximum.
+#[inline(always)]
+pub fn unexplained<T: Scalar>(extends: T, retracts: T, variance: T) -> T {
+    let both = extends * T::of(4.0) * retracts;
+    variance * T::of(UNEXPLAINED) * both * (T::of(UNEXPLAINED_SHAPE.0) + both * T::of(UNEXPLAINED_SHAPE.1))
 }
 
 /// Steepness of the logistic distribution that stands for the normal one: `Φ(r) ≈ 1/(1 + exp(-1.702 r))`.
@@ -56,6 +89,9 @@ pub struct SplitRate<T> {
     pub extend_probability: T,
     /// Probability of releasing, the slope of `retract`.
     pub retract_probability: T,
+    /// Variance of the stretching rate around `extend` that the rate does not explain, 1/s²; as much, of opposite sign, is
+    /// the releasing rate's.
+    pub variance: T,
 }
 
 impl<T: Scalar> Direction<T> {
@@ -68,16 +104,17 @@ impl<T: Scalar> Direction<T> {
     pub fn split(self, rate: T) -> SplitRate<T> {
         let (zero, one) = (T::zero(), T::one());
         match self {
-            Self::Known(Phase::Extend) => {
-                SplitRate { extend: rate, retract: zero, extend_probability: one, retract_probability: zero }
+            Self::Known(phase) => SplitRate::known(phase, rate),
+            Self::Within { phase, turning } => {
+                let (net, half) = (SplitRate::known(phase, rate), T::of(0.5));
+                SplitRate {
+                    extend: net.extend + half * turning.excess,
+                    retract: net.retract - half * turning.excess,
+                    variance: half * half * turning.variance,
+                    ..net
+                }
             }
-            Self::Known(Phase::Retract) => {
-                SplitRate { extend: zero, retract: rate, extend_probability: zero, retract_probability: one }
-            }
-            Self::Known(Phase::Hold) => {
-                SplitRate { extend: zero, retract: zero, extend_probability: zero, retract_probability: zero }
-            }
-            Self::Uncertain { rate_sd } => {
+            Self::Uncertain { rate_sd, .. } => {
                 // Below this share of the rate the deviation makes no difference, and 0/0 is avoided.
                 let scale = (rate_sd.max(rate.abs() * T::of(0.01)) + T::of(1e-30)) / T::of(STEEPNESS);
                 let lean = rate / scale;
@@ -92,6 +129,7 @@ impl<T: Scalar> Direction<T> {
                     retract: rate.min(zero) - spread,
                     extend_probability,
                     retract_probability,
+                    variance: unexplained(extend_probability, retract_probability, rate_sd * rate_sd),
                 }
             }
         }
@@ -99,6 +137,18 @@ impl<T: Scalar> Direction<T> {
 }
 
 impl<T: Scalar> SplitRate<T> {
+    /// All of the rate in one direction, or in none.
+    fn known(phase: Phase, rate: T) -> Self {
+        let (zero, one) = (T::zero(), T::one());
+        let none =
+            Self { extend: zero, retract: zero, extend_probability: zero, retract_probability: zero, variance: zero };
+        match phase {
+            Phase::Extend => Self { extend: rate, extend_probability: one, ..none },
+            Phase::Hold => none,
+            Phase::Retract => Self { retract: rate, retract_probability: one, ..none },
+        }
+    }
+
     /// Expected product of gain and rate.
     #[must_use]
     pub fn drive(&self, extend_gain: T, retract_gain: T) -> T {

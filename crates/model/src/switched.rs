@@ -2,6 +2,7 @@ use nalgebra::{SMatrix, SVector};
 
 use crate::error::{ParameterError, Problem};
 use crate::phase::Direction;
+use crate::reversal::averaging;
 use crate::{ModelNoise, Motion, Phase, Response, Scalar, SensorLaw, Symmetric};
 
 /// The state after a time step, given the state before it: `x' = mean + jacobian · (x - x̂) + noise`.
@@ -65,6 +66,8 @@ pub struct SwitchedStep<T, const M: usize, const B: usize> {
     branch_variance: [T; B],
     pub(crate) baseline_change: T,
     baseline_variance: T,
+    /// Share of an instant's variance that the mean over the step has, of what follows the rate's sign.
+    pub(crate) averaging: T,
 }
 
 impl<T: Scalar, const M: usize, const B: usize> SwitchedStep<T, M, B> {
@@ -90,6 +93,12 @@ impl<T: Scalar, const M: usize, const B: usize> SwitchedStep<T, M, B> {
     #[must_use]
     pub fn baseline_change(&self) -> T {
         self.baseline_change
+    }
+
+    /// Share of an instant's variance that the mean over the step has, of what follows the rate's sign.
+    #[must_use]
+    pub fn averaging(&self) -> T {
+        self.averaging
     }
 
     /// Variance that the baseline gathers, relative to R₀, squared.
@@ -165,6 +174,7 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize> SwitchedModel<T,
             branch_variance: self.law.branches.map(|branch| growth(self.noise.branch_sd, branch.tau_s)),
             baseline_change: (-dt_s / self.noise.baseline_time_s).exp_m1(),
             baseline_variance: growth(self.noise.baseline_sd, self.noise.baseline_time_s),
+            averaging: averaging(&self.motion, dt_s),
         }
     }
 
@@ -276,7 +286,9 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize> SwitchedModel<T,
             value += state[i];
             gradient[i] = T::one();
         }
-        Observation { value, gradient, variance: self.noise.reading_sd * self.noise.reading_sd }
+        let jump = viscosities.0 - viscosities.1;
+        let variance = self.noise.reading_sd * self.noise.reading_sd + jump * jump * rate.variance;
+        Observation { value, gradient, variance }
     }
 
     /// Strain and its derivatives: linear, whatever the gains.
@@ -306,8 +318,12 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize> SwitchedModel<T,
     pub(crate) fn push(&self, direction: Direction<T>) -> T {
         let toward_strain = self.motion.restoring()[0] * self.motion.rest_strain();
         let toward_rate = match direction {
-            Direction::Known(Phase::Extend) => self.motion.phase_rate(),
-            Direction::Known(Phase::Retract) => -self.motion.phase_rate(),
+            Direction::Known(Phase::Extend) | Direction::Within { phase: Phase::Extend, .. } => {
+                self.motion.phase_rate()
+            }
+            Direction::Known(Phase::Retract) | Direction::Within { phase: Phase::Retract, .. } => {
+                -self.motion.phase_rate()
+            }
             _ => T::zero(),
         };
         toward_strain + self.motion.restoring()[1] * toward_rate
@@ -358,53 +374,5 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize> SwitchedModel<T,
             }
         }
         variance.max(T::zero())
-    }
-
-    /// What the motion does to the branches: gain at mid-strain times mean rate over the step.
-    ///
-    /// Noise of branch i is `γᵢ wᵢ + strain_pull · n_ε`: its gain depends on where the motion goes.
-    fn drive_branches<const W: usize, const L: usize>(
-        &self,
-        step: &SwitchedStep<T, M, B>,
-        state: &SVector<T, W>,
-        direction: Direction<T>,
-        out: &mut Transition<T, W, L>,
-    ) {
-        let response = &step.response;
-        let mid_strain = (state[0] + out.mean[0]) / T::of(2.0);
-        let push = self.push(direction);
-        let (mut gain, mut strain_pull) = ([T::zero(); B], [T::zero(); B]);
-        for i in 0..B {
-            let mut unit_drive = response.drive_input[i] * push;
-            for j in 0..M {
-                unit_drive += response.drive[i][j] * state[j];
-            }
-            // The rate that, held over the step, drives the branch as much as the motion does.
-            let reach_s = -response.decay_change[i] * self.law.branches[i].tau_s;
-            if !(reach_s > T::zero()) {
-                continue; // a step of zero seconds
-            }
-            let rate = direction.split(unit_drive / reach_s);
-            let (extend, extend_slope) = self.law.gain(i, mid_strain, Phase::Extend);
-            let (retract, retract_slope) = self.law.gain(i, mid_strain, Phase::Retract);
-            gain[i] = rate.slope(extend, retract);
-            strain_pull[i] = reach_s * rate.drive(extend_slope, retract_slope) / T::of(2.0);
-            let c = M + i;
-            out.mean[c] += reach_s * rate.drive(extend, retract);
-            for j in 0..M {
-                out.jacobian[(c, j)] = gain[i] * response.drive[i][j] + strain_pull[i] * out.jacobian[(0, j)];
-            }
-            out.jacobian[(c, 0)] += strain_pull[i];
-        }
-        for i in 0..B {
-            let cross = |j: usize| gain[i] * response.cross_noise[i][j] + strain_pull[i] * response.motion_noise[0][j];
-            for j in 0..M {
-                out.noise[(M + i, j)] += cross(j);
-            }
-            for k in 0..=i {
-                out.noise[(M + i, M + k)] += strain_pull[k] * cross(0)
-                    + gain[k] * (gain[i] * response.branch_noise[i][k] + strain_pull[i] * response.cross_noise[k][0]);
-            }
-        }
     }
 }

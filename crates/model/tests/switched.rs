@@ -4,21 +4,27 @@ use nalgebra::{SMatrix, SVector};
 use num_dual::Dual64;
 use ohmstrain_model::{
     Branch, Direction, Gauge, ModelNoise, Motion, Phase, Scalar, SensorLaw, StrainRange, SwitchedModel, Symmetric,
-    Transition,
+    Transition, Turning,
 };
 use proptest::prelude::*;
 
-const DIRECTIONS: [Direction<f64>; 4] = [
+const DIRECTIONS: [Direction<f64>; 5] = [
     Direction::Known(Phase::Extend),
     Direction::Known(Phase::Hold),
     Direction::Known(Phase::Retract),
-    Direction::Uncertain { rate_sd: 0.03 },
+    Direction::Uncertain { rate_sd: 0.03, persistence: 1.0 },
+    Direction::Within { phase: Phase::Retract, turning: Turning { excess: 0.01, variance: 1e-4 } },
 ];
 
 fn in_duals(direction: Direction<f64>) -> Direction<Dual64> {
     match direction {
         Direction::Known(phase) => Direction::Known(phase),
-        Direction::Uncertain { rate_sd } => Direction::Uncertain { rate_sd: rate_sd.into() },
+        Direction::Uncertain { rate_sd, persistence } => {
+            Direction::Uncertain { rate_sd: rate_sd.into(), persistence: persistence.into() }
+        }
+        Direction::Within { phase, turning: Turning { excess, variance } } => {
+            Direction::Within { phase, turning: Turning { excess: excess.into(), variance: variance.into() } }
+        }
     }
 }
 
@@ -179,14 +185,14 @@ fn an_uncertain_direction_drives_both_gains() {
     let dt = 1e-3;
     let rest = SVector::from([0.1, 0.0, 0.0, 0.0, 0.0]);
     let step: Transition<f64, 5, 15> =
-        model.transition(&model.prepare(dt), &rest, Direction::Uncertain { rate_sd: 0.05 });
+        model.transition(&model.prepare(dt), &rest, Direction::Uncertain { rate_sd: 0.05, persistence: 1.0 });
     let expected = 0.9 * dt * 0.05 / std::f64::consts::TAU.sqrt();
     // ln 2/1.702 = 0.4073 stands for 1/√(2π) = 0.3989.
     assert!((step.mean[2] / expected - 1.0).abs() < 0.022, "{} vs {expected}", step.mean[2]);
     // Where the direction is certain, the split is the sign.
     let moving = SVector::from([0.1, 0.5, 0.0, 0.0, 0.0]);
     let certain: Transition<f64, 5, 15> =
-        model.transition(&model.prepare(dt), &moving, Direction::Uncertain { rate_sd: 0.01 });
+        model.transition(&model.prepare(dt), &moving, Direction::Uncertain { rate_sd: 0.01, persistence: 1.0 });
     let known: Transition<f64, 5, 15> = model.transition(&model.prepare(dt), &moving, Direction::Known(Phase::Extend));
     assert!((certain.mean - known.mean).amax() < 1e-15);
 }

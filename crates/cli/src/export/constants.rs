@@ -2,7 +2,9 @@
 
 use ohmstrain_calib::{EstimatorKind, MotionParams, Quantity, ReadingUnit, SensorParams};
 use ohmstrain_ekf::{Belief, Compact, Switch};
-use ohmstrain_model::{Branch, Gauge, ModelNoise, Motion, ParameterError, SensorLaw, StrainRange, SwitchedModel};
+use ohmstrain_model::{
+    Branch, Gauge, LEAST_LEFT, ModelNoise, Motion, ParameterError, SensorLaw, StrainRange, SwitchedModel, UNEXPLAINED,
+};
 use serde::Serialize;
 
 use super::ExportError;
@@ -34,6 +36,12 @@ pub struct Exported {
     motion_noise: [Literal; 3],
     /// What the rate's new variance takes from the old ones of strain, of both, of rate.
     rate_squares: [Literal; 3],
+    averaging: Literal,
+    /// How what an uncertain direction leaves open is computed.
+    ninth: Literal,
+    unexplained: Literal,
+    least_left: Literal,
+    rate_change: [Literal; 2],
     /// Below, within and above the law's range.
     gain_regions: [Vec<GainConstants>; 3],
     branches: Vec<BranchConstants>,
@@ -230,6 +238,11 @@ impl Exported {
             motion_noise: [response.motion_noise[0][0], response.motion_noise[1][0], response.motion_noise[1][1]]
                 .map(Literal),
             rate_squares: [b[0] * b[0], 2.0 * b[0] * b[1], b[1] * b[1]].map(Literal),
+            averaging: Literal(step.averaging()),
+            ninth: Literal((1.0_f64 / 9.0) as f32),
+            unexplained: Literal(UNEXPLAINED as f32),
+            least_left: Literal(LEAST_LEFT as f32),
+            rate_change: response.motion_change[1].map(Literal),
             gain_regions: [Some(law.range.lower), None, Some(law.range.upper)].map(|border| gains(law, border)),
             branches: (0..B).map(|i| branch(&sensor, i)).collect(),
             baseline_decay: Literal(baseline_decay),

@@ -2,7 +2,7 @@
 //! and a choice; where it adds a product and the processor has an instruction for that, one rounding instead of two.
 
 use fearless_simd::{Select, Simd, SimdFloat, SimdInto};
-use ohmstrain_model::{Branch, SplitRate, StrainRange};
+use ohmstrain_model::{Branch, LEAST_LEFT, SplitRate, StrainRange, UNEXPLAINED, UNEXPLAINED_SHAPE};
 
 use super::Lane;
 use crate::sparse_constants::{BranchConstants, StepConstants};
@@ -38,6 +38,17 @@ struct Driven<V> {
     row: [V; 2],
     kept: [V; 2],
     carried: [V; 2],
+    jump: V,
+}
+
+/// How a branch is driven, as the sparse filter has it.
+#[derive(Clone, Copy)]
+struct Drive<V> {
+    change: V,
+    gain: V,
+    pull: V,
+    jump: V,
+    left: V,
 }
 
 /// `a₀ b₀ + a₁ b₁`.
@@ -82,27 +93,69 @@ pub(super) fn predict<
     p[1] = sum(step.noise[1], from_strain, b);
     let from_old = sum(step.noise[2], [strain_variance, strain_rate], [squares[0], squares[1]]);
     p[2] = rate_variance.mul_add(squares[2], from_old);
-    let spread = RateSpread::new(simd, p[2]);
+    let spread = RateSpread::new(simd, (rate_variance + p[2]) * T::of(0.5));
 
     let zero = V::splat(simd, T::zero());
-    let mut driven =
-        [Driven { change: zero, gain: zero, pull: zero, row: [zero; 2], kept: [zero; 2], carried: [zero; 2] }; B];
+    let mut driven = [Driven {
+        change: zero,
+        gain: zero,
+        pull: zero,
+        row: [zero; 2],
+        kept: [zero; 2],
+        carried: [zero; 2],
+        jump: zero,
+    }; B];
+    let mut unexplained = zero;
     for i in 0..B {
         let constants = &step.branches[i];
         let unit = sum(constants.input, [strain, rate], constants.drive);
-        let (change, gain, pull) = drive(simd, constants, &law.branches[i], &law.range, strain_sum, unit, &spread);
+        let Drive { change, gain, pull, jump, left } =
+            drive(simd, constants, &law.branches[i], &law.range, strain_sum, unit, &spread);
+        if i == 0 {
+            let with_strain = dot([strain_variance, strain_rate], b);
+            let together = dot([strain_rate, rate_variance], b);
+            let fresh = sum(step.noise[2], [with_strain, together], step.rate_change);
+            unexplained = left * (correlated_steps(simd, p[2], together, fresh) * step.averaging);
+        }
         let row = [gain.mul_add(constants.drive[0], pull), gain * constants.drive[1]];
         let kept = [p[at(2 + i, 0)] * constants.decay, p[at(2 + i, 1)] * constants.decay];
         let carried =
             [sum(kept[0], row, [strain_variance, strain_rate]), sum(kept[1], row, [strain_rate, rate_variance])];
-        driven[i] = Driven { change, gain, pull, row, kept, carried };
+        driven[i] = Driven { change, gain, pull, row, kept, carried, jump };
     }
     predict_branches(step, x, p, &driven);
+    leave_open(p, &driven, unexplained);
     predict_baseline(step, x, p, &driven);
-    spread
+    RateSpread::new(simd, p[2])
 }
 
-/// Change, gain and pull of a branch.
+/// As [`ohmstrain_model::correlated_steps`].
+#[inline(always)]
+fn correlated_steps<T: Lane, S: Simd, V: SimdFloat<S, Element = T>>(simd: S, ahead: V, together: V, fresh: V) -> V {
+    let (square, both) = (ahead * ahead, together * together);
+    let both = both.simd_lt(square).select(both, square);
+    let (left, least) = (fresh * (ahead + together), square * T::of(LEAST_LEFT));
+    let steps = (square + both) / left.simd_gt(least).select(left, least);
+    // A rate that is known has nothing to persist, and no correlation.
+    square.simd_gt(T::zero()).select(steps, V::splat(simd, T::zero()))
+}
+
+/// Adds what the direction leaves open: one number for all branches.
+#[inline(always)]
+fn leave_open<T: Lane, S: Simd, V: SimdFloat<S, Element = T>, const B: usize, const L: usize>(
+    p: &mut [V; L],
+    driven: &[Driven<V>; B],
+    unexplained: V,
+) {
+    for i in 0..B {
+        let share = unexplained * driven[i].jump;
+        for k in 0..=i {
+            p[at(2 + i, 2 + k)] = share.mul_add(driven[k].jump, p[at(2 + i, 2 + k)]);
+        }
+    }
+}
+
+/// How a branch is driven.
 #[inline(always)]
 fn drive<T: Lane, S: Simd, V: SimdFloat<S, Element = T>, const B: usize>(
     simd: S,
@@ -112,7 +165,7 @@ fn drive<T: Lane, S: Simd, V: SimdFloat<S, Element = T>, const B: usize>(
     strain_sum: V,
     unit: V,
     spread: &RateSpread<V>,
-) -> (V, V, V) {
+) -> Drive<V> {
     // Gains as functions of the sum of old and new strain, constant beyond the range.
     let (lower, upper) = (range.lower + range.lower, range.upper + range.upper);
     let inside = strain_sum.simd_ge(lower) & strain_sum.simd_le(upper);
@@ -130,7 +183,10 @@ fn drive<T: Lane, S: Simd, V: SimdFloat<S, Element = T>, const B: usize>(
     let change = uncertain.select(dot(rates, gains) * constants.reach, here * unit);
     let gain = uncertain.select(dot([split.extend_probability, split.retract_probability], gains), here);
     let pull = uncertain.select(dot(rates, growth) * constants.reach, growth_here * unit);
-    (change, gain, inside.select(pull, V::splat(simd, T::zero())))
+    let zero = V::splat(simd, T::zero());
+    let pull = inside.select(pull, zero);
+    let jump = (gains[0] - gains[1]) * constants.reach;
+    Drive { change, gain, pull, jump, left: uncertain.select(split.variance, zero) }
 }
 
 /// The branches' covariances with the new motion, which is in `p` already, and with each other.
@@ -143,7 +199,7 @@ fn predict_branches<T: Lane, S: Simd, V: SimdFloat<S, Element = T>, const B: usi
 ) {
     let [a, b] = step.motion;
     for i in 0..B {
-        let (c, branch, Driven { change, gain, pull, row, kept, carried }) = (2 + i, &step.branches[i], driven[i]);
+        let (c, branch, Driven { change, gain, pull, row, kept, carried, .. }) = (2 + i, &step.branches[i], driven[i]);
         let strain = sum(gain * branch.cross_noise[0], carried, a);
         let rate = sum(gain * branch.cross_noise[1], carried, b);
         let with_strain = pull.mul_add(p[0], strain);
@@ -188,6 +244,15 @@ fn predict_baseline<T: Lane, S: Simd, V: SimdFloat<S, Element = T>, const B: usi
     p[at(last, last)] = p[at(last, last)].mul_add(step.baseline_square, step.baseline_variance);
 }
 
+/// As [`ohmstrain_model::unexplained`].
+#[inline(always)]
+fn unexplained<T: Lane, S: Simd, V: SimdFloat<S, Element = T>>(simd: S, extends: V, retracts: V, variance: V) -> V {
+    let both = extends * T::of(4.0) * retracts;
+    let (constant, growth) = UNEXPLAINED_SHAPE;
+    let shape = both.mul_add(V::splat(simd, T::of(growth)), T::of(constant));
+    variance * T::of(UNEXPLAINED) * both * shape
+}
+
 pub(super) const CLEAR: f64 = <Compact as Switch<f64>>::CLEAR;
 
 impl<V> RateSpread<V> {
@@ -220,11 +285,18 @@ impl<V> RateSpread<V> {
         let outer = fourth.mul_add(number(0.01953125), minus_w.mul_add(number(0.109375), number(0.2734375)));
         let spread = (-fourth).mul_add(outer, w.mul_add(number(0.546875), number(0.13671875)));
         let mean = rate * half;
+        let (extend_probability, retract_probability) = (u.mul_add(lean, half), (-u).mul_add(lean, half));
         SplitRate {
             extend: self.width.mul_add(spread, mean),
             retract: (-self.width).mul_add(spread, mean),
-            extend_probability: u.mul_add(lean, half),
-            retract_probability: (-u).mul_add(lean, half),
+            extend_probability,
+            retract_probability,
+            variance: unexplained(
+                simd,
+                extend_probability,
+                retract_probability,
+                self.width * self.width * number(1.0 / 9.0),
+            ),
         }
     }
 }

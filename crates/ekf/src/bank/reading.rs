@@ -27,7 +27,7 @@ pub(super) fn update<T: Lane, S: Simd, V: SimdFloat<S, Element = T>, const B: us
     let law = ekf.model().law();
     let (gauge, slope) = curve(simd, &law.gauge, &law.range, x[0]);
     let viscosities = [law.extend_viscosity_s, law.retract_viscosity_s];
-    let (mut expected, viscosity) = with_dash_pot(simd, gauge, viscosities, x[1], spread);
+    let (mut expected, viscosity, open) = with_dash_pot(simd, gauge, viscosities, x[1], spread);
 
     // P Hᵀ, and S = H P Hᵀ + R.
     let mut ph = [expected; N];
@@ -46,7 +46,7 @@ pub(super) fn update<T: Lane, S: Simd, V: SimdFloat<S, Element = T>, const B: us
             ph[k] += p[at(i, k)];
         }
     }
-    let mut variance = sum(extra_variance + ekf.reading.variance, [ph[0], ph[1]], [slope, viscosity]);
+    let mut variance = sum(extra_variance + ekf.reading.variance + open, [ph[0], ph[1]], [slope, viscosity]);
     for ph in &ph[2..] {
         variance += *ph;
     }
@@ -65,7 +65,7 @@ pub(super) fn update<T: Lane, S: Simd, V: SimdFloat<S, Element = T>, const B: us
     Compared { innovation, variance, nis: innovation * scaled }
 }
 
-/// The expected reading of motion alone, and its derivative by the rate.
+/// The expected reading of motion alone, its derivative by the rate, and the variance of what the direction leaves open.
 #[inline(always)]
 fn with_dash_pot<T: Lane, S: Simd, V: SimdFloat<S, Element = T>>(
     simd: S,
@@ -73,14 +73,16 @@ fn with_dash_pot<T: Lane, S: Simd, V: SimdFloat<S, Element = T>>(
     viscosities: [T; 2],
     rate: V,
     spread: &RateSpread<V>,
-) -> (V, V) {
+) -> (V, V, V) {
     let uncertain = (rate * rate).simd_lt(spread.variance * T::of(CLEAR * CLEAR));
     let split = spread.split(simd, rate);
     let [extend, retract] = viscosities.map(|viscosity| V::splat(simd, viscosity));
     let here = rate.simd_gt(T::zero()).select(extend, retract);
     let expected = sum(gauge, [split.extend, split.retract], viscosities);
     let slope = dot([split.extend_probability, split.retract_probability], viscosities);
-    (uncertain.select(expected, here.mul_add(rate, gauge)), uncertain.select(slope, here))
+    let jump = extend - retract;
+    let open = uncertain.select(jump * jump * split.variance, V::splat(simd, T::zero()));
+    (uncertain.select(expected, here.mul_add(rate, gauge)), uncertain.select(slope, here), open)
 }
 
 /// The gauge within the range and its tangent outside, and the slope: a polynomial in vectors, what needs an exponential

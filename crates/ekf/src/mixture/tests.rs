@@ -45,15 +45,15 @@ proptest! {
         let apart = Component { phase: Phase::Hold, ..apart };
         let mut all = std::vec![first, apart];
         let mut mixture = Mixture::<f64, 3, 6, 2>::empty();
-        mixture.add(&first);
-        mixture.add(&apart);
+        mixture.add(&first, false);
+        mixture.add(&apart, false);
         for other in others {
             // Close to what is there already in strain and rate, anywhere in the third state.
             let mut close = other;
             for i in 0..2 {
                 close.belief.mean[i] = mixture.components()[0].belief.mean[i] + 0.04 * other.belief.mean[i];
             }
-            mixture.add(&close);
+            mixture.add(&close, false);
             all.push(close);
         }
         prop_assert_eq!(mixture.components().len(), 2);

@@ -40,6 +40,11 @@ static const float RATE_SQUARES[3] = {<< rate_squares[0] >>f, << rate_squares[1]
 static const float MOTION_NOISE[3] = {<< motion_noise[0] >>f, << motion_noise[1] >>f, << motion_noise[2] >>f};
 
 {% if branches %}
+/* Share of an instant's variance that the mean over an interval has, of what follows the rate's sign. */
+static const float AVERAGING = << averaging >>f;
+/* Change of the rate over an interval with strain and rate. */
+static const float RATE_CHANGE[2] = {<< rate_change[0] >>f, << rate_change[1] >>f};
+
 /* A relaxing branch over one interval: c' = decay c + gain (drive . [strain, rate] + drive_input) + noise. */
 typedef struct branch {
     float decay;
@@ -161,13 +166,14 @@ static float gauge(float strain, float *slope)
 typedef struct split {
     float extend, retract;
     float extend_probability, retract_probability;
+    float variance; /* of either rate, what the probabilities as slopes leave of it; (1/s)^2 */
 } split;
 
 /* The density 35/32 (1 - u^2)^3 at u deviations / 3 stands for the normal one: its integrals are polynomials, and from
  * three deviations on the direction is clear and there is nothing to split. */
 static split split_rate(float rate, rate_spread *spread)
 {
-    float u, w, fourth, lean, both, mean;
+    float u, w, fourth, lean, both, mean, unclear;
     split out;
 
     if (!(spread->width > 0.0f)) {
@@ -186,6 +192,8 @@ static split split_rate(float rate, rate_spread *spread)
     out.retract = mean - both;
     out.extend_probability = 0.5f + lean;
     out.retract_probability = 0.5f - lean;
+    unclear = out.extend_probability * 4.0f * out.retract_probability;
+    out.variance = spread->width * spread->width * << ninth >>f * << unexplained >>f * unclear * (0.77f + unclear * 0.23f);
     return out;
 }
 
@@ -215,6 +223,8 @@ typedef struct driven {
     float row[2];     /* answer to old strain and rate */
     float kept[2];    /* what is left of the covariances with old strain and rate */
     float carried[2]; /* the same with what the motion adds */
+    float jump;       /* what a unit of path in the other direction would have changed */
+    float open;       /* variance of the rate's split */
 } driven;
 
 static float gain_at(gain g, float strain_sum)
@@ -233,11 +243,15 @@ static driven drive_branch(const branch *b, const gains *g, float strain_sum, fl
         out.change = b->reach_s * split_drive(&rate, extend, retract);
         out.gain = split_slope(&rate, extend, retract);
         out.pull = b->reach_s * split_drive(&rate, g->extend.growth, g->retract.growth);
+        out.jump = b->reach_s * (extend - retract);
+        out.open = rate.variance;
     } else {
         const gain known = unit > 0.0f ? g->extend : g->retract;
         out.gain = gain_at(known, strain_sum);
         out.change = out.gain * unit;
         out.pull = known.growth * unit;
+        out.jump = 0.0f;
+        out.open = 0.0f;
     }
     out.row[0] = out.pull + out.gain * b->drive[0];
     out.row[1] = out.gain * b->drive[1];
@@ -254,7 +268,7 @@ static const gains *gains_at(float strain_sum)
 }
 
 {% endif %}
-/* The mean one interval on; `spread` is that of the rate at its end. */
+/* The mean one interval on{% if branches %}; `spread` is that of the rate in its middle{% endif %}. */
 static void predict_mean(float x[STATES]{% if branches %}, rate_spread *spread, driven by[BRANCHES]{% endif %})
 {
     const float strain = x[0], rate = x[1];
@@ -277,16 +291,20 @@ static void predict_mean(float x[STATES]{% if branches %}, rate_spread *spread, 
     x[LAST] *= BASELINE_DECAY;
 }
 
-/* The reading expected at x, relative; its derivatives with respect to strain and rate go to slope[]. */
-static float expected_reading(const float x[STATES], rate_spread *spread, float slope[2])
+/* The reading expected at x, relative; its derivatives with respect to strain and rate go to slope[], and the variance of
+ * what an uncertain direction leaves of the dash-pot to *open. */
+static float expected_reading(const float x[STATES], rate_spread *spread, float slope[2], float *open)
 {
     const float inside = clamped(x[0], RANGE_LOWER, RANGE_UPPER);
     float expected = gauge(inside, &slope[0]);
     int i;
 
     expected = expected + slope[0] * (x[0] - inside);
+    *open = 0.0f;
     if (x[1] * x[1] < 9.0f * spread->variance) {
         const split rate = split_rate(x[1], spread);
+        const float jump = EXTEND_VISCOSITY_S - RETRACT_VISCOSITY_S;
+        *open = jump * jump * rate.variance;
         expected = expected + EXTEND_VISCOSITY_S * rate.extend + RETRACT_VISCOSITY_S * rate.retract;
         slope[1] = split_slope(&rate, EXTEND_VISCOSITY_S, RETRACT_VISCOSITY_S);
     } else {
@@ -349,6 +367,36 @@ static void predict_branch(float p[ENTRIES], const driven by[BRANCHES], int i)
     p[AT(c, 1)] = rate + pull * p[AT(1, 0)];
 }
 
+/* `(1 + r^2)/(1 - r^2)` of a rate whose errors at both ends of an interval correlate with r: over how many intervals what
+ * the direction leaves open adds up. `ahead` is the variance at the end, `together` the covariance of both ends, `fresh`
+ * their difference. */
+static float correlated_steps(float ahead, float together, float fresh)
+{
+    const float square = ahead * ahead, least = << least_left >>f * square;
+    float both = together * together, left = fresh * (ahead + together);
+
+    if (!(both < square)) {
+        both = square;
+    }
+    if (!(left > least)) {
+        left = least;
+    }
+    return (square + both) / left;
+}
+
+/* Adds what the direction leaves open: one number for all branches. */
+static void leave_open(float p[ENTRIES], const driven by[BRANCHES], float unexplained)
+{
+    int i, k;
+
+    for (i = 0; i < BRANCHES; i++) {
+        const float share = unexplained * by[i].jump;
+        for (k = 0; k <= i; k++) {
+            p[AT(2 + i, 2 + k)] += share * by[k].jump;
+        }
+    }
+}
+
 {% endif %}
 /* The baseline's row of the covariance, from its own old values. */
 static void predict_baseline(float p[ENTRIES]{% if branches %}, const driven by[BRANCHES]{% endif %})
@@ -385,30 +433,43 @@ static void predict_motion(float p[ENTRIES], float rate_variance)
 /* Mean and covariance one interval on; returns how far the rate spreads at its end. */
 static rate_spread predict(float x[STATES], float p[ENTRIES])
 {
-    rate_spread spread = {0.0f, 0.0f, 0.0f, 0.0f};
+    rate_spread ahead = {0.0f, 0.0f, 0.0f, 0.0f};
 {% if branches %}
+    rate_spread spread = {0.0f, 0.0f, 0.0f, 0.0f};
     driven by[BRANCHES];
+    float unexplained;
     int i;
 {% endif %}
 
-    spread.variance = MOTION_NOISE[2] + RATE_SQUARES[0] * p[AT(0, 0)] + RATE_SQUARES[1] * p[AT(1, 0)] +
-                      RATE_SQUARES[2] * p[AT(1, 1)];
+    ahead.variance = MOTION_NOISE[2] + RATE_SQUARES[0] * p[AT(0, 0)] + RATE_SQUARES[1] * p[AT(1, 0)] +
+                     RATE_SQUARES[2] * p[AT(1, 1)];
 {% if branches %}
+    spread.variance = 0.5f * (p[AT(1, 1)] + ahead.variance);
     predict_mean(x, &spread, by);
+    unexplained = by[0].open;
+    if (unexplained > 0.0f) {
+        const float with_strain = MOTION[1][0] * p[AT(0, 0)] + MOTION[1][1] * p[AT(1, 0)];
+        const float together = MOTION[1][0] * p[AT(1, 0)] + MOTION[1][1] * p[AT(1, 1)];
+        const float fresh = MOTION_NOISE[2] + with_strain * RATE_CHANGE[0] + together * RATE_CHANGE[1];
+        unexplained *= AVERAGING * correlated_steps(ahead.variance, together, fresh);
+    }
     for (i = 0; i < BRANCHES; i++) {
         carry_branch(p, &by[i], i);
     }
-    predict_motion(p, spread.variance);
+    predict_motion(p, ahead.variance);
     for (i = 0; i < BRANCHES; i++) {
         predict_branch(p, by, i);
+    }
+    if (unexplained > 0.0f) {
+        leave_open(p, by, unexplained);
     }
     predict_baseline(p, by);
 {% else %}
     predict_mean(x);
-    predict_motion(p, spread.variance);
+    predict_motion(p, ahead.variance);
     predict_baseline(p);
 {% endif %}
-    return spread;
+    return ahead;
 }
 
 /* Covariances of the expected reading with each state. */
@@ -448,12 +509,12 @@ static int is_sound(const float x[STATES], const float p[ENTRIES], float sum)
 static ohmstrain_status update(float x[STATES], float p[ENTRIES], rate_spread *spread, float rho,
                                float extra_variance, ohmstrain_residual *residual)
 {
-    float slope[2], with[STATES], variance, innovation, per_variance, scaled;
+    float slope[2], with[STATES], open, variance, innovation, per_variance, scaled;
     int i, j;
 
-    innovation = rho - expected_reading(x, spread, slope);
+    innovation = rho - expected_reading(x, spread, slope, &open);
     covariances_with_reading(p, slope, with);
-    variance = READING_VARIANCE + extra_variance + slope[0] * with[0] + slope[1] * with[1];
+    variance = READING_VARIANCE + extra_variance + open + slope[0] * with[0] + slope[1] * with[1];
     for (i = 2; i < STATES; i++) {
         variance += with[i];
     }

@@ -1,0 +1,99 @@
+use ohmstrain_model::Scalar;
+
+use crate::{Advanced, Estimator, Reading, StepError};
+
+/// An estimator that takes a long step as several short ones, so that a pause in the readings may be written down as one step
+/// or as many rows without a reading.
+///
+/// How long a step may be is for the estimator to say ([`Estimator::longest_step_s`]); a pause is divided into 64 at most.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Substeps<E>(pub E);
+
+/// A prepared step, and how many of it there are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Repeated<P> {
+    step: P,
+    count: u8,
+}
+
+/// Into how many steps a pause is divided at most.
+const MOST: u8 = 64;
+
+/// Into how many steps of `longest_s` seconds at most a step of `dt_s` seconds is divided.
+pub(crate) fn count<T: Scalar>(dt_s: T, longest_s: T) -> u8 {
+    let mut count = 1;
+    // Half a per mille of grace: a step of the longest length shall be one step, whatever rounding says.
+    let mut covered = longest_s * T::of(1.0005);
+    let more = covered;
+    while covered < dt_s && count < MOST {
+        covered += more;
+        count += 1;
+    }
+    count
+}
+
+impl<E> Substeps<E> {
+    /// One step backwards over all that remain.
+    fn smooth_back_over<T, const N: usize, const L: usize>(
+        &self,
+        filtered: &E::State,
+        prepared: &Repeated<E::Prepared>,
+        reading: Option<Reading<T>>,
+        next: &E::State,
+    ) -> Result<Option<E::State>, StepError>
+    where
+        T: Scalar,
+        E: Estimator<T, N, L>,
+    {
+        if prepared.count <= 1 {
+            return self.0.smooth_back(filtered, &prepared.step, reading, next);
+        }
+        // Half of them forward, the rest backward, then the first half: few states at a time.
+        let half = prepared.count / 2;
+        let (first, rest) =
+            (Repeated { count: half, ..*prepared }, Repeated { count: prepared.count - half, ..*prepared });
+        let middle = self.advance(filtered, &first, None)?.state;
+        let Some(later) = self.smooth_back_over(&middle, &rest, reading, next)? else { return Ok(None) };
+        self.smooth_back_over(filtered, &first, None, &later)
+    }
+}
+
+impl<T, E, const N: usize, const L: usize> Estimator<T, N, L> for Substeps<E>
+where
+    T: Scalar,
+    E: Estimator<T, N, L>,
+{
+    type State = E::State;
+    type Prepared = Repeated<E::Prepared>;
+
+    fn prepare(&self, dt_s: T) -> Self::Prepared {
+        let count = count(dt_s, self.0.longest_step_s());
+        Repeated { step: self.0.prepare(dt_s / T::of(f64::from(count))), count }
+    }
+
+    fn advance(
+        &self,
+        state: &E::State,
+        prepared: &Self::Prepared,
+        reading: Option<Reading<T>>,
+    ) -> Result<Advanced<E::State, T>, StepError> {
+        if prepared.count <= 1 {
+            return self.0.advance(state, &prepared.step, reading);
+        }
+        let mut onward = self.0.advance(state, &prepared.step, None)?.state;
+        for _ in 2..prepared.count {
+            onward = self.0.advance(&onward, &prepared.step, None)?.state;
+        }
+        self.0.advance(&onward, &prepared.step, reading)
+    }
+
+    fn smooth_back(
+        &self,
+        filtered: &E::State,
+        prepared: &Self::Prepared,
+        reading: Option<Reading<T>>,
+        next: &E::State,
+    ) -> Result<Option<E::State>, StepError> {
+        self.smooth_back_over(filtered, prepared, reading, next)
+    }
+}

@@ -1,0 +1,290 @@
+//! A sensor whose law filters know exactly, simulated in steps much finer than its rows: what a filter says wrongly of it, it
+//! says because of how it takes steps.
+
+use ohmstrain_ekf::{Belief, Dwell, Estimator, Evidence, Reading, State, Substeps};
+use ohmstrain_model::{Branch, Gauge, ModelNoise, Motion, SensorLaw, StrainRange, SwitchedModel};
+
+use crate::Draws;
+
+const TAU_S: [f64; 2] = [5.0, 60.0];
+const EXTEND_GAIN: [f64; 2] = [0.9, 0.4];
+const RETRACT_GAIN: [f64; 2] = [-0.6, -0.2];
+const SLOPE: f64 = 1.9;
+const NOISE: ModelNoise<f64> =
+    ModelNoise { reading_sd: 2e-3, branch_sd: 2e-3, baseline_sd: 5e-3, baseline_time_s: 10.0 };
+const STRAIN_MEAN: f64 = 0.15;
+const STRAIN_SD: f64 = 0.1;
+const RATE_SD: f64 = 0.08;
+const RATE_TIME_S: f64 = 1.5;
+const ACCELERATION_SD: f64 = 0.12;
+/// Of a motion in phases.
+const PHASE_RATE: f64 = 0.08;
+const PHASE_RATE_SD: f64 = 0.03;
+const HOLD_S: f64 = 4.0;
+const MOVE_S: f64 = 3.0;
+const FAR: StrainRange<f64> = StrainRange { lower: -2.0, upper: 2.0 };
+
+/// How the body moves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Moves {
+    /// An Ornstein-Uhlenbeck rate.
+    Ou,
+    /// The same with holds.
+    OuAndHolds,
+    /// A smooth rate.
+    Smooth,
+    /// Phases of extend, hold and retract, whose gains hold whatever the sign of the rate at an instant.
+    Phases,
+}
+
+/// Where the simulation is.
+struct Body {
+    strain: f64,
+    rate: f64,
+    acceleration: f64,
+    rests: bool,
+    extends: bool,
+    branches: [f64; 2],
+    baseline: f64,
+}
+
+/// Rows of a reading, relative to R₀, and the true strain.
+#[must_use]
+pub fn simulate(moves: Moves, dt_s: f64, seconds: f64, seed: u64) -> Vec<(f64, f64)> {
+    let fine = 10_usize.max((dt_s / 0.004).ceil() as usize);
+    let h = dt_s / fine as f64;
+    let mut draws = Draws::new(seed);
+    let mut body = Body {
+        strain: STRAIN_MEAN + STRAIN_SD * draws.normal(),
+        rate: RATE_SD * draws.normal(),
+        acceleration: ACCELERATION_SD * draws.normal(),
+        rests: false,
+        extends: true,
+        branches: [NOISE.branch_sd * draws.normal(), NOISE.branch_sd * draws.normal()],
+        baseline: NOISE.baseline_sd * draws.normal(),
+    };
+    (0..(seconds / dt_s).round() as usize)
+        .map(|_| {
+            (0..fine).for_each(|_| body.move_on(moves, h, &mut draws));
+            let rho = SLOPE * body.strain + body.branches.iter().sum::<f64>() + body.baseline;
+            (rho + NOISE.reading_sd * draws.normal(), body.strain)
+        })
+        .collect()
+}
+
+impl Body {
+    /// Euler and Maruyama's step.
+    fn move_on(&mut self, moves: Moves, h: f64, draws: &mut Draws) {
+        let old = self.rate;
+        match moves {
+            Moves::Ou => self.ornstein_uhlenbeck(0.0, RATE_SD, h, draws),
+            Moves::Smooth => self.smooth(h, draws),
+            Moves::OuAndHolds => {
+                if self.rests && draws.uniform() < h / HOLD_S {
+                    (self.rests, self.rate) = (false, RATE_SD * draws.normal());
+                } else if !self.rests && draws.uniform() < h / MOVE_S {
+                    self.rests = true;
+                }
+                self.ornstein_uhlenbeck(0.0, RATE_SD, h, draws);
+            }
+            Moves::Phases => {
+                self.change_phase(h, draws);
+                self.ornstein_uhlenbeck(self.phase_rate(), PHASE_RATE_SD, h, draws);
+            }
+        }
+        if self.rests {
+            self.rate = 0.0;
+        }
+        let way = if self.rests { 0.0 } else { 0.5 * h * (old + self.rate) };
+        self.strain += way;
+        let extends = if moves == Moves::Phases { self.extends } else { way > 0.0 };
+        for i in 0..2 {
+            let gain = if extends { EXTEND_GAIN[i] } else { RETRACT_GAIN[i] };
+            let noise = NOISE.branch_sd * (2.0 * h / TAU_S[i]).sqrt() * draws.normal();
+            self.branches[i] += gain * way - h * self.branches[i] / TAU_S[i] + noise;
+        }
+        let drift = NOISE.baseline_sd * (2.0 * h / NOISE.baseline_time_s).sqrt() * draws.normal();
+        self.baseline += drift - h * self.baseline / NOISE.baseline_time_s;
+    }
+
+    fn phase_rate(&self) -> f64 {
+        if self.extends { PHASE_RATE } else { -PHASE_RATE }
+    }
+
+    fn change_phase(&mut self, h: f64, draws: &mut Draws) {
+        if self.rests && draws.uniform() < h / HOLD_S {
+            (self.rests, self.extends) = (false, draws.uniform() < 0.5);
+        } else if !self.rests && draws.uniform() < h / MOVE_S {
+            if draws.uniform() < 0.5 {
+                self.rests = true;
+                return;
+            }
+            self.extends = !self.extends;
+        } else {
+            return;
+        }
+        self.rate = self.phase_rate() + PHASE_RATE_SD * draws.normal();
+    }
+
+    fn ornstein_uhlenbeck(&mut self, toward: f64, sd: f64, h: f64, draws: &mut Draws) {
+        let pull = (sd / STRAIN_SD).powi(2) * (self.strain - STRAIN_MEAN);
+        self.rate +=
+            sd * (2.0 * h / RATE_TIME_S).sqrt() * draws.normal() - h * ((self.rate - toward) / RATE_TIME_S + pull);
+    }
+
+    fn smooth(&mut self, h: f64, draws: &mut Draws) {
+        let (omega, pull) = (ACCELERATION_SD / RATE_SD, (RATE_SD / STRAIN_SD).powi(2));
+        let density = 4.0 * RATE_SD * RATE_SD * omega * (omega * omega - pull);
+        let back = 2.0 * omega * self.acceleration
+            + omega * omega * self.rate
+            + 2.0 * omega * pull * (self.strain - STRAIN_MEAN);
+        let kick = (density * h).sqrt() * draws.normal() - h * back;
+        self.rate += h * (self.acceleration + 0.5 * kick);
+        self.acceleration += kick;
+    }
+}
+
+fn law() -> SensorLaw<f64, 2> {
+    let branch = |i: usize| Branch {
+        tau_s: TAU_S[i],
+        extend_gain: EXTEND_GAIN[i],
+        retract_gain: RETRACT_GAIN[i],
+        extend_gain_slope: 0.0,
+        retract_gain_slope: 0.0,
+    };
+    SensorLaw {
+        gauge: Gauge::Polynomial { coefficients: [SLOPE, 0.0, 0.0] },
+        extend_viscosity_s: 0.0,
+        retract_viscosity_s: 0.0,
+        branches: [branch(0), branch(1)],
+        range: FAR,
+    }
+}
+
+/// The model of a body that does not move smoothly.
+///
+/// # Panics
+/// Never: its parameters are fixed.
+#[must_use]
+pub fn two_states(moves: Moves) -> SwitchedModel<f64, 2, 2, 5> {
+    let (sd, phase_rate) = if moves == Moves::Phases { (PHASE_RATE_SD, PHASE_RATE) } else { (RATE_SD, 0.0) };
+    Motion::ornstein_uhlenbeck(RATE_TIME_S, sd, STRAIN_MEAN, STRAIN_SD)
+        .and_then(|motion| SwitchedModel::new(law(), motion.with_phase_rate(phase_rate), NOISE))
+        .unwrap_or_else(|_| unreachable!("fixed parameters"))
+}
+
+/// The model of a body that moves smoothly.
+///
+/// # Panics
+/// Never: its parameters are fixed.
+#[must_use]
+pub fn three_states() -> SwitchedModel<f64, 3, 2, 6> {
+    Motion::smooth(RATE_SD, ACCELERATION_SD, STRAIN_MEAN, STRAIN_SD)
+        .and_then(|motion| SwitchedModel::new(law(), motion, NOISE))
+        .unwrap_or_else(|_| unreachable!("fixed parameters"))
+}
+
+/// How long its holds and movements last.
+///
+/// # Panics
+/// Never: its parameters are fixed.
+#[must_use]
+pub fn dwell(moves: Moves) -> Dwell<f64> {
+    let reversal = if moves == Moves::Phases { 0.5 } else { 0.0 };
+    Dwell::new(HOLD_S, MOVE_S, reversal).unwrap_or_else(|_| unreachable!("fixed parameters"))
+}
+
+/// Nothing limits the strain.
+pub const EVIDENCE: Evidence<f64> = Evidence { limits: FAR, tempering: 1.0 };
+
+/// What a filter says of such recordings.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Honesty {
+    rows: f64,
+    inside: f64,
+    squares: f64,
+    deviations: f64,
+}
+
+impl Honesty {
+    /// Share of the rows whose 95 % interval holds the strain, per cent.
+    #[must_use]
+    pub fn coverage(&self) -> f64 {
+        100.0 * self.inside / self.rows
+    }
+
+    /// Root mean square error of strain.
+    #[must_use]
+    pub fn rmse(&self) -> f64 {
+        (self.squares / self.rows).sqrt()
+    }
+
+    /// Mean standard deviation that the filter states.
+    #[must_use]
+    pub fn stated_sd(&self) -> f64 {
+        self.deviations / self.rows
+    }
+}
+
+/// Runs an estimator over recordings of 60 s with these seeds; the first 5 s are not scored. With `third_missing` a random
+/// third of the rows has no reading.
+pub fn honesty<E, const N: usize, const L: usize>(
+    estimator: E,
+    start: &E::State,
+    (moves, dt_s, third_missing): (Moves, f64, bool),
+    seeds: core::ops::Range<u64>,
+) -> Honesty
+where
+    E: Estimator<f64, N, L>,
+{
+    let estimator = Substeps(estimator);
+    let prepared = estimator.prepare(dt_s);
+    let mut honesty = Honesty::default();
+    for seed in seeds {
+        let mut state = start.clone();
+        let mut missing = Draws::new(1000 + seed);
+        for (row, (rho, strain)) in simulate(moves, dt_s, 60.0, seed).into_iter().enumerate() {
+            let reading = (!third_missing || missing.uniform() > 1.0 / 3.0).then(|| Reading::from(rho));
+            if let Ok(advanced) = estimator.advance(&state, &prepared, reading) {
+                state = advanced.state;
+            }
+            if row as f64 * dt_s >= 5.0 {
+                honesty.add(&state.moments(), strain);
+            }
+        }
+    }
+    honesty
+}
+
+/// The state after rows that each have this reading, or none.
+///
+/// # Panics
+/// If the estimator refuses a step.
+pub fn after_rows<E, const N: usize, const L: usize>(
+    estimator: E,
+    start: &E::State,
+    dt_s: f64,
+    readings: impl IntoIterator<Item = Option<f64>>,
+) -> E::State
+where
+    E: Estimator<f64, N, L>,
+{
+    let estimator = Substeps(estimator);
+    let prepared = estimator.prepare(dt_s);
+    readings.into_iter().fold(start.clone(), |state, reading| {
+        match estimator.advance(&state, &prepared, reading.map(Reading::from)) {
+            Ok(advanced) => advanced.state,
+            Err(error) => unreachable!("{error}"),
+        }
+    })
+}
+
+impl Honesty {
+    fn add<const N: usize, const L: usize>(&mut self, belief: &Belief<f64, N, L>, strain: f64) {
+        let (error, variance) = (belief.mean[0] - strain, belief.covariance[(0, 0)]);
+        self.rows += 1.0;
+        self.inside += f64::from(u8::from(error * error < 3.841_458_820_694_124 * variance));
+        self.squares += error * error;
+        self.deviations += variance.sqrt();
+    }
+}
