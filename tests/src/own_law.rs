@@ -169,7 +169,8 @@ fn law() -> SensorLaw<f64, 2> {
 pub fn two_states(moves: Moves) -> SwitchedModel<f64, 2, 2, 5> {
     let (sd, phase_rate) = if moves == Moves::Phases { (PHASE_RATE_SD, PHASE_RATE) } else { (RATE_SD, 0.0) };
     Motion::ornstein_uhlenbeck(RATE_TIME_S, sd, STRAIN_MEAN, STRAIN_SD)
-        .and_then(|motion| SwitchedModel::new(law(), motion.with_phase_rate(phase_rate), NOISE))
+        .and_then(|motion| motion.with_phase_rate(phase_rate))
+        .and_then(|motion| SwitchedModel::new(law(), motion, NOISE))
         .unwrap_or_else(|_| unreachable!("fixed parameters"))
 }
 

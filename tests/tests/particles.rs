@@ -244,7 +244,7 @@ fn the_seed_decides_and_bad_input_is_refused_by_name() {
     assert_eq!(refused(1e300), StepError::NonFiniteState);
     let negative = Some(Reading { value: 0.1, extra_variance: -1.0 });
     let refused = filter.step_prepared(&cloud, &prepared, DT_S, negative).unwrap_err();
-    assert_eq!(refused, StepError::NonPositiveInnovationVariance);
+    assert_eq!(refused, StepError::NegativeVariance);
     assert_eq!(cloud, before);
     // A missing reading weighs nothing, and a step of zero seconds without one changes only what chance comes next.
     let missing = filter.step_prepared(&cloud, &model.prepare(0.0), 0.0, None).unwrap();

@@ -35,7 +35,7 @@ fn viscoelastic(oracle: &Value, curvature: f64) -> (SwitchedModel<f64, 2, 1, 3>,
             extend_gain_slope: 0.0,
             retract_gain_slope: 0.0,
         }],
-        range: StrainRange { lower: f64::NEG_INFINITY, upper: f64::INFINITY },
+        range: StrainRange { lower: -1e6, upper: 1e6 },
     };
     let noise = ModelNoise {
         reading_sd: p("R").sqrt(),
