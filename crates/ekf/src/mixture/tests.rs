@@ -114,7 +114,7 @@ fn the_lightest_makes_room() {
     };
     let mut mixture = Mixture::<f64, 2, 3, 2>::empty();
     for (strain, log_weight) in [(0.1, -1.0), (0.2, -3.0), (0.3, -2.0), (0.4, -4.0)] {
-        mixture.add(&far(strain, log_weight));
+        mixture.add(&far(strain, log_weight), false);
     }
     let kept: Vec<f64> = mixture.components().iter().map(|c| c.belief.mean[0]).collect();
     assert_eq!(kept, [0.1, 0.3]);
