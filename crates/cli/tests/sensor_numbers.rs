@@ -9,7 +9,8 @@ use toml::Value;
 /// What a number is changed to.
 const HOSTILE: [f64; 9] = [f64::NAN, f64::INFINITY, -1.0, 0.0, 1e300, -1e300, 1e9, -1e9, 1e-12];
 
-/// Paths of all numbers that are no counts. Of what is only told, one of each kind will do.
+/// Paths of all numbers that are no counts. Of what is only told, and of the rows that a correction
+/// learned from, one of each kind will do.
 fn numbers(value: &Value, path: &str, found: &mut Vec<String>) {
     match value {
         Value::Float(_) => found.push(path.to_string()),
@@ -20,7 +21,7 @@ fn numbers(value: &Value, path: &str, found: &mut Vec<String>) {
             }
         }
         Value::Array(array) => {
-            let told = path.starts_with("uncertainty");
+            let told = path.starts_with("uncertainty") || path.starts_with("correction");
             for (index, value) in array.iter().enumerate().take(if told { 1 } else { array.len() }) {
                 numbers(value, &format!("{path}[{index}]"), found);
             }
@@ -128,6 +129,14 @@ fn of_a_sensor_for_phase_histories() {
     let bench = Bench::calibrated();
     short(&bench);
     bench.run(&["calibrate", "trace.csv", "--until", "60", "--estimator", "hypotheses", "-o", "sensor.toml"]).ok();
+    survives(&bench);
+}
+
+#[test]
+fn of_a_sensor_with_a_learned_correction() {
+    let bench = Bench::calibrated();
+    short(&bench);
+    bench.run(&["calibrate", "trace.csv", "--until", "60", "-o", "sensor.toml"]).ok();
     survives(&bench);
 }
 
