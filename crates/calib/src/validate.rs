@@ -14,9 +14,11 @@ use crate::estimator_params::{EstimatorParams, MotionParams, NoiseParams, PhaseP
 use crate::law_params::{GaugeParams, LawParams};
 use crate::params::{JointParams, RangeParams, RecordingInfo, SensorParams, Uncertainty, Validity};
 
-/// Strains, degrees, gains, coefficients: far beyond what sensors have, and near enough for squares and products of some
+/// Strains, degrees, coefficients: far beyond what sensors have, and near enough for squares and products of some
 /// of them to be numbers.
 const SIGNED: Allowed = Allowed { least: -1e9, most: 1e9 };
+/// What a branch may gain or lose per strain, relative to R₀.
+const GAIN: Allowed = Allowed { least: -LARGEST_CHANGE, most: LARGEST_CHANGE };
 /// Resistances, times, rates, lengths. The search for noise and motion ends between `e^-25` and `e^15`.
 const POSITIVE: Allowed = Allowed { least: 1e-12, most: 1e12 };
 /// Deviations of what may be exact.
@@ -139,10 +141,10 @@ impl LawParams {
         for (index, branch) in self.branches.iter().enumerate() {
             let table = table.entry("branches", index);
             table.number("tau_s", branch.tau_s, POSITIVE)?;
-            table.number("extend_gain", branch.extend_gain, SIGNED)?;
-            table.number("retract_gain", branch.retract_gain, SIGNED)?;
-            table.number("extend_gain_slope", branch.extend_gain_slope, SIGNED)?;
-            table.number("retract_gain_slope", branch.retract_gain_slope, SIGNED)?;
+            table.number("extend_gain", branch.extend_gain, GAIN)?;
+            table.number("retract_gain", branch.retract_gain, GAIN)?;
+            table.number("extend_gain_slope", branch.extend_gain_slope, GAIN)?;
+            table.number("retract_gain_slope", branch.retract_gain_slope, GAIN)?;
         }
         Ok(())
     }

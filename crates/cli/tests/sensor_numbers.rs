@@ -80,7 +80,7 @@ fn survives(bench: &Bench) {
                 assert!(first.stderr.starts_with("ohmstrain: changed.toml:") && first.stdout.is_empty());
                 let line = first.stderr.split(':').nth(2).unwrap().parse::<usize>().unwrap();
                 let text = bench.read("changed.toml");
-                let last = path.split('[').next().unwrap().rsplit('.').next().unwrap();
+                let last = path.rsplit('.').next().unwrap().split('[').next().unwrap();
                 let table = field.rsplit('.').next().unwrap();
                 let line = text.lines().nth(line - 1).unwrap();
                 assert!(line.starts_with(last) || line.contains(table), "{path}: {line}");

@@ -17,7 +17,7 @@ fn scaled(bench: &Bench, column: usize, factor: f64) -> String {
 
 fn rest_reading(bench: &Bench) -> f64 {
     let sensor: toml::Table = toml::from_str(&bench.read("sensor.toml")).unwrap();
-    sensor["rest_reading"].as_float().unwrap()
+    sensor.get("measured_rest").unwrap_or(&sensor["rest_reading"]).as_float().unwrap()
 }
 
 #[track_caller]

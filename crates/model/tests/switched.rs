@@ -105,8 +105,8 @@ proptest! {
                 Gauge::DecayingExponential { slope: 3.0.into(), decay_strain: 0.2.into() },
             ),
             (
-                Gauge::Tunnelling { gap: 2.0, barrier: 1.5, path_loss: -4.0 },
-                Gauge::Tunnelling { gap: 2.0.into(), barrier: 1.5.into(), path_loss: (-4.0).into() },
+                Gauge::Tunnelling { gap: 1.5, barrier: 1.5, path_loss: -4.0 },
+                Gauge::Tunnelling { gap: 1.5.into(), barrier: 1.5.into(), path_loss: (-4.0).into() },
             ),
         ];
         for (gauge, dual_gauge) in families {
