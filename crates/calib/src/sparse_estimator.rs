@@ -92,6 +92,16 @@ pub(crate) trait Pair<const N: usize, const L: usize, const K: usize>: Copy {
         state: &mut SparseMixture<f64, N, L, K>,
         reading: Option<Reading<f64>>,
     ) -> Result<Option<MixtureResidual<f64>>, StepError>;
+
+    /// One step backwards along what [`Self::step`] did.
+    fn smooth_back(
+        &self,
+        sparse: &Self::Sparse,
+        step: &<Self::Dense as Estimator<f64, N, L>>::Prepared,
+        filtered: &SparseMixture<f64, N, L, K>,
+        reading: Option<Reading<f64>>,
+        next: &SparseMixture<f64, N, L, K>,
+    ) -> Result<SparseMixture<f64, N, L, K>, StepError>;
 }
 
 /// Phase histories of a sensor on Ornstein-Uhlenbeck motion.
@@ -120,6 +130,17 @@ impl<const B: usize, const N: usize, const L: usize> Pair<N, L, HISTORIES> for H
         reading: Option<Reading<f64>>,
     ) -> Result<Option<MixtureResidual<f64>>, StepError> {
         sparse.step(state, reading)
+    }
+
+    fn smooth_back(
+        &self,
+        sparse: &Self::Sparse,
+        step: &<Self::Dense as Estimator<f64, N, L>>::Prepared,
+        filtered: &SparseMixture<f64, N, L, HISTORIES>,
+        reading: Option<Reading<f64>>,
+        next: &SparseMixture<f64, N, L, HISTORIES>,
+    ) -> Result<SparseMixture<f64, N, L, HISTORIES>, StepError> {
+        sparse.smooth_back(&Pair::<N, L, HISTORIES>::dense(self), step, filtered, reading, next)
     }
 }
 
@@ -150,9 +171,20 @@ impl<const B: usize, const N: usize, const L: usize> Pair<N, L, HYPOTHESES> for 
     ) -> Result<Option<MixtureResidual<f64>>, StepError> {
         sparse.step(state, reading)
     }
+
+    fn smooth_back(
+        &self,
+        sparse: &Self::Sparse,
+        step: &<Self::Dense as Estimator<f64, N, L>>::Prepared,
+        filtered: &SparseMixture<f64, N, L, HYPOTHESES>,
+        reading: Option<Reading<f64>>,
+        next: &SparseMixture<f64, N, L, HYPOTHESES>,
+    ) -> Result<SparseMixture<f64, N, L, HYPOTHESES>, StepError> {
+        sparse.smooth_back(&Pair::<N, L, HYPOTHESES>::dense(self), step, filtered, reading, next)
+    }
 }
 
-/// The sparse filter of a pair forward; where it refuses a step, and on the way back, the dense one decides.
+/// The sparse filter of a pair forward, and back along what it did; where it refuses a step, the dense one decides.
 #[derive(Clone, Copy)]
 pub(crate) struct SparsePhases<P, const K: usize>(pub P);
 
@@ -209,6 +241,10 @@ impl<P: Pair<N, L, K>, const N: usize, const L: usize, const K: usize> Estimator
     ) -> Result<Option<Self::State>, StepError> {
         let dense = self.0.dense();
         let step = dense.prepare(prepared.dt_s);
+        let along = |sparse| self.0.smooth_back(sparse, &step, filtered, reading, next).ok();
+        if let Some(smoothed) = prepared.sparse.as_ref().and_then(along) {
+            return Ok(Some(smoothed));
+        }
         let smoothed = dense.smooth_back(&(*filtered).into(), &step, reading, &(*next).into())?;
         Ok(smoothed.as_ref().map(Into::into))
     }

@@ -73,6 +73,7 @@ mod error;
 mod estimate;
 mod estimator;
 mod gaussian;
+mod genealogy;
 mod guard;
 mod hypotheses;
 mod imm;

@@ -2,12 +2,16 @@ use nalgebra::{SMatrix, SVector};
 use ohmstrain_model::{Phase, Symmetric, Transition};
 
 use crate::gaussian::Real;
-use crate::mixture::{Component, Mixture, moment_match};
+use crate::mixture::{Added, Component, Mixture, moment_match};
 use crate::smoother::rts_step;
 use crate::{Belief, Phased};
 
 /// Hears of every child that a step of a filter of hypotheses makes. The filter itself listens with `()`.
 pub(crate) trait Recorder<T, const N: usize, const L: usize> {
+    /// Where a child went, or where it is to have gone.
+    fn place(&self, _parent: usize, _phase: Phase, added: Added) -> Added {
+        added
+    }
     /// A child was put into place `heir` of the new mixture, merged or alone.
     fn born(&mut self, _birth: &Birth<'_, T, N, L>, _heir: usize) {}
     /// The contents of every place moved to another one, or nowhere.
@@ -17,6 +21,10 @@ pub(crate) trait Recorder<T, const N: usize, const L: usize> {
 impl<T, const N: usize, const L: usize> Recorder<T, N, L> for () {}
 
 impl<T, R: Recorder<T, N, L>, const N: usize, const L: usize> Recorder<T, N, L> for &mut R {
+    fn place(&self, parent: usize, phase: Phase, added: Added) -> Added {
+        (**self).place(parent, phase, added)
+    }
+
     fn born(&mut self, birth: &Birth<'_, T, N, L>, heir: usize) {
         (**self).born(birth, heir);
     }

@@ -28,6 +28,7 @@ pub struct Mixture<T, const N: usize, const L: usize, const K: usize> {
 }
 
 /// Where a hypothesis went.
+#[derive(Clone, Copy)]
 pub(crate) enum Added {
     /// Into this place, alone or merged with what was there.
     To(usize),

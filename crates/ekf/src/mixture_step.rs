@@ -189,7 +189,8 @@ where
             posterior: &child.belief,
             log_weight: child.log_weight,
         };
-        match self.children.add(&child, self.reading.is_none()) {
+        let added = self.children.add(&child, self.reading.is_none());
+        match self.recorder.place(place, phase, added) {
             Added::To(heir) => self.recorder.born(&birth, heir),
             Added::InsteadOf(heir, into) => {
                 self.recorder.renumbered(|place| if place == heir { into } else { Some(place) });

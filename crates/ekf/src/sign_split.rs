@@ -54,7 +54,7 @@ impl<T: Real, M, const K: usize> SignSplit<T, M, K> {
         self.step_recorded(mixture, &(*prepared, dt_s), reading, &mut ())
     }
 
-    fn step_recorded<R: Recorder<T, N, L>, const N: usize, const L: usize>(
+    pub(crate) fn step_recorded<R: Recorder<T, N, L>, const N: usize, const L: usize>(
         &self,
         mixture: &Mixture<T, N, L, K>,
         (prepared, dt_s): &(M::Prepared, T),

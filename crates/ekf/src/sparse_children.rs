@@ -1,7 +1,8 @@
 use ohmstrain_model::{Phase, Symmetric};
 
 use crate::gaussian::Real;
-use crate::mixture::{ALIKE, LEAST_WEIGHT, LIGHTER};
+use crate::genealogy::Heirs;
+use crate::mixture::{ALIKE, Added, LEAST_WEIGHT, LIGHTER};
 use crate::sparse_evidence::{Weighed, Weight};
 use crate::sparse_mixture::{Share, SparseMixture};
 use crate::sparse_parts::Parts;
@@ -26,8 +27,8 @@ impl<T: Real, const N: usize, const L: usize, const K: usize> Children<T, N, L, 
     }
 
     /// Adds a child: merged with one that says the same, in a free place, or in the place of the lightest, which in a step
-    /// without a reading is merged with the nearest of its phase.
-    pub(crate) fn add<const B: usize>(&mut self, child: &Parts<T, B>, phase: Phase, weighed: &Weighed<T>) {
+    /// without a reading is merged with the nearest of its phase. Says where it went.
+    pub(crate) fn add<const B: usize>(&mut self, child: &Parts<T, B>, phase: Phase, weighed: &Weighed<T>) -> Added {
         let Weighed { weight, more_inside, log_inside } = *weighed;
         let likelihood = weight;
         let weight = Weight { exponent: weight.exponent + more_inside, ..weight };
@@ -35,29 +36,30 @@ impl<T: Real, const N: usize, const L: usize, const K: usize> Children<T, N, L, 
         let weight = weight.relative_to(self.exponent);
         // Mostly nothing is near a limit.
         self.density += if more_inside.is_zero() { weight } else { likelihood.relative_to(self.exponent) };
-        let like = self.kept.iter_mut().find(|(share, known)| **known == phase && share.is_like(child));
-        if let Some((like, _)) = like {
+        let like =
+            |(_, (share, known)): &(usize, (&mut Share<T, N, L>, &mut Phase))| **known == phase && share.is_like(child);
+        if let Some((place, (like, _))) = self.kept.iter_mut().enumerate().find(like) {
             like.merge(child, weight, log_inside);
-            return;
+            return Added::To(place);
         }
-        let displaced = if self.kept.shares().len() < K { None } else { self.lightest() };
-        let place = match displaced {
-            None => self.kept.one_more(),
+        let len = self.kept.shares().len();
+        let displaced = if len < K { None } else { self.lightest() };
+        let (added, place) = match displaced {
+            None => (Added::To(len), self.kept.one_more()),
             Some((at, share, of)) if share.weight < weight * T::of(1.0 - LIGHTER) => {
-                self.merge_into_nearest(
-                    &Parts::<T, B>::of(&share.belief),
-                    of,
-                    (share.weight, share.log_inside),
-                    Some(at),
-                );
-                self.kept.iter_mut().nth(at)
+                let displaced = Parts::<T, B>::of(&share.belief);
+                let into = self.merge_into_nearest(&displaced, of, (share.weight, share.log_inside), Some(at));
+                (Added::InsteadOf(at, into), self.kept.iter_mut().nth(at))
             }
-            Some(_) => return self.merge_into_nearest(child, phase, (weight, log_inside), None),
+            Some(_) => {
+                let into = self.merge_into_nearest(child, phase, (weight, log_inside), None);
+                return into.map_or(Added::Nowhere, Added::To);
+            }
         };
-        if let Some((place, of)) = place {
-            (place.weight, place.log_inside, *of) = (weight, log_inside, phase);
-            child.put_into(&mut place.belief);
-        }
+        let Some((place, of)) = place else { return Added::Nowhere };
+        (place.weight, place.log_inside, *of) = (weight, log_inside, phase);
+        child.put_into(&mut place.belief);
+        added
     }
 
     fn lightest(&mut self) -> Option<(usize, Share<T, N, L>, Phase)> {
@@ -65,8 +67,8 @@ impl<T: Real, const N: usize, const L: usize, const K: usize> Children<T, N, L, 
         all.reduce(|a, b| if b.1.weight < a.1.weight * T::of(1.0 - LIGHTER) { b } else { a })
     }
 
-    /// Merges a child into the nearest of its phase, not counting the one at `but`; if there is none, it is
-    /// negligible, or there is a reading, it is dropped.
+    /// Merges a child into the nearest of its phase, not counting the one at `but`, and says where that is; if there is none,
+    /// it is negligible, or there is a reading, it is dropped.
     #[inline(never)]
     fn merge_into_nearest<const B: usize>(
         &mut self,
@@ -74,20 +76,19 @@ impl<T: Real, const N: usize, const L: usize, const K: usize> Children<T, N, L, 
         phase: Phase,
         (weight, log_inside): (T, T),
         but: Option<usize>,
-    ) {
+    ) -> Option<usize> {
         if !self.unread {
-            return;
+            return None;
         }
         let heaviest = self.kept.shares().iter().fold(weight, |a, b| if b.weight > a { b.weight } else { a });
         if weight < heaviest * T::of(LEAST_WEIGHT) {
-            return;
+            return None;
         }
         let others = self.kept.iter_mut().enumerate().filter(|(at, (_, of))| Some(*at) != but && **of == phase);
-        let distances = others.map(|(_, (share, _))| (share.distance(child), share));
-        let nearest = distances.reduce(|a, b| if b.0 < a.0 { b } else { a });
-        if let Some((_, share)) = nearest {
-            share.merge(child, weight, log_inside);
-        }
+        let distances = others.map(|(at, (share, _))| (share.distance(child), at, share));
+        let (_, at, share) = distances.reduce(|a, b| if b.0 < a.0 { b } else { a })?;
+        share.merge(child, weight, log_inside);
+        Some(at)
     }
 
     /// Makes room for a larger exponent: the weights so far are given in units of its exponential.
@@ -112,9 +113,14 @@ impl<T: Real, const N: usize, const L: usize, const K: usize> Children<T, N, L, 
     }
 
     /// Makes the probabilities sum to one and drops what is negligible.
-    pub(crate) fn normalise(&mut self) -> Result<(), StepError> {
+    pub(crate) fn normalise(&mut self, heirs: &mut impl Heirs) -> Result<(), StepError> {
         let heaviest = self.kept.shares().iter().fold(T::zero(), |a, b| if b.weight > a { b.weight } else { a });
         let least = heaviest * T::of(LEAST_WEIGHT);
+        heirs.renumbered(|place| {
+            let (before, from_here) = self.kept.shares().split_at_checked(place)?;
+            let lighter = before.iter().filter(|share| !(share.weight > least)).count();
+            from_here.first().is_some_and(|share| share.weight > least).then_some(place - lighter)
+        });
         self.kept.retain(|share| share.weight > least);
         let factor = self.kept.shares().iter().fold(T::zero(), |sum, share| sum + share.weight);
         if !(factor > T::zero() && factor.is_finite()) {

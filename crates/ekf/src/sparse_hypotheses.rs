@@ -7,6 +7,7 @@
 use ohmstrain_model::{Phase, SwitchedModel};
 
 use crate::gaussian::Real;
+use crate::genealogy::{Heirs, sparse_smooth_back};
 use crate::mixture_step::Predicted;
 use crate::sparse_children::Children;
 use crate::sparse_evidence::{Newborn, Weighing};
@@ -76,9 +77,21 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
         state: &mut SparseMixture<T, N, L, K>,
         reading: Option<Reading<T>>,
     ) -> Result<Option<MixtureResidual<T>>, StepError> {
+        self.step_recorded(state, reading, &mut ())
+    }
+
+    sparse_smooth_back!(Hypotheses);
+
+    #[inline(always)]
+    fn step_recorded<const L: usize>(
+        &self,
+        state: &mut SparseMixture<T, N, L, K>,
+        reading: Option<Reading<T>>,
+        heirs: &mut impl Heirs,
+    ) -> Result<Option<MixtureResidual<T>>, StepError> {
         let mut children = Children::new(reading.is_none());
         let mut predicted = Predicted::new();
-        for (parent, from) in state.shares().iter().zip(state.phases()) {
+        for (place, (parent, from)) in state.shares().iter().zip(state.phases()).enumerate() {
             for (phase, probability) in Phase::ALL.into_iter().zip(self.chain[from.index()]) {
                 if !(probability > T::zero()) {
                     continue;
@@ -91,11 +104,11 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
                 let prior = parent.weight * probability;
                 let newborn = Newborn { phase, prior, spread, log_inside: parent.log_inside };
                 let weighed = self.kernel.weigh(&mut child, newborn, reading, &self.weighing, &mut predicted)?;
-                children.add(&child, phase, &weighed);
+                heirs.placed(place, phase, children.add(&child, phase, &weighed));
             }
         }
         let density = children.density();
-        children.normalise()?;
+        children.normalise(heirs)?;
         *state = children.into_state();
         Ok(reading.map(|_| MixtureResidual::new(&predicted, density, self.weighing.tempering())))
     }

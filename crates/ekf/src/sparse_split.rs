@@ -7,6 +7,8 @@
 use ohmstrain_model::{Phase, SwitchedModel, Turning};
 
 use crate::gaussian::Real;
+use crate::genealogy::{Heirs, sparse_smooth_back};
+use crate::mixture::Added;
 use crate::mixture_step::{LEAST_MASS, Predicted};
 use crate::sign_split::{HOPELESS, follows};
 use crate::sparse_children::Children;
@@ -77,19 +79,33 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
         state: &mut SparseMixture<T, N, L, K>,
         reading: Option<Reading<T>>,
     ) -> Result<Option<MixtureResidual<T>>, StepError> {
+        self.step_recorded(state, reading, &mut ())
+    }
+
+    sparse_smooth_back!(SignSplit);
+
+    #[inline(always)]
+    fn step_recorded<const L: usize>(
+        &self,
+        state: &mut SparseMixture<T, N, L, K>,
+        reading: Option<Reading<T>>,
+        heirs: &mut impl Heirs,
+    ) -> Result<Option<MixtureResidual<T>>, StepError> {
         let mut children = Children::new(reading.is_none());
         let mut predicted = Predicted::new();
-        for (parent, from) in state.shares().iter().zip(state.phases()) {
+        for (place, (parent, from)) in state.shares().iter().zip(state.phases()).enumerate() {
             let turning = self.kernel.turning(*from, &Parts::of(&parent.belief));
             for (phase, probability) in Phase::ALL.into_iter().zip(follows(self.chain.as_ref(), *from)) {
                 if probability > T::zero() {
                     let origin = Origin { parent, from: *from, turning, phase, probability };
-                    self.add_child(&origin, reading, &mut children, &mut predicted)?;
+                    if let Some(added) = self.add_child(&origin, reading, &mut children, &mut predicted)? {
+                        heirs.placed(place, phase, added);
+                    }
                 }
             }
         }
         let density = children.density();
-        children.normalise()?;
+        children.normalise(heirs)?;
         *state = children.into_state();
         Ok(reading.map(|_| MixtureResidual::new(&predicted, density, self.weighing.tempering())))
     }
@@ -101,7 +117,7 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
         reading: Option<Reading<T>>,
         children: &mut Children<T, N, L, K>,
         predicted: &mut Predicted<T>,
-    ) -> Result<(), StepError> {
+    ) -> Result<Option<Added>, StepError> {
         let Origin { parent, from, turning, phase, probability } = *origin;
         let mut child = Parts::of(&parent.belief);
         let rests = self.chain.is_some() && from == Phase::Hold && phase != Phase::Hold;
@@ -109,7 +125,7 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
             child.renew_rate(&self.fresh[phase.index()]);
         }
         if phase != Phase::Hold && self.is_hopeless(phase, &child) {
-            return Ok(());
+            return Ok(None);
         }
         let course = if from == Phase::Hold || phase == Phase::Hold {
             Course::Known(phase)
@@ -121,7 +137,7 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
         if phase != Phase::Hold {
             let mass = child.cut_rate::<S, N>(phase, self.weighing.clear());
             if !(mass > T::of(LEAST_MASS)) {
-                return Ok(());
+                return Ok(None);
             }
             // After a hold the chain has said how likely this direction is; none of it goes to the other.
             if !(rests && mass > T::of(0.5)) {
@@ -130,8 +146,7 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
         }
         let newborn = Newborn { phase, prior, spread, log_inside: parent.log_inside };
         let weighed = self.kernel.weigh(&mut child, newborn, reading, &self.weighing, predicted)?;
-        children.add(&child, phase, &weighed);
-        Ok(())
+        Ok(Some(children.add(&child, phase, &weighed)))
     }
 
     /// Whether next to nothing of a prediction has the sign of a moving phase.
