@@ -135,6 +135,8 @@ fn a_percent_sign_may_be_a_unit_and_a_hash_a_name() {
     is_imported("units.csv", file("Strain,R,Time\n%,Ohm,ms\n", row), &Recipe::default());
     let row = |ms, ohm, strain| format!("{ms},{},{},{ms}", decimal(strain, 2, '.'), decimal(ohm, 1, '.'));
     is_imported("hash.csv", file("#,Strain,R,Time\n,%,Ohm,ms\n", row), &Recipe::default());
+    let row = |ms, ohm, strain| format!("{}\t{}\t{ms}", decimal(strain, 2, '.'), decimal(ohm, 1, '.'));
+    is_imported("tabs.tsv", file("Strain\tR\tTime\n%\tOhm\tms\n", row), &Recipe::default());
 }
 
 #[test]
