@@ -7,12 +7,12 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize> SwitchedModel<T,
     ///
     /// Noise of branch i is `γᵢ wᵢ + strain_pull · n_ε`, because its gain depends on where the motion goes, and what an
     /// uncertain direction leaves open, which is one number for all branches.
-    pub(crate) fn drive_branches<const W: usize, const L: usize>(
+    pub(crate) fn drive_branches<const L: usize>(
         &self,
         step: &SwitchedStep<T, M, B>,
-        state: &SVector<T, W>,
+        state: &SVector<T, N>,
         direction: Direction<T>,
-        out: &mut Transition<T, W, L>,
+        out: &mut Transition<T, N, L>,
     ) {
         let response = &step.response;
         let mid_strain = (state[0] + out.mean[0]) / T::of(2.0);

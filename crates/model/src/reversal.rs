@@ -51,17 +51,16 @@ impl<T: Scalar> Direction<T> {
 }
 
 impl<T: Scalar, const M: usize, const B: usize, const N: usize> SwitchedModel<T, M, B, N> {
-    /// What one Gaussian knows of the direction over a step, from the covariance at its start of a state that begins with
-    /// the motion.
+    /// What one Gaussian knows of the direction over a step, from the covariance at its start.
     ///
     /// The rate's variance is that in the middle of the step. What the linearised switch leaves follows the error of the
     /// rate, and lasts as long: the squares of that error's correlations from step to step are summed up, geometric for a
     /// rate with white acceleration, Gaussian for a smooth one.
     #[must_use]
-    pub fn uncertain_direction<const W: usize, const L: usize>(
+    pub fn uncertain_direction<const L: usize>(
         &self,
         step: &SwitchedStep<T, M, B>,
-        covariance: &Symmetric<T, W, L>,
+        covariance: &Symmetric<T, N, L>,
     ) -> Direction<T> {
         let (now, ahead) = (covariance[(1, 1)].max(T::zero()), self.rate_variance(step, covariance));
         let rate_sd = (T::of(0.5) * (now + ahead)).sqrt();
@@ -99,11 +98,11 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize> SwitchedModel<T,
     /// but between an exponential's and the Gaussian's: `exp(1 - u²)/σ` at u deviations has both ends, and is 2 % off for
     /// one half of a Gaussian.
     #[must_use]
-    pub fn turning<const W: usize, const L: usize>(
+    pub fn turning<const L: usize>(
         &self,
         step: &SwitchedStep<T, M, B>,
-        mean: &SVector<T, W>,
-        covariance: &Symmetric<T, W, L>,
+        mean: &SVector<T, N>,
+        covariance: &Symmetric<T, N, L>,
         before: Phase,
     ) -> Turning<T> {
         let side = if before == Phase::Retract { -T::one() } else { T::one() };

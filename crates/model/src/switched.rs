@@ -189,16 +189,6 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize> SwitchedModel<T,
         state: &SVector<T, N>,
         direction: Direction<T>,
     ) -> Transition<T, N, L> {
-        self.transition_in(step, state, direction)
-    }
-
-    /// [`Self::transition`] in a state that begins with this model's and has more; what it has more is left zero.
-    pub(crate) fn transition_in<const W: usize, const L: usize>(
-        &self,
-        step: &SwitchedStep<T, M, B>,
-        state: &SVector<T, W>,
-        direction: Direction<T>,
-    ) -> Transition<T, W, L> {
         let mut out = Transition { mean: SVector::zeros(), jacobian: SMatrix::zeros(), noise: Symmetric::zeros() };
         if direction == Direction::Known(Phase::Hold) {
             out.mean[0] = state[0];
@@ -214,27 +204,18 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize> SwitchedModel<T,
 
     /// `F P Fᵀ + Q` of a transition of this model, without touching its zeros: motion moves by itself, a branch by the
     /// motion and itself, the baseline by itself.
+    #[inline]
     #[must_use]
     pub fn propagate<const L: usize>(
         &self,
         covariance: &Symmetric<T, N, L>,
         transition: &Transition<T, N, L>,
     ) -> Symmetric<T, N, L> {
-        Self::propagate_in(covariance, transition, |i| i < M + B)
-    }
-
-    /// [`Self::propagate`] in a state that begins with this model's; `moved` says which components the motion moves.
-    #[inline]
-    pub(crate) fn propagate_in<const W: usize, const L: usize>(
-        covariance: &Symmetric<T, W, L>,
-        transition: &Transition<T, W, L>,
-        moved: impl Fn(usize) -> bool,
-    ) -> Symmetric<T, W, L> {
         let jacobian = &transition.jacobian;
         // The whole of P: a row is then read without asking which triangle its entries lie in.
-        let mut whole = [[T::zero(); W]; W];
+        let mut whole = [[T::zero(); N]; N];
         let mut entries = covariance.packed().iter();
-        for i in 0..W {
+        for i in 0..N {
             for j in 0..=i {
                 if let Some(entry) = entries.next() {
                     whole[i][j] = *entry;
@@ -243,18 +224,18 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize> SwitchedModel<T,
             }
         }
         let mut out = transition.noise;
-        for i in 0..W {
-            let mut row = if i < M { [T::zero(); W] } else { whole[i].map(|entry| jacobian[(i, i)] * entry) };
-            if moved(i) {
+        for i in 0..N {
+            let mut row = if i < M { [T::zero(); N] } else { whole[i].map(|entry| jacobian[(i, i)] * entry) };
+            if i < M + B {
                 for l in 0..M {
                     let factor = jacobian[(i, l)];
-                    for k in 0..W {
+                    for k in 0..N {
                         row[k] += factor * whole[l][k];
                     }
                 }
             }
             for j in 0..=i {
-                out[(i, j)] += Self::sparse_dot(j, moved(j), |k| jacobian[(j, k)], |k| row[k]);
+                out[(i, j)] += Self::sparse_dot(j, |k| jacobian[(j, k)], |k| row[k]);
             }
         }
         out
@@ -262,9 +243,9 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize> SwitchedModel<T,
 
     /// Row `i` of the Jacobian, of which only these entries can differ from zero, times a column.
     #[inline]
-    fn sparse_dot(i: usize, moved: bool, row: impl Fn(usize) -> T, column: impl Fn(usize) -> T) -> T {
+    fn sparse_dot(i: usize, row: impl Fn(usize) -> T, column: impl Fn(usize) -> T) -> T {
         let mut sum = if i < M { T::zero() } else { row(i) * column(i) };
-        if moved {
+        if i < M + B {
             for k in 0..M {
                 sum += row(k) * column(k);
             }
@@ -292,12 +273,12 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize> SwitchedModel<T,
     }
 
     /// Strain and its derivatives: linear, whatever the gains.
-    fn move_body<const W: usize, const L: usize>(
+    fn move_body<const L: usize>(
         &self,
         step: &SwitchedStep<T, M, B>,
-        state: &SVector<T, W>,
+        state: &SVector<T, N>,
         direction: Direction<T>,
-        out: &mut Transition<T, W, L>,
+        out: &mut Transition<T, N, L>,
     ) {
         let push = self.push(direction);
         for i in 0..M {
@@ -330,11 +311,11 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize> SwitchedModel<T,
     }
 
     /// Branches and baseline decay, and wander around their law.
-    fn relax<const W: usize, const L: usize>(
+    fn relax<const L: usize>(
         &self,
         step: &SwitchedStep<T, M, B>,
-        state: &SVector<T, W>,
-        out: &mut Transition<T, W, L>,
+        state: &SVector<T, N>,
+        out: &mut Transition<T, N, L>,
     ) {
         for i in 0..B {
             let (c, change) = (M + i, step.response.decay_change[i]);
@@ -357,14 +338,9 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize> SwitchedModel<T,
         (0..M).fold(state[1] + change, |sum, j| sum + step.response.motion_change[1][j] * state[j])
     }
 
-    /// Variance of the rate at the end of a step, from the covariance at its start of a state that begins with the
-    /// motion.
+    /// Variance of the rate at the end of a step, from the covariance at its start.
     #[must_use]
-    pub fn rate_variance<const W: usize, const L: usize>(
-        &self,
-        step: &SwitchedStep<T, M, B>,
-        covariance: &Symmetric<T, W, L>,
-    ) -> T {
+    pub fn rate_variance<const L: usize>(&self, step: &SwitchedStep<T, M, B>, covariance: &Symmetric<T, N, L>) -> T {
         let mut row = step.response.motion_change[1];
         row[1] += T::one();
         let mut variance = step.response.motion_noise[1][1];
