@@ -24,7 +24,7 @@ fi
 
 ohmstrain=${OHMSTRAIN:-}
 if [[ -z $ohmstrain ]]; then
-    cargo build --quiet --locked -p ohmstrain
+    cargo build --quiet --locked -p ohmstrain-cli
     ohmstrain=$PWD/target/debug/ohmstrain
 fi
 

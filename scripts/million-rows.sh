@@ -13,7 +13,7 @@ largest=${1:-10000000}
 repetitions=${REPETITIONS:-5}
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
-cargo build --release --locked --quiet -p ohmstrain -p ohmstrain-bench-data --bin ohmstrain --example copy_columns
+cargo build --release --locked --quiet -p ohmstrain-cli -p ohmstrain-bench-data --bin ohmstrain --example copy_columns
 ohmstrain=target/release/ohmstrain
 copy_columns=target/release/examples/copy_columns
 

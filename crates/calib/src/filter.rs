@@ -2,8 +2,8 @@ use std::ops::Range;
 
 use ohmstrain_ekf::{Estimate, Gaussian, Guard, Reading, ReadingVerdict, StepError};
 
-/// A filter for a sensor whose number of branches and kind of motion are known at run time only.
-pub trait Filter {
+/// A filter for a sensor whose number of branches and kind of motion are known at run time only. Threads and tasks can own it.
+pub trait Filter: Send {
     /// Takes the reading `R/R₀ - 1` at `time_s`; `None` if it is missing. The first call is an update without a
     /// prediction.
     ///

@@ -103,8 +103,8 @@ where
 
 impl<E, S, const M: usize, const B: usize, const N: usize, const L: usize> Filter for Running<E, S, M, B, N, L>
 where
-    E: Estimator<f64, N, L>,
-    S: StrainSensor<f64, M, B, N>,
+    E: Estimator<f64, N, L, State: Send, Prepared: Send> + Send,
+    S: StrainSensor<f64, M, B, N> + Send,
 {
     fn guard(&mut self, guard: Guard<f64>) {
         self.stepper.guard = guard;

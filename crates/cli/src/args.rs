@@ -23,7 +23,7 @@ pub use split::Split;
 
 /// From the resistance of a soft strain sensor to strain, with an honest error bar.
 #[derive(Debug, Parser)]
-#[command(version, about, propagate_version = true)]
+#[command(name = "ohmstrain", version, about, propagate_version = true)]
 pub struct Args {
     /// What to do.
     #[command(subcommand)]

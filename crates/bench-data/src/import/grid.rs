@@ -95,9 +95,8 @@ impl Grid<'_> {
                 let mark = ["//", "#", "%"].into_iter().find(|mark| line.starts_with(mark))?;
                 let rest = &line[mark.len()..];
                 // `%;s;Ohm` is a line of units, `#,Time,R` one of names. A tab is a blank too: look before trimming.
-                let is_cell = separator
-                    .byte()
-                    .is_some_and(|byte| rest.trim_start_matches(' ').as_bytes().first() == Some(&byte));
+                let is_cell =
+                    separator.byte().is_some_and(|byte| rest.trim_start_matches(' ').as_bytes().first() == Some(&byte));
                 (!is_cell).then_some(rest.trim())
             }
         }

@@ -1,0 +1,287 @@
+use std::ops::Range;
+
+use ohmstrain_calib::{EstimatorKind, Rows, Start, build_filter};
+use ohmstrain_ekf::{Guard, Influence, StepError};
+
+use crate::estimate::Scale;
+use crate::filter::Kernel;
+use crate::{Error, Estimate, Filter, LaggedFilter, Reading, Sensor};
+
+/// How many readings in a row a gate turns down before it is the state that is doubted.
+const PATIENCE: u32 = 10;
+/// How far beyond the limits a strain may start, in spans.
+const START_BEYOND: f64 = 0.1;
+
+/// How a filter is to be; see [`Sensor::filter`]. Everything has a default.
+///
+/// ```
+/// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+/// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
+/// use ohmstrain::{EstimatorKind, Influence};
+///
+/// let filter = sensor
+///     .filter()
+///     .estimator(EstimatorKind::Ekf)
+///     .rest_resistance(1580.0)
+///     .initial_strain(0.0)
+///     .gate(10.8)
+///     .influence(Influence::Huber { threshold: 2.0 })
+///     .build()?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Copy, Debug)]
+pub struct FilterBuilder<'a> {
+    sensor: &'a Sensor,
+    estimator: Option<EstimatorKind>,
+    corrects: bool,
+    rest_resistance: Option<f64>,
+    initial_strain: Option<f64>,
+    gate: Option<f64>,
+    influence: Influence<f64>,
+}
+
+impl<'a> FilterBuilder<'a> {
+    pub(crate) const fn new(sensor: &'a Sensor) -> Self {
+        Self {
+            sensor,
+            estimator: None,
+            corrects: true,
+            rest_resistance: None,
+            initial_strain: None,
+            gate: None,
+            influence: Influence::Full,
+        }
+    }
+
+    /// Another estimator than the sensor's default.
+    ///
+    /// ```
+    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+    /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
+    /// let ekf = sensor.filter().estimator(ohmstrain::EstimatorKind::Ekf).build()?;
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub const fn estimator(self, kind: EstimatorKind) -> Self {
+        Self { estimator: Some(kind), ..self }
+    }
+
+    /// Without the learned correction of the strain.
+    ///
+    /// ```
+    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+    /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
+    /// let plain = sensor.filter().without_correction().build()?;
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub const fn without_correction(self) -> Self {
+        Self { corrects: false, ..self }
+    }
+
+    /// What the rested, unstretched sensor reads now, in place of what it read in calibration: another day, or another
+    /// sensor of the same make.
+    ///
+    /// ```
+    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+    /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
+    /// let today = sensor.filter().rest_resistance(1712.0).build()?;
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub const fn rest_resistance(self, measured: f64) -> Self {
+        Self { rest_resistance: Some(measured), ..self }
+    }
+
+    /// Strain (or angle) at the first row, if it is known; the body is at rest there.
+    ///
+    /// ```
+    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+    /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
+    /// assert!(sensor.filter().initial_strain(0.1).build().is_ok());
+    /// assert!(sensor.filter().initial_strain(10.0).build().is_err());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub const fn initial_strain(self, strain: f64) -> Self {
+        Self { initial_strain: Some(strain), ..self }
+    }
+
+    /// Turns down readings whose squared innovation over its variance is above `nis`; ten in a row at most. 10.8 turns down
+    /// one good reading in a thousand.
+    ///
+    /// ```
+    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+    /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
+    /// assert!(sensor.filter().gate(10.8).build().is_ok());
+    /// assert!(sensor.filter().gate(-1.0).build().is_err());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub const fn gate(self, nis: f64) -> Self {
+        Self { gate: Some(nis), ..self }
+    }
+
+    /// Bounds the influence of surprising readings.
+    ///
+    /// ```
+    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+    /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
+    /// use ohmstrain::Influence;
+    ///
+    /// let robust = sensor.filter().influence(Influence::StudentT { degrees_of_freedom: 4.0 }).build()?;
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub const fn influence(self, influence: Influence<f64>) -> Self {
+        Self { influence, ..self }
+    }
+
+    /// A filter that estimates each row from the readings up to it.
+    ///
+    /// # Errors
+    /// If the sensor has no parameters for the estimator, or an option makes no sense for it.
+    ///
+    /// ```
+    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+    /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
+    /// let mut filter = sensor.filter().build()?;
+    /// std::thread::spawn(move || filter.step(0.0, 1600.0)).join().unwrap()?;
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn build(self) -> Result<Filter, Error> {
+        Ok(Filter::new(self.kernel(self.kind())?))
+    }
+
+    /// A filter that estimates each row from the readings up to `lag_s` seconds after it.
+    ///
+    /// # Errors
+    /// As [`Self::build`]; or if the estimator cannot look back.
+    ///
+    /// ```
+    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+    /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
+    /// let mut filter = sensor.filter().build_lagged(0.2)?;
+    /// for row in filter.step(0.0, 1600.0)? {
+    ///     println!("{} s: {:.3} ± {:.3}", row.time_s, row.strain, row.strain_sd);
+    /// }
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn build_lagged(self, lag_s: f64) -> Result<LaggedFilter, Error> {
+        if !(lag_s.is_finite() && lag_s > 0.0) {
+            return Err(Error::NotPositive { name: "lag", found: lag_s });
+        }
+        let kind = self.kind();
+        if kind.smoother() != kind {
+            return Err(Error::NoSmoother);
+        }
+        Ok(LaggedFilter::new(self.kernel(kind)?, lag_s))
+    }
+
+    /// Estimates of a whole recording, each from all readings; NaN stands for a missing one.
+    ///
+    /// # Errors
+    /// As [`Sensor::smooth`].
+    ///
+    /// ```
+    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+    /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
+    /// let rows = sensor.filter().gate(10.8).smooth(&[0.00, 0.05], &[1600.0, 1632.0])?;
+    /// assert_eq!(rows.len(), 2);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn smooth(self, time_s: &[f64], readings: &[f64]) -> Result<Vec<Estimate>, Error> {
+        if time_s.len() != readings.len() {
+            return Err(Error::Lengths { times: time_s.len(), readings: readings.len() });
+        }
+        self.sensor.check_unit(readings.iter().copied(), self.rest_resistance)?;
+        let mut rows = Vec::with_capacity(time_s.len());
+        self.smooth_backward(
+            time_s.len(),
+            |row| (time_s[row], Reading::from(readings[row])),
+            |_, segment| {
+                rows.extend(segment.iter().rev());
+                Ok::<(), Error>(())
+            },
+        )?;
+        rows.reverse();
+        Ok(rows)
+    }
+
+    /// Smooths a recording that is too long to hold its estimates in memory: `row` gives time, s, and reading of each of
+    /// `len` rows; `take` gets the estimates segment by segment, the last segment first, each in order of time.
+    ///
+    /// # Errors
+    /// As [`Self::build`]; the row that cannot be taken; or the error of `take`.
+    ///
+    /// ```
+    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+    /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
+    /// use ohmstrain::{Error, Reading};
+    ///
+    /// let row = |k: usize| (0.05 * k as f64, Reading::from(1600.0 + k as f64));
+    /// sensor.filter().smooth_backward(10_000, row, |rows, estimates| {
+    ///     println!("rows {rows:?}: {} estimates", estimates.len());
+    ///     Ok::<(), Error>(())
+    /// })?;
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn smooth_backward<E: From<Error>>(
+        self,
+        len: usize,
+        row: impl Fn(usize) -> (f64, Reading),
+        mut take: impl FnMut(Range<usize>, &[Estimate]) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let Kernel { mut filter, scale } = self.kernel(self.kind().smoother())?;
+        let failed = |(row, source): (usize, StepError)| Error::Row { row, source };
+        let relative = |k: usize| {
+            let (time_s, reading) = row(k);
+            (time_s, reading.relative(scale.rest_reading))
+        };
+        let mut back = filter.way_back(Rows::new(len, &relative)).map_err(failed)?;
+        let (mut outputs, mut estimates, mut first) = (Vec::new(), Vec::new(), len);
+        while let Some(rows) = back.next_segment(&mut outputs).map_err(failed)? {
+            first = rows.start;
+            estimates.clear();
+            estimates.extend(rows.clone().zip(&outputs).map(|(k, output)| {
+                let (time_s, reading) = row(k);
+                scale.row(time_s, reading, output)
+            }));
+            take(rows, &estimates)?;
+        }
+        if first == 0 { Ok(()) } else { Err(Error::NoSmoother.into()) }
+    }
+
+    /// The estimator that was chosen.
+    fn kind(&self) -> EstimatorKind {
+        let kind = self.estimator.unwrap_or(self.sensor.params().default_estimator);
+        if self.corrects { kind } else { kind.filter() }
+    }
+
+    fn kernel(self, kind: EstimatorKind) -> Result<Kernel, Error> {
+        let params = self.sensor.params();
+        let start = self.initial_strain.map_or(Ok(Start::Unknown), |strain| self.start_at(strain))?;
+        let mut filter = build_filter(params, Some(kind), start)?;
+        filter.guard(self.guard()?);
+        let mut scale = Scale::new(self.sensor)?;
+        self.rest_resistance.map_or(Ok(()), |measured| scale.rest_at(measured))?;
+        Ok(Kernel { filter, scale })
+    }
+
+    fn start_at(&self, strain: f64) -> Result<Start, Error> {
+        let limits = self.sensor.params().limits;
+        let beyond = (limits.lower - strain).max(strain - limits.upper);
+        if beyond <= START_BEYOND * limits.span() {
+            return Ok(Start::Strain(strain));
+        }
+        Err(Error::InitialStrain { lower: limits.lower, upper: limits.upper, found: strain })
+    }
+
+    fn guard(&self) -> Result<Guard<f64>, Error> {
+        let mut guard = Guard::none();
+        if let Some(nis) = self.gate {
+            guard = guard.with_gate(nis, PATIENCE).map_err(Error::Guard)?;
+        }
+        guard.with_influence(self.influence).map_err(Error::Guard)
+    }
+}

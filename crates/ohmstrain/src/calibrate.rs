@@ -1,0 +1,168 @@
+use ohmstrain_calib::{
+    CalibrationError, Distrusted, EstimatorKind, GaugeFamily, LawOptions, RECIPE, Samples, SensorParams, Stage,
+};
+
+use crate::{Error, MADE_BY, Recording, Sensor};
+
+/// Calibrates a sensor on recordings with known strain, with every choice left to the program. See [`Calibration`].
+///
+/// # Errors
+/// If the recordings are too short or too plain, of different quantities or units, or the readings do not tell the strain.
+///
+/// ```
+/// use ohmstrain::{Recording, calibrate};
+///
+/// let time_s: Vec<f64> = (0..400).map(|k| 0.1 * f64::from(k)).collect();
+/// let strain: Vec<f64> = time_s.iter().map(|t| 0.15 - 0.15 * (0.6 * t).cos()).collect();
+/// let ohm: Vec<f64> = strain.iter().map(|e| 1600.0 * (1.0 + 1.9 * e - 2.0 * e * e)).collect();
+/// # if false { // takes half a minute in a test
+/// let sensor = calibrate(&[Recording::new(&time_s, &ohm, &strain)?])?;
+/// std::fs::write("sensor.toml", sensor.to_toml()?)?;
+/// # }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn calibrate(recordings: &[Recording]) -> Result<Sensor, Error> {
+    Calibration::new().run(recordings).map(|calibrated| calibrated.sensor)
+}
+
+/// How to calibrate. Everything has a default.
+///
+/// ```
+/// use ohmstrain::{Calibration, EstimatorKind, Recording};
+///
+/// let time_s: Vec<f64> = (0..400).map(|k| 0.1 * f64::from(k)).collect();
+/// let strain: Vec<f64> = time_s.iter().map(|t| 0.15 - 0.15 * (0.6 * t).cos()).collect();
+/// let ohm: Vec<f64> = strain.iter().map(|e| 1600.0 * (1.0 + 1.9 * e - 2.0 * e * e)).collect();
+/// let calibration = Calibration::new().estimator(EstimatorKind::Ekf).branches(1);
+/// let sensor = calibration.run(&[Recording::new(&time_s, &ohm, &strain)?])?.sensor;
+/// assert_eq!(sensor.params().law.branches.len(), 1);
+/// # Ok::<(), ohmstrain::Error>(())
+/// ```
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Calibration {
+    estimator: Option<EstimatorKind>,
+    branches: Option<usize>,
+    gauge: Option<GaugeFamily>,
+}
+
+/// What comes of a calibration.
+///
+/// ```
+/// fn remark(calibrated: &ohmstrain::Calibrated) {
+///     for row in &calibrated.distrusted {
+///         println!("recording {}, row {}: {}; left out", row.recording, row.row, row.doubt);
+///     }
+/// }
+/// ```
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct Calibrated {
+    /// The sensor.
+    pub sensor: Sensor,
+    /// R₀ of each recording, in the unit of its readings.
+    pub rest_readings: Vec<f64>,
+    /// Rows that were left out.
+    pub distrusted: Vec<Distrusted>,
+}
+
+impl Calibration {
+    /// With every choice left to the program.
+    ///
+    /// ```
+    /// let calibration = ohmstrain::Calibration::new();
+    /// ```
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { estimator: None, branches: None, gauge: None }
+    }
+
+    /// The estimator to calibrate and to make the sensor's default; the extended Kalman filter is calibrated in any case.
+    ///
+    /// ```
+    /// use ohmstrain::{Calibration, EstimatorKind};
+    ///
+    /// let quick = Calibration::new().estimator(EstimatorKind::Ekf);
+    /// ```
+    #[must_use]
+    pub const fn estimator(self, kind: EstimatorKind) -> Self {
+        Self { estimator: Some(kind), ..self }
+    }
+
+    /// Relaxing branches of the law, 0 to 4, in place of what the filter does best with.
+    ///
+    /// ```
+    /// let plain = ohmstrain::Calibration::new().branches(1);
+    /// ```
+    #[must_use]
+    pub const fn branches(self, branches: usize) -> Self {
+        Self { branches: Some(branches), ..self }
+    }
+
+    /// Family of the quasi-static curve, in place of a polynomial.
+    ///
+    /// ```
+    /// use ohmstrain::{Calibration, GaugeFamily};
+    ///
+    /// let tunnelling = Calibration::new().gauge(GaugeFamily::Tunnelling);
+    /// ```
+    #[must_use]
+    pub const fn gauge(self, family: GaugeFamily) -> Self {
+        Self { gauge: Some(family), ..self }
+    }
+
+    /// Calibrates. The same recordings give the same sensor.
+    ///
+    /// # Errors
+    /// As [`calibrate`].
+    ///
+    /// ```
+    /// use ohmstrain::{Calibration, Recording};
+    ///
+    /// let short = Recording::new(&[0.0, 0.1], &[1600.0, 1610.0], &[0.00, 0.01])?;
+    /// let error = Calibration::new().run(&[short]).unwrap_err();
+    /// assert!(error.to_string().starts_with("recording 1 has 2 rows"));
+    /// # Ok::<(), ohmstrain::Error>(())
+    /// ```
+    pub fn run(self, recordings: &[Recording]) -> Result<Calibrated, Error> {
+        self.run_with(recordings, |_| {})
+    }
+
+    /// The same, telling `progress` what it is about.
+    ///
+    /// # Errors
+    /// As [`calibrate`].
+    ///
+    /// ```
+    /// use ohmstrain::{Calibration, Recording};
+    ///
+    /// let short = Recording::new(&[0.0, 0.1], &[1600.0, 1610.0], &[0.00, 0.01])?;
+    /// let failed = Calibration::new().run_with(&[short], |stage| println!("{stage:?}"));
+    /// assert!(failed.is_err());
+    /// # Ok::<(), ohmstrain::Error>(())
+    /// ```
+    pub fn run_with(self, recordings: &[Recording], progress: impl FnMut(Stage)) -> Result<Calibrated, Error> {
+        let Some(first) = recordings.first() else { return Err(CalibrationError::NoRecording.into()) };
+        let (quantity, reading) = (first.quantity, first.reading);
+        if recordings.iter().any(|other| (other.quantity, other.reading) != (quantity, reading)) {
+            return Err(Error::OtherQuantity);
+        }
+        let estimator = self.estimator.unwrap_or(RECIPE.estimator);
+        let samples: Vec<Samples> = recordings.iter().map(|recording| recording.samples).collect();
+        let calibration = ohmstrain_calib::calibrate(&samples, &self.structures(estimator), &[estimator], progress)?;
+        let (distrusted, rest_readings) = (calibration.distrusted.clone(), calibration.rest_readings.clone());
+        let params = calibration.into_sensor(MADE_BY, quantity, reading);
+        let joint = recordings.iter().find_map(|recording| recording.joint);
+        let sensor = Sensor::from_params(SensorParams { joint, ..params })?;
+        Ok(Calibrated { sensor, rest_readings, distrusted })
+    }
+
+    /// Structures of the law to choose from.
+    fn structures(self, estimator: EstimatorKind) -> Vec<LawOptions> {
+        let with_gauge = |options: &LawOptions| LawOptions { gauge: self.gauge.unwrap_or(options.gauge), ..*options };
+        let structures: Vec<LawOptions> = LawOptions::candidates(estimator).iter().map(with_gauge).collect();
+        match self.branches {
+            Some(branches) => structures.first().map(|first| LawOptions { branches, ..*first }).into_iter().collect(),
+            None => structures,
+        }
+    }
+}

@@ -1,0 +1,172 @@
+use std::fmt;
+
+use ohmstrain_calib::{CalibrationError, FORMAT, FieldError, SamplesError};
+use ohmstrain_ekf::StepError;
+use ohmstrain_model::ParameterError;
+use thiserror::Error;
+
+use crate::UnitDoubt;
+
+/// Why there is no sensor, no filter or no estimate.
+///
+/// ```
+/// let error = ohmstrain::Sensor::from_toml("format = 3").unwrap_err();
+/// assert_eq!(error.to_string(), "line 1: field `format`: expected version 4, found 3");
+/// ```
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The text is no sensor.
+    #[error(transparent)]
+    Text(#[from] TextError),
+    /// The sensor has no parameters for the estimator, or they make no filter; or a calibration was not made.
+    #[error(transparent)]
+    Calibration(#[from] CalibrationError),
+    /// The sensor cannot be written as TOML.
+    #[error("cannot write parameters: {0}")]
+    Write(#[from] toml::ser::Error),
+    /// A gate or an influence that no filter can have.
+    #[error(transparent)]
+    Guard(ParameterError),
+    /// A joint that no sensor can sit on.
+    #[error("the sensor's joint: {0}")]
+    Joint(ParameterError),
+    /// A strain to start at that the sensor never reports.
+    #[error("initial strain: expected {lower:.4} to {upper:.4}, the sensor's limits, found {found}")]
+    InitialStrain {
+        /// Lower limit.
+        lower: f64,
+        /// Upper limit.
+        upper: f64,
+        /// What was given.
+        found: f64,
+    },
+    /// A resistance at rest, or a lag, that is not a positive number.
+    #[error("{name}: expected a positive number, found {found}")]
+    NotPositive {
+        /// What it is.
+        name: &'static str,
+        /// What was given.
+        found: f64,
+    },
+    /// Recordings of different quantities, strain and angle, or units, ohms and ratios; or others than the calibration's.
+    #[error("expected recordings of one quantity and one unit, those of the calibration")]
+    OtherQuantity,
+    /// Slices of different lengths.
+    #[error("{times} times and {readings} readings; expected as many of each")]
+    Lengths {
+        /// Number of times.
+        times: usize,
+        /// Number of readings.
+        readings: usize,
+    },
+    /// Slices that are no recording.
+    #[error(transparent)]
+    Samples(#[from] SamplesError),
+    /// Readings that seem to be in another unit than the calibration's.
+    #[error(transparent)]
+    Unit(#[from] UnitDoubt),
+    /// The filter does not take a row. It stays as it was: the next good row goes on from the last good one.
+    #[error(transparent)]
+    Step(#[from] StepError),
+    /// The same, of a row of a recording, counted from zero.
+    #[error("row {row}: {source}")]
+    Row {
+        /// The row.
+        row: usize,
+        /// What is wrong with it.
+        source: StepError,
+    },
+    /// The estimator cannot look back.
+    #[error("the estimator has no smoother")]
+    NoSmoother,
+}
+
+impl Error {
+    /// The error with the name of the file that the text was read from: `file:line: column c: message`.
+    ///
+    /// ```
+    /// let error = ohmstrain::Sensor::from_toml("format = 3").unwrap_err();
+    /// assert_eq!(error.in_file("s.toml"), "s.toml:1: field `format`: expected version 4, found 3");
+    /// ```
+    #[must_use]
+    pub fn in_file(&self, name: &str) -> String {
+        match self {
+            Self::Text(TextError { place: Some(Place { line, column }), cause }) => match column {
+                Some(column) => format!("{name}:{line}: column {column}: {cause}"),
+                None => format!("{name}:{line}: {cause}"),
+            },
+            other => format!("{name}: {other}"),
+        }
+    }
+}
+
+/// What is wrong with the text of a sensor, and where.
+///
+/// ```
+/// use ohmstrain::{Error, Sensor, TextCause};
+///
+/// let Err(Error::Text(error)) = Sensor::from_toml("format = 5") else { panic!() };
+/// assert!(matches!(error.cause, TextCause::Format { found: 5 }));
+/// assert_eq!(error.place.unwrap().line, 1);
+/// ```
+#[derive(Debug)]
+pub struct TextError {
+    /// Where; `None` if something is missing as a whole.
+    pub place: Option<Place>,
+    /// What.
+    pub cause: TextCause,
+}
+
+impl fmt::Display for TextError {
+    fn fmt(&self, out: &mut fmt::Formatter) -> fmt::Result {
+        match self.place {
+            Some(place) => write!(out, "{place}: {}", self.cause),
+            None => self.cause.fmt(out),
+        }
+    }
+}
+
+impl std::error::Error for TextError {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        Some(&self.cause)
+    }
+}
+
+/// What is wrong with the text of a sensor; see [`TextError`].
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum TextCause {
+    /// It is no TOML, or a field is unknown, missing or of the wrong type.
+    #[error("{}", .0.message().replace('\n', ", "))]
+    Toml(toml::de::Error),
+    /// It is of another version of the format.
+    #[error("field `format`: expected version {FORMAT}, found {found}")]
+    Format {
+        /// That version.
+        found: u32,
+    },
+    /// A number that no sensor can have.
+    #[error(transparent)]
+    Field(FieldError),
+}
+
+/// A place in a text, both counted from one.
+///
+/// ```
+/// assert_eq!(ohmstrain::Place { line: 3, column: Some(7) }.to_string(), "line 3, column 7");
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Place {
+    /// Line.
+    pub line: usize,
+    /// Column, in characters, where it is known.
+    pub column: Option<usize>,
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, out: &mut fmt::Formatter) -> fmt::Result {
+        write!(out, "line {}", self.line)?;
+        self.column.map_or(Ok(()), |column| write!(out, ", column {column}"))
+    }
+}

@@ -1,0 +1,155 @@
+use ohmstrain_calib::{Output, SensorParams};
+use ohmstrain_ekf::ReadingVerdict;
+use ohmstrain_model::Joint;
+use serde::ser::SerializeStruct;
+use serde::{Serialize, Serializer};
+
+use crate::column::Header;
+use crate::{Error, Flag, Flags, Reading, Sensor};
+
+/// What is known at one row: the row of `estimates.csv`, a field per column. Serialised, it has the names of that file's
+/// header, which tell the unit; what is not known is nothing.
+///
+/// Of a sensor that was calibrated in degrees the four fields of strain are degrees and degrees per second.
+///
+/// ```
+/// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+/// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
+/// let row = sensor.filter().build()?.step(0.0, 1600.0)?;
+/// println!("{:.3} ± {:.3}, {:.0} % stretching", row.strain, row.strain_sd, 100.0 * row.p_extend.unwrap_or(f64::NAN));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Estimate {
+    /// Time, s.
+    pub time_s: f64,
+    /// The reading as recorded, in the sensor's unit; `None` where it is missing.
+    pub resistance: Option<f64>,
+    /// Strain, moved into the sensor's limits.
+    pub strain: f64,
+    /// Its standard deviation.
+    pub strain_sd: f64,
+    /// Strain rate, 1/s.
+    pub strain_rate: f64,
+    /// Its standard deviation.
+    pub strain_rate_sd: f64,
+    /// Sum of the relaxing branches, relative to R₀.
+    pub relaxation: f64,
+    /// Its standard deviation.
+    pub relaxation_sd: f64,
+    /// Slow drift and error of the law, relative to R₀.
+    pub baseline: f64,
+    /// Where the reading will settle if the strain is held from now on, in the sensor's unit.
+    pub settled_resistance: f64,
+    /// Its standard deviation.
+    pub settled_resistance_sd: f64,
+    /// Probability that the sensor is being stretched; `None` if the estimator has no phases.
+    pub p_extend: Option<f64>,
+    /// Probability that it is held.
+    pub p_hold: Option<f64>,
+    /// Probability that it is being released.
+    pub p_retract: Option<f64>,
+    /// Probability that the strain lies beyond the peak of the quasi-static curve.
+    pub p_beyond_border: f64,
+    /// Squared innovation of the reading over its variance; `None` without a reading.
+    pub nis: Option<f64>,
+    /// What else there is to say.
+    pub flags: Flags,
+    /// Angle of the joint, degrees; `None` without a joint.
+    pub angle_deg: Option<f64>,
+    /// Its standard deviation.
+    pub angle_sd: Option<f64>,
+    header: Header,
+}
+
+/// With the names of `estimates.csv`.
+impl Serialize for Estimate {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut row = serializer.serialize_struct("Estimate", self.header.len())?;
+        for column in self.header.columns() {
+            if column.is_flags() {
+                row.serialize_field(column.name(), &self.flags)?;
+            } else {
+                let known = Some(column.number(self)).filter(|number| number.is_finite());
+                row.serialize_field(column.name(), &known)?;
+            }
+        }
+        row.end()
+    }
+}
+
+/// What leads from readings to the kernel and from there to rows.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Scale {
+    /// R₀ in the unit of the readings.
+    pub rest_reading: f64,
+    /// R₀ of the calibration, and what the rested sensor read then.
+    calibrated: (f64, f64),
+    limits: (f64, f64),
+    joint: Option<Joint<f64>>,
+    header: Header,
+}
+
+impl Scale {
+    pub(crate) fn new(sensor: &Sensor) -> Result<Self, Error> {
+        let params: &SensorParams = sensor.params();
+        let rest_reading = params.rest_reading;
+        let calibrated = (rest_reading, params.measured_rest.unwrap_or(rest_reading));
+        let limits = (params.limits.lower, params.limits.upper);
+        Ok(Self { rest_reading, calibrated, limits, joint: sensor.joint()?, header: Header::of(params) })
+    }
+
+    /// Moves R₀ to where the rested sensor reads `measured`.
+    pub(crate) fn rest_at(&mut self, measured: f64) -> Result<(), Error> {
+        if !(measured.is_finite() && measured > 0.0) {
+            return Err(Error::NotPositive { name: "resistance at rest", found: measured });
+        }
+        let (rest_reading, rested) = self.calibrated;
+        self.rest_reading = rest_reading * (measured / rested);
+        Ok(())
+    }
+
+    /// The row of a reading and what the kernel says of it.
+    pub(crate) fn row(&self, time_s: f64, reading: Reading, output: &Output) -> Estimate {
+        let estimate = &output.estimate;
+        let strain = (estimate.strain.mean, estimate.strain.sd());
+        let angle = self.joint.map(|joint| joint.angle_rad(strain.0, strain.1));
+        Estimate {
+            time_s,
+            resistance: Some(reading.value).filter(|value| !value.is_nan()),
+            strain: strain.0,
+            strain_sd: strain.1,
+            strain_rate: estimate.rate.mean,
+            strain_rate_sd: estimate.rate.sd(),
+            relaxation: estimate.relaxation.mean,
+            relaxation_sd: estimate.relaxation.sd(),
+            baseline: estimate.baseline,
+            settled_resistance: self.rest_reading * (1.0 + estimate.settled.mean),
+            settled_resistance_sd: self.rest_reading * estimate.settled.sd(),
+            p_extend: output.phases.map(|phases| phases[0]),
+            p_hold: output.phases.map(|phases| phases[1]),
+            p_retract: output.phases.map(|phases| phases[2]),
+            p_beyond_border: estimate.beyond_border,
+            nis: output.nis,
+            flags: self.flags(reading, output),
+            angle_deg: angle.map(|(angle, _)| angle.to_degrees()),
+            angle_sd: angle.map(|(_, sd)| sd.to_degrees()),
+            header: self.header,
+        }
+    }
+
+    fn flags(&self, reading: Reading, output: &Output) -> Flags {
+        let (strain, verdict) = (output.estimate.strain.mean, output.verdict);
+        Flags::NONE
+            .with(Flag::Missing, reading.value.is_nan() && !reading.saturated)
+            .with(Flag::Saturated, reading.saturated)
+            .with(Flag::Rejected, verdict == ReadingVerdict::Rejected)
+            .with(Flag::Downweighted, verdict == ReadingVerdict::Downweighted)
+            .with(Flag::Implausible, verdict == ReadingVerdict::Implausible || reading.value.is_infinite())
+            .with(Flag::Stuck, verdict == ReadingVerdict::Stuck)
+            .with(Flag::Readmitted, verdict == ReadingVerdict::Readmitted)
+            .with(Flag::RampBorder, output.estimate.near_ramp_border)
+            .with(Flag::AtLimit, strain <= self.limits.0 || strain >= self.limits.1)
+    }
+}

@@ -1,0 +1,195 @@
+use std::collections::VecDeque;
+use std::fmt;
+
+use crate::estimate::Scale;
+use crate::{Error, Estimate, Reading};
+
+/// A filter for the sizes of the sensor's law, and the way to it from readings and from it to rows.
+pub(crate) struct Kernel {
+    pub filter: Box<dyn ohmstrain_calib::Filter>,
+    pub scale: Scale,
+}
+
+/// A running filter: readings in, estimates out. It can be sent to another thread, and owned by an asynchronous task.
+///
+/// ```
+/// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+/// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
+/// let mut filter = sensor.filter().build()?;
+/// let e = filter.step(0.0, 1600.0)?;
+/// println!("{:.3} ± {:.3}", e.strain, e.strain_sd);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct Filter {
+    kernel: Kernel,
+}
+
+impl Filter {
+    pub(crate) const fn new(kernel: Kernel) -> Self {
+        Self { kernel }
+    }
+
+    /// Takes the reading at `time_s` and tells what is known then. A missing reading is NaN, `None` or
+    /// [`Reading::MISSING`]; the estimate is then a prediction. An infinite one is none that a sensor can have.
+    ///
+    /// # Errors
+    /// If time goes backwards or is no number. The filter stays as it was: the next good row goes on from the last good one.
+    ///
+    /// ```
+    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+    /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
+    /// let mut filter = sensor.filter().build()?;
+    /// let known = filter.step(0.00, 1600.0)?;
+    /// let missing = filter.step(0.05, None)?;
+    /// assert!(missing.resistance.is_none() && missing.strain_sd > known.strain_sd);
+    /// assert!(filter.step(0.04, 1600.0).is_err());
+    /// filter.step(0.10, 1601.0)?;
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn step(&mut self, time_s: f64, reading: impl Into<Reading>) -> Result<Estimate, Error> {
+        let Kernel { filter, scale } = &mut self.kernel;
+        let reading = reading.into();
+        filter.step(time_s, reading.relative(scale.rest_reading))?;
+        Ok(scale.row(time_s, reading, &filter.output()))
+    }
+
+    /// What the rested, unstretched sensor is found to read from now on, in place of what it read in calibration.
+    ///
+    /// # Errors
+    /// If it is not a positive number.
+    ///
+    /// ```
+    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+    /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
+    /// let mut filter = sensor.filter().build()?;
+    /// filter.rest_resistance(1712.0)?;
+    /// filter.step(0.0, 1730.0)?;
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn rest_resistance(&mut self, measured: f64) -> Result<(), Error> {
+        self.kernel.scale.rest_at(measured)
+    }
+}
+
+/// A running filter that waits: each row is estimated from the readings up to a fixed lag after it. See
+/// [`FilterBuilder::build_lagged`](crate::FilterBuilder::build_lagged).
+///
+/// ```
+/// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+/// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
+/// let mut filter = sensor.filter().build_lagged(0.1)?;
+/// let mut rows = Vec::new();
+/// for k in 0..100 {
+///     rows.extend_from_slice(filter.step(0.05 * f64::from(k), 1600.0)?);
+/// }
+/// rows.extend_from_slice(filter.finish()?);
+/// assert_eq!(rows.len(), 100);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct LaggedFilter {
+    kernel: Kernel,
+    lag_s: f64,
+    /// Rows whose estimates wait for later readings.
+    waiting: VecDeque<(f64, Reading)>,
+    /// Estimates that have become due.
+    due: Vec<Estimate>,
+    /// Whether they have been handed out.
+    are_out: bool,
+}
+
+impl LaggedFilter {
+    pub(crate) const fn new(kernel: Kernel, lag_s: f64) -> Self {
+        Self { kernel, lag_s, waiting: VecDeque::new(), due: Vec::new(), are_out: true }
+    }
+
+    /// Takes the reading at `time_s`, as [`Filter::step`] does, and hands out the rows that have become due, in order.
+    ///
+    /// # Errors
+    /// As [`Filter::step`]. Rows that have become due meanwhile are handed out with the next step.
+    ///
+    /// ```
+    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+    /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
+    /// let mut filter = sensor.filter().build_lagged(0.1)?;
+    /// assert_eq!(filter.step(0.00, 1600.0)?.len(), 0);
+    /// assert_eq!(filter.step(0.15, 1600.0)?.len(), 1);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn step(&mut self, time_s: f64, reading: impl Into<Reading>) -> Result<&[Estimate], Error> {
+        let (reading, scale, lag_s) = (reading.into(), self.kernel.scale, self.lag_s);
+        self.forget_handed_out();
+        self.waiting.push_back((time_s, reading));
+        let (waiting, due) = (&mut self.waiting, &mut self.due);
+        let mut out = |output| {
+            due.extend(waiting.pop_front().map(|(time_s, reading)| scale.row(time_s, reading, &output)));
+        };
+        let taken = self.kernel.filter.step_lagged(time_s, reading.relative(scale.rest_reading), lag_s, &mut out);
+        if taken.is_err() {
+            self.waiting.pop_back();
+        }
+        taken?;
+        self.are_out = true;
+        Ok(&self.due)
+    }
+
+    /// Hands out the rows that still wait, from all readings there are.
+    ///
+    /// # Errors
+    /// If a step backwards fails.
+    ///
+    /// ```
+    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+    /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
+    /// let mut filter = sensor.filter().build_lagged(1.0)?;
+    /// filter.step(0.0, 1600.0)?;
+    /// assert_eq!(filter.finish()?.len(), 1);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn finish(&mut self) -> Result<&[Estimate], Error> {
+        let scale = self.kernel.scale;
+        self.forget_handed_out();
+        let (waiting, due) = (&mut self.waiting, &mut self.due);
+        self.kernel.filter.flush_lagged(&mut |output| {
+            due.extend(waiting.pop_front().map(|(time_s, reading)| scale.row(time_s, reading, &output)));
+        })?;
+        self.are_out = true;
+        Ok(&self.due)
+    }
+
+    /// As [`Filter::rest_resistance`].
+    ///
+    /// # Errors
+    /// If it is not a positive number.
+    ///
+    /// ```
+    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+    /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
+    /// let mut filter = sensor.filter().build_lagged(0.5)?;
+    /// assert!(filter.rest_resistance(0.0).is_err());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn rest_resistance(&mut self, measured: f64) -> Result<(), Error> {
+        self.kernel.scale.rest_at(measured)
+    }
+
+    fn forget_handed_out(&mut self) {
+        if self.are_out {
+            self.due.clear();
+        }
+        self.are_out = false;
+    }
+}
+
+impl fmt::Debug for Filter {
+    fn fmt(&self, out: &mut fmt::Formatter) -> fmt::Result {
+        out.debug_struct("Filter").field("scale", &self.kernel.scale).finish_non_exhaustive()
+    }
+}
+
+impl fmt::Debug for LaggedFilter {
+    fn fmt(&self, out: &mut fmt::Formatter) -> fmt::Result {
+        let (scale, lag_s, waiting) = (&self.kernel.scale, &self.lag_s, &self.waiting.len());
+        let mut out = out.debug_struct("LaggedFilter");
+        out.field("scale", scale).field("lag_s", lag_s).field("waiting", waiting).finish_non_exhaustive()
+    }
+}

@@ -1,0 +1,143 @@
+use std::fmt;
+
+use serde::{Serialize, Serializer};
+
+/// What there is to say about an estimate beside its numbers.
+///
+/// ```
+/// use ohmstrain::{Flag, Flags};
+///
+/// let flags = Flags::NONE.with(Flag::AtLimit, true).with(Flag::Missing, true);
+/// assert!(flags.has(Flag::Missing) && !flags.has(Flag::Stuck));
+/// assert_eq!(flags.to_string(), "missing|at_limit");
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Flags(u16);
+
+/// One of the [`Flags`], in the order in which they are written.
+///
+/// ```
+/// assert_eq!(ohmstrain::Flag::RampBorder.name(), "ramp_border");
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Flag {
+    /// There was no reading.
+    Missing,
+    /// The converter stood at an end of its scale.
+    Saturated,
+    /// A gate, or the numbers, turned the reading down.
+    Rejected,
+    /// The reading was taken with less weight.
+    Downweighted,
+    /// Nothing that this sensor can read; it was not taken.
+    Implausible,
+    /// The same number for longer than in calibration; it was not taken.
+    Stuck,
+    /// Taken though beyond the gate, because too many in a row were turned down.
+    Readmitted,
+    /// At the present speed the reading stops telling the strain near here.
+    RampBorder,
+    /// The strain stands at a limit.
+    AtLimit,
+}
+
+impl Flag {
+    /// All of them.
+    ///
+    /// ```
+    /// assert_eq!(ohmstrain::Flag::ALL.len(), 9);
+    /// ```
+    pub const ALL: [Self; 9] = [
+        Self::Missing,
+        Self::Saturated,
+        Self::Rejected,
+        Self::Downweighted,
+        Self::Implausible,
+        Self::Stuck,
+        Self::Readmitted,
+        Self::RampBorder,
+        Self::AtLimit,
+    ];
+
+    /// Its name in `estimates.csv`.
+    ///
+    /// ```
+    /// assert_eq!(ohmstrain::Flag::AtLimit.name(), "at_limit");
+    /// ```
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Missing => "missing",
+            Self::Saturated => "saturated",
+            Self::Rejected => "rejected",
+            Self::Downweighted => "downweighted",
+            Self::Implausible => "implausible",
+            Self::Stuck => "stuck",
+            Self::Readmitted => "readmitted",
+            Self::RampBorder => "ramp_border",
+            Self::AtLimit => "at_limit",
+        }
+    }
+}
+
+impl Flags {
+    /// Nothing to say.
+    ///
+    /// ```
+    /// assert_eq!(ohmstrain::Flags::NONE.to_string(), "");
+    /// ```
+    pub const NONE: Self = Self(0);
+
+    /// With one more raised, if `raised`.
+    ///
+    /// ```
+    /// use ohmstrain::{Flag, Flags};
+    ///
+    /// assert_eq!(Flags::NONE.with(Flag::Stuck, false), Flags::NONE);
+    /// ```
+    #[must_use]
+    pub const fn with(self, flag: Flag, raised: bool) -> Self {
+        Self(self.0 | (raised as u16) << flag as u16)
+    }
+
+    /// Whether one is raised.
+    ///
+    /// ```
+    /// use ohmstrain::{Flag, Flags};
+    ///
+    /// assert!(Flags::NONE.with(Flag::Stuck, true).has(Flag::Stuck));
+    /// ```
+    #[must_use]
+    pub const fn has(self, flag: Flag) -> bool {
+        self.0 >> flag as u16 & 1 == 1
+    }
+
+    /// Names of those that are raised, in order.
+    ///
+    /// ```
+    /// use ohmstrain::{Flag, Flags};
+    ///
+    /// assert!(Flags::NONE.with(Flag::Stuck, true).names().eq(["stuck"]));
+    /// ```
+    pub fn names(self) -> impl Iterator<Item = &'static str> {
+        Flag::ALL.into_iter().filter(move |flag| self.has(*flag)).map(Flag::name)
+    }
+}
+
+/// As in `estimates.csv`: names joined by `|`.
+impl fmt::Display for Flags {
+    fn fmt(&self, out: &mut fmt::Formatter) -> fmt::Result {
+        for (k, name) in self.names().enumerate() {
+            out.write_str(if k == 0 { "" } else { "|" })?;
+            out.write_str(name)?;
+        }
+        Ok(())
+    }
+}
+
+impl Serialize for Flags {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}

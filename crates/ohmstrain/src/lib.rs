@@ -1,0 +1,65 @@
+//! From the resistance of a soft, stretchable strain sensor to strain, with an honest error bar.
+//!
+//! A [`Sensor`] is what a calibration knows: read from a `sensor.toml`, or made by [`calibrate`] of recordings with known
+//! strain. It makes a [`Filter`] for readings as they come, and smooths whole recordings; both say what they know in rows
+//! of plain numbers, [`Estimate`].
+//!
+//! ```
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let sensor = ohmstrain::Sensor::from_toml(&std::fs::read_to_string("examples/sensor.toml")?)?;
+//! let mut filter = sensor.filter().gate(10.8).build()?;
+//! for (time_s, ohm) in [(0.00, 1600.0), (0.05, 1632.0), (0.10, 1680.0)] {
+//!     let e = filter.step(time_s, ohm)?;
+//!     println!("{:.3} ± {:.3}", e.strain, e.strain_sd);
+//! }
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! # Policy
+//! - Knows slices and rows, not files. Readings are in the unit of the calibration, Ω or a ratio; strains are fractions.
+//! - What is read is checked: version, fields and the range of every number of a sensor, the unit of a recording.
+//! - An error leaves a filter as it was. A missing reading is none: NaN, `None`.
+//! - Deterministic: nothing is random but with a seed, no clock is read.
+
+mod builder;
+mod calibrate;
+mod column;
+mod error;
+mod estimate;
+mod filter;
+mod flags;
+mod reading;
+mod recording;
+mod sensor;
+mod text;
+mod unit_doubt;
+
+pub use builder::FilterBuilder;
+pub use calibrate::{Calibrated, Calibration, calibrate};
+pub use column::Column;
+pub use error::{Error, Place, TextCause, TextError};
+pub use estimate::Estimate;
+pub use filter::{Filter, LaggedFilter};
+pub use flags::{Flag, Flags};
+pub use reading::Reading;
+pub use recording::{Evaluation, Recording};
+pub use sensor::Sensor;
+pub use unit_doubt::{UnitDoubt, UnitGuess};
+
+#[doc(no_inline)]
+pub use ohmstrain_calib::{
+    CalibrationError, Distrusted, Doubt, EstimatorKind, FieldError, GaugeFamily, JointParams, Quantity, ReadingUnit,
+    SamplesError, Scores, SensorParams, Stage,
+};
+#[doc(no_inline)]
+pub use ohmstrain_ekf::{Influence, StepError};
+#[doc(no_inline)]
+pub use ohmstrain_model::ParameterError;
+
+/// Program and version, as written into files.
+///
+/// ```
+/// assert!(ohmstrain::MADE_BY.starts_with("ohmstrain "));
+/// ```
+pub const MADE_BY: &str = concat!("ohmstrain ", env!("CARGO_PKG_VERSION"));

@@ -1,0 +1,136 @@
+use ohmstrain_calib::{JointParams, Quantity, ReadingUnit, Samples, ScoredRow, Scores};
+
+use crate::{Error, Sensor};
+
+/// A recording with known strain, to calibrate on or to compare with.
+///
+/// ```
+/// use ohmstrain::Recording;
+///
+/// let recording = Recording::new(&[0.0, 0.1], &[1600.0, f64::NAN], &[0.00, 0.01])?;
+/// assert!(Recording::new(&[0.1, 0.0], &[1600.0, 1610.0], &[0.00, 0.01]).is_err());
+/// # Ok::<(), ohmstrain::Error>(())
+/// ```
+#[derive(Clone, Copy, Debug)]
+pub struct Recording<'a> {
+    pub(crate) samples: Samples<'a>,
+    pub(crate) reading: ReadingUnit,
+    pub(crate) quantity: Quantity,
+    pub(crate) joint: Option<JointParams>,
+}
+
+impl<'a> Recording<'a> {
+    /// Times, s, that increase; positive readings, Ω; and true strains, 0.1 for 10 %. NaN stands for a missing reading or
+    /// strain.
+    ///
+    /// # Errors
+    /// The first row that is not as it must be, or lengths that differ.
+    ///
+    /// ```
+    /// let (time_s, ohm, strain) = ([0.0, 0.1], [1600.0, 1610.0], [0.00, 0.01]);
+    /// let recording = ohmstrain::Recording::new(&time_s, &ohm, &strain)?;
+    /// # Ok::<(), ohmstrain::Error>(())
+    /// ```
+    pub fn new(time_s: &'a [f64], resistance: &'a [f64], strain: &'a [f64]) -> Result<Self, Error> {
+        let samples = Samples::new(time_s, resistance, strain)?;
+        Ok(Self { samples, reading: ReadingUnit::Ohm, quantity: Quantity::Strain, joint: None })
+    }
+
+    /// The readings are ratios to some resistance at rest.
+    ///
+    /// ```
+    /// let recording = ohmstrain::Recording::new(&[0.0, 0.1], &[1.00, 1.01], &[0.00, 0.01])?.of_ratios();
+    /// # Ok::<(), ohmstrain::Error>(())
+    /// ```
+    #[must_use]
+    pub const fn of_ratios(self) -> Self {
+        Self { reading: ReadingUnit::Ratio, ..self }
+    }
+
+    /// The reference is an angle in degrees, and an angle is what the sensor shall estimate.
+    ///
+    /// ```
+    /// let recording = ohmstrain::Recording::new(&[0.0, 0.1], &[1600.0, 1610.0], &[0.0, 3.5])?.of_angles_deg();
+    /// # Ok::<(), ohmstrain::Error>(())
+    /// ```
+    #[must_use]
+    pub const fn of_angles_deg(self) -> Self {
+        Self { quantity: Quantity::AngleDeg, ..self }
+    }
+
+    /// The sensor is glued across this joint.
+    ///
+    /// ```
+    /// use ohmstrain::{JointParams, Recording};
+    ///
+    /// let knee = JointParams { prestrain: 0.05, moment_arm_mm: 4.4, gauge_length_mm: 30.0 };
+    /// let recording = Recording::new(&[0.0, 0.1], &[1600.0, 1610.0], &[0.05, 0.06])?.on_joint(knee);
+    /// # Ok::<(), ohmstrain::Error>(())
+    /// ```
+    #[must_use]
+    pub const fn on_joint(self, joint: JointParams) -> Self {
+        Self { joint: Some(joint), ..self }
+    }
+}
+
+/// How good a sensor's estimates are on a recording; see [`Sensor::evaluate`].
+///
+/// ```
+/// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+/// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
+/// let recording = ohmstrain::Recording::new(&[0.0, 0.1, 0.2], &[1600.0, 1610.0, 1620.0], &[0.00, 0.01, 0.02])?;
+/// if let Some(found) = sensor.evaluate(&recording)? {
+///     println!("{:.1} %FS, without relaxation {:.1}", found.filter.rmse_percent_fs, found.static_cubic.rmse_percent_fs);
+/// }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Evaluation {
+    /// The filter's.
+    pub filter: Scores,
+    /// The smoother's.
+    pub smoother: Scores,
+    /// Those of strain as a cubic polynomial of the reading.
+    pub static_cubic: Scores,
+}
+
+impl Sensor {
+    /// Filters and smooths a recording, without looking at its strain, and compares; `None` if it has no known strain.
+    ///
+    /// # Errors
+    /// As [`Sensor::smooth`]; or if the recording is of another quantity or unit than the calibration.
+    ///
+    /// ```
+    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+    /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
+    /// use ohmstrain::Recording;
+    ///
+    /// let recording = Recording::new(&[0.0, 0.1, 0.2], &[1600.0, 1610.0, 1620.0], &[0.00, 0.01, 0.02])?;
+    /// let found = sensor.evaluate(&recording)?.unwrap();
+    /// assert_eq!(found.filter.n, 3);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn evaluate(&self, recording: &Recording) -> Result<Option<Evaluation>, Error> {
+        let (samples, params) = (&recording.samples, self.params());
+        if (recording.reading, recording.quantity) != (params.reading, params.quantity) {
+            return Err(Error::OtherQuantity);
+        }
+        let (time_s, readings) = (samples.time_s(), samples.reading());
+        let smoothed = self.smooth(time_s, readings)?;
+        let mut filter = self.filter().build()?;
+        let mut cubic = params.static_cubic.start();
+        let (mut filter_rows, mut smoother_rows, mut cubic_rows) = (Vec::new(), Vec::new(), Vec::new());
+        for (row, smoothed) in smoothed.iter().enumerate() {
+            let (time_s, reading, truth) = (time_s[row], readings[row], samples.strain()[row]);
+            let filtered = filter.step(time_s, reading)?;
+            let scored = |strain, sd| ScoredRow { time_s, truth, strain, sd };
+            filter_rows.push(scored(filtered.strain, Some(filtered.strain_sd)));
+            smoother_rows.push(scored(smoothed.strain, Some(smoothed.strain_sd)));
+            cubic_rows.push(scored(ohmstrain_calib::Baseline::strain(&mut cubic, time_s, reading), None));
+        }
+        let scores = (Scores::new(&filter_rows), Scores::new(&smoother_rows), Scores::new(&cubic_rows));
+        let (Some(filter), Some(smoother), Some(static_cubic)) = scores else { return Ok(None) };
+        Ok(Some(Evaluation { filter, smoother, static_cubic }))
+    }
+}

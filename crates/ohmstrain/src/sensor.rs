@@ -1,0 +1,210 @@
+use ohmstrain_calib::{EstimatorKind, JointParams, Quantity, SensorParams, Start, build_filter};
+use ohmstrain_model::Joint;
+
+use crate::column::Header;
+use crate::text;
+use crate::{Column, Error, Estimate, FilterBuilder, UnitDoubt};
+
+/// A calibrated sensor, checked: every number is in its range, and a filter can be made of it.
+///
+/// ```
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let sensor = ohmstrain::Sensor::from_toml(&std::fs::read_to_string("examples/sensor.toml")?)?;
+/// assert_eq!(sensor.params().default_estimator.name(), "sign-split");
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sensor {
+    params: SensorParams,
+}
+
+impl Sensor {
+    /// Reads the text of a `sensor.toml`.
+    ///
+    /// # Errors
+    /// With line and column if it is no TOML, of another version, has a field that is unknown or missing or a number that
+    /// no sensor can have; or if no filter can be made of its default estimator.
+    ///
+    /// ```
+    /// let text = std::fs::read_to_string("examples/sensor.toml")?;
+    /// let sensor = ohmstrain::Sensor::from_toml(&text)?;
+    /// let wrong = text.replace("rest_reading = 1", "rest_reading = -1");
+    /// assert!(ohmstrain::Sensor::from_toml(&wrong).unwrap_err().to_string().contains("column"));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn from_toml(text: &str) -> Result<Self, Error> {
+        Self::from_params(text::parse(text)?)
+    }
+
+    /// The same for use with one estimator, whatever the text's default is.
+    ///
+    /// # Errors
+    /// As [`Self::from_toml`], for that estimator.
+    ///
+    /// ```
+    /// use ohmstrain::{EstimatorKind, Sensor};
+    ///
+    /// let text = std::fs::read_to_string("examples/sensor.toml")?;
+    /// let sensor = Sensor::from_toml_for(&text, EstimatorKind::Ekf)?;
+    /// assert!(Sensor::from_toml_for(&text, EstimatorKind::Ukf).is_err());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn from_toml_for(text: &str, estimator: EstimatorKind) -> Result<Self, Error> {
+        let params = text::parse(text)?;
+        build_filter(&params, Some(estimator), Start::Unknown)?;
+        Ok(Self { params })
+    }
+
+    /// A sensor with these parameters.
+    ///
+    /// # Errors
+    /// Names the first number that is out of its range; or if no filter can be made of the default estimator.
+    ///
+    /// ```
+    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+    /// use ohmstrain::Sensor;
+    ///
+    /// let mut params = Sensor::from_toml(&text)?.params().clone();
+    /// params.limits.upper = f64::NAN;
+    /// assert!(Sensor::from_params(params).unwrap_err().to_string().contains("limits.upper"));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn from_params(params: SensorParams) -> Result<Self, Error> {
+        build_filter(&params, None, Start::Unknown)?;
+        Ok(Self { params })
+    }
+
+    /// The text of its `sensor.toml`: what [`Self::from_toml`] reads.
+    ///
+    /// # Errors
+    /// If TOML cannot hold a number.
+    ///
+    /// ```
+    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+    /// use ohmstrain::Sensor;
+    ///
+    /// let sensor = Sensor::from_toml(&text)?;
+    /// assert_eq!(Sensor::from_toml(&sensor.to_toml()?)?, sensor);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn to_toml(&self) -> Result<String, Error> {
+        self.params.validate().map_err(ohmstrain_calib::CalibrationError::from)?;
+        Ok(toml::to_string(&self.params)?)
+    }
+
+    /// All its numbers.
+    ///
+    /// ```
+    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+    /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
+    /// println!("{} branches", sensor.params().law.branches.len());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub const fn params(&self) -> &SensorParams {
+        &self.params
+    }
+
+    /// The sensor glued across a joint: estimates then have an angle, too. A sensor that was calibrated in degrees needs
+    /// no joint and stays as it is.
+    ///
+    /// # Errors
+    /// If no sensor can sit on that joint.
+    ///
+    /// ```
+    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+    /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
+    /// use ohmstrain::JointParams;
+    ///
+    /// let knee = JointParams { prestrain: 0.05, moment_arm_mm: 4.4, gauge_length_mm: 30.0 };
+    /// let mut filter = sensor.on_joint(knee)?.filter().build()?;
+    /// assert!(filter.step(0.0, 1600.0)?.angle_deg.is_some());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn on_joint(mut self, joint: JointParams) -> Result<Self, Error> {
+        if self.params.quantity == Quantity::Strain {
+            self.params.joint = Some(joint);
+        }
+        self.joint()?;
+        Ok(self)
+    }
+
+    /// The joint that it sits on, if there is one.
+    pub(crate) fn joint(&self) -> Result<Option<Joint<f64>>, Error> {
+        let joint = |joint: JointParams| Joint::new(joint.prestrain, joint.moment_arm_mm, joint.gauge_length_mm);
+        self.params.joint.map(joint).transpose().map_err(Error::Joint)
+    }
+
+    /// A filter to be set up and built.
+    ///
+    /// ```
+    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+    /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
+    /// let mut filter = sensor.filter().gate(10.8).build()?;
+    /// for (time_s, ohm) in [(0.00, 1600.0), (0.05, 1632.0), (0.10, f64::NAN)] {
+    ///     let e = filter.step(time_s, ohm)?;
+    ///     println!("{:.3} ± {:.3}", e.strain, e.strain_sd);
+    /// }
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub const fn filter(&self) -> FilterBuilder<'_> {
+        FilterBuilder::new(self)
+    }
+
+    /// Estimates of a whole recording, each from all readings; NaN stands for a missing one. See
+    /// [`FilterBuilder::smooth`] for more choice.
+    ///
+    /// # Errors
+    /// If the slices differ in length, a time or a reading cannot be taken, or the readings seem to be in another unit than
+    /// the calibration's.
+    ///
+    /// ```
+    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+    /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
+    /// let rows = sensor.smooth(&[0.00, 0.05, 0.10], &[1600.0, f64::NAN, 1660.0])?;
+    /// assert!(rows[1].flags.has(ohmstrain::Flag::Missing));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn smooth(&self, time_s: &[f64], readings: &[f64]) -> Result<Vec<Estimate>, Error> {
+        self.filter().smooth(time_s, readings)
+    }
+
+    /// The columns of its `estimates.csv`, in order.
+    ///
+    /// ```
+    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+    /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
+    /// let names: Vec<&str> = sensor.columns().iter().map(|column| column.name()).collect();
+    /// assert_eq!(names[..4], ["time_s", "resistance_ohm", "strain", "strain_sd"]);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn columns(&self) -> Vec<Column> {
+        Header::of(&self.params).columns().collect()
+    }
+
+    /// Asks whether readings are in the calibration's unit, by their median. `rest_resistance` is what the rested sensor
+    /// reads now, if it is not what it read in calibration.
+    ///
+    /// # Errors
+    /// If they are far from those of the calibration, and would not be in another unit.
+    ///
+    /// ```
+    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+    /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
+    /// sensor.check_unit([1600.0, 1632.0], None)?;
+    /// let doubt = sensor.check_unit([1.600, 1.632], None).unwrap_err();
+    /// assert!(doubt.to_string().ends_with("a thousandth of that: are they in kilo-ohms?"));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn check_unit(
+        &self,
+        readings: impl IntoIterator<Item = f64>,
+        rest_resistance: Option<f64>,
+    ) -> Result<(), UnitDoubt> {
+        let rest = rest_resistance.map_or(self.params.rest_reading, |measured| self.params.rest_reading_of(measured));
+        UnitDoubt::of(&self.params, rest, readings.into_iter()).map_or(Ok(()), Err)
+    }
+}

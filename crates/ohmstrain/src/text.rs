@@ -1,0 +1,58 @@
+//! `sensor.toml` as text: in, with the place of what is wrong, and out.
+
+use ohmstrain_calib::{FORMAT, SensorParams};
+use serde::Deserialize;
+use toml::de::{DeArray, DeTable};
+
+use crate::error::{Place, TextCause, TextError};
+
+/// The one field that every version of the format has.
+#[derive(Deserialize)]
+struct Version {
+    format: u32,
+}
+
+/// Parameters of which every number is in its range.
+pub(crate) fn parse(text: &str) -> Result<SensorParams, TextError> {
+    let no_toml = |error: toml::de::Error| TextError {
+        place: error.span().map(|span| position(text, span.start)),
+        cause: TextCause::Toml(error),
+    };
+    let Version { format } = toml::from_str(text).map_err(no_toml)?;
+    if format != FORMAT {
+        let line = text.lines().position(|line| line.trim_start().starts_with("format")).map_or(1, |line| line + 1);
+        let place = Some(Place { line, column: None });
+        return Err(TextError { place, cause: TextCause::Format { found: format } });
+    }
+    let params: SensorParams = toml::from_str(text).map_err(no_toml)?;
+    match params.validate() {
+        Ok(()) => Ok(params),
+        Err(error) => Err(TextError { place: place_of(text, &error.field), cause: TextCause::Field(error) }),
+    }
+}
+
+/// Where a field, `law.branches[0].tau_s`, stands, or the nearest table above it that the text has.
+fn place_of(text: &str, field: &str) -> Option<Place> {
+    let document = DeTable::parse(text).ok()?;
+    let mut start = None;
+    let mut table = Some(document.get_ref());
+    let mut array: Option<&DeArray> = None;
+    for step in field.split(['.', '[']) {
+        let found = match step.strip_suffix(']') {
+            Some(index) => array.and_then(|array| array.get(index.parse::<usize>().ok()?)),
+            None => table.and_then(|table| table.get(step)),
+        };
+        let Some(found) = found else { break };
+        start = Some(found.span().start);
+        (table, array) = (found.get_ref().as_table(), found.get_ref().as_array());
+    }
+    start.map(|start| position(text, start))
+}
+
+/// Line and column of a byte.
+fn position(text: &str, start: usize) -> Place {
+    let before = text.get(..start).unwrap_or("");
+    let line = before.matches('\n').count() + 1;
+    let column = before.rsplit('\n').next().unwrap_or("").chars().count() + 1;
+    Place { line, column: Some(column) }
+}

@@ -1,0 +1,99 @@
+use std::fmt;
+
+use ohmstrain_calib::{ReadingUnit, SensorParams};
+
+/// Readings may go this far beyond those of the calibration, and in another unit they would not: sensors of one kind differ
+/// by less, units by more.
+const READINGS_BEYOND: f64 = 2.0;
+
+/// Readings that seem to be in another unit than the calibration's; see [`Sensor::check_unit`](crate::Sensor::check_unit).
+///
+/// ```
+/// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+/// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
+/// use ohmstrain::UnitGuess;
+///
+/// let doubt = sensor.check_unit([1.600, 1.632], None).unwrap_err();
+/// assert_eq!((doubt.column, doubt.guess), ("resistance_ohm", UnitGuess::KiloOhm));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct UnitDoubt {
+    /// Name of the readings' column, with their unit.
+    pub column: &'static str,
+    /// Least and largest reading of the calibration, moved to the R₀ in use.
+    pub expected: (f64, f64),
+    /// That R₀, where it is not the calibration's.
+    pub rest_reading: Option<f64>,
+    /// Median of the readings.
+    pub median: f64,
+    /// What they may be.
+    pub guess: UnitGuess,
+}
+
+/// What readings may be that are in the wrong unit.
+///
+/// ```
+/// assert!(ohmstrain::UnitGuess::Percent.to_string().ends_with("are they in percent?"));
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum UnitGuess {
+    /// kΩ in place of Ω.
+    KiloOhm,
+    /// MΩ in place of Ω.
+    MegaOhm,
+    /// R₀, or the calibration, is in kΩ.
+    RestInKiloOhm,
+    /// Percent in place of ratios.
+    Percent,
+}
+
+impl UnitDoubt {
+    /// `None` if the readings are near those of the calibration, or far from them in a way that no unit explains.
+    pub(crate) fn of(params: &SensorParams, rest: f64, readings: impl Iterator<Item = f64>) -> Option<Self> {
+        let median = quantile(readings, 0.5)?;
+        let moved = rest / params.rest_reading;
+        let (low, high) = (moved * params.validity.reading_lower, moved * params.validity.reading_upper);
+        let suits = |reading: f64| (low / READINGS_BEYOND..=high * READINGS_BEYOND).contains(&reading);
+        let guesses: &[(f64, UnitGuess)] = match params.reading {
+            ReadingUnit::Ohm => {
+                &[(1e3, UnitGuess::KiloOhm), (1e6, UnitGuess::MegaOhm), (1e-3, UnitGuess::RestInKiloOhm)]
+            }
+            ReadingUnit::Ratio => &[(1e-2, UnitGuess::Percent)],
+        };
+        let (_, guess) = guesses.iter().find(|(factor, _)| !suits(median) && suits(factor * median))?;
+        let column = crate::column::reading_column(params.reading);
+        let rest_reading = Some(rest).filter(|_| moved != 1.0);
+        Some(Self { column, expected: (low, high), rest_reading, median, guess: *guess })
+    }
+}
+
+impl fmt::Display for UnitDoubt {
+    fn fmt(&self, out: &mut fmt::Formatter) -> fmt::Result {
+        let Self { column, expected: (low, high), median, guess, .. } = self;
+        write!(out, "column `{column}`: expected readings of {low:.5} to {high:.5}, as in the calibration")?;
+        self.rest_reading.map_or(Ok(()), |rest| write!(out, " with R0 = {rest:.5}"))?;
+        write!(out, ", found {median:.5} at the median, {guess}")
+    }
+}
+
+impl std::error::Error for UnitDoubt {}
+
+impl fmt::Display for UnitGuess {
+    fn fmt(&self, out: &mut fmt::Formatter) -> fmt::Result {
+        out.write_str(match self {
+            Self::KiloOhm => "a thousandth of that: are they in kilo-ohms?",
+            Self::MegaOhm => "a millionth of that: are they in mega-ohms?",
+            Self::RestInKiloOhm => "a thousand times that: is R0, or the calibration, in kilo-ohms?",
+            Self::Percent => "a hundred times that: are they in percent?",
+        })
+    }
+}
+
+/// The value that a share of the known ones is below; `None` if none is known.
+pub(crate) fn quantile(values: impl Iterator<Item = f64>, share: f64) -> Option<f64> {
+    let mut known: Vec<f64> = values.filter(|value| value.is_finite()).collect();
+    let rank = (share * known.len().checked_sub(1)? as f64) as usize;
+    Some(*known.select_nth_unstable_by(rank, f64::total_cmp).1)
+}
