@@ -7,6 +7,7 @@ use crate::correction_fit::fit_correction;
 use crate::correction_params::CorrectionParams;
 use crate::estimator_params::{EstimatorKind, EstimatorParams};
 use crate::filter::Start;
+use crate::findings::{Check, Findings, Seen};
 use crate::identifiability::identifiability;
 use crate::law_fit::{CrossFit, LawOptions, fit_laws};
 use crate::law_params::LawParams;
@@ -31,6 +32,8 @@ pub enum Stage {
         /// Evaluations expected.
         expected: u64,
     },
+    /// Estimating every quarter of the recordings with what was fitted to the others.
+    LeftOut,
 }
 
 /// A calibrated sensor, before it is written down.
@@ -61,6 +64,8 @@ pub struct Calibration {
     pub validity: Validity,
     /// The static inverse fitted to the same rows.
     pub static_cubic: StaticCubic,
+    /// What it is worth on parts that it was not fitted to; `None` if they cannot be estimated.
+    pub findings: Option<Findings>,
 }
 
 impl Calibration {
@@ -165,11 +170,18 @@ pub fn calibrate(
     let corrects = kinds.contains(&EstimatorKind::Corrected);
     let correction = if corrects { correction(recordings, fit, &estimators)? } else { None };
     let default_estimator = if correction.is_some() { Some(EstimatorKind::Corrected) } else { best };
+    let default_estimator = default_estimator.unwrap_or(EstimatorKind::Ekf);
     let limits = fit.law.law.range;
+    progress(Stage::LeftOut);
+    let identifiability = identifiability(recordings, &fit.law.law).ok();
+    let seen = Seen::new(recordings, limits, &stats);
+    let findings =
+        Check { recordings, fit, kind: default_estimator, estimators: &estimators }.findings(seen, &identifiability);
     let (reading_lower, reading_upper) = reading_range(recordings);
     Ok(Calibration {
         distrusted: screened.distrusted.clone(),
-        default_estimator: default_estimator.unwrap_or(EstimatorKind::Ekf),
+        default_estimator,
+        findings,
         estimators,
         correction,
         static_cubic: StaticCubic::fit(recordings, limits)?,
@@ -184,7 +196,7 @@ pub fn calibrate(
         },
         limits,
         law_error: fit.law.cross_validated_error,
-        uncertainty: identifiability(recordings, &fit.law.law).ok().map(|found| found.told()),
+        uncertainty: identifiability.map(|found| found.told()),
         rest_share: rest_share(recordings, &fit.law.rest_readings, limits.span()),
         rest_readings: fit.law.rest_readings.clone(),
         law: fit.law.law.clone(),

@@ -122,6 +122,6 @@ impl<'a> LeftOut<'a> {
 }
 
 /// Readings over R₀ minus 1; `None` where missing.
-fn relative_changes(reading: &[f64], rest_reading: f64) -> Vec<Option<Reading<f64>>> {
+pub(crate) fn relative_changes(reading: &[f64], rest_reading: f64) -> Vec<Option<Reading<f64>>> {
     reading.iter().map(|r| r.is_finite().then(|| Reading::from(r / rest_reading - 1.0))).collect()
 }

@@ -77,7 +77,7 @@ struct PhaseDurations {
 }
 
 /// Below this share of the fast rates (90th percentile) a body is at rest.
-const REST_SHARE: f64 = 0.05;
+pub(crate) const REST_SHARE: f64 = 0.05;
 /// A phase of fewer rows is a flicker.
 const FEWEST_PHASE_ROWS: usize = 2;
 
@@ -134,6 +134,6 @@ pub(crate) fn root_mean_square(x: &[f64]) -> f64 {
     (x.iter().map(|x| x * x).sum::<f64>() / x.len() as f64).sqrt()
 }
 
-fn moving_mean(x: &[f64]) -> Vec<f64> {
+pub(crate) fn moving_mean(x: &[f64]) -> Vec<f64> {
     (0..x.len()).map(|k| mean(&x[k.saturating_sub(HALF_WINDOW)..(k + HALF_WINDOW + 1).min(x.len())])).collect()
 }

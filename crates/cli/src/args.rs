@@ -177,6 +177,9 @@ pub struct CalibrateArgs {
     /// Print 95 % intervals of the law's parameters from N fits to blocks of the recordings drawn anew
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=100_000))]
     pub bootstrap: Option<u32>,
+    /// Print what the calibration came to as JSON
+    #[arg(long, conflicts_with_all = ["explain", "bootstrap"])]
+    pub json: bool,
     /// Also write a report of the first recording
     #[arg(long, value_name = "report.html")]
     pub report: Option<PathBuf>,

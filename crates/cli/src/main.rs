@@ -20,6 +20,7 @@ mod run;
 mod sensor_file;
 mod suits;
 mod validity;
+mod verdict;
 
 use std::process::ExitCode;
 

@@ -25,6 +25,7 @@ impl Progress {
     /// Shows where a calibration is.
     pub fn calibrating(&self, stage: Stage) {
         match stage {
+            Stage::LeftOut => self.bar.set_message("checking parts left out"),
             Stage::Law => self.bar.set_message("fitting the law"),
             Stage::Noise { done, expected } => {
                 if done == 1 {

@@ -1,9 +1,13 @@
+use std::io;
 use std::path::Path;
+use std::time::Instant;
 
 use ohmstrain_calib::{
-    EstimatorKind, LawOptions, Quantity, RECIPE, ReadingUnit, RecordingInfo, Samples, SensorParams, calibrate, screen,
+    EstimatorKind, Findings, LawOptions, Quantity, RECIPE, ReadingUnit, RecordingInfo, Samples, SensorParams,
+    calibrate, screen,
 };
 
+use super::closing::Closing;
 use super::{explain, scoring};
 use crate::alignment;
 use crate::args::CalibrateArgs;
@@ -34,14 +38,32 @@ pub fn run(args: &CalibrateArgs) -> Result<(), CliError> {
     }
     let estimator = args.estimator.chosen().map_or(RECIPE.estimator, |estimator| estimator.0);
     let structures = structures(args, estimator);
-    let params = calibrate_recordings(&recordings, &structures, estimator, &Progress::new("calibrating"))?;
+    let start = Instant::now();
+    let progress = Progress::new("calibrating");
+    let Calibrated { params, findings } = calibrate_recordings(&recordings, &structures, estimator, &progress)?;
+    drop(progress);
+    let calibration_s = start.elapsed().as_secs_f64();
     outputs.put(sensor_output, sensor_file::text(&params)?);
     if let Some(output) = report_output {
         outputs.put(output, report(&recordings[0], &params, None)?);
     }
     let explained = explain::text(args, &recordings, &params.law)?;
     outputs.publish()?;
-    print(|out| Ok(out.write_all(explained.as_bytes())?))
+    let file = args.output.display().to_string();
+    let closing = Closing { file: &file, params: &params, findings: findings.as_ref(), calibration_s };
+    let said = if args.json { closing.json().map_err(io::Error::from)? } else { closing.text().into_bytes() };
+    print(|out| {
+        out.write_all(explained.as_bytes())?;
+        Ok(out.write_all(&said)?)
+    })
+}
+
+/// What comes of a calibration.
+pub struct Calibrated {
+    /// The sensor.
+    pub params: SensorParams,
+    /// What it is worth; `None` if that could not be told.
+    pub findings: Option<Findings>,
 }
 
 /// What the flags leave to choose from.
@@ -64,7 +86,7 @@ pub fn calibrate_recordings(
     structures: &[LawOptions],
     estimator: EstimatorKind,
     progress: &Progress,
-) -> Result<SensorParams, CliError> {
+) -> Result<Calibrated, CliError> {
     let samples: Vec<Samples> = recordings.iter().map(Recording::samples).collect::<Result<_, _>>()?;
     let (quantity, reading) = common_units(recordings)?;
     let names: Vec<&str> = recordings.iter().map(|recording| recording.name.as_str()).collect();
@@ -72,7 +94,7 @@ pub fn calibrate_recordings(
     plausible::warn_of_copies(recordings);
     plausible::check(recordings, &screened)?;
     plausible::warn_of_distrusted(recordings, &screened.distrusted);
-    let calibration = calibrate(&screened.samples(), structures, &[estimator], |stage| progress.calibrating(stage))
+    let mut calibration = calibrate(&screened.samples(), structures, &[estimator], |stage| progress.calibrating(stage))
         .map_err(|error| CliError::calibration(&names, &error))?;
     let info = |(recording, rest_reading): (&Recording, &f64)| RecordingInfo {
         file: file_name(&recording.name),
@@ -81,11 +103,12 @@ pub fn calibrate_recordings(
         rest_reading: *rest_reading,
     };
     let infos = recordings.iter().zip(&calibration.rest_readings).map(info).collect();
+    let findings = calibration.findings.take();
     let sensor = calibration.into_sensor(MADE_BY, quantity, reading);
     let sensor = SensorParams { joint: recordings.iter().find_map(Recording::joint), recordings: infos, ..sensor };
     plausible::warn_of_rests(recordings, &sensor);
     plausible::warn_of_intervals(&sensor);
-    Ok(sensor)
+    Ok(Calibrated { params: sensor, findings })
 }
 
 /// Paths are the machine's own business; the name says which recording it was.

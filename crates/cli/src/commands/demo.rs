@@ -1,7 +1,7 @@
 use ohmstrain_bench_data::simulate::{Material, Protocol, SimulationSettings};
 use ohmstrain_calib::{LawOptions, Output, RECIPE, SensorParams};
 
-use super::calibrate::{calibrate_recordings, report};
+use super::calibrate::{Calibrated, calibrate_recordings, report};
 use super::score_table::{add_scores, score_table};
 use super::smooth::write_estimates;
 use super::{scoring, simulate};
@@ -37,7 +37,8 @@ pub fn run(args: &DemoArgs) -> Result<(), CliError> {
     let training = recording.rows(0..middle);
     let estimator = RECIPE.estimator;
     let structures = LawOptions::candidates(estimator);
-    let params = calibrate_recordings(std::slice::from_ref(&training), structures, estimator, &progress)?;
+    let Calibrated { params, .. } =
+        calibrate_recordings(std::slice::from_ref(&training), structures, estimator, &progress)?;
     outputs.put(sensor_output, sensor_file::text(&params)?);
 
     progress.doing("filtering and smoothing");

@@ -1,6 +1,7 @@
 //! One file per command.
 
 mod calibrate;
+mod closing;
 mod demo;
 mod evaluate;
 mod explain;

@@ -5,7 +5,7 @@ use ohmstrain_calib::{Baselines, EstimatorKind, LawOptions, RECIPE, SensorParams
 
 use super::evaluation::{BaselineScores, LearnedScores, RecordingScores};
 use crate::args::{Estimators, RestResistance};
-use crate::commands::calibrate::calibrate_recordings;
+use crate::commands::calibrate::{Calibrated, calibrate_recordings};
 use crate::commands::scoring::{self, Part};
 use crate::error::CliError;
 use crate::input::Recording;
@@ -64,7 +64,8 @@ impl Sensor {
         let wanted = distinct(wanted.into_iter().map(|kind| if corrects { kind } else { kind.filter() }));
         let calibrate = |kind| {
             let start = Instant::now();
-            let params = calibrate_recordings(training, LawOptions::candidates(kind), kind, progress)?;
+            let Calibrated { params, .. } =
+                calibrate_recordings(training, LawOptions::candidates(kind), kind, progress)?;
             let calibration_s = Some(start.elapsed().as_secs_f64());
             let kind = params.default_estimator;
             let part = Self { params: params.clone(), kind: kind.filter(), calibration_s, is_part: true };
