@@ -180,15 +180,26 @@ pub struct CalibrateArgs {
     /// Print what the calibration came to as JSON
     #[arg(long, conflicts_with_all = ["explain", "bootstrap"])]
     pub json: bool,
-    /// Also write a report of the first recording
-    #[arg(long, value_name = "report.html")]
-    pub report: Option<PathBuf>,
+    /// Report and figures, of the first recording
+    #[command(flatten)]
+    pub report: ReportArgs,
     /// Replace files that this program did not write, too
     #[arg(long)]
     pub force: bool,
     /// Overrides of the recordings' metadata
     #[command(flatten)]
     pub trace: TraceArgs,
+}
+
+/// Pictures of a recording and its estimates.
+#[derive(Debug, Default, ClapArgs)]
+pub struct ReportArgs {
+    /// Also write a report of the first recording
+    #[arg(long, value_name = "report.html")]
+    pub report: Option<PathBuf>,
+    /// Also write every plot of that report as SVG, with what is drawn as CSV, to this folder
+    #[arg(long, value_name = "DIR")]
+    pub figures: Option<PathBuf>,
 }
 
 /// Flags that `filter` and `smooth` share.

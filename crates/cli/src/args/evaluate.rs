@@ -4,7 +4,7 @@ use std::str::FromStr;
 use clap::Args as ClapArgs;
 use ohmstrain_calib::EstimatorKind;
 
-use super::{Estimator, RestResistance, Split, TraceArgs, finite};
+use super::{Estimator, ReportArgs, RestResistance, Split, TraceArgs, finite};
 
 /// Flags of `evaluate`.
 #[derive(Debug, ClapArgs)]
@@ -36,12 +36,27 @@ pub struct EvaluateArgs {
     /// 80 % or more
     #[arg(long)]
     pub check: bool,
+    /// Report and figures, of the first recording and the first estimator; the rows that are scored are marked
+    #[command(flatten)]
+    pub report: ReportArgs,
+    /// Replace files that this program did not write, too
+    #[arg(long)]
+    pub force: bool,
     /// Print JSON
     #[arg(long)]
     pub json: bool,
     /// Overrides of the recordings' metadata
     #[command(flatten)]
     pub trace: TraceArgs,
+}
+
+impl EvaluateArgs {
+    /// Whether this recording is to be drawn: the first one, if anything is.
+    pub fn draws(&self, name: &str) -> bool {
+        let first = self.traces.first().or(self.test.first());
+        let is_first = first.is_some_and(|first| first.display().to_string() == name);
+        is_first && (self.report.report.is_some() || self.report.figures.is_some())
+    }
 }
 
 /// Where `evaluate` takes the calibration from: exactly one of these.

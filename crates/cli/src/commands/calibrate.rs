@@ -8,7 +8,9 @@ use ohmstrain_calib::{
 };
 
 use super::closing::Closing;
-use super::{explain, scoring};
+use super::explain;
+use super::reporting::{Reporting, Wanted};
+use super::scoring::Part;
 use crate::alignment;
 use crate::args::CalibrateArgs;
 use crate::error::CliError;
@@ -16,15 +18,14 @@ use crate::input::{self, Recording, unit};
 use crate::output::{Kind, Outputs, print};
 use crate::plausible;
 use crate::progress::Progress;
-use crate::report::{ReportInput, ScoreRow, render};
-use crate::run::estimate;
+use crate::report::Sample;
 use crate::sensor_file::{self, MADE_BY};
 
 /// Calibrates a sensor on recordings and writes its parameters.
 pub fn run(args: &CalibrateArgs) -> Result<(), CliError> {
     let mut outputs = Outputs::new(args.force, &args.traces);
     let sensor_output = outputs.claim(&args.output, Kind::Sensor)?;
-    let report_output = args.report.as_deref().map(|path| outputs.claim(path, Kind::Report)).transpose()?;
+    let wanted = Wanted::claim(&args.report, &mut outputs)?;
     let overrides = args.trace.metadata();
     let mut recordings = Vec::new();
     for path in &args.traces {
@@ -44,13 +45,16 @@ pub fn run(args: &CalibrateArgs) -> Result<(), CliError> {
     drop(progress);
     let calibration_s = start.elapsed().as_secs_f64();
     outputs.put(sensor_output, sensor_file::text(&params)?);
-    if let Some(output) = report_output {
-        outputs.put(output, report(&recordings[0], &params, None)?);
+    let file = args.output.display().to_string();
+    let closing = Closing { file: &file, params: &params, findings: findings.as_ref(), calibration_s };
+    if let Some(wanted) = wanted {
+        let (facts, rest_reading) = (closing.facts(), params.rest_reading);
+        let (recording, part, sample) = (&recordings[0], Part::default(), Sample::In);
+        let reporting = Reporting { recording, params: &params, kind: None, rest_reading, part, sample, facts: &facts };
+        wanted.put(reporting.drawn()?, &mut outputs)?;
     }
     let explained = explain::text(args, &recordings, &params.law)?;
     outputs.publish()?;
-    let file = args.output.display().to_string();
-    let closing = Closing { file: &file, params: &params, findings: findings.as_ref(), calibration_s };
     let said = if args.json { closing.json().map_err(io::Error::from)? } else { closing.text().into_bytes() };
     print(|out| {
         out.write_all(explained.as_bytes())?;
@@ -125,40 +129,4 @@ fn common_units(recordings: &[Recording]) -> Result<(Quantity, ReadingUnit), Cli
         recording.check_quantity(quantity)?;
     }
     Ok((quantity, reading))
-}
-
-/// A report of a recording; scores are about the rows from `scored_from_s` on.
-pub fn report(recording: &Recording, params: &SensorParams, scored_from_s: Option<f64>) -> Result<String, CliError> {
-    let estimated = estimate(recording, params, params.rest_reading, None)?;
-    let part = scoring::Part::since(scored_from_s);
-    let filter = scoring::of_outputs(recording, &estimated.filtered, part);
-    let smoother = scoring::of_outputs(recording, &estimated.smoothed, part);
-    let cubic = scoring::of_baseline(recording, params.static_cubic.start(), part, 1.0);
-    let scores: Vec<ScoreRow> = [("filter", filter), ("smoother", smoother), ("static cubic", cubic)]
-        .into_iter()
-        .filter_map(|(name, scores)| {
-            scores.map(|scores| ScoreRow {
-                name,
-                rmse: scores.rmse,
-                rmse_percent_fs: scores.rmse_percent_fs,
-                coverage_95: scores.coverage_95,
-                width_95_percent_fs: scores.width_95_percent_fs,
-                crps_percent_fs: scores.crps_percent_fs,
-            })
-        })
-        .collect();
-    let input = ReportInput {
-        title: &file_name(&recording.name),
-        made_by: MADE_BY,
-        time_s: &recording.trace.time_s,
-        reading: &recording.trace.readings.values,
-        truth: recording.trace.reference.as_ref().map(|reference| reference.values.as_slice()),
-        filtered: &estimated.filtered,
-        smoothed: &estimated.smoothed,
-        params,
-        rest_reading: params.rest_reading,
-        scored_from_s,
-        scores: &scores,
-    };
-    render(&input).map_err(|error| CliError::Other(error.to_string()))
 }

@@ -68,6 +68,18 @@ impl Closing<'_> {
         Ok(bytes)
     }
 
+    /// What a report says of the calibration.
+    pub fn facts(&self) -> Vec<(&'static str, String)> {
+        let Some(found) = self.findings else { return vec![] };
+        let next = if found.advice.is_empty() { advice(&found.advice) } else { found.advice.join("; ") };
+        vec![
+            ("Left out", error_and_coverage(found)),
+            ("Seen", seen(&found.seen, self.params.quantity)),
+            ("Limited by", limited_by(found)),
+            ("Record next", next),
+        ]
+    }
+
     /// At most ten lines of a hundred columns.
     pub fn text(&self) -> String {
         let mut lines = Lines::default();
@@ -132,7 +144,7 @@ fn error_and_coverage(found: &Findings) -> String {
 }
 
 /// Range, gaps in it, speeds and holds.
-pub fn seen(seen: &Seen, quantity: Quantity) -> String {
+fn seen(seen: &Seen, quantity: Quantity) -> String {
     let (scale, unit) = match quantity {
         Quantity::Strain => (100.0, " %"),
         Quantity::AngleDeg => (1.0, "°"),
@@ -163,7 +175,7 @@ pub fn seen(seen: &Seen, quantity: Quantity) -> String {
 }
 
 /// What makes the error.
-pub fn limited_by(found: &Findings) -> String {
+fn limited_by(found: &Findings) -> String {
     let budget = &found.budget;
     let parts = [
         (Limit::Law, "law", budget.law_percent),

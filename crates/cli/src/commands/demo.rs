@@ -1,15 +1,21 @@
+use std::time::Instant;
+
 use ohmstrain_bench_data::simulate::{Material, Protocol, SimulationSettings};
 use ohmstrain_calib::{LawOptions, Output, RECIPE, SensorParams};
 
-use super::calibrate::{Calibrated, calibrate_recordings, report};
+use super::calibrate::{Calibrated, calibrate_recordings};
+use super::closing::Closing;
+use super::reporting::{Reporting, Wanted};
 use super::score_table::{add_scores, score_table};
+use super::scoring::{self, Part};
+use super::simulate;
 use super::smooth::write_estimates;
-use super::{scoring, simulate};
-use crate::args::DemoArgs;
+use crate::args::{DemoArgs, ReportArgs};
 use crate::error::CliError;
 use crate::input::{self, Recording};
 use crate::output::{Kind, Outputs, print};
 use crate::progress::Progress;
+use crate::report::Sample;
 use crate::run::estimate;
 use crate::sensor_file;
 
@@ -25,7 +31,8 @@ pub fn run(args: &DemoArgs) -> Result<(), CliError> {
     let sensor_output = claim("sensor.toml", Kind::Sensor)?;
     let filtered_output = claim("estimates.csv", Kind::Estimates)?;
     let smoothed_output = claim("smoothed.csv", Kind::Estimates)?;
-    let report_output = claim("report.html", Kind::Report)?;
+    let report = ReportArgs { report: Some(args.out.join("report.html")), figures: None };
+    let wanted = Wanted::claim(&report, &mut outputs)?;
 
     let progress = Progress::new("simulating a bench session");
     let trace = simulate::bytes(&settings(args.seed)).map_err(CliError::Other)?;
@@ -37,8 +44,10 @@ pub fn run(args: &DemoArgs) -> Result<(), CliError> {
     let training = recording.rows(0..middle);
     let estimator = RECIPE.estimator;
     let structures = LawOptions::candidates(estimator);
-    let Calibrated { params, .. } =
+    let start = Instant::now();
+    let Calibrated { params, findings } =
         calibrate_recordings(std::slice::from_ref(&training), structures, estimator, &progress)?;
+    let calibration_s = start.elapsed().as_secs_f64();
     outputs.put(sensor_output, sensor_file::text(&params)?);
 
     progress.doing("filtering and smoothing");
@@ -46,12 +55,18 @@ pub fn run(args: &DemoArgs) -> Result<(), CliError> {
     outputs.put(filtered_output, estimates(&recording, &params, &estimated.filtered)?);
     outputs.put(smoothed_output, estimates(&recording, &params, &estimated.smoothed)?);
     progress.doing("writing the report");
-    outputs.put(report_output, report(&recording, &params, Some(test_from))?);
+    let part = Part::since(Some(test_from));
+    let facts = Closing { file: "sensor.toml", params: &params, findings: findings.as_ref(), calibration_s }.facts();
+    let (rest_reading, sample) = (params.rest_reading, Sample::Out);
+    let reporting =
+        Reporting { recording: &recording, params: &params, kind: None, rest_reading, part, sample, facts: &facts };
+    if let Some(wanted) = wanted {
+        wanted.put(reporting.drawn()?, &mut outputs)?;
+    }
     outputs.publish()?;
     drop(progress);
 
     let mut table = score_table(params.quantity.name(), &[]);
-    let part = scoring::Part::since(Some(test_from));
     let scores = [
         ("filter", scoring::of_outputs(&recording, &estimated.filtered, part)),
         ("smoother", scoring::of_outputs(&recording, &estimated.smoothed, part)),

@@ -13,6 +13,7 @@ mod inspect;
 mod inspect_json;
 mod inspect_text;
 mod refine;
+mod reporting;
 mod score_table;
 mod scoring;
 mod simulate;

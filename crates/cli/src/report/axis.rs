@@ -84,6 +84,11 @@ impl Axis {
         share.clamp(0.0, 1.0)
     }
 
+    /// The value at a place, 0 at the lower and 1 at the upper end.
+    pub fn value(&self, share: f64) -> f64 {
+        if self.log { self.low * (self.high / self.low).powf(share) } else { self.low + share * (self.high - self.low) }
+    }
+
     /// Ends of the axis.
     pub fn ends(&self) -> (f64, f64) {
         (self.low, self.high)
@@ -188,6 +193,16 @@ mod tests {
             assert!(low < high && (high - low).is_finite(), "{case:?}: {low} to {high}");
             assert!(axis.ticks.len() <= 7, "{case:?}: {:?}", axis.ticks);
             assert!((0.0..=1.0).contains(&axis.unit(low)));
+        }
+    }
+
+    /// To rounding: a few units in the last place of the larger end.
+    #[test]
+    fn a_place_gives_the_value_back() {
+        for axis in [Axis::linear("", -3.0, 7.0, 5), Axis::logarithmic("", 0.1, 300.0)] {
+            for value in [0.1, 0.25, 3.0, 6.5] {
+                assert!((axis.value(axis.unit(value)) - value).abs() < 1e-12, "{value}");
+            }
         }
     }
 }

@@ -1,5 +1,7 @@
 //! One plot: axes, and layers that are drawn in the order in which they were added.
 
+use std::collections::HashSet;
+
 use plotters::coord::Shift;
 use plotters::prelude::{
     ChartBuilder, Circle, DrawingArea, DrawingBackend, FontFamily, IntoDrawingArea, PathElement, Polygon, Rectangle,
@@ -9,7 +11,7 @@ use plotters::style::{Color, RGBColor, TRANSPARENT, TextStyle};
 
 use super::ReportError;
 use super::axis::Axis;
-use super::ink::{Ink, Key};
+use super::ink::{Ink, Key, dashes};
 use super::thin::{self, Point};
 
 /// Drawing units per pixel of the page: the plotting library knows whole units only, and lines need a finer grid.
@@ -30,7 +32,14 @@ pub const WIDE: (f64, f64) = (940.0, 320.0);
 /// Size of a plot that shares its line with another one, px.
 pub const HALF: (f64, f64) = (460.0, 320.0);
 
+/// Side of the cells in which one dot stands for all, px.
+const DOT_CELL_PX: f64 = 3.0;
+/// Radius of a dot and size of an arrow's head, px.
+const DOT_PX: f64 = 1.6;
+const ARROW_PX: (f64, f64) = (9.0, 3.5);
+
 /// A plot.
+#[derive(Debug)]
 pub struct Chart {
     size_px: (f64, f64),
     x: Axis,
@@ -39,16 +48,20 @@ pub struct Chart {
     legend: Vec<Key>,
 }
 
+#[derive(Debug)]
 struct Layer {
     ink: Ink,
+    name: String,
     shape: Shape,
 }
 
 /// In shares of the plot's width and height.
+#[derive(Debug)]
 enum Shape {
     Lines(Vec<Vec<Point>>),
     Areas(Vec<Vec<Point>>),
     Boxes(Vec<(Point, Point)>),
+    Dots(Vec<Point>),
 }
 
 impl Chart {
@@ -97,6 +110,37 @@ impl Chart {
         }
     }
 
+    /// Single points, one for all that could not be told apart.
+    pub fn dots(&mut self, ink: Ink, name: &str, points: impl IntoIterator<Item = Point>) {
+        let (width, height) = self.area_px();
+        let mut visited = HashSet::new();
+        let ((left, right), (low, high)) = (self.x.ends(), self.y.ends());
+        let inside = |(x, y): &Point| (left..=right).contains(x) && (low..=high).contains(y);
+        let unit = points.into_iter().filter(inside).map(|(x, y)| (self.x.unit(x), self.y.unit(y)));
+        let cell = |share: f64, px: f64| (share * px / DOT_CELL_PX) as u32;
+        let dots: Vec<Point> = unit.filter(|(x, y)| visited.insert((cell(*x, width), cell(*y, height)))).collect();
+        self.add(ink, name, Shape::Dots(dots));
+    }
+
+    /// Heads of arrows, each at its second point, coming from the first one.
+    pub fn arrows(&mut self, ink: Ink, name: &str, steps: impl IntoIterator<Item = (Point, Point)>) {
+        let (width, height) = self.area_px();
+        let head = |((x0, y0), (x1, y1)): (Point, Point)| {
+            let tip = (self.x.unit(x1), self.y.unit(y1));
+            let (dx, dy) = ((tip.0 - self.x.unit(x0)) * width, (tip.1 - self.y.unit(y0)) * height);
+            let length = dx.hypot(dy);
+            let (ux, uy) = (dx / length, dy / length);
+            let (long, half) = ARROW_PX;
+            let corner = |side: f64| {
+                let (x, y) = (-long * ux - side * half * uy, -long * uy + side * half * ux);
+                (tip.0 + x / width, tip.1 + y / height)
+            };
+            (length > 0.0).then(|| vec![tip, corner(1.0), corner(-1.0)])
+        };
+        let heads: Vec<Vec<Point>> = steps.into_iter().filter_map(head).collect();
+        self.add(ink, name, Shape::Areas(heads));
+    }
+
     /// A part of the x axis.
     pub fn shade(&mut self, ink: Ink, name: &str, from: f64, until: f64) {
         let (from, until) = (self.x.unit(from), self.x.unit(until));
@@ -138,6 +182,7 @@ impl Chart {
         let empty = match &shape {
             Shape::Lines(pieces) | Shape::Areas(pieces) => pieces.is_empty(),
             Shape::Boxes(boxes) => boxes.is_empty(),
+            Shape::Dots(dots) => dots.is_empty(),
         };
         if empty {
             return;
@@ -145,12 +190,89 @@ impl Chart {
         if !name.is_empty() {
             self.legend.push(Key::new(ink, name));
         }
-        self.layers.push(Layer { ink, shape });
+        self.layers.push(Layer { ink, name: name.into(), shape });
+    }
+
+    /// Size of the plot without its labels, px.
+    fn area_px(&self) -> (f64, f64) {
+        ((self.size_px.0 - LEFT_PX - RIGHT_PX).max(1.0), (self.size_px.1 - ABOVE_PX - BELOW_PX).max(1.0))
     }
 
     /// One column per pixel of the page.
     fn columns(&self) -> usize {
-        (self.size_px.0 - LEFT_PX - RIGHT_PX).max(1.0) as usize
+        self.area_px().0 as usize
+    }
+
+    /// What is drawn as `series,part,x,y`: points of lines and dots, corners of areas, opposite corners of boxes.
+    pub fn csv(&self) -> String {
+        let quoted = |text: &str| format!("\"{}\"", text.replace('"', "'"));
+        let mut csv = format!("series,part,{},{}\n", quoted(&self.x.label), quoted(&self.y.label));
+        for layer in &self.layers {
+            let name = quoted(if layer.name.is_empty() { "line" } else { &layer.name });
+            let mut put = |part: usize, (x, y): Point| {
+                csv += &format!("{name},{part},{},{}\n", rounded(self.x.value(x)), rounded(self.y.value(y)));
+            };
+            match &layer.shape {
+                Shape::Lines(pieces) | Shape::Areas(pieces) => {
+                    pieces.iter().enumerate().for_each(|(part, piece)| piece.iter().for_each(|point| put(part, *point)))
+                }
+                Shape::Boxes(boxes) => boxes.iter().enumerate().for_each(|(part, (from, to))| {
+                    put(part, *from);
+                    put(part, *to);
+                }),
+                Shape::Dots(dots) => dots.iter().enumerate().for_each(|(part, point)| put(part, *point)),
+            }
+        }
+        csv
+    }
+
+    /// The drawing by itself, with its legend, in the colours of paper, `width_mm` wide.
+    ///
+    /// # Errors
+    /// If the plotting library cannot draw it.
+    pub fn standalone(&self, title: &str, width_mm: f64) -> Result<String, ReportError> {
+        let drawing = self.svg(title)?;
+        let inside = drawing.split_once('>').map_or("", |(_, inside)| inside);
+        let units = f64::from(UNITS_PER_PX);
+        let (width, height) = (units * self.size_px.0, units * self.size_px.1);
+        let (legend, legend_height) = self.drawn_legend();
+        let whole = height + legend_height;
+        let height_mm = width_mm * whole / width;
+        let (dashes, label) = (dashes(UNITS_PER_PX), minijinja::HtmlEscape(title));
+        Ok(format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" role=\"img\" aria-label=\"{label}\" width=\"{width_mm}mm\" \
+             height=\"{height_mm:.1}mm\" viewBox=\"0 0 {width} {whole}\">\n<style>{dashes}polyline{{stroke-linejoin:round}}\
+             text{{font-family:Arial,Helvetica,sans-serif}}</style>\n<rect width=\"{width}\" height=\"{whole}\" \
+             fill=\"#fff\"/>\n{legend}<g transform=\"translate(0 {legend_height})\">{}</g>\n</svg>\n",
+            inside.trim_end().trim_end_matches("</svg>")
+        ))
+    }
+
+    /// The legend in drawing units, and its height.
+    fn drawn_legend(&self) -> (String, f64) {
+        let units = f64::from(UNITS_PER_PX);
+        let (sample, gap, row, size) = (26.0 * units, 8.0 * units, 19.0 * units, TEXT_PX * units);
+        let (mut x, mut y) = (LEFT_PX * units, row);
+        let mut drawn = String::new();
+        for key in &self.legend {
+            // Letters are half as wide as high, on average.
+            let width = sample + 2.0 * gap + 0.52 * size * key.name.chars().count() as f64;
+            if x > LEFT_PX * units && x + width > (self.size_px.0 - RIGHT_PX) * units {
+                (x, y) = (LEFT_PX * units, y + row);
+            }
+            let (line, text) = (y - 0.35 * size, x + sample + gap);
+            drawn += &format!(
+                "<line x1=\"{x}\" x2=\"{}\" y1=\"{line}\" y2=\"{line}\" stroke=\"{}\" stroke-width=\"{}\" opacity=\"{}\"/>\
+                 <text x=\"{text}\" y=\"{y}\" font-size=\"{size}\" fill=\"#404040\">{}</text>\n",
+                x + sample,
+                key.hex,
+                key.width * units,
+                key.opacity,
+                minijinja::HtmlEscape(&key.name)
+            );
+            x += width + gap;
+        }
+        (drawn, if self.legend.is_empty() { 0.0 } else { y + 0.5 * row })
     }
 
     /// The drawing, with `description` for those who do not see it.
@@ -216,6 +338,9 @@ impl Layer {
                 [only] => area.draw(&Circle::new(place(*only), fine(self.ink.width.max(1.5)), style.filled())),
                 piece => area.draw(&PathElement::new(piece.iter().copied().map(place).collect::<Vec<_>>(), style)),
             }),
+            Shape::Dots(dots) => {
+                dots.iter().try_for_each(|dot| area.draw(&Circle::new(place(*dot), fine(DOT_PX), style.filled())))
+            }
             Shape::Areas(outlines) => outlines.iter().try_for_each(|outline| {
                 area.draw(&Polygon::new(outline.iter().copied().map(place).collect::<Vec<_>>(), style))
             }),
@@ -224,6 +349,11 @@ impl Layer {
                 .try_for_each(|(from, to)| area.draw(&Rectangle::new([place(*from), place(*to)], style.filled()))),
         }
     }
+}
+
+/// With as many digits as a drawing shows, and more.
+fn rounded(value: f64) -> f64 {
+    format!("{value:.6e}").parse().unwrap_or(value)
 }
 
 fn rgb(ink: Ink) -> RGBColor {

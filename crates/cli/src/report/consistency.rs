@@ -28,7 +28,7 @@ pub fn size(recording: &Recording, innovations: &Innovations) -> Result<Figure, 
         more => format!(" {more} values are larger than {} and drawn at the edge.", plain(top)),
     };
     let note = format!("Innovations over their predicted standard deviation; their signs are not known here.{beyond}");
-    Figure::new(&chart, "Normalised innovations", &note, false)
+    Figure::new(chart, "Normalised innovations", &note, false)
 }
 
 /// Histogram of |z| beside its density.
@@ -43,7 +43,7 @@ pub fn histogram(innovations: &Innovations) -> Result<Figure, ReportError> {
     let grid = (0..=100).map(|i| 0.01 * f64::from(i) * end);
     chart.line(Ink::TRUTH, "root of χ²(1)", grid.map(|z| (z, Innovations::expected_density(z))));
     let note = "Narrower than the curve: the filter's variances are too large. Wider: they are too small.";
-    Figure::new(&chart, "Distribution of |z|", note, true)
+    Figure::new(chart, "Distribution of |z|", note, true)
 }
 
 /// Autocorrelation of |z|.
@@ -59,5 +59,5 @@ pub fn autocorrelation(innovations: &Innovations) -> Result<Figure, ReportError>
     chart.horizontal(Ink::BOUND, "95 % of independent ones", bound);
     chart.horizontal(Ink::BOUND, "", -bound);
     let note = "What reaches beyond the lines is structure that the model does not know.";
-    Figure::new(&chart, "Autocorrelation of |z|", note, true)
+    Figure::new(chart, "Autocorrelation of |z|", note, true)
 }

@@ -42,12 +42,16 @@ impl Ink {
     pub const CURVE: Self = Self::line((0x00, 0x7A, 0x5B), "green", 2.2);
     /// The static calibration.
     pub const STATIC: Self = Self::dashed((0xA3, 0x3B, 0x7A), "purple", 2.2, &[7, 3]);
-    /// While stretching.
-    pub const EXTEND: Self = Self::line((0xD5, 0x5E, 0x01), "red", 1.1);
-    /// While releasing.
-    pub const RETRACT: Self = Self::line((0x00, 0x72, 0xB4), "blue", 1.1);
-    /// While holding.
-    pub const HOLD: Self = Self::line((0x6E, 0x6E, 0x6E), "soft", 1.6);
+    /// The course of time, from the first fifth to the last.
+    pub const TIMES: [Self; 5] = [
+        Self::line((0xC9, 0xA2, 0x27), "time-1", 1.1),
+        Self::line((0x4D, 0xAF, 0x62), "time-2", 1.1),
+        Self::line((0x1F, 0x8A, 0x8C), "time-3", 1.1),
+        Self::line((0x35, 0x5F, 0x8D), "time-4", 1.1),
+        Self::line((0x48, 0x1B, 0x6D), "time-5", 1.1),
+    ];
+    /// Which way a line goes.
+    pub const ARROWS: Self = Self::line((0x1D, 0x1D, 0x1D), "ink", 1.0);
     /// A bound.
     pub const BOUND: Self = Self::dashed((0xA3, 0x3B, 0x7B), "purple", 1.6, &[2, 3]);
     /// The part that is scored.
@@ -98,9 +102,7 @@ impl Ink {
             Self::LAW_BAND,
             Self::CURVE,
             Self::STATIC,
-            Self::EXTEND,
-            Self::RETRACT,
-            Self::HOLD,
+            Self::ARROWS,
             Self::BOUND,
             Self::TEST,
             Self::BARS,
@@ -109,7 +111,7 @@ impl Ink {
             Self::GRID,
             Self::FRAME,
         ];
-        single.into_iter().chain(Self::HOLDS).chain(Self::HELD_LAWS).collect()
+        single.into_iter().chain(Self::HOLDS).chain(Self::HELD_LAWS).chain(Self::TIMES).collect()
     }
 
     /// The colour as the drawing writes it.
@@ -126,6 +128,12 @@ pub struct Style {
     hue: &'static str,
     legend_dashes: String,
     plot_dashes: String,
+}
+
+/// The dashes alone, for a drawing without the page's style sheet.
+pub fn dashes(units_per_px: u32) -> String {
+    let rule = |style: Style| format!("[stroke=\"{}\"]{{stroke-dasharray:{}}}", style.hex, style.plot_dashes);
+    styles(units_per_px).into_iter().filter(|style| !style.plot_dashes.is_empty()).map(rule).collect()
 }
 
 /// The style sheet's rows. A plot has `units_per_px` drawing units per pixel, a legend has one.
@@ -146,9 +154,9 @@ pub fn styles(units_per_px: u32) -> Vec<Style> {
 /// An entry of a legend.
 #[derive(Clone, Debug, Serialize)]
 pub struct Key {
-    hex: String,
-    opacity: f64,
-    width: f64,
+    pub hex: String,
+    pub opacity: f64,
+    pub width: f64,
     /// What it is.
     pub name: String,
 }

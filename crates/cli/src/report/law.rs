@@ -42,6 +42,11 @@ impl<'a> Law<'a> {
         self.quasi_static.gauge_value_and_slope(strain).0
     }
 
+    /// dg/dε, the local gauge factor.
+    pub fn gauge_slope(&self, strain: f64) -> f64 {
+        self.quasi_static.gauge_value_and_slope(strain).1
+    }
+
     /// Strain beyond which one reading belongs to two strains.
     pub fn static_border(&self) -> Option<f64> {
         self.quasi_static.static_border()

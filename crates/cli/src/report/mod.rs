@@ -6,20 +6,24 @@
 mod axis;
 mod chart;
 mod consistency;
+mod errors;
 mod figures;
+mod held;
 mod ink;
 mod innovations;
 mod law;
 mod motion;
 pub mod number;
+mod pieces;
 mod recording;
+mod relation;
 mod summary;
 mod tables;
 mod thin;
 
 use minijinja::Environment;
 use minijinja::value::Serde;
-use ohmstrain_calib::{Output, SensorParams};
+use ohmstrain_calib::{EstimatorKind, Output, SensorParams};
 use serde::Serialize;
 
 use figures::Figure;
@@ -28,7 +32,7 @@ use recording::Recording;
 use tables::Table;
 
 /// What a report shows. All slices have one entry per row of the recording.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct ReportInput<'a> {
     /// Heading, the recording's name for instance.
     pub title: &'a str,
@@ -48,10 +52,49 @@ pub struct ReportInput<'a> {
     pub params: &'a SensorParams,
     /// R₀ of this recording, in the unit of the readings.
     pub rest_reading: f64,
-    /// Start of the part that the scores are about, if it is not everything.
-    pub scored_from_s: Option<f64>,
+    /// The part that the scores are about.
+    pub scored: Scored,
+    /// Whether that part was calibrated on.
+    pub sample: Sample,
+    /// The estimator.
+    pub estimator: EstimatorKind,
     /// Scores, the filter's first.
     pub scores: &'a [ScoreRow<'a>],
+    /// What the scores are worth, in a sentence.
+    pub verdict: Option<String>,
+    /// What else there is to say of the calibration: heading and text.
+    pub facts: &'a [(&'static str, String)],
+}
+
+/// The rows that are scored, by their times.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Scored {
+    /// Rows at this time, s, or later; all if there is none.
+    pub from_s: Option<f64>,
+    /// Rows before this time, s; all if there is none.
+    pub until_s: Option<f64>,
+}
+
+/// Whether rows were calibrated on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sample {
+    /// All of them.
+    In,
+    /// Some of them, or perhaps some: the sensor's file does not say which rows of the recording it is from.
+    Perhaps,
+    /// None.
+    Out,
+}
+
+impl Sample {
+    /// In a word.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::In => "in-sample",
+            Self::Perhaps => "perhaps in-sample",
+            Self::Out => "not calibrated on",
+        }
+    }
 }
 
 /// How well one estimator did.
@@ -88,7 +131,11 @@ pub enum ReportError {
 struct Page<'a> {
     title: &'a str,
     made_by: &'a str,
+    estimator: &'static str,
+    headline: String,
+    verdict: Option<String>,
     summary: String,
+    facts: &'a [(&'static str, String)],
     scores: Option<Table>,
     sections: Vec<Section>,
     inks: Vec<ink::Style>,
@@ -98,55 +145,117 @@ struct Page<'a> {
 #[derive(Debug, Serialize)]
 struct Section {
     title: &'static str,
+    /// Whether it is folded until somebody asks for it.
+    folded: bool,
     text: String,
     figures: Vec<Figure>,
     tables: Vec<Table>,
 }
 
-/// The report as HTML.
-///
-/// # Errors
-/// If a plot cannot be drawn or the template cannot be filled; no input is known that does this.
-pub fn render(input: &ReportInput) -> Result<String, ReportError> {
-    let recording = Recording::new(input);
-    let innovations = Innovations::new(input.filtered);
-    let scores = (!input.scores.is_empty()).then(|| tables::scores(input.scores, input.params.quantity));
-    let mut environment = Environment::new();
-    environment.add_template("report.html", include_str!("report.html"))?;
-    let page = Page {
-        title: input.title,
-        made_by: input.made_by,
-        summary: summary::sentences(input, &recording),
-        scores,
-        sections: sections(&recording, &innovations)?,
-        inks: ink::styles(chart::UNITS_PER_PX),
-    };
-    Ok(environment.get_template("report.html")?.render(Serde(page))?)
+/// A plot as files.
+pub struct FigureFiles {
+    /// Name without its ending.
+    pub name: String,
+    /// The drawing.
+    pub svg: String,
+    /// What is drawn.
+    pub csv: String,
+}
+
+/// Width of a figure across a page and across a column, mm.
+const PAGE_MM: f64 = 170.0;
+const COLUMN_MM: f64 = 85.0;
+
+/// A report that has been drawn.
+pub struct Report<'a> {
+    page: Page<'a>,
+}
+
+impl<'a> Report<'a> {
+    /// Draws the plots.
+    ///
+    /// # Errors
+    /// If a plot cannot be drawn; no input is known that does this.
+    pub fn new(input: &ReportInput<'a>) -> Result<Self, ReportError> {
+        let recording = Recording::new(input);
+        let innovations = Innovations::new(input.filtered);
+        let scores =
+            (!input.scores.is_empty()).then(|| tables::scores(input.scores, input.params.quantity, input.sample));
+        let page = Page {
+            title: input.title,
+            made_by: input.made_by,
+            estimator: input.estimator.name(),
+            headline: summary::headline(input, &recording),
+            verdict: input.verdict.clone(),
+            summary: summary::extent_of(&recording),
+            facts: input.facts,
+            scores,
+            sections: sections(&recording, &innovations)?,
+            inks: ink::styles(chart::UNITS_PER_PX),
+        };
+        Ok(Self { page })
+    }
+
+    /// As HTML.
+    ///
+    /// # Errors
+    /// If the template cannot be filled; no input is known that does this.
+    pub fn html(&self) -> Result<String, ReportError> {
+        let mut environment = Environment::new();
+        environment.add_template("report.html", include_str!("report.html"))?;
+        Ok(environment.get_template("report.html")?.render(Serde(&self.page))?)
+    }
+
+    /// Every plot as files of its own.
+    ///
+    /// # Errors
+    /// If a plot cannot be drawn; no input is known that does this.
+    pub fn figures(&self) -> Result<Vec<FigureFiles>, ReportError> {
+        let figures = self.page.sections.iter().flat_map(|section| &section.figures);
+        figures
+            .enumerate()
+            .map(|(i, figure)| {
+                let width_mm = if figure.half { COLUMN_MM } else { PAGE_MM };
+                let by = format!("Generated by {}", self.page.made_by);
+                let svg = format!("<!-- {by} -->\n{}", figure.chart.standalone(&figure.title, width_mm)?);
+                let csv = format!("# {by}\n{}", figure.chart.csv());
+                Ok(FigureFiles { name: format!("{:02}-{}", i + 1, slug(&figure.title)), svg, csv })
+            })
+            .collect()
+    }
+}
+
+/// A title as the name of a file.
+fn slug(title: &str) -> String {
+    let word = |c: char| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' };
+    let name: String = title.chars().map(word).collect();
+    name.split('-').filter(|part| !part.is_empty()).collect::<Vec<_>>().join("-")
 }
 
 fn sections(recording: &Recording, innovations: &Innovations) -> Result<Vec<Section>, ReportError> {
     let mut sections = vec![];
+    let plain = |title, figures| Section { title, folded: false, text: String::new(), figures, tables: vec![] };
     if recording.time_s.iter().any(|time| time.is_finite()) {
-        sections.push(Section {
-            title: "The recording",
-            text: String::new(),
-            figures: vec![figures::reading(recording)?, figures::strain(recording)?],
-            tables: vec![],
-        });
+        let strain = std::iter::once(figures::strain(recording)?).chain(errors::strain(recording)?);
+        sections.push(plain("The recording", strain.chain([figures::reading(recording)?]).collect()));
+        let pieces = pieces::strain(recording)?;
+        if !pieces.is_empty() {
+            sections.push(Section { folded: true, ..plain("Piece by piece", pieces) });
+        }
         sections.push(sensor_behaviour(recording)?);
+    } else {
+        sections.push(plain("The sensor", vec![relation::gauge(recording)?]));
+    }
+    if recording.time_s.iter().any(|time| time.is_finite()) {
         sections.push(consistency_of(recording, innovations)?);
     }
-    sections.push(Section {
-        title: "The sensor",
-        text: String::new(),
-        figures: vec![figures::gauge(recording)?],
-        tables: tables::parameters(recording.params, recording.rest_reading),
-    });
+    let tables = tables::parameters(recording.params, recording.rest_reading);
+    sections.push(Section { folded: true, tables, ..plain("The sensor in numbers", vec![]) });
     Ok(sections)
 }
 
 fn sensor_behaviour(recording: &Recording) -> Result<Section, ReportError> {
-    let relaxation = figures::relaxation(recording)?;
+    let relaxation = held::relaxation(recording)?;
     let text = match relaxation {
         Some(_) => String::new(),
         None => format!(
@@ -154,21 +263,20 @@ fn sensor_behaviour(recording: &Recording) -> Result<Section, ReportError> {
             recording::SHORTEST_HOLD_S
         ),
     };
-    let figures = std::iter::once(figures::hysteresis(recording)?).chain(relaxation).collect();
-    Ok(Section { title: "Hysteresis and relaxation", text, figures, tables: vec![] })
+    let relations = [relation::hysteresis(recording)?, relation::gauge(recording)?];
+    let figures = relations.into_iter().chain(relaxation).collect();
+    Ok(Section { title: "The sensor", folded: false, text, figures, tables: vec![] })
 }
 
 fn consistency_of(recording: &Recording, innovations: &Innovations) -> Result<Section, ReportError> {
-    let figures = if innovations.count > 0 {
-        vec![
-            consistency::size(recording, innovations)?,
-            consistency::histogram(innovations)?,
-            consistency::autocorrelation(innovations)?,
-        ]
-    } else {
-        vec![]
-    };
-    Ok(Section { title: "Consistency", text: summary::consistency(innovations), figures, tables: vec![] })
+    let mut figures: Vec<Figure> = errors::reading(recording)?.into_iter().collect();
+    if innovations.count > 0 {
+        figures.push(consistency::size(recording, innovations)?);
+        figures.push(consistency::histogram(innovations)?);
+        figures.push(consistency::autocorrelation(innovations)?);
+    }
+    let text = summary::consistency(innovations);
+    Ok(Section { title: "Statistics: residuals and innovations", folded: true, text, figures, tables: vec![] })
 }
 
 #[cfg(test)]

@@ -2,11 +2,11 @@
 
 use ohmstrain_calib::{Output, Quantity, ReadingUnit, SensorParams};
 
-use super::ReportInput;
 use super::axis::extent;
 use super::law::{Driven, Law};
 use super::motion::{self, Hold, Motion};
-use super::number::plain;
+use super::number::significant;
+use super::{ReportInput, Scored};
 
 /// Shortest hold whose relaxation is worth a plot, s.
 pub const SHORTEST_HOLD_S: f64 = 5.0;
@@ -31,8 +31,8 @@ pub struct Recording<'a> {
     pub params: &'a SensorParams,
     /// R₀.
     pub rest_reading: f64,
-    /// Start of the part that is scored.
-    pub scored_from_s: Option<f64>,
+    /// The part that is scored.
+    pub scored: Scored,
     /// The sensor's law.
     pub law: Law<'a>,
     /// What the strain does, row by row.
@@ -72,7 +72,7 @@ impl<'a> Recording<'a> {
             smoothed: input.smoothed,
             params: input.params,
             rest_reading: input.rest_reading,
-            scored_from_s: input.scored_from_s,
+            scored: input.scored,
             motions: motion::motions(input.time_s, &strain, &held),
             law,
             driven,
@@ -127,10 +127,18 @@ impl<'a> Recording<'a> {
         }
     }
 
+    /// A value of the estimated quantity as people read it: strain in percent.
+    pub fn shown(&self, value: f64) -> f64 {
+        match self.params.quantity {
+            Quantity::Strain => 100.0 * value,
+            Quantity::AngleDeg => value,
+        }
+    }
+
     /// Axis label of the estimated quantity.
     pub fn quantity_label(&self) -> &'static str {
         match self.params.quantity {
-            Quantity::Strain => "Strain",
+            Quantity::Strain => "Strain, %",
             Quantity::AngleDeg => "Angle, °",
         }
     }
@@ -144,11 +152,23 @@ impl<'a> Recording<'a> {
     /// A value of the estimated quantity.
     pub fn with_unit(&self, value: f64) -> String {
         match self.params.quantity {
-            Quantity::Strain => format!("strain {}", plain(value)),
-            Quantity::AngleDeg => format!("{}°", plain(value)),
+            Quantity::Strain => format!("strain {} %", significant(100.0 * value, 3)),
+            Quantity::AngleDeg => format!("{}°", significant(value, 3)),
         }
     }
+
+    /// The 95 % interval of an estimate, within the limits of the output.
+    pub fn interval(&self, output: &Output) -> (f64, f64) {
+        let (strain, limits) = (&output.estimate.strain, self.params.limits);
+        let half = Z_95 * strain.sd();
+        // A limit that is not a number bounds nothing.
+        let within = |x: f64| if x.is_nan() { x } else { x.max(limits.lower).min(limits.upper) };
+        (within(strain.mean - half), within(strain.mean + half))
+    }
 }
+
+/// Half-width of the 95 % interval of a standard normal.
+pub const Z_95: f64 = 1.96;
 
 /// Share of the limits' span within which an estimate leans on them.
 const AT_LIMIT: f64 = 0.02;

@@ -3,38 +3,45 @@
 use ohmstrain_calib::Quantity;
 
 use super::innovations::Innovations;
-use super::number::{percent, plain};
+use super::number::{percent, plain, significant};
 use super::recording::Recording;
-use super::{ReportInput, ScoreRow, axis};
+use super::{ReportInput, ScoreRow, Scored, axis};
 
-/// The report's first sentences: the result, and what it rests on.
-pub fn sentences(input: &ReportInput, recording: &Recording) -> String {
-    let result = match input.scores.first() {
+/// The result in words.
+pub fn headline(input: &ReportInput, recording: &Recording) -> String {
+    match input.scores.first() {
         Some(score) => scored(score, input),
         None if recording.truth.is_some() => "Nothing was scored against the reference.".into(),
         None => "There is no reference, so errors are not known.".into(),
-    };
-    format!("{result} {}", extent_of(recording))
+    }
 }
 
 fn scored(score: &ScoreRow, input: &ReportInput) -> String {
-    let unit = match input.params.quantity {
-        Quantity::Strain => "in strain",
-        Quantity::AngleDeg => "degrees",
+    let what = match input.params.quantity {
+        Quantity::Strain => "Strain",
+        Quantity::AngleDeg => "Angle",
     };
-    let part = input.scored_from_s.map_or_else(String::new, |from| format!(", scored from {} s on", plain(from)));
+    let own = match input.params.quantity {
+        Quantity::Strain => format!("{} % strain", significant(100.0 * score.rmse, 2)),
+        Quantity::AngleDeg => format!("{}°", significant(score.rmse, 2)),
+    };
+    let part = match input.scored {
+        Scored { from_s: None, until_s: None } => String::new(),
+        Scored { from_s: Some(from), until_s: None } => format!(", scored from {} s on", plain(from)),
+        Scored { from_s: None, until_s: Some(until) } => format!(", scored until {} s", plain(until)),
+        Scored { from_s: Some(from), until_s: Some(until) } => {
+            format!(", scored from {} to {} s", plain(from), plain(until))
+        }
+    };
     let coverage = score.coverage_95.map_or_else(String::new, |share| {
-        format!("; its 95 % interval holds the reference in {} of the rows", percent(share))
+        format!("; the 95 % interval holds the reference in {} of the rows", percent(share))
     });
-    format!(
-        "{}: RMSE {} of full scale ({} {unit}){part}{coverage}.",
-        score.name,
-        percent(score.rmse_percent_fs / 100.0),
-        plain(score.rmse)
-    )
+    let error = percent(score.rmse_percent_fs / 100.0);
+    format!("{what} to {error} of full scale RMS ({own}), {}{part}{coverage}.", input.sample.name())
 }
 
-fn extent_of(recording: &Recording) -> String {
+/// How long the recording is, and what is missing.
+pub fn extent_of(recording: &Recording) -> String {
     let rows = recording.time_s.len();
     let missing = rows.saturating_sub(recording.reading.iter().filter(|reading| reading.is_finite()).count());
     let duration = axis::extent(recording.time_s.iter().copied()).map_or(0.0, |(first, last)| last - first);

@@ -3,8 +3,8 @@
 use ohmstrain_calib::{GaugeParams, MotionParams, Quantity, RangeParams, ReadingUnit, SensorParams, Uncertainty};
 use serde::Serialize;
 
-use super::ScoreRow;
 use super::number::{percent, plain, with_error};
+use super::{Sample, ScoreRow};
 
 /// A table; the first cell of a row is its heading.
 #[derive(Debug, Serialize)]
@@ -51,7 +51,7 @@ fn per_time(quantity: Quantity, power: usize) -> String {
 }
 
 /// Scores, one estimator per row.
-pub fn scores(rows: &[ScoreRow], quantity: Quantity) -> Table {
+pub fn scores(rows: &[ScoreRow], quantity: Quantity, sample: Sample) -> Table {
     let rmse = match quantity {
         Quantity::Strain => "RMSE (strain)",
         Quantity::AngleDeg => "RMSE (°)",
@@ -67,17 +67,14 @@ pub fn scores(rows: &[ScoreRow], quantity: Quantity) -> Table {
             percent(row.crps_percent_fs / 100.0),
         ]
     };
-    Table::new(
-        "Error against the reference, how often the 95 % interval holds it and how wide it is, and the ranked probability \
+    let caption = format!(
+        "Errors ({}): RMSE, how often the 95 % interval holds the reference and how wide it is, and the ranked probability \
          score (CRPS), which counts both",
-        [
-            "Estimator",
-            rmse,
-            "of full scale",
-            "Coverage of 95 % interval",
-            "Width, of full scale",
-            "CRPS, of full scale",
-        ],
+        sample.name()
+    );
+    Table::new(
+        &caption,
+        ["Estimate", rmse, "of full scale", "Coverage of 95 % interval", "Width, of full scale", "CRPS, of full scale"],
         rows.iter().map(cells).collect(),
     )
 }

@@ -4,6 +4,7 @@ use ohmstrain_calib::{PARTICLE_SEED, Quantity, Scores};
 use serde::Serialize;
 
 use super::summary::{self, Summary, summaries};
+use crate::commands::reporting::Drawn;
 use crate::commands::score_table::{add_scores, score_table};
 use crate::error::CliError;
 use crate::sensor_file::MADE_BY;
@@ -15,6 +16,8 @@ const SCHEMA: u32 = 2;
 /// All scores, recording by recording.
 #[derive(Default)]
 pub struct Evaluation {
+    /// The report, if one was asked for.
+    pub drawn: Option<Drawn>,
     recordings: Vec<Vec<RecordingScores>>,
 }
 

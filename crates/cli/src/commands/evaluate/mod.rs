@@ -10,11 +10,13 @@ use rayon::prelude::*;
 use sensors::{Rivals, Sensor};
 
 use crate::args::{EvaluateArgs, Split};
+use crate::commands::reporting::{Drawn, Reporting, Wanted, sample};
 use crate::commands::scoring::Part;
 use crate::error::CliError;
 use crate::input::{self, Recording, check_unit};
-use crate::output::print;
+use crate::output::{Outputs, print};
 use crate::progress::Progress;
+use crate::report::Sample;
 use crate::suits;
 
 /// Smallest coverage of the 95 % interval that `--check` accepts.
@@ -24,6 +26,9 @@ const LEAST_COVERAGE: f64 = 0.8;
 pub fn run(args: &EvaluateArgs) -> Result<(), CliError> {
     let mut evaluation = Evaluation::default();
     let source = &args.calibration;
+    let inputs = args.traces.iter().chain(&args.test).chain(&source.train).chain(&source.sensor);
+    let mut outputs = Outputs::new(args.force, inputs);
+    let wanted = Wanted::claim(&args.report, &mut outputs)?;
     let judged = match (&source.sensor, source.split.is_empty()) {
         (Some(sensor), _) => with_sensor_file(args, sensor, &mut evaluation),
         (None, false) => with_splits(args, &mut evaluation),
@@ -34,6 +39,10 @@ pub fn run(args: &EvaluateArgs) -> Result<(), CliError> {
         print(|out| evaluation.write(out, args.json))?;
     }
     judged?;
+    if let Some((wanted, drawn)) = wanted.zip(evaluation.drawn.take()) {
+        wanted.put(drawn, &mut outputs)?;
+    }
+    outputs.publish()?;
     if args.check { check(&evaluation) } else { Ok(()) }
 }
 
@@ -51,7 +60,9 @@ fn with_splits(args: &EvaluateArgs, evaluation: &mut Evaluation) -> Result<(), C
     for path in &args.traces {
         let recording = read(args, path)?;
         for &split in &args.calibration.split {
-            evaluation.add(with_split(args, &recording, split, &progress)?);
+            let (scores, drawn) = with_split(args, &recording, split, &progress)?;
+            evaluation.add(scores);
+            evaluation.drawn = evaluation.drawn.take().or(drawn);
         }
     }
     Ok(())
@@ -63,7 +74,7 @@ fn with_split(
     recording: &Recording,
     split: Split,
     progress: &Progress,
-) -> Result<Vec<RecordingScores>, CliError> {
+) -> Result<(Vec<RecordingScores>, Option<Drawn>), CliError> {
     let rows = recording.trace.len();
     let training = [recording.rows(split.training(rows))];
     let (sensors, rivals) = calibrated(&training, args, progress)?;
@@ -71,11 +82,11 @@ fn with_split(
     let lag_s = reference_lag(&recording.samples()?).map(|lag| lag.lag_s);
     let (scored, time_at) = (split.scored(rows), |row: usize| recording.trace.time_s.get(row).copied());
     let part = Part { from_s: time_at(scored.start), until_s: time_at(scored.end) };
-    let Judged { mut scores, .. } = judge(args, recording, part, &sensors, &rivals)?;
+    let Judged { mut scores, drawn, .. } = judge(args, recording, part, &sensors, &rivals)?;
     for scores in &mut scores {
         (scores.lag_s, scores.split) = (Some(lag_s), Some(split.to_string()));
     }
-    Ok(scores)
+    Ok((scores, drawn))
 }
 
 /// Some recordings with parameters from others.
@@ -95,9 +106,10 @@ fn with_training(args: &EvaluateArgs, evaluation: &mut Evaluation) -> Result<(),
 /// until then, so that they come in order, too.
 fn add_until_error(evaluation: &mut Evaluation, judged: Vec<Result<Judged, CliError>>) -> Result<(), CliError> {
     for judged in judged {
-        let Judged { scores, warnings } = judged?;
+        let Judged { scores, warnings, drawn } = judged?;
         warnings.iter().for_each(|warning| CliError::warning(warning));
         evaluation.add(scores);
+        evaluation.drawn = evaluation.drawn.take().or(drawn);
     }
     Ok(())
 }
@@ -125,6 +137,8 @@ fn calibrated(
 struct Judged {
     scores: Vec<RecordingScores>,
     warnings: Vec<String>,
+    /// The report, of the first recording.
+    drawn: Option<Drawn>,
 }
 
 /// Scores of every sensor on some rows of a recording.
@@ -152,6 +166,13 @@ fn judge(
     for sensor in sensors {
         let scores = sensor.judge(recording, part, args.rest_resistance, baselines, &mut judged.warnings)?;
         judged.scores.push(scores.ok_or_else(nothing)?);
+    }
+    if args.draws(&recording.name) {
+        let kind = Some(first.kind);
+        let sample =
+            if args.calibration.split.is_empty() { sample(recording, &first.params, part) } else { Sample::Out };
+        let reporting = Reporting { recording, params: &first.params, kind, rest_reading, part, sample, facts: &[] };
+        judged.drawn = Some(reporting.drawn()?);
     }
     Ok(judged)
 }

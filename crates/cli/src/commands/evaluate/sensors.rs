@@ -17,7 +17,8 @@ use crate::validity::ValidityWatch;
 /// A calibrated sensor and the estimator that it is judged with.
 pub struct Sensor {
     pub params: SensorParams,
-    kind: EstimatorKind,
+    /// The estimator.
+    pub kind: EstimatorKind,
     /// Wall-clock time of the calibration, s; `None` if it was read from a file.
     calibration_s: Option<f64>,
     /// Whether it is shown to say what another one is made of.

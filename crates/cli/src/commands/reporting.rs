@@ -1,0 +1,125 @@
+use std::path::Path;
+
+use ohmstrain_calib::{EstimatorKind, Scores, SensorParams};
+
+use super::scoring::{self, Part};
+use crate::args::ReportArgs;
+use crate::error::CliError;
+use crate::input::Recording;
+use crate::output::{Claim, Kind, Outputs};
+use crate::report::{FigureFiles, Report, ReportInput, Sample, ScoreRow, Scored};
+use crate::run::estimate;
+use crate::sensor_file::MADE_BY;
+use crate::verdict::verdict;
+
+/// What a report is about.
+pub struct Reporting<'a> {
+    pub recording: &'a Recording,
+    pub params: &'a SensorParams,
+    /// Estimator; the sensor's own choice if there is none.
+    pub kind: Option<EstimatorKind>,
+    /// R₀ of the recording.
+    pub rest_reading: f64,
+    /// The rows that are scored, and whether they were calibrated on.
+    pub part: Part,
+    pub sample: Sample,
+    /// What else there is to say: heading and text.
+    pub facts: &'a [(&'static str, String)],
+}
+
+/// A report and its plots.
+pub struct Drawn {
+    html: String,
+    figures: Vec<FigureFiles>,
+}
+
+/// Where they go.
+pub struct Wanted<'a> {
+    report: Option<Claim>,
+    figures: Option<&'a Path>,
+}
+
+impl<'a> Wanted<'a> {
+    /// Claims what the flags ask for; `None` if they ask for nothing.
+    pub fn claim(args: &'a ReportArgs, outputs: &mut Outputs) -> Result<Option<Self>, CliError> {
+        let report = args.report.as_deref().map(|path| outputs.claim(path, Kind::Report)).transpose()?;
+        let figures = args.figures.as_deref();
+        figures.map_or(Ok(()), |folder| outputs.folder(folder))?;
+        Ok((report.is_some() || figures.is_some()).then_some(Self { report, figures }))
+    }
+
+    /// Puts what was drawn where it goes.
+    pub fn put(self, drawn: Drawn, outputs: &mut Outputs) -> Result<(), CliError> {
+        if let Some(claim) = self.report {
+            outputs.put(claim, drawn.html);
+        }
+        let Some(folder) = self.figures else { return Ok(()) };
+        for FigureFiles { name, svg, csv } in drawn.figures {
+            for (ending, content) in [("svg", svg), ("csv", csv)] {
+                let claim = outputs.claim(&folder.join(format!("{name}.{ending}")), Kind::Figure)?;
+                outputs.put(claim, content);
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Reporting<'_> {
+    /// Estimates, scores and draws.
+    pub fn drawn(&self) -> Result<Drawn, CliError> {
+        let Self { recording, params, part, .. } = *self;
+        let estimated = estimate(recording, params, self.rest_reading, self.kind)?;
+        let kind = self.kind.unwrap_or(params.default_estimator);
+        let moved = params.rest_reading / self.rest_reading;
+        let filter = scoring::of_outputs(recording, &estimated.filtered, part);
+        let smoother = scoring::of_outputs(recording, &estimated.smoothed, part);
+        let cubic = scoring::of_baseline(recording, params.static_cubic.start(), part, moved);
+        let rows = [("filter", filter), ("smoother", smoother), ("static cubic", cubic)];
+        let scores: Vec<ScoreRow> =
+            rows.into_iter().filter_map(|(name, scores)| scores.map(|scores| row(name, &scores))).collect();
+        let name =
+            Path::new(&recording.name).file_name().map_or_else(String::new, |name| name.to_string_lossy().into());
+        let input = ReportInput {
+            title: &name,
+            made_by: MADE_BY,
+            time_s: &recording.trace.time_s,
+            reading: &recording.trace.readings.values,
+            truth: recording.trace.reference.as_ref().map(|reference| reference.values.as_slice()),
+            filtered: &estimated.filtered,
+            smoothed: &estimated.smoothed,
+            params,
+            rest_reading: self.rest_reading,
+            scored: Scored { from_s: part.from_s, until_s: part.until_s },
+            sample: self.sample,
+            estimator: kind,
+            scores: &scores,
+            verdict: filter.map(|filter| verdict(&filter, cubic.as_ref())),
+            facts: self.facts,
+        };
+        let failed = |error: crate::report::ReportError| CliError::Other(error.to_string());
+        let report = Report::new(&input).map_err(failed)?;
+        Ok(Drawn { html: report.html().map_err(failed)?, figures: report.figures().map_err(failed)? })
+    }
+}
+
+/// Whether the rows of `part` were calibrated on, as far as a sensor file knows: it has the number of rows that were.
+pub fn sample(recording: &Recording, params: &SensorParams, part: Part) -> Sample {
+    let rows_before = |from_s: f64| recording.trace.time_s.partition_point(|time_s| *time_s < from_s);
+    match params.recordings.iter().find(|info| info.sha256 == recording.sha256) {
+        None => Sample::Out,
+        Some(info) if info.rows == recording.trace.len() => Sample::In,
+        Some(info) if part.from_s.is_some_and(|from_s| rows_before(from_s) == info.rows) => Sample::Out,
+        Some(_) => Sample::Perhaps,
+    }
+}
+
+fn row<'a>(name: &'a str, scores: &Scores) -> ScoreRow<'a> {
+    ScoreRow {
+        name,
+        rmse: scores.rmse,
+        rmse_percent_fs: scores.rmse_percent_fs,
+        coverage_95: scores.coverage_95,
+        width_95_percent_fs: scores.width_95_percent_fs,
+        crps_percent_fs: scores.crps_percent_fs,
+    }
+}

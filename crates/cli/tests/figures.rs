@@ -1,0 +1,58 @@
+//! Reports and figures of `evaluate` and `calibrate`.
+
+#[allow(dead_code, reason = "each test program uses its own share")]
+mod common;
+
+use common::{Bench, CALIBRATED_UNTIL, files_in};
+
+#[test]
+fn evaluate_draws_the_part_that_is_scored() {
+    let bench = Bench::calibrated();
+    let flags = ["evaluate", "trace.csv", "--sensor", "sensor.toml", "--report", "report.html", "--figures", "figures"];
+    let from = ["--from", CALIBRATED_UNTIL];
+    for _ in 0..2 {
+        bench.run(&[&flags[..], &from[..]].concat()).ok();
+    }
+    let report = bench.read("report.html");
+    // Three quarters of the rows were calibrated on: those before.
+    assert!(report.contains("not calibrated on, scored from 300 s on") && report.contains("estimator “ekf”"));
+    assert!(report.contains("scored part") && !report.contains("in-sample"));
+    bench.run(&flags).ok();
+    assert!(bench.read("report.html").contains("perhaps in-sample"));
+
+    let files = files_in(&bench.path("figures"));
+    let names = |ending: &str| -> Vec<String> {
+        files.iter().filter_map(|file| file.strip_suffix(ending)).map(str::to_owned).collect()
+    };
+    assert_eq!(names(".svg"), names(".csv"));
+    for wanted in
+        ["strain-against-time", "error-against-time", "hysteresis-loop", "gauge-curve", "relaxation-while-held"]
+    {
+        assert!(names(".svg").iter().any(|name| name.ends_with(wanted)), "{wanted}: {files:?}");
+    }
+    // The reference in the CSV is the recording's: strain in percent, between 0 and 10 mm on 30 mm.
+    let csv = bench.read("figures/01-strain-against-time.csv");
+    let reference: Vec<f64> = csv
+        .lines()
+        .filter(|line| line.starts_with("\"reference\""))
+        .map(|line| line.rsplit(',').next().unwrap().parse().unwrap())
+        .collect();
+    let largest = reference.iter().copied().fold(0.0, f64::max);
+    assert!(reference.len() > 500 && (largest - 100.0 / 3.0).abs() < 0.1, "{largest}");
+}
+
+#[test]
+fn a_calibration_reports_in_sample_and_says_so() {
+    let bench = Bench::new();
+    bench.run(&[&common::SIMULATE[..], &["-o", "trace.csv"]].concat()).ok();
+    let flags = ["calibrate", "trace.csv", "--until", "60", "--estimator", "ekf", "-o", "sensor.toml"];
+    bench.run(&[&flags[..], &["--report", "report.html", "--figures", "figures"]].concat()).ok();
+    let report = bench.read("report.html");
+    for words in ["in-sample", "<dt>Left out</dt>", "<dt>Record next</dt>", "static curve; its error bars"] {
+        assert!(report.contains(words), "{words}");
+    }
+    bench.write("figures/01-strain-against-time.svg", "<svg>mine</svg>");
+    let refused = bench.run(&[&flags[..], &["--figures", "figures"]].concat());
+    assert_eq!(refused.code, Some(2), "{}", refused.stderr);
+    assert!(refused.stderr.contains("something else than a figure"), "{}", refused.stderr);
+}
