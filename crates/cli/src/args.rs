@@ -11,7 +11,7 @@ use std::str::FromStr;
 use clap::{Args as ClapArgs, Parser, Subcommand, ValueEnum};
 use ohmstrain_bench_data::simulate::{Material, Protocol};
 use ohmstrain_bench_data::{FrontEndSpec, JointSpec, Metadata, ResistanceUnit, StrainUnit};
-use ohmstrain_calib::{EstimatorKind, GaugeFamily, SensorParams};
+use ohmstrain_calib::{EstimatorKind, GaugeFamily};
 use ohmstrain_ekf::Influence;
 
 pub use evaluate::{Estimators, EvaluateArgs};
@@ -234,14 +234,6 @@ pub struct EstimateArgs {
     /// Overrides of the recording's metadata
     #[command(flatten)]
     pub trace: TraceArgs,
-}
-
-impl EstimateArgs {
-    /// The estimator that was asked for.
-    pub fn kind(&self, params: &SensorParams) -> EstimatorKind {
-        let kind = self.estimator.chosen().map_or(params.default_estimator, |estimator| estimator.0);
-        if self.no_correction { kind.filter() } else { kind }
-    }
 }
 
 /// Flags of `filter`.

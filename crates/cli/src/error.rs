@@ -2,9 +2,12 @@ use std::io::{self, Write};
 use std::path::Path;
 use std::process::ExitCode;
 
+use ohmstrain::Error as LibraryError;
 use ohmstrain_bench_data::TraceError;
 use ohmstrain_calib::CalibrationError;
 use thiserror::Error;
+
+use crate::suits;
 
 /// Why a command stopped; each kind has its exit code.
 #[derive(Debug, Error)]
@@ -60,9 +63,33 @@ impl CliError {
         }
     }
 
+    /// An error about the contents of an input with the input's name.
+    pub fn named(self, name: &str) -> Self {
+        match self {
+            Self::Input(text) => Self::Input(format!("{name}: {text}")),
+            other => other,
+        }
+    }
+
     /// `path` cannot be read or written.
     pub fn file(doing: &str, path: &Path, error: &io::Error) -> Self {
         Self::Other(format!("cannot {doing} {}: {error}", path.display()))
+    }
+}
+
+/// What the library refuses: options are arguments, rows count from one.
+impl From<LibraryError> for CliError {
+    fn from(error: LibraryError) -> Self {
+        match error {
+            LibraryError::NoSmoother => Self::Arguments("--estimator: this one has no smoother".into()),
+            LibraryError::InitialStrain { quantity, .. } => {
+                let refused = error.to_string().replacen("initial strain", "--initial-strain", 1);
+                Self::Arguments(refused + suits::start_hint(quantity))
+            }
+            LibraryError::Guard(_) | LibraryError::NotPositive { .. } => Self::Arguments(error.to_string()),
+            LibraryError::Row { row, source } => Self::Input(format!("data row {}: {source}", row + 1)),
+            _ => Self::Input(error.to_string()),
+        }
     }
 }
 

@@ -3,8 +3,9 @@ use std::io::{self, BufReader, Read};
 use std::ops::Range;
 use std::path::Path;
 
-use ohmstrain_bench_data::{Metadata, ReadingKind, Trace, TraceReader};
-use ohmstrain_calib::{JointParams, Quantity, ReadingUnit, Samples, SensorParams};
+use ohmstrain::{JointParams, Quantity, Reading, ReadingUnit};
+use ohmstrain_bench_data::{Metadata, Reading as TraceReading, ReadingKind, Trace, TraceReader};
+use ohmstrain_calib::Samples;
 use sha2::{Digest, Sha256};
 
 use crate::error::CliError;
@@ -82,6 +83,15 @@ impl Recording {
             .map_err(|error| CliError::Input(format!("{}: data {error}", self.name)))
     }
 
+    /// Time, s, and reading of a row.
+    pub fn reading(&self, row: usize) -> (f64, Reading) {
+        let (time_s, value) = (self.trace.time_s[row], self.trace.readings.values[row]);
+        let converter = self.trace.readings.converter.as_ref();
+        let sd = converter.and_then(|converter| converter.sd_ohm.get(row).copied()).unwrap_or(0.0);
+        let saturated = converter.is_some_and(|converter| converter.saturated.get(row).copied().unwrap_or(false));
+        (time_s, Reading { value, sd, saturated })
+    }
+
     /// The reference in a row; NaN where it is missing.
     pub fn truth(&self, row: usize) -> f64 {
         let value = self.trace.reference.as_ref().and_then(|reference| reference.values.get(row));
@@ -117,7 +127,7 @@ impl Recording {
 }
 
 /// The joint that metadata describe.
-fn joint(metadata: &Metadata) -> Option<JointParams> {
+pub fn joint(metadata: &Metadata) -> Option<JointParams> {
     metadata.joint.map(|joint| JointParams {
         prestrain: joint.prestrain,
         moment_arm_mm: joint.moment_arm_mm,
@@ -125,11 +135,9 @@ fn joint(metadata: &Metadata) -> Option<JointParams> {
     })
 }
 
-/// Takes the joint that a recording, or a flag, puts the sensor on. A sensor calibrated in degrees needs none.
-pub fn take_joint(params: &mut SensorParams, metadata: &Metadata) {
-    if params.quantity == Quantity::Strain {
-        params.joint = joint(metadata).or(params.joint);
-    }
+/// A reading of a trace as the library takes it.
+pub fn reading(reading: &TraceReading) -> Reading {
+    Reading { value: reading.value, sd: reading.sd_ohm.unwrap_or(0.0), saturated: reading.saturated }
 }
 
 /// Unit of the readings.

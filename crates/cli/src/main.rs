@@ -19,7 +19,6 @@ mod report;
 mod run;
 mod sensor_file;
 mod suits;
-mod validity;
 mod verdict;
 
 use std::process::ExitCode;

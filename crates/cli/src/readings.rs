@@ -1,10 +1,9 @@
 use std::io::Read;
 
+use ohmstrain::Reading;
 use ohmstrain_bench_data::TraceReader;
-use ohmstrain_ekf::Reading;
 
 use crate::error::CliError;
-use crate::run::relative;
 
 /// The readings of a long recording, and nothing else of it: 16 bytes a row, 25 for those of a converter.
 pub struct Readings {
@@ -47,20 +46,12 @@ impl Readings {
         self.values.iter().copied()
     }
 
-    /// Time, s, and reading as recorded, of a row.
-    pub fn recorded(&self, row: usize) -> (f64, f64) {
-        (self.time_s[row], self.values[row])
-    }
-
-    /// Whether the converter stood at an end of its scale.
-    pub fn is_saturated(&self, row: usize) -> bool {
-        self.converter.as_ref().is_some_and(|converter| converter.saturated[row])
-    }
-
-    /// Time, s, and reading relative to R₀, of a row.
-    pub fn relative(&self, row: usize, rest_reading: f64) -> (f64, Option<Reading<f64>>) {
-        let sd_ohm = self.converter.as_ref().map(|converter| converter.sd_ohm[row]);
-        (self.time_s[row], relative(self.values[row], sd_ohm, rest_reading))
+    /// Time, s, and reading of a row.
+    pub fn row(&self, row: usize) -> (f64, Reading) {
+        let value = self.values[row];
+        let (sd, saturated) =
+            self.converter.as_ref().map_or((0.0, false), |converter| (converter.sd_ohm[row], converter.saturated[row]));
+        (self.time_s[row], Reading { value, sd, saturated })
     }
 }
 

@@ -269,12 +269,12 @@ impl<'a> FilterBuilder<'a> {
     }
 
     fn start_at(&self, strain: f64) -> Result<Start, Error> {
-        let limits = self.sensor.params().limits;
+        let (limits, quantity) = (self.sensor.params().limits, self.sensor.params().quantity);
         let beyond = (limits.lower - strain).max(strain - limits.upper);
         if beyond <= START_BEYOND * limits.span() {
             return Ok(Start::Strain(strain));
         }
-        Err(Error::InitialStrain { lower: limits.lower, upper: limits.upper, found: strain })
+        Err(Error::InitialStrain { quantity, lower: limits.lower, upper: limits.upper, found: strain })
     }
 
     fn guard(&self) -> Result<Guard<f64>, Error> {

@@ -140,6 +140,9 @@ pub(crate) struct Header {
 }
 
 impl Header {
+    pub(crate) const OHM_STRAIN: Self =
+        Self { reading: ReadingUnit::Ohm, quantity: Quantity::Strain, has_joint: false };
+
     pub(crate) const fn of(params: &SensorParams) -> Self {
         Self { reading: params.reading, quantity: params.quantity, has_joint: params.joint.is_some() }
     }

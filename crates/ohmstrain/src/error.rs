@@ -1,11 +1,11 @@
 use std::fmt;
 
-use ohmstrain_calib::{CalibrationError, FORMAT, FieldError, SamplesError};
+use ohmstrain_calib::{CalibrationError, FORMAT, FieldError, Quantity, SamplesError};
 use ohmstrain_ekf::StepError;
 use ohmstrain_model::ParameterError;
 use thiserror::Error;
 
-use crate::UnitDoubt;
+use crate::{ReferenceDoubt, UnitDoubt};
 
 /// Why there is no sensor, no filter or no estimate.
 ///
@@ -32,8 +32,10 @@ pub enum Error {
     #[error("the sensor's joint: {0}")]
     Joint(ParameterError),
     /// A strain to start at that the sensor never reports.
-    #[error("initial strain: expected {lower:.4} to {upper:.4}, the sensor's limits, found {found}")]
+    #[error("initial strain: expected {lower:.4} to {upper:.4}, the limits of the sensor's {}, found {found}", quantity.name())]
     InitialStrain {
+        /// What is estimated.
+        quantity: Quantity,
         /// Lower limit.
         lower: f64,
         /// Upper limit.
@@ -66,6 +68,9 @@ pub enum Error {
     /// Readings that seem to be in another unit than the calibration's.
     #[error(transparent)]
     Unit(#[from] UnitDoubt),
+    /// A reference that seems to be in percent.
+    #[error(transparent)]
+    Reference(#[from] ReferenceDoubt),
     /// The filter does not take a row. It stays as it was: the next good row goes on from the last good one.
     #[error(transparent)]
     Step(#[from] StepError),

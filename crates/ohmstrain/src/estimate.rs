@@ -63,6 +63,35 @@ pub struct Estimate {
     header: Header,
 }
 
+/// A row of which nothing is known: NaN and `None`. Serialised, it is one of a sensor that reads ohms and tells strains.
+impl Default for Estimate {
+    fn default() -> Self {
+        let unknown = f64::NAN;
+        Self {
+            time_s: unknown,
+            resistance: None,
+            strain: unknown,
+            strain_sd: unknown,
+            strain_rate: unknown,
+            strain_rate_sd: unknown,
+            relaxation: unknown,
+            relaxation_sd: unknown,
+            baseline: unknown,
+            settled_resistance: unknown,
+            settled_resistance_sd: unknown,
+            p_extend: None,
+            p_hold: None,
+            p_retract: None,
+            p_beyond_border: unknown,
+            nis: None,
+            flags: Flags::NONE,
+            angle_deg: None,
+            angle_sd: None,
+            header: Header::OHM_STRAIN,
+        }
+    }
+}
+
 /// With the names of `estimates.csv`.
 impl Serialize for Estimate {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {

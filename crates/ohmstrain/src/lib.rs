@@ -31,9 +31,11 @@ mod filter;
 mod flags;
 mod reading;
 mod recording;
+mod reference_doubt;
 mod sensor;
 mod text;
 mod unit_doubt;
+mod validity;
 
 pub use builder::FilterBuilder;
 pub use calibrate::{Calibrated, Calibration, calibrate};
@@ -44,8 +46,10 @@ pub use filter::{Filter, LaggedFilter};
 pub use flags::{Flag, Flags};
 pub use reading::Reading;
 pub use recording::{Evaluation, Recording};
+pub use reference_doubt::ReferenceDoubt;
 pub use sensor::Sensor;
 pub use unit_doubt::{UnitDoubt, UnitGuess};
+pub use validity::{Beyond, Extrapolation, ValidityWatch};
 
 #[doc(no_inline)]
 pub use ohmstrain_calib::{

@@ -25,8 +25,14 @@ impl Reading {
     /// ```
     pub const MISSING: Self = Self { value: f64::NAN, sd: 0.0, saturated: false };
 
-    /// Relative to R₀, as filters take it; `None` without a value.
-    pub(crate) fn relative(self, rest_reading: f64) -> Option<ohmstrain_ekf::Reading<f64>> {
+    /// Relative to R₀, R/R₀ - 1, as the kernels of `ohmstrain-ekf` take it; `None` without a value.
+    ///
+    /// ```
+    /// let relative = ohmstrain::Reading::from(1760.0).relative(1600.0).unwrap();
+    /// assert!((relative.value - 0.1).abs() < 1e-15);
+    /// ```
+    #[must_use]
+    pub fn relative(self, rest_reading: f64) -> Option<ohmstrain_ekf::Reading<f64>> {
         if !self.value.is_finite() {
             return None;
         }

@@ -116,6 +116,7 @@ impl Sensor {
         if (recording.reading, recording.quantity) != (params.reading, params.quantity) {
             return Err(Error::OtherQuantity);
         }
+        self.check_reference(samples.strain().iter().copied())?;
         let (time_s, readings) = (samples.time_s(), samples.reading());
         let smoothed = self.smooth(time_s, readings)?;
         let mut filter = self.filter().build()?;

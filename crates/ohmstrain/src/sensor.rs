@@ -106,6 +106,35 @@ impl Sensor {
         &self.params
     }
 
+    /// The same, given away.
+    ///
+    /// ```
+    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+    /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
+    /// let mut params = sensor.into_params();
+    /// params.limits.upper = 0.3;
+    /// let sensor = ohmstrain::Sensor::from_params(params)?;
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn into_params(self) -> SensorParams {
+        self.params
+    }
+
+    /// R₀ of the law, which everything is relative to, in the unit of the readings: the calibration's, or, if
+    /// `rest_resistance` is what the rested sensor reads now, where that moves it.
+    ///
+    /// ```
+    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+    /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
+    /// assert_eq!(sensor.rest_reading(None), sensor.params().rest_reading);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn rest_reading(&self, rest_resistance: Option<f64>) -> f64 {
+        rest_resistance.map_or(self.params.rest_reading, |measured| self.params.rest_reading_of(measured))
+    }
+
     /// The sensor glued across a joint: estimates then have an angle, too. A sensor that was calibrated in degrees needs
     /// no joint and stays as it is.
     ///
@@ -204,7 +233,6 @@ impl Sensor {
         readings: impl IntoIterator<Item = f64>,
         rest_resistance: Option<f64>,
     ) -> Result<(), UnitDoubt> {
-        let rest = rest_resistance.map_or(self.params.rest_reading, |measured| self.params.rest_reading_of(measured));
-        UnitDoubt::of(&self.params, rest, readings.into_iter()).map_or(Ok(()), Err)
+        UnitDoubt::of(&self.params, self.rest_reading(rest_resistance), readings.into_iter()).map_or(Ok(()), Err)
     }
 }

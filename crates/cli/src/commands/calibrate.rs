@@ -2,6 +2,7 @@ use std::io;
 use std::path::Path;
 use std::time::Instant;
 
+use ohmstrain::Sensor;
 use ohmstrain_calib::{
     EstimatorKind, Findings, LawOptions, Quantity, RECIPE, ReadingUnit, RecordingInfo, Samples, SensorParams,
     calibrate, screen,
@@ -41,16 +42,18 @@ pub fn run(args: &CalibrateArgs) -> Result<(), CliError> {
     let structures = structures(args, estimator);
     let start = Instant::now();
     let progress = Progress::new("calibrating");
-    let Calibrated { params, findings } = calibrate_recordings(&recordings, &structures, estimator, &progress)?;
+    let Calibrated { sensor, findings } = calibrate_recordings(&recordings, &structures, estimator, &progress)?;
     drop(progress);
     let calibration_s = start.elapsed().as_secs_f64();
-    outputs.put(sensor_output, sensor_file::text(&params)?);
+    let params = sensor.params();
+    outputs.put(sensor_output, sensor_file::text(&sensor)?);
     let file = args.output.display().to_string();
-    let closing = Closing { file: &file, params: &params, findings: findings.as_ref(), calibration_s };
+    let closing = Closing { file: &file, params, findings: findings.as_ref(), calibration_s };
     if let Some(wanted) = wanted {
-        let (facts, rest_reading) = (closing.facts(), params.rest_reading);
+        let (facts, rest_resistance) = (closing.facts(), None);
         let (recording, part, sample) = (&recordings[0], Part::default(), Sample::In);
-        let reporting = Reporting { recording, params: &params, kind: None, rest_reading, part, sample, facts: &facts };
+        let reporting =
+            Reporting { recording, sensor: &sensor, kind: None, rest_resistance, part, sample, facts: &facts };
         wanted.put(reporting.drawn()?, &mut outputs)?;
     }
     let explained = explain::text(args, &recordings, &params.law)?;
@@ -65,7 +68,7 @@ pub fn run(args: &CalibrateArgs) -> Result<(), CliError> {
 /// What comes of a calibration.
 pub struct Calibrated {
     /// The sensor.
-    pub params: SensorParams,
+    pub sensor: Sensor,
     /// What it is worth; `None` if that could not be told.
     pub findings: Option<Findings>,
 }
@@ -112,7 +115,7 @@ pub fn calibrate_recordings(
     let sensor = SensorParams { joint: recordings.iter().find_map(Recording::joint), recordings: infos, ..sensor };
     plausible::warn_of_rests(recordings, &sensor);
     plausible::warn_of_intervals(&sensor);
-    Ok(Calibrated { params: sensor, findings })
+    Ok(Calibrated { sensor: sensor_file::checked(sensor)?, findings })
 }
 
 /// Paths are the machine's own business; the name says which recording it was.

@@ -1,7 +1,8 @@
 use std::time::Instant;
 
+use ohmstrain::{Estimate, Sensor};
 use ohmstrain_bench_data::simulate::{Material, Protocol, SimulationSettings};
-use ohmstrain_calib::{LawOptions, Output, RECIPE, SensorParams};
+use ohmstrain_calib::{LawOptions, RECIPE};
 
 use super::calibrate::{Calibrated, calibrate_recordings};
 use super::closing::Closing;
@@ -12,7 +13,7 @@ use super::simulate;
 use super::smooth::write_estimates;
 use crate::args::{DemoArgs, ReportArgs};
 use crate::error::CliError;
-use crate::input::{self, Recording};
+use crate::input;
 use crate::output::{Kind, Outputs, print};
 use crate::progress::Progress;
 use crate::report::Sample;
@@ -45,21 +46,28 @@ pub fn run(args: &DemoArgs) -> Result<(), CliError> {
     let estimator = RECIPE.estimator;
     let structures = LawOptions::candidates(estimator);
     let start = Instant::now();
-    let Calibrated { params, findings } =
+    let Calibrated { sensor, findings } =
         calibrate_recordings(std::slice::from_ref(&training), structures, estimator, &progress)?;
     let calibration_s = start.elapsed().as_secs_f64();
-    outputs.put(sensor_output, sensor_file::text(&params)?);
+    let params = sensor.params();
+    outputs.put(sensor_output, sensor_file::text(&sensor)?);
 
     progress.doing("filtering and smoothing");
-    let estimated = estimate(&recording, &params, params.rest_reading, None)?;
-    outputs.put(filtered_output, estimates(&recording, &params, &estimated.filtered)?);
-    outputs.put(smoothed_output, estimates(&recording, &params, &estimated.smoothed)?);
+    let estimated = estimate(&recording, &sensor, None, None)?;
+    outputs.put(filtered_output, estimates(&sensor, &estimated.filtered)?);
+    outputs.put(smoothed_output, estimates(&sensor, &estimated.smoothed)?);
     progress.doing("writing the report");
     let part = Part::since(Some(test_from));
-    let facts = Closing { file: "sensor.toml", params: &params, findings: findings.as_ref(), calibration_s }.facts();
-    let (rest_reading, sample) = (params.rest_reading, Sample::Out);
-    let reporting =
-        Reporting { recording: &recording, params: &params, kind: None, rest_reading, part, sample, facts: &facts };
+    let facts = Closing { file: "sensor.toml", params, findings: findings.as_ref(), calibration_s }.facts();
+    let reporting = Reporting {
+        recording: &recording,
+        sensor: &sensor,
+        kind: None,
+        rest_resistance: None,
+        part,
+        sample: Sample::Out,
+        facts: &facts,
+    };
     if let Some(wanted) = wanted {
         wanted.put(reporting.drawn()?, &mut outputs)?;
     }
@@ -68,8 +76,8 @@ pub fn run(args: &DemoArgs) -> Result<(), CliError> {
 
     let mut table = score_table(params.quantity.name(), &[]);
     let scores = [
-        ("filter", scoring::of_outputs(&recording, &estimated.filtered, part)),
-        ("smoother", scoring::of_outputs(&recording, &estimated.smoothed, part)),
+        ("filter", scoring::of_estimates(&recording, &estimated.filtered, part)),
+        ("smoother", scoring::of_estimates(&recording, &estimated.smoothed, part)),
         ("static cubic", scoring::of_baseline(&recording, params.static_cubic.start(), part, 1.0)),
     ];
     for (name, scores) in scores {
@@ -92,8 +100,8 @@ fn settings(seed: u64) -> SimulationSettings {
     }
 }
 
-fn estimates(recording: &Recording, params: &SensorParams, outputs: &[Output]) -> Result<Vec<u8>, CliError> {
+fn estimates(sensor: &Sensor, estimates: &[Estimate]) -> Result<Vec<u8>, CliError> {
     let mut bytes = Vec::new();
-    write_estimates(&mut bytes, recording, params, params.rest_reading, outputs, &[])?;
+    write_estimates(&mut bytes, sensor, estimates)?;
     Ok(bytes)
 }

@@ -13,7 +13,7 @@ pub fn run(args: &ExportArgs) -> Result<(), CliError> {
         let name = other.name();
         return Err(CliError::Arguments(format!("--estimator: expected ekf, the only one to export, found {name}")));
     }
-    let params = sensor_file::read(&args.sensor, Some(EstimatorKind::Ekf))?;
+    let params = sensor_file::read(&args.sensor, Some(EstimatorKind::Ekf))?.into_params();
     let files = export::files(&params, args.target, args.dt_s)
         .map_err(|error| error.into_cli(&args.sensor.display().to_string()))?;
     if params.default_estimator != EstimatorKind::Ekf && args.estimator.chosen().is_none() {

@@ -1,6 +1,6 @@
 use std::path::Path;
 
-use ohmstrain_calib::{EstimatorKind, Scores, SensorParams};
+use ohmstrain::{EstimatorKind, Scores, Sensor, SensorParams};
 
 use super::scoring::{self, Part};
 use crate::args::ReportArgs;
@@ -15,11 +15,11 @@ use crate::verdict::verdict;
 /// What a report is about.
 pub struct Reporting<'a> {
     pub recording: &'a Recording,
-    pub params: &'a SensorParams,
+    pub sensor: &'a Sensor,
     /// Estimator; the sensor's own choice if there is none.
     pub kind: Option<EstimatorKind>,
-    /// R₀ of the recording.
-    pub rest_reading: f64,
+    /// What the rested sensor reads, if not what it read in calibration.
+    pub rest_resistance: Option<f64>,
     /// The rows that are scored, and whether they were calibrated on.
     pub part: Part,
     pub sample: Sample,
@@ -67,12 +67,13 @@ impl<'a> Wanted<'a> {
 impl Reporting<'_> {
     /// Estimates, scores and draws.
     pub fn drawn(&self) -> Result<Drawn, CliError> {
-        let Self { recording, params, part, .. } = *self;
-        let estimated = estimate(recording, params, self.rest_reading, self.kind)?;
+        let Self { recording, sensor, part, .. } = *self;
+        let (params, rest_reading) = (sensor.params(), sensor.rest_reading(self.rest_resistance));
+        let estimated = estimate(recording, sensor, self.rest_resistance, self.kind)?;
         let kind = self.kind.unwrap_or(params.default_estimator);
-        let moved = params.rest_reading / self.rest_reading;
-        let filter = scoring::of_outputs(recording, &estimated.filtered, part);
-        let smoother = scoring::of_outputs(recording, &estimated.smoothed, part);
+        let moved = params.rest_reading / rest_reading;
+        let filter = scoring::of_estimates(recording, &estimated.filtered, part);
+        let smoother = scoring::of_estimates(recording, &estimated.smoothed, part);
         let cubic = scoring::of_baseline(recording, params.static_cubic.start(), part, moved);
         let rows = [("filter", filter), ("smoother", smoother), ("static cubic", cubic)];
         let scores: Vec<ScoreRow> =
@@ -88,7 +89,7 @@ impl Reporting<'_> {
             filtered: &estimated.filtered,
             smoothed: &estimated.smoothed,
             params,
-            rest_reading: self.rest_reading,
+            rest_reading,
             scored: Scored { from_s: part.from_s, until_s: part.until_s },
             sample: self.sample,
             estimator: kind,

@@ -1,4 +1,5 @@
-use ohmstrain_calib::{Baseline, Output, ScoredRow, Scores};
+use ohmstrain::Estimate;
+use ohmstrain_calib::{Baseline, ScoredRow, Scores};
 
 use crate::input::Recording;
 
@@ -35,12 +36,9 @@ fn scores(recording: &Recording, part: Part, estimate: impl Fn(usize) -> (f64, O
     Scores::new(&rows)
 }
 
-/// Scores of an estimator's outputs; `None` without a reference.
-pub fn of_outputs(recording: &Recording, outputs: &[Output], part: Part) -> Option<Scores> {
-    scores(recording, part, |k| {
-        let strain = outputs[k].estimate.strain;
-        (strain.mean, Some(strain.sd()))
-    })
+/// Scores of estimates; `None` without a reference.
+pub fn of_estimates(recording: &Recording, estimates: &[Estimate], part: Part) -> Option<Scores> {
+    scores(recording, part, |k| (estimates[k].strain, Some(estimates[k].strain_sd)))
 }
 
 /// Scores of a baseline, which runs over the whole recording too; it is given the readings times `moved`.

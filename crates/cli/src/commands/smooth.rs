@@ -1,40 +1,45 @@
 use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
+use std::ops::Range;
 
-use ohmstrain_calib::{Filter, Output, Rows, SensorParams};
+use ohmstrain::{Estimate, FilterBuilder, Sensor, ValidityWatch};
 use tempfile::SpooledTempFile;
 
 use crate::args::SmoothArgs;
 use crate::error::CliError;
-use crate::estimates::{EstimateRow, EstimateWriter};
-use crate::input::{self, Recording, check_unit};
+use crate::estimates::EstimateWriter;
+use crate::input::{self, check_unit};
 use crate::readings::Readings;
-use crate::run::{filter, no_smoother, rest_reading, step_error};
+use crate::run::{builder, rest_resistance};
 use crate::sensor_file;
 use crate::suits;
-use crate::validity::ValidityWatch;
 
 /// Smooths a recording and writes its estimates, all of them or none. Of a long one, readings and rates are held in memory, and
 /// the states of a few thousand rows; estimates, which come out last segment first, wait in a temporary file.
 pub fn run(args: &SmoothArgs) -> Result<(), CliError> {
     let wanted = args.estimate.estimator.chosen().map(|estimator| estimator.0);
-    let mut params = sensor_file::read(&args.estimate.sensor, wanted)?;
-    let kind = args.estimate.kind(&params);
+    let mut sensor = sensor_file::read(&args.estimate.sensor, wanted)?;
     let rows = input::open(&args.trace_file, &args.estimate.trace.metadata())?;
     let header = input::header(&rows);
-    check_unit(&header, rows.reading_kind(), params.reading)?;
-    input::take_joint(&mut params, rows.metadata());
+    check_unit(&header, rows.reading_kind(), sensor.params().reading)?;
+    if let Some(joint) = input::joint(rows.metadata()) {
+        sensor = sensor.on_joint(joint)?;
+    }
     let name = rows.file().to_string();
     let readings = Readings::collect(rows)?;
-    let rest_reading = rest_reading(args.estimate.rest_resistance, &params, readings.values(), &name)?;
-    suits::check_readings(&header, &params, rest_reading, readings.values())?;
-    let mut filter = filter(&params, kind.smoother(), &args.estimate)?;
-    let writer = EstimateWriter::new(Segments::new(), &params, &args.estimate.columns)?;
+    let rest = rest_resistance(args.estimate.rest_resistance, readings.values(), &name)?;
+    suits::check_readings(&header, &sensor, rest, readings.values())?;
+    let builder = builder(&sensor, &args.estimate);
+    let builder = rest.map_or(builder, |measured| builder.rest_resistance(measured));
+    let writer = EstimateWriter::new(Segments::new(), &sensor, &args.estimate.columns)?;
     let mut rates = vec![f32::NAN; readings.len()];
-    let segments = smooth_into(writer, filter.as_mut(), &readings, rest_reading, &name, &mut rates)?;
-    let mut watch = ValidityWatch::new(&name, &params, rest_reading);
+    let segments = smooth_into(writer, builder, &readings, &mut rates).map_err(|error| error.named(&name))?;
+    suits::warn_of_start(args.estimate.initial_strain, &sensor);
+    let mut watch = ValidityWatch::new(&sensor, rest);
     for (row, rate) in rates.into_iter().enumerate() {
-        let (time_s, reading) = readings.recorded(row);
-        watch.see(time_s, reading, rate.into(), f64::NAN, &mut |warning| CliError::warning(&warning));
+        let (time_s, reading) = readings.row(row);
+        for warning in watch.see(time_s, reading.value, rate.into(), f64::NAN) {
+            CliError::warning(&format!("{name}: {warning}"));
+        }
     }
     segments.write_in_order(&mut io::stdout().lock())
 }
@@ -42,28 +47,23 @@ pub fn run(args: &SmoothArgs) -> Result<(), CliError> {
 /// Writes the smoothed rows of a recording, last segment first, and keeps their rates.
 fn smooth_into(
     mut writer: EstimateWriter<Segments>,
-    filter: &mut dyn Filter,
+    builder: FilterBuilder,
     readings: &Readings,
-    rest_reading: f64,
-    name: &str,
     rates: &mut [f32],
 ) -> Result<Segments, CliError> {
-    let failed = |(row, error)| step_error(name, row, error);
     writer.get_mut().end_segment()?;
-    let row = |row: usize| readings.relative(row, rest_reading);
-    let mut back = filter.way_back(Rows::new(readings.len(), &row)).map_err(failed)?;
-    let (mut outputs, mut first) = (Vec::new(), readings.len());
-    while let Some(rows) = back.next_segment(&mut outputs).map_err(failed)? {
-        first = rows.start;
-        for (row, output) in rows.zip(&outputs) {
-            let (time_s, reading) = readings.recorded(row);
-            let saturated = readings.is_saturated(row);
-            rates[row] = output.estimate.rate.mean as f32;
-            writer.write(&EstimateRow { time_s, reading, saturated, rest_reading, output: *output })?;
-        }
-        writer.get_mut().end_segment()?;
-    }
-    if first == 0 { Ok(writer.into_inner()) } else { Err(no_smoother()) }
+    builder.smooth_backward(
+        readings.len(),
+        |row| readings.row(row),
+        |rows: Range<usize>, estimates| {
+            for (rate, estimate) in rates[rows].iter_mut().zip(estimates) {
+                *rate = estimate.strain_rate as f32;
+                writer.write(estimate)?;
+            }
+            writer.get_mut().end_segment()
+        },
+    )?;
+    Ok(writer.into_inner())
 }
 
 /// Bytes of estimates that wait in memory; more of them wait in a temporary file.
@@ -117,26 +117,9 @@ fn temporary(error: io::Error) -> CliError {
 }
 
 /// Writes a whole recording's estimates.
-pub fn write_estimates(
-    out: impl Write,
-    recording: &Recording,
-    params: &SensorParams,
-    rest_reading: f64,
-    outputs: &[Output],
-    columns: &[String],
-) -> Result<(), CliError> {
-    let trace = &recording.trace;
-    let saturated = trace.readings.converter.as_ref().map(|converter| converter.saturated.as_slice());
-    let mut writer = EstimateWriter::new(out, params, columns)?;
-    for (k, output) in outputs.iter().enumerate() {
-        writer.write(&EstimateRow {
-            time_s: trace.time_s[k],
-            reading: trace.readings.values[k],
-            saturated: saturated.and_then(|saturated| saturated.get(k).copied()).unwrap_or(false),
-            rest_reading,
-            output: *output,
-        })?;
-    }
+pub fn write_estimates(out: impl Write, sensor: &Sensor, estimates: &[Estimate]) -> Result<(), CliError> {
+    let mut writer = EstimateWriter::new(out, sensor, &[])?;
+    estimates.iter().try_for_each(|row| writer.write(row))?;
     writer.flush()
 }
 

@@ -1,6 +1,6 @@
 //! The plots of what is left: of the strain, and of the readings.
 
-use ohmstrain_calib::Output;
+use ohmstrain::Estimate;
 
 use super::ReportError;
 use super::axis::Axis;
@@ -15,13 +15,11 @@ const HEIGHT_PX: f64 = 240.0;
 /// Estimate less reference against time; nothing without a reference.
 pub fn strain(recording: &Recording) -> Result<Option<Figure>, ReportError> {
     let Some(truth) = recording.truth else { return Ok(None) };
-    let error = |output: &Output, truth: f64| recording.shown(output.estimate.strain.mean - truth);
-    let errors = |outputs: &[Output]| -> Vec<f64> {
-        outputs.iter().zip(truth).map(|(output, truth)| error(output, *truth)).collect()
+    let errors = |rows: &[Estimate]| -> Vec<f64> {
+        rows.iter().zip(truth).map(|(row, truth)| recording.shown(row.strain - truth)).collect()
     };
     let (filtered, smoothed) = (errors(recording.filtered), errors(recording.smoothed));
-    let half: Vec<f64> =
-        recording.filtered.iter().map(|output| recording.shown(Z_95 * output.estimate.strain.sd())).collect();
+    let half: Vec<f64> = recording.filtered.iter().map(|row| recording.shown(Z_95 * row.strain_sd)).collect();
     let core = filtered.iter().chain(&smoothed).copied().chain([0.0]);
     let y = Axis::around(
         &format!("Error, {}", unit(recording)),

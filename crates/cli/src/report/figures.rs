@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use ohmstrain_calib::Output;
+use ohmstrain::Estimate;
 use serde::Serialize;
 
 use super::axis::{Axis, extent};
@@ -65,7 +65,7 @@ pub fn against_time<'a>(recording: &Recording<'a>, values: impl Iterator<Item = 
 
 /// Recorded readings, the filter's fit, and the law with its band.
 pub fn reading(recording: &Recording) -> Result<Figure, ReportError> {
-    let fitted: Vec<f64> = recording.filtered.iter().map(|output| recording.law.fitted(output)).collect();
+    let fitted: Vec<f64> = recording.filtered.iter().map(|row| recording.law.fitted(row)).collect();
     let (centre, sd) = match &recording.driven {
         Some(driven) => (driven.reading.as_slice(), recording.law.model_error()),
         None => (fitted.as_slice(), recording.law.reading_noise()),
@@ -110,11 +110,11 @@ pub fn strain(recording: &Recording) -> Result<Figure, ReportError> {
 
 /// An empty plot for the strain of some rows, on the scale of all of them.
 pub fn strain_chart(recording: &Recording, rows: Range<usize>, size_px: (f64, f64)) -> Chart {
-    let mean = |output: &Output| recording.shown(output.estimate.strain.mean);
+    let mean = |row: &Estimate| recording.shown(row.strain);
     let (filtered, smoothed) = (recording.filtered.iter(), recording.smoothed.iter());
     let truth = recording.truth.unwrap_or(&[]).iter().map(|x| recording.shown(*x));
     let core = truth.chain(filtered.clone().map(mean)).chain(smoothed.map(mean));
-    let rest = filtered.flat_map(|output| <[f64; 2]>::from(recording.interval(output))).map(|x| recording.shown(x));
+    let rest = filtered.flat_map(|row| <[f64; 2]>::from(recording.interval(row))).map(|x| recording.shown(x));
     let ticks = if size_px.1 < WIDE.1 { HIGH_TICKS - 2 } else { HIGH_TICKS };
     let y = Axis::around(recording.quantity_label(), core, rest, ticks);
     let times = recording.time_s.get(rows).unwrap_or(&[]);
@@ -128,9 +128,9 @@ pub fn draw_strain(chart: &mut Chart, recording: &Recording, rows: Range<usize>)
     let times = || recording.time_s.iter().copied().skip(skipped).take(count);
     let filtered = || recording.filtered.iter().skip(skipped).take(count);
     let smoothed = recording.smoothed.iter().skip(skipped).take(count);
-    let mean = |output: &Output| recording.shown(output.estimate.strain.mean);
-    let band = times().zip(filtered()).map(|(time, output)| {
-        let (lower, upper) = recording.interval(output);
+    let mean = |row: &Estimate| recording.shown(row.strain);
+    let band = times().zip(filtered()).map(|(time, row)| {
+        let (lower, upper) = recording.interval(row);
         (time, recording.shown(lower), recording.shown(upper))
     });
     chart.band(Ink::FILTER_BAND, "filter, 95 % interval", band);

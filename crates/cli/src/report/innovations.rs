@@ -1,6 +1,6 @@
 //! Whether the filter's own errors are as large as it says, and independent of one another.
 
-use ohmstrain_calib::Output;
+use ohmstrain::Estimate;
 
 /// Standardised innovations of a recording. Their signs are not known: `|z| = √NIS`.
 pub struct Innovations {
@@ -25,10 +25,10 @@ const BINS: usize = 20;
 const BLOCKS: usize = 60;
 
 impl Innovations {
-    /// From a filter's outputs.
-    pub fn new(outputs: &[Output]) -> Self {
+    /// From a filter's estimates.
+    pub fn new(rows: &[Estimate]) -> Self {
         let size: Vec<f64> =
-            outputs.iter().map(|output| output.nis.filter(|nis| *nis >= 0.0).map_or(f64::NAN, f64::sqrt)).collect();
+            rows.iter().map(|row| row.nis.filter(|nis| *nis >= 0.0).map_or(f64::NAN, f64::sqrt)).collect();
         let known = || size.iter().filter(|z| z.is_finite());
         let count = known().count();
         let share = |sum: f64| if count > 0 { sum / count as f64 } else { f64::NAN };

@@ -2,7 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use ohmstrain_calib::{BranchParams, EstimatorParams, Output, SensorParams};
+use ohmstrain::Estimate;
+use ohmstrain_calib::{BranchParams, EstimatorParams, SensorParams};
 use ohmstrain_model::SensorLaw;
 
 /// A sensor's law, with its branches in a slice.
@@ -53,11 +54,10 @@ impl<'a> Law<'a> {
     }
 
     /// The reading that an estimate stands for.
-    pub fn fitted(&self, output: &Output) -> f64 {
-        let estimate = &output.estimate;
-        let (rising, falling) = split(estimate.rate.mean, estimate.rate.sd());
+    pub fn fitted(&self, row: &Estimate) -> f64 {
+        let (rising, falling) = split(row.strain_rate, row.strain_rate_sd);
         let dash_pot = self.quasi_static.extend_viscosity_s * rising + self.quasi_static.retract_viscosity_s * falling;
-        self.reading(self.gauge(estimate.strain.mean) + dash_pot + estimate.relaxation.mean + estimate.baseline)
+        self.reading(self.gauge(row.strain) + dash_pot + row.relaxation + row.baseline)
     }
 
     /// Standard deviation of a reading around the law driven by the true strain: branches, baseline and white noise.

@@ -23,7 +23,7 @@ mod thin;
 
 use minijinja::Environment;
 use minijinja::value::Serde;
-use ohmstrain_calib::{EstimatorKind, Output, SensorParams};
+use ohmstrain::{Estimate, EstimatorKind, SensorParams};
 use serde::Serialize;
 
 use figures::Figure;
@@ -44,10 +44,10 @@ pub struct ReportInput<'a> {
     pub reading: &'a [f64],
     /// Reference; NaN where missing.
     pub truth: Option<&'a [f64]>,
-    /// The filter's outputs.
-    pub filtered: &'a [Output],
-    /// The smoother's outputs.
-    pub smoothed: &'a [Output],
+    /// The filter's estimates.
+    pub filtered: &'a [Estimate],
+    /// The smoother's estimates.
+    pub smoothed: &'a [Estimate],
     /// The sensor.
     pub params: &'a SensorParams,
     /// R₀ of this recording, in the unit of the readings.

@@ -1,6 +1,7 @@
 //! A recording with what the plots derive from it.
 
-use ohmstrain_calib::{Output, Quantity, ReadingUnit, SensorParams};
+use ohmstrain::Estimate;
+use ohmstrain_calib::{Quantity, ReadingUnit, SensorParams};
 
 use super::axis::extent;
 use super::law::{Driven, Law};
@@ -23,10 +24,10 @@ pub struct Recording<'a> {
     pub reading: &'a [f64],
     /// Reference, if it is known anywhere.
     pub truth: Option<&'a [f64]>,
-    /// The filter's outputs.
-    pub filtered: &'a [Output],
-    /// The smoother's outputs.
-    pub smoothed: &'a [Output],
+    /// The filter's estimates.
+    pub filtered: &'a [Estimate],
+    /// The smoother's estimates.
+    pub smoothed: &'a [Estimate],
     /// The sensor.
     pub params: &'a SensorParams,
     /// R₀.
@@ -49,8 +50,7 @@ impl<'a> Recording<'a> {
     pub fn new(input: &ReportInput<'a>) -> Self {
         let truth = input.truth.filter(|truth| truth.iter().any(|x| x.is_finite()));
         let estimates = if input.smoothed.is_empty() { input.filtered } else { input.smoothed };
-        let strain =
-            truth.map_or_else(|| estimates.iter().map(|output| output.estimate.strain.mean).collect(), <[f64]>::to_vec);
+        let strain = truth.map_or_else(|| estimates.iter().map(|row| row.strain).collect(), <[f64]>::to_vec);
         let law = Law::new(input.params, input.rest_reading);
         let mut held = motion::holds(input.time_s, &strain, SHORTEST_HOLD_S);
         if truth.is_none() {
@@ -158,12 +158,11 @@ impl<'a> Recording<'a> {
     }
 
     /// The 95 % interval of an estimate, within the limits of the output.
-    pub fn interval(&self, output: &Output) -> (f64, f64) {
-        let (strain, limits) = (&output.estimate.strain, self.params.limits);
-        let half = Z_95 * strain.sd();
+    pub fn interval(&self, row: &Estimate) -> (f64, f64) {
+        let (limits, half) = (self.params.limits, Z_95 * row.strain_sd);
         // A limit that is not a number bounds nothing.
         let within = |x: f64| if x.is_nan() { x } else { x.max(limits.lower).min(limits.upper) };
-        (within(strain.mean - half), within(strain.mean + half))
+        (within(row.strain - half), within(row.strain + half))
     }
 }
 

@@ -1,10 +1,10 @@
 use std::collections::BTreeMap;
 
+use ohmstrain::Estimate;
 use ohmstrain_calib::{
-    BranchParams, EstimatorKind, EstimatorParams, GaugeParams, LawParams, MotionParams, NoiseParams, Output, Quantity,
+    BranchParams, EstimatorKind, EstimatorParams, GaugeParams, LawParams, MotionParams, NoiseParams, Quantity,
     RangeParams, ReadingUnit, SensorParams, StaticCubic, Uncertainty, Validity,
 };
-use ohmstrain_ekf::{Estimate, Gaussian, ReadingVerdict};
 
 use super::{Report, ReportInput, Sample, ScoreRow, Scored};
 
@@ -69,21 +69,15 @@ fn sensor() -> SensorParams {
     }
 }
 
-fn output(strain: f64, nis: Option<f64>) -> Output {
-    let known = |mean| Gaussian { mean, variance: 1e-4 };
-    let estimate = Estimate {
-        strain: known(strain),
-        rate: known(0.01),
-        relaxation: known(0.02),
-        baseline: 0.0,
-        settled: known(2.0 * strain),
-        beyond_border: 0.0,
-        near_ramp_border: false,
-    };
-    Output { estimate, nis, verdict: ReadingVerdict::Accepted, phases: None }
+fn row(strain: f64, nis: Option<f64>) -> Estimate {
+    let mut row = Estimate::default();
+    (row.strain, row.strain_sd, row.nis) = (strain, 1e-2, nis);
+    (row.strain_rate, row.strain_rate_sd) = (0.01, 1e-2);
+    (row.relaxation, row.relaxation_sd, row.baseline) = (0.02, 1e-2, 0.0);
+    row
 }
 
-fn page(params: &SensorParams, time_s: &[f64], reading: &[f64], truth: Option<&[f64]>, outputs: &[Output]) -> String {
+fn page(params: &SensorParams, time_s: &[f64], reading: &[f64], truth: Option<&[f64]>, outputs: &[Estimate]) -> String {
     let input = ReportInput {
         title: "a <b> & \"c\".csv",
         made_by: "ohmstrain 0",
@@ -122,12 +116,12 @@ fn page(params: &SensorParams, time_s: &[f64], reading: &[f64], truth: Option<&[
 }
 
 /// Ramp, hold, ramp, hold.
-fn motion(rows: usize) -> (Vec<f64>, Vec<f64>, Vec<Output>) {
+fn motion(rows: usize) -> (Vec<f64>, Vec<f64>, Vec<Estimate>) {
     let time: Vec<f64> = (0..rows).map(|k| 100.0 * k as f64 / rows as f64).collect();
     let strain: Vec<f64> =
         time.iter().map(|t| 0.03 * ((t - 5.0).clamp(0.0, 8.0) - (t - 60.0).clamp(0.0, 8.0))).collect();
     let nis = |k: usize| (!k.is_multiple_of(7)).then_some((k % 5) as f64 * 0.4);
-    let outputs = strain.iter().enumerate().map(|(k, x)| output(*x, nis(k))).collect();
+    let outputs = strain.iter().enumerate().map(|(k, x)| row(*x, nis(k))).collect();
     (time, strain, outputs)
 }
 
@@ -162,7 +156,7 @@ fn anything_gives_a_report() {
     let (time, strain, outputs) = motion(300);
     let missing = vec![f64::NAN; time.len()];
     let wild = [f64::NAN, f64::INFINITY, f64::MAX, f64::MIN, 0.0, 1e-320];
-    let wild_outputs: Vec<Output> = wild.iter().map(|x| output(*x, Some(*x))).collect();
+    let wild_outputs: Vec<Estimate> = wild.iter().map(|x| row(*x, Some(*x))).collect();
     let mut angle = sensor();
     (angle.quantity, angle.reading) = (Quantity::AngleDeg, ReadingUnit::Ratio);
     angle.estimators.clear();
@@ -186,7 +180,7 @@ fn anything_gives_a_report() {
 fn what_is_not_there_is_said() {
     let time: Vec<f64> = (0..200).map(|k| 0.1 * f64::from(k)).collect();
     let strain: Vec<f64> = time.iter().map(|t| 0.1 + 0.1 * t.sin()).collect();
-    let outputs: Vec<Output> = strain.iter().map(|x| output(*x, None)).collect();
+    let outputs: Vec<Estimate> = strain.iter().map(|x| row(*x, None)).collect();
     let page = page(&sensor(), &time, &vec![f64::NAN; 200], Some(&strain), &outputs);
     assert!(page.contains("holds still nowhere"));
     assert!(page.contains("There is no reading"));

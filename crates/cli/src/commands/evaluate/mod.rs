@@ -17,6 +17,7 @@ use crate::input::{self, Recording, check_unit};
 use crate::output::{Outputs, print};
 use crate::progress::Progress;
 use crate::report::Sample;
+use crate::run::rest_resistance;
 use crate::suits;
 
 /// Smallest coverage of the 95 % interval that `--check` accepts.
@@ -49,7 +50,7 @@ pub fn run(args: &EvaluateArgs) -> Result<(), CliError> {
 /// Every recording with the parameters of a file.
 fn with_sensor_file(args: &EvaluateArgs, path: &Path, evaluation: &mut Evaluation) -> Result<(), CliError> {
     let sensors = Sensor::from_file(path, args.estimator, !args.no_correction)?;
-    let rivals = Rivals { static_cubic: sensors[0].params.static_cubic, learned: None };
+    let rivals = Rivals { static_cubic: sensors[0].sensor.params().static_cubic, learned: None };
     let judged = |path: &PathBuf| judge(args, &read(args, path)?, Part::since(args.from), &sensors, &rivals);
     add_until_error(evaluation, args.traces.par_iter().map(judged).collect())
 }
@@ -150,28 +151,28 @@ fn judge(
     rivals: &Rivals,
 ) -> Result<Judged, CliError> {
     let mut judged = Judged::default();
-    let Some(first) = sensors.first() else { return Ok(judged) };
-    check_unit(&recording.header, recording.trace.readings.kind, first.params.reading)?;
+    let Some(Sensor { sensor: first, kind, .. }) = sensors.first() else { return Ok(judged) };
+    check_unit(&recording.header, recording.trace.readings.kind, first.params().reading)?;
     recording.samples()?;
-    recording.check_quantity(first.params.quantity)?;
-    let rest_reading = first.rest_reading(recording, args.rest_resistance)?;
-    let readings = recording.trace.readings.values.iter().copied();
-    suits::check_readings(&recording.header, &first.params, rest_reading, readings)?;
-    suits::check_reference(recording, &first.params)?;
+    recording.check_quantity(first.params().quantity)?;
+    let readings = || recording.trace.readings.values.iter().copied();
+    let rest = rest_resistance(args.rest_resistance, readings(), &recording.name)?;
+    suits::check_readings(&recording.header, first, rest, readings())?;
+    suits::check_reference(recording, first)?;
     let nothing = || {
         let rows = part.from_s.map_or_else(|| "any row".into(), |from| format!("time_s >= {from}"));
         CliError::Input(format!("{}: expected a reference at {rows}, found none", recording.name))
     };
-    let baselines = rivals.scores(recording, part, first.params.rest_reading / rest_reading).ok_or_else(nothing)?;
+    let moved = first.params().rest_reading / first.rest_reading(rest);
+    let baselines = rivals.scores(recording, part, moved).ok_or_else(nothing)?;
     for sensor in sensors {
-        let scores = sensor.judge(recording, part, args.rest_resistance, baselines, &mut judged.warnings)?;
+        let scores = sensor.judge(recording, part, rest, baselines, &mut judged.warnings)?;
         judged.scores.push(scores.ok_or_else(nothing)?);
     }
     if args.draws(&recording.name) {
-        let kind = Some(first.kind);
-        let sample =
-            if args.calibration.split.is_empty() { sample(recording, &first.params, part) } else { Sample::Out };
-        let reporting = Reporting { recording, params: &first.params, kind, rest_reading, part, sample, facts: &[] };
+        let (kind, has_split) = (Some(*kind), !args.calibration.split.is_empty());
+        let sample = if has_split { Sample::Out } else { sample(recording, first.params(), part) };
+        let reporting = Reporting { recording, sensor: first, kind, rest_resistance: rest, part, sample, facts: &[] };
         judged.drawn = Some(reporting.drawn()?);
     }
     Ok(judged)

@@ -1,22 +1,23 @@
 use std::path::Path;
 use std::time::Instant;
 
-use ohmstrain_calib::{Baselines, EstimatorKind, LawOptions, RECIPE, SensorParams, Start, StaticCubic, build_filter};
+use ohmstrain::ValidityWatch;
+use ohmstrain_calib::{Baselines, EstimatorKind, LawOptions, RECIPE, StaticCubic};
 
 use super::evaluation::{BaselineScores, LearnedScores, RecordingScores};
-use crate::args::{Estimators, RestResistance};
+use crate::args::Estimators;
 use crate::commands::calibrate::{Calibrated, calibrate_recordings};
 use crate::commands::scoring::{self, Part};
 use crate::error::CliError;
 use crate::input::Recording;
 use crate::progress::Progress;
-use crate::run::{estimate, rest_reading};
+use crate::run::estimate;
 use crate::sensor_file;
-use crate::validity::ValidityWatch;
 
 /// A calibrated sensor and the estimator that it is judged with.
 pub struct Sensor {
-    pub params: SensorParams,
+    /// The sensor.
+    pub sensor: ohmstrain::Sensor,
     /// The estimator.
     pub kind: EstimatorKind,
     /// Wall-clock time of the calibration, s; `None` if it was read from a file.
@@ -36,17 +37,15 @@ impl Sensor {
     /// One per estimator asked for, with the parameters of a file; at least one.
     pub fn from_file(path: &Path, estimators: Estimators, corrects: bool) -> Result<Vec<Self>, CliError> {
         let wanted = if let Estimators::One(kind) = estimators { Some(kind) } else { None };
-        let params = sensor_file::read(path, wanted)?;
+        let sensor = sensor_file::read(path, wanted)?;
+        let can_be_built = |kind: &EstimatorKind| sensor.filter().estimator(*kind).build().is_ok();
         let kinds = match estimators {
-            Estimators::All => EstimatorKind::ALL
-                .into_iter()
-                .filter(|kind| build_filter(&params, Some(*kind), Start::Unknown).is_ok())
-                .collect(),
-            _ => vec![wanted.unwrap_or(params.default_estimator)],
+            Estimators::All => EstimatorKind::ALL.into_iter().filter(can_be_built).collect(),
+            _ => vec![wanted.unwrap_or(sensor.params().default_estimator)],
         };
         let kinds = distinct(kinds.into_iter().map(|kind| if corrects { kind } else { kind.filter() }));
-        let sensor = |kind| Self { params: params.clone(), kind, calibration_s: None, is_part: false };
-        Ok(kinds.into_iter().map(sensor).collect())
+        let judged = |kind| Self { sensor: sensor.clone(), kind, calibration_s: None, is_part: false };
+        Ok(kinds.into_iter().map(judged).collect())
     }
 
     /// One per estimator asked for, each calibrated as `calibrate --estimator` does; at least one. What a correction
@@ -65,12 +64,12 @@ impl Sensor {
         let wanted = distinct(wanted.into_iter().map(|kind| if corrects { kind } else { kind.filter() }));
         let calibrate = |kind| {
             let start = Instant::now();
-            let Calibrated { params, .. } =
+            let Calibrated { sensor, .. } =
                 calibrate_recordings(training, LawOptions::candidates(kind), kind, progress)?;
             let calibration_s = Some(start.elapsed().as_secs_f64());
-            let kind = params.default_estimator;
-            let part = Self { params: params.clone(), kind: kind.filter(), calibration_s, is_part: true };
-            let whole = Self { params, kind, calibration_s, is_part: false };
+            let kind = sensor.params().default_estimator;
+            let part = Self { sensor: sensor.clone(), kind: kind.filter(), calibration_s, is_part: true };
+            let whole = Self { sensor, kind, calibration_s, is_part: false };
             let is_corrected = part.kind != whole.kind;
             Ok([Some(whole), Some(part).filter(|_| is_corrected)])
         };
@@ -80,34 +79,26 @@ impl Sensor {
         Ok(sensors.filter(|sensor| !(sensor.is_part && wanted.contains(&sensor.kind))).collect())
     }
 
-    /// R₀ for a recording.
-    pub fn rest_reading(&self, recording: &Recording, wanted: Option<RestResistance>) -> Result<f64, CliError> {
-        let readings = recording.trace.readings.values.iter().copied();
-        rest_reading(wanted, &self.params, readings, &recording.name)
-    }
-
     /// Scores on some rows of a recording, the filter started at the first; `None` without a reference. What
     /// casts doubt on them is added to `warnings`.
     pub fn judge(
         &self,
         recording: &Recording,
         part: Part,
-        rest_resistance: Option<RestResistance>,
+        rest_resistance: Option<f64>,
         baselines: BaselineScores,
         warnings: &mut Vec<String>,
     ) -> Result<Option<RecordingScores>, CliError> {
-        let rest_reading = self.rest_reading(recording, rest_resistance)?;
-        let estimated = estimate(recording, &self.params, rest_reading, Some(self.kind))?;
+        let estimated = estimate(recording, &self.sensor, rest_resistance, Some(self.kind))?;
         if self.calibration_s.is_none() {
-            let trace = &recording.trace;
-            let mut watch = ValidityWatch::new(&recording.name, &self.params, rest_reading);
-            for (k, output) in estimated.filtered.iter().enumerate() {
-                let rate = output.estimate.rate.mean;
-                let mut keep = |warning: String| warnings.push(warning);
-                watch.see(trace.time_s[k], trace.readings.values[k], rate, recording.truth(k), &mut keep);
+            let mut watch = ValidityWatch::new(&self.sensor, rest_resistance);
+            for (k, row) in estimated.filtered.iter().enumerate() {
+                let reading = row.resistance.unwrap_or(f64::NAN);
+                let seen = watch.see(row.time_s, reading, row.strain_rate, recording.truth(k));
+                warnings.extend(seen.map(|warning| format!("{}: {warning}", recording.name)));
             }
         }
-        let scores = |outputs| scoring::of_outputs(recording, outputs, part);
+        let scores = |estimates: &[_]| scoring::of_estimates(recording, estimates, part);
         let (Some(filter), Some(smoother)) = (scores(&estimated.filtered), scores(&estimated.smoothed)) else {
             return Ok(None);
         };
@@ -122,7 +113,7 @@ impl Sensor {
             calibration_s: self.calibration_s,
             lag_s: None,
             baselines,
-            quantity: self.params.quantity,
+            quantity: self.sensor.params().quantity,
         }))
     }
 }

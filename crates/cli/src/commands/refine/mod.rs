@@ -11,7 +11,7 @@ use crate::error::CliError;
 use crate::input::{self, Recording, check_unit, reading_column};
 use crate::output::{Kind, Outputs, print};
 use crate::progress::Progress;
-use crate::run::rest_reading;
+use crate::run::rest_resistance;
 use crate::sensor_file;
 use crate::suits;
 use rows::RelativeRows;
@@ -30,19 +30,19 @@ pub fn run(args: &RefineArgs) -> Result<(), CliError> {
     }
     let mut outputs = Outputs::new(args.force, [&args.trace_file, &args.sensor]);
     let output = outputs.claim(&args.output, Kind::Sensor)?;
-    let mut params = sensor_file::read(&args.sensor, Some(EstimatorKind::Ekf))?;
+    let sensor = sensor_file::read(&args.sensor, Some(EstimatorKind::Ekf))?;
     let recording = input::read(&args.trace_file, &args.trace.metadata())?;
-    check_unit(&recording.header, recording.trace.readings.kind, params.reading)?;
-    let readings = recording.trace.readings.values.iter().copied();
-    let rest_reading = rest_reading(args.rest_resistance, &params, readings, &recording.name)?;
-    let readings = recording.trace.readings.values.iter().copied();
-    suits::check_readings(&recording.header, &params, rest_reading, readings)?;
-    let rows = RelativeRows::new(&recording, args.from, args.until, rest_reading)?;
+    check_unit(&recording.header, recording.trace.readings.kind, sensor.params().reading)?;
+    let readings = || recording.trace.readings.values.iter().copied();
+    let rest = rest_resistance(args.rest_resistance, readings(), &recording.name)?;
+    suits::check_readings(&recording.header, &sensor, rest, readings())?;
+    let rows = RelativeRows::new(&recording, args.from, args.until, sensor.rest_reading(rest))?;
+    let mut params = sensor.into_params();
     let (start, free) = start(args, &params)?;
     let refinement = refine(&params.law, start, free, &rows).map_err(|error| named(args, &error))?;
     remark_on_input(&recording, &rows, &params);
     replace(&mut params, &refinement);
-    outputs.put(output, sensor_file::text(&params)?);
+    outputs.put(output, sensor_file::text(&sensor_file::checked(params)?)?);
     outputs.publish()?;
     print(|out| table::write(out, &refinement))?;
     for warning in &refinement.found.warnings {

@@ -1,6 +1,5 @@
 use crate::error::CliError;
 use crate::input::Recording;
-use crate::run::relative_trace;
 
 /// Rows for which a maximum and its intervals take seconds; more of them are thinned, since the model is continuous in
 /// time.
@@ -35,7 +34,9 @@ impl RelativeRows {
             trace = trace.since(from);
         }
         let stride = trace.len().div_ceil(MOST_ROWS).max(1);
-        let readings: Vec<_> = relative_trace(&trace, rest_reading).into_iter().step_by(stride).collect();
+        let rows = Recording { trace, ..recording.rows(0..0) };
+        let relative = |row: usize| rows.reading(row).1.relative(rest_reading);
+        let readings: Vec<_> = (0..rows.trace.len()).step_by(stride).map(relative).collect();
         let known = readings.iter().flatten().count();
         if known < FEWEST_READINGS {
             let name = &recording.name;
@@ -45,10 +46,10 @@ impl RelativeRows {
             )));
         }
         Ok(Self {
-            time_s: trace.time_s.iter().copied().step_by(stride).collect(),
+            time_s: rows.trace.time_s.iter().copied().step_by(stride).collect(),
             value: readings.iter().map(|reading| reading.map_or(f64::NAN, |reading| reading.value)).collect(),
             extra_sd: readings.iter().map(|reading| reading.map_or(f64::NAN, |r| r.extra_variance.sqrt())).collect(),
-            all: trace.len(),
+            all: rows.trace.len(),
             stride,
         })
     }

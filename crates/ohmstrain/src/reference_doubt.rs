@@ -1,0 +1,72 @@
+use std::fmt;
+use std::ops::RangeInclusive;
+
+use ohmstrain_calib::Quantity;
+
+use crate::Sensor;
+use crate::unit_doubt::quantile;
+
+/// References whose 95th percentile is this many times the largest strain of the calibration are a hundred times too large.
+const PERCENT: RangeInclusive<f64> = 30.0..=300.0;
+/// No sensor that is glued or cast is stretched this much: a calibration with such strains was one in percent.
+const LARGEST_STRAIN: f64 = 3.0;
+
+/// A reference that seems to be in percent, or of a sensor that was calibrated in percent; see
+/// [`Sensor::check_reference`].
+///
+/// ```
+/// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+/// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
+/// let doubt = sensor.check_reference([20.0, 30.0]).unwrap_err();
+/// assert!(doubt.to_string().ends_with("are they in percent?"));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ReferenceDoubt {
+    /// Largest strain of the calibration.
+    pub expected: f64,
+    /// 95th percentile of the reference's magnitude.
+    pub found: f64,
+    /// Whether it is the calibration that seems to be in percent.
+    pub is_of_calibration: bool,
+}
+
+impl fmt::Display for ReferenceDoubt {
+    fn fmt(&self, out: &mut fmt::Formatter) -> fmt::Result {
+        let Self { expected, found, is_of_calibration } = self;
+        let question = if *is_of_calibration { "was the calibration in percent?" } else { "are they in percent?" };
+        write!(
+            out,
+            "column `strain`: expected strains of up to {expected:.4}, as in the calibration, found {found:.4}: {question}"
+        )
+    }
+}
+
+impl std::error::Error for ReferenceDoubt {}
+
+impl Sensor {
+    /// Asks whether a reference is in the calibration's unit: fractions, not percent. Angles are not asked about.
+    ///
+    /// # Errors
+    /// If it is a hundred times too large, or too small.
+    ///
+    /// ```
+    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+    /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
+    /// sensor.check_reference([0.0, 0.2, 0.3])?;
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn check_reference(&self, strains: impl IntoIterator<Item = f64>) -> Result<(), ReferenceDoubt> {
+        let params = self.params();
+        if params.quantity != Quantity::Strain {
+            return Ok(());
+        }
+        let Some(found) = quantile(strains.into_iter().map(f64::abs), 0.95) else { return Ok(()) };
+        let expected = params.validity.lower.abs().max(params.validity.upper.abs());
+        let is_of_calibration = expected > LARGEST_STRAIN && PERCENT.contains(&(expected / found));
+        if PERCENT.contains(&(found / expected)) || is_of_calibration {
+            return Err(ReferenceDoubt { expected, found, is_of_calibration });
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,199 @@
+use std::fmt;
+
+use ohmstrain_calib::{Quantity, Validity};
+
+use crate::Sensor;
+use crate::column::reading_column;
+
+/// Says, once for each, that a sensor is used outside of what its calibration has seen.
+///
+/// ```
+/// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+/// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
+/// use ohmstrain::ValidityWatch;
+///
+/// let (mut filter, mut watch) = (sensor.filter().build()?, ValidityWatch::new(&sensor, None));
+/// for (time_s, ohm) in [(0.0, 1600.0), (3600.0, 1600.0)] {
+///     let row = filter.step(time_s, ohm)?;
+///     for beyond in watch.see(row.time_s, ohm, row.strain_rate, f64::NAN) {
+///         assert_eq!(beyond.to_string(), "at 3600 s: longer than the 199.9 s of the calibration; estimates are extrapolations");
+///     }
+/// }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct ValidityWatch {
+    validity: Validity,
+    quantity: Quantity,
+    reading: &'static str,
+    /// Readings that calibration has seen, moved to the R₀ in use.
+    readings: (f64, f64),
+    start_s: Option<f64>,
+    long: bool,
+    fast: Outside,
+    beyond_readings: Outside,
+    beyond_strains: Outside,
+}
+
+/// A use outside of what the calibration has seen; estimates are extrapolations.
+///
+/// ```
+/// use ohmstrain::{Beyond, Extrapolation};
+///
+/// let warning = Extrapolation { time_s: 3.0, beyond: Beyond::Duration { longest_s: 2.0 } };
+/// assert_eq!(warning.to_string(), "at 3 s: longer than the 2.0 s of the calibration; estimates are extrapolations");
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Extrapolation {
+    /// Time of the row at which it became clear, s.
+    pub time_s: f64,
+    /// In what way.
+    pub beyond: Beyond,
+}
+
+/// In what way a sensor is used outside of what its calibration has seen.
+///
+/// ```
+/// assert!(matches!(ohmstrain::Beyond::Duration { longest_s: 2.0 }, ohmstrain::Beyond::Duration { .. }));
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Beyond {
+    /// For longer.
+    Duration {
+        /// Longest recording of the calibration, s.
+        longest_s: f64,
+    },
+    /// At higher rates.
+    Rate {
+        /// What changes.
+        quantity: Quantity,
+        /// 99th percentile of the calibration, 1/s.
+        fastest_per_s: f64,
+    },
+    /// With other readings.
+    Readings {
+        /// Name of their column.
+        column: &'static str,
+        /// The least of the calibration, moved to the R₀ in use.
+        least: f64,
+        /// The largest.
+        most: f64,
+    },
+    /// At other strains.
+    Strain {
+        /// What is estimated.
+        quantity: Quantity,
+        /// The least of the calibration.
+        least: f64,
+        /// The largest.
+        most: f64,
+    },
+}
+
+/// Rows outside of a range.
+#[derive(Clone, Copy, Debug, Default)]
+struct Outside {
+    rows: usize,
+    outside: usize,
+    said: bool,
+}
+
+/// Rows outside are a matter of chance up to this number and this share: by definition 1 % of the calibration's own rows
+/// are faster than its 99th percentile.
+const CHANCE: (usize, f64) = (10, 0.02);
+
+impl Outside {
+    /// Whether it is time to say so.
+    fn see(&mut self, outside: bool) -> bool {
+        self.rows += 1;
+        self.outside += usize::from(outside);
+        let many = self.outside > CHANCE.0 && self.outside as f64 > CHANCE.1 * self.rows as f64;
+        let now = many && !self.said;
+        self.said |= now;
+        now
+    }
+}
+
+impl ValidityWatch {
+    /// Watches the use of a sensor. `rest_resistance` is what the rested sensor reads now, if it is not what it read in
+    /// calibration.
+    ///
+    /// ```
+    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+    /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
+    /// let watch = ohmstrain::ValidityWatch::new(&sensor, Some(1712.0));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn new(sensor: &Sensor, rest_resistance: Option<f64>) -> Self {
+        let (params, seen) = (sensor.params(), &sensor.params().validity);
+        let moved = sensor.rest_reading(rest_resistance) / params.rest_reading;
+        Self {
+            validity: params.validity,
+            quantity: params.quantity,
+            reading: reading_column(params.reading),
+            readings: (moved * seen.reading_lower, moved * seen.reading_upper),
+            start_s: None,
+            long: false,
+            fast: Outside::default(),
+            beyond_readings: Outside::default(),
+            beyond_strains: Outside::default(),
+        }
+    }
+
+    /// Takes a row and says what there is to say: the reading as recorded, the estimated rate, and the true strain; NaN for
+    /// what is missing. An uncertain rate is estimated near zero, so that a high one means something.
+    ///
+    /// ```
+    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+    /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
+    /// let mut watch = ohmstrain::ValidityWatch::new(&sensor, None);
+    /// assert_eq!(watch.see(0.0, 1600.0, 0.01, f64::NAN).count(), 0);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn see(
+        &mut self,
+        time_s: f64,
+        reading: f64,
+        rate: f64,
+        truth: f64,
+    ) -> impl Iterator<Item = Extrapolation> + use<> {
+        let Validity { lower, upper, fastest_rate_per_s: fastest_per_s, duration_s: longest_s, .. } = self.validity;
+        let (quantity, column, (least, most)) = (self.quantity, self.reading, self.readings);
+        let lasted_s = time_s - *self.start_s.get_or_insert(time_s);
+        let is_long = !self.long && lasted_s > longest_s;
+        self.long |= is_long;
+        let is_fast = self.fast.see(rate.abs() > fastest_per_s);
+        let is_other = reading.is_finite() && self.beyond_readings.see(!(least..=most).contains(&reading));
+        let is_beyond = truth.is_finite() && self.beyond_strains.see(!(lower..=upper).contains(&truth));
+        let said = [
+            (is_long, Beyond::Duration { longest_s }),
+            (is_fast, Beyond::Rate { quantity, fastest_per_s }),
+            (is_other, Beyond::Readings { column, least, most }),
+            (is_beyond, Beyond::Strain { quantity, least: lower, most: upper }),
+        ];
+        said.into_iter().filter_map(move |(now, beyond)| now.then_some(Extrapolation { time_s, beyond }))
+    }
+}
+
+impl fmt::Display for Extrapolation {
+    fn fmt(&self, out: &mut fmt::Formatter) -> fmt::Result {
+        write!(out, "at {} s: ", self.time_s)?;
+        match self.beyond {
+            Beyond::Duration { longest_s } => write!(out, "longer than the {longest_s:.1} s of the calibration"),
+            Beyond::Rate { quantity, fastest_per_s } => {
+                let quantity = quantity.name();
+                write!(out, "{quantity} changes faster than the calibration's {fastest_per_s:.4} per second")
+            }
+            Beyond::Readings { column, least, most } => {
+                write!(out, "{column} is outside of the calibration's {least:.5} to {most:.5}")
+            }
+            Beyond::Strain { quantity, least, most } => {
+                let quantity = quantity.name();
+                write!(out, "{quantity} is outside of the calibration's {least:.4} to {most:.4}")
+            }
+        }?;
+        out.write_str("; estimates are extrapolations")
+    }
+}
