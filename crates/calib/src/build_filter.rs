@@ -1,6 +1,7 @@
+#[cfg(feature = "particles")]
+use ohmstrain_ekf::Particles;
 use ohmstrain_ekf::{
-    Belief, Dwell, Ekf, Evidence, Hypotheses, Imm, Mixture, Particles, SignSplit, SparseMixture, StrainSensor, Ukf,
-    Unscented,
+    Belief, Dwell, Ekf, Evidence, Hypotheses, Imm, Mixture, SignSplit, SparseMixture, StrainSensor, Ukf, Unscented,
 };
 use ohmstrain_model::{Motion, Phase, SwitchedModel};
 
@@ -166,6 +167,11 @@ fn of_size<const M: usize, const B: usize, const N: usize, const L: usize>(
             let filter = SignSplit::<_, _, HYPOTHESES>::new(model, hold, evidence);
             Box::new(Running::new(filter, start, model, interval))
         }
+        #[cfg(not(feature = "particles"))]
+        EstimatorKind::Particles => {
+            return Err(CalibrationError::Unsupported("`particles` without the feature of that name".into()));
+        }
+        #[cfg(feature = "particles")]
         EstimatorKind::Particles => {
             let filter = Particles::new(model, hold, evidence, PARTICLES, PARTICLE_SEED);
             let start = filter.start(&belief, Phase::Extend);
@@ -212,6 +218,7 @@ pub(crate) const HYPOTHESES: usize = 8;
 /// Capacity of the filter of phase histories.
 pub(crate) const HISTORIES: usize = 16;
 /// Particles.
+#[cfg(feature = "particles")]
 const PARTICLES: usize = 4000;
 /// Seed of the particles' paths: the same readings give the same estimates.
 pub const PARTICLE_SEED: u64 = 1;

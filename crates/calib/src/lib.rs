@@ -12,6 +12,7 @@
 mod advice;
 mod baselines;
 mod blocks;
+#[cfg(feature = "bootstrap")]
 mod bootstrap;
 mod build_filter;
 mod calibrate;
@@ -58,6 +59,7 @@ mod validate;
 mod way_back;
 
 pub use baselines::{Baseline, Baselines, Features, Fir, LeakyBank, LowPassMode, Regression, StaticCubic};
+#[cfg(feature = "bootstrap")]
 pub use bootstrap::{Bootstrap, bootstrap_law};
 pub use build_filter::{PARTICLE_SEED, build_filter};
 pub use calibrate::{Calibration, Stage, calibrate};

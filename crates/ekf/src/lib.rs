@@ -5,7 +5,7 @@
 //!
 //! [`Ekf`] (plain, iterated, or unscented as [`Ukf`]) keeps one Gaussian and has a smoother. [`Imm`], [`SignSplit`] and
 //! [`Hypotheses`] keep a [`Mixture`] of hypotheses about the phase, because stretching and releasing look alike.
-//! `Particles` (feature `std`) samples the motion instead: slow, and the reference for all of them.
+//! `Particles` (feature `particles`) samples the motion instead: slow, and the reference for all of them.
 //! [`ConsistencyTest`] judges a running filter by its innovations. [`correction`] makes a calibrated filter's strain better
 //! by what was learned in calibration. `Bank` (feature `simd`) steps many sensors at once, in vector registers.
 //!
@@ -81,12 +81,12 @@ mod lags;
 mod lineage;
 mod mixture;
 mod mixture_step;
-#[cfg(feature = "std")]
+#[cfg(feature = "particles")]
 mod particle_cloud;
-#[cfg(feature = "std")]
+#[cfg(feature = "particles")]
 mod particles;
 mod psd;
-#[cfg(feature = "std")]
+#[cfg(feature = "particles")]
 mod rejuvenation;
 mod residual;
 mod sensor;
@@ -134,9 +134,9 @@ pub use hypotheses::Hypotheses;
 pub use imm::Imm;
 pub use mixture::{Component, Mixture};
 pub use mixture_step::{Evidence, MixtureStep};
-#[cfg(feature = "std")]
+#[cfg(feature = "particles")]
 pub use particle_cloud::{Particle, ParticleCloud};
-#[cfg(feature = "std")]
+#[cfg(feature = "particles")]
 pub use particles::{ParticleStep, Particles};
 pub use residual::{LogLikelihood, Residual};
 pub use sensor::StrainSensor;
