@@ -3,7 +3,7 @@ use ohmstrain_model::Phase;
 use crate::gaussian::Real;
 use crate::lineage::{Lineage, Recorder};
 use crate::mixture::Mixture;
-use crate::mixture_step::{Candidates, Evidence, MixtureStep, Origin, mixture_estimator, smooth_step};
+use crate::mixture_step::{Candidates, Course, Evidence, MixtureStep, Origin, mixture_estimator, smooth_step};
 use crate::switching::enter;
 use crate::{Dwell, Phased, Reading, StepError};
 
@@ -71,7 +71,7 @@ impl<T: Real, M, const K: usize> Hypotheses<T, M, K> {
             for phase in Phase::ALL {
                 let (from, begins) = &enter(&self.model, parent.1, phase);
                 let probability = chain[parent.1.phase.index()][phase.index()];
-                let origin = Origin { parent, from, begins: *begins, before: None, phase, probability };
+                let origin = Origin { parent, from, begins: *begins, course: Course::Known, phase, probability };
                 candidates.add(&origin, prepared, |_| T::one())?;
             }
         }

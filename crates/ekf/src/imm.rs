@@ -4,7 +4,7 @@ use crate::ekf::stand_still;
 use crate::gaussian::Real;
 use crate::lineage::{Birth, Lineage, Recorder};
 use crate::mixture::{Component, Mixture};
-use crate::mixture_step::{Candidates, Evidence, MixtureStep, Origin, mixture_estimator};
+use crate::mixture_step::{Candidates, Course, Evidence, MixtureStep, Origin, mixture_estimator};
 use crate::switching::enter;
 use crate::{Dwell, Phased, Reading, StepError};
 
@@ -70,7 +70,7 @@ impl<T: Real, M> Imm<T, M> {
         let mut candidates = Candidates::new(&self.model, &self.evidence, reading, recorder);
         for parent in self.mix_all(mixture, &chain).components().iter().enumerate() {
             let (from, phase) = (&parent.1.belief, parent.1.phase);
-            let origin = Origin { parent, from, begins: false, before: None, phase, probability: T::one() };
+            let origin = Origin { parent, from, begins: false, course: Course::Known, phase, probability: T::one() };
             candidates.add(&origin, prepared, |_| T::one())?;
         }
         candidates.finish()

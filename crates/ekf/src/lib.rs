@@ -85,6 +85,7 @@ mod mixture_step;
 mod particle_cloud;
 #[cfg(feature = "particles")]
 mod particles;
+mod pause;
 mod psd;
 #[cfg(feature = "particles")]
 mod rejuvenation;

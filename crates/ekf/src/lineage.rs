@@ -138,6 +138,7 @@ impl<T: Real, const N: usize, const L: usize, const K: usize> Lineage<T, N, L, K
     ) -> Mixture<T, N, L, K> {
         let totals: [T; K] = core::array::from_fn(|heir| self.log_total(heir));
         let mut smoothed = Mixture::empty();
+        smoothed.set_pause(*filtered.pause());
         for (parent, children) in filtered.components().iter().zip(&self.children) {
             let ways: [(T, Belief<T, N, L>); 3] = core::array::from_fn(|phase| {
                 let way = children.get(phase).and_then(|child| {

@@ -4,6 +4,7 @@ use ohmstrain_model::{Phase, Scalar, StrainRange, Symmetric};
 use crate::ekf::pinned;
 use crate::gaussian::{Gaussian, Real};
 use crate::lineage::Recorder;
+use crate::pause::{Pause, PhaseSum};
 use crate::{Belief, State, StepError};
 
 /// One hypothesis: a phase and what is known of the state if it is the right one.
@@ -25,6 +26,7 @@ pub struct Component<T, const N: usize, const L: usize> {
 pub struct Mixture<T, const N: usize, const L: usize, const K: usize> {
     components: [Component<T, N, L>; K],
     len: usize,
+    pause: Pause<T>,
 }
 
 /// Where a hypothesis went.
@@ -67,7 +69,15 @@ impl<T: Real, const N: usize, const L: usize, const K: usize> Mixture<T, N, L, K
         let () = Self::CAPACITY;
         let nothing = Belief { mean: SVector::zeros(), covariance: Symmetric::zeros() };
         let vacant = Component { log_weight: T::zero(), phase: Phase::Hold, belief: nothing, log_inside: T::zero() };
-        Self { components: [vacant; K], len: 0 }
+        Self { components: [vacant; K], len: 0, pause: Pause::over() }
+    }
+
+    pub(crate) const fn pause(&self) -> &Pause<T> {
+        &self.pause
+    }
+
+    pub(crate) fn set_pause(&mut self, pause: Pause<T>) {
+        self.pause = pause;
     }
 
     /// The hypotheses.
@@ -176,7 +186,7 @@ impl<T: Real, const N: usize, const L: usize, const K: usize> Mixture<T, N, L, K
         &self,
         mut change: impl FnMut(&Component<T, N, L>) -> Result<Component<T, N, L>, StepError>,
     ) -> Result<Self, StepError> {
-        let mut changed = Self::empty();
+        let mut changed = Self { pause: self.pause, ..Self::empty() };
         for component in self.components() {
             changed.push(change(component)?);
         }
@@ -186,13 +196,11 @@ impl<T: Real, const N: usize, const L: usize, const K: usize> Mixture<T, N, L, K
     /// Probability of each phase, in the order of [`Phase::ALL`].
     #[must_use]
     pub fn phase_probabilities(&self) -> [T; 3] {
-        let mut probabilities = [T::zero(); 3];
+        let mut probabilities = PhaseSum::new(self.pause.open);
         for component in self.components() {
-            if let Some(probability) = probabilities.get_mut(component.phase.index()) {
-                *probability += component.log_weight.exp();
-            }
+            probabilities.add(component.log_weight.exp(), component.phase, &component.belief);
         }
-        probabilities
+        probabilities.sums
     }
 
     /// The Gaussian with the mixture's mean and covariance.

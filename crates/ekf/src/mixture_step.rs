@@ -127,11 +127,21 @@ pub(crate) struct Origin<'a, T, const N: usize, const L: usize> {
     /// The belief it starts from: the parent's, with rates drawn anew if a phase begins.
     pub from: &'a Belief<T, N, L>,
     pub begins: bool,
-    /// The sign of the rate at the start of the step where that is a hypothesis too.
-    pub before: Option<Phase>,
+    pub course: Course,
     pub phase: Phase,
     /// Probability that the parent has this child.
     pub probability: T,
+}
+
+/// What a hypothesis says of the direction over a step.
+#[derive(Clone, Copy)]
+pub(crate) enum Course {
+    /// That of its phase.
+    Known,
+    /// The rate had the sign of this phase at the start, and has that of its own at the end.
+    After(Phase),
+    /// Nothing: the rate may have either sign.
+    Open,
 }
 
 /// A cut that leaves less than this of a prediction is not followed: its moments would be those of a far tail.
@@ -155,13 +165,14 @@ where
         prepared: &M::Prepared,
         cut: impl FnOnce(&mut Belief<T, N, L>) -> T,
     ) -> Result<(), StepError> {
-        let Origin { parent: (place, parent), from, begins, before, phase, probability } = *origin;
+        let Origin { parent: (place, parent), from, begins, course, phase, probability } = *origin;
         if !(probability > T::zero()) {
             return Ok(());
         }
-        let transition = match before {
-            Some(before) => self.model.transition_between(prepared, from, before, phase),
-            None => self.model.transition(prepared, from, Some(phase)),
+        let transition = match course {
+            Course::After(before) => self.model.transition_between(prepared, from, before, phase),
+            Course::Known => self.model.transition(prepared, from, Some(phase)),
+            Course::Open => self.model.transition(prepared, from, None),
         };
         let covariance = self.model.propagate(&from.covariance, &transition);
         let predicted = Belief { mean: transition.mean, covariance };

@@ -3,7 +3,8 @@ use ohmstrain_model::{Phase, StrainRange};
 use crate::gaussian::Real;
 use crate::lineage::{Lineage, Recorder};
 use crate::mixture::{Mixture, keep_rate_in};
-use crate::mixture_step::{Candidates, Evidence, MixtureStep, Origin, mixture_estimator, smooth_step};
+use crate::mixture_step::{Candidates, Course, Evidence, MixtureStep, Origin, mixture_estimator, smooth_step};
+use crate::pause::Pause;
 use crate::{Dwell, Gaussian, Phased, Reading, StepError};
 
 /// At most `K` Gaussian hypotheses split by the sign of the rate.
@@ -11,6 +12,11 @@ use crate::{Dwell, Gaussian, Phased, Reading, StepError};
 /// Each predicted Gaussian is cut at rate zero. The masses of the halves are the probabilities of stretching and
 /// releasing, and each half drives the branches with its own gains. With a [`Dwell`] there is a hold phase besides,
 /// entered and left by the chain's probabilities; its moving phases turn around by crossing rate zero, not by the chain.
+///
+/// In a pause of the readings nothing is cut any more once the rate has forgotten its direction: a Gaussian whose tail is cut off
+/// and merged with the other half at every row would forget it the sooner the more rows there are, and with it how far the body
+/// may have gone. Each hypothesis then moves on with an uncertain direction, as that of an [`Ekf`](crate::Ekf), and the next
+/// reading splits it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SignSplit<T, M, const K: usize> {
     model: M,
@@ -66,7 +72,13 @@ impl<T: Real, M, const K: usize> SignSplit<T, M, K> {
     {
         let mut candidates = Candidates::new(&self.model, &self.evidence, reading, recorder);
         let chain = self.hold.map(|dwell| dwell.probabilities(*dt_s));
+        let pause = match reading {
+            None => mixture.pause().goes_on(*dt_s, self.model.forgets_direction_s()),
+            Some(_) => Pause::over(),
+        };
+        let open = pause.open;
         for parent in mixture.components().iter().enumerate() {
+            let follows = if open { goes_on } else { follows };
             for (phase, probability) in Phase::ALL.into_iter().zip(follows(chain.as_ref(), parent.1.phase)) {
                 // A body without a hold phase goes on moving, whatever it was called before.
                 let rests = self.hold.is_some() && parent.1.phase == Phase::Hold && phase != Phase::Hold;
@@ -75,22 +87,29 @@ impl<T: Real, M, const K: usize> SignSplit<T, M, K> {
                     let toward = if phase == Phase::Retract { -rate.mean } else { rate.mean };
                     toward < -T::of(HOPELESS) * rate.sd()
                 };
-                if phase != Phase::Hold && self.model.rate_ahead(prepared, from, phase).is_some_and(hopeless) {
+                if !open && phase != Phase::Hold && self.model.rate_ahead(prepared, from, phase).is_some_and(hopeless) {
                     continue;
                 }
-                let before = (!rests).then_some(parent.1.phase);
-                let origin = Origin { parent, from, begins: rests, before, phase, probability };
+                let before = if mixture.pause().open { toward(parent.1.phase, &from.mean[1]) } else { parent.1.phase };
+                let course = match phase {
+                    _ if rests => Course::Known,
+                    Phase::Extend | Phase::Retract if open => Course::Open,
+                    _ => Course::After(before),
+                };
+                let origin = Origin { parent, from, begins: rests, course, phase, probability };
                 candidates.add(&origin, prepared, |prior| match rates_of(phase) {
-                    None => T::one(),
-                    Some(rates) => {
+                    Some(rates) if !open => {
                         let mass = keep_rate_in(prior, &rates);
                         // After a hold the chain has said how likely this direction is; none of it goes to the other.
                         if rests && mass > T::of(0.5) { T::one() } else { mass }
                     }
+                    _ => T::one(),
                 })?;
             }
         }
-        candidates.finish()
+        let mut step = candidates.finish()?;
+        step.posterior.set_pause(pause);
+        Ok(step)
     }
 
     smooth_step!();
@@ -106,6 +125,25 @@ pub(crate) fn follows<T: Real>(chain: Option<&[[T; 3]; 3]>, phase: Phase) -> [T;
         (None, _) => [T::one(), T::zero(), T::one()],
         (Some(chain), Phase::Hold) => chain[1],
         (Some(chain), _) => [T::one() - chain[0][1], chain[0][1], T::one() - chain[0][1]],
+    }
+}
+
+/// The same where the direction stays open: a movement goes on as one, until a reading splits it.
+pub(crate) fn goes_on<T: Real>(chain: Option<&[[T; 3]; 3]>, phase: Phase) -> [T; 3] {
+    let (stops, zero) = (chain.map_or(T::zero(), |chain| chain[0][1]), T::zero());
+    match (chain, phase) {
+        (Some(chain), Phase::Hold) => chain[1],
+        (_, Phase::Retract) => [zero, stops, T::one() - stops],
+        _ => [T::one() - stops, stops, zero],
+    }
+}
+
+/// The phase of a rate that was left open; what holds has none.
+pub(crate) fn toward<T: Real>(phase: Phase, rate: &T) -> Phase {
+    match phase {
+        Phase::Hold => Phase::Hold,
+        _ if *rate < T::zero() => Phase::Retract,
+        _ => Phase::Extend,
     }
 }
 

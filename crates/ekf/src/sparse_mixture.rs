@@ -3,6 +3,7 @@ use ohmstrain_model::{Phase, Scalar, Symmetric};
 
 use crate::gaussian::Real;
 use crate::mixture::{Component, Mixture};
+use crate::pause::{Pause, PhaseSum};
 use crate::{Belief, Gaussian, State, StepError};
 
 /// A Gaussian and its share of a mixture. Shares are probabilities, not logarithms: nothing is to be converted at a step.
@@ -81,6 +82,7 @@ pub struct SparseMixture<T, const N: usize, const L: usize, const K: usize> {
     shares: [Share<T, N, L>; K],
     phases: [Phase; K],
     len: usize,
+    pause: Pause<T>,
 }
 
 impl<T: Real, const N: usize, const L: usize, const K: usize> SparseMixture<T, N, L, K> {
@@ -89,14 +91,22 @@ impl<T: Real, const N: usize, const L: usize, const K: usize> SparseMixture<T, N
     pub fn single(belief: Belief<T, N, L>, phase: Phase) -> Self {
         let () = Mixture::<T, N, L, K>::CAPACITY;
         let share = Share { weight: T::one(), belief, log_inside: T::zero() };
-        Self { shares: [share; K], phases: [phase; K], len: 1 }
+        Self { shares: [share; K], phases: [phase; K], len: 1, pause: Pause::over() }
     }
 
     #[inline(always)]
     pub(crate) fn empty() -> Self {
         let nothing = Belief { mean: SVector::zeros(), covariance: Symmetric::zeros() };
         let vacant = Share { weight: T::zero(), belief: nothing, log_inside: T::zero() };
-        Self { shares: [vacant; K], phases: [Phase::Hold; K], len: 0 }
+        Self { shares: [vacant; K], phases: [Phase::Hold; K], len: 0, pause: Pause::over() }
+    }
+
+    pub(crate) const fn pause(&self) -> &Pause<T> {
+        &self.pause
+    }
+
+    pub(crate) fn set_pause(&mut self, pause: Pause<T>) {
+        self.pause = pause;
     }
 
     /// One place more, if there is room.
@@ -146,17 +156,16 @@ impl<T: Real, const N: usize, const L: usize, const K: usize> SparseMixture<T, N
     /// Probability of each phase, in the order of [`Phase::ALL`].
     #[must_use]
     pub fn phase_probabilities(&self) -> [T; 3] {
-        let mut probabilities = [T::zero(); 3];
+        let mut probabilities = PhaseSum::new(self.pause.open);
         for (share, phase) in self.shares().iter().zip(self.phases()) {
-            if let Some(probability) = probabilities.get_mut(phase.index()) {
-                *probability += share.weight;
-            }
+            probabilities.add(share.weight, *phase, &share.belief);
         }
-        probabilities
+        probabilities.sums
     }
 
     fn mixture(&self) -> Mixture<T, N, L, K> {
         let mut mixture = Mixture::empty();
+        mixture.set_pause(self.pause);
         for (share, phase) in self.shares().iter().zip(self.phases()) {
             mixture.push(share.component(*phase));
         }
@@ -169,6 +178,7 @@ impl<T: Real, const N: usize, const L: usize, const K: usize> SparseMixture<T, N
             (*share, *phase) = (Share::of(component), component.phase);
         }
         self.len = from.components().len();
+        self.pause = *from.pause();
         self
     }
 }

@@ -10,27 +10,30 @@ use crate::gaussian::Real;
 use crate::genealogy::{Heirs, sparse_smooth_back};
 use crate::mixture::Added;
 use crate::mixture_step::{LEAST_MASS, Predicted};
-use crate::sign_split::{HOPELESS, follows};
+use crate::pause::Pause;
+use crate::sign_split::{HOPELESS, follows, goes_on, toward};
 use crate::sparse_children::Children;
 use crate::sparse_evidence::{Newborn, Weighing};
 use crate::sparse_mixture::{Share, SparseMixture};
 use crate::sparse_parts::Parts;
 use crate::sparse_predict::Course;
-use crate::switching::fresh_rate;
+use crate::switching::{forgets_direction_s, fresh_rate};
 use crate::{
-    AnyCurve, Compact, Curve, Dwell, Evidence, Gaussian, MixtureResidual, Reading, SparseEkf, StepError, Switch,
+    AnyCurve, Curve, Dwell, Evidence, Gaussian, Logistic, MixtureResidual, Reading, SparseEkf, StepError, Switch,
 };
 
 /// [`SignSplit`](crate::SignSplit) of a [`SwitchedModel`] with Ornstein-Uhlenbeck motion, for steps of one length: the
 /// same to rounding, without multiplying zeros. `G` as for [`SparseEkf`].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SparseSignSplit<T, const B: usize, const N: usize, const K: usize, S = Compact, G = AnyCurve<T>> {
+pub struct SparseSignSplit<T, const B: usize, const N: usize, const K: usize, S = Logistic, G = AnyCurve<T>> {
     kernel: SparseEkf<T, S, B, N, G>,
     /// Probabilities of a change of phase over a step, `[from][to]`; `None` for a body that never rests.
     chain: Option<[[T; 3]; 3]>,
     weighing: Weighing<T>,
     /// Rate of a moving phase after a hold.
     fresh: [Gaussian<T>; 3],
+    /// Seconds without a reading after which a step leaves the direction open.
+    forgets_direction_s: T,
 }
 
 impl<T: Real, const B: usize, const N: usize, const K: usize> SparseSignSplit<T, B, N, K> {
@@ -54,12 +57,13 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
     SparseSignSplit<T, B, N, K, S, G>
 {
     /// A filter whose hypotheses step as `kernel` does; the other arguments as for [`Self::new`]. Of its switch only the
-    /// square root is used.
+    /// square root is used but in a pause, where the direction stays open.
     pub fn around(kernel: SparseEkf<T, S, B, N, G>, hold: Option<Dwell<T>>, evidence: Evidence<T>) -> Self {
         Self {
             chain: hold.map(|dwell| dwell.probabilities(kernel.dt_s())),
             weighing: Weighing::new(evidence),
             fresh: Phase::ALL.map(|phase| fresh_rate(kernel.model().motion(), phase)),
+            forgets_direction_s: forgets_direction_s(kernel.model()),
             kernel,
         }
     }
@@ -91,10 +95,17 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
         reading: Option<Reading<T>>,
         heirs: &mut impl Heirs,
     ) -> Result<Option<MixtureResidual<T>>, StepError> {
+        let pause = match reading {
+            None => state.pause().goes_on(self.kernel.dt_s(), self.forgets_direction_s),
+            Some(_) => Pause::over(),
+        };
+        let open = pause.open;
         let mut children = Children::new(reading.is_none());
         let mut predicted = Predicted::new();
         for (place, (parent, from)) in state.shares().iter().zip(state.phases()).enumerate() {
-            let turning = self.kernel.turning(*from, &Parts::of(&parent.belief));
+            let before = if state.pause().open { toward(*from, &parent.belief.mean[1]) } else { *from };
+            let turning = if open { None } else { Some(self.kernel.turning(before, &Parts::of(&parent.belief))) };
+            let follows = if open { goes_on } else { follows };
             for (phase, probability) in Phase::ALL.into_iter().zip(follows(self.chain.as_ref(), *from)) {
                 if probability > T::zero() {
                     let origin = Origin { parent, from: *from, turning, phase, probability };
@@ -107,6 +118,7 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
         let density = children.density();
         children.normalise(heirs)?;
         *state = children.into_state();
+        state.set_pause(pause);
         Ok(reading.map(|_| MixtureResidual::new(&predicted, density, self.weighing.tempering())))
     }
 
@@ -124,17 +136,18 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
         if rests {
             child.renew_rate(&self.fresh[phase.index()]);
         }
-        if phase != Phase::Hold && self.is_hopeless(phase, &child) {
+        if turning.is_some() && phase != Phase::Hold && self.is_hopeless(phase, &child) {
             return Ok(None);
         }
-        let course = if from == Phase::Hold || phase == Phase::Hold {
-            Course::Known(phase)
-        } else {
-            Course::Within(phase, turning)
+        let course = match turning {
+            _ if rests || phase == Phase::Hold => Course::Known(phase),
+            None => Course::Uncertain,
+            Some(_) if from == Phase::Hold => Course::Known(phase),
+            Some(turning) => Course::Within(phase, turning),
         };
         let spread = self.kernel.predict(&mut child, course);
         let mut prior = parent.weight * probability;
-        if phase != Phase::Hold {
+        if turning.is_some() && phase != Phase::Hold {
             let mass = child.cut_rate::<S, N>(phase, self.weighing.clear());
             if !(mass > T::of(LEAST_MASS)) {
                 return Ok(None);
@@ -162,8 +175,8 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
 struct Origin<'a, T, const N: usize, const L: usize> {
     parent: &'a Share<T, N, L>,
     from: Phase,
-    /// What its rate leaves open over the step, unless it rests.
-    turning: Turning<T>,
+    /// What its rate leaves open over the step, unless it rests; `None` if a reading is missing to tell its direction.
+    turning: Option<Turning<T>>,
     phase: Phase,
     /// Probability that the parent has this child.
     probability: T,

@@ -5,7 +5,7 @@ use crate::{Advanced, Estimator, Reading, StepError};
 /// An estimator that takes a long step as several short ones, so that a pause in the readings may be written down as one step
 /// or as many rows without a reading.
 ///
-/// How long a step may be is for the estimator to say ([`Estimator::longest_step_s`]); a pause is divided into 64 at most.
+/// How long a step may be is for the estimator to say ([`Estimator::longest_step_s`]); a pause is divided into 128 at most.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Substeps<E>(pub E);
 
@@ -17,13 +17,14 @@ pub struct Repeated<P> {
 }
 
 /// Into how many steps a pause is divided at most.
-const MOST: u8 = 64;
+const MOST: u8 = 128;
+/// A step of the longest length shall be one step, whatever rounding says.
+pub(crate) const GRACE: f64 = 1.0005;
 
 /// Into how many steps of `longest_s` seconds at most a step of `dt_s` seconds is divided.
 pub(crate) fn count<T: Scalar>(dt_s: T, longest_s: T) -> u8 {
     let mut count = 1;
-    // Half a per mille of grace: a step of the longest length shall be one step, whatever rounding says.
-    let mut covered = longest_s * T::of(1.0005);
+    let mut covered = longest_s * T::of(GRACE);
     let more = covered;
     while covered < dt_s && count < MOST {
         covered += more;

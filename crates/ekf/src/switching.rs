@@ -25,6 +25,12 @@ pub trait Phased<T: Scalar, const N: usize, const L: usize>: Dynamics<T, N, L> +
         self.transition(step, from, Some(after))
     }
 
+    /// After how many seconds without a reading a step leaves the direction open ([`Dynamics::transition`] without a phase):
+    /// infinite by default, and wherever a movement tends another way in each phase.
+    fn forgets_direction_s(&self) -> T {
+        T::one() / T::zero()
+    }
+
     /// The components of the state that [`Self::enter`] draws anew; it leaves the others as they are.
     fn renewed(&self) -> Range<usize>;
 }
@@ -53,6 +59,20 @@ pub(crate) fn fresh_rate<T: Scalar, const M: usize>(motion: &Motion<T, M>, phase
         return Gaussian { mean: sign * motion.phase_rate(), variance };
     }
     Gaussian { mean: sign * T::of(HALF_NORMAL.0) * variance.sqrt(), variance: T::of(HALF_NORMAL.1) * variance }
+}
+
+/// So many longest steps are two thirds of the integral of a rate's squared correlation: of exp(-t/T), and of (1 + x) exp(-x) for
+/// a smooth one.
+const FORGETS: (f64, f64) = (1.0, 2.5);
+
+/// Seconds without a reading after which a step leaves the direction open.
+pub(crate) fn forgets_direction_s<T: Scalar, const M: usize, const B: usize, const N: usize>(
+    model: &SwitchedModel<T, M, B, N>,
+) -> T {
+    if !model.motion().phase_rate().is_zero() {
+        return T::one() / T::zero();
+    }
+    T::of(if M == 2 { FORGETS.0 } else { FORGETS.1 }) * model.longest_step_s()
 }
 
 /// Draws rate and acceleration anew from the motion's prior of a phase.
@@ -95,6 +115,10 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize, const L: usize> 
             Direction::Within { phase: after, turning: self.turning(step, &from.mean, &from.covariance, before) }
         };
         SwitchedModel::transition(self, step, &from.mean, direction)
+    }
+
+    fn forgets_direction_s(&self) -> T {
+        forgets_direction_s(self)
     }
 
     fn renewed(&self) -> Range<usize> {

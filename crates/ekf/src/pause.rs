@@ -1,0 +1,54 @@
+//! What a pause of the readings is to hypotheses about the sign of the rate.
+
+use ohmstrain_model::{Phase, Scalar};
+
+use crate::Belief;
+use crate::gaussian::{Gaussian, Real};
+use crate::substeps::GRACE;
+
+/// For how long there has been no reading.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Pause<T> {
+    seconds: T,
+    /// Whether the phase of what moves is where it came from, and its rate may have either sign by now.
+    pub open: bool,
+}
+
+impl<T: Scalar> Pause<T> {
+    pub(crate) fn over() -> Self {
+        Self { seconds: T::zero(), open: false }
+    }
+
+    /// After a step of `dt_s` more seconds without a reading; the direction stays open from `longest_s` on.
+    pub(crate) fn goes_on(self, dt_s: T, longest_s: T) -> Self {
+        let seconds = self.seconds + dt_s;
+        Self { seconds, open: seconds > longest_s * T::of(GRACE) }
+    }
+}
+
+/// Sums up the probabilities of phases.
+pub(crate) struct PhaseSum<T> {
+    pub sums: [T; 3],
+    /// Whether the sign of the rate tells the phase of what moves.
+    open: bool,
+}
+
+impl<T: Real> PhaseSum<T> {
+    pub(crate) fn new(open: bool) -> Self {
+        Self { sums: [T::zero(); 3], open }
+    }
+
+    pub(crate) fn add<const N: usize, const L: usize>(&mut self, weight: T, phase: Phase, belief: &Belief<T, N, L>) {
+        let [extend, hold, retract] = &mut self.sums;
+        match phase {
+            Phase::Hold => *hold += weight,
+            _ if self.open => {
+                let stretches = Gaussian::marginal(belief, 1).probability_above(T::zero());
+                *extend += weight * stretches;
+                *retract += weight * (T::one() - stretches);
+            }
+            Phase::Extend => *extend += weight,
+            Phase::Retract => *retract += weight,
+        }
+    }
+}
