@@ -170,6 +170,11 @@ fn huber_bounds_the_influence() {
         let full = step(expected + 1.9 * sd, Influence::Full);
         (ReadingVerdict::Accepted, full.advanced.state)
     });
+    // A threshold below one deviation bounds from there on, too.
+    let small = step(expected + 0.7 * sd, Influence::Huber { threshold: 0.5 });
+    let half = step(expected + 0.5 * sd, Influence::Full);
+    assert_eq!(small.verdict, ReadingVerdict::Downweighted);
+    assert!((small.advanced.state.mean - half.advanced.state.mean).amax() <= 1e-12 * half.advanced.state.mean.amax());
     // Student's t with ν = 4: weight 5 / (4 + 16) at four deviations, 5 / (4 + 2500) at fifty, and full weight at one.
     let student = Influence::StudentT { degrees_of_freedom: 4.0 };
     let gain = at_threshold / (2.0 * sd);

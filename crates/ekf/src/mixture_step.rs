@@ -302,3 +302,43 @@ macro_rules! smooth_step {
     };
 }
 pub(crate) use smooth_step;
+
+#[cfg(test)]
+mod tests {
+    use super::{LogSum, Predicted};
+
+    /// Mean `Σ w ν / Σ w` and variance `Σ w (S + ν²) / Σ w - mean²`, which is exact as far from the reading as here; and in
+    /// `f32` at a distance at which these squares leave nothing of the variance.
+    #[test]
+    fn the_innovation_of_a_mixture_has_its_moments() {
+        let parts = [(0.2, 1.0, 0.5), (0.1, -2.0, 0.3), (0.4, 0.25, 0.7)];
+        let mut predicted = Predicted::new();
+        parts.iter().for_each(|(weight, innovation, variance)| predicted.add(*weight, *innovation, *variance));
+        let sum = |of: fn(f64, f64, f64) -> f64| parts.iter().map(|(w, nu, s)| of(*w, *nu, *s)).sum::<f64>();
+        let total = sum(|w, _, _| w);
+        let mean = sum(|w, nu, _| w * nu) / total;
+        let variance = sum(|w, nu, s| w * (s + nu * nu)) / total - mean * mean;
+        let found = predicted.moments();
+        assert!((found.0 - mean).abs() < 1e-15 && (found.1 - variance).abs() < 1e-15, "{found:?} {mean} {variance}");
+        let mut far = Predicted::<f32>::new();
+        far.add(0.5, 3e4, 1e-4);
+        far.add(0.5, 3e4 + 0.25, 1e-4);
+        // A quarter is a multiple of rounding there: nothing is rounded.
+        assert_eq!(far.moments(), (30_000.125, 1e-4 + 0.015_625));
+    }
+
+    /// `ln Σ w exp(x)`, in any order and where no single exponential is a number.
+    #[test]
+    fn a_sum_of_exponentials_needs_no_exponential() {
+        for shift in [0.0, -2000.0, 2000.0] {
+            for order in [[0, 1, 2], [2, 1, 0], [1, 2, 0]] {
+                let parts = [(0.2, 0.0), (0.5, -1.0), (0.3, 2.0)];
+                let mut sum = LogSum { most: 0.0, sum: 0.0 };
+                order.iter().for_each(|k| sum.add(parts[*k].0, parts[*k].1 + shift));
+                let expected =
+                    parts.iter().map(|(weight, exponent): &(f64, f64)| weight * exponent.exp()).sum::<f64>().ln();
+                assert!((sum.sum.ln() + sum.most - shift - expected).abs() < 1e-12, "{shift} {order:?}");
+            }
+        }
+    }
+}

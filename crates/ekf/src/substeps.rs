@@ -98,3 +98,19 @@ where
         self.smooth_back_over(filtered, prepared, reading, next)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{MOST, count};
+
+    /// As many as it takes, whatever rounding makes of a sum, and no more than there may be.
+    #[test]
+    fn a_long_step_is_divided_into_as_many_as_it_takes() {
+        for (dt_s, expected) in
+            [(0.01, 1), (0.1, 1), (0.1001, 2), (0.1 + 0.1 + 0.1, 3), (0.95, 10), (6.0, 60), (1e9, MOST)]
+        {
+            assert_eq!(count(dt_s, 0.1), expected, "{dt_s} s");
+        }
+        assert_eq!(count(1e9, f64::INFINITY), 1);
+    }
+}
