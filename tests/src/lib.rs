@@ -149,7 +149,12 @@ pub fn switching_sensor() -> SwitchedModel<f64, 2, 1, 3> {
 #[doc = include_str!("../../README.md")]
 struct Readme;
 
-/// So does the code in the architecture document.
+/// So does the code in the description of the library.
+#[cfg(doctest)]
+#[doc = include_str!("../../docs/library.md")]
+struct Library;
+
+/// And the code in the architecture document.
 #[cfg(doctest)]
 #[doc = include_str!("../../ARCHITECTURE.md")]
 struct Architecture;

@@ -3,12 +3,13 @@ mod export;
 mod files;
 mod fit_law;
 mod refine;
+mod shell;
 mod split;
 
 use std::path::PathBuf;
 use std::str::FromStr;
 
-use clap::{Args as ClapArgs, Parser, Subcommand, ValueEnum};
+use clap::{Args as ClapArgs, CommandFactory, Parser, Subcommand, ValueEnum};
 use ohmstrain_bench_data::simulate::{Material, Protocol};
 use ohmstrain_bench_data::{FrontEndSpec, JointSpec, Metadata, ResistanceUnit, StrainUnit};
 use ohmstrain_calib::{EstimatorKind, GaugeFamily};
@@ -19,7 +20,10 @@ pub use export::{ExportArgs, ExportTarget};
 pub use files::{ImportArgs, InspectArgs};
 pub use fit_law::{FitLawArgs, SegmentChoice, phase_name};
 pub use refine::RefineArgs;
+pub use shell::{CompletionsArgs, ManArgs};
 pub use split::Split;
+
+use crate::verbosity::Verbosity;
 
 /// From the resistance of a soft strain sensor to strain, with an honest error bar.
 #[derive(Debug, Parser)]
@@ -28,33 +32,75 @@ pub struct Args {
     /// What to do.
     #[command(subcommand)]
     pub command: Command,
+    /// Say nothing on stderr but errors, and nothing at the end of a calibration
+    #[arg(short, long, global = true, conflicts_with = "verbose")]
+    pub quiet: bool,
+    /// Say on stderr what is being done
+    #[arg(short, long, global = true)]
+    pub verbose: bool,
+}
+
+impl Args {
+    /// How much is to be said.
+    pub const fn verbosity(&self) -> Verbosity {
+        match (self.quiet, self.verbose) {
+            (true, _) => Verbosity::Quiet,
+            (_, true) => Verbosity::Detailed,
+            _ => Verbosity::Usual,
+        }
+    }
+}
+
+/// The example that a command's help leads with.
+pub fn example(command: &str) -> Option<String> {
+    let known = Args::command().find_subcommand(command)?.get_before_help()?.to_string();
+    Some(known)
 }
 
 /// The commands.
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Simulate a bench session, calibrate on its first half, filter, smooth and report; needs no input
+    #[command(before_help = "Example: ohmstrain demo --out ohmstrain-demo")]
     Demo(DemoArgs),
     /// Say what stands in a lab's files, and how to import them
+    #[command(before_help = "Example: ohmstrain inspect rig.csv --gauge-length-mm 40")]
     Inspect(InspectArgs),
     /// Make a trace of a lab's files
+    #[command(before_help = "Example: ohmstrain import rig.csv --gauge-length-mm 40 -o trace.csv")]
     Import(ImportArgs),
     /// Simulate a recording of the bench
+    #[command(before_help = "Example: ohmstrain simulate --protocol mixed --speed-mm-s 5 -o trace.csv")]
     Simulate(SimulateArgs),
     /// Fit law, noise and motion to recordings with a known strain
+    #[command(before_help = "Example: ohmstrain calibrate bench.csv -o sensor.toml --report report.html")]
     Calibrate(CalibrateArgs),
     /// Fit the extended Kalman filter's noise to readings alone, where no strain was recorded
+    #[command(before_help = "Example: ohmstrain refine readings.csv --sensor sensor.toml -o refined.toml")]
     Refine(RefineArgs),
     /// Fit the source paper's closed-form laws to stretches, holds and releases
+    #[command(before_help = "Example: ohmstrain fit-law bench.csv --table")]
     FitLaw(FitLawArgs),
     /// Turn readings into strain, row by row
+    #[command(before_help = "Example: ohmstrain filter readings.csv --sensor sensor.toml > estimates.csv")]
     Filter(FilterArgs),
     /// Turn a whole recording into strain, every estimate from all readings
+    #[command(before_help = "Example: ohmstrain smooth readings.csv --sensor sensor.toml > smoothed.csv")]
     Smooth(SmoothArgs),
     /// Compare estimates with a known strain
+    #[command(before_help = "Example: ohmstrain evaluate bench.csv --split 0.5 --report report.html")]
     Evaluate(EvaluateArgs),
     /// Write a calibrated sensor's filter as C or Rust source for a microcontroller
+    #[command(before_help = "Example: ohmstrain export --sensor sensor.toml --target c --dt-s 0.02 -o firmware")]
     Export(ExportArgs),
+    /// Print a shell's completions of commands and flags
+    #[command(
+        before_help = "Example: ohmstrain completions bash > ~/.local/share/bash-completion/completions/ohmstrain"
+    )]
+    Completions(CompletionsArgs),
+    /// Write manual pages
+    #[command(before_help = "Example: ohmstrain man -o ~/.local/share/man/man1")]
+    Man(ManArgs),
 }
 
 /// Flags of `demo`.

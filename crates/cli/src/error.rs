@@ -8,6 +8,7 @@ use ohmstrain_calib::CalibrationError;
 use thiserror::Error;
 
 use crate::suits;
+use crate::verbosity::Verbosity;
 
 /// Why a command stopped; each kind has its exit code.
 #[derive(Debug, Error)]
@@ -46,6 +47,9 @@ impl CliError {
 
     /// Says on stderr what did not stop the command.
     pub fn remark(text: &str) {
+        if Verbosity::chosen() == Verbosity::Quiet {
+            return;
+        }
         let _ = writeln!(io::stderr(), "ohmstrain: {text}");
     }
 

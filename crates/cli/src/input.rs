@@ -9,6 +9,7 @@ use ohmstrain_calib::Samples;
 use sha2::{Digest, Sha256};
 
 use crate::error::CliError;
+use crate::sensor_file;
 
 /// A recording in memory.
 pub struct Recording {
@@ -53,6 +54,11 @@ pub fn read(path: &Path, overrides: &Metadata) -> Result<Recording, CliError> {
 
 /// A whole recording of these bytes.
 pub fn parse(bytes: &[u8], path: &Path, overrides: &Metadata) -> Result<Recording, CliError> {
+    if sensor_file::is_one(bytes) {
+        let (name, word) =
+            (path.display(), "is a sensor file, not a recording: give it to --sensor, and the recording here");
+        return Err(CliError::Input(format!("{name} {word}")));
+    }
     let sha256 = Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect();
     let rows = TraceReader::with_overrides(bytes, &path.display().to_string(), overrides)?;
     let (name, header) = (rows.file().to_string(), header(&rows));
@@ -69,6 +75,20 @@ impl Recording {
     pub fn rows(&self, rows: Range<usize>) -> Self {
         let (name, header, sha256) = (self.name.clone(), self.header.clone(), self.sha256.clone());
         Self { name, header, sha256, first_row: self.first_row + rows.start, trace: self.trace.rows(rows) }
+    }
+
+    /// There is no row between these times.
+    pub fn no_rows(&self, from_s: Option<f64>, until_s: Option<f64>) -> CliError {
+        let times = &self.trace.time_s;
+        let (first, last) = (times.first().copied().unwrap_or(f64::NAN), times.last().copied().unwrap_or(f64::NAN));
+        let from = from_s.map(|from_s| format!("--from {from_s}"));
+        let until = until_s.map(|until_s| format!("--until {until_s}"));
+        let flags: Vec<String> = from.into_iter().chain(until).collect();
+        CliError::Input(format!(
+            "{}: no row is left by {}; the recording goes from {first} to {last} s",
+            self.name,
+            flags.join(" ")
+        ))
     }
 
     /// As calibration wants it.

@@ -19,15 +19,34 @@ mod report;
 mod run;
 mod sensor_file;
 mod suits;
+mod verbosity;
 mod verdict;
 
+use std::io::{self, Write};
 use std::process::ExitCode;
 
 use clap::Parser;
+use clap::error::ErrorKind;
 
 fn main() -> ExitCode {
-    match commands::dispatch(&args::Args::parse().command) {
+    let args = match args::Args::try_parse() {
+        Ok(args) => args,
+        Err(error) => return refused(&error),
+    };
+    args.verbosity().choose();
+    match commands::dispatch(&args.command) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => error.report(),
     }
+}
+
+/// Says what is wrong with the arguments, with the command's example where something is missing; or prints help.
+fn refused(error: &clap::Error) -> ExitCode {
+    let _ = error.print();
+    if error.kind() == ErrorKind::MissingRequiredArgument
+        && let Some(example) = std::env::args().nth(1).and_then(|command| args::example(&command))
+    {
+        let _ = writeln!(io::stderr(), "\n{example}");
+    }
+    ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2))
 }

@@ -1,35 +1,51 @@
+use std::time::Instant;
+
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use ohmstrain_calib::Stage;
+
+use crate::verbosity::Verbosity;
 
 /// A progress bar on stderr; silent unless stderr is a terminal.
 pub struct Progress {
     bar: ProgressBar,
+    start: Instant,
 }
 
 impl Progress {
     /// A bar with a heading.
     pub fn new(heading: &'static str) -> Self {
-        let bar = ProgressBar::with_draw_target(Some(1), ProgressDrawTarget::stderr());
+        let target = match Verbosity::chosen() {
+            Verbosity::Quiet => ProgressDrawTarget::hidden(),
+            _ => ProgressDrawTarget::stderr(),
+        };
+        let bar = ProgressBar::with_draw_target(Some(1), target);
         if let Ok(style) = ProgressStyle::with_template("{msg:32} {wide_bar} {percent:>3} %") {
             bar.set_style(style);
         }
         bar.set_message(heading);
-        Self { bar }
+        let progress = Self { bar, start: Instant::now() };
+        progress.detail(heading);
+        progress
     }
 
     /// Says what is being done, with nothing to count.
     pub fn doing(&self, what: &'static str) {
         self.bar.set_message(what);
+        self.detail(what);
+    }
+
+    fn detail(&self, what: &str) {
+        Verbosity::detail(&format!("{:.1} s: {what}", self.start.elapsed().as_secs_f64()));
     }
 
     /// Shows where a calibration is.
     pub fn calibrating(&self, stage: Stage) {
         match stage {
-            Stage::LeftOut => self.bar.set_message("checking parts left out"),
-            Stage::Law => self.bar.set_message("fitting the law"),
+            Stage::LeftOut => self.doing("checking parts left out"),
+            Stage::Law => self.doing("fitting the law"),
             Stage::Noise { done, expected } => {
                 if done == 1 {
-                    self.bar.set_message("fitting noise and motion");
+                    self.doing("fitting noise and motion");
                 }
                 self.bar.set_length(expected.max(done));
                 self.bar.set_position(done);

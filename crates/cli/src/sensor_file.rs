@@ -12,11 +12,27 @@ pub fn read(path: &Path, estimator: Option<EstimatorKind>) -> Result<Sensor, Cli
     let bytes = fs::read(path).map_err(|error| CliError::file("read", path, &error))?;
     let text = String::from_utf8(bytes)
         .map_err(|_| CliError::Input(format!("{name}:1: expected a text file in UTF-8, found other bytes")))?;
+    if is_recording(&text) {
+        return Err(CliError::Input(format!(
+            "{name} is a recording, not a sensor file: give --sensor what `ohmstrain calibrate` wrote, and the recording by itself"
+        )));
+    }
     let sensor = match estimator {
         Some(kind) => Sensor::from_toml_for(&text, kind),
         None => Sensor::from_toml(&text),
     };
     sensor.map_err(|error| CliError::Input(error.in_file(&name)))
+}
+
+/// Whether these are the first bytes of a sensor's parameters.
+pub fn is_one(bytes: &[u8]) -> bool {
+    bytes.starts_with(b"format = ")
+}
+
+/// Whether this is a recording: its first line that is no comment has names of columns.
+fn is_recording(text: &str) -> bool {
+    let first = text.lines().find(|line| !line.trim().is_empty() && !line.starts_with('#')).unwrap_or("");
+    first.contains(',') && first.split(',').any(|cell| matches!(cell.trim(), "time_s" | "time_us"))
 }
 
 /// A sensor with these parameters, or why it cannot be written.

@@ -186,7 +186,7 @@ fn a_reference_that_teaches_nothing_is_refused() {
 
     bench.write("bad.csv", &trace);
     let from = [evaluate, &["--from", "400.5"]].concat();
-    fails(&bench, &from, CONTENT, "bad.csv: expected a reference at time_s >= 400.5, found none");
+    fails(&bench, &from, CONTENT, "bad.csv: no row is left by --from 400.5; the recording goes from 0 to 400 s");
     let few = "bad.csv: recording 1 has 15 rows with reading and reference, at least 60 are needed";
     fails(&bench, &[calibrate, &["--until", "3"]].concat(), CONTENT, few);
 
@@ -229,7 +229,6 @@ fn readings_in_another_unit_than_the_sensors_are_refused() {
 fn a_sensor_file_that_is_none_is_refused_alike_by_every_command() {
     let bench = Bench::calibrated();
     let (sensor, trace) = (bench.read("sensor.toml"), bench.read("trace.csv"));
-    let header_line = header_line(&trace);
     /// Replaces the first line that starts with `start`; the line's number.
     fn swap(sensor: &str, start: &str, by: &str) -> (String, usize) {
         let index = sensor.lines().position(|line| line.starts_with(start)).unwrap();
@@ -275,7 +274,7 @@ fn a_sensor_file_that_is_none_is_refused_alike_by_every_command() {
             sensor.replace("[law]", joint).into(),
             format!(":{}: column 17: field `joint.moment_arm_mm`: expected a length", 3 + line_of("[law]")),
         ),
-        (trace.into(), format!(":{header_line}: column 7: key with no value, expected `=`")),
+        (trace.into(), " is a recording, not a sensor file: give --sensor what ".into()),
         ("hello there\n".into(), ":1: column 7: key with no value, expected `=`".into()),
         ("format = 1\n[law\n".into(), ":2: column 5: unclosed table, expected `]`".into()),
         (Vec::new(), ":1: column 1: missing field `format`".into()),

@@ -8,7 +8,6 @@ use super::positive;
 
 /// Flags of `inspect`.
 #[derive(Debug, ClapArgs)]
-#[command(after_help = "Example: ohmstrain inspect rig.csv --gauge-length-mm 40")]
 pub struct InspectArgs {
     /// Files of one recording: text, XLSX, Parquet, each perhaps in gzip; - for stdin
     #[arg(required = true)]
@@ -26,8 +25,7 @@ pub struct InspectArgs {
 
 /// Flags of `import`.
 #[derive(Debug, ClapArgs)]
-#[command(after_help = "Example: ohmstrain import rig.csv --gauge-length-mm 40 -o trace.csv\n\
-    `ohmstrain inspect FILE…` prints the command for a file.")]
+#[command(after_help = "`ohmstrain inspect FILE…` prints the command for a file.")]
 pub struct ImportArgs {
     /// Files of one recording: text, XLSX, Parquet, each perhaps in gzip; - for stdin
     #[arg(required = true)]

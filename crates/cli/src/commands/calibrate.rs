@@ -21,6 +21,7 @@ use crate::plausible;
 use crate::progress::Progress;
 use crate::report::Sample;
 use crate::sensor_file::{self, MADE_BY};
+use crate::verbosity::Verbosity;
 
 /// Calibrates a sensor on recordings and writes its parameters.
 pub fn run(args: &CalibrateArgs) -> Result<(), CliError> {
@@ -33,7 +34,11 @@ pub fn run(args: &CalibrateArgs) -> Result<(), CliError> {
         let recording = input::read(path, &overrides)?;
         let row_at = |time_s: f64| recording.trace.time_s.partition_point(|earlier_s| *earlier_s < time_s);
         let end = args.until.map_or(recording.trace.len(), row_at);
-        recordings.push(recording.rows(args.from.map_or(0, row_at).min(end)..end));
+        let rows = args.from.map_or(0, row_at).min(end)..end;
+        if rows.is_empty() && !recording.trace.is_empty() {
+            return Err(recording.no_rows(args.from, args.until));
+        }
+        recordings.push(recording.rows(rows));
     }
     for recording in &mut recordings {
         alignment::check(recording, args.align)?;
@@ -58,7 +63,13 @@ pub fn run(args: &CalibrateArgs) -> Result<(), CliError> {
     }
     let explained = explain::text(args, &recordings, &params.law)?;
     outputs.publish()?;
-    let said = if args.json { closing.json().map_err(io::Error::from)? } else { closing.text().into_bytes() };
+    let said = if Verbosity::chosen() == Verbosity::Quiet && !args.json {
+        vec![]
+    } else if args.json {
+        closing.json().map_err(io::Error::from)?
+    } else {
+        closing.text().into_bytes()
+    };
     print(|out| {
         out.write_all(explained.as_bytes())?;
         Ok(out.write_all(&said)?)

@@ -7,7 +7,7 @@ use ohmstrain_calib::{LawOptions, RECIPE};
 use super::calibrate::{Calibrated, calibrate_recordings};
 use super::closing::Closing;
 use super::reporting::{Reporting, Wanted};
-use super::score_table::{add_scores, score_table};
+use super::score_table::{KEY, add_scores, score_table};
 use super::scoring::{self, Part};
 use super::simulate;
 use super::smooth::write_estimates;
@@ -74,7 +74,7 @@ pub fn run(args: &DemoArgs) -> Result<(), CliError> {
     outputs.publish()?;
     drop(progress);
 
-    let mut table = score_table(params.quantity.name(), &[]);
+    let mut table = score_table();
     let scores = [
         ("filter", scoring::of_estimates(&recording, &estimated.filtered, part)),
         ("smoother", scoring::of_estimates(&recording, &estimated.smoothed, part)),
@@ -82,11 +82,11 @@ pub fn run(args: &DemoArgs) -> Result<(), CliError> {
     ];
     for (name, scores) in scores {
         if let Some(scores) = scores {
-            add_scores(&mut table, "second half", name, &scores, &[]);
+            add_scores(&mut table, name, &scores);
         }
     }
     print(|out| {
-        writeln!(out, "{table}")?;
+        writeln!(out, "second half, not calibrated on: errors in strain\n{table}\n\n{KEY}")?;
         Ok(writeln!(out, "\nSee {}", args.out.join("report.html").display())?)
     })
 }

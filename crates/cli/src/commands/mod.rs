@@ -16,6 +16,7 @@ mod refine;
 mod reporting;
 mod score_table;
 mod scoring;
+mod shell;
 mod simulate;
 mod smooth;
 
@@ -36,5 +37,7 @@ pub fn dispatch(command: &Command) -> Result<(), CliError> {
         Command::Smooth(args) => smooth::run(args),
         Command::Evaluate(args) => evaluate::run(args),
         Command::Export(args) => export::run(args),
+        Command::Completions(args) => shell::completions(args),
+        Command::Man(args) => shell::man(args),
     }
 }

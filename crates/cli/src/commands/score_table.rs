@@ -1,48 +1,40 @@
 use comfy_table::{Table, presets};
 use ohmstrain_calib::Scores;
 
-/// An empty table for [`add_scores`], with more columns at its end.
-pub fn score_table(quantity: &str, more: &[&str]) -> Table {
+/// What the columns mean, for under the tables; no line is wider than a terminal.
+pub const KEY: &str = "\
+RMSE, MAE and bias (mean error) are in the unit of the reference; %FS is the RMSE in percent of the
+reference's range in the rows scored. 50/90/95 %: percent of the rows in which the interval of that
+level holds the reference. width: mean width of the 95 % interval, CRPS: ranked probability score,
+both %FS, less is better. log: mean log density, more is better. wrong: percent of the time on the
+wrong branch, more than 20 %FS off for 2 s or longer.";
+
+/// An empty table for [`add_scores`].
+pub fn score_table() -> Table {
     let mut table = Table::new();
     table.load_style(presets::ASCII_MARKDOWN);
-    let (rmse, mae) = (format!("RMSE, {quantity}"), format!("MAE, {quantity}"));
-    let columns = [
-        "recording",
-        "estimate",
-        &rmse,
-        &mae,
-        "%FS",
-        "bias",
-        "50 % covers",
-        "90 % covers",
-        "95 % covers",
-        "95 % width, %FS",
-        "CRPS, %FS",
-        "log score",
-        "wrong branch",
-    ];
-    table.set_header(columns.iter().chain(more));
+    table.set_header(["estimate", "%FS", "RMSE", "MAE", "bias", "50/90/95 %", "width", "CRPS", "log", "wrong"]);
     table
 }
 
-/// One row of scores; `more` are the cells of the columns at the end.
-pub fn add_scores(table: &mut Table, recording: &str, estimate: &str, scores: &Scores, more: &[String]) {
-    let percent = |share: Option<f64>| share.map_or_else(String::new, |share| format!("{:.1} %", 100.0 * share));
-    let mut cells = vec![
-        recording.to_string(),
+/// One row of scores.
+pub fn add_scores(table: &mut Table, estimate: &str, scores: &Scores) {
+    table.add_row([
         estimate.to_string(),
+        format!("{:.2}", scores.rmse_percent_fs),
         format!("{:.4}", scores.rmse),
         format!("{:.4}", scores.mae),
-        format!("{:.2}", scores.rmse_percent_fs),
         format!("{:+.4}", scores.bias),
-        percent(scores.coverage_50),
-        percent(scores.coverage_90),
-        percent(scores.coverage_95),
+        covered([scores.coverage_50, scores.coverage_90, scores.coverage_95]),
         scores.width_95_percent_fs.map_or_else(String::new, |width| format!("{width:.1}")),
         format!("{:.2}", scores.crps_percent_fs),
         scores.log_score.map_or_else(String::new, |score| format!("{score:.2}")),
-        percent(Some(scores.wrong_branch)),
-    ];
-    cells.extend_from_slice(more);
-    table.add_row(cells);
+        format!("{:.1}", 100.0 * scores.wrong_branch),
+    ]);
+}
+
+/// Coverages in whole percent; nothing where there are none.
+pub fn covered(shares: [Option<f64>; 3]) -> String {
+    let known: Vec<String> = shares.into_iter().flatten().map(|share| format!("{:.0}", 100.0 * share)).collect();
+    known.join("/")
 }

@@ -9,6 +9,9 @@ use super::motion::Hold;
 use super::number::plain;
 use super::recording::Recording;
 
+/// Share of a hold that is plotted.
+const LAST: f64 = 0.99;
+
 /// The longest holds on a logarithmic time axis, or nothing if there is none.
 pub fn relaxation(recording: &Recording) -> Result<Option<Figure>, ReportError> {
     let held: Vec<(Curve, &Hold)> =
@@ -44,7 +47,12 @@ struct Curve {
 impl Curve {
     fn new(recording: &Recording, hold: &Hold) -> Option<Self> {
         let start_s = *recording.time_s.get(hold.first)?;
-        let rows = || recording.time_s.iter().zip(recording.reading).take(hold.last + 1).skip(hold.first);
+        // The next movement begins in the readings before the reference has left the hold's tolerance.
+        let end_s = start_s + LAST * hold.duration_s;
+        let rows = || {
+            let rows = recording.time_s.iter().zip(recording.reading).take(hold.last + 1).skip(hold.first);
+            rows.take_while(move |(time_s, _)| **time_s <= end_s)
+        };
         let (first_time, first_reading) = rows().find(|(_, reading)| reading.is_finite())?;
         let memory = recording.memory_at(hold.first)?;
         let law = |time_s: f64| recording.law.held(hold.strain, memory, time_s - start_s);

@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use super::summary::{self, Summary, summaries};
 use crate::commands::reporting::Drawn;
-use crate::commands::score_table::{add_scores, score_table};
+use crate::commands::score_table::{KEY, add_scores, score_table};
 use crate::error::CliError;
 use crate::sensor_file::MADE_BY;
 
@@ -120,8 +120,11 @@ impl Evaluation {
             serde_json::to_writer_pretty(&mut *out, &json).map_err(Error::from)?;
             Ok(writeln!(out)?)
         } else {
-            self.write_table(out)?;
-            if self.recordings.len() > 1 { summary::write(&self.summaries(), out) } else { Ok(()) }
+            self.write_tables(out)?;
+            if self.recordings.len() > 1 {
+                summary::write(&self.summaries(), out)?;
+            }
+            Ok(writeln!(out, "{KEY}")?)
         }
     }
 
@@ -129,27 +132,22 @@ impl Evaluation {
         summaries(self.recordings.iter().map(Vec::as_slice))
     }
 
-    /// One table: filter and smoother of every estimator, then what they are compared with.
-    fn write_table(&self, out: &mut dyn Write) -> Result<(), CliError> {
-        let Some(first) = self.recordings().next() else { return Ok(()) };
-        let timed = first.calibration_s.map(|_| "calibration, s");
-        let lagged = first.lag_s.map(|_| "lag, s");
-        let more: Vec<&str> = timed.into_iter().chain(lagged).collect();
-        let mut quantities: Vec<&str> = self.recordings().map(|scores| scores.quantity.name()).collect();
-        quantities.sort_unstable();
-        quantities.dedup();
-        let mut table = score_table(&quantities.join(" or "), &more);
+    /// One table per recording under its name: filter and smoother of every estimator, then what they are compared with.
+    fn write_tables(&self, out: &mut dyn Write) -> Result<(), CliError> {
         for scores in &self.recordings {
-            for (k, of) in scores.iter().enumerate() {
-                let case = if k == 0 { of.case() } else { String::new() };
-                add_scores(&mut table, &case, of.estimator, &of.filter, &of.more());
-                add_scores(&mut table, "", "smoother", &of.smoother, &[]);
+            let Some(first) = scores.first() else { continue };
+            writeln!(out, "{}", first.heading())?;
+            let mut table = score_table();
+            for of in scores {
+                add_scores(&mut table, of.estimator, &of.filter);
+                add_scores(&mut table, "smoother", &of.smoother);
             }
-            for (name, of) in scores.iter().take(1).flat_map(|scores| scores.baselines.named()) {
-                add_scores(&mut table, "", name, &of, &[]);
+            for (name, of) in first.baselines.named() {
+                add_scores(&mut table, name, &of);
             }
+            writeln!(out, "{table}\n")?;
         }
-        Ok(writeln!(out, "{table}")?)
+        Ok(())
     }
 }
 
@@ -159,9 +157,18 @@ impl RecordingScores {
         self.split.as_ref().map_or_else(|| self.file.clone(), |split| format!("{} {split}", self.file))
     }
 
-    /// The cells beyond the scores.
-    fn more(&self) -> Vec<String> {
-        let lag = self.lag_s.map(|lag| lag.map_or_else(|| "unknown".into(), |lag_s| format!("{lag_s:+.2}")));
-        self.calibration_s.map(|seconds| format!("{seconds:.1}")).into_iter().chain(lag).collect()
+    /// The case, what its errors are errors of, and what else is known of it.
+    fn heading(&self) -> String {
+        let unit = match self.quantity {
+            Quantity::Strain => "strain",
+            Quantity::AngleDeg => "degrees",
+        };
+        let seconds = self.calibration_s.map(|seconds| format!("calibrated in {seconds:.1} s"));
+        let lag = self.lag_s.map(|lag| match lag {
+            Some(lag_s) => format!("the reference is {lag_s:+.2} s late"),
+            None => "how late the reference is cannot be told".into(),
+        });
+        let more = [format!("errors in {unit}")].into_iter().chain(seconds).chain(lag).collect::<Vec<_>>().join(", ");
+        format!("{}: {more}", self.case())
     }
 }

@@ -159,6 +159,10 @@ fn judge(
     let rest = rest_resistance(args.rest_resistance, readings(), &recording.name)?;
     suits::check_readings(&recording.header, first, rest, readings())?;
     suits::check_reference(recording, first)?;
+    let last_s = recording.trace.time_s.last().copied();
+    if part.until_s.is_none() && part.from_s.zip(last_s).is_some_and(|(from_s, last_s)| from_s > last_s) {
+        return Err(recording.no_rows(part.from_s, None));
+    }
     let nothing = || {
         let rows = part.from_s.map_or_else(|| "any row".into(), |from| format!("time_s >= {from}"));
         CliError::Input(format!("{}: expected a reference at {rows}, found none", recording.name))

@@ -5,6 +5,7 @@ use ohmstrain_calib::Scores;
 use serde::Serialize;
 
 use super::evaluation::RecordingScores;
+use crate::commands::score_table::covered;
 use crate::error::CliError;
 
 /// All cases of one estimate in a row of figures. A case is a recording and a split of it.
@@ -97,34 +98,26 @@ fn summary(estimate: &str, cases: Vec<&Case>) -> Option<Summary> {
 pub fn write(summaries: &[Summary], out: &mut dyn Write) -> Result<(), CliError> {
     let mut table = Table::new();
     table.load_style(presets::ASCII_MARKDOWN);
-    table.set_header([
-        "estimate",
-        "cases",
-        "error / static cubic",
-        "worst",
-        "in",
-        "CRPS, %FS",
-        "95 % width, %FS",
-        "50 % covers",
-        "90 % covers",
-        "95 % covers",
-        "least",
-    ]);
-    let percent = |share: Option<f64>| share.map_or_else(String::new, |share| format!("{:.1} %", 100.0 * share));
+    table.set_header(["all cases", "cases", "/ cubic", "worst", "50/90/95 %", "least 95 %", "width", "CRPS"]);
     for summary in summaries {
         table.add_row([
             summary.estimate.clone(),
             summary.cases.to_string(),
             format!("{:.3}", summary.ratio),
             format!("{:.2}", summary.worst_ratio),
-            summary.worst_case.clone(),
-            format!("{:.2}", summary.crps_percent_fs),
+            covered([summary.coverage_50, summary.coverage_90, summary.coverage_95]),
+            summary.least_coverage_95.map_or_else(String::new, |share| format!("{:.0}", 100.0 * share)),
             summary.width_95_percent_fs.map_or_else(String::new, |width| format!("{width:.1}")),
-            percent(summary.coverage_50),
-            percent(summary.coverage_90),
-            percent(summary.coverage_95),
-            percent(summary.least_coverage_95),
+            format!("{:.2}", summary.crps_percent_fs),
         ]);
     }
-    Ok(writeln!(out, "\n{table}")?)
+    writeln!(out, "{table}")?;
+    writeln!(
+        out,
+        "/ cubic: geometric mean of the RMSE over the static cubic's; worst: the largest of these ratios, in"
+    )?;
+    for summary in summaries.iter().filter(|summary| summary.width_95_percent_fs.is_some()) {
+        writeln!(out, "  {}: {}", summary.estimate, summary.worst_case)?;
+    }
+    Ok(writeln!(out)?)
 }

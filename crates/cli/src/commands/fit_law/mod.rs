@@ -50,6 +50,7 @@ pub fn run(args: &FitLawArgs) -> Result<(), CliError> {
     for path in &args.traces {
         recordings.push(fit_recording(&input::read(path, &overrides)?, args)?);
     }
+    output::warn(&recordings);
     if args.json {
         output::json(&recordings, args)
     } else if args.table {

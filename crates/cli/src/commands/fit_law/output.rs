@@ -1,3 +1,5 @@
+use std::collections::BTreeSet;
+
 use comfy_table::{Table, presets};
 use ohmstrain_calib::closed_form::{Estimated, ModulusShape};
 use serde::Serialize;
@@ -98,7 +100,7 @@ pub fn table(recordings: &[Fits]) -> Result<(), CliError> {
     table.load_style(presets::ASCII_MARKDOWN);
     let header = ["recording", "segment", "speed, 1/s"].map(String::from).into_iter();
     let quality = ["R^2", "AIC", "n", "neighbours"].map(String::from);
-    table.set_header(header.chain(names.iter().cloned()).chain(quality));
+    table.set_header(header.chain(with_units(&names, fits())).chain(quality));
     for (recording, Fitted { piece, fit }) in fits() {
         let mut row = vec![recording.name.clone(), piece.label.clone()];
         row.push(piece.speed_per_s.map_or_else(String::new, plain));
@@ -125,6 +127,50 @@ pub fn names<'a>(fits: impl Iterator<Item = &'a Fitted>) -> Vec<String> {
         }
     }
     out
+}
+
+/// Names with the units that their values have; without where recordings differ, or the name has it.
+pub fn with_units<'a>(names: &[String], fits: impl Iterator<Item = (&'a Fits, &'a Fitted)> + Clone) -> Vec<String> {
+    let of = |name: &String| {
+        let units: BTreeSet<String> = fits
+            .clone()
+            .filter_map(|(recording, fitted)| Some((recording, fitted.fit.get(name)?)))
+            .map(|(recording, found)| found.parameter.unit.text(recording.reading_unit, recording.strain_unit))
+            .collect();
+        match units.first() {
+            Some(unit) if units.len() == 1 && unit != "1" && !name.ends_with(&format!("_{unit}")) => {
+                format!("{name}, {unit}")
+            }
+            _ => name.clone(),
+        }
+    };
+    names.iter().map(of).collect()
+}
+
+/// R² below which a law hardly describes a segment.
+const POOR: f64 = 0.9;
+
+/// Warns of fits that are poor, did not converge, or end at a limit of the search.
+pub fn warn(recordings: &[Fits]) {
+    for recording in recordings {
+        for Fitted { piece, fit } in &recording.fits {
+            let mut doubts = Vec::new();
+            if fit.r_squared < POOR {
+                doubts.push(format!("R^2 is {:.2}: the law hardly describes it", fit.r_squared));
+            }
+            if !fit.converged {
+                doubts.push("the search has not converged".into());
+            }
+            let at_limit = fit.parameters.iter().filter(|found| found.at_limit);
+            let at_limit: Vec<&str> = at_limit.map(|found| found.parameter.name.as_str()).collect();
+            if !at_limit.is_empty() {
+                doubts.push(format!("{} at the limit of the search: the readings ask for more", at_limit.join(", ")));
+            }
+            if !doubts.is_empty() {
+                CliError::warning(&format!("{}: {}: {}", recording.name, piece.label, doubts.join("; ")));
+            }
+        }
+    }
 }
 
 /// A value with its standard error, or what there is to say instead.

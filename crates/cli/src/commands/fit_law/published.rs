@@ -31,7 +31,8 @@ pub fn table(recordings: &[Fits]) -> Result<(), CliError> {
     table.load_style(presets::ASCII_MARKDOWN);
     let unit = if in_mm { "speed, mm/s" } else { "speed, 1/s" };
     let header = ["material", unit, "phase", "segments"].map(String::from).into_iter();
-    table.set_header(header.chain(names.iter().cloned()).chain(["R^2".into()]));
+    let fits = recordings.iter().flat_map(|recording| recording.fits.iter().map(move |fitted| (recording, fitted)));
+    table.set_header(header.chain(output::with_units(&names, fits)).chain(["R^2".into()]));
     for group in entries.chunk_by_mut(|a, b| a.material == b.material && is_same_speed(a.speed, b.speed)) {
         group.sort_by_key(order);
         for phase in group.chunk_by(|a, b| a.phase == b.phase) {

@@ -1,0 +1,118 @@
+//! How the program speaks: help, hints, how much it says, and what shells and manuals get.
+
+#[allow(dead_code, reason = "each test program uses its own share")]
+mod common;
+
+use common::{Bench, SIMULATE, files_in};
+
+const COMMANDS: [&str; 13] = [
+    "demo",
+    "inspect",
+    "import",
+    "simulate",
+    "calibrate",
+    "refine",
+    "fit-law",
+    "filter",
+    "smooth",
+    "evaluate",
+    "export",
+    "completions",
+    "man",
+];
+
+#[test]
+fn help_leads_with_an_example() {
+    let bench = Bench::new();
+    for command in COMMANDS {
+        for flag in ["-h", "--help"] {
+            let help = bench.run(&[command, flag]).ok();
+            assert!(help.starts_with(&format!("Example: ohmstrain {command} ")), "{help}");
+        }
+    }
+}
+
+#[test]
+fn what_is_missing_is_shown_in_an_example() {
+    let bench = Bench::new();
+    let run = bench.run(&["calibrate", "trace.csv"]);
+    assert_eq!(run.code, Some(2));
+    assert!(run.stderr.contains("--output <sensor.toml>"), "{}", run.stderr);
+    assert!(run.stderr.ends_with("Example: ohmstrain calibrate bench.csv -o sensor.toml --report report.html\n"));
+}
+
+#[test]
+fn a_recording_and_a_sensor_file_that_are_swapped_are_told_apart() {
+    let bench = Bench::calibrated();
+    for command in ["filter", "smooth", "evaluate"] {
+        let swapped = "trace.csv is a recording, not a sensor file: give --sensor what `ohmstrain calibrate` wrote, and the \
+                       recording by itself";
+        bench.run(&[command, "sensor.toml", "--sensor", "trace.csv"]).fails(4, swapped);
+    }
+    let sensor = "sensor.toml is a sensor file, not a recording: give it to --sensor, and the recording here";
+    bench.run(&["evaluate", "sensor.toml", "--sensor", "sensor.toml"]).fails(4, sensor);
+    bench.run(&["calibrate", "sensor.toml", "-o", "new.toml"]).fails(4, sensor);
+}
+
+#[test]
+fn times_outside_of_a_recording_are_answered_with_its_range() {
+    let bench = Bench::calibrated();
+    let range = "the recording goes from 0 to 400 s";
+    let calibrate = ["calibrate", "trace.csv", "-o", "new.toml"];
+    for (flags, said) in [
+        (&["--from", "900"][..], "--from 900"),
+        (&["--until", "-5"], "--until -5"),
+        (&["--from", "60", "--until", "50"], "--from 60 --until 50"),
+    ] {
+        let message = format!("trace.csv: no row is left by {said}; {range}");
+        bench.run(&[&calibrate[..], flags].concat()).fails(4, &message);
+    }
+}
+
+#[test]
+fn quiet_says_nothing_and_verbose_what_is_done() {
+    let bench = Bench::new();
+    bench.run(&[&SIMULATE[..], &["-o", "trace.csv"]].concat()).ok();
+    let calibrate = ["calibrate", "trace.csv", "trace.csv", "--until", "60", "--estimator", "ekf", "-o", "sensor.toml"];
+    let usual = bench.run(&calibrate);
+    assert!(usual.warnings.iter().any(|warning| warning.contains("same content")), "{:?}", usual.warnings);
+    let quiet = bench.run(&[&calibrate[..], &["--quiet"]].concat());
+    assert!(quiet.warnings.is_empty() && quiet.ok().is_empty());
+    let verbose = bench.run(&[&calibrate[..], &["-v"]].concat());
+    for stage in ["fitting the law", "fitting noise and motion", "checking parts left out"] {
+        assert!(verbose.stderr.lines().any(|line| line.starts_with("ohmstrain: ") && line.ends_with(stage)), "{stage}");
+    }
+    assert_eq!(bench.run(&["demo", "-q", "-v"]).code, Some(2));
+}
+
+#[test]
+fn shells_and_manuals_know_every_command() {
+    let bench = Bench::new();
+    for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
+        let script = bench.run(&["completions", shell]).ok();
+        assert!(COMMANDS.iter().all(|command| script.contains(command)), "{shell}");
+    }
+    bench.run(&["man", "-o", "man"]).ok();
+    let pages = files_in(&bench.path("man"));
+    assert!(pages.contains(&"ohmstrain.1".to_owned()), "{pages:?}");
+    for command in COMMANDS {
+        assert!(pages.contains(&format!("ohmstrain-{command}.1")), "{command}: {pages:?}");
+    }
+}
+
+/// A movement at random noise is no law's.
+#[test]
+fn fits_that_say_little_are_warned_of_and_tables_have_units() {
+    let bench = Bench::new();
+    let simulate = ["simulate", "--protocol", "extend-hold", "--sample-rate-hz", "10", "-o", "trace.csv"];
+    bench.run(&simulate).ok();
+    let table = bench.run(&["fit-law", "trace.csv", "--table"]).ok();
+    for column in ["| tau0_s ", "| r_start, ohm "] {
+        assert!(table.lines().next().unwrap().contains(column), "{column}: {table}");
+    }
+    let noise = |k: usize| 1000 + (k * 7919) % 101;
+    let rows: String = (0..200).map(|k| format!("{k},{}\n", noise(k))).collect();
+    bench.write("noise.csv", format!("time_s,resistance_ohm\n{rows}"));
+    let run = bench.run(&["fit-law", "--law", "eq9", "--segment", "whole", "noise.csv"]);
+    assert!(run.warnings.iter().any(|warning| warning.contains("hardly describes")), "{:?}", run.warnings);
+}

@@ -1,0 +1,21 @@
+#!/usr/bin/env bash
+# A stripped binary with manual pages, completions and licences, as dist/ohmstrain-VERSION-TARGET.tar.gz.
+#
+#   dist.sh [--target TRIPLE]    another target's binary must run here, for the pages
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+target=${2:-$(rustc -vV | sed -n 's/^host: //p')}
+cargo build --locked --profile dist -p ohmstrain-cli --target "$target"
+binary=${CARGO_TARGET_DIR:-target}/$target/dist/ohmstrain
+
+name=ohmstrain-$("$binary" --version | cut -d' ' -f2)-$target
+rm -rf "dist/$name"
+mkdir -p "dist/$name/completions"
+cp "$binary" README.md CHANGELOG.md LICENSE-MIT LICENSE-APACHE "dist/$name"
+"$binary" man -o "dist/$name/man"
+for shell in bash zsh fish powershell elvish; do
+    "$binary" completions "$shell" >"dist/$name/completions/ohmstrain.$shell"
+done
+tar -C dist -czf "dist/$name.tar.gz" "$name"
+ls -l "$binary" "dist/$name.tar.gz"
