@@ -141,6 +141,28 @@ fn a_pause_widens_the_belief_as_the_law_does_however_it_is_written_down() {
     }
 }
 
+/// The same of a smooth motion, whose memory is another one: the deviation within 20 % again, of 600 motions with six standard
+/// errors of that.
+#[test]
+fn a_pause_of_a_smooth_motion_widens_the_belief_as_the_law_does() {
+    const MOTIONS: u64 = 600;
+    const SECONDS: f64 = 10.0;
+    let model = three_states();
+    let start: Belief<f64, 6, 21> = Belief::initial(&model);
+    let ends = (0..MOTIONS).filter_map(|seed| simulate(Moves::Smooth, SECONDS, SECONDS, seed).pop());
+    let sums: Vec<f64> = ends.map(|(rho, strain)| rho - 1.9 * strain).collect();
+    let mean = sums.iter().sum::<f64>() / MOTIONS as f64;
+    let variance = sums.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / MOTIONS as f64;
+    let sd = (variance - 5e-3_f64.powi(2) - 2e-3_f64.powi(2)).sqrt();
+    for dt_s in [0.02, 0.2] {
+        let rows = (SECONDS / dt_s).round() as usize;
+        let belief = after_rows(Ekf::new(model), &start, dt_s, std::iter::repeat_n(None, rows));
+        let p = &belief.covariance;
+        let stated = (p[(3, 3)] + p[(4, 4)] + 2.0 * p[(3, 4)]).sqrt();
+        assert!((stated / sd - 1.0).abs() < 0.2, "by {dt_s}: ± {stated}, simulated ± {sd}");
+    }
+}
+
 /// A smooth motion known from readings: one step over a pause and many empty rows say the same.
 #[test]
 fn one_step_is_many_empty_rows() {

@@ -133,6 +133,29 @@ fn an_error_leaves_the_belief() {
     assert!(SparseEkf::<f64, Compact, 1, 3>::new(model, f64::NAN).is_err());
 }
 
+/// Whatever a belief has lost, no step passes it on, with a reading or without.
+#[test]
+fn a_lost_belief_goes_no_further() {
+    let model: SwitchedModel<f64, 2, 1, 4> = sensor();
+    let ekf = SparseEkf::<f64, Compact, 1, 4>::new(model, DT_S).unwrap();
+    let check = |belief: Belief<f64, 4, 10>, what: &str| {
+        for reading in [None, Some(Reading::from(0.1))] {
+            let mut stepped = belief;
+            assert!(ekf.step(&mut stepped, reading).is_err(), "{what}, {reading:?}: {stepped:?}");
+        }
+    };
+    for i in 0..4 {
+        for lost in [f64::NAN, f64::INFINITY] {
+            let mut belief = Belief::<f64, 4, 10>::initial(&model);
+            belief.mean[i] = lost;
+            check(belief, "mean");
+            let mut belief = Belief::<f64, 4, 10>::initial(&model);
+            belief.covariance[(i, i)] = lost;
+            check(belief, "variance");
+        }
+    }
+}
+
 /// Largest difference of smoothed beliefs from [`rts_smooth`] over the generic filter's steps: means in filtered deviations,
 /// covariances relative to the filtered diagonals.
 fn smoothed_differences<const B: usize, const N: usize, const L: usize>() -> f64 {

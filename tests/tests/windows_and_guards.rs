@@ -147,6 +147,34 @@ fn a_gate_cannot_lock_the_filter_out() {
     assert!((predicted(&recovered).value - 3.0).abs() < 0.1);
 }
 
+/// What a readmission takes from the state's confidence: as much as the reading is beyond the gate, ten times at most, and three
+/// times in a row at most.
+#[test]
+fn readmission_takes_no_more_confidence_than_it_needs() {
+    let (ekf, gate, patience) = (ekf(), 10.8, 5);
+    let guard = Guard::none().with_gate(gate, patience).unwrap();
+    let prepared = Estimator::<f64, 4, 10>::prepare(&ekf, DT_S);
+    for jump in [0.9, 1e6] {
+        let (mut state, mut streak, mut factors) = (start(), Streak::default(), Vec::new());
+        for k in 0..50 {
+            let reading = Some(Reading::from(if k < 30 { 0.1 } else { jump }));
+            let step: Guarded<Kalman, f64> = guard.advance(&ekf, &state, streak, &prepared, reading).unwrap();
+            let factor = step.from.covariance[(0, 0)] / state.covariance[(0, 0)];
+            if step.verdict == ReadingVerdict::Readmitted {
+                let nis = step.advanced.innovation.unwrap().nis();
+                let expected = if factors.len() < 3 { (nis / gate).min(10.0) } else { 1.0 };
+                assert!((factor / expected - 1.0).abs() < 1e-12, "{jump}, readmission {}: {factor}", factors.len());
+                factors.push(factor);
+            } else {
+                assert_eq!(factor, 1.0);
+            }
+            (state, streak) = (step.advanced.state, step.streak);
+        }
+        assert!(!factors.is_empty(), "{jump}");
+        assert_eq!(factors.len() > 3, jump > 1e3, "{jump}: {factors:?}");
+    }
+}
+
 /// Huber's ψ: beyond the threshold the state moves as far as at the threshold.
 #[test]
 fn huber_bounds_the_influence() {

@@ -2,7 +2,7 @@
 
 use num_dual::Dual64;
 use ohmstrain_model::{
-    AdcCode, ConstantCurrent, Divider, Gauge, Joint, Modulus, Phase, PhaseStart, RelaxingModulus, SensorLaw,
+    AdcCode, Branch, ConstantCurrent, Divider, Gauge, Joint, Modulus, Phase, PhaseStart, RelaxingModulus, SensorLaw,
     SensorSide, StrainRange,
 };
 use proptest::prelude::*;
@@ -21,6 +21,25 @@ fn gauge_curves_start_at_zero_and_know_their_borders() {
             assert!(gauge.value_and_slope(border).1.abs() < 1e-13, "{gauge:?} at {border}");
         }
     }
+}
+
+/// `ρ = g(ε) + η v + Σ c + b`, by hand.
+#[test]
+fn a_law_adds_up() {
+    let branch =
+        |tau_s| Branch { tau_s, extend_gain: 0.5, retract_gain: -0.3, extend_gain_slope: 0.0, retract_gain_slope: 0.0 };
+    let law = SensorLaw {
+        gauge: Gauge::Polynomial { coefficients: [2.0_f64, -1.0, 0.0] },
+        extend_viscosity_s: 0.5,
+        retract_viscosity_s: -0.25,
+        branches: [branch(1.0), branch(10.0)],
+        range: StrainRange { lower: 0.0, upper: 0.5 },
+    };
+    let at = |rate, phase| law.relative_change(0.25, rate, &[0.5, -0.125], 0.0625, phase);
+    // 2/4 - 1/16 = 7/16 of the gauge, 3/8 of the branches; binary fractions, so that nothing is rounded.
+    assert_eq!(at(0.125, Phase::Extend), 0.4375 + 0.0625 + 0.375 + 0.0625);
+    assert_eq!(at(-0.125, Phase::Retract), 0.4375 + 0.03125 + 0.375 + 0.0625);
+    assert_eq!(at(0.0, Phase::Hold), 0.4375 + 0.375 + 0.0625);
 }
 
 #[test]
