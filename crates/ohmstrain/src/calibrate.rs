@@ -1,5 +1,8 @@
+use std::mem;
+
 use ohmstrain_calib::{
-    CalibrationError, Distrusted, EstimatorKind, GaugeFamily, LawOptions, RECIPE, Samples, SensorParams, Stage,
+    CalibrationError, Distrusted, EstimatorKind, Findings, GaugeFamily, LawOptions, RECIPE, RecordingInfo, Samples,
+    SensorParams, Stage,
 };
 
 use crate::{Error, MADE_BY, Recording, Sensor};
@@ -59,6 +62,8 @@ pub struct Calibration {
 pub struct Calibrated {
     /// The sensor.
     pub sensor: Sensor,
+    /// What it is worth; `None` if that could not be told.
+    pub findings: Option<Findings>,
     /// R₀ of each recording, in the unit of its readings.
     pub rest_readings: Vec<f64>,
     /// Rows that were left out.
@@ -148,12 +153,19 @@ impl Calibration {
         }
         let estimator = self.estimator.unwrap_or(RECIPE.estimator);
         let samples: Vec<Samples> = recordings.iter().map(|recording| recording.samples).collect();
-        let calibration = ohmstrain_calib::calibrate(&samples, &self.structures(estimator), &[estimator], progress)?;
-        let (distrusted, rest_readings) = (calibration.distrusted.clone(), calibration.rest_readings.clone());
-        let params = calibration.into_sensor(MADE_BY, quantity, reading);
+        let mut calibration =
+            ohmstrain_calib::calibrate(&samples, &self.structures(estimator), &[estimator], progress)?;
+        let (distrusted, findings) = (mem::take(&mut calibration.distrusted), calibration.findings.take());
+        let rest_readings = calibration.rest_readings.clone();
+        let info = |(recording, rest_reading): (&Recording, &f64)| {
+            let (file, sha256) = recording.file.map(|(file, sha256)| (file.to_string(), sha256.to_string()))?;
+            Some(RecordingInfo { file, sha256, rows: recording.samples.len(), rest_reading: *rest_reading })
+        };
+        let infos = recordings.iter().zip(&rest_readings).filter_map(info).collect();
         let joint = recordings.iter().find_map(|recording| recording.joint);
-        let sensor = Sensor::from_params(SensorParams { joint, ..params })?;
-        Ok(Calibrated { sensor, rest_readings, distrusted })
+        let params = calibration.into_sensor(MADE_BY, quantity, reading);
+        let sensor = Sensor::from_params(SensorParams { joint, recordings: infos, ..params })?;
+        Ok(Calibrated { sensor, findings, rest_readings, distrusted })
     }
 
     /// Structures of the law to choose from.

@@ -53,8 +53,8 @@ pub use validity::{Beyond, Extrapolation, ValidityWatch};
 
 #[doc(no_inline)]
 pub use ohmstrain_calib::{
-    CalibrationError, Distrusted, Doubt, EstimatorKind, FieldError, GaugeFamily, JointParams, Quantity, ReadingUnit,
-    SamplesError, Scores, SensorParams, Stage,
+    CalibrationError, Distrusted, Doubt, EstimatorKind, FieldError, Findings, GaugeFamily, JointParams, Quantity,
+    ReadingUnit, SamplesError, Scores, SensorParams, Stage,
 };
 #[doc(no_inline)]
 pub use ohmstrain_ekf::{Influence, StepError};

@@ -17,6 +17,7 @@ pub struct Recording<'a> {
     pub(crate) reading: ReadingUnit,
     pub(crate) quantity: Quantity,
     pub(crate) joint: Option<JointParams>,
+    pub(crate) file: Option<(&'a str, &'a str)>,
 }
 
 impl<'a> Recording<'a> {
@@ -33,7 +34,7 @@ impl<'a> Recording<'a> {
     /// ```
     pub fn new(time_s: &'a [f64], resistance: &'a [f64], strain: &'a [f64]) -> Result<Self, Error> {
         let samples = Samples::new(time_s, resistance, strain)?;
-        Ok(Self { samples, reading: ReadingUnit::Ohm, quantity: Quantity::Strain, joint: None })
+        Ok(Self { samples, reading: ReadingUnit::Ohm, quantity: Quantity::Strain, joint: None, file: None })
     }
 
     /// The readings are ratios to some resistance at rest.
@@ -56,6 +57,18 @@ impl<'a> Recording<'a> {
     #[must_use]
     pub const fn of_angles_deg(self) -> Self {
         Self { quantity: Quantity::AngleDeg, ..self }
+    }
+
+    /// The file that it was read from, by name and SHA-256 of its bytes, hexadecimal: the sensor then remembers it.
+    ///
+    /// ```
+    /// let hash = "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855";
+    /// let recording = ohmstrain::Recording::new(&[0.0, 0.1], &[1.0, 1.1], &[0.0, 0.1])?.of_file("bench.csv", hash);
+    /// # Ok::<(), ohmstrain::Error>(())
+    /// ```
+    #[must_use]
+    pub const fn of_file(self, name: &'a str, sha256: &'a str) -> Self {
+        Self { file: Some((name, sha256)), ..self }
     }
 
     /// The sensor is glued across this joint.

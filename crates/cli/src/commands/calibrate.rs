@@ -2,11 +2,8 @@ use std::io;
 use std::path::Path;
 use std::time::Instant;
 
-use ohmstrain::Sensor;
-use ohmstrain_calib::{
-    EstimatorKind, Findings, LawOptions, Quantity, RECIPE, ReadingUnit, RecordingInfo, Samples, SensorParams,
-    calibrate, screen,
-};
+use ohmstrain::{Calibrated, Calibration, Error, Quantity, ReadingUnit};
+use ohmstrain_calib::{Samples, screen};
 
 use super::closing::Closing;
 use super::explain;
@@ -20,7 +17,7 @@ use crate::output::{Kind, Outputs, print};
 use crate::plausible;
 use crate::progress::Progress;
 use crate::report::Sample;
-use crate::sensor_file::{self, MADE_BY};
+use crate::sensor_file;
 use crate::verbosity::Verbosity;
 
 /// Calibrates a sensor on recordings and writes its parameters.
@@ -43,11 +40,9 @@ pub fn run(args: &CalibrateArgs) -> Result<(), CliError> {
     for recording in &mut recordings {
         alignment::check(recording, args.align)?;
     }
-    let estimator = args.estimator.chosen().map_or(RECIPE.estimator, |estimator| estimator.0);
-    let structures = structures(args, estimator);
     let start = Instant::now();
     let progress = Progress::new("calibrating");
-    let Calibrated { sensor, findings } = calibrate_recordings(&recordings, &structures, estimator, &progress)?;
+    let Calibrated { sensor, findings, .. } = calibrate_recordings(&recordings, calibration(args), &progress)?;
     drop(progress);
     let calibration_s = start.elapsed().as_secs_f64();
     let params = sensor.params();
@@ -76,33 +71,22 @@ pub fn run(args: &CalibrateArgs) -> Result<(), CliError> {
     })
 }
 
-/// What comes of a calibration.
-pub struct Calibrated {
-    /// The sensor.
-    pub sensor: Sensor,
-    /// What it is worth; `None` if that could not be told.
-    pub findings: Option<Findings>,
-}
-
 /// What the flags leave to choose from.
-fn structures(args: &CalibrateArgs, estimator: EstimatorKind) -> Vec<LawOptions> {
-    let mut structures = LawOptions::candidates(estimator).to_vec();
-    for structure in &mut structures {
-        if let Some(gauge) = args.gauge.chosen() {
-            structure.gauge = gauge.into();
-        }
+fn calibration(args: &CalibrateArgs) -> Calibration {
+    let mut calibration = Calibration::new();
+    if let Some(estimator) = args.estimator.chosen() {
+        calibration = calibration.estimator(estimator.0);
     }
-    match args.branches.chosen() {
-        Some(branches) => vec![LawOptions { branches: branches.0, ..structures[0] }],
-        None => structures,
+    if let Some(gauge) = args.gauge.chosen() {
+        calibration = calibration.gauge(gauge.into());
     }
+    args.branches.chosen().map_or(calibration, |branches| calibration.branches(branches.0))
 }
 
-/// The parameters of the sensor behind `recordings`, with `estimator` as the default.
+/// The sensor behind `recordings`.
 pub fn calibrate_recordings(
     recordings: &[Recording],
-    structures: &[LawOptions],
-    estimator: EstimatorKind,
+    calibration: Calibration,
     progress: &Progress,
 ) -> Result<Calibrated, CliError> {
     let samples: Vec<Samples> = recordings.iter().map(Recording::samples).collect::<Result<_, _>>()?;
@@ -112,21 +96,23 @@ pub fn calibrate_recordings(
     plausible::warn_of_copies(recordings);
     plausible::check(recordings, &screened)?;
     plausible::warn_of_distrusted(recordings, &screened.distrusted);
-    let mut calibration = calibrate(&screened.samples(), structures, &[estimator], |stage| progress.calibrating(stage))
-        .map_err(|error| CliError::calibration(&names, &error))?;
-    let info = |(recording, rest_reading): (&Recording, &f64)| RecordingInfo {
-        file: file_name(&recording.name),
-        sha256: recording.sha256.clone(),
-        rows: recording.trace.len(),
-        rest_reading: *rest_reading,
-    };
-    let infos = recordings.iter().zip(&calibration.rest_readings).map(info).collect();
-    let findings = calibration.findings.take();
-    let sensor = calibration.into_sensor(MADE_BY, quantity, reading);
-    let sensor = SensorParams { joint: recordings.iter().find_map(Recording::joint), recordings: infos, ..sensor };
-    plausible::warn_of_rests(recordings, &sensor);
-    plausible::warn_of_intervals(&sensor);
-    Ok(Calibrated { sensor: sensor_file::checked(sensor)?, findings })
+    let (samples, files) = (screened.samples(), names.iter().map(|name| file_name(name)).collect::<Vec<_>>());
+    let mut known = Vec::new();
+    for ((recording, samples), file) in recordings.iter().zip(&samples).zip(&files) {
+        let mut one = ohmstrain::Recording::new(samples.time_s(), samples.reading(), samples.strain())?;
+        one = one.of_file(file, &recording.sha256);
+        one = if reading == ReadingUnit::Ratio { one.of_ratios() } else { one };
+        one = if quantity == Quantity::AngleDeg { one.of_angles_deg() } else { one };
+        known.push(recording.joint().map_or(one, |joint| one.on_joint(joint)));
+    }
+    let calibrated =
+        calibration.run_with(&known, |stage| progress.calibrating(stage)).map_err(|error| match error {
+            Error::Calibration(error) => CliError::calibration(&names, &error),
+            other => other.into(),
+        })?;
+    plausible::warn_of_rests(recordings, calibrated.sensor.params());
+    plausible::warn_of_intervals(calibrated.sensor.params());
+    Ok(calibrated)
 }
 
 /// Paths are the machine's own business; the name says which recording it was.

@@ -1,10 +1,9 @@
 use std::time::Instant;
 
-use ohmstrain::{Estimate, Sensor};
+use ohmstrain::{Calibrated, Calibration, Estimate, Sensor};
 use ohmstrain_bench_data::simulate::{Material, Protocol, SimulationSettings};
-use ohmstrain_calib::{LawOptions, RECIPE};
 
-use super::calibrate::{Calibrated, calibrate_recordings};
+use super::calibrate::calibrate_recordings;
 use super::closing::Closing;
 use super::reporting::{Reporting, Wanted};
 use super::score_table::{KEY, add_scores, score_table};
@@ -43,11 +42,9 @@ pub fn run(args: &DemoArgs) -> Result<(), CliError> {
     let test_from = recording.trace.time_s[middle];
 
     let training = recording.rows(0..middle);
-    let estimator = RECIPE.estimator;
-    let structures = LawOptions::candidates(estimator);
     let start = Instant::now();
-    let Calibrated { sensor, findings } =
-        calibrate_recordings(std::slice::from_ref(&training), structures, estimator, &progress)?;
+    let Calibrated { sensor, findings, .. } =
+        calibrate_recordings(std::slice::from_ref(&training), Calibration::new(), &progress)?;
     let calibration_s = start.elapsed().as_secs_f64();
     let params = sensor.params();
     outputs.put(sensor_output, sensor_file::text(&sensor)?);

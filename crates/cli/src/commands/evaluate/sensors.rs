@@ -1,12 +1,12 @@
 use std::path::Path;
 use std::time::Instant;
 
-use ohmstrain::ValidityWatch;
-use ohmstrain_calib::{Baselines, EstimatorKind, LawOptions, RECIPE, StaticCubic};
+use ohmstrain::{Calibrated, Calibration, ValidityWatch};
+use ohmstrain_calib::{Baselines, EstimatorKind, RECIPE, StaticCubic};
 
 use super::evaluation::{BaselineScores, LearnedScores, RecordingScores};
 use crate::args::Estimators;
-use crate::commands::calibrate::{Calibrated, calibrate_recordings};
+use crate::commands::calibrate::calibrate_recordings;
 use crate::commands::scoring::{self, Part};
 use crate::error::CliError;
 use crate::input::Recording;
@@ -65,7 +65,7 @@ impl Sensor {
         let calibrate = |kind| {
             let start = Instant::now();
             let Calibrated { sensor, .. } =
-                calibrate_recordings(training, LawOptions::candidates(kind), kind, progress)?;
+                calibrate_recordings(training, Calibration::new().estimator(kind), progress)?;
             let calibration_s = Some(start.elapsed().as_secs_f64());
             let kind = sensor.params().default_estimator;
             let part = Self { sensor: sensor.clone(), kind: kind.filter(), calibration_s, is_part: true };
