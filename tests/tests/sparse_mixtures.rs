@@ -311,6 +311,16 @@ fn the_limits_of_these_runs_count() {
     assert!(apart > 0.01, "{apart}");
 }
 
+#[test]
+fn a_single_phase_has_all_the_weight() {
+    let belief = Belief::<f64, 6, 21>::initial(&sensor::<f64, 3, 6>());
+    for phase in Phase::ALL {
+        let expected = Phase::ALL.map(|of| f64::from(u8::from(of == phase)));
+        assert_eq!(PhaseMixture::single(belief, phase).phase_probabilities(), expected);
+        assert_eq!(SparseMixture::<f64, 6, 21, 4>::single(belief, phase).phase_probabilities(), expected);
+    }
+}
+
 /// The oracle is the sum over the parts, written out.
 #[test]
 fn a_marginal_is_that_of_the_whole_mixture() {

@@ -126,8 +126,13 @@ mod tests {
 
     /// At strains 0, -0.5 and 0.5, of which there is room for the children of two.
     fn three(weights: [f64; 3]) -> State {
+        of(&weights)
+    }
+
+    /// The first of these.
+    fn of(weights: &[f64]) -> State {
         let mut state = State::empty();
-        for (strain, weight) in [0.0, -0.5, 0.5].into_iter().zip(weights) {
+        for (strain, weight) in [0.0, -0.5, 0.5].into_iter().zip(weights.iter().copied()) {
             let (share, phase) = state.one_more().unwrap();
             share.belief = Belief::independent(vector![strain, 0.0, 0.0], &[1e-4, 1e-4, 4e-4]);
             (share.weight, *phase) = (weight, Phase::Extend);
@@ -161,6 +166,27 @@ mod tests {
         let from: Mixture<f64, 3, 6, 4> = state.into();
         let by_place = dense.smooth_back(&from, &prepared, None, &next.into()).unwrap().unwrap();
         assert!(by_place.components()[2].log_weight.exp() > 0.999);
+    }
+
+    /// What is negligible is dropped after a step, and the places of the others move up: of two, the second is followed.
+    #[test]
+    fn what_moves_up_is_followed() {
+        let (sparse, dense) = filters();
+        let prepared = Estimator::<f64, 3, 6>::prepare(&dense, 0.1);
+        let state = of(&[1e-8, 1.0]);
+        let mut next = state;
+        sparse.step(&mut next, None).unwrap();
+        assert!(next.shares().iter().all(|share| (share.belief.mean[0] + 0.5).abs() < 0.1), "the first is not dropped");
+        let back = sparse.smooth_back(&dense, &prepared, &state, None, &next).unwrap();
+        let weights = weights(&back);
+        assert!(weights[0] < 1e-6 && weights[1] > 0.999, "{weights:?}");
+        let (known, smoothed) = (&state.shares()[1].belief, &back.shares()[1].belief);
+        assert!((known.mean - smoothed.mean).amax() < 1e-9, "{smoothed:?}");
+        let from: Mixture<f64, 3, 6, 4> = state.into();
+        let next = dense.advance(&from, &prepared, None).unwrap().state;
+        let back = dense.smooth_back(&from, &prepared, None, &next).unwrap().unwrap();
+        let by_dense: std::vec::Vec<f64> = back.components().iter().map(|c| c.log_weight.exp()).collect();
+        assert!(by_dense[0] < 1e-6 && by_dense[1] > 0.999, "{by_dense:?}");
     }
 
     /// What says nothing new changes no weight, by the law of total probability. Without a reading nothing is lost: what there
