@@ -13,6 +13,7 @@ name=ohmstrain-$("$binary" --version | cut -d' ' -f2)-$target
 rm -rf "dist/$name"
 mkdir -p "dist/$name/completions"
 cp "$binary" README.md CHANGELOG.md LICENSE-MIT LICENSE-APACHE "dist/$name"
+cp -r docs "dist/$name/docs"
 "$binary" man -o "dist/$name/man"
 for shell in bash zsh fish powershell elvish; do
     "$binary" completions "$shell" >"dist/$name/completions/ohmstrain.$shell"

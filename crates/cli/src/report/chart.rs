@@ -27,6 +27,9 @@ const ABOVE_PX: f64 = 10.0;
 /// Half of a long tick label.
 const RIGHT_PX: f64 = 24.0;
 
+/// Space to the left of a drawing by itself, px: letters of the axis' label begin where it begins.
+const MARGIN_PX: f64 = 6.0;
+
 /// Size of a plot across the page, px.
 pub const WIDE: (f64, f64) = (940.0, 320.0);
 /// Size of a plot that shares its line with another one, px.
@@ -236,14 +239,16 @@ impl Chart {
         let units = f64::from(UNITS_PER_PX);
         let (width, height) = (units * self.size_px.0, units * self.size_px.1);
         let (legend, legend_height) = self.drawn_legend();
-        let whole = height + legend_height;
-        let height_mm = width_mm * whole / width;
+        let (margin, whole) = (units * MARGIN_PX, height + legend_height);
+        let height_mm = width_mm * whole / (width + margin);
         let (dashes, label) = (dashes(UNITS_PER_PX), minijinja::HtmlEscape(title));
         Ok(format!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" role=\"img\" aria-label=\"{label}\" width=\"{width_mm}mm\" \
-             height=\"{height_mm:.1}mm\" viewBox=\"0 0 {width} {whole}\">\n<style>{dashes}polyline{{stroke-linejoin:round}}\
-             text{{font-family:Arial,Helvetica,sans-serif}}</style>\n<rect width=\"{width}\" height=\"{whole}\" \
+             height=\"{height_mm:.1}mm\" viewBox=\"-{margin} 0 {} {whole}\">\n<style>{dashes}polyline{{stroke-linejoin:round}}\
+             text{{font-family:Arial,Helvetica,sans-serif}}</style>\n<rect x=\"-{margin}\" width=\"{}\" height=\"{whole}\" \
              fill=\"#fff\"/>\n{legend}<g transform=\"translate(0 {legend_height})\">{}</g>\n</svg>\n",
+            width + margin,
+            width + margin,
             inside.trim_end().trim_end_matches("</svg>")
         ))
     }
