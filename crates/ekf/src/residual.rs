@@ -73,3 +73,17 @@ impl<T: Scalar> Default for LogLikelihood<T> {
         Self::new()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::Residual;
+
+    /// The logarithm of N(ν; 0, S), written out.
+    #[test]
+    fn a_log_likelihood_is_that_of_the_normal_distribution() {
+        let (innovation, variance) = (0.3_f64, 0.04_f64);
+        let residual = Residual { innovation, variance, nis: innovation * innovation / variance };
+        let density = (-0.5 * innovation * innovation / variance).exp() / (core::f64::consts::TAU * variance).sqrt();
+        assert!((residual.log_likelihood() - density.ln()).abs() < 1e-15);
+    }
+}

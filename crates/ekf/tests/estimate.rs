@@ -48,6 +48,13 @@ fn the_border_has_its_probability() {
     assert_eq!(straight.beyond_border, 0.0);
 }
 
+#[test]
+fn relaxation_and_baseline_are_told_apart() {
+    let belief = belief([0.1, 0.0, 0.02, 0.03], [0.1; 4]);
+    let estimate = Estimate::new(&model([1.9, -1.0, 0.0], [0.6, -0.4]), &belief, &RANGE, 1.0);
+    assert_eq!((estimate.relaxation.mean, estimate.baseline), (0.02, 0.03));
+}
+
 /// On a ramp dρ/dε = 1.9 - 5.6 ε + k - c/(τ v), which is zero at one strain.
 #[test]
 fn the_ramp_border_is_where_the_reading_stops_changing() {
