@@ -294,7 +294,12 @@ fn what_cannot_be_refined_is_refused_and_nothing_is_written() {
         ),
         (&["trace.csv", "--sensor", "five.toml"], 4, "five.toml: a law with 5 branches; at most 4 are supported"),
         (&["trace.csv", "--sensor", "negative.toml"], 4, &negative),
-        (&["trace.csv", "--sensor", "word.csv"], 4, "word.csv:1: column 7: key with no value, expected `=`"),
+        (
+            &["trace.csv", "--sensor", "word.csv"],
+            4,
+            "word.csv is a recording, not a sensor file: give --sensor what `ohmstrain calibrate` wrote, and the recording by \
+             itself",
+        ),
     ];
     let old = "format = 4\nmade_by = \"ohmstrain 0.0.1\"\n";
     bench.write("old.toml", old);
