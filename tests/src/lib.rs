@@ -1,5 +1,6 @@
 //! Models and random numbers that several tests share. The oracles stand in the tests themselves.
 
+pub mod character;
 mod draws;
 mod flow;
 pub mod own_law;

@@ -197,7 +197,7 @@ fn one_step_is_many_empty_rows_for_hypotheses_too() {
             let at_once = after_rows(split, &mixture, pause_s, [None]);
             let one = at_once.moments();
             for dt_s in [0.01, 0.05, 0.2] {
-                let rows = (pause_s / dt_s as f64).round() as usize;
+                let rows = (pause_s / dt_s).round() as usize;
                 let row_by_row = after_rows(split, &mixture, dt_s, std::iter::repeat_n(None, rows));
                 let many = row_by_row.moments();
                 for of in [[1.0, 0.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 1.0, 0.0]] {

@@ -186,10 +186,11 @@ impl Apart {
 
     /// `rounding`: of the beliefs. A hypothesis that counts lies within √24 deviations of the reading (e⁻¹² of the best is
     /// dropped), so that half its NIS, and with it its weight, is uncertain by that times the uncertainty of its innovation
-    /// in deviations; a variance of several hypotheses contains their squares.
+    /// in deviations; a variance of several hypotheses contains their squares. A merged hypothesis lies between distant ones
+    /// by their weights, and is uncertain by both.
     fn check(&self, rounding: f64) {
-        assert!(self.belief < rounding, "{self:?}");
         let weighed = 24_f64.sqrt() * rounding;
+        assert!(self.belief < rounding + weighed, "{self:?}");
         assert!(self.weight < weighed && self.density < weighed && self.innovation < weighed, "{self:?}");
     }
 }

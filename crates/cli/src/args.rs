@@ -109,6 +109,9 @@ pub struct DemoArgs {
     /// Folder for trace.csv, sensor.toml, estimates.csv, smoothed.csv and report.html
     #[arg(long, default_value = "ohmstrain-demo")]
     pub out: PathBuf,
+    /// The simulated sensor: as wrong-headed as real ones, or three times so
+    #[arg(long, value_enum, default_value_t = DemoMaterial::Representative)]
+    pub material: DemoMaterial,
     /// Seed of the simulated bench
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
@@ -117,10 +120,19 @@ pub struct DemoArgs {
     pub force: bool,
 }
 
+/// Sensors of `demo`, neither of the family of laws that is fitted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum DemoMaterial {
+    /// Hysteresis, release peaks and drift as public recordings show them
+    Representative,
+    /// Release peaks and relaxation beyond those of any recording
+    WorstCase,
+}
+
 /// Flags of `simulate`.
 #[derive(Debug, ClapArgs)]
 pub struct SimulateArgs {
-    /// Illustrative material: ecoflex-00-30, ecoflex-00-50 or vytaflex-10
+    /// Illustrative material: ecoflex-00-30, ecoflex-00-50, vytaflex-10 or representative
     #[arg(long, default_value = "ecoflex-00-30")]
     pub material: Material,
     /// What the bench does: extend-retract, extend-hold, load-steps, long-holds or mixed

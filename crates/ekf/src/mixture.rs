@@ -91,9 +91,9 @@ impl<T: Real, const N: usize, const L: usize, const K: usize> Mixture<T, N, L, K
     }
 
     /// Adds a hypothesis: merged with one that says the same, or in a free place. Where there is none the lightest of all
-    /// makes room: `unread`, in a step without a reading, it is merged with the nearest of its phase, because nothing speaks
-    /// against it, and dropping it would over many such steps lose what together is likely. Says where it went.
-    pub(crate) fn add(&mut self, candidate: &Component<T, N, L>, unread: bool) -> Added {
+    /// makes room and is merged with the nearest of its phase: dropped, step after step, what is unlikely in each of many short
+    /// steps and likely in all of them together would be lost before a reading has spoken for it. Says where it went.
+    pub(crate) fn add(&mut self, candidate: &Component<T, N, L>) -> Added {
         let alike = self.components_mut().iter_mut().enumerate().find(|(_, known)| known.is_like(candidate));
         if let Some((place, like)) = alike {
             *like = like.merged(candidate);
@@ -107,11 +107,10 @@ impl<T: Real, const N: usize, const L: usize, const K: usize> Mixture<T, N, L, K
         let weights = self.components().iter().map(|component| component.log_weight).enumerate();
         let lightest = weights.reduce(lighter).filter(|(_, weight)| *weight < candidate.log_weight - T::of(LIGHTER));
         let Some((place, _)) = lightest else {
-            let into = if unread { self.merge_into_nearest(candidate, None) } else { None };
-            return into.map_or(Added::Nowhere, Added::To);
+            return self.merge_into_nearest(candidate, None).map_or(Added::Nowhere, Added::To);
         };
         let Some(displaced) = self.components.get(place).copied() else { return Added::Nowhere };
-        let into = if unread { self.merge_into_nearest(&displaced, Some(place)) } else { None };
+        let into = self.merge_into_nearest(&displaced, Some(place));
         if let Some(component) = self.components.get_mut(place) {
             *component = *candidate;
         }

@@ -200,7 +200,7 @@ where
             posterior: &child.belief,
             log_weight: child.log_weight,
         };
-        let added = self.children.add(&child, self.reading.is_none());
+        let added = self.children.add(&child);
         match self.recorder.place(place, phase, added) {
             Added::To(heir) => self.recorder.born(&birth, heir),
             Added::InsteadOf(heir, into) => {

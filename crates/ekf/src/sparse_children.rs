@@ -16,18 +16,16 @@ pub(crate) struct Children<T, const N: usize, const L: usize, const K: usize> {
     exponent: T,
     /// Sum of all weights, limits aside, of those that were dropped too.
     density: T,
-    /// Whether the step has no reading.
-    unread: bool,
 }
 
 impl<T: Real, const N: usize, const L: usize, const K: usize> Children<T, N, L, K> {
     #[inline(always)]
-    pub(crate) fn new(unread: bool) -> Self {
-        Self { kept: SparseMixture::empty(), exponent: T::zero(), density: T::zero(), unread }
+    pub(crate) fn new() -> Self {
+        Self { kept: SparseMixture::empty(), exponent: T::zero(), density: T::zero() }
     }
 
-    /// Adds a child: merged with one that says the same, in a free place, or in the place of the lightest, which in a step
-    /// without a reading is merged with the nearest of its phase. Says where it went.
+    /// Adds a child: merged with one that says the same, in a free place, or in the place of the lightest, which is
+    /// merged with the nearest of its phase. Says where it went.
     pub(crate) fn add<const B: usize>(&mut self, child: &Parts<T, B>, phase: Phase, weighed: &Weighed<T>) -> Added {
         let Weighed { weight, more_inside, log_inside } = *weighed;
         let likelihood = weight;
@@ -68,7 +66,7 @@ impl<T: Real, const N: usize, const L: usize, const K: usize> Children<T, N, L, 
     }
 
     /// Merges a child into the nearest of its phase, not counting the one at `but`, and says where that is; if there is none,
-    /// it is negligible, or there is a reading, it is dropped.
+    /// or it is negligible, it is dropped.
     #[inline(never)]
     fn merge_into_nearest<const B: usize>(
         &mut self,
@@ -77,9 +75,6 @@ impl<T: Real, const N: usize, const L: usize, const K: usize> Children<T, N, L, 
         (weight, log_inside): (T, T),
         but: Option<usize>,
     ) -> Option<usize> {
-        if !self.unread {
-            return None;
-        }
         let heaviest = self.kept.shares().iter().fold(weight, |a, b| if b.weight > a { b.weight } else { a });
         if weight < heaviest * T::of(LEAST_WEIGHT) {
             return None;

@@ -89,7 +89,7 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
         reading: Option<Reading<T>>,
         heirs: &mut impl Heirs,
     ) -> Result<Option<MixtureResidual<T>>, StepError> {
-        let mut children = Children::new(reading.is_none());
+        let mut children = Children::new();
         let mut predicted = Predicted::new();
         for (place, (parent, from)) in state.shares().iter().zip(state.phases()).enumerate() {
             for (phase, probability) in Phase::ALL.into_iter().zip(self.chain[from.index()]) {

@@ -100,7 +100,7 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
             Some(_) => Pause::over(),
         };
         let open = pause.open;
-        let mut children = Children::new(reading.is_none());
+        let mut children = Children::new();
         let mut predicted = Predicted::new();
         for (place, (parent, from)) in state.shares().iter().zip(state.phases()).enumerate() {
             let before = if state.pause().open { toward(*from, &parent.belief.mean[1]) } else { *from };

@@ -36,7 +36,7 @@ impl Sensor for Matched {
 /// The illustrative laws: slope and peak of the quasi-static curve, a fast and a slow branch, dash-pot terms.
 fn law(material: Material) -> SensorLaw<f64, 2> {
     let (slope, decay_strain, viscosity_s, branches) = match material {
-        Material::Ecoflex0030 => {
+        Material::Ecoflex0030 | Material::Representative => {
             (4.0, 0.21, 0.02, [branch(3.5, 0.75, -0.9, -1.0, -0.3), branch(45.0, 0.45, -0.35, -0.9, -0.2)])
         }
         Material::Ecoflex0050 => {

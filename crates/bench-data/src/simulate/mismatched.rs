@@ -6,29 +6,74 @@ use super::bench::{Movement, Sensor};
 const BRANCHES: usize = 9;
 const PLAYS: usize = 3;
 
-/// Time constants, s, from the fastest to the slowest, log-spaced.
+/// The fastest of the time constants, s, which are log-spaced.
 const FASTEST_S: f64 = 0.4;
-const SLOWEST_S: f64 = 2500.0;
-/// Weights of the branches fall as τ^-0.22: together they relax much like a stretched exponential.
-const SPECTRUM: f64 = -0.22;
 /// Branches are driven by |v|^0.9, in units of this rate, 1/s: gains depend on speed.
 const DRIVE_POWER: f64 = 0.9;
 const DRIVE_RATE: f64 = 0.1;
 /// Broken paths cannot break again: the drive fades as the relaxing share nears this ceiling, so that cycling settles
 /// into a band instead of climbing for ever.
 const CEILING: f64 = 2.0;
-/// Half-widths of the play operators, and their common weight.
+/// Half-widths of the play operators.
 const PLAY_STRAINS: [f64; PLAYS] = [0.01, 0.03, 0.08];
-const PLAY_WEIGHT: f64 = 0.1;
-/// Resistance that the largest strain so far leaves behind for good, and how slowly it comes, s.
-const MEMORY_PER_STRAIN: f64 = 0.06;
+/// How slowly the largest strain so far leaves a resistance behind, s.
 const MEMORY_TIME_S: f64 = 150.0;
+
+/// In what mismatched sensors differ.
+#[derive(Clone, Copy)]
+struct Character {
+    /// Of the quasi-static curve.
+    gauge_slope: f64,
+    gauge_peak: f64,
+    /// On all time constants, and the slowest of them before that, s.
+    time_scale: f64,
+    slowest_s: f64,
+    /// Weights of the branches go as τ to this power: with -0.22 they relax together much like a stretched exponential.
+    spectrum: f64,
+    /// On all that breaks conducting paths.
+    breaking: f64,
+    /// Common weight of the play operators.
+    play_weight: f64,
+    /// Resistance that the largest strain so far leaves behind for good.
+    memory_per_strain: f64,
+}
+
+/// Made after 10 wt-% carbon black.
+const STRONG: Character = Character {
+    gauge_slope: 3.3,
+    gauge_peak: 0.20,
+    time_scale: 1.0,
+    slowest_s: 2500.0,
+    spectrum: -0.22,
+    breaking: 1.0,
+    play_weight: 0.1,
+    memory_per_strain: 0.06,
+};
+
+impl Character {
+    const fn of(material: Material) -> Self {
+        match material {
+            Material::Ecoflex0030 => STRONG,
+            Material::Ecoflex0050 => Self { gauge_slope: 4.6, gauge_peak: 0.12, time_scale: 0.35, ..STRONG },
+            Material::Vytaflex10 => Self { gauge_slope: 3.1, time_scale: 1.2, ..STRONG },
+            Material::Representative => Self {
+                gauge_slope: 2.6,
+                gauge_peak: 1.0,
+                slowest_s: 600.0,
+                spectrum: -1.2,
+                breaking: 3.5,
+                play_weight: 0.6,
+                memory_per_strain: 0.03,
+                ..STRONG
+            },
+        }
+    }
+}
 
 /// A sensor outside of the family that is fitted: nine branches with gains that are not affine in strain and a drive
 /// that is not linear in speed and saturates, hysteresis without a time constant (play operators), and a memory of the largest strain.
 pub(super) struct Mismatched {
-    gauge_slope: f64,
-    gauge_peak: f64,
+    character: Character,
     tau_s: [f64; BRANCHES],
     weight: [f64; BRANCHES],
     relaxation: [f64; BRANCHES],
@@ -39,18 +84,13 @@ pub(super) struct Mismatched {
 
 impl Mismatched {
     pub(super) fn new(material: Material) -> Self {
-        let (gauge_slope, gauge_peak, time_scale) = match material {
-            Material::Ecoflex0030 => (3.3, 0.20, 1.0),
-            Material::Ecoflex0050 => (4.6, 0.12, 0.35),
-            Material::Vytaflex10 => (3.1, 0.20, 1.2),
-        };
-        let spacing = (SLOWEST_S / FASTEST_S).powf(1.0 / (BRANCHES - 1) as f64);
-        let tau_s = std::array::from_fn(|i| time_scale * FASTEST_S * spacing.powi(i as i32));
-        let spectrum: [f64; BRANCHES] = tau_s.map(|tau: f64| tau.powf(SPECTRUM));
+        let character = Character::of(material);
+        let spacing = (character.slowest_s / FASTEST_S).powf(1.0 / (BRANCHES - 1) as f64);
+        let tau_s = std::array::from_fn(|i| character.time_scale * FASTEST_S * spacing.powi(i as i32));
+        let spectrum: [f64; BRANCHES] = tau_s.map(|tau: f64| tau.powf(character.spectrum));
         let total: f64 = spectrum.iter().sum();
         Self {
-            gauge_slope,
-            gauge_peak,
+            character,
             tau_s,
             weight: spectrum.map(|share| share / total),
             relaxation: [0.0; BRANCHES],
@@ -65,7 +105,7 @@ impl Mismatched {
     /// Drive of the branches, 1/s, with the branches where they are.
     fn drive(&self, movement: &Movement, relaxation: &[f64; BRANCHES]) -> f64 {
         let left_to_break = (1.0 - relaxation.iter().sum::<f64>() / CEILING).max(0.0);
-        let gain = left_to_break * gain(movement.mid_strain(), movement.phase());
+        let gain = self.character.breaking * left_to_break * gain(movement.mid_strain(), movement.phase());
         gain * (movement.rate.abs() / DRIVE_RATE).powf(DRIVE_POWER) * DRIVE_RATE
     }
 
@@ -88,14 +128,14 @@ impl Sensor for Mismatched {
         }
         self.largest_strain = self.largest_strain.max(movement.to_strain);
         let gone = -(-movement.duration_s / MEMORY_TIME_S).exp_m1();
-        self.memory += gone * (MEMORY_PER_STRAIN * self.largest_strain - self.memory);
+        self.memory += gone * (self.character.memory_per_strain * self.largest_strain - self.memory);
     }
 
     fn relative_change(&self, movement: &Movement) -> f64 {
         let strain = movement.to_strain;
-        let gauge = self.gauge_slope * strain * (-strain / self.gauge_peak).exp();
+        let gauge = self.character.gauge_slope * strain * (-strain / self.character.gauge_peak).exp();
         let relaxing: f64 = self.relaxation.iter().sum();
-        gauge + relaxing + PLAY_WEIGHT * self.play.iter().sum::<f64>() + self.memory
+        gauge + relaxing + self.character.play_weight * self.play.iter().sum::<f64>() + self.memory
     }
 }
 

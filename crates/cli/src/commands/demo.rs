@@ -10,7 +10,7 @@ use super::score_table::{KEY, add_scores, score_table};
 use super::scoring::{self, Part};
 use super::simulate;
 use super::smooth::write_estimates;
-use crate::args::{DemoArgs, ReportArgs};
+use crate::args::{DemoArgs, DemoMaterial, ReportArgs};
 use crate::error::CliError;
 use crate::input;
 use crate::output::{Kind, Outputs, print};
@@ -35,7 +35,7 @@ pub fn run(args: &DemoArgs) -> Result<(), CliError> {
     let wanted = Wanted::claim(&report, &mut outputs)?;
 
     let progress = Progress::new("simulating a bench session");
-    let trace = simulate::bytes(&settings(args.seed)).map_err(CliError::Other)?;
+    let trace = simulate::bytes(&settings(args.material, args.seed)).map_err(CliError::Other)?;
     let recording = input::parse(&trace, &args.out.join("trace.csv"), &Default::default())?;
     outputs.put(trace_output, trace);
     let middle = (recording.trace.len() as f64 * CALIBRATION_SHARE) as usize;
@@ -88,13 +88,12 @@ pub fn run(args: &DemoArgs) -> Result<(), CliError> {
     })
 }
 
-fn settings(seed: u64) -> SimulationSettings {
-    SimulationSettings {
-        speed_mm_s: 5.0,
-        mismatched: true,
-        seed,
-        ..SimulationSettings::new(Material::Ecoflex0030, Protocol::MIXED)
-    }
+fn settings(material: DemoMaterial, seed: u64) -> SimulationSettings {
+    let material = match material {
+        DemoMaterial::Representative => Material::Representative,
+        DemoMaterial::WorstCase => Material::Ecoflex0030,
+    };
+    SimulationSettings { speed_mm_s: 5.0, mismatched: true, seed, ..SimulationSettings::new(material, Protocol::MIXED) }
 }
 
 fn estimates(sensor: &Sensor, estimates: &[Estimate]) -> Result<Vec<u8>, CliError> {

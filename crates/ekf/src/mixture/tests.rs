@@ -45,15 +45,15 @@ proptest! {
         let apart = Component { phase: Phase::Hold, ..apart };
         let mut all = std::vec![first, apart];
         let mut mixture = Mixture::<f64, 3, 6, 2>::empty();
-        mixture.add(&first, false);
-        mixture.add(&apart, false);
+        mixture.add(&first);
+        mixture.add(&apart);
         for other in others {
             // Close to what is there already in strain and rate, anywhere in the third state.
             let mut close = other;
             for i in 0..2 {
                 close.belief.mean[i] = mixture.components()[0].belief.mean[i] + 0.04 * other.belief.mean[i];
             }
-            mixture.add(&close, false);
+            mixture.add(&close);
             all.push(close);
         }
         prop_assert_eq!(mixture.components().len(), 2);
@@ -103,7 +103,8 @@ fn exactly_known_states_are_alike_only_if_they_are_equal() {
     }
 }
 
-/// A mixture that is full gives up its lightest hypothesis, and none for a lighter one.
+/// A mixture that is full merges its lightest hypothesis with the nearest, in units of the wider of the two: here with the
+/// one that is wide already because it has been merged.
 #[test]
 fn the_lightest_makes_room() {
     let far = |strain: f64, log_weight: f64| Component {
@@ -114,8 +115,10 @@ fn the_lightest_makes_room() {
     };
     let mut mixture = Mixture::<f64, 2, 3, 2>::empty();
     for (strain, log_weight) in [(0.1, -1.0), (0.2, -3.0), (0.3, -2.0), (0.4, -4.0)] {
-        mixture.add(&far(strain, log_weight), false);
+        mixture.add(&far(strain, log_weight));
     }
     let kept: Vec<f64> = mixture.components().iter().map(|c| c.belief.mean[0]).collect();
-    assert_eq!(kept, [0.1, 0.3]);
+    let weights = [-1.0_f64, -3.0, -4.0].map(f64::exp);
+    let merged = (0.1 * weights[0] + 0.2 * weights[1] + 0.4 * weights[2]) / weights.iter().sum::<f64>();
+    assert!((kept[0] - merged).abs() < 1e-15 && kept[1] == 0.3, "{kept:?}");
 }
