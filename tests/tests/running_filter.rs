@@ -31,7 +31,13 @@ fn sensor() -> SensorParams {
             strain_mean: 0.15,
             strain_sd: 0.1,
         },
-        noise: NoiseParams { reading_sd: 2e-3, branch_sd: 5e-3, baseline_sd: 0.02, baseline_time_s: 30.0 },
+        noise: NoiseParams {
+            reading_sd: 2e-3,
+            reading_time_s: 0.0,
+            branch_sd: 5e-3,
+            baseline_sd: 0.02,
+            baseline_time_s: 30.0,
+        },
         phases: Some(PhaseParams {
             hold_time_s: 2.0,
             move_time_s: 2.0,
@@ -89,6 +95,7 @@ fn correction() -> CorrectionParams {
         smoothed: std::array::from_fn(|i| 0.2 + 0.1 * wave(k, 30 + i)),
     };
     CorrectionParams {
+        corrects: EstimatorKind::SignSplit,
         reading_centre: 0.2,
         reading_half_range: 0.25,
         rate_scales: [0.02, 0.05],

@@ -31,7 +31,8 @@ pub fn build_filter(
     params.validate()?;
     let kind = kind.unwrap_or(params.default_estimator);
     let setting = Setting { limits: params.limits, start, sieve: Sieve::new(params) };
-    let filter = filter_from_parts(kind.filter(), &params.law, params.estimator(kind.filter())?, setting)?;
+    let of = params.filter_of(kind);
+    let filter = filter_from_parts(of, &params.law, params.estimator(of)?, setting)?;
     if kind != EstimatorKind::Corrected {
         return Ok(filter);
     }
@@ -209,14 +210,14 @@ fn interval(estimator: &EstimatorParams, setting: Setting) -> Interval {
         limits: setting.limits.to_model(),
         filtered_scale: estimator.strain_sd_scale,
         smoothed_scale: estimator.smoothed_sd_scale.unwrap_or(1.0),
-        sieve: setting.sieve,
+        sieve: setting.sieve.with_error_time(estimator.noise.reading_time_s),
     }
 }
 
 /// Capacity of the sign-split filter.
 pub(crate) const HYPOTHESES: usize = 8;
 /// Capacity of the filter of phase histories.
-pub(crate) const HISTORIES: usize = 16;
+pub(crate) const HISTORIES: usize = 8;
 /// Particles.
 #[cfg(feature = "particles")]
 const PARTICLES: usize = 4000;

@@ -13,8 +13,9 @@ use crate::law_fit::{CrossFit, LawOptions, fit_laws};
 use crate::law_params::LawParams;
 use crate::left_out::REFERENCE_SD;
 use crate::motion_stats::MotionStats;
-use crate::noise_fit::{NoiseProblem, REFINEMENT, SURVEY, Surveyed, survey, survey_evaluations};
+use crate::noise_fit::{NoiseProblem, REFINEMENT, SURVEY, Surveyed, best_of_each_size, survey, survey_evaluations};
 use crate::params::{FORMAT, Quantity, RangeParams, ReadingUnit, SensorParams, Uncertainty, Validity};
+use crate::recipe::RECIPE;
 use crate::rest::rest_share;
 use crate::samples::Samples;
 use crate::screen::{Distrusted, screen};
@@ -127,56 +128,43 @@ pub fn calibrate(
     let recordings: &[Samples] = &screened.samples();
     let laws = fit_laws(recordings, structures)?;
     let stats = MotionStats::new(recordings);
-    let wanted = distinct(kinds.iter().map(|kind| kind.filter()));
-    let smoothers = wanted.iter().map(|kind| kind.smoother());
-    let all_kinds = distinct(wanted.iter().copied().chain(smoothers).chain([EstimatorKind::Ekf]));
-    let fits = all_kinds.iter().map(|kind| kind.motion_families().len() as u64).sum::<u64>();
-    let surveys = wanted.iter().map(|kind| survey_evaluations(*kind, laws.len(), structures.len())).sum::<u64>();
-    let unsurveyed = all_kinds.iter().filter(|kind| !wanted.contains(*kind)).count() as u64;
-    let expected = surveys + unsurveyed * SURVEY.evaluations() + fits * REFINEMENT.evaluations();
-    let mut done = 0;
-    let mut evaluated = || {
-        done += 1;
-        progress(Stage::Noise { done, expected });
-    };
-    let all_laws: Vec<&CrossFit> = laws.iter().collect();
-    let mut surveyed = Vec::new();
-    for &kind in &wanted {
-        surveyed.extend(survey(recordings, &all_laws, stats, kind, &mut evaluated)?);
-    }
-    let cost = |one: &Surveyed| one.tuned.cost + handicap(one.kind);
-    let Some(fit) = surveyed.iter().min_by(|a, b| cost(a).total_cmp(&cost(b))).map(|best| best.law) else {
+    let corrects = kinds.contains(&EstimatorKind::Corrected);
+    let named: Vec<EstimatorKind> = kinds.iter().copied().filter(|kind| *kind != EstimatorKind::Corrected).collect();
+    let candidates = if corrects { RECIPE.candidates(stats.hold_s.is_some()) } else { &[] };
+    let wanted = distinct(candidates.iter().chain(&named).copied());
+    let mut steps = Steps { done: 0, expected: expected_evaluations(&wanted, &laws, structures.len()), progress };
+    let surveyed = survey_all(recordings, &laws, stats, (&wanted, candidates), &mut || steps.evaluated())?;
+    let cost = |one: &&Surveyed| one.tuned.cost + handicap(one.kind);
+    let cheapest = |a: &&Surveyed, b: &&Surveyed| cost(a).total_cmp(&cost(b));
+    let Some(fit) = surveyed.iter().min_by(cheapest).map(|best| best.law) else {
         return Err(CalibrationError::Unsupported("a calibration without an estimator".into()));
     };
+    // One filter is corrected: no other one needs to be refined.
+    let corrected = surveyed.iter().filter(|one| candidates.contains(&one.kind)).min_by(cheapest).map(|one| one.kind);
+    let wanted = distinct(corrected.into_iter().chain(named));
+    let smoothers = wanted.iter().map(|kind| kind.smoother());
+    let all_kinds = distinct(wanted.iter().copied().chain(smoothers).chain([EstimatorKind::Ekf]));
     let mut estimators = BTreeMap::new();
     for kind in all_kinds {
-        let mut best: Option<EstimatorParams> = None;
-        for &family in kind.motion_families() {
-            let problem = NoiseProblem::new(recordings, fit, stats, (kind, family));
-            let is_this = |one: &&Surveyed| one.kind == kind && one.family == family && std::ptr::eq(one.law, fit);
-            let tuned = match surveyed.iter().find(is_this) {
-                Some(known) => known.tuned.clone(),
-                None => problem.search(None, SURVEY, &mut evaluated)?,
-            };
-            let params = problem.refine(&tuned, &mut evaluated)?;
-            best = best.filter(|best| best.score <= params.score).or(Some(params));
-        }
+        let known = surveyed.iter().filter(|one| one.kind == kind && std::ptr::eq(one.law, fit));
+        let best = refined(recordings, (fit, stats), kind, &known.collect::<Vec<_>>(), &mut || steps.evaluated())?;
         estimators.extend(best.map(|best| (kind, best)));
     }
+    let mut progress = steps.progress;
     worth_something(&estimators, &stats, fit.law.law.range)?;
     let score =
         |kind: &EstimatorKind| estimators.get(kind).map_or(f64::INFINITY, |params| params.score + handicap(*kind));
     let best = wanted.iter().copied().min_by(|a, b| score(a).total_cmp(&score(b)));
-    let corrects = kinds.contains(&EstimatorKind::Corrected);
-    let correction = if corrects { correction(recordings, fit, &estimators)? } else { None };
-    let default_estimator = if correction.is_some() { Some(EstimatorKind::Corrected) } else { best };
-    let default_estimator = default_estimator.unwrap_or(EstimatorKind::Ekf);
+    let correction = corrected.map(|kind| correction(recordings, fit, kind, &estimators)).transpose()?.flatten();
+    let best = best.unwrap_or(EstimatorKind::Ekf);
+    let (default_estimator, filter) =
+        correction.as_ref().map_or((best, best), |correction| (EstimatorKind::Corrected, correction.corrects));
     let limits = fit.law.law.range;
     progress(Stage::LeftOut);
     let identifiability = identifiability(recordings, &fit.law.law).ok();
     let seen = Seen::new(recordings, limits, &stats);
-    let findings =
-        Check { recordings, fit, kind: default_estimator, estimators: &estimators }.findings(seen, &identifiability);
+    let findings = Check { recordings, fit, kind: default_estimator, filter, estimators: &estimators }
+        .findings(seen, &identifiability);
     let (reading_lower, reading_upper) = reading_range(recordings);
     Ok(Calibration {
         distrusted: screened.distrusted.clone(),
@@ -228,13 +216,75 @@ fn worth_something(
 fn correction(
     recordings: &[Samples],
     fit: &CrossFit,
+    kind: EstimatorKind,
     estimators: &BTreeMap<EstimatorKind, EstimatorParams>,
 ) -> Result<Option<CorrectionParams>, CalibrationError> {
-    let (kind, limits) = (EstimatorKind::Corrected.filter(), fit.law.law.range);
+    let limits = fit.law.law.range;
     let Some(params) = estimators.get(&kind) else { return Ok(None) };
     let setting = Setting { limits, start: Start::Unknown, sieve: Sieve::OPEN };
     let build = || filter_from_parts(kind, &fit.law.law, params, setting);
-    fit_correction(recordings, &fit.law.rest_readings, limits, &build)
+    fit_correction(recordings, &fit.law.rest_readings, limits, (kind, &build))
+}
+
+/// Counts evaluations of the score.
+struct Steps<P> {
+    done: u64,
+    expected: u64,
+    progress: P,
+}
+
+impl<P: FnMut(Stage)> Steps<P> {
+    fn evaluated(&mut self) {
+        self.done += 1;
+        (self.progress)(Stage::Noise { done: self.done, expected: self.expected });
+    }
+}
+
+/// Evaluations to expect, near enough for a progress bar: surveys, and one refinement of the best filter and of the EKF.
+fn expected_evaluations(wanted: &[EstimatorKind], laws: &[CrossFit], structures: usize) -> u64 {
+    let surveys: u64 = wanted.iter().map(|kind| survey_evaluations(*kind, laws.len(), structures)).sum();
+    let fits: u64 = wanted.iter().map(|kind| kind.motion_families().len() as u64).max().unwrap_or(0) + 1;
+    surveys + SURVEY.evaluations() + fits * REFINEMENT.evaluations()
+}
+
+/// Surveys estimators under the laws. Of the candidates for a correction the first one is tried under all of them, the
+/// others under those that served it best.
+fn survey_all<'a>(
+    recordings: &[Samples],
+    laws: &'a [CrossFit],
+    stats: MotionStats,
+    (wanted, candidates): (&[EstimatorKind], &[EstimatorKind]),
+    evaluated: &mut dyn FnMut(),
+) -> Result<Vec<Surveyed<'a>>, CalibrationError> {
+    let mut surveyed: Vec<Surveyed<'a>> = Vec::new();
+    for &kind in wanted {
+        let is_other_candidate = candidates.iter().skip(1).any(|candidate| *candidate == kind);
+        let laws = if is_other_candidate { best_of_each_size(&surveyed) } else { laws.iter().collect() };
+        surveyed.extend(survey(recordings, &laws, stats, kind, &mut *evaluated)?);
+    }
+    Ok(surveyed)
+}
+
+/// Noise and motion of an estimator under a law, with the family of motions that serves it best; `known` surveys are not
+/// made again.
+fn refined(
+    recordings: &[Samples],
+    (fit, stats): (&CrossFit, MotionStats),
+    kind: EstimatorKind,
+    known: &[&Surveyed],
+    evaluated: &mut dyn FnMut(),
+) -> Result<Option<EstimatorParams>, CalibrationError> {
+    let mut best: Option<EstimatorParams> = None;
+    for &family in kind.motion_families() {
+        let problem = NoiseProblem::new(recordings, fit, stats, (kind, family));
+        let tuned = match known.iter().find(|one| one.family == family) {
+            Some(known) => known.tuned.clone(),
+            None => problem.search(None, SURVEY, &mut *evaluated)?,
+        };
+        let params = problem.refine(&tuned, &mut *evaluated)?;
+        best = best.filter(|best| best.score <= params.score).or(Some(params));
+    }
+    Ok(best)
 }
 
 fn distinct(kinds: impl Iterator<Item = EstimatorKind>) -> Vec<EstimatorKind> {

@@ -5,6 +5,7 @@ use crate::CalibrationError;
 use crate::corrected::{future_features, outputs};
 use crate::correction_params::{CorrectionParams, CorrectorParams, TrainingRow};
 use crate::corrector::Examples;
+use crate::estimator_params::EstimatorKind;
 use crate::filter::Filter;
 use crate::params::RangeParams;
 use crate::samples::Samples;
@@ -19,13 +20,16 @@ const PAUSE_S: f64 = 1000.0;
 /// Significant digits of what is written down. The fit sees the same numbers as the reader of the file.
 const DIGITS: usize = 6;
 
+/// Makes a filter.
+type Build<'a> = dyn Fn() -> Result<Box<dyn Filter>, CalibrationError> + 'a;
+
 /// Learns the correction of a filter from the recordings that it was calibrated on; `rest_readings` are their R₀, `build`
-/// makes the filter. None if nothing can be learned from them.
+/// makes the filter, `corrects` names it. None if nothing can be learned from them.
 pub(crate) fn fit_correction(
     recordings: &[Samples],
     rest_readings: &[f64],
     limits: RangeParams,
-    build: &dyn Fn() -> Result<Box<dyn Filter>, CalibrationError>,
+    (corrects, build): (EstimatorKind, &Build),
 ) -> Result<Option<CorrectionParams>, CalibrationError> {
     let relative = |(samples, rest): (&Samples, &f64)| {
         let relative = |r: &f64| r.is_finite().then(|| Reading::from(r / rest - 1.0));
@@ -41,10 +45,15 @@ pub(crate) fn fit_correction(
         candidates.extend(rows);
     }
     let rows: Vec<TrainingRow> = chosen(&candidates).into_iter().map(rounded).collect();
-    Ok(learn(scale, rows, limits))
+    Ok(learn(corrects, scale, rows, limits))
 }
 
-fn learn(scale: FeatureScale<f64>, rows: Vec<TrainingRow>, limits: RangeParams) -> Option<CorrectionParams> {
+fn learn(
+    corrects: EstimatorKind,
+    scale: FeatureScale<f64>,
+    rows: Vec<TrainingRow>,
+    limits: RangeParams,
+) -> Option<CorrectionParams> {
     let (strain, time_s): (Vec<f64>, Vec<f64>) = rows.iter().map(|row| (row.strain, row.time_s)).unzip();
     let (strain, time_s) = (strain.as_slice(), time_s.as_slice());
     let of_filter: Vec<_> = rows.iter().map(TrainingRow::filter_inputs).collect();
@@ -52,7 +61,7 @@ fn learn(scale: FeatureScale<f64>, rows: Vec<TrainingRow>, limits: RangeParams) 
     let filter = CorrectorParams::fit(Examples { inputs: &of_filter, strain, time_s, limits })?;
     let smoother = CorrectorParams::fit(Examples { inputs: &of_smoother, strain, time_s, limits })?;
     let FeatureScale { centre: reading_centre, half_range: reading_half_range, rates: rate_scales } = scale;
-    Some(CorrectionParams { reading_centre, reading_half_range, rate_scales, filter, smoother, rows })
+    Some(CorrectionParams { corrects, reading_centre, reading_half_range, rate_scales, filter, smoother, rows })
 }
 
 /// The range of the readings, and the usual size of their rates; none if they do not vary.
@@ -98,7 +107,7 @@ fn candidate_rows(
     readings: &[Option<Reading<f64>>],
     scale: FeatureScale<f64>,
     start_s: f64,
-    build: &dyn Fn() -> Result<Box<dyn Filter>, CalibrationError>,
+    build: &Build,
 ) -> Result<Option<Vec<TrainingRow>>, CalibrationError> {
     let failed = |row: usize, error| CalibrationError::Filter { time_s: samples.time_s[row], error };
     let mut filter = build()?;

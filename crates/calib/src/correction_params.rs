@@ -1,6 +1,7 @@
 use ohmstrain_ekf::correction::{FEATURES, FeatureScale, OUTPUTS};
 use serde::{Deserialize, Serialize};
 
+use crate::estimator_params::EstimatorKind;
 use crate::gaussian_process::ProcessParams;
 
 /// Features of the readings to come: those of the past read backwards, but for the reading itself.
@@ -11,6 +12,8 @@ pub const FUTURE_FEATURES: usize = FEATURES - 1;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CorrectionParams {
+    /// The filter that it corrects.
+    pub corrects: EstimatorKind,
     /// The change of resistance `R/R₀ - 1` that counts as zero.
     pub reading_centre: f64,
     /// Distance from there that counts as one.

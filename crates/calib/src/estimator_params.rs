@@ -1,7 +1,7 @@
 use ohmstrain_model::{ModelNoise, Motion, ParameterError};
 use serde::{Deserialize, Serialize};
 
-use crate::recipe::RECIPE;
+use crate::sieve::news;
 
 /// The estimators, by the names used on the command line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -19,7 +19,7 @@ pub enum EstimatorKind {
     Hypotheses,
     /// Particles: the reference that shows whether the law or the estimator limits.
     Particles,
-    /// The filter of [`RECIPE`](crate::RECIPE) with the learned correction of its strain.
+    /// One of the filters of [`RECIPE`](crate::RECIPE) with the learned correction of its strain.
     Corrected,
 }
 
@@ -27,15 +27,6 @@ impl EstimatorKind {
     /// All estimators.
     pub const ALL: [Self; 7] =
         [Self::Ekf, Self::Ukf, Self::Imm, Self::SignSplit, Self::Hypotheses, Self::Particles, Self::Corrected];
-
-    /// The filter that runs: itself, or the one whose strain is corrected.
-    #[must_use]
-    pub const fn filter(self) -> Self {
-        match self {
-            Self::Corrected => RECIPE.filter,
-            own => own,
-        }
-    }
 
     /// Whether it keeps hypotheses about the phase; the others are one Gaussian.
     #[must_use]
@@ -47,7 +38,7 @@ impl EstimatorKind {
     /// what they do better is the estimator's doing and not the parameters'.
     #[must_use]
     pub const fn tuned_as(self) -> Self {
-        match self.filter() {
+        match self {
             Self::Particles => Self::SignSplit,
             own => own,
         }
@@ -136,8 +127,12 @@ pub struct PhaseParams {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct NoiseParams {
-    /// White noise of a reading.
+    /// Error of a reading that the baseline does not take up.
     pub reading_sd: f64,
+    /// Time over which these errors are alike, s; 0 where every reading has one of its own. Of the information in a reading
+    /// a share 1 - exp(-dt/T) is new, dt after the one before, so that the same parameters fit any sampling.
+    #[serde(default)]
+    pub reading_time_s: f64,
     /// Wander of each branch.
     pub branch_sd: f64,
     /// Wander of the baseline.
@@ -147,7 +142,7 @@ pub struct NoiseParams {
 }
 
 impl NoiseParams {
-    /// As the model has it.
+    /// As the model has it, for a reading on its own.
     #[must_use]
     pub const fn to_model(self) -> ModelNoise<f64> {
         ModelNoise {
@@ -156,6 +151,13 @@ impl NoiseParams {
             baseline_sd: self.baseline_sd,
             baseline_time_s: self.baseline_time_s,
         }
+    }
+
+    /// As the model has it, for readings every `dt_s` seconds.
+    #[must_use]
+    pub fn every(self, dt_s: f64) -> ModelNoise<f64> {
+        let reading_sd = self.reading_sd / news(dt_s, self.reading_time_s).sqrt();
+        ModelNoise { reading_sd, ..self.to_model() }
     }
 }
 

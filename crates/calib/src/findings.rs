@@ -91,6 +91,8 @@ pub(crate) struct Check<'a> {
     pub recordings: &'a [Samples<'a>],
     pub fit: &'a CrossFit,
     pub kind: EstimatorKind,
+    /// The filter that runs: itself, or the one that it corrects.
+    pub filter: EstimatorKind,
     /// Noise and motion, that of the estimator and of what smooths in its place among them.
     pub estimators: &'a BTreeMap<EstimatorKind, EstimatorParams>,
 }
@@ -192,12 +194,12 @@ impl Check<'_> {
         let limits = self.fit.law.law.range;
         let setting = Setting { limits, start: Start::Unknown, sieve: Sieve::OPEN };
         let bare = move |smooths: bool| {
-            let kind = if smooths { self.kind.smoother() } else { self.kind }.filter();
+            let kind = if smooths { self.filter.smoother() } else { self.filter };
             let params = self.estimators.get(&kind).ok_or_else(|| CalibrationError::no_parameters(kind))?;
             filter_from_parts(kind, &law.law, params, setting)
         };
         let correction = if self.kind == EstimatorKind::Corrected {
-            fit_correction(training, &law.rest_readings, limits, &|| bare(false))?
+            fit_correction(training, &law.rest_readings, limits, (self.filter, &|| bare(false)))?
         } else {
             None
         };

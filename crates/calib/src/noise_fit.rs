@@ -9,9 +9,9 @@ use crate::left_out::{Fold, LeftOut};
 use crate::motion_stats::{MotionStats, root_mean_square};
 use crate::optimise;
 use crate::params::RangeParams;
-use crate::samples::Samples;
+use crate::samples::{Samples, usual_step_s};
 use crate::sd_scale::sd_scale;
-use crate::sieve::Sieve;
+use crate::sieve::{Sieve, news};
 
 /// Pull toward the starting values, per squared step of a log-parameter: a score from one recording must not run away.
 const REGULARISATION: f64 = 1e-2;
@@ -45,9 +45,9 @@ pub(crate) fn survey_evaluations(kind: EstimatorKind, laws: usize, structures: u
     each(laws) + (kind.motion_families().len() as u64 - 1) * each(structures)
 }
 
-/// Places of the white noise and of the tempering among the parameters.
-const READING_SD: usize = 2;
-const TEMPERING_AT: usize = 10;
+/// Times over which errors of readings may be alike, in steps of the rows that a search has seen, from not at all to much
+/// longer.
+const ERROR_TIMES: [f64; 5] = [0.0, 0.25, 1.0, 4.0, 16.0];
 
 /// Rows on which the smoother's intervals are looked at; smoothing costs ten times as much as filtering.
 pub(crate) const SMOOTHED_ROWS: usize = 2000;
@@ -92,7 +92,7 @@ pub(crate) fn survey<'a>(
 }
 
 /// The best law of each number of branches.
-fn best_of_each_size<'a>(surveyed: &[Surveyed<'a>]) -> Vec<&'a CrossFit> {
+pub(crate) fn best_of_each_size<'a>(surveyed: &[Surveyed<'a>]) -> Vec<&'a CrossFit> {
     let mut best: BTreeMap<usize, &Surveyed<'a>> = BTreeMap::new();
     for one in surveyed {
         let best = best.entry(one.law.branches()).or_insert(one);
@@ -156,32 +156,45 @@ impl<'a> NoiseProblem<'a> {
         Ok(Tuned { cost: cost(&point), point })
     }
 
-    /// Searches on from a survey. What that leads to may mean several things on every row, and what residuals and motion
-    /// suggest without a search competes there: most of these rows the search has not seen.
+    /// Searches on from a survey. Where that has not seen every row, it finds the time over which errors of the readings are
+    /// alike: that with which the parameters do best on every row. What residuals and motion suggest without a search
+    /// competes there: most of these rows the search has not seen.
     pub(crate) fn refine(&self, from: &Tuned, evaluated: impl FnMut()) -> Result<EstimatorParams, CalibrationError> {
         let refined = self.search(Some(from), REFINEMENT, evaluated)?.point;
-        let left_out = self.left_out(1);
-        let mut best = (f64::INFINITY, &refined);
-        let candidates = self.at_every_row(&refined, self.stride(REFINEMENT.rows));
-        for point in candidates.iter().chain([&self.untuned]) {
-            let params = self.params(point);
-            let score = left_out.score(&|fold| self.build(self.kind, fold, &params));
+        let stride = self.stride(REFINEMENT.rows);
+        let every_row = self.left_out(1);
+        let step_s = stride as f64 * usual_step_s(self.samples.iter().map(|samples| samples.time_s));
+        let times = if stride > 1 { &ERROR_TIMES[..] } else { &ERROR_TIMES[..1] };
+        let alike = times.iter().map(|steps| self.alike_over(&refined, steps * step_s, step_s));
+        let mut best = (f64::INFINITY, self.params(&refined));
+        for params in alike.chain([self.params(&self.untuned)]) {
+            let score = every_row.score(&|fold| self.build(self.kind, fold, &params));
             if score < best.0 {
-                best = (score, point);
+                best = (score, params);
             }
         }
-        Ok(self.finish(&left_out, best.1, best.0))
+        Ok(self.finish(&every_row, best.1, best.0))
     }
 
-    /// The parameters, with the factors that make their intervals cover the blocks left out.
-    fn finish(&self, left_out: &LeftOut, point: &[f64], score: f64) -> EstimatorParams {
-        let mut params = EstimatorParams { score, ..self.params(point) };
+    /// The parameters with errors that are alike over `error_time_s`, as they were found on rows every `step_s` seconds.
+    fn alike_over(&self, point: &[f64], error_time_s: f64, step_s: f64) -> EstimatorParams {
+        let mut params = self.params(point);
+        params.noise.reading_time_s = error_time_s;
+        params.noise.reading_sd *= news(step_s, error_time_s).sqrt();
+        params
+    }
+
+    /// The parameters with their score, and the factors that make their intervals cover the blocks left out.
+    fn finish(&self, left_out: &LeftOut, params: EstimatorParams, score: f64) -> EstimatorParams {
         let build = |fold: Fold| self.build(self.kind, fold, &params);
         let filtered = left_out.filtered_deviations(&build);
         let smoothed = self.left_out(self.stride(SMOOTHED_ROWS)).smoothed_deviations(&build);
-        params.strain_sd_scale = filtered.map_or(1.0, |deviations| sd_scale(&deviations));
-        params.smoothed_sd_scale = smoothed.map(|deviations| sd_scale(&deviations));
-        params
+        EstimatorParams {
+            score,
+            strain_sd_scale: filtered.map_or(1.0, |deviations| sd_scale(&deviations)),
+            smoothed_sd_scale: smoothed.map(|deviations| sd_scale(&deviations)),
+            ..params
+        }
     }
 
     fn build(
@@ -192,26 +205,6 @@ impl<'a> NoiseProblem<'a> {
     ) -> Result<Box<dyn Filter>, CalibrationError> {
         let setting = Setting { limits: self.limits, start: Start::Unknown, sieve: Sieve::OPEN };
         filter_from_parts(kind, fold.law, params, setting)
-    }
-
-    /// What parameters that were found on every `stride`-th row may mean for every row. White noise stays what it is; if
-    /// it stands for model error that is correlated over `stride` rows, it is that much larger, or the likelihood of a
-    /// row counts that much less.
-    fn at_every_row(&self, point: &[f64], stride: usize) -> Vec<Vec<f64>> {
-        let mut candidates = vec![point.to_vec()];
-        let mut vary = |place: usize, by: f64| {
-            for mut varied in candidates.clone() {
-                if let Some(parameter) = varied.get_mut(place) {
-                    *parameter += by;
-                    candidates.push(varied);
-                }
-            }
-        };
-        if stride > 1 {
-            vary(READING_SD, 0.5 * (stride as f64).ln());
-            vary(TEMPERING_AT, -(stride as f64).ln());
-        }
-        candidates
     }
 
     fn left_out(&self, stride: usize) -> LeftOut<'a> {
@@ -278,7 +271,13 @@ impl<'a> NoiseProblem<'a> {
             strain_sd_scale: 1.0,
             smoothed_sd_scale: None,
             motion,
-            noise: NoiseParams { baseline_sd: p[0], baseline_time_s: p[1], reading_sd: p[2], branch_sd: p[3] },
+            noise: NoiseParams {
+                baseline_sd: p[0],
+                baseline_time_s: p[1],
+                reading_sd: p[2],
+                reading_time_s: 0.0,
+                branch_sd: p[3],
+            },
             phases,
         }
     }

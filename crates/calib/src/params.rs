@@ -192,11 +192,20 @@ impl Uncertainty {
 }
 
 impl SensorParams {
+    /// The filter that runs for an estimator: itself, or the one whose strain is corrected.
+    #[must_use]
+    pub fn filter_of(&self, kind: EstimatorKind) -> EstimatorKind {
+        match &self.correction {
+            Some(correction) if kind == EstimatorKind::Corrected => correction.corrects,
+            _ => kind,
+        }
+    }
+
     /// Whose intervals were widened as far as they ever are, [`LARGEST_SD_SCALE`](crate::LARGEST_SD_SCALE), when the blocks
     /// left out may ask for more: the default estimator's, or those of the filter that it corrects, `filter` or `smoother`.
     #[must_use]
     pub fn widened_most(&self) -> Vec<&'static str> {
-        let of = |kind: EstimatorKind| self.estimators.get(&kind.filter());
+        let of = |kind: EstimatorKind| self.estimators.get(&self.filter_of(kind));
         let kind = self.default_estimator;
         let filter = of(kind).map(|params| params.strain_sd_scale);
         let smoother = of(kind.smoother()).and_then(|params| params.smoothed_sd_scale);

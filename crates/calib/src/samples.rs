@@ -192,3 +192,10 @@ pub(crate) fn filled_strain(samples: &Samples) -> Vec<f64> {
     }
     filled
 }
+
+/// The usual time between rows, s: the median of recordings' steps.
+pub(crate) fn usual_step_s<'a>(recordings: impl Iterator<Item = &'a [f64]>) -> f64 {
+    let mut steps: Vec<f64> = recordings.flat_map(|time_s| time_s.windows(2).map(|pair| pair[1] - pair[0])).collect();
+    let middle = steps.len() / 2;
+    if steps.is_empty() { 0.0 } else { *steps.select_nth_unstable_by(middle, f64::total_cmp).1 }
+}

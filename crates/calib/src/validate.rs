@@ -223,6 +223,7 @@ impl MotionParams {
 impl NoiseParams {
     fn validate(&self, table: &Table) -> Result<(), FieldError> {
         table.number("reading_sd", self.reading_sd, AMOUNT)?;
+        table.number("reading_time_s", self.reading_time_s, AMOUNT)?;
         table.number("branch_sd", self.branch_sd, AMOUNT)?;
         table.number("baseline_sd", self.baseline_sd, AMOUNT)?;
         table.number("baseline_time_s", self.baseline_time_s, POSITIVE)

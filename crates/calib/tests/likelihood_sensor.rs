@@ -13,7 +13,7 @@ use rand_distr::{Distribution, StandardNormal};
 
 const STEP_S: f64 = 0.05;
 const TRUE_NOISE: NoiseParams =
-    NoiseParams { reading_sd: 4e-3, branch_sd: 0.0, baseline_sd: 0.1, baseline_time_s: 10.0 };
+    NoiseParams { reading_sd: 4e-3, reading_time_s: 0.0, branch_sd: 0.0, baseline_sd: 0.1, baseline_time_s: 10.0 };
 const TRUE_MOTION: MotionParams =
     MotionParams::OrnsteinUhlenbeck { rate_time_s: 0.5, rate_sd_per_s: 0.2, strain_mean: 0.15, strain_sd: 0.08 };
 const FREE: [NoiseParameter; 4] =
@@ -74,7 +74,13 @@ fn simulate(seed: u64, rows: usize) -> (Vec<f64>, Vec<f64>) {
 /// A start that is off by a factor of two or three everywhere.
 fn start() -> NoiseStart {
     NoiseStart {
-        noise: NoiseParams { reading_sd: 1e-2, branch_sd: 0.0, baseline_sd: 0.03, baseline_time_s: 10.0 },
+        noise: NoiseParams {
+            reading_sd: 1e-2,
+            reading_time_s: 0.0,
+            branch_sd: 0.0,
+            baseline_sd: 0.03,
+            baseline_time_s: 10.0,
+        },
         motion: MotionParams::OrnsteinUhlenbeck {
             rate_time_s: 1.2,
             rate_sd_per_s: 0.08,

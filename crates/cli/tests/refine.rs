@@ -18,7 +18,7 @@ use rand_distr::{Distribution, StandardNormal};
 const REST_OHM: f64 = 1600.0;
 const STEP_S: f64 = 0.05;
 const TRUE_NOISE: NoiseParams =
-    NoiseParams { reading_sd: 1e-2, branch_sd: 0.0, baseline_sd: 0.1, baseline_time_s: 10.0 };
+    NoiseParams { reading_sd: 1e-2, reading_time_s: 0.0, branch_sd: 0.0, baseline_sd: 0.1, baseline_time_s: 10.0 };
 const TRUE_MOTION: MotionParams =
     MotionParams::OrnsteinUhlenbeck { rate_time_s: 0.5, rate_sd_per_s: 0.2, strain_mean: 0.15, strain_sd: 0.08 };
 
@@ -121,7 +121,13 @@ const REFINE: [&str; 6] = ["refine", "drawn.csv", "--sensor", "start.toml", "-o"
 fn the_noise_that_was_drawn_is_found_from_a_start_three_times_off() {
     let bench = Bench::calibrated();
     bench.write("drawn.csv", drawn(1500));
-    let noise = NoiseParams { reading_sd: 3e-2, branch_sd: 0.0, baseline_sd: 0.033, baseline_time_s: 30.0 };
+    let noise = NoiseParams {
+        reading_sd: 3e-2,
+        reading_time_s: 0.0,
+        branch_sd: 0.0,
+        baseline_sd: 0.033,
+        baseline_time_s: 30.0,
+    };
     let motion =
         MotionParams::OrnsteinUhlenbeck { rate_time_s: 1.5, rate_sd_per_s: 0.067, strain_mean: 0.15, strain_sd: 0.08 };
     write_sensor(&bench, linear_law(), noise, motion);
@@ -187,7 +193,13 @@ fn the_white_noise_of_the_bench_comes_nearer_though_the_bench_does_not_move_as_t
     let mut text = Vec::new();
     simulate(&settings).unwrap().write(&mut text).unwrap();
     bench.write("drawn.csv", text);
-    let noise = NoiseParams { reading_sd: 3.0 * WHITE_SD, branch_sd: 1e-3, baseline_sd: 3e-3, baseline_time_s: 8.0 };
+    let noise = NoiseParams {
+        reading_sd: 3.0 * WHITE_SD,
+        reading_time_s: 0.0,
+        branch_sd: 1e-3,
+        baseline_sd: 3e-3,
+        baseline_time_s: 8.0,
+    };
     let motion =
         MotionParams::OrnsteinUhlenbeck { rate_time_s: 1.0, rate_sd_per_s: 0.1, strain_mean: 0.15, strain_sd: 0.1 };
     write_sensor(&bench, matched_law(), noise, motion);

@@ -255,7 +255,7 @@ impl<'a> FilterBuilder<'a> {
     /// The estimator that was chosen.
     fn kind(&self) -> EstimatorKind {
         let kind = self.estimator.unwrap_or(self.sensor.params().default_estimator);
-        if self.corrects { kind } else { kind.filter() }
+        if self.corrects { kind } else { self.sensor.params().filter_of(kind) }
     }
 
     fn kernel(self, kind: EstimatorKind) -> Result<Kernel, Error> {

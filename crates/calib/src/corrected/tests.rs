@@ -4,6 +4,7 @@ use ohmstrain_ekf::correction::{FEATURES, FeatureScale, ReadingFeatures, mixture
 use ohmstrain_ekf::{Estimate, Gaussian, Guard, Reading, ReadingVerdict, StepError};
 
 use super::{Corrected, future_features, outputs};
+use crate::EstimatorKind;
 use crate::correction_params::{CorrectionParams, CorrectorParams, TrainingRow, filter_inputs, smoother_inputs};
 use crate::filter::{Filter, Output, Rows, WayBack};
 use crate::gaussian_process::ProcessParams;
@@ -167,6 +168,7 @@ fn params() -> CorrectionParams {
     let process = |length: f64| ProcessParams { length, noise: 0.1, noise_time_s: 2.0, sd_scale: 1.2 };
     let corrector = CorrectorParams { sd_scale: 0.9, direct: process(2.0), residual: process(4.0) };
     CorrectionParams {
+        corrects: EstimatorKind::SignSplit,
         reading_centre: SCALE.centre,
         reading_half_range: SCALE.half_range,
         rate_scales: SCALE.rates,

@@ -1,7 +1,8 @@
 use super::{LikelihoodFit, NoiseParameter, NoiseProblem, Readings};
 use crate::CalibrationError;
-use crate::estimator_params::{MotionParams, NoiseParams};
+use crate::estimator_params::{EstimatorParams, MotionParams, NoiseParams};
 use crate::law_params::LawParams;
+use crate::samples::usual_step_s;
 
 /// Noise and motion to start from; what is not moved stays as it is here.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -10,6 +11,17 @@ pub struct NoiseStart {
     pub noise: NoiseParams,
     /// Motion.
     pub motion: MotionParams,
+}
+
+impl NoiseStart {
+    /// Those of an estimator. The likelihood takes errors of readings for white: it starts with what they amount to at the
+    /// usual step of the rows.
+    #[must_use]
+    pub fn new(estimator: &EstimatorParams, time_s: &[f64]) -> Self {
+        let step_s = usual_step_s([time_s].into_iter());
+        let reading_sd = estimator.noise.every(step_s).reading_sd;
+        Self { noise: NoiseParams { reading_sd, reading_time_s: 0.0, ..estimator.noise }, motion: estimator.motion }
+    }
 }
 
 /// Noise and motion that make the readings most likely.
@@ -52,6 +64,7 @@ pub(super) fn found(start: &NoiseStart, free: &[NoiseParameter], fit: &Likelihoo
     };
     let noise = NoiseParams {
         reading_sd: value(NoiseParameter::ReadingSd),
+        reading_time_s: 0.0,
         branch_sd: value(NoiseParameter::BranchSd),
         baseline_sd: value(NoiseParameter::BaselineSd),
         baseline_time_s: value(NoiseParameter::BaselineTime),

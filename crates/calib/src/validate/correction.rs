@@ -1,6 +1,7 @@
 use super::table::{FieldError, Table};
 use super::{FACTOR, POSITIVE, SIGNED};
 use crate::correction_params::{CorrectionParams, CorrectorParams, TrainingRow};
+use crate::estimator_params::EstimatorKind;
 use crate::gaussian_process::ProcessParams;
 
 /// Training rows that a file may have: the work grows with their cube.
@@ -8,6 +9,9 @@ const ROWS: std::ops::RangeInclusive<usize> = 2..=1000;
 
 impl CorrectionParams {
     pub(super) fn validate(&self, table: &Table) -> Result<(), FieldError> {
+        if self.corrects == EstimatorKind::Corrected {
+            return Err(table.wrong("corrects", "a filter", self.corrects.name()));
+        }
         table.number("reading_centre", self.reading_centre, SIGNED)?;
         table.number("reading_half_range", self.reading_half_range, POSITIVE)?;
         table.numbers("rate_scales", &self.rate_scales, POSITIVE)?;

@@ -200,7 +200,7 @@ impl Exported {
         let limits = narrow_range(params.limits.to_model());
         let motion = [prior.rate_time_s, prior.rate_sd_per_s, prior.strain_mean, prior.strain_sd];
         let motion = motion.map(|literal| f64::from(literal.0));
-        let mut sensor = FixedRate::new(law, motion, estimator.noise.to_model(), dt_s as f32, limits)?;
+        let mut sensor = FixedRate::new(law, motion, estimator.noise.every(dt_s), dt_s as f32, limits)?;
         sensor.rest_reading = params.rest_reading as f32;
         sensor.strain_sd_scale = estimator.strain_sd_scale as f32;
         let model = sensor.model;

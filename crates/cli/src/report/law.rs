@@ -34,7 +34,7 @@ impl<'a> Law<'a> {
             branches: [],
             range: law.range.to_model(),
         };
-        let estimator = params.estimator(params.default_estimator.filter()).ok();
+        let estimator = params.estimator(params.filter_of(params.default_estimator)).ok();
         Self { quasi_static, branches: &law.branches, estimator, rest_reading }
     }
 

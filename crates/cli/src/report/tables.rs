@@ -192,7 +192,7 @@ fn gauge(rows: &mut Rows, gauge: &GaugeParams, quantity: Quantity) {
 }
 
 fn estimator(params: &SensorParams) -> Option<Table> {
-    let kind = params.default_estimator.filter();
+    let kind = params.filter_of(params.default_estimator);
     let estimator = params.estimator(kind).ok()?;
     let (noise, own) = (&estimator.noise, unit(params.quantity));
     let (rate, acceleration) = (per_time(params.quantity, 1), per_time(params.quantity, 2));

@@ -28,7 +28,13 @@ fn sensor() -> SensorParams {
             strain_mean: 0.15,
             strain_sd: 0.1,
         },
-        noise: NoiseParams { reading_sd: 1e-3, branch_sd: 0.01, baseline_sd: 0.01, baseline_time_s: 30.0 },
+        noise: NoiseParams {
+            reading_sd: 1e-3,
+            reading_time_s: 0.0,
+            branch_sd: 0.01,
+            baseline_sd: 0.01,
+            baseline_time_s: 30.0,
+        },
     };
     SensorParams {
         format: ohmstrain_calib::FORMAT,

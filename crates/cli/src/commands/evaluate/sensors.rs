@@ -43,7 +43,8 @@ impl Sensor {
             Estimators::All => EstimatorKind::ALL.into_iter().filter(can_be_built).collect(),
             _ => vec![wanted.unwrap_or(sensor.params().default_estimator)],
         };
-        let kinds = distinct(kinds.into_iter().map(|kind| if corrects { kind } else { kind.filter() }));
+        let kinds =
+            distinct(kinds.into_iter().map(|kind| if corrects { kind } else { sensor.params().filter_of(kind) }));
         let judged = |kind| Self { sensor: sensor.clone(), kind, calibration_s: None, is_part: false };
         Ok(kinds.into_iter().map(judged).collect())
     }
@@ -58,20 +59,22 @@ impl Sensor {
     ) -> Result<Vec<Self>, CliError> {
         let wanted = match estimators {
             Estimators::Auto => vec![RECIPE.estimator],
-            Estimators::All => EstimatorKind::ALL.to_vec(),
+            Estimators::All => {
+                EstimatorKind::ALL.into_iter().filter(|kind| corrects || *kind != EstimatorKind::Corrected).collect()
+            }
             Estimators::One(kind) => vec![kind],
         };
-        let wanted = distinct(wanted.into_iter().map(|kind| if corrects { kind } else { kind.filter() }));
         let calibrate = |kind| {
             let start = Instant::now();
             let Calibrated { sensor, .. } =
                 calibrate_recordings(training, Calibration::new().estimator(kind), progress)?;
             let calibration_s = Some(start.elapsed().as_secs_f64());
             let kind = sensor.params().default_estimator;
-            let part = Self { sensor: sensor.clone(), kind: kind.filter(), calibration_s, is_part: true };
+            let filter = sensor.params().filter_of(kind);
+            let part = Self { sensor: sensor.clone(), kind: filter, calibration_s, is_part: corrects };
             let whole = Self { sensor, kind, calibration_s, is_part: false };
             let is_corrected = part.kind != whole.kind;
-            Ok([Some(whole), Some(part).filter(|_| is_corrected)])
+            Ok([Some(whole).filter(|_| corrects || !is_corrected), Some(part).filter(|_| is_corrected)])
         };
         let calibrated = wanted.iter().map(|kind| calibrate(*kind)).collect::<Result<Vec<_>, CliError>>()?;
         let sensors = calibrated.into_iter().flatten().flatten();

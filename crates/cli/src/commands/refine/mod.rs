@@ -38,7 +38,7 @@ pub fn run(args: &RefineArgs) -> Result<(), CliError> {
     suits::check_readings(&recording.header, &sensor, rest, readings())?;
     let rows = RelativeRows::new(&recording, args.from, args.until, sensor.rest_reading(rest))?;
     let mut params = sensor.into_params();
-    let (start, free) = start(args, &params)?;
+    let (start, free) = start(args, &params, &rows.time_s)?;
     let refinement = refine(&params.law, start, free, &rows).map_err(|error| named(args, &error))?;
     remark_on_input(&recording, &rows, &params);
     replace(&mut params, &refinement);
@@ -78,9 +78,13 @@ fn refine(
 }
 
 /// Where the search starts, and the parameters that it moves.
-fn start(args: &RefineArgs, params: &SensorParams) -> Result<(NoiseStart, Vec<NoiseParameter>), CliError> {
+fn start(
+    args: &RefineArgs,
+    params: &SensorParams,
+    time_s: &[f64],
+) -> Result<(NoiseStart, Vec<NoiseParameter>), CliError> {
     let ekf = params.estimator(EstimatorKind::Ekf).map_err(|error| named(args, &error))?;
-    let start = NoiseStart { noise: ekf.noise, motion: ekf.motion };
+    let start = NoiseStart::new(ekf, time_s);
     let movable = movable(&params.law, &start);
     let wanted: Vec<NoiseParameter> = args.parameters.iter().map(|moved| moved.0).collect();
     if let Some(parameter) = wanted.iter().find(|parameter| !movable.contains(parameter)) {
