@@ -1,0 +1,67 @@
+use std::path::PathBuf;
+
+use clap::Args as ClapArgs;
+
+use super::{Auto, Branches, Estimator, Gauge, TraceArgs, finite};
+
+/// Flags of `calibrate`.
+#[derive(Debug, ClapArgs)]
+pub struct CalibrateArgs {
+    /// Recordings with a reference
+    #[arg(required = true)]
+    pub traces: Vec<PathBuf>,
+    /// Where to write the sensor's parameters
+    #[arg(short, long, value_name = "sensor.toml")]
+    pub output: PathBuf,
+    /// Use rows with time_s >= T only
+    #[arg(long, value_name = "T", allow_negative_numbers = true, value_parser = finite)]
+    pub from: Option<f64>,
+    /// Use rows with time_s < T only
+    #[arg(long, value_name = "T", allow_negative_numbers = true, value_parser = finite)]
+    pub until: Option<f64>,
+    /// Relaxing branches: auto (1 to 3, what the filter does best with) or 0 to 4
+    #[arg(long, default_value = "auto")]
+    pub branches: Auto<Branches>,
+    /// Family of the gauge curve: auto (polynomial), polynomial, decaying-exponential or tunnelling
+    #[arg(long, default_value = "auto")]
+    pub gauge: Auto<Gauge>,
+    /// Estimator to calibrate and to make the default: auto (corrected: sign-split and what is learned about its error), corrected, ekf, ukf, imm, sign-split,
+    /// hypotheses or particles; ekf is calibrated in any case
+    #[arg(long, default_value = "auto")]
+    pub estimator: Auto<Estimator>,
+    /// Move a reference that is early or late to where the readings say it belongs
+    #[arg(long)]
+    pub align: bool,
+    /// Seed of --bootstrap; the calibration itself draws nothing
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// Print what the recordings say about the law's parameters, which structures explain them, and what to record next
+    #[arg(long)]
+    pub explain: bool,
+    /// Print 95 % intervals of the law's parameters from N fits to blocks of the recordings drawn anew
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=100_000))]
+    pub bootstrap: Option<u32>,
+    /// Print what the calibration came to as JSON
+    #[arg(long, conflicts_with_all = ["explain", "bootstrap"])]
+    pub json: bool,
+    /// Report and figures, of the first recording
+    #[command(flatten)]
+    pub report: ReportArgs,
+    /// Replace files that this program did not write, too
+    #[arg(long)]
+    pub force: bool,
+    /// Overrides of the recordings' metadata
+    #[command(flatten)]
+    pub trace: TraceArgs,
+}
+
+/// Pictures of a recording and its estimates.
+#[derive(Debug, Default, ClapArgs)]
+pub struct ReportArgs {
+    /// Also write a report of the first recording
+    #[arg(long, value_name = "report.html")]
+    pub report: Option<PathBuf>,
+    /// Also write every plot of that report as SVG, with what is drawn as CSV, to this folder
+    #[arg(long, value_name = "DIR")]
+    pub figures: Option<PathBuf>,
+}

@@ -1,0 +1,108 @@
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use clap::Args as ClapArgs;
+use ohmstrain_ekf::Influence;
+
+use super::{Auto, Estimator, TraceArgs, finite, positive};
+
+/// Flags that `filter` and `smooth` share.
+#[derive(Debug, ClapArgs)]
+pub struct EstimateArgs {
+    /// The sensor's parameters
+    #[arg(long, value_name = "sensor.toml")]
+    pub sensor: PathBuf,
+    /// Estimator: auto (the sensor file's choice), corrected, ekf, ukf, imm, sign-split, hypotheses or
+    /// particles, which smooth with sign-split
+    #[arg(long, default_value = "auto")]
+    pub estimator: Auto<Estimator>,
+    /// Do without the learned correction of the strain, to compare
+    #[arg(long)]
+    pub no_correction: bool,
+    /// Strain (or angle) at the first row, if it is known; the body is at rest there
+    #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = finite)]
+    pub initial_strain: Option<f64>,
+    /// What the rested, unstretched sensor reads now, in place of what it read in calibration: a number in the readings'
+    /// unit, or first:N for the median of the first N readings
+    #[arg(long, value_name = "OHM|first:N")]
+    pub rest_resistance: Option<RestResistance>,
+    /// Turn down readings whose normalised innovation squared (column nis) is above X, ten in a row at most
+    #[arg(long, value_name = "X", value_parser = positive)]
+    pub gate: Option<f64>,
+    /// Bound the influence of surprising readings: huber:K (in standard deviations) or student-t:DOF
+    #[arg(long, value_name = "huber:K|student-t:DOF")]
+    pub influence: Option<BoundedInfluence>,
+    /// Columns to write, separated by commas; all by default
+    #[arg(long, value_delimiter = ',')]
+    pub columns: Vec<String>,
+    /// Overrides of the recording's metadata
+    #[command(flatten)]
+    pub trace: TraceArgs,
+}
+
+/// Flags of `filter`.
+#[derive(Debug, ClapArgs)]
+pub struct FilterArgs {
+    /// Recording, or - for stdin
+    #[arg(default_value = "-")]
+    pub trace_file: PathBuf,
+    /// Estimate every row from the readings up to S seconds after it; rows come out that much later
+    #[arg(long, value_name = "S", value_parser = positive)]
+    pub lag_s: Option<f64>,
+    /// How to estimate
+    #[command(flatten)]
+    pub estimate: EstimateArgs,
+}
+
+/// Flags of `smooth`.
+#[derive(Debug, ClapArgs)]
+pub struct SmoothArgs {
+    /// Recording, or - for stdin
+    pub trace_file: PathBuf,
+    /// How to estimate
+    #[command(flatten)]
+    pub estimate: EstimateArgs,
+}
+
+/// How the influence of a surprising reading is bounded.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BoundedInfluence(pub Influence<f64>);
+
+impl FromStr for BoundedInfluence {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let expected = || "expected huber:K or student-t:DOF with a positive number".to_string();
+        let (kind, number) = text.split_once(':').ok_or_else(expected)?;
+        let number = positive(number).map_err(|_| expected())?;
+        match kind {
+            "huber" => Ok(Self(Influence::Huber { threshold: number })),
+            "student-t" => Ok(Self(Influence::StudentT { degrees_of_freedom: number })),
+            _ => Err(expected()),
+        }
+    }
+}
+
+/// Where R₀ comes from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum RestResistance {
+    /// Given.
+    Value(f64),
+    /// Median of the first readings.
+    First(usize),
+}
+
+impl FromStr for RestResistance {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let expected = || "expected a positive number or first:N".to_string();
+        if let Some(count) = text.strip_prefix("first:") {
+            return match count.parse() {
+                Ok(count @ 1..) => Ok(Self::First(count)),
+                _ => Err(expected()),
+            };
+        }
+        positive(text).map(Self::Value).map_err(|_| expected())
+    }
+}

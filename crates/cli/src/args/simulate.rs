@@ -1,0 +1,66 @@
+use std::path::PathBuf;
+
+use clap::{Args as ClapArgs, ValueEnum};
+use ohmstrain_bench_data::FrontEndSpec;
+use ohmstrain_bench_data::simulate::{Material, Protocol};
+
+/// Flags of `demo`.
+#[derive(Debug, ClapArgs)]
+pub struct DemoArgs {
+    /// Folder for trace.csv, sensor.toml, estimates.csv, smoothed.csv and report.html
+    #[arg(long, default_value = "ohmstrain-demo")]
+    pub out: PathBuf,
+    /// The simulated sensor: as wrong-headed as real ones, or three times so
+    #[arg(long, value_enum, default_value_t = DemoMaterial::Representative)]
+    pub material: DemoMaterial,
+    /// Seed of the simulated bench
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// Replace files that this program did not write, too
+    #[arg(long)]
+    pub force: bool,
+}
+
+/// Sensors of `demo`, neither of the family of laws that is fitted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum DemoMaterial {
+    /// Hysteresis, release peaks and drift as public recordings show them
+    Representative,
+    /// Release peaks and relaxation beyond those of any recording
+    WorstCase,
+}
+
+/// Flags of `simulate`.
+#[derive(Debug, ClapArgs)]
+pub struct SimulateArgs {
+    /// Illustrative material: ecoflex-00-30, ecoflex-00-50, vytaflex-10 or representative
+    #[arg(long, default_value = "ecoflex-00-30")]
+    pub material: Material,
+    /// What the bench does: extend-retract, extend-hold, load-steps, long-holds or mixed
+    #[arg(long, default_value = "extend-hold")]
+    pub protocol: Protocol,
+    /// Largest elongation of the 30 mm sensor, mm
+    #[arg(long, default_value_t = 10.0)]
+    pub elongation_mm: f64,
+    /// Speed of stretching, mm/s
+    #[arg(long, default_value_t = 1.0)]
+    pub speed_mm_s: f64,
+    /// Readings per second
+    #[arg(long, default_value_t = 20.0)]
+    pub sample_rate_hz: f64,
+    /// A sensor outside the family of laws that calibration fits: release peaks, more branches, other nonlinearity
+    #[arg(long)]
+    pub mismatched: bool,
+    /// Read through electronics: the trace then holds `adc` codes
+    #[arg(long, value_name = "SPEC")]
+    pub front_end: Option<FrontEndSpec>,
+    /// Seed of noise, drift and random protocols
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// File to write instead of stdout
+    #[arg(short, long)]
+    pub output: Option<PathBuf>,
+    /// Replace files that this program did not write, too
+    #[arg(long)]
+    pub force: bool,
+}
