@@ -36,9 +36,11 @@ mod columns;
 mod error;
 #[cfg(feature = "import")]
 pub mod import;
+mod line_parser;
 mod lines;
 mod metadata;
 mod reader;
+mod row_parser;
 mod rows;
 mod segment;
 pub mod simulate;
@@ -47,6 +49,7 @@ mod trace;
 mod writer;
 
 pub use error::{BadContent, SpecError, TraceError};
+pub use line_parser::{Line, LineParser};
 pub use metadata::{Metadata, ResistanceUnit, StrainUnit};
 pub use reader::{Reading, Row, TraceReader};
 pub use rows::RowWriter;

@@ -112,6 +112,13 @@ impl<R: Read> LineFeed<R> {
         Ok(Some(false))
     }
 
+    /// Takes the next line apart by itself, whatever became of the one before; `false` at the end of the source.
+    pub(crate) fn next_alone(&mut self, cells: &mut StringRecord) -> Result<bool, LineFault> {
+        let Some(line) = self.lines.next()? else { return Ok(false) };
+        take_apart(line, cells).map_err(LineFault::Content)?;
+        Ok(true)
+    }
+
     fn next_line(&mut self) -> Result<Option<()>, LineFault> {
         if self.record_has_line {
             let found = quote(&String::from_utf8_lossy(&self.pending));
@@ -127,6 +134,22 @@ impl<R: Read> LineFeed<R> {
     pub(crate) const fn take_fault(&mut self) -> Option<LineFault> {
         self.fault.take()
     }
+}
+
+/// The cells of a line that stands by itself.
+pub(crate) fn take_apart(line: &str, cells: &mut StringRecord) -> Result<(), Fault> {
+    cells.clear();
+    if is_plain(line) {
+        line.split(',').for_each(|cell| cells.push_field(cell));
+        return Ok(());
+    }
+    let unpaired = || Fault::new("quotation marks in pairs", quote(line));
+    if line.bytes().filter(|byte| *byte == b'"').count() % 2 == 1 {
+        return Err(unpaired());
+    }
+    let mut records = csv::ReaderBuilder::new().has_headers(false).flexible(true).from_reader(line.as_bytes());
+    records.read_record(cells).map_err(|_| unpaired())?;
+    Ok(())
 }
 
 /// Whether a line is one record whose cells are what stands between its commas: no quotation mark, no end of line.

@@ -1,15 +1,12 @@
 use std::io::Read;
 
-use csv::StringRecord;
-use ohmstrain_model::{AdcCode, FrontEnd, Joint};
-
-use crate::cell;
-use crate::clock::Clock;
-use crate::columns::{Column, Columns, Place};
+use crate::columns::Columns;
 use crate::error::{Fault, TraceError};
 use crate::lines::{LineFault, LineFeed, Lines, is_plain};
-use crate::metadata::{Metadata, ResistanceUnit, StrainUnit};
+use crate::metadata::Metadata;
+use crate::row_parser::RowParser;
 use crate::trace::{Quantity, ReadingKind};
+use csv::StringRecord;
 
 /// One reading. NaN is a missing one.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -57,24 +54,14 @@ pub struct Row {
 pub struct TraceReader<R> {
     file: String,
     metadata: Metadata,
-    columns: Columns,
-    conversion: Conversion,
-    clock: Clock,
+    parser: RowParser,
     records: csv::Reader<LineFeed<R>>,
     record: StringRecord,
     /// Every line up to now was plain; after the first that was not, the csv crate reads them all.
     plain: bool,
+    /// A bad row does not end the trace.
+    goes_on: bool,
     done: bool,
-}
-
-/// What turns cells into readings and references.
-struct Conversion {
-    front_end: Option<FrontEnd<f64>>,
-    joint: Option<Joint<f64>>,
-    gauge_length_mm: f64,
-    /// What a strain and a resistance in the file are multiplied with.
-    strain_factor: f64,
-    ohm_factor: f64,
 }
 
 impl<R: Read> TraceReader<R> {
@@ -102,10 +89,24 @@ impl<R: Read> TraceReader<R> {
         records.read_record(&mut record).map_err(|error| feed_error(error, &mut records, &file))?;
         let at_header = |fault: Fault| TraceError::from(fault.at(&file, records.get_ref().line()));
         let columns = Columns::of_header(&record).map_err(at_header)?;
-        let conversion = Conversion::new(&columns, &metadata).map_err(at_header)?;
-        let clock = Clock::new(columns.time.column);
+        let parser = RowParser::new(columns, &metadata).map_err(at_header)?;
         let metadata = metadata.in_own_units();
-        Ok(Self { file, metadata, columns, conversion, clock, records, record, plain, done: false })
+        Ok(Self { file, metadata, parser, records, record, plain, goes_on: false, done: false })
+    }
+
+    /// Goes on after a line that is none of a trace: the iterator delivers its error, and then the rows after it. Whatever
+    /// the source itself fails with still ends it.
+    ///
+    /// ```
+    /// use ohmstrain_bench_data::TraceReader;
+    /// let file = "time_s,resistance_ohm\n0.0,1600\n0.1,16\"\u{0}0\n0.2,1601\n";
+    /// let rows = TraceReader::new(file.as_bytes(), "-")?.past_bad_lines();
+    /// assert_eq!(rows.filter(Result::is_ok).count(), 2);
+    /// # Ok::<(), ohmstrain_bench_data::TraceError>(())
+    /// ```
+    #[must_use]
+    pub fn past_bad_lines(self) -> Self {
+        Self { goes_on: true, ..self }
     }
 
     /// Name of the source, as messages call it.
@@ -123,26 +124,25 @@ impl<R: Read> TraceReader<R> {
     /// What the readings are.
     #[must_use]
     pub fn reading_kind(&self) -> ReadingKind {
-        if self.columns.reading.column == Column::ResistanceRatio { ReadingKind::Ratio } else { ReadingKind::Ohm }
+        self.parser.reading_kind()
     }
 
     /// Whether the readings are converter codes, so that each carries its own standard deviation.
     #[must_use]
     pub fn has_codes(&self) -> bool {
-        self.columns.reading.column == Column::Adc
+        self.parser.has_codes()
     }
 
     /// What the reference is, if there is one. A displacement becomes strain, and so does an angle with a joint.
     #[must_use]
     pub fn reference_quantity(&self) -> Option<Quantity> {
-        let is_angle = self.columns.reference?.column == Column::AngleDeg && self.conversion.joint.is_none();
-        Some(if is_angle { Quantity::AngleDeg } else { Quantity::Strain })
+        self.parser.reference_quantity()
     }
 
     /// Whether the file has temperatures.
     #[must_use]
     pub const fn has_temperature(&self) -> bool {
-        self.columns.temperature.is_some()
+        self.parser.has_temperature()
     }
 
     /// Physical line read last, counted from 1.
@@ -155,13 +155,18 @@ impl<R: Read> TraceReader<R> {
         if !self.next_record()? {
             return Ok(None);
         }
-        self.parse_row().map(Some).map_err(|fault| fault.at(&self.file, self.line()).into())
+        let line = self.line();
+        self.parser.row(&self.record, line).map(Some).map_err(|fault| fault.at(&self.file, line).into())
     }
 
     /// Reads the cells of the next row; `false` at the end of the source.
     fn next_record(&mut self) -> Result<bool, TraceError> {
         let feed = self.records.get_mut();
         feed.begin_record();
+        if self.goes_on {
+            let taken = feed.next_alone(&mut self.record);
+            return taken.map_err(|fault| placed(fault, &self.file, self.records.get_ref().line()));
+        }
         if self.plain {
             let plain = feed.next_plain(&mut self.record);
             match plain.map_err(|fault| placed(fault, &self.file, self.records.get_ref().line()))? {
@@ -173,28 +178,6 @@ impl<R: Read> TraceReader<R> {
         let record = self.records.read_record(&mut self.record);
         record.map_err(|error| feed_error(error, &mut self.records, &self.file))
     }
-
-    fn parse_row(&mut self) -> Result<Row, Fault> {
-        let record = &self.record;
-        if record.len() != self.columns.width {
-            let expected = format!("{} cells, as in the header", self.columns.width);
-            return Err(Fault::new(expected, format!("{}", record.len())));
-        }
-        let temperature = self.columns.temperature.as_ref();
-        Ok(Row {
-            line: self.records.get_ref().line(),
-            time_s: self.clock.read(self.columns.time.cell(record))?,
-            reading: self.conversion.reading(&self.columns.reading, record)?,
-            reference: match &self.columns.reference {
-                Some(place) => self.conversion.reference(place, record)?,
-                None => f64::NAN,
-            },
-            temperature_c: match temperature {
-                Some(place) => cell::number(place.column.name(), place.cell(record))?,
-                None => f64::NAN,
-            },
-        })
-    }
 }
 
 impl<R: Read> Iterator for TraceReader<R> {
@@ -205,62 +188,16 @@ impl<R: Read> Iterator for TraceReader<R> {
             return None;
         }
         let row = self.next_row().transpose();
-        self.done = !matches!(row, Some(Ok(_)));
+        self.done = match &row {
+            Some(Ok(_)) => false,
+            Some(Err(TraceError::Content(_))) => !self.goes_on,
+            _ => true,
+        };
         row
     }
 }
 
 impl<R: Read> std::iter::FusedIterator for TraceReader<R> {}
-
-impl Conversion {
-    fn new(columns: &Columns, metadata: &Metadata) -> Result<Self, Fault> {
-        let impossible = |error: ohmstrain_model::ParameterError| Fault::new("possible metadata", error.to_string());
-        let needs = |column: Column, key: &str| {
-            Fault::in_column(column.name(), format!("a line `# {key} = …` above the header"), "none")
-        };
-        if columns.reading.column == Column::Adc && metadata.front_end.is_none() {
-            return Err(needs(Column::Adc, "front_end"));
-        }
-        let is_displacement = columns.reference.is_some_and(|place| place.column == Column::DisplacementMm);
-        if is_displacement && metadata.gauge_length_mm.is_none() {
-            return Err(needs(Column::DisplacementMm, "gauge_length_mm"));
-        }
-        Ok(Self {
-            front_end: metadata.front_end.map(|spec| spec.build()).transpose().map_err(impossible)?,
-            joint: metadata.joint.map(|spec| spec.build()).transpose().map_err(impossible)?,
-            gauge_length_mm: metadata.gauge_length_mm.unwrap_or(f64::NAN),
-            strain_factor: metadata.strain_unit.map_or(1.0, StrainUnit::factor),
-            ohm_factor: metadata.resistance_unit.map_or(1.0, ResistanceUnit::factor),
-        })
-    }
-
-    fn reading(&self, place: &Place, record: &StringRecord) -> Result<Reading, Fault> {
-        let cell = place.cell(record);
-        let missing = Reading { value: f64::NAN, sd_ohm: None, code: None, saturated: false };
-        let (Column::Adc, Some(front_end)) = (place.column, &self.front_end) else {
-            let factor = if place.column == Column::ResistanceOhm { self.ohm_factor } else { 1.0 };
-            return Ok(Reading { value: factor * cell::positive(place.column.name(), cell)?, ..missing });
-        };
-        let code = cell::code(place.column.name(), cell)?;
-        Ok(match code.map(|code| front_end.read(code)) {
-            None => missing,
-            Some(AdcCode::Saturated) => Reading { code, saturated: true, ..missing },
-            Some(AdcCode::Reading(ohms)) => {
-                Reading { value: ohms.resistance_ohm, sd_ohm: Some(ohms.sd_ohm), code, saturated: false }
-            }
-        })
-    }
-
-    fn reference(&self, place: &Place, record: &StringRecord) -> Result<f64, Fault> {
-        let value = cell::number(place.column.name(), place.cell(record))?;
-        Ok(match (place.column, &self.joint) {
-            (Column::DisplacementMm, _) => value / self.gauge_length_mm,
-            (Column::Strain, _) => self.strain_factor * value,
-            (Column::AngleDeg, Some(joint)) => joint.strain(value.to_radians()),
-            _ => value,
-        })
-    }
-}
 
 /// Metadata lines, and the header line.
 fn read_prelude<R: Read>(lines: &mut Lines<R>) -> Result<(Metadata, String), LineFault> {

@@ -5,6 +5,7 @@ mod evaluate;
 mod export;
 mod files;
 mod fit_law;
+mod live;
 mod refine;
 mod shell;
 mod simulate;
@@ -20,6 +21,7 @@ pub use evaluate::{Estimators, EvaluateArgs};
 pub use export::{ExportArgs, ExportTarget};
 pub use files::{ImportArgs, InspectArgs};
 pub use fit_law::{FitLawArgs, SegmentChoice, phase_name};
+pub use live::LiveArgs;
 pub use refine::RefineArgs;
 pub use shell::{CompletionsArgs, ManArgs};
 pub use simulate::{DemoArgs, DemoMaterial, SimulateArgs};
@@ -87,6 +89,9 @@ pub enum Command {
     /// Turn readings into strain, row by row
     #[command(before_help = "Example: ohmstrain filter readings.csv --sensor sensor.toml > estimates.csv")]
     Filter(FilterArgs),
+    /// Watch strain in the terminal while readings arrive from a serial port, or play a recording back
+    #[command(before_help = "Example: ohmstrain live --port /dev/ttyACM0 --sensor sensor.toml")]
+    Live(LiveArgs),
     /// Turn a whole recording into strain, every estimate from all readings
     #[command(before_help = "Example: ohmstrain smooth readings.csv --sensor sensor.toml > smoothed.csv")]
     Smooth(SmoothArgs),

@@ -41,12 +41,17 @@ pub fn rest_resistance(
 
 /// Median of the first `count` known readings.
 pub fn median_of_first(count: usize, first: impl Iterator<Item = f64>, file: &str) -> Result<f64, CliError> {
-    let mut known: Vec<f64> = first.filter(|value| value.is_finite()).take(count).collect();
+    let none = || CliError::Input(format!("{file}: expected a reading among the first rows, found none"));
+    median(first.filter(|value| value.is_finite()).take(count).collect()).ok_or_else(none)
+}
+
+/// Median of numbers; `None` if there is none.
+pub fn median(mut known: Vec<f64>) -> Option<f64> {
     known.sort_by(f64::total_cmp);
     match known.len() {
-        0 => Err(CliError::Input(format!("{file}: expected a reading among the first rows, found none"))),
-        n if n % 2 == 1 => Ok(known[n / 2]),
-        n => Ok(0.5 * (known[n / 2 - 1] + known[n / 2])),
+        0 => None,
+        n if n % 2 == 1 => Some(known[n / 2]),
+        n => Some(0.5 * (known[n / 2 - 1] + known[n / 2])),
     }
 }
 

@@ -270,3 +270,27 @@ fn microseconds_that_wrap_are_seconds_that_do_not() {
         }
     }
 }
+
+#[test]
+fn bad_lines_are_skipped_where_that_is_wanted_and_counted() {
+    let bench = Bench::calibrated();
+    let good = first_lines(&bench.read("trace.csv"), 60);
+    let mut bad: Vec<u8> = vec![];
+    for (row, line) in good.lines().enumerate() {
+        bad.extend_from_slice(line.as_bytes());
+        bad.push(b'\n');
+        match row {
+            30 => bad.extend_from_slice(b"1.4\"x,160\n\xff\xfe\x00garbage\n"),
+            40 => bad.extend_from_slice(b"9999,-3\n0.0,1600,0\n"),
+            _ => {}
+        }
+    }
+    let strict = bench.feed(&FILTER, bad.clone());
+    assert_eq!(strict.code, Some(4));
+    let skipping = bench.feed(&[&FILTER[..], &["--skip-bad"]].concat(), bad);
+    let said = skipping.warnings.concat();
+    assert!(said.contains("4 lines were skipped; the first one: stdin:32: "), "{said}");
+    assert_eq!(skipping.ok(), bench.feed(&FILTER, good).ok());
+    let nothing = bench.feed(&[&FILTER[..], &["--skip-bad"]].concat(), "time_s,resistance_ohm\nx,y\n");
+    assert_eq!(nothing.code, Some(4));
+}

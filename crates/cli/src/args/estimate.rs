@@ -6,7 +6,7 @@ use ohmstrain_ekf::Influence;
 
 use super::{Auto, Estimator, TraceArgs, finite, positive};
 
-/// Flags that `filter` and `smooth` share.
+/// Flags that `filter`, `smooth` and `live` share.
 #[derive(Debug, ClapArgs)]
 pub struct EstimateArgs {
     /// The sensor's parameters
@@ -32,9 +32,6 @@ pub struct EstimateArgs {
     /// Bound the influence of surprising readings: huber:K (in standard deviations) or student-t:DOF
     #[arg(long, value_name = "huber:K|student-t:DOF")]
     pub influence: Option<BoundedInfluence>,
-    /// Columns to write, separated by commas; all by default
-    #[arg(long, value_delimiter = ',')]
-    pub columns: Vec<String>,
     /// Overrides of the recording's metadata
     #[command(flatten)]
     pub trace: TraceArgs,
@@ -49,6 +46,12 @@ pub struct FilterArgs {
     /// Estimate every row from the readings up to S seconds after it; rows come out that much later
     #[arg(long, value_name = "S", value_parser = positive)]
     pub lag_s: Option<f64>,
+    /// Go on after lines that are none of a trace, as serial lines bring; they are counted on stderr
+    #[arg(long)]
+    pub skip_bad: bool,
+    /// Columns to write, separated by commas; all by default
+    #[arg(long, value_delimiter = ',')]
+    pub columns: Vec<String>,
     /// How to estimate
     #[command(flatten)]
     pub estimate: EstimateArgs,
@@ -59,6 +62,9 @@ pub struct FilterArgs {
 pub struct SmoothArgs {
     /// Recording, or - for stdin
     pub trace_file: PathBuf,
+    /// Columns to write, separated by commas; all by default
+    #[arg(long, value_delimiter = ',')]
+    pub columns: Vec<String>,
     /// How to estimate
     #[command(flatten)]
     pub estimate: EstimateArgs,

@@ -1,7 +1,7 @@
 use std::io::{self, Read};
 
 use ohmstrain::{Error, Estimate, Filter, LaggedFilter, Reading, Sensor, ValidityWatch};
-use ohmstrain_bench_data::{Row, TraceError, TraceReader};
+use ohmstrain_bench_data::{BadContent, Row, TraceError, TraceReader};
 
 use crate::args::{FilterArgs, RestResistance};
 use crate::error::CliError;
@@ -32,7 +32,7 @@ pub fn run(args: &FilterArgs) -> Result<(), CliError> {
         filter = Running::new(&sensor, args)?;
     }
     let out = io::BufWriter::with_capacity(WRITTEN_AT_ONCE, io::stdout().lock());
-    let writer = EstimateWriter::new(out, &sensor, &args.estimate.columns)?;
+    let writer = EstimateWriter::new(out, &sensor, &args.columns)?;
     let live = is_stdin(&args.trace_file) || !args.trace_file.is_file();
     let watch = ValidityWatch::new(&sensor, None);
     let sink =
@@ -83,15 +83,17 @@ impl Running {
 fn stream<W: io::Write>(
     args: &FilterArgs,
     mut filter: Running,
-    mut rows: TraceReader<Box<dyn Read>>,
+    rows: TraceReader<Box<dyn Read>>,
     mut sink: Sink<W>,
 ) -> Result<(), CliError> {
     let wanted = args.estimate.rest_resistance;
     // The rows that R₀ is taken from, at least one, are estimated too, once it is known.
     let count = if let Some(RestResistance::First(count)) = wanted { count } else { 0 };
-    let first = first_rows(&mut rows, count, if sink.live { count } else { count.max(FIRST_READINGS) })?;
-    if first.is_empty() {
-        return Err(no_row(&rows));
+    let mut rows = if args.skip_bad { rows.past_bad_lines() } else { rows };
+    let first = first_rows(&mut rows, args.skip_bad, count, if sink.live { count } else { count.max(FIRST_READINGS) })?;
+    if first.iter().all(Result::is_err) {
+        // What was skipped may be all there was.
+        return Err(first.into_iter().find_map(Result::err).map_or_else(|| no_row(&rows), CliError::from));
     }
     let known = || first.iter().flatten().map(|row| row.reading.value);
     let rest = rest_resistance(wanted, known(), &sink.file)?;
@@ -104,7 +106,15 @@ fn stream<W: io::Write>(
         let at = |error| CliError::Input(format!("{}:{}: {error}", sink.file, row.line));
         sink.write(filter.step(row.time_s, input::reading(&row.reading)).map_err(at)?)
     };
-    let streamed = first.into_iter().chain(rows).try_for_each(|row| take(row?));
+    let mut skipped = Skipped::default();
+    let streamed = first.into_iter().chain(rows).try_for_each(|row| match row {
+        Err(TraceError::Content(fault)) if args.skip_bad => {
+            skipped.count(fault);
+            Ok(())
+        }
+        row => take(row?),
+    });
+    skipped.say();
     // The rows that still wait get their estimates, whatever stopped the stream, and what was estimated is still good.
     let finished = match filter.finish() {
         Ok(estimates) => sink.write(estimates),
@@ -156,6 +166,26 @@ impl<W: io::Write> Sink<'_, W> {
     }
 }
 
+/// Lines that were none of a trace.
+#[derive(Default)]
+struct Skipped {
+    first: Option<BadContent>,
+    count: usize,
+}
+
+impl Skipped {
+    fn count(&mut self, fault: BadContent) {
+        self.first.get_or_insert(fault);
+        self.count += 1;
+    }
+
+    fn say(&self) {
+        let Some(first) = &self.first else { return };
+        let lines = if self.count == 1 { "1 line was skipped" } else { &format!("{} lines were skipped", self.count) };
+        CliError::warning(&format!("{lines}; the first one: {first}"));
+    }
+}
+
 /// Rows without a reading among which a reading is looked for, where it is not needed.
 const MOST_FIRST_ROWS: usize = 10 * FIRST_READINGS;
 
@@ -163,14 +193,16 @@ const MOST_FIRST_ROWS: usize = 10 * FIRST_READINGS;
 /// if fewer readings than that are known.
 fn first_rows<R: Read>(
     rows: &mut TraceReader<R>,
+    skips_bad: bool,
     enough: usize,
     wanted: usize,
 ) -> Result<Vec<Result<Row, TraceError>>, CliError> {
     let (mut first, mut known) = (Vec::new(), 0);
     for row in rows {
-        let row = if known < enough { Ok(row?) } else { row };
+        let passed_over = skips_bad && matches!(row, Err(TraceError::Content(_)));
+        let row = if known < enough && !passed_over { Ok(row?) } else { row };
         known += usize::from(row.as_ref().is_ok_and(|row| row.reading.value.is_finite()));
-        let failed = row.is_err();
+        let failed = row.is_err() && !passed_over;
         first.push(row);
         if failed || known >= wanted || (known >= enough && first.len() >= MOST_FIRST_ROWS) {
             break;

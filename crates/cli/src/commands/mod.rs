@@ -12,6 +12,7 @@ mod import;
 mod inspect;
 mod inspect_json;
 mod inspect_text;
+mod live;
 mod refine;
 mod reporting;
 mod score_table;
@@ -34,6 +35,7 @@ pub fn dispatch(command: &Command) -> Result<(), CliError> {
         Command::Refine(args) => refine::run(args),
         Command::FitLaw(args) => fit_law::run(args),
         Command::Filter(args) => filter::run(args),
+        Command::Live(args) => live::run(args),
         Command::Smooth(args) => smooth::run(args),
         Command::Evaluate(args) => evaluate::run(args),
         Command::Export(args) => export::run(args),

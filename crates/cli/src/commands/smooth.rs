@@ -30,7 +30,7 @@ pub fn run(args: &SmoothArgs) -> Result<(), CliError> {
     suits::check_readings(&header, &sensor, rest, readings.values())?;
     let builder = builder(&sensor, &args.estimate);
     let builder = rest.map_or(builder, |measured| builder.rest_resistance(measured));
-    let writer = EstimateWriter::new(Segments::new(), &sensor, &args.estimate.columns)?;
+    let writer = EstimateWriter::new(Segments::new(), &sensor, &args.columns)?;
     let mut rates = vec![f32::NAN; readings.len()];
     let segments = smooth_into(writer, builder, &readings, &mut rates).map_err(|error| error.named(&name))?;
     suits::warn_of_start(args.estimate.initial_strain, &sensor);

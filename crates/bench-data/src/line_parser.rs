@@ -1,0 +1,184 @@
+use csv::StringRecord;
+
+use crate::columns::Columns;
+use crate::error::{BadContent, Fault};
+use crate::lines::take_apart;
+use crate::metadata::Metadata;
+use crate::reader::Row;
+use crate::row_parser::RowParser;
+use crate::trace::{Quantity, ReadingKind};
+
+/// Lines in a row whose times go on from each other, but not from the last row's: then the clock has started again.
+const LATE_LINES: u32 = 3;
+/// Longest line that a device sends.
+const LONGEST_LINE: usize = 4096;
+
+/// Takes a trace apart line by line, as a device sends it: what is none of a trace is an error of that line alone, a header
+/// may come again at any time, and so may the clock start again.
+///
+/// ```
+/// use ohmstrain_bench_data::{Line, LineParser, Metadata};
+/// let mut lines = LineParser::new("/dev/ttyACM0", Metadata::default());
+/// assert!(lines.take(b"05,16").is_err());
+/// assert!(matches!(lines.take(b"time_s,resistance_ohm"), Ok(Line::Header)));
+/// let Ok(Line::Row(row)) = lines.take(b"0.05,1600\r\n") else { panic!() };
+/// assert_eq!(row.reading.value, 1600.0);
+/// ```
+pub struct LineParser {
+    name: String,
+    overrides: Metadata,
+    metadata: Metadata,
+    /// Whether a header has come since the metadata before it.
+    headed: bool,
+    parser: Option<(RowParser, Columns)>,
+    late: u32,
+    number: u64,
+    record: StringRecord,
+}
+
+/// What a line was.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Line {
+    /// A row.
+    Row(Row),
+    /// The first row of a clock that has started again.
+    Restarted(Row),
+    /// A header; what is known of the columns and the sensor may have changed.
+    Header,
+    /// Nothing, metadata or a remark.
+    Nothing,
+}
+
+impl LineParser {
+    /// Waits for a header. `name` is what errors call the source, `overrides` takes the place of the stream's metadata.
+    #[must_use]
+    pub fn new(name: &str, overrides: Metadata) -> Self {
+        let metadata = overrides.clone();
+        let (parser, record) = (None, StringRecord::new());
+        Self { name: name.into(), overrides, metadata, headed: false, parser, late: 0, number: 0, record }
+    }
+
+    /// What the stream says of itself, with the overrides; units are those of rows.
+    #[must_use]
+    pub fn metadata(&self) -> Metadata {
+        self.metadata.in_own_units()
+    }
+
+    /// What the readings are; `None` before the header.
+    #[must_use]
+    pub fn reading_kind(&self) -> Option<ReadingKind> {
+        self.parser.as_ref().map(|(parser, _)| parser.reading_kind())
+    }
+
+    /// Whether the readings are converter codes.
+    #[must_use]
+    pub fn has_codes(&self) -> bool {
+        self.parser.as_ref().is_some_and(|(parser, _)| parser.has_codes())
+    }
+
+    /// What the reference is, if there is one.
+    #[must_use]
+    pub fn reference_quantity(&self) -> Option<Quantity> {
+        self.parser.as_ref().and_then(|(parser, _)| parser.reference_quantity())
+    }
+
+    /// Takes a line, with or without its end.
+    ///
+    /// # Errors
+    /// If it is none of a trace; the next line is taken as if it had not been there.
+    pub fn take(&mut self, line: &[u8]) -> Result<Line, BadContent> {
+        self.number += 1;
+        self.of_line(line).map_err(|fault| fault.at(&self.name, self.number))
+    }
+
+    fn of_line(&mut self, line: &[u8]) -> Result<Line, Fault> {
+        if line.len() > LONGEST_LINE {
+            return Err(Fault::new(format!("a line of at most {LONGEST_LINE} bytes"), "a longer one"));
+        }
+        let text = std::str::from_utf8(line).map_err(|_| Fault::new("UTF-8 text", "other bytes"))?;
+        let text = text.trim_start_matches('\u{feff}').trim();
+        if text.is_empty() {
+            return Ok(Line::Nothing);
+        }
+        if text.starts_with('#') {
+            if std::mem::take(&mut self.headed) {
+                self.metadata = Metadata::default();
+            }
+            return self.metadata.take_line(text).map(|()| Line::Nothing);
+        }
+        take_apart(text, &mut self.record)?;
+        if let Ok(columns) = Columns::of_header(&self.record) {
+            return self.begin(columns);
+        }
+        let Some((parser, columns)) = &mut self.parser else {
+            // Says which columns a header has.
+            return Columns::of_header(&self.record).map(|_| Line::Nothing);
+        };
+        match parser.row(&self.record, self.number) {
+            Ok(row) => {
+                self.late = 0;
+                Ok(Line::Row(row))
+            }
+            Err(fault) if parser.is_late(&self.record) && self.late + 1 < LATE_LINES => {
+                self.late += 1;
+                Err(fault)
+            }
+            Err(fault) if parser.is_late(&self.record) => {
+                let mut fresh = RowParser::new(*columns, &self.metadata)?;
+                let row = fresh.row(&self.record, self.number).map_err(|_| fault)?;
+                (*parser, self.late) = (fresh, 0);
+                Ok(Line::Restarted(row))
+            }
+            Err(fault) => Err(fault),
+        }
+    }
+
+    fn begin(&mut self, columns: Columns) -> Result<Line, Fault> {
+        let mut metadata = self.metadata.clone();
+        metadata.override_with(&self.overrides);
+        self.parser = Some((RowParser::new(columns, &metadata)?, columns));
+        (self.metadata, self.headed, self.late) = (metadata, true, 0);
+        Ok(Line::Header)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn times(lines: &[&str]) -> Vec<Option<f64>> {
+        let mut parser = LineParser::new("-", Metadata::default());
+        let time = |line: Line| match line {
+            Line::Row(row) | Line::Restarted(row) => Some(row.time_s),
+            _ => None,
+        };
+        lines.iter().map(|line| parser.take(line.as_bytes()).ok().and_then(time)).collect()
+    }
+
+    #[test]
+    fn garbage_is_one_line_and_leaves_the_clock() {
+        let lines = ["time_s,resistance_ohm", "1,1600", "9e9,-3", "\"7", "2,x,3", "2,1600"];
+        assert_eq!(times(&lines), [None, Some(1.0), None, None, None, Some(2.0)]);
+    }
+
+    #[test]
+    fn a_clock_starts_again_after_three_lines_or_a_header() {
+        let lines = ["time_s,resistance_ohm", "90,1600", "1,1600", "91,1600", "0,1", "1,1", "2,1", "3,1"];
+        let known = [None, Some(90.0), None, Some(91.0), None, None, Some(2.0), Some(3.0)];
+        assert_eq!(times(&lines), known);
+        let lines = ["time_s,resistance_ohm", "90,1600", "time_us,resistance_ohm", "5000000,1600"];
+        assert_eq!(times(&lines), [None, Some(90.0), None, Some(5.0)]);
+    }
+
+    #[test]
+    fn what_came_before_a_header_belongs_to_it() {
+        let mut parser = LineParser::new("-", Metadata::default());
+        let code = "# front_end = divider reference_ohm=10000 side=low bits=12 noise_codes=0.5";
+        for line in [code, "time_us,adc"] {
+            assert!(parser.take(line.as_bytes()).is_ok());
+        }
+        assert!(parser.metadata().front_end.is_some());
+        assert!(matches!(parser.take(b"5000,512"), Ok(Line::Row(row)) if row.reading.sd_ohm.is_some()));
+    }
+}

@@ -1,0 +1,130 @@
+use csv::StringRecord;
+use ohmstrain_model::{AdcCode, FrontEnd, Joint};
+
+use crate::cell;
+use crate::clock::Clock;
+use crate::columns::{Column, Columns, Place};
+use crate::error::Fault;
+use crate::metadata::{Metadata, ResistanceUnit, StrainUnit};
+use crate::reader::{Reading, Row};
+use crate::trace::{Quantity, ReadingKind};
+
+/// Turns the cells of a line into a row; knows the time of the row before.
+pub(crate) struct RowParser {
+    columns: Columns,
+    conversion: Conversion,
+    clock: Clock,
+}
+
+/// What turns cells into readings and references.
+struct Conversion {
+    front_end: Option<FrontEnd<f64>>,
+    joint: Option<Joint<f64>>,
+    gauge_length_mm: f64,
+    /// What a strain and a resistance in the file are multiplied with.
+    strain_factor: f64,
+    ohm_factor: f64,
+}
+
+impl RowParser {
+    pub(crate) fn new(columns: Columns, metadata: &Metadata) -> Result<Self, Fault> {
+        let conversion = Conversion::new(&columns, metadata)?;
+        Ok(Self { columns, conversion, clock: Clock::new(columns.time.column) })
+    }
+
+    pub(crate) fn reading_kind(&self) -> ReadingKind {
+        if self.columns.reading.column == Column::ResistanceRatio { ReadingKind::Ratio } else { ReadingKind::Ohm }
+    }
+
+    pub(crate) fn has_codes(&self) -> bool {
+        self.columns.reading.column == Column::Adc
+    }
+
+    pub(crate) fn reference_quantity(&self) -> Option<Quantity> {
+        let is_angle = self.columns.reference?.column == Column::AngleDeg && self.conversion.joint.is_none();
+        Some(if is_angle { Quantity::AngleDeg } else { Quantity::Strain })
+    }
+
+    pub(crate) const fn has_temperature(&self) -> bool {
+        self.columns.temperature.is_some()
+    }
+
+    /// Whether a line's time is one, though not after the last row's.
+    pub(crate) fn is_late(&self, record: &StringRecord) -> bool {
+        let mut fresh = Clock::new(self.columns.time.column);
+        record.len() == self.columns.width && fresh.read(self.columns.time.cell(record)).is_ok()
+    }
+
+    /// The row of a line.
+    pub(crate) fn row(&mut self, record: &StringRecord, line: u64) -> Result<Row, Fault> {
+        if record.len() != self.columns.width {
+            let expected = format!("{} cells, as in the header", self.columns.width);
+            return Err(Fault::new(expected, format!("{}", record.len())));
+        }
+        let temperature = self.columns.temperature.as_ref();
+        Ok(Row {
+            line,
+            reading: self.conversion.reading(&self.columns.reading, record)?,
+            reference: match &self.columns.reference {
+                Some(place) => self.conversion.reference(place, record)?,
+                None => f64::NAN,
+            },
+            temperature_c: match temperature {
+                Some(place) => cell::number(place.column.name(), place.cell(record))?,
+                None => f64::NAN,
+            },
+            // Last: a line that is refused leaves the clock as it was.
+            time_s: self.clock.read(self.columns.time.cell(record))?,
+        })
+    }
+}
+
+impl Conversion {
+    fn new(columns: &Columns, metadata: &Metadata) -> Result<Self, Fault> {
+        let impossible = |error: ohmstrain_model::ParameterError| Fault::new("possible metadata", error.to_string());
+        let needs = |column: Column, key: &str| {
+            Fault::in_column(column.name(), format!("a line `# {key} = …` above the header"), "none")
+        };
+        if columns.reading.column == Column::Adc && metadata.front_end.is_none() {
+            return Err(needs(Column::Adc, "front_end"));
+        }
+        let is_displacement = columns.reference.is_some_and(|place| place.column == Column::DisplacementMm);
+        if is_displacement && metadata.gauge_length_mm.is_none() {
+            return Err(needs(Column::DisplacementMm, "gauge_length_mm"));
+        }
+        Ok(Self {
+            front_end: metadata.front_end.map(|spec| spec.build()).transpose().map_err(impossible)?,
+            joint: metadata.joint.map(|spec| spec.build()).transpose().map_err(impossible)?,
+            gauge_length_mm: metadata.gauge_length_mm.unwrap_or(f64::NAN),
+            strain_factor: metadata.strain_unit.map_or(1.0, StrainUnit::factor),
+            ohm_factor: metadata.resistance_unit.map_or(1.0, ResistanceUnit::factor),
+        })
+    }
+
+    fn reading(&self, place: &Place, record: &StringRecord) -> Result<Reading, Fault> {
+        let cell = place.cell(record);
+        let missing = Reading { value: f64::NAN, sd_ohm: None, code: None, saturated: false };
+        let (Column::Adc, Some(front_end)) = (place.column, &self.front_end) else {
+            let factor = if place.column == Column::ResistanceOhm { self.ohm_factor } else { 1.0 };
+            return Ok(Reading { value: factor * cell::positive(place.column.name(), cell)?, ..missing });
+        };
+        let code = cell::code(place.column.name(), cell)?;
+        Ok(match code.map(|code| front_end.read(code)) {
+            None => missing,
+            Some(AdcCode::Saturated) => Reading { code, saturated: true, ..missing },
+            Some(AdcCode::Reading(ohms)) => {
+                Reading { value: ohms.resistance_ohm, sd_ohm: Some(ohms.sd_ohm), code, saturated: false }
+            }
+        })
+    }
+
+    fn reference(&self, place: &Place, record: &StringRecord) -> Result<f64, Fault> {
+        let value = cell::number(place.column.name(), place.cell(record))?;
+        Ok(match (place.column, &self.joint) {
+            (Column::DisplacementMm, _) => value / self.gauge_length_mm,
+            (Column::Strain, _) => self.strain_factor * value,
+            (Column::AngleDeg, Some(joint)) => joint.strain(value.to_radians()),
+            _ => value,
+        })
+    }
+}

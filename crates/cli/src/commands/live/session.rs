@@ -1,0 +1,336 @@
+//! What is known while the view runs: the filter, and what has become of the lines.
+
+use std::collections::VecDeque;
+use std::time::Instant;
+
+use ohmstrain::{Error, Estimate, Filter, Sensor, ValidityWatch};
+use ohmstrain_bench_data::{Line, LineParser, Row};
+
+use super::recorder::Recorder;
+use crate::args::{LiveArgs, RestResistance};
+use crate::error::CliError;
+use crate::input::{self, check_unit};
+use crate::run::{builder, median};
+use crate::suits::{self, FIRST_LIVE_READINGS};
+
+/// Rows that are kept for the plot at most.
+const MOST_POINTS: usize = 1 << 16;
+/// A step this many times as long as steps usually are is a gap.
+const GAP: f64 = 5.0;
+/// Between lines that arrive at once, s: two digits above what is written.
+const LEAST_STEP_S: f64 = 1e-4;
+/// Share of a new step in what steps usually are.
+const NEW_STEP: f64 = 0.1;
+/// Readings of the last seconds, and how many, that tell what the rested sensor reads.
+const REST_S: f64 = 1.0;
+const LEAST_AT_REST: usize = 5;
+
+/// A row of the plot.
+#[derive(Clone, Copy)]
+pub struct Point {
+    pub time_s: f64,
+    /// The reading; NaN where it is missing.
+    pub reading: f64,
+    /// Strain, and half its 95 % interval.
+    pub strain: f64,
+    pub half_width: f64,
+}
+
+/// Counts of what has come.
+#[derive(Clone, Copy, Default)]
+pub struct Counts {
+    pub rows: u64,
+    pub missing: u64,
+    pub gaps: u64,
+    pub bad_lines: u64,
+    pub restarts: u64,
+    pub marks: u32,
+}
+
+/// Times of lines that have none: when they arrive. Of several that arrive at once each is a little later than the one
+/// before.
+#[derive(Default)]
+struct Arrivals {
+    first: Option<Instant>,
+    last_s: Option<f64>,
+}
+
+impl Arrivals {
+    fn time_s(&mut self, arrived: Instant) -> f64 {
+        let elapsed_s = arrived.duration_since(*self.first.get_or_insert(arrived)).as_secs_f64();
+        let time_s = self.last_s.map_or(elapsed_s, |last_s| elapsed_s.max(last_s + LEAST_STEP_S));
+        self.last_s = Some(time_s);
+        time_s
+    }
+}
+
+/// A filter on a stream of lines.
+pub struct Session<'a> {
+    args: &'a LiveArgs,
+    calibrated: Sensor,
+    sensor: Sensor,
+    lines: LineParser,
+    filter: Filter,
+    watch: ValidityWatch,
+    /// What the rested sensor reads, if that is not what it read in calibration.
+    rest: Option<f64>,
+    /// The first known readings.
+    early: Vec<f64>,
+    /// Where lines have no time: when they come.
+    arrivals: Option<Arrivals>,
+    usual_step_s: Option<f64>,
+    new_mark: Option<u32>,
+    pub points: VecDeque<Point>,
+    /// Times of the marks, s.
+    pub marks: VecDeque<f64>,
+    pub last: Option<Estimate>,
+    pub counts: Counts,
+    pub recorder: Option<Recorder>,
+    /// The last thing that there was to say.
+    pub message: String,
+}
+
+impl<'a> Session<'a> {
+    /// Waits for a header, unless the flags have it.
+    ///
+    /// # Errors
+    /// If the flags contradict each other or the sensor.
+    pub fn new(args: &'a LiveArgs, sensor: Sensor) -> Result<Self, CliError> {
+        let rest = match args.estimate.rest_resistance {
+            Some(RestResistance::Value(value)) => Some(value),
+            _ => None,
+        };
+        let name = args.port.display().to_string();
+        let lines = LineParser::new(&name, args.estimate.trace.metadata());
+        let (filter, watch) = (builder(&sensor, &args.estimate).build()?, ValidityWatch::new(&sensor, rest));
+        let mut session = Self {
+            args,
+            calibrated: sensor.clone(),
+            sensor,
+            lines,
+            filter,
+            watch,
+            rest,
+            early: vec![],
+            arrivals: None,
+            usual_step_s: None,
+            new_mark: None,
+            points: VecDeque::new(),
+            marks: VecDeque::new(),
+            last: None,
+            counts: Counts::default(),
+            recorder: None,
+            message: String::new(),
+        };
+        session.begin()?;
+        if let Some(header) = &args.header {
+            let has_time = header.split(',').any(|name| matches!(name.trim(), "time_s" | "time_us"));
+            session.arrivals = (!has_time).then(Arrivals::default);
+            let line = if has_time { header.clone() } else { format!("time_s,{header}") };
+            match session.lines.take(line.as_bytes()) {
+                Ok(Line::Header) => session.headed()?,
+                Ok(_) => return Err(CliError::Arguments("--header: expected names of columns".into())),
+                Err(fault) => return Err(CliError::Arguments(format!("--header: expected {}", fault.expected))),
+            }
+        }
+        Ok(session)
+    }
+
+    /// The sensor.
+    pub const fn sensor(&self) -> &Sensor {
+        &self.sensor
+    }
+
+    /// The row of a line, and whether its clock has started again; `None` if it was no row.
+    ///
+    /// # Errors
+    /// If the stream turns out not to be of this sensor.
+    pub fn parse(&mut self, line: &[u8], arrived: Instant) -> Result<Option<(Row, bool)>, CliError> {
+        let timed = |arrivals: &mut Arrivals| [format!("{:.6},", arrivals.time_s(arrived)).as_bytes(), line].concat();
+        let with_time = self.arrivals.as_mut().filter(|_| !line.trim_ascii().is_empty()).map(timed);
+        match self.lines.take(with_time.as_deref().unwrap_or(line)) {
+            Ok(Line::Row(row)) => Ok(Some((row, false))),
+            Ok(Line::Restarted(row)) => Ok(Some((row, true))),
+            Ok(Line::Header) => self.headed().map(|()| None),
+            Ok(_) => Ok(None),
+            Err(fault) => {
+                self.counts.bad_lines += 1;
+                self.message = format!("skipped {fault}");
+                if self.lines.reading_kind().is_none() {
+                    self.message += "; a stream without a header needs --header time_s,resistance_ohm";
+                }
+                Ok(None)
+            }
+        }
+    }
+
+    /// A header has come: another stream begins.
+    fn headed(&mut self) -> Result<(), CliError> {
+        let kind = self.lines.reading_kind();
+        let header = self.args.port.display().to_string();
+        kind.map_or(Ok(()), |kind| check_unit(&header, kind, self.sensor.params().reading))?;
+        if let Some(joint) = input::joint(&self.lines.metadata()) {
+            self.sensor = self.calibrated.clone().on_joint(joint)?;
+        }
+        if self.counts.rows > 0 { self.restart() } else { Ok(self.begin()?) }
+    }
+
+    /// A fresh filter.
+    fn begin(&mut self) -> Result<(), Error> {
+        let wanted = builder(&self.sensor, &self.args.estimate);
+        self.filter = self.rest.map_or(wanted, |measured| wanted.rest_resistance(measured)).build()?;
+        self.watch = ValidityWatch::new(&self.sensor, self.rest);
+        self.usual_step_s = None;
+        Ok(())
+    }
+
+    /// The clock has started again: so does everything that has times.
+    fn restart(&mut self) -> Result<(), CliError> {
+        self.begin()?;
+        self.points.clear();
+        self.marks.clear();
+        self.counts.restarts += 1;
+        self.message = "the clock has started again, and so has the filter".into();
+        if self.recorder.is_some() {
+            self.toggle_record();
+            self.toggle_record();
+        }
+        Ok(())
+    }
+
+    /// Takes a row.
+    ///
+    /// # Errors
+    /// If no filter can be made any more.
+    pub fn take(&mut self, row: &Row, restarted: bool) -> Result<(), CliError> {
+        if restarted {
+            self.restart()?;
+        }
+        let estimate = match self.filter.step(row.time_s, input::reading(&row.reading)) {
+            Ok(estimate) => estimate,
+            Err(error) => {
+                self.counts.bad_lines += 1;
+                self.message = error.to_string();
+                return Ok(());
+            }
+        };
+        self.count(row);
+        let (reading, half_width) = (row.reading.value, 1.96 * estimate.strain_sd);
+        self.points.push_back(Point { time_s: row.time_s, reading, strain: estimate.strain, half_width });
+        let oldest_s = row.time_s - self.args.window_s.max(REST_S);
+        while self.points.len() > MOST_POINTS || self.points.front().is_some_and(|point| point.time_s < oldest_s) {
+            self.points.pop_front();
+        }
+        while self.marks.front().is_some_and(|mark_s| *mark_s < oldest_s) {
+            self.marks.pop_front();
+        }
+        if let Some(warning) = self.watch.see(row.time_s, reading, estimate.strain_rate, f64::NAN).last() {
+            self.message = warning.to_string();
+        }
+        self.last = Some(estimate);
+        self.doubt_early(reading)?;
+        self.record(row);
+        Ok(())
+    }
+
+    fn count(&mut self, row: &Row) {
+        self.counts.rows += 1;
+        self.counts.missing += u64::from(!row.reading.value.is_finite());
+        let Some(step_s) = self.points.back().map(|last| row.time_s - last.time_s) else { return };
+        let usual_s = self.usual_step_s.get_or_insert(step_s);
+        if step_s > GAP * *usual_s {
+            self.counts.gaps += 1;
+        } else {
+            *usual_s += NEW_STEP * (step_s - *usual_s);
+        }
+    }
+
+    /// Rows per second, as they usually come.
+    pub fn rate_hz(&self) -> Option<f64> {
+        self.usual_step_s.filter(|step_s| *step_s > 0.0).map(f64::recip)
+    }
+
+    /// Doubts the unit of the readings, and takes R₀ of the first ones if that is wanted.
+    fn doubt_early(&mut self, reading: f64) -> Result<(), CliError> {
+        let wanted = match self.args.estimate.rest_resistance {
+            Some(RestResistance::First(count)) => count,
+            _ => 0,
+        };
+        if !reading.is_finite() || self.early.len() >= wanted.max(FIRST_LIVE_READINGS) {
+            return Ok(());
+        }
+        self.early.push(reading);
+        if self.early.len() == wanted {
+            self.rest = median(self.early.clone());
+            self.rest.map_or(Ok(()), |measured| self.filter.rest_resistance(measured))?;
+            self.watch = ValidityWatch::new(&self.sensor, self.rest);
+        }
+        if self.early.len() == wanted.max(FIRST_LIVE_READINGS)
+            && let Err(doubt) = self.sensor.check_unit(self.early.iter().copied(), self.rest)
+        {
+            self.message = suits::answerable(&doubt);
+        }
+        Ok(())
+    }
+
+    /// The sensor is at rest now: what it reads is R₀, and the strain is zero.
+    ///
+    /// # Errors
+    /// If no filter can be made any more.
+    pub fn zero(&mut self) -> Result<(), CliError> {
+        let Some(last_s) = self.points.back().map(|point| point.time_s) else { return Ok(()) };
+        let recent = self.points.iter().rev().take_while(|point| point.time_s >= last_s - REST_S);
+        let mut readings: Vec<f64> = recent.map(|point| point.reading).filter(|reading| reading.is_finite()).collect();
+        if readings.len() < LEAST_AT_REST {
+            let known = self.points.iter().rev().map(|point| point.reading).filter(|reading| reading.is_finite());
+            readings = known.take(LEAST_AT_REST).collect();
+        }
+        let count = readings.len();
+        let Some(rest) = median(readings) else { return Ok(()) };
+        self.rest = Some(rest);
+        self.begin()?;
+        // A sensor that is always stretched somewhat cannot start at zero.
+        let wanted = builder(&self.sensor, &self.args.estimate).rest_resistance(rest);
+        let at_zero = wanted.initial_strain(0.0).build();
+        let starts = if at_zero.is_ok() { "; it starts again at zero" } else { "" };
+        self.filter = at_zero.unwrap_or(wanted.build()?);
+        self.message = format!("R0 is {rest:.5} now, the median of {count} readings{starts}");
+        Ok(())
+    }
+
+    /// Puts a mark on the next row.
+    pub fn mark(&mut self) {
+        let Some(last) = self.points.back() else { return };
+        self.counts.marks += 1;
+        self.new_mark = Some(self.counts.marks);
+        self.marks.push_back(last.time_s);
+        self.message = format!("mark {} at {:.2} s", self.counts.marks, last.time_s);
+    }
+
+    /// Begins a record, or ends it.
+    pub fn toggle_record(&mut self) {
+        self.message = match self.recorder.take() {
+            Some(recorder) => {
+                let said = format!("recorded {} ({} rows)", recorder.path.display(), recorder.count);
+                recorder.finish().map_or_else(|error| format!("cannot record: {error}"), |()| said)
+            }
+            None => match Recorder::begin(&self.args.record, &self.lines) {
+                Ok(recorder) => {
+                    let said = format!("recording to {}", recorder.path.display());
+                    self.recorder = Some(recorder);
+                    said
+                }
+                Err(error) => format!("cannot record: {error}"),
+            },
+        };
+    }
+
+    fn record(&mut self, row: &Row) {
+        let mark = self.new_mark.take();
+        let Some(recorder) = &mut self.recorder else { return };
+        if let Err(error) = recorder.write(row, mark) {
+            self.message = format!("cannot record: {error}");
+            self.recorder = None;
+        }
+    }
+}

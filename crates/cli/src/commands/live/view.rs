@@ -1,0 +1,133 @@
+//! The picture: a plot of the last seconds, and the numbers of now. Any size of terminal will do, as far as it goes.
+
+use ohmstrain::{Estimate, Quantity, ReadingUnit};
+use ratatui::Frame;
+use ratatui::layout::{Constraint, Layout, Rect};
+use ratatui::style::{Color, Style, Stylize};
+use ratatui::symbols::Marker;
+use ratatui::text::{Line, Span};
+use ratatui::widgets::{Axis, Block, Chart, Dataset, GraphType, Paragraph, Wrap};
+
+use super::session::Session;
+use crate::args::LiveArgs;
+
+/// Columns of the numbers, and the least that a plot needs beside them.
+const NUMBERS_WIDTH: u16 = 38;
+const PLOT_WIDTH: u16 = 30;
+const PLOT_HEIGHT: u16 = 6;
+/// Points that are drawn: a few per dot of a wide terminal.
+const MOST_DRAWN: usize = 2000;
+/// Width of a bar that stands for a probability.
+const BAR: usize = 10;
+
+/// Draws everything.
+pub fn draw(frame: &mut Frame, session: &Session, status: &str, args: &LiveArgs) {
+    let rows = [Constraint::Length(1), Constraint::Min(0), Constraint::Length(2), Constraint::Length(1)];
+    let [title, middle, message, keys] = Layout::vertical(rows).areas(frame.area());
+    let sensor = args.estimate.sensor.file_name().unwrap_or_default().to_string_lossy();
+    let heading = format!("ohmstrain live · {} · {sensor} · {status}", args.port.display());
+    frame.render_widget(Paragraph::new(heading).bold(), title);
+    frame.render_widget(Paragraph::new(session.message.as_str()).wrap(Wrap { trim: true }), message);
+    frame.render_widget(Paragraph::new("z zero at rest   r record   m mark   q quit").dim(), keys);
+    let numbers = numbers(session);
+    if middle.width >= NUMBERS_WIDTH + PLOT_WIDTH && middle.height >= PLOT_HEIGHT {
+        let [left, right] = Layout::horizontal([Constraint::Min(0), Constraint::Length(NUMBERS_WIDTH)]).areas(middle);
+        draw_plot(frame, session, args.window_s, left);
+        frame.render_widget(Paragraph::new(numbers).block(Block::bordered()), right);
+    } else {
+        frame.render_widget(Paragraph::new(numbers), middle);
+    }
+}
+
+/// How the sensor's quantity is shown: a factor and a unit.
+fn scale(session: &Session) -> (f64, &'static str) {
+    match session.sensor().params().quantity {
+        Quantity::Strain => (100.0, " %"),
+        Quantity::AngleDeg => (1.0, "°"),
+    }
+}
+
+fn draw_plot(frame: &mut Frame, session: &Session, window_s: f64, area: Rect) {
+    let (factor, unit) = scale(session);
+    let limits = session.sensor().params().limits;
+    let every = session.points.len().div_ceil(MOST_DRAWN).max(1);
+    let line = |offset: f64| -> Vec<(f64, f64)> {
+        let points = session.points.iter().step_by(every);
+        let inside = |x: f64| x.max(limits.lower).min(limits.upper);
+        points.map(|p| (p.time_s, factor * inside(p.strain + offset * p.half_width))).collect()
+    };
+    let (mean, upper, lower) = (line(0.0), line(1.0), line(-1.0));
+    let end_s = session.points.back().map_or(window_s, |point| point.time_s);
+    let x = [end_s - window_s, end_s];
+    let margin = 0.05 * limits.span();
+    let y = [factor * (limits.lower - margin), factor * (limits.upper + margin)];
+    let marks: Vec<(f64, f64)> = session.marks.iter().map(|mark_s| (*mark_s, y[0])).collect();
+    let dataset = |data, colour, kind| {
+        let style = Style::default().fg(colour);
+        Dataset::default().marker(Marker::Braille).graph_type(kind).style(style).data(data)
+    };
+    let datasets = vec![
+        dataset(&upper, Color::DarkGray, GraphType::Line),
+        dataset(&lower, Color::DarkGray, GraphType::Line),
+        dataset(&mean, Color::Cyan, GraphType::Line),
+        dataset(&marks, Color::Yellow, GraphType::Scatter).marker(Marker::Block),
+    ];
+    let labels = |[low, high]: [f64; 2]| [low, 0.5 * (low + high), high].map(|x| Line::from(format!("{x:.1}")));
+    let name = match session.sensor().params().quantity {
+        Quantity::Strain => "strain",
+        Quantity::AngleDeg => "angle",
+    };
+    let title = format!(" {name},{unit}, with its 95 % interval; time, s ");
+    let chart = Chart::new(datasets)
+        .block(Block::bordered().title(title))
+        .x_axis(Axis::default().bounds(x).labels(labels(x)))
+        .y_axis(Axis::default().bounds(y).labels(labels(y)));
+    frame.render_widget(chart, area);
+}
+
+fn numbers(session: &Session) -> Vec<Line<'static>> {
+    let mut lines = vec![];
+    let mut line =
+        |name: &str, text: String| lines.push(Line::from(vec![Span::from(format!("{name:<11}")).dim(), text.into()]));
+    if let Some(row) = &session.last {
+        of_estimate(session, row, &mut line);
+    } else {
+        line("", "no reading yet".into());
+    }
+    let counts = &session.counts;
+    let rate = session.rate_hz().map_or_else(String::new, |hz| format!(" at {hz:.1}/s"));
+    line("rows", format!("{}{rate}", counts.rows));
+    line("drop-outs", format!("{} missing, {} gaps", counts.missing, counts.gaps));
+    line("skipped", format!("{} lines", counts.bad_lines));
+    line("record", session.recorder.as_ref().map_or("off".into(), |recorder| format!("{} rows", recorder.count)));
+    line("marks", counts.marks.to_string());
+    lines
+}
+
+fn of_estimate(session: &Session, row: &Estimate, line: &mut impl FnMut(&str, String)) {
+    let (factor, unit) = scale(session);
+    let name = if unit == "°" { "angle" } else { "strain" };
+    line(name, format!("{:.2} ± {:.2}{unit}", factor * row.strain, factor * 1.96 * row.strain_sd));
+    if let (Some(angle), Some(sd)) = (row.angle_deg, row.angle_sd) {
+        line("joint", format!("{angle:.1} ± {:.1}°", 1.96 * sd));
+    }
+    line("rate", format!("{:+.2}{unit}/s", factor * row.strain_rate));
+    for (name, share) in [("stretching", row.p_extend), ("held", row.p_hold), ("released", row.p_retract)] {
+        if let Some(share) = share {
+            let full = (share.clamp(0.0, 1.0) * BAR as f64).round() as usize;
+            line(name, format!("{}{} {:3.0} %", "█".repeat(full), "·".repeat(BAR - full), 100.0 * share));
+        }
+    }
+    let reading_unit = match session.sensor().params().reading {
+        ReadingUnit::Ohm => " Ω",
+        ReadingUnit::Ratio => "",
+    };
+    line("reading", row.resistance.map_or("missing".into(), |reading| format!("{reading:.5}{reading_unit}")));
+    line("relaxation", format!("{:+.4} R0", row.relaxation));
+    line(
+        "settles at",
+        format!("{:.1} ± {:.1}{reading_unit}", row.settled_resistance, 1.96 * row.settled_resistance_sd),
+    );
+    line("NIS", row.nis.map_or("-".into(), |nis| format!("{nis:.2}")));
+    line("flags", if row.flags == ohmstrain::Flags::NONE { "none".into() } else { row.flags.to_string() });
+}

@@ -1,0 +1,244 @@
+//! `live` in a terminal of its own, on a serial port that is the other end of a pseudo-terminal.
+#![cfg(unix)]
+
+#[allow(dead_code, reason = "each test program uses its own share")]
+mod common;
+
+use std::io::{Read, Write};
+use std::num::NonZero;
+use std::os::unix::fs::symlink;
+use std::path::Path;
+use std::sync::{Arc, Mutex};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use assert_cmd::cargo::cargo_bin;
+use common::{Bench, Csv};
+use portable_pty::{Child, CommandBuilder, MasterPty, PtyPair, PtySize, native_pty_system};
+
+/// Longer than anything takes on a busy machine.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+fn pair(rows: u16, cols: u16) -> PtyPair {
+    native_pty_system().openpty(PtySize { rows, cols, pixel_width: 0, pixel_height: 0 }).unwrap()
+}
+
+fn cells(count: u16) -> NonZero<u16> {
+    NonZero::new(count).unwrap()
+}
+
+/// The program on a terminal.
+struct Terminal {
+    master: Box<dyn MasterPty + Send>,
+    keys: Box<dyn Write + Send>,
+    screen: Arc<Mutex<vt100::Parser>>,
+    child: Box<dyn Child + Send + Sync>,
+}
+
+impl Terminal {
+    fn new(bench: &Bench, program: &Path, arguments: &[&str]) -> Self {
+        let pair = pair(30, 110);
+        let mut command = CommandBuilder::new(program);
+        command.cwd(bench.path(""));
+        command.args(arguments);
+        command.env("TERM", "xterm");
+        let child = pair.slave.spawn_command(command).unwrap();
+        drop(pair.slave);
+        let screen = Arc::new(Mutex::new(vt100::Parser::new(cells(30), cells(110), 0)));
+        let (mut output, drawn) = (pair.master.try_clone_reader().unwrap(), Arc::clone(&screen));
+        thread::spawn(move || {
+            let mut bytes = [0; 4096];
+            while let Ok(count @ 1..) = output.read(&mut bytes) {
+                drawn.lock().unwrap().process(&bytes[..count]);
+            }
+        });
+        let keys = pair.master.take_writer().unwrap();
+        Self { master: pair.master, keys, screen, child }
+    }
+
+    /// `live` with the bench's sensor.
+    fn live(bench: &Bench, port: &str, more: &[&str]) -> Self {
+        let arguments = [&["live", "--port", port, "--sensor", "sensor.toml"], more].concat();
+        Self::new(bench, cargo_bin!("ohmstrain"), &arguments)
+    }
+
+    fn text(&self) -> String {
+        self.screen.lock().unwrap().screen().contents()
+    }
+
+    #[track_caller]
+    fn wait_for(&self, words: &str) {
+        let start = Instant::now();
+        while !self.text().contains(words) {
+            assert!(start.elapsed() < PATIENCE, "no `{words}` on\n{}", self.text());
+            thread::sleep(Duration::from_millis(20));
+        }
+    }
+
+    fn press(&mut self, key: &str) {
+        self.keys.write_all(key.as_bytes()).unwrap();
+    }
+
+    fn resize(&self, rows: u16, cols: u16) {
+        self.screen.lock().unwrap().screen_mut().set_size(cells(rows), cells(cols));
+        self.master.resize(PtySize { rows, cols, pixel_width: 0, pixel_height: 0 }).unwrap();
+    }
+
+    /// Leaves; what stands on the terminal then.
+    #[track_caller]
+    fn quit(mut self) -> String {
+        self.press("q");
+        let start = Instant::now();
+        let status = loop {
+            if let Some(status) = self.child.try_wait().unwrap() {
+                break status;
+            }
+            assert!(start.elapsed() < PATIENCE, "still there:\n{}", self.text());
+            thread::sleep(Duration::from_millis(20));
+        };
+        assert_eq!(status.exit_code(), 0, "{}", self.text());
+        self.wait_for(" rows, ");
+        assert!(!self.screen.lock().unwrap().screen().alternate_screen());
+        self.text()
+    }
+}
+
+/// A serial port's other end.
+struct Port {
+    device: Box<dyn Write + Send>,
+    _pair: PtyPair,
+}
+
+impl Port {
+    /// Plugs it in where `path` points.
+    fn plug_in(path: &Path) -> Self {
+        let pair = pair(24, 80);
+        let _ = std::fs::remove_file(path);
+        symlink(pair.master.tty_name().unwrap(), path).unwrap();
+        Self { device: pair.master.take_writer().unwrap(), _pair: pair }
+    }
+
+    fn send(&mut self, text: &str) {
+        self.device.write_all(text.as_bytes()).unwrap();
+    }
+}
+
+/// What stands on the terminal for a row of `filter`.
+fn shown(estimates: &Csv, row: usize) -> String {
+    let number = |column: &str| estimates.numbers(column)[row];
+    // 1.96 standard deviations, in percent, as the terminal's two digits have them.
+    format!("{:.2} ± {:.2} %", 100.0 * number("strain"), 100.0 * 1.96 * number("strain_sd"))
+}
+
+#[test]
+fn lines_from_a_port_are_filtered_at_real_speed_and_faster() {
+    let bench = Bench::calibrated();
+    let trace = bench.read("trace.csv");
+    let estimates = Csv::new(&bench.run(&["filter", "trace.csv", "--sensor", "sensor.toml"]).ok());
+    let lines: Vec<&str> = trace.lines().collect();
+    let head = lines.iter().position(|line| line.starts_with("time_s")).unwrap() + 1;
+    let port_path = bench.path("port");
+    let mut port = Port::plug_in(&port_path);
+    let terminal = Terminal::live(&bench, "port", &[]);
+    terminal.wait_for("connected");
+    port.send(&(lines[..head].join("\r\n") + "\r\n"));
+    // Five readings per second, as the recording has them.
+    for line in &lines[head..head + 10] {
+        port.send(&format!("{line}\r\n"));
+        thread::sleep(Duration::from_millis(200));
+    }
+    terminal.wait_for("10 at 5.0/s");
+    terminal.wait_for(&shown(&estimates, 9));
+    for line in &lines[head + 10..] {
+        port.send(&format!("{line}\r\n"));
+    }
+    let last = estimates.len() - 1;
+    terminal.wait_for(&format!("{} at 5.0/s", last + 1));
+    terminal.wait_for(&shown(&estimates, last));
+    terminal.wait_for("0 lines");
+    assert!(terminal.quit().contains(&format!("{} rows, 0 readings missing, 0 gaps, 0 lines skipped", last + 1)));
+}
+
+#[test]
+fn garbage_resizing_and_unplugging_stop_nothing() {
+    let bench = Bench::calibrated();
+    let port_path = bench.path("port");
+    let terminal = Terminal::live(&bench, "port", &["--header", "time_s,resistance_ohm"]);
+    terminal.wait_for("waiting for the port");
+    let mut port = Port::plug_in(&port_path);
+    terminal.wait_for("connected");
+    // The middle of a line, as a port that is joined late gives it; then a good one, and what interference makes of others.
+    port.send("00,16");
+    port.send("\n1.0,1600\n\u{fffd}\u{1}\"\n1.2,16x0\n1.2,1601,7\n");
+    port.device.write_all(&[0xff, 0xfe, b'\n', b'1', b'.', b'2', b',', b'\n', b'1', b'.', b'4', b',']).unwrap();
+    port.send("1602\n");
+    terminal.wait_for("1 missing, 0 gaps");
+    // `00,16` is a row by chance: 16 ohms at 0 s, which the sensor cannot read.
+    terminal.wait_for("4 lines");
+    for (rows, cols) in [(3, 10), (1, 1), (200, 20), (12, 300), (30, 110)] {
+        terminal.resize(rows, cols);
+        thread::sleep(Duration::from_millis(120));
+    }
+    terminal.wait_for("z zero at rest");
+    terminal.wait_for("4 lines");
+    drop(port);
+    terminal.wait_for("waiting for the port");
+    let mut port = Port::plug_in(&port_path);
+    terminal.wait_for("connected");
+    // The device has been reset: its clock starts again, which three lines are needed to be sure of.
+    port.send("0.2,1600\n0.4,1600\n0.6,1600\n0.8,1601\n1.0,1601\n");
+    terminal.wait_for("the clock has started again");
+    let left = terminal.quit();
+    assert!(left.contains("6 lines skipped, 1 restarts"), "{left}");
+}
+
+#[test]
+fn a_recording_is_played_back_recorded_marked_and_zeroed() {
+    let bench = Bench::calibrated();
+    let mut terminal = Terminal::live(&bench, "trace.csv", &["--speed", "20"]);
+    // 5 rows per second, twenty times as fast.
+    terminal.wait_for("at 5.0/s");
+    terminal.press("r");
+    terminal.wait_for("recording to live-1.csv");
+    terminal.press("m");
+    terminal.wait_for("mark 1 at");
+    terminal.press("z");
+    terminal.wait_for("it starts again at zero");
+    terminal.press("r");
+    terminal.wait_for("recorded live-1.csv (");
+    let left = terminal.quit();
+    assert!(left.contains("0 lines skipped"), "{left}");
+
+    let (recorded, trace) = (Csv::new(&bench.read("live-1.csv")), Csv::new(&bench.read("trace.csv")));
+    assert_eq!(recorded.header, "time_s,resistance_ohm,strain,mark");
+    let first = trace.cells("time_s").iter().position(|time| *time == recorded.cells("time_s")[0]).unwrap();
+    for column in ["time_s", "resistance_ohm", "strain"] {
+        assert_eq!(recorded.numbers(column), trace.numbers(column)[first..first + recorded.len()], "{column}");
+    }
+    assert_eq!(recorded.cells("mark").iter().filter(|mark| **mark == "1").count(), 1);
+    bench.run(&["filter", "live-1.csv", "--sensor", "sensor.toml"]).ok();
+}
+
+#[test]
+fn readings_on_stdin_leave_the_keys_to_the_terminal() {
+    let bench = Bench::calibrated();
+    let program = cargo_bin!("ohmstrain");
+    let rows: String = (0..30).map(|row| format!("{}\n", 1600 + row)).collect();
+    bench.write("readings.txt", rows);
+    let line =
+        format!("'{}' live --port - --header resistance_ohm --sensor sensor.toml < readings.txt", program.display());
+    let terminal = Terminal::new(&bench, Path::new("/bin/sh"), &["-c", &line]);
+    terminal.wait_for("the readings have ended");
+    // All arrive at once, and none is lost.
+    terminal.wait_for("drop-outs");
+    let left = terminal.quit();
+    assert!(left.contains("30 rows, 0 readings missing, 0 gaps, 0 lines skipped"), "{left}");
+}
+
+#[test]
+fn without_a_terminal_there_is_nothing_to_draw_on() {
+    let bench = Bench::calibrated();
+    let refused = bench.run(&["live", "--port", "trace.csv", "--sensor", "sensor.toml"]);
+    assert_eq!(refused.code, Some(2));
+    assert!(refused.stderr.contains("ohmstrain filter") && refused.stdout.is_empty(), "{}", refused.stderr);
+}
