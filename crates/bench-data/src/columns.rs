@@ -17,6 +17,19 @@ pub(crate) enum Column {
 }
 
 impl Column {
+    /// All of them.
+    #[cfg(feature = "import")]
+    pub(crate) const ALL: [Self; 9] = [
+        Self::TimeS,
+        Self::TimeUs,
+        Self::ResistanceOhm,
+        Self::ResistanceRatio,
+        Self::Adc,
+        Self::Strain,
+        Self::DisplacementMm,
+        Self::AngleDeg,
+        Self::TemperatureC,
+    ];
     const TIMES: [Self; 2] = [Self::TimeS, Self::TimeUs];
     const READINGS: [Self; 3] = [Self::ResistanceOhm, Self::ResistanceRatio, Self::Adc];
     const REFERENCES: [Self; 3] = [Self::Strain, Self::DisplacementMm, Self::AngleDeg];

@@ -39,6 +39,8 @@ pub mod import;
 mod line_parser;
 mod lines;
 mod metadata;
+#[cfg(feature = "import")]
+mod parquet_text;
 mod reader;
 mod row_parser;
 mod rows;
@@ -51,6 +53,8 @@ mod writer;
 pub use error::{BadContent, SpecError, TraceError};
 pub use line_parser::{Line, LineParser};
 pub use metadata::{Metadata, ResistanceUnit, StrainUnit};
+#[cfg(feature = "import")]
+pub use parquet_text::ParquetText;
 pub use reader::{Reading, Row, TraceReader};
 pub use rows::RowWriter;
 pub use segment::{Segment, segment};

@@ -86,6 +86,11 @@ impl FromStr for ResistanceUnit {
 }
 
 impl Metadata {
+    /// The keys that mean something.
+    #[cfg(feature = "import")]
+    pub(crate) const KEYS: [&str; 6] =
+        ["material", "gauge_length_mm", "front_end", "joint", "strain_unit", "resistance_unit"];
+
     /// The units that numbers are in once they have been read: where a file names one, this says so.
     pub(crate) fn in_own_units(&self) -> Self {
         Self {

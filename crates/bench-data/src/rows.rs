@@ -97,7 +97,7 @@ impl<W: Write> RowWriter<W> {
 
 /// A number that is not NaN as `f64`'s `Display` has it, several times faster.
 #[inline]
-fn append_number(out: &mut Vec<u8>, value: f64) {
+pub(crate) fn append_number(out: &mut Vec<u8>, value: f64) {
     if value.is_infinite() {
         out.extend_from_slice(if value > 0.0 { b"inf" } else { b"-inf" });
         return;

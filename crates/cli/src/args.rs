@@ -1,3 +1,4 @@
+mod batch;
 mod calibrate;
 mod choice;
 mod estimate;
@@ -14,9 +15,10 @@ mod trace;
 
 use clap::{CommandFactory, Parser, Subcommand};
 
+pub use batch::{BatchArgs, BatchCommand, SummaryForm};
 pub use calibrate::{CalibrateArgs, ReportArgs};
 pub use choice::{Auto, Branches, Estimator, Gauge};
-pub use estimate::{EstimateArgs, FilterArgs, RestResistance, SmoothArgs};
+pub use estimate::{EstimateArgs, FilterArgs, Format, RestResistance, SmoothArgs};
 pub use evaluate::{Estimators, EvaluateArgs};
 pub use export::{ExportArgs, ExportTarget};
 pub use files::{ImportArgs, InspectArgs};
@@ -98,6 +100,9 @@ pub enum Command {
     /// Compare estimates with a known strain
     #[command(before_help = "Example: ohmstrain evaluate bench.csv --split 0.5 --report report.html")]
     Evaluate(EvaluateArgs),
+    /// Filter, smooth, evaluate or calibrate many recordings, in parallel; bad ones are reported and the others go on
+    #[command(before_help = "Example: ohmstrain batch smooth recordings/*.csv --sensor sensor.toml -o smoothed")]
+    Batch(BatchArgs),
     /// Write a calibrated sensor's filter as C or Rust source for a microcontroller
     #[command(before_help = "Example: ohmstrain export --sensor sensor.toml --target c --dt-s 0.02 -o firmware")]
     Export(ExportArgs),

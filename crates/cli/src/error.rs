@@ -22,6 +22,9 @@ pub enum CliError {
     /// `evaluate --check` found the estimates wanting.
     #[error("{0}")]
     Check(String),
+    /// `batch` could not do some recordings.
+    #[error("{0}")]
+    Batch(String),
     /// Whoever read our output has left.
     #[error("the pipe is closed")]
     ClosedPipe,
@@ -39,10 +42,16 @@ impl CliError {
             Self::Arguments(_) => 2,
             Self::Check(_) => 3,
             Self::Input(_) => 4,
+            Self::Batch(_) => 5,
         };
-        // `eprintln!` would panic if whoever read stderr has left.
-        let _ = writeln!(io::stderr(), "ohmstrain: {self}");
+        Self::error(&self.to_string());
         ExitCode::from(code)
+    }
+
+    /// Says on stderr what went wrong.
+    pub fn error(text: &str) {
+        // `eprintln!` would panic if whoever read stderr has left.
+        let _ = writeln!(io::stderr(), "ohmstrain: {text}");
     }
 
     /// Says on stderr what did not stop the command.
@@ -50,7 +59,7 @@ impl CliError {
         if Verbosity::chosen() == Verbosity::Quiet {
             return;
         }
-        let _ = writeln!(io::stderr(), "ohmstrain: {text}");
+        Self::error(text);
     }
 
     /// Says on stderr what casts doubt on a result.

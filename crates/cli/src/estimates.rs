@@ -1,56 +1,132 @@
 use std::io::Write;
 
-use ohmstrain::{Column, Estimate, Sensor};
+use ohmstrain::{Column, Estimate, Flag, Flags, Sensor};
 use ohmstrain_bench_data::RowWriter;
 
+use crate::args::Format;
 use crate::error::CliError;
+use crate::parquet_table::ParquetTable;
 
-/// Writes `estimates.csv`: one row per reading, cells that are not known left empty.
-pub struct EstimateWriter<W: Write> {
-    rows: RowWriter<W>,
+/// Writes estimates: one row per reading, cells that are not known left empty.
+pub struct EstimateWriter<W: Write + Send> {
+    rows: Rows<W>,
     columns: Vec<Column>,
 }
 
-impl<W: Write> EstimateWriter<W> {
-    /// Writes the header. `chosen` are the columns wanted, all if empty.
-    pub fn new(out: W, sensor: &Sensor, chosen: &[String]) -> Result<Self, CliError> {
-        let columns = columns(sensor, chosen)?;
-        let mut rows = RowWriter::new(out);
-        columns.iter().for_each(|column| rows.text(column.name()));
-        rows.end()?;
+enum Rows<W: Write + Send> {
+    Csv(RowWriter<W>),
+    Parquet(Box<ParquetTable<W>>),
+}
+
+impl<W: Write + Send> EstimateWriter<W> {
+    /// Writes the header of `columns`.
+    pub fn new(out: W, format: Format, columns: Vec<Column>) -> Result<Self, CliError> {
+        let rows = match format {
+            Format::Csv => {
+                let mut rows = RowWriter::new(out);
+                columns.iter().for_each(|column| rows.text(column.name()));
+                rows.end()?;
+                Rows::Csv(rows)
+            }
+            Format::Parquet => {
+                let named = columns.iter().map(|column| (column.name(), !column.is_flags()));
+                Rows::Parquet(Box::new(ParquetTable::new(out, named)?))
+            }
+        };
         Ok(Self { rows, columns })
     }
 
     /// Writes one row.
     pub fn write(&mut self, row: &Estimate) -> Result<(), CliError> {
-        for column in &self.columns {
-            if column.is_flags() {
-                self.rows.words(row.flags.names());
-            } else {
-                self.rows.number(column.number(row));
-            }
-        }
-        Ok(self.rows.end()?)
+        let number = |column: &Column| column.number(row);
+        write_row(&mut self.rows, &self.columns, number, row.flags)
     }
 
-    /// Hands everything written so far on to the reader.
+    /// Writes one row of [`Packed`] ones.
+    fn write_packed(&mut self, row: &[u8]) -> Result<(), CliError> {
+        let (numbers, flags) = row.split_at(row.len().saturating_sub(FLAG_BYTES));
+        let mut numbers = numbers.as_chunks::<NUMBER_BYTES>().0.iter().map(|bytes| f64::from_le_bytes(*bytes));
+        let bits = flags.iter().rev().fold(0, |bits, byte| bits << 8 | u16::from(*byte));
+        let flags =
+            Flag::ALL.into_iter().fold(Flags::NONE, |flags, flag| flags.with(flag, bits >> flag as u16 & 1 == 1));
+        write_row(&mut self.rows, &self.columns, |_| numbers.next().unwrap_or(f64::NAN), flags)
+    }
+
+    /// Hands everything written so far on to the reader, as far as the format lets it.
     pub fn flush(&mut self) -> Result<(), CliError> {
-        Ok(self.rows.flush()?)
+        match &mut self.rows {
+            Rows::Csv(rows) => Ok(rows.flush()?),
+            Rows::Parquet(_) => Ok(()),
+        }
     }
 
-    /// What is written to.
-    pub const fn get_mut(&mut self) -> &mut W {
-        self.rows.get_mut()
-    }
-
-    /// What was written to, without a flush.
-    pub fn into_inner(self) -> W {
-        self.rows.into_inner()
+    /// Writes the end.
+    pub fn finish(self) -> Result<(), CliError> {
+        match self.rows {
+            Rows::Csv(mut rows) => Ok(rows.flush()?),
+            Rows::Parquet(rows) => Ok(rows.finish()?.flush()?),
+        }
     }
 }
 
-/// The columns of a sensor that are wanted.
-fn columns(sensor: &Sensor, chosen: &[String]) -> Result<Vec<Column>, CliError> {
+/// Writes one row, `number` being asked for each column in order.
+fn write_row<W: Write + Send>(
+    rows: &mut Rows<W>,
+    columns: &[Column],
+    mut number: impl FnMut(&Column) -> f64,
+    flags: Flags,
+) -> Result<(), CliError> {
+    for column in columns {
+        let value = number(column);
+        match (&mut *rows, column.is_flags()) {
+            (Rows::Csv(rows), true) => rows.words(flags.names()),
+            (Rows::Csv(rows), false) => rows.number(value),
+            (Rows::Parquet(rows), true) => rows.text(Some(&flags.to_string())),
+            (Rows::Parquet(rows), false) => rows.number(value),
+        }
+    }
+    Ok(match rows {
+        Rows::Csv(rows) => rows.end(),
+        Rows::Parquet(rows) => rows.end(),
+    }?)
+}
+
+const NUMBER_BYTES: usize = size_of::<f64>();
+const FLAG_BYTES: usize = size_of::<u16>();
+
+/// Rows of some columns as bytes, all of one length: numbers, then flags.
+pub struct Packed {
+    columns: Vec<Column>,
+}
+
+impl Packed {
+    /// Rows of these columns.
+    pub const fn new(columns: Vec<Column>) -> Self {
+        Self { columns }
+    }
+
+    /// Bytes of a row.
+    pub fn row_len(&self) -> usize {
+        self.columns.len() * NUMBER_BYTES + FLAG_BYTES
+    }
+
+    /// Appends a row.
+    pub fn push(&self, row: &Estimate, out: &mut Vec<u8>) {
+        for column in &self.columns {
+            out.extend(column.number(row).to_le_bytes());
+        }
+        let bits = Flag::ALL.into_iter().fold(0_u16, |bits, flag| bits | u16::from(row.flags.has(flag)) << flag as u16);
+        out.extend(bits.to_le_bytes());
+    }
+
+    /// Writes rows that were packed.
+    pub fn unpack<W: Write + Send>(&self, rows: &[u8], writer: &mut EstimateWriter<W>) -> Result<(), CliError> {
+        rows.chunks_exact(self.row_len()).try_for_each(|row| writer.write_packed(row))
+    }
+}
+
+/// The columns of a sensor that are wanted, all if none is named.
+pub fn columns(sensor: &Sensor, chosen: &[String]) -> Result<Vec<Column>, CliError> {
     let known = sensor.columns();
     if chosen.is_empty() {
         return Ok(known);

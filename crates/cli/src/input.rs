@@ -1,10 +1,10 @@
 use std::fs::File;
-use std::io::{self, BufReader, Read};
+use std::io::{self, BufRead, BufReader, Read};
 use std::ops::Range;
 use std::path::Path;
 
 use ohmstrain::{JointParams, Quantity, Reading, ReadingUnit};
-use ohmstrain_bench_data::{Metadata, Reading as TraceReading, ReadingKind, Trace, TraceReader};
+use ohmstrain_bench_data::{Metadata, ParquetText, Reading as TraceReading, ReadingKind, Trace, TraceReader};
 use ohmstrain_calib::Samples;
 use sha2::{Digest, Sha256};
 
@@ -30,9 +30,25 @@ pub fn open(path: &Path, overrides: &Metadata) -> Result<TraceReader<Box<dyn Rea
     let source: Box<dyn Read> = if is_stdin(path) {
         Box::new(io::stdin().lock())
     } else {
-        Box::new(BufReader::new(File::open(path).map_err(|error| CliError::file("read", path, &error))?))
+        let unreadable = |error| CliError::file("read", path, &error);
+        let mut file = BufReader::new(File::open(path).map_err(unreadable)?);
+        if ParquetText::is_one(file.fill_buf().map_err(unreadable)?) {
+            return open_parquet(path, overrides);
+        }
+        Box::new(file)
     };
     Ok(TraceReader::with_overrides(source, &path.display().to_string(), overrides)?)
+}
+
+/// Opens a recording in a Parquet file, row by row as any other.
+fn open_parquet(path: &Path, overrides: &Metadata) -> Result<TraceReader<Box<dyn Read>>, CliError> {
+    let unreadable = |error| CliError::Input(format!("{}: {error}", path.display()));
+    let file = File::open(path).map_err(|error| CliError::file("read", path, &error))?;
+    let text = ParquetText::new(file).map_err(unreadable)?;
+    let mut metadata = text.metadata().clone();
+    metadata.override_with(overrides);
+    let source: Box<dyn Read> = Box::new(text);
+    Ok(TraceReader::with_overrides(source, &path.display().to_string(), &metadata)?)
 }
 
 /// Whether a path means stdin.
@@ -59,10 +75,26 @@ pub fn parse(bytes: &[u8], path: &Path, overrides: &Metadata) -> Result<Recordin
             (path.display(), "is a sensor file, not a recording: give it to --sensor, and the recording here");
         return Err(CliError::Input(format!("{name} {word}")));
     }
-    let sha256 = Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect();
-    let rows = TraceReader::with_overrides(bytes, &path.display().to_string(), overrides)?;
+    let sha256 = sha256(bytes);
+    if ParquetText::is_one(bytes) {
+        return collect(open_parquet(path, overrides)?, sha256);
+    }
+    collect(TraceReader::with_overrides(bytes, &path.display().to_string(), overrides)?, sha256)
+}
+
+fn collect<R: Read>(rows: TraceReader<R>, sha256: String) -> Result<Recording, CliError> {
     let (name, header) = (rows.file().to_string(), header(&rows));
     Ok(Recording { name, header, sha256, first_row: 0, trace: Trace::collect(rows)? })
+}
+
+/// SHA-256, hexadecimal.
+pub fn sha256(bytes: &[u8]) -> String {
+    hexadecimal(Sha256::digest(bytes).as_slice())
+}
+
+/// Bytes in hexadecimal.
+pub fn hexadecimal(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 /// What messages call the header of a recording of which no row has been read yet.

@@ -1,7 +1,8 @@
 //! `ohmstrain`: from the resistance of a soft strain sensor to strain, with an honest error bar.
 //!
 //! stdout is data, stderr is messages. Exit codes: 0 done (a closed pipe too), 1 anything else, 2 arguments, 3
-//! `evaluate --check` failed, 4 the contents of an input.
+//! `evaluate --check` failed, 4 the contents of an input, 5 `batch`
+//! could not do some recordings.
 
 mod alignment;
 mod args;
@@ -12,6 +13,7 @@ mod export;
 mod input;
 mod lab_files;
 mod output;
+mod parquet_table;
 mod plausible;
 mod progress;
 mod readings;

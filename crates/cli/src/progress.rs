@@ -28,6 +28,28 @@ impl Progress {
         progress
     }
 
+    /// A bar over so many bytes of recordings, with the time that is left.
+    pub fn over_bytes(heading: &'static str, bytes: u64) -> Self {
+        let progress = Self::new(heading);
+        if let Ok(style) = ProgressStyle::with_template("{msg:32} {wide_bar} {percent:>3} %, {eta} left") {
+            progress.bar.set_style(style);
+        }
+        progress.bar.set_length(bytes);
+        progress
+    }
+
+    /// Counts what is done.
+    pub fn advance(&self, bytes: u64, message: String) {
+        self.detail(&message);
+        self.bar.set_message(message);
+        self.bar.inc(bytes);
+    }
+
+    /// Prints around the bar.
+    pub fn around<T>(&self, print: impl FnOnce() -> T) -> T {
+        self.bar.suspend(print)
+    }
+
     /// Says what is being done, with nothing to count.
     pub fn doing(&self, what: &'static str) {
         self.bar.set_message(what);

@@ -1,7 +1,7 @@
 use std::path::PathBuf;
 use std::str::FromStr;
 
-use clap::Args as ClapArgs;
+use clap::{Args as ClapArgs, ValueEnum};
 use ohmstrain_ekf::Influence;
 
 use super::{Auto, Estimator, TraceArgs, finite, positive};
@@ -37,6 +37,25 @@ pub struct EstimateArgs {
     pub trace: TraceArgs,
 }
 
+/// Form of a table of rows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Format {
+    /// Text, a line per row
+    Csv,
+    /// Apache Parquet: the same numbers in a quarter of the space, complete with the last row only
+    Parquet,
+}
+
+impl Format {
+    /// Its name, which is what file names end in.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Csv => "csv",
+            Self::Parquet => "parquet",
+        }
+    }
+}
+
 /// Flags of `filter`.
 #[derive(Debug, ClapArgs)]
 pub struct FilterArgs {
@@ -49,6 +68,9 @@ pub struct FilterArgs {
     /// Go on after lines that are none of a trace, as serial lines bring; they are counted on stderr
     #[arg(long)]
     pub skip_bad: bool,
+    /// Form of the estimates
+    #[arg(long, value_enum, default_value_t = Format::Csv)]
+    pub format: Format,
     /// Columns to write, separated by commas; all by default
     #[arg(long, value_delimiter = ',')]
     pub columns: Vec<String>,
@@ -62,6 +84,9 @@ pub struct FilterArgs {
 pub struct SmoothArgs {
     /// Recording, or - for stdin
     pub trace_file: PathBuf,
+    /// Form of the estimates
+    #[arg(long, value_enum, default_value_t = Format::Csv)]
+    pub format: Format,
     /// Columns to write, separated by commas; all by default
     #[arg(long, value_delimiter = ',')]
     pub columns: Vec<String>,

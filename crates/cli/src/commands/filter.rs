@@ -5,7 +5,7 @@ use ohmstrain_bench_data::{BadContent, Row, TraceError, TraceReader};
 
 use crate::args::{FilterArgs, RestResistance};
 use crate::error::CliError;
-use crate::estimates::EstimateWriter;
+use crate::estimates::{EstimateWriter, columns};
 use crate::input::{self, check_unit, is_stdin};
 use crate::readings::no_row;
 use crate::run::{builder, rest_resistance};
@@ -31,8 +31,8 @@ pub fn run(args: &FilterArgs) -> Result<(), CliError> {
         sensor = sensor.on_joint(joint)?;
         filter = Running::new(&sensor, args)?;
     }
-    let out = io::BufWriter::with_capacity(WRITTEN_AT_ONCE, io::stdout().lock());
-    let writer = EstimateWriter::new(out, &sensor, &args.columns)?;
+    let out = io::BufWriter::with_capacity(WRITTEN_AT_ONCE, io::stdout());
+    let writer = EstimateWriter::new(out, args.format, columns(&sensor, &args.columns)?)?;
     let live = is_stdin(&args.trace_file) || !args.trace_file.is_file();
     let watch = ValidityWatch::new(&sensor, None);
     let sink =
@@ -80,7 +80,7 @@ impl Running {
 }
 
 /// Filters row by row.
-fn stream<W: io::Write>(
+fn stream<W: io::Write + Send>(
     args: &FilterArgs,
     mut filter: Running,
     rows: TraceReader<Box<dyn Read>>,
@@ -120,11 +120,11 @@ fn stream<W: io::Write>(
         Ok(estimates) => sink.write(estimates),
         Err(error) => Err(CliError::Input(format!("{}: {error}", sink.file))),
     };
-    sink.writer.flush().and(streamed).and(finished)
+    sink.writer.finish().and(streamed).and(finished)
 }
 
 /// Where estimates go.
-struct Sink<'a, W: io::Write> {
+struct Sink<'a, W: io::Write + Send> {
     writer: EstimateWriter<W>,
     /// Says when the calibration does not reach.
     watch: ValidityWatch,
@@ -140,7 +140,7 @@ struct Sink<'a, W: io::Write> {
     early: Vec<f64>,
 }
 
-impl<W: io::Write> Sink<'_, W> {
+impl<W: io::Write + Send> Sink<'_, W> {
     fn write(&mut self, estimates: &[Estimate]) -> Result<(), CliError> {
         for row in estimates {
             let reading = row.resistance.unwrap_or(f64::NAN);

@@ -1,5 +1,6 @@
 //! One file per command.
 
+mod batch;
 mod calibrate;
 mod closing;
 mod demo;
@@ -38,6 +39,7 @@ pub fn dispatch(command: &Command) -> Result<(), CliError> {
         Command::Live(args) => live::run(args),
         Command::Smooth(args) => smooth::run(args),
         Command::Evaluate(args) => evaluate::run(args),
+        Command::Batch(args) => batch::run(args),
         Command::Export(args) => export::run(args),
         Command::Completions(args) => shell::completions(args),
         Command::Man(args) => shell::man(args),

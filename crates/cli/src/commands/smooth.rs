@@ -4,9 +4,9 @@ use std::ops::Range;
 use ohmstrain::{Estimate, FilterBuilder, Sensor, ValidityWatch};
 use tempfile::SpooledTempFile;
 
-use crate::args::SmoothArgs;
+use crate::args::{Format, SmoothArgs};
 use crate::error::CliError;
-use crate::estimates::EstimateWriter;
+use crate::estimates::{EstimateWriter, Packed, columns};
 use crate::input::{self, check_unit};
 use crate::readings::Readings;
 use crate::run::{builder, rest_resistance};
@@ -30,9 +30,10 @@ pub fn run(args: &SmoothArgs) -> Result<(), CliError> {
     suits::check_readings(&header, &sensor, rest, readings.values())?;
     let builder = builder(&sensor, &args.estimate);
     let builder = rest.map_or(builder, |measured| builder.rest_resistance(measured));
-    let writer = EstimateWriter::new(Segments::new(), &sensor, &args.columns)?;
+    let columns = columns(&sensor, &args.columns)?;
     let mut rates = vec![f32::NAN; readings.len()];
-    let segments = smooth_into(writer, builder, &readings, &mut rates).map_err(|error| error.named(&name))?;
+    let segments = smooth_into(Packed::new(columns.clone()), builder, &readings, &mut rates)
+        .map_err(|error| error.named(&name))?;
     suits::warn_of_start(args.estimate.initial_strain, &sensor);
     let mut watch = ValidityWatch::new(&sensor, rest);
     for (row, rate) in rates.into_iter().enumerate() {
@@ -41,73 +42,72 @@ pub fn run(args: &SmoothArgs) -> Result<(), CliError> {
             CliError::warning(&format!("{name}: {warning}"));
         }
     }
-    segments.write_in_order(&mut io::stdout().lock())
+    let out = BufWriter::with_capacity(WRITTEN_AT_ONCE, io::stdout());
+    let mut writer = EstimateWriter::new(out, args.format, columns)?;
+    segments.write_in_order(&mut writer)?;
+    writer.finish()
 }
 
-/// Writes the smoothed rows of a recording, last segment first, and keeps their rates.
+/// Smooths a recording, and keeps its rates.
 fn smooth_into(
-    mut writer: EstimateWriter<Segments>,
+    packed: Packed,
     builder: FilterBuilder,
     readings: &Readings,
     rates: &mut [f32],
 ) -> Result<Segments, CliError> {
-    writer.get_mut().end_segment()?;
+    let mut segments = Segments::new(packed);
     builder.smooth_backward(
         readings.len(),
         |row| readings.row(row),
         |rows: Range<usize>, estimates| {
             for (rate, estimate) in rates[rows].iter_mut().zip(estimates) {
                 *rate = estimate.strain_rate as f32;
-                writer.write(estimate)?;
             }
-            writer.get_mut().end_segment()
+            segments.push(estimates)
         },
     )?;
-    Ok(writer.into_inner())
+    Ok(segments)
 }
+
+/// Bytes handed to standard output at once.
+const WRITTEN_AT_ONCE: usize = 1 << 16;
 
 /// Bytes of estimates that wait in memory; more of them wait in a temporary file.
 const WAIT_IN_MEMORY: usize = 16 << 20;
 
-/// A header and segments of rows that were written last segment first.
+/// Segments of rows that came last segment first.
 struct Segments {
-    written: BufWriter<SpooledTempFile>,
-    /// Where the header and each segment end.
+    packed: Packed,
+    written: SpooledTempFile,
+    /// Where each segment ends.
     ends: Vec<u64>,
+    /// The segment at hand.
+    bytes: Vec<u8>,
 }
 
 impl Segments {
-    fn new() -> Self {
-        let file = tempfile::spooled_tempfile(WAIT_IN_MEMORY);
-        Self { written: BufWriter::new(file), ends: Vec::new() }
+    fn new(packed: Packed) -> Self {
+        Self { packed, written: tempfile::spooled_tempfile(WAIT_IN_MEMORY), ends: vec![0], bytes: Vec::new() }
     }
 
-    fn end_segment(&mut self) -> Result<(), CliError> {
-        self.ends.push(self.written.stream_position().map_err(temporary)?);
+    fn push(&mut self, rows: &[Estimate]) -> Result<(), CliError> {
+        self.bytes.clear();
+        rows.iter().for_each(|row| self.packed.push(row, &mut self.bytes));
+        self.written.write_all(&self.bytes).map_err(temporary)?;
+        let end = self.ends.last().unwrap_or(&0) + self.bytes.len() as u64;
+        self.ends.push(end);
         Ok(())
     }
 
-    /// The header, then the segments in order of time.
-    fn write_in_order(mut self, out: &mut impl Write) -> Result<(), CliError> {
-        self.written.flush().map_err(temporary)?;
-        let file = self.written.get_mut();
-        let segments = self.ends.windows(2).rev().map(|ends| ends[0]..ends[1]);
-        let header = self.ends.first().map(|end| 0..*end);
-        for place in header.into_iter().chain(segments) {
-            file.seek(SeekFrom::Start(place.start)).map_err(temporary)?;
-            io::copy(&mut (&mut *file).take(place.end - place.start), out)?;
+    /// The segments in order of time.
+    fn write_in_order<W: Write + Send>(mut self, out: &mut EstimateWriter<W>) -> Result<(), CliError> {
+        for place in self.ends.windows(2).rev() {
+            self.bytes.resize((place[1] - place[0]) as usize, 0);
+            self.written.seek(SeekFrom::Start(place[0])).map_err(temporary)?;
+            self.written.read_exact(&mut self.bytes).map_err(temporary)?;
+            self.packed.unpack(&self.bytes, out)?;
         }
-        Ok(out.flush()?)
-    }
-}
-
-impl Write for Segments {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.written.write(bytes)
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        self.written.flush()
+        Ok(())
     }
 }
 
@@ -117,10 +117,10 @@ fn temporary(error: io::Error) -> CliError {
 }
 
 /// Writes a whole recording's estimates.
-pub fn write_estimates(out: impl Write, sensor: &Sensor, estimates: &[Estimate]) -> Result<(), CliError> {
-    let mut writer = EstimateWriter::new(out, sensor, &[])?;
+pub fn write_estimates(out: impl Write + Send, sensor: &Sensor, estimates: &[Estimate]) -> Result<(), CliError> {
+    let mut writer = EstimateWriter::new(out, Format::Csv, sensor.columns())?;
     estimates.iter().try_for_each(|row| writer.write(row))?;
-    writer.flush()
+    writer.finish()
 }
 
 #[cfg(test)]
@@ -130,18 +130,21 @@ mod tests {
     /// Segments that fit in memory, and such that do not.
     #[test]
     fn segments_come_out_in_order_of_time() {
-        for rows in [3, WAIT_IN_MEMORY] {
-            let mut segments = Segments::new();
-            segments.write_all(b"header\n").unwrap();
-            segments.end_segment().unwrap();
-            for letter in [b"c", b"b", b"a"] {
-                segments.write_all(&letter.repeat(rows)).unwrap();
-                segments.end_segment().unwrap();
-            }
-            let mut out = Vec::new();
-            segments.write_in_order(&mut out).unwrap();
-            let expected = [b"header\n".to_vec(), b"a".repeat(rows), b"b".repeat(rows), b"c".repeat(rows)].concat();
-            assert!(out == expected, "{rows} rows");
+        let text = include_str!("../../../ohmstrain/examples/sensor.toml");
+        let sensor = Sensor::from_toml(text).unwrap();
+        let mut filter = sensor.filter().build().unwrap();
+        let rows: Vec<Estimate> = (0..9).map(|k| filter.step(0.05 * f64::from(k), 1600.0).unwrap()).collect();
+        for repeated in [1, WAIT_IN_MEMORY / 900] {
+            let all: Vec<Estimate> = rows.chunks(3).flat_map(|rows| rows.repeat(repeated)).collect();
+            let mut segments = Segments::new(Packed::new(sensor.columns()));
+            all.chunks(3 * repeated).rev().for_each(|rows| segments.push(rows).unwrap());
+            assert_eq!(segments.written.is_rolled(), repeated > 1);
+            let (mut expected, mut out) = (Vec::new(), Vec::new());
+            write_estimates(&mut expected, &sensor, &all).unwrap();
+            let mut writer = EstimateWriter::new(&mut out, Format::Csv, sensor.columns()).unwrap();
+            segments.write_in_order(&mut writer).unwrap();
+            writer.finish().unwrap();
+            assert!(out == expected, "{repeated} times");
         }
     }
 }

@@ -1,0 +1,148 @@
+use std::fs::File;
+use std::io::{self, Cursor, Read};
+use std::sync::Arc;
+
+use parquet::errors::ParquetError;
+use parquet::file::reader::{FileReader, SerializedFileReader};
+use parquet::record::reader::RowIter;
+use parquet::record::{Field, Row};
+use parquet::schema::types::Type;
+
+use crate::columns::Column;
+use crate::metadata::Metadata;
+use crate::rows::append_number;
+
+/// What a Parquet file begins with.
+const MAGIC: &[u8; 4] = b"PAR1";
+/// Rows that become text at once.
+const ROWS_AT_ONCE: usize = 256;
+
+/// A trace in a Parquet file, as the text of the trace CSV that it stands for: line 1 is the header, data row k line k + 1.
+///
+/// The file is read page by page, whatever its size: uncompressed, Snappy or gzip. Columns that no trace has are passed over
+/// unread. Numbers arrive unchanged.
+///
+/// ```no_run
+/// use ohmstrain_bench_data::{ParquetText, TraceReader};
+/// let text = ParquetText::new(std::fs::File::open("trace.parquet")?)?;
+/// let metadata = text.metadata().clone();
+/// for row in TraceReader::with_overrides(text, "trace.parquet", &metadata)? {
+///     println!("{}", row?.reading.value);
+/// }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct ParquetText {
+    rows: RowIter<'static>,
+    metadata: Metadata,
+    /// Whether a column of the file is read, in its order.
+    is_read: Vec<bool>,
+    pending: Cursor<Vec<u8>>,
+}
+
+impl ParquetText {
+    /// Whether a file that begins with these bytes is Parquet.
+    #[must_use]
+    pub fn is_one(head: &[u8]) -> bool {
+        head.starts_with(MAGIC)
+    }
+
+    /// Reads schema and metadata of a file.
+    ///
+    /// # Errors
+    /// If it is no Parquet file, or what it says about the recording makes no sense.
+    pub fn new(file: File) -> io::Result<Self> {
+        let reader = SerializedFileReader::new(file).map_err(broken)?;
+        let described = reader.metadata().file_metadata();
+        let mut metadata = Metadata::default();
+        for pair in described.key_value_metadata().into_iter().flatten() {
+            if let Some(value) = pair.value.as_ref().filter(|_| Metadata::KEYS.contains(&pair.key.as_str())) {
+                let taken = metadata.take_line(&format!("# {} = {value}", pair.key));
+                taken
+                    .map_err(|fault| io::Error::other(format!("expected {}, found {}", fault.expected, fault.found)))?;
+            }
+        }
+        let is_known =
+            |field: &Type| field.is_primitive() && Column::ALL.iter().any(|known| known.name() == field.name());
+        let fields = described.schema().get_fields();
+        let is_read = fields.iter().map(|field| is_known(field)).collect();
+        let wanted = fields.iter().filter(|field| is_known(field)).map(Arc::clone).collect();
+        let mut header = Vec::new();
+        for field in fields {
+            push_text(field.name(), &mut header);
+            header.push(b',');
+        }
+        end_line(&mut header);
+        let wanted = Type::group_type_builder("schema").with_fields(wanted).build().map_err(broken)?;
+        let rows = RowIter::from_file_into(Box::new(reader)).project(Some(wanted)).map_err(broken)?;
+        Ok(Self { rows, metadata, is_read, pending: Cursor::new(header) })
+    }
+
+    /// What the file says about the recording, in its key-value metadata: the keys of a trace CSV.
+    #[must_use]
+    pub const fn metadata(&self) -> &Metadata {
+        &self.metadata
+    }
+
+    /// The text of some more rows; empty at the end.
+    fn more(&mut self, mut text: Vec<u8>) -> io::Result<Vec<u8>> {
+        text.clear();
+        for row in self.rows.by_ref().take(ROWS_AT_ONCE) {
+            push_row(&row.map_err(broken)?, &self.is_read, &mut text);
+        }
+        Ok(text)
+    }
+}
+
+impl Read for ParquetText {
+    fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
+        if self.pending.position() == self.pending.get_ref().len() as u64 {
+            let text = std::mem::take(self.pending.get_mut());
+            self.pending = Cursor::new(self.more(text)?);
+        }
+        self.pending.read(out)
+    }
+}
+
+fn push_row(row: &Row, is_read: &[bool], out: &mut Vec<u8>) {
+    let mut cells = row.get_column_iter();
+    for is_read in is_read {
+        if let Some((_, cell)) = is_read.then(|| cells.next()).flatten() {
+            push_cell(cell, out);
+        }
+        out.push(b',');
+    }
+    end_line(out);
+}
+
+fn push_cell(cell: &Field, out: &mut Vec<u8>) {
+    match cell {
+        Field::Null => {}
+        Field::Double(value) if value.is_finite() => append_number(out, *value),
+        Field::Double(value) => out.extend(value.to_string().bytes()),
+        // By its own digits: 0.1 in single precision is meant to be 0.1.
+        Field::Float(value) => out.extend(value.to_string().bytes()),
+        Field::Str(text) => push_text(text, out),
+        other => push_text(&other.to_string(), out),
+    }
+}
+
+/// Text as a cell on one line, in quotation marks if it needs them.
+fn push_text(text: &str, out: &mut Vec<u8>) {
+    let text = text.trim().replace(char::is_control, " ");
+    if text.contains([',', '"']) {
+        out.extend(format!("\"{}\"", text.replace('"', "\"\"")).bytes());
+    } else {
+        out.extend(text.bytes());
+    }
+}
+
+/// The comma behind the last cell becomes the end of the line.
+fn end_line(out: &mut Vec<u8>) {
+    if let Some(last) = out.last_mut() {
+        *last = b'\n';
+    }
+}
+
+fn broken(error: ParquetError) -> io::Error {
+    io::Error::other(format!("cannot be read as Parquet (uncompressed, Snappy or gzip): {error}"))
+}

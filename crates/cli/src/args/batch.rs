@@ -1,0 +1,107 @@
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+
+use clap::{Args as ClapArgs, ValueEnum};
+
+use super::Format;
+
+/// Flags of `batch`.
+#[derive(Debug, ClapArgs)]
+#[command(after_long_help = DETAILS)]
+pub struct BatchArgs {
+    /// What to do with each recording
+    #[arg(value_enum)]
+    pub command: BatchCommand,
+    /// Recordings
+    #[arg(required_unless_present_any = ["glob", "manifest"])]
+    pub files: Vec<PathBuf>,
+    /// Recordings by pattern, as in 'data/**/*.csv'; may be given several times
+    #[arg(long, value_name = "PATTERN")]
+    pub glob: Vec<String>,
+    /// Recordings in a CSV with the columns file, sensor, output and flags of COMMAND by their names
+    #[arg(long, value_name = "manifest.csv")]
+    pub manifest: Option<PathBuf>,
+    /// Folder for what comes of the recordings, and for the summary
+    #[arg(short, long, value_name = "DIR")]
+    pub output: PathBuf,
+    /// The sensor of recordings for which the manifest names none
+    #[arg(long, value_name = "sensor.toml")]
+    pub sensor: Option<PathBuf>,
+    /// Recordings at a time; by default as many as the machine has cores
+    #[arg(short, long, value_name = "N")]
+    pub jobs: Option<NonZeroUsize>,
+    /// Form of the estimates
+    #[arg(long, value_enum, default_value_t = Format::Csv)]
+    pub format: Format,
+    /// Form of the summary
+    #[arg(long, value_enum, default_value_t = SummaryForm::Csv)]
+    pub summary: SummaryForm,
+    /// Do again what an earlier run has finished
+    #[arg(long)]
+    pub again: bool,
+    /// Replace files that no earlier run wrote, too
+    #[arg(long)]
+    pub force: bool,
+    /// Flags of COMMAND
+    #[arg(last = true)]
+    pub flags: Vec<String>,
+}
+
+/// Commands that are done for each recording.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum BatchCommand {
+    /// Estimates, each from the readings up to it
+    Filter,
+    /// Estimates, each from all readings
+    Smooth,
+    /// Scores, as JSON
+    Evaluate,
+    /// A sensor of each recording, or of those that the manifest gives the same name in its column sensor
+    Calibrate,
+}
+
+impl BatchCommand {
+    /// Its name.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Filter => "filter",
+            Self::Smooth => "smooth",
+            Self::Evaluate => "evaluate",
+            Self::Calibrate => "calibrate",
+        }
+    }
+}
+
+/// Form of a summary.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum SummaryForm {
+    /// A line per recording
+    Csv,
+    /// An array of objects
+    Json,
+    /// Apache Parquet
+    Parquet,
+}
+
+impl SummaryForm {
+    /// What file names end in.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Csv => "csv",
+            Self::Json => "json",
+            Self::Parquet => "parquet",
+        }
+    }
+}
+
+/// What the long help says after the flags.
+const DETAILS: &str = "\
+Every recording is done by a process of its own, which prints and writes what COMMAND does: one that cannot be read, or
+needs more memory than there is, is reported and leaves the others alone. Exit code 5 says that there were such. Outputs
+lie in DIR as the recordings lie below the folder that all of them share.
+
+DIR/summary.csv has a row per recording: state, messages and warnings, scores, SHA-256 of recording, sensor and output,
+flags and version. DIR/batch.jsonl grows by a line with each recording that is done. Another run with the same DIR does
+what is not there yet, or has changed: recording, sensor, flags, version or output.
+
+Paths in a manifest start at its folder. An empty cell is a flag that is not given; `true` gives one without a value.";

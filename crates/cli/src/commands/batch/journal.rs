@@ -1,0 +1,123 @@
+use std::collections::HashMap;
+use std::fs::{self, File, OpenOptions};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+
+use serde::{Deserialize, Serialize};
+
+use super::process::sha256_of;
+use super::scores::Figures;
+use crate::error::CliError;
+
+/// What became of a job: a line of the journal, a row of the summary.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct Entry {
+    pub command: String,
+    pub files: Vec<PathBuf>,
+    /// SHA-256 of each.
+    pub sha256: Vec<String>,
+    pub sensor: Option<PathBuf>,
+    pub sensor_sha256: Option<String>,
+    /// Flags but for `--sensor` and what `batch` adds.
+    pub flags: Vec<String>,
+    /// Program and version.
+    pub made_by: String,
+    /// Below the folder of outputs.
+    pub output: PathBuf,
+    pub output_sha256: Option<String>,
+    pub state: State,
+    /// Exit code of the command; `None` if it had no chance to give one.
+    pub exit_code: Option<i32>,
+    /// Why it failed.
+    pub message: String,
+    pub warnings: Vec<String>,
+    /// Rows of the output's table, or rows that were scored.
+    pub rows: Option<u64>,
+    pub seconds: f64,
+    pub figures: Figures,
+}
+
+/// Whether a job is done.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum State {
+    /// Its output is there.
+    Done,
+    /// It was there before.
+    Kept,
+    /// It is not, or found wanting by `evaluate --check`.
+    #[default]
+    Failed,
+}
+
+impl State {
+    /// Its name.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Done => "done",
+            Self::Kept => "kept",
+            Self::Failed => "failed",
+        }
+    }
+}
+
+impl Entry {
+    /// Whether two entries are of the same work: the same program, command, flags and bytes.
+    fn is_same_work(&self, other: &Self) -> bool {
+        let work = |of: &Self| {
+            let names: Vec<_> = of.files.iter().filter_map(|file| file.file_name()).map(ToOwned::to_owned).collect();
+            (of.command.clone(), of.flags.clone(), of.made_by.clone(), names)
+        };
+        work(self) == work(other) && (&self.sha256, &self.sensor_sha256) == (&other.sha256, &other.sensor_sha256)
+    }
+}
+
+/// What earlier runs have done, and this one does: a line of JSON each, the last one of an output counts.
+pub struct Journal {
+    folder: PathBuf,
+    known: HashMap<PathBuf, Entry>,
+    file: Mutex<File>,
+}
+
+/// Its name.
+const FILE: &str = "batch.jsonl";
+
+impl Journal {
+    /// Reads the journal of a folder, and begins one if there is none.
+    pub fn open(folder: &Path) -> Result<Self, CliError> {
+        let path = folder.join(FILE);
+        let text = fs::read_to_string(&path).unwrap_or_default();
+        // A line that a killed run left unfinished, or another version wrote, says nothing.
+        let entries = text.lines().filter_map(|line| serde_json::from_str::<Entry>(line).ok());
+        let known = entries.map(|entry| (entry.output.clone(), entry)).collect();
+        let opened = OpenOptions::new().create(true).append(true).open(&path);
+        let mut file = opened.map_err(|error| CliError::file("write", &path, &error))?;
+        if !text.is_empty() && !text.ends_with('\n') {
+            file.write_all(b"\n")?;
+        }
+        Ok(Self { folder: folder.to_path_buf(), known, file: Mutex::new(file) })
+    }
+
+    /// Whether an earlier run wrote this output.
+    pub fn knows(&self, output: &Path) -> bool {
+        self.known.contains_key(output)
+    }
+
+    /// What an earlier run made of the same work, if it is still there.
+    pub fn finished(&self, work: &Entry) -> Option<Entry> {
+        let known = self.known.get(&work.output)?;
+        let is_there = || sha256_of(&self.folder.join(&known.output)).ok() == known.output_sha256;
+        let is_done = known.state == State::Done && known.is_same_work(work) && is_there();
+        is_done.then(|| known.clone())
+    }
+
+    /// Notes what became of a job, at once.
+    pub fn note(&self, entry: &Entry) -> Result<(), CliError> {
+        let mut line = serde_json::to_vec(entry).map_err(|error| CliError::Other(error.to_string()))?;
+        line.push(b'\n');
+        let path = self.folder.join(FILE);
+        let mut file = self.file.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        file.write_all(&line).map_err(|error| CliError::file("write", &path, &error))
+    }
+}

@@ -1,0 +1,215 @@
+use std::collections::{HashMap, HashSet};
+use std::fs;
+use std::path::{Component, Path, PathBuf};
+
+use clap::Parser;
+use csv::{Reader, StringRecord};
+
+use super::journal::Journal;
+use crate::args::{Args, BatchArgs, BatchCommand};
+use crate::error::CliError;
+
+/// Recordings that are done together, and what comes of them.
+#[derive(Clone, Debug, Default)]
+pub struct Job {
+    /// One, or those that a sensor is calibrated on.
+    pub files: Vec<PathBuf>,
+    /// The sensor's parameters, if the command is given some.
+    pub sensor: Option<PathBuf>,
+    /// Flags besides.
+    pub flags: Vec<String>,
+    /// The output below the folder of outputs.
+    pub output: PathBuf,
+}
+
+impl Job {
+    /// Bytes of its recordings, as far as they can be read.
+    pub fn bytes(&self) -> u64 {
+        self.files.iter().filter_map(|file| fs::metadata(file).ok()).map(|found| found.len()).sum()
+    }
+
+    /// What messages call it.
+    pub fn name(&self) -> String {
+        self.files.iter().map(|file| file.display().to_string()).collect::<Vec<_>>().join(", ")
+    }
+
+    /// The command line that does it, but for where a sensor is written to.
+    pub fn arguments(&self, args: &BatchArgs) -> Vec<String> {
+        let mut words = vec![args.command.name().to_owned()];
+        words.extend(self.flags.iter().cloned());
+        if let Some(sensor) = &self.sensor {
+            words.extend(["--sensor".into(), sensor.display().to_string()]);
+        }
+        match args.command {
+            BatchCommand::Filter | BatchCommand::Smooth => {
+                words.extend(["--format".to_owned(), args.format.name().to_owned()]);
+            }
+            BatchCommand::Evaluate | BatchCommand::Calibrate => words.push("--json".to_owned()),
+        }
+        words.push("--".to_owned());
+        words.extend(self.files.iter().map(|file| file.display().to_string()));
+        words
+    }
+}
+
+/// All jobs, each with a command line that the command takes.
+pub fn jobs(args: &BatchArgs) -> Result<Vec<Job>, CliError> {
+    let sensor = args.sensor.clone().filter(|_| args.command != BatchCommand::Calibrate);
+    let plain = |file: PathBuf| Job {
+        files: vec![file],
+        sensor: sensor.clone(),
+        flags: args.flags.clone(),
+        output: PathBuf::new(),
+    };
+    let mut jobs: Vec<Job> = args.files.iter().cloned().map(plain).collect();
+    for pattern in &args.glob {
+        jobs.extend(matching(pattern)?.into_iter().map(plain));
+    }
+    if let Some(manifest) = &args.manifest {
+        jobs.extend(listed(manifest, args, &plain)?);
+    }
+    name_outputs(&mut jobs, args);
+    for job in &jobs {
+        check_arguments(job, args)?;
+    }
+    Ok(jobs)
+}
+
+fn matching(pattern: &str) -> Result<Vec<PathBuf>, CliError> {
+    let paths = glob::glob(pattern).map_err(|error| CliError::Arguments(format!("--glob {pattern}: {error}")))?;
+    let files: Vec<PathBuf> = paths.filter_map(Result::ok).filter(|path| path.is_file()).collect();
+    if files.is_empty() {
+        return Err(CliError::Arguments(format!("--glob {pattern}: expected files, found none")));
+    }
+    Ok(files)
+}
+
+/// The rows of a manifest. Of `calibrate`, those with the same sensor are one job.
+fn listed(manifest: &Path, args: &BatchArgs, plain: &dyn Fn(PathBuf) -> Job) -> Result<Vec<Job>, CliError> {
+    let wrong = |error: csv::Error| CliError::Input(format!("{}: {error}", manifest.display()));
+    let mut rows = Reader::from_path(manifest).map_err(wrong)?;
+    let header = rows.headers().map_err(wrong)?.clone();
+    if !header.iter().any(|name| name.trim() == "file") {
+        let found = header.iter().collect::<Vec<_>>().join(",");
+        return Err(CliError::Input(format!(
+            "{}:1: expected a header with the column `file`, found `{found}`",
+            manifest.display()
+        )));
+    }
+    let folder = manifest.parent().unwrap_or(Path::new(""));
+    let (mut jobs, mut made): (Vec<Job>, HashMap<PathBuf, usize>) = (Vec::new(), HashMap::new());
+    for row in rows.records() {
+        let job = of_row(&header, &row.map_err(wrong)?, folder, args, plain);
+        let is_shared = args.command == BatchCommand::Calibrate && !job.output.as_os_str().is_empty();
+        match made.get(&job.output).filter(|_| is_shared) {
+            Some(first) => jobs[*first].files.extend(job.files),
+            None => {
+                made.insert(job.output.clone(), jobs.len());
+                jobs.push(job);
+            }
+        }
+    }
+    Ok(jobs)
+}
+
+fn of_row(
+    header: &StringRecord,
+    row: &StringRecord,
+    folder: &Path,
+    args: &BatchArgs,
+    plain: &dyn Fn(PathBuf) -> Job,
+) -> Job {
+    let mut job = plain(PathBuf::new());
+    for (name, cell) in header.iter().map(str::trim).zip(row.iter().map(str::trim)) {
+        match name {
+            "file" => job.files = vec![folder.join(cell)],
+            _ if cell.is_empty() => {}
+            "sensor" if args.command == BatchCommand::Calibrate => job.output = PathBuf::from(cell),
+            "sensor" => job.sensor = Some(folder.join(cell)),
+            "output" => job.output = PathBuf::from(cell),
+            _ => {
+                job.flags.push(format!("--{}", name.replace('_', "-")));
+                job.flags.extend((cell != "true").then(|| cell.to_owned()));
+            }
+        }
+    }
+    job
+}
+
+/// Names outputs that nobody has named: as the recordings lie below the folder that all of them share.
+fn name_outputs(jobs: &mut [Job], args: &BatchArgs) {
+    let ending = match args.command {
+        BatchCommand::Filter | BatchCommand::Smooth => args.format.name(),
+        BatchCommand::Evaluate => "json",
+        BatchCommand::Calibrate => "toml",
+    };
+    let folders = jobs.iter().flat_map(|job| &job.files).filter_map(|file| file.parent());
+    let shared = folders.map(Path::to_path_buf).reduce(|a, b| {
+        a.components().zip(b.components()).take_while(|(a, b)| a == b).map(|(a, _)| a).collect::<PathBuf>()
+    });
+    for job in jobs {
+        if job.output.as_os_str().is_empty()
+            && let Some(file) = job.files.first()
+        {
+            let below = shared.as_ref().and_then(|shared| file.strip_prefix(shared).ok()).unwrap_or(file);
+            // What leads out of the folder of outputs is left out.
+            job.output = below.components().filter(|part| matches!(part, Component::Normal(_))).collect();
+            job.output.set_extension("");
+        }
+        // Not `set_extension`: a name may have dots.
+        let mut name = job.output.clone().into_os_string();
+        if job.output.extension().is_none_or(|found| found != ending) {
+            name.push(".");
+            name.push(ending);
+        }
+        job.output = name.into();
+    }
+}
+
+/// What the command would say to its arguments is said before anything is done.
+fn check_arguments(job: &Job, args: &BatchArgs) -> Result<(), CliError> {
+    if job.files.iter().any(|file| file == Path::new("-")) {
+        return Err(CliError::Arguments("batch reads files; for standard input there is the command itself".into()));
+    }
+    let mut words = vec!["ohmstrain".to_owned()];
+    words.extend(job.arguments(args));
+    if args.command == BatchCommand::Calibrate {
+        words.splice(2..2, ["-o".to_owned(), "sensor.toml".to_owned()]);
+    }
+    let parsed = Args::try_parse_from(words);
+    parsed.map(drop).map_err(|error| {
+        let text = error.to_string();
+        let text = text.lines().map(str::trim).take_while(|line| !line.is_empty()).collect::<Vec<_>>().join(" ");
+        CliError::Arguments(format!("{}: {}", job.name(), text.trim_start_matches("error: ")))
+    })
+}
+
+/// Refuses outputs that would replace each other, an input, or what no earlier run wrote.
+pub fn check_outputs(jobs: &[Job], args: &BatchArgs, journal: &Journal) -> Result<(), CliError> {
+    let inputs = jobs.iter().flat_map(|job| job.files.iter().chain(&job.sensor));
+    let inputs: HashSet<PathBuf> = inputs.filter_map(|file| fs::canonicalize(file).ok()).collect();
+    let mut outputs = HashSet::new();
+    for job in jobs {
+        let path = args.output.join(&job.output);
+        let refused =
+            |why: &str| CliError::Arguments(format!("cannot write {} for {}: {why}", path.display(), job.name()));
+        if !job.output.components().all(|part| matches!(part, Component::Normal(_))) {
+            return Err(refused("it is not in the folder of outputs"));
+        }
+        if !outputs.insert(&job.output) {
+            return Err(refused(
+                "another recording's output has the same name; name them in a manifest's column `output`",
+            ));
+        }
+        let Ok(found) = fs::canonicalize(&path) else { continue };
+        if inputs.contains(&found) {
+            return Err(refused("it is an input; choose another folder"));
+        }
+        if !args.force && !journal.knows(&job.output) {
+            return Err(refused(
+                "no earlier run wrote what is there; choose another folder, or replace it with --force",
+            ));
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,197 @@
+//! Many recordings: what comes of each, what is done again, and what is refused.
+
+#[allow(dead_code, reason = "each test program uses its own share")]
+mod common;
+
+use std::fs;
+
+use common::Bench;
+
+/// Recordings of the same readings at other times, a sensor, and two files that are no recordings.
+fn folder() -> Bench {
+    let bench = Bench::calibrated();
+    let trace = bench.read("trace.csv");
+    fs::create_dir_all(bench.path("in/day 2")).unwrap();
+    for (name, rows) in [("in/a.csv", 400), ("in/b.csv", 500), ("in/day 2/a.csv", 600)] {
+        bench.write(name, trace.lines().take(rows).map(|line| format!("{line}\n")).collect::<String>());
+    }
+    bench
+}
+
+const SMOOTH: [&str; 9] = ["-q", "batch", "smooth", "--sensor", "sensor.toml", "-o", "out", "--glob", "in/**/*.csv"];
+
+/// One row of a summary in JSON per recording.
+fn summary(bench: &Bench) -> Vec<serde_json::Value> {
+    serde_json::from_str(&bench.read("out/summary.json")).unwrap()
+}
+
+#[test]
+fn outputs_are_those_of_the_command() {
+    let bench = folder();
+    let flags = ["--", "--gate", "10.8", "--columns", "time_s,strain,flags"];
+    bench.run(&[&SMOOTH[..], &["--jobs", "2"], &flags].concat()).ok();
+    for name in ["a.csv", "b.csv", "day 2/a.csv"] {
+        let input = format!("in/{name}");
+        let single = bench.run(&[&["smooth", &input, "--sensor", "sensor.toml"], &flags[1..]].concat()).ok();
+        assert_eq!(bench.read(&format!("out/{name}")), single, "{name}");
+    }
+    let text = bench.read("out/summary.csv");
+    assert_eq!(text.lines().count(), 4, "{text}");
+    assert!(text.lines().skip(1).all(|row| row.contains(",done,")), "{text}");
+}
+
+#[test]
+fn bad_recordings_leave_the_others_alone() {
+    let bench = folder();
+    bench.write("in/c.csv", "time_s,resistance_ohm\n0,1600\n1,oops\n");
+    bench.write("in/d.csv", [0, 159, 146, 150]);
+    let run = bench.run(&[&SMOOTH[..], &["--summary", "json"]].concat());
+    assert_eq!(run.code, Some(5), "{}", run.stderr);
+    assert!(run.stderr.contains("in/c.csv:3: column `resistance_ohm`"), "{}", run.stderr);
+    assert!(run.stderr.contains("3 done, 0 done before, 2 failed"), "{}", run.stderr);
+    let rows = summary(&bench);
+    let states: Vec<_> =
+        rows.iter().map(|row| (row["file"].as_str().unwrap(), row["state"].as_str().unwrap())).collect();
+    let expected = [("in/a.csv", "done"), ("in/b.csv", "done"), ("in/c.csv", "failed"), ("in/d.csv", "failed")];
+    assert_eq!(states[..4], expected);
+    assert_eq!((rows[2]["exit_code"].as_i64(), rows[2]["output_sha256"].as_str()), (Some(4), None));
+    assert!(bench.path("out/b.csv").is_file() && !bench.path("out/c.csv").exists());
+    let left = fs::read_dir(bench.path("out"))
+        .unwrap()
+        .filter(|found| found.as_ref().unwrap().file_name().to_string_lossy().starts_with('.'));
+    assert_eq!(left.count(), 0, "drafts go");
+}
+
+#[test]
+fn what_is_done_is_done_once() {
+    let bench = folder();
+    let smooth = [&SMOOTH[..], &["--summary", "json"]].concat();
+    let states = |arguments: &[&str]| {
+        bench.run(arguments).ok();
+        summary(&bench).iter().map(|row| row["state"].as_str().unwrap().to_owned()).collect::<Vec<_>>().join(" ")
+    };
+    assert_eq!(states(&smooth), "done done done");
+    assert_eq!(states(&smooth), "kept kept kept");
+    // A recording that has changed, an output that somebody has cut, and one that is gone.
+    bench.write("in/b.csv", bench.read("in/a.csv"));
+    assert_eq!(states(&smooth), "kept done kept");
+    bench.write("out/a.csv", "time_s\n");
+    assert_eq!(states(&smooth), "done kept kept");
+    fs::remove_file(bench.path("out/day 2/a.csv")).unwrap();
+    assert_eq!(states(&smooth), "kept kept done");
+    // Other flags, another sensor, and because somebody says so.
+    assert_eq!(states(&[&smooth[..], &["--", "--no-correction"]].concat()), "done done done");
+    bench.write("sensor.toml", bench.read("sensor.toml") + "\n");
+    assert_eq!(states(&[&smooth[..], &["--", "--no-correction"]].concat()), "done done done");
+    assert_eq!(states(&[&smooth[..], &["--again", "--", "--no-correction"]].concat()), "done done done");
+    // A line that a killed run left unfinished.
+    let journal = bench.read("out/batch.jsonl");
+    let lines: Vec<&str> = journal.lines().collect();
+    let [.., first, second, third] = lines[..] else { panic!("{journal}") };
+    bench.write("out/batch.jsonl", format!("{first}\n{second}\n{}", &third[..third.len() - 20]));
+    let last = states(&[&smooth[..], &["--force", "--", "--no-correction"]].concat());
+    assert_eq!((last.matches("done").count(), last.matches("kept").count()), (1, 2), "{last}");
+}
+
+#[test]
+fn inputs_and_other_peoples_files_stay() {
+    let bench = folder();
+    let refused = |arguments: &[&str], why: &str| {
+        let run = bench.run(arguments);
+        assert_eq!(run.code, Some(2), "{}", run.stderr);
+        assert!(run.stderr.contains(why), "{}", run.stderr);
+    };
+    let smooth = ["-q", "batch", "smooth", "--sensor", "sensor.toml"];
+    refused(&[&smooth[..], &["in/a.csv", "-o", "in"]].concat(), "it is an input");
+    bench.write("in/note.csv", bench.read("in/a.csv"));
+    fs::create_dir(bench.path("out")).unwrap();
+    bench.write("out/note.csv", "mine\n");
+    refused(&[&smooth[..], &["in/note.csv", "-o", "out"]].concat(), "no earlier run wrote");
+    assert_eq!(bench.read("out/note.csv"), "mine\n");
+    bench.run(&[&smooth[..], &["in/note.csv", "-o", "out", "--force"]].concat()).ok();
+    refused(&[&smooth[..], &["in/a.csv", "in/a.csv", "-o", "other"]].concat(), "same name");
+    refused(&[&smooth[..], &["in/a.csv", "-o", "other", "--", "--gate", "x"]].concat(), "expected a positive number");
+    refused(&["-q", "batch", "filter", "in/a.csv", "-o", "other"], "--sensor");
+    refused(&[&smooth[..], &["-", "-o", "other"]].concat(), "batch reads files");
+}
+
+#[test]
+fn a_manifest_has_sensors_names_and_flags() {
+    let bench = folder();
+    fs::copy(bench.path("sensor.toml"), bench.path("in/mine.toml")).unwrap();
+    let manifest =
+        "file,sensor,output,initial-strain,no_correction\na.csv,mine.toml,first,0,true\nb.csv,,day/second.csv,,\n";
+    bench.write("in/manifest.csv", manifest);
+    let batch = ["-q", "batch", "filter", "--manifest", "in/manifest.csv", "--sensor", "sensor.toml", "-o", "out"];
+    bench.run(&batch).ok();
+    let a = ["filter", "in/a.csv", "--sensor", "sensor.toml", "--initial-strain", "0", "--no-correction"];
+    assert_eq!(bench.read("out/first.csv"), bench.run(&a).ok());
+    let b = ["filter", "in/b.csv", "--sensor", "sensor.toml"];
+    assert_eq!(bench.read("out/day/second.csv"), bench.run(&b).ok());
+}
+
+#[test]
+fn recordings_of_one_sensor_are_calibrated_together_and_evaluated() {
+    let bench = folder();
+    bench.write("manifest.csv", "file,sensor\nin/day 2/a.csv,left\nin/b.csv,left\nin/a.csv,right\n");
+    let calibrate = ["-q", "batch", "calibrate", "--manifest", "manifest.csv", "-o", "out", "--summary", "json"];
+    bench.run(&[&calibrate[..], &["--", "--estimator", "ekf"]].concat()).ok();
+    let single = ["calibrate", "in/day 2/a.csv", "in/b.csv", "-o", "single.toml", "--estimator", "ekf"];
+    bench.run(&single).ok();
+    assert_eq!(bench.read("out/left.toml"), bench.read("single.toml"));
+    let rows = summary(&bench);
+    assert_eq!((rows.len(), rows[0]["file"].as_str()), (2, Some("in/day 2/a.csv; in/b.csv")));
+    assert!(rows[1]["filter_percent_fs"].as_f64().is_some(), "{}", rows[1]);
+
+    bench
+        .run(&[
+            "-q",
+            "batch",
+            "evaluate",
+            "in/b.csv",
+            "--sensor",
+            "out/left.toml",
+            "-o",
+            "scores",
+            "--summary",
+            "parquet",
+        ])
+        .ok();
+    let single = bench.run(&["evaluate", "in/b.csv", "--sensor", "out/left.toml", "--json"]).ok();
+    assert_eq!(bench.read("scores/b.json"), single);
+    assert!(fs::read(bench.path("scores/summary.parquet")).unwrap().ends_with(b"PAR1"));
+}
+
+/// Numbers of a CSV and of the CSV that is filtered from its Parquet are the same, out and in.
+#[test]
+fn parquet_holds_the_same_numbers() {
+    let bench = folder();
+    let batch = [
+        "-q",
+        "batch",
+        "filter",
+        "in/a.csv",
+        "in/b.csv",
+        "--sensor",
+        "sensor.toml",
+        "-o",
+        "out",
+        "--format",
+        "parquet",
+    ];
+    bench.run(&batch).ok();
+    let bytes = fs::metadata(bench.path("out/b.parquet")).unwrap().len();
+    let text = bench.run(&["filter", "in/b.csv", "--sensor", "sensor.toml"]).ok();
+    assert!(bytes < text.len() as u64, "{bytes} of {}", text.len());
+    // Estimates hold time and readings: they are a recording again, and give the same estimates.
+    for command in ["filter", "smooth"] {
+        let again = bench.run(&[command, "out/b.parquet", "--sensor", "sensor.toml"]).ok();
+        let first = bench.run(&[command, "in/b.csv", "--sensor", "sensor.toml"]).ok();
+        assert_eq!(again, first, "{command}");
+    }
+    let evaluated = |file: &str| bench.run(&["evaluate", file, "--sensor", "sensor.toml"]).ok();
+    let lines = |text: String| text.lines().skip(1).map(str::to_owned).collect::<Vec<_>>();
+    // Scored against its own estimates, as a CSV with the same columns is.
+    bench.write("b.csv", text);
+    assert_eq!(lines(evaluated("out/b.parquet")), lines(evaluated("b.csv")));
+}
