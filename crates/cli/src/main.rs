@@ -22,7 +22,6 @@ mod run;
 mod sensor_file;
 mod suits;
 mod verbosity;
-mod verdict;
 
 use std::io::{self, Write};
 use std::process::ExitCode;

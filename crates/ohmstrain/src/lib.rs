@@ -24,11 +24,13 @@
 
 mod builder;
 mod calibrate;
+mod closing;
 mod column;
 mod error;
 mod estimate;
 mod filter;
 mod flags;
+pub mod number;
 mod reading;
 mod recording;
 mod reference_doubt;
@@ -36,9 +38,11 @@ mod sensor;
 mod text;
 mod unit_doubt;
 mod validity;
+pub mod verdict;
 
 pub use builder::FilterBuilder;
 pub use calibrate::{Calibrated, Calibration, calibrate};
+pub use closing::Closing;
 pub use column::Column;
 pub use error::{Error, Place, TextCause, TextError};
 pub use estimate::Estimate;

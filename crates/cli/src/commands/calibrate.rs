@@ -2,10 +2,10 @@ use std::io;
 use std::path::Path;
 use std::time::Instant;
 
-use ohmstrain::{Calibrated, Calibration, Error, Quantity, ReadingUnit};
+use ohmstrain::{Calibrated, Calibration, Closing, Error, Quantity, ReadingUnit};
 use ohmstrain_calib::{Samples, screen};
 
-use super::closing::Closing;
+use super::closing;
 use super::explain;
 use super::reporting::{Reporting, Wanted};
 use super::scoring::Part;
@@ -48,7 +48,7 @@ pub fn run(args: &CalibrateArgs) -> Result<(), CliError> {
     let params = sensor.params();
     outputs.put(sensor_output, sensor_file::text(&sensor)?);
     let file = args.output.display().to_string();
-    let closing = Closing { file: &file, params, findings: findings.as_ref(), calibration_s };
+    let closing = Closing { file: Some(&file), params, findings: findings.as_ref(), calibration_s };
     if let Some(wanted) = wanted {
         let (facts, rest_resistance) = (closing.facts(), None);
         let (recording, part, sample) = (&recordings[0], Part::default(), Sample::In);
@@ -61,7 +61,7 @@ pub fn run(args: &CalibrateArgs) -> Result<(), CliError> {
     let said = if Verbosity::chosen() == Verbosity::Quiet && !args.json {
         vec![]
     } else if args.json {
-        closing.json().map_err(io::Error::from)?
+        closing::json(&closing, &file).map_err(io::Error::from)?
     } else {
         closing.text().into_bytes()
     };

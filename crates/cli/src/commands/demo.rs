@@ -1,10 +1,9 @@
 use std::time::Instant;
 
-use ohmstrain::{Calibrated, Calibration, Estimate, Sensor};
+use ohmstrain::{Calibrated, Calibration, Closing, Estimate, Sensor};
 use ohmstrain_bench_data::simulate::{Material, Protocol, SimulationSettings};
 
 use super::calibrate::calibrate_recordings;
-use super::closing::Closing;
 use super::reporting::{Reporting, Wanted};
 use super::score_table::{KEY, add_scores, score_table};
 use super::scoring::{self, Part};
@@ -55,7 +54,7 @@ pub fn run(args: &DemoArgs) -> Result<(), CliError> {
     outputs.put(smoothed_output, estimates(&sensor, &estimated.smoothed)?);
     progress.doing("writing the report");
     let part = Part::since(Some(test_from));
-    let facts = Closing { file: "sensor.toml", params, findings: findings.as_ref(), calibration_s }.facts();
+    let facts = Closing { file: Some("sensor.toml"), params, findings: findings.as_ref(), calibration_s }.facts();
     let reporting = Reporting {
         recording: &recording,
         sensor: &sensor,

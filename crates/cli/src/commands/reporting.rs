@@ -1,5 +1,6 @@
 use std::path::Path;
 
+use ohmstrain::verdict::verdict;
 use ohmstrain::{EstimatorKind, Scores, Sensor, SensorParams};
 
 use super::scoring::{self, Part};
@@ -10,7 +11,6 @@ use crate::output::{Claim, Kind, Outputs};
 use crate::report::{FigureFiles, Report, ReportInput, Sample, ScoreRow, Scored};
 use crate::run::estimate;
 use crate::sensor_file::MADE_BY;
-use crate::verdict::verdict;
 
 /// What a report is about.
 pub struct Reporting<'a> {

@@ -7,7 +7,7 @@ use std::ops::Range;
 
 use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, ValueFormatter};
 
-use super::number;
+use ohmstrain::number;
 
 /// Largest magnitude on an axis: the difference of two such numbers is still finite.
 const LARGEST: f64 = 1e300;

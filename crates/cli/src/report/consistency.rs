@@ -6,8 +6,8 @@ use super::chart::{Chart, HALF, WIDE};
 use super::figures::{Figure, HALF_TICKS, HIGH_TICKS, mark_test, time_axis};
 use super::ink::Ink;
 use super::innovations::{BOUND, Innovations};
-use super::number::plain;
 use super::recording::Recording;
+use ohmstrain::number::plain;
 
 /// |z| against time.
 pub fn size(recording: &Recording, innovations: &Innovations) -> Result<Figure, ReportError> {

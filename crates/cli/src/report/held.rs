@@ -6,8 +6,8 @@ use super::chart::{Chart, WIDE};
 use super::figures::{Figure, HIGH_TICKS};
 use super::ink::Ink;
 use super::motion::Hold;
-use super::number::plain;
 use super::recording::Recording;
+use ohmstrain::number::plain;
 
 /// Share of a hold that is plotted.
 const LAST: f64 = 0.99;

@@ -13,7 +13,6 @@ mod ink;
 mod innovations;
 mod law;
 mod motion;
-pub mod number;
 mod pieces;
 mod recording;
 mod relation;

@@ -3,8 +3,8 @@
 use super::ReportError;
 use super::chart::WIDE;
 use super::figures::{Figure, draw_strain, strain_chart};
-use super::number::significant;
 use super::recording::Recording;
+use ohmstrain::number::significant;
 
 /// Movements that one plot shows well, and most plots.
 const MOVEMENTS: usize = 14;

@@ -6,8 +6,8 @@ use ohmstrain_calib::{Quantity, ReadingUnit, SensorParams};
 use super::axis::extent;
 use super::law::{Driven, Law};
 use super::motion::{self, Hold, Motion};
-use super::number::significant;
 use super::{ReportInput, Scored};
+use ohmstrain::number::significant;
 
 /// Shortest hold whose relaxation is worth a plot, s.
 pub const SHORTEST_HOLD_S: f64 = 5.0;

@@ -6,9 +6,9 @@ use super::chart::{Chart, WIDE};
 use super::figures::{Figure, HIGH_TICKS};
 use super::ink::Ink;
 use super::motion::Motion;
-use super::number::{plain, significant};
 use super::recording::Recording;
 use super::thin::Point;
+use ohmstrain::number::{plain, significant};
 
 /// Arrows on a plot at most.
 const MOST_ARROWS: usize = 24;

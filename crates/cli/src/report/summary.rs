@@ -3,9 +3,9 @@
 use ohmstrain_calib::Quantity;
 
 use super::innovations::Innovations;
-use super::number::{percent, plain, significant};
 use super::recording::Recording;
 use super::{ReportInput, ScoreRow, Scored, axis};
+use ohmstrain::number::{percent, plain, significant};
 
 /// The result in words.
 pub fn headline(input: &ReportInput, recording: &Recording) -> String {

@@ -3,8 +3,8 @@
 use ohmstrain_calib::{GaugeParams, MotionParams, Quantity, RangeParams, ReadingUnit, SensorParams, Uncertainty};
 use serde::Serialize;
 
-use super::number::{percent, plain, with_error};
 use super::{Sample, ScoreRow};
+use ohmstrain::number::{percent, plain, with_error};
 
 /// A table; the first cell of a row is its heading.
 #[derive(Debug, Serialize)]

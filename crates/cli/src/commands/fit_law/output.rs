@@ -8,7 +8,7 @@ use super::{Fits, Fitted, phase_of};
 use crate::args::FitLawArgs;
 use crate::error::CliError;
 use crate::output::print;
-use crate::report::number::{plain, with_error};
+use ohmstrain::number::{plain, with_error};
 
 /// What `--json` prints.
 #[derive(Serialize)]

@@ -5,7 +5,7 @@ use ohmstrain_model::Phase;
 use super::{Fits, Fitted, SAME_SPEED, output};
 use crate::error::CliError;
 use crate::output::print;
-use crate::report::number::{fixed, plain, with_error};
+use ohmstrain::number::{fixed, plain, with_error};
 
 /// What one phase of one fit contributes.
 struct Entry<'a> {

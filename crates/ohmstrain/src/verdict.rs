@@ -2,7 +2,7 @@
 
 use ohmstrain_calib::Scores;
 
-use crate::report::number::fixed;
+use crate::number::fixed;
 
 /// Below this share of the static cubic's error an estimate is clearly better, below this one better.
 const CLEARLY_BETTER: f64 = 0.5;
