@@ -1,4 +1,6 @@
-use ohmstrain_ekf::{MixtureResidual, PhaseMixture, Reading, SparseImm, SparseMixture, SparseSignSplit, StepError};
+use ohmstrain_ekf::{
+    MixtureResidual, PhaseMixture, Reading, SparseHypotheses, SparseImm, SparseMixture, SparseSignSplit, State, StepError,
+};
 
 use crate::Filter;
 use crate::estimators::GATE;
@@ -25,18 +27,26 @@ impl InPlace for SparseImm<f64, 3, 6> {
     }
 }
 
-impl<const K: usize> InPlace for SparseSignSplit<f64, 3, 6, K> {
-    type State = SparseMixture<f64, 6, 21, K>;
+/// What the two filters of up to `K` Gaussians do alike.
+macro_rules! in_place {
+    ($filter:ident) => {
+        impl<const K: usize> InPlace for $filter<f64, 3, 6, K> {
+            type State = SparseMixture<f64, 6, 21, K>;
 
-    #[inline]
-    fn take(&self, state: &mut Self::State, reading: Option<f64>) -> Result<Option<MixtureResidual<f64>>, StepError> {
-        self.step(state, reading.map(Reading::from))
-    }
+            #[inline]
+            fn take(&self, state: &mut Self::State, reading: Option<f64>) -> Result<Option<MixtureResidual<f64>>, StepError> {
+                self.step(state, reading.map(Reading::from))
+            }
 
-    fn strain(state: &Self::State) -> f64 {
-        state.marginal(0).mean
-    }
+            fn strain(state: &Self::State) -> f64 {
+                state.marginal(0).mean
+            }
+        }
+    };
 }
+
+in_place!(SparseSignSplit);
+in_place!(SparseHypotheses);
 
 /// Such a filter with a gate on the normalised innovation squared and a log-likelihood.
 pub(crate) struct GatedMixture<F: InPlace> {

@@ -2,7 +2,7 @@ use std::collections::VecDeque;
 use std::mem;
 
 use ohmstrain_ekf::{
-    Belief, Estimate, Estimator, Gaussian, Guard, PastStep, Reading, Repeated, State, StepError, StrainSensor,
+    Estimate, Estimator, Gaussian, Guard, PastStep, Reading, Repeated, State, StepError, StrainSensor,
     smooth_back_through,
 };
 use ohmstrain_model::StrainRange;
@@ -115,9 +115,9 @@ where
     }
 
     fn strain(&self) -> Gaussian<f64> {
-        let belief: Belief<f64, N, L> = self.now.state.moments();
-        let variance = belief.covariance[(0, 0)] * self.interval.filtered_scale.powi(2);
-        Gaussian { mean: belief.mean[0], variance }.clamped(&self.interval.limits)
+        let Gaussian { mean, variance } = self.now.state.marginal(0);
+        let variance = variance * self.interval.filtered_scale.powi(2);
+        Gaussian { mean, variance }.clamped(&self.interval.limits)
     }
 
     fn output(&self) -> Output {

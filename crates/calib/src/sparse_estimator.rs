@@ -89,8 +89,9 @@ pub(crate) trait Pair<const N: usize, const L: usize, const K: usize>: Copy {
 
     fn step(
         sparse: &Self::Sparse,
-        state: &mut SparseMixture<f64, N, L, K>,
+        state: &SparseMixture<f64, N, L, K>,
         reading: Option<Reading<f64>>,
+        next: &mut SparseMixture<f64, N, L, K>,
     ) -> Result<Option<MixtureResidual<f64>>, StepError>;
 
     /// One step backwards along what [`Self::step`] did.
@@ -126,10 +127,11 @@ impl<const B: usize, const N: usize, const L: usize> Pair<N, L, HISTORIES> for H
 
     fn step(
         sparse: &Self::Sparse,
-        state: &mut SparseMixture<f64, N, L, HISTORIES>,
+        state: &SparseMixture<f64, N, L, HISTORIES>,
         reading: Option<Reading<f64>>,
+        next: &mut SparseMixture<f64, N, L, HISTORIES>,
     ) -> Result<Option<MixtureResidual<f64>>, StepError> {
-        sparse.step(state, reading)
+        sparse.step_into(state, reading, next)
     }
 
     fn smooth_back(
@@ -166,10 +168,11 @@ impl<const B: usize, const N: usize, const L: usize> Pair<N, L, HYPOTHESES> for 
 
     fn step(
         sparse: &Self::Sparse,
-        state: &mut SparseMixture<f64, N, L, HYPOTHESES>,
+        state: &SparseMixture<f64, N, L, HYPOTHESES>,
         reading: Option<Reading<f64>>,
+        next: &mut SparseMixture<f64, N, L, HYPOTHESES>,
     ) -> Result<Option<MixtureResidual<f64>>, StepError> {
-        sparse.step(state, reading)
+        sparse.step_into(state, reading, next)
     }
 
     fn smooth_back(
@@ -214,20 +217,30 @@ impl<P: Pair<N, L, K>, const N: usize, const L: usize, const K: usize> Estimator
         reading: Option<Reading<f64>>,
     ) -> Result<Advanced<Self::State, f64>, StepError> {
         let mut next = *state;
-        match prepared.sparse.as_ref().map(|sparse| P::step(sparse, &mut next, reading)) {
+        let innovation = self.advance_into(state, prepared, reading, &mut next)?;
+        Ok(Advanced { state: next, innovation })
+    }
+
+    fn advance_into(
+        &self,
+        state: &Self::State,
+        prepared: &Self::Prepared,
+        reading: Option<Reading<f64>>,
+        next: &mut Self::State,
+    ) -> Result<Option<Innovation<f64>>, StepError> {
+        match prepared.sparse.as_ref().map(|sparse| P::step(sparse, state, reading, next)) {
             Some(Ok(said)) if said.is_none_or(|said| said.residual.nis.is_finite()) => {
-                let innovation = said.map(|said| Innovation {
+                Ok(said.map(|said| Innovation {
                     value: said.residual.innovation,
                     variance: said.residual.variance,
                     log_likelihood: said.log_likelihood(),
-                });
-                Ok(Advanced { state: next, innovation })
+                }))
             }
             _ => {
                 let dense = self.0.dense();
-                let Advanced { state, innovation } =
-                    dense.advance(&(*state).into(), &dense.prepare(prepared.dt_s), reading)?;
-                Ok(Advanced { state: (&state).into(), innovation })
+                let taken = dense.advance(&(*state).into(), &dense.prepare(prepared.dt_s), reading)?;
+                *next = (&taken.state).into();
+                Ok(taken.innovation)
             }
         }
     }

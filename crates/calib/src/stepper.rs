@@ -15,6 +15,8 @@ pub(crate) struct Stepper<E: Estimator<f64, N, L>, const N: usize, const L: usiz
     /// Of the model's own noise.
     reading_variance: f64,
     prepared: PreparedSteps<Repeated<E::Prepared>>,
+    /// Where the next state is made: two take turns.
+    next: Option<Box<E::State>>,
 }
 
 /// A step as a smoother needs it.
@@ -58,6 +60,7 @@ impl<E: Estimator<f64, N, L>, const N: usize, const L: usize> Stepper<E, N, L> {
             sieve,
             reading_variance,
             prepared: PreparedSteps::new(),
+            next: None,
         }
     }
 
@@ -107,19 +110,19 @@ impl<E: Estimator<f64, N, L>, const N: usize, const L: usize> Stepper<E, N, L> {
         let mut repeats = now.repeats;
         let (reading, decided) = self.sieved(&mut repeats, time_s, reading);
         let prepared = self.prepared.of(now.seconds_until(time_s), |dt_s| self.estimator.prepare(dt_s))?;
-        let (taken, verdict) = match self.estimator.advance(&now.state, prepared, reading) {
+        let next = self.next.get_or_insert_with(|| Box::new(now.state.clone()));
+        let (innovation, verdict) = match self.estimator.advance_into(&now.state, prepared, reading, next) {
             Err(error) if reading.is_some() && error.is_of_the_reading() => {
-                (self.estimator.advance(&now.state, prepared, None)?, ReadingVerdict::Rejected)
+                (self.estimator.advance_into(&now.state, prepared, None, next)?, ReadingVerdict::Rejected)
             }
             taken => {
                 let verdict = if reading.is_some() { ReadingVerdict::Accepted } else { ReadingVerdict::Missing };
                 (taken?, decided.unwrap_or(verdict))
             }
         };
-        let Advanced { state, innovation } = taken;
         now.repeats = repeats;
         now.time_s = Some(time_s);
-        now.state = state;
+        now.state.clone_from(next);
         now.seen = Seen { innovation, verdict };
         Ok(())
     }

@@ -1,5 +1,5 @@
 use crate::Real;
-use crate::gaussian::upper_tail;
+use crate::tail::{density, upper_tail};
 
 /// The χ² distribution.
 ///
@@ -67,7 +67,7 @@ impl<T: Real> ChiSquare<T> {
         let odd = !(self.dof / two - (self.dof / two).floor()).is_zero();
         let decay = (-half).exp();
         let (mut sum, mut term, mut dof) = if odd {
-            (half.sqrt().erfc(), decay * half.sqrt() * T::of(core::f64::consts::FRAC_2_SQRT_PI), T::one())
+            (two * upper_tail(x.sqrt()), decay * half.sqrt() * T::of(core::f64::consts::FRAC_2_SQRT_PI), T::one())
         } else {
             (decay, decay * half, two)
         };
@@ -86,7 +86,7 @@ impl<T: Real> ChiSquare<T> {
 /// mass inside.
 pub(crate) fn gated_moments<T: Real>(gate: T) -> (T, T) {
     let a = gate.sqrt();
-    let edge = T::of(2.0) * a * crate::gaussian::density(a) / (T::one() - T::of(2.0) * upper_tail(a));
+    let edge = T::of(2.0) * a * density(a) / (T::one() - T::of(2.0) * upper_tail(a));
     let mean = T::one() - edge;
     (mean, T::of(3.0) - (gate + T::of(3.0)) * edge - mean * mean)
 }

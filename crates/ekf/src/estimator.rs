@@ -33,6 +33,23 @@ pub trait Estimator<T: Scalar, const N: usize, const L: usize> {
         reading: Option<Reading<T>>,
     ) -> Result<Advanced<Self::State, T>, StepError>;
 
+    /// [`Self::advance`] into a state that is there already, whatever it was: nothing need be moved. After an error it means
+    /// nothing.
+    ///
+    /// # Errors
+    /// See [`StepError`].
+    fn advance_into(
+        &self,
+        state: &Self::State,
+        prepared: &Self::Prepared,
+        reading: Option<Reading<T>>,
+        next: &mut Self::State,
+    ) -> Result<Option<Innovation<T>>, StepError> {
+        let Advanced { state, innovation } = self.advance(state, prepared, reading)?;
+        *next = state;
+        Ok(innovation)
+    }
+
     /// One step backwards: the state at time k given all readings, from `filtered` at k, the step that led from there to
     /// k+1, and `next`, the state at k+1 given all readings. `None` if the estimator has no smoother.
     ///
@@ -51,6 +68,12 @@ pub trait Estimator<T: Scalar, const N: usize, const L: usize> {
 pub trait State<T: Scalar, const N: usize, const L: usize>: Clone {
     /// The Gaussian with its mean and covariance.
     fn moments(&self) -> Belief<T, N, L>;
+
+    /// Mean and variance of one of its components.
+    fn marginal(&self, index: usize) -> Gaussian<T> {
+        let belief = self.moments();
+        Gaussian { mean: belief.mean[index], variance: belief.covariance[(index, index)] }
+    }
 
     /// Visits what the state is a mixture of: weights that sum to one, and Gaussians.
     fn each(&self, visit: &mut dyn FnMut(T, &Belief<T, N, L>));

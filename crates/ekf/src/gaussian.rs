@@ -1,23 +1,7 @@
-use ohmstrain_model::{Scalar, StrainRange};
+use ohmstrain_model::StrainRange;
 
-/// `f32` or `f64`: scalars that know the complementary error function.
-pub trait Real: Scalar {
-    /// `erfc(x) = 1 - erf(x)`, accurate in the far tail.
-    #[must_use]
-    fn erfc(self) -> Self;
-}
-
-impl Real for f32 {
-    fn erfc(self) -> Self {
-        libm::erfcf(self)
-    }
-}
-
-impl Real for f64 {
-    fn erfc(self) -> Self {
-        libm::erfc(self)
-    }
-}
+pub use crate::tail::Real;
+use crate::tail::{Tail, density, upper_tail};
 
 /// A Gaussian in one dimension.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -91,6 +75,10 @@ impl<T: Real> Gaussian<T> {
         if width * width * width * width * width < T::of(NARROW) * T::default_epsilon() {
             return self.in_narrow(a, b, side);
         }
+        if b > T::of(WHOLLY_INSIDE) && a < T::of(MIDDLE) {
+            let Tail { mass, hazard } = Tail::above(a);
+            return self.within(mass, side * sd, hazard, a * hazard);
+        }
         let mass = mass_between(a, b);
         if !(mass > T::of(FAR_TAIL)) {
             let slope = T::one() / a;
@@ -102,12 +90,16 @@ impl<T: Real> Gaussian<T> {
             };
         }
         let (at_a, at_b) = (density(a), density(b));
-        let shift = (at_a - at_b) / mass;
         let edge = |x: T, at_x: T| if at_x.is_zero() { T::zero() } else { x * at_x };
-        let narrowed = T::one() + (edge(a, at_a) - edge(b, at_b)) / mass - shift * shift;
+        self.within(mass, side * sd, (at_a - at_b) / mass, (edge(a, at_a) - edge(b, at_b)) / mass)
+    }
+
+    /// What is left of it: a mass whose mean is shifted by so many deviations `sd`, and `edge` for what is cut off.
+    fn within(&self, mass: T, sd: T, shift: T, edge: T) -> TruncatedGaussian<T> {
+        let narrowed = T::one() + edge - shift * shift;
         TruncatedGaussian {
             mass,
-            mean: self.mean + side * sd * shift,
+            mean: self.mean + sd * shift,
             variance: self.variance * narrowed.max(T::zero()).min(T::one()),
         }
     }
@@ -143,6 +135,8 @@ const FLAT: f64 = 0.1;
 
 /// With both ends this many deviations away nothing is cut off that a double would notice: 2 · 10⁻¹⁹.
 const WHOLLY_INSIDE: f64 = 9.0;
+/// Up to so many deviations a tail without another end has its moments from its hazard.
+const MIDDLE: f64 = 5.0;
 /// Below this mass the moments of a truncated Gaussian are taken from the tail's asymptote; about 5.6 deviations out.
 const FAR_TAIL: f64 = 1e-8;
 
@@ -154,18 +148,8 @@ fn mass_between<T: Real>(a: T, b: T) -> T {
     if a < -whole {
         return T::one(); // then b is further away still
     }
-    if a < T::zero() && b > whole {
+    if a < T::of(MIDDLE) && b > whole {
         return upper_tail(a);
     }
     upper_tail(a) - upper_tail(b)
-}
-
-/// Probability of a standard normal above `x`.
-pub(crate) fn upper_tail<T: Real>(x: T) -> T {
-    T::of(0.5) * (x * T::of(core::f64::consts::FRAC_1_SQRT_2)).erfc()
-}
-
-/// Density of the standard normal.
-pub(crate) fn density<T: Real>(x: T) -> T {
-    (T::of(-0.5) * x * x).exp() / T::two_pi().sqrt()
 }

@@ -66,9 +66,39 @@ impl<T: Real, const N: usize, const L: usize, const K: usize> Recorder<T, N, L> 
     }
 }
 
-/// One step backwards of a sparse filter.
-macro_rules! sparse_smooth_back {
+/// The steps of a sparse filter, forward and backwards, around its `step_recorded`.
+macro_rules! sparse_steps {
     ($dense:ident) => {
+        /// Predicts one step ahead and takes the reading; without one it is a prediction and returns `None`.
+        ///
+        /// # Errors
+        /// See [`StepError`]; the state is untouched.
+        #[inline]
+        pub fn step<const L: usize>(
+            &self,
+            state: &mut SparseMixture<T, N, L, K>,
+            reading: Option<Reading<T>>,
+        ) -> Result<Option<MixtureResidual<T>>, StepError> {
+            let mut next = SparseMixture::empty();
+            let residual = self.step_into(state, reading, &mut next)?;
+            *state = next;
+            Ok(residual)
+        }
+
+        /// [`Self::step`] into a state that is there already, whatever it was: nothing need be moved.
+        ///
+        /// # Errors
+        /// See [`StepError`]; `next` then means nothing.
+        #[inline]
+        pub fn step_into<const L: usize>(
+            &self,
+            state: &SparseMixture<T, N, L, K>,
+            reading: Option<Reading<T>>,
+            next: &mut SparseMixture<T, N, L, K>,
+        ) -> Result<Option<MixtureResidual<T>>, StepError> {
+            self.step_recorded(state, reading, next, &mut ())
+        }
+
         /// One step backwards along what [`Self::step`] did: the state before it given all readings, from `filtered` before it,
         /// the reading at its end, and `next`, the state after it given all readings. `dense` is the same filter with its
         /// linearisations, `prepared` its step of the same length.
@@ -84,7 +114,7 @@ macro_rules! sparse_smooth_back {
             next: &SparseMixture<T, N, L, K>,
         ) -> Result<SparseMixture<T, N, L, K>, StepError> {
             let (mut genealogy, mut heirs) = ($crate::genealogy::Genealogy::<K>::new(), *filtered);
-            self.step_recorded(&mut heirs, reading, &mut genealogy)?;
+            self.step_recorded(filtered, reading, &mut heirs, &mut genealogy)?;
             let lineage = $crate::lineage::Lineage::new(dense.model());
             let mut following = $crate::genealogy::Following { lineage, genealogy: &genealogy };
             let from: $crate::Mixture<T, N, L, K> = (*filtered).into();
@@ -94,7 +124,7 @@ macro_rules! sparse_smooth_back {
         }
     };
 }
-pub(crate) use sparse_smooth_back;
+pub(crate) use sparse_steps;
 
 #[cfg(test)]
 #[allow(clippy::unwrap_used, reason = "a test")]

@@ -112,6 +112,7 @@ mod sparse_update;
 mod substeps;
 mod switch;
 mod switching;
+mod tail;
 mod traits;
 mod unscented;
 mod window;

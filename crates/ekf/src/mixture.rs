@@ -214,6 +214,10 @@ impl<T: Real, const N: usize, const L: usize, const K: usize> State<T, N, L> for
         self.moments()
     }
 
+    fn marginal(&self, index: usize) -> Gaussian<T> {
+        marginal_match(self.components().iter().map(|c| (c.log_weight.exp(), &c.belief)), index)
+    }
+
     fn each(&self, visit: &mut dyn FnMut(T, &Belief<T, N, L>)) {
         for component in self.components() {
             visit(component.log_weight.exp(), &component.belief);
@@ -294,6 +298,20 @@ pub(crate) fn moment_match<'a, T: Scalar, const N: usize, const L: usize>(
         covariance.add_outer(&(belief.mean - mean), weight);
     }
     Belief { mean, covariance }
+}
+
+/// The same of one component of the state.
+pub(crate) fn marginal_match<'a, T: Scalar, const N: usize, const L: usize>(
+    weighted: impl Iterator<Item = (T, &'a Belief<T, N, L>)> + Clone,
+    index: usize,
+) -> Gaussian<T> {
+    let mean = weighted.clone().fold(T::zero(), |sum, (weight, belief)| sum + weight * belief.mean[index]);
+    let mut variance = T::zero();
+    for (weight, belief) in weighted {
+        let apart = belief.mean[index] - mean;
+        variance += weight * (belief.covariance[(index, index)] + apart * apart);
+    }
+    Gaussian { mean, variance }
 }
 
 /// Restricts a belief to rates of one sign; the probability of that sign.

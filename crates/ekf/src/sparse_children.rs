@@ -1,16 +1,16 @@
-use ohmstrain_model::{Phase, Symmetric};
+use ohmstrain_model::Phase;
 
+use crate::StepError;
 use crate::gaussian::Real;
 use crate::genealogy::Heirs;
 use crate::mixture::{ALIKE, Added, LEAST_WEIGHT, LIGHTER};
 use crate::sparse_evidence::{Weighed, Weight};
 use crate::sparse_mixture::{Share, SparseMixture};
 use crate::sparse_parts::Parts;
-use crate::{Belief, StepError};
 
 /// Collects the children of a step: keeps, merges and drops them as [`Mixture`](crate::Mixture) does.
-pub(crate) struct Children<T, const N: usize, const L: usize, const K: usize> {
-    kept: SparseMixture<T, N, L, K>,
+pub(crate) struct Children<'a, T, const N: usize, const L: usize, const K: usize> {
+    kept: &'a mut SparseMixture<T, N, L, K>,
     /// The largest exponent so far; weights are in units of its exponential. What is so much lighter that it has become
     /// zero would be dropped in the end.
     exponent: T,
@@ -18,10 +18,12 @@ pub(crate) struct Children<T, const N: usize, const L: usize, const K: usize> {
     density: T,
 }
 
-impl<T: Real, const N: usize, const L: usize, const K: usize> Children<T, N, L, K> {
+impl<'a, T: Real, const N: usize, const L: usize, const K: usize> Children<'a, T, N, L, K> {
+    /// In the place of what `kept` has been.
     #[inline(always)]
-    pub(crate) fn new() -> Self {
-        Self { kept: SparseMixture::empty(), exponent: T::zero(), density: T::zero() }
+    pub(crate) fn new(kept: &'a mut SparseMixture<T, N, L, K>) -> Self {
+        kept.clear();
+        Self { kept, exponent: T::zero(), density: T::zero() }
     }
 
     /// Adds a child: merged with one that says the same, in a free place, or in the place of the lightest, which is
@@ -40,19 +42,16 @@ impl<T: Real, const N: usize, const L: usize, const K: usize> Children<T, N, L, 
             like.merge(child, weight, log_inside);
             return Added::To(place);
         }
-        let len = self.kept.shares().len();
-        let displaced = if len < K { None } else { self.lightest() };
-        let (added, place) = match displaced {
-            None => (Added::To(len), self.kept.one_more()),
-            Some((at, share, of)) if share.weight < weight * T::of(1.0 - LIGHTER) => {
-                let displaced = Parts::<T, B>::of(&share.belief);
-                let into = self.merge_into_nearest(&displaced, of, (share.weight, share.log_inside), Some(at));
-                (Added::InsteadOf(at, into), self.kept.iter_mut().nth(at))
-            }
-            Some(_) => {
+        let (added, place) = if self.kept.shares().len() < K {
+            (Added::To(self.kept.shares().len()), self.kept.one_more())
+        } else {
+            let (at, lightest) = self.lightest();
+            if !(lightest < weight * T::of(1.0 - LIGHTER)) {
                 let into = self.merge_into_nearest(child, phase, (weight, log_inside), None);
                 return into.map_or(Added::Nowhere, Added::To);
             }
+            let into = self.displace::<B>(at);
+            (Added::InsteadOf(at, into), self.kept.iter_mut().nth(at))
         };
         let Some((place, of)) = place else { return Added::Nowhere };
         (place.weight, place.log_inside, *of) = (weight, log_inside, phase);
@@ -60,9 +59,19 @@ impl<T: Real, const N: usize, const L: usize, const K: usize> Children<T, N, L, 
         added
     }
 
-    fn lightest(&mut self) -> Option<(usize, Share<T, N, L>, Phase)> {
-        let all = self.kept.iter_mut().enumerate().map(|(at, (share, of))| (at, *share, *of));
-        all.reduce(|a, b| if b.1.weight < a.1.weight * T::of(1.0 - LIGHTER) { b } else { a })
+    /// Where the lightest is, and its weight.
+    fn lightest(&self) -> (usize, T) {
+        let weights = self.kept.shares().iter().map(|share| share.weight).enumerate();
+        let lighter = |a: (usize, T), b: (usize, T)| if b.1 < a.1 * T::of(1.0 - LIGHTER) { b } else { a };
+        weights.reduce(lighter).unwrap_or((0, T::zero()))
+    }
+
+    /// Merges what is at a place into the nearest of its phase, and says where that is.
+    #[inline(never)]
+    fn displace<const B: usize>(&mut self, at: usize) -> Option<usize> {
+        let (share, phase) = self.kept.iter_mut().nth(at)?;
+        let (displaced, counts, phase) = (Parts::<T, B>::of(&share.belief), (share.weight, share.log_inside), *phase);
+        self.merge_into_nearest(&displaced, phase, counts, Some(at))
     }
 
     /// Merges a child into the nearest of its phase, not counting the one at `but`, and says where that is; if there is none,
@@ -127,16 +136,17 @@ impl<T: Real, const N: usize, const L: usize, const K: usize> Children<T, N, L, 
         }
         Ok(())
     }
-
-    pub(crate) fn into_state(self) -> SparseMixture<T, N, L, K> {
-        self.kept
-    }
 }
 
 impl<T: Real, const N: usize, const L: usize> Share<T, N, L> {
     /// As hypotheses of one phase count as one in a [`Mixture`](crate::Mixture).
     #[inline(always)]
     fn is_like<const B: usize>(&self, other: &Parts<T, B>) -> bool {
+        // Mostly they are not, which the strain tells without a division.
+        let (apart, variance) = (self.belief.mean[0] - other.strain, self.belief.covariance[(0, 0)]);
+        if apart * apart > T::of(ALIKE) * (variance + other.strain_variance) {
+            return false;
+        }
         let strain = self.apart(0, other.strain, other.strain_variance);
         strain < T::of(ALIKE) && strain + self.apart(1, other.rate, other.rate_variance) < T::of(ALIKE)
     }
@@ -161,20 +171,20 @@ impl<T: Real, const N: usize, const L: usize> Share<T, N, L> {
             return;
         }
         let (mine, theirs) = (self.weight / total, weight / total);
-        let mut taken = self.belief;
-        other.put_into(&mut taken);
-        let (apart, both) = (taken.mean - self.belief.mean, mine * theirs);
+        let both = mine * theirs;
         // By iterators throughout: an index could panic.
-        let mut covariance = [T::zero(); L];
-        let known = self.belief.covariance.packed().iter().zip(taken.covariance.packed());
-        let mut entries = covariance.iter_mut().zip(known);
-        for (i, a) in apart.iter().enumerate() {
-            for (b, (merged, (p, q))) in apart.iter().take(i + 1).zip(&mut entries) {
-                *merged = mine * *p + theirs * *q + both * *a * *b;
+        let (mut mean, mut covariance) = ([T::zero(); N], [T::zero(); L]);
+        other.write::<N>(&mut mean.iter_mut(), &mut covariance.iter_mut());
+        for (apart, mine) in mean.iter_mut().zip(self.belief.mean.iter_mut()) {
+            *apart -= *mine;
+            *mine += *apart * theirs;
+        }
+        let mut entries = self.belief.covariance.packed_mut().iter_mut().zip(&covariance);
+        for (i, a) in mean.iter().enumerate() {
+            for (b, (p, q)) in mean.iter().take(i + 1).zip(&mut entries) {
+                *p = mine * *p + theirs * *q + both * *a * *b;
             }
         }
-        self.belief =
-            Belief { mean: self.belief.mean + apart * theirs, covariance: Symmetric::from_packed(covariance) };
         self.weight = total;
         self.log_inside = mine * self.log_inside + theirs * log_inside;
     }

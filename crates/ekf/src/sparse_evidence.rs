@@ -1,10 +1,11 @@
 use ohmstrain_model::{Phase, Scalar, StrainRange};
 
-use crate::gaussian::{Real, upper_tail};
+use crate::gaussian::Real;
 use crate::mixture::LEAST_INSIDE;
 use crate::mixture_step::Predicted;
 use crate::sparse_parts::Parts;
 use crate::switch::RateSpread;
+use crate::tail::upper_tail;
 use crate::{Curve, Evidence, Reading, Residual, SparseEkf, StepError, Switch};
 
 /// What weighs the Gaussians of a sparse mixture: as [`Evidence`] does, in factors instead of logarithms.

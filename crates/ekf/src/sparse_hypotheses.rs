@@ -7,7 +7,7 @@
 use ohmstrain_model::{Phase, SwitchedModel};
 
 use crate::gaussian::Real;
-use crate::genealogy::{Heirs, sparse_smooth_back};
+use crate::genealogy::{Heirs, sparse_steps};
 use crate::mixture_step::Predicted;
 use crate::sparse_children::Children;
 use crate::sparse_evidence::{Newborn, Weighing};
@@ -67,29 +67,17 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
         self.kernel.model()
     }
 
-    /// Predicts one step ahead and takes the reading; without one it is a prediction and returns `None`.
-    ///
-    /// # Errors
-    /// See [`StepError`]; the state is untouched.
-    #[inline]
-    pub fn step<const L: usize>(
-        &self,
-        state: &mut SparseMixture<T, N, L, K>,
-        reading: Option<Reading<T>>,
-    ) -> Result<Option<MixtureResidual<T>>, StepError> {
-        self.step_recorded(state, reading, &mut ())
-    }
-
-    sparse_smooth_back!(Hypotheses);
+    sparse_steps!(Hypotheses);
 
     #[inline(always)]
     fn step_recorded<const L: usize>(
         &self,
-        state: &mut SparseMixture<T, N, L, K>,
+        state: &SparseMixture<T, N, L, K>,
         reading: Option<Reading<T>>,
+        next: &mut SparseMixture<T, N, L, K>,
         heirs: &mut impl Heirs,
     ) -> Result<Option<MixtureResidual<T>>, StepError> {
-        let mut children = Children::new();
+        let mut children = Children::new(next);
         let mut predicted = Predicted::new();
         for (place, (parent, from)) in state.shares().iter().zip(state.phases()).enumerate() {
             for (phase, probability) in Phase::ALL.into_iter().zip(self.chain[from.index()]) {
@@ -109,7 +97,6 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
         }
         let density = children.density();
         children.normalise(heirs)?;
-        *state = children.into_state();
         Ok(reading.map(|_| MixtureResidual::new(&predicted, density, self.weighing.tempering())))
     }
 }

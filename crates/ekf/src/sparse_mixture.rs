@@ -1,8 +1,8 @@
 use nalgebra::SVector;
-use ohmstrain_model::{Phase, Scalar, Symmetric};
+use ohmstrain_model::{Phase, Symmetric};
 
 use crate::gaussian::Real;
-use crate::mixture::{Component, Mixture};
+use crate::mixture::{Component, Mixture, marginal_match, moment_match};
 use crate::pause::{Pause, PhaseSum};
 use crate::{Belief, Gaussian, State, StepError};
 
@@ -120,13 +120,11 @@ impl<T: Real, const N: usize, const L: usize, const K: usize> SparseMixture<T, N
     pub(crate) fn retain(&mut self, counts: impl Fn(&Share<T, N, L>) -> bool) {
         let mut kept = 0;
         for place in 0..self.len {
-            let (Some(share), Some(phase)) = (self.shares.get(place).copied(), self.phases.get(place).copied()) else {
-                break;
-            };
-            if !counts(&share) {
+            if !self.shares.get(place).is_some_and(&counts) {
                 continue;
             }
             if kept < place
+                && let (Some(share), Some(phase)) = (self.shares.get(place).copied(), self.phases.get(place).copied())
                 && let (Some(to), Some(of)) = (self.shares.get_mut(kept), self.phases.get_mut(kept))
             {
                 (*to, *of) = (share, phase);
@@ -134,6 +132,11 @@ impl<T: Real, const N: usize, const L: usize, const K: usize> SparseMixture<T, N
             kept += 1;
         }
         self.len = kept;
+    }
+
+    /// Follows nothing.
+    pub(crate) fn clear(&mut self) {
+        (self.len, self.pause) = (0, Pause::over());
     }
 
     /// The Gaussians with their phases.
@@ -192,14 +195,6 @@ impl<T: Real, const N: usize, const L: usize, const K: usize> From<&Mixture<T, N
 /// What both have in common. Everything that is not done at every step goes through [`Mixture`].
 macro_rules! sparse_state {
     ($state:ident<T, N, L $(, $k:ident)?>, $capacity:expr) => {
-        impl<T: Real, const N: usize, const L: usize $(, const $k: usize)?> $state<T, N, L $(, $k)?> {
-            /// Mean and variance of one component of the state over the whole mixture.
-            #[must_use]
-            pub fn marginal(&self, index: usize) -> Gaussian<T> {
-                marginal(self.shares(), index)
-            }
-        }
-
         impl<T: Real, const N: usize, const L: usize $(, const $k: usize)?> From<$state<T, N, L $(, $k)?>>
             for Mixture<T, N, L, { $capacity }>
         {
@@ -212,7 +207,12 @@ macro_rules! sparse_state {
             for $state<T, N, L $(, $k)?>
         {
             fn moments(&self) -> Belief<T, N, L> {
-                self.mixture().moments()
+                let followed = self.shares().iter().filter(|share| share.weight > T::zero());
+                moment_match(followed.map(|share| (share.weight, &share.belief)))
+            }
+
+            fn marginal(&self, index: usize) -> Gaussian<T> {
+                marginal_match(self.shares().iter().map(|share| (share.weight, &share.belief)), index)
             }
 
             fn each(&self, visit: &mut dyn FnMut(T, &Belief<T, N, L>)) {
@@ -238,16 +238,3 @@ macro_rules! sparse_state {
 
 sparse_state!(PhaseMixture<T, N, L>, 3);
 sparse_state!(SparseMixture<T, N, L, K>, K);
-
-fn marginal<T: Scalar, const N: usize, const L: usize>(shares: &[Share<T, N, L>], index: usize) -> Gaussian<T> {
-    let mut mean = T::zero();
-    for share in shares {
-        mean += share.weight * share.belief.mean[index];
-    }
-    let mut variance = T::zero();
-    for share in shares {
-        let apart = share.belief.mean[index] - mean;
-        variance += share.weight * (share.belief.covariance[(index, index)] + apart * apart);
-    }
-    Gaussian { mean, variance }
-}

@@ -1,4 +1,4 @@
-use ohmstrain_model::{Scalar, Symmetric};
+use ohmstrain_model::Scalar;
 
 use crate::Belief;
 
@@ -125,9 +125,7 @@ impl<T: Scalar, const B: usize> Parts<T, B> {
 
     #[inline(always)]
     pub(crate) fn put_into<const N: usize, const L: usize>(&self, belief: &mut Belief<T, N, L>) {
-        let mut covariances = [T::zero(); L];
-        self.write::<N>(&mut belief.mean.iter_mut(), &mut covariances.iter_mut());
-        belief.covariance = Symmetric::from_packed(covariances);
+        self.write::<N>(&mut belief.mean.iter_mut(), &mut belief.covariance.packed_mut().iter_mut());
     }
 
     /// Whether a step has left numbers: no variance is negative and nothing is infinite or not a number. `extra` is a number

@@ -2,8 +2,9 @@
 
 use ohmstrain_model::{Phase, RateChange, Scalar, Turning};
 
-use crate::gaussian::{Real, density, upper_tail};
+use crate::gaussian::Real;
 use crate::sparse_parts::{Part, Parts};
+use crate::tail::Tail;
 use crate::{Curve, Gaussian, SparseEkf, Switch};
 
 impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> SparseEkf<T, S, B, N, G> {
@@ -68,8 +69,7 @@ impl<T: Real, const B: usize> Parts<T, B> {
         }
         let per_sd = T::one() / S::root(variance);
         let border = -toward * per_sd;
-        let mass = upper_tail(border);
-        let shift = density(border) / mass;
+        let Tail { mass, hazard: shift } = Tail::above(border);
         let (narrowed, zero, gone) = (border * shift - shift * shift, T::zero(), -T::one());
         // By comparisons, which cost less than calls of `fmax` and `fmin`.
         let narrowed = if narrowed > zero {

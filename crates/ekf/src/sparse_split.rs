@@ -7,7 +7,7 @@
 use ohmstrain_model::{Phase, SwitchedModel, Turning};
 
 use crate::gaussian::Real;
-use crate::genealogy::{Heirs, sparse_smooth_back};
+use crate::genealogy::{Heirs, sparse_steps};
 use crate::mixture::Added;
 use crate::mixture_step::{LEAST_MASS, Predicted};
 use crate::pause::Pause;
@@ -73,26 +73,14 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
         self.kernel.model()
     }
 
-    /// Predicts one step ahead and takes the reading; without one it is a prediction and returns `None`.
-    ///
-    /// # Errors
-    /// See [`StepError`]; the state is untouched.
-    #[inline]
-    pub fn step<const L: usize>(
-        &self,
-        state: &mut SparseMixture<T, N, L, K>,
-        reading: Option<Reading<T>>,
-    ) -> Result<Option<MixtureResidual<T>>, StepError> {
-        self.step_recorded(state, reading, &mut ())
-    }
-
-    sparse_smooth_back!(SignSplit);
+    sparse_steps!(SignSplit);
 
     #[inline(always)]
     fn step_recorded<const L: usize>(
         &self,
-        state: &mut SparseMixture<T, N, L, K>,
+        state: &SparseMixture<T, N, L, K>,
         reading: Option<Reading<T>>,
+        next: &mut SparseMixture<T, N, L, K>,
         heirs: &mut impl Heirs,
     ) -> Result<Option<MixtureResidual<T>>, StepError> {
         let pause = match reading {
@@ -100,7 +88,7 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
             Some(_) => Pause::over(),
         };
         let open = pause.open;
-        let mut children = Children::new();
+        let mut children = Children::new(next);
         let mut predicted = Predicted::new();
         for (place, (parent, from)) in state.shares().iter().zip(state.phases()).enumerate() {
             let before = if state.pause().open { toward(*from, &parent.belief.mean[1]) } else { *from };
@@ -117,8 +105,7 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
         }
         let density = children.density();
         children.normalise(heirs)?;
-        *state = children.into_state();
-        state.set_pause(pause);
+        next.set_pause(pause);
         Ok(reading.map(|_| MixtureResidual::new(&predicted, density, self.weighing.tempering())))
     }
 
@@ -127,7 +114,7 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
         &self,
         origin: &Origin<'_, T, N, L>,
         reading: Option<Reading<T>>,
-        children: &mut Children<T, N, L, K>,
+        children: &mut Children<'_, T, N, L, K>,
         predicted: &mut Predicted<T>,
     ) -> Result<Option<Added>, StepError> {
         let Origin { parent, from, turning, phase, probability } = *origin;

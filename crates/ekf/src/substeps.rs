@@ -1,6 +1,6 @@
 use ohmstrain_model::Scalar;
 
-use crate::{Advanced, Estimator, Reading, StepError};
+use crate::{Advanced, Estimator, Innovation, Reading, StepError};
 
 /// An estimator that takes a long step as several short ones, so that a pause in the readings may be written down as one step
 /// or as many rows without a reading.
@@ -78,14 +78,38 @@ where
         prepared: &Self::Prepared,
         reading: Option<Reading<T>>,
     ) -> Result<Advanced<E::State, T>, StepError> {
+        let mut next = state.clone();
+        let innovation = self.advance_into(state, prepared, reading, &mut next)?;
+        Ok(Advanced { state: next, innovation })
+    }
+
+    fn advance_into(
+        &self,
+        state: &E::State,
+        prepared: &Self::Prepared,
+        reading: Option<Reading<T>>,
+        next: &mut E::State,
+    ) -> Result<Option<Innovation<T>>, StepError> {
         if prepared.count <= 1 {
-            return self.0.advance(state, &prepared.step, reading);
+            return self.0.advance_into(state, &prepared.step, reading, next);
         }
-        let mut onward = self.0.advance(state, &prepared.step, None)?.state;
-        for _ in 2..prepared.count {
-            onward = self.0.advance(&onward, &prepared.step, None)?.state;
+        // To and fro between two states: the last step ends in `next`.
+        let mut between = state.clone();
+        let mut remaining = prepared.count;
+        if remaining % 2 == 1 {
+            self.0.advance_into(state, &prepared.step, None, next)?;
+            self.0.advance_into(next, &prepared.step, None, &mut between)?;
+            remaining -= 2;
+        } else {
+            self.0.advance_into(state, &prepared.step, None, &mut between)?;
+            remaining -= 1;
         }
-        self.0.advance(&onward, &prepared.step, reading)
+        while remaining > 1 {
+            self.0.advance_into(&between, &prepared.step, None, next)?;
+            self.0.advance_into(next, &prepared.step, None, &mut between)?;
+            remaining -= 2;
+        }
+        self.0.advance_into(&between, &prepared.step, reading, next)
     }
 
     fn smooth_back(

@@ -58,6 +58,12 @@ impl<T: Scalar, const N: usize, const L: usize> Symmetric<T, N, L> {
         &self.0
     }
 
+    /// The lower triangle, row by row, to be changed.
+    #[must_use]
+    pub const fn packed_mut(&mut self) -> &mut [T; L] {
+        &mut self.0
+    }
+
     /// The matrix from its lower triangle, row by row.
     #[must_use]
     pub fn from_packed(packed: [T; L]) -> Self {
