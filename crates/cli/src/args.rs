@@ -22,7 +22,7 @@ pub use estimate::{EstimateArgs, FilterArgs, Format, RestResistance, SmoothArgs}
 pub use evaluate::{Estimators, EvaluateArgs};
 pub use export::{ExportArgs, ExportTarget};
 pub use files::{ImportArgs, InspectArgs};
-pub use fit_law::{FitLawArgs, SegmentChoice, phase_name};
+pub use fit_law::{FitLawArgs, SegmentChoice, TableFormat, phase_name};
 pub use live::LiveArgs;
 pub use refine::RefineArgs;
 pub use shell::{CompletionsArgs, ManArgs};

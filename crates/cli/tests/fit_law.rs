@@ -197,3 +197,52 @@ fn what_cannot_be_fitted_is_refused() {
     assert_eq!((wrong.code, wrong.stdout.as_str()), (Some(ARGUMENTS), ""));
     assert!(wrong.stderr.contains("expected eq1, eq2"), "{}", wrong.stderr);
 }
+
+#[test]
+fn laws_are_compared_on_the_same_readings() {
+    let bench = Bench::new();
+    bench.write("trace.csv", as_printed());
+    // One exponential made the hold: laws with more parameters fit as well, and cost more.
+    let csv = bench.run(&["fit-law", "trace.csv", "--compare", "prony:2,prony:1,kww", "--format", "csv"]).ok();
+    let rows: Vec<Vec<&str>> = csv.lines().skip(1).map(|line| line.split(',').collect()).collect();
+    assert_eq!(rows.len(), 3, "{csv}");
+    assert!(rows.iter().all(|row| row[4].parse::<f64>().unwrap() > 0.999), "{csv}");
+    assert!(rows.iter().any(|row| row[6] == "0.0"), "{csv}");
+    let refused = bench.run(&["fit-law", "trace.csv", "--compare", "eq8,kww,eq8+eq9"]);
+    assert!(refused.code != Some(0) || refused.stdout.lines().count() > 3);
+}
+
+#[test]
+fn fits_come_as_csv_latex_and_figures() {
+    let bench = Bench::new();
+    bench.write("trace.csv", as_printed());
+    let csv = bench.run(&["fit-law", "trace.csv", "--format", "csv", "--figures", "figures"]).ok();
+    let lines: Vec<Vec<&str>> = csv.lines().map(|line| line.split(',').collect()).collect();
+    let column =
+        csv.lines().next().unwrap().replace(", ", " ").split(',').position(|name| name.starts_with("tau0")).unwrap();
+    let tau0: f64 = lines[1][column].parse().unwrap();
+    // Where the movement begins and ends is found to a row: 0.1 s of 10.
+    assert!((tau0 / 6.0 - 1.0).abs() < 0.01, "{csv}");
+    let latex = bench.run(&["fit-law", "trace.csv", "--table", "--format", "latex"]).ok();
+    assert!(
+        latex.contains("\\begin{tabular}") && latex.contains("$\\pm$") && latex.ends_with("\\end{tabular}\n"),
+        "{latex}"
+    );
+    let files = common::files_in(&bench.path("figures"));
+    assert_eq!(
+        files,
+        ["01-eq8-eq9-extend-1-hold-2.csv", "01-eq8-eq9-extend-1-hold-2.pdf", "01-eq8-eq9-extend-1-hold-2.svg"]
+    );
+    // The drawn law meets the reading where the movement ends: 2000 exp(-10/6) 0.2 + 1600.
+    let drawn = bench.read("figures/01-eq8-eq9-extend-1-hold-2.csv");
+    let end = 2000.0 * (-10.0_f64 / 6.0).exp() * 0.2 + 1600.0;
+    let law = drawn.lines().filter(|line| line.starts_with("\"eq8+eq9"));
+    let points = law.map(|line| {
+        let mut numbers = line.rsplit(',').map(|cell| cell.parse::<f64>().unwrap());
+        (numbers.next().unwrap(), numbers.next().unwrap())
+    });
+    let at_end = points.min_by(|a, b| (a.1 - 10.0).abs().total_cmp(&(b.1 - 10.0).abs()));
+    let found = at_end.unwrap_or_else(|| panic!("{drawn}")).0;
+    // A row is 0.1 s, in which the reading changes by some 1.5 ohms; the fit is good to the error of its times.
+    assert!((found - end).abs() < 1.5, "{found} {end}");
+}

@@ -2,14 +2,14 @@ use std::fmt;
 use std::path::PathBuf;
 use std::str::FromStr;
 
-use clap::Args as ClapArgs;
+use clap::{Args as ClapArgs, ValueEnum};
 use ohmstrain_calib::closed_form::{ClosedForm, ModulusShape};
 use ohmstrain_model::Phase;
 
 use super::{RestResistance, TraceArgs};
 
 /// Flags of `fit-law`.
-#[derive(Debug, ClapArgs)]
+#[derive(Clone, Debug, ClapArgs)]
 #[command(after_long_help = LAWS)]
 pub struct FitLawArgs {
     /// Recordings; with a reference, unless `--segment whole`
@@ -31,15 +31,38 @@ pub struct FitLawArgs {
     /// Resistance at rest for eq2: a number in the readings' unit, or first:N for the median of the first N readings
     #[arg(long, value_name = "OHM|first:N", default_value = "first:20")]
     pub rest_resistance: RestResistance,
+    /// Fit several laws of one phase to the same segments and rank them by AICc and BIC: eq1,eq2,kww,prony:3
+    #[arg(long, value_name = "LAWS", value_delimiter = ',', conflicts_with_all = ["law", "json", "table", "figures"])]
+    pub compare: Vec<ClosedForm>,
     /// Print JSON
     #[arg(long)]
     pub json: bool,
+    /// How tables are printed; CSV has all digits, and a column of standard errors for each parameter
+    #[arg(long, value_enum, default_value_t = TableFormat::Text, conflicts_with = "json")]
+    pub format: TableFormat,
+    /// Also write a plot of each fit as SVG and PDF, with what is drawn as CSV, to this folder
+    #[arg(long, value_name = "DIR")]
+    pub figures: Option<PathBuf>,
+    /// Replace files that this program did not write, too
+    #[arg(long)]
+    pub force: bool,
     /// Print one row per material, speed and phase over all recordings
     #[arg(long, conflicts_with_all = ["json", "pool"])]
     pub table: bool,
     /// Overrides of the recordings' metadata
     #[command(flatten)]
     pub trace: TraceArgs,
+}
+
+/// A form of tables.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum TableFormat {
+    /// For a terminal.
+    Text,
+    /// For another program.
+    Csv,
+    /// For a paper: a tabular with booktabs.
+    Latex,
 }
 
 /// What the long help says after the flags.

@@ -4,7 +4,7 @@ use ohmstrain_bench_data::{FrontEndSpec, JointSpec, Metadata, ResistanceUnit, St
 use super::positive;
 
 /// What a trace's metadata lines leave unsaid, or say wrongly.
-#[derive(Debug, Default, ClapArgs)]
+#[derive(Clone, Debug, Default, ClapArgs)]
 pub struct TraceArgs {
     /// Length of the unstretched sensor, mm
     #[arg(long, value_name = "MM", value_parser = positive)]

@@ -89,6 +89,11 @@ impl Axis {
         if self.log { self.low * (self.high / self.low).powf(share) } else { self.low + share * (self.high - self.low) }
     }
 
+    /// Ends, and `log` if it is logarithmic.
+    pub fn as_attribute(&self) -> String {
+        format!("{} {}{}", self.low, self.high, if self.log { " log" } else { "" })
+    }
+
     /// Ends of the axis.
     pub fn ends(&self) -> (f64, f64) {
         (self.low, self.high)

@@ -290,9 +290,34 @@ impl Chart {
         self.draw(SVGBackend::with_string(&mut drawing, size)).map_err(ReportError::Plot)?;
         // Its size on the page is the style sheet's affair; the view box keeps the proportions.
         let inside = drawing.split_once("viewBox").map_or("", |(_, inside)| inside);
+        let inside = self.with_data_apart(inside);
         let label = minijinja::HtmlEscape(description);
-        let width = self.size_px.0;
-        Ok(format!("<svg role=\"img\" aria-label=\"{label}\" style=\"--width: {width}px\" viewBox{inside}"))
+        let (width, area, axes) = (self.size_px.0, self.area_units(), [&self.x, &self.y].map(Axis::as_attribute));
+        Ok(format!(
+            "<svg role=\"img\" aria-label=\"{label}\" style=\"--width: {width}px\" data-area=\"{area}\" data-x=\"{}\" \
+             data-y=\"{}\" viewBox{inside}",
+            axes[0], axes[1]
+        ))
+    }
+
+    /// Left, top, width and height of the plot without its labels, in drawing units.
+    fn area_units(&self) -> String {
+        let (width, height) = self.area_px();
+        [LEFT_PX, ABOVE_PX, width, height].map(|px| fine(px).to_string()).join(" ")
+    }
+
+    /// The layers in a group of their own, which a script can move without the axes.
+    fn with_data_apart(&self, inside: &str) -> String {
+        let Some(layers) = self.layers.first() else { return inside.into() };
+        let hex = layers.ink.hex();
+        // Each ink has a colour of its own, and axes come first.
+        let first = inside.find(&format!("\"{hex}\"")).and_then(|at| inside[..at].rfind('<'));
+        match (first, inside.rfind("</svg>")) {
+            (Some(first), Some(end)) if first < end => {
+                format!("{}<g class=\"data\">\n{}</g>\n{}", &inside[..first], &inside[first..end], &inside[end..])
+            }
+            _ => inside.into(),
+        }
     }
 
     fn draw(&self, backend: SVGBackend) -> Result<(), String> {
@@ -344,7 +369,8 @@ impl Layer {
                 piece => area.draw(&PathElement::new(piece.iter().copied().map(place).collect::<Vec<_>>(), style)),
             }),
             Shape::Dots(dots) => {
-                dots.iter().try_for_each(|dot| area.draw(&Circle::new(place(*dot), fine(DOT_PX), style.filled())))
+                let radius = fine(DOT_PX.max(0.5 * self.ink.width));
+                dots.iter().try_for_each(|dot| area.draw(&Circle::new(place(*dot), radius, style.filled())))
             }
             Shape::Areas(outlines) => outlines.iter().try_for_each(|outline| {
                 area.draw(&Polygon::new(outline.iter().copied().map(place).collect::<Vec<_>>(), style))

@@ -37,6 +37,78 @@ pub fn relaxation(recording: &Recording) -> Result<Option<Figure>, ReportError> 
     Figure::new(chart, "Relaxation while held", note, false).map(Some)
 }
 
+/// Parts of a decade over which a rate is taken.
+const PER_DECADE: f64 = 8.0;
+
+/// How fast the readings change in the longest holds, or nothing if there is none.
+pub fn rate(recording: &Recording) -> Result<Option<Figure>, ReportError> {
+    let held: Vec<(Curve, &Hold)> =
+        recording.longest_holds().iter().filter_map(|hold| Some((Curve::new(recording, hold)?, hold))).collect();
+    let rates: Vec<_> = held.iter().map(|(curve, _)| (slopes(&curve.recorded), slopes(&curve.predicted))).collect();
+    let recorded = || rates.iter().flat_map(|(recorded, _)| recorded);
+    let Some((first, last)) = extent(recorded().map(|(time, _)| *time)) else { return Ok(None) };
+    let predicted = rates.iter().flat_map(|(_, law)| law.iter().map(|(_, rate)| *rate));
+    let y = Axis::around("d(R/R at start)/dt, 1/s", recorded().map(|(_, rate)| *rate), predicted, HIGH_TICKS);
+    let mut chart =
+        Chart::new((WIDE.0 * 0.8, 340.0), Axis::logarithmic("Time since the hold began, s", first, last), y);
+    let inks = Ink::HOLDS.into_iter().zip(Ink::HELD_LAWS);
+    for (place, (((curve, hold), (recorded, predicted)), (ink, law))) in held.iter().zip(&rates).zip(inks).enumerate() {
+        let name = format!("{} held from {} s", recording.with_unit(hold.strain), plain(curve.start_s));
+        chart.line(ink, &name, recorded.iter().copied());
+        chart.curve(law, if place == 0 { "law, in the same colours" } else { "" }, predicted.iter().copied());
+    }
+    let note = "Slopes of straight lines through an eighth of a decade of readings each.";
+    Figure::new(chart, "Rate of relaxation", note, false).map(Some)
+}
+
+/// Slopes of straight lines through parts of a decade, at the middle of their times.
+fn slopes(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
+    let part = |time: f64| (time.log10() * PER_DECADE).floor();
+    let known: Vec<(f64, f64)> = points.iter().copied().filter(|(time, y)| *time > 0.0 && y.is_finite()).collect();
+    let of_part = |points: &[(f64, f64)]| {
+        let n = points.len() as f64;
+        let (mean_t, mean_y) = points.iter().fold((0.0, 0.0), |sum, (t, y)| (sum.0 + t / n, sum.1 + y / n));
+        let (sty, stt) = points
+            .iter()
+            .fold((0.0, 0.0), |sum, (t, y)| (sum.0 + (t - mean_t) * (y - mean_y), sum.1 + (t - mean_t) * (t - mean_t)));
+        (points.len() > 2 && stt > 0.0).then_some((mean_t, sty / stt))
+    };
+    known.chunk_by(|a, b| part(a.0) == part(b.0)).filter_map(of_part).collect()
+}
+
+/// Readings at the beginning and at the end of every hold, level by level; nothing where fewer than three levels are held.
+pub fn levels(recording: &Recording) -> Result<Option<Figure>, ReportError> {
+    let ends: Vec<(f64, f64, f64)> = recording.holds().iter().filter_map(|hold| ends_of(recording, hold)).collect();
+    let mut levels: Vec<f64> = ends.iter().map(|(strain, ..)| *strain).collect();
+    levels.sort_by(f64::total_cmp);
+    let Some((low, high)) = extent(levels.iter().copied()) else { return Ok(None) };
+    levels.dedup_by(|b, a| *b - *a < 0.05 * (high - low));
+    if levels.len() < 3 {
+        return Ok(None);
+    }
+    let curve = recording.gauge_curve(Some((low, high)));
+    let settled = || curve.iter().map(|(x, g)| (recording.shown(*x), recording.rest_reading * (1.0 + g)));
+    let x = Axis::holding(recording.quantity_label(), levels.iter().map(|x| recording.shown(*x)), HIGH_TICKS + 2);
+    let readings = ends.iter().flat_map(|(_, begun, ended)| [*begun, *ended]);
+    let y = Axis::around(recording.reading_label(), readings, settled().map(|(_, y)| y), HIGH_TICKS);
+    let mut chart = Chart::new((WIDE.0 * 0.7, 340.0), x, y);
+    chart.curve(Ink::CURVE, "gauge curve: fully relaxed", settled());
+    chart.dots(Ink::BEGUN, "hold begins", ends.iter().map(|(x, begun, _)| (recording.shown(*x), *begun)));
+    chart.dots(Ink::ENDED, "hold ends", ends.iter().map(|(x, _, ended)| (recording.shown(*x), *ended)));
+    let note = "What a level reads depends on how it was reached, and for how long it is held.";
+    Figure::new(chart, "Held levels", note, false).map(Some)
+}
+
+/// Strain of a hold, and its first and last readings.
+fn ends_of(recording: &Recording, hold: &Hold) -> Option<(f64, f64, f64)> {
+    let end_s = recording.time_s.get(hold.first)? + LAST * hold.duration_s;
+    let rows = recording.time_s.iter().zip(recording.reading).take(hold.last + 1).skip(hold.first);
+    let mut known =
+        rows.filter(|(time_s, reading)| **time_s <= end_s && reading.is_finite()).map(|(_, reading)| *reading);
+    let begun = known.next()?;
+    Some((hold.strain, begun, known.next_back()?))
+}
+
 /// A hold's readings and the law's, relative to their first.
 struct Curve {
     start_s: f64,

@@ -50,6 +50,15 @@ impl Ink {
         Self::line((0x35, 0x5F, 0x8D), "time-4", 1.1),
         Self::line((0x48, 0x1B, 0x6D), "time-5", 1.1),
     ];
+    /// Movements, from slow to fast.
+    pub const SPEEDS: [Self; 3] = [
+        Self::line((0x00, 0x7A, 0x5E), "green", 1.2),
+        Self::line((0x00, 0x72, 0xB8), "blue", 1.2),
+        Self::line((0xD5, 0x5E, 0x04), "red", 1.2),
+    ];
+    /// Where a hold begins, and where it ends.
+    pub const BEGUN: Self = Self::line((0xD5, 0x5E, 0x05), "red", 6.0);
+    pub const ENDED: Self = Self::line((0x00, 0x72, 0xB9), "blue", 6.0);
     /// Which way a line goes.
     pub const ARROWS: Self = Self::line((0x1D, 0x1D, 0x1D), "ink", 1.0);
     /// A bound.
@@ -103,6 +112,8 @@ impl Ink {
             Self::CURVE,
             Self::STATIC,
             Self::ARROWS,
+            Self::BEGUN,
+            Self::ENDED,
             Self::BOUND,
             Self::TEST,
             Self::BARS,
@@ -111,7 +122,7 @@ impl Ink {
             Self::GRID,
             Self::FRAME,
         ];
-        single.into_iter().chain(Self::HOLDS).chain(Self::HELD_LAWS).chain(Self::TIMES).collect()
+        single.into_iter().chain(Self::HOLDS).chain(Self::HELD_LAWS).chain(Self::TIMES).chain(Self::SPEEDS).collect()
     }
 
     /// The colour as the drawing writes it.

@@ -92,6 +92,11 @@ impl<'a> Recording<'a> {
         self.held.get(..PLOTTED_HOLDS).unwrap_or(&self.held)
     }
 
+    /// All holds, longest first.
+    pub fn holds(&self) -> &[Hold] {
+        &self.held
+    }
+
     /// What the law remembers at the start of one of the longest holds.
     pub fn memory_at(&self, row: usize) -> Option<&[f64]> {
         self.held_driven.memories.get(&row).map(Vec::as_slice)

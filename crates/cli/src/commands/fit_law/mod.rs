@@ -1,8 +1,11 @@
 //! `fit-law`: closed-form laws fitted to the segments of recordings.
 
+mod compare;
+mod figures;
 mod output;
 mod pieces;
 mod published;
+mod rows;
 
 use ohmstrain_bench_data::ReadingKind;
 use ohmstrain_calib::closed_form::{ClosedForm, ClosedFormFit, ModulusShape, fit_closed_form};
@@ -46,17 +49,21 @@ pub fn run(args: &FitLawArgs) -> Result<(), CliError> {
         return Err(CliError::Arguments(format!("--modulus is for eq8, eq9 and eq8+eq9, not for {}", args.law)));
     }
     let overrides = args.trace.metadata();
-    let mut recordings = Vec::new();
-    for path in &args.traces {
-        recordings.push(fit_recording(&input::read(path, &overrides)?, args)?);
+    let read = |path: &std::path::PathBuf| input::read(path, &overrides);
+    let recordings: Vec<Recording> = args.traces.iter().map(read).collect::<Result<_, _>>()?;
+    if !args.compare.is_empty() {
+        return compare::compare(&recordings, args);
     }
-    output::warn(&recordings);
+    let fits: Vec<Fits> =
+        recordings.iter().map(|recording| fit_recording(recording, args)).collect::<Result<_, _>>()?;
+    output::warn(&fits);
+    args.figures.as_deref().map_or(Ok(()), |folder| figures::put(folder, &fits, args.force))?;
     if args.json {
-        output::json(&recordings, args)
+        output::json(&fits, args)
     } else if args.table {
-        published::table(&recordings)
+        published::table(&fits).print(args.format)
     } else {
-        output::table(&recordings)
+        output::table(&fits).print(args.format)
     }
 }
 

@@ -1,14 +1,14 @@
 use std::collections::BTreeSet;
 
-use comfy_table::{Table, presets};
 use ohmstrain_calib::closed_form::{Estimated, ModulusShape};
 use serde::Serialize;
 
+use super::rows::{Cell, Rows};
 use super::{Fits, Fitted, phase_of};
 use crate::args::FitLawArgs;
 use crate::error::CliError;
 use crate::output::print;
-use ohmstrain::number::{plain, with_error};
+use ohmstrain::number::plain;
 
 /// What `--json` prints.
 #[derive(Serialize)]
@@ -92,28 +92,24 @@ fn fit_report<'a>(recording: &'a Fits, Fitted { piece, fit }: &'a Fitted, args: 
     }
 }
 
-/// Prints one row per fit.
-pub fn table(recordings: &[Fits]) -> Result<(), CliError> {
+/// One row per fit.
+pub fn table(recordings: &[Fits]) -> Rows {
     let fits = || recordings.iter().flat_map(|recording| recording.fits.iter().map(move |fitted| (recording, fitted)));
     let names = names(fits().map(|(_, fitted)| fitted));
-    let mut table = Table::new();
-    table.load_style(presets::ASCII_MARKDOWN);
     let header = ["recording", "segment", "speed, 1/s"].map(String::from).into_iter();
     let quality = ["R^2", "AIC", "n", "neighbours"].map(String::from);
-    table.set_header(header.chain(with_units(&names, fits())).chain(quality));
-    for (recording, Fitted { piece, fit }) in fits() {
-        let mut row = vec![recording.name.clone(), piece.label.clone()];
-        row.push(piece.speed_per_s.map_or_else(String::new, plain));
-        row.extend(names.iter().map(|name| fit.get(name).map_or_else(String::new, cell)));
-        row.extend([
-            format!("{:.5}", fit.r_squared),
-            format!("{:.1}", fit.aic),
-            fit.readings.to_string(),
-            format!("{:.2}", fit.residual_autocorrelation),
-        ]);
-        table.add_row(row);
-    }
-    print(|out| Ok(writeln!(out, "{table}")?))
+    let header = header.chain(with_units(&names, fits())).chain(quality).collect();
+    let row = |(recording, Fitted { piece, fit }): (&Fits, &Fitted)| {
+        let speed = piece.speed_per_s.map_or_else(String::new, plain);
+        let mut row: Vec<Cell> = [recording.name.clone(), piece.label.clone(), speed].map(Cell::from).into();
+        row.extend(names.iter().map(|name| Cell::of(fit.get(name))));
+        let (r_squared, aic) = (format!("{:.5}", fit.r_squared), format!("{:.1}", fit.aic));
+        let (readings, neighbours) = (fit.readings.to_string(), format!("{:.2}", fit.residual_autocorrelation));
+        row.extend([r_squared, aic, readings, neighbours].map(Cell::from));
+        row
+    };
+    let rows = fits().map(row).collect();
+    Rows { header, rows }
 }
 
 /// Names of all parameters and derived quantities, each once.
@@ -170,14 +166,5 @@ pub fn warn(recordings: &[Fits]) {
                 CliError::warning(&format!("{}: {}: {}", recording.name, piece.label, doubts.join("; ")));
             }
         }
-    }
-}
-
-/// A value with its standard error, or what there is to say instead.
-fn cell(estimated: &Estimated) -> String {
-    match estimated.standard_error {
-        Some(error) => with_error(estimated.value, error),
-        None if estimated.at_limit => format!("{} (limit)", plain(estimated.value)),
-        None => "not told".into(),
     }
 }

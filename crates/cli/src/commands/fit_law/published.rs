@@ -1,11 +1,9 @@
-use comfy_table::{Table, presets};
 use ohmstrain_calib::closed_form::{ClosedForm, Datum, Estimated};
 use ohmstrain_model::Phase;
 
+use super::rows::{Cell, Rows};
 use super::{Fits, Fitted, SAME_SPEED, output};
-use crate::error::CliError;
-use crate::output::print;
-use ohmstrain::number::{fixed, plain, with_error};
+use ohmstrain::number::{fixed, plain};
 
 /// What one phase of one fit contributes.
 struct Entry<'a> {
@@ -19,27 +17,26 @@ struct Entry<'a> {
 /// Order of the phases in the table.
 const PHASES: [&str; 5] = ["extend", "hold", "retract", "rest", "whole"];
 
-/// Prints one row per material, speed and phase.
-pub fn table(recordings: &[Fits]) -> Result<(), CliError> {
+/// One row per material, speed and phase.
+pub fn table(recordings: &[Fits]) -> Rows {
     let in_mm = recordings.iter().all(|recording| recording.gauge_length_mm.is_some());
     let mut entries: Vec<Entry> = recordings.iter().flat_map(|recording| entries(recording, in_mm)).collect();
     let order = |entry: &Entry| PHASES.iter().position(|phase| *phase == entry.phase);
     let speed = |entry: &Entry| entry.speed.unwrap_or(f64::INFINITY);
     entries.sort_by(|a, b| a.material.cmp(b.material).then(speed(a).total_cmp(&speed(b))));
     let names = output::names(entries.iter().map(|entry| entry.fitted));
-    let mut table = Table::new();
-    table.load_style(presets::ASCII_MARKDOWN);
     let unit = if in_mm { "speed, mm/s" } else { "speed, 1/s" };
     let header = ["material", unit, "phase", "segments"].map(String::from).into_iter();
     let fits = recordings.iter().flat_map(|recording| recording.fits.iter().map(move |fitted| (recording, fitted)));
-    table.set_header(header.chain(output::with_units(&names, fits)).chain(["R^2".into()]));
+    let header = header.chain(output::with_units(&names, fits)).chain(["R^2".into()]).collect();
+    let mut rows = Vec::new();
     for group in entries.chunk_by_mut(|a, b| a.material == b.material && is_same_speed(a.speed, b.speed)) {
         group.sort_by_key(order);
         for phase in group.chunk_by(|a, b| a.phase == b.phase) {
-            table.add_row(row(phase, &names));
+            rows.push(row(phase, &names));
         }
     }
-    print(|out| Ok(writeln!(out, "{table}")?))
+    Rows { header, rows }
 }
 
 /// Neighbours in the order of speeds.
@@ -112,35 +109,35 @@ fn belongs(name: &str, phase: &str) -> bool {
 }
 
 /// Means over the fits of a group, with their standard errors.
-fn row(group: &[Entry], names: &[String]) -> Vec<String> {
+fn row(group: &[Entry], names: &[String]) -> Vec<Cell> {
     let first = &group[0];
     let speeds: Vec<f64> = group.iter().filter_map(|entry| entry.speed).collect();
-    let mut out = vec![first.material.to_string()];
-    out.push(if speeds.is_empty() { String::new() } else { plain(speeds.iter().sum::<f64>() / speeds.len() as f64) });
-    out.extend([first.phase.to_string(), group.len().to_string()]);
+    let speed = if speeds.is_empty() { String::new() } else { plain(speeds.iter().sum::<f64>() / speeds.len() as f64) };
+    let head = [first.material.to_string(), speed, first.phase.to_string(), group.len().to_string()];
+    let mut out: Vec<Cell> = head.map(Cell::from).into();
     for name in names {
         let is_here = belongs(name, first.phase);
         let own: Vec<&Estimated> =
             group.iter().filter_map(|entry| entry.fitted.fit.get(name).filter(|_| is_here)).collect();
         let told: Vec<(f64, f64)> =
             own.iter().filter_map(|estimated| Some((estimated.value, estimated.standard_error?))).collect();
-        out.push(if told.is_empty() && !own.is_empty() { "not told".into() } else { mean(&told) });
+        out.push(if told.is_empty() && !own.is_empty() { Cell::NotTold } else { mean(&told) });
     }
     let worst = group.iter().map(|entry| entry.r_squared).fold(f64::INFINITY, f64::min);
-    out.push(fixed(worst, 4));
+    out.push(fixed(worst, 4).into());
     out
 }
 
 /// Mean of values with its standard error: the fit's own for one value, from the scatter for more.
-fn mean(found: &[(f64, f64)]) -> String {
+fn mean(found: &[(f64, f64)]) -> Cell {
     match found {
-        [] => String::new(),
-        [(value, error)] => with_error(*value, *error),
+        [] => Cell::Nothing,
+        [(value, error)] => Cell::Estimate(*value, *error),
         _ => {
             let n = found.len() as f64;
             let mean = found.iter().map(|(value, _)| value).sum::<f64>() / n;
             let squares: f64 = found.iter().map(|(value, _)| (value - mean).powi(2)).sum();
-            with_error(mean, (squares / (n - 1.0) / n).sqrt())
+            Cell::Estimate(mean, (squares / (n - 1.0) / n).sqrt())
         }
     }
 }

@@ -29,7 +29,7 @@ impl Recorder {
     /// If none can be made.
     pub fn begin(prefix: &Path, lines: &LineParser) -> io::Result<Self> {
         let (path, mut file) = new_file(prefix)?;
-        writeln!(file, "# generator = {MADE_BY}")?;
+        writeln!(file, "# made_by = {MADE_BY}")?;
         write!(file, "{}", lines.metadata())?;
         let mut rows = RowWriter::new(BufWriter::new(file));
         let reading = match (lines.has_codes(), lines.reading_kind()) {

@@ -1,0 +1,183 @@
+//! A table as text, CSV or LaTeX.
+
+use comfy_table::{Table, presets};
+use ohmstrain_calib::closed_form::Estimated;
+
+use crate::args::TableFormat;
+use crate::error::CliError;
+use crate::output::print;
+use ohmstrain::number::{plain, with_error};
+
+/// A cell.
+pub enum Cell {
+    /// Words, or a number as it is to be read.
+    Text(String),
+    /// A value with its standard error.
+    Estimate(f64, f64),
+    /// A value at the limit of the search.
+    AtLimit(f64),
+    /// The readings do not tell it.
+    NotTold,
+    /// There is none.
+    Nothing,
+}
+
+impl Cell {
+    /// What a fit says of a parameter.
+    pub fn of(estimated: Option<&Estimated>) -> Self {
+        match estimated {
+            None => Self::Nothing,
+            Some(Estimated { value, standard_error: Some(error), .. }) => Self::Estimate(*value, *error),
+            Some(Estimated { value, at_limit: true, .. }) => Self::AtLimit(*value),
+            Some(_) => Self::NotTold,
+        }
+    }
+
+    fn text(&self) -> String {
+        match self {
+            Self::Text(text) => text.clone(),
+            Self::Estimate(value, error) => with_error(*value, *error),
+            Self::AtLimit(value) => format!("{} (limit)", plain(*value)),
+            Self::NotTold => "not told".into(),
+            Self::Nothing => String::new(),
+        }
+    }
+
+    /// Value and standard error, with all digits.
+    fn csv(&self, has_error: bool) -> String {
+        let value = match self {
+            Self::Text(text) => quoted(&text.replace('−', "-")),
+            Self::Estimate(value, error) => return format!("{value},{error}"),
+            Self::AtLimit(value) => value.to_string(),
+            Self::NotTold | Self::Nothing => String::new(),
+        };
+        if has_error { value + "," } else { value }
+    }
+}
+
+impl From<String> for Cell {
+    fn from(text: String) -> Self {
+        Self::Text(text)
+    }
+}
+
+/// A table.
+pub struct Rows {
+    pub header: Vec<String>,
+    pub rows: Vec<Vec<Cell>>,
+}
+
+impl Rows {
+    /// Prints it.
+    pub fn print(&self, format: TableFormat) -> Result<(), CliError> {
+        let text = match format {
+            TableFormat::Text => self.text(),
+            TableFormat::Csv => self.csv(),
+            TableFormat::Latex => self.latex(),
+        };
+        print(|out| Ok(out.write_all(text.as_bytes())?))
+    }
+
+    fn text(&self) -> String {
+        let mut table = Table::new();
+        table.load_style(presets::ASCII_MARKDOWN);
+        table.set_header(&self.header);
+        for row in &self.rows {
+            table.add_row(row.iter().map(Cell::text));
+        }
+        format!("{table}\n")
+    }
+
+    /// With a column of standard errors behind that of each parameter.
+    fn csv(&self) -> String {
+        let is_estimate = |row: &Vec<Cell>, column: usize| matches!(row.get(column), Some(Cell::Estimate(..)));
+        let has_error = |column: usize| self.rows.iter().any(|row| is_estimate(row, column));
+        let name = |(column, name): (usize, &String)| match has_error(column) {
+            true => format!("{},{}", quoted(name), quoted(&format!("standard error of {name}"))),
+            false => quoted(name),
+        };
+        let mut text = self.header.iter().enumerate().map(name).collect::<Vec<_>>().join(",") + "\n";
+        for row in &self.rows {
+            let cells = row.iter().enumerate().map(|(column, cell)| cell.csv(has_error(column)));
+            text += &(cells.collect::<Vec<_>>().join(",") + "\n");
+        }
+        text
+    }
+
+    /// A `tabular` with the rules of the package booktabs.
+    fn latex(&self) -> String {
+        let line = |cells: Vec<String>| cells.join(" & ") + " \\\\\n";
+        let mut text = format!(
+            "% needs \\usepackage{{booktabs}}\n\\begin{{tabular}}{{{}}}\n\\toprule\n",
+            "l".repeat(self.header.len())
+        );
+        text += &line(self.header.iter().map(|name| escaped(name)).collect());
+        text += "\\midrule\n";
+        for row in &self.rows {
+            text += &line(row.iter().map(|cell| escaped(&cell.text())).collect());
+        }
+        text + "\\bottomrule\n\\end{tabular}\n"
+    }
+}
+
+fn quoted(text: &str) -> String {
+    if text.contains([',', '"', '\n']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.into() }
+}
+
+/// Superscripts and what stands for them.
+const POWERS: &str = "⁻⁰¹²³⁴⁵⁶⁷⁸⁹";
+const POWER_DIGITS: &str = "-0123456789";
+
+/// A cell as LaTeX takes it.
+fn escaped(text: &str) -> String {
+    let mut out = String::new();
+    let mut in_power = false;
+    for c in text.chars() {
+        let power = POWERS.chars().position(|power| power == c).and_then(|at| POWER_DIGITS.chars().nth(at));
+        if in_power && power.is_none() {
+            out += "}$";
+        }
+        if let Some(digit) = power {
+            out += if in_power { "" } else { "$^{" };
+            out.push(digit);
+            in_power = true;
+            continue;
+        }
+        in_power = false;
+        match c {
+            '_' | '%' | '&' | '#' | '{' | '}' => out.extend(['\\', c]),
+            '^' => out += "\\textasciicircum{}",
+            '\\' => out += "\\textbackslash{}",
+            '~' => out += "\\textasciitilde{}",
+            '±' => out += "$\\pm$",
+            '−' => out += "$-$",
+            '·' => out += "$\\cdot$",
+            '*' => out += "$\\cdot$",
+            '∞' => out += "$\\infty$",
+            'Δ' => out += "$\\Delta$",
+            c => out.push(c),
+        }
+    }
+    out + if in_power { "}$" } else { "" }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Cell, Rows};
+
+    #[test]
+    fn numbers_keep_their_digits_in_csv_and_their_signs_in_latex() {
+        let header = ["segment", "tau_0, s"].map(String::from).to_vec();
+        let rows = vec![
+            vec![Cell::from("a, b".to_string()), Cell::Estimate(-1.23456789e-9, 1e-10)],
+            vec![Cell::from("c_1".to_string()), Cell::NotTold],
+        ];
+        let table = Rows { header, rows };
+        let csv = table.csv();
+        let lines: Vec<&str> = csv.lines().collect();
+        assert_eq!(lines[0], "segment,\"tau_0, s\",\"standard error of tau_0, s\"");
+        assert_eq!(lines[1..], ["\"a, b\",-0.00000000123456789,0.0000000001", "c_1,,"]);
+        let latex = table.latex();
+        assert!(latex.contains("tau\\_0, s") && latex.contains("$-$1.235$\\cdot$10$^{-9}$ $\\pm$"), "{latex}");
+    }
+}

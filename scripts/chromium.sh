@@ -1,0 +1,11 @@
+#!/usr/bin/env bash
+# Installs what crates/cli/tests/browser.rs and the figures' PDF need, where it is missing and this may: Chromium, and a font
+# without serifs.
+set -euo pipefail
+
+has() { command -v "$1" >/dev/null; }
+if ! { has chromium || has chromium-browser || has google-chrome || has chrome; } ||
+    ! compgen -G "/usr/share/fonts/truetype/*/*Sans*.ttf" >/dev/null; then
+    apt-get -q update >/dev/null
+    DEBIAN_FRONTEND=noninteractive apt-get -q install -y --no-install-recommends chromium fonts-dejavu-core >/dev/null
+fi
