@@ -137,7 +137,7 @@ fn push_text(text: &str, out: &mut Vec<u8>) {
 }
 
 /// The comma behind the last cell becomes the end of the line.
-fn end_line(out: &mut Vec<u8>) {
+fn end_line(out: &mut [u8]) {
     if let Some(last) = out.last_mut() {
         *last = b'\n';
     }

@@ -1,0 +1,100 @@
+"""Scores of estimates against a known strain."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from . import _core, _tables
+from ._sensor import Sensor, _choices, _split, _warn
+
+
+@dataclass(frozen=True)
+class Scores:
+    """Scores of one estimate; the names are those of ``ohmstrain evaluate --json``."""
+
+    n: int
+    rmse: float
+    mae: float
+    bias: float
+    rmse_percent_fs: float
+    coverage_50: float | None
+    coverage_90: float | None
+    coverage_95: float | None
+    width_95_percent_fs: float | None
+    crps_percent_fs: float
+    log_score: float | None
+    wrong_branch: float
+
+    @classmethod
+    def of_json(cls, text: str) -> Scores:
+        """What the library says."""
+        known = json.loads(text)
+        return cls(**{name: known.get(name) for name in cls.__dataclass_fields__})
+
+
+class Evaluation:
+    """Scores by what is scored: ``filter``, ``smoother``, ``static_cubic``, and further baselines after a split."""
+
+    def __init__(self, scored: Iterable[tuple[str, str]], name: str | None, split: float | None) -> None:
+        self.scores = {of: Scores.of_json(text) for of, text in scored}
+        self.name = name
+        self.split = split
+        #: The sensor that was calibrated for a split.
+        self.sensor: Sensor | None = None
+
+    def __getitem__(self, of: str) -> Scores:
+        return self.scores[of]
+
+    def __getattr__(self, of: str) -> Scores:
+        try:
+            return self.__dict__["scores"][of]
+        except KeyError:
+            raise AttributeError(of) from None
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.scores)
+
+    def __repr__(self) -> str:
+        head = f"{'estimate':14}{'%FS':>8}{'RMSE':>10}{'bias':>10}  50/90/95 %"
+        lines = [head]
+        for of, scores in self.scores.items():
+            covered = [scores.coverage_50, scores.coverage_90, scores.coverage_95]
+            shares = "/".join(f"{100 * share:.0f}" for share in covered if share is not None)
+            lines.append(
+                f"{of:14}{scores.rmse_percent_fs:8.2f}{scores.rmse:10.4f}{scores.bias:+10.4f}  {shares}".rstrip()
+            )
+        return "\n".join(lines)
+
+
+def evaluate(
+    recording: Any, *, splits: Iterable[float] = (0.5,), estimator: str = "auto", **about: Any
+) -> list[Evaluation]:
+    """Calibrate on the first rows of a recording, score the rest, and compare with four baselines.
+
+    Parameters
+    ----------
+    recording
+        A table with a reference.
+    splits
+        Shares of the rows to calibrate on, between 0 and 1.
+    estimator : str
+        As in :func:`calibrate`.
+
+    Returns
+    -------
+    list of Evaluation
+        One per split, with the scores of ``ohmstrain evaluate --splits``.
+    """
+    about, _ = _split(dict(about))
+    table = _tables.to_arrow(recording)
+    evaluations = []
+    for share in splits:
+        core, doubts, scored = _core.evaluate_split(table, about, _choices(estimator), share)
+        _warn(doubts)
+        evaluation = Evaluation(scored, about["name"], share)
+        evaluation.sensor = Sensor(core)
+        evaluations.append(evaluation)
+    return evaluations

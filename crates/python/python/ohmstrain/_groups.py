@@ -1,0 +1,173 @@
+"""Many recordings in one table: the same work for every engine that groups rows and hands each group over as Arrow.
+
+Nothing here schedules, shuffles or stores: an engine calls a :class:`Work` with the rows of one recording.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.compute as pc
+
+from . import _core, _tables
+from ._sensor import Sensor, _choices, _options, _split
+
+#: Column that says what is wrong with a recording; null in rows of good ones.
+ERROR = "error"
+
+#: What ``evaluate`` and ``calibrate`` say of each recording or sensor, beside its keys.
+SCORES = ("n", "filter_percent_fs", "smoother_percent_fs", "static_cubic_percent_fs", "coverage_95")
+
+
+class Work:
+    """What is done with the rows of one group. It can be sent to other processes: sensors go as text."""
+
+    def __init__(self, task: str, by: Iterable[str], sensors: Any = None, **arguments: Any) -> None:
+        self.task = task
+        self.by = [by] if isinstance(by, str) else list(by)
+        if not self.by:
+            raise _core.OhmstrainError("by: expected the columns that tell recordings apart, found none")
+        self.about, self.options = _split(arguments)
+        self.texts = None if task == "calibrate" else _texts(sensors)
+        self._made: dict[Any, Sensor] = {}
+        # Wrong options are an error of this call, not of ten thousand groups.
+        if task == "calibrate":
+            _choices(**self.options)
+        else:
+            columns = {key: tuple(Sensor.from_toml(text).columns) for key, text in self.texts.items()}
+            if len(set(columns.values())) > 1:
+                raise _core.OhmstrainError("sensors: expected sensors of one quantity and one unit of readings")
+            self.columns = next(iter(columns.values()))
+            first = Sensor.from_toml(next(iter(self.texts.values())))
+            first._core.live(_options(**self.options))
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "_made": {}}
+
+    def check(self, names: Iterable[str]) -> None:
+        """Refuse a table without the columns that are needed, before the job starts."""
+        names = list(names)
+        for key in self.by:
+            if key not in names:
+                raise _core.OhmstrainError(f"by: expected the column `{key}`, found `{','.join(names)}`")
+        for group in (("time_s", "time_us"), ("resistance_ohm", "resistance_ratio", "adc")):
+            if not any(name in names for name in group):
+                raise _core.OhmstrainError(f"expected a column `{'` or `'.join(group)}`, found `{','.join(names)}`")
+        if self.task in ("calibrate", "evaluate") and not any(
+            name in names for name in ("strain", "displacement_mm", "angle_deg")
+        ):
+            raise _core.OhmstrainError(f"expected a reference (strain, displacement_mm or angle_deg), found `{','.join(names)}`")
+
+    def needed(self, names: Iterable[str]) -> list[str]:
+        """The columns that are handed over; nothing else travels."""
+        return [name for name in names if name in self.by or name in _tables.COLUMNS]
+
+    def schema(self, keys: Mapping[str, pa.DataType]) -> pa.Schema:
+        """Columns of the result: keys, what the task gives, and the error."""
+        fields = [pa.field(key, keys[key]) for key in self.by]
+        if self.task in ("filter", "smooth"):
+            fields += [pa.field(name, pa.string() if name == "flags" else pa.float64()) for name in self.columns]
+        else:
+            fields += [pa.field("sensor_toml", pa.string())] * (self.task == "calibrate")
+            fields += [pa.field(name, pa.float64()) for name in SCORES]
+        return pa.schema([*fields, pa.field(ERROR, pa.string())])
+
+    def __call__(self, group: pa.Table) -> pa.Table:
+        """The rows that come of one group; of a bad one, a row that says why."""
+        keys = {key: group[key][0] for key in self.by}
+        schema = self.schema({key: group.schema.field(key).type for key in self.by})
+        try:
+            columns = self._columns(keys, in_order(group))
+        except Exception as error:  # noqa: BLE001: whatever it is, it is this recording's alone.
+            columns = {ERROR: pa.array([f"{type(error).__name__}: {error}"])}
+        rows = len(next(iter(columns.values())))
+        arrays = []
+        for field in schema:
+            if field.name in keys:
+                arrays.append(pa.repeat(keys[field.name], rows))
+            else:
+                cells = columns.get(field.name)
+                arrays.append(pa.nulls(rows, field.type) if cells is None else cells)
+        return pa.table(arrays, schema=schema)
+
+    def stream(self, batches: Iterator[pa.RecordBatch]) -> Iterator[pa.RecordBatch]:
+        """The same of a group that comes in pieces, in order of time: one piece is held at a time. For ``filter``."""
+        live = None
+        for batch in batches:
+            group = pa.Table.from_batches([batch])
+            keys = {key: group[key][0] for key in self.by}
+            schema = self.schema({key: group.schema.field(key).type for key in self.by})
+            try:
+                live = live or self._sensor(keys).filter(**self.options)
+                found = live.run(group, **self.about)
+                arrays = [pa.repeat(keys[name], len(group)) if name in keys else found[name] for name in schema.names[:-1]]
+                arrays.append(pa.nulls(len(group), pa.string()))
+                yield from pa.table(arrays, schema=schema).combine_chunks().to_batches()
+            except Exception as error:  # noqa: BLE001: as above
+                row = [pa.repeat(keys[field.name], 1) if field.name in keys else pa.nulls(1, field.type) for field in schema]
+                row[-1] = pa.array([f"{type(error).__name__}: {error}"])
+                yield from pa.table(row, schema=schema).to_batches()
+                for _ in batches:  # The rest of a bad recording is passed over.
+                    pass
+                return
+
+    def _sensor(self, keys: Mapping[str, Any]) -> Sensor:
+        key = None if None in self.texts else keys[self.by[0]].as_py()
+        if key not in self._made:
+            if key not in self.texts:
+                raise _core.OhmstrainError(f"sensors: expected one for {self.by[0]} `{key}`, found none")
+            self._made[key] = Sensor.from_toml(self.texts[key])
+        return self._made[key]
+
+    def _columns(self, keys: Mapping[str, Any], group: pa.Table) -> dict[str, Any]:
+        recording = group.select([name for name in group.column_names if name in _tables.COLUMNS])
+        if self.task in ("filter", "smooth"):
+            core = self._sensor(keys)._core
+            table, _ = getattr(core, self.task)(recording, self.about, _options(**self.options))
+            table = pa.table(table)
+            return dict(zip(table.column_names, table.columns))
+        if self.task == "evaluate":
+            core = self._sensor(keys)._core
+            scored = dict(core.evaluate(recording, self.about, _options(**self.options), float("-inf")))
+            scores = {of: json.loads(text) for of, text in scored.items()}
+            return _figures(scores["filter"], scores["smoother"], scores["static_cubic"])
+        core, _ = _core.calibrate([(recording, self.about)], _choices(**self.options))
+        sensor = Sensor(core)
+        found = sensor.findings or {}
+        figures = _figures(found.get("filter"), found.get("smoother"), found.get("static_cubic"))
+        return {"sensor_toml": pa.array([sensor.to_toml()]), **figures}
+
+
+def in_order(group: pa.Table) -> pa.Table:
+    """Rows in order of time: no engine promises an order inside a group."""
+    time = "time_s" if "time_s" in group.column_names else "time_us"
+    times = group[time].combine_chunks()
+    if len(times) > 1 and not pc.all(pc.less_equal(times[:-1], times[1:])).as_py():
+        group = group.sort_by(time)
+    return group
+
+
+def _figures(filtered: Any, smoothed: Any, cubic: Any) -> dict[str, Any]:
+    cell = lambda scores, name: pa.array([None if scores is None else scores.get(name)], pa.float64())  # noqa: E731
+    return {
+        "n": cell(filtered, "n"),
+        "filter_percent_fs": cell(filtered, "rmse_percent_fs"),
+        "smoother_percent_fs": cell(smoothed, "rmse_percent_fs"),
+        "static_cubic_percent_fs": cell(cubic, "rmse_percent_fs"),
+        "coverage_95": cell(filtered, "coverage_95"),
+    }
+
+
+def _texts(sensors: Any) -> dict[Any, str]:
+    """Sensors by the first key, or one for all under None; as text."""
+    text = lambda sensor: sensor.to_toml() if isinstance(sensor, Sensor) else str(sensor)  # noqa: E731
+    if isinstance(sensors, Mapping):
+        if not sensors:
+            raise _core.OhmstrainError("sensors: expected at least one, found none")
+        return {key: text(sensor) for key, sensor in sensors.items()}
+    if sensors is None:
+        raise _core.OhmstrainError("sensors: expected a sensor, or a dict of sensors by the first column of `by`")
+    return {None: text(sensors)}

@@ -1,0 +1,313 @@
+"""Sensors and filters."""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+import warnings
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+
+from . import _core, _tables
+
+
+class OhmstrainWarning(UserWarning):
+    """What casts doubt on a result: a use outside of what the calibration has seen, rows that were left out."""
+
+
+def _warn(messages: Iterable[str]) -> None:
+    for message in messages:
+        warnings.warn(message, OhmstrainWarning, stacklevel=3)
+
+
+def _about(
+    name: str | None = None,
+    gauge_length_mm: float | None = None,
+    front_end: str | None = None,
+    joint: str | None = None,
+) -> dict[str, Any]:
+    return {"name": name, "gauge_length_mm": gauge_length_mm, "front_end": front_end, "joint": joint}
+
+
+def _options(
+    estimator: str = "auto",
+    correction: bool = True,
+    initial_strain: float | None = None,
+    rest_resistance: float | None = None,
+    gate: float | None = None,
+    influence: str | None = None,
+) -> dict[str, Any]:
+    return {
+        "estimator": estimator,
+        "correction": correction,
+        "initial_strain": initial_strain,
+        "rest_resistance": rest_resistance,
+        "gate": gate,
+        "influence": influence,
+    }
+
+
+def _choices(
+    estimator: str = "auto", branches: int | None = None, gauge: str = "auto"
+) -> dict[str, Any]:
+    return {"estimator": estimator, "branches": branches, "gauge": gauge}
+
+
+def _split(arguments: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Arguments about the recording, and those about the work."""
+    names = _about.__code__.co_varnames[: _about.__code__.co_argcount]
+    about = {name: arguments.pop(name) for name in names if name in arguments}
+    return _about(**about), arguments
+
+
+class Sensor:
+    """A calibrated sensor: made by :func:`calibrate`, :meth:`load` or :meth:`from_toml`."""
+
+    def __init__(self, core: _core.Sensor, file: str | None = None) -> None:
+        self._core = core
+        self._file = file
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Sensor:
+        """Read a ``sensor.toml``.
+
+        Raises
+        ------
+        OhmstrainError
+            With file, line and column, if it is none or has a number that no sensor can have.
+        """
+        name = os.fspath(path)
+        return cls(_core.Sensor.from_toml(Path(path).read_text(encoding="utf-8"), file=name), name)
+
+    @classmethod
+    def from_toml(cls, text: str) -> Sensor:
+        """Take the text of a ``sensor.toml``."""
+        return cls(_core.Sensor.from_toml(text))
+
+    def to_toml(self) -> str:
+        """The text of its ``sensor.toml``."""
+        return self._core.to_toml()
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write a ``sensor.toml``, whole or not at all."""
+        target = Path(path)
+        with tempfile.NamedTemporaryFile("w", encoding="utf-8", dir=target.parent, delete=False) as draft:
+            draft.write(self.to_toml())
+        os.chmod(draft.name, 0o644)
+        os.replace(draft.name, target)
+        self._file = os.fspath(path)
+
+    @property
+    def params(self) -> dict[str, Any]:
+        """All its numbers, as they stand in ``sensor.toml``."""
+        return json.loads(self._core.json()[0])
+
+    @property
+    def findings(self) -> dict[str, Any] | None:
+        """What the calibration is worth on quarters left out, what limits it, what to record next; if it was made here."""
+        text = self._core.json()[1]
+        return None if text is None else json.loads(text)
+
+    @property
+    def quantity(self) -> str:
+        """``strain`` or ``angle_deg``."""
+        return self._core.quantity
+
+    @property
+    def reading(self) -> str:
+        """Column of the readings: ``resistance_ohm`` or ``resistance_ratio``."""
+        return self._core.reading
+
+    @property
+    def estimator(self) -> str:
+        """The default estimator."""
+        return self._core.estimator
+
+    @property
+    def columns(self) -> list[str]:
+        """Columns of its estimates."""
+        return self._core.columns()
+
+    def filter(self, recording: Any = None, *, lag_s: float | None = None, **options: Any) -> Any:
+        """Estimates of a recording, each from the readings up to it; or, without one, a filter for readings as they come.
+
+        Parameters
+        ----------
+        recording
+            A table. If there is none, a :class:`LiveFilter` is returned, or a :class:`LaggedFilter`.
+        lag_s
+            Wait so many seconds for later readings; for live filters.
+        estimator : str
+            ``auto`` (the sensor's choice), ``corrected``, ``ekf``, ``ukf``, ``imm``, ``sign-split``, ``hypotheses``.
+        correction : bool
+            With the learned correction of the strain, the default.
+        initial_strain : float
+            Strain at the first row, if it is known; the body is at rest there.
+        rest_resistance : float
+            What the rested, unstretched sensor reads now, in place of what it read in calibration.
+        gate : float
+            Turn down readings whose normalised innovation squared is above this, ten in a row at most.
+        influence : str
+            Bound the influence of surprising readings: ``huber:K`` or ``student-t:DOF``.
+        name, gauge_length_mm, front_end, joint
+            What messages call the recording, and what stands above the header of a trace CSV.
+
+        Returns
+        -------
+        A table of the recording's kind with the columns of ``estimates.csv``; what is not known is null.
+
+        Raises
+        ------
+        OhmstrainError
+            Names row and column.
+        """
+        if recording is not None:
+            if lag_s is not None:
+                raise TypeError("lag_s is for live filters; smooth() estimates from all readings")
+            return self._estimate(self._core.filter, recording, options)
+        if lag_s is None:
+            return LiveFilter(self._core.live(_options(**options)))
+        return LaggedFilter(self._core.lagged(_options(**options), lag_s))
+
+    def smooth(self, recording: Any, **options: Any) -> Any:
+        """Estimates of a recording, each from all readings.
+
+        Parameters and result are those of :meth:`filter`.
+        """
+        return self._estimate(self._core.smooth, recording, options)
+
+    def evaluate(self, recording: Any, *, from_s: float = float("-inf"), **options: Any) -> Any:
+        """Scores of filter, smoother and static cubic on the rows at ``from_s`` or later; the filter starts at the first.
+
+        Returns
+        -------
+        Evaluation
+        """
+        from ._evaluation import Evaluation
+
+        about, options = _split(options)
+        scored = self._core.evaluate(_tables.to_arrow(recording), about, _options(**options), from_s)
+        return Evaluation(scored, about["name"], None)
+
+    def _estimate(self, method: Any, recording: Any, options: dict[str, Any]) -> Any:
+        about, options = _split(options)
+        table, doubts = method(_tables.to_arrow(recording), about, _options(**options))
+        _warn(doubts)
+        return _tables.converter(recording)(pa.table(table))
+
+    @property
+    def plot(self) -> Any:
+        """Its plots: ``sensor.plot.calibration()``. Needs matplotlib."""
+        from .plot import SensorPlots
+
+        return SensorPlots(self)
+
+    def __repr__(self) -> str:
+        closing = self._core.closing(self._file)
+        if closing is not None:
+            return closing.rstrip("\n")
+        params = self.params
+        lower, upper = params["limits"]["lower"], params["limits"]["upper"]
+        branches = len(params["law"]["branches"])
+        file = self._file or "made of parameters"
+        return (
+            f"Sensor       {file}, estimator {self.estimator}, a law of {branches} branch{'es' * (branches != 1)}\n"
+            f"Reports      {self.quantity} {lower:.4g} to {upper:.4g} of `{self.reading}`, "
+            f"R0 {params['rest_reading']:.5g}"
+        )
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Sensor) and self.params == other.params
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Sensor.from_toml, (self.to_toml(),)
+
+
+class LiveFilter:
+    """A running filter: readings in, estimates out. See :meth:`Sensor.filter`."""
+
+    def __init__(self, core: _core.LiveFilter) -> None:
+        self._core = core
+
+    def step(self, time_s: float, reading: float | None = None) -> dict[str, Any]:
+        """Take the reading at a time, s; a missing one is None or NaN. An error leaves the filter as it was."""
+        return self._core.step(time_s, reading)
+
+    def run(self, rows: Any, **about: Any) -> Any:
+        """Take the rows of a table, and go on from the last one with the next: a recording in pieces."""
+        table = self._core.run(_tables.to_arrow(rows), _about(**about))
+        return _tables.converter(rows)(pa.table(table))
+
+    def rest_resistance(self, measured: float) -> None:
+        """What the rested, unstretched sensor is found to read from now on."""
+        self._core.rest_resistance(measured)
+
+
+class LaggedFilter:
+    """A running filter that waits: each row is estimated from the readings up to a fixed lag after it."""
+
+    def __init__(self, core: _core.LaggedFilter) -> None:
+        self._core = core
+
+    def step(self, time_s: float, reading: float | None = None) -> list[dict[str, Any]]:
+        """Take a reading; the rows that have become due."""
+        return self._core.step(time_s, reading)
+
+    def finish(self) -> list[dict[str, Any]]:
+        """The rows that still wait."""
+        return self._core.finish()
+
+    def rest_resistance(self, measured: float) -> None:
+        """What the rested, unstretched sensor is found to read from now on."""
+        self._core.rest_resistance(measured)
+
+
+def calibrate(
+    recordings: Any,
+    *,
+    estimator: str = "auto",
+    branches: int | None = None,
+    gauge: str = "auto",
+    **about: Any,
+) -> Sensor:
+    """Calibrate a sensor on recordings with known strain.
+
+    Parameters
+    ----------
+    recordings
+        Tables, each with a reference, or one table; or a dict of tables by the names that messages call them.
+    estimator : str
+        The estimator to calibrate and to make the default; ``auto`` is what the command line does.
+    branches : int
+        Relaxing branches of the law, 0 to 4, in place of what the filter does best with.
+    gauge : str
+        Family of the quasi-static curve: ``auto``, ``polynomial``, ``decaying-exponential`` or ``tunnelling``.
+    gauge_length_mm, front_end, joint
+        What stands above the header of a trace CSV.
+
+    Returns
+    -------
+    Sensor
+        The same as ``ohmstrain calibrate`` writes, but for the recordings' names.
+
+    Raises
+    ------
+    OhmstrainError
+        Names recording, row and column; or says what recordings lack.
+    """
+    if isinstance(recordings, Mapping) and not any(name in _tables.COLUMNS for name in recordings):
+        named = list(recordings.items())
+    elif isinstance(recordings, (list, tuple)):
+        named = [(None, recording) for recording in recordings]
+    else:
+        named = [(None, recordings)]
+    tables = [(_tables.to_arrow(table), _about(name=name, **about)) for name, table in named]
+    core, doubts = _core.calibrate(tables, _choices(estimator, branches, gauge))
+    _warn(doubts)
+    return Sensor(core)

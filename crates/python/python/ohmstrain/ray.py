@@ -1,0 +1,55 @@
+"""Recordings in a Ray dataset: ``pip install 'ohmstrain[ray]'``.
+
+As :mod:`ohmstrain.spark`: each group of rows with the same keys is a recording, a bad one is a row with a text in the
+column ``error``.
+
+>>> from ohmstrain import ray as oh_ray
+>>> oh_ray.smooth(ray.data.read_parquet("recordings"), sensors).write_parquet("estimates")     # doctest: +SKIP
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
+
+import pyarrow as pa
+
+from ._groups import Work
+
+if TYPE_CHECKING:
+    from ray.data import Dataset
+
+#: Columns that tell recordings apart, the sensor's first.
+BY = ("sensor_id", "recording_id")
+
+
+def filter(ds: Dataset, sensors: Any, by: Iterable[str] = BY, **options: Any) -> Dataset:
+    """Estimates, each from the readings up to it. See :func:`ohmstrain.spark.filter`."""
+    return _grouped(ds, Work("filter", by, sensors, **options))
+
+
+def smooth(ds: Dataset, sensors: Any, by: Iterable[str] = BY, **options: Any) -> Dataset:
+    """Estimates, each from all readings of its recording. See :func:`ohmstrain.spark.smooth`."""
+    return _grouped(ds, Work("smooth", by, sensors, **options))
+
+
+def evaluate(ds: Dataset, sensors: Any, by: Iterable[str] = BY, **options: Any) -> Dataset:
+    """Scores, a row per recording. See :func:`ohmstrain.spark.evaluate`."""
+    return _grouped(ds, Work("evaluate", by, sensors, **options))
+
+
+def calibrate(ds: Dataset, by: Iterable[str] = ("sensor_id",), **choices: Any) -> Dataset:
+    """A sensor per group. See :func:`ohmstrain.spark.calibrate`."""
+    return _grouped(ds, Work("calibrate", by, **choices))
+
+
+def _grouped(ds: Dataset, work: Work) -> Dataset:
+    names = ds.columns() or []
+    work.check(names)
+    needed = work.needed(names)
+    ds = ds if needed == names else ds.select_columns(needed)
+
+    def one(group: pa.Table) -> pa.Table:
+        return work(group)
+
+    return ds.groupby(work.by if len(work.by) > 1 else work.by[0]).map_groups(one, batch_format="pyarrow")

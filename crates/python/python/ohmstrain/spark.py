@@ -1,0 +1,94 @@
+"""Recordings in a Spark DataFrame: ``pip install 'ohmstrain[spark]'``, Spark 4.0 or newer.
+
+Each group of rows with the same keys is a recording. Rows may come in any order; they are put in order of time inside the
+group. What comes of it is the same as on one machine, to the bit. A recording that cannot be done is a row with a text in
+the column ``error``, and the job goes on.
+
+>>> from ohmstrain import spark as oh_spark
+>>> done = oh_spark.smooth(df, sensors, by=["sensor_id", "recording_id"])     # doctest: +SKIP
+>>> done.where("error is null").drop("error").write.parquet("estimates")      # doctest: +SKIP
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING, Any
+
+import pyarrow as pa
+from pyspark.sql.pandas.types import from_arrow_schema, to_arrow_type
+
+from ._groups import Work
+
+if TYPE_CHECKING:
+    from pyspark.sql import DataFrame
+
+#: Columns that tell recordings apart, the sensor's first.
+BY = ("sensor_id", "recording_id")
+
+
+def filter(df: DataFrame, sensors: Any, by: Iterable[str] = BY, *, streaming: bool = False, **options: Any) -> DataFrame:
+    """Estimates, each from the readings up to it.
+
+    Parameters
+    ----------
+    df
+        Columns of a trace CSV, and the keys.
+    sensors
+        One :class:`ohmstrain.Sensor` (or its text) for all, or a dict of them by the first key.
+    by
+        Columns that tell recordings apart.
+    streaming
+        Hold one Arrow batch of a recording at a time, whatever its length; needs Spark 4.1 and sorts by time on disk.
+    **options
+        As of :meth:`ohmstrain.Sensor.filter`.
+
+    Returns
+    -------
+    DataFrame
+        Keys, columns of ``estimates.csv``, and ``error``: null but in the one row of a recording that cannot be done.
+    """
+    work = Work("filter", by, sensors, **options)
+    return _streamed(df, work) if streaming else _grouped(df, work)
+
+
+def smooth(df: DataFrame, sensors: Any, by: Iterable[str] = BY, **options: Any) -> DataFrame:
+    """Estimates, each from all readings of its recording. Parameters and result are those of :func:`filter`."""
+    return _grouped(df, Work("smooth", by, sensors, **options))
+
+
+def evaluate(df: DataFrame, sensors: Any, by: Iterable[str] = BY, **options: Any) -> DataFrame:
+    """Scores, a row per recording: errors in percent of full scale, coverage of the 95 % interval as a share."""
+    return _grouped(df, Work("evaluate", by, sensors, **options))
+
+
+def calibrate(df: DataFrame, by: Iterable[str] = ("sensor_id",), **choices: Any) -> DataFrame:
+    """A sensor per group, as the text of its ``sensor.toml`` with scores on quarters left out."""
+    return _grouped(df, Work("calibrate", by, **choices))
+
+
+def _prepared(df: DataFrame, work: Work) -> tuple[DataFrame, Any]:
+    """The columns that travel, and the schema of the result; refuses what cannot be done before the job starts."""
+    work.check(df.columns)
+    keys = {key: to_arrow_type(df.schema[key].dataType) for key in work.by}
+    return df.select(work.needed(df.columns)), from_arrow_schema(work.schema(keys))
+
+
+def _grouped(df: DataFrame, work: Work) -> DataFrame:
+    needed, schema = _prepared(df, work)
+
+    def one(group: pa.Table) -> pa.Table:
+        return work(group)
+
+    return needed.groupBy(*work.by).applyInArrow(one, schema)
+
+
+def _streamed(df: DataFrame, work: Work) -> DataFrame:
+    needed, schema = _prepared(df, work)
+    time = "time_s" if "time_s" in df.columns else "time_us"
+
+    def pieces(batches: Iterator[pa.RecordBatch]) -> Iterator[pa.RecordBatch]:
+        yield from work.stream(batches)
+
+    # Grouping keeps the order inside a partition that is sorted by more than the keys; a filter refuses rows out of order.
+    ordered = needed.repartition(*work.by).sortWithinPartitions(*work.by, time)
+    return ordered.groupBy(*work.by).applyInArrow(pieces, schema)

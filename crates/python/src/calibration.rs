@@ -1,0 +1,133 @@
+use std::time::Instant;
+
+use ohmstrain::{Calibrated, Calibration, GaugeFamily, Quantity};
+use ohmstrain_calib::{Samples, screen};
+use pyo3::prelude::*;
+use pyo3_arrow::PyTable;
+
+use crate::error::{Place, of_library, raise};
+use crate::evaluation::{Scored, after_split};
+use crate::options::estimator;
+use crate::recording::{About, Recording};
+use crate::sensor::Sensor;
+
+/// What is left to choose.
+#[derive(Debug, Default, FromPyObject)]
+#[pyo3(from_item_all)]
+pub struct Choices {
+    estimator: Option<String>,
+    branches: Option<usize>,
+    gauge: Option<String>,
+}
+
+impl Choices {
+    fn calibration(&self) -> PyResult<Calibration> {
+        let mut calibration = Calibration::new();
+        if let Some(kind) = self.estimator.as_deref().map(estimator).transpose()?.flatten() {
+            calibration = calibration.estimator(kind);
+        }
+        if let Some(branches) = self.branches {
+            if branches > 4 {
+                return Err(raise(&Place::default(), &format!("branches: expected 0 to 4, found {branches}")));
+            }
+            calibration = calibration.branches(branches);
+        }
+        let family = match self.gauge.as_deref() {
+            None | Some("auto") => return Ok(calibration),
+            Some("polynomial") => GaugeFamily::Polynomial,
+            Some("decaying-exponential") => GaugeFamily::DecayingExponential,
+            Some("tunnelling") => GaugeFamily::Tunnelling,
+            Some(other) => {
+                let text =
+                    format!("gauge: expected auto, polynomial, decaying-exponential or tunnelling, found `{other}`");
+                return Err(raise(&Place::default(), &text));
+            }
+        };
+        Ok(calibration.gauge(family))
+    }
+}
+
+/// The sensor behind recordings with a reference.
+#[pyfunction]
+pub fn calibrate(py: Python, tables: Vec<(PyTable, About)>, choices: Choices) -> PyResult<(Sensor, Vec<String>)> {
+    let recordings =
+        tables.into_iter().map(|(table, about)| Recording::new(table, about)).collect::<PyResult<Vec<Recording>>>()?;
+    let whole: Vec<usize> = recordings.iter().map(|recording| recording.time_s.len()).collect();
+    calibrated(py, &recordings, &whole, choices.calibration()?)
+}
+
+/// The sensor behind the first rows of recordings, as many as `rows` says of each; and what is to be said of it.
+pub fn calibrated(
+    py: Python,
+    recordings: &[Recording],
+    rows: &[usize],
+    calibration: Calibration,
+) -> PyResult<(Sensor, Vec<String>)> {
+    for recording in recordings {
+        if recording.reference.is_none() {
+            let place = Place { file: recording.name.as_deref(), column: Some("strain"), row: None };
+            return Err(raise(&place, "expected a reference (strain, displacement_mm or angle_deg), found none"));
+        }
+    }
+    let start = Instant::now();
+    let made = py.detach(|| run(recordings, rows, calibration));
+    let (calibrated, left_out) = made.map_err(|error| {
+        let name = if let [one] = recordings { one.name.as_deref() } else { None };
+        of_library(&error, name)
+    })?;
+    let warnings = left_out.iter().map(|one| {
+        let name = recordings.get(one.recording).and_then(|recording| recording.name.as_deref());
+        let name = name.map_or_else(|| format!("recording {}", one.recording + 1), str::to_owned);
+        format!("{name}: row {} ({} s): {}; left out of the calibration", one.row, one.time_s, one.doubt)
+    });
+    let warnings = warnings.collect();
+    let made = Some((calibrated.findings, start.elapsed().as_secs_f64()));
+    Ok((Sensor { sensor: calibrated.sensor, made }, warnings))
+}
+
+/// As the command line does it: rows that nobody can trust are left out first.
+fn run(
+    recordings: &[Recording],
+    rows: &[usize],
+    calibration: Calibration,
+) -> Result<(Calibrated, Vec<ohmstrain::Distrusted>), ohmstrain::Error> {
+    let parts = recordings.iter().zip(rows).map(|(recording, rows)| recording.until(*rows));
+    let parts: Vec<_> = parts.collect();
+    let samples = parts.iter().map(|(time_s, reading, strain)| Samples::new(time_s, reading, strain.unwrap_or(&[])));
+    let samples = samples.collect::<Result<Vec<_>, _>>()?;
+    let screened = screen(&samples)?;
+    let mut known = Vec::new();
+    for (recording, samples) in recordings.iter().zip(screened.samples()) {
+        let mut one = ohmstrain::Recording::new(samples.time_s(), samples.reading(), samples.strain())?;
+        if recording.unit == ohmstrain::ReadingUnit::Ratio {
+            one = one.of_ratios();
+        }
+        if recording.reference.as_ref().is_some_and(|(quantity, _)| *quantity == Quantity::AngleDeg) {
+            one = one.of_angles_deg();
+        }
+        known.push(recording.joint.map_or(one, |joint| one.on_joint(joint)));
+    }
+    let calibrated = calibration.run(&known)?;
+    Ok((calibrated, screened.distrusted))
+}
+
+/// Calibrates on the first rows of a recording and scores the rest; the sensor, and scores as JSON.
+#[pyfunction]
+pub fn evaluate_split(
+    py: Python,
+    table: PyTable,
+    about: About,
+    choices: Choices,
+    share: f64,
+) -> PyResult<(Sensor, Vec<String>, Scored)> {
+    if !(share > 0.0 && share < 1.0) {
+        return Err(raise(&Place::default(), &format!("splits: expected shares between 0 and 1, found {share}")));
+    }
+    let recording = Recording::new(table, about)?;
+    let rows = (recording.time_s.len() as f64 * share) as usize;
+    let recordings = [recording];
+    let (sensor, warnings) = calibrated(py, &recordings, &[rows], choices.calibration()?)?;
+    let [recording] = &recordings;
+    let scored = after_split(py, recording, rows, &sensor.sensor)?;
+    Ok((sensor, warnings, scored))
+}

@@ -1,0 +1,123 @@
+use ohmstrain::{Scores, Sensor};
+use ohmstrain_calib::{Baseline, Baselines, CalibrationError, Samples, ScoredRow, screen};
+use pyo3::prelude::*;
+
+use crate::error::{Place, of_library, raise};
+use crate::options::Options;
+use crate::recording::Recording;
+
+/// What is scored by name, and its scores as JSON.
+pub type Scored = Vec<(&'static str, String)>;
+
+/// Scores of filter, smoother and static cubic on the rows at a time or later; the filter starts at the first row.
+pub fn with_sensor(
+    py: Python,
+    recording: &Recording,
+    sensor: &Sensor,
+    options: &Options,
+    from_s: f64,
+) -> PyResult<Scored> {
+    let truth = truth(recording)?;
+    let file = recording.name.as_deref();
+    let params = sensor.params();
+    if recording.reference.as_ref().map(|(quantity, _)| *quantity) != Some(params.quantity) {
+        let text = format!("expected a reference in `{}`, as the calibration has it", params.quantity.name());
+        return Err(raise(&Place { file, ..Place::default() }, &text));
+    }
+    let checked = sensor.check_reference(truth.iter().copied());
+    checked.map_err(|doubt| of_library(&doubt.into(), file))?;
+    let moved = params.rest_reading / sensor.rest_reading(options.rest_resistance);
+    let part = Part { recording, truth, first: recording.time_s.partition_point(|time_s| *time_s < from_s) };
+    let scores = py.detach(|| {
+        let mut scores = part.of_estimates(sensor, options)?;
+        scores.push(("static_cubic", part.of_baseline(params.static_cubic.start(), moved)));
+        Ok::<_, PyErr>(scores)
+    })?;
+    named(scores, file)
+}
+
+/// The same with the baselines that are fitted to the rows before `rows`, which calibrated the sensor; the sensor without
+/// its correction, too, if it has one.
+pub fn after_split(py: Python, recording: &Recording, rows: usize, sensor: &Sensor) -> PyResult<Scored> {
+    let (truth, file) = (truth(recording)?, recording.name.as_deref());
+    let part = Part { recording, truth, first: rows };
+    let scores = py.detach(|| {
+        let corrected = Options::default().with_correction();
+        let mut scores = part.of_estimates(sensor, &corrected)?;
+        let baselines = fitted(recording, rows).map_err(|error| of_library(&error.into(), file))?;
+        scores.push(("static_cubic", part.of_baseline(baselines.static_cubic.start(), 1.0)));
+        scores.push(("fir_20s", part.of_baseline(baselines.fir.start(), 1.0)));
+        scores.push(("low_pass_mode", part.of_baseline(baselines.low_pass_mode.start(), 1.0)));
+        scores.push(("leaky_bank", part.of_baseline(baselines.leaky_bank.start(), 1.0)));
+        Ok::<_, PyErr>(scores)
+    })?;
+    named(scores, file)
+}
+
+fn fitted(recording: &Recording, rows: usize) -> Result<Baselines, CalibrationError> {
+    let (time_s, reading, strain) = recording.until(rows);
+    let samples = [Samples::new(time_s, reading, strain.unwrap_or(&[])).map_err(CalibrationError::from)?];
+    Baselines::fit(&screen(&samples)?.samples())
+}
+
+fn truth(recording: &Recording) -> PyResult<&[f64]> {
+    let missing = || {
+        let place = Place { file: recording.name.as_deref(), column: Some("strain"), row: None };
+        raise(&place, "expected a reference (strain, displacement_mm or angle_deg), found none")
+    };
+    recording.reference.as_ref().map(|(_, values)| values.as_slice()).ok_or_else(missing)
+}
+
+fn named(scores: Vec<(&'static str, Option<Scores>)>, file: Option<&str>) -> PyResult<Scored> {
+    let place = Place { file, ..Place::default() };
+    let text = |(name, scores): (&'static str, Option<Scores>)| {
+        let scores = scores.ok_or_else(|| raise(&place, "expected a reference in the rows to score, found none"))?;
+        let text = serde_json::to_string(&scores).map_err(|error| raise(&place, &error.to_string()))?;
+        Ok((name, text))
+    };
+    scores.into_iter().map(text).collect()
+}
+
+/// The rows that are scored: all from `first` on.
+struct Part<'a> {
+    recording: &'a Recording,
+    truth: &'a [f64],
+    first: usize,
+}
+
+impl Part<'_> {
+    fn scores(&self, estimate: impl Fn(usize) -> (f64, Option<f64>)) -> Option<Scores> {
+        let row = |row: usize| {
+            let (strain, sd) = estimate(row);
+            ScoredRow { time_s: self.recording.time_s[row], truth: self.truth[row], strain, sd }
+        };
+        Scores::new(&(self.first..self.truth.len()).map(row).collect::<Vec<_>>())
+    }
+
+    fn of_baseline(&self, mut baseline: impl Baseline, moved: f64) -> Option<Scores> {
+        let rows = self.recording.time_s.iter().zip(&self.recording.readings);
+        let strains: Vec<f64> = rows.map(|(time_s, reading)| baseline.strain(*time_s, moved * reading)).collect();
+        self.scores(|row| (strains[row], None))
+    }
+
+    /// Of filter and smoother.
+    fn of_estimates(&self, sensor: &Sensor, options: &Options) -> PyResult<Vec<(&'static str, Option<Scores>)>> {
+        let refused = |error| of_library(&error, self.recording.name.as_deref());
+        let len = self.truth.len();
+        let mut filter = options.builder(sensor)?.build().map_err(refused)?;
+        let mut filtered = Vec::with_capacity(len);
+        for row in 0..len {
+            let (time_s, reading) = self.recording.row(row);
+            let estimate = filter.step(time_s, reading).map_err(refused)?;
+            filtered.push((estimate.strain, Some(estimate.strain_sd)));
+        }
+        let mut smoothed = vec![(f64::NAN, None); len];
+        let keep = |rows: std::ops::Range<usize>, segment: &[ohmstrain::Estimate]| {
+            let cells = smoothed[rows].iter_mut().zip(segment);
+            cells.for_each(|(cell, row)| *cell = (row.strain, Some(row.strain_sd)));
+            Ok::<(), ohmstrain::Error>(())
+        };
+        options.builder(sensor)?.smooth_backward(len, |row| self.recording.row(row), keep).map_err(refused)?;
+        Ok(vec![("filter", self.scores(|row| filtered[row])), ("smoother", self.scores(|row| smoothed[row]))])
+    }
+}

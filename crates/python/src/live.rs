@@ -1,0 +1,116 @@
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use ohmstrain::{Column, Error, Estimate};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use pyo3_arrow::PyTable;
+
+use crate::error::of_library;
+use crate::recording::{About, Recording};
+use crate::table::Estimates;
+
+/// A running filter.
+#[pyclass(frozen, module = "ohmstrain._core")]
+pub struct LiveFilter {
+    filter: Mutex<ohmstrain::Filter>,
+    sensor: ohmstrain::Sensor,
+    columns: Vec<Column>,
+    /// What the rested sensor reads, if not what it read in calibration.
+    rest_resistance: Option<f64>,
+}
+
+/// A running filter that waits.
+#[pyclass(frozen, module = "ohmstrain._core")]
+pub struct LaggedFilter {
+    filter: Mutex<ohmstrain::LaggedFilter>,
+    columns: Vec<Column>,
+}
+
+/// A filter for one caller at a time. A step either succeeds or leaves the filter as it was, also if it panics.
+fn locked<T>(filter: &Mutex<T>) -> MutexGuard<'_, T> {
+    filter.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+fn refused(error: Error) -> PyErr {
+    of_library(&error, None)
+}
+
+/// A row as a dictionary with the names of the columns; `None` for what is not known.
+fn row<'py>(py: Python<'py>, columns: &[Column], row: &Estimate) -> PyResult<Bound<'py, PyDict>> {
+    let cells = PyDict::new(py);
+    for column in columns {
+        if column.is_flags() {
+            cells.set_item(column.name(), row.flags.to_string())?;
+        } else {
+            let known = Some(column.number(row)).filter(|number| !number.is_nan());
+            cells.set_item(column.name(), known)?;
+        }
+    }
+    Ok(cells)
+}
+
+impl LiveFilter {
+    pub(crate) fn new(filter: ohmstrain::Filter, sensor: ohmstrain::Sensor, rest_resistance: Option<f64>) -> Self {
+        let columns = sensor.columns();
+        Self { filter: Mutex::new(filter), sensor, columns, rest_resistance }
+    }
+}
+
+impl LaggedFilter {
+    pub(crate) fn new(filter: ohmstrain::LaggedFilter, columns: Vec<Column>) -> Self {
+        Self { filter: Mutex::new(filter), columns }
+    }
+}
+
+#[pymethods]
+impl LiveFilter {
+    #[pyo3(signature = (time_s, reading=None))]
+    fn step<'py>(&self, py: Python<'py>, time_s: f64, reading: Option<f64>) -> PyResult<Bound<'py, PyDict>> {
+        let estimate = locked(&self.filter).step(time_s, reading).map_err(refused)?;
+        row(py, &self.columns, &estimate)
+    }
+
+    /// Takes the rows of a table, and goes on from the last one with the next.
+    fn run(&self, py: Python, table: PyTable, about: About) -> PyResult<PyTable> {
+        let recording = Recording::new(table, about)?;
+        recording.check_unit(&self.sensor, self.rest_resistance)?;
+        let estimates = py.detach(|| {
+            let mut estimates = Estimates::new(self.columns.clone(), recording.time_s.len());
+            let mut filter = locked(&self.filter);
+            for row in 0..recording.time_s.len() {
+                let (time_s, reading) = recording.row(row);
+                let estimate = filter.step(time_s, reading).map_err(|error| match error {
+                    Error::Step(source) => Error::Row { row, source },
+                    other => other,
+                })?;
+                estimates.put(row, std::slice::from_ref(&estimate));
+            }
+            Ok(estimates)
+        });
+        estimates.map_err(|error| of_library(&error, recording.name.as_deref()))?.into_table()
+    }
+
+    fn rest_resistance(&self, measured: f64) -> PyResult<()> {
+        locked(&self.filter).rest_resistance(measured).map_err(refused)
+    }
+}
+
+#[pymethods]
+impl LaggedFilter {
+    #[pyo3(signature = (time_s, reading=None))]
+    fn step<'py>(&self, py: Python<'py>, time_s: f64, reading: Option<f64>) -> PyResult<Vec<Bound<'py, PyDict>>> {
+        let mut filter = locked(&self.filter);
+        let rows = filter.step(time_s, reading).map_err(refused)?;
+        rows.iter().map(|estimate| row(py, &self.columns, estimate)).collect()
+    }
+
+    fn finish<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
+        let mut filter = locked(&self.filter);
+        let rows = filter.finish().map_err(refused)?;
+        rows.iter().map(|estimate| row(py, &self.columns, estimate)).collect()
+    }
+
+    fn rest_resistance(&self, measured: f64) -> PyResult<()> {
+        locked(&self.filter).rest_resistance(measured).map_err(refused)
+    }
+}

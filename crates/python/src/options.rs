@@ -1,0 +1,73 @@
+use ohmstrain::{EstimatorKind, FilterBuilder, Influence, Sensor};
+use pyo3::prelude::*;
+
+use crate::error::{Place, raise};
+
+/// How a filter is to be: the flags of `ohmstrain filter`.
+#[derive(Clone, Debug, Default, FromPyObject)]
+#[pyo3(from_item_all)]
+pub struct Options {
+    estimator: Option<String>,
+    correction: bool,
+    initial_strain: Option<f64>,
+    /// What the rested sensor reads now.
+    pub rest_resistance: Option<f64>,
+    gate: Option<f64>,
+    influence: Option<String>,
+}
+
+impl Options {
+    /// With the learned correction, if the sensor has one.
+    pub fn with_correction(self) -> Self {
+        Self { correction: true, ..self }
+    }
+
+    /// A sensor's filter as they want it.
+    pub fn builder<'a>(&self, sensor: &'a Sensor) -> PyResult<FilterBuilder<'a>> {
+        let mut builder = sensor.filter();
+        if let Some(kind) = self.estimator.as_deref().map(estimator).transpose()?.flatten() {
+            builder = builder.estimator(kind);
+        }
+        if !self.correction {
+            builder = builder.without_correction();
+        }
+        if let Some(strain) = self.initial_strain {
+            builder = builder.initial_strain(strain);
+        }
+        if let Some(measured) = self.rest_resistance {
+            builder = builder.rest_resistance(measured);
+        }
+        if let Some(nis) = self.gate {
+            builder = builder.gate(nis);
+        }
+        if let Some(text) = &self.influence {
+            builder = builder.influence(influence(text)?);
+        }
+        Ok(builder)
+    }
+}
+
+/// An estimator by its name; `None` for `auto`.
+pub fn estimator(name: &str) -> PyResult<Option<EstimatorKind>> {
+    if name == "auto" {
+        return Ok(None);
+    }
+    let found = EstimatorKind::ALL.into_iter().find(|kind| kind.name() == name);
+    found.map(Some).ok_or_else(|| {
+        let names = EstimatorKind::ALL.map(EstimatorKind::name).join(", ");
+        raise(&Place::default(), &format!("estimator: expected auto or {names}, found `{name}`"))
+    })
+}
+
+fn influence(text: &str) -> PyResult<Influence<f64>> {
+    let parsed = text.split_once(':').and_then(|(kind, number)| {
+        let number: f64 = number.parse().ok().filter(|number: &f64| number.is_finite() && *number > 0.0)?;
+        match kind {
+            "huber" => Some(Influence::Huber { threshold: number }),
+            "student-t" => Some(Influence::StudentT { degrees_of_freedom: number }),
+            _ => None,
+        }
+    });
+    let message = || format!("influence: expected huber:K or student-t:DOF with a positive number, found `{text}`");
+    parsed.ok_or_else(|| raise(&Place::default(), &message()))
+}

@@ -1,0 +1,174 @@
+use ohmstrain::{Closing, EstimatorKind, Findings, Quantity, ReadingUnit, ValidityWatch};
+use pyo3::prelude::*;
+use pyo3_arrow::PyTable;
+
+use crate::error::{Place, of_library, raise};
+use crate::evaluation::{self, Scored};
+use crate::live::{LaggedFilter, LiveFilter};
+use crate::options::Options;
+use crate::recording::{About, Recording};
+use crate::table::Estimates;
+
+/// A calibrated sensor.
+#[pyclass(frozen, module = "ohmstrain._core")]
+pub struct Sensor {
+    pub(crate) sensor: ohmstrain::Sensor,
+    /// What the calibration came to, and the seconds that it took, if it was made here.
+    pub(crate) made: Option<(Option<Findings>, f64)>,
+}
+
+/// Estimates and what casts doubt on them.
+type Doubtful = (PyTable, Vec<String>);
+
+impl Sensor {
+    /// On the joint of a recording, if it has one; with its readings checked.
+    fn for_recording(&self, recording: &Recording, options: &Options) -> PyResult<ohmstrain::Sensor> {
+        recording.check_unit(&self.sensor, options.rest_resistance)?;
+        let refused = |error| of_library(&error, recording.name.as_deref());
+        recording
+            .joint
+            .map_or_else(|| Ok(self.sensor.clone()), |joint| self.sensor.clone().on_joint(joint).map_err(refused))
+    }
+}
+
+#[pymethods]
+impl Sensor {
+    #[staticmethod]
+    #[pyo3(signature = (text, file=None, estimator=None))]
+    fn from_toml(text: &str, file: Option<&str>, estimator: Option<&str>) -> PyResult<Self> {
+        let kind = estimator.map(crate::options::estimator).transpose()?.flatten();
+        let sensor = match kind {
+            Some(kind) => ohmstrain::Sensor::from_toml_for(text, kind),
+            None => ohmstrain::Sensor::from_toml(text),
+        };
+        Ok(Self { sensor: sensor.map_err(|error| of_library(&error, file))?, made: None })
+    }
+
+    fn to_toml(&self) -> PyResult<String> {
+        self.sensor.to_toml().map_err(|error| of_library(&error, None))
+    }
+
+    /// What the calibration came to, in at most ten lines.
+    fn closing(&self, file: Option<&str>) -> Option<String> {
+        let (findings, calibration_s) = self.made.as_ref()?;
+        let (findings, params) = (findings.as_ref(), self.sensor.params());
+        Some(Closing { file, params, findings, calibration_s: *calibration_s }.text())
+    }
+
+    /// All numbers, and what the calibration came to, as JSON.
+    fn json(&self) -> PyResult<(String, Option<String>)> {
+        let failed = |error: serde_json::Error| raise(&Place::default(), &error.to_string());
+        let params = serde_json::to_string(self.sensor.params()).map_err(failed)?;
+        let findings = self.made.as_ref().and_then(|(findings, _)| findings.as_ref());
+        Ok((params, findings.map(serde_json::to_string).transpose().map_err(failed)?))
+    }
+
+    #[getter]
+    fn quantity(&self) -> &'static str {
+        match self.sensor.params().quantity {
+            Quantity::Strain => "strain",
+            Quantity::AngleDeg => "angle_deg",
+        }
+    }
+
+    #[getter]
+    fn reading(&self) -> &'static str {
+        match self.sensor.params().reading {
+            ReadingUnit::Ohm => "resistance_ohm",
+            ReadingUnit::Ratio => "resistance_ratio",
+        }
+    }
+
+    #[getter]
+    fn estimator(&self) -> &'static str {
+        EstimatorKind::name(self.sensor.params().default_estimator)
+    }
+
+    fn columns(&self) -> Vec<&'static str> {
+        self.sensor.columns().iter().map(ohmstrain::Column::name).collect()
+    }
+
+    fn live(&self, options: Options) -> PyResult<LiveFilter> {
+        let filter = options.builder(&self.sensor)?.build().map_err(|error| of_library(&error, None))?;
+        Ok(LiveFilter::new(filter, self.sensor.clone(), options.rest_resistance))
+    }
+
+    fn lagged(&self, options: Options, lag_s: f64) -> PyResult<LaggedFilter> {
+        let filter = options.builder(&self.sensor)?.build_lagged(lag_s).map_err(|error| of_library(&error, None))?;
+        Ok(LaggedFilter::new(filter, self.sensor.columns()))
+    }
+
+    fn filter(&self, py: Python, table: PyTable, about: About, options: Options) -> PyResult<Doubtful> {
+        let recording = Recording::new(table, about)?;
+        let sensor = self.for_recording(&recording, &options)?;
+        let refused = |error| of_library(&error, recording.name.as_deref());
+        let mut filter = options.builder(&sensor)?.build().map_err(refused)?;
+        let estimates = py.detach(|| {
+            let mut estimates = Estimates::new(sensor.columns(), recording.time_s.len());
+            let mut watch = Watch::new(&sensor, &recording, &options);
+            for row in 0..recording.time_s.len() {
+                let (time_s, reading) = recording.row(row);
+                let estimate = filter.step(time_s, reading).map_err(|error| (row, error))?;
+                estimates.put(row, std::slice::from_ref(&estimate));
+                watch.see(row, estimate.strain_rate);
+            }
+            Ok((estimates, watch.warnings))
+        });
+        let (estimates, warnings) = estimates.map_err(|(row, error)| match error {
+            ohmstrain::Error::Step(source) => refused(ohmstrain::Error::Row { row, source }),
+            other => refused(other),
+        })?;
+        Ok((estimates.into_table()?, warnings))
+    }
+
+    fn smooth(&self, py: Python, table: PyTable, about: About, options: Options) -> PyResult<Doubtful> {
+        let recording = Recording::new(table, about)?;
+        let sensor = self.for_recording(&recording, &options)?;
+        let builder = options.builder(&sensor)?;
+        let estimates = py.detach(|| {
+            let len = recording.time_s.len();
+            let mut estimates = Estimates::new(sensor.columns(), len);
+            let mut rates = vec![0.0; len];
+            builder.smooth_backward(
+                len,
+                |row| recording.row(row),
+                |rows, segment| {
+                    estimates.put(rows.start, segment);
+                    rates[rows].iter_mut().zip(segment).for_each(|(rate, row)| *rate = row.strain_rate);
+                    Ok::<(), ohmstrain::Error>(())
+                },
+            )?;
+            let mut watch = Watch::new(&sensor, &recording, &options);
+            rates.iter().enumerate().for_each(|(row, rate)| watch.see(row, *rate));
+            Ok((estimates, watch.warnings))
+        });
+        let (estimates, warnings) = estimates.map_err(|error| of_library(&error, recording.name.as_deref()))?;
+        Ok((estimates.into_table()?, warnings))
+    }
+
+    fn evaluate(&self, py: Python, table: PyTable, about: About, options: Options, from_s: f64) -> PyResult<Scored> {
+        let recording = Recording::new(table, about)?;
+        let sensor = self.for_recording(&recording, &options)?;
+        evaluation::with_sensor(py, &recording, &sensor, &options, from_s)
+    }
+}
+
+/// Says when the calibration does not reach.
+struct Watch<'a> {
+    watch: ValidityWatch,
+    recording: &'a Recording,
+    warnings: Vec<String>,
+}
+
+impl<'a> Watch<'a> {
+    fn new(sensor: &ohmstrain::Sensor, recording: &'a Recording, options: &Options) -> Self {
+        Self { watch: ValidityWatch::new(sensor, options.rest_resistance), recording, warnings: Vec::new() }
+    }
+
+    fn see(&mut self, row: usize, rate: f64) {
+        let (time_s, reading) = self.recording.row(row);
+        let seen = self.watch.see(time_s, reading.value, rate, f64::NAN);
+        let name = self.recording.name.as_deref().map_or_else(String::new, |name| format!("{name}: "));
+        self.warnings.extend(seen.map(|warning| format!("{name}{warning}")));
+    }
+}

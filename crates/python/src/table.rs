@@ -1,0 +1,72 @@
+use std::sync::Arc;
+
+use arrow_array::builder::StringBuilder;
+use arrow_array::{ArrayRef, Float64Array, RecordBatch};
+use arrow_schema::{ArrowError, DataType, Field, Schema};
+use ohmstrain::{Column, Estimate};
+use pyo3::prelude::*;
+use pyo3_arrow::PyTable;
+
+use crate::error::{Place, raise};
+
+/// Estimates, column by column, while they are made: cells that are not known are null.
+#[derive(Debug)]
+pub struct Estimates {
+    columns: Vec<Column>,
+    /// NaN where nothing is known; empty for flags.
+    numbers: Vec<Vec<f64>>,
+    flags: Vec<ohmstrain::Flags>,
+}
+
+impl Estimates {
+    /// Room for so many rows.
+    pub fn new(columns: Vec<Column>, rows: usize) -> Self {
+        let room = |column: &Column| if column.is_flags() { vec![] } else { vec![f64::NAN; rows] };
+        let numbers = columns.iter().map(room).collect();
+        Self { columns, numbers, flags: vec![ohmstrain::Flags::NONE; rows] }
+    }
+
+    /// Puts rows from `first` on.
+    pub fn put(&mut self, first: usize, rows: &[Estimate]) {
+        for (column, numbers) in self.columns.iter().zip(&mut self.numbers) {
+            if let Some(cells) = numbers.get_mut(first..first + rows.len()) {
+                cells.iter_mut().zip(rows).for_each(|(cell, row)| *cell = column.number(row));
+            }
+        }
+        if let Some(flags) = self.flags.get_mut(first..first + rows.len()) {
+            flags.iter_mut().zip(rows).for_each(|(flags, row)| *flags = row.flags);
+        }
+    }
+
+    /// As a table of one batch.
+    pub fn into_table(self) -> PyResult<PyTable> {
+        let failed = |error: ArrowError| raise(&Place::default(), &error.to_string());
+        let (mut fields, mut arrays): (Vec<Field>, Vec<ArrayRef>) = (Vec::new(), Vec::new());
+        for (column, numbers) in self.columns.iter().zip(self.numbers) {
+            let kind = if column.is_flags() { DataType::Utf8 } else { DataType::Float64 };
+            fields.push(Field::new(column.name(), kind, !column.is_flags()));
+            arrays.push(if column.is_flags() { texts(&self.flags) } else { nullable(numbers) });
+        }
+        let schema = Arc::new(Schema::new(fields));
+        let batch = RecordBatch::try_new(Arc::clone(&schema), arrays).map_err(failed)?;
+        PyTable::try_new(vec![batch], schema)
+    }
+}
+
+fn nullable(numbers: Vec<f64>) -> ArrayRef {
+    if numbers.iter().any(|number| number.is_nan()) {
+        let known = |number: f64| Some(number).filter(|number| !number.is_nan());
+        Arc::new(numbers.into_iter().map(known).collect::<Float64Array>())
+    } else {
+        Arc::new(Float64Array::from(numbers))
+    }
+}
+
+fn texts(flags: &[ohmstrain::Flags]) -> ArrayRef {
+    let mut texts = StringBuilder::with_capacity(flags.len(), flags.len());
+    for flags in flags {
+        // Mostly there is nothing to say.
+        if *flags == ohmstrain::Flags::NONE { texts.append_value("") } else { texts.append_value(flags.to_string()) }
+    }
+    Arc::new(texts.finish())
+}

@@ -1,0 +1,87 @@
+"""Recordings in one table: what an engine calls for each of them."""
+
+import pickle
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pytest
+
+import ohmstrain as oh
+from ohmstrain._groups import Work
+
+BY = ("sensor_id", "recording_id")
+
+
+def fleet(trace, recordings=4, rows=300, bad=(2,)):
+    """Recordings of two sensors, rows shuffled; those that are bad have a negative reading."""
+    parts = []
+    for k in range(recordings):
+        part = trace.iloc[k * 20 : k * 20 + rows][["time_s", "resistance_ohm", "strain"]].copy()
+        if k in bad:
+            part.iloc[10, 1] = -1.0
+        parts.append(part.assign(sensor_id=["left", "right"][k % 2], recording_id=k, other="x"))
+    return pd.concat(parts).sample(frac=1, random_state=1)
+
+
+def of(table, recording):
+    rows = table[table["recording_id"] == recording].sort_values("time_s")
+    return rows.reset_index(drop=True)
+
+
+def check(done, table, sensor, bad=(2,)):
+    """Nothing lost, nothing doubled, and the numbers of one machine."""
+    errors = done[done["error"].notna()]
+    assert sorted(errors["recording_id"]) == list(bad)
+    assert errors["error"].str.contains("expected a positive number").all()
+    for k in set(table["recording_id"]) - set(bad):
+        expected = sensor.smooth(of(table, k)[["time_s", "resistance_ohm"]])
+        found = of(done, k)
+        for name in ("time_s", "strain", "strain_sd", "nis"):
+            np.testing.assert_array_equal(found[name].to_numpy(float), expected[name].to_numpy(float))
+
+
+def test_work(trace, sensor):
+    table = fleet(trace)
+    work = pickle.loads(pickle.dumps(Work("smooth", BY, {"left": sensor, "right": sensor})))
+    work.check(table.columns)
+    assert "other" not in work.needed(table.columns)
+    groups = [pa.Table.from_pandas(group, preserve_index=False) for _, group in table.groupby(list(BY))]
+    done = pa.concat_tables([work(group) for group in groups])
+    assert done.schema.names == [*BY, *sensor.columns, "error"]
+    check(done.to_pandas(), table, sensor)
+
+
+def test_pieces_are_the_whole(trace, sensor):
+    rows = trace.head(250)[["time_s", "resistance_ohm"]].assign(sensor_id="left", recording_id=1)
+    batches = pa.Table.from_pandas(rows, preserve_index=False).to_batches(max_chunksize=64)
+    work = Work("filter", BY, sensor)
+    done = pa.Table.from_batches(list(work.stream(iter(batches)))).to_pandas()
+    np.testing.assert_array_equal(done["strain"], sensor.filter(rows)["strain"])
+    backwards = list(work.stream(iter(batches[::-1])))
+    errors = pa.Table.from_batches(backwards).to_pandas()["error"].dropna()
+    assert len(errors) == 1 and "time" in errors.iloc[0]
+
+
+def test_scores_and_sensors(trace, sensor):
+    rows = trace[["time_s", "resistance_ohm", "strain"]].assign(sensor_id="left", recording_id=1)
+    group = pa.Table.from_pandas(rows, preserve_index=False)
+    [scores] = Work("evaluate", BY, sensor)(group).to_pylist()
+    assert scores["filter_percent_fs"] == sensor.evaluate(trace).filter.rmse_percent_fs
+    [made] = Work("calibrate", ["sensor_id"], estimator="ekf")(group).to_pylist()
+    assert oh.Sensor.from_toml(made["sensor_toml"]) == oh.calibrate(trace, estimator="ekf")
+    assert made["error"] is None and made["coverage_95"] > 0.5
+
+
+def test_what_cannot_work_is_refused_before(trace, sensor):
+    with pytest.raises(oh.OhmstrainError, match="recording_id"):
+        Work("smooth", BY, sensor).check(["sensor_id", "time_s", "resistance_ohm"])
+    with pytest.raises(oh.OhmstrainError, match="resistance_ratio"):
+        Work("smooth", BY, sensor).check([*BY, "time_s"])
+    with pytest.raises(oh.OhmstrainError, match="sensors"):
+        Work("smooth", BY, {})
+    with pytest.raises(oh.OhmstrainError, match="estimator"):
+        Work("smooth", BY, sensor, estimator="kalman")
+    rows = trace.head(50).assign(sensor_id="unknown", recording_id=1)
+    [row] = Work("smooth", BY, {"left": sensor})(pa.Table.from_pandas(rows, preserve_index=False)).to_pylist()
+    assert "expected one for sensor_id `unknown`" in row["error"]

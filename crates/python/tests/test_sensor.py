@@ -1,0 +1,99 @@
+"""Sensors as objects, filters as they run, plots."""
+
+import pickle
+import threading
+import time
+
+import numpy as np
+import pytest
+
+import ohmstrain as oh
+
+
+def test_save_load_pickle(tmp_path, folder, sensor):
+    sensor = oh.Sensor.load(folder / "sensor.toml")
+    sensor.save(tmp_path / "copy.toml")
+    assert (tmp_path / "copy.toml").read_text() == (folder / "sensor.toml").read_text()
+    assert pickle.loads(pickle.dumps(sensor)) == sensor
+    assert "copy.toml" in repr(sensor) and sensor.estimator == "sign-split" and sensor.quantity == "strain"
+
+
+def test_a_bad_file_is_named(tmp_path, folder):
+    path = tmp_path / "bad.toml"
+    path.write_text((folder / "sensor.toml").read_text().replace("rest_reading = ", "rest_reading = -", 1))
+    with pytest.raises(oh.OhmstrainError, match=r"bad.toml:\d+: column \d+"):
+        oh.Sensor.load(path)
+
+
+def test_live_is_the_filter(trace, sensor):
+    rows = trace.head(100)
+    expected = sensor.filter(rows)
+    live, pieces = sensor.filter(), sensor.filter()
+    for row, (time_s, reading) in enumerate(zip(rows["time_s"], rows["resistance_ohm"])):
+        assert live.step(time_s, reading)["strain"] == expected["strain"][row]
+    found = [pieces.run(rows.iloc[at : at + 33]) for at in range(0, 100, 33)]
+    np.testing.assert_array_equal(np.concatenate([piece["strain"] for piece in found]), expected["strain"])
+    with pytest.raises(oh.OhmstrainError):
+        live.step(0.0, 1600.0)
+    assert live.step(1e3, None)["flags"] == "missing"
+    lagged = sensor.filter(lag_s=0.5)
+    out = [row for time_s, reading in zip(rows["time_s"], rows["resistance_ohm"]) for row in lagged.step(time_s, reading)]
+    out += lagged.finish()
+    assert [row["time_s"] for row in out] == list(rows["time_s"])
+
+
+def test_wrong_options_are_named(sensor):
+    with pytest.raises(oh.OhmstrainError, match="sign-split"):
+        sensor.filter(estimator="kalman")
+    with pytest.raises(oh.OhmstrainError, match="huber:K"):
+        sensor.filter(influence="huber")
+    with pytest.raises(oh.OhmstrainError, match="initial strain"):
+        sensor.filter(initial_strain=10.0)
+    with pytest.raises(TypeError):
+        sensor.filter(gait=1)
+
+
+@pytest.mark.filterwarnings("ignore::ohmstrain.OhmstrainWarning")
+def test_warns_beyond_the_calibration(trace, sensor):
+    longer = trace.assign(time_s=trace["time_s"] * 3)
+    with pytest.warns(oh.OhmstrainWarning, match="longer than"):
+        sensor.filter(longer)
+
+
+def test_the_interpreter_is_free_meanwhile(trace, sensor):
+    """Another thread goes on counting while a smoother runs, which holds the lock for no longer than a switch."""
+    long = {"time_s": np.arange(60_000) * 0.2, "resistance_ohm": np.resize(trace["resistance_ohm"].to_numpy(), 60_000)}
+    ticks, done = [], threading.Event()
+
+    def tick():
+        while not done.is_set():
+            ticks.append(time.perf_counter())
+            time.sleep(0.001)
+
+    thread = threading.Thread(target=tick)
+    thread.start()
+    start = time.perf_counter()
+    with pytest.warns(oh.OhmstrainWarning):
+        sensor.smooth(long)
+    end = time.perf_counter()
+    done.set()
+    thread.join()
+    inside = [at for at in ticks if start + 0.1 * (end - start) < at < end - 0.1 * (end - start)]
+    # Of a millisecond each, half would do for a busy machine; with the lock held there is none.
+    assert len(inside) > 5, (len(inside), end - start)
+
+
+def test_plots(trace, sensor):
+    matplotlib = pytest.importorskip("matplotlib")
+    matplotlib.use("Agg")
+    estimates = sensor.smooth(trace.head(300))
+    figure = oh.plot.strain(estimates, trace.head(300))
+    assert {line.get_label() for line in figure.axes[0].lines} == {"estimate", "reference"}
+    assert len(sensor.plot.calibration().axes) == 1
+    made = oh.calibrate(trace, estimator="ekf")
+    assert len(made.plot.calibration().axes) == 3
+    # g(0) = 0, and the curve of the report at one strain, written out.
+    line = made.plot.gauge().axes[0].lines[0]
+    a, b, c = made.params["law"]["gauge"]["coefficients"]
+    e, g = line.get_xdata()[50] / 100, line.get_ydata()[50] / 100
+    assert g == pytest.approx(a * e + b * e**2 + c * e**3)

@@ -1,0 +1,30 @@
+#!/usr/bin/env bash
+# Builds the Python wheel and installs it into a virtual environment of its own; prints that environment's Python.
+#
+#   python.sh [--engines]      with pyspark, ray, and the Java that Spark needs (by apt, as root, where there is none)
+#
+# Environment:
+#   PYTHON3  the Python to start from, 3.10 or newer; default: python3. Installed by apt where there is none and this is root.
+#   VENV     the environment; default: target/python
+set -euo pipefail
+cd "$(dirname "$0")/.."
+readonly venv=${VENV:-$PWD/target/python}
+
+if ! command -v "${PYTHON3:-python3}" >/dev/null || ! "${PYTHON3:-python3}" -c 'import venv, ensurepip' 2>/dev/null; then
+    apt-get -q update >/dev/null
+    DEBIAN_FRONTEND=noninteractive apt-get -q install -y --no-install-recommends python3 python3-venv >/dev/null
+fi
+if [[ ${1:-} == --engines ]] && ! command -v java >/dev/null; then
+    apt-get -q update >/dev/null
+    DEBIAN_FRONTEND=noninteractive apt-get -q install -y --no-install-recommends default-jre-headless >/dev/null
+fi
+[[ -x $venv/bin/python ]] || "${PYTHON3:-python3}" -m venv "$venv"
+"$venv/bin/python" -m pip install --quiet 'maturin>=1.9,<2'
+rm -rf "$venv/wheels"
+(cd crates/python && "$venv/bin/maturin" build --quiet --release --locked --out "$venv/wheels" >&2)
+extras=test
+if [[ ${1:-} == --engines ]]; then extras=test,spark,ray; fi
+wheel=$(echo "$venv"/wheels/ohmstrain-*.whl)
+"$venv/bin/python" -m pip install --quiet --force-reinstall --no-deps "$wheel"
+"$venv/bin/python" -m pip install --quiet "$wheel[$extras]"
+echo "$venv/bin/python"
