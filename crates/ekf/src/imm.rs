@@ -139,14 +139,14 @@ impl<T: Real, M> Imm<T, M> {
             return None;
         }
         let mut entered = Mixture::<T, N, L, 3>::empty();
-        let mut log_inside = T::zero();
+        let mut per_inside = T::zero();
         for from in mixture.components() {
             let weight = comes_from(chain, from, phase) / total;
             let (belief, _) = enter(&self.model, from, phase);
             entered.push(Component { log_weight: weight.ln(), belief, ..*from });
-            log_inside += weight * from.log_inside;
+            per_inside += weight * from.per_inside;
         }
-        Some(Component { log_weight: total.ln(), phase, belief: entered.moments(), log_inside })
+        Some(Component { log_weight: total.ln(), phase, belief: entered.moments(), per_inside })
     }
 }
 

@@ -16,9 +16,10 @@ pub struct Component<T, const N: usize, const L: usize> {
     pub phase: Phase,
     /// The state, given the hypothesis.
     pub belief: Belief<T, N, L>,
-    /// Logarithm of the probability of the strain's limits under `belief`. Only its changes enter the weight: evidence
-    /// that was counted once is not counted again at every step of a rest on a limit.
-    pub(crate) log_inside: T,
+    /// One over the probability of the strain's limits under `belief`. Only changes of the probability enter the weight:
+    /// evidence that was counted once is not counted again at every step of a rest on a limit. The weight times this is what
+    /// it would be without limits, so that a merged hypothesis has the mean of both.
+    pub(crate) per_inside: T,
 }
 
 /// At most `K` weighted hypotheses about the state, in fixed memory.
@@ -61,14 +62,14 @@ impl<T: Real, const N: usize, const L: usize, const K: usize> Mixture<T, N, L, K
     #[must_use]
     pub fn single(belief: Belief<T, N, L>, phase: Phase) -> Self {
         let mut mixture = Self::empty();
-        mixture.push(Component { log_weight: T::zero(), phase, belief, log_inside: T::zero() });
+        mixture.push(Component { log_weight: T::zero(), phase, belief, per_inside: T::one() });
         mixture
     }
 
     pub(crate) fn empty() -> Self {
         let () = Self::CAPACITY;
         let nothing = Belief { mean: SVector::zeros(), covariance: Symmetric::zeros() };
-        let vacant = Component { log_weight: T::zero(), phase: Phase::Hold, belief: nothing, log_inside: T::zero() };
+        let vacant = Component { log_weight: T::zero(), phase: Phase::Hold, belief: nothing, per_inside: T::one() };
         Self { components: [vacant; K], len: 0, pause: Pause::over() }
     }
 
@@ -272,18 +273,20 @@ impl<T: Real, const N: usize, const L: usize> Component<T, N, L> {
             log_weight: heavier + total.ln(),
             phase: self.phase,
             belief: moment_match([(mine, &self.belief), (theirs, &other.belief)].into_iter()),
-            log_inside: mine * self.log_inside + theirs * other.log_inside,
+            per_inside: mine * self.per_inside + theirs * other.per_inside,
         }
     }
 
     /// Takes in how much more, or less, probability its belief now gives to the limits.
     pub(crate) fn weigh_limits(&mut self, limits: &StrainRange<T>) {
         let strain = Gaussian { mean: self.belief.mean[0], variance: self.belief.covariance[(0, 0)] };
-        let inside = strain.mass_within(limits);
+        let inside = strain.mass_within(limits).max(T::of(LEAST_INSIDE));
+        let more_inside = inside * self.per_inside;
         // Mostly nothing is near a limit.
-        let log_inside = if inside < T::one() { inside.max(T::of(LEAST_INSIDE)).ln() } else { T::zero() };
-        self.log_weight += log_inside - self.log_inside;
-        self.log_inside = log_inside;
+        if more_inside != T::one() {
+            self.log_weight += more_inside.ln();
+        }
+        self.per_inside = T::one() / inside;
     }
 }
 

@@ -177,7 +177,7 @@ where
         let covariance = self.model.propagate(&from.covariance, &transition);
         let predicted = Belief { mean: transition.mean, covariance };
         let mut child =
-            Component { log_weight: parent.log_weight, phase, belief: predicted, log_inside: parent.log_inside };
+            Component { log_weight: parent.log_weight, phase, belief: predicted, per_inside: parent.per_inside };
         let mass = cut(&mut child.belief);
         if !(mass > T::of(LEAST_MASS)) {
             return Ok(());

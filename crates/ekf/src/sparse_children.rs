@@ -29,17 +29,15 @@ impl<'a, T: Real, const N: usize, const L: usize, const K: usize> Children<'a, T
     /// Adds a child: merged with one that says the same, in a free place, or in the place of the lightest, which is
     /// merged with the nearest of its phase. Says where it went.
     pub(crate) fn add<const B: usize>(&mut self, child: &Parts<T, B>, phase: Phase, weighed: &Weighed<T>) -> Added {
-        let Weighed { weight, more_inside, log_inside } = *weighed;
-        let likelihood = weight;
-        let weight = Weight { exponent: weight.exponent + more_inside, ..weight };
+        let Weighed { weight, more_inside, per_inside } = *weighed;
         self.raise_to(weight.exponent);
-        let weight = weight.relative_to(self.exponent);
-        // Mostly nothing is near a limit.
-        self.density += if more_inside.is_zero() { weight } else { likelihood.relative_to(self.exponent) };
+        let likelihood = weight.relative_to(self.exponent);
+        self.density += likelihood;
+        let weight = likelihood * more_inside;
         let like =
             |(_, (share, known)): &(usize, (&mut Share<T, N, L>, &mut Phase))| **known == phase && share.is_like(child);
         if let Some((place, (like, _))) = self.kept.iter_mut().enumerate().find(like) {
-            like.merge(child, weight, log_inside);
+            like.merge(child, weight, per_inside);
             return Added::To(place);
         }
         let (added, place) = if self.kept.shares().len() < K {
@@ -47,14 +45,14 @@ impl<'a, T: Real, const N: usize, const L: usize, const K: usize> Children<'a, T
         } else {
             let (at, lightest) = self.lightest();
             if !(lightest < weight * T::of(1.0 - LIGHTER)) {
-                let into = self.merge_into_nearest(child, phase, (weight, log_inside), None);
+                let into = self.merge_into_nearest(child, phase, (weight, per_inside), None);
                 return into.map_or(Added::Nowhere, Added::To);
             }
             let into = self.displace::<B>(at);
             (Added::InsteadOf(at, into), self.kept.iter_mut().nth(at))
         };
         let Some((place, of)) = place else { return Added::Nowhere };
-        (place.weight, place.log_inside, *of) = (weight, log_inside, phase);
+        (place.weight, place.per_inside, *of) = (weight, per_inside, phase);
         child.put_into(&mut place.belief);
         added
     }
@@ -70,7 +68,7 @@ impl<'a, T: Real, const N: usize, const L: usize, const K: usize> Children<'a, T
     #[inline(never)]
     fn displace<const B: usize>(&mut self, at: usize) -> Option<usize> {
         let (share, phase) = self.kept.iter_mut().nth(at)?;
-        let (displaced, counts, phase) = (Parts::<T, B>::of(&share.belief), (share.weight, share.log_inside), *phase);
+        let (displaced, counts, phase) = (Parts::<T, B>::of(&share.belief), (share.weight, share.per_inside), *phase);
         self.merge_into_nearest(&displaced, phase, counts, Some(at))
     }
 
@@ -81,7 +79,7 @@ impl<'a, T: Real, const N: usize, const L: usize, const K: usize> Children<'a, T
         &mut self,
         child: &Parts<T, B>,
         phase: Phase,
-        (weight, log_inside): (T, T),
+        (weight, per_inside): (T, T),
         but: Option<usize>,
     ) -> Option<usize> {
         let heaviest = self.kept.shares().iter().fold(weight, |a, b| if b.weight > a { b.weight } else { a });
@@ -91,7 +89,7 @@ impl<'a, T: Real, const N: usize, const L: usize, const K: usize> Children<'a, T
         let others = self.kept.iter_mut().enumerate().filter(|(at, (_, of))| Some(*at) != but && **of == phase);
         let distances = others.map(|(at, (share, _))| (share.distance(child), at, share));
         let (_, at, share) = distances.reduce(|a, b| if b.0 < a.0 { b } else { a })?;
-        share.merge(child, weight, log_inside);
+        share.merge(child, weight, per_inside);
         Some(at)
     }
 
@@ -165,7 +163,7 @@ impl<T: Real, const N: usize, const L: usize> Share<T, N, L> {
     }
 
     /// Takes in another one, with the mean and covariance of the pair.
-    fn merge<const B: usize>(&mut self, other: &Parts<T, B>, weight: T, log_inside: T) {
+    fn merge<const B: usize>(&mut self, other: &Parts<T, B>, weight: T, per_inside: T) {
         let total = self.weight + weight;
         if !(total > T::zero()) {
             return;
@@ -186,6 +184,6 @@ impl<T: Real, const N: usize, const L: usize> Share<T, N, L> {
             }
         }
         self.weight = total;
-        self.log_inside = mine * self.log_inside + theirs * log_inside;
+        self.per_inside = mine * self.per_inside + theirs * per_inside;
     }
 }

@@ -15,8 +15,6 @@ pub(crate) struct Weighing<T> {
     tempering: T,
     /// Squared number of deviations beyond which a tail adds less to 1 than rounding: `Q(z) ≤ exp(-z²/2)/2 = ε/2`.
     clear: T,
-    /// Below this, `ln(1 - x) = -x - x²/2` to rounding: the next term is `x³/3 = ε/2`.
-    slight: T,
 }
 
 /// A weight as `factor · exp(exponent)`: factors have the size of probabilities, exponents any.
@@ -39,8 +37,7 @@ impl<T: Real> Weighing<T> {
     pub(crate) fn new(evidence: Evidence<T>) -> Self {
         let rounding = T::default_epsilon();
         let clear = T::of(-2.0) * rounding.ln();
-        let slight = ((T::of(1.5) * rounding).ln() / T::of(3.0)).exp();
-        Self { limits: evidence.limits, tempering: evidence.tempering, clear, slight }
+        Self { limits: evidence.limits, tempering: evidence.tempering, clear }
     }
 
     /// A prior probability times the likelihood of a reading to the power of the tempering, without the constant
@@ -54,35 +51,42 @@ impl<T: Real> Weighing<T> {
         Weight { factor: prior, exponent: half * (residual.nis + residual.variance.ln()) }
     }
 
-    /// Logarithm of the probability that a strain lies within the limits, as the generic filters have it.
+    /// Probability that a strain lies within the limits, as the generic filters have it.
     #[inline(always)]
-    pub(crate) fn log_inside<S: Switch<T>>(&self, strain: T, variance: T) -> T {
+    pub(crate) fn inside<S: Switch<T>>(&self, strain: T, variance: T) -> T {
         let (above_lower, below_upper) = (strain - self.limits.lower, self.limits.upper - strain);
         let reach = self.clear * variance;
         let clear = |distance: T| distance > T::zero() && distance * distance > reach;
         if variance <= T::zero() || (clear(above_lower) && clear(below_upper)) {
-            return T::zero();
+            return T::one();
         }
-        self.log_inside_near::<S>(above_lower, below_upper, variance)
+        self.inside_near::<S>(above_lower, below_upper, variance)
     }
 
-    /// The same where a tail counts.
+    /// The same where a tail counts. What has left the limits altogether is no less likely than [`LEAST_INSIDE`].
     #[inline(never)]
-    fn log_inside_near<S: Switch<T>>(&self, above_lower: T, below_upper: T, variance: T) -> T {
+    fn inside_near<S: Switch<T>>(&self, above_lower: T, below_upper: T, variance: T) -> T {
         let per_sd = T::one() / S::root(variance);
         let (near, far) =
             if above_lower < below_upper { (above_lower, below_upper) } else { (below_upper, above_lower) };
         let far_is_clear = far > T::zero() && far * far > self.clear * variance;
         let beyond_far = if far_is_clear { T::zero() } else { upper_tail(far * per_sd) };
-        if near > T::zero() {
-            let outside = upper_tail(near * per_sd) + beyond_far;
-            if outside < self.slight {
-                return -outside - T::of(0.5) * outside * outside;
-            }
-            return log_of_inside(T::one() - outside);
-        }
         // Beyond the near end the mass inside is the small number, and is to keep its digits.
-        log_of_inside(upper_tail(-near * per_sd) - beyond_far)
+        let inside = if near > T::zero() {
+            T::one() - (upper_tail(near * per_sd) + beyond_far)
+        } else {
+            upper_tail(-near * per_sd) - beyond_far
+        };
+        let least = T::of(LEAST_INSIDE);
+        if inside > least { inside } else { least }
+    }
+
+    /// Probability of the limits over what `per_inside` is one over, and one over the probability itself.
+    #[inline(always)]
+    pub(crate) fn of_limits<S: Switch<T>, const B: usize>(&self, parts: &Parts<T, B>, per_inside: T) -> (T, T) {
+        let inside = self.inside::<S>(parts.strain, parts.strain_variance);
+        // Mostly nothing is near a limit.
+        if inside == T::one() { (per_inside, inside) } else { (inside * per_inside, T::one() / inside) }
     }
 
     pub(crate) fn tempering(&self) -> T {
@@ -99,10 +103,10 @@ impl<T: Real> Weighing<T> {
 pub(crate) struct Weighed<T> {
     /// Its prior probability times the likelihood of the reading.
     pub weight: Weight<T>,
-    /// Growth of the logarithm of its probability of the limits, which weighs it too but says nothing of the reading.
+    /// Its probability of the limits over its parent's, which weighs it too but says nothing of the reading.
     pub more_inside: T,
-    /// The logarithm itself.
-    pub log_inside: T,
+    /// One over the probability itself.
+    pub per_inside: T,
 }
 
 /// A child that has been predicted, before the reading.
@@ -111,8 +115,8 @@ pub(crate) struct Newborn<T: Real, S: Switch<T>> {
     pub prior: T,
     /// What its prediction returned.
     pub spread: RateSpread<T, S>,
-    /// Its parent's.
-    pub log_inside: T,
+    /// One over its parent's probability of the limits.
+    pub per_inside: T,
 }
 
 impl<T: Real, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> SparseEkf<T, S, B, N, G> {
@@ -126,7 +130,7 @@ impl<T: Real, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> SparseE
         weighing: &Weighing<T>,
         predicted: &mut Predicted<T>,
     ) -> Result<Weighed<T>, StepError> {
-        let Newborn { phase, prior, spread, log_inside } = newborn;
+        let Newborn { phase, prior, spread, per_inside } = newborn;
         let mut weight = Weight { factor: prior, exponent: T::zero() };
         if let Some(reading) = reading {
             let residual = self.update(child, reading, Some(phase), spread)?;
@@ -135,15 +139,9 @@ impl<T: Real, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> SparseE
         } else if !child.is_sound::<N>(child.variances::<N>()) {
             return Err(StepError::NonFiniteState);
         }
-        let inside = weighing.log_inside::<S>(child.strain, child.strain_variance);
-        Ok(Weighed { weight, more_inside: inside - log_inside, log_inside: inside })
+        let (more_inside, per_inside) = weighing.of_limits::<S, B>(child, per_inside);
+        Ok(Weighed { weight, more_inside, per_inside })
     }
-}
-
-/// What has left the limits altogether is no less likely than [`LEAST_INSIDE`].
-fn log_of_inside<T: Real>(mass: T) -> T {
-    let least = T::of(LEAST_INSIDE);
-    if mass > least { mass.ln() } else { least.ln() }
 }
 
 /// How a reading compares with the prediction of a whole mixture.

@@ -90,7 +90,7 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
                 }
                 let spread = self.kernel.predict(&mut child, Course::Known(phase));
                 let prior = parent.weight * probability;
-                let newborn = Newborn { phase, prior, spread, log_inside: parent.log_inside };
+                let newborn = Newborn { phase, prior, spread, per_inside: parent.per_inside };
                 let weighed = self.kernel.weigh(&mut child, newborn, reading, &self.weighing, &mut predicted)?;
                 heirs.placed(place, phase, children.add(&child, phase, &weighed));
             }

@@ -40,9 +40,9 @@ struct Mode<T, const B: usize> {
     /// Its probability before the reading; what the reading makes of it.
     prior: T,
     weight: Weight<T>,
-    /// Growth of the logarithm of its probability of the limits, and the logarithm itself.
+    /// As in [`Weighed`](crate::sparse_evidence::Weighed).
     more_inside: T,
-    log_inside: T,
+    per_inside: T,
     residual: Option<Residual<T>>,
 }
 
@@ -100,7 +100,7 @@ impl<T: Real, const B: usize, const N: usize, S: Switch<T>, G: Curve<T>> SparseI
         let mut predicted = Predicted::new();
         for ((mode, share), weight) in modes.into_iter().zip(&mut state.modes).zip(shares) {
             share.weight = weight;
-            share.log_inside = mode.log_inside;
+            share.per_inside = mode.per_inside;
             mode.parts.put_into(&mut share.belief);
             if let Some(residual) = &mode.residual {
                 predicted.add(mode.prior, residual.innovation, residual.variance);
@@ -130,9 +130,7 @@ impl<T: Real, const B: usize, const N: usize, S: Switch<T>, G: Curve<T>> SparseI
         } else if !mode.parts.is_sound::<N>(mode.parts.variances::<N>()) {
             return Err(StepError::NonFiniteState);
         }
-        let log_inside = self.weighing.log_inside::<S>(mode.parts.strain, mode.parts.strain_variance);
-        mode.more_inside = log_inside - mode.log_inside;
-        mode.log_inside = log_inside;
+        (mode.more_inside, mode.per_inside) = self.weighing.of_limits::<S, B>(&mode.parts, mode.per_inside);
         Ok(mode)
     }
 
@@ -146,19 +144,19 @@ impl<T: Real, const B: usize, const N: usize, S: Switch<T>, G: Curve<T>> SparseI
         let prior = joint[0] + joint[1] + joint[2];
         let weight = Weight { factor: prior, exponent: zero };
         if !(prior > zero) {
-            let (parts, log_inside) = (Parts::of(&own.belief), own.log_inside);
-            return Mode { parts, prior, weight, more_inside: zero, log_inside, residual: None };
+            let (parts, per_inside) = (Parts::of(&own.belief), own.per_inside);
+            return Mode { parts, prior, weight, more_inside: T::one(), per_inside, residual: None };
         }
         let per_prior = T::one() / prior;
         let shares = joint.map(|weight| weight * per_prior);
-        let log_inside =
-            shares[0] * modes[0].log_inside + shares[1] * modes[1].log_inside + shares[2] * modes[2].log_inside;
+        let per_inside =
+            shares[0] * modes[0].per_inside + shares[1] * modes[1].per_inside + shares[2] * modes[2].per_inside;
         let [a, b, c] = heaviest_first([(shares[0], &modes[0]), (shares[1], &modes[1]), (shares[2], &modes[2])]);
         let mut parts = Parts::mixed([a.0, b.0, c.0], [&a.1.belief, &b.1.belief, &c.1.belief]);
         if phase != Phase::Hold {
             parts.mix_rate(shares[to], &own.belief, &self.fresh[to]);
         }
-        Mode { parts, prior, weight, more_inside: zero, log_inside, residual: None }
+        Mode { parts, prior, weight, more_inside: T::one(), per_inside, residual: None }
     }
 }
 
@@ -174,20 +172,20 @@ fn heaviest_first<T: Real, S>([a, b, c]: [(T, S); 3]) -> [(T, S); 3] {
     if c.0 > a.0 { [c, b, a] } else { [a, b, c] }
 }
 
-/// Probabilities from weights and what the limits add to their exponents, and the weights' sum. What is lighter than the
+/// Probabilities from weights and what the limits make of them, and the weights' sum. What is lighter than the
 /// heaviest by e⁻¹² gets none.
 #[inline(always)]
 fn shares<T: Real>(weights: [(Weight<T>, T); 3]) -> Result<([T; 3], Weight<T>), StepError> {
     let followed = weights.iter().filter(|(weight, _)| weight.factor > T::zero());
-    let exponents = followed.map(|(weight, more_inside)| weight.exponent + *more_inside);
+    let exponents = followed.map(|(weight, _)| weight.exponent);
     let Some(exponent) = exponents.reduce(|a, b| if b > a { b } else { a }) else {
         return Err(StepError::NonFiniteState);
     };
     let mut density = T::zero();
     let mut weights = weights.map(|(likelihood, more_inside)| {
-        let weight = Weight { exponent: likelihood.exponent + more_inside, ..likelihood }.relative_to(exponent);
-        density += if more_inside.is_zero() { weight } else { likelihood.relative_to(exponent) };
-        weight
+        let likelihood = likelihood.relative_to(exponent);
+        density += likelihood;
+        likelihood * more_inside
     });
     let heaviest = weights.iter().fold(T::zero(), |a, b| if *b > a { *b } else { a });
     let mut factor = T::zero();

@@ -14,16 +14,16 @@ pub struct Share<T, const N: usize, const L: usize> {
     /// The state, given the hypothesis.
     pub belief: Belief<T, N, L>,
     /// As in [`Component`].
-    pub(crate) log_inside: T,
+    pub(crate) per_inside: T,
 }
 
 impl<T: Real, const N: usize, const L: usize> Share<T, N, L> {
     fn component(&self, phase: Phase) -> Component<T, N, L> {
-        Component { log_weight: self.weight.ln(), phase, belief: self.belief, log_inside: self.log_inside }
+        Component { log_weight: self.weight.ln(), phase, belief: self.belief, per_inside: self.per_inside }
     }
 
     fn of(component: &Component<T, N, L>) -> Self {
-        Self { weight: component.log_weight.exp(), belief: component.belief, log_inside: component.log_inside }
+        Self { weight: component.log_weight.exp(), belief: component.belief, per_inside: component.per_inside }
     }
 }
 
@@ -38,7 +38,7 @@ impl<T: Real, const N: usize, const L: usize> PhaseMixture<T, N, L> {
     #[must_use]
     pub fn single(belief: Belief<T, N, L>, phase: Phase) -> Self {
         let weight = |of| if of == phase { T::one() } else { T::zero() };
-        Self { modes: Phase::ALL.map(|of| Share { weight: weight(of), belief, log_inside: T::zero() }) }
+        Self { modes: Phase::ALL.map(|of| Share { weight: weight(of), belief, per_inside: T::one() }) }
     }
 
     /// The Gaussians in the order of [`Phase::ALL`]; one without weight is not followed.
@@ -90,14 +90,14 @@ impl<T: Real, const N: usize, const L: usize, const K: usize> SparseMixture<T, N
     #[must_use]
     pub fn single(belief: Belief<T, N, L>, phase: Phase) -> Self {
         let () = Mixture::<T, N, L, K>::CAPACITY;
-        let share = Share { weight: T::one(), belief, log_inside: T::zero() };
+        let share = Share { weight: T::one(), belief, per_inside: T::one() };
         Self { shares: [share; K], phases: [phase; K], len: 1, pause: Pause::over() }
     }
 
     #[inline(always)]
     pub(crate) fn empty() -> Self {
         let nothing = Belief { mean: SVector::zeros(), covariance: Symmetric::zeros() };
-        let vacant = Share { weight: T::zero(), belief: nothing, log_inside: T::zero() };
+        let vacant = Share { weight: T::zero(), belief: nothing, per_inside: T::one() };
         Self { shares: [vacant; K], phases: [Phase::Hold; K], len: 0, pause: Pause::over() }
     }
 

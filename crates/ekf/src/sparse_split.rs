@@ -144,7 +144,7 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
                 prior *= mass;
             }
         }
-        let newborn = Newborn { phase, prior, spread, log_inside: parent.log_inside };
+        let newborn = Newborn { phase, prior, spread, per_inside: parent.per_inside };
         let weighed = self.kernel.weigh(&mut child, newborn, reading, &self.weighing, predicted)?;
         Ok(Some(children.add(&child, phase, &weighed)))
     }

@@ -1,4 +1,5 @@
 //! Tails of the normal distribution, each from one exponential and one division of polynomials.
+#![allow(clippy::excessive_precision, reason = "coefficients as they were published")]
 
 use ohmstrain_model::Scalar;
 

@@ -15,7 +15,7 @@ fn component() -> impl Strategy<Value = Three> {
         let root = SMatrix::<f64, 3, 3>::from_row_slice(&root);
         let covariance = Symmetric::from_lower(&(root * root.transpose() + SMatrix::identity() * 0.01));
         let belief = Belief { mean: SVector::from(mean), covariance };
-        Component { log_weight: w.ln(), phase: Phase::Extend, belief, log_inside: 0.0 }
+        Component { log_weight: w.ln(), phase: Phase::Extend, belief, per_inside: 1.0 }
     })
 }
 
@@ -96,7 +96,7 @@ fn exactly_known_states_are_alike_only_if_they_are_equal() {
             log_weight: 0.0,
             phase: Phase::Hold,
             belief: Belief::<f64, 2, 3>::independent(SVector::from([strain * unit, 0.0]), &[0.0; 2]),
-            log_inside: 0.0,
+            per_inside: 1.0,
         };
         assert!(known(0.1).is_like(&known(0.1)));
         assert!(!known(0.1).is_like(&known(0.2)));
@@ -111,7 +111,7 @@ fn the_lightest_makes_room() {
         log_weight,
         phase: Phase::Extend,
         belief: Belief::<f64, 2, 3>::independent(SVector::from([strain, 0.0]), &[1e-6; 2]),
-        log_inside: 0.0,
+        per_inside: 1.0,
     };
     let mut mixture = Mixture::<f64, 2, 3, 2>::empty();
     for (strain, log_weight) in [(0.1, -1.0), (0.2, -3.0), (0.3, -2.0), (0.4, -4.0)] {
@@ -121,4 +121,30 @@ fn the_lightest_makes_room() {
     let weights = [-1.0_f64, -3.0, -4.0].map(f64::exp);
     let merged = (0.1 * weights[0] + 0.2 * weights[1] + 0.4 * weights[2]) / weights.iter().sum::<f64>();
     assert!((kept[0] - merged).abs() < 1e-15 && kept[1] == 0.3, "{kept:?}");
+}
+
+/// Hypotheses on a limit that are merged, and found to be far inside later: what the limits had taken from each is given
+/// back, whether they were merged or not.
+#[test]
+fn what_limits_took_is_given_back_after_merging() {
+    let limits = StrainRange { lower: 0.0, upper: 1.0 };
+    let at = |strain: f64, weight: f64| {
+        let covariance = Symmetric::from_diagonal(&[1e-2, 1.0, 1.0]);
+        let belief = Belief { mean: SVector::from([strain, 0.0, 0.0]), covariance };
+        let mut component = Component { log_weight: weight.ln(), phase: Phase::Hold, belief, per_inside: 1.0 };
+        component.weigh_limits(&limits);
+        component
+    };
+    let inside = |mut component: Three| {
+        component.belief.mean[0] = 0.5;
+        component.belief.covariance[(0, 0)] = 1e-6;
+        component.weigh_limits(&limits);
+        component.log_weight.exp()
+    };
+    let (a, b) = (at(0.0, 0.3), at(-0.06, 0.7));
+    assert!((a.log_weight.exp() - 0.15).abs() < 1e-15, "half of it is outside");
+    let apart = inside(a) + inside(b);
+    assert!((apart - 1.0).abs() < 1e-14, "{apart}");
+    let merged = inside(a.merged(&b));
+    assert!((merged - 1.0).abs() < 1e-14, "{merged}");
 }
