@@ -1,6 +1,6 @@
 use ohmstrain_ekf::{
-    Belief, Dwell, Ekf, Estimator, Evidence, Hypotheses, Imm, Mixture, PhaseMixture, Reading, SignSplit, SparseHypotheses, SparseImm,
-    SparseMixture, SparseSignSplit, State, Unscented,
+    Belief, Dwell, Ekf, Estimator, Evidence, Hypotheses, Imm, Mixture, PhaseMixture, Reading, SignSplit,
+    SparseHypotheses, SparseImm, SparseMixture, SparseSignSplit, State, Unscented,
 };
 use ohmstrain_model::{Phase, SwitchedModel};
 
@@ -105,7 +105,8 @@ fn every_large_filter(visitor: &mut impl Visitor) {
         &readings,
         GatedMixture::new(split, SparseMixture::single(start, Phase::Hold)),
     );
-    let best = SparseHypotheses::<_, 3, 6, 8>::new(phased, DT_S, dwell, evidence).expect("the step's length is positive");
+    let best =
+        SparseHypotheses::<_, 3, 6, 8>::new(phased, DT_S, dwell, evidence).expect("the step's length is positive");
     let start_of_best = SparseMixture::single(start, Phase::Hold);
     visitor.visit("sparse_hypotheses_6", &readings, GatedMixture::new(best, start_of_best));
     let best = Hypotheses::<_, _, 8>::new(phased, dwell, evidence);

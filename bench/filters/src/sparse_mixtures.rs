@@ -1,5 +1,6 @@
 use ohmstrain_ekf::{
-    MixtureResidual, PhaseMixture, Reading, SparseHypotheses, SparseImm, SparseMixture, SparseSignSplit, State, StepError,
+    MixtureResidual, PhaseMixture, Reading, SparseHypotheses, SparseImm, SparseMixture, SparseSignSplit, State,
+    StepError,
 };
 
 use crate::Filter;
@@ -34,7 +35,11 @@ macro_rules! in_place {
             type State = SparseMixture<f64, 6, 21, K>;
 
             #[inline]
-            fn take(&self, state: &mut Self::State, reading: Option<f64>) -> Result<Option<MixtureResidual<f64>>, StepError> {
+            fn take(
+                &self,
+                state: &mut Self::State,
+                reading: Option<f64>,
+            ) -> Result<Option<MixtureResidual<f64>>, StepError> {
                 self.step(state, reading.map(Reading::from))
             }
 

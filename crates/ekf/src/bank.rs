@@ -8,9 +8,7 @@
 //!   neighbours do not notice.
 //! - Memory is allocated when a bank is made, and not by a step.
 
-mod kernel;
 mod lane;
-mod reading;
 mod step;
 
 use core::fmt;

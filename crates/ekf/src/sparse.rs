@@ -15,12 +15,7 @@ use core::marker::PhantomData;
 
 use ohmstrain_model::{Scalar, SwitchedModel};
 
-use crate::curve::Regions;
-use crate::sparse_constants::{Gains, StepConstants};
-use crate::sparse_parts::Parts;
-use crate::sparse_predict::Course;
-use crate::sparse_update::ReadingLaw;
-use crate::switch::RateSpread;
+use crate::kernel::{Course, Gains, Parts, RateSpread, ReadingLaw, Regions, StepConstants};
 use crate::{AnyCurve, Belief, Curve, Reading, Residual, StepError, Switch};
 
 /// The EKF of a [`SwitchedModel`] with Ornstein-Uhlenbeck motion, for steps of one length.

@@ -3,10 +3,10 @@ use ohmstrain_model::Phase;
 use crate::StepError;
 use crate::gaussian::Real;
 use crate::genealogy::Heirs;
+use crate::kernel::Parts;
 use crate::mixture::{ALIKE, Added, LEAST_WEIGHT, LIGHTER};
 use crate::sparse_evidence::{Weighed, Weight};
 use crate::sparse_mixture::{Share, SparseMixture};
-use crate::sparse_parts::Parts;
 
 /// Collects the children of a step: keeps, merges and drops them as [`Mixture`](crate::Mixture) does.
 pub(crate) struct Children<'a, T, const N: usize, const L: usize, const K: usize> {

@@ -1,10 +1,9 @@
 use ohmstrain_model::{Phase, Scalar, StrainRange};
 
 use crate::gaussian::Real;
+use crate::kernel::{Parts, RateSpread};
 use crate::mixture::LEAST_INSIDE;
 use crate::mixture_step::Predicted;
-use crate::sparse_parts::Parts;
-use crate::switch::RateSpread;
 use crate::tail::upper_tail;
 use crate::{Curve, Evidence, Reading, Residual, SparseEkf, StepError, Switch};
 

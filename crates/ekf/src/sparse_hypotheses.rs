@@ -8,12 +8,11 @@ use ohmstrain_model::{Phase, SwitchedModel};
 
 use crate::gaussian::Real;
 use crate::genealogy::{Heirs, sparse_steps};
+use crate::kernel::{Course, Parts};
 use crate::mixture_step::Predicted;
 use crate::sparse_children::Children;
 use crate::sparse_evidence::{Newborn, Weighing};
 use crate::sparse_mixture::SparseMixture;
-use crate::sparse_parts::Parts;
-use crate::sparse_predict::Course;
 use crate::switching::fresh_rate;
 use crate::{
     AnyCurve, Compact, Curve, Dwell, Evidence, Gaussian, MixtureResidual, Reading, SparseEkf, StepError, Switch,

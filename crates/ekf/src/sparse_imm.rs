@@ -10,12 +10,11 @@
 use ohmstrain_model::{Phase, SwitchedModel};
 
 use crate::gaussian::Real;
+use crate::kernel::{Course, Parts};
 use crate::mixture::LEAST_WEIGHT;
 use crate::mixture_step::Predicted;
 use crate::sparse_evidence::{Weighing, Weight};
 use crate::sparse_mixture::{PhaseMixture, Share};
-use crate::sparse_parts::Parts;
-use crate::sparse_predict::Course;
 use crate::switching::fresh_rate;
 use crate::{
     AnyCurve, Compact, Curve, Dwell, Evidence, Gaussian, MixtureResidual, Reading, Residual, SparseEkf, StepError,

@@ -1,6 +1,6 @@
 use ohmstrain_model::Scalar;
 
-use crate::sparse_parts::{Part, Parts};
+use crate::kernel::{Part, Parts};
 use crate::{Belief, Gaussian};
 
 /// Where a mixture's mean of one component of the state lies, and its parts around it.

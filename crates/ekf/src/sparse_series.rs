@@ -2,7 +2,7 @@
 
 use ohmstrain_model::Scalar;
 
-use crate::sparse_parts::Parts;
+use crate::kernel::Parts;
 use crate::{Belief, Curve, LogLikelihood, Reading, SparseEkf, StepError, Switch};
 
 impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> SparseEkf<T, S, B, N, G> {

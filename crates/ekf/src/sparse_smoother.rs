@@ -7,9 +7,7 @@
 
 use ohmstrain_model::{Scalar, Symmetric};
 
-use crate::sparse_parts::Parts;
-use crate::sparse_predict::{Course, Driven};
-use crate::sparse_update::Compared;
+use crate::kernel::{Compared, Course, Driven, Parts};
 use crate::{Belief, Curve, Reading, SparseEkf, StepError, Switch};
 
 /// What later readings say of a state; of Λ the lower triangle is used.

@@ -8,6 +8,7 @@ use ohmstrain_model::{Phase, SwitchedModel, Turning};
 
 use crate::gaussian::Real;
 use crate::genealogy::{Heirs, sparse_steps};
+use crate::kernel::{Course, Parts};
 use crate::mixture::Added;
 use crate::mixture_step::{LEAST_MASS, Predicted};
 use crate::pause::Pause;
@@ -15,8 +16,6 @@ use crate::sign_split::{HOPELESS, follows, goes_on, toward};
 use crate::sparse_children::Children;
 use crate::sparse_evidence::{Newborn, Weighing};
 use crate::sparse_mixture::{Share, SparseMixture};
-use crate::sparse_parts::Parts;
-use crate::sparse_predict::Course;
 use crate::switching::{forgets_direction_s, fresh_rate};
 use crate::{
     AnyCurve, Curve, Dwell, Evidence, Gaussian, Logistic, MixtureResidual, Reading, SparseEkf, StepError, Switch,

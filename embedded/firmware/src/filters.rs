@@ -4,7 +4,7 @@ use core::hint::black_box;
 
 use ohmstrain_ekf::{
     Belief, Cubic, Dwell, Ekf, Evidence, Imm, LogLikelihood, Mixture, PhaseMixture, Reading, Real, SignSplit,
-    SparseEkf, SparseImm, SparseMixture, SparseSignSplit, Switch,
+    SparseEkf, SparseImm, SparseMixture, SparseSignSplit, State, Switch,
 };
 use ohmstrain_model::{ParameterError, Phase, Problem, Scalar, SwitchedModel, SwitchedStep};
 

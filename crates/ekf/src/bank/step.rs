@@ -1,10 +1,9 @@
 //! Blocks through registers: loads, one step, and what is accepted of it back to memory.
 
-use fearless_simd::{Select, Simd, SimdBase, SimdFloat, SimdMask};
+use fearless_simd::{Simd, SimdBase, SimdFloat, SimdMask};
 
-use super::kernel::{self, Beliefs};
 use super::lane::{Block, Lane, Row};
-use super::reading::{self, Compared};
+use crate::kernel::{Compared, Course, Lanes, Parts, Vector};
 use crate::{Compact, Reading, SparseEkf};
 
 /// Steps all blocks and counts the sensors that were refused.
@@ -72,44 +71,52 @@ fn step_vector<T: Lane, S: Simd, V: SimdFloat<S, Element = T>, const B: usize, c
     variances: Option<&[T]>,
     from: usize,
 ) -> (V::Mask, V::Mask) {
-    let load = |row: &Row<T::Row>| V::from_slice(simd, &row.0.as_ref()[from..from + V::LEN]);
-    let store = |row: &mut Row<T::Row>, value: V| value.store_slice(&mut row.0.as_mut()[from..from + V::LEN]);
-
-    let zero = V::splat(simd, T::zero());
-    let mut beliefs = Beliefs { mean: [zero; N], covariance: [zero; L] };
+    let nothing = Vector { numbers: V::splat(simd, T::zero()), simd };
+    let (mut mean, mut covariance) = ([nothing; N], [nothing; L]);
     for i in 0..N {
-        beliefs.mean[i] = load(&block.mean[i]);
+        mean[i] = load(simd, &block.mean[i], from);
     }
     for i in 0..L {
-        beliefs.covariance[i] = load(&block.covariance[i]);
+        covariance[i] = load(simd, &block.covariance[i], from);
     }
-    let spread = kernel::predict(simd, ekf, &mut beliefs);
-    let extra = variances.map_or(zero, |variances| V::from_slice(simd, &variances[from..from + V::LEN]));
-    let reading = V::from_slice(simd, &values[from..from + V::LEN]);
-    let present = reading.simd_eq(reading);
-    let Compared { innovation, variance, nis } =
-        reading::update(simd, ekf, &mut beliefs, (reading, extra), present, &spread);
-    store(&mut block.innovation, innovation);
-    store(&mut block.innovation_variance, variance);
+    let mut parts = Parts::read::<N>(&mut mean.iter(), &mut covariance.iter(), nothing);
+    let spread = ekf.predict(&mut parts, Course::Uncertain);
 
-    // Whatever is not finite makes this sum not finite, or a comparison false.
-    let mut sum = present.select(variance + nis, zero);
-    let mut accepted = (variance.simd_gt(T::zero()) & extra.simd_ge(T::zero())) | !present;
-    for i in 0..N {
-        let variance = beliefs.covariance[kernel::at(i, i)];
-        accepted &= variance.simd_ge(T::zero());
-        sum += beliefs.mean[i] + variance;
+    let value = Vector { numbers: V::from_slice(simd, &values[from..from + V::LEN]), simd };
+    let mut extra_variance = nothing;
+    if let Some(variances) = variances {
+        extra_variance.numbers = V::from_slice(simd, &variances[from..from + V::LEN]);
     }
-    accepted &= sum.is_finite();
+    let present = value.numbers.simd_eq(value.numbers);
+    let compared = ekf.compare(&parts, Reading { value, extra_variance }, None, spread);
+    let nis = SparseEkf::<T, Compact, B, N>::correct(&mut parts, &compared, present);
+    let Compared { innovation, variance, .. } = compared;
+    store(&mut block.innovation, from, innovation);
+    store(&mut block.innovation_variance, from, variance);
+
+    // Without a reading no variance has been looked at yet.
+    let said = Vector::pick(present, variance + nis, parts.variances::<N>());
+    let sound = parts.is_sound::<N>(said);
+    let accepted = sound & ((nothing.less(variance) & extra_variance.not_negative()) | !present);
+    let (old_mean, old_covariance) = (mean, covariance);
+    parts.write::<N>(&mut mean.iter_mut(), &mut covariance.iter_mut());
     for i in 0..N {
-        let kept = accepted.select(beliefs.mean[i], load(&block.mean[i]));
-        store(&mut block.mean[i], kept);
+        store(&mut block.mean[i], from, Vector::pick(accepted, mean[i], old_mean[i]));
     }
     for i in 0..L {
-        let kept = accepted.select(beliefs.covariance[i], load(&block.covariance[i]));
-        store(&mut block.covariance[i], kept);
+        store(&mut block.covariance[i], from, Vector::pick(accepted, covariance[i], old_covariance[i]));
     }
     (present, accepted)
+}
+
+#[inline(always)]
+fn load<T: Lane, S: Simd, V: SimdFloat<S, Element = T>>(simd: S, row: &Row<T::Row>, from: usize) -> Vector<V, S> {
+    Vector { numbers: V::from_slice(simd, &row.0.as_ref()[from..from + V::LEN]), simd }
+}
+
+#[inline(always)]
+fn store<T: Lane, S: Simd, V: SimdFloat<S, Element = T>>(row: &mut Row<T::Row>, from: usize, vector: Vector<V, S>) {
+    vector.numbers.store_slice(&mut row.0.as_mut()[from..from + V::LEN]);
 }
 
 /// Steps those that were refused once more, one by one as [`SparseEkf::step`] does: it has a way on for readings that are too

@@ -1,6 +1,6 @@
 use ohmstrain_model::{Branch, Response, Scalar, SensorLaw, StrainRange, SwitchedModel};
 
-use crate::curve::Regions;
+use super::{Lanes, Regions};
 
 /// What a step needs besides the belief and does not change from step to step of one length.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -108,10 +108,85 @@ pub(crate) struct Gain<T> {
     pub growth: T,
 }
 
+impl<V: Lanes> Gain<V> {
+    #[inline(always)]
+    pub(crate) fn at(&self, strain_sum: V) -> V {
+        strain_sum.mul_add(self.growth, self.at_zero)
+    }
+}
+
 impl<T: Scalar> Gain<T> {
     #[inline(always)]
-    pub(crate) fn at(&self, strain_sum: T) -> T {
-        self.at_zero + self.growth * strain_sum
+    fn in_lanes<V: Lanes<Number = T>>(&self, like: V) -> Gain<V> {
+        Gain { at_zero: like.with(self.at_zero), growth: like.with(self.growth) }
+    }
+}
+
+/// The gains of a branch at a sum of strains: what is not asked for is not computed.
+#[derive(Clone, Copy)]
+pub(super) struct GainsAt<'a, V: Lanes, const B: usize> {
+    regions: &'a Regions<V::Number, [Gains<V::Number>; B]>,
+    /// Those of all lanes, if they are in one region.
+    common: Option<&'a [Gains<V::Number>; B]>,
+    pub strain_sum: V,
+    i: usize,
+}
+
+impl<T: Scalar, const B: usize> Regions<T, [Gains<T>; B]> {
+    /// Those of the first branch; see [`GainsAt::of`].
+    #[inline(always)]
+    pub(super) fn gains<V: Lanes<Number = T>>(&self, strain_sum: V) -> GainsAt<'_, V, B> {
+        GainsAt { regions: self, common: self.common(strain_sum), strain_sum, i: 0 }
+    }
+}
+
+impl<V: Lanes, const B: usize> GainsAt<'_, V, B> {
+    /// Those of another branch.
+    #[inline(always)]
+    pub(super) fn of(self, i: usize) -> Self {
+        Self { i, ..self }
+    }
+
+    #[inline(always)]
+    pub(super) fn extend(&self) -> Gain<V> {
+        match self.common {
+            Some(row) => row[self.i].extend.in_lanes(self.strain_sum),
+            None => self.chosen(|gains| &gains.extend),
+        }
+    }
+
+    #[inline(always)]
+    pub(super) fn retract(&self) -> Gain<V> {
+        match self.common {
+            Some(row) => row[self.i].retract.in_lanes(self.strain_sum),
+            None => self.chosen(|gains| &gains.retract),
+        }
+    }
+
+    /// The gain of the direction in each lane.
+    #[inline(always)]
+    pub(super) fn toward(&self, extends: V::Mask) -> Gain<V> {
+        if let Some(row) = self.common
+            && let Some(gain) = V::one_of(extends, &row[self.i].extend, &row[self.i].retract)
+        {
+            return gain.in_lanes(self.strain_sum);
+        }
+        let (extend, retract) = (self.extend(), self.retract());
+        Gain {
+            at_zero: V::pick(extends, extend.at_zero, retract.at_zero),
+            growth: V::pick(extends, extend.growth, retract.growth),
+        }
+    }
+
+    #[inline(always)]
+    fn chosen(&self, of: impl Fn(&Gains<V::Number>) -> &Gain<V::Number>) -> Gain<V> {
+        let regions = self.regions;
+        let [below, within, above] =
+            [of(&regions.below[self.i]), of(&regions.within[self.i]), of(&regions.above[self.i])];
+        Gain {
+            at_zero: regions.chosen(self.strain_sum, [below.at_zero, within.at_zero, above.at_zero]),
+            growth: regions.chosen(self.strain_sum, [below.growth, within.growth, above.growth]),
+        }
     }
 }
 

@@ -2,8 +2,8 @@
 
 use ohmstrain_model::{Phase, RateChange, Scalar, Turning};
 
+use super::{Part, Parts};
 use crate::gaussian::Real;
-use crate::sparse_parts::{Part, Parts};
 use crate::tail::Tail;
 use crate::{Curve, Gaussian, SparseEkf, Switch};
 

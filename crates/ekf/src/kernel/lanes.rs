@@ -1,0 +1,309 @@
+use core::ops::{Add, AddAssign, Mul, MulAssign, Neg, Sub, SubAssign};
+
+use ohmstrain_model::Scalar;
+
+/// What the kernel computes with: a number, or a vector with a number of another sensor or hypothesis in each lane.
+pub trait Lanes:
+    Copy
+    + Add<Output = Self>
+    + AddAssign
+    + Mul<Output = Self>
+    + MulAssign
+    + Neg<Output = Self>
+    + Sub<Output = Self>
+    + SubAssign
+{
+    /// What there is one of in every lane.
+    type Number: Scalar;
+    /// A truth for every lane.
+    type Mask: Copy;
+
+    /// The same number in all lanes, of which there are as many as here.
+    #[must_use]
+    fn with(self, number: Self::Number) -> Self;
+    /// `self · factor + term`, in one rounding where the processor does that for vectors.
+    #[must_use]
+    fn mul_add(self, factor: Self, term: Self) -> Self;
+    /// One over each.
+    #[must_use]
+    fn recip(self) -> Self;
+    /// Quotients.
+    #[must_use]
+    fn over(self, divisor: Self) -> Self;
+    /// Square roots.
+    #[must_use]
+    fn root(self) -> Self;
+    /// Where it is less.
+    fn less(self, other: Self) -> Self::Mask;
+    /// Where it is not negative; not where it is no number.
+    fn not_negative(self) -> Self::Mask;
+    /// Where it is finite.
+    fn finite(self) -> Self::Mask;
+    /// Where both are true.
+    fn both(a: Self::Mask, b: Self::Mask) -> Self::Mask;
+    /// Whether it is true nowhere.
+    fn none(mask: Self::Mask) -> bool;
+    /// Whether it is true everywhere.
+    fn all(mask: Self::Mask) -> bool;
+    /// `yes` where the mask is true, else `no`.
+    fn pick(mask: Self::Mask, yes: Self, no: Self) -> Self;
+    /// A function of each number by itself.
+    fn each(self, function: impl Fn(Self::Number) -> (Self::Number, Self::Number)) -> (Self, Self);
+    /// What holds where the mask is true or where it is not, if that is the same in all lanes.
+    fn one_of<'a, R>(mask: Self::Mask, yes: &'a R, no: &'a R) -> Option<&'a R>;
+    /// What holds below, within or above a range, if the same holds for all lanes; within, where it is not a number.
+    fn region<R>(self, lower: Self::Number, upper: Self::Number, rows: [&R; 3]) -> Option<&R>;
+
+    /// `self · factor + term` with the same factor for all.
+    #[must_use]
+    #[inline(always)]
+    fn scale_add(self, factor: Self::Number, term: Self) -> Self {
+        self.mul_add(self.with(factor), term)
+    }
+
+    /// `self · factor` with the same factor for all.
+    #[must_use]
+    #[inline(always)]
+    fn scale(self, factor: Self::Number) -> Self {
+        self * self.with(factor)
+    }
+
+    /// A constant of the source text.
+    #[must_use]
+    #[inline(always)]
+    fn literal(self, number: f64) -> Self {
+        self.with(<Self::Number as Scalar>::of(number))
+    }
+
+    /// Zero in all lanes.
+    #[must_use]
+    #[inline(always)]
+    fn nothing(self) -> Self {
+        self.literal(0.0)
+    }
+}
+
+impl<T: Scalar> Lanes for T {
+    type Number = T;
+    type Mask = bool;
+
+    #[inline(always)]
+    fn with(self, number: T) -> T {
+        number
+    }
+
+    #[inline(always)]
+    fn mul_add(self, factor: T, term: T) -> T {
+        self * factor + term
+    }
+
+    #[inline(always)]
+    fn recip(self) -> T {
+        T::one() / self
+    }
+
+    #[inline(always)]
+    fn over(self, divisor: T) -> T {
+        self / divisor
+    }
+
+    #[inline(always)]
+    fn root(self) -> T {
+        self.sqrt()
+    }
+
+    #[inline(always)]
+    fn less(self, other: T) -> bool {
+        self < other
+    }
+
+    #[inline(always)]
+    fn not_negative(self) -> bool {
+        self >= T::zero()
+    }
+
+    #[allow(clippy::eq_op, reason = "a number minus itself is zero only if it is finite")]
+    #[inline(always)]
+    fn finite(self) -> bool {
+        self - self == T::zero()
+    }
+
+    #[inline(always)]
+    fn both(a: bool, b: bool) -> bool {
+        a && b
+    }
+
+    #[inline(always)]
+    fn none(mask: bool) -> bool {
+        !mask
+    }
+
+    #[inline(always)]
+    fn all(mask: bool) -> bool {
+        mask
+    }
+
+    #[inline(always)]
+    fn pick(mask: bool, yes: T, no: T) -> T {
+        if mask { yes } else { no }
+    }
+
+    #[inline(always)]
+    fn each(self, function: impl Fn(T) -> (T, T)) -> (T, T) {
+        function(self)
+    }
+
+    #[inline(always)]
+    fn one_of<'a, R>(mask: bool, yes: &'a R, no: &'a R) -> Option<&'a R> {
+        Some(if mask { yes } else { no })
+    }
+
+    #[inline(always)]
+    fn region<R>(self, lower: T, upper: T, [below, within, above]: [&R; 3]) -> Option<&R> {
+        Some(if self < lower {
+            below
+        } else if self > upper {
+            above
+        } else {
+            within
+        })
+    }
+}
+
+/// A vector register, or as many as hold a row.
+#[cfg(feature = "simd")]
+#[derive(Clone, Copy)]
+pub(crate) struct Vector<V, S> {
+    pub numbers: V,
+    pub simd: S,
+}
+
+#[cfg(feature = "simd")]
+mod vector {
+    use core::ops::{Add, AddAssign, Mul, MulAssign, Neg, Sub, SubAssign};
+
+    use fearless_simd::{Select, Simd, SimdFloat, SimdMask};
+    use ohmstrain_model::Scalar;
+
+    use super::{Lanes, Vector};
+
+    macro_rules! operation {
+        ($trait:ident $method:ident, $assign:ident $assigned:ident) => {
+            impl<S: Simd, V: SimdFloat<S>> $trait for Vector<V, S> {
+                type Output = Self;
+                #[inline(always)]
+                fn $method(self, other: Self) -> Self {
+                    Self { numbers: self.numbers.$method(other.numbers), ..self }
+                }
+            }
+            impl<S: Simd, V: SimdFloat<S>> $assign for Vector<V, S> {
+                #[inline(always)]
+                fn $assigned(&mut self, other: Self) {
+                    *self = self.$method(other);
+                }
+            }
+        };
+    }
+    operation!(Add add, AddAssign add_assign);
+    operation!(Sub sub, SubAssign sub_assign);
+    operation!(Mul mul, MulAssign mul_assign);
+
+    impl<S: Simd, V: SimdFloat<S>> Neg for Vector<V, S> {
+        type Output = Self;
+        #[inline(always)]
+        fn neg(self) -> Self {
+            Self { numbers: -self.numbers, ..self }
+        }
+    }
+
+    impl<S: Simd, V: SimdFloat<S, Element: Scalar>> Lanes for Vector<V, S> {
+        type Number = V::Element;
+        type Mask = V::Mask;
+
+        #[inline(always)]
+        fn with(self, number: V::Element) -> Self {
+            Self { numbers: V::splat(self.simd, number), ..self }
+        }
+
+        #[inline(always)]
+        fn mul_add(self, factor: Self, term: Self) -> Self {
+            Self { numbers: self.numbers.mul_add(factor.numbers, term.numbers), ..self }
+        }
+
+        #[inline(always)]
+        fn recip(self) -> Self {
+            self.with(V::Element::of(1.0)).over(self)
+        }
+
+        #[inline(always)]
+        fn over(self, divisor: Self) -> Self {
+            Self { numbers: self.numbers / divisor.numbers, ..self }
+        }
+
+        #[inline(always)]
+        fn root(self) -> Self {
+            Self { numbers: self.numbers.sqrt(), ..self }
+        }
+
+        #[inline(always)]
+        fn less(self, other: Self) -> V::Mask {
+            self.numbers.simd_lt(other.numbers)
+        }
+
+        #[inline(always)]
+        fn not_negative(self) -> V::Mask {
+            self.numbers.simd_ge(V::Element::of(0.0))
+        }
+
+        #[inline(always)]
+        fn finite(self) -> V::Mask {
+            self.numbers.is_finite()
+        }
+
+        #[inline(always)]
+        fn both(a: V::Mask, b: V::Mask) -> V::Mask {
+            a & b
+        }
+
+        #[inline(always)]
+        fn none(mask: V::Mask) -> bool {
+            !mask.any_true()
+        }
+
+        #[inline(always)]
+        fn all(mask: V::Mask) -> bool {
+            mask.all_true()
+        }
+
+        #[inline(always)]
+        fn pick(mask: V::Mask, yes: Self, no: Self) -> Self {
+            Self { numbers: mask.select(yes.numbers, no.numbers), ..yes }
+        }
+
+        #[inline(always)]
+        fn each(self, function: impl Fn(V::Element) -> (V::Element, V::Element)) -> (Self, Self) {
+            let (mut a, mut b) = (self.numbers, self.numbers);
+            for (a, b) in a.as_mut_slice().iter_mut().zip(b.as_mut_slice()) {
+                (*a, *b) = function(*a);
+            }
+            (Self { numbers: a, ..self }, Self { numbers: b, ..self })
+        }
+
+        #[inline(always)]
+        fn one_of<'a, R>(mask: V::Mask, yes: &'a R, no: &'a R) -> Option<&'a R> {
+            if mask.all_true() {
+                Some(yes)
+            } else if mask.any_true() {
+                None
+            } else {
+                Some(no)
+            }
+        }
+
+        #[inline(always)]
+        fn region<R>(self, lower: V::Element, upper: V::Element, rows: [&R; 3]) -> Option<&R> {
+            let outside = self.numbers.simd_lt(lower) | self.numbers.simd_gt(upper);
+            if outside.any_true() { None } else { Some(rows[1]) }
+        }
+    }
+}

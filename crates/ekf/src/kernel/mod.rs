@@ -1,0 +1,30 @@
+//! The sensor's step: predict, cut, renew, compare, update. It stands here once, for numbers and for vectors of them.
+//!
+//! # Policy
+//! - A [`Lanes`] is a number or a vector. Where lanes may go different ways, all ways that some lane goes are computed and the
+//!   results chosen; where the mask is a `bool`, that is a branch.
+//! - Everything is `#[inline(always)]`, and loops run over constant sizes: code in closures that is not inlined would not use the
+//!   vector instructions of its caller.
+//! - Multiplications and additions are rounded one by one, in the order in which they are written; vectors fuse them where the
+//!   processor can.
+
+mod constants;
+mod curve;
+mod lanes;
+mod parts;
+mod predict;
+mod rate;
+mod switch;
+mod update;
+
+pub(crate) use constants::{Gains, StepConstants};
+pub(crate) use curve::Regions;
+pub use curve::{AnyCurve, Cubic, Curve};
+pub use lanes::Lanes;
+#[cfg(feature = "simd")]
+pub(crate) use lanes::Vector;
+pub(crate) use parts::{Part, Parts};
+pub(crate) use predict::{Course, Driven};
+pub(crate) use switch::RateSpread;
+pub use switch::{Compact, CompactWidth, Logistic, Switch};
+pub(crate) use update::{Compared, ReadingLaw};

@@ -1,0 +1,189 @@
+use ohmstrain_model::Scalar;
+
+use super::Lanes;
+use crate::Belief;
+
+/// A belief taken apart into motion, branches and baseline: each moves in its own way, no index needs a check, and with one
+/// branch there is no loop.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Parts<T, const B: usize> {
+    pub strain: T,
+    pub rate: T,
+    pub strain_variance: T,
+    /// Covariance of strain and rate.
+    pub strain_rate: T,
+    pub rate_variance: T,
+    pub branches: [Part<T, B>; B],
+    /// Means nothing where there is no baseline.
+    pub baseline: Part<T, B>,
+}
+
+/// A branch, or the baseline.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Part<T, const B: usize> {
+    pub mean: T,
+    pub with_strain: T,
+    pub with_rate: T,
+    /// Covariances with the branches: of a branch those before it, of the baseline all.
+    pub with: [T; B],
+    pub variance: T,
+}
+
+/// Takes numbers one after another. Their count is known while compiling, so that no test of an end is left.
+#[inline(always)]
+fn next<'a, V: Lanes + 'a>(numbers: &mut impl Iterator<Item = &'a V>, nothing: V) -> V {
+    match numbers.next() {
+        Some(number) => *number,
+        None => nothing,
+    }
+}
+
+impl<V: Lanes, const B: usize> Part<V, B> {
+    #[inline(always)]
+    const fn vacant(nothing: V) -> Self {
+        Self { mean: nothing, with_strain: nothing, with_rate: nothing, with: [nothing; B], variance: nothing }
+    }
+
+    #[inline(always)]
+    fn read<'a>(
+        others: usize,
+        means: &mut impl Iterator<Item = &'a V>,
+        covariances: &mut impl Iterator<Item = &'a V>,
+        nothing: V,
+    ) -> Self
+    where
+        V: 'a,
+    {
+        let mut part = Self::vacant(nothing);
+        part.mean = next(means, nothing);
+        part.with_strain = next(covariances, nothing);
+        part.with_rate = next(covariances, nothing);
+        for i in 0..others {
+            part.with[i] = next(covariances, nothing);
+        }
+        part.variance = next(covariances, nothing);
+        part
+    }
+
+    /// Writes into what [`Self::read`] has read from.
+    #[inline(always)]
+    fn write<'a>(
+        &self,
+        others: usize,
+        means: &mut impl Iterator<Item = &'a mut V>,
+        covariances: &mut impl Iterator<Item = &'a mut V>,
+    ) where
+        V: 'a,
+    {
+        put(means, self.mean);
+        put(covariances, self.with_strain);
+        put(covariances, self.with_rate);
+        for i in 0..others {
+            put(covariances, self.with[i]);
+        }
+        put(covariances, self.variance);
+    }
+}
+
+#[inline(always)]
+fn put<'a, V: Lanes + 'a>(places: &mut impl Iterator<Item = &'a mut V>, number: V) {
+    if let Some(place) = places.next() {
+        *place = number;
+    }
+}
+
+impl<V: Lanes, const B: usize> Parts<V, B> {
+    /// Whether the last of `n` states is a baseline.
+    pub(crate) const fn has_baseline(n: usize) -> bool {
+        n == B + 3
+    }
+
+    /// From means, and the lower triangle of covariances row by row.
+    #[inline(always)]
+    pub(crate) fn read<'a, const N: usize>(
+        means: &mut impl Iterator<Item = &'a V>,
+        covariances: &mut impl Iterator<Item = &'a V>,
+        nothing: V,
+    ) -> Self
+    where
+        V: 'a,
+    {
+        let (strain, rate) = (next(means, nothing), next(means, nothing));
+        let strain_variance = next(covariances, nothing);
+        let strain_rate = next(covariances, nothing);
+        let rate_variance = next(covariances, nothing);
+        let mut branches = [Part::vacant(nothing); B];
+        for i in 0..B {
+            branches[i] = Part::read(i, means, covariances, nothing);
+        }
+        let mut baseline = Part::vacant(nothing);
+        if Self::has_baseline(N) {
+            baseline = Part::read(B, means, covariances, nothing);
+        }
+        Self { strain, rate, strain_variance, strain_rate, rate_variance, branches, baseline }
+    }
+
+    #[inline(always)]
+    pub(crate) fn write<'a, const N: usize>(
+        &self,
+        means: &mut impl Iterator<Item = &'a mut V>,
+        covariances: &mut impl Iterator<Item = &'a mut V>,
+    ) where
+        V: 'a,
+    {
+        put(means, self.strain);
+        put(means, self.rate);
+        put(covariances, self.strain_variance);
+        put(covariances, self.strain_rate);
+        put(covariances, self.rate_variance);
+        for i in 0..B {
+            self.branches[i].write(i, means, covariances);
+        }
+        if Self::has_baseline(N) {
+            self.baseline.write(B, means, covariances);
+        }
+    }
+
+    /// Where a step has left numbers: no variance is negative and nothing is infinite or not a number. `extra` is a number
+    /// that shall be finite too.
+    #[inline(always)]
+    pub(crate) fn is_sound<const N: usize>(&self, extra: V) -> V::Mask {
+        let mut positive = V::both(self.strain_variance.not_negative(), self.rate_variance.not_negative());
+        let mut sum = extra + self.strain + self.rate;
+        for i in 0..B {
+            positive = V::both(positive, self.branches[i].variance.not_negative());
+            sum += self.branches[i].mean;
+        }
+        if Self::has_baseline(N) {
+            positive = V::both(positive, self.baseline.variance.not_negative());
+            sum += self.baseline.mean;
+        }
+        // Whatever is not finite makes the sum not finite.
+        V::both(positive, sum.finite())
+    }
+
+    /// Sum of all variances.
+    #[inline(always)]
+    pub(crate) fn variances<const N: usize>(&self) -> V {
+        let mut sum = self.strain_variance + self.rate_variance;
+        if Self::has_baseline(N) {
+            sum += self.baseline.variance;
+        }
+        for i in 0..B {
+            sum += self.branches[i].variance;
+        }
+        sum
+    }
+}
+
+impl<T: Scalar, const B: usize> Parts<T, B> {
+    #[inline(always)]
+    pub(crate) fn of<const N: usize, const L: usize>(belief: &Belief<T, N, L>) -> Self {
+        Self::read::<N>(&mut belief.mean.iter(), &mut belief.covariance.packed().iter(), T::zero())
+    }
+
+    #[inline(always)]
+    pub(crate) fn put_into<const N: usize, const L: usize>(&self, belief: &mut Belief<T, N, L>) {
+        self.write::<N>(&mut belief.mean.iter_mut(), &mut belief.covariance.packed_mut().iter_mut());
+    }
+}
