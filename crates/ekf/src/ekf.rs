@@ -1,7 +1,7 @@
 use nalgebra::SVector;
 use ohmstrain_model::{Observation, Scalar, Symmetric, Transition};
 
-use crate::smoother::rts_step;
+use crate::smooth::rts_step;
 use crate::substeps;
 use crate::{Advanced, Belief, Channel, Dynamics, Estimator, Gaussian, Innovation, Reading, StepError};
 

@@ -63,92 +63,50 @@ mod adskalman_bridge;
 #[cfg(feature = "simd")]
 mod bank;
 mod belief;
-mod chi_square;
 mod clock;
 mod consistency;
 pub mod correction;
 mod ekf;
 mod error;
-mod estimate;
 mod estimator;
-mod gaussian;
-mod genealogy;
 mod guard;
-mod hypotheses;
-mod imm;
 mod kernel;
-mod lags;
-mod lineage;
 mod mixture;
-mod mixture_step;
-#[cfg(feature = "particles")]
-mod particle_cloud;
 #[cfg(feature = "particles")]
 mod particles;
-mod pause;
-mod psd;
-#[cfg(feature = "particles")]
-mod rejuvenation;
 mod residual;
 mod sensor;
-mod sign_split;
-mod smoother;
-mod smoothing;
+mod smooth;
 mod sparse;
-mod sparse_children;
-mod sparse_evidence;
-mod sparse_hypotheses;
-mod sparse_imm;
-mod sparse_mixing;
-mod sparse_mixture;
 mod sparse_series;
-mod sparse_smoother;
-mod sparse_split;
 mod substeps;
-mod switching;
-mod tail;
 mod traits;
 mod unscented;
-mod window;
 
 #[cfg(feature = "adskalman")]
 pub use adskalman_bridge::LinearStep;
 #[cfg(feature = "simd")]
 pub use bank::{Bank, Lane, WrongLength};
-pub use belief::Belief;
-pub use chi_square::ChiSquare;
+pub use belief::{Belief, Estimate, Gaussian, Real, TruncatedGaussian};
 pub use clock::seconds_between;
-pub use consistency::{ConsistencyRecord, ConsistencyReport, ConsistencyTest, MeanTest, Verdict, Whiteness};
+pub use consistency::{ChiSquare, ConsistencyRecord, ConsistencyReport, ConsistencyTest, MeanTest, Verdict, Whiteness};
 pub use ekf::{Ekf, Step, Update};
 pub use error::StepError;
-pub use estimate::Estimate;
 pub use estimator::{Advanced, Estimator, Innovation, State};
-pub use gaussian::{Gaussian, Real, TruncatedGaussian};
 pub use guard::{Guard, Guarded, Influence, ReadingVerdict, Streak};
-pub use hypotheses::Hypotheses;
-pub use imm::Imm;
 pub use kernel::{AnyCurve, Compact, CompactWidth, Cubic, Curve, Lanes, Logistic, Switch};
-pub use mixture::{Component, Mixture};
-pub use mixture_step::{Evidence, MixtureStep};
+pub use mixture::{
+    Component, Dwell, Evidence, Hypotheses, Imm, Mixture, MixtureResidual, MixtureStep, PhaseMixture, Phased, Share,
+    SignSplit, SparseHypotheses, SparseImm, SparseMixture, SparseSignSplit,
+};
 #[cfg(feature = "particles")]
-pub use particle_cloud::{Particle, ParticleCloud};
-#[cfg(feature = "particles")]
-pub use particles::{ParticleStep, Particles};
+pub use particles::{Particle, ParticleCloud, ParticleStep, Particles};
 pub use residual::{LogLikelihood, Residual};
 pub use sensor::StrainSensor;
-pub use sign_split::SignSplit;
 #[cfg(feature = "std")]
-pub use smoother::rts_smooth_vec;
-pub use smoother::{rts_smooth, rts_step};
-pub use smoothing::{PastStep, smooth_back_through};
+pub use smooth::rts_smooth_vec;
+pub use smooth::{PastStep, Window, rts_smooth, rts_step, smooth_back_through};
 pub use sparse::SparseEkf;
-pub use sparse_evidence::MixtureResidual;
-pub use sparse_hypotheses::SparseHypotheses;
-pub use sparse_imm::SparseImm;
-pub use sparse_mixture::{PhaseMixture, Share, SparseMixture};
-pub use sparse_split::SparseSignSplit;
 pub use substeps::{Repeated, Substeps};
-pub use switching::{Dwell, Phased};
 pub use traits::{Channel, Dynamics, Reading};
 pub use unscented::{Ukf, Unscented};
-pub use window::Window;

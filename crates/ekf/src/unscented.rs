@@ -1,7 +1,7 @@
 use nalgebra::SVector;
 use ohmstrain_model::{Observation, Phase, Scalar, Symmetric, Transition};
 
-use crate::psd::SemiDefinite;
+use crate::belief::psd::SemiDefinite;
 use crate::{Belief, Channel, Dynamics, Ekf, Gaussian, Phased};
 
 /// Unscented Kalman filter: the prediction is linear given the phase, the reading goes through sigma points.

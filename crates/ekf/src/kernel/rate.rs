@@ -3,8 +3,8 @@
 use ohmstrain_model::{Phase, RateChange, Scalar, Turning};
 
 use super::{Part, Parts};
-use crate::gaussian::Real;
-use crate::tail::Tail;
+use crate::belief::gaussian::Real;
+use crate::belief::tail::Tail;
 use crate::{Curve, Gaussian, SparseEkf, Switch};
 
 impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> SparseEkf<T, S, B, N, G> {

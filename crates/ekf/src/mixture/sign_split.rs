@@ -1,10 +1,10 @@
 use ohmstrain_model::{Phase, StrainRange};
 
-use crate::gaussian::Real;
-use crate::lineage::{Lineage, Recorder};
+use crate::belief::gaussian::Real;
+use crate::mixture::lineage::{Lineage, Recorder};
+use crate::mixture::pause::Pause;
+use crate::mixture::step::{Candidates, Course, Evidence, MixtureStep, Origin, mixture_estimator, smooth_step};
 use crate::mixture::{Mixture, keep_rate_in};
-use crate::mixture_step::{Candidates, Course, Evidence, MixtureStep, Origin, mixture_estimator, smooth_step};
-use crate::pause::Pause;
 use crate::{Dwell, Gaussian, Phased, Reading, StepError};
 
 /// At most `K` Gaussian hypotheses split by the sign of the rate.

@@ -1,7 +1,7 @@
 use nalgebra::SMatrix;
 use ohmstrain_model::{Scalar, Transition};
 
-use crate::psd::SemiDefinite;
+use crate::belief::psd::SemiDefinite;
 use crate::{Belief, Step};
 
 /// One step backwards of the Rauch-Tung-Striebel smoother.

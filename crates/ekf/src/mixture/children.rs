@@ -1,12 +1,12 @@
 use ohmstrain_model::Phase;
 
 use crate::StepError;
-use crate::gaussian::Real;
-use crate::genealogy::Heirs;
+use crate::belief::gaussian::Real;
 use crate::kernel::Parts;
+use crate::mixture::evidence::{Weighed, Weight};
+use crate::mixture::genealogy::Heirs;
+use crate::mixture::sparse::{Share, SparseMixture};
 use crate::mixture::{ALIKE, Added, LEAST_WEIGHT, LIGHTER};
-use crate::sparse_evidence::{Weighed, Weight};
-use crate::sparse_mixture::{Share, SparseMixture};
 
 /// Collects the children of a step: keeps, merges and drops them as [`Mixture`](crate::Mixture) does.
 pub(crate) struct Children<'a, T, const N: usize, const L: usize, const K: usize> {

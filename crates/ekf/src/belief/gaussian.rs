@@ -1,7 +1,7 @@
 use ohmstrain_model::StrainRange;
 
-pub use crate::tail::Real;
-use crate::tail::{Tail, density, upper_tail};
+pub use crate::belief::tail::Real;
+use crate::belief::tail::{Tail, density, upper_tail};
 
 /// A Gaussian in one dimension.
 #[derive(Clone, Copy, Debug, PartialEq)]

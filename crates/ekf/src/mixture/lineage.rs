@@ -1,9 +1,9 @@
 use nalgebra::{SMatrix, SVector};
 use ohmstrain_model::{Phase, Symmetric, Transition};
 
-use crate::gaussian::Real;
+use crate::belief::gaussian::Real;
 use crate::mixture::{Added, Component, Mixture, moment_match};
-use crate::smoother::rts_step;
+use crate::smooth::rts_step;
 use crate::{Belief, Phased};
 
 /// Hears of every child that a step of a filter of hypotheses makes. The filter itself listens with `()`.

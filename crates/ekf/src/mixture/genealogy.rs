@@ -4,9 +4,9 @@
 
 use ohmstrain_model::Phase;
 
-use crate::gaussian::Real;
-use crate::lineage::{Birth, Lineage, Recorder};
+use crate::belief::gaussian::Real;
 use crate::mixture::Added;
+use crate::mixture::lineage::{Birth, Lineage, Recorder};
 
 /// Hears where every child of a sparse step went. The filter itself listens with `()`.
 pub(crate) trait Heirs {
@@ -113,10 +113,10 @@ macro_rules! sparse_steps {
             reading: Option<Reading<T>>,
             next: &SparseMixture<T, N, L, K>,
         ) -> Result<SparseMixture<T, N, L, K>, StepError> {
-            let (mut genealogy, mut heirs) = ($crate::genealogy::Genealogy::<K>::new(), *filtered);
+            let (mut genealogy, mut heirs) = ($crate::mixture::genealogy::Genealogy::<K>::new(), *filtered);
             self.step_recorded(filtered, reading, &mut heirs, &mut genealogy)?;
-            let lineage = $crate::lineage::Lineage::new(dense.model());
-            let mut following = $crate::genealogy::Following { lineage, genealogy: &genealogy };
+            let lineage = $crate::mixture::lineage::Lineage::new(dense.model());
+            let mut following = $crate::mixture::genealogy::Following { lineage, genealogy: &genealogy };
             let from: $crate::Mixture<T, N, L, K> = (*filtered).into();
             dense.step_recorded(&from, prepared, reading, &mut following)?;
             let smoothed = following.lineage.smooth(&from, &heirs.into(), &(*next).into());

@@ -6,14 +6,14 @@
 
 use ohmstrain_model::{Phase, SwitchedModel};
 
-use crate::gaussian::Real;
-use crate::genealogy::{Heirs, sparse_steps};
+use crate::belief::gaussian::Real;
 use crate::kernel::{Course, Parts};
-use crate::mixture_step::Predicted;
-use crate::sparse_children::Children;
-use crate::sparse_evidence::{Newborn, Weighing};
-use crate::sparse_mixture::SparseMixture;
-use crate::switching::fresh_rate;
+use crate::mixture::children::Children;
+use crate::mixture::evidence::{Newborn, Weighing};
+use crate::mixture::genealogy::{Heirs, sparse_steps};
+use crate::mixture::sparse::SparseMixture;
+use crate::mixture::step::Predicted;
+use crate::mixture::switching::fresh_rate;
 use crate::{
     AnyCurve, Compact, Curve, Dwell, Evidence, Gaussian, MixtureResidual, Reading, SparseEkf, StepError, Switch,
 };

@@ -1,5 +1,5 @@
 use crate::Real;
-use crate::tail::{density, upper_tail};
+use crate::belief::tail::{density, upper_tail};
 
 /// The χ² distribution.
 ///

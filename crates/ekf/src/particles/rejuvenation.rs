@@ -3,8 +3,8 @@ use std::vec::Vec;
 use nalgebra::SVector;
 use ohmstrain_model::{Phase, Scalar};
 
-use crate::particle_cloud::{Chance, Particle, weighted_moments};
-use crate::psd::SemiDefinite;
+use crate::belief::psd::SemiDefinite;
+use crate::particles::cloud::{Chance, Particle, weighted_moments};
 
 /// How far the kernel reaches, in deviations of the cloud; its shrinkage a = √(1 - h²) is 0.995, which is Liu and West's
 /// discount factor (3δ - 1)/(2δ) at δ = 0.99.

@@ -1,8 +1,16 @@
+mod estimate;
+pub(crate) mod gaussian;
+pub(crate) mod psd;
+pub(crate) mod tail;
+
+pub use estimate::Estimate;
+pub use gaussian::{Gaussian, Real, TruncatedGaussian};
+
 use nalgebra::SVector;
 use ohmstrain_model::{Scalar, Symmetric};
 
 use crate::ekf::pinned;
-use crate::{Gaussian, State, StepError, StrainSensor};
+use crate::{State, StepError, StrainSensor};
 
 /// What is known of the state: mean and covariance of a Gaussian. `L = N (N + 1) / 2`.
 #[derive(Clone, Copy, Debug, PartialEq)]

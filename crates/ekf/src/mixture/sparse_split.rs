@@ -6,17 +6,17 @@
 
 use ohmstrain_model::{Phase, SwitchedModel, Turning};
 
-use crate::gaussian::Real;
-use crate::genealogy::{Heirs, sparse_steps};
+use crate::belief::gaussian::Real;
 use crate::kernel::{Course, Parts};
 use crate::mixture::Added;
-use crate::mixture_step::{LEAST_MASS, Predicted};
-use crate::pause::Pause;
-use crate::sign_split::{HOPELESS, follows, goes_on, toward};
-use crate::sparse_children::Children;
-use crate::sparse_evidence::{Newborn, Weighing};
-use crate::sparse_mixture::{Share, SparseMixture};
-use crate::switching::{forgets_direction_s, fresh_rate};
+use crate::mixture::children::Children;
+use crate::mixture::evidence::{Newborn, Weighing};
+use crate::mixture::genealogy::{Heirs, sparse_steps};
+use crate::mixture::pause::Pause;
+use crate::mixture::sign_split::{HOPELESS, follows, goes_on, toward};
+use crate::mixture::sparse::{Share, SparseMixture};
+use crate::mixture::step::{LEAST_MASS, Predicted};
+use crate::mixture::switching::{forgets_direction_s, fresh_rate};
 use crate::{
     AnyCurve, Curve, Dwell, Evidence, Gaussian, Logistic, MixtureResidual, Reading, SparseEkf, StepError, Switch,
 };

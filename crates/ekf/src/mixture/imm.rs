@@ -1,11 +1,11 @@
 use ohmstrain_model::Phase;
 
+use crate::belief::gaussian::Real;
 use crate::ekf::stand_still;
-use crate::gaussian::Real;
-use crate::lineage::{Birth, Lineage, Recorder};
+use crate::mixture::lineage::{Birth, Lineage, Recorder};
+use crate::mixture::step::{Candidates, Course, Evidence, MixtureStep, Origin, mixture_estimator};
+use crate::mixture::switching::enter;
 use crate::mixture::{Component, Mixture};
-use crate::mixture_step::{Candidates, Course, Evidence, MixtureStep, Origin, mixture_estimator};
-use crate::switching::enter;
 use crate::{Dwell, Phased, Reading, StepError};
 
 /// Interacting multiple models: one Gaussian per phase (extend, hold, retract), mixed before every step by the

@@ -1,10 +1,10 @@
 use ohmstrain_model::{Phase, Scalar, StrainRange};
 
-use crate::gaussian::Real;
+use crate::belief::gaussian::Real;
+use crate::belief::tail::upper_tail;
 use crate::kernel::{Parts, RateSpread};
 use crate::mixture::LEAST_INSIDE;
-use crate::mixture_step::Predicted;
-use crate::tail::upper_tail;
+use crate::mixture::step::Predicted;
 use crate::{Curve, Evidence, Reading, Residual, SparseEkf, StepError, Switch};
 
 /// What weighs the Gaussians of a sparse mixture: as [`Evidence`] does, in factors instead of logarithms.

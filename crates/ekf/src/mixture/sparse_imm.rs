@@ -9,13 +9,13 @@
 
 use ohmstrain_model::{Phase, SwitchedModel};
 
-use crate::gaussian::Real;
+use crate::belief::gaussian::Real;
 use crate::kernel::{Course, Parts};
 use crate::mixture::LEAST_WEIGHT;
-use crate::mixture_step::Predicted;
-use crate::sparse_evidence::{Weighing, Weight};
-use crate::sparse_mixture::{PhaseMixture, Share};
-use crate::switching::fresh_rate;
+use crate::mixture::evidence::{Weighing, Weight};
+use crate::mixture::sparse::{PhaseMixture, Share};
+use crate::mixture::step::Predicted;
+use crate::mixture::switching::fresh_rate;
 use crate::{
     AnyCurve, Compact, Curve, Dwell, Evidence, Gaussian, MixtureResidual, Reading, Residual, SparseEkf, StepError,
     Switch,
@@ -39,7 +39,7 @@ struct Mode<T, const B: usize> {
     /// Its probability before the reading; what the reading makes of it.
     prior: T,
     weight: Weight<T>,
-    /// As in [`Weighed`](crate::sparse_evidence::Weighed).
+    /// As in [`Weighed`](crate::mixture::evidence::Weighed).
     more_inside: T,
     per_inside: T,
     residual: Option<Residual<T>>,

@@ -1,10 +1,10 @@
 use ohmstrain_model::Phase;
 
-use crate::gaussian::Real;
-use crate::lineage::{Lineage, Recorder};
+use crate::belief::gaussian::Real;
 use crate::mixture::Mixture;
-use crate::mixture_step::{Candidates, Course, Evidence, MixtureStep, Origin, mixture_estimator, smooth_step};
-use crate::switching::enter;
+use crate::mixture::lineage::{Lineage, Recorder};
+use crate::mixture::step::{Candidates, Course, Evidence, MixtureStep, Origin, mixture_estimator, smooth_step};
+use crate::mixture::switching::enter;
 use crate::{Dwell, Phased, Reading, StepError};
 
 /// The best `K` phase histories, each with a Kalman filter of its own: for protocols of ramps and long holds.

@@ -1,9 +1,9 @@
 use ohmstrain_model::{ParameterError, Phase, Problem, Scalar, StrainRange};
 
+use crate::belief::gaussian::Real;
 use crate::ekf::update;
 use crate::estimator::Innovation;
-use crate::gaussian::Real;
-use crate::lineage::{Birth, Recorder};
+use crate::mixture::lineage::{Birth, Recorder};
 use crate::mixture::{Added, Component, Mixture};
 use crate::{Belief, Phased, Reading, StepError};
 

@@ -1,10 +1,37 @@
+mod children;
+mod evidence;
+mod genealogy;
+mod hypotheses;
+mod imm;
+mod lineage;
+mod mixing;
+mod pause;
+mod sign_split;
+mod sparse;
+mod sparse_hypotheses;
+mod sparse_imm;
+mod sparse_split;
+mod step;
+pub(crate) mod switching;
+
+pub use evidence::MixtureResidual;
+pub use hypotheses::Hypotheses;
+pub use imm::Imm;
+pub use sign_split::SignSplit;
+pub use sparse::{PhaseMixture, Share, SparseMixture};
+pub use sparse_hypotheses::SparseHypotheses;
+pub use sparse_imm::SparseImm;
+pub use sparse_split::SparseSignSplit;
+pub use step::{Evidence, MixtureStep};
+pub use switching::{Dwell, Phased};
+
 use nalgebra::SVector;
 use ohmstrain_model::{Phase, Scalar, StrainRange, Symmetric};
 
+use crate::belief::gaussian::{Gaussian, Real};
 use crate::ekf::pinned;
-use crate::gaussian::{Gaussian, Real};
-use crate::lineage::Recorder;
-use crate::pause::{Pause, PhaseSum};
+use crate::mixture::lineage::Recorder;
+use crate::mixture::pause::{Pause, PhaseSum};
 use crate::{Belief, State, StepError};
 
 /// One hypothesis: a phase and what is known of the state if it is the right one.

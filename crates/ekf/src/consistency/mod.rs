@@ -7,14 +7,19 @@
 //! Sources: Bar-Shalom, Li & Kirubarajan, *Estimation with Applications to Tracking and Navigation* (2001), 5.4; Ljung &
 //! Box, *Biometrika* 65 (1978) 297.
 
+mod chi_square;
+mod lags;
+
+pub use chi_square::ChiSquare;
+
 use core::fmt;
 
 use nalgebra::SVector;
 use ohmstrain_model::{ParameterError, Problem, Symmetric};
 
-use crate::chi_square::{ChiSquare, gated_moments};
-use crate::lags::{Lags, Sum};
-use crate::psd::SemiDefinite;
+use crate::belief::psd::SemiDefinite;
+use crate::consistency::chi_square::gated_moments;
+use crate::consistency::lags::{Lags, Sum};
 use crate::{Real, Step, Update};
 
 /// What a filter's normalised errors say of its variances.

@@ -1,12 +1,17 @@
+mod cloud;
+mod rejuvenation;
+
+pub use cloud::{Particle, ParticleCloud};
+
 use nalgebra::SVector;
 use ohmstrain_model::{Direction, Phase, Scalar, SwitchedModel, SwitchedStep, Symmetric};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 
+use crate::belief::psd::SemiDefinite;
 use crate::ekf::update;
-use crate::particle_cloud::{Chance, Particle, ParticleCloud};
-use crate::psd::SemiDefinite;
-use crate::rejuvenation::rejuvenate;
+use crate::particles::cloud::Chance;
+use crate::particles::rejuvenation::rejuvenate;
 use crate::{Advanced, Belief, Dwell, Estimator, Evidence, Innovation, Reading, StepError};
 
 /// Rao-Blackwellised particle filter: paths of motion and phase are sampled, branches and baseline are not.

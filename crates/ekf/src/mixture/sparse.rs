@@ -1,9 +1,9 @@
 use nalgebra::SVector;
 use ohmstrain_model::{Phase, Symmetric};
 
-use crate::gaussian::Real;
+use crate::belief::gaussian::Real;
+use crate::mixture::pause::{Pause, PhaseSum};
 use crate::mixture::{Component, Mixture, marginal_match, moment_match};
-use crate::pause::{Pause, PhaseSum};
 use crate::{Belief, Gaussian, State, StepError};
 
 /// A Gaussian and its share of a mixture. Shares are probabilities, not logarithms: nothing is to be converted at a step.

@@ -4,7 +4,7 @@ use ohmstrain_model::{
     Direction, Motion, ParameterError, Phase, Problem, Scalar, SwitchedModel, SwitchedStep, Transition,
 };
 
-use crate::gaussian::Gaussian;
+use crate::belief::gaussian::Gaussian;
 use crate::{Belief, Channel, Component, Dynamics};
 
 /// A model whose dynamics depend on the phase: what a filter of phase hypotheses needs besides.

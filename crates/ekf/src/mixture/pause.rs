@@ -3,7 +3,7 @@
 use ohmstrain_model::{Phase, Scalar};
 
 use crate::Belief;
-use crate::gaussian::{Gaussian, Real};
+use crate::belief::gaussian::{Gaussian, Real};
 use crate::substeps::GRACE;
 
 /// For how long there has been no reading.
