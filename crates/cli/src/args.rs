@@ -6,7 +6,9 @@ mod evaluate;
 mod export;
 mod files;
 mod fit_law;
+mod hand;
 mod live;
+mod plan;
 mod refine;
 mod shell;
 mod simulate;
@@ -23,7 +25,9 @@ pub use evaluate::{Estimators, EvaluateArgs};
 pub use export::{ExportArgs, ExportTarget};
 pub use files::{ImportArgs, InspectArgs};
 pub use fit_law::{FitLawArgs, SegmentChoice, TableFormat, phase_name};
+pub use hand::HandArgs;
 pub use live::LiveArgs;
+pub use plan::PlanArgs;
 pub use refine::RefineArgs;
 pub use shell::{CompletionsArgs, ManArgs};
 pub use simulate::{DemoArgs, DemoMaterial, SimulateArgs};
@@ -76,6 +80,9 @@ pub enum Command {
     /// Make a trace of a lab's files
     #[command(before_help = "Example: ohmstrain import rig.csv --gauge-length-mm 40 -o trace.csv")]
     Import(ImportArgs),
+    /// Say what a recording should contain, and what sampling and converter will be worth
+    #[command(before_help = "Example: ohmstrain plan --material ecoflex-00-30")]
+    Plan(PlanArgs),
     /// Simulate a recording of the bench
     #[command(before_help = "Example: ohmstrain simulate --protocol mixed --speed-mm-s 5 -o trace.csv")]
     Simulate(SimulateArgs),
@@ -94,6 +101,9 @@ pub enum Command {
     /// Watch strain in the terminal while readings arrive from a serial port, or play a recording back
     #[command(before_help = "Example: ohmstrain live --port /dev/ttyACM0 --sensor sensor.toml")]
     Live(LiveArgs),
+    /// Turn readings of several joints into all their angles
+    #[command(before_help = "Example: ohmstrain hand hand.toml readings.csv > angles.csv")]
+    Hand(HandArgs),
     /// Turn a whole recording into strain, every estimate from all readings
     #[command(before_help = "Example: ohmstrain smooth readings.csv --sensor sensor.toml > smoothed.csv")]
     Smooth(SmoothArgs),

@@ -28,12 +28,21 @@ pub struct Recording {
 /// Opens a recording for reading row by row; `-` is stdin.
 pub fn open(path: &Path, overrides: &Metadata) -> Result<TraceReader<Box<dyn Read>>, CliError> {
     let source: Box<dyn Read> = if is_stdin(path) {
-        Box::new(io::stdin().lock())
+        let mut stdin = io::stdin().lock();
+        // Waits for the first bytes, and leaves them where they are.
+        if stdin.fill_buf().is_ok_and(sensor_file::is_one) {
+            return Err(is_a_sensor(path));
+        }
+        Box::new(stdin)
     } else {
         let unreadable = |error| CliError::file("read", path, &error);
         let mut file = BufReader::new(File::open(path).map_err(unreadable)?);
-        if ParquetText::is_one(file.fill_buf().map_err(unreadable)?) {
+        let first = file.fill_buf().map_err(unreadable)?;
+        if ParquetText::is_one(first) {
             return open_parquet(path, overrides);
+        }
+        if sensor_file::is_one(first) {
+            return Err(is_a_sensor(path));
         }
         Box::new(file)
     };
@@ -71,9 +80,7 @@ pub fn read(path: &Path, overrides: &Metadata) -> Result<Recording, CliError> {
 /// A whole recording of these bytes.
 pub fn parse(bytes: &[u8], path: &Path, overrides: &Metadata) -> Result<Recording, CliError> {
     if sensor_file::is_one(bytes) {
-        let (name, word) =
-            (path.display(), "is a sensor file, not a recording: give it to --sensor, and the recording here");
-        return Err(CliError::Input(format!("{name} {word}")));
+        return Err(is_a_sensor(path));
     }
     let sha256 = sha256(bytes);
     if ParquetText::is_one(bytes) {
@@ -95,6 +102,11 @@ pub fn sha256(bytes: &[u8]) -> String {
 /// Bytes in hexadecimal.
 pub fn hexadecimal(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+fn is_a_sensor(path: &Path) -> CliError {
+    let name = path.display();
+    CliError::Input(format!("{name} is a sensor file, not a recording: give it to --sensor, and the recording here"))
 }
 
 /// What messages call the header of a recording of which no row has been read yet.

@@ -79,7 +79,7 @@ fn calibrate() {
 
 #[test]
 fn filter() {
-    holds(&run("filter.md"), &["estimates.csv", "smoothed.csv"]);
+    holds(&run("filter.md"), &["estimates.csv", "smoothed.csv", "angles.csv"]);
 }
 
 #[test]

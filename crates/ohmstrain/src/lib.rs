@@ -28,6 +28,7 @@ mod closing;
 mod column;
 mod error;
 mod estimate;
+mod explain;
 mod filter;
 mod flags;
 pub mod number;
@@ -46,6 +47,7 @@ pub use closing::Closing;
 pub use column::Column;
 pub use error::{Error, Place, TextCause, TextError};
 pub use estimate::Estimate;
+pub use explain::{ReferenceLag, explain};
 pub use filter::{Filter, LaggedFilter};
 pub use flags::{Flag, Flags};
 pub use reading::Reading;
@@ -57,8 +59,8 @@ pub use validity::{Beyond, Extrapolation, ValidityWatch};
 
 #[doc(no_inline)]
 pub use ohmstrain_calib::{
-    CalibrationError, Distrusted, Doubt, EstimatorKind, FieldError, Findings, GaugeFamily, JointParams, Quantity,
-    ReadingUnit, SamplesError, Scores, SensorParams, Stage,
+    CalibrationError, Distrusted, Doubt, EstimatorKind, FieldError, Findings, GaugeFamily, Identifiability,
+    JointParams, Quantity, ReadingUnit, SamplesError, Scores, SensorParams, Stage,
 };
 #[doc(no_inline)]
 pub use ohmstrain_ekf::{Influence, StepError};

@@ -5,14 +5,15 @@ use serde_json::{Value, json};
 
 use crate::commands::inspect::{Findings, Proposal};
 use crate::error::CliError;
+use crate::sensor_file::MADE_BY;
 
 /// Version of what is printed: a field that changes its meaning or goes raises it.
-const FORMAT: u32 = 1;
+const SCHEMA: u32 = 1;
 
 /// Prints what was found as JSON.
 pub fn write(out: &mut dyn Write, findings: &Findings) -> Result<(), CliError> {
     let files: Vec<Value> = (0..findings.tables.len()).map(|index| file(findings, index)).collect();
-    let mut all = json!({ "format": FORMAT, "files": files });
+    let mut all = json!({ "schema": SCHEMA, "made_by": MADE_BY, "files": files });
     match &findings.plan {
         Ok(proposal) => {
             all["command"] = json!(proposal.command);

@@ -9,11 +9,13 @@ mod explain;
 mod export;
 mod filter;
 mod fit_law;
+mod hand;
 mod import;
 mod inspect;
 mod inspect_json;
 mod inspect_text;
 mod live;
+mod plan;
 mod refine;
 mod reporting;
 mod score_table;
@@ -36,6 +38,8 @@ pub fn dispatch(command: &Command) -> Result<(), CliError> {
         Command::Refine(args) => refine::run(args),
         Command::FitLaw(args) => fit_law::run(args),
         Command::Filter(args) => filter::run(args),
+        Command::Hand(args) => hand::run(args),
+        Command::Plan(args) => plan::run(args),
         Command::Live(args) => live::run(args),
         Command::Smooth(args) => smooth::run(args),
         Command::Evaluate(args) => evaluate::run(args),

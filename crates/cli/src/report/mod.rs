@@ -33,6 +33,7 @@ pub use chart::{Chart, WIDE};
 use figures::Figure;
 pub use ink::Ink;
 use innovations::Innovations;
+pub use law::Law;
 use recording::Recording;
 use tables::Table;
 

@@ -8,11 +8,18 @@ use super::{Fits, Fitted, phase_of};
 use crate::args::FitLawArgs;
 use crate::error::CliError;
 use crate::output::print;
+use crate::sensor_file::MADE_BY;
 use ohmstrain::number::plain;
+
+/// Version of what `--json` prints. Names are added without another version; one that goes or changes its meaning brings
+/// the next.
+const SCHEMA: u32 = 1;
 
 /// What `--json` prints.
 #[derive(Serialize)]
 struct Report<'a> {
+    schema: u32,
+    made_by: &'static str,
     fits: Vec<FitReport<'a>>,
 }
 
@@ -55,7 +62,8 @@ pub fn json(recordings: &[Fits], args: &FitLawArgs) -> Result<(), CliError> {
     let of = |recording| move |fitted| fit_report(recording, fitted, args);
     let fits = recordings.iter().flat_map(|recording| recording.fits.iter().map(of(recording))).collect();
     print(|out| {
-        serde_json::to_writer_pretty(&mut *out, &Report { fits }).map_err(std::io::Error::from)?;
+        serde_json::to_writer_pretty(&mut *out, &Report { schema: SCHEMA, made_by: MADE_BY, fits })
+            .map_err(std::io::Error::from)?;
         Ok(writeln!(out)?)
     })
 }

@@ -1,5 +1,6 @@
 //! The picture: a plot of the last seconds, and the numbers of now. Any size of terminal will do, as far as it goes.
 
+use ohmstrain::number::significant;
 use ohmstrain::{Estimate, Quantity, ReadingUnit};
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
@@ -122,7 +123,7 @@ fn of_estimate(session: &Session, row: &Estimate, line: &mut impl FnMut(&str, St
         ReadingUnit::Ohm => " Ω",
         ReadingUnit::Ratio => "",
     };
-    line("reading", row.resistance.map_or("missing".into(), |reading| format!("{reading:.5}{reading_unit}")));
+    line("reading", row.resistance.map_or("missing".into(), |reading| significant(reading, 5) + reading_unit));
     line("relaxation", format!("{:+.4} R0", row.relaxation));
     line(
         "settles at",

@@ -1,0 +1,30 @@
+use std::path::PathBuf;
+
+use clap::Args as ClapArgs;
+
+/// Flags of `hand`.
+#[derive(Debug, ClapArgs)]
+#[command(after_long_help = FORMAT)]
+pub struct HandArgs {
+    /// The joints and their sensors
+    #[arg(value_name = "hand.toml")]
+    pub hand: PathBuf,
+    /// Recording with a column of readings per joint, or - for stdin
+    #[arg(default_value = "-")]
+    pub trace_file: PathBuf,
+    /// Go on after lines that are none of a trace; they are counted on stderr
+    #[arg(long)]
+    pub skip_bad: bool,
+}
+
+/// What the long help says after the flags.
+const FORMAT: &str = "\
+hand.toml:
+  format = 1
+  [[joints]]
+  name = \"index\"                  # of its columns in the output
+  column = \"index_ohm\"            # of its readings in the recording
+  sensor = \"index.toml\"           # as calibrate wrote it; the path goes from hand.toml
+  joint = \"prestrain=0.05 moment_arm_mm=4.4 gauge_length_mm=30\"   # unless the sensor knows its joint, or an angle
+  rest_resistance = 1612.0        # R0 of today, if it is not the calibration's
+  front_end = \"divider reference_ohm=10000 side=low bits=12 noise_codes=0.5\"   # if the column has converter codes";

@@ -1,0 +1,22 @@
+use std::path::PathBuf;
+
+use clap::Args as ClapArgs;
+use ohmstrain_bench_data::JointSpec;
+use ohmstrain_bench_data::simulate::Material;
+
+/// Flags of `plan`.
+#[derive(Debug, ClapArgs)]
+pub struct PlanArgs {
+    /// A calibrated sensor; without one, an illustrative sensor of --material
+    #[arg(long, value_name = "sensor.toml")]
+    pub sensor: Option<PathBuf>,
+    /// Illustrative material: ecoflex-00-30, ecoflex-00-50, vytaflex-10 or representative
+    #[arg(long, default_value = "representative", conflicts_with = "sensor")]
+    pub material: Material,
+    /// Joint, as in `# joint = …`, to tell the error of its angle
+    #[arg(long, value_name = "SPEC")]
+    pub joint: Option<JointSpec>,
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
+}

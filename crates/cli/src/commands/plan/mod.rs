@@ -1,0 +1,129 @@
+//! What to record, and what it will be worth, before anything has been recorded: simulated with a sensor's own law.
+
+mod motion;
+mod worth;
+
+use comfy_table::{Table, presets};
+use ohmstrain::{Calibration, EstimatorKind, JointParams, Quantity, Sensor};
+use ohmstrain_bench_data::Metadata;
+use ohmstrain_bench_data::simulate::{Protocol, SimulationSettings};
+use serde::Serialize;
+
+use super::calibrate::calibrate_recordings;
+use super::simulate;
+use crate::args::PlanArgs;
+use crate::error::CliError;
+use crate::input;
+use crate::output::print;
+use crate::progress::Progress;
+use crate::sensor_file::{self, MADE_BY};
+use motion::Protocols;
+use ohmstrain::number::{fixed, significant};
+use worth::{Told, Worth};
+
+/// Version of what `--json` prints. Names are added without another version.
+const SCHEMA: u32 = 1;
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Json<'a> {
+    schema: u32,
+    made_by: &'static str,
+    sensor: String,
+    recordings: &'a [Told],
+    sampling: &'a [Worth],
+}
+
+/// Plans a recording.
+pub fn run(args: &PlanArgs) -> Result<(), CliError> {
+    let (sensor, name) = match &args.sensor {
+        Some(path) => (sensor_file::read(path, None)?, path.display().to_string()),
+        None => (illustrative(args)?, format!("an illustrative sensor of {}", args.material)),
+    };
+    let joint = args.joint.map(|joint| JointParams {
+        prestrain: joint.prestrain,
+        moment_arm_mm: joint.moment_arm_mm,
+        gauge_length_mm: joint.gauge_length_mm,
+    });
+    let sensor = joint.map_or(Ok(sensor.clone()), |joint| sensor.on_joint(joint))?;
+    let progress = Progress::new("planning");
+    let protocols = Protocols::new(sensor.params());
+    let told: Vec<Told> = protocols.all().iter().map(|protocol| worth::told(&sensor, protocol)).collect();
+    let worth = worth::sampling(&sensor, &protocols)?;
+    drop(progress);
+    print(|out| {
+        if args.json {
+            let json = Json { schema: SCHEMA, made_by: MADE_BY, sensor: name, recordings: &told, sampling: &worth };
+            serde_json::to_writer_pretty(&mut *out, &json).map_err(std::io::Error::from)?;
+            return Ok(writeln!(out)?);
+        }
+        Ok(out.write_all(text(&sensor, &name, &protocols, &told, &worth).as_bytes())?)
+    })
+}
+
+/// A sensor calibrated on a simulated bench session.
+fn illustrative(args: &PlanArgs) -> Result<Sensor, CliError> {
+    let settings = SimulationSettings {
+        speed_mm_s: 5.0,
+        sample_rate_hz: 5.0,
+        ..SimulationSettings::new(args.material, Protocol::Mixed { duration_s: 400.0 })
+    };
+    let bytes = simulate::bytes(&settings).map_err(CliError::Other)?;
+    let recording = input::parse(&bytes, "simulated.csv".as_ref(), &Metadata::default())?;
+    let calibration = Calibration::new().estimator(EstimatorKind::Ekf);
+    Ok(calibrate_recordings(&[recording], calibration, &Progress::new("simulating"))?.sensor)
+}
+
+fn text(sensor: &Sensor, name: &str, protocols: &Protocols, told: &[Told], worth: &[Worth]) -> String {
+    let params = sensor.params();
+    let (factor, unit) = match params.quantity {
+        Quantity::Strain => (100.0, " %"),
+        Quantity::AngleDeg => (1.0, "°"),
+    };
+    let shown = |x: f64| format!("{}{unit}", significant(factor * x, 3));
+    let speeds: Vec<String> = protocols.speeds.iter().map(|speed| format!("{}/s", shown(*speed))).collect();
+    let (low, high) = (params.law.range.lower, params.law.range.upper);
+    let mut text = format!(
+        "{name}: {} to {}, relaxation within {} s. All of this is simulated with the sensor's own law: what the law gets wrong \
+         comes on top.\n\nWhat a recording tells, at speeds of {}:\n",
+        shown(low),
+        shown(high),
+        significant(protocols.slowest_s, 2),
+        speeds.join(", ")
+    );
+    let mut recordings = table(["recording", "minutes", "parameters told", "worst told", "condition", "left open"]);
+    for one in told {
+        recordings.add_row([
+            one.protocol.to_string(),
+            fixed(one.minutes, 1),
+            format!("{} of {}", one.told, one.parameters),
+            one.worst_percent.map_or("-".into(), |worst| format!("± {} %", significant(worst, 2))),
+            format!("{:.0e}", one.condition),
+            one.left_open.clone(),
+        ]);
+    }
+    let estimator = params.filter_of(params.default_estimator).name();
+    text += &format!(
+        "{recordings}\n\nError of strain by the filter {estimator}, % of the range (share of rows in the 95 % interval), by sampling \
+         and converter:\n"
+    );
+    let mut errors = table(["readings per s", "as good as the sensor", "16 bits", "12 bits", "10 bits"]);
+    for rate in worth::RATES_HZ {
+        let of_rate = worth.iter().filter(|one| one.rate_hz == rate);
+        let cells = of_rate.map(|one| format!("{} ({:.0})", fixed(one.error_percent, 1), one.coverage_percent));
+        errors.add_row([format!("{rate}")].into_iter().chain(cells));
+    }
+    text += &format!("{errors}\n");
+    text += "The converter is read through a divider whose resistor is the geometric mean of the readings' range.\n";
+    if let Some(best) = worth.iter().filter_map(|one| one.angle_deg).reduce(f64::min) {
+        text += &format!("Of the joint's angle the least of these errors is {}°.\n", significant(best, 2));
+    }
+    text
+}
+
+fn table<const N: usize>(header: [&str; N]) -> Table {
+    let mut table = Table::new();
+    table.load_style(presets::ASCII_MARKDOWN);
+    table.set_header(header);
+    table
+}

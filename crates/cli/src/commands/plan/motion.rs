@@ -1,0 +1,125 @@
+//! Recordings that could be made: strain over time.
+
+use ohmstrain::SensorParams;
+
+/// Readings per second of these recordings.
+pub const RATE_HZ: f64 = 20.0;
+/// Speeds as shares of the fastest.
+const SPEEDS: [f64; 3] = [1.0, 0.4, 0.15];
+/// A hold is this many times as long as the slowest relaxation, and within these bounds, s.
+const HOLD: f64 = 3.0;
+const HOLD_S: (f64, f64) = (10.0, 300.0);
+/// Levels of holds, as shares of the range.
+const LEVELS: [f64; 4] = [0.25, 0.5, 0.75, 1.0];
+/// Movements to and fro at each speed.
+const CYCLES: usize = 6;
+
+/// A recording that could be made.
+pub struct Protocol {
+    pub name: &'static str,
+    pub strain: Vec<f64>,
+}
+
+/// What all of them are made of.
+pub struct Protocols {
+    low: f64,
+    high: f64,
+    /// Speeds, per second, fastest first.
+    pub speeds: Vec<f64>,
+    /// The slowest relaxation, s.
+    pub slowest_s: f64,
+}
+
+impl Protocols {
+    /// For a sensor's range, speeds and time constants.
+    pub fn new(params: &SensorParams) -> Self {
+        let range = params.law.range;
+        let slowest_s = params.law.branches.iter().map(|branch| branch.tau_s).fold(1.0, f64::max);
+        // A tenth of a second for the whole range is more than any stage does.
+        let fastest = params.validity.fastest_rate_per_s.min(10.0 * range.span());
+        let speeds = SPEEDS.map(|share| share * fastest).to_vec();
+        Self { low: range.lower, high: range.upper, speeds, slowest_s }
+    }
+
+    /// The recordings, from the poorest to the best.
+    pub fn all(&self) -> Vec<Protocol> {
+        let hold_s = (HOLD * self.slowest_s).clamp(HOLD_S.0, HOLD_S.1);
+        let one = Protocol { name: "to and fro, one speed", strain: self.cycles(&self.speeds[..1], 3 * CYCLES) };
+        let several = Protocol { name: "to and fro, three speeds", strain: self.cycles(&self.speeds, CYCLES) };
+        let short = self.with_holds(CYCLES, 5.0);
+        let long = self.with_holds(CYCLES, hold_s);
+        vec![
+            one,
+            several,
+            Protocol { name: "three speeds, holds of 5 s at four levels", strain: short },
+            Protocol { name: "three speeds, long holds at four levels", strain: long },
+        ]
+    }
+
+    /// What the sampling is judged by: all speeds, and short holds.
+    pub fn usual(&self) -> Vec<f64> {
+        self.with_holds(CYCLES / 2, 5.0)
+    }
+
+    fn cycles(&self, speeds: &[f64], count: usize) -> Vec<f64> {
+        let mut path = Path::at(self.low);
+        path.hold(5.0);
+        for speed in speeds {
+            for cycle in 0..count {
+                // Every second one goes half-way only, so that the past differs at one strain.
+                let top = if cycle % 2 == 0 { self.high } else { self.low + 0.5 * (self.high - self.low) };
+                path.go(top, *speed);
+                path.go(self.low, *speed);
+            }
+        }
+        path.strain
+    }
+
+    fn with_holds(&self, cycles: usize, hold_s: f64) -> Vec<f64> {
+        let mut path = Path { strain: self.cycles(&self.speeds, cycles) };
+        for (place, level) in LEVELS.into_iter().enumerate() {
+            path.go(self.low + level * (self.high - self.low), self.speeds[place % self.speeds.len()]);
+            path.hold(hold_s);
+            path.go(self.low, self.speeds[(place + 1) % self.speeds.len()]);
+            path.hold(hold_s);
+        }
+        path.strain
+    }
+}
+
+struct Path {
+    strain: Vec<f64>,
+}
+
+impl Path {
+    fn at(strain: f64) -> Self {
+        Self { strain: vec![strain] }
+    }
+
+    fn last(&self) -> f64 {
+        self.strain.last().copied().unwrap_or(0.0)
+    }
+
+    fn hold(&mut self, seconds: f64) {
+        let last = self.last();
+        self.strain.extend(std::iter::repeat_n(last, (seconds * RATE_HZ) as usize));
+    }
+
+    fn go(&mut self, to: f64, speed: f64) {
+        let from = self.last();
+        let steps = ((to - from).abs() / speed * RATE_HZ).ceil().max(1.0);
+        self.strain.extend((1..=steps as usize).map(|step| from + (to - from) * step as f64 / steps));
+    }
+}
+
+/// The strain at another rate, straight between the rows.
+pub fn at_rate(strain: &[f64], rate_hz: f64) -> Vec<f64> {
+    let end_s = (strain.len() - 1) as f64 / RATE_HZ;
+    let at = |row: usize| {
+        let place = (row as f64 / rate_hz * RATE_HZ).min((strain.len() - 1) as f64);
+        let (before, share) = (place.floor() as usize, place.fract());
+        let after = (before + 1).min(strain.len() - 1);
+        strain[before] + share * (strain[after] - strain[before])
+    };
+    (0..=(end_s * rate_hz) as usize).map(at).collect()
+}

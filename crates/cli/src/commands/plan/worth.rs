@@ -1,0 +1,242 @@
+//! What recordings tell of a law's parameters, and what sampling and converters leave of an estimate.
+
+use nalgebra::DMatrix;
+use ohmstrain::{JointParams, Reading, ReadingUnit, Sensor};
+use ohmstrain_bench_data::FrontEndSpec;
+use ohmstrain_calib::{GaugeParams, LawParams};
+use ohmstrain_model::AdcCode;
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::SeedableRng;
+use rand_distr::{Distribution, StandardNormal};
+use serde::Serialize;
+
+use super::motion::{Protocol, Protocols, RATE_HZ, at_rate};
+use crate::error::CliError;
+use crate::report::Law;
+
+/// Readings per second that are tried.
+pub const RATES_HZ: [f64; 4] = [5.0, 10.0, 20.0, 50.0];
+/// Bits of a converter; 0 for readings as good as the sensor.
+const BITS: [u32; 4] = [0, 16, 12, 10];
+/// Seed of noise and drift.
+const SEED: u64 = 1;
+/// A parameter is told if its standard error is less than this share of it.
+const TOLD: f64 = 0.25;
+/// Relative step of a difference: errors of its square and of rounding over it are both about 1e-9.
+const STEP: f64 = 1e-5;
+/// Seconds in which a filter finds its feet, which are not scored.
+const SETTLING_S: f64 = 5.0;
+
+/// What a recording tells.
+#[derive(Serialize)]
+pub struct Told {
+    pub protocol: &'static str,
+    pub minutes: f64,
+    /// Parameters of the law.
+    pub parameters: usize,
+    /// Those with a standard error of less than a quarter of them.
+    pub told: usize,
+    /// The largest standard error of those that are told, percent.
+    pub worst_percent: Option<f64>,
+    /// Condition number of the Fisher information, its diagonal scaled to one.
+    pub condition: f64,
+    /// The parameter that is told least, if any is not.
+    pub left_open: String,
+}
+
+/// What a way of sampling leaves.
+#[derive(Serialize)]
+pub struct Worth {
+    pub rate_hz: f64,
+    /// Bits of the converter; none if it is as good as the sensor.
+    pub bits: Option<u32>,
+    /// Root mean square error in percent of the sensor's range.
+    pub error_percent: f64,
+    pub coverage_percent: f64,
+    /// Root mean square error of the joint's angle, degrees, if there is a joint.
+    pub angle_deg: Option<f64>,
+}
+
+/// Readings of a motion by the sensor's law, with white noise and a drifting baseline.
+fn readings(sensor: &Sensor, time_s: &[f64], strain: &[f64]) -> Vec<f64> {
+    let params = sensor.params();
+    let law = Law::new(params, params.rest_reading);
+    let driven = law.driven(time_s, strain, &[]).reading;
+    let Some(noise) = params.estimator(params.filter_of(params.default_estimator)).ok().map(|own| own.noise) else {
+        return driven;
+    };
+    let mut random = ChaCha8Rng::seed_from_u64(SEED);
+    let mut draw = || -> f64 { StandardNormal.sample(&mut random) };
+    let mut baseline = noise.baseline_sd * draw();
+    let mut before_s = None;
+    let noisy = |(reading, time_s): (f64, &f64)| {
+        let kept = before_s.map_or(1.0, |before_s: f64| (-(time_s - before_s) / noise.baseline_time_s).exp());
+        before_s = Some(*time_s);
+        baseline = kept * baseline + noise.baseline_sd * (1.0 - kept * kept).sqrt() * draw();
+        reading + params.rest_reading * (baseline + noise.reading_sd * draw())
+    };
+    driven.into_iter().zip(time_s).map(noisy).collect()
+}
+
+fn times(rows: usize, rate_hz: f64) -> Vec<f64> {
+    (0..rows).map(|row| row as f64 / rate_hz).collect()
+}
+
+/// What a recording tells of the law's parameters: their Fisher information, at the sensor's own values.
+pub fn told(sensor: &Sensor, protocol: &Protocol) -> Told {
+    let minutes = protocol.strain.len() as f64 / RATE_HZ / 60.0;
+    let (names, values) = parameters(&sensor.params().law);
+    let information = information(sensor, &protocol.strain);
+    // With ones on its diagonal, so that units do not count.
+    let scale: Vec<f64> = information.diagonal().iter().map(|x| x.sqrt().max(f64::MIN_POSITIVE)).collect();
+    let scaled = DMatrix::from_fn(values.len(), values.len(), |i, j| information[(i, j)] / (scale[i] * scale[j]));
+    let eigen = scaled.symmetric_eigen();
+    let most = eigen.eigenvalues.max();
+    let least = eigen.eigenvalues.min().max(f64::EPSILON * most);
+    let error = |i: usize| {
+        let row = eigen.eigenvectors.row(i);
+        let squares = row.iter().zip(eigen.eigenvalues.iter());
+        squares.map(|(x, value)| x * x / value.max(f64::EPSILON * most)).sum::<f64>().sqrt() / scale[i]
+    };
+    let relative: Vec<f64> = values.iter().enumerate().map(|(i, value)| (error(i) / value).abs()).collect();
+    let is_told = |share: &f64| *share < TOLD;
+    let open = relative.iter().zip(&names).filter(|(share, _)| !is_told(share)).max_by(|a, b| a.0.total_cmp(b.0));
+    Told {
+        protocol: protocol.name,
+        minutes,
+        parameters: relative.len(),
+        told: relative.iter().filter(|share| is_told(share)).count(),
+        worst_percent: relative.iter().copied().filter(is_told).reduce(f64::max).map(|share| 100.0 * share),
+        condition: most / least,
+        left_open: open.map_or_else(String::new, |(_, name)| name.clone()),
+    }
+}
+
+/// The parameters of a law that are not zero, by name.
+fn parameters(law: &LawParams) -> (Vec<String>, Vec<f64>) {
+    let mut law = law.clone();
+    let found: Vec<(String, f64)> = places(&mut law).into_iter().map(|(name, place)| (name, *place)).collect();
+    found.into_iter().filter(|(_, value)| *value != 0.0).unzip()
+}
+
+/// Every parameter of a law with its place.
+fn places(law: &mut LawParams) -> Vec<(String, &mut f64)> {
+    let mut found: Vec<(String, &mut f64)> = match &mut law.gauge {
+        GaugeParams::Polynomial { coefficients } => {
+            coefficients.iter_mut().enumerate().map(|(i, x)| (format!("gauge.coefficients[{i}]"), x)).collect()
+        }
+        GaugeParams::DecayingExponential { slope, decay_strain } => {
+            vec![("gauge.slope".into(), slope), ("gauge.decay_strain".into(), decay_strain)]
+        }
+        GaugeParams::Tunnelling { gap, barrier, path_loss } => {
+            let own = [("gauge.gap", gap), ("gauge.barrier", barrier), ("gauge.path_loss", path_loss)];
+            own.map(|(name, place)| (name.into(), place)).into()
+        }
+    };
+    found.push(("extend_viscosity_s".into(), &mut law.extend_viscosity_s));
+    found.push(("retract_viscosity_s".into(), &mut law.retract_viscosity_s));
+    for (i, branch) in law.branches.iter_mut().enumerate() {
+        let own = [
+            ("tau_s", &mut branch.tau_s),
+            ("extend_gain", &mut branch.extend_gain),
+            ("retract_gain", &mut branch.retract_gain),
+            ("extend_gain_slope", &mut branch.extend_gain_slope),
+            ("retract_gain_slope", &mut branch.retract_gain_slope),
+        ];
+        found.extend(own.map(|(name, place)| (format!("branches[{i}].{name}"), place)));
+    }
+    found
+}
+
+/// JᵀJ of the whitened readings by central differences. The drift is an Ornstein-Uhlenbeck process: a reading less what is left of
+/// the one before has white errors of the variance that both noises leave, but for the neighbours' share of the white one.
+fn information(sensor: &Sensor, strain: &[f64]) -> DMatrix<f64> {
+    let params = sensor.params();
+    let time_s = times(strain.len(), RATE_HZ);
+    let noise = params.estimator(params.filter_of(params.default_estimator)).ok().map(|own| own.noise);
+    let (white, drift, drift_s) =
+        noise.map_or((1e-3, 0.0, 1.0), |noise| (noise.reading_sd, noise.baseline_sd, noise.baseline_time_s));
+    let kept = (-1.0 / RATE_HZ / drift_s).exp();
+    let sd = (drift * drift * (1.0 - kept * kept) + white * white * (1.0 + kept * kept)).sqrt();
+    let names = parameters(&params.law).0;
+    let driven = |name: &str, factor: f64| {
+        let mut moved = params.clone();
+        if let Some((_, place)) = places(&mut moved.law).into_iter().find(|(own, _)| own == name) {
+            *place *= factor;
+        }
+        Law::new(&moved, 1.0).driven(&time_s, strain, &[]).reading
+    };
+    let values = parameters(&params.law).1;
+    let mut jacobian = DMatrix::zeros(strain.len(), names.len());
+    for (column, (name, value)) in names.iter().zip(&values).enumerate() {
+        let (above, below) = (driven(name, 1.0 + STEP), driven(name, 1.0 - STEP));
+        let slope = |row: usize| (above[row] - below[row]) / (2.0 * STEP * value);
+        for row in 1..strain.len() {
+            jacobian[(row, column)] = (slope(row) - kept * slope(row - 1)) / sd;
+        }
+    }
+    jacobian.tr_mul(&jacobian)
+}
+
+/// What rates and converters leave of the estimate, all on one motion.
+pub fn sampling(sensor: &Sensor, protocols: &Protocols) -> Result<Vec<Worth>, CliError> {
+    let path = protocols.usual();
+    let mut found = Vec::new();
+    for rate_hz in RATES_HZ {
+        let strain = at_rate(&path, rate_hz);
+        let time_s = times(strain.len(), rate_hz);
+        let exact = readings(sensor, &time_s, &strain);
+        for bits in BITS.into_iter().filter(|bits| *bits == 0 || sensor.params().reading == ReadingUnit::Ohm) {
+            found.push(scored(sensor, (rate_hz, bits), &time_s, &strain, &converted(&exact, bits)?)?);
+        }
+    }
+    Ok(found)
+}
+
+/// Readings through a divider whose resistor is the geometric mean of their range.
+fn converted(exact: &[f64], bits: u32) -> Result<Vec<Reading>, CliError> {
+    if bits == 0 {
+        return Ok(exact.iter().map(|value| Reading::from(*value)).collect());
+    }
+    let (low, high) = exact.iter().fold((f64::INFINITY, 0.0_f64), |(low, high), x| (low.min(*x), high.max(*x)));
+    let spec = format!("divider reference_ohm={} side=low bits={bits} noise_codes=0.5", (low * high).sqrt());
+    let spec: FrontEndSpec = spec.parse().map_err(|error| CliError::Other(format!("{error}")))?;
+    let front_end = spec.build().map_err(|error| CliError::Other(error.to_string()))?;
+    let read = |value: &f64| match front_end.read(front_end.code(*value).round().max(0.0) as u32) {
+        AdcCode::Reading(ohms) => Reading { value: ohms.resistance_ohm, sd: ohms.sd_ohm, saturated: false },
+        AdcCode::Saturated => Reading { saturated: true, ..Reading::MISSING },
+    };
+    Ok(exact.iter().map(read).collect())
+}
+
+fn scored(
+    sensor: &Sensor,
+    (rate_hz, bits): (f64, u32),
+    time_s: &[f64],
+    strain: &[f64],
+    readings: &[Reading],
+) -> Result<Worth, CliError> {
+    // What a correction has learned is the error of the law on real readings; these have none.
+    let mut filter = sensor.filter().without_correction().build()?;
+    let (mut squares, mut inside, mut count) = (0.0, 0_usize, 0_usize);
+    for ((time_s, truth), reading) in time_s.iter().zip(strain).zip(readings) {
+        let row = filter.step(*time_s, *reading)?;
+        if *time_s < SETTLING_S {
+            continue;
+        }
+        let error = row.strain - truth;
+        squares += error * error;
+        inside += usize::from(error.abs() <= 1.96 * row.strain_sd);
+        count += 1;
+    }
+    let n = count.max(1) as f64;
+    let error = (squares / n).sqrt();
+    let per_strain = |joint: JointParams| (joint.gauge_length_mm / joint.moment_arm_mm).to_degrees();
+    Ok(Worth {
+        rate_hz,
+        bits: (bits > 0).then_some(bits),
+        error_percent: 100.0 * error / sensor.params().law.range.span(),
+        coverage_percent: 100.0 * inside as f64 / n,
+        angle_deg: sensor.params().joint.map(|joint| error * per_strain(joint)),
+    })
+}

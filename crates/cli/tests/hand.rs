@@ -1,0 +1,94 @@
+//! A hand of five fingers, simulated and calibrated one by one, then all of them in one recording; and what `plan` says.
+
+#[allow(dead_code, reason = "each test program uses its own share")]
+mod common;
+
+use common::{Bench, Csv};
+
+const FINGERS: [&str; 5] = ["thumb", "index", "middle", "ring", "little"];
+/// A third of its length is what the simulated sensor is stretched by; that is 90° over 6.4 mm on 30 mm.
+const JOINT: &str = "prestrain=0 moment_arm_mm=6.4 gauge_length_mm=30";
+/// Of `JOINT`: degrees per strain.
+const DEGREES: f64 = 180.0 / std::f64::consts::PI * 30.0 / 6.4;
+
+/// A folder with a sensor and a recording per finger, `hand.toml`, and `hand.csv` with all readings.
+fn hand() -> (Bench, usize) {
+    let bench = Bench::new();
+    let mut traces = vec![];
+    let mut description = String::from("format = 1\n");
+    for (place, finger) in FINGERS.iter().enumerate() {
+        let (seed, trace, sensor) = (format!("{}", place + 1), format!("{finger}.csv"), format!("{finger}.toml"));
+        bench.run(&[&common::SIMULATE[..7], &["--seed", &seed, "-o", &trace]].concat()).ok();
+        bench.run(&["calibrate", &trace, "--until", "300", "-o", &sensor, "--estimator", "ekf", "--quiet"]).ok();
+        description += &format!(
+            "[[joints]]\nname = \"{finger}\"\ncolumn = \"{finger}_ohm\"\nsensor = \"{sensor}\"\njoint = \"{JOINT}\"\n"
+        );
+        traces.push(Csv::new(&bench.read(&trace)));
+    }
+    bench.write("hand.toml", description);
+    let names: Vec<String> = FINGERS.iter().map(|finger| format!("{finger}_ohm")).collect();
+    let mut all = format!("time_s,{}\n", names.join(","));
+    for row in 0..traces[0].len() {
+        let cells: Vec<&str> = traces.iter().map(|trace| trace.cells("resistance_ohm")[row]).collect();
+        all += &format!("{},{}\n", traces[0].cells("time_s")[row], cells.join(","));
+    }
+    bench.write("hand.csv", all);
+    let rows = traces[0].len();
+    (bench, rows)
+}
+
+#[test]
+fn all_angles_of_a_hand() {
+    let (bench, rows) = hand();
+    let angles = Csv::new(&bench.run(&["hand", "hand.toml", "hand.csv"]).ok());
+    assert!(angles.header.starts_with("time_s,thumb_deg,thumb_sd_deg,index_deg,"));
+    assert_eq!(angles.len(), rows);
+    for finger in FINGERS {
+        // Each finger is what `filter` makes of it alone.
+        let alone =
+            bench.run(&["filter", &format!("{finger}.csv"), "--sensor", &format!("{finger}.toml"), "--joint", JOINT]);
+        let alone = Csv::new(&alone.ok());
+        assert_eq!(angles.cells(&format!("{finger}_deg")), alone.cells("angle_deg"), "{finger}");
+        assert_eq!(angles.cells(&format!("{finger}_sd_deg")), alone.cells("angle_sd"), "{finger}");
+    }
+    let garbage = bench.read("hand.csv") + "1e9,1,2\n";
+    let strict = bench.feed(&["hand", "hand.toml"], garbage.clone());
+    assert_eq!(strict.code, Some(4), "{}", strict.stderr);
+    let skipping = bench.feed(&["hand", "hand.toml", "--skip-bad"], garbage);
+    assert!(skipping.warnings.concat().contains("1 lines were skipped"));
+    assert_eq!(Csv::new(&skipping.ok()).len(), angles.len());
+
+    let refused = bench.run(&["hand", "hand.toml", "thumb.csv"]);
+    assert!(refused.code == Some(4) && refused.stderr.contains("expected a column `thumb_ohm`"), "{}", refused.stderr);
+    bench.write("odd.toml", "format = 1\n[[joints]]\nname = \"a\"\ncolum = \"a\"\n");
+    let refused = bench.run(&["hand", "odd.toml", "hand.csv"]);
+    assert!(refused.code == Some(4) && refused.stderr.contains("odd.toml:4: unknown field"), "{}", refused.stderr);
+}
+
+#[test]
+fn a_plan_says_what_recordings_tell_and_what_sampling_leaves() {
+    let bench = Bench::calibrated();
+    let json = bench.run(&["plan", "--sensor", "sensor.toml", "--joint", JOINT, "--json"]).ok();
+    let plan: serde_json::Value = serde_json::from_str(&json).unwrap();
+    let recordings = plan["recordings"].as_array().unwrap();
+    let told = |place: usize| recordings[place]["told"].as_u64().unwrap();
+    let condition = |place: usize| recordings[place]["condition"].as_f64().unwrap();
+    // At one speed rate and strain go together; each further recording tells them apart better. One speed tells less than three of them with holds.
+    assert!(recordings.len() == 4 && told(0) <= told(3) && condition(0) > 100.0 * condition(3), "{json}");
+    let sampling = plan["sampling"].as_array().unwrap();
+    assert_eq!(sampling.len(), 16);
+    for one in sampling {
+        let number = |name: &str| one[name].as_f64().unwrap();
+        assert!(
+            (0.0..100.0).contains(&number("error_percent")) && (0.0..=100.0).contains(&number("coverage_percent")),
+            "{one}"
+        );
+        // A percent of the range is a third of a percent of strain, and that an angle.
+        let degrees = DEGREES / 3.0 * number("error_percent") / 100.0;
+        assert!((number("angle_deg") / degrees - 1.0).abs() < 1e-3, "{one}");
+    }
+    let text = bench.run(&["plan", "--sensor", "sensor.toml"]).ok();
+    assert!(text.contains("to and fro, one speed") && text.contains("12 bits"), "{text}");
+    let illustrative = bench.run(&["plan", "--material", "ecoflex-00-30"]).ok();
+    assert!(illustrative.contains("an illustrative sensor of ecoflex-00-30"), "{illustrative}");
+}
