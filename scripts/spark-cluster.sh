@@ -1,0 +1,54 @@
+#!/usr/bin/env bash
+# Smooths simulated recordings on a standalone Spark cluster (a master and two workers of one core, on the loopback address),
+# once more while a worker is killed, and on Ray while a worker is killed; compares with one core.
+#
+#   spark-cluster.sh [RECORDINGS] [SECONDS FROM THE FIRST OUTPUT UNTIL THE KILL]
+#
+# Wants Java, a Python with the ohmstrain wheel, pyspark and ray (PYTHON; default: `scripts/python.sh --engines` makes one and
+# installs Java), and the program (OHMSTRAIN; default: built by cargo).
+set -euo pipefail
+cd "$(dirname "$0")/.."
+readonly recordings=${1:-200} after_s=${2:-0}
+readonly fleet=crates/python/examples/fleet.py
+work=$(mktemp -d)
+started=()
+finish() {
+    for pid in "${started[@]}"; do kill "$pid" 2>/dev/null || true; done
+    rm -rf "$work"
+}
+trap finish EXIT
+
+if [[ -z ${OHMSTRAIN:-} ]]; then
+    cargo build --quiet --locked -p ohmstrain-cli
+    export OHMSTRAIN=$PWD/target/debug/ohmstrain
+fi
+python=${PYTHON:-$(scripts/python.sh --engines)}
+
+SPARK_HOME=$("$python" -c 'import pyspark, os; print(os.path.dirname(pyspark.__file__))')
+export SPARK_HOME PYSPARK_PYTHON=$python SPARK_LOCAL_IP=127.0.0.1 SPARK_WORKER_DIR=$work/workers SPARK_DAEMON_MEMORY=256m
+export SPARK_NO_DAEMONIZE=1 PYTHONWARNINGS=ignore
+port=$("$python" -c 'import socket; s = socket.socket(); s.bind(("127.0.0.1", 0)); print(s.getsockname()[1])')
+readonly url=spark://127.0.0.1:$port
+
+# service CLASS ARGUMENT...: a part of the cluster, in the background.
+service() {
+    "$SPARK_HOME/bin/spark-class" "org.apache.spark.deploy.$1" --host 127.0.0.1 "${@:2}" >"$work/$1-${#started[@]}.log" 2>&1 &
+    started+=("$!")
+}
+service master.Master --port "$port" --webui-port 0
+service worker.Worker --cores 1 --memory 1g --webui-port 0 "$url"
+service worker.Worker --cores 1 --memory 1g --webui-port 0 "$url"
+for _ in $(seq 60); do
+    [[ $(cat "$work"/worker.Worker-*.log | grep -c 'Successfully registered') -eq 2 ]] && break
+    sleep 1
+done
+
+"$python" $fleet make "$work/fleet" --recordings "$recordings"
+"$python" $fleet run "$work/fleet" plain
+"$python" $fleet run "$work/fleet" spark --master "$url" 2>"$work/spark.log" || { cat "$work/spark.log" >&2; exit 1; }
+"$python" $fleet check "$work/fleet" spark
+"$python" $fleet run "$work/fleet" spark --master "$url" --kill "${started[2]}" --after-s "$after_s" 2>"$work/spark.log" ||
+    { cat "$work/spark.log" >&2; exit 1; }
+"$python" $fleet check "$work/fleet" spark
+"$python" $fleet run "$work/fleet" ray --kill any --after-s "$after_s" 2>"$work/ray.log" || { cat "$work/ray.log" >&2; exit 1; }
+"$python" $fleet check "$work/fleet" ray
