@@ -10,6 +10,7 @@ use crate::correction_params::{
 };
 use crate::corrector::{Corrector, Examples};
 use crate::filter::{Filter, Output, Rows, WayBack};
+use crate::known::KnownError;
 use crate::params::RangeParams;
 use crate::way_back::SEGMENT;
 
@@ -29,6 +30,10 @@ pub(crate) struct Corrected {
     readings: Readings,
     /// What the filter has said of the last row.
     said: Option<Output>,
+    /// For how long errors of the correction hang together, s.
+    errors_last_s: f64,
+    /// What is left of a moment at which the strain was known.
+    known: Option<KnownError>,
     /// Corrected strains of the rows that wait for a fixed lag.
     waiting: VecDeque<Gaussian<f64>>,
     /// Lagged estimates on their way out.
@@ -84,6 +89,8 @@ impl Corrected {
             scale,
             readings: Readings::new(scale),
             said: None,
+            errors_last_s: params.filter.residual.noise_time_s,
+            known: None,
             waiting: VecDeque::new(),
             lagged: Vec::new(),
         })
@@ -101,6 +108,14 @@ impl Corrected {
 
     /// The filter's strain, corrected; as it is before the first reading.
     fn corrected(&self, output: &Output) -> Gaussian<f64> {
+        let strain = self.learned(output);
+        match (self.known, self.readings.time_s) {
+            (Some(known), Some(time_s)) => known.correct(time_s, strain),
+            _ => strain,
+        }
+    }
+
+    fn learned(&self, output: &Output) -> Gaussian<f64> {
         let filtered = output.estimate.strain;
         let Some(past) = self.readings.now else { return filtered };
         let inputs = filter_inputs(&outputs(output), &past);
@@ -145,6 +160,16 @@ impl Filter for Corrected {
     fn step(&mut self, time_s: f64, reading: Option<Reading<f64>>) -> Result<(), StepError> {
         self.filter.step(time_s, reading)?;
         self.see(time_s, reading);
+        Ok(())
+    }
+
+    fn know(&mut self, strain: &Gaussian<f64>) -> Result<(), StepError> {
+        self.filter.know(strain)?;
+        let said = self.filter.output();
+        let learned = self.learned(&said);
+        let lasts_s = self.errors_last_s;
+        self.known = self.readings.time_s.map(|time_s| KnownError::new(time_s, lasts_s, strain, &learned));
+        self.said = Some(said);
         Ok(())
     }
 
@@ -194,7 +219,7 @@ impl Filter for Corrected {
             past.step(time_s, reading);
         }
         // The filter says what it says at the end of the recording.
-        (self.readings, self.said) = (past, None);
+        (self.readings, self.said, self.known) = (past, None, None);
         let back = self.filter.way_back(rows)?;
         let (corrector, ahead) = (&self.of_smoother, Readings::new(self.scale));
         Ok(Box::new(CorrectedWayBack { back, corrector, rows, starts, ahead }))

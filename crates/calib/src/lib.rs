@@ -29,6 +29,7 @@ mod filter;
 mod findings;
 mod gaussian_process;
 mod identifiability;
+mod known;
 mod lag;
 mod law_fit;
 mod law_params;

@@ -95,8 +95,9 @@ impl From<LibraryError> for CliError {
     fn from(error: LibraryError) -> Self {
         match error {
             LibraryError::NoSmoother => Self::Arguments("--estimator: this one has no smoother".into()),
-            LibraryError::InitialStrain { quantity, .. } => {
-                let refused = error.to_string().replacen("initial strain", "--initial-strain", 1);
+            LibraryError::KnownStrain { quantity, name, .. } => {
+                let flag = if name == "known strain" { "--known" } else { "--initial-strain" };
+                let refused = error.to_string().replacen(name, flag, 1);
                 Self::Arguments(refused + suits::start_hint(quantity))
             }
             LibraryError::Guard(_) | LibraryError::NotPositive { .. } => Self::Arguments(error.to_string()),

@@ -346,6 +346,8 @@ fn an_argument_that_cannot_be_is_named() {
         (&filter, &["--initial-strain", "x"], "'x' for '--initial-strain"),
         (&filter, &["--initial-strain", "NaN"], "'NaN' for '--initial-strain"),
         (&filter, &["--initial-strain", "inf"], "'inf' for '--initial-strain"),
+        (&filter, &["--known", "3"], "'3' for '--known"),
+        (&filter, &["--known", "3:0.1:0"], "'3:0.1:0' for '--known"),
         (&filter, &["--rest-resistance", "0"], "'0' for '--rest-resistance"),
         (&filter, &["--rest-resistance=-5"], "'-5' for '--rest-resistance"),
         (&filter, &["--rest-resistance", "first:0"], "'first:0' for '--rest-resistance"),

@@ -207,6 +207,40 @@ fn a_known_initial_strain_starts_there() {
     assert!((Csv::new(&far).numbers("strain")[0] - 0.2).abs() < 2e-3);
 }
 
+/// Where the filter errs most it is told the truth: that row and the second after it are better, also with a lag, where the
+/// rows before it profit too; and rows before it, without a lag, are as they were.
+#[test]
+fn a_strain_that_is_known_is_taken_in() {
+    let bench = Bench::calibrated();
+    let truth = Csv::new(&bench.read("trace.csv")).numbers("strain");
+    for lag in [&[][..], &["--lag-s", "0.6"]] {
+        let errors = |flags: &[&str]| -> (Vec<f64>, Csv) {
+            let run = bench.run(&[&["filter", "trace.csv", "--sensor", "sensor.toml"][..], lag, flags].concat());
+            let estimates = Csv::new(&run.ok());
+            let strains = estimates.numbers("strain");
+            (strains.iter().zip(&truth).map(|(strain, truth)| (strain - truth).abs()).collect(), estimates)
+        };
+        let (untold, estimates) = errors(&[]);
+        let worst = (50..untold.len() - 10).max_by(|a, b| untold[*a].total_cmp(&untold[*b])).unwrap();
+        // A time between the rows: it is the next row's strain that is known.
+        let time_s = estimates.numbers("time_s")[worst] - 0.01;
+        let known = format!("{time_s}:{}:0.001", truth[worst]);
+        let (told, estimates) = errors(&["--known", &known]);
+        let mean = |errors: &[f64]| errors.iter().sum::<f64>() / errors.len() as f64;
+        let sd = estimates.numbers("strain_sd")[worst] / sd_scale(&bench, "strain_sd_scale");
+        // Four deviations of what is known.
+        assert!(told[worst] < 0.004 && sd < 1.001e-3, "{lag:?}: {} ± {sd}, was {}", told[worst], untold[worst]);
+        assert!(mean(&told[worst..worst + 5]) < 0.7 * mean(&untold[worst..worst + 5]), "{lag:?}: {told:?}");
+        if lag.is_empty() {
+            assert_eq!(told[..worst], untold[..worst]);
+        } else {
+            assert!(told[worst - 1] < untold[worst - 1]);
+        }
+    }
+    let far = bench.run(&["filter", "trace.csv", "--sensor", "sensor.toml", "--known", "3:12"]);
+    far.fails(2, "--known: expected 0.0000 to 0.3333, the limits of the sensor's strain, found 12; 10 % is 0.1");
+}
+
 #[test]
 fn the_rest_resistance_is_the_sensors_or_given_or_that_of_the_first_readings() {
     let bench = Bench::calibrated();

@@ -9,8 +9,8 @@ use crate::{Error, Estimate, Filter, LaggedFilter, Reading, Sensor};
 
 /// How many readings in a row a gate turns down before it is the state that is doubted.
 const PATIENCE: u32 = 10;
-/// How far beyond the limits a strain may start, in spans.
-const START_BEYOND: f64 = 0.1;
+/// How far beyond the limits a strain may be that somebody knows, in spans.
+pub(crate) const KNOWN_BEYOND: f64 = 0.1;
 
 /// How a filter is to be; see [`Sensor::filter`]. Everything has a default.
 ///
@@ -271,10 +271,16 @@ impl<'a> FilterBuilder<'a> {
     fn start_at(&self, strain: f64) -> Result<Start, Error> {
         let (limits, quantity) = (self.sensor.params().limits, self.sensor.params().quantity);
         let beyond = (limits.lower - strain).max(strain - limits.upper);
-        if beyond <= START_BEYOND * limits.span() {
+        if beyond <= KNOWN_BEYOND * limits.span() {
             return Ok(Start::Strain(strain));
         }
-        Err(Error::InitialStrain { quantity, lower: limits.lower, upper: limits.upper, found: strain })
+        Err(Error::KnownStrain {
+            name: "initial strain",
+            quantity,
+            lower: limits.lower,
+            upper: limits.upper,
+            found: strain,
+        })
     }
 
     fn guard(&self) -> Result<Guard<f64>, Error> {

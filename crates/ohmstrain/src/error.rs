@@ -31,9 +31,11 @@ pub enum Error {
     /// A joint that no sensor can sit on.
     #[error("the sensor's joint: {0}")]
     Joint(ParameterError),
-    /// A strain to start at that the sensor never reports.
-    #[error("initial strain: expected {lower:.4} to {upper:.4}, the limits of the sensor's {}, found {found}", quantity.name())]
-    InitialStrain {
+    /// A strain to start at, or that is known later, that the sensor never reports.
+    #[error("{name}: expected {lower:.4} to {upper:.4}, the limits of the sensor's {}, found {found}", quantity.name())]
+    KnownStrain {
+        /// What it is.
+        name: &'static str,
         /// What is estimated.
         quantity: Quantity,
         /// Lower limit.

@@ -1,9 +1,10 @@
-use ohmstrain_calib::{Output, SensorParams};
-use ohmstrain_ekf::ReadingVerdict;
+use ohmstrain_calib::{Output, Quantity, SensorParams};
+use ohmstrain_ekf::{Gaussian, ReadingVerdict};
 use ohmstrain_model::Joint;
 use serde::ser::SerializeStruct;
 use serde::{Serialize, Serializer};
 
+use crate::builder::KNOWN_BEYOND;
 use crate::column::Header;
 use crate::{Error, Flag, Flags, Reading, Sensor};
 
@@ -116,6 +117,7 @@ pub(crate) struct Scale {
     /// R₀ of the calibration, and what the rested sensor read then.
     calibrated: (f64, f64),
     limits: (f64, f64),
+    quantity: Quantity,
     joint: Option<Joint<f64>>,
     header: Header,
 }
@@ -126,7 +128,8 @@ impl Scale {
         let rest_reading = params.rest_reading;
         let calibrated = (rest_reading, params.measured_rest.unwrap_or(rest_reading));
         let limits = (params.limits.lower, params.limits.upper);
-        Ok(Self { rest_reading, calibrated, limits, joint: sensor.joint()?, header: Header::of(params) })
+        let quantity = params.quantity;
+        Ok(Self { rest_reading, calibrated, limits, quantity, joint: sensor.joint()?, header: Header::of(params) })
     }
 
     /// Moves R₀ to where the rested sensor reads `measured`.
@@ -137,6 +140,18 @@ impl Scale {
         let (rest_reading, rested) = self.calibrated;
         self.rest_reading = rest_reading * (measured / rested);
         Ok(())
+    }
+
+    /// A strain that is known to `sd`, within the limits or a little beyond.
+    pub(crate) fn known(&self, strain: f64, sd: f64) -> Result<Gaussian<f64>, Error> {
+        let ((lower, upper), quantity) = (self.limits, self.quantity);
+        if !((lower - strain).max(strain - upper) <= KNOWN_BEYOND * (upper - lower)) {
+            return Err(Error::KnownStrain { name: "known strain", quantity, lower, upper, found: strain });
+        }
+        if !(sd.is_finite() && sd > 0.0) {
+            return Err(Error::NotPositive { name: "standard deviation of a known strain", found: sd });
+        }
+        Ok(Gaussian { mean: strain, variance: sd * sd })
     }
 
     /// The row of a reading and what the kernel says of it.

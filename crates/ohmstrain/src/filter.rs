@@ -22,11 +22,13 @@ pub(crate) struct Kernel {
 /// ```
 pub struct Filter {
     kernel: Kernel,
+    /// Time and reading of the last row.
+    last: (f64, Reading),
 }
 
 impl Filter {
     pub(crate) const fn new(kernel: Kernel) -> Self {
-        Self { kernel }
+        Self { kernel, last: (0.0, Reading::MISSING) }
     }
 
     /// Takes the reading at `time_s` and tells what is known then. A missing reading is NaN, `None` or
@@ -50,6 +52,28 @@ impl Filter {
         let Kernel { filter, scale } = &mut self.kernel;
         let reading = reading.into();
         filter.step(time_s, reading.relative(scale.rest_reading))?;
+        self.last = (time_s, reading);
+        Ok(scale.row(time_s, reading, &filter.output()))
+    }
+
+    /// Takes in that the strain (or angle) is known now, to `sd`: the estimate of the last row, and those after it, follow.
+    ///
+    /// # Errors
+    /// If the strain lies beyond the limits by more than a tenth of them, or `sd` is not positive. The filter stays as it was.
+    ///
+    /// ```
+    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+    /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
+    /// let mut filter = sensor.filter().build()?;
+    /// filter.step(0.0, 1600.0)?;
+    /// let e = filter.know(0.10, 0.002)?;
+    /// assert!((e.strain - 0.10).abs() < 0.01 && e.strain_sd <= 0.0021);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn know(&mut self, strain: f64, sd: f64) -> Result<Estimate, Error> {
+        let Kernel { filter, scale } = &mut self.kernel;
+        filter.know(&scale.known(strain, sd)?)?;
+        let (time_s, reading) = self.last;
         Ok(scale.row(time_s, reading, &filter.output()))
     }
 
@@ -154,6 +178,25 @@ impl LaggedFilter {
         })?;
         self.are_out = true;
         Ok(&self.due)
+    }
+
+    /// As [`Filter::know`], for rows that are still to be handed out and those to come.
+    ///
+    /// # Errors
+    /// As [`Filter::know`].
+    ///
+    /// ```
+    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+    /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
+    /// let mut filter = sensor.filter().build_lagged(0.5)?;
+    /// filter.step(0.0, 1600.0)?;
+    /// assert!(filter.know(0.10, 0.0).is_err());
+    /// filter.know(0.10, 0.002)?;
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn know(&mut self, strain: f64, sd: f64) -> Result<(), Error> {
+        let Kernel { filter, scale } = &mut self.kernel;
+        Ok(filter.know(&scale.known(strain, sd)?)?)
     }
 
     /// As [`Filter::rest_resistance`].

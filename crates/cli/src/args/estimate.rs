@@ -65,6 +65,10 @@ pub struct FilterArgs {
     /// Estimate every row from the readings up to S seconds after it; rows come out that much later
     #[arg(long, value_name = "S", value_parser = positive)]
     pub lag_s: Option<f64>,
+    /// The strain (or angle) is known to be X at the first row from T seconds on, to SD (0.5 % of the limits); repeatable.
+    /// Estimates from there on follow
+    #[arg(long, value_name = "T:X[:SD]", allow_negative_numbers = true)]
+    pub known: Vec<KnownStrain>,
     /// Go on after lines that are none of a trace, as serial lines bring; they are counted on stderr
     #[arg(long)]
     pub skip_bad: bool,
@@ -109,6 +113,33 @@ impl FromStr for BoundedInfluence {
         match kind {
             "huber" => Ok(Self(Influence::Huber { threshold: number })),
             "student-t" => Ok(Self(Influence::StudentT { degrees_of_freedom: number })),
+            _ => Err(expected()),
+        }
+    }
+}
+
+/// A strain that is known at a time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct KnownStrain {
+    /// From when on, s.
+    pub time_s: f64,
+    /// The strain, or the angle in degrees.
+    pub strain: f64,
+    /// Its standard deviation, if it was given.
+    pub sd: Option<f64>,
+}
+
+impl FromStr for KnownStrain {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let expected =
+            || "expected T:X or T:X:SD, a time in seconds, a strain and its deviation, e.g. 12.5:0.10".to_string();
+        let mut parts = text.split(':');
+        let mut number = || parts.next().map(|part| finite(part).map_err(|_| expected())).transpose();
+        let (time_s, strain, sd) = (number()?, number()?, number()?);
+        match (time_s, strain, parts.next()) {
+            (Some(time_s), Some(strain), None) if sd.is_none_or(|sd| sd > 0.0) => Ok(Self { time_s, strain, sd }),
             _ => Err(expected()),
         }
     }

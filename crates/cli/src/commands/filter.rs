@@ -1,9 +1,10 @@
+use std::collections::VecDeque;
 use std::io::{self, Read};
 
 use ohmstrain::{Error, Estimate, Filter, LaggedFilter, Reading, Sensor, ValidityWatch};
 use ohmstrain_bench_data::{BadContent, Row, TraceError, TraceReader};
 
-use crate::args::{FilterArgs, RestResistance};
+use crate::args::{FilterArgs, KnownStrain, RestResistance};
 use crate::error::CliError;
 use crate::estimates::{EstimateWriter, columns};
 use crate::input::{self, check_unit, is_stdin};
@@ -14,6 +15,9 @@ use crate::suits::{self, FIRST_LIVE_READINGS, FIRST_READINGS};
 
 /// Bytes handed to standard output at once, unless somebody waits for them.
 const WRITTEN_AT_ONCE: usize = 1 << 16;
+
+/// How well a known strain is known unless it says so, in spans of the limits.
+const KNOWN_TO: f64 = 0.005;
 
 /// Turns readings into strain as they arrive. Memory does not grow with the recording.
 pub fn run(args: &FilterArgs) -> Result<(), CliError> {
@@ -40,43 +44,88 @@ pub fn run(args: &FilterArgs) -> Result<(), CliError> {
     stream(args, filter, rows, sink)
 }
 
-/// A filter with or without a lag.
-enum Running {
-    Now(Filter, Option<Estimate>),
-    Later(LaggedFilter),
+/// A filter with or without a lag, and the strains that will be known to it.
+struct Running {
+    filter: Lag,
+    /// In order of time.
+    known: VecDeque<KnownStrain>,
+    /// How well they are known, unless they say so themselves.
+    known_sd: f64,
+    /// Time of the last row.
+    time_s: f64,
+}
+
+enum Lag {
+    None(Filter, Option<Estimate>),
+    Some(LaggedFilter),
 }
 
 impl Running {
     fn new(sensor: &Sensor, args: &FilterArgs) -> Result<Self, Error> {
         let builder = builder(sensor, &args.estimate);
-        Ok(match args.lag_s {
-            None => Self::Now(builder.build()?, None),
-            Some(lag_s) => Self::Later(builder.build_lagged(lag_s)?),
-        })
+        let filter = match args.lag_s {
+            None => Lag::None(builder.build()?, None),
+            Some(lag_s) => Lag::Some(builder.build_lagged(lag_s)?),
+        };
+        let mut known = args.known.clone();
+        known.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
+        let known_sd = KNOWN_TO * sensor.params().limits.span();
+        // What would be refused in the middle is refused before the first row.
+        let mut trial = builder.build()?;
+        for known in &known {
+            trial.know(known.strain, known.sd.unwrap_or(known_sd))?;
+        }
+        Ok(Self { filter, known: known.into(), known_sd, time_s: f64::NEG_INFINITY })
     }
 
     /// Takes a row; the rows that are due.
     fn step(&mut self, time_s: f64, reading: Reading) -> Result<&[Estimate], Error> {
-        match self {
-            Self::Now(filter, row) => Ok(std::slice::from_ref(row.insert(filter.step(time_s, reading)?))),
-            Self::Later(filter) => filter.step(time_s, reading),
+        // Rows with a lag are handed out as soon as they are due: what is known at one of them is taken in after it.
+        self.know_with_lag()?;
+        if let Lag::None(filter, row) = &mut self.filter {
+            *row = Some(filter.step(time_s, reading)?);
+        }
+        self.time_s = time_s;
+        match &mut self.filter {
+            Lag::None(filter, row) => {
+                while let Some(known) = next_until(&mut self.known, time_s) {
+                    *row = Some(filter.know(known.strain, known.sd.unwrap_or(self.known_sd))?);
+                }
+                Ok(row.as_slice())
+            }
+            Lag::Some(filter) => filter.step(time_s, reading),
         }
     }
 
     /// The rows that still wait.
     fn finish(&mut self) -> Result<&[Estimate], Error> {
-        match self {
-            Self::Now(..) => Ok(&[]),
-            Self::Later(filter) => filter.finish(),
+        self.know_with_lag()?;
+        match &mut self.filter {
+            Lag::None(..) => Ok(&[]),
+            Lag::Some(filter) => filter.finish(),
         }
     }
 
+    fn know_with_lag(&mut self) -> Result<(), Error> {
+        if let Lag::Some(filter) = &mut self.filter {
+            while let Some(known) = next_until(&mut self.known, self.time_s) {
+                filter.know(known.strain, known.sd.unwrap_or(self.known_sd))?;
+            }
+        }
+        Ok(())
+    }
+
     fn rest_resistance(&mut self, measured: f64) -> Result<(), Error> {
-        match self {
-            Self::Now(filter, _) => filter.rest_resistance(measured),
-            Self::Later(filter) => filter.rest_resistance(measured),
+        match &mut self.filter {
+            Lag::None(filter, _) => filter.rest_resistance(measured),
+            Lag::Some(filter) => filter.rest_resistance(measured),
         }
     }
+}
+
+/// The next strain that is known by `time_s`.
+fn next_until(known: &mut VecDeque<KnownStrain>, time_s: f64) -> Option<KnownStrain> {
+    known.front().is_some_and(|known| known.time_s <= time_s).then(|| known.pop_front()).flatten()
 }
 
 /// Filters row by row.
