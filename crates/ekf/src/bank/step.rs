@@ -98,13 +98,14 @@ fn step_vector<T: Lane, S: Simd, V: SimdFloat<S, Element = T>, const B: usize, c
     let said = Vector::pick(present, variance + nis, parts.variances::<N>());
     let sound = parts.is_sound::<N>(said);
     let accepted = sound & ((nothing.less(variance) & extra_variance.not_negative()) | !present);
-    let (old_mean, old_covariance) = (mean, covariance);
     parts.write::<N>(&mut mean.iter_mut(), &mut covariance.iter_mut());
     for i in 0..N {
-        store(&mut block.mean[i], from, Vector::pick(accepted, mean[i], old_mean[i]));
+        let old = load(simd, &block.mean[i], from);
+        store(&mut block.mean[i], from, Vector::pick(accepted, mean[i], old));
     }
     for i in 0..L {
-        store(&mut block.covariance[i], from, Vector::pick(accepted, covariance[i], old_covariance[i]));
+        let old = load(simd, &block.covariance[i], from);
+        store(&mut block.covariance[i], from, Vector::pick(accepted, covariance[i], old));
     }
     (present, accepted)
 }
