@@ -103,11 +103,13 @@ impl Cells {
         match self {
             Self::Numbers(values, levels) => {
                 column.typed::<DoubleType>().write_batch(values, Some(levels), None)?;
-                (values.clear(), levels.clear());
+                values.clear();
+                levels.clear();
             }
             Self::Words(values, levels) => {
                 column.typed::<ByteArrayType>().write_batch(values, Some(levels), None)?;
-                (values.clear(), levels.clear());
+                values.clear();
+                levels.clear();
             }
         }
         column.close()
