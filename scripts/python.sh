@@ -6,6 +6,7 @@
 # Environment:
 #   PYTHON3  the Python to start from, 3.10 or newer; default: python3. Installed by apt where there is none and this is root.
 #   VENV     the environment; default: target/python
+#   PROFILE  cargo's profile; default: release
 set -euo pipefail
 cd "$(dirname "$0")/.."
 readonly venv=${VENV:-$PWD/target/python}
@@ -21,7 +22,7 @@ fi
 [[ -x $venv/bin/python ]] || "${PYTHON3:-python3}" -m venv "$venv"
 "$venv/bin/python" -m pip install --quiet 'maturin>=1.9,<2'
 rm -rf "$venv/wheels"
-(cd crates/python && "$venv/bin/maturin" build --quiet --release --locked --out "$venv/wheels" >&2)
+(cd crates/python && "$venv/bin/maturin" build --quiet --profile "${PROFILE:-release}" --locked --out "$venv/wheels" >&2)
 extras=test
 if [[ ${1:-} == --engines ]]; then extras=test,spark,ray; fi
 wheel=$(echo "$venv"/wheels/ohmstrain-*.whl)

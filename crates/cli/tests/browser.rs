@@ -1,7 +1,7 @@
 //! The report in a browser without a window: no complaint on its console, nothing wider than a phone, values under the
 //! pointer, plots that can be enlarged; and figures that look as they did when a person last looked at them.
 //!
-//! Needs Chromium, and says so if it is missing; `OHMSTRAIN_WITHOUT_CHROMIUM=1` goes without. After a wanted change of a
+//! Without Chromium they test nothing, and say so on stderr; with `OHMSTRAIN_REQUIRE_CHROMIUM=1`, as in `.ci/run`, they fail. After a wanted change of a
 //! figure: `OHMSTRAIN_FINGERPRINTS=DIR cargo test -p ohmstrain-cli --test browser` writes the pictures to DIR for somebody to
 //! look at, and the new fingerprints to `tests/fingerprints`.
 
@@ -10,6 +10,7 @@ mod common;
 
 use std::env;
 use std::fs;
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -18,17 +19,17 @@ use common::Bench;
 /// Names under which Chromium goes.
 const NAMES: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "chrome"];
 
-/// The browser; `None` only where somebody has said to go without.
+/// The browser, if there is one or none is required.
 fn browser() -> Option<PathBuf> {
     let path = env::var_os("PATH").unwrap_or_default();
     let found =
         env::split_paths(&path).flat_map(|folder| NAMES.map(|name| folder.join(name))).find(|file| file.is_file());
-    let may_go_without = env::var_os("OHMSTRAIN_WITHOUT_CHROMIUM").is_some();
-    assert!(
-        found.is_some() || may_go_without,
-        "this test needs chromium and finds none: `apt-get install chromium`, or set OHMSTRAIN_WITHOUT_CHROMIUM=1 to go \
-         without what it tests"
-    );
+    if found.is_none() {
+        let missing = "the report is not tested: no chromium (scripts/chromium.sh installs it)";
+        assert!(env::var_os("OHMSTRAIN_REQUIRE_CHROMIUM").is_none(), "{missing}");
+        // Not by a macro: those are heard of tests that fail only.
+        let _ = writeln!(io::stderr(), "{missing}");
+    }
     found
 }
 
