@@ -21,6 +21,8 @@ const SIGNED: Allowed = Allowed { least: -1e9, most: 1e9 };
 const GAIN: Allowed = Allowed { least: -LARGEST_CHANGE, most: LARGEST_CHANGE };
 /// Resistances, times, rates, lengths. The search for noise and motion ends between `e^-25` and `e^15`.
 const POSITIVE: Allowed = Allowed { least: 1e-12, most: 1e12 };
+/// Rates, 1/s: squares of what is faster leave no digits to a belief, and the search ends far below.
+const RATE: Allowed = Allowed { least: 1e-12, most: 1e8 };
 /// Deviations of what may be exact.
 const AMOUNT: Allowed = Allowed { least: 0.0, most: 1e6 };
 /// Probabilities and powers.
@@ -197,7 +199,7 @@ impl MotionParams {
     fn validate(&self, table: &Table, limits: RangeParams) -> Result<(), FieldError> {
         let (Self::OrnsteinUhlenbeck { rate_sd_per_s, strain_mean, strain_sd, .. }
         | Self::Smooth { rate_sd_per_s, strain_mean, strain_sd, .. }) = *self;
-        table.number("rate_sd_per_s", rate_sd_per_s, POSITIVE)?;
+        table.number("rate_sd_per_s", rate_sd_per_s, RATE)?;
         let beyond = MEAN_BEYOND * limits.span();
         let (least, most) = (limits.lower - beyond, limits.upper + beyond);
         if !(least..=most).contains(&strain_mean) {

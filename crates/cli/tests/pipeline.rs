@@ -72,11 +72,12 @@ fn the_demo_writes_five_whole_files_prints_its_table_and_does_the_same_twice() {
 fn assert_one_whole_page(page: &str) {
     assert!(page.starts_with("<!DOCTYPE html>") && page.trim_end().ends_with("</html>"));
     assert!(page.matches("<svg").count() >= 5);
-    // The name of a namespace, which nothing loads.
-    let page = page.replace(" xmlns=\"http://www.w3.org/2000/svg\"", "");
-    for reference in ["http:", "https:", "src=", "href=\"/", "url(", "@import", "<script", "<link", "<iframe"] {
+    // The name of a namespace, which nothing loads, and places on the page itself.
+    let page = page.replace("http://www.w3.org/2000/svg", "").replace("url(#", "");
+    for reference in ["http:", "https:", "src=", "href=\"/", "url(", "@import", "<script ", "<link", "<iframe"] {
         assert!(!page.contains(reference), "{reference}");
     }
+    assert_eq!(page.matches("<script>").count(), 1, "the page's own script, and no other");
 }
 
 #[test]

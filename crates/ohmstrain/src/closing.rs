@@ -21,7 +21,7 @@ const SELDOM: f64 = 0.04;
 /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
 /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
 /// let closing = ohmstrain::Closing { file: Some("s.toml"), params: sensor.params(), findings: None, calibration_s: 1.5 };
-/// assert!(closing.text().ends_with("Written      s.toml, estimator sign-split, a law of 1 branch; it took 1.5 s\n"));
+/// assert!(closing.text().ends_with("Written      s.toml, estimator sign-split, a law of 3 branches; it took 1.5 s\n"));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Copy, Debug)]
