@@ -1,7 +1,9 @@
 #!/usr/bin/env bash
 # Builds the Python wheel and installs it into a virtual environment of its own; prints that environment's Python.
 #
-#   python.sh [--engines]      with pyspark, ray, and the Java that Spark needs (by apt, as root, where there is none)
+#   python.sh                  the wheel and what its tests need
+#   python.sh --engines        with pyspark, ray, and the Java that Spark needs (by apt, as root, where there is none)
+#   python.sh --tools-only     an environment that can build it, and no more
 #
 # Environment:
 #   PYTHON3  the Python to start from, 3.10 or newer; default: python3. Installed by apt where there is none and this is root.
@@ -21,6 +23,7 @@ if [[ ${1:-} == --engines ]] && ! command -v java >/dev/null; then
 fi
 [[ -x $venv/bin/python ]] || "${PYTHON3:-python3}" -m venv "$venv"
 "$venv/bin/python" -m pip install --quiet 'maturin>=1.9,<2'
+if [[ ${1:-} == --tools-only ]]; then exit 0; fi
 rm -rf "$venv/wheels"
 (cd crates/python && "$venv/bin/maturin" build --quiet --profile "${PROFILE:-release}" --locked --out "$venv/wheels" >&2)
 extras=test
