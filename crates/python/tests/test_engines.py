@@ -1,4 +1,4 @@
-"""Spark and Ray, as they run on one machine. CI demands them: OHMSTRAIN_REQUIRE_ENGINES=1."""
+"""Spark and Ray, as they run on one machine; skipped where they are not installed, unless OHMSTRAIN_REQUIRE_ENGINES=1."""
 
 import os
 import sys
