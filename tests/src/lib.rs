@@ -2,6 +2,7 @@
 
 pub mod character;
 mod draws;
+pub mod faults;
 mod flow;
 pub mod own_law;
 

@@ -203,9 +203,15 @@ fn huber_bounds_the_influence() {
     let half = step(expected + 0.5 * sd, Influence::Full);
     assert_eq!(small.verdict, ReadingVerdict::Downweighted);
     assert!((small.advanced.state.mean - half.advanced.state.mean).amax() <= 1e-12 * half.advanced.state.mean.amax());
+    // Redescending from three deviations on: weight 9/16 at four, 9/2500 at fifty, full weight at 2.9.
+    let redescending = Influence::Redescending { threshold: 3.0 };
+    let gain = at_threshold / (2.0 * sd);
+    for (deviations, weight) in [(2.9, 1.0), (4.0, 9.0 / 16.0), (50.0, 9.0 / 2500.0)] {
+        let moved = step(expected + deviations * sd, redescending).advanced.state.mean - missing.mean;
+        assert!((moved - gain * (weight * deviations * sd)).amax() < 1e-12, "{deviations}");
+    }
     // Student's t with ν = 4: weight 5 / (4 + 16) at four deviations, 5 / (4 + 2500) at fifty, and full weight at one.
     let student = Influence::StudentT { degrees_of_freedom: 4.0 };
-    let gain = at_threshold / (2.0 * sd);
     for (deviations, weight) in [(1.0, 1.0), (4.0, 0.25), (50.0, 5.0 / 2504.0)] {
         let moved = step(expected + deviations * sd, student).advanced.state.mean - missing.mean;
         assert!((moved - gain * (weight * deviations * sd)).amax() < 1e-12, "{deviations}");

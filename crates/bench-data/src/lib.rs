@@ -4,6 +4,7 @@
 //! - [`segment`] cuts a reference into stretching, holding and releasing.
 //! - With the feature `import`, the module of that name takes a lab's files apart and makes traces of them.
 //! - [`simulate`](mod@simulate) makes recordings of a bench that nobody has to own.
+//! - [`faults`] breaks them.
 //!
 //! # Policy
 //! - Units are converted here and nowhere else: inside, there is strain, Ω or R/R₀, and seconds.
@@ -34,6 +35,7 @@ mod cell;
 mod clock;
 mod columns;
 mod error;
+pub mod faults;
 #[cfg(feature = "import")]
 pub mod import;
 mod line_parser;

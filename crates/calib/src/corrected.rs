@@ -16,7 +16,7 @@ use crate::way_back::SEGMENT;
 
 /// A reading that a guard has weighed down and whose normalised innovation squared is above this is not shown to the
 /// correction, which expects none in particular: three standard deviations.
-const SURPRISING: f64 = 9.0;
+pub const SURPRISING_NIS: f64 = 9.0;
 
 /// A filter with the learned correction of its strain. Everything else that it says is the filter's.
 ///
@@ -139,7 +139,7 @@ impl Corrected {
 fn seen(output: &Output, reading: Option<Reading<f64>>) -> Option<Reading<f64>> {
     let is_seen = match output.verdict {
         ReadingVerdict::Accepted | ReadingVerdict::Readmitted => true,
-        ReadingVerdict::Downweighted => output.nis.is_none_or(|nis| nis <= SURPRISING),
+        ReadingVerdict::Downweighted => output.nis.is_none_or(|nis| nis <= SURPRISING_NIS),
         _ => false,
     };
     reading.filter(|reading| is_seen && reading.value.is_finite())

@@ -64,6 +64,7 @@ pub use baselines::{Baseline, Baselines, Features, Fir, LeakyBank, LowPassMode, 
 pub use bootstrap::{Bootstrap, bootstrap_law};
 pub use build_filter::{PARTICLE_SEED, build_filter};
 pub use calibrate::{Calibration, Stage, calibrate};
+pub use corrected::SURPRISING_NIS;
 pub use correction_params::{CorrectionParams, CorrectorParams, FUTURE_FEATURES, TrainingRow};
 pub use error::CalibrationError;
 pub use error_budget::{ErrorBudget, Limit};

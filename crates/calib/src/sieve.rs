@@ -23,9 +23,11 @@ pub(crate) struct Repeats {
     last_s: f64,
 }
 
-/// By how many ranges of the calibration's readings, and by what factor, a reading may lie outside of them: drift and strains
-/// that were not calibrated for do not change a resistance tenfold, an open circuit or a meter's overload does.
-const OUTSIDE: f64 = 10.0;
+/// By what factor a reading may lie outside of the calibration's, and by how many ranges of them above: another day, drift
+/// and strains that were not calibrated for do not double a resistance; a bad contact or a meter's overload does. No limit is set
+/// to the step from one reading to the next: a filter that takes surprising readings with less weight does as well without one
+/// against spikes, and better against what lasts, which such a limit has to let in after a while.
+const OUTSIDE: f64 = 2.0;
 /// A number that has come again for so many times the longest repetition in calibration, and so often, is stuck.
 const LONGER: f64 = 3.0;
 const MOST_REPEATS: u32 = 10;

@@ -103,11 +103,7 @@ impl<E: Estimator<f64, N, L>, const N: usize, const L: usize> Stepper<E, N, L> {
         time_s: f64,
         reading: Option<Reading<f64>>,
     ) -> Result<(), StepError> {
-        if !self.guard.is_none() {
-            (*now, _) = self.advance(now, time_s, reading)?;
-            return Ok(());
-        }
-        let mut repeats = now.repeats;
+        let (came, mut repeats) = (reading, now.repeats);
         let (reading, decided) = self.sieved(&mut repeats, time_s, reading);
         let prepared = self.prepared.of(now.seconds_until(time_s), |dt_s| self.estimator.prepare(dt_s))?;
         let next = self.next.get_or_insert_with(|| Box::new(now.state.clone()));
@@ -120,8 +116,15 @@ impl<E: Estimator<f64, N, L>, const N: usize, const L: usize> Stepper<E, N, L> {
                 (taken?, decided.unwrap_or(verdict))
             }
         };
+        if innovation.is_some_and(|innovation| !self.guard.takes_whole(innovation.nis())) {
+            (*now, _) = self.advance(now, time_s, came)?;
+            return Ok(());
+        }
         now.repeats = repeats;
         now.time_s = Some(time_s);
+        if reading.is_some() && verdict == ReadingVerdict::Accepted {
+            now.streak = Streak::default();
+        }
         now.state.clone_from(next);
         now.seen = Seen { innovation, verdict };
         Ok(())

@@ -29,6 +29,13 @@ pub enum Influence<T> {
         /// In standard deviations; 1.345 costs 5 % of efficiency on Gaussian readings.
         threshold: T,
     },
+    /// As much as the gain says up to `threshold` standard deviations; beyond, the less the farther: an innovation of z moves the
+    /// state by threshold²/z. Costs nothing where nothing surprises, and what is far away counts for next to nothing. Of the
+    /// redescending kind (Hampel, *J. Am. Stat. Assoc.* 69 (1974) 383), with the tail of Student's t.
+    Redescending {
+        /// In standard deviations.
+        threshold: T,
+    },
     /// As if innovations followed Student's t: the weight `(ν + 1)/(ν + NIS)` falls toward zero for large ones (Lange,
     /// Little, Taylor, *J. Am. Stat. Assoc.* 84 (1989) 881), and never exceeds one.
     StudentT {
@@ -110,7 +117,7 @@ impl<T: Scalar> Guard<T> {
     pub fn with_influence(self, influence: Influence<T>) -> Result<Self, ParameterError> {
         let (name, value) = match influence {
             Influence::Full => return Ok(Self { influence, ..self }),
-            Influence::Huber { threshold } => ("threshold", threshold),
+            Influence::Huber { threshold } | Influence::Redescending { threshold } => ("threshold", threshold),
             Influence::StudentT { degrees_of_freedom } => ("degrees_of_freedom", degrees_of_freedom),
         };
         if !(value > T::zero()) {
@@ -123,6 +130,12 @@ impl<T: Scalar> Guard<T> {
     #[must_use]
     pub fn is_none(&self) -> bool {
         !self.gate.is_finite() && self.influence == Influence::Full
+    }
+
+    /// Whether a reading with this normalised innovation squared is taken as it is.
+    #[must_use]
+    pub fn takes_whole(&self, nis: T) -> bool {
+        nis >= T::zero() && nis <= self.gate && self.influence.weight(nis) >= T::one()
     }
 
     /// A step of `estimator` under guard.
@@ -210,7 +223,8 @@ impl<T: Scalar> Influence<T> {
         match *self {
             Self::Full => T::one(),
             Self::Huber { threshold } if nis > threshold * threshold => threshold / nis.sqrt(),
-            Self::Huber { .. } => T::one(),
+            Self::Redescending { threshold } if nis > threshold * threshold => threshold * threshold / nis,
+            Self::Huber { .. } | Self::Redescending { .. } => T::one(),
             Self::StudentT { degrees_of_freedom } => {
                 ((degrees_of_freedom + T::one()) / (degrees_of_freedom + nis)).min(T::one())
             }

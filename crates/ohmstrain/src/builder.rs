@@ -9,6 +9,9 @@ use crate::{Error, Estimate, Filter, LaggedFilter, Reading, Sensor};
 
 /// How many readings in a row a gate turns down before it is the state that is doubted.
 const PATIENCE: u32 = 10;
+/// What a surprising reading may do unless somebody says otherwise. On five public recordings of two materials it costs at most
+/// one hundredth of the error where nothing is wrong (Student's t with four degrees of freedom costs a tenth on two of them).
+pub(crate) const INFLUENCE: Influence<f64> = Influence::Redescending { threshold: 3.0 };
 /// How far beyond the limits a strain may be that somebody knows, in spans.
 pub(crate) const KNOWN_BEYOND: f64 = 0.1;
 
@@ -49,7 +52,7 @@ impl<'a> FilterBuilder<'a> {
             rest_resistance: None,
             initial_strain: None,
             gate: None,
-            influence: Influence::Full,
+            influence: INFLUENCE,
         }
     }
 
@@ -122,14 +125,15 @@ impl<'a> FilterBuilder<'a> {
         Self { gate: Some(nis), ..self }
     }
 
-    /// Bounds the influence of surprising readings.
+    /// How surprising readings are taken: the less the farther beyond three standard deviations, unless said otherwise.
+    /// [`Influence::Full`] takes every one as it is.
     ///
     /// ```
     /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
     /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
     /// use ohmstrain::Influence;
     ///
-    /// let robust = sensor.filter().influence(Influence::StudentT { degrees_of_freedom: 4.0 }).build()?;
+    /// let trusting = sensor.filter().influence(Influence::Full).build()?;
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     #[must_use]

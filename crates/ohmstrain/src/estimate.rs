@@ -1,4 +1,4 @@
-use ohmstrain_calib::{Output, Quantity, SensorParams};
+use ohmstrain_calib::{Output, Quantity, SURPRISING_NIS, SensorParams};
 use ohmstrain_ekf::{Gaussian, ReadingVerdict};
 use ohmstrain_model::Joint;
 use serde::ser::SerializeStruct;
@@ -185,11 +185,12 @@ impl Scale {
 
     fn flags(&self, reading: Reading, output: &Output) -> Flags {
         let (strain, verdict) = (output.estimate.strain.mean, output.verdict);
+        let surprising = output.nis.is_none_or(|nis| nis > SURPRISING_NIS);
         Flags::NONE
             .with(Flag::Missing, reading.value.is_nan() && !reading.saturated)
             .with(Flag::Saturated, reading.saturated)
             .with(Flag::Rejected, verdict == ReadingVerdict::Rejected)
-            .with(Flag::Downweighted, verdict == ReadingVerdict::Downweighted)
+            .with(Flag::Downweighted, verdict == ReadingVerdict::Downweighted && surprising)
             .with(Flag::Implausible, verdict == ReadingVerdict::Implausible || reading.value.is_infinite())
             .with(Flag::Stuck, verdict == ReadingVerdict::Stuck)
             .with(Flag::Readmitted, verdict == ReadingVerdict::Readmitted)

@@ -28,7 +28,7 @@ pub enum Flag {
     Saturated,
     /// A gate, or the numbers, turned the reading down.
     Rejected,
-    /// The reading was taken with less weight.
+    /// The reading was surprising, by three standard deviations or more, and taken with less weight.
     Downweighted,
     /// Nothing that this sensor can read; it was not taken.
     Implausible,

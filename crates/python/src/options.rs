@@ -60,14 +60,18 @@ pub fn estimator(name: &str) -> PyResult<Option<EstimatorKind>> {
 }
 
 fn influence(text: &str) -> PyResult<Influence<f64>> {
+    if text == "none" {
+        return Ok(Influence::Full);
+    }
     let parsed = text.split_once(':').and_then(|(kind, number)| {
         let number: f64 = number.parse().ok().filter(|number: &f64| number.is_finite() && *number > 0.0)?;
         match kind {
             "huber" => Some(Influence::Huber { threshold: number }),
+            "redescending" => Some(Influence::Redescending { threshold: number }),
             "student-t" => Some(Influence::StudentT { degrees_of_freedom: number }),
             _ => None,
         }
     });
-    let message = || format!("influence: expected huber:K or student-t:DOF with a positive number, found `{text}`");
+    let message = || format!("influence: expected none, or redescending:K, huber:K or student-t:DOF with a positive number, found `{text}`");
     parsed.ok_or_else(|| raise(&Place::default(), &message()))
 }

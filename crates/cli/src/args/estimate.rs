@@ -29,8 +29,9 @@ pub struct EstimateArgs {
     /// Turn down readings whose normalised innovation squared (column nis) is above X, ten in a row at most
     #[arg(long, value_name = "X", value_parser = positive)]
     pub gate: Option<f64>,
-    /// Bound the influence of surprising readings: huber:K (in standard deviations) or student-t:DOF
-    #[arg(long, value_name = "huber:K|student-t:DOF")]
+    /// How surprising readings are taken: redescending:K, the less the farther beyond K standard deviations, huber:K,
+    /// student-t:DOF, or none, as they are [default: redescending:3]
+    #[arg(long, value_name = "redescending:K|huber:K|student-t:DOF|none")]
     pub influence: Option<BoundedInfluence>,
     /// Overrides of the recording's metadata
     #[command(flatten)]
@@ -107,11 +108,16 @@ impl FromStr for BoundedInfluence {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let expected = || "expected huber:K or student-t:DOF with a positive number".to_string();
+        if text == "none" {
+            return Ok(Self(Influence::Full));
+        }
+        let expected =
+            || "expected none, or redescending:K, huber:K or student-t:DOF with a positive number".to_string();
         let (kind, number) = text.split_once(':').ok_or_else(expected)?;
         let number = positive(number).map_err(|_| expected())?;
         match kind {
             "huber" => Ok(Self(Influence::Huber { threshold: number })),
+            "redescending" => Ok(Self(Influence::Redescending { threshold: number })),
             "student-t" => Ok(Self(Influence::StudentT { degrees_of_freedom: number })),
             _ => Err(expected()),
         }

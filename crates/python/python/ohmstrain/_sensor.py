@@ -152,7 +152,8 @@ class Sensor:
         gate : float
             Turn down readings whose normalised innovation squared is above this, ten in a row at most.
         influence : str
-            Bound the influence of surprising readings: ``huber:K`` or ``student-t:DOF``.
+            How surprising readings are taken: ``redescending:K`` (``redescending:3`` by default), ``huber:K``,
+            ``student-t:DOF`` or ``none``, as they are.
         name, gauge_length_mm, front_end, joint
             What messages call the recording, and what stands above the header of a trace CSV.
 

@@ -1,0 +1,52 @@
+//! Readings that surprise a filter.
+
+use ohmstrain::{Estimate, Flag, Influence, Sensor};
+
+fn sensor() -> Sensor {
+    Sensor::from_toml(&std::fs::read_to_string("examples/sensor.toml").unwrap()).unwrap()
+}
+
+/// Twenty rows a second about one level with a noise of one ohm, of which `spike` changes one.
+fn estimates(influence: Option<Influence<f64>>, spike: Option<f64>) -> Vec<Estimate> {
+    let sensor = sensor();
+    let builder = sensor.filter();
+    let mut filter = influence.map_or(builder, |influence| builder.influence(influence)).build().unwrap();
+    let reading = |k: i32| match spike {
+        Some(ohm) if k == 200 => ohm,
+        _ => 2000.0 + f64::from(k % 3 - 1),
+    };
+    (0..400).map(|k| filter.step(0.05 * f64::from(k), reading(k)).unwrap()).collect()
+}
+
+/// A spike within twice the range of calibration reaches the filter.
+#[test]
+fn one_spike_does_not_outlive_a_second_unless_it_is_asked_to() {
+    let after = 221..400;
+    let farthest = |influence| {
+        let (clean, spiked) = (estimates(influence, None), estimates(influence, Some(3000.0)));
+        after.clone().map(|k| (spiked[k].strain - clean[k].strain).abs() / clean[k].strain_sd).fold(0.0, f64::max)
+    };
+    let (robust, full) = (farthest(None), farthest(Some(Influence::Full)));
+    assert!(robust < 0.5 && full > 2.0 * robust, "{robust} and {full} standard deviations");
+}
+
+#[test]
+fn what_surprises_is_flagged_and_nothing_else() {
+    let flagged = |rows: &[Estimate]| -> Vec<usize> {
+        (0..rows.len()).filter(|&k| rows[k].flags.has(Flag::Downweighted)).collect()
+    };
+    assert_eq!(flagged(&estimates(None, Some(3000.0)))[..1], [200]);
+    assert!(flagged(&estimates(Some(Influence::Full), Some(3000.0))).is_empty());
+}
+
+/// Zero, negative, a converter one code below its rail, an overload: none is taken, none ends the run.
+#[test]
+fn what_no_sensor_reads_is_as_good_as_missing() {
+    for ohm in [0.0, -1600.0, 1e-3, 10.2e6, 65535e3, 9.9e37, f64::INFINITY, f64::NEG_INFINITY] {
+        let (strange, missing) = (estimates(None, Some(ohm)), estimates(None, Some(f64::NAN)));
+        assert!(strange[200].flags.has(Flag::Implausible), "{ohm}: {}", strange[200].flags);
+        for (a, b) in strange.iter().zip(&missing) {
+            assert_eq!((a.strain, a.strain_sd), (b.strain, b.strain_sd), "{ohm} at {} s", a.time_s);
+        }
+    }
+}

@@ -1,0 +1,164 @@
+//! What a filter makes of faults: error, coverage, recovery and flags, before, during and after.
+
+use ohmstrain::{Estimate, FilterBuilder, Flag};
+use ohmstrain_bench_data::Trace;
+use ohmstrain_bench_data::faults::Episode;
+
+/// Time before a fault that the filter has to settle, of which the last third is scored, s.
+pub const BEFORE_S: f64 = 60.0;
+/// Time after a fault that is looked at, s.
+pub const AFTER_S: f64 = 60.0;
+/// A filter has recovered once its error stays within this share of the full scale of what it would have been.
+const RECOVERED: f64 = 0.03;
+/// Normal deviates that hold 95 %.
+const TWO_SIDED: f64 = 1.959_963_984_540_054;
+
+/// Rows that were scored together.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Score {
+    rows: f64,
+    squares: f64,
+    covered: f64,
+    flagged: f64,
+    silent: f64,
+}
+
+impl Score {
+    fn add(&mut self, row: &Estimate, truth: f64, full_scale: f64) {
+        let error = row.strain - truth;
+        let covered = error.abs() <= TWO_SIDED * row.strain_sd;
+        let flagged = is_flagged(row);
+        self.rows += 1.0;
+        self.squares += (error / full_scale).powi(2);
+        self.covered += f64::from(u8::from(covered));
+        self.flagged += f64::from(u8::from(flagged));
+        self.silent += f64::from(u8::from(!flagged && !covered));
+    }
+
+    /// Both together.
+    pub fn merge(&mut self, other: &Self) {
+        self.rows += other.rows;
+        self.squares += other.squares;
+        self.covered += other.covered;
+        self.flagged += other.flagged;
+        self.silent += other.silent;
+    }
+
+    /// Root mean squared error, percent of full scale.
+    #[must_use]
+    pub fn rmse(&self) -> f64 {
+        100.0 * (self.squares / self.rows).sqrt()
+    }
+
+    /// Rows whose 95 % interval holds the truth, percent.
+    #[must_use]
+    pub fn coverage(&self) -> f64 {
+        100.0 * self.covered / self.rows
+    }
+
+    /// Rows with a flag that says that something is wrong, percent.
+    #[must_use]
+    pub fn flagged(&self) -> f64 {
+        100.0 * self.flagged / self.rows
+    }
+
+    /// Rows whose interval does not hold the truth and that have no such flag, percent.
+    #[must_use]
+    pub fn silent(&self) -> f64 {
+        100.0 * self.silent / self.rows
+    }
+}
+
+/// Whether a row says that something is wrong with the reading, or with the use of the sensor.
+fn is_flagged(row: &Estimate) -> bool {
+    Flag::ALL.into_iter().any(|flag| row.flags.has(flag) && !matches!(flag, Flag::RampBorder | Flag::AtLimit))
+}
+
+/// What a filter makes of a fault.
+#[derive(Clone, Debug, Default)]
+pub struct Answer {
+    /// Settled rows before it.
+    pub before: Score,
+    /// While it lasts.
+    pub during: Score,
+    /// The first five seconds after it.
+    pub soon: Score,
+    /// Later ones.
+    pub later: Score,
+    /// Time after its end, s, at which each filter's error was the last time more than it would have been.
+    pub recovery_s: Vec<f64>,
+}
+
+impl Answer {
+    /// Episodes that were over within five seconds of the fault's end, percent.
+    #[must_use]
+    pub fn recovered(&self) -> f64 {
+        let soon = self.recovery_s.iter().filter(|seconds| **seconds <= 5.0).count();
+        100.0 * soon as f64 / self.recovery_s.len() as f64
+    }
+
+    /// The longest recovery, s.
+    #[must_use]
+    pub fn slowest_s(&self) -> f64 {
+        self.recovery_s.iter().copied().fold(0.0, f64::max)
+    }
+}
+
+/// Estimates row by row, with the true strain; rows that the filter refuses are left out.
+fn estimates(builder: FilterBuilder, trace: &Trace) -> Vec<(Estimate, f64)> {
+    let Ok(mut filter) = builder.build() else { return Vec::new() };
+    let strain = trace.reference.as_ref().map(|reference| &reference.values);
+    let truth = |row: usize| strain.map_or(f64::NAN, |strain| strain[row]);
+    let step = |row: usize| Some((filter.step(trace.time_s[row], trace.readings.values[row]).ok()?, truth(row)));
+    (0..trace.len()).filter_map(step).collect()
+}
+
+/// Puts a fault into a recording at some times and adds up what the filter says.
+pub fn answer(
+    builder: FilterBuilder,
+    trace: &Trace,
+    (episode, onsets_s): (Episode, &[f64]),
+    full_scale: f64,
+) -> Answer {
+    let mut answer = Answer::default();
+    let lasts_s = episode.until_s - episode.from_s;
+    for (k, &from_s) in onsets_s.iter().enumerate() {
+        let until_s = from_s + lasts_s;
+        let part = trace.since(from_s - BEFORE_S).until(until_s + AFTER_S);
+        let episode = Episode { from_s, until_s, seed: episode.seed + k as u64, ..episode };
+        let faulty = estimates(builder, &episode.put_into(&part));
+        let clean = estimates(builder, &part);
+        // A clock that is off does not end when the fault should.
+        let rows = |time_s: f64| part.time_s.partition_point(|time| *time < time_s);
+        let end_s =
+            faulty.get(rows(until_s) + faulty.len() - part.len().min(faulty.len())).map_or(until_s, |row| row.0.time_s);
+        let mut recovery_s = 0.0;
+        for (row, truth) in faulty.iter().filter(|row| row.1.is_finite()) {
+            let time_s = row.time_s;
+            let score = if time_s < from_s - BEFORE_S / 3.0 {
+                continue;
+            } else if time_s < from_s {
+                &mut answer.before
+            } else if time_s < end_s {
+                &mut answer.during
+            } else if time_s < end_s + 5.0 {
+                &mut answer.soon
+            } else {
+                &mut answer.later
+            };
+            score.add(row, *truth, full_scale);
+        }
+        for ((row, truth), (without, same)) in faulty.iter().rev().zip(clean.iter().rev()) {
+            if row.time_s < end_s {
+                break;
+            }
+            let worse = (row.strain - truth).abs() - (without.strain - same).abs();
+            if worse > RECOVERED * full_scale {
+                recovery_s = row.time_s - end_s;
+                break;
+            }
+        }
+        answer.recovery_s.push(recovery_s);
+    }
+    answer
+}
