@@ -1,10 +1,8 @@
 //! The simulated sensors do what was published about real ones.
 
-mod common;
-
 use std::fmt::Write as _;
 
-use common::{Bench, Curve, LongHold};
+use crate::common::{Bench, Curve, LongHold};
 use ohmstrain_bench_data::simulate::{Material, Protocol};
 
 const MATCHED: [Bench; 3] = [
@@ -157,7 +155,7 @@ fn residual(values: &[f64], basis: &[&Vec<f64>]) -> f64 {
     (dot(&rest, &rest) / values.len() as f64).sqrt()
 }
 
-/// `OHMSTRAIN_UPDATE=1 cargo test -p ohmstrain-bench-data --test findings` writes the table anew.
+/// `OHMSTRAIN_UPDATE=1 cargo test -p ohmstrain-bench-data --test all findings::` writes the table anew.
 #[test]
 fn the_table_in_the_documentation_is_what_the_simulator_does() {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/preset-findings.md");

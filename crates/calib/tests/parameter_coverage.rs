@@ -1,7 +1,7 @@
 //! How often the intervals of a law's parameters hold the parameters that made the recording.
 //!
 //! The table in `docs/parameter-coverage.md` comes from
-//! `cargo test --release -p ohmstrain-calib --test parameter_coverage -- --ignored --nocapture`.
+//! `cargo test --release -p ohmstrain-calib --test all parameter_coverage:: -- --ignored --nocapture`.
 
 use std::f64::consts::TAU;
 

@@ -1,10 +1,7 @@
 //! Whatever is wrong with an input: one line that says where, what was expected and what was found; no panic, no half
 //! file, no half row.
 
-#[allow(dead_code, reason = "each test program uses its own share")]
-mod common;
-
-use common::{Bench, change_rows};
+use crate::common::{Bench, change_rows};
 
 /// Exit code for the contents of an input.
 const CONTENT: i32 = 4;

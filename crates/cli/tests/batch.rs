@@ -1,11 +1,8 @@
 //! Many recordings: what comes of each, what is done again, and what is refused.
 
-#[allow(dead_code, reason = "each test program uses its own share")]
-mod common;
-
 use std::fs;
 
-use common::Bench;
+use crate::common::Bench;
 
 /// Recordings of the same readings at other times, a sensor, and two files that are no recordings.
 fn folder() -> Bench {

@@ -2,11 +2,8 @@
 //! pointer, plots that can be enlarged; and figures that look as they did when a person last looked at them.
 //!
 //! Without Chromium they test nothing, and say so on stderr; with `OHMSTRAIN_REQUIRE_CHROMIUM=1`, as in `.ci/run`, they fail. After a wanted change of a
-//! figure: `OHMSTRAIN_FINGERPRINTS=DIR cargo test -p ohmstrain-cli --test browser` writes the pictures to DIR for somebody to
+//! figure: `OHMSTRAIN_FINGERPRINTS=DIR cargo test -p ohmstrain-cli --test all browser::` writes the pictures to DIR for somebody to
 //! look at, and the new fingerprints to `tests/fingerprints`.
-
-#[allow(dead_code, reason = "each test program uses its own share")]
-mod common;
 
 use std::env;
 use std::fs;
@@ -14,7 +11,7 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use common::Bench;
+use crate::common::Bench;
 
 /// Names under which Chromium goes.
 const NAMES: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "chrome"];
@@ -58,7 +55,7 @@ fn reported() -> Bench {
     let bench = Bench::new();
     // Not calibrated here: what is compared is how things are drawn.
     bench.write("sensor.toml", include_str!("../../ohmstrain/examples/sensor.toml"));
-    bench.run(&[&common::SIMULATE[..7], &["-o", "trace.csv"]].concat()).ok();
+    bench.run(&[&crate::common::SIMULATE[..7], &["-o", "trace.csv"]].concat()).ok();
     let flags = ["evaluate", "trace.csv", "--sensor", "sensor.toml", "--report", "report.html", "--figures", "figures"];
     bench.run(&flags).ok();
     bench
@@ -163,7 +160,7 @@ fn figures_look_as_they_did_when_somebody_looked() {
     let bench = reported();
     let pictures = env::var_os("OHMSTRAIN_FINGERPRINTS").map(PathBuf::from);
     let kept = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fingerprints");
-    let files = common::files_in(&bench.path("figures"));
+    let files = crate::common::files_in(&bench.path("figures"));
     for name in LOOKED_AT {
         let name =
             files.iter().find(|file| file.ends_with(&format!("-{name}.svg"))).unwrap_or_else(|| panic!("{name}"));

@@ -1,9 +1,6 @@
 //! What `calibrate` makes of recordings that are partly, or wholly, wrong.
 
-#[allow(dead_code, reason = "each test program uses its own share")]
-mod common;
-
-use common::{Bench, Run, SIMULATE, change_rows};
+use crate::common::{Bench, Run, SIMULATE, change_rows};
 
 /// Rows before this one calibrate, the others test.
 const HALF: usize = 1000;

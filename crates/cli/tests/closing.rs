@@ -1,9 +1,6 @@
 //! What `calibrate` says at its end.
 
-#[allow(dead_code, reason = "each test program uses its own share")]
-mod common;
-
-use common::{Bench, SIMULATE};
+use crate::common::{Bench, SIMULATE};
 use serde_json::Value;
 
 /// At most ten lines, none wider than a terminal, with every heading.

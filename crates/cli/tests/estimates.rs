@@ -1,9 +1,6 @@
 //! What `filter` and `smooth` print: columns, units, flags, and what the flags of the command line change.
 
-#[allow(dead_code, reason = "each test program uses its own share")]
-mod common;
-
-use common::{Bench, Csv, ESTIMATES_HEADER, SIMULATE, change_rows};
+use crate::common::{Bench, Csv, ESTIMATES_HEADER, SIMULATE, change_rows};
 use serde_json::Value;
 
 #[test]

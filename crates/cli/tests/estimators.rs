@@ -1,9 +1,6 @@
 //! Every estimator from the command line: calibrated, stored as the default, run, scored.
 
-#[allow(dead_code, reason = "each test program uses its own share")]
-mod common;
-
-use common::{Bench, Csv, SIMULATE};
+use crate::common::{Bench, Csv, SIMULATE};
 use serde_json::Value;
 
 /// A minute of calibration is little to learn from, and enough to see that everything is wired.

@@ -1,9 +1,6 @@
 //! `evaluate` that calibrates by itself: on the first rows of a recording, or on other recordings.
 
-#[allow(dead_code, reason = "each test program uses its own share")]
-mod common;
-
-use common::{Bench, CALIBRATED_UNTIL, Csv, SIMULATE, change_rows};
+use crate::common::{Bench, CALIBRATED_UNTIL, Csv, SIMULATE, change_rows};
 use serde_json::Value;
 
 /// The names of the baselines in JSON, sorted.

@@ -1,9 +1,6 @@
 //! What `calibrate --explain` and `--bootstrap` print.
 
-#[allow(dead_code, reason = "each test program uses its own share")]
-mod common;
-
-use common::{Bench, SIMULATE};
+use crate::common::{Bench, SIMULATE};
 
 #[test]
 fn calibrate_explains_itself_and_changes_nothing() {

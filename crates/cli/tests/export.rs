@@ -1,12 +1,9 @@
 //! What `export` writes, and that the C it writes computes what the program computes.
 
-#[allow(dead_code, reason = "each test program uses its own share")]
-mod common;
-
 use std::path::Path;
 use std::process::Command;
 
-use common::{Bench, Csv, files_in};
+use crate::common::{Bench, Csv, files_in};
 
 const EXPORT: [&str; 4] = ["export", "--sensor", "sensor.toml", "--dt-s"];
 /// Interval of the recordings of `SIMULATE`.

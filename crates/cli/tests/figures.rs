@@ -1,9 +1,6 @@
 //! Reports and figures of `evaluate` and `calibrate`.
 
-#[allow(dead_code, reason = "each test program uses its own share")]
-mod common;
-
-use common::{Bench, CALIBRATED_UNTIL, files_in};
+use crate::common::{Bench, CALIBRATED_UNTIL, files_in};
 
 #[test]
 fn evaluate_draws_the_part_that_is_scored() {
@@ -55,7 +52,7 @@ fn evaluate_draws_the_part_that_is_scored() {
 #[test]
 fn a_calibration_reports_in_sample_and_says_so() {
     let bench = Bench::new();
-    bench.run(&[&common::SIMULATE[..], &["-o", "trace.csv"]].concat()).ok();
+    bench.run(&[&crate::common::SIMULATE[..], &["-o", "trace.csv"]].concat()).ok();
     let flags = ["calibrate", "trace.csv", "--until", "60", "--estimator", "ekf", "-o", "sensor.toml"];
     bench.run(&[&flags[..], &["--report", "report.html", "--figures", "figures"]].concat()).ok();
     let report = bench.read("report.html");

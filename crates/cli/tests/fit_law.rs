@@ -1,9 +1,6 @@
 //! `fit-law`: what it prints for recordings whose law is known, and what it refuses.
 
-#[allow(dead_code, reason = "each test program uses its own share")]
-mod common;
-
-use common::Bench;
+use crate::common::Bench;
 
 /// Exit code for the contents of an input.
 const CONTENT: i32 = 4;
@@ -228,7 +225,7 @@ fn fits_come_as_csv_latex_and_figures() {
         latex.contains("\\begin{tabular}") && latex.contains("$\\pm$") && latex.ends_with("\\end{tabular}\n"),
         "{latex}"
     );
-    let files = common::files_in(&bench.path("figures"));
+    let files = crate::common::files_in(&bench.path("figures"));
     assert_eq!(
         files,
         ["01-eq8-eq9-extend-1-hold-2.csv", "01-eq8-eq9-extend-1-hold-2.pdf", "01-eq8-eq9-extend-1-hold-2.svg"]

@@ -1,9 +1,6 @@
 //! A hand of five fingers, simulated and calibrated one by one, then all of them in one recording; and what `plan` says.
 
-#[allow(dead_code, reason = "each test program uses its own share")]
-mod common;
-
-use common::{Bench, Csv};
+use crate::common::{Bench, Csv};
 
 const FINGERS: [&str; 5] = ["thumb", "index", "middle", "ring", "little"];
 /// A third of its length is what the simulated sensor is stretched by; that is 90° over 6.4 mm on 30 mm.
@@ -18,7 +15,7 @@ fn hand() -> (Bench, usize) {
     let mut description = String::from("format = 1\n");
     for (place, finger) in FINGERS.iter().enumerate() {
         let (seed, trace, sensor) = (format!("{}", place + 1), format!("{finger}.csv"), format!("{finger}.toml"));
-        bench.run(&[&common::SIMULATE[..7], &["--seed", &seed, "-o", &trace]].concat()).ok();
+        bench.run(&[&crate::common::SIMULATE[..7], &["--seed", &seed, "-o", &trace]].concat()).ok();
         bench.run(&["calibrate", &trace, "--until", "300", "-o", &sensor, "--estimator", "ekf", "--quiet"]).ok();
         description += &format!(
             "[[joints]]\nname = \"{finger}\"\ncolumn = \"{finger}_ohm\"\nsensor = \"{sensor}\"\njoint = \"{JOINT}\"\n"

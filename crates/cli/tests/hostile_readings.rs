@@ -1,9 +1,6 @@
 //! Readings that are none: overloads, unplugged and stuck sensors. No reading ends a run.
 
-#[allow(dead_code, reason = "each test program uses its own share")]
-mod common;
-
-use common::{Bench, Csv, change_rows};
+use crate::common::{Bench, Csv, change_rows};
 
 /// `trace.csv` with another resistance in some rows.
 fn with_resistance(bench: &Bench, name: &str, rows: std::ops::Range<usize>, resistance: &str) {

@@ -1,13 +1,10 @@
 //! Whatever `inspect --suggest` suggests, a shell runs, `import` accepts, and the trace has the numbers that the file was
 //! made of.
 
-#[allow(dead_code, reason = "each test program uses its own share")]
-mod common;
-
 use std::process::Command;
 
+use crate::common::{Bench, Csv};
 use assert_cmd::cargo::cargo_bin;
-use common::{Bench, Csv};
 use proptest::prelude::*;
 use proptest::sample::select;
 

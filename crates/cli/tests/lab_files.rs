@@ -1,13 +1,10 @@
 //! `inspect` and `import` as a shell runs them.
 
-#[allow(dead_code, reason = "each test program uses its own share")]
-mod common;
-
 use std::fmt::Write as _;
 use std::process::Command;
 
+use crate::common::{Bench, Csv, SIMULATE};
 use assert_cmd::cargo::cargo_bin;
-use common::{Bench, Csv, SIMULATE};
 
 /// Runs a line of shell in the bench's folder, with the program on its path; what was printed.
 #[track_caller]

@@ -1,9 +1,6 @@
 //! `live` in a terminal of its own, on a serial port that is the other end of a pseudo-terminal.
 #![cfg(unix)]
 
-#[allow(dead_code, reason = "each test program uses its own share")]
-mod common;
-
 use std::io::{Read, Write};
 use std::num::NonZero;
 use std::os::unix::fs::symlink;
@@ -12,8 +9,8 @@ use std::sync::{Arc, Mutex};
 use std::thread;
 use std::time::{Duration, Instant};
 
+use crate::common::{Bench, Csv};
 use assert_cmd::cargo::cargo_bin;
-use common::{Bench, Csv};
 use portable_pty::{Child, CommandBuilder, MasterPty, PtyPair, PtySize, native_pty_system};
 
 /// Longer than anything takes on a busy machine.

@@ -1,9 +1,6 @@
 //! How the program speaks: help, hints, how much it says, and what shells and manuals get.
 
-#[allow(dead_code, reason = "each test program uses its own share")]
-mod common;
-
-use common::{Bench, SIMULATE, files_in};
+use crate::common::{Bench, SIMULATE, files_in};
 
 const COMMANDS: [&str; 13] = [
     "demo",

@@ -1,9 +1,6 @@
 //! Files that commands write: what was there before is not lost, and a command that fails leaves everything as it was.
 
-#[allow(dead_code, reason = "each test program uses its own share")]
-mod common;
-
-use common::{Bench, SIMULATE};
+use crate::common::{Bench, SIMULATE};
 
 /// Exit codes for arguments and for files that cannot be written.
 const ARGUMENTS: i32 = 2;
@@ -129,7 +126,7 @@ fn a_command_that_fails_leaves_no_folder_behind() {
     bench.write("half/README.md", "Mine");
     let c = ["export", "--sensor", "sensor.toml", "--target", "c", "--dt-s", "0.2", "-o", "half"];
     refused(&bench, &c, ARGUMENTS, "cannot write half/README.md: ");
-    assert_eq!(common::files_in(&bench.path("half")), ["README.md"]);
+    assert_eq!(crate::common::files_in(&bench.path("half")), ["README.md"]);
 }
 
 #[cfg(unix)]
@@ -184,7 +181,7 @@ mod on_unix {
             assert!(fs::symlink_metadata(bench.path("link.toml")).unwrap().is_symlink());
             assert!(bench.read("folder/there.toml").starts_with("format = "));
         }
-        assert_eq!(common::files_in(&bench.path("folder")), ["there.toml"]);
+        assert_eq!(crate::common::files_in(&bench.path("folder")), ["there.toml"]);
     }
 
     #[test]

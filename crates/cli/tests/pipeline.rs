@@ -1,11 +1,8 @@
 //! From a recording to a report: what the program promises when nothing is wrong.
 
-#[allow(dead_code, reason = "each test program uses its own share")]
-mod common;
-
 use std::fs;
 
-use common::{Bench, CALIBRATED_UNTIL, Csv, ESTIMATES_HEADER, SIMULATE, files_in};
+use crate::common::{Bench, CALIBRATED_UNTIL, Csv, ESTIMATES_HEADER, SIMULATE, files_in};
 use serde_json::Value;
 
 /// Share of the limits within which 95 % of a normal distribution lies.

@@ -1,11 +1,8 @@
 //! `refine`: the noise of readings found again from a start that is off, and what it refuses.
 
-#[allow(dead_code, reason = "each test program uses its own share")]
-mod common;
-
 use std::fmt::Write;
 
-use common::{Bench, Run};
+use crate::common::{Bench, Run};
 use ohmstrain_bench_data::simulate::{Disturbances, Material, Protocol, SimulationSettings, simulate};
 use ohmstrain_calib::{
     BranchParams, EstimatorKind, GaugeParams, LawParams, MotionParams, NoiseParams, RangeParams, SensorParams,

@@ -1,9 +1,6 @@
 //! Whatever one number of a sensor file is changed to: it is refused by its name, or every number that comes out is one.
 
-#[allow(dead_code, reason = "each test program uses its own share")]
-mod common;
-
-use common::{Bench, Csv, change_rows};
+use crate::common::{Bench, Csv, change_rows};
 use toml::Value;
 
 /// What a number is changed to.

@@ -1,16 +1,13 @@
 //! Recordings as they arrive: row in, row out.
 
-#[allow(dead_code, reason = "each test program uses its own share")]
-mod common;
-
 use std::io::{BufRead, BufReader, ErrorKind, Write};
 use std::process::{Child, ChildStdin, Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 use std::thread;
 use std::time::Duration;
 
+use crate::common::{Bench, Csv, ESTIMATES_HEADER, Run};
 use assert_cmd::cargo::cargo_bin;
-use common::{Bench, Csv, ESTIMATES_HEADER, Run};
 
 /// Far more than a row needs on any machine; less than anybody waits for a test that hangs.
 const PATIENCE: Duration = Duration::from_secs(20);

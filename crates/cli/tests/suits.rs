@@ -1,9 +1,6 @@
 //! Files and arguments that cannot be meant for the sensor: a question that says how to answer it, not an estimate.
 
-#[allow(dead_code, reason = "each test program uses its own share")]
-mod common;
-
-use common::{Bench, CALIBRATED_UNTIL, Csv, change_rows};
+use crate::common::{Bench, CALIBRATED_UNTIL, Csv, change_rows};
 use serde_json::Value;
 
 const SENSOR: [&str; 2] = ["--sensor", "sensor.toml"];

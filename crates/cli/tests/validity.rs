@@ -1,9 +1,6 @@
 //! Warnings where a sensor file is used outside of what its calibration has seen.
 
-#[allow(dead_code, reason = "each test program uses its own share")]
-mod common;
-
-use common::{Bench, CALIBRATED_UNTIL, SIMULATE, change_rows};
+use crate::common::{Bench, CALIBRATED_UNTIL, SIMULATE, change_rows};
 
 /// `trace.csv` and a sensor calibrated on its first rows, `seen.csv`.
 fn calibrated() -> Bench {
