@@ -61,6 +61,7 @@ fn sensor() -> SensorParams {
         rest_reading: 1.0,
         measured_rest: None,
         default_estimator: EstimatorKind::Ekf,
+        summary: None,
         limits,
         validity: Validity {
             lower: 0.0,

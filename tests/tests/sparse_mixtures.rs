@@ -1,11 +1,17 @@
 //! The sparse filters of hypotheses compute what the generic ones compute.
 
+mod apart;
+mod pairs;
+
 use ohmstrain_ekf::{
-    Belief, Dwell, Dynamics, Evidence, Gaussian, Hypotheses, Imm, Mixture, MixtureResidual, MixtureStep, PhaseMixture,
-    Reading, Real, SignSplit, SparseHypotheses, SparseImm, SparseMixture, SparseSignSplit, State, StepError,
+    Belief, Dwell, Evidence, Gaussian, Mixture, PhaseMixture, Reading, Real, SparseHypotheses, SparseImm,
+    SparseMixture, SparseSignSplit, State, StepError,
 };
 use ohmstrain_model::{Phase, StrainRange, SwitchedModel};
 use ohmstrain_tests::sensor;
+
+use apart::Apart;
+use pairs::{Histories, Imms, Pair, Splits};
 
 const DT_S: f64 = 0.01;
 const STEPS: usize = 3000;
@@ -26,197 +32,6 @@ fn dwell<T: Real>() -> Dwell<T> {
     Dwell::new(T::of(5.0), T::of(1.0), T::of(0.3)).unwrap()
 }
 
-/// A sparse filter and its generic counterpart.
-trait Pair<T: Real, const N: usize, const L: usize, const K: usize> {
-    type State: State<T, N, L> + Into<Mixture<T, N, L, K>>;
-    fn sparse(&self, state: &mut Self::State, reading: Option<Reading<T>>) -> Option<MixtureResidual<T>>;
-    fn generic(&self, from: &Mixture<T, N, L, K>, reading: Option<Reading<T>>) -> MixtureStep<T, N, L, K>;
-}
-
-struct Imms<T, const B: usize, const N: usize> {
-    sparse: SparseImm<T, B, N>,
-    generic: Imm<T, SwitchedModel<T, 2, B, N>>,
-}
-
-impl<T: Real, const B: usize, const N: usize> Imms<T, B, N> {
-    fn new(model: SwitchedModel<T, 2, B, N>, tempering: f64) -> Self {
-        let (dt_s, evidence) = (T::of(DT_S), evidence(tempering));
-        let sparse = SparseImm::new(model, dt_s, dwell(), evidence).unwrap();
-        Self { sparse, generic: Imm::new(model, dwell(), evidence) }
-    }
-}
-
-impl<T: Real, const B: usize, const N: usize, const L: usize> Pair<T, N, L, 3> for Imms<T, B, N> {
-    type State = PhaseMixture<T, N, L>;
-
-    fn sparse(&self, state: &mut Self::State, reading: Option<Reading<T>>) -> Option<MixtureResidual<T>> {
-        self.sparse.step(state, reading).unwrap()
-    }
-
-    fn generic(&self, from: &Mixture<T, N, L, 3>, reading: Option<Reading<T>>) -> MixtureStep<T, N, L, 3> {
-        let prepared = Dynamics::<T, N, L>::prepare(self.generic.model(), T::of(DT_S));
-        self.generic.step_prepared(from, &prepared, T::of(DT_S), reading).unwrap()
-    }
-}
-
-struct Splits<T, const B: usize, const N: usize, const K: usize> {
-    sparse: SparseSignSplit<T, B, N, K>,
-    generic: SignSplit<T, SwitchedModel<T, 2, B, N>, K>,
-}
-
-impl<T: Real, const B: usize, const N: usize, const K: usize> Splits<T, B, N, K> {
-    fn new(model: SwitchedModel<T, 2, B, N>, hold: Option<Dwell<T>>, tempering: f64) -> Self {
-        let (dt_s, evidence) = (T::of(DT_S), evidence(tempering));
-        let sparse = SparseSignSplit::new(model, dt_s, hold, evidence).unwrap();
-        Self { sparse, generic: SignSplit::new(model, hold, evidence) }
-    }
-}
-
-impl<T: Real, const B: usize, const N: usize, const L: usize, const K: usize> Pair<T, N, L, K> for Splits<T, B, N, K> {
-    type State = SparseMixture<T, N, L, K>;
-
-    fn sparse(&self, state: &mut Self::State, reading: Option<Reading<T>>) -> Option<MixtureResidual<T>> {
-        self.sparse.step(state, reading).unwrap()
-    }
-
-    fn generic(&self, from: &Mixture<T, N, L, K>, reading: Option<Reading<T>>) -> MixtureStep<T, N, L, K> {
-        let prepared = Dynamics::<T, N, L>::prepare(self.generic.model(), T::of(DT_S));
-        self.generic.step_prepared(from, &prepared, T::of(DT_S), reading).unwrap()
-    }
-}
-
-struct Histories<T, const B: usize, const N: usize, const K: usize> {
-    sparse: SparseHypotheses<T, B, N, K>,
-    generic: Hypotheses<T, SwitchedModel<T, 2, B, N>, K>,
-}
-
-impl<T: Real, const B: usize, const N: usize, const K: usize> Histories<T, B, N, K> {
-    fn new(model: SwitchedModel<T, 2, B, N>, tempering: f64) -> Self {
-        let (dt_s, evidence) = (T::of(DT_S), evidence(tempering));
-        let sparse = SparseHypotheses::new(model, dt_s, dwell(), evidence).unwrap();
-        Self { sparse, generic: Hypotheses::new(model, dwell(), evidence) }
-    }
-}
-
-impl<T: Real, const B: usize, const N: usize, const L: usize, const K: usize> Pair<T, N, L, K>
-    for Histories<T, B, N, K>
-{
-    type State = SparseMixture<T, N, L, K>;
-
-    fn sparse(&self, state: &mut Self::State, reading: Option<Reading<T>>) -> Option<MixtureResidual<T>> {
-        self.sparse.step(state, reading).unwrap()
-    }
-
-    fn generic(&self, from: &Mixture<T, N, L, K>, reading: Option<Reading<T>>) -> MixtureStep<T, N, L, K> {
-        let prepared = Dynamics::<T, N, L>::prepare(self.generic.model(), T::of(DT_S));
-        self.generic.step_prepared(from, &prepared, T::of(DT_S), reading).unwrap()
-    }
-}
-
-/// The largest differences of a run.
-#[derive(Debug, Default)]
-struct Apart {
-    /// Of means in deviations of the prediction in the same phase, of covariances relative to its diagonals.
-    belief: f64,
-    /// The same of the mixture as a whole.
-    whole: f64,
-    /// Whether hypotheses are not compared one by one.
-    whole_only: bool,
-    /// Of probabilities, and of logarithms of the density of the reading.
-    weight: f64,
-    density: f64,
-    /// Of the innovation in deviations, and of its variance relative to itself.
-    innovation: f64,
-    /// How many hypotheses there were at most.
-    hypotheses: usize,
-}
-
-fn number<T: Real>(x: T) -> f64 {
-    x.to_subset().unwrap_or(f64::NAN)
-}
-
-fn larger(most: &mut f64, apart: f64) {
-    // A NaN must not hide behind `max`.
-    *most = if apart.is_nan() || apart > *most { apart } else { *most };
-}
-
-/// The largest deviations that a phase predicts; the whole mixture's if none of its hypotheses counts without a reading.
-fn deviations<T: Real, const N: usize, const L: usize, const K: usize>(
-    prediction: &Mixture<T, N, L, K>,
-    phase: Phase,
-) -> [f64; N] {
-    let all = prediction.moments();
-    let mut most = [0.0_f64; N];
-    let of_phase = prediction.components().iter().filter(|component| component.phase == phase);
-    for belief in of_phase.map(|component| &component.belief).chain([&all]) {
-        for (i, most) in most.iter_mut().enumerate() {
-            *most = most.max(number(belief.covariance[(i, i)]).sqrt());
-        }
-    }
-    most
-}
-
-impl Apart {
-    fn add<T: Real, const N: usize, const L: usize, const K: usize>(
-        &mut self,
-        sparse: &Mixture<T, N, L, K>,
-        residual: Option<MixtureResidual<T>>,
-        generic: &MixtureStep<T, N, L, K>,
-        prediction: &Mixture<T, N, L, K>,
-    ) {
-        let (whole, of_whole) = (sparse.moments(), generic.posterior.moments());
-        let all = prediction.moments();
-        for i in 0..N {
-            let sd = number(all.covariance[(i, i)]).sqrt();
-            larger(&mut self.whole, number(whole.mean[i] - of_whole.mean[i]).abs() / sd);
-            larger(&mut self.whole, number(whole.covariance[(i, i)] - of_whole.covariance[(i, i)]).abs() / (sd * sd));
-        }
-        self.add_residual(residual, generic);
-        let of_generic = generic.posterior.components();
-        self.hypotheses = self.hypotheses.max(of_generic.len());
-        if self.whole_only {
-            return;
-        }
-        assert_eq!(sparse.components().len(), of_generic.len());
-        for (a, b) in sparse.components().iter().zip(of_generic) {
-            assert_eq!(a.phase, b.phase);
-            larger(&mut self.weight, number(a.log_weight.exp() - b.log_weight.exp()).abs());
-            let sd = deviations(prediction, a.phase);
-            for i in 0..N {
-                larger(&mut self.belief, number(a.belief.mean[i] - b.belief.mean[i]).abs() / sd[i]);
-                for j in 0..=i {
-                    let apart = number(a.belief.covariance[(i, j)] - b.belief.covariance[(i, j)]).abs();
-                    larger(&mut self.belief, apart / (sd[i] * sd[j]));
-                }
-            }
-        }
-    }
-
-    fn add_residual<T: Real, const N: usize, const L: usize, const K: usize>(
-        &mut self,
-        residual: Option<MixtureResidual<T>>,
-        generic: &MixtureStep<T, N, L, K>,
-    ) {
-        assert_eq!(residual.is_some(), generic.innovation.is_some());
-        if let (Some(of_sparse), Some(innovation)) = (residual, generic.innovation) {
-            let (residual, variance) = (of_sparse.residual, number(innovation.variance));
-            larger(&mut self.innovation, number(residual.innovation - innovation.value).abs() / variance.sqrt());
-            larger(&mut self.innovation, (number(residual.variance) / variance - 1.0).abs());
-            larger(&mut self.density, number(of_sparse.log_likelihood() - generic.log_likelihood).abs());
-        }
-    }
-
-    /// `rounding`: of the beliefs. A hypothesis that counts lies within √24 deviations of the reading (e⁻¹² of the best is
-    /// dropped), so that half its NIS, and with it its weight, is uncertain by that times the uncertainty of its innovation
-    /// in deviations; a variance of several hypotheses contains their squares. A merged hypothesis lies between distant ones
-    /// by their weights, and is uncertain by both.
-    fn check(&self, rounding: f64) {
-        let weighed = 24_f64.sqrt() * rounding;
-        assert!(self.belief < rounding + weighed && self.whole < rounding + weighed, "{self:?}");
-        assert!(self.weight < weighed && self.density < weighed && self.innovation < weighed, "{self:?}");
-    }
-}
-
 /// Every step from the same state; `on_its_own`, the generic filter goes its own way.
 fn differences<T: Real, P: Pair<T, N, L, K>, const N: usize, const L: usize, const K: usize>(
     pair: &P,
@@ -225,7 +40,7 @@ fn differences<T: Real, P: Pair<T, N, L, K>, const N: usize, const L: usize, con
 ) -> Apart {
     // In single precision which of two hypotheses is the nearer one may be decided by rounding. Whichever two are merged, mean
     // and covariance of all stay what they are.
-    let mut most = Apart { whole_only: size_of::<T>() < size_of::<f64>(), ..Apart::default() };
+    let mut most = Apart::new(size_of::<T>() < size_of::<f64>());
     let mut own: Mixture<T, N, L, K> = state.clone().into();
     for k in 0..STEPS {
         let from = if on_its_own { own } else { state.clone().into() };

@@ -57,6 +57,17 @@ impl Format {
     }
 }
 
+/// How estimates are written.
+#[derive(Debug, ClapArgs)]
+pub struct WrittenArgs {
+    /// Form of the estimates
+    #[arg(long, value_enum, default_value_t = Format::Csv)]
+    pub format: Format,
+    /// Columns to write, separated by commas; all by default
+    #[arg(long, value_delimiter = ',')]
+    pub columns: Vec<String>,
+}
+
 /// Flags of `filter`.
 #[derive(Debug, ClapArgs)]
 pub struct FilterArgs {
@@ -73,12 +84,9 @@ pub struct FilterArgs {
     /// Go on after lines that are none of a trace, as serial lines bring; they are counted on stderr
     #[arg(long)]
     pub skip_bad: bool,
-    /// Form of the estimates
-    #[arg(long, value_enum, default_value_t = Format::Csv)]
-    pub format: Format,
-    /// Columns to write, separated by commas; all by default
-    #[arg(long, value_delimiter = ',')]
-    pub columns: Vec<String>,
+    /// What to write
+    #[command(flatten)]
+    pub written: WrittenArgs,
     /// How to estimate
     #[command(flatten)]
     pub estimate: EstimateArgs,
@@ -89,12 +97,9 @@ pub struct FilterArgs {
 pub struct SmoothArgs {
     /// Recording, or - for stdin
     pub trace_file: PathBuf,
-    /// Form of the estimates
-    #[arg(long, value_enum, default_value_t = Format::Csv)]
-    pub format: Format,
-    /// Columns to write, separated by commas; all by default
-    #[arg(long, value_delimiter = ',')]
-    pub columns: Vec<String>,
+    /// What to write
+    #[command(flatten)]
+    pub written: WrittenArgs,
     /// How to estimate
     #[command(flatten)]
     pub estimate: EstimateArgs,

@@ -36,7 +36,7 @@ pub fn run(args: &FilterArgs) -> Result<(), CliError> {
         filter = Running::new(&sensor, args)?;
     }
     let out = io::BufWriter::with_capacity(WRITTEN_AT_ONCE, io::stdout());
-    let writer = EstimateWriter::new(out, args.format, columns(&sensor, &args.columns)?)?;
+    let writer = EstimateWriter::new(out, args.written.format, columns(&sensor, &args.written.columns)?)?;
     let live = is_stdin(&args.trace_file) || !args.trace_file.is_file();
     let watch = ValidityWatch::new(&sensor, None);
     let sink =

@@ -30,7 +30,7 @@ pub fn run(args: &SmoothArgs) -> Result<(), CliError> {
     suits::check_readings(&header, &sensor, rest, readings.values())?;
     let builder = builder(&sensor, &args.estimate);
     let builder = rest.map_or(builder, |measured| builder.rest_resistance(measured));
-    let columns = columns(&sensor, &args.columns)?;
+    let columns = columns(&sensor, &args.written.columns)?;
     let mut rates = vec![f32::NAN; readings.len()];
     let segments = smooth_into(Packed::new(columns.clone()), builder, &readings, &mut rates)
         .map_err(|error| error.named(&name))?;
@@ -43,7 +43,7 @@ pub fn run(args: &SmoothArgs) -> Result<(), CliError> {
         }
     }
     let out = BufWriter::with_capacity(WRITTEN_AT_ONCE, io::stdout());
-    let mut writer = EstimateWriter::new(out, args.format, columns)?;
+    let mut writer = EstimateWriter::new(out, args.written.format, columns)?;
     segments.write_in_order(&mut writer)?;
     writer.finish()
 }

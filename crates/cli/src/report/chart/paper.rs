@@ -1,0 +1,61 @@
+//! A plot by itself, for a paper.
+
+use super::{Chart, LEFT_PX, RIGHT_PX, TEXT_PX, UNITS_PER_PX};
+use crate::report::ReportError;
+use crate::report::ink::dashes;
+
+/// Space to the left of a drawing by itself, px: letters of the axis' label begin where it begins.
+const MARGIN_PX: f64 = 6.0;
+
+impl Chart {
+    /// The drawing by itself, with its legend, in the colours of paper, `width_mm` wide.
+    ///
+    /// # Errors
+    /// If the plotting library cannot draw it.
+    pub fn standalone(&self, title: &str, width_mm: f64) -> Result<String, ReportError> {
+        let drawing = self.svg(title)?;
+        let inside = drawing.split_once('>').map_or("", |(_, inside)| inside);
+        let units = f64::from(UNITS_PER_PX);
+        let (width, height) = (units * self.size_px.0, units * self.size_px.1);
+        let (legend, legend_height) = self.drawn_legend();
+        let (margin, whole) = (units * MARGIN_PX, height + legend_height);
+        let height_mm = width_mm * whole / (width + margin);
+        let (dashes, label) = (dashes(UNITS_PER_PX), minijinja::HtmlEscape(title));
+        Ok(format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" role=\"img\" aria-label=\"{label}\" width=\"{width_mm}mm\" \
+             height=\"{height_mm:.1}mm\" viewBox=\"-{margin} 0 {} {whole}\">\n<style>{dashes}polyline{{stroke-linejoin:round}}\
+             text{{font-family:Arial,Helvetica,sans-serif}}</style>\n<rect x=\"-{margin}\" width=\"{}\" height=\"{whole}\" \
+             fill=\"#fff\"/>\n{legend}<g transform=\"translate(0 {legend_height})\">{}</g>\n</svg>\n",
+            width + margin,
+            width + margin,
+            inside.trim_end().trim_end_matches("</svg>")
+        ))
+    }
+
+    /// The legend in drawing units, and its height.
+    fn drawn_legend(&self) -> (String, f64) {
+        let units = f64::from(UNITS_PER_PX);
+        let (sample, gap, row, size) = (26.0 * units, 8.0 * units, 19.0 * units, TEXT_PX * units);
+        let (mut x, mut y) = (LEFT_PX * units, row);
+        let mut drawn = String::new();
+        for key in &self.legend {
+            // Letters are half as wide as high, on average.
+            let width = sample + 2.0 * gap + 0.52 * size * key.name.chars().count() as f64;
+            if x > LEFT_PX * units && x + width > (self.size_px.0 - RIGHT_PX) * units {
+                (x, y) = (LEFT_PX * units, y + row);
+            }
+            let (line, text) = (y - 0.35 * size, x + sample + gap);
+            drawn += &format!(
+                "<line x1=\"{x}\" x2=\"{}\" y1=\"{line}\" y2=\"{line}\" stroke=\"{}\" stroke-width=\"{}\" opacity=\"{}\"/>\
+                 <text x=\"{text}\" y=\"{y}\" font-size=\"{size}\" fill=\"#404040\">{}</text>\n",
+                x + sample,
+                key.hex,
+                key.width * units,
+                key.opacity,
+                minijinja::HtmlEscape(&key.name)
+            );
+            x += width + gap;
+        }
+        (drawn, if self.legend.is_empty() { 0.0 } else { y + 0.5 * row })
+    }
+}
