@@ -4,7 +4,9 @@ use ohmstrain_ekf::{
     Belief, Compact, Dwell, Ekf, Estimator, Evidence, Gaussian, Guard, Hypotheses, Influence, Mixture, Reading,
     ReadingVerdict, SignSplit, SparseEkf, SparseMixture, SparseSignSplit, Streak,
 };
-use ohmstrain_model::{Branch, Gauge, ModelNoise, Motion, Phase, Scalar, SensorLaw, StrainRange, SwitchedModel};
+use ohmstrain_model::{
+    Branch, Gauge, ModelNoise, Motion, Phase, Scalar, SensorLaw, StrainRange, SwitchedModel, Symmetric,
+};
 
 const DT_S: f64 = 0.02;
 
@@ -109,38 +111,35 @@ impl Draws {
     }
 }
 
-fn random_model(draws: &mut Draws) -> (SwitchedModel<f32, 2, 2, 5>, f32) {
+/// A model and the length of its steps, s; the same numbers in either precision. `quiet`: what is
+/// multiplied with its noise, and with all that makes a reading depend on more than the strain.
+fn random_model<T: Scalar>(draws: &mut Draws, quiet: f64) -> (SwitchedModel<T, 2, 2, 5>, T) {
+    let of = |number: f64| T::of(f64::from(number as f32));
+    let mut between = |low: f64, high: f64| of(draws.between(low, high));
     let mut branch = |low: f64, high: f64| Branch {
-        tau_s: draws.between(low, high) as f32,
-        extend_gain: draws.between(0.1, 2.0) as f32,
-        retract_gain: -draws.between(0.1, 2.0) as f32,
-        extend_gain_slope: draws.between(0.1, 4.0) as f32,
-        retract_gain_slope: -draws.between(0.1, 4.0) as f32,
+        tau_s: between(low, high),
+        extend_gain: between(0.1 * quiet, 2.0 * quiet),
+        retract_gain: -between(0.1 * quiet, 2.0 * quiet),
+        extend_gain_slope: between(0.1 * quiet, 4.0 * quiet),
+        retract_gain_slope: -between(0.1 * quiet, 4.0 * quiet),
     };
     let branches = [branch(0.5, 10.0), branch(10.0, 300.0)];
     let law = SensorLaw {
-        gauge: Gauge::Polynomial {
-            coefficients: [draws.between(0.3, 4.0) as f32, -draws.between(0.3, 8.0) as f32, 0.0],
-        },
-        extend_viscosity_s: draws.between(1e-3, 0.1) as f32,
-        retract_viscosity_s: -draws.between(1e-3, 0.1) as f32,
+        gauge: Gauge::Polynomial { coefficients: [between(0.3, 4.0), -between(0.3, 8.0), T::zero()] },
+        extend_viscosity_s: between(1e-3 * quiet, 0.1 * quiet),
+        retract_viscosity_s: -between(1e-3 * quiet, 0.1 * quiet),
         branches,
-        range: StrainRange { lower: 0.0, upper: 0.33 },
+        range: StrainRange { lower: T::zero(), upper: of(0.33) },
     };
-    let motion = Motion::ornstein_uhlenbeck(
-        draws.between(0.1, 5.0) as f32,
-        draws.between(0.01, 1.0) as f32,
-        0.15,
-        draws.between(0.05, 0.5) as f32,
-    )
-    .unwrap();
+    let motion =
+        Motion::ornstein_uhlenbeck(between(0.1, 5.0), between(0.01, 1.0), of(0.15), between(0.05, 0.5)).unwrap();
     let noise = ModelNoise {
-        reading_sd: draws.between(1e-6, 1e-3) as f32,
-        branch_sd: draws.between(1e-4, 0.05) as f32,
-        baseline_sd: draws.between(1e-3, 0.1) as f32,
-        baseline_time_s: draws.between(5.0, 500.0) as f32,
+        reading_sd: between(1e-6 * quiet, 1e-3 * quiet),
+        branch_sd: between(1e-4 * quiet, 0.05 * quiet),
+        baseline_sd: between(1e-3 * quiet, 0.1 * quiet),
+        baseline_time_s: between(5.0, 500.0),
     };
-    (SwitchedModel::new(law, motion, noise).unwrap(), draws.between(2e-3, 0.2) as f32)
+    (SwitchedModel::new(law, motion, noise).unwrap(), between(2e-3, 0.2))
 }
 
 /// A reading that single precision cannot take without a variance below zero must not lock the filter out: no reading that
@@ -150,7 +149,7 @@ fn single_precision_takes_precise_readings() {
     let mut draws = Draws(1);
     let (mut refused, mut steps, mut stuck) = (0, 0, 0);
     for _ in 0..4000 {
-        let (model, dt_s) = random_model(&mut draws);
+        let (model, dt_s) = random_model::<f32>(&mut draws, 1.0);
         let filter = SparseEkf::<f32, Compact, 2, 5>::new(model, dt_s).unwrap();
         let mut belief: Belief<f32, 5, 15> = Belief::initial(&model);
         let mut last_refused = 0;
@@ -170,6 +169,71 @@ fn single_precision_takes_precise_readings() {
     }
     assert_eq!((refused, stuck), (0, 0), "of {steps}");
 }
+
+fn wide(belief: &Belief<f32, 5, 15>) -> Belief<f64, 5, 15> {
+    let mean = belief.mean.map(f64::from);
+    let mut covariance = Symmetric::zeros();
+    for i in 0..5 {
+        for j in 0..=i {
+            covariance[(i, j)] = f64::from(belief.covariance[(i, j)]);
+        }
+    }
+    Belief { mean, covariance }
+}
+
+/// Largest difference of two beliefs: of means in the deviations of the prediction, of covariances relative to its diagonal.
+fn apart(a: &Belief<f64, 5, 15>, b: &Belief<f64, 5, 15>, prediction: &Belief<f64, 5, 15>) -> f64 {
+    let sd: [f64; 5] = std::array::from_fn(|i| prediction.covariance[(i, i)].sqrt());
+    let mean = (0..5).map(|i| (a.mean[i] - b.mean[i]).abs() / sd[i]);
+    let pairs = (0..5).flat_map(|i| (0..=i).map(move |j| (i, j)));
+    let covariance = pairs.map(|(i, j)| (a.covariance[(i, j)] - b.covariance[(i, j)]).abs() / (sd[i] * sd[j]));
+    mean.chain(covariance).fold(0.0, f64::max)
+}
+
+/// A reading that is too exact for single precision is taken again with more noise *from where the step began*: what comes out is
+/// a step in double precision, with the reading as it is or with sixteen times the noise, once or more often.
+#[test]
+fn a_reading_taken_again_is_taken_from_the_same_belief() {
+    let mut draws = Draws(1);
+    let (mut again, mut most) = (0, 0.0_f64);
+    for _ in 0..MODELS {
+        let (of_double, dt_s) = random_model::<f64>(&mut Draws(draws.0), QUIET);
+        let double = SparseEkf::<f64, Compact, 2, 5>::new(of_double, dt_s).unwrap();
+        let (model, dt_s) = random_model::<f32>(&mut draws, QUIET);
+        let filter = SparseEkf::<f32, Compact, 2, 5>::new(model, dt_s).unwrap();
+        let mut belief: Belief<f32, 5, 15> = Belief::initial(&model);
+        for k in 0..300 {
+            let strain = 0.15 + 0.1 * (0.7 * dt_s * k as f32).sin();
+            let value = model.law().gauge_value_and_slope(strain).0 + 1e-3 * (draws.uniform() as f32 - 0.5);
+            let (before, value) = (wide(&belief), f64::from(value));
+            let residual = filter.step(&mut belief, Some(Reading::from(value as f32))).unwrap().unwrap();
+            let step = |reading| {
+                let mut after = before;
+                double.step(&mut after, reading).unwrap();
+                after
+            };
+            let prediction = step(None);
+            // In units of what rounding leaves: of covariances ε, of a mean that of the reading in its deviations.
+            let unit = f64::from(f32::EPSILON) * (1.0 + 1.0 / f64::from(residual.variance).sqrt());
+            let apart = |extra_variance| {
+                apart(&wide(&belief), &step(Some(Reading { value, extra_variance })), &prediction) / unit
+            };
+            let variance = of_double.noise().reading_sd.powi(2) + f64::from(f32::EPSILON).powi(2);
+            let coarser = std::iter::successors(Some(0.0), |noise| Some(16.0 * (noise + variance))).take(13);
+            let (tries, least) = coarser.map(apart).enumerate().min_by(|a, b| a.1.total_cmp(&b.1)).unwrap();
+            again += usize::from(tries > 0 && apart(0.0) > ROUNDING);
+            most = most.max(least);
+        }
+    }
+    assert!(again > 0);
+    assert!(most < ROUNDING, "{most:e}");
+}
+
+/// Models, and how quiet they are: enough to meet such readings.
+const MODELS: usize = 400;
+const QUIET: f64 = 1e-5;
+/// Some thirty operations of a step, one after the other, on sums of up to ten terms.
+const ROUNDING: f64 = 300.0;
 
 #[test]
 fn what_limits_say_is_no_evidence_of_a_reading() {
