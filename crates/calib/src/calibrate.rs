@@ -20,6 +20,7 @@ use crate::rest::rest_share;
 use crate::samples::Samples;
 use crate::screen::{Distrusted, screen};
 use crate::sieve::{Sieve, longest_repeat_s};
+use crate::summary::Summary;
 
 /// What calibration is doing, for a progress bar.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -84,6 +85,7 @@ impl Calibration {
             rest_reading: rests[rests.len() / 2],
             measured_rest: self.rest_share.map(|share| share * rests[rests.len() / 2]),
             default_estimator: self.default_estimator,
+            summary: self.findings.as_ref().map(Summary::from),
             limits: self.limits,
             validity: self.validity,
             static_cubic: self.static_cubic,

@@ -1,4 +1,4 @@
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::design::central_rate;
 use crate::law_fit::CrossFit;
@@ -25,7 +25,8 @@ pub struct ErrorBudget {
 }
 
 /// What limits a filter.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Limit {
     /// The form of the law.
     Law,

@@ -56,6 +56,7 @@ mod sd_scale;
 mod sieve;
 mod sparse_estimator;
 mod stepper;
+mod summary;
 mod validate;
 mod way_back;
 
@@ -85,4 +86,5 @@ pub use samples::{Samples, SamplesError};
 pub use scores::{ScoredRow, Scores};
 pub use screen::{Distrusted, Doubt, Screened, screen};
 pub use sd_scale::LARGEST_SD_SCALE;
+pub use summary::Summary;
 pub use validate::FieldError;

@@ -9,6 +9,7 @@ use crate::correction_params::CorrectionParams;
 use crate::estimator_params::{EstimatorKind, EstimatorParams};
 use crate::law_params::LawParams;
 use crate::sd_scale::LARGEST_SD_SCALE;
+use crate::summary::Summary;
 
 /// Version of the parameter file this code reads and writes.
 pub const FORMAT: u32 = 4;
@@ -35,6 +36,9 @@ pub struct SensorParams {
     pub measured_rest: Option<f64>,
     /// The estimator to use unless another is asked for.
     pub default_estimator: EstimatorKind,
+    /// What the calibration came to; `None` if nothing could be scored on parts left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub summary: Option<Summary>,
     /// Range of the output: the reference's range in calibration, or a joint's stops.
     pub limits: RangeParams,
     /// What calibration has seen.

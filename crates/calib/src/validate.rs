@@ -13,6 +13,7 @@ use crate::baselines::StaticCubic;
 use crate::estimator_params::{EstimatorParams, MotionParams, NoiseParams, PhaseParams};
 use crate::law_params::{GaugeParams, LawParams};
 use crate::params::{JointParams, RangeParams, RecordingInfo, SensorParams, Uncertainty, Validity};
+use crate::summary::Summary;
 
 /// Strains, degrees, coefficients: far beyond what sensors have, and near enough for squares and products of some
 /// of them to be numbers.
@@ -54,6 +55,9 @@ impl SensorParams {
         let root = Table::root();
         root.number("rest_reading", self.rest_reading, POSITIVE)?;
         self.measured_rest.map_or(Ok(()), |measured| root.number("measured_rest", measured, POSITIVE))?;
+        if let Some(summary) = &self.summary {
+            summary.validate(&root.table("summary"))?;
+        }
         self.limits.validate(&root.table("limits"))?;
         self.validity.validate(&root.table("validity"))?;
         self.check_rest(&root)?;
@@ -96,6 +100,16 @@ fn ends(table: &Table, names: [&str; 2], lower: f64, upper: f64, allowed: Allowe
         return Ok(());
     }
     Err(table.wrong(names[1], format!("more than `{}`, {}", names[0], short(lower)), short(upper)))
+}
+
+impl Summary {
+    fn validate(&self, table: &Table) -> Result<(), FieldError> {
+        table.number("left_out_percent_fs", self.left_out_percent_fs, TOLD_AMOUNT)?;
+        self.smoothed_percent_fs.map_or(Ok(()), |error| table.number("smoothed_percent_fs", error, TOLD_AMOUNT))?;
+        table.number("static_cubic_percent_fs", self.static_cubic_percent_fs, TOLD_AMOUNT)?;
+        table.number("coverage_95_percent", self.coverage_95_percent, TOLD_AMOUNT)?;
+        table.number("width_95_percent_fs", self.width_95_percent_fs, TOLD_AMOUNT)
+    }
 }
 
 impl RangeParams {

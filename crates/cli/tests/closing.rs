@@ -1,6 +1,6 @@
 //! What `calibrate` says at its end.
 
-use crate::common::{Bench, SIMULATE};
+use crate::common::{Bench, CALIBRATED_UNTIL, Csv, SIMULATE, change_rows};
 use serde_json::Value;
 
 /// At most ten lines, none wider than a terminal, with every heading.
@@ -13,7 +13,7 @@ fn a_calibration_ends_in_ten_lines() {
             "calibrate",
             "trace.csv",
             "--until",
-            "150",
+            "60",
             "--branches",
             "1",
             "-o",
@@ -34,16 +34,16 @@ fn a_calibration_ends_in_ten_lines() {
 /// The error on quarters left out is near the one on rows that the calibration never had.
 #[test]
 fn json_says_what_the_error_elsewhere_is() {
-    let bench = Bench::new();
-    bench.run(&[&SIMULATE[..], &["-o", "trace.csv"]].concat()).ok();
-    let json = |flags: &[&str]| -> Value { serde_json::from_str(&bench.run(flags).ok()).unwrap() };
-    let closing = json(&["calibrate", "trace.csv", "--until", "300", "--branches", "1", "-o", "sensor.toml", "--json"]);
+    let bench = Bench::calibrated_by_default();
+    let json = |text: &str| -> Value { serde_json::from_str(text).unwrap() };
+    let closing = json(&bench.read("closing.json"));
     let number = |value: &Value| value.as_f64().unwrap();
     let left_out = &closing["left_out"];
     assert_eq!(closing["schema"], 1);
     assert_eq!(closing["estimator"], "corrected");
     let (filter, smoother) = (number(&left_out["filter"]["rmse"]), number(&left_out["smoother"]["rmse"]));
-    let unseen = json(&["evaluate", "trace.csv", "--sensor", "sensor.toml", "--from", "300", "--json"]);
+    let evaluate = ["evaluate", "trace.csv", "--sensor", "sensor.toml", "--from", CALIBRATED_UNTIL, "--json"];
+    let unseen = json(&bench.run(&evaluate).ok());
     let unseen = number(&unseen["recordings"][0]["rmse"]);
     let cubic = number(&left_out["static_cubic"]["rmse"]);
     assert!(smoother < filter && filter < cubic, "{smoother} {filter} {cubic}");
@@ -52,4 +52,71 @@ fn json_says_what_the_error_elsewhere_is() {
     assert_eq!(left_out["seen"]["tenths"].as_array().unwrap().len(), 10);
     let rows: f64 = left_out["seen"]["tenths"].as_array().unwrap().iter().map(number).sum();
     assert!((rows - 1.0).abs() < 1e-9);
+}
+
+const CALIBRATE: [&str; 8] =
+    ["calibrate", "trace.csv", "--until", CALIBRATED_UNTIL, "--estimator", "ekf", "-o", "sensor.toml"];
+
+/// Rows that were kept from a calibration are scored as `evaluate` scores them, and count where they are worse.
+#[test]
+fn the_verdict_is_of_the_worst_that_is_known() {
+    let narrow = "its error bars are too narrow.";
+    // After the calibration the contacts change: half more resistance.
+    for changed in [false, true] {
+        let bench = Bench::calibrated();
+        let until: f64 = CALIBRATED_UNTIL.parse().unwrap();
+        let trace = change_rows(&bench.read("trace.csv"), |_, cells| {
+            if changed && cells[0].parse::<f64>().unwrap() >= until {
+                cells[1] = (1.5 * cells[1].parse::<f64>().unwrap()).to_string();
+            }
+        });
+        bench.write("trace.csv", &trace);
+        let run = |more: &[&str]| bench.run(&[&CALIBRATE[..], more].concat()).ok();
+        let json: Value = serde_json::from_str(&run(&["--json", "--report", "report.html"])).unwrap();
+        let tested = &json["tested"];
+        let evaluate = ["evaluate", "trace.csv", "--sensor", "sensor.toml", "--from", CALIBRATED_UNTIL, "--json"];
+        let evaluated = bench.run(&evaluate);
+        let evaluated: Value = serde_json::from_str(&evaluated.stdout).unwrap();
+        let evaluated = &evaluated["recordings"][0];
+        for name in ["rmse", "coverage_95", "n"] {
+            assert_eq!(tested["filter"][name], evaluated[name], "{name}");
+            assert_eq!(tested["static_cubic"][name], evaluated["baselines"]["static_cubic"][name], "{name}");
+        }
+        let text = run(&["--explain"]);
+        let verdict = json["verdict"].as_str().unwrap();
+        assert!(text.contains(&format!("Verdict      {verdict}\n")) && text.contains("\nTested       "), "{text}");
+        assert_eq!(verdict.ends_with(narrow), changed, "{json}");
+        assert_eq!(bench.read("report.html").contains(narrow), changed);
+    }
+}
+
+/// Without rows that were kept from it there is nothing to test on, and what is left out is all.
+#[test]
+fn a_calibration_on_all_rows_is_tested_on_none() {
+    let bench = Bench::calibrated();
+    let rows = Csv::new(&bench.read("trace.csv")).len();
+    let calibrate = ["calibrate", "trace.csv", "--estimator", "ekf", "-o", "sensor.toml", "--json"];
+    let json: Value = serde_json::from_str(&bench.run(&calibrate).ok()).unwrap();
+    assert!(json["tested"].is_null() && json["left_out"]["seen"]["rows"] == rows);
+}
+
+/// The sensor's file says what it is worth.
+#[test]
+fn the_sensor_keeps_a_summary() {
+    let bench = Bench::calibrated();
+    let json: Value = serde_json::from_str(&bench.run(&[&CALIBRATE[..], &["--json"]].concat()).ok()).unwrap();
+    let sensor: toml::Table = toml::from_str(&bench.read("sensor.toml")).unwrap();
+    let (summary, left_out) = (&sensor["summary"], &json["left_out"]);
+    for (name, expected) in [
+        ("left_out_percent_fs", &left_out["filter"]["rmse_percent_fs"]),
+        ("smoothed_percent_fs", &left_out["smoother"]["rmse_percent_fs"]),
+        ("static_cubic_percent_fs", &left_out["static_cubic"]["rmse_percent_fs"]),
+        ("width_95_percent_fs", &left_out["filter"]["width_95_percent_fs"]),
+    ] {
+        assert_eq!(summary[name].as_float(), expected.as_f64(), "{name}");
+    }
+    // A share that was read from text, and then multiplied, may be rounded otherwise.
+    let covered = 100.0 * left_out["filter"]["coverage_95"].as_f64().unwrap();
+    assert!((summary["coverage_95_percent"].as_float().unwrap() - covered).abs() < 1e-12);
+    assert_eq!(summary["limited_by"].as_str(), json["limited_by"].as_str());
 }

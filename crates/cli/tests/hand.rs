@@ -84,6 +84,10 @@ fn a_plan_says_what_recordings_tell_and_what_sampling_leaves() {
         let degrees = DEGREES / 3.0 * number("error_percent") / 100.0;
         assert!((number("angle_deg") / degrees - 1.0).abs() < 1e-3, "{one}");
     }
+    // Exact readings, and such with one kind of noise.
+    for name in ["drift_alone_percent", "noise_alone_percent", "neither_percent"] {
+        assert!((0.0..100.0).contains(&plan[name].as_f64().unwrap()), "{name}: {json}");
+    }
     let text = bench.run(&["plan", "--sensor", "sensor.toml"]).ok();
     assert!(text.contains("to and fro, one speed") && text.contains("12 bits"), "{text}");
     let illustrative = bench.run(&["plan", "--material", "ecoflex-00-30"]).ok();

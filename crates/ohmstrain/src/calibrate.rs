@@ -155,7 +155,7 @@ impl Calibration {
         let samples: Vec<Samples> = recordings.iter().map(|recording| recording.samples).collect();
         let mut calibration =
             ohmstrain_calib::calibrate(&samples, &self.structures(estimator), &[estimator], progress)?;
-        let (distrusted, findings) = (mem::take(&mut calibration.distrusted), calibration.findings.take());
+        let (distrusted, findings) = (mem::take(&mut calibration.distrusted), calibration.findings.clone());
         let rest_readings = calibration.rest_readings.clone();
         let info = |(recording, rest_reading): (&Recording, &f64)| {
             let (file, sha256) = recording.file.map(|(file, sha256)| (file.to_string(), sha256.to_string()))?;

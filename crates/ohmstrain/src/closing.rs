@@ -1,15 +1,14 @@
 //! What a calibration came to, in words.
 
 use ohmstrain_calib::{Findings, Limit, Quantity, Scores, Seen, SensorParams};
+use serde::Serialize;
 
 use crate::number::{fixed, significant};
-use crate::verdict::{percent, verdict};
+use crate::verdict::{Known, percent, verdict};
 
 /// Columns of a terminal that lines keep within, and of the words before them.
 const COLUMNS: usize = 100;
 const HEAD: usize = 13;
-/// A percent sign with its space and a mark behind it.
-const SIGN: usize = 3;
 /// Advice that is printed; the rest is counted.
 const PRINTED_ADVICE: usize = 1;
 /// A tenth of the range with a smaller share of the rows than this is named.
@@ -20,7 +19,8 @@ const SELDOM: f64 = 0.04;
 /// ```
 /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
 /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
-/// let closing = ohmstrain::Closing { file: Some("s.toml"), params: sensor.params(), findings: None, calibration_s: 1.5 };
+/// let closing = ohmstrain::Closing { file: Some("s.toml"), params: sensor.params(), findings: None, tested: None,
+///     calibration_s: 1.5 };
 /// assert!(closing.text().ends_with("Written      s.toml, estimator sign-split, a law of 3 branches; it took 1.5 s\n"));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -32,11 +32,42 @@ pub struct Closing<'a> {
     pub params: &'a SensorParams,
     /// What it is worth; `None` if that could not be told.
     pub findings: Option<&'a Findings>,
+    /// What it is worth on rows that it never saw; `None` if there were none.
+    pub tested: Option<&'a Tested>,
     /// Wall-clock time, s.
     pub calibration_s: f64,
 }
 
+/// Scores of rows that a calibration never saw.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Tested {
+    /// The default estimator's filter.
+    pub filter: Scores,
+    /// The static cubic.
+    pub static_cubic: Scores,
+}
+
+impl From<&Tested> for Known {
+    fn from(tested: &Tested) -> Self {
+        Self::new(&tested.filter, Some(&tested.static_cubic))
+    }
+}
+
 impl Closing<'_> {
+    /// What the sensor is worth on rows that it was not fitted to, in a sentence; `None` if there are none.
+    ///
+    /// ```
+    /// fn print(closing: &ohmstrain::Closing) {
+    ///     println!("{}", closing.verdict().unwrap_or_default());
+    /// }
+    /// ```
+    #[must_use]
+    pub fn verdict(&self) -> Option<String> {
+        let left_out = self.findings.map(|found| Known::new(&found.filter, Some(&found.static_cubic)));
+        let known: Vec<Known> = left_out.into_iter().chain(self.tested.map(Known::from)).collect();
+        (!known.is_empty()).then(|| verdict(&known))
+    }
+
     /// What a report says of the calibration: names and texts.
     ///
     /// ```
@@ -46,14 +77,15 @@ impl Closing<'_> {
     /// ```
     #[must_use]
     pub fn facts(&self) -> Vec<(&'static str, String)> {
-        let Some(found) = self.findings else { return vec![] };
+        let tested = self.tested.map(|tested| ("Tested", error_in_test(tested)));
+        let Some(found) = self.findings else { return tested.into_iter().collect() };
         let next = if found.advice.is_empty() { advice(&found.advice) } else { found.advice.join("; ") };
-        vec![
-            ("Left out", error_and_coverage(found)),
+        let facts = [
             ("Seen", seen(&found.seen, self.params.quantity)),
             ("Limited by", limited_by(found)),
             ("Record next", next),
-        ]
+        ];
+        [("Left out", error_and_coverage(found))].into_iter().chain(tested).chain(facts).collect()
     }
 
     /// At most ten lines of a hundred columns.
@@ -66,15 +98,20 @@ impl Closing<'_> {
     #[must_use]
     pub fn text(&self) -> String {
         let mut lines = Lines::default();
+        if let Some(verdict) = self.verdict() {
+            lines.add("Verdict", &verdict);
+        }
         match self.findings {
             None => lines.add("Left out", "nothing could be scored on parts of the recordings left out"),
-            Some(found) => {
-                lines.add("Verdict", &verdict(&found.filter, Some(&found.static_cubic)));
-                lines.add("Left out", &error_and_coverage(found));
-                lines.add("Seen", &seen(&found.seen, self.params.quantity));
-                lines.add("Limited by", &limited_by(found));
-                lines.add("Record next", &advice(&found.advice));
-            }
+            Some(found) => lines.add("Left out", &error_and_coverage(found)),
+        }
+        if let Some(tested) = self.tested {
+            lines.add("Tested", &error_in_test(tested));
+        }
+        if let Some(found) = self.findings {
+            lines.add("Seen", &seen(&found.seen, self.params.quantity));
+            lines.add("Limited by", &limited_by(found));
+            lines.add("Record next", &advice(&found.advice));
         }
         let (estimator, branches) = (self.params.default_estimator.name(), self.params.law.branches.len());
         let law = if branches == 1 { "1 branch".into() } else { format!("{branches} branches") };
@@ -97,22 +134,33 @@ struct Lines {
 impl Lines {
     fn add(&mut self, head: &str, body: &str) {
         let mut line = format!("{head:HEAD$}");
-        for word in body.split(' ') {
+        for word in with_units(body) {
             let has_word = line.len() > HEAD;
-            // A number stays with its percent sign.
-            let is_sign = word.starts_with('%');
-            if has_word && !is_sign && line.chars().count() + 1 + word.chars().count() + SIGN > COLUMNS {
+            if has_word && line.chars().count() + 1 + word.chars().count() > COLUMNS {
                 self.text += &line;
                 self.text.push('\n');
                 line = " ".repeat(HEAD);
             } else if has_word {
                 line.push(' ');
             }
-            line += word;
+            line += &word;
         }
         self.text += &line;
         self.text.push('\n');
     }
+}
+
+/// The words of a text, each number with its percent sign or its seconds.
+fn with_units(text: &str) -> Vec<String> {
+    let mut words: Vec<String> = Vec::new();
+    for word in text.split(' ') {
+        let is_unit = word.starts_with('%') || word.trim_end_matches([';', ',', ':']) == "s";
+        match words.last_mut() {
+            Some(number) if is_unit => *number += &format!(" {word}"),
+            _ => words.push(word.into()),
+        }
+    }
+    words
 }
 
 fn error_and_coverage(found: &Findings) -> String {
@@ -130,6 +178,15 @@ fn error_and_coverage(found: &Findings) -> String {
     )
 }
 
+fn error_in_test(tested: &Tested) -> String {
+    format!(
+        "{} of full scale on rows kept from it, static cubic {}; the interval holds {}",
+        percent(tested.filter.rmse_percent_fs),
+        percent(tested.static_cubic.rmse_percent_fs),
+        percent(100.0 * tested.filter.coverage_95.unwrap_or(0.0))
+    )
+}
+
 /// Range, gaps in it, speeds and holds.
 fn seen(seen: &Seen, quantity: Quantity) -> String {
     let (scale, unit) = match quantity {
@@ -144,7 +201,7 @@ fn seen(seen: &Seen, quantity: Quantity) -> String {
         format!(" (least often {} to {}{unit}: {} of the rows)", edge(tenth), edge(tenth + 1), percent(100.0 * share))
     });
     let holds = if seen.longest_hold_s > 0.0 {
-        format!("holds up to {} s", significant(seen.longest_hold_s, 2))
+        format!("holds to {} s", significant(seen.longest_hold_s, 2))
     } else {
         "no holds".into()
     };

@@ -43,7 +43,7 @@ pub mod verdict;
 
 pub use builder::FilterBuilder;
 pub use calibrate::{Calibrated, Calibration, calibrate};
-pub use closing::Closing;
+pub use closing::{Closing, Tested};
 pub use column::Column;
 pub use error::{Error, Place, TextCause, TextError};
 pub use estimate::Estimate;

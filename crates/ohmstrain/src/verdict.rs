@@ -1,34 +1,67 @@
 //! Scores in words.
 
-use ohmstrain_calib::Scores;
+use ohmstrain_calib::{Scores, Summary};
 
 use crate::number::fixed;
 
 /// Below this share of the static cubic's error an estimate is clearly better, below this one better.
 const CLEARLY_BETTER: f64 = 0.5;
 const BETTER: f64 = 0.9;
-/// Coverages of 95 % intervals, in percent, that are taken for right.
-const COVERED: f64 = 90.0;
+/// Coverages of 95 % intervals that are taken for right.
+const COVERED: f64 = 0.9;
 /// Mean width of 95 % intervals, in percent of full scale, that says little: the standard deviation of a constant guess in
 /// the middle of an evenly used range gives 113.
 const WIDE: f64 = 60.0;
 
-/// What an error and its intervals are worth, in one sentence.
-pub fn verdict(scores: &Scores, static_cubic: Option<&Scores>) -> String {
-    let better = match static_cubic.map(|cubic| scores.rmse / cubic.rmse) {
+/// What is known of an estimate on some rows; errors in percent of full scale.
+#[derive(Clone, Copy, Debug)]
+pub struct Known {
+    error: f64,
+    /// The static cubic's, if there is one.
+    static_cubic: Option<f64>,
+    /// Share of the rows, 0 to 1, that the 95 % interval holds.
+    covered: f64,
+    width: f64,
+}
+
+impl Known {
+    /// From scores, and those of the static cubic on the same rows.
+    pub fn new(scores: &Scores, static_cubic: Option<&Scores>) -> Self {
+        Self {
+            error: scores.rmse_percent_fs,
+            static_cubic: static_cubic.map(|cubic| cubic.rmse_percent_fs),
+            covered: scores.coverage_95.unwrap_or(0.0),
+            width: scores.width_95_percent_fs.unwrap_or(0.0),
+        }
+    }
+}
+
+impl From<&Summary> for Known {
+    fn from(summary: &Summary) -> Self {
+        Self {
+            error: summary.left_out_percent_fs,
+            static_cubic: Some(summary.static_cubic_percent_fs),
+            covered: summary.coverage_95_percent / 100.0,
+            width: summary.width_95_percent_fs,
+        }
+    }
+}
+
+/// What errors and their intervals are worth, in one sentence: the worst of what is known.
+pub fn verdict(known: &[Known]) -> String {
+    let ratios = known.iter().filter_map(|part| part.static_cubic.map(|cubic| part.error / cubic));
+    let better = match ratios.max_by(f64::total_cmp) {
         Some(ratio) if ratio < CLEARLY_BETTER => "Clearly better than a static curve",
         Some(ratio) if ratio < BETTER => "Better than a static curve",
         Some(ratio) if ratio < 1.0 / BETTER => "About as good as a static curve",
         Some(_) => "Worse than a static curve",
         None => "No static curve to compare with",
     };
-    format!("{better}; {}.", of_intervals(scores))
+    format!("{better}; {}.", of_intervals(known))
 }
 
-fn of_intervals(scores: &Scores) -> &'static str {
-    let covered = scores.coverage_95.map_or(0.0, |share| 100.0 * share);
-    let wide = scores.width_95_percent_fs.is_some_and(|width| width > WIDE);
-    match (covered < COVERED, wide) {
+fn of_intervals(known: &[Known]) -> &'static str {
+    match (known.iter().any(|part| part.covered < COVERED), known.iter().any(|part| part.width > WIDE)) {
         (true, _) => "its error bars are too narrow",
         (false, true) => "its error bars hold, but are wide",
         (false, false) => "its error bars hold",
@@ -44,7 +77,7 @@ pub fn percent(value: f64) -> String {
 mod tests {
     use ohmstrain_calib::{ScoredRow, Scores};
 
-    use super::{percent, verdict};
+    use super::{Known, percent, verdict};
 
     fn scores(error: f64, sd: f64) -> Scores {
         let row = |k: u32| {
@@ -57,18 +90,20 @@ mod tests {
 
     #[test]
     fn error_and_intervals_are_judged() {
-        let cubic = scores(0.1, 1.0);
-        assert_eq!(
-            verdict(&scores(0.03, 0.03), Some(&cubic)),
-            "Clearly better than a static curve; its error bars hold."
-        );
-        assert_eq!(
-            verdict(&scores(0.08, 0.01), Some(&cubic)),
-            "Better than a static curve; its error bars are too narrow."
-        );
+        let part = |error: f64, sd: f64| Known::new(&scores(error, sd), Some(&scores(0.1, 1.0)));
+        assert_eq!(verdict(&[part(0.03, 0.03)]), "Clearly better than a static curve; its error bars hold.");
+        assert_eq!(verdict(&[part(0.08, 0.01)]), "Better than a static curve; its error bars are too narrow.");
         let wide = "Worse than a static curve; its error bars hold, but are wide.";
-        assert_eq!(verdict(&scores(0.2, 0.3), Some(&cubic)), wide);
-        assert!(verdict(&scores(0.1, 0.1), None).starts_with("No static curve"));
+        assert_eq!(verdict(&[part(0.2, 0.3)]), wide);
+        assert!(verdict(&[Known::new(&scores(0.1, 0.1), None)]).starts_with("No static curve"));
+    }
+
+    #[test]
+    fn the_worst_part_counts() {
+        let part = |error: f64, sd: f64| Known::new(&scores(error, sd), Some(&scores(0.1, 1.0)));
+        let worst = "Worse than a static curve; its error bars are too narrow.";
+        assert_eq!(verdict(&[part(0.03, 0.03), part(0.2, 0.3), part(0.03, 0.001)]), worst);
+        assert_eq!(verdict(&[part(0.2, 0.01), part(0.03, 0.03)]), worst);
     }
 
     #[test]

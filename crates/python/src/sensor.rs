@@ -52,7 +52,7 @@ impl Sensor {
     fn closing(&self, file: Option<&str>) -> Option<String> {
         let (findings, calibration_s) = self.made.as_ref()?;
         let (findings, params) = (findings.as_ref(), self.sensor.params());
-        Some(Closing { file, params, findings, calibration_s: *calibration_s }.text())
+        Some(Closing { file, params, findings, tested: None, calibration_s: *calibration_s }.text())
     }
 
     /// All numbers, and what the calibration came to, as JSON.

@@ -9,6 +9,7 @@ use super::closing;
 use super::explain;
 use super::reporting::{Reporting, Wanted};
 use super::scoring::Part;
+use super::tested::{Kept, tested};
 use crate::alignment;
 use crate::args::CalibrateArgs;
 use crate::error::CliError;
@@ -26,7 +27,7 @@ pub fn run(args: &CalibrateArgs) -> Result<(), CliError> {
     let sensor_output = outputs.claim(&args.output, Kind::Sensor)?;
     let wanted = Wanted::claim(&args.report, &mut outputs)?;
     let overrides = args.trace.metadata();
-    let mut recordings = Vec::new();
+    let (mut recordings, mut kept) = (Vec::new(), Vec::new());
     for path in &args.traces {
         let recording = input::read(path, &overrides)?;
         let row_at = |time_s: f64| recording.trace.time_s.partition_point(|earlier_s| *earlier_s < time_s);
@@ -35,25 +36,38 @@ pub fn run(args: &CalibrateArgs) -> Result<(), CliError> {
         if rows.is_empty() && !recording.trace.is_empty() {
             return Err(recording.no_rows(args.from, args.until));
         }
-        recordings.push(recording.rows(rows));
+        recordings.push(recording.rows(rows.clone()));
+        if rows.len() < recording.trace.len() {
+            kept.push((recordings.len() - 1, Kept { whole: recording, seen: rows }));
+        }
     }
-    for recording in &mut recordings {
-        alignment::check(recording, args.align)?;
-    }
+    let lags_s = recordings.iter_mut().map(|recording| alignment::check(recording, args.align));
+    let lags_s: Vec<f64> = lags_s.collect::<Result<_, _>>()?;
     let start = Instant::now();
     let progress = Progress::new("calibrating");
     let Calibrated { sensor, findings, .. } = calibrate_recordings(&recordings, calibration(args), &progress)?;
     drop(progress);
     let calibration_s = start.elapsed().as_secs_f64();
+    for (recording, kept) in &mut kept {
+        alignment::shift(&mut kept.whole, lags_s[*recording])?;
+    }
+    let tested = tested(&kept.into_iter().map(|(_, kept)| kept).collect::<Vec<_>>(), &sensor);
     let params = sensor.params();
     outputs.put(sensor_output, sensor_file::text(&sensor)?);
     let file = args.output.display().to_string();
-    let closing = Closing { file: Some(&file), params, findings: findings.as_ref(), calibration_s };
+    let closing =
+        Closing { file: Some(&file), params, findings: findings.as_ref(), tested: tested.as_ref(), calibration_s };
     if let Some(wanted) = wanted {
-        let (facts, rest_resistance) = (closing.facts(), None);
-        let (recording, part, sample) = (&recordings[0], Part::default(), Sample::In);
-        let reporting =
-            Reporting { recording, sensor: &sensor, kind: None, rest_resistance, part, sample, facts: &facts };
+        let reporting = Reporting {
+            recording: &recordings[0],
+            sensor: &sensor,
+            kind: None,
+            rest_resistance: None,
+            part: Part::default(),
+            sample: Sample::In,
+            tested: tested.as_ref(),
+            facts: &closing.facts(),
+        };
         wanted.put(reporting.drawn()?, &mut outputs)?;
     }
     let explained = explain::text(args, &recordings, &params.law)?;

@@ -1,7 +1,6 @@
 //! What `calibrate --json` prints.
 
-use ohmstrain::verdict::verdict;
-use ohmstrain::{Closing, Findings, MADE_BY};
+use ohmstrain::{Closing, Findings, MADE_BY, Tested};
 use ohmstrain_calib::Limit;
 use serde::Serialize;
 
@@ -20,7 +19,9 @@ struct Json<'a> {
     calibration_s: f64,
     /// Scores of parts that were left out in turn, what limits them, and what the recordings contain.
     left_out: Option<&'a Findings>,
-    limited_by: Option<&'static str>,
+    /// Scores of the rows that `--from` and `--until` kept from it.
+    tested: Option<&'a Tested>,
+    limited_by: Option<Limit>,
     verdict: Option<String>,
 }
 
@@ -36,19 +37,11 @@ pub fn json(closing: &Closing, file: &str) -> serde_json::Result<Vec<u8>> {
         quantity: params.quantity.name(),
         calibration_s: closing.calibration_s,
         left_out: findings,
-        limited_by: findings.map(|found| limit_name(found.budget.limit())),
-        verdict: findings.map(|found| verdict(&found.filter, Some(&found.static_cubic))),
+        limited_by: findings.map(|found| found.budget.limit()),
+        tested: closing.tested,
+        verdict: closing.verdict(),
     };
     let mut bytes = serde_json::to_vec_pretty(&json)?;
     bytes.push(b'\n');
     Ok(bytes)
-}
-
-const fn limit_name(limit: Limit) -> &'static str {
-    match limit {
-        Limit::Law => "law",
-        Limit::Direction => "direction",
-        Limit::Drift => "drift",
-        Limit::Noise => "noise",
-    }
 }

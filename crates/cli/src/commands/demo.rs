@@ -54,7 +54,8 @@ pub fn run(args: &DemoArgs) -> Result<(), CliError> {
     outputs.put(smoothed_output, estimates(&sensor, &estimated.smoothed)?);
     progress.doing("writing the report");
     let part = Part::since(Some(test_from));
-    let facts = Closing { file: Some("sensor.toml"), params, findings: findings.as_ref(), calibration_s }.facts();
+    let closing =
+        Closing { file: Some("sensor.toml"), params, findings: findings.as_ref(), tested: None, calibration_s };
     let reporting = Reporting {
         recording: &recording,
         sensor: &sensor,
@@ -62,7 +63,8 @@ pub fn run(args: &DemoArgs) -> Result<(), CliError> {
         rest_resistance: None,
         part,
         sample: Sample::Out,
-        facts: &facts,
+        tested: None,
+        facts: &closing.facts(),
     };
     if let Some(wanted) = wanted {
         wanted.put(reporting.drawn()?, &mut outputs)?;

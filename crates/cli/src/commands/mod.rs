@@ -23,6 +23,7 @@ mod scoring;
 mod shell;
 mod simulate;
 mod smooth;
+mod tested;
 
 use crate::args::Command;
 use crate::error::CliError;

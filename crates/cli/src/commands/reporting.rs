@@ -1,7 +1,7 @@
 use std::path::Path;
 
-use ohmstrain::verdict::verdict;
-use ohmstrain::{EstimatorKind, Scores, Sensor, SensorParams};
+use ohmstrain::verdict::{Known, verdict};
+use ohmstrain::{EstimatorKind, Scores, Sensor, SensorParams, Tested};
 
 use super::scoring::{self, Part};
 use crate::args::ReportArgs;
@@ -23,6 +23,8 @@ pub struct Reporting<'a> {
     /// The rows that are scored, and whether they were calibrated on.
     pub part: Part,
     pub sample: Sample,
+    /// What it is worth on rows that were kept from the calibration, if that is known.
+    pub tested: Option<&'a Tested>,
     /// What else there is to say: heading and text.
     pub facts: &'a [(&'static str, String)],
 }
@@ -104,12 +106,20 @@ impl Reporting<'_> {
             sample: self.sample,
             estimator: kind,
             scores: &scores,
-            verdict: filter.map(|filter| verdict(&filter, cubic.as_ref())),
+            verdict: filter.map(|filter| self.verdict(&filter, cubic.as_ref())),
             facts: self.facts,
         };
         let failed = |error: crate::report::ReportError| CliError::Other(error.to_string());
         let report = Report::new(&input).map_err(failed)?;
         Ok(Drawn { html: report.html().map_err(failed)?, figures: report.figures().map_err(failed)? })
+    }
+
+    /// Rows that were calibrated on look better than others: what is known of those counts, too.
+    fn verdict(&self, filter: &Scores, cubic: Option<&Scores>) -> String {
+        let params = self.sensor.params();
+        let left_out = params.summary.as_ref().filter(|_| self.sample != Sample::Out).map(Known::from);
+        let known = [Known::new(filter, cubic)].into_iter().chain(left_out).chain(self.tested.map(Known::from));
+        verdict(&known.collect::<Vec<_>>())
     }
 }
 

@@ -44,6 +44,7 @@ fn sensor() -> SensorParams {
         rest_reading: 1000.0,
         measured_rest: None,
         default_estimator: EstimatorKind::Ekf,
+        summary: None,
         limits: range,
         validity: Validity {
             lower: 0.0,

@@ -48,6 +48,22 @@ impl Bench {
         bench
     }
 
+    /// The same with the default estimator, and `closing.json`, what its calibration ended with: half a minute, once.
+    pub fn calibrated_by_default() -> Self {
+        static FILES: OnceLock<[String; 3]> = OnceLock::new();
+        let names = ["trace.csv", "sensor.toml", "closing.json"];
+        let contents = FILES.get_or_init(|| {
+            let bench = Self::new();
+            bench.run(&[&SIMULATE[..], &["-o", "trace.csv"]].concat()).ok();
+            let calibrate = ["calibrate", "trace.csv", "--until", CALIBRATED_UNTIL, "-o", "sensor.toml", "--json"];
+            bench.write("closing.json", bench.run(&calibrate).ok());
+            names.map(|name| bench.read(name))
+        });
+        let bench = Self::new();
+        names.iter().zip(contents).for_each(|(name, content)| bench.write(name, content));
+        bench
+    }
+
     /// Where a file of the folder is.
     pub fn path(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)

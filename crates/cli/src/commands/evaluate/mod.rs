@@ -176,7 +176,9 @@ fn judge(
     if args.draws(&recording.name) {
         let (kind, has_split) = (Some(*kind), !args.calibration.split.is_empty());
         let sample = if has_split { Sample::Out } else { sample(recording, first.params(), part) };
-        let reporting = Reporting { recording, sensor: first, kind, rest_resistance: rest, part, sample, facts: &[] };
+        let (tested, facts) = (None, &[]);
+        let reporting =
+            Reporting { recording, sensor: first, kind, rest_resistance: rest, part, sample, tested, facts };
         judged.drawn = Some(reporting.drawn()?);
     }
     Ok(judged)

@@ -19,7 +19,7 @@ use crate::progress::Progress;
 use crate::sensor_file::{self, MADE_BY};
 use motion::Protocols;
 use ohmstrain::number::{fixed, significant};
-use worth::{Told, Worth};
+use worth::{Sampling, Told, Worth};
 
 /// Version of what `--json` prints. Names are added without another version.
 const SCHEMA: u32 = 1;
@@ -32,6 +32,10 @@ struct Json<'a> {
     sensor: String,
     recordings: &'a [Told],
     sampling: &'a [Worth],
+    /// At the fastest of these rates.
+    drift_alone_percent: f64,
+    noise_alone_percent: f64,
+    neither_percent: f64,
 }
 
 /// Plans a recording.
@@ -53,7 +57,17 @@ pub fn run(args: &PlanArgs) -> Result<(), CliError> {
     drop(progress);
     print(|out| {
         if args.json {
-            let json = Json { schema: SCHEMA, made_by: MADE_BY, sensor: name, recordings: &told, sampling: &worth };
+            let Sampling { cases, drift_alone_percent, noise_alone_percent, neither_percent } = &worth;
+            let json = Json {
+                schema: SCHEMA,
+                made_by: MADE_BY,
+                sensor: name,
+                recordings: &told,
+                sampling: cases,
+                drift_alone_percent: *drift_alone_percent,
+                noise_alone_percent: *noise_alone_percent,
+                neither_percent: *neither_percent,
+            };
             serde_json::to_writer_pretty(&mut *out, &json).map_err(std::io::Error::from)?;
             return Ok(writeln!(out)?);
         }
@@ -74,7 +88,7 @@ fn illustrative(args: &PlanArgs) -> Result<Sensor, CliError> {
     Ok(calibrate_recordings(&[recording], calibration, &Progress::new("simulating"))?.sensor)
 }
 
-fn text(sensor: &Sensor, name: &str, protocols: &Protocols, told: &[Told], worth: &[Worth]) -> String {
+fn text(sensor: &Sensor, name: &str, protocols: &Protocols, told: &[Told], worth: &Sampling) -> String {
     let params = sensor.params();
     let (factor, unit) = match params.quantity {
         Quantity::Strain => (100.0, " %"),
@@ -109,16 +123,33 @@ fn text(sensor: &Sensor, name: &str, protocols: &Protocols, told: &[Told], worth
     );
     let mut errors = table(["readings per s", "as good as the sensor", "16 bits", "12 bits", "10 bits"]);
     for rate in worth::RATES_HZ {
-        let of_rate = worth.iter().filter(|one| one.rate_hz == rate);
+        let of_rate = worth.cases.iter().filter(|one| one.rate_hz == rate);
         let cells = of_rate.map(|one| format!("{} ({:.0})", fixed(one.error_percent, 1), one.coverage_percent));
         errors.add_row([format!("{rate}")].into_iter().chain(cells));
     }
     text += &format!("{errors}\n");
+    text += &floor(worth);
     text += "The converter is read through a divider whose resistor is the geometric mean of the readings' range.\n";
-    if let Some(best) = worth.iter().filter_map(|one| one.angle_deg).reduce(f64::min) {
+    if let Some(best) = worth.cases.iter().filter_map(|one| one.angle_deg).reduce(f64::min) {
         text += &format!("Of the joint's angle the least of these errors is {}°.\n", significant(best, 2));
     }
     text
+}
+
+/// What no way of sampling mends.
+fn floor(worth: &Sampling) -> String {
+    let Sampling { drift_alone_percent, noise_alone_percent, neither_percent, .. } = worth;
+    let shown = |percent: &f64| fixed(*percent, 1);
+    format!(
+        "Of {} readings per s drift by itself leaves {}, noise by itself {}, and exact readings {}. What exact readings leave is \
+         the filter's own:\nit allows for an error of the law, and has to find out which way the body moves. Neither that nor \
+         drift is mended by rate or converter,\nbut by a better filter (--sensor, calibrated by default) and by rests now and \
+         then (--rest-resistance, filter --known).\n",
+        worth::FASTEST_HZ,
+        shown(drift_alone_percent),
+        shown(noise_alone_percent),
+        shown(neither_percent)
+    )
 }
 
 fn table<const N: usize>(header: [&str; N]) -> Table {

@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 use ohmstrain::{JointParams, Reading, ReadingUnit, Sensor};
 use ohmstrain_bench_data::FrontEndSpec;
-use ohmstrain_calib::{GaugeParams, LawParams};
+use ohmstrain_calib::{GaugeParams, LawParams, NoiseParams};
 use ohmstrain_model::AdcCode;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
@@ -15,7 +15,10 @@ use crate::error::CliError;
 use crate::report::Law;
 
 /// Readings per second that are tried.
-pub const RATES_HZ: [f64; 4] = [5.0, 10.0, 20.0, 50.0];
+pub const RATES_HZ: [f64; 4] = [5.0, 10.0, 20.0, FASTEST_HZ];
+/// The last of them, and a multiple of all.
+pub const FASTEST_HZ: f64 = 50.0;
+const FINEST_HZ: f64 = 100.0;
 /// Bits of a converter; 0 for readings as good as the sensor.
 const BITS: [u32; 4] = [0, 16, 12, 10];
 /// Seed of noise and drift.
@@ -57,25 +60,58 @@ pub struct Worth {
     pub angle_deg: Option<f64>,
 }
 
+/// What ways of sampling leave, and what none of them mends.
+#[derive(Serialize)]
+pub struct Sampling {
+    pub cases: Vec<Worth>,
+    /// Error at [`FASTEST_HZ`] of readings that drift and have no noise otherwise, percent of the sensor's range.
+    pub drift_alone_percent: f64,
+    /// And of such that have noise and do not drift.
+    pub noise_alone_percent: f64,
+    /// And of such that have neither.
+    pub neither_percent: f64,
+}
+
+/// What is made of each kind of noise, relative to what the calibration found.
+#[derive(Clone, Copy)]
+struct Disturbed {
+    drift: f64,
+    white: f64,
+}
+
+/// As the calibration found it.
+const AS_FOUND: Disturbed = Disturbed { drift: 1.0, white: 1.0 };
+
+/// The sensor's drift, the same one however it is sampled: shares of R₀, [`FINEST_HZ`] of them a second.
+fn drift(noise: NoiseParams, rows: usize) -> Vec<f64> {
+    let mut random = ChaCha8Rng::seed_from_u64(SEED);
+    let mut draw = || -> f64 { StandardNormal.sample(&mut random) };
+    let kept = (-1.0 / (FINEST_HZ * noise.baseline_time_s)).exp();
+    let mut baseline = noise.baseline_sd * draw();
+    let next = |_| {
+        baseline = kept * baseline + noise.baseline_sd * (1.0 - kept * kept).sqrt() * draw();
+        baseline
+    };
+    (0..rows).map(next).collect()
+}
+
 /// Readings of a motion by the sensor's law, with white noise and a drifting baseline.
-fn readings(sensor: &Sensor, time_s: &[f64], strain: &[f64]) -> Vec<f64> {
+fn readings(sensor: &Sensor, (rate_hz, strain): (f64, &[f64]), disturbed: Disturbed) -> Vec<f64> {
     let params = sensor.params();
     let law = Law::new(params, params.rest_reading);
-    let driven = law.driven(time_s, strain, &[]).reading;
+    let driven = law.driven(&times(strain.len(), rate_hz), strain, &[]).reading;
     let Some(noise) = params.estimator(params.filter_of(params.default_estimator)).ok().map(|own| own.noise) else {
         return driven;
     };
-    let mut random = ChaCha8Rng::seed_from_u64(SEED);
+    let every = (FINEST_HZ / rate_hz).round() as usize;
+    let drift = drift(noise, strain.len() * every);
+    let mut random = ChaCha8Rng::seed_from_u64(SEED + 1);
     let mut draw = || -> f64 { StandardNormal.sample(&mut random) };
-    let mut baseline = noise.baseline_sd * draw();
-    let mut before_s = None;
-    let noisy = |(reading, time_s): (f64, &f64)| {
-        let kept = before_s.map_or(1.0, |before_s: f64| (-(time_s - before_s) / noise.baseline_time_s).exp());
-        before_s = Some(*time_s);
-        baseline = kept * baseline + noise.baseline_sd * (1.0 - kept * kept).sqrt() * draw();
-        reading + params.rest_reading * (baseline + noise.reading_sd * draw())
+    let noisy = |(reading, row): (f64, usize)| {
+        let noise = disturbed.drift * drift[row * every] + disturbed.white * noise.reading_sd * draw();
+        reading + params.rest_reading * noise
     };
-    driven.into_iter().zip(time_s).map(noisy).collect()
+    driven.into_iter().zip(0..).map(noisy).collect()
 }
 
 fn times(rows: usize, rate_hz: f64) -> Vec<f64> {
@@ -178,19 +214,26 @@ fn information(sensor: &Sensor, strain: &[f64]) -> DMatrix<f64> {
     jacobian.tr_mul(&jacobian)
 }
 
-/// What rates and converters leave of the estimate, all on one motion.
-pub fn sampling(sensor: &Sensor, protocols: &Protocols) -> Result<Vec<Worth>, CliError> {
+/// What rates and converters leave of the estimate, all on one motion with one drift.
+pub fn sampling(sensor: &Sensor, protocols: &Protocols) -> Result<Sampling, CliError> {
     let path = protocols.usual();
-    let mut found = Vec::new();
+    let mut cases = Vec::new();
     for rate_hz in RATES_HZ {
         let strain = at_rate(&path, rate_hz);
-        let time_s = times(strain.len(), rate_hz);
-        let exact = readings(sensor, &time_s, &strain);
+        let exact = readings(sensor, (rate_hz, &strain), AS_FOUND);
         for bits in BITS.into_iter().filter(|bits| *bits == 0 || sensor.params().reading == ReadingUnit::Ohm) {
-            found.push(scored(sensor, (rate_hz, bits), &time_s, &strain, &converted(&exact, bits)?)?);
+            cases.push(scored(sensor, (rate_hz, bits), &strain, &converted(&exact, bits)?)?);
         }
     }
-    Ok(found)
+    let strain = at_rate(&path, FASTEST_HZ);
+    let alone = |disturbed: Disturbed| {
+        let exact = readings(sensor, (FASTEST_HZ, &strain), disturbed);
+        scored(sensor, (FASTEST_HZ, 0), &strain, &converted(&exact, 0)?).map(|one| one.error_percent)
+    };
+    let drift_alone_percent = alone(Disturbed { white: 0.0, ..AS_FOUND })?;
+    let noise_alone_percent = alone(Disturbed { drift: 0.0, ..AS_FOUND })?;
+    let neither_percent = alone(Disturbed { drift: 0.0, white: 0.0 })?;
+    Ok(Sampling { cases, drift_alone_percent, noise_alone_percent, neither_percent })
 }
 
 /// Readings through a divider whose resistor is the geometric mean of their range.
@@ -212,16 +255,15 @@ fn converted(exact: &[f64], bits: u32) -> Result<Vec<Reading>, CliError> {
 fn scored(
     sensor: &Sensor,
     (rate_hz, bits): (f64, u32),
-    time_s: &[f64],
     strain: &[f64],
     readings: &[Reading],
 ) -> Result<Worth, CliError> {
     // What a correction has learned is the error of the law on real readings; these have none.
     let mut filter = sensor.filter().without_correction().build()?;
     let (mut squares, mut inside, mut count) = (0.0, 0_usize, 0_usize);
-    for ((time_s, truth), reading) in time_s.iter().zip(strain).zip(readings) {
-        let row = filter.step(*time_s, *reading)?;
-        if *time_s < SETTLING_S {
+    for ((time_s, truth), reading) in times(strain.len(), rate_hz).into_iter().zip(strain).zip(readings) {
+        let row = filter.step(time_s, *reading)?;
+        if time_s < SETTLING_S {
             continue;
         }
         let error = row.strain - truth;
