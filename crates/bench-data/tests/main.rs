@@ -2,6 +2,7 @@
 
 mod common;
 
+mod faults;
 mod findings;
 #[cfg(feature = "import")]
 mod import_clocks;

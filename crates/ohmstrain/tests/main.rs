@@ -1,6 +1,7 @@
 //! The library as its users see it. One test program; a module for each subject.
 
 mod rows;
+mod surprises;
 mod threads;
 
 /// A file that is not named above would not be compiled.
