@@ -111,9 +111,9 @@ impl Check<'_> {
     pub(crate) fn findings(&self, seen: Seen, told: &Option<Identifiability>) -> Option<Findings> {
         let scored = self.scored().ok()?;
         Some(Findings {
-            filter: Scores::new(&scored.filter)?,
-            smoother: Scores::new(&scored.smoother),
-            static_cubic: Scores::new(&scored.static_cubic)?,
+            filter: Scores::of_full_scale(&scored.filter)?,
+            smoother: Scores::of_full_scale(&scored.smoother),
+            static_cubic: Scores::of_full_scale(&scored.static_cubic)?,
             budget: ErrorBudget::new(self.recordings, self.fit, &scored.wrong),
             seen,
             advice: told.as_ref().map_or_else(Vec::new, |told| told.advice.clone()),

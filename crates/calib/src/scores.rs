@@ -95,6 +95,13 @@ impl Scores {
     }
 }
 
+impl Scores {
+    /// The same where errors can be told in percent of full scale; `None` if the truth is constant or an estimate is no number.
+    pub(crate) fn of_full_scale(rows: &[ScoredRow]) -> Option<Self> {
+        Self::new(rows).filter(|scores| scores.rmse_percent_fs.is_finite())
+    }
+}
+
 /// Share of the time between the first and the last row.
 fn wrong_branch(rows: &[&ScoredRow], full_scale: f64) -> f64 {
     let wrong = |row: &ScoredRow| (row.strain - row.truth).abs() > WRONG_BRANCH.0 * full_scale;
@@ -155,5 +162,17 @@ mod tests {
         };
         let rows: Vec<ScoredRow> = (0..=40).map(row).collect();
         assert_eq!(Scores::new(&rows).unwrap().wrong_branch, 2.0 / 40.0);
+    }
+
+    /// Zero error over zero full scale is no number, and neither is what an estimate that is none leaves.
+    #[test]
+    fn there_is_no_percentage_of_a_constant() {
+        let row = |k: u32, truth: f64, strain: f64| ScoredRow { time_s: f64::from(k), truth, strain, sd: None };
+        let constant: Vec<ScoredRow> = (0..9).map(|k| row(k, 0.1, 0.1)).collect();
+        let lost: Vec<ScoredRow> = (0..9).map(|k| row(k, f64::from(k), f64::NAN)).collect();
+        let known: Vec<ScoredRow> = (0..9).map(|k| row(k, f64::from(k), 1.0)).collect();
+        for (rows, is_known) in [(constant, false), (lost, false), (known, true)] {
+            assert_eq!(Scores::of_full_scale(&rows).is_some(), is_known);
+        }
     }
 }
