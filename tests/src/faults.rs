@@ -5,11 +5,13 @@ use ohmstrain_bench_data::Trace;
 use ohmstrain_bench_data::faults::Episode;
 
 /// Time before a fault that the filter has to settle, of which the last third is scored, s.
-pub const BEFORE_S: f64 = 60.0;
+pub const BEFORE_S: f64 = 30.0;
 /// Time after a fault that is looked at, s.
-pub const AFTER_S: f64 = 60.0;
-/// A filter has recovered once its error stays within this share of the full scale of what it would have been.
+pub const AFTER_S: f64 = 40.0;
+/// A filter has recovered once its error, averaged over two seconds, stays within this share of the full scale of what it would
+/// have been.
 const RECOVERED: f64 = 0.03;
+const AVERAGED_S: f64 = 2.0;
 /// Normal deviates that hold 95 %.
 const TWO_SIDED: f64 = 1.959_963_984_540_054;
 
@@ -71,7 +73,9 @@ impl Score {
 
 /// Whether a row says that something is wrong with the reading, or with the use of the sensor.
 fn is_flagged(row: &Estimate) -> bool {
-    Flag::ALL.into_iter().any(|flag| row.flags.has(flag) && !matches!(flag, Flag::RampBorder | Flag::AtLimit))
+    Flag::ALL
+        .into_iter()
+        .any(|flag| row.flags.has(flag) && !matches!(flag, Flag::RampBorder | Flag::AtLimit | Flag::LongRun))
 }
 
 /// What a filter makes of a fault.
@@ -90,6 +94,15 @@ pub struct Answer {
 }
 
 impl Answer {
+    /// Adds other episodes.
+    pub fn merge(&mut self, other: Self) {
+        self.before.merge(&other.before);
+        self.during.merge(&other.during);
+        self.soon.merge(&other.soon);
+        self.later.merge(&other.later);
+        self.recovery_s.extend(other.recovery_s);
+    }
+
     /// Episodes that were over within five seconds of the fault's end, percent.
     #[must_use]
     pub fn recovered(&self) -> f64 {
@@ -132,7 +145,6 @@ pub fn answer(
         let rows = |time_s: f64| part.time_s.partition_point(|time| *time < time_s);
         let end_s =
             faulty.get(rows(until_s) + faulty.len() - part.len().min(faulty.len())).map_or(until_s, |row| row.0.time_s);
-        let mut recovery_s = 0.0;
         for (row, truth) in faulty.iter().filter(|row| row.1.is_finite()) {
             let time_s = row.time_s;
             let score = if time_s < from_s - BEFORE_S / 3.0 {
@@ -148,17 +160,25 @@ pub fn answer(
             };
             score.add(row, *truth, full_scale);
         }
-        for ((row, truth), (without, same)) in faulty.iter().rev().zip(clean.iter().rev()) {
-            if row.time_s < end_s {
-                break;
-            }
-            let worse = (row.strain - truth).abs() - (without.strain - same).abs();
-            if worse > RECOVERED * full_scale {
-                recovery_s = row.time_s - end_s;
-                break;
-            }
-        }
-        answer.recovery_s.push(recovery_s);
+        answer.recovery_s.push(recovery_s(&faulty, &clean, end_s, full_scale));
     }
     answer
+}
+
+/// Time after a fault's end at which the mean error was too large for the last time, s. Rows are compared from the end on, where
+/// both runs have the same.
+fn recovery_s(faulty: &[(Estimate, f64)], clean: &[(Estimate, f64)], end_s: f64, full_scale: f64) -> f64 {
+    let error = |(row, truth): &(Estimate, f64)| (row.strain - truth).abs();
+    let pairs = faulty.iter().rev().zip(clean.iter().rev());
+    let worse: Vec<(f64, f64)> = pairs
+        .take_while(|(row, _)| row.0.time_s >= end_s)
+        .map(|(row, without)| (row.0.time_s, error(row) - error(without)))
+        .filter(|(_, worse)| worse.is_finite())
+        .collect();
+    let too_large = |k: usize| {
+        let around: Vec<f64> =
+            worse[k..].iter().take_while(|row| worse[k].0 - row.0 < AVERAGED_S).map(|row| row.1).collect();
+        around.iter().sum::<f64>() > RECOVERED * full_scale * around.len() as f64
+    };
+    (0..worse.len()).find(|&k| too_large(k)).map_or(0.0, |k| worse[k].0 - end_s)
 }

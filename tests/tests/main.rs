@@ -7,6 +7,7 @@ mod capacity;
 mod consistency;
 mod cramer_rao;
 mod direction;
+mod faults;
 mod linear_oracles;
 mod long_run;
 mod mixture_smoother;

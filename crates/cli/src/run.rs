@@ -19,6 +19,9 @@ pub fn builder<'a>(sensor: &'a Sensor, args: &EstimateArgs) -> FilterBuilder<'a>
     if let Some(nis) = args.gate {
         builder = builder.gate(nis);
     }
+    if args.no_doubts {
+        builder = builder.without_doubts();
+    }
     if let Some(influence) = args.influence {
         builder = builder.influence(influence.0);
     }

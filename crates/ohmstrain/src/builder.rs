@@ -3,9 +3,10 @@ use std::ops::Range;
 use ohmstrain_calib::{EstimatorKind, Rows, Start, build_filter};
 use ohmstrain_ekf::{Guard, Influence, StepError};
 
+use crate::doubt::Doubt;
 use crate::estimate::Scale;
 use crate::filter::Kernel;
-use crate::{Error, Estimate, Filter, LaggedFilter, Reading, Sensor};
+use crate::{Error, Estimate, Filter, Flags, LaggedFilter, Reading, Sensor};
 
 /// How many readings in a row a gate turns down before it is the state that is doubted.
 const PATIENCE: u32 = 10;
@@ -41,6 +42,7 @@ pub struct FilterBuilder<'a> {
     initial_strain: Option<f64>,
     gate: Option<f64>,
     influence: Influence<f64>,
+    doubts: bool,
 }
 
 impl<'a> FilterBuilder<'a> {
@@ -53,6 +55,7 @@ impl<'a> FilterBuilder<'a> {
             initial_strain: None,
             gate: None,
             influence: INFLUENCE,
+            doubts: true,
         }
     }
 
@@ -139,6 +142,21 @@ impl<'a> FilterBuilder<'a> {
     #[must_use]
     pub const fn influence(self, influence: Influence<f64>) -> Self {
         Self { influence, ..self }
+    }
+
+    /// Intervals as the filter states them: not widened where it has just begun, finds its way back after a fault, or is used
+    /// outside of what calibration has seen. Smoothers never widen theirs; of these flags they have `long_run`.
+    ///
+    /// ```
+    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+    /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
+    /// let first = |row: ohmstrain::FilterBuilder| row.build()?.step(0.0, 1600.0);
+    /// assert!(first(sensor.filter().without_doubts())?.strain_sd < first(sensor.filter())?.strain_sd);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub const fn without_doubts(self) -> Self {
+        Self { doubts: false, ..self }
     }
 
     /// A filter that estimates each row from the readings up to it.
@@ -236,7 +254,7 @@ impl<'a> FilterBuilder<'a> {
         row: impl Fn(usize) -> (f64, Reading),
         mut take: impl FnMut(Range<usize>, &[Estimate]) -> Result<(), E>,
     ) -> Result<(), E> {
-        let Kernel { mut filter, scale } = self.kernel(self.kind().smoother())?;
+        let Kernel { mut filter, scale, doubt } = self.kernel(self.kind().smoother())?;
         let failed = |(row, source): (usize, StepError)| Error::Row { row, source };
         let relative = |k: usize| {
             let (time_s, reading) = row(k);
@@ -244,12 +262,16 @@ impl<'a> FilterBuilder<'a> {
         };
         let mut back = filter.way_back(Rows::new(len, &relative)).map_err(failed)?;
         let (mut outputs, mut estimates, mut first) = (Vec::new(), Vec::new(), len);
+        let start_s = if len > 0 { row(0).0 } else { 0.0 };
         while let Some(rows) = back.next_segment(&mut outputs).map_err(failed)? {
             first = rows.start;
             estimates.clear();
             estimates.extend(rows.clone().zip(&outputs).map(|(k, output)| {
                 let (time_s, reading) = row(k);
-                scale.row(time_s, reading, output)
+                let mut estimate = scale.row(time_s, reading, output);
+                estimate.flags =
+                    estimate.flags.and(doubt.map_or(Flags::NONE, |doubt| doubt.long_run(time_s - start_s)));
+                estimate
             }));
             take(rows, &estimates)?;
         }
@@ -269,7 +291,8 @@ impl<'a> FilterBuilder<'a> {
         filter.guard(self.guard()?);
         let mut scale = Scale::new(self.sensor)?;
         self.rest_resistance.map_or(Ok(()), |measured| scale.rest_at(measured))?;
-        Ok(Kernel { filter, scale })
+        let doubt = self.doubts.then(|| Doubt::new(params, self.initial_strain.is_some()));
+        Ok(Kernel { filter, scale, doubt })
     }
 
     fn start_at(&self, strain: f64) -> Result<Start, Error> {

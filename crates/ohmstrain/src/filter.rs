@@ -1,13 +1,32 @@
 use std::collections::VecDeque;
 use std::fmt;
 
+use ohmstrain_calib::Output;
+
+use crate::doubt::Doubt;
 use crate::estimate::Scale;
-use crate::{Error, Estimate, Reading};
+use crate::{Error, Estimate, Flags, Reading};
 
 /// A filter for the sizes of the sensor's law, and the way to it from readings and from it to rows.
 pub(crate) struct Kernel {
     pub filter: Box<dyn ohmstrain_calib::Filter>,
     pub scale: Scale,
+    /// None if intervals are to be as the filter states them.
+    pub doubt: Option<Doubt>,
+}
+
+/// The row of a reading and what the filter says of it, in doubt.
+fn doubted(
+    doubt: &mut Option<Doubt>,
+    scale: &Scale,
+    (time_s, reading): (f64, Reading),
+    mut output: Output,
+) -> Estimate {
+    let relative = reading.relative(scale.rest_reading).map(|reading| reading.value);
+    let flags = doubt.as_mut().map_or(Flags::NONE, |doubt| doubt.widen(time_s, relative, &mut output));
+    let mut row = scale.row(time_s, reading, &output);
+    row.flags = row.flags.and(flags);
+    row
 }
 
 /// A running filter: readings in, estimates out. It can be sent to another thread, and owned by an asynchronous task.
@@ -49,11 +68,11 @@ impl Filter {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn step(&mut self, time_s: f64, reading: impl Into<Reading>) -> Result<Estimate, Error> {
-        let Kernel { filter, scale } = &mut self.kernel;
+        let Kernel { filter, scale, doubt } = &mut self.kernel;
         let reading = reading.into();
         filter.step(time_s, reading.relative(scale.rest_reading))?;
         self.last = (time_s, reading);
-        Ok(scale.row(time_s, reading, &filter.output()))
+        Ok(doubted(doubt, scale, self.last, filter.output()))
     }
 
     /// Takes in that the strain (or angle) is known now, to `sd`: the estimate of the last row, and those after it, follow.
@@ -71,8 +90,9 @@ impl Filter {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn know(&mut self, strain: f64, sd: f64) -> Result<Estimate, Error> {
-        let Kernel { filter, scale } = &mut self.kernel;
+        let Kernel { filter, scale, doubt } = &mut self.kernel;
         filter.know(&scale.known(strain, sd)?)?;
+        doubt.iter_mut().for_each(Doubt::settle);
         let (time_s, reading) = self.last;
         Ok(scale.row(time_s, reading, &filter.output()))
     }
@@ -140,14 +160,13 @@ impl LaggedFilter {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn step(&mut self, time_s: f64, reading: impl Into<Reading>) -> Result<&[Estimate], Error> {
-        let (reading, scale, lag_s) = (reading.into(), self.kernel.scale, self.lag_s);
+        let (reading, lag_s) = (reading.into(), self.lag_s);
         self.forget_handed_out();
         self.waiting.push_back((time_s, reading));
+        let Kernel { filter, scale, doubt } = &mut self.kernel;
         let (waiting, due) = (&mut self.waiting, &mut self.due);
-        let mut out = |output| {
-            due.extend(waiting.pop_front().map(|(time_s, reading)| scale.row(time_s, reading, &output)));
-        };
-        let taken = self.kernel.filter.step_lagged(time_s, reading.relative(scale.rest_reading), lag_s, &mut out);
+        let mut out = |output| due.extend(waiting.pop_front().map(|row| doubted(doubt, scale, row, output)));
+        let taken = filter.step_lagged(time_s, reading.relative(scale.rest_reading), lag_s, &mut out);
         if taken.is_err() {
             self.waiting.pop_back();
         }
@@ -170,11 +189,11 @@ impl LaggedFilter {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn finish(&mut self) -> Result<&[Estimate], Error> {
-        let scale = self.kernel.scale;
         self.forget_handed_out();
+        let Kernel { filter, scale, doubt } = &mut self.kernel;
         let (waiting, due) = (&mut self.waiting, &mut self.due);
-        self.kernel.filter.flush_lagged(&mut |output| {
-            due.extend(waiting.pop_front().map(|(time_s, reading)| scale.row(time_s, reading, &output)));
+        filter.flush_lagged(&mut |output| {
+            due.extend(waiting.pop_front().map(|row| doubted(doubt, scale, row, output)))
         })?;
         self.are_out = true;
         Ok(&self.due)
@@ -195,8 +214,10 @@ impl LaggedFilter {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn know(&mut self, strain: f64, sd: f64) -> Result<(), Error> {
-        let Kernel { filter, scale } = &mut self.kernel;
-        Ok(filter.know(&scale.known(strain, sd)?)?)
+        let Kernel { filter, scale, doubt } = &mut self.kernel;
+        filter.know(&scale.known(strain, sd)?)?;
+        doubt.iter_mut().for_each(Doubt::settle);
+        Ok(())
     }
 
     /// As [`Filter::rest_resistance`].

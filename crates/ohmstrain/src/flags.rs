@@ -40,15 +40,23 @@ pub enum Flag {
     RampBorder,
     /// The strain stands at a limit.
     AtLimit,
+    /// The filter has only just begun, where nobody said at which strain.
+    StartUp,
+    /// Readings have jumped, or come again after there were none to be believed: the estimate finds its way back.
+    Recovering,
+    /// Readings are, or have been, outside of calibration's, or the strain changes much faster.
+    Extrapolated,
+    /// It has been running for longer than any recording of the calibration.
+    LongRun,
 }
 
 impl Flag {
     /// All of them.
     ///
     /// ```
-    /// assert_eq!(ohmstrain::Flag::ALL.len(), 9);
+    /// assert_eq!(ohmstrain::Flag::ALL.len(), 13);
     /// ```
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 13] = [
         Self::Missing,
         Self::Saturated,
         Self::Rejected,
@@ -58,6 +66,10 @@ impl Flag {
         Self::Readmitted,
         Self::RampBorder,
         Self::AtLimit,
+        Self::StartUp,
+        Self::Recovering,
+        Self::Extrapolated,
+        Self::LongRun,
     ];
 
     /// Its name in `estimates.csv`.
@@ -77,6 +89,10 @@ impl Flag {
             Self::Readmitted => "readmitted",
             Self::RampBorder => "ramp_border",
             Self::AtLimit => "at_limit",
+            Self::StartUp => "start_up",
+            Self::Recovering => "recovering",
+            Self::Extrapolated => "extrapolated",
+            Self::LongRun => "long_run",
         }
     }
 }
@@ -99,6 +115,19 @@ impl Flags {
     #[must_use]
     pub const fn with(self, flag: Flag, raised: bool) -> Self {
         Self(self.0 | (raised as u16) << flag as u16)
+    }
+
+    /// Those of either.
+    ///
+    /// ```
+    /// use ohmstrain::{Flag, Flags};
+    ///
+    /// let either = Flags::NONE.with(Flag::Stuck, true).and(Flags::NONE.with(Flag::AtLimit, true));
+    /// assert_eq!(either.to_string(), "stuck|at_limit");
+    /// ```
+    #[must_use]
+    pub const fn and(self, others: Self) -> Self {
+        Self(self.0 | others.0)
     }
 
     /// Whether one is raised.

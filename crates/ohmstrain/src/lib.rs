@@ -26,6 +26,7 @@ mod builder;
 mod calibrate;
 mod closing;
 mod column;
+mod doubt;
 mod error;
 mod estimate;
 mod explain;

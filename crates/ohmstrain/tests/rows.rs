@@ -48,7 +48,7 @@ fn serialised_rows_have_the_columns_of_estimates_csv() {
         let names: Vec<&str> = sensor.columns().iter().map(|column| column.name()).collect();
         assert_eq!(names.join(","), header);
         let missing: Vec<&str> = lines[2].split(',').collect();
-        assert_eq!((missing[1], missing[15], missing[16]), ("", "", "missing"));
+        assert_eq!((missing[1], missing[15], missing[16]), ("", "", "missing|start_up"));
     }
 }
 

@@ -33,6 +33,9 @@ pub struct EstimateArgs {
     /// student-t:DOF, or none, as they are [default: redescending:3]
     #[arg(long, value_name = "redescending:K|huber:K|student-t:DOF|none")]
     pub influence: Option<BoundedInfluence>,
+    /// Leave intervals as the filter states them: not wider at a start, after a fault, or outside of the calibration
+    #[arg(long)]
+    pub no_doubts: bool,
     /// Overrides of the recording's metadata
     #[command(flatten)]
     pub trace: TraceArgs,

@@ -1,0 +1,108 @@
+//! Where the interval is wider than the filter states, and the flags that say why.
+
+use ohmstrain::{Estimate, Filter, Flag, Sensor};
+
+/// Calibrated on 200 s, with readings of 1599 to 3703 ohms.
+fn sensor() -> Sensor {
+    Sensor::from_toml(&std::fs::read_to_string("examples/sensor.toml").unwrap()).unwrap()
+}
+
+/// Twenty rows a second of a level with a noise of one ohm, from `from` on.
+fn run(filter: &mut Filter, rows: std::ops::Range<i32>, ohm: f64) -> Vec<Estimate> {
+    rows.map(|k| filter.step(0.05 * f64::from(k), ohm + f64::from(k % 3 - 1)).unwrap()).collect()
+}
+
+/// Rows with a flag.
+fn flagged(rows: &[Estimate], flag: Flag) -> usize {
+    rows.iter().filter(|row| row.flags.has(flag)).count()
+}
+
+/// The deviation that doubts add to the one that is stated.
+fn more((doubted, stated): &(Estimate, Estimate)) -> f64 {
+    (doubted.strain_sd.powi(2) - stated.strain_sd.powi(2)).sqrt()
+}
+
+/// With and without doubts, the same rows.
+fn both(of: impl Fn(&mut Filter) -> Vec<Estimate>) -> Vec<(Estimate, Estimate)> {
+    let sensor = sensor();
+    let mut filters = [sensor.filter(), sensor.filter().without_doubts()].map(|builder| builder.build().unwrap());
+    let [doubted, stated] = filters.each_mut().map(of);
+    doubted.into_iter().zip(stated).collect()
+}
+
+/// A tenth of the span, 0.0333, at the start, of which exp(-4/5) is left as variance after four seconds, and nothing after sixty.
+#[test]
+fn a_start_is_doubted_for_seconds() {
+    let rows = both(|filter| run(filter, 0..1200, 2000.0));
+    let expected = |seconds: f64| 0.033333 * (-0.5 * seconds / 5.0).exp();
+    for k in [0, 80] {
+        let more = more(&rows[k]);
+        assert!((more / expected(0.05 * k as f64) - 1.0).abs() < 1e-6, "{k}: {more}");
+    }
+    assert!((rows[1199].0.strain_sd / rows[1199].1.strain_sd - 1.0).abs() < 1e-3);
+    let (doubted, stated): (Vec<_>, Vec<_>) = rows.into_iter().unzip();
+    assert!(doubted[0].flags.has(Flag::StartUp) && !doubted[1199].flags.has(Flag::StartUp));
+    assert_eq!(flagged(&stated, Flag::StartUp), 0);
+}
+
+#[test]
+fn a_strain_that_is_known_is_not_doubted() {
+    let sensor = sensor();
+    let mut known = sensor.filter().initial_strain(0.1).build().unwrap();
+    assert_eq!(flagged(&run(&mut known, 0..100, 2000.0), Flag::StartUp), 0);
+    let mut told = sensor.filter().build().unwrap();
+    let before = run(&mut told, 0..20, 2000.0)[19];
+    let after = told.know(0.1, 0.002).unwrap();
+    assert!(before.strain_sd > 10.0 * after.strain_sd);
+    assert_eq!(flagged(&run(&mut told, 20..40, 2000.0), Flag::StartUp), 0);
+}
+
+#[test]
+fn readings_that_come_again_are_believed_little_by_little() {
+    let rows = both(|filter| {
+        let mut rows = run(filter, 0..800, 2000.0);
+        rows.extend((800..1200).map(|k| filter.step(0.05 * f64::from(k), None).unwrap()));
+        rows.extend(run(filter, 1200..1800, 2100.0));
+        rows
+    });
+    // The first row after the pause has the pause's variance besides its own, up to half the span; half a minute later all is
+    // as it was.
+    let lost = rows[800..1200].iter().map(|row| row.1.strain_sd).fold(0.0, f64::max).min(0.5 * 0.33333);
+    assert!((more(&rows[1200]) / lost - 1.0).abs() < 1e-6, "{} {lost}", more(&rows[1200]));
+    assert!((rows[1799].0.strain_sd / rows[1799].1.strain_sd - 1.0).abs() < 0.01);
+    let doubted: Vec<Estimate> = rows.into_iter().map(|row| row.0).collect();
+    assert_eq!(flagged(&doubted[600..1200], Flag::Recovering), 0);
+    assert!(doubted[1200].flags.has(Flag::Recovering) && !doubted[1799].flags.has(Flag::Recovering));
+}
+
+/// A jump that the filter does not expect: at once it states nearly what it stated before, while it may be the contacts.
+#[test]
+fn a_jump_is_doubted() {
+    let rows = both(|filter| {
+        let mut rows = run(filter, 0..800, 2000.0);
+        rows.extend(run(filter, 800..820, 3000.0));
+        rows
+    });
+    assert!(rows[801].0.flags.has(Flag::Recovering), "{}", rows[801].0.flags);
+    // 1000 Ω of the calibration's 2104 are 0.158 of strain; most of that is a surprise.
+    assert!((0.08..0.159).contains(&more(&rows[801])), "{}", more(&rows[801]));
+    assert_eq!(flagged(&rows[..800].iter().map(|row| row.0).collect::<Vec<_>>(), Flag::Recovering), 0);
+}
+
+/// 4201 Ω are 498 Ω beyond the calibration's 2104, of which a fiftieth is free; the rest counts twice: 0.433 of the span.
+#[test]
+fn readings_outside_of_calibration_widen_the_interval() {
+    let rows = both(|filter| run(filter, 0..1200, 4200.0));
+    let expected = 2.0 * 0.33333 * ((4200.0 + 1.0 - 3703.107) / (3703.107 - 1598.905) - 0.02);
+    let more = more(&rows[1199]);
+    assert!((more / expected - 1.0).abs() < 0.01, "{more} {expected}");
+    assert!(rows[1199].0.flags.has(Flag::Extrapolated) && !rows[1199].1.flags.has(Flag::Extrapolated));
+}
+
+#[test]
+fn a_long_run_is_flagged() {
+    let sensor = sensor();
+    let mut filter = sensor.filter().build().unwrap();
+    let long = |time_s: f64, filter: &mut Filter| filter.step(time_s, 2000.0).unwrap().flags.has(Flag::LongRun);
+    assert_eq!([10.0, 209.0, 211.0].map(|time_s| long(time_s, &mut filter)), [false, false, true]);
+}

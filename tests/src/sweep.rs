@@ -1,0 +1,123 @@
+//! The sweep of faults: which ones, how much, on which recordings, and a row of its table.
+
+use ohmstrain::{EstimatorKind, Sensor};
+use ohmstrain_bench_data::Trace;
+use ohmstrain_bench_data::faults::{Episode, Fault};
+use ohmstrain_bench_data::simulate::{Material, Protocol, SettingsError, SimulationSettings, simulate};
+
+use crate::faults::{AFTER_S, Answer, BEFORE_S, answer};
+
+/// A sensor calibrated on the first half of the demo's recording: `ohmstrain demo --seed 1`, version 0.1.0.
+pub const SENSOR: &str = include_str!("../fixtures/representative.toml");
+/// Times at which every fault begins.
+const ONSETS: usize = 6;
+/// The calibration's rows are not scored.
+const CALIBRATED_UNTIL_S: f64 = 200.0;
+
+/// A fault with its severity and how long it lasts, s.
+#[derive(Clone, Copy, Debug)]
+pub struct Case {
+    /// As the table names it.
+    pub name: &'static str,
+    /// What goes wrong.
+    pub fault: Fault,
+    /// For how long, s.
+    pub lasts_s: f64,
+}
+
+const fn case(name: &'static str, fault: Fault, lasts_s: f64) -> Case {
+    Case { name, fault, lasts_s }
+}
+
+/// Every fault, mild and severe. The sensor reads 1.6 to 3.8 kΩ.
+pub const CASES: [Case; 35] = [
+    case("nothing", Fault::Dropout { share: 0.0 }, 10.0),
+    case("dropout, every other reading, 20 s", Fault::Dropout { share: 0.5 }, 20.0),
+    case("dropout, all, 2 s", Fault::Dropout { share: 1.0 }, 2.0),
+    case("dropout, all, 20 s", Fault::Dropout { share: 1.0 }, 20.0),
+    case("burst of noise, 2 % of R₀, 10 s", Fault::Burst { sd: 0.02 }, 10.0),
+    case("burst of noise, 20 % of R₀, 10 s", Fault::Burst { sd: 0.2 }, 10.0),
+    case("one spike, × 1.3", Fault::Spike { factor: 1.3 }, 0.05),
+    case("one spike, × 10", Fault::Spike { factor: 10.0 }, 0.05),
+    case("spikes × 1.3, 5 % of the rows, 20 s", Fault::Spikes { share: 0.05, factor: 1.3 }, 20.0),
+    case("spikes × 10, 1 % of the rows, 20 s", Fault::Spikes { share: 0.01, factor: 10.0 }, 20.0),
+    case("stuck, 2 s", Fault::Stuck, 2.0),
+    case("stuck, 20 s", Fault::Stuck, 20.0),
+    case("saturated in the upper 20 %, 20 s", Fault::Saturation { share: 0.8 }, 20.0),
+    case("saturated in the upper 60 %, 20 s", Fault::Saturation { share: 0.4 }, 20.0),
+    case("unplugged, 5 kΩ, 2 s", Fault::UnpluggedHigh { reading: 5000.0 }, 2.0),
+    case("unplugged, 210 kΩ, 2 s", Fault::UnpluggedHigh { reading: 210e3 }, 2.0),
+    case("one code below the rail, 10.2 MΩ, 20 s", Fault::UnpluggedHigh { reading: 10.2e6 }, 20.0),
+    case("unplugged, 1 kΩ, 5 s", Fault::UnpluggedLow { reading: 1000.0 }, 5.0),
+    case("short circuit, 1.6 Ω, 5 s", Fault::UnpluggedLow { reading: 1.6 }, 5.0),
+    case("step in baseline, 5 % of R₀, 10 s", Fault::BaselineStep { share: 0.05 }, 10.0),
+    case("step in baseline, 50 % of R₀, 10 s", Fault::BaselineStep { share: 0.5 }, 10.0),
+    case("gain × 1.1, 20 s", Fault::GainChange { factor: 1.1 }, 20.0),
+    case("gain × 1.5, 20 s", Fault::GainChange { factor: 1.5 }, 20.0),
+    case("polarity flipped, 10 s", Fault::PolarityFlip, 10.0),
+    case("jitter, 10 % of a step, 20 s", Fault::Jitter { share: 0.1 }, 20.0),
+    case("jitter, 40 % of a step, 20 s", Fault::Jitter { share: 0.4 }, 20.0),
+    case("duplicated, 20 % of the rows, 20 s", Fault::Duplicated { share: 0.2 }, 20.0),
+    case("late, 20 % of the rows, 20 s", Fault::Late { share: 0.2 }, 20.0),
+    case("R₀ × 1.05, 20 s", Fault::WrongRest { factor: 1.05 }, 20.0),
+    case("R₀ × 1.1, 20 s", Fault::WrongRest { factor: 1.1 }, 20.0),
+    case("R₀ × 1.2, 20 s", Fault::WrongRest { factor: 1.2 }, 20.0),
+    case("R₀ × 0.9, 20 s", Fault::WrongRest { factor: 0.9 }, 20.0),
+    case("slipped by 2 % strain, 20 s", Fault::Slipped { by: 0.02 }, 20.0),
+    case("clock 5 % fast, 20 s", Fault::WrongRate { factor: 1.05 }, 20.0),
+    case("clock twice as fast, 20 s", Fault::WrongRate { factor: 2.0 }, 20.0),
+];
+
+/// The rest of the recording that was calibrated on, and another one of the same sensor.
+///
+/// # Errors
+/// Never: a bench can have these settings.
+pub fn recordings() -> Result<[Trace; 2], SettingsError> {
+    let recording = |seed: u64| {
+        simulate(&SimulationSettings {
+            speed_mm_s: 5.0,
+            mismatched: true,
+            seed,
+            ..SimulationSettings::new(Material::Representative, Protocol::MIXED)
+        })
+    };
+    Ok([recording(1)?, recording(2)?])
+}
+
+/// What the sensor's default, or another estimator, makes of a fault on one or more recordings.
+#[must_use]
+pub fn answer_to(sensor: &Sensor, kind: EstimatorKind, case: &Case, traces: &[Trace]) -> Answer {
+    let mut sum = Answer::default();
+    for trace in traces {
+        let strain = trace.reference.iter().flat_map(|reference| &reference.values);
+        let (low, high) = strain.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)));
+        let last_s = trace.time_s.last().copied().unwrap_or(0.0) - AFTER_S - case.lasts_s;
+        let first_s = CALIBRATED_UNTIL_S.max(BEFORE_S);
+        // An odd fraction of a second, so that no onset is a turn of the machine.
+        let onset = |k: usize| first_s + 0.73 + (last_s - first_s - 1.0) * k as f64 / (ONSETS - 1) as f64;
+        let onsets: [f64; ONSETS] = std::array::from_fn(onset);
+        let episode = Episode { fault: case.fault, from_s: 0.0, until_s: case.lasts_s, seed: 1 };
+        sum.merge(answer(sensor.filter().estimator(kind), trace, (episode, &onsets), high - low));
+    }
+    sum
+}
+
+/// A row of the table, in Markdown.
+#[must_use]
+pub fn row(sensor: &Sensor, kind: EstimatorKind, case: &Case, traces: &[Trace]) -> String {
+    let said = answer_to(sensor, kind, case, traces);
+    let cell = |score: &crate::faults::Score| format!("{:.1} ({:.0})", score.rmse(), score.coverage());
+    format!(
+        "| {} | {} | {} | {} | {} | {} | {:.0} | {:.0} | {:.0} | {:.0} |",
+        case.name,
+        if kind == EstimatorKind::Ekf { "EKF" } else { "default" },
+        cell(&said.before),
+        cell(&said.during),
+        cell(&said.soon),
+        cell(&said.later),
+        said.during.flagged(),
+        said.during.silent(),
+        said.recovered(),
+        said.slowest_s()
+    )
+}
