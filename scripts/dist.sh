@@ -12,8 +12,8 @@ binary=${CARGO_TARGET_DIR:-target}/$target/dist/ohmstrain
 name=ohmstrain-$("$binary" --version | cut -d' ' -f2)-$target
 rm -rf "dist/$name"
 mkdir -p "dist/$name/completions"
-cp "$binary" README.md CHANGELOG.md LICENSE-MIT LICENSE-APACHE "dist/$name"
-cp -r docs "dist/$name/docs"
+cp "$binary" README.md NOTATION.md CHANGELOG.md LICENSE-MIT LICENSE-APACHE "dist/$name"
+cp -r docs guide "dist/$name"
 "$binary" man -o "dist/$name/man"
 for shell in bash zsh fish powershell elvish; do
     "$binary" completions "$shell" >"dist/$name/completions/ohmstrain.$shell"
