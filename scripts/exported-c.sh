@@ -48,7 +48,7 @@ report() {
 
 # QEMU's semihosting console is its standard error.
 qemu() {
-    timeout 60 qemu-system-arm -M mps2-an386 -icount shift=0 -nographic -monitor none -serial none \
+    timeout 300 qemu-system-arm -M mps2-an386 -icount shift=0 -nographic -monitor none -serial none \
         -semihosting-config enable=on,target=native -kernel "$1" </dev/null
 }
 
@@ -76,17 +76,24 @@ on_target() {
 }
 
 "$ohmstrain" simulate --protocol mixed --speed-mm-s 5 --sample-rate-hz 5 -o "$work/trace.csv"
-for gauge in polynomial:2 polynomial:0 decaying-exponential:1 tunnelling:3; do
-    name=${gauge%:*}-${gauge#*:}
-    "$ohmstrain" calibrate "$work/trace.csv" --estimator ekf --gauge "${gauge%:*}" --branches "${gauge#*:}" \
-        -o "$work/$name.toml"
+for kind in polynomial:2:corrected polynomial:0:ekf decaying-exponential:1:sign-split tunnelling:3:hypotheses; do
+    IFS=: read -r gauge branches estimator <<<"$kind"
+    name=$gauge-$branches-$estimator
+    "$ohmstrain" --quiet calibrate "$work/trace.csv" --until 120 --estimator "$estimator" --gauge "$gauge" \
+        --branches "$branches" -o "$work/$name.toml"
     folder=$work/$name
-    "$ohmstrain" export --sensor "$work/$name.toml" --target c --dt-s 0.02 -o "$folder"
-    "$ohmstrain" export --sensor "$work/$name.toml" --target rust --dt-s 0.02 -o "$folder/rust"
+    "$ohmstrain" export --sensor "$work/$name.toml" --target c --dt-s 0.2 -o "$folder"
+    "$ohmstrain" export --sensor "$work/$name.toml" --target rust --dt-s 0.2 -o "$folder/rust"
     on_host "$folder" gcc -O2
+    on_host "$folder" gcc -O1 -fsanitize=address,undefined -fno-sanitize-recover
     on_host "$folder" clang -O2
     on_target "$folder" cortex-m4f "${m4f[@]}"
     on_target "$folder" cortex-m0+ "${m0[@]}"
+    g++ -std=c++11 -fsyntax-only -Wall -Wextra -Werror -I"$folder/ohmstrain" -x c++ "$folder/ohmstrain/ohmstrain.c"
+    if gcc -std=c99 -ffast-math -fsyntax-only -I"$folder/ohmstrain" "$folder/ohmstrain/ohmstrain.c" 2>/dev/null; then
+        echo "-ffast-math was not refused" >&2
+        exit 1
+    fi
     g++ -std=gnu++11 -fsyntax-only -Wall -Wextra -Werror -I"$here" -include Arduino.h -I"$folder/ohmstrain" \
         -x c++ "$folder/ohmstrain/ohmstrain.ino"
     g++ -std=gnu++11 -fsyntax-only -Wall -Wextra -Werror -DARDUINO_ARCH_ESP32 -I"$here" -include Arduino.h \

@@ -199,8 +199,8 @@ impl PhaseFilter {
         let phases = estimator.phases.ok_or_else(|| {
             CalibrationError::Unsupported(format!("`{}` needs `phases` in its parameters", kind.name()))
         })?;
-        let dwell = Dwell::new(phases.hold_time_s, phases.move_time_s, phases.reversal)?;
-        let hold = (phases.hold_time_s > 0.0 && phases.reversal < 1.0).then_some(dwell);
+        let dwell = phases.dwell()?;
+        let hold = phases.rests().then_some(dwell);
         Ok(Self { dwell, hold, evidence: Evidence::new(limits.to_model(), phases.tempering)? })
     }
 }
@@ -215,9 +215,9 @@ fn interval(estimator: &EstimatorParams, setting: Setting) -> Interval {
 }
 
 /// Capacity of the sign-split filter.
-pub(crate) const HYPOTHESES: usize = 8;
+pub const HYPOTHESES: usize = 8;
 /// Capacity of the filter of phase histories.
-pub(crate) const HISTORIES: usize = 8;
+pub const HISTORIES: usize = 8;
 /// Particles.
 #[cfg(feature = "particles")]
 const PARTICLES: usize = 4000;

@@ -134,7 +134,7 @@ pub fn calibrate(
     let named: Vec<EstimatorKind> = kinds.iter().copied().filter(|kind| *kind != EstimatorKind::Corrected).collect();
     let candidates = if corrects { RECIPE.candidates(stats.hold_s.is_some()) } else { &[] };
     let wanted = distinct(candidates.iter().chain(&named).copied());
-    let mut steps = Steps { done: 0, expected: expected_evaluations(&wanted, &laws, structures.len()), progress };
+    let mut steps = Steps { done: 0, expected: expected_evaluations(&wanted, &laws), progress };
     let surveyed = survey_all(recordings, &laws, stats, (&wanted, candidates), &mut || steps.evaluated())?;
     let cost = |one: &&Surveyed| one.tuned.cost + handicap(one.kind);
     let cheapest = |a: &&Surveyed, b: &&Surveyed| cost(a).total_cmp(&cost(b));
@@ -148,9 +148,9 @@ pub fn calibrate(
     let all_kinds = distinct(wanted.iter().copied().chain(smoothers).chain([EstimatorKind::Ekf]));
     let mut estimators = BTreeMap::new();
     for kind in all_kinds {
-        let known = surveyed.iter().filter(|one| one.kind == kind && std::ptr::eq(one.law, fit));
-        let best = refined(recordings, (fit, stats), kind, &known.collect::<Vec<_>>(), &mut || steps.evaluated())?;
-        estimators.extend(best.map(|best| (kind, best)));
+        let known = surveyed.iter().find(|one| one.kind == kind && std::ptr::eq(one.law, fit));
+        let params = refined(recordings, (fit, stats), kind, known, &mut || steps.evaluated())?;
+        estimators.insert(kind, params);
     }
     let mut progress = steps.progress;
     worth_something(&estimators, &stats, fit.law.law.range)?;
@@ -243,10 +243,8 @@ impl<P: FnMut(Stage)> Steps<P> {
 }
 
 /// Evaluations to expect, near enough for a progress bar: surveys, and one refinement of the best filter and of the EKF.
-fn expected_evaluations(wanted: &[EstimatorKind], laws: &[CrossFit], structures: usize) -> u64 {
-    let surveys: u64 = wanted.iter().map(|kind| survey_evaluations(*kind, laws.len(), structures)).sum();
-    let fits: u64 = wanted.iter().map(|kind| kind.motion_families().len() as u64).max().unwrap_or(0) + 1;
-    surveys + SURVEY.evaluations() + fits * REFINEMENT.evaluations()
+fn expected_evaluations(wanted: &[EstimatorKind], laws: &[CrossFit]) -> u64 {
+    (wanted.len() as u64) * survey_evaluations(laws.len()) + SURVEY.evaluations() + 2 * REFINEMENT.evaluations()
 }
 
 /// Surveys estimators under the laws. Of the candidates for a correction the first one is tried under all of them, the
@@ -267,26 +265,20 @@ fn survey_all<'a>(
     Ok(surveyed)
 }
 
-/// Noise and motion of an estimator under a law, with the family of motions that serves it best; `known` surveys are not
-/// made again.
+/// Noise and motion of an estimator under a law; a `known` survey is not made again.
 fn refined(
     recordings: &[Samples],
     (fit, stats): (&CrossFit, MotionStats),
     kind: EstimatorKind,
-    known: &[&Surveyed],
+    known: Option<&Surveyed>,
     evaluated: &mut dyn FnMut(),
-) -> Result<Option<EstimatorParams>, CalibrationError> {
-    let mut best: Option<EstimatorParams> = None;
-    for &family in kind.motion_families() {
-        let problem = NoiseProblem::new(recordings, fit, stats, (kind, family));
-        let tuned = match known.iter().find(|one| one.family == family) {
-            Some(known) => known.tuned.clone(),
-            None => problem.search(None, SURVEY, &mut *evaluated)?,
-        };
-        let params = problem.refine(&tuned, &mut *evaluated)?;
-        best = best.filter(|best| best.score <= params.score).or(Some(params));
-    }
-    Ok(best)
+) -> Result<EstimatorParams, CalibrationError> {
+    let problem = NoiseProblem::new(recordings, fit, stats, kind);
+    let tuned = match known {
+        Some(known) => known.tuned.clone(),
+        None => problem.search(None, SURVEY, &mut *evaluated)?,
+    };
+    problem.refine(&tuned, &mut *evaluated)
 }
 
 fn distinct(kinds: impl Iterator<Item = EstimatorKind>) -> Vec<EstimatorKind> {

@@ -6,7 +6,8 @@ use ohmstrain_ekf::{Gaussian, Guard, Reading, ReadingVerdict, StepError};
 
 use crate::CalibrationError;
 use crate::correction_params::{
-    CorrectionParams, FILTER_INPUTS, FUTURE_FEATURES, SMOOTHER_INPUTS, filter_inputs, smoother_inputs,
+    CorrectionParams, CorrectorParams, FILTER_INPUTS, FUTURE_FEATURES, SMOOTHER_INPUTS, TrainingRow, filter_inputs,
+    smoother_inputs,
 };
 use crate::corrector::{Corrector, Examples};
 use crate::filter::{Filter, Output, Rows, WayBack};
@@ -73,19 +74,11 @@ impl Corrected {
         params: &CorrectionParams,
         limits: RangeParams,
     ) -> Result<Self, CalibrationError> {
-        let rows = &params.rows;
-        let (strain, time_s): (Vec<f64>, Vec<f64>) = rows.iter().map(|row| (row.strain, row.time_s)).unzip();
-        let of_filter: Vec<_> = rows.iter().map(|row| row.filter_inputs()).collect();
-        let of_smoother: Vec<_> = rows.iter().map(|row| row.smoother_inputs()).collect();
-        let singular = || CalibrationError::Unsupported("`correction` of rows that nothing can be learned from".into());
-        let (strain, time_s) = (strain.as_slice(), time_s.as_slice());
-        let filter_examples = Examples { inputs: &of_filter, strain, time_s, limits };
-        let smoother_examples = Examples { inputs: &of_smoother, strain, time_s, limits };
         let scale = params.feature_scale();
         Ok(Self {
             filter,
-            of_filter: Corrector::new(&params.filter, filter_examples).ok_or_else(singular)?,
-            of_smoother: Corrector::new(&params.smoother, smoother_examples).ok_or_else(singular)?,
+            of_filter: learned_for_filter(params, limits)?,
+            of_smoother: learned(&params.smoother, &params.rows, TrainingRow::smoother_inputs, limits)?,
             scale,
             readings: Readings::new(scale),
             said: None,
@@ -133,6 +126,27 @@ impl Corrected {
             out(output);
         }
     }
+}
+
+/// What corrects the filter's strain.
+pub(crate) fn learned_for_filter(
+    params: &CorrectionParams,
+    limits: RangeParams,
+) -> Result<Corrector<FILTER_INPUTS>, CalibrationError> {
+    learned(&params.filter, &params.rows, TrainingRow::filter_inputs, limits)
+}
+
+fn learned<const D: usize>(
+    params: &CorrectorParams,
+    rows: &[TrainingRow],
+    inputs: impl Fn(&TrainingRow) -> [f64; D],
+    limits: RangeParams,
+) -> Result<Corrector<D>, CalibrationError> {
+    let (strain, time_s): (Vec<f64>, Vec<f64>) = rows.iter().map(|row| (row.strain, row.time_s)).unzip();
+    let inputs: Vec<_> = rows.iter().map(inputs).collect();
+    let examples = Examples { inputs: &inputs, strain: &strain, time_s: &time_s, limits };
+    let singular = || CalibrationError::Unsupported("`correction` of rows that nothing can be learned from".into());
+    Corrector::new(params, examples).ok_or_else(singular)
 }
 
 /// The reading of a row, unless it was kept from the filter, or a guard would rather have.

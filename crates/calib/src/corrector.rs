@@ -29,23 +29,23 @@ pub(crate) struct Examples<'a, const D: usize> {
 pub(crate) struct Corrector<const D: usize> {
     rows: Vec<[f64; D]>,
     scales: [InputScale<f64>; D],
-    direct: Learned,
-    residual: Learned,
+    pub direct: Learned,
+    pub residual: Learned,
     limits: RangeParams,
     strain_variance: f64,
     variance_factor: f64,
 }
 
 /// A process with its weights.
-struct Learned {
-    length: f64,
-    mean: f64,
-    weights: Vec<f64>,
-    explained: Vec<f64>,
-    variance: f64,
-    noise: f64,
-    widening: f64,
-    least_variance: f64,
+pub(crate) struct Learned {
+    pub length: f64,
+    pub mean: f64,
+    pub weights: Vec<f64>,
+    pub explained: Vec<f64>,
+    pub variance: f64,
+    pub noise: f64,
+    pub widening: f64,
+    pub least_variance: f64,
 }
 
 /// Examples on the scale that their inputs have, and the targets of both processes.

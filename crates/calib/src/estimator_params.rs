@@ -1,3 +1,4 @@
+use ohmstrain_ekf::Dwell;
 use ohmstrain_model::{ModelNoise, Motion, ParameterError};
 use serde::{Deserialize, Serialize};
 
@@ -68,24 +69,6 @@ impl EstimatorKind {
     }
 }
 
-/// Families of priors on how the body moves.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum MotionFamily {
-    OrnsteinUhlenbeck,
-    /// With an acceleration.
-    Smooth,
-}
-
-impl EstimatorKind {
-    /// What an estimator is tried with: sign-split with both, which serve different recordings.
-    pub(crate) const fn motion_families(self) -> &'static [MotionFamily] {
-        match self.tuned_as() {
-            Self::SignSplit => &[MotionFamily::OrnsteinUhlenbeck, MotionFamily::Smooth],
-            _ => &[MotionFamily::OrnsteinUhlenbeck],
-        }
-    }
-}
-
 /// Noise and motion as one estimator needs them.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -121,6 +104,22 @@ pub struct PhaseParams {
     pub speed_per_s: f64,
     /// Power to which a reading's likelihood enters the weights of the hypotheses.
     pub tempering: f64,
+}
+
+impl PhaseParams {
+    /// How long phases last and what follows them.
+    ///
+    /// # Errors
+    /// If a number is out of its range.
+    pub fn dwell(&self) -> Result<Dwell<f64>, ParameterError> {
+        Dwell::new(self.hold_time_s, self.move_time_s, self.reversal)
+    }
+
+    /// Whether the body rests at times.
+    #[must_use]
+    pub fn rests(&self) -> bool {
+        self.hold_time_s > 0.0 && self.reversal < 1.0
+    }
 }
 
 /// Noise of the law, relative to R₀.

@@ -45,6 +45,7 @@ mod motion_stats;
 mod noise_fit;
 mod optimise;
 mod params;
+mod portable;
 mod recipe;
 mod rest;
 mod robust_loss;
@@ -63,7 +64,7 @@ mod way_back;
 pub use baselines::{Baseline, Baselines, Features, Fir, LeakyBank, LowPassMode, Regression, StaticCubic};
 #[cfg(feature = "bootstrap")]
 pub use bootstrap::{Bootstrap, bootstrap_law};
-pub use build_filter::{PARTICLE_SEED, build_filter};
+pub use build_filter::{HISTORIES, HYPOTHESES, PARTICLE_SEED, build_filter};
 pub use calibrate::{Calibration, Stage, calibrate};
 pub use corrected::SURPRISING_NIS;
 pub use correction_params::{CorrectionParams, CorrectorParams, FUTURE_FEATURES, TrainingRow};
@@ -81,6 +82,7 @@ pub use law_structures::{StructureScore, compare_structures};
 pub use params::{
     FORMAT, JointParams, Quantity, RangeParams, ReadingUnit, RecordingInfo, SensorParams, Uncertainty, Validity,
 };
+pub use portable::{PortableCorrection, PortableFilter, PortableProcess, PortableSieve};
 pub use recipe::{RECIPE, Recipe};
 pub use samples::{Samples, SamplesError};
 pub use scores::{ScoredRow, Scores};

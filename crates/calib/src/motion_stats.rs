@@ -9,7 +9,6 @@ pub(crate) struct MotionStats {
     pub rate_sd: f64,
     /// Time after which the rate's autocorrelation has fallen to 1/e.
     pub rate_time_s: f64,
-    pub acceleration_sd: f64,
     /// Mean durations of holds and of movements in one direction; `None` for a body that never rests.
     pub hold_s: Option<f64>,
     pub move_s: f64,
@@ -32,7 +31,7 @@ const HALF_WINDOW: usize = 2;
 
 impl MotionStats {
     pub(crate) fn new(recordings: &[Samples]) -> Self {
-        let (mut strains, mut rates, mut accelerations) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut strains, mut rates) = (Vec::new(), Vec::new());
         let mut phases = PhaseDurations::default();
         let mut times = Vec::new();
         let mut longest_s = 0.0_f64;
@@ -40,7 +39,6 @@ impl MotionStats {
             let strain = filled_strain(samples);
             let rate = moving_mean(&central_rate(samples.time_s, &strain));
             times.push(correlation_time(samples.time_s, &rate));
-            accelerations.extend(moving_mean(&central_rate(samples.time_s, &rate)));
             phases.add(samples.time_s, &rate);
             rates.extend(rate);
             strains.extend(strain);
@@ -55,7 +53,6 @@ impl MotionStats {
             strain_sd: root_mean_square(&deviations),
             rate_sd: root_mean_square(&rates),
             rate_time_s: mean(&times),
-            acceleration_sd: root_mean_square(&accelerations),
             hold_s: (!phases.holds.is_empty()).then(|| mean(&phases.holds)),
             move_s: if phases.moves.is_empty() { longest_s } else { mean(&phases.moves) },
             reversal: phases.reversal(),

@@ -2,7 +2,7 @@ use std::collections::BTreeMap;
 
 use crate::CalibrationError;
 use crate::build_filter::{Setting, filter_from_parts};
-use crate::estimator_params::{EstimatorKind, EstimatorParams, MotionFamily, MotionParams, NoiseParams, PhaseParams};
+use crate::estimator_params::{EstimatorKind, EstimatorParams, MotionParams, NoiseParams, PhaseParams};
 use crate::filter::{Filter, Start};
 use crate::law_fit::CrossFit;
 use crate::left_out::{Fold, LeftOut};
@@ -39,10 +39,9 @@ impl Search {
     }
 }
 
-/// Evaluations to expect of a survey under so many laws of so many structures.
-pub(crate) fn survey_evaluations(kind: EstimatorKind, laws: usize, structures: usize) -> u64 {
-    let each = |laws: usize| SURVEY.evaluations() + (laws.max(1) as u64 - 1) * RESURVEY.evaluations();
-    each(laws) + (kind.motion_families().len() as u64 - 1) * each(structures)
+/// Evaluations to expect of a survey under so many laws.
+pub(crate) fn survey_evaluations(laws: usize) -> u64 {
+    SURVEY.evaluations() + (laws.max(1) as u64 - 1) * RESURVEY.evaluations()
 }
 
 /// Times over which errors of readings may be alike, in steps of the rows that a search has seen, from not at all to much
@@ -58,16 +57,14 @@ const SHARE_OF_RESIDUAL: f64 = 0.3;
 /// First guess of the tempering: model error is correlated from reading to reading.
 const TEMPERING: f64 = 0.7;
 
-/// What an estimator makes of a law, with motions of one family.
+/// What an estimator makes of a law.
 pub(crate) struct Surveyed<'a> {
     pub kind: EstimatorKind,
-    pub family: MotionFamily,
     pub law: &'a CrossFit,
     pub tuned: Tuned,
 }
 
-/// Searches under one law after another, each from where the one before has got to. The first family of motions sees all
-/// laws, the others the best one of each number of branches.
+/// Searches under one law after another, each from where the one before has got to.
 pub(crate) fn survey<'a>(
     samples: &[Samples],
     laws: &[&'a CrossFit],
@@ -76,17 +73,11 @@ pub(crate) fn survey<'a>(
     evaluated: &mut dyn FnMut(),
 ) -> Result<Vec<Surveyed<'a>>, CalibrationError> {
     let mut surveyed: Vec<Surveyed<'a>> = Vec::new();
-    let mut laws = laws.to_vec();
-    for &family in kind.motion_families() {
-        let mut before: Option<Tuned> = None;
-        for law in laws {
-            let search = if before.is_none() { SURVEY } else { RESURVEY };
-            let problem = NoiseProblem::new(samples, law, stats, (kind, family));
-            let tuned = problem.search(before.as_ref(), search, &mut *evaluated)?;
-            before = Some(tuned.clone());
-            surveyed.push(Surveyed { kind, family, law, tuned });
-        }
-        laws = best_of_each_size(&surveyed);
+    for &law in laws {
+        let before = surveyed.last().map(|one| &one.tuned);
+        let search = if before.is_none() { SURVEY } else { RESURVEY };
+        let tuned = NoiseProblem::new(samples, law, stats, kind).search(before, search, &mut *evaluated)?;
+        surveyed.push(Surveyed { kind, law, tuned });
     }
     Ok(surveyed)
 }
@@ -120,19 +111,13 @@ pub(crate) struct NoiseProblem<'a> {
     limits: RangeParams,
     stats: MotionStats,
     kind: EstimatorKind,
-    family: MotionFamily,
     /// Logarithms of the parameters that residuals and motion suggest.
     untuned: Vec<f64>,
 }
 
 impl<'a> NoiseProblem<'a> {
-    pub(crate) fn new(
-        samples: &'a [Samples<'a>],
-        fit: &'a CrossFit,
-        stats: MotionStats,
-        (kind, family): (EstimatorKind, MotionFamily),
-    ) -> Self {
-        let mut problem = Self { samples, fit, limits: fit.law.law.range, stats, kind, family, untuned: Vec::new() };
+    pub(crate) fn new(samples: &'a [Samples<'a>], fit: &'a CrossFit, stats: MotionStats, kind: EstimatorKind) -> Self {
+        let mut problem = Self { samples, fit, limits: fit.law.law.range, stats, kind, untuned: Vec::new() };
         problem.untuned = problem.start();
         problem
     }
@@ -232,7 +217,6 @@ impl<'a> NoiseProblem<'a> {
             EstimatorKind::Imm | EstimatorKind::Hypotheses => {
                 [0.5 * stats.speed, stats.rate_time_s, 3.0 * stats.strain_sd]
             }
-            _ if self.family == MotionFamily::Smooth => [stats.rate_sd, stats.acceleration_sd, stats.strain_sd],
             _ => [stats.rate_sd, stats.rate_time_s, stats.strain_sd],
         });
         if self.kind.has_phases() {
@@ -245,17 +229,8 @@ impl<'a> NoiseProblem<'a> {
         let p: Vec<f64> = point.iter().map(|x| x.clamp(-25.0, 15.0).exp()).collect();
         let strain_mean = self.stats.strain_mean;
         let kind = self.kind.tuned_as();
-        let motion = if self.family == MotionFamily::Smooth {
-            MotionParams::Smooth {
-                rate_sd_per_s: p[4],
-                // A stationary motion has σ_v² < σ_ε σ_a.
-                acceleration_sd_per_s2: p[5].max(1.2 * p[4] * p[4] / p[6]),
-                strain_mean,
-                strain_sd: p[6],
-            }
-        } else {
-            MotionParams::OrnsteinUhlenbeck { rate_sd_per_s: p[4], rate_time_s: p[5], strain_mean, strain_sd: p[6] }
-        };
+        let motion =
+            MotionParams::OrnsteinUhlenbeck { rate_sd_per_s: p[4], rate_time_s: p[5], strain_mean, strain_sd: p[6] };
         let phases = kind.has_phases().then(|| PhaseParams {
             hold_time_s: p[7],
             move_time_s: p[8],

@@ -7,9 +7,9 @@ use crate::samples::Samples;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sieve {
     /// Least and largest R/R₀ - 1 that can be a reading of this sensor.
-    plausible: (f64, f64),
+    pub(crate) plausible: (f64, f64),
     /// Longest time, s, for which a working sensor repeats one number.
-    longest_repeat_s: f64,
+    pub(crate) longest_repeat_s: f64,
     /// Time, s, over which errors of the readings are alike.
     error_time_s: f64,
 }
@@ -30,7 +30,7 @@ pub(crate) struct Repeats {
 const OUTSIDE: f64 = 2.0;
 /// A number that has come again for so many times the longest repetition in calibration, and so often, is stuck.
 const LONGER: f64 = 3.0;
-const MOST_REPEATS: u32 = 10;
+pub(crate) const MOST_REPEATS: u32 = 10;
 
 impl Sieve {
     /// For a calibration, which sees to its readings itself.

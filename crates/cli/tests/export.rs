@@ -2,6 +2,7 @@
 
 use std::path::Path;
 use std::process::Command;
+use std::sync::OnceLock;
 
 use crate::common::{Bench, Csv, files_in};
 
@@ -49,7 +50,7 @@ fn c_is_an_arduino_sketch_a_self_test_and_a_readme_and_the_same_every_time() {
     for (folder, names) in [
         ("", &["README.md", "ohmstrain", "selftest"][..]),
         ("/ohmstrain", &["ohmstrain.c", "ohmstrain.h", "ohmstrain.ino"]),
-        ("/selftest", &["selftest.c", "vectors.h"]),
+        ("/selftest", &["replay.c", "selftest.c", "vectors.h"]),
     ] {
         assert_eq!(files_in(&bench.path(&format!("once{folder}"))), names);
         for name in names.iter().filter(|name| name.contains('.')) {
@@ -67,79 +68,112 @@ fn c_is_an_arduino_sketch_a_self_test_and_a_readme_and_the_same_every_time() {
     }
 }
 
-/// Additions, multiplications, divisions and square roots are rounded correctly by both languages, and a polynomial gauge needs
-/// nothing else: not one bit differs.
-#[test]
-fn the_self_test_finds_no_difference() {
-    let bench = Bench::calibrated();
-    export(&bench, "c", "c");
-    for compiler in compilers() {
-        let sources = ["ohmstrain/ohmstrain.c", "selftest/selftest.c"];
-        let printed = compile_and_run(compiler, &bench.path("c"), &sources, "");
-        assert!(printed.contains("largest difference: 0 of 0 ulp; wrong answers 0"), "{printed}");
+const ESTIMATORS: [&str; 4] = ["corrected", "sign-split", "hypotheses", "ekf"];
+
+/// A recording, and a sensor for each filter that can be exported.
+fn every_filter() -> Bench {
+    static FILES: OnceLock<(String, [String; 4])> = OnceLock::new();
+    let (trace, sensors) = FILES.get_or_init(|| {
+        let bench = Bench::new();
+        let simulate = ["simulate", "--material", "representative", "--protocol", "mixed", "--speed-mm-s", "5"];
+        bench.run(&[&simulate[..], &["--sample-rate-hz", "5", "-o", "trace.csv"]].concat()).ok();
+        let sensors = ESTIMATORS.map(|estimator| {
+            let calibrate = ["calibrate", "trace.csv", "--until", "120", "--branches", "1", "--gauge", "polynomial"];
+            bench.run(&[&calibrate[..], &["-o", "sensor.toml", "--force", "--estimator", estimator]].concat()).ok();
+            bench.read("sensor.toml")
+        });
+        (bench.read("trace.csv"), sensors)
+    });
+    let bench = Bench::new();
+    bench.write("trace.csv", trace);
+    for (estimator, sensor) in ESTIMATORS.iter().zip(sensors) {
+        bench.write(&format!("{estimator}.toml"), sensor);
     }
+    bench
 }
 
-/// Reads resistances, writes strain and its interval; a missing reading is a line with a word.
-const DRIVER: &str = r#"
-#include "ohmstrain.h"
-#include <stdio.h>
-int main(void)
-{
-    ohmstrain_state state;
-    char line[64];
-    ohmstrain_start(&state);
-    printf("strain,lo,hi\n");
-    while (fgets(line, sizeof line, stdin)) {
-        ohmstrain_estimate e;
-        float reading;
-        const ohmstrain_status status = sscanf(line, "%f", &reading) == 1
-            ? ohmstrain_step(&state, reading, 0.0f, 0) : ohmstrain_predict(&state);
-        if (status != OHMSTRAIN_OK || ohmstrain_get(&state, &e) != OHMSTRAIN_OK) {
-            return 1;
+/// Exports a sensor's default, scored on the recording; what was printed.
+fn scored_export(bench: &Bench, estimator: &str) -> String {
+    let export = ["export", "--dt-s", DT_S, "--target", "c", "-o", estimator, "--score", "trace.csv"];
+    bench.run(&[&export[..], &["--sensor", &format!("{estimator}.toml")]].concat()).ok()
+}
+
+/// The same functions of the same numbers in the same order: only the exponentials of two libraries could differ, and both
+/// languages call the one of the host.
+#[test]
+fn the_self_test_of_every_filter_finds_no_difference() {
+    let bench = every_filter();
+    for estimator in ESTIMATORS {
+        scored_export(&bench, estimator);
+        for compiler in compilers() {
+            let sources = ["ohmstrain/ohmstrain.c", "selftest/selftest.c"];
+            let printed = compile_and_run(compiler, &bench.path(estimator), &sources, "");
+            assert!(printed.contains("self-test passed"), "{estimator}: {printed}");
+            assert!(printed.starts_with("largest difference: 0 of "), "{estimator}: {printed}");
         }
-        printf("%.9g,%.9g,%.9g\n", (double)e.strain, (double)e.lo, (double)e.hi);
     }
-    return 0;
 }
-"#;
 
-/// The program's EKF splits an uncertain rate by a logistic distribution, the exported one by a density that ends; both stand
-/// for the normal one. Row by row the two are 0.15 deviations apart here (root mean square, measured). That is allowed to
-/// make an estimate worse by what an independent difference of this size adds to a squared error, 0.15² = 2 %, and no more.
-/// (The distance was measured before what the direction leaves open came in; since then the exported filter errs by 4 % less
-/// here, which is no fault.)
+/// A whole recording through the exported code, and through the program. What `export` has printed is the error of the very
+/// code. The default in single precision is as good as the program's: it may be worse by what an independent difference of 0.15
+/// deviations adds to a squared error, 0.15² = 2 %, and no more. (A filter of hypotheses without correction under a law as
+/// poor as this one merges other hypotheses where rounding differs, and may be better or worse by some per cent.)
 #[test]
-fn the_exported_filter_is_as_good_as_the_program() {
-    let bench = Bench::calibrated();
-    export(&bench, "c", "c");
-    bench.write("c/driver.c", DRIVER);
+fn a_recording_replayed_is_as_good_as_the_program() {
+    let bench = every_filter();
     let truth = Csv::new(&bench.read("trace.csv")).numbers("strain");
-    let estimates = bench.run(&["filter", "trace.csv", "--sensor", "sensor.toml", "--estimator", "ekf"]).ok();
-    let estimates = Csv::new(&estimates);
-    let readings: String = estimates.cells("resistance_ohm").iter().map(|cell| format!("{cell}\n")).collect();
-    let error = |strains: &[f64]| {
+    let range = truth.iter().fold((f64::MAX, f64::MIN), |(low, high), x| (low.min(*x), high.max(*x)));
+    let percent = |strains: &[f64]| {
+        assert_eq!(strains.len(), truth.len());
         let squares: f64 = strains.iter().zip(&truth).map(|(strain, truth)| (strain - truth).powi(2)).sum();
-        (squares / truth.len() as f64).sqrt()
+        100.0 * (squares / truth.len() as f64).sqrt() / (range.1 - range.0)
     };
-    for compiler in compilers() {
-        let sources = ["ohmstrain/ohmstrain.c", "driver.c"];
-        let exported = Csv::new(&compile_and_run(compiler, &bench.path("c"), &sources, &readings));
-        let (strain, lo, hi) = (exported.numbers("strain"), exported.numbers("lo"), exported.numbers("hi"));
-        assert_eq!(strain.len(), truth.len());
-        let mut widths: Vec<f64> = (0..strain.len())
-            .map(|k| {
-                // Symmetric to a few roundings of numbers below one.
-                assert!((0.5 * (lo[k] + hi[k]) - strain[k]).abs() < 4.0 * f64::from(f32::EPSILON), "row {k}");
-                (hi[k] - lo[k]) / (2.0 * 1.959_964)
-            })
-            .zip(estimates.numbers("strain_sd"))
-            .map(|(sd, of_program)| sd / of_program)
-            .collect();
-        widths.sort_by(f64::total_cmp);
-        let (width, errors) = (widths[widths.len() / 2], error(&strain) / error(&estimates.numbers("strain")));
-        println!("{compiler}: errors {errors}, widths {width} of the program's");
-        assert!(errors < 1.02 && (width - 1.0).abs() < 0.02, "{compiler}: {errors}, {width}");
+    for estimator in ESTIMATORS {
+        let program = bench.run(&["filter", "trace.csv", "--sensor", &format!("{estimator}.toml")]).ok();
+        let program = percent(&Csv::new(&program).numbers("strain"));
+        let scored = scored_export(&bench, estimator);
+        let promised = scored.lines().find(|line| line.contains("exported")).unwrap().split('|').nth(2).unwrap();
+        let promised: f64 = promised.trim().parse().unwrap();
+        for compiler in compilers() {
+            let sources = ["ohmstrain/ohmstrain.c", "selftest/replay.c"];
+            let replayed = compile_and_run(compiler, &bench.path(estimator), &sources, &bench.read("trace.csv"));
+            let exported = percent(&Csv::new(&replayed).numbers("strain"));
+            println!("{estimator}, {compiler}: {exported} %FS, promised {promised}, program {program}");
+            assert!((promised - exported).abs() < 0.006, "{estimator}, {compiler}: {exported}, promised {promised}");
+            assert!(estimator != "corrected" || exported < 1.02 * program, "{compiler}: {exported}, program {program}");
+        }
+    }
+}
+
+/// A recording that pulls the plug: zero, an open circuit, an overload, a number that comes again.
+#[test]
+fn no_reading_stops_what_was_exported() {
+    let bench = every_filter();
+    let sensor = bench.read("corrected.toml");
+    let rest: f64 = sensor.lines().find_map(|line| line.strip_prefix("rest_reading = ")).unwrap().parse().unwrap();
+    let readings = |row: usize| match row {
+        100..110 => "0".to_owned(),
+        200..210 => "9.9e37".to_owned(),
+        300..310 => "-1".to_owned(),
+        400..410 => String::new(),
+        500..900 => rest.to_string(),
+        _ => format!("{}", rest * (1.2 + 0.1 * (0.05 * row as f64).sin())),
+    };
+    let rows: Vec<String> = (0..1000).map(|row| format!("{},{}\n", 0.2 * row as f64, readings(row))).collect();
+    let trace = format!("time_s,resistance_ohm\n{}", rows.concat());
+    for estimator in ["corrected", "hypotheses"] {
+        scored_export(&bench, estimator);
+        for compiler in compilers() {
+            let sources = ["ohmstrain/ohmstrain.c", "selftest/replay.c"];
+            let printed = Csv::new(&compile_and_run(compiler, &bench.path(estimator), &sources, &trace));
+            // The last four of them say why there was no reading.
+            let why: Vec<f64> = printed.numbers("flags").iter().map(|flags| flags.rem_euclid(16.0)).collect();
+            for (rows, flag) in [(100..110, 2.0), (200..210, 2.0), (300..310, 2.0), (400..410, 1.0)] {
+                assert!(why[rows].iter().all(|found| *found == flag), "{why:?}");
+            }
+            assert_eq!([50, 899, 999].map(|row: usize| why[row]), [0.0, 4.0, 0.0]);
+            assert!(printed.numbers("strain_sd").iter().all(|sd| sd.is_finite() && *sd > 0.0));
+        }
     }
 }
 
@@ -169,11 +203,11 @@ fn what_has_no_exported_form_is_refused_and_nothing_is_written() {
     };
     c("smooth.toml", &["--dt-s", DT_S]).fails(
         4,
-        "smooth.toml: the ekf's motion has an acceleration, which the exported filter has not; calibrate with \
-         `--estimator ekf`, which gives it Ornstein-Uhlenbeck motion",
+        "smooth.toml: the motion of ekf has an acceleration, which the exported filter has not; calibrate again, which gives \
+         it Ornstein-Uhlenbeck motion",
     );
-    c("sensor.toml", &["--dt-s", DT_S, "--estimator", "imm"])
-        .fails(2, "--estimator: expected ekf, the only one to export, found imm");
+    c("sensor.toml", &["--dt-s", DT_S, "--estimator", "particles"])
+        .fails(2, "--estimator: expected corrected, sign-split, hypotheses or ekf, found particles");
     let longest = sensor.lines().find_map(|line| line.strip_prefix("duration_s = ")).unwrap();
     c("sensor.toml", &["--dt-s", "1e6"]).fails(
         2,
@@ -186,19 +220,4 @@ fn what_has_no_exported_form_is_refused_and_nothing_is_written() {
         assert_eq!(c("sensor.toml", dt_s).code, Some(2), "{dt_s:?}");
     }
     assert!(!bench.path("out").exists());
-}
-
-#[test]
-fn a_default_that_has_no_exported_form_is_remarked_on() {
-    let bench = Bench::calibrated();
-    let sensor = bench.read("sensor.toml").replace("default_estimator = \"ekf\"", "default_estimator = \"corrected\"");
-    bench.write("corrected.toml", sensor);
-    let arguments = ["export", "--sensor", "corrected.toml", "--target", "c", "--dt-s", DT_S, "-o", "out"];
-    let run = bench.run(&arguments);
-    assert_eq!(
-        run.stderr,
-        "ohmstrain: exported is the ekf: the file's default estimator, corrected, has no such form\n"
-    );
-    assert_eq!(run.code, Some(0));
-    bench.run(&[&arguments[..], &["--estimator", "ekf"]].concat()).ok();
 }

@@ -74,6 +74,8 @@ mod kernel;
 mod mixture;
 #[cfg(feature = "particles")]
 mod particles;
+#[cfg(feature = "record")]
+pub mod record;
 mod residual;
 mod sensor;
 mod smooth;
@@ -107,6 +109,6 @@ pub use sensor::StrainSensor;
 pub use smooth::rts_smooth_vec;
 pub use smooth::{PastStep, Window, rts_smooth, rts_step, smooth_back_through};
 pub use sparse::SparseEkf;
-pub use substeps::{Repeated, Substeps};
+pub use substeps::{GRACE as STEP_GRACE, Repeated, Substeps};
 pub use traits::{Channel, Dynamics, Reading};
 pub use unscented::{Ukf, Unscented};

@@ -28,7 +28,7 @@ pub struct SparseEkf<T, S, const B: usize, const N: usize, G = AnyCurve<T>> {
     pub(crate) gains: Regions<T, [Gains<T>; B]>,
     pub(crate) reading: ReadingLaw<T, G>,
     model: SwitchedModel<T, 2, B, N>,
-    dt_s: T,
+    pub(crate) dt_s: T,
     switch: PhantomData<S>,
 }
 

@@ -19,7 +19,7 @@ pub struct Repeated<P> {
 /// Into how many steps a pause is divided at most.
 const MOST: u8 = 128;
 /// A step of the longest length shall be one step, whatever rounding says.
-pub(crate) const GRACE: f64 = 1.0005;
+pub const GRACE: f64 = 1.0005;
 
 /// Into how many steps of `longest_s` seconds at most a step of `dt_s` seconds is divided.
 pub(crate) fn count<T: Scalar>(dt_s: T, longest_s: T) -> u8 {

@@ -50,7 +50,7 @@ pub use noise::ModelNoise;
 pub use phase::{Direction, Phase, SplitRate, Turning, UNEXPLAINED, UNEXPLAINED_SHAPE, unexplained};
 pub use relaxing_modulus::{Modulus, PhaseStart, RelaxingModulus, ResistanceGradient};
 pub use response::Response;
-pub use reversal::{LEAST_LEFT, RateChange, correlated_steps};
+pub use reversal::{LEAST_LEFT, RateChange, TURNING, TurningNumbers, correlated_steps};
 pub use scalar::Scalar;
 pub use switched::{Observation, SwitchedModel, SwitchedStep, Transition};
 pub use symmetric::Symmetric;

@@ -145,6 +145,30 @@ pub struct RateChange<T> {
     pub is_brownian: bool,
 }
 
+/// The numbers in [`Turning::new`], for programs that write it in another language.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TurningNumbers {
+    /// Deviations from zero at which no rate turns around.
+    pub clear: f64,
+    /// How far from zero a rate starts that turns around, in deviations of its change.
+    pub reach: f64,
+    /// Path beyond the net move's of an even change, over the product of the change and its probability.
+    pub even_excess: f64,
+    /// The same of a Brownian one, and its variance.
+    pub brownian: (f64, f64),
+    /// 1/√(2π).
+    pub normal_density: f64,
+}
+
+/// The numbers in [`Turning::new`].
+pub const TURNING: TurningNumbers = TurningNumbers {
+    clear: CLEAR,
+    reach: REACH,
+    even_excess: EVEN_EXCESS,
+    brownian: (BROWNIAN_EXCESS, BROWNIAN_VARIANCE),
+    normal_density: NORMAL_DENSITY,
+};
+
 impl<T: Scalar> Turning<T> {
     /// Of a rate, positive away from zero, with its variance. A microcontroller's own square root comes in as `root`.
     #[inline(always)]

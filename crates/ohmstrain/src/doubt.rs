@@ -51,6 +51,39 @@ const MOST: f64 = 0.5;
 /// Share of the filter's variance, or of the doubt at a start, from which on a doubt is worth a flag.
 const WORTH: f64 = 0.2;
 
+/// The numbers behind the widened intervals, for programs that write a filter in another language.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DoubtNumbers {
+    /// Deviation at an unknown start, and what is known least of all, in spans of the strain.
+    pub start: f64,
+    /// As deviation, in spans.
+    pub most: f64,
+    /// Times after which doubts have fallen to 37 %, s: of a start or a fault, and of readings outside of calibration's.
+    pub fades_s: f64,
+    /// See [`Self::fades_s`].
+    pub outside_fades_s: f64,
+    /// Share of calibration's range of readings that counts for nothing, and how many times counts what is beyond.
+    pub margin: f64,
+    /// See [`Self::margin`].
+    pub shows: f64,
+    /// How many times calibration's fastest rate is beyond it.
+    pub faster: f64,
+    /// Share of a variance from which on a doubt is worth a flag.
+    pub worth: f64,
+}
+
+/// The numbers behind the widened intervals.
+pub const DOUBT: DoubtNumbers = DoubtNumbers {
+    start: START,
+    most: MOST,
+    fades_s: FADES_S,
+    outside_fades_s: OUTSIDE_FADES_S,
+    margin: MARGIN,
+    shows: SHOWS,
+    faster: FASTER,
+    worth: WORTH,
+};
+
 impl Doubt {
     /// Before the first row; `starts_known` if the strain is known there.
     pub(crate) fn new(params: &SensorParams, starts_known: bool) -> Self {

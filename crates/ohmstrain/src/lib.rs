@@ -46,6 +46,7 @@ pub use builder::FilterBuilder;
 pub use calibrate::{Calibrated, Calibration, calibrate};
 pub use closing::{Closing, Tested};
 pub use column::Column;
+pub use doubt::{DOUBT, DoubtNumbers};
 pub use error::{Error, Place, TextCause, TextError};
 pub use estimate::Estimate;
 pub use explain::{ReferenceLag, explain};

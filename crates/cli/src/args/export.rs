@@ -16,15 +16,22 @@ pub struct ExportArgs {
     /// Folder to write into; files of an earlier export are replaced
     #[arg(short, long, value_name = "DIR")]
     pub output: PathBuf,
-    /// Replace files that this program did not write, too
+    /// Replace files that this program did not write, too, and export what scores worse than a static cubic
     #[arg(long)]
     pub force: bool,
-    /// Time between two readings on the microcontroller, s
+    /// Usual time between two readings on the microcontroller, s
     #[arg(long, value_name = "S", value_parser = positive)]
     pub dt_s: f64,
-    /// Estimator to export: auto (ekf) or ekf, the only one that has such a form
+    /// Estimator to export: auto (the sensor's default), corrected, sign-split, hypotheses or ekf
     #[arg(long, default_value = "auto")]
     pub estimator: Auto<Estimator>,
+    /// Recording with a reference: what is exported runs over it first, and its error is printed beside what was promised.
+    /// What is worse than a static cubic is not exported without --force
+    #[arg(long, value_name = "TRACE")]
+    pub score: Option<PathBuf>,
+    /// Score the rows from this time on only, s
+    #[arg(long, value_name = "S", requires = "score")]
+    pub from: Option<f64>,
 }
 
 /// A language that sensors are exported to.

@@ -1,26 +1,31 @@
-use ohmstrain_calib::EstimatorKind;
+use ohmstrain_bench_data::Metadata;
 
 use crate::args::ExportArgs;
+use crate::commands::export_score;
 use crate::error::CliError;
 use crate::export;
+use crate::input;
 use crate::output::{Kind, Outputs};
 use crate::sensor_file;
 
 /// Writes a sensor's filter as source code.
 pub fn run(args: &ExportArgs) -> Result<(), CliError> {
-    if let Some(other) = args.estimator.chosen().map(|estimator| estimator.0).filter(|kind| *kind != EstimatorKind::Ekf)
-    {
-        let name = other.name();
-        return Err(CliError::Arguments(format!("--estimator: expected ekf, the only one to export, found {name}")));
+    let asked = args.estimator.chosen().map(|estimator| estimator.0);
+    if let Some(other) = asked.filter(|kind| !export::FILTERS.contains(kind)) {
+        let message = "--estimator: expected corrected, sign-split, hypotheses or ekf, found";
+        return Err(CliError::Arguments(format!("{message} {}", other.name())));
     }
-    let params = sensor_file::read(&args.sensor, Some(EstimatorKind::Ekf))?.into_params();
-    let files = export::files(&params, args.target, args.dt_s)
+    let sensor = sensor_file::read(&args.sensor, asked)?;
+    let params = sensor.params();
+    if let Some(trace) = &args.score {
+        if params.joint.is_some() {
+            return Err(CliError::Arguments("--score: expected a sensor of strain, found one across a joint".into()));
+        }
+        export_score::run(args, &sensor, &input::read(trace, &Metadata::default())?)?;
+    }
+    let files = export::files(params, asked, args.target, args.dt_s)
         .map_err(|error| error.into_cli(&args.sensor.display().to_string()))?;
-    if params.default_estimator != EstimatorKind::Ekf && args.estimator.chosen().is_none() {
-        let name = params.default_estimator.name();
-        CliError::remark(&format!("exported is the ekf: the file's default estimator, {name}, has no such form"));
-    }
-    let mut outputs = Outputs::new(args.force, [&args.sensor]);
+    let mut outputs = Outputs::new(args.force, std::iter::once(&args.sensor).chain(&args.score));
     for file in files {
         let path = args.output.join(file.path);
         if let Some(folder) = path.parent() {

@@ -5,6 +5,13 @@ use serde::{Serialize, Serializer};
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Literal(pub f32);
 
+impl Literal {
+    /// The number as text, without a suffix.
+    pub fn text(self) -> String {
+        format!("{:?}", self.0)
+    }
+}
+
 impl Serialize for Literal {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.collect_str(&format_args!("{:?}", self.0))

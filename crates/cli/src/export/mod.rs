@@ -1,22 +1,30 @@
-//! A calibrated sensor's EKF as source code for a microcontroller: C99 with a self-test, or constants in Rust.
+//! A calibrated sensor's filter as source code for a microcontroller: C99 with a self-test, or constants in Rust.
 //!
-//! What is exported computes in `f32` and is [`SparseEkf`](ohmstrain_ekf::SparseEkf) at a fixed rate, operation by
-//! operation; the same sensor and interval give the same files.
+//! What is exported computes in `f32`, at a fixed rate, operation by operation as the Rust filter does ([`twin`]); the same sensor and interval give the same files.
 
+mod arithmetic;
 mod constants;
+mod correction;
+mod doubt;
+mod fixed_rate;
+mod law;
 mod literal;
 mod motion;
+mod replay;
+mod steps;
+mod twin;
 mod vectors;
 
 use minijinja::Environment;
 use minijinja::syntax::SyntaxConfig;
 use minijinja::value::Serde;
-use ohmstrain_calib::SensorParams;
+use ohmstrain_calib::{EstimatorKind, SensorParams};
 
 use crate::args::ExportTarget;
 use crate::error::CliError;
 use crate::sensor_file::MADE_BY;
 use constants::Exported;
+pub use replay::{ReplayedRow, replay};
 
 /// A file to write.
 pub struct SourceFile {
@@ -26,6 +34,10 @@ pub struct SourceFile {
     pub content: String,
 }
 
+/// The estimators that have an exported form.
+pub const FILTERS: [EstimatorKind; 4] =
+    [EstimatorKind::Corrected, EstimatorKind::SignSplit, EstimatorKind::Hypotheses, EstimatorKind::Ekf];
+
 /// Why there is no source code.
 #[derive(Debug, thiserror::Error)]
 pub enum ExportError {
@@ -33,7 +45,7 @@ pub enum ExportError {
     #[error("{what}; {instead}")]
     Unsupported {
         /// What it has.
-        what: &'static str,
+        what: String,
         /// How to get a sensor file without it.
         instead: &'static str,
     },
@@ -59,18 +71,38 @@ impl ExportError {
     }
 }
 
+/// A number that the filter cannot work with.
+fn parameter(error: impl ToString) -> ExportError {
+    ExportError::Parameter(error.to_string())
+}
+
+/// A law that no filter is made for.
+fn too_many_branches() -> ExportError {
+    ExportError::Unsupported {
+        what: "the law has more than four branches".into(),
+        instead: "calibrate with `--branches 4` or fewer",
+    }
+}
+
 /// Name in the exported folder, and template.
 type Template = (&'static str, &'static str);
 
 /// Arduino compiles what lies in a sketch's own folder, named as the sketch, and nothing from folders beside it: the self-test
 /// with its `main` must not be in there.
-const C: [Template; 6] = [
+const C: [Template; 7] = [
     ("ohmstrain/ohmstrain.h", include_str!("templates/ohmstrain.h")),
     ("ohmstrain/ohmstrain.c", include_str!("templates/ohmstrain.c")),
     ("ohmstrain/ohmstrain.ino", include_str!("templates/ohmstrain.ino")),
     ("selftest/vectors.h", include_str!("templates/vectors.h")),
     ("selftest/selftest.c", include_str!("templates/selftest.c")),
+    ("selftest/replay.c", include_str!("templates/replay.c")),
     ("README.md", include_str!("templates/readme_c.md")),
+];
+
+/// What `ohmstrain.c` includes.
+const C_PARTS: [Template; 2] = [
+    ("hypotheses.c", include_str!("templates/hypotheses.c")),
+    ("correction.c", include_str!("templates/correction.c")),
 ];
 
 const RUST: [Template; 2] =
@@ -80,8 +112,13 @@ const RUST: [Template; 2] =
 ///
 /// # Errors
 /// See [`ExportError`].
-pub fn files(params: &SensorParams, target: ExportTarget, dt_s: f64) -> Result<Vec<SourceFile>, ExportError> {
-    let exported = Exported::new(params, MADE_BY, dt_s)?;
+pub fn files(
+    params: &SensorParams,
+    kind: Option<EstimatorKind>,
+    target: ExportTarget,
+    dt_s: f64,
+) -> Result<Vec<SourceFile>, ExportError> {
+    let exported = Exported::new(params, kind, MADE_BY, dt_s)?;
     let templates: &[Template] = match target {
         ExportTarget::C => &C,
         ExportTarget::Rust => &RUST,
@@ -95,6 +132,9 @@ pub fn files(params: &SensorParams, target: ExportTarget, dt_s: f64) -> Result<V
         .keep_trailing_newline(true)
         .build()?;
     environment.set_syntax(syntax);
+    for (name, part) in C_PARTS {
+        environment.add_template(name, part)?;
+    }
     let mut files = Vec::new();
     for (path, template) in templates {
         environment.add_template(path, template)?;

@@ -1,22 +1,21 @@
 //! What the Rust filters make of a short motion: what the exported filter must make of it too.
 
-use ohmstrain_ekf::{Belief, Compact, Reading, SparseEkf, StepError};
-use ohmstrain_model::{Scalar, SwitchedModel};
+use ohmstrain_ekf::{Reading, Real, StepError};
+use ohmstrain_model::SwitchedModel;
 use serde::Serialize;
 
 use super::ExportError;
-use super::constants::FixedRate;
+use super::fixed_rate::FixedRate;
 use super::literal::Literal;
 use super::motion;
+use super::twin::{Numbers, Twin};
 
 /// Readings and results, and how far other results may be off.
 #[derive(Debug, Serialize)]
 pub struct Vectors {
     seed: u64,
     ulp: Literal,
-    /// Where only expf may differ, and where products may be contracted.
     tolerance_ulp: u64,
-    contracted_tolerance_ulp: u64,
     rows: Vec<Vector>,
 }
 
@@ -31,29 +30,31 @@ struct Vector {
 
 /// A row as the microcontroller gets it.
 #[derive(Clone, Copy)]
-struct Input {
-    reading: Option<f32>,
-    reading_sd: f32,
+pub struct Input {
+    pub reading: Option<f32>,
+    pub reading_sd: f32,
 }
 
 /// How many times further than Rust's `f32` filter another one may be from exact arithmetic.
 const FURTHER: f64 = 3.0;
+
 impl Vectors {
     /// Runs the filters.
-    pub fn new<const B: usize, const N: usize, const L: usize>(sensor: &FixedRate<B, N>) -> Result<Self, ExportError> {
+    pub fn new<const B: usize, const N: usize, const L: usize>(
+        sensor: &FixedRate<'_, B, N>,
+    ) -> Result<Self, ExportError> {
         let inputs = readings(sensor);
-        let estimates = run_ekf::<f32, B, N, L>(&sensor.model, sensor, &inputs)?;
-        let exact = run_ekf::<f64, B, N, L>(&sensor.reference, sensor, &inputs)?;
+        let estimates = run::<f32, B, N, L>(sensor.model, sensor, sensor.interpolated(), &inputs)?;
+        let exact = run::<f64, B, N, L>(sensor.reference, sensor, sensor.exact(), &inputs)?;
 
-        let largest = sensor.limits.lower.abs().max(sensor.limits.upper.abs());
+        let limits = sensor.parts.limits;
+        let largest = limits.lower.abs().max(limits.upper.abs());
         let ulp = largest.next_up() - largest;
         let off = |((strain, sd), exact): (&(f32, f32), &(f64, f64))| {
             (f64::from(*strain) - exact.0).abs().max((f64::from(*sd) - exact.1).abs())
         };
         let rounding = estimates.iter().zip(&exact).map(off).fold(0.0, f64::max);
         let tolerance = ((FURTHER + 1.0) * rounding / f64::from(ulp)).ceil() as u64;
-        let rounded = !sensor.is_exact();
-
         let row = |(input, estimate): (&Input, &(f32, f32))| Vector {
             reading: input.reading.map(Literal),
             reading_sd: Literal(input.reading_sd),
@@ -63,48 +64,48 @@ impl Vectors {
         Ok(Self {
             seed: motion::SEED,
             ulp: Literal(ulp),
-            tolerance_ulp: if rounded { tolerance } else { 0 },
-            contracted_tolerance_ulp: tolerance,
+            tolerance_ulp: tolerance,
             rows: inputs.iter().zip(&estimates).map(row).collect(),
         })
     }
 }
 
 /// The readings of the motion, in the sensor's unit.
-fn readings<const B: usize, const N: usize>(sensor: &FixedRate<B, N>) -> Vec<Input> {
+fn readings<const B: usize, const N: usize>(sensor: &FixedRate<'_, B, N>) -> Vec<Input> {
     let rest = f64::from(sensor.rest_reading);
     let input = |row: motion::Row| Input {
         reading: row.rho.map(|rho| (rest * (1.0 + rho)) as f32),
         reading_sd: (rest * row.extra_sd) as f32,
     };
     let reading_sd = f64::from(sensor.model.noise().reading_sd);
-    motion::rows(sensor.reference.law(), f64::from(sensor.dt_s), reading_sd).into_iter().map(input).collect()
+    motion::rows(sensor.reference.law(), f64::from(sensor.parts.dt_s), reading_sd).into_iter().map(input).collect()
 }
 
 /// A row relative to R₀, computed as on the microcontroller.
-fn relative(rest_reading: f32, input: &Input) -> Option<Reading<f32>> {
+pub fn relative(rest_reading: f32, input: &Input) -> Option<Reading<f32>> {
     let sd = input.reading_sd / rest_reading;
     input.reading.map(|reading| Reading { value: (reading - rest_reading) / rest_reading, extra_variance: sd * sd })
 }
 
-/// Mean strain and reported standard deviation, row by row.
-fn run_ekf<T: Scalar, const B: usize, const N: usize, const L: usize>(
-    model: &SwitchedModel<T, 2, B, N>,
-    sensor: &FixedRate<B, N>,
+/// Strain and deviation as they are reported, row by row.
+fn run<T: Real, const B: usize, const N: usize, const L: usize>(
+    model: SwitchedModel<T, 2, B, N>,
+    sensor: &FixedRate<'_, B, N>,
+    numbers: Numbers<'_, T>,
     inputs: &[Input],
 ) -> Result<Vec<(T, T)>, ExportError> {
     let exactly = |x: f32| T::of(x.into());
-    let filter: SparseEkf<T, Compact, B, N> = SparseEkf::new(*model, exactly(sensor.dt_s)).map_err(refused)?;
-    let mut belief: Belief<T, N, L> = Belief::initial(model);
+    let mut twin: Twin<T, B, N, L> = Twin::new(model, &sensor.parts, numbers).map_err(refused)?;
     let estimate = |input: &Input| {
         let reading = relative(sensor.rest_reading, input)
             .map(|reading| Reading { value: exactly(reading.value), extra_variance: exactly(reading.extra_variance) });
-        filter.step(&mut belief, reading).map_err(refused)?;
-        Ok((belief.mean[0], exactly(sensor.strain_sd_scale) * belief.covariance[(0, 0)].sqrt()))
+        twin.step(reading).map_err(refused)?;
+        let strain = twin.strain();
+        Ok((strain.mean, strain.sd()))
     };
     inputs.iter().map(estimate).collect()
 }
 
-fn refused(error: StepError) -> ExportError {
+pub fn refused(error: StepError) -> ExportError {
     ExportError::Parameter(format!("the filter refuses the law's own readings: {error}"))
 }

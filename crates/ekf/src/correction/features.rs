@@ -4,17 +4,17 @@ use crate::Real;
 /// Number of features of the readings up to now.
 pub const FEATURES: usize = 7;
 /// Time constants of the low-passes, s.
-const TIME_CONSTANTS_S: [f64; 6] = [0.25, 0.5, 1.0, 2.0, 8.0, 32.0];
+pub const TIME_CONSTANTS_S: [f64; 6] = [0.25, 0.5, 1.0, 2.0, 8.0, 32.0];
 /// The places among them from which distances are taken.
 const FAR_FROM: [usize; 4] = [1, 3, 4, 5];
 /// The pairs among them whose differences are rates: of time constants τ/2 and τ.
 const RATES: [(usize, usize); 2] = [(0, 1), (2, 3)];
 /// A rate of a third of its usual size is still told apart well from twice that.
-const RATE_GAIN: f64 = 3.0;
+pub const RATE_GAIN: f64 = 3.0;
 
 /// Readings farther away than this, in half ranges of the calibration's, are taken for this far: one gross error does not
 /// stay in the low-passes for minutes.
-const FARTHEST: f64 = 3.0;
+pub const FARTHEST: f64 = 3.0;
 
 /// The scale on which readings `R/R₀ - 1` are seen.
 #[derive(Clone, Copy, Debug, PartialEq)]

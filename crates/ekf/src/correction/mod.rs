@@ -19,10 +19,10 @@ mod process;
 use ohmstrain_model::StrainRange;
 
 use crate::{Gaussian, Real};
-pub use features::{FEATURES, FeatureScale, ReadingFeatures};
+pub use features::{FARTHEST, FEATURES, FeatureScale, RATE_GAIN, ReadingFeatures, TIME_CONSTANTS_S};
 pub use low_pass::LowPass;
-pub use process::Process;
 use process::{Kernels, Said};
+pub use process::{LINEAR, Process};
 
 /// Number of a filter's outputs that a correction sees: strain, its rate, relaxation, baseline, and the probabilities of
 /// stretching and releasing.
@@ -31,11 +31,11 @@ pub const OUTPUTS: usize = 6;
 pub const INDUCING: usize = 48;
 
 /// Variance per square of a standardised input's distance from the training range, in variances of the strain.
-const FAR: f64 = 0.03;
+pub const FAR: f64 = 0.03;
 /// Variance of a result whose inputs are nothing like the training rows, in variances of the strain, on top of all else.
-const NOVEL: f64 = 0.06;
+pub const NOVEL: f64 = 0.06;
 /// Squared distance from the training range beyond which an input is new, in squared standard deviations.
-const NEW: f64 = 5.0;
+pub const NEW: f64 = 5.0;
 
 /// Where an input lay in the training rows.
 #[derive(Clone, Copy, Debug, PartialEq)]

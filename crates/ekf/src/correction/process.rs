@@ -2,7 +2,7 @@ use super::INDUCING;
 use crate::{Gaussian, Real};
 
 /// Weight of the linear part of the kernel, relative to the squared exponential.
-const LINEAR: f64 = 0.09;
+pub const LINEAR: f64 = 0.09;
 
 /// A Gaussian process conditioned on training rows, with the kernel `exp(-d²/2ℓ²) + 0.09 (x x' + 1)`: d is the distance of
 /// two inputs, x the first of them, all standardised.

@@ -94,6 +94,45 @@ impl<T: Scalar, const B: usize> StepConstants<T, B> {
     }
 }
 
+#[cfg(feature = "record")]
+impl<T, const B: usize> StepConstants<T, B> {
+    /// Shows every number with its name, branches as `name.number`, always in the same order. Covariances of branches with
+    /// later ones are not used, and not shown.
+    pub(crate) fn visit(&mut self, visit: &mut impl FnMut(&'static str, usize, &mut T)) {
+        let mut all = |name, numbers: &mut [T]| {
+            for (i, number) in numbers.iter_mut().enumerate() {
+                visit(name, i, number);
+            }
+        };
+        let [to_strain, to_rate] = &mut self.motion;
+        all("to_strain", to_strain);
+        all("to_rate", to_rate);
+        all("rate_squares", &mut self.rate_squares);
+        all("input", &mut self.input);
+        all("phase_input", &mut self.phase_input);
+        all("noise", &mut self.noise);
+        all("rate_change", &mut self.rate_change);
+        all("averaging", core::slice::from_mut(&mut self.averaging));
+        all("baseline_decay", core::slice::from_mut(&mut self.baseline_decay));
+        all("baseline_decays", &mut self.baseline_decays);
+        all("baseline_square", core::slice::from_mut(&mut self.baseline_square));
+        all("baseline_variance", core::slice::from_mut(&mut self.baseline_variance));
+        for branch in &mut self.branches {
+            all("decay", core::slice::from_mut(&mut branch.decay));
+            all("decays", &mut branch.decays);
+            all("drive", &mut branch.drive);
+            all("branch_input", core::slice::from_mut(&mut branch.input));
+            all("branch_phase_input", core::slice::from_mut(&mut branch.phase_input));
+            all("reach", core::slice::from_mut(&mut branch.reach));
+            all("per_reach", core::slice::from_mut(&mut branch.per_reach));
+            all("clear", core::slice::from_mut(&mut branch.clear));
+            all("cross_noise", &mut branch.cross_noise);
+            all("branch_noise", &mut branch.noise);
+            all("variance", core::slice::from_mut(&mut branch.variance));
+        }
+    }
+}
+
 /// The gains of all branches.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Gains<T> {

@@ -28,15 +28,33 @@ impl<T: Scalar> Curve<T> for AnyCurve<T> {
         // By comparisons, which cost less than calls of `fmax` and `fmin`.
         let (lower, upper) = (strain.with(self.range.lower), strain.with(self.range.upper));
         let inside = V::pick(strain.less(lower), lower, V::pick(upper.less(strain), upper, strain));
-        // A polynomial in vectors, what needs an exponential number by number.
-        let (value, slope) = if let Gauge::Polynomial { coefficients: [a1, a2, a3] } = self.gauge {
-            let (three, twice) = (inside * inside.literal(3.0), T::of(2.0) * a2);
-            let value = inside * inside.mul_add(inside.scale_add(a3, inside.with(a2)), inside.with(a1));
-            (value, inside.mul_add(three.scale_add(a3, inside.with(twice)), inside.with(a1)))
-        } else {
-            inside.each(|strain| self.gauge.value_and_slope(strain))
-        };
+        let (value, slope) = gauge_in_lanes(&self.gauge, inside);
         (slope.mul_add(strain - inside, value), slope)
+    }
+}
+
+/// [`Gauge::value_and_slope`] in lanes.
+#[inline(always)]
+fn gauge_in_lanes<V: Lanes>(gauge: &Gauge<V::Number>, strain: V) -> (V, V) {
+    let number = |number| strain.with(number);
+    let (one, two) = (strain.literal(1.0), V::Number::of(2.0));
+    match *gauge {
+        Gauge::Polynomial { coefficients: [a1, a2, a3] } => {
+            let (three, twice) = (strain * strain.literal(3.0), two * a2);
+            let value = strain * strain.mul_add(strain.scale_add(a3, number(a2)), number(a1));
+            (value, strain.mul_add(three.scale_add(a3, number(twice)), number(a1)))
+        }
+        Gauge::DecayingExponential { slope, decay_strain } => {
+            let x = strain.over(number(decay_strain));
+            let decay = (-x).exponential();
+            (strain.scale(slope) * decay, (one - x).scale(slope) * decay)
+        }
+        Gauge::Tunnelling { gap, barrier, path_loss } => {
+            let growth = (strain * strain.scale_add(path_loss, number(barrier))).exponential();
+            let width = strain.scale_add(gap, one);
+            let exponent_slope = strain.scale_add(two * path_loss, number(barrier));
+            (width * growth - one, width.mul_add(exponent_slope, number(gap)) * growth)
+        }
     }
 }
 

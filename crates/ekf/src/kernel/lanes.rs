@@ -47,8 +47,9 @@ pub trait Lanes:
     fn all(mask: Self::Mask) -> bool;
     /// `yes` where the mask is true, else `no`.
     fn pick(mask: Self::Mask, yes: Self, no: Self) -> Self;
-    /// A function of each number by itself.
-    fn each(self, function: impl Fn(Self::Number) -> (Self::Number, Self::Number)) -> (Self, Self);
+    /// Exponentials.
+    #[must_use]
+    fn exponential(self) -> Self;
     /// What holds where the mask is true or where it is not, if that is the same in all lanes.
     fn one_of<'a, R>(mask: Self::Mask, yes: &'a R, no: &'a R) -> Option<&'a R>;
     /// What holds below, within or above a range, if the same holds for all lanes; within, where it is not a number.
@@ -149,8 +150,8 @@ impl<T: Scalar> Lanes for T {
     }
 
     #[inline(always)]
-    fn each(self, function: impl Fn(T) -> (T, T)) -> (T, T) {
-        function(self)
+    fn exponential(self) -> T {
+        self.exp()
     }
 
     #[inline(always)]
@@ -281,12 +282,11 @@ mod vector {
         }
 
         #[inline(always)]
-        fn each(self, function: impl Fn(V::Element) -> (V::Element, V::Element)) -> (Self, Self) {
-            let (mut a, mut b) = (self.numbers, self.numbers);
-            for (a, b) in a.as_mut_slice().iter_mut().zip(b.as_mut_slice()) {
-                (*a, *b) = function(*a);
+        fn exponential(mut self) -> Self {
+            for number in self.numbers.as_mut_slice() {
+                *number = number.exponential();
             }
-            (Self { numbers: a, ..self }, Self { numbers: b, ..self })
+            self
         }
 
         #[inline(always)]

@@ -47,11 +47,16 @@ pub(crate) enum Course<V> {
 impl<V> Course<V> {
     /// An input, and what the mean rate of a moving phase adds to it.
     #[inline(always)]
-    fn input<T: Scalar>(&self, toward_strain: T, toward_rate: T) -> T {
+    fn input(&self, like: V, toward_strain: V::Number, toward_rate: V::Number) -> V
+    where
+        V: Lanes,
+    {
         match self {
-            Self::Uncertain => toward_strain,
-            Self::Known(Phase::Extend) | Self::Within(Phase::Extend, _) => toward_strain + toward_rate,
-            _ => toward_strain - toward_rate,
+            Self::Uncertain => like.with(toward_strain),
+            Self::Known(Phase::Extend) | Self::Within(Phase::Extend, _) => {
+                like.with(toward_strain) + like.with(toward_rate)
+            }
+            _ => like.with(toward_strain) - like.with(toward_rate),
         }
     }
 }
@@ -104,10 +109,10 @@ impl<T: Scalar, S, const B: usize, const N: usize, G> SparseEkf<T, S, B, N, G> {
         let step = &self.step;
         let Parts { strain, rate, strain_variance, strain_rate, rate_variance, .. } = *parts;
         let [a, b] = [pair(strain, step.motion[0]), pair(strain, step.motion[1])];
-        let (zero, push) = (strain.nothing(), |i: usize| course.input(step.input[i], step.phase_input[i]));
+        let (zero, push) = (strain.nothing(), |i: usize| course.input(strain, step.input[i], step.phase_input[i]));
         let before = [strain, rate];
-        parts.strain = sum(strain.with(push(0)), before, a);
-        parts.rate = sum(strain.with(push(1)), before, b);
+        parts.strain = sum(push(0), before, a);
+        parts.rate = sum(push(1), before, b);
         let strain_sum = strain + parts.strain;
 
         let (with_strain, with_rate) = ([strain_variance, strain_rate], [strain_rate, rate_variance]);
@@ -125,7 +130,7 @@ impl<T: Scalar, S, const B: usize, const N: usize, G> SparseEkf<T, S, B, N, G> {
         // Two loops: one short enough to be unrolled, and one that holds the choices.
         for i in 0..B {
             let branch = &step.branches[i];
-            let push = strain.with(course.input(branch.input, branch.phase_input));
+            let push = course.input(strain, branch.input, branch.phase_input);
             let unit = sum(push, before, pair(strain, branch.drive));
             drives[i] = match course {
                 Course::Uncertain => split(branch, gains.of(i), unit, &mut spread),
@@ -279,7 +284,7 @@ fn split<V: Lanes, S: Switch<V>, const B: usize>(
         change: V::pick(uncertain, open.change, clear.change),
         gain: V::pick(uncertain, open.gain, clear.gain),
         pull: V::pick(uncertain, open.pull, clear.pull),
-        jump: open.jump,
+        jump: V::pick(uncertain, open.jump, zero),
         left: V::pick(uncertain, open.left, zero),
     }
 }

@@ -2,46 +2,55 @@
 
 use ohmstrain_model::{Phase, RateChange, Scalar, Turning};
 
-use super::{Part, Parts};
+use super::predict::{dot, sum};
+use super::{Lanes, Part, Parts};
 use crate::belief::gaussian::Real;
 use crate::belief::tail::Tail;
 use crate::{Curve, Gaussian, SparseEkf, Switch};
 
 impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> SparseEkf<T, S, B, N, G> {
+    /// What the pull toward the mean strain and the mean rate of a phase add to the rate.
+    #[inline(always)]
+    fn push<V: Lanes<Number = T>>(&self, extends: bool, like: V) -> V {
+        let (input, toward) = (like.with(self.step.input[1]), like.with(self.step.phase_input[1]));
+        if extends { input + toward } else { input - toward }
+    }
+
     /// The rate after a step in a moving phase.
     #[inline(always)]
-    pub(crate) fn rate_ahead(&self, phase: Phase, from: &Parts<T, B>) -> Gaussian<T> {
+    pub(crate) fn rate_ahead<V: Lanes<Number = T>>(&self, phase: Phase, from: &Parts<V, B>) -> Gaussian<V> {
         let (step, b) = (&self.step, self.step.motion[1]);
-        let toward = if phase == Phase::Extend { step.phase_input[1] } else { -step.phase_input[1] };
-        let mean = step.input[1] + toward + b[0] * from.strain + b[1] * from.rate;
-        let spread = [
-            b[0] * from.strain_variance + b[1] * from.strain_rate,
-            b[0] * from.strain_rate + b[1] * from.rate_variance,
-        ];
-        Gaussian { mean, variance: step.noise[2] + b[0] * spread[0] + b[1] * spread[1] }
+        let push = self.push(phase == Phase::Extend, from.rate);
+        let (mean, variance) = answered(b, (push, from.rate.with(step.noise[2])), from);
+        Gaussian { mean, variance }
     }
-}
 
-impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> SparseEkf<T, S, B, N, G> {
+    /// How a rate of the sign of `before` changes over a step, positive away from zero.
+    #[inline(always)]
+    pub(crate) fn rate_change<V: Lanes<Number = T>>(&self, before: Phase, from: &Parts<V, B>) -> RateChange<V> {
+        let (step, like) = (&self.step, from.rate);
+        let push = self.push(before != Phase::Retract, like);
+        let (expected, spread) = answered(step.rate_change, (push, like.nothing()), from);
+        let expected = if before == Phase::Retract { -expected } else { expected };
+        RateChange { expected, spread, noise: like.with(step.noise[2]), is_brownian: true }
+    }
     /// What a rate of the sign of `before` leaves open over a step, as
     /// [`SwitchedModel::turning`](ohmstrain_model::SwitchedModel::turning).
     #[inline(always)]
     pub(crate) fn turning(&self, before: Phase, from: &Parts<T, B>) -> Turning<T> {
-        let (step, change) = (&self.step, self.step.rate_change);
-        let (side, toward) =
-            if before == Phase::Retract { (-T::one(), -step.phase_input[1]) } else { (T::one(), step.phase_input[1]) };
-        let spread = [
-            change[0] * from.strain_variance + change[1] * from.strain_rate,
-            change[0] * from.strain_rate + change[1] * from.rate_variance,
-        ];
-        let change = RateChange {
-            expected: side * (step.input[1] + toward + change[0] * from.strain + change[1] * from.rate),
-            spread: change[0] * spread[0] + change[1] * spread[1],
-            noise: step.noise[2],
-            is_brownian: true,
-        };
+        let side = if before == Phase::Retract { -T::one() } else { T::one() };
+        let change = self.rate_change(before, from);
         Turning::new(side * from.rate, from.rate_variance, &change, S::root)
     }
+}
+
+/// What motion by `by` from a belief adds to a mean, and to a variance.
+#[inline(always)]
+fn answered<V: Lanes, const B: usize>(by: [V::Number; 2], (mean, variance): (V, V), from: &Parts<V, B>) -> (V, V) {
+    let like = from.strain;
+    let by = by.map(|factor| like.with(factor));
+    let spread = [dot(by, [from.strain_variance, from.strain_rate]), dot(by, [from.strain_rate, from.rate_variance])];
+    (sum(mean, by, [from.strain, from.rate]), sum(variance, by, spread))
 }
 
 impl<T: Real, const B: usize> Parts<T, B> {
@@ -82,15 +91,17 @@ impl<T: Real, const B: usize> Parts<T, B> {
         self.regress::<N>(side * shift * per_sd, narrowed * per_sd * per_sd);
         mass
     }
+}
 
+impl<V: Lanes, const B: usize> Parts<V, B> {
     /// Moves the rate, everything else along its regression: means by covariance · `moves`, covariances by the product of
     /// both covariances · `narrows`.
     #[inline(always)]
-    fn regress<const N: usize>(&mut self, moves: T, narrows: T) {
+    pub(crate) fn regress<const N: usize>(&mut self, moves: V, narrows: V) {
         let (with_strain, with_rate) = (self.strain_rate, self.rate_variance);
         let (on_strain, on_rate) = (with_strain * narrows, with_rate * narrows);
         let branches = self.branches.map(|branch| branch.with_rate);
-        let follow = |part: &mut Part<T, B>, others: usize| {
+        let follow = |part: &mut Part<V, B>, others: usize| {
             let (own, narrowing) = (part.with_rate, part.with_rate * narrows);
             part.mean += own * moves;
             part.with_strain += narrowing * with_strain;

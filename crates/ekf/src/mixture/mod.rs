@@ -6,12 +6,12 @@ mod imm;
 mod lineage;
 mod mixing;
 mod pause;
-mod sign_split;
+pub(crate) mod sign_split;
 mod sparse;
 mod sparse_hypotheses;
 mod sparse_imm;
 mod sparse_split;
-mod step;
+pub(crate) mod step;
 pub(crate) mod switching;
 
 pub use evidence::MixtureResidual;

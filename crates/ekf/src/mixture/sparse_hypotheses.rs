@@ -22,12 +22,12 @@ use crate::{
 /// same to rounding, without multiplying zeros. `G` as for [`SparseEkf`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SparseHypotheses<T, const B: usize, const N: usize, const K: usize, S = Compact, G = AnyCurve<T>> {
-    kernel: SparseEkf<T, S, B, N, G>,
+    pub(crate) kernel: SparseEkf<T, S, B, N, G>,
     /// Probabilities of a change of phase over a step, `[from][to]`.
-    chain: [[T; 3]; 3],
-    weighing: Weighing<T>,
+    pub(crate) chain: [[T; 3]; 3],
+    pub(crate) weighing: Weighing<T>,
     /// Rate of a moving phase that begins.
-    fresh: [Gaussian<T>; 3],
+    pub(crate) fresh: [Gaussian<T>; 3],
 }
 
 impl<T: Real, const B: usize, const N: usize, const K: usize> SparseHypotheses<T, B, N, K> {

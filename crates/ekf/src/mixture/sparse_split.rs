@@ -25,14 +25,14 @@ use crate::{
 /// same to rounding, without multiplying zeros. `G` as for [`SparseEkf`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SparseSignSplit<T, const B: usize, const N: usize, const K: usize, S = Logistic, G = AnyCurve<T>> {
-    kernel: SparseEkf<T, S, B, N, G>,
+    pub(crate) kernel: SparseEkf<T, S, B, N, G>,
     /// Probabilities of a change of phase over a step, `[from][to]`; `None` for a body that never rests.
-    chain: Option<[[T; 3]; 3]>,
-    weighing: Weighing<T>,
+    pub(crate) chain: Option<[[T; 3]; 3]>,
+    pub(crate) weighing: Weighing<T>,
     /// Rate of a moving phase after a hold.
-    fresh: [Gaussian<T>; 3],
+    pub(crate) fresh: [Gaussian<T>; 3],
     /// Seconds without a reading after which a step leaves the direction open.
-    forgets_direction_s: T,
+    pub(crate) forgets_direction_s: T,
 }
 
 impl<T: Real, const B: usize, const N: usize, const K: usize> SparseSignSplit<T, B, N, K> {

@@ -28,7 +28,7 @@ float level() {
 #endif
 }
 
-// Resistance of the sensor, ohm; infinite if it is not connected, which the filter refuses.
+// Resistance of the sensor, ohm; infinite if it is not connected: the filter goes on without.
 float sensor_ohm() {
   const float at_pin = level();
   return R_SERIES * at_pin / (SUPPLY - at_pin);
@@ -66,10 +66,7 @@ void loop() {
   }
   due += PERIOD_US;
   const float ohm = sensor_ohm();
-  ohmstrain_status status = ohmstrain_step(&state, ohm, 0.0f, nullptr);
-  if (status == OHMSTRAIN_ERR_NOT_FINITE) {
-    status = ohmstrain_predict(&state);  // no reading: go on without
-  }
+  const ohmstrain_status status = ohmstrain_step(&state, ohm, 0.0f, nullptr);
   if (status != OHMSTRAIN_OK) {
     fail("ohmstrain_step: ", status);
   }

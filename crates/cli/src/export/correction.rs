@@ -1,0 +1,112 @@
+//! The learned correction as the templates have it.
+
+use ohmstrain_calib::{PortableCorrection, PortableProcess};
+use ohmstrain_ekf::correction::{FAR, FARTHEST, LINEAR, NEW, NOVEL, RATE_GAIN, TIME_CONSTANTS_S};
+use serde::Serialize;
+
+use super::literal::Literal;
+
+/// Rows, weights and scales.
+#[derive(Debug, Serialize)]
+pub struct CorrectionConstants {
+    centre: Literal,
+    half_range: Literal,
+    rates: [Literal; 2],
+    time_constants_s: Vec<Literal>,
+    rate_gain: Literal,
+    farthest: Literal,
+    rows: Vec<Vec<Literal>>,
+    mean: Vec<Literal>,
+    /// `None` for an input that never changes: infinite.
+    sd: Vec<Option<Literal>>,
+    lower: Vec<Literal>,
+    upper: Vec<Literal>,
+    inducing: usize,
+    processes: [ProcessConstants; 2],
+    far: Literal,
+    novel: Literal,
+    new: Literal,
+    linear: Literal,
+    strain_variance: Literal,
+    variance_factor: Literal,
+}
+
+/// A Gaussian process.
+#[derive(Debug, Serialize)]
+struct ProcessConstants {
+    name: &'static str,
+    comment: &'static str,
+    length: Literal,
+    length_square: Literal,
+    mean: Literal,
+    variance: Literal,
+    noise: Literal,
+    widening: Literal,
+    least_variance: Literal,
+    weights: Vec<Literal>,
+    explained: Vec<Literal>,
+}
+
+fn narrow(number: f64) -> Literal {
+    Literal(number as f32)
+}
+
+fn narrowed<'a>(numbers: impl IntoIterator<Item = &'a f64>) -> Vec<Literal> {
+    numbers.into_iter().copied().map(narrow).collect()
+}
+
+impl CorrectionConstants {
+    /// Of a correction.
+    pub fn new(correction: &PortableCorrection) -> Self {
+        let scales = &correction.scales;
+        let explained = correction.direct.explained.len();
+        Self {
+            centre: narrow(correction.features.centre),
+            half_range: narrow(correction.features.half_range),
+            rates: correction.features.rates.map(narrow),
+            time_constants_s: narrowed(&TIME_CONSTANTS_S),
+            rate_gain: narrow(RATE_GAIN),
+            farthest: narrow(FARTHEST),
+            rows: correction.rows.iter().map(narrowed).collect(),
+            mean: scales.iter().map(|scale| narrow(scale.mean)).collect(),
+            sd: scales.iter().map(|scale| Some(narrow(scale.sd)).filter(|sd| sd.0.is_finite())).collect(),
+            lower: scales.iter().map(|scale| narrow(scale.lower)).collect(),
+            upper: scales.iter().map(|scale| narrow(scale.upper)).collect(),
+            // m rows of the triangle are m (m + 1) / 2 numbers.
+            inducing: ((8 * explained + 1).isqrt() - 1) / 2,
+            processes: [
+                ProcessConstants::new("DIRECT", "Strain from the features.", &correction.direct),
+                ProcessConstants::new(
+                    "RESIDUAL",
+                    "What the filter's strain lacks, from all inputs.",
+                    &correction.residual,
+                ),
+            ],
+            far: narrow(FAR),
+            novel: narrow(NOVEL),
+            new: narrow(NEW),
+            linear: narrow(LINEAR),
+            strain_variance: narrow(correction.strain_variance),
+            variance_factor: narrow(correction.variance_factor),
+        }
+    }
+}
+
+impl ProcessConstants {
+    fn new(name: &'static str, comment: &'static str, process: &PortableProcess) -> Self {
+        let length = process.length as f32;
+        Self {
+            name,
+            comment,
+            length: Literal(length),
+            length_square: Literal(length * length),
+            mean: narrow(process.mean),
+            variance: narrow(process.variance),
+            noise: narrow(process.noise),
+            widening: narrow(process.widening),
+            least_variance: narrow(process.least_variance),
+            weights: narrowed(&process.weights),
+            explained: narrowed(&process.explained),
+        }
+    }
+}

@@ -1,0 +1,121 @@
+//! When an interval is wider than the filter says: the library's doubts, in any precision.
+
+use ohmstrain::DOUBT;
+use ohmstrain_calib::{SURPRISING_NIS, SensorParams};
+use ohmstrain_ekf::Real;
+
+use super::twin::{flag, number};
+
+/// What the doubts of a sensor depend on: what its calibration has seen.
+#[derive(Clone, Copy)]
+pub struct DoubtParts {
+    /// Range of the readings, R/R₀ - 1.
+    pub low: f64,
+    pub high: f64,
+    /// Fastest rate, 1/s, and longest recording, s.
+    pub fastest_per_s: f64,
+    pub longest_s: f64,
+    /// Range of the strain over that of the readings.
+    pub per_reading: f64,
+    /// Variances: at an unknown start, and of what is known least.
+    pub start: f64,
+    pub most: f64,
+}
+
+impl DoubtParts {
+    /// Of a sensor.
+    pub fn new(params: &SensorParams) -> Self {
+        let (seen, span) = (&params.validity, params.limits.span());
+        let relative = |reading: f64| reading / params.rest_reading - 1.0;
+        let (low, high) = (relative(seen.reading_lower), relative(seen.reading_upper));
+        Self {
+            low,
+            high,
+            fastest_per_s: seen.fastest_rate_per_s,
+            longest_s: seen.duration_s,
+            per_reading: span / (high - low),
+            start: (DOUBT.start * span).powi(2),
+            most: (DOUBT.most * span).powi(2),
+        }
+    }
+}
+
+/// Doubts as they are.
+#[derive(Clone, Copy)]
+pub struct Doubt<T> {
+    parts: DoubtParts,
+    runs: bool,
+    starts: bool,
+    run_s: T,
+    fading: T,
+    lost: Option<T>,
+    believed: Option<T>,
+    outside: T,
+}
+
+impl<T: Real> Doubt<T> {
+    /// Before the first row.
+    pub fn new(parts: DoubtParts) -> Self {
+        Self {
+            parts,
+            runs: false,
+            starts: true,
+            run_s: T::zero(),
+            fading: number(parts.start),
+            lost: None,
+            believed: None,
+            outside: T::zero(),
+        }
+    }
+
+    fn raise(&mut self, variance: T) {
+        let variance = variance.min(number(self.parts.most));
+        if variance > self.fading {
+            (self.fading, self.starts) = (variance, false);
+        }
+    }
+
+    /// A step has passed, with a reading that was used and its normalised innovation squared, or without; `variance` is
+    /// the strain's.
+    pub fn see(&mut self, dt_s: T, reading: Option<(T, T)>, variance: T) {
+        let passed_s = if self.runs { dt_s } else { T::zero() };
+        self.runs = true;
+        self.run_s += passed_s;
+        let Some((rho, nis)) = reading else {
+            self.lost = Some(self.lost.map_or(variance, |lost| lost.max(variance)));
+            return;
+        };
+        let surprising: T = number(SURPRISING_NIS);
+        if nis > surprising {
+            let jump = self.believed.map_or(T::zero(), |last| (rho - last) * number(self.parts.per_reading));
+            let doubt = (T::one() - (surprising / nis).sqrt()) * jump;
+            self.raise(doubt * doubt);
+        } else {
+            self.fading *= (-passed_s / number(DOUBT.fades_s)).exp();
+            if let Some(lost) = self.lost.take() {
+                self.raise(lost);
+            }
+            self.believed = Some(rho);
+        }
+        let (low, high): (T, T) = (number(self.parts.low), number(self.parts.high));
+        let beyond = (rho - high).max(low - rho) - number::<T>(DOUBT.margin) * (high - low);
+        self.outside = (self.outside * (-passed_s / number(DOUBT.outside_fades_s)).exp()).max(beyond);
+    }
+
+    /// The strain's variance with all doubts, and flags that say so.
+    pub fn widened(&self, rate: T, variance: T) -> (T, u32) {
+        let far = number::<T>(DOUBT.shows) * self.outside.max(T::zero()) * number(self.parts.per_reading);
+        let (outside, worth): (T, T) = (far * far, number(DOUBT.worth));
+        let faster = rate.abs() / number(self.parts.fastest_per_s);
+        let fast = if faster > number(DOUBT.faster) { faster * faster } else { T::one() };
+        let more = (self.fading + outside).min(number(self.parts.most));
+        let raised = [
+            (self.starts && self.fading > worth * number(self.parts.start), flag::START_UP),
+            (!self.starts && self.fading > worth * variance, flag::RECOVERING),
+            (outside > worth * variance || fast > T::one(), flag::EXTRAPOLATED),
+            (self.run_s > number(self.parts.longest_s), flag::LONG_RUN),
+        ];
+        let flags = raised.into_iter().filter(|(is_raised, _)| *is_raised).fold(0, |flags, (_, flag)| flags | flag);
+        (variance * fast + more, flags)
+    }
+}

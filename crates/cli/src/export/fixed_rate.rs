@@ -1,0 +1,154 @@
+//! A sensor's filter at a fixed rate, in single and in double precision.
+
+use ohmstrain_calib::{EstimatorKind, EstimatorParams, HISTORIES, HYPOTHESES, PortableFilter, SensorParams};
+use ohmstrain_ekf::{Compact, Ekf, Estimator, Evidence, Hypotheses, STEP_GRACE, SignSplit, SparseEkf, StepError};
+use ohmstrain_model::{Motion, SensorLaw, StrainRange, SwitchedModel};
+
+use super::doubt::DoubtParts;
+use super::law::{PriorConstants, narrow_law, narrow_noise, narrow_range};
+use super::steps::StepTable;
+use super::twin::{Numbers, Parts, PhaseParts, number};
+use super::{ExportError, parameter};
+
+/// A filter in single precision, with what the numbers of states in its type are made for.
+pub struct FixedRate<'a, const B: usize, const N: usize> {
+    /// The model in double precision, for simulation and to see what rounding does.
+    pub reference: SwitchedModel<f64, 2, B, N>,
+    /// The model in single precision.
+    pub model: SwitchedModel<f32, 2, B, N>,
+    /// R₀.
+    pub rest_reading: f32,
+    /// Everything else.
+    pub parts: Parts<'a>,
+    /// What depends on the length of a step.
+    pub table: StepTable,
+}
+
+impl<'a, const B: usize, const N: usize> FixedRate<'a, B, N> {
+    /// Of a sensor, at `dt_s` seconds from reading to reading.
+    ///
+    /// # Errors
+    /// See [`ExportError`].
+    pub fn new<const L: usize>(
+        params: &SensorParams,
+        filter: &'a PortableFilter,
+        dt_s: f32,
+    ) -> Result<Self, ExportError> {
+        let EstimatorParams { noise, motion, phases, strain_sd_scale, .. } = filter.estimator;
+        let [time, rate_sd, mean, sd] = PriorConstants::new(&motion, filter.kind)?.numbers();
+        let speed = phases.map_or(0.0, |phases| phases.speed_per_s);
+        let law: SensorLaw<f64, B> = params
+            .law
+            .to_model()
+            .ok_or_else(|| ExportError::Parameter("field `law.branches`: another number of them".into()))?;
+        let reference = Motion::ornstein_uhlenbeck(time, rate_sd, mean, sd)
+            .and_then(|motion| motion.with_phase_rate(number(speed)))
+            .and_then(|motion| SwitchedModel::new(law, motion, noise.to_model()))
+            .map_err(parameter)?;
+        let [time, rate_sd, mean, sd] = [time, rate_sd, mean, sd].map(|x| x as f32);
+        let model = Motion::ornstein_uhlenbeck(time, rate_sd, mean, sd)
+            .and_then(|motion| motion.with_phase_rate(speed as f32))
+            .and_then(|motion| SwitchedModel::new(narrow_law(&law), motion, narrow_noise(noise.to_model())))
+            .map_err(parameter)?;
+        let limits = narrow_range(params.limits.to_model());
+        let phases = phases.map(|phases| PhaseParts {
+            hold_time_s: phases.hold_time_s,
+            move_time_s: phases.move_time_s,
+            reversal: phases.reversal,
+            tempering: phases.tempering,
+            rests: phases.rests(),
+        });
+        let phases = phases.filter(|_| filter.kind != EstimatorKind::Ekf);
+        let mut parts = Parts {
+            kind: filter.kind,
+            dt_s,
+            longest_step_s: 0.0,
+            phases,
+            limits,
+            strain_sd_scale: strain_sd_scale as f32,
+            sieve: filter.readings,
+            correction: filter.correction.as_ref(),
+            doubt: DoubtParts::new(params),
+        };
+        let longest_s = longest_step_s::<B, N, L>(&reference, &parts)?;
+        let usual_s = f64::from(dt_s) / (f64::from(dt_s) / longest_s).ceil().max(1.0);
+        let kernel = |step_s| SparseEkf::<f64, Compact, B, N>::new(reference, step_s).map_err(parameter);
+        let numbers = |step_s| exact_numbers(&reference, phases, step_s).map_err(parameter);
+        let table = StepTable::new(usual_s, &kernel(usual_s)?.step_names(), numbers)?;
+        // Not longer than the table either.
+        parts.longest_step_s = longest_s.min(table.range.1) as f32;
+        Ok(Self { reference, model, rest_reading: params.rest_reading as f32, parts, table })
+    }
+
+    /// Length of the steps that the usual time between readings is divided into, s.
+    pub fn usual_step_s(&self) -> f32 {
+        let (dt_s, longest_s) = (self.parts.dt_s, self.parts.longest_step_s);
+        let (mut count, mut covered) = (1.0, longest_s);
+        while covered < dt_s {
+            covered += longest_s;
+            count += 1.0;
+        }
+        dt_s / count
+    }
+
+    /// What depends on the length of a step, as the exported program has it.
+    pub fn interpolated(&self) -> Numbers<'_, f32> {
+        let usual = self.usual_numbers();
+        Box::new(move |step_s| if step_s == self.usual_step_s() { usual.clone() } else { self.table.at(step_s) })
+    }
+
+    /// The same in double precision, as the law has it.
+    pub fn exact(&self) -> Numbers<'_, f64> {
+        Box::new(|step_s| {
+            let numbers = exact_numbers(&self.reference, self.parts.phases, step_s);
+            numbers.unwrap_or_else(|_| self.table.at(step_s))
+        })
+    }
+
+    /// What depends on the length of a step, for the usual one.
+    pub fn usual_numbers(&self) -> Vec<f32> {
+        let numbers = exact_numbers(&self.reference, self.parts.phases, self.usual_step_s().into());
+        numbers.map_or_else(|_| self.table.at(self.usual_step_s()), |all| all.iter().map(|x| *x as f32).collect())
+    }
+}
+
+/// Numbers of the kernel, and of the chain, for steps of a length.
+fn exact_numbers<const B: usize, const N: usize>(
+    model: &SwitchedModel<f64, 2, B, N>,
+    phases: Option<PhaseParts>,
+    step_s: f64,
+) -> Result<Vec<f64>, StepError> {
+    let mut numbers = SparseEkf::<f64, Compact, B, N>::new(*model, step_s)?.step_numbers();
+    let limits = StrainRange { lower: 0.0, upper: 1.0 };
+    let chain = match phases {
+        Some(phases) => phases.filter_parts::<f64>(limits)?.0.probabilities(step_s),
+        None => [[0.0; 3]; 3],
+    };
+    numbers.extend(chain.as_flattened());
+    Ok(numbers)
+}
+
+/// The longest step over which a prediction is as good as many short ones, s.
+fn longest_step_s<const B: usize, const N: usize, const L: usize>(
+    model: &SwitchedModel<f64, 2, B, N>,
+    parts: &Parts<'_>,
+) -> Result<f64, ExportError> {
+    let limits = StrainRange { lower: f64::from(parts.limits.lower), upper: f64::from(parts.limits.upper) };
+    let longest_s = match parts.phases {
+        None => longest::<N, L>(&Ekf::new(*model)),
+        Some(phases) => {
+            let (dwell, evidence): (_, Evidence<f64>) = phases.filter_parts(limits).map_err(parameter)?;
+            let hold = phases.rests.then_some(dwell);
+            if parts.kind == EstimatorKind::SignSplit {
+                longest::<N, L>(&SignSplit::<_, _, HYPOTHESES>::new(*model, hold, evidence))
+            } else {
+                longest::<N, L>(&Hypotheses::<_, _, HISTORIES>::new(*model, dwell, evidence))
+            }
+        }
+    };
+    Ok(longest_s * STEP_GRACE)
+}
+
+fn longest<const N: usize, const L: usize>(estimator: &impl Estimator<f64, N, L>) -> f64 {
+    estimator.longest_step_s()
+}

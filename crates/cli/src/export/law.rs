@@ -1,0 +1,183 @@
+//! Law, noise and motion as they were calibrated, in single precision.
+
+use ohmstrain_calib::{EstimatorKind, MotionParams, PhaseParams};
+use ohmstrain_model::{Branch, Gauge, ModelNoise, SensorLaw, StrainRange};
+use serde::Serialize;
+
+use super::ExportError;
+use super::literal::Literal;
+
+/// The law as it was calibrated.
+#[derive(Debug, Serialize)]
+pub struct LawConstants {
+    gauge: GaugeConstants,
+    viscosity_s: [Literal; 2],
+    branches: Vec<BranchConstants>,
+    range_lower: Literal,
+    range_upper: Literal,
+}
+
+/// A branch as it was calibrated; gains and their growth with strain.
+#[derive(Debug, Serialize)]
+pub struct BranchConstants {
+    tau_s: Literal,
+    extend: [Literal; 2],
+    retract: [Literal; 2],
+}
+
+/// The gauge curve by family.
+#[derive(Debug, Serialize)]
+#[serde(tag = "family", rename_all = "kebab-case")]
+pub enum GaugeConstants {
+    Polynomial { coefficients: [Literal; 3] },
+    DecayingExponential { slope: Literal, decay_strain: Literal },
+    Tunnelling { gap: Literal, barrier: Literal, path_loss: Literal },
+}
+
+/// The noise as it was calibrated.
+#[derive(Debug, Serialize)]
+pub struct NoiseConstants {
+    reading_sd: Literal,
+    branch_sd: Literal,
+    baseline_sd: Literal,
+    baseline_time_s: Literal,
+}
+
+/// The motion as it was calibrated.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct PriorConstants {
+    rate_time_s: Literal,
+    rate_sd_per_s: Literal,
+    strain_mean: Literal,
+    strain_sd: Literal,
+}
+
+/// Phases as they were calibrated.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct PhaseConstants {
+    hold_time_s: Literal,
+    move_time_s: Literal,
+    reversal: Literal,
+    tempering: Literal,
+    speed_per_s: Literal,
+}
+
+impl LawConstants {
+    /// Of a law.
+    pub fn new<const B: usize>(law: &SensorLaw<f32, B>) -> Self {
+        let branch = |branch: &Branch<f32>| BranchConstants {
+            tau_s: Literal(branch.tau_s),
+            extend: [branch.extend_gain, branch.extend_gain_slope].map(Literal),
+            retract: [branch.retract_gain, branch.retract_gain_slope].map(Literal),
+        };
+        Self {
+            gauge: gauge_constants(&law.gauge),
+            viscosity_s: [law.extend_viscosity_s, law.retract_viscosity_s].map(Literal),
+            branches: law.branches.iter().map(branch).collect(),
+            range_lower: Literal(law.range.lower),
+            range_upper: Literal(law.range.upper),
+        }
+    }
+}
+
+impl NoiseConstants {
+    /// Of a noise.
+    pub const fn new(noise: &ModelNoise<f32>) -> Self {
+        Self {
+            reading_sd: Literal(noise.reading_sd),
+            branch_sd: Literal(noise.branch_sd),
+            baseline_sd: Literal(noise.baseline_sd),
+            baseline_time_s: Literal(noise.baseline_time_s),
+        }
+    }
+}
+
+impl PhaseConstants {
+    /// Of phases.
+    pub const fn new(phases: &PhaseParams) -> Self {
+        Self {
+            hold_time_s: Literal(phases.hold_time_s as f32),
+            move_time_s: Literal(phases.move_time_s as f32),
+            reversal: Literal(phases.reversal as f32),
+            tempering: Literal(phases.tempering as f32),
+            speed_per_s: Literal(phases.speed_per_s as f32),
+        }
+    }
+}
+
+impl PriorConstants {
+    /// Of a motion that the exported filter has a form for.
+    ///
+    /// # Errors
+    /// If it has none.
+    pub fn new(motion: &MotionParams, kind: EstimatorKind) -> Result<Self, ExportError> {
+        match *motion {
+            MotionParams::OrnsteinUhlenbeck { rate_time_s, rate_sd_per_s, strain_mean, strain_sd } => Ok(Self {
+                rate_time_s: Literal(rate_time_s as f32),
+                rate_sd_per_s: Literal(rate_sd_per_s as f32),
+                strain_mean: Literal(strain_mean as f32),
+                strain_sd: Literal(strain_sd as f32),
+            }),
+            MotionParams::Smooth { .. } => Err(ExportError::Unsupported {
+                what: format!("the motion of {} has an acceleration, which the exported filter has not", kind.name()),
+                instead: "calibrate again, which gives it Ornstein-Uhlenbeck motion",
+            }),
+        }
+    }
+
+    /// Correlation time of the rate, its deviation, mean and deviation of strain.
+    pub fn numbers(&self) -> [f64; 4] {
+        [self.rate_time_s, self.rate_sd_per_s, self.strain_mean, self.strain_sd].map(|literal| f64::from(literal.0))
+    }
+}
+
+pub fn narrow_noise(noise: ModelNoise<f64>) -> ModelNoise<f32> {
+    ModelNoise {
+        reading_sd: noise.reading_sd as f32,
+        branch_sd: noise.branch_sd as f32,
+        baseline_sd: noise.baseline_sd as f32,
+        baseline_time_s: noise.baseline_time_s as f32,
+    }
+}
+
+pub fn narrow_law<const B: usize>(law: &SensorLaw<f64, B>) -> SensorLaw<f32, B> {
+    let gauge = match law.gauge {
+        Gauge::Polynomial { coefficients } => Gauge::Polynomial { coefficients: coefficients.map(|a| a as f32) },
+        Gauge::DecayingExponential { slope, decay_strain } => {
+            Gauge::DecayingExponential { slope: slope as f32, decay_strain: decay_strain as f32 }
+        }
+        Gauge::Tunnelling { gap, barrier, path_loss } => {
+            Gauge::Tunnelling { gap: gap as f32, barrier: barrier as f32, path_loss: path_loss as f32 }
+        }
+    };
+    let branch = |branch: &Branch<f64>| Branch {
+        tau_s: branch.tau_s as f32,
+        extend_gain: branch.extend_gain as f32,
+        retract_gain: branch.retract_gain as f32,
+        extend_gain_slope: branch.extend_gain_slope as f32,
+        retract_gain_slope: branch.retract_gain_slope as f32,
+    };
+    SensorLaw {
+        gauge,
+        extend_viscosity_s: law.extend_viscosity_s as f32,
+        retract_viscosity_s: law.retract_viscosity_s as f32,
+        branches: law.branches.each_ref().map(branch),
+        range: narrow_range(law.range),
+    }
+}
+
+pub fn narrow_range(range: StrainRange<f64>) -> StrainRange<f32> {
+    StrainRange { lower: range.lower as f32, upper: range.upper as f32 }
+}
+
+fn gauge_constants(gauge: &Gauge<f32>) -> GaugeConstants {
+    match *gauge {
+        Gauge::Polynomial { coefficients } => GaugeConstants::Polynomial { coefficients: coefficients.map(Literal) },
+        Gauge::DecayingExponential { slope, decay_strain } => {
+            GaugeConstants::DecayingExponential { slope: Literal(slope), decay_strain: Literal(decay_strain) }
+        }
+        Gauge::Tunnelling { gap, barrier, path_loss } => {
+            GaugeConstants::Tunnelling { gap: Literal(gap), barrier: Literal(barrier), path_loss: Literal(path_loss) }
+        }
+    }
+}

@@ -1,0 +1,130 @@
+//! A recording through the exported program's twin.
+
+use ohmstrain_calib::{EstimatorKind, PortableFilter, SensorParams};
+use ohmstrain_ekf::{Reading, Real};
+use ohmstrain_model::SwitchedModel;
+
+use super::fixed_rate::FixedRate;
+use super::twin::{Numbers, Twin};
+use super::vectors::{Input, refused, relative};
+use super::{ExportError, parameter, too_many_branches};
+
+/// A row of a recording; a missing reading is NaN.
+pub struct ReplayedRow {
+    /// Time, s.
+    pub time_s: f64,
+    /// The reading, in the sensor's unit, and the deviation that its electronics add.
+    pub reading: f64,
+    /// That deviation.
+    pub reading_sd: f64,
+}
+
+/// Strain and its deviation in every row, as the exported program in single precision reports them.
+///
+/// # Errors
+/// See [`ExportError`].
+pub fn replay(
+    params: &SensorParams,
+    kind: Option<EstimatorKind>,
+    dt_s: f64,
+    rows: &[ReplayedRow],
+) -> Result<Vec<(f32, f32)>, ExportError> {
+    let filter = PortableFilter::new(params, kind).map_err(parameter)?;
+    match params.law.branches.len() {
+        0 => of::<0, 3, 6>(params, &filter, dt_s, rows),
+        1 => of::<1, 4, 10>(params, &filter, dt_s, rows),
+        2 => of::<2, 5, 15>(params, &filter, dt_s, rows),
+        3 => of::<3, 6, 21>(params, &filter, dt_s, rows),
+        4 => of::<4, 7, 28>(params, &filter, dt_s, rows),
+        _ => Err(too_many_branches()),
+    }
+}
+
+fn of<const B: usize, const N: usize, const L: usize>(
+    params: &SensorParams,
+    filter: &PortableFilter,
+    dt_s: f64,
+    rows: &[ReplayedRow],
+) -> Result<Vec<(f32, f32)>, ExportError> {
+    let sensor = FixedRate::<B, N>::new::<L>(params, filter, dt_s as f32)?;
+    run::<f32, B, N, L>(sensor.model, &sensor, sensor.interpolated(), rows)
+}
+
+fn run<T: Real, const B: usize, const N: usize, const L: usize>(
+    model: SwitchedModel<T, 2, B, N>,
+    sensor: &FixedRate<'_, B, N>,
+    numbers: Numbers<'_, T>,
+    rows: &[ReplayedRow],
+) -> Result<Vec<(T, T)>, ExportError> {
+    let exactly = |x: f32| T::of(x.into());
+    let mut twin: Twin<T, B, N, L> = Twin::new(model, &sensor.parts, numbers).map_err(refused)?;
+    let mut last_s = None;
+    let said = |row: &ReplayedRow| {
+        let since_s = last_s.replace(row.time_s).map_or(sensor.parts.dt_s, |last_s| (row.time_s - last_s) as f32);
+        let reading = (!row.reading.is_nan()).then_some(row.reading as f32);
+        let input = Input { reading, reading_sd: row.reading_sd as f32 };
+        let reading = relative(sensor.rest_reading, &input)
+            .map(|reading| Reading { value: exactly(reading.value), extra_variance: exactly(reading.extra_variance) });
+        twin.step_after(exactly(since_s), reading).map_err(refused)?;
+        let strain = twin.strain();
+        Ok((strain.mean, strain.sd()))
+    };
+    rows.iter().map(said).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use ohmstrain::Sensor;
+    use ohmstrain_calib::{EstimatorKind, PortableFilter, SensorParams};
+
+    use super::{FixedRate, ReplayedRow, run};
+
+    /// A sensor and a recording of its law's own readings, at times that jitter.
+    fn sensor() -> Sensor {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/fixtures/representative.toml");
+        Sensor::from_toml(&std::fs::read_to_string(path).unwrap()).unwrap()
+    }
+
+    fn rows(params: &SensorParams) -> Vec<ReplayedRow> {
+        let law = params.law.to_model::<2>().unwrap();
+        let dt_s = |k: u32| 0.05 + 0.03 * (1.7 * f64::from(k)).sin();
+        let mut time_s = 0.0;
+        let row = |k: u32| {
+            time_s += dt_s(k);
+            let strain = 0.5 * params.limits.span() * (1.0 - (0.9 * time_s).cos());
+            let rho = law.gauge_value_and_slope(strain).0 + 1e-3 * (5.3 * f64::from(k)).sin();
+            ReplayedRow { time_s, reading: params.rest_reading * (1.0 + rho), reading_sd: 0.0 }
+        };
+        (0..1500).map(row).collect()
+    }
+
+    /// The first step of a chip takes an interval, the first row of a recording none: after so many rows that is forgotten.
+    const SETTLED: usize = 600;
+
+    /// The twin in double precision is the filter of the library: readings and limits rounded to 6e-8 move what it says by no
+    /// more than a hundred times that.
+    #[test]
+    fn the_twin_in_double_precision_is_the_librarys_filter() {
+        let sensor = sensor();
+        let params = sensor.params();
+        let rows = rows(params);
+        let mut worst = 0.0_f64;
+        for kind in [EstimatorKind::Corrected, params.filter_of(EstimatorKind::Corrected)] {
+            let parts = PortableFilter::new(params, Some(kind)).unwrap();
+            let fixed = FixedRate::<2, 5>::new::<15>(params, &parts, 0.05).unwrap();
+            let twin = run::<f64, 2, 5, 15>(fixed.reference, &fixed, fixed.exact(), &rows).unwrap();
+            let mut filter = sensor.filter().estimator(kind).build().unwrap();
+            let mut largest = 0.0_f64;
+            for (k, (row, (strain, sd))) in rows.iter().zip(twin).enumerate() {
+                let expected = filter.step(row.time_s, row.reading).unwrap();
+                if k < SETTLED {
+                    continue;
+                }
+                largest = largest.max((strain - expected.strain).abs()).max((sd - expected.strain_sd).abs());
+            }
+            println!("{}: {largest:.1e}", kind.name());
+            worst = worst.max(largest);
+        }
+        assert!(worst < 6e-6, "{worst}");
+    }
+}

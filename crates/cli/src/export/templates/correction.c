@@ -1,0 +1,180 @@
+/* ---- The learned correction ---------------------------------------------------------------------------------------- */
+
+enum { INPUTS = 13, OUTPUTS = 6, FEATURES = 7, ROWS = << correction.rows|length >>, INDUCING = << correction.inducing >> };
+
+/* Scales of the inputs: the filter's strain, rate, relaxation, baseline, probabilities of stretching and releasing; then
+ * the reading, its distances from low-passes, and two rates. */
+static const float INPUT_MEAN[INPUTS] = {<< correction.mean|join("f, ") >>f};
+static const float INPUT_SD[INPUTS] = {{% for x in correction.sd %}{% if x is none %}INFINITY{% else %}<< x >>f{% endif %}<< ", " if not loop.last >>{% endfor %}};
+static const float INPUT_LOWER[INPUTS] = {<< correction.lower|join("f, ") >>f};
+static const float INPUT_UPPER[INPUTS] = {<< correction.upper|join("f, ") >>f};
+/* Time constants of the low-passes, s, and the usual sizes of the two rates. */
+static const float TIME_CONSTANT_S[LOW_PASSES] = {<< correction.time_constants_s|join("f, ") >>f};
+static const float RATE_SCALE[2] = {<< correction.rates|join("f, ") >>f};
+
+/* Standardised inputs of rows of the calibration; the first are the inducing rows. */
+static const float ROW[ROWS][INPUTS] = {
+{% for row in correction.rows %}
+    {<< row|join("f, ") >>f},
+{% endfor %}
+};
+
+/* A Gaussian process: see the Rust crate `ohmstrain-ekf`, module `correction`. */
+typedef struct process {
+    float length_square; /* squared length scale, in standard deviations of the inputs */
+    float mean;
+    float variance;
+    float noise;
+    float widening;
+    float least_variance;
+    float weight[ROWS];
+    float explained[INDUCING * (INDUCING + 1) / 2];
+} process;
+
+{% for p in correction.processes %}
+/* << p.comment >> */
+static const process << p.name >> = {
+    << p.length_square >>f, << p.mean >>f, << p.variance >>f, << p.noise >>f, << p.widening >>f, << p.least_variance >>f,
+    {<< p.weights|join("f, ") >>f},
+    {<< p.explained|join("f, ") >>f},
+};
+{% endfor %}
+
+/* Takes a reading, relative, into the low-passes; without one they wait. */
+static void watch(readings *seen, float dt_s, const float *rho)
+{
+    float low[LOW_PASSES], scaled, fast, slow;
+    int i;
+
+    seen->waited_s += dt_s;
+    seen->missing = rho == 0;
+    if (!rho) {
+        return;
+    }
+    scaled = clamped((*rho - << correction.centre >>f) / << correction.half_range >>f, -<< correction.farthest >>f, << correction.farthest >>f);
+    for (i = 0; i < LOW_PASSES; i++) {
+        if (seen->has_feature) {
+            const float x = seen->waited_s / TIME_CONSTANT_S[i], decay = expf(-x);
+            const float mean_decay = x > 0.0f ? -expm1f(-x) / x : 1.0f;
+            seen->low_pass[i] = decay * seen->low_pass[i] + (mean_decay - decay) * seen->scaled +
+                                (1.0f - mean_decay) * scaled;
+        } else {
+            seen->low_pass[i] = scaled;
+        }
+        low[i] = seen->low_pass[i];
+    }
+    seen->scaled = scaled;
+    seen->waited_s = 0.0f;
+    seen->has_feature = 1;
+    seen->feature[0] = scaled;
+    seen->feature[1] = scaled - low[1];
+    seen->feature[2] = scaled - low[3];
+    seen->feature[3] = scaled - low[4];
+    seen->feature[4] = scaled - low[5];
+    fast = low[0] - low[1];
+    slow = low[2] - low[3];
+    seen->feature[5] = tanhf(<< correction.rate_gain >>f * fast / RATE_SCALE[0]);
+    seen->feature[6] = tanhf(<< correction.rate_gain >>f * slow / RATE_SCALE[1]);
+}
+
+static float linear(float product)
+{
+    return << correction.linear >>f * (product + 1.0f);
+}
+
+/* What a process says of kernels: its variance, and the share of the prior that is not explained. */
+static float variance_of(const process *p, const float kernel[INDUCING], float first, float least, float *unknown)
+{
+    const float prior = 1.0f + linear(first * first), *w = p->explained;
+    float explained = 0.0f, latent;
+    int i, j;
+
+    for (i = 0; i < INDUCING; i++) {
+        float product = 0.0f;
+        for (j = i; j < INDUCING; j++) {
+            product += *w++ * kernel[j];
+        }
+        explained += product * product;
+    }
+    *unknown = clamped((prior - explained) / prior, 0.0f, 1.0f);
+    latent = prior * p->variance;
+    return (latent > least ? latent : least) * *unknown + p->noise;
+}
+
+/* The strain and its variance, corrected. `filtered` is the filter's strain, moved into the limits. */
+static void correct(const summary *all, const readings *seen, float filtered, float filtered_variance, float *strain,
+                    float *variance)
+{
+    float x[INPUTS], kernel[2][INDUCING], said[2], spread[2], unknown, outside[2] = {0.0f, 0.0f};
+    float least, beyond, novelty, of_residual, of_direct, mean;
+    int i, k;
+
+    x[0] = filtered;
+    x[1] = all->mean[1];
+    x[2] = 0.0f;
+    for (i = 2; i < 2 + OHMSTRAIN_BRANCHES; i++) {
+        x[2] += all->mean[i];
+    }
+    x[3] = all->mean[LAST];
+    x[4] = all->phase[EXTEND];
+    x[5] = all->phase[RETRACT];
+    for (i = 0; i < FEATURES; i++) {
+        x[OUTPUTS + i] = seen->feature[i];
+    }
+    for (i = 0; i < INPUTS; i++) {
+        const float inside = clamped(x[i], INPUT_LOWER[i], INPUT_UPPER[i]);
+        const float excess = (x[i] - inside) / INPUT_SD[i];
+        outside[i >= OUTPUTS] += excess * excess;
+        x[i] = (inside - INPUT_MEAN[i]) / INPUT_SD[i];
+    }
+
+    said[0] = DIRECT.mean;
+    said[1] = RESIDUAL.mean;
+    for (k = 0; k < ROWS; k++) {
+        const float *row = ROW[k];
+        float outputs = 0.0f, features = 0.0f, k0, k1;
+        for (i = 0; i < OUTPUTS; i++) {
+            outputs += (x[i] - row[i]) * (x[i] - row[i]);
+        }
+        for (; i < INPUTS; i++) {
+            features += (x[i] - row[i]) * (x[i] - row[i]);
+        }
+        k0 = expf(-0.5f * features / DIRECT.length_square) + linear(x[OUTPUTS] * row[OUTPUTS]);
+        k1 = expf(-0.5f * (outputs + features) / RESIDUAL.length_square) + linear(x[0] * row[0]);
+        said[0] += DIRECT.weight[k] * k0;
+        said[1] += RESIDUAL.weight[k] * k1;
+        if (k < INDUCING) {
+            kernel[0][k] = k0;
+            kernel[1][k] = k1;
+        }
+    }
+
+    spread[0] = variance_of(&DIRECT, kernel[0], x[OUTPUTS], DIRECT.least_variance, &unknown);
+    spread[0] = spread[0] * DIRECT.widening + << correction.far >>f * << correction.strain_variance >>f * outside[1];
+    said[0] = clamped(0.0f + said[0], OHMSTRAIN_LOWER, OHMSTRAIN_UPPER);
+    least = filtered_variance > RESIDUAL.least_variance ? filtered_variance : RESIDUAL.least_variance;
+    spread[1] = variance_of(&RESIDUAL, kernel[1], x[0], least, &unknown);
+    beyond = outside[0] + outside[1];
+    novelty = 1.0f - (1.0f - unknown) * expf(-beyond / << correction.new >>f);
+    spread[1] = spread[1] * RESIDUAL.widening + << correction.far >>f * << correction.strain_variance >>f * beyond;
+    said[1] = clamped(filtered + said[1], OHMSTRAIN_LOWER, OHMSTRAIN_UPPER);
+
+    /* Their mixture, each weighted by its variance to the power -3/4. */
+    of_residual = spread[0] <= spread[1] ? 0.0f : 1.0f;
+    if (spread[0] > 0.0f && spread[1] > 0.0f) {
+        const float ratio = sqrtf(spread[0] / spread[1]), odds = ratio * sqrtf(ratio);
+        of_residual = odds > 1.0f ? 1.0f / (1.0f + 1.0f / odds) : odds / (1.0f + odds);
+    }
+    of_direct = 1.0f - of_residual;
+    mean = of_direct * said[0] + of_residual * said[1];
+    *variance = (of_direct * (spread[0] + (said[0] - mean) * (said[0] - mean)) +
+                 of_residual * (spread[1] + (said[1] - mean) * (said[1] - mean))) *
+                    << correction.variance_factor >>f +
+                << correction.novel >>f * << correction.strain_variance >>f * novelty;
+    *strain = mean;
+    /* Without a reading the deviation grows as that of the filter. */
+    if (seen->missing && filtered_variance > seen->known_variance) {
+        *variance += filtered_variance - seen->known_variance;
+    }
+}
+

@@ -1,0 +1,160 @@
+//! What is written down, done operation by operation, gives the bits of the kernel.
+
+#![allow(clippy::unwrap_used, reason = "tests")]
+
+use ohmstrain_model::{Branch, Gauge, ModelNoise, Motion, Phase, SensorLaw, StrainRange, SwitchedModel, Turning};
+use std::vec::Vec;
+
+use super::{Operation, Piece, Recorded};
+use crate::kernel::{Course, Parts, RateSpread};
+use crate::{Belief, Compact, Reading, SparseEkf};
+
+type Filter = SparseEkf<f32, Compact, 2, 5>;
+type State = Belief<f32, 5, 15>;
+
+/// Does what is written down: truths as 1 and 0.
+fn run(recorded: &Recorded, inputs: &[f32]) -> Vec<f32> {
+    let truth = |truth: bool| f32::from(u8::from(truth));
+    let mut values: Vec<f32> = Vec::new();
+    for operation in &recorded.operations {
+        let at = |place: usize| values[place];
+        let value = match *operation {
+            Operation::Input(number) => inputs[number],
+            Operation::Constant(number) => number,
+            Operation::Add(a, b) => at(a) + at(b),
+            Operation::Subtract(a, b) => at(a) - at(b),
+            Operation::Multiply(a, b) => at(a) * at(b),
+            Operation::Divide(a, b) => at(a) / at(b),
+            Operation::Negate(a) => -at(a),
+            Operation::Root(a) => at(a).sqrt(),
+            Operation::Exponential(a) => at(a).exp(),
+            Operation::Less(a, b) => truth(at(a) < at(b)),
+            Operation::NotNegative(a) => truth(at(a) >= 0.0),
+            Operation::Finite(a) => truth(at(a).is_finite()),
+            Operation::Both(a, b) => truth(at(a) * at(b) == 1.0),
+            Operation::Known(known) => truth(known),
+            Operation::Pick(mask, yes, no) => at(if at(mask) == 1.0 { yes } else { no }),
+        };
+        values.push(value);
+    }
+    recorded.results.iter().map(|place| values[*place]).collect()
+}
+
+fn filter(gauge: Gauge<f32>) -> Filter {
+    let branch = |tau_s, extend_gain, retract_gain| Branch {
+        tau_s,
+        extend_gain,
+        retract_gain,
+        extend_gain_slope: 0.7,
+        retract_gain_slope: -0.3,
+    };
+    let law = SensorLaw {
+        gauge,
+        extend_viscosity_s: 0.03,
+        retract_viscosity_s: -0.02,
+        branches: [branch(0.6, 0.9, -0.6), branch(30.0, 0.4, -0.2)],
+        range: StrainRange { lower: 0.0, upper: 0.3 },
+    };
+    let motion = Motion::ornstein_uhlenbeck(0.8, 0.1, 0.15, 0.1).unwrap();
+    let noise = ModelNoise { reading_sd: 2e-3, branch_sd: 5e-3, baseline_sd: 0.02, baseline_time_s: 30.0 };
+    SparseEkf::new(SwitchedModel::new(law, motion, noise).unwrap(), 0.05).unwrap()
+}
+
+/// States on the way of a body that stretches beyond the law's range, turns and comes back.
+fn states(filter: &Filter) -> Vec<State> {
+    let mut belief: State = Belief::initial(filter.model());
+    let state = |k: i32| {
+        let reading = (k % 4 != 3).then(|| Reading::from(0.6 - 0.6 * (0.1 * k as f32).cos()));
+        filter.step(&mut belief, reading).unwrap();
+        belief
+    };
+    (0..80).map(state).collect()
+}
+
+#[track_caller]
+fn compare(filter: &Filter, piece: Piece, state: &State, more: [f32; 2], expected: &[f32]) {
+    let mut inputs: Vec<f32> = state.mean.iter().chain(state.covariance.packed()).copied().collect();
+    inputs.extend(more);
+    inputs.extend(filter.step_numbers());
+    let found = run(&filter.record(piece), &inputs);
+    // Zeros of both signs are the same here: where no lane goes a way, what it would have added is not added.
+    assert!(found == expected, "{piece:?}: {found:?}, expected {expected:?}");
+}
+
+fn numbers(parts: &Parts<f32, 2>, state: &State) -> Vec<f32> {
+    let mut state = *state;
+    parts.put_into(&mut state);
+    state.mean.iter().chain(state.covariance.packed()).copied().collect()
+}
+
+#[test]
+fn what_is_written_down_is_what_the_kernel_does() {
+    let gauges = [
+        Gauge::Polynomial { coefficients: [1.9, -2.8, 1.0] },
+        Gauge::DecayingExponential { slope: 3.0, decay_strain: 0.25 },
+        Gauge::Tunnelling { gap: 0.8, barrier: 1.2, path_loss: -2.0 },
+    ];
+    for filter in gauges.map(filter) {
+        let mut clear = 0;
+        for state in states(&filter) {
+            let predicted = |course| {
+                let mut parts = Parts::of(&state);
+                filter.predict(&mut parts, course);
+                numbers(&parts, &state)
+            };
+            for phase in Phase::ALL {
+                compare(&filter, Piece::Predict(phase), &state, [0.0; 2], &predicted(Course::Known(phase)));
+            }
+            for phase in [Phase::Extend, Phase::Retract] {
+                let turning = Turning { excess: 2e-3, variance: 3e-5 };
+                let expected = predicted(Course::Within(phase, turning));
+                let more = [turning.excess, turning.variance];
+                compare(&filter, Piece::PredictTurning(phase), &state, more, &expected);
+                let ahead = filter.rate_ahead(phase, &Parts::of(&state));
+                compare(&filter, Piece::RateAhead(phase), &state, more, &[ahead.mean, ahead.variance]);
+            }
+            compare(&filter, Piece::PredictOpen, &state, [0.0; 2], &predicted(Course::Uncertain));
+            for phase in Phase::ALL.map(Some).into_iter().chain([None]) {
+                let mut parts = Parts::of(&state);
+                let reading = Reading { value: 0.3, extra_variance: 1e-6 };
+                let spread = RateSpread::new(parts.rate_variance);
+                let taken = filter.update(&mut parts, reading, phase, spread).unwrap();
+                let mut expected = numbers(&parts, &state);
+                expected.extend([taken.innovation, taken.variance, taken.nis, 1.0]);
+                compare(&filter, Piece::Take(phase), &state, [0.3, 1e-6], &expected);
+            }
+            let mut parts = Parts::of(&state);
+            parts.regress::<5>(0.4, -0.1);
+            compare(&filter, Piece::Regress, &state, [0.4, -0.1], &numbers(&parts, &state));
+            compare(&filter, Piece::Sound, &state, [0.0; 2], &[1.0]);
+            clear += usize::from(state.mean[1].powi(2) > 9.0 * state.covariance[(1, 1)]);
+        }
+        // Rates whose direction is clear, and others.
+        assert!(clear > 5 && clear < 70, "{clear}");
+    }
+}
+
+#[test]
+fn a_state_that_is_none_is_not_sound() {
+    let filter = filter(Gauge::Polynomial { coefficients: [1.9, -2.8, 1.0] });
+    let mut state = states(&filter)[3];
+    state.covariance[(2, 2)] = -1e-9;
+    compare(&filter, Piece::Sound, &state, [0.0; 2], &[0.0]);
+    state.covariance[(2, 2)] = f32::NAN;
+    compare(&filter, Piece::Sound, &state, [0.0; 2], &[0.0]);
+}
+
+/// Numbers of another length, set one by one, make the filter of that length.
+#[test]
+fn a_step_of_other_numbers_is_a_step_of_another_length() {
+    let mut filter = filter(Gauge::Polynomial { coefficients: [1.9, -2.8, 1.0] });
+    let mut longer = filter;
+    longer.retime(0.07).unwrap();
+    filter.set_step(0.07, &longer.step_numbers());
+    assert_eq!(filter, longer);
+    let names = filter.step_names();
+    assert_eq!(names.len(), filter.step_numbers().len());
+    for name in ["to_strain_1", "b0_decay_0", "b1_decay_0", "b1_branch_noise_1", "b1_per_reach_0"] {
+        assert!(names.iter().any(|known| known == name), "{name}: {names:?}");
+    }
+}
