@@ -4,7 +4,7 @@
 #
 #   exported-c.sh
 #
-# Installs gcc, clang, gcc-arm-none-eabi, libnewlib-arm-none-eabi and qemu-system-arm by apt where they are missing and this
+# Installs gcc, clang, cmake, gcc-arm-none-eabi, libnewlib-arm-none-eabi and qemu-system-arm by apt where they are missing and this
 # is root. Prints the largest differences, sizes and instructions per step. Needs a minute.
 #
 # Environment:
@@ -16,10 +16,10 @@ work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
 if ! command -v clang >/dev/null || ! command -v gcc >/dev/null || ! command -v qemu-system-arm >/dev/null ||
-    ! echo '#include <math.h>' | arm-none-eabi-gcc -E - >/dev/null 2>&1; then
+    ! command -v cmake >/dev/null || ! echo '#include <math.h>' | arm-none-eabi-gcc -E - >/dev/null 2>&1; then
     apt-get -q update >/dev/null
     DEBIAN_FRONTEND=noninteractive apt-get -q install -y --no-install-recommends \
-        gcc g++ clang libc6-dev gcc-arm-none-eabi libnewlib-arm-none-eabi qemu-system-arm >/dev/null
+        gcc g++ clang cmake make libc6-dev gcc-arm-none-eabi libnewlib-arm-none-eabi qemu-system-arm >/dev/null
 fi
 
 ohmstrain=${OHMSTRAIN:-}
@@ -99,6 +99,11 @@ for kind in polynomial:2:corrected polynomial:0:ekf decaying-exponential:1:sign-
     g++ -std=gnu++11 -fsyntax-only -Wall -Wextra -Werror -DARDUINO_ARCH_ESP32 -I"$here" -include Arduino.h \
         -I"$folder/ohmstrain" -x c++ "$folder/ohmstrain/ohmstrain.ino"
 done
+
+cmake -S "$folder" -B "$work/build" >/dev/null
+cmake --build "$work/build" >/dev/null
+ctest --test-dir "$work/build" --quiet
+say "CMake" "builds, and the self-test passes"
 
 # The Rust modules, all in one crate without std.
 mkdir -p "$work/crate/src"

@@ -48,7 +48,7 @@ fn c_is_an_arduino_sketch_a_self_test_and_a_readme_and_the_same_every_time() {
     assert_eq!(export(&bench, "c", "twice"), "");
     assert_eq!(export(&bench, "c", "twice"), "");
     for (folder, names) in [
-        ("", &["README.md", "ohmstrain", "selftest"][..]),
+        ("", &["CMakeLists.txt", "README.md", "ohmstrain", "selftest"][..]),
         ("/ohmstrain", &["ohmstrain.c", "ohmstrain.h", "ohmstrain.ino"]),
         ("/selftest", &["replay.c", "selftest.c", "vectors.h"]),
     ] {
@@ -142,6 +142,45 @@ fn a_recording_replayed_is_as_good_as_the_program() {
             assert!((promised - exported).abs() < 0.006, "{estimator}, {compiler}: {exported}, promised {promised}");
             assert!(estimator != "corrected" || exported < 1.02 * program, "{compiler}: {exported}, program {program}");
         }
+    }
+}
+
+/// Two calibrations in one program, linked together.
+const TWO: &str = r#"
+#include "left.h"
+#include "right.h"
+#include <stdio.h>
+int main(void)
+{
+    left_state left;
+    right_state right;
+    left_estimate l;
+    right_estimate r;
+    left_start(&left);
+    right_start(&right);
+    left_step(&left, LEFT_REST_READING, 0.0f, 0);
+    right_step(&right, RIGHT_REST_READING, 0.0f, 0);
+    left_get(&left, &l);
+    right_get(&right, &r);
+    printf("%d %d\n", l.strain_sd > 0.0f, r.strain_sd > 0.0f);
+    return 0;
+}
+"#;
+
+#[test]
+fn two_sensors_with_prefixes_live_in_one_program() {
+    let bench = every_filter();
+    for (prefix, estimator) in [("left", "corrected"), ("right", "ekf")] {
+        let export = ["export", "--dt-s", DT_S, "--target", "c", "-o", "two", "--prefix", prefix, "--force"];
+        bench.run(&[&export[..], &["--sensor", &format!("{estimator}.toml")]].concat()).ok();
+    }
+    bench.write("two/two.c", TWO);
+    for compiler in compilers() {
+        let sources = ["-Ileft", "-Iright", "left/left.c", "right/right.c", "two.c"];
+        assert_eq!(compile_and_run(compiler, &bench.path("two"), &sources, ""), "1 1\n");
+        // The last one's self-test knows its name.
+        let sources = ["-Iright", "right/right.c", "selftest/selftest.c"];
+        assert!(compile_and_run(compiler, &bench.path("two"), &sources, "").contains("self-test passed"));
     }
 }
 

@@ -98,7 +98,7 @@ impl Doubt {
                 fastest_per_s: seen.fastest_rate_per_s,
                 longest_s: seen.duration_s,
                 span,
-                per_reading: span / (high - low),
+                per_reading: if high > low { span / (high - low) } else { 0.0 },
             },
             start_s: None,
             last_s: 0.0,
@@ -153,14 +153,15 @@ impl Doubt {
         }
         let outside = (SHOWS * self.outside.max(0.0) * self.seen.per_reading).powi(2);
         let faster = (output.estimate.rate.mean / self.seen.fastest_per_s).abs();
-        let fast = if faster > FASTER { faster * faster } else { 1.0 };
-        output.estimate.strain.variance = variance * fast + (self.fading + outside).min(most);
+        let is_fast = faster > FASTER;
+        let stated = if is_fast { (variance * (faster * faster)).min(most).max(variance) } else { variance };
+        output.estimate.strain.variance = stated + (self.fading + outside).min(most);
         let starts = self.starting && self.fading > WORTH * (START * self.seen.span).powi(2);
         let recovers = !self.starting && self.fading > WORTH * variance;
         Flags::NONE
             .with(Flag::StartUp, starts)
             .with(Flag::Recovering, recovers)
-            .with(Flag::Extrapolated, outside > WORTH * variance || fast > 1.0)
+            .with(Flag::Extrapolated, outside > WORTH * variance || is_fast)
             .and(self.long_run(time_s - start_s))
     }
 

@@ -3,6 +3,7 @@ use std::path::PathBuf;
 use clap::{Args as ClapArgs, ValueEnum};
 
 use super::{Auto, Estimator, positive};
+use crate::export::Prefix;
 
 /// Flags of `export`.
 #[derive(Debug, ClapArgs)]
@@ -25,6 +26,9 @@ pub struct ExportArgs {
     /// Estimator to export: auto (the sensor's default), corrected, sign-split, hypotheses or ekf
     #[arg(long, default_value = "auto")]
     pub estimator: Auto<Estimator>,
+    /// What names in C begin with: two sensors in one program need names of their own
+    #[arg(long, value_name = "NAME", default_value = "ohmstrain")]
+    pub prefix: Prefix,
     /// Recording with a reference: what is exported runs over it first, and its error is printed beside what was promised.
     /// What is worse than a static cubic is not exported without --force
     #[arg(long, value_name = "TRACE")]

@@ -23,11 +23,11 @@ pub fn run(args: &ExportArgs) -> Result<(), CliError> {
         }
         export_score::run(args, &sensor, &input::read(trace, &Metadata::default())?)?;
     }
-    let files = export::files(params, asked, args.target, args.dt_s)
+    let files = export::files(params, asked, args.target, args.dt_s, &args.prefix)
         .map_err(|error| error.into_cli(&args.sensor.display().to_string()))?;
     let mut outputs = Outputs::new(args.force, std::iter::once(&args.sensor).chain(&args.score));
     for file in files {
-        let path = args.output.join(file.path);
+        let path = args.output.join(&file.path);
         if let Some(folder) = path.parent() {
             outputs.folder(folder)?;
         }

@@ -33,7 +33,7 @@ impl DoubtParts {
             high,
             fastest_per_s: seen.fastest_rate_per_s,
             longest_s: seen.duration_s,
-            per_reading: span / (high - low),
+            per_reading: if high > low { span / (high - low) } else { 0.0 },
             start: (DOUBT.start * span).powi(2),
             most: (DOUBT.most * span).powi(2),
         }
@@ -107,15 +107,16 @@ impl<T: Real> Doubt<T> {
         let far = number::<T>(DOUBT.shows) * self.outside.max(T::zero()) * number(self.parts.per_reading);
         let (outside, worth): (T, T) = (far * far, number(DOUBT.worth));
         let faster = rate.abs() / number(self.parts.fastest_per_s);
-        let fast = if faster > number(DOUBT.faster) { faster * faster } else { T::one() };
-        let more = (self.fading + outside).min(number(self.parts.most));
+        let (is_fast, most): (bool, T) = (faster > number(DOUBT.faster), number(self.parts.most));
+        let stated = if is_fast { (variance * (faster * faster)).min(most).max(variance) } else { variance };
+        let more = (self.fading + outside).min(most);
         let raised = [
             (self.starts && self.fading > worth * number(self.parts.start), flag::START_UP),
             (!self.starts && self.fading > worth * variance, flag::RECOVERING),
-            (outside > worth * variance || fast > T::one(), flag::EXTRAPOLATED),
+            (outside > worth * variance || is_fast, flag::EXTRAPOLATED),
             (self.run_s > number(self.parts.longest_s), flag::LONG_RUN),
         ];
         let flags = raised.into_iter().filter(|(is_raised, _)| *is_raised).fold(0, |flags, (_, flag)| flags | flag);
-        (variance * fast + more, flags)
+        (stated + more, flags)
     }
 }

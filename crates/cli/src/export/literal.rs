@@ -1,3 +1,4 @@
+use serde::ser::Error;
 use serde::{Serialize, Serializer};
 
 /// A number as source code: the shortest decimal that reads back as the same `f32`, always with a point or an exponent.
@@ -14,7 +15,11 @@ impl Literal {
 
 impl Serialize for Literal {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_str(&format_args!("{:?}", self.0))
+        // What is no number would not compile, or worse.
+        if !self.0.is_finite() {
+            return Err(S::Error::custom(format_args!("a number of the sensor is {:?} in single precision", self.0)));
+        }
+        serializer.collect_str(&self.text())
     }
 }
 

@@ -10,6 +10,7 @@ mod fixed_rate;
 mod law;
 mod literal;
 mod motion;
+mod prefix;
 mod replay;
 mod steps;
 mod twin;
@@ -24,12 +25,13 @@ use crate::args::ExportTarget;
 use crate::error::CliError;
 use crate::sensor_file::MADE_BY;
 use constants::Exported;
+pub use prefix::Prefix;
 pub use replay::{ReplayedRow, replay};
 
 /// A file to write.
 pub struct SourceFile {
     /// Where it belongs in the folder.
-    pub path: &'static str,
+    pub path: String,
     /// Its text.
     pub content: String,
 }
@@ -89,13 +91,14 @@ type Template = (&'static str, &'static str);
 
 /// Arduino compiles what lies in a sketch's own folder, named as the sketch, and nothing from folders beside it: the self-test
 /// with its `main` must not be in there.
-const C: [Template; 7] = [
+const C: [Template; 8] = [
     ("ohmstrain/ohmstrain.h", include_str!("templates/ohmstrain.h")),
     ("ohmstrain/ohmstrain.c", include_str!("templates/ohmstrain.c")),
     ("ohmstrain/ohmstrain.ino", include_str!("templates/ohmstrain.ino")),
     ("selftest/vectors.h", include_str!("templates/vectors.h")),
     ("selftest/selftest.c", include_str!("templates/selftest.c")),
     ("selftest/replay.c", include_str!("templates/replay.c")),
+    ("CMakeLists.txt", include_str!("templates/CMakeLists.txt")),
     ("README.md", include_str!("templates/readme_c.md")),
 ];
 
@@ -117,6 +120,7 @@ pub fn files(
     kind: Option<EstimatorKind>,
     target: ExportTarget,
     dt_s: f64,
+    prefix: &Prefix,
 ) -> Result<Vec<SourceFile>, ExportError> {
     let exported = Exported::new(params, kind, MADE_BY, dt_s)?;
     let templates: &[Template] = match target {
@@ -139,7 +143,7 @@ pub fn files(
     for (path, template) in templates {
         environment.add_template(path, template)?;
         let content = environment.get_template(path)?.render(Serde(&exported))?;
-        files.push(SourceFile { path, content });
+        files.push(SourceFile { path: prefix.put_into(path), content: prefix.put_into(&content) });
     }
     Ok(files)
 }

@@ -415,13 +415,20 @@ static float doubted(const readings *seen, float rate, float variance, unsigned 
 {
     const float far = << doubt.shows >>f * (seen->outside > 0.0f ? seen->outside : 0.0f) * PER_READING, outside = far * far;
     const float faster = (rate < 0.0f ? -rate : rate) / FASTEST_PER_S;
-    const float fast = faster > << doubt.faster >>f ? faster * faster : 1.0f, more = seen->fading + outside;
+    const int is_fast = faster > << doubt.faster >>f;
+    const float more = seen->fading + outside;
+    float stated = variance;
 
     *flags |= seen->starts && seen->fading > << doubt.worth >>f * START_DOUBT ? OHMSTRAIN_START_UP : 0;
     *flags |= !seen->starts && seen->fading > << doubt.worth >>f * variance ? OHMSTRAIN_RECOVERING : 0;
-    *flags |= outside > << doubt.worth >>f * variance || fast > 1.0f ? OHMSTRAIN_EXTRAPOLATED : 0;
+    *flags |= outside > << doubt.worth >>f * variance || is_fast ? OHMSTRAIN_EXTRAPOLATED : 0;
     *flags |= seen->run_s > LONGEST_RUN_S ? OHMSTRAIN_LONG_RUN : 0;
-    return variance * fast + (more < MOST_DOUBT ? more : MOST_DOUBT);
+    if (is_fast) {
+        stated = variance * (faster * faster);
+        stated = stated < MOST_DOUBT ? stated : MOST_DOUBT;
+        stated = stated > variance ? stated : variance;
+    }
+    return stated + (more < MOST_DOUBT ? more : MOST_DOUBT);
 }
 
 /* Flags of intervals that were passed without a reading. */

@@ -1,0 +1,63 @@
+use std::str::FromStr;
+
+/// What the names in exported C code begin with: two sensors in one program have names of their own.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Prefix(String);
+
+/// What templates are written with.
+const WRITTEN: &str = "ohmstrain";
+
+impl Default for Prefix {
+    fn default() -> Self {
+        Self(WRITTEN.to_owned())
+    }
+}
+
+impl FromStr for Prefix {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let is_name = text.starts_with(|c: char| c.is_ascii_lowercase())
+            && text.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_');
+        if is_name {
+            Ok(Self(text.to_owned()))
+        } else {
+            Err("expected small letters, digits and underscores, a letter first".to_owned())
+        }
+    }
+}
+
+impl Prefix {
+    /// A text, or a file's name, with this prefix for the one that templates are written with.
+    pub fn put_into(&self, text: &str) -> String {
+        let Self(prefix) = self;
+        if prefix == WRITTEN {
+            return text.to_owned();
+        }
+        let upper = prefix.to_uppercase();
+        let names = [
+            ("OHMSTRAIN_", format!("{upper}_")),
+            ("ohmstrain_", format!("{prefix}_")),
+            ("ohmstrain/ohmstrain.", format!("{prefix}/{prefix}.")),
+            ("\"ohmstrain.h\"", format!("\"{prefix}.h\"")),
+            ("-Iohmstrain ", format!("-I{prefix} ")),
+            ("PUBLIC ohmstrain)", format!("PUBLIC {prefix})")),
+        ];
+        names.iter().fold(text.to_owned(), |text, (from, to)| text.replace(from, to))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Prefix;
+
+    #[test]
+    fn a_prefix_is_a_name_in_c() {
+        for name in ["left", "finger_2"] {
+            assert!(name.parse::<Prefix>().is_ok(), "{name}");
+        }
+        for name in ["", "2nd", "Left", "a-b", "_a", "é"] {
+            assert!(name.parse::<Prefix>().is_err(), "{name}");
+        }
+    }
+}
