@@ -4,6 +4,7 @@ use ohmstrain_ekf::correction::{Correction, INDUCING, InputScale, OUTPUTS, Proce
 use crate::correction_params::CorrectorParams;
 use crate::gaussian_process::{GaussianProcess, LeftOutRow, Lessons, ProcessParams, inducing_rows};
 use crate::params::RangeParams;
+use crate::portable::PortableProcess;
 use crate::sd_scale::{joint_scale, sd_scale_up_to};
 
 /// Blocks of rows that are left out in turn.
@@ -29,23 +30,11 @@ pub(crate) struct Examples<'a, const D: usize> {
 pub(crate) struct Corrector<const D: usize> {
     rows: Vec<[f64; D]>,
     scales: [InputScale<f64>; D],
-    pub direct: Learned,
-    pub residual: Learned,
+    pub direct: PortableProcess,
+    pub residual: PortableProcess,
     limits: RangeParams,
     strain_variance: f64,
     variance_factor: f64,
-}
-
-/// A process with its weights.
-pub(crate) struct Learned {
-    pub length: f64,
-    pub mean: f64,
-    pub weights: Vec<f64>,
-    pub explained: Vec<f64>,
-    pub variance: f64,
-    pub noise: f64,
-    pub widening: f64,
-    pub least_variance: f64,
 }
 
 /// Examples on the scale that their inputs have, and the targets of both processes.
@@ -149,7 +138,7 @@ impl<const D: usize> Corrector<D> {
             let settings = settings(which);
             let process = GaussianProcess::new(lessons, settings)?;
             let weights: Vec<f64> = process.weights().collect();
-            Some(Learned {
+            Some(PortableProcess {
                 length: settings.length,
                 mean: process.centre,
                 weights: order.iter().map(|&row| weights[row]).collect(),
@@ -185,7 +174,7 @@ impl<const D: usize> Corrector<D> {
     }
 }
 
-impl Learned {
+impl PortableProcess {
     fn process(&self) -> Process<'_, f64> {
         Process {
             length: self.length,

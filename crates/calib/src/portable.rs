@@ -5,7 +5,7 @@ use ohmstrain_ekf::correction::{FEATURES, FeatureScale, INDUCING, InputScale, OU
 use crate::CalibrationError;
 use crate::build_filter::{HISTORIES, HYPOTHESES};
 use crate::corrected::learned_for_filter;
-use crate::corrector::{Corrector, Learned};
+use crate::corrector::Corrector;
 use crate::estimator_params::{EstimatorKind, EstimatorParams};
 use crate::params::SensorParams;
 use crate::sieve::{MOST_REPEATS, Sieve};
@@ -118,25 +118,10 @@ impl PortableCorrection {
             features,
             rows: correction.rows.to_vec(),
             scales: *correction.scales,
-            direct: PortableProcess::new(&corrector.direct),
-            residual: PortableProcess::new(&corrector.residual),
+            direct: corrector.direct.clone(),
+            residual: corrector.residual.clone(),
             strain_variance: correction.strain_variance,
             variance_factor: correction.variance_factor,
-        }
-    }
-}
-
-impl PortableProcess {
-    fn new(learned: &Learned) -> Self {
-        Self {
-            length: learned.length,
-            mean: learned.mean,
-            weights: learned.weights.clone(),
-            explained: learned.explained.clone(),
-            variance: learned.variance,
-            noise: learned.noise,
-            widening: learned.widening,
-            least_variance: learned.least_variance,
         }
     }
 }

@@ -13,9 +13,9 @@ use super::{ExportError, parameter, too_many_branches};
 pub struct ReplayedRow {
     /// Time, s.
     pub time_s: f64,
-    /// The reading, in the sensor's unit, and the deviation that its electronics add.
+    /// The reading, in the sensor's unit.
     pub reading: f64,
-    /// That deviation.
+    /// The deviation that its electronics add, in the same unit.
     pub reading_sd: f64,
 }
 

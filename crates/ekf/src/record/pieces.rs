@@ -33,7 +33,7 @@ pub enum Piece {
     RateChange(Phase),
 }
 
-/// What [`Piece`] adds to the state's numbers.
+/// The sizes of a state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Carried {
     /// Number of means.
