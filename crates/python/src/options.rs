@@ -72,6 +72,10 @@ fn influence(text: &str) -> PyResult<Influence<f64>> {
             _ => None,
         }
     });
-    let message = || format!("influence: expected none, or redescending:K, huber:K or student-t:DOF with a positive number, found `{text}`");
+    let message = || {
+        format!(
+            "influence: expected none, or redescending:K, huber:K or student-t:DOF with a positive number, found `{text}`"
+        )
+    };
     parsed.ok_or_else(|| raise(&Place::default(), &message()))
 }
