@@ -39,17 +39,38 @@ impl BlockedNormal {
     /// Ridge regression on `columns`, without the blocks of `left_out`; one weight per column. `ridge` is relative to
     /// each column's variance.
     pub(crate) fn fit(&self, columns: &[usize], ridge: f64, left_out: &[usize]) -> Option<DVector<f64>> {
-        let gram = left_out.iter().fold(self.total.clone(), |rest, &block| rest - &self.blocks[block]);
-        self.solve(&gram, columns, ridge)
+        self.solve(&self.without(left_out), columns, ridge)
+    }
+
+    /// The most probable weights of all columns, without the blocks of `left_out`: those that are penalised are normal around
+    /// zero with this precision, in terms of a row's.
+    pub(crate) fn fit_normal(&self, precision: &DMatrix<f64>, left_out: &[usize]) -> Option<DVector<f64>> {
+        let mut gram = self.without(left_out);
+        let mut penalised = gram.view_mut((self.free, self.free), precision.shape());
+        penalised += precision;
+        self.solve(&gram, &(0..self.scale.len() - 1).collect::<Vec<_>>(), 0.0)
     }
 
     /// Mean squared error on blocks left out in turn, each block's mean removed.
     pub(crate) fn cross_validate(&self, columns: &[usize], ridge: f64) -> Option<f64> {
+        self.left_out_variance(columns, |block| self.fit(columns, ridge, &[block]))
+    }
+
+    /// The same for weights of columns that are fitted in another way.
+    pub(crate) fn left_out_variance(
+        &self,
+        columns: &[usize],
+        fit_without: impl Fn(usize) -> Option<DVector<f64>>,
+    ) -> Option<f64> {
         let mut sum = 0.0;
         for (b, block) in self.blocks.iter().enumerate() {
-            sum += block_error(block, columns, &self.fit(columns, ridge, &[b])?);
+            sum += block_error(block, columns, &fit_without(b)?);
         }
         Some(sum / self.blocks.len() as f64)
+    }
+
+    fn without(&self, left_out: &[usize]) -> DMatrix<f64> {
+        left_out.iter().fold(self.total.clone(), |rest, &block| rest - &self.blocks[block])
     }
 
     /// Mean squared error over the rows of all blocks, left out in turn, offsets and all: for regressions that have

@@ -15,6 +15,7 @@ use crate::left_out::REFERENCE_SD;
 use crate::motion_stats::MotionStats;
 use crate::noise_fit::{NoiseProblem, REFINEMENT, SURVEY, Surveyed, best_of_each_size, survey, survey_evaluations};
 use crate::params::{FORMAT, Quantity, RangeParams, ReadingUnit, SensorParams, Uncertainty, Validity};
+use crate::prior::{CorrectionPrior, Prior};
 use crate::recipe::RECIPE;
 use crate::rest::rest_share;
 use crate::samples::Samples;
@@ -75,15 +76,14 @@ impl Calibration {
     /// know (a joint, names and hashes of recordings) is left empty.
     #[must_use]
     pub fn into_sensor(self, made_by: &str, quantity: Quantity, reading: ReadingUnit) -> SensorParams {
-        let mut rests = self.rest_readings;
-        rests.sort_by(f64::total_cmp);
+        let rest_reading = median_rest(&self.rest_readings);
         SensorParams {
             format: FORMAT,
             made_by: made_by.into(),
             quantity,
             reading,
-            rest_reading: rests[rests.len() / 2],
-            measured_rest: self.rest_share.map(|share| share * rests[rests.len() / 2]),
+            rest_reading,
+            measured_rest: self.rest_share.map(|share| share * rest_reading),
             default_estimator: self.default_estimator,
             summary: self.findings.as_ref().map(Summary::from),
             limits: self.limits,
@@ -97,6 +97,13 @@ impl Calibration {
             correction: self.correction,
         }
     }
+}
+
+/// R₀ of the sensor from those of its recordings.
+fn median_rest(rest_readings: &[f64]) -> f64 {
+    let mut rests = rest_readings.to_vec();
+    rests.sort_by(f64::total_cmp);
+    rests[rests.len() / 2]
 }
 
 /// How much better, in mean log density of the strain, a single Gaussian must be than hypotheses: once it has taken the
@@ -123,19 +130,42 @@ pub fn calibrate(
     recordings: &[Samples],
     structures: &[LawOptions],
     kinds: &[EstimatorKind],
+    progress: impl FnMut(Stage),
+) -> Result<Calibration, CalibrationError> {
+    calibrate_with_prior(recordings, structures, kinds, None, progress)
+}
+
+/// The same for one more sensor of a make that is known. A prior brings the law's structure; `structures` counts without one.
+/// Noise and motion start from it, and the filter that the others correct is the only candidate for a correction.
+///
+/// # Errors
+/// As [`calibrate`].
+pub fn calibrate_with_prior(
+    recordings: &[Samples],
+    structures: &[LawOptions],
+    kinds: &[EstimatorKind],
+    prior: Option<&Prior>,
     mut progress: impl FnMut(Stage),
 ) -> Result<Calibration, CalibrationError> {
     progress(Stage::Law);
     let screened = screen(recordings)?;
     let recordings: &[Samples] = &screened.samples();
-    let laws = fit_laws(recordings, structures)?;
+    let laws = match prior {
+        Some(prior) => vec![prior.law.posterior(recordings)?],
+        None => fit_laws(recordings, structures)?,
+    };
+    let of_make = prior.and_then(|prior| prior.correction.as_ref());
     let stats = MotionStats::new(recordings);
     let corrects = kinds.contains(&EstimatorKind::Corrected);
     let named: Vec<EstimatorKind> = kinds.iter().copied().filter(|kind| *kind != EstimatorKind::Corrected).collect();
-    let candidates = if corrects { RECIPE.candidates(stats.hold_s.is_some()) } else { &[] };
+    let candidates = match of_make {
+        _ if !corrects => &[],
+        Some(of_make) => std::slice::from_ref(&of_make.corrects),
+        None => RECIPE.candidates(stats.hold_s.is_some()),
+    };
     let wanted = distinct(candidates.iter().chain(&named).copied());
     let mut steps = Steps { done: 0, expected: expected_evaluations(&wanted, &laws), progress };
-    let surveyed = survey_all(recordings, &laws, stats, (&wanted, candidates), &mut || steps.evaluated())?;
+    let surveyed = survey_all(recordings, &laws, stats, (&wanted, candidates), prior, &mut || steps.evaluated())?;
     let cost = |one: &&Surveyed| one.tuned.cost + handicap(one.kind);
     let cheapest = |a: &&Surveyed, b: &&Surveyed| cost(a).total_cmp(&cost(b));
     let Some(fit) = surveyed.iter().min_by(cheapest).map(|best| best.law) else {
@@ -149,7 +179,7 @@ pub fn calibrate(
     let mut estimators = BTreeMap::new();
     for kind in all_kinds {
         let known = surveyed.iter().find(|one| one.kind == kind && std::ptr::eq(one.law, fit));
-        let params = refined(recordings, (fit, stats), kind, known, &mut || steps.evaluated())?;
+        let params = refined(recordings, (fit, stats), (kind, prior), known, &mut || steps.evaluated())?;
         estimators.insert(kind, params);
     }
     let mut progress = steps.progress;
@@ -157,7 +187,8 @@ pub fn calibrate(
     let score =
         |kind: &EstimatorKind| estimators.get(kind).map_or(f64::INFINITY, |params| params.score + handicap(*kind));
     let best = wanted.iter().copied().min_by(|a, b| score(a).total_cmp(&score(b)));
-    let correction = corrected.map(|kind| correction(recordings, fit, kind, &estimators)).transpose()?.flatten();
+    let correction =
+        corrected.map(|kind| correction(recordings, fit, (kind, of_make), &estimators)).transpose()?.flatten();
     let best = best.unwrap_or(EstimatorKind::Ekf);
     let (default_estimator, filter) =
         correction.as_ref().map_or((best, best), |correction| (EstimatorKind::Corrected, correction.corrects));
@@ -165,9 +196,11 @@ pub fn calibrate(
     progress(Stage::LeftOut);
     let identifiability = identifiability(recordings, &fit.law.law).ok();
     let seen = Seen::new(recordings, limits, &stats);
-    let findings = Check { recordings, fit, kind: default_estimator, filter, estimators: &estimators }
+    let findings = Check { recordings, fit, kind: default_estimator, filter, estimators: &estimators, of_make }
         .findings(seen, &identifiability);
     let (reading_lower, reading_upper) = reading_range(recordings);
+    let rest_reading = median_rest(&fit.law.rest_readings);
+    let validity = |own: Validity| prior.map_or(own, |prior| prior.joined(own, rest_reading));
     Ok(Calibration {
         distrusted: screened.distrusted.clone(),
         default_estimator,
@@ -175,7 +208,7 @@ pub fn calibrate(
         estimators,
         correction,
         static_cubic: StaticCubic::fit(recordings, limits)?,
-        validity: Validity {
+        validity: validity(Validity {
             lower: limits.lower,
             upper: limits.upper,
             reading_lower,
@@ -183,7 +216,7 @@ pub fn calibrate(
             fastest_rate_per_s: stats.fastest_rate,
             duration_s: stats.longest_s,
             longest_repeat_s: longest_repeat_s(recordings),
-        },
+        }),
         limits,
         law_error: fit.law.cross_validated_error,
         uncertainty: identifiability.map(|found| found.told()),
@@ -218,14 +251,14 @@ fn worth_something(
 fn correction(
     recordings: &[Samples],
     fit: &CrossFit,
-    kind: EstimatorKind,
+    (kind, of_make): (EstimatorKind, Option<&CorrectionPrior>),
     estimators: &BTreeMap<EstimatorKind, EstimatorParams>,
 ) -> Result<Option<CorrectionParams>, CalibrationError> {
     let limits = fit.law.law.range;
     let Some(params) = estimators.get(&kind) else { return Ok(None) };
     let setting = Setting { limits, start: Start::Unknown, sieve: Sieve::OPEN };
     let build = || filter_from_parts(kind, &fit.law.law, params, setting);
-    fit_correction(recordings, &fit.law.rest_readings, limits, (kind, &build))
+    fit_correction(recordings, &fit.law.rest_readings, limits, (kind, &build), of_make)
 }
 
 /// Counts evaluations of the score.
@@ -254,13 +287,15 @@ fn survey_all<'a>(
     laws: &'a [CrossFit],
     stats: MotionStats,
     (wanted, candidates): (&[EstimatorKind], &[EstimatorKind]),
+    prior: Option<&Prior>,
     evaluated: &mut dyn FnMut(),
 ) -> Result<Vec<Surveyed<'a>>, CalibrationError> {
     let mut surveyed: Vec<Surveyed<'a>> = Vec::new();
     for &kind in wanted {
         let is_other_candidate = candidates.iter().skip(1).any(|candidate| *candidate == kind);
         let laws = if is_other_candidate { best_of_each_size(&surveyed) } else { laws.iter().collect() };
-        surveyed.extend(survey(recordings, &laws, stats, kind, &mut *evaluated)?);
+        let of_make = prior.and_then(|prior| prior.estimator(kind));
+        surveyed.extend(survey(recordings, &laws, stats, (kind, of_make), &mut *evaluated)?);
     }
     Ok(surveyed)
 }
@@ -269,11 +304,12 @@ fn survey_all<'a>(
 fn refined(
     recordings: &[Samples],
     (fit, stats): (&CrossFit, MotionStats),
-    kind: EstimatorKind,
+    (kind, prior): (EstimatorKind, Option<&Prior>),
     known: Option<&Surveyed>,
     evaluated: &mut dyn FnMut(),
 ) -> Result<EstimatorParams, CalibrationError> {
-    let problem = NoiseProblem::new(recordings, fit, stats, kind);
+    let of_make = prior.and_then(|prior| prior.estimator(kind));
+    let problem = NoiseProblem::new(recordings, fit, stats, kind).with_prior(of_make);
     let tuned = match known {
         Some(known) => known.tuned.clone(),
         None => problem.search(None, SURVEY, &mut *evaluated)?,

@@ -8,6 +8,7 @@ use crate::corrector::Examples;
 use crate::estimator_params::EstimatorKind;
 use crate::filter::Filter;
 use crate::params::RangeParams;
+use crate::prior::{self, CorrectionPrior};
 use crate::samples::Samples;
 
 /// Rows that a correction learns from at most. With a hundred errors are a tenth larger, with four hundred no smaller.
@@ -16,7 +17,7 @@ const ROWS: usize = 200;
 /// over again.
 const BY_WAY: f64 = 0.8;
 /// Pause between recordings, s: noise that lasts for seconds is not shared by them.
-const PAUSE_S: f64 = 1000.0;
+pub(crate) const PAUSE_S: f64 = 1000.0;
 /// Significant digits of what is written down. The fit sees the same numbers as the reader of the file.
 const DIGITS: usize = 6;
 
@@ -24,27 +25,33 @@ const DIGITS: usize = 6;
 type Build<'a> = dyn Fn() -> Result<Box<dyn Filter>, CalibrationError> + 'a;
 
 /// Learns the correction of a filter from the recordings that it was calibrated on; `rest_readings` are their R₀, `build`
-/// makes the filter, `corrects` names it. None if nothing can be learned from them.
+/// makes the filter, `corrects` names it. With a prior of that filter the rows of other sensors come first, and half as many
+/// of their own follow. None if nothing can be learned from them.
 pub(crate) fn fit_correction(
     recordings: &[Samples],
     rest_readings: &[f64],
     limits: RangeParams,
     (corrects, build): (EstimatorKind, &Build),
+    of_make: Option<&CorrectionPrior>,
 ) -> Result<Option<CorrectionParams>, CalibrationError> {
+    let of_make = of_make.filter(|prior| prior.corrects == corrects);
     let relative = |(samples, rest): (&Samples, &f64)| {
         let relative = |r: &f64| r.is_finite().then(|| Reading::from(r / rest - 1.0));
         samples.reading.iter().map(relative).collect::<Vec<Option<Reading<f64>>>>()
     };
     let readings: Vec<Vec<Option<Reading<f64>>>> = recordings.iter().zip(rest_readings).map(relative).collect();
-    let Some(scale) = feature_scale(recordings, &readings) else { return Ok(None) };
+    let own_scale = || feature_scale(recordings, &readings);
+    let Some(scale) = of_make.map_or_else(own_scale, |prior| Some(prior.feature_scale())) else { return Ok(None) };
+    let mut rows: Vec<TrainingRow> = of_make.map_or_else(Vec::new, |prior| prior.rows.clone());
     let mut candidates = Vec::new();
-    let mut start_s = 0.0;
+    let mut start_s = rows.last().map_or(0.0, |row| row.time_s + PAUSE_S);
     for (samples, readings) in recordings.iter().zip(&readings) {
         let Some(rows) = candidate_rows(samples, readings, scale, start_s, build)? else { return Ok(None) };
         start_s = rows.last().map_or(start_s, |row: &TrainingRow| row.time_s + PAUSE_S);
         candidates.extend(rows);
     }
-    let rows: Vec<TrainingRow> = chosen(&candidates).into_iter().map(rounded).collect();
+    let most = if rows.is_empty() { ROWS } else { prior::ROWS };
+    rows.extend(chosen(&candidates, most).into_iter().map(rounded));
     Ok(learn(corrects, scale, rows, limits))
 }
 
@@ -140,9 +147,9 @@ fn candidate_rows(
 }
 
 /// Rows that are spread evenly over time and the way that the features of the past go.
-fn chosen(candidates: &[TrainingRow]) -> Vec<TrainingRow> {
+fn chosen(candidates: &[TrainingRow], most: usize) -> Vec<TrainingRow> {
     let n = candidates.len();
-    let most = ROWS.min(n);
+    let most = most.min(n);
     let sd = |i: usize| {
         let mean = candidates.iter().map(|row| row.past[i]).sum::<f64>() / n as f64;
         (candidates.iter().map(|row| (row.past[i] - mean).powi(2)).sum::<f64>() / n as f64).sqrt()
@@ -169,7 +176,7 @@ fn chosen(candidates: &[TrainingRow]) -> Vec<TrainingRow> {
 }
 
 /// With the digits that are written down.
-fn rounded(row: TrainingRow) -> TrainingRow {
+pub(crate) fn rounded(row: TrainingRow) -> TrainingRow {
     TrainingRow {
         time_s: digits(row.time_s),
         strain: digits(row.strain),

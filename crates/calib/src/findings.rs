@@ -17,6 +17,7 @@ use crate::law_fit::{CrossFit, LawFit};
 use crate::left_out::relative_changes;
 use crate::motion_stats::MotionStats;
 use crate::params::RangeParams;
+use crate::prior::CorrectionPrior;
 use crate::samples::Samples;
 use crate::scores::{ScoredRow, Scores};
 use crate::sieve::Sieve;
@@ -95,6 +96,8 @@ pub(crate) struct Check<'a> {
     pub filter: EstimatorKind,
     /// Noise and motion, that of the estimator and of what smooths in its place among them.
     pub estimators: &'a BTreeMap<EstimatorKind, EstimatorParams>,
+    /// What other sensors of the make tell the correction.
+    pub of_make: Option<&'a CorrectionPrior>,
 }
 
 /// Rows of all recordings that were scored, in a row.
@@ -199,7 +202,7 @@ impl Check<'_> {
             filter_from_parts(kind, &law.law, params, setting)
         };
         let correction = if self.kind == EstimatorKind::Corrected {
-            fit_correction(training, &law.rest_readings, limits, (self.filter, &|| bare(false)))?
+            fit_correction(training, &law.rest_readings, limits, (self.filter, &|| bare(false)), self.of_make)?
         } else {
             None
         };

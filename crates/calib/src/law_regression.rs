@@ -60,6 +60,21 @@ impl LawRegression {
     pub(crate) fn new(samples: &[Samples]) -> Result<Self, CalibrationError> {
         let (lower, upper) = check(samples)?;
         let scale = StrainScale { centre: 0.5 * (lower + upper), span: upper - lower };
+        Ok(Self::scaled(samples, scale, RangeParams { lower, upper }))
+    }
+
+    /// The same on a scale that others have, for laws that hold in a range at least.
+    pub(crate) fn on_scale(
+        samples: &[Samples],
+        scale: StrainScale,
+        at_least: RangeParams,
+    ) -> Result<Self, CalibrationError> {
+        let (lower, upper) = check(samples)?;
+        let range = RangeParams { lower: lower.min(at_least.lower), upper: upper.max(at_least.upper) };
+        Ok(Self::scaled(samples, scale, range))
+    }
+
+    fn scaled(samples: &[Samples], scale: StrainScale, range: RangeParams) -> Self {
         let stride = samples.iter().map(Samples::len).sum::<usize>().div_ceil(MOST_ROWS);
         let recordings: Vec<Recording> = samples
             .iter()
@@ -79,9 +94,9 @@ impl LawRegression {
             start += rows;
         }
         let tau_bounds = tau_bounds(samples);
-        let mut regression = Self { recordings, blocks, scale, range: RangeParams { lower, upper }, tau_bounds };
+        let mut regression = Self { recordings, blocks, scale, range, tau_bounds };
         robust_loss::weigh(&mut regression);
-        Ok(regression)
+        regression
     }
 
     /// Sets the weights of the complete rows, in their order.
@@ -181,12 +196,27 @@ impl LawRegression {
     /// recording by the R₀ of the pass before.
     pub(crate) fn solve(&self, design: &Design, ridge: f64, left_out: Option<usize>) -> Option<Solution> {
         let all: Vec<usize> = (0..design.columns.len()).collect();
-        let left_out: Vec<usize> =
-            left_out.map_or(vec![], |block| (0..self.recordings.len()).map(|r| r * BLOCKS + block).collect());
+        let left_out = self.left_out(left_out);
+        let fitted = self.with_own_rests(design, |normal| normal.fit(&all, ridge, &left_out));
+        let (weights, rest_readings, normal) = fitted?;
+        Some(Solution { weights, rest_readings, cross_validated: normal.cross_validate(&all, ridge)? })
+    }
+
+    /// The blocks of the normal equations that a block of every recording is.
+    pub(crate) fn left_out(&self, block: Option<usize>) -> Vec<usize> {
+        block.map_or(vec![], |block| (0..self.recordings.len()).map(|r| r * BLOCKS + block).collect())
+    }
+
+    /// Weights by some fit, R₀ of each recording, and the normal equations relative to those.
+    pub(crate) fn with_own_rests(
+        &self,
+        design: &Design,
+        fit: impl Fn(&BlockedNormal) -> Option<DVector<f64>>,
+    ) -> Option<(DVector<f64>, Vec<f64>, BlockedNormal)> {
         let normal = |rest_readings: &[f64]| self.normal(design, rest_readings);
         let mut rest_readings: Vec<f64> = self.median_readings();
         for _ in 0..SCALING_PASSES {
-            let weights = normal(&rest_readings).fit(&all, ridge, &left_out)?;
+            let weights = fit(&normal(&rest_readings))?;
             for (r, rest) in rest_readings.iter_mut().enumerate() {
                 *rest *= weights[0] + if r == 0 { 0.0 } else { weights[r] };
             }
@@ -195,8 +225,7 @@ impl LawRegression {
             }
         }
         let normal = normal(&rest_readings);
-        let (weights, cross_validated) = (normal.fit(&all, ridge, &left_out)?, normal.cross_validate(&all, ridge)?);
-        Some(Solution { weights, rest_readings, cross_validated })
+        Some((fit(&normal)?, rest_readings, normal))
     }
 }
 

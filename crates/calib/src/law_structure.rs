@@ -85,6 +85,31 @@ impl LawStructure {
         })
     }
 
+    /// The weights of a law of this structure in the design of one recording, the constant with them: what [`Self::law`] turns
+    /// into that law.
+    pub(crate) fn weights(&self, law: &LawParams, scale: StrainScale) -> DVector<f64> {
+        let StrainScale { centre, span } = scale;
+        let mut weights = vec![0.0];
+        match law.gauge {
+            GaugeParams::Polynomial { coefficients: [a, b, c] } => {
+                weights.extend([a * span, b * span.powi(2), c * span.powi(3)]);
+            }
+            GaugeParams::DecayingExponential { slope, .. } => weights.push(slope * span),
+            GaugeParams::Tunnelling { .. } => {}
+        }
+        weights.extend([law.extend_viscosity_s * span, law.retract_viscosity_s * span]);
+        for branch in &law.branches {
+            let gain = |gain: f64, slope: f64| (gain + slope * centre) * span;
+            weights.extend([
+                gain(branch.extend_gain, branch.extend_gain_slope),
+                gain(branch.retract_gain, branch.retract_gain_slope),
+                branch.extend_gain_slope * span.powi(2),
+                branch.retract_gain_slope * span.powi(2),
+            ]);
+        }
+        DVector::from_vec(weights)
+    }
+
     pub(crate) fn sort_branches(&mut self) {
         self.nonlinear[..self.taus].sort_by(f64::total_cmp);
     }

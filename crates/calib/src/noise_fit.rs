@@ -9,6 +9,7 @@ use crate::left_out::{Fold, LeftOut};
 use crate::motion_stats::{MotionStats, root_mean_square};
 use crate::optimise;
 use crate::params::RangeParams;
+use crate::prior::EstimatorPrior;
 use crate::samples::{Samples, usual_step_s};
 use crate::sd_scale::sd_scale;
 use crate::sieve::{Sieve, news};
@@ -69,14 +70,15 @@ pub(crate) fn survey<'a>(
     samples: &[Samples],
     laws: &[&'a CrossFit],
     stats: MotionStats,
-    kind: EstimatorKind,
+    (kind, of_make): (EstimatorKind, Option<&EstimatorPrior>),
     evaluated: &mut dyn FnMut(),
 ) -> Result<Vec<Surveyed<'a>>, CalibrationError> {
     let mut surveyed: Vec<Surveyed<'a>> = Vec::new();
     for &law in laws {
         let before = surveyed.last().map(|one| &one.tuned);
         let search = if before.is_none() { SURVEY } else { RESURVEY };
-        let tuned = NoiseProblem::new(samples, law, stats, kind).search(before, search, &mut *evaluated)?;
+        let problem = NoiseProblem::new(samples, law, stats, kind).with_prior(of_make);
+        let tuned = problem.search(before, search, &mut *evaluated)?;
         surveyed.push(Surveyed { kind, law, tuned });
     }
     Ok(surveyed)
@@ -111,15 +113,33 @@ pub(crate) struct NoiseProblem<'a> {
     limits: RangeParams,
     stats: MotionStats,
     kind: EstimatorKind,
-    /// Logarithms of the parameters that residuals and motion suggest.
+    /// What other sensors of the make tell.
+    of_make: Option<&'a EstimatorPrior>,
+    /// Logarithms of the parameters that residuals and motion suggest, or those sensors.
     untuned: Vec<f64>,
 }
 
 impl<'a> NoiseProblem<'a> {
     pub(crate) fn new(samples: &'a [Samples<'a>], fit: &'a CrossFit, stats: MotionStats, kind: EstimatorKind) -> Self {
-        let mut problem = Self { samples, fit, limits: fit.law.law.range, stats, kind, untuned: Vec::new() };
+        let limits = fit.law.law.range;
+        let mut problem = Self { samples, fit, limits, stats, kind, of_make: None, untuned: Vec::new() };
         problem.untuned = problem.start();
         problem
+    }
+
+    /// The same with a prior of noise and motion.
+    pub(crate) fn with_prior(self, of_make: Option<&'a EstimatorPrior>) -> Self {
+        let same_size = of_make.filter(|prior| prior.ln_mean.len() == self.untuned.len());
+        match same_size {
+            Some(prior) => Self { of_make: same_size, untuned: prior.ln_mean.clone(), ..self },
+            None => self,
+        }
+    }
+
+    /// What keeps a search near where it starts.
+    fn pull(&self, point: &[f64]) -> f64 {
+        let flat = || point.iter().zip(&self.untuned).map(|(x, untuned)| (x - untuned).powi(2)).sum::<f64>();
+        self.of_make.map_or_else(|| REGULARISATION * flat(), |prior| prior.pull(point, self.stats.longest_s))
     }
 
     /// Searches from the values that residuals and motion suggest, or from where another search has got to.
@@ -132,9 +152,8 @@ impl<'a> NoiseProblem<'a> {
         let left_out = self.left_out(self.stride(search.rows));
         let mut cost = |point: &[f64]| {
             evaluated();
-            let pull: f64 = point.iter().zip(&self.untuned).map(|(x, untuned)| (x - untuned).powi(2)).sum();
             let params = self.params(point);
-            left_out.score(&|fold| self.build(self.kind.tuned_as(), fold, &params)) + REGULARISATION * pull
+            left_out.score(&|fold| self.build(self.kind.tuned_as(), fold, &params)) + self.pull(point)
         };
         let from = from.map_or(&self.untuned, |tuned| &tuned.point);
         let point = optimise::polish(&mut cost, from, search.side, search.steps)?;
@@ -150,9 +169,11 @@ impl<'a> NoiseProblem<'a> {
         let every_row = self.left_out(1);
         let step_s = stride as f64 * usual_step_s(self.samples.iter().map(|samples| samples.time_s));
         let times = if stride > 1 { &ERROR_TIMES[..] } else { &ERROR_TIMES[..1] };
+        let times = if self.of_make.is_some() { &[] } else { times };
         let alike = times.iter().map(|steps| self.alike_over(&refined, steps * step_s, step_s));
+        let as_made = self.of_make.map(|_| self.params(&refined));
         let mut best = (f64::INFINITY, self.params(&refined));
-        for params in alike.chain([self.params(&self.untuned)]) {
+        for params in alike.chain(as_made).chain([self.params(&self.untuned)]) {
             let score = every_row.score(&|fold| self.build(self.kind, fold, &params));
             if score < best.0 {
                 best = (score, params);
@@ -172,11 +193,13 @@ impl<'a> NoiseProblem<'a> {
     /// The parameters with their score, and the factors that make their intervals cover the blocks left out.
     fn finish(&self, left_out: &LeftOut, params: EstimatorParams, score: f64) -> EstimatorParams {
         let build = |fold: Fold| self.build(self.kind, fold, &params);
+        // A short motion shows less of what may go wrong.
+        let of_make = self.of_make.map_or(1.0, |prior| prior.strain_sd_scale);
         let filtered = left_out.filtered_deviations(&build);
         let smoothed = self.left_out(self.stride(SMOOTHED_ROWS)).smoothed_deviations(&build);
         EstimatorParams {
             score,
-            strain_sd_scale: filtered.map_or(1.0, |deviations| sd_scale(&deviations)),
+            strain_sd_scale: filtered.map_or(1.0, |deviations| sd_scale(&deviations)).max(of_make),
             smoothed_sd_scale: smoothed.map(|deviations| sd_scale(&deviations)),
             ..params
         }
@@ -227,15 +250,16 @@ impl<'a> NoiseProblem<'a> {
 
     fn params(&self, point: &[f64]) -> EstimatorParams {
         let p: Vec<f64> = point.iter().map(|x| x.clamp(-25.0, 15.0).exp()).collect();
-        let strain_mean = self.stats.strain_mean;
+        let strain_mean = self.of_make.map_or(self.stats.strain_mean, |prior| prior.strain_mean);
         let kind = self.kind.tuned_as();
         let motion =
             MotionParams::OrnsteinUhlenbeck { rate_sd_per_s: p[4], rate_time_s: p[5], strain_mean, strain_sd: p[6] };
         let phases = kind.has_phases().then(|| PhaseParams {
             hold_time_s: p[7],
             move_time_s: p[8],
-            reversal: match (kind, self.stats.hold_s) {
-                (EstimatorKind::SignSplit, None) => 1.0,
+            reversal: match (self.of_make, kind, self.stats.hold_s) {
+                (Some(prior), ..) => prior.reversal,
+                (None, EstimatorKind::SignSplit, None) => 1.0,
                 _ => self.stats.reversal,
             },
             speed_per_s: if kind == EstimatorKind::SignSplit { 0.0 } else { p[9] },
@@ -250,7 +274,7 @@ impl<'a> NoiseProblem<'a> {
                 baseline_sd: p[0],
                 baseline_time_s: p[1],
                 reading_sd: p[2],
-                reading_time_s: 0.0,
+                reading_time_s: self.of_make.map_or(0.0, |prior| prior.reading_time_s),
                 branch_sd: p[3],
             },
             phases,

@@ -4,6 +4,7 @@
 //! says something else than what it means.
 
 mod correction;
+mod prior;
 mod table;
 
 pub use table::FieldError;

@@ -6,6 +6,7 @@ mod evaluate;
 mod export;
 mod files;
 mod fit_law;
+mod fleet;
 mod hand;
 mod live;
 mod plan;
@@ -25,6 +26,7 @@ pub use evaluate::{Estimators, EvaluateArgs};
 pub use export::{ExportArgs, ExportTarget};
 pub use files::{ImportArgs, InspectArgs};
 pub use fit_law::{FitLawArgs, SegmentChoice, TableFormat, phase_name};
+pub use fleet::{FleetArgs, FleetCommand, FleetFitArgs};
 pub use hand::HandArgs;
 pub use live::LiveArgs;
 pub use plan::PlanArgs;
@@ -113,6 +115,9 @@ pub enum Command {
     /// Filter, smooth, evaluate or calibrate many recordings, in parallel; bad ones are reported and the others go on
     #[command(before_help = "Example: ohmstrain batch smooth recordings/*.csv --sensor sensor.toml -o smoothed")]
     Batch(BatchArgs),
+    /// Learn from calibrated sensors of one make, so that a short motion calibrates the next one
+    #[command(before_help = "Example: ohmstrain fleet fit sensors/*.toml -o prior.toml")]
+    Fleet(FleetArgs),
     /// Write a calibrated sensor's filter as C or Rust source for a microcontroller
     #[command(before_help = "Example: ohmstrain export --sensor sensor.toml --target c --dt-s 0.02 -o firmware")]
     Export(ExportArgs),

@@ -2,10 +2,10 @@ use std::mem;
 
 use ohmstrain_calib::{
     CalibrationError, Distrusted, EstimatorKind, Findings, GaugeFamily, LawOptions, RECIPE, RecordingInfo, Samples,
-    SensorParams, Stage,
+    SensorParams, Stage, calibrate_with_prior,
 };
 
-use crate::{Error, MADE_BY, Recording, Sensor};
+use crate::{Error, MADE_BY, Prior, Recording, Sensor};
 
 /// Calibrates a sensor on recordings with known strain, with every choice left to the program. See [`Calibration`].
 ///
@@ -42,7 +42,8 @@ pub fn calibrate(recordings: &[Recording]) -> Result<Sensor, Error> {
 /// # Ok::<(), ohmstrain::Error>(())
 /// ```
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Calibration {
+pub struct Calibration<'a> {
+    prior: Option<&'a Prior>,
     estimator: Option<EstimatorKind>,
     branches: Option<usize>,
     gauge: Option<GaugeFamily>,
@@ -70,7 +71,7 @@ pub struct Calibrated {
     pub distrusted: Vec<Distrusted>,
 }
 
-impl Calibration {
+impl<'a> Calibration<'a> {
     /// With every choice left to the program.
     ///
     /// ```
@@ -78,7 +79,7 @@ impl Calibration {
     /// ```
     #[must_use]
     pub const fn new() -> Self {
-        Self { estimator: None, branches: None, gauge: None }
+        Self { prior: None, estimator: None, branches: None, gauge: None }
     }
 
     /// The estimator to calibrate and to make the sensor's default; the extended Kalman filter is calibrated in any case.
@@ -113,6 +114,21 @@ impl Calibration {
     #[must_use]
     pub const fn gauge(self, family: GaugeFamily) -> Self {
         Self { gauge: Some(family), ..self }
+    }
+
+    /// With what other sensors of the make have taught: a short motion is enough then. The law's structure is the prior's,
+    /// whatever [`Self::branches`] and [`Self::gauge`] say; the sensor's R₀ is its own.
+    ///
+    /// ```
+    /// use ohmstrain::{Calibration, Prior};
+    ///
+    /// fn short(prior: &Prior) -> Calibration<'_> {
+    ///     Calibration::new().prior(prior)
+    /// }
+    /// ```
+    #[must_use]
+    pub const fn prior(self, prior: &'a Prior) -> Self {
+        Self { prior: Some(prior), ..self }
     }
 
     /// Calibrates. The same recordings give the same sensor.
@@ -153,8 +169,12 @@ impl Calibration {
         }
         let estimator = self.estimator.unwrap_or(RECIPE.estimator);
         let samples: Vec<Samples> = recordings.iter().map(|recording| recording.samples).collect();
+        let prior = self.prior.map(Prior::params);
+        if let Some(of_make) = prior.map(|prior| prior.quantity).filter(|of_make| *of_make != quantity) {
+            return Err(Error::OtherMake { of_make, found: quantity });
+        }
         let mut calibration =
-            ohmstrain_calib::calibrate(&samples, &self.structures(estimator), &[estimator], progress)?;
+            calibrate_with_prior(&samples, &self.structures(estimator), &[estimator], prior, progress)?;
         let (distrusted, findings) = (mem::take(&mut calibration.distrusted), calibration.findings.clone());
         let rest_readings = calibration.rest_readings.clone();
         let info = |(recording, rest_reading): (&Recording, &f64)| {

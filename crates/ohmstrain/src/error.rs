@@ -1,6 +1,6 @@
 use std::fmt;
 
-use ohmstrain_calib::{CalibrationError, FORMAT, FieldError, Quantity, SamplesError};
+use ohmstrain_calib::{CalibrationError, FieldError, Quantity, SamplesError};
 use ohmstrain_ekf::StepError;
 use ohmstrain_model::ParameterError;
 use thiserror::Error;
@@ -56,6 +56,14 @@ pub enum Error {
     /// Recordings of different quantities, strain and angle, or units, ohms and ratios; or others than the calibration's.
     #[error("expected recordings of one quantity and one unit, those of the calibration")]
     OtherQuantity,
+    /// A prior of another quantity than the recordings', strain or angle.
+    #[error("the prior is of {}, the recordings are of {}", of_make.name(), found.name())]
+    OtherMake {
+        /// What the prior's sensors estimate.
+        of_make: Quantity,
+        /// What the recordings' reference is.
+        found: Quantity,
+    },
     /// Slices of different lengths.
     #[error("{times} times and {readings} readings; expected as many of each")]
     Lengths {
@@ -114,7 +122,7 @@ impl Error {
 /// use ohmstrain::{Error, Sensor, TextCause};
 ///
 /// let Err(Error::Text(error)) = Sensor::from_toml("format = 5") else { panic!() };
-/// assert!(matches!(error.cause, TextCause::Format { found: 5 }));
+/// assert!(matches!(error.cause, TextCause::Format { expected: 4, found: 5 }));
 /// assert_eq!(error.place.unwrap().line, 1);
 /// ```
 #[derive(Debug)]
@@ -148,8 +156,10 @@ pub enum TextCause {
     #[error("{}", .0.message().replace('\n', ", "))]
     Toml(toml::de::Error),
     /// It is of another version of the format.
-    #[error("field `format`: expected version {FORMAT}, found {found}")]
+    #[error("field `format`: expected version {expected}, found {found}")]
     Format {
+        /// The version that is read.
+        expected: u32,
         /// That version.
         found: u32,
     },

@@ -1,7 +1,8 @@
-//! `sensor.toml` as text: in, with the place of what is wrong, and out.
+//! `sensor.toml` and `prior.toml` as text: in, with the place of what is wrong.
 
-use ohmstrain_calib::{FORMAT, SensorParams};
+use ohmstrain_calib::{FORMAT, FieldError, PRIOR_FORMAT, Prior, SensorParams};
 use serde::Deserialize;
+use serde::de::DeserializeOwned;
 use toml::de::{DeArray, DeTable};
 
 use crate::error::{Place, TextCause, TextError};
@@ -12,20 +13,45 @@ struct Version {
     format: u32,
 }
 
+/// What a text may hold.
+pub(crate) trait Document: DeserializeOwned {
+    /// The version that is read.
+    const FORMAT: u32;
+
+    /// Names the first number that is out of its range.
+    fn check(&self) -> Result<(), FieldError>;
+}
+
+impl Document for SensorParams {
+    const FORMAT: u32 = FORMAT;
+
+    fn check(&self) -> Result<(), FieldError> {
+        self.validate()
+    }
+}
+
+impl Document for Prior {
+    const FORMAT: u32 = PRIOR_FORMAT;
+
+    fn check(&self) -> Result<(), FieldError> {
+        self.validate()
+    }
+}
+
 /// Parameters of which every number is in its range.
-pub(crate) fn parse(text: &str) -> Result<SensorParams, TextError> {
+pub(crate) fn parse<D: Document>(text: &str) -> Result<D, TextError> {
     let no_toml = |error: toml::de::Error| TextError {
         place: error.span().map(|span| position(text, span.start)),
         cause: TextCause::Toml(error),
     };
     let Version { format } = toml::from_str(text).map_err(no_toml)?;
-    if format != FORMAT {
+    if format != D::FORMAT {
         let line = text.lines().position(|line| line.trim_start().starts_with("format")).map_or(1, |line| line + 1);
         let place = Some(Place { line, column: None });
-        return Err(TextError { place, cause: TextCause::Format { found: format } });
+        return Err(TextError { place, cause: TextCause::Format { expected: D::FORMAT, found: format } });
     }
-    let params: SensorParams = toml::from_str(text).map_err(no_toml)?;
-    match params.validate() {
+    let params: D = toml::from_str(text).map_err(no_toml)?;
+    match params.check() {
         Ok(()) => Ok(params),
         Err(error) => Err(TextError { place: place_of(text, &error.field), cause: TextCause::Field(error) }),
     }

@@ -1,6 +1,6 @@
 use std::time::Instant;
 
-use ohmstrain::{Calibrated, Calibration, GaugeFamily, Quantity};
+use ohmstrain::{Calibrated, Calibration, GaugeFamily, Prior, Quantity};
 use ohmstrain_calib::{Samples, screen};
 use pyo3::prelude::*;
 use pyo3_arrow::PyTable;
@@ -18,11 +18,20 @@ pub struct Choices {
     estimator: Option<String>,
     branches: Option<usize>,
     gauge: Option<String>,
+    /// The text of a `prior.toml`.
+    prior: Option<String>,
 }
 
 impl Choices {
-    fn calibration(&self) -> PyResult<Calibration> {
+    fn prior(&self) -> PyResult<Option<Prior>> {
+        self.prior.as_deref().map(parsed).transpose()
+    }
+
+    fn calibration<'a>(&self, prior: Option<&'a Prior>) -> PyResult<Calibration<'a>> {
         let mut calibration = Calibration::new();
+        if let Some(prior) = prior {
+            calibration = calibration.prior(prior);
+        }
         if let Some(kind) = self.estimator.as_deref().map(estimator).transpose()?.flatten() {
             calibration = calibration.estimator(kind);
         }
@@ -53,7 +62,26 @@ pub fn calibrate(py: Python, tables: Vec<(PyTable, About)>, choices: Choices) ->
     let recordings =
         tables.into_iter().map(|(table, about)| Recording::new(table, about)).collect::<PyResult<Vec<Recording>>>()?;
     let whole: Vec<usize> = recordings.iter().map(|recording| recording.time_s.len()).collect();
-    calibrated(py, &recordings, &whole, choices.calibration()?)
+    let prior = choices.prior()?;
+    calibrated(py, &recordings, &whole, choices.calibration(prior.as_ref())?)
+}
+
+fn parsed(text: &str) -> PyResult<Prior> {
+    Prior::from_toml(text).map_err(|error| of_library(&error, None))
+}
+
+/// What sensors of one make have in common, as the text of a `prior.toml`.
+#[pyfunction]
+pub fn fit_prior(py: Python, sensors: Vec<PyRef<Sensor>>) -> PyResult<String> {
+    let sensors: Vec<ohmstrain::Sensor> = sensors.iter().map(|sensor| sensor.sensor.clone()).collect();
+    let text = py.detach(|| Prior::learn(&sensors)?.to_toml());
+    text.map_err(|error| of_library(&error, None))
+}
+
+/// Refuses a text that is no prior.
+#[pyfunction]
+pub fn check_prior(text: &str, file: Option<&str>) -> PyResult<()> {
+    Prior::from_toml(text).map(|_| ()).map_err(|error| of_library(&error, file))
 }
 
 /// The sensor behind the first rows of recordings, as many as `rows` says of each; and what is to be said of it.
@@ -126,7 +154,7 @@ pub fn evaluate_split(
     let recording = Recording::new(table, about)?;
     let rows = (recording.time_s.len() as f64 * share) as usize;
     let recordings = [recording];
-    let (sensor, warnings) = calibrated(py, &recordings, &[rows], choices.calibration()?)?;
+    let (sensor, warnings) = calibrated(py, &recordings, &[rows], choices.calibration(None)?)?;
     let [recording] = &recordings;
     let scored = after_split(py, recording, rows, &sensor.sensor)?;
     Ok((sensor, warnings, scored))

@@ -18,7 +18,7 @@ use pyo3::prelude::*;
 #[pymodule]
 mod _core {
     #[pymodule_export]
-    use super::calibration::{calibrate, evaluate_split};
+    use super::calibration::{calibrate, check_prior, evaluate_split, fit_prior};
     #[pymodule_export]
     use super::error::OhmstrainError;
     #[pymodule_export]

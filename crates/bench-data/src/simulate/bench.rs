@@ -2,6 +2,7 @@ use ohmstrain_model::{AdcCode, FrontEnd, Phase};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 
+use super::individual::{Individual, REST_SPREAD};
 use super::matched::Matched;
 use super::mismatched::Mismatched;
 use super::noise::{Drift, conditioning, normal};
@@ -54,12 +55,14 @@ pub fn simulate(settings: &SimulationSettings) -> Result<Trace, SettingsError> {
     settings.validate()?;
     let profile = Profile::new(settings, &mut random(settings.seed, Stream::Profile));
     settings.check_rows(profile.duration_s())?;
+    let mut individual = Individual::new(settings.individual);
+    let rest_ohm = settings.material.rest_resistance_ohm() * individual.factor(REST_SPREAD);
     let truth = if settings.mismatched {
-        run(&profile, settings.sample_rate_hz, &mut Mismatched::new(settings.material))
+        run(&profile, settings.sample_rate_hz, &mut Mismatched::new(settings.material, &mut individual))
     } else {
         run(&profile, settings.sample_rate_hz, &mut Matched::new(settings.material))
     };
-    let resistance_ohm = disturbed(settings, &profile, &truth);
+    let resistance_ohm = disturbed(settings, &profile, rest_ohm, &truth);
     Ok(Trace {
         metadata: metadata(settings),
         time_s: truth.iter().map(|sample| round(sample.time_s, 1e6)).collect(),
@@ -111,9 +114,8 @@ fn run(profile: &Profile, rate_hz: f64, sensor: &mut impl Sensor) -> Vec<Sample>
 }
 
 /// Resistance with conditioning, drift and white noise, Ω.
-fn disturbed(settings: &SimulationSettings, profile: &Profile, truth: &[Sample]) -> Vec<f64> {
+fn disturbed(settings: &SimulationSettings, profile: &Profile, rest_ohm: f64, truth: &[Sample]) -> Vec<f64> {
     let disturbances = &settings.disturbances;
-    let rest_ohm = settings.material.rest_resistance_ohm();
     let mut white = random(settings.seed, Stream::White);
     let mut drifting = random(settings.seed, Stream::Drift);
     let mut drift = Drift::new(disturbances.drift_density, &mut drifting);
@@ -172,21 +174,26 @@ fn metadata(settings: &SimulationSettings) -> Metadata {
         gauge_length_mm: Some(GAUGE_LENGTH_MM),
         front_end: settings.front_end,
         joint: None,
-        other: other.map(|(key, value)| (key.to_owned(), value)).into(),
+        other: other
+            .map(|(key, value)| (key.to_owned(), value))
+            .into_iter()
+            .chain(settings.individual.map(|seed| ("individual".to_owned(), seed.to_string())))
+            .collect(),
         ..Metadata::default()
     }
 }
 
 /// Independent random numbers for each use, so that switching one off leaves the others as they are.
 #[derive(Clone, Copy)]
-enum Stream {
+pub(super) enum Stream {
     Profile = 1,
     White,
     Drift,
     Converter,
+    Individual,
 }
 
-fn random(seed: u64, stream: Stream) -> ChaCha8Rng {
+pub(super) fn random(seed: u64, stream: Stream) -> ChaCha8Rng {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     random.set_stream(stream as u64);
     random

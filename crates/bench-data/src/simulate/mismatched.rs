@@ -2,6 +2,7 @@ use ohmstrain_model::Phase;
 
 use super::Material;
 use super::bench::{Movement, Sensor};
+use super::individual::{CHARACTER_SPREAD, Individual};
 
 const BRANCHES: usize = 9;
 const PLAYS: usize = 3;
@@ -68,6 +69,20 @@ impl Character {
             },
         }
     }
+
+    /// One sensor of this make.
+    fn drawn(self, individual: &mut Individual) -> Self {
+        let mut drawn = |of_make: f64| of_make * individual.factor(CHARACTER_SPREAD);
+        Self {
+            gauge_slope: drawn(self.gauge_slope),
+            gauge_peak: drawn(self.gauge_peak),
+            time_scale: drawn(self.time_scale),
+            breaking: drawn(self.breaking),
+            play_weight: drawn(self.play_weight),
+            memory_per_strain: drawn(self.memory_per_strain),
+            ..self
+        }
+    }
 }
 
 /// A sensor outside of the family that is fitted: nine branches with gains that are not affine in strain and a drive
@@ -83,8 +98,8 @@ pub(super) struct Mismatched {
 }
 
 impl Mismatched {
-    pub(super) fn new(material: Material) -> Self {
-        let character = Character::of(material);
+    pub(super) fn new(material: Material, individual: &mut Individual) -> Self {
+        let character = Character::of(material).drawn(individual);
         let spacing = (character.slowest_s / FASTEST_S).powf(1.0 / (BRANCHES - 1) as f64);
         let tau_s = std::array::from_fn(|i| character.time_scale * FASTEST_S * spacing.powi(i as i32));
         let spectrum: [f64; BRANCHES] = tau_s.map(|tau: f64| tau.powf(character.spectrum));

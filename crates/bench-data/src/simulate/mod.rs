@@ -17,6 +17,7 @@
 //! ```
 
 mod bench;
+mod individual;
 mod matched;
 mod material;
 mod mismatched;

@@ -26,6 +26,9 @@ pub struct SimulationSettings {
     pub front_end: Option<FrontEndSpec>,
     /// Equal seeds give equal recordings; default 1.
     pub seed: u64,
+    /// Which sensor of the make, a seed too: its R₀ and, with `mismatched`, its character are drawn around the make's; default
+    /// none, the make's own.
+    pub individual: Option<u64>,
 }
 
 impl SimulationSettings {
@@ -42,6 +45,7 @@ impl SimulationSettings {
             disturbances: Disturbances::BENCH,
             front_end: None,
             seed: 1,
+            individual: None,
         }
     }
 

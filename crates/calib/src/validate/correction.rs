@@ -43,7 +43,7 @@ impl ProcessParams {
 }
 
 impl TrainingRow {
-    fn validate(&self, table: &Table) -> Result<(), FieldError> {
+    pub(super) fn validate(&self, table: &Table) -> Result<(), FieldError> {
         table.number("time_s", self.time_s, SIGNED)?;
         table.number("strain", self.strain, SIGNED)?;
         table.numbers("past", &self.past, SIGNED)?;

@@ -29,6 +29,9 @@ pub struct CalibrateArgs {
     /// hypotheses or particles; ekf is calibrated in any case
     #[arg(long, default_value = "auto")]
     pub estimator: Auto<Estimator>,
+    /// What other sensors of the make have taught (`fleet fit`): a short motion is enough then
+    #[arg(long, value_name = "prior.toml", conflicts_with_all = ["branches", "gauge"])]
+    pub prior: Option<PathBuf>,
     /// Move a reference that is early or late to where the readings say it belongs
     #[arg(long)]
     pub align: bool,

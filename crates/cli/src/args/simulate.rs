@@ -57,6 +57,9 @@ pub struct SimulateArgs {
     /// Seed of noise, drift and random protocols
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
+    /// Another sensor of the same make, drawn with this seed
+    #[arg(long, value_name = "SEED")]
+    pub individual: Option<u64>,
     /// File to write instead of stdout
     #[arg(short, long)]
     pub output: Option<PathBuf>,

@@ -7,6 +7,7 @@ use ohmstrain_calib::{Samples, screen};
 
 use super::closing;
 use super::explain;
+use super::fleet;
 use super::reporting::{Reporting, Wanted};
 use super::scoring::Part;
 use super::tested::{Kept, tested};
@@ -23,7 +24,7 @@ use crate::verbosity::Verbosity;
 
 /// Calibrates a sensor on recordings and writes its parameters.
 pub fn run(args: &CalibrateArgs) -> Result<(), CliError> {
-    let mut outputs = Outputs::new(args.force, &args.traces);
+    let mut outputs = Outputs::new(args.force, args.traces.iter().chain(&args.prior));
     let sensor_output = outputs.claim(&args.output, Kind::Sensor)?;
     let wanted = Wanted::claim(&args.report, &mut outputs)?;
     let overrides = args.trace.metadata();
@@ -43,9 +44,12 @@ pub fn run(args: &CalibrateArgs) -> Result<(), CliError> {
     }
     let lags_s = recordings.iter_mut().map(|recording| alignment::check(recording, args.align));
     let lags_s: Vec<f64> = lags_s.collect::<Result<_, _>>()?;
+    let prior = args.prior.as_deref().map(fleet::read).transpose()?;
+    let wished = calibration(args);
+    let wished = prior.as_ref().map_or(wished, |prior| wished.prior(prior));
     let start = Instant::now();
     let progress = Progress::new("calibrating");
-    let Calibrated { sensor, findings, .. } = calibrate_recordings(&recordings, calibration(args), &progress)?;
+    let Calibrated { sensor, findings, .. } = calibrate_recordings(&recordings, wished, &progress)?;
     drop(progress);
     let calibration_s = start.elapsed().as_secs_f64();
     for (recording, kept) in &mut kept {
@@ -86,7 +90,7 @@ pub fn run(args: &CalibrateArgs) -> Result<(), CliError> {
 }
 
 /// What the flags leave to choose from.
-fn calibration(args: &CalibrateArgs) -> Calibration {
+fn calibration(args: &CalibrateArgs) -> Calibration<'static> {
     let mut calibration = Calibration::new();
     if let Some(estimator) = args.estimator.chosen() {
         calibration = calibration.estimator(estimator.0);

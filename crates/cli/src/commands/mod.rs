@@ -10,6 +10,7 @@ mod export;
 mod export_score;
 mod filter;
 mod fit_law;
+mod fleet;
 mod hand;
 mod import;
 mod inspect;
@@ -46,6 +47,7 @@ pub fn dispatch(command: &Command) -> Result<(), CliError> {
         Command::Smooth(args) => smooth::run(args),
         Command::Evaluate(args) => evaluate::run(args),
         Command::Batch(args) => batch::run(args),
+        Command::Fleet(args) => fleet::run(args),
         Command::Export(args) => export::run(args),
         Command::Completions(args) => shell::completions(args),
         Command::Man(args) => shell::man(args),

@@ -17,6 +17,7 @@ pub fn run(args: &SimulateArgs) -> Result<(), CliError> {
         mismatched: args.mismatched,
         front_end: args.front_end,
         seed: args.seed,
+        individual: args.individual,
         ..SimulationSettings::new(args.material, args.protocol)
     };
     let bytes = bytes(&settings).map_err(CliError::Arguments)?;

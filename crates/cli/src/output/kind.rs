@@ -5,6 +5,8 @@ pub enum Kind {
     Trace,
     /// A sensor's parameters.
     Sensor,
+    /// What a fleet has taught.
+    Prior,
     /// Estimates of a recording.
     Estimates,
     /// A report.
@@ -21,6 +23,7 @@ impl Kind {
         match self {
             Self::Trace => "a recording",
             Self::Sensor => "a sensor file",
+            Self::Prior => "a prior",
             Self::Estimates => "estimates",
             Self::Report => "a report",
             Self::Figure => "a figure",
@@ -39,6 +42,10 @@ impl Kind {
             Self::Sensor => {
                 let mut starts = |start| lines.next().is_some_and(|line: &str| line.starts_with(start));
                 starts("format = ") && starts("made_by = \"ohmstrain ")
+            }
+            Self::Prior => {
+                let mut starts = |start| lines.next().is_some_and(|line: &str| line.starts_with(start));
+                starts("format = ") && starts("made_by = \"ohmstrain ") && starts("sensors = ")
             }
             Self::Estimates => {
                 lines.next().is_some_and(|header| header.starts_with("time_s,resistance_") && header.contains("_sd,"))
@@ -62,6 +69,7 @@ mod tests {
             (Kind::Trace, "# material = silicone\ntime_s,resistance_ohm\n0,1\n"),
             (Kind::Trace, "time_s,resistance_ohm\n# made_by = ohmstrain 0.1.0\n"),
             (Kind::Sensor, "format = 4\nmade_by = \"somebody\"\n"),
+            (Kind::Prior, "format = 4\nmade_by = \"ohmstrain 0.1.0\"\nquantity = \"strain\"\n"),
             (Kind::Sensor, "[package]\nname = \"ohmstrain\"\n"),
             (Kind::Estimates, "time_s,resistance_ohm,strain\n"),
             (Kind::Report, "<!DOCTYPE html>\n<html>ohmstrain</html>"),

@@ -15,7 +15,7 @@ the strain is known, ``strain``, ``displacement_mm`` or ``angle_deg``. What is m
 from . import plot
 from ._core import MADE_BY, OhmstrainError
 from ._evaluation import Evaluation, Scores, evaluate
-from ._sensor import LaggedFilter, LiveFilter, OhmstrainWarning, Sensor, calibrate
+from ._sensor import LaggedFilter, LiveFilter, OhmstrainWarning, Prior, Sensor, calibrate
 
 __version__ = MADE_BY.split()[-1]
 
@@ -25,6 +25,7 @@ __all__ = [
     "LiveFilter",
     "OhmstrainError",
     "OhmstrainWarning",
+    "Prior",
     "Scores",
     "Sensor",
     "calibrate",

@@ -52,9 +52,15 @@ def _options(
 
 
 def _choices(
-    estimator: str = "auto", branches: int | None = None, gauge: str = "auto"
+    estimator: str = "auto",
+    branches: int | None = None,
+    gauge: str = "auto",
+    prior: Prior | str | os.PathLike[str] | None = None,
 ) -> dict[str, Any]:
-    return {"estimator": estimator, "branches": branches, "gauge": gauge}
+    if prior is not None and not isinstance(prior, Prior):
+        prior = Prior.load(prior)
+    text = None if prior is None else prior.to_toml()
+    return {"estimator": estimator, "branches": branches, "gauge": gauge, "prior": text}
 
 
 def _split(arguments: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -62,6 +68,41 @@ def _split(arguments: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
     names = _about.__code__.co_varnames[: _about.__code__.co_argcount]
     about = {name: arguments.pop(name) for name in names if name in arguments}
     return _about(**about), arguments
+
+
+def _write(path: str | os.PathLike[str], text: str) -> None:
+    """Whole or not at all."""
+    target = Path(path)
+    with tempfile.NamedTemporaryFile("w", encoding="utf-8", dir=target.parent, delete=False) as draft:
+        draft.write(text)
+    os.chmod(draft.name, 0o644)
+    os.replace(draft.name, target)
+
+
+class Prior:
+    """What calibrated sensors of one make have in common: with it a short motion calibrates the next one."""
+
+    def __init__(self, text: str, file: str | None = None) -> None:
+        _core.check_prior(text, file)
+        self._text = text
+
+    @classmethod
+    def fit(cls, sensors: Iterable[Sensor]) -> Prior:
+        """Learn from at least three sensors, as ``ohmstrain fleet fit`` does."""
+        return cls(_core.fit_prior([sensor._core for sensor in sensors]))
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Prior:
+        """Read a ``prior.toml``."""
+        return cls(Path(path).read_text(encoding="utf-8"), os.fspath(path))
+
+    def to_toml(self) -> str:
+        """The text of its ``prior.toml``."""
+        return self._text
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write a ``prior.toml``, whole or not at all."""
+        _write(path, self._text)
 
 
 class Sensor:
@@ -94,11 +135,7 @@ class Sensor:
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write a ``sensor.toml``, whole or not at all."""
-        target = Path(path)
-        with tempfile.NamedTemporaryFile("w", encoding="utf-8", dir=target.parent, delete=False) as draft:
-            draft.write(self.to_toml())
-        os.chmod(draft.name, 0o644)
-        os.replace(draft.name, target)
+        _write(path, self.to_toml())
         self._file = os.fspath(path)
 
     @property
@@ -275,6 +312,7 @@ def calibrate(
     estimator: str = "auto",
     branches: int | None = None,
     gauge: str = "auto",
+    prior: Prior | str | os.PathLike[str] | None = None,
     **about: Any,
 ) -> Sensor:
     """Calibrate a sensor on recordings with known strain.
@@ -289,6 +327,9 @@ def calibrate(
         Relaxing branches of the law, 0 to 4, in place of what the filter does best with.
     gauge : str
         Family of the quasi-static curve: ``auto``, ``polynomial``, ``decaying-exponential`` or ``tunnelling``.
+    prior : Prior
+        What other sensors of the make have taught, or the path of a ``prior.toml``: a short motion is enough then. It brings
+        the law's structure; ``branches`` and ``gauge`` do not count.
     gauge_length_mm, front_end, joint
         What stands above the header of a trace CSV.
 
@@ -309,6 +350,6 @@ def calibrate(
     else:
         named = [(None, recordings)]
     tables = [(_tables.to_arrow(table), _about(name=name, **about)) for name, table in named]
-    core, doubts = _core.calibrate(tables, _choices(estimator, branches, gauge))
+    core, doubts = _core.calibrate(tables, _choices(estimator, branches, gauge, prior))
     _warn(doubts)
     return Sensor(core)

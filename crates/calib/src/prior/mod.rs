@@ -1,0 +1,85 @@
+//! What sensors of one make have in common, learned from calibrated ones: it makes a short motion enough for the next one.
+//!
+//! Empirical Bayes: mean and spread over the sensors stand for the prior of one more. The law's regression takes it as
+//! further rows, the search for noise and motion starts from it and is pulled toward it, and the correction learns from some
+//! rows of every sensor beside the new one's own. R₀ is every sensor's own.
+
+mod law;
+mod learn;
+mod noise;
+mod parameters;
+mod population;
+mod probe;
+mod rows;
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+pub use law::LawPrior;
+pub(crate) use learn::is_covariance;
+pub use noise::EstimatorPrior;
+pub use rows::CorrectionPrior;
+pub(crate) use rows::ROWS;
+
+use crate::estimator_params::EstimatorKind;
+use crate::params::{Quantity, Validity};
+
+/// Version of the file that a prior is written to.
+pub const PRIOR_FORMAT: u32 = 1;
+/// Sensors that a spread can be told from.
+pub const FEWEST_SENSORS: usize = 3;
+
+/// The content of `prior.toml`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Prior {
+    /// Version of the format, [`PRIOR_FORMAT`].
+    pub format: u32,
+    /// Program and version that made it.
+    pub made_by: String,
+    /// How many sensors it was learned from.
+    pub sensors: usize,
+    /// What they estimate.
+    pub quantity: Quantity,
+    /// What calibration has seen of the median sensor; its readings over R₀.
+    pub validity: Validity,
+    /// The law.
+    pub law: LawPrior,
+    /// Noise and motion, per estimator.
+    pub estimators: BTreeMap<EstimatorKind, EstimatorPrior>,
+    /// The correction; `None` if too few sensors have one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub correction: Option<CorrectionPrior>,
+}
+
+impl Prior {
+    /// The prior of an estimator's noise and motion; particles take those of the sign-split filter.
+    pub(crate) fn estimator(&self, kind: EstimatorKind) -> Option<&EstimatorPrior> {
+        self.estimators.get(&kind.tuned_as())
+    }
+
+    /// What a calibration on a sensor with this R₀ has seen, together with what the others have.
+    pub(crate) fn joined(&self, own: Validity, rest_reading: f64) -> Validity {
+        let of_make = &self.validity;
+        Validity {
+            lower: own.lower.min(of_make.lower),
+            upper: own.upper.max(of_make.upper),
+            reading_lower: own.reading_lower.min(of_make.reading_lower * rest_reading),
+            reading_upper: own.reading_upper.max(of_make.reading_upper * rest_reading),
+            fastest_rate_per_s: own.fastest_rate_per_s.max(of_make.fastest_rate_per_s),
+            duration_s: own.duration_s.max(of_make.duration_s),
+            longest_repeat_s: own.longest_repeat_s.max(of_make.longest_repeat_s),
+        }
+    }
+}
+
+/// The middle one, the upper one of two; zero without any.
+fn median(values: impl IntoIterator<Item = f64>) -> f64 {
+    let mut sorted: Vec<f64> = values.into_iter().collect();
+    sorted.sort_by(f64::total_cmp);
+    sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,33 @@
+use std::path::PathBuf;
+
+use clap::{Args as ClapArgs, Subcommand};
+
+/// Flags of `fleet`.
+#[derive(Debug, ClapArgs)]
+pub struct FleetArgs {
+    /// What to do with the sensors.
+    #[command(subcommand)]
+    pub command: FleetCommand,
+}
+
+/// What can be done with sensors of one make.
+#[derive(Debug, Subcommand)]
+pub enum FleetCommand {
+    /// Learn what calibrated sensors of one make have in common, for `calibrate --prior`
+    #[command(before_help = "Example: ohmstrain fleet fit sensors/*.toml -o prior.toml")]
+    Fit(FleetFitArgs),
+}
+
+/// Flags of `fleet fit`.
+#[derive(Debug, ClapArgs)]
+pub struct FleetFitArgs {
+    /// Calibrated sensors of one make, at least three
+    #[arg(required = true, value_name = "sensor.toml")]
+    pub sensors: Vec<PathBuf>,
+    /// Where to write what they have in common
+    #[arg(short, long, value_name = "prior.toml")]
+    pub output: PathBuf,
+    /// Replace files that this program did not write, too
+    #[arg(long)]
+    pub force: bool,
+}

@@ -1,0 +1,53 @@
+use std::fs;
+use std::path::Path;
+
+use ohmstrain::{Prior, Sensor};
+
+use crate::args::{FleetArgs, FleetCommand, FleetFitArgs};
+use crate::error::CliError;
+use crate::output::{Kind, Outputs, print};
+use crate::sensor_file;
+use crate::verbosity::Verbosity;
+
+/// Learns from sensors of one make.
+pub fn run(args: &FleetArgs) -> Result<(), CliError> {
+    match &args.command {
+        FleetCommand::Fit(args) => fit(args),
+    }
+}
+
+fn fit(args: &FleetFitArgs) -> Result<(), CliError> {
+    let mut outputs = Outputs::new(args.force, &args.sensors);
+    let output = outputs.claim(&args.output, Kind::Prior)?;
+    let sensors = args.sensors.iter().map(|path| sensor_file::read(path, None));
+    let sensors: Vec<Sensor> = sensors.collect::<Result<_, _>>()?;
+    let prior = Prior::learn(&sensors)?;
+    outputs.put(output, prior.to_toml()?.into_bytes());
+    outputs.publish()?;
+    if Verbosity::chosen() != Verbosity::Quiet {
+        print(|out| Ok(writeln!(out, "{}", told(&prior, &args.output))?))?;
+    }
+    Ok(())
+}
+
+/// What was learned, in a few words.
+fn told(prior: &Prior, output: &Path) -> String {
+    let params = prior.params();
+    let branches = params.law.tau_s.iter().map(|tau_s| format!("{tau_s:.1}")).collect::<Vec<_>>().join(", ");
+    let correction = params.correction.as_ref().map_or_else(
+        || "no correction".to_owned(),
+        |correction| format!("{} rows for the correction of {}", correction.rows.len(), correction.corrects.name()),
+    );
+    format!(
+        "{}: {} sensors; branches of {branches} s; {} estimators; {correction}",
+        output.display(),
+        params.sensors,
+        params.estimators.len()
+    )
+}
+
+/// Reads what a fleet has taught.
+pub fn read(path: &Path) -> Result<Prior, CliError> {
+    let text = fs::read_to_string(path).map_err(|error| CliError::file("read", path, &error))?;
+    Prior::from_toml(&text).map_err(|error| CliError::Input(error.in_file(&path.display().to_string())))
+}
