@@ -52,7 +52,7 @@ fn sparse<const B: usize, const N: usize, const L: usize>(criterion: &mut Criter
 }
 
 /// Filter and smoother.
-fn smoother(criterion: &mut Criterion, model: &SwitchedModel<f64, 2, 1, 3>) {
+fn smoother(criterion: &mut Criterion, model: &SwitchedModel<f64, 1, 3>) {
     let (ekf, readings) = (Ekf::new(*model), readings());
     let prepared = model.prepare(DT_S);
     criterion.bench_function("smoother, n = 3, 512 steps", |bencher| {
@@ -70,7 +70,7 @@ fn smoother(criterion: &mut Criterion, model: &SwitchedModel<f64, 2, 1, 3>) {
 }
 
 /// The law frozen at one linearisation, which is what adskalman can be given.
-fn adskalman(criterion: &mut Criterion, model: &SwitchedModel<f64, 2, 1, 3>) {
+fn adskalman(criterion: &mut Criterion, model: &SwitchedModel<f64, 1, 3>) {
     let start = Belief::<f64, 3, 6>::initial(model);
     let prepared = Dynamics::<f64, 3, 6>::prepare(model, DT_S);
     let transition = Dynamics::<f64, 3, 6>::transition(model, &prepared, &start, Some(Phase::Extend));

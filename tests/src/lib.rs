@@ -96,7 +96,7 @@ impl<T: Scalar, M: Channel<T, N, L>, const N: usize, const L: usize> Channel<T, 
 /// # Panics
 /// Never: the parameters are valid.
 #[must_use]
-pub fn sensor<T: Scalar, const B: usize, const N: usize>() -> SwitchedModel<T, 2, B, N> {
+pub fn sensor<T: Scalar, const B: usize, const N: usize>() -> SwitchedModel<T, B, N> {
     let branch = |i: usize| Branch {
         tau_s: T::of(4.0 * 8_f64.powi(i as i32)),
         extend_gain: T::of(0.8),
@@ -127,7 +127,7 @@ pub fn sensor<T: Scalar, const B: usize, const N: usize>() -> SwitchedModel<T, 2
 /// # Panics
 /// Never: the parameters are valid.
 #[must_use]
-pub fn switching_sensor() -> SwitchedModel<f64, 2, 1, 3> {
+pub fn switching_sensor() -> SwitchedModel<f64, 1, 3> {
     let law = SensorLaw {
         gauge: Gauge::Polynomial { coefficients: [1.5, 0.0, 0.0] },
         extend_viscosity_s: 0.0,

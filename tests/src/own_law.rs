@@ -16,7 +16,6 @@ const STRAIN_MEAN: f64 = 0.15;
 const STRAIN_SD: f64 = 0.1;
 const RATE_SD: f64 = 0.08;
 const RATE_TIME_S: f64 = 1.5;
-const ACCELERATION_SD: f64 = 0.12;
 /// Of a motion in phases.
 const PHASE_RATE: f64 = 0.08;
 const PHASE_RATE_SD: f64 = 0.03;
@@ -31,8 +30,6 @@ pub enum Moves {
     Ou,
     /// The same with holds.
     OuAndHolds,
-    /// A smooth rate.
-    Smooth,
     /// Phases of extend, hold and retract, whose gains hold whatever the sign of the rate at an instant.
     Phases,
 }
@@ -41,7 +38,6 @@ pub enum Moves {
 struct Body {
     strain: f64,
     rate: f64,
-    acceleration: f64,
     rests: bool,
     extends: bool,
     branches: [f64; 2],
@@ -54,10 +50,12 @@ pub fn simulate(moves: Moves, dt_s: f64, seconds: f64, seed: u64) -> Vec<(f64, f
     let fine = 10_usize.max((dt_s / 0.004).ceil() as usize);
     let h = dt_s / fine as f64;
     let mut draws = Draws::new(seed);
+    let (strain, rate) = (STRAIN_MEAN + STRAIN_SD * draws.normal(), RATE_SD * draws.normal());
+    // An acceleration was drawn here once; without it every recording would be another one.
+    draws.normal();
     let mut body = Body {
-        strain: STRAIN_MEAN + STRAIN_SD * draws.normal(),
-        rate: RATE_SD * draws.normal(),
-        acceleration: ACCELERATION_SD * draws.normal(),
+        strain,
+        rate,
         rests: false,
         extends: true,
         branches: [NOISE.branch_sd * draws.normal(), NOISE.branch_sd * draws.normal()],
@@ -78,7 +76,6 @@ impl Body {
         let old = self.rate;
         match moves {
             Moves::Ou => self.ornstein_uhlenbeck(0.0, RATE_SD, h, draws),
-            Moves::Smooth => self.smooth(h, draws),
             Moves::OuAndHolds => {
                 if self.rests && draws.uniform() < h / HOLD_S {
                     (self.rests, self.rate) = (false, RATE_SD * draws.normal());
@@ -131,17 +128,6 @@ impl Body {
         self.rate +=
             sd * (2.0 * h / RATE_TIME_S).sqrt() * draws.normal() - h * ((self.rate - toward) / RATE_TIME_S + pull);
     }
-
-    fn smooth(&mut self, h: f64, draws: &mut Draws) {
-        let (omega, pull) = (ACCELERATION_SD / RATE_SD, (RATE_SD / STRAIN_SD).powi(2));
-        let density = 4.0 * RATE_SD * RATE_SD * omega * (omega * omega - pull);
-        let back = 2.0 * omega * self.acceleration
-            + omega * omega * self.rate
-            + 2.0 * omega * pull * (self.strain - STRAIN_MEAN);
-        let kick = (density * h).sqrt() * draws.normal() - h * back;
-        self.rate += h * (self.acceleration + 0.5 * kick);
-        self.acceleration += kick;
-    }
 }
 
 fn law() -> SensorLaw<f64, 2> {
@@ -161,26 +147,15 @@ fn law() -> SensorLaw<f64, 2> {
     }
 }
 
-/// The model of a body that does not move smoothly.
+/// The model of the body.
 ///
 /// # Panics
 /// Never: its parameters are fixed.
 #[must_use]
-pub fn two_states(moves: Moves) -> SwitchedModel<f64, 2, 2, 5> {
+pub fn sensor(moves: Moves) -> SwitchedModel<f64, 2, 5> {
     let (sd, phase_rate) = if moves == Moves::Phases { (PHASE_RATE_SD, PHASE_RATE) } else { (RATE_SD, 0.0) };
     Motion::ornstein_uhlenbeck(RATE_TIME_S, sd, STRAIN_MEAN, STRAIN_SD)
         .and_then(|motion| motion.with_phase_rate(phase_rate))
-        .and_then(|motion| SwitchedModel::new(law(), motion, NOISE))
-        .unwrap_or_else(|_| unreachable!("fixed parameters"))
-}
-
-/// The model of a body that moves smoothly.
-///
-/// # Panics
-/// Never: its parameters are fixed.
-#[must_use]
-pub fn three_states() -> SwitchedModel<f64, 3, 2, 6> {
-    Motion::smooth(RATE_SD, ACCELERATION_SD, STRAIN_MEAN, STRAIN_SD)
         .and_then(|motion| SwitchedModel::new(law(), motion, NOISE))
         .unwrap_or_else(|_| unreachable!("fixed parameters"))
 }

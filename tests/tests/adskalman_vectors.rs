@@ -10,7 +10,7 @@ use rand_chacha::ChaCha12Rng;
 use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 
-type Sensor = SwitchedModel<f64, 2, 2, 5>;
+type Sensor = SwitchedModel<f64, 2, 5>;
 
 /// The sensor with a linear reading instead of its own.
 #[derive(Clone, Copy)]

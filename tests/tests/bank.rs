@@ -57,7 +57,7 @@ fn deviations<T: Lane, const N: usize, const L: usize>(belief: &Belief<T, N, L>)
 
 /// Largest difference from the sparse filter over 3000 steps of as many sensors, each step from the same beliefs.
 fn difference<T: Lane, const B: usize, const N: usize, const L: usize>(bits: usize, sensors: usize) -> f64 {
-    let model: SwitchedModel<T, 2, B, N> = sensor();
+    let model: SwitchedModel<T, B, N> = sensor();
     let ekf = SparseEkf::<T, Compact, B, N>::new(model, T::of(DT_S)).unwrap();
     let mut bank = Bank::<T, B, N, L>::new(model, T::of(DT_S), sensors).unwrap().with_vectors_up_to(bits);
     let mut beliefs = vec![Belief::<T, N, L>::initial(&model); sensors];
@@ -123,7 +123,7 @@ fn is_the_sparse_filter_to_rounding_in_vectors_of_any_width() {
 /// 32 s, is 3200 steps, of which each may add what one step does.
 #[test]
 fn stays_with_the_sparse_filter_for_thousands_of_steps() {
-    let model: SwitchedModel<f64, 2, 2, 5> = sensor();
+    let model: SwitchedModel<f64, 2, 5> = sensor();
     let ekf = SparseEkf::<f64, Compact, 2, 5>::new(model, DT_S).unwrap();
     let mut bank = Bank::<f64, 2, 5, 15>::new(model, DT_S, 9).unwrap();
     let mut beliefs = vec![Belief::<f64, 5, 15>::initial(&model); 9];
@@ -148,7 +148,7 @@ fn stays_with_the_sparse_filter_for_thousands_of_steps() {
 /// Sensor by sensor, the gauge with an exponential gives the same numbers too.
 #[test]
 fn knows_the_gauges_with_an_exponential() {
-    let polynomial: SwitchedModel<f64, 2, 1, 4> = sensor();
+    let polynomial: SwitchedModel<f64, 1, 4> = sensor();
     for gauge in [
         Gauge::DecayingExponential { slope: 1.6, decay_strain: 0.3 },
         Gauge::Tunnelling { gap: 0.5, barrier: 1.0, path_loss: -2.0 },
@@ -176,7 +176,7 @@ fn knows_the_gauges_with_an_exponential() {
 /// they are without it.
 #[test]
 fn a_refused_sensor_keeps_its_belief_and_disturbs_nobody() {
-    let model: SwitchedModel<f64, 2, 1, 4> = sensor();
+    let model: SwitchedModel<f64, 1, 4> = sensor();
     let ekf = SparseEkf::<f64, Compact, 1, 4>::new(model, DT_S).unwrap();
     let cases = [
         (f64::INFINITY, 0.0, StepError::NonFiniteReading),
@@ -211,7 +211,7 @@ fn a_refused_sensor_keeps_its_belief_and_disturbs_nobody() {
 /// A belief that is no number is refused with a reading and without, and stays what it is until it is set again.
 #[test]
 fn a_lost_belief_stays_lost_alone() {
-    let model: SwitchedModel<f32, 2, 1, 3> = sensor();
+    let model: SwitchedModel<f32, 1, 3> = sensor();
     let start = Belief::<f32, 3, 6>::initial(&model);
     let mut lost = start;
     lost.mean[2] = f32::NAN;
@@ -232,7 +232,7 @@ fn a_lost_belief_stays_lost_alone() {
 
 #[test]
 fn refuses_what_does_not_fit() {
-    let model: SwitchedModel<f64, 2, 1, 3> = sensor();
+    let model: SwitchedModel<f64, 1, 3> = sensor();
     assert!(Bank::<f64, 1, 3, 6>::new(model, 0.0, 3).is_err());
     let mut bank = Bank::<f64, 1, 3, 6>::new(model, DT_S, 3).unwrap();
     let before = bank.belief(0);

@@ -19,7 +19,7 @@ const STRAIN_MEAN: f64 = 0.15;
 const STRAIN_SD: f64 = 0.1;
 const FAR: StrainRange<f64> = StrainRange { lower: -2.0, upper: 2.0 };
 
-fn model() -> SwitchedModel<f64, 2, 1, 4> {
+fn model() -> SwitchedModel<f64, 1, 4> {
     let branch = Branch {
         tau_s: TAU_S,
         extend_gain: EXTEND_GAIN,

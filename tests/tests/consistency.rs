@@ -16,7 +16,7 @@ const DT_S: f64 = 0.2;
 /// A sensor that is known to stretch, as the filter is told it is.
 #[derive(Clone, Copy)]
 struct Told {
-    sensor: KnownPhase<SwitchedModel<f64, 2, 1, 3>>,
+    sensor: KnownPhase<SwitchedModel<f64, 1, 3>>,
     /// What the filter's Q is multiplied with.
     process: f64,
     /// What its R is multiplied with.
@@ -24,7 +24,7 @@ struct Told {
 }
 
 impl Dynamics<f64, 3, 6> for Told {
-    type Prepared = <SwitchedModel<f64, 2, 1, 3> as Dynamics<f64, 3, 6>>::Prepared;
+    type Prepared = <SwitchedModel<f64, 1, 3> as Dynamics<f64, 3, 6>>::Prepared;
 
     fn prepare(&self, dt_s: f64) -> Self::Prepared {
         Dynamics::<f64, 3, 6>::prepare(&self.sensor, dt_s)

@@ -17,7 +17,7 @@ use ohmstrain_model::{
 };
 use ohmstrain_tests::{Draws, KnownPhase, square_root};
 
-type Sensor = SwitchedModel<f64, 2, 1, 3>;
+type Sensor = SwitchedModel<f64, 1, 3>;
 type State = SVector<f64, 3>;
 type Matrix = SMatrix<f64, 3, 3>;
 

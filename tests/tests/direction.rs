@@ -7,9 +7,7 @@ use ohmstrain_model::{
     unexplained,
 };
 use ohmstrain_tests::Draws;
-use ohmstrain_tests::own_law::{
-    EVIDENCE, Honesty, Moves, after_rows, dwell, honesty, simulate, three_states, two_states,
-};
+use ohmstrain_tests::own_law::{EVIDENCE, Honesty, Moves, after_rows, dwell, honesty, sensor, simulate};
 use statrs::distribution::{Continuous, ContinuousCDF, Normal};
 
 /// The fit is stated to be off by 3 % of its maximum; the exact moments of max(v, 0) are in any textbook.
@@ -53,7 +51,7 @@ fn a_rate_turns_around_as_far_as_stated() {
         sum += density * reach * (path - rate.signum() * net);
         count += 1.0;
     }
-    let change = RateChange { expected: 0.0, spread: 0.0, noise: 1.0, is_brownian: true };
+    let change = RateChange { expected: 0.0, spread: 0.0, noise: 1.0 };
     let Turning { excess, .. } = Turning::new(SCALE, SCALE * SCALE, &change, f64::sqrt);
     let simulated: f64 = sum / count;
     assert!((excess / simulated - 1.0).abs() < 0.07, "{excess} vs {simulated}");
@@ -89,7 +87,7 @@ fn between_known_rates_the_way_varies_as_stated() {
         sum += 0.5 * density * (beyond() - beyond()).powi(2);
     }
     let simulated = reach * sum / PAIRS as f64;
-    let change = RateChange { expected: 0.0, spread: 0.0, noise: 1.0, is_brownian: true };
+    let change = RateChange { expected: 0.0, spread: 0.0, noise: 1.0 };
     let Turning { variance, .. } = Turning::new(SCALE, SCALE * SCALE, &change, f64::sqrt);
     assert!((variance / simulated - 1.0).abs() < 0.1, "{variance} vs {simulated}");
 }
@@ -100,7 +98,7 @@ fn between_known_rates_the_way_varies_as_stated() {
 #[test]
 fn a_pause_widens_the_belief_as_the_law_does_however_it_is_written_down() {
     const MOTIONS: u64 = 1200;
-    let model = two_states(Moves::Ou);
+    let model = sensor(Moves::Ou);
     let start: Belief<f64, 5, 15> = Belief::initial(&model);
     let relaxation = |belief: &Belief<f64, 5, 15>| {
         let p = &belief.covariance;
@@ -141,40 +139,18 @@ fn a_pause_widens_the_belief_as_the_law_does_however_it_is_written_down() {
     }
 }
 
-/// The same of a smooth motion, whose memory is another one: the deviation within 20 % again, of 600 motions with six standard
-/// errors of that.
-#[test]
-fn a_pause_of_a_smooth_motion_widens_the_belief_as_the_law_does() {
-    const MOTIONS: u64 = 600;
-    const SECONDS: f64 = 10.0;
-    let model = three_states();
-    let start: Belief<f64, 6, 21> = Belief::initial(&model);
-    let ends = (0..MOTIONS).filter_map(|seed| simulate(Moves::Smooth, SECONDS, SECONDS, seed).pop());
-    let sums: Vec<f64> = ends.map(|(rho, strain)| rho - 1.9 * strain).collect();
-    let mean = sums.iter().sum::<f64>() / MOTIONS as f64;
-    let variance = sums.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / MOTIONS as f64;
-    let sd = (variance - 5e-3_f64.powi(2) - 2e-3_f64.powi(2)).sqrt();
-    for dt_s in [0.02, 0.2] {
-        let rows = (SECONDS / dt_s).round() as usize;
-        let belief = after_rows(Ekf::new(model), &start, dt_s, std::iter::repeat_n(None, rows));
-        let p = &belief.covariance;
-        let stated = (p[(3, 3)] + p[(4, 4)] + 2.0 * p[(3, 4)]).sqrt();
-        assert!((stated / sd - 1.0).abs() < 0.2, "by {dt_s}: ± {stated}, simulated ± {sd}");
-    }
-}
-
-/// A smooth motion known from readings: one step over a pause and many empty rows say the same.
+/// A motion known from readings: one step over a pause and many empty rows say the same.
 #[test]
 fn one_step_is_many_empty_rows() {
-    let model = three_states();
-    let start: Belief<f64, 6, 21> = Belief::initial(&model);
-    let readings = simulate(Moves::Smooth, 0.05, 20.0, 3).into_iter().map(|(rho, _)| Some(rho));
+    let model = sensor(Moves::Ou);
+    let start: Belief<f64, 5, 15> = Belief::initial(&model);
+    let readings = simulate(Moves::Ou, 0.05, 20.0, 3).into_iter().map(|(rho, _)| Some(rho));
     let belief = after_rows(Ekf::new(model), &start, 0.05, readings);
     for pause_s in [1.0, 5.0, 60.0] {
         let at_once = after_rows(Ekf::new(model), &belief, pause_s, [None]);
         let rows = (pause_s / 0.05_f64).round() as usize;
         let row_by_row = after_rows(Ekf::new(model), &belief, 0.05, std::iter::repeat_n(None, rows));
-        for i in 0..6 {
+        for i in 0..5 {
             let (one, many) = (at_once.covariance[(i, i)].sqrt(), row_by_row.covariance[(i, i)].sqrt());
             assert!((at_once.mean[i] - row_by_row.mean[i]).abs() < 0.1 * many, "{pause_s} s, state {i}");
             assert!((one / many - 1.0).abs() < 0.15, "{pause_s} s, state {i}: {one} vs {many}");
@@ -187,7 +163,7 @@ fn one_step_is_many_empty_rows() {
 #[test]
 fn one_step_is_many_empty_rows_for_hypotheses_too() {
     for moves in [Moves::Ou, Moves::OuAndHolds] {
-        let model = two_states(moves);
+        let model = sensor(moves);
         let hold = (moves == Moves::OuAndHolds).then(|| dwell(moves));
         let split = SignSplit::<_, _, 8>::new(model, hold, EVIDENCE);
         let start = Mixture::single(Belief::<f64, 5, 15>::initial(&model), Phase::Extend);
@@ -220,7 +196,7 @@ fn one_step_is_many_empty_rows_for_hypotheses_too() {
 /// smoother comes back to where the pause began with what was known there, but for what merging hypotheses blurs (5 %).
 #[test]
 fn a_pause_forgets_the_direction_and_a_smoother_comes_back_through_it() {
-    let model = two_states(Moves::Ou);
+    let model = sensor(Moves::Ou);
     let split = Substeps(SignSplit::<_, _, 8>::new(model, None, EVIDENCE));
     let start = Mixture::single(Belief::<f64, 5, 15>::initial(&model), Phase::Extend);
     let prepared = Estimator::<f64, 5, 15>::prepare(&split, 0.05);
@@ -263,7 +239,7 @@ fn the_unscented_reading_counts_the_spread_of_the_rate_once() {
     };
     let motion = Motion::ornstein_uhlenbeck(1.0, 1.0, 0.0, 1.0).unwrap();
     let noise = ModelNoise { reading_sd: 1e-3, branch_sd: 0.0, baseline_sd: 0.0, baseline_time_s: 1.0 };
-    let model = SwitchedModel::<f64, 2, 0, 2>::new(law, motion, noise).unwrap();
+    let model = SwitchedModel::<f64, 0, 2>::new(law, motion, noise).unwrap();
     let belief: Belief<f64, 2, 3> = Belief::initial(&model);
     let observed: Observation<f64, 2> = Channel::<f64, 2, 3>::observe(&Unscented::new(model), &belief, None);
     assert!((observed.value - 0.797_885).abs() < 0.021 * 0.797_885, "{}", observed.value);
@@ -284,7 +260,7 @@ fn intervals_hold_on_the_own_law_at_any_rate_and_errors_are_smaller_than_they_we
         );
     };
     let (one, several) = ((85.0, 99.5), (90.0, 99.0));
-    let model = two_states(Moves::Ou);
+    let model = sensor(Moves::Ou);
     let start: Belief<f64, 5, 15> = Belief::initial(&model);
     for (dt_s, ekf_before, split_before) in
         [(0.02, 0.0053, 0.0046), (0.05, 0.0097, 0.0070), (0.2, 0.0217, 0.0233), (0.5, 0.0316, 0.0442)]
@@ -300,11 +276,11 @@ fn intervals_hold_on_the_own_law_at_any_rate_and_errors_are_smaller_than_they_we
     }
     for dt_s in [0.05, 0.5] {
         let moves = Moves::OuAndHolds;
-        let split = SignSplit::<_, _, 8>::new(two_states(moves), Some(dwell(moves)), EVIDENCE);
+        let split = SignSplit::<_, _, 8>::new(sensor(moves), Some(dwell(moves)), EVIDENCE);
         let mixture = Mixture::single(start, Phase::Extend);
         check("sign-split with holds", dt_s, several, 0.0245, honesty(split, &mixture, (moves, dt_s, false), 0..16));
         let moves = Moves::Phases;
-        let model = two_states(moves);
+        let model = sensor(moves);
         let histories = Hypotheses::<_, _, 16>::new(model, dwell(moves), EVIDENCE);
         let start = Mixture::single(Belief::<f64, 5, 15>::initial(&model), Phase::Extend);
         check("phase histories", dt_s, several, 0.0374, honesty(histories, &start, (moves, dt_s, false), 0..16));

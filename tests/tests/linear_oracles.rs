@@ -196,10 +196,7 @@ fn random_models_equal_both_oracles_at_every_row() {
 
 /// A linear sensor whose branches wander by `branch_sd` around their law, and whose baseline, if it has one, never
 /// leaves zero.
-fn linear_sensor<const M: usize, const B: usize, const N: usize>(
-    motion: Motion<f64, M>,
-    branch_sd: f64,
-) -> SwitchedModel<f64, M, B, N> {
+fn linear_sensor<const B: usize, const N: usize>(motion: Motion<f64>, branch_sd: f64) -> SwitchedModel<f64, B, N> {
     let branch = |i: usize| Branch {
         tau_s: 4.0 * 8_f64.powi(i as i32),
         extend_gain: 0.8,
@@ -218,11 +215,11 @@ fn linear_sensor<const M: usize, const B: usize, const N: usize>(
     SwitchedModel::new(law, motion, noise).unwrap()
 }
 
-/// Stretches, rests, releases and rests again; in a rest rate and acceleration are exactly zero.
-fn check_sensor<const M: usize, const B: usize, const N: usize, const L: usize>(
+/// Stretches, rests, releases and rests again; in a rest the rate is exactly zero.
+fn check_sensor<const B: usize, const N: usize, const L: usize>(
     what: &str,
     tolerance: f64,
-    model: SwitchedModel<f64, M, B, N>,
+    model: SwitchedModel<f64, B, N>,
 ) {
     let phases = [Phase::Extend, Phase::Hold, Phase::Retract, Phase::Hold];
     let mut draws = Draws::new(7);
@@ -234,22 +231,16 @@ fn check_sensor<const M: usize, const B: usize, const N: usize, const L: usize>(
     }
 }
 
-fn rough() -> Motion<f64, 2> {
+fn rough() -> Motion<f64> {
     Motion::ornstein_uhlenbeck(1.5, 0.05, 0.15, 0.1).unwrap()
-}
-
-fn smooth() -> Motion<f64, 3> {
-    Motion::smooth(0.05, 0.1, 0.15, 0.1).unwrap()
 }
 
 /// Rests and a baseline that is exactly zero make priors singular.
 #[test]
 fn the_sensor_equals_both_oracles_at_every_row() {
-    check_sensor::<2, 0, 2, 3>("no branch", ROUNDING, linear_sensor(rough(), 0.0));
-    check_sensor::<2, 1, 4, 10>("one branch", ROUNDING, linear_sensor(rough(), 0.01));
-    check_sensor::<2, 2, 5, 15>("two branches", ROUNDING, linear_sensor(rough(), 0.01));
-    check_sensor::<3, 1, 4, 10>("smooth motion", ROUNDING, linear_sensor(smooth(), 0.01));
-    check_sensor::<3, 2, 6, 21>("smooth motion, two branches", ROUNDING, linear_sensor(smooth(), 0.01));
+    check_sensor::<0, 2, 3>("no branch", ROUNDING, linear_sensor(rough(), 0.0));
+    check_sensor::<1, 4, 10>("one branch", ROUNDING, linear_sensor(rough(), 0.01));
+    check_sensor::<2, 5, 15>("two branches", ROUNDING, linear_sensor(rough(), 0.01));
 }
 
 /// All states driven by one noise: after a short step from a known state they are nearly one number, and the smoother's
@@ -258,10 +249,8 @@ fn the_sensor_equals_both_oracles_at_every_row() {
 #[test]
 fn branches_without_noise_of_their_own_stay_within_the_promise() {
     let promise = |n: f64| n * n * f64::EPSILON.cbrt();
-    check_sensor::<2, 1, 4, 10>("one branch", promise(4.0), linear_sensor(rough(), 0.0));
-    check_sensor::<2, 2, 5, 15>("two branches", promise(5.0), linear_sensor(rough(), 0.0));
-    check_sensor::<3, 1, 4, 10>("smooth motion", promise(4.0), linear_sensor(smooth(), 0.0));
-    check_sensor::<3, 2, 6, 21>("smooth motion, two branches", promise(6.0), linear_sensor(smooth(), 0.0));
+    check_sensor::<1, 4, 10>("one branch", promise(4.0), linear_sensor(rough(), 0.0));
+    check_sensor::<2, 5, 15>("two branches", promise(5.0), linear_sensor(rough(), 0.0));
 }
 
 /// A state that is known exactly and never changes, but drives another one.

@@ -39,7 +39,7 @@ fn ten_million_steps_keep_the_covariance_positive_semi_definite() {
     assert!(belief.is_finite());
 }
 
-type Model<T> = SwitchedModel<T, 2, 1, 4>;
+type Model<T> = SwitchedModel<T, 1, 4>;
 type State<T> = Belief<T, 4, 10>;
 
 const DAY_US: u64 = 86_400_000_000;

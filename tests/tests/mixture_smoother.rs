@@ -13,7 +13,7 @@ use ohmstrain_tests::Linear;
 
 const N: usize = 4;
 const L: usize = 10;
-type Model = SwitchedModel<f64, 2, 1, N>;
+type Model = SwitchedModel<f64, 1, N>;
 const STEPS: usize = 4;
 /// Every history of four steps from one start.
 const HISTORIES: usize = 81;

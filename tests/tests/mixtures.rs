@@ -147,14 +147,14 @@ fn a_thousand_steps_at_rest_on_a_limit_change_nothing() {
 /// Stretching and releasing both raise R here. The sign-split filter, told nothing about direction, must know it.
 #[test]
 fn sign_split_tells_stretching_from_releasing() {
-    let motion = Motion::smooth(0.1, 0.15, 0.15, 0.12).unwrap();
+    let motion = Motion::ornstein_uhlenbeck(0.7, 0.1, 0.15, 0.12).unwrap();
     let law = *switching_sensor().law();
     let noise = *switching_sensor().noise();
-    let model = SwitchedModel::<f64, 3, 1, 4>::new(law, motion, noise).unwrap();
+    let model = SwitchedModel::<f64, 1, 3>::new(law, motion, noise).unwrap();
     let filter = SignSplit::new(model, None, within(-0.2, 0.5));
-    let prepared = Dynamics::<f64, 4, 10>::prepare(&model, 0.05);
-    let start: Belief<f64, 4, 10> = Belief::initial(&model);
-    let mut mixture = Mixture::<f64, 4, 10, 8>::single(start, Phase::Extend);
+    let prepared = Dynamics::<f64, 3, 6>::prepare(&model, 0.05);
+    let start: Belief<f64, 3, 6> = Belief::initial(&model);
+    let mut mixture = Mixture::<f64, 3, 6, 8>::single(start, Phase::Extend);
     let mut branch = 0.0;
     let (mut right, mut counted) = (0, 0);
     let mut before = 0.15;

@@ -15,7 +15,7 @@ fn normal(rng: &mut ChaCha12Rng) -> f64 {
     StandardNormal.sample(rng)
 }
 
-type Model = SwitchedModel<f64, 2, 2, 5>;
+type Model = SwitchedModel<f64, 2, 5>;
 type Cloud = ParticleCloud<f64, 5, 15>;
 
 /// What the oracle needs to know of the linear sensor.

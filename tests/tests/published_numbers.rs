@@ -21,7 +21,7 @@ fn numbers(value: &Value) -> Vec<f64> {
 
 /// The oracle's state is (strain, rate, q) with `q̇ = (ε - q)/τ`, `y = g ε + g₂ ε² + h q`. Ours is (strain, rate, c)
 /// with `c = -h (ε - q)`: gain k = -h, gauge slope g + h, branch noise h² times q's.
-fn viscoelastic(oracle: &Value, curvature: f64) -> (SwitchedModel<f64, 2, 1, 3>, SMatrix<f64, 3, 3>) {
+fn viscoelastic(oracle: &Value, curvature: f64) -> (SwitchedModel<f64, 1, 3>, SMatrix<f64, 3, 3>) {
     let p = |name: &str| oracle["params"][name].as_f64().unwrap();
     let (h, tau_s) = (p("h"), p("tau"));
     let law = SensorLaw {

@@ -25,12 +25,7 @@ fn sensor() -> SensorParams {
         score: 0.0,
         strain_sd_scale: 1.1,
         smoothed_sd_scale: None,
-        motion: MotionParams::OrnsteinUhlenbeck {
-            rate_time_s: 1.5,
-            rate_sd_per_s: 0.05,
-            strain_mean: 0.15,
-            strain_sd: 0.1,
-        },
+        motion: MotionParams { rate_time_s: 1.5, rate_sd_per_s: 0.05, strain_mean: 0.15, strain_sd: 0.1 },
         noise: NoiseParams {
             reading_sd: 2e-3,
             reading_time_s: 0.0,

@@ -17,7 +17,7 @@ fn reading(k: usize) -> f64 {
 /// Largest difference of a step from the generic one over 3000 steps, each from the same belief: of means in deviations, of
 /// covariances relative to their diagonals; and of the log-likelihood of all of them.
 fn differences<T: Scalar, const B: usize, const N: usize, const L: usize>() -> (f64, f64) {
-    let model: SwitchedModel<T, 2, B, N> = sensor();
+    let model: SwitchedModel<T, B, N> = sensor();
     let generic = Ekf::new(model);
     let prepared = model.prepare(T::of(DT_S));
     let sparse = SparseEkf::<T, Logistic, B, N>::new(model, T::of(DT_S)).unwrap();
@@ -98,7 +98,7 @@ fn the_compact_split_integrates_its_density() {
 /// Without Joseph's form: 100,000 steps in `f32`, exact readings, still a covariance.
 #[test]
 fn stays_a_covariance_in_single_precision() {
-    let model: SwitchedModel<f32, 2, 3, 6> = sensor();
+    let model: SwitchedModel<f32, 3, 6> = sensor();
     let ekf = SparseEkf::<f32, Compact, 3, 6>::new(model, DT_S as f32).unwrap();
     let mut belief = Belief::<f32, 6, 21>::initial(&model);
     let mut least = f64::INFINITY;
@@ -115,7 +115,7 @@ fn stays_a_covariance_in_single_precision() {
 
 #[test]
 fn an_error_leaves_the_belief() {
-    let model: SwitchedModel<f64, 2, 1, 3> = sensor();
+    let model: SwitchedModel<f64, 1, 3> = sensor();
     let ekf = SparseEkf::<f64, Compact, 1, 3>::new(model, DT_S).unwrap();
     let start = Belief::<f64, 3, 6>::initial(&model);
     let mut belief = start;
@@ -136,7 +136,7 @@ fn an_error_leaves_the_belief() {
 /// Whatever a belief has lost, no step passes it on, with a reading or without.
 #[test]
 fn a_lost_belief_goes_no_further() {
-    let model: SwitchedModel<f64, 2, 1, 4> = sensor();
+    let model: SwitchedModel<f64, 1, 4> = sensor();
     let ekf = SparseEkf::<f64, Compact, 1, 4>::new(model, DT_S).unwrap();
     let check = |belief: Belief<f64, 4, 10>, what: &str| {
         for reading in [None, Some(Reading::from(0.1))] {
@@ -159,7 +159,7 @@ fn a_lost_belief_goes_no_further() {
 /// Largest difference of smoothed beliefs from [`rts_smooth`] over the generic filter's steps: means in filtered deviations,
 /// covariances relative to the filtered diagonals.
 fn smoothed_differences<const B: usize, const N: usize, const L: usize>() -> f64 {
-    let model: SwitchedModel<f64, 2, B, N> = sensor();
+    let model: SwitchedModel<f64, B, N> = sensor();
     let readings: Vec<_> =
         (0..1500).map(|k| (k % 7 != 3).then(|| Reading { value: reading(k), extra_variance: 1e-7 })).collect();
     let start = Belief::<f64, N, L>::initial(&model);
@@ -213,7 +213,7 @@ fn smooths_as_rauch_tung_and_striebel_do() {
 
 #[test]
 fn series_are_the_steps_one_after_another() {
-    let model: SwitchedModel<f64, 2, 3, 6> = sensor();
+    let model: SwitchedModel<f64, 3, 6> = sensor();
     let ekf = SparseEkf::<f64, Compact, 3, 6>::new(model, DT_S).unwrap();
     let start = Belief::<f64, 6, 21>::initial(&model);
     let readings: Vec<_> = (0..300).map(|k| (k % 5 != 2).then(|| Reading::from(reading(k)))).collect();
@@ -237,7 +237,7 @@ fn series_are_the_steps_one_after_another() {
 /// A filter for another step length is the filter made for it; a cubic by itself is the cubic among other gauges.
 #[test]
 fn a_retimed_filter_is_a_new_one() {
-    let model: SwitchedModel<f64, 2, 3, 6> = sensor();
+    let model: SwitchedModel<f64, 3, 6> = sensor();
     let mut ekf = SparseEkf::<f64, Compact, 3, 6, Cubic<f64>>::new(model, DT_S).unwrap();
     let fresh = SparseEkf::<f64, Compact, 3, 6, Cubic<f64>>::new(model, 3.0 * DT_S).unwrap();
     let same = ekf;
@@ -268,7 +268,7 @@ fn a_retimed_filter_is_a_new_one() {
 /// negative variance among them. The kernel looks at few of its numbers; this looks at all.
 #[test]
 fn what_a_step_accepts_is_finite() {
-    let model: SwitchedModel<f32, 2, 3, 6> = sensor();
+    let model: SwitchedModel<f32, 3, 6> = sensor();
     let ekf = SparseEkf::<f32, Compact, 3, 6>::new(model, DT_S as f32).unwrap();
     let mut state = 1_u64;
     let mut uniform = || {
@@ -302,7 +302,7 @@ fn what_a_step_accepts_is_finite() {
 
 #[test]
 fn a_cubic_refuses_other_gauges() {
-    let model: SwitchedModel<f64, 2, 1, 3> = sensor();
+    let model: SwitchedModel<f64, 1, 3> = sensor();
     let gauge = Gauge::DecayingExponential { slope: 1.5, decay_strain: 0.4 };
     let law = SensorLaw { gauge, ..*model.law() };
     let other = SwitchedModel::new(law, *model.motion(), *model.noise()).unwrap();

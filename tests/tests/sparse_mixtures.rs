@@ -54,7 +54,7 @@ fn differences<T: Real, P: Pair<T, N, L, K>, const N: usize, const L: usize, con
 }
 
 /// The sensor of all tests; with `phase_rate`, moving phases have a mean rate.
-fn model<T: Real, const B: usize, const N: usize>(phase_rate: f64) -> SwitchedModel<T, 2, B, N> {
+fn model<T: Real, const B: usize, const N: usize>(phase_rate: f64) -> SwitchedModel<T, B, N> {
     let model = sensor::<T, B, N>();
     SwitchedModel::new(*model.law(), model.motion().with_phase_rate(T::of(phase_rate)).unwrap(), *model.noise())
         .unwrap()

@@ -23,7 +23,7 @@ fn returns<V: Serialize + DeserializeOwned + PartialEq + Debug>(value: V) {
 }
 
 /// A belief after some readings: numbers without a short decimal form.
-fn belief<T: Scalar>(ekf: &Ekf<SwitchedModel<T, 2, 3, 6>>) -> Belief<T, 6, 21> {
+fn belief<T: Scalar>(ekf: &Ekf<SwitchedModel<T, 3, 6>>) -> Belief<T, 6, 21> {
     (0..30).fold(Belief::initial(ekf.model()), |belief, k| {
         let reading = Reading { value: T::of(0.004 * f64::from(k)), extra_variance: T::of(1e-7) };
         ekf.step(&belief, T::of(0.013), Some(reading)).unwrap().posterior
@@ -108,7 +108,7 @@ fn what_is_no_value_is_refused() {
     let mut text = serde_json::to_value(model.law()).unwrap();
     text["branches"][0]["tau_s"] = (-1.0).into();
     let law: SensorLaw<f64, 1> = serde_json::from_value(text).unwrap();
-    let refused = SwitchedModel::<f64, 2, 1, 4>::new(law, *model.motion(), *model.noise()).unwrap_err();
+    let refused = SwitchedModel::<f64, 1, 4>::new(law, *model.motion(), *model.noise()).unwrap_err();
     assert_eq!(refused.parameter, "tau_s");
     assert!(serde_json::from_str::<SensorLaw<f64, 2>>(&serde_json::to_string(model.law()).unwrap()).is_err());
     returns(StrainRange { lower: -0.02, upper: 0.35 });

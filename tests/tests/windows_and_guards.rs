@@ -8,7 +8,7 @@ use ohmstrain_ekf::{
 use ohmstrain_model::{Phase, StrainRange, SwitchedModel};
 use ohmstrain_tests::sensor;
 
-type Model = SwitchedModel<f64, 2, 1, 4>;
+type Model = SwitchedModel<f64, 1, 4>;
 type Kalman = Belief<f64, 4, 10>;
 const DT_S: f64 = 0.1;
 

@@ -23,8 +23,8 @@ pub fn simulated_recording() -> Vec<f64> {
 
 /// Filters of two branches and a baseline, which is what `calibrate` fits most often.
 pub struct RecordingPass {
-    generic: Ekf<SwitchedModel<f64, 2, 2, 5>>,
-    prepared: SwitchedStep<f64, 2, 2>,
+    generic: Ekf<SwitchedModel<f64, 2, 5>>,
+    prepared: SwitchedStep<f64, 2>,
     sparse: SparseEkf<f64, Compact, 2, 5>,
     start: Belief<f64, 5, 15>,
 }

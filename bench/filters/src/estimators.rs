@@ -59,9 +59,9 @@ impl<E: Estimator<f64, N, L>, const N: usize, const L: usize> Filter for Gated<E
 /// The generic EKF from the model's long-run distribution; the reading is linearised `iterations` times.
 #[must_use]
 pub fn ekf<const B: usize, const N: usize, const L: usize>(
-    model: SwitchedModel<f64, 2, B, N>,
+    model: SwitchedModel<f64, B, N>,
     iterations: usize,
-) -> Gated<Ekf<SwitchedModel<f64, 2, B, N>>, N, L> {
+) -> Gated<Ekf<SwitchedModel<f64, B, N>>, N, L> {
     Gated::new(Ekf::new(model).iterated(iterations), Belief::initial(&model))
 }
 

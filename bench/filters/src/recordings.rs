@@ -8,14 +8,14 @@ use crate::DT_S;
 /// Filter and Rauch-Tung-Striebel smoother of three states.
 #[derive(Clone, Copy, Debug)]
 pub struct Smoother {
-    ekf: Ekf<SwitchedModel<f64, 2, 1, 3>>,
-    prepared: SwitchedStep<f64, 2, 1>,
+    ekf: Ekf<SwitchedModel<f64, 1, 3>>,
+    prepared: SwitchedStep<f64, 1>,
     start: Belief<f64, 3, 6>,
 }
 
 /// A smoother from the model's long-run distribution.
 #[must_use]
-pub fn smoother(model: SwitchedModel<f64, 2, 1, 3>) -> Smoother {
+pub fn smoother(model: SwitchedModel<f64, 1, 3>) -> Smoother {
     let prepared = Dynamics::<f64, 3, 6>::prepare(&model, DT_S);
     Smoother { ekf: Ekf::new(model), prepared, start: Belief::initial(&model) }
 }

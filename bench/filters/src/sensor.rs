@@ -35,7 +35,7 @@ pub(crate) fn law<const B: usize>() -> SensorLaw<f64, B> {
 /// # Panics
 /// Never: the parameters are valid.
 #[must_use]
-pub fn sensor<const B: usize, const N: usize>() -> SwitchedModel<f64, 2, B, N> {
+pub fn sensor<const B: usize, const N: usize>() -> SwitchedModel<f64, B, N> {
     model(law(), motion(0.15))
 }
 
@@ -44,7 +44,7 @@ pub fn sensor<const B: usize, const N: usize>() -> SwitchedModel<f64, 2, B, N> {
 /// # Panics
 /// Never: the parameters are valid.
 #[must_use]
-pub fn phased_sensor<const B: usize, const N: usize>() -> SwitchedModel<f64, 2, B, N> {
+pub fn phased_sensor<const B: usize, const N: usize>() -> SwitchedModel<f64, B, N> {
     model(law(), motion(0.15).with_phase_rate(0.1).unwrap())
 }
 
@@ -53,7 +53,7 @@ pub fn phased_sensor<const B: usize, const N: usize>() -> SwitchedModel<f64, 2, 
 /// # Panics
 /// Never: the parameters are valid.
 #[must_use]
-pub fn linear_sensor() -> SwitchedModel<f64, 2, 1, 3> {
+pub fn linear_sensor() -> SwitchedModel<f64, 1, 3> {
     let branch =
         Branch { tau_s: 4.0, extend_gain: 0.3, retract_gain: 0.3, extend_gain_slope: 0.0, retract_gain_slope: 0.0 };
     let law = SensorLaw {
@@ -66,14 +66,11 @@ pub fn linear_sensor() -> SwitchedModel<f64, 2, 1, 3> {
     model(law, motion(0.0))
 }
 
-fn motion(strain_mean: f64) -> Motion<f64, 2> {
+fn motion(strain_mean: f64) -> Motion<f64> {
     Motion::ornstein_uhlenbeck(0.5, 0.1, strain_mean, 0.1).expect("the parameters are valid")
 }
 
-fn model<const B: usize, const N: usize>(
-    law: SensorLaw<f64, B>,
-    motion: Motion<f64, 2>,
-) -> SwitchedModel<f64, 2, B, N> {
+fn model<const B: usize, const N: usize>(law: SensorLaw<f64, B>, motion: Motion<f64>) -> SwitchedModel<f64, B, N> {
     let baseline_sd = if N == B + 3 { 0.02 } else { 0.0 };
     let noise = ModelNoise { reading_sd: READING_SD, branch_sd: 5e-3, baseline_sd, baseline_time_s: 30.0 };
     SwitchedModel::new(law, motion, noise).expect("the parameters are valid")

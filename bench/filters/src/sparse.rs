@@ -18,7 +18,7 @@ impl<const B: usize, const N: usize, const L: usize> GatedSparse<B, N, L> {
     /// # Panics
     /// Never: the step's length is positive.
     #[must_use]
-    pub fn new(model: SwitchedModel<f64, 2, B, N>) -> Self {
+    pub fn new(model: SwitchedModel<f64, B, N>) -> Self {
         let ekf = SparseEkf::new(model, DT_S).expect("the step's length is positive");
         Self { ekf, belief: Belief::initial(&model), log_likelihood: LogLikelihood::new() }
     }

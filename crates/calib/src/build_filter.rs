@@ -1,13 +1,11 @@
 #[cfg(feature = "particles")]
 use ohmstrain_ekf::Particles;
-use ohmstrain_ekf::{
-    Belief, Dwell, Ekf, Evidence, Hypotheses, Imm, Mixture, SignSplit, SparseMixture, StrainSensor, Ukf, Unscented,
-};
-use ohmstrain_model::{Motion, Phase, SwitchedModel};
+use ohmstrain_ekf::{Belief, Dwell, Evidence, Imm, Mixture, SparseMixture, StrainSensor, Ukf, Unscented};
+use ohmstrain_model::{Phase, SwitchedModel};
 
 use crate::CalibrationError;
 use crate::corrected::Corrected;
-use crate::estimator_params::{AnyMotion, EstimatorKind, EstimatorParams};
+use crate::estimator_params::{EstimatorKind, EstimatorParams};
 use crate::filter::{Filter, Start};
 use crate::law_params::LawParams;
 use crate::params::{RangeParams, SensorParams};
@@ -54,103 +52,47 @@ pub(crate) fn filter_from_parts(
     estimator: &EstimatorParams,
     setting: Setting,
 ) -> Result<Box<dyn Filter>, CalibrationError> {
-    /// One instance per number of motion states and branches, N = M + B + 1 and L = N (N + 1) / 2.
+    /// One instance per number of branches, N = B + 3 and L = N (N + 1) / 2.
     macro_rules! build {
-        ($motion:expr, $m:literal, $([$b:literal, $n:literal, $l:literal]),+) => {
+        ($([$b:literal, $n:literal, $l:literal]),+) => {
             match law.branches.len() {
-                $($b => of_size::<$m, $b, $n, $l>(kind, $motion, law, estimator, setting),)+
+                $($b => of_size::<$b, $n, $l>(kind, law, estimator, setting),)+
                 branches => Err(CalibrationError::Unsupported(format!(
                     "a law with {branches} branches; at most 4 are supported"
                 ))),
             }
         };
     }
-    match estimator.motion.to_model()? {
-        AnyMotion::Two(mut motion) => {
-            if let Some(phases) = estimator.phases {
-                motion = motion.with_phase_rate(phases.speed_per_s)?;
-            }
-            if let Some(sparse) = sparse(kind, motion, law, estimator, setting)? {
-                return Ok(sparse);
-            }
-            build!(motion, 2, [0, 3, 6], [1, 4, 10], [2, 5, 15], [3, 6, 21], [4, 7, 28])
-        }
-        AnyMotion::Three(motion) => {
-            build!(motion, 3, [0, 4, 10], [1, 5, 15], [2, 6, 21], [3, 7, 28], [4, 8, 36])
-        }
-    }
-}
-
-/// EKF, sign-split or phase histories on Ornstein-Uhlenbeck motion; `None` for any other.
-fn sparse(
-    kind: EstimatorKind,
-    motion: Motion<f64, 2>,
-    law: &LawParams,
-    estimator: &EstimatorParams,
-    setting: Setting,
-) -> Result<Option<Box<dyn Filter>>, CalibrationError> {
-    let supported = matches!(kind, EstimatorKind::Ekf | EstimatorKind::SignSplit | EstimatorKind::Hypotheses);
-    if !supported {
-        return Ok(None);
-    }
-    Ok(Some(match law.branches.len() {
-        0 => sparse_of::<0, 3, 6>(kind, motion, law, estimator, setting)?,
-        1 => sparse_of::<1, 4, 10>(kind, motion, law, estimator, setting)?,
-        2 => sparse_of::<2, 5, 15>(kind, motion, law, estimator, setting)?,
-        3 => sparse_of::<3, 6, 21>(kind, motion, law, estimator, setting)?,
-        4 => sparse_of::<4, 7, 28>(kind, motion, law, estimator, setting)?,
-        _ => return Ok(None),
-    }))
-}
-
-fn sparse_of<const B: usize, const N: usize, const L: usize>(
-    kind: EstimatorKind,
-    motion: Motion<f64, 2>,
-    law: &LawParams,
-    estimator: &EstimatorParams,
-    setting: Setting,
-) -> Result<Box<dyn Filter>, CalibrationError> {
-    let model = switched::<2, B, N>(motion, law, estimator)?;
-    let belief: Belief<f64, N, L> = initial_belief(&model, setting);
-    let interval = interval(estimator, setting);
-    if kind == EstimatorKind::Ekf {
-        return Ok(Box::new(Running::new(SparseEstimator::new(model), belief, model, interval)));
-    }
-    let PhaseFilter { dwell, hold, evidence } = PhaseFilter::new(kind, estimator, setting.limits)?;
-    Ok(if kind == EstimatorKind::SignSplit {
-        let start = SparseMixture::single(belief, Phase::Extend);
-        let filter = SparsePhases::<_, HYPOTHESES>(Splits { model, hold, evidence });
-        Box::new(Running::new(filter, start, model, interval))
-    } else {
-        let start = SparseMixture::single(belief, Phase::Hold);
-        let filter = SparsePhases::<_, HISTORIES>(Histories { model, dwell, evidence });
-        Box::new(Running::new(filter, start, model, interval))
-    })
+    build!([0, 3, 6], [1, 4, 10], [2, 5, 15], [3, 6, 21], [4, 7, 28])
 }
 
 /// The model of a law.
-fn switched<const M: usize, const B: usize, const N: usize>(
-    motion: Motion<f64, M>,
+fn switched<const B: usize, const N: usize>(
     law: &LawParams,
     estimator: &EstimatorParams,
-) -> Result<SwitchedModel<f64, M, B, N>, CalibrationError> {
+) -> Result<SwitchedModel<f64, B, N>, CalibrationError> {
     let law = law.to_model().ok_or_else(|| CalibrationError::Unsupported("number of branches".into()))?;
+    let mut motion = estimator.motion.to_model()?;
+    if let Some(phases) = estimator.phases {
+        motion = motion.with_phase_rate(phases.speed_per_s)?;
+    }
     Ok(SwitchedModel::new(law, motion, estimator.noise.to_model())?)
 }
 
 /// Any filter of a model of known size.
-fn of_size<const M: usize, const B: usize, const N: usize, const L: usize>(
+fn of_size<const B: usize, const N: usize, const L: usize>(
     kind: EstimatorKind,
-    motion: Motion<f64, M>,
     law: &LawParams,
     estimator: &EstimatorParams,
     setting: Setting,
 ) -> Result<Box<dyn Filter>, CalibrationError> {
-    let model = switched::<M, B, N>(motion, law, estimator)?;
+    let model = switched::<B, N>(law, estimator)?;
     let belief: Belief<f64, N, L> = initial_belief(&model, setting);
     let interval = interval(estimator, setting);
     match kind {
-        EstimatorKind::Ekf => return Ok(Box::new(Running::new(Ekf::new(model), belief, model, interval))),
+        EstimatorKind::Ekf => {
+            return Ok(Box::new(Running::new(SparseEstimator::new(model), belief, model, interval)));
+        }
         EstimatorKind::Ukf => {
             return Ok(Box::new(Running::new(Ukf::new(Unscented::new(model)), belief, model, interval)));
         }
@@ -164,8 +106,8 @@ fn of_size<const M: usize, const B: usize, const N: usize, const L: usize>(
             Box::new(Running::new(Imm::new(model, dwell, evidence), start, model, interval))
         }
         EstimatorKind::SignSplit => {
-            let start = Mixture::single(belief, Phase::Extend);
-            let filter = SignSplit::<_, _, HYPOTHESES>::new(model, hold, evidence);
+            let start = SparseMixture::single(belief, Phase::Extend);
+            let filter = SparsePhases::<_, HYPOTHESES>(Splits { model, hold, evidence });
             Box::new(Running::new(filter, start, model, interval))
         }
         #[cfg(not(feature = "particles"))]
@@ -179,8 +121,8 @@ fn of_size<const M: usize, const B: usize, const N: usize, const L: usize>(
             Box::new(Running::new(filter, start, model, interval))
         }
         _ => {
-            let start = Mixture::single(belief, Phase::Hold);
-            let filter = Hypotheses::<_, _, HISTORIES>::new(model, dwell, evidence);
+            let start = SparseMixture::single(belief, Phase::Hold);
+            let filter = SparsePhases::<_, HISTORIES>(Histories { model, dwell, evidence });
             Box::new(Running::new(filter, start, model, interval))
         }
     })
@@ -224,7 +166,7 @@ const PARTICLES: usize = 4000;
 /// Seed of the particles' paths: the same readings give the same estimates.
 pub const PARTICLE_SEED: u64 = 1;
 
-fn initial_belief<S: StrainSensor<f64, M, B, N>, const M: usize, const B: usize, const N: usize, const L: usize>(
+fn initial_belief<S: StrainSensor<f64, B, N>, const B: usize, const N: usize, const L: usize>(
     model: &S,
     setting: Setting,
 ) -> Belief<f64, N, L> {

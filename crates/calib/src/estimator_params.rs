@@ -1,5 +1,6 @@
 use ohmstrain_ekf::Dwell;
 use ohmstrain_model::{ModelNoise, Motion, ParameterError};
+use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
 
 use crate::sieve::news;
@@ -160,41 +161,53 @@ impl NoiseParams {
     }
 }
 
-/// How the body moves: standard deviations of strain and its derivatives.
+/// How the body moves: an Ornstein-Uhlenbeck velocity, by standard deviations of strain and rate.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "family", rename_all = "kebab-case", deny_unknown_fields)]
-pub enum MotionParams {
-    /// Velocity forgets itself exponentially.
-    OrnsteinUhlenbeck {
-        /// Correlation time of the rate, s.
-        rate_time_s: f64,
-        /// Standard deviation of the rate, per second.
-        rate_sd_per_s: f64,
-        /// Mean strain.
-        strain_mean: f64,
-        /// Standard deviation of the strain.
-        strain_sd: f64,
-    },
-    /// Acceleration is a state.
-    Smooth {
-        /// Standard deviation of the rate, per second.
-        rate_sd_per_s: f64,
-        /// Standard deviation of the acceleration, per second squared.
-        acceleration_sd_per_s2: f64,
-        /// Mean strain.
-        strain_mean: f64,
-        /// Standard deviation of the strain.
-        strain_sd: f64,
-    },
+#[serde(into = "MotionTable", try_from = "MotionTable")]
+pub struct MotionParams {
+    /// Correlation time of the rate, s.
+    pub rate_time_s: f64,
+    /// Standard deviation of the rate, per second.
+    pub rate_sd_per_s: f64,
+    /// Mean strain.
+    pub strain_mean: f64,
+    /// Standard deviation of the strain.
+    pub strain_sd: f64,
 }
 
-/// A motion prior with its number of states.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum AnyMotion {
-    /// Strain and rate.
-    Two(Motion<f64, 2>),
-    /// Strain, rate and acceleration.
-    Three(Motion<f64, 3>),
+/// A motion as it stands in a sensor's file.
+#[derive(Serialize, Deserialize)]
+#[serde(tag = "family", rename_all = "kebab-case", deny_unknown_fields)]
+enum MotionTable {
+    OrnsteinUhlenbeck {
+        rate_time_s: f64,
+        rate_sd_per_s: f64,
+        strain_mean: f64,
+        strain_sd: f64,
+    },
+    /// Files had it up to version 0.1.
+    #[serde(skip_serializing)]
+    Smooth(IgnoredAny),
+}
+
+impl From<MotionParams> for MotionTable {
+    fn from(motion: MotionParams) -> Self {
+        let MotionParams { rate_time_s, rate_sd_per_s, strain_mean, strain_sd } = motion;
+        Self::OrnsteinUhlenbeck { rate_time_s, rate_sd_per_s, strain_mean, strain_sd }
+    }
+}
+
+impl TryFrom<MotionTable> for MotionParams {
+    type Error = &'static str;
+
+    fn try_from(table: MotionTable) -> Result<Self, Self::Error> {
+        match table {
+            MotionTable::OrnsteinUhlenbeck { rate_time_s, rate_sd_per_s, strain_mean, strain_sd } => {
+                Ok(Self { rate_time_s, rate_sd_per_s, strain_mean, strain_sd })
+            }
+            MotionTable::Smooth(_) => Err("the motion family `smooth` is not supported any more; calibrate again"),
+        }
+    }
 }
 
 impl MotionParams {
@@ -202,14 +215,7 @@ impl MotionParams {
     ///
     /// # Errors
     /// Names the parameter that no motion can have.
-    pub fn to_model(self) -> Result<AnyMotion, ParameterError> {
-        Ok(match self {
-            Self::OrnsteinUhlenbeck { rate_time_s, rate_sd_per_s, strain_mean, strain_sd } => {
-                AnyMotion::Two(Motion::ornstein_uhlenbeck(rate_time_s, rate_sd_per_s, strain_mean, strain_sd)?)
-            }
-            Self::Smooth { rate_sd_per_s, acceleration_sd_per_s2, strain_mean, strain_sd } => {
-                AnyMotion::Three(Motion::smooth(rate_sd_per_s, acceleration_sd_per_s2, strain_mean, strain_sd)?)
-            }
-        })
+    pub fn to_model(self) -> Result<Motion<f64>, ParameterError> {
+        Motion::ornstein_uhlenbeck(self.rate_time_s, self.rate_sd_per_s, self.strain_mean, self.strain_sd)
     }
 }

@@ -252,8 +252,7 @@ impl<'a> NoiseProblem<'a> {
         let p: Vec<f64> = point.iter().map(|x| x.clamp(-25.0, 15.0).exp()).collect();
         let strain_mean = self.of_make.map_or(self.stats.strain_mean, |prior| prior.strain_mean);
         let kind = self.kind.tuned_as();
-        let motion =
-            MotionParams::OrnsteinUhlenbeck { rate_sd_per_s: p[4], rate_time_s: p[5], strain_mean, strain_sd: p[6] };
+        let motion = MotionParams { rate_sd_per_s: p[4], rate_time_s: p[5], strain_mean, strain_sd: p[6] };
         let phases = kind.has_phases().then(|| PhaseParams {
             hold_time_s: p[7],
             move_time_s: p[8],

@@ -13,7 +13,7 @@ use crate::stepper::{Moment, Seen, Stepper};
 use crate::way_back::Segments;
 
 /// An estimator with its state.
-pub(crate) struct Running<E: Estimator<f64, N, L>, S, const M: usize, const B: usize, const N: usize, const L: usize> {
+pub(crate) struct Running<E: Estimator<f64, N, L>, S, const B: usize, const N: usize, const L: usize> {
     pub stepper: Stepper<E, N, L>,
     model: S,
     interval: Interval,
@@ -41,10 +41,10 @@ struct Pending<S, P> {
     onward: Option<PastStep<S, P, f64>>,
 }
 
-impl<E, S, const M: usize, const B: usize, const N: usize, const L: usize> Running<E, S, M, B, N, L>
+impl<E, S, const B: usize, const N: usize, const L: usize> Running<E, S, B, N, L>
 where
     E: Estimator<f64, N, L>,
-    S: StrainSensor<f64, M, B, N>,
+    S: StrainSensor<f64, B, N>,
 {
     pub(crate) fn new(estimator: E, state: E::State, model: S, interval: Interval) -> Self {
         let (pending, due) = (VecDeque::new(), Vec::new());
@@ -101,10 +101,10 @@ where
     }
 }
 
-impl<E, S, const M: usize, const B: usize, const N: usize, const L: usize> Filter for Running<E, S, M, B, N, L>
+impl<E, S, const B: usize, const N: usize, const L: usize> Filter for Running<E, S, B, N, L>
 where
     E: Estimator<f64, N, L, State: Send, Prepared: Send> + Send,
-    S: StrainSensor<f64, M, B, N> + Send,
+    S: StrainSensor<f64, B, N> + Send,
 {
     fn guard(&mut self, guard: Guard<f64>) {
         self.stepper.guard = guard;

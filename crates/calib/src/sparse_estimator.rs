@@ -10,23 +10,23 @@ use crate::build_filter::{HISTORIES, HYPOTHESES};
 /// [`Ekf`] to rounding; where it refuses a step, and on the way back, `Ekf` decides.
 #[derive(Clone, Copy)]
 pub(crate) struct SparseEstimator<const B: usize, const N: usize> {
-    model: SwitchedModel<f64, 2, B, N>,
+    model: SwitchedModel<f64, B, N>,
 }
 
 /// A step of one length for both.
 #[derive(Clone, Copy)]
 pub(crate) struct SparseStep<const B: usize, const N: usize> {
-    dense: SwitchedStep<f64, 2, B>,
+    dense: SwitchedStep<f64, B>,
     /// `None` for a step of no length.
     sparse: Option<SparseEkf<f64, Logistic, B, N>>,
 }
 
 impl<const B: usize, const N: usize> SparseEstimator<B, N> {
-    pub(crate) const fn new(model: SwitchedModel<f64, 2, B, N>) -> Self {
+    pub(crate) const fn new(model: SwitchedModel<f64, B, N>) -> Self {
         Self { model }
     }
 
-    const fn dense(&self) -> Ekf<SwitchedModel<f64, 2, B, N>> {
+    const fn dense(&self) -> Ekf<SwitchedModel<f64, B, N>> {
         Ekf::new(self.model)
     }
 }
@@ -108,14 +108,14 @@ pub(crate) trait Pair<const N: usize, const L: usize, const K: usize>: Copy {
 /// Phase histories of a sensor on Ornstein-Uhlenbeck motion.
 #[derive(Clone, Copy)]
 pub(crate) struct Histories<const B: usize, const N: usize> {
-    pub model: SwitchedModel<f64, 2, B, N>,
+    pub model: SwitchedModel<f64, B, N>,
     pub dwell: Dwell<f64>,
     pub evidence: Evidence<f64>,
 }
 
 impl<const B: usize, const N: usize, const L: usize> Pair<N, L, HISTORIES> for Histories<B, N> {
     type Sparse = SparseHypotheses<f64, B, N, HISTORIES>;
-    type Dense = Hypotheses<f64, SwitchedModel<f64, 2, B, N>, HISTORIES>;
+    type Dense = Hypotheses<f64, SwitchedModel<f64, B, N>, HISTORIES>;
 
     fn dense(&self) -> Self::Dense {
         Hypotheses::new(self.model, self.dwell, self.evidence)
@@ -149,14 +149,14 @@ impl<const B: usize, const N: usize, const L: usize> Pair<N, L, HISTORIES> for H
 /// The sign-split filter of the same.
 #[derive(Clone, Copy)]
 pub(crate) struct Splits<const B: usize, const N: usize> {
-    pub model: SwitchedModel<f64, 2, B, N>,
+    pub model: SwitchedModel<f64, B, N>,
     pub hold: Option<Dwell<f64>>,
     pub evidence: Evidence<f64>,
 }
 
 impl<const B: usize, const N: usize, const L: usize> Pair<N, L, HYPOTHESES> for Splits<B, N> {
     type Sparse = SparseSignSplit<f64, B, N, HYPOTHESES>;
-    type Dense = SignSplit<f64, SwitchedModel<f64, 2, B, N>, HYPOTHESES>;
+    type Dense = SignSplit<f64, SwitchedModel<f64, B, N>, HYPOTHESES>;
 
     fn dense(&self) -> Self::Dense {
         SignSplit::new(self.model, self.hold, self.evidence)

@@ -212,8 +212,7 @@ impl EstimatorParams {
 
 impl MotionParams {
     fn validate(&self, table: &Table, limits: RangeParams) -> Result<(), FieldError> {
-        let (Self::OrnsteinUhlenbeck { rate_sd_per_s, strain_mean, strain_sd, .. }
-        | Self::Smooth { rate_sd_per_s, strain_mean, strain_sd, .. }) = *self;
+        let Self { rate_time_s, rate_sd_per_s, strain_mean, strain_sd } = *self;
         table.number("rate_sd_per_s", rate_sd_per_s, RATE)?;
         let beyond = MEAN_BEYOND * limits.span();
         let (least, most) = (limits.lower - beyond, limits.upper + beyond);
@@ -222,18 +221,7 @@ impl MotionParams {
             return Err(table.wrong("strain_mean", expected, short(strain_mean)));
         }
         table.number("strain_sd", strain_sd, POSITIVE)?;
-        match *self {
-            Self::OrnsteinUhlenbeck { rate_time_s, .. } => table.number("rate_time_s", rate_time_s, POSITIVE),
-            Self::Smooth { acceleration_sd_per_s2, .. } => {
-                let least = rate_sd_per_s * rate_sd_per_s / strain_sd;
-                if acceleration_sd_per_s2 > least && acceleration_sd_per_s2 <= POSITIVE.most {
-                    return Ok(());
-                }
-                let expected =
-                    format!("more than rate_sd_per_s²/strain_sd, {}, up to {}", short(least), short(POSITIVE.most));
-                Err(table.wrong("acceleration_sd_per_s2", expected, short(acceleration_sd_per_s2)))
-            }
-        }
+        table.number("rate_time_s", rate_time_s, POSITIVE)
     }
 }
 

@@ -11,16 +11,8 @@ use crate::stepper::{Moment, Seen, Taken};
 pub(crate) const SEGMENT: usize = 4096;
 
 /// The way back through a recording: every segment is filtered once more, from the state kept before its first row.
-pub(crate) struct Segments<
-    'a,
-    E: Estimator<f64, N, L>,
-    S,
-    const M: usize,
-    const B: usize,
-    const N: usize,
-    const L: usize,
-> {
-    running: &'a mut Running<E, S, M, B, N, L>,
+pub(crate) struct Segments<'a, E: Estimator<f64, N, L>, S, const B: usize, const N: usize, const L: usize> {
+    running: &'a mut Running<E, S, B, N, L>,
     rows: Rows<'a>,
     /// Where the filter was before the first row of each segment that is not smoothed yet.
     starts: Vec<Moment<E::State>>,
@@ -30,13 +22,13 @@ pub(crate) struct Segments<
     steps: Vec<(Seen, Taken<E, N, L>)>,
 }
 
-impl<'a, E, S, const M: usize, const B: usize, const N: usize, const L: usize> Segments<'a, E, S, M, B, N, L>
+impl<'a, E, S, const B: usize, const N: usize, const L: usize> Segments<'a, E, S, B, N, L>
 where
     E: Estimator<f64, N, L>,
-    S: StrainSensor<f64, M, B, N>,
+    S: StrainSensor<f64, B, N>,
 {
     /// Filters the recording; the filter then stands at its end.
-    pub(crate) fn new(running: &'a mut Running<E, S, M, B, N, L>, rows: Rows<'a>) -> Result<Self, (usize, StepError)> {
+    pub(crate) fn new(running: &'a mut Running<E, S, B, N, L>, rows: Rows<'a>) -> Result<Self, (usize, StepError)> {
         let mut now = running.now.clone();
         let mut starts = Vec::with_capacity(rows.len() / SEGMENT + 1);
         for row in 0..rows.len() {
@@ -64,10 +56,10 @@ where
     }
 }
 
-impl<E, S, const M: usize, const B: usize, const N: usize, const L: usize> WayBack for Segments<'_, E, S, M, B, N, L>
+impl<E, S, const B: usize, const N: usize, const L: usize> WayBack for Segments<'_, E, S, B, N, L>
 where
     E: Estimator<f64, N, L>,
-    S: StrainSensor<f64, M, B, N>,
+    S: StrainSensor<f64, B, N>,
 {
     fn next_segment(&mut self, out: &mut Vec<Output>) -> Result<Option<Range<usize>>, (usize, StepError)> {
         out.clear();

@@ -15,7 +15,7 @@ const STEP_S: f64 = 0.05;
 const TRUE_NOISE: NoiseParams =
     NoiseParams { reading_sd: 4e-3, reading_time_s: 0.0, branch_sd: 0.0, baseline_sd: 0.1, baseline_time_s: 10.0 };
 const TRUE_MOTION: MotionParams =
-    MotionParams::OrnsteinUhlenbeck { rate_time_s: 0.5, rate_sd_per_s: 0.2, strain_mean: 0.15, strain_sd: 0.08 };
+    MotionParams { rate_time_s: 0.5, rate_sd_per_s: 0.2, strain_mean: 0.15, strain_sd: 0.08 };
 const FREE: [NoiseParameter; 4] =
     [NoiseParameter::ReadingSd, NoiseParameter::BaselineSd, NoiseParameter::RateSd, NoiseParameter::RateTime];
 
@@ -39,12 +39,9 @@ fn law(lean: f64) -> LawParams {
 
 /// Readings drawn from the model.
 fn simulate(seed: u64, rows: usize) -> (Vec<f64>, Vec<f64>) {
-    let MotionParams::OrnsteinUhlenbeck { rate_time_s, rate_sd_per_s, strain_mean, strain_sd } = TRUE_MOTION else {
-        unreachable!()
-    };
+    let MotionParams { rate_time_s, rate_sd_per_s, strain_mean, strain_sd } = TRUE_MOTION;
     let motion = Motion::ornstein_uhlenbeck(rate_time_s, rate_sd_per_s, strain_mean, strain_sd).unwrap();
-    let model =
-        SwitchedModel::<f64, 2, 1, 4>::new(law(0.0).to_model().unwrap(), motion, TRUE_NOISE.to_model()).unwrap();
+    let model = SwitchedModel::<f64, 1, 4>::new(law(0.0).to_model().unwrap(), motion, TRUE_NOISE.to_model()).unwrap();
     let mut rng = ChaCha12Rng::seed_from_u64(seed);
     let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
     let (mean, variance) = model.initial_distribution();
@@ -81,12 +78,7 @@ fn start() -> NoiseStart {
             baseline_sd: 0.03,
             baseline_time_s: 10.0,
         },
-        motion: MotionParams::OrnsteinUhlenbeck {
-            rate_time_s: 1.2,
-            rate_sd_per_s: 0.08,
-            strain_mean: 0.15,
-            strain_sd: 0.08,
-        },
+        motion: MotionParams { rate_time_s: 1.2, rate_sd_per_s: 0.08, strain_mean: 0.15, strain_sd: 0.08 },
     }
 }
 
@@ -154,7 +146,7 @@ fn what_the_readings_do_not_say_is_warned_of() {
 /// The sensor with a law whose directions differ, as a family in the white noise and the rate.
 struct Switched;
 
-fn switched<T: Scalar>(parameters: &[T]) -> Result<SwitchedModel<T, 2, 1, 4>, ParameterError> {
+fn switched<T: Scalar>(parameters: &[T]) -> Result<SwitchedModel<T, 1, 4>, ParameterError> {
     let law = law(1.0);
     let branch = law.branches[0];
     let law = ohmstrain_model::SensorLaw {
@@ -181,7 +173,7 @@ fn switched<T: Scalar>(parameters: &[T]) -> Result<SwitchedModel<T, 2, 1, 4>, Pa
 }
 
 impl ModelFamily<4, 10> for Switched {
-    type Model<T: Scalar> = SwitchedModel<T, 2, 1, 4>;
+    type Model<T: Scalar> = SwitchedModel<T, 1, 4>;
     fn model<T: Scalar>(&self, parameters: &[T]) -> Result<Self::Model<T>, ParameterError> {
         switched(parameters)
     }
@@ -194,7 +186,7 @@ impl ModelFamily<4, 10> for Switched {
 struct UnscentedSwitched;
 
 impl ModelFamily<4, 10> for UnscentedSwitched {
-    type Model<T: Scalar> = Unscented<SwitchedModel<T, 2, 1, 4>>;
+    type Model<T: Scalar> = Unscented<SwitchedModel<T, 1, 4>>;
     fn model<T: Scalar>(&self, parameters: &[T]) -> Result<Self::Model<T>, ParameterError> {
         switched(parameters).map(Unscented::new)
     }

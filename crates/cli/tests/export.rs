@@ -231,22 +231,12 @@ fn rust_is_a_module_of_constants_and_a_readme() {
 #[test]
 fn what_has_no_exported_form_is_refused_and_nothing_is_written() {
     let bench = Bench::calibrated();
-    let sensor = bench.read("sensor.toml");
-    let motion = sensor.find("[estimators.ekf.motion]").unwrap();
-    let rest = motion + sensor[motion + 1..].find("\n[").unwrap();
-    let smooth = "[estimators.ekf.motion]\nfamily = \"smooth\"\nrate_sd_per_s = 0.03\nacceleration_sd_per_s2 = 0.1\n\
-                  strain_mean = 0.15\nstrain_sd = 0.1\n";
-    bench.write("smooth.toml", format!("{}{smooth}{}", &sensor[..motion], &sensor[rest..]));
     let c = |sensor: &str, more: &[&str]| {
         bench.run(&[&["export", "--sensor", sensor, "--target", "c", "-o", "out"], more].concat())
     };
-    c("smooth.toml", &["--dt-s", DT_S]).fails(
-        4,
-        "smooth.toml: the motion of ekf has an acceleration, which the exported filter has not; calibrate again, which gives \
-         it Ornstein-Uhlenbeck motion",
-    );
     c("sensor.toml", &["--dt-s", DT_S, "--estimator", "particles"])
         .fails(2, "--estimator: expected corrected, sign-split, hypotheses or ekf, found particles");
+    let sensor = bench.read("sensor.toml");
     let longest = sensor.lines().find_map(|line| line.strip_prefix("duration_s = ")).unwrap();
     c("sensor.toml", &["--dt-s", "1e6"]).fails(
         2,

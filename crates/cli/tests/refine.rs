@@ -17,7 +17,7 @@ const STEP_S: f64 = 0.05;
 const TRUE_NOISE: NoiseParams =
     NoiseParams { reading_sd: 1e-2, reading_time_s: 0.0, branch_sd: 0.0, baseline_sd: 0.1, baseline_time_s: 10.0 };
 const TRUE_MOTION: MotionParams =
-    MotionParams::OrnsteinUhlenbeck { rate_time_s: 0.5, rate_sd_per_s: 0.2, strain_mean: 0.15, strain_sd: 0.08 };
+    MotionParams { rate_time_s: 0.5, rate_sd_per_s: 0.2, strain_mean: 0.15, strain_sd: 0.08 };
 
 /// A linear law that is the same in both directions: the filter is exact on it, and so is the likelihood.
 fn linear_law() -> LawParams {
@@ -42,12 +42,10 @@ fn branch(tau_s: f64, gains: [f64; 2], slopes: [f64; 2]) -> BranchParams {
 
 /// A recording drawn from the model itself, without a reference.
 fn drawn(rows: usize) -> String {
-    let MotionParams::OrnsteinUhlenbeck { rate_time_s, rate_sd_per_s, strain_mean, strain_sd } = TRUE_MOTION else {
-        unreachable!()
-    };
+    let MotionParams { rate_time_s, rate_sd_per_s, strain_mean, strain_sd } = TRUE_MOTION;
     let motion = Motion::ornstein_uhlenbeck(rate_time_s, rate_sd_per_s, strain_mean, strain_sd).unwrap();
     let model =
-        SwitchedModel::<f64, 2, 1, 4>::new(linear_law().to_model().unwrap(), motion, TRUE_NOISE.to_model()).unwrap();
+        SwitchedModel::<f64, 1, 4>::new(linear_law().to_model().unwrap(), motion, TRUE_NOISE.to_model()).unwrap();
     let mut rng = ChaCha12Rng::seed_from_u64(1);
     let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
     let (mut state, variance) = model.initial_distribution();
@@ -125,8 +123,7 @@ fn the_noise_that_was_drawn_is_found_from_a_start_three_times_off() {
         baseline_sd: 0.033,
         baseline_time_s: 30.0,
     };
-    let motion =
-        MotionParams::OrnsteinUhlenbeck { rate_time_s: 1.5, rate_sd_per_s: 0.067, strain_mean: 0.15, strain_sd: 0.08 };
+    let motion = MotionParams { rate_time_s: 1.5, rate_sd_per_s: 0.067, strain_mean: 0.15, strain_sd: 0.08 };
     write_sensor(&bench, linear_law(), noise, motion);
     let run = bench.run(&REFINE);
     let printed = done(&run);
@@ -197,8 +194,7 @@ fn the_white_noise_of_the_bench_comes_nearer_though_the_bench_does_not_move_as_t
         baseline_sd: 3e-3,
         baseline_time_s: 8.0,
     };
-    let motion =
-        MotionParams::OrnsteinUhlenbeck { rate_time_s: 1.0, rate_sd_per_s: 0.1, strain_mean: 0.15, strain_sd: 0.1 };
+    let motion = MotionParams { rate_time_s: 1.0, rate_sd_per_s: 0.1, strain_mean: 0.15, strain_sd: 0.1 };
     write_sensor(&bench, matched_law(), noise, motion);
     let run = bench.run(&REFINE);
     let printed = done(&run);

@@ -17,7 +17,7 @@ use ohmstrain_model::{
 
 const N: usize = 4;
 const L: usize = 10;
-type Sensor = SwitchedModel<f64, 2, 1, N>;
+type Sensor = SwitchedModel<f64, 1, N>;
 
 /// A second reading of the same state: strain itself, to 0.02.
 #[derive(Clone, Copy)]

@@ -42,7 +42,7 @@
 //! # };
 //! # let motion = Motion::ornstein_uhlenbeck(1.0, 0.1, 0.15, 0.1)?;
 //! # let noise = ModelNoise { reading_sd: 2e-3, branch_sd: 5e-3, baseline_sd: 0.02, baseline_time_s: 30.0 };
-//! let model = SwitchedModel::<f64, 2, 1, 4>::new(law, motion, noise)?;
+//! let model = SwitchedModel::<f64, 1, 4>::new(law, motion, noise)?;
 //! let ekf = Ekf::new(model);
 //! let mut belief: Belief<f64, 4, 10> = Belief::initial(ekf.model());
 //! for rho in [0.01, 0.03, 0.06] {

@@ -1,23 +1,23 @@
 use nalgebra::SVector;
-use ohmstrain_model::{ModelNoise, Scalar, SensorLaw, SwitchedModel};
+use ohmstrain_model::{MOTION_STATES, ModelNoise, Scalar, SensorLaw, SwitchedModel};
 
-/// A model of a strain sensor with state `[ε, v, (a), c₁ … c_B, (b)]`: what initial beliefs and
+/// A model of a strain sensor with state `[ε, v, c₁ … c_B, (b)]`: what initial beliefs and
 /// [`Estimate`](crate::Estimate)s take from it.
-pub trait StrainSensor<T: Scalar, const M: usize, const B: usize, const N: usize> {
+pub trait StrainSensor<T: Scalar, const B: usize, const N: usize> {
     /// The sensor's law.
     fn law(&self) -> &SensorLaw<T, B>;
 
     /// What the law does not explain.
     fn noise(&self) -> &ModelNoise<T>;
 
-    /// Whether component `M + B` of the state is a baseline.
+    /// Whether component `B + 2` of the state is a baseline.
     fn has_baseline(&self) -> bool;
 
     /// Mean and variances before any reading.
     fn initial_distribution(&self) -> (SVector<T, N>, [T; N]);
 }
 
-impl<T: Scalar, const M: usize, const B: usize, const N: usize> StrainSensor<T, M, B, N> for SwitchedModel<T, M, B, N> {
+impl<T: Scalar, const B: usize, const N: usize> StrainSensor<T, B, N> for SwitchedModel<T, B, N> {
     fn law(&self) -> &SensorLaw<T, B> {
         self.law()
     }
@@ -27,7 +27,7 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize> StrainSensor<T, 
     }
 
     fn has_baseline(&self) -> bool {
-        N > M + B
+        N > MOTION_STATES + B
     }
 
     fn initial_distribution(&self) -> (SVector<T, N>, [T; N]) {

@@ -27,7 +27,7 @@ pub struct SparseEkf<T, S, const B: usize, const N: usize, G = AnyCurve<T>> {
     pub(crate) step: StepConstants<T, B>,
     pub(crate) gains: Regions<T, [Gains<T>; B]>,
     pub(crate) reading: ReadingLaw<T, G>,
-    model: SwitchedModel<T, 2, B, N>,
+    model: SwitchedModel<T, B, N>,
     pub(crate) dt_s: T,
     switch: PhantomData<S>,
 }
@@ -37,7 +37,7 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
     ///
     /// # Errors
     /// If `dt_s` is not a positive number, or the model's gauge is of another family than `G`.
-    pub fn new(model: SwitchedModel<T, 2, B, N>, dt_s: T) -> Result<Self, StepError> {
+    pub fn new(model: SwitchedModel<T, B, N>, dt_s: T) -> Result<Self, StepError> {
         check_step_length(dt_s)?;
         Ok(Self {
             step: StepConstants::new(&model, dt_s, RateSpread::<T, S>::clear()),
@@ -50,7 +50,7 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
     }
 
     /// The model.
-    pub const fn model(&self) -> &SwitchedModel<T, 2, B, N> {
+    pub const fn model(&self) -> &SwitchedModel<T, B, N> {
         &self.model
     }
 

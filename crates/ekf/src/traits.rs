@@ -46,10 +46,8 @@ pub trait Channel<T: Scalar, const N: usize, const L: usize> {
     }
 }
 
-impl<T: Scalar, const M: usize, const B: usize, const N: usize, const L: usize> Dynamics<T, N, L>
-    for SwitchedModel<T, M, B, N>
-{
-    type Prepared = SwitchedStep<T, M, B>;
+impl<T: Scalar, const B: usize, const N: usize, const L: usize> Dynamics<T, N, L> for SwitchedModel<T, B, N> {
+    type Prepared = SwitchedStep<T, B>;
 
     fn prepare(&self, dt_s: T) -> Self::Prepared {
         self.prepare(dt_s)
@@ -82,9 +80,7 @@ fn at_reading<T: Scalar>(rate_variance: T) -> Direction<T> {
     Direction::Uncertain { rate_sd: rate_variance.max(T::zero()).sqrt(), persistence: T::one() }
 }
 
-impl<T: Scalar, const M: usize, const B: usize, const N: usize, const L: usize> Channel<T, N, L>
-    for SwitchedModel<T, M, B, N>
-{
+impl<T: Scalar, const B: usize, const N: usize, const L: usize> Channel<T, N, L> for SwitchedModel<T, B, N> {
     fn observe(&self, at: &Belief<T, N, L>, phase: Option<Phase>) -> Observation<T, N> {
         let direction = match phase {
             Some(phase) => Direction::Known(phase),

@@ -16,7 +16,7 @@ use crate::{Belief, Channel, Dynamics, Ekf, Gaussian, Phased};
 /// # };
 /// # let motion = Motion::ornstein_uhlenbeck(1.0, 0.1, 0.15, 0.1)?;
 /// # let noise = ModelNoise { reading_sd: 2e-3, branch_sd: 0.0, baseline_sd: 0.0, baseline_time_s: 1.0 };
-/// # let model = SwitchedModel::<f64, 2, 0, 2>::new(law, motion, noise)?;
+/// # let model = SwitchedModel::<f64, 0, 2>::new(law, motion, noise)?;
 /// let belief: Belief<f64, 2, 3> = Belief::initial(&model);
 /// let ukf = Ukf::new(Unscented::new(model));
 /// let step = ukf.step(&belief, 0.05, Some(Reading::from(0.1)))?;

@@ -7,7 +7,7 @@ use ohmstrain_model::{Branch, Gauge, ModelNoise, Motion, Phase, SensorLaw, Strai
 const RANGE: StrainRange<f64> = StrainRange { lower: 0.0, upper: 0.4 };
 const TAU_S: f64 = 20.0;
 
-fn model(gauge: [f64; 3], gains: [f64; 2]) -> SwitchedModel<f64, 2, 1, 4> {
+fn model(gauge: [f64; 3], gains: [f64; 2]) -> SwitchedModel<f64, 1, 4> {
     let [extend_gain, retract_gain] = gains;
     let branch = Branch { tau_s: TAU_S, extend_gain, retract_gain, extend_gain_slope: 0.0, retract_gain_slope: 0.0 };
     let law = SensorLaw {

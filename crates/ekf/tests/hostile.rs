@@ -10,7 +10,7 @@ use ohmstrain_model::{
 
 const DT_S: f64 = 0.02;
 
-fn model<T: Scalar>(gauge: [f64; 3]) -> SwitchedModel<T, 2, 1, 4> {
+fn model<T: Scalar>(gauge: [f64; 3]) -> SwitchedModel<T, 1, 4> {
     let of = T::of;
     let branch = Branch {
         tau_s: of(20.0),
@@ -38,7 +38,7 @@ fn evidence<T: Scalar>() -> Evidence<T> {
     Evidence { limits: StrainRange { lower: T::of(0.0), upper: T::of(0.33) }, tempering: T::one() }
 }
 
-fn split<T: ohmstrain_ekf::Real>() -> SignSplit<T, SwitchedModel<T, 2, 1, 4>, 8> {
+fn split<T: ohmstrain_ekf::Real>() -> SignSplit<T, SwitchedModel<T, 1, 4>, 8> {
     SignSplit::new(model(RISING), None, evidence())
 }
 
@@ -113,7 +113,7 @@ impl Draws {
 
 /// A model and the length of its steps, s; the same numbers in either precision. `quiet`: what is
 /// multiplied with its noise, and with all that makes a reading depend on more than the strain.
-fn random_model<T: Scalar>(draws: &mut Draws, quiet: f64) -> (SwitchedModel<T, 2, 2, 5>, T) {
+fn random_model<T: Scalar>(draws: &mut Draws, quiet: f64) -> (SwitchedModel<T, 2, 5>, T) {
     let of = |number: f64| T::of(f64::from(number as f32));
     let mut between = |low: f64, high: f64| of(draws.between(low, high));
     let mut branch = |low: f64, high: f64| Branch {

@@ -6,7 +6,7 @@ use ohmstrain_model::{Branch, Gauge, ModelNoise, Motion, Scalar, SensorLaw, Stra
 use proptest::prelude::*;
 
 /// A sensor whose strains are counted in units of `1/unit` and whose readings are relative to R₀.
-fn sensor<T: Scalar>(unit: f64) -> SwitchedModel<T, 2, 2, 5> {
+fn sensor<T: Scalar>(unit: f64) -> SwitchedModel<T, 2, 5> {
     let of = |x: f64| T::of(x);
     let branch = |tau_s: f64| Branch {
         tau_s: of(tau_s),
@@ -33,7 +33,7 @@ fn readings() -> impl Strategy<Value = Vec<(f64, Option<f64>)>> {
 }
 
 fn run<T: Scalar>(
-    model: SwitchedModel<T, 2, 2, 5>,
+    model: SwitchedModel<T, 2, 5>,
     rows: &[(f64, Option<f64>)],
 ) -> Result<(Belief<T, 5, 15>, T), StepError> {
     let ekf = Ekf::new(model);

@@ -1,15 +1,16 @@
 use nalgebra::SVector;
 
+use crate::motion::MOTION_STATES as M;
 use crate::{Direction, Phase, Scalar, SwitchedModel, SwitchedStep, Transition};
 
-impl<T: Scalar, const M: usize, const B: usize, const N: usize> SwitchedModel<T, M, B, N> {
+impl<T: Scalar, const B: usize, const N: usize> SwitchedModel<T, B, N> {
     /// What the motion does to the branches: gain at mid-strain times mean rate over the step.
     ///
     /// Noise of branch i is `γᵢ wᵢ + strain_pull · n_ε`, because its gain depends on where the motion goes, and what an
     /// uncertain direction leaves open, which is one number for all branches.
     pub(crate) fn drive_branches<const L: usize>(
         &self,
-        step: &SwitchedStep<T, M, B>,
+        step: &SwitchedStep<T, B>,
         state: &SVector<T, N>,
         direction: Direction<T>,
         out: &mut Transition<T, N, L>,

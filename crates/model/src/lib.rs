@@ -45,7 +45,7 @@ pub use front_end::{AdcCode, ConstantCurrent, Divider, FrontEnd, Ohms, SensorSid
 pub use gauge::Gauge;
 pub use joint::Joint;
 pub use law::{Branch, SensorLaw, StrainRange};
-pub use motion::Motion;
+pub use motion::{MOTION_STATES, Motion};
 pub use noise::ModelNoise;
 pub use phase::{Direction, Phase, SplitRate, Turning, UNEXPLAINED, UNEXPLAINED_SHAPE, unexplained};
 pub use relaxing_modulus::{Modulus, PhaseStart, RelaxingModulus, ResistanceGradient};

@@ -1,23 +1,25 @@
 use crate::Scalar;
 use crate::error::{ParameterError, Problem};
 
-/// Prior on how the body moves: strain and its first `M - 1` derivatives as a linear stochastic differential equation,
+/// States of a motion: strain and rate.
+pub const MOTION_STATES: usize = 2;
+
+/// Prior on how the body moves: strain and rate as a linear stochastic differential equation,
 ///
-/// `dᴹε/dtᴹ = -Σⱼ restoringⱼ · dʲ(ε - rest)/dtʲ + white noise`.
+/// `v̇ = -restoring₀ (ε - rest) - restoring₁ v + white noise`.
 ///
-/// `M = 2` is an Ornstein-Uhlenbeck velocity (state strain, rate), `M = 3` smooth motion with acceleration as a state.
-/// Both are given by statistics that a recording shows directly: standard deviations of strain, rate and
-/// acceleration. An infinite `strain_sd` means no pull toward a mean strain.
+/// It is given by statistics that a recording shows directly: standard deviations of strain and rate, and how long a rate
+/// lasts. An infinite `strain_sd` means no pull toward a mean strain.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Motion<T, const M: usize> {
-    restoring: [T; M],
+pub struct Motion<T> {
+    restoring: [T; MOTION_STATES],
     noise_density: T,
     rest_strain: T,
     phase_rate: T,
-    stationary_variance: [T; M],
+    stationary_variance: [T; MOTION_STATES],
 }
 
-impl<T: Scalar> Motion<T, 2> {
+impl<T: Scalar> Motion<T> {
     /// Ornstein-Uhlenbeck velocity: `v̇ = -v/T_v - (σ_v/σ_ε)² (ε - ε̄) + noise`.
     ///
     /// - `rate_time_s`: correlation time T_v of the rate, s.
@@ -76,41 +78,10 @@ impl<T: Scalar> Motion<T, 2> {
         self.phase_rate = phase_rate;
         Ok(self)
     }
-}
 
-impl<T: Scalar> Motion<T, 3> {
-    /// Smooth motion, critically damped with ω = σ_a/σ_v:
-    /// `ȧ = -2 ω a - ω² v - 2 ω (σ_v/σ_ε)² (ε - ε̄) + noise`.
-    ///
-    /// - `rate_sd` σ_v in 1/s, `acceleration_sd` σ_a in 1/s²;
-    /// - `strain_mean`, `strain_sd`: distribution of strain; `strain_sd` infinite for none.
-    ///
-    /// # Errors
-    /// Names the parameter that is not positive or not finite. A stationary process has `σ_v² < σ_ε σ_a`
-    /// (Cauchy-Schwarz); anything else is out of range.
-    pub fn smooth(rate_sd: T, acceleration_sd: T, strain_mean: T, strain_sd: T) -> Result<Self, ParameterError> {
-        positive("rate_sd", rate_sd)?;
-        positive("acceleration_sd", acceleration_sd)?;
-        let pull = pull_toward_mean(strain_mean, strain_sd, rate_sd)?;
-        let omega = acceleration_sd / rate_sd;
-        if pull >= omega * omega {
-            return Err(ParameterError::new("acceleration_sd", Problem::OutOfRange));
-        }
-        let (two, variance) = (T::of(2.0), rate_sd * rate_sd);
-        Ok(Self {
-            restoring: [two * omega * pull, omega * omega, two * omega],
-            noise_density: T::of(4.0) * variance * omega * (omega * omega - pull),
-            rest_strain: strain_mean,
-            phase_rate: T::zero(),
-            stationary_variance: [strain_sd * strain_sd, variance, acceleration_sd * acceleration_sd],
-        })
-    }
-}
-
-impl<T: Scalar, const M: usize> Motion<T, M> {
-    /// Coefficients of the restoring term, of ε first; 1/s^(M-j).
+    /// Coefficients of the restoring term, of ε first; 1/s² and 1/s.
     #[must_use]
-    pub const fn restoring(&self) -> &[T; M] {
+    pub const fn restoring(&self) -> &[T; MOTION_STATES] {
         &self.restoring
     }
 
@@ -132,25 +103,16 @@ impl<T: Scalar, const M: usize> Motion<T, M> {
         self.phase_rate
     }
 
-    /// Variances of strain, rate, … in the long run: the prior before anything is known. Infinite where there is none.
+    /// Variances of strain and rate in the long run: the prior before anything is known. Infinite where there is none.
     #[must_use]
-    pub const fn stationary_variance(&self) -> &[T; M] {
+    pub const fn stationary_variance(&self) -> &[T; MOTION_STATES] {
         &self.stationary_variance
     }
 
     /// An upper bound of the fastest rate in the motion, 1/s.
     pub(crate) fn fastest_rate(&self) -> T {
-        let mut fastest = T::zero();
-        for (j, coefficient) in self.restoring.iter().rev().enumerate() {
-            let root = match j {
-                0 => coefficient.abs(),
-                1 => coefficient.abs().sqrt(),
-                // Not `cbrt`: for f32 that is software in double precision on a microcontroller.
-                _ => coefficient.abs().powf(T::of(1.0 / 3.0)),
-            };
-            fastest = fastest.max(root);
-        }
-        fastest
+        let [to_strain, to_rate] = self.restoring;
+        to_rate.abs().max(to_strain.abs().sqrt())
     }
 }
 

@@ -1,14 +1,15 @@
 use nalgebra::SVector;
 
+use crate::motion::MOTION_STATES as M;
 use crate::{Direction, Phase, Scalar, StrainRange, SwitchedModel, SwitchedStep, Symmetric};
 
 /// The model along one path of the motion, for estimators that sample paths. Given the path, branches and baseline are
 /// linear and Gaussian, with a covariance that depends on neither strain nor phase: that of a hold.
-impl<T: Scalar, const M: usize, const B: usize, const N: usize> SwitchedModel<T, M, B, N> {
+impl<T: Scalar, const B: usize, const N: usize> SwitchedModel<T, B, N> {
     /// Covariance of what chance adds over a step to the motion, and through it to branches of unit gain, each in its
     /// place of the state. The branches' own noise is not part of it.
     #[must_use]
-    pub fn path_noise<const L: usize>(&self, step: &SwitchedStep<T, M, B>) -> Symmetric<T, N, L> {
+    pub fn path_noise<const L: usize>(&self, step: &SwitchedStep<T, B>) -> Symmetric<T, N, L> {
         let response = &step.response;
         let mut out = Symmetric::zeros();
         for i in 0..M {
@@ -32,7 +33,7 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize> SwitchedModel<T,
     /// - `state`: strain and its derivatives as they are, means of branches and baseline given the path so far.
     /// - `phase`: what the body is about; it decides what the rate reverts to and whether the body moves at all.
     /// - `chance`: a draw with covariance [`Self::path_noise`].
-    /// - `stops`: strains at which the body is stopped for good, without a rebound: rate and acceleration outward are
+    /// - `stops`: strains at which the body is stopped for good, without a rebound: the rate outward is
     ///   lost, and the branches are driven by that share of the step's path that the body has gone.
     ///
     /// Branches see the gain at the middle of the strains at both ends, and of the direction in which the strain went: the
@@ -40,7 +41,7 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize> SwitchedModel<T,
     #[must_use]
     pub fn along_path(
         &self,
-        step: &SwitchedStep<T, M, B>,
+        step: &SwitchedStep<T, B>,
         state: &SVector<T, N>,
         phase: Phase,
         chance: &SVector<T, N>,
@@ -55,9 +56,7 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize> SwitchedModel<T,
             out[N - 1] += step.baseline_change * state[N - 1];
         }
         if phase == Phase::Hold {
-            for i in 1..M {
-                out[i] = T::zero();
-            }
+            out[1] = T::zero();
             return (out, phase);
         }
         let push = self.push(Direction::Known(phase));
@@ -85,10 +84,8 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize> SwitchedModel<T,
             return T::one();
         }
         state[0] = stopped;
-        for i in 1..M {
-            if state[i] * (free - stopped) > T::zero() {
-                state[i] = T::zero();
-            }
+        if state[1] * (free - stopped) > T::zero() {
+            state[1] = T::zero();
         }
         let way = free - start;
         if way.is_zero() { T::zero() } else { ((stopped - start) / way).max(T::zero()).min(T::one()) }

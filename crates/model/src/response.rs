@@ -1,18 +1,19 @@
+use crate::motion::MOTION_STATES as M;
 use crate::{Branch, Motion, Scalar};
 
 /// How motion and branches of unit gain answer over one time step: everything in the transition that depends on the
 /// step's length and not on the state. Compute it once for a fixed step.
 ///
-/// With m the motion states (ε, v, …) and c a branch of gain 1,
+/// With m the motion states (ε, v) and c a branch of gain 1,
 /// `m' = m + motion_change · m + input · u + n`, `c' = c + decay_change · c + drive · m + drive_input · u + w`,
-/// u a constant push on the highest derivative, n and w Gaussian. Changes are kept instead of transitions because a
+/// u a constant push on the rate, n and w Gaussian. Changes are kept instead of transitions because a
 /// transition close to the identity has lost the digits that matter, above all in `f32`.
 ///
 /// Textbook formulas for these integrals subtract nearly equal numbers when the step is short against a time
 /// constant. Here they are Taylor sums and Gauss-Legendre sums of one sign over a step so short that both are exact to
 /// rounding, doubled as often as needed: nothing cancels, for any ratio of step to time constant, in `f32` too.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Response<T, const M: usize, const B: usize> {
+pub struct Response<T, const B: usize> {
     /// Length of the step, s.
     pub dt_s: T,
     /// Transition of the motion, less the identity.
@@ -60,10 +61,10 @@ fn nodes<T: Scalar>() -> [(T, T); 7] {
 /// Doublings allowed: enough for a step 10¹⁵ times longer than the fastest time constant.
 const MOST_DOUBLINGS: u32 = 52;
 
-impl<T: Scalar, const M: usize, const B: usize> Response<T, M, B> {
+impl<T: Scalar, const B: usize> Response<T, B> {
     /// The answer over `dt_s ≥ 0` seconds.
     #[must_use]
-    pub fn new(motion: &Motion<T, M>, branches: &[Branch<T>; B], dt_s: T) -> Self {
+    pub fn new(motion: &Motion<T>, branches: &[Branch<T>; B], dt_s: T) -> Self {
         let mut fastest = motion.fastest_rate();
         for branch in branches {
             fastest = fastest.max(T::one() / branch.tau_s);
@@ -82,7 +83,7 @@ impl<T: Scalar, const M: usize, const B: usize> Response<T, M, B> {
     }
 
     /// The answer over a step `h` that is short against every time constant.
-    fn short(motion: &Motion<T, M>, branches: &[Branch<T>; B], h: T) -> Self {
+    fn short(motion: &Motion<T>, branches: &[Branch<T>; B], h: T) -> Self {
         let mut out = Self {
             dt_s: h,
             motion_change: [[T::zero(); M]; M],
@@ -182,14 +183,14 @@ impl<T: Scalar, const M: usize, const B: usize> Response<T, M, B> {
 }
 
 /// Taylor coefficients in time of how motion and branches of unit gain go on from a unit start.
-struct Series<T, const M: usize, const B: usize> {
+struct Series<T, const B: usize> {
     motion: [[T; M]; TERMS],
     branches: [[T; B]; TERMS],
 }
 
-impl<T: Scalar, const M: usize, const B: usize> Series<T, M, B> {
+impl<T: Scalar, const B: usize> Series<T, B> {
     /// From motion state `start` = 1 and everything else 0.
-    fn from_unit(start: usize, motion: &Motion<T, M>, branches: &[Branch<T>; B]) -> Self {
+    fn from_unit(start: usize, motion: &Motion<T>, branches: &[Branch<T>; B]) -> Self {
         let mut series = Self { motion: [[T::zero(); M]; TERMS], branches: [[T::zero(); B]; TERMS] };
         series.motion[0][start] = T::one();
         let mut order = T::zero();
@@ -236,14 +237,14 @@ impl<T: Scalar, const M: usize, const B: usize> Series<T, M, B> {
     }
 }
 
-fn dot<T: Scalar, const M: usize>(a: &[T; M], b: &[T; M]) -> T {
+fn dot<T: Scalar>(a: &[T; M], b: &[T; M]) -> T {
     a.iter().zip(b).fold(T::zero(), |sum, (x, y)| sum + *x * *y)
 }
 
-fn add<T: Scalar, const M: usize>(a: [T; M], b: &[T; M]) -> [T; M] {
+fn add<T: Scalar>(a: [T; M], b: &[T; M]) -> [T; M] {
     core::array::from_fn(|i| a[i] + b[i])
 }
 
-fn mul_vec<T: Scalar, const M: usize>(a: &[[T; M]; M], b: &[T; M]) -> [T; M] {
+fn mul_vec<T: Scalar>(a: &[[T; M]; M], b: &[T; M]) -> [T; M] {
     core::array::from_fn(|i| dot(&a[i], b))
 }

@@ -5,13 +5,12 @@
 
 use nalgebra::SVector;
 
+use crate::motion::MOTION_STATES as M;
 use crate::phase::{Direction, Turning};
 use crate::{Branch, Motion, Phase, Scalar, SwitchedModel, SwitchedStep, Symmetric};
 
 /// `1 - r²` of neighbouring steps from which on it counts as no less: a persistence of 10⁴ steps.
 pub const LEAST_LEFT: f64 = 2e-4;
-/// `∫ exp(-t²/ℓ²) dt` over all times, in units of ℓ, is √π: squared correlation of a smooth error of curvature 1/ℓ².
-const SMOOTH_MEMORY: f64 = 1.772_453_850_905_516;
 
 /// Of a Brownian rate that passes zero with unit density and changes by one standard deviation over a step of unit length:
 /// the mean path beyond what the sign at the end makes of the net move, ¼, and the variance of that path given the rates
@@ -34,13 +33,9 @@ const NORMAL_DENSITY: f64 = 0.398_942_280_401_432_7;
 /// What is left of the steps' persistence where a step is no longer short against the motion's memory: such that without
 /// readings the variance of what the direction leaves grows at one rate, whatever the step. A rate with white acceleration
 /// correlates as exp(-t/T_v) and its direction as the square of that, whose steps sum up to coth(h/T_v).
-pub(crate) fn averaging<T: Scalar, const M: usize>(motion: &Motion<T, M>, dt_s: T) -> T {
-    if M == 2 {
-        let x = dt_s * motion.restoring()[1];
-        return if x < T::of(1e-3) { T::one() } else { x.tanh() / x };
-    }
-    let memories = dt_s * motion.restoring()[1].sqrt() / T::of(SMOOTH_MEMORY);
-    if memories > T::one() { T::one() / memories } else { T::one() }
+pub(crate) fn averaging<T: Scalar>(motion: &Motion<T>, dt_s: T) -> T {
+    let x = dt_s * motion.restoring()[1];
+    if x < T::of(1e-3) { T::one() } else { x.tanh() / x }
 }
 
 impl<T: Scalar> Direction<T> {
@@ -50,32 +45,27 @@ impl<T: Scalar> Direction<T> {
     }
 }
 
-impl<T: Scalar, const M: usize, const B: usize, const N: usize> SwitchedModel<T, M, B, N> {
+impl<T: Scalar, const B: usize, const N: usize> SwitchedModel<T, B, N> {
     /// What one Gaussian knows of the direction over a step, from the covariance at its start.
     ///
     /// The rate's variance is that in the middle of the step. What the linearised switch leaves follows the error of the
-    /// rate, and lasts as long: the squares of that error's correlations from step to step are summed up, geometric for a
-    /// rate with white acceleration, Gaussian for a smooth one.
+    /// rate, and lasts as long: the squares of that error's correlations from step to step are summed up, a
+    /// geometric series.
     #[must_use]
     pub fn uncertain_direction<const L: usize>(
         &self,
-        step: &SwitchedStep<T, M, B>,
+        step: &SwitchedStep<T, B>,
         covariance: &Symmetric<T, N, L>,
     ) -> Direction<T> {
         let (now, ahead) = (covariance[(1, 1)].max(T::zero()), self.rate_variance(step, covariance));
         let rate_sd = (T::of(0.5) * (now + ahead)).sqrt();
         let steps = if !(ahead > T::zero() && step.dt_s() > T::zero()) {
             T::one()
-        } else if M == 2 {
+        } else {
             let change = &step.response().motion_change[1];
             let with = |i: usize| (0..M).fold(covariance[(i, 1)], |sum, j| sum + change[j] * covariance[(i, j)]);
             let fresh = (0..M).fold(step.response().motion_noise[1][1], |sum, i| sum + change[i] * with(i));
             correlated_steps(ahead, with(1), fresh)
-        } else {
-            let curvature = covariance[(M - 1, M - 1)].max(T::zero());
-            let lasts_s = T::of(SMOOTH_MEMORY) * ahead.sqrt() / curvature.sqrt();
-            let most = T::of(2.0 / LEAST_LEFT);
-            (lasts_s / step.dt_s()).max(T::one()).min(most)
         };
         Direction::Uncertain { rate_sd, persistence: step.averaging * steps }
     }
@@ -87,8 +77,7 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize> SwitchedModel<T,
         let same = |branch: &Branch<T>| {
             branch.extend_gain == branch.retract_gain && branch.extend_gain_slope == branch.retract_gain_slope
         };
-        let restoring = self.motion().restoring()[1];
-        let per_time = if M == 2 { restoring } else { restoring.sqrt() };
+        let per_time = self.motion().restoring()[1];
         if self.law().branches.iter().all(same) { T::one() / T::zero() } else { T::of(LONGEST) / per_time }
     }
 
@@ -100,7 +89,7 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize> SwitchedModel<T,
     #[must_use]
     pub fn turning<const L: usize>(
         &self,
-        step: &SwitchedStep<T, M, B>,
+        step: &SwitchedStep<T, B>,
         mean: &SVector<T, N>,
         covariance: &Symmetric<T, N, L>,
         before: Phase,
@@ -116,7 +105,7 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize> SwitchedModel<T,
             }
         }
         let noise = step.response().motion_noise[1][1];
-        let change = RateChange { expected: side * expected, spread, noise, is_brownian: M == 2 };
+        let change = RateChange { expected: side * expected, spread, noise };
         Turning::new(side * mean[1], covariance[(1, 1)], &change, |square| square.sqrt())
     }
 }
@@ -139,10 +128,8 @@ pub struct RateChange<T> {
     pub expected: T,
     /// Variance from what is not known at the start of the step, and from chance on the way; 1/s².
     pub spread: T,
-    /// From chance on the way.
+    /// From chance on the way, as of a Brownian rate.
     pub noise: T,
-    /// Whether chance acts on the rate itself, or smoothly on its derivative.
-    pub is_brownian: bool,
 }
 
 /// The numbers in [`Turning::new`], for programs that write it in another language.
@@ -184,14 +171,14 @@ impl<T: Scalar> Turning<T> {
         let gaussian = T::of(NORMAL_DENSITY) * (T::of(-0.5) * square).exp();
         let density = if cut > gaussian { cut } else { gaussian } * per_sd;
 
-        let RateChange { expected, spread, noise, is_brownian } = *change;
+        let RateChange { expected, spread, noise } = *change;
         let even = if expected < zero { expected * expected } else { zero };
         let total = noise + even + spread;
         let change_sd = root(total);
         let thinner = T::one() + T::of(REACH) * change_sd * per_sd;
         // Half of an even change of unknown sign leads toward zero.
         let evenly = T::of(EVEN_EXCESS) * (even + T::of(0.5) * spread);
-        let by_chance = T::of(if is_brownian { BROWNIAN_EXCESS } else { 0.5 * EVEN_EXCESS }) * noise;
+        let by_chance = T::of(BROWNIAN_EXCESS) * noise;
         Self {
             excess: density * (evenly + by_chance),
             variance: T::of(BROWNIAN_VARIANCE) * density * total * change_sd / thinner,

@@ -1,6 +1,7 @@
 use nalgebra::{SMatrix, SVector};
 
 use crate::error::{ParameterError, Problem};
+use crate::motion::MOTION_STATES as M;
 use crate::phase::Direction;
 use crate::reversal::averaging;
 use crate::{ModelNoise, Motion, Phase, Response, Scalar, SensorLaw, Symmetric};
@@ -27,10 +28,10 @@ pub struct Observation<T, const N: usize> {
     pub variance: T,
 }
 
-/// The switched Kelvin-Voigt law as a state-space model with state `x = [ε, v, (a), c₁ … c_B, (b)]`.
+/// The switched Kelvin-Voigt law as a state-space model with state `x = [ε, v, c₁ … c_B, (b)]`.
 ///
-/// `M` motion states (2: strain and rate; 3: acceleration too), `B` branches, and a baseline if `N = M + B + 1`; with
-/// `N = M + B` there is none. Anything else does not compile. `L` in the methods is `N (N + 1) / 2`.
+/// `B` branches, and a baseline if `N = B + 3`; with `N = B + 2` there is none. Anything else does not compile. `L` in the
+/// methods is `N (N + 1) / 2`.
 ///
 /// ```
 /// use ohmstrain_model::*;
@@ -45,7 +46,7 @@ pub struct Observation<T, const N: usize> {
 /// };
 /// let motion = Motion::ornstein_uhlenbeck(1.0, 0.1, 0.15, 0.1)?;
 /// let noise = ModelNoise { reading_sd: 2e-3, branch_sd: 5e-3, baseline_sd: 0.02, baseline_time_s: 30.0 };
-/// let model = SwitchedModel::<f64, 2, 1, 4>::new(law, motion, noise)?;
+/// let model = SwitchedModel::<f64, 1, 4>::new(law, motion, noise)?;
 /// let step = model.prepare(0.01);
 /// let state = nalgebra::vector![0.1, 0.05, 0.02, 0.0];
 /// let next: Transition<f64, 4, 10> = model.transition(&step, &state, Direction::Known(Phase::Extend));
@@ -53,16 +54,16 @@ pub struct Observation<T, const N: usize> {
 /// # Ok::<(), ParameterError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SwitchedModel<T, const M: usize, const B: usize, const N: usize> {
+pub struct SwitchedModel<T, const B: usize, const N: usize> {
     law: SensorLaw<T, B>,
-    motion: Motion<T, M>,
+    motion: Motion<T>,
     noise: ModelNoise<T>,
 }
 
 /// What [`SwitchedModel::transition`] needs of the step's length: computed once where the step is fixed.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SwitchedStep<T, const M: usize, const B: usize> {
-    pub(crate) response: Response<T, M, B>,
+pub struct SwitchedStep<T, const B: usize> {
+    pub(crate) response: Response<T, B>,
     branch_variance: [T; B],
     pub(crate) baseline_change: T,
     baseline_variance: T,
@@ -70,7 +71,7 @@ pub struct SwitchedStep<T, const M: usize, const B: usize> {
     pub(crate) averaging: T,
 }
 
-impl<T: Scalar, const M: usize, const B: usize> SwitchedStep<T, M, B> {
+impl<T: Scalar, const B: usize> SwitchedStep<T, B> {
     /// Length of the step, s.
     #[must_use]
     pub fn dt_s(&self) -> T {
@@ -79,7 +80,7 @@ impl<T: Scalar, const M: usize, const B: usize> SwitchedStep<T, M, B> {
 
     /// How motion and branches of unit gain answer.
     #[must_use]
-    pub const fn response(&self) -> &Response<T, M, B> {
+    pub const fn response(&self) -> &Response<T, B> {
         &self.response
     }
 
@@ -108,9 +109,8 @@ impl<T: Scalar, const M: usize, const B: usize> SwitchedStep<T, M, B> {
     }
 }
 
-impl<T: Scalar, const M: usize, const B: usize, const N: usize> SwitchedModel<T, M, B, N> {
-    const SIZES_FIT: () =
-        assert!((M == 2 || M == 3) && (N == M + B || N == M + B + 1), "N must be M + B or M + B + 1, M 2 or 3");
+impl<T: Scalar, const B: usize, const N: usize> SwitchedModel<T, B, N> {
+    const SIZES_FIT: () = assert!(N == M + B || N == M + B + 1, "N must be B + 2 or B + 3");
 
     pub(crate) const HAS_BASELINE: bool = N == M + B + 1;
 
@@ -118,7 +118,7 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize> SwitchedModel<T,
     ///
     /// # Errors
     /// Names the parameter that no model can have.
-    pub fn new(law: SensorLaw<T, B>, motion: Motion<T, M>, noise: ModelNoise<T>) -> Result<Self, ParameterError> {
+    pub fn new(law: SensorLaw<T, B>, motion: Motion<T>, noise: ModelNoise<T>) -> Result<Self, ParameterError> {
         let () = Self::SIZES_FIT;
         law.validate()?;
         noise.validate()?;
@@ -136,7 +136,7 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize> SwitchedModel<T,
 
     /// The motion prior.
     #[must_use]
-    pub const fn motion(&self) -> &Motion<T, M> {
+    pub const fn motion(&self) -> &Motion<T> {
         &self.motion
     }
 
@@ -167,7 +167,7 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize> SwitchedModel<T,
 
     /// What a step of `dt_s ≥ 0` seconds does, whatever the state.
     #[must_use]
-    pub fn prepare(&self, dt_s: T) -> SwitchedStep<T, M, B> {
+    pub fn prepare(&self, dt_s: T) -> SwitchedStep<T, B> {
         let growth = |sd: T, time_s: T| -(T::of(-2.0) * dt_s / time_s).exp_m1() * sd * sd;
         SwitchedStep {
             response: Response::new(&self.motion, &self.law.branches, dt_s),
@@ -185,7 +185,7 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize> SwitchedModel<T,
     #[must_use]
     pub fn transition<const L: usize>(
         &self,
-        step: &SwitchedStep<T, M, B>,
+        step: &SwitchedStep<T, B>,
         state: &SVector<T, N>,
         direction: Direction<T>,
     ) -> Transition<T, N, L> {
@@ -272,10 +272,10 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize> SwitchedModel<T,
         Observation { value, gradient, variance }
     }
 
-    /// Strain and its derivatives: linear, whatever the gains.
+    /// Strain and rate: linear, whatever the gains.
     fn move_body<const L: usize>(
         &self,
-        step: &SwitchedStep<T, M, B>,
+        step: &SwitchedStep<T, B>,
         state: &SVector<T, N>,
         direction: Direction<T>,
         out: &mut Transition<T, N, L>,
@@ -295,7 +295,7 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize> SwitchedModel<T,
         }
     }
 
-    /// The constant push on the highest derivative: toward the mean strain and the phase's mean rate.
+    /// The constant push on the rate: toward the mean strain and the phase's mean rate.
     pub(crate) fn push(&self, direction: Direction<T>) -> T {
         let toward_strain = self.motion.restoring()[0] * self.motion.rest_strain();
         let toward_rate = match direction {
@@ -311,12 +311,7 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize> SwitchedModel<T,
     }
 
     /// Branches and baseline decay, and wander around their law.
-    fn relax<const L: usize>(
-        &self,
-        step: &SwitchedStep<T, M, B>,
-        state: &SVector<T, N>,
-        out: &mut Transition<T, N, L>,
-    ) {
+    fn relax<const L: usize>(&self, step: &SwitchedStep<T, B>, state: &SVector<T, N>, out: &mut Transition<T, N, L>) {
         for i in 0..B {
             let (c, change) = (M + i, step.response.decay_change[i]);
             out.mean[c] = state[c] + change * state[c];
@@ -333,14 +328,14 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize> SwitchedModel<T,
 
     /// Mean of the rate at the end of a step that moves.
     #[must_use]
-    pub fn rate_mean(&self, step: &SwitchedStep<T, M, B>, state: &SVector<T, N>, direction: Direction<T>) -> T {
+    pub fn rate_mean(&self, step: &SwitchedStep<T, B>, state: &SVector<T, N>, direction: Direction<T>) -> T {
         let change = step.response.input[1] * self.push(direction);
         (0..M).fold(state[1] + change, |sum, j| sum + step.response.motion_change[1][j] * state[j])
     }
 
     /// Variance of the rate at the end of a step, from the covariance at its start.
     #[must_use]
-    pub fn rate_variance<const L: usize>(&self, step: &SwitchedStep<T, M, B>, covariance: &Symmetric<T, N, L>) -> T {
+    pub fn rate_variance<const L: usize>(&self, step: &SwitchedStep<T, B>, covariance: &Symmetric<T, N, L>) -> T {
         let mut row = step.response.motion_change[1];
         row[1] += T::one();
         let mut variance = step.response.motion_noise[1][1];

@@ -32,8 +32,8 @@ pub trait Filter<T>: Copy {
 /// An EKF at a fixed rate.
 #[derive(Clone, Copy)]
 pub struct PreparedEkf<T, const B: usize, const N: usize, const L: usize> {
-    ekf: Ekf<SwitchedModel<T, 2, B, N>>,
-    prepared: SwitchedStep<T, 2, B>,
+    ekf: Ekf<SwitchedModel<T, B, N>>,
+    prepared: SwitchedStep<T, B>,
     belief: Belief<T, N, L>,
 }
 
@@ -71,7 +71,7 @@ impl<T: Scalar, const B: usize, const N: usize, const L: usize> Filter<T> for Pr
 /// The EKF of three states with a step length that changes from reading to reading.
 #[derive(Clone, Copy)]
 pub struct VaryingEkf3<T> {
-    ekf: Ekf<SwitchedModel<T, 2, 1, 3>>,
+    ekf: Ekf<SwitchedModel<T, 1, 3>>,
     belief: Belief<T, 3, 6>,
     dt_s: T,
 }
@@ -104,8 +104,8 @@ impl<T: Scalar> Filter<T> for VaryingEkf3<T> {
 /// Three phases, six states.
 #[derive(Clone, Copy)]
 pub struct Imm6<T> {
-    imm: Imm<T, SwitchedModel<T, 2, 3, 6>>,
-    prepared: SwitchedStep<T, 2, 3>,
+    imm: Imm<T, SwitchedModel<T, 3, 6>>,
+    prepared: SwitchedStep<T, 3>,
     mixture: Mixture<T, 6, 21, 3>,
 }
 
@@ -147,8 +147,8 @@ impl<T: Real> Filter<T> for Imm6<T> {
 /// Four hypotheses split by the sign of the rate, six states.
 #[derive(Clone, Copy)]
 pub struct SplitFour<T> {
-    split: SignSplit<T, SwitchedModel<T, 2, 3, 6>, 4>,
-    prepared: SwitchedStep<T, 2, 3>,
+    split: SignSplit<T, SwitchedModel<T, 3, 6>, 4>,
+    prepared: SwitchedStep<T, 3>,
     mixture: Mixture<T, 6, 21, 4>,
 }
 

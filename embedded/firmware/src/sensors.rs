@@ -22,7 +22,7 @@ pub fn limits<T: Scalar>() -> StrainRange<T> {
 ///
 /// # Errors
 /// None: the parameters are valid.
-pub fn sensor<T: Scalar, const B: usize, const N: usize>() -> Result<SwitchedModel<T, 2, B, N>, ParameterError> {
+pub fn sensor<T: Scalar, const B: usize, const N: usize>() -> Result<SwitchedModel<T, B, N>, ParameterError> {
     let share = |gain: f64| T::of(gain / B as f64);
     let law = SensorLaw {
         gauge: Gauge::Polynomial { coefficients: [T::of(1.6), T::of(-1.2), T::of(0.5)] },

@@ -17,11 +17,11 @@ pub trait Pair<T: Real, const N: usize, const L: usize, const K: usize> {
 
 pub struct Imms<T, const B: usize, const N: usize> {
     sparse: SparseImm<T, B, N>,
-    generic: Imm<T, SwitchedModel<T, 2, B, N>>,
+    generic: Imm<T, SwitchedModel<T, B, N>>,
 }
 
 impl<T: Real, const B: usize, const N: usize> Imms<T, B, N> {
-    pub fn new(model: SwitchedModel<T, 2, B, N>, tempering: f64) -> Self {
+    pub fn new(model: SwitchedModel<T, B, N>, tempering: f64) -> Self {
         let (dt_s, evidence) = (T::of(DT_S), evidence(tempering));
         let sparse = SparseImm::new(model, dt_s, dwell(), evidence).unwrap();
         Self { sparse, generic: Imm::new(model, dwell(), evidence) }
@@ -43,11 +43,11 @@ impl<T: Real, const B: usize, const N: usize, const L: usize> Pair<T, N, L, 3> f
 
 pub struct Splits<T, const B: usize, const N: usize, const K: usize> {
     sparse: SparseSignSplit<T, B, N, K>,
-    generic: SignSplit<T, SwitchedModel<T, 2, B, N>, K>,
+    generic: SignSplit<T, SwitchedModel<T, B, N>, K>,
 }
 
 impl<T: Real, const B: usize, const N: usize, const K: usize> Splits<T, B, N, K> {
-    pub fn new(model: SwitchedModel<T, 2, B, N>, hold: Option<Dwell<T>>, tempering: f64) -> Self {
+    pub fn new(model: SwitchedModel<T, B, N>, hold: Option<Dwell<T>>, tempering: f64) -> Self {
         let (dt_s, evidence) = (T::of(DT_S), evidence(tempering));
         let sparse = SparseSignSplit::new(model, dt_s, hold, evidence).unwrap();
         Self { sparse, generic: SignSplit::new(model, hold, evidence) }
@@ -69,11 +69,11 @@ impl<T: Real, const B: usize, const N: usize, const L: usize, const K: usize> Pa
 
 pub struct Histories<T, const B: usize, const N: usize, const K: usize> {
     sparse: SparseHypotheses<T, B, N, K>,
-    generic: Hypotheses<T, SwitchedModel<T, 2, B, N>, K>,
+    generic: Hypotheses<T, SwitchedModel<T, B, N>, K>,
 }
 
 impl<T: Real, const B: usize, const N: usize, const K: usize> Histories<T, B, N, K> {
-    pub fn new(model: SwitchedModel<T, 2, B, N>, tempering: f64) -> Self {
+    pub fn new(model: SwitchedModel<T, B, N>, tempering: f64) -> Self {
         let (dt_s, evidence) = (T::of(DT_S), evidence(tempering));
         let sparse = SparseHypotheses::new(model, dt_s, dwell(), evidence).unwrap();
         Self { sparse, generic: Hypotheses::new(model, dwell(), evidence) }

@@ -1,11 +1,10 @@
 use super::sensor::{found, warnings};
-use super::sensor_family::{SensorFamily, ThreeStates, TwoStates};
+use super::sensor_family::SensorFamily;
 use super::{
     Likelihood, LikelihoodFit, LogLikelihood, ModelFamily, NoiseFit, NoiseParameter, NoiseStart, Parameter,
     ProfileInterval, Readings,
 };
 use crate::CalibrationError;
-use crate::estimator_params::MotionParams;
 use crate::law_params::LawParams;
 use crate::optimise::polish;
 
@@ -57,25 +56,18 @@ impl NoiseProblem<'_> {
 
     /// Makes the likelihood of the law's size and asks it.
     fn ask<Q: Question>(&self, question: Q) -> Result<Q::Answer, CalibrationError> {
-        /// One instance per number of branches; N = M + B + 1, L = N (N + 1) / 2.
+        /// One instance per number of branches; N = B + 3, L = N (N + 1) / 2.
         macro_rules! sized {
-            ($family:ident, $([$b:literal, $n:literal, $l:literal]),+) => {
+            ($([$b:literal, $n:literal, $l:literal]),+) => {
                 match self.law.branches.len() {
-                    $($b => self.ask_family::<_, Q, $n, $l>(&$family(self.family::<$b>()?), question),)+
+                    $($b => self.ask_family::<_, Q, $n, $l>(&self.family::<$b>()?, question),)+
                     branches => Err(CalibrationError::Unsupported(format!(
                         "a law with {branches} branches; the likelihood of readings has at most 4"
                     ))),
                 }
             };
         }
-        match self.start.motion {
-            MotionParams::OrnsteinUhlenbeck { .. } => {
-                sized!(TwoStates, [0, 3, 6], [1, 4, 10], [2, 5, 15], [3, 6, 21], [4, 7, 28])
-            }
-            MotionParams::Smooth { .. } => {
-                sized!(ThreeStates, [0, 4, 10], [1, 5, 15], [2, 6, 21], [3, 7, 28], [4, 8, 36])
-            }
-        }
+        sized!([0, 3, 6], [1, 4, 10], [2, 5, 15], [3, 6, 21], [4, 7, 28])
     }
 
     fn ask_family<F: ModelFamily<N, L>, Q: Question, const N: usize, const L: usize>(

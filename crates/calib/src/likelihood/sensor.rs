@@ -69,16 +69,11 @@ pub(super) fn found(start: &NoiseStart, free: &[NoiseParameter], fit: &Likelihoo
         baseline_sd: value(NoiseParameter::BaselineSd),
         baseline_time_s: value(NoiseParameter::BaselineTime),
     };
-    let (rate_sd, rate_time) = (value(NoiseParameter::RateSd), value(NoiseParameter::RateTime));
-    let mut motion = start.motion;
-    match &mut motion {
-        MotionParams::OrnsteinUhlenbeck { rate_time_s, rate_sd_per_s, .. } => {
-            (*rate_sd_per_s, *rate_time_s) = (rate_sd, rate_time);
-        }
-        MotionParams::Smooth { rate_sd_per_s, acceleration_sd_per_s2, .. } => {
-            (*rate_sd_per_s, *acceleration_sd_per_s2) = (rate_sd, rate_sd / rate_time);
-        }
-    }
+    let motion = MotionParams {
+        rate_sd_per_s: value(NoiseParameter::RateSd),
+        rate_time_s: value(NoiseParameter::RateTime),
+        ..start.motion
+    };
     (noise, motion)
 }
 

@@ -19,7 +19,7 @@ pub enum NoiseParameter {
     BaselineTime,
     /// Standard deviation of the rate, 1/s.
     RateSd,
-    /// Time scale of the rate, s: correlation time of an Ornstein-Uhlenbeck rate; σ_v/σ_a = 1/ω of a smooth motion.
+    /// Correlation time of the rate, s.
     RateTime,
 }
 
@@ -44,24 +44,18 @@ impl NoiseParameter {
     /// Its value in a pair of noise and motion.
     #[must_use]
     pub fn get(self, noise: &NoiseParams, motion: &MotionParams) -> f64 {
-        let (rate_sd, rate_time_s) = match *motion {
-            MotionParams::OrnsteinUhlenbeck { rate_sd_per_s, rate_time_s, .. } => (rate_sd_per_s, rate_time_s),
-            MotionParams::Smooth { rate_sd_per_s, acceleration_sd_per_s2, .. } => {
-                (rate_sd_per_s, rate_sd_per_s / acceleration_sd_per_s2)
-            }
-        };
         match self {
             Self::ReadingSd => noise.reading_sd,
             Self::BranchSd => noise.branch_sd,
             Self::BaselineSd => noise.baseline_sd,
             Self::BaselineTime => noise.baseline_time_s,
-            Self::RateSd => rate_sd,
-            Self::RateTime => rate_time_s,
+            Self::RateSd => motion.rate_sd_per_s,
+            Self::RateTime => motion.rate_time_s,
         }
     }
 }
 
-/// Noise and motion around a known law; `free` are the parameters that the likelihood moves.
+/// Noise and motion around a known law, N = B + 3; `free` are the parameters that the likelihood moves.
 pub(super) struct SensorFamily<'a, const B: usize> {
     pub law: SensorLaw<f64, B>,
     pub noise: NoiseParams,
@@ -101,15 +95,12 @@ impl<const B: usize> SensorFamily<'_, B> {
         }
     }
 
-    fn rate<T: Scalar>(&self, values: &[T]) -> (T, T) {
-        (self.value(NoiseParameter::RateSd, values), self.value(NoiseParameter::RateTime, values))
-    }
-
-    /// Mean and standard deviation of strain, which the readings' scale is judged by and which therefore stay.
-    fn strain<T: Scalar>(&self) -> (T, T) {
-        let (MotionParams::OrnsteinUhlenbeck { strain_mean, strain_sd, .. }
-        | MotionParams::Smooth { strain_mean, strain_sd, .. }) = self.motion;
-        (T::of(strain_mean), T::of(strain_sd))
+    /// Mean and standard deviation of strain, which the readings' scale is judged by, stay.
+    fn motion<T: Scalar>(&self, values: &[T]) -> Result<Motion<T>, ParameterError> {
+        let (rate_sd, rate_time_s) =
+            (self.value(NoiseParameter::RateSd, values), self.value(NoiseParameter::RateTime, values));
+        let MotionParams { strain_mean, strain_sd, .. } = self.motion;
+        Motion::ornstein_uhlenbeck(rate_time_s, rate_sd, T::of(strain_mean), T::of(strain_sd))
     }
 }
 
@@ -125,38 +116,11 @@ fn in_numbers<T: Scalar>(gauge: &Gauge<f64>) -> Gauge<T> {
     }
 }
 
-/// The families with two and three motion states: N = M + B + 1.
-pub(super) struct TwoStates<'a, const B: usize>(pub SensorFamily<'a, B>);
-/// See [`TwoStates`].
-pub(super) struct ThreeStates<'a, const B: usize>(pub SensorFamily<'a, B>);
-
-impl<const B: usize, const N: usize, const L: usize> ModelFamily<N, L> for TwoStates<'_, B> {
-    type Model<T: Scalar> = SwitchedModel<T, 2, B, N>;
+impl<const B: usize, const N: usize, const L: usize> ModelFamily<N, L> for SensorFamily<'_, B> {
+    type Model<T: Scalar> = SwitchedModel<T, B, N>;
 
     fn model<T: Scalar>(&self, values: &[T]) -> Result<Self::Model<T>, ParameterError> {
-        let ((rate_sd, rate_time_s), (mean, sd)) = (self.0.rate(values), self.0.strain());
-        SwitchedModel::new(
-            self.0.law(),
-            Motion::ornstein_uhlenbeck(rate_time_s, rate_sd, mean, sd)?,
-            self.0.noise(values),
-        )
-    }
-
-    fn start<T: Scalar>(&self, model: &Self::Model<T>) -> Belief<T, N, L> {
-        Belief::initial(model)
-    }
-}
-
-impl<const B: usize, const N: usize, const L: usize> ModelFamily<N, L> for ThreeStates<'_, B> {
-    type Model<T: Scalar> = SwitchedModel<T, 3, B, N>;
-
-    fn model<T: Scalar>(&self, values: &[T]) -> Result<Self::Model<T>, ParameterError> {
-        let ((rate_sd, rate_time_s), (mean, sd)) = (self.0.rate(values), self.0.strain());
-        SwitchedModel::new(
-            self.0.law(),
-            Motion::smooth(rate_sd, rate_sd / rate_time_s, mean, sd)?,
-            self.0.noise(values),
-        )
+        SwitchedModel::new(self.law(), self.motion(values)?, self.noise(values))
     }
 
     fn start<T: Scalar>(&self, model: &Self::Model<T>) -> Belief<T, N, L> {

@@ -30,9 +30,9 @@ const LEAST_SD: f64 = 0.1;
 const NO_SPEED: f64 = 1e-12;
 
 impl EstimatorPrior {
-    /// From several sensors' parameters of the estimator; `None` if their motions are not of the family that is fitted.
+    /// From several sensors' parameters of the estimator; `None` if there are none, or some have phases and others have not.
     pub(super) fn learn(sensors: &[&EstimatorParams]) -> Option<Self> {
-        let points: Vec<DVector<f64>> = sensors.iter().map(|params| point(params)).collect::<Option<_>>()?;
+        let points: Vec<DVector<f64>> = sensors.iter().map(|params| point(params)).collect();
         let size = points.first()?.len();
         if points.iter().any(|point| point.len() != size) {
             return None;
@@ -42,7 +42,7 @@ impl EstimatorPrior {
             ln_mean: mean.iter().copied().collect(),
             ln_sd: covariance.diagonal().iter().map(|variance| variance.sqrt().max(LEAST_SD)).collect(),
             reading_time_s: median(sensors.iter().map(|params| params.noise.reading_time_s)),
-            strain_mean: median(sensors.iter().filter_map(|params| strain_mean(params))),
+            strain_mean: median(sensors.iter().map(|params| params.motion.strain_mean)),
             reversal: median(sensors.iter().filter_map(|params| params.phases.map(|phases| phases.reversal))),
             strain_sd_scale: median(sensors.iter().map(|params| params.strain_sd_scale)),
         })
@@ -59,10 +59,8 @@ impl EstimatorPrior {
 }
 
 /// In the order in which calibration searches.
-fn point(params: &EstimatorParams) -> Option<DVector<f64>> {
-    let MotionParams::OrnsteinUhlenbeck { rate_time_s, rate_sd_per_s, strain_sd, .. } = params.motion else {
-        return None;
-    };
+fn point(params: &EstimatorParams) -> DVector<f64> {
+    let MotionParams { rate_time_s, rate_sd_per_s, strain_sd, .. } = params.motion;
     let noise = params.noise;
     let mut values = vec![noise.baseline_sd, noise.baseline_time_s, noise.reading_sd, noise.branch_sd];
     values.extend([rate_sd_per_s, rate_time_s, strain_sd]);
@@ -70,12 +68,5 @@ fn point(params: &EstimatorParams) -> Option<DVector<f64>> {
         values.extend([phases.hold_time_s, phases.move_time_s, phases.speed_per_s.max(NO_SPEED), phases.tempering]);
     }
     let ln: Vec<f64> = values.iter().map(|value| value.max(NO_SPEED).ln()).collect();
-    Some(DVector::from_vec(ln))
-}
-
-fn strain_mean(params: &EstimatorParams) -> Option<f64> {
-    match params.motion {
-        MotionParams::OrnsteinUhlenbeck { strain_mean, .. } => Some(strain_mean),
-        MotionParams::Smooth { .. } => None,
-    }
+    DVector::from_vec(ln)
 }

@@ -267,7 +267,7 @@ impl Exported {
             arithmetic,
             law: LawConstants::new(model.law()),
             noise: NoiseConstants::new(model.noise()),
-            prior: PriorConstants::new(&filter.estimator.motion, filter.kind)?,
+            prior: PriorConstants::new(&filter.estimator.motion),
             phases: filter.estimator.phases.as_ref().map(PhaseConstants::new),
             vectors: Vectors::new::<B, N, L>(&sensor)?,
         };

@@ -13,9 +13,9 @@ use super::{ExportError, parameter};
 /// A filter in single precision, with what the numbers of states in its type are made for.
 pub struct FixedRate<'a, const B: usize, const N: usize> {
     /// The model in double precision, for simulation and to see what rounding does.
-    pub reference: SwitchedModel<f64, 2, B, N>,
+    pub reference: SwitchedModel<f64, B, N>,
     /// The model in single precision.
-    pub model: SwitchedModel<f32, 2, B, N>,
+    pub model: SwitchedModel<f32, B, N>,
     /// R₀.
     pub rest_reading: f32,
     /// Everything else.
@@ -35,7 +35,7 @@ impl<'a, const B: usize, const N: usize> FixedRate<'a, B, N> {
         dt_s: f32,
     ) -> Result<Self, ExportError> {
         let EstimatorParams { noise, motion, phases, strain_sd_scale, .. } = filter.estimator;
-        let [time, rate_sd, mean, sd] = PriorConstants::new(&motion, filter.kind)?.numbers();
+        let [time, rate_sd, mean, sd] = PriorConstants::new(&motion).numbers();
         let speed = phases.map_or(0.0, |phases| phases.speed_per_s);
         let law: SensorLaw<f64, B> = params
             .law
@@ -114,7 +114,7 @@ impl<'a, const B: usize, const N: usize> FixedRate<'a, B, N> {
 
 /// Numbers of the kernel, and of the chain, for steps of a length.
 fn exact_numbers<const B: usize, const N: usize>(
-    model: &SwitchedModel<f64, 2, B, N>,
+    model: &SwitchedModel<f64, B, N>,
     phases: Option<PhaseParts>,
     step_s: f64,
 ) -> Result<Vec<f64>, StepError> {
@@ -130,7 +130,7 @@ fn exact_numbers<const B: usize, const N: usize>(
 
 /// The longest step over which a prediction is as good as many short ones, s.
 fn longest_step_s<const B: usize, const N: usize, const L: usize>(
-    model: &SwitchedModel<f64, 2, B, N>,
+    model: &SwitchedModel<f64, B, N>,
     parts: &Parts<'_>,
 ) -> Result<f64, ExportError> {
     let limits = StrainRange { lower: f64::from(parts.limits.lower), upper: f64::from(parts.limits.upper) };

@@ -1,10 +1,9 @@
 //! Law, noise and motion as they were calibrated, in single precision.
 
-use ohmstrain_calib::{EstimatorKind, MotionParams, PhaseParams};
+use ohmstrain_calib::{MotionParams, PhaseParams};
 use ohmstrain_model::{Branch, Gauge, ModelNoise, SensorLaw, StrainRange};
 use serde::Serialize;
 
-use super::ExportError;
 use super::literal::Literal;
 
 /// The law as it was calibrated.
@@ -106,22 +105,13 @@ impl PhaseConstants {
 }
 
 impl PriorConstants {
-    /// Of a motion that the exported filter has a form for.
-    ///
-    /// # Errors
-    /// If it has none.
-    pub fn new(motion: &MotionParams, kind: EstimatorKind) -> Result<Self, ExportError> {
-        match *motion {
-            MotionParams::OrnsteinUhlenbeck { rate_time_s, rate_sd_per_s, strain_mean, strain_sd } => Ok(Self {
-                rate_time_s: Literal(rate_time_s as f32),
-                rate_sd_per_s: Literal(rate_sd_per_s as f32),
-                strain_mean: Literal(strain_mean as f32),
-                strain_sd: Literal(strain_sd as f32),
-            }),
-            MotionParams::Smooth { .. } => Err(ExportError::Unsupported {
-                what: format!("the motion of {} has an acceleration, which the exported filter has not", kind.name()),
-                instead: "calibrate again, which gives it Ornstein-Uhlenbeck motion",
-            }),
+    /// Of a motion.
+    pub const fn new(motion: &MotionParams) -> Self {
+        Self {
+            rate_time_s: Literal(motion.rate_time_s as f32),
+            rate_sd_per_s: Literal(motion.rate_sd_per_s as f32),
+            strain_mean: Literal(motion.strain_mean as f32),
+            strain_sd: Literal(motion.strain_sd as f32),
         }
     }
 

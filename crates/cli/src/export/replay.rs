@@ -51,7 +51,7 @@ fn of<const B: usize, const N: usize, const L: usize>(
 }
 
 fn run<T: Real, const B: usize, const N: usize, const L: usize>(
-    model: SwitchedModel<T, 2, B, N>,
+    model: SwitchedModel<T, B, N>,
     sensor: &FixedRate<'_, B, N>,
     numbers: Numbers<'_, T>,
     rows: &[ReplayedRow],

@@ -132,11 +132,7 @@ impl<'a, T: Real, const B: usize, const N: usize, const L: usize> Twin<'a, T, B,
     ///
     /// # Errors
     /// If the filter cannot work with its numbers.
-    pub fn new(
-        model: SwitchedModel<T, 2, B, N>,
-        parts: &Parts<'_>,
-        numbers: Numbers<'a, T>,
-    ) -> Result<Self, StepError> {
+    pub fn new(model: SwitchedModel<T, B, N>, parts: &Parts<'_>, numbers: Numbers<'a, T>) -> Result<Self, StepError> {
         let dt_s: T = number(parts.dt_s.into());
         let limits = StrainRange { lower: number(parts.limits.lower.into()), upper: number(parts.limits.upper.into()) };
         let belief = Belief::initial(&model);

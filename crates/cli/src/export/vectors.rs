@@ -89,7 +89,7 @@ pub fn relative(rest_reading: f32, input: &Input) -> Option<Reading<f32>> {
 
 /// Strain and deviation as they are reported, row by row.
 fn run<T: Real, const B: usize, const N: usize, const L: usize>(
-    model: SwitchedModel<T, 2, B, N>,
+    model: SwitchedModel<T, B, N>,
     sensor: &FixedRate<'_, B, N>,
     numbers: Numbers<'_, T>,
     inputs: &[Input],

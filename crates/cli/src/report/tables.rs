@@ -42,11 +42,10 @@ fn per_quantity(quantity: Quantity, power: usize) -> String {
 }
 
 /// The unit of the quantity's rate, or of its second derivative.
-fn per_time(quantity: Quantity, power: usize) -> String {
-    let seconds = if power > 1 { "s²" } else { "s" };
+fn per_time(quantity: Quantity) -> String {
     match quantity {
-        Quantity::Strain => format!("1/{seconds}"),
-        Quantity::AngleDeg => format!("°/{seconds}"),
+        Quantity::Strain => "1/s".into(),
+        Quantity::AngleDeg => "°/s".into(),
     }
 }
 
@@ -195,7 +194,7 @@ fn estimator(params: &SensorParams) -> Option<Table> {
     let kind = params.filter_of(params.default_estimator);
     let estimator = params.estimator(kind).ok()?;
     let (noise, own) = (&estimator.noise, unit(params.quantity));
-    let (rate, acceleration) = (per_time(params.quantity, 1), per_time(params.quantity, 2));
+    let rate = per_time(params.quantity);
     let row = |name: &str, value: f64, unit: &str| [name.to_owned(), plain(value), unit.to_owned()];
     let mut rows = vec![
         row("White noise of a reading, of R₀", noise.reading_sd, "–"),
@@ -203,25 +202,17 @@ fn estimator(params: &SensorParams) -> Option<Table> {
         row("Wander of the baseline, of R₀", noise.baseline_sd, "–"),
         row("Correlation time of the baseline", noise.baseline_time_s, "s"),
     ];
-    let (rate_sd, mean, sd) = match estimator.motion {
-        MotionParams::OrnsteinUhlenbeck { rate_time_s, rate_sd_per_s, strain_mean, strain_sd } => {
-            rows.push(row("Motion: correlation time of the rate", rate_time_s, "s"));
-            (rate_sd_per_s, strain_mean, strain_sd)
-        }
-        MotionParams::Smooth { rate_sd_per_s, acceleration_sd_per_s2, strain_mean, strain_sd } => {
-            rows.push(row("Motion: sd of the acceleration", acceleration_sd_per_s2, &acceleration));
-            (rate_sd_per_s, strain_mean, strain_sd)
-        }
-    };
-    rows.push(row("Motion: sd of the rate", rate_sd, &rate));
-    rows.push(row("Motion: mean", mean, own));
-    rows.push(row("Motion: sd", sd, own));
+    let MotionParams { rate_time_s, rate_sd_per_s, strain_mean, strain_sd } = estimator.motion;
+    rows.push(row("Motion: correlation time of the rate", rate_time_s, "s"));
+    rows.push(row("Motion: sd of the rate", rate_sd_per_s, &rate));
+    rows.push(row("Motion: mean", strain_mean, own));
+    rows.push(row("Motion: sd", strain_sd, own));
     let caption = format!("Noise and motion for the estimator “{}”", kind.name());
     Some(Table::new(&caption, ["Parameter", "Value", "Unit"], rows))
 }
 
 fn ranges(params: &SensorParams) -> Table {
-    let (own, rate) = (unit(params.quantity), per_time(params.quantity, 1));
+    let (own, rate) = (unit(params.quantity), per_time(params.quantity));
     let range = |range: RangeParams| format!("{} to {}", plain(range.lower), plain(range.upper));
     let validity = &params.validity;
     let seen = RangeParams { lower: validity.lower, upper: validity.upper };

@@ -41,7 +41,7 @@ pub use self::lane::Lane;
 /// # };
 /// # let motion = Motion::ornstein_uhlenbeck(1.0, 0.1, 0.15, 0.1)?;
 /// # let noise = ModelNoise { reading_sd: 2e-3, branch_sd: 5e-3, baseline_sd: 0.02, baseline_time_s: 30.0 };
-/// let model = SwitchedModel::<f64, 2, 1, 4>::new(law, motion, noise)?;
+/// let model = SwitchedModel::<f64, 1, 4>::new(law, motion, noise)?;
 /// let mut hand = Bank::<f64, 1, 4, 10>::new(model, 0.01, 3)?;
 /// // At the mean strain before any reading, 0.15, the curve is at 0.222.
 /// let refused = hand.step(&[0.05, f64::NAN, 0.25])?;
@@ -84,7 +84,7 @@ impl<T: Lane, const B: usize, const N: usize, const L: usize> Bank<T, B, N, L> {
     ///
     /// # Errors
     /// If `dt_s` is not a positive number.
-    pub fn new(model: SwitchedModel<T, 2, B, N>, dt_s: T, sensors: usize) -> Result<Self, StepError> {
+    pub fn new(model: SwitchedModel<T, B, N>, dt_s: T, sensors: usize) -> Result<Self, StepError> {
         let ekf = SparseEkf::new(model, dt_s)?;
         let start = Belief::<T, N, L>::initial(ekf.model());
         let zero = T::row(T::zero());
@@ -121,7 +121,7 @@ impl<T: Lane, const B: usize, const N: usize, const L: usize> Bank<T, B, N, L> {
     }
 
     /// The model they share.
-    pub const fn model(&self) -> &SwitchedModel<T, 2, B, N> {
+    pub const fn model(&self) -> &SwitchedModel<T, B, N> {
         self.ekf.model()
     }
 

@@ -1,4 +1,4 @@
-use ohmstrain_model::{Phase, Scalar, StrainRange};
+use ohmstrain_model::{MOTION_STATES, Phase, Scalar, StrainRange};
 
 use crate::{Belief, Gaussian, Real, State, StrainSensor};
 
@@ -30,8 +30,8 @@ impl<T: Real> Estimate<T> {
     /// The estimate that a state stands for. `limits` act on the reported strain only, the state goes on unrestricted;
     /// `strain_sd_scale` multiplies the strain's standard deviation (1 for none), as a calibration found it necessary.
     #[must_use]
-    pub fn new<S: State<T, N, L>, const M: usize, const B: usize, const N: usize, const L: usize>(
-        model: &impl StrainSensor<T, M, B, N>,
+    pub fn new<S: State<T, N, L>, const B: usize, const N: usize, const L: usize>(
+        model: &impl StrainSensor<T, B, N>,
         state: &S,
         limits: &StrainRange<T>,
         strain_sd_scale: T,
@@ -58,8 +58,8 @@ impl<T: Real> Estimate<T> {
         Self {
             strain,
             rate,
-            relaxation: relaxation::<T, M, B, N, L>(belief),
-            baseline: if model.has_baseline() { belief.mean[M + B] } else { T::zero() },
+            relaxation: relaxation::<T, B, N, L>(belief),
+            baseline: if model.has_baseline() { belief.mean[MOTION_STATES + B] } else { T::zero() },
             settled: Gaussian { mean: settled.0, variance: spread + wander },
             beyond_border,
             near_ramp_border: near_ramp_border(model, belief, &strain, &rate),
@@ -68,13 +68,11 @@ impl<T: Real> Estimate<T> {
 }
 
 /// Sum of the branches.
-fn relaxation<T: Scalar, const M: usize, const B: usize, const N: usize, const L: usize>(
-    belief: &Belief<T, N, L>,
-) -> Gaussian<T> {
+fn relaxation<T: Scalar, const B: usize, const N: usize, const L: usize>(belief: &Belief<T, N, L>) -> Gaussian<T> {
     let (mut mean, mut variance) = (T::zero(), T::zero());
-    for i in M..M + B {
+    for i in MOTION_STATES..MOTION_STATES + B {
         mean += belief.mean[i];
-        for j in M..M + B {
+        for j in MOTION_STATES..MOTION_STATES + B {
             variance += belief.covariance[(i, j)];
         }
     }
@@ -86,8 +84,8 @@ const NEAR: f64 = 2.0;
 
 /// Whether the reading has an extremum along the present movement, dρ/dt = 0, within two deviations of the strain. A body
 /// whose rate cannot be told from zero is on no ramp.
-fn near_ramp_border<T: Scalar, const M: usize, const B: usize, const N: usize, const L: usize>(
-    model: &impl StrainSensor<T, M, B, N>,
+fn near_ramp_border<T: Scalar, const B: usize, const N: usize, const L: usize>(
+    model: &impl StrainSensor<T, B, N>,
     belief: &Belief<T, N, L>,
     strain: &Gaussian<T>,
     rate: &Gaussian<T>,
@@ -96,7 +94,7 @@ fn near_ramp_border<T: Scalar, const M: usize, const B: usize, const N: usize, c
         return false;
     }
     let phase = if rate.mean > T::zero() { Phase::Extend } else { Phase::Retract };
-    let relaxation = core::array::from_fn(|i| belief.mean[M + i]);
+    let relaxation = core::array::from_fn(|i| belief.mean[MOTION_STATES + i]);
     let slope = |strain: T| model.law().ramp_slope(strain, rate.mean, &relaxation, phase);
     let reach = T::of(NEAR) * strain.sd();
     let (below, above) = (slope(strain.mean - reach), slope(strain.mean + reach));

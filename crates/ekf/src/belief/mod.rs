@@ -36,7 +36,7 @@ impl<T: Scalar, const N: usize, const L: usize> Belief<T, N, L> {
 
     /// Before any reading: the model's long-run distribution.
     #[must_use]
-    pub fn initial<const M: usize, const B: usize>(model: &impl StrainSensor<T, M, B, N>) -> Self {
+    pub fn initial<const B: usize>(model: &impl StrainSensor<T, B, N>) -> Self {
         let (mean, variance) = model.initial_distribution();
         Self::independent(mean, &variance)
     }

@@ -50,9 +50,9 @@ pub(crate) struct BranchConstants<T, const B: usize> {
 
 impl<T: Scalar, const B: usize> StepConstants<T, B> {
     /// Of steps of `dt_s > 0` seconds; a rate is clear if its square is not less than `clear` variances.
-    pub(crate) fn new<const N: usize>(model: &SwitchedModel<T, 2, B, N>, dt_s: T, clear: T) -> Self {
+    pub(crate) fn new<const N: usize>(model: &SwitchedModel<T, B, N>, dt_s: T, clear: T) -> Self {
         let step = model.prepare(dt_s);
-        let response: &Response<T, 2, B> = step.response();
+        let response: &Response<T, B> = step.response();
         let motion = model.motion();
         let push = motion.restoring()[0] * motion.rest_strain();
         let phase_push = motion.restoring()[1] * motion.phase_rate();

@@ -32,7 +32,7 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
         let push = self.push(before != Phase::Retract, like);
         let (expected, spread) = answered(step.rate_change, (push, like.nothing()), from);
         let expected = if before == Phase::Retract { -expected } else { expected };
-        RateChange { expected, spread, noise: like.with(step.noise[2]), is_brownian: true }
+        RateChange { expected, spread, noise: like.with(step.noise[2]) }
     }
     /// What a rate of the sign of `before` leaves open over a step, as
     /// [`SwitchedModel::turning`](ohmstrain_model::SwitchedModel::turning).

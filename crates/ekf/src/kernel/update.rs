@@ -42,7 +42,7 @@ struct OfMotion<V> {
 }
 
 impl<T: Scalar, G: Curve<T>> ReadingLaw<T, G> {
-    pub(crate) fn new<const B: usize, const N: usize>(model: &SwitchedModel<T, 2, B, N>) -> Option<Self> {
+    pub(crate) fn new<const B: usize, const N: usize>(model: &SwitchedModel<T, B, N>) -> Option<Self> {
         let law = model.law();
         Some(Self {
             curve: G::new(&law.gauge, &law.range)?,

@@ -107,8 +107,8 @@ macro_rules! sparse_steps {
         /// See [`StepError`]; a step that went forward goes backward.
         pub fn smooth_back<const L: usize>(
             &self,
-            dense: &$crate::$dense<T, SwitchedModel<T, 2, B, N>, K>,
-            prepared: &(ohmstrain_model::SwitchedStep<T, 2, B>, T),
+            dense: &$crate::$dense<T, SwitchedModel<T, B, N>, K>,
+            prepared: &(ohmstrain_model::SwitchedStep<T, B>, T),
             filtered: &SparseMixture<T, N, L, K>,
             reading: Option<Reading<T>>,
             next: &SparseMixture<T, N, L, K>,
@@ -135,7 +135,7 @@ mod tests {
     use crate::mixture::LIGHTER;
     use crate::{Belief, Estimator, Evidence, Mixture, SignSplit, SparseMixture, SparseSignSplit};
 
-    type Dense = SignSplit<f64, SwitchedModel<f64, 2, 0, 3>, 4>;
+    type Dense = SignSplit<f64, SwitchedModel<f64, 0, 3>, 4>;
     type Sparse = SparseSignSplit<f64, 0, 3, 4>;
     type State = SparseMixture<f64, 3, 6, 4>;
 

@@ -38,7 +38,7 @@ impl<T: Real, const B: usize, const N: usize, const K: usize> SparseHypotheses<T
     /// # Errors
     /// If `dt_s` is not a positive number.
     pub fn new(
-        model: SwitchedModel<T, 2, B, N>,
+        model: SwitchedModel<T, B, N>,
         dt_s: T,
         dwell: Dwell<T>,
         evidence: Evidence<T>,
@@ -62,7 +62,7 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
     }
 
     /// The model.
-    pub const fn model(&self) -> &SwitchedModel<T, 2, B, N> {
+    pub const fn model(&self) -> &SwitchedModel<T, B, N> {
         self.kernel.model()
     }
 

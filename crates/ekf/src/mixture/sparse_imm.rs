@@ -53,7 +53,7 @@ impl<T: Real, const B: usize, const N: usize> SparseImm<T, B, N> {
     /// # Errors
     /// If `dt_s` is not a positive number.
     pub fn new(
-        model: SwitchedModel<T, 2, B, N>,
+        model: SwitchedModel<T, B, N>,
         dt_s: T,
         dwell: Dwell<T>,
         evidence: Evidence<T>,
@@ -76,7 +76,7 @@ impl<T: Real, const B: usize, const N: usize, S: Switch<T>, G: Curve<T>> SparseI
     }
 
     /// The model.
-    pub const fn model(&self) -> &SwitchedModel<T, 2, B, N> {
+    pub const fn model(&self) -> &SwitchedModel<T, B, N> {
         self.kernel.model()
     }
 

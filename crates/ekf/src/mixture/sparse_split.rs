@@ -43,7 +43,7 @@ impl<T: Real, const B: usize, const N: usize, const K: usize> SparseSignSplit<T,
     /// # Errors
     /// If `dt_s` is not a positive number.
     pub fn new(
-        model: SwitchedModel<T, 2, B, N>,
+        model: SwitchedModel<T, B, N>,
         dt_s: T,
         hold: Option<Dwell<T>>,
         evidence: Evidence<T>,
@@ -68,7 +68,7 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
     }
 
     /// The model.
-    pub const fn model(&self) -> &SwitchedModel<T, 2, B, N> {
+    pub const fn model(&self) -> &SwitchedModel<T, B, N> {
         self.kernel.model()
     }
 

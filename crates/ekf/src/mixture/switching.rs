@@ -9,7 +9,7 @@ use crate::{Belief, Channel, Component, Dynamics};
 
 /// A model whose dynamics depend on the phase: what a filter of phase hypotheses needs besides.
 pub trait Phased<T: Scalar, const N: usize, const L: usize>: Dynamics<T, N, L> + Channel<T, N, L> {
-    /// The same belief at the moment a moving phase begins: rate (and acceleration) drawn anew from the phase's prior,
+    /// The same belief at the moment a moving phase begins: rate drawn anew from the phase's prior,
     /// independent of everything else.
     fn enter(&self, from: &Belief<T, N, L>, phase: Phase) -> Belief<T, N, L>;
 
@@ -52,7 +52,7 @@ const LONGEST: f64 = 0.02;
 const HALF_NORMAL: (f64, f64) = (0.797_884_560_802_865_4, 0.363_380_227_632_418_6);
 
 /// The rate that a moving phase begins with; of no meaning for a hold.
-pub(crate) fn fresh_rate<T: Scalar, const M: usize>(motion: &Motion<T, M>, phase: Phase) -> Gaussian<T> {
+pub(crate) fn fresh_rate<T: Scalar>(motion: &Motion<T>, phase: Phase) -> Gaussian<T> {
     let sign = if phase == Phase::Retract { -T::one() } else { T::one() };
     let variance = motion.stationary_variance()[1];
     if motion.phase_rate() > T::zero() {
@@ -61,33 +61,24 @@ pub(crate) fn fresh_rate<T: Scalar, const M: usize>(motion: &Motion<T, M>, phase
     Gaussian { mean: sign * T::of(HALF_NORMAL.0) * variance.sqrt(), variance: T::of(HALF_NORMAL.1) * variance }
 }
 
-/// So many longest steps are two thirds of the integral of a rate's squared correlation: of exp(-t/T), and of (1 + x) exp(-x) for
-/// a smooth one.
-const FORGETS: (f64, f64) = (1.0, 2.5);
-
-/// Seconds without a reading after which a step leaves the direction open.
-pub(crate) fn forgets_direction_s<T: Scalar, const M: usize, const B: usize, const N: usize>(
-    model: &SwitchedModel<T, M, B, N>,
-) -> T {
+/// Seconds without a reading after which a step leaves the direction open: the longest step, which is two thirds of the integral of
+/// the rate's squared correlation.
+pub(crate) fn forgets_direction_s<T: Scalar, const B: usize, const N: usize>(model: &SwitchedModel<T, B, N>) -> T {
     if !model.motion().phase_rate().is_zero() {
         return T::one() / T::zero();
     }
-    T::of(if M == 2 { FORGETS.0 } else { FORGETS.1 }) * model.longest_step_s()
+    model.longest_step_s()
 }
 
-/// Draws rate and acceleration anew from the motion's prior of a phase.
-fn renew<T: Scalar, const M: usize, const N: usize, const L: usize>(
-    motion: &Motion<T, M>,
+/// Draws the rate anew from the motion's prior of a phase.
+fn renew<T: Scalar, const N: usize, const L: usize>(
+    motion: &Motion<T>,
     from: &Belief<T, N, L>,
     phase: Phase,
 ) -> Belief<T, N, L> {
     let mut out = *from;
-    for i in 1..M {
-        for j in 0..N {
-            out.covariance[(i, j)] = T::zero();
-        }
-        out.mean[i] = T::zero();
-        out.covariance[(i, i)] = motion.stationary_variance()[i];
+    for j in 0..N {
+        out.covariance[(1, j)] = T::zero();
     }
     let rate = fresh_rate(motion, phase);
     out.mean[1] = rate.mean;
@@ -95,16 +86,14 @@ fn renew<T: Scalar, const M: usize, const N: usize, const L: usize>(
     out
 }
 
-impl<T: Scalar, const M: usize, const B: usize, const N: usize, const L: usize> Phased<T, N, L>
-    for SwitchedModel<T, M, B, N>
-{
+impl<T: Scalar, const B: usize, const N: usize, const L: usize> Phased<T, N, L> for SwitchedModel<T, B, N> {
     fn enter(&self, from: &Belief<T, N, L>, phase: Phase) -> Belief<T, N, L> {
         renew(self.motion(), from, phase)
     }
 
     fn transition_between(
         &self,
-        step: &SwitchedStep<T, M, B>,
+        step: &SwitchedStep<T, B>,
         from: &Belief<T, N, L>,
         before: Phase,
         after: Phase,
@@ -122,7 +111,7 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize, const L: usize> 
     }
 
     fn renewed(&self) -> Range<usize> {
-        1..M
+        1..2
     }
 }
 

@@ -4,7 +4,7 @@ mod rejuvenation;
 pub use cloud::{Particle, ParticleCloud};
 
 use nalgebra::SVector;
-use ohmstrain_model::{Direction, Phase, Scalar, SwitchedModel, SwitchedStep, Symmetric};
+use ohmstrain_model::{Direction, MOTION_STATES, Phase, Scalar, SwitchedModel, SwitchedStep, Symmetric};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 
@@ -20,7 +20,7 @@ use crate::{Advanced, Belief, Dwell, Estimator, Evidence, Innovation, Reading, S
 /// holds, the kernel that keeps them apart), so where it is no better than [`SignSplit`](crate::SignSplit), the law
 /// limits and not the estimator.
 ///
-/// A particle is a strain, its derivatives and a phase. Given their path, branches and baseline are linear and Gaussian:
+/// A particle is a strain, a rate and a phase. Given their path, branches and baseline are linear and Gaussian:
 /// each particle has a Kalman mean of them, and one covariance and one gain serve all particles. Paths follow the
 /// model's own dynamics, are weighted by the likelihood of the reading, and are resampled when the effective sample size
 /// falls below half their number.
@@ -74,7 +74,7 @@ impl<T: Scalar, M> Particles<T, M> {
     }
 }
 
-impl<T: Scalar, const M: usize, const B: usize, const N: usize> Particles<T, SwitchedModel<T, M, B, N>> {
+impl<T: Scalar, const B: usize, const N: usize> Particles<T, SwitchedModel<T, B, N>> {
     /// A cloud with the given moments, in `phase`: at rest in a hold (if the filter knows holds), otherwise moving, each
     /// path in the direction of its own rate.
     ///
@@ -86,7 +86,7 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize> Particles<T, Swi
         // columns are the covariance of the rest given the motion.
         let root = SemiDefinite::factor(&belief.covariance);
         let columns: [SVector<T, N>; N] = core::array::from_fn(|i| root.column(i));
-        let (motion, rest) = columns.split_at(M);
+        let (motion, rest) = columns.split_at(MOTION_STATES);
         let mut covariance = Symmetric::zeros();
         for column in rest {
             covariance.add_outer(column, T::one());
@@ -113,7 +113,7 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize> Particles<T, Swi
     pub fn step_prepared<const L: usize>(
         &self,
         cloud: &ParticleCloud<T, N, L>,
-        prepared: &SwitchedStep<T, M, B>,
+        prepared: &SwitchedStep<T, B>,
         dt_s: T,
         reading: Option<Reading<T>>,
     ) -> Result<ParticleStep<T, N, L>, StepError> {
@@ -137,10 +137,10 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize> Particles<T, Swi
     }
 
     /// Leads every path a step on.
-    fn predict<const L: usize>(&self, cloud: &mut ParticleCloud<T, N, L>, prepared: &SwitchedStep<T, M, B>, dt_s: T) {
+    fn predict<const L: usize>(&self, cloud: &mut ParticleCloud<T, N, L>, prepared: &SwitchedStep<T, B>, dt_s: T) {
         let root = SemiDefinite::factor(&self.model.path_noise::<L>(prepared));
         let columns: [SVector<T, N>; N] = core::array::from_fn(|i| root.column(i));
-        let (moved, _) = columns.split_at(M + B);
+        let (moved, _) = columns.split_at(MOTION_STATES + B);
         let chain = self.hold.map(|dwell| dwell.probabilities(dt_s));
         for particle in &mut cloud.particles {
             if let Some(chain) = &chain {
@@ -172,12 +172,10 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize> Particles<T, Swi
         }
     }
 
-    /// Draws rate and acceleration from the prior of the phase that begins.
+    /// Draws the rate from the prior of the phase that begins.
     fn set_off(&self, particle: &mut Particle<T, N>, chance: &mut Chance) {
         let motion = self.model.motion();
-        for i in 1..M {
-            particle.state[i] = motion.stationary_variance()[i].sqrt() * chance.normal();
-        }
+        particle.state[1] = motion.stationary_variance()[1].sqrt() * chance.normal();
         let speed = if motion.phase_rate() > T::zero() {
             motion.phase_rate() + particle.state[1]
         } else {
@@ -228,12 +226,12 @@ impl<T: Scalar, const M: usize, const B: usize, const N: usize> Particles<T, Swi
     }
 }
 
-impl<T: Scalar, const M: usize, const B: usize, const N: usize, const L: usize> Estimator<T, N, L>
-    for Particles<T, SwitchedModel<T, M, B, N>>
+impl<T: Scalar, const B: usize, const N: usize, const L: usize> Estimator<T, N, L>
+    for Particles<T, SwitchedModel<T, B, N>>
 {
     type State = ParticleCloud<T, N, L>;
     /// The model's step, and its length for the chain of phases.
-    type Prepared = (SwitchedStep<T, M, B>, T);
+    type Prepared = (SwitchedStep<T, B>, T);
 
     /// A path knows its direction at the ends of a step only: it needs shorter ones than a Gaussian.
     fn longest_step_s(&self) -> T {

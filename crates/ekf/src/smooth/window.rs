@@ -17,7 +17,7 @@ use crate::{Estimator, PastStep, Reading, StepError, smooth_back_through};
 /// # };
 /// # let motion = Motion::ornstein_uhlenbeck(1.0, 0.1, 0.15, 0.1)?;
 /// # let noise = ModelNoise { reading_sd: 2e-3, branch_sd: 0.0, baseline_sd: 0.0, baseline_time_s: 1.0 };
-/// # let model = SwitchedModel::<f64, 2, 0, 2>::new(law, motion, noise)?;
+/// # let model = SwitchedModel::<f64, 0, 2>::new(law, motion, noise)?;
 /// let ekf = Ekf::new(model);
 /// let start: Belief<f64, 2, 3> = Belief::initial(&model);
 /// let mut window: Window<_, _, _, 8> = Window::new(start);

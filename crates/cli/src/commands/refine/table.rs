@@ -1,7 +1,6 @@
 use std::io::Write;
 
 use comfy_table::{Table, presets};
-use ohmstrain_calib::MotionParams;
 use ohmstrain_calib::likelihood::{Bound, LogLikelihood, NoiseFit, NoiseParameter, NoiseStart, ProfileInterval};
 
 use crate::error::CliError;
@@ -59,9 +58,6 @@ pub fn write(out: &mut dyn Write, refinement: &Refinement) -> Result<(), CliErro
         NoiseParameter::ALL.iter().filter(|each| !free.contains(each)).map(|each| each.name()).collect();
     if !held.is_empty() {
         writeln!(out, "held: {}", held.join(", "))?;
-    }
-    if let MotionParams::Smooth { .. } = start.motion {
-        writeln!(out, "rate_time_s is rate_sd_per_s / acceleration_sd_per_s2")?;
     }
     Ok(())
 }

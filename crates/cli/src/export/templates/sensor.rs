@@ -25,7 +25,7 @@ pub const STATES: usize = BRANCHES + 3;
 pub const ENTRIES: usize = STATES * (STATES + 1) / 2;
 
 /// The model of this sensor.
-pub type Model = SwitchedModel<f32, 2, BRANCHES, STATES>;
+pub type Model = SwitchedModel<f32, BRANCHES, STATES>;
 {% if estimator.hypotheses %}
 /// Hypotheses that are followed at once.
 pub const HYPOTHESES: usize = << estimator.hypotheses >>;
