@@ -9,7 +9,7 @@ pub(crate) struct MotionStats {
     pub rate_sd: f64,
     /// Time after which the rate's autocorrelation has fallen to 1/e.
     pub rate_time_s: f64,
-    /// Mean durations of holds and of movements in one direction; `None` for a body that never rests.
+    /// Mean durations of holds and of movements in one direction; `None` for a body that does not rest ([`PhaseDurations::rests`]).
     pub hold_s: Option<f64>,
     pub move_s: f64,
     /// Share of movements that another one follows without a hold.
@@ -53,7 +53,7 @@ impl MotionStats {
             strain_sd: root_mean_square(&deviations),
             rate_sd: root_mean_square(&rates),
             rate_time_s: mean(&times),
-            hold_s: (!phases.holds.is_empty()).then(|| mean(&phases.holds)),
+            hold_s: phases.rests().then(|| mean(&phases.holds)),
             move_s: if phases.moves.is_empty() { longest_s } else { mean(&phases.moves) },
             reversal: phases.reversal(),
             speed: phases.speed_at(1, 2),
@@ -64,6 +64,10 @@ impl MotionStats {
         }
     }
 }
+
+/// Below this share of its time at rest a body does not rest, it turns around: a sine's rate is below [`REST_SHARE`] of
+/// its fast ones for (2/π) asin(0.05 · sin 81°) = 3 % of the time. Three times that.
+const LEAST_REST: f64 = 0.1;
 
 /// Durations of holds and movements.
 #[derive(Default)]
@@ -96,6 +100,12 @@ impl PhaseDurations {
             start = k;
         }
         self.speeds.extend(rate.iter().filter(|v| phase(**v) != 0).map(|v| v.abs()));
+    }
+
+    /// Whether the body rests, and not only for the moment in which it turns around.
+    fn rests(&self) -> bool {
+        let (at_rest, moving): (f64, f64) = (self.holds.iter().sum(), self.moves.iter().sum());
+        !self.holds.is_empty() && at_rest >= LEAST_REST * (at_rest + moving)
     }
 
     /// Every hold ends one movement; the movements beyond that turned around.
