@@ -50,3 +50,16 @@ fn what_no_sensor_reads_is_as_good_as_missing() {
         }
     }
 }
+
+/// At rest for ten seconds, and then up by a third of the range within eight rows: whoever waits for ten readings misses all of it.
+#[test]
+fn a_gate_lets_a_body_set_off() {
+    let reading = |k: i32| 2000.0 + f64::from(k % 3 - 1) + 100.0 * f64::from((k - 200).clamp(0, 8));
+    for gate in [3.0, 6.6, 10.8] {
+        let mut filter = sensor().filter().gate(gate).build().unwrap();
+        let rows: Vec<Estimate> = (0..240).map(|k| filter.step(0.05 * f64::from(k), reading(k)).unwrap()).collect();
+        let rejected = rows.iter().filter(|row| row.flags.has(Flag::Rejected)).count();
+        assert!((1..=2).contains(&rejected), "gate {gate}: {rejected} of eight readings are turned down");
+        assert!(rows[200..208].iter().any(|row| row.flags.has(Flag::Readmitted)), "gate {gate}");
+    }
+}

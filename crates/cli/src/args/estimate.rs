@@ -26,7 +26,7 @@ pub struct EstimateArgs {
     /// unit, or first:N for the median of the first N readings
     #[arg(long, value_name = "OHM|first:N")]
     pub rest_resistance: Option<RestResistance>,
-    /// Turn down readings whose normalised innovation squared (column nis) is above X, ten in a row at most
+    /// Turn down readings whose normalised innovation squared (column nis) is above X, two in a row at most
     #[arg(long, value_name = "X", value_parser = positive)]
     pub gate: Option<f64>,
     /// How surprising readings are taken: redescending:K, the less the farther beyond K standard deviations, huber:K,

@@ -187,7 +187,7 @@ class Sensor:
         rest_resistance : float
             What the rested, unstretched sensor reads now, in place of what it read in calibration.
         gate : float
-            Turn down readings whose normalised innovation squared is above this, ten in a row at most.
+            Turn down readings whose normalised innovation squared is above this, two in a row at most.
         influence : str
             How surprising readings are taken: ``redescending:K`` (``redescending:3`` by default), ``huber:K``,
             ``student-t:DOF`` or ``none``, as they are.
