@@ -144,3 +144,28 @@ pub(crate) fn root_mean_square(x: &[f64]) -> f64 {
 pub(crate) fn moving_mean(x: &[f64]) -> Vec<f64> {
     (0..x.len()).map(|k| mean(&x[k.saturating_sub(HALF_WINDOW)..(k + HALF_WINDOW + 1).min(x.len())])).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn hold_s(strain: impl Fn(f64) -> f64) -> Option<f64> {
+        let time_s: Vec<f64> = (0..3000).map(|k| 0.1 * f64::from(k)).collect();
+        let (strain, reading): (Vec<f64>, Vec<f64>) = time_s.iter().map(|t| (strain(*t), 1000.0)).unzip();
+        MotionStats::new(&[Samples::new(&time_s, &reading, &strain).unwrap()]).hold_s
+    }
+
+    /// At its turns a sine is slow for 3 % of the time; that is no hold.
+    #[test]
+    fn a_body_that_turns_around_does_not_rest() {
+        assert_eq!(hold_s(|t| 0.15 * (1.0 - (std::f64::consts::TAU * t / 30.0).cos())), None);
+    }
+
+    /// Up in 5 s, held for 10, down in 5, held for 10. Averages over five rows round off the corners by half their width.
+    #[test]
+    fn holds_between_movements_are_rest() {
+        let ramps = |t: f64| 0.3 * ((t % 30.0) / 5.0).min(1.0).min((20.0 - t % 30.0) / 5.0).max(0.0);
+        let held = hold_s(ramps).unwrap();
+        assert!((held - 10.0).abs() < 0.5, "{held} s");
+    }
+}
