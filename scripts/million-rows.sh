@@ -111,6 +111,6 @@ memory smooth ekf yes
 memory smooth corrected no
 cat <<END
 
-\`filter\` holds one row. \`smooth\` holds the readings, 16 bytes a row (25 for converter codes), the states of 4096 rows and
-one state per 4096 rows; estimates wait in a temporary file once they exceed 16 MB.
+\`filter\` holds one row. \`smooth\` holds the states of 4096 rows and one state per 4096 rows; readings and estimates wait in
+temporary files once they exceed 16 MB.
 END

@@ -132,15 +132,11 @@ pub fn calibrate(
     kinds: &[EstimatorKind],
     progress: impl FnMut(Stage),
 ) -> Result<Calibration, CalibrationError> {
-    calibrate_with_prior(recordings, structures, kinds, None, progress)
+    calibrate_once(recordings, structures, kinds, None, progress)
 }
 
-/// The same for one more sensor of a make that is known. A prior brings the law's structure; `structures` counts without one.
-/// Noise and motion start from it, and the filter that the others correct is the only candidate for a correction.
-///
-/// # Errors
-/// As [`calibrate`].
-pub fn calibrate_with_prior(
+/// [`calibrate`] with a prior, or without.
+pub(crate) fn calibrate_once(
     recordings: &[Samples],
     structures: &[LawOptions],
     kinds: &[EstimatorKind],

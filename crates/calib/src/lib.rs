@@ -66,7 +66,7 @@ pub use baselines::{Baseline, Baselines, Features, Fir, LeakyBank, LowPassMode, 
 #[cfg(feature = "bootstrap")]
 pub use bootstrap::{Bootstrap, bootstrap_law};
 pub use build_filter::{HISTORIES, HYPOTHESES, PARTICLE_SEED, build_filter};
-pub use calibrate::{Calibration, Stage, calibrate, calibrate_with_prior};
+pub use calibrate::{Calibration, Stage, calibrate};
 pub use corrected::SURPRISING_NIS;
 pub use correction_params::{CorrectionParams, CorrectorParams, FUTURE_FEATURES, TrainingRow};
 pub use error::CalibrationError;
@@ -84,7 +84,7 @@ pub use params::{
     FORMAT, JointParams, Quantity, RangeParams, ReadingUnit, RecordingInfo, SensorParams, Uncertainty, Validity,
 };
 pub use portable::{PortableCorrection, PortableFilter, PortableProcess, PortableSieve};
-pub use prior::{CorrectionPrior, EstimatorPrior, FEWEST_SENSORS, LawPrior, PRIOR_FORMAT, Prior};
+pub use prior::{CorrectionPrior, EstimatorPrior, FEWEST_SENSORS, LawPrior, PRIOR_FORMAT, Prior, calibrate_with_prior};
 pub use recipe::{RECIPE, Recipe};
 pub use samples::{Samples, SamplesError};
 pub use scores::{ScoredRow, Scores};

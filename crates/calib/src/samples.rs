@@ -120,6 +120,11 @@ impl<'a> Samples<'a> {
         Self { time_s: &self.time_s[..rows], reading: &self.reading[..rows], strain: &self.strain[..rows] }
     }
 
+    /// Time from the first row to the last, s.
+    pub(crate) fn duration_s(&self) -> f64 {
+        self.time_s.last().zip(self.time_s.first()).map_or(0.0, |(last, first)| last - first)
+    }
+
     /// Number of rows.
     #[must_use]
     pub fn len(&self) -> usize {

@@ -1,62 +1,153 @@
-use std::io::Read;
+use std::cell::RefCell;
+use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
 
 use ohmstrain::Reading;
 use ohmstrain_bench_data::TraceReader;
+use tempfile::SpooledTempFile;
 
 use crate::error::CliError;
 
-/// The readings of a long recording, and nothing else of it: 16 bytes a row, 25 for those of a converter.
+/// Bytes that wait in memory; more of them wait in a temporary file.
+pub const WAIT_IN_MEMORY: usize = 16 << 20;
+
+/// The readings of a recording that may be longer than memory, and nothing else of it: what exceeds 16 MB waits in a temporary
+/// file, and rows are taken out of it by the thousand.
 pub struct Readings {
-    time_s: Vec<f64>,
-    values: Vec<f64>,
-    converter: Option<Converter>,
+    /// Of a row: time, value and, for those of a converter, deviation and a byte that says whether it was saturated.
+    has_codes: bool,
+    len: usize,
+    kept: RefCell<Kept>,
 }
 
-/// What a converter's codes tell beyond the resistance.
-#[derive(Default)]
-struct Converter {
-    sd_ohm: Vec<f64>,
-    saturated: Vec<bool>,
+/// The file, and the rows around the one that was asked for last.
+struct Kept {
+    file: SpooledTempFile,
+    first: usize,
+    rows: Vec<(f64, Reading)>,
+    bytes: Vec<u8>,
+    /// Why rows cannot be taken out again.
+    failed: Option<io::Error>,
 }
+
+/// Rows taken out at once: those of a segment of the smoother, which goes through it twice.
+const AT_ONCE: usize = 4096;
+const NUMBER: usize = size_of::<f64>();
 
 impl Readings {
     /// Reads what is left in `rows`, at least one.
     pub fn collect<R: Read>(mut rows: TraceReader<R>) -> Result<Self, CliError> {
-        let converter = rows.has_codes().then(Converter::default);
-        let mut kept = Self { time_s: Vec::new(), values: Vec::new(), converter };
+        let has_codes = rows.has_codes();
+        let mut out = BufWriter::new(tempfile::spooled_tempfile(WAIT_IN_MEMORY));
+        let mut len = 0;
         for row in rows.by_ref() {
             let row = row?;
-            kept.time_s.push(row.time_s);
-            kept.values.push(row.reading.value);
-            if let Some(converter) = &mut kept.converter {
-                converter.sd_ohm.push(row.reading.sd_ohm.unwrap_or(f64::NAN));
-                converter.saturated.push(row.reading.saturated);
+            let mut put = |number: f64| out.write_all(&number.to_le_bytes()).map_err(|error| temporary(&error));
+            put(row.time_s)?;
+            put(row.reading.value)?;
+            if has_codes {
+                put(row.reading.sd_ohm.unwrap_or(f64::NAN))?;
+                out.write_all(&[row.reading.saturated.into()]).map_err(|error| temporary(&error))?;
             }
+            len += 1;
         }
-        if kept.values.is_empty() { Err(no_row(&rows)) } else { Ok(kept) }
+        if len == 0 {
+            return Err(no_row(&rows));
+        }
+        let file = out.into_inner().map_err(|error| temporary(error.error()))?;
+        let kept = Kept { file, first: 0, rows: Vec::new(), bytes: Vec::new(), failed: None };
+        Ok(Self { has_codes, len, kept: RefCell::new(kept) })
     }
 
     /// Number of rows.
-    pub fn len(&self) -> usize {
-        self.values.len()
+    pub const fn len(&self) -> usize {
+        self.len
     }
 
     /// All readings as recorded; NaN where missing.
     pub fn values(&self) -> impl Iterator<Item = f64> {
-        self.values.iter().copied()
+        (0..self.len).map(|row| self.row(row).1.value)
     }
 
-    /// Time, s, and reading of a row.
+    /// Time, s, and reading of a row; NaN if it cannot be taken out, which [`Self::whole`] then says.
     pub fn row(&self, row: usize) -> (f64, Reading) {
-        let value = self.values[row];
-        let (sd, saturated) =
-            self.converter.as_ref().map_or((0.0, false), |converter| (converter.sd_ohm[row], converter.saturated[row]));
-        (self.time_s[row], Reading { value, sd, saturated })
+        let mut kept = self.kept.borrow_mut();
+        if kept.failed.is_none() && (kept.rows.is_empty() || row / AT_ONCE != kept.first / AT_ONCE) {
+            let first = row - row % AT_ONCE;
+            kept.failed = kept.take_out(first, AT_ONCE.min(self.len - first), self.has_codes).err();
+        }
+        let known = kept.failed.is_none().then(|| kept.rows[row - kept.first]);
+        known.unwrap_or((f64::NAN, Reading { value: f64::NAN, sd: 0.0, saturated: false }))
     }
+
+    /// Whether all rows that were asked for could be taken out.
+    pub fn whole(&self) -> Result<(), CliError> {
+        self.kept.borrow().failed.as_ref().map_or(Ok(()), |error| Err(temporary(error)))
+    }
+}
+
+impl Kept {
+    fn take_out(&mut self, first: usize, count: usize, has_codes: bool) -> io::Result<()> {
+        let row_len = if has_codes { 3 * NUMBER + 1 } else { 2 * NUMBER };
+        self.bytes.resize(count * row_len, 0);
+        self.file.seek(SeekFrom::Start((first * row_len) as u64))?;
+        self.file.read_exact(&mut self.bytes)?;
+        self.first = first;
+        self.rows.clear();
+        self.rows.extend(self.bytes.chunks_exact(row_len).map(unpacked));
+        Ok(())
+    }
+}
+
+fn unpacked(row: &[u8]) -> (f64, Reading) {
+    let (numbers, saturated) = row.as_chunks::<NUMBER>();
+    let number = |place: usize| numbers.get(place).map(|bytes| f64::from_le_bytes(*bytes));
+    let reading = Reading {
+        value: number(1).unwrap_or(f64::NAN),
+        sd: number(2).unwrap_or(0.0),
+        saturated: saturated.first().is_some_and(|byte| *byte != 0),
+    };
+    (number(0).unwrap_or(f64::NAN), reading)
+}
+
+/// The temporary file fails, which is not a closed pipe.
+pub fn temporary(error: &io::Error) -> CliError {
+    CliError::Other(format!("cannot keep rows in a temporary file: {error}"))
 }
 
 /// A recording has ended before its first row.
 pub fn no_row<R: Read>(rows: &TraceReader<R>) -> CliError {
     let none = "expected at least one row of data, found the end of the file";
     CliError::Input(format!("{}:{}: {none}", rows.file(), rows.line() + 1))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fmt::Write as _;
+
+    use super::*;
+
+    /// Rows in the order in which a smoother asks: forward, then segment by segment backwards. As many as exceed what waits
+    /// in memory, and few.
+    #[test]
+    fn rows_come_out_as_they_went_in() {
+        for rows in [10, WAIT_IN_MEMORY / (2 * NUMBER) + 5000] {
+            let mut text = String::from("time_s,resistance_ohm\n");
+            let value = |row: usize| if row % 7 == 3 { None } else { Some(1000 + row % 911) };
+            for row in 0..rows {
+                let cell = value(row).map_or_else(String::new, |value| value.to_string());
+                writeln!(text, "{row},{cell}").unwrap();
+            }
+            let readings = Readings::collect(TraceReader::new(text.as_bytes(), "t.csv").unwrap()).unwrap();
+            assert_eq!(readings.len(), rows);
+            assert_eq!(readings.kept.borrow().file.is_rolled(), rows > 10);
+            let backwards = (0..rows.div_ceil(AT_ONCE)).rev().flat_map(|at| at * AT_ONCE..rows.min((at + 1) * AT_ONCE));
+            for row in (0..rows).chain(backwards) {
+                let (time_s, reading) = readings.row(row);
+                assert!(time_s == row as f64 && reading.sd == 0.0 && !reading.saturated);
+                assert_eq!(reading.value.is_finite().then_some(reading.value as usize), value(row), "row {row}");
+            }
+            assert!(readings.kept.borrow().rows.len() <= AT_ONCE);
+            readings.whole().unwrap();
+        }
+    }
 }

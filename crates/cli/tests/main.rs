@@ -15,6 +15,7 @@ mod explain;
 mod export;
 mod figures;
 mod fit_law;
+mod fleet;
 mod guide;
 mod hand;
 mod hostile_readings;

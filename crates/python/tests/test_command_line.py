@@ -75,3 +75,18 @@ def compare(evaluation, printed):
         expected = printed if of == "filter" else printed["smoother"] if of == "smoother" else printed["baselines"][of]
         for name in ("n", "rmse", "bias", "rmse_percent_fs", "coverage_95", "log_score"):
             assert getattr(evaluation[of], name) == expected[name], (of, name)
+
+
+def test_a_prior(folder, trace, sensor, tmp_path):
+    run(folder, "fleet", "fit", "sensor.toml", "sensor.toml", "sensor.toml", "-o", "prior.toml")
+    prior = oh.Prior.fit([sensor] * 3)
+    prior.save(tmp_path / "prior.toml")
+    assert (tmp_path / "prior.toml").read_text() == (folder / "prior.toml").read_text()
+    flags = ("--until", "20", "--estimator", "sign-split", "--prior", "prior.toml")
+    run(folder, "calibrate", "trace.csv", "-o", "taught.toml", *flags)
+    short = trace[trace["time_s"] < 20]
+    taught = oh.calibrate(short, estimator="sign-split", prior=prior).params
+    expected = oh.Sensor.load(folder / "taught.toml").params
+    assert [taught[part] for part in ("law", "estimators")] == [expected[part] for part in ("law", "estimators")]
+    with pytest.raises(oh.OhmstrainError, match="format"):
+        oh.calibrate(short, prior=folder / "sensor.toml")

@@ -4,6 +4,7 @@
 //! further rows, the search for noise and motion starts from it and is pulled toward it, and the correction learns from some
 //! rows of every sensor beside the new one's own. R₀ is every sensor's own.
 
+mod calibrate;
 mod law;
 mod learn;
 mod noise;
@@ -16,6 +17,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+pub use calibrate::calibrate_with_prior;
 pub use law::LawPrior;
 pub(crate) use learn::is_covariance;
 pub use noise::EstimatorPrior;

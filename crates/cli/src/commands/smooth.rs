@@ -1,5 +1,4 @@
 use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
-use std::ops::Range;
 
 use ohmstrain::{Estimate, FilterBuilder, Sensor, ValidityWatch};
 use tempfile::SpooledTempFile;
@@ -8,13 +7,14 @@ use crate::args::{Format, SmoothArgs};
 use crate::error::CliError;
 use crate::estimates::{EstimateWriter, Packed, columns};
 use crate::input::{self, check_unit};
-use crate::readings::Readings;
+use crate::readings::{Readings, WAIT_IN_MEMORY, temporary};
 use crate::run::{builder, rest_resistance};
 use crate::sensor_file;
 use crate::suits;
 
-/// Smooths a recording and writes its estimates, all of them or none. Of a long one, readings and rates are held in memory, and
-/// the states of a few thousand rows; estimates, which come out last segment first, wait in a temporary file.
+/// Smooths a recording and writes its estimates, all of them or none. Of a long one the states of a few thousand rows are in
+/// memory, and one state for as many others; readings, and estimates, which come out last segment first, wait in temporary
+/// files.
 pub fn run(args: &SmoothArgs) -> Result<(), CliError> {
     let wanted = args.estimate.estimator.chosen().map(|estimator| estimator.0);
     let mut sensor = sensor_file::read(&args.estimate.sensor, wanted)?;
@@ -31,51 +31,34 @@ pub fn run(args: &SmoothArgs) -> Result<(), CliError> {
     let builder = builder(&sensor, &args.estimate);
     let builder = rest.map_or(builder, |measured| builder.rest_resistance(measured));
     let columns = columns(&sensor, &args.written.columns)?;
-    let mut rates = vec![f32::NAN; readings.len()];
-    let segments = smooth_into(Packed::new(columns.clone()), builder, &readings, &mut rates)
-        .map_err(|error| error.named(&name))?;
+    let segments = smooth_into(Packed::new(columns.clone()), builder, &readings);
+    readings.whole()?;
+    let segments = segments.map_err(|error| error.named(&name))?;
     suits::warn_of_start(args.estimate.initial_strain, &sensor);
     let mut watch = ValidityWatch::new(&sensor, rest);
-    for (row, rate) in rates.into_iter().enumerate() {
+    let see = |row: usize, rate: f32| {
         let (time_s, reading) = readings.row(row);
         for warning in watch.see(time_s, reading.value, rate.into(), f64::NAN) {
             CliError::warning(&format!("{name}: {warning}"));
         }
-    }
+    };
     let out = BufWriter::with_capacity(WRITTEN_AT_ONCE, io::stdout());
     let mut writer = EstimateWriter::new(out, args.written.format, columns)?;
-    segments.write_in_order(&mut writer)?;
+    segments.write_in_order(&mut writer, see)?;
+    readings.whole()?;
     writer.finish()
 }
 
-/// Smooths a recording, and keeps its rates.
-fn smooth_into(
-    packed: Packed,
-    builder: FilterBuilder,
-    readings: &Readings,
-    rates: &mut [f32],
-) -> Result<Segments, CliError> {
+fn smooth_into(packed: Packed, builder: FilterBuilder, readings: &Readings) -> Result<Segments, CliError> {
     let mut segments = Segments::new(packed);
-    builder.smooth_backward(
-        readings.len(),
-        |row| readings.row(row),
-        |rows: Range<usize>, estimates| {
-            for (rate, estimate) in rates[rows].iter_mut().zip(estimates) {
-                *rate = estimate.strain_rate as f32;
-            }
-            segments.push(estimates)
-        },
-    )?;
+    builder.smooth_backward(readings.len(), |row| readings.row(row), |_, estimates| segments.push(estimates))?;
     Ok(segments)
 }
 
 /// Bytes handed to standard output at once.
 const WRITTEN_AT_ONCE: usize = 1 << 16;
 
-/// Bytes of estimates that wait in memory; more of them wait in a temporary file.
-const WAIT_IN_MEMORY: usize = 16 << 20;
-
-/// Segments of rows that came last segment first.
+/// Segments of rows that came last segment first: their rates, then what is written of them.
 struct Segments {
     packed: Packed,
     written: SpooledTempFile,
@@ -92,29 +75,38 @@ impl Segments {
 
     fn push(&mut self, rows: &[Estimate]) -> Result<(), CliError> {
         self.bytes.clear();
+        rows.iter().for_each(|row| self.bytes.extend((row.strain_rate as f32).to_le_bytes()));
         rows.iter().for_each(|row| self.packed.push(row, &mut self.bytes));
-        self.written.write_all(&self.bytes).map_err(temporary)?;
+        self.written.write_all(&self.bytes).map_err(|error| temporary(&error))?;
         let end = self.ends.last().unwrap_or(&0) + self.bytes.len() as u64;
         self.ends.push(end);
         Ok(())
     }
 
-    /// The segments in order of time.
-    fn write_in_order<W: Write + Send>(mut self, out: &mut EstimateWriter<W>) -> Result<(), CliError> {
+    /// The segments in order of time; `see` is shown number and rate of every row.
+    fn write_in_order<W: Write + Send>(
+        mut self,
+        out: &mut EstimateWriter<W>,
+        mut see: impl FnMut(usize, f32),
+    ) -> Result<(), CliError> {
+        let mut row = 0;
         for place in self.ends.windows(2).rev() {
             self.bytes.resize((place[1] - place[0]) as usize, 0);
-            self.written.seek(SeekFrom::Start(place[0])).map_err(temporary)?;
-            self.written.read_exact(&mut self.bytes).map_err(temporary)?;
-            self.packed.unpack(&self.bytes, out)?;
+            self.written.seek(SeekFrom::Start(place[0])).map_err(|error| temporary(&error))?;
+            self.written.read_exact(&mut self.bytes).map_err(|error| temporary(&error))?;
+            let rows = self.bytes.len() / (RATE_BYTES + self.packed.row_len());
+            let (rates, packed) = self.bytes.split_at(rows * RATE_BYTES);
+            for rate in rates.as_chunks::<RATE_BYTES>().0 {
+                see(row, f32::from_le_bytes(*rate));
+                row += 1;
+            }
+            self.packed.unpack(packed, out)?;
         }
         Ok(())
     }
 }
 
-/// The temporary file fails, which is not a closed pipe.
-fn temporary(error: io::Error) -> CliError {
-    CliError::Other(format!("cannot keep estimates in a temporary file: {error}"))
-}
+const RATE_BYTES: usize = size_of::<f32>();
 
 /// Writes a whole recording's estimates.
 pub fn write_estimates(out: impl Write + Send, sensor: &Sensor, estimates: &[Estimate]) -> Result<(), CliError> {
@@ -142,7 +134,9 @@ mod tests {
             let (mut expected, mut out) = (Vec::new(), Vec::new());
             write_estimates(&mut expected, &sensor, &all).unwrap();
             let mut writer = EstimateWriter::new(&mut out, Format::Csv, sensor.columns()).unwrap();
-            segments.write_in_order(&mut writer).unwrap();
+            let mut rates = Vec::new();
+            segments.write_in_order(&mut writer, |row, rate| rates.push((row, rate))).unwrap();
+            assert!(rates.iter().enumerate().all(|(k, (row, rate))| *row == k && *rate == all[k].strain_rate as f32));
             writer.finish().unwrap();
             assert!(out == expected, "{repeated} times");
         }
