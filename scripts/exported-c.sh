@@ -72,7 +72,28 @@ on_target() {
             -T"$here/mps2.ld" -Wl,--gc-sections "$work/filter.o" "$program" "$here/board.c" -lm -o "$work/program.elf"
         report "${folder##*/}, $name" qemu "$work/program.elf"
     done
-    say "${folder##*/}, $name" "code and constants $(arm-none-eabi-size "$work/filter.o" | awk 'NR == 2 { print $1 }') B"
+    code=$(arm-none-eabi-size "$work/filter.o" | awk 'NR == 2 { print $1 }')
+    say "${folder##*/}, $name" "code and constants $code B"
+}
+
+# near FOLDER WHAT FOUND PROMISED: fails unless what was promised is within a tenth of what was found.
+near() {
+    awk -v found="$3" -v promised="$4" 'BEGIN { exit !(promised > 0.9 * found && promised < 1.1 * found) }' || {
+        echo "$1: $2 are $3, the header says about $4: adjust crates/cli/src/export/cost.rs" >&2
+        return 1
+    }
+}
+
+# promised FOLDER: what the header says of a Cortex-M4F, against what was counted in the last on_target.
+promised() {
+    local said counted
+    said=$(tr -d '\n' <"$1/ohmstrain/ohmstrain.h" | sed 's/ \* / /g' | grep -oE 'about [0-9]+ instructions a step, [0-9]+ B of +code and constants, [0-9]+ B of state and [0-9]+' | grep -oE '[0-9]+')
+    counted=$(grep -oE 'step: [0-9]+|state [0-9]+|stack [0-9]+' "$work/output" | grep -oE '[0-9]+')
+    set -- "${1##*/}" $said $counted
+    near "$1" "instructions a step" "$6" "$2"
+    near "$1" "bytes of code and constants" "$code" "$3"
+    near "$1" "bytes of state" "$7" "$4"
+    near "$1" "bytes of stack" "$8" "$5"
 }
 
 "$ohmstrain" simulate --protocol mixed --speed-mm-s 5 --sample-rate-hz 5 -o "$work/trace.csv"
@@ -88,6 +109,7 @@ for kind in polynomial:2:corrected polynomial:0:ekf decaying-exponential:1:sign-
     on_host "$folder" gcc -O1 -fsanitize=address,undefined -fno-sanitize-recover
     on_host "$folder" clang -O2
     on_target "$folder" cortex-m4f "${m4f[@]}"
+    promised "$folder"
     on_target "$folder" cortex-m0+ "${m0[@]}"
     g++ -std=c++11 -fsyntax-only -Wall -Wextra -Werror -I"$folder/ohmstrain" -x c++ "$folder/ohmstrain/ohmstrain.c"
     if gcc -std=c99 -ffast-math -fsyntax-only -I"$folder/ohmstrain" "$folder/ohmstrain/ohmstrain.c" 2>/dev/null; then
@@ -98,6 +120,16 @@ for kind in polynomial:2:corrected polynomial:0:ekf decaying-exponential:1:sign-
         -x c++ "$folder/ohmstrain/ohmstrain.ino"
     g++ -std=gnu++11 -fsyntax-only -Wall -Wextra -Werror -DARDUINO_ARCH_ESP32 -I"$here" -include Arduino.h \
         -I"$folder/ohmstrain" -x c++ "$folder/ohmstrain/ohmstrain.ino"
+done
+
+# The same sensors on smaller chips.
+for kind in polynomial-2-corrected:lean polynomial-2-corrected:flash=30000,ram=3000 tunnelling-3-hypotheses:ram=2600; do
+    IFS=: read -r name budget <<<"$kind"
+    folder=$work/$name-${budget%%=*}
+    "$ohmstrain" export --sensor "$work/$name.toml" --target c --dt-s 0.2 -o "$folder" --budget "$budget" >/dev/null
+    on_host "$folder" gcc -O2
+    on_target "$folder" cortex-m4f "${m4f[@]}"
+    promised "$folder"
 done
 
 cmake -S "$folder" -B "$work/build" >/dev/null

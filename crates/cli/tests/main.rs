@@ -13,6 +13,7 @@ mod estimators;
 mod evaluate_split;
 mod explain;
 mod export;
+mod export_budget;
 mod figures;
 mod fit_law;
 mod fleet;

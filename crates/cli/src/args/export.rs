@@ -3,7 +3,7 @@ use std::path::PathBuf;
 use clap::{Args as ClapArgs, ValueEnum};
 
 use super::{Auto, Estimator, positive};
-use crate::export::Prefix;
+use crate::export::{Budget, Prefix};
 
 /// Flags of `export`.
 #[derive(Debug, ClapArgs)]
@@ -26,6 +26,10 @@ pub struct ExportArgs {
     /// Estimator to export: auto (the sensor's default), corrected, sign-split, hypotheses or ekf
     #[arg(long, default_value = "auto")]
     pub estimator: Auto<Estimator>,
+    /// The best that fits a chip, fewer hypotheses and rows of the correction if need be: lean (15 000 instructions a step on a
+    /// Cortex-M4F), or some of instructions=N,flash=BYTES,ram=BYTES. With --score the best on that recording, else by a table
+    #[arg(long, value_name = "BUDGET", conflicts_with = "estimator")]
+    pub budget: Option<Budget>,
     /// What names in C begin with: two sensors in one program need names of their own
     #[arg(long, value_name = "NAME", default_value = "ohmstrain")]
     pub prefix: Prefix,

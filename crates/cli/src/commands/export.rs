@@ -1,9 +1,10 @@
 use ohmstrain_bench_data::Metadata;
 
 use crate::args::ExportArgs;
-use crate::commands::export_score;
+use crate::commands::export_choice;
+use crate::commands::export_score::{OnRecording, Promise};
 use crate::error::CliError;
-use crate::export;
+use crate::export::{self, ExportError};
 use crate::input;
 use crate::output::{Kind, Outputs};
 use crate::sensor_file;
@@ -17,14 +18,18 @@ pub fn run(args: &ExportArgs) -> Result<(), CliError> {
     }
     let sensor = sensor_file::read(&args.sensor, asked)?;
     let params = sensor.params();
-    if let Some(trace) = &args.score {
-        if params.joint.is_some() {
+    let recording = match &args.score {
+        Some(_) if params.joint.is_some() => {
             return Err(CliError::Arguments("--score: expected a sensor of strain, found one across a joint".into()));
         }
-        export_score::run(args, &sensor, &input::read(trace, &Metadata::default())?)?;
-    }
-    let files = export::files(params, asked, args.target, args.dt_s, &args.prefix)
-        .map_err(|error| error.into_cli(&args.sensor.display().to_string()))?;
+        Some(trace) => Some(OnRecording::new(args, &sensor, &input::read(trace, &Metadata::default())?)?),
+        None => None,
+    };
+    let plan = export_choice::plan(args, params, recording.as_ref())?;
+    let refused = |error: ExportError| error.into_cli(&args.sensor.display().to_string());
+    let promise = Promise::new(args, params, &plan, recording.as_ref())?;
+    let files = export::files(params, &plan, args.target, args.dt_s, &args.prefix, &promise.lines).map_err(refused)?;
+    promise.print(args)?;
     let mut outputs = Outputs::new(args.force, std::iter::once(&args.sensor).chain(&args.score));
     for file in files {
         let path = args.output.join(&file.path);

@@ -2,81 +2,142 @@
 
 use comfy_table::{Table, presets};
 use ohmstrain::Sensor;
-use ohmstrain_calib::{Baseline, ScoredRow, Scores};
+use ohmstrain_calib::{Baseline, ScoredRow, Scores, SensorParams};
 
 use crate::args::ExportArgs;
 use crate::commands::score_table::covered;
 use crate::error::CliError;
-use crate::export::{self, ReplayedRow};
+use crate::export::{self, ChipFilter, Cost, Plan, ReplayedRow};
 use crate::input::Recording;
 use crate::output::print;
 
-/// Scores of the rows from `from_s` on, all of them with a reference.
-struct Scored {
-    program: Scores,
-    exported: Scores,
-    static_cubic: Scores,
+/// A recording with a reference, and what this computer and a static cubic make of it, as they would live.
+pub struct OnRecording {
+    name: String,
+    from_s: Option<f64>,
+    rows: Vec<ReplayedRow>,
+    program: Vec<ScoredRow>,
+    static_cubic: Vec<ScoredRow>,
 }
 
-/// Prints the table; refuses what is worse than a static cubic, unless it is forced.
-pub fn run(args: &ExportArgs, sensor: &Sensor, recording: &Recording) -> Result<(), CliError> {
-    let name = &recording.name;
-    let Some(scored) = scored(args, sensor, recording)? else {
-        return Err(CliError::Input(format!("{name}: expected rows with a reference to score, found none")));
-    };
-    let Scored { program, exported, static_cubic } = &scored;
-    let mut table = Table::new();
-    table.load_style(presets::ASCII_MARKDOWN);
-    table.set_header(["estimate", "%FS", "50/90/95 %"]);
-    if let Some(summary) = &sensor.params().summary {
-        let coverage = format!("{:.0}", summary.coverage_95_percent);
-        table.add_row(["promised: left out".into(), format!("{:.2}", summary.left_out_percent_fs), coverage]);
+impl OnRecording {
+    /// Runs both over the whole recording.
+    pub fn new(args: &ExportArgs, sensor: &Sensor, recording: &Recording) -> Result<Self, CliError> {
+        let refused = |error: &dyn std::fmt::Display| CliError::Input(format!("{}: {error}", recording.name));
+        let mut builder = sensor.filter();
+        if let Some(estimator) = args.estimator.chosen() {
+            builder = builder.estimator(estimator.0);
+        }
+        let mut filter = builder.build().map_err(|error| refused(&error))?;
+        let mut cubic = sensor.params().static_cubic.start();
+        let mut rows = Vec::new();
+        let [mut program, mut static_cubic] = [const { Vec::new() }; 2];
+        for row in 0..recording.trace.len() {
+            let (time_s, reading) = recording.reading(row);
+            rows.push(ReplayedRow { time_s, reading: reading.value, reading_sd: reading.sd });
+            let estimate = filter.step(time_s, reading).map_err(|error| refused(&error))?;
+            let truth = recording.truth(row);
+            program.push(ScoredRow { time_s, truth, strain: estimate.strain, sd: Some(estimate.strain_sd) });
+            static_cubic.push(ScoredRow { time_s, truth, strain: cubic.strain(time_s, reading.value), sd: None });
+        }
+        Ok(Self { name: recording.name.clone(), from_s: args.from, rows, program, static_cubic })
     }
-    for (estimate, scores) in [("this computer", program), ("exported", exported), ("static cubic", static_cubic)] {
-        let coverage = covered([scores.coverage_50, scores.coverage_90, scores.coverage_95]);
-        table.add_row([estimate.to_owned(), format!("{:.2}", scores.rmse_percent_fs), coverage]);
+
+    /// Of the rows that are asked for.
+    fn scores(&self, rows: &[ScoredRow]) -> Result<Scores, CliError> {
+        let counted = |row: &&ScoredRow| row.truth.is_finite() && self.from_s.is_none_or(|from_s| row.time_s >= from_s);
+        Scores::new(&rows.iter().filter(counted).copied().collect::<Vec<_>>()).ok_or_else(|| {
+            CliError::Input(format!("{}: expected rows with a reference to score, found none", self.name))
+        })
     }
-    print(|out| Ok(writeln!(out, "{table}")?))?;
-    if exported.rmse > static_cubic.rmse && !args.force {
-        return Err(CliError::Input(format!(
-            "{name}: what would be exported is worse than a static cubic here; --force exports it"
-        )));
+
+    /// What the exported code makes of it.
+    fn exported(&self, params: &SensorParams, plan: &Plan, args: &ExportArgs) -> Result<Scores, CliError> {
+        let replayed = export::replay(params, plan, args.dt_s, &self.rows)
+            .map_err(|error| error.into_cli(&args.sensor.display().to_string()))?;
+        let of = |(row, said): (&ScoredRow, &export::Said)| ScoredRow {
+            strain: said.strain.into(),
+            sd: Some(said.sd.into()),
+            ..*row
+        };
+        self.scores(&self.program.iter().zip(&replayed).map(of).collect::<Vec<_>>())
     }
-    Ok(())
+
+    /// Its error, percent of full scale.
+    pub fn error(&self, params: &SensorParams, plan: &Plan, args: &ExportArgs) -> Result<f64, CliError> {
+        Ok(self.exported(params, plan, args)?.rmse_percent_fs)
+    }
 }
 
-/// Runs all three over the whole recording, as they would live.
-fn scored(args: &ExportArgs, sensor: &Sensor, recording: &Recording) -> Result<Option<Scored>, CliError> {
-    let asked = args.estimator.chosen().map(|estimator| estimator.0);
-    let params = sensor.params();
-    let mut builder = sensor.filter();
-    if let Some(kind) = asked {
-        builder = builder.estimator(kind);
+/// What is exported, what it is worth and what it costs.
+pub struct Promise {
+    /// A table of errors, for the header of the exported code, too.
+    pub lines: Vec<String>,
+    words: String,
+    cost: Cost,
+    /// The recording on which it is worse than a static cubic.
+    worse_on: Option<String>,
+}
+
+impl Promise {
+    /// Of a plan; scored if there is a recording.
+    pub fn new(
+        args: &ExportArgs,
+        params: &SensorParams,
+        plan: &Plan,
+        recording: Option<&OnRecording>,
+    ) -> Result<Self, CliError> {
+        let name = args.sensor.display().to_string();
+        let chip = ChipFilter::new(params, plan).map_err(|error| error.into_cli(&name))?;
+        let cost = export::cost(params, plan, args.dt_s).map_err(|error| error.into_cli(&name))?;
+        let mut table = Table::new();
+        table.load_style(presets::ASCII_MARKDOWN);
+        table.set_header(["estimate", "%FS", "50/90/95 %"]);
+        let mut worse_on = None;
+        if let Some(summary) = &params.summary {
+            let coverage = format!("{:.0}", summary.coverage_95_percent);
+            table.add_row(["promised: left out".into(), format!("{:.2}", summary.left_out_percent_fs), coverage]);
+            let cubic = format!("{:.2}", summary.static_cubic_percent_fs);
+            table.add_row(["static cubic: left out".into(), cubic, String::new()]);
+        }
+        if let Some(recording) = recording {
+            let exported = recording.exported(params, plan, args)?;
+            let (program, cubic) = (recording.scores(&recording.program)?, recording.scores(&recording.static_cubic)?);
+            for (estimate, scores) in [("this computer", &program), ("exported", &exported), ("static cubic", &cubic)] {
+                let coverage = covered([scores.coverage_50, scores.coverage_90, scores.coverage_95]);
+                table.add_row([estimate.to_owned(), format!("{:.2}", scores.rmse_percent_fs), coverage]);
+            }
+            worse_on = (exported.rmse > cubic.rmse).then(|| recording.name.clone());
+        }
+        let lines = if table.row_count() > 0 { table.lines().collect() } else { Vec::new() };
+        Ok(Self { lines, words: chip.words(), cost, worse_on })
     }
-    let mut filter = builder.build().map_err(|error| CliError::Input(format!("{}: {error}", recording.name)))?;
-    let mut cubic = params.static_cubic.start();
-    let mut rows = Vec::new();
-    let [mut program, mut static_cubic] = [const { Vec::new() }; 2];
-    for row in 0..recording.trace.len() {
-        let (time_s, reading) = recording.reading(row);
-        rows.push(ReplayedRow { time_s, reading: reading.value, reading_sd: reading.sd });
-        let estimate = filter.step(time_s, reading).map_err(|e| CliError::Input(format!("{}: {e}", recording.name)))?;
-        let truth = recording.truth(row);
-        program.push(ScoredRow { time_s, truth, strain: estimate.strain, sd: Some(estimate.strain_sd) });
-        static_cubic.push(ScoredRow { time_s, truth, strain: cubic.strain(time_s, reading.value), sd: None });
+
+    /// Prints it; refuses what is worse than a static cubic, unless it is forced.
+    pub fn print(&self, args: &ExportArgs) -> Result<(), CliError> {
+        print(|out| {
+            for line in &self.lines {
+                writeln!(out, "{line}")?;
+            }
+            Ok(writeln!(out, "{}\n{}", self.words, costs(&self.cost))?)
+        })?;
+        match &self.worse_on {
+            Some(name) if !args.force => Err(CliError::Input(format!(
+                "{name}: what would be exported is worse than a static cubic here; --force exports it"
+            ))),
+            _ => Ok(()),
+        }
     }
-    let replayed = export::replay(params, asked, args.dt_s, &rows)
-        .map_err(|error| error.into_cli(&args.sensor.display().to_string()))?;
-    let exported: Vec<ScoredRow> = program
-        .iter()
-        .zip(&replayed)
-        .map(|(row, said)| ScoredRow { strain: said.0.into(), sd: Some(said.1.into()), ..*row })
-        .collect();
-    let of = |rows: &[ScoredRow]| {
-        let counted = |row: &&ScoredRow| row.truth.is_finite() && args.from.is_none_or(|from_s| row.time_s >= from_s);
-        Scores::new(&rows.iter().filter(counted).copied().collect::<Vec<_>>())
-    };
-    let all = (of(&program), of(&exported), of(&static_cubic));
-    let (Some(program), Some(exported), Some(static_cubic)) = all else { return Ok(None) };
-    Ok(Some(Scored { program, exported, static_cubic }))
+}
+
+/// What a filter costs, in words.
+fn costs(cost: &Cost) -> String {
+    format!(
+        "on a Cortex-M4F about {} instructions a step, {:.1} kB of flash, {} B of RAM (state {} B, stack {} B)",
+        cost.instructions,
+        cost.flash as f64 / 1e3,
+        cost.ram(),
+        cost.state,
+        cost.stack
+    )
 }

@@ -7,6 +7,7 @@ mod demo;
 mod evaluate;
 mod explain;
 mod export;
+mod export_choice;
 mod export_score;
 mod filter;
 mod fit_law;

@@ -8,10 +8,12 @@ use ohmstrain_model::TURNING;
 use serde::Serialize;
 
 use super::correction::CorrectionConstants;
+use super::cost::Cost;
 use super::doubt::DoubtParts;
 use super::fixed_rate::FixedRate;
 use super::law::{LawConstants, NoiseConstants, PhaseConstants, PriorConstants};
 use super::literal::{Literal, literals};
+use super::plan::{ChipFilter, Plan};
 use super::twin::Parts;
 use super::vectors::Vectors;
 use super::{ExportError, arithmetic, parameter, too_many_branches};
@@ -60,6 +62,13 @@ pub struct Exported {
     correction: Option<CorrectionConstants>,
     /// The kernel as functions in C.
     arithmetic: String,
+    /// What is left of the filter, and about what it costs.
+    words: String,
+    /// Whether it is less than what a computer runs.
+    is_smaller: bool,
+    /// What was promised and scored, line by line.
+    promise: Vec<String>,
+    cost: Cost,
     law: LawConstants,
     noise: NoiseConstants,
     prior: PriorConstants,
@@ -168,15 +177,16 @@ struct TurningConstants {
 }
 
 impl Exported {
-    /// Checks that the sensor has an exported form and computes all of it. `kind` is the estimator, or the sensor's default.
+    /// Checks that the sensor has an exported form and computes all of it. `plan` says what of its filter.
     ///
     /// # Errors
     /// See [`ExportError`].
     pub fn new(
         params: &SensorParams,
-        kind: Option<EstimatorKind>,
+        plan: &Plan,
         made_by: &str,
         dt_s: f64,
+        promise: &[String],
     ) -> Result<Self, ExportError> {
         if dt_s * 1e6 < 1.0 || dt_s > params.validity.duration_s {
             return Err(ExportError::Interval(format!(
@@ -184,24 +194,27 @@ impl Exported {
                 params.validity.duration_s
             )));
         }
-        let filter = PortableFilter::new(params, kind).map_err(parameter)?;
-        match params.law.branches.len() {
+        let filter = ChipFilter::new(params, plan)?;
+        let mut exported = match params.law.branches.len() {
             0 => Self::of::<0, 3, 6>(params, &filter, made_by, dt_s),
             1 => Self::of::<1, 4, 10>(params, &filter, made_by, dt_s),
             2 => Self::of::<2, 5, 15>(params, &filter, made_by, dt_s),
             3 => Self::of::<3, 6, 21>(params, &filter, made_by, dt_s),
             4 => Self::of::<4, 7, 28>(params, &filter, made_by, dt_s),
             _ => Err(too_many_branches()),
-        }
+        }?;
+        exported.promise = promise.to_vec();
+        Ok(exported)
     }
 
     fn of<const B: usize, const N: usize, const L: usize>(
         params: &SensorParams,
-        filter: &PortableFilter,
+        chip: &ChipFilter,
         made_by: &str,
         dt_s: f64,
     ) -> Result<Self, ExportError> {
-        let sensor = FixedRate::<B, N>::new::<L>(params, filter, dt_s as f32)?;
+        let sensor = FixedRate::<B, N>::new::<L>(params, chip, dt_s as f32)?;
+        let filter = &chip.filter;
         let Parts { strain_sd_scale, limits, .. } = sensor.parts;
         let Recorded { arithmetic, numbers, names } = Recorded::new(&sensor)?;
         let model = &sensor.model;
@@ -209,6 +222,7 @@ impl Exported {
         let reading_sd = model.noise().reading_sd;
         let finite = |number: f32| number.is_finite().then_some(Literal(number));
         let sieve = filter.readings;
+        let vectors = Vectors::new::<B, N, L>(&sensor)?;
         let exported = Self {
             made_by: made_by.into(),
             version: env!("CARGO_PKG_VERSION"),
@@ -263,13 +277,20 @@ impl Exported {
                 brownian_excess: Literal(TURNING.brownian.0 as f32),
                 brownian_variance: Literal(TURNING.brownian.1 as f32),
             },
-            correction: filter.correction.as_ref().map(CorrectionConstants::new),
+            correction: filter
+                .correction
+                .as_ref()
+                .map(|correction| CorrectionConstants::new(correction, chip.quadratics.as_ref(), dt_s as f32)),
             arithmetic,
+            words: chip.words(),
+            is_smaller: chip.is_smaller(),
+            promise: Vec::new(),
+            cost: Cost::of(&params.law, chip, vectors.work),
             law: LawConstants::new(model.law()),
             noise: NoiseConstants::new(model.noise()),
             prior: PriorConstants::new(&filter.estimator.motion),
             phases: filter.estimator.phases.as_ref().map(PhaseConstants::new),
-            vectors: Vectors::new::<B, N, L>(&sensor)?,
+            vectors,
         };
         exported.check_finite()?;
         Ok(exported)

@@ -1,10 +1,12 @@
 //! The learned correction as the templates have it.
 
 use ohmstrain_calib::{PortableCorrection, PortableProcess};
+use ohmstrain_ekf::Real;
 use ohmstrain_ekf::correction::{FAR, FARTHEST, LINEAR, NEW, NOVEL, RATE_GAIN, TIME_CONSTANTS_S};
 use serde::Serialize;
 
 use super::literal::Literal;
+use super::quadratic::Quadratic;
 
 /// Rows, weights and scales.
 #[derive(Debug, Serialize)]
@@ -13,6 +15,9 @@ pub struct CorrectionConstants {
     half_range: Literal,
     rates: [Literal; 2],
     time_constants_s: Vec<Literal>,
+    /// What low-passes forget in the usual time between readings, and the mean over it.
+    decays: Vec<Literal>,
+    mean_decays: Vec<Literal>,
     rate_gain: Literal,
     farthest: Literal,
     rows: Vec<Vec<Literal>>,
@@ -23,6 +28,7 @@ pub struct CorrectionConstants {
     upper: Vec<Literal>,
     inducing: usize,
     processes: [ProcessConstants; 2],
+    quadratics: Option<[QuadraticConstants; 2]>,
     far: Literal,
     novel: Literal,
     new: Literal,
@@ -47,6 +53,36 @@ struct ProcessConstants {
     explained: Vec<Literal>,
 }
 
+/// A quadratic function.
+#[derive(Debug, Serialize)]
+struct QuadraticConstants {
+    rows: Vec<QuadraticRow>,
+}
+
+/// What an input is multiplied by: `linear`, and `square` times this and earlier inputs.
+#[derive(Debug, Serialize)]
+struct QuadraticRow {
+    linear: Literal,
+    square: Vec<Literal>,
+}
+
+impl QuadraticConstants {
+    fn new(of: &Quadratic) -> Self {
+        let mut square = of.square.iter();
+        let row = |(i, linear): (usize, &f64)| QuadraticRow {
+            linear: narrow(*linear),
+            square: narrowed(square.by_ref().take(i + 1)),
+        };
+        Self { rows: of.linear.iter().enumerate().map(row).collect() }
+    }
+}
+
+/// exp(-x) and its mean, as `ohmstrain_ekf::correction::LowPass` has them.
+fn decays<T: Real>(dt_s: T, tau_s: T) -> (T, T) {
+    let x = dt_s / tau_s;
+    ((-x).exp(), if x > T::zero() { -(-x).exp_m1() / x } else { T::one() })
+}
+
 fn narrow(number: f64) -> Literal {
     Literal(number as f32)
 }
@@ -57,14 +93,17 @@ fn narrowed<'a>(numbers: impl IntoIterator<Item = &'a f64>) -> Vec<Literal> {
 
 impl CorrectionConstants {
     /// Of a correction.
-    pub fn new(correction: &PortableCorrection) -> Self {
+    pub fn new(correction: &PortableCorrection, quadratics: Option<&[Quadratic; 2]>, dt_s: f32) -> Self {
         let scales = &correction.scales;
+        let decays = TIME_CONSTANTS_S.map(|tau_s| decays(dt_s, tau_s as f32));
         let explained = correction.direct.explained.len();
         Self {
             centre: narrow(correction.features.centre),
             half_range: narrow(correction.features.half_range),
             rates: correction.features.rates.map(narrow),
             time_constants_s: narrowed(&TIME_CONSTANTS_S),
+            decays: decays.iter().map(|(decay, _)| Literal(*decay)).collect(),
+            mean_decays: decays.iter().map(|(_, mean)| Literal(*mean)).collect(),
             rate_gain: narrow(RATE_GAIN),
             farthest: narrow(FARTHEST),
             rows: correction.rows.iter().map(narrowed).collect(),
@@ -82,6 +121,7 @@ impl CorrectionConstants {
                     &correction.residual,
                 ),
             ],
+            quadratics: quadratics.map(|both| both.each_ref().map(QuadraticConstants::new)),
             far: narrow(FAR),
             novel: narrow(NOVEL),
             new: narrow(NEW),

@@ -1,11 +1,12 @@
 //! A sensor's filter at a fixed rate, in single and in double precision.
 
-use ohmstrain_calib::{EstimatorKind, EstimatorParams, HISTORIES, HYPOTHESES, PortableFilter, SensorParams};
+use ohmstrain_calib::{EstimatorKind, EstimatorParams, HISTORIES, HYPOTHESES, SensorParams};
 use ohmstrain_ekf::{Compact, Ekf, Estimator, Evidence, Hypotheses, STEP_GRACE, SignSplit, SparseEkf, StepError};
 use ohmstrain_model::{Motion, SensorLaw, StrainRange, SwitchedModel};
 
 use super::doubt::DoubtParts;
 use super::law::{PriorConstants, narrow_law, narrow_noise, narrow_range};
+use super::plan::ChipFilter;
 use super::steps::StepTable;
 use super::twin::{Numbers, Parts, PhaseParts, number};
 use super::{ExportError, parameter};
@@ -16,6 +17,8 @@ pub struct FixedRate<'a, const B: usize, const N: usize> {
     pub reference: SwitchedModel<f64, B, N>,
     /// The model in single precision.
     pub model: SwitchedModel<f32, B, N>,
+    /// How many hypotheses it keeps; 1 if it keeps none.
+    pub hypotheses: usize,
     /// R₀.
     pub rest_reading: f32,
     /// Everything else.
@@ -29,11 +32,8 @@ impl<'a, const B: usize, const N: usize> FixedRate<'a, B, N> {
     ///
     /// # Errors
     /// See [`ExportError`].
-    pub fn new<const L: usize>(
-        params: &SensorParams,
-        filter: &'a PortableFilter,
-        dt_s: f32,
-    ) -> Result<Self, ExportError> {
+    pub fn new<const L: usize>(params: &SensorParams, filter: &'a ChipFilter, dt_s: f32) -> Result<Self, ExportError> {
+        let ChipFilter { filter, quadratics } = filter;
         let EstimatorParams { noise, motion, phases, strain_sd_scale, .. } = filter.estimator;
         let [time, rate_sd, mean, sd] = PriorConstants::new(&motion).numbers();
         let speed = phases.map_or(0.0, |phases| phases.speed_per_s);
@@ -68,6 +68,7 @@ impl<'a, const B: usize, const N: usize> FixedRate<'a, B, N> {
             strain_sd_scale: strain_sd_scale as f32,
             sieve: filter.readings,
             correction: filter.correction.as_ref(),
+            quadratics: quadratics.as_ref(),
             doubt: DoubtParts::new(params),
         };
         let longest_s = longest_step_s::<B, N, L>(&reference, &parts)?;
@@ -77,7 +78,8 @@ impl<'a, const B: usize, const N: usize> FixedRate<'a, B, N> {
         let table = StepTable::new(usual_s, &kernel(usual_s)?.step_names(), numbers)?;
         // Not longer than the table either.
         parts.longest_step_s = longest_s.min(table.range.1) as f32;
-        Ok(Self { reference, model, rest_reading: params.rest_reading as f32, parts, table })
+        let rest_reading = params.rest_reading as f32;
+        Ok(Self { reference, model, hypotheses: filter.hypotheses, rest_reading, parts, table })
     }
 
     /// Length of the steps that the usual time between readings is divided into, s.

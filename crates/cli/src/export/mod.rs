@@ -3,14 +3,21 @@
 //! What is exported computes in `f32`, at a fixed rate, operation by operation as the Rust filter does ([`twin`]); the same sensor and interval give the same files.
 
 mod arithmetic;
+mod budget;
 mod constants;
 mod correction;
+mod cost;
 mod doubt;
 mod fixed_rate;
 mod law;
+mod learned;
 mod literal;
 mod motion;
+mod moving;
+mod plan;
 mod prefix;
+mod quadratic;
+mod reduced;
 mod replay;
 mod steps;
 mod twin;
@@ -24,9 +31,12 @@ use ohmstrain_calib::{EstimatorKind, SensorParams};
 use crate::args::ExportTarget;
 use crate::error::CliError;
 use crate::sensor_file::MADE_BY;
+pub use budget::{Budget, fitting};
 use constants::Exported;
+pub use cost::{Cost, cost};
+pub use plan::{ChipFilter, Plan};
 pub use prefix::Prefix;
-pub use replay::{ReplayedRow, replay};
+pub use replay::{ReplayedRow, Said, replay};
 
 /// A file to write.
 pub struct SourceFile {
@@ -57,6 +67,12 @@ pub enum ExportError {
     /// The interval does not go with the sensor.
     #[error("--dt-s: {0}")]
     Interval(String),
+    /// Nothing is small enough.
+    #[error(
+        "--budget: nothing fits; the smallest filter of this sensor takes about {} instructions a step, {} B of flash and {} B of RAM",
+        .0.instructions, .0.flash, .0.ram()
+    )]
+    Budget(Cost),
     /// The template failed.
     #[error("cannot fill the template of an exported file: {0}")]
     Template(#[from] minijinja::Error),
@@ -67,7 +83,7 @@ impl ExportError {
     pub fn into_cli(self, name: &str) -> CliError {
         match self {
             Self::Unsupported { .. } | Self::Parameter(_) => CliError::Input(format!("{name}: {self}")),
-            Self::Interval(_) => CliError::Arguments(self.to_string()),
+            Self::Interval(_) | Self::Budget(_) => CliError::Arguments(self.to_string()),
             Self::Template(_) => CliError::Other(self.to_string()),
         }
     }
@@ -111,18 +127,19 @@ const C_PARTS: [Template; 2] = [
 const RUST: [Template; 2] =
     [("sensor.rs", include_str!("templates/sensor.rs")), ("README.md", include_str!("templates/readme_rust.md"))];
 
-/// The files of a sensor whose readings come every `dt_s` seconds.
+/// The files of a sensor whose readings come every `dt_s` seconds; the header repeats what was promised of it.
 ///
 /// # Errors
 /// See [`ExportError`].
 pub fn files(
     params: &SensorParams,
-    kind: Option<EstimatorKind>,
+    plan: &Plan,
     target: ExportTarget,
     dt_s: f64,
     prefix: &Prefix,
+    promise: &[String],
 ) -> Result<Vec<SourceFile>, ExportError> {
-    let exported = Exported::new(params, kind, MADE_BY, dt_s)?;
+    let exported = Exported::new(params, plan, MADE_BY, dt_s, promise)?;
     let templates: &[Template] = match target {
         ExportTarget::C => &C,
         ExportTarget::Rust => &RUST,

@@ -1,13 +1,15 @@
 //! A recording through the exported program's twin.
 
-use ohmstrain_calib::{EstimatorKind, PortableFilter, SensorParams};
+use ohmstrain_calib::SensorParams;
 use ohmstrain_ekf::{Reading, Real};
 use ohmstrain_model::SwitchedModel;
 
 use super::fixed_rate::FixedRate;
+use super::moving::with_hypotheses;
+use super::plan::{ChipFilter, Plan};
 use super::twin::{Numbers, Twin};
 use super::vectors::{Input, refused, relative};
-use super::{ExportError, parameter, too_many_branches};
+use super::{ExportError, too_many_branches};
 
 /// A row of a recording; a missing reading is NaN.
 pub struct ReplayedRow {
@@ -19,17 +21,23 @@ pub struct ReplayedRow {
     pub reading_sd: f64,
 }
 
-/// Strain and its deviation in every row, as the exported program in single precision reports them.
+/// A row as the exported program in single precision reports it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Said<T = f32> {
+    /// Strain.
+    pub strain: T,
+    /// Its deviation.
+    pub sd: T,
+    /// `ohmstrain_flag` in C.
+    pub flags: u32,
+}
+
+/// Every row of a recording, as the exported program in single precision reports it.
 ///
 /// # Errors
 /// See [`ExportError`].
-pub fn replay(
-    params: &SensorParams,
-    kind: Option<EstimatorKind>,
-    dt_s: f64,
-    rows: &[ReplayedRow],
-) -> Result<Vec<(f32, f32)>, ExportError> {
-    let filter = PortableFilter::new(params, kind).map_err(parameter)?;
+pub fn replay(params: &SensorParams, plan: &Plan, dt_s: f64, rows: &[ReplayedRow]) -> Result<Vec<Said>, ExportError> {
+    let filter = ChipFilter::new(params, plan)?;
     match params.law.branches.len() {
         0 => of::<0, 3, 6>(params, &filter, dt_s, rows),
         1 => of::<1, 4, 10>(params, &filter, dt_s, rows),
@@ -42,22 +50,22 @@ pub fn replay(
 
 fn of<const B: usize, const N: usize, const L: usize>(
     params: &SensorParams,
-    filter: &PortableFilter,
+    filter: &ChipFilter,
     dt_s: f64,
     rows: &[ReplayedRow],
-) -> Result<Vec<(f32, f32)>, ExportError> {
+) -> Result<Vec<Said>, ExportError> {
     let sensor = FixedRate::<B, N>::new::<L>(params, filter, dt_s as f32)?;
-    run::<f32, B, N, L>(sensor.model, &sensor, sensor.interpolated(), rows)
+    with_hypotheses!(sensor.hypotheses, K => run::<f32, B, N, L, K>(sensor.model, &sensor, sensor.interpolated(), rows))
 }
 
-fn run<T: Real, const B: usize, const N: usize, const L: usize>(
+fn run<T: Real, const B: usize, const N: usize, const L: usize, const K: usize>(
     model: SwitchedModel<T, B, N>,
     sensor: &FixedRate<'_, B, N>,
     numbers: Numbers<'_, T>,
     rows: &[ReplayedRow],
-) -> Result<Vec<(T, T)>, ExportError> {
+) -> Result<Vec<Said<T>>, ExportError> {
     let exactly = |x: f32| T::of(x.into());
-    let mut twin: Twin<T, B, N, L> = Twin::new(model, &sensor.parts, numbers).map_err(refused)?;
+    let mut twin: Twin<T, B, N, L, K> = Twin::new(model, &sensor.parts, numbers).map_err(refused)?;
     let mut last_s = None;
     let said = |row: &ReplayedRow| {
         let since_s = last_s.replace(row.time_s).map_or(sensor.parts.dt_s, |last_s| (row.time_s - last_s) as f32);
@@ -65,9 +73,9 @@ fn run<T: Real, const B: usize, const N: usize, const L: usize>(
         let input = Input { reading, reading_sd: row.reading_sd as f32 };
         let reading = relative(sensor.rest_reading, &input)
             .map(|reading| Reading { value: exactly(reading.value), extra_variance: exactly(reading.extra_variance) });
-        twin.step_after(exactly(since_s), reading).map_err(refused)?;
+        let flags = twin.step_after(exactly(since_s), reading).map_err(refused)?;
         let strain = twin.strain();
-        Ok((strain.mean, strain.sd()))
+        Ok(Said { strain: strain.mean, sd: strain.sd(), flags })
     };
     rows.iter().map(said).collect()
 }
@@ -75,9 +83,9 @@ fn run<T: Real, const B: usize, const N: usize, const L: usize>(
 #[cfg(test)]
 mod tests {
     use ohmstrain::Sensor;
-    use ohmstrain_calib::{EstimatorKind, PortableFilter, SensorParams};
+    use ohmstrain_calib::{EstimatorKind, HYPOTHESES, SensorParams};
 
-    use super::{FixedRate, ReplayedRow, run};
+    use super::{ChipFilter, FixedRate, Plan, ReplayedRow, run};
 
     /// A sensor and a recording of its law's own readings, at times that jitter.
     fn sensor() -> Sensor {
@@ -110,17 +118,17 @@ mod tests {
         let rows = rows(params);
         let mut worst = 0.0_f64;
         for kind in [EstimatorKind::Corrected, params.filter_of(EstimatorKind::Corrected)] {
-            let parts = PortableFilter::new(params, Some(kind)).unwrap();
+            let parts = ChipFilter::new(params, &Plan { kind: Some(kind), ..Plan::default() }).unwrap();
             let fixed = FixedRate::<2, 5>::new::<15>(params, &parts, 0.05).unwrap();
-            let twin = run::<f64, 2, 5, 15>(fixed.reference, &fixed, fixed.exact(), &rows).unwrap();
+            let twin = run::<f64, 2, 5, 15, HYPOTHESES>(fixed.reference, &fixed, fixed.exact(), &rows).unwrap();
             let mut filter = sensor.filter().estimator(kind).build().unwrap();
             let mut largest = 0.0_f64;
-            for (k, (row, (strain, sd))) in rows.iter().zip(twin).enumerate() {
+            for (k, (row, said)) in rows.iter().zip(twin).enumerate() {
                 let expected = filter.step(row.time_s, row.reading).unwrap();
                 if k < SETTLED {
                     continue;
                 }
-                largest = largest.max((strain - expected.strain).abs()).max((sd - expected.strain_sd).abs());
+                largest = largest.max((said.strain - expected.strain).abs()).max((said.sd - expected.strain_sd).abs());
             }
             println!("{}: {largest:.1e}", kind.name());
             worst = worst.max(largest);

@@ -1,26 +1,23 @@
 //! The exported program in Rust, in any precision: the filter, what a reading must be for it, and the correction.
 
-use ohmstrain_calib::{
-    EstimatorKind, HISTORIES, HYPOTHESES, PortableCorrection, PortableProcess, PortableSieve, SURPRISING_NIS,
-};
-use ohmstrain_ekf::correction::{Correction, FEATURES, FeatureScale, InputScale, OUTPUTS, Process, ReadingFeatures};
+use ohmstrain_calib::{EstimatorKind, PortableCorrection, PortableSieve};
+use ohmstrain_ekf::Belief;
+use ohmstrain_ekf::correction::{FEATURES, FeatureScale, ReadingFeatures};
 use ohmstrain_ekf::{
-    Belief, Compact, Dwell, Evidence, Gaussian, Reading, Real, Residual, SparseEkf, SparseHypotheses, SparseMixture,
-    SparseSignSplit, State, StepError,
+    Dwell, Evidence, Gaussian, Reading, Real, SparseEkf, SparseHypotheses, SparseMixture, SparseSignSplit, StepError,
 };
 use ohmstrain_model::{Phase, StrainRange, SwitchedModel};
 
 use super::doubt::{Doubt, DoubtParts};
+use super::learned::{INPUTS, Table};
+use super::moving::Moving;
+use super::quadratic::Quadratic;
 
-/// Inputs of the correction.
-const INPUTS: usize = OUTPUTS + FEATURES;
 /// The most tries with more noise after a reading was refused, and the growth of its noise; as `SparseEkf`.
 const MOST_TRIES: u32 = 12;
 const COARSER: f64 = 16.0;
 /// Into how many steps an interval is divided at most.
 const MOST_STEPS: u32 = 128;
-/// Numbers of the chain.
-const CHAIN: usize = 9;
 
 /// What became of a reading, as `ohmstrain_flag` in C has it.
 pub mod flag {
@@ -38,14 +35,6 @@ pub mod flag {
     pub const NO_READING: u32 = MISSING | IMPLAUSIBLE | STUCK | REJECTED;
 }
 
-/// A filter with its state.
-#[derive(Clone, Copy)]
-enum Moving<T, const B: usize, const N: usize, const L: usize> {
-    Ekf(SparseEkf<T, Compact, B, N>, Belief<T, N, L>),
-    SignSplit(SparseSignSplit<T, B, N, HYPOTHESES, Compact>, SparseMixture<T, N, L, HYPOTHESES>),
-    Histories(SparseHypotheses<T, B, N, HISTORIES, Compact>, SparseMixture<T, N, L, HISTORIES>),
-}
-
 /// What a twin is made of, whatever its precision.
 #[derive(Clone, Copy)]
 pub struct Parts<'a> {
@@ -59,6 +48,8 @@ pub struct Parts<'a> {
     pub strain_sd_scale: f32,
     pub sieve: PortableSieve,
     pub correction: Option<&'a PortableCorrection>,
+    /// What stands for rows of the correction that were left out.
+    pub quadratics: Option<&'a [Quadratic; 2]>,
     pub doubt: DoubtParts,
 }
 
@@ -76,8 +67,8 @@ pub struct PhaseParts {
 pub type Numbers<'a, T> = Box<dyn Fn(T) -> Vec<T> + 'a>;
 
 /// The exported program.
-pub struct Twin<'a, T: Real, const B: usize, const N: usize, const L: usize> {
-    moving: Moving<T, B, N, L>,
+pub struct Twin<'a, T: Real, const B: usize, const N: usize, const L: usize, const K: usize> {
+    moving: Moving<T, B, N, L, K>,
     dt_s: T,
     longest_step_s: T,
     /// Length of the steps that the filter is prepared for, and what depends on it for another one.
@@ -96,6 +87,8 @@ pub struct Twin<'a, T: Real, const B: usize, const N: usize, const L: usize> {
     doubt: Doubt<T>,
     /// As it is reported.
     strain: Gaussian<T>,
+    /// How many hypotheses have been moved on: with a reading, and without.
+    work: [usize; 2],
 }
 
 /// What was seen of the readings.
@@ -106,28 +99,12 @@ struct Seen<T> {
     count: u32,
 }
 
-/// A correction in any precision.
-struct Table<T: Real> {
-    rows: Vec<[T; INPUTS]>,
-    scales: [InputScale<T>; INPUTS],
-    direct: ProcessTable<T>,
-    residual: ProcessTable<T>,
-    strain_variance: T,
-    variance_factor: T,
-}
-
-struct ProcessTable<T: Real> {
-    weights: Vec<T>,
-    explained: Vec<T>,
-    process: Process<'static, T>,
-}
-
 /// A number of a file, as exactly as the precision can have it.
 pub fn number<T: Real>(value: f64) -> T {
     T::of(value)
 }
 
-impl<'a, T: Real, const B: usize, const N: usize, const L: usize> Twin<'a, T, B, N, L> {
+impl<'a, T: Real, const B: usize, const N: usize, const L: usize, const K: usize> Twin<'a, T, B, N, L, K> {
     /// Before any reading.
     ///
     /// # Errors
@@ -155,7 +132,7 @@ impl<'a, T: Real, const B: usize, const N: usize, const L: usize> Twin<'a, T, B,
             let FeatureScale { centre, half_range, rates } = correction.features;
             let scale =
                 FeatureScale { centre: number(centre), half_range: number(half_range), rates: rates.map(number) };
-            (Table::new(correction), ReadingFeatures::new(scale))
+            (Table::new(correction, parts.quadratics), ReadingFeatures::new(scale))
         });
         Ok(Self {
             moving,
@@ -174,6 +151,7 @@ impl<'a, T: Real, const B: usize, const N: usize, const L: usize> Twin<'a, T, B,
             missing: true,
             doubt: Doubt::new(parts.doubt),
             strain: Gaussian { mean: T::zero(), variance: T::zero() },
+            work: [0; 2],
         })
     }
 
@@ -200,6 +178,7 @@ impl<'a, T: Real, const B: usize, const N: usize, const L: usize> Twin<'a, T, B,
             };
         }
         for _ in 1..self.prepare(dt_s) {
+            self.work[1] += self.moving.count();
             self.moving.step(None)?;
         }
         let (taken, nis) = self.taken(used)?;
@@ -237,12 +216,16 @@ impl<'a, T: Real, const B: usize, const N: usize, const L: usize> Twin<'a, T, B,
     /// Takes a reading, with more and more noise where it is refused; flags, and its normalised
     /// innovation squared as it came.
     fn taken(&mut self, reading: Option<Reading<T>>) -> Result<(u32, T), StepError> {
+        self.work[usize::from(reading.is_none())] += self.moving.count();
         let Some(mut reading) = reading else {
             self.moving.step(None)?;
             return Ok((0, T::zero()));
         };
         for _ in 0..=MOST_TRIES {
+            let count = self.moving.count();
             if let Ok(taken) = self.moving.take(reading) {
+                // What surprises is taken twice.
+                self.work[0] += if taken.0 == 0 { 0 } else { count };
                 return Ok(taken);
             }
             let rounding = T::default_epsilon() * T::default_epsilon();
@@ -251,6 +234,7 @@ impl<'a, T: Real, const B: usize, const N: usize, const L: usize> Twin<'a, T, B,
                 break;
             }
             reading.extra_variance = T::of(COARSER) * noise;
+            self.work[0] += count;
         }
         self.moving.step(None)?;
         Ok((flag::REJECTED, T::zero()))
@@ -291,6 +275,11 @@ impl<'a, T: Real, const B: usize, const N: usize, const L: usize> Twin<'a, T, B,
         Gaussian { mean: belief.mean[0], variance }.clamped(&self.limits)
     }
 
+    /// How many hypotheses have been moved on, with a reading and without: what a filter's instructions are due to.
+    pub const fn work(&self) -> [usize; 2] {
+        self.work
+    }
+
     /// The strain as it is reported.
     pub const fn strain(&self) -> Gaussian<T>
     where
@@ -310,62 +299,9 @@ impl<'a, T: Real, const B: usize, const N: usize, const L: usize> Twin<'a, T, B,
         let outputs = [filtered.mean, belief.mean[1], relaxation, baseline, extend, retract];
         let mut inputs = [T::zero(); INPUTS];
         inputs.iter_mut().zip(outputs.iter().chain(&features)).for_each(|(place, input)| *place = *input);
-        let strain = table.correction(self.limits).correct(&inputs, filtered).strain;
+        let strain = table.correct(&inputs, filtered, self.limits);
         let grown = (filtered.variance - self.known_variance).max(T::zero());
         if self.missing { Gaussian { variance: strain.variance + grown, ..strain } } else { strain }
-    }
-}
-
-impl<T: Real, const B: usize, const N: usize, const L: usize> Moving<T, B, N, L> {
-    /// Goes on with steps of another length, for which these are the numbers.
-    fn set_step(&mut self, step_s: T, numbers: &[T]) {
-        let (numbers, chain) = numbers.split_at(numbers.len() - CHAIN);
-        let chain = [0, 1, 2].map(|from| [0, 1, 2].map(|to| chain[3 * from + to]));
-        match self {
-            Self::Ekf(filter, _) => filter.set_step(step_s, numbers),
-            Self::SignSplit(filter, _) => filter.set_step(step_s, numbers, chain),
-            Self::Histories(filter, _) => filter.set_step(step_s, numbers, chain),
-        }
-    }
-
-    /// A step, and its innovation with that one's variance.
-    fn step(&mut self, reading: Option<Reading<T>>) -> Result<Option<Residual<T>>, StepError> {
-        match self {
-            Self::Ekf(filter, belief) => filter.step(belief, reading),
-            Self::SignSplit(filter, state) => Ok(filter.step(state, reading)?.map(|taken| taken.residual)),
-            Self::Histories(filter, state) => Ok(filter.step(state, reading)?.map(|taken| taken.residual)),
-        }
-    }
-
-    /// A step with a reading, with less weight if it surprises; flags.
-    fn take(&mut self, reading: Reading<T>) -> Result<(u32, T), StepError> {
-        let before = *self;
-        let taken = self.step(Some(reading)).inspect_err(|_| *self = before)?;
-        let surprising = T::of(SURPRISING_NIS);
-        let Some(Residual { nis, variance, .. }) = taken.filter(|residual| residual.nis > surprising) else {
-            return Ok((0, taken.map_or(T::zero(), |residual| residual.nis)));
-        };
-        *self = before;
-        let more = variance * (T::one() / (surprising / nis) - T::one());
-        let reading = Reading { extra_variance: reading.extra_variance + more, ..reading };
-        self.step(Some(reading)).inspect_err(|_| *self = before)?;
-        Ok((flag::DOWNWEIGHTED, nis))
-    }
-
-    fn moments(&self) -> Belief<T, N, L> {
-        match self {
-            Self::Ekf(_, belief) => *belief,
-            Self::SignSplit(_, state) => state.moments(),
-            Self::Histories(_, state) => state.moments(),
-        }
-    }
-
-    fn phases(&self) -> [T; 3] {
-        match self {
-            Self::Ekf(..) => [T::zero(); 3],
-            Self::SignSplit(_, state) => state.phase_probabilities(),
-            Self::Histories(_, state) => state.phase_probabilities(),
-        }
     }
 }
 
@@ -379,56 +315,5 @@ impl PhaseParts {
         let evidence = Evidence::new(limits, number(self.tempering));
         // Checked when the file was read; single precision may still turn a number into zero.
         dwell.and_then(|dwell| Ok((dwell, evidence?))).map_err(|_| StepError::NonFiniteState)
-    }
-}
-
-impl<T: Real> Table<T> {
-    fn new(correction: &PortableCorrection) -> Self {
-        Self {
-            rows: correction.rows.iter().map(|row| row.map(number)).collect(),
-            scales: correction.scales.map(|scale| InputScale {
-                mean: number(scale.mean),
-                sd: number(scale.sd),
-                lower: number(scale.lower),
-                upper: number(scale.upper),
-            }),
-            direct: ProcessTable::new(&correction.direct),
-            residual: ProcessTable::new(&correction.residual),
-            strain_variance: number(correction.strain_variance),
-            variance_factor: number(correction.variance_factor),
-        }
-    }
-
-    fn correction(&self, limits: StrainRange<T>) -> Correction<'_, T, INPUTS> {
-        Correction {
-            rows: &self.rows,
-            scales: &self.scales,
-            direct: self.direct.process(),
-            residual: self.residual.process(),
-            limits,
-            strain_variance: self.strain_variance,
-            variance_factor: self.variance_factor,
-        }
-    }
-}
-
-impl<T: Real> ProcessTable<T> {
-    fn new(from: &PortableProcess) -> Self {
-        let process = Process {
-            length: number(from.length),
-            mean: number(from.mean),
-            weights: &[],
-            explained: &[],
-            variance: number(from.variance),
-            noise: number(from.noise),
-            widening: number(from.widening),
-            least_variance: number(from.least_variance),
-        };
-        let numbers = |all: &[f64]| all.iter().copied().map(number).collect();
-        Self { weights: numbers(&from.weights), explained: numbers(&from.explained), process }
-    }
-
-    fn process(&self) -> Process<'_, T> {
-        Process { weights: &self.weights, explained: &self.explained, ..self.process }
     }
 }

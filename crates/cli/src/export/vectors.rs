@@ -8,6 +8,7 @@ use super::ExportError;
 use super::fixed_rate::FixedRate;
 use super::literal::Literal;
 use super::motion;
+use super::moving::with_hypotheses;
 use super::twin::{Numbers, Twin};
 
 /// Readings and results, and how far other results may be off.
@@ -17,6 +18,9 @@ pub struct Vectors {
     ulp: Literal,
     tolerance_ulp: u64,
     rows: Vec<Vector>,
+    /// Hypotheses moved on in a step, on average.
+    #[serde(skip)]
+    pub work: f64,
 }
 
 /// One row.
@@ -35,6 +39,9 @@ pub struct Input {
     pub reading_sd: f32,
 }
 
+/// What a prediction takes of the instructions of a step with a reading.
+const PREDICTION: f64 = 0.75;
+
 /// How many times further than Rust's `f32` filter another one may be from exact arithmetic.
 const FURTHER: f64 = 3.0;
 
@@ -44,8 +51,10 @@ impl Vectors {
         sensor: &FixedRate<'_, B, N>,
     ) -> Result<Self, ExportError> {
         let inputs = readings(sensor);
-        let estimates = run::<f32, B, N, L>(sensor.model, sensor, sensor.interpolated(), &inputs)?;
-        let exact = run::<f64, B, N, L>(sensor.reference, sensor, sensor.exact(), &inputs)?;
+        let ((estimates, work), (exact, _)) = with_hypotheses!(sensor.hypotheses, K => {
+            let estimates = run::<f32, B, N, L, K>(sensor.model, sensor, sensor.interpolated(), &inputs)?;
+            (estimates, run::<f64, B, N, L, K>(sensor.reference, sensor, sensor.exact(), &inputs)?)
+        });
 
         let limits = sensor.parts.limits;
         let largest = limits.lower.abs().max(limits.upper.abs());
@@ -65,9 +74,18 @@ impl Vectors {
             seed: motion::SEED,
             ulp: Literal(ulp),
             tolerance_ulp: tolerance,
+            work,
             rows: inputs.iter().zip(&estimates).map(row).collect(),
         })
     }
+}
+
+/// Hypotheses moved on in a step of the motion, on average, each time that they are.
+pub fn work<const B: usize, const N: usize, const L: usize>(sensor: &FixedRate<'_, B, N>) -> Result<f64, ExportError> {
+    let inputs = readings(sensor);
+    with_hypotheses!(sensor.hypotheses, K => {
+        run::<f32, B, N, L, K>(sensor.model, sensor, sensor.interpolated(), &inputs).map(|(_, work)| work)
+    })
 }
 
 /// The readings of the motion, in the sensor's unit.
@@ -88,14 +106,14 @@ pub fn relative(rest_reading: f32, input: &Input) -> Option<Reading<f32>> {
 }
 
 /// Strain and deviation as they are reported, row by row.
-fn run<T: Real, const B: usize, const N: usize, const L: usize>(
+fn run<T: Real, const B: usize, const N: usize, const L: usize, const K: usize>(
     model: SwitchedModel<T, B, N>,
     sensor: &FixedRate<'_, B, N>,
     numbers: Numbers<'_, T>,
     inputs: &[Input],
-) -> Result<Vec<(T, T)>, ExportError> {
+) -> Result<(Vec<(T, T)>, f64), ExportError> {
     let exactly = |x: f32| T::of(x.into());
-    let mut twin: Twin<T, B, N, L> = Twin::new(model, &sensor.parts, numbers).map_err(refused)?;
+    let mut twin: Twin<T, B, N, L, K> = Twin::new(model, &sensor.parts, numbers).map_err(refused)?;
     let estimate = |input: &Input| {
         let reading = relative(sensor.rest_reading, input)
             .map(|reading| Reading { value: exactly(reading.value), extra_variance: exactly(reading.extra_variance) });
@@ -103,7 +121,9 @@ fn run<T: Real, const B: usize, const N: usize, const L: usize>(
         let strain = twin.strain();
         Ok((strain.mean, strain.sd()))
     };
-    inputs.iter().map(estimate).collect()
+    let estimates = inputs.iter().map(estimate).collect::<Result<Vec<_>, ExportError>>()?;
+    let [updated, predicted] = twin.work().map(|count| count as f64 / inputs.len() as f64);
+    Ok((estimates, updated + PREDICTION * predicted))
 }
 
 pub fn refused(error: StepError) -> ExportError {

@@ -10,6 +10,9 @@ static const float INPUT_LOWER[INPUTS] = {<< correction.lower|join("f, ") >>f};
 static const float INPUT_UPPER[INPUTS] = {<< correction.upper|join("f, ") >>f};
 /* Time constants of the low-passes, s, and the usual sizes of the two rates. */
 static const float TIME_CONSTANT_S[LOW_PASSES] = {<< correction.time_constants_s|join("f, ") >>f};
+/* What they forget over the usual interval, and its mean: exponentials are dear. */
+static const float USUAL_DECAY[LOW_PASSES] = {<< correction.decays|join("f, ") >>f};
+static const float USUAL_MEAN_DECAY[LOW_PASSES] = {<< correction.mean_decays|join("f, ") >>f};
 static const float RATE_SCALE[2] = {<< correction.rates|join("f, ") >>f};
 
 /* Standardised inputs of rows of the calibration; the first are the inducing rows. */
@@ -54,8 +57,12 @@ static void watch(readings *seen, float dt_s, const float *rho)
     scaled = clamped((*rho - << correction.centre >>f) / << correction.half_range >>f, -<< correction.farthest >>f, << correction.farthest >>f);
     for (i = 0; i < LOW_PASSES; i++) {
         if (seen->has_feature) {
-            const float x = seen->waited_s / TIME_CONSTANT_S[i], decay = expf(-x);
-            const float mean_decay = x > 0.0f ? -expm1f(-x) / x : 1.0f;
+            float decay = USUAL_DECAY[i], mean_decay = USUAL_MEAN_DECAY[i];
+            if (seen->waited_s != OHMSTRAIN_DT_S) {
+                const float x = seen->waited_s / TIME_CONSTANT_S[i];
+                decay = expf(-x);
+                mean_decay = x > 0.0f ? -expm1f(-x) / x : 1.0f;
+            }
             seen->low_pass[i] = decay * seen->low_pass[i] + (mean_decay - decay) * seen->scaled +
                                 (1.0f - mean_decay) * scaled;
         } else {
@@ -77,6 +84,25 @@ static void watch(readings *seen, float dt_s, const float *rho)
     seen->feature[6] = tanhf(<< correction.rate_gain >>f * slow / RATE_SCALE[1]);
 }
 
+{% if correction.quadratics %}
+/* What stands for rows of the calibration that were left out: quadratic functions of a process' inputs, written out. */
+{% for q in correction.quadratics %}
+static float quadratic_of_<< correction.processes[loop.index0].name|lower >>(const float *x)
+{
+    float sum = 0.0f, slope;
+
+{% for row in q.rows %}
+    slope = << row.linear >>f;
+{% for other in row.square %}
+    slope += << other >>f * x[<< loop.index0 >>];
+{% endfor %}
+    sum += slope * x[<< loop.index0 >>];
+{% endfor %}
+    return sum;
+}
+{% endfor %}
+
+{% endif %}
 static float linear(float product)
 {
     return << correction.linear >>f * (product + 1.0f);
@@ -128,17 +154,23 @@ static void correct(const summary *all, const readings *seen, float filtered, fl
         x[i] = (inside - INPUT_MEAN[i]) / INPUT_SD[i];
     }
 
+{% if correction.quadratics %}
+    said[0] = DIRECT.mean + quadratic_of_direct(x + OUTPUTS);
+    said[1] = RESIDUAL.mean + quadratic_of_residual(x);
+{% else %}
     said[0] = DIRECT.mean;
     said[1] = RESIDUAL.mean;
+{% endif %}
     for (k = 0; k < ROWS; k++) {
         const float *row = ROW[k];
         float outputs = 0.0f, features = 0.0f, k0, k1;
-        for (i = 0; i < OUTPUTS; i++) {
-            outputs += (x[i] - row[i]) * (x[i] - row[i]);
-        }
-        for (; i < INPUTS; i++) {
-            features += (x[i] - row[i]) * (x[i] - row[i]);
-        }
+        /* Written out: a loop takes as long again. */
+{% for i in range(6) %}
+        outputs += (x[<< i >>] - row[<< i >>]) * (x[<< i >>] - row[<< i >>]);
+{% endfor %}
+{% for i in range(6, 13) %}
+        features += (x[<< i >>] - row[<< i >>]) * (x[<< i >>] - row[<< i >>]);
+{% endfor %}
         k0 = expf(-0.5f * features / DIRECT.length_square) + linear(x[OUTPUTS] * row[OUTPUTS]);
         k1 = expf(-0.5f * (outputs + features) / RESIDUAL.length_square) + linear(x[0] * row[0]);
         said[0] += DIRECT.weight[k] * k0;

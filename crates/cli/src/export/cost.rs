@@ -1,0 +1,164 @@
+//! About what an exported filter costs on a Cortex-M4F: what a step takes, and how much memory.
+//!
+//! The state's size is computed, and so are the tables in flash. Instructions, code and stack are sums over what there is
+//! (hypotheses, branches, rows); the coefficients below are least squares over what `scripts/exported-c.sh` counts in QEMU for filters
+//! of all kinds (arm-none-eabi-gcc 12.2, -O2 -fno-math-errno), which checks in turn that no estimate is further than a
+//! tenth from what it counts.
+
+use ohmstrain_calib::{EstimatorKind, GaugeParams, LawParams, SensorParams};
+use ohmstrain_ekf::correction::{FEATURES, OUTPUTS, TIME_CONSTANTS_S};
+use serde::Serialize;
+
+use super::fixed_rate::FixedRate;
+use super::plan::{ChipFilter, Plan};
+use super::{ExportError, too_many_branches, vectors};
+
+/// About what a filter costs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct Cost {
+    /// Instructions a step, with a reading, at the usual interval.
+    pub instructions: usize,
+    /// Code and constants, bytes.
+    pub flash: usize,
+    /// The state, bytes: exact, but for the padding of another processor.
+    pub state: usize,
+    /// The stack that a step takes, bytes.
+    pub stack: usize,
+}
+
+impl Cost {
+    /// What memory a filter takes while it runs, bytes.
+    pub const fn ram(&self) -> usize {
+        self.state + self.stack
+    }
+}
+
+/// What a kind of filter costs without a correction.
+struct OfKind {
+    /// Instructions of a step; and for each hypothesis that is moved on, for each of its branches, for a curve with an
+    /// exponential.
+    step: f64,
+    hypothesis: f64,
+    branch: f64,
+    curve: f64,
+    /// Bytes of code and tables; and for each branch.
+    flash: f64,
+    flash_branch: f64,
+    /// Bytes of the stack; and for each branch, for each hypothesis, for each branch of each hypothesis.
+    stack: [f64; 4],
+}
+
+const EKF: OfKind = OfKind {
+    step: 800.0,
+    hypothesis: 0.0,
+    branch: 385.0,
+    curve: 80.0,
+    flash: 5000.0,
+    flash_branch: 2510.0,
+    stack: [640.0, 225.0, 0.0, 0.0],
+};
+/// Where the motion is clear fewer hypotheses part than in the motion of the self-test: then a step takes up to a third less.
+const SIGN_SPLIT: OfKind = OfKind {
+    step: 0.0,
+    hypothesis: 4150.0,
+    branch: 800.0,
+    curve: 150.0,
+    flash: 10_700.0,
+    flash_branch: 6100.0,
+    stack: [744.0, 191.0, 93.0, 56.0],
+};
+const HISTORIES: OfKind = OfKind {
+    step: 0.0,
+    hypothesis: 2150.0,
+    branch: 740.0,
+    curve: 100.0,
+    flash: 9000.0,
+    flash_branch: 2600.0,
+    stack: [695.0, 154.0, 100.0, 49.0],
+};
+
+/// Instructions of a correction for each row, for each entry of the two triangles, for its quadratic functions.
+const ROW: f64 = 214.5;
+const ENTRY: f64 = 12.7;
+const QUADRATIC: f64 = 1930.0;
+/// Bytes of code of a correction and of its quadratic functions; bytes of the stack.
+const CORRECTION_CODE: f64 = 2490.0;
+const QUADRATIC_CODE: f64 = 2000.0;
+const CORRECTION_STACK: f64 = 270.0;
+
+const FLOAT: usize = 4;
+
+impl Cost {
+    /// Of a filter of a law, that moves on so many hypotheses in a step, `work` (1 for a single Gaussian; what surprises is
+    /// taken twice).
+    pub fn of(law: &LawParams, chip: &ChipFilter, work: f64) -> Self {
+        let ChipFilter { filter, quadratics } = chip;
+        let kind = match filter.kind {
+            EstimatorKind::SignSplit => &SIGN_SPLIT,
+            EstimatorKind::Hypotheses => &HISTORIES,
+            _ => &EKF,
+        };
+        let branches = law.branches.len() as f64;
+        let curve = if matches!(law.gauge, GaugeParams::Polynomial { .. }) { 0.0 } else { kind.curve };
+        let mut instructions = kind.step + work * (kind.hypothesis + kind.branch * branches + curve);
+        let mut flash = kind.flash + kind.flash_branch * branches;
+        let hypotheses = if filter.kind == EstimatorKind::Ekf { 0.0 } else { filter.hypotheses as f64 };
+        let of_stack = [1.0, branches, hypotheses, hypotheses * branches];
+        let mut stack: f64 = kind.stack.iter().zip(of_stack).map(|(bytes, count)| bytes * count).sum();
+        if let Some(correction) = &filter.correction {
+            let (rows, entries) = (correction.rows.len() as f64, correction.direct.explained.len() as f64);
+            instructions += ROW * rows + ENTRY * entries;
+            let inputs = (OUTPUTS + FEATURES) as f64;
+            // Inputs and two weights a row, two triangles, four numbers of each input's scale.
+            flash += CORRECTION_CODE + FLOAT as f64 * ((inputs + 2.0) * rows + 2.0 * entries + 4.0 * inputs);
+            stack += CORRECTION_STACK;
+        }
+        if quadratics.is_some() {
+            instructions += QUADRATIC;
+            flash += QUADRATIC_CODE;
+        }
+        let [instructions, flash, stack] = [instructions, flash, stack].map(|x: f64| x.round() as usize);
+        Self { instructions, flash, state: state(law.branches.len(), chip), stack }
+    }
+}
+
+/// What a sensor's filter costs, its work counted over the motion of the self-test.
+///
+/// # Errors
+/// If it has no exported form.
+pub fn cost(params: &SensorParams, plan: &Plan, dt_s: f64) -> Result<Cost, ExportError> {
+    let chip = ChipFilter::new(params, plan)?;
+    let work = match params.law.branches.len() {
+        0 => work_of::<0, 3, 6>(params, &chip, dt_s),
+        1 => work_of::<1, 4, 10>(params, &chip, dt_s),
+        2 => work_of::<2, 5, 15>(params, &chip, dt_s),
+        3 => work_of::<3, 6, 21>(params, &chip, dt_s),
+        4 => work_of::<4, 7, 28>(params, &chip, dt_s),
+        _ => Err(too_many_branches()),
+    }?;
+    Ok(Cost::of(&params.law, &chip, work))
+}
+
+fn work_of<const B: usize, const N: usize, const L: usize>(
+    params: &SensorParams,
+    chip: &ChipFilter,
+    dt_s: f64,
+) -> Result<f64, ExportError> {
+    vectors::work::<B, N, L>(&FixedRate::<B, N>::new::<L>(params, chip, dt_s as f32)?)
+}
+
+/// Size of `ohmstrain_state`.
+fn state(branches: usize, chip: &ChipFilter) -> usize {
+    let filter = &chip.filter;
+    let states = branches + 3;
+    let gaussian = states + states * (states + 1) / 2;
+    // Weight, probability inside of the limits, phase; the number of hypotheses; of sign-split a pause and a flag.
+    let words = match filter.kind {
+        EstimatorKind::SignSplit => filter.hypotheses * (gaussian + 3) + 3,
+        EstimatorKind::Hypotheses => filter.hypotheses * (gaussian + 3) + 1,
+        _ => gaussian,
+    };
+    // Readings and doubts: twelve words; of a correction four, low-passes and features. Strain, variance, rest reading.
+    let correction = filter.correction.as_ref().map_or(0, |_| 4 + TIME_CONSTANTS_S.len() + FEATURES);
+    FLOAT * (words + 12 + correction + 3)
+}

@@ -1,0 +1,78 @@
+//! What of a sensor's filter is exported: all of it, or less for a small chip.
+
+use ohmstrain_calib::{EstimatorKind, HYPOTHESES, PortableFilter, SensorParams};
+
+use super::quadratic::Quadratic;
+use super::reduced::reduced;
+use super::{ExportError, parameter};
+
+/// What of a filter is exported.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Plan {
+    /// The estimator; the sensor's default if `None`.
+    pub kind: Option<EstimatorKind>,
+    /// How many hypotheses it keeps; as many as on a computer if `None`.
+    pub hypotheses: Option<usize>,
+    /// How much of the correction; all of it if `None`.
+    pub rows: Option<Rows>,
+}
+
+/// How many rows of a correction are left.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Rows {
+    /// For its means, beside a quadratic function.
+    pub mean: usize,
+    /// For its variances.
+    pub variance: usize,
+}
+
+/// A filter as it goes onto a chip.
+pub struct ChipFilter {
+    /// The filter, with as many hypotheses and rows as are left.
+    pub filter: PortableFilter,
+    /// What stands for the other rows, of the direct and of the residual process.
+    pub quadratics: Option<[Quadratic; 2]>,
+}
+
+impl ChipFilter {
+    /// What is left of a sensor's filter.
+    ///
+    /// # Errors
+    /// If the sensor has no parameters for it, or its correction cannot do with fewer rows.
+    pub fn new(params: &SensorParams, plan: &Plan) -> Result<Self, ExportError> {
+        let mut filter = PortableFilter::new(params, plan.kind).map_err(parameter)?;
+        if filter.kind != EstimatorKind::Ekf {
+            filter.hypotheses = plan.hypotheses.map_or(filter.hypotheses, |most| most.min(filter.hypotheses));
+        }
+        let mut quadratics = None;
+        if let (Some(rows), Some(correction)) = (plan.rows, &mut filter.correction) {
+            let singular = || parameter("`correction`: its rows cannot be projected onto fewer");
+            let (fewer, both) = reduced(correction, rows).ok_or_else(singular)?;
+            (*correction, quadratics) = (fewer, Some(both));
+        }
+        Ok(Self { filter, quadratics })
+    }
+
+    /// Whether it is less than what a computer runs.
+    pub fn is_smaller(&self) -> bool {
+        let has_fewer = self.filter.kind != EstimatorKind::Ekf && self.filter.hypotheses < HYPOTHESES;
+        has_fewer || self.quadratics.is_some()
+    }
+
+    /// What is left, in words.
+    pub fn words(&self) -> String {
+        let name = self.filter.kind.name();
+        let filter = match self.filter.hypotheses {
+            _ if self.filter.kind == EstimatorKind::Ekf => name.to_owned(),
+            1 => format!("{name}, one hypothesis"),
+            several => format!("{name}, {several} hypotheses"),
+        };
+        match (&self.filter.correction, &self.quadratics) {
+            (None, _) => format!("{filter}, no correction"),
+            (Some(all), None) => format!("{filter}, correction of {} rows", all.rows.len()),
+            (Some(few), Some(_)) => {
+                format!("{filter}, correction of {} rows and a quadratic function", few.rows.len())
+            }
+        }
+    }
+}

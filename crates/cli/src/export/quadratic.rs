@@ -1,0 +1,64 @@
+//! A quadratic function of a correction's inputs: most of what a smooth Gaussian process says, at little cost.
+
+use nalgebra::{DMatrix, DVector};
+use ohmstrain_ekf::Real;
+
+/// `Σ (lᵢ + Σⱼ≤ᵢ qᵢⱼ xⱼ) xᵢ`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Quadratic<T = f64> {
+    /// lᵢ.
+    pub linear: Vec<T>,
+    /// qᵢⱼ, the lower triangle row by row.
+    pub square: Vec<T>,
+}
+
+impl<T: Real> Quadratic<T> {
+    /// Its value, in the order in which the exported program adds.
+    pub fn value(&self, x: &[T]) -> T {
+        let mut square = self.square.iter();
+        let mut sum = T::zero();
+        for (i, (linear, input)) in self.linear.iter().zip(x).enumerate() {
+            let slope = square.by_ref().take(i + 1).zip(x).fold(*linear, |slope, (q, other)| slope + *q * *other);
+            sum += slope * *input;
+        }
+        sum
+    }
+}
+
+/// Share of a column's mean square that keeps the equations regular.
+const RIDGE: f64 = 1e-5;
+
+/// A constant, a quadratic function and weights of further columns that come closest to values at points.
+pub struct Fit {
+    pub constant: f64,
+    pub quadratic: Quadratic,
+    pub weights: Vec<f64>,
+}
+
+impl Fit {
+    /// Weighted least squares; none if the equations are singular.
+    pub fn new(points: &[&[f64]], columns: &DMatrix<f64>, values: &DVector<f64>, weights: &[f64]) -> Option<Self> {
+        let inputs = points.first()?.len();
+        let monomials: Vec<Vec<f64>> = points.iter().map(|x| monomials(x)).collect();
+        let count = monomials.first()?.len();
+        let entry = |i: usize, j: usize| if j < count { monomials[i][j] } else { columns[(i, j - count)] };
+        let design = DMatrix::from_fn(points.len(), count + columns.ncols(), |i, j| weights[i].sqrt() * entry(i, j));
+        let target = DVector::from_fn(points.len(), |i, _| weights[i].sqrt() * values[i]);
+        let mut normal = design.tr_mul(&design);
+        // Columns of an input that never changes are zero.
+        let least = f64::EPSILON * normal.diagonal().max();
+        for i in 0..normal.nrows() {
+            normal[(i, i)] += RIDGE * normal[(i, i)] + least;
+        }
+        let solved = normal.cholesky()?.solve(&design.tr_mul(&target));
+        let part = |from: usize, until: usize| solved.rows(from, until - from).iter().copied().collect();
+        let quadratic = Quadratic { linear: part(1, 1 + inputs), square: part(1 + inputs, count) };
+        Some(Self { constant: solved[0], quadratic, weights: part(count, solved.len()) })
+    }
+}
+
+/// 1, x, and the products of the lower triangle.
+fn monomials(x: &[f64]) -> Vec<f64> {
+    let products = x.iter().enumerate().flat_map(|(i, a)| x[..=i].iter().map(move |b| a * b));
+    std::iter::once(1.0).chain(x.iter().copied()).chain(products).collect()
+}

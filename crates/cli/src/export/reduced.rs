@@ -1,0 +1,137 @@
+//! A learned correction with fewer rows: from the sensor's file alone, nothing is learned again.
+//!
+//! The mean of a process with a long length scale is nearly quadratic within the range of its rows. So the means become a
+//! quadratic function and kernels of the rows that say most (the first ones: a correction lists its inducing rows first, in
+//! the order of a pivoted Cholesky decomposition), fitted to the processes' own means. Variances take the kernels of
+//! fewer inducing rows, onto which those of the others are projected, as the others are projected already (Nyström).
+
+use nalgebra::{DMatrix, DVector};
+use ohmstrain_calib::{PortableCorrection, PortableProcess};
+use ohmstrain_ekf::correction::{FEATURES, LINEAR, OUTPUTS};
+
+use super::plan::Rows;
+use super::quadratic::{Fit, Quadratic};
+
+/// Inputs of the correction.
+const INPUTS: usize = OUTPUTS + FEATURES;
+type Row = [f64; INPUTS];
+
+/// Means are fitted in the rows, half-way to these of the nearest others, and from these as far beyond the row.
+const BETWEEN: [usize; 4] = [1, 2, 4, 8];
+const BEYOND: [usize; 2] = [2, 5];
+const AS_FAR: f64 = 0.7;
+/// And in rows whose inputs are other rows', with this weight: within the range of the rows, like nothing that was seen.
+const MIXED_WEIGHT: f64 = 0.03;
+const MIXED: [usize; 2] = [1, 2];
+/// A prime: other inputs come from far apart rows.
+const APART: usize = 17;
+/// Keeps kernels of inducing rows regular; less than the processes' own jitter.
+const JITTER: f64 = 1e-8;
+
+/// Which of the two processes.
+#[derive(Clone, Copy)]
+enum Which {
+    Direct,
+    Residual,
+}
+
+impl Which {
+    fn inputs(self, row: &Row) -> &[f64] {
+        match self {
+            Self::Direct => &row[OUTPUTS..],
+            Self::Residual => row,
+        }
+    }
+}
+
+/// The correction with no more than these rows, and what stands for the others; none if kernels are singular.
+pub fn reduced(full: &PortableCorrection, to: Rows) -> Option<(PortableCorrection, [Quadratic; 2])> {
+    let inducing = side(full.direct.explained.len()).min(side(full.residual.explained.len()));
+    let rows = to.mean.max(to.variance).min(inducing).max(1);
+    let to = Rows { mean: rows, variance: to.variance.clamp(1, rows) };
+    let points = points(&full.rows);
+    let (direct, of_direct) = process(&full.direct, Which::Direct, &full.rows, &points, to)?;
+    let (residual, of_residual) = process(&full.residual, Which::Residual, &full.rows, &points, to)?;
+    let rows = full.rows[..rows].to_vec();
+    Some((PortableCorrection { rows, direct, residual, ..full.clone() }, [of_direct, of_residual]))
+}
+
+/// Rows of a triangle of so many numbers.
+fn side(entries: usize) -> usize {
+    ((8 * entries + 1).isqrt() - 1) / 2
+}
+
+fn process(
+    full: &PortableProcess,
+    which: Which,
+    rows: &[Row],
+    points: &[(Row, f64)],
+    to: Rows,
+) -> Option<(PortableProcess, Quadratic)> {
+    let at: Vec<&[f64]> = points.iter().map(|(row, _)| which.inputs(row)).collect();
+    let all: Vec<&[f64]> = rows.iter().map(|row| which.inputs(row)).collect();
+    let weights: Vec<f64> = points.iter().map(|(_, weight)| *weight).collect();
+    let kernels = kernels(full.length, &at, &all);
+    let means = &kernels * DVector::from_column_slice(&full.weights);
+    let fit = Fit::new(&at, &kernels.columns(0, to.mean).into_owned(), &means, &weights)?;
+    let explained = explained(full, &all, to.variance)?;
+    let process = PortableProcess { mean: full.mean + fit.constant, weights: fit.weights, explained, ..full.clone() };
+    Some((process, fit.quadratic))
+}
+
+/// Kernels of two lists of inputs, as `ohmstrain_ekf::correction::Process` has them.
+fn kernels(length: f64, a: &[&[f64]], b: &[&[f64]]) -> DMatrix<f64> {
+    DMatrix::from_fn(a.len(), b.len(), |i, j| {
+        let square: f64 = a[i].iter().zip(b[j]).map(|(a, b)| (a - b).powi(2)).sum();
+        (-0.5 * square / length.powi(2)).exp() + LINEAR * (a[i][0] * b[j][0] + 1.0)
+    })
+}
+
+/// What the first few of the inducing rows explain.
+fn explained(full: &PortableProcess, rows: &[&[f64]], few: usize) -> Option<Vec<f64>> {
+    let inducing = side(full.explained.len());
+    let mut numbers = full.explained.iter();
+    let mut triangle = DMatrix::zeros(inducing, inducing);
+    for i in 0..inducing {
+        for j in i..inducing {
+            triangle[(i, j)] = *numbers.next()?;
+        }
+    }
+    let among = kernels(full.length, &rows[..few], &rows[..few]) + DMatrix::identity(few, few) * JITTER;
+    let with_others = kernels(full.length, &rows[..few], &rows[..inducing]);
+    let projection = among.cholesky()?.solve(&with_others).transpose();
+    let triangle = (triangle * projection).qr().r();
+    Some((0..few).flat_map(|i| (i..few).map(move |j| (i, j))).map(|place| triangle[place]).collect())
+}
+
+/// Where means are to be right, and how much it matters.
+fn points(rows: &[Row]) -> Vec<(Row, f64)> {
+    let range: [(f64, f64); INPUTS] = std::array::from_fn(|i| {
+        let column = rows.iter().map(|row| row[i]);
+        (column.clone().fold(f64::INFINITY, f64::min), column.fold(f64::NEG_INFINITY, f64::max))
+    });
+    let toward = |a: &Row, b: &Row, share: f64| -> Row {
+        std::array::from_fn(|i| (a[i] + share * (b[i] - a[i])).clamp(range[i].0, range[i].1))
+    };
+    let mut points = Vec::new();
+    for (k, row) in rows.iter().enumerate() {
+        let nearest = nearest(rows, row);
+        let other = |rank: &usize| &rows[nearest[*rank % nearest.len()]];
+        points.push((*row, 1.0));
+        points.extend(BETWEEN.iter().map(|rank| (toward(row, other(rank), 0.5), 1.0)));
+        points.extend(BEYOND.iter().map(|rank| (toward(row, other(rank), -AS_FAR), 1.0)));
+        for apart in MIXED {
+            let mixed = std::array::from_fn(|i| rows[(k + apart * (i + 1) * APART) % rows.len()][i]);
+            points.extend([(mixed, MIXED_WEIGHT), (toward(row, &mixed, 0.5), MIXED_WEIGHT)]);
+        }
+    }
+    points
+}
+
+/// All rows, the nearest first.
+fn nearest(rows: &[Row], to: &Row) -> Vec<usize> {
+    let square = |k: usize| -> f64 { rows[k].iter().zip(to).map(|(a, b)| (a - b).powi(2)).sum() };
+    let mut order: Vec<(f64, usize)> = (0..rows.len()).map(|k| (square(k), k)).collect();
+    order.sort_by(|a, b| a.0.total_cmp(&b.0));
+    order.into_iter().map(|(_, k)| k).collect()
+}

@@ -1,0 +1,110 @@
+//! Smaller filters for smaller chips: they fit, and the C is the twin that was scored, in faults, too.
+
+use crate::common::{Bench, Csv};
+use crate::export::{DT_S, compile_and_run, compilers, every_filter};
+
+/// Exports within a budget, scored on a recording; what was printed.
+fn within(bench: &Bench, sensor: &str, budget: &str, trace: &str, folder: &str) -> String {
+    let export = ["export", "--dt-s", DT_S, "--target", "c", "-o", folder, "--budget", budget, "--force"];
+    bench.run(&[&export[..], &["--sensor", sensor, "--score", trace]].concat()).ok()
+}
+
+/// The number before a word.
+fn number_before(text: &str, word: &str) -> f64 {
+    let before = text.split(word).next().unwrap();
+    before.trim_end().rsplit([' ', '(']).next().unwrap().parse().unwrap()
+}
+
+/// The error of a row of the table.
+fn percent_fs(printed: &str, row: &str) -> f64 {
+    printed.lines().find(|line| line.contains(row)).unwrap().split('|').nth(2).unwrap().trim().parse().unwrap()
+}
+
+/// To the bit: a quadratic function and fewer rows are added up in the same order in both languages.
+#[test]
+fn a_smaller_filter_fits_and_is_its_twin() {
+    let bench = every_filter();
+    for (budget, most, unit) in [
+        ("lean", 15_000.0, " instructions"),
+        ("instructions=20000", 20_000.0, " instructions"),
+        ("flash=24000", 24.0, " kB of flash"),
+        ("ram=1900", 1900.0, " B of RAM"),
+    ] {
+        let printed = within(&bench, "corrected.toml", budget, "trace.csv", "small");
+        assert!(number_before(&printed, unit) <= most, "{budget}: {printed}");
+        assert!(bench.read("small/ohmstrain/ohmstrain.h").contains("| exported"));
+        for compiler in compilers() {
+            let sources = ["ohmstrain/ohmstrain.c", "selftest/selftest.c"];
+            let tested = compile_and_run(compiler, &bench.path("small"), &sources, "");
+            assert!(tested.starts_with("largest difference: 0 of "), "{budget}, {compiler}: {tested}");
+        }
+    }
+    // By the table instead of a score: a quadratic function is among what fits.
+    let export = ["export", "--sensor", "corrected.toml", "--dt-s", DT_S, "--target", "c", "-o", "small"];
+    let printed = bench.run(&[&export[..], &["--budget", "flash=24000"]].concat()).ok();
+    assert!(printed.contains("a quadratic function"), "{printed}");
+    for compiler in compilers() {
+        let sources = ["ohmstrain/ohmstrain.c", "selftest/selftest.c"];
+        let tested = compile_and_run(compiler, &bench.path("small"), &sources, "");
+        assert!(tested.starts_with("largest difference: 0 of "), "{compiler}: {tested}");
+    }
+}
+
+#[test]
+fn what_does_not_fit_is_said() {
+    let bench = every_filter();
+    let export = ["export", "--dt-s", DT_S, "--sensor", "corrected.toml", "-o", "none", "--budget"];
+    let c = |budget: &str, more: &[&str]| bench.run(&[&export[..], &[budget], more].concat());
+    let nothing = c("instructions=100", &["--target", "c"]);
+    assert_eq!(nothing.code, Some(2));
+    assert!(
+        nothing.stderr.contains("nothing fits; the smallest filter of this sensor takes about"),
+        "{}",
+        nothing.stderr
+    );
+    assert_eq!(c("lean", &["--target", "rust"]).code, Some(2));
+    assert_eq!(c("lean", &["--target", "c", "--estimator", "ekf"]).code, Some(2));
+    assert_eq!(c("fast", &["--target", "c"]).code, Some(2));
+    assert!(!bench.path("none").exists());
+}
+
+/// A recording's reading with a fault.
+type Fault = (&'static str, fn(usize, f64) -> f64);
+
+const FAULTS: [Fault; 6] = [
+    ("one in fifty a spike of 1.3", |row, ohm| if row % 50 == 0 { 1.3 * ohm } else { ohm }),
+    ("every other missing", |row, ohm| if row % 2 == 0 { f64::NAN } else { ohm }),
+    ("unplugged for 10 s", |row, ohm| if (700..750).contains(&row) { 1e6 } else { ohm }),
+    ("short circuit of 10 s", |row, ohm| if (700..750).contains(&row) { 1.6 } else { ohm }),
+    ("half more for 20 s", |row, ohm| if (700..800).contains(&row) { 1.5 * ohm } else { ohm }),
+    ("a tenth more from half-way", |row, ohm| if row > 1000 { 1.1 * ohm } else { ohm }),
+];
+
+/// The error that `export` prints is that of the compiled program, whatever happens to the readings.
+#[test]
+fn the_compiled_program_answers_faults_as_its_twin() {
+    let bench = every_filter();
+    let trace = Csv::new(&bench.read("trace.csv"));
+    let [time_s, ohm, truth] = ["time_s", "resistance_ohm", "strain"].map(|column| trace.numbers(column));
+    let range = truth.iter().fold((f64::MAX, f64::MIN), |(low, high), x| (low.min(*x), high.max(*x)));
+    for (name, fault) in FAULTS {
+        let cell = |ohm: f64| if ohm.is_nan() { String::new() } else { ohm.to_string() };
+        let row = |k: usize| format!("{},{},{}\n", time_s[k], cell(fault(k, ohm[k])), truth[k]);
+        let rows: String = (0..time_s.len()).map(row).collect();
+        bench.write("fault.csv", format!("time_s,resistance_ohm,strain\n{rows}"));
+        for budget in ["instructions=1000000", "lean"] {
+            let promised = percent_fs(&within(&bench, "corrected.toml", budget, "fault.csv", "faulty"), "exported");
+            for compiler in compilers() {
+                let sources = ["ohmstrain/ohmstrain.c", "selftest/replay.c"];
+                let folder = bench.path("faulty");
+                let said = Csv::new(&compile_and_run(compiler, &folder, &sources, &bench.read("fault.csv")));
+                let strain = said.numbers("strain");
+                let squares: f64 = strain.iter().zip(&truth).map(|(strain, truth)| (strain - truth).powi(2)).sum();
+                let found = 100.0 * (squares / truth.len() as f64).sqrt() / (range.1 - range.0);
+                println!("{name}, {budget}, {compiler}: {found:.2}");
+                // Two digits are printed.
+                assert!((found - promised).abs() < 0.006, "{name}, {budget}, {compiler}: {found}, promised {promised}");
+            }
+        }
+    }
+}
