@@ -71,7 +71,7 @@ const HISTORIES: OfKind = OfKind {
     step: 0.0,
     hypothesis: 2150.0,
     branch: 740.0,
-    curve: 100.0,
+    curve: 1050.0,
     flash: 9000.0,
     flash_branch: 2600.0,
     stack: [695.0, 154.0, 100.0, 49.0],
