@@ -14,6 +14,7 @@ void delay(unsigned long milliseconds);
 struct SerialPort {
   void begin(unsigned long baud);
   void print(const char *text);
+  void print(unsigned long number);
   void print(double number, int digits);
   void println(int number);
   void println(double number, int digits);

@@ -11,6 +11,7 @@ mod hand;
 mod live;
 mod plan;
 mod refine;
+mod serial_check;
 mod shell;
 mod simulate;
 mod split;
@@ -31,6 +32,7 @@ pub use hand::HandArgs;
 pub use live::LiveArgs;
 pub use plan::PlanArgs;
 pub use refine::RefineArgs;
+pub use serial_check::SerialCheckArgs;
 pub use shell::{CompletionsArgs, ManArgs};
 pub use simulate::{DemoArgs, DemoMaterial, SimulateArgs};
 pub use split::Split;
@@ -121,6 +123,9 @@ pub enum Command {
     /// Write a calibrated sensor's filter as C or Rust source for a microcontroller
     #[command(before_help = "Example: ohmstrain export --sensor sensor.toml --target c --dt-s 0.02 -o firmware")]
     Export(ExportArgs),
+    /// Say whether a board with the exported sketch computes what this computer does
+    #[command(before_help = "Example: ohmstrain serial-check --sensor sensor.toml --dt-s 0.02 --port /dev/ttyACM0")]
+    SerialCheck(SerialCheckArgs),
     /// Print a shell's completions of commands and flags
     #[command(
         before_help = "Example: ohmstrain completions bash > ~/.local/share/bash-completion/completions/ohmstrain"

@@ -28,6 +28,7 @@ mod outputs;
 mod pipeline;
 mod refine;
 mod sensor_numbers;
+mod serial_check;
 mod streaming;
 mod suits;
 mod validity;

@@ -29,7 +29,6 @@ pub fn run(args: &ExportArgs) -> Result<(), CliError> {
     let refused = |error: ExportError| error.into_cli(&args.sensor.display().to_string());
     let promise = Promise::new(args, params, &plan, recording.as_ref())?;
     let files = export::files(params, &plan, args.target, args.dt_s, &args.prefix, &promise.lines).map_err(refused)?;
-    promise.print(args)?;
     let mut outputs = Outputs::new(args.force, std::iter::once(&args.sensor).chain(&args.score));
     for file in files {
         let path = args.output.join(&file.path);
@@ -39,5 +38,7 @@ pub fn run(args: &ExportArgs) -> Result<(), CliError> {
         let output = outputs.claim(&path, Kind::Source)?;
         outputs.put(output, file.content);
     }
+    // After the places are known to be there, before anything is written to them: it may refuse.
+    promise.print(args)?;
     outputs.publish()
 }

@@ -23,6 +23,7 @@ mod refine;
 mod reporting;
 mod score_table;
 mod scoring;
+mod serial_check;
 mod shell;
 mod simulate;
 mod smooth;
@@ -50,6 +51,7 @@ pub fn dispatch(command: &Command) -> Result<(), CliError> {
         Command::Batch(args) => batch::run(args),
         Command::Fleet(args) => fleet::run(args),
         Command::Export(args) => export::run(args),
+        Command::SerialCheck(args) => serial_check::run(args),
         Command::Completions(args) => shell::completions(args),
         Command::Man(args) => shell::man(args),
     }

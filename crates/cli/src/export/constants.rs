@@ -188,12 +188,6 @@ impl Exported {
         dt_s: f64,
         promise: &[String],
     ) -> Result<Self, ExportError> {
-        if dt_s * 1e6 < 1.0 || dt_s > params.validity.duration_s {
-            return Err(ExportError::Interval(format!(
-                "expected between a microsecond and the longest recording, {} s, found {dt_s}",
-                params.validity.duration_s
-            )));
-        }
         let filter = ChipFilter::new(params, plan)?;
         let mut exported = match params.law.branches.len() {
             0 => Self::of::<0, 3, 6>(params, &filter, made_by, dt_s),

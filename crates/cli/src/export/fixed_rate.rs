@@ -33,6 +33,12 @@ impl<'a, const B: usize, const N: usize> FixedRate<'a, B, N> {
     /// # Errors
     /// See [`ExportError`].
     pub fn new<const L: usize>(params: &SensorParams, filter: &'a ChipFilter, dt_s: f32) -> Result<Self, ExportError> {
+        let longest_s = params.validity.duration_s;
+        if dt_s * 1e6 < 1.0 || f64::from(dt_s) > longest_s {
+            return Err(ExportError::Interval(format!(
+                "expected between a microsecond and the longest recording, {longest_s} s, found {dt_s}"
+            )));
+        }
         let ChipFilter { filter, quadratics } = filter;
         let EstimatorParams { noise, motion, phases, strain_sd_scale, .. } = filter.estimator;
         let [time, rate_sd, mean, sd] = PriorConstants::new(&motion).numbers();

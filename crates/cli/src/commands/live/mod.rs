@@ -20,7 +20,7 @@ use crate::args::LiveArgs;
 use crate::error::CliError;
 use crate::sensor_file;
 use session::Session;
-use source::{Event, Source};
+pub use source::{Event, Source};
 
 /// How long rows are taken before anything else is looked at.
 const TAKEN_FOR: Duration = Duration::from_millis(20);

@@ -6,6 +6,11 @@
 //                        └── PIN
 #include "ohmstrain.h"
 
+// 1: print what `ohmstrain serial-check` compares, too.
+#ifndef OHMSTRAIN_CHECK
+#define OHMSTRAIN_CHECK 0
+#endif
+
 const int PIN = A0;
 const float R_SERIES = 10000.0f;  // ohm; choose it near the sensor's resistance in the middle of its range
 #if defined(ARDUINO_ARCH_ESP32)
@@ -72,6 +77,14 @@ void loop() {
   }
   ohmstrain_estimate estimate;
   ohmstrain_get(&state, &estimate);
+#if OHMSTRAIN_CHECK
+  static unsigned long steps = 0;
+  Serial.print("step:");
+  Serial.print(steps++);
+  Serial.print(",ohm:");
+  Serial.print(ohm, 4);
+  Serial.print(",");
+#endif
   Serial.print("strain:");
   Serial.print(estimate.strain, 5);
   Serial.print(",lo:");

@@ -1,0 +1,183 @@
+//! Whether a board computes what this computer does.
+
+use std::path::Path;
+
+use ohmstrain_calib::SensorParams;
+
+use crate::args::SerialCheckArgs;
+use crate::commands::live::{Event, Source};
+use crate::error::CliError;
+use crate::export::{self, Plan, ReplayedRow, Said};
+use crate::input::is_stdin;
+use crate::output::print;
+use crate::sensor_file;
+
+/// Steps of a port, which never ends.
+const STEPS_OF_A_PORT: usize = 600;
+/// The interval is the strain and this many deviations to each side.
+const HALF_WIDTH: f64 = 1.96;
+/// The sketch prints five digits; two of them make a deviation.
+const PRINTED_TO: f64 = 1e-5;
+/// Another library's `expf` moves an estimate by far less than this share of its deviation.
+const SHARE_OF_DEVIATION: f64 = 0.01;
+
+/// Compares a board's estimates with those of the exported code's twin, given the board's readings.
+pub fn run(args: &SerialCheckArgs) -> Result<(), CliError> {
+    let asked = args.estimator.chosen().map(|estimator| estimator.0);
+    let sensor = sensor_file::read(&args.sensor, asked)?;
+    let name = args.sensor.display().to_string();
+    let params = sensor.params();
+    let plan = match &args.budget {
+        None => Plan { kind: asked, ..Plan::default() },
+        Some(budget) => {
+            let fitting = export::fitting(params, budget, args.dt_s).map_err(|error| error.into_cli(&name))?;
+            fitting.into_iter().next().unwrap_or_default()
+        }
+    };
+    let heard = listen(args)?;
+    let said = replayed(params, &plan, args.dt_s, &heard.steps).map_err(|error| error.into_cli(&name))?;
+    let farthest = compared(&heard.steps, &said)?;
+    print(|out| {
+        writeln!(out, "{} steps, {} other lines", heard.steps.len(), heard.others)?;
+        writeln!(
+            out,
+            "largest difference: strain {:.1e}, its deviation {:.1e}; the deviation is {:.1e} at least",
+            farthest.strain, farthest.sd, farthest.least_sd
+        )?;
+        Ok(writeln!(out, "The board computes what this computer does.")?)
+    })
+}
+
+/// A step as the board printed it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Step {
+    number: u64,
+    ohm: f64,
+    strain: f64,
+    sd: f64,
+}
+
+impl Step {
+    /// Of a line `step:0,ohm:1600.0000,strain:0.10000,lo:0.08000,hi:0.12000`; `None` of any other.
+    fn of(line: &[u8]) -> Option<Self> {
+        let line = std::str::from_utf8(line).ok()?.trim();
+        let parts: Vec<(&str, &str)> = line.split(',').map(|part| part.split_once(':')).collect::<Option<_>>()?;
+        let text = |label: &str| parts.iter().find(|(name, _)| *name == label).map(|(_, value)| *value);
+        let number = |label: &str| text(label)?.parse::<f64>().ok();
+        let ohm = match text("ohm")? {
+            // What does not fit into Arduino's printed numbers.
+            "ovf" => f64::INFINITY,
+            "-ovf" => f64::NEG_INFINITY,
+            other => other.parse().ok()?,
+        };
+        let sd = (number("hi")? - number("lo")?) / (2.0 * HALF_WIDTH);
+        Some(Self { number: text("step")?.parse().ok()?, ohm, strain: number("strain")?, sd })
+    }
+}
+
+/// What came from a board.
+struct Heard {
+    steps: Vec<Step>,
+    /// Lines that are no steps.
+    others: usize,
+}
+
+/// Listens until there are steps enough, from a board's first one on.
+fn listen(args: &SerialCheckArgs) -> Result<Heard, CliError> {
+    let name = args.port.display().to_string();
+    let ends = is_stdin(&args.port) || args.port.is_file();
+    let wanted = args.steps.unwrap_or(if ends { usize::MAX } else { STEPS_OF_A_PORT });
+    let mut heard = Heard { steps: Vec::new(), others: 0 };
+    let mut late = None;
+    for event in Source::open(Path::new(&args.port), args.baud)?.events {
+        let line = match event {
+            Event::Line(line, _) => line,
+            Event::Connected => continue,
+            Event::Ended => break,
+            Event::Away(why) => return Err(CliError::Other(format!("cannot read {name}: {why}"))),
+        };
+        match Step::of(&line) {
+            None => heard.others += 1,
+            Some(step) if step.number == 0 => heard.steps = vec![step],
+            Some(step) if heard.steps.is_empty() => late = late.or(Some(step.number)),
+            Some(step) => {
+                let expected = heard.steps.len() as u64;
+                if step.number != expected {
+                    return Err(CliError::Input(format!(
+                        "{name}: expected step {expected}, found step {}: lines were lost; send fewer, or faster",
+                        step.number
+                    )));
+                }
+                heard.steps.push(step);
+            }
+        }
+        if heard.steps.len() >= wanted {
+            break;
+        }
+    }
+    match (heard.steps.is_empty(), late) {
+        (false, _) => Ok(heard),
+        (true, Some(number)) => Err(CliError::Input(format!(
+            "{name}: expected step 0 first, found step {number}: reset the board while it is listened to"
+        ))),
+        (true, None) => Err(CliError::Input(format!(
+            "{name}: expected lines like step:0,ohm:1600.0000,strain:0.10000,lo:0.08000,hi:0.12000, found none in {}; \
+             is OHMSTRAIN_CHECK 1 in the sketch?",
+            heard.others
+        ))),
+    }
+}
+
+/// The twin's estimates from the board's readings.
+fn replayed(params: &SensorParams, plan: &Plan, dt_s: f64, steps: &[Step]) -> Result<Vec<Said>, export::ExportError> {
+    // Multiples of what single precision makes of the interval: their differences are it, exactly.
+    let dt_s = f64::from(dt_s as f32);
+    let row = |(k, step): (usize, &Step)| ReplayedRow { time_s: dt_s * k as f64, reading: step.ohm, reading_sd: 0.0 };
+    let rows: Vec<ReplayedRow> = steps.iter().enumerate().map(row).collect();
+    export::replay(params, plan, dt_s, &rows)
+}
+
+/// The largest differences.
+struct Farthest {
+    strain: f64,
+    sd: f64,
+    least_sd: f64,
+}
+
+fn compared(steps: &[Step], said: &[Said]) -> Result<Farthest, CliError> {
+    let mut farthest = Farthest { strain: 0.0, sd: 0.0, least_sd: f64::INFINITY };
+    for (step, said) in steps.iter().zip(said) {
+        let (strain, sd) = (f64::from(said.strain), f64::from(said.sd));
+        let (of_strain, of_sd) = ((step.strain - strain).abs(), (step.sd - sd).abs());
+        let least = PRINTED_TO + SHARE_OF_DEVIATION * sd;
+        // Not a number is no agreement.
+        if !(of_strain <= least && of_sd <= least) {
+            return Err(CliError::Check(format!(
+                "step {}: expected strain {strain:.5} ± {sd:.5} for {} ohm, found {:.5} ± {:.5} on the board; was it \
+                 exported from this sensor, with this --dt-s and this estimator?",
+                step.number, step.ohm, step.strain, step.sd
+            )));
+        }
+        farthest.strain = farthest.strain.max(of_strain);
+        farthest.sd = farthest.sd.max(of_sd);
+        farthest.least_sd = farthest.least_sd.min(sd);
+    }
+    Ok(farthest)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Step;
+
+    #[test]
+    fn a_line_is_a_step_or_something_else() {
+        let step = Step::of(b"step:3,ohm:1600.5000,strain:0.10000,lo:0.08040,hi:0.11960\r").unwrap();
+        assert_eq!((step.number, step.ohm, step.strain), (3, 1600.5, 0.1));
+        assert!((step.sd - 0.01).abs() < 1e-12);
+        let open = Step::of(b"step:4,ohm:ovf,strain:0.1,lo:0.0,hi:0.2").unwrap();
+        assert_eq!(open.ohm, f64::INFINITY);
+        for other in ["", "ets Jul 29 2019", "strain:0.1,lo:0.0,hi:0.2", "step:4,ohm:16", "time_s,resistance_ohm"] {
+            assert_eq!(Step::of(other.as_bytes()), None, "{other}");
+        }
+    }
+}

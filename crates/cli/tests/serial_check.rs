@@ -1,0 +1,63 @@
+//! Whether a board agrees with this computer: the exported sketch, compiled for this computer with an Arduino that is none.
+
+use std::process::Command;
+
+use crate::common::Bench;
+use crate::export::{DT_S, compilers};
+
+/// What the sketch of a calibrated sensor prints.
+fn printed(bench: &Bench) -> Option<String> {
+    let arduino = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scripts/exported-c");
+    bench.run(&["export", "--sensor", "sensor.toml", "--dt-s", DT_S, "--target", "c", "-o", "c"]).ok();
+    let compiler = compilers().first().map(|c| if *c == "gcc" { "g++" } else { "clang++" })?;
+    let board = format!("{arduino}/board.cpp");
+    let flags =
+        ["-std=gnu++11", "-O2", "-ffp-contract=off", "-DOHMSTRAIN_CHECK=1", "-I", arduino, "-include", "Arduino.h"];
+    let sources = ["-I", "c/ohmstrain", "-x", "c++", "c/ohmstrain/ohmstrain.ino", "c/ohmstrain/ohmstrain.c", &board];
+    let compiled = Command::new(compiler)
+        .current_dir(bench.path(""))
+        .args(flags)
+        .args(sources)
+        .args(["-lm", "-o", "board"])
+        .output();
+    let compiled = compiled.unwrap();
+    assert!(compiled.status.success(), "{}", String::from_utf8_lossy(&compiled.stderr));
+    let run = Command::new(bench.path("board")).output().unwrap();
+    assert!(run.status.success());
+    Some(String::from_utf8(run.stdout).unwrap())
+}
+
+const CHECK: [&str; 7] = ["serial-check", "--sensor", "sensor.toml", "--port", "board.txt", "--dt-s", DT_S];
+
+#[test]
+fn a_board_agrees_until_it_runs_something_else() {
+    let bench = Bench::calibrated_by_default();
+    let Some(printed) = printed(&bench) else { return };
+    bench.write("board.txt", &printed);
+    let said = bench.run(&CHECK).ok();
+    assert!(said.starts_with("1000 steps, 1 other lines\n"), "{said}");
+    assert!(said.ends_with("\nThe board computes what this computer does.\n"), "{said}");
+    // Another estimator than the board's, and another pace.
+    for other in [[&CHECK[..], &["--estimator", "ekf"]].concat(), [&CHECK[..6], &["0.1"]].concat()] {
+        let run = bench.run(&other);
+        assert!(run.code == Some(3) && run.stderr.contains("on the board; was it exported"), "{}", run.stderr);
+    }
+}
+
+#[test]
+fn lines_that_are_lost_or_missing_are_said() {
+    let bench = Bench::calibrated();
+    let line = |step: u32| format!("step:{step},ohm:1700.0000,strain:0.01000,lo:0.00000,hi:0.02000\n");
+    for (lines, message) in [
+        (line(0) + &line(1) + &line(3), "expected step 2, found step 3: lines were lost; send fewer, or faster"),
+        (line(57) + &line(58), "expected step 0 first, found step 57: reset the board while it is listened to"),
+        (
+            "strain:0.01,lo:0.0,hi:0.02\n".into(),
+            "expected lines like step:0,ohm:1600.0000,strain:0.10000,lo:0.08000,hi:0.12000, found none in 1; \
+             is OHMSTRAIN_CHECK 1 in the sketch?",
+        ),
+    ] {
+        bench.write("board.txt", &lines);
+        bench.run(&CHECK).fails(4, &format!("board.txt: {message}"));
+    }
+}

@@ -1,0 +1,40 @@
+/* An Arduino that a computer pretends to be: a sensor that moves, is unplugged for a moment, and a serial port that is stdout. */
+#include "Arduino.h"
+
+#include <cmath>
+#include <cstdio>
+
+SerialPort Serial;
+
+void SerialPort::begin(unsigned long) { std::printf("ets Jul 29 2019 12:21:46\r\n"); }
+void SerialPort::print(const char *text) { std::printf("%s", text); }
+void SerialPort::print(unsigned long number) { std::printf("%lu", number); }
+void SerialPort::print(double number, int digits) { std::printf("%.*f", digits, number); }
+void SerialPort::println(int number) { std::printf("%d\r\n", number); }
+void SerialPort::println(double number, int digits) { std::printf("%.*f\r\n", digits, number); }
+
+unsigned long micros(void) {
+  static unsigned long now = 4294000000UL;
+  return now += 50000UL;
+}
+
+void delay(unsigned long) {}
+
+/* Codes of a 10-bit converter: 1600 to 2400 ohm below 10 kohm; the rail while nothing is connected. */
+int analogRead(uint8_t) {
+  static int reading = 0;
+  reading++;
+  return reading >= 200 && reading < 210 ? 1023 : static_cast<int>(165.0 + 27.0 * std::sin(0.05 * reading));
+}
+
+uint32_t analogReadMilliVolts(uint8_t pin) { return static_cast<uint32_t>(analogRead(pin)) * 3300 / 1023; }
+
+void setup();
+void loop();
+
+int main() {
+  setup();
+  for (int i = 0; i < 4000; i++) {
+    loop();
+  }
+}
