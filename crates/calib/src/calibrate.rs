@@ -11,7 +11,6 @@ use crate::findings::{Check, Findings, Seen};
 use crate::identifiability::identifiability;
 use crate::law_fit::{CrossFit, LawOptions, fit_laws};
 use crate::law_params::LawParams;
-use crate::left_out::REFERENCE_SD;
 use crate::motion_stats::MotionStats;
 use crate::noise_fit::{NoiseProblem, REFINEMENT, SURVEY, Surveyed, best_of_each_size, survey, survey_evaluations};
 use crate::params::{FORMAT, Quantity, RangeParams, ReadingUnit, SensorParams, Uncertainty, Validity};
@@ -124,8 +123,8 @@ fn handicap(kind: EstimatorKind) -> f64 {
 /// for; what it corrects is learned last, from the same rows.
 ///
 /// # Errors
-/// If the recordings are too short or too plain to learn a law from, if the law explains nothing or the estimates are no
-/// better than a constant, or `structures` or `kinds` is empty.
+/// If the recordings are too short or too plain to learn a law from, if the law explains nothing, or `structures` or `kinds` is
+/// empty.
 pub fn calibrate(
     recordings: &[Samples],
     structures: &[LawOptions],
@@ -179,7 +178,6 @@ pub(crate) fn calibrate_once(
         estimators.insert(kind, params);
     }
     let mut progress = steps.progress;
-    worth_something(&estimators, &stats, fit.law.law.range)?;
     let score =
         |kind: &EstimatorKind| estimators.get(kind).map_or(f64::INFINITY, |params| params.score + handicap(*kind));
     let best = wanted.iter().copied().min_by(|a, b| score(a).total_cmp(&score(b)));
@@ -226,21 +224,6 @@ pub(crate) fn calibrate_once(
 fn reading_range(recordings: &[Samples]) -> (f64, f64) {
     let readings = recordings.iter().flat_map(|samples| samples.complete_rows().map(|k| samples.reading[k]));
     readings.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), reading| (low.min(reading), high.max(reading)))
-}
-
-/// How much better, in mean log density, the best estimator must be than a constant strain: 5 % in the deviation.
-const LEAST_GAIN: f64 = 0.05;
-
-/// Refuses estimators that are no better than the reference's mean and deviation.
-fn worth_something(
-    estimators: &BTreeMap<EstimatorKind, EstimatorParams>,
-    stats: &MotionStats,
-    limits: RangeParams,
-) -> Result<(), CalibrationError> {
-    let variance = (stats.strain_sd / limits.span()).powi(2) + REFERENCE_SD * REFERENCE_SD;
-    let constant = 0.5 + 0.5 * variance.ln();
-    let score = estimators.values().map(|params| params.score).fold(f64::INFINITY, f64::min);
-    if score > constant - LEAST_GAIN { Err(CalibrationError::NothingEstimated { score, constant }) } else { Ok(()) }
 }
 
 /// The correction of the calibrated filter; none if nothing can be learned about it.

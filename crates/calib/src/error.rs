@@ -44,17 +44,6 @@ pub enum CalibrationError {
         /// Squared error of the law over that of a constant, on blocks left out.
         unexplained: f64,
     },
-    /// Estimates that are no better than none.
-    #[error(
-        "the estimates are no better than a constant strain: on parts that the calibration has not seen, their score is \
-         {score:.2}, that of a constant {constant:.2} (less is better)"
-    )]
-    NothingEstimated {
-        /// Mean negative log density of the best estimator.
-        score: f64,
-        /// The same of the reference's mean and deviation.
-        constant: f64,
-    },
     /// The least-squares problem has no unique solution.
     #[error("the law cannot be fitted: its equations are singular")]
     Singular,
