@@ -118,7 +118,7 @@ fn handicap(kind: EstimatorKind) -> f64 {
 ///
 /// Estimators are tried with a law for each of `structures` and each strength of ridge; the pair with the best score on
 /// blocks that the law has not seen gives the law. To that law every one of them, what smooths in its place, and the extended
-/// Kalman filter in any case, is then fitted, with the family of motions that serves it best, and the best of `kinds` becomes
+/// Kalman filter in any case, is then fitted, and the best of `kinds` becomes
 /// the default. Near ties go to the one that keeps hypotheses. [`EstimatorKind::Corrected`] is the default where it is asked
 /// for; what it corrects is learned last, from the same rows.
 ///

@@ -216,7 +216,7 @@ fn drift(readings: &[f64], reference: Option<&[f64]>) -> Option<f64> {
 pub(crate) fn alternation(values: &[f64]) -> Option<f64> {
     const STRETCH: usize = 20;
     const SHARE: f64 = 0.8;
-    // White noise fills one stretch in a hundred: two of them once in ten thousand recordings, three of four once in a million.
+    // Of simulated white noise 1.3 % of the stretches are filled, two of two in 2e-4 of the recordings, three of four in 1e-5.
     const FEWEST: usize = 4;
     let known: Vec<f64> = values.iter().copied().filter(|value| !value.is_nan()).collect();
     let off = |i: usize| known[i] - 0.5 * (known[i - 1] + known[i + 1]);
