@@ -13,6 +13,8 @@ void delay(unsigned long milliseconds);
 
 struct SerialPort {
   void begin(unsigned long baud);
+  int available();
+  int read();
   void print(const char *text);
   void print(unsigned long number);
   void print(double number, int digits);

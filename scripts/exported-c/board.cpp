@@ -7,6 +7,8 @@
 SerialPort Serial;
 
 void SerialPort::begin(unsigned long) { std::printf("ets Jul 29 2019 12:21:46\r\n"); }
+int SerialPort::available() { return 0; }
+int SerialPort::read() { return -1; }
 void SerialPort::print(const char *text) { std::printf("%s", text); }
 void SerialPort::print(unsigned long number) { std::printf("%lu", number); }
 void SerialPort::print(double number, int digits) { std::printf("%.*f", digits, number); }

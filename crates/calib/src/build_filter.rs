@@ -14,7 +14,7 @@ use crate::sieve::Sieve;
 use crate::sparse_estimator::{Histories, SparseEstimator, SparsePhases, Splits};
 
 /// Share of the limits' span to which a given initial strain is believed.
-const START_SD: f64 = 1e-3;
+pub(crate) const START_SD: f64 = 1e-3;
 
 /// Builds the filter for a sensor.
 ///

@@ -3,7 +3,7 @@
 use ohmstrain_ekf::correction::{FEATURES, FeatureScale, INDUCING, InputScale, OUTPUTS};
 
 use crate::CalibrationError;
-use crate::build_filter::{HISTORIES, HYPOTHESES};
+use crate::build_filter::{HISTORIES, HYPOTHESES, START_SD};
 use crate::corrected::learned_for_filter;
 use crate::corrector::Corrector;
 use crate::estimator_params::{EstimatorKind, EstimatorParams};
@@ -23,6 +23,8 @@ pub struct PortableFilter {
     pub readings: PortableSieve,
     /// What corrects its strain.
     pub correction: Option<PortableCorrection>,
+    /// Deviation of a strain that is known when it starts.
+    pub known_sd: f64,
 }
 
 /// What a reading must be for a filter to see it.
@@ -106,7 +108,8 @@ impl PortableFilter {
             most_repeats: MOST_REPEATS,
             error_time_s: estimator.noise.reading_time_s,
         };
-        Ok(Self { kind, hypotheses, estimator, readings, correction: correction.transpose()? })
+        let known_sd = START_SD * params.limits.span();
+        Ok(Self { kind, hypotheses, estimator, readings, correction: correction.transpose()?, known_sd })
     }
 }
 

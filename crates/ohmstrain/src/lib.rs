@@ -43,7 +43,7 @@ mod unit_doubt;
 mod validity;
 pub mod verdict;
 
-pub use builder::FilterBuilder;
+pub use builder::{FilterBuilder, KNOWN_BEYOND};
 pub use calibrate::{Calibrated, Calibration, calibrate};
 pub use closing::{Closing, Tested};
 pub use column::Column;

@@ -1,6 +1,6 @@
 //! What the templates show: a sensor's filter in `f32`, for steps of one length.
 
-use ohmstrain::DOUBT;
+use ohmstrain::{DOUBT, KNOWN_BEYOND};
 use ohmstrain_calib::{EstimatorKind, HISTORIES, HYPOTHESES, PortableFilter, Quantity, ReadingUnit, SensorParams};
 use ohmstrain_ekf::record::{MixtureNumbers, shared};
 use ohmstrain_ekf::{Belief, Compact, Gaussian, SparseEkf, SparseHypotheses, SparseSignSplit};
@@ -34,6 +34,9 @@ pub struct Exported {
     dt_us: u64,
     dt_ms: f64,
     rest_reading: Literal,
+    /// What the rested sensor read in calibration, and whether zero is a strain that it can have.
+    rested: Literal,
+    rests_at_zero: bool,
     lower: Literal,
     upper: Literal,
     strain_sd_scale: Literal,
@@ -45,6 +48,9 @@ pub struct Exported {
     rests: bool,
     start_mean: Vec<Literal>,
     start_variance: Vec<Literal>,
+    /// Of a strain that is known at a start, and how far beyond the limits that may be.
+    known_variance: Literal,
+    known_beyond: Literal,
     reading_variance: Literal,
     sieve: SieveConstants,
     doubt: DoubtConstants,
@@ -230,6 +236,8 @@ impl Exported {
             dt_us: (dt_s * 1e6).round() as u64,
             dt_ms: (dt_s * 1e6).round() / 1e3,
             rest_reading: Literal(sensor.rest_reading),
+            rested: Literal(sensor.rested),
+            rests_at_zero: sensor.rested_strain().is_some(),
             lower: Literal(limits.lower),
             upper: Literal(limits.upper),
             strain_sd_scale: Literal(strain_sd_scale),
@@ -240,6 +248,8 @@ impl Exported {
             rests: filter.estimator.phases.is_some_and(|phases| phases.rests()),
             start_mean: literals(start.mean.iter()),
             start_variance: (0..N).map(|i| Literal(start.covariance[(i, i)])).collect(),
+            known_variance: Literal(sensor.parts.start_variance),
+            known_beyond: Literal((KNOWN_BEYOND * params.limits.span()) as f32),
             reading_variance: Literal(reading_sd * reading_sd),
             sieve: SieveConstants {
                 lower: Literal(sieve.plausible.0 as f32),
@@ -292,11 +302,12 @@ impl Exported {
 
     /// A literal that is no number would not compile, or worse.
     fn check_finite(&self) -> Result<(), ExportError> {
-        let scalars = [self.rest_reading, self.lower, self.upper, self.strain_sd_scale, self.reading_variance];
+        let scalars =
+            [self.rest_reading, self.rested, self.lower, self.upper, self.strain_sd_scale, self.reading_variance];
         let all = self.start_mean.iter().chain(&self.start_variance).chain(&scalars);
         match all.copied().find(|literal| !literal.0.is_finite()) {
             Some(literal) => Err(ExportError::Parameter(format!("a parameter is {:?} in single precision", literal.0))),
-            None if !(self.rest_reading.0 > 0.0) => {
+            None if !(self.rest_reading.0 > 0.0 && self.rested.0 > 0.0) => {
                 Err(ExportError::Parameter("field `rest_reading`: vanishes in single precision".into()))
             }
             None => Ok(()),

@@ -68,6 +68,11 @@ impl<T: Real> Doubt<T> {
         }
     }
 
+    /// The same where the strain is known at the start.
+    pub fn of_known_strain(self) -> Self {
+        Self { starts: false, fading: T::zero(), ..self }
+    }
+
     fn raise(&mut self, variance: T) {
         let variance = variance.min(number(self.parts.most));
         if variance > self.fading {

@@ -1,5 +1,6 @@
 //! A sensor's filter at a fixed rate, in single and in double precision.
 
+use ohmstrain::KNOWN_BEYOND;
 use ohmstrain_calib::{EstimatorKind, EstimatorParams, HISTORIES, HYPOTHESES, SensorParams};
 use ohmstrain_ekf::{Compact, Ekf, Estimator, Evidence, Hypotheses, STEP_GRACE, SignSplit, SparseEkf, StepError};
 use ohmstrain_model::{Motion, SensorLaw, StrainRange, SwitchedModel};
@@ -19,8 +20,9 @@ pub struct FixedRate<'a, const B: usize, const N: usize> {
     pub model: SwitchedModel<f32, B, N>,
     /// How many hypotheses it keeps; 1 if it keeps none.
     pub hypotheses: usize,
-    /// R₀.
+    /// R₀ of the law, and what the rested sensor read in calibration.
     pub rest_reading: f32,
+    pub rested: f32,
     /// Everything else.
     pub parts: Parts<'a>,
     /// What depends on the length of a step.
@@ -73,6 +75,7 @@ impl<'a, const B: usize, const N: usize> FixedRate<'a, B, N> {
             limits,
             strain_sd_scale: strain_sd_scale as f32,
             sieve: filter.readings,
+            start_variance: (filter.known_sd * filter.known_sd) as f32,
             correction: filter.correction.as_ref(),
             quadratics: quadratics.as_ref(),
             doubt: DoubtParts::new(params),
@@ -85,7 +88,20 @@ impl<'a, const B: usize, const N: usize> FixedRate<'a, B, N> {
         // Not longer than the table either.
         parts.longest_step_s = longest_s.min(table.range.1) as f32;
         let rest_reading = params.rest_reading as f32;
-        Ok(Self { reference, model, hypotheses: filter.hypotheses, rest_reading, parts, table })
+        let rested = params.measured_rest.map_or(rest_reading, |measured| measured as f32);
+        Ok(Self { reference, model, hypotheses: filter.hypotheses, rest_reading, rested, parts, table })
+    }
+
+    /// R₀ where the rested sensor reads this today.
+    pub fn rest_reading_at(&self, measured: f32) -> f32 {
+        self.rest_reading * (measured / self.rested)
+    }
+
+    /// The strain at which a sensor that has just been rested begins again: zero, if the limits allow for it.
+    pub fn rested_strain(&self) -> Option<f32> {
+        let StrainRange { lower, upper } = self.parts.limits;
+        let beyond = KNOWN_BEYOND as f32 * (upper - lower);
+        (lower.max(-upper) <= beyond).then_some(0.0)
     }
 
     /// Length of the steps that the usual time between readings is divided into, s.

@@ -5,6 +5,7 @@ use ohmstrain_ekf::{
     Belief, Compact, Reading, Real, Residual, SparseEkf, SparseHypotheses, SparseMixture, SparseSignSplit, State,
     StepError,
 };
+use ohmstrain_model::Phase;
 
 use super::twin::flag;
 
@@ -56,6 +57,15 @@ impl<T: Real, const B: usize, const N: usize, const L: usize, const K: usize> Mo
             Self::Ekf(filter, _) => filter.set_step(step_s, numbers),
             Self::SignSplit(filter, _) => filter.set_step(step_s, numbers, chain),
             Self::Histories(filter, _) => filter.set_step(step_s, numbers, chain),
+        }
+    }
+
+    /// Begins again from one Gaussian, as a filter begins.
+    pub fn start_from(&mut self, belief: Belief<T, N, L>) {
+        match self {
+            Self::Ekf(_, state) => *state = belief,
+            Self::SignSplit(_, state) => *state = SparseMixture::single(belief, Phase::Extend),
+            Self::Histories(_, state) => *state = SparseMixture::single(belief, Phase::Hold),
         }
     }
 

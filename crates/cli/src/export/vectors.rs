@@ -18,6 +18,9 @@ pub struct Vectors {
     ulp: Literal,
     tolerance_ulp: u64,
     rows: Vec<Vector>,
+    /// The row before which the sensor is found to rest, and what it reads then.
+    rezeroed: usize,
+    rested: Literal,
     /// Hypotheses moved on in a step, on average.
     #[serde(skip)]
     pub work: f64,
@@ -41,6 +44,10 @@ pub struct Input {
 
 /// What a prediction takes of the instructions of a step with a reading.
 const PREDICTION: f64 = 0.75;
+
+/// Rows at the end for which the sensor rests, and what it reads then over what it read in calibration: another day.
+const RESTED: usize = 20;
+const ANOTHER_DAY: f32 = 1.08;
 
 /// How many times further than Rust's `f32` filter another one may be from exact arithmetic.
 const FURTHER: f64 = 3.0;
@@ -72,6 +79,8 @@ impl Vectors {
         };
         Ok(Self {
             seed: motion::SEED,
+            rezeroed: inputs.len() - RESTED,
+            rested: Literal(rested_elsewhere(sensor)),
             ulp: Literal(ulp),
             tolerance_ulp: tolerance,
             work,
@@ -96,7 +105,19 @@ fn readings<const B: usize, const N: usize>(sensor: &FixedRate<'_, B, N>) -> Vec
         reading_sd: (rest * row.extra_sd) as f32,
     };
     let reading_sd = f64::from(sensor.model.noise().reading_sd);
-    motion::rows(sensor.reference.law(), f64::from(sensor.parts.dt_s), reading_sd).into_iter().map(input).collect()
+    let dt_s = f64::from(sensor.parts.dt_s);
+    let mut inputs: Vec<Input> =
+        motion::rows(sensor.reference.law(), dt_s, reading_sd).into_iter().map(input).collect();
+    // It wanders, so that no number comes twice.
+    let wandering = |row: usize| 1.0 + reading_sd * (row as f64).sin();
+    let rested = f64::from(rested_elsewhere(sensor));
+    inputs.extend((0..RESTED).map(|row| Input { reading: Some((rested * wandering(row)) as f32), reading_sd: 0.0 }));
+    inputs
+}
+
+/// What the rested sensor reads on another day.
+fn rested_elsewhere<const B: usize, const N: usize>(sensor: &FixedRate<'_, B, N>) -> f32 {
+    sensor.rested * ANOTHER_DAY
 }
 
 /// A row relative to R₀, computed as on the microcontroller.
@@ -114,14 +135,19 @@ fn run<T: Real, const B: usize, const N: usize, const L: usize, const K: usize>(
 ) -> Result<(Vec<(T, T)>, f64), ExportError> {
     let exactly = |x: f32| T::of(x.into());
     let mut twin: Twin<T, B, N, L, K> = Twin::new(model, &sensor.parts, numbers).map_err(refused)?;
-    let estimate = |input: &Input| {
-        let reading = relative(sensor.rest_reading, input)
+    let mut rest_reading = sensor.rest_reading;
+    let estimate = |(row, input): (usize, &Input)| {
+        if row + RESTED == inputs.len() {
+            rest_reading = sensor.rest_reading_at(rested_elsewhere(sensor));
+            twin.restart(sensor.rested_strain().map(exactly));
+        }
+        let reading = relative(rest_reading, input)
             .map(|reading| Reading { value: exactly(reading.value), extra_variance: exactly(reading.extra_variance) });
         twin.step(reading).map_err(refused)?;
         let strain = twin.strain();
         Ok((strain.mean, strain.sd()))
     };
-    let estimates = inputs.iter().map(estimate).collect::<Result<Vec<_>, ExportError>>()?;
+    let estimates = inputs.iter().enumerate().map(estimate).collect::<Result<Vec<_>, ExportError>>()?;
     let [updated, predicted] = twin.work().map(|count| count as f64 / inputs.len() as f64);
     Ok((estimates, updated + PREDICTION * predicted))
 }

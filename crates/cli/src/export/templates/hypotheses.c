@@ -573,7 +573,7 @@ static int attempt(ohmstrain_state *state, const interval *over, const float *rh
     return OHMSTRAIN_OK;
 }
 
-static void start_mixture(ohmstrain_state *state)
+static void start_mixture(ohmstrain_state *state, const float *strain)
 {
     hypothesis *first = &state->mixture.hypothesis[0];
     int i, j;
@@ -584,6 +584,10 @@ static void start_mixture(ohmstrain_state *state)
             first->covariance[AT(i, j)] = 0.0f;
         }
         first->covariance[AT(i, i)] = START_VARIANCE[i];
+    }
+    if (strain) {
+        first->mean[0] = *strain;
+        first->covariance[0] = KNOWN_VARIANCE;
     }
     first->weight = 1.0f;
     first->per_inside = 1.0f;

@@ -32,6 +32,11 @@ enum { STATES = OHMSTRAIN_STATES, ENTRIES = OHMSTRAIN_ENTRIES, LAST = STATES - 1
 static const float START_MEAN[STATES] = {<< start_mean|join("f, ") >>f};
 static const float START_VARIANCE[STATES] = {<< start_variance|join("f, ") >>f};
 
+/* Of a strain that is known at a start, and how far beyond the limits one can be known. */
+static const float KNOWN_VARIANCE = << known_variance >>f, KNOWN_BEYOND = << known_beyond >>f;
+/* What the rested, unstretched sensor read in calibration: of the day, where OHMSTRAIN_REST_READING is of the law. */
+static const float RESTED = << rested >>f;
+
 /* White noise of a reading, relative to the rest reading, squared. */
 static const float READING_VARIANCE = << reading_variance >>f;
 /* Least and largest rho that can be a reading of this sensor: others are taken for missing. */
@@ -193,7 +198,7 @@ static int attempt(ohmstrain_state *state, const interval *over, const float *rh
     return OHMSTRAIN_OK;
 }
 
-static void start_mixture(ohmstrain_state *state)
+static void start_mixture(ohmstrain_state *state, const float *strain)
 {
     int i, j;
 
@@ -203,6 +208,10 @@ static void start_mixture(ohmstrain_state *state)
             state->covariance[AT(i, j)] = 0.0f;
         }
         state->covariance[AT(i, i)] = START_VARIANCE[i];
+    }
+    if (strain) {
+        state->mean[0] = *strain;
+        state->covariance[0] = KNOWN_VARIANCE;
     }
 }
 
@@ -479,24 +488,72 @@ static ohmstrain_status step(ohmstrain_state *state, float dt_s, const float *rh
     return OHMSTRAIN_OK;
 }
 
-ohmstrain_status ohmstrain_start(ohmstrain_state *state)
+/* Before any reading; at a strain that is known if there is one. */
+static ohmstrain_status start(ohmstrain_state *state, const float *strain, float rest_reading)
 {
     /* Zeros, in C and in C++; nobody writes to it. */
     static readings none;
     summary all;
 
+    start_mixture(state, strain);
+    state->readings = none;
+    state->readings.starts = !strain;
+    state->readings.fading = strain ? 0.0f : START_DOUBT;
+    summarise(state, &all);
+    state->strain = strain_of(&all, &state->variance);
+    state->variance += state->readings.fading;
+    state->rest_reading = rest_reading;
+    return OHMSTRAIN_OK;
+}
+
+ohmstrain_status ohmstrain_start(ohmstrain_state *state)
+{
+    return state ? start(state, (const float *)0, OHMSTRAIN_REST_READING) : OHMSTRAIN_ERR_ARGUMENT;
+}
+
+ohmstrain_status ohmstrain_start_at(ohmstrain_state *state, float strain)
+{
+    if (!state || !(OHMSTRAIN_LOWER - strain <= KNOWN_BEYOND && strain - OHMSTRAIN_UPPER <= KNOWN_BEYOND)) {
+        return OHMSTRAIN_ERR_ARGUMENT;
+    }
+    return start(state, &strain, OHMSTRAIN_REST_READING);
+}
+
+/* R0 of the law where the rested sensor reads this. */
+static float rest_reading_at(float measured)
+{
+    return OHMSTRAIN_REST_READING * (measured / RESTED);
+}
+
+ohmstrain_status ohmstrain_rest(ohmstrain_state *state, float measured)
+{
     if (!state) {
         return OHMSTRAIN_ERR_ARGUMENT;
     }
-    start_mixture(state);
-    state->readings = none;
-    state->readings.starts = 1;
-    state->readings.fading = START_DOUBT;
-    summarise(state, &all);
-    state->strain = strain_of(&all, &state->variance);
-    state->variance += START_DOUBT;
-    state->rest_reading = OHMSTRAIN_REST_READING;
+    if (!usable(rest_reading_at(measured))) {
+        return OHMSTRAIN_ERR_NOT_FINITE;
+    }
+    state->rest_reading = rest_reading_at(measured);
     return OHMSTRAIN_OK;
+}
+
+ohmstrain_status ohmstrain_rezero(ohmstrain_state *state, float measured)
+{
+{% if rests_at_zero %}
+    static const float zero = 0.0f;
+    const float *const strain = &zero;
+{% else %}
+    /* It is always stretched somewhat: nobody knows by how much. */
+    const float *const strain = (const float *)0;
+{% endif %}
+
+    if (!state) {
+        return OHMSTRAIN_ERR_ARGUMENT;
+    }
+    if (!usable(rest_reading_at(measured))) {
+        return OHMSTRAIN_ERR_NOT_FINITE;
+    }
+    return start(state, strain, rest_reading_at(measured));
 }
 
 ohmstrain_status ohmstrain_step_after(ohmstrain_state *state, float dt_s, float reading, float reading_sd,

@@ -24,7 +24,7 @@ extern "C" {
 
 /* Usual time between two steps, s. */
 #define OHMSTRAIN_DT_S << dt_s >>f
-/* Reading at zero << quantity >> after everything has relaxed, << reading_unit >>. */
+/* Reading at zero << quantity >> after everything has relaxed, << reading_unit >>: of the law, not what a rested sensor reads. */
 #define OHMSTRAIN_REST_READING << rest_reading >>f
 /* Smallest and largest << quantity >> that is reported<< quantity_unit >>. */
 #define OHMSTRAIN_LOWER << lower >>f
@@ -49,9 +49,9 @@ extern "C" {
 /* What a function returns. */
 typedef enum ohmstrain_status {
     OHMSTRAIN_OK = 0,
-    /* A null pointer where a state or a result is needed. */
+    /* A null pointer where a state or a result is needed; a << quantity >> far outside of the limits. */
     OHMSTRAIN_ERR_ARGUMENT = -1,
-    /* The deviation of a reading is NaN or infinite, or the rest reading is not positive. */
+    /* The deviation of a reading is NaN or infinite, or what the rested sensor reads is not positive. */
     OHMSTRAIN_ERR_NOT_FINITE = -2,
     /* The new state would not be finite. */
     OHMSTRAIN_ERR_STATE = -4
@@ -142,7 +142,7 @@ typedef struct ohmstrain_state {
     /* The strain as it is reported, and its variance. */
     float strain;
     float variance;
-    /* Reading at rest, << reading_unit >>: OHMSTRAIN_REST_READING, or what you measure at rest. */
+    /* OHMSTRAIN_REST_READING, or that of another day: ohmstrain_rest sets it. */
     float rest_reading;
 } ohmstrain_state;
 
@@ -166,7 +166,10 @@ typedef struct ohmstrain_estimate {
 
 /* << estimator.title >>{% if correction %}, its strain corrected by what was learned in calibration{% endif %}.
  *
- * ohmstrain_start:   before any reading.
+ * ohmstrain_start:   before any reading; ohmstrain_start_at: where the << quantity >> is known, at rest.
+ * ohmstrain_rest:    the rested, unstretched sensor is found to read `measured`, in place of what it read in calibration: R0 of
+ *                    today, from the next reading on.
+ * ohmstrain_rezero:  the same, and the sensor rests now: the filter starts again, at zero.
  * ohmstrain_step:    one interval on, with a reading in << reading_unit >>. `reading_sd` is what the electronics add to its
  *                    noise, 0 for nothing beyond the calibration; `residual` may be null. A reading that no working sensor
  *                    gives is no error: it is taken for missing, and the estimate's flags say so.
@@ -176,6 +179,9 @@ typedef struct ohmstrain_estimate {
  * ohmstrain_get:     the estimate after the last step.
  */
 ohmstrain_status ohmstrain_start(ohmstrain_state *state);
+ohmstrain_status ohmstrain_start_at(ohmstrain_state *state, float strain);
+ohmstrain_status ohmstrain_rest(ohmstrain_state *state, float measured);
+ohmstrain_status ohmstrain_rezero(ohmstrain_state *state, float measured);
 ohmstrain_status ohmstrain_step(ohmstrain_state *state, float reading, float reading_sd, ohmstrain_residual *residual);
 ohmstrain_status ohmstrain_step_after(ohmstrain_state *state, float dt_s, float reading, float reading_sd,
                                       ohmstrain_residual *residual);

@@ -37,6 +37,19 @@ static int without_reading(ohmstrain_state *state, int k)
     return failures;
 }
 
+/* What cannot be read at rest, and what cannot be known, is refused, and leaves the state alone. */
+static int wrong_rest(ohmstrain_state *state)
+{
+    const float rest_reading = state->rest_reading;
+    int failures = ohmstrain_rezero(state, 0.0f) != OHMSTRAIN_ERR_NOT_FINITE;
+
+    failures += ohmstrain_rest(state, NAN) != OHMSTRAIN_ERR_NOT_FINITE;
+    failures += ohmstrain_rest(state, INFINITY) != OHMSTRAIN_ERR_NOT_FINITE;
+    failures += ohmstrain_start_at(state, NAN) != OHMSTRAIN_ERR_ARGUMENT;
+    failures += ohmstrain_start_at(state, OHMSTRAIN_UPPER + (OHMSTRAIN_UPPER - OHMSTRAIN_LOWER)) != OHMSTRAIN_ERR_ARGUMENT;
+    return failures + (state->rest_reading != rest_reading);
+}
+
 /* Runs the filter; returns the number of wrong answers other than differences of numbers. */
 static int test_filter(float *largest)
 {
@@ -45,6 +58,9 @@ static int test_filter(float *largest)
     int k, failures = ohmstrain_start(&state) != OHMSTRAIN_OK;
     for (k = 0; k < VECTORS; k++) {
         const vector *v = &VECTOR[k];
+        if (k == REZEROED) {
+            failures += wrong_rest(&state) + (ohmstrain_rezero(&state, RESTED_READING) != OHMSTRAIN_OK);
+        }
         if (v->reading == v->reading) {
             ohmstrain_residual residual;
             failures += ohmstrain_step(&state, v->reading, v->reading_sd, &residual) != OHMSTRAIN_OK;

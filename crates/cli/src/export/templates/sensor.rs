@@ -9,11 +9,11 @@
 use ohmstrain_ekf::correction::{Correction, FEATURES, FeatureScale, InputScale, OUTPUTS, Process, ReadingFeatures};
 {% endif %}
 {% if splits %}
-use ohmstrain_ekf::{Belief, Compact, {% if rests %}Dwell, {% endif %}Evidence, Reading, SparseEkf, SparseMixture, SparseSignSplit, StepError};
+use ohmstrain_ekf::{Belief, Compact, {% if rests %}Dwell, {% endif %}Evidence, Reading, SparseEkf, SparseMixture, SparseSignSplit, StepError, StrainSensor};
 {% elif estimator.hypotheses %}
-use ohmstrain_ekf::{Belief, Compact, Dwell, Evidence, Reading, SparseEkf, SparseHypotheses, SparseMixture, StepError};
+use ohmstrain_ekf::{Belief, Compact, Dwell, Evidence, Reading, SparseEkf, SparseHypotheses, SparseMixture, StepError, StrainSensor};
 {% else %}
-use ohmstrain_ekf::{Belief, Compact, Reading, SparseEkf, StepError};
+use ohmstrain_ekf::{Belief, Compact, Reading, SparseEkf, StepError, StrainSensor};
 {% endif %}
 use ohmstrain_model::{{% if branches %}Branch, {% endif %}Gauge, ModelNoise, Motion, ParameterError, {% if estimator.hypotheses %}Phase, {% endif %}SensorLaw, StrainRange, SwitchedModel};
 
@@ -44,6 +44,8 @@ pub type State = Belief<f32, STATES, ENTRIES>;
 pub const DT_S: f32 = << dt_s >>;
 /// Reading at zero << quantity >> after everything has relaxed, << reading_unit >>.
 pub const REST_READING: f32 = << rest_reading >>;
+/// What the rested, unstretched sensor read in calibration: of the day, where [`REST_READING`] is of the law.
+pub const RESTED: f32 = << rested >>;
 /// Range of the reported << quantity >>.
 pub const LIMITS: StrainRange<f32> = StrainRange { lower: << lower >>, upper: << upper >> };
 /// Factor on the standard deviation of << quantity >> that the calibration found necessary.
@@ -145,6 +147,26 @@ pub fn start(model: &Model) -> State {
 {% else %}
     Belief::initial(model)
 {% endif %}
+}
+
+/// The state where the << quantity >> is known, at rest.
+#[must_use]
+pub fn start_at(model: &Model, strain: f32) -> State {
+    let (mut mean, mut variance) = model.initial_distribution();
+    (mean[0], variance[0]) = (strain, << known_variance >>);
+    let belief = Belief::independent(mean, &variance);
+{% if estimator.hypotheses %}
+    SparseMixture::single(belief, Phase::<< "Extend" if splits else "Hold" >>)
+{% else %}
+    belief
+{% endif %}
+}
+
+/// R₀ of today, where the rested, unstretched sensor is found to read `measured`: what [`relative`] divides by. A filter that
+/// is given it while the sensor rests begins again with `start_at(&model, 0.0)`.
+#[must_use]
+pub fn rest_reading(measured: f32) -> f32 {
+    REST_READING * (measured / RESTED)
 }
 
 /// A reading relative to the rest reading; `None` for one that no working sensor gives. `reading_sd` is what the electronics

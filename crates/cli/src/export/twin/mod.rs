@@ -1,0 +1,247 @@
+//! The exported program in Rust, in any precision: the filter, what a reading must be for it, and the correction.
+
+mod parts;
+mod seen;
+
+use ohmstrain_calib::EstimatorKind;
+use ohmstrain_ekf::correction::{FEATURES, FeatureScale, ReadingFeatures};
+use ohmstrain_ekf::{
+    Belief, Gaussian, Reading, Real, SparseEkf, SparseHypotheses, SparseMixture, SparseSignSplit, StepError,
+};
+use ohmstrain_model::{Phase, StrainRange, SwitchedModel};
+
+use super::doubt::Doubt;
+use super::learned::{INPUTS, Table};
+use super::moving::Moving;
+pub use parts::{Numbers, Parts, PhaseParts, flag, number};
+use seen::Seen;
+
+/// The most tries with more noise after a reading was refused, and the growth of its noise; as `SparseEkf`.
+const MOST_TRIES: u32 = 12;
+const COARSER: f64 = 16.0;
+/// Into how many steps an interval is divided at most.
+const MOST_STEPS: u32 = 128;
+
+/// The exported program.
+pub struct Twin<'a, T: Real, const B: usize, const N: usize, const L: usize, const K: usize> {
+    model: SwitchedModel<T, B, N>,
+    dt_s: T,
+    longest_step_s: T,
+    /// What depends on the length of a step.
+    numbers: Numbers<'a, T>,
+    limits: StrainRange<T>,
+    strain_sd_scale: T,
+    /// Variance of a strain that is known at a start.
+    start_variance: T,
+    correction: Option<Table<T>>,
+    /// As it is before any reading, and now.
+    fresh: Memory<T, B, N, L, K>,
+    now: Memory<T, B, N, L, K>,
+    /// How many hypotheses have been moved on: with a reading, and without.
+    work: [usize; 2],
+}
+
+/// What changes from step to step.
+#[derive(Clone, Copy)]
+struct Memory<T, const B: usize, const N: usize, const L: usize, const K: usize> {
+    moving: Moving<T, B, N, L, K>,
+    /// Length of the steps that the filter is prepared for.
+    step_s: T,
+    seen: Seen<T>,
+    /// What the correction sees of readings, if there is one.
+    watched: Option<ReadingFeatures<T>>,
+    /// Features at the last reading, the filter's variance then, and whether the row had none.
+    features: Option<[T; FEATURES]>,
+    known_variance: T,
+    missing: bool,
+    doubt: Doubt<T>,
+    /// As it is reported.
+    strain: Gaussian<T>,
+}
+
+impl<'a, T: Real, const B: usize, const N: usize, const L: usize, const K: usize> Twin<'a, T, B, N, L, K> {
+    /// Before any reading.
+    ///
+    /// # Errors
+    /// If the filter cannot work with its numbers.
+    pub fn new(model: SwitchedModel<T, B, N>, parts: &Parts<'_>, numbers: Numbers<'a, T>) -> Result<Self, StepError> {
+        let dt_s: T = number(parts.dt_s.into());
+        let limits = StrainRange { lower: number(parts.limits.lower.into()), upper: number(parts.limits.upper.into()) };
+        let belief = Belief::initial(&model);
+        let kernel = SparseEkf::new(model, dt_s)?;
+        let moving = match (parts.kind, parts.phases) {
+            (EstimatorKind::SignSplit, Some(phases)) => {
+                let (dwell, evidence) = phases.filter_parts(limits)?;
+                let filter = SparseSignSplit::around(kernel, phases.rests.then_some(dwell), evidence);
+                Moving::SignSplit(filter, SparseMixture::single(belief, Phase::Extend))
+            }
+            (EstimatorKind::Hypotheses, Some(phases)) => {
+                let (dwell, evidence) = phases.filter_parts(limits)?;
+                let filter = SparseHypotheses::around(kernel, dwell, evidence);
+                Moving::Histories(filter, SparseMixture::single(belief, Phase::Hold))
+            }
+            _ => Moving::Ekf(kernel, belief),
+        };
+        let sd = model.noise().reading_sd;
+        let watched = parts.correction.map(|correction| {
+            let FeatureScale { centre, half_range, rates } = correction.features;
+            let (centre, half_range) = (number(centre), number(half_range));
+            ReadingFeatures::new(FeatureScale { centre, half_range, rates: rates.map(number) })
+        });
+        let fresh = Memory {
+            moving,
+            // None yet.
+            step_s: -T::one(),
+            seen: Seen::new(parts.sieve, sd * sd),
+            watched,
+            features: None,
+            known_variance: T::zero(),
+            missing: true,
+            doubt: Doubt::new(parts.doubt),
+            strain: Gaussian { mean: T::zero(), variance: T::zero() },
+        };
+        Ok(Self {
+            model,
+            dt_s,
+            longest_step_s: number(parts.longest_step_s.into()),
+            numbers,
+            limits,
+            strain_sd_scale: number(parts.strain_sd_scale.into()),
+            start_variance: number(parts.start_variance.into()),
+            correction: parts.correction.map(|correction| Table::new(correction, parts.quadratics)),
+            fresh,
+            now: fresh,
+            work: [0; 2],
+        })
+    }
+
+    /// Begins again, at a strain that is known if there is one.
+    pub fn restart(&mut self, strain: Option<T>) {
+        self.now = self.fresh;
+        let Some(strain) = strain else { return };
+        let (mut mean, mut variance) = self.model.initial_distribution();
+        (mean[0], variance[0]) = (strain, self.start_variance);
+        self.now.moving.start_from(Belief::independent(mean, &variance));
+        self.now.doubt = self.now.doubt.of_known_strain();
+    }
+
+    /// The usual time on, with a reading or without; flags.
+    ///
+    /// # Errors
+    /// If even a prediction is refused.
+    pub fn step(&mut self, reading: Option<Reading<T>>) -> Result<u32, StepError> {
+        self.step_after(self.dt_s, reading)
+    }
+
+    /// The same, `dt_s` seconds on.
+    ///
+    /// # Errors
+    /// As [`Self::step`].
+    pub fn step_after(&mut self, dt_s: T, reading: Option<Reading<T>>) -> Result<u32, StepError> {
+        self.now.seen.pass(dt_s);
+        let (mut flags, mut used) = (flag::MISSING, None);
+        if let Some(reading) = reading {
+            (flags, used) = match self.now.seen.sieved(reading) {
+                Ok(reading) => (0, Some(reading)),
+                Err(flag) => (flag, None),
+            };
+        }
+        for _ in 1..self.prepare(dt_s) {
+            self.work[1] += self.now.moving.count();
+            self.now.moving.step(None)?;
+        }
+        let (taken, nis) = self.taken(used)?;
+        flags |= taken;
+        let is_seen = flags == 0;
+        let filtered = self.filtered();
+        if let Some(watched) = &mut self.now.watched {
+            self.now.features = watched.step(dt_s, reading.filter(|_| is_seen).map(|reading| reading.value));
+            self.now.missing = !is_seen;
+            self.now.known_variance = if is_seen { filtered.variance } else { self.now.known_variance };
+        }
+        let Gaussian { mean, variance } = self.corrected();
+        let used = reading.filter(|_| flags & flag::NO_READING == 0).map(|reading| (reading.value, nis));
+        self.now.doubt.see(dt_s, used, variance);
+        let (variance, doubts) = self.now.doubt.widened(self.now.moving.moments().mean[1], variance);
+        self.now.strain = Gaussian { mean, variance };
+        Ok(flags | doubts)
+    }
+
+    /// Prepares the steps that `dt_s` seconds are divided into; how many they are.
+    fn prepare(&mut self, dt_s: T) -> u32 {
+        let (mut count, mut covered) = (1, self.longest_step_s);
+        while covered < dt_s && count < MOST_STEPS {
+            covered += self.longest_step_s;
+            count += 1;
+        }
+        let step_s = dt_s / T::of(f64::from(count));
+        if step_s != self.now.step_s {
+            self.now.moving.set_step(step_s, &(self.numbers)(step_s));
+            self.now.step_s = step_s;
+        }
+        count
+    }
+
+    /// Takes a reading, with more and more noise where it is refused; flags, and its normalised
+    /// innovation squared as it came.
+    fn taken(&mut self, reading: Option<Reading<T>>) -> Result<(u32, T), StepError> {
+        self.work[usize::from(reading.is_none())] += self.now.moving.count();
+        let Some(mut reading) = reading else {
+            self.now.moving.step(None)?;
+            return Ok((0, T::zero()));
+        };
+        for _ in 0..=MOST_TRIES {
+            let count = self.now.moving.count();
+            if let Ok(taken) = self.now.moving.take(reading) {
+                // What surprises is taken twice.
+                self.work[0] += if taken.0 == 0 { 0 } else { count };
+                return Ok(taken);
+            }
+            let rounding = T::default_epsilon() * T::default_epsilon();
+            let noise = reading.extra_variance + self.now.seen.reading_variance() + rounding;
+            if !(reading.value * reading.value / noise).is_finite() {
+                break;
+            }
+            reading.extra_variance = T::of(COARSER) * noise;
+            self.work[0] += count;
+        }
+        self.now.moving.step(None)?;
+        Ok((flag::REJECTED, T::zero()))
+    }
+
+    /// The filter's strain, moved into the limits.
+    fn filtered(&self) -> Gaussian<T> {
+        let belief = self.now.moving.moments();
+        let variance = belief.covariance[(0, 0)].max(T::zero()) * self.strain_sd_scale * self.strain_sd_scale;
+        Gaussian { mean: belief.mean[0], variance }.clamped(&self.limits)
+    }
+
+    /// How many hypotheses have been moved on, with a reading and without: what a filter's instructions are due to.
+    pub const fn work(&self) -> [usize; 2] {
+        self.work
+    }
+
+    /// The strain as it is reported.
+    pub const fn strain(&self) -> Gaussian<T>
+    where
+        T: Copy,
+    {
+        self.now.strain
+    }
+
+    /// The filter's strain, corrected.
+    fn corrected(&self) -> Gaussian<T> {
+        let filtered = self.filtered();
+        let (Some(table), Some(features)) = (&self.correction, self.now.features) else { return filtered };
+        let belief = self.now.moving.moments();
+        let relaxation = (2..2 + B).fold(T::zero(), |sum, i| sum + belief.mean[i]);
+        let baseline = if N == B + 3 { belief.mean[N - 1] } else { T::zero() };
+        let [extend, _, retract] = self.now.moving.phases();
+        let outputs = [filtered.mean, belief.mean[1], relaxation, baseline, extend, retract];
+        let mut inputs = [T::zero(); INPUTS];
+        inputs.iter_mut().zip(outputs.iter().chain(&features)).for_each(|(place, input)| *place = *input);
+        let strain = table.correct(&inputs, filtered, self.limits);
+        let grown = (filtered.variance - self.now.known_variance).max(T::zero());
+        if self.now.missing { Gaussian { variance: strain.variance + grown, ..strain } } else { strain }
+    }
+}
