@@ -1,25 +1,27 @@
 #!/usr/bin/env bash
 # Compiles and runs what `ohmstrain export` writes: C on the host with GCC and Clang, for Cortex-M0+ and -M4F, and there
-# under QEMU; the sketch against a stand-in for Arduino; the Rust module in a no_std crate for Cortex-M4F.
+# under QEMU; the sketch against a stand-in for Arduino, and for a Mega 2560 with Arduino's core; the Rust module in a no_std crate for Cortex-M4F.
 #
 #   exported-c.sh
 #
-# Installs gcc, clang, cmake, gcc-arm-none-eabi, libnewlib-arm-none-eabi and qemu-system-arm by apt where they are missing and this
-# is root. Prints the largest differences, sizes and instructions per step. Needs a minute.
+# Installs gcc, clang, cmake, gcc-arm-none-eabi, libnewlib-arm-none-eabi, qemu-system-arm, gcc-avr, avr-libc and arduino-core-avr by
+# apt where they are missing and this is root. Prints the largest differences, sizes and instructions per step. Needs a minute.
 #
 # Environment:
 #   OHMSTRAIN  the program; default: built by cargo
 set -euo pipefail
 cd "$(dirname "$0")/.."
 readonly here=$PWD/scripts/exported-c
+readonly plotter=examples/ohmstrain_plotter/ohmstrain_plotter.ino
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
 if ! command -v clang >/dev/null || ! command -v gcc >/dev/null || ! command -v qemu-system-arm >/dev/null ||
-    ! command -v cmake >/dev/null || ! echo '#include <math.h>' | arm-none-eabi-gcc -E - >/dev/null 2>&1; then
+    ! command -v cmake >/dev/null || ! command -v avr-gcc >/dev/null || [[ ! -d /usr/share/arduino/hardware/arduino/avr ]] || ! echo '#include <math.h>' | arm-none-eabi-gcc -E - >/dev/null 2>&1; then
     apt-get -q update >/dev/null
     DEBIAN_FRONTEND=noninteractive apt-get -q install -y --no-install-recommends \
-        gcc g++ clang cmake make libc6-dev gcc-arm-none-eabi libnewlib-arm-none-eabi qemu-system-arm >/dev/null
+        gcc g++ clang cmake make libc6-dev gcc-arm-none-eabi libnewlib-arm-none-eabi qemu-system-arm \
+        gcc-avr avr-libc arduino-core-avr >/dev/null
 fi
 
 ohmstrain=${OHMSTRAIN:-}
@@ -56,8 +58,8 @@ qemu() {
 on_host() {
     local folder=$1
     shift
-    "$@" "${strict[@]}" -I"$folder/ohmstrain" \
-        "$folder/ohmstrain/ohmstrain.c" "$folder/selftest/selftest.c" -lm -o "$work/selftest"
+    "$@" "${strict[@]}" -I"$folder/src" \
+        "$folder/src/ohmstrain.c" "$folder/selftest/selftest.c" -lm -o "$work/selftest"
     report "${folder##*/}, $*" "$work/selftest"
 }
 
@@ -65,8 +67,8 @@ on_host() {
 on_target() {
     local folder=$1 name=$2 program
     shift 2
-    local build=(arm-none-eabi-gcc "$@" -O2 -fno-math-errno -ffunction-sections -I"$folder/ohmstrain")
-    "${build[@]}" "${strict[@]}" -c "$folder/ohmstrain/ohmstrain.c" -o "$work/filter.o"
+    local build=(arm-none-eabi-gcc "$@" -O2 -fno-math-errno -ffunction-sections -I"$folder/src")
+    "${build[@]}" "${strict[@]}" -c "$folder/src/ohmstrain.c" -o "$work/filter.o"
     for program in "$folder/selftest/selftest.c" "$here/count.c"; do
         "${build[@]}" -I"$folder/selftest" -std=c99 -ffp-contract=off --specs=nano.specs -nostartfiles \
             -T"$here/mps2.ld" -Wl,--gc-sections "$work/filter.o" "$program" "$here/board.c" -lm -o "$work/program.elf"
@@ -87,7 +89,7 @@ near() {
 # promised FOLDER: what the header says of a Cortex-M4F, against what was counted in the last on_target.
 promised() {
     local said counted
-    said=$(tr -d '\n' <"$1/ohmstrain/ohmstrain.h" | sed 's/ \* / /g' | grep -oE 'about [0-9]+ instructions a step, [0-9]+ B of +code and constants, [0-9]+ B of state and [0-9]+' | grep -oE '[0-9]+')
+    said=$(tr -d '\n' <"$1/src/ohmstrain.h" | sed 's/ \* / /g' | grep -oE 'about [0-9]+ instructions a step, [0-9]+ B of +code and constants, [0-9]+ B of state and [0-9]+' | grep -oE '[0-9]+')
     counted=$(grep -oE 'step: [0-9]+|state [0-9]+|stack [0-9]+' "$work/output" | grep -oE '[0-9]+')
     set -- "${1##*/}" $said $counted
     near "$1" "instructions a step" "$6" "$2"
@@ -111,15 +113,15 @@ for kind in polynomial:2:corrected polynomial:0:ekf decaying-exponential:1:sign-
     on_target "$folder" cortex-m4f "${m4f[@]}"
     promised "$folder"
     on_target "$folder" cortex-m0+ "${m0[@]}"
-    g++ -std=c++11 -fsyntax-only -Wall -Wextra -Werror -I"$folder/ohmstrain" -x c++ "$folder/ohmstrain/ohmstrain.c"
-    if gcc -std=c99 -ffast-math -fsyntax-only -I"$folder/ohmstrain" "$folder/ohmstrain/ohmstrain.c" 2>/dev/null; then
+    g++ -std=c++11 -fsyntax-only -Wall -Wextra -Werror -I"$folder/src" -x c++ "$folder/src/ohmstrain.c"
+    if gcc -std=c99 -ffast-math -fsyntax-only -I"$folder/src" "$folder/src/ohmstrain.c" 2>/dev/null; then
         echo "-ffast-math was not refused" >&2
         exit 1
     fi
-    g++ -std=gnu++11 -fsyntax-only -Wall -Wextra -Werror -I"$here" -include Arduino.h -I"$folder/ohmstrain" \
-        -x c++ "$folder/ohmstrain/ohmstrain.ino"
+    g++ -std=gnu++11 -fsyntax-only -Wall -Wextra -Werror -I"$here" -include Arduino.h -I"$folder/src" \
+        -x c++ "$folder/$plotter"
     g++ -std=gnu++11 -fsyntax-only -Wall -Wextra -Werror -DARDUINO_ARCH_ESP32 -I"$here" -include Arduino.h \
-        -I"$folder/ohmstrain" -x c++ "$folder/ohmstrain/ohmstrain.ino"
+        -I"$folder/src" -x c++ "$folder/$plotter"
 done
 
 # The same sensors on smaller chips.
@@ -131,6 +133,7 @@ for kind in polynomial-2-corrected:lean polynomial-2-corrected:flash=30000,ram=3
     on_target "$folder" cortex-m4f "${m4f[@]}"
     promised "$folder"
 done
+say "polynomial-2-corrected-lean, Arduino" "$("$here/arduino-avr.sh" "$work/polynomial-2-corrected-lean")"
 
 cmake -S "$folder" -B "$work/build" >/dev/null
 cmake --build "$work/build" >/dev/null

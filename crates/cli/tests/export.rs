@@ -36,7 +36,7 @@ pub fn compile_and_run(compiler: &str, folder: &Path, sources: &[&str], stdin: &
 #[track_caller]
 fn compile_and_run_with(compiler: &str, folder: &Path, sources: &[&str], stdin: &str, arguments: &[&str]) -> String {
     let program = folder.join("program.out");
-    let flags = ["-std=c99", "-O2", "-ffp-contract=off", "-Wall", "-Wextra", "-Werror", "-pedantic", "-Iohmstrain"];
+    let flags = ["-std=c99", "-O2", "-ffp-contract=off", "-Wall", "-Wextra", "-Werror", "-pedantic", "-Isrc"];
     let compiled =
         Command::new(compiler).current_dir(folder).args(flags).args(sources).args(["-lm", "-o"]).arg(&program).output();
     let compiled = compiled.unwrap();
@@ -48,15 +48,16 @@ fn compile_and_run_with(compiler: &str, folder: &Path, sources: &[&str], stdin: 
 }
 
 #[test]
-fn c_is_an_arduino_sketch_a_self_test_and_a_readme_and_the_same_every_time() {
+fn c_is_an_arduino_library_a_self_test_and_a_readme_and_the_same_every_time() {
     let bench = Bench::calibrated();
     let printed = export(&bench, "c", "once");
     assert!(printed.contains(" instructions a step, ") && printed.contains(" of RAM"), "{printed}");
     assert_eq!(export(&bench, "c", "twice"), printed);
     assert_eq!(export(&bench, "c", "twice"), printed);
     for (folder, names) in [
-        ("", &["CMakeLists.txt", "README.md", "ohmstrain", "selftest"][..]),
-        ("/ohmstrain", &["ohmstrain.c", "ohmstrain.h", "ohmstrain.ino"]),
+        ("", &["CMakeLists.txt", "README.md", "examples", "library.json", "library.properties", "selftest", "src"][..]),
+        ("/examples/ohmstrain_plotter", &["ohmstrain_plotter.ino"]),
+        ("/src", &["ohmstrain.c", "ohmstrain.h"]),
         ("/selftest", &["replay.c", "selftest.c", "vectors.h"]),
     ] {
         assert_eq!(files_in(&bench.path(&format!("once{folder}"))), names);
@@ -66,11 +67,11 @@ fn c_is_an_arduino_sketch_a_self_test_and_a_readme_and_the_same_every_time() {
             assert!(!file("once").contains("<<") && !file("once").contains("{%"), "{name}");
         }
     }
-    let sketch = bench.read("once/ohmstrain/ohmstrain.ino");
+    let sketch = bench.read("once/examples/ohmstrain_plotter/ohmstrain_plotter.ino");
     for printed in ["\"strain:\"", "\",lo:\"", "\",hi:\""] {
         assert!(sketch.contains(printed), "{printed}");
     }
-    for line in bench.read("once/ohmstrain/ohmstrain.c").lines().filter(|line| line.starts_with("#include")) {
+    for line in bench.read("once/src/ohmstrain.c").lines().filter(|line| line.starts_with("#include")) {
         assert!(["#include \"ohmstrain.h\"", "#include <math.h>"].contains(&line), "{line}");
     }
 }
@@ -113,7 +114,7 @@ fn the_self_test_of_every_filter_finds_no_difference() {
     for estimator in ESTIMATORS {
         scored_export(&bench, estimator);
         for compiler in compilers() {
-            let sources = ["ohmstrain/ohmstrain.c", "selftest/selftest.c"];
+            let sources = ["src/ohmstrain.c", "selftest/selftest.c"];
             let printed = compile_and_run(compiler, &bench.path(estimator), &sources, "");
             assert!(printed.contains("self-test passed"), "{estimator}: {printed}");
             assert!(printed.starts_with("largest difference: 0 of "), "{estimator}: {printed}");
@@ -142,7 +143,7 @@ fn a_recording_replayed_is_as_good_as_the_program() {
         let promised = scored.lines().find(|line| line.contains("exported")).unwrap().split('|').nth(2).unwrap();
         let promised: f64 = promised.trim().parse().unwrap();
         for compiler in compilers() {
-            let sources = ["ohmstrain/ohmstrain.c", "selftest/replay.c"];
+            let sources = ["src/ohmstrain.c", "selftest/replay.c"];
             let replayed = compile_and_run(compiler, &bench.path(estimator), &sources, &bench.read("trace.csv"));
             let exported = percent(&Csv::new(&replayed).numbers("strain"));
             println!("{estimator}, {compiler}: {exported} %FS, promised {promised}, program {program}");
@@ -183,10 +184,10 @@ fn two_sensors_with_prefixes_live_in_one_program() {
     }
     bench.write("two/two.c", TWO);
     for compiler in compilers() {
-        let sources = ["-Ileft", "-Iright", "left/left.c", "right/right.c", "two.c"];
+        let sources = ["src/left.c", "src/right.c", "two.c"];
         assert_eq!(compile_and_run(compiler, &bench.path("two"), &sources, ""), "1 1\n");
         // The last one's self-test knows its name.
-        let sources = ["-Iright", "right/right.c", "selftest/selftest.c"];
+        let sources = ["src/right.c", "selftest/selftest.c"];
         assert!(compile_and_run(compiler, &bench.path("two"), &sources, "").contains("self-test passed"));
     }
 }
@@ -210,7 +211,7 @@ fn no_reading_stops_what_was_exported() {
     for estimator in ["corrected", "hypotheses"] {
         scored_export(&bench, estimator);
         for compiler in compilers() {
-            let sources = ["ohmstrain/ohmstrain.c", "selftest/replay.c"];
+            let sources = ["src/ohmstrain.c", "selftest/replay.c"];
             let printed = Csv::new(&compile_and_run(compiler, &bench.path(estimator), &sources, &trace));
             // The last four of them say why there was no reading.
             let why: Vec<f64> = printed.numbers("flags").iter().map(|flags| flags.rem_euclid(16.0)).collect();
@@ -273,7 +274,7 @@ fn another_days_resistance_at_rest_can_be_told() {
         rows.map(|(time_s, ohm)| format!("{time_s},{}\n", factor * ohm)).collect::<String>()
     };
     for compiler in compilers() {
-        let sources = ["ohmstrain/ohmstrain.c", "selftest/replay.c"];
+        let sources = ["src/ohmstrain.c", "selftest/replay.c"];
         let replay = |factor: f64, told: &[&str]| {
             let recording = format!("time_s,resistance_ohm\n{}", rows(factor));
             let printed = compile_and_run_with(compiler, &bench.path("corrected"), &sources, &recording, told);
@@ -286,5 +287,32 @@ fn another_days_resistance_at_rest_can_be_told() {
         // Two hypotheses may be merged a row earlier or later; without being told it is off by more than a tenth.
         println!("{compiler}: {} {}", farthest(&told), farthest(&untold));
         assert!(farthest(&told) < 0.01 && farthest(&untold) > 0.03, "{} {}", farthest(&told), farthest(&untold));
+    }
+}
+
+/// Half a minute at rest with an R₀ that has fallen by an eighth, then a motion: flag 512 in C, `rest_moved` in the program, from
+/// the same row on.
+#[test]
+fn an_r0_that_has_fallen_is_flagged_as_by_the_program() {
+    let bench = every_filter();
+    let sensor = bench.read("corrected.toml");
+    let rested = sensor.lines().find_map(|line| line.strip_prefix("measured_rest = ")).unwrap();
+    let rested = 0.875 * rested.parse::<f64>().unwrap();
+    let motion = |row: i32| f64::max(0.0, 0.2 * (0.05 * f64::from(row - 150)).sin());
+    let reading = |row: i32| rested * (1.0 + if row < 150 { 1e-4 * f64::from(row % 3) } else { motion(row) });
+    let rows: String = (0..500).map(|row| format!("{},{}\n", 0.2 * f64::from(row), reading(row))).collect();
+    bench.write("moved.csv", format!("time_s,resistance_ohm\n{rows}"));
+    let program = Csv::new(&bench.run(&["filter", "moved.csv", "--sensor", "corrected.toml"]).ok());
+    let expected: Vec<bool> = program.cells("flags").iter().map(|flags| flags.contains("rest_moved")).collect();
+    assert!(!expected[45] && expected[55..].iter().all(|flagged| *flagged));
+    scored_export(&bench, "corrected");
+    for compiler in compilers() {
+        let sources = ["src/ohmstrain.c", "selftest/replay.c"];
+        let printed = compile_and_run(compiler, &bench.path("corrected"), &sources, &bench.read("moved.csv"));
+        let flagged: Vec<bool> =
+            Csv::new(&printed).numbers("flags").iter().map(|flags| flags.rem_euclid(1024.0) >= 512.0).collect();
+        let differ = |(a, b): (&bool, &bool)| a != b;
+        // Sums of 0.2 s in single precision may reach ten seconds a row later.
+        assert!(flagged.iter().zip(&expected).filter(|pair| differ(*pair)).count() <= 1, "{flagged:?} {expected:?}");
     }
 }

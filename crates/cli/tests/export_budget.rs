@@ -32,9 +32,9 @@ fn a_smaller_filter_fits_and_is_its_twin() {
     ] {
         let printed = within(&bench, "corrected.toml", budget, "trace.csv", "small");
         assert!(number_before(&printed, unit) <= most, "{budget}: {printed}");
-        assert!(bench.read("small/ohmstrain/ohmstrain.h").contains("| exported"));
+        assert!(bench.read("small/src/ohmstrain.h").contains("| exported"));
         for compiler in compilers() {
-            let sources = ["ohmstrain/ohmstrain.c", "selftest/selftest.c"];
+            let sources = ["src/ohmstrain.c", "selftest/selftest.c"];
             let tested = compile_and_run(compiler, &bench.path("small"), &sources, "");
             assert!(tested.starts_with("largest difference: 0 of "), "{budget}, {compiler}: {tested}");
         }
@@ -44,7 +44,7 @@ fn a_smaller_filter_fits_and_is_its_twin() {
     let printed = bench.run(&[&export[..], &["--budget", "flash=24000"]].concat()).ok();
     assert!(printed.contains("a quadratic function"), "{printed}");
     for compiler in compilers() {
-        let sources = ["ohmstrain/ohmstrain.c", "selftest/selftest.c"];
+        let sources = ["src/ohmstrain.c", "selftest/selftest.c"];
         let tested = compile_and_run(compiler, &bench.path("small"), &sources, "");
         assert!(tested.starts_with("largest difference: 0 of "), "{compiler}: {tested}");
     }
@@ -95,7 +95,7 @@ fn the_compiled_program_answers_faults_as_its_twin() {
         for budget in ["instructions=1000000", "lean"] {
             let promised = percent_fs(&within(&bench, "corrected.toml", budget, "fault.csv", "faulty"), "exported");
             for compiler in compilers() {
-                let sources = ["ohmstrain/ohmstrain.c", "selftest/replay.c"];
+                let sources = ["src/ohmstrain.c", "selftest/replay.c"];
                 let folder = bench.path("faulty");
                 let said = Csv::new(&compile_and_run(compiler, &folder, &sources, &bench.read("fault.csv")));
                 let strain = said.numbers("strain");

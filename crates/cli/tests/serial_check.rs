@@ -5,6 +5,8 @@ use std::process::Command;
 use crate::common::Bench;
 use crate::export::{DT_S, compilers};
 
+const PLOTTER: &str = "c/examples/ohmstrain_plotter/ohmstrain_plotter.ino";
+
 /// What the sketch of a calibrated sensor prints.
 fn printed(bench: &Bench) -> Option<String> {
     let arduino = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scripts/exported-c");
@@ -13,7 +15,7 @@ fn printed(bench: &Bench) -> Option<String> {
     let board = format!("{arduino}/board.cpp");
     let flags =
         ["-std=gnu++11", "-O2", "-ffp-contract=off", "-DOHMSTRAIN_CHECK=1", "-I", arduino, "-include", "Arduino.h"];
-    let sources = ["-I", "c/ohmstrain", "-x", "c++", "c/ohmstrain/ohmstrain.ino", "c/ohmstrain/ohmstrain.c", &board];
+    let sources = ["-I", "c/src", "-x", "c++", PLOTTER, "c/src/ohmstrain.c", &board];
     let compiled = Command::new(compiler)
         .current_dir(bench.path(""))
         .args(flags)

@@ -151,7 +151,7 @@ impl<'a> FilterBuilder<'a> {
     }
 
     /// Intervals as the filter states them: not widened where it has just begun, finds its way back after a fault, or is used
-    /// outside of what calibration has seen. Smoothers never widen theirs; of these flags they have `long_run`.
+    /// outside of what calibration has seen, or with another R₀. Smoothers never widen theirs; of these flags they have `long_run`.
     ///
     /// ```
     /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
@@ -297,7 +297,7 @@ impl<'a> FilterBuilder<'a> {
         filter.guard(self.guard()?);
         let mut scale = Scale::new(self.sensor)?;
         self.rest_resistance.map_or(Ok(()), |measured| scale.rest_at(measured))?;
-        let doubt = self.doubts.then(|| Doubt::new(params, self.initial_strain.is_some()));
+        let doubt = self.doubts.then(|| Doubt::new(params, self.initial_strain));
         Ok(Kernel { filter, scale, doubt })
     }
 

@@ -1,7 +1,8 @@
 use ohmstrain_calib::{Output, SURPRISING_NIS, SensorParams};
 use ohmstrain_ekf::ReadingVerdict;
 
-use crate::{Flag, Flags};
+use crate::rest_watch::ZERO;
+use crate::{Flag, Flags, RestSeen, RestWatch};
 
 /// What no filter knows by itself: that it has only just begun, or begun again; that readings have jumped; that the sensor is
 /// used outside of what its calibration has seen. It widens the strain's interval, and says why.
@@ -19,6 +20,8 @@ pub(crate) struct Doubt {
     believed: Option<f64>,
     /// How far readings have been outside of calibration's, R/R₀ - 1, fading.
     outside: f64,
+    /// Whether R₀ is calibration's; none where that one does not know what the sensor reads at rest.
+    rest: Option<RestWatch<f64>>,
 }
 
 /// What calibration has seen.
@@ -70,6 +73,8 @@ pub struct DoubtNumbers {
     pub faster: f64,
     /// Share of a variance from which on a doubt is worth a flag.
     pub worth: f64,
+    /// Share of the span that a strain of none may have.
+    pub zero: f64,
 }
 
 /// The numbers behind the widened intervals.
@@ -82,11 +87,13 @@ pub const DOUBT: DoubtNumbers = DoubtNumbers {
     shows: SHOWS,
     faster: FASTER,
     worth: WORTH,
+    zero: ZERO,
 };
 
 impl Doubt {
-    /// Before the first row; `starts_known` if the strain is known there.
-    pub(crate) fn new(params: &SensorParams, starts_known: bool) -> Self {
+    /// Before the first row, with its strain if that is known.
+    pub(crate) fn new(params: &SensorParams, known: Option<f64>) -> Self {
+        let starts_known = known.is_some();
         let (seen, span) = (&params.validity, params.limits.span());
         let relative = |reading: f64| reading / params.rest_reading - 1.0;
         let (low, high) = (relative(seen.reading_lower), relative(seen.reading_upper));
@@ -107,7 +114,13 @@ impl Doubt {
             lost: None,
             believed: None,
             outside: 0.0,
+            rest: RestSeen::of(params).map(|seen| RestWatch::new(seen, known.is_some_and(|x| x.abs() <= ZERO * span))),
         }
+    }
+
+    /// R₀ of today has been told.
+    pub(crate) fn told_rest(&mut self) {
+        self.rest.iter_mut().for_each(RestWatch::told);
     }
 
     /// The strain is known now: what was doubted of it is gone.
@@ -150,18 +163,24 @@ impl Doubt {
             let range = self.seen.high - self.seen.low;
             let beyond = (reading - self.seen.high).max(self.seen.low - reading) - MARGIN * range;
             self.outside = (self.outside * (-dt_s / OUTSIDE_FADES_S).exp()).max(beyond);
+            self.rest.iter_mut().for_each(|rest| {
+                rest.see(dt_s, reading);
+            });
         }
+        let rest_off = self.rest.map_or(0.0, |rest| rest.off());
+        let elsewhere = (rest_off * self.seen.per_reading).powi(2);
         let outside = (SHOWS * self.outside.max(0.0) * self.seen.per_reading).powi(2);
         let faster = (output.estimate.rate.mean / self.seen.fastest_per_s).abs();
         let is_fast = faster > FASTER;
         let stated = if is_fast { (variance * (faster * faster)).min(most).max(variance) } else { variance };
-        output.estimate.strain.variance = stated + (self.fading + outside).min(most);
+        output.estimate.strain.variance = stated + (self.fading + outside + elsewhere).min(most);
         let starts = self.starting && self.fading > WORTH * (START * self.seen.span).powi(2);
         let recovers = !self.starting && self.fading > WORTH * variance;
         Flags::NONE
             .with(Flag::StartUp, starts)
             .with(Flag::Recovering, recovers)
             .with(Flag::Extrapolated, outside > WORTH * variance || is_fast)
+            .with(Flag::RestMoved, rest_off > 0.0)
             .and(self.long_run(time_s - start_s))
     }
 

@@ -111,7 +111,10 @@ impl Filter {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn rest_resistance(&mut self, measured: f64) -> Result<(), Error> {
-        self.kernel.scale.rest_at(measured)
+        let Kernel { scale, doubt, .. } = &mut self.kernel;
+        scale.rest_at(measured)?;
+        doubt.iter_mut().for_each(Doubt::told_rest);
+        Ok(())
     }
 }
 
@@ -233,7 +236,10 @@ impl LaggedFilter {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn rest_resistance(&mut self, measured: f64) -> Result<(), Error> {
-        self.kernel.scale.rest_at(measured)
+        let Kernel { scale, doubt, .. } = &mut self.kernel;
+        scale.rest_at(measured)?;
+        doubt.iter_mut().for_each(Doubt::told_rest);
+        Ok(())
     }
 
     fn forget_handed_out(&mut self) {

@@ -48,15 +48,17 @@ pub enum Flag {
     Extrapolated,
     /// It has been running for longer than any recording of the calibration.
     LongRun,
+    /// The sensor does not rest where it rested in calibration: R₀ is another one.
+    RestMoved,
 }
 
 impl Flag {
     /// All of them.
     ///
     /// ```
-    /// assert_eq!(ohmstrain::Flag::ALL.len(), 13);
+    /// assert_eq!(ohmstrain::Flag::ALL.len(), 14);
     /// ```
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 14] = [
         Self::Missing,
         Self::Saturated,
         Self::Rejected,
@@ -70,6 +72,7 @@ impl Flag {
         Self::Recovering,
         Self::Extrapolated,
         Self::LongRun,
+        Self::RestMoved,
     ];
 
     /// Its name in `estimates.csv`.
@@ -93,6 +96,7 @@ impl Flag {
             Self::Recovering => "recovering",
             Self::Extrapolated => "extrapolated",
             Self::LongRun => "long_run",
+            Self::RestMoved => "rest_moved",
         }
     }
 }

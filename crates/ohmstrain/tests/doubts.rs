@@ -106,3 +106,50 @@ fn a_long_run_is_flagged() {
     let long = |time_s: f64, filter: &mut Filter| filter.step(time_s, 2000.0).unwrap().flags.has(Flag::LongRun);
     assert_eq!([10.0, 209.0, 211.0].map(|time_s| long(time_s, &mut filter)), [false, false, true]);
 }
+
+/// Calibrated where the rested sensor read 1599.83 ohms. Another day's reads a tenth more: 160 of calibration's 2104 ohms for
+/// 0.33333 of strain. Not told that it rests, it may as well be stretched.
+#[test]
+fn a_rest_that_is_not_calibrations_is_doubted_until_it_is_told() {
+    let sensor = sensor();
+    let today = 1.1 * 1599.83;
+    let run_from = |known: Option<f64>| {
+        let builder = known.map_or(sensor.filter(), |strain| sensor.filter().initial_strain(strain));
+        let mut filter = builder.build().unwrap();
+        let mut rows = run(&mut filter, 0..1200, today);
+        filter.rest_resistance(today).unwrap();
+        rows.extend(run(&mut filter, 1200..1300, today));
+        rows
+    };
+    let rows = run_from(Some(0.0));
+    assert_eq!(flagged(&rows, Flag::RestMoved), 1200);
+    let bare = sensor.filter().initial_strain(0.0).without_doubts();
+    let stated = run(&mut bare.build().unwrap(), 0..1200, today);
+    let expected = 0.1 * 1599.83 * 0.33333 / (3703.107 - 1598.905);
+    let more = more(&(rows[1199], stated[1199]));
+    assert!((more / expected - 1.0).abs() < 0.01, "{more} {expected}");
+    for known in [None, Some(0.1)] {
+        assert_eq!(flagged(&run_from(known), Flag::RestMoved), 0);
+    }
+    // 4 % more are as little as nothing.
+    let mut near = sensor.filter().initial_strain(0.0).build().unwrap();
+    assert_eq!(flagged(&run(&mut near, 0..100, 1.04 * 1599.83), Flag::RestMoved), 0);
+}
+
+/// No strain leads below what was read at rest: after ten seconds there R₀ is another one, and it is calibration's again once
+/// the sensor has rested for ten seconds where it did then. A wire that is off for less says nothing.
+#[test]
+fn readings_that_stay_below_rest_tell_of_another_r0() {
+    let mut filter = sensor().filter().build().unwrap();
+    let mut rows = run(&mut filter, 0..100, 2000.0);
+    rows.extend(run(&mut filter, 100..280, 0.9 * 1599.83));
+    rows.extend(run(&mut filter, 280..380, 2000.0));
+    assert_eq!(flagged(&rows, Flag::RestMoved), 0);
+    rows.extend(run(&mut filter, 380..700, 0.9 * 1599.83));
+    rows.extend(run(&mut filter, 700..900, 2000.0));
+    // The 200th row below it has been there for 10 s, to a rounding of the times.
+    assert!(rows[..579].iter().all(|row| !row.flags.has(Flag::RestMoved)));
+    assert!(rows[581..].iter().all(|row| row.flags.has(Flag::RestMoved)));
+    let rows = run(&mut filter, 900..1200, 1599.83);
+    assert!(rows[190].flags.has(Flag::RestMoved) && !rows[210].flags.has(Flag::RestMoved));
+}

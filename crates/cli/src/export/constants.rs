@@ -122,10 +122,22 @@ struct DoubtConstants {
     shows: Literal,
     faster: Literal,
     worth: Literal,
+    zero: Literal,
+    rest: Option<RestConstants>,
+}
+
+/// Where the sensor rests.
+#[derive(Debug, Serialize)]
+struct RestConstants {
+    rested: Literal,
+    tolerance: Literal,
+    lasts_s: Literal,
+    sign: Literal,
+    end: Literal,
 }
 
 impl DoubtConstants {
-    fn new(seen: &DoubtParts) -> Self {
+    fn new(seen: &DoubtParts, zero: Literal) -> Self {
         let narrow = |number: f64| Literal(number as f32);
         Self {
             low: narrow(seen.low),
@@ -141,6 +153,14 @@ impl DoubtConstants {
             shows: narrow(DOUBT.shows),
             faster: narrow(DOUBT.faster),
             worth: narrow(DOUBT.worth),
+            zero,
+            rest: seen.rest.map(|rest| RestConstants {
+                rested: narrow(rest.rested),
+                tolerance: narrow(rest.tolerance),
+                lasts_s: narrow(rest.lasts_s),
+                sign: narrow(rest.sign),
+                end: narrow(rest.end),
+            }),
         }
     }
 }
@@ -258,7 +278,7 @@ impl Exported {
                 most_repeats: sieve.most_repeats,
                 error_time_s: Some(Literal(sieve.error_time_s as f32)).filter(|time_s| time_s.0 > 0.0),
             },
-            doubt: DoubtConstants::new(&sensor.parts.doubt),
+            doubt: DoubtConstants::new(&sensor.parts.doubt, Literal(sensor.parts.zero)),
             steps: StepConstants::new(&sensor, &names),
             fresh_mean: numbers.fresh.iter().map(|rate| Literal(rate.mean)).collect(),
             fresh_variance: numbers.fresh.iter().map(|rate| Literal(rate.variance)).collect(),

@@ -49,13 +49,13 @@ struct OfKind {
 }
 
 const EKF: OfKind = OfKind {
-    step: 800.0,
+    step: 880.0,
     hypothesis: 0.0,
     branch: 385.0,
     curve: 80.0,
-    flash: 5000.0,
+    flash: 5900.0,
     flash_branch: 2510.0,
-    stack: [640.0, 225.0, 0.0, 0.0],
+    stack: [715.0, 225.0, 0.0, 0.0],
 };
 /// Where the motion is clear fewer hypotheses part than in the motion of the self-test: then a step takes up to a third less.
 const SIGN_SPLIT: OfKind = OfKind {
@@ -63,7 +63,7 @@ const SIGN_SPLIT: OfKind = OfKind {
     hypothesis: 4150.0,
     branch: 800.0,
     curve: 150.0,
-    flash: 10_700.0,
+    flash: 11_500.0,
     flash_branch: 6100.0,
     stack: [744.0, 191.0, 93.0, 56.0],
 };
@@ -72,7 +72,7 @@ const HISTORIES: OfKind = OfKind {
     hypothesis: 2150.0,
     branch: 740.0,
     curve: 1050.0,
-    flash: 9000.0,
+    flash: 9800.0,
     flash_branch: 2600.0,
     stack: [695.0, 154.0, 100.0, 49.0],
 };
@@ -158,7 +158,7 @@ fn state(branches: usize, chip: &ChipFilter) -> usize {
         EstimatorKind::Hypotheses => filter.hypotheses * (gaussian + 3) + 1,
         _ => gaussian,
     };
-    // Readings and doubts: twelve words; of a correction four, low-passes and features. Strain, variance, rest reading.
+    // Readings and doubts: sixteen words; of a correction four, low-passes and features. Strain, variance, rest reading.
     let correction = filter.correction.as_ref().map_or(0, |_| 4 + TIME_CONSTANTS_S.len() + FEATURES);
-    FLOAT * (words + 12 + correction + 3)
+    FLOAT * (words + 16 + correction + 3)
 }

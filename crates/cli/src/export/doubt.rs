@@ -1,6 +1,6 @@
 //! When an interval is wider than the filter says: the library's doubts, in any precision.
 
-use ohmstrain::DOUBT;
+use ohmstrain::{DOUBT, RestSeen, RestWatch};
 use ohmstrain_calib::{SURPRISING_NIS, SensorParams};
 use ohmstrain_ekf::Real;
 
@@ -20,6 +20,8 @@ pub struct DoubtParts {
     /// Variances: at an unknown start, and of what is known least.
     pub start: f64,
     pub most: f64,
+    /// What the sensor read at rest, if that is known.
+    pub rest: Option<RestSeen>,
 }
 
 impl DoubtParts {
@@ -36,6 +38,7 @@ impl DoubtParts {
             per_reading: if high > low { span / (high - low) } else { 0.0 },
             start: (DOUBT.start * span).powi(2),
             most: (DOUBT.most * span).powi(2),
+            rest: RestSeen::of(params),
         }
     }
 }
@@ -51,6 +54,7 @@ pub struct Doubt<T> {
     lost: Option<T>,
     believed: Option<T>,
     outside: T,
+    rest: Option<RestWatch<T>>,
 }
 
 impl<T: Real> Doubt<T> {
@@ -65,12 +69,14 @@ impl<T: Real> Doubt<T> {
             lost: None,
             believed: None,
             outside: T::zero(),
+            rest: parts.rest.map(|seen| RestWatch::new(seen, false)),
         }
     }
 
-    /// The same where the strain is known at the start.
-    pub fn of_known_strain(self) -> Self {
-        Self { starts: false, fading: T::zero(), ..self }
+    /// The same where the strain is known at the start, and whether it is none.
+    pub fn of_known_strain(self, rests: bool) -> Self {
+        let rest = self.parts.rest.map(|seen| RestWatch::new(seen, rests));
+        Self { starts: false, fading: T::zero(), rest, ..self }
     }
 
     fn raise(&mut self, variance: T) {
@@ -105,6 +111,9 @@ impl<T: Real> Doubt<T> {
         let (low, high): (T, T) = (number(self.parts.low), number(self.parts.high));
         let beyond = (rho - high).max(low - rho) - number::<T>(DOUBT.margin) * (high - low);
         self.outside = (self.outside * (-passed_s / number(DOUBT.outside_fades_s)).exp()).max(beyond);
+        self.rest.iter_mut().for_each(|rest| {
+            rest.see(passed_s, rho);
+        });
     }
 
     /// The strain's variance with all doubts, and flags that say so.
@@ -114,12 +123,15 @@ impl<T: Real> Doubt<T> {
         let faster = rate.abs() / number(self.parts.fastest_per_s);
         let (is_fast, most): (bool, T) = (faster > number(DOUBT.faster), number(self.parts.most));
         let stated = if is_fast { (variance * (faster * faster)).min(most).max(variance) } else { variance };
-        let more = (self.fading + outside).min(most);
+        let rest_off = self.rest.map_or(T::zero(), |rest| rest.off());
+        let elsewhere = rest_off * number(self.parts.per_reading);
+        let more = (self.fading + outside + elsewhere * elsewhere).min(most);
         let raised = [
             (self.starts && self.fading > worth * number(self.parts.start), flag::START_UP),
             (!self.starts && self.fading > worth * variance, flag::RECOVERING),
             (outside > worth * variance || is_fast, flag::EXTRAPOLATED),
             (self.run_s > number(self.parts.longest_s), flag::LONG_RUN),
+            (rest_off > T::zero(), flag::REST_MOVED),
         ];
         let flags = raised.into_iter().filter(|(is_raised, _)| *is_raised).fold(0, |flags, (_, flag)| flags | flag);
         (stated + more, flags)

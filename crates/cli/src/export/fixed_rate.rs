@@ -1,6 +1,6 @@
 //! A sensor's filter at a fixed rate, in single and in double precision.
 
-use ohmstrain::KNOWN_BEYOND;
+use ohmstrain::{DOUBT, KNOWN_BEYOND};
 use ohmstrain_calib::{EstimatorKind, EstimatorParams, HISTORIES, HYPOTHESES, SensorParams};
 use ohmstrain_ekf::{Compact, Ekf, Estimator, Evidence, Hypotheses, STEP_GRACE, SignSplit, SparseEkf, StepError};
 use ohmstrain_model::{Motion, SensorLaw, StrainRange, SwitchedModel};
@@ -75,6 +75,7 @@ impl<'a, const B: usize, const N: usize> FixedRate<'a, B, N> {
             limits,
             strain_sd_scale: strain_sd_scale as f32,
             sieve: filter.readings,
+            zero: (DOUBT.zero * params.limits.span()) as f32,
             start_variance: (filter.known_sd * filter.known_sd) as f32,
             correction: filter.correction.as_ref(),
             quadratics: quadratics.as_ref(),

@@ -105,12 +105,14 @@ fn too_many_branches() -> ExportError {
 /// Name in the exported folder, and template.
 type Template = (&'static str, &'static str);
 
-/// Arduino compiles what lies in a sketch's own folder, named as the sketch, and nothing from folders beside it: the self-test
-/// with its `main` must not be in there.
-const C: [Template; 8] = [
-    ("ohmstrain/ohmstrain.h", include_str!("templates/ohmstrain.h")),
-    ("ohmstrain/ohmstrain.c", include_str!("templates/ohmstrain.c")),
-    ("ohmstrain/ohmstrain.ino", include_str!("templates/ohmstrain.ino")),
+/// The layout of an Arduino library, which PlatformIO takes too: of it only `src` is compiled into a program, not the self-test
+/// with its `main`.
+const C: [Template; 10] = [
+    ("src/ohmstrain.h", include_str!("templates/ohmstrain.h")),
+    ("src/ohmstrain.c", include_str!("templates/ohmstrain.c")),
+    ("examples/ohmstrain_plotter/ohmstrain_plotter.ino", include_str!("templates/ohmstrain.ino")),
+    ("library.properties", include_str!("templates/library.properties")),
+    ("library.json", include_str!("templates/library.json")),
     ("selftest/vectors.h", include_str!("templates/vectors.h")),
     ("selftest/selftest.c", include_str!("templates/selftest.c")),
     ("selftest/replay.c", include_str!("templates/replay.c")),

@@ -38,10 +38,12 @@ impl Prefix {
         let names = [
             ("OHMSTRAIN_", format!("{upper}_")),
             ("ohmstrain_", format!("{prefix}_")),
-            ("ohmstrain/ohmstrain.", format!("{prefix}/{prefix}.")),
+            ("src/ohmstrain.", format!("src/{prefix}.")),
+            ("name=ohmstrain\n", format!("name={prefix}\n")),
+            ("includes=ohmstrain.h", format!("includes={prefix}.h")),
+            ("\"name\": \"ohmstrain\"", format!("\"name\": \"{prefix}\"")),
+            ("Examples → ohmstrain", format!("Examples → {prefix}")),
             ("\"ohmstrain.h\"", format!("\"{prefix}.h\"")),
-            ("-Iohmstrain ", format!("-I{prefix} ")),
-            ("PUBLIC ohmstrain)", format!("PUBLIC {prefix})")),
         ];
         names.iter().fold(text.to_owned(), |text, (from, to)| text.replace(from, to))
     }

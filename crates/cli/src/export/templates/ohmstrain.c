@@ -21,6 +21,16 @@
 #error "-ffast-math removes the checks for numbers that are not finite"
 #endif
 
+#ifdef __AVR__
+/* Its C library has none. What expf rounds off cancels in the quotient (Kahan). */
+static inline float expm1f(float x)
+{
+    const float u = expf(x), more = u - 1.0f;
+
+    return u == 1.0f ? x : more == -1.0f ? -1.0f : more * x / logf(u);
+}
+#endif
+
 enum { STATES = OHMSTRAIN_STATES, ENTRIES = OHMSTRAIN_ENTRIES, LAST = STATES - 1 };
 
 /* Place of entry (i, j), j <= i, in a lower triangle. */
@@ -56,6 +66,12 @@ static const float SEEN_LOW = << doubt.low >>f, SEEN_HIGH = << doubt.high >>f;
 static const float FASTEST_PER_S = << doubt.fastest_per_s >>f, LONGEST_RUN_S = << doubt.longest_s >>f;
 /* Strain for a change of the reading over these ranges, and variances: of an unknown start, and of what is known least. */
 static const float PER_READING = << doubt.per_reading >>f, START_DOUBT = << doubt.start >>f, MOST_DOUBT = << doubt.most >>f;
+{% if doubt.rest %}
+/* At rest: the reading, relative, and how far it may be from there; for how long readings must stay where they are, s; 1 where
+ * they grow from rest on, -1 where they fall, 0 where nobody knows, and the last one on that side. */
+static const float AT_REST = << doubt.rest.rested >>f, REST_TOLERANCE = << doubt.rest.tolerance >>f, REST_LASTS_S = << doubt.rest.lasts_s >>f;
+static const float REST_SIGN = << doubt.rest.sign >>f, REST_END = << doubt.rest.end >>f;
+{% endif %}
 /* Factor on the standard deviation of strain that the calibration found necessary. */
 static const float STRAIN_SD_SCALE = << strain_sd_scale >>f;
 /* The square of the rounding of a relative reading of order one, and the most tries with more noise after the first. */
@@ -386,6 +402,31 @@ static void raise_doubt(readings *seen, float variance)
     }
 }
 
+{% if doubt.rest %}
+/* Watches for another R0: a sensor that is known to rest and reads something else, or readings that stay where no strain leads. */
+static void watch_rest(readings *seen, float dt_s, float rho)
+{
+    const float from_rest = fabsf(rho - AT_REST), beyond = REST_SIGN * (REST_END - rho);
+
+    if (seen->rests) {
+        seen->rests = 0;
+        seen->rest_off = from_rest > REST_TOLERANCE ? from_rest : 0.0f;
+    }
+    if (beyond > REST_TOLERANCE) {
+        seen->least = seen->beyond_s > 0.0f && seen->least < beyond ? seen->least : beyond;
+        seen->beyond_s += dt_s;
+    } else {
+        seen->beyond_s = 0.0f;
+    }
+    seen->near_s = from_rest > REST_TOLERANCE ? 0.0f : seen->near_s + dt_s;
+    if (seen->beyond_s >= REST_LASTS_S) {
+        seen->rest_off = seen->rest_off > seen->least ? seen->rest_off : seen->least;
+    } else if (seen->near_s >= REST_LASTS_S) {
+        seen->rest_off = 0.0f;
+    }
+}
+
+{% endif %}
 /* A step has passed, with a reading that was used or without; `variance` is the strain's. */
 static void doubt_reading(readings *seen, float dt_s, const float *rho, float nis, float variance)
 {
@@ -417,6 +458,9 @@ static void doubt_reading(readings *seen, float dt_s, const float *rho, float ni
     beyond = (above > below ? above : below) - << doubt.margin >>f * (SEEN_HIGH - SEEN_LOW);
     seen->outside *= expf(-passed_s / << doubt.outside_fades_s >>f);
     seen->outside = seen->outside > beyond ? seen->outside : beyond;
+{% if doubt.rest %}
+    watch_rest(seen, passed_s, *rho);
+{% endif %}
 }
 
 /* The strain's variance with all doubts, and flags that say so. */
@@ -425,13 +469,21 @@ static float doubted(const readings *seen, float rate, float variance, unsigned 
     const float far = << doubt.shows >>f * (seen->outside > 0.0f ? seen->outside : 0.0f) * PER_READING, outside = far * far;
     const float faster = (rate < 0.0f ? -rate : rate) / FASTEST_PER_S;
     const int is_fast = faster > << doubt.faster >>f;
+{% if doubt.rest %}
+    const float elsewhere = seen->rest_off * PER_READING;
+    const float more = seen->fading + outside + elsewhere * elsewhere;
+{% else %}
     const float more = seen->fading + outside;
+{% endif %}
     float stated = variance;
 
     *flags |= seen->starts && seen->fading > << doubt.worth >>f * START_DOUBT ? OHMSTRAIN_START_UP : 0;
     *flags |= !seen->starts && seen->fading > << doubt.worth >>f * variance ? OHMSTRAIN_RECOVERING : 0;
     *flags |= outside > << doubt.worth >>f * variance || is_fast ? OHMSTRAIN_EXTRAPOLATED : 0;
     *flags |= seen->run_s > LONGEST_RUN_S ? OHMSTRAIN_LONG_RUN : 0;
+{% if doubt.rest %}
+    *flags |= seen->rest_off > 0.0f ? OHMSTRAIN_REST_MOVED : 0;
+{% endif %}
     if (is_fast) {
         stated = variance * (faster * faster);
         stated = stated < MOST_DOUBT ? stated : MOST_DOUBT;
@@ -498,6 +550,9 @@ static ohmstrain_status start(ohmstrain_state *state, const float *strain, float
     start_mixture(state, strain);
     state->readings = none;
     state->readings.starts = !strain;
+{% if doubt.rest %}
+    state->readings.rests = strain && fabsf(*strain) <= << doubt.zero >>f;
+{% endif %}
     state->readings.fading = strain ? 0.0f : START_DOUBT;
     summarise(state, &all);
     state->strain = strain_of(&all, &state->variance);
@@ -534,6 +589,9 @@ ohmstrain_status ohmstrain_rest(ohmstrain_state *state, float measured)
         return OHMSTRAIN_ERR_NOT_FINITE;
     }
     state->rest_reading = rest_reading_at(measured);
+{% if doubt.rest %}
+    state->readings.rest_off = state->readings.beyond_s = state->readings.near_s = 0.0f;
+{% endif %}
     return OHMSTRAIN_OK;
 }
 

@@ -76,7 +76,9 @@ enum ohmstrain_flag {
     /* Readings are, or have been, outside of calibration's, or the << quantity >> changes much faster. */
     OHMSTRAIN_EXTRAPOLATED = 128,
     /* It has been running for longer than any recording of the calibration. */
-    OHMSTRAIN_LONG_RUN = 256
+    OHMSTRAIN_LONG_RUN = 256,
+    /* The sensor does not rest where it rested in calibration: R0 is another one, ohmstrain_rezero tells it. */
+    OHMSTRAIN_REST_MOVED = 512
 };
 
 /* What was seen of the readings. */
@@ -88,12 +90,14 @@ typedef struct ohmstrain_readings {
     unsigned flags;   /* of the last step */
     unsigned char has_reading;
     /* Doubts of the interval. */
-    unsigned char runs, starts, is_lost, has_believed;
+    unsigned char runs, starts, is_lost, has_believed, rests;
     float run_s;    /* time since the first step */
     float fading;   /* variance that fades while readings are believed */
     float lost;     /* variance of the strain where readings have not been believed since */
     float believed; /* the last reading that was */
     float outside;  /* how far readings have been outside of calibration's */
+    float rest_off; /* how far R0 is off, as a share of it */
+    float beyond_s, near_s, least; /* time for which readings have been beyond those at rest, and near them; how far beyond */
 {% if correction %}
     unsigned char has_feature;
     unsigned char missing;

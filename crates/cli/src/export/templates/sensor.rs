@@ -9,11 +9,11 @@
 use ohmstrain_ekf::correction::{Correction, FEATURES, FeatureScale, InputScale, OUTPUTS, Process, ReadingFeatures};
 {% endif %}
 {% if splits %}
-use ohmstrain_ekf::{Belief, Compact, {% if rests %}Dwell, {% endif %}Evidence, Reading, SparseEkf, SparseMixture, SparseSignSplit, StepError, StrainSensor};
+use ohmstrain_ekf::{Belief, Compact, {% if rests %}Dwell, {% endif %}Evidence, Reading, SparseEkf, SparseMixture, SparseSignSplit, StepError};
 {% elif estimator.hypotheses %}
-use ohmstrain_ekf::{Belief, Compact, Dwell, Evidence, Reading, SparseEkf, SparseHypotheses, SparseMixture, StepError, StrainSensor};
+use ohmstrain_ekf::{Belief, Compact, Dwell, Evidence, Reading, SparseEkf, SparseHypotheses, SparseMixture, StepError};
 {% else %}
-use ohmstrain_ekf::{Belief, Compact, Reading, SparseEkf, StepError, StrainSensor};
+use ohmstrain_ekf::{Belief, Compact, Reading, SparseEkf, StepError};
 {% endif %}
 use ohmstrain_model::{{% if branches %}Branch, {% endif %}Gauge, ModelNoise, Motion, ParameterError, {% if estimator.hypotheses %}Phase, {% endif %}SensorLaw, StrainRange, SwitchedModel};
 

@@ -33,6 +33,8 @@ pub struct Twin<'a, T: Real, const B: usize, const N: usize, const L: usize, con
     strain_sd_scale: T,
     /// Variance of a strain that is known at a start.
     start_variance: T,
+    /// A strain that is less is none.
+    zero: T,
     correction: Option<Table<T>>,
     /// As it is before any reading, and now.
     fresh: Memory<T, B, N, L, K>,
@@ -108,6 +110,7 @@ impl<'a, T: Real, const B: usize, const N: usize, const L: usize, const K: usize
             limits,
             strain_sd_scale: number(parts.strain_sd_scale.into()),
             start_variance: number(parts.start_variance.into()),
+            zero: number(parts.zero.into()),
             correction: parts.correction.map(|correction| Table::new(correction, parts.quadratics)),
             fresh,
             now: fresh,
@@ -122,7 +125,7 @@ impl<'a, T: Real, const B: usize, const N: usize, const L: usize, const K: usize
         let (mut mean, mut variance) = self.model.initial_distribution();
         (mean[0], variance[0]) = (strain, self.start_variance);
         self.now.moving.start_from(Belief::independent(mean, &variance));
-        self.now.doubt = self.now.doubt.of_known_strain();
+        self.now.doubt = self.now.doubt.of_known_strain(strain.abs() <= self.zero);
     }
 
     /// The usual time on, with a reading or without; flags.

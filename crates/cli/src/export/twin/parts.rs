@@ -18,6 +18,7 @@ pub mod flag {
     pub const RECOVERING: u32 = 64;
     pub const EXTRAPOLATED: u32 = 128;
     pub const LONG_RUN: u32 = 256;
+    pub const REST_MOVED: u32 = 512;
 
     /// The reading was not used.
     pub const NO_READING: u32 = MISSING | IMPLAUSIBLE | STUCK | REJECTED;
@@ -37,6 +38,8 @@ pub struct Parts<'a> {
     pub sieve: PortableSieve,
     /// Variance of a strain that is known at a start.
     pub start_variance: f32,
+    /// A strain that is less is none.
+    pub zero: f32,
     pub correction: Option<&'a PortableCorrection>,
     /// What stands for rows of the correction that were left out.
     pub quadratics: Option<&'a [Quadratic; 2]>,
