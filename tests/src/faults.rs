@@ -1,5 +1,10 @@
 //! What a filter makes of faults: error, coverage, recovery and flags, before, during and after.
 
+use std::fmt::Write;
+use std::io::{Seek, Write as _};
+use std::path::Path;
+use std::process::{Command, Stdio};
+
 use ohmstrain::{Estimate, FilterBuilder, Flag};
 use ohmstrain_bench_data::Trace;
 use ohmstrain_bench_data::faults::Episode;
@@ -15,6 +20,16 @@ const AVERAGED_S: f64 = 2.0;
 /// Normal deviates that hold 95 %.
 const TWO_SIDED: f64 = 1.959_963_984_540_054;
 
+/// What a filter says of a row.
+#[derive(Clone, Copy, Debug)]
+pub struct Said {
+    time_s: f64,
+    strain: f64,
+    strain_sd: f64,
+    /// Whether it says that something is wrong with the reading, or with the use of the sensor.
+    flagged: bool,
+}
+
 /// Rows that were scored together.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Score {
@@ -26,15 +41,14 @@ pub struct Score {
 }
 
 impl Score {
-    fn add(&mut self, row: &Estimate, truth: f64, full_scale: f64) {
+    fn add(&mut self, row: &Said, truth: f64, full_scale: f64) {
         let error = row.strain - truth;
         let covered = error.abs() <= TWO_SIDED * row.strain_sd;
-        let flagged = is_flagged(row);
         self.rows += 1.0;
         self.squares += (error / full_scale).powi(2);
         self.covered += f64::from(u8::from(covered));
-        self.flagged += f64::from(u8::from(flagged));
-        self.silent += f64::from(u8::from(!flagged && !covered));
+        self.flagged += f64::from(u8::from(row.flagged));
+        self.silent += f64::from(u8::from(!row.flagged && !covered));
     }
 
     /// Both together.
@@ -117,18 +131,61 @@ impl Answer {
     }
 }
 
-/// Estimates row by row, with the true strain; rows that the filter refuses are left out.
-fn estimates(builder: FilterBuilder, trace: &Trace) -> Vec<(Estimate, f64)> {
+/// Estimates of the library row by row, with the true strain; rows that the filter refuses are left out.
+#[must_use]
+pub fn estimates(builder: FilterBuilder, trace: &Trace) -> Vec<(Said, f64)> {
     let Ok(mut filter) = builder.build() else { return Vec::new() };
     let strain = trace.reference.as_ref().map(|reference| &reference.values);
     let truth = |row: usize| strain.map_or(f64::NAN, |strain| strain[row]);
-    let step = |row: usize| Some((filter.step(trace.time_s[row], trace.readings.values[row]).ok()?, truth(row)));
+    let said = |row: Estimate| Said {
+        time_s: row.time_s,
+        strain: row.strain,
+        strain_sd: row.strain_sd,
+        flagged: is_flagged(&row),
+    };
+    let step = |row: usize| Some((said(filter.step(trace.time_s[row], trace.readings.values[row]).ok()?), truth(row)));
     (0..trace.len()).filter_map(step).collect()
+}
+
+/// `OHMSTRAIN_LONG_RUN` of exported C: the one of its flags that does not say that something is wrong.
+const LONG_RUN: u32 = 256;
+
+/// The same of the compiled `replay.c` of an exported folder; rows whose time goes back, which it refuses, are left out.
+///
+/// # Errors
+/// If it cannot be run, or prints something else.
+pub fn replayed(program: &Path, trace: &Trace) -> std::io::Result<Vec<(Said, f64)>> {
+    let strain = trace.reference.as_ref().map(|reference| &reference.values);
+    let (mut recording, mut truths, mut last_s) = ("time_s,resistance_ohm\n".to_owned(), Vec::new(), f64::NEG_INFINITY);
+    for (row, &time_s) in trace.time_s.iter().enumerate().filter(|(_, time_s)| !time_s.is_nan()) {
+        if time_s < last_s {
+            continue;
+        }
+        last_s = time_s;
+        let reading = trace.readings.values[row];
+        let cell = if reading.is_nan() { String::new() } else { reading.to_string() };
+        writeln!(recording, "{time_s},{cell}").map_err(std::io::Error::other)?;
+        truths.push(strain.map_or(f64::NAN, |strain| strain[row]));
+    }
+    let mut stdin = tempfile::tempfile()?;
+    stdin.write_all(recording.as_bytes())?;
+    stdin.rewind()?;
+    let printed = Command::new(program).stdin(stdin).stderr(Stdio::inherit()).output()?.stdout;
+    let said = |line: &str| {
+        let numbers: Option<Vec<f64>> = line.split(',').map(|cell| cell.parse().ok()).collect();
+        let [time_s, strain, strain_sd, flags] = numbers?[..] else { return None };
+        Some(Said { time_s, strain, strain_sd, flagged: flags as u32 & !LONG_RUN != 0 })
+    };
+    let rows: Option<Vec<Said>> = String::from_utf8_lossy(&printed).lines().skip(1).map(said).collect();
+    match rows.filter(|rows| rows.len() == truths.len()) {
+        Some(rows) => Ok(rows.into_iter().zip(truths).collect()),
+        None => Err(std::io::Error::other(format!("{}: printed other rows", program.display()))),
+    }
 }
 
 /// Puts a fault into a recording at some times and adds up what the filter says.
 pub fn answer(
-    builder: FilterBuilder,
+    run: &dyn Fn(&Trace) -> Vec<(Said, f64)>,
     trace: &Trace,
     (episode, onsets_s): (Episode, &[f64]),
     full_scale: f64,
@@ -139,8 +196,8 @@ pub fn answer(
         let until_s = from_s + lasts_s;
         let part = trace.since(from_s - BEFORE_S).until(until_s + AFTER_S);
         let episode = Episode { from_s, until_s, seed: episode.seed + k as u64, ..episode };
-        let faulty = estimates(builder, &episode.put_into(&part));
-        let clean = estimates(builder, &part);
+        let faulty = run(&episode.put_into(&part));
+        let clean = run(&part);
         // A clock that is off does not end when the fault should.
         let rows = |time_s: f64| part.time_s.partition_point(|time| *time < time_s);
         let end_s =
@@ -167,8 +224,8 @@ pub fn answer(
 
 /// Time after a fault's end at which the mean error was too large for the last time, s. Rows are compared from the end on, where
 /// both runs have the same.
-fn recovery_s(faulty: &[(Estimate, f64)], clean: &[(Estimate, f64)], end_s: f64, full_scale: f64) -> f64 {
-    let error = |(row, truth): &(Estimate, f64)| (row.strain - truth).abs();
+fn recovery_s(faulty: &[(Said, f64)], clean: &[(Said, f64)], end_s: f64, full_scale: f64) -> f64 {
+    let error = |(row, truth): &(Said, f64)| (row.strain - truth).abs();
     let pairs = faulty.iter().rev().zip(clean.iter().rev());
     let worse: Vec<(f64, f64)> = pairs
         .take_while(|(row, _)| row.0.time_s >= end_s)

@@ -5,7 +5,7 @@ use ohmstrain_bench_data::Trace;
 use ohmstrain_bench_data::faults::{Episode, Fault};
 use ohmstrain_bench_data::simulate::{Material, Protocol, SettingsError, SimulationSettings, simulate};
 
-use crate::faults::{AFTER_S, Answer, BEFORE_S, answer};
+use crate::faults::{AFTER_S, Answer, BEFORE_S, Said, answer, estimates};
 
 /// A sensor calibrated on the first half of the demo's recording: `ohmstrain demo --seed 1`, version 0.1.0.
 pub const SENSOR: &str = include_str!("../fixtures/representative.toml");
@@ -84,9 +84,18 @@ pub fn recordings() -> Result<[Trace; 2], SettingsError> {
     Ok([recording(1)?, recording(2)?])
 }
 
-/// What the sensor's default, or another estimator, makes of a fault on one or more recordings.
+/// A filter: estimates of a recording, row by row, with the true strain.
+pub type Run<'a> = Box<dyn Fn(&Trace) -> Vec<(Said, f64)> + 'a>;
+
+/// The sensor's default, or another estimator, as the library has it.
 #[must_use]
-pub fn answer_to(sensor: &Sensor, kind: EstimatorKind, case: &Case, traces: &[Trace]) -> Answer {
+pub fn of_library(sensor: &Sensor, kind: EstimatorKind) -> Run<'_> {
+    Box::new(move |trace| estimates(sensor.filter().estimator(kind), trace))
+}
+
+/// What a filter makes of a fault on one or more recordings.
+#[must_use]
+pub fn answer_to(run: &Run, case: &Case, traces: &[Trace]) -> Answer {
     let mut sum = Answer::default();
     for trace in traces {
         let strain = trace.reference.iter().flat_map(|reference| &reference.values);
@@ -97,20 +106,20 @@ pub fn answer_to(sensor: &Sensor, kind: EstimatorKind, case: &Case, traces: &[Tr
         let onset = |k: usize| first_s + 0.73 + (last_s - first_s - 1.0) * k as f64 / (ONSETS - 1) as f64;
         let onsets: [f64; ONSETS] = std::array::from_fn(onset);
         let episode = Episode { fault: case.fault, from_s: 0.0, until_s: case.lasts_s, seed: 1 };
-        sum.merge(answer(sensor.filter().estimator(kind), trace, (episode, &onsets), high - low));
+        sum.merge(answer(run, trace, (episode, &onsets), high - low));
     }
     sum
 }
 
 /// A row of the table, in Markdown.
 #[must_use]
-pub fn row(sensor: &Sensor, kind: EstimatorKind, case: &Case, traces: &[Trace]) -> String {
-    let said = answer_to(sensor, kind, case, traces);
+pub fn row(name: &str, run: &Run, case: &Case, traces: &[Trace]) -> String {
+    let said = answer_to(run, case, traces);
     let cell = |score: &crate::faults::Score| format!("{:.1} ({:.0})", score.rmse(), score.coverage());
     format!(
         "| {} | {} | {} | {} | {} | {} | {:.0} | {:.0} | {:.0} | {:.0} |",
         case.name,
-        if kind == EstimatorKind::Ekf { "EKF" } else { "default" },
+        name,
         cell(&said.before),
         cell(&said.during),
         cell(&said.soon),
