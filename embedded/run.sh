@@ -9,7 +9,7 @@
 set -euo pipefail
 cd "$(dirname "$0")"
 
-readonly programs=(ekf3 ekf3_varying fast3 fast3_varying ekf6 fast6 imm6 fast_imm6 split6 fast_split6)
+readonly programs=(ekf3 ekf3_varying fast3 fast3_varying ekf6 fast6 fast_imm6 fast_split6)
 readonly images=target/images
 update=0
 [[ ${1:-} != --update ]] || update=1

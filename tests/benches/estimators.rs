@@ -8,8 +8,8 @@ use adskalman::{KalmanFilterNoControl, StateAndCovariance};
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
 use nalgebra::SVector;
 use ohmstrain_ekf::{
-    Belief, Channel, Compact, Dwell, Dynamics, Ekf, Estimator, Evidence, Imm, LinearStep, Mixture, Reading, SignSplit,
-    SparseEkf, State, Step, Unscented, rts_smooth_vec,
+    Belief, Channel, Compact, Dwell, Dynamics, Ekf, Estimator, Evidence, Imm, LinearStep, Mixture, PhaseMixture,
+    Reading, SignSplit, SparseEkf, State, Step, Unscented, rts_smooth_vec,
 };
 use ohmstrain_model::{Phase, StrainRange, SwitchedModel};
 use ohmstrain_tests::sensor;
@@ -94,10 +94,12 @@ fn benchmarks(criterion: &mut Criterion) {
     let Ok(dwell) = Dwell::new(5.0, 1.0, 0.3) else { return };
     let evidence = Evidence { limits: StrainRange { lower: -0.02, upper: 0.35 }, tempering: 1.0 };
     let belief = Belief::initial(&six);
+    let start = PhaseMixture::single(belief, Phase::Hold);
+    let imm = Imm::<f64, 3, 6>::new(six, DT_S, dwell, evidence).expect("the step's length is positive");
+    estimator::<_, 6, 21>(criterion, "IMM, n = 6", &start, imm);
     let start = Mixture::single(belief, Phase::Hold);
-    estimator::<_, 6, 21>(criterion, "IMM, n = 6", &start, Imm::new(six, dwell, evidence));
-    let start = Mixture::single(belief, Phase::Hold);
-    let split = SignSplit::<_, _, 8>::new(six, Some(dwell), evidence);
+    let split = SignSplit::<f64, 3, 6, 8>::new(six, DT_S, Some(dwell), evidence);
+    let split = split.expect("the step's length is positive");
     estimator::<_, 6, 21>(criterion, "sign-split of 8, n = 6", &start, split);
     smoother(criterion, &three);
 }

@@ -5,7 +5,7 @@
 //! ```
 
 use comfy_table::{Table, presets};
-use ohmstrain_ekf::{Belief, Ekf, Estimator, Hypotheses, Imm, Mixture, SignSplit, Ukf, Unscented};
+use ohmstrain_ekf::{Belief, Ekf, Estimator, Hypotheses, Imm, Mixture, PhaseMixture, SignSplit, Ukf, Unscented};
 use ohmstrain_model::{Phase, SwitchedModel};
 use ohmstrain_tests::own_law::{EVIDENCE, Moves, dwell, honesty, sensor};
 
@@ -21,16 +21,12 @@ fn main() {
         of(&mut table, sensor(moves), moves);
     }
     let (model, moves) = (sensor(Moves::Phases), Moves::Phases);
+    let start = PhaseMixture::single(Belief::<f64, 5, 15>::initial(&model), Phase::Extend);
+    let imm = Imm::<_, 2, 5>::new(model, 0.0, dwell(moves), EVIDENCE).expect("no step is refused");
+    row::<_, 5, 15>(&mut table, "IMM", imm, &start, moves);
     let start = Mixture::single(Belief::<f64, 5, 15>::initial(&model), Phase::Extend);
-    row::<_, 5, 15>(&mut table, "IMM", Imm::new(model, dwell(moves), EVIDENCE), &start, moves);
-    let start = Mixture::single(Belief::<f64, 5, 15>::initial(&model), Phase::Extend);
-    row::<_, 5, 15>(
-        &mut table,
-        "phase histories (16)",
-        Hypotheses::<_, _, 16>::new(model, dwell(moves), EVIDENCE),
-        &start,
-        moves,
-    );
+    let histories = Hypotheses::<_, 2, 5, 16>::new(model, 0.0, dwell(moves), EVIDENCE).expect("no step is refused");
+    row::<_, 5, 15>(&mut table, "phase histories (16)", histories, &start, moves);
     println!("{}\n\n{table}", include_str!("sampling_rates.md").trim_end());
 }
 
@@ -42,7 +38,8 @@ fn of(table: &mut Table, model: SwitchedModel<f64, 2, 5>, moves: Moves) {
         row::<_, 5, 15>(table, "EKF", Ekf::new(model), &start, moves);
         row::<_, 5, 15>(table, "UKF", Ukf::new(Unscented::new(model)), &start, moves);
     }
-    let split = SignSplit::<_, _, 8>::new(model, rests.then(|| dwell(moves)), EVIDENCE);
+    let split =
+        SignSplit::<_, 2, 5, 8>::new(model, 0.0, rests.then(|| dwell(moves)), EVIDENCE).expect("no step is refused");
     row::<_, 5, 15>(table, "sign-split (8)", split, &Mixture::single(start, Phase::Extend), moves);
 }
 

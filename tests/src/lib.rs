@@ -10,7 +10,7 @@ pub mod sweep;
 pub use draws::{Draws, square_root};
 pub use flow::Flow;
 use nalgebra::{SMatrix, SVector};
-use ohmstrain_ekf::{Belief, Channel, Dynamics, Phased};
+use ohmstrain_ekf::{Belief, Channel, Dynamics};
 use ohmstrain_model::{
     Branch, Gauge, ModelNoise, Motion, Observation, Phase, Scalar, SensorLaw, StrainRange, SwitchedModel, Symmetric,
     Transition,
@@ -46,17 +46,6 @@ impl<T: Scalar, const N: usize, const L: usize> Dynamics<T, N, L> for Linear<T, 
 impl<T: Scalar, const N: usize, const L: usize> Channel<T, N, L> for Linear<T, N> {
     fn observe(&self, at: &Belief<T, N, L>, _: Option<Phase>) -> Observation<T, N> {
         Observation { value: self.gradient.dot(&at.mean), gradient: self.gradient, variance: self.variance }
-    }
-}
-
-/// One phase, so nothing begins.
-impl<T: Scalar, const N: usize, const L: usize> Phased<T, N, L> for Linear<T, N> {
-    fn enter(&self, from: &Belief<T, N, L>, _: Phase) -> Belief<T, N, L> {
-        *from
-    }
-
-    fn renewed(&self) -> std::ops::Range<usize> {
-        0..0
     }
 }
 

@@ -1,7 +1,7 @@
 //! A few hypotheses stand for all of them, however often the sensor is read: what is unlikely in each of many short steps and
 //! likely in all of them together is not lost between them.
 
-use ohmstrain_ekf::{Belief, Dwell, Evidence, Reading, SparseMixture, SparseSignSplit};
+use ohmstrain_ekf::{Belief, Dwell, Evidence, Mixture, Reading, SignSplit};
 use ohmstrain_model::{Branch, Gauge, ModelNoise, Motion, Phase, SensorLaw, StrainRange, SwitchedModel};
 use ohmstrain_tests::Draws;
 
@@ -69,8 +69,8 @@ fn rows(dt_s: f64, seconds: f64, seed: u64) -> Vec<(f64, f64)> {
 fn surprise<const K: usize>(dt_s: f64, rows: &[(f64, f64)]) -> f64 {
     let hold = Dwell::new(HOLD_S, MOVE_S, 0.0).unwrap();
     let evidence = Evidence::new(FAR, 1.0).unwrap();
-    let filter = SparseSignSplit::<f64, 1, 4, K>::new(model(), dt_s, Some(hold), evidence).unwrap();
-    let mut state = SparseMixture::<f64, 4, 10, K>::single(Belief::initial(&model()), Phase::Hold);
+    let filter = SignSplit::<f64, 1, 4, K>::new(model(), dt_s, Some(hold), evidence).unwrap();
+    let mut state = Mixture::<f64, 4, 10, K>::single(Belief::initial(&model()), Phase::Hold);
     let of_row = |(reading, strain): &(f64, f64)| {
         filter.step(&mut state, Some(Reading::from(*reading))).unwrap();
         let belief: Belief<f64, 4, 10> = ohmstrain_ekf::State::moments(&state);

@@ -1,7 +1,7 @@
 //! What the direction of motion leaves open: its mean and variance against simulations of the continuous law, written out
 //! here or in `own_law`, and the coverage of intervals at any sampling rate.
 
-use ohmstrain_ekf::{Belief, Channel, Ekf, Estimator, Hypotheses, Mixture, SignSplit, Substeps, Ukf, Unscented};
+use ohmstrain_ekf::{Belief, Channel, Ekf, Estimator, Hypotheses, Mixture, SignSplit, State, Substeps, Ukf, Unscented};
 use ohmstrain_model::{
     Gauge, ModelNoise, Motion, Observation, Phase, RateChange, SensorLaw, StrainRange, SwitchedModel, Turning,
     unexplained,
@@ -126,7 +126,7 @@ fn a_pause_widens_the_belief_as_the_law_does_however_it_is_written_down() {
                 (stated_sd / sd - 1.0).abs() < 0.2,
                 "{seconds} s by {dt_s}: {stated} ± {stated_sd}, {expected} ± {sd}"
             );
-            let split = SignSplit::<_, _, 8>::new(model, None, EVIDENCE);
+            let split = SignSplit::<_, 2, 5, 8>::new(model, 0.0, None, EVIDENCE).unwrap();
             let mixture =
                 after_rows(split, &Mixture::single(start, Phase::Extend), dt_s, std::iter::repeat_n(None, rows));
             let (several, several_sd) = relaxation(&mixture.moments());
@@ -165,7 +165,7 @@ fn one_step_is_many_empty_rows_for_hypotheses_too() {
     for moves in [Moves::Ou, Moves::OuAndHolds] {
         let model = sensor(moves);
         let hold = (moves == Moves::OuAndHolds).then(|| dwell(moves));
-        let split = SignSplit::<_, _, 8>::new(model, hold, EVIDENCE);
+        let split = SignSplit::<_, 2, 5, 8>::new(model, 0.0, hold, EVIDENCE).unwrap();
         let start = Mixture::single(Belief::<f64, 5, 15>::initial(&model), Phase::Extend);
         let readings = simulate(moves, 0.05, 20.0, 3).into_iter().map(|(rho, _)| Some(rho));
         let mixture = after_rows(split, &start, 0.05, readings);
@@ -197,7 +197,7 @@ fn one_step_is_many_empty_rows_for_hypotheses_too() {
 #[test]
 fn a_pause_forgets_the_direction_and_a_smoother_comes_back_through_it() {
     let model = sensor(Moves::Ou);
-    let split = Substeps(SignSplit::<_, _, 8>::new(model, None, EVIDENCE));
+    let split = Substeps(SignSplit::<_, 2, 5, 8>::new(model, 0.0, None, EVIDENCE).unwrap());
     let start = Mixture::single(Belief::<f64, 5, 15>::initial(&model), Phase::Extend);
     let prepared = Estimator::<f64, 5, 15>::prepare(&split, 0.05);
     let readings = (0..40).map(|k| Some(0.01 * f64::from(k)));
@@ -269,19 +269,19 @@ fn intervals_hold_on_the_own_law_at_any_rate_and_errors_are_smaller_than_they_we
         check("ekf", dt_s, one, ekf_before, honesty(Ekf::new(model), &start, scenario, 0..16));
         let ukf = Ukf::new(Unscented::new(model));
         check("ukf", dt_s, one, ekf_before, honesty(ukf, &start, scenario, 0..16));
-        let split = SignSplit::<_, _, 8>::new(model, None, EVIDENCE);
+        let split = SignSplit::<_, 2, 5, 8>::new(model, 0.0, None, EVIDENCE).unwrap();
         let mixture = Mixture::single(start, Phase::Extend);
         check("sign-split", dt_s, several, split_before, honesty(split, &mixture, scenario, 0..16));
         check("sign-split", dt_s, several, f64::INFINITY, honesty(split, &mixture, (Moves::Ou, dt_s, true), 0..16));
     }
     for dt_s in [0.05, 0.5] {
         let moves = Moves::OuAndHolds;
-        let split = SignSplit::<_, _, 8>::new(sensor(moves), Some(dwell(moves)), EVIDENCE);
+        let split = SignSplit::<_, 2, 5, 8>::new(sensor(moves), 0.0, Some(dwell(moves)), EVIDENCE).unwrap();
         let mixture = Mixture::single(start, Phase::Extend);
         check("sign-split with holds", dt_s, several, 0.0245, honesty(split, &mixture, (moves, dt_s, false), 0..16));
         let moves = Moves::Phases;
         let model = sensor(moves);
-        let histories = Hypotheses::<_, _, 16>::new(model, dwell(moves), EVIDENCE);
+        let histories = Hypotheses::<_, 2, 5, 16>::new(model, 0.0, dwell(moves), EVIDENCE).unwrap();
         let start = Mixture::single(Belief::<f64, 5, 15>::initial(&model), Phase::Extend);
         check("phase histories", dt_s, several, 0.0374, honesty(histories, &start, (moves, dt_s, false), 0..16));
     }

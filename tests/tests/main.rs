@@ -12,6 +12,7 @@ mod linear_oracles;
 mod long_run;
 mod mixture_smoother;
 mod mixtures;
+mod naive_mixtures;
 mod one_kalman_filter;
 mod particle_oracles;
 mod particles;
@@ -22,7 +23,6 @@ mod representative;
 mod running_consistency;
 mod running_filter;
 mod sparse;
-mod sparse_mixtures;
 mod stored;
 mod windows_and_guards;
 

@@ -2,7 +2,9 @@
 //! moments of all phase histories; limits count once; stretching and releasing are told apart.
 
 use nalgebra::{Matrix3, SVector};
-use ohmstrain_ekf::{Belief, Dwell, Dynamics, Evidence, Hypotheses, Imm, Mixture, Phased, Reading, SignSplit};
+use ohmstrain_ekf::{
+    Belief, Dwell, Estimator, Evidence, Hypotheses, Imm, Mixture, PhaseMixture, Reading, SignSplit, State,
+};
 use ohmstrain_model::{Direction, Motion, Phase, StrainRange, SwitchedModel, Symmetric, Transition};
 use ohmstrain_tests::switching_sensor;
 use proptest::prelude::*;
@@ -48,6 +50,17 @@ struct History {
     belief: Belief<f64, 3, 6>,
 }
 
+/// A moving phase begins: its rate is that of the phase, and depends on nothing.
+fn enter(from: &Belief<f64, 3, 6>, phase: Phase) -> Belief<f64, 3, 6> {
+    let (mut entered, motion) = (*from, *switching_sensor().motion());
+    for j in 0..3 {
+        entered.covariance[(1, j)] = 0.0;
+    }
+    entered.mean[1] = if phase == Phase::Retract { -motion.phase_rate() } else { motion.phase_rate() };
+    entered.covariance[(1, 1)] = motion.stationary_variance()[1];
+    entered
+}
+
 /// All 3ⁿ histories of n steps.
 fn every_history(dwell: Dwell<f64>, start: History, steps: usize) -> Vec<History> {
     let model = switching_sensor();
@@ -58,7 +71,7 @@ fn every_history(dwell: Dwell<f64>, start: History, steps: usize) -> Vec<History
         for from in &histories {
             for phase in Phase::ALL {
                 let begins = phase != Phase::Hold && phase != from.phase;
-                let entered = if begins { model.enter(&from.belief, phase) } else { from.belief };
+                let entered = if begins { enter(&from.belief, phase) } else { from.belief };
                 let moved: Transition<f64, 3, 6> =
                     model.transition(&model.prepare(DT_S), &entered.mean, Direction::Known(phase));
                 let f = moved.jacobian;
@@ -78,18 +91,19 @@ fn every_history(dwell: Dwell<f64>, start: History, steps: usize) -> Vec<History
 /// Without readings, mixing and merging lose nothing of the first two moments: the sum over all histories is the same.
 /// No change of phase is less likely than 0.07 here, so no history is as light as 0.07⁴ = 2.4e-5, and none is dropped as
 /// negligible, which begins at e⁻¹² = 6e-6.
-fn check_prediction<const K: usize>(
-    step: impl Fn(&Mixture<f64, 3, 6, K>, Dwell<f64>) -> Mixture<f64, 3, 6, K>,
+fn check_prediction<E: Estimator<f64, 3, 6>>(
+    filter: &E,
+    from: E::State,
     dwell: Dwell<f64>,
     start: Belief<f64, 3, 6>,
 ) -> Result<(), TestCaseError> {
-    let mut mixture = Mixture::<f64, 3, 6, K>::single(start, Phase::Hold);
+    let (mut mixture, prepared) = (from, filter.prepare(DT_S));
     for steps in 1..=4 {
-        mixture = step(&mixture, dwell);
+        mixture = filter.advance(&mixture, &prepared, None).unwrap().state;
         let histories = every_history(dwell, History { probability: 1.0, phase: Phase::Hold, belief: start }, steps);
         for phase in Phase::ALL {
             let expected: f64 = histories.iter().filter(|h| h.phase == phase).map(|h| h.probability).sum();
-            prop_assert!((mixture.phase_probabilities()[phase.index()] - expected).abs() < 1e-13);
+            prop_assert!((mixture.phases().unwrap()[phase.index()] - expected).abs() < 1e-13);
         }
         let mean: SVector<f64, 3> = histories.iter().map(|h| h.belief.mean * h.probability).sum();
         let second: Matrix3<f64> = histories
@@ -113,16 +127,10 @@ proptest! {
     ) {
         let dwell = Dwell::new(hold, moving, reversal).unwrap();
         let start: Belief<f64, 3, 6> = Belief::independent(SVector::from([strain, 0.0, branch]), &[1e-3, 0.0, 1e-3]);
-        let model = switching_sensor();
-        let prepared = Dynamics::<f64, 3, 6>::prepare(&model, DT_S);
-        let imm = |mixture: &_, dwell| {
-            Imm::new(model, dwell, ANYWHERE).step_prepared(mixture, &prepared, DT_S, None).unwrap().posterior
-        };
-        check_prediction::<3>(imm, dwell, start)?;
-        let hypotheses = |mixture: &_, dwell| {
-            Hypotheses::new(model, dwell, ANYWHERE).step_prepared(mixture, &prepared, DT_S, None).unwrap().posterior
-        };
-        check_prediction::<81>(hypotheses, dwell, start)?;
+        let imm = Imm::<f64, 1, 3>::new(switching_sensor(), DT_S, dwell, ANYWHERE).unwrap();
+        check_prediction(&imm, PhaseMixture::single(start, Phase::Hold), dwell, start)?;
+        let hypotheses = Hypotheses::<f64, 1, 3, 81>::new(switching_sensor(), DT_S, dwell, ANYWHERE).unwrap();
+        check_prediction(&hypotheses, Mixture::single(start, Phase::Hold), dwell, start)?;
     }
 }
 
@@ -131,13 +139,13 @@ proptest! {
 fn a_thousand_steps_at_rest_on_a_limit_change_nothing() {
     let evidence = within(0.0, 0.3);
     let dwell = Dwell::new(1e9, 1.0, 0.3).unwrap();
-    let prepared = Dynamics::<f64, 3, 6>::prepare(&switching_sensor(), DT_S);
     let start: Belief<f64, 3, 6> = Belief::independent(SVector::zeros(), &[1e-4, 0.0, 0.0]);
-    let filter = Hypotheses::new(switching_sensor(), dwell, evidence);
+    let filter = Hypotheses::<f64, 1, 3, 8>::new(switching_sensor(), DT_S, dwell, evidence).unwrap();
     let mut mixture = Mixture::<f64, 3, 6, 8>::single(start, Phase::Hold);
-    let first = filter.step_prepared(&mixture, &prepared, DT_S, None).unwrap().posterior.moments();
+    filter.step(&mut mixture, None).unwrap();
+    let first = mixture.moments();
     for _ in 0..1000 {
-        mixture = filter.step_prepared(&mixture, &prepared, DT_S, None).unwrap().posterior;
+        filter.step(&mut mixture, None).unwrap();
     }
     let last = mixture.moments();
     assert!((last.mean[0] - first.mean[0]).abs() < 1e-6, "{} {}", last.mean[0], first.mean[0]);
@@ -151,8 +159,7 @@ fn sign_split_tells_stretching_from_releasing() {
     let law = *switching_sensor().law();
     let noise = *switching_sensor().noise();
     let model = SwitchedModel::<f64, 1, 3>::new(law, motion, noise).unwrap();
-    let filter = SignSplit::new(model, None, within(-0.2, 0.5));
-    let prepared = Dynamics::<f64, 3, 6>::prepare(&model, 0.05);
+    let filter = SignSplit::<f64, 1, 3, 8>::new(model, 0.05, None, within(-0.2, 0.5)).unwrap();
     let start: Belief<f64, 3, 6> = Belief::initial(&model);
     let mut mixture = Mixture::<f64, 3, 6, 8>::single(start, Phase::Extend);
     let mut branch = 0.0;
@@ -165,7 +172,7 @@ fn sign_split_tells_stretching_from_releasing() {
         branch += (if step > 0.0 { 1.0 } else { -0.8 }) * step - branch * 0.05 / 3.0;
         before = strain;
         let reading = Some(Reading::from(1.5 * strain + branch));
-        mixture = filter.step_prepared(&mixture, &prepared, 0.05, reading).unwrap().posterior;
+        filter.step(&mut mixture, reading).unwrap();
         let speed = step.abs() / 0.05;
         if k > 400 && speed > 0.03 {
             let [extends, _, _] = mixture.phase_probabilities();

@@ -6,18 +6,13 @@
 
 use adskalman::{KalmanFilterNoControl, StateAndCovariance};
 use nalgebra::{Const, SMatrix, SVector};
-use ohmstrain_ekf::{
-    Belief, Channel, Dwell, Dynamics, Ekf, Evidence, Hypotheses, Imm, LinearStep, Mixture, Phased, Reading, SignSplit,
-    Step, Ukf, Unscented, rts_smooth_vec,
-};
-use ohmstrain_model::{Observation, Phase, StrainRange, Symmetric, Transition};
+use ohmstrain_ekf::{Belief, Channel, Dynamics, Ekf, LinearStep, Reading, Step, Ukf, Unscented, rts_smooth_vec};
+use ohmstrain_model::{Observation, Phase, Symmetric, Transition};
 use ohmstrain_tests::{Draws, Linear};
 
 const TOLERANCE: f64 = 1e-11;
 const ROWS: usize = 25;
 const DT_S: f64 = 0.1;
-const ANYWHERE: Evidence<f64> =
-    Evidence { limits: StrainRange { lower: f64::NEG_INFINITY, upper: f64::INFINITY }, tempering: 1.0 };
 
 /// A linear model around another state than zero.
 #[derive(Clone, Copy)]
@@ -42,16 +37,6 @@ impl<const N: usize, const L: usize> Channel<f64, N, L> for Around<N> {
     fn observe(&self, at: &Belief<f64, N, L>, _: Option<Phase>) -> Observation<f64, N> {
         let Linear { gradient, variance, .. } = self.linear;
         Observation { value: gradient.dot(&(at.mean - self.centre)), gradient, variance }
-    }
-}
-
-impl<const N: usize, const L: usize> Phased<f64, N, L> for Around<N> {
-    fn enter(&self, from: &Belief<f64, N, L>, _: Phase) -> Belief<f64, N, L> {
-        *from
-    }
-
-    fn renewed(&self) -> std::ops::Range<usize> {
-        0..0
     }
 }
 
@@ -138,23 +123,6 @@ impl<const N: usize, const L: usize> Case<N, L> {
         }
         steps
     }
-
-    /// `step` returns the mixture after a reading, and its log-likelihood where the filter keeps every hypothesis.
-    fn check_mixture<const K: usize>(
-        &self,
-        who: &str,
-        step: impl Fn(&Mixture<f64, N, L, K>, Option<Reading<f64>>) -> (Mixture<f64, N, L, K>, Option<f64>),
-    ) {
-        let mut mixture = Mixture::<f64, N, L, K>::single(self.start, Phase::Extend);
-        for (reading, row) in self.readings.iter().zip(&self.rows) {
-            let (posterior, log_likelihood) = step(&mixture, reading.map(Reading::from));
-            mixture = posterior;
-            row.check(who, &mixture.moments());
-            if let Some(log_likelihood) = log_likelihood {
-                row.check_log_likelihood(who, log_likelihood);
-            }
-        }
-    }
 }
 
 fn check_filters_of_one_gaussian<const N: usize, const L: usize>(seed: u64) {
@@ -190,44 +158,6 @@ fn belief_of<const N: usize, const L: usize>(theirs: &StateAndCovariance<f64, Co
     Belief { mean: *theirs.state(), covariance: Symmetric::from_lower(theirs.covariance()) }
 }
 
-/// Where the rate is a hundred deviations from zero there is nothing to cut, and the sign-split filter keeps one half.
-/// With holds it also gives up the histories that release after a hold, and their part of the likelihood.
-fn check_mixtures<const N: usize, const L: usize>(seed: u64) {
-    let case = Case::<N, L>::new(seed, SVector::from_fn(|i, _| if i == 1 { 500.0 } else { 0.0 }));
-    let dwell = Dwell::new(1.0, 2.0, 0.3).unwrap();
-    let imm = Imm::new(case.model, dwell, ANYWHERE);
-    case.check_mixture::<3>("imm", |mixture, reading| {
-        let step = imm.step_prepared(mixture, &(), DT_S, reading).unwrap();
-        (step.posterior, Some(step.log_likelihood))
-    });
-    let unscented = Imm::new(Unscented::new(case.model), dwell, ANYWHERE);
-    case.check_mixture::<3>("unscented imm", |mixture, reading| {
-        let step = unscented.step_prepared(mixture, &(), DT_S, reading).unwrap();
-        (step.posterior, Some(step.log_likelihood))
-    });
-    let single = Hypotheses::new(case.model, dwell, ANYWHERE);
-    case.check_mixture::<1>("one hypothesis", |mixture, reading| {
-        (single.step_prepared(mixture, &(), DT_S, reading).unwrap().posterior, None)
-    });
-    let histories = Hypotheses::new(case.model, dwell, ANYWHERE);
-    case.check_mixture::<8>("hypotheses", |mixture, reading| {
-        let step = histories.step_prepared(mixture, &(), DT_S, reading).unwrap();
-        (step.posterior, Some(step.log_likelihood))
-    });
-    for hold in [None, Some(dwell)] {
-        let single = SignSplit::new(case.model, hold, ANYWHERE);
-        case.check_mixture::<1>("one sign-split hypothesis", |mixture, reading| {
-            let step = single.step_prepared(mixture, &(), DT_S, reading).unwrap();
-            (step.posterior, hold.is_none().then_some(step.log_likelihood))
-        });
-        let split = SignSplit::new(case.model, hold, ANYWHERE);
-        case.check_mixture::<8>("sign-split", |mixture, reading| {
-            let step = split.step_prepared(mixture, &(), DT_S, reading).unwrap();
-            (step.posterior, hold.is_none().then_some(step.log_likelihood))
-        });
-    }
-}
-
 #[test]
 fn filters_of_one_gaussian_are_the_textbook_s() {
     check_filters_of_one_gaussian::<1, 1>(1);
@@ -236,14 +166,4 @@ fn filters_of_one_gaussian_are_the_textbook_s() {
     check_filters_of_one_gaussian::<4, 10>(4);
     check_filters_of_one_gaussian::<5, 15>(5);
     check_filters_of_one_gaussian::<6, 21>(6);
-}
-
-/// A mixture holds strain and rate at least, so n starts at 2.
-#[test]
-fn filters_of_hypotheses_are_the_textbook_s() {
-    check_mixtures::<2, 3>(2);
-    check_mixtures::<3, 6>(3);
-    check_mixtures::<4, 10>(4);
-    check_mixtures::<5, 15>(5);
-    check_mixtures::<6, 21>(6);
 }

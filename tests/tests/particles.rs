@@ -2,7 +2,7 @@
 //! directions matter it agrees with Gaussians cut by direction; stops stop; and bad input is refused.
 
 use ohmstrain_ekf::{
-    Belief, Dwell, Estimate, Evidence, Mixture, ParticleCloud, Particles, Reading, SignSplit, StepError,
+    Belief, Dwell, Estimate, Evidence, Mixture, ParticleCloud, Particles, Reading, SignSplit, State, StepError,
 };
 use ohmstrain_model::{Phase, Scalar, StrainRange};
 use ohmstrain_tests::sensor;
@@ -164,7 +164,7 @@ fn it_agrees_with_gaussians_cut_by_direction() {
     let model = sensor::<f64, 2, 5>();
     let prepared = model.prepare(DT_S);
     let evidence = within(-0.1, 0.45);
-    let split = SignSplit::new(model, None, evidence);
+    let split = SignSplit::<f64, 2, 5, 24>::new(model, DT_S, None, evidence).unwrap();
     let mut mixture = Mixture::<f64, 5, 15, 24>::single(Belief::initial(&model), Phase::Extend);
     let filters: [_; CLOUDS] = std::array::from_fn(|i| Particles::new(model, None, evidence, 4000, i as u64));
     let mut clouds: [Cloud; CLOUDS] = filters.each_ref().map(|f| f.start(&Belief::initial(&model), Phase::Extend));
@@ -173,7 +173,7 @@ fn it_agrees_with_gaussians_cut_by_direction() {
     const STEPS: u32 = 200;
     for _ in 0..STEPS {
         let reading = Some(Reading::from(process.step()));
-        mixture = split.step_prepared(&mixture, &prepared, DT_S, reading).unwrap().posterior;
+        split.step(&mut mixture, reading).unwrap();
         for (filter, cloud) in filters.iter().zip(&mut clouds) {
             *cloud = filter.step_prepared(cloud, &prepared, DT_S, reading).unwrap().posterior;
         }

@@ -8,7 +8,7 @@
 //! lie within ±3.29.
 
 use nalgebra::{SMatrix, SVector};
-use ohmstrain_ekf::{Belief, Dwell, Dynamics, Evidence, Hypotheses, Imm, Mixture, MixtureStep, Phased, Reading};
+use ohmstrain_ekf::{Belief, Dwell, Estimator, Evidence, Hypotheses, Imm, Mixture, PhaseMixture, Reading, State};
 use ohmstrain_model::{Direction, Phase, StrainRange, Transition};
 use ohmstrain_tests::{Draws, square_root, switching_sensor};
 use statrs::distribution::{ContinuousCDF, Normal};
@@ -50,10 +50,8 @@ impl Process {
         let next = self.next_phase();
         if next != Phase::Hold && next != self.phase {
             // The rate is drawn anew from the phase's prior.
-            let known: Belief<f64, 3, 6> = Belief::independent(self.state, &[0.0; 3]);
-            let entered = model.enter(&known, next);
-            self.state = entered.mean;
-            self.state[1] += entered.covariance[(1, 1)].sqrt() * self.draws.normal();
+            let (speed, sd) = (model.motion().phase_rate(), model.motion().stationary_variance()[1].sqrt());
+            self.state[1] = if next == Phase::Retract { -speed } else { speed } + sd * self.draws.normal();
         }
         self.phase = next;
         self.state = moved(&self.state, next).mean + self.roots[next.index()] * self.draws.vector::<3>();
@@ -105,20 +103,19 @@ struct Reliability {
 }
 
 impl Reliability {
-    fn of<const K: usize>(
-        filter: impl Fn(&Mixture<f64, 3, 6, K>, Option<Reading<f64>>) -> MixtureStep<f64, 3, 6, K>,
-    ) -> Self {
+    fn of<E: Estimator<f64, 3, 6>>(filter: &E, from: &E::State) -> Self {
+        let prepared = filter.prepare(DT_S);
         let mut table = Self { bins: [[Clustered::default(); BINS]; 3], nis: Clustered::default() };
         for seed in 0..RUNS {
             let mut process = Process::new(seed);
-            let mut mixture = Mixture::<f64, 3, 6, K>::single(start(), Phase::Hold);
+            let mut state = from.clone();
             let (mut surplus, mut seen, mut nis) = ([[0.0; BINS]; 3], [[false; BINS]; 3], 0.0);
             for _ in 0..ROWS {
                 let (truth, reading) = process.step();
-                let step = filter(&mixture, Some(Reading::from(reading)));
-                mixture = step.posterior;
-                nis += step.nis.unwrap() - 1.0;
-                for (phase, probability) in Phase::ALL.into_iter().zip(mixture.phase_probabilities()) {
+                let step = filter.advance(&state, &prepared, Some(Reading::from(reading))).unwrap();
+                state = step.state;
+                nis += step.innovation.unwrap().nis() - 1.0;
+                for (phase, probability) in Phase::ALL.into_iter().zip(state.phases().unwrap()) {
                     let bin = ((probability * BINS as f64) as usize).min(BINS - 1);
                     surplus[phase.index()][bin] += f64::from(u8::from(truth == phase)) - probability;
                     seen[phase.index()][bin] = true;
@@ -147,15 +144,13 @@ impl Reliability {
 }
 
 fn imm(dwell: Dwell<f64>) -> Reliability {
-    let filter = Imm::new(switching_sensor(), dwell, ANYWHERE);
-    let prepared = Dynamics::<f64, 3, 6>::prepare(&switching_sensor(), DT_S);
-    Reliability::of::<3>(|mixture, reading| filter.step_prepared(mixture, &prepared, DT_S, reading).unwrap())
+    let filter = Imm::<f64, 1, 3>::new(switching_sensor(), DT_S, dwell, ANYWHERE).unwrap();
+    Reliability::of(&filter, &PhaseMixture::single(start(), Phase::Hold))
 }
 
 fn hypotheses(dwell: Dwell<f64>) -> Reliability {
-    let filter = Hypotheses::new(switching_sensor(), dwell, ANYWHERE);
-    let prepared = Dynamics::<f64, 3, 6>::prepare(&switching_sensor(), DT_S);
-    Reliability::of::<16>(|mixture, reading| filter.step_prepared(mixture, &prepared, DT_S, reading).unwrap())
+    let filter = Hypotheses::<f64, 1, 3, 16>::new(switching_sensor(), DT_S, dwell, ANYWHERE).unwrap();
+    Reliability::of(&filter, &Mixture::single(start(), Phase::Hold))
 }
 
 /// Two-sided 99.9 % of the standard normal.

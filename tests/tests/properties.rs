@@ -3,16 +3,15 @@
 
 use nalgebra::{DMatrix, SVector};
 use ohmstrain_ekf::{
-    Belief, Channel, Dwell, Dynamics, Ekf, Evidence, Hypotheses, Imm, Mixture, MixtureStep, Reading, SignSplit, Step,
-    StepError, Ukf, Unscented, rts_smooth_vec,
+    Belief, Channel, Dwell, Dynamics, Ekf, Estimator, Evidence, Hypotheses, Imm, Mixture, PhaseMixture, Reading,
+    SignSplit, State as _, Step, Ukf, Unscented, rts_smooth_vec,
 };
-use ohmstrain_model::{Branch, Gauge, ModelNoise, Motion, Phase, SensorLaw, StrainRange, SwitchedModel, SwitchedStep};
+use ohmstrain_model::{Branch, Gauge, ModelNoise, Motion, Phase, SensorLaw, StrainRange, SwitchedModel};
 use ohmstrain_tests::KnownPhase;
 use proptest::prelude::*;
 
 type Sensor = SwitchedModel<f64, 2, 5>;
 type State = Belief<f64, 5, 15>;
-type Prepared = SwitchedStep<f64, 2>;
 
 /// Seconds since the row before, and a reading relative to R₀.
 type Row = (f64, Option<f64>);
@@ -135,21 +134,16 @@ fn run<M: Dynamics<f64, N, L> + Channel<f64, N, L>, const N: usize, const L: usi
 }
 
 /// Moments and phase probabilities of a filter of hypotheses, in plain units.
-fn mixture<const K: usize>(
+fn mixture<E: Estimator<f64, 5, 15>>(
     units: Units,
     rows: &[Row],
-    step: impl Fn(
-        &Mixture<f64, 5, 15, K>,
-        &Prepared,
-        f64,
-        Option<Reading<f64>>,
-    ) -> Result<MixtureStep<f64, 5, 15, K>, StepError>,
+    filter: &E,
+    start: E::State,
 ) -> Vec<(State, [f64; 3])> {
-    let sensor = units.sensor();
-    let mut mixture = Mixture::<f64, 5, 15, K>::single(Belief::initial(&sensor), Phase::Extend);
+    let mut state = start;
     let step = |(dt_s, reading): &Row| {
-        mixture = step(&mixture, &sensor.prepare(*dt_s), *dt_s, units.reading(*reading)).unwrap().posterior;
-        (units.back(&mixture.moments()), mixture.phase_probabilities())
+        state = filter.advance(&state, &filter.prepare(*dt_s), units.reading(*reading)).unwrap().state;
+        (units.back(&state.moments()), state.phases().unwrap())
     };
     rows.iter().map(step).collect()
 }
@@ -157,12 +151,13 @@ fn mixture<const K: usize>(
 /// All three filters of hypotheses, one after the other.
 fn mixtures(units: Units, rows: &[Row]) -> Vec<(State, [f64; 3])> {
     let (sensor, evidence, dwell) = (units.sensor(), units.evidence(), Dwell::new(2.0, 1.0, 0.3).unwrap());
-    let imm = Imm::new(sensor, dwell, evidence);
-    let split = SignSplit::new(Unscented::new(sensor), Some(dwell), evidence);
-    let histories = Hypotheses::new(sensor, dwell, evidence);
-    let mut all = mixture::<3>(units, rows, |m, prepared, dt_s, y| imm.step_prepared(m, prepared, dt_s, y));
-    all.extend(mixture::<8>(units, rows, |m, prepared, dt_s, y| split.step_prepared(m, prepared, dt_s, y)));
-    all.extend(mixture::<16>(units, rows, |m, prepared, dt_s, y| histories.step_prepared(m, prepared, dt_s, y)));
+    let start: Belief<f64, 5, 15> = Belief::initial(&sensor);
+    let imm = Imm::<f64, 2, 5>::new(sensor, 0.0, dwell, evidence).unwrap();
+    let split = SignSplit::<f64, 2, 5, 8>::new(sensor, 0.0, Some(dwell), evidence).unwrap();
+    let histories = Hypotheses::<f64, 2, 5, 16>::new(sensor, 0.0, dwell, evidence).unwrap();
+    let mut all = mixture(units, rows, &imm, PhaseMixture::single(start, Phase::Extend));
+    all.extend(mixture(units, rows, &split, Mixture::single(start, Phase::Extend)));
+    all.extend(mixture(units, rows, &histories, Mixture::single(start, Phase::Extend)));
     all
 }
 

@@ -20,9 +20,9 @@ fn start() -> Kalman {
     Belief::initial(ekf().model())
 }
 
-fn sign_split() -> SignSplit<f64, Model, 4> {
+fn sign_split() -> SignSplit<f64, 1, 4, 4> {
     let evidence = Evidence { limits: StrainRange { lower: -0.05, upper: 0.4 }, tempering: 0.8 };
-    SignSplit::new(sensor(), Some(Dwell::new(2.0, 3.0, 0.5).unwrap()), evidence)
+    SignSplit::new(sensor(), DT_S, Some(Dwell::new(2.0, 3.0, 0.5).unwrap()), evidence).unwrap()
 }
 
 /// A reading every step but every seventh.

@@ -1,10 +1,10 @@
 use ohmstrain_ekf::{
-    Belief, Dwell, Ekf, Estimator, Evidence, Hypotheses, Imm, Mixture, PhaseMixture, Reading, SignSplit,
-    SparseHypotheses, SparseImm, SparseMixture, SparseSignSplit, State, Unscented,
+    Belief, Dwell, Ekf, Estimator, Evidence, Hypotheses, Imm, Mixture, PhaseMixture, Reading, SignSplit, State,
+    Unscented,
 };
 use ohmstrain_model::{Phase, SwitchedModel};
 
-use crate::sparse_mixtures::GatedMixture;
+use crate::mixtures::GatedMixture;
 use crate::{DT_S, Filter, GatedSparse, PackedReference, RANGE, Visitor, linearised, phased_sensor, readings, sensor};
 
 /// Two periods of the readings, so that they can be repeated.
@@ -92,23 +92,12 @@ fn every_large_filter(visitor: &mut impl Visitor) {
     let evidence = Evidence { limits: RANGE, tempering: 1.0 };
     let dwell = Dwell::new(0.7, 1.5, 0.3).expect("the durations are valid");
     let start = Belief::<f64, 6, 21>::initial(&six);
-    let mixture = Mixture::single(start, Phase::Hold);
-    visitor.visit("imm_6", &readings, Gated::<_, 6, 21>::new(Imm::new(phased, dwell, evidence), mixture));
-    let split = SignSplit::<_, _, 8>::new(six, Some(dwell), evidence);
-    visitor.visit("sign_split_6", &readings, Gated::<_, 6, 21>::new(split, Mixture::single(start, Phase::Hold)));
-    let imm = SparseImm::new(phased, DT_S, dwell, evidence).expect("the step's length is positive");
-    visitor.visit("sparse_imm_6", &readings, GatedMixture::new(imm, PhaseMixture::single(start, Phase::Hold)));
-    let split = SparseSignSplit::<_, 3, 6, 8>::new(six, DT_S, Some(dwell), evidence);
+    let imm = Imm::new(phased, DT_S, dwell, evidence).expect("the step's length is positive");
+    visitor.visit("imm_6", &readings, GatedMixture::new(imm, PhaseMixture::single(start, Phase::Hold)));
+    let split = SignSplit::<_, 3, 6, 8>::new(six, DT_S, Some(dwell), evidence);
     let split = split.expect("the step's length is positive");
-    visitor.visit(
-        "sparse_sign_split_6",
-        &readings,
-        GatedMixture::new(split, SparseMixture::single(start, Phase::Hold)),
-    );
-    let best =
-        SparseHypotheses::<_, 3, 6, 8>::new(phased, DT_S, dwell, evidence).expect("the step's length is positive");
-    let start_of_best = SparseMixture::single(start, Phase::Hold);
-    visitor.visit("sparse_hypotheses_6", &readings, GatedMixture::new(best, start_of_best));
-    let best = Hypotheses::<_, _, 8>::new(phased, dwell, evidence);
-    visitor.visit("hypotheses_6", &readings, Gated::<_, 6, 21>::new(best, Mixture::single(start, Phase::Hold)));
+    visitor.visit("sign_split_6", &readings, GatedMixture::new(split, Mixture::single(start, Phase::Hold)));
+    let best = Hypotheses::<_, 3, 6, 8>::new(phased, DT_S, dwell, evidence).expect("the step's length is positive");
+    let start_of_best = Mixture::single(start, Phase::Hold);
+    visitor.visit("hypotheses_6", &readings, GatedMixture::new(best, start_of_best));
 }

@@ -2,12 +2,12 @@
 //! hand-written filter without checks to measure them by.
 
 mod estimators;
+mod mixtures;
 mod readings;
 mod recordings;
 mod reference;
 mod sensor;
 mod sparse;
-mod sparse_mixtures;
 
 pub use estimators::{Gated, STEPS, ekf, every_filter};
 pub use readings::{readings, strain_at};

@@ -1,6 +1,8 @@
 #[cfg(feature = "particles")]
 use ohmstrain_ekf::Particles;
-use ohmstrain_ekf::{Belief, Dwell, Evidence, Imm, Mixture, SparseMixture, StrainSensor, Ukf, Unscented};
+use ohmstrain_ekf::{
+    Belief, Dwell, Evidence, Hypotheses, Imm, Mixture, PhaseMixture, SignSplit, StepError, StrainSensor, Ukf, Unscented,
+};
 use ohmstrain_model::{Phase, SwitchedModel};
 
 use crate::CalibrationError;
@@ -11,7 +13,7 @@ use crate::law_params::LawParams;
 use crate::params::{RangeParams, SensorParams};
 use crate::running::{Interval, Running};
 use crate::sieve::Sieve;
-use crate::sparse_estimator::{Histories, SparseEstimator, SparsePhases, Splits};
+use crate::sparse_estimator::SparseEstimator;
 
 /// Share of the limits' span to which a given initial strain is believed.
 pub(crate) const START_SD: f64 = 1e-3;
@@ -102,12 +104,13 @@ fn of_size<const B: usize, const N: usize, const L: usize>(
     let PhaseFilter { dwell, hold, evidence } = PhaseFilter::new(kind, estimator, setting.limits)?;
     Ok(match kind {
         EstimatorKind::Imm => {
-            let start = Mixture::single(belief, Phase::Hold);
-            Box::new(Running::new(Imm::new(model, dwell, evidence), start, model, interval))
+            let start = PhaseMixture::single(belief, Phase::Hold);
+            let filter = Imm::<_, B, N>::new(model, NO_STEP_S, dwell, evidence).map_err(refused)?;
+            Box::new(Running::new(filter, start, model, interval))
         }
         EstimatorKind::SignSplit => {
-            let start = SparseMixture::single(belief, Phase::Extend);
-            let filter = SparsePhases::<_, HYPOTHESES>(Splits { model, hold, evidence });
+            let start = Mixture::single(belief, Phase::Extend);
+            let filter = SignSplit::<_, B, N, HYPOTHESES>::new(model, NO_STEP_S, hold, evidence).map_err(refused)?;
             Box::new(Running::new(filter, start, model, interval))
         }
         #[cfg(not(feature = "particles"))]
@@ -121,8 +124,8 @@ fn of_size<const B: usize, const N: usize, const L: usize>(
             Box::new(Running::new(filter, start, model, interval))
         }
         _ => {
-            let start = SparseMixture::single(belief, Phase::Hold);
-            let filter = SparsePhases::<_, HISTORIES>(Histories { model, dwell, evidence });
+            let start = Mixture::single(belief, Phase::Hold);
+            let filter = Hypotheses::<_, B, N, HISTORIES>::new(model, NO_STEP_S, dwell, evidence).map_err(refused)?;
             Box::new(Running::new(filter, start, model, interval))
         }
     })
@@ -155,6 +158,13 @@ fn interval(estimator: &EstimatorParams, setting: Setting) -> Interval {
         sieve: setting.sieve.with_error_time(estimator.noise.reading_time_s),
     }
 }
+
+fn refused(error: StepError) -> CalibrationError {
+    CalibrationError::Unsupported(error.to_string())
+}
+
+/// What filters are made for before they know the length of a step.
+const NO_STEP_S: f64 = 0.0;
 
 /// Capacity of the sign-split filter.
 pub const HYPOTHESES: usize = 8;

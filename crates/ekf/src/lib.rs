@@ -19,7 +19,7 @@
 //!   reading, a negative step and a variance that is not positive are [`StepError`]s.
 //! - Everything computed is returned: prior, innovation, its variance, log-likelihood, gain.
 //! - Covariances are packed symmetric, so they are symmetric by construction, and are updated in Joseph's form, except in the
-//!   sparse filters, which say so.
+//!   filters on the kernel, which say so.
 //!
 //! # Features
 //! `std` (on by default) and `simd` are named above; `adskalman` hands linearised steps to that crate. Off by default and
@@ -97,10 +97,7 @@ pub use error::StepError;
 pub use estimator::{Advanced, Estimator, Innovation, State};
 pub use guard::{Guard, Guarded, Influence, ReadingVerdict, Streak};
 pub use kernel::{AnyCurve, Compact, CompactWidth, Cubic, Curve, Lanes, Logistic, Switch};
-pub use mixture::{
-    Component, Dwell, Evidence, Hypotheses, Imm, Mixture, MixtureResidual, MixtureStep, PhaseMixture, Phased, Share,
-    SignSplit, SparseHypotheses, SparseImm, SparseMixture, SparseSignSplit,
-};
+pub use mixture::{Dwell, Evidence, Hypotheses, Imm, Mixture, MixtureResidual, PhaseMixture, Share, SignSplit};
 #[cfg(feature = "particles")]
 pub use particles::{Particle, ParticleCloud, ParticleStep, Particles};
 pub use residual::{LogLikelihood, Residual};

@@ -15,6 +15,7 @@ use core::marker::PhantomData;
 
 use ohmstrain_model::{Scalar, SwitchedModel};
 
+use crate::ekf::check_time_step;
 use crate::kernel::{Course, Gains, Parts, RateSpread, ReadingLaw, Regions, StepConstants};
 use crate::{AnyCurve, Belief, Curve, Reading, Residual, StepError, Switch};
 
@@ -39,6 +40,12 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
     /// If `dt_s` is not a positive number, or the model's gauge is of another family than `G`.
     pub fn new(model: SwitchedModel<T, B, N>, dt_s: T) -> Result<Self, StepError> {
         check_step_length(dt_s)?;
+        Self::of_any_length(model, dt_s)
+    }
+
+    /// The same; a step of no length is an update without a prediction.
+    pub(crate) fn of_any_length(model: SwitchedModel<T, B, N>, dt_s: T) -> Result<Self, StepError> {
+        check_time_step(dt_s)?;
         Ok(Self {
             step: StepConstants::new(&model, dt_s, RateSpread::<T, S>::clear()),
             gains: Gains::by_region(model.law()),
@@ -72,9 +79,14 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
     #[inline(never)]
     fn set_time_step(&mut self, dt_s: T) -> Result<(), StepError> {
         check_step_length(dt_s)?;
+        self.set_length(dt_s);
+        Ok(())
+    }
+
+    /// The same for a length that has been looked at, or is refused by its consequences.
+    pub(crate) fn set_length(&mut self, dt_s: T) {
         self.step = StepConstants::new(&self.model, dt_s, RateSpread::<T, S>::clear());
         self.dt_s = dt_s;
-        Ok(())
     }
 
     /// Predicts one step ahead and takes the reading; without one it is a prediction and returns `None`.
@@ -121,7 +133,12 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
     /// A refused reading with more noise; the refusal where noise is of no use.
     #[cold]
     #[inline(never)]
-    fn coarser(&self, reading: Option<Reading<T>>, tries: u32, refused: StepError) -> Result<Reading<T>, StepError> {
+    pub(crate) fn coarser(
+        &self,
+        reading: Option<Reading<T>>,
+        tries: u32,
+        refused: StepError,
+    ) -> Result<Reading<T>, StepError> {
         let Some(reading) = reading.filter(|_| refused.is_of_the_reading() && tries <= MOST_TRIES) else {
             return Err(refused);
         };
@@ -142,6 +159,6 @@ const MOST_TRIES: u32 = 12;
 
 /// Refuses what is no length of a step that moves.
 fn check_step_length<T: Scalar>(dt_s: T) -> Result<(), StepError> {
-    crate::ekf::check_time_step(dt_s)?;
+    check_time_step(dt_s)?;
     if dt_s.is_zero() { Err(StepError::NegativeTimeStep) } else { Ok(()) }
 }

@@ -2,7 +2,7 @@ use nalgebra::SVector;
 use ohmstrain_model::{Observation, Phase, Scalar, Symmetric, Transition};
 
 use crate::belief::psd::SemiDefinite;
-use crate::{Belief, Channel, Dynamics, Ekf, Gaussian, Phased};
+use crate::{Belief, Channel, Dynamics, Ekf, Gaussian};
 
 /// Unscented Kalman filter: the prediction is linear given the phase, the reading goes through sigma points.
 ///
@@ -73,26 +73,6 @@ impl<T: Scalar, M: Dynamics<T, N, L>, const N: usize, const L: usize> Dynamics<T
 
     fn propagate(&self, covariance: &Symmetric<T, N, L>, transition: &Transition<T, N, L>) -> Symmetric<T, N, L> {
         self.model.propagate(covariance, transition)
-    }
-}
-
-impl<T: Scalar, M: Phased<T, N, L>, const N: usize, const L: usize> Phased<T, N, L> for Unscented<M> {
-    fn enter(&self, from: &Belief<T, N, L>, phase: Phase) -> Belief<T, N, L> {
-        self.model.enter(from, phase)
-    }
-
-    fn transition_between(
-        &self,
-        step: &Self::Prepared,
-        from: &Belief<T, N, L>,
-        before: Phase,
-        after: Phase,
-    ) -> Transition<T, N, L> {
-        self.model.transition_between(step, from, before, after)
-    }
-
-    fn renewed(&self) -> core::ops::Range<usize> {
-        self.model.renewed()
     }
 }
 

@@ -79,8 +79,13 @@ fn the_ramp_border_is_where_the_reading_stops_changing() {
 #[test]
 fn a_smoother_goes_back_through_the_prediction_before_its_cut() {
     let model = model([1.9, -2.8, 0.0], [0.6, -0.4]);
-    let filter =
-        SignSplit::<_, _, 4>::new(model, None, Evidence::new(StrainRange { lower: -9.0, upper: 9.0 }, 1.0).unwrap());
+    let filter = SignSplit::<_, 1, 4, 4>::new(
+        model,
+        0.2,
+        None,
+        Evidence::new(StrainRange { lower: -9.0, upper: 9.0 }, 1.0).unwrap(),
+    )
+    .unwrap();
     let start = belief([0.15, 0.05, 0.02, 0.0], [0.03, 0.06, 0.02, 0.01]);
     let prepared = Estimator::<f64, 4, 10>::prepare(&filter, 0.2);
     let filtered = Mixture::single(start, Phase::Extend);

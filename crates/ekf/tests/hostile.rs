@@ -2,7 +2,7 @@
 
 use ohmstrain_ekf::{
     Belief, Compact, Dwell, Ekf, Estimator, Evidence, Gaussian, Guard, Hypotheses, Influence, Mixture, Reading,
-    ReadingVerdict, SignSplit, SparseEkf, SparseMixture, SparseSignSplit, Streak,
+    ReadingVerdict, SignSplit, SparseEkf, State, Streak,
 };
 use ohmstrain_model::{
     Branch, Gauge, ModelNoise, Motion, Phase, Scalar, SensorLaw, StrainRange, SwitchedModel, Symmetric,
@@ -38,8 +38,8 @@ fn evidence<T: Scalar>() -> Evidence<T> {
     Evidence { limits: StrainRange { lower: T::of(0.0), upper: T::of(0.33) }, tempering: T::one() }
 }
 
-fn split<T: ohmstrain_ekf::Real>() -> SignSplit<T, SwitchedModel<T, 1, 4>, 8> {
-    SignSplit::new(model(RISING), None, evidence())
+fn split<T: ohmstrain_ekf::Real>() -> SignSplit<T, 1, 4, 8> {
+    SignSplit::new(model(RISING), T::of(DT_S), None, evidence()).unwrap()
 }
 
 /// After readings that belong to a strain of about 0.15, one far away: the squared innovation over its variance is then
@@ -90,8 +90,8 @@ fn a_variance_below_zero_is_refused() {
     let mut belief = start;
     assert!(SparseEkf::<f64, Compact, 1, 4>::new(model, DT_S).unwrap().step(&mut belief, slight).is_err());
     assert_eq!(belief, start);
-    let mut mixture = SparseMixture::<f64, 4, 10, 8>::single(start, Phase::Extend);
-    let split = SparseSignSplit::<f64, 1, 4, 8>::new(model, DT_S, None, evidence()).unwrap();
+    let mut mixture = Mixture::<f64, 4, 10, 8>::single(start, Phase::Extend);
+    let split = SignSplit::<f64, 1, 4, 8>::new(model, DT_S, None, evidence()).unwrap();
     assert!(split.step(&mut mixture, slight).is_err());
 }
 
@@ -238,22 +238,19 @@ const ROUNDING: f64 = 300.0;
 #[test]
 fn what_limits_say_is_no_evidence_of_a_reading() {
     let model = model::<f64>(RISING);
-    let inside = |limits| Hypotheses::<_, _, 16>::new(model, dwell(), Evidence { limits, tempering: 1.0 });
+    let inside =
+        |limits| Hypotheses::<_, 1, 4, 16>::new(model, DT_S, dwell(), Evidence { limits, tempering: 1.0 }).unwrap();
     // The start is wider than the limits.
     let start = Mixture::single(Belief::<f64, 4, 10>::initial(&model), Phase::Hold);
     let (narrow, wide) = (StrainRange { lower: 0.1, upper: 0.2 }, StrainRange { lower: -1e3, upper: 1e3 });
-    let prepared = ohmstrain_ekf::Dynamics::<f64, 4, 10>::prepare(&model, DT_S);
-    let step = |limits, reading| inside(limits).step_prepared(&start, &prepared, DT_S, reading).unwrap();
-    for limits in [narrow, wide] {
-        assert_eq!(step(limits, None).log_likelihood, 0.0);
-    }
     let reading = Some(Reading::from(0.3));
-    let (near, far) = (step(narrow, reading).log_likelihood, step(wide, reading).log_likelihood);
+    let step = |limits| inside(limits).step(&mut start.clone(), reading).unwrap().unwrap().log_likelihood();
+    let (near, far) = (step(narrow), step(wide));
     assert!((near - far).abs() < 1e-12, "{near} {far}");
     // Nor does it matter how many hypotheses there is room for afterwards.
-    let few = Hypotheses::<_, _, 2>::new(model, dwell(), Evidence { limits: wide, tempering: 1.0 });
-    let start = Mixture::single(Belief::<f64, 4, 10>::initial(&model), Phase::Hold);
-    let crowded = few.step_prepared(&start, &prepared, DT_S, reading).unwrap().log_likelihood;
+    let few = Hypotheses::<_, 1, 4, 2>::new(model, DT_S, dwell(), Evidence { limits: wide, tempering: 1.0 }).unwrap();
+    let mut start = Mixture::single(Belief::<f64, 4, 10>::initial(&model), Phase::Hold);
+    let crowded = few.step(&mut start, reading).unwrap().unwrap().log_likelihood();
     assert!((crowded - far).abs() < 1e-12, "{crowded} {far}");
 }
 

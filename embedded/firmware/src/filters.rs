@@ -4,7 +4,7 @@ use core::hint::black_box;
 
 use ohmstrain_ekf::{
     Belief, Cubic, Dwell, Ekf, Evidence, Imm, LogLikelihood, Mixture, PhaseMixture, Reading, Real, SignSplit,
-    SparseEkf, SparseImm, SparseMixture, SparseSignSplit, State, Switch,
+    SparseEkf, State, Switch,
 };
 use ohmstrain_model::{ParameterError, Phase, Problem, Scalar, SwitchedModel, SwitchedStep};
 
@@ -101,82 +101,12 @@ impl<T: Scalar> Filter<T> for VaryingEkf3<T> {
     }
 }
 
-/// Three phases, six states.
-#[derive(Clone, Copy)]
-pub struct Imm6<T> {
-    imm: Imm<T, SwitchedModel<T, 3, 6>>,
-    prepared: SwitchedStep<T, 3>,
-    mixture: Mixture<T, 6, 21, 3>,
-}
-
 fn dwell<T: Scalar>() -> Result<Dwell<T>, ParameterError> {
     Dwell::new(T::of(5.0), T::of(1.0), T::of(0.3))
 }
 
 fn evidence<T: Scalar>() -> Evidence<T> {
     Evidence { limits: limits(), tempering: T::one() }
-}
-
-impl<T: Real> Filter<T> for Imm6<T> {
-    fn start() -> Result<Self, ParameterError> {
-        let model = black_box(sensor()?);
-        let prepared = model.prepare(T::of(DT_S));
-        let mixture = Mixture::single(Belief::initial(&model), Phase::Hold);
-        Ok(Self { imm: Imm::new(model, black_box(dwell()?), black_box(evidence())), prepared, mixture })
-    }
-
-    fn step(&mut self, reading: Reading<T>) -> bool {
-        match self.imm.step_prepared(&self.mixture, &self.prepared, T::of(DT_S), Some(reading)) {
-            Ok(step) => {
-                self.mixture = step.posterior;
-                true
-            }
-            Err(_) => false,
-        }
-    }
-
-    fn strain(&self) -> T {
-        self.mixture.moments().mean[0]
-    }
-
-    fn state_bytes() -> usize {
-        size_of::<Mixture<T, 6, 21, 3>>()
-    }
-}
-
-/// Four hypotheses split by the sign of the rate, six states.
-#[derive(Clone, Copy)]
-pub struct SplitFour<T> {
-    split: SignSplit<T, SwitchedModel<T, 3, 6>, 4>,
-    prepared: SwitchedStep<T, 3>,
-    mixture: Mixture<T, 6, 21, 4>,
-}
-
-impl<T: Real> Filter<T> for SplitFour<T> {
-    fn start() -> Result<Self, ParameterError> {
-        let model = black_box(sensor()?);
-        let prepared = model.prepare(T::of(DT_S));
-        let mixture = Mixture::single(Belief::initial(&model), Phase::Extend);
-        Ok(Self { split: SignSplit::new(model, None, black_box(evidence())), prepared, mixture })
-    }
-
-    fn step(&mut self, reading: Reading<T>) -> bool {
-        match self.split.step_prepared(&self.mixture, &self.prepared, T::of(DT_S), Some(reading)) {
-            Ok(step) => {
-                self.mixture = step.posterior;
-                true
-            }
-            Err(_) => false,
-        }
-    }
-
-    fn strain(&self) -> T {
-        self.mixture.moments().mean[0]
-    }
-
-    fn state_bytes() -> usize {
-        size_of::<Mixture<T, 6, 21, 4>>()
-    }
 }
 
 /// A filter of the sensor's own model that leaves out the zeros, at a fixed rate, and its state, which changes in place.
@@ -188,8 +118,8 @@ pub struct Fast<F, S> {
 
 /// The EKF that leaves out the zeros, with the unit's square root and a gauge that is a polynomial.
 type Kernel<T, const B: usize, const N: usize> = SparseEkf<T, OnFpu, B, N, Cubic<T>>;
-type FastImm<T, const B: usize, const N: usize> = SparseImm<T, B, N, OnFpu, Cubic<T>>;
-type FastSplit<T, const B: usize, const N: usize, const K: usize> = SparseSignSplit<T, B, N, K, OnFpu, Cubic<T>>;
+type FastImm<T, const B: usize, const N: usize> = Imm<T, B, N, OnFpu, Cubic<T>>;
+type FastSplit<T, const B: usize, const N: usize, const K: usize> = SignSplit<T, B, N, K, OnFpu, Cubic<T>>;
 
 /// Strain, rate, one branch.
 pub type Fast3<T> = Fast<Kernel<T, 1, 3>, Belief<T, 3, 6>>;
@@ -198,7 +128,7 @@ pub type Fast6<T> = Fast<Kernel<T, 3, 6>, Belief<T, 6, 21>>;
 /// Three phases of those six states.
 pub type FastImm6<T> = Fast<FastImm<T, 3, 6>, PhaseMixture<T, 6, 21>>;
 /// Four hypotheses of them, split by the sign of the rate.
-pub type FastSplit6<T> = Fast<FastSplit<T, 3, 6, 4>, SparseMixture<T, 6, 21, 4>>;
+pub type FastSplit6<T> = Fast<FastSplit<T, 3, 6, 4>, Mixture<T, 6, 21, 4>>;
 
 fn kernel<T: Scalar, const B: usize, const N: usize>() -> Result<Kernel<T, B, N>, ParameterError>
 where
@@ -248,15 +178,15 @@ fast_filter!(
     <T: Real, const B, const N, const L> FastImm<T, B, N>, PhaseMixture<T, N, L>,
     |kernel| (
         PhaseMixture::single(Belief::initial(kernel.model()), Phase::Hold),
-        SparseImm::around(kernel, black_box(dwell()?), black_box(evidence()))
+        Imm::around(kernel, black_box(dwell()?), black_box(evidence()))
     ),
     |mixture| mixture.marginal(0).mean
 );
 fast_filter!(
-    <T: Real, const B, const N, const L, const K> FastSplit<T, B, N, K>, SparseMixture<T, N, L, K>,
+    <T: Real, const B, const N, const L, const K> FastSplit<T, B, N, K>, Mixture<T, N, L, K>,
     |kernel| (
-        SparseMixture::single(Belief::initial(kernel.model()), Phase::Extend),
-        SparseSignSplit::around(kernel, None, black_box(evidence()))
+        Mixture::single(Belief::initial(kernel.model()), Phase::Extend),
+        SignSplit::around(kernel, None, black_box(evidence()))
     ),
     |mixture| mixture.marginal(0).mean
 );

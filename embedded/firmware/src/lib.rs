@@ -13,8 +13,7 @@ mod sensors;
 
 pub use codes::{CODES_3, CODES_6};
 pub use filters::{
-    Ekf3, Ekf6, Fast, Fast3, Fast6, FastImm6, FastSplit6, Filter, Imm6, PreparedEkf, SplitFour, VaryingEkf3,
-    VaryingFast3,
+    Ekf3, Ekf6, Fast, Fast3, Fast6, FastImm6, FastSplit6, Filter, PreparedEkf, VaryingEkf3, VaryingFast3,
 };
 pub use fpu::OnFpu;
 pub use sensors::{DT_S, REST_OHM, front_end, limits, sensor, to_reading};

@@ -5,22 +5,20 @@ use std::fmt::Write;
 use std::fs;
 use std::path::Path;
 
-use ohmstrain_firmware::{Ekf3, Ekf6, Fast3, Fast6, Filter, Imm6, SplitFour, VaryingEkf3, front_end, to_reading};
+use ohmstrain_firmware::{Ekf3, Ekf6, Fast3, Fast6, FastImm6, FastSplit6, Filter, VaryingEkf3, front_end, to_reading};
 
 use crate::codes::{SEED, codes, strains};
 
 /// Programs, in the order of the table, and the filter of the library whose `f64` strain is the reference of each.
-pub const PROGRAMS: [(&str, &str); 10] = [
+pub const PROGRAMS: [(&str, &str); 8] = [
     ("ekf3", "ekf3"),
     ("ekf3_varying", "ekf3_varying"),
     ("fast3", "fast3"),
     ("fast3_varying", "fast3"),
     ("ekf6", "ekf6"),
     ("fast6", "fast6"),
-    ("imm6", "imm6"),
-    ("fast_imm6", "imm6"),
-    ("split6", "split6"),
-    ("fast_split6", "split6"),
+    ("fast_imm6", "fast_imm6"),
+    ("fast_split6", "fast_split6"),
 ];
 
 /// The column of the strain that the codes were made from.
@@ -70,8 +68,8 @@ fn generate() -> Result<[(&'static str, String); 2], Box<dyn Error>> {
         ("fast3", filtered::<Fast3<f64>>(&three)?),
         ("ekf6", filtered::<Ekf6<f64>>(&six)?),
         ("fast6", filtered::<Fast6<f64>>(&six)?),
-        ("imm6", filtered::<Imm6<f64>>(&six)?),
-        ("split6", filtered::<SplitFour<f64>>(&six)?),
+        ("fast_imm6", filtered::<FastImm6<f64>>(&six)?),
+        ("fast_split6", filtered::<FastSplit6<f64>>(&six)?),
     ];
     let mut csv = format!("# Strain that the codes were made from, and that of each filter in f64; {provenance}\n");
     csv.push_str("code_3,code_6");

@@ -3,7 +3,7 @@
 use ohmstrain::{DOUBT, KNOWN_BEYOND};
 use ohmstrain_calib::{EstimatorKind, HISTORIES, HYPOTHESES, PortableFilter, Quantity, ReadingUnit, SensorParams};
 use ohmstrain_ekf::record::{MixtureNumbers, shared};
-use ohmstrain_ekf::{Belief, Compact, Gaussian, SparseEkf, SparseHypotheses, SparseSignSplit};
+use ohmstrain_ekf::{Belief, Compact, Gaussian, Hypotheses, SignSplit, SparseEkf};
 use ohmstrain_model::TURNING;
 use serde::Serialize;
 
@@ -360,9 +360,9 @@ impl EstimatorText {
             EstimatorKind::SignSplit => (
                 "Filter of hypotheses about the sign of the rate",
                 "filter of hypotheses about the sign of the rate (sign-split)",
-                "SparseSignSplit",
+                "SignSplit",
             ),
-            EstimatorKind::Hypotheses => ("Filter of phase histories", "filter of phase histories", "SparseHypotheses"),
+            EstimatorKind::Hypotheses => ("Filter of phase histories", "filter of phase histories", "Hypotheses"),
             _ => ("Extended Kalman filter", "extended Kalman filter", "SparseEkf"),
         };
         let hypotheses = if filter.kind == EstimatorKind::Ekf { 0 } else { filter.hypotheses };
@@ -402,9 +402,9 @@ impl Recorded {
         let (dwell, evidence) = phases.filter_parts(sensor.parts.limits).map_err(parameter)?;
         let splits = sensor.parts.kind == EstimatorKind::SignSplit;
         let numbers = if splits {
-            SparseSignSplit::<_, B, N, HYPOTHESES, _>::around(kernel, phases.rests.then_some(dwell), evidence).numbers()
+            SignSplit::<_, B, N, HYPOTHESES, _>::around(kernel, phases.rests.then_some(dwell), evidence).numbers()
         } else {
-            SparseHypotheses::<_, B, N, HISTORIES, _>::around(kernel, dwell, evidence).numbers()
+            Hypotheses::<_, B, N, HISTORIES, _>::around(kernel, dwell, evidence).numbers()
         };
         Ok(Self { arithmetic: arithmetic::of_hypotheses(splits, carried, &names, record), numbers, names })
     }

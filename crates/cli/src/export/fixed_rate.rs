@@ -165,9 +165,11 @@ fn longest_step_s<const B: usize, const N: usize, const L: usize>(
             let (dwell, evidence): (_, Evidence<f64>) = phases.filter_parts(limits).map_err(parameter)?;
             let hold = phases.rests.then_some(dwell);
             if parts.kind == EstimatorKind::SignSplit {
-                longest::<N, L>(&SignSplit::<_, _, HYPOTHESES>::new(*model, hold, evidence))
+                let filter = SignSplit::<_, B, N, HYPOTHESES>::new(*model, 0.0, hold, evidence);
+                longest::<N, L>(&filter.map_err(parameter)?)
             } else {
-                longest::<N, L>(&Hypotheses::<_, _, HISTORIES>::new(*model, dwell, evidence))
+                let filter = Hypotheses::<_, B, N, HISTORIES>::new(*model, 0.0, dwell, evidence);
+                longest::<N, L>(&filter.map_err(parameter)?)
             }
         }
     };

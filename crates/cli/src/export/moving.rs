@@ -2,8 +2,7 @@
 
 use ohmstrain_calib::SURPRISING_NIS;
 use ohmstrain_ekf::{
-    Belief, Compact, Reading, Real, Residual, SparseEkf, SparseHypotheses, SparseMixture, SparseSignSplit, State,
-    StepError,
+    Belief, Compact, Hypotheses, Mixture, Reading, Real, Residual, SignSplit, SparseEkf, State, StepError,
 };
 use ohmstrain_model::Phase;
 
@@ -44,8 +43,8 @@ const CHAIN: usize = 9;
 #[derive(Clone, Copy)]
 pub enum Moving<T, const B: usize, const N: usize, const L: usize, const K: usize> {
     Ekf(SparseEkf<T, Compact, B, N>, Belief<T, N, L>),
-    SignSplit(SparseSignSplit<T, B, N, K, Compact>, SparseMixture<T, N, L, K>),
-    Histories(SparseHypotheses<T, B, N, K, Compact>, SparseMixture<T, N, L, K>),
+    SignSplit(SignSplit<T, B, N, K, Compact>, Mixture<T, N, L, K>),
+    Histories(Hypotheses<T, B, N, K, Compact>, Mixture<T, N, L, K>),
 }
 
 impl<T: Real, const B: usize, const N: usize, const L: usize, const K: usize> Moving<T, B, N, L, K> {
@@ -64,8 +63,8 @@ impl<T: Real, const B: usize, const N: usize, const L: usize, const K: usize> Mo
     pub fn start_from(&mut self, belief: Belief<T, N, L>) {
         match self {
             Self::Ekf(_, state) => *state = belief,
-            Self::SignSplit(_, state) => *state = SparseMixture::single(belief, Phase::Extend),
-            Self::Histories(_, state) => *state = SparseMixture::single(belief, Phase::Hold),
+            Self::SignSplit(_, state) => *state = Mixture::single(belief, Phase::Extend),
+            Self::Histories(_, state) => *state = Mixture::single(belief, Phase::Hold),
         }
     }
 

@@ -3,7 +3,7 @@ use ohmstrain_model::{Direction, Scalar, SplitRate, UNEXPLAINED, UNEXPLAINED_SHA
 use super::Lanes;
 
 /// How [`SparseEkf`](crate::SparseEkf) splits an uncertain rate between stretching and releasing.
-pub trait Switch<V: Lanes> {
+pub trait Switch<V: Lanes>: Copy {
     /// A rate of at least that many standard deviations has one direction; nothing is computed for it.
     const CLEAR: f64;
 

@@ -4,13 +4,13 @@ use crate::StepError;
 use crate::belief::gaussian::Real;
 use crate::kernel::Parts;
 use crate::mixture::evidence::{Weighed, Weight};
-use crate::mixture::genealogy::Heirs;
-use crate::mixture::sparse::{Share, SparseMixture};
+use crate::mixture::lineage::Recorder;
+use crate::mixture::state::{Mixture, Share};
 use crate::mixture::{ALIKE, Added, LEAST_WEIGHT, LIGHTER};
 
-/// Collects the children of a step: keeps, merges and drops them as [`Mixture`](crate::Mixture) does.
+/// Collects the children of a step: keeps, merges and drops them.
 pub(crate) struct Children<'a, T, const N: usize, const L: usize, const K: usize> {
-    kept: &'a mut SparseMixture<T, N, L, K>,
+    kept: &'a mut Mixture<T, N, L, K>,
     /// The largest exponent so far; weights are in units of its exponential. What is so much lighter that it has become
     /// zero would be dropped in the end.
     exponent: T,
@@ -21,13 +21,14 @@ pub(crate) struct Children<'a, T, const N: usize, const L: usize, const K: usize
 impl<'a, T: Real, const N: usize, const L: usize, const K: usize> Children<'a, T, N, L, K> {
     /// In the place of what `kept` has been.
     #[inline(always)]
-    pub(crate) fn new(kept: &'a mut SparseMixture<T, N, L, K>) -> Self {
+    pub(crate) fn new(kept: &'a mut Mixture<T, N, L, K>) -> Self {
         kept.clear();
         Self { kept, exponent: T::zero(), density: T::zero() }
     }
 
-    /// Adds a child: merged with one that says the same, in a free place, or in the place of the lightest, which is
-    /// merged with the nearest of its phase. Says where it went.
+    /// Adds a child: merged with one that says the same, or in a free place. Where there is none the lightest of all makes room
+    /// and is merged with the nearest of its phase: dropped, step after step, what is unlikely in each of many short steps and
+    /// likely in all of them together would be lost before a reading has spoken for it. Says where it went.
     pub(crate) fn add<const B: usize>(&mut self, child: &Parts<T, B>, phase: Phase, weighed: &Weighed<T>) -> Added {
         let Weighed { weight, more_inside, per_inside } = *weighed;
         self.raise_to(weight.exponent);
@@ -115,7 +116,7 @@ impl<'a, T: Real, const N: usize, const L: usize, const K: usize> Children<'a, T
     }
 
     /// Makes the probabilities sum to one and drops what is negligible.
-    pub(crate) fn normalise(&mut self, heirs: &mut impl Heirs) -> Result<(), StepError> {
+    pub(crate) fn normalise<const B: usize>(&mut self, heirs: &mut impl Recorder<T, B>) -> Result<(), StepError> {
         let heaviest = self.kept.shares().iter().fold(T::zero(), |a, b| if b.weight > a { b.weight } else { a });
         let least = heaviest * T::of(LEAST_WEIGHT);
         heirs.renumbered(|place| {
@@ -137,7 +138,7 @@ impl<'a, T: Real, const N: usize, const L: usize, const K: usize> Children<'a, T
 }
 
 impl<T: Real, const N: usize, const L: usize> Share<T, N, L> {
-    /// As hypotheses of one phase count as one in a [`Mixture`](crate::Mixture).
+    /// Whether two hypotheses of one phase count as one.
     #[inline(always)]
     fn is_like<const B: usize>(&self, other: &Parts<T, B>) -> bool {
         // Mostly they are not, which the strain tells without a division.

@@ -1,13 +1,41 @@
-use ohmstrain_model::{Phase, Scalar, StrainRange};
+use ohmstrain_model::{ParameterError, Phase, Problem, Scalar, StrainRange};
 
 use crate::belief::gaussian::Real;
 use crate::belief::tail::upper_tail;
 use crate::kernel::{Parts, RateSpread};
 use crate::mixture::LEAST_INSIDE;
-use crate::mixture::step::Predicted;
-use crate::{Curve, Evidence, Reading, Residual, SparseEkf, StepError, Switch};
+use crate::mixture::predicted::Predicted;
+use crate::{Curve, Innovation, Reading, Residual, SparseEkf, StepError, Switch};
 
-/// What weighs the Gaussians of a sparse mixture: as [`Evidence`] does, in factors instead of logarithms.
+/// What weighs hypotheses, in every filter that keeps some.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Evidence<T> {
+    /// Strains beyond these limits are unlikely.
+    pub limits: StrainRange<T>,
+    /// Power, 0 to 1, to which the likelihood of a reading enters the weights; below 1 it allows for model error that is
+    /// correlated from reading to reading.
+    pub tempering: T,
+}
+
+impl<T: Scalar> Evidence<T> {
+    /// Limits and tempering, checked.
+    ///
+    /// # Errors
+    /// If the limits are not in order, or the tempering is not a number from 0 to 1.
+    pub fn new(limits: StrainRange<T>, tempering: T) -> Result<Self, ParameterError> {
+        if !(limits.lower < limits.upper) {
+            return Err(ParameterError::new("limits", Problem::OutOfRange));
+        }
+        if !(tempering >= T::zero() && tempering <= T::one()) {
+            return Err(ParameterError::new("tempering", Problem::OutOfRange));
+        }
+        Ok(Self { limits, tempering })
+    }
+}
+
+/// [`Evidence`] in factors instead of logarithms.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Weighing<T> {
     limits: StrainRange<T>,
@@ -50,7 +78,7 @@ impl<T: Real> Weighing<T> {
         Weight { factor: prior, exponent: half * (residual.nis + residual.variance.ln()) }
     }
 
-    /// Probability that a strain lies within the limits, as the generic filters have it.
+    /// Probability that a strain lies within the limits.
     #[inline(always)]
     pub(crate) fn inside<S: Switch<T>>(&self, strain: T, variance: T) -> T {
         let (above_lower, below_upper) = (strain - self.limits.lower, self.limits.upper - strain);
@@ -162,10 +190,16 @@ impl<T: Scalar> MixtureResidual<T> {
         Self { residual, factor: density.factor / *predicted.weight(), exponent: density.exponent, tempering }
     }
 
-    /// Log density of the reading under the mixture, tempered if the filter tempers: what
-    /// [`MixtureStep`](crate::MixtureStep) calls by this name.
+    /// Log density of the reading under the mixture, tempered if the filter tempers.
     #[must_use]
     pub fn log_likelihood(&self) -> T {
         self.factor.ln() + self.exponent - T::of(0.5) * self.tempering * T::two_pi().ln()
+    }
+
+    /// The same for [`Estimator`](crate::Estimator). What overflows a square is no reading.
+    pub(crate) fn innovation(&self) -> Result<Innovation<T>, StepError> {
+        let Residual { innovation, variance, nis } = self.residual;
+        let innovation = Innovation { value: innovation, variance, log_likelihood: self.log_likelihood() };
+        if nis.is_finite() { Ok(innovation) } else { Err(StepError::NonFiniteState) }
     }
 }

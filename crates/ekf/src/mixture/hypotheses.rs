@@ -1,84 +1,121 @@
-use ohmstrain_model::Phase;
+//! The filter of phase histories.
+//!
+//! # Policy
+//! As [`SparseEkf`](crate::SparseEkf): the state is changed in place, an error leaves it as it was, and nothing takes a
+//! logarithm unless asked or unless the strain is near a limit.
+
+use ohmstrain_model::{Phase, SwitchedModel};
 
 use crate::belief::gaussian::Real;
-use crate::mixture::Mixture;
-use crate::mixture::lineage::{Lineage, Recorder};
-use crate::mixture::step::{Candidates, Course, Evidence, MixtureStep, Origin, mixture_estimator, smooth_step};
-use crate::mixture::switching::enter;
-use crate::{Dwell, Phased, Reading, StepError};
+use crate::kernel::{Course, Parts};
+use crate::mixture::children::Children;
+use crate::mixture::estimator::{mixture_filter, mixture_steps};
+use crate::mixture::evidence::{Newborn, Weighing};
+use crate::mixture::lineage::{Birth, Following, Recorder};
+use crate::mixture::predicted::Predicted;
+use crate::mixture::state::Mixture;
+use crate::mixture::switching::fresh_rate;
+use crate::{
+    AnyCurve, Compact, Curve, Dwell, Evidence, Gaussian, MixtureResidual, Reading, SparseEkf, StepError, Switch,
+};
 
-/// The best `K` phase histories, each with a Kalman filter of its own: for protocols of ramps and long holds.
+/// The best `K` phase histories of a [`SwitchedModel`], each with a Kalman filter of its own: for protocols of ramps and long
+/// holds. A pruned generalised pseudo-Bayes tree.
 ///
 /// Unlike [`Imm`](crate::Imm) it does not mix histories before a step; it keeps those that explain the readings and
-/// merges the ones that have become alike.
+/// merges the ones that have become alike. `G` as for [`SparseEkf`].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Hypotheses<T, M, const K: usize> {
-    model: M,
+pub struct Hypotheses<T, const B: usize, const N: usize, const K: usize, S = Compact, G = AnyCurve<T>> {
+    pub(crate) kernel: SparseEkf<T, S, B, N, G>,
     dwell: Dwell<T>,
-    evidence: Evidence<T>,
+    /// Probabilities of a change of phase over a step, `[from][to]`.
+    pub(crate) chain: [[T; 3]; 3],
+    pub(crate) weighing: Weighing<T>,
+    /// Rate of a moving phase that begins.
+    pub(crate) fresh: [Gaussian<T>; 3],
 }
 
-impl<T: Real, M, const K: usize> Hypotheses<T, M, K> {
+impl<T: Real, const B: usize, const N: usize, const K: usize> Hypotheses<T, B, N, K> {
+    /// A filter for steps of `dt_s` seconds.
     /// - `dwell`: how long phases last and what follows them.
-    /// - `evidence`: what weighs the hypotheses.
-    pub const fn new(model: M, dwell: Dwell<T>, evidence: Evidence<T>) -> Self {
-        Self { model, dwell, evidence }
+    /// - `evidence`: what weighs the histories.
+    ///
+    /// # Errors
+    /// If `dt_s` is negative or not finite.
+    pub fn new(
+        model: SwitchedModel<T, B, N>,
+        dt_s: T,
+        dwell: Dwell<T>,
+        evidence: Evidence<T>,
+    ) -> Result<Self, StepError> {
+        Ok(Self::around(SparseEkf::of_any_length(model, dt_s)?, dwell, evidence))
     }
+}
 
-    /// The model.
-    pub const fn model(&self) -> &M {
-        &self.model
+impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: Curve<T>> Hypotheses<T, B, N, K, S, G> {
+    /// A filter whose histories step as `kernel` does; the other arguments as for [`Self::new`]. Of its switch only the
+    /// square root is used.
+    pub fn around(kernel: SparseEkf<T, S, B, N, G>, dwell: Dwell<T>, evidence: Evidence<T>) -> Self {
+        Self {
+            dwell,
+            chain: dwell.probabilities(kernel.dt_s()),
+            weighing: Weighing::new(evidence),
+            fresh: Phase::ALL.map(|phase| fresh_rate(kernel.model().motion(), phase)),
+            kernel,
+        }
     }
 
     /// A phase changes at the beginning of a step: steps are short against phases, and against what the model asks for.
-    fn longest_s<const N: usize, const L: usize>(&self) -> T
-    where
-        M: Phased<T, N, L>,
-    {
-        self.model.longest_step_s().min(self.dwell.longest_step_s())
+    fn longest_s(&self) -> T {
+        self.model().longest_step_s().min(self.dwell.longest_step_s())
     }
 
-    /// Predicts over a prepared step of `dt_s ≥ 0` seconds, then takes the reading.
-    ///
-    /// # Errors
-    /// See [`StepError`]; the mixture passed in is untouched.
-    pub fn step_prepared<const N: usize, const L: usize>(
-        &self,
-        mixture: &Mixture<T, N, L, K>,
-        prepared: &M::Prepared,
-        dt_s: T,
-        reading: Option<Reading<T>>,
-    ) -> Result<MixtureStep<T, N, L, K>, StepError>
-    where
-        M: Phased<T, N, L>,
-    {
-        self.step_recorded(mixture, &(*prepared, dt_s), reading, &mut ())
+    /// The same filter for steps of another length.
+    fn every(&self, dt_s: T) -> Self {
+        let mut other = *self;
+        other.kernel.set_length(dt_s);
+        other.chain = other.dwell.probabilities(dt_s);
+        other
     }
 
-    pub(crate) fn step_recorded<R: Recorder<T, N, L>, const N: usize, const L: usize>(
+    mixture_steps!();
+
+    #[inline(always)]
+    fn step_recorded<const L: usize>(
         &self,
-        mixture: &Mixture<T, N, L, K>,
-        (prepared, dt_s): &(M::Prepared, T),
+        state: &Mixture<T, N, L, K>,
         reading: Option<Reading<T>>,
-        recorder: &mut R,
-    ) -> Result<MixtureStep<T, N, L, K>, StepError>
-    where
-        M: Phased<T, N, L>,
-    {
-        let chain = self.dwell.probabilities(*dt_s);
-        let mut candidates = Candidates::new(&self.model, &self.evidence, reading, recorder);
-        for parent in mixture.components().iter().enumerate() {
-            for phase in Phase::ALL {
-                let (from, begins) = &enter(&self.model, parent.1, phase);
-                let probability = chain[parent.1.phase.index()][phase.index()];
-                let origin = Origin { parent, from, begins: *begins, course: Course::Known, phase, probability };
-                candidates.add(&origin, prepared, |_| T::one())?;
+        next: &mut Mixture<T, N, L, K>,
+        recorder: &mut impl Recorder<T, B>,
+    ) -> Result<Option<MixtureResidual<T>>, StepError> {
+        let mut children = Children::new(next);
+        let mut predicted = Predicted::new();
+        for (place, (parent, from)) in state.shares().iter().zip(state.phases()).enumerate() {
+            for (phase, probability) in Phase::ALL.into_iter().zip(self.chain[from.index()]) {
+                if !(probability > T::zero()) {
+                    continue;
+                }
+                let mut child = Parts::of(&parent.belief);
+                let begins = phase != Phase::Hold && *from != phase;
+                if begins {
+                    child.renew_rate(&self.fresh[phase.index()]);
+                }
+                let (from, course) = (child, Course::Known(phase));
+                let spread = self.kernel.predict(&mut child, course);
+                let prediction = child;
+                let prior = parent.weight * probability;
+                let newborn = Newborn { phase, prior, spread, per_inside: parent.per_inside };
+                let weighed = self.kernel.weigh(&mut child, newborn, reading, &self.weighing, &mut predicted)?;
+                let added = children.add(&child, phase, &weighed);
+                let (predicted, posterior, weighed) = (&prediction, &child, &weighed);
+                let birth = Birth { parent: place, phase, from: &from, begins, course, predicted, posterior, weighed };
+                recorder.born(&birth, added);
             }
         }
-        candidates.finish()
+        let density = children.density();
+        children.normalise(recorder)?;
+        Ok(reading.map(|_| MixtureResidual::new(&predicted, density, self.weighing.tempering())))
     }
-
-    smooth_step!();
 }
 
-mixture_estimator!(Hypotheses<T, M, K>, K);
+mixture_filter!(Hypotheses<B, N, K>, Mixture<K>);

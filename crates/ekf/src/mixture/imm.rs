@@ -1,162 +1,255 @@
-use ohmstrain_model::Phase;
+//! Interacting multiple models.
+//!
+//! Given its phase, a mode's direction is certain: nothing is split, no root is taken. A hold has no rate, and a phase that
+//! begins draws its rate anew, so the rate takes no part in the mixing but through the mode's own.
+//!
+//! # Policy
+//! As [`SparseEkf`](crate::SparseEkf): the state is changed in place, an error leaves it as it was, and nothing takes a
+//! logarithm unless asked or unless the strain is near a limit.
+
+use ohmstrain_model::{Phase, SwitchedModel};
 
 use crate::belief::gaussian::Real;
-use crate::ekf::stand_still;
-use crate::mixture::lineage::{Birth, Lineage, Recorder};
-use crate::mixture::step::{Candidates, Course, Evidence, MixtureStep, Origin, mixture_estimator};
-use crate::mixture::switching::enter;
-use crate::mixture::{Component, Mixture};
-use crate::{Dwell, Phased, Reading, StepError};
+use crate::kernel::{Course, Parts};
+use crate::mixture::LEAST_WEIGHT;
+use crate::mixture::estimator::mixture_filter;
+use crate::mixture::evidence::{Weighing, Weight};
+use crate::mixture::predicted::Predicted;
+use crate::mixture::state::{PhaseMixture, Share};
+use crate::mixture::switching::fresh_rate;
+use crate::{
+    AnyCurve, Compact, Curve, Dwell, Evidence, Gaussian, MixtureResidual, Reading, Residual, SparseEkf, StepError,
+    Switch,
+};
 
-/// Interacting multiple models: one Gaussian per phase (extend, hold, retract), mixed before every step by the
-/// probabilities of changing phase.
+/// Interacting multiple models over the phases of a [`SwitchedModel`]: one Gaussian per phase, mixed before every step. `G` as
+/// for [`SparseEkf`].
 ///
 /// Source: Blom & Bar-Shalom, *IEEE Trans. Autom. Control* 33 (1988) 780.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Imm<T, M> {
-    model: M,
+pub struct Imm<T, const B: usize, const N: usize, S = Compact, G = AnyCurve<T>> {
+    pub(super) kernel: SparseEkf<T, S, B, N, G>,
     dwell: Dwell<T>,
-    evidence: Evidence<T>,
+    /// Probabilities of a change of phase over a step, `[to][from]`.
+    pub(super) chain: [[T; 3]; 3],
+    weighing: Weighing<T>,
+    /// Rate of a moving phase that begins.
+    pub(super) fresh: [Gaussian<T>; 3],
 }
 
-impl<T: Real, M> Imm<T, M> {
-    /// - `dwell`: how long phases last and what follows them.
-    /// - `evidence`: what weighs the hypotheses.
-    pub const fn new(model: M, dwell: Dwell<T>, evidence: Evidence<T>) -> Self {
-        Self { model, dwell, evidence }
-    }
+/// A mode while a step works on it.
+struct Mode<T, const B: usize> {
+    parts: Parts<T, B>,
+    /// Its probability before the reading; what the reading makes of it.
+    prior: T,
+    weight: Weight<T>,
+    /// As in [`Weighed`](crate::mixture::evidence::Weighed).
+    more_inside: T,
+    per_inside: T,
+    residual: Option<Residual<T>>,
+}
 
-    /// The model.
-    pub const fn model(&self) -> &M {
-        &self.model
+impl<T: Real, const B: usize, const N: usize> Imm<T, B, N> {
+    /// A filter for steps of `dt_s` seconds.
+    /// - `dwell`: how long phases last and what follows them.
+    /// - `evidence`: what weighs the phases.
+    ///
+    /// # Errors
+    /// If `dt_s` is negative or not finite.
+    pub fn new(
+        model: SwitchedModel<T, B, N>,
+        dt_s: T,
+        dwell: Dwell<T>,
+        evidence: Evidence<T>,
+    ) -> Result<Self, StepError> {
+        Ok(Self::around(SparseEkf::of_any_length(model, dt_s)?, dwell, evidence))
+    }
+}
+
+impl<T: Real, const B: usize, const N: usize, S: Switch<T>, G: Curve<T>> Imm<T, B, N, S, G> {
+    /// A filter whose modes step as `kernel` does; the other arguments as for [`Self::new`]. Of its switch only the square
+    /// root is used.
+    pub fn around(kernel: SparseEkf<T, S, B, N, G>, dwell: Dwell<T>, evidence: Evidence<T>) -> Self {
+        Self {
+            dwell,
+            chain: transposed(&dwell.probabilities(kernel.dt_s())),
+            weighing: Weighing::new(evidence),
+            fresh: Phase::ALL.map(|phase| fresh_rate(kernel.model().motion(), phase)),
+            kernel,
+        }
     }
 
     /// A phase changes at the beginning of a step: steps are short against phases, and against what the model asks for.
-    fn longest_s<const N: usize, const L: usize>(&self) -> T
-    where
-        M: Phased<T, N, L>,
-    {
-        self.model.longest_step_s().min(self.dwell.longest_step_s())
+    fn longest_s(&self) -> T {
+        self.model().longest_step_s().min(self.dwell.longest_step_s())
     }
 
-    /// Predicts over a prepared step of `dt_s ≥ 0` seconds, then takes the reading.
+    /// The same filter for steps of another length.
+    fn every(&self, dt_s: T) -> Self {
+        let mut other = *self;
+        other.kernel.set_length(dt_s);
+        other.chain = transposed(&other.dwell.probabilities(dt_s));
+        other
+    }
+
+    /// Predicts one step ahead and takes the reading; without one it is a prediction and returns `None`. A reading that is more
+    /// exact than the numbers is taken again with more and more noise.
     ///
     /// # Errors
-    /// See [`StepError`]; the mixture passed in is untouched.
-    pub fn step_prepared<const N: usize, const L: usize>(
+    /// See [`StepError`]; the state is untouched.
+    #[inline]
+    pub fn step<const L: usize>(
         &self,
-        mixture: &Mixture<T, N, L, 3>,
-        prepared: &M::Prepared,
-        dt_s: T,
-        reading: Option<Reading<T>>,
-    ) -> Result<MixtureStep<T, N, L, 3>, StepError>
-    where
-        M: Phased<T, N, L>,
-    {
-        self.step_recorded(mixture, &(*prepared, dt_s), reading, &mut ())
-    }
-
-    fn step_recorded<R: Recorder<T, N, L>, const N: usize, const L: usize>(
-        &self,
-        mixture: &Mixture<T, N, L, 3>,
-        (prepared, dt_s): &(M::Prepared, T),
-        reading: Option<Reading<T>>,
-        recorder: &mut R,
-    ) -> Result<MixtureStep<T, N, L, 3>, StepError>
-    where
-        M: Phased<T, N, L>,
-    {
-        let chain = self.dwell.probabilities(*dt_s);
-        let mut candidates = Candidates::new(&self.model, &self.evidence, reading, recorder);
-        for parent in self.mix_all(mixture, &chain).components().iter().enumerate() {
-            let (from, phase) = (&parent.1.belief, parent.1.phase);
-            let origin = Origin { parent, from, begins: false, course: Course::Known, phase, probability: T::one() };
-            candidates.add(&origin, prepared, |_| T::one())?;
-        }
-        candidates.finish()
-    }
-
-    /// One step backwards: along the three filters to the mixed beliefs they started from, then through the mixing.
-    fn smooth_step<const N: usize, const L: usize>(
-        &self,
-        filtered: &Mixture<T, N, L, 3>,
-        prepared: &(M::Prepared, T),
-        reading: Option<Reading<T>>,
-        next: &Mixture<T, N, L, 3>,
-    ) -> Result<Mixture<T, N, L, 3>, StepError>
-    where
-        M: Phased<T, N, L>,
-    {
-        let chain = self.dwell.probabilities(prepared.1);
-        let mixed = self.mix_all(filtered, &chain);
-        let mut lineage = Lineage::new(&self.model);
-        let step = self.step_recorded(filtered, prepared, reading, &mut lineage)?;
-        let smoothed = lineage.smooth(&mixed, &step.posterior, next);
-        let mut mixing = Lineage::new(&self.model);
-        for (heir, phase) in mixed.components().iter().map(|component| component.phase).enumerate() {
-            for (parent, component) in filtered.components().iter().enumerate() {
-                let (entered, begins) = &enter(&self.model, component, phase);
-                let transition = &stand_still(entered);
-                let log_weight = comes_from(&chain, component, phase).ln();
-                let (from, predicted, posterior, begins) = (entered, entered, entered, *begins);
-                let birth = Birth { parent, phase, from, begins, transition, predicted, posterior, log_weight };
-                mixing.born(&birth, heir);
+        state: &mut PhaseMixture<T, N, L>,
+        mut reading: Option<Reading<T>>,
+    ) -> Result<Option<MixtureResidual<T>>, StepError> {
+        let mut tries = 0;
+        loop {
+            match self.step_once(state, reading) {
+                Err(refused) if reading.is_some() => {
+                    tries += 1;
+                    reading = Some(self.kernel.coarser(reading, tries, refused)?);
+                }
+                taken => return taken,
             }
         }
-        Ok(mixing.smooth(filtered, &mixed, &smoothed))
     }
 
-    /// What is known of the state at the beginning of a step, for every phase that the step may have.
-    fn mix_all<const N: usize, const L: usize>(
+    /// [`Self::step`] into a state that is there already, whatever it was.
+    ///
+    /// # Errors
+    /// See [`StepError`]; `next` then means nothing.
+    #[inline]
+    pub fn step_into<const L: usize>(
         &self,
-        mixture: &Mixture<T, N, L, 3>,
-        chain: &[[T; 3]; 3],
-    ) -> Mixture<T, N, L, 3>
-    where
-        M: Phased<T, N, L>,
-    {
-        let mut mixed = Mixture::empty();
-        for phase in Phase::ALL {
-            if let Some(component) = self.mix(mixture, chain, phase) {
-                mixed.push(component);
+        state: &PhaseMixture<T, N, L>,
+        reading: Option<Reading<T>>,
+        next: &mut PhaseMixture<T, N, L>,
+    ) -> Result<Option<MixtureResidual<T>>, StepError> {
+        *next = *state;
+        self.step(next, reading)
+    }
+
+    #[inline(always)]
+    fn step_once<const L: usize>(
+        &self,
+        state: &mut PhaseMixture<T, N, L>,
+        reading: Option<Reading<T>>,
+    ) -> Result<Option<MixtureResidual<T>>, StepError> {
+        // Three results that stay where they are: nothing is moved, and a state is written when all of them are there.
+        let extend = self.advanced(state, Phase::Extend, reading);
+        let hold = self.advanced(state, Phase::Hold, reading);
+        let retract = self.advanced(state, Phase::Retract, reading);
+        let modes = [borrowed(&extend)?, borrowed(&hold)?, borrowed(&retract)?];
+        let (shares, density) = shares(modes.map(|mode| (mode.weight, mode.more_inside)))?;
+        let mut predicted = Predicted::new();
+        for ((mode, share), weight) in modes.into_iter().zip(&mut state.modes).zip(shares) {
+            share.weight = weight;
+            share.per_inside = mode.per_inside;
+            mode.parts.put_into(&mut share.belief);
+            if let Some(residual) = &mode.residual {
+                predicted.add(mode.prior, residual.innovation, residual.variance);
             }
         }
-        mixed
+        Ok(reading.map(|_| MixtureResidual::new(&predicted, density, self.weighing.tempering())))
     }
 
-    /// What is known of the state if `phase` begins or goes on now.
-    fn mix<const N: usize, const L: usize>(
+    /// A mode after the step: its belief, and what is known of its weight. One function for all phases, so that a program
+    /// has it once.
+    #[inline(never)]
+    fn advanced<const L: usize>(
         &self,
-        mixture: &Mixture<T, N, L, 3>,
-        chain: &[[T; 3]; 3],
+        state: &PhaseMixture<T, N, L>,
         phase: Phase,
-    ) -> Option<Component<T, N, L>>
-    where
-        M: Phased<T, N, L>,
-    {
-        let total = mixture.components().iter().fold(T::zero(), |sum, from| sum + comes_from(chain, from, phase));
-        if !(total > T::zero()) {
-            return None;
+        reading: Option<Reading<T>>,
+    ) -> Result<Mode<T, B>, StepError> {
+        let mut mode = self.mixed(&state.modes, phase);
+        if !(mode.prior > T::zero()) {
+            return Ok(mode);
         }
-        let mut entered = Mixture::<T, N, L, 3>::empty();
-        let mut per_inside = T::zero();
-        for from in mixture.components() {
-            let weight = comes_from(chain, from, phase) / total;
-            let (belief, _) = enter(&self.model, from, phase);
-            entered.push(Component { log_weight: weight.ln(), belief, ..*from });
-            per_inside += weight * from.per_inside;
+        let spread = self.kernel.predict(&mut mode.parts, Course::Known(phase));
+        if let Some(reading) = reading {
+            let residual = self.kernel.update(&mut mode.parts, reading, Some(phase), spread)?;
+            mode.weight = self.weighing.likelihood::<S>(mode.prior, &residual);
+            mode.residual = Some(residual);
+        } else if !mode.parts.is_sound::<N>(mode.parts.variances::<N>()) {
+            return Err(StepError::NonFiniteState);
         }
-        Some(Component { log_weight: total.ln(), phase, belief: entered.moments(), per_inside })
+        (mode.more_inside, mode.per_inside) = self.weighing.of_limits::<S, B>(&mode.parts, mode.per_inside);
+        Ok(mode)
+    }
+
+    /// What is known of the state if `phase` begins or goes on now; if it cannot, what was known of the phase. The rate of
+    /// a hold is left out: its prediction does not look at it.
+    #[inline(always)]
+    fn mixed<const L: usize>(&self, modes: &[Share<T, N, L>; 3], phase: Phase) -> Mode<T, B> {
+        let (zero, to) = (T::zero(), phase.index());
+        let own = &modes[to];
+        let joint: [T; 3] = core::array::from_fn(|from| self.chain[to][from] * modes[from].weight);
+        let prior = joint[0] + joint[1] + joint[2];
+        let weight = Weight { factor: prior, exponent: zero };
+        if !(prior > zero) {
+            let (parts, per_inside) = (Parts::of(&own.belief), own.per_inside);
+            return Mode { parts, prior, weight, more_inside: T::one(), per_inside, residual: None };
+        }
+        let per_prior = T::one() / prior;
+        let shares = joint.map(|weight| weight * per_prior);
+        let per_inside =
+            shares[0] * modes[0].per_inside + shares[1] * modes[1].per_inside + shares[2] * modes[2].per_inside;
+        let [a, b, c] = heaviest_first([(shares[0], &modes[0]), (shares[1], &modes[1]), (shares[2], &modes[2])]);
+        let mut parts = Parts::mixed([a.0, b.0, c.0], [&a.1.belief, &b.1.belief, &c.1.belief]);
+        if phase != Phase::Hold {
+            parts.mix_rate(shares[to], &own.belief, &self.fresh[to]);
+        }
+        Mode { parts, prior, weight, more_inside: T::one(), per_inside, residual: None }
     }
 }
 
-/// Probability that `phase` follows and that it follows this hypothesis.
-fn comes_from<T: Real, const N: usize, const L: usize>(
-    chain: &[[T; 3]; 3],
-    from: &Component<T, N, L>,
-    phase: Phase,
-) -> T {
-    chain[from.phase.index()][phase.index()] * from.log_weight.exp()
+/// `[to][from]` of `[from][to]`.
+fn transposed<T: Real>(chain: &[[T; 3]; 3]) -> [[T; 3]; 3] {
+    core::array::from_fn(|to| core::array::from_fn(|from| chain[from][to]))
 }
 
-mixture_estimator!(Imm<T, M>, 3);
+/// What went well, without moving it.
+fn borrowed<T>(result: &Result<T, StepError>) -> Result<&T, StepError> {
+    result.as_ref().map_err(|error| *error)
+}
+
+/// The heaviest in front, by two comparisons.
+#[inline(always)]
+fn heaviest_first<T: Real, S>([a, b, c]: [(T, S); 3]) -> [(T, S); 3] {
+    let [a, b] = if b.0 > a.0 { [b, a] } else { [a, b] };
+    if c.0 > a.0 { [c, b, a] } else { [a, b, c] }
+}
+
+/// Probabilities from weights and what the limits make of them, and the weights' sum. What is lighter than the
+/// heaviest by e⁻¹² gets none.
+#[inline(always)]
+fn shares<T: Real>(weights: [(Weight<T>, T); 3]) -> Result<([T; 3], Weight<T>), StepError> {
+    let followed = weights.iter().filter(|(weight, _)| weight.factor > T::zero());
+    let exponents = followed.map(|(weight, _)| weight.exponent);
+    let Some(exponent) = exponents.reduce(|a, b| if b > a { b } else { a }) else {
+        return Err(StepError::NonFiniteState);
+    };
+    let mut density = T::zero();
+    let mut weights = weights.map(|(likelihood, more_inside)| {
+        let likelihood = likelihood.relative_to(exponent);
+        density += likelihood;
+        likelihood * more_inside
+    });
+    let heaviest = weights.iter().fold(T::zero(), |a, b| if *b > a { *b } else { a });
+    let mut factor = T::zero();
+    for weight in &mut weights {
+        if !(*weight > heaviest * T::of(LEAST_WEIGHT)) {
+            *weight = T::zero();
+        }
+        factor += *weight;
+    }
+    if !(factor > T::zero() && factor.is_finite()) {
+        return Err(StepError::NonFiniteState);
+    }
+    let per_sum = T::one() / factor;
+    Ok((weights.map(|weight| weight * per_sum), Weight { factor: density, exponent }))
+}
+
+mixture_filter!(Imm<B, N>, PhaseMixture<>);

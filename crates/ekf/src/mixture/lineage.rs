@@ -1,94 +1,132 @@
-use nalgebra::{SMatrix, SVector};
-use ohmstrain_model::{Phase, Symmetric, Transition};
+//! Who descends from whom in a step of a filter of hypotheses: what its smoother goes back along.
 
+use nalgebra::{SMatrix, SVector};
+use ohmstrain_model::{Direction, Phase, SwitchedModel, SwitchedStep, Symmetric, Transition};
+
+use crate::Belief;
 use crate::belief::gaussian::Real;
-use crate::mixture::{Added, Component, Mixture, moment_match};
+use crate::kernel::{Course, Parts};
+use crate::mixture::evidence::Weighed;
+use crate::mixture::state::Share;
+use crate::mixture::{Added, moment_match};
 use crate::smooth::rts_step;
-use crate::{Belief, Phased};
 
 /// Hears of every child that a step of a filter of hypotheses makes. The filter itself listens with `()`.
-pub(crate) trait Recorder<T, const N: usize, const L: usize> {
-    /// Where a child went, or where it is to have gone.
-    fn place(&self, _parent: usize, _phase: Phase, added: Added) -> Added {
-        added
-    }
-    /// A child was put into place `heir` of the new mixture, merged or alone.
-    fn born(&mut self, _birth: &Birth<'_, T, N, L>, _heir: usize) {}
+pub(crate) trait Recorder<T: Real, const B: usize> {
+    /// A child was put into the new mixture, merged or alone.
+    fn born(&mut self, _birth: &Birth<'_, T, B>, _added: Added) {}
     /// The contents of every place moved to another one, or nowhere.
     fn renumbered(&mut self, _new_place: impl Fn(usize) -> Option<usize>) {}
 }
 
-impl<T, const N: usize, const L: usize> Recorder<T, N, L> for () {}
-
-impl<T, R: Recorder<T, N, L>, const N: usize, const L: usize> Recorder<T, N, L> for &mut R {
-    fn place(&self, parent: usize, phase: Phase, added: Added) -> Added {
-        (**self).place(parent, phase, added)
-    }
-
-    fn born(&mut self, birth: &Birth<'_, T, N, L>, heir: usize) {
-        (**self).born(birth, heir);
-    }
-
-    fn renumbered(&mut self, new_place: impl Fn(usize) -> Option<usize>) {
-        (**self).renumbered(new_place);
-    }
-}
+impl<T: Real, const B: usize> Recorder<T, B> for () {}
 
 /// A child at its birth.
-pub(crate) struct Birth<'a, T, const N: usize, const L: usize> {
+pub(crate) struct Birth<'a, T, const B: usize> {
     /// Which hypothesis it comes from.
     pub parent: usize,
     pub phase: Phase,
-    /// Where it started: the parent's belief, rates drawn anew if a phase began.
-    pub from: &'a Belief<T, N, L>,
+    /// Where it started: the parent's belief, the rate drawn anew if a phase began.
+    pub from: &'a Parts<T, B>,
     /// Whether a phase began.
     pub begins: bool,
-    pub transition: &'a Transition<T, N, L>,
+    pub course: Course<T>,
     /// The prediction before it was cut.
-    pub predicted: &'a Belief<T, N, L>,
+    pub predicted: &'a Parts<T, B>,
     /// The belief that went into the new mixture, before it was merged with others.
-    pub posterior: &'a Belief<T, N, L>,
-    /// Logarithm of its share of the new mixture, not normalised.
-    pub log_weight: T,
+    pub posterior: &'a Parts<T, B>,
+    pub weighed: &'a Weighed<T>,
 }
 
-/// Who descends from whom in one step of a filter of hypotheses: what its smoother goes back along.
-///
-/// Source of the recursion: Kim, *J. Econometrics* 60 (1994) 1, here over hypotheses that are merged and pruned.
+/// The children of one step. Source of the recursion: Kim, *J. Econometrics* 60 (1994) 1, here over hypotheses that are merged
+/// and pruned.
 pub(crate) struct Lineage<T, const N: usize, const L: usize, const K: usize> {
     /// By parent and phase.
     children: [[Option<Descent<T, N, L>>; 3]; K],
-    /// States that are drawn anew when a phase begins.
-    renewed: core::ops::Range<usize>,
 }
 
-struct Descent<T, const N: usize, const L: usize> {
-    /// From the parent, renewed rates included.
-    transition: Transition<T, N, L>,
-    predicted: Belief<T, N, L>,
-    posterior: Belief<T, N, L>,
-    log_weight: T,
-    heir: usize,
+/// A child and where it went.
+pub(crate) struct Descent<T, const N: usize, const L: usize> {
+    /// From the parent, the renewed rate included.
+    pub transition: Transition<T, N, L>,
+    pub predicted: Belief<T, N, L>,
+    pub posterior: Belief<T, N, L>,
+    /// Logarithm of its share of the new mixture, not normalised.
+    pub log_weight: T,
+    pub heir: usize,
+}
+
+/// Listens to a step of a sensor's filter: its linearisations are those of the model.
+pub(crate) struct Following<'a, T: Real, const B: usize, const N: usize, const L: usize, const K: usize> {
+    pub lineage: Lineage<T, N, L, K>,
+    model: &'a SwitchedModel<T, B, N>,
+    step: SwitchedStep<T, B>,
 }
 
 /// Children with less of the smoothed weight than this leave no trace in the moments.
 const LEAST_SHARE: f64 = 1e-7;
 
-impl<T: Real, const N: usize, const L: usize, const K: usize> Recorder<T, N, L> for Lineage<T, N, L, K> {
-    fn born(&mut self, birth: &Birth<'_, T, N, L>, heir: usize) {
-        let transition = if birth.begins { self.through_renewal(birth) } else { *birth.transition };
-        let (predicted, posterior, log_weight) = (*birth.predicted, *birth.posterior, birth.log_weight);
-        let descent = Descent { transition, predicted, posterior, log_weight, heir };
-        if let Some(place) = self.children.get_mut(birth.parent).map(|phases| &mut phases[birth.phase.index()]) {
-            *place = Some(descent);
-        }
+impl<'a, T: Real, const B: usize, const N: usize, const L: usize, const K: usize> Following<'a, T, B, N, L, K> {
+    pub(crate) fn new(model: &'a SwitchedModel<T, B, N>, dt_s: T) -> Self {
+        Self { lineage: Lineage::new(), model, step: model.prepare(dt_s) }
+    }
+
+    fn transition(&self, birth: &Birth<'_, T, B>) -> Transition<T, N, L> {
+        let from = whole::<T, B, N, L>(birth.from);
+        let direction = match birth.course {
+            Course::Known(phase) => Direction::Known(phase),
+            Course::Within(phase, turning) => Direction::Within { phase, turning },
+            Course::Uncertain => self.model.uncertain_direction(&self.step, &from.covariance),
+        };
+        let transition = self.model.transition(&self.step, &from.mean, direction);
+        if birth.begins { through_renewal(transition, from.covariance[(1, 1)]) } else { transition }
+    }
+}
+
+impl<T: Real, const B: usize, const N: usize, const L: usize, const K: usize> Recorder<T, B>
+    for Following<'_, T, B, N, L, K>
+{
+    fn born(&mut self, birth: &Birth<'_, T, B>, added: Added) {
+        let heir = match added {
+            Added::To(heir) => heir,
+            Added::InsteadOf(heir, into) => {
+                self.lineage.renumber(|place| if place == heir { into } else { Some(place) });
+                heir
+            }
+            Added::Nowhere => return self.lineage.put(birth.parent, birth.phase, None),
+        };
+        let Weighed { weight, more_inside, .. } = *birth.weighed;
+        let descent = Descent {
+            transition: self.transition(birth),
+            predicted: whole(birth.predicted),
+            posterior: whole(birth.posterior),
+            log_weight: (weight.factor * more_inside).ln() + weight.exponent,
+            heir,
+        };
+        self.lineage.put(birth.parent, birth.phase, Some(descent));
     }
 
     fn renumbered(&mut self, new_place: impl Fn(usize) -> Option<usize>) {
-        for child in self.children.iter_mut().flatten() {
-            *child = child.take().and_then(|child| Some(Descent { heir: new_place(child.heir)?, ..child }));
-        }
+        self.lineage.renumber(new_place);
     }
+}
+
+fn whole<T: Real, const B: usize, const N: usize, const L: usize>(parts: &Parts<T, B>) -> Belief<T, N, L> {
+    let mut belief = Belief { mean: SVector::zeros(), covariance: Symmetric::zeros() };
+    parts.put_into(&mut belief);
+    belief
+}
+
+/// The transition from before a phase began: the rate that is drawn anew does not depend on what it was, and its spread is
+/// process noise.
+pub(crate) fn through_renewal<T: Real, const N: usize, const L: usize>(
+    transition: Transition<T, N, L>,
+    fresh_variance: T,
+) -> Transition<T, N, L> {
+    let Transition { mean, mut jacobian, mut noise } = transition;
+    noise.add_outer(&jacobian.column(1).into_owned(), fresh_variance);
+    jacobian.set_column(1, &SVector::zeros());
+    Transition { mean, jacobian, noise }
 }
 
 impl<T: Real, const N: usize, const L: usize> Descent<T, N, L> {
@@ -110,41 +148,33 @@ impl<T: Real, const N: usize, const L: usize> Descent<T, N, L> {
 }
 
 impl<T: Real, const N: usize, const L: usize, const K: usize> Lineage<T, N, L, K> {
-    pub(crate) fn new<M: Phased<T, N, L>>(model: &M) -> Self {
-        Self { children: core::array::from_fn(|_| [None, None, None]), renewed: model.renewed() }
+    pub(crate) const fn new() -> Self {
+        Self { children: [const { [None, None, None] }; K] }
     }
 
-    /// The transition from the parent itself: what is drawn anew does not depend on it, and its spread is process noise.
-    fn through_renewal(&self, birth: &Birth<'_, T, N, L>) -> Transition<T, N, L> {
-        let mut fresh = Symmetric::zeros();
-        let mut jacobian = birth.transition.jacobian;
-        for i in self.renewed.clone() {
-            for j in self.renewed.clone() {
-                fresh[(i, j)] = birth.from.covariance[(i, j)];
-            }
-            jacobian.set_column(i, &SVector::zeros());
+    pub(crate) fn put(&mut self, parent: usize, phase: Phase, descent: Option<Descent<T, N, L>>) {
+        if let Some(place) = self.children.get_mut(parent).and_then(|phases| phases.get_mut(phase.index())) {
+            *place = descent;
         }
-        let noise = fresh.congruence(&birth.transition.jacobian).plus(&birth.transition.noise);
-        Transition { jacobian, noise, ..*birth.transition }
     }
 
-    /// The hypotheses at the beginning of the step given all readings, in the order of `filtered`. `heirs` are those that
-    /// the step made, `next` the same ones given all readings.
-    pub(crate) fn smooth(
-        &self,
-        filtered: &Mixture<T, N, L, K>,
-        heirs: &Mixture<T, N, L, K>,
-        next: &Mixture<T, N, L, K>,
-    ) -> Mixture<T, N, L, K> {
+    fn renumber(&mut self, new_place: impl Fn(usize) -> Option<usize>) {
+        for child in self.children.iter_mut().flatten() {
+            *child = child.take().and_then(|child| Some(Descent { heir: new_place(child.heir)?, ..child }));
+        }
+    }
+
+    /// The hypotheses at the beginning of the step given all readings, into `smoothed`, which are those as they were filtered.
+    /// `heirs` are those that the step made, `next` the same ones given all readings.
+    pub(crate) fn smooth(&self, smoothed: &mut [Share<T, N, L>], heirs: &[Share<T, N, L>], next: &[Share<T, N, L>]) {
         let totals: [T; K] = core::array::from_fn(|heir| self.log_total(heir));
-        let mut smoothed = Mixture::empty();
-        smoothed.set_pause(*filtered.pause());
-        for (parent, children) in filtered.components().iter().zip(&self.children) {
+        let mut total = T::zero();
+        for (parent, children) in smoothed.iter_mut().zip(&self.children) {
             let ways: [(T, Belief<T, N, L>); 3] = core::array::from_fn(|phase| {
                 let way = children.get(phase).and_then(|child| {
                     let child = child.as_ref()?;
-                    let (merged, heir) = (heirs.components().get(child.heir)?, next.components().get(child.heir)?);
-                    let share = (heir.log_weight + child.log_weight - *totals.get(child.heir)?).exp();
+                    let (merged, heir) = (heirs.get(child.heir)?, next.get(child.heir)?);
+                    let share = heir.weight * (child.log_weight - *totals.get(child.heir)?).exp();
                     let back = || {
                         let own = child.unmerged(&merged.belief, &heir.belief);
                         rts_step(&parent.belief, &child.transition, &child.predicted, &own)
@@ -153,15 +183,15 @@ impl<T: Real, const N: usize, const L: usize, const K: usize> Lineage<T, N, L, K
                 });
                 way.unwrap_or((T::zero(), parent.belief))
             });
-            let weight = ways.iter().fold(T::zero(), |sum, (share, _)| sum + *share);
-            let belief = if weight > T::zero() {
-                moment_match(ways.iter().map(|(share, belief)| (*share / weight, belief)))
-            } else {
-                parent.belief
-            };
-            smoothed.push(Component { log_weight: weight.ln(), belief, ..*parent });
+            parent.weight = ways.iter().fold(T::zero(), |sum, (share, _)| sum + *share);
+            if parent.weight > T::zero() {
+                parent.belief = moment_match(ways.iter().map(|(share, belief)| (*share / parent.weight, belief)));
+            }
+            total += parent.weight;
         }
-        smoothed.with_sum_one()
+        for parent in smoothed {
+            parent.weight /= total;
+        }
     }
 
     /// Logarithm of the sum of the weights that were merged into a place.

@@ -1,11 +1,24 @@
-use ohmstrain_model::{Phase, StrainRange};
+//! The sign-split filter.
+//!
+//! # Policy
+//! As [`SparseEkf`](crate::SparseEkf): the state is changed in place, an error leaves it as it was, and nothing takes a
+//! logarithm unless asked or unless the strain is near a limit.
+
+use ohmstrain_model::{Phase, SwitchedModel, Turning};
 
 use crate::belief::gaussian::Real;
-use crate::mixture::lineage::{Lineage, Recorder};
+use crate::kernel::{Course, Parts};
+use crate::mixture::children::Children;
+use crate::mixture::estimator::{mixture_filter, mixture_steps};
+use crate::mixture::evidence::{Newborn, Weighing};
+use crate::mixture::lineage::{Birth, Following, Recorder};
 use crate::mixture::pause::Pause;
-use crate::mixture::step::{Candidates, Course, Evidence, MixtureStep, Origin, mixture_estimator, smooth_step};
-use crate::mixture::{Mixture, keep_rate_in};
-use crate::{Dwell, Gaussian, Phased, Reading, StepError};
+use crate::mixture::predicted::Predicted;
+use crate::mixture::state::{Mixture, Share};
+use crate::mixture::switching::{forgets_direction_s, fresh_rate};
+use crate::{
+    AnyCurve, Curve, Dwell, Evidence, Gaussian, Logistic, MixtureResidual, Reading, SparseEkf, StepError, Switch,
+};
 
 /// At most `K` Gaussian hypotheses split by the sign of the rate.
 ///
@@ -17,110 +30,175 @@ use crate::{Dwell, Gaussian, Phased, Reading, StepError};
 /// and merged with the other half at every row would forget it the sooner the more rows there are, and with it how far the body
 /// may have gone. Each hypothesis then moves on with an uncertain direction, as that of an [`Ekf`](crate::Ekf), and the next
 /// reading splits it.
+///
+/// A truncated Gaussian-sum split. `G` as for [`SparseEkf`].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SignSplit<T, M, const K: usize> {
-    model: M,
+pub struct SignSplit<T, const B: usize, const N: usize, const K: usize, S = Logistic, G = AnyCurve<T>> {
+    pub(crate) kernel: SparseEkf<T, S, B, N, G>,
     hold: Option<Dwell<T>>,
-    evidence: Evidence<T>,
+    /// Probabilities of a change of phase over a step, `[from][to]`; `None` for a body that never rests.
+    pub(crate) chain: Option<[[T; 3]; 3]>,
+    pub(crate) weighing: Weighing<T>,
+    /// Rate of a moving phase after a hold.
+    pub(crate) fresh: [Gaussian<T>; 3],
+    /// Seconds without a reading after which a step leaves the direction open.
+    pub(crate) forgets_direction_s: T,
 }
 
-impl<T: Real, M, const K: usize> SignSplit<T, M, K> {
+impl<T: Real, const B: usize, const N: usize, const K: usize> SignSplit<T, B, N, K> {
+    /// A filter for steps of `dt_s` seconds.
     /// - `hold`: how long holds and movements last; `None` for a body that never rests.
     /// - `evidence`: what weighs the hypotheses.
-    pub const fn new(model: M, hold: Option<Dwell<T>>, evidence: Evidence<T>) -> Self {
-        Self { model, hold, evidence }
-    }
-
-    /// The model.
-    pub const fn model(&self) -> &M {
-        &self.model
-    }
-
-    fn longest_s<const N: usize, const L: usize>(&self) -> T
-    where
-        M: Phased<T, N, L>,
-    {
-        self.model.longest_step_s()
-    }
-
-    /// Predicts over a prepared step of `dt_s ≥ 0` seconds, then takes the reading.
     ///
     /// # Errors
-    /// See [`StepError`]; the mixture passed in is untouched.
-    pub fn step_prepared<const N: usize, const L: usize>(
-        &self,
-        mixture: &Mixture<T, N, L, K>,
-        prepared: &M::Prepared,
+    /// If `dt_s` is negative or not finite.
+    pub fn new(
+        model: SwitchedModel<T, B, N>,
         dt_s: T,
-        reading: Option<Reading<T>>,
-    ) -> Result<MixtureStep<T, N, L, K>, StepError>
-    where
-        M: Phased<T, N, L>,
-    {
-        self.step_recorded(mixture, &(*prepared, dt_s), reading, &mut ())
+        hold: Option<Dwell<T>>,
+        evidence: Evidence<T>,
+    ) -> Result<Self, StepError> {
+        Ok(Self::around(SparseEkf::of_any_length(model, dt_s)?, hold, evidence))
+    }
+}
+
+impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: Curve<T>> SignSplit<T, B, N, K, S, G> {
+    /// A filter whose hypotheses step as `kernel` does; the other arguments as for [`Self::new`]. Of its switch only the
+    /// square root is used but in a pause, where the direction stays open.
+    pub fn around(kernel: SparseEkf<T, S, B, N, G>, hold: Option<Dwell<T>>, evidence: Evidence<T>) -> Self {
+        Self {
+            hold,
+            chain: hold.map(|dwell| dwell.probabilities(kernel.dt_s())),
+            weighing: Weighing::new(evidence),
+            fresh: Phase::ALL.map(|phase| fresh_rate(kernel.model().motion(), phase)),
+            forgets_direction_s: forgets_direction_s(kernel.model()),
+            kernel,
+        }
     }
 
-    pub(crate) fn step_recorded<R: Recorder<T, N, L>, const N: usize, const L: usize>(
+    fn longest_s(&self) -> T {
+        self.model().longest_step_s()
+    }
+
+    /// The same filter for steps of another length.
+    fn every(&self, dt_s: T) -> Self {
+        let mut other = *self;
+        other.kernel.set_length(dt_s);
+        other.chain = other.hold.map(|dwell| dwell.probabilities(dt_s));
+        other
+    }
+
+    mixture_steps!();
+
+    #[inline(always)]
+    fn step_recorded<const L: usize>(
         &self,
-        mixture: &Mixture<T, N, L, K>,
-        (prepared, dt_s): &(M::Prepared, T),
+        state: &Mixture<T, N, L, K>,
         reading: Option<Reading<T>>,
-        recorder: &mut R,
-    ) -> Result<MixtureStep<T, N, L, K>, StepError>
-    where
-        M: Phased<T, N, L>,
-    {
-        let mut candidates = Candidates::new(&self.model, &self.evidence, reading, recorder);
-        let chain = self.hold.map(|dwell| dwell.probabilities(*dt_s));
+        next: &mut Mixture<T, N, L, K>,
+        recorder: &mut impl Recorder<T, B>,
+    ) -> Result<Option<MixtureResidual<T>>, StepError> {
         let pause = match reading {
-            None => mixture.pause().goes_on(*dt_s, self.model.forgets_direction_s()),
+            None => state.pause().goes_on(self.kernel.dt_s(), self.forgets_direction_s),
             Some(_) => Pause::over(),
         };
         let open = pause.open;
-        for parent in mixture.components().iter().enumerate() {
+        let mut children = Children::new(next);
+        let mut predicted = Predicted::new();
+        for (place, (parent, from)) in state.shares().iter().zip(state.phases()).enumerate() {
+            let before = if state.pause().open { toward(*from, &parent.belief.mean[1]) } else { *from };
+            let turning = if open { None } else { Some(self.kernel.turning(before, &Parts::of(&parent.belief))) };
             let follows = if open { goes_on } else { follows };
-            for (phase, probability) in Phase::ALL.into_iter().zip(follows(chain.as_ref(), parent.1.phase)) {
-                // A body without a hold phase goes on moving, whatever it was called before.
-                let rests = self.hold.is_some() && parent.1.phase == Phase::Hold && phase != Phase::Hold;
-                let from = &if rests { self.model.enter(&parent.1.belief, phase) } else { parent.1.belief };
-                let hopeless = |rate: Gaussian<T>| {
-                    let toward = if phase == Phase::Retract { -rate.mean } else { rate.mean };
-                    toward < -T::of(HOPELESS) * rate.sd()
-                };
-                if !open && phase != Phase::Hold && self.model.rate_ahead(prepared, from, phase).is_some_and(hopeless) {
-                    continue;
+            for (phase, probability) in Phase::ALL.into_iter().zip(follows(self.chain.as_ref(), *from)) {
+                if probability > T::zero() {
+                    let origin = Origin { place, parent, from: *from, turning, phase, probability };
+                    self.add_child(&origin, reading, &mut children, &mut predicted, recorder)?;
                 }
-                let before = if mixture.pause().open { toward(parent.1.phase, &from.mean[1]) } else { parent.1.phase };
-                let course = match phase {
-                    _ if rests => Course::Known,
-                    Phase::Extend | Phase::Retract if open => Course::Open,
-                    _ => Course::After(before),
-                };
-                let origin = Origin { parent, from, begins: rests, course, phase, probability };
-                candidates.add(&origin, prepared, |prior| match rates_of(phase) {
-                    Some(rates) if !open => {
-                        let mass = keep_rate_in(prior, &rates);
-                        // After a hold the chain has said how likely this direction is; none of it goes to the other.
-                        if rests && mass > T::of(0.5) { T::one() } else { mass }
-                    }
-                    _ => T::one(),
-                })?;
             }
         }
-        let mut step = candidates.finish()?;
-        step.posterior.set_pause(pause);
-        Ok(step)
+        let density = children.density();
+        children.normalise(recorder)?;
+        next.set_pause(pause);
+        Ok(reading.map(|_| MixtureResidual::new(&predicted, density, self.weighing.tempering())))
     }
 
-    smooth_step!();
+    #[inline(always)]
+    fn add_child<const L: usize>(
+        &self,
+        origin: &Origin<'_, T, N, L>,
+        reading: Option<Reading<T>>,
+        children: &mut Children<'_, T, N, L, K>,
+        predicted: &mut Predicted<T>,
+        recorder: &mut impl Recorder<T, B>,
+    ) -> Result<(), StepError> {
+        let Origin { place, parent, from, turning, phase, probability } = *origin;
+        let mut child = Parts::of(&parent.belief);
+        let rests = self.chain.is_some() && from == Phase::Hold && phase != Phase::Hold;
+        if rests {
+            child.renew_rate(&self.fresh[phase.index()]);
+        }
+        if turning.is_some() && phase != Phase::Hold && self.is_hopeless(phase, &child) {
+            return Ok(());
+        }
+        let course = match turning {
+            _ if rests || phase == Phase::Hold => Course::Known(phase),
+            None => Course::Uncertain,
+            Some(_) if from == Phase::Hold => Course::Known(phase),
+            Some(turning) => Course::Within(phase, turning),
+        };
+        let start = child;
+        let spread = self.kernel.predict(&mut child, course);
+        let prediction = child;
+        let mut prior = parent.weight * probability;
+        if turning.is_some() && phase != Phase::Hold {
+            let mass = child.cut_rate::<S, N>(phase, self.weighing.clear());
+            if !(mass > T::of(LEAST_MASS)) {
+                return Ok(());
+            }
+            // After a hold the chain has said how likely this direction is; none of it goes to the other.
+            if !(rests && mass > T::of(0.5)) {
+                prior *= mass;
+            }
+        }
+        let newborn = Newborn { phase, prior, spread, per_inside: parent.per_inside };
+        let weighed = self.kernel.weigh(&mut child, newborn, reading, &self.weighing, predicted)?;
+        let added = children.add(&child, phase, &weighed);
+        let (from, predicted, posterior, weighed) = (&start, &prediction, &child, &weighed);
+        let birth = Birth { parent: place, phase, from, begins: rests, course, predicted, posterior, weighed };
+        recorder.born(&birth, added);
+        Ok(())
+    }
+
+    /// Whether next to nothing of a prediction has the sign of a moving phase.
+    #[inline(always)]
+    fn is_hopeless(&self, phase: Phase, from: &Parts<T, B>) -> bool {
+        let ahead = self.kernel.rate_ahead(phase, from);
+        let toward = if phase == Phase::Retract { -ahead.mean } else { ahead.mean };
+        toward < T::zero() && toward * toward > T::of(HOPELESS * HOPELESS) * ahead.variance
+    }
 }
 
+/// What a child is made of.
+struct Origin<'a, T, const N: usize, const L: usize> {
+    /// Where its parent is.
+    place: usize,
+    parent: &'a Share<T, N, L>,
+    from: Phase,
+    /// What its rate leaves open over the step, unless it rests; `None` if a reading is missing to tell its direction.
+    turning: Option<Turning<T>>,
+    phase: Phase,
+    /// Probability that the parent has this child.
+    probability: T,
+}
+
+/// A cut that leaves less than this of a prediction is not followed: its moments would be those of a far tail.
+pub(crate) const LEAST_MASS: f64 = 1e-3;
 /// Deviations of the rate beyond zero at which less than a thousandth of the prediction is left, too little to follow.
 pub(crate) const HOPELESS: f64 = 3.090_232_306_167_813_5;
 
 /// Probabilities of the phases that follow `phase`, in the order of [`Phase::ALL`]. Whether a moving body stretches or
 /// releases is for the cut to say.
-pub(crate) fn follows<T: Real>(chain: Option<&[[T; 3]; 3]>, phase: Phase) -> [T; 3] {
+fn follows<T: Real>(chain: Option<&[[T; 3]; 3]>, phase: Phase) -> [T; 3] {
     match (chain, phase) {
         (None, _) => [T::one(), T::zero(), T::one()],
         (Some(chain), Phase::Hold) => chain[1],
@@ -129,7 +207,7 @@ pub(crate) fn follows<T: Real>(chain: Option<&[[T; 3]; 3]>, phase: Phase) -> [T;
 }
 
 /// The same where the direction stays open: a movement goes on as one, until a reading splits it.
-pub(crate) fn goes_on<T: Real>(chain: Option<&[[T; 3]; 3]>, phase: Phase) -> [T; 3] {
+fn goes_on<T: Real>(chain: Option<&[[T; 3]; 3]>, phase: Phase) -> [T; 3] {
     let (stops, zero) = (chain.map_or(T::zero(), |chain| chain[0][1]), T::zero());
     match (chain, phase) {
         (Some(chain), Phase::Hold) => chain[1],
@@ -139,7 +217,7 @@ pub(crate) fn goes_on<T: Real>(chain: Option<&[[T; 3]; 3]>, phase: Phase) -> [T;
 }
 
 /// The phase of a rate that was left open; what holds has none.
-pub(crate) fn toward<T: Real>(phase: Phase, rate: &T) -> Phase {
+fn toward<T: Real>(phase: Phase, rate: &T) -> Phase {
     match phase {
         Phase::Hold => Phase::Hold,
         _ if *rate < T::zero() => Phase::Retract,
@@ -147,14 +225,4 @@ pub(crate) fn toward<T: Real>(phase: Phase, rate: &T) -> Phase {
     }
 }
 
-/// The rates that belong to a moving phase.
-fn rates_of<T: Real>(phase: Phase) -> Option<StrainRange<T>> {
-    let (zero, infinite) = (T::zero(), T::one() / T::zero());
-    match phase {
-        Phase::Extend => Some(StrainRange { lower: zero, upper: infinite }),
-        Phase::Hold => None,
-        Phase::Retract => Some(StrainRange { lower: -infinite, upper: zero }),
-    }
-}
-
-mixture_estimator!(SignSplit<T, M, K>, K);
+mixture_filter!(SignSplit<B, N, K>, Mixture<K>);

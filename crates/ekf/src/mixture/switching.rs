@@ -1,49 +1,6 @@
-use core::ops::Range;
-
-use ohmstrain_model::{
-    Direction, Motion, ParameterError, Phase, Problem, Scalar, SwitchedModel, SwitchedStep, Transition,
-};
+use ohmstrain_model::{Motion, ParameterError, Phase, Problem, Scalar, SwitchedModel};
 
 use crate::belief::gaussian::Gaussian;
-use crate::{Belief, Channel, Component, Dynamics};
-
-/// A model whose dynamics depend on the phase: what a filter of phase hypotheses needs besides.
-pub trait Phased<T: Scalar, const N: usize, const L: usize>: Dynamics<T, N, L> + Channel<T, N, L> {
-    /// The same belief at the moment a moving phase begins: rate drawn anew from the phase's prior,
-    /// independent of everything else.
-    fn enter(&self, from: &Belief<T, N, L>, phase: Phase) -> Belief<T, N, L>;
-
-    /// The transition over a step at whose start the rate had the sign of the moving phase `before`, and at whose end it has
-    /// that of `after`. The default does not ask where the rate was before.
-    fn transition_between(
-        &self,
-        step: &Self::Prepared,
-        from: &Belief<T, N, L>,
-        _before: Phase,
-        after: Phase,
-    ) -> Transition<T, N, L> {
-        self.transition(step, from, Some(after))
-    }
-
-    /// After how many seconds without a reading a step leaves the direction open ([`Dynamics::transition`] without a phase):
-    /// infinite by default, and wherever a movement tends another way in each phase.
-    fn forgets_direction_s(&self) -> T {
-        T::one() / T::zero()
-    }
-
-    /// The components of the state that [`Self::enter`] draws anew; it leaves the others as they are.
-    fn renewed(&self) -> Range<usize>;
-}
-
-/// The belief that a hypothesis goes into `phase` with, and whether a moving phase begins.
-pub(crate) fn enter<T: Scalar, M: Phased<T, N, L>, const N: usize, const L: usize>(
-    model: &M,
-    from: &Component<T, N, L>,
-    phase: Phase,
-) -> (Belief<T, N, L>, bool) {
-    let begins = phase != Phase::Hold && from.phase != phase;
-    (if begins { model.enter(&from.belief, phase) } else { from.belief }, begins)
-}
 
 /// Longest step over the mean length of a phase.
 const LONGEST: f64 = 0.02;
@@ -68,51 +25,6 @@ pub(crate) fn forgets_direction_s<T: Scalar, const B: usize, const N: usize>(mod
         return T::one() / T::zero();
     }
     model.longest_step_s()
-}
-
-/// Draws the rate anew from the motion's prior of a phase.
-fn renew<T: Scalar, const N: usize, const L: usize>(
-    motion: &Motion<T>,
-    from: &Belief<T, N, L>,
-    phase: Phase,
-) -> Belief<T, N, L> {
-    let mut out = *from;
-    for j in 0..N {
-        out.covariance[(1, j)] = T::zero();
-    }
-    let rate = fresh_rate(motion, phase);
-    out.mean[1] = rate.mean;
-    out.covariance[(1, 1)] = rate.variance;
-    out
-}
-
-impl<T: Scalar, const B: usize, const N: usize, const L: usize> Phased<T, N, L> for SwitchedModel<T, B, N> {
-    fn enter(&self, from: &Belief<T, N, L>, phase: Phase) -> Belief<T, N, L> {
-        renew(self.motion(), from, phase)
-    }
-
-    fn transition_between(
-        &self,
-        step: &SwitchedStep<T, B>,
-        from: &Belief<T, N, L>,
-        before: Phase,
-        after: Phase,
-    ) -> Transition<T, N, L> {
-        let direction = if before == Phase::Hold || after == Phase::Hold {
-            Direction::Known(after)
-        } else {
-            Direction::Within { phase: after, turning: self.turning(step, &from.mean, &from.covariance, before) }
-        };
-        SwitchedModel::transition(self, step, &from.mean, direction)
-    }
-
-    fn forgets_direction_s(&self) -> T {
-        forgets_direction_s(self)
-    }
-
-    fn renewed(&self) -> Range<usize> {
-        1..2
-    }
 }
 
 /// How long phases last and what follows them: a Markov chain in continuous time over extend, hold and retract.

@@ -1,35 +1,54 @@
+#![allow(clippy::unwrap_used, reason = "tests")]
+
 extern crate std;
 
 use std::vec::Vec;
 
-use nalgebra::SMatrix;
+use nalgebra::{SMatrix, vector};
+use ohmstrain_model::{Gauge, ModelNoise, Motion, Phase, SensorLaw, StrainRange, SwitchedModel};
 use proptest::prelude::*;
 
+use super::children::Children;
+use super::evidence::{Weighed, Weighing, Weight};
+use super::state::Share;
 use super::*;
+use crate::kernel::Parts;
+use crate::{Estimator, Logistic, SignSplit};
 
-type Three = Component<f64, 3, 6>;
+/// Strain, rate, baseline.
+type One = (f64, Belief<f64, 3, 6>);
 
-fn component() -> impl Strategy<Value = Three> {
+fn one() -> impl Strategy<Value = One> {
     let normal = -1.0..1.0_f64;
     (prop::array::uniform3(normal.clone()), prop::array::uniform9(normal), 0.01..1.0_f64).prop_map(|(mean, root, w)| {
         let root = SMatrix::<f64, 3, 3>::from_row_slice(&root);
         let covariance = Symmetric::from_lower(&(root * root.transpose() + SMatrix::identity() * 0.01));
-        let belief = Belief { mean: SVector::from(mean), covariance };
-        Component { log_weight: w.ln(), phase: Phase::Extend, belief, per_inside: 1.0 }
+        (w, Belief { mean: SVector::from(mean), covariance })
     })
 }
 
 /// Total weight, mean and covariance by first and second moments about zero.
-fn naive_moments(components: &[Three]) -> (f64, SVector<f64, 3>, SMatrix<f64, 3, 3>) {
+fn naive_moments(all: &[One]) -> (f64, SVector<f64, 3>, SMatrix<f64, 3, 3>) {
     let (mut total, mut first, mut second) = (0.0, SVector::zeros(), SMatrix::zeros());
-    for Component { log_weight, belief, .. } in components {
-        let weight = log_weight.exp();
+    for (weight, belief) in all {
         total += weight;
-        first += belief.mean * weight;
-        second += (belief.covariance.to_matrix() + belief.mean * belief.mean.transpose()) * weight;
+        first += belief.mean * *weight;
+        second += (belief.covariance.to_matrix() + belief.mean * belief.mean.transpose()) * *weight;
     }
     let mean = first / total;
     (total, mean, second / total - mean * mean.transpose())
+}
+
+fn weighed(weight: f64, exponent: f64) -> Weighed<f64> {
+    Weighed { weight: Weight { factor: weight, exponent }, more_inside: 1.0, per_inside: 1.0 }
+}
+
+fn add<const K: usize>(children: &mut Children<'_, f64, 3, 6, K>, (weight, belief): &One, phase: Phase) {
+    children.add(&Parts::<f64, 0>::of(belief), phase, &weighed(*weight, 0.0));
+}
+
+fn kept(mixture: &Mixture<f64, 3, 6, 2>) -> Vec<One> {
+    mixture.shares().iter().map(|Share { weight, belief, .. }| (*weight, *belief)).collect()
 }
 
 /// Some thirty rounded sums and products of numbers of at most ten.
@@ -40,66 +59,71 @@ proptest! {
     /// mixture says of the state and of the phases is the same.
     #[test]
     fn merging_preserves_weight_mean_and_covariance(
-        first in component(), others in prop::collection::vec(component(), 1..6), apart in component(),
+        first in one(), others in prop::collection::vec(one(), 1..6), apart in one(),
     ) {
-        let apart = Component { phase: Phase::Hold, ..apart };
         let mut all = std::vec![first, apart];
         let mut mixture = Mixture::<f64, 3, 6, 2>::empty();
-        mixture.add(&first);
-        mixture.add(&apart);
-        for other in others {
-            // Close to what is there already in strain and rate, anywhere in the third state.
-            let mut close = other;
+        let mut children = Children::new(&mut mixture);
+        add(&mut children, &first, Phase::Extend);
+        add(&mut children, &apart, Phase::Hold);
+        for (weight, mut close) in others {
+            // Close to the first one in strain and rate, anywhere in the third state.
+            let (_, mean, _) = naive_moments(&[&all[..1], &all[2..]].concat());
             for i in 0..2 {
-                close.belief.mean[i] = mixture.components()[0].belief.mean[i] + 0.04 * other.belief.mean[i];
+                close.mean[i] = mean[i] + 0.04 * close.mean[i];
             }
-            mixture.add(&close);
-            all.push(close);
+            add(&mut children, &(weight, close), Phase::Extend);
+            all.push((weight, close));
         }
-        prop_assert_eq!(mixture.components().len(), 2);
         let (total, mean, covariance) = naive_moments(&all);
-        let (merged_total, merged_mean, merged_covariance) = naive_moments(mixture.components());
-        prop_assert!((merged_total - total).abs() < ROUNDING);
+        prop_assert!((children.density().factor - total).abs() < ROUNDING);
+        prop_assert!(children.normalise::<0>(&mut ()).is_ok());
+        prop_assert_eq!(mixture.shares().len(), 2);
+        let (merged_total, merged_mean, merged_covariance) = naive_moments(&kept(&mixture));
+        prop_assert!((merged_total - 1.0).abs() < ROUNDING);
         prop_assert!((merged_mean - mean).amax() < ROUNDING);
         prop_assert!((merged_covariance - covariance).amax() < ROUNDING);
-        let Ok(log_sum) = mixture.normalise(&mut ()) else { return Err(TestCaseError::fail("weights are finite")) };
-        prop_assert!((log_sum - total.ln()).abs() < ROUNDING);
-        let moments = mixture.moments();
-        prop_assert!((moments.mean - mean).amax() < ROUNDING);
-        prop_assert!((moments.covariance.to_matrix() - covariance).amax() < ROUNDING);
-        let extends: f64 = all.iter().filter(|c| c.phase == Phase::Extend).map(|c| c.log_weight.exp()).sum();
-        prop_assert!((mixture.phase_probabilities()[0] - extends / total).abs() < ROUNDING);
+        prop_assert!((mixture.phase_probabilities()[1] - apart.0 / total).abs() < ROUNDING);
     }
 
     /// Both halves of a belief, weighted with their masses, are the belief. Differences of erfc lose some digits.
     #[test]
-    fn halves_of_a_cut_belief_make_the_whole(whole in component()) {
-        let infinite = f64::INFINITY;
-        let halves = [(0.0, infinite), (-infinite, 0.0)].map(|(lower, upper)| {
-            let mut belief = whole.belief;
-            let mass = keep_rate_in(&mut belief, &StrainRange { lower, upper });
-            Component { log_weight: mass.ln(), belief, ..whole }
+    fn halves_of_a_cut_belief_make_the_whole((_, whole) in one()) {
+        let halves = [Phase::Extend, Phase::Retract].map(|phase| {
+            let (mut parts, mut half) = (Parts::<f64, 0>::of(&whole), whole);
+            let mass = parts.cut_rate::<Logistic, 3>(phase, f64::INFINITY);
+            parts.put_into(&mut half);
+            (mass, half)
         });
         let (total, mean, covariance) = naive_moments(&halves);
         prop_assert!((total - 1.0).abs() < ROUNDING);
         // Far out, the moments of the smaller half are asymptotes, of mass 1e-8 and less.
-        prop_assert!((mean - whole.belief.mean).amax() < 1e-7);
-        prop_assert!((covariance - whole.belief.covariance.to_matrix()).amax() < 1e-7);
+        prop_assert!((mean - whole.mean).amax() < 1e-7);
+        prop_assert!((covariance - whole.covariance.to_matrix()).amax() < 1e-7);
     }
 }
 
-/// In no unit are two exactly known strains that differ the same strain.
+/// Weights of which no single one need be a number, in any order: `wᵢ exp(xᵢ)` over their sum.
 #[test]
-fn exactly_known_states_are_alike_only_if_they_are_equal() {
-    for unit in [1e-9, 1.0, 1e9] {
-        let known = |strain: f64| Component {
-            log_weight: 0.0,
-            phase: Phase::Hold,
-            belief: Belief::<f64, 2, 3>::independent(SVector::from([strain * unit, 0.0]), &[0.0; 2]),
-            per_inside: 1.0,
-        };
-        assert!(known(0.1).is_like(&known(0.1)));
-        assert!(!known(0.1).is_like(&known(0.2)));
+fn no_single_weight_need_be_a_number() {
+    let parts = [(0.2, 0.0), (0.5, -1.0), (0.3, 2.0)];
+    let total: f64 = parts.iter().map(|(weight, exponent): &(f64, f64)| weight * exponent.exp()).sum();
+    for shift in [0.0, -2000.0, 2000.0] {
+        for order in [[0, 1, 2], [2, 1, 0], [1, 2, 0]] {
+            let mut mixture = Mixture::<f64, 3, 6, 3>::empty();
+            let mut children = Children::new(&mut mixture);
+            for k in order {
+                let belief: Belief<f64, 3, 6> = Belief::independent(vector![k as f64, 0.0, 0.0], &[1e-6; 3]);
+                let weighed = weighed(parts[k].0, parts[k].1 + shift);
+                children.add(&Parts::<f64, 0>::of(&belief), Phase::Extend, &weighed);
+            }
+            let density = children.density();
+            assert!((density.factor.ln() + density.exponent - shift - total.ln()).abs() < 1e-12, "{shift} {order:?}");
+            children.normalise::<0>(&mut ()).unwrap();
+            for (share, k) in mixture.shares().iter().zip(order) {
+                assert!((share.weight - parts[k].0 * parts[k].1.exp() / total).abs() < 1e-12, "{shift} {order:?}");
+            }
+        }
     }
 }
 
@@ -107,44 +131,157 @@ fn exactly_known_states_are_alike_only_if_they_are_equal() {
 /// one that is wide already because it has been merged.
 #[test]
 fn the_lightest_makes_room() {
-    let far = |strain: f64, log_weight: f64| Component {
-        log_weight,
-        phase: Phase::Extend,
-        belief: Belief::<f64, 2, 3>::independent(SVector::from([strain, 0.0]), &[1e-6; 2]),
-        per_inside: 1.0,
-    };
-    let mut mixture = Mixture::<f64, 2, 3, 2>::empty();
-    for (strain, log_weight) in [(0.1, -1.0), (0.2, -3.0), (0.3, -2.0), (0.4, -4.0)] {
-        mixture.add(&far(strain, log_weight));
+    let mut mixture = Mixture::<f64, 3, 6, 2>::empty();
+    let mut children = Children::new(&mut mixture);
+    for (strain, log_weight) in [(0.1, -1.0_f64), (0.2, -3.0), (0.3, -2.0), (0.4, -4.0)] {
+        let belief = Belief::independent(vector![strain, 0.0, 0.0], &[1e-6; 3]);
+        add(&mut children, &(log_weight.exp(), belief), Phase::Extend);
     }
-    let kept: Vec<f64> = mixture.components().iter().map(|c| c.belief.mean[0]).collect();
+    let strains: Vec<f64> = mixture.shares().iter().map(|share| share.belief.mean[0]).collect();
     let weights = [-1.0_f64, -3.0, -4.0].map(f64::exp);
     let merged = (0.1 * weights[0] + 0.2 * weights[1] + 0.4 * weights[2]) / weights.iter().sum::<f64>();
-    assert!((kept[0] - merged).abs() < 1e-15 && kept[1] == 0.3, "{kept:?}");
+    assert!((strains[0] - merged).abs() < 1e-15 && strains[1] == 0.3, "{strains:?}");
+}
+
+/// In no unit are two exactly known strains that differ the same strain.
+#[test]
+fn exactly_known_states_are_alike_only_if_they_are_equal() {
+    for unit in [1e-9, 1.0, 1e9] {
+        let mut mixture = Mixture::<f64, 3, 6, 8>::empty();
+        let mut children = Children::new(&mut mixture);
+        for strain in [0.1, 0.1, 0.2] {
+            let belief = Belief::independent(vector![strain * unit, 0.0, 0.0], &[0.0; 3]);
+            add(&mut children, &(1.0, belief), Phase::Hold);
+        }
+        assert_eq!(mixture.shares().len(), 2);
+    }
 }
 
 /// Hypotheses on a limit that are merged, and found to be far inside later: what the limits had taken from each is given
-/// back, whether they were merged or not.
+/// back.
 #[test]
 fn what_limits_took_is_given_back_after_merging() {
     let limits = StrainRange { lower: 0.0, upper: 1.0 };
-    let at = |strain: f64, weight: f64| {
-        let covariance = Symmetric::from_diagonal(&[1e-2, 1.0, 1.0]);
-        let belief = Belief { mean: SVector::from([strain, 0.0, 0.0]), covariance };
-        let mut component = Component { log_weight: weight.ln(), phase: Phase::Hold, belief, per_inside: 1.0 };
-        component.weigh_limits(&limits);
-        component
+    let weighing = Weighing::new(Evidence::new(limits, 1.0).unwrap());
+    let at = |strain: f64, variance: f64, per_inside: f64| {
+        let belief: Belief<f64, 3, 6> = Belief::independent(vector![strain, 0.0, 0.0], &[variance, 1.0, 1.0]);
+        let parts = Parts::<f64, 0>::of(&belief);
+        let (more_inside, per_inside) = weighing.of_limits::<Logistic, 0>(&parts, per_inside);
+        (parts, more_inside, per_inside)
     };
-    let inside = |mut component: Three| {
-        component.belief.mean[0] = 0.5;
-        component.belief.covariance[(0, 0)] = 1e-6;
-        component.weigh_limits(&limits);
-        component.log_weight.exp()
+    let mut mixture = Mixture::<f64, 3, 6, 2>::empty();
+    let mut children = Children::new(&mut mixture);
+    let mut taken = 0.0;
+    for (strain, weight) in [(0.0, 0.3), (-0.06, 0.7)] {
+        let (parts, more_inside, per_inside) = at(strain, 1e-2, 1.0);
+        taken += weight * (1.0 - more_inside);
+        children.add(&parts, Phase::Hold, &Weighed { more_inside, per_inside, ..weighed(weight, 0.0) });
+    }
+    let [merged]: [Share<f64, 3, 6>; 1] = mixture.shares().try_into().unwrap();
+    assert!(taken > 0.6 && (merged.weight + taken - 1.0).abs() < 1e-14, "{taken} {}", merged.weight);
+    let (_, more_inside, _) = at(0.5, 1e-6, merged.per_inside);
+    assert!((merged.weight * more_inside - 1.0).abs() < 1e-14, "{}", merged.weight * more_inside);
+}
+
+/// Pinning a mixture weighs its parts by how likely each found what is known: Bayes' rule, written out.
+#[test]
+fn a_pinned_mixture_is_weighed() {
+    let parts = [(0.3, 0.0), (0.7, 0.3)];
+    let mut mixture = Mixture::<f64, 3, 6, 2>::empty();
+    for (weight, strain) in parts {
+        let (share, phase) = mixture.one_more().unwrap();
+        (share.weight, *phase) = (weight, Phase::Extend);
+        share.belief = Belief::independent(vector![strain, 0.0, 0.0], &[0.01, 1.0, 1.0]);
+    }
+    let pinned = crate::State::pinned(&mixture, 0, &Gaussian { mean: 0.1, variance: 0.02 }).unwrap();
+    let likelihood = |strain: f64| (-0.5 * (0.1 - strain) * (0.1 - strain) / 0.03).exp();
+    let total: f64 = parts.iter().map(|(weight, strain)| weight * likelihood(*strain)).sum();
+    for (share, (weight, strain)) in pinned.shares().iter().zip(parts) {
+        assert!((share.weight - weight * likelihood(strain) / total).abs() < 1e-14);
+        assert!((share.belief.mean[0] - (strain + (0.1 - strain) / 3.0)).abs() < 1e-14);
+    }
+}
+
+type Split = SignSplit<f64, 0, 3, 4>;
+type State = Mixture<f64, 3, 6, 4>;
+
+fn split() -> Split {
+    let law = SensorLaw {
+        gauge: Gauge::Polynomial { coefficients: [1.5, 0.0, 0.0] },
+        extend_viscosity_s: 0.0,
+        retract_viscosity_s: 0.0,
+        branches: [],
+        range: StrainRange { lower: -1.0, upper: 1.0 },
     };
-    let (a, b) = (at(0.0, 0.3), at(-0.06, 0.7));
-    assert!((a.log_weight.exp() - 0.15).abs() < 1e-15, "half of it is outside");
-    let apart = inside(a) + inside(b);
-    assert!((apart - 1.0).abs() < 1e-14, "{apart}");
-    let merged = inside(a.merged(&b));
-    assert!((merged - 1.0).abs() < 1e-14, "{merged}");
+    let motion = Motion::ornstein_uhlenbeck(1.0, 0.01, 0.0, f64::INFINITY).unwrap();
+    let noise = ModelNoise { reading_sd: 1e-3, branch_sd: 0.0, baseline_sd: 0.02, baseline_time_s: 30.0 };
+    let model = SwitchedModel::new(law, motion, noise).unwrap();
+    Split::new(model, 0.1, None, Evidence::new(StrainRange { lower: -9.0, upper: 9.0 }, 1.0).unwrap()).unwrap()
+}
+
+/// At strains 0, -0.5 and 0.5, of which there is room for the children of two.
+fn of(weights: &[f64]) -> State {
+    let mut state = State::empty();
+    for (strain, weight) in [0.0, -0.5, 0.5].into_iter().zip(weights.iter().copied()) {
+        let (share, phase) = state.one_more().unwrap();
+        share.belief = Belief::independent(vector![strain, 0.0, 0.0], &[1e-4, 1e-4, 4e-4]);
+        (share.weight, *phase) = (weight, Phase::Extend);
+    }
+    state
+}
+
+fn back(state: &State, next: &State) -> State {
+    let split = split();
+    split.smooth_back(state, &split, None, next).unwrap().unwrap()
+}
+
+fn weights(state: &State) -> Vec<f64> {
+    state.shares().iter().map(|share| share.weight).collect()
+}
+
+/// Two hypotheses whose weights differ by less than the margin within which none is the lighter one: the children that came
+/// first are kept, those of the heavier are merged with the nearest. The strain is then told to be that of the first, so it
+/// was that before.
+#[test]
+fn a_smoother_goes_back_along_what_ran_forward_at_a_tie() {
+    let state = of(&[0.998, 1e-3 * (1.0 - 0.5 * LIGHTER), 1e-3]);
+    let mut next = state;
+    split().step(&mut next, None).unwrap();
+    for (share, _) in next.iter_mut() {
+        share.weight = if (share.belief.mean[0] + 0.5).abs() < 0.1 { 0.5 } else { 1e-12 };
+    }
+    assert_eq!(weights(&next), [1e-12, 1e-12, 0.5, 0.5], "the first are kept");
+    let back = back(&state, &next);
+    let weights = weights(&back);
+    assert!(weights[1] > 0.999 && weights[2] < 1e-9, "{weights:?}");
+    assert!((back.shares()[1].belief.mean[0] + 0.5).abs() < 0.01);
+}
+
+/// What is negligible is dropped after a step, and the places of the others move up: of two, the second is followed.
+#[test]
+fn what_moves_up_is_followed() {
+    let state = of(&[1e-8, 1.0]);
+    let mut next = state;
+    split().step(&mut next, None).unwrap();
+    assert!(next.shares().iter().all(|share| (share.belief.mean[0] + 0.5).abs() < 0.1), "the first is not dropped");
+    let back = back(&state, &next);
+    let weights = weights(&back);
+    assert!(weights[0] < 1e-6 && weights[1] > 0.999, "{weights:?}");
+    let (known, smoothed) = (&state.shares()[1].belief, &back.shares()[1].belief);
+    assert!((known.mean - smoothed.mean).amax() < 1e-9, "{smoothed:?}");
+}
+
+/// What says nothing new changes no weight, by the law of total probability. Without a reading nothing is lost: what there
+/// is no room for is merged with the nearest, whether it was displaced (the last is the heavier) or came too late (the
+/// last is the lighter).
+#[test]
+fn what_was_merged_is_followed() {
+    for filtered in [[0.997, 1e-3, 2e-3], [0.997, 2e-3, 1e-3]] {
+        let state = of(&filtered);
+        let mut next = state;
+        split().step(&mut next, None).unwrap();
+        for (back, filtered) in weights(&back(&state, &next)).iter().zip(filtered) {
+            assert!((back / filtered - 1.0).abs() < 1e-9, "{back} after all, {filtered} before");
+        }
+    }
 }

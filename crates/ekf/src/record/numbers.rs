@@ -1,10 +1,9 @@
 use ohmstrain_model::TURNING;
 
-use crate::mixture::sign_split::HOPELESS;
-use crate::mixture::step::LEAST_MASS;
+use crate::mixture::sign_split::{HOPELESS, LEAST_MASS};
 use crate::mixture::{ALIKE, LEAST_INSIDE, LEAST_WEIGHT, LIGHTER};
 use crate::substeps::GRACE;
-use crate::{Curve, Gaussian, SparseHypotheses, SparseSignSplit, Switch};
+use crate::{Curve, Gaussian, Hypotheses, SignSplit, Switch};
 
 /// What a filter of hypotheses has besides the kernel.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,9 +38,7 @@ pub mod shared {
     pub const TURNING_CLEAR_SQUARE: f32 = (TURNING.clear * TURNING.clear) as f32;
 }
 
-impl<const B: usize, const N: usize, const K: usize, S: Switch<f32>, G: Curve<f32>>
-    SparseSignSplit<f32, B, N, K, S, G>
-{
+impl<const B: usize, const N: usize, const K: usize, S: Switch<f32>, G: Curve<f32>> SignSplit<f32, B, N, K, S, G> {
     /// What it has besides the kernel.
     #[must_use]
     pub fn numbers(&self) -> MixtureNumbers {
@@ -57,9 +54,7 @@ impl<const B: usize, const N: usize, const K: usize, S: Switch<f32>, G: Curve<f3
     }
 }
 
-impl<const B: usize, const N: usize, const K: usize, S: Switch<f32>, G: Curve<f32>>
-    SparseHypotheses<f32, B, N, K, S, G>
-{
+impl<const B: usize, const N: usize, const K: usize, S: Switch<f32>, G: Curve<f32>> Hypotheses<f32, B, N, K, S, G> {
     /// What it has besides the kernel.
     #[must_use]
     pub fn numbers(&self) -> MixtureNumbers {

@@ -4,7 +4,7 @@ use std::vec::Vec;
 use ohmstrain_model::Scalar;
 
 use crate::belief::gaussian::Real;
-use crate::{Curve, SparseEkf, SparseHypotheses, SparseSignSplit, Switch};
+use crate::{Curve, Hypotheses, SignSplit, SparseEkf, Switch};
 
 /// What depends on the length of a step, as a list of numbers: what a filter goes on with for steps of another length.
 impl<T: Scalar, S, const B: usize, const N: usize, G: Curve<T>> SparseEkf<T, S, B, N, G> {
@@ -42,9 +42,7 @@ impl<T: Scalar, S, const B: usize, const N: usize, G: Curve<T>> SparseEkf<T, S, 
     }
 }
 
-impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: Curve<T>>
-    SparseSignSplit<T, B, N, K, S, G>
-{
+impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: Curve<T>> SignSplit<T, B, N, K, S, G> {
     /// As [`SparseEkf::set_step`], with the probabilities of a change of phase, `[from][to]`.
     pub fn set_step(&mut self, dt_s: T, numbers: &[T], chain: [[T; 3]; 3]) {
         self.kernel.set_step(dt_s, numbers);
@@ -52,9 +50,7 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
     }
 }
 
-impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: Curve<T>>
-    SparseHypotheses<T, B, N, K, S, G>
-{
+impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: Curve<T>> Hypotheses<T, B, N, K, S, G> {
     /// As [`SparseEkf::set_step`], with the probabilities of a change of phase, `[from][to]`.
     pub fn set_step(&mut self, dt_s: T, numbers: &[T], chain: [[T; 3]; 3]) {
         self.kernel.set_step(dt_s, numbers);

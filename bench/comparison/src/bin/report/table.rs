@@ -24,7 +24,7 @@ const fn ratio(words: &'static str, over: &'static str, under: &'static str, tar
     Ratio { words, over, under, target }
 }
 
-const RATIOS: [Ratio; 16] = [
+const RATIOS: [Ratio; 14] = [
     ratio("hand-written reference ÷ adskalman", "step/reference_3", "step/adskalman_3", AtMost(0.45)),
     ratio("EKF ÷ hand-written reference", "step/sparse_ekf_3", "step/reference_3", AtMost(1.3)),
     ratio("EKF ÷ adskalman", "step/sparse_ekf_3", "step/adskalman_3", AtMost(0.6)),
@@ -34,8 +34,6 @@ const RATIOS: [Ratio; 16] = [
     ratio("UKF ÷ typed-kalman's", "step/ukf_3", "step/typed_kalman_ukf_3", AtMost(0.6)),
     ratio("IMM ÷ EKF, six states", "step/imm_6", "step/sparse_ekf_6", AtMost(4.0)),
     ratio("sign-split of 8 ÷ EKF, six states", "step/sign_split_6", "step/sparse_ekf_6", AtMost(14.0)),
-    ratio("sparse IMM ÷ EKF, six states", "step/sparse_imm_6", "step/sparse_ekf_6", AtMost(4.0)),
-    ratio("sparse sign-split of 8 ÷ EKF, six states", "step/sparse_sign_split_6", "step/sparse_ekf_6", AtMost(14.0)),
     ratio(
         "samples a second of the smoother ÷ adskalman's",
         "recording/adskalman_smoother_3",
@@ -75,7 +73,7 @@ pub fn ratios(builds: &[Build]) -> String {
     out
 }
 
-const STEPS: [(&str, &str); 21] = [
+const STEPS: [(&str, &str); 19] = [
     ("hand-written reference, linear, without checks", "reference_3"),
     ("**EKF, sparse**", "sparse_ekf_3"),
     ("EKF, sparse, four states", "sparse_ekf_4"),
@@ -86,9 +84,7 @@ const STEPS: [(&str, &str); 21] = [
     ("iterated EKF, three linearisations", "iterated_ekf_3"),
     ("UKF", "ukf_3"),
     ("IMM, six states", "imm_6"),
-    ("IMM, sparse, six states", "sparse_imm_6"),
     ("sign-split of 8, six states", "sign_split_6"),
-    ("sign-split of 8, sparse, six states", "sparse_sign_split_6"),
     ("best 8 hypotheses, six states", "hypotheses_6"),
     ("nalgebra written straight, linear, without checks", "nalgebra_3"),
     ("adskalman 0.18, linear", "adskalman_3"),

@@ -9,9 +9,9 @@
 use ohmstrain_ekf::correction::{Correction, FEATURES, FeatureScale, InputScale, OUTPUTS, Process, ReadingFeatures};
 {% endif %}
 {% if splits %}
-use ohmstrain_ekf::{Belief, Compact, {% if rests %}Dwell, {% endif %}Evidence, Reading, SparseEkf, SparseMixture, SparseSignSplit, StepError};
+use ohmstrain_ekf::{Belief, Compact, {% if rests %}Dwell, {% endif %}Evidence, Mixture, Reading, SignSplit, SparseEkf, StepError};
 {% elif estimator.hypotheses %}
-use ohmstrain_ekf::{Belief, Compact, Dwell, Evidence, Reading, SparseEkf, SparseHypotheses, SparseMixture, StepError};
+use ohmstrain_ekf::{Belief, Compact, Dwell, Evidence, Hypotheses, Mixture, Reading, SparseEkf, StepError};
 {% else %}
 use ohmstrain_ekf::{Belief, Compact, Reading, SparseEkf, StepError};
 {% endif %}
@@ -30,9 +30,9 @@ pub type Model = SwitchedModel<f32, BRANCHES, STATES>;
 /// Hypotheses that are followed at once.
 pub const HYPOTHESES: usize = << estimator.hypotheses >>;
 /// Its filter.
-pub type Filter = << "SparseSignSplit" if splits else "SparseHypotheses" >><f32, BRANCHES, STATES, HYPOTHESES, Compact>;
+pub type Filter = << "SignSplit" if splits else "Hypotheses" >><f32, BRANCHES, STATES, HYPOTHESES, Compact>;
 /// What the filter knows.
-pub type State = SparseMixture<f32, STATES, ENTRIES, HYPOTHESES>;
+pub type State = Mixture<f32, STATES, ENTRIES, HYPOTHESES>;
 {% else %}
 /// Its filter.
 pub type Filter = SparseEkf<f32, Compact, BRANCHES, STATES>;
@@ -143,7 +143,7 @@ pub fn filter(model: Model) -> Result<Filter, StepError> {
 #[must_use]
 pub fn start(model: &Model) -> State {
 {% if estimator.hypotheses %}
-    SparseMixture::single(Belief::initial(model), Phase::<< "Extend" if splits else "Hold" >>)
+    Mixture::single(Belief::initial(model), Phase::<< "Extend" if splits else "Hold" >>)
 {% else %}
     Belief::initial(model)
 {% endif %}
@@ -156,7 +156,7 @@ pub fn start_at(model: &Model, strain: f32) -> State {
     (mean[0], variance[0]) = (strain, << known_variance >>);
     let belief = Belief::independent(mean, &variance);
 {% if estimator.hypotheses %}
-    SparseMixture::single(belief, Phase::<< "Extend" if splits else "Hold" >>)
+    Mixture::single(belief, Phase::<< "Extend" if splits else "Hold" >>)
 {% else %}
     belief
 {% endif %}

@@ -5,9 +5,7 @@ mod seen;
 
 use ohmstrain_calib::EstimatorKind;
 use ohmstrain_ekf::correction::{FEATURES, FeatureScale, ReadingFeatures};
-use ohmstrain_ekf::{
-    Belief, Gaussian, Reading, Real, SparseEkf, SparseHypotheses, SparseMixture, SparseSignSplit, StepError,
-};
+use ohmstrain_ekf::{Belief, Gaussian, Hypotheses, Mixture, Reading, Real, SignSplit, SparseEkf, StepError};
 use ohmstrain_model::{Phase, StrainRange, SwitchedModel};
 
 use super::doubt::Doubt;
@@ -74,13 +72,13 @@ impl<'a, T: Real, const B: usize, const N: usize, const L: usize, const K: usize
         let moving = match (parts.kind, parts.phases) {
             (EstimatorKind::SignSplit, Some(phases)) => {
                 let (dwell, evidence) = phases.filter_parts(limits)?;
-                let filter = SparseSignSplit::around(kernel, phases.rests.then_some(dwell), evidence);
-                Moving::SignSplit(filter, SparseMixture::single(belief, Phase::Extend))
+                let filter = SignSplit::around(kernel, phases.rests.then_some(dwell), evidence);
+                Moving::SignSplit(filter, Mixture::single(belief, Phase::Extend))
             }
             (EstimatorKind::Hypotheses, Some(phases)) => {
                 let (dwell, evidence) = phases.filter_parts(limits)?;
-                let filter = SparseHypotheses::around(kernel, dwell, evidence);
-                Moving::Histories(filter, SparseMixture::single(belief, Phase::Hold))
+                let filter = Hypotheses::around(kernel, dwell, evidence);
+                Moving::Histories(filter, Mixture::single(belief, Phase::Hold))
             }
             _ => Moving::Ekf(kernel, belief),
         };

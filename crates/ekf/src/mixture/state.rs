@@ -2,8 +2,9 @@ use nalgebra::SVector;
 use ohmstrain_model::{Phase, Symmetric};
 
 use crate::belief::gaussian::Real;
+use crate::ekf::pinned;
 use crate::mixture::pause::{Pause, PhaseSum};
-use crate::mixture::{Component, Mixture, marginal_match, moment_match};
+use crate::mixture::{LEAST_WEIGHT, marginal_match, moment_match};
 use crate::{Belief, Gaussian, State, StepError};
 
 /// A Gaussian and its share of a mixture. Shares are probabilities, not logarithms: nothing is to be converted at a step.
@@ -13,21 +14,53 @@ pub struct Share<T, const N: usize, const L: usize> {
     pub weight: T,
     /// The state, given the hypothesis.
     pub belief: Belief<T, N, L>,
-    /// As in [`Component`].
+    /// One over the probability of the strain's limits under `belief`. Only changes of the probability enter the weight:
+    /// evidence that was counted once is not counted again at every step of a rest on a limit. The weight times this is what
+    /// it would be without limits, so that a merged hypothesis has the mean of both.
     pub(crate) per_inside: T,
 }
 
 impl<T: Real, const N: usize, const L: usize> Share<T, N, L> {
-    fn component(&self, phase: Phase) -> Component<T, N, L> {
-        Component { log_weight: self.weight.ln(), phase, belief: self.belief, per_inside: self.per_inside }
-    }
-
-    fn of(component: &Component<T, N, L>) -> Self {
-        Self { weight: component.log_weight.exp(), belief: component.belief, per_inside: component.per_inside }
+    #[inline(always)]
+    fn vacant() -> Self {
+        let nothing = Belief { mean: SVector::zeros(), covariance: Symmetric::zeros() };
+        Self { weight: T::zero(), belief: nothing, per_inside: T::one() }
     }
 }
 
-/// One Gaussian per phase: what [`SparseImm`](crate::SparseImm) carries from step to step.
+/// Pins a component of every Gaussian, and weighs them by how likely that made it; what is negligible has no weight.
+fn pin<T: Real, const N: usize, const L: usize>(
+    shares: &mut [Share<T, N, L>],
+    index: usize,
+    known: &Gaussian<T>,
+) -> Result<(), StepError> {
+    let mut most = T::zero().ln();
+    for share in shares.iter_mut() {
+        let mut logarithm = share.weight.ln();
+        if share.weight > T::zero() {
+            let (belief, update) = pinned(&share.belief, index, known)?;
+            logarithm += update.log_likelihood;
+            share.belief = belief;
+        }
+        share.weight = logarithm;
+        most = most.max(logarithm);
+    }
+    if !most.is_finite() {
+        return Err(StepError::NonFiniteState);
+    }
+    let mut total = T::zero();
+    for share in shares.iter_mut() {
+        let weight = (share.weight - most).exp();
+        share.weight = if weight > T::of(LEAST_WEIGHT) { weight } else { T::zero() };
+        total += share.weight;
+    }
+    for share in shares {
+        share.weight /= total;
+    }
+    Ok(())
+}
+
+/// One Gaussian per phase: what [`Imm`](crate::Imm) carries from step to step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PhaseMixture<T, const N: usize, const L: usize> {
     pub(crate) modes: [Share<T, N, L>; 3],
@@ -53,52 +86,47 @@ impl<T: Real, const N: usize, const L: usize> PhaseMixture<T, N, L> {
         core::array::from_fn(|i| self.modes[i].weight)
     }
 
-    fn shares(&self) -> &[Share<T, N, L>] {
+    pub(crate) const fn shares(&self) -> &[Share<T, N, L>] {
         &self.modes
     }
 
-    fn mixture(&self) -> Mixture<T, N, L, 3> {
-        let mut mixture = Mixture::empty();
-        for (mode, phase) in self.modes.iter().zip(Phase::ALL).filter(|(mode, _)| mode.weight > T::zero()) {
-            mixture.push(mode.component(phase));
-        }
-        mixture
+    pub(crate) const fn shares_mut(&mut self) -> &mut [Share<T, N, L>] {
+        &mut self.modes
     }
 
-    /// A mixture that this one became: no two components of one phase.
-    fn refilled(mut self, from: &Mixture<T, N, L, 3>) -> Self {
-        for (mode, phase) in self.modes.iter_mut().zip(Phase::ALL) {
-            let found = from.components().iter().find(|component| component.phase == phase);
-            *mode = found.map_or(Share { weight: T::zero(), ..*mode }, Share::of);
-        }
-        self
+    #[inline(always)]
+    pub(crate) fn empty() -> Self {
+        Self { modes: [Share::vacant(); 3] }
     }
+
+    /// What has no weight stays where it is.
+    const fn drop_weightless(&mut self) {}
 }
 
-/// At most `K` Gaussians, each stretching, holding or releasing: what [`SparseSignSplit`](crate::SparseSignSplit) and
-/// [`SparseHypotheses`](crate::SparseHypotheses) carry from step to step.
+/// At most `K` Gaussians, each stretching, holding or releasing: what [`SignSplit`](crate::SignSplit) and
+/// [`Hypotheses`](crate::Hypotheses) carry from step to step.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SparseMixture<T, const N: usize, const L: usize, const K: usize> {
+pub struct Mixture<T, const N: usize, const L: usize, const K: usize> {
     shares: [Share<T, N, L>; K],
     phases: [Phase; K],
     len: usize,
     pause: Pause<T>,
 }
 
-impl<T: Real, const N: usize, const L: usize, const K: usize> SparseMixture<T, N, L, K> {
+impl<T: Real, const N: usize, const L: usize, const K: usize> Mixture<T, N, L, K> {
+    const CAPACITY: () = assert!(K >= 1 && N >= 2, "a mixture holds at least one hypothesis of strain and rate");
+
     /// One Gaussian that has all the weight.
     #[must_use]
     pub fn single(belief: Belief<T, N, L>, phase: Phase) -> Self {
-        let () = Mixture::<T, N, L, K>::CAPACITY;
+        let () = Self::CAPACITY;
         let share = Share { weight: T::one(), belief, per_inside: T::one() };
         Self { shares: [share; K], phases: [phase; K], len: 1, pause: Pause::over() }
     }
 
     #[inline(always)]
     pub(crate) fn empty() -> Self {
-        let nothing = Belief { mean: SVector::zeros(), covariance: Symmetric::zeros() };
-        let vacant = Share { weight: T::zero(), belief: nothing, per_inside: T::one() };
-        Self { shares: [vacant; K], phases: [Phase::Hold; K], len: 0, pause: Pause::over() }
+        Self { shares: [Share::vacant(); K], phases: [Phase::Hold; K], len: 0, pause: Pause::over() }
     }
 
     pub(crate) const fn pause(&self) -> &Pause<T> {
@@ -166,43 +194,18 @@ impl<T: Real, const N: usize, const L: usize, const K: usize> SparseMixture<T, N
         probabilities.sums
     }
 
-    fn mixture(&self) -> Mixture<T, N, L, K> {
-        let mut mixture = Mixture::empty();
-        mixture.set_pause(self.pause);
-        for (share, phase) in self.shares().iter().zip(self.phases()) {
-            mixture.push(share.component(*phase));
-        }
-        mixture
+    pub(crate) fn shares_mut(&mut self) -> &mut [Share<T, N, L>] {
+        self.shares.get_mut(..self.len).unwrap_or(&mut [])
     }
 
-    fn refilled(mut self, from: &Mixture<T, N, L, K>) -> Self {
-        let places = self.shares.iter_mut().zip(self.phases.iter_mut());
-        for ((share, phase), component) in places.zip(from.components()) {
-            (*share, *phase) = (Share::of(component), component.phase);
-        }
-        self.len = from.components().len();
-        self.pause = *from.pause();
-        self
+    fn drop_weightless(&mut self) {
+        self.retain(|share| share.weight > T::zero());
     }
 }
 
-impl<T: Real, const N: usize, const L: usize, const K: usize> From<&Mixture<T, N, L, K>> for SparseMixture<T, N, L, K> {
-    fn from(mixture: &Mixture<T, N, L, K>) -> Self {
-        Self::empty().refilled(mixture)
-    }
-}
-
-/// What both have in common. Everything that is not done at every step goes through [`Mixture`].
-macro_rules! sparse_state {
-    ($state:ident<T, N, L $(, $k:ident)?>, $capacity:expr) => {
-        impl<T: Real, const N: usize, const L: usize $(, const $k: usize)?> From<$state<T, N, L $(, $k)?>>
-            for Mixture<T, N, L, { $capacity }>
-        {
-            fn from(state: $state<T, N, L $(, $k)?>) -> Self {
-                state.mixture()
-            }
-        }
-
+/// What both have in common.
+macro_rules! mixture_state {
+    ($state:ident<T, N, L $(, $k:ident)?>) => {
         impl<T: Real, const N: usize, const L: usize $(, const $k: usize)?> State<T, N, L>
             for $state<T, N, L $(, $k)?>
         {
@@ -226,15 +229,22 @@ macro_rules! sparse_state {
             }
 
             fn inflated(&self, factor: T) -> Self {
-                self.refilled(&self.mixture().inflated(factor))
+                let mut inflated = *self;
+                for share in inflated.shares_mut() {
+                    share.belief = share.belief.inflated(factor);
+                }
+                inflated
             }
 
             fn pinned(&self, index: usize, known: &Gaussian<T>) -> Result<Self, StepError> {
-                Ok(self.refilled(&self.mixture().pinned(index, known)?))
+                let mut pinned = *self;
+                pin(pinned.shares_mut(), index, known)?;
+                pinned.drop_weightless();
+                Ok(pinned)
             }
         }
     };
 }
 
-sparse_state!(PhaseMixture<T, N, L>, 3);
-sparse_state!(SparseMixture<T, N, L, K>, K);
+mixture_state!(PhaseMixture<T, N, L>);
+mixture_state!(Mixture<T, N, L, K>);

@@ -1,0 +1,142 @@
+//! What the filters of hypotheses have in common around a step: in place, into a state that is there already, backwards, and as
+//! [`Estimator`](crate::Estimator), whose prepared step is the filter itself, made for that length.
+
+/// Its length of a step, and the estimator, of a filter whose state is `$state`.
+macro_rules! mixture_filter {
+    ($filter:ident<$($size:ident),+>, $state:ident<$($of_state:ident),*>) => {
+        impl<T: Real, $(const $size: usize,)+ S: Switch<T>, G: Curve<T>> $filter<T, $($size,)+ S, G> {
+            /// The model.
+            pub const fn model(&self) -> &SwitchedModel<T, B, N> {
+                self.kernel.model()
+            }
+
+            /// Goes on with steps of another length.
+            ///
+            /// # Errors
+            /// If `dt_s` is negative or not finite; the filter stays as it was.
+            pub fn retime(&mut self, dt_s: T) -> Result<(), StepError> {
+                $crate::ekf::check_time_step(dt_s)?;
+                *self = self.every(dt_s);
+                Ok(())
+            }
+        }
+
+        impl<T: Real, $(const $size: usize,)+ S: Switch<T>, G: Curve<T>, const L: usize> $crate::Estimator<T, N, L>
+            for $filter<T, $($size,)+ S, G>
+        {
+            type State = $state<T, N, L $(, $of_state)*>;
+            /// The filter for steps of that length.
+            type Prepared = Self;
+
+            fn prepare(&self, dt_s: T) -> Self {
+                self.every(dt_s)
+            }
+
+            fn longest_step_s(&self) -> T {
+                self.longest_s()
+            }
+
+            fn advance(
+                &self,
+                state: &Self::State,
+                prepared: &Self,
+                reading: Option<Reading<T>>,
+            ) -> Result<$crate::Advanced<Self::State, T>, StepError> {
+                let mut next = $state::empty();
+                let innovation = $crate::Estimator::advance_into(self, state, prepared, reading, &mut next)?;
+                Ok($crate::Advanced { state: next, innovation })
+            }
+
+            fn advance_into(
+                &self,
+                state: &Self::State,
+                prepared: &Self,
+                reading: Option<Reading<T>>,
+                next: &mut Self::State,
+            ) -> Result<Option<$crate::Innovation<T>>, StepError> {
+                prepared.step_into(state, reading, next)?.map(|said| said.innovation()).transpose()
+            }
+
+            fn smooth_back(
+                &self,
+                filtered: &Self::State,
+                prepared: &Self,
+                reading: Option<Reading<T>>,
+                next: &Self::State,
+            ) -> Result<Option<Self::State>, StepError> {
+                prepared.back(filtered, reading, next).map(Some)
+            }
+        }
+    };
+}
+pub(crate) use mixture_filter;
+
+/// The steps of a filter whose `step_recorded` makes a [`Mixture`](crate::Mixture) anew, forward and backwards along the same.
+macro_rules! mixture_steps {
+    () => {
+        /// Predicts one step ahead and takes the reading; without one it is a prediction and returns `None`.
+        ///
+        /// # Errors
+        /// See [`StepError`]; the state is untouched.
+        #[inline]
+        pub fn step<const L: usize>(
+            &self,
+            state: &mut Mixture<T, N, L, K>,
+            reading: Option<Reading<T>>,
+        ) -> Result<Option<MixtureResidual<T>>, StepError> {
+            let mut next = Mixture::empty();
+            let residual = self.step_into(state, reading, &mut next)?;
+            *state = next;
+            Ok(residual)
+        }
+
+        /// [`Self::step`] into a state that is there already, whatever it was: nothing need be moved.
+        ///
+        /// # Errors
+        /// See [`StepError`]; `next` then means nothing.
+        #[inline]
+        pub fn step_into<const L: usize>(
+            &self,
+            state: &Mixture<T, N, L, K>,
+            reading: Option<Reading<T>>,
+            next: &mut Mixture<T, N, L, K>,
+        ) -> Result<Option<MixtureResidual<T>>, StepError> {
+            self.step_heard(state, reading, next, &mut ())
+        }
+
+        /// A reading that is more exact than the numbers is taken again with more and more noise.
+        #[inline(always)]
+        fn step_heard<const L: usize>(
+            &self,
+            state: &Mixture<T, N, L, K>,
+            mut reading: Option<Reading<T>>,
+            next: &mut Mixture<T, N, L, K>,
+            recorder: &mut impl Recorder<T, B>,
+        ) -> Result<Option<MixtureResidual<T>>, StepError> {
+            let mut tries = 0;
+            loop {
+                match self.step_recorded(state, reading, next, recorder) {
+                    Err(refused) if reading.is_some() => {
+                        tries += 1;
+                        reading = Some(self.kernel.coarser(reading, tries, refused)?);
+                    }
+                    taken => return taken,
+                }
+            }
+        }
+
+        fn back<const L: usize>(
+            &self,
+            filtered: &Mixture<T, N, L, K>,
+            reading: Option<Reading<T>>,
+            next: &Mixture<T, N, L, K>,
+        ) -> Result<Mixture<T, N, L, K>, StepError> {
+            let mut following = Following::<T, B, N, L, K>::new(self.model(), self.kernel.dt_s());
+            let (mut heirs, mut smoothed) = (Mixture::empty(), *filtered);
+            self.step_heard(filtered, reading, &mut heirs, &mut following)?;
+            following.lineage.smooth(smoothed.shares_mut(), heirs.shares(), next.shares());
+            Ok(smoothed)
+        }
+    };
+}
+pub(crate) use mixture_steps;
