@@ -1,8 +1,9 @@
 use std::io::Read;
+use std::vec;
 
 use crate::columns::Columns;
-use crate::error::{Fault, TraceError};
-use crate::lines::{LineFault, LineFeed, Lines, is_plain};
+use crate::error::{BadContent, Fault, TraceError};
+use crate::lines::{LineFault, LineFeed, Lines, is_plain, take_apart};
 use crate::metadata::Metadata;
 use crate::row_parser::RowParser;
 use crate::trace::{Quantity, ReadingKind};
@@ -59,6 +60,8 @@ pub struct TraceReader<R> {
     record: StringRecord,
     /// Every line up to now was plain; after the first that was not, the csv crate reads them all.
     plain: bool,
+    /// What stood above the header and was none of a trace.
+    skipped: vec::IntoIter<BadContent>,
     /// A bad row does not end the trace.
     goes_on: bool,
     done: bool,
@@ -78,20 +81,58 @@ impl<R: Read> TraceReader<R> {
     /// # Errors
     /// [`TraceError`] if the source fails or does not start like a trace.
     pub fn with_overrides(source: R, name: &str, overrides: &Metadata) -> Result<Self, TraceError> {
-        let file = if name == "-" { "stdin" } else { name }.to_owned();
-        let mut lines = Lines::new(source);
-        let (mut metadata, header) = read_prelude(&mut lines).map_err(|fault| placed(fault, &file, lines.number()))?;
+        let (file, mut lines) = (called(name), Lines::new(source));
+        let (metadata, header) = read_prelude(&mut lines).map_err(|fault| placed(fault, &file, lines.number()))?;
+        Self::begin(file, lines, metadata, overrides, &header)
+    }
+
+    /// As [`with_overrides`](Self::with_overrides) and [`past_bad_lines`](Self::past_bad_lines), of a device that may say
+    /// something else first, a hundred lines at most: the iterator delivers their errors before the first row.
+    ///
+    /// ```
+    /// use ohmstrain_bench_data::{Metadata, TraceReader};
+    /// let file = "ets Jun  8 2016\nboot: 0x13\ntime_s,resistance_ohm\n0.0,1600\n";
+    /// let rows = TraceReader::past_preamble(file.as_bytes(), "-", &Metadata::default())?;
+    /// assert_eq!(rows.map(|row| row.is_ok()).collect::<Vec<_>>(), [false, false, true]);
+    /// # Ok::<(), ohmstrain_bench_data::TraceError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`TraceError`] if the source fails, or no header comes.
+    pub fn past_preamble(source: R, name: &str, overrides: &Metadata) -> Result<Self, TraceError> {
+        let (file, mut lines) = (called(name), Lines::new(source));
+        let (metadata, header, skipped) = read_past_preamble(&mut lines, &file)?;
+        let begun = Self::begin(file, lines, metadata, overrides, &header)?;
+        Ok(Self { skipped: skipped.into_iter(), goes_on: true, ..begun })
+    }
+
+    /// A source that has no header, or is joined after it: `header` names the columns, and its first line is a row.
+    ///
+    /// # Errors
+    /// [`TraceError`] if these are no columns of a trace.
+    pub fn headless(source: R, name: &str, header: &str, overrides: &Metadata) -> Result<Self, TraceError> {
+        Self::begin(called(name), Lines::new(source), Metadata::default(), overrides, header)
+    }
+
+    fn begin(
+        file: String,
+        lines: Lines<R>,
+        mut metadata: Metadata,
+        overrides: &Metadata,
+        header: &str,
+    ) -> Result<Self, TraceError> {
         metadata.override_with(overrides);
-        let plain = is_plain(&header);
+        let plain = is_plain(header);
         let mut records =
-            csv::ReaderBuilder::new().has_headers(false).flexible(true).from_reader(LineFeed::new(lines, &header));
+            csv::ReaderBuilder::new().has_headers(false).flexible(true).from_reader(LineFeed::new(lines, header));
         let mut record = StringRecord::new();
         records.read_record(&mut record).map_err(|error| feed_error(error, &mut records, &file))?;
         let at_header = |fault: Fault| TraceError::from(fault.at(&file, records.get_ref().line()));
         let columns = Columns::of_header(&record).map_err(at_header)?;
         let parser = RowParser::new(columns, &metadata).map_err(at_header)?;
         let metadata = metadata.in_own_units();
-        Ok(Self { file, metadata, parser, records, record, plain, goes_on: false, done: false })
+        let skipped = Vec::new().into_iter();
+        Ok(Self { file, metadata, parser, records, record, plain, skipped, goes_on: false, done: false })
     }
 
     /// Goes on after a line that is none of a trace: the iterator delivers its error, and then the rows after it. Whatever
@@ -145,7 +186,7 @@ impl<R: Read> TraceReader<R> {
         self.parser.has_temperature()
     }
 
-    /// Physical line read last, counted from 1.
+    /// Physical line read last, counted from 1; 0 before the first, where the header stands elsewhere.
     #[must_use]
     pub fn line(&self) -> u64 {
         self.records.get_ref().line()
@@ -187,6 +228,9 @@ impl<R: Read> Iterator for TraceReader<R> {
         if self.done {
             return None;
         }
+        if let Some(skipped) = self.skipped.next() {
+            return Some(Err(skipped.into()));
+        }
         let row = self.next_row().transpose();
         self.done = match &row {
             Some(Ok(_)) => false,
@@ -199,6 +243,39 @@ impl<R: Read> Iterator for TraceReader<R> {
 
 impl<R: Read> std::iter::FusedIterator for TraceReader<R> {}
 
+/// What messages call a source.
+fn called(name: &str) -> String {
+    if name == "-" { "stdin" } else { name }.to_owned()
+}
+
+/// Lines that a device may say before its header: a boot loader's are some dozen.
+const LONGEST_PREAMBLE: usize = 100;
+
+/// Metadata lines, the header line, and what stood above it that was neither.
+fn read_past_preamble<R: Read>(
+    lines: &mut Lines<R>,
+    file: &str,
+) -> Result<(Metadata, String, Vec<BadContent>), TraceError> {
+    let (mut metadata, mut skipped, mut cells) = (Metadata::default(), Vec::new(), StringRecord::new());
+    while skipped.len() < LONGEST_PREAMBLE {
+        let taken = match lines.next() {
+            Ok(None) => break,
+            Ok(Some(line)) if line.starts_with('#') => metadata.take_line(line),
+            Ok(Some(line)) => match take_apart(line, &mut cells).and_then(|()| Columns::of_header(&cells)) {
+                Ok(_) => return Ok((metadata, line.to_owned(), skipped)),
+                Err(fault) => Err(fault),
+            },
+            Err(LineFault::Content(fault)) => Err(fault),
+            Err(failed) => return Err(placed(failed, file, lines.number())),
+        };
+        skipped.extend(taken.err().map(|fault| fault.at(file, lines.number())));
+    }
+    let nothing = || Fault::new(A_HEADER, "the end of the file").at(file, lines.number().max(1));
+    Err(skipped.into_iter().next().unwrap_or_else(nothing).into())
+}
+
+const A_HEADER: &str = "a header such as `time_s,resistance_ohm,strain`";
+
 /// Metadata lines, and the header line.
 fn read_prelude<R: Read>(lines: &mut Lines<R>) -> Result<(Metadata, String), LineFault> {
     let mut metadata = Metadata::default();
@@ -209,7 +286,7 @@ fn read_prelude<R: Read>(lines: &mut Lines<R>) -> Result<(Metadata, String), Lin
         metadata.take_line(line).map_err(LineFault::Content)?;
     }
     let found = if lines.number() == 0 { "an empty file" } else { "the end of the file" };
-    Err(LineFault::Content(Fault::new("a header such as `time_s,resistance_ohm,strain`", found)))
+    Err(LineFault::Content(Fault::new(A_HEADER, found)))
 }
 
 /// An error of the csv crate is one of the lines that it was fed with.

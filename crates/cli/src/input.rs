@@ -4,7 +4,9 @@ use std::ops::Range;
 use std::path::Path;
 
 use ohmstrain::{JointParams, Quantity, Reading, ReadingUnit};
-use ohmstrain_bench_data::{Metadata, ParquetText, Reading as TraceReading, ReadingKind, Trace, TraceReader};
+use ohmstrain_bench_data::{
+    Metadata, ParquetText, Reading as TraceReading, ReadingKind, Trace, TraceError, TraceReader,
+};
 use ohmstrain_calib::Samples;
 use sha2::{Digest, Sha256};
 
@@ -25,8 +27,28 @@ pub struct Recording {
     pub trace: Trace,
 }
 
+/// How a recording begins.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Beginning<'a> {
+    /// With metadata and a header.
+    Header,
+    /// With what a device says before its header.
+    Preamble,
+    /// With a row of these columns.
+    Row(&'a str),
+}
+
 /// Opens a recording for reading row by row; `-` is stdin.
 pub fn open(path: &Path, overrides: &Metadata) -> Result<TraceReader<Box<dyn Read>>, CliError> {
+    open_at(path, overrides, Beginning::Header)
+}
+
+/// Opens a recording, or a stream that may have been joined in its middle.
+pub fn open_at(
+    path: &Path,
+    overrides: &Metadata,
+    beginning: Beginning<'_>,
+) -> Result<TraceReader<Box<dyn Read>>, CliError> {
     let source: Box<dyn Read> = if is_stdin(path) {
         let mut stdin = io::stdin().lock();
         // Waits for the first bytes, and leaves them where they are.
@@ -46,7 +68,33 @@ pub fn open(path: &Path, overrides: &Metadata) -> Result<TraceReader<Box<dyn Rea
         }
         Box::new(file)
     };
-    Ok(TraceReader::with_overrides(source, &path.display().to_string(), overrides)?)
+    let name = path.display().to_string();
+    match beginning {
+        Beginning::Header => Ok(TraceReader::with_overrides(source, &name, overrides)?),
+        Beginning::Preamble => Ok(TraceReader::past_preamble(source, &name, overrides).map_err(without_header)?),
+        Beginning::Row(header) => TraceReader::headless(source, &name, header, overrides).map_err(of_header_flag),
+    }
+}
+
+/// A stream whose header did not come.
+fn without_header(error: TraceError) -> CliError {
+    match error {
+        TraceError::Content(content) => {
+            let hint = "a stream without a header, or joined after it, needs --header time_s,resistance_ohm";
+            CliError::Input(format!("{content}; {hint}"))
+        }
+        error => error.into(),
+    }
+}
+
+/// `--header` has none of the columns.
+fn of_header_flag(error: TraceError) -> CliError {
+    match error {
+        TraceError::Content(content) => {
+            CliError::Arguments(format!("--header: expected {}, found {}", content.expected, content.found))
+        }
+        error => error.into(),
+    }
 }
 
 /// Opens a recording in a Parquet file, row by row as any other.
@@ -111,7 +159,7 @@ fn is_a_sensor(path: &Path) -> CliError {
 
 /// What messages call the header of a recording of which no row has been read yet.
 pub fn header<R: Read>(rows: &TraceReader<R>) -> String {
-    format!("{}:{}", rows.file(), rows.line())
+    if rows.line() == 0 { rows.file().to_owned() } else { format!("{}:{}", rows.file(), rows.line()) }
 }
 
 impl Recording {

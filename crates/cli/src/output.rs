@@ -10,7 +10,7 @@ use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-pub use kind::Kind;
+pub use kind::{IMPORT, Kind, SIMULATE};
 use place::{Identity, Place};
 
 use crate::error::CliError;

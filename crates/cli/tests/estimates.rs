@@ -241,6 +241,13 @@ fn a_strain_that_is_known_is_taken_in() {
             assert!(told[worst - 1] < untold[worst - 1]);
         }
     }
+    // After the end it is of no use, which is said.
+    for lag in [&["--lag-s", "1"][..], &[]] {
+        let late =
+            bench.run(&[&["filter", "trace.csv", "--sensor", "sensor.toml", "--known", "5000:0.1"], lag].concat());
+        let warned = "warning: trace.csv: --known 5000:0.1 was not used: the recording goes from 0 to ";
+        assert!(late.warnings.iter().any(|warning| warning.contains(warned)), "{:?}", late.warnings);
+    }
     let far = bench.run(&["filter", "trace.csv", "--sensor", "sensor.toml", "--known", "3:12"]);
     far.fails(2, "--known: expected 0.0000 to 0.3333, the limits of the sensor's strain, found 12; 10 % is 0.1");
 }

@@ -214,6 +214,9 @@ fn a_recording_is_played_back_recorded_marked_and_zeroed() {
     }
     assert_eq!(recorded.cells("mark").iter().filter(|mark| **mark == "1").count(), 1);
     bench.run(&["filter", "live-1.csv", "--sensor", "sensor.toml"]).ok();
+    let written = bench.read("live-1.csv");
+    let made_by: Vec<&str> = written.lines().filter(|line| line.starts_with("# made_by = ")).collect();
+    assert!(made_by.len() == 1 && made_by[0].ends_with(" live"), "{made_by:?}");
 }
 
 #[test]

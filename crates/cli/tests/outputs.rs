@@ -43,12 +43,12 @@ fn a_file_of_another_kind_is_replaced_only_by_force() {
         )
     };
     let cases: [(&[&str], &[&str], String); 7] = [
-        (&["simulate", "-o"], &["recording.csv"], foreign("recording.csv", "a recording")),
+        (&["simulate", "-o"], &["recording.csv"], foreign("recording.csv", "a simulated recording")),
         (&CALIBRATE, &["recording.csv"], foreign("recording.csv", "a sensor file")),
         (&CALIBRATE, &["new.toml", "--report", "README.md"], foreign("README.md", "a report")),
         (&REFINE, &["recording.csv"], foreign("recording.csv", "a sensor file")),
         (&EXPORT, &["."], foreign("./README.md", "an export")),
-        (&["demo", "--out"], &["mine"], foreign("mine/trace.csv", "a recording")),
+        (&["demo", "--out"], &["mine"], foreign("mine/trace.csv", "a simulated recording")),
         // A sensor file is no report, though both are ours.
         (&CALIBRATE, &["new.toml", "--report", "sensor.toml"], foreign("sensor.toml", "a report")),
     ];
@@ -61,6 +61,29 @@ fn a_file_of_another_kind_is_replaced_only_by_force() {
     assert!(bench.read("README.md").starts_with("<!DOCTYPE html>"));
     bench.run(&[&EXPORT[..], &[".", "--force"]].concat()).ok();
     assert!(bench.read("README.md").starts_with("# One soft strain sensor"));
+}
+
+/// What `live` recorded is nowhere else; a simulation is, and so is what was imported.
+#[test]
+fn only_what_can_be_made_again_is_replaced() {
+    let bench = Bench::new();
+    let rows: String = (0..60).map(|row| format!("{},{},{}\n", row, 1600 + row % 7, row % 5)).collect();
+    bench.write("rig.csv", format!("Time (s),Resistance (Ohm),Displacement (mm)\n{rows}"));
+    let import = ["import", "rig.csv", "--gauge-length-mm", "40", "--align", "none", "-o", "trace.csv"];
+    for _ in 0..2 {
+        assert_eq!(bench.run(&import).code, Some(0), "{}", bench.run(&import).stderr);
+    }
+    let imported = bench.read("trace.csv");
+    let recorded = format!("# made_by = ohmstrain 0.1.0 live\n{RECORDING}");
+    bench.write("live-1.csv", &recorded);
+    let simulated = "holds something else than a simulated recording of this program";
+    for name in ["trace.csv", "live-1.csv"] {
+        let message = format!("cannot write {name}: it {simulated}");
+        refused(&bench, &[&SIMULATE[..], &["-o", name]].concat(), ARGUMENTS, &message);
+    }
+    let message = "cannot write live-1.csv: it holds something else than an imported recording";
+    refused(&bench, &[&import[..7], &["live-1.csv"]].concat(), ARGUMENTS, message);
+    assert!(bench.read("trace.csv") == imported && bench.read("live-1.csv") == recorded);
 }
 
 #[test]

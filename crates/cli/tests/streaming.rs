@@ -291,3 +291,35 @@ fn bad_lines_are_skipped_where_that_is_wanted_and_counted() {
     let nothing = bench.feed(&[&FILTER[..], &["--skip-bad"]].concat(), "time_s,resistance_ohm\nx,y\n");
     assert_eq!(nothing.code, Some(4));
 }
+
+/// A board that starts says something first; who joins a stream late has not seen its header.
+#[test]
+fn a_stream_may_begin_with_something_else_or_in_its_middle() {
+    let bench = Bench::calibrated();
+    let good = first_lines(&bench.read("trace.csv"), 60);
+    let whole = bench.feed(&FILTER, good.clone()).ok();
+    let banner = b"\xff\x00booting...\nets Jun  8 2016 00:22:57\n".to_vec();
+    let skipping = [&FILTER[..], &["--skip-bad"]].concat();
+    let booted = bench.feed(&skipping, [banner.clone(), good.clone().into_bytes()].concat());
+    assert!(
+        booted.warnings.concat().contains("2 lines were skipped; the first one: stdin:1: "),
+        "{:?}",
+        booted.warnings
+    );
+    assert_eq!(booted.ok(), whole);
+
+    let is_row = |line: &&str| line.starts_with(|c: char| c.is_ascii_digit());
+    let rows: String = good.lines().filter(is_row).map(|line| format!("{line}\n")).collect();
+    let header = good.lines().find(|line| line.starts_with("time_s")).unwrap();
+    assert_eq!(bench.feed(&[&FILTER[..], &["--header", header]].concat(), rows.clone()).ok(), whole);
+    let joined = bench.feed(&[&skipping[..], &["--header", header]].concat(), format!("9,16\n{rows}"));
+    assert_eq!(joined.ok(), whole);
+
+    let hint = "; a stream without a header, or joined after it, needs --header time_s,resistance_ohm\n";
+    let headless = bench.feed(&skipping, rows);
+    assert!(headless.code == Some(4) && headless.stderr.ends_with(hint), "{}", headless.stderr);
+    let only = bench.feed(&skipping, [banner, header.as_bytes().to_vec()].concat());
+    only.fails(4, "stdin:4: expected at least one row of data, found the end of the file");
+    let odd = bench.feed(&[&FILTER[..], &["--header", "a,b"]].concat(), "1,2\n");
+    odd.fails(2, "--header: expected a header with the column `time_s` or `time_us`, found `a,b`");
+}

@@ -84,9 +84,12 @@ pub struct FilterArgs {
     /// Estimates from there on follow
     #[arg(long, value_name = "T:X[:SD]", allow_negative_numbers = true)]
     pub known: Vec<KnownStrain>,
-    /// Go on after lines that are none of a trace, as serial lines bring; they are counted on stderr
+    /// Go on after lines that are none of a trace, as serial lines bring, before the header too; they are counted on stderr
     #[arg(long)]
     pub skip_bad: bool,
+    /// Names of the columns of a stream that has no header line, or was joined after it: time_us,adc for instance
+    #[arg(long, value_name = "COLUMNS")]
+    pub header: Option<String>,
     /// What to write
     #[command(flatten)]
     pub written: WrittenArgs,

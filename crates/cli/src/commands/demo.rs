@@ -26,7 +26,7 @@ pub fn run(args: &DemoArgs) -> Result<(), CliError> {
     let mut outputs = Outputs::new(args.force, []);
     outputs.folder(&args.out)?;
     let mut claim = |name: &str, kind| outputs.claim(&args.out.join(name), kind);
-    let trace_output = claim("trace.csv", Kind::Trace)?;
+    let trace_output = claim("trace.csv", Kind::Simulation)?;
     let sensor_output = claim("sensor.toml", Kind::Sensor)?;
     let filtered_output = claim("estimates.csv", Kind::Estimates)?;
     let smoothed_output = claim("smoothed.csv", Kind::Estimates)?;

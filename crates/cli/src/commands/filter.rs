@@ -1,13 +1,14 @@
 use std::collections::VecDeque;
 use std::io::{self, Read};
 
+use ohmstrain::number::significant;
 use ohmstrain::{Error, Estimate, Filter, LaggedFilter, Reading, Sensor, ValidityWatch};
 use ohmstrain_bench_data::{BadContent, Row, TraceError, TraceReader};
 
 use crate::args::{FilterArgs, KnownStrain, RestResistance};
 use crate::error::CliError;
 use crate::estimates::{EstimateWriter, columns};
-use crate::input::{self, check_unit, is_stdin};
+use crate::input::{self, Beginning, check_unit, is_stdin};
 use crate::readings::no_row;
 use crate::run::{builder, rest_resistance};
 use crate::sensor_file;
@@ -28,7 +29,12 @@ pub fn run(args: &FilterArgs) -> Result<(), CliError> {
     let mut sensor = sensor_file::read(&args.estimate.sensor, kind)?;
     let mut filter = Running::new(&sensor, args)?;
     suits::warn_of_start(args.estimate.initial_strain, &sensor);
-    let rows = input::open(&args.trace_file, &args.estimate.trace.metadata())?;
+    let beginning = match &args.header {
+        Some(columns) => Beginning::Row(columns),
+        None if args.skip_bad => Beginning::Preamble,
+        None => Beginning::Header,
+    };
+    let rows = input::open_at(&args.trace_file, &args.estimate.trace.metadata(), beginning)?;
     let header = input::header(&rows);
     check_unit(&header, rows.reading_kind(), sensor.params().reading)?;
     if let Some(joint) = input::joint(rows.metadata()) {
@@ -51,7 +57,8 @@ struct Running {
     known: VecDeque<KnownStrain>,
     /// How well they are known, unless they say so themselves.
     known_sd: f64,
-    /// Time of the last row.
+    /// Times of the first and the last row.
+    first_s: f64,
     time_s: f64,
 }
 
@@ -75,7 +82,7 @@ impl Running {
         for known in &known {
             trial.know(known.strain, known.sd.unwrap_or(known_sd))?;
         }
-        Ok(Self { filter, known: known.into(), known_sd, time_s: f64::NEG_INFINITY })
+        Ok(Self { filter, known: known.into(), known_sd, first_s: f64::NAN, time_s: f64::NEG_INFINITY })
     }
 
     /// Takes a row; the rows that are due.
@@ -85,6 +92,7 @@ impl Running {
         if let Lag::None(filter, row) = &mut self.filter {
             *row = Some(filter.step(time_s, reading)?);
         }
+        self.first_s = self.first_s.min(time_s);
         self.time_s = time_s;
         match &mut self.filter {
             Lag::None(filter, row) => {
@@ -103,6 +111,17 @@ impl Running {
         match &mut self.filter {
             Lag::None(..) => Ok(&[]),
             Lag::Some(filter) => filter.finish(),
+        }
+    }
+
+    /// Says which strains no row came for.
+    fn warn_of_unused(&self, file: &str) {
+        let (first, last) = (significant(self.first_s, 6), significant(self.time_s, 6));
+        for known in self.known.iter().filter(|known| known.time_s > self.time_s) {
+            let KnownStrain { time_s, strain, .. } = known;
+            CliError::warning(&format!(
+                "{file}: --known {time_s}:{strain} was not used: the recording goes from {first} to {last} s"
+            ));
         }
     }
 
@@ -141,8 +160,10 @@ fn stream<W: io::Write + Send>(
     let mut rows = if args.skip_bad { rows.past_bad_lines() } else { rows };
     let first = first_rows(&mut rows, args.skip_bad, count, if sink.live { count } else { count.max(FIRST_READINGS) })?;
     if first.iter().all(Result::is_err) {
-        // What was skipped may be all there was.
-        return Err(first.into_iter().find_map(Result::err).map_or_else(|| no_row(&rows), CliError::from));
+        // What was skipped may be all there was; what stood above the header is not to blame for it.
+        let above = |error: &TraceError| matches!(error, TraceError::Content(fault) if fault.is_foreign);
+        let fault = first.into_iter().filter_map(Result::err).find(|error| !above(error));
+        return Err(fault.map_or_else(|| no_row(&rows), CliError::from));
     }
     let known = || first.iter().flatten().map(|row| row.reading.value);
     let rest = rest_resistance(wanted, known(), &sink.file)?;
@@ -164,6 +185,9 @@ fn stream<W: io::Write + Send>(
         row => take(row?),
     });
     skipped.say();
+    if streamed.is_ok() {
+        filter.warn_of_unused(&sink.file);
+    }
     // The rows that still wait get their estimates, whatever stopped the stream, and what was estimated is still good.
     let finished = match filter.finish() {
         Ok(estimates) => sink.write(estimates),
@@ -253,7 +277,8 @@ fn first_rows<R: Read>(
         known += usize::from(row.as_ref().is_ok_and(|row| row.reading.value.is_finite()));
         let failed = row.is_err() && !passed_over;
         first.push(row);
-        if failed || known >= wanted || (known >= enough && first.len() >= MOST_FIRST_ROWS) {
+        let is_enough = !passed_over && known >= wanted;
+        if failed || is_enough || (known >= enough && first.len() >= MOST_FIRST_ROWS) {
             break;
         }
     }

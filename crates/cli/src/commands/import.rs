@@ -3,20 +3,20 @@ use ohmstrain_bench_data::import::{Plan, Table};
 use crate::args::ImportArgs;
 use crate::error::CliError;
 use crate::lab_files;
-use crate::output::{Kind, Outputs, print};
+use crate::output::{IMPORT, Kind, Outputs, print};
 use crate::sensor_file::MADE_BY;
 
 /// Makes a trace of a lab's files. What was taken for what, and what was left out, goes to stderr.
 pub fn run(args: &ImportArgs) -> Result<(), CliError> {
     let mut outputs = Outputs::new(args.force, &args.files);
-    let output = args.output.as_deref().map(|path| outputs.claim(path, Kind::Trace)).transpose()?;
+    let output = args.output.as_deref().map(|path| outputs.claim(path, Kind::Import)).transpose()?;
     let recipe = args.known.recipe();
     let tables = lab_files::read(&args.files, &recipe)?;
     let plan = Plan::new(&tables, &recipe)?;
     let mut imported = plan.import(&tables)?;
     let other = &mut imported.trace.metadata.other;
     other.retain(|(key, _)| key != "made_by");
-    other.push(("made_by".into(), MADE_BY.into()));
+    other.push(("made_by".into(), format!("{MADE_BY} {IMPORT}")));
     CliError::remark(&columns(&plan, &tables));
     imported.remarks.iter().for_each(|remark| CliError::remark(remark));
     let mut bytes = Vec::new();

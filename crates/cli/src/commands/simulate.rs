@@ -3,13 +3,13 @@ use ohmstrain_bench_data::simulate::{SimulationSettings, simulate};
 
 use crate::args::SimulateArgs;
 use crate::error::CliError;
-use crate::output::{Kind, Outputs, print};
+use crate::output::{Kind, Outputs, SIMULATE, print};
 use crate::sensor_file::MADE_BY;
 
 /// Simulates a recording and writes it.
 pub fn run(args: &SimulateArgs) -> Result<(), CliError> {
     let mut outputs = Outputs::new(args.force, []);
-    let output = args.output.as_deref().map(|path| outputs.claim(path, Kind::Trace)).transpose()?;
+    let output = args.output.as_deref().map(|path| outputs.claim(path, Kind::Simulation)).transpose()?;
     let settings = SimulationSettings {
         elongation_mm: args.elongation_mm,
         speed_mm_s: args.speed_mm_s,
@@ -33,7 +33,7 @@ pub fn run(args: &SimulateArgs) -> Result<(), CliError> {
 /// A simulated recording as it is written: it says that it is one, so that it may be replaced by another.
 pub fn bytes(settings: &SimulationSettings) -> Result<Vec<u8>, String> {
     let mut trace: Trace = simulate(settings).map_err(|error| error.to_string())?;
-    trace.metadata.other.push(("made_by".into(), MADE_BY.into()));
+    trace.metadata.other.push(("made_by".into(), format!("{MADE_BY} {SIMULATE}")));
     let mut bytes = Vec::new();
     trace.write(&mut bytes).map_err(|error| error.to_string())?;
     Ok(bytes)

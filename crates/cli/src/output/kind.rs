@@ -1,8 +1,10 @@
 /// What an output is, and how one that this program wrote is told from others.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// A recording.
-    Trace,
+    /// A simulated recording.
+    Simulation,
+    /// A recording made of a lab's files.
+    Import,
     /// A sensor's parameters.
     Sensor,
     /// What a fleet has taught.
@@ -21,7 +23,8 @@ impl Kind {
     /// Its name in messages.
     pub const fn name(self) -> &'static str {
         match self {
-            Self::Trace => "a recording",
+            Self::Simulation => "a simulated recording",
+            Self::Import => "an imported recording",
             Self::Sensor => "a sensor file",
             Self::Prior => "a prior",
             Self::Estimates => "estimates",
@@ -35,10 +38,10 @@ impl Kind {
     pub fn wrote(self, head: &str) -> bool {
         let mut lines = head.lines();
         match self {
-            // What `simulate` writes says so; a recording never does by itself.
-            Self::Trace => {
-                lines.take_while(|line| line.starts_with('#')).any(|line| line.starts_with("# made_by = ohmstrain "))
-            }
+            // What can be made again says so: a simulation, and what was imported from files that are still there. What
+            // `live` recorded cannot.
+            Self::Simulation => is_made_by(lines, SIMULATE),
+            Self::Import => is_made_by(lines.clone(), IMPORT) || is_made_by(lines, SIMULATE),
             Self::Sensor => {
                 let mut starts = |start| lines.next().is_some_and(|line: &str| line.starts_with(start));
                 starts("format = ") && starts("made_by = \"ohmstrain ")
@@ -58,6 +61,19 @@ impl Kind {
     }
 }
 
+/// What recordings say of the command that made them.
+pub const SIMULATE: &str = "simulate";
+/// As [`SIMULATE`].
+pub const IMPORT: &str = "import";
+
+/// Whether the metadata say that this program's `command` made a recording.
+fn is_made_by<'a>(lines: impl Iterator<Item = &'a str>, command: &str) -> bool {
+    let by = |line: &str| {
+        line.strip_prefix("# made_by = ohmstrain ").is_some_and(|by| by.split(' ').nth(1) == Some(command))
+    };
+    lines.take_while(|line| line.starts_with('#')).any(by)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -66,8 +82,11 @@ mod tests {
     #[test]
     fn what_others_wrote_is_not_ours() {
         let cases = [
-            (Kind::Trace, "# material = silicone\ntime_s,resistance_ohm\n0,1\n"),
-            (Kind::Trace, "time_s,resistance_ohm\n# made_by = ohmstrain 0.1.0\n"),
+            (Kind::Simulation, "# material = silicone\ntime_s,resistance_ohm\n0,1\n"),
+            (Kind::Simulation, "time_s,resistance_ohm\n# made_by = ohmstrain 0.1.0 simulate\n"),
+            (Kind::Simulation, "# made_by = ohmstrain 0.1.0 live\ntime_s,resistance_ohm\n"),
+            (Kind::Simulation, "# made_by = ohmstrain 0.1.0 import\ntime_s,resistance_ohm\n"),
+            (Kind::Import, "# made_by = ohmstrain 0.1.0 live\ntime_s,resistance_ohm\n"),
             (Kind::Sensor, "format = 4\nmade_by = \"somebody\"\n"),
             (Kind::Prior, "format = 4\nmade_by = \"ohmstrain 0.1.0\"\nquantity = \"strain\"\n"),
             (Kind::Sensor, "[package]\nname = \"ohmstrain\"\n"),

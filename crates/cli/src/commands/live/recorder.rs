@@ -29,8 +29,10 @@ impl Recorder {
     /// If none can be made.
     pub fn begin(prefix: &Path, lines: &LineParser) -> io::Result<Self> {
         let (path, mut file) = new_file(prefix)?;
-        writeln!(file, "# made_by = {MADE_BY}")?;
-        write!(file, "{}", lines.metadata())?;
+        // Who made what is played back did not make this.
+        let mut metadata = lines.metadata();
+        metadata.other.retain(|(key, _)| key != "made_by");
+        write!(file, "# made_by = {MADE_BY} live\n{metadata}")?;
         let mut rows = RowWriter::new(BufWriter::new(file));
         let reading = match (lines.has_codes(), lines.reading_kind()) {
             (true, _) => "adc",
