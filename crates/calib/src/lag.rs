@@ -21,7 +21,7 @@ struct Search {
 }
 
 /// The first look, as far as a reference is late or early where clocks were started by hand.
-const FAR: Search = Search { around_s: 0.0, reach_s: 10.0, steps: 20, rows: 1500 };
+const FAR: Search = Search { around_s: 0.0, reach_s: 12.0, steps: 24, rows: 1500 };
 /// The second look, around what the first one has found.
 const NEAR: Search = Search { around_s: 0.0, reach_s: 1.0, steps: 20, rows: 6000 };
 /// The first look reaches no further than this share of the recording.
@@ -53,8 +53,8 @@ pub struct Lag {
 
 /// How far the reference lags behind the reading.
 ///
-/// The lag, within ±10 s (or a tenth of the recording) if it is [sure](Lag::is_sure) and ±1 s if not, at which a law with two branches, a cubic gauge and no dash-pots
-/// explains the readings best, on blocks left out. Law and readings are compared through a high-pass as long as the lags
+/// The lag, within ±12 s (or a tenth of the recording) if it is [sure](Lag::is_sure) and ±1 s if not, at which a law with
+/// two branches, a cubic gauge and no dash-pots explains the readings best, on blocks left out. Law and readings are compared through a high-pass as long as the lags
 /// reach: a lag shows where the movement changes, and slow errors of the law, which are larger, would move it by half a
 /// second and more. A dash-pot is left out because it looks like a lag: what a sensor has of one is part of the answer. A
 /// movement that repeats cannot tell a lag from one that is a period longer; the smaller one is given.

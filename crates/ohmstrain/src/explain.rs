@@ -1,4 +1,4 @@
-use ohmstrain_calib::{Identifiability, Lag, Samples, identifiability, reference_lag, screen};
+use ohmstrain_calib::{CalibrationError, Identifiability, Lag, Samples, identifiability, reference_lag, screen};
 
 use crate::{Error, Recording, Sensor};
 
@@ -49,9 +49,14 @@ impl Recording<'_> {
     /// ```
     #[must_use]
     pub fn reference_lag(&self) -> Option<ReferenceLag> {
-        // What cannot be screened is for the calibration to refuse.
-        let screened = screen(&[self.samples]).ok()?;
-        let lag = screened.samples().first().and_then(reference_lag).filter(Lag::is_sure)?;
+        let lag = match screen(&[self.samples]) {
+            Ok(screened) => screened.samples().first().and_then(reference_lag),
+            // Which may be the lag's own doing.
+            Err(CalibrationError::NothingExplained { .. }) => reference_lag(&self.samples),
+            // What cannot be screened is for the calibration to refuse.
+            Err(_) => None,
+        };
+        let lag = lag.filter(Lag::is_sure)?;
         Some(ReferenceLag { lag_s: lag.lag_s, movement_s: lag.movement_s })
     }
 }

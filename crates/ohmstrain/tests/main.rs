@@ -1,6 +1,7 @@
 //! The library as its users see it. One test program; a module for each subject.
 
 mod doubts;
+mod lag;
 mod rows;
 mod surprises;
 mod threads;
