@@ -1,22 +1,25 @@
 //! What the templates show: a sensor's filter in `f32`, for steps of one length.
 
-use ohmstrain::{DOUBT, KNOWN_BEYOND};
-use ohmstrain_calib::{EstimatorKind, HISTORIES, HYPOTHESES, PortableFilter, Quantity, ReadingUnit, SensorParams};
-use ohmstrain_ekf::record::{MixtureNumbers, shared};
-use ohmstrain_ekf::{Belief, Compact, Gaussian, Hypotheses, SignSplit, SparseEkf};
-use ohmstrain_model::TURNING;
+mod kernel;
+mod readings;
+
+use ohmstrain::KNOWN_BEYOND;
+use ohmstrain_calib::{EstimatorKind, PortableFilter, Quantity, ReadingUnit, SensorParams};
+use ohmstrain_ekf::Belief;
+use ohmstrain_ekf::record::shared;
 use serde::Serialize;
 
 use super::correction::CorrectionConstants;
 use super::cost::Cost;
-use super::doubt::DoubtParts;
 use super::fixed_rate::FixedRate;
 use super::law::{LawConstants, NoiseConstants, PhaseConstants, PriorConstants};
 use super::literal::{Literal, literals};
 use super::plan::{ChipFilter, Plan};
 use super::twin::Parts;
 use super::vectors::Vectors;
-use super::{ExportError, arithmetic, parameter, too_many_branches};
+use super::{ExportError, too_many_branches};
+use kernel::{Recorded, SharedConstants, StepConstants, TurningConstants};
+use readings::{DoubtConstants, SieveConstants};
 
 /// A sensor as the templates have it.
 #[derive(Debug, Serialize)]
@@ -95,113 +98,6 @@ struct EstimatorText {
     hypotheses: usize,
 }
 
-/// What a reading must be.
-#[derive(Debug, Serialize)]
-struct SieveConstants {
-    lower: Literal,
-    upper: Literal,
-    longest_repeat_s: Option<Literal>,
-    most_repeats: u32,
-    error_time_s: Option<Literal>,
-}
-
-/// When the interval is wider than the filter says.
-#[derive(Debug, Serialize)]
-struct DoubtConstants {
-    low: Literal,
-    high: Literal,
-    fastest_per_s: Literal,
-    longest_s: Literal,
-    per_reading: Literal,
-    /// Variances.
-    start: Literal,
-    most: Literal,
-    fades_s: Literal,
-    outside_fades_s: Literal,
-    margin: Literal,
-    shows: Literal,
-    faster: Literal,
-    worth: Literal,
-    zero: Literal,
-    rest: Option<RestConstants>,
-}
-
-/// Where the sensor rests.
-#[derive(Debug, Serialize)]
-struct RestConstants {
-    rested: Literal,
-    tolerance: Literal,
-    lasts_s: Literal,
-    sign: Literal,
-    end: Literal,
-}
-
-impl DoubtConstants {
-    fn new(seen: &DoubtParts, zero: Literal) -> Self {
-        let narrow = |number: f64| Literal(number as f32);
-        Self {
-            low: narrow(seen.low),
-            high: narrow(seen.high),
-            fastest_per_s: narrow(seen.fastest_per_s),
-            longest_s: narrow(seen.longest_s),
-            per_reading: narrow(seen.per_reading),
-            start: narrow(seen.start),
-            most: narrow(seen.most),
-            fades_s: narrow(DOUBT.fades_s),
-            outside_fades_s: narrow(DOUBT.outside_fades_s),
-            margin: narrow(DOUBT.margin),
-            shows: narrow(DOUBT.shows),
-            faster: narrow(DOUBT.faster),
-            worth: narrow(DOUBT.worth),
-            zero,
-            rest: seen.rest.map(|rest| RestConstants {
-                rested: narrow(rest.rested),
-                tolerance: narrow(rest.tolerance),
-                lasts_s: narrow(rest.lasts_s),
-                sign: narrow(rest.sign),
-                end: narrow(rest.end),
-            }),
-        }
-    }
-}
-
-/// What depends on the length of a step.
-#[derive(Debug, Serialize)]
-struct StepConstants {
-    names: Vec<String>,
-    usual_s: Literal,
-    longest_s: Literal,
-    usual: Vec<Literal>,
-    lower_s: Literal,
-    upper_s: Literal,
-    nodes: Vec<Literal>,
-    inverses: Vec<Literal>,
-    rows: Vec<Vec<Literal>>,
-    /// What is one over what.
-    reciprocals: Vec<(String, String)>,
-}
-
-/// What is the same in all filters of hypotheses.
-#[derive(Debug, Serialize)]
-struct SharedConstants {
-    alike: Literal,
-    least_weight: Literal,
-    not_lighter: Literal,
-    least_inside: Literal,
-    least_mass: Literal,
-}
-
-/// How often a rate turns around within a step.
-#[derive(Debug, Serialize)]
-struct TurningConstants {
-    clear: Literal,
-    normal_density: Literal,
-    reach: Literal,
-    even_excess: Literal,
-    brownian_excess: Literal,
-    brownian_variance: Literal,
-}
-
 impl Exported {
     /// Checks that the sensor has an exported form and computes all of it. `plan` says what of its filter.
     ///
@@ -241,7 +137,6 @@ impl Exported {
         let start: Belief<f32, N, L> = Belief::initial(model);
         let reading_sd = model.noise().reading_sd;
         let finite = |number: f32| number.is_finite().then_some(Literal(number));
-        let sieve = filter.readings;
         let vectors = Vectors::new::<B, N, L>(&sensor)?;
         let exported = Self {
             made_by: made_by.into(),
@@ -271,13 +166,7 @@ impl Exported {
             known_variance: Literal(sensor.parts.start_variance),
             known_beyond: Literal((KNOWN_BEYOND * params.limits.span()) as f32),
             reading_variance: Literal(reading_sd * reading_sd),
-            sieve: SieveConstants {
-                lower: Literal(sieve.plausible.0 as f32),
-                upper: Literal(sieve.plausible.1 as f32),
-                longest_repeat_s: finite(sieve.longest_repeat_s as f32),
-                most_repeats: sieve.most_repeats,
-                error_time_s: Some(Literal(sieve.error_time_s as f32)).filter(|time_s| time_s.0 > 0.0),
-            },
+            sieve: SieveConstants::new(&filter.readings),
             doubt: DoubtConstants::new(&sensor.parts.doubt, Literal(sensor.parts.zero)),
             steps: StepConstants::new(&sensor, &names),
             fresh_mean: numbers.fresh.iter().map(|rate| Literal(rate.mean)).collect(),
@@ -286,21 +175,8 @@ impl Exported {
             forgets_s: finite(numbers.forgets_direction_s),
             clear_tail: Literal(numbers.clear),
             hopeless: Literal(shared::HOPELESS_SQUARE),
-            limits: SharedConstants {
-                alike: Literal(shared::ALIKE_BELOW),
-                least_weight: Literal(shared::LEAST_WEIGHT_KEPT),
-                not_lighter: Literal(shared::NOT_LIGHTER),
-                least_inside: Literal(shared::LEAST_INSIDE_LIMITS),
-                least_mass: Literal(shared::LEAST_MASS_LEFT),
-            },
-            turning: TurningConstants {
-                clear: Literal(shared::TURNING_CLEAR_SQUARE),
-                normal_density: Literal(TURNING.normal_density as f32),
-                reach: Literal(TURNING.reach as f32),
-                even_excess: Literal(TURNING.even_excess as f32),
-                brownian_excess: Literal(TURNING.brownian.0 as f32),
-                brownian_variance: Literal(TURNING.brownian.1 as f32),
-            },
+            limits: SharedConstants::new(),
+            turning: TurningConstants::new(),
             correction: filter
                 .correction
                 .as_ref()
@@ -335,25 +211,6 @@ impl Exported {
     }
 }
 
-impl StepConstants {
-    fn new<const B: usize, const N: usize>(sensor: &FixedRate<'_, B, N>, names: &[String]) -> Self {
-        let table = &sensor.table;
-        let narrow = |numbers: &[f64]| numbers.iter().map(|x| Literal(*x as f32)).collect();
-        Self {
-            names: names.to_vec(),
-            usual_s: Literal(sensor.usual_step_s()),
-            longest_s: Literal(sensor.parts.longest_step_s),
-            usual: literals(&sensor.usual_numbers()),
-            lower_s: Literal(table.range.0 as f32),
-            upper_s: Literal(table.range.1 as f32),
-            nodes: narrow(&table.nodes),
-            inverses: narrow(&table.inverses),
-            rows: table.rows.iter().map(|row| narrow(row)).collect(),
-            reciprocals: table.reciprocals.iter().map(|(at, of)| (names[*at].clone(), names[*of].clone())).collect(),
-        }
-    }
-}
-
 impl EstimatorText {
     fn new(filter: &PortableFilter, branches: usize, states: usize) -> Self {
         let (title, prose, name) = match filter.kind {
@@ -372,40 +229,5 @@ impl EstimatorText {
         };
         let estimator = if filter.correction.is_some() { EstimatorKind::Corrected } else { filter.kind };
         Self { title, prose, name: estimator.name(), rust, hypotheses }
-    }
-}
-
-/// What the filter in single precision says of itself.
-struct Recorded {
-    arithmetic: String,
-    numbers: MixtureNumbers,
-    /// Of what depends on the length of a step, as C has them.
-    names: Vec<String>,
-}
-
-impl Recorded {
-    fn new<const B: usize, const N: usize>(sensor: &FixedRate<'_, B, N>) -> Result<Self, ExportError> {
-        let kernel: SparseEkf<f32, Compact, B, N> =
-            SparseEkf::new(sensor.model, sensor.usual_step_s()).map_err(parameter)?;
-        let names: Vec<String> = kernel.step_names().iter().map(|name| name.to_uppercase()).collect();
-        let carried = SparseEkf::<f32, Compact, B, N>::carried();
-        let none = MixtureNumbers {
-            fresh: [Gaussian { mean: 0.0, variance: 0.0 }; 3],
-            tempering: 1.0,
-            clear: 0.0,
-            forgets_direction_s: f32::INFINITY,
-        };
-        let record = |piece| kernel.record(piece);
-        let Some(phases) = sensor.parts.phases else {
-            return Ok(Self { arithmetic: arithmetic::of_ekf(carried, &names, record), numbers: none, names });
-        };
-        let (dwell, evidence) = phases.filter_parts(sensor.parts.limits).map_err(parameter)?;
-        let splits = sensor.parts.kind == EstimatorKind::SignSplit;
-        let numbers = if splits {
-            SignSplit::<_, B, N, HYPOTHESES, _>::around(kernel, phases.rests.then_some(dwell), evidence).numbers()
-        } else {
-            Hypotheses::<_, B, N, HISTORIES, _>::around(kernel, dwell, evidence).numbers()
-        };
-        Ok(Self { arithmetic: arithmetic::of_hypotheses(splits, carried, &names, record), numbers, names })
     }
 }

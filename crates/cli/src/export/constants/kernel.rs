@@ -1,0 +1,135 @@
+//! Numbers and arithmetic of the filter's step.
+
+use ohmstrain_calib::{EstimatorKind, HISTORIES, HYPOTHESES};
+use ohmstrain_ekf::record::{MixtureNumbers, shared};
+use ohmstrain_ekf::{Compact, Gaussian, Hypotheses, SignSplit, SparseEkf};
+use ohmstrain_model::TURNING;
+use serde::Serialize;
+
+use crate::export::fixed_rate::FixedRate;
+use crate::export::literal::{Literal, literals};
+use crate::export::{ExportError, arithmetic, parameter};
+
+/// What depends on the length of a step.
+#[derive(Debug, Serialize)]
+pub struct StepConstants {
+    names: Vec<String>,
+    usual_s: Literal,
+    longest_s: Literal,
+    usual: Vec<Literal>,
+    lower_s: Literal,
+    upper_s: Literal,
+    nodes: Vec<Literal>,
+    inverses: Vec<Literal>,
+    rows: Vec<Vec<Literal>>,
+    /// What is one over what.
+    reciprocals: Vec<(String, String)>,
+}
+
+/// What is the same in all filters of hypotheses.
+#[derive(Debug, Serialize)]
+pub struct SharedConstants {
+    alike: Literal,
+    least_weight: Literal,
+    not_lighter: Literal,
+    least_inside: Literal,
+    least_mass: Literal,
+}
+
+/// How often a rate turns around within a step.
+#[derive(Debug, Serialize)]
+pub struct TurningConstants {
+    clear: Literal,
+    normal_density: Literal,
+    reach: Literal,
+    even_excess: Literal,
+    brownian_excess: Literal,
+    brownian_variance: Literal,
+}
+
+impl SharedConstants {
+    /// The same for every sensor.
+    pub fn new() -> Self {
+        Self {
+            alike: Literal(shared::ALIKE_BELOW),
+            least_weight: Literal(shared::LEAST_WEIGHT_KEPT),
+            not_lighter: Literal(shared::NOT_LIGHTER),
+            least_inside: Literal(shared::LEAST_INSIDE_LIMITS),
+            least_mass: Literal(shared::LEAST_MASS_LEFT),
+        }
+    }
+}
+
+impl TurningConstants {
+    /// The same for every sensor.
+    pub fn new() -> Self {
+        Self {
+            clear: Literal(shared::TURNING_CLEAR_SQUARE),
+            normal_density: Literal(TURNING.normal_density as f32),
+            reach: Literal(TURNING.reach as f32),
+            even_excess: Literal(TURNING.even_excess as f32),
+            brownian_excess: Literal(TURNING.brownian.0 as f32),
+            brownian_variance: Literal(TURNING.brownian.1 as f32),
+        }
+    }
+}
+
+impl StepConstants {
+    /// Of a sensor, by the names that the kernel gives them.
+    pub fn new<const B: usize, const N: usize>(sensor: &FixedRate<'_, B, N>, names: &[String]) -> Self {
+        let table = &sensor.table;
+        let narrow = |numbers: &[f64]| numbers.iter().map(|x| Literal(*x as f32)).collect();
+        Self {
+            names: names.to_vec(),
+            usual_s: Literal(sensor.usual_step_s()),
+            longest_s: Literal(sensor.parts.longest_step_s),
+            usual: literals(&sensor.usual_numbers()),
+            lower_s: Literal(table.range.0 as f32),
+            upper_s: Literal(table.range.1 as f32),
+            nodes: narrow(&table.nodes),
+            inverses: narrow(&table.inverses),
+            rows: table.rows.iter().map(|row| narrow(row)).collect(),
+            reciprocals: table.reciprocals.iter().map(|(at, of)| (names[*at].clone(), names[*of].clone())).collect(),
+        }
+    }
+}
+
+/// What the filter in single precision says of itself.
+pub struct Recorded {
+    /// Functions in C.
+    pub arithmetic: String,
+    pub numbers: MixtureNumbers,
+    /// Of what depends on the length of a step, as C has them.
+    pub names: Vec<String>,
+}
+
+impl Recorded {
+    /// Of a sensor.
+    ///
+    /// # Errors
+    /// If the filter cannot work with its numbers.
+    pub fn new<const B: usize, const N: usize>(sensor: &FixedRate<'_, B, N>) -> Result<Self, ExportError> {
+        let kernel: SparseEkf<f32, Compact, B, N> =
+            SparseEkf::new(sensor.model, sensor.usual_step_s()).map_err(parameter)?;
+        let names: Vec<String> = kernel.step_names().iter().map(|name| name.to_uppercase()).collect();
+        let carried = SparseEkf::<f32, Compact, B, N>::carried();
+        let none = MixtureNumbers {
+            fresh: [Gaussian { mean: 0.0, variance: 0.0 }; 3],
+            tempering: 1.0,
+            clear: 0.0,
+            forgets_direction_s: f32::INFINITY,
+        };
+        let record = |piece| kernel.record(piece);
+        let Some(phases) = sensor.parts.phases else {
+            return Ok(Self { arithmetic: arithmetic::of_ekf(carried, &names, record), numbers: none, names });
+        };
+        let (dwell, evidence) = phases.filter_parts(sensor.parts.limits).map_err(parameter)?;
+        let splits = sensor.parts.kind == EstimatorKind::SignSplit;
+        let numbers = if splits {
+            SignSplit::<_, B, N, HYPOTHESES, _>::around(kernel, phases.rests.then_some(dwell), evidence).numbers()
+        } else {
+            Hypotheses::<_, B, N, HISTORIES, _>::around(kernel, dwell, evidence).numbers()
+        };
+        Ok(Self { arithmetic: arithmetic::of_hypotheses(splits, carried, &names, record), numbers, names })
+    }
+}

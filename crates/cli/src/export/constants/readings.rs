@@ -1,0 +1,93 @@
+//! What a reading must be, and when an interval is wider than the filter says.
+
+use ohmstrain::DOUBT;
+use ohmstrain_calib::PortableSieve;
+use serde::Serialize;
+
+use crate::export::doubt::DoubtParts;
+use crate::export::literal::Literal;
+
+/// What a reading must be.
+#[derive(Debug, Serialize)]
+pub struct SieveConstants {
+    lower: Literal,
+    upper: Literal,
+    longest_repeat_s: Option<Literal>,
+    most_repeats: u32,
+    error_time_s: Option<Literal>,
+}
+
+/// When the interval is wider than the filter says.
+#[derive(Debug, Serialize)]
+pub struct DoubtConstants {
+    low: Literal,
+    high: Literal,
+    fastest_per_s: Literal,
+    longest_s: Literal,
+    per_reading: Literal,
+    /// Variances.
+    start: Literal,
+    most: Literal,
+    fades_s: Literal,
+    outside_fades_s: Literal,
+    margin: Literal,
+    shows: Literal,
+    faster: Literal,
+    worth: Literal,
+    zero: Literal,
+    rest: Option<RestConstants>,
+}
+
+/// Where the sensor rests.
+#[derive(Debug, Serialize)]
+struct RestConstants {
+    rested: Literal,
+    tolerance: Literal,
+    lasts_s: Literal,
+    sign: Literal,
+    end: Literal,
+}
+
+impl DoubtConstants {
+    /// Of a sensor; a strain below `zero` is none.
+    pub fn new(seen: &DoubtParts, zero: Literal) -> Self {
+        let narrow = |number: f64| Literal(number as f32);
+        Self {
+            low: narrow(seen.low),
+            high: narrow(seen.high),
+            fastest_per_s: narrow(seen.fastest_per_s),
+            longest_s: narrow(seen.longest_s),
+            per_reading: narrow(seen.per_reading),
+            start: narrow(seen.start),
+            most: narrow(seen.most),
+            fades_s: narrow(DOUBT.fades_s),
+            outside_fades_s: narrow(DOUBT.outside_fades_s),
+            margin: narrow(DOUBT.margin),
+            shows: narrow(DOUBT.shows),
+            faster: narrow(DOUBT.faster),
+            worth: narrow(DOUBT.worth),
+            zero,
+            rest: seen.rest.map(|rest| RestConstants {
+                rested: narrow(rest.rested),
+                tolerance: narrow(rest.tolerance),
+                lasts_s: narrow(rest.lasts_s),
+                sign: narrow(rest.sign),
+                end: narrow(rest.end),
+            }),
+        }
+    }
+}
+
+impl SieveConstants {
+    /// Of a filter.
+    pub fn new(sieve: &PortableSieve) -> Self {
+        let finite = |number: f32| number.is_finite().then_some(Literal(number));
+        Self {
+            lower: Literal(sieve.plausible.0 as f32),
+            upper: Literal(sieve.plausible.1 as f32),
+            longest_repeat_s: finite(sieve.longest_repeat_s as f32),
+            most_repeats: sieve.most_repeats,
+            error_time_s: Some(Literal(sieve.error_time_s as f32)).filter(|time_s| time_s.0 > 0.0),
+        }
+    }
+}
