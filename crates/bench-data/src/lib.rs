@@ -34,6 +34,7 @@
 mod cell;
 mod clock;
 mod columns;
+mod counted;
 mod error;
 pub mod faults;
 #[cfg(feature = "import")]
@@ -52,6 +53,7 @@ mod spec;
 mod trace;
 mod writer;
 
+pub use counted::counted;
 pub use error::{BadContent, SpecError, TraceError};
 pub use line_parser::{Line, LineParser};
 pub use metadata::{Metadata, ResistanceUnit, StrainUnit};

@@ -42,7 +42,7 @@ use crate::verbosity::Verbosity;
 
 /// From the resistance of a soft strain sensor to strain, with an honest error bar.
 #[derive(Debug, Parser)]
-#[command(name = "ohmstrain", version, about, propagate_version = true)]
+#[command(name = "ohmstrain", version, about, propagate_version = true, max_term_width = 100)]
 pub struct Args {
     /// What to do.
     #[command(subcommand)]

@@ -120,7 +120,7 @@ impl From<TraceError> for CliError {
 }
 
 /// A word as a shell takes it; one that no shell takes as it is.
-fn shell_word(word: &str) -> String {
+pub fn shell_word(word: &str) -> String {
     shlex::try_quote(word).map_or_else(|_| word.to_owned(), Into::into)
 }
 

@@ -3,6 +3,7 @@ use std::io::{self, BufRead, BufReader, Read};
 use std::ops::Range;
 use std::path::Path;
 
+use ohmstrain::number::significant;
 use ohmstrain::{JointParams, Quantity, Reading, ReadingUnit};
 use ohmstrain_bench_data::{
     Metadata, ParquetText, Reading as TraceReading, ReadingKind, Trace, TraceError, TraceReader,
@@ -177,9 +178,11 @@ impl Recording {
         let until = until_s.map(|until_s| format!("--until {until_s}"));
         let flags: Vec<String> = from.into_iter().chain(until).collect();
         CliError::Input(format!(
-            "{}: no row is left by {}; the recording goes from {first} to {last} s",
+            "{}: no row is left by {}; the recording goes from {} to {} s",
             self.name,
-            flags.join(" ")
+            flags.join(" "),
+            significant(first, 6),
+            significant(last, 6)
         ))
     }
 

@@ -5,6 +5,33 @@ use ohmstrain_bench_data::import::{ImportError, Plan, Recipe, Table, read_table}
 
 use crate::error::CliError;
 use crate::input::is_stdin;
+use crate::output::Kind;
+use crate::sensor_file;
+
+/// Bytes that tell what a file is.
+const HEAD: u64 = 4096;
+
+/// Refuses what this program made of recordings, which looks like a table, too.
+pub fn refuse_results(path: &Path) -> Result<(), CliError> {
+    let Some(head) = std::fs::File::open(path).ok().filter(|_| path.is_file()).and_then(head) else { return Ok(()) };
+    let what = if Kind::Prior.wrote(&head) {
+        "is a prior: give it to `calibrate --prior`"
+    } else if sensor_file::is_one(head.as_bytes()) {
+        "is a sensor file: give it to --sensor of `filter`, `smooth`, `evaluate` or `live`"
+    } else if Kind::Estimates.wrote(&head) {
+        "has estimates, what `filter` or `smooth` made of a recording: give the recording itself"
+    } else {
+        return Ok(());
+    };
+    Err(CliError::Input(format!("{} {what}", path.display())))
+}
+
+/// The first bytes of a file as text.
+fn head(file: std::fs::File) -> Option<String> {
+    let mut bytes = Vec::new();
+    file.take(HEAD).read_to_end(&mut bytes).ok()?;
+    Some(String::from_utf8_lossy(&bytes).into_owned())
+}
 
 /// Reads files as a lab writes them.
 pub fn read(paths: &[PathBuf], recipe: &Recipe) -> Result<Vec<Table>, CliError> {

@@ -5,6 +5,7 @@
 
 mod kind;
 mod place;
+mod wide;
 
 use std::fs;
 use std::io::{self, Write};
@@ -12,6 +13,7 @@ use std::path::{Path, PathBuf};
 
 pub use kind::{IMPORT, Kind, SIMULATE};
 use place::{Identity, Place};
+pub use wide::{COLUMNS, table, wrapped};
 
 use crate::error::CliError;
 
@@ -59,7 +61,12 @@ impl Outputs {
     /// # Errors
     /// If it cannot be written, is an input or another output, or holds something that this program did not write.
     pub fn claim(&mut self, path: &Path, kind: Kind) -> Result<Claim, CliError> {
-        let place = Place::of(path).map_err(|error| CliError::file("write", path, &error))?;
+        let place = Place::of(path).map_err(|error| match path.parent() {
+            Some(folder) if !folder.as_os_str().is_empty() && !folder.exists() => {
+                CliError::Other(format!("cannot write {}: there is no folder {}", path.display(), folder.display()))
+            }
+            _ => CliError::file("write", path, &error),
+        })?;
         if let Some(identity) = place.identity() {
             let refused = |what: &str, other: &Path| {
                 let (path, other) = (path.display(), other.display());

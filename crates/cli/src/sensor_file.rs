@@ -30,7 +30,7 @@ pub fn is_one(bytes: &[u8]) -> bool {
 }
 
 /// Whether this is a recording: its first line that is no comment has names of columns.
-fn is_recording(text: &str) -> bool {
+pub fn is_recording(text: &str) -> bool {
     let first = text.lines().find(|line| !line.trim().is_empty() && !line.starts_with('#')).unwrap_or("");
     first.contains(',') && first.split(',').any(|cell| matches!(cell.trim(), "time_s" | "time_us"))
 }

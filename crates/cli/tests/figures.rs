@@ -16,6 +16,14 @@ fn evaluate_draws_the_part_that_is_scored() {
     assert!(report.contains("scored part") && !report.contains("in-sample"));
     bench.run(&flags).ok();
     assert!(bench.read("report.html").contains("perhaps in-sample"));
+    for name in ["01-strain-against-time.svg", "01-strain-against-time.csv"] {
+        let first = bench.read(&format!("figures/{name}")).lines().next().unwrap().to_owned();
+        assert!(first.contains(", perhaps in-sample"), "{first}");
+    }
+    let sensor = bench.run(&flags[..4]).ok();
+    assert!(sensor.starts_with("trace.csv: errors in strain, perhaps in-sample\n"), "{sensor}");
+    let kept = bench.run(&[&flags[..4], &from].concat()).ok();
+    assert!(kept.starts_with("trace.csv: errors in strain\n"), "{kept}");
 
     let files = files_in(&bench.path("figures"));
     let names = |ending: &str| -> Vec<String> {

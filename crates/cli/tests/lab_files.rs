@@ -158,3 +158,26 @@ fn a_file_that_is_no_trace_is_sent_to_inspect() {
     let run = bench.feed(&["filter", "--sensor", "sensor.toml"], export(5));
     assert!(run.code == Some(4) && !run.stderr.contains("inspect"), "{}", run.stderr);
 }
+
+/// What was taken for what is said once for each column, with every word that was taken for none.
+#[test]
+fn remarks_name_every_missing_word_and_come_once() {
+    let bench = Bench::new();
+    let words = ["OL", "####", "--", "n/a", "NaN"];
+    let rows: String = (0..300)
+        .map(|row| {
+            let reading = words
+                .get(row / 7)
+                .filter(|_| row % 7 == 3)
+                .map_or_else(|| (1600 + row % 9).to_string(), |w| (*w).into());
+            format!("{:.1},{reading},{:.2}\n", 0.1 * row as f64, 0.01 * (row % 20) as f64)
+        })
+        .collect();
+    bench.write("rig.csv", format!("t,R (Ohm),eps\n{rows}"));
+    let said = bench.run(&["import", "rig.csv", "-o", "trace.csv"]).stderr;
+    for word in words {
+        assert!(said.contains(&format!("1 × `{word}`")), "{word}: {said}");
+    }
+    let lines: Vec<&str> = said.lines().collect();
+    assert!(lines.iter().enumerate().all(|(k, line)| !lines[..k].contains(line)), "{said}");
+}

@@ -186,7 +186,7 @@ fn garbage_resizing_and_unplugging_stop_nothing() {
     port.send("0.2,1600\n0.4,1600\n0.6,1600\n0.8,1601\n1.0,1601\n");
     terminal.wait_for("the clock has started again");
     let left = terminal.quit();
-    assert!(left.contains("6 lines skipped, 1 restarts"), "{left}");
+    assert!(left.contains("6 lines skipped, 1 restart of the clock"), "{left}");
 }
 
 #[test]

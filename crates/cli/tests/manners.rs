@@ -105,11 +105,82 @@ fn fits_that_say_little_are_warned_of_and_tables_have_units() {
     bench.run(&simulate).ok();
     let table = bench.run(&["fit-law", "trace.csv", "--table"]).ok();
     for column in ["| tau0_s ", "| r_start, ohm "] {
-        assert!(table.lines().next().unwrap().contains(column), "{column}: {table}");
+        assert!(table.contains(column), "{column}: {table}");
     }
     let noise = |k: usize| 1000 + (k * 7919) % 101;
     let rows: String = (0..200).map(|k| format!("{k},{}\n", noise(k))).collect();
     bench.write("noise.csv", format!("time_s,resistance_ohm\n{rows}"));
     let run = bench.run(&["fit-law", "--law", "eq9", "--segment", "whole", "noise.csv"]);
     assert!(run.warnings.iter().any(|warning| warning.contains("hardly describes")), "{:?}", run.warnings);
+    let run = bench.run(&["fit-law", "--compare", "kww,prony:1", "--segment", "whole", "noise.csv"]);
+    let of_law = |law: &str| run.warnings.iter().any(|w| w.contains(&format!("{law}: whole: R^2 is ")));
+    assert!(of_law("kww") && of_law("prony:1"), "{:?}", run.warnings);
+}
+
+/// A table of numbers that is broken by the terminal cannot be read.
+#[test]
+fn no_table_and_no_help_is_wider_than_a_hundred_columns() {
+    let bench = Bench::calibrated();
+    bench.run(&["simulate", "--protocol", "extend-hold", "--sample-rate-hz", "10", "-o", "hold.csv"]).ok();
+    let narrow = |arguments: &[&str]| {
+        let run = bench.run(arguments);
+        assert_eq!(run.code, Some(0), "{}: {}", run.command, run.stderr);
+        // clap does not break the line of usage.
+        for line in run.stdout.lines().filter(|line| !line.starts_with("Usage: ")) {
+            assert!(line.chars().count() <= 100, "{}: {line}", run.command);
+        }
+        run
+    };
+    for flags in [&[][..], &["--table"], &["--compare", "eq1,kww,prony:2", "--segment", "hold"]] {
+        narrow(&[&["fit-law", "hold.csv"], flags].concat());
+    }
+    narrow(&["plan", "--sensor", "sensor.toml"]);
+    narrow(&["refine", "trace.csv", "--sensor", "sensor.toml", "-o", "refined.toml", "--parameters", "reading_sd"]);
+    narrow(&["calibrate", "trace.csv", "--until", "120", "--estimator", "ekf", "--explain", "-o", "new.toml"]);
+    for command in COMMANDS {
+        narrow(&[command, "--help"]);
+    }
+}
+
+/// One name was all that an error said, and not what it is about.
+#[test]
+fn what_a_file_is_and_what_is_missing_is_said() {
+    let bench = Bench::calibrated();
+    let estimates = bench.run(&["filter", "trace.csv", "--sensor", "sensor.toml"]).stdout;
+    bench.write("estimates.csv", estimates);
+    let cases: [(&[&str], i32, &str); 5] = [
+        (&["simulate", "-o", "no/such/s.csv"], 1, "cannot write no/such/s.csv: there is no folder no/such"),
+        (
+            &["hand", "trace.csv"],
+            4,
+            "trace.csv is a recording, not the description of a hand: give hand.toml first, and the recording after it",
+        ),
+        (
+            &["inspect", "sensor.toml"],
+            4,
+            "sensor.toml is a sensor file: give it to --sensor of `filter`, `smooth`, `evaluate` or `live`",
+        ),
+        (
+            &["inspect", "estimates.csv"],
+            4,
+            "estimates.csv has estimates, what `filter` or `smooth` made of a recording: give the recording itself",
+        ),
+        (
+            &["evaluate", "trace.csv", "--sensor", "sensor.toml", "--from", "1e6"],
+            4,
+            "trace.csv: no row is left by --from 1000000; the recording goes from 0 to 400 s",
+        ),
+    ];
+    for (arguments, code, message) in cases {
+        bench.run(arguments).fails(code, message);
+    }
+    let gate = bench.run(&["filter", "trace.csv", "--sensor", "sensor.toml", "--gate", "-1"]);
+    assert!(gate.stderr.contains("'-1' for '--gate <X>': expected a positive number"), "{}", gate.stderr);
+    let inspected = bench.run(&["inspect", "trace.csv"]).ok();
+    let next = "it is a trace already and needs no import; go on with\nohmstrain calibrate trace.csv -o sensor.toml\n";
+    assert!(inspected.ends_with(next), "{inspected}");
+    // Strain in percent that nobody says is in percent is none yet.
+    let percent = bench.read("trace.csv").replace("strain\n", "strain (%)\n");
+    bench.write("percent.csv", percent);
+    assert!(bench.run(&["inspect", "percent.csv"]).ok().contains("import it with"));
 }

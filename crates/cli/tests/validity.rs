@@ -1,6 +1,6 @@
 //! Warnings where a sensor file is used outside of what its calibration has seen.
 
-use crate::common::{Bench, CALIBRATED_UNTIL, SIMULATE, change_rows};
+use crate::common::{Bench, CALIBRATED_UNTIL, Csv, SIMULATE, change_rows};
 
 /// `trace.csv` and a sensor calibrated on its first rows, `seen.csv`.
 fn calibrated() -> Bench {
@@ -39,8 +39,8 @@ fn a_longer_recording_is_warned_of_once() {
     for command in [&["filter"][..], &["smooth"], &["evaluate"], &["filter", "--lag-s", "1"]] {
         let mut warnings = warned(&bench, &[command, &["trace.csv"]].concat());
         warnings.retain(|line| line.contains("longer"));
-        // Five rows a second: the first one left out is as long after the first as the calibration and 0.2 s more.
-        let expected = "ohmstrain: warning: trace.csv: at 300 s: longer than the 299.8 s of the calibration; estimates are \
+        // Five rows a second: the first after a twentieth more than the calibration's 299.8 s.
+        let expected = "ohmstrain: warning: trace.csv: at 314.8 s: longer than the 299.8 s of the calibration; estimates are \
                         extrapolations\n";
         assert_eq!(warnings, [expected]);
     }
@@ -65,6 +65,28 @@ fn readings_and_strains_that_calibration_has_not_seen_are_warned_of() {
     let smoothed = warned(&bench, &["smooth", "scaled.csv"]);
     assert_eq!(smoothed.iter().filter(|line| line.contains(": resistance_ohm is outside of")).count(), 1);
     assert_eq!(warned(&bench, &["filter", "scaled.csv", "--rest-resistance", &(2.0 * rest).to_string()]), [""; 0]);
+}
+
+/// The fastest rate is a 99th percentile: one row in a hundred of the calibration's own is faster, and filters overshoot.
+/// Twice as fast is what no calibration has seen.
+#[test]
+fn twice_the_speed_is_warned_of_and_the_speed_of_the_calibration_is_not() {
+    let bench = Bench::calibrated();
+    let estimates = Csv::new(&bench.run(&["filter", "trace.csv", "--sensor", "sensor.toml"]).stdout);
+    let mut rates: Vec<f64> = estimates.numbers("strain_rate").into_iter().map(f64::abs).collect();
+    rates.sort_by(f64::total_cmp);
+    let most = rates[rates.len() * 95 / 100];
+    // One row in twenty, of two thousand, is faster than `most`.
+    let warned = |fastest: f64| {
+        let is_fastest = |line: &str| line.starts_with("fastest_rate_per_s");
+        let line =
+            |line: &str| if is_fastest(line) { format!("fastest_rate_per_s = {fastest:e}") } else { line.to_owned() };
+        let text: String = bench.read("sensor.toml").lines().map(|old| line(old) + "\n").collect();
+        bench.write("other.toml", text);
+        let run = bench.run(&["filter", "trace.csv", "--sensor", "other.toml"]);
+        run.warnings.iter().any(|line| line.contains("changes faster"))
+    };
+    assert!(!warned(most) && warned(0.5 * most));
 }
 
 #[test]

@@ -1,6 +1,7 @@
 use std::fmt::Write as _;
 
 use crate::Trace;
+use crate::counted::counted;
 use crate::error::{Fault, TraceError, quote};
 use crate::import::align::{Offset, motion_offset};
 use crate::import::channel::{Channel, Values, name};
@@ -14,6 +15,9 @@ use crate::import::survey::alternation;
 use crate::import::table::Table;
 use crate::metadata::{Metadata, ResistanceUnit, StrainUnit};
 use crate::rows::RowWriter;
+
+/// Texts that stand for missing values and are named.
+const MOST_TEXTS: usize = 8;
 
 /// A trace out of files.
 #[derive(Clone, Debug, PartialEq)]
@@ -63,7 +67,10 @@ impl Work<'_> {
         let channel = self.plan.readings;
         let times = Times::read(self.tables, &self.plan.time, &self.plan.recipe.missing)?;
         if times.wraps > 0 {
-            self.remark(channel.table, &format!("the clock's 32-bit counter started again {} times", times.wraps));
+            self.remark(
+                channel.table,
+                &format!("the clock's 32-bit counter started again {}", counted(times.wraps, "time")),
+            );
         }
         let values = self.values(&channel)?;
         let mut series = self.ordered(channel.table, &times.seconds, values)?;
@@ -90,8 +97,10 @@ impl Work<'_> {
         let column = name(table, channel.column);
         if !missing.is_empty() {
             let texts: Vec<String> =
-                missing.iter().take(3).map(|(text, count)| format!("{count} × {}", quote(text))).collect();
-            self.remark(channel.table, &format!("column {column}: missing values: {}", texts.join(", ")));
+                missing.iter().take(MOST_TEXTS).map(|(text, count)| format!("{count} × {}", quote(text))).collect();
+            let others = missing.len().saturating_sub(MOST_TEXTS);
+            let others = if others > 0 { format!(" and {}", counted(others, "other text")) } else { String::new() };
+            self.remark(channel.table, &format!("column {column}: missing values: {}{others}", texts.join(", ")));
         }
         if recipe.magnitude.contains(&channel.role) {
             values.iter_mut().for_each(|value| *value = value.abs());
@@ -100,7 +109,10 @@ impl Work<'_> {
             let zeros = spurious_zeros(&values, Role::READINGS.contains(&channel.role));
             zeros.iter().for_each(|row| values[*row] = f64::NAN);
             if !zeros.is_empty() {
-                self.remark(channel.table, &format!("column {column}: {} zeros that are none left out", zeros.len()));
+                self.remark(
+                    channel.table,
+                    &format!("column {column}: {} left out: no reading is zero there", counted(zeros.len(), "zero")),
+                );
             }
         }
         match channel.role {
@@ -153,11 +165,11 @@ impl Work<'_> {
             ));
         }
         if untimed > 0 {
-            self.remark(table, &format!("{untimed} rows without a time left out"));
+            self.remark(table, &format!("{} without a time left out", counted(untimed, "row")));
         }
         if repeated > 0 {
             self.duplicates += repeated;
-            self.remark(table, &format!("{repeated} rows with the time of the row before left out"));
+            self.remark(table, &format!("{} with the time of the row before left out", counted(repeated, "row")));
         }
         Ok(series)
     }

@@ -1,3 +1,5 @@
+use std::collections::BTreeSet;
+
 use crate::import::build::{Imported, build};
 use crate::import::candidates::{candidates, choose, find, refer};
 use crate::import::channel::{Channel, name};
@@ -47,6 +49,9 @@ impl Plan {
             }
         };
         let temperature = temperature(tables, &recipe, readings.table, &mut remarks)?;
+        // What two columns, or two roles of one, share is said once.
+        let mut said = BTreeSet::new();
+        remarks.retain(|remark: &String| said.insert(remark.clone()));
         let plan = Self { recipe, given: given.clone(), readings, time, reference, temperature, remarks };
         plan.check(tables)?;
         Ok(plan)

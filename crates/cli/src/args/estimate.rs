@@ -27,7 +27,7 @@ pub struct EstimateArgs {
     #[arg(long, value_name = "OHM|first:N")]
     pub rest_resistance: Option<RestResistance>,
     /// Turn down readings whose normalised innovation squared (column nis) is above X, two in a row at most
-    #[arg(long, value_name = "X", value_parser = positive)]
+    #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = positive)]
     pub gate: Option<f64>,
     /// How surprising readings are taken: redescending:K, the less the farther beyond K standard deviations, huber:K,
     /// student-t:DOF, or none, as they are [default: redescending:3]
@@ -78,7 +78,7 @@ pub struct FilterArgs {
     #[arg(default_value = "-")]
     pub trace_file: PathBuf,
     /// Estimate every row from the readings up to S seconds after it; rows come out that much later
-    #[arg(long, value_name = "S", value_parser = positive)]
+    #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = positive)]
     pub lag_s: Option<f64>,
     /// The strain (or angle) is known to be X at the first row from T seconds on, to SD (0.5 % of the limits); repeatable.
     /// Estimates from there on follow

@@ -21,7 +21,7 @@ pub struct ExportArgs {
     #[arg(long)]
     pub force: bool,
     /// Usual time between two readings on the microcontroller, s
-    #[arg(long, value_name = "S", value_parser = positive)]
+    #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = positive)]
     pub dt_s: f64,
     /// Estimator to export: auto (the sensor's default), corrected, sign-split, hypotheses or ekf
     #[arg(long, default_value = "auto")]

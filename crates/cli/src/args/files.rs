@@ -77,10 +77,10 @@ pub struct FilesArgs {
     #[arg(long, value_name = "motion|none|S", allow_hyphen_values = true)]
     pub align: Option<Align>,
     /// Rows per second, where no column is a time
-    #[arg(long, value_name = "HZ", value_parser = positive)]
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true, value_parser = positive)]
     pub rate_hz: Option<f64>,
     /// Length of the unstretched sensor, mm: turns a displacement into strain
-    #[arg(long, value_name = "MM", value_parser = positive)]
+    #[arg(long, value_name = "MM", allow_negative_numbers = true, value_parser = positive)]
     pub gauge_length_mm: Option<f64>,
     /// Electronics, as in `# front_end = …`: turns converter codes into ohms
     #[arg(long, value_name = "SPEC")]

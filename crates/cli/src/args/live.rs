@@ -19,10 +19,10 @@ pub struct LiveArgs {
     #[arg(long, value_name = "COLUMNS")]
     pub header: Option<String>,
     /// Play a recording back X times as fast as it was recorded
-    #[arg(long, value_name = "X", default_value = "1", value_parser = positive)]
+    #[arg(long, value_name = "X", default_value = "1", allow_negative_numbers = true, value_parser = positive)]
     pub speed: f64,
     /// Seconds that the plot shows
-    #[arg(long, value_name = "S", default_value = "30", value_parser = positive)]
+    #[arg(long, value_name = "S", default_value = "30", allow_negative_numbers = true, value_parser = positive)]
     pub window_s: f64,
     /// The key r records to PREFIX-1.csv, PREFIX-2.csv and so on; no file is replaced
     #[arg(long, value_name = "PREFIX", default_value = "live")]

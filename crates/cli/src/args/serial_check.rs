@@ -13,7 +13,7 @@ pub struct SerialCheckArgs {
     #[arg(long, value_name = "sensor.toml")]
     pub sensor: PathBuf,
     /// Time between two readings that it was exported for, s
-    #[arg(long, value_name = "S", value_parser = positive)]
+    #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = positive)]
     pub dt_s: f64,
     /// Estimator that was exported
     #[arg(long, default_value = "auto")]

@@ -7,7 +7,7 @@ use super::positive;
 #[derive(Clone, Debug, Default, ClapArgs)]
 pub struct TraceArgs {
     /// Length of the unstretched sensor, mm
-    #[arg(long, value_name = "MM", value_parser = positive)]
+    #[arg(long, value_name = "MM", allow_negative_numbers = true, value_parser = positive)]
     pub gauge_length_mm: Option<f64>,
     /// Electronics, as in `# front_end = …`
     #[arg(long, value_name = "SPEC")]

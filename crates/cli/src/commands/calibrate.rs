@@ -2,7 +2,7 @@ use std::io;
 use std::path::Path;
 use std::time::Instant;
 
-use ohmstrain::{Calibrated, Calibration, Closing, Error, Quantity, ReadingUnit};
+use ohmstrain::{Calibrated, Calibration, Closing, Error, EstimatorKind, Quantity, ReadingUnit};
 use ohmstrain_calib::{Samples, screen};
 
 use super::closing;
@@ -73,6 +73,14 @@ pub fn run(args: &CalibrateArgs) -> Result<(), CliError> {
             facts: &closing.facts(),
         };
         wanted.put(reporting.drawn()?, &mut outputs)?;
+    }
+    if let Some(chosen) = args.estimator.chosen().filter(|chosen| chosen.0 != EstimatorKind::Corrected)
+        && closing.verdict().is_some_and(|verdict| !verdict.to_lowercase().contains("better"))
+    {
+        CliError::warning(&format!(
+            "{file}: {} is no better than a static curve; without --estimator, calibrate tries others and a correction",
+            chosen.0.name()
+        ));
     }
     let explained = explain::text(args, &recordings, &params.law)?;
     outputs.publish()?;

@@ -1,4 +1,4 @@
-use comfy_table::{Table, presets};
+use comfy_table::Table;
 use ohmstrain_calib::{
     GaugeFamily, LawParams, Samples, StructureScore, bootstrap_law, compare_structures, identifiability, screen,
 };
@@ -6,6 +6,7 @@ use ohmstrain_calib::{
 use crate::args::CalibrateArgs;
 use crate::error::CliError;
 use crate::input::Recording;
+use crate::output;
 use crate::plausible;
 
 /// What `calibrate --explain` and `--bootstrap` print.
@@ -22,7 +23,7 @@ pub fn text(args: &CalibrateArgs, recordings: &[Recording], law: &LawParams) -> 
         }
         let found = identifiability(&samples, law).map_err(failed)?;
         let structures = structures(&compare_structures(&samples).map_err(failed)?);
-        text += &format!("{found}\n{structures}\n");
+        text += &format!("{}\n{structures}\n", output::wrapped(&found.to_string()));
     }
     if let Some(replicates) = args.bootstrap {
         let found = bootstrap_law(&samples, law, replicates as usize, args.seed).map_err(failed)?;
@@ -56,8 +57,7 @@ fn structures(scores: &[StructureScore]) -> Table {
 }
 
 fn table<const N: usize>(header: [&str; N]) -> Table {
-    let mut table = Table::new();
-    table.load_style(presets::ASCII_MARKDOWN);
+    let mut table = output::table();
     table.set_header(header);
     table
 }

@@ -2,6 +2,7 @@ use std::fs;
 use std::path::Path;
 
 use ohmstrain::{Prior, Sensor};
+use ohmstrain_bench_data::counted;
 
 use crate::args::{FleetArgs, FleetCommand, FleetFitArgs};
 use crate::error::CliError;
@@ -36,13 +37,15 @@ fn told(prior: &Prior, output: &Path) -> String {
     let branches = params.law.tau_s.iter().map(|tau_s| format!("{tau_s:.1}")).collect::<Vec<_>>().join(", ");
     let correction = params.correction.as_ref().map_or_else(
         || "no correction".to_owned(),
-        |correction| format!("{} rows for the correction of {}", correction.rows.len(), correction.corrects.name()),
+        |correction| {
+            format!("{} for the correction of {}", counted(correction.rows.len(), "row"), correction.corrects.name())
+        },
     );
     format!(
-        "{}: {} sensors; branches of {branches} s; {} estimators; {correction}",
+        "{}: {} sensors; branches of {branches} s; {}; {correction}",
         output.display(),
         params.sensors,
-        params.estimators.len()
+        counted(params.estimators.len(), "estimator")
     )
 }
 

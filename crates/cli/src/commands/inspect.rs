@@ -1,9 +1,13 @@
-use ohmstrain_bench_data::import::{ImportError, Plan, Recipe, Survey, Table};
+use std::path::PathBuf;
+
+use ohmstrain_bench_data::import::{ImportError, Imported, Plan, Recipe, Survey, Table};
+use ohmstrain_bench_data::{Metadata, Trace};
 
 use crate::args::InspectArgs;
 use crate::commands::inspect_json;
 use crate::commands::inspect_text;
-use crate::error::CliError;
+use crate::error::{CliError, shell_word};
+use crate::input::{self, is_stdin};
 use crate::lab_files;
 use crate::output::print;
 
@@ -25,11 +29,14 @@ pub struct Proposal {
     pub remarks: Vec<String>,
     /// What the trace looks like.
     pub survey: Survey,
+    /// What to do with the file where it is a trace already: importing it changes nothing.
+    pub next: Option<String>,
 }
 
 /// Says what stands in a lab's files, and how to import them.
 pub fn run(args: &InspectArgs) -> Result<(), CliError> {
     let recipe = args.known.recipe();
+    args.files.iter().try_for_each(|path| lab_files::refuse_results(path))?;
     let tables = lab_files::read(&args.files, &recipe)?;
     if args.suggest {
         let plan = proposed(&tables, &recipe)?.0;
@@ -37,9 +44,10 @@ pub fn run(args: &InspectArgs) -> Result<(), CliError> {
         return print(|out| Ok(writeln!(out, "{command}")?));
     }
     let plan = match proposed(&tables, &recipe) {
-        Ok((plan, remarks, survey)) => {
+        Ok((plan, imported, survey)) => {
             let command = lab_files::command(&args.files, &tables, &plan)?;
-            Ok(Proposal { plan, command, remarks, survey })
+            let next = next(&args.files, &imported.trace);
+            Ok(Proposal { plan, command, remarks: imported.remarks, survey, next })
         }
         Err(error) => Err(error),
     };
@@ -48,9 +56,25 @@ pub fn run(args: &InspectArgs) -> Result<(), CliError> {
 }
 
 /// A plan that has been tried.
-fn proposed(tables: &[Table], recipe: &Recipe) -> Result<(Plan, Vec<String>, Survey), ImportError> {
+fn proposed(tables: &[Table], recipe: &Recipe) -> Result<(Plan, Imported, Survey), ImportError> {
     let plan = Plan::propose(tables, recipe)?;
     let imported = plan.import(tables)?;
     let survey = Survey::new(&imported);
-    Ok((plan, imported.remarks, survey))
+    Ok((plan, imported, survey))
+}
+
+/// The command that uses a file which reads as it would be imported.
+fn next(files: &[PathBuf], imported: &Trace) -> Option<String> {
+    let [file] = files else { return None };
+    let trace = input::read(file, &Metadata::default()).ok().filter(|_| !is_stdin(file))?.trace;
+    let numbers = |trace: &Trace| -> Vec<u64> {
+        let reference = trace.reference.iter().flat_map(|reference| &reference.values);
+        trace.time_s.iter().chain(&trace.readings.values).chain(reference).map(|number| number.to_bits()).collect()
+    };
+    let is_same = trace.readings.kind == imported.readings.kind && numbers(&trace) == numbers(imported);
+    let name = shell_word(&file.display().to_string());
+    is_same.then(|| match trace.reference {
+        Some(_) => format!("ohmstrain calibrate {name} -o sensor.toml"),
+        None => format!("ohmstrain filter {name} --sensor sensor.toml > estimates.csv"),
+    })
 }

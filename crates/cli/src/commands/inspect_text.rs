@@ -1,6 +1,7 @@
 use std::io::Write;
 
 use comfy_table::{Table as TextTable, presets};
+use ohmstrain_bench_data::counted;
 use ohmstrain_bench_data::import::{ChannelSurvey, ClockSurvey, PhaseSurvey, Role, Survey, Table, candidates};
 
 use crate::commands::inspect::{Findings, Proposal};
@@ -52,7 +53,10 @@ fn write_proposal(out: &mut dyn Write, proposal: &Proposal) -> Result<(), CliErr
     for remark in &proposal.remarks {
         writeln!(out, "note        {remark}")?;
     }
-    Ok(writeln!(out, "\nimport it with\n{}", proposal.command)?)
+    match &proposal.next {
+        Some(next) => Ok(writeln!(out, "\nit is a trace already and needs no import; go on with\n{next}")?),
+        None => Ok(writeln!(out, "\nimport it with\n{}", proposal.command)?),
+    }
 }
 
 /// How a file is written, in words.
@@ -65,7 +69,7 @@ fn layout(table: &Table) -> String {
         words.push(format!("decimal mark `{}`", layout.decimal));
     }
     if layout.skip > 0 {
-        words.push(format!("{} lines above the header", layout.skip));
+        words.push(format!("{} above the header", counted(layout.skip, "line")));
     }
     words.push(match layout.header_lines {
         0 if table.has_names() => "names from the file itself".to_owned(),
@@ -77,9 +81,9 @@ fn layout(table: &Table) -> String {
         words.push("a line of units".to_owned());
     }
     if layout.text_lines > 0 {
-        words.push(format!("{} lines of text passed over", layout.text_lines));
+        words.push(format!("{} of text passed over", counted(layout.text_lines, "line")));
     }
-    words.push(format!("{} rows", table.len()));
+    words.push(counted(table.len(), "row"));
     words.join(", ")
 }
 
@@ -128,9 +132,9 @@ fn clock_line(clock: &ClockSurvey) -> String {
         number(clock.span_s.1 - clock.span_s.0)
     );
     if clock.gaps.0 > 0 {
-        line += &format!("; {} gaps, the longest {} s", clock.gaps.0, number(clock.gaps.1));
+        line += &format!("; {}, the longest {} s", counted(clock.gaps.0, "gap"), number(clock.gaps.1));
     }
-    line + &format!("; {} duplicates", clock.duplicates)
+    line + &format!("; {}", counted(clock.duplicates, "duplicate"))
 }
 
 fn channel_line(channel: &ChannelSurvey) -> String {
@@ -156,12 +160,10 @@ fn allan_line(channel: &ChannelSurvey, has_reference: bool) -> Option<String> {
 }
 
 fn phases_line(survey: &PhaseSurvey) -> String {
-    let names = ["stretches", "holds", "releases"];
-    let phases = survey
-        .phases
-        .iter()
-        .zip(names)
-        .map(|((count, seconds), name)| format!("{count} {name} ({} s)", number(*seconds)));
+    let names = [("stretch", "stretches"), ("hold", "holds"), ("release", "releases")];
+    let phases = survey.phases.iter().zip(names).map(|((count, seconds), (one, many))| {
+        format!("{count} {} ({} s)", if *count == 1 { one } else { many }, number(*seconds))
+    });
     phases.collect::<Vec<_>>().join(", ")
 }
 

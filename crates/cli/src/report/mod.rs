@@ -137,6 +137,8 @@ pub enum ReportError {
 struct Page<'a> {
     title: &'a str,
     made_by: &'a str,
+    #[serde(skip)]
+    sample: Sample,
     estimator: &'static str,
     headline: String,
     verdict: Option<String>,
@@ -192,6 +194,7 @@ impl<'a> Report<'a> {
         let page = Page {
             title: input.title,
             made_by: input.made_by,
+            sample: input.sample,
             estimator: input.estimator.name(),
             headline: summary::headline(input, &recording),
             verdict: input.verdict.clone(),
@@ -220,11 +223,14 @@ impl<'a> Report<'a> {
     /// If a plot cannot be drawn; no input is known that does this.
     pub fn figures(&self) -> Result<Vec<FigureFiles>, ReportError> {
         let figures = self.page.sections.iter().flat_map(|section| &section.figures);
+        let Page { made_by, sample, .. } = self.page;
+        // What the rows are worth goes with each file, wherever it is taken.
+        let made_by = if sample == Sample::Out { made_by.into() } else { format!("{made_by}, {}", sample.name()) };
         figures
             .enumerate()
             .map(|(i, figure)| {
                 let width_mm = if figure.half { COLUMN_MM } else { PAGE_MM };
-                files(&figure.chart, &figure.title, i + 1, width_mm, self.page.made_by)
+                files(&figure.chart, &figure.title, i + 1, width_mm, &made_by)
             })
             .collect()
     }

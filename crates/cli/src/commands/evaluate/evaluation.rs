@@ -7,6 +7,7 @@ use super::summary::{self, Summary, summaries};
 use crate::commands::reporting::Drawn;
 use crate::commands::score_table::{KEY, add_scores, score_table};
 use crate::error::CliError;
+use crate::report::Sample;
 use crate::sensor_file::MADE_BY;
 
 /// Version of what `--json` prints. Names are added without another version; one that goes or changes its meaning brings
@@ -44,6 +45,9 @@ pub struct RecordingScores {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub split: Option<String>,
     pub estimator: &'static str,
+    /// Whether the rows that are scored were calibrated on.
+    #[serde(skip)]
+    pub sample: Sample,
     /// Whether it is shown to say what the estimator before it is made of.
     #[serde(skip)]
     pub is_part: bool,
@@ -168,7 +172,14 @@ impl RecordingScores {
             Some(lag_s) => format!("the reference is {lag_s:+.2} s late"),
             None => "how late the reference is cannot be told".into(),
         });
-        let more = [format!("errors in {unit}")].into_iter().chain(seconds).chain(lag).collect::<Vec<_>>().join(", ");
+        let sample = (self.sample != Sample::Out).then(|| self.sample.name().to_owned());
+        let more = [format!("errors in {unit}")]
+            .into_iter()
+            .chain(sample)
+            .chain(seconds)
+            .chain(lag)
+            .collect::<Vec<_>>()
+            .join(", ");
         format!("{}: {more}", self.case())
     }
 }

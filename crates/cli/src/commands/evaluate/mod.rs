@@ -169,14 +169,14 @@ fn judge(
     };
     let moved = first.params().rest_reading / first.rest_reading(rest);
     let baselines = rivals.scores(recording, part, moved).ok_or_else(nothing)?;
+    let has_split = !args.calibration.split.is_empty();
+    let sample = if has_split { Sample::Out } else { sample(recording, first.params(), part) };
     for sensor in sensors {
         let scores = sensor.judge(recording, part, rest, baselines, &mut judged.warnings)?;
-        judged.scores.push(scores.ok_or_else(nothing)?);
+        judged.scores.push(RecordingScores { sample, ..scores.ok_or_else(nothing)? });
     }
     if args.draws(&recording.name) {
-        let (kind, has_split) = (Some(*kind), !args.calibration.split.is_empty());
-        let sample = if has_split { Sample::Out } else { sample(recording, first.params(), part) };
-        let (tested, facts) = (None, &[]);
+        let (kind, tested, facts) = (Some(*kind), None, &[]);
         let reporting =
             Reporting { recording, sensor: first, kind, rest_resistance: rest, part, sample, tested, facts };
         judged.drawn = Some(reporting.drawn()?);

@@ -11,6 +11,7 @@ use crate::commands::scoring::{self, Part};
 use crate::error::CliError;
 use crate::input::Recording;
 use crate::progress::Progress;
+use crate::report::Sample;
 use crate::run::estimate;
 use crate::sensor_file;
 
@@ -110,6 +111,7 @@ impl Sensor {
             sha256: recording.sha256.clone(),
             split: None,
             estimator: self.kind.name(),
+            sample: Sample::Out,
             is_part: self.is_part,
             filter,
             smoother,

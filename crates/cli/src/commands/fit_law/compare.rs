@@ -1,7 +1,7 @@
 //! Several laws on the same segments, by what Akaike's and the Bayesian criterion say of them.
 
 use super::rows::{Cell, Rows};
-use super::{Fits, fit_recording};
+use super::{Fits, fit_recording, output};
 use crate::args::FitLawArgs;
 use crate::error::CliError;
 use crate::input::Recording;
@@ -17,9 +17,10 @@ pub fn compare(recordings: &[Recording], args: &FitLawArgs) -> Result<(), CliErr
             let own = FitLawArgs { law: *law, compare: vec![], ..args.clone() };
             tried.push((law.to_string(), fit_recording(recording, &own)?));
         }
+        tried.iter().for_each(|(law, fits)| output::warn_of_law(fits, law));
         rows.extend(rows_of(&tried)?);
     }
-    Rows { header: header.map(String::from).to_vec(), rows }.print(args.format)
+    Rows { keys: 3, header: header.map(String::from).to_vec(), rows }.print(args.format)
 }
 
 fn rows_of(tried: &[(String, Fits)]) -> Result<Vec<Vec<Cell>>, CliError> {

@@ -57,6 +57,9 @@ pub fn run(args: &FitLawArgs) -> Result<(), CliError> {
     let fits: Vec<Fits> =
         recordings.iter().map(|recording| fit_recording(recording, args)).collect::<Result<_, _>>()?;
     output::warn(&fits);
+    if args.table {
+        published::warn(&fits);
+    }
     args.figures.as_deref().map_or(Ok(()), |folder| figures::put(folder, &fits, args.force))?;
     if args.json {
         output::json(&fits, args)

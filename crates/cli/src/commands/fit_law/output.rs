@@ -117,7 +117,7 @@ pub fn table(recordings: &[Fits]) -> Rows {
         row
     };
     let rows = fits().map(row).collect();
-    Rows { header, rows }
+    Rows { keys: 2, header, rows }
 }
 
 /// Names of all parameters and derived quantities, each once.
@@ -152,27 +152,34 @@ pub fn with_units<'a>(names: &[String], fits: impl Iterator<Item = (&'a Fits, &'
 }
 
 /// R² below which a law hardly describes a segment.
-const POOR: f64 = 0.9;
+pub const POOR: f64 = 0.9;
 
 /// Warns of fits that are poor, did not converge, or end at a limit of the search.
 pub fn warn(recordings: &[Fits]) {
-    for recording in recordings {
-        for Fitted { piece, fit } in &recording.fits {
-            let mut doubts = Vec::new();
-            if fit.r_squared < POOR {
-                doubts.push(format!("R^2 is {:.2}: the law hardly describes it", fit.r_squared));
-            }
-            if !fit.converged {
-                doubts.push("the search has not converged".into());
-            }
-            let at_limit = fit.parameters.iter().filter(|found| found.at_limit);
-            let at_limit: Vec<&str> = at_limit.map(|found| found.parameter.name.as_str()).collect();
-            if !at_limit.is_empty() {
-                doubts.push(format!("{} at the limit of the search: the readings ask for more", at_limit.join(", ")));
-            }
-            if !doubts.is_empty() {
-                CliError::warning(&format!("{}: {}: {}", recording.name, piece.label, doubts.join("; ")));
-            }
+    recordings.iter().for_each(|recording| warn_of(recording, ""));
+}
+
+/// The same of one law of several.
+pub fn warn_of_law(recording: &Fits, law: &str) {
+    warn_of(recording, &format!("{law}: "));
+}
+
+fn warn_of(recording: &Fits, law: &str) {
+    for Fitted { piece, fit } in &recording.fits {
+        let mut doubts = Vec::new();
+        if fit.r_squared < POOR {
+            doubts.push(format!("R^2 is {:.2}: the law hardly describes it", fit.r_squared));
+        }
+        if !fit.converged {
+            doubts.push("the search has not converged".into());
+        }
+        let at_limit = fit.parameters.iter().filter(|found| found.at_limit);
+        let at_limit: Vec<&str> = at_limit.map(|found| found.parameter.name.as_str()).collect();
+        if !at_limit.is_empty() {
+            doubts.push(format!("{} at the limit of the search: the readings ask for more", at_limit.join(", ")));
+        }
+        if !doubts.is_empty() {
+            CliError::warning(&format!("{}: {law}{}: {}", recording.name, piece.label, doubts.join("; ")));
         }
     }
 }

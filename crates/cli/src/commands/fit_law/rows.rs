@@ -5,7 +5,7 @@ use ohmstrain_calib::closed_form::Estimated;
 
 use crate::args::TableFormat;
 use crate::error::CliError;
-use crate::output::print;
+use crate::output::{COLUMNS, print};
 use ohmstrain::number::{plain, with_error};
 
 /// A cell.
@@ -63,6 +63,8 @@ impl From<String> for Cell {
 
 /// A table.
 pub struct Rows {
+    /// Leading columns that say what a row is about.
+    pub keys: usize,
     pub header: Vec<String>,
     pub rows: Vec<Vec<Cell>>,
 }
@@ -79,13 +81,50 @@ impl Rows {
     }
 
     fn text(&self) -> String {
-        let mut table = Table::new();
-        table.load_style(presets::ASCII_MARKDOWN);
-        table.set_header(&self.header);
-        for row in &self.rows {
-            table.add_row(row.iter().map(Cell::text));
+        let rows: Vec<Vec<String>> = self.rows.iter().map(|row| row.iter().map(Cell::text).collect()).collect();
+        let mut text = String::new();
+        // What all rows have in common stands above them.
+        let shared =
+            rows.first().filter(|first| self.header[0] == "recording" && rows.iter().all(|row| row[0] == first[0]));
+        if let Some(shared) = shared {
+            text += &format!("{}:\n", shared[0]);
         }
-        format!("{table}\n")
+        let keys: Vec<usize> = (usize::from(shared.is_some())..self.keys).collect();
+        for columns in self.blocks(&rows, &keys) {
+            let columns = || keys.iter().chain(&columns);
+            let mut table = Table::new();
+            table.load_style(presets::ASCII_MARKDOWN);
+            table.set_header(columns().map(|column| &self.header[*column]));
+            for row in &rows {
+                table.add_row(columns().map(|column| &row[*column]));
+            }
+            text += &format!("{table}\n");
+        }
+        text
+    }
+
+    /// The columns behind the keys, as many together as fit a terminal beside these.
+    fn blocks(&self, rows: &[Vec<String>], keys: &[usize]) -> Vec<Vec<usize>> {
+        let width = |column: &usize| {
+            let cells = rows.iter().map(|row| &row[*column]).chain([&self.header[*column]]);
+            3 + cells.map(|cell| cell.chars().count()).max().unwrap_or(0)
+        };
+        let room = COLUMNS.saturating_sub(1 + keys.iter().map(width).sum::<usize>());
+        let (mut blocks, mut used): (Vec<Vec<usize>>, usize) = (vec![vec![]], 0);
+        for column in self.keys..self.header.len() {
+            let wide = width(&column);
+            match blocks.last_mut() {
+                Some(block) if block.is_empty() || used + wide <= room => {
+                    block.push(column);
+                    used += wide;
+                }
+                _ => {
+                    blocks.push(vec![column]);
+                    used = wide;
+                }
+            }
+        }
+        blocks
     }
 
     /// With a column of standard errors behind that of each parameter.
@@ -172,7 +211,7 @@ mod tests {
             vec![Cell::from("a, b".to_string()), Cell::Estimate(-1.23456789e-9, 1e-10)],
             vec![Cell::from("c_1".to_string()), Cell::NotTold],
         ];
-        let table = Rows { header, rows };
+        let table = Rows { keys: 1, header, rows };
         let csv = table.csv();
         let lines: Vec<&str> = csv.lines().collect();
         assert_eq!(lines[0], "segment,\"tau_0, s\",\"standard error of tau_0, s\"");

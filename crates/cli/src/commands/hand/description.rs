@@ -6,6 +6,7 @@ use ohmstrain_bench_data::{FrontEndSpec, JointSpec};
 use serde::{Deserialize, Deserializer};
 
 use crate::error::CliError;
+use crate::sensor_file;
 
 /// The version of the file that is read.
 const FORMAT: u32 = 1;
@@ -52,6 +53,11 @@ impl Description {
     pub fn read(path: &Path) -> Result<Self, CliError> {
         let name = path.display();
         let text = fs::read_to_string(path).map_err(|error| CliError::file("read", path, &error))?;
+        if sensor_file::is_recording(&text) {
+            return Err(CliError::Input(format!(
+                "{name} is a recording, not the description of a hand: give hand.toml first, and the recording after it"
+            )));
+        }
         let wrong = |error: toml::de::Error| {
             let line = error.span().map_or(1, |span| 1 + text[..span.start].matches('\n').count());
             CliError::Input(format!("{name}:{line}: {}", error.message().replace('\n', " ")))

@@ -12,7 +12,7 @@ use std::io::{self, IsTerminal};
 use std::sync::mpsc::TryRecvError;
 use std::time::{Duration, Instant};
 
-use ohmstrain_bench_data::Row;
+use ohmstrain_bench_data::{Row, counted};
 use ratatui::DefaultTerminal;
 use ratatui::crossterm::event::{self, Event as Input, KeyCode, KeyEventKind, KeyModifiers};
 
@@ -53,8 +53,12 @@ pub fn run(args: &LiveArgs) -> Result<(), CliError> {
     }
     let counts = session.counts;
     CliError::remark(&format!(
-        "{} rows, {} readings missing, {} gaps, {} lines skipped, {} restarts of the clock",
-        counts.rows, counts.missing, counts.gaps, counts.bad_lines, counts.restarts
+        "{}, {} missing, {}, {} skipped, {} of the clock",
+        counted(counts.rows, "row"),
+        counted(counts.missing, "reading"),
+        counted(counts.gaps, "gap"),
+        counted(counts.bad_lines, "line"),
+        counted(counts.restarts, "restart")
     ));
     shown
 }

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::time::Instant;
 
 use ohmstrain::{Error, Estimate, Filter, Sensor, ValidityWatch};
-use ohmstrain_bench_data::{Line, LineParser, Row};
+use ohmstrain_bench_data::{Line, LineParser, Row, counted};
 
 use super::recorder::Recorder;
 use crate::args::{LiveArgs, RestResistance};
@@ -311,7 +311,7 @@ impl<'a> Session<'a> {
     pub fn toggle_record(&mut self) {
         self.message = match self.recorder.take() {
             Some(recorder) => {
-                let said = format!("recorded {} ({} rows)", recorder.path.display(), recorder.count);
+                let said = format!("recorded {} ({})", recorder.path.display(), counted(recorder.count, "row"));
                 recorder.finish().map_or_else(|error| format!("cannot record: {error}"), |()| said)
             }
             None => match Recorder::begin(&self.args.record, &self.lines) {

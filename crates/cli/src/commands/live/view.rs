@@ -2,6 +2,7 @@
 
 use ohmstrain::number::significant;
 use ohmstrain::{Estimate, Quantity, ReadingUnit};
+use ohmstrain_bench_data::counted;
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::style::{Color, Style, Stylize};
@@ -98,9 +99,9 @@ fn numbers(session: &Session) -> Vec<Line<'static>> {
     let counts = &session.counts;
     let rate = session.rate_hz().map_or_else(String::new, |hz| format!(" at {hz:.1}/s"));
     line("rows", format!("{}{rate}", counts.rows));
-    line("drop-outs", format!("{} missing, {} gaps", counts.missing, counts.gaps));
-    line("skipped", format!("{} lines", counts.bad_lines));
-    line("record", session.recorder.as_ref().map_or("off".into(), |recorder| format!("{} rows", recorder.count)));
+    line("drop-outs", format!("{} missing, {}", counts.missing, counted(counts.gaps, "gap")));
+    line("skipped", counted(counts.bad_lines, "line"));
+    line("record", session.recorder.as_ref().map_or("off".into(), |recorder| counted(recorder.count, "row")));
     line("marks", counts.marks.to_string());
     lines
 }

@@ -3,7 +3,7 @@
 mod motion;
 mod worth;
 
-use comfy_table::{Table, presets};
+use comfy_table::{ColumnConstraint, Table};
 use ohmstrain::{Calibration, EstimatorKind, JointParams, Quantity, Sensor};
 use ohmstrain_bench_data::Metadata;
 use ohmstrain_bench_data::simulate::{Protocol, SimulationSettings};
@@ -14,7 +14,7 @@ use super::simulate;
 use crate::args::PlanArgs;
 use crate::error::CliError;
 use crate::input;
-use crate::output::print;
+use crate::output::{self, print, wrapped};
 use crate::progress::Progress;
 use crate::sensor_file::{self, MADE_BY};
 use motion::Protocols;
@@ -97,15 +97,15 @@ fn text(sensor: &Sensor, name: &str, protocols: &Protocols, told: &[Told], worth
     let shown = |x: f64| format!("{}{unit}", significant(factor * x, 3));
     let speeds: Vec<String> = protocols.speeds.iter().map(|speed| format!("{}/s", shown(*speed))).collect();
     let (low, high) = (params.law.range.lower, params.law.range.upper);
-    let mut text = format!(
+    let mut text = wrapped(&format!(
         "{name}: {} to {}, relaxation within {} s. All of this is simulated with the sensor's own law: what the law gets wrong \
-         comes on top.\n\nWhat a recording tells, at speeds of {}:\n",
+         comes on top.\n\nWhat a recording tells, parameters and the worst of their errors, at speeds of {}:\n",
         shown(low),
         shown(high),
         significant(protocols.slowest_s, 2),
         speeds.join(", ")
-    );
-    let mut recordings = table(["recording", "minutes", "parameters told", "worst told", "condition", "left open"]);
+    ));
+    let mut recordings = table(["recording", "minutes", "told", "worst", "condition", "left open"]);
     for one in told {
         recordings.add_row([
             one.protocol.to_string(),
@@ -117,10 +117,15 @@ fn text(sensor: &Sensor, name: &str, protocols: &Protocols, told: &[Told], worth
         ]);
     }
     let estimator = params.filter_of(params.default_estimator).name();
-    text += &format!(
-        "{recordings}\n\nError of strain by the filter {estimator}, % of the range (share of rows in the 95 % interval), by sampling \
-         and converter:\n"
-    );
+    // Names of parameters are not broken, those of recordings are.
+    if let Some(left_open) = recordings.column_mut(5) {
+        left_open.set_constraint(ColumnConstraint::ContentWidth);
+    }
+    text += &format!("{recordings}\n\n");
+    text += &wrapped(&format!(
+        "Error of strain by the filter {estimator}, % of the range (share of rows in the 95 % interval), by sampling and \
+         converter:"
+    ));
     let mut errors = table(["readings per s", "as good as the sensor", "16 bits", "12 bits", "10 bits"]);
     for rate in worth::RATES_HZ {
         let of_rate = worth.cases.iter().filter(|one| one.rate_hz == rate);
@@ -128,7 +133,7 @@ fn text(sensor: &Sensor, name: &str, protocols: &Protocols, told: &[Told], worth
         errors.add_row([format!("{rate}")].into_iter().chain(cells));
     }
     text += &format!("{errors}\n");
-    text += &floor(worth);
+    text += &wrapped(&floor(worth));
     text += "The converter is read through a divider whose resistor is the geometric mean of the readings' range.\n";
     if let Some(best) = worth.cases.iter().filter_map(|one| one.angle_deg).reduce(f64::min) {
         text += &format!("Of the joint's angle the least of these errors is {}°.\n", significant(best, 2));
@@ -142,8 +147,8 @@ fn floor(worth: &Sampling) -> String {
     let shown = |percent: &f64| fixed(*percent, 1);
     format!(
         "Of {} readings per s drift by itself leaves {}, noise by itself {}, and exact readings {}. What exact readings leave is \
-         the filter's own:\nit allows for an error of the law, and has to find out which way the body moves. Neither that nor \
-         drift is mended by rate or converter,\nbut by a better filter (--sensor, calibrated by default) and by rests now and \
+         the filter's own: it allows for an error of the law, and has to find out which way the body moves. Neither that nor \
+         drift is mended by rate or converter, but by a better filter (--sensor, calibrated by default) and by rests now and \
          then (--rest-resistance, filter --known).\n",
         worth::FASTEST_HZ,
         shown(drift_alone_percent),
@@ -153,8 +158,7 @@ fn floor(worth: &Sampling) -> String {
 }
 
 fn table<const N: usize>(header: [&str; N]) -> Table {
-    let mut table = Table::new();
-    table.load_style(presets::ASCII_MARKDOWN);
+    let mut table = output::table();
     table.set_header(header);
     table
 }

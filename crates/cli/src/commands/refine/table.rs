@@ -1,9 +1,9 @@
 use std::io::Write;
 
-use comfy_table::{Table, presets};
 use ohmstrain_calib::likelihood::{Bound, LogLikelihood, NoiseFit, NoiseParameter, NoiseStart, ProfileInterval};
 
 use crate::error::CliError;
+use crate::output;
 
 /// All that `refine` found.
 pub struct Refinement {
@@ -22,8 +22,7 @@ pub struct Refinement {
 /// Prints what was found.
 pub fn write(out: &mut dyn Write, refinement: &Refinement) -> Result<(), CliError> {
     let Refinement { start, free, before, found, profiles } = refinement;
-    let mut table = Table::new();
-    table.load_style(presets::ASCII_MARKDOWN);
+    let mut table = output::table();
     table.set_header(["parameter", "before", "after", "s.e. of ln", "95 % profile interval", "on bound"]);
     for ((parameter, fitted), profile) in free.iter().zip(&found.fit.parameters).zip(profiles) {
         table.add_row([
