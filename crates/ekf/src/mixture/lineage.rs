@@ -63,6 +63,19 @@ pub(crate) struct Following<'a, T: Real, const B: usize, const N: usize, const L
     step: SwitchedStep<T, B>,
 }
 
+/// Variances, and squared distances of means, that are this many times what the filter states are none that later readings
+/// can have told. What is known of a merged hypothesis is known of its children but roughly, and where a state decays
+/// without noise the way back makes an excess grow with every step, e-fold in each time constant: in a gap without bound.
+const ASTRAY: [f64; 2] = [4.0, 400.0];
+
+fn is_astray<T: Real, const N: usize, const L: usize>(smoothed: &Belief<T, N, L>, filtered: &Belief<T, N, L>) -> bool {
+    (0..N).any(|i| {
+        let (moved, variance) = (smoothed.mean[i] - filtered.mean[i], filtered.covariance[(i, i)]);
+        let least = T::of(ASTRAY[0]) * variance >= smoothed.covariance[(i, i)];
+        !(least && moved * moved <= T::of(ASTRAY[1]) * variance)
+    })
+}
+
 /// Children with less of the smoothed weight than this leave no trace in the moments.
 const LEAST_SHARE: f64 = 1e-7;
 
@@ -177,7 +190,8 @@ impl<T: Real, const N: usize, const L: usize, const K: usize> Lineage<T, N, L, K
                     let share = heir.weight * (child.log_weight - *totals.get(child.heir)?).exp();
                     let back = || {
                         let own = child.unmerged(&merged.belief, &heir.belief);
-                        rts_step(&parent.belief, &child.transition, &child.predicted, &own)
+                        let back = rts_step(&parent.belief, &child.transition, &child.predicted, &own);
+                        if is_astray(&back, &parent.belief) { parent.belief } else { back }
                     };
                     (share > T::of(LEAST_SHARE)).then(|| (share, back()))
                 });
