@@ -264,11 +264,7 @@ fn widest_after_smoothing<E: Estimator<f64, N, L>>(
         let wave = 0.3 + 0.2 * (0.06 * f64::from(k)).sin();
         let reading = (!(100..700).contains(&k)).then(|| Reading::from(wave));
         let advanced = estimator.advance(&state, &prepared, reading).unwrap();
-        past.push(PastStep {
-            from: std::mem::replace(&mut state, advanced.state),
-            prepared: prepared.clone(),
-            reading,
-        });
+        past.push(PastStep { from: std::mem::replace(&mut state, advanced.state), prepared, reading });
         filtered = widest(&state, filtered);
     }
     let mut smoothed = SVector::zeros();
