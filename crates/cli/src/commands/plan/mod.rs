@@ -133,6 +133,13 @@ fn text(sensor: &Sensor, name: &str, protocols: &Protocols, told: &[Told], worth
         errors.add_row([format!("{rate}")].into_iter().chain(cells));
     }
     text += &format!("{errors}\n");
+    text += &wrapped("Medians of five draws of noise and drift, without a learned correction.\n");
+    if let Some(summary) = params.summary.as_ref().filter(|_| params.correction.is_some()) {
+        text += &wrapped(&format!(
+            "With its correction this sensor's calibration left {} % on quarters left out.\n",
+            fixed(summary.left_out_percent_fs, 1)
+        ));
+    }
     text += &wrapped(&floor(worth));
     text += "The converter is read through a divider whose resistor is the geometric mean of the readings' range.\n";
     if let Some(best) = worth.cases.iter().filter_map(|one| one.angle_deg).reduce(f64::min) {

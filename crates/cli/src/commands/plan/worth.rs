@@ -21,10 +21,12 @@ pub const FASTEST_HZ: f64 = 50.0;
 const FINEST_HZ: f64 = 100.0;
 /// Bits of a converter; 0 for readings as good as the sensor.
 const BITS: [u32; 4] = [0, 16, 12, 10];
-/// Seed of noise and drift.
-const SEED: u64 = 1;
+/// Draws of noise and drift; the median of their errors is stated. One that leads the filter astray says little about sampling.
+const DRAWS: u64 = 5;
 /// A parameter is told if its standard error is less than this share of it.
 const TOLD: f64 = 0.25;
+/// Least reading, as a share of R₀: the drift stands for the law's errors too, and can be larger than a resistance.
+const LEAST_READING: f64 = 0.01;
 /// Relative step of a difference: errors of its square and of rounding over it are both about 1e-9.
 const STEP: f64 = 1e-5;
 /// Seconds in which a filter finds its feet, which are not scored.
@@ -53,7 +55,7 @@ pub struct Worth {
     pub rate_hz: f64,
     /// Bits of the converter; none if it is as good as the sensor.
     pub bits: Option<u32>,
-    /// Root mean square error in percent of the sensor's range.
+    /// Root mean square error in percent of the sensor's range, the median of several draws of noise and drift.
     pub error_percent: f64,
     pub coverage_percent: f64,
     /// Root mean square error of the joint's angle, degrees, if there is a joint.
@@ -83,8 +85,8 @@ struct Disturbed {
 const AS_FOUND: Disturbed = Disturbed { drift: 1.0, white: 1.0 };
 
 /// The sensor's drift, the same one however it is sampled: shares of R₀, [`FINEST_HZ`] of them a second.
-fn drift(noise: NoiseParams, rows: usize) -> Vec<f64> {
-    let mut random = ChaCha8Rng::seed_from_u64(SEED);
+fn drift(noise: NoiseParams, rows: usize, seed: u64) -> Vec<f64> {
+    let mut random = ChaCha8Rng::seed_from_u64(2 * seed);
     let mut draw = || -> f64 { StandardNormal.sample(&mut random) };
     let kept = (-1.0 / (FINEST_HZ * noise.baseline_time_s)).exp();
     let mut baseline = noise.baseline_sd * draw();
@@ -96,7 +98,7 @@ fn drift(noise: NoiseParams, rows: usize) -> Vec<f64> {
 }
 
 /// Readings of a motion by the sensor's law, with white noise and a drifting baseline.
-fn readings(sensor: &Sensor, (rate_hz, strain): (f64, &[f64]), disturbed: Disturbed) -> Vec<f64> {
+fn readings(sensor: &Sensor, (rate_hz, strain): (f64, &[f64]), disturbed: Disturbed, seed: u64) -> Vec<f64> {
     let params = sensor.params();
     let law = Law::new(params, params.rest_reading);
     let driven = law.driven(&times(strain.len(), rate_hz), strain, &[]).reading;
@@ -104,12 +106,12 @@ fn readings(sensor: &Sensor, (rate_hz, strain): (f64, &[f64]), disturbed: Distur
         return driven;
     };
     let every = (FINEST_HZ / rate_hz).round() as usize;
-    let drift = drift(noise, strain.len() * every);
-    let mut random = ChaCha8Rng::seed_from_u64(SEED + 1);
+    let drift = drift(noise, strain.len() * every, seed);
+    let mut random = ChaCha8Rng::seed_from_u64(2 * seed + 1);
     let mut draw = || -> f64 { StandardNormal.sample(&mut random) };
     let noisy = |(reading, row): (f64, usize)| {
         let noise = disturbed.drift * drift[row * every] + disturbed.white * noise.reading_sd * draw();
-        reading + params.rest_reading * noise
+        (reading + params.rest_reading * noise).max(LEAST_READING * params.rest_reading)
     };
     driven.into_iter().zip(0..).map(noisy).collect()
 }
@@ -214,26 +216,41 @@ fn information(sensor: &Sensor, strain: &[f64]) -> DMatrix<f64> {
     jacobian.tr_mul(&jacobian)
 }
 
-/// What rates and converters leave of the estimate, all on one motion with one drift.
+/// What rates and converters leave of the estimate, all on one motion with the same drifts.
 pub fn sampling(sensor: &Sensor, protocols: &Protocols) -> Result<Sampling, CliError> {
-    let path = protocols.usual();
-    let mut cases = Vec::new();
+    let (path, mut cases) = (protocols.usual(), Vec::new());
     for rate_hz in RATES_HZ {
         let strain = at_rate(&path, rate_hz);
-        let exact = readings(sensor, (rate_hz, &strain), AS_FOUND);
         for bits in BITS.into_iter().filter(|bits| *bits == 0 || sensor.params().reading == ReadingUnit::Ohm) {
-            cases.push(scored(sensor, (rate_hz, bits), &strain, &converted(&exact, bits)?)?);
+            cases.push(median_of_draws(sensor, (rate_hz, bits), &strain, AS_FOUND)?);
         }
     }
     let strain = at_rate(&path, FASTEST_HZ);
     let alone = |disturbed: Disturbed| {
-        let exact = readings(sensor, (FASTEST_HZ, &strain), disturbed);
-        scored(sensor, (FASTEST_HZ, 0), &strain, &converted(&exact, 0)?).map(|one| one.error_percent)
+        median_of_draws(sensor, (FASTEST_HZ, 0), &strain, disturbed).map(|one| one.error_percent)
     };
     let drift_alone_percent = alone(Disturbed { white: 0.0, ..AS_FOUND })?;
     let noise_alone_percent = alone(Disturbed { drift: 0.0, ..AS_FOUND })?;
     let neither_percent = alone(Disturbed { drift: 0.0, white: 0.0 })?;
     Ok(Sampling { cases, drift_alone_percent, noise_alone_percent, neither_percent })
+}
+
+/// The draw with the median error, with the coverage of all.
+fn median_of_draws(
+    sensor: &Sensor,
+    (rate_hz, bits): (f64, u32),
+    strain: &[f64],
+    disturbed: Disturbed,
+) -> Result<Worth, CliError> {
+    let draw = |seed: u64| {
+        let exact = readings(sensor, (rate_hz, strain), disturbed, seed);
+        scored(sensor, (rate_hz, bits), strain, &converted(&exact, bits)?)
+    };
+    let mut draws = (1..=DRAWS).map(draw).collect::<Result<Vec<Worth>, _>>()?;
+    draws.sort_by(|a, b| a.error_percent.total_cmp(&b.error_percent));
+    let coverage_percent = draws.iter().map(|one| one.coverage_percent).sum::<f64>() / DRAWS as f64;
+    let median = draws.swap_remove(draws.len() / 2);
+    Ok(Worth { coverage_percent, ..median })
 }
 
 /// Readings through a divider whose resistor is the geometric mean of their range.
