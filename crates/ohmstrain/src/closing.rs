@@ -206,7 +206,7 @@ fn seen(seen: &Seen, quantity: Quantity) -> String {
         "no holds".into()
     };
     format!(
-        "{} {} to {}{unit}{}; mostly {} to {}{unit}/s, seldom above {}{unit}/s; {holds}; {} s",
+        "{} {} to {}{unit}{}; mostly {} to {}, seldom over {}{unit}/s; {holds}; {} s",
         quantity.name().trim_end_matches("_deg"),
         number(low),
         number(seen.range.upper),

@@ -2,6 +2,8 @@
 
 use std::collections::VecDeque;
 
+use super::axis::extent;
+
 /// What the strain does at a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Motion {
@@ -26,6 +28,8 @@ pub struct Hold {
     pub duration_s: f64,
 }
 
+/// Levels are apart by this share of what holds reach over.
+const LEVELS_APART: f64 = 0.1;
 /// A hold's strain stays within this share of the recording's whole range.
 const TOLERANCE: f64 = 0.005;
 /// With a tolerance this much wider a hold grows by its edges only; the turning point of a sine grows by 1.7, the tip
@@ -81,6 +85,19 @@ pub fn holds(time_s: &[f64], strain: &[f64], shortest_s: f64) -> Vec<Hold> {
         .filter_map(|window| hold(&samples, window))
         .filter(|hold| hold.duration_s >= shortest_s)
         .collect()
+}
+
+/// Holds with the first of each level before all others; levels are apart by a tenth of what holds reach over.
+pub fn levels_first(held: Vec<Hold>) -> Vec<Hold> {
+    let Some((low, high)) = extent(held.iter().map(|hold| hold.strain)) else { return held };
+    let mut levels: Vec<f64> = vec![];
+    let (mut first, others): (Vec<Hold>, Vec<Hold>) = held.into_iter().partition(|hold| {
+        let is_new = levels.iter().all(|level| (level - hold.strain).abs() > LEVELS_APART * (high - low));
+        levels.extend(is_new.then_some(hold.strain));
+        is_new
+    });
+    first.extend(others);
+    first
 }
 
 /// Longest windows of samples, both ends included, in which the strain stays within `tolerance`, starts and ends
@@ -190,7 +207,7 @@ fn fill(motions: &mut [Motion], from: usize, until: usize, motion: Option<Motion
 
 #[cfg(test)]
 mod tests {
-    use super::{Motion, holds, motions};
+    use super::{Hold, Motion, holds, levels_first, motions};
 
     fn clock(rows: usize) -> Vec<f64> {
         (0..rows).map(|k| 0.1 * k as f64).collect()
@@ -243,5 +260,16 @@ mod tests {
         assert_eq!(at(100.0), Motion::Hold);
         assert_eq!(motions(&[], &[], &[]), []);
         assert_eq!(motions(&[0.0], &[f64::NAN], &[]).len(), 1);
+    }
+
+    /// Step-holds return to zero after every level, and stay there longest.
+    #[test]
+    fn a_hold_of_each_level_comes_first() {
+        let hold = |strain: f64, duration_s: f64| Hold { first: 0, last: 1, strain, duration_s };
+        let held = [(0.0, 90.0), (0.001, 80.0), (0.0, 70.0), (0.1, 60.0), (0.2, 50.0), (0.1, 40.0)];
+        let order: Vec<f64> =
+            levels_first(held.map(|(x, s)| hold(x, s)).to_vec()).into_iter().map(|hold| hold.duration_s).collect();
+        assert_eq!(order, [90.0, 60.0, 50.0, 80.0, 70.0, 40.0]);
+        assert!(levels_first(vec![]).is_empty());
     }
 }

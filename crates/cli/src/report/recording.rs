@@ -56,6 +56,7 @@ impl<'a> Recording<'a> {
         if truth.is_none() {
             held.retain(|hold| is_free(hold.strain, input.params));
         }
+        let held = motion::levels_first(held);
         let starts: Vec<usize> = held.iter().take(PLOTTED_HOLDS).map(|hold| hold.first).collect();
         let driven = law.driven(input.time_s, &strain, &starts);
         let (driven, held_driven) = if truth.is_some() {
@@ -87,12 +88,12 @@ impl<'a> Recording<'a> {
         &self.strain
     }
 
-    /// The longest holds, at most four, longest first.
+    /// The holds that are plotted, at most four: the longest of each level, then the longest others.
     pub fn longest_holds(&self) -> &[Hold] {
         self.held.get(..PLOTTED_HOLDS).unwrap_or(&self.held)
     }
 
-    /// All holds, longest first.
+    /// All holds: the longest of each level, then the others, longest first.
     pub fn holds(&self) -> &[Hold] {
         &self.held
     }
