@@ -25,6 +25,8 @@ const GAIN: Allowed = Allowed { least: -LARGEST_CHANGE, most: LARGEST_CHANGE };
 const POSITIVE: Allowed = Allowed { least: 1e-12, most: 1e12 };
 /// Rates, 1/s: squares of what is faster leave no digits to a belief, and the search ends far below.
 const RATE: Allowed = Allowed { least: 1e-12, most: 1e8 };
+/// Deviations of the strain, likewise.
+const SPREAD: Allowed = Allowed { least: 1e-12, most: 1e6 };
 /// Deviations of what may be exact.
 const AMOUNT: Allowed = Allowed { least: 0.0, most: 1e6 };
 /// Probabilities and powers.
@@ -220,7 +222,7 @@ impl MotionParams {
             let expected = format!("{} to {}, near the `limits`", short(least), short(most));
             return Err(table.wrong("strain_mean", expected, short(strain_mean)));
         }
-        table.number("strain_sd", strain_sd, POSITIVE)?;
+        table.number("strain_sd", strain_sd, SPREAD)?;
         table.number("rate_time_s", rate_time_s, POSITIVE)
     }
 }
