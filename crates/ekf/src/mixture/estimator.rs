@@ -71,6 +71,56 @@ macro_rules! mixture_filter {
 }
 pub(crate) use mixture_filter;
 
+/// How a filter over a chain of all phases begins, and for steps of how many seconds it is.
+macro_rules! over_phases {
+    ($filter:ident<$($size:ident),+>) => {
+        impl<T: Real, $(const $size: usize),+> $filter<T, $($size),+> {
+            /// A filter for steps of `dt_s` seconds.
+            /// - `dwell`: how long phases last and what follows them.
+            /// - `evidence`: what weighs the hypotheses.
+            ///
+            /// # Errors
+            /// If `dt_s` is negative or not finite.
+            pub fn new(
+                model: SwitchedModel<T, B, N>,
+                dt_s: T,
+                dwell: Dwell<T>,
+                evidence: Evidence<T>,
+            ) -> Result<Self, StepError> {
+                Ok(Self::around(SparseEkf::of_any_length(model, dt_s)?, dwell, evidence))
+            }
+        }
+
+        impl<T: Real, $(const $size: usize,)+ S: Switch<T>, G: Curve<T>> $filter<T, $($size,)+ S, G> {
+            /// A filter whose hypotheses step as `kernel` does; the other arguments as for [`Self::new`]. Of its switch only
+            /// the square root is used.
+            pub fn around(kernel: SparseEkf<T, S, B, N, G>, dwell: Dwell<T>, evidence: Evidence<T>) -> Self {
+                Self {
+                    dwell,
+                    chain: dwell.probabilities(kernel.dt_s()),
+                    weighing: Weighing::new(evidence),
+                    fresh: Phase::ALL.map(|phase| fresh_rate(kernel.model().motion(), phase)),
+                    kernel,
+                }
+            }
+
+            /// A phase changes at the beginning of a step: steps are short against phases, and against what the model asks for.
+            fn longest_s(&self) -> T {
+                self.model().longest_step_s().min(self.dwell.longest_step_s())
+            }
+
+            /// The same filter for steps of another length.
+            fn every(&self, dt_s: T) -> Self {
+                let mut other = *self;
+                other.kernel.set_length(dt_s);
+                other.chain = other.dwell.probabilities(dt_s);
+                other
+            }
+        }
+    };
+}
+pub(crate) use over_phases;
+
 /// The steps of a filter whose `step_recorded` makes a [`Mixture`](crate::Mixture) anew, forward and backwards along the same.
 macro_rules! mixture_steps {
     () => {
@@ -109,16 +159,18 @@ macro_rules! mixture_steps {
         fn step_heard<const L: usize>(
             &self,
             state: &Mixture<T, N, L, K>,
-            mut reading: Option<Reading<T>>,
+            reading: Option<Reading<T>>,
             next: &mut Mixture<T, N, L, K>,
             recorder: &mut impl Recorder<T, B>,
         ) -> Result<Option<MixtureResidual<T>>, StepError> {
             let mut tries = 0;
+            let mut extra_variance = reading.map_or(T::zero(), |reading| reading.extra_variance);
             loop {
-                match self.step_recorded(state, reading, next, recorder) {
+                let heard = reading.map(|reading| Reading { extra_variance, ..reading });
+                match self.step_recorded(state, heard, next, recorder) {
                     Err(refused) if reading.is_some() => {
                         tries += 1;
-                        reading = Some(self.kernel.coarser(reading, tries, refused)?);
+                        extra_variance = self.kernel.coarser(heard, tries, refused)?.extra_variance;
                     }
                     taken => return taken,
                 }

@@ -9,7 +9,7 @@ use ohmstrain_model::{Phase, SwitchedModel};
 use crate::belief::gaussian::Real;
 use crate::kernel::{Course, Parts};
 use crate::mixture::children::Children;
-use crate::mixture::estimator::{mixture_filter, mixture_steps};
+use crate::mixture::estimator::{mixture_filter, mixture_steps, over_phases};
 use crate::mixture::evidence::{Newborn, Weighing};
 use crate::mixture::lineage::{Birth, Following, Recorder};
 use crate::mixture::predicted::Predicted;
@@ -35,49 +35,7 @@ pub struct Hypotheses<T, const B: usize, const N: usize, const K: usize, S = Com
     pub(crate) fresh: [Gaussian<T>; 3],
 }
 
-impl<T: Real, const B: usize, const N: usize, const K: usize> Hypotheses<T, B, N, K> {
-    /// A filter for steps of `dt_s` seconds.
-    /// - `dwell`: how long phases last and what follows them.
-    /// - `evidence`: what weighs the histories.
-    ///
-    /// # Errors
-    /// If `dt_s` is negative or not finite.
-    pub fn new(
-        model: SwitchedModel<T, B, N>,
-        dt_s: T,
-        dwell: Dwell<T>,
-        evidence: Evidence<T>,
-    ) -> Result<Self, StepError> {
-        Ok(Self::around(SparseEkf::of_any_length(model, dt_s)?, dwell, evidence))
-    }
-}
-
 impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: Curve<T>> Hypotheses<T, B, N, K, S, G> {
-    /// A filter whose histories step as `kernel` does; the other arguments as for [`Self::new`]. Of its switch only the
-    /// square root is used.
-    pub fn around(kernel: SparseEkf<T, S, B, N, G>, dwell: Dwell<T>, evidence: Evidence<T>) -> Self {
-        Self {
-            dwell,
-            chain: dwell.probabilities(kernel.dt_s()),
-            weighing: Weighing::new(evidence),
-            fresh: Phase::ALL.map(|phase| fresh_rate(kernel.model().motion(), phase)),
-            kernel,
-        }
-    }
-
-    /// A phase changes at the beginning of a step: steps are short against phases, and against what the model asks for.
-    fn longest_s(&self) -> T {
-        self.model().longest_step_s().min(self.dwell.longest_step_s())
-    }
-
-    /// The same filter for steps of another length.
-    fn every(&self, dt_s: T) -> Self {
-        let mut other = *self;
-        other.kernel.set_length(dt_s);
-        other.chain = other.dwell.probabilities(dt_s);
-        other
-    }
-
     mixture_steps!();
 
     #[inline(always)]
@@ -118,4 +76,5 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
     }
 }
 
+over_phases!(Hypotheses<B, N, K>);
 mixture_filter!(Hypotheses<B, N, K>, Mixture<K>);

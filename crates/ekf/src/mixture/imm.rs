@@ -12,7 +12,7 @@ use ohmstrain_model::{Phase, SwitchedModel};
 use crate::belief::gaussian::Real;
 use crate::kernel::{Course, Parts};
 use crate::mixture::LEAST_WEIGHT;
-use crate::mixture::estimator::mixture_filter;
+use crate::mixture::estimator::{mixture_filter, over_phases};
 use crate::mixture::evidence::{Weighing, Weight};
 use crate::mixture::predicted::Predicted;
 use crate::mixture::state::{PhaseMixture, Share};
@@ -30,7 +30,7 @@ use crate::{
 pub struct Imm<T, const B: usize, const N: usize, S = Compact, G = AnyCurve<T>> {
     pub(super) kernel: SparseEkf<T, S, B, N, G>,
     dwell: Dwell<T>,
-    /// Probabilities of a change of phase over a step, `[to][from]`.
+    /// Probabilities of a change of phase over a step, `[from][to]`.
     pub(super) chain: [[T; 3]; 3],
     weighing: Weighing<T>,
     /// Rate of a moving phase that begins.
@@ -49,49 +49,7 @@ struct Mode<T, const B: usize> {
     residual: Option<Residual<T>>,
 }
 
-impl<T: Real, const B: usize, const N: usize> Imm<T, B, N> {
-    /// A filter for steps of `dt_s` seconds.
-    /// - `dwell`: how long phases last and what follows them.
-    /// - `evidence`: what weighs the phases.
-    ///
-    /// # Errors
-    /// If `dt_s` is negative or not finite.
-    pub fn new(
-        model: SwitchedModel<T, B, N>,
-        dt_s: T,
-        dwell: Dwell<T>,
-        evidence: Evidence<T>,
-    ) -> Result<Self, StepError> {
-        Ok(Self::around(SparseEkf::of_any_length(model, dt_s)?, dwell, evidence))
-    }
-}
-
 impl<T: Real, const B: usize, const N: usize, S: Switch<T>, G: Curve<T>> Imm<T, B, N, S, G> {
-    /// A filter whose modes step as `kernel` does; the other arguments as for [`Self::new`]. Of its switch only the square
-    /// root is used.
-    pub fn around(kernel: SparseEkf<T, S, B, N, G>, dwell: Dwell<T>, evidence: Evidence<T>) -> Self {
-        Self {
-            dwell,
-            chain: transposed(&dwell.probabilities(kernel.dt_s())),
-            weighing: Weighing::new(evidence),
-            fresh: Phase::ALL.map(|phase| fresh_rate(kernel.model().motion(), phase)),
-            kernel,
-        }
-    }
-
-    /// A phase changes at the beginning of a step: steps are short against phases, and against what the model asks for.
-    fn longest_s(&self) -> T {
-        self.model().longest_step_s().min(self.dwell.longest_step_s())
-    }
-
-    /// The same filter for steps of another length.
-    fn every(&self, dt_s: T) -> Self {
-        let mut other = *self;
-        other.kernel.set_length(dt_s);
-        other.chain = transposed(&other.dwell.probabilities(dt_s));
-        other
-    }
-
     /// Predicts one step ahead and takes the reading; without one it is a prediction and returns `None`. A reading that is more
     /// exact than the numbers is taken again with more and more noise.
     ///
@@ -101,14 +59,16 @@ impl<T: Real, const B: usize, const N: usize, S: Switch<T>, G: Curve<T>> Imm<T, 
     pub fn step<const L: usize>(
         &self,
         state: &mut PhaseMixture<T, N, L>,
-        mut reading: Option<Reading<T>>,
+        reading: Option<Reading<T>>,
     ) -> Result<Option<MixtureResidual<T>>, StepError> {
         let mut tries = 0;
+        let mut extra_variance = reading.map_or(T::zero(), |reading| reading.extra_variance);
         loop {
-            match self.step_once(state, reading) {
+            let heard = reading.map(|reading| Reading { extra_variance, ..reading });
+            match self.step_once(state, heard) {
                 Err(refused) if reading.is_some() => {
                     tries += 1;
-                    reading = Some(self.kernel.coarser(reading, tries, refused)?);
+                    extra_variance = self.kernel.coarser(heard, tries, refused)?.extra_variance;
                 }
                 taken => return taken,
             }
@@ -185,7 +145,7 @@ impl<T: Real, const B: usize, const N: usize, S: Switch<T>, G: Curve<T>> Imm<T, 
     fn mixed<const L: usize>(&self, modes: &[Share<T, N, L>; 3], phase: Phase) -> Mode<T, B> {
         let (zero, to) = (T::zero(), phase.index());
         let own = &modes[to];
-        let joint: [T; 3] = core::array::from_fn(|from| self.chain[to][from] * modes[from].weight);
+        let joint: [T; 3] = core::array::from_fn(|from| self.chain[from][to] * modes[from].weight);
         let prior = joint[0] + joint[1] + joint[2];
         let weight = Weight { factor: prior, exponent: zero };
         if !(prior > zero) {
@@ -203,11 +163,6 @@ impl<T: Real, const B: usize, const N: usize, S: Switch<T>, G: Curve<T>> Imm<T, 
         }
         Mode { parts, prior, weight, more_inside: T::one(), per_inside, residual: None }
     }
-}
-
-/// `[to][from]` of `[from][to]`.
-fn transposed<T: Real>(chain: &[[T; 3]; 3]) -> [[T; 3]; 3] {
-    core::array::from_fn(|to| core::array::from_fn(|from| chain[from][to]))
 }
 
 /// What went well, without moving it.
@@ -252,4 +207,5 @@ fn shares<T: Real>(weights: [(Weight<T>, T); 3]) -> Result<([T; 3], Weight<T>), 
     Ok((weights.map(|weight| weight * per_sum), Weight { factor: density, exponent }))
 }
 
+over_phases!(Imm<B, N>);
 mixture_filter!(Imm<B, N>, PhaseMixture<>);

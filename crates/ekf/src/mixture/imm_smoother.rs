@@ -47,7 +47,7 @@ impl<T: Real, const B: usize, const N: usize, S: Switch<T>, G: Curve<T>> Imm<T, 
         mixed: &mut Belief<T, N, L>,
         mixing: &mut Lineage<T, N, L, 3>,
     ) -> T {
-        let joint: [T; 3] = core::array::from_fn(|from| self.chain[phase.index()][from] * filtered.modes[from].weight);
+        let joint: [T; 3] = core::array::from_fn(|from| self.chain[from][phase.index()] * filtered.modes[from].weight);
         let total = joint[0] + joint[1] + joint[2];
         let entered = Phase::ALL.map(|from| self.entered(&filtered.modes[from.index()], from, phase));
         for ((from, belief), weight) in Phase::ALL.into_iter().zip(&entered).zip(joint) {
