@@ -6,7 +6,7 @@ use ohmstrain_ekf::{Guard, Influence, StepError};
 use crate::doubt::Doubt;
 use crate::estimate::Scale;
 use crate::filter::Kernel;
-use crate::{Error, Estimate, Filter, Flags, LaggedFilter, Reading, Sensor};
+use crate::{Error, Estimate, Filter, Flags, LaggedFilter, Reading, Sensor, Unread};
 
 /// How many readings in a row a gate turns down before it is the state that is doubted: outliers come alone, a body that sets off
 /// surprises until it is followed. With ten a knee that bent within half a second was missed.
@@ -269,8 +269,10 @@ impl<'a> FilterBuilder<'a> {
         let mut back = filter.way_back(Rows::new(len, &relative)).map_err(failed)?;
         let (mut outputs, mut estimates, mut first) = (Vec::new(), Vec::new(), len);
         let start_s = if len > 0 { row(0).0 } else { 0.0 };
+        let mut pauses = doubt.map(|doubt| doubt.pauses());
         while let Some(rows) = back.next_segment(&mut outputs).map_err(failed)? {
             first = rows.start;
+            pauses.iter_mut().for_each(|pauses| pauses.widen(rows.clone(), |k| row(k).0, &mut outputs));
             estimates.clear();
             estimates.extend(rows.clone().zip(&outputs).map(|(k, output)| {
                 let (time_s, reading) = row(k);
@@ -297,7 +299,8 @@ impl<'a> FilterBuilder<'a> {
         filter.guard(self.guard()?);
         let mut scale = Scale::new(self.sensor)?;
         self.rest_resistance.map_or(Ok(()), |measured| scale.rest_at(measured))?;
-        let doubt = self.doubts.then(|| Doubt::new(params, self.initial_strain));
+        let unread = Unread::new(&params.estimator(params.filter_of(kind))?.motion, params.limits);
+        let doubt = self.doubts.then(|| Doubt::new(params, unread, self.initial_strain));
         Ok(Kernel { filter, scale, doubt })
     }
 

@@ -1,8 +1,9 @@
 use ohmstrain_calib::{Output, SURPRISING_NIS, SensorParams};
 use ohmstrain_ekf::ReadingVerdict;
 
+use crate::pauses::Pauses;
 use crate::rest_watch::ZERO;
-use crate::{Flag, Flags, RestSeen, RestWatch};
+use crate::{Flag, Flags, NEVER_READ_S, RestSeen, RestWatch, Unread};
 
 /// What no filter knows by itself: that it has only just begun, or begun again; that readings have jumped; that the sensor is
 /// used outside of what its calibration has seen. It widens the strain's interval, and says why.
@@ -14,6 +15,9 @@ pub(crate) struct Doubt {
     /// Variance of the strain that fades while readings are believed.
     fading: f64,
     starting: bool,
+    /// What is known without a reading, and for how long there has been none, s.
+    unread: Unread,
+    unread_s: f64,
     /// The strain's variance where readings have not been believed since.
     lost: Option<f64>,
     /// The last reading that was believed, R/R₀ - 1.
@@ -92,7 +96,7 @@ pub const DOUBT: DoubtNumbers = DoubtNumbers {
 
 impl Doubt {
     /// Before the first row, with its strain if that is known.
-    pub(crate) fn new(params: &SensorParams, known: Option<f64>) -> Self {
+    pub(crate) fn new(params: &SensorParams, unread: Unread, known: Option<f64>) -> Self {
         let starts_known = known.is_some();
         let (seen, span) = (&params.validity, params.limits.span());
         let relative = |reading: f64| reading / params.rest_reading - 1.0;
@@ -111,6 +115,8 @@ impl Doubt {
             last_s: 0.0,
             fading: start * start,
             starting: !starts_known,
+            unread,
+            unread_s: if starts_known { 0.0 } else { NEVER_READ_S },
             lost: None,
             believed: None,
             outside: 0.0,
@@ -125,7 +131,7 @@ impl Doubt {
 
     /// The strain is known now: what was doubted of it is gone.
     pub(crate) fn settle(&mut self) {
-        (self.fading, self.starting, self.lost) = (0.0, false, None);
+        (self.fading, self.starting, self.lost, self.unread_s) = (0.0, false, None, 0.0);
     }
 
     /// There is more to doubt than what is left of a start.
@@ -140,13 +146,18 @@ impl Doubt {
         let start_s = *self.start_s.get_or_insert(time_s);
         let dt_s = if start_s < time_s { time_s - self.last_s } else { 0.0 };
         self.last_s = time_s;
-        let variance = output.estimate.strain.variance;
         let taken = reading.filter(|_| is_taken(output.verdict));
+        let filtered = output.estimate.strain;
+        self.unread_s = if taken.is_some() { 0.0 } else { self.unread_s + dt_s };
+        let variance = match taken {
+            Some(_) => filtered.variance,
+            None => self.unread.variance(self.unread_s, filtered.mean, filtered.variance),
+        };
         // The share of an innovation that is beyond what is no surprise.
         let surprise = output.nis.map_or(0.0, |nis| 1.0 - (SURPRISING_NIS / nis).sqrt());
         let most = (MOST * self.seen.span).powi(2);
         match taken {
-            None => self.lost = Some(self.lost.unwrap_or(0.0).max(variance)),
+            None => self.lost = Some(self.lost.unwrap_or(0.0).max(variance).max(filtered.variance)),
             Some(reading) if surprise > 0.0 => {
                 let jump = self.believed.map_or(0.0, |last| (reading - last) * self.seen.per_reading);
                 self.raise((surprise * jump).powi(2).min(most));
@@ -184,12 +195,18 @@ impl Doubt {
             .and(self.long_run(time_s - start_s))
     }
 
+    /// The same pauses for a smoother.
+    pub(crate) const fn pauses(&self) -> Pauses {
+        Pauses::new(self.unread, self.unread_s)
+    }
+
     /// What there is to say of a row so long after the first one, s.
     pub(crate) fn long_run(&self, since_start_s: f64) -> Flags {
         Flags::NONE.with(Flag::LongRun, since_start_s > self.seen.longest_s)
     }
 }
 
-const fn is_taken(verdict: ReadingVerdict) -> bool {
+/// Whether a reading has told the filter something.
+pub(crate) const fn is_taken(verdict: ReadingVerdict) -> bool {
     matches!(verdict, ReadingVerdict::Accepted | ReadingVerdict::Downweighted | ReadingVerdict::Readmitted)
 }

@@ -33,6 +33,7 @@ mod explain;
 mod filter;
 mod flags;
 pub mod number;
+mod pauses;
 mod prior;
 mod reading;
 mod recording;
@@ -41,6 +42,7 @@ mod rest_watch;
 mod sensor;
 mod text;
 mod unit_doubt;
+mod unread;
 mod validity;
 pub mod verdict;
 
@@ -61,6 +63,7 @@ pub use reference_doubt::ReferenceDoubt;
 pub use rest_watch::{RestSeen, RestWatch};
 pub use sensor::Sensor;
 pub use unit_doubt::{UnitDoubt, UnitGuess};
+pub use unread::{NEVER_READ_S, Unread};
 pub use validity::{Beyond, Extrapolation, ValidityWatch};
 
 #[doc(no_inline)]

@@ -1,6 +1,6 @@
 //! Where the interval is wider than the filter states, and the flags that say why.
 
-use ohmstrain::{Estimate, Filter, Flag, Sensor};
+use ohmstrain::{Estimate, EstimatorKind, Filter, Flag, Sensor};
 
 /// Calibrated on 200 s, with readings of 1599 to 3703 ohms.
 fn sensor() -> Sensor {
@@ -73,6 +73,66 @@ fn readings_that_come_again_are_believed_little_by_little() {
     let doubted: Vec<Estimate> = rows.into_iter().map(|row| row.0).collect();
     assert_eq!(flagged(&doubted[600..1200], Flag::Recovering), 0);
     assert!(doubted[1200].flags.has(Flag::Recovering) && !doubted[1799].flags.has(Flag::Recovering));
+}
+
+/// The sensor, with a pull toward its mean strain that leaves too little, as fits to readings without a pause have it.
+fn pulled() -> Sensor {
+    let mut params = sensor().params().clone();
+    params.estimators.values_mut().for_each(|estimator| estimator.motion.strain_sd = 0.02);
+    Sensor::from_params(params).unwrap()
+}
+
+/// Whether all of the intervals hold any strain that calibration has seen.
+fn hold_all(rows: &[Estimate]) -> bool {
+    let ends = [0.0, 0.33333];
+    rows.iter().all(|row| ends.iter().all(|end| (row.strain - end).abs() < 1.96 * row.strain_sd))
+}
+
+/// Six hours with a row every ten seconds: what stands still at an end of what calibration has seen is not in the middle for want of
+/// readings; it is not far outside either.
+#[test]
+fn hours_without_a_reading_tell_nothing() {
+    let sensor = pulled();
+    let ekf = || sensor.filter().estimator(EstimatorKind::Ekf);
+    for ohm in [1600.0, 3600.0] {
+        let pause = |builder: ohmstrain::FilterBuilder<'_>, value: Option<f64>| {
+            let mut filter = builder.build().unwrap();
+            run(&mut filter, 0..1200, ohm);
+            let mut step = |k: u32| filter.step(60.0 + if k < 20 { 0.05 } else { 10.0 } * f64::from(k), value).unwrap();
+            (0..2160).map(&mut step).collect::<Vec<_>>().split_off(20)
+        };
+        for value in [None, Some(ohm)] {
+            let rows = pause(ekf(), value);
+            assert!(hold_all(&rows), "{ohm} {value:?}");
+            // √(1/12 + 1/4) spans, if the estimate were at an end of them.
+            assert!(rows.iter().all(|row| row.strain_sd < 0.58 * 0.33333));
+        }
+        // The pull by itself.
+        assert!(!hold_all(&pause(ekf().without_doubts(), None)[2139..]), "{ohm}");
+    }
+}
+
+/// A strain that is read before and after a pause is as well known at both of its ends as the smoother states, and anywhere between.
+#[test]
+fn a_smoother_knows_both_ends_of_a_pause() {
+    let sensor = pulled();
+    let ekf = || sensor.filter().estimator(EstimatorKind::Ekf);
+    // Rows of 0.05 s, for a minute, but for an hour of every second; the last hour has no end.
+    let time_s: Vec<f64> = (0..1200)
+        .map(|k| 0.05 * f64::from(k))
+        .chain((0..3600).map(|k| 60.0 + f64::from(k)))
+        .chain((0..1200).map(|k| 3660.0 + 0.05 * f64::from(k)))
+        .chain((0..3600).map(|k| 3720.0 + f64::from(k)))
+        .collect();
+    let reading = |k: usize| if k % 4800 < 1200 { 1600.0 + (k % 3) as f64 } else { f64::NAN };
+    let readings: Vec<f64> = (0..time_s.len()).map(reading).collect();
+    let rows = ekf().smooth(&time_s, &readings).unwrap();
+    assert!(hold_all(&rows[1260..4740]) && hold_all(&rows[6060..]));
+    let stated = ekf().without_doubts().smooth(&time_s, &readings).unwrap();
+    assert!(!hold_all(&stated[3000..3001]) && !hold_all(&stated[9000..]));
+    for k in [600, 1200, 4799, 4800, 6000] {
+        assert_eq!(rows[k].strain_sd, stated[k].strain_sd, "{k}");
+    }
 }
 
 /// A jump that the filter does not expect: at once it states nearly what it stated before, while it may be the contacts.

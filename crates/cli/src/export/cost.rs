@@ -49,7 +49,7 @@ struct OfKind {
 }
 
 const EKF: OfKind = OfKind {
-    step: 880.0,
+    step: 950.0,
     hypothesis: 0.0,
     branch: 385.0,
     curve: 80.0,
@@ -158,7 +158,7 @@ fn state(branches: usize, chip: &ChipFilter) -> usize {
         EstimatorKind::Hypotheses => filter.hypotheses * (gaussian + 3) + 1,
         _ => gaussian,
     };
-    // Readings and doubts: sixteen words; of a correction four, low-passes and features. Strain, variance, rest reading.
+    // Readings and doubts: seventeen words; of a correction four, low-passes and features. Strain, variance, rest reading.
     let correction = filter.correction.as_ref().map_or(0, |_| 4 + TIME_CONSTANTS_S.len() + FEATURES);
-    FLOAT * (words + 16 + correction + 3)
+    FLOAT * (words + 17 + correction + 3)
 }

@@ -1,8 +1,8 @@
 //! When an interval is wider than the filter says: the library's doubts, in any precision.
 
-use ohmstrain::{DOUBT, RestSeen, RestWatch};
-use ohmstrain_calib::{SURPRISING_NIS, SensorParams};
-use ohmstrain_ekf::Real;
+use ohmstrain::{DOUBT, NEVER_READ_S, RestSeen, RestWatch, Unread};
+use ohmstrain_calib::{MotionParams, SURPRISING_NIS, SensorParams};
+use ohmstrain_ekf::{Gaussian, Real};
 
 use super::twin::{flag, number};
 
@@ -20,13 +20,15 @@ pub struct DoubtParts {
     /// Variances: at an unknown start, and of what is known least.
     pub start: f64,
     pub most: f64,
+    /// What is known without a reading.
+    pub unread: Unread,
     /// What the sensor read at rest, if that is known.
     pub rest: Option<RestSeen>,
 }
 
 impl DoubtParts {
-    /// Of a sensor.
-    pub fn new(params: &SensorParams) -> Self {
+    /// Of a sensor whose filter runs with that motion.
+    pub fn new(params: &SensorParams, motion: &MotionParams) -> Self {
         let (seen, span) = (&params.validity, params.limits.span());
         let relative = |reading: f64| reading / params.rest_reading - 1.0;
         let (low, high) = (relative(seen.reading_lower), relative(seen.reading_upper));
@@ -38,6 +40,7 @@ impl DoubtParts {
             per_reading: if high > low { span / (high - low) } else { 0.0 },
             start: (DOUBT.start * span).powi(2),
             most: (DOUBT.most * span).powi(2),
+            unread: Unread::new(motion, params.limits),
             rest: RestSeen::of(params),
         }
     }
@@ -51,6 +54,7 @@ pub struct Doubt<T> {
     starts: bool,
     run_s: T,
     fading: T,
+    unread_s: T,
     lost: Option<T>,
     believed: Option<T>,
     outside: T,
@@ -66,6 +70,7 @@ impl<T: Real> Doubt<T> {
             starts: true,
             run_s: T::zero(),
             fading: number(parts.start),
+            unread_s: number(NEVER_READ_S),
             lost: None,
             believed: None,
             outside: T::zero(),
@@ -76,7 +81,7 @@ impl<T: Real> Doubt<T> {
     /// The same where the strain is known at the start, and whether it is none.
     pub fn of_known_strain(self, rests: bool) -> Self {
         let rest = self.parts.rest.map(|seen| RestWatch::new(seen, rests));
-        Self { starts: false, fading: T::zero(), rest, ..self }
+        Self { starts: false, fading: T::zero(), unread_s: T::zero(), rest, ..self }
     }
 
     fn raise(&mut self, variance: T) {
@@ -86,15 +91,18 @@ impl<T: Real> Doubt<T> {
         }
     }
 
-    /// A step has passed, with a reading that was used and its normalised innovation squared, or without; `variance` is
-    /// the strain's.
-    pub fn see(&mut self, dt_s: T, reading: Option<(T, T)>, variance: T) {
+    /// A step has passed, with a reading that was used and its normalised innovation squared, or without; the variance of
+    /// the strain that is stated, or what a pause of the readings leaves open.
+    pub fn see(&mut self, dt_s: T, reading: Option<(T, T)>, stated: Gaussian<T>) -> T {
         let passed_s = if self.runs { dt_s } else { T::zero() };
         self.runs = true;
         self.run_s += passed_s;
+        self.unread_s = if reading.is_some() { T::zero() } else { self.unread_s + passed_s };
         let Some((rho, nis)) = reading else {
-            self.lost = Some(self.lost.map_or(variance, |lost| lost.max(variance)));
-            return;
+            let variance = self.parts.unread.variance(self.unread_s, stated.mean, stated.variance);
+            let widest = variance.max(stated.variance);
+            self.lost = Some(self.lost.map_or(widest, |lost| lost.max(widest)));
+            return variance;
         };
         let surprising: T = number(SURPRISING_NIS);
         if nis > surprising {
@@ -114,6 +122,7 @@ impl<T: Real> Doubt<T> {
         self.rest.iter_mut().for_each(|rest| {
             rest.see(passed_s, rho);
         });
+        stated.variance
     }
 
     /// The strain's variance with all doubts, and flags that say so.

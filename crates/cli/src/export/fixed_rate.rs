@@ -79,7 +79,7 @@ impl<'a, const B: usize, const N: usize> FixedRate<'a, B, N> {
             start_variance: (filter.known_sd * filter.known_sd) as f32,
             correction: filter.correction.as_ref(),
             quadratics: quadratics.as_ref(),
-            doubt: DoubtParts::new(params),
+            doubt: DoubtParts::new(params, &motion),
         };
         let longest_s = longest_step_s::<B, N, L>(&reference, &parts)?;
         let usual_s = f64::from(dt_s) / (f64::from(dt_s) / longest_s).ceil().max(1.0);

@@ -1,6 +1,6 @@
 //! What a reading must be, and when an interval is wider than the filter says.
 
-use ohmstrain::DOUBT;
+use ohmstrain::{DOUBT, NEVER_READ_S};
 use ohmstrain_calib::PortableSieve;
 use serde::Serialize;
 
@@ -35,7 +35,18 @@ pub struct DoubtConstants {
     faster: Literal,
     worth: Literal,
     zero: Literal,
+    unread: UnreadConstants,
     rest: Option<RestConstants>,
+}
+
+/// What is known without a reading.
+#[derive(Debug, Serialize)]
+struct UnreadConstants {
+    rate_time_s: Literal,
+    path_variance: Literal,
+    centre: Literal,
+    anywhere: Literal,
+    never_s: Literal,
 }
 
 /// Where the sensor rests.
@@ -67,6 +78,13 @@ impl DoubtConstants {
             faster: narrow(DOUBT.faster),
             worth: narrow(DOUBT.worth),
             zero,
+            unread: UnreadConstants {
+                rate_time_s: narrow(seen.unread.rate_time_s),
+                path_variance: narrow(seen.unread.path_variance),
+                centre: narrow(seen.unread.centre),
+                anywhere: narrow(seen.unread.anywhere),
+                never_s: narrow(NEVER_READ_S),
+            },
             rest: seen.rest.map(|rest| RestConstants {
                 rested: narrow(rest.rested),
                 tolerance: narrow(rest.tolerance),

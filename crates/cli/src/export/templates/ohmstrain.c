@@ -66,6 +66,10 @@ static const float SEEN_LOW = << doubt.low >>f, SEEN_HIGH = << doubt.high >>f;
 static const float FASTEST_PER_S = << doubt.fastest_per_s >>f, LONGEST_RUN_S = << doubt.longest_s >>f;
 /* Strain for a change of the reading over these ranges, and variances: of an unknown start, and of what is known least. */
 static const float PER_READING = << doubt.per_reading >>f, START_DOUBT = << doubt.start >>f, MOST_DOUBT = << doubt.most >>f;
+/* Without a reading: how long a rate lasts, s; twice the variance of a path with the rate's deviation for so long; centre of the
+ * limits, and the variance of a strain that is anywhere in them; what is time without end, s. */
+static const float RATE_TIME_S = << doubt.unread.rate_time_s >>f, PATH_VARIANCE = << doubt.unread.path_variance >>f;
+static const float CENTRE = << doubt.unread.centre >>f, ANYWHERE = << doubt.unread.anywhere >>f, NEVER_READ_S = << doubt.unread.never_s >>f;
 {% if doubt.rest %}
 /* At rest: the reading, relative, and how far it may be from there; for how long readings must stay where they are, s; 1 where
  * they grow from rest on, -1 where they fall, 0 where nobody knows, and the last one on that side. */
@@ -427,18 +431,30 @@ static void watch_rest(readings *seen, float dt_s, float rho)
 }
 
 {% endif %}
-/* A step has passed, with a reading that was used or without; `variance` is the strain's. */
-static void doubt_reading(readings *seen, float dt_s, const float *rho, float nis, float variance)
+/* The strain's variance without a reading for a while: it has moved without the pull toward its mean, but not beyond the limits. */
+static float unread_variance(float seconds, float strain, float variance)
+{
+    const float times = seconds / RATE_TIME_S, share = times * times / (3.0f + times * (1.5f + times));
+    const float moved = PATH_VARIANCE * (times * share), off = strain - CENTRE, most = off * off + ANYWHERE;
+    const float open = variance > moved ? variance : moved;
+
+    return open < most ? open : most;
+}
+
+/* A step has passed, with a reading that was used or without; the strain's variance, or what a pause leaves open of it. */
+static float doubt_reading(readings *seen, float dt_s, const float *rho, float nis, float strain, float variance)
 {
     const float passed_s = seen->runs ? dt_s : 0.0f;
     float above, below, beyond;
 
     seen->runs = 1;
     seen->run_s += passed_s;
+    seen->unread_s = rho ? 0.0f : seen->unread_s + passed_s;
     if (!rho) {
-        seen->lost = seen->is_lost && seen->lost > variance ? seen->lost : variance;
+        const float open = unread_variance(seen->unread_s, strain, variance), widest = open > variance ? open : variance;
+        seen->lost = seen->is_lost && seen->lost > widest ? seen->lost : widest;
         seen->is_lost = 1;
-        return;
+        return open;
     }
     if (nis > SURPRISING) {
         const float jump = seen->has_believed ? (*rho - seen->believed) * PER_READING : 0.0f;
@@ -461,6 +477,7 @@ static void doubt_reading(readings *seen, float dt_s, const float *rho, float ni
 {% if doubt.rest %}
     watch_rest(seen, passed_s, *rho);
 {% endif %}
+    return variance;
 }
 
 /* The strain's variance with all doubts, and flags that say so. */
@@ -532,7 +549,7 @@ static ohmstrain_status step(ohmstrain_state *state, float dt_s, const float *rh
         correct(&all, &seen, filtered, filtered_variance, &strain, &variance);
     }
 {% endif %}
-    doubt_reading(&seen, dt_s, rho, of_step.nis, variance);
+    variance = doubt_reading(&seen, dt_s, rho, of_step.nis, strain, variance);
     state->strain = strain;
     state->variance = doubted(&seen, all.mean[1], variance, &flags);
     seen.flags = flags;
@@ -554,6 +571,7 @@ static ohmstrain_status start(ohmstrain_state *state, const float *strain, float
     state->readings.rests = strain && fabsf(*strain) <= << doubt.zero >>f;
 {% endif %}
     state->readings.fading = strain ? 0.0f : START_DOUBT;
+    state->readings.unread_s = strain ? 0.0f : NEVER_READ_S;
     summarise(state, &all);
     state->strain = strain_of(&all, &state->variance);
     state->variance += state->readings.fading;

@@ -93,6 +93,7 @@ typedef struct ohmstrain_readings {
     unsigned char runs, starts, is_lost, has_believed, rests;
     float run_s;    /* time since the first step */
     float fading;   /* variance that fades while readings are believed */
+    float unread_s; /* time without a reading */
     float lost;     /* variance of the strain where readings have not been believed since */
     float believed; /* the last reading that was */
     float outside;  /* how far readings have been outside of calibration's */

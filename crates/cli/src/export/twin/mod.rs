@@ -162,7 +162,7 @@ impl<'a, T: Real, const B: usize, const N: usize, const L: usize, const K: usize
         }
         let Gaussian { mean, variance } = self.corrected();
         let used = reading.filter(|_| flags & flag::NO_READING == 0).map(|reading| (reading.value, nis));
-        self.now.doubt.see(dt_s, used, variance);
+        let variance = self.now.doubt.see(dt_s, used, Gaussian { mean, variance });
         let (variance, doubts) = self.now.doubt.widened(self.now.moving.moments().mean[1], variance);
         self.now.strain = Gaussian { mean, variance };
         Ok(flags | doubts)

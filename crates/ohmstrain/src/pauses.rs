@@ -1,0 +1,49 @@
+use std::ops::Range;
+
+use ohmstrain_calib::Output;
+
+use crate::doubt::is_taken;
+use crate::unread::{NEVER_READ_S, Unread};
+
+/// Pauses of the readings in a recording that is smoothed, from its end to its beginning.
+pub(crate) struct Pauses {
+    unread: Unread,
+    /// For how long there has been no reading before the first row, s.
+    before_s: f64,
+    /// Time of the row that was seen last, s, and how long after it the next reading comes.
+    next: Option<(f64, f64)>,
+}
+
+impl Pauses {
+    pub(crate) const fn new(unread: Unread, before_s: f64) -> Self {
+        Self { unread, before_s, next: None }
+    }
+
+    /// Widens what a segment of the rows says where it has no readings: the strain moves from the last one and to the next
+    /// one. How long before the segment the last one was is not known, but only at its beginning.
+    pub(crate) fn widen(&mut self, rows: Range<usize>, time_s: impl Fn(usize) -> f64, outputs: &mut [Output]) {
+        let mut until_s = vec![0.0; outputs.len()];
+        for (k, (until_s, output)) in rows.clone().zip(until_s.iter_mut().zip(outputs.iter())).rev() {
+            let now_s = time_s(k);
+            *until_s = match self.next {
+                _ if is_taken(output.verdict) => 0.0,
+                Some((next_s, after_s)) => next_s - now_s + after_s,
+                None => NEVER_READ_S,
+            };
+            self.next = Some((now_s, *until_s));
+        }
+        let mut since_s = if rows.start == 0 { self.before_s } else { NEVER_READ_S };
+        let mut last_s = time_s(rows.start);
+        for (k, (until_s, output)) in rows.zip(until_s.iter().zip(outputs)) {
+            let now_s = time_s(k);
+            since_s += now_s - last_s;
+            last_s = now_s;
+            if is_taken(output.verdict) {
+                since_s = 0.0;
+                continue;
+            }
+            let strain = &mut output.estimate.strain;
+            strain.variance = self.unread.variance(until_s.min(since_s), strain.mean, strain.variance);
+        }
+    }
+}

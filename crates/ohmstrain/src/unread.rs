@@ -1,0 +1,103 @@
+//! What is known of the strain while nothing is read.
+
+use ohmstrain_calib::{MotionParams, RangeParams};
+use ohmstrain_ekf::Real;
+
+/// How far a body can have moved since it was last read.
+///
+/// A motion's pull toward a mean strain, and the spread that this leaves in the long run, are fitted where every row has a
+/// reading: for a pause they promise nothing. Without the pull a rate v̇ = -v/T + noise that was known moves the strain in t
+/// seconds by something of the variance σ²T² (2x - 3 + 4 exp(-x) - exp(-2x)), x = t/T, σ the rate's deviation (Uhlenbeck and
+/// Ornstein, *Phys. Rev.* 36 (1930) 823); here with the same ends, 2x³/3 and 2x - 3, 2x³/(3 + 3x/2 + x²), which differs by
+/// less than a tenth and does not cancel. In the end the strain may be anywhere in the limits, and no farther: its mean square
+/// distance from an estimate m is then span²/12 + (m - centre)².
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Unread {
+    /// How long a rate lasts, s.
+    pub rate_time_s: f64,
+    /// Twice the variance of a path with the rate's deviation for that long.
+    pub path_variance: f64,
+    /// Centre of the limits, and the variance of a strain that is anywhere in them.
+    pub centre: f64,
+    /// See [`Self::centre`].
+    pub anywhere: f64,
+}
+
+/// Since when, s, nothing has been read before the first reading of all.
+pub const NEVER_READ_S: f64 = 1e9;
+
+impl Unread {
+    /// Of the motion that an estimator runs with.
+    ///
+    /// ```
+    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+    /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
+    /// let params = sensor.params();
+    /// let of = params.filter_of(params.default_estimator);
+    /// let unread = ohmstrain::Unread::new(&params.estimator(of)?.motion, params.limits);
+    /// // A second after the last reading, of an estimate in the middle of the limits, and six hours after it.
+    /// assert!(unread.variance(1.0, unread.centre, 1e-6).sqrt() < 0.05);
+    /// assert_eq!(unread.variance(21_600.0, unread.centre, 1e-6), unread.anywhere);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn new(motion: &MotionParams, limits: RangeParams) -> Self {
+        Self {
+            rate_time_s: motion.rate_time_s,
+            path_variance: 2.0 * (motion.rate_sd_per_s * motion.rate_time_s).powi(2),
+            centre: limits.lower + 0.5 * limits.span(),
+            anywhere: limits.span().powi(2) / 12.0,
+        }
+    }
+
+    /// The variance of a strain of which nothing has been read for `seconds`, from what a filter states of it.
+    pub fn variance<T: Real>(&self, seconds: T, strain: T, stated: T) -> T {
+        let times = seconds / T::of(self.rate_time_s);
+        let share = times * times / (T::of(3.0) + times * (T::of(1.5) + times));
+        let moved = T::of(self.path_variance) * (times * share);
+        let off = strain - T::of(self.centre);
+        stated.max(moved).min(off * off + T::of(self.anywhere))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Unread;
+
+    /// The variance of the path by the integral of the rate's covariance, summed naively: a rate known at the start has
+    /// cov(v(s), v(u)) = σ² (exp(-|s - u|/T) - exp(-(s + u)/T)). The midpoint rule with 400 steps is good to 1e-5 of it.
+    fn summed(rate_sd: f64, rate_time_s: f64, seconds: f64) -> f64 {
+        let step_s = seconds / 400.0;
+        let times = || (0..400).map(|k| (f64::from(k) + 0.5) * step_s);
+        let covariance = |s: f64, u: f64| (-(s - u).abs() / rate_time_s).exp() - (-(s + u) / rate_time_s).exp();
+        let sum: f64 = times().flat_map(|s| times().map(move |u| covariance(s, u))).sum();
+        rate_sd * rate_sd * step_s * step_s * sum
+    }
+
+    #[test]
+    fn a_path_grows_as_its_motion_without_the_pull() {
+        let (rate_sd, rate_time_s) = (0.03_f64, 2.0);
+        let path_variance = 2.0 * (rate_sd * rate_time_s).powi(2);
+        // Limits so wide that nothing reaches them.
+        let unread = Unread { rate_time_s, path_variance, centre: 0.0, anywhere: 1e6 };
+        for seconds in [0.02, 0.2, 1.0, 2.0, 4.0, 10.0, 60.0] {
+            let found = unread.variance(seconds, 0.0, 0.0);
+            let expected = summed(rate_sd, rate_time_s, seconds);
+            assert!((found / expected - 1.0).abs() < 0.1, "{seconds} s: {found} for {expected}");
+        }
+    }
+
+    /// However far the estimate is from the strain, within limits: 1.96 deviations reach it, once it may be anywhere.
+    #[test]
+    fn what_may_be_anywhere_is_covered_everywhere() {
+        let unread = Unread { rate_time_s: 2.0, path_variance: 1e-3, centre: 0.15, anywhere: 0.3 * 0.3 / 12.0 };
+        for (mean, stated) in [0.0, 0.05, 0.15, 0.3].into_iter().flat_map(|mean| [(mean, 1e-6), (mean, 9.0)]) {
+            let deviation = unread.variance(21_600.0_f64, mean, stated).sqrt();
+            for strain in [0.0, 0.1, 0.3] {
+                let off: f64 = strain - mean;
+                assert!(off.abs() < 1.96 * deviation, "{strain} from {mean}: {deviation}");
+            }
+            assert!(deviation < 0.58 * 0.3, "{deviation}");
+        }
+    }
+}
