@@ -2,13 +2,13 @@
 # Smooths simulated recordings on a standalone Spark cluster (a master and two workers of one core, on the loopback address),
 # once more while a worker is killed, and on Ray while a worker is killed; compares with one core.
 #
-#   spark-cluster.sh [RECORDINGS] [SECONDS FROM THE FIRST OUTPUT UNTIL THE KILL]
+#   spark-cluster.sh [RECORDINGS] [FILES OF OUTPUT BEFORE THE KILL] [ESTIMATOR] [ROWS OF A RECORDING]
 #
 # Wants Java, a Python with the ohmstrain wheel, pyspark and ray (PYTHON; default: `scripts/python.sh --engines` makes one and
 # installs Java), and the program (OHMSTRAIN; default: built by cargo).
 set -euo pipefail
 cd "$(dirname "$0")/.."
-readonly recordings=${1:-200} after_s=${2:-0}
+readonly recordings=${1:-200} after_files=${2:-8} estimator=${3:-auto} rows=${4:-1000}
 readonly fleet=crates/python/examples/fleet.py
 work=$(mktemp -d)
 started=()
@@ -43,12 +43,13 @@ for _ in $(seq 60); do
     sleep 1
 done
 
-"$python" $fleet make "$work/fleet" --recordings "$recordings"
-"$python" $fleet run "$work/fleet" plain
-"$python" $fleet run "$work/fleet" spark --master "$url" 2>"$work/spark.log" || { cat "$work/spark.log" >&2; exit 1; }
-"$python" $fleet check "$work/fleet" spark
-"$python" $fleet run "$work/fleet" spark --master "$url" --kill "${started[2]}" --after-s "$after_s" 2>"$work/spark.log" ||
-    { cat "$work/spark.log" >&2; exit 1; }
-"$python" $fleet check "$work/fleet" spark
-"$python" $fleet run "$work/fleet" ray --kill any --after-s "$after_s" 2>"$work/ray.log" || { cat "$work/ray.log" >&2; exit 1; }
-"$python" $fleet check "$work/fleet" ray
+# run ENGINE FLAG...: with what it says only where it fails.
+run() {
+    "$python" $fleet run "$work/fleet" "$1" --estimator "$estimator" "${@:2}" 2>"$work/$1.log" || { cat "$work/$1.log" >&2; exit 1; }
+    [[ $1 = plain ]] || "$python" $fleet check "$work/fleet" "$1"
+}
+"$python" $fleet make "$work/fleet" --recordings "$recordings" --rows "$rows"
+run plain
+run spark --master "$url"
+run spark --master "$url" --kill "${started[2]}" --after-files "$after_files"
+run ray --kill any --after-files "$after_files"

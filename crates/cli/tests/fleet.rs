@@ -76,6 +76,46 @@ fn a_long_motion_stands_for_itself() {
     assert_eq!(bench.read("taught.toml"), bench.read("alone.toml"));
 }
 
+/// Each of a batch is calibrated as the command calibrates it alone; another prior is another work.
+#[test]
+fn a_batch_learns_from_a_prior() {
+    let bench = fleet();
+    std::fs::create_dir(bench.path("rig")).unwrap();
+    bench.write("rig/9.csv", bench.read("9.csv"));
+    bench.write("rig/manifest.csv", "file,sensor,prior\n9.csv,listed,../prior.toml\n");
+    bench.write("rig/bad.csv", "time_s,resistance_ohm,strain\n0,1600,0\n");
+    let flags = ["--until", "20", "--estimator", "ekf"];
+    calibrate(&bench, "9.csv", "20", "single.toml", &["--prior", "prior.toml"]);
+    let batch = ["-q", "batch", "calibrate", "-o", "out", "--summary", "json"];
+    let taught = [&batch[..], &["rig/9.csv", "rig/bad.csv", "--"], &flags, &["--prior", "prior.toml"]].concat();
+    let state = |words: &[&str], code: i32| {
+        let run = bench.run(words);
+        assert_eq!(run.code, Some(code), "{}: {}", run.command, run.stderr);
+        let rows: Value = serde_json::from_str(&bench.read("out/summary.json")).unwrap();
+        (rows[0]["state"].as_str().unwrap().to_owned(), rows[0]["prior_sha256"].as_str().map(str::to_owned))
+    };
+    let (made, of_prior) = state(&taught, 5);
+    assert_eq!(made, "done");
+    assert_eq!(bench.read("out/9.toml"), bench.read("single.toml"));
+    assert!(!bench.read("out/batch.jsonl").contains(".batch-"), "what is said of a draft names the output");
+    assert_eq!(state(&taught, 5), ("kept".to_owned(), of_prior.clone()));
+    bench.run(&["-q", "fleet", "fit", "1.toml", "2.toml", "3.toml", "-o", "prior.toml", "--force"]).ok();
+    let (again, of_another) = state(&taught, 5);
+    assert_eq!(again, "done");
+    assert!(of_another.is_some() && of_another != of_prior);
+    // A manifest's prior lies where its recordings do.
+    state(&[&batch[..], &["--manifest", "rig/manifest.csv", "--"], &flags].concat(), 0);
+    assert_eq!(bench.read("out/listed.toml"), bench.read("out/9.toml"));
+    // What is no prior fails each of them, and is no output's place.
+    bench.write("none.toml", "format = 4\n");
+    assert_eq!(state(&[&batch[..], &["rig/9.csv", "--", "--prior", "none.toml"]].concat(), 5).0, "failed");
+    std::fs::create_dir(bench.path("out2")).unwrap();
+    bench.write("out2/9.toml", bench.read("prior.toml"));
+    let onto = ["-q", "batch", "calibrate", "rig/9.csv", "-o", "out2", "--force", "--", "--prior", "out2/9.toml"];
+    let run = bench.run(&onto);
+    assert!(run.code == Some(2) && run.stderr.contains("it is an input"), "{}", run.stderr);
+}
+
 #[test]
 fn what_is_no_fleet_is_refused() {
     let bench = Bench::calibrated();

@@ -91,9 +91,60 @@ impl fmt::Display for UnitGuess {
     }
 }
 
-/// The value that a share of the known ones is below; `None` if none is known.
+/// Known values that are looked at: of more, such as are evenly spread.
+const LOOKED_AT: usize = 1 << 17;
+
+/// The value that a share of the known ones is below; `None` if none is known. Where there are many, its rank errs by less than one
+/// in ten thousand, and memory does not grow with their number.
 pub(crate) fn quantile(values: impl Iterator<Item = f64>, share: f64) -> Option<f64> {
-    let mut known: Vec<f64> = values.filter(|value| value.is_finite()).collect();
+    let mut known = spread(values.filter(|value| value.is_finite()));
     let rank = (share * known.len().checked_sub(1)? as f64) as usize;
     Some(*known.select_nth_unstable_by(rank, f64::total_cmp).1)
+}
+
+/// All values, or at least half of [`LOOKED_AT`], each as far from the next as all others.
+fn spread(values: impl Iterator<Item = f64>) -> Vec<f64> {
+    let (mut kept, mut apart) = (Vec::new(), 1);
+    for (place, value) in values.enumerate() {
+        if place % apart != 0 {
+            continue;
+        }
+        if kept.len() == LOOKED_AT {
+            let mut is_even = false;
+            kept.retain(|_| {
+                is_even = !is_even;
+                is_even
+            });
+            apart *= 2;
+        }
+        // `LOOKED_AT` is even: what comes after halving is a multiple of the new distance.
+        kept.push(value);
+    }
+    kept
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The quantiles of a ramp are known. A rank is rounded down to the one that is kept, and those after the last are not seen: each
+    /// time less than a distance, and there are at least `LOOKED_AT` / 2 of those.
+    #[test]
+    fn quantiles_of_long_recordings_take_little_memory() {
+        for len in [1, 2, LOOKED_AT - 1, LOOKED_AT, LOOKED_AT + 1, 5 * LOOKED_AT + 3, 16 * LOOKED_AT] {
+            let kept = spread((0..len).map(|k| k as f64));
+            assert!(kept.len() <= LOOKED_AT && kept.len() >= len.min(LOOKED_AT / 2), "{len}: {}", kept.len());
+            assert!(kept.capacity() <= LOOKED_AT);
+            assert!(kept.windows(2).all(|pair| pair[1] - pair[0] == kept[1] - kept[0]), "{len}");
+            for share in [0.0, 0.5, 0.95] {
+                let found = quantile((0..len).map(|k| k as f64), share).unwrap();
+                let exact = share * (len - 1) as f64;
+                assert!(
+                    (found - exact).abs() <= 1.0 + 2.0 * 2.0 * len as f64 / LOOKED_AT as f64,
+                    "{len} {share}: {found}"
+                );
+            }
+        }
+        assert_eq!(quantile([f64::NAN, f64::INFINITY].into_iter(), 0.5), None);
+    }
 }

@@ -19,6 +19,8 @@ pub struct Entry {
     pub sha256: Vec<String>,
     pub sensor: Option<PathBuf>,
     pub sensor_sha256: Option<String>,
+    /// Of what `--prior` among the flags names.
+    pub prior_sha256: Option<String>,
     /// Flags but for `--sensor` and what `batch` adds.
     pub flags: Vec<String>,
     /// Program and version.
@@ -69,7 +71,8 @@ impl Entry {
             let names: Vec<_> = of.files.iter().filter_map(|file| file.file_name()).map(ToOwned::to_owned).collect();
             (of.command.clone(), of.flags.clone(), of.made_by.clone(), names)
         };
-        work(self) == work(other) && (&self.sha256, &self.sensor_sha256) == (&other.sha256, &other.sensor_sha256)
+        let bytes = |of: &Self| (of.sha256.clone(), of.sensor_sha256.clone(), of.prior_sha256.clone());
+        work(self) == work(other) && bytes(self) == bytes(other)
     }
 }
 

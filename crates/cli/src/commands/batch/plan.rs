@@ -6,7 +6,7 @@ use clap::Parser;
 use csv::{Reader, StringRecord};
 
 use super::journal::Journal;
-use crate::args::{Args, BatchArgs, BatchCommand};
+use crate::args::{Args, BatchArgs, BatchCommand, Command};
 use crate::error::CliError;
 
 /// Recordings that are done together, and what comes of them.
@@ -16,6 +16,8 @@ pub struct Job {
     pub files: Vec<PathBuf>,
     /// The sensor's parameters, if the command is given some.
     pub sensor: Option<PathBuf>,
+    /// What `--prior` among the flags names.
+    pub prior: Option<PathBuf>,
     /// Flags besides.
     pub flags: Vec<String>,
     /// The output below the folder of outputs.
@@ -55,12 +57,8 @@ impl Job {
 /// All jobs, each with a command line that the command takes.
 pub fn jobs(args: &BatchArgs) -> Result<Vec<Job>, CliError> {
     let sensor = args.sensor.clone().filter(|_| args.command != BatchCommand::Calibrate);
-    let plain = |file: PathBuf| Job {
-        files: vec![file],
-        sensor: sensor.clone(),
-        flags: args.flags.clone(),
-        output: PathBuf::new(),
-    };
+    let plain =
+        |file: PathBuf| Job { files: vec![file], sensor: sensor.clone(), flags: args.flags.clone(), ..Job::default() };
     let mut jobs: Vec<Job> = args.files.iter().cloned().map(plain).collect();
     for pattern in &args.glob {
         jobs.extend(matching(pattern)?.into_iter().map(plain));
@@ -69,7 +67,7 @@ pub fn jobs(args: &BatchArgs) -> Result<Vec<Job>, CliError> {
         jobs.extend(listed(manifest, args, &plain)?);
     }
     name_outputs(&mut jobs, args);
-    for job in &jobs {
+    for job in &mut jobs {
         check_arguments(job, args)?;
     }
     Ok(jobs)
@@ -127,6 +125,7 @@ fn of_row(
             "sensor" if args.command == BatchCommand::Calibrate => job.output = PathBuf::from(cell),
             "sensor" => job.sensor = Some(folder.join(cell)),
             "output" => job.output = PathBuf::from(cell),
+            "prior" => job.flags.extend(["--prior".to_owned(), folder.join(cell).display().to_string()]),
             _ => {
                 job.flags.push(format!("--{}", name.replace('_', "-")));
                 job.flags.extend((cell != "true").then(|| cell.to_owned()));
@@ -167,7 +166,7 @@ fn name_outputs(jobs: &mut [Job], args: &BatchArgs) {
 }
 
 /// What the command would say to its arguments is said before anything is done.
-fn check_arguments(job: &Job, args: &BatchArgs) -> Result<(), CliError> {
+fn check_arguments(job: &mut Job, args: &BatchArgs) -> Result<(), CliError> {
     if job.files.iter().any(|file| file == Path::new("-")) {
         return Err(CliError::Arguments("batch reads files; for standard input there is the command itself".into()));
     }
@@ -176,17 +175,20 @@ fn check_arguments(job: &Job, args: &BatchArgs) -> Result<(), CliError> {
     if args.command == BatchCommand::Calibrate {
         words.splice(2..2, ["-o".to_owned(), "sensor.toml".to_owned()]);
     }
-    let parsed = Args::try_parse_from(words);
-    parsed.map(drop).map_err(|error| {
+    let parsed = Args::try_parse_from(words).map_err(|error| {
         let text = error.to_string();
         let text = text.lines().map(str::trim).take_while(|line| !line.is_empty()).collect::<Vec<_>>().join(" ");
         CliError::Arguments(format!("{}: {}", job.name(), text.trim_start_matches("error: ")))
-    })
+    })?;
+    if let Command::Calibrate(calibrate) = parsed.command {
+        job.prior = calibrate.prior;
+    }
+    Ok(())
 }
 
 /// Refuses outputs that would replace each other, an input, or what no earlier run wrote.
 pub fn check_outputs(jobs: &[Job], args: &BatchArgs, journal: &Journal) -> Result<(), CliError> {
-    let inputs = jobs.iter().flat_map(|job| job.files.iter().chain(&job.sensor));
+    let inputs = jobs.iter().flat_map(|job| job.files.iter().chain(&job.sensor).chain(&job.prior));
     let inputs: HashSet<PathBuf> = inputs.filter_map(|file| fs::canonicalize(file).ok()).collect();
     let mut outputs = HashSet::new();
     for job in jobs {

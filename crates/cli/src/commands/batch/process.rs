@@ -32,8 +32,8 @@ pub struct Workshop<'a> {
     places: usize,
     /// For outputs until they are whole; in the folder of outputs, so that taking their place is a change of name.
     drafts: TempDir,
-    /// Hashes of sensors: many recordings share one.
-    sensors: Mutex<HashMap<PathBuf, String>>,
+    /// Hashes of sensors and priors: many recordings share one.
+    shared: Mutex<HashMap<PathBuf, String>>,
 }
 
 /// A job of which all inputs have been read once.
@@ -52,7 +52,7 @@ impl<'a> Workshop<'a> {
         let places = args.jobs.or(thread::available_parallelism().ok()).map_or(1, usize::from);
         let drafts = tempfile::Builder::new().prefix(".batch-").tempdir_in(&args.output);
         let drafts = drafts.map_err(|error| CliError::file("write to", &args.output, &error))?;
-        Ok(Self { args, program, places, drafts, sensors: Mutex::default() })
+        Ok(Self { args, program, places, drafts, shared: Mutex::default() })
     }
 
     /// Processes at a time.
@@ -74,22 +74,28 @@ impl<'a> Workshop<'a> {
             output: job.output.clone(),
             ..Entry::default()
         };
-        for file in job.files.iter().chain(&job.sensor) {
-            let hash = if job.sensor.as_ref() == Some(file) { self.sensor_hash(file) } else { sha256_of(file) };
-            match hash {
-                Ok(hash) if job.sensor.as_ref() == Some(file) => entry.sensor_sha256 = Some(hash),
-                Ok(hash) => entry.sha256.push(hash),
-                Err(error) => {
-                    entry.message = format!("cannot read {}: {error}", file.display());
-                    return Err(Box::new(entry));
-                }
-            }
+        match self.hash_inputs(job, &mut entry) {
+            Ok(()) => Ok(Started { workshop: self, job, entry }),
+            Err(message) => Err(Box::new(Entry { message, ..entry })),
         }
-        Ok(Started { workshop: self, job, entry })
     }
 
-    fn sensor_hash(&self, path: &Path) -> io::Result<String> {
-        let mut known = self.sensors.lock().unwrap_or_else(PoisonError::into_inner);
+    fn hash_inputs(&self, job: &Job, entry: &mut Entry) -> Result<(), String> {
+        let unreadable = |file: &Path, error: &io::Error| format!("cannot read {}: {error}", file.display());
+        for file in &job.files {
+            entry.sha256.push(sha256_of(file).map_err(|error| unreadable(file, &error))?);
+        }
+        let shared = |file: &Option<PathBuf>| {
+            let hash = |file: &PathBuf| self.shared_hash(file).map_err(|error| unreadable(file, &error));
+            file.as_ref().map(hash).transpose()
+        };
+        entry.sensor_sha256 = shared(&job.sensor)?;
+        entry.prior_sha256 = shared(&job.prior)?;
+        Ok(())
+    }
+
+    fn shared_hash(&self, path: &Path) -> io::Result<String> {
+        let mut known = self.shared.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(hash) = known.get(path) {
             return Ok(hash.clone());
         }
@@ -145,8 +151,11 @@ impl Workshop<'_> {
         }
         let mut child = command.spawn()?;
         let mut last = String::new();
+        // What is said of a draft holds of what it becomes.
+        let (drafted, published) =
+            (draft.display().to_string(), self.args.output.join(&job.output).display().to_string());
         for line in child.stderr.take().map(BufReader::new).into_iter().flat_map(BufRead::lines) {
-            let line = line?;
+            let line = line?.replace(&drafted, &published);
             let text = line.strip_prefix(SPEAKER).unwrap_or(&line);
             match text.strip_prefix("warning: ") {
                 Some(warning) => entry.warnings.push(warning.to_owned()),

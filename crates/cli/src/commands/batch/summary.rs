@@ -41,6 +41,7 @@ fn cells(entry: &Entry) -> Vec<(&'static str, Cell)> {
         ("sha256", some(entry.sha256.join(BETWEEN))),
         ("sensor", some(entry.sensor.as_ref().map(|sensor| sensor.display().to_string()).unwrap_or_default())),
         ("sensor_sha256", Cell::Text(entry.sensor_sha256.clone())),
+        ("prior_sha256", Cell::Text(entry.prior_sha256.clone())),
         ("output_sha256", Cell::Text(entry.output_sha256.clone())),
         ("command", some(entry.command.clone())),
         ("flags", some(entry.flags.join(" "))),
