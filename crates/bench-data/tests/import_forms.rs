@@ -303,6 +303,10 @@ fn what_nothing_decides_is_asked_with_the_answer() {
     let signs = file("time_ms,R_ohm\n", |ms, ohm, _| format!("{ms},{}", decimal(ohm, 1, '.')));
     let back = signs.clone() + "3,1600\n";
     asks(&[("a.csv", &back)], &nothing, &["a.csv:62", "expected a time after"]);
+    // Minutes to nine decimals: what multiplying them with 60 adds is no digit of the file's.
+    let minutes = |k: u32| format!("{:.9},{}\n", f64::from(k) * 0.097 / 60.0, 1600 + k % 7);
+    let back = format!("time_min,R_ohm\n{}{}", (0..62).map(minutes).collect::<String>(), minutes(11));
+    asks(&[("a.csv", &back)], &nothing, &["a.csv:64", "expected a time after 5.917 s, found 1.067 s"]);
 }
 
 /// The rig's irregular steps, s.

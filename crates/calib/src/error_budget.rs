@@ -38,17 +38,64 @@ pub enum Limit {
     Noise,
 }
 
+impl Limit {
+    /// In a word.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Law => "law",
+            Self::Direction => "direction",
+            Self::Drift => "drift",
+            Self::Noise => "noise",
+        }
+    }
+}
+
+/// Parts of a filter's squared error, each 0 to 1; together they are 1.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct ErrorShares {
+    /// Of the law's form and parameters.
+    pub law: f64,
+    /// Of rows in which the direction is wrong.
+    pub direction: f64,
+    /// Of slow changes.
+    pub drift: f64,
+    /// Of single readings' noise.
+    pub noise: f64,
+}
+
+impl ErrorShares {
+    /// With their names, the largest first.
+    #[must_use]
+    pub fn sorted(&self) -> [(Limit, f64); 4] {
+        let mut parts = [
+            (Limit::Law, self.law),
+            (Limit::Direction, self.direction),
+            (Limit::Drift, self.drift),
+            (Limit::Noise, self.noise),
+        ];
+        parts.sort_by(|a, b| b.1.total_cmp(&a.1));
+        parts
+    }
+}
+
 impl ErrorBudget {
-    /// What makes most of the error: the direction if more than half of it lies in rows where that is wrong, otherwise the
-    /// largest part of what the law leaves.
+    /// Where the squared error of the strain lies: in rows where the direction is wrong; and of the other rows as law, drift
+    /// and noise share the square of what the law leaves of the readings.
+    #[must_use]
+    pub fn shares(&self) -> ErrorShares {
+        let squares = [self.law_percent, self.drift_percent, self.noise_percent].map(|percent| percent * percent);
+        let sum: f64 = squares.iter().sum();
+        // Where the law leaves nothing, what there is of error is not told apart, and counted as the law's.
+        let [law, drift, noise] = if sum > 0.0 { squares.map(|square| square / sum) } else { [1.0, 0.0, 0.0] };
+        let others = 1.0 - self.wrong_error;
+        ErrorShares { law: others * law, direction: self.wrong_error, drift: others * drift, noise: others * noise }
+    }
+
+    /// What makes most of the error: the largest of [`ErrorBudget::shares`].
     #[must_use]
     pub fn limit(&self) -> Limit {
-        if self.wrong_error > 0.5 {
-            return Limit::Direction;
-        }
-        let parts =
-            [(self.law_percent, Limit::Law), (self.drift_percent, Limit::Drift), (self.noise_percent, Limit::Noise)];
-        parts.into_iter().max_by(|a, b| a.0.total_cmp(&b.0)).map_or(Limit::Law, |part| part.1)
+        self.shares().sorted()[0].0
     }
 
     pub(crate) fn new(recordings: &[Samples], fit: &CrossFit, wrong: &WrongDirection) -> Self {
@@ -156,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn the_largest_part_limits_unless_the_direction_does() {
+    fn the_largest_share_limits() {
         let budget = |law_percent, drift_percent, noise_percent, wrong_error| ErrorBudget {
             law_percent,
             drift_percent,
@@ -164,9 +211,16 @@ mod tests {
             wrong_rows: 0.1,
             wrong_error,
         };
+        // Squares 9, 1, 0.25 of 10.25: law has 0.878 of what the direction leaves.
         assert_eq!(budget(3.0, 1.0, 0.5, 0.4).limit(), Limit::Law);
         assert_eq!(budget(1.0, 3.0, 0.5, 0.4).limit(), Limit::Drift);
         assert_eq!(budget(1.0, 0.5, 3.0, 0.4).limit(), Limit::Noise);
         assert_eq!(budget(3.0, 1.0, 0.5, 0.6).limit(), Limit::Direction);
+        // Less than half, and more than any other: 0.4 against 0.6 / 2.
+        assert_eq!(budget(2.0, 2.0, 0.0, 0.4).limit(), Limit::Direction);
+        let shares = budget(3.0, 1.0, 0.5, 0.4).shares();
+        assert!((shares.law - 0.6 * 9.0 / 10.25).abs() < 1e-15 && shares.direction == 0.4);
+        assert!((shares.law + shares.direction + shares.drift + shares.noise - 1.0).abs() < 1e-15);
+        assert_eq!(budget(0.0, 0.0, 0.0, 0.0).limit(), Limit::Law);
     }
 }

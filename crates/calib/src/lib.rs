@@ -70,7 +70,7 @@ pub use calibrate::{Calibration, Stage, calibrate};
 pub use corrected::SURPRISING_NIS;
 pub use correction_params::{CorrectionParams, CorrectorParams, FUTURE_FEATURES, TrainingRow};
 pub use error::CalibrationError;
-pub use error_budget::{ErrorBudget, Limit};
+pub use error_budget::{ErrorBudget, ErrorShares, Limit};
 pub use estimator_params::{EstimatorKind, EstimatorParams, MotionParams, NoiseParams, PhaseParams};
 pub use filter::{Filter, Output, Rows, Start, WayBack};
 pub use findings::{Findings, Seen};

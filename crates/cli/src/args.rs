@@ -22,7 +22,7 @@ use clap::{CommandFactory, Parser, Subcommand};
 pub use batch::{BatchArgs, BatchCommand, SummaryForm};
 pub use calibrate::{CalibrateArgs, ReportArgs};
 pub use choice::{Auto, Branches, Estimator, Gauge};
-pub use estimate::{EstimateArgs, FilterArgs, Format, KnownStrain, RestResistance, SmoothArgs};
+pub use estimate::{EstimateArgs, FilterArgs, Format, KnownStrain, RestResistance, SmoothArgs, WrittenArgs};
 pub use evaluate::{Estimators, EvaluateArgs};
 pub use export::{ExportArgs, ExportTarget};
 pub use files::{ImportArgs, InspectArgs};
@@ -36,7 +36,7 @@ pub use serial_check::SerialCheckArgs;
 pub use shell::{CompletionsArgs, ManArgs};
 pub use simulate::{DemoArgs, DemoMaterial, SimulateArgs};
 pub use split::Split;
-pub use trace::TraceArgs;
+pub use trace::{ReplaceArgs, SetupArgs, TraceArgs};
 
 use crate::verbosity::Verbosity;
 
@@ -100,7 +100,7 @@ pub enum Command {
     #[command(before_help = "Example: ohmstrain fit-law bench.csv --table")]
     FitLaw(FitLawArgs),
     /// Turn readings into strain, row by row
-    #[command(before_help = "Example: ohmstrain filter readings.csv --sensor sensor.toml > estimates.csv")]
+    #[command(before_help = "Example: ohmstrain filter readings.csv --sensor sensor.toml -o estimates.csv")]
     Filter(FilterArgs),
     /// Watch strain in the terminal while readings arrive from a serial port, or play a recording back
     #[command(before_help = "Example: ohmstrain live --port /dev/ttyACM0 --sensor sensor.toml")]
@@ -109,7 +109,7 @@ pub enum Command {
     #[command(before_help = "Example: ohmstrain hand hand.toml readings.csv > angles.csv")]
     Hand(HandArgs),
     /// Turn a whole recording into strain, every estimate from all readings
-    #[command(before_help = "Example: ohmstrain smooth readings.csv --sensor sensor.toml > smoothed.csv")]
+    #[command(before_help = "Example: ohmstrain smooth readings.csv --sensor sensor.toml -o smoothed.csv")]
     Smooth(SmoothArgs),
     /// Compare estimates with a known strain
     #[command(before_help = "Example: ohmstrain evaluate bench.csv --split 0.5 --report report.html")]

@@ -5,6 +5,7 @@
 
 mod kind;
 mod place;
+mod rows;
 mod wide;
 
 use std::fs;
@@ -12,7 +13,8 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 pub use kind::{IMPORT, Kind, SIMULATE};
-use place::{Identity, Place};
+use place::{Identity, Place, Prepared};
+pub use rows::RowsOut;
 pub use wide::{COLUMNS, table, wrapped};
 
 use crate::error::CliError;
@@ -37,6 +39,8 @@ struct Claimed {
     kind: Kind,
     place: Place,
     content: Option<Vec<u8>>,
+    /// What was written bit by bit.
+    begun: Option<Prepared>,
 }
 
 impl Outputs {
@@ -79,7 +83,7 @@ impl Outputs {
                 return Err(refused("the output", &other.path));
             }
         }
-        let claimed = Claimed { path: path.to_path_buf(), kind, place, content: None };
+        let claimed = Claimed { path: path.to_path_buf(), kind, place, content: None, begun: None };
         self.check_kind(&claimed)?;
         self.files.push(claimed);
         Ok(Claim(self.files.len() - 1))
@@ -105,13 +109,34 @@ impl Outputs {
         }
     }
 
+    /// A file to write bit by bit: it is published with the others, or, if it `grows`, is seen while it is written.
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    pub fn open(&mut self, claim: Claim, grows: bool) -> Result<(fs::File, PathBuf), CliError> {
+        let Some(claimed) = self.files.get_mut(claim.0) else {
+            return Err(CliError::Other("an output was not claimed".into()));
+        };
+        let opened = if grows { claimed.place.grow().map(|file| (file, None)) } else { claimed.place.begin() };
+        let (file, begun) = opened.map_err(|error| CliError::file("write", &claimed.path, &error))?;
+        claimed.begun = begun;
+        Ok((file, claimed.path.clone()))
+    }
+
     /// Writes all that was put: each file whole, and nothing before everything lies ready beside its place.
     pub fn publish(mut self) -> Result<(), CliError> {
         let mut ready = Vec::new();
-        for file in &self.files {
-            let Some(content) = &file.content else { continue };
+        for file in self.files.iter().filter(|file| file.content.is_some() || file.begun.is_some()) {
             self.check_kind(file)?;
-            let prepared = file.place.prepare(content).map_err(|error| CliError::file("write", &file.path, &error))?;
+        }
+        for file in &mut self.files {
+            let prepared = match (file.begun.take(), &file.content) {
+                (Some(begun), _) => begun,
+                (None, Some(content)) => {
+                    file.place.prepare(content).map_err(|error| CliError::file("write", &file.path, &error))?
+                }
+                (None, None) => continue,
+            };
             ready.push((file.path.clone(), prepared));
         }
         // A device may still fail; taking a place hardly does.

@@ -73,7 +73,9 @@ const SCRIPT: &str = "<script>addEventListener('load', () => {
   svg.dispatchEvent(new MouseEvent('dblclick'));
   const back = data.getAttribute('transform');
   document.title = JSON.stringify({ value, zoomed, ticks, back, wide: document.documentElement.scrollWidth,
-    window: innerWidth, dark: getComputedStyle(document.body).backgroundColor });
+    window: innerWidth, dark: getComputedStyle(document.body).backgroundColor,
+    hint: getComputedStyle(document.querySelector('figcaption'), '::after').content,
+    cut: svg.parentNode.scrollWidth > svg.parentNode.clientWidth });
 });</script></body>";
 
 #[test]
@@ -100,6 +102,9 @@ fn the_report_works_on_every_screen() {
         assert!((150.0..250.0).contains(&time_s), "{found}");
         assert!(found["zoomed"].as_str().unwrap().contains("scale(") && found["ticks"] == 10, "{found}");
         assert_eq!(found["back"], "", "{found}");
+        // Where a plot is wider than the screen, it says so.
+        assert_eq!(found["hint"].as_str().unwrap().contains("slide"), found["cut"] == true, "{found}");
+        assert_eq!(found["cut"], size.contains("500"), "{found}");
     }
 }
 
@@ -162,13 +167,12 @@ fn figures_look_as_they_did_when_somebody_looked() {
     let kept = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fingerprints");
     let files = crate::common::files_in(&bench.path("figures"));
     for name in LOOKED_AT {
-        let name =
-            files.iter().find(|file| file.ends_with(&format!("-{name}.svg"))).unwrap_or_else(|| panic!("{name}"));
+        let name = files.iter().find(|file| **file == format!("{name}.svg")).unwrap_or_else(|| panic!("{name}"));
         let picture = bench.path("picture.png");
         let flag = format!("--screenshot={}", picture.display());
         open(&browser, &bench, &format!("figures/{name}"), &[&flag, "--window-size=760,420"]);
         let png = fs::read(&picture).unwrap();
-        let name = name.trim_end_matches(".svg").split_once('-').unwrap().1;
+        let name = name.trim_end_matches(".svg");
         let (found, file) = (fingerprint(&png), kept.join(format!("{name}.txt")));
         if let Some(folder) = &pictures {
             fs::create_dir_all(folder).unwrap();

@@ -28,6 +28,16 @@ fn a_calibration_ends_in_ten_lines() {
             assert!(printed.lines().any(|line| line.starts_with(head)), "{head}: {printed}");
         }
         assert!(printed.contains(&format!("sensor.toml, estimator {estimator}, ")), "{printed}");
+        // Shares of the error, the largest first.
+        let limited = printed.lines().find(|line| line.starts_with("Limited by")).unwrap();
+        let shares: Vec<f64> = limited
+            .split(" of squared error")
+            .next()
+            .unwrap()
+            .split(", ")
+            .map(|part| part.split_whitespace().rev().nth(1).unwrap().parse().unwrap())
+            .collect();
+        assert!(shares.len() == 4 && shares.is_sorted_by(|a, b| a >= b), "{limited}");
     }
 }
 
@@ -52,6 +62,11 @@ fn json_says_what_the_error_elsewhere_is() {
     assert_eq!(left_out["seen"]["tenths"].as_array().unwrap().len(), 10);
     let rows: f64 = left_out["seen"]["tenths"].as_array().unwrap().iter().map(number).sum();
     assert!((rows - 1.0).abs() < 1e-9);
+    // What limits the error is the largest of the shares beside it.
+    let shares = closing["error_shares"].as_object().unwrap();
+    let largest = shares.iter().max_by(|a, b| number(a.1).total_cmp(&number(b.1))).unwrap().0;
+    assert_eq!(closing["limited_by"].as_str(), Some(largest.as_str()));
+    assert!((shares.values().map(number).sum::<f64>() - 1.0).abs() < 1e-12, "{shares:?}");
 }
 
 const CALIBRATE: [&str; 8] =

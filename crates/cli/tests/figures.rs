@@ -16,7 +16,7 @@ fn evaluate_draws_the_part_that_is_scored() {
     assert!(report.contains("scored part") && !report.contains("in-sample"));
     bench.run(&flags).ok();
     assert!(bench.read("report.html").contains("perhaps in-sample"));
-    for name in ["01-strain-against-time.svg", "01-strain-against-time.csv"] {
+    for name in ["strain-against-time.svg", "strain-against-time.csv"] {
         let first = bench.read(&format!("figures/{name}")).lines().next().unwrap().to_owned();
         assert!(first.contains(", perhaps in-sample"), "{first}");
     }
@@ -32,7 +32,7 @@ fn evaluate_draws_the_part_that_is_scored() {
     assert_eq!(names(".svg"), names(".csv"));
     // Every plot as PDF too, one page 170 mm (481.9 points) wide, with letters that are letters.
     assert_eq!(names(".svg"), names(".pdf"), "is no font installed?");
-    let pdf = std::fs::read(bench.path("figures/01-strain-against-time.pdf")).unwrap();
+    let pdf = std::fs::read(bench.path("figures/strain-against-time.pdf")).unwrap();
     let pdf = String::from_utf8_lossy(&pdf);
     assert!(pdf.contains("[0 0 481.88") && pdf.contains("/FontFile"), "{}", pdf.chars().take(600).collect::<String>());
     for wanted in [
@@ -44,10 +44,22 @@ fn evaluate_draws_the_part_that_is_scored() {
         "relaxation-while-held",
         "rate-of-relaxation",
     ] {
-        assert!(names(".svg").iter().any(|name| name.ends_with(wanted)), "{wanted}: {files:?}");
+        assert!(names(".svg").iter().any(|name| name == wanted), "{wanted}: {files:?}");
     }
+    // One scale, so that letters are of one size: millimetres of paper per unit of the drawing.
+    let scale = |name: &String| -> f64 {
+        let svg = bench.read(&format!("figures/{name}.svg"));
+        let between = |start: &str, end: &str| svg.split(start).nth(1).unwrap().split(end).next().unwrap().to_owned();
+        let (width, view) = (between(" width=\"", "mm\""), between("viewBox=\"", "\""));
+        assert!(["170", "85"].contains(&width.as_str()), "{name}: {width} mm");
+        width.parse::<f64>().unwrap() / view.split(' ').nth(2).unwrap().parse::<f64>().unwrap()
+    };
+    let scales: Vec<f64> = names(".svg").iter().map(scale).collect();
+    assert!(scales.iter().all(|scale| (scale / scales[0] - 1.0).abs() < 1e-9), "{scales:?}");
+    // What is drawn as dots is a dot in the legend.
+    assert!(bench.read("figures/gauge-curve.svg").split("<g transform").next().unwrap().contains("<circle "));
     // The reference in the CSV is the recording's: strain in percent, between 0 and 10 mm on 30 mm.
-    let csv = bench.read("figures/01-strain-against-time.csv");
+    let csv = bench.read("figures/strain-against-time.csv");
     let reference: Vec<f64> = csv
         .lines()
         .filter(|line| line.starts_with("\"reference\""))
@@ -67,7 +79,7 @@ fn a_calibration_reports_in_sample_and_says_so() {
     for words in ["in-sample", "<dt>Left out</dt>", "<dt>Record next</dt>", "static curve; its error bars"] {
         assert!(report.contains(words), "{words}");
     }
-    bench.write("figures/01-strain-against-time.svg", "<svg>mine</svg>");
+    bench.write("figures/strain-against-time.svg", "<svg>mine</svg>");
     let refused = bench.run(&[&flags[..], &["--figures", "figures"]].concat());
     assert_eq!(refused.code, Some(2), "{}", refused.stderr);
     assert!(refused.stderr.contains("something else than a figure"), "{}", refused.stderr);

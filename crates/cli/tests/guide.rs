@@ -74,7 +74,7 @@ fn import() {
 
 #[test]
 fn calibrate() {
-    holds(&run("calibrate.md"), &["sensor.toml", "report.html", "test.html", "figures/01-strain-against-time.svg"]);
+    holds(&run("calibrate.md"), &["sensor.toml", "report.html", "test.html", "figures/strain-against-time.svg"]);
 }
 
 #[test]

@@ -27,6 +27,7 @@ mod manners;
 mod outputs;
 mod pipeline;
 mod refine;
+mod rows_out;
 mod sensor_numbers;
 mod serial_check;
 mod streaming;

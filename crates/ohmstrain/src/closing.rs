@@ -5,9 +5,9 @@ use serde::Serialize;
 
 use crate::number::{fixed, significant};
 use crate::verdict::{Known, percent, verdict};
+use crate::wrap::wrapped;
 
-/// Columns of a terminal that lines keep within, and of the words before them.
-const COLUMNS: usize = 100;
+/// Columns of the words before the lines.
 const HEAD: usize = 13;
 /// Advice that is printed; the rest is counted.
 const PRINTED_ADVICE: usize = 1;
@@ -82,7 +82,7 @@ impl Closing<'_> {
         let next = if found.advice.is_empty() { advice(&found.advice) } else { found.advice.join("; ") };
         let facts = [
             ("Seen", seen(&found.seen, self.params.quantity)),
-            ("Limited by", limited_by(found)),
+            ("Limited by", limited_by_in_full(found)),
             ("Record next", next),
         ];
         [("Left out", error_and_coverage(found))].into_iter().chain(tested).chain(facts).collect()
@@ -133,34 +133,8 @@ struct Lines {
 
 impl Lines {
     fn add(&mut self, head: &str, body: &str) {
-        let mut line = format!("{head:HEAD$}");
-        for word in with_units(body) {
-            let has_word = line.len() > HEAD;
-            if has_word && line.chars().count() + 1 + word.chars().count() > COLUMNS {
-                self.text += &line;
-                self.text.push('\n');
-                line = " ".repeat(HEAD);
-            } else if has_word {
-                line.push(' ');
-            }
-            line += &word;
-        }
-        self.text += &line;
-        self.text.push('\n');
+        self.text += &wrapped(body, &format!("{head:HEAD$}"), &" ".repeat(HEAD));
     }
-}
-
-/// The words of a text, each number with its percent sign or its seconds.
-fn with_units(text: &str) -> Vec<String> {
-    let mut words: Vec<String> = Vec::new();
-    for word in text.split(' ') {
-        let is_unit = word.starts_with('%') || word.trim_end_matches([';', ',', ':']) == "s";
-        match words.last_mut() {
-            Some(number) if is_unit => *number += &format!(" {word}"),
-            _ => words.push(word.into()),
-        }
-    }
-    words
 }
 
 fn error_and_coverage(found: &Findings) -> String {
@@ -218,23 +192,24 @@ fn seen(seen: &Seen, quantity: Quantity) -> String {
     )
 }
 
-/// What makes the error.
+/// What makes the error: shares of it, the largest first. One line of a terminal.
 fn limited_by(found: &Findings) -> String {
+    let whole = |share: f64| fixed(100.0 * share, 0);
+    let share = |(limit, share): (Limit, f64)| format!("{} {} %", limit.name(), whole(share));
+    let shares = found.budget.shares().sorted().map(share).join(", ");
+    format!("{shares} of squared error; wrong way in {} %", whole(found.budget.wrong_rows))
+}
+
+/// The same with what the shares are made of.
+fn limited_by_in_full(found: &Findings) -> String {
     let budget = &found.budget;
-    let parts = [
-        (Limit::Law, "law", budget.law_percent),
-        (Limit::Drift, "drift", budget.drift_percent),
-        (Limit::Noise, "noise", budget.noise_percent),
-    ];
-    let wrong = percent(100.0 * budget.wrong_rows);
-    let size = |(_, name, percent_of_range): &(Limit, &str, f64)| format!("{name} {}", percent(*percent_of_range));
-    let (first, others): (Vec<_>, Vec<_>) = parts.iter().partition(|part| part.0 == budget.limit());
-    let sizes = first.into_iter().chain(others).map(size).collect::<Vec<_>>().join(", ");
-    if budget.limit() == Limit::Direction {
-        format!("direction (wrong in {wrong}); {sizes} of the readings' range")
-    } else {
-        format!("{sizes} of the readings' range; direction wrong in {wrong}")
-    }
+    format!(
+        "{} of the moving rows; of the readings' range the law misses {}, drift moves {}, noise {}",
+        limited_by(found),
+        percent(budget.law_percent),
+        percent(budget.drift_percent),
+        percent(budget.noise_percent)
+    )
 }
 
 fn advice(advice: &[String]) -> String {

@@ -45,6 +45,7 @@ mod unit_doubt;
 mod unread;
 mod validity;
 pub mod verdict;
+pub mod wrap;
 
 pub use builder::{FilterBuilder, KNOWN_BEYOND};
 pub use calibrate::{Calibrated, Calibration, calibrate};

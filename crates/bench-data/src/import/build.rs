@@ -6,6 +6,7 @@ use crate::error::{Fault, TraceError, quote};
 use crate::import::align::{Offset, motion_offset};
 use crate::import::channel::{Channel, Values, name};
 use crate::import::clock::Times;
+use crate::import::digits::{DIGITS, rounded, told_apart};
 use crate::import::error::ImportError;
 use crate::import::plan::Plan;
 use crate::import::recipe::Align;
@@ -127,8 +128,8 @@ impl Work<'_> {
         let Some(row) = values.iter().position(|value| *value <= 0.0) else { return Ok(values) };
         let flag = if values[row] < 0.0 { "magnitude" } else { "drop-zeros" };
         let why = if values[row] < 0.0 { "if signs are arbitrary" } else { "if zeros are missing values" };
-        let what =
-            format!("column {}: expected a positive resistance, found {}", name(table, channel.column), values[row]);
+        let (column, found) = (name(table, channel.column), rounded(values[row], DIGITS));
+        let what = format!("column {column}: expected a positive resistance, found {found}");
         let place = format!("{}:{}", table.file, table.lines[row]);
         Err(ImportError::question(&place, what, [format!("--{flag} {} {why}", channel.role)]))
     }
@@ -142,12 +143,9 @@ impl Work<'_> {
                 _ if time.is_nan() => untimed += 1,
                 Some(&last) if time == last => repeated += 1,
                 Some(&last) if time < last => {
-                    let expected = format!("a time after {last} s");
-                    return Err(ImportError::content(
-                        &of.file,
-                        of.lines[row],
-                        Fault::new(expected, format!("{time} s")),
-                    ));
+                    let (last, time) = told_apart(last, time);
+                    let fault = Fault::new(format!("a time after {last} s"), format!("{time} s"));
+                    return Err(ImportError::content(&of.file, of.lines[row], fault));
                 }
                 _ => series.push(time, value, row),
             }

@@ -19,6 +19,7 @@ mod build;
 mod candidates;
 mod channel;
 mod clock;
+mod digits;
 mod error;
 mod grid;
 mod header;

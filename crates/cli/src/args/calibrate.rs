@@ -2,7 +2,7 @@ use std::path::PathBuf;
 
 use clap::Args as ClapArgs;
 
-use super::{Auto, Branches, Estimator, Gauge, TraceArgs, finite};
+use super::{Auto, Branches, Estimator, Gauge, ReplaceArgs, TraceArgs, finite};
 
 /// Flags of `calibrate`.
 #[derive(Debug, ClapArgs)]
@@ -50,9 +50,9 @@ pub struct CalibrateArgs {
     /// Report and figures, of the first recording
     #[command(flatten)]
     pub report: ReportArgs,
-    /// Replace files that this program did not write, too
-    #[arg(long)]
-    pub force: bool,
+    /// Whether to replace
+    #[command(flatten)]
+    pub replace: ReplaceArgs,
     /// Overrides of the recordings' metadata
     #[command(flatten)]
     pub trace: TraceArgs,

@@ -4,7 +4,7 @@ use std::str::FromStr;
 use clap::{Args as ClapArgs, ValueEnum};
 use ohmstrain_ekf::Influence;
 
-use super::{Auto, Estimator, TraceArgs, finite, positive};
+use super::{Auto, Estimator, ReplaceArgs, TraceArgs, finite, positive};
 
 /// Flags that `filter`, `smooth` and `live` share.
 #[derive(Debug, ClapArgs)]
@@ -60,15 +60,29 @@ impl Format {
     }
 }
 
-/// How estimates are written.
+/// How estimates are written, and where.
 #[derive(Debug, ClapArgs)]
 pub struct WrittenArgs {
+    /// File to write instead of stdout; a name that ends in .parquet is written as Parquet
+    #[arg(short, long, value_name = "estimates.csv")]
+    pub output: Option<PathBuf>,
+    /// Whether to replace
+    #[command(flatten)]
+    pub replace: ReplaceArgs,
     /// Form of the estimates
     #[arg(long, value_enum, default_value_t = Format::Csv)]
     pub format: Format,
     /// Columns to write, separated by commas; all by default
     #[arg(long, value_delimiter = ',')]
     pub columns: Vec<String>,
+}
+
+impl WrittenArgs {
+    /// The form that flag or name ask for.
+    pub fn format(&self) -> Format {
+        let named = self.output.as_deref().and_then(|path| path.extension());
+        if named.is_some_and(|ending| ending == Format::Parquet.name()) { Format::Parquet } else { self.format }
+    }
 }
 
 /// Flags of `filter`.

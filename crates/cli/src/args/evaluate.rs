@@ -4,7 +4,7 @@ use std::str::FromStr;
 use clap::Args as ClapArgs;
 use ohmstrain_calib::EstimatorKind;
 
-use super::{Estimator, ReportArgs, RestResistance, Split, TraceArgs, finite};
+use super::{Estimator, ReplaceArgs, ReportArgs, RestResistance, Split, TraceArgs, finite};
 
 /// Flags of `evaluate`.
 #[derive(Debug, ClapArgs)]
@@ -39,9 +39,9 @@ pub struct EvaluateArgs {
     /// Report and figures, of the first recording and the first estimator; the rows that are scored are marked
     #[command(flatten)]
     pub report: ReportArgs,
-    /// Replace files that this program did not write, too
-    #[arg(long)]
-    pub force: bool,
+    /// Whether to replace
+    #[command(flatten)]
+    pub replace: ReplaceArgs,
     /// Print JSON
     #[arg(long)]
     pub json: bool,

@@ -2,9 +2,8 @@ use std::path::PathBuf;
 
 use clap::Args as ClapArgs;
 use ohmstrain_bench_data::import::{Align, ColumnName, DecimalMark, PerFile, Preset, Recipe, Role};
-use ohmstrain_bench_data::{FrontEndSpec, JointSpec};
 
-use super::positive;
+use super::{ReplaceArgs, SetupArgs, positive};
 
 /// Flags of `inspect`.
 #[derive(Debug, ClapArgs)]
@@ -30,12 +29,12 @@ pub struct ImportArgs {
     /// Files of one recording: text, XLSX, Parquet, each perhaps in gzip; - for stdin
     #[arg(required = true)]
     pub files: Vec<PathBuf>,
-    /// Where to write the trace; stdout by default
+    /// File to write instead of stdout
     #[arg(short, long, value_name = "trace.csv")]
     pub output: Option<PathBuf>,
-    /// Replace the output even if it is no recording that this program wrote
-    #[arg(long)]
-    pub force: bool,
+    /// Whether to replace
+    #[command(flatten)]
+    pub replace: ReplaceArgs,
     /// What is known of the files
     #[command(flatten)]
     pub known: FilesArgs,
@@ -79,15 +78,9 @@ pub struct FilesArgs {
     /// Rows per second, where no column is a time
     #[arg(long, value_name = "HZ", allow_negative_numbers = true, value_parser = positive)]
     pub rate_hz: Option<f64>,
-    /// Length of the unstretched sensor, mm: turns a displacement into strain
-    #[arg(long, value_name = "MM", allow_negative_numbers = true, value_parser = positive)]
-    pub gauge_length_mm: Option<f64>,
-    /// Electronics, as in `# front_end = …`: turns converter codes into ohms
-    #[arg(long, value_name = "SPEC")]
-    pub front_end: Option<FrontEndSpec>,
-    /// Joint, as in `# joint = …`: turns an angle into strain
-    #[arg(long, value_name = "SPEC")]
-    pub joint: Option<JointSpec>,
+    /// What was measured with
+    #[command(flatten)]
+    pub setup: SetupArgs,
     /// A known layout: electromech-stretcher (no header; Ro, Ri, tR, P, tP, F, tF)
     #[arg(long, value_name = "NAME")]
     pub preset: Option<Preset>,
@@ -109,9 +102,9 @@ impl FilesArgs {
             fold_polarity: self.fold_polarity,
             align: self.align,
             rate_hz: self.rate_hz,
-            gauge_length_mm: self.gauge_length_mm,
-            front_end: self.front_end,
-            joint: self.joint,
+            gauge_length_mm: self.setup.gauge_length_mm,
+            front_end: self.setup.front_end,
+            joint: self.setup.joint,
         }
     }
 }

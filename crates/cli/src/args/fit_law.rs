@@ -6,7 +6,7 @@ use clap::{Args as ClapArgs, ValueEnum};
 use ohmstrain_calib::closed_form::{ClosedForm, ModulusShape};
 use ohmstrain_model::Phase;
 
-use super::{RestResistance, TraceArgs};
+use super::{ReplaceArgs, RestResistance, TraceArgs};
 
 /// Flags of `fit-law`.
 #[derive(Clone, Debug, ClapArgs)]
@@ -43,9 +43,9 @@ pub struct FitLawArgs {
     /// Also write a plot of each fit as SVG and PDF, with what is drawn as CSV, to this folder
     #[arg(long, value_name = "DIR")]
     pub figures: Option<PathBuf>,
-    /// Replace files that this program did not write, too
-    #[arg(long)]
-    pub force: bool,
+    /// Whether to replace
+    #[command(flatten)]
+    pub replace: ReplaceArgs,
     /// Print one row per material, speed and phase over all recordings
     #[arg(long, conflicts_with_all = ["json", "pool"])]
     pub table: bool,

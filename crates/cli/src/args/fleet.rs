@@ -2,6 +2,8 @@ use std::path::PathBuf;
 
 use clap::{Args as ClapArgs, Subcommand};
 
+use super::ReplaceArgs;
+
 /// Flags of `fleet`.
 #[derive(Debug, ClapArgs)]
 pub struct FleetArgs {
@@ -27,7 +29,7 @@ pub struct FleetFitArgs {
     /// Where to write what they have in common
     #[arg(short, long, value_name = "prior.toml")]
     pub output: PathBuf,
-    /// Replace files that this program did not write, too
-    #[arg(long)]
-    pub force: bool,
+    /// Whether to replace
+    #[command(flatten)]
+    pub replace: ReplaceArgs,
 }

@@ -4,7 +4,7 @@ use std::str::FromStr;
 use clap::Args as ClapArgs;
 use ohmstrain_calib::likelihood::NoiseParameter;
 
-use super::{Auto, Estimator, RestResistance, TraceArgs, finite};
+use super::{Auto, Estimator, ReplaceArgs, RestResistance, TraceArgs, finite};
 
 /// Flags of `refine`.
 #[derive(Debug, ClapArgs)]
@@ -18,9 +18,9 @@ pub struct RefineArgs {
     /// Where to write the refined parameters
     #[arg(short, long, value_name = "refined.toml")]
     pub output: PathBuf,
-    /// Replace files that this program did not write, too
-    #[arg(long)]
-    pub force: bool,
+    /// Whether to replace
+    #[command(flatten)]
+    pub replace: ReplaceArgs,
     /// Use rows with time_s >= T only
     #[arg(long, value_name = "T", allow_negative_numbers = true, value_parser = finite)]
     pub from: Option<f64>,

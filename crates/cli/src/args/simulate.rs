@@ -4,6 +4,8 @@ use clap::{Args as ClapArgs, ValueEnum};
 use ohmstrain_bench_data::FrontEndSpec;
 use ohmstrain_bench_data::simulate::{Material, Protocol};
 
+use super::ReplaceArgs;
+
 /// Flags of `demo`.
 #[derive(Debug, ClapArgs)]
 pub struct DemoArgs {
@@ -16,9 +18,9 @@ pub struct DemoArgs {
     /// Seed of the simulated bench
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
-    /// Replace files that this program did not write, too
-    #[arg(long)]
-    pub force: bool,
+    /// Whether to replace
+    #[command(flatten)]
+    pub replace: ReplaceArgs,
 }
 
 /// Sensors of `demo`, neither of the family of laws that is fitted.
@@ -63,7 +65,7 @@ pub struct SimulateArgs {
     /// File to write instead of stdout
     #[arg(short, long)]
     pub output: Option<PathBuf>,
-    /// Replace files that this program did not write, too
-    #[arg(long)]
-    pub force: bool,
+    /// Whether to replace
+    #[command(flatten)]
+    pub replace: ReplaceArgs,
 }

@@ -3,18 +3,34 @@ use ohmstrain_bench_data::{FrontEndSpec, JointSpec, Metadata, ResistanceUnit, St
 
 use super::positive;
 
+/// What was measured with.
+#[derive(Clone, Debug, Default, ClapArgs)]
+pub struct SetupArgs {
+    /// Length of the unstretched sensor, mm: turns a displacement into strain
+    #[arg(long, value_name = "MM", allow_negative_numbers = true, value_parser = positive)]
+    pub gauge_length_mm: Option<f64>,
+    /// Electronics, as in `# front_end = …`: turns converter codes into ohms
+    #[arg(long, value_name = "SPEC")]
+    pub front_end: Option<FrontEndSpec>,
+    /// Joint, as in `# joint = …`: turns an angle into strain
+    #[arg(long, value_name = "SPEC")]
+    pub joint: Option<JointSpec>,
+}
+
+/// What is replaced.
+#[derive(Clone, Copy, Debug, Default, ClapArgs)]
+pub struct ReplaceArgs {
+    /// Replace files that this program did not write, too
+    #[arg(long)]
+    pub force: bool,
+}
+
 /// What a trace's metadata lines leave unsaid, or say wrongly.
 #[derive(Clone, Debug, Default, ClapArgs)]
 pub struct TraceArgs {
-    /// Length of the unstretched sensor, mm
-    #[arg(long, value_name = "MM", allow_negative_numbers = true, value_parser = positive)]
-    pub gauge_length_mm: Option<f64>,
-    /// Electronics, as in `# front_end = …`
-    #[arg(long, value_name = "SPEC")]
-    pub front_end: Option<FrontEndSpec>,
-    /// Joint, as in `# joint = …`
-    #[arg(long, value_name = "SPEC")]
-    pub joint: Option<JointSpec>,
+    /// What was measured with
+    #[command(flatten)]
+    pub setup: SetupArgs,
     /// Unit of the column `strain`: fraction or percent
     #[arg(long, value_name = "UNIT")]
     pub strain_unit: Option<StrainUnit>,
@@ -27,9 +43,9 @@ impl TraceArgs {
     /// As metadata that overrides the file's.
     pub fn metadata(&self) -> Metadata {
         Metadata {
-            gauge_length_mm: self.gauge_length_mm,
-            front_end: self.front_end,
-            joint: self.joint,
+            gauge_length_mm: self.setup.gauge_length_mm,
+            front_end: self.setup.front_end,
+            joint: self.setup.joint,
             strain_unit: self.strain_unit,
             resistance_unit: self.resistance_unit,
             ..Metadata::default()

@@ -24,7 +24,7 @@ use crate::verbosity::Verbosity;
 
 /// Calibrates a sensor on recordings and writes its parameters.
 pub fn run(args: &CalibrateArgs) -> Result<(), CliError> {
-    let mut outputs = Outputs::new(args.force, args.traces.iter().chain(&args.prior));
+    let mut outputs = Outputs::new(args.replace.force, args.traces.iter().chain(&args.prior));
     let sensor_output = outputs.claim(&args.output, Kind::Sensor)?;
     let wanted = Wanted::claim(&args.report, &mut outputs)?;
     let overrides = args.trace.metadata();

@@ -1,7 +1,7 @@
 //! What `calibrate --json` prints.
 
 use ohmstrain::{Closing, Findings, MADE_BY, Tested};
-use ohmstrain_calib::Limit;
+use ohmstrain_calib::{ErrorShares, Limit};
 use serde::Serialize;
 
 /// Version of what `--json` prints. Names are added without another version; one that goes or changes its meaning brings
@@ -22,6 +22,8 @@ struct Json<'a> {
     /// Scores of the rows that `--from` and `--until` kept from it.
     tested: Option<&'a Tested>,
     limited_by: Option<Limit>,
+    /// Of the squared error, 0 to 1.
+    error_shares: Option<ErrorShares>,
     verdict: Option<String>,
 }
 
@@ -38,6 +40,7 @@ pub fn json(closing: &Closing, file: &str) -> serde_json::Result<Vec<u8>> {
         calibration_s: closing.calibration_s,
         left_out: findings,
         limited_by: findings.map(|found| found.budget.limit()),
+        error_shares: findings.map(|found| found.budget.shares()),
         tested: closing.tested,
         verdict: closing.verdict(),
     };

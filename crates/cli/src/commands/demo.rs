@@ -23,7 +23,7 @@ const CALIBRATION_SHARE: f64 = 0.5;
 
 /// The whole chain on a simulated sensor that is not of the fitted model's family.
 pub fn run(args: &DemoArgs) -> Result<(), CliError> {
-    let mut outputs = Outputs::new(args.force, []);
+    let mut outputs = Outputs::new(args.replace.force, []);
     outputs.folder(&args.out)?;
     let mut claim = |name: &str, kind| outputs.claim(&args.out.join(name), kind);
     let trace_output = claim("trace.csv", Kind::Simulation)?;

@@ -5,17 +5,15 @@ use ohmstrain::number::significant;
 use ohmstrain::{Error, Estimate, Filter, LaggedFilter, Reading, Sensor, ValidityWatch};
 use ohmstrain_bench_data::{BadContent, Row, TraceError, TraceReader};
 
-use crate::args::{FilterArgs, KnownStrain, RestResistance};
+use crate::args::{FilterArgs, KnownStrain, RestResistance, WrittenArgs};
 use crate::error::CliError;
-use crate::estimates::{EstimateWriter, columns};
+use crate::estimates::{self, EstimateWriter};
 use crate::input::{self, Beginning, check_unit, is_stdin};
+use crate::output::RowsOut;
 use crate::readings::no_row;
 use crate::run::{builder, rest_resistance};
 use crate::sensor_file;
 use crate::suits::{self, FIRST_LIVE_READINGS, FIRST_READINGS};
-
-/// Bytes handed to standard output at once, unless somebody waits for them.
-const WRITTEN_AT_ONCE: usize = 1 << 16;
 
 /// How well a known strain is known unless it says so, in spans of the limits.
 const KNOWN_TO: f64 = 0.005;
@@ -26,6 +24,8 @@ pub fn run(args: &FilterArgs) -> Result<(), CliError> {
     if args.lag_s.is_some() && kind.is_some_and(|kind| kind.smoother() != kind) {
         return Err(Error::NoSmoother.into());
     }
+    let WrittenArgs { output, replace, columns, .. } = &args.written;
+    let mut rows_out = RowsOut::claim(output.as_deref(), replace.force, [&args.trace_file, &args.estimate.sensor])?;
     let mut sensor = sensor_file::read(&args.estimate.sensor, kind)?;
     let mut filter = Running::new(&sensor, args)?;
     suits::warn_of_start(args.estimate.initial_strain, &sensor);
@@ -41,13 +41,14 @@ pub fn run(args: &FilterArgs) -> Result<(), CliError> {
         sensor = sensor.on_joint(joint)?;
         filter = Running::new(&sensor, args)?;
     }
-    let out = io::BufWriter::with_capacity(WRITTEN_AT_ONCE, io::stdout());
-    let writer = EstimateWriter::new(out, args.written.format, columns(&sensor, &args.written.columns)?)?;
+    let columns = estimates::columns(&sensor, columns)?;
     let live = is_stdin(&args.trace_file) || !args.trace_file.is_file();
+    let writer = EstimateWriter::new(rows_out.open(live)?, args.written.format(), columns)?;
     let watch = ValidityWatch::new(&sensor, None);
     let sink =
         Sink { writer, watch, sensor: &sensor, rest: None, file: rows.file().into(), header, live, early: vec![] };
-    stream(args, filter, rows, sink)
+    stream(args, filter, rows, sink)?;
+    rows_out.publish()
 }
 
 /// A filter with or without a lag, and the strains that will be known to it.

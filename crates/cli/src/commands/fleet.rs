@@ -18,7 +18,7 @@ pub fn run(args: &FleetArgs) -> Result<(), CliError> {
 }
 
 fn fit(args: &FleetFitArgs) -> Result<(), CliError> {
-    let mut outputs = Outputs::new(args.force, &args.sensors);
+    let mut outputs = Outputs::new(args.replace.force, &args.sensors);
     let output = outputs.claim(&args.output, Kind::Prior)?;
     let sensors = args.sensors.iter().map(|path| sensor_file::read(path, None));
     let sensors: Vec<Sensor> = sensors.collect::<Result<_, _>>()?;

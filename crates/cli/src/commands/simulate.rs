@@ -8,7 +8,7 @@ use crate::sensor_file::MADE_BY;
 
 /// Simulates a recording and writes it.
 pub fn run(args: &SimulateArgs) -> Result<(), CliError> {
-    let mut outputs = Outputs::new(args.force, []);
+    let mut outputs = Outputs::new(args.replace.force, []);
     let output = args.output.as_deref().map(|path| outputs.claim(path, Kind::Simulation)).transpose()?;
     let settings = SimulationSettings {
         elongation_mm: args.elongation_mm,

@@ -1,12 +1,13 @@
-use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
+use std::io::{Read, Seek, SeekFrom, Write};
 
 use ohmstrain::{Estimate, FilterBuilder, Sensor, ValidityWatch};
 use tempfile::SpooledTempFile;
 
-use crate::args::{Format, SmoothArgs};
+use crate::args::{Format, SmoothArgs, WrittenArgs};
 use crate::error::CliError;
 use crate::estimates::{EstimateWriter, Packed, columns};
 use crate::input::{self, check_unit};
+use crate::output::RowsOut;
 use crate::readings::{Readings, WAIT_IN_MEMORY, temporary};
 use crate::run::{builder, rest_resistance};
 use crate::sensor_file;
@@ -17,6 +18,8 @@ use crate::suits;
 /// files.
 pub fn run(args: &SmoothArgs) -> Result<(), CliError> {
     let wanted = args.estimate.estimator.chosen().map(|estimator| estimator.0);
+    let WrittenArgs { output, replace, .. } = &args.written;
+    let mut rows_out = RowsOut::claim(output.as_deref(), replace.force, [&args.trace_file, &args.estimate.sensor])?;
     let mut sensor = sensor_file::read(&args.estimate.sensor, wanted)?;
     let rows = input::open(&args.trace_file, &args.estimate.trace.metadata())?;
     let header = input::header(&rows);
@@ -42,11 +45,11 @@ pub fn run(args: &SmoothArgs) -> Result<(), CliError> {
             CliError::warning(&format!("{name}: {warning}"));
         }
     };
-    let out = BufWriter::with_capacity(WRITTEN_AT_ONCE, io::stdout());
-    let mut writer = EstimateWriter::new(out, args.written.format, columns)?;
+    let mut writer = EstimateWriter::new(rows_out.open(false)?, args.written.format(), columns)?;
     segments.write_in_order(&mut writer, see)?;
     readings.whole()?;
-    writer.finish()
+    writer.finish()?;
+    rows_out.publish()
 }
 
 fn smooth_into(packed: Packed, builder: FilterBuilder, readings: &Readings) -> Result<Segments, CliError> {
@@ -54,9 +57,6 @@ fn smooth_into(packed: Packed, builder: FilterBuilder, readings: &Readings) -> R
     builder.smooth_backward(readings.len(), |row| readings.row(row), |_, estimates| segments.push(estimates))?;
     Ok(segments)
 }
-
-/// Bytes handed to standard output at once.
-const WRITTEN_AT_ONCE: usize = 1 << 16;
 
 /// Segments of rows that came last segment first: their rates, then what is written of them.
 struct Segments {

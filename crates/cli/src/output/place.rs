@@ -1,5 +1,5 @@
 use std::fs::{self, File, OpenOptions, Permissions};
-use std::io::{self, Read, Write};
+use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 use tempfile::{Builder, NamedTempFile};
@@ -96,22 +96,44 @@ impl Place {
             opened => opened?,
         };
         let mut head = Vec::new();
-        file.take(HEAD).read_to_end(&mut head)?;
+        (&file).take(HEAD).read_to_end(&mut head)?;
+        if head.starts_with(b"PAR1") {
+            // Parquet says at its end who wrote it.
+            (&file).seek(SeekFrom::Start(file.metadata()?.len().saturating_sub(HEAD)))?;
+            (&file).take(HEAD).read_to_end(&mut head)?;
+        }
         Ok(!head.is_empty() && !kind.wrote(&String::from_utf8_lossy(&head)))
     }
 
     /// Writes `content` beside the place.
     pub fn prepare(&self, content: &[u8]) -> io::Result<Prepared> {
-        let (path, permissions) = match self {
-            Self::Through(file) => return Ok(Prepared::Through(file.try_clone()?, content.to_vec())),
-            Self::Whole { path, permissions, .. } => (path, permissions),
-        };
-        let mut file = new_file(&mut Builder::new()).tempfile_in(folder(path)).map_err(|error| error.kind())?;
-        file.write_all(content)?;
-        if let Some(permissions) = permissions {
-            file.as_file().set_permissions(permissions.clone())?;
+        match self {
+            Self::Through(file) => Ok(Prepared::Through(file.try_clone()?, content.to_vec())),
+            Self::Whole { path, permissions, .. } => {
+                let mut file = neighbour(path, permissions.as_ref())?;
+                file.write_all(content)?;
+                Ok(Prepared::Whole(file, path.clone()))
+            }
         }
-        Ok(Prepared::Whole(file, path.clone()))
+    }
+
+    /// A file to write bit by bit, and what then puts it in its place; nothing where bytes go through.
+    pub fn begin(&self) -> io::Result<(File, Option<Prepared>)> {
+        match self {
+            Self::Through(file) => Ok((file.try_clone()?, None)),
+            Self::Whole { path, permissions, .. } => {
+                let file = neighbour(path, permissions.as_ref())?;
+                Ok((file.as_file().try_clone()?, Some(Prepared::Whole(file, path.clone()))))
+            }
+        }
+    }
+
+    /// The file itself, emptied, for what is to be seen as it grows.
+    pub fn grow(&self) -> io::Result<File> {
+        match self {
+            Self::Through(file) => file.try_clone(),
+            Self::Whole { path, .. } => File::create(path),
+        }
     }
 }
 
@@ -134,6 +156,15 @@ impl Prepared {
             Self::Whole(file, path) => file.persist(path).map(drop).map_err(|error| error.error),
         }
     }
+}
+
+/// A temporary file beside `path`, which is to take its place.
+fn neighbour(path: &Path, permissions: Option<&Permissions>) -> io::Result<NamedTempFile> {
+    let file = new_file(&mut Builder::new()).tempfile_in(folder(path)).map_err(|error| error.kind())?;
+    if let Some(permissions) = permissions {
+        file.as_file().set_permissions(permissions.clone())?;
+    }
+    Ok(file)
 }
 
 /// A temporary file is private; a result is as readable as the user's umask lets new files be.

@@ -2,8 +2,7 @@
 
 use comfy_table::{ContentArrangement, Table, presets};
 
-/// Columns that no line exceeds where words can be wrapped.
-pub const COLUMNS: usize = 100;
+pub use ohmstrain::wrap::COLUMNS;
 
 /// An empty table whose cells are wrapped where it would be too wide.
 pub fn table() -> Table {
@@ -15,25 +14,11 @@ pub fn table() -> Table {
 
 /// A text whose lines are broken between words; what goes on is indented as its line was.
 pub fn wrapped(text: &str) -> String {
-    let mut out = String::new();
-    for line in text.lines() {
+    let line = |line: &str| {
         let indent = &line[..line.len() - line.trim_start().len()];
-        let mut width = 0;
-        for word in line.split_whitespace() {
-            let long = word.chars().count();
-            let breaks = width > 0 && width + 1 + long > COLUMNS;
-            let between = match (width, breaks) {
-                (0, _) => indent,
-                (_, true) => &format!("\n{indent}"),
-                _ => " ",
-            };
-            width = long + if width == 0 || breaks { indent.len() } else { width + 1 };
-            out += between;
-            out += word;
-        }
-        out.push('\n');
-    }
-    out
+        ohmstrain::wrap::wrapped(line, indent, indent)
+    };
+    text.lines().map(line).collect()
 }
 
 #[cfg(test)]

@@ -20,8 +20,9 @@ const ABOVE_PX: f64 = 10.0;
 /// Half of a long tick label.
 const RIGHT_PX: f64 = 24.0;
 
-/// Size of a plot across the page, px.
+/// Size of a plot across the page, px, and of a high one.
 pub const WIDE: (f64, f64) = (940.0, 320.0);
+pub const HIGH: (f64, f64) = (WIDE.0, 440.0);
 /// Size of a plot that shares its line with another one, px.
 pub const HALF: (f64, f64) = (460.0, 320.0);
 
@@ -180,7 +181,8 @@ impl Chart {
             return;
         }
         if !name.is_empty() {
-            self.legend.push(Key::new(ink, name));
+            let key = Key::new(ink, name);
+            self.legend.push(Key { is_dot: matches!(shape, Shape::Dots(_)), ..key });
         }
         self.layers.push(Layer { ink, name: name.into(), shape });
     }

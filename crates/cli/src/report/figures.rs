@@ -9,7 +9,7 @@ use super::axis::{Axis, extent};
 use super::chart::{Chart, WIDE};
 use super::ink::{Ink, Key};
 use super::recording::Recording;
-use super::{ReportError, Scored};
+use super::{ReportError, Scored, slug};
 
 /// A plot with what belongs to it.
 #[derive(Debug, Serialize)]
@@ -24,6 +24,9 @@ pub struct Figure {
     pub note: String,
     /// Shares its line with the next one.
     pub half: bool,
+    /// Name of its files without their ending: the same for every recording, so that a paper can include them.
+    #[serde(skip)]
+    pub file: String,
     /// What it was drawn from.
     #[serde(skip)]
     pub chart: Chart,
@@ -33,7 +36,8 @@ impl Figure {
     /// Draws a chart.
     pub fn new(chart: Chart, title: &str, note: &str, half: bool) -> Result<Self, ReportError> {
         let svg = chart.svg(&format!("{title}. {note}"))?;
-        Ok(Self { title: title.into(), svg, legend: chart.legend(), note: note.into(), half, chart })
+        let (title, file, note) = (title.into(), slug(title), note.into());
+        Ok(Self { title, svg, legend: chart.legend(), note, half, file, chart })
     }
 }
 

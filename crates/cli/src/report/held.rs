@@ -20,8 +20,7 @@ pub fn relaxation(recording: &Recording) -> Result<Option<Figure>, ReportError> 
     let Some((first, last)) = extent(points().map(|(time, _)| *time)) else { return Ok(None) };
     let predicted = held.iter().flat_map(|(curve, _)| curve.predicted.iter().map(|(_, ratio)| *ratio));
     let y = Axis::around("R / R at the hold's start", points().map(|(_, ratio)| *ratio), predicted, HIGH_TICKS);
-    let mut chart =
-        Chart::new((WIDE.0 * 0.8, 340.0), Axis::logarithmic("Time since the hold began, s", first, last), y);
+    let mut chart = Chart::new(WIDE, Axis::logarithmic("Time since the hold began, s", first, last), y);
     let inks = Ink::HOLDS.into_iter().zip(Ink::HELD_LAWS);
     for (place, ((curve, hold), (ink, law))) in held.iter().zip(inks).enumerate() {
         let name = format!("{} held from {} s", recording.with_unit(hold.strain), plain(curve.start_s));
@@ -49,8 +48,7 @@ pub fn rate(recording: &Recording) -> Result<Option<Figure>, ReportError> {
     let Some((first, last)) = extent(recorded().map(|(time, _)| *time)) else { return Ok(None) };
     let predicted = rates.iter().flat_map(|(_, law)| law.iter().map(|(_, rate)| *rate));
     let y = Axis::around("d(R/R at start)/dt, 1/s", recorded().map(|(_, rate)| *rate), predicted, HIGH_TICKS);
-    let mut chart =
-        Chart::new((WIDE.0 * 0.8, 340.0), Axis::logarithmic("Time since the hold began, s", first, last), y);
+    let mut chart = Chart::new(WIDE, Axis::logarithmic("Time since the hold began, s", first, last), y);
     let inks = Ink::HOLDS.into_iter().zip(Ink::HELD_LAWS);
     for (place, (((curve, hold), (recorded, predicted)), (ink, law))) in held.iter().zip(&rates).zip(inks).enumerate() {
         let name = format!("{} held from {} s", recording.with_unit(hold.strain), plain(curve.start_s));
@@ -91,7 +89,7 @@ pub fn levels(recording: &Recording) -> Result<Option<Figure>, ReportError> {
     let x = Axis::holding(recording.quantity_label(), levels.iter().map(|x| recording.shown(*x)), HIGH_TICKS + 2);
     let readings = ends.iter().flat_map(|(_, begun, ended)| [*begun, *ended]);
     let y = Axis::around(recording.reading_label(), readings, settled().map(|(_, y)| y), HIGH_TICKS);
-    let mut chart = Chart::new((WIDE.0 * 0.7, 340.0), x, y);
+    let mut chart = Chart::new(WIDE, x, y);
     chart.curve(Ink::CURVE, "gauge curve: fully relaxed", settled());
     chart.dots(Ink::BEGUN, "hold begins", ends.iter().map(|(x, begun, _)| (recording.shown(*x), *begun)));
     chart.dots(Ink::ENDED, "hold ends", ends.iter().map(|(x, _, ended)| (recording.shown(*x), *ended)));

@@ -168,6 +168,8 @@ pub struct Key {
     pub hex: String,
     pub opacity: f64,
     pub width: f64,
+    /// A dot, and no line.
+    pub is_dot: bool,
     /// What it is.
     pub name: String,
 }
@@ -175,7 +177,7 @@ pub struct Key {
 impl Key {
     /// The entry of an ink.
     pub fn new(ink: Ink, name: &str) -> Self {
-        Self { hex: ink.hex(), opacity: ink.opacity, width: ink.width.max(1.5), name: name.into() }
+        Self { hex: ink.hex(), opacity: ink.opacity, width: ink.width.max(1.5), is_dot: false, name: name.into() }
     }
 }
 

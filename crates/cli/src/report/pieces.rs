@@ -1,8 +1,10 @@
 //! A long recording piece by piece, so that every movement can be seen.
 
 use super::ReportError;
+use super::axis::extent;
 use super::chart::WIDE;
 use super::figures::{Figure, draw_strain, strain_chart};
+use super::motion::Motion;
 use super::recording::Recording;
 use ohmstrain::number::significant;
 
@@ -11,11 +13,12 @@ const MOVEMENTS: usize = 14;
 const MOST_PIECES: usize = 12;
 /// Height of a piece, px.
 const HEIGHT_PX: f64 = 220.0;
+/// What a movement of usual length takes of a plot's width at least.
+const VISIBLE: f64 = 1.0 / 40.0;
 
 /// The strain in pieces of equal numbers of rows; none if one plot shows all movements.
 pub fn strain(recording: &Recording) -> Result<Vec<Figure>, ReportError> {
-    let movements = recording.motions.windows(2).filter(|pair| pair[0] != pair[1]).count();
-    let pieces = movements.div_ceil(MOVEMENTS).min(MOST_PIECES);
+    let pieces = count(&recording.motions, recording.time_s);
     if pieces < 2 {
         return Ok(vec![]);
     }
@@ -23,10 +26,48 @@ pub fn strain(recording: &Recording) -> Result<Vec<Figure>, ReportError> {
     let piece = |i: usize| {
         let own = i * rows / pieces..(i + 1) * rows / pieces;
         let at = |row: usize| recording.time_s.get(row).copied().unwrap_or(f64::NAN);
-        let title = format!("{} to {} s", significant(at(own.start), 4), significant(at(own.end.saturating_sub(1)), 4));
+        let (from, until) = (significant(at(own.start), 4), significant(at(own.end.saturating_sub(1)), 4));
+        let title = format!("Piece {} of {pieces}: {from} to {until} s", i + 1);
         let mut chart = strain_chart(recording, own.clone(), (WIDE.0, HEIGHT_PX));
         draw_strain(&mut chart, recording, own);
-        Figure::new(chart, &title, "", false)
+        let figure = Figure::new(chart, &title, "", false)?;
+        Ok(Figure { file: format!("piece-{:02}", i + 1), ..figure })
     };
     (0..pieces).map(piece).collect()
+}
+
+/// How many pieces it takes: for their number of movements, and for movements that are short beside the recording, as ramps
+/// between long holds are.
+fn count(motions: &[Motion], time_s: &[f64]) -> usize {
+    let ends: Vec<usize> = (1..motions.len()).filter(|row| motions[*row] != motions[*row - 1]).collect();
+    let lasting = |pair: &[usize]| time_s.get(pair[1]).zip(time_s.get(pair[0])).map(|(end, start)| end - start);
+    let moving = ends.windows(2).filter(|pair| motions[pair[0]] != Motion::Hold);
+    let mut lengths: Vec<f64> = moving.filter_map(lasting).filter(|length| *length > 0.0).collect();
+    lengths.sort_by(f64::total_cmp);
+    let whole = extent(time_s.iter().copied()).map_or(0.0, |(first, last)| last - first);
+    let short = lengths.get(lengths.len() / 2).map_or(0.0, |usual| VISIBLE * whole / usual);
+    ends.len().div_ceil(MOVEMENTS).max(short.ceil() as usize).min(MOST_PIECES)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Motion, count};
+
+    #[test]
+    fn short_movements_between_long_holds_make_pieces() {
+        // Eight ramps of 10 s in 2400 s are 1/240 of it each: a plot that shows one at a fortieth of its width has a sixth.
+        let phase = |k: usize| match k % 600 {
+            0..10 => Motion::Extend,
+            300..310 => Motion::Retract,
+            _ => Motion::Hold,
+        };
+        let time_s: Vec<f64> = (0..2400).map(|k| k as f64).collect();
+        let motions: Vec<Motion> = (0..2400).map(phase).collect();
+        assert_eq!(count(&motions, &time_s), 6);
+        // Ramps without holds, ten in all, fill one plot.
+        let ramps: Vec<Motion> =
+            (0..1000).map(|k| if k / 100 % 2 == 0 { Motion::Extend } else { Motion::Retract }).collect();
+        assert_eq!(count(&ramps, &time_s[..1000]), 1);
+        assert_eq!(count(&[], &[]), 0);
+    }
 }

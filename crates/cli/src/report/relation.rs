@@ -2,7 +2,7 @@
 
 use super::ReportError;
 use super::axis::{Axis, extent};
-use super::chart::{Chart, WIDE};
+use super::chart::{Chart, HIGH, WIDE};
 use super::figures::{Figure, HIGH_TICKS};
 use super::ink::Ink;
 use super::motion::Motion;
@@ -22,7 +22,7 @@ pub fn hysteresis(recording: &Recording) -> Result<Figure, ReportError> {
     let settled = curve.iter().map(|(_, change)| recording.rest_reading * (1.0 + change));
     let recorded = recording.reading.iter().copied();
     let y = Axis::around(recording.reading_label(), recorded.clone(), settled.clone(), HIGH_TICKS + 1);
-    let mut chart = Chart::new((WIDE.0 * 0.8, 440.0), x, y);
+    let mut chart = Chart::new(HIGH, x, y);
     let (first_s, last_s) = extent(recording.time_s.iter().copied()).unwrap_or((0.0, 1.0));
     let parts = Ink::TIMES.len();
     let edge = |i: usize| first_s + (last_s - first_s) * i as f64 / parts as f64;
@@ -80,7 +80,7 @@ pub fn gauge(recording: &Recording) -> Result<Figure, ReportError> {
     let x = Axis::holding(recording.quantity_label(), curve.iter().map(|(x, _)| recording.shown(*x)), HIGH_TICKS);
     let heights = settled.iter().map(|(_, g)| *g);
     let y = Axis::around("g, relative change of R", curve.iter().map(|(_, g)| *g), heights, HIGH_TICKS);
-    let mut chart = Chart::new((WIDE.0 * 0.7, 340.0), x, y);
+    let mut chart = Chart::new(WIDE, x, y);
     let error = recording.law.model_error() / recording.rest_reading.abs();
     let band = curve.iter().map(|(x, g)| (recording.shown(*x), g - 2.0 * error, g + 2.0 * error));
     chart.band(Ink::LAW_BAND, "± 2 sd of the model error", band);

@@ -2,7 +2,7 @@
 
 use super::ReportError;
 use super::axis::{Axis, extent};
-use super::chart::{Chart, WIDE};
+use super::chart::{Chart, HIGH};
 use super::figures::{Figure, HIGH_TICKS};
 use super::ink::Ink;
 use super::motion::Motion;
@@ -45,7 +45,7 @@ pub fn loops(recording: &Recording) -> Result<Option<Figure>, ReportError> {
     let shown = |x: f64| recording.shown(x);
     let x = Axis::holding(&recording.known_strain_label(), strain.iter().map(|x| shown(*x)), HIGH_TICKS + 2);
     let y = Axis::holding(recording.reading_label(), recording.reading.iter().copied(), HIGH_TICKS + 1);
-    let mut chart = Chart::new((WIDE.0 * 0.8, 440.0), x, y);
+    let mut chart = Chart::new(HIGH, x, y);
     let name = |(slowest, fastest): &(f64, f64)| {
         let (low, high) = (significant(shown(*slowest), 2), significant(shown(*fastest), 2));
         let speeds = if low == high { low } else { format!("{low} to {high}") };

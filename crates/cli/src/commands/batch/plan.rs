@@ -180,10 +180,21 @@ fn check_arguments(job: &mut Job, args: &BatchArgs) -> Result<(), CliError> {
         let text = text.lines().map(str::trim).take_while(|line| !line.is_empty()).collect::<Vec<_>>().join(" ");
         CliError::Arguments(format!("{}: {}", job.name(), text.trim_start_matches("error: ")))
     })?;
-    if let Command::Calibrate(calibrate) = parsed.command {
-        job.prior = calibrate.prior;
+    let output = match parsed.command {
+        Command::Calibrate(calibrate) => {
+            job.prior = calibrate.prior;
+            None
+        }
+        Command::Filter(filter) => filter.written.output,
+        Command::Smooth(smooth) => smooth.written.output,
+        _ => None,
+    };
+    match output {
+        None => Ok(()),
+        Some(_) => {
+            Err(CliError::Arguments("batch names the outputs itself, or as the manifest's `output` says".into()))
+        }
     }
-    Ok(())
 }
 
 /// Refuses outputs that would replace each other, an input, or what no earlier run wrote.

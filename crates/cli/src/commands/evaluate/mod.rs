@@ -28,7 +28,7 @@ pub fn run(args: &EvaluateArgs) -> Result<(), CliError> {
     let mut evaluation = Evaluation::default();
     let source = &args.calibration;
     let inputs = args.traces.iter().chain(&args.test).chain(&source.train).chain(&source.sensor);
-    let mut outputs = Outputs::new(args.force, inputs);
+    let mut outputs = Outputs::new(args.replace.force, inputs);
     let wanted = Wanted::claim(&args.report, &mut outputs)?;
     let judged = match (&source.sensor, source.split.is_empty()) {
         (Some(sensor), _) => with_sensor_file(args, sensor, &mut evaluation),

@@ -6,7 +6,7 @@ use super::{Fits, Fitted};
 use crate::commands::reporting::put_figures;
 use crate::error::CliError;
 use crate::output::Outputs;
-use crate::report::{Axis, Chart, Ink, PAGE_MM, ReportError, WIDE, files};
+use crate::report::{Axis, Chart, Ink, ReportError, WIDE, files, slug};
 use crate::sensor_file::MADE_BY;
 
 /// Figures of all fits into a folder.
@@ -18,7 +18,9 @@ pub fn put(folder: &Path, recordings: &[Fits], force: bool) -> Result<(), CliErr
         .enumerate()
         .map(|(place, (recording, fitted))| {
             let title = format!("{} {}", fitted.piece.law, fitted.piece.label);
-            files(&chart(recording, fitted), &title, place + 1, PAGE_MM, MADE_BY)
+            // Recordings may have pieces of the same names.
+            let name = format!("{:02}-{}", place + 1, slug(&title));
+            files(&chart(recording, fitted), &title, &name, MADE_BY)
         })
         .collect();
     put_figures(folder, drawn.map_err(|error| CliError::Other(error.to_string()))?, &mut outputs)?;

@@ -60,7 +60,7 @@ pub fn run(args: &FitLawArgs) -> Result<(), CliError> {
     if args.table {
         published::warn(&fits);
     }
-    args.figures.as_deref().map_or(Ok(()), |folder| figures::put(folder, &fits, args.force))?;
+    args.figures.as_deref().map_or(Ok(()), |folder| figures::put(folder, &fits, args.replace.force))?;
     if args.json {
         output::json(&fits, args)
     } else if args.table {

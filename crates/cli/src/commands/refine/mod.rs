@@ -28,7 +28,7 @@ pub fn run(args: &RefineArgs) -> Result<(), CliError> {
         let name = other.name();
         return Err(CliError::Arguments(format!("--estimator: expected ekf, the only one to refine, found {name}")));
     }
-    let mut outputs = Outputs::new(args.force, [&args.trace_file, &args.sensor]);
+    let mut outputs = Outputs::new(args.replace.force, [&args.trace_file, &args.sensor]);
     let output = outputs.claim(&args.output, Kind::Sensor)?;
     let sensor = sensor_file::read(&args.sensor, Some(EstimatorKind::Ekf))?;
     let recording = input::read(&args.trace_file, &args.trace.metadata())?;

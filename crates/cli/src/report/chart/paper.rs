@@ -1,24 +1,35 @@
 //! A plot by itself, for a paper.
 
-use super::{Chart, LEFT_PX, RIGHT_PX, TEXT_PX, UNITS_PER_PX};
+use super::{Chart, HALF, LEFT_PX, RIGHT_PX, TEXT_PX, UNITS_PER_PX, WIDE};
 use crate::report::ReportError;
 use crate::report::ink::dashes;
 
-/// Space to the left of a drawing by itself, px: letters of the axis' label begin where it begins.
+/// Width of a figure across a page and across a column, mm.
+const PAGE_MM: f64 = 170.0;
+const COLUMN_MM: f64 = 85.0;
+/// Space to the left of a drawing by itself across a page, px: letters of the axis' label begin where it begins.
 const MARGIN_PX: f64 = 6.0;
+/// One scale for all, so that letters are of one size: 13 px are 2.3 mm.
+const PX_PER_MM: f64 = (WIDE.0 + MARGIN_PX) / PAGE_MM;
 
 impl Chart {
-    /// The drawing by itself, with its legend, in the colours of paper, `width_mm` wide.
+    /// Width of the drawing by itself, mm: a column's or a page's.
+    pub const fn width_mm(&self) -> f64 {
+        if self.size_px.0 <= HALF.0 { COLUMN_MM } else { PAGE_MM }
+    }
+
+    /// The drawing by itself, with its legend, in the colours of paper.
     ///
     /// # Errors
     /// If the plotting library cannot draw it.
-    pub fn standalone(&self, title: &str, width_mm: f64) -> Result<String, ReportError> {
+    pub fn standalone(&self, title: &str) -> Result<String, ReportError> {
         let drawing = self.svg(title)?;
         let inside = drawing.split_once('>').map_or("", |(_, inside)| inside);
         let units = f64::from(UNITS_PER_PX);
         let (width, height) = (units * self.size_px.0, units * self.size_px.1);
         let (legend, legend_height) = self.drawn_legend();
-        let (margin, whole) = (units * MARGIN_PX, height + legend_height);
+        let width_mm = self.width_mm();
+        let (margin, whole) = (units * (width_mm * PX_PER_MM - self.size_px.0), height + legend_height);
         let height_mm = width_mm * whole / (width + margin);
         let (dashes, label) = (dashes(UNITS_PER_PX), minijinja::HtmlEscape(title));
         Ok(format!(
@@ -44,14 +55,20 @@ impl Chart {
             if x > LEFT_PX * units && x + width > (self.size_px.0 - RIGHT_PX) * units {
                 (x, y) = (LEFT_PX * units, y + row);
             }
-            let (line, text) = (y - 0.35 * size, x + sample + gap);
+            let (middle, text, hex) = (y - 0.35 * size, x + sample + gap, &key.hex);
+            drawn += &if key.is_dot {
+                format!("<circle cx=\"{}\" cy=\"{middle}\" r=\"{}\" fill=\"{hex}\"/>", x + 0.5 * sample, 3.0 * units)
+            } else {
+                format!(
+                    "<line x1=\"{x}\" x2=\"{}\" y1=\"{middle}\" y2=\"{middle}\" stroke=\"{hex}\" stroke-width=\"{}\" \
+                     opacity=\"{}\"/>",
+                    x + sample,
+                    key.width * units,
+                    key.opacity
+                )
+            };
             drawn += &format!(
-                "<line x1=\"{x}\" x2=\"{}\" y1=\"{line}\" y2=\"{line}\" stroke=\"{}\" stroke-width=\"{}\" opacity=\"{}\"/>\
-                 <text x=\"{text}\" y=\"{y}\" font-size=\"{size}\" fill=\"#404040\">{}</text>\n",
-                x + sample,
-                key.hex,
-                key.width * units,
-                key.opacity,
+                "<text x=\"{text}\" y=\"{y}\" font-size=\"{size}\" fill=\"#404040\">{}</text>\n",
                 minijinja::HtmlEscape(&key.name)
             );
             x += width + gap;

@@ -1,0 +1,77 @@
+//! Where a table of rows goes while it is made: to stdout, or to a file.
+
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use super::{Claim, Kind, Outputs};
+use crate::error::CliError;
+
+/// Bytes that are written at once, unless somebody waits for them.
+const WRITTEN_AT_ONCE: usize = 1 << 16;
+
+/// Where estimates go.
+pub struct RowsOut {
+    outputs: Outputs,
+    claim: Option<Claim>,
+}
+
+impl RowsOut {
+    /// Stdout, or a file, which is claimed.
+    ///
+    /// # Errors
+    /// As [`Outputs::claim`].
+    pub fn claim<'a>(
+        output: Option<&Path>,
+        force: bool,
+        inputs: impl IntoIterator<Item = &'a PathBuf>,
+    ) -> Result<Self, CliError> {
+        let mut outputs = Outputs::new(force, inputs);
+        let claim = output.map(|path| outputs.claim(path, Kind::Estimates)).transpose()?;
+        Ok(Self { outputs, claim })
+    }
+
+    /// What to write to. A file takes its place in [`RowsOut::publish`], unless it `grows`: of a live stream each row is
+    /// there at once, and stays if the stream breaks.
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    pub fn open(&mut self, grows: bool) -> Result<Box<dyn Write + Send>, CliError> {
+        Ok(match self.claim {
+            None => Box::new(BufWriter::with_capacity(WRITTEN_AT_ONCE, io::stdout())),
+            Some(claim) => {
+                let (file, path) = self.outputs.open(claim, grows)?;
+                Box::new(BufWriter::with_capacity(WRITTEN_AT_ONCE, Named { file, path }))
+            }
+        })
+    }
+
+    /// Puts a file in its place.
+    ///
+    /// # Errors
+    /// If that cannot be done.
+    pub fn publish(self) -> Result<(), CliError> {
+        self.outputs.publish()
+    }
+}
+
+/// A file whose errors name it.
+struct Named {
+    file: File,
+    path: PathBuf,
+}
+
+impl Write for Named {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let named = |error: io::Error| match error.kind() {
+            // Whoever reads a pipe may leave, and an interrupted call is made again.
+            io::ErrorKind::BrokenPipe | io::ErrorKind::Interrupted => error,
+            kind => io::Error::new(kind, format!("{}: {error}", self.path.display())),
+        };
+        self.file.write(bytes).map_err(named)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
+    }
+}
