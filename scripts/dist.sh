@@ -5,6 +5,13 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
+case "${1:-}" in
+'' | --target) ;;
+*)
+    echo "usage: $0 [--target TRIPLE]" >&2
+    exit 2
+    ;;
+esac
 target=${2:-$(rustc -vV | sed -n 's/^host: //p')}
 cargo build --locked --profile dist -p ohmstrain-cli --target "$target"
 binary=${CARGO_TARGET_DIR:-target}/$target/dist/ohmstrain
@@ -12,11 +19,12 @@ binary=${CARGO_TARGET_DIR:-target}/$target/dist/ohmstrain
 name=ohmstrain-$("$binary" --version | cut -d' ' -f2)-$target
 rm -rf "dist/$name"
 mkdir -p "dist/$name/completions"
-cp "$binary" README.md NOTATION.md CHANGELOG.md LICENSE-MIT LICENSE-APACHE "dist/$name"
+cp "$binary" README.md ARCHITECTURE.md CONTRIBUTING.md NOTATION.md CHANGELOG.md LICENSE-MIT LICENSE-APACHE "dist/$name"
 cp -r docs guide "dist/$name"
 "$binary" man -o "dist/$name/man"
-for shell in bash zsh fish powershell elvish; do
-    "$binary" completions "$shell" >"dist/$name/completions/ohmstrain.$shell"
+# Named as each shell looks for them.
+for file in bash:ohmstrain.bash zsh:_ohmstrain fish:ohmstrain.fish powershell:_ohmstrain.ps1 elvish:ohmstrain.elv; do
+    "$binary" completions "${file%%:*}" >"dist/$name/completions/${file#*:}"
 done
 tar -C dist -czf "dist/$name.tar.gz" "$name"
 ls -l "$binary" "dist/$name.tar.gz"
