@@ -62,10 +62,31 @@ pub struct Lag {
 /// `None` if no lag within reach is best, or the recording is too short or too plain to tell.
 #[must_use]
 pub fn reference_lag(samples: &Samples) -> Option<Lag> {
-    let duration_s = samples.time_s.last()? - samples.time_s.first()?;
-    let far = Search { reach_s: FAR.reach_s.min(LARGEST_SHARE * duration_s), ..FAR };
+    let far = far(samples)?;
     let found = best_lag(samples, far).and_then(|(around_s, _)| examined(samples, around_s, far.reach_s));
     found.filter(Lag::is_sure).or_else(|| examined(samples, 0.0, far.reach_s))
+}
+
+/// The end of the lags that are looked for, s (negative: the reference is early), if the readings are explained best there, and
+/// surely better than without a lag: the clocks are further apart than that.
+#[must_use]
+pub fn lag_out_of_reach(samples: &Samples) -> Option<f64> {
+    let far = far(samples)?;
+    let errors = errors(samples, far)?;
+    let least = errors.iter().copied().fold(f64::INFINITY, f64::min);
+    let is_sure = *errors.get(far.steps as usize)? >= SURE * least;
+    let is_least = |error: Option<&f64>| is_sure && error == Some(&least);
+    match (is_least(errors.first()), is_least(errors.last())) {
+        (true, false) => Some(-far.reach_s),
+        (false, true) => Some(far.reach_s),
+        _ => None,
+    }
+}
+
+/// The first look, in a recording of that length.
+fn far(samples: &Samples) -> Option<Search> {
+    let duration_s = samples.time_s.last()? - samples.time_s.first()?;
+    Some(Search { reach_s: FAR.reach_s.min(LARGEST_SHARE * duration_s), ..FAR })
 }
 
 /// The best lag near `around_s`.
@@ -106,11 +127,8 @@ pub fn aligned(samples: &Samples, lag_s: f64) -> Vec<f64> {
 
 /// The best lag of a search, between those tried, and its error; `None` if it lies at an end.
 fn best_lag(samples: &Samples, search: Search) -> Option<(f64, f64)> {
-    let step_s = search.reach_s / f64::from(search.steps);
-    let offset_s = |i: usize| (i as f64 - f64::from(search.steps)) * step_s;
-    let lags = 0..=2 * search.steps as usize;
-    let errors: Vec<f64> =
-        lags.map(|i| left_out_error(samples, search.around_s + offset_s(i), search)).collect::<Option<_>>()?;
+    let offset_s = |i: usize| search.offset_s(i);
+    let errors = errors(samples, search)?;
     let least = errors.iter().copied().fold(f64::INFINITY, f64::min);
     let is_valley =
         |i: usize| i > 0 && i + 1 < errors.len() && errors[i] <= errors[i - 1] && errors[i] <= errors[i + 1];
@@ -123,7 +141,24 @@ fn best_lag(samples: &Samples, search: Search) -> Option<(f64, f64)> {
     // The minimum of the parabola through the best lag and its neighbours.
     let curvature = before - 2.0 * errors[best] + after;
     let offset = if curvature > 0.0 { 0.5 * (before - after) / curvature } else { 0.0 };
-    Some((search.around_s + offset_s(best) + offset * step_s, errors[best]))
+    Some((search.around_s + offset_s(best) + offset * search.step_s(), errors[best]))
+}
+
+/// The law's error at every lag of a search.
+fn errors(samples: &Samples, search: Search) -> Option<Vec<f64>> {
+    let lags = 0..=2 * search.steps as usize;
+    lags.map(|i| left_out_error(samples, search.around_s + search.offset_s(i), search)).collect()
+}
+
+impl Search {
+    fn step_s(&self) -> f64 {
+        self.reach_s / f64::from(self.steps)
+    }
+
+    /// How far the i-th lag is from the middle, s.
+    fn offset_s(&self, i: usize) -> f64 {
+        (i as f64 - f64::from(self.steps)) * self.step_s()
+    }
 }
 
 /// Mean squared error of the law behind the high-pass, on blocks left out, if the reference is read `lag_s` later.

@@ -76,7 +76,7 @@ pub use filter::{Filter, Output, Rows, Start, WayBack};
 pub use findings::{Findings, Seen};
 pub use gaussian_process::ProcessParams;
 pub use identifiability::{Identifiability, OnBound, identifiability};
-pub use lag::{Lag, aligned, reference_lag};
+pub use lag::{Lag, aligned, lag_out_of_reach, reference_lag};
 pub use law_fit::{CrossFit, GaugeFamily, LawFit, LawOptions, fit_law};
 pub use law_params::{BranchParams, GaugeParams, LawParams};
 pub use law_structures::{StructureScore, compare_structures};

@@ -4,21 +4,38 @@ use ohmstrain_calib::aligned;
 
 use crate::error::CliError;
 use crate::input::Recording;
+use crate::verbosity::Verbosity;
 
 /// Says how late the reference of a recording is; moves it if that is wanted, and refuses one that is too late to be used
-/// otherwise. By how much it was moved, s.
-pub fn check(recording: &mut Recording, align: bool) -> Result<f64, CliError> {
+/// otherwise; says how late it is where that does not matter if `explain`. By how much it was moved, s.
+pub fn check(recording: &mut Recording, align: bool, explain: bool) -> Result<f64, CliError> {
     let samples = recording.samples()?;
     let known = ohmstrain::Recording::new(samples.time_s(), samples.reading(), samples.strain())?;
-    let Some(lag) = known.reference_lag() else { return Ok(0.0) };
     let name = recording.name.clone();
-    let late = format!("{:.2} s {}", lag.lag_s.abs(), if lag.lag_s < 0.0 { "early" } else { "late" });
+    let late = |lag_s: f64| format!("{:.2} s {}", lag_s.abs(), if lag_s < 0.0 { "early" } else { "late" });
+    let Some(lag) = known.reference_lag() else {
+        if let Some(lag_s) = known.lag_out_of_reach() {
+            CliError::warning(&format!(
+                "{name}: the reference seems to be {} or more, as far as lags are looked for; it was not moved: are both on one clock?",
+                late(lag_s)
+            ));
+        }
+        return Ok(0.0);
+    };
+    let late = late(lag.lag_s);
     if align {
         CliError::warning(&format!("{name}: the reference is {late}; it was moved by that"));
         shift(recording, lag.lag_s)?;
         return Ok(lag.lag_s);
     }
     if !lag.is_too_late() {
+        let text =
+            format!("{name}: the reference seems to be {late}, little of the {:.1} s of a movement", lag.movement_s);
+        if explain {
+            CliError::remark(&text)
+        } else {
+            Verbosity::detail(&text)
+        }
         return Ok(0.0);
     }
     Err(CliError::Input(format!(

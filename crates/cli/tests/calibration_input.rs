@@ -198,3 +198,24 @@ fn a_late_reference_is_refused_or_moved() {
     let moved = error_on_the_rest(&bench);
     assert!(moved < 1.1 * plain, "{moved} %FS instead of {plain}");
 }
+
+/// Two rows, 0.4 s, where a movement takes 7: too little to refuse, and said where everything is.
+#[test]
+fn a_reference_that_is_a_little_late_is_told_of() {
+    let bench = Bench::new();
+    let simulate = ["simulate", "--protocol", "mixed", "--speed-mm-s", "2", "--sample-rate-hz", "5", "--mismatched"];
+    bench.run(&[&simulate[..], &["-o", "trace.csv"]].concat()).ok();
+    let mut strains: Vec<String> = Vec::new();
+    change_rows(&bench.read("trace.csv"), |_, cells| strains.push(cells[2].clone()));
+    let late = change_rows(&bench.read("trace.csv"), |k, cells| cells[2].clone_from(&strains[k.saturating_sub(2)]));
+    bench.write("late.csv", late);
+    let calibrate = |more: &[&str]| {
+        let run = bench.run(&[&["calibrate", "late.csv", "-o", "sensor.toml"], &EKF[..], more].concat());
+        assert_eq!(run.code, Some(0), "{}", run.stderr);
+        run.stderr
+    };
+    let said = "late.csv: the reference seems to be 0.4";
+    assert!(!calibrate(&[]).contains(said));
+    let verbose = calibrate(&["--verbose", "--force"]);
+    assert!(verbose.contains(said), "{verbose}");
+}

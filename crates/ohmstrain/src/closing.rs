@@ -4,7 +4,7 @@ use ohmstrain_calib::{Findings, Limit, Quantity, Scores, Seen, SensorParams};
 use serde::Serialize;
 
 use crate::number::{fixed, significant};
-use crate::verdict::{Known, percent, verdict};
+use crate::verdict::{Known, is_better, percent, verdict};
 use crate::wrap::wrapped;
 
 /// Columns of the words before the lines.
@@ -63,9 +63,27 @@ impl Closing<'_> {
     /// ```
     #[must_use]
     pub fn verdict(&self) -> Option<String> {
-        let left_out = self.findings.map(|found| Known::new(&found.filter, Some(&found.static_cubic)));
-        let known: Vec<Known> = left_out.into_iter().chain(self.tested.map(Known::from)).collect();
+        let known = self.known();
         (!known.is_empty()).then(|| verdict(&known))
+    }
+
+    /// Whether its errors are below the static cubic's, wherever they are known, by more than chance makes them; `None` if none are.
+    ///
+    /// ```
+    /// fn warn(closing: &ohmstrain::Closing) {
+    ///     if closing.is_better() == Some(false) {
+    ///         println!("no better than a static curve");
+    ///     }
+    /// }
+    /// ```
+    #[must_use]
+    pub fn is_better(&self) -> Option<bool> {
+        is_better(&self.known())
+    }
+
+    fn known(&self) -> Vec<Known> {
+        let left_out = self.findings.map(|found| Known::new(&found.filter, Some(&found.static_cubic)));
+        left_out.into_iter().chain(self.tested.map(Known::from)).collect()
     }
 
     /// What a report says of the calibration: names and texts.

@@ -1,4 +1,6 @@
-use ohmstrain_calib::{CalibrationError, Identifiability, Lag, Samples, identifiability, reference_lag, screen};
+use ohmstrain_calib::{
+    CalibrationError, Identifiability, Lag, Samples, identifiability, lag_out_of_reach, reference_lag, screen,
+};
 
 use crate::{Error, Recording, Sensor};
 
@@ -49,15 +51,32 @@ impl Recording<'_> {
     /// ```
     #[must_use]
     pub fn reference_lag(&self) -> Option<ReferenceLag> {
-        let lag = match screen(&[self.samples]) {
-            Ok(screened) => screened.samples().first().and_then(reference_lag),
-            // Which may be the lag's own doing.
-            Err(CalibrationError::NothingExplained { .. }) => reference_lag(&self.samples),
+        let lag = self.screened(reference_lag).filter(Lag::is_sure)?;
+        Some(ReferenceLag { lag_s: lag.lag_s, movement_s: lag.movement_s })
+    }
+
+    /// How far lags are looked for, s, with its sign, if the reference seems to be as late as that or later (negative: early);
+    /// [`Self::reference_lag`] is then `None`.
+    ///
+    /// ```
+    /// let recording = ohmstrain::Recording::new(&[0.0, 0.1], &[1600.0, 1610.0], &[0.00, 0.01])?;
+    /// assert_eq!(recording.lag_out_of_reach(), None);
+    /// # Ok::<(), ohmstrain::Error>(())
+    /// ```
+    #[must_use]
+    pub fn lag_out_of_reach(&self) -> Option<f64> {
+        self.screened(lag_out_of_reach)
+    }
+
+    /// What the recording without distrusted rows says.
+    fn screened<T>(&self, said: impl Fn(&Samples) -> Option<T>) -> Option<T> {
+        match screen(&[self.samples]) {
+            Ok(screened) => screened.samples().first().and_then(said),
+            // Which may be a lag's own doing.
+            Err(CalibrationError::NothingExplained { .. }) => said(&self.samples),
             // What cannot be screened is for the calibration to refuse.
             Err(_) => None,
-        };
-        let lag = lag.filter(Lag::is_sure)?;
-        Some(ReferenceLag { lag_s: lag.lag_s, movement_s: lag.movement_s })
+        }
     }
 }
 

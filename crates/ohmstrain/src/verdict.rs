@@ -47,10 +47,21 @@ impl From<&Summary> for Known {
     }
 }
 
+/// The largest of the errors as a share of the static cubic's; `None` without one.
+fn worst_ratio(known: &[Known]) -> Option<f64> {
+    let ratios = known.iter().filter_map(|part| part.static_cubic.map(|cubic| part.error / cubic));
+    ratios.max_by(f64::total_cmp)
+}
+
+/// Whether all errors are below the static cubic's, by more than chance makes them; `None` without one.
+#[must_use]
+pub fn is_better(known: &[Known]) -> Option<bool> {
+    Some(worst_ratio(known)? < BETTER)
+}
+
 /// What errors and their intervals are worth, in one sentence: the worst of what is known.
 pub fn verdict(known: &[Known]) -> String {
-    let ratios = known.iter().filter_map(|part| part.static_cubic.map(|cubic| part.error / cubic));
-    let better = match ratios.max_by(f64::total_cmp) {
+    let better = match worst_ratio(known) {
         Some(ratio) if ratio < CLEARLY_BETTER => "Clearly better than a static curve",
         Some(ratio) if ratio < BETTER => "Better than a static curve",
         Some(ratio) if ratio < 1.0 / BETTER => "About as good as a static curve",
@@ -77,7 +88,7 @@ pub fn percent(value: f64) -> String {
 mod tests {
     use ohmstrain_calib::{ScoredRow, Scores};
 
-    use super::{Known, percent, verdict};
+    use super::{Known, is_better, percent, verdict};
 
     fn scores(error: f64, sd: f64) -> Scores {
         let row = |k: u32| {
@@ -104,6 +115,17 @@ mod tests {
         let worst = "Worse than a static curve; its error bars are too narrow.";
         assert_eq!(verdict(&[part(0.03, 0.03), part(0.2, 0.3), part(0.03, 0.001)]), worst);
         assert_eq!(verdict(&[part(0.2, 0.01), part(0.03, 0.03)]), worst);
+    }
+
+    /// By numbers, whatever the sentence says.
+    #[test]
+    fn what_is_not_better_is_told_by_its_errors() {
+        let part = |error: f64| Known::new(&scores(error, 0.1), Some(&scores(0.1, 1.0)));
+        assert_eq!(is_better(&[part(0.08)]), Some(true));
+        for known in [vec![part(0.095)], vec![part(0.2)], vec![part(0.03), part(0.2)]] {
+            assert_eq!(is_better(&known), Some(false));
+        }
+        assert_eq!(is_better(&[Known::new(&scores(0.1, 0.1), None)]), None);
     }
 
     #[test]

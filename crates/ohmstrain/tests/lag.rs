@@ -23,3 +23,16 @@ fn a_reference_that_explains_nothing_is_looked_for_elsewhere() {
         assert!(found.is_too_late() && (found.lag_s - lag_s).abs() < 0.1, "{found:?} for {lag_s}");
     }
 }
+
+/// Further away than lags are looked for, 12 s, but by less than a movement: the end of the search explains the readings best.
+#[test]
+fn a_lag_at_the_end_of_the_search_is_said() {
+    let time_s: Vec<f64> = (0..1500).map(|k| 0.1 * f64::from(k)).collect();
+    let ohm: Vec<f64> = time_s.iter().map(|t| 1500.0 * (1.0 + 1.8 * strain_at(*t) - strain_at(*t).powi(2))).collect();
+    for (lag_s, end_s) in [(12.4, Some(12.0)), (-12.4, Some(-12.0)), (4.9, None), (0.0, None)] {
+        let late: Vec<f64> = time_s.iter().map(|t| strain_at(t - lag_s)).collect();
+        let recording = Recording::new(&time_s, &ohm, &late).unwrap();
+        assert_eq!(recording.lag_out_of_reach(), end_s, "{lag_s}");
+        assert!(end_s.is_none() || recording.reference_lag().is_none(), "{lag_s}");
+    }
+}

@@ -42,7 +42,7 @@ pub fn run(args: &CalibrateArgs) -> Result<(), CliError> {
             kept.push((recordings.len() - 1, Kept { whole: recording, seen: rows }));
         }
     }
-    let lags_s = recordings.iter_mut().map(|recording| alignment::check(recording, args.align));
+    let lags_s = recordings.iter_mut().map(|recording| alignment::check(recording, args.align, args.explain));
     let lags_s: Vec<f64> = lags_s.collect::<Result<_, _>>()?;
     let prior = args.prior.as_deref().map(fleet::read).transpose()?;
     let wished = calibration(args);
@@ -75,7 +75,7 @@ pub fn run(args: &CalibrateArgs) -> Result<(), CliError> {
         wanted.put(reporting.drawn()?, &mut outputs)?;
     }
     if let Some(chosen) = args.estimator.chosen().filter(|chosen| chosen.0 != EstimatorKind::Corrected)
-        && closing.verdict().is_some_and(|verdict| !verdict.to_lowercase().contains("better"))
+        && closing.is_better() == Some(false)
     {
         CliError::warning(&format!(
             "{file}: {} is no better than a static curve; without --estimator, calibrate tries others and a correction",
