@@ -3,8 +3,11 @@
 
 use ohmstrain_model::Scalar;
 
+use crate::kernel::InVectors;
+
 /// `f32` or `f64`: what filters of hypotheses compute with.
-pub trait Real: Scalar {}
+#[allow(private_bounds, reason = "sealed: what a vector holds")]
+pub trait Real: Scalar + InVectors {}
 
 impl Real for f32 {}
 impl Real for f64 {}

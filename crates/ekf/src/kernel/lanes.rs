@@ -171,10 +171,10 @@ impl<T: Scalar> Lanes for T {
     }
 }
 
-/// A vector register, or as many as hold a row.
+/// A vector register, or as many as hold a row. It fuses products with sums unless it is to give the bits of a number.
 #[cfg(feature = "simd")]
 #[derive(Clone, Copy)]
-pub(crate) struct Vector<V, S> {
+pub(crate) struct Vector<V, S, const FUSED: bool = true> {
     pub numbers: V,
     pub simd: S,
 }
@@ -190,14 +190,14 @@ mod vector {
 
     macro_rules! operation {
         ($trait:ident $method:ident, $assign:ident $assigned:ident) => {
-            impl<S: Simd, V: SimdFloat<S>> $trait for Vector<V, S> {
+            impl<S: Simd, V: SimdFloat<S>, const FUSED: bool> $trait for Vector<V, S, FUSED> {
                 type Output = Self;
                 #[inline(always)]
                 fn $method(self, other: Self) -> Self {
                     Self { numbers: self.numbers.$method(other.numbers), ..self }
                 }
             }
-            impl<S: Simd, V: SimdFloat<S>> $assign for Vector<V, S> {
+            impl<S: Simd, V: SimdFloat<S>, const FUSED: bool> $assign for Vector<V, S, FUSED> {
                 #[inline(always)]
                 fn $assigned(&mut self, other: Self) {
                     *self = self.$method(other);
@@ -209,7 +209,7 @@ mod vector {
     operation!(Sub sub, SubAssign sub_assign);
     operation!(Mul mul, MulAssign mul_assign);
 
-    impl<S: Simd, V: SimdFloat<S>> Neg for Vector<V, S> {
+    impl<S: Simd, V: SimdFloat<S>, const FUSED: bool> Neg for Vector<V, S, FUSED> {
         type Output = Self;
         #[inline(always)]
         fn neg(self) -> Self {
@@ -217,7 +217,7 @@ mod vector {
         }
     }
 
-    impl<S: Simd, V: SimdFloat<S, Element: Scalar>> Lanes for Vector<V, S> {
+    impl<S: Simd, V: SimdFloat<S, Element: Scalar>, const FUSED: bool> Lanes for Vector<V, S, FUSED> {
         type Number = V::Element;
         type Mask = V::Mask;
 
@@ -228,7 +228,11 @@ mod vector {
 
         #[inline(always)]
         fn mul_add(self, factor: Self, term: Self) -> Self {
-            Self { numbers: self.numbers.mul_add(factor.numbers, term.numbers), ..self }
+            if FUSED {
+                Self { numbers: self.numbers.mul_add(factor.numbers, term.numbers), ..self }
+            } else {
+                self * factor + term
+            }
         }
 
         #[inline(always)]

@@ -14,6 +14,7 @@ mod lanes;
 mod parts;
 mod predict;
 mod rate;
+mod several;
 mod switch;
 mod update;
 
@@ -25,6 +26,7 @@ pub use lanes::Lanes;
 pub(crate) use lanes::Vector;
 pub(crate) use parts::{Part, Parts};
 pub(crate) use predict::{Course, Driven};
+pub(crate) use several::{InVectors, MOST_LANES, Several, Work};
 pub(crate) use switch::RateSpread;
 pub use switch::{Compact, CompactWidth, Logistic, Switch};
-pub(crate) use update::{Compared, ReadingLaw};
+pub(crate) use update::{Compared, ReadingLaw, refusal};

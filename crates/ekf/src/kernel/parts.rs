@@ -1,6 +1,6 @@
 use ohmstrain_model::Scalar;
 
-use super::Lanes;
+use super::{Lanes, Several};
 use crate::Belief;
 
 /// A belief taken apart into motion, branches and baseline: each moves in its own way, no index needs a check, and with one
@@ -173,6 +173,63 @@ impl<V: Lanes, const B: usize> Parts<V, B> {
             sum += self.branches[i].variance;
         }
         sum
+    }
+}
+
+impl<V: Several, const B: usize> Parts<V, B> {
+    /// Of as many beliefs as there are lanes.
+    #[inline(always)]
+    pub(crate) fn gathered<'a, const N: usize, const L: usize>(
+        like: V,
+        belief: impl Fn(usize) -> &'a Belief<V::Number, N, L>,
+    ) -> Self
+    where
+        V::Number: 'a,
+    {
+        let nothing = like.nothing();
+        let (mut means, mut covariances) = ([nothing; N], [nothing; L]);
+        for i in 0..N {
+            [means[i]] = like.build(|lane| [belief(lane).mean.as_slice()[i]]);
+        }
+        for i in 0..L {
+            [covariances[i]] = like.build(|lane| [belief(lane).covariance.packed()[i]]);
+        }
+        Self::read::<N>(&mut means.iter(), &mut covariances.iter(), nothing)
+    }
+
+    /// The numbers in a lane.
+    #[inline(always)]
+    pub(crate) fn in_lane(&self, lane: usize) -> Parts<V::Number, B> {
+        let mut branches = [Part::vacant(<V::Number as Scalar>::of(0.0)); B];
+        for i in 0..B {
+            branches[i] = self.branches[i].in_lane(lane);
+        }
+        Parts {
+            strain: self.strain.at(lane),
+            rate: self.rate.at(lane),
+            strain_variance: self.strain_variance.at(lane),
+            strain_rate: self.strain_rate.at(lane),
+            rate_variance: self.rate_variance.at(lane),
+            branches,
+            baseline: self.baseline.in_lane(lane),
+        }
+    }
+}
+
+impl<V: Several, const B: usize> Part<V, B> {
+    #[inline(always)]
+    fn in_lane(&self, lane: usize) -> Part<V::Number, B> {
+        let mut with = [<V::Number as Scalar>::of(0.0); B];
+        for k in 0..B {
+            with[k] = self.with[k].at(lane);
+        }
+        Part {
+            mean: self.mean.at(lane),
+            with_strain: self.with_strain.at(lane),
+            with_rate: self.with_rate.at(lane),
+            with,
+            variance: self.variance.at(lane),
+        }
     }
 }
 

@@ -89,6 +89,16 @@ impl<T: Scalar, S, const B: usize, const N: usize, G> SparseEkf<T, S, B, N, G> {
     where
         S: Switch<V>,
     {
+        self.predict_as(parts, course)
+    }
+
+    /// The same with a switch of the caller's, which only an uncertain course asks: that of the filter may not know these lanes.
+    #[inline(always)]
+    pub(crate) fn predict_as<V: Lanes<Number = T>, X: Switch<V>>(
+        &self,
+        parts: &mut Parts<V, B>,
+        course: Course<V>,
+    ) -> RateSpread<V, X> {
         if let Course::Known(Phase::Hold) = course {
             self.hold(parts);
             return RateSpread::new(parts.rate);
@@ -98,14 +108,11 @@ impl<T: Scalar, S, const B: usize, const N: usize, G> SparseEkf<T, S, B, N, G> {
 
     /// The prediction of a step that moves, and what it did to the branches.
     #[inline(always)]
-    pub(crate) fn move_on<V: Lanes<Number = T>>(
+    pub(crate) fn move_on<V: Lanes<Number = T>, X: Switch<V>>(
         &self,
         parts: &mut Parts<V, B>,
         course: Course<V>,
-    ) -> (RateSpread<V, S>, [Driven<V>; B])
-    where
-        S: Switch<V>,
-    {
+    ) -> (RateSpread<V, X>, [Driven<V>; B]) {
         let step = &self.step;
         let Parts { strain, rate, strain_variance, strain_rate, rate_variance, .. } = *parts;
         let [a, b] = [pair(strain, step.motion[0]), pair(strain, step.motion[1])];
@@ -122,7 +129,7 @@ impl<T: Scalar, S, const B: usize, const N: usize, G> SparseEkf<T, S, B, N, G> {
         let squares = step.rate_squares;
         let from_old = sum(strain.with(step.noise[2]), with_strain, pair(strain, [squares[0], squares[1]]));
         parts.rate_variance = rate_variance.scale_add(squares[2], from_old);
-        let mut spread: RateSpread<V, S> = RateSpread::new((rate_variance + parts.rate_variance).scale(T::of(0.5)));
+        let mut spread: RateSpread<V, X> = RateSpread::new((rate_variance + parts.rate_variance).scale(T::of(0.5)));
 
         let gains = self.gains.gains(strain_sum);
         let nothing = Drive { change: zero, gain: zero, pull: zero, jump: zero, left: zero };

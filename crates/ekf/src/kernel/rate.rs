@@ -3,7 +3,7 @@
 use ohmstrain_model::{Phase, RateChange, Scalar, Turning};
 
 use super::predict::{dot, sum};
-use super::{Lanes, Part, Parts};
+use super::{Lanes, Part, Parts, Several};
 use crate::belief::gaussian::Real;
 use crate::belief::tail::Tail;
 use crate::{Curve, Gaussian, SparseEkf, Switch};
@@ -53,43 +53,58 @@ fn answered<V: Lanes, const B: usize>(by: [V::Number; 2], (mean, variance): (V, 
     (sum(mean, by, [from.strain, from.rate]), sum(variance, by, spread))
 }
 
-impl<T: Real, const B: usize> Parts<T, B> {
-    /// Draws the rate anew, independent of everything else.
+impl<V: Several<Number: Real>, const B: usize> Parts<V, B> {
+    /// Draws the rate anew where a phase `begins`, independent of everything else.
     #[inline(always)]
-    pub(crate) fn renew_rate(&mut self, fresh: &Gaussian<T>) {
-        (self.rate, self.rate_variance, self.strain_rate) = (fresh.mean, fresh.variance, T::zero());
+    pub(crate) fn renew_rate(&mut self, fresh: &Gaussian<V::Number>, begins: V::Mask) {
+        let (like, zero) = (self.rate, self.rate.nothing());
+        self.rate = V::pick(begins, like.with(fresh.mean), self.rate);
+        self.rate_variance = V::pick(begins, like.with(fresh.variance), self.rate_variance);
+        self.strain_rate = V::pick(begins, zero, self.strain_rate);
         for part in self.branches.iter_mut().chain([&mut self.baseline]) {
-            part.with_rate = T::zero();
+            part.with_rate = V::pick(begins, zero, part.with_rate);
         }
     }
 
-    /// Restricts the rate to the sign of a moving phase; what that leaves of the Gaussian. Tails beyond `clear` squared
-    /// deviations are not cut off.
+    /// Restricts the rate to the sign of a moving phase where that is `wanted`; what it leaves of the Gaussian. Tails beyond
+    /// `clear` squared deviations are not cut off.
     #[inline(always)]
-    pub(crate) fn cut_rate<S: Switch<T>, const N: usize>(&mut self, phase: Phase, clear: T) -> T {
+    pub(crate) fn cut_rate<X: Switch<V>, const N: usize>(
+        &mut self,
+        phase: Phase,
+        clear: V::Number,
+        wanted: V::Mask,
+    ) -> V {
         let variance = self.rate_variance;
-        let side = if phase == Phase::Retract { -T::one() } else { T::one() };
-        let toward = side * self.rate;
-        if variance <= T::zero() {
-            return if toward < T::zero() { T::zero() } else { T::one() };
+        let (zero, one) = (variance.nothing(), variance.literal(1.0));
+        let toward = if phase == Phase::Retract { -self.rate } else { self.rate };
+        let known = (-variance).not_negative();
+        let certain = V::pick(toward.less(zero), zero, one);
+        if V::all(known) {
+            return certain;
         }
-        if toward > T::zero() && toward * toward > clear * variance {
-            return T::one();
+        let far = V::both(zero.less(toward), variance.scale(clear).less(toward * toward));
+        let certain = V::pick(known, certain, one);
+        let cut = V::without(wanted, V::either(known, far));
+        if V::none(cut) {
+            return certain;
         }
-        let per_sd = T::one() / S::root(variance);
+        let per_sd = X::root(variance).recip();
         let border = -toward * per_sd;
-        let Tail { mass, hazard: shift } = Tail::above(border);
-        let (narrowed, zero, gone) = (border * shift - shift * shift, T::zero(), -T::one());
+        let [mass, shift] = border.build(|lane| {
+            if !V::holds(cut, lane) {
+                return [<V::Number as Scalar>::of(0.0); 2];
+            }
+            let Tail { mass, hazard } = Tail::above(border.at(lane));
+            [mass, hazard]
+        });
+        let (narrowed, gone) = (border * shift - shift * shift, -one);
         // By comparisons, which cost less than calls of `fmax` and `fmin`.
-        let narrowed = if narrowed > zero {
-            zero
-        } else if narrowed < gone {
-            gone
-        } else {
-            narrowed
-        };
-        self.regress::<N>(side * shift * per_sd, narrowed * per_sd * per_sd);
-        mass
+        let narrowed = V::pick(zero.less(narrowed), zero, V::pick(narrowed.less(gone), gone, narrowed));
+        let (toward, narrows) = (shift * per_sd, narrowed * per_sd * per_sd);
+        let moves = if phase == Phase::Retract { -toward } else { toward };
+        self.regress::<N>(V::pick(cut, moves, zero), V::pick(cut, narrows, zero));
+        V::pick(cut, mass, certain)
     }
 }
 
@@ -100,27 +115,38 @@ impl<V: Lanes, const B: usize> Parts<V, B> {
     pub(crate) fn regress<const N: usize>(&mut self, moves: V, narrows: V) {
         let (with_strain, with_rate) = (self.strain_rate, self.rate_variance);
         let (on_strain, on_rate) = (with_strain * narrows, with_rate * narrows);
-        let branches = self.branches.map(|branch| branch.with_rate);
-        let follow = |part: &mut Part<V, B>, others: usize| {
-            let (own, narrowing) = (part.with_rate, part.with_rate * narrows);
-            part.mean += own * moves;
-            part.with_strain += narrowing * with_strain;
-            part.with_rate += narrowing * with_rate;
-            for (with, other) in part.with.iter_mut().zip(&branches).take(others) {
-                *with += narrowing * *other;
-            }
-            part.variance += narrowing * own;
-        };
+        let mut branches = [with_rate; B];
+        for i in 0..B {
+            branches[i] = self.branches[i].with_rate;
+        }
         self.strain += with_strain * moves;
         self.rate += with_rate * moves;
         self.strain_variance += on_strain * with_strain;
         self.strain_rate += on_rate * with_strain;
         self.rate_variance += on_rate * with_rate;
-        for (i, branch) in self.branches.iter_mut().enumerate() {
-            follow(branch, i);
+        for i in 0..B {
+            follow(&mut self.branches[i], i, (with_strain, with_rate, &branches), (moves, narrows));
         }
         if Self::has_baseline(N) {
-            follow(&mut self.baseline, B);
+            follow(&mut self.baseline, B, (with_strain, with_rate, &branches), (moves, narrows));
         }
     }
+}
+
+/// What a branch, or the baseline, makes of a move of the rate.
+#[inline(always)]
+fn follow<V: Lanes, const B: usize>(
+    part: &mut Part<V, B>,
+    others: usize,
+    (with_strain, with_rate, branches): (V, V, &[V; B]),
+    (moves, narrows): (V, V),
+) {
+    let (own, narrowing) = (part.with_rate, part.with_rate * narrows);
+    part.mean += own * moves;
+    part.with_strain += narrowing * with_strain;
+    part.with_rate += narrowing * with_rate;
+    for i in 0..others {
+        part.with[i] += narrowing * branches[i];
+    }
+    part.variance += narrowing * own;
 }

@@ -3,7 +3,7 @@
 use ohmstrain_model::{Phase, Scalar, SwitchedModel};
 
 use super::predict::{dot, sum};
-use super::{Curve, Lanes, Part, Parts, RateSpread, Switch};
+use super::{Curve, Lanes, Part, Parts, RateSpread, Several, Switch};
 use crate::{Reading, Residual, SparseEkf, StepError};
 
 /// A reading beside its prediction.
@@ -116,27 +116,47 @@ impl<T: Scalar, S, const B: usize, const N: usize, G: Curve<T>> SparseEkf<T, S, 
         let compared = self.compare(parts, reading, phase, spread);
         let nis = Self::correct(parts, &compared, true);
         let Compared { innovation, variance, .. } = compared;
+        let residual = Residual { innovation, variance, nis };
         // S and ν²/S finite, S above zero: then everything before was finite. No variance below zero: then no gain can have
         // left the range of the numbers (Cauchy-Schwarz), and the means are all that is left to look at.
         if variance > T::zero() && !(reading.extra_variance < T::zero()) && parts.is_sound::<N>(variance + nis) {
-            Ok(Residual { innovation, variance, nis })
+            Ok(residual)
         } else {
-            Err(refusal(reading, innovation, variance))
+            Err(refusal(reading, &residual))
         }
+    }
+
+    /// Takes readings where they are `present`; how they compared, and where what is left is sound.
+    #[inline(always)]
+    pub(crate) fn hear<V: Several<Number = T>, X: Switch<V>>(
+        &self,
+        parts: &mut Parts<V, B>,
+        reading: Reading<V>,
+        phase: Option<Phase>,
+        spread: RateSpread<V, X>,
+        present: V::Mask,
+    ) -> (Residual<V>, V::Mask) {
+        let compared = self.compare(parts, reading, phase, spread);
+        let nis = Self::correct(parts, &compared, present);
+        let Compared { innovation, variance, .. } = compared;
+        // S and ν²/S finite, S above zero: then everything before was finite. No variance below zero: then no gain can have
+        // left the range of the numbers (Cauchy-Schwarz), and the means are all that is left to look at.
+        let mut sound = V::both(variance.nothing().less(variance), reading.extra_variance.not_negative());
+        if !V::none(sound) {
+            sound = V::both(sound, parts.is_sound::<N>(variance + nis));
+        }
+        (Residual { innovation, variance, nis }, sound)
     }
 
     /// Compares a reading with its prediction.
     #[inline(always)]
-    pub(crate) fn compare<V: Lanes<Number = T>>(
+    pub(crate) fn compare<V: Lanes<Number = T>, X: Switch<V>>(
         &self,
         parts: &Parts<V, B>,
         reading: Reading<V>,
         phase: Option<Phase>,
-        mut spread: RateSpread<V, S>,
-    ) -> Compared<V, B>
-    where
-        S: Switch<V>,
-    {
+        mut spread: RateSpread<V, X>,
+    ) -> Compared<V, B> {
         let of_motion = self.reading.of_motion(parts.strain, parts.rate, phase, &mut spread);
         let OfMotion { mut expected, slope, viscosity, open } = of_motion;
 
@@ -232,7 +252,8 @@ fn take<V: Lanes, const B: usize>(
 
 /// Why a reading was not taken.
 #[cold]
-fn refusal<T: Scalar>(reading: Reading<T>, innovation: T, variance: T) -> StepError {
+pub(crate) fn refusal<T: Scalar>(reading: Reading<T>, residual: &Residual<T>) -> StepError {
+    let Residual { innovation, variance, .. } = *residual;
     if !(reading.value.is_finite() && reading.extra_variance.is_finite()) {
         StepError::NonFiniteReading
     } else if reading.extra_variance < T::zero() {

@@ -2,11 +2,31 @@ use ohmstrain_model::Phase;
 
 use crate::StepError;
 use crate::belief::gaussian::Real;
-use crate::kernel::Parts;
+use crate::kernel::{Parts, Several};
 use crate::mixture::evidence::{Weighed, Weight};
 use crate::mixture::lineage::Recorder;
 use crate::mixture::state::{Mixture, Share};
 use crate::mixture::{ALIKE, Added, LEAST_WEIGHT, LIGHTER};
+
+/// What tells whether two hypotheses are alike.
+struct About<T> {
+    strain: T,
+    strain_variance: T,
+    rate: T,
+    rate_variance: T,
+}
+
+impl<T: Real> About<T> {
+    #[inline(always)]
+    fn of<V: Several<Number = T>, const B: usize>(parts: &Parts<V, B>, lane: usize) -> Self {
+        Self {
+            strain: parts.strain.at(lane),
+            strain_variance: parts.strain_variance.at(lane),
+            rate: parts.rate.at(lane),
+            rate_variance: parts.rate_variance.at(lane),
+        }
+    }
+}
 
 /// Collects the children of a step: keeps, merges and drops them.
 pub(crate) struct Children<'a, T, const N: usize, const L: usize, const K: usize> {
@@ -29,16 +49,24 @@ impl<'a, T: Real, const N: usize, const L: usize, const K: usize> Children<'a, T
     /// Adds a child: merged with one that says the same, or in a free place. Where there is none the lightest of all makes room
     /// and is merged with the nearest of its phase: dropped, step after step, what is unlikely in each of many short steps and
     /// likely in all of them together would be lost before a reading has spoken for it. Says where it went.
-    pub(crate) fn add<const B: usize>(&mut self, child: &Parts<T, B>, phase: Phase, weighed: &Weighed<T>) -> Added {
+    pub(crate) fn add<V: Several<Number = T>, const B: usize>(
+        &mut self,
+        children: &Parts<V, B>,
+        lane: usize,
+        phase: Phase,
+        weighed: &Weighed<T>,
+    ) -> Added {
+        let about = About::of(children, lane);
         let Weighed { weight, more_inside, per_inside } = *weighed;
         self.raise_to(weight.exponent);
         let likelihood = weight.relative_to(self.exponent);
         self.density += likelihood;
         let weight = likelihood * more_inside;
-        let like =
-            |(_, (share, known)): &(usize, (&mut Share<T, N, L>, &mut Phase))| **known == phase && share.is_like(child);
+        let like = |(_, (share, known)): &(usize, (&mut Share<T, N, L>, &mut Phase))| {
+            **known == phase && share.is_like(&about)
+        };
         if let Some((place, (like, _))) = self.kept.iter_mut().enumerate().find(like) {
-            like.merge(child, weight, per_inside);
+            V::parts(children, lane, |child| like.merge(child, weight, per_inside));
             return Added::To(place);
         }
         let (added, place) = if self.kept.shares().len() < K {
@@ -46,7 +74,8 @@ impl<'a, T: Real, const N: usize, const L: usize, const K: usize> Children<'a, T
         } else {
             let (at, lightest) = self.lightest();
             if !(lightest < weight * T::of(1.0 - LIGHTER)) {
-                let into = self.merge_into_nearest(child, phase, (weight, per_inside), None);
+                let into =
+                    V::parts(children, lane, |child| self.merge_into_nearest(child, phase, (weight, per_inside), None));
                 return into.map_or(Added::Nowhere, Added::To);
             }
             let into = self.displace::<B>(at);
@@ -54,7 +83,7 @@ impl<'a, T: Real, const N: usize, const L: usize, const K: usize> Children<'a, T
         };
         let Some((place, of)) = place else { return Added::Nowhere };
         (place.weight, place.per_inside, *of) = (weight, per_inside, phase);
-        child.put_into(&mut place.belief);
+        V::parts(children, lane, |child| child.put_into(&mut place.belief));
         added
     }
 
@@ -88,7 +117,8 @@ impl<'a, T: Real, const N: usize, const L: usize, const K: usize> Children<'a, T
             return None;
         }
         let others = self.kept.iter_mut().enumerate().filter(|(at, (_, of))| Some(*at) != but && **of == phase);
-        let distances = others.map(|(at, (share, _))| (share.distance(child), at, share));
+        let about = About::of(child, 0);
+        let distances = others.map(|(at, (share, _))| (share.distance(&about), at, share));
         let (_, at, share) = distances.reduce(|a, b| if b.0 < a.0 { b } else { a })?;
         share.merge(child, weight, per_inside);
         Some(at)
@@ -140,7 +170,7 @@ impl<'a, T: Real, const N: usize, const L: usize, const K: usize> Children<'a, T
 impl<T: Real, const N: usize, const L: usize> Share<T, N, L> {
     /// Whether two hypotheses of one phase count as one.
     #[inline(always)]
-    fn is_like<const B: usize>(&self, other: &Parts<T, B>) -> bool {
+    fn is_like(&self, other: &About<T>) -> bool {
         // Mostly they are not, which the strain tells without a division.
         let (apart, variance) = (self.belief.mean[0] - other.strain, self.belief.covariance[(0, 0)]);
         if apart * apart > T::of(ALIKE) * (variance + other.strain_variance) {
@@ -150,7 +180,7 @@ impl<T: Real, const N: usize, const L: usize> Share<T, N, L> {
         strain < T::of(ALIKE) && strain + self.apart(1, other.rate, other.rate_variance) < T::of(ALIKE)
     }
 
-    fn distance<const B: usize>(&self, other: &Parts<T, B>) -> T {
+    fn distance(&self, other: &About<T>) -> T {
         self.apart(0, other.strain, other.strain_variance) + self.apart(1, other.rate, other.rate_variance)
     }
 

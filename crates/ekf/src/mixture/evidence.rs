@@ -2,7 +2,7 @@ use ohmstrain_model::{ParameterError, Phase, Problem, Scalar, StrainRange};
 
 use crate::belief::gaussian::Real;
 use crate::belief::tail::upper_tail;
-use crate::kernel::{Parts, RateSpread};
+use crate::kernel::{Lanes, Parts, RateSpread, Several};
 use crate::mixture::LEAST_INSIDE;
 use crate::mixture::predicted::Predicted;
 use crate::{Curve, Innovation, Reading, Residual, SparseEkf, StepError, Switch};
@@ -70,17 +70,22 @@ impl<T: Real> Weighing<T> {
     /// A prior probability times the likelihood of a reading to the power of the tempering, without the constant
     /// `(2π)^(-tempering/2)`.
     #[inline(always)]
-    pub(crate) fn likelihood<S: Switch<T>>(&self, prior: T, residual: &Residual<T>) -> Weight<T> {
-        let half = T::of(-0.5) * self.tempering;
+    pub(crate) fn likelihood<V, X>(&self, prior: V, residual: &Residual<V>) -> Weight<V>
+    where
+        V: Several<Number = T>,
+        X: Switch<V>,
+    {
+        let (half, Residual { variance, nis, .. }) = (T::of(-0.5) * self.tempering, *residual);
         if self.tempering == T::one() {
-            return Weight { factor: prior / S::root(residual.variance), exponent: half * residual.nis };
+            return Weight { factor: prior.over(X::root(variance)), exponent: nis.scale(half) };
         }
-        Weight { factor: prior, exponent: half * (residual.nis + residual.variance.ln()) }
+        let [logarithm] = variance.build(|lane| [variance.at(lane).ln()]);
+        Weight { factor: prior, exponent: (nis + logarithm).scale(half) }
     }
 
     /// Probability that a strain lies within the limits.
     #[inline(always)]
-    pub(crate) fn inside<S: Switch<T>>(&self, strain: T, variance: T) -> T {
+    fn inside<S: Switch<T>>(&self, strain: T, variance: T) -> T {
         let (above_lower, below_upper) = (strain - self.limits.lower, self.limits.upper - strain);
         let reach = self.clear * variance;
         let clear = |distance: T| distance > T::zero() && distance * distance > reach;
@@ -88,6 +93,41 @@ impl<T: Real> Weighing<T> {
             return T::one();
         }
         self.inside_near::<S>(above_lower, below_upper, variance)
+    }
+
+    /// Probability of the limits over what `per_inside` is one over, and one over the probability itself.
+    #[inline(always)]
+    pub(crate) fn of_limits<S: Switch<T>>(&self, strain: T, variance: T, per_inside: T) -> [T; 2] {
+        let inside = self.inside::<S>(strain, variance);
+        // Mostly nothing is near a limit.
+        if inside == T::one() { [per_inside, inside] } else { [inside * per_inside, T::one() / inside] }
+    }
+
+    /// The same in lanes, where it is `wanted`.
+    #[inline(always)]
+    fn of_limits_in_lanes<V, S>(&self, (strain, variance): (V, V), per_inside: V, wanted: V::Mask) -> [V; 2]
+    where
+        V: Several<Number = T>,
+        S: Switch<T>,
+    {
+        if V::WIDTH > 1 {
+            let zero = strain.nothing();
+            let reach = variance.scale(self.clear);
+            let (lower, upper) = (strain.with(self.limits.lower), strain.with(self.limits.upper));
+            let (above_lower, below_upper) = (strain - lower, upper - strain);
+            let within = V::both(zero.less(above_lower), zero.less(below_upper));
+            let clear = V::both(reach.less(above_lower * above_lower), reach.less(below_upper * below_upper));
+            if V::none(V::without(wanted, V::both(within, clear))) {
+                return [per_inside, strain.literal(1.0)];
+            }
+        }
+        strain.build(|lane| {
+            let per_inside = per_inside.at(lane);
+            if !V::holds(wanted, lane) {
+                return [per_inside, T::one()];
+            }
+            self.of_limits::<S>(strain.at(lane), variance.at(lane), per_inside)
+        })
     }
 
     /// The same where a tail counts. What has left the limits altogether is no less likely than [`LEAST_INSIDE`].
@@ -106,14 +146,6 @@ impl<T: Real> Weighing<T> {
         };
         let least = T::of(LEAST_INSIDE);
         if inside > least { inside } else { least }
-    }
-
-    /// Probability of the limits over what `per_inside` is one over, and one over the probability itself.
-    #[inline(always)]
-    pub(crate) fn of_limits<S: Switch<T>, const B: usize>(&self, parts: &Parts<T, B>, per_inside: T) -> (T, T) {
-        let inside = self.inside::<S>(parts.strain, parts.strain_variance);
-        // Mostly nothing is near a limit.
-        if inside == T::one() { (per_inside, inside) } else { (inside * per_inside, T::one() / inside) }
     }
 
     pub(crate) fn tempering(&self) -> T {
@@ -136,38 +168,66 @@ pub(crate) struct Weighed<T> {
     pub per_inside: T,
 }
 
-/// A child that has been predicted, before the reading.
-pub(crate) struct Newborn<T: Real, S: Switch<T>> {
+impl<V: Several> Weighed<V> {
+    /// In a lane.
+    #[inline(always)]
+    pub(crate) fn in_lane(&self, lane: usize) -> Weighed<V::Number> {
+        let Weight { factor, exponent } = &self.weight;
+        Weighed {
+            weight: Weight { factor: factor.at(lane), exponent: exponent.at(lane) },
+            more_inside: self.more_inside.at(lane),
+            per_inside: self.per_inside.at(lane),
+        }
+    }
+}
+
+/// Children that have been predicted, before the reading.
+pub(crate) struct Newborn<'a, V: Lanes, X: Switch<V>, const B: usize> {
+    pub parts: &'a mut Parts<V, B>,
     pub phase: Phase,
-    pub prior: T,
-    /// What its prediction returned.
-    pub spread: RateSpread<T, S>,
-    /// One over its parent's probability of the limits.
-    pub per_inside: T,
+    pub prior: V,
+    /// What their prediction returned.
+    pub spread: RateSpread<V, X>,
+    /// One over their parents' probability of the limits.
+    pub per_inside: V,
+    /// In which lanes there is one.
+    pub alive: V::Mask,
+}
+
+/// What the reading has made of them.
+pub(crate) struct Heard<V: Lanes> {
+    pub prior: V,
+    pub alive: V::Mask,
+    /// Whose numbers are sound.
+    pub sound: V::Mask,
+    /// Zero without a reading.
+    pub residual: Residual<V>,
+    pub weighed: Weighed<V>,
 }
 
 impl<T: Real, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> SparseEkf<T, S, B, N, G> {
-    /// Gives a child the reading.
+    /// Gives children the reading.
     #[inline(always)]
-    pub(crate) fn weigh(
+    pub(crate) fn weigh<V: Several<Number = T>, X: Switch<V>>(
         &self,
-        child: &mut Parts<T, B>,
-        newborn: Newborn<T, S>,
-        reading: Option<Reading<T>>,
+        newborn: Newborn<'_, V, X, B>,
+        reading: Option<Reading<V>>,
         weighing: &Weighing<T>,
-        predicted: &mut Predicted<T>,
-    ) -> Result<Weighed<T>, StepError> {
-        let Newborn { phase, prior, spread, per_inside } = newborn;
-        let mut weight = Weight { factor: prior, exponent: T::zero() };
+    ) -> Heard<V> {
+        let Newborn { parts, phase, prior, spread, per_inside, alive } = newborn;
+        let nothing = prior.nothing();
+        let mut residual = Residual { innovation: nothing, variance: nothing, nis: nothing };
+        let mut weight = Weight { factor: prior, exponent: nothing };
+        let sound;
         if let Some(reading) = reading {
-            let residual = self.update(child, reading, Some(phase), spread)?;
-            weight = weighing.likelihood::<S>(prior, &residual);
-            predicted.add(prior, residual.innovation, residual.variance);
-        } else if !child.is_sound::<N>(child.variances::<N>()) {
-            return Err(StepError::NonFiniteState);
+            (residual, sound) = self.hear(parts, reading, Some(phase), spread, alive);
+            weight = weighing.likelihood::<V, X>(prior, &residual);
+        } else {
+            sound = parts.is_sound::<N>(parts.variances::<N>());
         }
-        let (more_inside, per_inside) = weighing.of_limits::<S, B>(child, per_inside);
-        Ok(Weighed { weight, more_inside, per_inside })
+        let strain = (parts.strain, parts.strain_variance);
+        let [more_inside, per_inside] = weighing.of_limits_in_lanes::<V, S>(strain, per_inside, alive);
+        Heard { prior, alive, sound, residual, weighed: Weighed { weight, more_inside, per_inside } }
     }
 }
 

@@ -4,15 +4,16 @@
 //! As [`SparseEkf`](crate::SparseEkf): the state is changed in place, an error leaves it as it was, and nothing takes a
 //! logarithm unless asked or unless the strain is near a limit.
 
-use ohmstrain_model::{Phase, SwitchedModel};
+use core::marker::PhantomData;
+
+use ohmstrain_model::{Phase, SwitchedModel, Turning};
 
 use crate::belief::gaussian::Real;
-use crate::kernel::{Course, Parts};
-use crate::mixture::children::Children;
+use crate::kernel::{Course, Parts, Several};
+use crate::mixture::brood::{Breeding, Breeds, Parents, Trail};
 use crate::mixture::estimator::{mixture_filter, mixture_steps, over_phases};
-use crate::mixture::evidence::{Newborn, Weighing};
-use crate::mixture::lineage::{Birth, Following, Recorder};
-use crate::mixture::predicted::Predicted;
+use crate::mixture::evidence::{Heard, Newborn, Weighing};
+use crate::mixture::lineage::{Following, Recorder};
 use crate::mixture::state::Mixture;
 use crate::mixture::switching::fresh_rate;
 use crate::{
@@ -46,33 +47,58 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
         next: &mut Mixture<T, N, L, K>,
         recorder: &mut impl Recorder<T, B>,
     ) -> Result<Option<MixtureResidual<T>>, StepError> {
-        let mut children = Children::new(next);
-        let mut predicted = Predicted::new();
-        for (place, (parent, from)) in state.shares().iter().zip(state.phases()).enumerate() {
-            for (phase, probability) in Phase::ALL.into_iter().zip(self.chain[from.index()]) {
-                if !(probability > T::zero()) {
-                    continue;
-                }
-                let mut child = Parts::of(&parent.belief);
-                let begins = phase != Phase::Hold && *from != phase;
-                if begins {
-                    child.renew_rate(&self.fresh[phase.index()]);
-                }
-                let (from, course) = (child, Course::Known(phase));
-                let spread = self.kernel.predict(&mut child, course);
-                let prediction = child;
-                let prior = parent.weight * probability;
-                let newborn = Newborn { phase, prior, spread, per_inside: parent.per_inside };
-                let weighed = self.kernel.weigh(&mut child, newborn, reading, &self.weighing, &mut predicted)?;
-                let added = children.add(&child, phase, &weighed);
-                let (predicted, posterior, weighed) = (&prediction, &child, &weighed);
-                let birth = Birth { parent: place, phase, from: &from, begins, course, predicted, posterior, weighed };
-                recorder.born(&birth, added);
+        Breeding { filter: self, state, reading, next: &mut *next, open: false, branches: PhantomData }.done(recorder)
+    }
+}
+
+impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: Curve<T>> Breeds<T, B, N>
+    for Hypotheses<T, B, N, K, S, G>
+{
+    type Switch = S;
+
+    fn weighing(&self) -> &Weighing<T> {
+        &self.weighing
+    }
+
+    #[inline(always)]
+    fn follows(&self, from: Phase, _: bool) -> [T; 3] {
+        self.chain[from.index()]
+    }
+
+    /// Nothing: a phase has the direction of its net move.
+    #[inline(always)]
+    fn turning(&self, _: Phase, _: &Parts<T, B>, _: bool) -> Turning<T> {
+        Turning { excess: T::zero(), variance: T::zero() }
+    }
+
+    #[inline(always)]
+    fn brood<V: Several<Number = T>, X: Switch<V>>(
+        &self,
+        parts: &mut Parts<V, B>,
+        parents: &Parents<V>,
+        phase: Phase,
+        reading: Option<Reading<V>>,
+        trail: &mut impl Trail<V, B>,
+    ) -> Option<Heard<V>> {
+        let probability = parents.follows[phase.index()];
+        let alive = V::both(parents.there, probability.nothing().less(probability));
+        if V::none(alive) {
+            return None;
+        }
+        let mut begins = V::without(parents.there, parents.there);
+        if phase != Phase::Hold {
+            begins = V::without(parents.there, parents.from[phase.index()]);
+            if !V::none(begins) {
+                parts.renew_rate(&self.fresh[phase.index()], begins);
             }
         }
-        let density = children.density();
-        children.normalise(recorder)?;
-        Ok(reading.map(|_| MixtureResidual::new(&predicted, density, self.weighing.tempering())))
+        let course = Course::Known(phase);
+        trail.starts(parts, begins, &course);
+        let spread = self.kernel.predict_as::<V, X>(parts, course);
+        trail.ahead(parts);
+        let (prior, per_inside) = (parents.weight * probability, parents.per_inside);
+        let newborn = Newborn { parts, phase, prior, spread, per_inside, alive };
+        Some(self.kernel.weigh(newborn, reading, &self.weighing))
     }
 }
 

@@ -130,12 +130,13 @@ impl<T: Real, const B: usize, const N: usize, S: Switch<T>, G: Curve<T>> Imm<T, 
         let spread = self.kernel.predict(&mut mode.parts, Course::Known(phase));
         if let Some(reading) = reading {
             let residual = self.kernel.update(&mut mode.parts, reading, Some(phase), spread)?;
-            mode.weight = self.weighing.likelihood::<S>(mode.prior, &residual);
+            mode.weight = self.weighing.likelihood::<T, S>(mode.prior, &residual);
             mode.residual = Some(residual);
         } else if !mode.parts.is_sound::<N>(mode.parts.variances::<N>()) {
             return Err(StepError::NonFiniteState);
         }
-        (mode.more_inside, mode.per_inside) = self.weighing.of_limits::<S, B>(&mode.parts, mode.per_inside);
+        let Parts { strain, strain_variance, .. } = mode.parts;
+        [mode.more_inside, mode.per_inside] = self.weighing.of_limits::<S>(strain, strain_variance, mode.per_inside);
         Ok(mode)
     }
 

@@ -13,13 +13,18 @@ use crate::smooth::rts_step;
 
 /// Hears of every child that a step of a filter of hypotheses makes. The filter itself listens with `()`.
 pub(crate) trait Recorder<T: Real, const B: usize> {
+    /// Whether it wants to hear of each.
+    const LISTENS: bool = true;
+
     /// A child was put into the new mixture, merged or alone.
     fn born(&mut self, _birth: &Birth<'_, T, B>, _added: Added) {}
     /// The contents of every place moved to another one, or nowhere.
     fn renumbered(&mut self, _new_place: impl Fn(usize) -> Option<usize>) {}
 }
 
-impl<T: Real, const B: usize> Recorder<T, B> for () {}
+impl<T: Real, const B: usize> Recorder<T, B> for () {
+    const LISTENS: bool = false;
+}
 
 /// A child at its birth.
 pub(crate) struct Birth<'a, T, const B: usize> {

@@ -1,3 +1,4 @@
+pub(crate) mod brood;
 mod children;
 mod estimator;
 mod evidence;

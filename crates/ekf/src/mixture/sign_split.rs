@@ -4,17 +4,18 @@
 //! As [`SparseEkf`](crate::SparseEkf): the state is changed in place, an error leaves it as it was, and nothing takes a
 //! logarithm unless asked or unless the strain is near a limit.
 
+use core::marker::PhantomData;
+
 use ohmstrain_model::{Phase, SwitchedModel, Turning};
 
 use crate::belief::gaussian::Real;
-use crate::kernel::{Course, Parts};
-use crate::mixture::children::Children;
+use crate::kernel::{Course, Parts, Several};
+use crate::mixture::brood::{Breeding, Breeds, Parents, Trail};
 use crate::mixture::estimator::{mixture_filter, mixture_steps};
-use crate::mixture::evidence::{Newborn, Weighing};
-use crate::mixture::lineage::{Birth, Following, Recorder};
+use crate::mixture::evidence::{Heard, Newborn, Weighing};
+use crate::mixture::lineage::{Following, Recorder};
 use crate::mixture::pause::Pause;
-use crate::mixture::predicted::Predicted;
-use crate::mixture::state::{Mixture, Share};
+use crate::mixture::state::Mixture;
 use crate::mixture::switching::{forgets_direction_s, fresh_rate};
 use crate::{
     AnyCurve, Curve, Dwell, Evidence, Gaussian, Logistic, MixtureResidual, Reading, SparseEkf, StepError, Switch,
@@ -102,93 +103,99 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
             None => state.pause().goes_on(self.kernel.dt_s(), self.forgets_direction_s),
             Some(_) => Pause::over(),
         };
-        let open = pause.open;
-        let mut children = Children::new(next);
-        let mut predicted = Predicted::new();
-        for (place, (parent, from)) in state.shares().iter().zip(state.phases()).enumerate() {
-            let before = if state.pause().open { toward(*from, &parent.belief.mean[1]) } else { *from };
-            let turning = if open { None } else { Some(self.kernel.turning(before, &Parts::of(&parent.belief))) };
-            let follows = if open { goes_on } else { follows };
-            for (phase, probability) in Phase::ALL.into_iter().zip(follows(self.chain.as_ref(), *from)) {
-                if probability > T::zero() {
-                    let origin = Origin { place, parent, from: *from, turning, phase, probability };
-                    self.add_child(&origin, reading, &mut children, &mut predicted, recorder)?;
-                }
-            }
-        }
-        let density = children.density();
-        children.normalise(recorder)?;
+        let said = Breeding { filter: self, state, reading, next: &mut *next, open: pause.open, branches: PhantomData }
+            .done(recorder)?;
         next.set_pause(pause);
-        Ok(reading.map(|_| MixtureResidual::new(&predicted, density, self.weighing.tempering())))
+        Ok(said)
     }
 
+    /// Where next to nothing of a prediction has the sign of a moving phase.
     #[inline(always)]
-    fn add_child<const L: usize>(
-        &self,
-        origin: &Origin<'_, T, N, L>,
-        reading: Option<Reading<T>>,
-        children: &mut Children<'_, T, N, L, K>,
-        predicted: &mut Predicted<T>,
-        recorder: &mut impl Recorder<T, B>,
-    ) -> Result<(), StepError> {
-        let Origin { place, parent, from, turning, phase, probability } = *origin;
-        let mut child = Parts::of(&parent.belief);
-        let rests = self.chain.is_some() && from == Phase::Hold && phase != Phase::Hold;
-        if rests {
-            child.renew_rate(&self.fresh[phase.index()]);
-        }
-        if turning.is_some() && phase != Phase::Hold && self.is_hopeless(phase, &child) {
-            return Ok(());
-        }
-        let course = match turning {
-            _ if rests || phase == Phase::Hold => Course::Known(phase),
-            None => Course::Uncertain,
-            Some(_) if from == Phase::Hold => Course::Known(phase),
-            Some(turning) => Course::Within(phase, turning),
-        };
-        let start = child;
-        let spread = self.kernel.predict(&mut child, course);
-        let prediction = child;
-        let mut prior = parent.weight * probability;
-        if turning.is_some() && phase != Phase::Hold {
-            let mass = child.cut_rate::<S, N>(phase, self.weighing.clear());
-            if !(mass > T::of(LEAST_MASS)) {
-                return Ok(());
-            }
-            // After a hold the chain has said how likely this direction is; none of it goes to the other.
-            if !(rests && mass > T::of(0.5)) {
-                prior *= mass;
-            }
-        }
-        let newborn = Newborn { phase, prior, spread, per_inside: parent.per_inside };
-        let weighed = self.kernel.weigh(&mut child, newborn, reading, &self.weighing, predicted)?;
-        let added = children.add(&child, phase, &weighed);
-        let (from, predicted, posterior, weighed) = (&start, &prediction, &child, &weighed);
-        let birth = Birth { parent: place, phase, from, begins: rests, course, predicted, posterior, weighed };
-        recorder.born(&birth, added);
-        Ok(())
-    }
-
-    /// Whether next to nothing of a prediction has the sign of a moving phase.
-    #[inline(always)]
-    fn is_hopeless(&self, phase: Phase, from: &Parts<T, B>) -> bool {
+    fn is_hopeless<V: Several<Number = T>>(&self, phase: Phase, from: &Parts<V, B>) -> V::Mask {
         let ahead = self.kernel.rate_ahead(phase, from);
         let toward = if phase == Phase::Retract { -ahead.mean } else { ahead.mean };
-        toward < T::zero() && toward * toward > T::of(HOPELESS * HOPELESS) * ahead.variance
+        let behind = toward.less(toward.nothing());
+        if V::none(behind) {
+            return behind;
+        }
+        V::both(behind, ahead.variance.scale(T::of(HOPELESS * HOPELESS)).less(toward * toward))
     }
 }
 
-/// What a child is made of.
-struct Origin<'a, T, const N: usize, const L: usize> {
-    /// Where its parent is.
-    place: usize,
-    parent: &'a Share<T, N, L>,
-    from: Phase,
-    /// What its rate leaves open over the step, unless it rests; `None` if a reading is missing to tell its direction.
-    turning: Option<Turning<T>>,
-    phase: Phase,
-    /// Probability that the parent has this child.
-    probability: T,
+impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: Curve<T>> Breeds<T, B, N>
+    for SignSplit<T, B, N, K, S, G>
+{
+    type Switch = S;
+
+    fn weighing(&self) -> &Weighing<T> {
+        &self.weighing
+    }
+
+    #[inline(always)]
+    fn follows(&self, from: Phase, open: bool) -> [T; 3] {
+        if open { goes_on(self.chain.as_ref(), from) } else { follows(self.chain.as_ref(), from) }
+    }
+
+    /// Nothing of what rested.
+    #[inline(always)]
+    fn turning(&self, from: Phase, belief: &Parts<T, B>, was_open: bool) -> Turning<T> {
+        let before = if was_open { toward(from, belief.rate) } else { from };
+        match before {
+            Phase::Hold => Turning { excess: T::zero(), variance: T::zero() },
+            moving => self.kernel.turning(moving, belief),
+        }
+    }
+
+    #[inline(always)]
+    fn brood<V: Several<Number = T>, X: Switch<V>>(
+        &self,
+        parts: &mut Parts<V, B>,
+        parents: &Parents<V>,
+        phase: Phase,
+        reading: Option<Reading<V>>,
+        trail: &mut impl Trail<V, B>,
+    ) -> Option<Heard<V>> {
+        let probability = parents.follows[phase.index()];
+        let mut alive = V::both(parents.there, probability.nothing().less(probability));
+        if V::none(alive) {
+            return None;
+        }
+        let moves = phase != Phase::Hold;
+        let mut begins = V::without(parents.there, parents.there);
+        if moves && self.chain.is_some() {
+            begins = parents.from[Phase::Hold.index()];
+            if !V::none(begins) {
+                parts.renew_rate(&self.fresh[phase.index()], begins);
+            }
+        }
+        let course = match parents.turning {
+            Some(turning) if moves => {
+                alive = V::without(alive, self.is_hopeless(phase, parts));
+                if V::none(alive) {
+                    return None;
+                }
+                Course::Within(phase, turning)
+            }
+            None if moves && V::none(begins) => Course::Uncertain,
+            _ => Course::Known(phase),
+        };
+        trail.starts(parts, begins, &course);
+        let spread = self.kernel.predict_as::<V, X>(parts, course);
+        trail.ahead(parts);
+        let mut prior = parents.weight * probability;
+        if moves && parents.turning.is_some() {
+            let mass = parts.cut_rate::<X, N>(phase, self.weighing.clear(), alive);
+            alive = V::both(alive, mass.literal(LEAST_MASS).less(mass));
+            if V::none(alive) {
+                return None;
+            }
+            // After a hold the chain has said how likely this direction is; none of it goes to the other.
+            let said = V::both(begins, mass.literal(0.5).less(mass));
+            prior = V::pick(said, prior, prior * mass);
+        }
+        let newborn = Newborn { parts, phase, prior, spread, per_inside: parents.per_inside, alive };
+        Some(self.kernel.weigh(newborn, reading, &self.weighing))
+    }
 }
 
 /// A cut that leaves less than this of a prediction is not followed: its moments would be those of a far tail.
@@ -217,10 +224,10 @@ fn goes_on<T: Real>(chain: Option<&[[T; 3]; 3]>, phase: Phase) -> [T; 3] {
 }
 
 /// The phase of a rate that was left open; what holds has none.
-fn toward<T: Real>(phase: Phase, rate: &T) -> Phase {
+fn toward<T: Real>(phase: Phase, rate: T) -> Phase {
     match phase {
         Phase::Hold => Phase::Hold,
-        _ if *rate < T::zero() => Phase::Retract,
+        _ if rate < T::zero() => Phase::Retract,
         _ => Phase::Extend,
     }
 }

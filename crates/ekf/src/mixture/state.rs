@@ -178,6 +178,12 @@ impl<T: Real, const N: usize, const L: usize, const K: usize> Mixture<T, N, L, K
         self.shares.get(..self.len).unwrap_or(&[])
     }
 
+    /// A Gaussian and its phase.
+    #[inline(always)]
+    pub(crate) fn at(&self, place: usize) -> Option<(&Share<T, N, L>, Phase)> {
+        Some((self.shares().get(place)?, *self.phases().get(place)?))
+    }
+
     /// Their phases.
     #[must_use]
     pub fn phases(&self) -> &[Phase] {

@@ -2,18 +2,20 @@
 
 extern crate std;
 
+use core::marker::PhantomData;
 use std::vec::Vec;
 
 use nalgebra::{SMatrix, vector};
-use ohmstrain_model::{Gauge, ModelNoise, Motion, Phase, SensorLaw, StrainRange, SwitchedModel};
+use ohmstrain_model::{Branch, Gauge, ModelNoise, Motion, Phase, SensorLaw, StrainRange, SwitchedModel};
 use proptest::prelude::*;
 
+use super::brood::{Breeding, Breeds};
 use super::children::Children;
 use super::evidence::{Weighed, Weighing, Weight};
 use super::state::Share;
 use super::*;
 use crate::kernel::Parts;
-use crate::{Estimator, Logistic, SignSplit};
+use crate::{Estimator, Logistic, Reading, SignSplit};
 
 /// Strain, rate, baseline.
 type One = (f64, Belief<f64, 3, 6>);
@@ -44,7 +46,7 @@ fn weighed(weight: f64, exponent: f64) -> Weighed<f64> {
 }
 
 fn add<const K: usize>(children: &mut Children<'_, f64, 3, 6, K>, (weight, belief): &One, phase: Phase) {
-    children.add(&Parts::<f64, 0>::of(belief), phase, &weighed(*weight, 0.0));
+    children.add(&Parts::<f64, 0>::of(belief), 0, phase, &weighed(*weight, 0.0));
 }
 
 fn kept(mixture: &Mixture<f64, 3, 6, 2>) -> Vec<One> {
@@ -91,7 +93,7 @@ proptest! {
     fn halves_of_a_cut_belief_make_the_whole((_, whole) in one()) {
         let halves = [Phase::Extend, Phase::Retract].map(|phase| {
             let (mut parts, mut half) = (Parts::<f64, 0>::of(&whole), whole);
-            let mass = parts.cut_rate::<Logistic, 3>(phase, f64::INFINITY);
+            let mass = parts.cut_rate::<Logistic, 3>(phase, f64::INFINITY, true);
             parts.put_into(&mut half);
             (mass, half)
         });
@@ -115,7 +117,7 @@ fn no_single_weight_need_be_a_number() {
             for k in order {
                 let belief: Belief<f64, 3, 6> = Belief::independent(vector![k as f64, 0.0, 0.0], &[1e-6; 3]);
                 let weighed = weighed(parts[k].0, parts[k].1 + shift);
-                children.add(&Parts::<f64, 0>::of(&belief), Phase::Extend, &weighed);
+                children.add(&Parts::<f64, 0>::of(&belief), 0, Phase::Extend, &weighed);
             }
             let density = children.density();
             assert!((density.factor.ln() + density.exponent - shift - total.ln()).abs() < 1e-12, "{shift} {order:?}");
@@ -166,7 +168,7 @@ fn what_limits_took_is_given_back_after_merging() {
     let at = |strain: f64, variance: f64, per_inside: f64| {
         let belief: Belief<f64, 3, 6> = Belief::independent(vector![strain, 0.0, 0.0], &[variance, 1.0, 1.0]);
         let parts = Parts::<f64, 0>::of(&belief);
-        let (more_inside, per_inside) = weighing.of_limits::<Logistic, 0>(&parts, per_inside);
+        let [more_inside, per_inside] = weighing.of_limits::<Logistic>(parts.strain, parts.strain_variance, per_inside);
         (parts, more_inside, per_inside)
     };
     let mut mixture = Mixture::<f64, 3, 6, 2>::empty();
@@ -175,7 +177,7 @@ fn what_limits_took_is_given_back_after_merging() {
     for (strain, weight) in [(0.0, 0.3), (-0.06, 0.7)] {
         let (parts, more_inside, per_inside) = at(strain, 1e-2, 1.0);
         taken += weight * (1.0 - more_inside);
-        children.add(&parts, Phase::Hold, &Weighed { more_inside, per_inside, ..weighed(weight, 0.0) });
+        children.add(&parts, 0, Phase::Hold, &Weighed { more_inside, per_inside, ..weighed(weight, 0.0) });
     }
     let [merged]: [Share<f64, 3, 6>; 1] = mixture.shares().try_into().unwrap();
     assert!(taken > 0.6 && (merged.weight + taken - 1.0).abs() < 1e-14, "{taken} {}", merged.weight);
@@ -283,5 +285,70 @@ fn what_was_merged_is_followed() {
         for (back, filtered) in weights(&back(&state, &next)).iter().zip(filtered) {
             assert!((back / filtered - 1.0).abs() < 1e-9, "{back} after all, {filtered} before");
         }
+    }
+}
+
+/// Listens, so that every child is stepped by itself.
+struct Listener;
+
+impl super::lineage::Recorder<f64, 2> for Listener {}
+
+/// A body that goes to and fro with rests, near both limits; now and then without a reading, or with a wild one.
+fn heard(k: usize) -> Option<Reading<f64>> {
+    let t = k as f64;
+    let slow = 0.22 + 0.24 * (t * 0.01).sin().clamp(-0.8, 0.8);
+    let wild = if k % 97 == 5 { 0.4 } else { 0.0 };
+    let noise = 1e-3 * ((t * 2.9).sin() + (t * 7.3).cos());
+    (k % 7 != 3).then_some(Reading { value: slow + noise + wild, extra_variance: 1e-7 })
+}
+
+fn in_vectors_and_one_by_one<F: Breeds<f64, 2, 5>>(filter: &F, start: &Belief<f64, 5, 15>) -> usize {
+    let mut state = Mixture::<f64, 5, 15, 8>::single(*start, Phase::Hold);
+    let (mut together, mut alone, mut most) = (Mixture::empty(), Mixture::empty(), 0);
+    for k in 0..3000 {
+        let step = |next, listens: bool| {
+            let step = Breeding { filter, state: &state, reading: heard(k), next, open: false, branches: PhantomData };
+            if listens { step.done(&mut Listener) } else { step.done(&mut ()) }
+        };
+        assert_eq!(step(&mut together, false), step(&mut alone, true), "row {k}");
+        // Places that are not in use keep what was there before.
+        assert_eq!((together.shares(), together.phases()), (alone.shares(), alone.phases()), "row {k}");
+        state = alone;
+        most = most.max(state.shares().len());
+    }
+    most
+}
+
+/// What is followed in vectors is what is followed hypothesis by hypothesis, to the last bit: whether a processor has
+/// vectors, and whether somebody listens, shall not be seen in a result. Without vectors this says nothing.
+#[test]
+fn vectors_give_the_bits_of_numbers() {
+    let branch = |tau_s, slope| Branch {
+        tau_s,
+        extend_gain: 0.3,
+        retract_gain: -0.2,
+        extend_gain_slope: slope,
+        retract_gain_slope: -0.1,
+    };
+    let law = SensorLaw {
+        gauge: Gauge::Polynomial { coefficients: [1.9, -2.8, 0.4] },
+        extend_viscosity_s: 0.02,
+        retract_viscosity_s: -0.01,
+        branches: [branch(4.0, -0.2), branch(60.0, 0.1)],
+        range: StrainRange { lower: 0.0, upper: 0.3 },
+    };
+    let motion = Motion::ornstein_uhlenbeck(0.5, 0.1, 0.15, 0.1).unwrap();
+    let noise = ModelNoise { reading_sd: 2e-3, branch_sd: 5e-3, baseline_sd: 0.02, baseline_time_s: 30.0 };
+    let model = SwitchedModel::<f64, 2, 5>::new(law, motion, noise).unwrap();
+    let start = Belief::initial(&model);
+    let dwell = Dwell::new(0.7, 1.5, 0.3).unwrap();
+    for tempering in [1.0, 0.5] {
+        let evidence = Evidence { limits: StrainRange { lower: 0.0, upper: 0.2 }, tempering };
+        for hold in [Some(dwell), None] {
+            let split = SignSplit::<_, 2, 5, 8>::new(model, 0.01, hold, evidence).unwrap();
+            assert!(in_vectors_and_one_by_one(&split, &start) > 4);
+        }
+        let histories = Hypotheses::<_, 2, 5, 8>::new(model, 0.01, dwell, evidence).unwrap();
+        assert!(in_vectors_and_one_by_one(&histories, &start) > 4);
     }
 }

@@ -72,7 +72,7 @@ impl<const B: usize, const N: usize, G: Curve<f32>> SparseEkf<f32, Compact, B, N
         let (covariance, more) = rest.split_at(covariances);
         let (first, second) = (more[0], more[1]);
         let mut parts = Parts::read::<N>(&mut mean.iter(), &mut covariance.iter(), first.literal(0.0));
-        let spread = RateSpread::new(parts.rate_variance);
+        let spread = RateSpread::<_, Compact>::new(parts.rate_variance);
         match piece {
             Piece::Predict(phase) => drop(self.predict(&mut parts, Course::Known(phase))),
             Piece::PredictTurning(phase) => {

@@ -39,7 +39,7 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
         let steps = readings.iter().take(count).skip(1);
         for (reading, belief) in steps.zip(beliefs.iter_mut()).rev() {
             let mut parts = Parts::of(belief);
-            let (spread, driven) = self.move_on(&mut parts, Course::Uncertain);
+            let (spread, driven) = self.move_on::<T, S>(&mut parts, Course::Uncertain);
             if let Some(reading) = *reading {
                 ahead.take(&self.compare(&parts, reading, None, spread), Self::HAS_BASELINE);
             }

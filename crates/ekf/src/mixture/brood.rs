@@ -1,0 +1,267 @@
+//! The children of hypotheses that stand side by side: one hypothesis, or as many as a vector has lanes.
+
+use core::marker::PhantomData;
+
+use ohmstrain_model::{Phase, Turning};
+
+use crate::belief::gaussian::Real;
+use crate::kernel::{Course, Lanes, MOST_LANES, Parts, Several, Work, refusal};
+use crate::mixture::Added;
+use crate::mixture::children::Children;
+use crate::mixture::evidence::{Heard, Weighing};
+use crate::mixture::lineage::{Birth, Recorder};
+use crate::mixture::predicted::Predicted;
+use crate::mixture::state::{Mixture, Share};
+use crate::{Compact, MixtureResidual, Reading, Residual, StepError, Switch};
+
+/// Hypotheses side by side, with what all their children share.
+pub(crate) struct Parents<V: Lanes> {
+    pub weight: V,
+    /// One over the probability of the limits.
+    pub per_inside: V,
+    /// In which lanes there is one.
+    pub there: V::Mask,
+    /// Which of them come from each phase, and how likely each follows.
+    pub from: [V::Mask; 3],
+    pub follows: [V; 3],
+    /// What their rates leave open over the step; `None` if a reading is missing to tell their directions, which vectors do not
+    /// know of.
+    pub turning: Option<Turning<V>>,
+}
+
+/// Sees children on their way to the reading.
+pub(crate) trait Trail<V: Lanes, const B: usize> {
+    /// Where they started: their parents' beliefs, the rate drawn anew where a phase `begins`.
+    fn starts(&mut self, _from: &Parts<V, B>, _begins: V::Mask, _course: &Course<V>) {}
+    /// The prediction before it is cut.
+    fn ahead(&mut self, _predicted: &Parts<V, B>) {}
+}
+
+/// Nobody looks.
+impl<V: Lanes, const B: usize> Trail<V, B> for () {}
+
+/// What somebody who listens is told of a child.
+struct Seen<T, const B: usize> {
+    from: Parts<T, B>,
+    begins: bool,
+    course: Course<T>,
+    predicted: Parts<T, B>,
+}
+
+impl<T: Real, const B: usize> Trail<T, B> for Option<Seen<T, B>> {
+    #[inline(always)]
+    fn starts(&mut self, from: &Parts<T, B>, begins: bool, course: &Course<T>) {
+        if let Some(seen) = self {
+            (seen.from, seen.begins, seen.course) = (*from, begins, *course);
+        }
+    }
+
+    #[inline(always)]
+    fn ahead(&mut self, predicted: &Parts<T, B>) {
+        if let Some(seen) = self {
+            seen.predicted = *predicted;
+        }
+    }
+}
+
+/// A filter whose hypotheses have a child in each phase at most.
+pub(crate) trait Breeds<T: Real, const B: usize, const N: usize> {
+    /// What splits uncertain rates, and takes roots, where numbers are stepped one by one.
+    type Switch: Switch<T>;
+
+    fn weighing(&self) -> &Weighing<T>;
+
+    /// Probabilities of the phases that follow one; `open` if its direction is not asked.
+    fn follows(&self, from: Phase, open: bool) -> [T; 3];
+
+    /// What a hypothesis leaves open whose rate may turn around; `was_open` if its direction was not asked in the step before.
+    fn turning(&self, from: Phase, belief: &Parts<T, B>, was_open: bool) -> Turning<T>;
+
+    /// Makes the children of one phase of their parents' beliefs; `None` if there are none.
+    fn brood<V: Several<Number = T>, X: Switch<V>>(
+        &self,
+        parts: &mut Parts<V, B>,
+        parents: &Parents<V>,
+        phase: Phase,
+        reading: Option<Reading<V>>,
+        trail: &mut impl Trail<V, B>,
+    ) -> Option<Heard<V>>;
+}
+
+/// One step of a filter.
+pub(crate) struct Breeding<'a, F, T, const B: usize, const N: usize, const L: usize, const K: usize> {
+    pub filter: &'a F,
+    pub state: &'a Mixture<T, N, L, K>,
+    pub reading: Option<Reading<T>>,
+    /// What is filled with the children.
+    pub next: &'a mut Mixture<T, N, L, K>,
+    /// Whether directions stay open.
+    pub open: bool,
+    pub branches: PhantomData<[T; B]>,
+}
+
+type Said<T> = Result<Option<MixtureResidual<T>>, StepError>;
+
+impl<F: Breeds<T, B, N>, T: Real, const B: usize, const N: usize, const L: usize, const K: usize>
+    Breeding<'_, F, T, B, N, L, K>
+{
+    /// In vectors where there are any, unless somebody listens to each child, or directions stay open.
+    #[inline(always)]
+    pub(crate) fn done(self, recorder: &mut impl Recorder<T, B>) -> Said<T> {
+        let Self { filter, state, reading, next, open, branches } = self;
+        if !hears(recorder) && !open {
+            // What vectors refuse is looked at number by number, which tells why.
+            if let Some(Ok(said)) = T::in_vectors(Breeding { filter, state, reading, next: &mut *next, open, branches })
+            {
+                return Ok(said);
+            }
+        }
+        Breeding { filter, state, reading, next, open, branches }.one_by_one(recorder)
+    }
+
+    #[inline(always)]
+    fn one_by_one<R: Recorder<T, B>>(self, recorder: &mut R) -> Said<T> {
+        let Self { filter, state, reading, next, open, .. } = self;
+        let (mut children, mut predicted) = (Children::new(next), Predicted::new());
+        for (place, (share, from)) in state.shares().iter().zip(state.phases()).enumerate() {
+            let turning = (!open).then(|| filter.turning(*from, &Parts::of(&share.belief), state.pause().open));
+            let parents = Parents {
+                weight: share.weight,
+                per_inside: share.per_inside,
+                there: true,
+                from: Phase::ALL.map(|phase| *from == phase),
+                follows: filter.follows(*from, open),
+                turning,
+            };
+            for phase in Phase::ALL {
+                // Before anything is copied.
+                if !(parents.follows[phase.index()] > T::zero()) {
+                    continue;
+                }
+                let mut child = Parts::of(&share.belief);
+                let mut seen = hears(recorder).then_some(Seen {
+                    from: child,
+                    begins: false,
+                    course: Course::Uncertain,
+                    predicted: child,
+                });
+                let Some(heard) = filter.brood::<T, F::Switch>(&mut child, &parents, phase, reading, &mut seen) else {
+                    continue;
+                };
+                if !heard.sound {
+                    return Err(reading.map_or(StepError::NonFiniteState, |reading| refusal(reading, &heard.residual)));
+                }
+                let added = collect(&mut children, &mut predicted, (&child, &heard), (0, phase), reading.is_some());
+                if let Some(Seen { from, begins, course, predicted }) = &seen {
+                    let (posterior, weighed, course, begins) = (&child, &heard.weighed, *course, *begins);
+                    let birth = Birth { parent: place, phase, from, begins, course, predicted, posterior, weighed };
+                    recorder.born(&birth, added);
+                }
+            }
+        }
+        let density = children.density();
+        children.normalise(recorder)?;
+        Ok(reading.map(|_| MixtureResidual::new(&predicted, density, filter.weighing().tempering())))
+    }
+}
+
+fn hears<T: Real, R: Recorder<T, B>, const B: usize>(_: &R) -> bool {
+    R::LISTENS
+}
+
+impl<F: Breeds<T, B, N>, T: Real, const B: usize, const N: usize, const L: usize, const K: usize> Work<T>
+    for Breeding<'_, F, T, B, N, L, K>
+{
+    type Said = Said<T>;
+
+    #[inline(always)]
+    fn with_lanes<V: Several<Number = T>>(self, like: V) -> Said<T> {
+        let Self { filter, state, reading, next, .. } = self;
+        let in_lanes = reading.map(|Reading { value, extra_variance }| Reading {
+            value: like.with(value),
+            extra_variance: like.with(extra_variance),
+        });
+        let (mut children, mut predicted) = (Children::new(next), Predicted::new());
+        let mut place = 0;
+        while let Some(first) = state.at(place) {
+            // Lanes that are left have the first one's numbers.
+            let mut of = [first; MOST_LANES];
+            for lane in 1..V::WIDTH {
+                of[lane] = state.at(place + lane).unwrap_or(first);
+            }
+            let there = like.mask(|lane| place + lane < state.shares().len());
+            let parents = side_by_side(filter, like, &of, (there, state.pause().open));
+            let start = Parts::gathered(like, |lane| &of[lane].0.belief);
+            let [mut extend, mut hold, mut retract] = [start; 3];
+            let broods = [
+                filter.brood::<V, Compact>(&mut extend, &parents, Phase::Extend, in_lanes, &mut ()),
+                filter.brood::<V, Compact>(&mut hold, &parents, Phase::Hold, in_lanes, &mut ()),
+                filter.brood::<V, Compact>(&mut retract, &parents, Phase::Retract, in_lanes, &mut ()),
+            ];
+            if broods.iter().flatten().any(|heard| !V::none(V::without(heard.alive, heard.sound))) {
+                return Err(StepError::NonFiniteState);
+            }
+            for lane in 0..V::WIDTH {
+                for ((phase, parts), heard) in Phase::ALL.into_iter().zip([&extend, &hold, &retract]).zip(&broods) {
+                    if let Some(heard) = heard
+                        && V::holds(heard.alive, lane)
+                    {
+                        collect(&mut children, &mut predicted, (parts, heard), (lane, phase), reading.is_some());
+                    }
+                }
+            }
+            place += V::WIDTH;
+        }
+        let density = children.density();
+        children.normalise::<B>(&mut ())?;
+        Ok(reading.map(|_| MixtureResidual::new(&predicted, density, filter.weighing().tempering())))
+    }
+}
+
+/// What the children of hypotheses in the lanes of vectors share.
+#[inline(always)]
+fn side_by_side<F, V, const B: usize, const N: usize, const L: usize>(
+    filter: &F,
+    like: V,
+    of: &[(&Share<V::Number, N, L>, Phase); MOST_LANES],
+    (there, was_open): (V::Mask, bool),
+) -> Parents<V>
+where
+    V: Several<Number: Real>,
+    F: Breeds<V::Number, B, N>,
+{
+    let [weight, per_inside, extend, hold, retract, excess, variance] = like.build(|lane| {
+        let (share, from) = of[lane];
+        let [extend, hold, retract] = filter.follows(from, false);
+        let turning = filter.turning(from, &Parts::of(&share.belief), was_open);
+        [share.weight, share.per_inside, extend, hold, retract, turning.excess, turning.variance]
+    });
+    let comes = |phase| like.mask(|lane| of[lane].1 == phase);
+    Parents {
+        weight,
+        per_inside,
+        there,
+        from: [comes(Phase::Extend), comes(Phase::Hold), comes(Phase::Retract)],
+        follows: [extend, hold, retract],
+        turning: Some(Turning { excess, variance }),
+    }
+}
+
+/// Puts the child in a lane among the others.
+#[inline(always)]
+fn collect<V, const B: usize, const N: usize, const L: usize, const K: usize>(
+    children: &mut Children<'_, V::Number, N, L, K>,
+    predicted: &mut Predicted<V::Number>,
+    (parts, heard): (&Parts<V, B>, &Heard<V>),
+    (lane, phase): (usize, Phase),
+    compared: bool,
+) -> Added
+where
+    V: Several<Number: Real>,
+{
+    if compared {
+        let Residual { innovation, variance, .. } = &heard.residual;
+        predicted.add(heard.prior.at(lane), innovation.at(lane), variance.at(lane));
+    }
+    children.add(parts, lane, phase, &heard.weighed.in_lane(lane))
+}
