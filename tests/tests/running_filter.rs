@@ -4,9 +4,9 @@
 use std::collections::BTreeMap;
 
 use ohmstrain_calib::{
-    BranchParams, CorrectionParams, CorrectorParams, EstimatorKind, EstimatorParams, FORMAT, Filter, GaugeParams,
-    LawParams, MotionParams, NoiseParams, PhaseParams, ProcessParams, Quantity, RangeParams, ReadingUnit, Rows,
-    SensorParams, Start, StaticCubic, TrainingRow, Validity, build_filter,
+    BranchParams, CorrectionParams, CorrectionScale, CorrectorParams, EstimatorKind, EstimatorParams, FORMAT, Filter,
+    GaugeParams, LawParams, MotionParams, NoiseParams, PhaseParams, ProcessParams, Quantity, RangeParams, ReadingUnit,
+    Rows, SensorParams, Start, StaticCubic, TrainingRow, Validity, build_filter,
 };
 use ohmstrain_ekf::{Guard, Reading, StepError};
 use proptest::prelude::*;
@@ -92,9 +92,7 @@ fn correction() -> CorrectionParams {
     };
     CorrectionParams {
         corrects: EstimatorKind::SignSplit,
-        reading_centre: 0.2,
-        reading_half_range: 0.25,
-        rate_scales: [0.02, 0.05],
+        readings: CorrectionScale { centre: 0.2, half_range: 0.25, rates: [0.02, 0.05], starts: [[0.1, 0.6]; 6] },
         filter: corrector,
         smoother: corrector,
         rows: (0..40).map(row).collect(),

@@ -6,8 +6,8 @@ use ohmstrain_ekf::{Gaussian, Guard, Reading, ReadingVerdict, StepError};
 
 use crate::CalibrationError;
 use crate::correction_params::{
-    CorrectionParams, CorrectorParams, FILTER_INPUTS, FUTURE_FEATURES, SMOOTHER_INPUTS, TrainingRow, filter_inputs,
-    smoother_inputs,
+    CorrectionParams, CorrectionScale, CorrectorParams, FILTER_INPUTS, FUTURE_FEATURES, SMOOTHER_INPUTS, TrainingRow,
+    filter_inputs, smoother_inputs,
 };
 use crate::corrector::{Corrector, Examples};
 use crate::filter::{Filter, Output, Rows, WayBack};
@@ -27,7 +27,7 @@ pub(crate) struct Corrected {
     filter: Box<dyn Filter>,
     of_filter: Corrector<FILTER_INPUTS>,
     of_smoother: Corrector<SMOOTHER_INPUTS>,
-    scale: FeatureScale<f64>,
+    scale: CorrectionScale,
     readings: Readings,
     /// What the filter has said of the last row.
     said: Option<Output>,
@@ -74,13 +74,13 @@ impl Corrected {
         params: &CorrectionParams,
         limits: RangeParams,
     ) -> Result<Self, CalibrationError> {
-        let scale = params.feature_scale();
+        let scale = params.readings;
         Ok(Self {
             filter,
             of_filter: learned_for_filter(params, limits)?,
             of_smoother: learned(&params.smoother, &params.rows, TrainingRow::smoother_inputs, limits)?,
             scale,
-            readings: Readings::new(scale),
+            readings: Readings::new(scale.past()),
             said: None,
             errors_last_s: params.filter.residual.noise_time_s,
             known: None,
@@ -235,7 +235,7 @@ impl Filter for Corrected {
         // The filter says what it says at the end of the recording.
         (self.readings, self.said, self.known) = (past, None, None);
         let back = self.filter.way_back(rows)?;
-        let (corrector, ahead) = (&self.of_smoother, Readings::new(self.scale));
+        let (corrector, ahead) = (&self.of_smoother, Readings::new(self.scale.future()));
         Ok(Box::new(CorrectedWayBack { back, corrector, rows, starts, ahead }))
     }
 }

@@ -1,9 +1,10 @@
 use ohmstrain_ekf::Reading;
-use ohmstrain_ekf::correction::{FEATURES, FeatureScale, ReadingFeatures};
+use ohmstrain_ekf::correction::FEATURES;
 
 use crate::CalibrationError;
 use crate::corrected::{future_features, outputs};
-use crate::correction_params::{CorrectionParams, CorrectorParams, TrainingRow};
+use crate::correction_params::{CorrectionParams, CorrectionScale, CorrectorParams, TrainingRow};
+use crate::correction_scale::{each_row, reading_scale};
 use crate::corrector::Examples;
 use crate::estimator_params::EstimatorKind;
 use crate::filter::Filter;
@@ -40,13 +41,13 @@ pub(crate) fn fit_correction(
         samples.reading.iter().map(relative).collect::<Vec<Option<Reading<f64>>>>()
     };
     let readings: Vec<Vec<Option<Reading<f64>>>> = recordings.iter().zip(rest_readings).map(relative).collect();
-    let own_scale = || feature_scale(recordings, &readings);
-    let Some(scale) = of_make.map_or_else(own_scale, |prior| Some(prior.feature_scale())) else { return Ok(None) };
+    let own_scale = || reading_scale(recordings, &readings);
+    let Some(scale) = of_make.map_or_else(own_scale, |prior| Some(prior.readings)) else { return Ok(None) };
     let mut rows: Vec<TrainingRow> = of_make.map_or_else(Vec::new, |prior| prior.rows.clone());
     let mut candidates = Vec::new();
     let mut start_s = rows.last().map_or(0.0, |row| row.time_s + PAUSE_S);
     for (samples, readings) in recordings.iter().zip(&readings) {
-        let Some(rows) = candidate_rows(samples, readings, scale, start_s, build)? else { return Ok(None) };
+        let Some(rows) = candidate_rows(samples, readings, &scale, start_s, build)? else { return Ok(None) };
         start_s = rows.last().map_or(start_s, |row: &TrainingRow| row.time_s + PAUSE_S);
         candidates.extend(rows);
     }
@@ -57,7 +58,7 @@ pub(crate) fn fit_correction(
 
 fn learn(
     corrects: EstimatorKind,
-    scale: FeatureScale<f64>,
+    readings: CorrectionScale,
     rows: Vec<TrainingRow>,
     limits: RangeParams,
 ) -> Option<CorrectionParams> {
@@ -67,44 +68,7 @@ fn learn(
     let of_smoother: Vec<_> = rows.iter().map(TrainingRow::smoother_inputs).collect();
     let filter = CorrectorParams::fit(Examples { inputs: &of_filter, strain, time_s, limits })?;
     let smoother = CorrectorParams::fit(Examples { inputs: &of_smoother, strain, time_s, limits })?;
-    let FeatureScale { centre: reading_centre, half_range: reading_half_range, rates: rate_scales } = scale;
-    Some(CorrectionParams { corrects, reading_centre, reading_half_range, rate_scales, filter, smoother, rows })
-}
-
-/// The range of the readings, and the usual size of their rates; none if they do not vary.
-fn feature_scale(recordings: &[Samples], readings: &[Vec<Option<Reading<f64>>>]) -> Option<FeatureScale<f64>> {
-    let known = readings.iter().flatten().flatten().map(|reading| reading.value);
-    let (low, high) = known.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
-    let (centre, half_range) = (digits(0.5 * (low + high)), digits(0.5 * (high - low)));
-    if !(half_range > 0.0) {
-        return None;
-    }
-    let unknown = FeatureScale { centre, half_range, rates: [1.0; 2] };
-    let (mut squares, mut count) = ([0.0; 2], 0.0);
-    for (samples, readings) in recordings.iter().zip(readings) {
-        each_row(samples.time_s, readings, unknown, |_, features, _| {
-            squares.iter_mut().zip(features.rates()).for_each(|(sum, rate)| *sum += rate * rate);
-            count += 1.0;
-        });
-    }
-    let rates = squares.map(|square: f64| digits((square / f64::max(count, 1.0)).sqrt()).max(f64::MIN_POSITIVE));
-    Some(FeatureScale { rates, ..unknown })
-}
-
-/// Visits every row, in order of time, with the features after it.
-fn each_row(
-    time_s: &[f64],
-    readings: &[Option<Reading<f64>>],
-    scale: FeatureScale<f64>,
-    mut visit: impl FnMut(usize, &ReadingFeatures<f64>, Option<[f64; FEATURES]>),
-) {
-    let mut features = ReadingFeatures::new(scale);
-    let mut before_s = time_s.first().copied().unwrap_or(0.0);
-    for (row, (&time_s, reading)) in time_s.iter().zip(readings).enumerate() {
-        let now = features.step((time_s - before_s).abs(), reading.map(|reading| reading.value));
-        before_s = time_s;
-        visit(row, &features, now);
-    }
+    Some(CorrectionParams { corrects, readings, filter, smoother, rows })
 }
 
 /// All rows of a recording with reading and strain, as the calibrated filter and smoother see them; none if the estimator
@@ -112,7 +76,7 @@ fn each_row(
 fn candidate_rows(
     samples: &Samples,
     readings: &[Option<Reading<f64>>],
-    scale: FeatureScale<f64>,
+    scale: &CorrectionScale,
     start_s: f64,
     build: &Build,
 ) -> Result<Option<Vec<TrainingRow>>, CalibrationError> {
@@ -126,11 +90,11 @@ fn candidate_rows(
     let smoothed = build()?.smooth(samples.time_s, readings).map_err(|(row, error)| failed(row, error))?;
     let Some(smoothed) = smoothed else { return Ok(None) };
     let mut past = Vec::with_capacity(readings.len());
-    each_row(samples.time_s, readings, scale, |_, _, now| past.push(now));
+    each_row(samples.time_s, readings, scale.past(), |_, _, now| past.push(now));
     let backwards: (Vec<f64>, Vec<Option<Reading<f64>>>) =
         (samples.time_s.iter().rev().copied().collect(), readings.iter().rev().copied().collect());
     let mut future = Vec::with_capacity(readings.len());
-    each_row(&backwards.0, &backwards.1, scale, |_, _, now| future.push(now));
+    each_row(&backwards.0, &backwards.1, scale.future(), |_, _, now| future.push(now));
     future.reverse();
     let first_s = samples.time_s.first().copied().unwrap_or(0.0);
     let row = |k: usize| {
@@ -187,6 +151,6 @@ pub(crate) fn rounded(row: TrainingRow) -> TrainingRow {
     }
 }
 
-fn digits(value: f64) -> f64 {
+pub(crate) fn digits(value: f64) -> f64 {
     format!("{value:.*e}", DIGITS - 1).parse().unwrap_or(value)
 }

@@ -1,4 +1,4 @@
-use ohmstrain_ekf::correction::{FEATURES, FeatureScale, OUTPUTS};
+use ohmstrain_ekf::correction::{FEATURES, FeatureScale, OUTPUTS, Starts, settled};
 use serde::{Deserialize, Serialize};
 
 use crate::estimator_params::EstimatorKind;
@@ -14,18 +14,28 @@ pub const FUTURE_FEATURES: usize = FEATURES - 1;
 pub struct CorrectionParams {
     /// The filter that it corrects.
     pub corrects: EstimatorKind,
-    /// The change of resistance `R/R₀ - 1` that counts as zero.
-    pub reading_centre: f64,
-    /// Distance from there that counts as one.
-    pub reading_half_range: f64,
-    /// Usual sizes of the readings' two rates.
-    pub rate_scales: [f64; 2],
+    /// How it sees readings.
+    pub readings: CorrectionScale,
     /// For the filter.
     pub filter: CorrectorParams,
     /// For the smoother.
     pub smoother: CorrectorParams,
     /// What both learn from, in order of time.
     pub rows: Vec<TrainingRow>,
+}
+
+/// The scale on which a correction sees readings.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CorrectionScale {
+    /// The change of resistance `R/R₀ - 1` that counts as zero.
+    pub centre: f64,
+    /// Distance from there that counts as one.
+    pub half_range: f64,
+    /// Usual sizes of the readings' two rates.
+    pub rates: [f64; 2],
+    /// Where low-passes usually are at a reading y, a + b y: where they start at the first one.
+    pub starts: Starts<f64>,
 }
 
 /// How one of the two estimates is corrected.
@@ -63,10 +73,17 @@ pub(crate) const FILTER_INPUTS: usize = OUTPUTS + FEATURES;
 /// Inputs of the smoother's.
 pub(crate) const SMOOTHER_INPUTS: usize = FILTER_INPUTS + FUTURE_FEATURES;
 
-impl CorrectionParams {
-    /// The scale of the features.
-    pub(crate) const fn feature_scale(&self) -> FeatureScale<f64> {
-        FeatureScale { centre: self.reading_centre, half_range: self.reading_half_range, rates: self.rate_scales }
+impl CorrectionScale {
+    /// For the past.
+    pub(crate) const fn past(self) -> FeatureScale<f64> {
+        let Self { centre, half_range, rates, starts } = self;
+        FeatureScale { centre, half_range, rates, starts }
+    }
+
+    /// For the future, whose low-passes start settled on the last reading: starts of their own made smoothers surer of other
+    /// motions than they may be.
+    pub(crate) fn future(self) -> FeatureScale<f64> {
+        FeatureScale { starts: settled(), ..self.past() }
     }
 }
 

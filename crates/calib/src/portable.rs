@@ -93,7 +93,7 @@ impl PortableFilter {
         let learned = params.correction.as_ref().filter(|_| asked == EstimatorKind::Corrected);
         let correction = learned.map(|correction| {
             let corrector = learned_for_filter(correction, params.limits)?;
-            Ok::<_, CalibrationError>(PortableCorrection::new(correction.feature_scale(), &corrector))
+            Ok::<_, CalibrationError>(PortableCorrection::new(correction.readings.past(), &corrector))
         });
         let hypotheses = match kind {
             EstimatorKind::SignSplit => HYPOTHESES,

@@ -11,7 +11,7 @@ const ARGUMENTS: i32 = 2;
 const OTHER: i32 = 1;
 
 /// What was there before: a sensor file that may be replaced.
-const OLD: &str = "format = 4\nmade_by = \"ohmstrain 0.0.1\"\n";
+const OLD: &str = "format = 5\nmade_by = \"ohmstrain 0.0.1\"\n";
 
 /// The commands that read a recording, each with a file that it would write.
 const READERS: [&[&str]; 4] = [
@@ -275,7 +275,7 @@ fn a_sensor_file_that_is_none_is_refused_alike_by_every_command() {
         ("hello there\n".into(), ":1: column 7: key with no value, expected `=`".into()),
         ("format = 1\n[law\n".into(), ":2: column 5: unclosed table, expected `]`".into()),
         (Vec::new(), ":1: column 1: missing field `format`".into()),
-        (b"format = 4\n".to_vec(), ":1: column 1: missing field `made_by`".into()),
+        (b"format = 5\n".to_vec(), ":1: column 1: missing field `made_by`".into()),
         (utf_16("format = 1", [0xff, 0xfe], u16::to_le_bytes), ":1: expected a text file in UTF-8, found ".into()),
     ];
     for (content, message) in cases {

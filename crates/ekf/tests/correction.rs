@@ -2,7 +2,7 @@
 
 use ohmstrain_ekf::Gaussian;
 use ohmstrain_ekf::correction::{
-    Correction, FEATURES, FeatureScale, InputScale, LowPass, Process, ReadingFeatures, mixture,
+    Correction, FEATURES, FeatureScale, InputScale, LowPass, Process, ReadingFeatures, mixture, settled,
 };
 use ohmstrain_model::StrainRange;
 
@@ -189,7 +189,7 @@ fn low_passes_are_exact_however_long_the_step() {
 
 #[test]
 fn a_missing_reading_holds_the_features_and_the_next_one_is_taken_over_the_whole_gap() {
-    let scale = FeatureScale { centre: 0.1, half_range: 0.5, rates: [0.01, 0.02] };
+    let scale = FeatureScale { centre: 0.1, half_range: 0.5, rates: [0.01, 0.02], starts: settled() };
     let (mut gappy, mut known) = (ReadingFeatures::<f64>::new(scale), ReadingFeatures::<f64>::new(scale));
     assert_eq!(gappy.step(0.0, None), None);
     let first = gappy.step(0.4, Some(0.3));
@@ -204,4 +204,25 @@ fn a_missing_reading_holds_the_features_and_the_next_one_is_taken_over_the_whole
     let (gappy, known) = (gappy.step(0.5, Some(0.5)).unwrap(), known.step(2.0, Some(0.5)).unwrap());
     assert!(gappy.iter().zip(known).all(|(a, b)| (a - b).abs() < 1e-14));
     assert!(known[1..].iter().all(|x| *x > 0.0) && known[5] < 1.0);
+}
+
+/// What a start is off by fades as exp(−t/τ) and nothing else changes, since low-passes are linear.
+#[test]
+fn low_passes_start_where_they_are_told_to_and_forget_it() {
+    let starts: [[f64; 2]; 6] = std::array::from_fn(|i| [0.1 * i as f64, 0.9 - 0.1 * i as f64]);
+    let scale = FeatureScale { centre: 0.1, half_range: 0.5, rates: [0.01, 0.02], starts };
+    let (mut told, mut at_rest) =
+        (ReadingFeatures::<f64>::new(scale), ReadingFeatures::<f64>::new(FeatureScale { starts: settled(), ..scale }));
+    let first = (0.3 - 0.1) / 0.5;
+    let off = starts.map(|[a, b]| a + b * first - first);
+    let mut time_s = 0.0;
+    for (dt_s, reading) in [(0.0, 0.3), (0.4, 0.5), (3.0, 0.2), (20.0, 0.4)] {
+        time_s += dt_s;
+        told.step(dt_s, Some(reading));
+        at_rest.step(dt_s, Some(reading));
+        for (i, tau_s) in ohmstrain_ekf::correction::TIME_CONSTANTS_S.into_iter().enumerate() {
+            let expected = at_rest.low_passes()[i] + off[i] * (-time_s / tau_s).exp();
+            assert!((told.low_passes()[i] - expected).abs() < 1e-14, "{time_s} s, τ = {tau_s} s");
+        }
+    }
 }

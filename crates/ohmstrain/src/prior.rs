@@ -47,7 +47,7 @@ impl Prior {
     ///
     /// ```
     /// let error = ohmstrain::Prior::from_toml("format = 4").unwrap_err();
-    /// assert_eq!(error.to_string(), "line 1: field `format`: expected version 1, found 4");
+    /// assert_eq!(error.to_string(), "line 1: field `format`: expected version 2, found 4");
     /// ```
     pub fn from_toml(text: &str) -> Result<Self, Error> {
         Ok(Self { params: text::parse(text)? })

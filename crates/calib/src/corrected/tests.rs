@@ -1,11 +1,13 @@
 use std::ops::Range;
 
-use ohmstrain_ekf::correction::{FEATURES, FeatureScale, ReadingFeatures, mixture};
+use ohmstrain_ekf::correction::{FEATURES, FeatureScale, ReadingFeatures, Starts, mixture};
 use ohmstrain_ekf::{Estimate, Gaussian, Guard, Reading, ReadingVerdict, StepError};
 
 use super::{Corrected, future_features, outputs};
 use crate::EstimatorKind;
-use crate::correction_params::{CorrectionParams, CorrectorParams, TrainingRow, filter_inputs, smoother_inputs};
+use crate::correction_params::{
+    CorrectionParams, CorrectionScale, CorrectorParams, TrainingRow, filter_inputs, smoother_inputs,
+};
 use crate::filter::{Filter, Output, Rows, WayBack};
 use crate::gaussian_process::ProcessParams;
 use crate::params::RangeParams;
@@ -128,7 +130,9 @@ impl WayBack for FakeBack {
     }
 }
 
-const SCALE: FeatureScale<f64> = FeatureScale { centre: 0.25, half_range: 0.3, rates: [0.02, 0.05] };
+/// Low-passes start a third of the way to the middle.
+const STARTS: Starts<f64> = [[0.0, 0.67]; 6];
+const SCALE: CorrectionScale = CorrectionScale { centre: 0.25, half_range: 0.3, rates: [0.02, 0.05], starts: STARTS };
 
 fn reading(time_s: f64) -> Reading<f64> {
     Reading::from(0.25 + 0.28 * (0.3 * time_s + 0.2).sin() + 0.02 * (2.1 * time_s).sin())
@@ -138,8 +142,8 @@ fn reading(time_s: f64) -> Reading<f64> {
 type Seen = Option<[f64; FEATURES]>;
 
 /// Features of the past, or of the future of times in falling order.
-fn features(time_s: &[f64], readings: &[Option<Reading<f64>>]) -> Vec<Seen> {
-    let mut features = ReadingFeatures::new(SCALE);
+fn features(time_s: &[f64], readings: &[Option<Reading<f64>>], scale: FeatureScale<f64>) -> Vec<Seen> {
+    let mut features = ReadingFeatures::new(scale);
     let mut before_s = time_s[0];
     let mut step = |time_s: f64, reading: Option<Reading<f64>>| {
         let dt_s = (time_s - before_s).abs();
@@ -152,9 +156,9 @@ fn features(time_s: &[f64], readings: &[Option<Reading<f64>>]) -> Vec<Seen> {
 fn both_ways(time_s: &[f64], readings: &[Option<Reading<f64>>]) -> (Vec<Seen>, Vec<Seen>) {
     let back: (Vec<f64>, Vec<Option<Reading<f64>>>) =
         (time_s.iter().rev().copied().collect(), readings.iter().rev().copied().collect());
-    let mut future = features(&back.0, &back.1);
+    let mut future = features(&back.0, &back.1, SCALE.future());
     future.reverse();
-    (features(time_s, readings), future)
+    (features(time_s, readings, SCALE.past()), future)
 }
 
 fn params() -> CorrectionParams {
@@ -173,9 +177,7 @@ fn params() -> CorrectionParams {
     let corrector = CorrectorParams { sd_scale: 0.9, direct: process(2.0), residual: process(4.0) };
     CorrectionParams {
         corrects: EstimatorKind::SignSplit,
-        reading_centre: SCALE.centre,
-        reading_half_range: SCALE.half_range,
-        rate_scales: SCALE.rates,
+        readings: SCALE,
         filter: corrector,
         smoother: corrector,
         rows: (0..600).step_by(10).map(row).collect(),

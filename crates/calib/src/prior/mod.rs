@@ -28,7 +28,7 @@ use crate::estimator_params::EstimatorKind;
 use crate::params::{Quantity, Validity};
 
 /// Version of the file that a prior is written to.
-pub const PRIOR_FORMAT: u32 = 1;
+pub const PRIOR_FORMAT: u32 = 2;
 /// Sensors that a spread can be told from.
 pub const FEWEST_SENSORS: usize = 3;
 

@@ -1,9 +1,9 @@
-use ohmstrain_ekf::correction::{FEATURES, FeatureScale, RATE_GAIN};
+use ohmstrain_ekf::correction::{FEATURES, RATE_GAIN};
 use serde::{Deserialize, Serialize};
 
 use super::median;
 use crate::correction_fit::{PAUSE_S, rounded};
-use crate::correction_params::{CorrectionParams, FUTURE_FEATURES, TrainingRow};
+use crate::correction_params::{CorrectionParams, CorrectionScale, FUTURE_FEATURES, TrainingRow};
 use crate::estimator_params::EstimatorKind;
 
 /// Rows of other sensors that a correction learns from beside the new sensor's own: as many as its own at most.
@@ -17,12 +17,8 @@ const LEAST_FROM_BOUND: f64 = 1e-6;
 pub struct CorrectionPrior {
     /// The filter that it corrects.
     pub corrects: EstimatorKind,
-    /// As in [`CorrectionParams`], of the median sensor.
-    pub reading_centre: f64,
-    /// Likewise.
-    pub reading_half_range: f64,
-    /// Likewise.
-    pub rate_scales: [f64; 2],
+    /// How it sees readings: the median sensor's.
+    pub readings: CorrectionScale,
     /// Rows of all sensors, in order of time.
     pub rows: Vec<TrainingRow>,
 }
@@ -31,11 +27,8 @@ impl CorrectionPrior {
     /// From the corrections of several sensors, all of one filter; `None` without any.
     pub(super) fn learn(sensors: &[&CorrectionParams]) -> Option<Self> {
         let first = sensors.first()?;
-        let of_make = FeatureScale {
-            centre: median(sensors.iter().map(|one| one.reading_centre)),
-            half_range: median(sensors.iter().map(|one| one.reading_half_range)),
-            rates: [0, 1].map(|i| median(sensors.iter().map(|one| one.rate_scales[i]))),
-        };
+        let scales: Vec<CorrectionScale> = sensors.iter().map(|one| one.readings).collect();
+        let of_make = CorrectionScale::median(&scales);
         let mut rows: Vec<TrainingRow> = Vec::new();
         let mut start_s = 0.0;
         for (k, sensor) in sensors.iter().enumerate() {
@@ -44,27 +37,37 @@ impl CorrectionPrior {
             let first_s = sensor.rows.first().map_or(0.0, |row| row.time_s);
             for i in 0..wanted.min(sensor.rows.len()) {
                 let place = (i * sensors.len() + k) * sensor.rows.len() / (wanted * sensors.len());
-                let row = moved(&sensor.rows[place], sensor.feature_scale(), of_make);
+                let row = moved(&sensor.rows[place], &sensor.readings, &of_make);
                 rows.push(rounded(TrainingRow { time_s: start_s + row.time_s - first_s, ..row }));
             }
             start_s = rows.last().map_or(0.0, |row| row.time_s + PAUSE_S);
         }
-        Some(Self {
-            corrects: first.corrects,
-            reading_centre: of_make.centre,
-            reading_half_range: of_make.half_range,
-            rate_scales: of_make.rates,
-            rows,
-        })
+        Some(Self { corrects: first.corrects, readings: of_make, rows })
+    }
+}
+
+impl CorrectionScale {
+    /// The median of each number, of starts where they are on the median scale.
+    fn median(scales: &[Self]) -> Self {
+        let of = |number: &dyn Fn(&Self) -> f64| median(scales.iter().map(number));
+        let (centre, half_range) = (of(&|scale| scale.centre), of(&|scale| scale.half_range));
+        let start = |i: usize, part: usize| of(&|scale| scale.start_on(scale.starts[i], centre, half_range)[part]);
+        Self {
+            centre,
+            half_range,
+            rates: [0, 1].map(|i| of(&|scale| scale.rates[i])),
+            starts: std::array::from_fn(|i| [start(i, 0), start(i, 1)]),
+        }
     }
 
-    pub(crate) const fn feature_scale(&self) -> FeatureScale<f64> {
-        FeatureScale { centre: self.reading_centre, half_range: self.reading_half_range, rates: self.rate_scales }
+    /// Where a low-pass starts, told on another scale.
+    fn start_on(&self, [a, b]: [f64; 2], centre: f64, half_range: f64) -> [f64; 2] {
+        [(a * self.half_range + (b - 1.0) * (centre - self.centre)) / half_range, b]
     }
 }
 
 /// A row as it would have been seen on another scale.
-fn moved(row: &TrainingRow, from: FeatureScale<f64>, to: FeatureScale<f64>) -> TrainingRow {
+fn moved(row: &TrainingRow, from: &CorrectionScale, to: &CorrectionScale) -> TrainingRow {
     let size = from.half_range / to.half_range;
     let rate = |i: usize, bounded: f64| {
         let most = 1.0 - LEAST_FROM_BOUND;
@@ -83,16 +86,16 @@ fn moved(row: &TrainingRow, from: FeatureScale<f64>, to: FeatureScale<f64>) -> T
 
 #[cfg(test)]
 mod tests {
-    use ohmstrain_ekf::correction::ReadingFeatures;
+    use ohmstrain_ekf::correction::{ReadingFeatures, settled};
 
     use super::*;
 
     /// The features themselves, seen on both scales.
     #[test]
     fn rows_are_what_the_other_scale_would_have_seen() {
-        let from = FeatureScale { centre: 0.3, half_range: 0.25, rates: [0.08, 0.05] };
-        let to = FeatureScale { centre: 0.2, half_range: 0.4, rates: [0.11, 0.02] };
-        let (mut on_from, mut on_to) = (ReadingFeatures::new(from), ReadingFeatures::new(to));
+        let scale = |centre, half_range, rates| CorrectionScale { centre, half_range, rates, starts: settled() };
+        let (from, to) = (scale(0.3, 0.25, [0.08, 0.05]), scale(0.2, 0.4, [0.11, 0.02]));
+        let (mut on_from, mut on_to) = (ReadingFeatures::new(from.past()), ReadingFeatures::new(to.past()));
         for k in 0..200 {
             let reading = Some(0.3 + 0.2 * (0.1 * f64::from(k)).sin());
             let (Some(past), Some(expected)) = (on_from.step(0.1, reading), on_to.step(0.1, reading)) else {
@@ -101,11 +104,25 @@ mod tests {
             let future: [f64; FUTURE_FEATURES] = std::array::from_fn(|i| past[i + 1]);
             let zeros = [0.0; ohmstrain_ekf::correction::OUTPUTS];
             let row = TrainingRow { time_s: 0.0, strain: 0.0, past, future, filtered: zeros, smoothed: zeros };
-            let found = moved(&row, from, to);
+            let found = moved(&row, &from, &to);
             for (i, expected) in expected.into_iter().enumerate() {
                 assert!((found.past[i] - expected).abs() < 1e-9, "row {k}, feature {i}: {} {expected}", found.past[i]);
                 assert!(i == 0 || found.future[i - 1] == found.past[i]);
             }
+        }
+    }
+
+    /// The same low-pass at the same reading, whatever scale it is told on.
+    #[test]
+    fn starts_are_moved_with_the_scale() {
+        let (centre, half_range, start) = (0.3, 0.25, [0.3, 0.4]);
+        let scale = CorrectionScale { centre, half_range, rates: [0.1; 2], starts: settled() };
+        let low_pass = |centre: f64, half_range: f64, [a, b]: [f64; 2], reading: f64| {
+            centre + half_range * (a + b * (reading - centre) / half_range)
+        };
+        for reading in [0.1, 0.35, 0.8] {
+            let moved = low_pass(0.2, 0.4, scale.start_on(start, 0.2, 0.4), reading);
+            assert!((moved - low_pass(centre, half_range, start, reading)).abs() < 1e-15, "{reading}");
         }
     }
 }

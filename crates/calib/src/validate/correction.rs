@@ -1,6 +1,6 @@
 use super::table::{FieldError, Table};
 use super::{FACTOR, POSITIVE, SIGNED};
-use crate::correction_params::{CorrectionParams, CorrectorParams, TrainingRow};
+use crate::correction_params::{CorrectionParams, CorrectionScale, CorrectorParams, TrainingRow};
 use crate::estimator_params::EstimatorKind;
 use crate::gaussian_process::ProcessParams;
 
@@ -12,9 +12,7 @@ impl CorrectionParams {
         if self.corrects == EstimatorKind::Corrected {
             return Err(table.wrong("corrects", "a filter", self.corrects.name()));
         }
-        table.number("reading_centre", self.reading_centre, SIGNED)?;
-        table.number("reading_half_range", self.reading_half_range, POSITIVE)?;
-        table.numbers("rate_scales", &self.rate_scales, POSITIVE)?;
+        self.readings.validate(&table.table("readings"))?;
         self.filter.validate(&table.table("filter"))?;
         self.smoother.validate(&table.table("smoother"))?;
         if !ROWS.contains(&self.rows.len()) {
@@ -22,6 +20,15 @@ impl CorrectionParams {
             return Err(table.wrong("rows", expected, self.rows.len()));
         }
         self.rows.iter().enumerate().try_for_each(|(index, row)| row.validate(&table.entry("rows", index)))
+    }
+}
+
+impl CorrectionScale {
+    pub(super) fn validate(&self, table: &Table) -> Result<(), FieldError> {
+        table.number("centre", self.centre, SIGNED)?;
+        table.number("half_range", self.half_range, POSITIVE)?;
+        table.numbers("rates", &self.rates, POSITIVE)?;
+        table.numbers("starts", self.starts.as_flattened(), SIGNED)
     }
 }
 

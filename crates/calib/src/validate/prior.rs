@@ -77,9 +77,7 @@ impl CorrectionPrior {
         if self.corrects == EstimatorKind::Corrected {
             return Err(table.wrong("corrects", "a filter", self.corrects.name()));
         }
-        table.number("reading_centre", self.reading_centre, SIGNED)?;
-        table.number("reading_half_range", self.reading_half_range, POSITIVE)?;
-        table.numbers("rate_scales", &self.rate_scales, POSITIVE)?;
+        self.readings.validate(&table.table("readings"))?;
         if !ROWS.contains(&self.rows.len()) {
             let expected = format!("{} to {} entries", ROWS.start(), ROWS.end());
             return Err(table.wrong("rows", expected, self.rows.len()));

@@ -14,6 +14,8 @@ pub struct CorrectionConstants {
     centre: Literal,
     half_range: Literal,
     rates: [Literal; 2],
+    /// Offset and slope of each low-pass' start.
+    starts: Vec<[Literal; 2]>,
     time_constants_s: Vec<Literal>,
     /// What low-passes forget in the usual time between readings, and the mean over it.
     decays: Vec<Literal>,
@@ -101,6 +103,7 @@ impl CorrectionConstants {
             centre: narrow(correction.features.centre),
             half_range: narrow(correction.features.half_range),
             rates: correction.features.rates.map(narrow),
+            starts: correction.features.starts.iter().map(|start| start.map(narrow)).collect(),
             time_constants_s: narrowed(&TIME_CONSTANTS_S),
             decays: decays.iter().map(|(decay, _)| Literal(*decay)).collect(),
             mean_decays: decays.iter().map(|(_, mean)| Literal(*mean)).collect(),

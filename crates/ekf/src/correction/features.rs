@@ -25,6 +25,17 @@ pub struct FeatureScale<T> {
     pub half_range: T,
     /// Usual size (standard deviation) of the two rates, in half ranges.
     pub rates: [T; 2],
+    /// Where low-passes start: a and b of a + b y at the first reading y.
+    pub starts: Starts<T>,
+}
+
+/// Lines on which low-passes start.
+pub type Starts<T> = [[T; 2]; TIME_CONSTANTS_S.len()];
+
+/// All low-passes are at the first reading, as if it had been there for long.
+#[must_use]
+pub fn settled<T: Real>() -> Starts<T> {
+    [[T::zero(), T::one()]; TIME_CONSTANTS_S.len()]
 }
 
 /// What a correction sees of the readings up to now: the scaled reading, its distances from low-passes of 0.5, 2, 8 and
@@ -56,7 +67,13 @@ impl<T: Real> ReadingFeatures<T> {
             let scaled = (reading - self.scale.centre) / self.scale.half_range;
             let scaled = scaled.max(-T::of(FARTHEST)).min(T::of(FARTHEST));
             let waited_s = self.waited_s;
-            let low = self.low_passes.each_mut().map(|low_pass| low_pass.next(waited_s, scaled));
+            let low = if self.now.is_some() {
+                self.low_passes.each_mut().map(|low_pass| low_pass.next(waited_s, scaled))
+            } else {
+                let mut starts = self.scale.starts.into_iter();
+                let mut start = || starts.next().map_or(scaled, |[a, b]| a + b * scaled);
+                self.low_passes.each_mut().map(|low_pass| low_pass.start(scaled, start()))
+            };
             self.waited_s = T::zero();
             self.now = Some(self.features(scaled, &low));
         }
@@ -68,6 +85,12 @@ impl<T: Real> ReadingFeatures<T> {
         let [fast, slow] = RATES.map(|(sooner, later)| low[sooner] - low[later]);
         let bounded = |rate: T, usual: T| (T::of(RATE_GAIN) * rate / usual).tanh();
         [scaled, a, b, c, d, bounded(fast, self.scale.rates[0]), bounded(slow, self.scale.rates[1])]
+    }
+
+    /// The low-passes at the last reading, in half ranges: what a calibration takes [`FeatureScale::starts`] from.
+    #[must_use]
+    pub fn low_passes(&self) -> [T; TIME_CONSTANTS_S.len()] {
+        self.low_passes.each_ref().map(LowPass::value)
     }
 
     /// The two rates before they are bounded, in half ranges, of a row whose reading was the last: what a calibration

@@ -1,7 +1,7 @@
 use crate::Real;
 
 /// Exponential low-pass, τ L′ = y − L, exact for readings that move linearly from one known reading to the next, however
-/// long the step. It starts settled on the first reading.
+/// long the step. It starts settled on the first reading, unless it is told where.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LowPass<T> {
     tau_s: T,
@@ -26,6 +26,12 @@ impl<T: Real> LowPass<T> {
     #[must_use]
     pub const fn value(&self) -> T {
         self.value
+    }
+
+    /// Takes the first reading, at which the low-pass is said to be at `value`, and returns that.
+    pub fn start(&mut self, reading: T, value: T) -> T {
+        (self.last, self.value) = (Some(reading), value);
+        value
     }
 
     /// Takes a reading `dt_s` seconds after the one before, at least zero, and returns the low-pass at its time.

@@ -19,7 +19,7 @@ mod process;
 use ohmstrain_model::StrainRange;
 
 use crate::{Gaussian, Real};
-pub use features::{FARTHEST, FEATURES, FeatureScale, RATE_GAIN, ReadingFeatures, TIME_CONSTANTS_S};
+pub use features::{FARTHEST, FEATURES, FeatureScale, RATE_GAIN, ReadingFeatures, Starts, TIME_CONSTANTS_S, settled};
 pub use low_pass::LowPass;
 use process::{Kernels, Said};
 pub use process::{LINEAR, Process};

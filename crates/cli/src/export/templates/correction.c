@@ -13,6 +13,8 @@ static const float TIME_CONSTANT_S[LOW_PASSES] = {<< correction.time_constants_s
 /* What they forget over the usual interval, and its mean: exponentials are dear. */
 static const float USUAL_DECAY[LOW_PASSES] = {<< correction.decays|join("f, ") >>f};
 static const float USUAL_MEAN_DECAY[LOW_PASSES] = {<< correction.mean_decays|join("f, ") >>f};
+/* Where they start at a first reading y: a + b y. */
+static const float START[LOW_PASSES][2] = {{% for start in correction.starts %}{<< start|join("f, ") >>f}<< ", " if not loop.last >>{% endfor %}};
 static const float RATE_SCALE[2] = {<< correction.rates|join("f, ") >>f};
 
 /* Standardised inputs of rows of the calibration; the first are the inducing rows. */
@@ -66,7 +68,7 @@ static void watch(readings *seen, float dt_s, const float *rho)
             seen->low_pass[i] = decay * seen->low_pass[i] + (mean_decay - decay) * seen->scaled +
                                 (1.0f - mean_decay) * scaled;
         } else {
-            seen->low_pass[i] = scaled;
+            seen->low_pass[i] = START[i][0] + START[i][1] * scaled;
         }
         low[i] = seen->low_pass[i];
     }

@@ -189,6 +189,7 @@ pub fn features() -> ReadingFeatures<f32> {
         centre: << correction.centre >>,
         half_range: << correction.half_range >>,
         rates: [<< correction.rates|join(", ") >>],
+        starts: [{% for start in correction.starts %}[<< start|join(", ") >>]{% if not loop.last %}, {% endif %}{% endfor %}],
     })
 }
 

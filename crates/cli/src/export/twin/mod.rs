@@ -84,9 +84,10 @@ impl<'a, T: Real, const B: usize, const N: usize, const L: usize, const K: usize
         };
         let sd = model.noise().reading_sd;
         let watched = parts.correction.map(|correction| {
-            let FeatureScale { centre, half_range, rates } = correction.features;
+            let FeatureScale { centre, half_range, rates, starts } = correction.features;
+            let starts = starts.map(|start| start.map(number));
             let (centre, half_range) = (number(centre), number(half_range));
-            ReadingFeatures::new(FeatureScale { centre, half_range, rates: rates.map(number) })
+            ReadingFeatures::new(FeatureScale { centre, half_range, rates: rates.map(number), starts })
         });
         let fresh = Memory {
             moving,
