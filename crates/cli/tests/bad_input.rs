@@ -248,7 +248,7 @@ fn a_sensor_file_that_is_none_is_refused_alike_by_every_command() {
         (unknown.0.into(), format!(":{}: column 1: unknown field `colour`, expected one of `format`, ", unknown.1)),
         (in_table.0.into(), format!(":{}: column 1: unknown field `tau_min`, expected one of `tau_s`, ", in_table.1)),
         // What a newer version has is not unknown but newer.
-        (newer.0.into(), ":1: field `format`: expected version 4, found 9".into()),
+        (newer.0.into(), ":1: field `format`: expected version 5, found 9".into()),
         (word.0.into(), format!(":{}: column 16: invalid type: string \"high\", expected f64", word.1)),
         (
             negative.0.into(),

@@ -11,7 +11,7 @@ use crate::{ReferenceDoubt, UnitDoubt};
 ///
 /// ```
 /// let error = ohmstrain::Sensor::from_toml("format = 3").unwrap_err();
-/// assert_eq!(error.to_string(), "line 1: field `format`: expected version 4, found 3");
+/// assert_eq!(error.to_string(), "line 1: field `format`: expected version 5, found 3");
 /// ```
 #[derive(Debug, Error)]
 #[non_exhaustive]
@@ -102,7 +102,7 @@ impl Error {
     ///
     /// ```
     /// let error = ohmstrain::Sensor::from_toml("format = 3").unwrap_err();
-    /// assert_eq!(error.in_file("s.toml"), "s.toml:1: field `format`: expected version 4, found 3");
+    /// assert_eq!(error.in_file("s.toml"), "s.toml:1: field `format`: expected version 5, found 3");
     /// ```
     #[must_use]
     pub fn in_file(&self, name: &str) -> String {
@@ -121,8 +121,8 @@ impl Error {
 /// ```
 /// use ohmstrain::{Error, Sensor, TextCause};
 ///
-/// let Err(Error::Text(error)) = Sensor::from_toml("format = 5") else { panic!() };
-/// assert!(matches!(error.cause, TextCause::Format { expected: 4, found: 5 }));
+/// let Err(Error::Text(error)) = Sensor::from_toml("format = 4") else { panic!() };
+/// assert!(matches!(error.cause, TextCause::Format { expected: 5, found: 4 }));
 /// assert_eq!(error.place.unwrap().line, 1);
 /// ```
 #[derive(Debug)]
