@@ -144,6 +144,7 @@ pub(crate) trait Work<T> {
     type Said;
 
     /// Does it with lanes as these.
+    #[cfg_attr(not(all(feature = "simd", target_arch = "x86_64")), expect(dead_code, reason = "only vectors ask"))]
     fn with_lanes<V: Several<Number = T>>(self, like: V) -> Self::Said;
 }
 
