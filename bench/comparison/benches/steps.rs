@@ -5,7 +5,7 @@ use std::hint::black_box;
 
 use criterion::measurement::WallTime;
 use criterion::{BenchmarkGroup, Criterion, Throughput, criterion_group, criterion_main};
-use ohmstrain_bench_comparison::every_rival;
+use ohmstrain_bench_comparison::{every_nonlinear_rival, every_rival};
 use ohmstrain_bench_filters::{Filter, STEPS, Visitor, every_filter, linearised};
 
 struct Timed<'a, 'b>(&'a mut BenchmarkGroup<'b, WallTime>);
@@ -29,6 +29,7 @@ fn steps(criterion: &mut Criterion) {
     group.throughput(Throughput::Elements(STEPS as u64));
     let mut timed = Timed(&mut group);
     every_rival(&linearised(), &mut timed);
+    every_nonlinear_rival(&mut timed);
     every_filter(&mut timed);
     group.finish();
 }

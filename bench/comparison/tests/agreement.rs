@@ -3,11 +3,11 @@
 
 use nalgebra::SVector;
 use ohmstrain_bench_comparison::{
-    RecordingPass, adskalman_smoother, every_rival, simulated_recording, typed_kalman_smoother,
+    RecordingPass, adskalman_smoother, every_nonlinear_rival, every_rival, simulated_recording, typed_kalman_smoother,
 };
 use ohmstrain_bench_filters::{
-    DT_S, Filter, Gated, GatedSparse, LinearModel, PackedReference, RANGE, STEPS, Visitor, ekf, every_filter,
-    linear_sensor, linearised, log_likelihood, readings, sensor, smoother, sparse_smooth, strain_at,
+    DT_S, Filter, Gated, GatedSparse, LinearModel, NonlinearReference, PackedReference, RANGE, STEPS, Visitor, ekf,
+    every_filter, linear_sensor, linearised, log_likelihood, readings, sensor, smoother, sparse_smooth, strain_at,
 };
 use ohmstrain_ekf::{Belief, Ekf, Reading, SparseEkf, Unscented};
 
@@ -78,6 +78,22 @@ fn all_filters_agree_on_the_linear_sensor() {
     // The strain moves, so that agreement says something.
     let (least, most) = compared.expected.iter().fold((1.0_f64, -1.0_f64), |(a, b), x| (a.min(*x), b.max(*x)));
     assert!(most - least > 0.05, "{least} to {most}");
+}
+
+/// F, Q and H of ours are nowhere written down: this says that they are those that the others were given. What a filter leaves of
+/// an uncertain direction is smooth, so that rounding stays rounding.
+#[test]
+fn all_filters_agree_on_the_sensor_that_is_not_linear() {
+    let readings = readings::<1>(STEPS);
+    let mut ours = GatedSparse::<1, 3, 6>::new(sensor());
+    let take = |reading: &f64| {
+        assert!(ours.step(*reading));
+        ours.strain()
+    };
+    let mut compared = Compared { expected: readings.iter().map(take).collect(), seen: Vec::new() };
+    every_nonlinear_rival(&mut compared);
+    compared.visit("hand-written", &readings, NonlinearReference::new());
+    assert_eq!(compared.seen.len(), 5);
 }
 
 #[test]

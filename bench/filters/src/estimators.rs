@@ -5,7 +5,10 @@ use ohmstrain_ekf::{
 use ohmstrain_model::{Phase, SwitchedModel};
 
 use crate::mixtures::GatedMixture;
-use crate::{DT_S, Filter, GatedSparse, PackedReference, RANGE, Visitor, linearised, phased_sensor, readings, sensor};
+use crate::{
+    DT_S, Filter, GatedSparse, NonlinearReference, PackedReference, RANGE, Visitor, linear_sensor, linearised,
+    phased_sensor, readings, sensor,
+};
 
 /// Two periods of the readings, so that they can be repeated.
 pub const STEPS: usize = 1000;
@@ -65,7 +68,7 @@ pub fn ekf<const B: usize, const N: usize, const L: usize>(
     Gated::new(Ekf::new(model).iterated(iterations), Belief::initial(&model))
 }
 
-/// Shows every filter with a thousand readings of the sensor it is for; all but the linear ones are for [`sensor`].
+/// Shows every filter with a thousand readings of the sensor it is for; all but the linear ones are for a [`sensor`].
 ///
 /// # Panics
 /// Never: the parameters are valid.
@@ -73,6 +76,8 @@ pub fn every_filter(visitor: &mut impl Visitor) {
     let readings = readings::<1>(STEPS);
     let three = sensor::<1, 3>();
     visitor.visit("reference_3", &readings, PackedReference::new(&linearised()));
+    visitor.visit("nonlinear_reference_3", &readings, NonlinearReference::new());
+    visitor.visit("sparse_ekf_3_linear", &readings, GatedSparse::<1, 3, 6>::new(linear_sensor()));
     visitor.visit("sparse_ekf_3", &readings, GatedSparse::<1, 3, 6>::new(three));
     visitor.visit("sparse_ekf_4", &readings, GatedSparse::<1, 4, 10>::new(sensor()));
     visitor.visit("ekf_3", &readings, ekf::<1, 3, 6>(three, 1));

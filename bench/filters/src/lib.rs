@@ -3,6 +3,7 @@
 
 mod estimators;
 mod mixtures;
+mod nonlinear;
 mod readings;
 mod recordings;
 mod reference;
@@ -10,10 +11,11 @@ mod sensor;
 mod sparse;
 
 pub use estimators::{Gated, STEPS, ekf, every_filter};
+pub use nonlinear::{Ahead, Expected, NonlinearModel};
 pub use readings::{readings, strain_at};
 pub use recordings::{Smoother, log_likelihood, smoother, sparse_smooth};
-pub use reference::PackedReference;
-pub use sensor::{DT_S, LinearModel, RANGE, linear_sensor, linearised, phased_sensor, sensor};
+pub use reference::{NonlinearReference, PackedReference};
+pub use sensor::{DT_S, LinearModel, RANGE, linear_sensor, linearised, phased_sensor, sensor, sensor_of};
 pub use sparse::GatedSparse;
 
 /// A filter with its state.

@@ -17,7 +17,7 @@ pub fn strain_at(k: usize) -> f64 {
 /// repeats too.
 #[must_use]
 pub fn readings<const B: usize>(count: usize) -> Vec<f64> {
-    let law = law::<B>();
+    let law = law::<f64, B>();
     let mut noise = Noise(1);
     let mut relaxation = [0.0; B];
     let mut period = Vec::new();

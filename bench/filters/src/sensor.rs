@@ -1,7 +1,9 @@
 //! The sensor that everything here runs on. Illustrative numbers.
 
 use ohmstrain_ekf::{Belief, Channel, Dynamics};
-use ohmstrain_model::{Branch, Gauge, ModelNoise, Motion, Phase, SensorLaw, StrainRange, SwitchedModel, Symmetric};
+use ohmstrain_model::{
+    Branch, Gauge, ModelNoise, Motion, Phase, Scalar, SensorLaw, StrainRange, SwitchedModel, Symmetric,
+};
 
 /// Time between readings, s.
 pub const DT_S: f64 = 0.01;
@@ -13,20 +15,20 @@ pub(crate) const READING_SD: f64 = 2e-3;
 pub const RANGE: StrainRange<f64> = StrainRange { lower: -0.02, upper: 0.35 };
 
 /// The law of a sensor whose `B` branches share what relaxes.
-pub(crate) fn law<const B: usize>() -> SensorLaw<f64, B> {
+pub(crate) fn law<T: Scalar, const B: usize>() -> SensorLaw<T, B> {
     let share = 1.0 / B as f64;
     SensorLaw {
-        gauge: Gauge::Polynomial { coefficients: [1.6, -1.2, 0.5] },
-        extend_viscosity_s: 0.02,
-        retract_viscosity_s: -0.01,
+        gauge: Gauge::Polynomial { coefficients: [1.6, -1.2, 0.5].map(T::of) },
+        extend_viscosity_s: T::of(0.02),
+        retract_viscosity_s: T::of(-0.01),
         branches: std::array::from_fn(|i| Branch {
-            tau_s: 4.0 * 4_f64.powi(i as i32),
-            extend_gain: 0.3 * share,
-            retract_gain: 0.2 * share,
-            extend_gain_slope: -0.2 * share,
-            retract_gain_slope: -0.1 * share,
+            tau_s: T::of(4.0 * 4_f64.powi(i as i32)),
+            extend_gain: T::of(0.3 * share),
+            retract_gain: T::of(0.2 * share),
+            extend_gain_slope: T::of(-0.2 * share),
+            retract_gain_slope: T::of(-0.1 * share),
         }),
-        range: RANGE,
+        range: StrainRange { lower: T::of(RANGE.lower), upper: T::of(RANGE.upper) },
     }
 }
 
@@ -36,6 +38,15 @@ pub(crate) fn law<const B: usize>() -> SensorLaw<f64, B> {
 /// Never: the parameters are valid.
 #[must_use]
 pub fn sensor<const B: usize, const N: usize>() -> SwitchedModel<f64, B, N> {
+    sensor_of()
+}
+
+/// The same in numbers of any kind.
+///
+/// # Panics
+/// Never: the parameters are valid.
+#[must_use]
+pub fn sensor_of<T: Scalar, const B: usize, const N: usize>() -> SwitchedModel<T, B, N> {
     model(law(), motion(0.15))
 }
 
@@ -66,13 +77,18 @@ pub fn linear_sensor() -> SwitchedModel<f64, 1, 3> {
     model(law, motion(0.0))
 }
 
-fn motion(strain_mean: f64) -> Motion<f64> {
-    Motion::ornstein_uhlenbeck(0.5, 0.1, strain_mean, 0.1).expect("the parameters are valid")
+fn motion<T: Scalar>(strain_mean: f64) -> Motion<T> {
+    let motion = Motion::ornstein_uhlenbeck(T::of(0.5), T::of(0.1), T::of(strain_mean), T::of(0.1));
+    motion.expect("the parameters are valid")
 }
 
-fn model<const B: usize, const N: usize>(law: SensorLaw<f64, B>, motion: Motion<f64>) -> SwitchedModel<f64, B, N> {
-    let baseline_sd = if N == B + 3 { 0.02 } else { 0.0 };
-    let noise = ModelNoise { reading_sd: READING_SD, branch_sd: 5e-3, baseline_sd, baseline_time_s: 30.0 };
+fn model<T: Scalar, const B: usize, const N: usize>(law: SensorLaw<T, B>, motion: Motion<T>) -> SwitchedModel<T, B, N> {
+    let noise = ModelNoise {
+        reading_sd: T::of(READING_SD),
+        branch_sd: T::of(5e-3),
+        baseline_sd: T::of(if N == B + 3 { 0.02 } else { 0.0 }),
+        baseline_time_s: T::of(30.0),
+    };
     SwitchedModel::new(law, motion, noise).expect("the parameters are valid")
 }
 

@@ -99,34 +99,57 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
         belief: &mut Belief<T, N, L>,
         reading: Option<Reading<T>>,
     ) -> Result<Option<Residual<T>>, StepError> {
+        match self.step_once(belief, reading) {
+            Err(refused) => self.step_again(belief, reading, refused),
+            taken => taken,
+        }
+    }
+
+    /// Never inlined: beside a second try a compiler would compute in advance, and store, what both have in common.
+    #[inline(never)]
+    fn step_once<const L: usize>(
+        &self,
+        belief: &mut Belief<T, N, L>,
+        reading: Option<Reading<T>>,
+    ) -> Result<Option<Residual<T>>, StepError> {
         let mut parts = Parts::of(belief);
-        let residual = self.advance(&mut parts, reading, |parts| *parts = Parts::of(belief))?;
+        let residual = self.advance(&mut parts, reading)?;
         parts.put_into(belief);
         Ok(residual)
     }
 
-    /// [`Self::step`] of a belief taken apart, which `restore` brings back; after an error `parts` means nothing.
+    /// A step that was `refused`, with more and more noise in its reading.
+    #[cold]
+    #[inline(never)]
+    pub(crate) fn step_again<const L: usize>(
+        &self,
+        belief: &mut Belief<T, N, L>,
+        mut reading: Option<Reading<T>>,
+        mut refused: StepError,
+    ) -> Result<Option<Residual<T>>, StepError> {
+        let mut tries = 0;
+        loop {
+            tries += 1;
+            reading = Some(self.coarser(reading, tries, refused)?);
+            match self.step_once(belief, reading) {
+                Err(error) => refused = error,
+                taken => return taken,
+            }
+        }
+    }
+
+    /// A step of a belief taken apart; after an error `parts` means nothing.
     #[inline(always)]
     pub(crate) fn advance(
         &self,
         parts: &mut Parts<T, B>,
-        mut reading: Option<Reading<T>>,
-        restore: impl Fn(&mut Parts<T, B>),
+        reading: Option<Reading<T>>,
     ) -> Result<Option<Residual<T>>, StepError> {
-        let mut tries = 0;
-        loop {
-            let spread = self.predict(parts, Course::Uncertain);
-            let refused = match reading {
-                Some(reading) => match self.update(parts, reading, None, spread) {
-                    Ok(residual) => return Ok(Some(residual)),
-                    Err(error) => error,
-                },
-                None if parts.is_sound::<N>(parts.variances::<N>()) => return Ok(None),
-                None => StepError::NonFiniteState,
-            };
-            tries += 1;
-            reading = Some(self.coarser(reading, tries, refused)?);
-            restore(parts);
+        let spread = self.predict(parts, Course::Uncertain);
+        match reading {
+            Some(reading) => self.update(parts, reading, None, spread).map(Some),
+            None if parts.is_sound::<N>(parts.variances::<N>()) => Ok(None),
+            None => Err(StepError::NonFiniteState),
         }
     }
 

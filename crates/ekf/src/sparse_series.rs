@@ -1,9 +1,10 @@
 //! Whole series of readings, without memory of its own: the belief stays taken apart from step to step.
 
-use ohmstrain_model::Scalar;
+use nalgebra::SVector;
+use ohmstrain_model::{Scalar, Symmetric};
 
 use crate::kernel::Parts;
-use crate::{Belief, Curve, LogLikelihood, Reading, SparseEkf, StepError, Switch};
+use crate::{Belief, Curve, LogLikelihood, Reading, Residual, SparseEkf, StepError, Switch};
 
 impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> SparseEkf<T, S, B, N, G> {
     /// Log-likelihood of readings one step apart, the first one a step after `start`; `None` is a missing one.
@@ -17,8 +18,7 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
     ) -> Result<T, StepError> {
         let (mut parts, mut sum) = (Parts::of(start), LogLikelihood::new());
         for reading in readings {
-            let before = parts;
-            if let Some(residual) = self.advance(&mut parts, reading, |parts| *parts = before)? {
+            if let Some(residual) = self.advance_or_again::<L>(&mut parts, reading)? {
                 sum.add(&residual);
             }
         }
@@ -37,12 +37,29 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
     ) -> Result<T, StepError> {
         let (mut parts, mut sum) = (Parts::of(start), LogLikelihood::new());
         for (reading, after) in readings.into_iter().zip(filtered) {
-            let before = parts;
-            if let Some(residual) = self.advance(&mut parts, reading, |parts| *parts = before)? {
+            if let Some(residual) = self.advance_or_again::<L>(&mut parts, reading)? {
                 sum.add(&residual);
             }
             parts.put_into(after);
         }
         Ok(sum.value())
+    }
+
+    #[inline(always)]
+    fn advance_or_again<const L: usize>(
+        &self,
+        parts: &mut Parts<T, B>,
+        reading: Option<Reading<T>>,
+    ) -> Result<Option<Residual<T>>, StepError> {
+        let before = *parts;
+        let refused = match self.advance(parts, reading) {
+            Err(refused) => refused,
+            taken => return taken,
+        };
+        let mut belief = Belief { mean: SVector::zeros(), covariance: Symmetric::<T, N, L>::zeros() };
+        before.put_into(&mut belief);
+        let taken = self.step_again(&mut belief, reading, refused)?;
+        *parts = Parts::of(&belief);
+        Ok(taken)
     }
 }

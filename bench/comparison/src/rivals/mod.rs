@@ -2,11 +2,13 @@ mod adskalman;
 mod kfilter;
 mod minikalman;
 mod nalgebra_straight;
+mod nonlinear;
 mod typed_kalman;
 
 use ohmstrain_bench_filters::{LinearModel, STEPS, Visitor, readings};
 
 pub use self::adskalman::smoother as adskalman_smoother;
+pub use self::nonlinear::every_nonlinear_rival;
 pub use self::typed_kalman::smoother as typed_kalman_smoother;
 
 /// Shows every filter that is not ours, with the readings that ours of three states get.

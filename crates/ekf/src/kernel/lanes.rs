@@ -149,7 +149,8 @@ impl<T: Scalar> Lanes for T {
         if mask { yes } else { no }
     }
 
-    #[inline(always)]
+    /// Never inlined: what a compiler knows to be an exponential it may compute for gauges that have none.
+    #[inline(never)]
     fn exponential(self) -> T {
         self.exp()
     }
