@@ -106,7 +106,7 @@ pub enum Command {
     #[command(before_help = "Example: ohmstrain live --port /dev/ttyACM0 --sensor sensor.toml")]
     Live(LiveArgs),
     /// Turn readings of several joints into all their angles
-    #[command(before_help = "Example: ohmstrain hand hand.toml readings.csv > angles.csv")]
+    #[command(before_help = "Example: ohmstrain hand hand.toml readings.csv -o angles.csv")]
     Hand(HandArgs),
     /// Turn a whole recording into strain, every estimate from all readings
     #[command(before_help = "Example: ohmstrain smooth readings.csv --sensor sensor.toml -o smoothed.csv")]

@@ -37,7 +37,8 @@ fn hand() -> (Bench, usize) {
 #[test]
 fn all_angles_of_a_hand() {
     let (bench, rows) = hand();
-    let angles = Csv::new(&bench.run(&["hand", "hand.toml", "hand.csv"]).ok());
+    let shown = bench.run(&["hand", "hand.toml", "hand.csv"]).ok();
+    let angles = Csv::new(&shown);
     assert!(angles.header.starts_with("time_s,thumb_deg,thumb_sd_deg,index_deg,"));
     assert_eq!(angles.len(), rows);
     for finger in FINGERS {
@@ -48,10 +49,21 @@ fn all_angles_of_a_hand() {
         assert_eq!(angles.cells(&format!("{finger}_deg")), alone.cells("angle_deg"), "{finger}");
         assert_eq!(angles.cells(&format!("{finger}_sd_deg")), alone.cells("angle_sd"), "{finger}");
     }
+    // Into a file, twice: its own output is replaced without a word, an input never.
+    for _ in 0..2 {
+        assert_eq!(bench.run(&["hand", "hand.toml", "hand.csv", "-o", "angles.csv"]).ok(), "");
+        assert_eq!(bench.read("angles.csv"), shown);
+    }
+    let refused = bench.run(&["hand", "hand.toml", "hand.csv", "-o", "thumb.toml", "--force"]);
+    assert!(refused.code == Some(2) && refused.stderr.contains("it is the input"), "{}", refused.stderr);
     let garbage = bench.read("hand.csv") + "1e9,1,2\n";
     let strict = bench.feed(&["hand", "hand.toml"], garbage.clone());
     assert_eq!(strict.code, Some(4), "{}", strict.stderr);
     let skipping = bench.feed(&["hand", "hand.toml", "--skip-bad"], garbage);
+    // Of a recording that breaks off in an error the file stays as it was.
+    bench.write("broken.csv", bench.read("hand.csv") + "1e9,1,2\n");
+    assert_eq!(bench.run(&["hand", "hand.toml", "broken.csv", "-o", "angles.csv"]).code, Some(4));
+    assert_eq!(bench.read("angles.csv"), shown);
     assert!(skipping.warnings.concat().contains("1 lines were skipped"));
     assert_eq!(Csv::new(&skipping.ok()).len(), angles.len());
 

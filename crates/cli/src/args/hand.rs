@@ -2,6 +2,8 @@ use std::path::PathBuf;
 
 use clap::Args as ClapArgs;
 
+use super::ReplaceArgs;
+
 /// Flags of `hand`.
 #[derive(Debug, ClapArgs)]
 #[command(after_long_help = FORMAT)]
@@ -15,6 +17,12 @@ pub struct HandArgs {
     /// Go on after lines that are none of a trace; they are counted on stderr
     #[arg(long)]
     pub skip_bad: bool,
+    /// File to write instead of stdout
+    #[arg(short, long, value_name = "angles.csv")]
+    pub output: Option<PathBuf>,
+    /// Whether to replace
+    #[command(flatten)]
+    pub replace: ReplaceArgs,
 }
 
 /// What the long help says after the flags.

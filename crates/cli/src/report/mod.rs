@@ -251,9 +251,9 @@ fn sections(recording: &Recording, innovations: &Innovations) -> Result<Vec<Sect
     if recording.time_s.iter().any(|time| time.is_finite()) {
         let strain = std::iter::once(figures::strain(recording)?).chain(errors::strain(recording)?);
         sections.push(plain("The recording", strain.chain([figures::reading(recording)?]).collect()));
-        let pieces = pieces::strain(recording)?;
+        let (pieces, text) = pieces::strain(recording)?;
         if !pieces.is_empty() {
-            sections.push(Section { folded: true, ..plain("Piece by piece", pieces) });
+            sections.push(Section { folded: true, text, ..plain("Piece by piece", pieces) });
         }
         sections.push(sensor_behaviour(recording)?);
     } else {

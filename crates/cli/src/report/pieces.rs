@@ -8,20 +8,27 @@ use super::motion::Motion;
 use super::recording::Recording;
 use ohmstrain::number::significant;
 
-/// Movements that one plot shows well, and most plots.
+/// Movements that one plot shows well, and most plots: a piece has some 30 kB.
 const MOVEMENTS: usize = 14;
-const MOST_PIECES: usize = 12;
+const MOST_PIECES: usize = 48;
 /// Height of a piece, px.
 const HEIGHT_PX: f64 = 220.0;
 /// What a movement of usual length takes of a plot's width at least.
 const VISIBLE: f64 = 1.0 / 40.0;
 
-/// The strain in pieces of equal numbers of rows; none if one plot shows all movements.
-pub fn strain(recording: &Recording) -> Result<Vec<Figure>, ReportError> {
-    let pieces = count(&recording.motions, recording.time_s);
+/// The strain in pieces of equal numbers of rows, and what is to be said of them; none if one plot shows all movements.
+pub fn strain(recording: &Recording) -> Result<(Vec<Figure>, String), ReportError> {
+    let wanted = count(&recording.motions, recording.time_s);
+    let pieces = wanted.min(MOST_PIECES);
     if pieces < 2 {
-        return Ok(vec![]);
+        return Ok((vec![], String::new()));
     }
+    let note = match wanted {
+        0..=MOST_PIECES => String::new(),
+        _ => format!(
+            "To show every movement at its size would take {wanted} pieces; there are {pieces}. Drag over one to enlarge a part of it."
+        ),
+    };
     let rows = recording.time_s.len();
     let piece = |i: usize| {
         let own = i * rows / pieces..(i + 1) * rows / pieces;
@@ -33,7 +40,7 @@ pub fn strain(recording: &Recording) -> Result<Vec<Figure>, ReportError> {
         let figure = Figure::new(chart, &title, "", false)?;
         Ok(Figure { file: format!("piece-{:02}", i + 1), ..figure })
     };
-    (0..pieces).map(piece).collect()
+    Ok(((0..pieces).map(piece).collect::<Result<_, ReportError>>()?, note))
 }
 
 /// How many pieces it takes: for their number of movements, and for movements that are short beside the recording, as ramps
@@ -46,7 +53,7 @@ fn count(motions: &[Motion], time_s: &[f64]) -> usize {
     lengths.sort_by(f64::total_cmp);
     let whole = extent(time_s.iter().copied()).map_or(0.0, |(first, last)| last - first);
     let short = lengths.get(lengths.len() / 2).map_or(0.0, |usual| VISIBLE * whole / usual);
-    ends.len().div_ceil(MOVEMENTS).max(short.ceil() as usize).min(MOST_PIECES)
+    ends.len().div_ceil(MOVEMENTS).max(short.ceil() as usize)
 }
 
 #[cfg(test)]
@@ -69,5 +76,9 @@ mod tests {
             (0..1000).map(|k| if k / 100 % 2 == 0 { Motion::Extend } else { Motion::Retract }).collect();
         assert_eq!(count(&ramps, &time_s[..1000]), 1);
         assert_eq!(count(&[], &[]), 0);
+        // The number follows the length: a hundred such recordings in a row take a hundred times as many.
+        let long_s: Vec<f64> = (0..240_000).map(|k| k as f64).collect();
+        let long: Vec<Motion> = (0..240_000).map(phase).collect();
+        assert_eq!(count(&long, &long_s), 600);
     }
 }

@@ -14,6 +14,7 @@ use ohmstrain_bench_data::{Line, LineParser, Metadata, Row, RowWriter};
 use crate::args::HandArgs;
 use crate::error::CliError;
 use crate::input::{self, is_stdin, reading_column};
+use crate::output::RowsOut;
 use crate::sensor_file;
 use description::{Description, Joint};
 
@@ -32,11 +33,16 @@ pub fn run(args: &HandArgs) -> Result<(), CliError> {
     for joint in &description.joints {
         channels.push(Channel::new(joint, folder, &name)?);
     }
-    let mut out = RowWriter::new(io::BufWriter::new(io::stdout().lock()));
+    let sensors = channels.iter().map(|channel| folder.join(&channel.joint.sensor)).collect::<Vec<_>>();
+    let inputs = [&args.trace_file, &args.hand].into_iter().chain(&sensors);
+    let mut rows_out = RowsOut::claim(args.output.as_deref(), args.replace.force, inputs)?;
+    let live = is_stdin(&args.trace_file) || !args.trace_file.is_file();
+    let mut out = RowWriter::new(rows_out.open(live)?);
     header(&channels, &mut out)?;
-    let streamed = stream(args, &name, source, &mut channels, &mut out);
+    let streamed = stream(args, &name, source, &mut channels, &mut out, live);
     out.flush()?;
-    streamed
+    streamed?;
+    rows_out.publish()
 }
 
 /// A joint with its filter.
@@ -107,10 +113,10 @@ fn stream<W: Write>(
     source: Box<dyn io::Read>,
     channels: &mut [Channel],
     out: &mut RowWriter<W>,
+    live: bool,
 ) -> Result<(), CliError> {
     let (mut has_header, mut skipped, mut line) = (false, 0_u64, Vec::new());
     let mut source = BufReader::new(source);
-    let live = is_stdin(&args.trace_file);
     loop {
         line.clear();
         let unreadable = |error| CliError::file("read", &args.trace_file, &error);
