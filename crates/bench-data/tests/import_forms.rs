@@ -127,6 +127,11 @@ fn two_header_lines_and_a_line_of_units_below_a_preamble() {
     let row = |ms, ohm, strain| format!("{},{},{}", ms, decimal(ohm, 4, '.'), decimal(strain, 2, '.'));
     let above = "Rig 7\nOperator: N. N.\n\nClock,DMM,Stage\nTime,Resistance,Position\nms,kΩ,mm\n";
     is_imported("rig.csv", file(above, row), &gauge_100());
+    // The names may stand in the upper line; where it has none, the lower one's counts.
+    let above = "Rig 7\n\nTime,Resistance,Extension\nChannel 1,DMM,Channel 2\n(ms),(kΩ),(mm)\n";
+    is_imported("upper.csv", file(above, row), &gauge_100());
+    let above = "Time,,Extension\nClock,Resistance,Channel 2\n(ms),(kΩ),(mm)\n";
+    is_imported("both.csv", file(above, row), &gauge_100());
 }
 
 #[test]

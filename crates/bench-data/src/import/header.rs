@@ -1,7 +1,7 @@
 use crate::error::Fault;
 use crate::import::error::ImportError;
 use crate::import::grid::Grid;
-use crate::import::names;
+use crate::import::names::{self, Sureness};
 use crate::import::number::{DecimalMark, Value, value};
 use crate::import::stamp::is_stamp;
 use crate::import::units;
@@ -91,14 +91,21 @@ impl Header {
         self.headings.clone_from(nearest);
         self.header_lines = 1;
         let mut top = *row;
-        // A line of groups above, `Sensor,Sensor,Stage,Stage`, tells columns of the same name apart.
-        if let Some((row, groups)) = names.get(1)
-            && has_twins(nearest)
-        {
-            let join = |(group, name): (&String, &String)| format!("{group} {name}").trim().to_owned();
-            self.headings = filled_to_the_right(groups).iter().zip(nearest).map(join).collect();
-            self.header_lines = 2;
-            top = *row;
+        if let Some((row, above)) = names.get(1) {
+            if has_twins(nearest) {
+                // A line of groups above, `Sensor,Sensor,Stage,Stage`, tells columns of the same name apart.
+                let join = |(group, name): (&String, &String)| format!("{group} {name}").trim().to_owned();
+                self.headings = filled_to_the_right(above).iter().zip(nearest).map(join).collect();
+                (self.header_lines, top) = (2, *row);
+            } else if !has_twins(above) {
+                // `Time,Resistance` above `Channel 1,DMM`: each column has the name that says what is measured.
+                for (heading, above) in self.headings.iter_mut().zip(above) {
+                    if is_quantity(above) && !is_quantity(heading) {
+                        heading.clone_from(above);
+                        (self.header_lines, top) = (2, *row);
+                    }
+                }
+            }
         }
         Ok(top)
     }
@@ -203,6 +210,12 @@ fn is_unit_line(cells: &[String]) -> bool {
 fn is_bracketed(cells: &[String]) -> bool {
     let mut filled = cells.iter().filter(|cell| !cell.is_empty()).peekable();
     filled.peek().is_some() && filled.all(|cell| cell.starts_with(['(', '[']) && cell.ends_with([')', ']']))
+}
+
+/// Whether a name says what is measured.
+fn is_quantity(heading: &str) -> bool {
+    let (name, unit) = names::take_apart(heading);
+    matches!(names::role(&name, unit.as_deref()), Some((_, Sureness::Strong)))
 }
 
 fn has_twins(names: &[String]) -> bool {
