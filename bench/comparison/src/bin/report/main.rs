@@ -20,9 +20,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     };
     let builds =
         directories.iter().map(|directory| Build::read(Path::new(directory))).collect::<Result<Vec<_>, _>>()?;
+    let instructions = std::fs::read_to_string(Path::new(readme).with_file_name("instructions.toml"))?;
     let text = include_str!("introduction.md")
         .replace("{machine}", &machine::describe(mode)?)
-        .replace("{ratios}", &table::ratios(&builds))
+        .replace("{targets}", &table::targets(&builds))
+        .replace("{instructions}", &table::instructions(&instructions).ok_or("no figure of the sign-split filter")?)
+        .replace("{beside}", &table::beside_constants(&builds))
         .replace("{steps}", &table::steps(&builds))
         .replace("{banks}", &table::banks(&builds))
         .replace("{recordings}", &table::recordings(&builds))
