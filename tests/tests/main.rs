@@ -8,6 +8,7 @@ mod consistency;
 mod cramer_rao;
 mod direction;
 mod faults;
+mod guards;
 mod linear_oracles;
 mod long_run;
 mod mixture_smoother;
@@ -20,11 +21,9 @@ mod phase_calibration;
 mod properties;
 mod published_numbers;
 mod representative;
-mod running_consistency;
 mod running_filter;
 mod sparse;
 mod stored;
-mod windows_and_guards;
 
 /// A file that is not named above would not be compiled.
 #[test]

@@ -17,8 +17,6 @@ pub enum StepError {
     /// The innovation's variance is not a positive number: neither the state nor the reading has any uncertainty left,
     /// or the belief passed in is no covariance.
     NonPositiveInnovationVariance,
-    /// A late reading is older than everything that is remembered.
-    ReadingTooOld,
     /// The new state would not be finite: the belief or the model's parameters are far out of range.
     NonFiniteState,
     /// The model's gauge curve is not of the family that the filter was made for.
@@ -43,7 +41,6 @@ impl fmt::Display for StepError {
             Self::NonFiniteTimeStep => "the time step is not a finite number",
             Self::NegativeTimeStep => "the time step is negative",
             Self::NonPositiveInnovationVariance => "the innovation's variance is not positive",
-            Self::ReadingTooOld => "the reading is older than the remembered steps",
             Self::NonFiniteState => "the new state is not finite",
             Self::OtherGauge => "the gauge curve is of another family than the filter's",
             Self::NoSmoother => "the estimator has no smoother",

@@ -5,8 +5,8 @@ use crate::{Belief, Gaussian, Reading, StepError};
 /// What every estimator has in common: a state that a prepared step turns into the next one.
 ///
 /// The estimator is configuration, the state is the caller's; an error leaves it as it was. Outlier guards
-/// ([`Guard`](crate::Guard)), windows for fixed lag and late readings ([`Window`](crate::Window)) and smoothing of whole
-/// recordings work on any of them.
+/// ([`Guard`](crate::Guard)) and smoothing of past steps ([`smooth_back_through`](crate::smooth_back_through)) work on any of
+/// them.
 pub trait Estimator<T: Scalar, const N: usize, const L: usize> {
     /// What is carried from step to step.
     type State: State<T, N, L>;

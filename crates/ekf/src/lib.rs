@@ -6,8 +6,7 @@
 //! [`Ekf`] (plain, iterated, or unscented as [`Ukf`]) keeps one Gaussian and has a smoother. [`Imm`], [`SignSplit`] and
 //! [`Hypotheses`] keep a [`Mixture`] of hypotheses about the phase, because stretching and releasing look alike.
 //! `Particles` (feature `particles`) samples the motion instead: slow, and the reference for all of them.
-//! [`ConsistencyTest`] judges a running filter by its innovations. [`correction`] makes a calibrated filter's strain better
-//! by what was learned in calibration. `Bank` (feature `simd`) steps many sensors at once, in vector registers.
+//! [`correction`] makes a calibrated filter's strain better by what was learned in calibration. `Bank` (feature `simd`) steps many sensors at once, in vector registers.
 //!
 //! Models are anything that implements [`Dynamics`] and [`Channel`];
 //! [`SwitchedModel`](ohmstrain_model::SwitchedModel) does.
@@ -24,7 +23,7 @@
 //! # Features
 //! `std` (on by default) and `simd` are named above; `adskalman` hands linearised steps to that crate. Off by default and
 //! without std:
-//! - `serde`: [`Belief`], [`Estimate`], [`Gaussian`], readings, innovations, verdicts, reports and errors as plain data. A
+//! - `serde`: [`Belief`], [`Estimate`], [`Gaussian`], readings, innovations, verdicts of readings and errors as plain data. A
 //!   belief that comes back is not checked; the step that it cannot take is refused. Mixtures, and what is made
 //!   by constructors that check, are left out.
 //! - `defmt`: `Format` for the same. It takes no text from the target, only numbers.
@@ -64,7 +63,6 @@ mod adskalman_bridge;
 mod bank;
 mod belief;
 mod clock;
-mod consistency;
 pub mod correction;
 mod ekf;
 mod error;
@@ -91,7 +89,6 @@ pub use adskalman_bridge::LinearStep;
 pub use bank::{Bank, Lane, WrongLength};
 pub use belief::{Belief, Estimate, Gaussian, Real, TruncatedGaussian};
 pub use clock::seconds_between;
-pub use consistency::{ChiSquare, ConsistencyRecord, ConsistencyReport, ConsistencyTest, MeanTest, Verdict, Whiteness};
 pub use ekf::{Ekf, Step, Update};
 pub use error::StepError;
 pub use estimator::{Advanced, Estimator, Innovation, State};
@@ -104,7 +101,7 @@ pub use residual::{LogLikelihood, Residual};
 pub use sensor::StrainSensor;
 #[cfg(feature = "std")]
 pub use smooth::rts_smooth_vec;
-pub use smooth::{PastStep, Window, rts_smooth, rts_step, smooth_back_through};
+pub use smooth::{PastStep, rts_smooth, rts_step, smooth_back_through};
 pub use sparse::SparseEkf;
 pub use substeps::{GRACE as STEP_GRACE, Repeated, Substeps};
 pub use traits::{Channel, Dynamics, Reading};

@@ -14,7 +14,7 @@ mod step;
 use core::fmt;
 use std::vec::Vec;
 
-use fearless_simd::{Level, Simd, SimdBase, dispatch};
+use fearless_simd::{Level, Simd, dispatch};
 use ohmstrain_model::{SwitchedModel, Symmetric};
 
 use self::lane::{Block, Row};
@@ -106,12 +106,6 @@ impl<T: Lane, const B: usize, const N: usize, const L: usize> Bank<T, B, N, L> {
     pub fn with_vectors_up_to(mut self, bits: usize) -> Self {
         self.level = narrowed(Level::new(), bits);
         self
-    }
-
-    /// Bits of the vectors in use.
-    #[must_use]
-    pub fn vector_bits(&self) -> usize {
-        dispatch!(self.level, simd => bits_of(simd))
     }
 
     /// Number of sensors.
@@ -239,9 +233,4 @@ fn narrowed(level: Level, bits: usize) -> Level {
         let _ = bits;
         level
     }
-}
-
-#[inline(always)]
-fn bits_of<S: Simd>(_: S) -> usize {
-    64 * <S::f64s as SimdBase<S>>::LEN
 }

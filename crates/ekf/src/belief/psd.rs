@@ -45,11 +45,6 @@ impl<T: Scalar, const N: usize> SemiDefinite<T, N> {
         self.lower.column(i) * self.pivots[i].sqrt()
     }
 
-    /// Pivot `i`: the variance of component `i` of `L⁻¹ x`.
-    pub(crate) fn pivot(&self, i: usize) -> T {
-        self.pivots[i]
-    }
-
     /// A solution x of `P x = rhs` for a right-hand side in the range of P.
     pub(crate) fn solve(&self, rhs: &SVector<T, N>) -> SVector<T, N> {
         let mut x = *rhs;

@@ -1,9 +1,9 @@
-//! Fixed lag, late readings, outliers and re-zeroing, on any estimator: checked against the plain filter run differently.
+//! Outliers and re-zeroing, on any estimator: checked against the plain filter run differently.
 
 use nalgebra::SVector;
 use ohmstrain_ekf::{
     Belief, Dwell, Ekf, Estimator, Evidence, Gaussian, Guard, Guarded, Influence, Mixture, Reading, ReadingVerdict,
-    SignSplit, State, StepError, Streak, Window, rts_smooth_vec,
+    SignSplit, State, StepError, Streak,
 };
 use ohmstrain_model::{Phase, StrainRange, SwitchedModel};
 use ohmstrain_tests::sensor;
@@ -28,70 +28,6 @@ fn sign_split() -> SignSplit<f64, 1, 4, 4> {
 /// A reading every step but every seventh.
 fn reading(k: u32) -> Option<Reading<f64>> {
     (k % 7 != 3).then(|| Reading::from(0.15 + 0.1 * (0.3 * f64::from(k)).sin()))
-}
-
-/// The lagged estimate is what smoothing the record up to now says.
-#[test]
-fn a_window_smooths_the_record_so_far() {
-    let ekf = ekf();
-    let mut window: Window<Kalman, _, f64, 16> = Window::new(start());
-    let (mut belief, mut steps) = (start(), Vec::new());
-    for k in 0..40 {
-        window.step(&ekf, DT_S, reading(k)).unwrap();
-        let step = ekf.step(&belief, DT_S, reading(k)).unwrap();
-        belief = step.posterior;
-        steps.push(step);
-        assert_eq!(window.newest(), &belief);
-        let smoothed = rts_smooth_vec(&steps);
-        for back in [0, 1, 7, 15] {
-            let lagged = window.lagged(&ekf, back).unwrap();
-            let expected = (back < steps.len()).then(|| smoothed[steps.len() - 1 - back]);
-            // The very start is one step further back than the first smoothed row.
-            let reaches = back <= 16.min(steps.len());
-            assert_eq!(lagged.is_some(), reaches, "row {k}, {back} back");
-            if let (Some(lagged), Some(expected)) = (lagged, expected) {
-                assert_eq!(lagged, expected, "row {k}, {back} back");
-            }
-        }
-    }
-    assert_eq!(window.lagged(&ekf, 17).unwrap(), None);
-}
-
-/// Steps at 0, 0.1, 0.15, 0.2 …: with the reading at 0.15 in its turn, or arriving three steps late.
-fn check_late<E: Estimator<f64, 4, 10>>(estimator: &E, start: E::State)
-where
-    E::State: PartialEq + std::fmt::Debug,
-{
-    let mut in_turn: Window<E::State, E::Prepared, f64, 8> = Window::new(start.clone());
-    let mut late = Window::<_, _, _, 8>::new(start);
-    for k in 0..20 {
-        in_turn.step(estimator, DT_S, reading(k)).unwrap();
-        late.step(estimator, DT_S, reading(k)).unwrap();
-    }
-    let between = Reading::from(0.2);
-    in_turn.step(estimator, 0.0625, Some(between)).unwrap();
-    in_turn.step(estimator, 0.0625, reading(20)).unwrap();
-    late.step(estimator, 0.125, reading(20)).unwrap();
-    for k in 21..23 {
-        in_turn.step(estimator, 0.125, reading(k)).unwrap();
-        late.step(estimator, 0.125, reading(k)).unwrap();
-    }
-    // Binary fractions: 0.3125 s before the newest reading is exactly in the middle of the long step.
-    late.insert_late(estimator, 0.3125, between).unwrap();
-    assert_eq!(late.newest(), in_turn.newest());
-    assert_eq!(late.lagged(estimator, 3).unwrap(), in_turn.lagged(estimator, 3).unwrap());
-
-    let before = late.newest().clone();
-    assert_eq!(late.insert_late(estimator, 60.0, between), Err(StepError::ReadingTooOld));
-    assert_eq!(late.insert_late(estimator, 0.2, Reading::from(f64::NAN)), Err(StepError::NonFiniteReading));
-    assert_eq!(late.step(estimator, -1.0, None), Err(StepError::NegativeTimeStep));
-    assert_eq!(late.newest(), &before);
-}
-
-#[test]
-fn a_late_reading_counts_as_if_it_had_come_in_time() {
-    check_late(&ekf(), start());
-    check_late(&sign_split(), Mixture::single(start(), Phase::Extend));
 }
 
 /// Runs a guard over readings; states and verdicts.
