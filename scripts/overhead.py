@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """What Python, Spark, Ray and `ohmstrain batch` cost beside the Rust library: processor time of all processes together.
 
-PYTHON scripts/overhead.py PROGRAM LIBRARY FOLDER [REPETITIONS, 3]
+PYTHON scripts/overhead.py PROGRAM LIBRARY FOLDER [REPETITIONS, 3 [ESTIMATOR SMALLER LARGER]]
 
 PYTHON has the wheel, pyspark and ray (`scripts/python.sh --engines` prints it), PROGRAM is the command line, LIBRARY
 `crates/python/target/release/examples/library_time` of the same build. Everything is repeated in turn, medians are compared; of an
@@ -23,7 +23,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 FLEET = Path(__file__).resolve().parents[1] / "crates/python/examples/fleet.py"
-#: Estimator, and recordings of 1000 rows in the smaller and in the larger fleet.
+#: Unless told otherwise: estimator, and recordings of 1000 rows in the smaller and in the larger fleet.
 CASES = [("ekf", 500, 2500), ("auto", 50, 250)]
 ENGINES = ["plain", "spark", "ray"]
 GROUPS = [Path("/sys/fs/cgroup/cpuacct"), Path("/sys/fs/cgroup/unified"), Path("/sys/fs/cgroup")]
@@ -105,10 +105,11 @@ def make(python, fleet, size, sensor):
 def main():
     program, library, folder = (Path(word).absolute() for word in sys.argv[1:4])
     repetitions = int(sys.argv[4]) if len(sys.argv) > 4 else 3
+    cases = [(sys.argv[5], int(sys.argv[6]), int(sys.argv[7]))] if len(sys.argv) > 5 else CASES
     python = sys.executable
     os.environ.update(OHMSTRAIN=str(program), PYTHONWARNINGS="ignore", RAYON_NUM_THREADS="1", PYSPARK_PYTHON=python)
     group = Group()
-    for estimator, *sizes in CASES:
+    for estimator, *sizes in cases:
         found = {}
         note = lambda what, seconds: found.setdefault(what, []).append(seconds)  # noqa: E731
         fleets = [folder / f"fleet-{size}" for size in sizes]

@@ -2,7 +2,8 @@
 # Builds the Python wheel and installs it into a virtual environment of its own; prints that environment's Python.
 #
 #   python.sh                  the wheel and what its tests need
-#   python.sh --engines        with pyspark, ray, and the Java that Spark needs (by apt, as root, where there is none)
+#   python.sh --engines        with pyspark, ray, dask, and the Java that Spark needs (by apt, as root, where there is none)
+#   python.sh --engines-only   those alone, into an environment that has the wheel
 #   python.sh --tools-only     an environment that can build it, and no more
 #
 # Environment:
@@ -17,17 +18,21 @@ if ! command -v "${PYTHON3:-python3}" >/dev/null || ! "${PYTHON3:-python3}" -c '
     apt-get -q update >/dev/null
     DEBIAN_FRONTEND=noninteractive apt-get -q install -y --no-install-recommends python3 python3-venv >/dev/null
 fi
-if [[ ${1:-} == --engines ]] && ! command -v java >/dev/null; then
+if [[ ${1:-} == --engines* ]] && ! command -v java >/dev/null; then
     apt-get -q update >/dev/null
     DEBIAN_FRONTEND=noninteractive apt-get -q install -y --no-install-recommends default-jre-headless >/dev/null
 fi
 [[ -x $venv/bin/python ]] || "${PYTHON3:-python3}" -m venv "$venv"
 "$venv/bin/python" -m pip install --quiet 'maturin>=1.9,<2'
 if [[ ${1:-} == --tools-only ]]; then exit 0; fi
+if [[ ${1:-} == --engines-only ]]; then
+    "$venv/bin/python" -m pip install --quiet "$(echo "$venv"/wheels/ohmstrain-*.whl)[spark,ray,dask]"
+    exit
+fi
 rm -rf "$venv/wheels"
 (cd crates/python && "$venv/bin/maturin" build --quiet --profile "${PROFILE:-release}" --locked --out "$venv/wheels" >&2)
 extras=test
-if [[ ${1:-} == --engines ]]; then extras=test,spark,ray; fi
+if [[ ${1:-} == --engines ]]; then extras=test,spark,ray,dask; fi
 wheel=$(echo "$venv"/wheels/ohmstrain-*.whl)
 "$venv/bin/python" -m pip install --quiet --force-reinstall --no-deps "$wheel"
 "$venv/bin/python" -m pip install --quiet "$wheel[$extras]"

@@ -1,3 +1,5 @@
+use std::borrow::Cow;
+
 use ohmstrain::{Closing, EstimatorKind, Findings, Quantity, ReadingUnit, ValidityWatch};
 use pyo3::prelude::*;
 use pyo3_arrow::PyTable;
@@ -22,12 +24,11 @@ type Doubtful = (PyTable, Vec<String>);
 
 impl Sensor {
     /// On the joint of a recording, if it has one; with its readings checked.
-    fn for_recording(&self, recording: &Recording, options: &Options) -> PyResult<ohmstrain::Sensor> {
+    fn for_recording(&self, recording: &Recording, options: &Options) -> PyResult<Cow<'_, ohmstrain::Sensor>> {
         recording.check_unit(&self.sensor, options.rest_resistance)?;
-        let refused = |error| of_library(&error, recording.name.as_deref());
-        recording
-            .joint
-            .map_or_else(|| Ok(self.sensor.clone()), |joint| self.sensor.clone().on_joint(joint).map_err(refused))
+        let Some(joint) = recording.joint else { return Ok(Cow::Borrowed(&self.sensor)) };
+        let moved = self.sensor.clone().on_joint(joint);
+        moved.map(Cow::Owned).map_err(|error| of_library(&error, recording.name.as_deref()))
     }
 }
 

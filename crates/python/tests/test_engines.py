@@ -1,4 +1,4 @@
-"""Spark and Ray, as they run on one machine; skipped where they are not installed, unless OHMSTRAIN_REQUIRE_ENGINES=1."""
+"""Spark, Ray and Dask, as they run on one machine; skipped where they are not installed, unless OHMSTRAIN_REQUIRE_ENGINES=1."""
 
 import os
 import sys
@@ -73,3 +73,19 @@ def test_ray(ray, trace, sensor):
     table = fleet(trace)
     ds = ray.data.from_pandas(table)
     check(oh_ray.smooth(ds, {"left": sensor, "right": sensor}).to_pandas(), table, sensor)
+
+
+def test_dask(trace, sensor):
+    engine("dask")
+    import dask.dataframe as dd
+
+    from ohmstrain import dask as oh_dask
+
+    table = fleet(trace)
+    df = dd.from_pandas(table, npartitions=3)
+    sensors = {"left": sensor, "right": sensor}
+    check(oh_dask.smooth(df, sensors).compute(), table, sensor)
+    scores = oh_dask.evaluate(df, sensors).compute()
+    assert len(scores) == 4 and scores["error"].notna().sum() == 1
+    with pytest.raises(oh.OhmstrainError, match="no_such"):
+        oh_dask.smooth(df, sensor, by=["no_such"])

@@ -19,6 +19,12 @@ pub(super) struct Allowed {
     pub most: f64,
 }
 
+impl Allowed {
+    fn contains(self, value: f64) -> bool {
+        (self.least..=self.most).contains(&value)
+    }
+}
+
 /// A table of the file by the path that leads to it.
 pub(super) struct Table(String);
 
@@ -49,16 +55,17 @@ impl Table {
     }
 
     pub(super) fn number(&self, name: &str, value: f64, allowed: Allowed) -> Result<(), FieldError> {
-        let Allowed { least, most } = allowed;
-        if (least..=most).contains(&value) {
+        if allowed.contains(value) {
             return Ok(());
         }
+        let Allowed { least, most } = allowed;
         Err(self.wrong(name, format!("{} to {}", short(least), short(most)), short(value)))
     }
 
     pub(super) fn numbers(&self, name: &str, values: &[f64], allowed: Allowed) -> Result<(), FieldError> {
-        let mut numbered = values.iter().enumerate();
-        numbered.try_for_each(|(index, value)| self.number(&format!("{name}[{index}]"), *value, allowed))
+        // A filter's thousands of numbers are checked whenever one is built: they get names only where one is wrong.
+        let wrong = values.iter().enumerate().find(|(_, value)| !allowed.contains(**value));
+        wrong.map_or(Ok(()), |(index, value)| self.number(&format!("{name}[{index}]"), *value, allowed))
     }
 
     pub(super) fn length(&self, name: &str, expected: usize, found: usize) -> Result<(), FieldError> {
@@ -70,4 +77,18 @@ impl Table {
 pub(super) fn short(value: f64) -> String {
     let plain = value == 0.0 || !value.is_finite() || (1e-4..1e6).contains(&value.abs());
     if plain { value.to_string() } else { format!("{value:e}") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Allowed, Table};
+
+    #[test]
+    fn the_first_wrong_number_of_several_is_named() {
+        let share = Allowed { least: 0.0, most: 1.0 };
+        let rows = Table::root().entry("rows", 3);
+        assert_eq!(rows.numbers("past", &[0.0, 0.5, 1.0], share), Ok(()));
+        let refused = rows.numbers("past", &[0.5, f64::NAN, 2.0], share).unwrap_err();
+        assert_eq!(refused.to_string(), "field `rows[3].past[1]`: expected 0 to 1, found NaN");
+    }
 }

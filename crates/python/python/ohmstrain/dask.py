@@ -1,0 +1,59 @@
+"""Recordings in a Dask dataframe: ``pip install 'ohmstrain[dask]'``.
+
+As :mod:`ohmstrain.spark`: each group of rows with the same keys is a recording, a bad one is a row with a text in the
+column ``error``.
+
+>>> from ohmstrain import dask as oh_dask
+>>> oh_dask.smooth(dask.dataframe.read_parquet("recordings"), sensors).to_parquet("estimates")     # doctest: +SKIP
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
+
+import pyarrow as pa
+
+from ._groups import Work
+
+if TYPE_CHECKING:
+    from dask.dataframe import DataFrame
+
+#: Columns that tell recordings apart, the sensor's first.
+BY = ("sensor_id", "recording_id")
+
+
+def filter(df: DataFrame, sensors: Any, by: Iterable[str] = BY, **options: Any) -> DataFrame:
+    """Estimates, each from the readings up to it. See :func:`ohmstrain.spark.filter`."""
+    return _grouped(df, Work("filter", by, sensors, **options))
+
+
+def smooth(df: DataFrame, sensors: Any, by: Iterable[str] = BY, **options: Any) -> DataFrame:
+    """Estimates, each from all readings of its recording. See :func:`ohmstrain.spark.smooth`."""
+    return _grouped(df, Work("smooth", by, sensors, **options))
+
+
+def evaluate(df: DataFrame, sensors: Any, by: Iterable[str] = BY, **options: Any) -> DataFrame:
+    """Scores, a row per recording. See :func:`ohmstrain.spark.evaluate`."""
+    return _grouped(df, Work("evaluate", by, sensors, **options))
+
+
+def calibrate(df: DataFrame, by: Iterable[str] = ("sensor_id",), **choices: Any) -> DataFrame:
+    """A sensor per group. See :func:`ohmstrain.spark.calibrate`."""
+    return _grouped(df, Work("calibrate", by, **choices))
+
+
+def _grouped(df: DataFrame, work: Work) -> DataFrame:
+    work.check(df.columns)
+    needed = df[work.needed(df.columns)]
+    keys = pa.Schema.from_pandas(needed._meta[work.by], preserve_index=False)
+    types = {key: needed._meta[key].dtype for key in work.by}
+    empty = work.schema({key: keys.field(key).type for key in work.by}).empty_table().to_pandas().astype(types)
+
+    def of_partition(rows: Any) -> Any:
+        groups = rows.groupby(work.by, sort=False, observed=True, dropna=False)
+        done = [work(pa.Table.from_pandas(group, preserve_index=False)) for _, group in groups]
+        return pa.concat_tables(done).to_pandas().astype(types) if done else empty
+
+    # All rows of a recording into one partition; what follows needs no more of Dask.
+    return needed.shuffle(on=work.by).map_partitions(of_partition, meta=empty)
