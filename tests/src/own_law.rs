@@ -1,8 +1,9 @@
 //! A sensor whose law filters know exactly, simulated in steps much finer than its rows: what a filter says wrongly of it, it
 //! says because of how it takes steps.
 
-use ohmstrain_ekf::{Belief, Dwell, Estimator, Evidence, Reading, State, Substeps};
-use ohmstrain_model::{Branch, Gauge, ModelNoise, Motion, SensorLaw, StrainRange, SwitchedModel};
+use nalgebra::{SMatrix, SVector};
+use ohmstrain_ekf::{Belief, Dwell, Estimator, Evidence, Mixture, Reading, State, Substeps};
+use ohmstrain_model::{Branch, Gauge, ModelNoise, Motion, Phase, SensorLaw, StrainRange, SwitchedModel};
 
 use crate::Draws;
 
@@ -70,7 +71,54 @@ pub fn simulate(moves: Moves, dt_s: f64, seconds: f64, seed: u64) -> Vec<(f64, f
         .collect()
 }
 
+/// Mean and deviation of the strain, and of the sum of the branches, `seconds` after a state without any reading: of
+/// motions that begin at states drawn from it, in steps of 2 ms.
+#[must_use]
+pub fn spread_after<const K: usize>(
+    (from, moves): (&Mixture<f64, 5, 15, K>, Moves),
+    seconds: f64,
+    motions: usize,
+    seed: u64,
+) -> [(f64, f64); 2] {
+    const STEP_S: f64 = 0.002;
+    let mut draws = Draws::new(seed);
+    let (mut parts, mut sums) = (Vec::new(), [(0.0, 0.0); 2]);
+    from.each(&mut |weight, belief| parts.push((weight, *belief)));
+    for _ in 0..motions {
+        let mut body = Body::drawn(&parts, from.phases(), &mut draws);
+        (0..(seconds / STEP_S).round() as usize).for_each(|_| body.move_on(moves, STEP_S, &mut draws));
+        for (sum, x) in sums.iter_mut().zip([body.strain, body.branches.iter().sum()]) {
+            *sum = (sum.0 + x, sum.1 + x * x);
+        }
+    }
+    let count = motions as f64;
+    sums.map(|(sum, squares)| (sum / count, (squares / count - (sum / count).powi(2)).sqrt()))
+}
+
 impl Body {
+    /// A state drawn from hypotheses with their weights and phases.
+    fn drawn(parts: &[(f64, Belief<f64, 5, 15>)], phases: &[Phase], draws: &mut Draws) -> Self {
+        let (mut left, mut which) = (draws.uniform(), 0);
+        while which + 1 < parts.len() && left > parts[which].0 {
+            left -= parts[which].0;
+            which += 1;
+        }
+        let belief = &parts[which].1;
+        // What is known exactly has no variance, and no Cholesky factor: the strain of 10⁻⁶ that this adds is nothing.
+        let covariance = belief.covariance.to_matrix() + SMatrix::<f64, 5, 5>::identity() * 1e-12;
+        let factor = covariance.cholesky().map_or_else(SMatrix::zeros, |cholesky| cholesky.l());
+        let state = belief.mean + factor * SVector::<f64, 5>::from_fn(|_, _| draws.normal());
+        let rests = phases.get(which) == Some(&Phase::Hold);
+        Self {
+            strain: state[0],
+            rate: if rests { 0.0 } else { state[1] },
+            rests,
+            extends: phases.get(which) == Some(&Phase::Extend),
+            branches: [state[2], state[3]],
+            baseline: state[4],
+        }
+    }
+
     /// Euler and Maruyama's step.
     fn move_on(&mut self, moves: Moves, h: f64, draws: &mut Draws) {
         let old = self.rate;

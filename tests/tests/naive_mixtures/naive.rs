@@ -209,7 +209,7 @@ impl<const B: usize, const N: usize> Naive<B, N> {
     ) -> (Hypotheses<N>, Option<Said>) {
         let pause_s = if reading.is_some() { 0.0 } else { from.pause_s + dt_s };
         let forgets_s =
-            if self.model.motion().phase_rate() == 0.0 { self.model.longest_step_s() } else { f64::INFINITY };
+            if self.model.motion().phase_rate() == 0.0 { 0.75 * self.model.longest_step_s() } else { f64::INFINITY };
         let open = matches!(self.rule, Rule::Signs(_)) && pause_s > forgets_s * 1.0005;
         let mut children = Children { kept: Vec::new(), room: self.room, compared: Vec::new() };
         let parents = if let Rule::Imm(dwell) = self.rule { self.mixed(from, &dwell, dt_s) } else { from.all.clone() };

@@ -16,7 +16,7 @@ use crate::mixture::evidence::{Heard, Newborn, Weighing};
 use crate::mixture::lineage::{Following, Recorder};
 use crate::mixture::pause::Pause;
 use crate::mixture::state::Mixture;
-use crate::mixture::switching::{forgets_direction_s, fresh_rate};
+use crate::mixture::switching::{forgets_direction_s, fresh_rate, longest_cut_s};
 use crate::{
     AnyCurve, Curve, Dwell, Evidence, Gaussian, Logistic, MixtureResidual, Reading, SparseEkf, StepError, Switch,
 };
@@ -78,7 +78,7 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
     }
 
     fn longest_s(&self) -> T {
-        self.model().longest_step_s()
+        longest_cut_s(self.model())
     }
 
     /// The same filter for steps of another length.
