@@ -63,7 +63,9 @@ mod summary;
 mod validate;
 mod way_back;
 
-pub use baselines::{Baseline, Baselines, Features, Fir, LeakyBank, LowPassMode, Regression, StaticCubic};
+pub use baselines::{
+    Baseline, Baselines, Features, Fir, LeakyBank, LowPassMode, PhaseRows, PublishedLaw, Regression, StaticCubic,
+};
 #[cfg(feature = "bootstrap")]
 pub use bootstrap::{Bootstrap, bootstrap_law};
 pub use build_filter::{HISTORIES, HYPOTHESES, PARTICLE_SEED, build_filter};

@@ -1,7 +1,8 @@
 //! Baselines against naive dense least squares: integrals summed up, designs stacked, every block left out by hand.
 
 use nalgebra::{DMatrix, DVector};
-use ohmstrain_calib::{Baseline, Baselines, Fir, LeakyBank, LowPassMode, Samples};
+use ohmstrain_calib::{Baseline, Baselines, Fir, LeakyBank, LowPassMode, PublishedLaw, Samples};
+use ohmstrain_model::Phase;
 
 /// A recording with irregular steps, missing readings and a missing reference.
 struct Bench {
@@ -305,4 +306,43 @@ fn readings_that_do_not_vary_are_an_error() {
     let mut bench = record(100, 0.2, 0.0);
     bench.reading.fill(1000.0);
     assert!(Baselines::fit(&[bench.samples()]).is_err());
+}
+
+/// Ramps at several speeds with holds between, by equations 8 and 9 as they are printed; the law that is fitted to them
+/// and told when phases begin says the strains.
+#[test]
+fn the_published_law_says_the_strain_of_its_own_readings() {
+    // Stretches of 4 s and less, releases of 3; time constants that are among those tried.
+    let dt_s = 0.25;
+    let tau_s = |longest_s: f64, place: i32| longest_s * 0.01 * 3000_f64.powf(f64::from(place) / 79.0);
+    let ramps = [(0.05, 4.0), (-0.04, 3.0), (0.02, 2.0), (-0.1, 1.0), (0.08, 1.5), (-0.05, 2.0)];
+    let law = |speed: f64| if speed > 0.0 { (900.0, 150.0, tau_s(4.0, 60)) } else { (400.0, -80.0, tau_s(3.0, 50)) };
+    let mut bench = Bench { time_s: vec![0.0], reading: vec![1000.0], strain: vec![0.1] };
+    let mut phases = Vec::new();
+    for (speed, duration_s) in ramps {
+        let (start_s, strain, latched) =
+            (bench.time_s.len(), bench.strain[bench.strain.len() - 1], bench.reading[bench.reading.len() - 1]);
+        let (stiffness, viscosity, tau_s) = law(speed);
+        for k in 1..=(duration_s / dt_s) as usize {
+            let (elapsed_s, travel) = (k as f64 * dt_s, speed * k as f64 * dt_s);
+            let moving: f64 = latched + stiffness * (-elapsed_s / tau_s).exp() * travel + viscosity * speed;
+            bench.time_s.push(bench.time_s[bench.time_s.len() - 1] + dt_s);
+            bench.reading.push(moving);
+            bench.strain.push(strain + travel);
+        }
+        phases.push((if speed > 0.0 { Phase::Extend } else { Phase::Retract }, start_s..bench.time_s.len()));
+        let (start_s, strain, latched) =
+            (bench.time_s.len(), bench.strain[bench.strain.len() - 1], bench.reading[bench.reading.len() - 1]);
+        for k in 1..=8 {
+            bench.time_s.push(bench.time_s[bench.time_s.len() - 1] + dt_s);
+            bench.reading.push(latched * (0.9 + 0.1 * (-f64::from(k) * dt_s / 3.0).exp()));
+            bench.strain.push(strain);
+        }
+        phases.push((Phase::Hold, start_s..bench.time_s.len()));
+    }
+    let fitted = PublishedLaw::fit(&[bench.samples()], std::slice::from_ref(&phases)).unwrap();
+    let starts = phases.iter().map(|(phase, rows)| (bench.time_s[rows.start], *phase)).collect();
+    // Readings of 10³ from which differences of one are taken, six times over.
+    assert_close(&run(fitted.start(starts, bench.strain[0]), &bench), &bench.strain, 1e-10);
+    assert!(PublishedLaw::fit(&[bench.samples()], &[phases[..2].to_vec()]).is_err(), "there is no release");
 }

@@ -1,5 +1,6 @@
 use ohmstrain::{Scores, Sensor};
-use ohmstrain_calib::{Baseline, Baselines, CalibrationError, Samples, ScoredRow, screen};
+use ohmstrain_bench_data::segment;
+use ohmstrain_calib::{Baseline, Baselines, CalibrationError, PublishedLaw, Samples, ScoredRow, screen};
 use pyo3::prelude::*;
 
 use crate::error::{Place, of_library, raise};
@@ -49,6 +50,9 @@ pub fn after_split(py: Python, recording: &Recording, rows: usize, sensor: &Sens
         scores.push(("fir_20s", part.of_baseline(baselines.fir.start(), 1.0)));
         scores.push(("low_pass_mode", part.of_baseline(baselines.low_pass_mode.start(), 1.0)));
         scores.push(("leaky_bank", part.of_baseline(baselines.leaky_bank.start(), 1.0)));
+        if let Some(published) = published(recording, rows, truth) {
+            scores.push(("relaxing_modulus", part.of_baseline(published, 1.0)));
+        }
         Ok::<_, PyErr>(scores)
     })?;
     named(scores, file)
@@ -58,6 +62,17 @@ fn fitted(recording: &Recording, rows: usize) -> Result<Baselines, CalibrationEr
     let (time_s, reading, strain) = recording.until(rows);
     let samples = [Samples::new(time_s, reading, strain.unwrap_or(&[])).map_err(CalibrationError::from)?];
     Baselines::fit(&screen(&samples)?.samples())
+}
+
+/// The published law, fitted to the rows before `rows` and told the phases.
+fn published(recording: &Recording, rows: usize, truth: &[f64]) -> Option<impl Baseline> {
+    let (time_s, reading, strain) = recording.until(rows);
+    let samples = [Samples::new(time_s, reading, strain.unwrap_or(&[])).ok()?];
+    let phases = |time_s: &[f64], strain: &[f64]| segment(time_s, strain).into_iter().map(|s| (s.phase, s.rows));
+    let law = PublishedLaw::fit(&samples, &[phases(time_s, samples[0].strain()).collect()]).ok()?;
+    let time_s = &recording.time_s;
+    let starts = phases(time_s, truth).map(|(phase, rows)| (time_s[rows.start], phase)).collect();
+    Some(law.start(starts, truth.first().copied().unwrap_or(f64::NAN)))
 }
 
 fn truth(recording: &Recording) -> PyResult<&[f64]> {

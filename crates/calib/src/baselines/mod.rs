@@ -1,12 +1,13 @@
-//! Inverses without a model of the sensor, to compare the filter with.
+//! Inverses to compare the filter with: four without a model of the sensor, and the published law ([`PublishedLaw`]).
 //!
-//! [`Baselines::fit`] fits all of them to recordings with known strain; each one then runs over readings row by row, as a
+//! [`Baselines::fit`] fits the four to recordings with known strain; each one then runs over readings row by row, as a
 //! filter does. What they say is clipped to the strains they were fitted on. Ridge and time constant come from
 //! cross-validation on contiguous blocks, on the same normal equations as the law's.
 
 mod fir;
 mod leaky_bank;
 mod low_pass_mode;
+mod published;
 mod reading_scale;
 mod regression;
 mod static_cubic;
@@ -14,6 +15,7 @@ mod static_cubic;
 pub use fir::Fir;
 pub use leaky_bank::LeakyBank;
 pub use low_pass_mode::LowPassMode;
+pub use published::{PhaseRows, PublishedLaw};
 pub use regression::{Features, Regression};
 pub use static_cubic::StaticCubic;
 

@@ -5,9 +5,9 @@ mod summary;
 use std::path::{Path, PathBuf};
 
 use evaluation::{Evaluation, RecordingScores};
-use ohmstrain_calib::{Baselines, Samples, reference_lag, screen};
+use ohmstrain_calib::{Baselines, PublishedLaw, Samples, reference_lag, screen};
 use rayon::prelude::*;
-use sensors::{Rivals, Sensor};
+use sensors::{Rivals, Sensor, phases};
 
 use crate::args::{EvaluateArgs, Split};
 use crate::commands::reporting::{Drawn, Reporting, Wanted, sample};
@@ -50,7 +50,7 @@ pub fn run(args: &EvaluateArgs) -> Result<(), CliError> {
 /// Every recording with the parameters of a file.
 fn with_sensor_file(args: &EvaluateArgs, path: &Path, evaluation: &mut Evaluation) -> Result<(), CliError> {
     let sensors = Sensor::from_file(path, args.estimator, !args.no_correction)?;
-    let rivals = Rivals { static_cubic: sensors[0].sensor.params().static_cubic, learned: None };
+    let rivals = Rivals { static_cubic: sensors[0].sensor.params().static_cubic, learned: None, published: None };
     let judged = |path: &PathBuf| judge(args, &read(args, path)?, Part::since(args.from), &sensors, &rivals);
     add_until_error(evaluation, args.traces.par_iter().map(judged).collect())
 }
@@ -130,7 +130,9 @@ fn calibrated(
     let names: Vec<&str> = training.iter().map(|recording| recording.name.as_str()).collect();
     let failed = |error| CliError::calibration(&names, &error);
     let baselines = Baselines::fit(&screen(&samples).map_err(failed)?.samples()).map_err(failed)?;
-    Ok((sensors, Rivals { static_cubic: baselines.static_cubic, learned: Some(baselines) }))
+    let phases: Vec<_> = samples.iter().map(|samples| phases(samples.time_s(), samples.strain())).collect();
+    let published = PublishedLaw::fit(&samples, &phases).ok();
+    Ok((sensors, Rivals { static_cubic: baselines.static_cubic, learned: Some(baselines), published }))
 }
 
 /// What comes of a recording.

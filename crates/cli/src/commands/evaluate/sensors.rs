@@ -2,7 +2,8 @@ use std::path::Path;
 use std::time::Instant;
 
 use ohmstrain::{Calibrated, Calibration, ValidityWatch};
-use ohmstrain_calib::{Baselines, EstimatorKind, RECIPE, StaticCubic};
+use ohmstrain_bench_data::segment;
+use ohmstrain_calib::{Baselines, EstimatorKind, PhaseRows, PublishedLaw, RECIPE, StaticCubic};
 
 use super::evaluation::{BaselineScores, LearnedScores, RecordingScores};
 use crate::args::Estimators;
@@ -32,6 +33,13 @@ pub struct Rivals {
     pub static_cubic: StaticCubic,
     /// The others, where there are rows to fit them to.
     pub learned: Option<Baselines>,
+    /// The published law, where these move both ways.
+    pub published: Option<PublishedLaw>,
+}
+
+/// What the body does, by the reference.
+pub fn phases(time_s: &[f64], strain: &[f64]) -> Vec<PhaseRows> {
+    segment(time_s, strain).into_iter().map(|segment| (segment.phase, segment.rows)).collect()
 }
 
 impl Sensor {
@@ -143,9 +151,18 @@ impl Rivals {
                 fir_20s: scoring::of_baseline(recording, learned.fir.start(), part, moved)?,
                 low_pass_mode: scoring::of_baseline(recording, learned.low_pass_mode.start(), part, moved)?,
                 leaky_bank: scoring::of_baseline(recording, learned.leaky_bank.start(), part, moved)?,
+                relaxing_modulus: self.of_published(recording, part, moved),
             }),
         };
         let static_cubic = scoring::of_baseline(recording, self.static_cubic.start(), part, moved)?;
         Some(BaselineScores { static_cubic, learned })
+    }
+
+    fn of_published(&self, recording: &Recording, part: Part, moved: f64) -> Option<ohmstrain::Scores> {
+        let time_s = &recording.trace.time_s;
+        let strain: Vec<f64> = (0..time_s.len()).map(|row| recording.truth(row)).collect();
+        let phases = phases(time_s, &strain).into_iter().map(|(phase, rows)| (time_s[rows.start], phase)).collect();
+        let first = strain.first().copied().unwrap_or(f64::NAN);
+        scoring::of_baseline(recording, self.published?.start(phases, first), part, moved)
     }
 }

@@ -1,0 +1,157 @@
+use std::ops::Range;
+
+use nalgebra::{Matrix2, Vector2};
+use ohmstrain_model::{Modulus, Phase, PhaseStart, RelaxingModulus};
+
+use super::{Baseline, Held};
+use crate::CalibrationError;
+use crate::params::RangeParams;
+use crate::samples::{Samples, check, filled_strain};
+
+/// Time constants tried for one direction.
+const TIME_CONSTANTS: usize = 80;
+/// The longest of them, in longest movements: an exponential that is a straight line by then.
+const LONGEST: f64 = 30.0;
+/// The shortest of them, in longest movements.
+const SHORTEST: f64 = 0.01;
+
+/// A phase and its rows.
+pub type PhaseRows = (Phase, Range<usize>);
+
+/// The published law taken literally ([`RelaxingModulus`]), solved for the strain: `R = R_s + r₀ exp(-t/τ₀) u + η v` in a
+/// movement, at the constant speed `v = u/t` of the paper's ramps. In a hold its readings say nothing of the strain, which
+/// stays. Each direction has numbers of its own.
+///
+/// It is told when phases begin, and the strain of the first row, which no body that wears a sensor says: this is how far
+/// the law itself carries.
+#[derive(Clone, Copy, Debug)]
+pub struct PublishedLaw {
+    extend: RelaxingModulus<f64, 0>,
+    retract: RelaxingModulus<f64, 0>,
+    range: RangeParams,
+}
+
+/// A row of a movement, from its start and beyond the dash-pot's reading of the phase before.
+struct MovingRow {
+    elapsed_s: f64,
+    travel: f64,
+    rate: f64,
+    reading: f64,
+}
+
+impl PublishedLaw {
+    /// Least squares over all movements of recordings whose phases are known.
+    ///
+    /// # Errors
+    /// If a recording is too short or the strain is constant, and if there is no movement in one of the directions.
+    pub fn fit(recordings: &[Samples], phases: &[Vec<PhaseRows>]) -> Result<Self, CalibrationError> {
+        let (lower, upper) = check(recordings)?;
+        let law = |direction: Phase| {
+            let of_recording = |(samples, phases): (&Samples, &Vec<PhaseRows>)| moving_rows(samples, phases, direction);
+            let rows: Vec<MovingRow> = recordings.iter().zip(phases).flat_map(of_recording).collect();
+            best_law(&rows).ok_or(CalibrationError::Singular)
+        };
+        let (extend, retract) = (law(Phase::Extend)?, law(Phase::Retract)?);
+        Ok(Self { extend, retract, range: RangeParams { lower, upper } })
+    }
+
+    /// At work on a recording whose phases begin at these times, s, and whose first strain is known.
+    #[must_use]
+    pub fn start(&self, phases: Vec<(f64, Phase)>, strain: f64) -> impl Baseline + use<> {
+        let mut held = Held::new(self.range);
+        held.next(strain.is_finite().then_some(strain));
+        Running { law: *self, phases, next: 0, held, started: None, before: None }
+    }
+}
+
+fn moving_rows(samples: &Samples, phases: &[PhaseRows], direction: Phase) -> Vec<MovingRow> {
+    let strain = filled_strain(samples);
+    let mean_rate = |rows: &Range<usize>| {
+        let (first, last) = (rows.start.saturating_sub(1), rows.end - 1);
+        (strain[last] - strain[first]) / (samples.time_s[last] - samples.time_s[first]).max(f64::MIN_POSITIVE)
+    };
+    let rate_of = |(phase, rows): &PhaseRows| if *phase == Phase::Hold { 0.0 } else { mean_rate(rows) };
+    let mut found = Vec::new();
+    for (place, (_, rows)) in phases.iter().enumerate().filter(|(_, (phase, _))| *phase == direction) {
+        let before = place.checked_sub(1).map_or(0.0, |before| rate_of(&phases[before]));
+        let start = rows.start.saturating_sub(1);
+        let rate = mean_rate(rows) - before;
+        let row = |k: usize| MovingRow {
+            elapsed_s: samples.time_s[k] - samples.time_s[start],
+            travel: strain[k] - strain[start],
+            rate,
+            reading: samples.reading[k] - samples.reading[start],
+        };
+        found.extend(rows.clone().map(row).filter(|row| row.reading.is_finite()));
+    }
+    found
+}
+
+/// r₀ and η by linear least squares for every time constant, and the one that leaves least.
+fn best_law(rows: &[MovingRow]) -> Option<RelaxingModulus<f64, 0>> {
+    let longest_s = rows.iter().map(|row| row.elapsed_s).fold(0.0, f64::max);
+    let tau_s = |i: usize| longest_s * SHORTEST * (LONGEST / SHORTEST).powf(i as f64 / (TIME_CONSTANTS - 1) as f64);
+    let fitted = |tau_s: f64| {
+        let (mut normal, mut right) = (Matrix2::zeros(), Vector2::zeros());
+        for row in rows {
+            let basis = Vector2::new((-row.elapsed_s / tau_s).exp() * row.travel, row.rate);
+            normal += basis * basis.transpose();
+            right += basis * row.reading;
+        }
+        let weights = normal.svd(true, true).solve(&right, f64::EPSILON * normal.norm()).ok()?;
+        Some((right.dot(&weights), tau_s, weights))
+    };
+    let (_, tau_s, weights) =
+        (0..TIME_CONSTANTS).filter_map(|i| fitted(tau_s(i))).max_by(|a, b| a.0.total_cmp(&b.0))?;
+    RelaxingModulus::new(weights[0], weights[1], 0.0, Modulus::Single { tau_s }).ok()
+}
+
+struct Running {
+    law: PublishedLaw,
+    /// Starts of phases, s.
+    phases: Vec<(f64, Phase)>,
+    next: usize,
+    held: Held,
+    /// The movement that goes on: since when, s, with which law.
+    started: Option<(f64, PhaseStart<f64>, RelaxingModulus<f64, 0>)>,
+    /// Time, reading and rate at the last reading.
+    before: Option<(f64, f64, f64)>,
+}
+
+impl Running {
+    fn begin(&mut self, phase: Phase, time_s: f64, reading: f64) {
+        let (start_s, start_reading, rate) = self.before.unwrap_or((time_s, reading, 0.0));
+        let law = match phase {
+            Phase::Hold => None,
+            Phase::Extend => Some(self.law.extend),
+            Phase::Retract => Some(self.law.retract),
+        };
+        let of_movement =
+            |law: RelaxingModulus<f64, 0>| (start_s, law.begin(phase, self.held.last, rate, start_reading), law);
+        self.started = law.map(of_movement);
+    }
+
+    /// Strain and rate.
+    fn solved(&self, time_s: f64, reading: f64) -> Option<(f64, f64)> {
+        let (start_s, start, law) = self.started?;
+        let elapsed_s = time_s - start_s;
+        let (at_start, [slope, viscosity]) = law.resistance_ohm(&start, elapsed_s, start.strain, 0.0);
+        let travel = (reading - at_start) / (slope + viscosity / elapsed_s);
+        (elapsed_s > 0.0 && travel.is_finite()).then(|| (start.strain + travel, travel / elapsed_s))
+    }
+}
+
+impl Baseline for Running {
+    fn strain(&mut self, time_s: f64, reading: f64) -> f64 {
+        if !reading.is_finite() {
+            return self.held.next(None);
+        }
+        while let Some((_, phase)) = self.phases.get(self.next).filter(|(start_s, _)| *start_s <= time_s).copied() {
+            self.begin(phase, time_s, reading);
+            self.next += 1;
+        }
+        let solved = self.solved(time_s, reading);
+        self.before = Some((time_s, reading, solved.map_or(0.0, |(_, rate)| rate)));
+        self.held.next(solved.map(|(strain, _)| strain))
+    }
+}
