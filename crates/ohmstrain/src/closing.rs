@@ -197,15 +197,19 @@ fn seen(seen: &Seen, quantity: Quantity) -> String {
     } else {
         "no holds".into()
     };
+    // One speed has quartiles, and a 95 % quantile, that differ by noise alone.
+    let (slow, fast) = (number(seen.quartile_speeds.0), number(seen.quartile_speeds.1.min(seen.fastest_rate)));
+    let fastest = if seen.quartile_speeds.1 < seen.fastest_rate {
+        format!(", seldom over {}", number(seen.fastest_rate))
+    } else {
+        String::new()
+    };
     format!(
-        "{} {} to {}{unit}{}; mostly {} to {}, seldom over {}{unit}/s; {holds}; {} s",
+        "{} {} to {}{unit}{}; mostly {slow} to {fast}{fastest}{unit}/s; {holds}; {} s",
         quantity.name().trim_end_matches("_deg"),
         number(low),
         number(seen.range.upper),
         seldom.unwrap_or_default(),
-        number(seen.quartile_speeds.0),
-        number(seen.quartile_speeds.1),
-        number(seen.fastest_rate),
         significant(seen.longest_s, 3)
     )
 }
