@@ -1,13 +1,13 @@
 use std::collections::VecDeque;
 use std::ops::Range;
 
-use ohmstrain_ekf::correction::{FEATURES, FeatureScale, OUTPUTS, ReadingFeatures, mixture};
+use ohmstrain_ekf::correction::{FEATURES, FeatureScale, OUTPUTS, ReadingFeatures, Weighting, mixture};
 use ohmstrain_ekf::{Gaussian, Guard, Reading, ReadingVerdict, StepError};
 
 use crate::CalibrationError;
 use crate::correction_params::{
-    CorrectionParams, CorrectionScale, CorrectorParams, FILTER_INPUTS, FUTURE_FEATURES, SMOOTHER_INPUTS, TrainingRow,
-    filter_inputs, smoother_inputs,
+    CorrectionParams, CorrectionScale, CorrectorParams, FILTER_INPUTS, FUTURE_FEATURES, SIDES, SMOOTHER_INPUTS,
+    TrainingRow, filter_inputs, smoother_inputs,
 };
 use crate::corrector::{Corrector, Examples};
 use crate::filter::{Filter, Output, Rows, WayBack};
@@ -15,8 +15,8 @@ use crate::known::KnownError;
 use crate::params::RangeParams;
 use crate::way_back::SEGMENT;
 
-/// A reading that a guard has weighed down and whose normalised innovation squared is above this is not shown to the
-/// correction, which expects none in particular: three standard deviations.
+/// A reading that a guard has weighed down and whose normalised innovation squared is above this surprises: three standard
+/// deviations.
 pub const SURPRISING_NIS: f64 = 9.0;
 
 /// A filter with the learned correction of its strain. Everything else that it says is the filter's.
@@ -26,7 +26,7 @@ pub const SURPRISING_NIS: f64 = 9.0;
 pub(crate) struct Corrected {
     filter: Box<dyn Filter>,
     of_filter: Corrector<FILTER_INPUTS>,
-    of_smoother: Corrector<SMOOTHER_INPUTS>,
+    of_smoother: Corrector<SMOOTHER_INPUTS, SIDES>,
     scale: CorrectionScale,
     readings: Readings,
     /// What the filter has said of the last row.
@@ -59,11 +59,11 @@ impl Readings {
     }
 
     /// Takes a row in either direction of time.
-    fn step(&mut self, time_s: f64, reading: Option<Reading<f64>>) -> Option<[f64; FEATURES]> {
+    fn step(&mut self, time_s: f64, Seen { reading, surprises }: Seen) -> Option<[f64; FEATURES]> {
         let dt_s = (time_s - self.time_s.unwrap_or(time_s)).abs();
         self.time_s = Some(time_s);
-        self.missing = reading.is_none();
-        self.now = self.features.step(dt_s, reading.map(|reading| reading.value));
+        self.now = self.features.step_unless(surprises, dt_s, reading);
+        self.missing = reading.is_none() || self.features.is_waiting();
         self.now
     }
 }
@@ -92,7 +92,7 @@ impl Corrected {
     /// Lets the correction see a row that the filter has taken.
     fn see(&mut self, time_s: f64, reading: Option<Reading<f64>>) {
         let said = self.filter.output();
-        self.readings.step(time_s, seen(&said, reading));
+        self.readings.step(time_s, Seen::new(&said, reading));
         if !self.readings.missing {
             self.readings.known_variance = Some(said.estimate.strain.variance);
         }
@@ -121,7 +121,7 @@ impl Corrected {
     fn hand_out(&mut self, out: &mut dyn FnMut(Output)) {
         for mut output in self.lagged.drain(..) {
             if let Some(corrected) = self.waiting.pop_front() {
-                output.estimate.strain = mixture(corrected, output.estimate.strain);
+                output.estimate.strain = mixture(Weighting::Mild, [corrected, output.estimate.strain]);
             }
             out(output);
         }
@@ -136,12 +136,12 @@ pub(crate) fn learned_for_filter(
     learned(&params.filter, &params.rows, TrainingRow::filter_inputs, limits)
 }
 
-fn learned<const D: usize>(
+fn learned<const D: usize, const S: usize>(
     params: &CorrectorParams,
     rows: &[TrainingRow],
     inputs: impl Fn(&TrainingRow) -> [f64; D],
     limits: RangeParams,
-) -> Result<Corrector<D>, CalibrationError> {
+) -> Result<Corrector<D, S>, CalibrationError> {
     let (strain, time_s): (Vec<f64>, Vec<f64>) = rows.iter().map(|row| (row.strain, row.time_s)).unzip();
     let inputs: Vec<_> = rows.iter().map(inputs).collect();
     let examples = Examples { inputs: &inputs, strain: &strain, time_s: &time_s, limits };
@@ -149,14 +149,30 @@ fn learned<const D: usize>(
     Corrector::new(params, examples).ok_or_else(singular)
 }
 
-/// The reading of a row, unless it was kept from the filter, or a guard would rather have.
-fn seen(output: &Output, reading: Option<Reading<f64>>) -> Option<Reading<f64>> {
-    let is_seen = match output.verdict {
-        ReadingVerdict::Accepted | ReadingVerdict::Readmitted => true,
-        ReadingVerdict::Downweighted => output.nis.is_none_or(|nis| nis <= SURPRISING_NIS),
-        _ => false,
-    };
-    reading.filter(|reading| is_seen && reading.value.is_finite())
+/// What the correction is shown of a row.
+#[derive(Clone, Copy)]
+struct Seen {
+    reading: Option<f64>,
+    /// Whether the filter would rather not have seen it.
+    surprises: bool,
+}
+
+impl Seen {
+    /// As it was read.
+    fn plain(reading: Option<Reading<f64>>) -> Self {
+        let finite = |reading: Reading<f64>| Some(reading.value).filter(|value| value.is_finite());
+        Self { reading: reading.and_then(finite), surprises: false }
+    }
+
+    /// As the filter has taken it: nothing, if it was kept from it.
+    fn new(output: &Output, reading: Option<Reading<f64>>) -> Self {
+        let (is_seen, surprises) = match output.verdict {
+            ReadingVerdict::Accepted | ReadingVerdict::Readmitted => (true, false),
+            ReadingVerdict::Downweighted => (true, output.nis.is_some_and(|nis| nis > SURPRISING_NIS)),
+            _ => (false, false),
+        };
+        Self { surprises, ..Self::plain(reading.filter(|_| is_seen)) }
+    }
 }
 
 /// What a correction sees of a filter's output.
@@ -230,7 +246,7 @@ impl Filter for Corrected {
                 starts.push(past);
             }
             let (time_s, reading) = rows.get(row);
-            past.step(time_s, reading);
+            past.step(time_s, Seen::plain(reading));
         }
         // The filter says what it says at the end of the recording.
         (self.readings, self.said, self.known) = (past, None, None);
@@ -243,7 +259,7 @@ impl Filter for Corrected {
 /// A smoother on its way back, corrected segment by segment.
 struct CorrectedWayBack<'a> {
     back: Box<dyn WayBack + 'a>,
-    corrector: &'a Corrector<SMOOTHER_INPUTS>,
+    corrector: &'a Corrector<SMOOTHER_INPUTS, SIDES>,
     rows: Rows<'a>,
     /// What had been seen of the past before each segment that is still to come. Readings that were kept from the filter
     /// were seen here, as far as features go: within a segment they are not, and what was before it fades in seconds.
@@ -260,13 +276,13 @@ impl WayBack for CorrectedWayBack<'_> {
         let mut behind = Vec::with_capacity(rows.len());
         for (row, output) in rows.clone().zip(out.iter()) {
             let (time_s, reading) = self.rows.get(row);
-            let reading = seen(output, reading);
-            known = if reading.is_some() { Some(output.estimate.strain.variance) } else { known };
-            behind.push((past.step(time_s, reading), known));
+            let features = past.step(time_s, Seen::new(output, reading));
+            known = if past.missing { known } else { Some(output.estimate.strain.variance) };
+            behind.push((features, known));
         }
         for ((row, output), (past, known)) in rows.clone().zip(out.iter_mut()).zip(behind).rev() {
             let (time_s, reading) = self.rows.get(row);
-            let future = self.ahead.step(time_s, seen(output, reading));
+            let future = self.ahead.step(time_s, Seen::new(output, reading));
             let smoothed = output.estimate.strain;
             if !self.ahead.missing {
                 self.ahead.known_variance = Some(smoothed.variance);

@@ -3,7 +3,7 @@ use ohmstrain_ekf::correction::FEATURES;
 
 use crate::CalibrationError;
 use crate::corrected::{future_features, outputs};
-use crate::correction_params::{CorrectionParams, CorrectionScale, CorrectorParams, TrainingRow};
+use crate::correction_params::{CorrectionParams, CorrectionScale, CorrectorParams, SIDES, TrainingRow};
 use crate::correction_scale::{each_row, reading_scale};
 use crate::corrector::Examples;
 use crate::estimator_params::EstimatorKind;
@@ -66,8 +66,8 @@ fn learn(
     let (strain, time_s) = (strain.as_slice(), time_s.as_slice());
     let of_filter: Vec<_> = rows.iter().map(TrainingRow::filter_inputs).collect();
     let of_smoother: Vec<_> = rows.iter().map(TrainingRow::smoother_inputs).collect();
-    let filter = CorrectorParams::fit(Examples { inputs: &of_filter, strain, time_s, limits })?;
-    let smoother = CorrectorParams::fit(Examples { inputs: &of_smoother, strain, time_s, limits })?;
+    let filter = CorrectorParams::fit::<_, 0>(Examples { inputs: &of_filter, strain, time_s, limits })?;
+    let smoother = CorrectorParams::fit::<_, SIDES>(Examples { inputs: &of_smoother, strain, time_s, limits })?;
     Some(CorrectionParams { corrects, readings, filter, smoother, rows })
 }
 

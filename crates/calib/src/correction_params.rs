@@ -39,7 +39,7 @@ pub struct CorrectionScale {
 }
 
 /// How one of the two estimates is corrected.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CorrectorParams {
     /// Factor on the corrected strain's standard deviation, from blocks left out.
@@ -48,6 +48,9 @@ pub struct CorrectorParams {
     pub direct: ProcessParams,
     /// What the filter's strain lacks, from its outputs and the features.
     pub residual: ProcessParams,
+    /// Strain from the features of the past alone, and from those of the future: a smoother's, none of a filter.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub one_sided: Vec<ProcessParams>,
 }
 
 /// A row of a calibration recording.
@@ -72,6 +75,8 @@ pub struct TrainingRow {
 pub(crate) const FILTER_INPUTS: usize = OUTPUTS + FEATURES;
 /// Inputs of the smoother's.
 pub(crate) const SMOOTHER_INPUTS: usize = FILTER_INPUTS + FUTURE_FEATURES;
+/// One-sided processes of the smoother's.
+pub(crate) const SIDES: usize = 2;
 
 impl CorrectionScale {
     /// For the past.

@@ -1,7 +1,7 @@
 use ohmstrain_ekf::Gaussian;
-use ohmstrain_ekf::correction::{Correction, INDUCING, InputScale, OUTPUTS, Process, mixture};
+use ohmstrain_ekf::correction::{Correction, FEATURES, INDUCING, InputScale, OUTPUTS, Process, Weighting, mixture};
 
-use crate::correction_params::CorrectorParams;
+use crate::correction_params::{CorrectorParams, SIDES};
 use crate::gaussian_process::{GaussianProcess, LeftOutRow, Lessons, ProcessParams, inducing_rows};
 use crate::params::RangeParams;
 use crate::portable::PortableProcess;
@@ -27,55 +27,108 @@ pub(crate) struct Examples<'a, const D: usize> {
 }
 
 /// A correction with everything that it is made of.
-pub(crate) struct Corrector<const D: usize> {
+pub(crate) struct Corrector<const D: usize, const S: usize = 0> {
     rows: Vec<[f64; D]>,
     scales: [InputScale<f64>; D],
     pub direct: PortableProcess,
+    one_sided: [PortableProcess; S],
     pub residual: PortableProcess,
     limits: RangeParams,
     strain_variance: f64,
     variance_factor: f64,
 }
 
-/// Examples on the scale that their inputs have, and the targets of both processes.
-struct Prepared<const D: usize> {
-    rows: Vec<[f64; D]>,
-    scales: [InputScale<f64>; D],
-    residuals: Vec<f64>,
-    strain_variance: f64,
-}
-
-impl<const D: usize> Prepared<D> {
-    fn new(examples: Examples<D>) -> Self {
-        let scales: [InputScale<f64>; D] = std::array::from_fn(|i| scale(examples.inputs.iter().map(|row| row[i])));
-        let standardised = |row: &[f64; D]| std::array::from_fn(|i| (row[i] - scales[i].mean) / scales[i].sd);
-        Self {
-            rows: examples.inputs.iter().map(standardised).collect(),
-            scales,
-            residuals: examples.inputs.iter().zip(examples.strain).map(|(row, strain)| strain - row[0]).collect(),
-            strain_variance: scale(examples.strain.iter().copied()).sd.powi(2),
-        }
-    }
-
-    /// Lets `learn` see the examples of the direct and of the residual process.
-    fn taught<X>(&self, examples: Examples<D>, learn: impl Fn(Lessons, Which) -> Option<X>) -> Option<[X; 2]> {
-        let time_s = examples.time_s;
-        let features: Vec<&[f64]> = self.rows.iter().map(|row| &row[OUTPUTS..]).collect();
-        let all: Vec<&[f64]> = self.rows.iter().map(<[f64; D]>::as_slice).collect();
-        let direct = learn(Lessons { inputs: &features, targets: examples.strain, time_s }, Which::Direct)?;
-        let residual = learn(Lessons { inputs: &all, targets: &self.residuals, time_s }, Which::Residual)?;
-        Some([direct, residual])
-    }
-
-    fn least_variance(&self, which: Which) -> f64 {
-        self.strain_variance * if which == Which::Direct { LEAST_DIRECT } else { LEAST_RESIDUAL }
-    }
-}
-
+/// A process of a correction.
 #[derive(Clone, Copy, PartialEq)]
 enum Which {
     Direct,
+    Past,
+    Future,
     Residual,
+}
+
+/// Direct processes that see one side of time, in order.
+const ONE_SIDED: [Which; SIDES] = [Which::Past, Which::Future];
+
+impl Which {
+    fn sees(self, row: &[f64]) -> Vec<f64> {
+        let (features, future) = (&row[OUTPUTS..], &row[row.len().min(OUTPUTS + FEATURES)..]);
+        match self {
+            Which::Direct => features.to_vec(),
+            Which::Past => features[..FEATURES].to_vec(),
+            Which::Future => [&features[..1], future].concat(),
+            Which::Residual => row.to_vec(),
+        }
+    }
+
+    const fn least_variance(self) -> f64 {
+        match self {
+            Which::Residual => LEAST_RESIDUAL,
+            _ => LEAST_DIRECT,
+        }
+    }
+
+    fn params(self, of: &CorrectorParams) -> Option<ProcessParams> {
+        match self {
+            Which::Direct => Some(of.direct),
+            Which::Past => of.one_sided.first().copied(),
+            Which::Future => of.one_sided.get(1).copied(),
+            Which::Residual => Some(of.residual),
+        }
+    }
+}
+
+/// Examples on the scale that their inputs have.
+struct Prepared<'a, const D: usize> {
+    examples: Examples<'a, D>,
+    rows: Vec<[f64; D]>,
+    scales: [InputScale<f64>; D],
+    strain_variance: f64,
+}
+
+impl<'a, const D: usize> Prepared<'a, D> {
+    fn new(examples: Examples<'a, D>) -> Self {
+        let scales: [InputScale<f64>; D] = std::array::from_fn(|i| scale(examples.inputs.iter().map(|row| row[i])));
+        let standardised = |row: &[f64; D]| std::array::from_fn(|i| (row[i] - scales[i].mean) / scales[i].sd);
+        let strain_variance = scale(examples.strain.iter().copied()).sd.powi(2);
+        Self { examples, rows: examples.inputs.iter().map(standardised).collect(), scales, strain_variance }
+    }
+
+    /// What a process adds its mean to.
+    fn base(&self, which: Which, row: usize) -> f64 {
+        if which == Which::Residual { self.examples.inputs[row][0] } else { 0.0 }
+    }
+
+    fn least_variance(&self, which: Which) -> f64 {
+        self.strain_variance * which.least_variance()
+    }
+
+    /// Lets `learn` see the examples of a process.
+    fn taught<X>(&self, which: Which, learn: impl Fn(Lessons) -> Option<X>) -> Option<X> {
+        let inputs: Vec<Vec<f64>> = self.rows.iter().map(|row| which.sees(row)).collect();
+        let inputs: Vec<&[f64]> = inputs.iter().map(Vec::as_slice).collect();
+        let target = |(row, strain): (usize, &f64)| strain - self.base(which, row);
+        let targets: Vec<f64> = self.examples.strain.iter().enumerate().map(target).collect();
+        learn(Lessons { inputs: &inputs, targets: &targets, time_s: self.examples.time_s })
+    }
+
+    /// Chooses a process, and says what it says of every row from the blocks that the row is not in.
+    fn chosen(&self, which: Which) -> Option<(ProcessParams, Vec<Gaussian<f64>>)> {
+        self.taught(which, |lessons| {
+            let settings = lessons.best_settings()?;
+            let process = GaussianProcess::new(lessons, settings)?;
+            let (limits, least) = (self.examples.limits, self.least_variance(which));
+            let said = |(k, row): (usize, LeftOutRow)| {
+                let variance = row.unknown * row.prior.max(least) + process.noise * process.variance();
+                let mean = (self.base(which, k) + row.mean).clamp(limits.lower, limits.upper);
+                Gaussian { mean, variance }
+            };
+            let mut said: Vec<Gaussian<f64>> = process.left_out(BLOCKS)?.into_iter().enumerate().map(said).collect();
+            let sd_scale = sd_scale_up_to(&deviations(&said, self.examples.strain), WIDEST_PROCESS);
+            said.iter_mut().for_each(|said| said.variance *= sd_scale.powi(2));
+            Some((ProcessParams { sd_scale, ..settings }, said))
+        })
+    }
 }
 
 /// Mean, deviation and range of values; a value that never changes tells nothing, however far from it another one is.
@@ -88,32 +141,18 @@ fn scale(values: impl Iterator<Item = f64> + Clone) -> InputScale<f64> {
 }
 
 impl CorrectorParams {
-    /// Learns from examples; none if there is nothing to learn from them.
-    pub(crate) fn fit<const D: usize>(examples: Examples<D>) -> Option<Self> {
+    /// Learns from examples, with S one-sided processes; none if there is nothing to learn from them.
+    pub(crate) fn fit<const D: usize, const S: usize>(examples: Examples<D>) -> Option<Self> {
         let prepared = Prepared::new(examples);
-        let [direct, residual] = prepared.taught(examples, |lessons, which| {
-            let settings = lessons.best_settings()?;
-            let process = GaussianProcess::new(lessons, settings)?;
-            let left_out = process.left_out(BLOCKS)?;
-            let base = |k: usize| if which == Which::Direct { 0.0 } else { examples.inputs[k][0] };
-            let least = prepared.least_variance(which);
-            let said = |(k, row): (usize, &LeftOutRow)| {
-                let variance = row.unknown * row.prior.max(least) + process.noise * process.variance();
-                let mean = (base(k) + row.mean).clamp(examples.limits.lower, examples.limits.upper);
-                Gaussian { mean, variance }
-            };
-            let said: Vec<Gaussian<f64>> = left_out.iter().enumerate().map(said).collect();
-            let sd_scale = sd_scale_up_to(&deviations(&said, examples.strain), WIDEST_PROCESS);
-            Some((ProcessParams { sd_scale, ..settings }, said))
-        })?;
-        let widened = |(params, said): &(ProcessParams, Vec<Gaussian<f64>>), k: usize| Gaussian {
-            variance: said[k].variance * params.sd_scale.powi(2),
-            ..said[k]
-        };
-        let mixed: Vec<Gaussian<f64>> =
-            (0..examples.strain.len()).map(|k| mixture(widened(&direct, k), widened(&residual, k))).collect();
+        let (direct, of_direct) = prepared.chosen(Which::Direct)?;
+        let (residual, of_residual) = prepared.chosen(Which::Residual)?;
+        let sides: Vec<_> = ONE_SIDED[..S].iter().map(|side| prepared.chosen(*side)).collect::<Option<_>>()?;
+        let voices =
+            |k: usize| [of_direct[k], of_residual[k]].into_iter().chain(sides.iter().map(move |(_, of)| of[k]));
+        let weighting = if S == 0 { Weighting::Mild } else { Weighting::Sharp };
+        let mixed: Vec<Gaussian<f64>> = (0..examples.strain.len()).map(|k| mixture(weighting, voices(k))).collect();
         let sd_scale = joint_scale(&deviations(&mixed, examples.strain).concat());
-        Some(Self { sd_scale, direct: direct.0, residual: residual.0 })
+        Some(Self { sd_scale, direct, residual, one_sided: sides.into_iter().map(|(params, _)| params).collect() })
     }
 }
 
@@ -124,19 +163,19 @@ fn deviations(said: &[Gaussian<f64>], strain: &[f64]) -> Vec<Vec<f64>> {
     (0..BLOCKS).map(|block| (block * n / BLOCKS..(block + 1) * n / BLOCKS).map(of_row).collect()).collect()
 }
 
-impl<const D: usize> Corrector<D> {
+impl<const D: usize, const S: usize> Corrector<D, S> {
     /// Makes weights of examples; none if the covariances are not positive definite.
     pub(crate) fn new(params: &CorrectorParams, examples: Examples<D>) -> Option<Self> {
         let prepared = Prepared::new(examples);
-        let settings = |which: Which| if which == Which::Direct { params.direct } else { params.residual };
-        let kernels = prepared.taught(examples, |lessons, which| {
-            GaussianProcess::new(lessons, settings(which)).map(|process| process.kernel().clone())
-        })?;
-        let inducing = inducing_rows(&(&kernels[0] + &kernels[1]), INDUCING);
+        let made =
+            |which: Which| prepared.taught(which, |lessons| GaussianProcess::new(lessons, which.params(params)?));
+        let (direct, residual) = (made(Which::Direct)?, made(Which::Residual)?);
+        let sides: Vec<_> = ONE_SIDED[..S].iter().map(|side| made(*side)).collect::<Option<_>>()?;
+        let kernels = sides.iter().fold(direct.kernel() + residual.kernel(), |sum, side| sum + side.kernel());
+        let inducing = inducing_rows(&kernels, INDUCING);
         let order = inducing_first(&inducing, prepared.rows.len());
-        let [direct, residual] = prepared.taught(examples, |lessons, which| {
-            let settings = settings(which);
-            let process = GaussianProcess::new(lessons, settings)?;
+        let portable = |which: Which, process: &GaussianProcess| {
+            let settings = which.params(params)?;
             let weights: Vec<f64> = process.weights().collect();
             Some(PortableProcess {
                 length: settings.length,
@@ -148,12 +187,14 @@ impl<const D: usize> Corrector<D> {
                 widening: settings.sd_scale.powi(2),
                 least_variance: prepared.least_variance(which),
             })
-        })?;
+        };
+        let one_sided = ONE_SIDED.iter().zip(&sides).map(|(which, side)| portable(*which, side));
         Some(Self {
             rows: order.iter().map(|&row| prepared.rows[row]).collect(),
             scales: prepared.scales,
-            direct,
-            residual,
+            direct: portable(Which::Direct, &direct)?,
+            one_sided: one_sided.collect::<Option<Vec<_>>>()?.try_into().ok()?,
+            residual: portable(Which::Residual, &residual)?,
             limits: examples.limits,
             strain_variance: prepared.strain_variance,
             variance_factor: params.sd_scale.powi(2),
@@ -161,11 +202,12 @@ impl<const D: usize> Corrector<D> {
     }
 
     /// As it runs.
-    pub(crate) fn correction(&self) -> Correction<'_, f64, D> {
+    pub(crate) fn correction(&self) -> Correction<'_, f64, D, S> {
         Correction {
             rows: &self.rows,
             scales: &self.scales,
             direct: self.direct.process(),
+            one_sided: self.one_sided.each_ref().map(PortableProcess::process),
             residual: self.residual.process(),
             limits: self.limits.to_model(),
             strain_variance: self.strain_variance,

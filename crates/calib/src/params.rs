@@ -12,7 +12,7 @@ use crate::sd_scale::LARGEST_SD_SCALE;
 use crate::summary::Summary;
 
 /// Version of the parameter file this code reads and writes.
-pub const FORMAT: u32 = 5;
+pub const FORMAT: u32 = 6;
 
 /// Everything a filter needs to know of a sensor: the content of `sensor.toml`.
 ///

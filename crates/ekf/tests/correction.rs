@@ -2,11 +2,12 @@
 
 use ohmstrain_ekf::Gaussian;
 use ohmstrain_ekf::correction::{
-    Correction, FEATURES, FeatureScale, InputScale, LowPass, Process, ReadingFeatures, mixture, settled,
+    Correction, FEATURES, FeatureScale, InputScale, LowPass, Process, ReadingFeatures, Weighting, mixture, settled,
 };
 use ohmstrain_model::StrainRange;
 
-const D: usize = 9;
+/// Two features of the future.
+const D: usize = 15;
 const ROWS: usize = 12;
 const INDUCING: usize = 5;
 
@@ -16,11 +17,21 @@ fn number(seed: usize) -> f64 {
     2.0 * (x - x.floor()) - 1.0
 }
 
+/// Direct, residual, past and future: where their inputs are.
+fn sees(p: usize) -> Vec<usize> {
+    match p {
+        0 => (6..D).collect(),
+        1 => (0..D).collect(),
+        2 => (6..13).collect(),
+        _ => [6, 13, 14].to_vec(),
+    }
+}
+
 struct Numbers {
     rows: [[f64; D]; ROWS],
     scales: [InputScale<f64>; D],
-    weights: [[f64; ROWS]; 2],
-    triangles: [[f64; INDUCING * (INDUCING + 1) / 2]; 2],
+    weights: [[f64; ROWS]; 4],
+    triangles: [[f64; INDUCING * (INDUCING + 1) / 2]; 4],
 }
 
 fn numbers() -> Numbers {
@@ -37,25 +48,27 @@ fn numbers() -> Numbers {
     }
 }
 
-const LENGTHS: [f64; 2] = [1.5, 2.5];
-const MEANS: [f64; 2] = [0.2, -0.1];
-const VARIANCES: [f64; 2] = [0.5, 0.3];
-const NOISES: [f64; 2] = [0.02, 0.01];
-const WIDENINGS: [f64; 2] = [1.3, 2.0];
-const LEAST: [f64; 2] = [0.8, 0.1];
+const LENGTHS: [f64; 4] = [1.5, 2.5, 1.2, 1.9];
+const MEANS: [f64; 4] = [0.2, -0.1, 0.3, 0.0];
+const VARIANCES: [f64; 4] = [0.5, 0.3, 0.4, 0.9];
+const NOISES: [f64; 4] = [0.02, 0.01, 0.03, 0.05];
+const WIDENINGS: [f64; 4] = [1.3, 2.0, 1.1, 1.7];
+const LEAST: [f64; 4] = [0.8, 0.1, 0.7, 0.6];
 
-/// Direct and residual process by the formulas, and the novelty.
-fn written_out(numbers: &Numbers, input: &[f64; D], filtered: Gaussian<f64>) -> ([Gaussian<f64>; 2], f64) {
+/// Direct, residual and one-sided processes by the formulas, and the novelty.
+fn written_out(numbers: &Numbers, input: &[f64; D], filtered: Gaussian<f64>) -> ([Gaussian<f64>; 4], f64) {
     let inside: Vec<f64> = (0..D).map(|i| input[i].clamp(numbers.scales[i].lower, numbers.scales[i].upper)).collect();
     let x: Vec<f64> = (0..D).map(|i| (inside[i] - numbers.scales[i].mean) / numbers.scales[i].sd).collect();
-    let outside =
-        |from: usize| -> f64 { (from..D).map(|i| ((input[i] - inside[i]) / numbers.scales[i].sd).powi(2)).sum() };
-    let mut unknown = 0.0;
-    let said = [6, 0].map(|from| {
-        let p = usize::from(from == 0);
+    let outside = |places: &[usize]| -> f64 {
+        places.iter().map(|&i| ((input[i] - inside[i]) / numbers.scales[i].sd).powi(2)).sum()
+    };
+    let mut unknowns = [0.0; 4];
+    let said = [0, 1, 2, 3].map(|p| {
+        let places = sees(p);
+        let first = places[0];
         let kernel = |k: usize| {
-            let square: f64 = (from..D).map(|i| (x[i] - numbers.rows[k][i]).powi(2)).sum();
-            (-0.5 * square / LENGTHS[p].powi(2)).exp() + 0.09 * (1.0 + x[from] * numbers.rows[k][from])
+            let square: f64 = places.iter().map(|&i| (x[i] - numbers.rows[k][i]).powi(2)).sum();
+            (-0.5 * square / LENGTHS[p].powi(2)).exp() + 0.09 * (1.0 + x[first] * numbers.rows[k][first])
         };
         let mean = MEANS[p] + (0..ROWS).map(|k| numbers.weights[p][k] * kernel(k)).sum::<f64>();
         let mut explained = 0.0;
@@ -65,19 +78,20 @@ fn written_out(numbers: &Numbers, input: &[f64; D], filtered: Gaussian<f64>) -> 
             let product: f64 = (i..INDUCING).map(|j| numbers.triangles[p][start + j - i] * kernel(j)).sum();
             explained += product * product;
         }
-        let prior = 1.0 + 0.09 * (1.0 + x[from] * x[from]);
-        unknown = (1.0 - explained / prior).clamp(0.0, 1.0);
+        let prior = 1.0 + 0.09 * (1.0 + x[first] * x[first]);
+        let unknown = (1.0 - explained / prior).clamp(0.0, 1.0);
+        unknowns[p] = unknown;
         let least = if p == 1 { LEAST[p].max(filtered.variance) } else { LEAST[p] };
         let base = if p == 1 { filtered.mean } else { 0.0 };
         let variance =
-            ((prior * VARIANCES[p]).max(least) * unknown + NOISES[p]) * WIDENINGS[p] + 0.03 * 0.7 * outside(from);
+            ((prior * VARIANCES[p]).max(least) * unknown + NOISES[p]) * WIDENINGS[p] + 0.03 * 0.7 * outside(&places);
         Gaussian { mean: (base + mean).clamp(-2.0, 2.0), variance }
     });
-    (said, 1.0 - (1.0 - unknown) * (-outside(0) / 5.0).exp())
+    (said, 1.0 - (1.0 - unknowns[1]) * (-outside(&sees(1)) / 5.0).exp())
 }
 
 macro_rules! correction {
-    ($t:ty, $numbers:expr, $rows:ident, $scales:ident, $weights:ident, $triangles:ident, $correction:ident) => {
+    ($t:ty, $numbers:expr, $sides:expr, $rows:ident, $scales:ident, $weights:ident, $triangles:ident, $correction:ident) => {
         let $rows = $numbers.rows.map(|row| row.map(|x| x as $t));
         let $scales = $numbers.scales.map(|scale| InputScale {
             mean: scale.mean as $t,
@@ -101,6 +115,7 @@ macro_rules! correction {
             rows: &$rows,
             scales: &$scales,
             direct: process(0),
+            one_sided: $sides.map(process),
             residual: process(1),
             limits: StrainRange { lower: -2.0, upper: 2.0 },
             strain_variance: 0.7,
@@ -110,24 +125,25 @@ macro_rules! correction {
 }
 
 #[test]
-fn both_processes_their_mixture_and_novelty() {
+fn all_processes_their_mixture_and_novelty() {
     let numbers = numbers();
-    correction!(f64, numbers, rows, scales, weights, triangles, correction);
+    correction!(f64, numbers, [2, 3], rows, scales, weights, triangles, correction);
     for trial in 0..50 {
         let input: [f64; D] = std::array::from_fn(|i| 3.0 * number(1000 + 10 * trial + i));
         let filtered = Gaussian { mean: input[0], variance: 0.05 * (1.0 + number(9000 + trial)) };
         let said = correction.correct(&input, filtered);
-        let ([direct, residual], novelty) = written_out(&numbers, &input, filtered);
+        let (voices, novelty) = written_out(&numbers, &input, filtered);
         // Tens of sums of products of numbers of order one.
         let close = |a: f64, b: f64| (a - b).abs() < 1e-12 * (1.0 + b.abs());
         let same = |a: Gaussian<f64>, b: Gaussian<f64>| close(a.mean, b.mean) && close(a.variance, b.variance);
-        assert!(same(said.direct, direct) && same(said.residual, residual), "{trial}: {said:?}");
+        let [past, future] = said.one_sided;
+        let expected = [said.direct, said.residual, past, future];
+        assert!(voices.into_iter().zip(expected).all(|(a, b)| same(b, a)), "{trial}: {said:?}");
         assert!(close(said.novelty, novelty), "{trial}");
-        let share =
-            |of: Gaussian<f64>| of.variance.powf(-0.75) / (direct.variance.powf(-0.75) + residual.variance.powf(-0.75));
-        let (a, b) = (share(direct), share(residual));
-        let mean = a * direct.mean + b * residual.mean;
-        let second = a * (direct.variance + direct.mean.powi(2)) + b * (residual.variance + residual.mean.powi(2));
+        let weights = voices.map(|voice| voice.variance.powf(-1.5));
+        let share = |p: usize| weights[p] / weights.iter().sum::<f64>();
+        let mean: f64 = (0..4).map(|p| share(p) * voices[p].mean).sum();
+        let second: f64 = (0..4).map(|p| share(p) * (voices[p].variance + voices[p].mean.powi(2))).sum();
         let variance = 0.6 * (second - mean * mean) + 0.06 * 0.7 * novelty;
         assert!(close(said.strain.mean, mean) && (said.strain.variance - variance).abs() < 1e-11, "{trial}");
     }
@@ -136,8 +152,8 @@ fn both_processes_their_mixture_and_novelty() {
 #[test]
 fn single_precision_says_the_same() {
     let numbers = numbers();
-    correction!(f64, numbers, rows, scales, weights, triangles, wide);
-    correction!(f32, numbers, rows_32, scales_32, weights_32, triangles_32, narrow);
+    correction!(f64, numbers, [], rows, scales, weights, triangles, wide);
+    correction!(f32, numbers, [], rows_32, scales_32, weights_32, triangles_32, narrow);
     for trial in 0..50 {
         let input: [f64; D] = std::array::from_fn(|i| 3.0 * number(2000 + 10 * trial + i));
         let said = wide.correct(&input, Gaussian { mean: input[0], variance: 0.05 });
@@ -153,19 +169,22 @@ fn single_precision_says_the_same() {
 fn a_mixture_of_any_scale() {
     let at = |mean: f64, variance: f64| Gaussian { mean, variance };
     // Equal variances: the middle, and the distance of both from it.
-    assert_eq!(mixture(at(-1.0, 0.25), at(1.0, 0.25)), at(0.0, 1.25));
+    assert_eq!(mixture(Weighting::Mild, [at(-1.0, 0.25), at(1.0, 0.25)]), at(0.0, 1.25));
     // 16 times the variance: an eighth of the weight.
-    let mixed = mixture(at(0.0, 1.0), at(9.0, 16.0));
+    let mixed = mixture(Weighting::Mild, [at(0.0, 1.0), at(9.0, 16.0)]);
     assert!((mixed.mean - 1.0).abs() < 1e-15);
     for scale in [1e-30_f64, 1e30] {
-        let scaled = mixture(at(0.0, scale * scale), at(9.0 * scale, 16.0 * scale * scale));
+        let scaled = mixture(Weighting::Mild, [at(0.0, scale * scale), at(9.0 * scale, 16.0 * scale * scale)]);
         assert!(
             (scaled.mean / scale - 1.0).abs() < 1e-12
                 && (scaled.variance / (scale * scale) / mixed.variance - 1.0).abs() < 1e-12
         );
     }
+    // 16 times the variance, sharply: a 64th of the weight.
+    let sharp = mixture(Weighting::Sharp, [at(0.0, 1.0), at(65.0, 16.0)]);
+    assert!((sharp.mean - 1.0).abs() < 1e-14);
     // Exact knowledge drowns the rest.
-    assert_eq!(mixture(at(0.3, 0.0), at(0.5, 1.0)), at(0.3, 0.0));
+    assert_eq!(mixture(Weighting::Mild, [at(0.3, 0.0), at(0.5, 1.0)]), at(0.3, 0.0));
 }
 
 /// A low-pass of a reading that goes straight from one known row to the next, against ten thousand small steps.
@@ -204,6 +223,33 @@ fn a_missing_reading_holds_the_features_and_the_next_one_is_taken_over_the_whole
     let (gappy, known) = (gappy.step(0.5, Some(0.5)).unwrap(), known.step(2.0, Some(0.5)).unwrap());
     assert!(gappy.iter().zip(known).all(|(a, b)| (a - b).abs() < 1e-14));
     assert!(known[1..].iter().all(|x| *x > 0.0) && known[5] < 1.0);
+}
+
+/// A spike leaves the features as they were, and a step that goes on surprising is seen after the first three rows.
+#[test]
+fn a_few_surprising_readings_are_passed_over() {
+    let scale = FeatureScale { centre: 0.1, half_range: 0.5, rates: [0.01, 0.02], starts: settled() };
+    let start = || {
+        let mut features = ReadingFeatures::<f64>::new(scale);
+        features.step(0.1, Some(0.2));
+        features
+    };
+    let (mut features, mut plain) = (start(), start());
+    let before = plain.step(0.0, None);
+    for spike in 0..3 {
+        assert_eq!(features.step_unless(true, 0.1, Some(5.0)), before, "{spike}");
+        assert!(features.is_waiting());
+    }
+    // A missing row neither counts nor breaks the row of surprises.
+    assert_eq!(features.step_unless(true, 0.1, None), before);
+    let seen = features.step_unless(true, 0.1, Some(0.3));
+    assert!(seen != before && !features.is_waiting());
+    // As if nothing had come in between, over the whole time; the sum of 0.1 five times is rounded.
+    let expected = plain.step(0.5, Some(0.3)).unwrap();
+    assert!(seen.unwrap().iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-14));
+    features.step_unless(false, 0.1, Some(0.3));
+    let before = features.step(0.0, None);
+    assert_eq!(features.step_unless(true, 0.1, Some(5.0)), before, "after one that does not surprise");
 }
 
 /// What a start is off by fades as exp(−t/τ) and nothing else changes, since low-passes are linear.

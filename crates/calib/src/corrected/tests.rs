@@ -1,6 +1,6 @@
 use std::ops::Range;
 
-use ohmstrain_ekf::correction::{FEATURES, FeatureScale, ReadingFeatures, Starts, mixture};
+use ohmstrain_ekf::correction::{FEATURES, FeatureScale, ReadingFeatures, Starts, Weighting, mixture};
 use ohmstrain_ekf::{Estimate, Gaussian, Guard, Reading, ReadingVerdict, StepError};
 
 use super::{Corrected, future_features, outputs};
@@ -174,12 +174,13 @@ fn params() -> CorrectionParams {
         smoothed: outputs(&says(time_s[k], 0.0, ReadingVerdict::Accepted)),
     };
     let process = |length: f64| ProcessParams { length, noise: 0.1, noise_time_s: 2.0, sd_scale: 1.2 };
-    let corrector = CorrectorParams { sd_scale: 0.9, direct: process(2.0), residual: process(4.0) };
+    let corrector =
+        |one_sided| CorrectorParams { sd_scale: 0.9, direct: process(2.0), residual: process(4.0), one_sided };
     CorrectionParams {
         corrects: EstimatorKind::SignSplit,
         readings: SCALE,
-        filter: corrector,
-        smoother: corrector,
+        filter: corrector(Vec::new()),
+        smoother: corrector(vec![process(2.0), process(4.0)]),
         rows: (0..600).step_by(10).map(row).collect(),
     }
 }
@@ -282,6 +283,7 @@ fn a_lagged_row_is_mixed_with_what_was_said_of_it() {
     }
     assert_eq!(out.len(), 48);
     lagging.flush_lagged(&mut |output| out.push(output)).unwrap();
-    let expected: Vec<Gaussian<f64>> = said.iter().map(|said| mixture(*said, lagged().estimate.strain)).collect();
+    let expected: Vec<Gaussian<f64>> =
+        said.iter().map(|said| mixture(Weighting::Mild, [*said, lagged().estimate.strain])).collect();
     assert_eq!(out.iter().map(|output| output.estimate.strain).collect::<Vec<_>>(), expected);
 }

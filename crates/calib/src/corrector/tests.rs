@@ -10,7 +10,7 @@ const D: usize = 8;
 const LIMITS: RangeParams = RangeParams { lower: -10.0, upper: 10.0 };
 
 /// Rows that no two inputs of agree, on curves that wander; a filter that is wrong by something smooth.
-fn examples(n: usize, dt_s: f64) -> (Vec<[f64; D]>, Vec<f64>, Vec<f64>) {
+fn examples<const D: usize>(n: usize, dt_s: f64) -> (Vec<[f64; D]>, Vec<f64>, Vec<f64>) {
     let time_s: Vec<f64> = (0..n).map(|k| dt_s * k as f64).collect();
     let strain: Vec<f64> = time_s.iter().map(|t| (0.21 * t).sin()).collect();
     let row = |(t, strain): (&f64, &f64)| -> [f64; D] {
@@ -76,7 +76,9 @@ fn a_correction_says_what_the_textbook_says() {
     let examples = Examples { inputs: &inputs, strain: &strain, time_s: &time_s, limits: LIMITS };
     let direct = ProcessParams { length: 2.0, noise: 0.1, noise_time_s: 2.0, sd_scale: 1.5 };
     let residual = ProcessParams { length: 4.0, noise: 0.3, noise_time_s: 10.0, sd_scale: 1.0 };
-    let corrector = Corrector::new(&CorrectorParams { sd_scale: 0.8, direct, residual }, examples).unwrap();
+    let corrector =
+        Corrector::<D>::new(&CorrectorParams { sd_scale: 0.8, direct, residual, one_sided: Vec::new() }, examples)
+            .unwrap();
     let all: Vec<Vec<f64>> = inputs.iter().map(|row| row.to_vec()).collect();
     let features: Vec<Vec<f64>> = inputs.iter().map(|row| row[6..].to_vec()).collect();
     let residuals: Vec<f64> = inputs.iter().zip(&strain).map(|(row, strain)| strain - row[0]).collect();
@@ -101,14 +103,42 @@ fn a_correction_says_what_the_textbook_says() {
     }
 }
 
+/// A process of one side of time says what the textbook says of rows that have nothing but that side.
+#[test]
+fn one_sided_processes_see_their_side_alone() {
+    const BOTH: usize = 16;
+    let (inputs, strain, time_s) = examples::<BOTH>(40, 1.7);
+    let examples = Examples { inputs: &inputs, strain: &strain, time_s: &time_s, limits: LIMITS };
+    let [direct, residual, past, future] = [(4.0, 0.1), (4.0, 0.3), (2.0, 0.1), (8.0, 0.03)]
+        .map(|(length, noise)| ProcessParams { length, noise, noise_time_s: 2.0, sd_scale: 1.0 });
+    let params = CorrectorParams { sd_scale: 1.0, direct, residual, one_sided: vec![past, future] };
+    let corrector = Corrector::<BOTH, 2>::new(&params, examples).unwrap();
+    // Six outputs, the reading, six features of the past, three of the future.
+    let of_past = |row: &[f64; BOTH]| row[6..13].to_vec();
+    let of_future = |row: &[f64; BOTH]| [&row[6..7], &row[13..]].concat();
+    let pasts: Vec<Vec<f64>> = inputs.iter().map(of_past).collect();
+    let futures: Vec<Vec<f64>> = inputs.iter().map(of_future).collect();
+    for k in 0..39 {
+        let input: [f64; BOTH] = std::array::from_fn(|i| 0.5 * (inputs[k][i] + inputs[k + 1][i]));
+        let said = corrector.correction().correct(&input, Gaussian { mean: input[0], variance: 0.0 });
+        let books = [
+            textbook(&pasts, &strain, &time_s, past, &of_past(&input)),
+            textbook(&futures, &strain, &time_s, future, &of_future(&input)),
+        ];
+        for (said, book) in said.one_sided.iter().zip(books) {
+            assert!((said.mean - book.mean).abs() < 1e-6, "{k}: {} {}", said.mean, book.mean);
+        }
+    }
+}
+
 /// With fewer inducing rows the variance is larger, never smaller, and the mean as with all.
 #[test]
 fn inducing_rows_cost_no_certainty_that_is_not_there() {
     let (inputs, strain, time_s) = examples(200, 1.7);
     let examples = Examples { inputs: &inputs, strain: &strain, time_s: &time_s, limits: LIMITS };
     let settings = ProcessParams { length: 4.0, noise: 0.1, noise_time_s: 2.0, sd_scale: 1.0 };
-    let params = CorrectorParams { sd_scale: 1.0, direct: settings, residual: settings };
-    let corrector = Corrector::new(&params, examples).unwrap();
+    let params = CorrectorParams { sd_scale: 1.0, direct: settings, residual: settings, one_sided: Vec::new() };
+    let corrector = Corrector::<D>::new(&params, examples).unwrap();
     let all: Vec<Vec<f64>> = inputs.iter().map(|row| row.to_vec()).collect();
     let residuals: Vec<f64> = inputs.iter().zip(&strain).map(|(row, strain)| strain - row[0]).collect();
     for k in (0..199).step_by(7) {
@@ -123,7 +153,7 @@ fn inducing_rows_cost_no_certainty_that_is_not_there() {
 /// What a process says of a block in closed form is what one says that was never told of it, centre and scale aside.
 #[test]
 fn blocks_left_out_are_predicted_from_the_others() {
-    let (inputs, strain, time_s) = examples(50, 1.7);
+    let (inputs, strain, time_s) = examples::<D>(50, 1.7);
     let rows: Vec<&[f64]> = inputs.iter().map(|row| row.as_slice()).collect();
     let settings = ProcessParams { length: 4.0, noise: 0.1, noise_time_s: 2.0, sd_scale: 1.0 };
     let process = GaussianProcess::new(Lessons { inputs: &rows, targets: &strain, time_s: &time_s }, settings).unwrap();
@@ -163,8 +193,8 @@ fn learning_helps_near_and_leaves_far_alone() {
     let learned: Vec<[f64; D]> = (0..160).filter(even).map(|k| inputs[k]).collect();
     let (known, times) = (pick(&strain), pick(&time_s));
     let examples = Examples { inputs: &learned, strain: &known, time_s: &times, limits: LIMITS };
-    let params = CorrectorParams::fit(examples).unwrap();
-    let corrector = Corrector::new(&params, examples).unwrap();
+    let params = CorrectorParams::fit::<D, 0>(examples).unwrap();
+    let corrector = Corrector::<D>::new(&params, examples).unwrap();
     let (mut before, mut after, mut covered) = (0.0, 0.0, 0);
     for k in (1..160).step_by(2) {
         let filtered = Gaussian { mean: inputs[k][0], variance: 0.01 };

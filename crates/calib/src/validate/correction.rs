@@ -1,6 +1,6 @@
 use super::table::{FieldError, Table};
 use super::{FACTOR, POSITIVE, SIGNED};
-use crate::correction_params::{CorrectionParams, CorrectionScale, CorrectorParams, TrainingRow};
+use crate::correction_params::{CorrectionParams, CorrectionScale, CorrectorParams, SIDES, TrainingRow};
 use crate::estimator_params::EstimatorKind;
 use crate::gaussian_process::ProcessParams;
 
@@ -13,8 +13,8 @@ impl CorrectionParams {
             return Err(table.wrong("corrects", "a filter", self.corrects.name()));
         }
         self.readings.validate(&table.table("readings"))?;
-        self.filter.validate(&table.table("filter"))?;
-        self.smoother.validate(&table.table("smoother"))?;
+        self.filter.validate(&table.table("filter"), 0)?;
+        self.smoother.validate(&table.table("smoother"), SIDES)?;
         if !ROWS.contains(&self.rows.len()) {
             let expected = format!("{} to {} entries", ROWS.start(), ROWS.end());
             return Err(table.wrong("rows", expected, self.rows.len()));
@@ -33,10 +33,15 @@ impl CorrectionScale {
 }
 
 impl CorrectorParams {
-    fn validate(&self, table: &Table) -> Result<(), FieldError> {
+    fn validate(&self, table: &Table, sides: usize) -> Result<(), FieldError> {
         table.number("sd_scale", self.sd_scale, FACTOR)?;
         self.direct.validate(&table.table("direct"))?;
-        self.residual.validate(&table.table("residual"))
+        self.residual.validate(&table.table("residual"))?;
+        if self.one_sided.len() != sides {
+            return Err(table.wrong("one_sided", format!("{sides} entries"), self.one_sided.len()));
+        }
+        let mut one_sided = self.one_sided.iter().enumerate();
+        one_sided.try_for_each(|(index, side)| side.validate(&table.entry("one_sided", index)))
     }
 }
 

@@ -2,7 +2,7 @@
 
 use ohmstrain_calib::{PortableCorrection, PortableProcess};
 use ohmstrain_ekf::Real;
-use ohmstrain_ekf::correction::{FAR, FARTHEST, LINEAR, NEW, NOVEL, RATE_GAIN, TIME_CONSTANTS_S};
+use ohmstrain_ekf::correction::{FAR, FARTHEST, LINEAR, NEW, NOVEL, PASSED_OVER, RATE_GAIN, TIME_CONSTANTS_S};
 use serde::Serialize;
 
 use super::literal::Literal;
@@ -22,6 +22,7 @@ pub struct CorrectionConstants {
     mean_decays: Vec<Literal>,
     rate_gain: Literal,
     farthest: Literal,
+    passed_over: u8,
     rows: Vec<Vec<Literal>>,
     mean: Vec<Literal>,
     /// `None` for an input that never changes: infinite.
@@ -109,6 +110,7 @@ impl CorrectionConstants {
             mean_decays: decays.iter().map(|(_, mean)| Literal(*mean)).collect(),
             rate_gain: narrow(RATE_GAIN),
             farthest: narrow(FARTHEST),
+            passed_over: PASSED_OVER,
             rows: correction.rows.iter().map(narrowed).collect(),
             mean: scales.iter().map(|scale| narrow(scale.mean)).collect(),
             sd: scales.iter().map(|scale| Some(narrow(scale.sd)).filter(|sd| sd.0.is_finite())).collect(),

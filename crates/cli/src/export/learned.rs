@@ -62,6 +62,7 @@ impl<T: Real> Table<T> {
             rows: &self.rows,
             scales: &self.scales,
             direct,
+            one_sided: [],
             residual,
             limits,
             strain_variance: self.strain_variance,

@@ -16,6 +16,10 @@ pub const RATE_GAIN: f64 = 3.0;
 /// stay in the low-passes for minutes.
 pub const FARTHEST: f64 = 3.0;
 
+/// How many readings in a row that surprise the filter are passed over: spikes. Where more do, the law is at fault, and what it is
+/// corrected by needs the readings most.
+pub const PASSED_OVER: u8 = 3;
+
 /// The scale on which readings `R/R₀ - 1` are seen.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FeatureScale<T> {
@@ -48,6 +52,8 @@ pub struct ReadingFeatures<T> {
     low_passes: [LowPass<T>; TIME_CONSTANTS_S.len()],
     /// Time since the last reading.
     waited_s: T,
+    /// How many surprising readings have come in a row, [`PASSED_OVER`] at most.
+    surprises: u8,
     now: Option<[T; FEATURES]>,
 }
 
@@ -56,7 +62,7 @@ impl<T: Real> ReadingFeatures<T> {
     #[must_use]
     pub fn new(scale: FeatureScale<T>) -> Self {
         let low_passes = TIME_CONSTANTS_S.map(|tau_s| LowPass::new(T::of(tau_s)));
-        Self { scale, low_passes, waited_s: T::zero(), now: None }
+        Self { scale, low_passes, waited_s: T::zero(), surprises: 0, now: None }
     }
 
     /// Takes the reading `R/R₀ - 1` of a row `dt_s` seconds after the one before, at least zero; `None` if it is missing.
@@ -78,6 +84,21 @@ impl<T: Real> ReadingFeatures<T> {
             self.now = Some(self.features(scaled, &low));
         }
         self.now
+    }
+
+    /// The same; a reading that surprises the filter is missing here, unless the [`PASSED_OVER`] readings before it did, too.
+    pub fn step_unless(&mut self, surprises: bool, dt_s: T, reading: Option<T>) -> Option<[T; FEATURES]> {
+        let before = self.surprises;
+        if reading.is_some() {
+            self.surprises = if surprises { PASSED_OVER.min(before + 1) } else { 0 };
+        }
+        self.step(dt_s, reading.filter(|_| !surprises || before == PASSED_OVER))
+    }
+
+    /// Whether the last row had no reading, or one that was passed over.
+    #[must_use]
+    pub fn is_waiting(&self) -> bool {
+        self.waited_s > T::zero()
     }
 
     fn features(&self, scaled: T, low: &[T; TIME_CONSTANTS_S.len()]) -> [T; FEATURES] {

@@ -45,12 +45,18 @@ static const process << p.name >> = {
 };
 {% endfor %}
 
-/* Takes a reading, relative, into the low-passes; without one they wait. */
-static void watch(readings *seen, float dt_s, const float *rho)
+/* Takes a reading, relative, into the low-passes; without one they wait. The first few that surprise are passed over. */
+static void watch(readings *seen, float dt_s, const float *rho, int surprises)
 {
     float low[LOW_PASSES], scaled, fast, slow;
     int i;
 
+    if (rho && !surprises) {
+        seen->surprises = 0;
+    } else if (rho && seen->surprises < << correction.passed_over >>) {
+        seen->surprises++;
+        rho = (const float *)0;
+    }
     seen->waited_s += dt_s;
     seen->missing = rho == 0;
     if (!rho) {
@@ -134,7 +140,7 @@ static void correct(const summary *all, const readings *seen, float filtered, fl
                     float *variance)
 {
     float x[INPUTS], kernel[2][INDUCING], said[2], spread[2], unknown, outside[2] = {0.0f, 0.0f};
-    float least, beyond, novelty, of_residual, of_direct, mean;
+    float least, beyond, novelty, total, mean, share[2];
     int i, k;
 
     x[0] = filtered;
@@ -193,16 +199,18 @@ static void correct(const summary *all, const readings *seen, float filtered, fl
     spread[1] = spread[1] * RESIDUAL.widening + << correction.far >>f * << correction.strain_variance >>f * beyond;
     said[1] = clamped(filtered + said[1], OHMSTRAIN_LOWER, OHMSTRAIN_UPPER);
 
-    /* Their mixture, each weighted by its variance to the power -3/4. */
-    of_residual = spread[0] <= spread[1] ? 0.0f : 1.0f;
-    if (spread[0] > 0.0f && spread[1] > 0.0f) {
-        const float ratio = sqrtf(spread[0] / spread[1]), odds = ratio * sqrtf(ratio);
-        of_residual = odds > 1.0f ? 1.0f / (1.0f + 1.0f / odds) : odds / (1.0f + odds);
+    /* Their mixture, each weighted by its variance to the power -3/4; an exact one is all that counts. */
+    least = spread[1] < spread[0] ? spread[1] : spread[0];
+    for (i = 0; i < 2; i++) {
+        const float ratio = sqrtf(least / spread[i]);
+        share[i] = least > 0.0f ? ratio * sqrtf(ratio) : (float)(spread[i] <= least && (i == 0 || spread[0] > least));
     }
-    of_direct = 1.0f - of_residual;
-    mean = of_direct * said[0] + of_residual * said[1];
-    *variance = (of_direct * (spread[0] + (said[0] - mean) * (said[0] - mean)) +
-                 of_residual * (spread[1] + (said[1] - mean) * (said[1] - mean))) *
+    total = share[0] + share[1];
+    share[0] /= total;
+    share[1] /= total;
+    mean = share[0] * said[0] + share[1] * said[1];
+    *variance = (share[0] * (spread[0] + (said[0] - mean) * (said[0] - mean)) +
+                 share[1] * (spread[1] + (said[1] - mean) * (said[1] - mean))) *
                     << correction.variance_factor >>f +
                 << correction.novel >>f * << correction.strain_variance >>f * novelty;
     *strain = mean;

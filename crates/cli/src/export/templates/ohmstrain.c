@@ -540,7 +540,7 @@ static ohmstrain_status step(ohmstrain_state *state, float dt_s, const float *rh
     summarise(state, &all);
     strain = strain_of(&all, &variance);
 {% if correction %}
-    watch(&seen, dt_s, flags ? (const float *)0 : rho);
+    watch(&seen, dt_s, flags & ~(unsigned)OHMSTRAIN_DOWNWEIGHTED ? (const float *)0 : rho, flags & OHMSTRAIN_DOWNWEIGHTED);
     if (!seen.missing) {
         seen.known_variance = variance;
     }

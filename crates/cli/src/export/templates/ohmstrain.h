@@ -102,6 +102,7 @@ typedef struct ohmstrain_readings {
 {% if correction %}
     unsigned char has_feature;
     unsigned char missing;
+    unsigned char surprises; /* in a row, that the correction has passed over */
     float waited_s; /* time since the last reading that the correction saw */
     float scaled;   /* that reading, on the correction's scale */
     float known_variance;

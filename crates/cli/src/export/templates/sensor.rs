@@ -197,6 +197,7 @@ pub fn features() -> ReadingFeatures<f32> {
 pub const CORRECTION: Correction<'static, f32, INPUTS> = Correction {
     rows: &ROWS,
     scales: &SCALES,
+    one_sided: [],
 {% for p in correction.processes %}
     << p.name|lower >>: Process {
         length: << p.length >>,

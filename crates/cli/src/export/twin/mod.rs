@@ -154,12 +154,13 @@ impl<'a, T: Real, const B: usize, const N: usize, const L: usize, const K: usize
         }
         let (taken, nis) = self.taken(used)?;
         flags |= taken;
-        let is_seen = flags == 0;
+        let surprises = flags == flag::DOWNWEIGHTED;
+        let shown = reading.filter(|_| flags == 0 || surprises).map(|reading| reading.value);
         let filtered = self.filtered();
         if let Some(watched) = &mut self.now.watched {
-            self.now.features = watched.step(dt_s, reading.filter(|_| is_seen).map(|reading| reading.value));
-            self.now.missing = !is_seen;
-            self.now.known_variance = if is_seen { filtered.variance } else { self.now.known_variance };
+            self.now.features = watched.step_unless(surprises, dt_s, shown);
+            self.now.missing = watched.is_waiting();
+            self.now.known_variance = if self.now.missing { self.now.known_variance } else { filtered.variance };
         }
         let Gaussian { mean, variance } = self.corrected();
         let used = reading.filter(|_| flags & flag::NO_READING == 0).map(|reading| (reading.value, nis));
