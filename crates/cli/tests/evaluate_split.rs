@@ -4,7 +4,7 @@ use crate::common::{Bench, CALIBRATED_UNTIL, Csv, SIMULATE, change_rows};
 use serde_json::Value;
 
 /// The names of the baselines in JSON, sorted.
-const BASELINES: [&str; 4] = ["fir_20s", "leaky_bank", "low_pass_mode", "static_cubic"];
+const BASELINES: [&str; 5] = ["fir_20s", "leaky_bank", "low_pass_mode", "relaxing_modulus", "static_cubic"];
 
 /// A folder with a simulated recording per seed: `1.csv`, `2.csv` and so on.
 fn simulated(seeds: &[&str]) -> Bench {
@@ -140,7 +140,7 @@ fn some_recordings_train_and_others_test() {
 }
 
 #[test]
-fn the_table_has_filter_smoother_and_four_baselines_per_recording() {
+fn the_table_has_filter_smoother_and_all_baselines_per_recording() {
     let bench = simulated(&["1", "2"]);
     let printed = bench.run(&["evaluate", "--split", "0.5", "--estimator", "ekf", "1.csv", "2.csv"]).ok();
     assert!(printed.lines().all(|line| line.chars().count() <= 100), "{printed}");
@@ -150,7 +150,7 @@ fn the_table_has_filter_smoother_and_four_baselines_per_recording() {
         .map(|block| block.lines().filter(|line| line.starts_with('|')).map(cells).collect())
         .filter(|table: &Vec<Vec<String>>| !table.is_empty())
         .collect();
-    let names = ["ekf", "smoother", "static cubic", "20 s FIR", "low-pass mode", "leaky bank"];
+    let names = ["ekf", "smoother", "static cubic", "20 s FIR", "low-pass mode", "leaky bank", "published law"];
     // A table per recording, then that of all cases.
     assert_eq!(tables.len(), 3, "{printed}");
     for table in &tables[..2] {

@@ -65,6 +65,9 @@ pub struct RecordingScores {
     pub quantity: Quantity,
 }
 
+/// The name of the published law in tables.
+const PUBLISHED: &str = "published law";
+
 /// Scores of the baselines; a sensor file holds the first one only.
 #[derive(Clone, Copy, Serialize)]
 pub struct BaselineScores {
@@ -91,7 +94,7 @@ impl BaselineScores {
                 Some(("20 s FIR", learned.fir_20s)),
                 Some(("low-pass mode", learned.low_pass_mode)),
                 Some(("leaky bank", learned.leaky_bank)),
-                learned.relaxing_modulus.map(|scores| ("eqs 8+9, told phases", scores)),
+                learned.relaxing_modulus.map(|scores| (PUBLISHED, scores)),
             ]
         });
         std::iter::once(("static cubic", self.static_cubic)).chain(learned.into_iter().flatten().flatten())
@@ -131,7 +134,12 @@ impl Evaluation {
             if self.recordings.len() > 1 {
                 summary::write(&self.summaries(), out)?;
             }
-            Ok(writeln!(out, "{KEY}")?)
+            writeln!(out, "{KEY}")?;
+            let has_published = |scores: &RecordingScores| scores.baselines.named().any(|(name, _)| name == PUBLISHED);
+            if self.recordings().any(has_published) {
+                writeln!(out, "{PUBLISHED}: equations 8 and 9 solved for the strain, told when phases begin.")?;
+            }
+            Ok(())
         }
     }
 
