@@ -57,10 +57,11 @@ const EKF: OfKind = OfKind {
     flash_branch: 2510.0,
     stack: [715.0, 225.0, 0.0, 0.0],
 };
-/// Where the motion is clear fewer hypotheses part than in the motion of the self-test: then a step takes up to a third less.
+/// Where the motion is clear fewer hypotheses part than in the motion of the self-test: then a step takes up to a third less. Two
+/// hypotheses are merged in less than their share of what eight take, which the step's negative number stands for.
 const SIGN_SPLIT: OfKind = OfKind {
-    step: 0.0,
-    hypothesis: 4150.0,
+    step: -1100.0,
+    hypothesis: 4180.0,
     branch: 800.0,
     curve: 150.0,
     flash: 11_500.0,
