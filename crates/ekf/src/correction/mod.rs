@@ -4,8 +4,8 @@
 //! calibrated on. A *direct* process says strain from features of the readings alone; a *residual* process says what the
 //! filter's strain lacks, from what the filter says and the same features. A smoother has two more direct processes, one
 //! of the readings' past and one of their future: neither is as easily led astray by a motion that begins as a known one
-//! and ends as none. The result is the [`mixture`] of all. Far from the training rows the residual process says what the filter says, its variance is no smaller than the filter's, and the
-//! result's grows.
+//! and ends as none. The result is the [`mixture`] of all. Far from the training rows the residual process says what the
+//! filter says, its variance is no smaller than the filter's, and the result's grows.
 //!
 //! # Policy
 //! - Configuration, borrowed as slices that may lie in flash, is apart from state ([`ReadingFeatures`]); no heap, no panic.
@@ -160,8 +160,7 @@ impl<T: Real, const D: usize, const S: usize> Correction<'_, T, D, S> {
         let said = residual.said(&of_residual, strain);
         let novelty = T::one() - (T::one() - said.unknown) * (-outside.of_all() / T::of(NEW)).exp();
         let residual = self.widened(said, &self.residual, outside.of_all(), filtered.mean);
-        let weighting = if S == 0 { Weighting::Mild } else { Weighting::Sharp };
-        let mixed = mixture(weighting, [direct, residual].into_iter().chain(one_sided));
+        let mixed = mixture(Weighting::of(S), [direct, residual].into_iter().chain(one_sided));
         let variance = mixed.variance * self.variance_factor + T::of(NOVEL) * self.strain_variance * novelty;
         Corrected { strain: Gaussian { mean: mixed.mean, variance }, direct, one_sided, residual, novelty }
     }
@@ -191,6 +190,14 @@ pub enum Weighting {
     Mild,
     /// By variance to the power −3/2, more than that: of four voices, of which three are much the same, the surest counts.
     Sharp,
+}
+
+impl Weighting {
+    /// Of a correction with so many one-sided processes.
+    #[must_use]
+    pub const fn of(one_sided: usize) -> Self {
+        if one_sided == 0 { Self::Mild } else { Self::Sharp }
+    }
 }
 
 /// Mean and variance of the mixture of Gaussians, weighted by their variances. One that is exact is all that counts;
