@@ -87,7 +87,7 @@ mod unscented;
 pub use adskalman_bridge::LinearStep;
 #[cfg(feature = "simd")]
 pub use bank::{Bank, Lane, WrongLength};
-pub use belief::{Belief, Estimate, Gaussian, Real, TruncatedGaussian};
+pub use belief::{Belief, Estimate, Gaussian, Real};
 pub use clock::seconds_between;
 pub use ekf::{Ekf, Step, Update};
 pub use error::StepError;

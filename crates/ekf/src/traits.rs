@@ -1,7 +1,7 @@
 use nalgebra::SVector;
 use ohmstrain_model::{Direction, Observation, Phase, Scalar, SwitchedModel, SwitchedStep, Symmetric, Transition};
 
-use crate::{Belief, Gaussian};
+use crate::Belief;
 
 /// How the state moves in time. `L = N (N + 1) / 2`.
 pub trait Dynamics<T: Scalar, const N: usize, const L: usize> {
@@ -20,12 +20,6 @@ pub trait Dynamics<T: Scalar, const N: usize, const L: usize> {
     /// The transition over a prepared step, linearised at the belief's mean. `phase` is a hypothesis; with `None` the
     /// model makes the best of the belief. Models of one phase ignore it.
     fn transition(&self, step: &Self::Prepared, from: &Belief<T, N, L>, phase: Option<Phase>) -> Transition<T, N, L>;
-
-    /// The rate at the end of a prepared step while moving, if it can be had without the whole transition: a filter of
-    /// directions then knows which are worth following.
-    fn rate_ahead(&self, _step: &Self::Prepared, _from: &Belief<T, N, L>, _phase: Phase) -> Option<Gaussian<T>> {
-        None
-    }
 
     /// `F P Fᵀ + Q`. The default multiplies full matrices; a model that knows where its zeros are can do better.
     fn propagate(&self, covariance: &Symmetric<T, N, L>, transition: &Transition<T, N, L>) -> Symmetric<T, N, L> {
@@ -63,11 +57,6 @@ impl<T: Scalar, const B: usize, const N: usize, const L: usize> Dynamics<T, N, L
             None => self.uncertain_direction(step, &from.covariance),
         };
         self.transition(step, &from.mean, direction)
-    }
-
-    fn rate_ahead(&self, step: &Self::Prepared, from: &Belief<T, N, L>, phase: Phase) -> Option<Gaussian<T>> {
-        let mean = self.rate_mean(step, &from.mean, Direction::Known(phase));
-        Some(Gaussian { mean, variance: self.rate_variance(step, &from.covariance) })
     }
 
     fn propagate(&self, covariance: &Symmetric<T, N, L>, transition: &Transition<T, N, L>) -> Symmetric<T, N, L> {

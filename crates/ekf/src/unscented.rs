@@ -2,7 +2,7 @@ use nalgebra::SVector;
 use ohmstrain_model::{Observation, Phase, Scalar, Symmetric, Transition};
 
 use crate::belief::psd::SemiDefinite;
-use crate::{Belief, Channel, Dynamics, Ekf, Gaussian};
+use crate::{Belief, Channel, Dynamics, Ekf};
 
 /// Unscented Kalman filter: the prediction is linear given the phase, the reading goes through sigma points.
 ///
@@ -65,10 +65,6 @@ impl<T: Scalar, M: Dynamics<T, N, L>, const N: usize, const L: usize> Dynamics<T
 
     fn transition(&self, step: &Self::Prepared, from: &Belief<T, N, L>, phase: Option<Phase>) -> Transition<T, N, L> {
         self.model.transition(step, from, phase)
-    }
-
-    fn rate_ahead(&self, step: &Self::Prepared, from: &Belief<T, N, L>, phase: Phase) -> Option<Gaussian<T>> {
-        self.model.rate_ahead(step, from, phase)
     }
 
     fn propagate(&self, covariance: &Symmetric<T, N, L>, transition: &Transition<T, N, L>) -> Symmetric<T, N, L> {

@@ -2,7 +2,6 @@
 
 mod correction;
 mod estimate;
-mod gaussian;
 mod hostile;
 mod step;
 

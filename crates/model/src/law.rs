@@ -143,17 +143,6 @@ impl<T: Scalar, const B: usize> SensorLaw<T, B> {
         gauge + self.viscosity_s(phase) * rate + relaxing + baseline
     }
 
-    /// Where ρ will be `horizon_s` seconds on if the strain is held: `g(ε) + Σ cᵢ exp(-h/τᵢ)`, without the baseline.
-    /// Its limit for h → ∞ is the settled value g(ε).
-    #[must_use]
-    pub fn held_relative_change(&self, strain: T, relaxation: &[T; B], horizon_s: T) -> T {
-        let (gauge, _) = self.gauge_value_and_slope(strain);
-        self.branches
-            .iter()
-            .zip(relaxation)
-            .fold(gauge, |sum, (branch, c)| sum + *c * (-horizon_s / branch.tau_s).exp())
-    }
-
     /// dρ/dt over v on a ramp of constant rate v: how much the reading changes per strain *along the movement*, relaxation
     /// included: `g′(ε) + Σ (kᵢᵖ + κᵢᵖ ε) - Σ cᵢ/(τᵢ v)`. It vanishes at the ramp border ε*(v).
     #[must_use]

@@ -326,13 +326,6 @@ impl<T: Scalar, const B: usize, const N: usize> SwitchedModel<T, B, N> {
         }
     }
 
-    /// Mean of the rate at the end of a step that moves.
-    #[must_use]
-    pub fn rate_mean(&self, step: &SwitchedStep<T, B>, state: &SVector<T, N>, direction: Direction<T>) -> T {
-        let change = step.response.input[1] * self.push(direction);
-        (0..M).fold(state[1] + change, |sum, j| sum + step.response.motion_change[1][j] * state[j])
-    }
-
     /// Variance of the rate at the end of a step, from the covariance at its start.
     #[must_use]
     pub fn rate_variance<const L: usize>(&self, step: &SwitchedStep<T, B>, covariance: &Symmetric<T, N, L>) -> T {

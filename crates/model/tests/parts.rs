@@ -56,7 +56,6 @@ fn a_law_goes_on_along_its_tangent() {
     let (beyond, beyond_slope) = law.gauge_value_and_slope(0.5);
     assert!((beyond - (edge + 0.2 * slope)).abs() < 1e-15);
     assert_eq!(beyond_slope, slope);
-    assert_eq!(law.held_relative_change(0.1, &[], 10.0), law.relative_change(0.1, 0.0, &[], 0.0, Phase::Hold));
 }
 
 proptest! {

@@ -4,7 +4,7 @@ pub(crate) mod psd;
 pub(crate) mod tail;
 
 pub use estimate::Estimate;
-pub use gaussian::{Gaussian, Real, TruncatedGaussian};
+pub use gaussian::{Gaussian, Real};
 
 use nalgebra::SVector;
 use ohmstrain_model::{Scalar, Symmetric};

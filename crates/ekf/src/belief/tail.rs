@@ -55,12 +55,6 @@ pub(crate) fn upper_tail<T: Scalar>(x: T) -> T {
     }
 }
 
-/// Density of the standard normal.
-#[inline]
-pub(crate) fn density<T: Scalar>(x: T) -> T {
-    (T::of(-0.5) * x * x).exp() * T::of(PER_ROOT_TWO_PI)
-}
-
 const PER_ROOT_TWO_PI: f64 = 0.398_942_280_401_432_7;
 const ROOT_TWO_PER_PI: f64 = 0.797_884_560_802_865_4;
 
@@ -158,7 +152,7 @@ fn polynomial<T: Scalar, const N: usize>(coefficients: [T; N], x: T) -> T {
 
 #[cfg(test)]
 mod tests {
-    use super::{Tail, density, upper_tail};
+    use super::{Tail, upper_tail};
 
     /// Against another implementation of erfc, and the definition of the hazard. An argument of `z²/2` is rounded twice on its
     /// way into the exponential, and the polynomials take some ten roundings more.
@@ -185,6 +179,5 @@ mod tests {
         assert!(
             Tail::above(f64::NAN).mass.is_nan() && Tail::above(60.0).mass == 0.0 && Tail::above(60.0).hazard > 60.0
         );
-        assert!((density(1.5_f64) / Tail::above(1.5).hazard - upper_tail(1.5)).abs() < 1e-16);
     }
 }
