@@ -3,10 +3,9 @@ use std::ops::Range;
 use ohmstrain_calib::{EstimatorKind, Rows, Start, build_filter};
 use ohmstrain_ekf::{Guard, Influence, StepError};
 
-use crate::doubt::Doubt;
 use crate::estimate::Scale;
-use crate::filter::Kernel;
-use crate::{Error, Estimate, Filter, Flags, LaggedFilter, Reading, Sensor, Unread};
+use crate::filter::{Kernel, taken};
+use crate::{DOUBT, DoubtParts, Doubts, Error, Estimate, Filter, Flags, LaggedFilter, Reading, Sensor};
 
 /// How many readings in a row a gate turns down before it is the state that is doubted: outliers come alone, a body that sets off
 /// surprises until it is followed. With ten a knee that bent within half a second was missed.
@@ -260,7 +259,8 @@ impl<'a> FilterBuilder<'a> {
         row: impl Fn(usize) -> (f64, Reading),
         mut take: impl FnMut(Range<usize>, &[Estimate]) -> Result<(), E>,
     ) -> Result<(), E> {
-        let Kernel { mut filter, scale, doubt } = self.kernel(self.kind().smoother())?;
+        let starts_known = self.initial_strain.is_some();
+        let Kernel { mut filter, scale, mut doubts, .. } = self.kernel(self.kind().smoother())?;
         let failed = |(row, source): (usize, StepError)| Error::Row { row, source };
         let relative = |k: usize| {
             let (time_s, reading) = row(k);
@@ -269,18 +269,26 @@ impl<'a> FilterBuilder<'a> {
         let mut back = filter.way_back(Rows::new(len, &relative)).map_err(failed)?;
         let (mut outputs, mut estimates, mut first) = (Vec::new(), Vec::new(), len);
         let start_s = if len > 0 { row(0).0 } else { 0.0 };
-        let mut pauses = doubt.map(|doubt| doubt.pauses());
+        let mut next_s = if len > 0 { row(len - 1).0 } else { 0.0 };
+        let mut pauses = doubts.map(|doubts| doubts.pauses());
         while let Some(rows) = back.next_segment(&mut outputs).map_err(failed)? {
             first = rows.start;
             pauses.iter_mut().for_each(|pauses| pauses.widen(rows.clone(), |k| row(k).0, &mut outputs));
             estimates.clear();
-            estimates.extend(rows.clone().zip(&outputs).map(|(k, output)| {
+            estimates.extend(rows.clone().zip(&mut outputs).rev().map(|(k, output)| {
                 let (time_s, reading) = row(k);
+                let mut flags = Flags::NONE;
+                if let Some(doubts) = doubts.as_mut().filter(|_| k > 0 || !starts_known) {
+                    let (taken, strain) = (taken(&scale, reading, output), &mut output.estimate.strain);
+                    doubts.see_back(time_s - start_s, next_s - time_s, taken);
+                    (strain.variance, flags) = doubts.widened(output.estimate.rate.mean, strain.variance);
+                }
+                next_s = time_s;
                 let mut estimate = scale.row(time_s, reading, output);
-                estimate.flags =
-                    estimate.flags.and(doubt.map_or(Flags::NONE, |doubt| doubt.long_run(time_s - start_s)));
+                estimate.flags = estimate.flags.and(flags);
                 estimate
             }));
+            estimates.reverse();
             take(rows, &estimates)?;
         }
         if first == 0 { Ok(()) } else { Err(Error::NoSmoother.into()) }
@@ -299,9 +307,13 @@ impl<'a> FilterBuilder<'a> {
         filter.guard(self.guard()?);
         let mut scale = Scale::new(self.sensor)?;
         self.rest_resistance.map_or(Ok(()), |measured| scale.rest_at(measured))?;
-        let unread = Unread::new(&params.estimator(params.filter_of(kind))?.motion, params.limits);
-        let doubt = self.doubts.then(|| Doubt::new(params, unread, self.initial_strain));
-        Ok(Kernel { filter, scale, doubt })
+        let motion = &params.estimator(params.filter_of(kind))?.motion;
+        let is_none = |strain: f64| strain.abs() <= DOUBT.zero * params.limits.span();
+        let doubts = self.doubts.then(|| {
+            let doubts = Doubts::new(DoubtParts::new(params, motion));
+            self.initial_strain.map_or(doubts, |strain| doubts.of_known_strain(is_none(strain)))
+        });
+        Ok(Kernel { filter, scale, doubts, seen_s: 0.0 })
     }
 
     fn start_at(&self, strain: f64) -> Result<Start, Error> {

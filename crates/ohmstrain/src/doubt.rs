@@ -1,78 +1,53 @@
-use ohmstrain_calib::{Output, SURPRISING_NIS, SensorParams};
-use ohmstrain_ekf::ReadingVerdict;
+//! When an interval is wider than the filter says, in any precision.
+
+use ohmstrain_calib::{MotionParams, SURPRISING_NIS, SensorParams};
+use ohmstrain_ekf::{Gaussian, Real};
 
 use crate::pauses::Pauses;
 use crate::rest_watch::ZERO;
 use crate::{Flag, Flags, NEVER_READ_S, RestSeen, RestWatch, Unread};
 
-/// What no filter knows by itself: that it has only just begun, or begun again; that readings have jumped; that the sensor is
-/// used outside of what its calibration has seen. It widens the strain's interval, and says why.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Doubt {
-    seen: Seen,
-    start_s: Option<f64>,
-    last_s: f64,
-    /// Variance of the strain that fades while readings are believed.
-    fading: f64,
-    starting: bool,
-    /// What is known without a reading, and for how long there has been none, s.
-    unread: Unread,
-    unread_s: f64,
-    /// The strain's variance where readings have not been believed since.
-    lost: Option<f64>,
-    /// The last reading that was believed, R/R₀ - 1.
-    believed: Option<f64>,
-    /// How far readings have been outside of calibration's, R/R₀ - 1, fading.
-    outside: f64,
-    /// Whether R₀ is calibration's; none where that one does not know what the sensor reads at rest.
-    rest: Option<RestWatch<f64>>,
-}
-
-/// What calibration has seen.
-#[derive(Clone, Copy, Debug)]
-struct Seen {
-    /// Range of R/R₀ - 1.
-    low: f64,
-    high: f64,
-    fastest_per_s: f64,
-    longest_s: f64,
-    /// Range of the strain, and that over the range of R/R₀ - 1.
-    span: f64,
-    per_reading: f64,
-}
-
 /// Standard deviation of the strain, in spans, that a filter has at its start besides what it states. Started in motion, on six
 /// recordings, its errors of the first two seconds are 9 to 15 %FS where it states 7 to 11, and all but settled after ten.
 const START: f64 = 0.1;
-/// How long it takes until a doubt has fallen to 37 %, s: that a filter has just begun, or begun again; that readings were outside.
+/// How long it takes until a doubt has fallen to 37 %, s: that a filter has just begun, or begun again.
 const FADES_S: f64 = 5.0;
-const OUTSIDE_FADES_S: f64 = 60.0;
-/// Readings may lie outside of calibration's by this share of their range for nothing; what they are beyond that counts twice, as
-/// where all readings are off only those at an end of their range show it, and not all of it.
+/// For how long it matters that readings were outside of calibration's on the side of rest, or off what was predicted, s.
+const LATELY_S: f64 = 20.0;
+/// The same where they were beyond those of the largest strains: a body comes there from time to time.
+const FAR_FADES_S: f64 = 60.0;
+/// How many times counts what readings are outside on the side of rest, where a sensor that has not moved for long begins and soon
+/// has left it, and on the other one, where nothing leads but another R₀, another gain or a strain beyond calibration's: if all
+/// readings are off, only those at an end of their range show it, and not all of it.
+const NEAR_COUNTS: f64 = 0.5;
+const FAR_COUNTS: f64 = 1.5;
+/// An innovation counts as no larger than this, as a normalised square: one alone is an outlier, not a law that does not fit.
+const MOST_NIS: f64 = 30.0;
+/// Readings may lie outside of calibration's by this share of their range for nothing.
 const MARGIN: f64 = 0.02;
-const SHOWS: f64 = 2.0;
 /// How many times the fastest rate of calibration, which is its 99th percentile, is beyond it.
 const FASTER: f64 = 1.5;
-/// What is known of the strain least of all, in spans: as deviation.
-const MOST: f64 = 0.5;
 /// Share of the filter's variance, or of the doubt at a start, from which on a doubt is worth a flag.
 const WORTH: f64 = 0.2;
 
 /// The numbers behind the widened intervals, for programs that write a filter in another language.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DoubtNumbers {
-    /// Deviation at an unknown start, and what is known least of all, in spans of the strain.
-    pub start: f64,
-    /// As deviation, in spans.
-    pub most: f64,
-    /// Times after which doubts have fallen to 37 %, s: of a start or a fault, and of readings outside of calibration's.
+    /// Time after which the doubt of a start or a fault has fallen to 37 %, s.
     pub fades_s: f64,
-    /// See [`Self::fades_s`].
-    pub outside_fades_s: f64,
-    /// Share of calibration's range of readings that counts for nothing, and how many times counts what is beyond.
+    /// Time constant of what readings have been outside of calibration's on the side of rest, and of the mean of normalised
+    /// innovations squared, s; of what they have been outside on the other side; how many times either counts.
+    pub lately_s: f64,
+    /// See [`Self::lately_s`].
+    pub far_fades_s: f64,
+    /// See [`Self::lately_s`].
+    pub near_counts: f64,
+    /// See [`Self::lately_s`].
+    pub far_counts: f64,
+    /// As much as a normalised innovation squared counts.
+    pub most_nis: f64,
+    /// Share of calibration's range of readings that counts for nothing.
     pub margin: f64,
-    /// See [`Self::margin`].
-    pub shows: f64,
     /// How many times calibration's fastest rate is beyond it.
     pub faster: f64,
     /// Share of a variance from which on a doubt is worth a flag.
@@ -83,130 +58,339 @@ pub struct DoubtNumbers {
 
 /// The numbers behind the widened intervals.
 pub const DOUBT: DoubtNumbers = DoubtNumbers {
-    start: START,
-    most: MOST,
     fades_s: FADES_S,
-    outside_fades_s: OUTSIDE_FADES_S,
+    lately_s: LATELY_S,
+    far_fades_s: FAR_FADES_S,
+    near_counts: NEAR_COUNTS,
+    far_counts: FAR_COUNTS,
+    most_nis: MOST_NIS,
     margin: MARGIN,
-    shows: SHOWS,
     faster: FASTER,
     worth: WORTH,
     zero: ZERO,
 };
 
-impl Doubt {
-    /// Before the first row, with its strain if that is known.
-    pub(crate) fn new(params: &SensorParams, unread: Unread, known: Option<f64>) -> Self {
-        let starts_known = known.is_some();
+/// What the doubts of a sensor depend on: what its calibration has seen.
+#[derive(Clone, Copy, Debug)]
+pub struct DoubtParts {
+    /// Range of the readings, R/R₀ - 1.
+    pub low: f64,
+    /// See [`Self::low`].
+    pub high: f64,
+    /// Fastest rate, 1/s.
+    pub fastest_per_s: f64,
+    /// Longest recording, s.
+    pub longest_s: f64,
+    /// Range of the strain over that of the readings.
+    pub per_reading: f64,
+    /// Variance of the strain at an unknown start.
+    pub start: f64,
+    /// Variance of a strain that may be anywhere in the limits: there is no more to doubt.
+    pub most: f64,
+    /// What is known without a reading.
+    pub unread: Unread,
+    /// What the sensor read at rest, if that is known.
+    pub rest: Option<RestSeen>,
+}
+
+impl DoubtParts {
+    /// Of a sensor whose filter runs with that motion.
+    ///
+    /// ```
+    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+    /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
+    /// let params = sensor.params();
+    /// let of = params.filter_of(params.default_estimator);
+    /// let parts = ohmstrain::DoubtParts::new(params, &params.estimator(of)?.motion);
+    /// assert!(parts.low < parts.high && parts.start < parts.most);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn new(params: &SensorParams, motion: &MotionParams) -> Self {
         let (seen, span) = (&params.validity, params.limits.span());
         let relative = |reading: f64| reading / params.rest_reading - 1.0;
         let (low, high) = (relative(seen.reading_lower), relative(seen.reading_upper));
-        let start = if starts_known { 0.0 } else { START * span };
+        let unread = Unread::new(motion, params.limits);
         Self {
-            seen: Seen {
-                low,
-                high,
-                fastest_per_s: seen.fastest_rate_per_s,
-                longest_s: seen.duration_s,
-                span,
-                per_reading: if high > low { span / (high - low) } else { 0.0 },
-            },
-            start_s: None,
-            last_s: 0.0,
-            fading: start * start,
-            starting: !starts_known,
+            low,
+            high,
+            fastest_per_s: seen.fastest_rate_per_s,
+            longest_s: seen.duration_s,
+            per_reading: if high > low { span / (high - low) } else { 0.0 },
+            start: (START * span).powi(2),
+            most: unread.anywhere,
             unread,
-            unread_s: if starts_known { 0.0 } else { NEVER_READ_S },
-            lost: None,
-            believed: None,
-            outside: 0.0,
-            rest: RestSeen::of(params).map(|seen| RestWatch::new(seen, known.is_some_and(|x| x.abs() <= ZERO * span))),
+            rest: RestSeen::of(params),
         }
-    }
-
-    /// R₀ of today has been told.
-    pub(crate) fn told_rest(&mut self) {
-        self.rest.iter_mut().for_each(RestWatch::told);
-    }
-
-    /// The strain is known now: what was doubted of it is gone.
-    pub(crate) fn settle(&mut self) {
-        (self.fading, self.starting, self.lost, self.unread_s) = (0.0, false, None, 0.0);
-    }
-
-    /// There is more to doubt than what is left of a start.
-    fn raise(&mut self, variance: f64) {
-        if variance > self.fading {
-            (self.fading, self.starting) = (variance, false);
-        }
-    }
-
-    /// Takes a row, with the reading R/R₀ - 1 if there is one; widens the interval of its strain and says why.
-    pub(crate) fn widen(&mut self, time_s: f64, reading: Option<f64>, output: &mut Output) -> Flags {
-        let start_s = *self.start_s.get_or_insert(time_s);
-        let dt_s = if start_s < time_s { time_s - self.last_s } else { 0.0 };
-        self.last_s = time_s;
-        let taken = reading.filter(|_| is_taken(output.verdict));
-        let filtered = output.estimate.strain;
-        self.unread_s = if taken.is_some() { 0.0 } else { self.unread_s + dt_s };
-        let variance = match taken {
-            Some(_) => filtered.variance,
-            None => self.unread.variance(self.unread_s, filtered.mean, filtered.variance),
-        };
-        // The share of an innovation that is beyond what is no surprise.
-        let surprise = output.nis.map_or(0.0, |nis| 1.0 - (SURPRISING_NIS / nis).sqrt());
-        let most = (MOST * self.seen.span).powi(2);
-        match taken {
-            None => self.lost = Some(self.lost.unwrap_or(0.0).max(variance).max(filtered.variance)),
-            Some(reading) if surprise > 0.0 => {
-                let jump = self.believed.map_or(0.0, |last| (reading - last) * self.seen.per_reading);
-                self.raise((surprise * jump).powi(2).min(most));
-            }
-            Some(reading) => {
-                self.fading *= (-dt_s / FADES_S).exp();
-                if let Some(lost) = self.lost.take() {
-                    self.raise((lost).min(most));
-                }
-                self.believed = Some(reading);
-            }
-        }
-        if let Some(reading) = taken {
-            let range = self.seen.high - self.seen.low;
-            let beyond = (reading - self.seen.high).max(self.seen.low - reading) - MARGIN * range;
-            self.outside = (self.outside * (-dt_s / OUTSIDE_FADES_S).exp()).max(beyond);
-            self.rest.iter_mut().for_each(|rest| {
-                rest.see(dt_s, reading);
-            });
-        }
-        let rest_off = self.rest.map_or(0.0, |rest| rest.off());
-        let elsewhere = (rest_off * self.seen.per_reading).powi(2);
-        let outside = (SHOWS * self.outside.max(0.0) * self.seen.per_reading).powi(2);
-        let faster = (output.estimate.rate.mean / self.seen.fastest_per_s).abs();
-        let is_fast = faster > FASTER;
-        let stated = if is_fast { (variance * (faster * faster)).min(most).max(variance) } else { variance };
-        output.estimate.strain.variance = stated + (self.fading + outside + elsewhere).min(most);
-        let starts = self.starting && self.fading > WORTH * (START * self.seen.span).powi(2);
-        let recovers = !self.starting && self.fading > WORTH * variance;
-        Flags::NONE
-            .with(Flag::StartUp, starts)
-            .with(Flag::Recovering, recovers)
-            .with(Flag::Extrapolated, outside > WORTH * variance || is_fast)
-            .with(Flag::RestMoved, rest_off > 0.0)
-            .and(self.long_run(time_s - start_s))
-    }
-
-    /// The same pauses for a smoother.
-    pub(crate) const fn pauses(&self) -> Pauses {
-        Pauses::new(self.unread, self.unread_s)
-    }
-
-    /// What there is to say of a row so long after the first one, s.
-    pub(crate) fn long_run(&self, since_start_s: f64) -> Flags {
-        Flags::NONE.with(Flag::LongRun, since_start_s > self.seen.longest_s)
     }
 }
 
-/// Whether a reading has told the filter something.
-pub(crate) const fn is_taken(verdict: ReadingVerdict) -> bool {
-    matches!(verdict, ReadingVerdict::Accepted | ReadingVerdict::Downweighted | ReadingVerdict::Readmitted)
+/// How ill the sensor's law has fitted lately.
+#[derive(Clone, Copy, Debug)]
+struct Misfit<T> {
+    /// How far readings have been outside of calibration's on the side of rest, and on the other one, R/R₀ - 1, fading.
+    near: T,
+    far: T,
+    /// Mean of the normalised innovations squared.
+    nis: T,
+}
+
+impl<T: Real> Misfit<T> {
+    /// Takes a reading R/R₀ - 1 and its normalised innovation squared, `passed_s` seconds from the row seen last.
+    fn see(&mut self, parts: &DoubtParts, passed_s: T, reading: T, nis: T) {
+        let (low, high) = (T::of(parts.low), T::of(parts.high));
+        let margin = T::of(MARGIN) * (high - low);
+        let (above, below) = (reading - high - margin, low - reading - margin);
+        let sign = parts.rest.map_or(0.0, |rest| rest.sign);
+        let (near, far) = match sign {
+            1.0 => (below, above),
+            -1.0 => (above, below),
+            _ => (T::zero(), above.max(below)),
+        };
+        let lately = (-passed_s / T::of(LATELY_S)).exp();
+        self.near = (self.near * lately).max(near);
+        self.far = (self.far * (-passed_s / T::of(FAR_FADES_S)).exp()).max(far);
+        self.nis += (T::one() - lately) * (nis.min(T::of(MOST_NIS)) - self.nis);
+    }
+
+    /// The strain's variance for readings outside of calibration's.
+    fn outside(&self, parts: &DoubtParts) -> T {
+        let per_reading = T::of(parts.per_reading);
+        let (near, far) = (T::of(NEAR_COUNTS) * self.near * per_reading, T::of(FAR_COUNTS) * self.far * per_reading);
+        near * near + far * far
+    }
+}
+
+/// What no filter knows by itself: that it has only just begun, or begun again; that readings have jumped; that the sensor is
+/// used outside of what its calibration has seen, or that its law does not fit. It widens the strain's interval, and says why.
+///
+/// ```
+/// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+/// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
+/// use ohmstrain::{DoubtParts, Doubts, Flag};
+/// use ohmstrain_ekf::Gaussian;
+///
+/// let params = sensor.params();
+/// let of = params.filter_of(params.default_estimator);
+/// let parts = DoubtParts::new(params, &params.estimator(of)?.motion);
+/// let mut doubts = Doubts::<f64>::new(parts);
+/// let stated = Gaussian { mean: 0.1, variance: 1e-5 };
+/// let variance = doubts.see(0.0, Some((parts.low, 1.0)), stated);
+/// let (variance, flags) = doubts.widened(0.0, variance);
+/// assert!(variance > stated.variance && flags.has(Flag::StartUp));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Copy, Debug)]
+pub struct Doubts<T> {
+    parts: DoubtParts,
+    runs: bool,
+    starts: bool,
+    /// Time since the first row, s.
+    run_s: T,
+    /// Variance of the strain that fades while readings are believed.
+    fading: T,
+    /// For how long there has been no reading, s.
+    unread_s: T,
+    /// The strain's variance where readings have not been believed since.
+    lost: Option<T>,
+    /// The last reading that was believed, R/R₀ - 1.
+    believed: Option<T>,
+    misfit: Misfit<T>,
+    /// Whether R₀ is calibration's; none where that one does not know what the sensor reads at rest.
+    rest: Option<RestWatch<T>>,
+}
+
+impl<T: Real> Doubts<T> {
+    /// Before the first row.
+    #[must_use]
+    pub fn new(parts: DoubtParts) -> Self {
+        Self {
+            parts,
+            runs: false,
+            starts: true,
+            run_s: T::zero(),
+            fading: T::of(parts.start),
+            unread_s: T::of(NEVER_READ_S),
+            lost: None,
+            believed: None,
+            misfit: Misfit { near: T::zero(), far: T::zero(), nis: T::zero() },
+            rest: parts.rest.map(|seen| RestWatch::new(seen, false)),
+        }
+    }
+
+    /// The same where the strain is known at the start, and whether it is none.
+    #[must_use]
+    pub fn of_known_strain(self, rests: bool) -> Self {
+        let rest = self.parts.rest.map(|seen| RestWatch::new(seen, rests));
+        Self { starts: false, fading: T::zero(), unread_s: T::zero(), rest, ..self }
+    }
+
+    /// The strain is known now: what was doubted of it is gone.
+    pub fn settle(&mut self) {
+        (self.fading, self.starts, self.lost, self.unread_s) = (T::zero(), false, None, T::zero());
+    }
+
+    /// R₀ of today has been told.
+    pub fn told_rest(&mut self) {
+        self.rest.iter_mut().for_each(RestWatch::told);
+    }
+
+    /// There is more to doubt than what is left of a start.
+    fn raise(&mut self, variance: T) {
+        let variance = variance.min(T::of(self.parts.most));
+        if variance > self.fading {
+            (self.fading, self.starts) = (variance, false);
+        }
+    }
+
+    /// A row has passed, with a reading that was used, R/R₀ - 1, and its normalised innovation squared, or without; the variance
+    /// of the strain that is stated, or what a pause of the readings leaves open.
+    pub fn see(&mut self, dt_s: T, reading: Option<(T, T)>, stated: Gaussian<T>) -> T {
+        let passed_s = if self.runs { dt_s } else { T::zero() };
+        self.runs = true;
+        self.run_s += passed_s;
+        self.unread_s = if reading.is_some() { T::zero() } else { self.unread_s + passed_s };
+        let Some((rho, nis)) = reading else {
+            let variance = self.parts.unread.variance(self.unread_s, stated.mean, stated.variance);
+            let widest = variance.max(stated.variance);
+            self.lost = Some(self.lost.map_or(widest, |lost| lost.max(widest)));
+            return variance;
+        };
+        let surprising = T::of(SURPRISING_NIS);
+        if nis > surprising {
+            let jump = self.believed.map_or(T::zero(), |last| (rho - last) * T::of(self.parts.per_reading));
+            let doubt = (T::one() - (surprising / nis).sqrt()) * jump;
+            self.raise(doubt * doubt);
+        } else {
+            self.fading *= (-passed_s / T::of(FADES_S)).exp();
+            if let Some(lost) = self.lost.take() {
+                self.raise(lost);
+            }
+            self.believed = Some(rho);
+        }
+        self.judge(passed_s, rho, nis);
+        stated.variance
+    }
+
+    /// The same on a smoother's way back, which knows no start and nothing that fades: `run_s` after the first row, `dt_s`
+    /// before the row that was seen last.
+    pub fn see_back(&mut self, run_s: T, dt_s: T, reading: Option<(T, T)>) {
+        (self.run_s, self.starts, self.fading) = (run_s, false, T::zero());
+        if let Some((rho, nis)) = reading {
+            self.judge(dt_s, rho, nis);
+        }
+    }
+
+    /// What a reading says of the law and of R₀.
+    fn judge(&mut self, passed_s: T, rho: T, nis: T) {
+        self.misfit.see(&self.parts, passed_s, rho, nis);
+        self.rest.iter_mut().for_each(|rest| {
+            rest.see(passed_s, rho);
+        });
+    }
+
+    /// The strain's variance with all doubts, and flags that say so. Readings outside of calibration's are off in strain by some
+    /// multiple of what the mean slope says. Innovations that are larger than stated widen the interval as they would a weighted mean's (Birge,
+    /// *Phys. Rev.* 40 (1932) 207), and so does a rate beyond calibration's; to no more than is left open without readings.
+    pub fn widened(&self, rate: T, variance: T) -> (T, Flags) {
+        let (worth, most, per_reading) = (T::of(WORTH), T::of(self.parts.most), T::of(self.parts.per_reading));
+        let faster = rate.abs() / T::of(self.parts.fastest_per_s);
+        let is_fast = faster > T::of(FASTER);
+        let birge = self.misfit.nis.max(T::one());
+        let times = if is_fast { birge * (faster * faster) } else { birge };
+        let stated = (variance * times).min(most).max(variance);
+        let outside = self.misfit.outside(&self.parts);
+        let rest_off = self.rest.map_or(T::zero(), |rest| rest.off());
+        let elsewhere = rest_off * per_reading;
+        let more = (self.fading + outside + elsewhere * elsewhere).min(most);
+        let is_beyond = is_fast || outside > worth * variance || birge > T::one() + worth;
+        let flags = Flags::NONE
+            .with(Flag::StartUp, self.starts && self.fading > worth * T::of(self.parts.start))
+            .with(Flag::Recovering, !self.starts && self.fading > worth * variance)
+            .with(Flag::Extrapolated, is_beyond)
+            .with(Flag::LongRun, self.run_s > T::of(self.parts.longest_s))
+            .with(Flag::RestMoved, rest_off > T::zero());
+        (stated + more, flags)
+    }
+}
+
+impl Doubts<f64> {
+    /// What there is to doubt of pauses, for a smoother.
+    pub(crate) const fn pauses(&self) -> Pauses {
+        Pauses::new(self.parts.unread, self.unread_s)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use ohmstrain_ekf::Gaussian;
+
+    use super::{DoubtParts, Doubts};
+    use crate::{Flag, Flags, RestSeen, Unread};
+
+    const STATED: Gaussian<f64> = Gaussian { mean: 0.1, variance: 1e-6 };
+
+    /// Readings of 0 to 1 for strains of 0 to 0.3, and a rest at the end that `sign` says.
+    fn parts(sign: f64) -> DoubtParts {
+        let anywhere = 0.3 * 0.3 / 12.0;
+        let unread = Unread { rate_time_s: 1.0, path_variance: 1e-3, centre: 0.15, anywhere };
+        let end = if sign < 0.0 { 1.0 } else { 0.0 };
+        let rest = RestSeen { rested: end, tolerance: 10.0, lasts_s: 10.0, sign, end };
+        let (per_reading, start, most) = (0.3, 1e-4, anywhere);
+        DoubtParts {
+            low: 0.0,
+            high: 1.0,
+            fastest_per_s: 1.0,
+            longest_s: 1e9,
+            per_reading,
+            start,
+            most,
+            unread,
+            rest: Some(rest),
+        }
+    }
+
+    /// What is said after rows every 0.1 s, of readings with normalised innovations squared.
+    fn said(parts: DoubtParts, rows: impl IntoIterator<Item = (f64, f64)>) -> (f64, Flags) {
+        let mut doubts = Doubts::new(parts).of_known_strain(false);
+        rows.into_iter().for_each(|row| {
+            doubts.see(0.1, Some(row), STATED);
+        });
+        doubts.widened(0.0, STATED.variance)
+    }
+
+    #[test]
+    fn innovations_that_are_larger_than_stated_widen_as_much() {
+        // After 200 s all but exp(-10) of the mean is there.
+        for (nis, times) in [(0.5, 1.0), (1.0, 1.0), (4.0, 4.0), (1e6, 30.0)] {
+            // No jump: all of them say the same.
+            let (variance, flags) = said(parts(1.0), vec![(0.5, nis); 2000]);
+            assert!((variance / STATED.variance / times - 1.0).abs() < 1e-3, "{nis}: {variance}");
+            assert_eq!(flags.has(Flag::Extrapolated), times > 1.0);
+        }
+        // One outlier among those that fit: 30 of it for a two-hundredth of the time.
+        let outlier = |k: usize| (0.5, if k == 1990 { 1e6 } else { 0.5 });
+        let (variance, flags) = said(parts(1.0), (0..2000).map(outlier));
+        assert!((variance - STATED.variance).abs() < 1e-12 && flags == Flags::NONE, "{variance} {flags}");
+    }
+
+    /// Ten seconds after a reading that was 0.12 beyond the margin: by one's own exponentials.
+    #[test]
+    fn readings_beyond_the_largest_strain_count_more_and_longer_than_those_beyond_rest() {
+        let after = |beyond: f64| std::iter::once((beyond, 0.1)).chain(vec![(0.5, 0.1); 100]);
+        let near = (0.5 * 0.12 * 0.3 * (-10.0_f64 / 20.0).exp()).powi(2);
+        let far = (1.5 * 0.12 * 0.3 * (-10.0_f64 / 60.0).exp()).powi(2);
+        for (sign, above, below) in [(1.0, far, near), (-1.0, near, far), (0.0, far, far)] {
+            for (reading, expected) in [(1.14, above), (-0.14, below), (1.02, 0.0)] {
+                let (variance, flags) = said(parts(sign), after(reading));
+                assert!(
+                    (variance - STATED.variance - expected).abs() < 1e-9,
+                    "{sign} {reading}: {variance} {expected}"
+                );
+                assert_eq!(flags.has(Flag::Extrapolated), expected > 0.0);
+            }
+        }
+        // No more than of a strain that may be anywhere.
+        assert!((said(parts(1.0), after(9.0)).0 - STATED.variance - 0.0075).abs() < 1e-12);
+    }
 }

@@ -1,32 +1,51 @@
 use std::collections::VecDeque;
-use std::fmt;
+use std::{fmt, mem};
 
 use ohmstrain_calib::Output;
+use ohmstrain_ekf::ReadingVerdict;
 
-use crate::doubt::Doubt;
 use crate::estimate::Scale;
-use crate::{Error, Estimate, Flags, Reading};
+use crate::{Doubts, Error, Estimate, Flags, Reading};
 
 /// A filter for the sizes of the sensor's law, and the way to it from readings and from it to rows.
 pub(crate) struct Kernel {
     pub filter: Box<dyn ohmstrain_calib::Filter>,
     pub scale: Scale,
     /// None if intervals are to be as the filter states them.
-    pub doubt: Option<Doubt>,
+    pub doubts: Option<Doubts<f64>>,
+    /// Time of the row that doubts have seen last, s.
+    pub seen_s: f64,
 }
 
 /// The row of a reading and what the filter says of it, in doubt.
 fn doubted(
-    doubt: &mut Option<Doubt>,
+    doubts: &mut Option<Doubts<f64>>,
+    seen_s: &mut f64,
     scale: &Scale,
     (time_s, reading): (f64, Reading),
     mut output: Output,
 ) -> Estimate {
-    let relative = reading.relative(scale.rest_reading).map(|reading| reading.value);
-    let flags = doubt.as_mut().map_or(Flags::NONE, |doubt| doubt.widen(time_s, relative, &mut output));
+    let dt_s = time_s - mem::replace(seen_s, time_s);
+    let mut flags = Flags::NONE;
+    if let Some(doubts) = doubts {
+        let (taken, strain) = (taken(scale, reading, &output), &mut output.estimate.strain);
+        let variance = doubts.see(dt_s, taken, *strain);
+        (strain.variance, flags) = doubts.widened(output.estimate.rate.mean, variance);
+    }
     let mut row = scale.row(time_s, reading, &output);
     row.flags = row.flags.and(flags);
     row
+}
+
+/// A reading R/R₀ - 1 that has told the filter something, and its normalised innovation squared.
+pub(crate) fn taken(scale: &Scale, reading: Reading, output: &Output) -> Option<(f64, f64)> {
+    let relative = reading.relative(scale.rest_reading).filter(|_| is_taken(output.verdict));
+    relative.map(|relative| (relative.value, output.nis.unwrap_or(0.0)))
+}
+
+/// Whether a reading has told the filter something.
+pub(crate) const fn is_taken(verdict: ReadingVerdict) -> bool {
+    matches!(verdict, ReadingVerdict::Accepted | ReadingVerdict::Downweighted | ReadingVerdict::Readmitted)
 }
 
 /// A running filter: readings in, estimates out. It can be sent to another thread, and owned by an asynchronous task.
@@ -68,11 +87,11 @@ impl Filter {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn step(&mut self, time_s: f64, reading: impl Into<Reading>) -> Result<Estimate, Error> {
-        let Kernel { filter, scale, doubt } = &mut self.kernel;
+        let Kernel { filter, scale, doubts, seen_s } = &mut self.kernel;
         let reading = reading.into();
         filter.step(time_s, reading.relative(scale.rest_reading))?;
         self.last = (time_s, reading);
-        Ok(doubted(doubt, scale, self.last, filter.output()))
+        Ok(doubted(doubts, seen_s, scale, self.last, filter.output()))
     }
 
     /// Takes in that the strain (or angle) is known now, to `sd`: the estimate of the last row, and those after it, follow.
@@ -90,9 +109,9 @@ impl Filter {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn know(&mut self, strain: f64, sd: f64) -> Result<Estimate, Error> {
-        let Kernel { filter, scale, doubt } = &mut self.kernel;
+        let Kernel { filter, scale, doubts, .. } = &mut self.kernel;
         filter.know(&scale.known(strain, sd)?)?;
-        doubt.iter_mut().for_each(Doubt::settle);
+        doubts.iter_mut().for_each(Doubts::settle);
         let (time_s, reading) = self.last;
         Ok(scale.row(time_s, reading, &filter.output()))
     }
@@ -111,9 +130,9 @@ impl Filter {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn rest_resistance(&mut self, measured: f64) -> Result<(), Error> {
-        let Kernel { scale, doubt, .. } = &mut self.kernel;
+        let Kernel { scale, doubts, .. } = &mut self.kernel;
         scale.rest_at(measured)?;
-        doubt.iter_mut().for_each(Doubt::told_rest);
+        doubts.iter_mut().for_each(Doubts::told_rest);
         Ok(())
     }
 }
@@ -166,9 +185,9 @@ impl LaggedFilter {
         let (reading, lag_s) = (reading.into(), self.lag_s);
         self.forget_handed_out();
         self.waiting.push_back((time_s, reading));
-        let Kernel { filter, scale, doubt } = &mut self.kernel;
+        let Kernel { filter, scale, doubts, seen_s } = &mut self.kernel;
         let (waiting, due) = (&mut self.waiting, &mut self.due);
-        let mut out = |output| due.extend(waiting.pop_front().map(|row| doubted(doubt, scale, row, output)));
+        let mut out = |output| due.extend(waiting.pop_front().map(|row| doubted(doubts, seen_s, scale, row, output)));
         let taken = filter.step_lagged(time_s, reading.relative(scale.rest_reading), lag_s, &mut out);
         if taken.is_err() {
             self.waiting.pop_back();
@@ -193,10 +212,10 @@ impl LaggedFilter {
     /// ```
     pub fn finish(&mut self) -> Result<&[Estimate], Error> {
         self.forget_handed_out();
-        let Kernel { filter, scale, doubt } = &mut self.kernel;
+        let Kernel { filter, scale, doubts, seen_s } = &mut self.kernel;
         let (waiting, due) = (&mut self.waiting, &mut self.due);
         filter.flush_lagged(&mut |output| {
-            due.extend(waiting.pop_front().map(|row| doubted(doubt, scale, row, output)))
+            due.extend(waiting.pop_front().map(|row| doubted(doubts, seen_s, scale, row, output)))
         })?;
         self.are_out = true;
         Ok(&self.due)
@@ -217,9 +236,9 @@ impl LaggedFilter {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn know(&mut self, strain: f64, sd: f64) -> Result<(), Error> {
-        let Kernel { filter, scale, doubt } = &mut self.kernel;
+        let Kernel { filter, scale, doubts, .. } = &mut self.kernel;
         filter.know(&scale.known(strain, sd)?)?;
-        doubt.iter_mut().for_each(Doubt::settle);
+        doubts.iter_mut().for_each(Doubts::settle);
         Ok(())
     }
 
@@ -236,9 +255,9 @@ impl LaggedFilter {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn rest_resistance(&mut self, measured: f64) -> Result<(), Error> {
-        let Kernel { scale, doubt, .. } = &mut self.kernel;
+        let Kernel { scale, doubts, .. } = &mut self.kernel;
         scale.rest_at(measured)?;
-        doubt.iter_mut().for_each(Doubt::told_rest);
+        doubts.iter_mut().for_each(Doubts::told_rest);
         Ok(())
     }
 

@@ -51,7 +51,7 @@ pub use builder::{FilterBuilder, KNOWN_BEYOND};
 pub use calibrate::{Calibrated, Calibration, calibrate};
 pub use closing::{Closing, Tested};
 pub use column::Column;
-pub use doubt::{DOUBT, DoubtNumbers};
+pub use doubt::{DOUBT, DoubtNumbers, DoubtParts, Doubts};
 pub use error::{Error, Place, TextCause, TextError};
 pub use estimate::Estimate;
 pub use explain::{ReferenceLag, explain};

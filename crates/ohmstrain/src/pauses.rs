@@ -2,7 +2,7 @@ use std::ops::Range;
 
 use ohmstrain_calib::Output;
 
-use crate::doubt::is_taken;
+use crate::filter::is_taken;
 use crate::unread::{NEVER_READ_S, Unread};
 
 /// Pauses of the readings in a recording that is smoothed, from its end to its beginning.

@@ -159,7 +159,7 @@ fn state(branches: usize, chip: &ChipFilter) -> usize {
         EstimatorKind::Hypotheses => filter.hypotheses * (gaussian + 3) + 1,
         _ => gaussian,
     };
-    // Readings and doubts: seventeen words; of a correction four, low-passes and features. Strain, variance, rest reading.
+    // Readings and doubts: nineteen words; of a correction four, low-passes and features. Strain, variance, rest reading.
     let correction = filter.correction.as_ref().map_or(0, |_| 4 + TIME_CONSTANTS_S.len() + FEATURES);
-    FLOAT * (words + 17 + correction + 3)
+    FLOAT * (words + 19 + correction + 3)
 }

@@ -1,11 +1,10 @@
 //! A sensor's filter at a fixed rate, in single and in double precision.
 
-use ohmstrain::{DOUBT, KNOWN_BEYOND};
+use ohmstrain::{DOUBT, DoubtParts, KNOWN_BEYOND};
 use ohmstrain_calib::{EstimatorKind, EstimatorParams, HISTORIES, HYPOTHESES, SensorParams};
 use ohmstrain_ekf::{Compact, Ekf, Estimator, Evidence, Hypotheses, STEP_GRACE, SignSplit, SparseEkf, StepError};
 use ohmstrain_model::{Motion, SensorLaw, StrainRange, SwitchedModel};
 
-use super::doubt::DoubtParts;
 use super::law::{PriorConstants, narrow_law, narrow_noise, narrow_range};
 use super::plan::ChipFilter;
 use super::steps::StepTable;

@@ -7,7 +7,6 @@ mod budget;
 mod constants;
 mod correction;
 mod cost;
-mod doubt;
 mod fixed_rate;
 mod law;
 mod learned;

@@ -1,10 +1,9 @@
 //! What a reading must be, and when an interval is wider than the filter says.
 
-use ohmstrain::{DOUBT, NEVER_READ_S};
+use ohmstrain::{DOUBT, DoubtParts, NEVER_READ_S};
 use ohmstrain_calib::PortableSieve;
 use serde::Serialize;
 
-use crate::export::doubt::DoubtParts;
 use crate::export::literal::Literal;
 
 /// What a reading must be.
@@ -29,9 +28,14 @@ pub struct DoubtConstants {
     start: Literal,
     most: Literal,
     fades_s: Literal,
-    outside_fades_s: Literal,
+    lately_s: Literal,
+    far_fades_s: Literal,
+    near_counts: Literal,
+    far_counts: Literal,
+    /// 1 where readings grow from rest on, -1 where they fall, 0 where it is not known.
+    sign: Literal,
+    most_nis: Literal,
     margin: Literal,
-    shows: Literal,
     faster: Literal,
     worth: Literal,
     zero: Literal,
@@ -55,7 +59,6 @@ struct RestConstants {
     rested: Literal,
     tolerance: Literal,
     lasts_s: Literal,
-    sign: Literal,
     end: Literal,
 }
 
@@ -72,9 +75,13 @@ impl DoubtConstants {
             start: narrow(seen.start),
             most: narrow(seen.most),
             fades_s: narrow(DOUBT.fades_s),
-            outside_fades_s: narrow(DOUBT.outside_fades_s),
+            lately_s: narrow(DOUBT.lately_s),
+            far_fades_s: narrow(DOUBT.far_fades_s),
+            near_counts: narrow(DOUBT.near_counts),
+            far_counts: narrow(DOUBT.far_counts),
+            sign: narrow(seen.rest.map_or(0.0, |rest| rest.sign)),
+            most_nis: narrow(DOUBT.most_nis),
             margin: narrow(DOUBT.margin),
-            shows: narrow(DOUBT.shows),
             faster: narrow(DOUBT.faster),
             worth: narrow(DOUBT.worth),
             zero,
@@ -89,7 +96,6 @@ impl DoubtConstants {
                 rested: narrow(rest.rested),
                 tolerance: narrow(rest.tolerance),
                 lasts_s: narrow(rest.lasts_s),
-                sign: narrow(rest.sign),
                 end: narrow(rest.end),
             }),
         }

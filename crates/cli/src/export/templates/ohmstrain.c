@@ -63,6 +63,8 @@ static const float ERROR_TIME_S = << sieve.error_time_s >>f;
 {% endif %}
 /* What calibration has seen: readings, relative; the fastest rate, 1/s; the longest recording, s. */
 static const float SEEN_LOW = << doubt.low >>f, SEEN_HIGH = << doubt.high >>f;
+/* 1 where readings grow from rest on, -1 where they fall, 0 where that is not known. */
+static const float GROWS = << doubt.sign >>f;
 static const float FASTEST_PER_S = << doubt.fastest_per_s >>f, LONGEST_RUN_S = << doubt.longest_s >>f;
 /* Strain for a change of the reading over these ranges, and variances: of an unknown start, and of what is known least. */
 static const float PER_READING = << doubt.per_reading >>f, START_DOUBT = << doubt.start >>f, MOST_DOUBT = << doubt.most >>f;
@@ -74,7 +76,7 @@ static const float CENTRE = << doubt.unread.centre >>f, ANYWHERE = << doubt.unre
 /* At rest: the reading, relative, and how far it may be from there; for how long readings must stay where they are, s; 1 where
  * they grow from rest on, -1 where they fall, 0 where nobody knows, and the last one on that side. */
 static const float AT_REST = << doubt.rest.rested >>f, REST_TOLERANCE = << doubt.rest.tolerance >>f, REST_LASTS_S = << doubt.rest.lasts_s >>f;
-static const float REST_SIGN = << doubt.rest.sign >>f, REST_END = << doubt.rest.end >>f;
+static const float REST_END = << doubt.rest.end >>f;
 {% endif %}
 /* Factor on the standard deviation of strain that the calibration found necessary. */
 static const float STRAIN_SD_SCALE = << strain_sd_scale >>f;
@@ -410,7 +412,7 @@ static void raise_doubt(readings *seen, float variance)
 /* Watches for another R0: a sensor that is known to rest and reads something else, or readings that stay where no strain leads. */
 static void watch_rest(readings *seen, float dt_s, float rho)
 {
-    const float from_rest = fabsf(rho - AT_REST), beyond = REST_SIGN * (REST_END - rho);
+    const float from_rest = fabsf(rho - AT_REST), beyond = GROWS * (REST_END - rho);
 
     if (seen->rests) {
         seen->rests = 0;
@@ -445,7 +447,8 @@ static float unread_variance(float seconds, float strain, float variance)
 static float doubt_reading(readings *seen, float dt_s, const float *rho, float nis, float strain, float variance)
 {
     const float passed_s = seen->runs ? dt_s : 0.0f;
-    float above, below, beyond;
+    const float margin = << doubt.margin >>f * (SEEN_HIGH - SEEN_LOW);
+    float above, below, near_off, far_off, lately;
 
     seen->runs = 1;
     seen->run_s += passed_s;
@@ -469,11 +472,16 @@ static float doubt_reading(readings *seen, float dt_s, const float *rho, float n
         seen->believed = *rho;
         seen->has_believed = 1;
     }
-    above = *rho - SEEN_HIGH;
-    below = SEEN_LOW - *rho;
-    beyond = (above > below ? above : below) - << doubt.margin >>f * (SEEN_HIGH - SEEN_LOW);
-    seen->outside *= expf(-passed_s / << doubt.outside_fades_s >>f);
-    seen->outside = seen->outside > beyond ? seen->outside : beyond;
+    above = *rho - SEEN_HIGH - margin;
+    below = SEEN_LOW - *rho - margin;
+    near_off = GROWS > 0.0f ? below : GROWS < 0.0f ? above : 0.0f;
+    far_off = GROWS > 0.0f ? above : GROWS < 0.0f || below > above ? below : above;
+    lately = expf(-passed_s / << doubt.lately_s >>f);
+    seen->near_off *= lately;
+    seen->near_off = seen->near_off > near_off ? seen->near_off : near_off;
+    seen->far_off *= expf(-passed_s / << doubt.far_fades_s >>f);
+    seen->far_off = seen->far_off > far_off ? seen->far_off : far_off;
+    seen->misfit += (1.0f - lately) * ((nis < << doubt.most_nis >>f ? nis : << doubt.most_nis >>f) - seen->misfit);
 {% if doubt.rest %}
     watch_rest(seen, passed_s, *rho);
 {% endif %}
@@ -483,7 +491,9 @@ static float doubt_reading(readings *seen, float dt_s, const float *rho, float n
 /* The strain's variance with all doubts, and flags that say so. */
 static float doubted(const readings *seen, float rate, float variance, unsigned *flags)
 {
-    const float far = << doubt.shows >>f * (seen->outside > 0.0f ? seen->outside : 0.0f) * PER_READING, outside = far * far;
+    const float near_off = << doubt.near_counts >>f * seen->near_off * PER_READING;
+    const float far_off = << doubt.far_counts >>f * seen->far_off * PER_READING;
+    const float outside = near_off * near_off + far_off * far_off, birge = seen->misfit > 1.0f ? seen->misfit : 1.0f;
     const float faster = (rate < 0.0f ? -rate : rate) / FASTEST_PER_S;
     const int is_fast = faster > << doubt.faster >>f;
 {% if doubt.rest %}
@@ -492,20 +502,17 @@ static float doubted(const readings *seen, float rate, float variance, unsigned 
 {% else %}
     const float more = seen->fading + outside;
 {% endif %}
-    float stated = variance;
+    float stated = variance * (is_fast ? birge * (faster * faster) : birge);
 
     *flags |= seen->starts && seen->fading > << doubt.worth >>f * START_DOUBT ? OHMSTRAIN_START_UP : 0;
     *flags |= !seen->starts && seen->fading > << doubt.worth >>f * variance ? OHMSTRAIN_RECOVERING : 0;
-    *flags |= outside > << doubt.worth >>f * variance || is_fast ? OHMSTRAIN_EXTRAPOLATED : 0;
+    *flags |= is_fast || outside > << doubt.worth >>f * variance || birge > 1.0f + << doubt.worth >>f ? OHMSTRAIN_EXTRAPOLATED : 0;
     *flags |= seen->run_s > LONGEST_RUN_S ? OHMSTRAIN_LONG_RUN : 0;
 {% if doubt.rest %}
     *flags |= seen->rest_off > 0.0f ? OHMSTRAIN_REST_MOVED : 0;
 {% endif %}
-    if (is_fast) {
-        stated = variance * (faster * faster);
-        stated = stated < MOST_DOUBT ? stated : MOST_DOUBT;
-        stated = stated > variance ? stated : variance;
-    }
+    stated = stated < MOST_DOUBT ? stated : MOST_DOUBT;
+    stated = stated > variance ? stated : variance;
     return stated + (more < MOST_DOUBT ? more : MOST_DOUBT);
 }
 

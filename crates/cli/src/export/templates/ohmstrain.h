@@ -73,7 +73,7 @@ enum ohmstrain_flag {
     OHMSTRAIN_START_UP = 32,
     /* Readings have jumped, or come again after there were none to be believed: the estimate finds its way back. */
     OHMSTRAIN_RECOVERING = 64,
-    /* Readings are, or have been, outside of calibration's, or the << quantity >> changes much faster. */
+    /* Readings are, or were lately, outside of calibration's, or the << quantity >> changes much faster; or the law does not fit. */
     OHMSTRAIN_EXTRAPOLATED = 128,
     /* It has been running for longer than any recording of the calibration. */
     OHMSTRAIN_LONG_RUN = 256,
@@ -96,7 +96,8 @@ typedef struct ohmstrain_readings {
     float unread_s; /* time without a reading */
     float lost;     /* variance of the strain where readings have not been believed since */
     float believed; /* the last reading that was */
-    float outside;  /* how far readings have been outside of calibration's */
+    float near_off, far_off; /* how far readings have been outside of calibration's on the side of rest, and on the other one */
+    float misfit;   /* mean of the normalised innovations squared, lately */
     float rest_off; /* how far R0 is off, as a share of it */
     float beyond_s, near_s, least; /* time for which readings have been beyond those at rest, and near them; how far beyond */
 {% if correction %}

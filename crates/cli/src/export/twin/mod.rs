@@ -3,12 +3,12 @@
 mod parts;
 mod seen;
 
+use ohmstrain::Doubts;
 use ohmstrain_calib::EstimatorKind;
 use ohmstrain_ekf::correction::{FEATURES, FeatureScale, ReadingFeatures};
 use ohmstrain_ekf::{Belief, Gaussian, Hypotheses, Mixture, Reading, Real, SignSplit, SparseEkf, StepError};
 use ohmstrain_model::{Phase, StrainRange, SwitchedModel};
 
-use super::doubt::Doubt;
 use super::learned::{INPUTS, Table};
 use super::moving::Moving;
 pub use parts::{Numbers, Parts, PhaseParts, flag, number};
@@ -54,7 +54,7 @@ struct Memory<T, const B: usize, const N: usize, const L: usize, const K: usize>
     features: Option<[T; FEATURES]>,
     known_variance: T,
     missing: bool,
-    doubt: Doubt<T>,
+    doubts: Doubts<T>,
     /// As it is reported.
     strain: Gaussian<T>,
 }
@@ -98,7 +98,7 @@ impl<'a, T: Real, const B: usize, const N: usize, const L: usize, const K: usize
             features: None,
             known_variance: T::zero(),
             missing: true,
-            doubt: Doubt::new(parts.doubt),
+            doubts: Doubts::new(parts.doubt),
             strain: Gaussian { mean: T::zero(), variance: T::zero() },
         };
         Ok(Self {
@@ -124,7 +124,7 @@ impl<'a, T: Real, const B: usize, const N: usize, const L: usize, const K: usize
         let (mut mean, mut variance) = self.model.initial_distribution();
         (mean[0], variance[0]) = (strain, self.start_variance);
         self.now.moving.start_from(Belief::independent(mean, &variance));
-        self.now.doubt = self.now.doubt.of_known_strain(strain.abs() <= self.zero);
+        self.now.doubts = self.now.doubts.of_known_strain(strain.abs() <= self.zero);
     }
 
     /// The usual time on, with a reading or without; flags.
@@ -164,10 +164,10 @@ impl<'a, T: Real, const B: usize, const N: usize, const L: usize, const K: usize
         }
         let Gaussian { mean, variance } = self.corrected();
         let used = reading.filter(|_| flags & flag::NO_READING == 0).map(|reading| (reading.value, nis));
-        let variance = self.now.doubt.see(dt_s, used, Gaussian { mean, variance });
-        let (variance, doubts) = self.now.doubt.widened(self.now.moving.moments().mean[1], variance);
+        let variance = self.now.doubts.see(dt_s, used, Gaussian { mean, variance });
+        let (variance, doubts) = self.now.doubts.widened(self.now.moving.moments().mean[1], variance);
         self.now.strain = Gaussian { mean, variance };
-        Ok(flags | doubts)
+        Ok(flags | flag::of(doubts))
     }
 
     /// Prepares the steps that `dt_s` seconds are divided into; how many they are.

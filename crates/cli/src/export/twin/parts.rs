@@ -1,14 +1,16 @@
 //! What an exported program is made of.
 
+use ohmstrain::DoubtParts;
 use ohmstrain_calib::{EstimatorKind, PortableCorrection, PortableSieve};
 use ohmstrain_ekf::{Dwell, Evidence, Real, StepError};
 use ohmstrain_model::StrainRange;
 
-use crate::export::doubt::DoubtParts;
 use crate::export::quadratic::Quadratic;
 
 /// What became of a reading, as `ohmstrain_flag` in C has it.
 pub mod flag {
+    use ohmstrain::{Flag, Flags};
+
     pub const MISSING: u32 = 1;
     pub const IMPLAUSIBLE: u32 = 2;
     pub const STUCK: u32 = 4;
@@ -22,6 +24,18 @@ pub mod flag {
 
     /// The reading was not used.
     pub const NO_READING: u32 = MISSING | IMPLAUSIBLE | STUCK | REJECTED;
+
+    /// Those of doubts.
+    pub fn of(doubts: Flags) -> u32 {
+        let bits = [
+            (Flag::StartUp, START_UP),
+            (Flag::Recovering, RECOVERING),
+            (Flag::Extrapolated, EXTRAPOLATED),
+            (Flag::LongRun, LONG_RUN),
+            (Flag::RestMoved, REST_MOVED),
+        ];
+        bits.into_iter().fold(0, |all, (flag, bit)| if doubts.has(flag) { all | bit } else { all })
+    }
 }
 
 /// What a twin is made of, whatever its precision.
