@@ -10,11 +10,8 @@ use crate::{Flag, Flags, NEVER_READ_S, RestSeen, RestWatch, Unread};
 /// Standard deviation of the strain, in spans, that a filter has at its start besides what it states. Started in motion, on six
 /// recordings, its errors of the first two seconds are 9 to 15 %FS where it states 7 to 11, and all but settled after ten.
 const START: f64 = 0.1;
-/// How long it takes until a doubt has fallen to 37 %, s: that a filter has just begun, or begun again.
-const FADES_S: f64 = 5.0;
-/// For how long it matters that readings were outside of calibration's on the side of rest, or off what was predicted, s.
-const LATELY_S: f64 = 20.0;
-/// The same where they were beyond those of the largest strains: a body comes there from time to time.
+/// How long it takes until it has fallen to 37 % that readings were beyond those of the largest strains, s: a body comes there from
+/// time to time.
 const FAR_FADES_S: f64 = 60.0;
 /// How many times counts what readings are outside on the side of rest, where a sensor that has not moved for long begins and soon
 /// has left it, and on the other one, where nothing leads but another R₀, another gain or a strain beyond calibration's: if all
@@ -33,16 +30,12 @@ const WORTH: f64 = 0.2;
 /// The numbers behind the widened intervals, for programs that write a filter in another language.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DoubtNumbers {
-    /// Time after which the doubt of a start or a fault has fallen to 37 %, s.
-    pub fades_s: f64,
-    /// Time constant of what readings have been outside of calibration's on the side of rest, and of the mean of normalised
-    /// innovations squared, s; of what they have been outside on the other side; how many times either counts.
-    pub lately_s: f64,
-    /// See [`Self::lately_s`].
+    /// Time constant of what readings have been outside of calibration's on the side away from rest, s. A third of it is that of the
+    /// side of rest, and of the mean of normalised innovations squared; a twelfth that of the doubt of a start or a fault.
     pub far_fades_s: f64,
-    /// See [`Self::lately_s`].
+    /// How many times counts what readings are outside on the side of rest.
     pub near_counts: f64,
-    /// See [`Self::lately_s`].
+    /// The same on the other side.
     pub far_counts: f64,
     /// As much as a normalised innovation squared counts.
     pub most_nis: f64,
@@ -58,8 +51,6 @@ pub struct DoubtNumbers {
 
 /// The numbers behind the widened intervals.
 pub const DOUBT: DoubtNumbers = DoubtNumbers {
-    fades_s: FADES_S,
-    lately_s: LATELY_S,
     far_fades_s: FAR_FADES_S,
     near_counts: NEAR_COUNTS,
     far_counts: FAR_COUNTS,
@@ -125,6 +116,25 @@ impl DoubtParts {
     }
 }
 
+/// What is left after a row of what was known before it, of three time constants: one exponential.
+struct Left<T> {
+    /// 60 s.
+    far: T,
+    /// 20 s: that readings were outside of calibration's on the side of rest, or off what was predicted.
+    lately: T,
+    /// 5 s: that a filter has just begun, or begun again.
+    soon: T,
+}
+
+impl<T: Real> Left<T> {
+    fn after(passed_s: T) -> Self {
+        let far = (-passed_s / T::of(FAR_FADES_S)).exp();
+        let lately = far * far * far;
+        let twice = lately * lately;
+        Self { far, lately, soon: twice * twice }
+    }
+}
+
 /// How ill the sensor's law has fitted lately.
 #[derive(Clone, Copy, Debug)]
 struct Misfit<T> {
@@ -136,8 +146,8 @@ struct Misfit<T> {
 }
 
 impl<T: Real> Misfit<T> {
-    /// Takes a reading R/R₀ - 1 and its normalised innovation squared, `passed_s` seconds from the row seen last.
-    fn see(&mut self, parts: &DoubtParts, passed_s: T, reading: T, nis: T) {
+    /// Takes a reading R/R₀ - 1 and its normalised innovation squared.
+    fn see(&mut self, parts: &DoubtParts, left: &Left<T>, reading: T, nis: T) {
         let (low, high) = (T::of(parts.low), T::of(parts.high));
         let margin = T::of(MARGIN) * (high - low);
         let (above, below) = (reading - high - margin, low - reading - margin);
@@ -147,10 +157,9 @@ impl<T: Real> Misfit<T> {
             -1.0 => (above, below),
             _ => (T::zero(), above.max(below)),
         };
-        let lately = (-passed_s / T::of(LATELY_S)).exp();
-        self.near = (self.near * lately).max(near);
-        self.far = (self.far * (-passed_s / T::of(FAR_FADES_S)).exp()).max(far);
-        self.nis += (T::one() - lately) * (nis.min(T::of(MOST_NIS)) - self.nis);
+        self.near = (self.near * left.lately).max(near);
+        self.far = (self.far * left.far).max(far);
+        self.nis += (T::one() - left.lately) * (nis.min(T::of(MOST_NIS)) - self.nis);
     }
 
     /// The strain's variance for readings outside of calibration's.
@@ -256,19 +265,19 @@ impl<T: Real> Doubts<T> {
             self.lost = Some(self.lost.map_or(widest, |lost| lost.max(widest)));
             return variance;
         };
-        let surprising = T::of(SURPRISING_NIS);
+        let (surprising, left) = (T::of(SURPRISING_NIS), Left::after(passed_s));
         if nis > surprising {
             let jump = self.believed.map_or(T::zero(), |last| (rho - last) * T::of(self.parts.per_reading));
             let doubt = (T::one() - (surprising / nis).sqrt()) * jump;
             self.raise(doubt * doubt);
         } else {
-            self.fading *= (-passed_s / T::of(FADES_S)).exp();
+            self.fading *= left.soon;
             if let Some(lost) = self.lost.take() {
                 self.raise(lost);
             }
             self.believed = Some(rho);
         }
-        self.judge(passed_s, rho, nis);
+        self.judge(&left, passed_s, rho, nis);
         stated.variance
     }
 
@@ -277,13 +286,13 @@ impl<T: Real> Doubts<T> {
     pub fn see_back(&mut self, run_s: T, dt_s: T, reading: Option<(T, T)>) {
         (self.run_s, self.starts, self.fading) = (run_s, false, T::zero());
         if let Some((rho, nis)) = reading {
-            self.judge(dt_s, rho, nis);
+            self.judge(&Left::after(dt_s), dt_s, rho, nis);
         }
     }
 
     /// What a reading says of the law and of R₀.
-    fn judge(&mut self, passed_s: T, rho: T, nis: T) {
-        self.misfit.see(&self.parts, passed_s, rho, nis);
+    fn judge(&mut self, left: &Left<T>, passed_s: T, rho: T, nis: T) {
+        self.misfit.see(&self.parts, left, rho, nis);
         self.rest.iter_mut().for_each(|rest| {
             rest.see(passed_s, rho);
         });

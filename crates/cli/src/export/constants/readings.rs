@@ -27,8 +27,6 @@ pub struct DoubtConstants {
     /// Variances.
     start: Literal,
     most: Literal,
-    fades_s: Literal,
-    lately_s: Literal,
     far_fades_s: Literal,
     near_counts: Literal,
     far_counts: Literal,
@@ -74,8 +72,6 @@ impl DoubtConstants {
             per_reading: narrow(seen.per_reading),
             start: narrow(seen.start),
             most: narrow(seen.most),
-            fades_s: narrow(DOUBT.fades_s),
-            lately_s: narrow(DOUBT.lately_s),
             far_fades_s: narrow(DOUBT.far_fades_s),
             near_counts: narrow(DOUBT.near_counts),
             far_counts: narrow(DOUBT.far_counts),

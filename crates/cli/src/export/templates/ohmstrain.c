@@ -448,7 +448,7 @@ static float doubt_reading(readings *seen, float dt_s, const float *rho, float n
 {
     const float passed_s = seen->runs ? dt_s : 0.0f;
     const float margin = << doubt.margin >>f * (SEEN_HIGH - SEEN_LOW);
-    float above, below, near_off, far_off, lately;
+    float above, below, near_off, far_off, far_left, lately, twice;
 
     seen->runs = 1;
     seen->run_s += passed_s;
@@ -459,12 +459,16 @@ static float doubt_reading(readings *seen, float dt_s, const float *rho, float n
         seen->is_lost = 1;
         return open;
     }
+    /* What is left of what was known before: of 60, 20 and 5 s. */
+    far_left = expf(-passed_s / << doubt.far_fades_s >>f);
+    lately = far_left * far_left * far_left;
+    twice = lately * lately;
     if (nis > SURPRISING) {
         const float jump = seen->has_believed ? (*rho - seen->believed) * PER_READING : 0.0f;
         const float doubt = (1.0f - sqrtf(SURPRISING / nis)) * jump;
         raise_doubt(seen, doubt * doubt);
     } else {
-        seen->fading *= expf(-passed_s / << doubt.fades_s >>f);
+        seen->fading *= twice * twice;
         if (seen->is_lost) {
             raise_doubt(seen, seen->lost);
         }
@@ -476,10 +480,9 @@ static float doubt_reading(readings *seen, float dt_s, const float *rho, float n
     below = SEEN_LOW - *rho - margin;
     near_off = GROWS > 0.0f ? below : GROWS < 0.0f ? above : 0.0f;
     far_off = GROWS > 0.0f ? above : GROWS < 0.0f || below > above ? below : above;
-    lately = expf(-passed_s / << doubt.lately_s >>f);
     seen->near_off *= lately;
     seen->near_off = seen->near_off > near_off ? seen->near_off : near_off;
-    seen->far_off *= expf(-passed_s / << doubt.far_fades_s >>f);
+    seen->far_off *= far_left;
     seen->far_off = seen->far_off > far_off ? seen->far_off : far_off;
     seen->misfit += (1.0f - lately) * ((nis < << doubt.most_nis >>f ? nis : << doubt.most_nis >>f) - seen->misfit);
 {% if doubt.rest %}
