@@ -1,21 +1,18 @@
 #!/usr/bin/env python3
-"""What Python, Spark, Ray and `ohmstrain batch` cost beside the Rust library: processor time of all processes together.
+"""What Python costs beside the Rust library: processor time of smoothing recordings of 1000 rows, and of one long recording.
 
-PYTHON scripts/overhead.py PROGRAM LIBRARY FOLDER [REPETITIONS, 3 [ESTIMATOR SMALLER LARGER]]
+PYTHON scripts/overhead.py PROGRAM LIBRARY FOLDER [REPETITIONS, 3 [ESTIMATOR RECORDINGS]]
 
-PYTHON has the wheel, pyspark and ray (`scripts/python.sh --engines` prints it), PROGRAM is the command line, LIBRARY
-`crates/python/target/release/examples/library_time` of the same build. Everything is repeated in turn, medians are compared; of an
-engine what the larger fleet costs more than the smaller one, so that its start is left out. Wants root, for a control group
-that counts the time of every process that is started in it, whoever starts it.
+PYTHON has the wheel (`scripts/python.sh` prints it), PROGRAM is the command line, LIBRARY
+`crates/python/target/release/examples/library_time` of the same build. Everything is repeated in turn, medians are compared.
+What engines cost: `scripts/spark-cluster.sh --scaling`.
 """
 
 import os
-import shutil
 import statistics
 import struct
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -23,10 +20,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 FLEET = Path(__file__).resolve().parents[1] / "crates/python/examples/fleet.py"
-#: Unless told otherwise: estimator, and recordings of 1000 rows in the smaller and in the larger fleet.
-CASES = [("ekf", 500, 2500), ("auto", 50, 250)]
-ENGINES = ["plain", "spark", "ray"]
-GROUPS = [Path("/sys/fs/cgroup/cpuacct"), Path("/sys/fs/cgroup/unified"), Path("/sys/fs/cgroup")]
+#: Unless told otherwise: estimator, and recordings of 1000 rows.
+CASES = [("ekf", 500), ("auto", 50)]
 SMOOTH = """
 import sys, time
 import pyarrow as pa, pyarrow.parquet as pq
@@ -44,32 +39,6 @@ for _ in range(int(sys.argv[4])):
 """
 
 
-class Group:
-    """A control group; ``run`` gives what a command printed and the seconds of processor time of it and all that it started."""
-
-    def __init__(self):
-        root = next(root for root in GROUPS if (root / "cgroup.procs").exists())
-        self.path = root / f"ohmstrain-{os.getpid()}"
-        self.path.mkdir()
-
-    def seconds(self):
-        nanoseconds = self.path / "cpuacct.usage"
-        if nanoseconds.exists():
-            return int(nanoseconds.read_text()) / 1e9
-        return int((self.path / "cpu.stat").read_text().split()[1]) / 1e6
-
-    def run(self, *words):
-        before = self.seconds()
-        join = lambda: (self.path / "cgroup.procs").write_text(str(os.getpid()))  # noqa: E731
-        done = subprocess.run([str(word) for word in words], capture_output=True, text=True, preexec_fn=join)
-        assert done.returncode == 0, done.stderr
-        for _ in range(100):  # Until what an engine leaves behind has gone.
-            if not (self.path / "cgroup.procs").read_text():
-                break
-            time.sleep(0.1)
-        return done.stdout, self.seconds() - before
-
-
 def flat(recordings, path):
     """Recordings as LIBRARY reads them, and in one Parquet file as SMOOTH does."""
     with path.with_suffix(".f64").open("wb") as out:
@@ -80,13 +49,11 @@ def flat(recordings, path):
     pq.write_table(pa.concat_tables(recordings), path.with_suffix(".parquet"))
 
 
-def make(python, fleet, size, sensor):
+def make(python, fleet, size):
     """A fleet; its recordings in one file (`short`), and as a single recording (`long`)."""
     if (fleet / "long.parquet").exists():
         return
     subprocess.run([python, FLEET, "make", fleet, "--recordings", str(size)], check=True, stdout=sys.stderr)
-    if sensor != fleet / "sensor.toml":
-        shutil.copy(sensor, fleet / "sensor.toml")
     recordings, end = [], 0.0
     for part in sorted((fleet / "recordings").glob("*.parquet")):
         table = pq.read_table(part)
@@ -105,38 +72,27 @@ def make(python, fleet, size, sensor):
 def main():
     program, library, folder = (Path(word).absolute() for word in sys.argv[1:4])
     repetitions = int(sys.argv[4]) if len(sys.argv) > 4 else 3
-    cases = [(sys.argv[5], int(sys.argv[6]), int(sys.argv[7]))] if len(sys.argv) > 5 else CASES
-    python = sys.executable
-    os.environ.update(OHMSTRAIN=str(program), PYTHONWARNINGS="ignore", RAYON_NUM_THREADS="1", PYSPARK_PYTHON=python)
-    group = Group()
-    for estimator, *sizes in cases:
-        found = {}
-        note = lambda what, seconds: found.setdefault(what, []).append(seconds)  # noqa: E731
-        fleets = [folder / f"fleet-{size}" for size in sizes]
-        for fleet, size in zip(fleets, sizes):
-            make(python, fleet, size, fleets[0] / "sensor.toml")
-        small = fleets[0]
+    cases = [(sys.argv[5], int(sys.argv[6]))] if len(sys.argv) > 5 else CASES
+    os.environ.update(OHMSTRAIN=str(program), PYTHONWARNINGS="ignore", RAYON_NUM_THREADS="1")
+
+    def seconds(*words):
+        said = subprocess.run([str(word) for word in words], capture_output=True, text=True, check=True).stdout
+        return float(said.split()[0])
+
+    for estimator, size in cases:
+        fleet = folder / f"fleet-{size}"
+        make(sys.executable, fleet, size)
         name = {"auto": "corrected"}.get(estimator, estimator)
-        for repetition in range(repetitions):
-            for of in ("short", "long"):
-                said, _ = group.run(library, small / "sensor.toml", name, small / f"{of}.f64", 1)
-                note(f"library, {of}", float(said.split()[0]))
-                said, _ = group.run(python, "-c", SMOOTH, small / "sensor.toml", estimator, small / f"{of}.parquet", 1)
-                note(f"python, {of}", float(said))
-            for engine in ENGINES:
-                pair = []
-                for fleet in fleets:
-                    shutil.rmtree(fleet / f"estimates-{engine}", ignore_errors=True)
-                    said, seconds = group.run(python, FLEET, "run", fleet, engine, "--estimator", estimator)
-                    print(repetition, said.strip(), f"{seconds:.2f} s of processor time", file=sys.stderr, flush=True)
-                    pair.append(seconds)
-                note(engine, (pair[1] - pair[0]) * sizes[0] / (sizes[1] - sizes[0]))
-        for what, seconds in found.items():
-            base = found["library, long" if what.endswith("long") else "library, short"]
-            ratio = statistics.median(a / b for a, b in zip(seconds, base))
-            each = ", ".join(f"{second / sizes[0] * 1e3:.2f}" for second in seconds)
-            print(f"| {estimator} | {what} | {statistics.median(seconds) / sizes[0] * 1e3:.2f} | {each} | {ratio:.2f} |", flush=True)
-    os.rmdir(group.path)
+        for of in ("short", "long"):
+            found = {"library": [], "python": []}
+            for _ in range(repetitions):
+                found["library"].append(seconds(library, fleet / "sensor.toml", name, fleet / f"{of}.f64", 1))
+                python = (sys.executable, "-c", SMOOTH, fleet / "sensor.toml", estimator)
+                found["python"].append(seconds(*python, fleet / f"{of}.parquet", 1))
+            for what, each in found.items():
+                ratio = statistics.median(a / b for a, b in zip(each, found["library"]))
+                rows = ", ".join(f"{second / size * 1e3:.2f}" for second in each)
+                print(f"| {estimator} | {what}, {of} | {statistics.median(each) / size * 1e3:.2f} | {rows} | {ratio:.2f} |", flush=True)
 
 
 main()

@@ -1,7 +1,7 @@
 """Ten thousand recordings on Spark, on Ray, and on one core, with the same result.
 
     fleet.py make FOLDER --recordings 10000      recordings as Parquet, and a sensor
-    fleet.py run FOLDER plain                    estimates on one core: what the others are compared with
+    fleet.py run FOLDER plain --workers 1        estimates on one core: what the others are compared with
     fleet.py run FOLDER spark --master URL --kill PID
     fleet.py run FOLDER ray --kill any
     fleet.py check FOLDER spark                  nothing lost, nothing doubled, the same numbers
@@ -12,7 +12,9 @@
 """
 
 import argparse
+import concurrent.futures
 import hashlib
+import multiprocessing
 import os
 import shutil
 import signal
@@ -31,14 +33,14 @@ import ohmstrain as oh
 from ohmstrain._groups import Work
 
 BY = ["sensor_id", "recording_id"]
-#: Rows of a recording, at most.
+#: Rows of a recording that take 200 s, at 5 Hz; with more rows the sample rate is higher.
 ROWS = 1000
 #: Recordings that the simulator makes; the others are these with another R0 and other noise.
 SIMULATED = 50
 #: Recordings in a file.
 PER_FILE = 50
-#: Recordings that are compared at a time.
-COMPARED = 1000
+#: Rows that are compared at a time.
+COMPARED = 10_000_000
 
 
 def program(*words):
@@ -48,16 +50,17 @@ def program(*words):
 def make(folder, recordings, rows_each=ROWS, seed=1):
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "recordings").mkdir(exist_ok=True)
-    simulate = ["simulate", "--protocol", "mixed", "--speed-mm-s", 5, "--sample-rate-hz", 5, "--mismatched"]
+    oversampling = max(1, -(-rows_each // ROWS))
+    simulate = ["simulate", "--protocol", "mixed", "--speed-mm-s", 5, "--sample-rate-hz", 5 * oversampling, "--mismatched"]
     made = []
     for k in range(min(SIMULATED, recordings)):
         path = folder / f"simulated-{k}.csv"
         program(*simulate, "--seed", seed + k, "-o", path, "--force")
         rows = np.loadtxt([line for line in path.read_text().splitlines() if line[0].isdigit()], delimiter=",")
-        made.append(rows[:ROWS])
+        made.append(rows[: ROWS * oversampling])
     if not (folder / "sensor.toml").exists():
         names = ["time_s", "resistance_ohm", "strain"]
-        oh.calibrate(dict(zip(names, made[0].T.copy()))).save(folder / "sensor.toml")
+        oh.calibrate(dict(zip(names, made[0][::oversampling].T.copy()))).save(folder / "sensor.toml")
     chance = np.random.default_rng(seed)
     for first in range(0, recordings, PER_FILE):
         tables = []
@@ -70,19 +73,27 @@ def make(folder, recordings, rows_each=ROWS, seed=1):
     print(f"{recordings} recordings, {recordings * rows_each} rows")
 
 
-def plain(folder, task, estimator):
-    """One recording after another, on one core."""
+def plain_file(work, path, to):
+    table = pq.read_table(path)
+    starts = np.flatnonzero(np.diff(table["recording_id"].to_numpy(), prepend=-1))
+    ends = [*starts[1:], len(table)]
+    done = [work(table.slice(a, b - a)) for a, b in zip(starts, ends)]
+    pq.write_table(pa.concat_tables(done), to / path.name)
+
+
+def plain(folder, task, estimator, workers):
+    """One recording after another, in each worker."""
     work = Work(task, BY, oh.Sensor.load(folder / "sensor.toml"), estimator=estimator)
-    (folder / "estimates-plain").mkdir(exist_ok=True)
-    for path in sorted((folder / "recordings").glob("*.parquet")):
-        table = pq.read_table(path)
-        starts = np.flatnonzero(np.diff(table["recording_id"].to_numpy(), prepend=-1))
-        ends = [*starts[1:], len(table)]
-        done = [work(table.slice(a, b - a)) for a, b in zip(starts, ends)]
-        pq.write_table(pa.concat_tables(done), folder / "estimates-plain" / path.name)
+    to = folder / "estimates-plain"
+    to.mkdir(exist_ok=True)
+    files = sorted((folder / "recordings").glob("*.parquet"))
+    spawned = multiprocessing.get_context("spawn")
+    with Clock() as clock, concurrent.futures.ProcessPoolExecutor(workers, spawned) as pool:
+        list(pool.map(plain_file, [work] * len(files), files, [to] * len(files)))
+    return clock
 
 
-def spark(folder, task, estimator, master, partitions):
+def spark(folder, task, estimator, workers, partitions, master):
     from pyspark.sql import SparkSession
 
     from ohmstrain import spark as oh_spark
@@ -94,36 +105,35 @@ def spark(folder, task, estimator, master, partitions):
         "spark.sql.shuffle.partitions": str(partitions),
         "spark.sql.adaptive.enabled": "false",
         "spark.executor.memory": "1g",
+        "spark.cores.max": str(workers),
     }
     builder = SparkSession.builder.master(master).appName("ohmstrain")
     for key, value in settings.items():
         builder = builder.config(key, value)
     session = builder.getOrCreate()
     session.sparkContext.setLogLevel("ERROR")
-    start = time.perf_counter()
-    df = session.read.parquet(str((folder / "recordings").absolute()))
-    done = getattr(oh_spark, task)(df, oh.Sensor.load(folder / "sensor.toml"), estimator=estimator)
-    done.write.mode("overwrite").parquet(str((folder / "estimates-spark").absolute()))
-    seconds = time.perf_counter() - start
+    with Clock() as clock:
+        df = session.read.parquet(str((folder / "recordings").absolute()))
+        done = getattr(oh_spark, task)(df, oh.Sensor.load(folder / "sensor.toml"), estimator=estimator)
+        done.write.mode("overwrite").parquet(str((folder / "estimates-spark").absolute()))
     session.stop()
-    return seconds
+    return clock
 
 
-def ray(folder, task, estimator, cpus, partitions):
+def ray(folder, task, estimator, workers, partitions):
     import ray
     import ray.data
 
     from ohmstrain import ray as oh_ray
 
-    ray.init(num_cpus=cpus, include_dashboard=False, _node_ip_address="127.0.0.1", log_to_driver=False)
+    ray.init(num_cpus=workers, include_dashboard=False, _node_ip_address="127.0.0.1", log_to_driver=False)
     ray.data.DataContext.get_current().default_hash_shuffle_parallelism = partitions
-    start = time.perf_counter()
-    dataset = ray.data.read_parquet(str(folder / "recordings"))
-    done = getattr(oh_ray, task)(dataset, oh.Sensor.load(folder / "sensor.toml"), estimator=estimator)
-    done.write_parquet(str(folder / "estimates-ray"), mode=ray.data.SaveMode.OVERWRITE)
-    seconds = time.perf_counter() - start
+    with Clock() as clock:
+        dataset = ray.data.read_parquet(str(folder / "recordings"))
+        done = getattr(oh_ray, task)(dataset, oh.Sensor.load(folder / "sensor.toml"), estimator=estimator)
+        done.write_parquet(str(folder / "estimates-ray"), mode=ray.data.SaveMode.OVERWRITE)
     ray.shutdown()
-    return seconds
+    return clock
 
 
 def descendants(pid):
@@ -156,12 +166,33 @@ def kill_later(what, output, after_files, said):
     threading.Thread(target=kill, daemon=True).start()
 
 
+class Clock:
+    """Elapsed time, s, and processor time of the control group OHMSTRAIN_GROUP, if there is one, from start to end."""
+
+    @staticmethod
+    def now():
+        group = os.environ.get("OHMSTRAIN_GROUP")
+        if not group:
+            return time.perf_counter(), 0.0
+        nanoseconds = Path(group, "cpuacct.usage")
+        if nanoseconds.exists():
+            return time.perf_counter(), int(nanoseconds.read_text()) / 1e9
+        return time.perf_counter(), int(Path(group, "cpu.stat").read_text().split()[1]) / 1e6
+
+    def __enter__(self):
+        self.start = self.now()
+        return self
+
+    def __exit__(self, *_):
+        self.elapsed_s, self.processor_s = (b - a for a, b in zip(self.start, self.now()))
+
+
 class PeakMemory(threading.Thread):
-    """The largest resident memory of any Python worker, looked at four times a second."""
+    """The largest resident memory of Python workers by what they do, looked at four times a second."""
 
     def __init__(self):
         super().__init__(daemon=True)
-        self.peak_kb = 0
+        self.peak_kb = {}
         self.start()
 
     def run(self):
@@ -171,29 +202,34 @@ class PeakMemory(threading.Thread):
                     command = (status.parent / "cmdline").read_bytes()
                     if b"pyspark.daemon" in command or command.startswith(b"ray::"):
                         rss = [line for line in status.read_text().splitlines() if line.startswith("VmHWM")]
-                        self.peak_kb = max(self.peak_kb, *(int(line.split()[1]) for line in rss), 0)
+                        name = "pyspark" if b"pyspark" in command else command.split(b"\0")[0].decode().split(".")[0]
+                        self.peak_kb[name] = max(self.peak_kb.get(name, 0), *(int(line.split()[1]) for line in rss), 0)
                 except OSError:
                     pass
             time.sleep(0.25)
 
 
-def run(folder, engine, task, estimator, master, partitions, kill, after_files):
+def run(folder, engine, task, estimator, workers, partitions, master, kill, after_files):
     said = []
     if kill:
         kill_later(kill, folder / f"estimates-{engine}", after_files, said)
     peak = PeakMemory()
-    start = time.perf_counter()
     if engine == "plain":
-        plain(folder, task, estimator)
-        seconds = time.perf_counter() - start
+        clock = plain(folder, task, estimator, workers)
     elif engine == "spark":
-        seconds = spark(folder, task, estimator, master, partitions)
+        clock = spark(folder, task, estimator, workers, partitions, master)
     else:
-        seconds = ray(folder, task, estimator, int(master) if master.isdigit() else 2, partitions)
+        clock = ray(folder, task, estimator, workers, partitions)
     assert said or not kill, "it was over before a worker was killed"
     rows = ds.dataset(folder / "recordings").count_rows()
-    memory = f", {peak.peak_kb / 1024:.0f} MB in the largest worker" if engine != "plain" else ""
-    print("; ".join([f"{engine} {task} ({estimator}): {rows} rows in {seconds:.1f} s, {rows / seconds:.0f} rows/s{memory}", *said]))
+    seconds = clock.elapsed_s
+    found = f"{engine} {task} ({estimator}, workers: {workers}): {rows} rows in {seconds:.1f} s, {rows / seconds:.0f} rows/s"
+    if clock.processor_s:
+        said.insert(0, f"{clock.processor_s / rows * 1e6:.2f} us of processor time a row")
+    if engine != "plain":
+        largest = ", ".join(f"{name} {kb / 1024:.0f}" for name, kb in sorted(peak.peak_kb.items()))
+        said.insert(0, f"MB in the largest workers: {largest}")
+    print("; ".join([found, *said]), flush=True)
 
 
 def check(folder, engine):
@@ -205,9 +241,9 @@ def check(folder, engine):
     rows = recordings.count_rows()
     assert plain.count_rows() == found.count_rows() == rows, (rows, plain.count_rows(), found.count_rows())
     last = pc.max(recordings.to_table(columns=["recording_id"])["recording_id"]).as_py()
-    compared, digest = 0, hashlib.sha256()
-    for first in range(0, last + 1, COMPARED):
-        some = (ds.field("recording_id") >= first) & (ds.field("recording_id") < first + COMPARED)
+    compared, digest, step = 0, hashlib.sha256(), max(1, COMPARED * (last + 1) // rows)
+    for first in range(0, last + 1, step):
+        some = (ds.field("recording_id") >= first) & (ds.field("recording_id") < first + step)
         given = recordings.to_table(columns=["recording_id", "time_s"], filter=some).sort_by(order)
         one, other = (of.to_table(columns=columns, filter=some).sort_by(order) for of in (plain, found))
         assert other["error"].null_count == len(other)
@@ -228,10 +264,11 @@ def main():
     parser.add_argument("folder", type=Path)
     parser.add_argument("engine", nargs="?", choices=["plain", "spark", "ray"])
     parser.add_argument("--recordings", type=int, default=10_000)
-    parser.add_argument("--rows", type=int, default=ROWS, help="of a recording, at most 1000")
+    parser.add_argument("--rows", type=int, default=ROWS, help="of a recording")
     parser.add_argument("--task", choices=["filter", "smooth"], default="smooth")
     parser.add_argument("--estimator", default="auto", help="in place of the sensor's default")
-    parser.add_argument("--master", default="local[2]", help="of Spark; or processors of Ray")
+    parser.add_argument("--workers", type=int, default=2, help="of one core each")
+    parser.add_argument("--master", default="local[2]", help="of Spark")
     parser.add_argument("--partitions", type=int, default=32)
     parser.add_argument("--kill", help="a worker's process, or any")
     parser.add_argument("--after-files", type=int, default=8, help="when so many of its output have been begun")
@@ -239,7 +276,8 @@ def main():
     if args.what == "make":
         make(args.folder, args.recordings, args.rows)
     elif args.what == "run":
-        run(args.folder, args.engine, args.task, args.estimator, args.master, args.partitions, args.kill, args.after_files)
+        todo = (args.engine, args.task, args.estimator, args.workers, args.partitions, args.master)
+        run(args.folder, *todo, args.kill, args.after_files)
     else:
         check(args.folder, args.engine)
 

@@ -52,6 +52,8 @@ def test_spark(spark, trace, sensor):
     assert len(scores) == 4 and scores["error"].notna().sum() == 1
     with pytest.raises(oh.OhmstrainError, match="no_such"):
         oh_spark.smooth(df, sensor, by=["no_such"])
+    with pytest.raises(oh.OhmstrainError, match="`time_s`: expected numbers"):
+        oh_spark.smooth(df.withColumn("time_s", df.time_s.cast("string")), sensor)
     made = oh_spark.calibrate(df.where("recording_id = 1"), estimator="ekf").toPandas()
     assert oh.Sensor.from_toml(made["sensor_toml"][0]).estimator == "ekf"
 
@@ -73,6 +75,8 @@ def test_ray(ray, trace, sensor):
     table = fleet(trace)
     ds = ray.data.from_pandas(table)
     check(oh_ray.smooth(ds, {"left": sensor, "right": sensor}).to_pandas(), table, sensor)
+    with pytest.raises(oh.OhmstrainError, match="`time_s`: expected numbers"):
+        oh_ray.smooth(ray.data.from_pandas(table.assign(time_s="x")), sensor)
 
 
 def test_dask(trace, sensor):
@@ -89,3 +93,5 @@ def test_dask(trace, sensor):
     assert len(scores) == 4 and scores["error"].notna().sum() == 1
     with pytest.raises(oh.OhmstrainError, match="no_such"):
         oh_dask.smooth(df, sensor, by=["no_such"])
+    with pytest.raises(oh.OhmstrainError, match="`time_s`: expected numbers"):
+        oh_dask.smooth(df.assign(time_s="x"), sensor)

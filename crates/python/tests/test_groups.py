@@ -24,6 +24,11 @@ def fleet(trace, recordings=4, rows=300, bad=(2,)):
     return pd.concat(parts).sample(frac=1, random_state=1)
 
 
+def kinds(table):
+    schema = pa.Schema.from_pandas(table, preserve_index=False)
+    return dict(zip(schema.names, schema.types))
+
+
 def of(table, recording):
     rows = table[table["recording_id"] == recording].sort_values("time_s")
     return rows.reset_index(drop=True)
@@ -44,7 +49,7 @@ def check(done, table, sensor, bad=(2,)):
 def test_work(trace, sensor):
     table = fleet(trace)
     work = pickle.loads(pickle.dumps(Work("smooth", BY, {"left": sensor, "right": sensor})))
-    work.check(table.columns)
+    work.check(kinds(table))
     assert "other" not in work.needed(table.columns)
     groups = [pa.Table.from_pandas(group, preserve_index=False) for _, group in table.groupby(list(BY))]
     done = pa.concat_tables([work(group) for group in groups])
@@ -75,9 +80,15 @@ def test_scores_and_sensors(trace, sensor):
 
 def test_what_cannot_work_is_refused_before(trace, sensor):
     with pytest.raises(oh.OhmstrainError, match="recording_id"):
-        Work("smooth", BY, sensor).check(["sensor_id", "time_s", "resistance_ohm"])
+        Work("smooth", BY, sensor).check(dict.fromkeys(["sensor_id", "time_s", "resistance_ohm"]))
     with pytest.raises(oh.OhmstrainError, match="resistance_ratio"):
-        Work("smooth", BY, sensor).check([*BY, "time_s"])
+        Work("smooth", BY, sensor).check(dict.fromkeys([*BY, "time_s"]))
+    with pytest.raises(oh.OhmstrainError, match="as the sensors', `resistance_ohm`"):
+        Work("smooth", BY, sensor).check(dict.fromkeys([*BY, "time_s", "resistance_ratio"]))
+    table = fleet(trace)
+    for wrong in (table.assign(resistance_ohm="x"), table.assign(time_s=pd.Timestamp("2020-01-01", tz="Europe/Berlin"))):
+        with pytest.raises(oh.OhmstrainError, match="expected numbers"):
+            Work("smooth", BY, sensor).check(kinds(wrong))
     with pytest.raises(oh.OhmstrainError, match="sensors"):
         Work("smooth", BY, {})
     with pytest.raises(oh.OhmstrainError, match="estimator"):

@@ -57,8 +57,9 @@ def test_errors_name_the_place(trace, sensor, change, row, column, text):
         sensor.smooth(change(trace.head(100)), name="knee 3")
     assert (raised.value.file, raised.value.row, raised.value.column) == ("knee 3", row, column)
     assert str(raised.value).startswith("knee 3: ")
-    with pytest.raises(TypeError):
-        sensor.smooth([1, 2, 3])
+    for no_table in ([1, 2, 3], trace["resistance_ohm"]):
+        with pytest.raises(TypeError, match="expected a table"):
+            sensor.smooth(no_table)
 
 
 def test_a_reference_is_needed_where_it_is(trace):

@@ -42,14 +42,18 @@ class Work:
                 raise _core.OhmstrainError("sensors: expected sensors of one quantity and one unit of readings")
             self.columns = next(iter(columns.values()))
             first = Sensor.from_toml(next(iter(self.texts.values())))
+            self.reading = first.reading
             first._core.live(_options(**self.options))
 
     def __getstate__(self) -> dict[str, Any]:
         return {**self.__dict__, "_made": {}}
 
-    def check(self, names: Iterable[str]) -> None:
-        """Refuse a table without the columns that are needed, before the job starts."""
-        names = list(names)
+    def check(self, kinds: Mapping[str, Any]) -> None:
+        """Refuse a table without the columns that are needed, or with other kinds of them, before the job starts.
+
+        Kinds are Arrow's, or Python's ``object`` where an engine knows no such kind; None is not looked at.
+        """
+        names = list(kinds)
         for key in self.by:
             if key not in names:
                 raise _core.OhmstrainError(f"by: expected the column `{key}`, found `{','.join(names)}`")
@@ -60,6 +64,11 @@ class Work:
             name in names for name in ("strain", "displacement_mm", "angle_deg")
         ):
             raise _core.OhmstrainError(f"expected a reference (strain, displacement_mm or angle_deg), found `{','.join(names)}`")
+        for name, kind in kinds.items():
+            if name in _tables.COLUMNS and name not in self.by and kind is not None and not _is_number(kind):
+                raise _core.OhmstrainError(f"column `{name}`: expected numbers, found {kind}")
+        if self.texts and ("resistance_ratio" in names) != (self.reading == "resistance_ratio"):
+            raise _core.OhmstrainError(f"expected readings as the sensors', `{self.reading}`, found `{','.join(names)}`")
 
     def needed(self, names: Iterable[str]) -> list[str]:
         """The columns that are handed over; nothing else travels."""
@@ -148,6 +157,12 @@ def in_order(group: pa.Table) -> pa.Table:
     if len(times) > 1 and not pc.all(pc.less_equal(times[:-1], times[1:])).as_py():
         group = group.sort_by(time)
     return group
+
+
+def _is_number(kind: Any) -> bool:
+    of = pa.types
+    known = (of.is_integer, of.is_floating, of.is_decimal, of.is_null)
+    return isinstance(kind, pa.DataType) and any(is_such(kind) for is_such in known)
 
 
 def _figures(filtered: Any, smoothed: Any, cubic: Any) -> dict[str, Any]:

@@ -63,4 +63,4 @@ def _array(column: Any) -> Any:
 
 
 def _is_pandas(table: Any) -> bool:
-    return type(table).__module__.split(".")[0] == "pandas"
+    return type(table).__module__.split(".")[0] == "pandas" and hasattr(table, "columns")

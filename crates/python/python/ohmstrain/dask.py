@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import pyarrow as pa
 
 from ._groups import Work
+from ._tables import COLUMNS
 
 if TYPE_CHECKING:
     from dask.dataframe import DataFrame
@@ -44,11 +45,12 @@ def calibrate(df: DataFrame, by: Iterable[str] = ("sensor_id",), **choices: Any)
 
 
 def _grouped(df: DataFrame, work: Work) -> DataFrame:
-    work.check(df.columns)
+    known = [name for name in df.columns if name in work.by or name in COLUMNS]
+    schema = pa.Schema.from_pandas(df._meta_nonempty[known], preserve_index=False)
+    work.check({**dict.fromkeys(df.columns), **dict(zip(schema.names, schema.types))})
     needed = df[work.needed(df.columns)]
-    keys = pa.Schema.from_pandas(needed._meta[work.by], preserve_index=False)
     types = {key: needed._meta[key].dtype for key in work.by}
-    empty = work.schema({key: keys.field(key).type for key in work.by}).empty_table().to_pandas().astype(types)
+    empty = work.schema({key: schema.field(key).type for key in work.by}).empty_table().to_pandas().astype(types)
 
     def of_partition(rows: Any) -> Any:
         groups = rows.groupby(work.by, sort=False, observed=True, dropna=False)

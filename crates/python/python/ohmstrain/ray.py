@@ -44,8 +44,9 @@ def calibrate(ds: Dataset, by: Iterable[str] = ("sensor_id",), **choices: Any) -
 
 
 def _grouped(ds: Dataset, work: Work) -> Dataset:
-    names = ds.columns() or []
-    work.check(names)
+    schema = ds.schema()
+    names = schema.names if schema else []
+    work.check(dict(zip(names, schema.types)) if schema else {})
     needed = work.needed(names)
     ds = ds if needed == names else ds.select_columns(needed)
 

@@ -18,6 +18,7 @@ import pyarrow as pa
 from pyspark.sql.pandas.types import from_arrow_schema, to_arrow_type
 
 from ._groups import Work
+from ._tables import COLUMNS
 
 if TYPE_CHECKING:
     from pyspark.sql import DataFrame
@@ -68,9 +69,10 @@ def calibrate(df: DataFrame, by: Iterable[str] = ("sensor_id",), **choices: Any)
 
 def _prepared(df: DataFrame, work: Work) -> tuple[DataFrame, Any]:
     """The columns that travel, and the schema of the result; refuses what cannot be done before the job starts."""
-    work.check(df.columns)
-    keys = {key: to_arrow_type(df.schema[key].dataType) for key in work.by}
-    return df.select(work.needed(df.columns)), from_arrow_schema(work.schema(keys))
+    known = {*work.by, *COLUMNS}
+    kinds = {name: to_arrow_type(df.schema[name].dataType) if name in known else None for name in df.columns}
+    work.check(kinds)
+    return df.select(work.needed(df.columns)), from_arrow_schema(work.schema(kinds))
 
 
 def _grouped(df: DataFrame, work: Work) -> DataFrame:
