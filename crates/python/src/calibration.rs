@@ -1,3 +1,4 @@
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::time::Instant;
 
 use ohmstrain::{Calibrated, Calibration, GaugeFamily, Prior, Quantity};
@@ -5,7 +6,7 @@ use ohmstrain_calib::{Samples, screen};
 use pyo3::prelude::*;
 use pyo3_arrow::PyTable;
 
-use crate::error::{Place, of_library, raise};
+use crate::error::{Place, heed, of_library, raise};
 use crate::evaluation::{Scored, after_split};
 use crate::options::estimator;
 use crate::recording::{About, Recording};
@@ -98,7 +99,12 @@ pub fn calibrated(
         }
     }
     let start = Instant::now();
-    let made = py.detach(|| run(recordings, rows, calibration));
+    // Unwinding is the one way out of a calibration.
+    let made = catch_unwind(AssertUnwindSafe(|| py.detach(|| run(recordings, rows, calibration))));
+    let made = made.or_else(|stopped| match stopped.downcast::<PyErr>() {
+        Ok(interrupt) => Err(*interrupt),
+        Err(panicked) => resume_unwind(panicked),
+    })?;
     let (calibrated, left_out) = made.map_err(|error| {
         let name = if let [one] = recordings { one.name.as_deref() } else { None };
         of_library(&error, name)
@@ -135,7 +141,8 @@ fn run(
         }
         known.push(recording.joint.map_or(one, |joint| one.on_joint(joint)));
     }
-    let calibrated = calibration.run(&known)?;
+    let interrupted = |error: PyErr| resume_unwind(Box::new(error));
+    let calibrated = calibration.run_with(&known, |_| heed().unwrap_or_else(interrupted))?;
     Ok((calibrated, screened.distrusted))
 }
 

@@ -42,6 +42,26 @@ pub fn raise(place: &Place, message: &str) -> PyErr {
     })
 }
 
+/// Why rows were not gone through to the end.
+#[derive(Debug)]
+pub enum Stopped {
+    /// The library refuses them.
+    Refused(Error),
+    /// The user, or whoever sent a signal.
+    Interrupted(PyErr),
+}
+
+impl From<Error> for Stopped {
+    fn from(error: Error) -> Self {
+        Self::Refused(error)
+    }
+}
+
+/// The exception of a signal, if one has come.
+pub fn heed() -> PyResult<()> {
+    Python::attach(|py| py.check_signals())
+}
+
 /// What the library refuses, of a recording or file of this name.
 pub fn of_library(error: &Error, file: Option<&str>) -> PyErr {
     let place = Place { file, ..Place::default() };

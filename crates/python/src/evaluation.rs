@@ -117,22 +117,15 @@ impl Part<'_> {
 
     /// Of filter and smoother.
     fn of_estimates(&self, sensor: &Sensor, options: &Options) -> PyResult<Vec<(&'static str, Option<Scores>)>> {
-        let refused = |error| of_library(&error, self.recording.name.as_deref());
         let len = self.truth.len();
-        let mut filter = options.builder(sensor)?.build().map_err(refused)?;
+        let mut filter = options.builder(sensor)?.build().map_err(|error| self.recording.refused(&error))?;
         let mut filtered = Vec::with_capacity(len);
-        for row in 0..len {
-            let (time_s, reading) = self.recording.row(row);
-            let estimate = filter.step(time_s, reading).map_err(refused)?;
-            filtered.push((estimate.strain, Some(estimate.strain_sd)));
-        }
+        self.recording.filtered(&mut filter, |_, row| filtered.push((row.strain, Some(row.strain_sd))))?;
         let mut smoothed = vec![(f64::NAN, None); len];
-        let keep = |rows: std::ops::Range<usize>, segment: &[ohmstrain::Estimate]| {
+        self.recording.smoothed(options.builder(sensor)?, |rows, segment| {
             let cells = smoothed[rows].iter_mut().zip(segment);
             cells.for_each(|(cell, row)| *cell = (row.strain, Some(row.strain_sd)));
-            Ok::<(), ohmstrain::Error>(())
-        };
-        options.builder(sensor)?.smooth_backward(len, |row| self.recording.row(row), keep).map_err(refused)?;
+        })?;
         Ok(vec![("filter", self.scores(|row| filtered[row])), ("smoother", self.scores(|row| smoothed[row]))])
     }
 }

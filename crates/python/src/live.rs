@@ -2,6 +2,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use ohmstrain::{Column, Error, Estimate};
 use pyo3::prelude::*;
+use pyo3::sync::MutexExt;
 use pyo3::types::PyDict;
 use pyo3_arrow::PyTable;
 
@@ -26,9 +27,10 @@ pub struct LaggedFilter {
     columns: Vec<Column>,
 }
 
-/// A filter for one caller at a time. A step either succeeds or leaves the filter as it was, also if it panics.
-fn locked<T>(filter: &Mutex<T>) -> MutexGuard<'_, T> {
-    filter.lock().unwrap_or_else(PoisonError::into_inner)
+/// A filter for one caller at a time, who waits without the interpreter. A step either succeeds or leaves the filter as it
+/// was, also if it panics.
+fn locked<'a, T>(filter: &'a Mutex<T>, py: Python) -> MutexGuard<'a, T> {
+    filter.lock_py_attached(py).unwrap_or_else(PoisonError::into_inner)
 }
 
 fn refused(error: Error) -> PyErr {
@@ -66,7 +68,7 @@ impl LaggedFilter {
 impl LiveFilter {
     #[pyo3(signature = (time_s, reading=None))]
     fn step<'py>(&self, py: Python<'py>, time_s: f64, reading: Option<f64>) -> PyResult<Bound<'py, PyDict>> {
-        let estimate = locked(&self.filter).step(time_s, reading).map_err(refused)?;
+        let estimate = locked(&self.filter, py).step(time_s, reading).map_err(refused)?;
         row(py, &self.columns, &estimate)
     }
 
@@ -74,24 +76,15 @@ impl LiveFilter {
     fn run(&self, py: Python, table: PyTable, about: About) -> PyResult<PyTable> {
         let recording = Recording::new(table, about)?;
         recording.check_unit(&self.sensor, self.rest_resistance)?;
-        let estimates = py.detach(|| {
-            let mut estimates = Estimates::new(self.columns.clone(), recording.time_s.len());
-            let mut filter = locked(&self.filter);
-            for row in 0..recording.time_s.len() {
-                let (time_s, reading) = recording.row(row);
-                let estimate = filter.step(time_s, reading).map_err(|error| match error {
-                    Error::Step(source) => Error::Row { row, source },
-                    other => other,
-                })?;
-                estimates.put(row, std::slice::from_ref(&estimate));
-            }
-            Ok(estimates)
-        });
-        estimates.map_err(|error| of_library(&error, recording.name.as_deref()))?.into_table()
+        let mut estimates = Estimates::new(self.columns.clone(), recording.time_s.len());
+        let mut filter = locked(&self.filter, py);
+        let filter = &mut *filter;
+        py.detach(|| recording.filtered(filter, |row, one| estimates.put(row, std::slice::from_ref(one))))?;
+        estimates.into_table()
     }
 
-    fn rest_resistance(&self, measured: f64) -> PyResult<()> {
-        locked(&self.filter).rest_resistance(measured).map_err(refused)
+    fn rest_resistance(&self, py: Python, measured: f64) -> PyResult<()> {
+        locked(&self.filter, py).rest_resistance(measured).map_err(refused)
     }
 }
 
@@ -99,18 +92,18 @@ impl LiveFilter {
 impl LaggedFilter {
     #[pyo3(signature = (time_s, reading=None))]
     fn step<'py>(&self, py: Python<'py>, time_s: f64, reading: Option<f64>) -> PyResult<Vec<Bound<'py, PyDict>>> {
-        let mut filter = locked(&self.filter);
+        let mut filter = locked(&self.filter, py);
         let rows = filter.step(time_s, reading).map_err(refused)?;
         rows.iter().map(|estimate| row(py, &self.columns, estimate)).collect()
     }
 
     fn finish<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
-        let mut filter = locked(&self.filter);
+        let mut filter = locked(&self.filter, py);
         let rows = filter.finish().map_err(refused)?;
         rows.iter().map(|estimate| row(py, &self.columns, estimate)).collect()
     }
 
-    fn rest_resistance(&self, measured: f64) -> PyResult<()> {
-        locked(&self.filter).rest_resistance(measured).map_err(refused)
+    fn rest_resistance(&self, py: Python, measured: f64) -> PyResult<()> {
+        locked(&self.filter, py).rest_resistance(measured).map_err(refused)
     }
 }

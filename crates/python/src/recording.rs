@@ -1,5 +1,6 @@
 //! Recordings in tables: the columns of a trace CSV.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use arrow_array::cast::AsArray;
@@ -7,12 +8,12 @@ use arrow_array::types::Float64Type;
 use arrow_array::{Array, RecordBatch};
 use arrow_cast::cast;
 use arrow_schema::{ArrowError, DataType, Schema};
-use ohmstrain::{JointParams, Quantity, Reading, ReadingUnit, Sensor};
+use ohmstrain::{Error, Estimate, Filter, FilterBuilder, JointParams, Quantity, Reading, ReadingUnit, Sensor};
 use ohmstrain_bench_data::{FrontEndSpec, JointSpec};
 use pyo3::prelude::*;
 use pyo3_arrow::PyTable;
 
-use crate::error::{Place, raise};
+use crate::error::{Place, Stopped, heed, of_library, raise};
 
 /// What a table leaves unsaid: the lines above a trace CSV's header.
 #[derive(Debug, Default, FromPyObject)]
@@ -42,6 +43,9 @@ pub struct Recording {
     /// The joint that the sensor sits on.
     pub joint: Option<JointParams>,
 }
+
+/// Rows after which an interrupt is heeded.
+const HEEDED: usize = 4096;
 
 /// Exactly one of each of the first two groups, at most one of the third.
 const TIMES: [&str; 2] = ["time_s", "time_us"];
@@ -99,6 +103,43 @@ impl Recording {
         (self.time_s[row], Reading { value: self.readings[row], sd, saturated })
     }
 
+    /// What a filter makes of each row, in turn; heeds an interrupt.
+    pub fn filtered(&self, filter: &mut Filter, mut take: impl FnMut(usize, &Estimate)) -> PyResult<()> {
+        for row in 0..self.time_s.len() {
+            if row % HEEDED == HEEDED - 1 {
+                heed()?;
+            }
+            let (time_s, reading) = self.row(row);
+            let estimate = filter.step(time_s, reading).map_err(|error| match error {
+                Error::Step(source) => self.refused(&Error::Row { row, source }),
+                other => self.refused(&other),
+            })?;
+            take(row, &estimate);
+        }
+        Ok(())
+    }
+
+    /// What a smoother makes of the rows, in segments from the last to the first; heeds an interrupt on its way back.
+    pub fn smoothed(&self, builder: FilterBuilder, mut take: impl FnMut(Range<usize>, &[Estimate])) -> PyResult<()> {
+        let done = builder.smooth_backward(
+            self.time_s.len(),
+            |row| self.row(row),
+            |rows, segment| {
+                take(rows, segment);
+                heed().map_err(Stopped::Interrupted)
+            },
+        );
+        done.map_err(|stopped| match stopped {
+            Stopped::Refused(error) => self.refused(&error),
+            Stopped::Interrupted(interrupt) => interrupt,
+        })
+    }
+
+    /// What the library refuses of it.
+    pub fn refused(&self, error: &Error) -> PyErr {
+        of_library(error, self.name.as_deref())
+    }
+
     /// Refuses readings in another unit than the sensor's, or that seem to be.
     pub fn check_unit(&self, sensor: &Sensor, rest_resistance: Option<f64>) -> PyResult<()> {
         let place = Place { file: self.name.as_deref(), ..Place::default() };
@@ -106,7 +147,7 @@ impl Recording {
             return Err(raise(&place, "expected readings in the unit of the sensor's calibration, ohms or ratios"));
         }
         let checked = sensor.check_unit(self.readings.iter().copied(), rest_resistance);
-        checked.map_err(|doubt| crate::error::of_library(&doubt.into(), self.name.as_deref()))
+        checked.map_err(|doubt| self.refused(&doubt.into()))
     }
 }
 
@@ -209,8 +250,10 @@ fn numbers(batches: &[RecordBatch], schema: &Arc<Schema>, name: &str, file: Opti
     let place = || Place { file, column: Some(name), ..Place::default() };
     let wrong = |error: ArrowError| raise(&place(), &format!("expected numbers: {error}"));
     let index = schema.index_of(name).map_err(wrong)?;
-    if !schema.field(index).data_type().is_numeric() {
-        return Err(raise(&place(), &format!("expected numbers, found {}", schema.field(index).data_type())));
+    let kind = schema.field(index).data_type();
+    // A column of nulls alone has no other kind.
+    if !kind.is_numeric() && !kind.is_null() {
+        return Err(raise(&place(), &format!("expected numbers, found {kind}")));
     }
     let mut values = Vec::with_capacity(batches.iter().map(RecordBatch::num_rows).sum());
     for batch in batches {

@@ -28,7 +28,7 @@ impl Sensor {
         recording.check_unit(&self.sensor, options.rest_resistance)?;
         let Some(joint) = recording.joint else { return Ok(Cow::Borrowed(&self.sensor)) };
         let moved = self.sensor.clone().on_joint(joint);
-        moved.map(Cow::Owned).map_err(|error| of_library(&error, recording.name.as_deref()))
+        moved.map(Cow::Owned).map_err(|error| recording.refused(&error))
     }
 }
 
@@ -102,22 +102,15 @@ impl Sensor {
     fn filter(&self, py: Python, table: PyTable, about: About, options: Options) -> PyResult<Doubtful> {
         let recording = Recording::new(table, about)?;
         let sensor = self.for_recording(&recording, &options)?;
-        let refused = |error| of_library(&error, recording.name.as_deref());
-        let mut filter = options.builder(&sensor)?.build().map_err(refused)?;
-        let estimates = py.detach(|| {
+        let mut filter = options.builder(&sensor)?.build().map_err(|error| recording.refused(&error))?;
+        let (estimates, warnings) = py.detach(|| {
             let mut estimates = Estimates::new(sensor.columns(), recording.time_s.len());
             let mut watch = Watch::new(&sensor, &recording, &options);
-            for row in 0..recording.time_s.len() {
-                let (time_s, reading) = recording.row(row);
-                let estimate = filter.step(time_s, reading).map_err(|error| (row, error))?;
-                estimates.put(row, std::slice::from_ref(&estimate));
+            recording.filtered(&mut filter, |row, estimate| {
+                estimates.put(row, std::slice::from_ref(estimate));
                 watch.see(row, estimate.strain_rate);
-            }
-            Ok((estimates, watch.warnings))
-        });
-        let (estimates, warnings) = estimates.map_err(|(row, error)| match error {
-            ohmstrain::Error::Step(source) => refused(ohmstrain::Error::Row { row, source }),
-            other => refused(other),
+            })?;
+            Ok::<_, PyErr>((estimates, watch.warnings))
         })?;
         Ok((estimates.into_table()?, warnings))
     }
@@ -126,24 +119,18 @@ impl Sensor {
         let recording = Recording::new(table, about)?;
         let sensor = self.for_recording(&recording, &options)?;
         let builder = options.builder(&sensor)?;
-        let estimates = py.detach(|| {
+        let (estimates, warnings) = py.detach(|| {
             let len = recording.time_s.len();
             let mut estimates = Estimates::new(sensor.columns(), len);
             let mut rates = vec![0.0; len];
-            builder.smooth_backward(
-                len,
-                |row| recording.row(row),
-                |rows, segment| {
-                    estimates.put(rows.start, segment);
-                    rates[rows].iter_mut().zip(segment).for_each(|(rate, row)| *rate = row.strain_rate);
-                    Ok::<(), ohmstrain::Error>(())
-                },
-            )?;
+            recording.smoothed(builder, |rows, segment| {
+                estimates.put(rows.start, segment);
+                rates[rows].iter_mut().zip(segment).for_each(|(rate, row)| *rate = row.strain_rate);
+            })?;
             let mut watch = Watch::new(&sensor, &recording, &options);
             rates.iter().enumerate().for_each(|(row, rate)| watch.see(row, *rate));
-            Ok((estimates, watch.warnings))
-        });
-        let (estimates, warnings) = estimates.map_err(|error| of_library(&error, recording.name.as_deref()))?;
+            Ok::<_, PyErr>((estimates, watch.warnings))
+        })?;
         Ok((estimates.into_table()?, warnings))
     }
 

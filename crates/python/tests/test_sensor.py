@@ -1,6 +1,7 @@
 """Sensors as objects, filters as they run, plots."""
 
 import pickle
+import signal
 import threading
 import time
 
@@ -81,6 +82,47 @@ def test_the_interpreter_is_free_meanwhile(trace, sensor):
     inside = [at for at in ticks if start + 0.1 * (end - start) < at < end - 0.1 * (end - start)]
     # Of a millisecond each, half would do for a busy machine; with the lock held there is none.
     assert len(inside) > 5, (len(inside), end - start)
+
+
+@pytest.mark.filterwarnings("ignore::ohmstrain.OhmstrainWarning")
+def test_an_interrupt_is_heeded(trace, sensor):
+    """What a signal's handler raises comes out of the work that it meets."""
+    rows = 40_000
+    readings, strain = (np.resize(trace[name].to_numpy(), rows) for name in ("resistance_ohm", "strain"))
+    long = {"time_s": np.arange(rows) * 0.2, "resistance_ohm": readings, "strain": strain}
+    works = [sensor.filter, sensor.smooth, sensor.evaluate, sensor.filter().run, lambda _: oh.calibrate(trace, estimator="ekf")]
+    before = signal.signal(signal.SIGALRM, lambda *_: (_ for _ in ()).throw(InterruptedError))
+    try:
+        for work in works:
+            with pytest.raises(InterruptedError):
+                signal.setitimer(signal.ITIMER_REAL, 0.005)
+                work(long)
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
+
+
+def test_threads_take_turns_with_a_filter(trace, sensor):
+    """One runs through tables while another steps and has the interpreter: neither waits for ever."""
+    live, done = sensor.filter(), []
+
+    def rows(first):
+        times = np.arange(first, first + 20_000) * 1e-6
+        return {"time_s": times, "resistance_ohm": np.resize(trace["resistance_ohm"].to_numpy(), len(times))}
+
+    def run():
+        for k in range(5):
+            done.append(live.run(rows(20_000 * k)))
+
+    thread = threading.Thread(target=run)
+    thread.start()
+    while thread.is_alive():
+        try:
+            live.step(0.0, 1600.0)
+        except oh.OhmstrainError:
+            pass
+    thread.join()
+    assert len(done) == 5
 
 
 def test_plots(trace, sensor):

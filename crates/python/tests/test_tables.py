@@ -29,6 +29,8 @@ def test_the_kind_comes_back(trace, sensor):
     assert (sensor.smooth(shifted).index == shifted.index).all()
     chunked = pa.concat_tables([arrow.slice(0, 50), arrow.slice(50)])
     np.testing.assert_array_equal(sensor.smooth(chunked)["strain"], expected["strain"].to_numpy())
+    nothing = sensor.smooth(first.assign(resistance_ohm=np.nan))
+    assert sensor.smooth(first.assign(resistance_ohm=None)).equals(nothing)
 
 
 def test_units_are_converted(trace, sensor):
