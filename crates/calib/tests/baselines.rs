@@ -1,21 +1,12 @@
 //! Baselines against naive dense least squares: integrals summed up, designs stacked, every block left out by hand.
 
 use nalgebra::{DMatrix, DVector};
-use ohmstrain_calib::{Baseline, Baselines, Fir, LeakyBank, LowPassMode, PublishedLaw, Samples};
+use ohmstrain_calib::{Baseline, Baselines, Fir, LeakyBank, LowPassMode, PublishedLaw};
 use ohmstrain_model::Phase;
 
-/// A recording with irregular steps, missing readings and a missing reference.
-struct Bench {
-    time_s: Vec<f64>,
-    reading: Vec<f64>,
-    strain: Vec<f64>,
-}
+use super::bench::Bench;
 
 impl Bench {
-    fn samples(&self) -> Samples<'_> {
-        Samples::new(&self.time_s, &self.reading, &self.strain).unwrap()
-    }
-
     /// Times and readings that are known up to a row.
     fn known(&self, row: usize) -> Vec<(f64, f64)> {
         (0..=row).filter(|&k| self.reading[k].is_finite()).map(|k| (self.time_s[k], self.reading[k])).collect()
@@ -26,9 +17,10 @@ impl Bench {
     }
 }
 
-/// A sine with a harmonic, read through a parabola that remembers; steps from `step_s` to twice that.
+/// A sine with a harmonic, read through a parabola that remembers; steps from `step_s` to twice that, missing readings and a
+/// missing reference.
 fn record(rows: usize, step_s: f64, phase: f64) -> Bench {
-    let mut bench = Bench { time_s: vec![], reading: vec![], strain: vec![] };
+    let mut bench = Bench::default();
     let (mut time_s, mut memory) = (3.0, 0.0);
     for k in 0..rows {
         let strain = 0.15 + 0.1 * (0.4 * time_s + phase).sin() + 0.04 * (1.1 * time_s).sin();
@@ -247,7 +239,7 @@ fn rows_on_a_line_between_rows_change_nothing() {
     let bench = record(300, 0.2, 0.0);
     let baselines = Baselines::fit(&[bench.samples()]).unwrap();
     let known = bench.known(299);
-    let mut between = Bench { time_s: vec![], reading: vec![], strain: vec![] };
+    let mut between = Bench::default();
     for pair in known.windows(2) {
         let ((a_s, a), (b_s, b)) = (pair[0], pair[1]);
         for share in [0.0, 0.1, 0.7] {

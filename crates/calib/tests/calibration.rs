@@ -5,23 +5,11 @@ use std::f64::consts::TAU;
 use ohmstrain_calib::{
     Calibration, CalibrationError, EstimatorKind, GaugeFamily, LARGEST_SD_SCALE, LawFit, LawOptions, Quantity,
     RangeParams, ReadingUnit, Samples, ScoredRow, Scores, SensorParams, Stage, Start, StaticCubic, build_filter,
-    calibrate, fit_law,
+    calibrate, fit_law, identifiability,
 };
 use ohmstrain_ekf::Reading;
 
-/// A recording with known strain, as owned vectors.
-#[derive(Clone)]
-struct Bench {
-    time_s: Vec<f64>,
-    reading: Vec<f64>,
-    strain: Vec<f64>,
-}
-
-impl Bench {
-    fn samples(&self) -> Samples<'_> {
-        Samples::new(&self.time_s, &self.reading, &self.strain).unwrap()
-    }
-}
+use super::bench::Bench;
 
 /// A small deterministic noise: the fractional parts of multiples of the golden ratio, roughly uniform in ±1.
 fn jitter(k: usize) -> f64 {
@@ -31,7 +19,7 @@ fn jitter(k: usize) -> f64 {
 /// The switched law written out naively, one explicit Euler step of a millisecond at a time.
 fn record(rest_ohm: f64, phase: f64, noise: f64) -> Bench {
     let strain_at = |t: f64| 0.15 + 0.08 * (TAU * t / 17.0 + phase).sin() + 0.06 * (TAU * t / 7.3).sin();
-    let mut bench = Bench { time_s: vec![], reading: vec![], strain: vec![] };
+    let mut bench = Bench::default();
     let (mut fast, mut slow) = (0.0, 0.0);
     let inner = 1e-3;
     for step in 0..150_000_usize {
@@ -87,9 +75,9 @@ fn rows_without_contact_do_not_bend_the_law() {
 
 #[test]
 fn standard_errors_shrink_with_noise_and_form_a_covariance() {
-    let errors =
-        |noise: f64| fit_law(&[record(1500.0, 0.0, noise).samples()], LawOptions::default()).unwrap().uncertainty;
-    let (quiet, noisy) = (errors(1e-4), errors(0.1));
+    let law = fit_law(&[record(1500.0, 0.0, 1e-3).samples()], LawOptions::default()).unwrap().law.law;
+    let errors = |noise: f64| identifiability(&[record(1500.0, 0.0, noise).samples()], &law).unwrap().parameters;
+    let (quiet, noisy) = (errors(1e-3), errors(0.1));
     assert_eq!(quiet.names[0], "rest_reading");
     assert!(quiet.standard_errors[0] > 0.0 && quiet.standard_errors[0] < noisy.standard_errors[0]);
     for (i, row) in quiet.covariance.iter().enumerate() {

@@ -2,26 +2,16 @@
 
 use ohmstrain_calib::likelihood::Bound;
 use ohmstrain_calib::{
-    BranchParams, GaugeFamily, GaugeParams, Identifiability, LawOptions, LawParams, RangeParams, Samples,
-    bootstrap_law, compare_structures, identifiability,
+    BranchParams, GaugeFamily, GaugeParams, Identifiability, LawOptions, LawParams, RangeParams, bootstrap_law,
+    compare_structures, identifiability,
 };
 use rand_chacha::ChaCha12Rng;
 use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 
+use super::bench::Bench;
+
 const STEP_S: f64 = 0.1;
-
-struct Bench {
-    time_s: Vec<f64>,
-    reading: Vec<f64>,
-    strain: Vec<f64>,
-}
-
-impl Bench {
-    fn samples(&self) -> Samples<'_> {
-        Samples::new(&self.time_s, &self.reading, &self.strain).unwrap()
-    }
-}
 
 fn law(tau_s: f64) -> LawParams {
     let branch =
