@@ -42,6 +42,7 @@ pub mod import;
 mod line_parser;
 mod lines;
 mod metadata;
+mod order;
 #[cfg(feature = "import")]
 mod parquet_text;
 mod reader;

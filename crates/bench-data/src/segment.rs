@@ -2,6 +2,8 @@ use std::ops::Range;
 
 use ohmstrain_model::Phase;
 
+use crate::order::{extent, median};
+
 /// A stretch of rows in one phase.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Segment {
@@ -225,11 +227,6 @@ fn merge_short(segments: &mut Vec<Segment>, time_s: &[f64], shortest_s: f64) {
 }
 
 fn span(values: &[f64]) -> f64 {
-    let (low, high) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
+    let (low, high) = extent(values.iter().copied());
     high - low
-}
-
-fn median(mut values: Vec<f64>) -> Option<f64> {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied()
 }

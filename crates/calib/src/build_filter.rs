@@ -1,11 +1,10 @@
 #[cfg(feature = "particles")]
 use ohmstrain_ekf::Particles;
 use ohmstrain_ekf::{
-    Belief, Dwell, Evidence, Hypotheses, Imm, Mixture, PhaseMixture, SignSplit, StepError, StrainSensor, Ukf, Unscented,
+    Belief, Dwell, Evidence, Hypotheses, Imm, Mixture, PhaseMixture, SignSplit, StepError, Ukf, Unscented,
 };
 use ohmstrain_model::{Phase, SwitchedModel};
 
-use crate::CalibrationError;
 use crate::corrected::Corrected;
 use crate::estimator_params::{EstimatorKind, EstimatorParams};
 use crate::filter::{Filter, Start};
@@ -14,6 +13,7 @@ use crate::params::{RangeParams, SensorParams};
 use crate::running::{Interval, Running};
 use crate::sieve::Sieve;
 use crate::sparse_estimator::SparseEstimator;
+use crate::{CalibrationError, with_sizes};
 
 /// Share of the limits' span to which a given initial strain is believed.
 pub(crate) const START_SD: f64 = 1e-3;
@@ -54,18 +54,9 @@ pub(crate) fn filter_from_parts(
     estimator: &EstimatorParams,
     setting: Setting,
 ) -> Result<Box<dyn Filter>, CalibrationError> {
-    /// One instance per number of branches, N = B + 3 and L = N (N + 1) / 2.
-    macro_rules! build {
-        ($([$b:literal, $n:literal, $l:literal]),+) => {
-            match law.branches.len() {
-                $($b => of_size::<$b, $n, $l>(kind, law, estimator, setting),)+
-                branches => Err(CalibrationError::Unsupported(format!(
-                    "a law with {branches} branches; at most 4 are supported"
-                ))),
-            }
-        };
-    }
-    build!([0, 3, 6], [1, 4, 10], [2, 5, 15], [3, 6, 21], [4, 7, 28])
+    let branches = law.branches.len();
+    with_sizes!(branches, B, N, L => of_size::<B, N, L>(kind, law, estimator, setting))
+        .unwrap_or_else(|| Err(CalibrationError::branches(branches)))
 }
 
 /// The model of a law.
@@ -176,8 +167,8 @@ const PARTICLES: usize = 4000;
 /// Seed of the particles' paths: the same readings give the same estimates.
 pub const PARTICLE_SEED: u64 = 1;
 
-fn initial_belief<S: StrainSensor<f64, B, N>, const B: usize, const N: usize, const L: usize>(
-    model: &S,
+fn initial_belief<const B: usize, const N: usize, const L: usize>(
+    model: &SwitchedModel<f64, B, N>,
     setting: Setting,
 ) -> Belief<f64, N, L> {
     let Start::Strain(strain) = setting.start else { return Belief::initial(model) };

@@ -13,6 +13,7 @@ use crate::law_fit::{CrossFit, LawOptions, fit_laws};
 use crate::law_params::LawParams;
 use crate::motion_stats::MotionStats;
 use crate::noise_fit::{NoiseProblem, REFINEMENT, SURVEY, Surveyed, best_of_each_size, survey, survey_evaluations};
+use crate::order::{extent, median};
 use crate::params::{FORMAT, Quantity, RangeParams, ReadingUnit, SensorParams, Uncertainty, Validity};
 use crate::prior::{CorrectionPrior, Prior};
 use crate::recipe::RECIPE;
@@ -52,8 +53,6 @@ pub struct Calibration {
     /// What the recordings tell of the law's parameters: without the ridge, as [`identifiability`] has it; `None` if they
     /// tell nothing without it.
     pub uncertainty: Option<Uncertainty>,
-    /// Root mean squared error of the law on blocks left out, relative to R₀.
-    pub law_error: f64,
     /// The estimator that did best.
     pub default_estimator: EstimatorKind,
     /// Noise and motion, per estimator.
@@ -100,9 +99,7 @@ impl Calibration {
 
 /// R₀ of the sensor from those of its recordings.
 fn median_rest(rest_readings: &[f64]) -> f64 {
-    let mut rests = rest_readings.to_vec();
-    rests.sort_by(f64::total_cmp);
-    rests[rests.len() / 2]
+    median(rest_readings.iter().copied()).unwrap_or(f64::NAN)
 }
 
 /// How much better, in mean log density of the strain, a single Gaussian must be than hypotheses: once it has taken the
@@ -212,7 +209,6 @@ pub(crate) fn calibrate_once(
             longest_repeat_s: longest_repeat_s(recordings),
         }),
         limits,
-        law_error: fit.law.cross_validated_error,
         uncertainty: identifiability.map(|found| found.told()),
         rest_share: rest_share(recordings, &fit.law.rest_readings, limits.span()),
         rest_readings: fit.law.rest_readings.clone(),
@@ -221,9 +217,9 @@ pub(crate) fn calibrate_once(
 }
 
 /// Smallest and largest reading of the rows that were calibrated on.
-fn reading_range(recordings: &[Samples]) -> (f64, f64) {
+pub(crate) fn reading_range(recordings: &[Samples]) -> (f64, f64) {
     let readings = recordings.iter().flat_map(|samples| samples.complete_rows().map(|k| samples.reading[k]));
-    readings.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), reading| (low.min(reading), high.max(reading)))
+    extent(readings)
 }
 
 /// The correction of the calibrated filter; none if nothing can be learned about it.

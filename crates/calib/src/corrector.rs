@@ -3,6 +3,7 @@ use ohmstrain_ekf::correction::{Correction, FEATURES, INDUCING, InputScale, OUTP
 
 use crate::correction_params::{CorrectorParams, SIDES};
 use crate::gaussian_process::{GaussianProcess, LeftOutRow, Lessons, ProcessParams, inducing_rows};
+use crate::order::extent;
 use crate::params::RangeParams;
 use crate::portable::PortableProcess;
 use crate::sd_scale::{joint_scale, sd_scale_up_to};
@@ -136,7 +137,7 @@ fn scale(values: impl Iterator<Item = f64> + Clone) -> InputScale<f64> {
     let n = values.clone().count() as f64;
     let mean = values.clone().sum::<f64>() / n;
     let sd = (values.clone().map(|x| (x - mean).powi(2)).sum::<f64>() / n).sqrt();
-    let (lower, upper) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
+    let (lower, upper) = extent(values);
     InputScale { mean, sd: if upper > lower { sd } else { f64::INFINITY }, lower, upper }
 }
 

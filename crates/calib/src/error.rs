@@ -1,4 +1,5 @@
 use crate::estimator_params::EstimatorKind;
+use crate::law_fit::MOST_BRANCHES;
 use crate::samples::SamplesError;
 use crate::validate::FieldError;
 use ohmstrain_ekf::StepError;
@@ -76,6 +77,10 @@ pub enum CalibrationError {
 }
 
 impl CalibrationError {
+    pub(crate) fn branches(found: usize) -> Self {
+        Self::Unsupported(format!("a law with {found} branches; at most {MOST_BRANCHES} are supported"))
+    }
+
     pub(crate) fn no_parameters(kind: EstimatorKind) -> Self {
         Self::Unsupported(format!(
             "the sensor file has no parameters for `{0}`; calibrate with `{0}` as the estimator",

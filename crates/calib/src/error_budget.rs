@@ -3,6 +3,7 @@ use serde::{Deserialize, Serialize};
 use crate::design::central_rate;
 use crate::law_fit::CrossFit;
 use crate::motion_stats::{REST_SHARE, moving_mean};
+use crate::order::extent;
 use crate::samples::{Samples, filled_strain};
 
 /// What makes the error of a calibrated filter, from parts of the recordings that its law was not fitted to.
@@ -131,7 +132,7 @@ impl ErrorBudget {
 /// Range of the readings.
 fn range(samples: &Samples) -> f64 {
     let known = samples.complete_rows().map(|k| samples.reading[k]);
-    let (low, high) = known.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
+    let (low, high) = extent(known);
     high - low
 }
 

@@ -1,6 +1,5 @@
 use ohmstrain_ekf::Dwell;
 use ohmstrain_model::{ModelNoise, Motion, ParameterError};
-use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
 
 use crate::sieve::news;
@@ -163,7 +162,7 @@ impl NoiseParams {
 
 /// How the body moves: an Ornstein-Uhlenbeck velocity, by standard deviations of strain and rate.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(into = "MotionTable", try_from = "MotionTable")]
+#[serde(into = "MotionTable", from = "MotionTable")]
 pub struct MotionParams {
     /// Correlation time of the rate, s.
     pub rate_time_s: f64,
@@ -179,15 +178,7 @@ pub struct MotionParams {
 #[derive(Serialize, Deserialize)]
 #[serde(tag = "family", rename_all = "kebab-case", deny_unknown_fields)]
 enum MotionTable {
-    OrnsteinUhlenbeck {
-        rate_time_s: f64,
-        rate_sd_per_s: f64,
-        strain_mean: f64,
-        strain_sd: f64,
-    },
-    /// Files had it up to version 0.1.
-    #[serde(skip_serializing)]
-    Smooth(IgnoredAny),
+    OrnsteinUhlenbeck { rate_time_s: f64, rate_sd_per_s: f64, strain_mean: f64, strain_sd: f64 },
 }
 
 impl From<MotionParams> for MotionTable {
@@ -197,16 +188,10 @@ impl From<MotionParams> for MotionTable {
     }
 }
 
-impl TryFrom<MotionTable> for MotionParams {
-    type Error = &'static str;
-
-    fn try_from(table: MotionTable) -> Result<Self, Self::Error> {
-        match table {
-            MotionTable::OrnsteinUhlenbeck { rate_time_s, rate_sd_per_s, strain_mean, strain_sd } => {
-                Ok(Self { rate_time_s, rate_sd_per_s, strain_mean, strain_sd })
-            }
-            MotionTable::Smooth(_) => Err("the motion family `smooth` is not supported any more; calibrate again"),
-        }
+impl From<MotionTable> for MotionParams {
+    fn from(table: MotionTable) -> Self {
+        let MotionTable::OrnsteinUhlenbeck { rate_time_s, rate_sd_per_s, strain_mean, strain_sd } = table;
+        Self { rate_time_s, rate_sd_per_s, strain_mean, strain_sd }
     }
 }
 

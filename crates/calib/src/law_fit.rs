@@ -5,9 +5,7 @@ use crate::estimator_params::EstimatorKind;
 use crate::law_params::LawParams;
 use crate::law_regression::{BLOCKS, LawRegression};
 use crate::law_structure::LawStructure;
-use crate::law_uncertainty::law_uncertainty;
 use crate::optimise;
-use crate::params::Uncertainty;
 use crate::samples::Samples;
 
 /// What the fit of the law may choose from.
@@ -77,8 +75,6 @@ pub struct CrossFit {
     pub law: LawFit,
     /// Fitted without block k of every recording.
     pub without_block: Vec<LawFit>,
-    /// Standard errors of the law's parameters.
-    pub uncertainty: Uncertainty,
     /// Rows of the blocks, `blocks[recording][k]`.
     pub blocks: Vec<Vec<std::ops::Range<usize>>>,
 }
@@ -138,8 +134,7 @@ pub(crate) fn fit_laws(recordings: &[Samples], structures: &[LawOptions]) -> Res
 /// The best law for each ridge, strongest ridge first; at least one.
 fn fit_ridges(recordings: &[Samples], options: LawOptions) -> Result<Vec<CrossFit>, CalibrationError> {
     if options.branches > MOST_BRANCHES {
-        let message = format!("{} branches; at most {MOST_BRANCHES} are supported", options.branches);
-        return Err(CalibrationError::Unsupported(message));
+        return Err(CalibrationError::branches(options.branches));
     }
     let regression = LawRegression::new(recordings)?;
     let grid = TauGrid::new(&regression, options.branches);
@@ -159,12 +154,7 @@ fn cross_fit(
     let mut structure = polish(regression, gauge, &grid.best(ridge)?, ridge)?;
     structure.sort_branches();
     let without_block = (0..BLOCKS).map(|block| structure.fit(regression, Some(block))).collect::<Result<_, _>>()?;
-    Ok(CrossFit {
-        law: structure.fit(regression, None)?,
-        without_block,
-        uncertainty: law_uncertainty(&structure, regression)?,
-        blocks: regression.block_rows(),
-    })
+    Ok(CrossFit { law: structure.fit(regression, None)?, without_block, blocks: regression.block_rows() })
 }
 
 /// One structure with the least ridge.

@@ -7,6 +7,7 @@ use crate::blocks::BlockedNormal;
 use crate::design::{Regressors, StrainScale};
 use crate::law_fit::MOST_ROWS;
 use crate::motion_stats::MotionStats;
+use crate::order::median;
 use crate::params::RangeParams;
 use crate::robust_loss;
 use crate::samples::{Samples, check};
@@ -231,9 +232,7 @@ impl LawRegression {
 
 impl Recording {
     pub(crate) fn median_reading(&self) -> f64 {
-        let mut known: Vec<f64> = self.complete.iter().map(|&k| self.reading[k]).collect();
-        known.sort_by(f64::total_cmp);
-        known[known.len() / 2]
+        median(self.complete.iter().map(|&k| self.reading[k])).unwrap_or(f64::NAN)
     }
 }
 

@@ -62,7 +62,10 @@ impl<'a> Linearised<'a> {
         normal
     }
 
-    /// `A⁻¹ (Σ g_b g_bᵀ) A⁻¹`, g_b the gradient summed over a block of rows.
+    /// The block sandwich `A⁻¹ (Σ g_b g_bᵀ) A⁻¹`, g_b the gradient summed over a block of rows. Residuals of such laws are neither
+    /// white nor even, for which the usual `σ² A⁻¹` is several times too small.
+    ///
+    /// Source: Liang & Zeger, *Biometrika* 73 (1986) 13.
     fn sandwich(&self) -> Option<DMatrix<f64>> {
         let size = self.jacobian.ncols();
         let mut spread = DMatrix::zeros(size, size);
@@ -124,18 +127,6 @@ impl<'a> Linearised<'a> {
         let law = self.structure.law(self.regression, self.solution.weights.as_slice());
         in_own_units(&law, self.solution.weights[0] * self.solution.rest_readings[0], self.solution.weights[0])
     }
-}
-
-/// Standard errors of the law's parameters: the block sandwich of the penalised least squares, carried over to the law's
-/// own units. Residuals of such laws are neither white nor even, for which the usual `σ² A⁻¹` is several times too small.
-///
-/// Source: Liang & Zeger, *Biometrika* 73 (1986) 13.
-pub(crate) fn law_uncertainty(
-    structure: &LawStructure,
-    regression: &LawRegression,
-) -> Result<Uncertainty, CalibrationError> {
-    let fit = Linearised::new(structure, regression)?;
-    Ok(fit.uncertainty(&fit.sandwich().ok_or(CalibrationError::Singular)?))
 }
 
 /// Covariance of `physical(point)` from the covariance of `point`, to first order.

@@ -1,3 +1,4 @@
+use crate::order::median;
 use crate::samples::Samples;
 
 /// A strain within this share of the reference's span of zero is zero.
@@ -11,19 +12,13 @@ const ZERO: f64 = 0.01;
 pub(crate) fn rest_share(recordings: &[Samples], rest_readings: &[f64], span: f64) -> Option<f64> {
     let measured = recordings.iter().zip(rest_readings);
     let shares = measured.filter_map(|(samples, rest)| Some(reading_before_moving(samples, span)? / rest));
-    median(shares.collect())
+    median(shares)
 }
 
 /// Median reading of the first rows, those at zero strain before the first one that is not.
 fn reading_before_moving(samples: &Samples, span: f64) -> Option<f64> {
     let at_zero = samples.complete_rows().take_while(|&k| samples.strain[k].abs() <= ZERO * span);
-    median(at_zero.map(|k| samples.reading[k]).collect())
-}
-
-/// The middle value; `None` without any.
-fn median(mut values: Vec<f64>) -> Option<f64> {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied()
+    median(at_zero.map(|k| samples.reading[k]))
 }
 
 #[cfg(test)]

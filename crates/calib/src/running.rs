@@ -2,10 +2,9 @@ use std::collections::VecDeque;
 use std::mem;
 
 use ohmstrain_ekf::{
-    Estimate, Estimator, Gaussian, Guard, PastStep, Reading, Repeated, State, StepError, StrainSensor,
-    smooth_back_through,
+    Estimate, Estimator, Gaussian, Guard, PastStep, Reading, Repeated, State, StepError, smooth_back_through,
 };
-use ohmstrain_model::StrainRange;
+use ohmstrain_model::{StrainRange, SwitchedModel};
 
 use crate::filter::{Filter, Output, Rows, WayBack};
 use crate::sieve::Sieve;
@@ -13,9 +12,9 @@ use crate::stepper::{Moment, Seen, Stepper};
 use crate::way_back::Segments;
 
 /// An estimator with its state.
-pub(crate) struct Running<E: Estimator<f64, N, L>, S, const B: usize, const N: usize, const L: usize> {
+pub(crate) struct Running<E: Estimator<f64, N, L>, const B: usize, const N: usize, const L: usize> {
     pub stepper: Stepper<E, N, L>,
-    model: S,
+    model: SwitchedModel<f64, B, N>,
     interval: Interval,
     pub now: Moment<E::State>,
     pending: VecDeque<Pending<E::State, Repeated<E::Prepared>>>,
@@ -41,12 +40,11 @@ struct Pending<S, P> {
     onward: Option<PastStep<S, P, f64>>,
 }
 
-impl<E, S, const B: usize, const N: usize, const L: usize> Running<E, S, B, N, L>
+impl<E, const B: usize, const N: usize, const L: usize> Running<E, B, N, L>
 where
     E: Estimator<f64, N, L>,
-    S: StrainSensor<f64, B, N>,
 {
-    pub(crate) fn new(estimator: E, state: E::State, model: S, interval: Interval) -> Self {
+    pub(crate) fn new(estimator: E, state: E::State, model: SwitchedModel<f64, B, N>, interval: Interval) -> Self {
         let (pending, due) = (VecDeque::new(), Vec::new());
         let reading_variance = model.noise().reading_sd.powi(2);
         let stepper = Stepper::new(estimator, interval.sieve, reading_variance);
@@ -101,10 +99,9 @@ where
     }
 }
 
-impl<E, S, const B: usize, const N: usize, const L: usize> Filter for Running<E, S, B, N, L>
+impl<E, const B: usize, const N: usize, const L: usize> Filter for Running<E, B, N, L>
 where
     E: Estimator<f64, N, L, State: Send, Prepared: Send> + Send,
-    S: StrainSensor<f64, B, N> + Send,
 {
     fn guard(&mut self, guard: Guard<f64>) {
         self.stepper.guard = guard;

@@ -2,6 +2,7 @@ use std::fmt;
 
 use crate::CalibrationError;
 use crate::law_regression::LawRegression;
+use crate::order::median;
 use crate::robust_loss;
 use crate::samples::Samples;
 
@@ -188,10 +189,10 @@ fn spikes(values: &[f64]) -> Vec<(usize, f64, f64)> {
     let known: Vec<usize> = (0..values.len()).filter(|&k| values[k].is_finite()).collect();
     let Some(span) = span(values) else { return Vec::new() };
     let around: Vec<(f64, f64)> = (0..known.len())
-        .map(|i| {
+        .filter_map(|i| {
             let window = &known[i.saturating_sub(NEIGHBOURS)..(i + NEIGHBOURS + 1).min(known.len())];
-            let median = median(window.iter().map(|&k| values[k]).collect());
-            (median, self::median(window.iter().map(|&k| (values[k] - median).abs()).collect()))
+            let middle = median(window.iter().map(|&k| values[k]))?;
+            Some((middle, median(window.iter().map(|&k| (values[k] - middle).abs()))?))
         })
         .collect();
     let mut away: Vec<f64> = known.iter().zip(&around).map(|(&k, (median, _))| (values[k] - median).abs()).collect();
@@ -213,12 +214,6 @@ fn span(values: &[f64]) -> Option<f64> {
     let last = known.len().checked_sub(1)?;
     let at = |share: f64| known[(last as f64 * share).round() as usize];
     Some(at(SPAN.1) - at(SPAN.0))
-}
-
-/// The middle one of at least one value.
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values[values.len() / 2]
 }
 
 /// The law's squared error on blocks left out over that of a constant.

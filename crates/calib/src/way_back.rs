@@ -1,6 +1,6 @@
 use std::ops::Range;
 
-use ohmstrain_ekf::{Estimator, Reading, StepError, StrainSensor};
+use ohmstrain_ekf::{Estimator, Reading, StepError};
 
 use crate::filter::{Output, Rows, WayBack};
 use crate::running::Running;
@@ -11,8 +11,8 @@ use crate::stepper::{Moment, Seen, Taken};
 pub(crate) const SEGMENT: usize = 4096;
 
 /// The way back through a recording: every segment is filtered once more, from the state kept before its first row.
-pub(crate) struct Segments<'a, E: Estimator<f64, N, L>, S, const B: usize, const N: usize, const L: usize> {
-    running: &'a mut Running<E, S, B, N, L>,
+pub(crate) struct Segments<'a, E: Estimator<f64, N, L>, const B: usize, const N: usize, const L: usize> {
+    running: &'a mut Running<E, B, N, L>,
     rows: Rows<'a>,
     /// Where the filter was before the first row of each segment that is not smoothed yet.
     starts: Vec<Moment<E::State>>,
@@ -22,13 +22,12 @@ pub(crate) struct Segments<'a, E: Estimator<f64, N, L>, S, const B: usize, const
     steps: Vec<(Seen, Taken<E, N, L>)>,
 }
 
-impl<'a, E, S, const B: usize, const N: usize, const L: usize> Segments<'a, E, S, B, N, L>
+impl<'a, E, const B: usize, const N: usize, const L: usize> Segments<'a, E, B, N, L>
 where
     E: Estimator<f64, N, L>,
-    S: StrainSensor<f64, B, N>,
 {
     /// Filters the recording; the filter then stands at its end.
-    pub(crate) fn new(running: &'a mut Running<E, S, B, N, L>, rows: Rows<'a>) -> Result<Self, (usize, StepError)> {
+    pub(crate) fn new(running: &'a mut Running<E, B, N, L>, rows: Rows<'a>) -> Result<Self, (usize, StepError)> {
         let mut now = running.now.clone();
         let mut starts = Vec::with_capacity(rows.len() / SEGMENT + 1);
         for row in 0..rows.len() {
@@ -56,10 +55,9 @@ where
     }
 }
 
-impl<E, S, const B: usize, const N: usize, const L: usize> WayBack for Segments<'_, E, S, B, N, L>
+impl<E, const B: usize, const N: usize, const L: usize> WayBack for Segments<'_, E, B, N, L>
 where
     E: Estimator<f64, N, L>,
-    S: StrainSensor<f64, B, N>,
 {
     fn next_segment(&mut self, out: &mut Vec<Output>) -> Result<Option<Range<usize>>, (usize, StepError)> {
         out.clear();

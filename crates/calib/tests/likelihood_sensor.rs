@@ -2,7 +2,6 @@
 
 use ohmstrain_calib::likelihood::{
     Likelihood, ModelFamily, NoiseFit, NoiseParameter, NoiseProblem, NoiseStart, Parameter, Readings,
-    fit_noise_without_reference,
 };
 use ohmstrain_calib::{BranchParams, CalibrationError, GaugeParams, LawParams, MotionParams, NoiseParams, RangeParams};
 use ohmstrain_ekf::{Belief, StepError, Unscented};
@@ -82,10 +81,19 @@ fn start() -> NoiseStart {
     }
 }
 
+fn noise_of(
+    recordings: &[Readings],
+    law: &LawParams,
+    start: &NoiseStart,
+    free: &[NoiseParameter],
+) -> Result<NoiseFit, CalibrationError> {
+    NoiseProblem { recordings, law, start, free }.fit()
+}
+
 fn fit(seed: u64, rows: usize) -> NoiseFit {
     let (time_s, value) = simulate(seed, rows);
     let recordings = [Readings { time_s: &time_s, value: &value, extra_sd: &[] }];
-    fit_noise_without_reference(&recordings, &law(0.0), &start(), &FREE).unwrap()
+    noise_of(&recordings, &law(0.0), &start(), &FREE).unwrap()
 }
 
 #[test]
@@ -137,7 +145,7 @@ fn what_the_readings_do_not_say_is_warned_of() {
     let mut start = NoiseStart { noise: TRUE_NOISE, motion: TRUE_MOTION };
     // The simulated branch does not wander.
     start.noise.branch_sd = 1e-3;
-    let found = fit_noise_without_reference(&recordings, &law(0.0), &start, &[NoiseParameter::BranchSd]).unwrap();
+    let found = noise_of(&recordings, &law(0.0), &start, &[NoiseParameter::BranchSd]).unwrap();
     assert!(!found.warnings.is_empty() && found.warnings[0].contains("branch_sd"), "{found:?}");
     assert!(found.noise.branch_sd < 1e-3);
     assert_eq!(found.motion, start.motion);
@@ -240,9 +248,8 @@ fn errors_name_the_culprit() {
     let time_s = [0.0, 0.1, 0.2];
     let value = [0.3, f64::INFINITY, 0.3];
     let recordings = [Readings { time_s: &time_s, value: &value, extra_sd: &[] }];
-    let at = |recordings: &[Readings], free: &[NoiseParameter]| {
-        fit_noise_without_reference(recordings, &law(0.0), &start(), free).unwrap_err()
-    };
+    let at =
+        |recordings: &[Readings], free: &[NoiseParameter]| noise_of(recordings, &law(0.0), &start(), free).unwrap_err();
     let failed = |time_s: f64, error: StepError| CalibrationError::Filter { time_s, error };
     assert_eq!(at(&recordings, &FREE), failed(0.1, StepError::NonFiniteReading));
     let backwards = [Readings { time_s: &[0.0, 0.2, 0.1], value: &[0.3; 3], extra_sd: &[] }];
@@ -251,6 +258,6 @@ fn errors_name_the_culprit() {
     assert!(at(&recordings, &[NoiseParameter::BranchSd]).to_string().contains("branch_sd"));
     let mut five = law(0.0);
     five.branches = vec![five.branches[0]; 5];
-    let refused = fit_noise_without_reference(&recordings, &five, &start(), &FREE).unwrap_err();
+    let refused = noise_of(&recordings, &five, &start(), &FREE).unwrap_err();
     assert!(refused.to_string().contains("a law with 5 branches"), "{refused}");
 }

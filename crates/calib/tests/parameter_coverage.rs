@@ -159,22 +159,15 @@ fn intervals_without_the_ridge_hold_the_truth() {
 fn table_of_coverage() {
     const RECORDINGS: u64 = 300;
     let options = LawOptions { branches: 1, gauge: GaugeFamily::Polynomial };
-    let (mut without, mut with) = (Tally::default(), Tally::default());
+    let mut tally = Tally::default();
     for_each_recording(RECORDINGS, |samples| {
-        let fit = fit_law(&[*samples], options).unwrap();
-        with.add(&fit.uncertainty);
-        without.add(&identifiability(&[*samples], &fit.law.law).unwrap().parameters);
+        let law = fit_law(&[*samples], options).unwrap().law.law;
+        tally.add(&identifiability(&[*samples], &law).unwrap().parameters);
     });
-    println!(
-        "| parameter | truth | coverage | se / scatter | bias / scatter | with ridge: coverage | bias / scatter |"
-    );
-    println!("|---|---|---|---|---|---|---|");
-    for (i, name) in without.names.iter().enumerate() {
-        let (share, error, bias) = without.summary(i);
-        let (ridge_share, _, ridge_bias) = with.summary(i);
-        println!(
-            "| `{name}` | {} | {share:.1} % | {error:.2} | {bias:+.2} | {ridge_share:.1} % | {ridge_bias:+.1} |",
-            truth(name)
-        );
+    println!("| parameter | truth | coverage | se / scatter | bias / scatter |");
+    println!("|---|---|---|---|---|");
+    for (i, name) in tally.names.iter().enumerate() {
+        let (share, error, bias) = tally.summary(i);
+        println!("| `{name}` | {} | {share:.1} % | {error:.2} | {bias:+.2} |", truth(name));
     }
 }

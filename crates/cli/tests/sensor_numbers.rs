@@ -151,24 +151,3 @@ fn a_reversed_range_is_refused_where_it_stands() {
     let place = format!("changed.toml:{}: column 9", table + 3);
     run.fails(4, &format!("{place}: field `static_cubic.range.upper`: expected more than `lower`, 0.5, found {upper}"));
 }
-
-/// Sensor files had another family of motions once.
-#[test]
-fn a_smooth_motion_is_to_be_calibrated_again() {
-    let bench = Bench::calibrated();
-    let sensor = bench.read("sensor.toml");
-    let start = sensor.find("[estimators.ekf.motion]").unwrap();
-    let rest = start + sensor[start + 1..].find("\n[").unwrap();
-    let smooth = "[estimators.ekf.motion]\nfamily = \"smooth\"\nrate_sd_per_s = 0.03\nacceleration_sd_per_s2 = 0.1\n\
-                  strain_mean = 0.15\nstrain_sd = 0.1\n";
-    bench.write("smooth.toml", format!("{}{smooth}{}", &sensor[..start], &sensor[rest..]));
-    for command in ["filter", "smooth", "evaluate"] {
-        bench.run(&[command, "trace.csv", "--sensor", "smooth.toml"]).fails(
-            4,
-            &format!(
-                "smooth.toml:{}: column 1: the motion family `smooth` is not supported any more; calibrate again",
-                sensor[..start].lines().count() + 1
-            ),
-        );
-    }
-}

@@ -75,7 +75,6 @@ mod particles;
 #[cfg(feature = "record")]
 pub mod record;
 mod residual;
-mod sensor;
 mod smooth;
 mod sparse;
 mod sparse_series;
@@ -98,7 +97,6 @@ pub use mixture::{Dwell, Evidence, Hypotheses, Imm, Mixture, MixtureResidual, Ph
 #[cfg(feature = "particles")]
 pub use particles::{Particle, ParticleCloud, ParticleStep, Particles};
 pub use residual::{LogLikelihood, Residual};
-pub use sensor::StrainSensor;
 #[cfg(feature = "std")]
 pub use smooth::rts_smooth_vec;
 pub use smooth::{PastStep, rts_smooth, rts_step, smooth_back_through};

@@ -5,10 +5,11 @@ use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal, StandardUniform};
 
 use super::Fault;
+use crate::order::extent;
 
 /// Changes the readings of some rows; missing ones stay missing.
 pub(super) fn put_into(values: &mut [f64], rows: Range<usize>, fault: Fault, seed: u64) {
-    let (low, high) = range(values);
+    let (low, high) = extent(values.iter().copied().filter(|value| value.is_finite()));
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let mut by_chance = |share: f64| uniform(&mut random) < share;
     let before = values[..rows.start].iter().rev().find(|value| value.is_finite()).copied();
@@ -32,12 +33,6 @@ pub(super) fn put_into(values: &mut [f64], rows: Range<usize>, fault: Fault, see
             _ => *value,
         };
     }
-}
-
-/// Least and largest reading.
-fn range(values: &[f64]) -> (f64, f64) {
-    let known = values.iter().copied().filter(|value| value.is_finite());
-    known.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)))
 }
 
 /// Uniform in [0, 1).

@@ -1,5 +1,5 @@
 use crate::import::motion_fit::{Blocks, Motion, Pull};
-use crate::import::questions::median;
+use crate::order::median;
 
 /// Blocks of the jackknife.
 const BLOCKS: usize = 10;

@@ -1,13 +1,14 @@
 use crate::import::channel::{Channel, name};
 use crate::import::error::ImportError;
 use crate::import::number::number;
-use crate::import::questions::{median, quoted};
+use crate::import::questions::quoted;
 use crate::import::recipe::Recipe;
 use crate::import::roles::Role;
 use crate::import::stamp::{Order, has_points, orders};
 use crate::import::table::Table;
 use crate::import::units::{self, Unit};
 use crate::metadata::{ResistanceUnit, StrainUnit};
+use crate::order::median;
 
 /// Steps of times with fractions are taken for seconds up to this, s: slower than that, they may be milliseconds.
 const LONGEST_STEP_S: f64 = 2.0;

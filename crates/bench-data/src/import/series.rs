@@ -1,4 +1,4 @@
-use crate::import::questions::median;
+use crate::order::median;
 
 /// A gap of more typical steps is not bridged, unless the values on both sides are the same.
 const LONGEST_GAP: f64 = 10.0;

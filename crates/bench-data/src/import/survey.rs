@@ -2,7 +2,7 @@ use ohmstrain_model::Phase;
 
 use crate::import::align::{Offset, motion_offset, typical_step};
 use crate::import::build::Imported;
-use crate::import::questions::median;
+use crate::order::{extent, median};
 use crate::segment::{Segment, noise_sd, segment};
 
 /// A step longer than so many typical ones is a gap.
@@ -130,7 +130,7 @@ fn clock_survey(time_s: &[f64], duplicates: usize) -> ClockSurvey {
 fn channel_survey(time_s: &[f64], values: &[f64], quiet: &std::ops::Range<usize>) -> ChannelSurvey {
     let known: Vec<usize> = (0..values.len()).filter(|row| !values[*row].is_nan()).collect();
     let (times, numbers): (Vec<f64>, Vec<f64>) = known.iter().map(|row| (time_s[*row], values[*row])).unzip();
-    let (low, high) = numbers.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
+    let (low, high) = extent(numbers.iter().copied());
     ChannelSurvey {
         counts: (known.len(), values.len() - known.len()),
         range: (low, high),
@@ -199,7 +199,7 @@ fn longest_hold(time_s: &[f64], segments: &[Segment]) -> Option<std::ops::Range<
 /// From the first tenth of the readings at the least strain to the last.
 fn drift(readings: &[f64], reference: Option<&[f64]>) -> Option<f64> {
     let known = reference.map(|reference| reference.iter().copied().filter(|value| !value.is_nan()));
-    let range = known.map(|known| known.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x))));
+    let range = known.map(extent);
     let is_low = |row: usize| match (reference, range) {
         (Some(reference), Some((low, high))) => reference[row] <= low + LOWEST * (high - low),
         _ => true,

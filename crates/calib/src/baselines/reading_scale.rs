@@ -1,4 +1,5 @@
 use crate::CalibrationError;
+use crate::calibrate::reading_range;
 use crate::samples::Samples;
 
 /// Centre and half the range of the readings, so that what regressions see is between -1 and 1 where they were fitted.
@@ -11,9 +12,7 @@ pub(super) struct ReadingScale {
 impl ReadingScale {
     /// Over all rows with reading and strain. Readings that do not vary are an error.
     pub(super) fn of(recordings: &[Samples]) -> Result<Self, CalibrationError> {
-        let readings = recordings.iter().flat_map(|samples| samples.complete_rows().map(|k| samples.reading[k]));
-        let (low, high) = readings
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), reading| (low.min(reading), high.max(reading)));
+        let (low, high) = reading_range(recordings);
         if !(high > low) {
             return Err(CalibrationError::Singular);
         }

@@ -29,23 +29,6 @@ pub fn fit_closed_form(law: &dyn SeparableLaw, data: &[Datum]) -> Result<ClosedF
     problem.best_of(ranked.into_iter().map(|(_, start)| start))
 }
 
-/// The same from a start of one's own for the nonlinear parameters; limits of their search are widened to include it.
-///
-/// # Errors
-/// Too few readings, or a law that is not finite at the start.
-pub fn fit_closed_form_from(
-    law: &dyn SeparableLaw,
-    data: &[Datum],
-    start: &[f64],
-) -> Result<ClosedFormFit, ClosedFormError> {
-    let mut searches = law.search(&Extent::of(data));
-    for (search, start) in searches.iter_mut().zip(start) {
-        search.low = search.low.min(*start);
-        search.high = search.high.max(*start);
-    }
-    Problem::new(law, data, searches)?.best_of(std::iter::once(start.to_vec()))
-}
-
 /// A law, its data and where to look.
 struct Problem<'a> {
     law: &'a dyn SeparableLaw,

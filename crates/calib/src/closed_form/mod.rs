@@ -24,7 +24,7 @@ mod tunnelling;
 
 pub use catalogue::{ClosedForm, ModulusShape};
 pub use exponentials::{Burgers, Exponentials};
-pub use fit::{fit_closed_form, fit_closed_form_from};
+pub use fit::fit_closed_form;
 pub use law::{ClosedFormError, Datum, Derived, Moment, Movement, Parameter, SeparableLaw, Unit, value_and_gradient};
 pub use moving::{Hold, Moving};
 pub use moving_hold::MovingHold;
@@ -32,4 +32,4 @@ pub use pieces::{hold_data, moving_data, whole_data};
 pub use search::{Extent, Search};
 pub use statistics::{ClosedFormFit, Estimated};
 pub use stretched::StretchedExponential;
-pub use tunnelling::{TunnellingCurve, tunnelling_path};
+pub use tunnelling::TunnellingCurve;

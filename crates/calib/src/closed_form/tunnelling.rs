@@ -39,23 +39,3 @@ impl SeparableLaw for TunnellingCurve {
         slopes.copy_from_slice(&[at.strain * growth, at.strain * value, at.strain * at.strain * value]);
     }
 }
-
-/// Planck's constant, J s (exact in the SI of 2019).
-const PLANCK_J_S: f64 = 6.626_070_15e-34;
-/// Mass of the electron, kg (CODATA 2018).
-const ELECTRON_KG: f64 = 9.109_383_701_5e-31;
-/// An electron volt, J (exact in the SI of 2019).
-const ELECTRON_VOLT_J: f64 = 1.602_176_634e-19;
-
-/// Equation 3: resistance of one conducting path, `s exp(4π s √(2 m φ) / h)` up to a factor, in nm, for a gap s in nm and
-/// a barrier φ in eV; with its derivatives with respect to gap and barrier.
-///
-/// Source: Simmons, *J. Appl. Phys.* 34 (1963) 1793, low voltage.
-#[must_use]
-pub fn tunnelling_path(gap_nm: f64, barrier_ev: f64) -> (f64, [f64; 2]) {
-    let momentum = (2.0 * ELECTRON_KG * ELECTRON_VOLT_J * barrier_ev).sqrt();
-    let per_nm = 4.0 * std::f64::consts::PI * momentum / PLANCK_J_S * 1e-9;
-    let exponent = per_nm * gap_nm;
-    let value = gap_nm * exponent.exp();
-    (value, [(1.0 + exponent) * exponent.exp(), value * exponent / (2.0 * barrier_ev)])
-}

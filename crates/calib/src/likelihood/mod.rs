@@ -2,8 +2,8 @@
 //!
 //! [`Likelihood`] joins a family of models ([`ModelFamily`]), parameters and recordings. It gives the log-likelihood of
 //! the Kalman filter's innovations with exact gradient and Hessian on the logarithms of the parameters (hyper-dual
-//! numbers run through the same filter), the maximum, standard errors and profile intervals. [`NoiseProblem`] does it for a sensor whose law is known, and
-//! [`fit_noise_without_reference`] is the short form of it.
+//! numbers run through the same filter), the maximum, standard errors and profile intervals. [`NoiseProblem`] does it for a sensor
+//! whose law is known.
 //!
 //! The likelihood trusts the model. A law that is wrong by more than its noise says makes a filter overconfident, which
 //! readings alone do not show: where a reference exists, [`calibrate`](crate::calibrate) is better.
@@ -30,5 +30,5 @@ pub use fit::{Bound, FittedParameter, Likelihood, LikelihoodFit};
 pub use log_likelihood::{LogLikelihood, Readings};
 pub use noise_problem::NoiseProblem;
 pub use profile::ProfileInterval;
-pub use sensor::{NoiseFit, NoiseStart, fit_noise_without_reference};
+pub use sensor::{NoiseFit, NoiseStart};
 pub use sensor_family::NoiseParameter;

@@ -24,13 +24,27 @@ pub struct NoiseProblem<'a> {
     pub free: &'a [NoiseParameter],
 }
 
+/// Makes the likelihood of the size that a problem's law has and asks it.
+macro_rules! asked {
+    ($problem:expr, $likelihood:ident => $answer:expr) => {{
+        let (parameters, branches) = ($problem.parameters(), $problem.law.branches.len());
+        $crate::with_sizes!(branches, B, N, L => {
+            let family = &$problem.family::<B>()?;
+            let $likelihood = Likelihood::<_, N, L> { family, parameters: &parameters, recordings: $problem.recordings };
+            $answer
+        })
+        .unwrap_or_else(|| Err(CalibrationError::branches(branches)))
+    }};
+}
+
 impl NoiseProblem<'_> {
     /// The log-likelihood where the search starts.
     ///
     /// # Errors
     /// As [`Self::fit`].
     pub fn log_likelihood(&self) -> Result<LogLikelihood<f64>, CalibrationError> {
-        self.ask(AtStart)
+        let start: Vec<f64> = self.parameters().iter().map(|parameter| parameter.start).collect();
+        asked!(self, likelihood => likelihood.log_likelihood(&start))
     }
 
     /// The noise and motion that make the readings most likely.
@@ -41,7 +55,7 @@ impl NoiseProblem<'_> {
         if self.free.is_empty() {
             return Err(CalibrationError::Unsupported("no parameter is free".into()));
         }
-        let fit = self.ask(Maximum)?;
+        let fit = asked!(self, likelihood => maximum(&likelihood))?;
         let (noise, motion) = found(self.start, self.free, &fit);
         Ok(NoiseFit { noise, motion, warnings: warnings(&fit), fit })
     }
@@ -51,36 +65,16 @@ impl NoiseProblem<'_> {
     /// # Errors
     /// If the law is not supported.
     pub fn profile_interval(&self, fit: &LikelihoodFit, index: usize) -> Result<ProfileInterval, CalibrationError> {
-        self.ask(Profile { fit, index })
+        asked!(self, likelihood => Ok(likelihood.profile_interval(fit, index)))
     }
 
-    /// Makes the likelihood of the law's size and asks it.
-    fn ask<Q: Question>(&self, question: Q) -> Result<Q::Answer, CalibrationError> {
-        /// One instance per number of branches; N = B + 3, L = N (N + 1) / 2.
-        macro_rules! sized {
-            ($([$b:literal, $n:literal, $l:literal]),+) => {
-                match self.law.branches.len() {
-                    $($b => self.ask_family::<_, Q, $n, $l>(&self.family::<$b>()?, question),)+
-                    branches => Err(CalibrationError::Unsupported(format!(
-                        "a law with {branches} branches; the likelihood of readings has at most 4"
-                    ))),
-                }
-            };
-        }
-        sized!([0, 3, 6], [1, 4, 10], [2, 5, 15], [3, 6, 21], [4, 7, 28])
-    }
-
-    fn ask_family<F: ModelFamily<N, L>, Q: Question, const N: usize, const L: usize>(
-        &self,
-        family: &F,
-        question: Q,
-    ) -> Result<Q::Answer, CalibrationError> {
+    /// The parameters that are looked for, and where.
+    fn parameters(&self) -> Vec<Parameter> {
         let parameter = |free: &NoiseParameter| {
             let value = free.get(&self.start.noise, &self.start.motion);
             Parameter { name: free.name(), start: value, lower: value * 1e-3, upper: value * 1e3 }
         };
-        let parameters: Vec<Parameter> = self.free.iter().map(parameter).collect();
-        question.ask(&Likelihood::<F, N, L> { family, parameters: &parameters, recordings: self.recordings })
+        self.free.iter().map(parameter).collect()
     }
 
     fn family<const B: usize>(&self) -> Result<SensorFamily<'_, B>, CalibrationError> {
@@ -89,39 +83,11 @@ impl NoiseProblem<'_> {
     }
 }
 
-/// What is asked of a likelihood whose size is known at run time only.
-trait Question {
-    type Answer;
-
-    fn ask<F: ModelFamily<N, L>, const N: usize, const L: usize>(
-        self,
-        likelihood: &Likelihood<F, N, L>,
-    ) -> Result<Self::Answer, CalibrationError>;
-}
-
-struct AtStart;
-
-impl Question for AtStart {
-    type Answer = LogLikelihood<f64>;
-
-    fn ask<F: ModelFamily<N, L>, const N: usize, const L: usize>(
-        self,
-        likelihood: &Likelihood<F, N, L>,
-    ) -> Result<Self::Answer, CalibrationError> {
-        let start: Vec<f64> = likelihood.parameters.iter().map(|parameter| parameter.start).collect();
-        likelihood.log_likelihood(&start)
-    }
-}
-
 /// Searches across jumps at most, and Newton's steps in each; a dozen or two are usual where nothing jumps.
 const MOST_ROUNDS: usize = 3;
 const MOST_STEPS: usize = 40;
 /// Side of the simplex, in the logarithms, and its steps: a hundred cost what a few of Newton's do.
 const SIMPLEX: (f64, u64) = (0.3, 200);
-
-/// The likelihood jumps where the mean of a filter moves across a border of the law's range, at which the slope of the
-/// gains ends: Newton's method may stop at the edge. A simplex goes on from there, and Newton's method from where that ends.
-struct Maximum;
 
 /// The parameters, starting from the best point that a simplex finds around `from`.
 fn across_jumps<F: ModelFamily<N, L>, const N: usize, const L: usize>(
@@ -138,46 +104,27 @@ fn across_jumps<F: ModelFamily<N, L>, const N: usize, const L: usize>(
     Ok(likelihood.parameters.iter().zip(values).map(|(parameter, start)| Parameter { start, ..*parameter }).collect())
 }
 
-impl Question for Maximum {
-    type Answer = LikelihoodFit;
-
-    fn ask<F: ModelFamily<N, L>, const N: usize, const L: usize>(
-        self,
-        likelihood: &Likelihood<F, N, L>,
-    ) -> Result<Self::Answer, CalibrationError> {
-        let mut best = likelihood.fit_within(MOST_STEPS)?;
-        for _ in 0..MOST_ROUNDS {
-            if best.converged {
-                break;
-            }
-            let start = across_jumps(likelihood, &best)?;
-            let LikelihoodFit { iterations, .. } = best;
-            let next = Likelihood { parameters: &start, ..*likelihood }.fit_within(MOST_STEPS)?;
-            let risen = next.log_likelihood.value > best.log_likelihood.value;
-            if risen {
-                best = next.clone();
-            }
-            best.iterations = iterations + next.iterations;
-            if !risen {
-                break;
-            }
+/// The likelihood jumps where the mean of a filter moves across a border of the law's range, at which the slope of the
+/// gains ends: Newton's method may stop at the edge. A simplex goes on from there, and Newton's method from where that ends.
+fn maximum<F: ModelFamily<N, L>, const N: usize, const L: usize>(
+    likelihood: &Likelihood<F, N, L>,
+) -> Result<LikelihoodFit, CalibrationError> {
+    let mut best = likelihood.fit_within(MOST_STEPS)?;
+    for _ in 0..MOST_ROUNDS {
+        if best.converged {
+            break;
         }
-        Ok(best)
+        let start = across_jumps(likelihood, &best)?;
+        let LikelihoodFit { iterations, .. } = best;
+        let next = Likelihood { parameters: &start, ..*likelihood }.fit_within(MOST_STEPS)?;
+        let risen = next.log_likelihood.value > best.log_likelihood.value;
+        if risen {
+            best = next.clone();
+        }
+        best.iterations = iterations + next.iterations;
+        if !risen {
+            break;
+        }
     }
-}
-
-struct Profile<'a> {
-    fit: &'a LikelihoodFit,
-    index: usize,
-}
-
-impl Question for Profile<'_> {
-    type Answer = ProfileInterval;
-
-    fn ask<F: ModelFamily<N, L>, const N: usize, const L: usize>(
-        self,
-        likelihood: &Likelihood<F, N, L>,
-    ) -> Result<Self::Answer, CalibrationError> {
-        Ok(likelihood.profile_interval(self.fit, self.index))
-    }
+    Ok(best)
 }

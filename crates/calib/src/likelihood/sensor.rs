@@ -1,7 +1,5 @@
-use super::{LikelihoodFit, NoiseParameter, NoiseProblem, Readings};
-use crate::CalibrationError;
+use super::{LikelihoodFit, NoiseParameter};
 use crate::estimator_params::{EstimatorParams, MotionParams, NoiseParams};
-use crate::law_params::LawParams;
 use crate::samples::usual_step_s;
 
 /// Noise and motion to start from; what is not moved stays as it is here.
@@ -40,22 +38,6 @@ pub struct NoiseFit {
 /// A logarithm known no better than this is a parameter about which the readings say next to nothing: a 95 % interval
 /// from a fiftieth to fifty times the value.
 const LEAST_SURE: f64 = 2.0;
-
-/// Maximises the likelihood of readings `R/R₀ - 1` under the extended Kalman filter of a known law over the parameters in
-/// `free`, from a thousandth to a thousand times where they start.
-///
-/// The strain is not needed. In exchange the law is trusted: its error goes into whatever noise fits it best.
-///
-/// # Errors
-/// If nothing is free, a free parameter starts at zero, the law has more than four branches, or the filter fails.
-pub fn fit_noise_without_reference(
-    recordings: &[Readings],
-    law: &LawParams,
-    start: &NoiseStart,
-    free: &[NoiseParameter],
-) -> Result<NoiseFit, CalibrationError> {
-    NoiseProblem { recordings, law, start, free }.fit()
-}
 
 pub(super) fn found(start: &NoiseStart, free: &[NoiseParameter], fit: &LikelihoodFit) -> (NoiseParams, MotionParams) {
     let value = |parameter: NoiseParameter| {

@@ -7,7 +7,7 @@ use crate::design::StrainScale;
 use crate::law_fit::{CrossFit, LawFit};
 use crate::law_regression::{BLOCKS, Design, LawRegression};
 use crate::law_structure::LawStructure;
-use crate::params::{RangeParams, Uncertainty};
+use crate::params::RangeParams;
 use crate::samples::{Samples, usual_step_s};
 
 /// The law of one more sensor of the make: a cubic gauge and branches whose time constants are the make's.
@@ -45,12 +45,7 @@ impl LawPrior {
         let regression = LawRegression::on_scale(recordings, self.scale(), self.range)?;
         let problem = Posterior::new(self, &regression, row_step_s(recordings, &regression))?;
         let without_block = (0..BLOCKS).map(|block| problem.fit(Some(block))).collect::<Result<_, _>>()?;
-        Ok(CrossFit {
-            law: problem.fit(None)?,
-            without_block,
-            uncertainty: Uncertainty { names: vec![], values: vec![], standard_errors: vec![], covariance: vec![] },
-            blocks: regression.block_rows(),
-        })
+        Ok(CrossFit { law: problem.fit(None)?, without_block, blocks: regression.block_rows() })
     }
 }
 

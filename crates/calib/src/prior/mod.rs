@@ -76,11 +76,9 @@ impl Prior {
     }
 }
 
-/// The middle one, the upper one of two; zero without any.
+/// The middle one; zero without any.
 fn median(values: impl IntoIterator<Item = f64>) -> f64 {
-    let mut sorted: Vec<f64> = values.into_iter().collect();
-    sorted.sort_by(f64::total_cmp);
-    sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
+    crate::order::median(values).unwrap_or(0.0)
 }
 
 #[cfg(test)]

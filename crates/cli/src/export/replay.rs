@@ -1,6 +1,6 @@
 //! A recording through the exported program's twin.
 
-use ohmstrain_calib::SensorParams;
+use ohmstrain_calib::{SensorParams, with_sizes};
 use ohmstrain_ekf::{Reading, Real};
 use ohmstrain_model::SwitchedModel;
 
@@ -38,14 +38,8 @@ pub struct Said<T = f32> {
 /// See [`ExportError`].
 pub fn replay(params: &SensorParams, plan: &Plan, dt_s: f64, rows: &[ReplayedRow]) -> Result<Vec<Said>, ExportError> {
     let filter = ChipFilter::new(params, plan)?;
-    match params.law.branches.len() {
-        0 => of::<0, 3, 6>(params, &filter, dt_s, rows),
-        1 => of::<1, 4, 10>(params, &filter, dt_s, rows),
-        2 => of::<2, 5, 15>(params, &filter, dt_s, rows),
-        3 => of::<3, 6, 21>(params, &filter, dt_s, rows),
-        4 => of::<4, 7, 28>(params, &filter, dt_s, rows),
-        _ => Err(too_many_branches()),
-    }
+    with_sizes!(params.law.branches.len(), B, N, L => of::<B, N, L>(params, &filter, dt_s, rows))
+        .unwrap_or_else(|| Err(too_many_branches()))
 }
 
 fn of<const B: usize, const N: usize, const L: usize>(

@@ -1,6 +1,6 @@
-use ohmstrain_model::{MOTION_STATES, Phase, Scalar, StrainRange};
+use ohmstrain_model::{MOTION_STATES, Phase, Scalar, StrainRange, SwitchedModel};
 
-use crate::{Belief, Gaussian, Real, State, StrainSensor};
+use crate::{Belief, Gaussian, Real, State};
 
 /// What a user wants to know, with standard deviations.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,7 +31,7 @@ impl<T: Real> Estimate<T> {
     /// `strain_sd_scale` multiplies the strain's standard deviation (1 for none), as a calibration found it necessary.
     #[must_use]
     pub fn new<S: State<T, N, L>, const B: usize, const N: usize, const L: usize>(
-        model: &impl StrainSensor<T, B, N>,
+        model: &SwitchedModel<T, B, N>,
         state: &S,
         limits: &StrainRange<T>,
         strain_sd_scale: T,
@@ -59,7 +59,7 @@ impl<T: Real> Estimate<T> {
             strain,
             rate,
             relaxation: relaxation::<T, B, N, L>(belief),
-            baseline: if model.has_baseline() { belief.mean[MOTION_STATES + B] } else { T::zero() },
+            baseline: if N > MOTION_STATES + B { belief.mean[MOTION_STATES + B] } else { T::zero() },
             settled: Gaussian { mean: settled.0, variance: spread + wander },
             beyond_border,
             near_ramp_border: near_ramp_border(model, belief, &strain, &rate),
@@ -85,7 +85,7 @@ const NEAR: f64 = 2.0;
 /// Whether the reading has an extremum along the present movement, dρ/dt = 0, within two deviations of the strain. A body
 /// whose rate cannot be told from zero is on no ramp.
 fn near_ramp_border<T: Scalar, const B: usize, const N: usize, const L: usize>(
-    model: &impl StrainSensor<T, B, N>,
+    model: &SwitchedModel<T, B, N>,
     belief: &Belief<T, N, L>,
     strain: &Gaussian<T>,
     rate: &Gaussian<T>,

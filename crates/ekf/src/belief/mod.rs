@@ -7,10 +7,10 @@ pub use estimate::Estimate;
 pub use gaussian::{Gaussian, Real};
 
 use nalgebra::SVector;
-use ohmstrain_model::{Scalar, Symmetric};
+use ohmstrain_model::{Scalar, SwitchedModel, Symmetric};
 
 use crate::ekf::pinned;
-use crate::{State, StepError, StrainSensor};
+use crate::{State, StepError};
 
 /// What is known of the state: mean and covariance of a Gaussian. `L = N (N + 1) / 2`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,7 +36,7 @@ impl<T: Scalar, const N: usize, const L: usize> Belief<T, N, L> {
 
     /// Before any reading: the model's long-run distribution.
     #[must_use]
-    pub fn initial<const B: usize>(model: &impl StrainSensor<T, B, N>) -> Self {
+    pub fn initial<const B: usize>(model: &SwitchedModel<T, B, N>) -> Self {
         let (mean, variance) = model.initial_distribution();
         Self::independent(mean, &variance)
     }

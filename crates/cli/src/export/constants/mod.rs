@@ -4,7 +4,7 @@ mod kernel;
 mod readings;
 
 use ohmstrain::KNOWN_BEYOND;
-use ohmstrain_calib::{EstimatorKind, PortableFilter, Quantity, ReadingUnit, SensorParams};
+use ohmstrain_calib::{EstimatorKind, PortableFilter, Quantity, ReadingUnit, SensorParams, with_sizes};
 use ohmstrain_ekf::Belief;
 use ohmstrain_ekf::record::shared;
 use serde::Serialize;
@@ -111,14 +111,9 @@ impl Exported {
         promise: &[String],
     ) -> Result<Self, ExportError> {
         let filter = ChipFilter::new(params, plan)?;
-        let mut exported = match params.law.branches.len() {
-            0 => Self::of::<0, 3, 6>(params, &filter, made_by, dt_s),
-            1 => Self::of::<1, 4, 10>(params, &filter, made_by, dt_s),
-            2 => Self::of::<2, 5, 15>(params, &filter, made_by, dt_s),
-            3 => Self::of::<3, 6, 21>(params, &filter, made_by, dt_s),
-            4 => Self::of::<4, 7, 28>(params, &filter, made_by, dt_s),
-            _ => Err(too_many_branches()),
-        }?;
+        let of_size =
+            with_sizes!(params.law.branches.len(), B, N, L => Self::of::<B, N, L>(params, &filter, made_by, dt_s));
+        let mut exported = of_size.unwrap_or_else(|| Err(too_many_branches()))?;
         exported.promise = promise.to_vec();
         Ok(exported)
     }
