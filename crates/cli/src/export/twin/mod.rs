@@ -14,9 +14,6 @@ use super::moving::Moving;
 pub use parts::{Numbers, Parts, PhaseParts, flag, number};
 use seen::Seen;
 
-/// The most tries with more noise after a reading was refused, and the growth of its noise; as `SparseEkf`.
-const MOST_TRIES: u32 = 12;
-const COARSER: f64 = 16.0;
 /// Into how many steps an interval is divided at most.
 const MOST_STEPS: u32 = 128;
 
@@ -185,31 +182,21 @@ impl<'a, T: Real, const B: usize, const N: usize, const L: usize, const K: usize
         count
     }
 
-    /// Takes a reading, with more and more noise where it is refused; flags, and its normalised
-    /// innovation squared as it came.
+    /// Takes a reading, unless it is refused; flags, and its normalised innovation squared as it came.
     fn taken(&mut self, reading: Option<Reading<T>>) -> Result<(u32, T), StepError> {
-        self.work[usize::from(reading.is_none())] += self.now.moving.count();
-        let Some(mut reading) = reading else {
-            self.now.moving.step(None)?;
-            return Ok((0, T::zero()));
-        };
-        for _ in 0..=MOST_TRIES {
-            let count = self.now.moving.count();
+        let count = self.now.moving.count();
+        self.work[usize::from(reading.is_none())] += count;
+        let mut refused = 0;
+        if let Some(reading) = reading {
             if let Ok(taken) = self.now.moving.take(reading) {
                 // What surprises is taken twice.
                 self.work[0] += if taken.0 == 0 { 0 } else { count };
                 return Ok(taken);
             }
-            let rounding = T::default_epsilon() * T::default_epsilon();
-            let noise = reading.extra_variance + self.now.seen.reading_variance() + rounding;
-            if !(reading.value * reading.value / noise).is_finite() {
-                break;
-            }
-            reading.extra_variance = T::of(COARSER) * noise;
-            self.work[0] += count;
+            refused = flag::REJECTED;
         }
         self.now.moving.step(None)?;
-        Ok((flag::REJECTED, T::zero()))
+        Ok((refused, T::zero()))
     }
 
     /// The filter's strain, moved into the limits.

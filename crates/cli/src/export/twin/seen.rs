@@ -22,14 +22,6 @@ impl<T: Real> Seen<T> {
         Self { sieve, reading_variance, last: None, since_s: T::zero(), repeated_s: T::zero(), count: 0 }
     }
 
-    /// Variance of the model's own noise.
-    pub const fn reading_variance(&self) -> T
-    where
-        T: Copy,
-    {
-        self.reading_variance
-    }
-
     /// Time has passed, s.
     pub fn pass(&mut self, dt_s: T) {
         self.since_s += dt_s;
