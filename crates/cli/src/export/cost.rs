@@ -5,7 +5,7 @@
 //! of all kinds (arm-none-eabi-gcc 12.2, -O2 -fno-math-errno), which checks in turn that no estimate is further than a
 //! tenth from what it counts.
 
-use ohmstrain_calib::{EstimatorKind, GaugeParams, LawParams, SensorParams};
+use ohmstrain_calib::{EstimatorKind, GaugeParams, LawParams, SensorParams, with_sizes};
 use ohmstrain_ekf::correction::{FEATURES, OUTPUTS, TIME_CONSTANTS_S};
 use serde::Serialize;
 
@@ -129,14 +129,8 @@ impl Cost {
 /// If it has no exported form.
 pub fn cost(params: &SensorParams, plan: &Plan, dt_s: f64) -> Result<Cost, ExportError> {
     let chip = ChipFilter::new(params, plan)?;
-    let work = match params.law.branches.len() {
-        0 => work_of::<0, 3, 6>(params, &chip, dt_s),
-        1 => work_of::<1, 4, 10>(params, &chip, dt_s),
-        2 => work_of::<2, 5, 15>(params, &chip, dt_s),
-        3 => work_of::<3, 6, 21>(params, &chip, dt_s),
-        4 => work_of::<4, 7, 28>(params, &chip, dt_s),
-        _ => Err(too_many_branches()),
-    }?;
+    let work = with_sizes!(params.law.branches.len(), B, N, L => work_of::<B, N, L>(params, &chip, dt_s));
+    let work = work.unwrap_or_else(|| Err(too_many_branches()))?;
     Ok(Cost::of(&params.law, &chip, work))
 }
 
