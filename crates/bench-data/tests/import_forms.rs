@@ -314,6 +314,122 @@ fn what_nothing_decides_is_asked_with_the_answer() {
     asks(&[("a.csv", &back)], &nothing, &["a.csv:64", "expected a time after 5.917 s, found 1.067 s"]);
 }
 
+/// Three cells with commas between them: s, Ω, percent.
+fn seconds_ohms_percent(ms: i64, ohm: i64, strain: i64) -> String {
+    format!("{},{},{}", decimal(ms, 3, '.'), decimal(ohm, 1, '.'), decimal(strain, 2, '.'))
+}
+
+#[test]
+fn words_beside_numbers_above_the_names_are_no_data() {
+    let names = "Time (s),R (Ohm),Strain (%)\n";
+    for above in ["Sample,7,\nDate,2024-05-13,\n", "Channels,2,\nX0,0.0,0.0\n***End***\n\n", "sep=,\n"] {
+        is_imported("above.csv", file(&format!("{above}{names}"), seconds_ohms_percent), &Recipe::default());
+    }
+    // LabVIEW has a name for remarks, and rows without them.
+    let above = "Separator\tTab\nX0\t0.0\t0.0\n***End_of_Header***\nX_Value\tR (Ohm)\tStrain (%)\tComment\n";
+    let row = |ms, ohm, strain| seconds_ohms_percent(ms, ohm, strain).replace(',', "\t");
+    is_imported("rig.lvm", file(above, row), &Recipe::default());
+    // R's write.table has a cell for the number of the row, and no name for it.
+    let row = |ms, ohm, strain| {
+        format!("\"{}\" {}", (ms - 200) / 50, seconds_ohms_percent(ms, ohm, strain).replace(',', " "))
+    };
+    is_imported("frame.txt", file("\"time_s\" \"R_ohm\" \"strain_percent\"\n", row), &Recipe::default());
+    // Neither is a first row that lacks its last cell the header's end.
+    let row = |ms, ohm, strain| {
+        let row = seconds_ohms_percent(ms, ohm, strain);
+        if ms == 250 { row[..row.rfind(',').unwrap()].to_owned() } else { row }
+    };
+    let (_, imported) = proposed(&[("short.csv", file(names, row).into())], &Recipe::default()).unwrap();
+    assert_eq!(imported.trace.readings.values, truth().ohm());
+    assert!(imported.trace.reference.unwrap().values[0].is_nan());
+    assert!(imported.remarks.iter().any(|remark| remark.contains("1 row with fewer cells")), "{:?}", imported.remarks);
+}
+
+#[test]
+fn what_stands_behind_the_data_is_passed_over_and_said() {
+    let text = file("Time (s),R (Ohm),Strain (%)\n", seconds_ohms_percent);
+    for (behind, said) in [
+        ("End of data\n", "1 line among or behind the data passed over, which is line 62"),
+        (
+            "\nMax R,1700\nMean,1650.2,20.1\n",
+            "2 lines among or behind the data passed over, of which the first is line 63",
+        ),
+        // Cut in the middle of a number.
+        ("3.3,16", "1 line among or behind the data passed over, which is line 62"),
+    ] {
+        let imported = is_imported("behind.csv", format!("{text}{behind}"), &Recipe::default());
+        assert!(imported.remarks.iter().any(|remark| remark.contains(said)), "{behind}: {:?}", imported.remarks);
+    }
+}
+
+#[test]
+fn a_serial_line_begins_with_garbage() {
+    let text = file("millis,R_ohm,strain_percent\n", |ms, ohm, strain| {
+        format!("{ms},{},{}", decimal(ohm, 1, '.'), decimal(strain, 2, '.'))
+    });
+    for garbage in [b"\0\0\xf0x\xe0\r\nready\r\n".as_slice(), b"\xff\x80,16\r\n"] {
+        is_imported("serial.log", [garbage, text.as_bytes()].concat(), &Recipe::default());
+    }
+    let binary: Vec<u8> = (0..2000_u32).map(|k| (k * k % 7) as u8).collect();
+    assert!(tables(&[("a.bin", binary)], &Recipe::default()).unwrap_err().to_string().contains("binary data"));
+}
+
+#[test]
+fn clocks_of_spreadsheets_scanners_and_computers() {
+    let rest = |ohm, strain| format!("{},{}", decimal(ohm, 1, '.'), decimal(strain, 2, '.'));
+    let since: Vec<f64> = truth().time_ms.iter().map(|ms| (ms - 250) as f64 / 1e3).collect();
+    type Clock<'a> = (&'a str, &'a dyn Fn(i64) -> String);
+    let forms: [Clock; 2] = [
+        ("minutes", &|ms| format!("59:{}", decimal(50_000 + ms, 3, '.'))),
+        ("thousandths", &|ms| format!("05/13/2024 10:00:{:02}:{:03}", ms / 1000, ms % 1000)),
+    ];
+    for (name, clock) in forms {
+        let text = file("Time,R_ohm,strain_pct\n", |ms, ohm, strain| format!("{},{}", clock(ms), rest(ohm, strain)));
+        let (_, imported) = proposed(&[(name, text.into())], &Recipe::default()).unwrap();
+        assert_eq!(imported.trace.time_s, since, "{name}");
+    }
+    let epoch = |ms| 1_715_594_400_000 + ms;
+    let text = file("timestamp,R_ohm,strain_pct\n", |ms, ohm, strain| {
+        format!("{},{}", decimal(epoch(ms), 3, '.'), rest(ohm, strain))
+    });
+    let (_, imported) = proposed(&[("epoch", text.into())], &Recipe::default()).unwrap();
+    // Numbers of that size are 2.4e-7 apart.
+    assert!(imported.trace.time_s.iter().zip(&since).all(|(found, expected)| (found - expected).abs() < 2.4e-7));
+    // A spreadsheet's days are not taken for seconds.
+    let text = file("Time,R_ohm,strain_pct\n", |ms, ohm, strain| {
+        format!("{:.10},{}", 45_425.0 + ms as f64 / 86_400e3, rest(ohm, strain))
+    });
+    asks(&[("days", &text)], &Recipe::default(), &["column `Time`", "its unit is not known", "--unit time=days"]);
+    let known = Recipe { units: vec![("time".parse().unwrap(), "days".to_owned())], ..Recipe::default() };
+    let (_, imported) = proposed(&[("days", text.into())], &known).unwrap();
+    let span = imported.trace.time_s.last().unwrap() - imported.trace.time_s[0];
+    // Ten decimals of a day are 9 µs.
+    assert!((span - since.last().unwrap()).abs() < 9e-6, "{span}");
+}
+
+#[test]
+fn what_is_no_resistance_and_what_has_no_reference_is_said() {
+    let nothing = Recipe::default();
+    let volts = file("Time (s),Output (V),Strain (%)\n", seconds_ohms_percent);
+    let known = |role: &str| Recipe {
+        columns: vec![(role.parse().unwrap(), "Output (V)".parse().unwrap())],
+        ..nothing.clone()
+    };
+    asks(&[("a.csv", &volts)], &known("resistance"), &["a.csv", "volts are not read", "--column adc=NAME"]);
+    let united = file("Time,R,Strain\n", |ms, ohm, _| format!("{} s,{ohm} Ohm,1 %", decimal(ms, 3, '.')));
+    asks(&[("a.csv", &united)], &nothing, &["cells like `3.2", "take units"]);
+    let sentinel = file("Time (s),R (Ohm)\n", |ms, ohm, _| {
+        format!("{},{}", decimal(ms, 3, '.'), if ms % 13 == 0 { "-999".to_owned() } else { decimal(ohm, 1, '.') })
+    });
+    asks(&[("a.csv", &sentinel)], &nothing, &["found -999", "--magnitude resistance", "--missing -999"]);
+    let length = file("Time (s),R (Ohm),Length (mm)\n", seconds_ohms_percent);
+    let (_, imported) = proposed(&[("a.csv", length.clone().into())], &nothing).unwrap();
+    let said = "--column 'displacement=Length (mm)'";
+    assert!(imported.remarks.iter().any(|remark| remark.contains(said)), "{:?}", imported.remarks);
+    let told = Recipe { columns: vec![("strain".parse().unwrap(), "none".parse().unwrap())], ..nothing };
+    assert!(proposed(&[("a.csv", length.into())], &told).unwrap().1.remarks.is_empty());
+}
+
 /// The rig's irregular steps, s.
 const STEPS: [f64; 5] = [0.08, 0.08, 0.08, 0.125, 0.19];
 

@@ -9,6 +9,7 @@ use crate::import::clock::Times;
 use crate::import::digits::{DIGITS, rounded, told_apart};
 use crate::import::error::ImportError;
 use crate::import::plan::Plan;
+use crate::import::questions::quoted;
 use crate::import::recipe::Align;
 use crate::import::roles::Role;
 use crate::import::series::{Series, folded, spurious_zeros};
@@ -42,6 +43,7 @@ pub(crate) fn build(plan: &Plan, tables: &[Table]) -> Result<Imported, ImportErr
     let reference = work.reference(&readings, zero.as_ref().map(|(zero, _)| *zero))?;
     let temperature = work.temperature(&readings)?;
     work.mention_unused();
+    work.mention_passed_over();
     let metadata = work.metadata(zero.map(|(_, text)| text));
     let trace = work.trace(&metadata, &readings, reference.as_deref(), temperature.as_deref())?;
     let Work { remarks, offset, duplicates, alternation, .. } = work;
@@ -126,12 +128,19 @@ impl Work<'_> {
     fn positive(&self, channel: &Channel, values: Vec<f64>) -> Result<Vec<f64>, ImportError> {
         let table = &self.tables[channel.table];
         let Some(row) = values.iter().position(|value| *value <= 0.0) else { return Ok(values) };
-        let flag = if values[row] < 0.0 { "magnitude" } else { "drop-zeros" };
-        let why = if values[row] < 0.0 { "if signs are arbitrary" } else { "if zeros are missing values" };
+        let cell = table.columns[channel.column].cells.get(row);
+        let answers = if values[row] < 0.0 {
+            vec![
+                format!("--magnitude {} if signs are arbitrary", channel.role),
+                format!("--missing {} if it means a missing value", quoted(cell)),
+            ]
+        } else {
+            vec![format!("--drop-zeros {} if zeros are missing values", channel.role)]
+        };
         let (column, found) = (name(table, channel.column), rounded(values[row], DIGITS));
         let what = format!("column {column}: expected a positive resistance, found {found}");
         let place = format!("{}:{}", table.file, table.lines[row]);
-        Err(ImportError::question(&place, what, [format!("--{flag} {} {why}", channel.role)]))
+        Err(ImportError::question(&place, what, answers))
     }
 
     /// Rows in the order of time: those without a time and repeated ones are left out.
@@ -144,7 +153,8 @@ impl Work<'_> {
                 Some(&last) if time == last => repeated += 1,
                 Some(&last) if time < last => {
                     let (last, time) = told_apart(last, time);
-                    let fault = Fault::new(format!("a time after {last} s"), format!("{time} s"));
+                    let found = format!("{time} s; if another recording begins here, make two files of them");
+                    let fault = Fault::new(format!("a time after {last} s"), found);
                     return Err(ImportError::content(&of.file, of.lines[row], fault));
                 }
                 _ => series.push(time, value, row),
@@ -208,7 +218,8 @@ impl Work<'_> {
             ImportError::question(&files.join(", "), format!("--align motion: {error}"), ["--align SECONDS".to_owned()])
         })?;
         self.remarks.push(format!(
-            "{}: the reference's clock plus {:.3} ± {:.3} s is the readings', by the motion",
+            "{}: the reference's clock plus {:.3} ± {:.3} s is the readings', by the motion; a lag of the sensor \
+             itself is in it",
             files.join(", "),
             offset.seconds,
             offset.sd_s
@@ -234,6 +245,25 @@ impl Work<'_> {
         used.extend(self.plan.reference.iter().map(|(channel, _)| of(channel)));
         for table in (0..self.tables.len()).filter(|table| !used.contains(table)).collect::<Vec<_>>() {
             self.remark(table, "nothing is taken from this file");
+        }
+    }
+
+    /// Lines that are no rows, and rows that lack cells.
+    fn mention_passed_over(&mut self) {
+        for (index, table) in self.tables.iter().enumerate() {
+            let layout = &table.layout;
+            if let Some(line) = layout.first_text_line {
+                let lines = counted(layout.text_lines, "line");
+                let which = if layout.text_lines > 1 { "of which the first is" } else { "which is" };
+                self.remark(index, &format!("{lines} among or behind the data passed over, {which} line {line}"));
+            }
+            if layout.short_lines > 0 {
+                let rows = counted(layout.short_lines, "row");
+                self.remark(
+                    index,
+                    &format!("{rows} with fewer cells than there are columns: the last ones are taken for missing"),
+                );
+            }
         }
     }
 

@@ -1,10 +1,15 @@
 use crate::error::{Fault, quote};
 use crate::import::channel::{Channel, Values, name};
 use crate::import::error::ImportError;
-use crate::import::stamp::{Order, past_midnight, stamp};
+use crate::import::stamp::{DAY, Order, past_midnight, stamp};
 use crate::import::table::Table;
 use crate::import::units::Scale;
 
+/// Times from here on, s, are no time since a recording began, but since 1970, or, in days, since the end of 1899.
+const DATES_FROM_S: f64 = 1e8;
+/// Days from the first of the calendar to these.
+const UNIX_DAY: i128 = 719_163;
+const SHEET_DAY: i128 = 693_594;
 /// Range of a 32-bit counter.
 const WRAP: f64 = 4_294_967_296.0;
 
@@ -31,7 +36,7 @@ impl Clock {
 /// Times of a table's rows.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Times {
-    /// s; NaN where missing. Dates and times of day are counted from the first.
+    /// s; NaN where missing. Dates, times of day and times since 1970 are counted from the first.
     pub seconds: Vec<f64>,
     /// The first date or time of day, ns, and as it stands in the file.
     pub zero: Option<(i128, String)>,
@@ -55,6 +60,13 @@ impl Times {
 
 fn counts(table: &Table, channel: &Channel, own_missing: &[String]) -> Result<Times, ImportError> {
     let Values { values: mut seconds, .. } = Values::read(table, channel, own_missing)?;
+    if let Some(row) = seconds.iter().position(|time| !time.is_nan()).filter(|row| seconds[*row] >= DATES_FROM_S) {
+        let (first, day) = (seconds[row], if channel.unit.name == "days" { SHEET_DAY } else { UNIX_DAY });
+        let zero = day * DAY + (first * 1e9) as i128;
+        seconds.iter_mut().for_each(|time| *time -= first);
+        let text = table.columns[channel.column].cells.get(row).to_owned();
+        return Ok(Times { seconds, zero: Some((zero, text)), wraps: 0 });
+    }
     let wrap_s = match channel.unit.name {
         "ms" => WRAP / 1e3,
         "us" => WRAP / 1e6,

@@ -44,7 +44,14 @@ impl Separator {
 /// A file as lines of cells, however they are kept.
 pub(crate) enum Grid<'a> {
     /// Lines of text with their numbers in the file.
-    Text { lines: Vec<(u64, &'a str)>, separator: Separator, labels: Vec<String>, monitor: bool },
+    Text {
+        lines: Vec<(u64, &'a str)>,
+        separator: Separator,
+        labels: Vec<String>,
+        monitor: bool,
+        /// The last line has no end: it may have been cut.
+        is_open: bool,
+    },
     /// Cells of a sheet, with their rows in it.
     Sheet(Vec<(u64, Vec<String>)>),
 }
@@ -71,7 +78,7 @@ impl Grid<'_> {
     pub(crate) fn cells(&self, row: usize) -> Vec<Cow<'_, str>> {
         match self {
             Self::Sheet(rows) => rows[row].1.iter().map(|cell| Cow::from(cell.trim())).collect(),
-            Self::Text { lines, separator, labels, monitor } => {
+            Self::Text { lines, separator, labels, monitor, .. } => {
                 let line = lines[row].1;
                 match (monitor, line.split_once(ARROW)) {
                     (true, Some((clock, rest))) => {

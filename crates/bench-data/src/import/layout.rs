@@ -8,6 +8,8 @@ use crate::import::stamp::is_stamp;
 
 /// Lines looked at to find out how a file is written.
 const SAMPLE: usize = 1000;
+/// Text has fewer NUL bytes than one in so many.
+const MOST_NULS: usize = 50;
 
 /// Text out of bytes, and what it was encoded in.
 ///
@@ -23,11 +25,15 @@ pub(crate) fn decode(bytes: &[u8]) -> Option<(Cow<'_, str>, &'static str)> {
         let nuls = |odd: usize| head.iter().skip(odd).step_by(2).filter(|byte| **byte == 0).count();
         let (even, odd) = (nuls(0), nuls(1));
         let encoding = match (even, odd) {
-            (0, odd) if odd * 4 > head.len() => UTF_16LE,
-            (even, 0) if even * 4 > head.len() => UTF_16BE,
+            (0, odd) if odd * 4 > head.len() => Some(UTF_16LE),
+            (even, 0) if even * 4 > head.len() => Some(UTF_16BE),
+            // A few are what a serial line brings when it is opened.
+            (even, odd) if (even + odd) * MOST_NULS < head.len() => None,
             _ => return None,
         };
-        return Some((encoding.decode_without_bom_handling(bytes).0, encoding.name()));
+        if let Some(encoding) = encoding {
+            return Some((encoding.decode_without_bom_handling(bytes).0, encoding.name()));
+        }
     }
     match std::str::from_utf8(bytes) {
         Ok(text) => Some((text.into(), if text.is_ascii() { "ASCII" } else { "UTF-8" })),

@@ -2,8 +2,22 @@ use crate::import::roles::Role;
 use crate::import::units;
 
 /// Units that are part of the name behind a blank or an underscore: `resistance_ratio`, `Stage Strain`.
-const WORDS: [&str; 11] =
-    ["strain", "ratio", "fraction", "frac", "none", "code", "codes", "count", "counts", "timestamp", "datetime"];
+const WORDS: [&str; 14] = [
+    "strain",
+    "ratio",
+    "fraction",
+    "frac",
+    "none",
+    "code",
+    "codes",
+    "count",
+    "counts",
+    "timestamp",
+    "datetime",
+    "day",
+    "days",
+    "tage",
+];
 
 /// A heading taken apart: the bare name, and the unit if it has one.
 pub(crate) fn take_apart(heading: &str) -> (String, Option<String>) {
@@ -43,7 +57,10 @@ pub(crate) enum Sureness {
 
 /// Whole names, in lower case, letters and digits only.
 const WHOLE: &[(Role, &[&str])] = &[
-    (Role::Time, &["t", "zeit", "temps", "micros", "millis", "seconds", "sec", "ms", "us", "clock", "tr", "ts"]),
+    (
+        Role::Time,
+        &["t", "zeit", "temps", "micros", "millis", "seconds", "sec", "ms", "us", "clock", "tr", "ts", "xvalue"],
+    ),
     (Role::Resistance, &["r", "rs", "rx", "rsensor", "res", "ohm", "ohms", "kohm", "widerstand", "sensor1r"]),
     (Role::Ratio, &["rr0", "rrel", "relr", "normalizedr", "rnorm", "drr0", "drr", "δrr0", "deltarr0"]),
     (Role::Adc, &["adc", "adccode", "adccounts", "adcvalue", "counts"]),

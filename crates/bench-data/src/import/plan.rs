@@ -14,6 +14,9 @@ use crate::import::roles::Role;
 use crate::import::survey::alternation;
 use crate::import::table::Table;
 
+/// Signs are arbitrary where a larger share of the readings than this is negative.
+const FEW_SIGNS: f64 = 0.1;
+
 /// An import with nothing left open.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
@@ -40,7 +43,10 @@ impl Plan {
         let time = clock(tables, &recipe, (Role::Time, readings.1, readings.2), &mut remarks)?;
         let readings = channel(tables, &recipe, readings, &mut remarks)?;
         let reference = match choose(tables, &recipe, &Role::REFERENCES, "the reference")? {
-            None => None,
+            None => {
+                remarks.extend(no_reference(tables, &recipe));
+                None
+            }
             Some(place) => {
                 let (_, table, column) = place;
                 // The readings' clock is in other hands where there is a column beside the reference or another file.
@@ -76,9 +82,11 @@ impl Plan {
         let mut plan = Self::new(tables, &recipe)?;
         let values =
             crate::import::channel::Values::read(&tables[plan.readings.table], &plan.readings, &recipe.missing)?;
-        let known = || values.values.iter().filter(|value| !value.is_nan());
+        let known = values.values.iter().filter(|value| !value.is_nan()).count();
+        let negative = values.values.iter().filter(|value| **value < 0.0).count();
+        // A few, such as -999, mean something else: a question.
         if plan.readings.role == Role::Resistance
-            && known().any(|value| *value < 0.0)
+            && negative as f64 > FEW_SIGNS * known as f64
             && !recipe.magnitude.contains(&Role::Resistance)
         {
             recipe.magnitude.push(Role::Resistance);
@@ -199,6 +207,24 @@ impl Plan {
         }
         Ok(())
     }
+}
+
+/// What there is to say where no column is the reference, and nobody has said that none is.
+fn no_reference(tables: &[Table], recipe: &Recipe) -> Option<String> {
+    if Role::REFERENCES.iter().any(|role| recipe.column(*role).is_some()) {
+        return None;
+    }
+    let weak = candidates(tables).into_iter().find(|found| Role::REFERENCES.contains(&found.role));
+    let (role, column) = weak.map_or(("strain".to_owned(), "NAME".to_owned()), |found| {
+        (found.role.to_string(), refer(tables, (found.table, found.column)).to_string())
+    });
+    let answer = quoted(&format!("{role}={column}"));
+    let files: Vec<&str> = tables.iter().map(|table| table.file.as_str()).collect();
+    Some(format!(
+        "{}: no column is taken for strain, displacement or angle, without which nothing can be calibrated; if one is, say \
+         --column {answer}",
+        files.join(", ")
+    ))
 }
 
 /// Point or comma?

@@ -107,8 +107,11 @@ pub(crate) fn no_readings(tables: &[Table]) -> ImportError {
         "no header; which column is what"
     };
     let what = format!("{none} among {}", lists.join(" and "));
-    let column = if tables.iter().any(Table::has_names) { "NAME" } else { "N" };
-    let time = if tables.iter().any(Table::has_names) { "" } else { "--column time=N " };
-    let answers = ["resistance", "ratio", "adc"].map(|role| format!("{time}--column {role}={column}"));
-    ImportError::question(&files.join(", "), what, answers)
+    if tables.iter().any(Table::has_names) {
+        let answers = ["resistance", "ratio", "adc"].map(|role| format!("--column {role}=NAME"));
+        return ImportError::question(&files.join(", "), what, answers);
+    }
+    let rising: Vec<usize> = (0..table.columns.len()).filter(|column| increases(table, *column)).collect();
+    let answer = "--column time=N --column resistance=N --column strain=N (ratio, adc; displacement, angle, none)";
+    ImportError::question(&files.join(", "), what + &rising_words(&rising), [answer.to_owned()])
 }

@@ -6,12 +6,14 @@ use crate::import::recipe::Recipe;
 use crate::import::roles::Role;
 use crate::import::stamp::{Order, has_points, orders};
 use crate::import::table::Table;
-use crate::import::units::{self, Unit};
+use crate::import::units::{self, Scale, Unit};
 use crate::metadata::{ResistanceUnit, StrainUnit};
 use crate::order::median;
 
 /// Steps of times with fractions are taken for seconds up to this, s: slower than that, they may be milliseconds.
 const LONGEST_STEP_S: f64 = 2.0;
+/// Shorter steps are no seconds: days, perhaps.
+const SHORTEST_STEP_S: f64 = 1e-5;
 /// A resistance without a unit is taken for ohms from this on.
 const LEAST_OHM: f64 = 10.0;
 
@@ -54,6 +56,11 @@ impl Asked<'_> {
         }
         if let Some(text) = &self.table.columns[self.column].unit {
             return units::unit(self.role, text).ok_or_else(|| {
+                if Role::READINGS.contains(&self.role) && matches!(text.to_lowercase().as_str(), "v" | "mv") {
+                    let what = "volts are not read: make a column of ohms of them first (of a divider, with the sensor at \
+                                ground: R_ref·V/(V_supply − V)), or take the converter's codes, --column adc=NAME";
+                    return ImportError::unreadable(&self.table.file, format!("{}: {what}", self.name()));
+                }
                 let what = format!("{}: the unit `{text}` is none of {}", self.name(), self.role);
                 self.question(what, &units::names(self.role))
             });
@@ -115,12 +122,13 @@ impl Asked<'_> {
         let (unit, why) = match self.role {
             Role::Time | Role::ReferenceTime => {
                 // `millis` and `micros` name the unit.
-                if let Some(unit) = known(&column.name).filter(|_| !column.name.is_empty() && column.name.len() > 1) {
+                let is_counted = |unit: &Unit| unit.scale != Scale::Stamp && column.name.len() > 1;
+                if let Some(unit) = known(&column.name).filter(is_counted) {
                     return Ok(unit);
                 }
                 let step = median(numbers.windows(2).map(|pair| pair[1] - pair[0]).collect()).unwrap_or(f64::NAN);
                 let has_fractions = numbers.iter().any(|number| number.fract() != 0.0);
-                let seconds = has_fractions && step > 0.0 && step <= LONGEST_STEP_S;
+                let seconds = has_fractions && (SHORTEST_STEP_S..=LONGEST_STEP_S).contains(&step);
                 (seconds.then_some("s"), format!("steps of {step:.3}"))
             }
             Role::Resistance => {
@@ -140,10 +148,10 @@ impl Asked<'_> {
             Role::Displacement | Role::Angle | Role::Temperature => (None, String::new()),
         };
         let Some(unit) = unit.and_then(known) else {
-            return Err(self.question(
-                format!("{} ({}): its unit is not known", self.name(), self.role),
-                &units::names(self.role),
-            ));
+            let what = format!("{} ({}): its unit is not known", self.name(), self.role);
+            let mut names = units::names(self.role);
+            names.retain(|name| units::unit(self.role, name).is_some_and(|unit| unit.scale != Scale::Stamp));
+            return Err(self.question(what, &names));
         };
         remarks.push(format!("{}: {} has no unit; {why}: taken for `{}`", self.table.file, self.name(), unit.name));
         Ok(unit)

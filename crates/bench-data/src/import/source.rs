@@ -2,10 +2,9 @@ use std::io::Read;
 
 use crate::import::error::ImportError;
 use crate::import::grid::{Grid, Separator};
-use crate::import::header::Header;
+use crate::import::header::{Header, Shape};
 use crate::import::layout::{TextLayout, decode, lines, text_layout};
-use crate::import::number::{DecimalMark, Value, value};
-use crate::import::stamp::is_stamp;
+use crate::import::number::DecimalMark;
 use crate::import::table::{Cells, Column, Layout, Table};
 use crate::import::{names, parquet, workbook};
 
@@ -66,7 +65,8 @@ fn read_text(text: &str, encoding: &'static str, name: &str, options: &ReadOptio
         ..Layout::default()
     };
     let label_header = (separator == Separator::Labels).then(|| Header::of_labels(&labels, monitor, skip, below));
-    let grid = Grid::Text { lines, separator, labels, monitor };
+    let is_open = !text.ends_with(['\n', '\r']);
+    let grid = Grid::Text { lines, separator, labels, monitor, is_open };
     let header = match label_header {
         Some(header) => header,
         None => Header::find(name, &grid, decimal, skip)?,
@@ -74,21 +74,34 @@ fn read_text(text: &str, encoding: &'static str, name: &str, options: &ReadOptio
     Ok(table(name, &grid, header, layout))
 }
 
+/// Where the lines begin that stand behind the data: text, sums with a word before them, and a line that was cut.
+fn end_of_data(grid: &Grid, header: &Header, decimal: DecimalMark) -> usize {
+    let is_behind = |row: &usize| {
+        let shape = Shape::of(&grid.cells(*row), decimal);
+        let is_cut = *row + 1 == grid.len()
+            && matches!(grid, Grid::Text { is_open: true, .. })
+            && shape.width < header.shape.width
+            && shape.numbers < header.shape.numbers;
+        grid.comment(*row).is_some() || shape.numbers == 0 || shape.is_worded(header.shape) || is_cut
+    };
+    (header.first_row..grid.len()).rev().take_while(is_behind).last().unwrap_or(grid.len())
+}
+
 /// A table out of lines of cells.
 pub(crate) fn table(file: &str, grid: &Grid, header: Header, layout: Layout) -> Table {
     let mut layout =
         Layout { skip: header.skip, header_lines: header.header_lines, unit_line: header.unit_line, ..layout };
-    let mut cells = vec![Cells::default(); header.width];
-    let mut numbers = Vec::new();
+    let mut cells = vec![Cells::default(); header.shape.width];
+    let (mut numbers, mut widths) = (Vec::new(), Vec::new());
+    let end = end_of_data(grid, &header, layout.decimal);
     for row in header.first_row..grid.len() {
         let line = grid.cells(row);
-        let is_text = |cell: &std::borrow::Cow<str>| {
-            !is_stamp(cell) && !matches!(value(cell, layout.decimal, 0, &[]), Value::Number(_))
-        };
-        if grid.comment(row).is_some() || line.iter().all(is_text) {
+        if row >= end || grid.comment(row).is_some() || Shape::of(&line, layout.decimal).numbers == 0 {
             layout.text_lines += 1;
+            layout.first_text_line.get_or_insert(grid.line(row));
             continue;
         }
+        widths.push(line.len());
         if !layout.has_groups {
             layout.has_groups = line.iter().any(|cell| crate::import::number::has_groups(cell, layout.decimal));
         }
@@ -106,5 +119,6 @@ pub(crate) fn table(file: &str, grid: &Grid, header: Header, layout: Layout) -> 
     while columns.last().is_some_and(|last| last.heading.is_empty() && last.cells.iter().all(str::is_empty)) {
         columns.pop();
     }
+    layout.short_lines = widths.into_iter().filter(|width| *width < columns.len()).count();
     Table { file: file.to_owned(), layout, metadata: header.metadata, columns, lines: numbers }
 }

@@ -1,7 +1,7 @@
 use chrono::{Datelike, NaiveDate};
 
 const SECOND: i128 = 1_000_000_000;
-const DAY: i128 = 86_400 * SECOND;
+pub(crate) const DAY: i128 = 86_400 * SECOND;
 
 /// How the parts of a date follow each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -62,7 +62,8 @@ fn days(date: &str, order: Order) -> Option<i32> {
     (year >= 1000).then(|| NaiveDate::from_ymd_opt(year as i32, month, day))?.map(|date| date.num_days_from_ce())
 }
 
-/// `12:30:01.25`, `12:30`, `1:30:01 PM`, `12:30:01+02:00`, `12:30:01Z`; nanoseconds since midnight UTC.
+/// `12:30:01.25`, `12:30:01:250`, `12:30`, `1:30:01 PM`, `12:30:01+02:00`, `12:30:01Z`; nanoseconds since midnight UTC.
+/// `01:30.5` is what spreadsheets write of minutes and seconds.
 fn time_of_day(time: &str) -> Option<i128> {
     let (time, zone) = match time.find(['Z', '+', '-']) {
         Some(at) => (&time[..at], zone(&time[at..])?),
@@ -74,11 +75,18 @@ fn time_of_day(time: &str) -> Option<i128> {
         (_, Some(clock)) => (clock.trim(), Some(12)),
         _ => (lower.as_str(), None),
     };
-    let mut parts = clock.split(':');
-    let mut hours: i128 = parts.next()?.parse().ok()?;
-    let minutes: i128 = parts.next().filter(|part| part.len() <= 2)?.parse().ok()?;
-    let nanoseconds = parts.next().map_or(Some(0), nanoseconds)?;
-    if parts.next().is_some() || hours > 24 || minutes > 59 || nanoseconds >= 61 * SECOND {
+    let (hours, minutes, seconds, thousandths) = match clock.split(':').collect::<Vec<_>>()[..] {
+        [minutes, seconds] if seconds.contains(['.', ',']) => ("0", minutes, seconds, ""),
+        [hours, minutes] => (hours, minutes, "0", ""),
+        [hours, minutes, seconds] => (hours, minutes, seconds, ""),
+        [hours, minutes, seconds, part] if part.len() == 3 && seconds.len() == 2 => (hours, minutes, seconds, part),
+        _ => return None,
+    };
+    let mut hours: i128 = hours.parse().ok()?;
+    let minutes: i128 = Some(minutes).filter(|part| part.len() <= 2)?.parse().ok()?;
+    let thousandths: i128 = if thousandths.is_empty() { 0 } else { thousandths.parse().ok()? };
+    let nanoseconds = nanoseconds(seconds)? + thousandths * SECOND / 1000;
+    if hours > 24 || minutes > 59 || nanoseconds >= 61 * SECOND {
         return None;
     }
     if let Some(half) = half {
@@ -160,6 +168,9 @@ mod tests {
         }
         assert_eq!(seconds("1.5.2024 10:30:01.5", Order::Dmy), moment);
         assert_eq!(seconds("05/01/2024 10:30:01.5 AM", Order::Mdy), moment);
+        assert_eq!(seconds("05/01/2024 10:30:01:500", Order::Mdy), moment);
+        assert_eq!(seconds("01:30.5", Order::Iso), Some(90.5));
+        assert_eq!(seconds("01:30", Order::Iso), Some(5400.0));
     }
 
     #[test]

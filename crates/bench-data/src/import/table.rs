@@ -75,8 +75,12 @@ pub struct Layout {
     pub header_lines: usize,
     /// Whether a line of units follows the header.
     pub unit_line: bool,
-    /// Lines of text among or behind the data, which are passed over.
+    /// Lines of text among or behind the data, and a last one that was cut, which are passed over.
     pub text_lines: usize,
+    /// The first of them, counted from 1.
+    pub first_text_line: Option<u64>,
+    /// Rows with fewer cells than there are columns.
+    pub short_lines: usize,
 }
 
 /// A file's cells by column, and how they were written.

@@ -31,6 +31,7 @@ const UNITS: &[Entry] = &[
     (Role::Time, "ns", Scale::Shift(-9), &["nsec", "nanos", "nanosecond", "nanoseconds"]),
     (Role::Time, "min", Scale::Affine(60.0, 0.0), &["mins", "minute", "minutes", "minuten"]),
     (Role::Time, "h", Scale::Affine(3600.0, 0.0), &["hr", "hrs", "hour", "hours"]),
+    (Role::Time, "days", Scale::Affine(86_400.0, 0.0), &["day", "tage"]),
     (Role::Time, "iso", Scale::Stamp, &["iso8601", "timestamp", "datetime", "hh:mm:ss", "utc"]),
     (Role::Time, "dmy", Scale::Stamp, &["dd.mm.yyyy", "dd/mm/yyyy"]),
     (Role::Time, "mdy", Scale::Stamp, &["mm/dd/yyyy"]),

@@ -56,6 +56,7 @@ fn file(findings: &Findings, index: usize) -> Value {
         "header_lines": layout.header_lines,
         "unit_line": layout.unit_line,
         "text_lines": layout.text_lines,
+        "short_lines": layout.short_lines,
         "rows": table.len(),
         "columns": columns,
     })

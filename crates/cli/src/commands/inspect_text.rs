@@ -80,9 +80,6 @@ fn layout(table: &Table) -> String {
     if layout.unit_line {
         words.push("a line of units".to_owned());
     }
-    if layout.text_lines > 0 {
-        words.push(format!("{} of text passed over", counted(layout.text_lines, "line")));
-    }
     words.push(counted(table.len(), "row"));
     words.join(", ")
 }
