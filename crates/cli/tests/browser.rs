@@ -121,6 +121,18 @@ fn the_report_is_complete_without_scripts() {
     }
 }
 
+/// On paper the figures share pages, and what is folded is left out.
+#[test]
+fn the_report_prints_on_few_pages() {
+    let Some(browser) = browser() else { return };
+    let bench = reported();
+    let pdf = bench.path("report.pdf");
+    open(&browser, &bench, "report.html", &["--no-pdf-header-footer", &format!("--print-to-pdf={}", pdf.display())]);
+    let bytes = fs::read(pdf).unwrap();
+    let pages = bytes.split(|byte| *byte == b'\n').filter(|line| line.ends_with(b"/Type /Page")).count();
+    assert!((3..=5).contains(&pages), "{pages}");
+}
+
 /// The figures that were looked at.
 const LOOKED_AT: [&str; 9] = [
     "strain-against-time",

@@ -115,6 +115,13 @@ fn fits_that_say_little_are_warned_of_and_tables_have_units() {
     let run = bench.run(&["fit-law", "--compare", "kww,prony:1", "--segment", "whole", "noise.csv"]);
     let of_law = |law: &str| run.warnings.iter().any(|w| w.contains(&format!("{law}: whole: R^2 is ")));
     assert!(of_law("kww") && of_law("prony:1"), "{:?}", run.warnings);
+    // Where many are poor they are counted.
+    let triangle = |k: usize| (k % 20).min(20 - k % 20) as f64 / 50.0;
+    let rows: String = (0..400).map(|k| format!("{}.{},{},{}\n", k / 10, k % 10, noise(k), triangle(k))).collect();
+    bench.write("many.csv", format!("time_s,resistance_ohm,strain\n{rows}"));
+    let run = bench.run(&["fit-law", "many.csv", "--table"]);
+    assert!(run.warnings.len() < 7, "{:?}", run.warnings);
+    assert!(run.warnings.iter().any(|warning| warning.contains("R^2 is below 0.9 in ")), "{:?}", run.warnings);
 }
 
 /// A table of numbers that is broken by the terminal cannot be read.

@@ -13,6 +13,8 @@ const HEAD: usize = 13;
 const PRINTED_ADVICE: usize = 1;
 /// A tenth of the range with a smaller share of the rows than this is named.
 const SELDOM: f64 = 0.04;
+/// One speed has quartiles, and a highest percentile, that differ by noise alone: up to this factor.
+const ONE_SPEED: f64 = 1.1;
 
 /// What a calibration came to, for people.
 ///
@@ -197,15 +199,19 @@ fn seen(seen: &Seen, quantity: Quantity) -> String {
     } else {
         "no holds".into()
     };
-    // One speed has quartiles, and a 95 % quantile, that differ by noise alone.
-    let (slow, fast) = (number(seen.quartile_speeds.0), number(seen.quartile_speeds.1.min(seen.fastest_rate)));
-    let fastest = if seen.quartile_speeds.1 < seen.fastest_rate {
+    let (slow, fast) = (seen.quartile_speeds.0, seen.quartile_speeds.1.min(seen.fastest_rate));
+    let usual = if fast < ONE_SPEED * slow {
+        format!("about {}", significant(scale * f64::midpoint(slow, fast), 2))
+    } else {
+        format!("{} to {}", number(slow), number(fast))
+    };
+    let fastest = if seen.fastest_rate > ONE_SPEED * fast {
         format!(", seldom over {}", number(seen.fastest_rate))
     } else {
         String::new()
     };
     format!(
-        "{} {} to {}{unit}{}; mostly {slow} to {fast}{fastest}{unit}/s; {holds}; {} s",
+        "{} {} to {}{unit}{}; mostly {usual}{fastest}{unit}/s; {holds}; {} s",
         quantity.name().trim_end_matches("_deg"),
         number(low),
         number(seen.range.upper),
@@ -240,5 +246,37 @@ fn advice(advice: &[String]) -> String {
         _ if advice.is_empty() => "another recording of another day: nothing stands out in this one".into(),
         0 => first,
         more => format!("{first} ({more} more: --explain)"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use ohmstrain_calib::RangeParams;
+
+    use super::*;
+
+    #[test]
+    fn one_speed_is_one_number() {
+        let with = |quartile_speeds, fastest_rate| {
+            let range = RangeParams { lower: 0.0, upper: 0.4 };
+            let seen = Seen {
+                range,
+                tenths: [0.1; 10],
+                quartile_speeds,
+                fastest_rate,
+                longest_hold_s: 0.0,
+                longest_s: 100.0,
+                rows: 1000,
+            };
+            super::seen(&seen, Quantity::Strain)
+        };
+        assert_eq!(with((0.0407, 0.0417), 0.0418), "strain 0 to 40 %; mostly about 4.1 %/s; no holds; 100 s");
+        assert_eq!(with((0.0407, 0.0417), 0.0405), "strain 0 to 40 %; mostly about 4.1 %/s; no holds; 100 s");
+        assert_eq!(
+            with((0.0407, 0.0417), 0.08),
+            "strain 0 to 40 %; mostly about 4.1, seldom over 8 %/s; no holds; 100 s"
+        );
+        assert_eq!(with((0.01, 0.04), 0.042), "strain 0 to 40 %; mostly 1 to 4 %/s; no holds; 100 s");
+        assert_eq!(with((0.01, 0.04), 0.05), "strain 0 to 40 %; mostly 1 to 4, seldom over 5 %/s; no holds; 100 s");
     }
 }

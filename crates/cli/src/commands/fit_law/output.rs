@@ -153,6 +153,8 @@ pub fn with_units<'a>(names: &[String], fits: impl Iterator<Item = (&'a Fits, &'
 
 /// R² below which a law hardly describes a segment.
 pub const POOR: f64 = 0.9;
+/// Segments that are warned of one by one; more are counted.
+const MOST_WARNED: usize = 6;
 
 /// Warns of fits that are poor, did not converge, or end at a limit of the search.
 pub fn warn(recordings: &[Fits]) {
@@ -165,21 +167,51 @@ pub fn warn_of_law(recording: &Fits, law: &str) {
 }
 
 fn warn_of(recording: &Fits, law: &str) {
-    for Fitted { piece, fit } in &recording.fits {
-        let mut doubts = Vec::new();
-        if fit.r_squared < POOR {
-            doubts.push(format!("R^2 is {:.2}: the law hardly describes it", fit.r_squared));
+    let name = &recording.name;
+    let doubts: Vec<(&str, Vec<String>)> =
+        recording.fits.iter().map(doubts).filter(|(_, doubts)| !doubts.is_empty()).collect();
+    if doubts.len() <= MOST_WARNED {
+        for (label, doubts) in doubts {
+            CliError::warning(&format!("{name}: {law}{label}: {}", doubts.join("; ")));
         }
-        if !fit.converged {
-            doubts.push("the search has not converged".into());
-        }
-        let at_limit = fit.parameters.iter().filter(|found| found.at_limit);
-        let at_limit: Vec<&str> = at_limit.map(|found| found.parameter.name.as_str()).collect();
-        if !at_limit.is_empty() {
-            doubts.push(format!("{} at the limit of the search: the readings ask for more", at_limit.join(", ")));
-        }
-        if !doubts.is_empty() {
-            CliError::warning(&format!("{}: {law}{}: {}", recording.name, piece.label, doubts.join("; ")));
+        return;
+    }
+    let all = recording.fits.len();
+    let fits = || recording.fits.iter().map(|fitted| &fitted.fit);
+    let poor: Vec<f64> = fits().map(|fit| fit.r_squared).filter(|r_squared| *r_squared < POOR).collect();
+    if !poor.is_empty() {
+        let (count, worst) = (poor.len(), poor.iter().fold(f64::INFINITY, |worst, found| worst.min(*found)));
+        CliError::warning(&format!(
+            "{name}: {law}R^2 is below {POOR} in {count} of {all} segments, {worst:.2} at worst: the law hardly describes them"
+        ));
+    }
+    let unfinished = fits().filter(|fit| !fit.converged).count();
+    if unfinished > 0 {
+        CliError::warning(&format!("{name}: {law}the search has not converged in {unfinished} of {all} segments"));
+    }
+    for parameter in names(recording.fits.iter()) {
+        let count = fits().filter(|fit| fit.get(&parameter).is_some_and(|found| found.at_limit)).count();
+        if count > 0 {
+            CliError::warning(&format!(
+                "{name}: {law}{parameter} at the limit of the search in {count} of {all} segments: their readings ask for more"
+            ));
         }
     }
+}
+
+/// What is doubtful about a fit, after its segment's name.
+fn doubts(Fitted { piece, fit }: &Fitted) -> (&str, Vec<String>) {
+    let mut doubts = Vec::new();
+    if fit.r_squared < POOR {
+        doubts.push(format!("R^2 is {:.2}: the law hardly describes it", fit.r_squared));
+    }
+    if !fit.converged {
+        doubts.push("the search has not converged".into());
+    }
+    let at_limit = fit.parameters.iter().filter(|found| found.at_limit);
+    let at_limit: Vec<&str> = at_limit.map(|found| found.parameter.name.as_str()).collect();
+    if !at_limit.is_empty() {
+        doubts.push(format!("{} at the limit of the search: the readings ask for more", at_limit.join(", ")));
+    }
+    (&piece.label, doubts)
 }
