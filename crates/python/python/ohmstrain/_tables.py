@@ -22,6 +22,7 @@ COLUMNS = (
 
 def to_arrow(table: Any) -> pa.Table:
     """The columns of a recording that a table has, without a copy where the table has them as Arrow has them."""
+    refused = TypeError(f"expected a table (pandas, polars, pyarrow) or a dict of arrays, found {type(table).__name__}")
     if isinstance(table, (pa.Table, pa.RecordBatch)):
         arrow = table
     elif isinstance(table, Mapping):
@@ -30,10 +31,12 @@ def to_arrow(table: Any) -> pa.Table:
         known = table[[name for name in table.columns if name in COLUMNS]]
         arrow = pa.Table.from_pandas(known, preserve_index=False)
     elif hasattr(table, "__arrow_c_stream__"):
-        arrow = pa.table(table)
+        try:
+            arrow = pa.table(table)
+        except pa.ArrowInvalid as error:  # A single column is a stream as well.
+            raise refused from error
     else:
-        kind = type(table).__name__
-        raise TypeError(f"expected a table (pandas, polars, pyarrow) or a dict of arrays, found {kind}")
+        raise refused
     known = [name for name in arrow.column_names if name in COLUMNS]
     # Without a known column all names go on, for the message that says what is missing.
     return arrow.select(known) if known else arrow
