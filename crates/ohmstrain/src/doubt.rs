@@ -7,43 +7,26 @@ use crate::pauses::Pauses;
 use crate::rest_watch::ZERO;
 use crate::{Flag, Flags, NEVER_READ_S, RestSeen, RestWatch, Unread};
 
-/// Standard deviation of the strain, in spans, that a filter has at its start besides what it states. Started in motion, on six
-/// recordings, its errors of the first two seconds are 9 to 15 %FS where it states 7 to 11, and all but settled after ten.
-const START: f64 = 0.1;
-/// How long it takes until it has fallen to 37 % that readings were beyond those of the largest strains, s: a body comes there from
-/// time to time.
-const FAR_FADES_S: f64 = 60.0;
-/// How many times counts what readings are outside on the side of rest, where a sensor that has not moved for long begins and soon
-/// has left it, and on the other one, where nothing leads but another R₀, another gain or a strain beyond calibration's: if all
-/// readings are off, only those at an end of their range show it, and not all of it.
-const NEAR_COUNTS: f64 = 0.5;
-const FAR_COUNTS: f64 = 1.5;
-/// An innovation counts as no larger than this, as a normalised square: one alone is an outlier, not a law that does not fit.
-const MOST_NIS: f64 = 30.0;
-/// Readings may lie outside of calibration's by this share of their range for nothing.
-const MARGIN: f64 = 0.02;
-/// How many times the fastest rate of calibration, which is its 99th percentile, is beyond it.
-const FASTER: f64 = 1.5;
-/// Share of the filter's variance, or of the doubt at a start, from which on a doubt is worth a flag.
-const WORTH: f64 = 0.2;
-
-/// The numbers behind the widened intervals, for programs that write a filter in another language.
+/// The numbers behind the widened intervals, also for programs that write a filter in another language.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DoubtNumbers {
-    /// Time constant of what readings have been outside of calibration's on the side away from rest, s. A third of it is that of the
-    /// side of rest, and of the mean of normalised innovations squared; a twelfth that of the doubt of a start or a fault.
+    /// How long it takes until it has fallen to 37 % that readings were beyond those of the largest strains, s: a body comes there
+    /// from time to time. A third of it is that of the side of rest, and of the mean of normalised innovations squared; a twelfth
+    /// that of the doubt of a start or a fault.
     pub far_fades_s: f64,
-    /// How many times counts what readings are outside on the side of rest.
+    /// How many times counts what readings are outside on the side of rest, where a sensor that has not moved for long begins and
+    /// soon has left it.
     pub near_counts: f64,
-    /// The same on the other side.
+    /// The same on the other side, where nothing leads but another R₀, another gain or a strain beyond calibration's: if all readings
+    /// are off, only those at an end of their range show it, and not all of it.
     pub far_counts: f64,
-    /// As much as a normalised innovation squared counts.
+    /// As much as a normalised innovation squared counts: one alone is an outlier, not a law that does not fit.
     pub most_nis: f64,
-    /// Share of calibration's range of readings that counts for nothing.
+    /// Share of calibration's range of readings by which they may lie outside for nothing.
     pub margin: f64,
-    /// How many times calibration's fastest rate is beyond it.
+    /// How many times the fastest rate of calibration, which is its 99th percentile, is beyond it.
     pub faster: f64,
-    /// Share of a variance from which on a doubt is worth a flag.
+    /// Share of the filter's variance, or of the doubt at a start, from which on a doubt is worth a flag.
     pub worth: f64,
     /// Share of the span that a strain of none may have.
     pub zero: f64,
@@ -51,15 +34,19 @@ pub struct DoubtNumbers {
 
 /// The numbers behind the widened intervals.
 pub const DOUBT: DoubtNumbers = DoubtNumbers {
-    far_fades_s: FAR_FADES_S,
-    near_counts: NEAR_COUNTS,
-    far_counts: FAR_COUNTS,
-    most_nis: MOST_NIS,
-    margin: MARGIN,
-    faster: FASTER,
-    worth: WORTH,
+    far_fades_s: 60.0,
+    near_counts: 0.5,
+    far_counts: 1.5,
+    most_nis: 30.0,
+    margin: 0.02,
+    faster: 1.5,
+    worth: 0.2,
     zero: ZERO,
 };
+
+/// Standard deviation of the strain, in spans, that a filter has at its start besides what it states. Started in motion, on six
+/// recordings, its errors of the first two seconds are 9 to 15 %FS where it states 7 to 11, and all but settled after ten.
+const START: f64 = 0.1;
 
 /// What the doubts of a sensor depend on: what its calibration has seen.
 #[derive(Clone, Copy, Debug)]
@@ -128,7 +115,7 @@ struct Left<T> {
 
 impl<T: Real> Left<T> {
     fn after(passed_s: T) -> Self {
-        let far = (-passed_s / T::of(FAR_FADES_S)).exp();
+        let far = (-passed_s / T::of(DOUBT.far_fades_s)).exp();
         let lately = far * far * far;
         let twice = lately * lately;
         Self { far, lately, soon: twice * twice }
@@ -149,7 +136,7 @@ impl<T: Real> Misfit<T> {
     /// Takes a reading R/R₀ - 1 and its normalised innovation squared.
     fn see(&mut self, parts: &DoubtParts, left: &Left<T>, reading: T, nis: T) {
         let (low, high) = (T::of(parts.low), T::of(parts.high));
-        let margin = T::of(MARGIN) * (high - low);
+        let margin = T::of(DOUBT.margin) * (high - low);
         let (above, below) = (reading - high - margin, low - reading - margin);
         let sign = parts.rest.map_or(0.0, |rest| rest.sign);
         let (near, far) = match sign {
@@ -159,13 +146,14 @@ impl<T: Real> Misfit<T> {
         };
         self.near = (self.near * left.lately).max(near);
         self.far = (self.far * left.far).max(far);
-        self.nis += (T::one() - left.lately) * (nis.min(T::of(MOST_NIS)) - self.nis);
+        self.nis += (T::one() - left.lately) * (nis.min(T::of(DOUBT.most_nis)) - self.nis);
     }
 
     /// The strain's variance for readings outside of calibration's.
     fn outside(&self, parts: &DoubtParts) -> T {
         let per_reading = T::of(parts.per_reading);
-        let (near, far) = (T::of(NEAR_COUNTS) * self.near * per_reading, T::of(FAR_COUNTS) * self.far * per_reading);
+        let (near, far) =
+            (T::of(DOUBT.near_counts) * self.near * per_reading, T::of(DOUBT.far_counts) * self.far * per_reading);
         near * near + far * far
     }
 }
@@ -302,9 +290,9 @@ impl<T: Real> Doubts<T> {
     /// multiple of what the mean slope says. Innovations that are larger than stated widen the interval as they would a weighted mean's (Birge,
     /// *Phys. Rev.* 40 (1932) 207), and so does a rate beyond calibration's; to no more than is left open without readings.
     pub fn widened(&self, rate: T, variance: T) -> (T, Flags) {
-        let (worth, most, per_reading) = (T::of(WORTH), T::of(self.parts.most), T::of(self.parts.per_reading));
+        let (worth, most, per_reading) = (T::of(DOUBT.worth), T::of(self.parts.most), T::of(self.parts.per_reading));
         let faster = rate.abs() / T::of(self.parts.fastest_per_s);
-        let is_fast = faster > T::of(FASTER);
+        let is_fast = faster > T::of(DOUBT.faster);
         let birge = self.misfit.nis.max(T::one());
         let times = if is_fast { birge * (faster * faster) } else { birge };
         let stated = (variance * times).min(most).max(variance);
