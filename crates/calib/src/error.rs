@@ -1,7 +1,7 @@
-use crate::estimator_params::EstimatorKind;
-use crate::law_fit::MOST_BRANCHES;
+use crate::params::estimator::EstimatorKind;
+use crate::params::law::MOST_BRANCHES;
+use crate::params::validate::FieldError;
 use crate::samples::SamplesError;
-use crate::validate::FieldError;
 use ohmstrain_ekf::StepError;
 use ohmstrain_model::ParameterError;
 use thiserror::Error;

@@ -9,91 +9,56 @@
 //! - Deterministic: the same samples give the same parameters. Nothing is random, no clock is read.
 //! - A calibration that cannot be made is a [`CalibrationError`]; nothing panics on recorded data.
 
-mod advice;
 mod baselines;
-mod blocks;
-#[cfg(feature = "bootstrap")]
-mod bootstrap;
-mod build_filter;
 mod calibrate;
 pub mod closed_form;
-mod corrected;
-mod correction_fit;
-mod correction_params;
-mod correction_scale;
-mod corrector;
-mod design;
+mod correction;
 mod error;
-mod error_budget;
-mod estimator_params;
 mod filter;
-mod findings;
-mod gaussian_process;
-mod identifiability;
-mod known;
-mod lag;
-mod law_fit;
-mod law_params;
-mod law_regression;
-mod law_structure;
-mod law_structures;
-mod law_uncertainty;
-mod least_squares;
-mod left_out;
+mod law;
 pub mod likelihood;
 mod low_pass;
 mod motion_stats;
-mod noise_fit;
 mod optimise;
 mod order;
 mod params;
-mod portable;
 mod prior;
-mod recipe;
-mod rest;
-mod robust_loss;
-mod running;
+mod recording;
 mod samples;
-mod scores;
-mod screen;
 mod sd_scale;
-mod sieve;
 mod sizes;
-mod sparse_estimator;
-mod stepper;
-mod summary;
-mod validate;
-mod way_back;
 
-pub use baselines::{
-    Baseline, Baselines, Features, Fir, LeakyBank, LowPassMode, PhaseRows, PublishedLaw, Regression, StaticCubic,
-};
-#[cfg(feature = "bootstrap")]
-pub use bootstrap::{Bootstrap, bootstrap_law};
-pub use build_filter::{HISTORIES, HYPOTHESES, PARTICLE_SEED, build_filter};
+pub use baselines::{Baseline, Baselines, Features, Fir, LeakyBank, LowPassMode, PhaseRows, PublishedLaw, Regression};
+pub use calibrate::error_budget::{ErrorBudget, ErrorShares};
+pub use calibrate::findings::{Findings, Seen};
+pub use calibrate::scores::{ScoredRow, Scores};
+pub use calibrate::with_prior::calibrate_with_prior;
 pub use calibrate::{Calibration, Stage, calibrate};
-pub use corrected::SURPRISING_NIS;
-pub use correction_params::{CorrectionParams, CorrectionScale, CorrectorParams, FUTURE_FEATURES, TrainingRow};
+pub use correction::owned::{OwnedCorrection, OwnedProcess};
 pub use error::CalibrationError;
-pub use error_budget::{ErrorBudget, ErrorShares, Limit};
-pub use estimator_params::{EstimatorKind, EstimatorParams, MotionParams, NoiseParams, PhaseParams};
+pub use filter::build::{HISTORIES, HYPOTHESES, PARTICLE_SEED, build_filter};
+pub use filter::corrected::SURPRISING_NIS;
+pub use filter::portable::{PortableCorrection, PortableFilter, PortableSieve};
 pub use filter::{Filter, Output, Rows, Start, WayBack};
-pub use findings::{Findings, Seen};
-pub use gaussian_process::ProcessParams;
-pub use identifiability::{Identifiability, OnBound, identifiability};
-pub use lag::{Lag, aligned, lag_out_of_reach, reference_lag};
-pub use law_fit::{CrossFit, GaugeFamily, LawFit, LawOptions, fit_law};
-pub use law_params::{BranchParams, GaugeParams, LawParams};
-pub use law_structures::{StructureScore, compare_structures};
-pub use params::{
-    FORMAT, JointParams, Quantity, RangeParams, ReadingUnit, RecordingInfo, SensorParams, Uncertainty, Validity,
+#[cfg(feature = "bootstrap")]
+pub use law::bootstrap::{Bootstrap, bootstrap_law};
+pub use law::compare::{StructureScore, compare_structures};
+pub use law::fit::{CrossFit, GaugeFamily, LawFit, LawOptions, fit_law};
+pub use law::identifiability::{Identifiability, OnBound, identifiability};
+pub use params::correction::{
+    CorrectionParams, CorrectionScale, CorrectorParams, FUTURE_FEATURES, ProcessParams, TrainingRow,
 };
-pub use portable::{PortableCorrection, PortableFilter, PortableProcess, PortableSieve};
-pub use prior::{CorrectionPrior, EstimatorPrior, FEWEST_SENSORS, LawPrior, PRIOR_FORMAT, Prior, calibrate_with_prior};
-pub use recipe::{RECIPE, Recipe};
+pub use params::estimator::{EstimatorKind, EstimatorParams, MotionParams, NoiseParams, PhaseParams};
+pub use params::law::{BranchParams, GaugeParams, LawParams};
+pub use params::recipe::{RECIPE, Recipe};
+pub use params::static_cubic::StaticCubic;
+pub use params::summary::{Limit, Summary};
+pub use params::validate::FieldError;
+pub use params::{
+    FORMAT, JointParams, LARGEST_SD_SCALE, Quantity, RangeParams, ReadingUnit, RecordingInfo, SensorParams,
+    Uncertainty, Validity,
+};
+pub use prior::{CorrectionPrior, EstimatorPrior, FEWEST_SENSORS, LawPrior, PRIOR_FORMAT, Prior};
+pub use recording::lag::{Lag, aligned, lag_out_of_reach, reference_lag};
+pub use recording::screen::{Distrusted, Doubt, Screened, screen};
 pub use samples::{Samples, SamplesError};
-pub use scores::{ScoredRow, Scores};
-pub use screen::{Distrusted, Doubt, Screened, screen};
-pub use sd_scale::LARGEST_SD_SCALE;
-pub use summary::Summary;
-pub use validate::FieldError;

@@ -1,4 +1,4 @@
-use crate::design::central_rate;
+use crate::samples::central_rate;
 use crate::samples::{Samples, filled_strain};
 
 /// How the strain of the recordings moves.

@@ -1,6 +1,7 @@
 use thiserror::Error;
 
 use crate::CalibrationError;
+use crate::order::extent;
 
 /// One recording: times, readings and, where it is known, the true strain.
 ///
@@ -203,4 +204,21 @@ pub(crate) fn usual_step_s<'a>(recordings: impl Iterator<Item = &'a [f64]>) -> f
     let mut steps: Vec<f64> = recordings.flat_map(|time_s| time_s.windows(2).map(|pair| pair[1] - pair[0])).collect();
     let middle = steps.len() / 2;
     if steps.is_empty() { 0.0 } else { *steps.select_nth_unstable_by(middle, f64::total_cmp).1 }
+}
+
+/// Smallest and largest reading of the rows that were calibrated on.
+pub(crate) fn reading_range(recordings: &[Samples]) -> (f64, f64) {
+    let readings = recordings.iter().flat_map(|samples| samples.complete_rows().map(|k| samples.reading[k]));
+    extent(readings)
+}
+
+/// Rate by central differences over one row to each side, one-sided at the ends.
+pub(crate) fn central_rate(time_s: &[f64], x: &[f64]) -> Vec<f64> {
+    let last = x.len().saturating_sub(1);
+    (0..x.len())
+        .map(|k| {
+            let (a, b) = (k.saturating_sub(1), (k + 1).min(last));
+            if a == b { 0.0 } else { (x[b] - x[a]) / (time_s[b] - time_s[a]) }
+        })
+        .collect()
 }

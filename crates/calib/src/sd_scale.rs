@@ -1,5 +1,5 @@
-/// A factor beyond this says that something else is wrong: calibrations say so where they reach it.
-pub const LARGEST_SD_SCALE: f64 = 5.0;
+use crate::params::LARGEST_SD_SCALE;
+
 /// No narrowing: an easy recording is no promise for the next one.
 const SCALES: std::ops::RangeInclusive<f64> = 1.0..=LARGEST_SD_SCALE;
 /// What has been widened to cover the worst block may be narrowed to cover all of them.

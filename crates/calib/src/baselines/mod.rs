@@ -17,10 +17,10 @@ pub use leaky_bank::LeakyBank;
 pub use low_pass_mode::LowPassMode;
 pub use published::{PhaseRows, PublishedLaw};
 pub use regression::{Features, Regression};
-pub use static_cubic::StaticCubic;
 
 use crate::CalibrationError;
 use crate::params::RangeParams;
+use crate::params::static_cubic::StaticCubic;
 use crate::samples::{Samples, check};
 
 /// An inverse at work on one recording.

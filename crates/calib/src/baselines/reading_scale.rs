@@ -1,6 +1,6 @@
 use crate::CalibrationError;
-use crate::calibrate::reading_range;
 use crate::samples::Samples;
+use crate::samples::reading_range;
 
 /// Centre and half the range of the readings, so that what regressions see is between -1 and 1 where they were fitted.
 #[derive(Clone, Copy, Debug)]

@@ -3,8 +3,8 @@ use nalgebra::DVector;
 use super::reading_scale::ReadingScale;
 use super::{Baseline, Held};
 use crate::CalibrationError;
-use crate::blocks::BlockedNormal;
-use crate::law_regression::BLOCKS;
+use crate::law::blocked_normal::BlockedNormal;
+use crate::law::regression::BLOCKS;
 use crate::params::RangeParams;
 use crate::samples::{Samples, check};
 

@@ -1,25 +1,11 @@
 use nalgebra::{DMatrix, DVector};
-use serde::{Deserialize, Serialize};
 
 use super::reading_scale::ReadingScale;
 use super::{Baseline, Held};
 use crate::CalibrationError;
 use crate::params::RangeParams;
+use crate::params::static_cubic::StaticCubic;
 use crate::samples::Samples;
-
-/// What people use today: strain as a cubic polynomial of the reading, clipped to the range it was fitted on.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct StaticCubic {
-    /// Centre of the readings it was fitted on.
-    pub reading_centre: f64,
-    /// Half their range.
-    pub reading_scale: f64,
-    /// Coefficients of 1, z, z², z³ with `z = (reading - centre)/scale`.
-    pub coefficients: [f64; 4],
-    /// The strains it was fitted on.
-    pub range: RangeParams,
-}
 
 impl StaticCubic {
     /// Least squares over all rows with reading and strain.
@@ -41,16 +27,6 @@ impl StaticCubic {
         Ok(Self { reading_centre, reading_scale, coefficients, range })
     }
 
-    /// The strain that a reading stands for.
-    #[must_use]
-    pub fn strain(&self, reading: f64) -> f64 {
-        let z = (reading - self.reading_centre) / self.reading_scale;
-        let [a, b, c, d] = self.coefficients;
-        self.range.to_model().clamp(a + z * (b + z * (c + z * d)))
-    }
-}
-
-impl StaticCubic {
     /// The same, row by row.
     #[must_use]
     pub fn start(&self) -> impl Baseline + use<> {

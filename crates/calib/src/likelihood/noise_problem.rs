@@ -5,8 +5,8 @@ use super::{
     ProfileInterval, Readings,
 };
 use crate::CalibrationError;
-use crate::law_params::LawParams;
 use crate::optimise::polish;
+use crate::params::law::LawParams;
 
 /// The likelihood of readings `R/R₀ - 1` under the extended Kalman filter of a known law, as a function of the parameters
 /// in `free`, each from a thousandth to a thousand times where it starts.

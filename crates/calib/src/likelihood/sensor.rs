@@ -1,5 +1,5 @@
 use super::{LikelihoodFit, NoiseParameter};
-use crate::estimator_params::{EstimatorParams, MotionParams, NoiseParams};
+use crate::params::estimator::{EstimatorParams, MotionParams, NoiseParams};
 use crate::samples::usual_step_s;
 
 /// Noise and motion to start from; what is not moved stays as it is here.

@@ -4,7 +4,7 @@ use ohmstrain_model::{
 };
 
 use super::ModelFamily;
-use crate::estimator_params::{MotionParams, NoiseParams};
+use crate::params::estimator::{MotionParams, NoiseParams};
 
 /// A parameter of noise or motion that readings alone may tell something about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

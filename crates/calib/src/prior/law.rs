@@ -3,10 +3,10 @@ use serde::{Deserialize, Serialize};
 
 use super::probe::common;
 use crate::CalibrationError;
-use crate::design::StrainScale;
-use crate::law_fit::{CrossFit, LawFit};
-use crate::law_regression::{BLOCKS, Design, LawRegression};
-use crate::law_structure::LawStructure;
+use crate::law::design::StrainScale;
+use crate::law::fit::{CrossFit, LawFit};
+use crate::law::regression::{BLOCKS, Design, LawRegression};
+use crate::law::structure::LawStructure;
 use crate::params::RangeParams;
 use crate::samples::{Samples, usual_step_s};
 

@@ -4,7 +4,6 @@
 //! further rows, the search for noise and motion starts from it and is pulled toward it, and the correction learns from some
 //! rows of every sensor beside the new one's own. R₀ is every sensor's own.
 
-mod calibrate;
 mod law;
 mod learn;
 mod noise;
@@ -12,19 +11,19 @@ mod parameters;
 mod population;
 mod probe;
 mod rows;
+mod validate;
 
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-pub use calibrate::calibrate_with_prior;
 pub use law::LawPrior;
 pub(crate) use learn::is_covariance;
 pub use noise::EstimatorPrior;
 pub use rows::CorrectionPrior;
 pub(crate) use rows::ROWS;
 
-use crate::estimator_params::EstimatorKind;
+use crate::params::estimator::EstimatorKind;
 use crate::params::{Quantity, Validity};
 
 /// Version of the file that a prior is written to.

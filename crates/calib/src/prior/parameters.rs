@@ -1,4 +1,4 @@
-use crate::law_params::{GaugeParams, LawParams};
+use crate::params::law::{GaugeParams, LawParams};
 
 impl LawParams {
     /// The parameter of a name that [`Uncertainty`](crate::Uncertainty) has; `None` for R₀, which is none of the law's.

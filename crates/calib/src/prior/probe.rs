@@ -1,10 +1,10 @@
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use crate::CalibrationError;
-use crate::law_fit::GaugeFamily;
-use crate::law_params::LawParams;
-use crate::law_regression::LawRegression;
-use crate::law_structure::LawStructure;
+use crate::law::fit::GaugeFamily;
+use crate::law::regression::LawRegression;
+use crate::law::structure::LawStructure;
+use crate::params::law::LawParams;
 use crate::params::{RangeParams, Uncertainty};
 use crate::samples::Samples;
 

@@ -2,9 +2,8 @@ use ohmstrain_ekf::correction::{FEATURES, RATE_GAIN};
 use serde::{Deserialize, Serialize};
 
 use super::median;
-use crate::correction_fit::{PAUSE_S, rounded};
-use crate::correction_params::{CorrectionParams, CorrectionScale, FUTURE_FEATURES, TrainingRow};
-use crate::estimator_params::EstimatorKind;
+use crate::params::correction::{CorrectionParams, CorrectionScale, FUTURE_FEATURES, PAUSE_S, TrainingRow};
+use crate::params::estimator::EstimatorKind;
 
 /// Rows of other sensors that a correction learns from beside the new sensor's own: as many as its own at most.
 pub(crate) const ROWS: usize = 100;
@@ -38,7 +37,7 @@ impl CorrectionPrior {
             for i in 0..wanted.min(sensor.rows.len()) {
                 let place = (i * sensors.len() + k) * sensor.rows.len() / (wanted * sensors.len());
                 let row = moved(&sensor.rows[place], &sensor.readings, &of_make);
-                rows.push(rounded(TrainingRow { time_s: start_s + row.time_s - first_s, ..row }));
+                rows.push(TrainingRow { time_s: start_s + row.time_s - first_s, ..row }.rounded());
             }
             start_s = rows.last().map_or(0.0, |row| row.time_s + PAUSE_S);
         }

@@ -1,5 +1,5 @@
 use super::*;
-use crate::law_params::{GaugeParams, LawParams};
+use crate::params::law::{GaugeParams, LawParams};
 use crate::params::{RangeParams, SensorParams};
 use crate::samples::Samples;
 

@@ -1,6 +1,6 @@
 //! The learned correction as the templates have it.
 
-use ohmstrain_calib::{PortableCorrection, PortableProcess};
+use ohmstrain_calib::{OwnedProcess, PortableCorrection};
 use ohmstrain_ekf::Real;
 use ohmstrain_ekf::correction::{FAR, FARTHEST, LINEAR, NEW, NOVEL, PASSED_OVER, RATE_GAIN, TIME_CONSTANTS_S};
 use serde::Serialize;
@@ -97,21 +97,22 @@ fn narrowed<'a>(numbers: impl IntoIterator<Item = &'a f64>) -> Vec<Literal> {
 impl CorrectionConstants {
     /// Of a correction.
     pub fn new(correction: &PortableCorrection, quadratics: Option<&[Quadratic; 2]>, dt_s: f32) -> Self {
-        let scales = &correction.scales;
+        let PortableCorrection { features, learned } = correction;
+        let scales = &learned.scales;
         let decays = TIME_CONSTANTS_S.map(|tau_s| decays(dt_s, tau_s as f32));
-        let explained = correction.direct.explained.len();
+        let explained = learned.direct.explained.len();
         Self {
-            centre: narrow(correction.features.centre),
-            half_range: narrow(correction.features.half_range),
-            rates: correction.features.rates.map(narrow),
-            starts: correction.features.starts.iter().map(|start| start.map(narrow)).collect(),
+            centre: narrow(features.centre),
+            half_range: narrow(features.half_range),
+            rates: features.rates.map(narrow),
+            starts: features.starts.iter().map(|start| start.map(narrow)).collect(),
             time_constants_s: narrowed(&TIME_CONSTANTS_S),
             decays: decays.iter().map(|(decay, _)| Literal(*decay)).collect(),
             mean_decays: decays.iter().map(|(_, mean)| Literal(*mean)).collect(),
             rate_gain: narrow(RATE_GAIN),
             farthest: narrow(FARTHEST),
             passed_over: PASSED_OVER,
-            rows: correction.rows.iter().map(narrowed).collect(),
+            rows: learned.rows.iter().map(narrowed).collect(),
             mean: scales.iter().map(|scale| narrow(scale.mean)).collect(),
             sd: scales.iter().map(|scale| Some(narrow(scale.sd)).filter(|sd| sd.0.is_finite())).collect(),
             lower: scales.iter().map(|scale| narrow(scale.lower)).collect(),
@@ -119,11 +120,11 @@ impl CorrectionConstants {
             // m rows of the triangle are m (m + 1) / 2 numbers.
             inducing: ((8 * explained + 1).isqrt() - 1) / 2,
             processes: [
-                ProcessConstants::new("DIRECT", "Strain from the features.", &correction.direct),
+                ProcessConstants::new("DIRECT", "Strain from the features.", &learned.direct),
                 ProcessConstants::new(
                     "RESIDUAL",
                     "What the filter's strain lacks, from all inputs.",
-                    &correction.residual,
+                    &learned.residual,
                 ),
             ],
             quadratics: quadratics.map(|both| both.each_ref().map(QuadraticConstants::new)),
@@ -131,25 +132,26 @@ impl CorrectionConstants {
             novel: narrow(NOVEL),
             new: narrow(NEW),
             linear: narrow(LINEAR),
-            strain_variance: narrow(correction.strain_variance),
-            variance_factor: narrow(correction.variance_factor),
+            strain_variance: narrow(learned.strain_variance),
+            variance_factor: narrow(learned.variance_factor),
         }
     }
 }
 
 impl ProcessConstants {
-    fn new(name: &'static str, comment: &'static str, process: &PortableProcess) -> Self {
-        let length = process.length as f32;
+    fn new(name: &'static str, comment: &'static str, process: &OwnedProcess<f64>) -> Self {
+        let numbers = &process.numbers;
+        let length = numbers.length as f32;
         Self {
             name,
             comment,
             length: Literal(length),
             length_square: Literal(length * length),
-            mean: narrow(process.mean),
-            variance: narrow(process.variance),
-            noise: narrow(process.noise),
-            widening: narrow(process.widening),
-            least_variance: narrow(process.least_variance),
+            mean: narrow(numbers.mean),
+            variance: narrow(numbers.variance),
+            noise: narrow(numbers.noise),
+            widening: narrow(numbers.widening),
+            least_variance: narrow(numbers.least_variance),
             weights: narrowed(&process.weights),
             explained: narrowed(&process.explained),
         }

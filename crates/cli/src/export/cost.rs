@@ -5,7 +5,7 @@
 //! of all kinds (arm-none-eabi-gcc 12.2, -O2 -fno-math-errno), which checks in turn that no estimate is further than a
 //! tenth from what it counts.
 
-use ohmstrain_calib::{EstimatorKind, GaugeParams, LawParams, SensorParams, with_sizes};
+use ohmstrain_calib::{EstimatorKind, GaugeParams, LawParams, PortableCorrection, SensorParams, with_sizes};
 use ohmstrain_ekf::correction::{FEATURES, OUTPUTS, TIME_CONSTANTS_S};
 use serde::Serialize;
 
@@ -106,8 +106,8 @@ impl Cost {
         let hypotheses = if filter.kind == EstimatorKind::Ekf { 0.0 } else { filter.hypotheses as f64 };
         let of_stack = [1.0, branches, hypotheses, hypotheses * branches];
         let mut stack: f64 = kind.stack.iter().zip(of_stack).map(|(bytes, count)| bytes * count).sum();
-        if let Some(correction) = &filter.correction {
-            let (rows, entries) = (correction.rows.len() as f64, correction.direct.explained.len() as f64);
+        if let Some(PortableCorrection { learned, .. }) = &filter.correction {
+            let (rows, entries) = (learned.rows.len() as f64, learned.direct.explained.len() as f64);
             instructions += ROW * rows + ENTRY * entries;
             let inputs = (OUTPUTS + FEATURES) as f64;
             // Inputs and two weights a row, two triangles, four numbers of each input's scale.

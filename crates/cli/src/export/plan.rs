@@ -47,8 +47,8 @@ impl ChipFilter {
         let mut quadratics = None;
         if let (Some(rows), Some(correction)) = (plan.rows, &mut filter.correction) {
             let singular = || parameter("`correction`: its rows cannot be projected onto fewer");
-            let (fewer, both) = reduced(correction, rows).ok_or_else(singular)?;
-            (*correction, quadratics) = (fewer, Some(both));
+            let (fewer, both) = reduced(&correction.learned, rows).ok_or_else(singular)?;
+            (correction.learned, quadratics) = (fewer, Some(both));
         }
         Ok(Self { filter, quadratics })
     }
@@ -69,9 +69,9 @@ impl ChipFilter {
         };
         match (&self.filter.correction, &self.quadratics) {
             (None, _) => format!("{filter}, no correction"),
-            (Some(all), None) => format!("{filter}, correction of {} rows", all.rows.len()),
+            (Some(all), None) => format!("{filter}, correction of {} rows", all.learned.rows.len()),
             (Some(few), Some(_)) => {
-                format!("{filter}, correction of {} rows and a quadratic function", few.rows.len())
+                format!("{filter}, correction of {} rows and a quadratic function", few.learned.rows.len())
             }
         }
     }

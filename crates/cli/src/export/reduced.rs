@@ -6,15 +6,15 @@
 //! fewer inducing rows, onto which those of the others are projected, as the others are projected already (Nyström).
 
 use nalgebra::{DMatrix, DVector};
-use ohmstrain_calib::{PortableCorrection, PortableProcess};
-use ohmstrain_ekf::correction::{FEATURES, LINEAR, OUTPUTS};
+use ohmstrain_calib::{OwnedCorrection, OwnedProcess};
+use ohmstrain_ekf::correction::{OUTPUTS, Process, kernel};
 
+use super::learned::INPUTS;
 use super::plan::Rows;
 use super::quadratic::{Fit, Quadratic};
 
-/// Inputs of the correction.
-const INPUTS: usize = OUTPUTS + FEATURES;
 type Row = [f64; INPUTS];
+type Correction = OwnedCorrection<f64, INPUTS>;
 
 /// Means are fitted in the rows, half-way to these of the nearest others, and from these as far beyond the row.
 const BETWEEN: [usize; 4] = [1, 2, 4, 8];
@@ -45,7 +45,7 @@ impl Which {
 }
 
 /// The correction with no more than these rows, and what stands for the others; none if kernels are singular.
-pub fn reduced(full: &PortableCorrection, to: Rows) -> Option<(PortableCorrection, [Quadratic; 2])> {
+pub fn reduced(full: &Correction, to: Rows) -> Option<(Correction, [Quadratic; 2])> {
     let inducing = side(full.direct.explained.len()).min(side(full.residual.explained.len()));
     let rows = to.mean.max(to.variance).min(inducing).max(1);
     let to = Rows { mean: rows, variance: to.variance.clamp(1, rows) };
@@ -53,7 +53,7 @@ pub fn reduced(full: &PortableCorrection, to: Rows) -> Option<(PortableCorrectio
     let (direct, of_direct) = process(&full.direct, Which::Direct, &full.rows, &points, to)?;
     let (residual, of_residual) = process(&full.residual, Which::Residual, &full.rows, &points, to)?;
     let rows = full.rows[..rows].to_vec();
-    Some((PortableCorrection { rows, direct, residual, ..full.clone() }, [of_direct, of_residual]))
+    Some((Correction { rows, direct, residual, ..full.clone() }, [of_direct, of_residual]))
 }
 
 /// Rows of a triangle of so many numbers.
@@ -62,33 +62,34 @@ fn side(entries: usize) -> usize {
 }
 
 fn process(
-    full: &PortableProcess,
+    full: &OwnedProcess<f64>,
     which: Which,
     rows: &[Row],
     points: &[(Row, f64)],
     to: Rows,
-) -> Option<(PortableProcess, Quadratic)> {
+) -> Option<(OwnedProcess<f64>, Quadratic)> {
     let at: Vec<&[f64]> = points.iter().map(|(row, _)| which.inputs(row)).collect();
     let all: Vec<&[f64]> = rows.iter().map(|row| which.inputs(row)).collect();
     let weights: Vec<f64> = points.iter().map(|(_, weight)| *weight).collect();
-    let kernels = kernels(full.length, &at, &all);
+    let kernels = kernels(full.numbers.length, &at, &all);
     let means = &kernels * DVector::from_column_slice(&full.weights);
     let fit = Fit::new(&at, &kernels.columns(0, to.mean).into_owned(), &means, &weights)?;
     let explained = explained(full, &all, to.variance)?;
-    let process = PortableProcess { mean: full.mean + fit.constant, weights: fit.weights, explained, ..full.clone() };
+    let numbers = Process { mean: full.numbers.mean + fit.constant, ..full.numbers };
+    let process = OwnedProcess { weights: fit.weights, explained, numbers };
     Some((process, fit.quadratic))
 }
 
-/// Kernels of two lists of inputs, as `ohmstrain_ekf::correction::Process` has them.
+/// Kernels of two lists of inputs.
 fn kernels(length: f64, a: &[&[f64]], b: &[&[f64]]) -> DMatrix<f64> {
     DMatrix::from_fn(a.len(), b.len(), |i, j| {
         let square: f64 = a[i].iter().zip(b[j]).map(|(a, b)| (a - b).powi(2)).sum();
-        (-0.5 * square / length.powi(2)).exp() + LINEAR * (a[i][0] * b[j][0] + 1.0)
+        kernel(length, square, a[i][0] * b[j][0])
     })
 }
 
 /// What the first few of the inducing rows explain.
-fn explained(full: &PortableProcess, rows: &[&[f64]], few: usize) -> Option<Vec<f64>> {
+fn explained(full: &OwnedProcess<f64>, rows: &[&[f64]], few: usize) -> Option<Vec<f64>> {
     let inducing = side(full.explained.len());
     let mut numbers = full.explained.iter();
     let mut triangle = DMatrix::zeros(inducing, inducing);
@@ -97,8 +98,8 @@ fn explained(full: &PortableProcess, rows: &[&[f64]], few: usize) -> Option<Vec<
             triangle[(i, j)] = *numbers.next()?;
         }
     }
-    let among = kernels(full.length, &rows[..few], &rows[..few]) + DMatrix::identity(few, few) * JITTER;
-    let with_others = kernels(full.length, &rows[..few], &rows[..inducing]);
+    let among = kernels(full.numbers.length, &rows[..few], &rows[..few]) + DMatrix::identity(few, few) * JITTER;
+    let with_others = kernels(full.numbers.length, &rows[..few], &rows[..inducing]);
     let projection = among.cholesky()?.solve(&with_others).transpose();
     let triangle = (triangle * projection).qr().r();
     Some((0..few).flat_map(|i| (i..few).map(move |j| (i, j))).map(|place| triangle[place]).collect())

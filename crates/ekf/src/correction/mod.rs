@@ -26,7 +26,7 @@ pub use features::{
 };
 pub use low_pass::LowPass;
 use process::{Kernels, Said};
-pub use process::{LINEAR, Process};
+pub use process::{LINEAR, Process, kernel};
 
 /// Number of a filter's outputs that a correction sees: strain, its rate, relaxation, baseline, and the probabilities of
 /// stretching and releasing.

@@ -10,7 +10,7 @@ pub const LINEAR: f64 = 0.09;
 /// Its mean takes all training rows. Its variance takes their kernels as weighted sums of those of the first few, the
 /// *inducing* rows (Nyström; Quiñonero-Candela & Rasmussen, *J. Mach. Learn. Res.* 6 (2005) 1939): larger than with all
 /// kernels where these rows are far, and much cheaper.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Process<'a, T> {
     /// ℓ, in standard deviations of the inputs.
     pub length: T,
@@ -54,7 +54,7 @@ impl<T: Real> Kernels<T> {
 
     /// Adds the next training row; `square` is its squared distance, `product` that of the first inputs.
     pub(super) fn add(&mut self, process: &Process<'_, T>, square: T, product: T) {
-        let kernel = (T::of(-0.5) * square / (process.length * process.length)).exp() + linear(product);
+        let kernel = kernel(process.length, square, product);
         if let Some(weight) = process.weights.get(self.rows) {
             self.mean += *weight * kernel;
         }
@@ -89,6 +89,12 @@ impl<T: Real> Kernels<T> {
         }
         explained
     }
+}
+
+/// The kernel of two rows whose squared distance is `square`; `product` is that of their first inputs.
+#[must_use]
+pub fn kernel<T: Real>(length: T, square: T, product: T) -> T {
+    (T::of(-0.5) * square / (length * length)).exp() + linear(product)
 }
 
 fn linear<T: Real>(product: T) -> T {

@@ -9,7 +9,7 @@ use ohmstrain_ekf::correction::{FEATURES, FeatureScale, ReadingFeatures};
 use ohmstrain_ekf::{Belief, Gaussian, Hypotheses, Mixture, Reading, Real, SignSplit, SparseEkf, StepError};
 use ohmstrain_model::{Phase, StrainRange, SwitchedModel};
 
-use super::learned::{INPUTS, Table};
+use super::learned::{INPUTS, Learned};
 use super::moving::Moving;
 pub use parts::{Numbers, Parts, PhaseParts, flag, number};
 use seen::Seen;
@@ -30,7 +30,7 @@ pub struct Twin<'a, T: Real, const B: usize, const N: usize, const L: usize, con
     start_variance: T,
     /// A strain that is less is none.
     zero: T,
-    correction: Option<Table<T>>,
+    correction: Option<Learned<T>>,
     /// As it is before any reading, and now.
     fresh: Memory<T, B, N, L, K>,
     now: Memory<T, B, N, L, K>,
@@ -107,7 +107,7 @@ impl<'a, T: Real, const B: usize, const N: usize, const L: usize, const K: usize
             strain_sd_scale: number(parts.strain_sd_scale.into()),
             start_variance: number(parts.start_variance.into()),
             zero: number(parts.zero.into()),
-            correction: parts.correction.map(|correction| Table::new(correction, parts.quadratics)),
+            correction: parts.correction.map(|correction| Learned::new(&correction.learned, parts.quadratics, limits)),
             fresh,
             now: fresh,
             work: [0; 2],
@@ -222,7 +222,7 @@ impl<'a, T: Real, const B: usize, const N: usize, const L: usize, const K: usize
     /// The filter's strain, corrected.
     fn corrected(&self) -> Gaussian<T> {
         let filtered = self.filtered();
-        let (Some(table), Some(features)) = (&self.correction, self.now.features) else { return filtered };
+        let (Some(learned), Some(features)) = (&self.correction, self.now.features) else { return filtered };
         let belief = self.now.moving.moments();
         let relaxation = (2..2 + B).fold(T::zero(), |sum, i| sum + belief.mean[i]);
         let baseline = if N == B + 3 { belief.mean[N - 1] } else { T::zero() };
@@ -230,7 +230,7 @@ impl<'a, T: Real, const B: usize, const N: usize, const L: usize, const K: usize
         let outputs = [filtered.mean, belief.mean[1], relaxation, baseline, extend, retract];
         let mut inputs = [T::zero(); INPUTS];
         inputs.iter_mut().zip(outputs.iter().chain(&features)).for_each(|(place, input)| *place = *input);
-        let strain = table.correct(&inputs, filtered, self.limits);
+        let strain = learned.correct(&inputs, filtered);
         let grown = (filtered.variance - self.now.known_variance).max(T::zero());
         if self.now.missing { Gaussian { variance: strain.variance + grown, ..strain } } else { strain }
     }

@@ -1,0 +1,201 @@
+use serde::Serialize;
+
+use crate::law::fit::CrossFit;
+use crate::motion_stats::{REST_SHARE, moving_mean};
+use crate::order::extent;
+use crate::params::summary::Limit;
+use crate::samples::central_rate;
+use crate::samples::{Samples, filled_strain};
+
+/// What makes the error of a calibrated filter, from parts of the recordings that its law was not fitted to.
+///
+/// Law, drift and noise are what the law leaves of the readings where the true strain drives it, in percent of the readings'
+/// range: what is the same throughout a part is drift, what differs from row to row is noise, the rest is the law's. The
+/// direction is the filter's affair: the squared error of rows in which it takes stretching for releasing, or the reverse.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct ErrorBudget {
+    /// Of the law's form and parameters, percent of the readings' range.
+    pub law_percent: f64,
+    /// Offset of whole parts, percent of the readings' range.
+    pub drift_percent: f64,
+    /// White noise of single readings, percent of the readings' range.
+    pub noise_percent: f64,
+    /// Share of the moving rows, 0 to 1, in which the direction is wrong.
+    pub wrong_rows: f64,
+    /// Share of all squared error, 0 to 1, in those rows.
+    pub wrong_error: f64,
+}
+
+/// Parts of a filter's squared error, each 0 to 1; together they are 1.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct ErrorShares {
+    /// Of the law's form and parameters.
+    pub law: f64,
+    /// Of rows in which the direction is wrong.
+    pub direction: f64,
+    /// Of slow changes.
+    pub drift: f64,
+    /// Of single readings' noise.
+    pub noise: f64,
+}
+
+impl ErrorShares {
+    /// With their names, the largest first.
+    #[must_use]
+    pub fn sorted(&self) -> [(Limit, f64); 4] {
+        let mut parts = [
+            (Limit::Law, self.law),
+            (Limit::Direction, self.direction),
+            (Limit::Drift, self.drift),
+            (Limit::Noise, self.noise),
+        ];
+        parts.sort_by(|a, b| b.1.total_cmp(&a.1));
+        parts
+    }
+}
+
+impl ErrorBudget {
+    /// Where the squared error of the strain lies: in rows where the direction is wrong; and of the other rows as law, drift
+    /// and noise share the square of what the law leaves of the readings.
+    #[must_use]
+    pub fn shares(&self) -> ErrorShares {
+        let squares = [self.law_percent, self.drift_percent, self.noise_percent].map(|percent| percent * percent);
+        let sum: f64 = squares.iter().sum();
+        // Where the law leaves nothing, what there is of error is not told apart, and counted as the law's.
+        let [law, drift, noise] = if sum > 0.0 { squares.map(|square| square / sum) } else { [1.0, 0.0, 0.0] };
+        let others = 1.0 - self.wrong_error;
+        ErrorShares { law: others * law, direction: self.wrong_error, drift: others * drift, noise: others * noise }
+    }
+
+    /// What makes most of the error: the largest of [`ErrorBudget::shares`].
+    #[must_use]
+    pub fn limit(&self) -> Limit {
+        self.shares().sorted()[0].0
+    }
+
+    pub(crate) fn new(recordings: &[Samples], fit: &CrossFit, wrong: &WrongDirection) -> Self {
+        let (mut law, mut drift, mut noise, mut count) = (0.0, 0.0, 0.0, 0.0);
+        for (block, without) in fit.without_block.iter().enumerate() {
+            for (r, (residuals, samples)) in without.residuals.iter().zip(recordings).enumerate() {
+                let rows = fit.blocks[r][block].clone();
+                let percent = 100.0 * without.rest_readings[r] / range(samples);
+                let known: Vec<f64> = residuals[rows].iter().filter(|x| x.is_finite()).map(|x| x * percent).collect();
+                let n = known.len() as f64;
+                if known.len() < 3 || !percent.is_finite() {
+                    continue;
+                }
+                let mean = known.iter().sum::<f64>() / n;
+                let variance = known.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / n;
+                let white = white_variance(&known).min(variance);
+                (law, drift, noise) = (law + n * (variance - white), drift + n * mean * mean, noise + n * white);
+                count += n;
+            }
+        }
+        let size = |sum: f64| (sum / f64::max(count, 1.0)).sqrt();
+        let share = |part: f64, whole: f64| if whole > 0.0 { part / whole } else { 0.0 };
+        Self {
+            law_percent: size(law),
+            drift_percent: size(drift),
+            noise_percent: size(noise),
+            wrong_rows: share(wrong.rows, wrong.moving_rows),
+            wrong_error: share(wrong.squared_error, wrong.all_squared_error),
+        }
+    }
+}
+
+/// Range of the readings.
+fn range(samples: &Samples) -> f64 {
+    let known = samples.complete_rows().map(|k| samples.reading[k]);
+    let (low, high) = extent(known);
+    high - low
+}
+
+/// Median of a χ² variable with one degree of freedom.
+const CHI_SQUARE_MEDIAN: f64 = 0.454_936;
+
+/// Variance of what is independent from row to row, from the median square of second differences, which a steady change
+/// does not touch: (x₋ − 2 x + x₊)² is 6 σ² on average.
+fn white_variance(x: &[f64]) -> f64 {
+    let mut squares: Vec<f64> = x.windows(3).map(|w| (w[0] - 2.0 * w[1] + w[2]).powi(2)).collect();
+    squares.sort_by(f64::total_cmp);
+    squares.get(squares.len() / 2).map_or(0.0, |median| median / (6.0 * CHI_SQUARE_MEDIAN))
+}
+
+/// Which way the body moves in a row; zero at rest.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Direction(i8);
+
+impl Direction {
+    /// Of every row of a recording.
+    pub(crate) fn of_rows(samples: &Samples) -> Vec<Self> {
+        let rate = moving_mean(&central_rate(samples.time_s, &filled_strain(samples)));
+        let mut speeds: Vec<f64> = rate.iter().map(|v| v.abs()).collect();
+        speeds.sort_by(f64::total_cmp);
+        let rest = REST_SHARE * speeds.get(speeds.len().saturating_sub(1) * 9 / 10).copied().unwrap_or(0.0);
+        rate.iter().map(|v| Self(i8::from(*v > rest) - i8::from(*v < -rest))).collect()
+    }
+}
+
+/// Rows in which a filter has the direction wrong.
+#[derive(Debug, Default)]
+pub(crate) struct WrongDirection {
+    rows: f64,
+    moving_rows: f64,
+    squared_error: f64,
+    all_squared_error: f64,
+}
+
+impl WrongDirection {
+    /// Takes a row: the true direction, the estimated rate, the error of the strain.
+    pub(crate) fn see(&mut self, truth: Direction, rate: f64, error: f64) {
+        let is_wrong = f64::from(truth.0) * rate < 0.0;
+        self.all_squared_error += error * error;
+        self.moving_rows += f64::from(u8::from(truth.0 != 0));
+        if is_wrong {
+            self.rows += 1.0;
+            self.squared_error += error * error;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{ErrorBudget, Limit, white_variance};
+
+    /// Second differences of white noise with deviation 0.3 on a steep line. The median of n = 20 000 squares, neighbours
+    /// correlated, is known to a few percent.
+    #[test]
+    fn noise_is_told_from_a_steady_change() {
+        let mut state = 1_u64;
+        let mut uniform = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1_u64 << 53) as f64
+        };
+        let noise: Vec<f64> = (0..20_000).map(|_| 0.3 * ((0..12).map(|_| uniform()).sum::<f64>() - 6.0)).collect();
+        let sloped: Vec<f64> = noise.iter().enumerate().map(|(k, x)| x + 5.0 * k as f64).collect();
+        assert!((white_variance(&sloped).sqrt() / 0.3 - 1.0).abs() < 0.05, "{}", white_variance(&sloped).sqrt());
+        assert_eq!(white_variance(&[1.0, 2.0]), 0.0);
+    }
+
+    #[test]
+    fn the_largest_share_limits() {
+        let budget = |law_percent, drift_percent, noise_percent, wrong_error| ErrorBudget {
+            law_percent,
+            drift_percent,
+            noise_percent,
+            wrong_rows: 0.1,
+            wrong_error,
+        };
+        // Squares 9, 1, 0.25 of 10.25: law has 0.878 of what the direction leaves.
+        assert_eq!(budget(3.0, 1.0, 0.5, 0.4).limit(), Limit::Law);
+        assert_eq!(budget(1.0, 3.0, 0.5, 0.4).limit(), Limit::Drift);
+        assert_eq!(budget(1.0, 0.5, 3.0, 0.4).limit(), Limit::Noise);
+        assert_eq!(budget(3.0, 1.0, 0.5, 0.6).limit(), Limit::Direction);
+        // Less than half, and more than any other: 0.4 against 0.6 / 2.
+        assert_eq!(budget(2.0, 2.0, 0.0, 0.4).limit(), Limit::Direction);
+        let shares = budget(3.0, 1.0, 0.5, 0.4).shares();
+        assert!((shares.law - 0.6 * 9.0 / 10.25).abs() < 1e-15 && shares.direction == 0.4);
+        assert!((shares.law + shares.direction + shares.drift + shares.noise - 1.0).abs() < 1e-15);
+        assert_eq!(budget(0.0, 0.0, 0.0, 0.0).limit(), Limit::Law);
+    }
+}

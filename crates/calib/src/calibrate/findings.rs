@@ -1,0 +1,229 @@
+//! What a calibration is worth on parts of the recordings that it was not fitted to, what it has seen, and what limits it.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use crate::CalibrationError;
+use crate::baselines::Baseline;
+use crate::calibrate::correction_fit::fit_correction;
+use crate::calibrate::error_budget::{Direction, ErrorBudget, WrongDirection};
+use crate::calibrate::left_out::relative_changes;
+use crate::calibrate::scores::{ScoredRow, Scores};
+use crate::filter::build::{Setting, filter_from_parts};
+use crate::filter::corrected::Corrected;
+use crate::filter::sieve::Sieve;
+use crate::filter::{Filter, Start};
+use crate::law::fit::{CrossFit, LawFit};
+use crate::law::identifiability::Identifiability;
+use crate::motion_stats::MotionStats;
+use crate::params::RangeParams;
+use crate::params::estimator::{EstimatorKind, EstimatorParams};
+use crate::params::static_cubic::StaticCubic;
+use crate::params::summary::Summary;
+use crate::prior::CorrectionPrior;
+use crate::samples::Samples;
+
+/// Tenths of a range.
+const TENTHS: usize = 10;
+
+/// What a calibration is worth, and what it rests on.
+///
+/// Every quarter of the recordings is estimated by a law and a correction that were fitted to the other three, and scored;
+/// the static cubic likewise. Structure, ridge, noise and motion were chosen with all quarters in view, so that a
+/// recording of another day may be estimated somewhat worse.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Findings {
+    /// The default estimator's filter on the quarters left out.
+    pub filter: Scores,
+    /// Its smoother, which sees the whole recording; `None` if it has none.
+    pub smoother: Option<Scores>,
+    /// The static cubic.
+    pub static_cubic: Scores,
+    /// What makes the error.
+    pub budget: ErrorBudget,
+    /// What was seen.
+    pub seen: Seen,
+    /// What to record next, most important first; empty if nothing stands out.
+    pub advice: Vec<String>,
+}
+
+/// What the recordings of a calibration contain.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Seen {
+    /// Range of the reference.
+    pub range: RangeParams,
+    /// Share of the rows, 0 to 1, in each tenth of that range, lowest first.
+    pub tenths: [f64; TENTHS],
+    /// Speeds that a quarter of the moving rows is below, and above, per second.
+    pub quartile_speeds: (f64, f64),
+    /// 99th percentile of the speed, per second.
+    pub fastest_rate: f64,
+    /// Longest hold, s; zero if the body never rests.
+    pub longest_hold_s: f64,
+    /// Longest recording, s.
+    pub longest_s: f64,
+    /// Rows with reading and reference.
+    pub rows: usize,
+}
+
+impl Seen {
+    pub(crate) fn new(recordings: &[Samples], range: RangeParams, stats: &MotionStats) -> Self {
+        let mut counts = [0_usize; TENTHS];
+        for samples in recordings {
+            for k in samples.complete_rows() {
+                let share = (samples.strain[k] - range.lower) / range.span();
+                counts[((share * TENTHS as f64) as usize).min(TENTHS - 1)] += 1;
+            }
+        }
+        let rows: usize = counts.iter().sum();
+        Self {
+            range,
+            tenths: counts.map(|count| count as f64 / rows.max(1) as f64),
+            quartile_speeds: stats.quartile_speeds,
+            fastest_rate: stats.fastest_rate,
+            longest_hold_s: stats.longest_hold_s,
+            longest_s: stats.longest_s,
+            rows,
+        }
+    }
+}
+
+/// What the scores of the quarters left out are made of.
+pub(crate) struct Check<'a> {
+    pub recordings: &'a [Samples<'a>],
+    pub fit: &'a CrossFit,
+    pub kind: EstimatorKind,
+    /// The filter that runs: itself, or the one that it corrects.
+    pub filter: EstimatorKind,
+    /// Noise and motion, that of the estimator and of what smooths in its place among them.
+    pub estimators: &'a BTreeMap<EstimatorKind, EstimatorParams>,
+    /// What other sensors of the make tell the correction.
+    pub of_make: Option<&'a CorrectionPrior>,
+}
+
+/// Rows of all recordings that were scored, in a row.
+#[derive(Default)]
+struct Scored {
+    filter: Vec<ScoredRow>,
+    smoother: Vec<ScoredRow>,
+    static_cubic: Vec<ScoredRow>,
+    wrong: WrongDirection,
+}
+
+impl Check<'_> {
+    /// Scores every quarter with what was fitted to the others; `None` if they cannot be estimated.
+    pub(crate) fn findings(&self, seen: Seen, told: &Option<Identifiability>) -> Option<Findings> {
+        let scored = self.scored().ok()?;
+        Some(Findings {
+            filter: Scores::of_full_scale(&scored.filter)?,
+            smoother: Scores::of_full_scale(&scored.smoother),
+            static_cubic: Scores::of_full_scale(&scored.static_cubic)?,
+            budget: ErrorBudget::new(self.recordings, self.fit, &scored.wrong),
+            seen,
+            advice: told.as_ref().map_or_else(Vec::new, |told| told.advice.clone()),
+        })
+    }
+
+    fn scored(&self) -> Result<Scored, CalibrationError> {
+        let mut scored = Scored::default();
+        // Times of one recording after the other, so that none goes back.
+        let mut offset_s = 0.0;
+        let directions: Vec<Vec<Direction>> = self.recordings.iter().map(Direction::of_rows).collect();
+        for block in 0..self.fit.without_block.len() {
+            self.score_block(block, &directions, &mut offset_s, &mut scored)?;
+        }
+        Ok(scored)
+    }
+
+    fn score_block(
+        &self,
+        block: usize,
+        directions: &[Vec<Direction>],
+        offset_s: &mut f64,
+        scored: &mut Scored,
+    ) -> Result<(), CalibrationError> {
+        let (law, limits) = (&self.fit.without_block[block], self.fit.law.law.range);
+        let masked: Vec<Vec<f64>> = self.recordings.iter().enumerate().map(|(r, s)| self.masked(r, s, block)).collect();
+        let training: Vec<Samples> = self
+            .recordings
+            .iter()
+            .zip(&masked)
+            .map(|(samples, strain)| Samples { strain: strain.as_slice(), ..*samples })
+            .collect();
+        let cubic = StaticCubic::fit(&training, limits)?;
+        let estimator = self.estimator_without(law, &training)?;
+        for (r, samples) in self.recordings.iter().enumerate() {
+            let rows = self.fit.blocks[r][block].clone();
+            let readings = relative_changes(samples.reading, law.rest_readings[r]);
+            let failed = |row: usize, error| CalibrationError::Filter { time_s: samples.time_s[row], error };
+            let mut filter = estimator(false)?;
+            let smoothed = estimator(true)?.smooth(samples.time_s, &readings).map_err(|(row, e)| failed(row, e))?;
+            let mut baseline = cubic.start();
+            for k in 0..rows.end {
+                filter.step(samples.time_s[k], readings[k]).map_err(|error| failed(k, error))?;
+                let on_cubic = baseline.strain(samples.time_s[k], samples.reading[k]);
+                let truth = samples.strain[k];
+                if k < rows.start || !truth.is_finite() {
+                    continue;
+                }
+                let time_s = *offset_s + samples.time_s[k] - samples.time_s[rows.start];
+                let row = |strain: f64, sd: Option<f64>| ScoredRow { time_s, truth, strain, sd };
+                let estimate = filter.output().estimate;
+                scored.filter.push(row(estimate.strain.mean, Some(estimate.strain.sd())));
+                scored.wrong.see(directions[r][k], estimate.rate.mean, estimate.strain.mean - truth);
+                if let Some(smoothed) = &smoothed {
+                    let strain = smoothed[k].estimate.strain;
+                    scored.smoother.push(row(strain.mean, Some(strain.sd())));
+                }
+                scored.static_cubic.push(row(on_cubic, None));
+            }
+            *offset_s = scored.filter.last().map_or(*offset_s, |row| row.time_s);
+        }
+        Ok(())
+    }
+
+    /// The strain of a recording, unknown in a block.
+    fn masked(&self, recording: usize, samples: &Samples, block: usize) -> Vec<f64> {
+        let mut strain = samples.strain.to_vec();
+        strain[self.fit.blocks[recording][block].clone()].fill(f64::NAN);
+        strain
+    }
+
+    /// Makes filter, or smoother, with a law and a correction that know the strains of `training` alone.
+    fn estimator_without<'b>(
+        &'b self,
+        law: &'b LawFit,
+        training: &[Samples],
+    ) -> Result<impl Fn(bool) -> Result<Box<dyn Filter>, CalibrationError> + 'b, CalibrationError> {
+        let limits = self.fit.law.law.range;
+        let setting = Setting { limits, start: Start::Unknown, sieve: Sieve::OPEN };
+        let bare = move |smooths: bool| {
+            let kind = if smooths { self.filter.smoother() } else { self.filter };
+            let params = self.estimators.get(&kind).ok_or_else(|| CalibrationError::no_parameters(kind))?;
+            filter_from_parts(kind, &law.law, params, setting)
+        };
+        let correction = if self.kind == EstimatorKind::Corrected {
+            fit_correction(training, &law.rest_readings, limits, (self.filter, &|| bare(false)), self.of_make)?
+        } else {
+            None
+        };
+        Ok(move |smooths: bool| match &correction {
+            Some(correction) => Ok(Box::new(Corrected::new(bare(smooths)?, correction, limits)?) as Box<dyn Filter>),
+            None => bare(smooths),
+        })
+    }
+}
+
+impl From<&Findings> for Summary {
+    fn from(found: &Findings) -> Self {
+        Self {
+            left_out_percent_fs: found.filter.rmse_percent_fs,
+            smoothed_percent_fs: found.smoother.map(|scores| scores.rmse_percent_fs),
+            static_cubic_percent_fs: found.static_cubic.rmse_percent_fs,
+            coverage_95_percent: 100.0 * found.filter.coverage_95.unwrap_or(0.0),
+            width_95_percent_fs: found.filter.width_95_percent_fs.unwrap_or(0.0),
+            limited_by: found.budget.limit(),
+        }
+    }
+}

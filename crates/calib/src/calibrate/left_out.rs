@@ -1,0 +1,127 @@
+use std::ops::Range;
+
+use ohmstrain_ekf::{Gaussian, Reading};
+
+use crate::CalibrationError;
+use crate::filter::Filter;
+use crate::law::fit::CrossFit;
+use crate::params::RangeParams;
+use crate::params::law::LawParams;
+use crate::samples::Samples;
+
+/// Standard deviation that every reference has of its own, as a share of the strain's range: no score can be had from
+/// being more precise.
+pub(crate) const REFERENCE_SD: f64 = 0.005;
+
+/// The recordings, block by block, each block with the law that was fitted without it.
+///
+/// With a law that has seen the block the residuals are too small, and a filter tuned on them believes its law more than
+/// it may elsewhere.
+pub(crate) struct LeftOut<'a> {
+    runs: Vec<Run<'a>>,
+    limits: RangeParams,
+}
+
+/// Makes a filter for a law that was fitted without a block.
+pub(crate) type Build<'a> = dyn Fn(Fold) -> Result<Box<dyn Filter>, CalibrationError> + 'a;
+
+/// A law that was fitted without a block.
+#[derive(Clone, Copy)]
+pub(crate) struct Fold<'a> {
+    pub law: &'a LawParams,
+    /// R₀ of that law in the recording, which readings are relative to.
+    pub rest_reading: f64,
+}
+
+/// One recording up to the end of the block that its law has not seen.
+struct Run<'a> {
+    fold: Fold<'a>,
+    time_s: Vec<f64>,
+    /// Relative to the R₀ of that law.
+    reading: Vec<Option<Reading<f64>>>,
+    strain: Vec<f64>,
+    block: Range<usize>,
+}
+
+impl<'a> LeftOut<'a> {
+    /// Takes every `stride`-th row. The model is continuous in time, so that the same parameters fit any sampling.
+    pub(crate) fn new(samples: &[Samples], fit: &'a CrossFit, limits: RangeParams, stride: usize) -> Self {
+        let mut runs = Vec::new();
+        for (block, law) in fit.without_block.iter().enumerate() {
+            for (recording, samples) in samples.iter().enumerate() {
+                let pick = |values: &[f64]| values.iter().copied().step_by(stride).collect::<Vec<f64>>();
+                let rows = &fit.blocks[recording][block];
+                let fold = Fold { law: &law.law, rest_reading: law.rest_readings[recording] };
+                runs.push(Run {
+                    fold,
+                    time_s: pick(samples.time_s),
+                    reading: relative_changes(&pick(samples.reading), fold.rest_reading),
+                    strain: pick(samples.strain),
+                    block: rows.start.div_ceil(stride)..rows.end.div_ceil(stride),
+                });
+            }
+        }
+        Self { runs, limits }
+    }
+
+    /// Mean negative log density of the true strain under the filter, strain in units of its range. Infinite if the
+    /// filter fails.
+    pub(crate) fn score(&self, build: &Build) -> f64 {
+        let span = self.limits.span();
+        let (mut sum, mut count) = (0.0, 0_usize);
+        let finished = self.each_row(build, |_, strain, truth| {
+            let variance = strain.variance / (span * span) + REFERENCE_SD * REFERENCE_SD;
+            let error = (strain.mean - truth) / span;
+            sum += 0.5 * (error * error / variance + variance.ln());
+            count += 1;
+        });
+        if finished.is_some() { sum / count.max(1) as f64 } else { f64::INFINITY }
+    }
+
+    /// Errors of the filter in units of its deviation, block by block; `None` if it fails.
+    pub(crate) fn filtered_deviations(&self, build: &Build) -> Option<Vec<Vec<f64>>> {
+        let mut deviations = vec![Vec::new(); self.runs.len()];
+        self.each_row(build, |run, strain, truth| {
+            deviations[run].push((strain.mean - truth).abs() / strain.sd());
+        })?;
+        Some(deviations)
+    }
+
+    /// The same for the smoother of whole recordings; `None` if the estimator has none.
+    pub(crate) fn smoothed_deviations(&self, build: &Build) -> Option<Vec<Vec<f64>>> {
+        let of_run = |run: &Run| {
+            let mut filter = build(run.fold).ok()?;
+            let smoothed = filter.smooth(&run.time_s, &run.reading).ok()??;
+            let known = run.block.clone().filter(|&k| run.strain[k].is_finite());
+            Some(
+                known
+                    .map(|k| {
+                        let strain = smoothed[k].estimate.strain;
+                        (strain.mean - run.strain[k]).abs() / strain.sd()
+                    })
+                    .collect(),
+            )
+        };
+        self.runs.iter().map(of_run).collect()
+    }
+
+    /// Visits run, estimate and true strain in every row of every block: the filter runs from the first row to the end
+    /// of the block. `None` if it fails.
+    fn each_row(&self, build: &Build, mut visit: impl FnMut(usize, Gaussian<f64>, f64)) -> Option<()> {
+        for (index, run) in self.runs.iter().enumerate() {
+            let mut filter = build(run.fold).ok()?;
+            for k in 0..run.block.end {
+                filter.step(run.time_s[k], run.reading[k]).ok()?;
+                if k >= run.block.start && run.strain[k].is_finite() {
+                    visit(index, filter.strain(), run.strain[k]);
+                }
+            }
+        }
+        Some(())
+    }
+}
+
+/// Readings over R₀ minus 1; `None` where missing.
+pub(crate) fn relative_changes(reading: &[f64], rest_reading: f64) -> Vec<Option<Reading<f64>>> {
+    reading.iter().map(|r| r.is_finite().then(|| Reading::from(r / rest_reading - 1.0))).collect()
+}

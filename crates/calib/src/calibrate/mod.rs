@@ -1,0 +1,333 @@
+//! From recordings with known strain to a sensor: the law, noise and motion of its filters, the correction, and what it all is
+//! worth on quarters left out.
+
+pub(crate) mod correction_fit;
+pub(crate) mod correction_scale;
+pub(crate) mod error_budget;
+pub(crate) mod findings;
+pub(crate) mod left_out;
+pub(crate) mod noise_fit;
+pub(crate) mod scores;
+pub(crate) mod with_prior;
+
+use std::collections::BTreeMap;
+
+use crate::CalibrationError;
+use crate::calibrate::correction_fit::fit_correction;
+use crate::calibrate::findings::{Check, Findings, Seen};
+use crate::calibrate::noise_fit::{
+    NoiseProblem, REFINEMENT, SURVEY, Surveyed, best_of_each_size, survey, survey_evaluations,
+};
+use crate::filter::Start;
+use crate::filter::build::{Setting, filter_from_parts};
+use crate::filter::sieve::{Sieve, longest_repeat_s};
+use crate::law::fit::{CrossFit, LawOptions, fit_laws};
+use crate::law::identifiability::identifiability;
+use crate::motion_stats::MotionStats;
+use crate::order::median;
+use crate::params::correction::CorrectionParams;
+use crate::params::estimator::{EstimatorKind, EstimatorParams};
+use crate::params::law::LawParams;
+use crate::params::recipe::RECIPE;
+use crate::params::static_cubic::StaticCubic;
+use crate::params::summary::Summary;
+use crate::params::{FORMAT, Quantity, RangeParams, ReadingUnit, SensorParams, Uncertainty, Validity};
+use crate::prior::{CorrectionPrior, Prior};
+use crate::recording::rest::rest_share;
+use crate::recording::screen::{Distrusted, screen};
+use crate::samples::{Samples, reading_range};
+
+/// What calibration is doing, for a progress bar.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stage {
+    /// Fitting the law.
+    Law,
+    /// Fitting noise and motion for an estimator: evaluations done and expected.
+    Noise {
+        /// Evaluations of the score so far.
+        done: u64,
+        /// Evaluations expected.
+        expected: u64,
+    },
+    /// Estimating every quarter of the recordings with what was fitted to the others.
+    LeftOut,
+}
+
+/// A calibrated sensor, before it is written down.
+#[derive(Clone, Debug)]
+pub struct Calibration {
+    /// Rows of the recordings that were left out, for standing far from their neighbours or from the law.
+    pub distrusted: Vec<Distrusted>,
+    /// The law.
+    pub law: LawParams,
+    /// R₀ of each recording.
+    pub rest_readings: Vec<f64>,
+    /// What the rested sensor reads over R₀, if a recording begins at rest.
+    pub rest_share: Option<f64>,
+    /// What the recordings tell of the law's parameters: without the ridge, as [`identifiability`] has it; `None` if they
+    /// tell nothing without it.
+    pub uncertainty: Option<Uncertainty>,
+    /// The estimator that did best.
+    pub default_estimator: EstimatorKind,
+    /// Noise and motion, per estimator.
+    pub estimators: BTreeMap<EstimatorKind, EstimatorParams>,
+    /// What was learned about the error of the filter that is corrected, if that was asked for.
+    pub correction: Option<CorrectionParams>,
+    /// The range of the reference.
+    pub limits: RangeParams,
+    /// What was seen.
+    pub validity: Validity,
+    /// The static inverse fitted to the same rows.
+    pub static_cubic: StaticCubic,
+    /// What it is worth on parts that it was not fitted to; `None` if they cannot be estimated.
+    pub findings: Option<Findings>,
+}
+
+impl Calibration {
+    /// The parameters of the sensor, in these units: R₀ is the median of the recordings', and what calibration does not
+    /// know (a joint, names and hashes of recordings) is left empty.
+    #[must_use]
+    pub fn into_sensor(self, made_by: &str, quantity: Quantity, reading: ReadingUnit) -> SensorParams {
+        let rest_reading = median_rest(&self.rest_readings);
+        SensorParams {
+            format: FORMAT,
+            made_by: made_by.into(),
+            quantity,
+            reading,
+            rest_reading,
+            measured_rest: self.rest_share.map(|share| share * rest_reading),
+            default_estimator: self.default_estimator,
+            summary: self.findings.as_ref().map(Summary::from),
+            limits: self.limits,
+            validity: self.validity,
+            static_cubic: self.static_cubic,
+            joint: None,
+            law: self.law,
+            estimators: self.estimators,
+            recordings: vec![],
+            uncertainty: self.uncertainty,
+            correction: self.correction,
+        }
+    }
+}
+
+/// R₀ of the sensor from those of its recordings.
+fn median_rest(rest_readings: &[f64]) -> f64 {
+    median(rest_readings.iter().copied()).unwrap_or(f64::NAN)
+}
+
+/// How much better, in mean log density of the strain, a single Gaussian must be than hypotheses: once it has taken the
+/// wrong direction it does not come back, and a short recording may not show that. Ten per cent in the deviation.
+const LOCK_IN: f64 = 0.1;
+
+fn handicap(kind: EstimatorKind) -> f64 {
+    if kind.has_phases() { 0.0 } else { LOCK_IN }
+}
+
+/// Calibrates law, noise and motion on recordings with known strain. Deterministic: same samples, same result. Rows that
+/// stand far from their neighbours, or from the law, take no part ([`screen`]).
+///
+/// Estimators are tried with a law for each of `structures` and each strength of ridge; the pair with the best score on
+/// blocks that the law has not seen gives the law. To that law every one of them, what smooths in its place, and the extended
+/// Kalman filter in any case, is then fitted, and the best of `kinds` becomes
+/// the default. Near ties go to the one that keeps hypotheses. [`EstimatorKind::Corrected`] is the default where it is asked
+/// for; what it corrects is learned last, from the same rows.
+///
+/// # Errors
+/// If the recordings are too short or too plain to learn a law from, if the law explains nothing, or `structures` or `kinds` is
+/// empty.
+pub fn calibrate(
+    recordings: &[Samples],
+    structures: &[LawOptions],
+    kinds: &[EstimatorKind],
+    progress: impl FnMut(Stage),
+) -> Result<Calibration, CalibrationError> {
+    calibrate_once(recordings, structures, kinds, None, progress)
+}
+
+/// [`calibrate`] with a prior, or without.
+pub(crate) fn calibrate_once(
+    recordings: &[Samples],
+    structures: &[LawOptions],
+    kinds: &[EstimatorKind],
+    prior: Option<&Prior>,
+    mut progress: impl FnMut(Stage),
+) -> Result<Calibration, CalibrationError> {
+    progress(Stage::Law);
+    let screened = screen(recordings)?;
+    let recordings: &[Samples] = &screened.samples();
+    let laws = match prior {
+        Some(prior) => vec![prior.law.posterior(recordings)?],
+        None => fit_laws(recordings, structures)?,
+    };
+    let stats = MotionStats::new(recordings);
+    let asked = Asked::new(kinds, prior, &stats);
+    let mut steps = Steps { done: 0, expected: asked.expected_evaluations(&laws), progress };
+    let surveyed = survey_all(recordings, &laws, stats, &asked, prior, &mut || steps.evaluated())?;
+    let Some(fit) = cheapest(surveyed.iter()).map(|best| best.law) else {
+        return Err(CalibrationError::Unsupported("a calibration without an estimator".into()));
+    };
+    let corrected = cheapest(surveyed.iter().filter(|one| asked.candidates.contains(&one.kind))).map(|one| one.kind);
+    // One filter is corrected: no other one needs to be refined.
+    let wanted = distinct(corrected.into_iter().chain(asked.named.iter().copied()));
+    let smoothers = wanted.iter().map(|kind| kind.smoother());
+    let mut estimators = BTreeMap::new();
+    for kind in distinct(wanted.iter().copied().chain(smoothers).chain([EstimatorKind::Ekf])) {
+        let known = surveyed.iter().find(|one| one.kind == kind && std::ptr::eq(one.law, fit));
+        let params = refined(recordings, (fit, stats), (kind, prior), known, &mut || steps.evaluated())?;
+        estimators.insert(kind, params);
+    }
+    let of_make = prior.and_then(|prior| prior.correction.as_ref());
+    let correction =
+        corrected.map(|kind| correction(recordings, fit, (kind, of_make), &estimators)).transpose()?.flatten();
+    let score =
+        |kind: &EstimatorKind| estimators.get(kind).map_or(f64::INFINITY, |params| params.score + handicap(*kind));
+    let best = wanted.iter().copied().min_by(|a, b| score(a).total_cmp(&score(b))).unwrap_or(EstimatorKind::Ekf);
+    let (default_estimator, filter) =
+        correction.as_ref().map_or((best, best), |correction| (EstimatorKind::Corrected, correction.corrects));
+    let limits = fit.law.law.range;
+    (steps.progress)(Stage::LeftOut);
+    let identifiability = identifiability(recordings, &fit.law.law).ok();
+    let seen = Seen::new(recordings, limits, &stats);
+    let findings = Check { recordings, fit, kind: default_estimator, filter, estimators: &estimators, of_make }
+        .findings(seen, &identifiability);
+    let own = validity(recordings, limits, &stats);
+    Ok(Calibration {
+        distrusted: screened.distrusted.clone(),
+        default_estimator,
+        findings,
+        estimators,
+        correction,
+        static_cubic: StaticCubic::fit(recordings, limits)?,
+        validity: prior.map_or(own, |prior| prior.joined(own, median_rest(&fit.law.rest_readings))),
+        limits,
+        uncertainty: identifiability.map(|found| found.told()),
+        rest_share: rest_share(recordings, &fit.law.rest_readings, limits.span()),
+        rest_readings: fit.law.rest_readings.clone(),
+        law: fit.law.law.clone(),
+    })
+}
+
+/// Estimators that a calibration is to try.
+struct Asked<'a> {
+    /// By the caller, for themselves.
+    named: Vec<EstimatorKind>,
+    /// To be corrected: the best of them is.
+    candidates: &'a [EstimatorKind],
+}
+
+impl<'a> Asked<'a> {
+    fn new(kinds: &[EstimatorKind], prior: Option<&'a Prior>, stats: &MotionStats) -> Self {
+        let candidates = match prior.and_then(|prior| prior.correction.as_ref()) {
+            _ if !kinds.contains(&EstimatorKind::Corrected) => &[],
+            Some(of_make) => std::slice::from_ref(&of_make.corrects),
+            None => RECIPE.candidates(stats.hold_s.is_some()),
+        };
+        Self { named: kinds.iter().copied().filter(|kind| *kind != EstimatorKind::Corrected).collect(), candidates }
+    }
+
+    fn all(&self) -> Vec<EstimatorKind> {
+        distinct(self.candidates.iter().chain(&self.named).copied())
+    }
+
+    /// Near enough for a progress bar: surveys, and one refinement of the best filter and of the EKF.
+    fn expected_evaluations(&self, laws: &[CrossFit]) -> u64 {
+        let surveys = self.all().len() as u64 * survey_evaluations(laws.len());
+        surveys + SURVEY.evaluations() + 2 * REFINEMENT.evaluations()
+    }
+}
+
+/// The best, but for the handicap.
+fn cheapest<'s, 'a: 's>(surveyed: impl Iterator<Item = &'s Surveyed<'a>>) -> Option<&'s Surveyed<'a>> {
+    let cost = |one: &Surveyed| one.tuned.cost + handicap(one.kind);
+    surveyed.min_by(|a, b| cost(a).total_cmp(&cost(b)))
+}
+
+/// What was seen.
+fn validity(recordings: &[Samples], limits: RangeParams, stats: &MotionStats) -> Validity {
+    let (reading_lower, reading_upper) = reading_range(recordings);
+    Validity {
+        lower: limits.lower,
+        upper: limits.upper,
+        reading_lower,
+        reading_upper,
+        fastest_rate_per_s: stats.fastest_rate,
+        duration_s: stats.longest_s,
+        longest_repeat_s: longest_repeat_s(recordings),
+    }
+}
+
+/// The correction of the calibrated filter; none if nothing can be learned about it.
+fn correction(
+    recordings: &[Samples],
+    fit: &CrossFit,
+    (kind, of_make): (EstimatorKind, Option<&CorrectionPrior>),
+    estimators: &BTreeMap<EstimatorKind, EstimatorParams>,
+) -> Result<Option<CorrectionParams>, CalibrationError> {
+    let limits = fit.law.law.range;
+    let Some(params) = estimators.get(&kind) else { return Ok(None) };
+    let setting = Setting { limits, start: Start::Unknown, sieve: Sieve::OPEN };
+    let build = || filter_from_parts(kind, &fit.law.law, params, setting);
+    fit_correction(recordings, &fit.law.rest_readings, limits, (kind, &build), of_make)
+}
+
+/// Counts evaluations of the score.
+struct Steps<P> {
+    done: u64,
+    expected: u64,
+    progress: P,
+}
+
+impl<P: FnMut(Stage)> Steps<P> {
+    fn evaluated(&mut self) {
+        self.done += 1;
+        (self.progress)(Stage::Noise { done: self.done, expected: self.expected });
+    }
+}
+
+/// Surveys estimators under the laws. Of the candidates for a correction the first one is tried under all of them, the
+/// others under those that served it best.
+fn survey_all<'a>(
+    recordings: &[Samples],
+    laws: &'a [CrossFit],
+    stats: MotionStats,
+    asked: &Asked,
+    prior: Option<&Prior>,
+    evaluated: &mut dyn FnMut(),
+) -> Result<Vec<Surveyed<'a>>, CalibrationError> {
+    let mut surveyed: Vec<Surveyed<'a>> = Vec::new();
+    for kind in asked.all() {
+        let is_other_candidate = asked.candidates.iter().skip(1).any(|candidate| *candidate == kind);
+        let laws = if is_other_candidate { best_of_each_size(&surveyed) } else { laws.iter().collect() };
+        let of_make = prior.and_then(|prior| prior.estimator(kind));
+        surveyed.extend(survey(recordings, &laws, stats, (kind, of_make), &mut *evaluated)?);
+    }
+    Ok(surveyed)
+}
+
+/// Noise and motion of an estimator under a law; a `known` survey is not made again.
+fn refined(
+    recordings: &[Samples],
+    (fit, stats): (&CrossFit, MotionStats),
+    (kind, prior): (EstimatorKind, Option<&Prior>),
+    known: Option<&Surveyed>,
+    evaluated: &mut dyn FnMut(),
+) -> Result<EstimatorParams, CalibrationError> {
+    let of_make = prior.and_then(|prior| prior.estimator(kind));
+    let problem = NoiseProblem::new(recordings, fit, stats, kind).with_prior(of_make);
+    let tuned = match known {
+        Some(known) => known.tuned.clone(),
+        None => problem.search(None, SURVEY, &mut *evaluated)?,
+    };
+    problem.refine(&tuned, &mut *evaluated)
+}
+
+fn distinct(kinds: impl Iterator<Item = EstimatorKind>) -> Vec<EstimatorKind> {
+    let mut seen = Vec::new();
+    for kind in kinds {
+        if !seen.contains(&kind) {
+            seen.push(kind);
+        }
+    }
+    seen
+}

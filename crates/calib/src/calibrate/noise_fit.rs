@@ -1,0 +1,288 @@
+use std::collections::BTreeMap;
+
+use crate::CalibrationError;
+use crate::calibrate::left_out::{Fold, LeftOut};
+use crate::filter::build::{Setting, filter_from_parts};
+use crate::filter::sieve::Sieve;
+use crate::filter::{Filter, Start};
+use crate::law::fit::CrossFit;
+use crate::motion_stats::{MotionStats, root_mean_square};
+use crate::optimise;
+use crate::params::RangeParams;
+use crate::params::estimator::news;
+use crate::params::estimator::{EstimatorKind, EstimatorParams, MotionParams, NoiseParams, PhaseParams};
+use crate::prior::EstimatorPrior;
+use crate::samples::{Samples, usual_step_s};
+use crate::sd_scale::sd_scale;
+
+/// Pull toward the starting values, per squared step of a log-parameter: a score from one recording must not run away.
+const REGULARISATION: f64 = 1e-2;
+/// A local search: the side of the first simplex in log-parameters, the number of steps, and to how many rows the
+/// recordings are thinned for it.
+#[derive(Clone, Copy)]
+pub(crate) struct Search {
+    side: f64,
+    steps: u64,
+    rows: usize,
+}
+
+/// Says how well an estimator does with a law.
+pub(crate) const SURVEY: Search = Search { side: 0.7, steps: 100, rows: 500 };
+
+/// Says how well it does with another law, from what the one before has led to.
+const RESURVEY: Search = Search { side: 0.4, steps: 25, rows: 500 };
+/// Goes on from the best survey.
+pub(crate) const REFINEMENT: Search = Search { side: 0.3, steps: 45, rows: 1500 };
+
+impl Search {
+    /// Evaluations to expect: a step of the simplex evaluates one or two points.
+    pub(crate) const fn evaluations(self) -> u64 {
+        self.steps * 3 / 2
+    }
+}
+
+/// Evaluations to expect of a survey under so many laws.
+pub(crate) fn survey_evaluations(laws: usize) -> u64 {
+    SURVEY.evaluations() + (laws.max(1) as u64 - 1) * RESURVEY.evaluations()
+}
+
+/// Times over which errors of readings may be alike, in steps of the rows that a search has seen, from not at all to much
+/// longer.
+const ERROR_TIMES: [f64; 5] = [0.0, 0.25, 1.0, 4.0, 16.0];
+
+/// Rows on which the smoother's intervals are looked at; smoothing costs ten times as much as filtering.
+pub(crate) const SMOOTHED_ROWS: usize = 2000;
+/// First guess of the baseline's correlation time, s.
+const BASELINE_TIME_S: f64 = 8.0;
+/// First guess of white noise and branch noise, as a share of the law's residual.
+const SHARE_OF_RESIDUAL: f64 = 0.3;
+/// First guess of the tempering: model error is correlated from reading to reading.
+const TEMPERING: f64 = 0.7;
+
+/// What an estimator makes of a law.
+pub(crate) struct Surveyed<'a> {
+    pub kind: EstimatorKind,
+    pub law: &'a CrossFit,
+    pub tuned: Tuned,
+}
+
+/// Searches under one law after another, each from where the one before has got to.
+pub(crate) fn survey<'a>(
+    samples: &[Samples],
+    laws: &[&'a CrossFit],
+    stats: MotionStats,
+    (kind, of_make): (EstimatorKind, Option<&EstimatorPrior>),
+    evaluated: &mut dyn FnMut(),
+) -> Result<Vec<Surveyed<'a>>, CalibrationError> {
+    let mut surveyed: Vec<Surveyed<'a>> = Vec::new();
+    for &law in laws {
+        let before = surveyed.last().map(|one| &one.tuned);
+        let search = if before.is_none() { SURVEY } else { RESURVEY };
+        let problem = NoiseProblem::new(samples, law, stats, kind).with_prior(of_make);
+        let tuned = problem.search(before, search, &mut *evaluated)?;
+        surveyed.push(Surveyed { kind, law, tuned });
+    }
+    Ok(surveyed)
+}
+
+/// The best law of each number of branches.
+pub(crate) fn best_of_each_size<'a>(surveyed: &[Surveyed<'a>]) -> Vec<&'a CrossFit> {
+    let mut best: BTreeMap<usize, &Surveyed<'a>> = BTreeMap::new();
+    for one in surveyed {
+        let best = best.entry(one.law.branches()).or_insert(one);
+        if one.tuned.cost < best.tuned.cost {
+            *best = one;
+        }
+    }
+    best.into_values().map(|one| one.law).collect()
+}
+
+/// Where a search has got to.
+#[derive(Clone, Debug)]
+pub(crate) struct Tuned {
+    /// Logarithms of the parameters.
+    point: Vec<f64>,
+    /// What was minimised.
+    pub cost: f64,
+}
+
+/// Noise and motion of one estimator, given a law: fitted so that the filter's own posterior is right on the known
+/// strain.
+pub(crate) struct NoiseProblem<'a> {
+    samples: &'a [Samples<'a>],
+    fit: &'a CrossFit,
+    limits: RangeParams,
+    stats: MotionStats,
+    kind: EstimatorKind,
+    /// What other sensors of the make tell.
+    of_make: Option<&'a EstimatorPrior>,
+    /// Logarithms of the parameters that residuals and motion suggest, or those sensors.
+    untuned: Vec<f64>,
+}
+
+impl<'a> NoiseProblem<'a> {
+    pub(crate) fn new(samples: &'a [Samples<'a>], fit: &'a CrossFit, stats: MotionStats, kind: EstimatorKind) -> Self {
+        let limits = fit.law.law.range;
+        let mut problem = Self { samples, fit, limits, stats, kind, of_make: None, untuned: Vec::new() };
+        problem.untuned = problem.start();
+        problem
+    }
+
+    /// The same with a prior of noise and motion.
+    pub(crate) fn with_prior(self, of_make: Option<&'a EstimatorPrior>) -> Self {
+        let same_size = of_make.filter(|prior| prior.ln_mean.len() == self.untuned.len());
+        match same_size {
+            Some(prior) => Self { of_make: same_size, untuned: prior.ln_mean.clone(), ..self },
+            None => self,
+        }
+    }
+
+    /// What keeps a search near where it starts.
+    fn pull(&self, point: &[f64]) -> f64 {
+        let flat = || point.iter().zip(&self.untuned).map(|(x, untuned)| (x - untuned).powi(2)).sum::<f64>();
+        self.of_make.map_or_else(|| REGULARISATION * flat(), |prior| prior.pull(point, self.stats.longest_s))
+    }
+
+    /// Searches from the values that residuals and motion suggest, or from where another search has got to.
+    pub(crate) fn search(
+        &self,
+        from: Option<&Tuned>,
+        search: Search,
+        mut evaluated: impl FnMut(),
+    ) -> Result<Tuned, CalibrationError> {
+        let left_out = self.left_out(self.stride(search.rows));
+        let mut cost = |point: &[f64]| {
+            evaluated();
+            let params = self.params(point);
+            left_out.score(&|fold| self.build(self.kind.tuned_as(), fold, &params)) + self.pull(point)
+        };
+        let from = from.map_or(&self.untuned, |tuned| &tuned.point);
+        let point = optimise::polish(&mut cost, from, search.side, search.steps)?;
+        Ok(Tuned { cost: cost(&point), point })
+    }
+
+    /// Searches on from a survey. Where that has not seen every row, it finds the time over which errors of the readings are
+    /// alike: that with which the parameters do best on every row. What residuals and motion suggest without a search
+    /// competes there: most of these rows the search has not seen.
+    pub(crate) fn refine(&self, from: &Tuned, evaluated: impl FnMut()) -> Result<EstimatorParams, CalibrationError> {
+        let refined = self.search(Some(from), REFINEMENT, evaluated)?.point;
+        let stride = self.stride(REFINEMENT.rows);
+        let every_row = self.left_out(1);
+        let step_s = stride as f64 * usual_step_s(self.samples.iter().map(|samples| samples.time_s));
+        let times = if stride > 1 { &ERROR_TIMES[..] } else { &ERROR_TIMES[..1] };
+        let times = if self.of_make.is_some() { &[] } else { times };
+        let alike = times.iter().map(|steps| self.alike_over(&refined, steps * step_s, step_s));
+        let as_made = self.of_make.map(|_| self.params(&refined));
+        let mut best = (f64::INFINITY, self.params(&refined));
+        for params in alike.chain(as_made).chain([self.params(&self.untuned)]) {
+            let score = every_row.score(&|fold| self.build(self.kind, fold, &params));
+            if score < best.0 {
+                best = (score, params);
+            }
+        }
+        Ok(self.finish(&every_row, best.1, best.0))
+    }
+
+    /// The parameters with errors that are alike over `error_time_s`, as they were found on rows every `step_s` seconds.
+    fn alike_over(&self, point: &[f64], error_time_s: f64, step_s: f64) -> EstimatorParams {
+        let mut params = self.params(point);
+        params.noise.reading_time_s = error_time_s;
+        params.noise.reading_sd *= news(step_s, error_time_s).sqrt();
+        params
+    }
+
+    /// The parameters with their score, and the factors that make their intervals cover the blocks left out.
+    fn finish(&self, left_out: &LeftOut, params: EstimatorParams, score: f64) -> EstimatorParams {
+        let build = |fold: Fold| self.build(self.kind, fold, &params);
+        // A short motion shows less of what may go wrong.
+        let of_make = self.of_make.map_or(1.0, |prior| prior.strain_sd_scale);
+        let filtered = left_out.filtered_deviations(&build);
+        let smoothed = self.left_out(self.stride(SMOOTHED_ROWS)).smoothed_deviations(&build);
+        EstimatorParams {
+            score,
+            strain_sd_scale: filtered.map_or(1.0, |deviations| sd_scale(&deviations)).max(of_make),
+            smoothed_sd_scale: smoothed.map(|deviations| sd_scale(&deviations)),
+            ..params
+        }
+    }
+
+    fn build(
+        &self,
+        kind: EstimatorKind,
+        fold: Fold,
+        params: &EstimatorParams,
+    ) -> Result<Box<dyn Filter>, CalibrationError> {
+        let setting = Setting { limits: self.limits, start: Start::Unknown, sieve: Sieve::OPEN };
+        filter_from_parts(kind, fold.law, params, setting)
+    }
+
+    fn left_out(&self, stride: usize) -> LeftOut<'a> {
+        LeftOut::new(self.samples, self.fit, self.limits, stride)
+    }
+
+    fn stride(&self, rows: usize) -> usize {
+        stride(self.samples, rows)
+    }
+
+    /// Logarithms of the parameters that the law's residuals and the motion of the strain suggest: noise (4), motion (3)
+    /// and, for filters of phases, durations, speed and tempering (4).
+    fn start(&self) -> Vec<f64> {
+        let mut left_out = Vec::new();
+        for (block, law) in self.fit.without_block.iter().enumerate() {
+            for (rows, residuals) in self.fit.blocks.iter().zip(&law.residuals) {
+                left_out.extend(residuals[rows[block].clone()].iter().filter(|r| r.is_finite()));
+            }
+        }
+        let known: Vec<f64> = self.fit.law.residuals.iter().flatten().copied().filter(|r| r.is_finite()).collect();
+        let fine = SHARE_OF_RESIDUAL * root_mean_square(&known).max(1e-9);
+        let stats = &self.stats;
+        let mut start = vec![root_mean_square(&left_out).max(1e-9), BASELINE_TIME_S, fine, fine];
+        start.extend(match self.kind.tuned_as() {
+            EstimatorKind::Imm | EstimatorKind::Hypotheses => {
+                [0.5 * stats.speed, stats.rate_time_s, 3.0 * stats.strain_sd]
+            }
+            _ => [stats.rate_sd, stats.rate_time_s, stats.strain_sd],
+        });
+        if self.kind.has_phases() {
+            start.extend([stats.hold_s.unwrap_or(0.5), stats.move_s, stats.speed.max(1e-12), TEMPERING]);
+        }
+        start.iter().map(|x| x.ln()).collect()
+    }
+
+    fn params(&self, point: &[f64]) -> EstimatorParams {
+        let p: Vec<f64> = point.iter().map(|x| x.clamp(-25.0, 15.0).exp()).collect();
+        let strain_mean = self.of_make.map_or(self.stats.strain_mean, |prior| prior.strain_mean);
+        let kind = self.kind.tuned_as();
+        let motion = MotionParams { rate_sd_per_s: p[4], rate_time_s: p[5], strain_mean, strain_sd: p[6] };
+        let phases = kind.has_phases().then(|| PhaseParams {
+            hold_time_s: p[7],
+            move_time_s: p[8],
+            reversal: match (self.of_make, kind, self.stats.hold_s) {
+                (Some(prior), ..) => prior.reversal,
+                (None, EstimatorKind::SignSplit, None) => 1.0,
+                _ => self.stats.reversal,
+            },
+            speed_per_s: if kind == EstimatorKind::SignSplit { 0.0 } else { p[9] },
+            tempering: p[10].min(1.0),
+        });
+        EstimatorParams {
+            score: f64::NAN,
+            strain_sd_scale: 1.0,
+            smoothed_sd_scale: None,
+            motion,
+            noise: NoiseParams {
+                baseline_sd: p[0],
+                baseline_time_s: p[1],
+                reading_sd: p[2],
+                reading_time_s: self.of_make.map_or(0.0, |prior| prior.reading_time_s),
+                branch_sd: p[3],
+            },
+            phases,
+        }
+    }
+}
+
+/// Every how manieth row to take so that no more than `rows` are left.
+pub(crate) fn stride(samples: &[Samples], rows: usize) -> usize {
+    samples.iter().map(Samples::len).sum::<usize>().div_ceil(rows)
+}

@@ -1,0 +1,178 @@
+use serde::Serialize;
+use statrs::distribution::{Continuous, ContinuousCDF, Normal};
+
+use crate::calibrate::left_out::REFERENCE_SD;
+
+/// How good estimates are against a known strain.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Scores {
+    /// Rows scored.
+    pub n: usize,
+    /// Root mean squared error, in the unit of strain.
+    pub rmse: f64,
+    /// The same in percent of full scale: the reference's range in the rows scored.
+    pub rmse_percent_fs: f64,
+    /// Mean absolute error, in the unit of strain.
+    pub mae: f64,
+    /// Mean error.
+    pub bias: f64,
+    /// Share of rows whose 50 % interval holds the truth; empty for estimates without a deviation.
+    pub coverage_50: Option<f64>,
+    /// The same for 90 %.
+    pub coverage_90: Option<f64>,
+    /// The same for 95 %.
+    pub coverage_95: Option<f64>,
+    /// Mean width of the 95 % interval, in the unit of strain: what the coverage was bought with.
+    pub width_95: Option<f64>,
+    /// The same in percent of full scale.
+    pub width_95_percent_fs: Option<f64>,
+    /// Mean continuous ranked probability score, in the unit of strain: of a normal distribution with the estimate as its
+    /// mean, as reported (within the limits), and its deviation. Less is better, whether an error is too large or an
+    /// interval too wide; without a deviation it is the absolute error, so that estimates with and without one compare.
+    ///
+    /// Source: Gneiting & Raftery, *J. Am. Stat. Assoc.* 102 (2007) 359, eq. 21.
+    pub crps: f64,
+    /// The same in percent of full scale.
+    pub crps_percent_fs: f64,
+    /// Mean log density of the truth, strain in units of full scale; a reference is given a deviation of 0.5 % of it.
+    pub log_score: Option<f64>,
+    /// Share of the time on the wrong branch: the error is above 20 % of full scale for 2 s or longer.
+    pub wrong_branch: f64,
+}
+
+/// Errors above this share of full scale, for this long, s, are no inaccuracy: the estimate follows another solution.
+const WRONG_BRANCH: (f64, f64) = (0.2, 2.0);
+
+/// One scored row.
+#[derive(Clone, Copy, Debug)]
+pub struct ScoredRow {
+    /// Time, s.
+    pub time_s: f64,
+    /// True strain.
+    pub truth: f64,
+    /// Estimate.
+    pub strain: f64,
+    /// Its standard deviation, if it has one.
+    pub sd: Option<f64>,
+}
+
+impl Scores {
+    /// Scores rows; `None` if there is none. Rows with an unknown truth are passed over.
+    #[must_use]
+    pub fn new(rows: &[ScoredRow]) -> Option<Self> {
+        let rows: Vec<&ScoredRow> = rows.iter().filter(|row| row.truth.is_finite()).collect();
+        let n = rows.len();
+        let count = n as f64;
+        let mean = |of: &dyn Fn(&ScoredRow) -> f64| rows.iter().map(|row| of(row)).sum::<f64>() / count;
+        let full_scale = rows
+            .iter()
+            .fold(None, |range, row| {
+                let (low, high) = range.unwrap_or((row.truth, row.truth));
+                Some((row.truth.min(low), row.truth.max(high)))
+            })
+            .map(|(low, high)| high - low)?;
+        let rmse = mean(&|row| (row.strain - row.truth).powi(2)).sqrt();
+        let has_sd = rows.iter().all(|row| row.sd.is_some());
+        let covered = |level: f64| has_sd.then(|| mean(&|row| f64::from(u8::from(row.is_covered(level)))));
+        let width_95 = has_sd.then(|| mean(&|row| 2.0 * row.half_width(0.95)));
+        let crps = mean(&ScoredRow::crps);
+        Some(Self {
+            n,
+            rmse,
+            rmse_percent_fs: 100.0 * rmse / full_scale,
+            mae: mean(&|row| (row.strain - row.truth).abs()),
+            bias: mean(&|row| row.strain - row.truth),
+            coverage_50: covered(0.5),
+            coverage_90: covered(0.9),
+            coverage_95: covered(0.95),
+            width_95,
+            width_95_percent_fs: width_95.map(|width| 100.0 * width / full_scale),
+            crps,
+            crps_percent_fs: 100.0 * crps / full_scale,
+            log_score: has_sd.then(|| mean(&|row| row.log_density(full_scale))),
+            wrong_branch: wrong_branch(&rows, full_scale),
+        })
+    }
+}
+
+impl Scores {
+    /// The same where errors can be told in percent of full scale; `None` if the truth is constant or an estimate is no number.
+    pub(crate) fn of_full_scale(rows: &[ScoredRow]) -> Option<Self> {
+        Self::new(rows).filter(|scores| scores.rmse_percent_fs.is_finite())
+    }
+}
+
+/// Share of the time between the first and the last row.
+fn wrong_branch(rows: &[&ScoredRow], full_scale: f64) -> f64 {
+    let wrong = |row: &ScoredRow| (row.strain - row.truth).abs() > WRONG_BRANCH.0 * full_scale;
+    let (mut total, mut since) = (0.0, None);
+    for (k, row) in rows.iter().enumerate() {
+        let last = k + 1 == rows.len();
+        match (since, wrong(row) && !last) {
+            (None, true) => since = Some(row.time_s),
+            (Some(start), false) => {
+                total += Some(row.time_s - start).filter(|duration| *duration >= WRONG_BRANCH.1).unwrap_or(0.0);
+                since = None;
+            }
+            _ => {}
+        }
+    }
+    let (first, last) = (rows.first().map_or(0.0, |row| row.time_s), rows.last().map_or(0.0, |row| row.time_s));
+    if last > first { total / (last - first) } else { 0.0 }
+}
+
+impl ScoredRow {
+    fn is_covered(&self, level: f64) -> bool {
+        (self.strain - self.truth).abs() <= self.half_width(level)
+    }
+
+    fn half_width(&self, level: f64) -> f64 {
+        Normal::standard().inverse_cdf(0.5 + 0.5 * level) * self.sd.unwrap_or(0.0)
+    }
+
+    fn crps(&self) -> f64 {
+        let error = (self.truth - self.strain).abs();
+        let Some(sd) = self.sd.filter(|sd| *sd > 0.0) else { return error };
+        let (normal, z) = (Normal::standard(), error / sd);
+        sd * (z * (2.0 * normal.cdf(z) - 1.0) + 2.0 * normal.pdf(z) - 0.5 * std::f64::consts::FRAC_2_SQRT_PI)
+    }
+
+    fn log_density(&self, full_scale: f64) -> f64 {
+        let variance = (self.sd.unwrap_or(0.0) / full_scale).powi(2) + REFERENCE_SD.powi(2);
+        let error = (self.strain - self.truth) / full_scale;
+        -0.5 * (error * error / variance + (std::f64::consts::TAU * variance).ln())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{ScoredRow, Scores};
+
+    #[test]
+    fn short_excursions_are_no_wrong_branch() {
+        // One row a second, full scale 1: errors of 0.3 in rows 10 to 11 (until 12, 2 s), in row 30, and of 0.1 before.
+        let row = |k: u32| {
+            let error = match k {
+                10 | 11 | 30 => 0.3,
+                0..10 => 0.1,
+                _ => 0.0,
+            };
+            let truth = f64::from(k % 2);
+            ScoredRow { time_s: f64::from(k), truth, strain: truth + error, sd: None }
+        };
+        let rows: Vec<ScoredRow> = (0..=40).map(row).collect();
+        assert_eq!(Scores::new(&rows).unwrap().wrong_branch, 2.0 / 40.0);
+    }
+
+    /// Zero error over zero full scale is no number, and neither is what an estimate that is none leaves.
+    #[test]
+    fn there_is_no_percentage_of_a_constant() {
+        let row = |k: u32, truth: f64, strain: f64| ScoredRow { time_s: f64::from(k), truth, strain, sd: None };
+        let constant: Vec<ScoredRow> = (0..9).map(|k| row(k, 0.1, 0.1)).collect();
+        let lost: Vec<ScoredRow> = (0..9).map(|k| row(k, f64::from(k), f64::NAN)).collect();
+        let known: Vec<ScoredRow> = (0..9).map(|k| row(k, f64::from(k), 1.0)).collect();
+        for (rows, is_known) in [(constant, false), (lost, false), (known, true)] {
+            assert_eq!(Scores::of_full_scale(&rows).is_some(), is_known);
+        }
+    }
+}

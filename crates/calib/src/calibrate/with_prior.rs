@@ -1,0 +1,38 @@
+use super::{Calibration, Stage, calibrate_once};
+use crate::CalibrationError;
+use crate::law::fit::LawOptions;
+use crate::params::estimator::EstimatorKind;
+use crate::prior::Prior;
+use crate::samples::Samples;
+
+/// Share of the length of the other sensors' recordings from which on a recording may do without them.
+const ALONE: f64 = 1.0 / 3.0;
+
+/// [`calibrate`](crate::calibrate) for one more sensor of a make that is known. A prior brings the law's structure; `structures`
+/// counts without one. Noise and motion start from it, and the filter that the others correct is the only candidate for a
+/// correction.
+///
+/// A recording a third as long as those of the others may tell more by itself: it is calibrated without the prior as well, and what
+/// errs less on quarters left out is taken.
+///
+/// # Errors
+/// As [`calibrate`](crate::calibrate).
+pub fn calibrate_with_prior(
+    recordings: &[Samples],
+    structures: &[LawOptions],
+    kinds: &[EstimatorKind],
+    prior: Option<&Prior>,
+    mut progress: impl FnMut(Stage),
+) -> Result<Calibration, CalibrationError> {
+    let taught = calibrate_once(recordings, structures, kinds, prior, &mut progress);
+    let longest_s = recordings.iter().map(Samples::duration_s).fold(0.0, f64::max);
+    if prior.is_none_or(|prior| longest_s < ALONE * prior.validity.duration_s) {
+        return taught;
+    }
+    let error = |made: &Calibration| made.findings.as_ref().map_or(f64::INFINITY, |findings| findings.filter.rmse);
+    match (taught, calibrate_once(recordings, structures, kinds, None, progress)) {
+        (Ok(taught), Ok(alone)) => Ok(if error(&alone) < error(&taught) { alone } else { taught }),
+        (Ok(taught), Err(_)) => Ok(taught),
+        (Err(_), alone) => alone,
+    }
+}

@@ -1,0 +1,189 @@
+use crate::params::correction::ProcessParams;
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use ohmstrain_ekf::correction::kernel;
+
+/// White noise beside the noise that is correlated in time, as a share of its variance.
+const WHITE: f64 = 0.09;
+/// Variance that keeps the equations regular, in variances of the targets.
+const JITTER: f64 = 1e-6;
+/// A pivot of the inducing rows below this share of the prior variance says nothing new.
+const SMALLEST_PIVOT: f64 = 1e-6;
+
+/// Length scales, noises and correlation times tried: coarse, since the marginal likelihood of a few hundred rows whose
+/// errors hang together tells no more.
+const LENGTHS: [f64; 3] = [2.0, 4.0, 8.0];
+const NOISES: [f64; 3] = [0.03, 0.1, 0.3];
+const NOISE_TIMES_S: [f64; 2] = [2.0, 10.0];
+
+/// Rows to learn from: standardised inputs, targets, times.
+#[derive(Clone, Copy)]
+pub(crate) struct Lessons<'a> {
+    pub inputs: &'a [&'a [f64]],
+    pub targets: &'a [f64],
+    pub time_s: &'a [f64],
+}
+
+/// A Gaussian process conditioned on rows.
+pub(crate) struct GaussianProcess {
+    /// Mean and standard deviation of the targets.
+    pub centre: f64,
+    pub size: f64,
+    /// Prior variance where the kernel is 1, in variances of the targets: the one that explains them best.
+    pub scale: f64,
+    /// Variance of the noise, in those of the prior.
+    pub noise: f64,
+    kernel: DMatrix<f64>,
+    covariance: Cholesky<f64, Dyn>,
+    weights: DVector<f64>,
+    targets: DVector<f64>,
+}
+
+/// What is said of a row by the process without the row's block, in the unit of the target.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LeftOutRow {
+    pub mean: f64,
+    /// Share of the prior variance that is unknown.
+    pub unknown: f64,
+    /// Prior variance.
+    pub prior: f64,
+}
+
+impl Lessons<'_> {
+    /// The settings with the largest marginal likelihood; none if no covariance is positive definite.
+    pub(crate) fn best_settings(self) -> Option<ProcessParams> {
+        let squares = self.squared_distances();
+        let mut best: Option<(f64, ProcessParams)> = None;
+        for length in LENGTHS {
+            for noise in NOISES {
+                for noise_time_s in NOISE_TIMES_S {
+                    let params = ProcessParams { length, noise, noise_time_s, sd_scale: 1.0 };
+                    let Some(process) = GaussianProcess::with_distances(self, &squares, params) else { continue };
+                    let cost = process.negative_log_evidence();
+                    if best.is_none_or(|(least, _)| cost < least) {
+                        best = Some((cost, params));
+                    }
+                }
+            }
+        }
+        best.map(|(_, params)| params)
+    }
+
+    fn squared_distances(self) -> DMatrix<f64> {
+        let n = self.inputs.len();
+        let square = |i: usize, j: usize| self.inputs[i].iter().zip(self.inputs[j]).map(|(a, b)| (a - b).powi(2)).sum();
+        DMatrix::from_fn(n, n, square)
+    }
+}
+
+impl GaussianProcess {
+    /// Conditions a process on rows; none if its covariance is not positive definite.
+    pub(crate) fn new(lessons: Lessons, params: ProcessParams) -> Option<Self> {
+        Self::with_distances(lessons, &lessons.squared_distances(), params)
+    }
+
+    fn with_distances(lessons: Lessons, squares: &DMatrix<f64>, params: ProcessParams) -> Option<Self> {
+        let Lessons { inputs, targets, time_s } = lessons;
+        let n = targets.len();
+        let centre = targets.iter().sum::<f64>() / n as f64;
+        let size = (targets.iter().map(|y| (y - centre).powi(2)).sum::<f64>() / n as f64).sqrt().max(f64::MIN_POSITIVE);
+        let targets = DVector::from_iterator(n, targets.iter().map(|y| (y - centre) / size));
+        let kernel = DMatrix::from_fn(n, n, |i, j| kernel(params.length, squares[(i, j)], inputs[i][0] * inputs[j][0]));
+        let covariance = (&kernel + noise_covariance(time_s, params)).cholesky()?;
+        let weights = covariance.solve(&targets);
+        let scale = targets.dot(&weights) / n as f64;
+        let noise = (1.0 + WHITE) * params.noise.powi(2);
+        Some(Self { centre, size, scale, noise, kernel, covariance, weights, targets })
+    }
+
+    /// Up to a constant, with the scale that makes it least.
+    fn negative_log_evidence(&self) -> f64 {
+        let n = self.targets.len() as f64;
+        let half_log_determinant: f64 = self.covariance.l_dirty().diagonal().iter().map(|pivot| pivot.ln()).sum();
+        0.5 * n * self.scale.ln() + half_log_determinant
+    }
+
+    /// Weights of the rows, in the unit of the targets.
+    pub(crate) fn weights(&self) -> impl Iterator<Item = f64> {
+        self.weights.iter().map(|weight| weight * self.size)
+    }
+
+    /// Variance for which the kernel 1 stands, in the squared unit of the targets.
+    pub(crate) fn variance(&self) -> f64 {
+        self.scale * self.size * self.size
+    }
+
+    /// Kernels of the rows with each other.
+    pub(crate) fn kernel(&self) -> &DMatrix<f64> {
+        &self.kernel
+    }
+
+    /// What the process says of every row without the row's block, in closed form from the inverse covariance (Rasmussen &
+    /// Williams, *Gaussian Processes for Machine Learning*, 2006, eq. 5.12, for blocks). Blocks are of rows in order.
+    pub(crate) fn left_out(&self, blocks: usize) -> Option<Vec<LeftOutRow>> {
+        let n = self.targets.len();
+        let inverse = self.covariance.inverse();
+        let mut rows = Vec::with_capacity(n);
+        for block in 0..blocks {
+            let (start, end) = (block * n / blocks, (block + 1) * n / blocks);
+            let len = end - start;
+            let conditional = inverse.view((start, start), (len, len)).into_owned().cholesky()?.inverse();
+            let errors = &conditional * self.weights.rows(start, len);
+            for k in 0..len {
+                let prior = self.kernel[(start + k, start + k)];
+                rows.push(LeftOutRow {
+                    mean: self.centre + self.size * (self.targets[start + k] - errors[k]),
+                    unknown: ((conditional[(k, k)] - self.noise - JITTER) / prior).clamp(0.0, 1.0),
+                    prior: prior * self.variance(),
+                });
+            }
+        }
+        Some(rows)
+    }
+
+    /// The upper triangle, row by row, of W: |W k|² is the share of the prior variance that all rows explain where their
+    /// kernels are projected onto those of these inducing rows, k (Nyström).
+    pub(crate) fn explained(&self, inducing: &[usize]) -> Option<Vec<f64>> {
+        let m = inducing.len();
+        let with_inducing = self.kernel.select_columns(inducing);
+        let among = with_inducing.select_rows(inducing) + DMatrix::identity(m, m) * JITTER * 1e-2;
+        // Kernels of all rows as weighted sums of those of the inducing rows.
+        let projection = among.cholesky()?.solve(&with_inducing.transpose()).transpose();
+        let triangle = self.covariance.l_dirty().solve_lower_triangular(&projection)?.qr().r();
+        Some((0..m).flat_map(|i| (i..m).map(move |j| (i, j))).map(|place| triangle[place]).collect())
+    }
+}
+
+/// Covariance of the noise, in variances of the targets.
+fn noise_covariance(time_s: &[f64], params: ProcessParams) -> DMatrix<f64> {
+    let variance = params.noise.powi(2);
+    DMatrix::from_fn(time_s.len(), time_s.len(), |i, j| {
+        let white = if i == j { WHITE * variance + JITTER } else { 0.0 };
+        variance * (-(time_s[i] - time_s[j]).abs() / params.noise_time_s).exp() + white
+    })
+}
+
+/// The rows that say most about all others, by a pivoted Cholesky decomposition of a kernel (Fine & Scheinberg, *J. Mach.
+/// Learn. Res.* 2 (2001) 243): at most `most`, fewer if the others add nothing.
+pub(crate) fn inducing_rows(kernel: &DMatrix<f64>, most: usize) -> Vec<usize> {
+    let n = kernel.nrows();
+    let mut left = kernel.diagonal();
+    let smallest = SMALLEST_PIVOT * left.max();
+    let mut columns: Vec<DVector<f64>> = Vec::new();
+    let mut chosen = Vec::new();
+    while chosen.len() < most.min(n) {
+        let pivot = left.imax();
+        if !(left[pivot] > smallest) {
+            break;
+        }
+        let mut column = kernel.column(pivot).into_owned();
+        for earlier in &columns {
+            column.axpy(-earlier[pivot], earlier, 1.0);
+        }
+        column /= left[pivot].sqrt();
+        left.zip_apply(&column, |left, entry| *left -= entry * entry);
+        left[pivot] = 0.0;
+        chosen.push(pivot);
+        columns.push(column);
+    }
+    chosen
+}

@@ -1,0 +1,208 @@
+//! The learned correction: choosing its processes, and making of a sensor's rows what `ohmstrain_ekf::correction` runs.
+
+pub(crate) mod gaussian_process;
+pub(crate) mod owned;
+
+use ohmstrain_ekf::Gaussian;
+use ohmstrain_ekf::correction::{FEATURES, INDUCING, InputScale, OUTPUTS, Process, Weighting, mixture};
+use owned::{OwnedCorrection, OwnedProcess};
+
+use crate::order::extent;
+use crate::params::RangeParams;
+use crate::params::correction::{CorrectorParams, ProcessParams, SIDES};
+use crate::sd_scale::{joint_scale, sd_scale_up_to};
+use gaussian_process::{GaussianProcess, LeftOutRow, Lessons, inducing_rows};
+
+/// Blocks of rows that are left out in turn.
+const BLOCKS: usize = 5;
+/// Where nothing is known, the variance of the strain that the direct process leaves, and of the filter's error that the
+/// residual process leaves, in variances of the strain. The targets' own variances, of a filter that has seen the rows,
+/// promise too much for other motions.
+const LEAST_DIRECT: f64 = 0.5;
+const LEAST_RESIDUAL: f64 = 0.07;
+/// Widest factor on a process' deviation: block left out of recordings that hold still for long are worlds of their own.
+const WIDEST_PROCESS: f64 = 3.0;
+
+/// What a correction learns from: inputs with the filter's outputs first, the true strain, and times, s, row by row.
+#[derive(Clone, Copy)]
+pub(crate) struct Examples<'a, const D: usize> {
+    pub inputs: &'a [[f64; D]],
+    pub strain: &'a [f64],
+    pub time_s: &'a [f64],
+    pub limits: RangeParams,
+}
+
+/// A process of a correction.
+#[derive(Clone, Copy, PartialEq)]
+enum Which {
+    Direct,
+    Past,
+    Future,
+    Residual,
+}
+
+/// Direct processes that see one side of time, in order.
+const ONE_SIDED: [Which; SIDES] = [Which::Past, Which::Future];
+
+impl Which {
+    fn sees(self, row: &[f64]) -> Vec<f64> {
+        let (features, future) = (&row[OUTPUTS..], &row[row.len().min(OUTPUTS + FEATURES)..]);
+        match self {
+            Which::Direct => features.to_vec(),
+            Which::Past => features[..FEATURES].to_vec(),
+            Which::Future => [&features[..1], future].concat(),
+            Which::Residual => row.to_vec(),
+        }
+    }
+
+    const fn least_variance(self) -> f64 {
+        match self {
+            Which::Residual => LEAST_RESIDUAL,
+            _ => LEAST_DIRECT,
+        }
+    }
+
+    fn params(self, of: &CorrectorParams) -> Option<ProcessParams> {
+        match self {
+            Which::Direct => Some(of.direct),
+            Which::Past => of.one_sided.first().copied(),
+            Which::Future => of.one_sided.get(1).copied(),
+            Which::Residual => Some(of.residual),
+        }
+    }
+}
+
+/// Examples on the scale that their inputs have.
+struct Prepared<'a, const D: usize> {
+    examples: Examples<'a, D>,
+    rows: Vec<[f64; D]>,
+    scales: [InputScale<f64>; D],
+    strain_variance: f64,
+}
+
+impl<'a, const D: usize> Prepared<'a, D> {
+    fn new(examples: Examples<'a, D>) -> Self {
+        let scales: [InputScale<f64>; D] = std::array::from_fn(|i| scale(examples.inputs.iter().map(|row| row[i])));
+        let standardised = |row: &[f64; D]| std::array::from_fn(|i| (row[i] - scales[i].mean) / scales[i].sd);
+        let strain_variance = scale(examples.strain.iter().copied()).sd.powi(2);
+        Self { examples, rows: examples.inputs.iter().map(standardised).collect(), scales, strain_variance }
+    }
+
+    /// What a process adds its mean to.
+    fn base(&self, which: Which, row: usize) -> f64 {
+        if which == Which::Residual { self.examples.inputs[row][0] } else { 0.0 }
+    }
+
+    fn least_variance(&self, which: Which) -> f64 {
+        self.strain_variance * which.least_variance()
+    }
+
+    /// Lets `learn` see the examples of a process.
+    fn taught<X>(&self, which: Which, learn: impl Fn(Lessons) -> Option<X>) -> Option<X> {
+        let inputs: Vec<Vec<f64>> = self.rows.iter().map(|row| which.sees(row)).collect();
+        let inputs: Vec<&[f64]> = inputs.iter().map(Vec::as_slice).collect();
+        let target = |(row, strain): (usize, &f64)| strain - self.base(which, row);
+        let targets: Vec<f64> = self.examples.strain.iter().enumerate().map(target).collect();
+        learn(Lessons { inputs: &inputs, targets: &targets, time_s: self.examples.time_s })
+    }
+
+    /// Chooses a process, and says what it says of every row from the blocks that the row is not in.
+    fn chosen(&self, which: Which) -> Option<(ProcessParams, Vec<Gaussian<f64>>)> {
+        self.taught(which, |lessons| {
+            let settings = lessons.best_settings()?;
+            let process = GaussianProcess::new(lessons, settings)?;
+            let (limits, least) = (self.examples.limits, self.least_variance(which));
+            let said = |(k, row): (usize, LeftOutRow)| {
+                let variance = row.unknown * row.prior.max(least) + process.noise * process.variance();
+                let mean = (self.base(which, k) + row.mean).clamp(limits.lower, limits.upper);
+                Gaussian { mean, variance }
+            };
+            let mut said: Vec<Gaussian<f64>> = process.left_out(BLOCKS)?.into_iter().enumerate().map(said).collect();
+            let sd_scale = sd_scale_up_to(&deviations(&said, self.examples.strain), WIDEST_PROCESS);
+            said.iter_mut().for_each(|said| said.variance *= sd_scale.powi(2));
+            Some((ProcessParams { sd_scale, ..settings }, said))
+        })
+    }
+}
+
+/// Mean, deviation and range of values; a value that never changes tells nothing, however far from it another one is.
+fn scale(values: impl Iterator<Item = f64> + Clone) -> InputScale<f64> {
+    let n = values.clone().count() as f64;
+    let mean = values.clone().sum::<f64>() / n;
+    let sd = (values.clone().map(|x| (x - mean).powi(2)).sum::<f64>() / n).sqrt();
+    let (lower, upper) = extent(values);
+    InputScale { mean, sd: if upper > lower { sd } else { f64::INFINITY }, lower, upper }
+}
+
+impl CorrectorParams {
+    /// Learns from examples, with S one-sided processes; none if there is nothing to learn from them.
+    pub(crate) fn fit<const D: usize, const S: usize>(examples: Examples<D>) -> Option<Self> {
+        let prepared = Prepared::new(examples);
+        let (direct, of_direct) = prepared.chosen(Which::Direct)?;
+        let (residual, of_residual) = prepared.chosen(Which::Residual)?;
+        let sides: Vec<_> = ONE_SIDED[..S].iter().map(|side| prepared.chosen(*side)).collect::<Option<_>>()?;
+        let voices =
+            |k: usize| [of_direct[k], of_residual[k]].into_iter().chain(sides.iter().map(move |(_, of)| of[k]));
+        let mixed: Vec<Gaussian<f64>> =
+            (0..examples.strain.len()).map(|k| mixture(Weighting::of(S), voices(k))).collect();
+        let sd_scale = joint_scale(&deviations(&mixed, examples.strain).concat());
+        Some(Self { sd_scale, direct, residual, one_sided: sides.into_iter().map(|(params, _)| params).collect() })
+    }
+}
+
+/// Errors in units of their deviations, block by block.
+fn deviations(said: &[Gaussian<f64>], strain: &[f64]) -> Vec<Vec<f64>> {
+    let n = said.len();
+    let of_row = |k: usize| (said[k].mean - strain[k]).abs() / said[k].sd();
+    (0..BLOCKS).map(|block| (block * n / BLOCKS..(block + 1) * n / BLOCKS).map(of_row).collect()).collect()
+}
+
+/// Makes weights of examples; none if the covariances are not positive definite.
+pub(crate) fn learned<const D: usize, const S: usize>(
+    params: &CorrectorParams,
+    examples: Examples<D>,
+) -> Option<OwnedCorrection<f64, D, S>> {
+    let prepared = Prepared::new(examples);
+    let made = |which: Which| prepared.taught(which, |lessons| GaussianProcess::new(lessons, which.params(params)?));
+    let (direct, residual) = (made(Which::Direct)?, made(Which::Residual)?);
+    let sides: Vec<_> = ONE_SIDED[..S].iter().map(|side| made(*side)).collect::<Option<_>>()?;
+    let kernels = sides.iter().fold(direct.kernel() + residual.kernel(), |sum, side| sum + side.kernel());
+    let inducing = inducing_rows(&kernels, INDUCING);
+    let order = inducing_first(&inducing, prepared.rows.len());
+    let owned = |which: Which, process: &GaussianProcess| {
+        let settings = which.params(params)?;
+        let weights: Vec<f64> = process.weights().collect();
+        let numbers = Process {
+            length: settings.length,
+            mean: process.centre,
+            weights: &[],
+            explained: &[],
+            variance: process.variance(),
+            noise: process.noise * process.variance(),
+            widening: settings.sd_scale.powi(2),
+            least_variance: prepared.least_variance(which),
+        };
+        let weights = order.iter().map(|&row| weights[row]).collect();
+        Some(OwnedProcess { weights, explained: process.explained(&inducing)?, numbers })
+    };
+    let one_sided = ONE_SIDED.iter().zip(&sides).map(|(which, side)| owned(*which, side));
+    Some(OwnedCorrection {
+        rows: order.iter().map(|&row| prepared.rows[row]).collect(),
+        scales: prepared.scales,
+        direct: owned(Which::Direct, &direct)?,
+        one_sided: one_sided.collect::<Option<Vec<_>>>()?.try_into().ok()?,
+        residual: owned(Which::Residual, &residual)?,
+        limits: examples.limits.to_model(),
+        strain_variance: prepared.strain_variance,
+        variance_factor: params.sd_scale.powi(2),
+    })
+}
+
+/// All rows, these first.
+fn inducing_first(inducing: &[usize], rows: usize) -> Vec<usize> {
+    let others = (0..rows).filter(|row| !inducing.contains(row));
+    inducing.iter().copied().chain(others).collect()
+}
+
+#[cfg(test)]
+mod tests;

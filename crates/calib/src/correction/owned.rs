@@ -1,0 +1,95 @@
+use ohmstrain_ekf::Real;
+use ohmstrain_ekf::correction::{Correction, InputScale, Process};
+use ohmstrain_model::StrainRange;
+
+/// A [`Correction`] with everything that it borrows.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OwnedCorrection<T: 'static, const D: usize, const S: usize = 0> {
+    /// Standardised inputs of the training rows; the first of them are the inducing rows.
+    pub rows: Vec<[T; D]>,
+    /// Scales of the inputs.
+    pub scales: [InputScale<T>; D],
+    /// Strain from the features.
+    pub direct: OwnedProcess<T>,
+    /// Strain from the features of one side of time.
+    pub one_sided: [OwnedProcess<T>; S],
+    /// What the filter's strain lacks, from all inputs.
+    pub residual: OwnedProcess<T>,
+    /// Limits of the output.
+    pub limits: StrainRange<T>,
+    /// Variance of the strain over the training rows.
+    pub strain_variance: T,
+    /// Factor on the mixture's variance.
+    pub variance_factor: T,
+}
+
+/// A [`Process`] with everything that it borrows.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OwnedProcess<T: 'static> {
+    /// Weight of each training row.
+    pub weights: Vec<T>,
+    /// The upper triangle of what the inducing rows explain, row by row.
+    pub explained: Vec<T>,
+    /// Its other numbers.
+    pub numbers: Process<'static, T>,
+}
+
+impl<T: Real + 'static, const D: usize, const S: usize> OwnedCorrection<T, D, S> {
+    /// As it runs.
+    pub fn correction(&self) -> Correction<'_, T, D, S> {
+        Correction {
+            rows: &self.rows,
+            scales: &self.scales,
+            direct: self.direct.process(),
+            one_sided: self.one_sided.each_ref().map(OwnedProcess::process),
+            residual: self.residual.process(),
+            limits: self.limits,
+            strain_variance: self.strain_variance,
+            variance_factor: self.variance_factor,
+        }
+    }
+
+    /// In another precision.
+    pub fn map<U: Real + 'static>(&self, number: impl Fn(T) -> U + Copy) -> OwnedCorrection<U, D, S> {
+        let scale = |scale: InputScale<T>| InputScale {
+            mean: number(scale.mean),
+            sd: number(scale.sd),
+            lower: number(scale.lower),
+            upper: number(scale.upper),
+        };
+        OwnedCorrection {
+            rows: self.rows.iter().map(|row| row.map(number)).collect(),
+            scales: self.scales.map(scale),
+            direct: self.direct.map(number),
+            one_sided: self.one_sided.each_ref().map(|side| side.map(number)),
+            residual: self.residual.map(number),
+            limits: StrainRange { lower: number(self.limits.lower), upper: number(self.limits.upper) },
+            strain_variance: number(self.strain_variance),
+            variance_factor: number(self.variance_factor),
+        }
+    }
+}
+
+impl<T: Real + 'static> OwnedProcess<T> {
+    fn process(&self) -> Process<'_, T> {
+        Process { weights: &self.weights, explained: &self.explained, ..self.numbers }
+    }
+
+    fn map<U: Real + 'static>(&self, number: impl Fn(T) -> U) -> OwnedProcess<U> {
+        let Process { length, mean, variance, noise, widening, least_variance, .. } = self.numbers;
+        OwnedProcess {
+            weights: self.weights.iter().copied().map(&number).collect(),
+            explained: self.explained.iter().copied().map(&number).collect(),
+            numbers: Process {
+                length: number(length),
+                mean: number(mean),
+                weights: &[],
+                explained: &[],
+                variance: number(variance),
+                noise: number(noise),
+                widening: number(widening),
+                least_variance: number(least_variance),
+            },
+        }
+    }
+}

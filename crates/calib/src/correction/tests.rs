@@ -1,0 +1,215 @@
+use nalgebra::{DMatrix, DVector};
+use ohmstrain_ekf::Gaussian;
+
+use super::owned::OwnedCorrection;
+use super::{Examples, learned};
+use crate::correction::gaussian_process::{GaussianProcess, Lessons};
+use crate::params::RangeParams;
+use crate::params::correction::{CorrectorParams, ProcessParams};
+
+const D: usize = 8;
+const LIMITS: RangeParams = RangeParams { lower: -10.0, upper: 10.0 };
+
+/// Rows that no two inputs of agree, on curves that wander; a filter that is wrong by something smooth.
+fn examples<const D: usize>(n: usize, dt_s: f64) -> (Vec<[f64; D]>, Vec<f64>, Vec<f64>) {
+    let time_s: Vec<f64> = (0..n).map(|k| dt_s * k as f64).collect();
+    let strain: Vec<f64> = time_s.iter().map(|t| (0.21 * t).sin()).collect();
+    let row = |(t, strain): (&f64, &f64)| -> [f64; D] {
+        let wave = |i: usize| ((0.13 + 0.07 * i as f64) * t + i as f64).sin() * (1.0 + i as f64);
+        std::array::from_fn(|i| if i == 0 { strain + 0.1 * (0.4 * t).cos() } else { wave(i) })
+    };
+    let inputs = time_s.iter().zip(&strain).map(row).collect();
+    (inputs, strain, time_s)
+}
+
+/// The textbook: mean and variance of the latent function and the noise's variance, with targets in their own unit
+/// (Rasmussen & Williams 2006, eqs 2.23 and 2.24), for the kernel and noise written out here.
+struct Textbook {
+    mean: f64,
+    latent: f64,
+    prior: f64,
+    noise: f64,
+}
+
+fn standardised(rows: &[Vec<f64>], row: &[f64]) -> Vec<f64> {
+    let n = rows.len() as f64;
+    (0..row.len())
+        .map(|i| {
+            let mean = rows.iter().map(|row| row[i]).sum::<f64>() / n;
+            let variance = rows.iter().map(|row| (row[i] - mean).powi(2)).sum::<f64>() / n;
+            (row[i] - mean) / variance.sqrt()
+        })
+        .collect()
+}
+
+fn textbook(rows: &[Vec<f64>], targets: &[f64], time_s: &[f64], settings: ProcessParams, at: &[f64]) -> Textbook {
+    let n = rows.len();
+    let x: Vec<Vec<f64>> = rows.iter().map(|row| standardised(rows, row)).collect();
+    let at = standardised(rows, at);
+    let kernel = |a: &[f64], b: &[f64]| {
+        let square: f64 = a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum();
+        (-square / (2.0 * settings.length * settings.length)).exp() + 0.09 * (1.0 + a[0] * b[0])
+    };
+    let covariance = DMatrix::from_fn(n, n, |i, j| {
+        let correlated = settings.noise.powi(2) * (-(time_s[i] - time_s[j]).abs() / settings.noise_time_s).exp();
+        let white = if i == j { 0.09 * settings.noise.powi(2) + 1e-6 } else { 0.0 };
+        kernel(&x[i], &x[j]) + correlated + white
+    });
+    let inverse = covariance.try_inverse().unwrap();
+    let mean = targets.iter().sum::<f64>() / n as f64;
+    let y = DVector::from_iterator(n, targets.iter().map(|y| y - mean));
+    let k = DVector::from_iterator(n, x.iter().map(|row| kernel(row, &at)));
+    // The kernel's scale in the unit of the targets that makes the marginal likelihood largest.
+    let scale = y.dot(&(&inverse * &y)) / n as f64;
+    let prior = kernel(&at, &at);
+    Textbook {
+        mean: mean + k.dot(&(&inverse * &y)),
+        latent: scale * (prior - k.dot(&(&inverse * &k))),
+        prior: scale * prior,
+        noise: scale * 1.09 * settings.noise.powi(2),
+    }
+}
+
+#[test]
+fn a_correction_says_what_the_textbook_says() {
+    // As many rows as may be inducing: nothing is left out of the variance.
+    let (inputs, strain, time_s) = examples(40, 1.7);
+    let examples = Examples { inputs: &inputs, strain: &strain, time_s: &time_s, limits: LIMITS };
+    let direct = ProcessParams { length: 2.0, noise: 0.1, noise_time_s: 2.0, sd_scale: 1.5 };
+    let residual = ProcessParams { length: 4.0, noise: 0.3, noise_time_s: 10.0, sd_scale: 1.0 };
+    let params = CorrectorParams { sd_scale: 0.8, direct, residual, one_sided: Vec::new() };
+    let correction: OwnedCorrection<f64, D> = learned(&params, examples).unwrap();
+    let all: Vec<Vec<f64>> = inputs.iter().map(|row| row.to_vec()).collect();
+    let features: Vec<Vec<f64>> = inputs.iter().map(|row| row[6..].to_vec()).collect();
+    let residuals: Vec<f64> = inputs.iter().zip(&strain).map(|(row, strain)| strain - row[0]).collect();
+    for k in 0..39 {
+        // Between two rows, within the range of all.
+        let input: [f64; D] = std::array::from_fn(|i| 0.5 * (inputs[k][i] + inputs[k + 1][i]));
+        let said = correction.correction().correct(&input, Gaussian { mean: input[0], variance: 0.0 });
+        let least = |book: &Textbook, share: f64| {
+            let variance =
+                strain.iter().map(|x| x * x).sum::<f64>() / 40.0 - (strain.iter().sum::<f64>() / 40.0).powi(2);
+            book.latent * (share * variance / book.prior).max(1.0)
+        };
+        // Matrices of condition 1e6, and what keeps the 40 kernels apart: 1e-8.
+        let close = |a: f64, b: f64| (a - b).abs() < 1e-6;
+        let book = textbook(&features, &strain, &time_s, direct, &input[6..]);
+        assert!(close(said.direct.mean, book.mean), "{k}: {} {}", said.direct.mean, book.mean);
+        assert!(close(said.direct.variance, 2.25 * (least(&book, 0.5) + book.noise)), "{k}");
+        let book = textbook(&all, &residuals, &time_s, residual, &input);
+        assert!(close(said.residual.mean, input[0] + book.mean), "{k}");
+        assert!(close(said.residual.variance, least(&book, 0.07) + book.noise), "{k}");
+        assert!(close(1.0 - said.novelty, 1.0 - book.latent / book.prior), "{k}");
+    }
+}
+
+/// A process of one side of time says what the textbook says of rows that have nothing but that side.
+#[test]
+fn one_sided_processes_see_their_side_alone() {
+    const BOTH: usize = 16;
+    let (inputs, strain, time_s) = examples::<BOTH>(40, 1.7);
+    let examples = Examples { inputs: &inputs, strain: &strain, time_s: &time_s, limits: LIMITS };
+    let [direct, residual, past, future] = [(4.0, 0.1), (4.0, 0.3), (2.0, 0.1), (8.0, 0.03)]
+        .map(|(length, noise)| ProcessParams { length, noise, noise_time_s: 2.0, sd_scale: 1.0 });
+    let params = CorrectorParams { sd_scale: 1.0, direct, residual, one_sided: vec![past, future] };
+    let correction: OwnedCorrection<f64, BOTH, 2> = learned(&params, examples).unwrap();
+    // Six outputs, the reading, six features of the past, three of the future.
+    let of_past = |row: &[f64; BOTH]| row[6..13].to_vec();
+    let of_future = |row: &[f64; BOTH]| [&row[6..7], &row[13..]].concat();
+    let pasts: Vec<Vec<f64>> = inputs.iter().map(of_past).collect();
+    let futures: Vec<Vec<f64>> = inputs.iter().map(of_future).collect();
+    for k in 0..39 {
+        let input: [f64; BOTH] = std::array::from_fn(|i| 0.5 * (inputs[k][i] + inputs[k + 1][i]));
+        let said = correction.correction().correct(&input, Gaussian { mean: input[0], variance: 0.0 });
+        let books = [
+            textbook(&pasts, &strain, &time_s, past, &of_past(&input)),
+            textbook(&futures, &strain, &time_s, future, &of_future(&input)),
+        ];
+        for (said, book) in said.one_sided.iter().zip(books) {
+            assert!((said.mean - book.mean).abs() < 1e-6, "{k}: {} {}", said.mean, book.mean);
+        }
+    }
+}
+
+/// With fewer inducing rows the variance is larger, never smaller, and the mean as with all.
+#[test]
+fn inducing_rows_cost_no_certainty_that_is_not_there() {
+    let (inputs, strain, time_s) = examples(200, 1.7);
+    let examples = Examples { inputs: &inputs, strain: &strain, time_s: &time_s, limits: LIMITS };
+    let settings = ProcessParams { length: 4.0, noise: 0.1, noise_time_s: 2.0, sd_scale: 1.0 };
+    let params = CorrectorParams { sd_scale: 1.0, direct: settings, residual: settings, one_sided: Vec::new() };
+    let correction: OwnedCorrection<f64, D> = learned(&params, examples).unwrap();
+    let all: Vec<Vec<f64>> = inputs.iter().map(|row| row.to_vec()).collect();
+    let residuals: Vec<f64> = inputs.iter().zip(&strain).map(|(row, strain)| strain - row[0]).collect();
+    for k in (0..199).step_by(7) {
+        let input: [f64; D] = std::array::from_fn(|i| 0.5 * (inputs[k][i] + inputs[k + 1][i]));
+        let said = correction.correction().correct(&input, Gaussian { mean: input[0], variance: 0.0 });
+        let book = textbook(&all, &residuals, &time_s, settings, &input);
+        assert!((said.residual.mean - input[0] - book.mean).abs() < 1e-6, "{k}");
+        assert!(said.novelty > book.latent / book.prior - 1e-6, "{k}");
+    }
+}
+
+/// What a process says of a block in closed form is what one says that was never told of it, centre and scale aside.
+#[test]
+fn blocks_left_out_are_predicted_from_the_others() {
+    let (inputs, strain, time_s) = examples::<D>(50, 1.7);
+    let rows: Vec<&[f64]> = inputs.iter().map(|row| row.as_slice()).collect();
+    let settings = ProcessParams { length: 4.0, noise: 0.1, noise_time_s: 2.0, sd_scale: 1.0 };
+    let process = GaussianProcess::new(Lessons { inputs: &rows, targets: &strain, time_s: &time_s }, settings).unwrap();
+    let left_out = process.left_out(5).unwrap();
+    let kernel = |a: &[f64], b: &[f64]| {
+        let square: f64 = a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum();
+        (-square / 32.0).exp() + 0.09 * (1.0 + a[0] * b[0])
+    };
+    let noise = |i: usize, j: usize| {
+        0.01 * (-(time_s[i] - time_s[j]).abs() / 2.0).exp() + if i == j { 0.0009 + 1e-6 } else { 0.0 }
+    };
+    let mean = strain.iter().sum::<f64>() / 50.0;
+    for block in 0..5 {
+        let others: Vec<usize> = (0..50).filter(|k| k / 10 != block).collect();
+        let covariance = |i: usize, j: usize| kernel(&inputs[i], &inputs[j]) + noise(i, j);
+        let inverse = DMatrix::from_fn(40, 40, |i, j| covariance(others[i], others[j])).try_inverse().unwrap();
+        let y = DVector::from_iterator(40, others.iter().map(|&k| strain[k] - mean));
+        for k in 10 * block..10 * block + 10 {
+            // Its noise is correlated with that of the neighbours, which is known.
+            let known = DVector::from_iterator(40, others.iter().map(|&j| covariance(k, j)));
+            let predicted = mean + known.dot(&(&inverse * &y));
+            assert!((left_out[k].mean - predicted).abs() < 1e-6, "{k}");
+            let variance = covariance(k, k) - known.dot(&(&inverse * &known));
+            let unknown = ((variance - 0.0109 - 1e-6) / kernel(&inputs[k], &inputs[k])).clamp(0.0, 1.0);
+            assert!((left_out[k].unknown - unknown).abs() < 1e-6, "{k}");
+        }
+    }
+}
+
+/// What was learned is better than the filter, on rows between those it was learned from, and what lies far from them is
+/// left as the filter says, with a wide interval.
+#[test]
+fn learning_helps_near_and_leaves_far_alone() {
+    let (inputs, strain, time_s) = examples(160, 0.5);
+    let even = |k: &usize| k.is_multiple_of(2);
+    let pick = |values: &[f64]| (0..160).filter(even).map(|k| values[k]).collect::<Vec<f64>>();
+    let seen: Vec<[f64; D]> = (0..160).filter(even).map(|k| inputs[k]).collect();
+    let (known, times) = (pick(&strain), pick(&time_s));
+    let examples = Examples { inputs: &seen, strain: &known, time_s: &times, limits: LIMITS };
+    let params = CorrectorParams::fit::<D, 0>(examples).unwrap();
+    let correction: OwnedCorrection<f64, D> = learned(&params, examples).unwrap();
+    let (mut before, mut after, mut covered) = (0.0, 0.0, 0);
+    for k in (1..160).step_by(2) {
+        let filtered = Gaussian { mean: inputs[k][0], variance: 0.01 };
+        let said = correction.correction().correct(&inputs[k], filtered).strain;
+        before += (inputs[k][0] - strain[k]).powi(2);
+        after += (said.mean - strain[k]).powi(2);
+        covered += u32::from((said.mean - strain[k]).abs() <= 1.96 * said.sd());
+    }
+    // The error of the filter is a function of the inputs; noise there is none.
+    assert!(after < 0.04 * before, "{after} {before}");
+    assert!(covered >= 72, "{covered} of 80");
+    let mut far = inputs[80].map(|x| x + 100.0);
+    far[0] = 0.3;
+    let said = correction.correction().correct(&far, Gaussian { mean: 0.3, variance: 0.01 });
+    assert!(said.novelty > 0.99);
+    // The strain has a deviation of 0.7; six per cent of its variance are allowed for at the least.
+    assert!(said.strain.sd() > 0.17, "{}", said.strain.sd());
+}

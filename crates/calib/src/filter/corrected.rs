@@ -1,0 +1,319 @@
+use std::collections::VecDeque;
+use std::ops::Range;
+
+use ohmstrain_ekf::correction::{FEATURES, FeatureScale, OUTPUTS, ReadingFeatures, Weighting, mixture};
+use ohmstrain_ekf::{Gaussian, Guard, Reading, ReadingVerdict, StepError};
+
+use crate::CalibrationError;
+use crate::correction::owned::OwnedCorrection;
+use crate::correction::{self, Examples};
+use crate::filter::known::KnownError;
+use crate::filter::way_back::SEGMENT;
+use crate::filter::{Filter, Output, Rows, WayBack};
+use crate::params::RangeParams;
+use crate::params::correction::{
+    CorrectionParams, CorrectionScale, CorrectorParams, FILTER_INPUTS, FUTURE_FEATURES, SIDES, SMOOTHER_INPUTS,
+    TrainingRow, filter_inputs, smoother_inputs,
+};
+
+/// A reading that a guard has weighed down and whose normalised innovation squared is above this surprises: three standard
+/// deviations.
+pub const SURPRISING_NIS: f64 = 9.0;
+
+/// A filter with the learned correction of its strain. Everything else that it says is the filter's.
+///
+/// Where a reading is missing the correction holds what it has seen last, and its variance grows by as much as the filter's
+/// has grown since. With a fixed lag the strain is the mixture of the filter's corrected strain and the lagged one.
+pub(crate) struct Corrected {
+    filter: Box<dyn Filter>,
+    of_filter: OwnedCorrection<f64, FILTER_INPUTS>,
+    of_smoother: OwnedCorrection<f64, SMOOTHER_INPUTS, SIDES>,
+    scale: CorrectionScale,
+    readings: Readings,
+    /// What the filter has said of the last row.
+    said: Option<Output>,
+    /// For how long errors of the correction hang together, s.
+    errors_last_s: f64,
+    /// What is left of a moment at which the strain was known.
+    known: Option<KnownError>,
+    /// Corrected strains of the rows that wait for a fixed lag.
+    waiting: VecDeque<Gaussian<f64>>,
+    /// Lagged estimates on their way out.
+    lagged: Vec<Output>,
+}
+
+/// What the correction has seen of the readings.
+#[derive(Clone, Copy)]
+struct Readings {
+    features: ReadingFeatures<f64>,
+    time_s: Option<f64>,
+    now: Option<[f64; FEATURES]>,
+    /// The filter's variance at the last reading, once one has been missing since.
+    known_variance: Option<f64>,
+    missing: bool,
+}
+
+impl Readings {
+    fn new(scale: FeatureScale<f64>) -> Self {
+        let features = ReadingFeatures::new(scale);
+        Self { features, time_s: None, now: None, known_variance: None, missing: false }
+    }
+
+    /// Takes a row in either direction of time.
+    fn step(&mut self, time_s: f64, Seen { reading, surprises }: Seen) -> Option<[f64; FEATURES]> {
+        let dt_s = (time_s - self.time_s.unwrap_or(time_s)).abs();
+        self.time_s = Some(time_s);
+        self.now = self.features.step_unless(surprises, dt_s, reading);
+        self.missing = reading.is_none() || self.features.is_waiting();
+        self.now
+    }
+}
+
+impl Corrected {
+    pub(crate) fn new(
+        filter: Box<dyn Filter>,
+        params: &CorrectionParams,
+        limits: RangeParams,
+    ) -> Result<Self, CalibrationError> {
+        let scale = params.readings;
+        Ok(Self {
+            filter,
+            of_filter: learned_for_filter(params, limits)?,
+            of_smoother: learned(&params.smoother, &params.rows, TrainingRow::smoother_inputs, limits)?,
+            scale,
+            readings: Readings::new(scale.past()),
+            said: None,
+            errors_last_s: params.filter.residual.noise_time_s,
+            known: None,
+            waiting: VecDeque::new(),
+            lagged: Vec::new(),
+        })
+    }
+
+    /// Lets the correction see a row that the filter has taken.
+    fn see(&mut self, time_s: f64, reading: Option<Reading<f64>>) {
+        let said = self.filter.output();
+        self.readings.step(time_s, Seen::new(&said, reading));
+        if !self.readings.missing {
+            self.readings.known_variance = Some(said.estimate.strain.variance);
+        }
+        self.said = Some(said);
+    }
+
+    /// The filter's strain, corrected; as it is before the first reading.
+    fn corrected(&self, output: &Output) -> Gaussian<f64> {
+        let strain = self.learned(output);
+        match (self.known, self.readings.time_s) {
+            (Some(known), Some(time_s)) => known.correct(time_s, strain),
+            _ => strain,
+        }
+    }
+
+    fn learned(&self, output: &Output) -> Gaussian<f64> {
+        let filtered = output.estimate.strain;
+        let Some(past) = self.readings.now else { return filtered };
+        let inputs = filter_inputs(&outputs(output), &past);
+        let strain = self.of_filter.correction().correct(&inputs, filtered).strain;
+        let grown = self.readings.known_variance.map_or(0.0, |known| (filtered.variance - known).max(0.0));
+        if self.readings.missing { Gaussian { variance: strain.variance + grown, ..strain } } else { strain }
+    }
+
+    /// Mixes lagged estimates with what was said of their rows.
+    fn hand_out(&mut self, out: &mut dyn FnMut(Output)) {
+        for mut output in self.lagged.drain(..) {
+            if let Some(corrected) = self.waiting.pop_front() {
+                output.estimate.strain = mixture(Weighting::Mild, [corrected, output.estimate.strain]);
+            }
+            out(output);
+        }
+    }
+}
+
+/// What corrects the filter's strain.
+pub(crate) fn learned_for_filter(
+    params: &CorrectionParams,
+    limits: RangeParams,
+) -> Result<OwnedCorrection<f64, FILTER_INPUTS>, CalibrationError> {
+    learned(&params.filter, &params.rows, TrainingRow::filter_inputs, limits)
+}
+
+fn learned<const D: usize, const S: usize>(
+    params: &CorrectorParams,
+    rows: &[TrainingRow],
+    inputs: impl Fn(&TrainingRow) -> [f64; D],
+    limits: RangeParams,
+) -> Result<OwnedCorrection<f64, D, S>, CalibrationError> {
+    let (strain, time_s): (Vec<f64>, Vec<f64>) = rows.iter().map(|row| (row.strain, row.time_s)).unzip();
+    let inputs: Vec<_> = rows.iter().map(inputs).collect();
+    let examples = Examples { inputs: &inputs, strain: &strain, time_s: &time_s, limits };
+    let singular = || CalibrationError::Unsupported("`correction` of rows that nothing can be learned from".into());
+    correction::learned(params, examples).ok_or_else(singular)
+}
+
+/// What the correction is shown of a row.
+#[derive(Clone, Copy)]
+struct Seen {
+    reading: Option<f64>,
+    /// Whether the filter would rather not have seen it.
+    surprises: bool,
+}
+
+impl Seen {
+    /// As it was read.
+    fn plain(reading: Option<Reading<f64>>) -> Self {
+        let finite = |reading: Reading<f64>| Some(reading.value).filter(|value| value.is_finite());
+        Self { reading: reading.and_then(finite), surprises: false }
+    }
+
+    /// As the filter has taken it: nothing, if it was kept from it.
+    fn new(output: &Output, reading: Option<Reading<f64>>) -> Self {
+        let (is_seen, surprises) = match output.verdict {
+            ReadingVerdict::Accepted | ReadingVerdict::Readmitted => (true, false),
+            ReadingVerdict::Downweighted => (true, output.nis.is_some_and(|nis| nis > SURPRISING_NIS)),
+            _ => (false, false),
+        };
+        Self { surprises, ..Self::plain(reading.filter(|_| is_seen)) }
+    }
+}
+
+/// What a correction sees of a filter's output.
+pub(crate) fn outputs(output: &Output) -> [f64; OUTPUTS] {
+    let estimate = &output.estimate;
+    let [extend, _, retract] = output.phases.unwrap_or_default();
+    [estimate.strain.mean, estimate.rate.mean, estimate.relaxation.mean, estimate.baseline, extend, retract]
+}
+
+impl Filter for Corrected {
+    fn guard(&mut self, guard: Guard<f64>) {
+        self.filter.guard(guard);
+    }
+
+    fn step(&mut self, time_s: f64, reading: Option<Reading<f64>>) -> Result<(), StepError> {
+        self.filter.step(time_s, reading)?;
+        self.see(time_s, reading);
+        Ok(())
+    }
+
+    fn know(&mut self, strain: &Gaussian<f64>) -> Result<(), StepError> {
+        self.filter.know(strain)?;
+        let said = self.filter.output();
+        let learned = self.learned(&said);
+        let lasts_s = self.errors_last_s;
+        self.known = self.readings.time_s.map(|time_s| KnownError::new(time_s, lasts_s, strain, &learned));
+        self.said = Some(said);
+        Ok(())
+    }
+
+    fn strain(&self) -> Gaussian<f64> {
+        self.output().estimate.strain
+    }
+
+    fn output(&self) -> Output {
+        let mut output = self.said.unwrap_or_else(|| self.filter.output());
+        output.estimate.strain = self.corrected(&output);
+        output
+    }
+
+    fn step_lagged(
+        &mut self,
+        time_s: f64,
+        reading: Option<Reading<f64>>,
+        lag_s: f64,
+        out: &mut dyn FnMut(Output),
+    ) -> Result<(), StepError> {
+        let lagged = &mut self.lagged;
+        let stepped = self.filter.step_lagged(time_s, reading, lag_s, &mut |output| lagged.push(output));
+        if stepped.is_ok() {
+            self.see(time_s, reading);
+            let corrected = self.strain();
+            self.waiting.push_back(corrected);
+        }
+        self.hand_out(out);
+        stepped
+    }
+
+    fn flush_lagged(&mut self, out: &mut dyn FnMut(Output)) -> Result<(), StepError> {
+        let lagged = &mut self.lagged;
+        let flushed = self.filter.flush_lagged(&mut |output| lagged.push(output));
+        self.hand_out(out);
+        flushed
+    }
+
+    fn way_back<'a>(&'a mut self, rows: Rows<'a>) -> Result<Box<dyn WayBack + 'a>, (usize, StepError)> {
+        let mut starts = Vec::with_capacity(rows.len() / SEGMENT + 1);
+        let mut past = self.readings;
+        for row in 0..rows.len() {
+            if row % SEGMENT == 0 {
+                starts.push(past);
+            }
+            let (time_s, reading) = rows.get(row);
+            past.step(time_s, Seen::plain(reading));
+        }
+        // The filter says what it says at the end of the recording.
+        (self.readings, self.said, self.known) = (past, None, None);
+        let back = self.filter.way_back(rows)?;
+        let (correction, ahead) = (&self.of_smoother, Readings::new(self.scale.future()));
+        Ok(Box::new(CorrectedWayBack { back, correction, rows, starts, ahead }))
+    }
+}
+
+/// A smoother on its way back, corrected segment by segment.
+struct CorrectedWayBack<'a> {
+    back: Box<dyn WayBack + 'a>,
+    correction: &'a OwnedCorrection<f64, SMOOTHER_INPUTS, SIDES>,
+    rows: Rows<'a>,
+    /// What had been seen of the past before each segment that is still to come. Readings that were kept from the filter
+    /// were seen here, as far as features go: within a segment they are not, and what was before it fades in seconds.
+    starts: Vec<Readings>,
+    /// What has been seen of the future.
+    ahead: Readings,
+}
+
+impl WayBack for CorrectedWayBack<'_> {
+    fn next_segment(&mut self, out: &mut Vec<Output>) -> Result<Option<Range<usize>>, (usize, StepError)> {
+        let Some(rows) = self.back.next_segment(out)? else { return Ok(None) };
+        let Some(mut past) = self.starts.pop() else { return Ok(Some(rows)) };
+        let mut known = past.known_variance;
+        let mut behind = Vec::with_capacity(rows.len());
+        for (row, output) in rows.clone().zip(out.iter()) {
+            let (time_s, reading) = self.rows.get(row);
+            let features = past.step(time_s, Seen::new(output, reading));
+            known = if past.missing { known } else { Some(output.estimate.strain.variance) };
+            behind.push((features, known));
+        }
+        for ((row, output), (past, known)) in rows.clone().zip(out.iter_mut()).zip(behind).rev() {
+            let (time_s, reading) = self.rows.get(row);
+            let future = self.ahead.step(time_s, Seen::new(output, reading));
+            let smoothed = output.estimate.strain;
+            if !self.ahead.missing {
+                self.ahead.known_variance = Some(smoothed.variance);
+            }
+            let Some(past) = past else { continue };
+            let mut strain = self.correct(output, &past, future);
+            if self.ahead.missing {
+                // The readings on both sides bound what the smoother knows in between.
+                let least = [known, self.ahead.known_variance].into_iter().flatten().reduce(f64::min).unwrap_or(0.0);
+                strain.variance += (smoothed.variance - least).max(0.0);
+            }
+            output.estimate.strain = strain;
+        }
+        Ok(Some(rows))
+    }
+}
+
+impl CorrectedWayBack<'_> {
+    /// After the last reading the future is as at the last reading: settled.
+    fn correct(&self, output: &Output, past: &[f64; FEATURES], future: Option<[f64; FEATURES]>) -> Gaussian<f64> {
+        let future = future.map_or([0.0; FUTURE_FEATURES], future_features);
+        let inputs = smoother_inputs(&outputs(output), past, &future);
+        self.correction.correction().correct(&inputs, output.estimate.strain).strain
+    }
+}
+
+/// Features of the readings to come: without the reading itself, which those of the past have.
+pub(crate) fn future_features([_, others @ ..]: [f64; FEATURES]) -> [f64; FUTURE_FEATURES] {
+    others
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,84 @@
+//! What a filter is made of as plain numbers: for programs that write it in another language.
+
+use ohmstrain_ekf::correction::FeatureScale;
+
+use crate::CalibrationError;
+use crate::correction::owned::OwnedCorrection;
+use crate::filter::build::{HISTORIES, HYPOTHESES, START_SD};
+use crate::filter::corrected::learned_for_filter;
+use crate::filter::sieve::{MOST_REPEATS, Sieve};
+use crate::params::SensorParams;
+use crate::params::correction::FILTER_INPUTS;
+use crate::params::estimator::{EstimatorKind, EstimatorParams};
+
+/// A sensor's filter, with what stands around it.
+#[derive(Clone, Debug)]
+pub struct PortableFilter {
+    /// Which filter moves the state: never [`EstimatorKind::Corrected`].
+    pub kind: EstimatorKind,
+    /// How many hypotheses it keeps: 1 if it keeps none.
+    pub hypotheses: usize,
+    /// Its noise, motion and phases.
+    pub estimator: EstimatorParams,
+    /// What a reading must be for it to see it.
+    pub readings: PortableSieve,
+    /// What corrects its strain.
+    pub correction: Option<PortableCorrection>,
+    /// Deviation of a strain that is known when it starts.
+    pub known_sd: f64,
+}
+
+/// What a reading must be for a filter to see it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PortableSieve {
+    /// Least and largest `R/R₀ - 1` that can be a reading.
+    pub plausible: (f64, f64),
+    /// Longest time, s, for which a working sensor repeats one number; infinite if that is not known.
+    pub longest_repeat_s: f64,
+    /// How often a number must have come again to be stuck.
+    pub most_repeats: u32,
+    /// Time, s, over which errors of the readings are alike.
+    pub error_time_s: f64,
+}
+
+/// The learned correction of a filter's strain.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PortableCorrection {
+    /// The scale of the features.
+    pub features: FeatureScale<f64>,
+    /// As it runs.
+    pub learned: OwnedCorrection<f64, FILTER_INPUTS>,
+}
+
+impl PortableFilter {
+    /// Of the sensor's default estimator, or of another one.
+    ///
+    /// # Errors
+    /// If the sensor has no parameters for it, or nothing can be learned from its correction's rows.
+    pub fn new(params: &SensorParams, kind: Option<EstimatorKind>) -> Result<Self, CalibrationError> {
+        params.validate()?;
+        let asked = kind.unwrap_or(params.default_estimator);
+        let kind = params.filter_of(asked);
+        let estimator = *params.estimator(kind)?;
+        let learned = params.correction.as_ref().filter(|_| asked == EstimatorKind::Corrected);
+        let correction = learned.map(|correction| {
+            let learned = learned_for_filter(correction, params.limits)?;
+            Ok::<_, CalibrationError>(PortableCorrection { features: correction.readings.past(), learned })
+        });
+        let hypotheses = match kind {
+            EstimatorKind::SignSplit => HYPOTHESES,
+            EstimatorKind::Hypotheses => HISTORIES,
+            EstimatorKind::Imm => 3,
+            _ => 1,
+        };
+        let sieve = Sieve::new(params);
+        let readings = PortableSieve {
+            plausible: sieve.plausible,
+            longest_repeat_s: sieve.longest_repeat_s,
+            most_repeats: MOST_REPEATS,
+            error_time_s: estimator.noise.reading_time_s,
+        };
+        let known_sd = START_SD * params.limits.span();
+        Ok(Self { kind, hypotheses, estimator, readings, correction: correction.transpose()?, known_sd })
+    }
+}

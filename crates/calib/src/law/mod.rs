@@ -1,0 +1,15 @@
+//! Regressions that find the law of the sensor, and what recordings tell of its parameters.
+
+pub(crate) mod advice;
+pub(crate) mod blocked_normal;
+#[cfg(feature = "bootstrap")]
+pub(crate) mod bootstrap;
+pub(crate) mod compare;
+pub(crate) mod design;
+pub(crate) mod fit;
+pub(crate) mod identifiability;
+pub(crate) mod least_squares;
+pub(crate) mod regression;
+pub(crate) mod robust_loss;
+pub(crate) mod structure;
+pub(crate) mod uncertainty;

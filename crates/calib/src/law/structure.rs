@@ -1,0 +1,157 @@
+use nalgebra::DVector;
+
+use crate::CalibrationError;
+use crate::law::design::{BRANCH_COLUMNS, StrainScale};
+use crate::law::fit::{GaugeFamily, LawFit};
+use crate::law::regression::{Design, LawRegression};
+use crate::params::law::{BranchParams, GaugeParams, LawParams};
+
+/// Smallest R₀ that is believed, relative to the median reading.
+const LEAST_REST_SHARE: f64 = 0.05;
+
+/// A structure with its time constants and gauge parameters.
+#[derive(Clone, Debug)]
+pub(crate) struct LawStructure {
+    pub family: GaugeFamily,
+    /// ln τ, then the gauge's own nonlinear parameters.
+    pub nonlinear: Vec<f64>,
+    pub taus: usize,
+    pub ridge: f64,
+}
+
+impl LawStructure {
+    /// The structure of a fitted law.
+    pub(crate) fn of_law(law: &LawParams, span: f64, ridge: f64) -> Self {
+        let mut nonlinear: Vec<f64> = law.branches.iter().map(|branch| branch.tau_s.ln()).collect();
+        let family = match law.gauge {
+            GaugeParams::Polynomial { .. } => GaugeFamily::Polynomial,
+            GaugeParams::DecayingExponential { decay_strain, .. } => {
+                nonlinear.push((decay_strain / span).ln());
+                GaugeFamily::DecayingExponential
+            }
+            GaugeParams::Tunnelling { gap, barrier, path_loss } => {
+                nonlinear.extend([(1.0 + gap * span).ln(), barrier * span, path_loss * span * span]);
+                GaugeFamily::Tunnelling
+            }
+        };
+        Self { family, taus: law.branches.len(), nonlinear, ridge }
+    }
+
+    /// Constant, one more constant per further recording, gauge, dash-pots, branches.
+    pub(crate) fn design(&self, regression: &LawRegression) -> Design {
+        let mut columns: Vec<DVector<f64>> =
+            (0..regression.recordings.len()).map(|r| regression.own_constant(r)).collect();
+        columns[0].fill(1.0);
+        let free = columns.len();
+        let (gauge, span) = (&self.nonlinear[self.taus..], regression.scale.span);
+        let mut offset = DVector::zeros(columns[0].len());
+        match self.family {
+            GaugeFamily::Polynomial => columns.extend((1..=3).map(|power| {
+                regression.column(|recording| recording.regressors.of_strain(|x| (x / span).powi(power)))
+            })),
+            GaugeFamily::DecayingExponential => {
+                let decay = gauge[0].exp() * span;
+                columns.push(regression.column(|r| r.regressors.of_strain(|x| x / span * (-x / decay).exp())));
+            }
+            GaugeFamily::Tunnelling => {
+                let curve = tunnelling(gauge, span).to_model();
+                offset = regression.column(|r| r.regressors.of_strain(|x| curve.value_and_slope(x).0));
+            }
+        }
+        columns.extend(regression.columns(|recording| recording.regressors.viscosity()));
+        for ln_tau in &self.nonlinear[..self.taus] {
+            columns.extend(regression.columns::<BRANCH_COLUMNS>(|recording| recording.regressors.branch(ln_tau.exp())));
+        }
+        Design { columns, free, offset }
+    }
+
+    /// The law without block `left_out` of every recording.
+    pub(crate) fn fit(&self, regression: &LawRegression, left_out: Option<usize>) -> Result<LawFit, CalibrationError> {
+        let design = self.design(regression);
+        let solution = regression.solve(&design, self.ridge, left_out).ok_or(CalibrationError::Singular)?;
+        for (recording, rest) in regression.recordings.iter().zip(&solution.rest_readings) {
+            let share = rest / recording.median_reading();
+            if share < LEAST_REST_SHARE {
+                return Err(CalibrationError::RestResistance { value: share });
+            }
+        }
+        let residual = regression.response(&solution.rest_readings) - design.fitted(&solution.weights);
+        Ok(LawFit {
+            law: self.law(regression, solution.weights.as_slice()),
+            rest_readings: solution.rest_readings,
+            residuals: regression.by_recording(&residual),
+            cross_validated_error: solution.cross_validated.sqrt(),
+            ridge: self.ridge,
+        })
+    }
+
+    /// The weights of a law of this structure in the design of one recording, the constant with them: what [`Self::law`] turns
+    /// into that law.
+    pub(crate) fn weights(&self, law: &LawParams, scale: StrainScale) -> DVector<f64> {
+        let StrainScale { centre, span } = scale;
+        let mut weights = vec![0.0];
+        match law.gauge {
+            GaugeParams::Polynomial { coefficients: [a, b, c] } => {
+                weights.extend([a * span, b * span.powi(2), c * span.powi(3)]);
+            }
+            GaugeParams::DecayingExponential { slope, .. } => weights.push(slope * span),
+            GaugeParams::Tunnelling { .. } => {}
+        }
+        weights.extend([law.extend_viscosity_s * span, law.retract_viscosity_s * span]);
+        for branch in &law.branches {
+            let gain = |gain: f64, slope: f64| (gain + slope * centre) * span;
+            weights.extend([
+                gain(branch.extend_gain, branch.extend_gain_slope),
+                gain(branch.retract_gain, branch.retract_gain_slope),
+                branch.extend_gain_slope * span.powi(2),
+                branch.retract_gain_slope * span.powi(2),
+            ]);
+        }
+        DVector::from_vec(weights)
+    }
+
+    pub(crate) fn sort_branches(&mut self) {
+        self.nonlinear[..self.taus].sort_by(f64::total_cmp);
+    }
+
+    /// The weights in the law's own units.
+    pub(crate) fn law(&self, regression: &LawRegression, weights: &[f64]) -> LawParams {
+        let StrainScale { centre, span } = regression.scale;
+        let mut rest = weights[regression.recordings.len()..].iter().copied();
+        let mut next = || rest.next().unwrap_or(0.0);
+        let gauge = match self.family {
+            GaugeFamily::Polynomial => {
+                GaugeParams::Polynomial { coefficients: [next() / span, next() / span.powi(2), next() / span.powi(3)] }
+            }
+            GaugeFamily::DecayingExponential => GaugeParams::DecayingExponential {
+                slope: next() / span,
+                decay_strain: self.nonlinear[self.taus].exp() * span,
+            },
+            GaugeFamily::Tunnelling => tunnelling(&self.nonlinear[self.taus..], span),
+        };
+        let (extend_viscosity_s, retract_viscosity_s) = (next() / span, next() / span);
+        let branches = self.nonlinear[..self.taus]
+            .iter()
+            .map(|ln_tau| {
+                let [extend, retract, extend_slope, retract_slope] = [next(), next(), next(), next()];
+                BranchParams {
+                    tau_s: ln_tau.exp(),
+                    extend_gain: (extend - extend_slope * centre / span) / span,
+                    retract_gain: (retract - retract_slope * centre / span) / span,
+                    extend_gain_slope: extend_slope / span.powi(2),
+                    retract_gain_slope: retract_slope / span.powi(2),
+                }
+            })
+            .collect();
+        LawParams { extend_viscosity_s, retract_viscosity_s, range: regression.range, gauge, branches }
+    }
+}
+
+/// The tunnelling curve from parameters of order one.
+fn tunnelling(parameters: &[f64], span: f64) -> GaugeParams {
+    GaugeParams::Tunnelling {
+        gap: (parameters[0].exp() - 1.0) / span,
+        barrier: parameters[1] / span,
+        path_loss: parameters[2] / (span * span),
+    }
+}

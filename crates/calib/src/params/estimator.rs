@@ -1,0 +1,210 @@
+use ohmstrain_ekf::Dwell;
+use ohmstrain_model::{ModelNoise, Motion, ParameterError};
+use serde::{Deserialize, Serialize};
+
+/// The estimators, by the names used on the command line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum EstimatorKind {
+    /// Extended Kalman filter.
+    Ekf,
+    /// Unscented Kalman filter.
+    Ukf,
+    /// Interacting multiple models over extend, hold and retract.
+    Imm,
+    /// Gaussian hypotheses split by the sign of the rate.
+    SignSplit,
+    /// Best phase histories.
+    Hypotheses,
+    /// Particles: the reference that shows whether the law or the estimator limits.
+    Particles,
+    /// One of the filters of [`RECIPE`](crate::RECIPE) with the learned correction of its strain.
+    Corrected,
+}
+
+impl EstimatorKind {
+    /// All estimators.
+    pub const ALL: [Self; 7] =
+        [Self::Ekf, Self::Ukf, Self::Imm, Self::SignSplit, Self::Hypotheses, Self::Particles, Self::Corrected];
+
+    /// Whether it keeps hypotheses about the phase; the others are one Gaussian.
+    #[must_use]
+    pub const fn has_phases(self) -> bool {
+        !matches!(self, Self::Ekf | Self::Ukf)
+    }
+
+    /// The estimator whose noise and motion this one runs with. Particles take those of the sign-split filter, so that
+    /// what they do better is the estimator's doing and not the parameters'.
+    #[must_use]
+    pub const fn tuned_as(self) -> Self {
+        match self {
+            Self::Particles => Self::SignSplit,
+            own => own,
+        }
+    }
+
+    /// The estimator that smooths in its place: itself, where it has a smoother.
+    #[must_use]
+    pub const fn smoother(self) -> Self {
+        match self {
+            Self::Corrected => self,
+            own => own.tuned_as(),
+        }
+    }
+
+    /// Its name on the command line and in files.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Ekf => "ekf",
+            Self::Ukf => "ukf",
+            Self::Imm => "imm",
+            Self::SignSplit => "sign-split",
+            Self::Hypotheses => "hypotheses",
+            Self::Particles => "particles",
+            Self::Corrected => "corrected",
+        }
+    }
+}
+
+/// Noise and motion as one estimator needs them.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct EstimatorParams {
+    /// Mean negative log density of the true strain that the fit reached, in spans; smaller is better.
+    pub score: f64,
+    /// Factor on the filter's standard deviation of strain, from how its 95 % interval covered the calibration, every
+    /// block with the law that had not seen it.
+    pub strain_sd_scale: f64,
+    /// The same for the smoother, where there is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub smoothed_sd_scale: Option<f64>,
+    /// How the body moves.
+    pub motion: MotionParams,
+    /// What the law does not explain.
+    pub noise: NoiseParams,
+    /// How phases follow each other, for estimators that keep phase hypotheses.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub phases: Option<PhaseParams>,
+}
+
+/// How phases follow each other.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PhaseParams {
+    /// Mean duration of a hold, s.
+    pub hold_time_s: f64,
+    /// Mean duration of a movement in one direction, s.
+    pub move_time_s: f64,
+    /// Probability that a movement turns around without a hold; 1 for a body that never rests.
+    pub reversal: f64,
+    /// Mean speed of a movement, per second; 0 where the rate has no preferred value.
+    pub speed_per_s: f64,
+    /// Power to which a reading's likelihood enters the weights of the hypotheses.
+    pub tempering: f64,
+}
+
+impl PhaseParams {
+    /// How long phases last and what follows them.
+    ///
+    /// # Errors
+    /// If a number is out of its range.
+    pub fn dwell(&self) -> Result<Dwell<f64>, ParameterError> {
+        Dwell::new(self.hold_time_s, self.move_time_s, self.reversal)
+    }
+
+    /// Whether the body rests at times.
+    #[must_use]
+    pub fn rests(&self) -> bool {
+        self.hold_time_s > 0.0 && self.reversal < 1.0
+    }
+}
+
+/// Noise of the law, relative to R₀.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct NoiseParams {
+    /// Error of a reading that the baseline does not take up.
+    pub reading_sd: f64,
+    /// Time over which these errors are alike, s; 0 where every reading has one of its own. Of the information in a reading
+    /// a share 1 - exp(-dt/T) is new, dt after the one before, so that the same parameters fit any sampling.
+    #[serde(default)]
+    pub reading_time_s: f64,
+    /// Wander of each branch.
+    pub branch_sd: f64,
+    /// Wander of the baseline.
+    pub baseline_sd: f64,
+    /// Correlation time of the baseline, s.
+    pub baseline_time_s: f64,
+}
+
+impl NoiseParams {
+    /// As the model has it, for a reading on its own.
+    #[must_use]
+    pub const fn to_model(self) -> ModelNoise<f64> {
+        ModelNoise {
+            reading_sd: self.reading_sd,
+            branch_sd: self.branch_sd,
+            baseline_sd: self.baseline_sd,
+            baseline_time_s: self.baseline_time_s,
+        }
+    }
+
+    /// As the model has it, for readings every `dt_s` seconds.
+    #[must_use]
+    pub fn every(self, dt_s: f64) -> ModelNoise<f64> {
+        let reading_sd = self.reading_sd / news(dt_s, self.reading_time_s).sqrt();
+        ModelNoise { reading_sd, ..self.to_model() }
+    }
+}
+
+/// How the body moves: an Ornstein-Uhlenbeck velocity, by standard deviations of strain and rate.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(into = "MotionTable", from = "MotionTable")]
+pub struct MotionParams {
+    /// Correlation time of the rate, s.
+    pub rate_time_s: f64,
+    /// Standard deviation of the rate, per second.
+    pub rate_sd_per_s: f64,
+    /// Mean strain.
+    pub strain_mean: f64,
+    /// Standard deviation of the strain.
+    pub strain_sd: f64,
+}
+
+/// A motion as it stands in a sensor's file.
+#[derive(Serialize, Deserialize)]
+#[serde(tag = "family", rename_all = "kebab-case", deny_unknown_fields)]
+enum MotionTable {
+    OrnsteinUhlenbeck { rate_time_s: f64, rate_sd_per_s: f64, strain_mean: f64, strain_sd: f64 },
+}
+
+impl From<MotionParams> for MotionTable {
+    fn from(motion: MotionParams) -> Self {
+        let MotionParams { rate_time_s, rate_sd_per_s, strain_mean, strain_sd } = motion;
+        Self::OrnsteinUhlenbeck { rate_time_s, rate_sd_per_s, strain_mean, strain_sd }
+    }
+}
+
+impl From<MotionTable> for MotionParams {
+    fn from(table: MotionTable) -> Self {
+        let MotionTable::OrnsteinUhlenbeck { rate_time_s, rate_sd_per_s, strain_mean, strain_sd } = table;
+        Self { rate_time_s, rate_sd_per_s, strain_mean, strain_sd }
+    }
+}
+
+impl MotionParams {
+    /// As the model has it.
+    ///
+    /// # Errors
+    /// Names the parameter that no motion can have.
+    pub fn to_model(self) -> Result<Motion<f64>, ParameterError> {
+        Motion::ornstein_uhlenbeck(self.rate_time_s, self.rate_sd_per_s, self.strain_mean, self.strain_sd)
+    }
+}
+
+/// The share of a reading's information that is new `dt_s` seconds after another one, if errors are alike over
+/// `error_time_s`: 1 - exp(-dt/T), at least as much as rounding leaves.
+pub(crate) fn news(dt_s: f64, error_time_s: f64) -> f64 {
+    if error_time_s > 0.0 { (-(-dt_s / error_time_s).exp_m1()).max(f64::EPSILON) } else { 1.0 }
+}

@@ -1,0 +1,104 @@
+use ohmstrain_model::{Branch, Gauge, SensorLaw};
+use serde::{Deserialize, Serialize};
+
+use crate::params::RangeParams;
+
+/// Most branches.
+pub(crate) const MOST_BRANCHES: usize = 4;
+
+/// The switched Kelvin-Voigt law with any number of branches up to four.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LawParams {
+    /// Dash-pot while stretching, s (per unit of strain).
+    pub extend_viscosity_s: f64,
+    /// Dash-pot while releasing, s.
+    pub retract_viscosity_s: f64,
+    /// The strains it was fitted on; beyond them it goes on along the tangent.
+    pub range: RangeParams,
+    /// Quasi-static curve.
+    pub gauge: GaugeParams,
+    /// Relaxing branches, fastest first.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub branches: Vec<BranchParams>,
+}
+
+/// The quasi-static curve g(ε).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "family", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum GaugeParams {
+    /// `a₁ ε + a₂ ε² + a₃ ε³`.
+    Polynomial {
+        /// a₁, a₂, a₃.
+        coefficients: [f64; 3],
+    },
+    /// `G ε exp(-ε/ε₀)`.
+    DecayingExponential {
+        /// G.
+        slope: f64,
+        /// ε₀.
+        decay_strain: f64,
+    },
+    /// `(1 + C ε) exp(A ε + W ε²) - 1`.
+    Tunnelling {
+        /// C.
+        gap: f64,
+        /// A.
+        barrier: f64,
+        /// W.
+        path_loss: f64,
+    },
+}
+
+impl GaugeParams {
+    /// As the model has it.
+    #[must_use]
+    pub const fn to_model(self) -> Gauge<f64> {
+        match self {
+            Self::Polynomial { coefficients } => Gauge::Polynomial { coefficients },
+            Self::DecayingExponential { slope, decay_strain } => Gauge::DecayingExponential { slope, decay_strain },
+            Self::Tunnelling { gap, barrier, path_loss } => Gauge::Tunnelling { gap, barrier, path_loss },
+        }
+    }
+}
+
+/// One relaxing branch.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BranchParams {
+    /// Time constant, s.
+    pub tau_s: f64,
+    /// Gain while stretching.
+    pub extend_gain: f64,
+    /// Gain while releasing.
+    pub retract_gain: f64,
+    /// Growth of the stretching gain with strain.
+    pub extend_gain_slope: f64,
+    /// Growth of the releasing gain with strain.
+    pub retract_gain_slope: f64,
+}
+
+impl LawParams {
+    /// As the model has it; `None` unless there are exactly `B` branches.
+    #[must_use]
+    pub fn to_model<const B: usize>(&self) -> Option<SensorLaw<f64, B>> {
+        let branches: Vec<Branch<f64>> = self
+            .branches
+            .iter()
+            .map(|branch| Branch {
+                tau_s: branch.tau_s,
+                extend_gain: branch.extend_gain,
+                retract_gain: branch.retract_gain,
+                extend_gain_slope: branch.extend_gain_slope,
+                retract_gain_slope: branch.retract_gain_slope,
+            })
+            .collect();
+        Some(SensorLaw {
+            gauge: self.gauge.to_model(),
+            extend_viscosity_s: self.extend_viscosity_s,
+            retract_viscosity_s: self.retract_viscosity_s,
+            branches: branches.try_into().ok()?,
+            range: self.range.to_model(),
+        })
+    }
+}

@@ -1,0 +1,48 @@
+use serde::{Deserialize, Serialize};
+
+/// What a calibration is worth in a few numbers, kept with the sensor: see [`Findings`](crate::Findings). Nothing computes with them.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Summary {
+    /// Root mean squared error of the default estimator's filter on quarters that it was not fitted to, percent of full
+    /// scale.
+    pub left_out_percent_fs: f64,
+    /// Its smoother's; `None` if it has none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub smoothed_percent_fs: Option<f64>,
+    /// The static cubic's on the same quarters.
+    pub static_cubic_percent_fs: f64,
+    /// Share of their rows that the filter's 95 % interval holds, percent.
+    pub coverage_95_percent: f64,
+    /// Mean width of that interval, percent of full scale.
+    pub width_95_percent_fs: f64,
+    /// What makes most of the error.
+    pub limited_by: Limit,
+}
+
+/// What limits a filter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Limit {
+    /// The form of the law.
+    Law,
+    /// Which way the body moves.
+    Direction,
+    /// Slow changes that strain does not explain.
+    Drift,
+    /// Noise of the readings.
+    Noise,
+}
+
+impl Limit {
+    /// In a word.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Law => "law",
+            Self::Direction => "direction",
+            Self::Drift => "drift",
+            Self::Noise => "noise",
+        }
+    }
+}

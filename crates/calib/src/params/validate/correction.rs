@@ -1,0 +1,66 @@
+use super::table::{FACTOR, FieldError, POSITIVE, SIGNED, Table};
+use crate::params::correction::{
+    CorrectionParams, CorrectionScale, CorrectorParams, ProcessParams, SIDES, TrainingRow,
+};
+use crate::params::estimator::EstimatorKind;
+
+/// Training rows that a file may have: the work grows with their cube.
+const ROWS: std::ops::RangeInclusive<usize> = 2..=1000;
+
+impl CorrectionParams {
+    pub(crate) fn validate(&self, table: &Table) -> Result<(), FieldError> {
+        if self.corrects == EstimatorKind::Corrected {
+            return Err(table.wrong("corrects", "a filter", self.corrects.name()));
+        }
+        self.readings.validate(&table.table("readings"))?;
+        self.filter.validate(&table.table("filter"), 0)?;
+        self.smoother.validate(&table.table("smoother"), SIDES)?;
+        if !ROWS.contains(&self.rows.len()) {
+            let expected = format!("{} to {} entries", ROWS.start(), ROWS.end());
+            return Err(table.wrong("rows", expected, self.rows.len()));
+        }
+        self.rows.iter().enumerate().try_for_each(|(index, row)| row.validate(&table.entry("rows", index)))
+    }
+}
+
+impl CorrectionScale {
+    pub(crate) fn validate(&self, table: &Table) -> Result<(), FieldError> {
+        table.number("centre", self.centre, SIGNED)?;
+        table.number("half_range", self.half_range, POSITIVE)?;
+        table.numbers("rates", &self.rates, POSITIVE)?;
+        table.numbers("starts", self.starts.as_flattened(), SIGNED)
+    }
+}
+
+impl CorrectorParams {
+    fn validate(&self, table: &Table, sides: usize) -> Result<(), FieldError> {
+        table.number("sd_scale", self.sd_scale, FACTOR)?;
+        self.direct.validate(&table.table("direct"))?;
+        self.residual.validate(&table.table("residual"))?;
+        if self.one_sided.len() != sides {
+            return Err(table.wrong("one_sided", format!("{sides} entries"), self.one_sided.len()));
+        }
+        let mut one_sided = self.one_sided.iter().enumerate();
+        one_sided.try_for_each(|(index, side)| side.validate(&table.entry("one_sided", index)))
+    }
+}
+
+impl ProcessParams {
+    fn validate(&self, table: &Table) -> Result<(), FieldError> {
+        table.number("length", self.length, FACTOR)?;
+        table.number("noise", self.noise, FACTOR)?;
+        table.number("noise_time_s", self.noise_time_s, POSITIVE)?;
+        table.number("sd_scale", self.sd_scale, FACTOR)
+    }
+}
+
+impl TrainingRow {
+    pub(crate) fn validate(&self, table: &Table) -> Result<(), FieldError> {
+        table.number("time_s", self.time_s, SIGNED)?;
+        table.number("strain", self.strain, SIGNED)?;
+        table.numbers("past", &self.past, SIGNED)?;
+        table.numbers("future", &self.future, SIGNED)?;
+        table.numbers("filtered", &self.filtered, SIGNED)?;
+        table.numbers("smoothed", &self.smoothed, SIGNED)
+    }
+}

@@ -1,0 +1,87 @@
+use crate::params::estimator::EstimatorKind;
+use crate::params::law::MOST_BRANCHES;
+use crate::params::validate::table::{AMOUNT, Allowed, FACTOR, FieldError, GAIN, POSITIVE, SHARE, SIGNED, Table};
+use crate::prior::{CorrectionPrior, EstimatorPrior, FEWEST_SENSORS, LawPrior, Prior, is_covariance};
+
+/// Logarithms of what searches may find, and of what has no speed.
+const LOGARITHM: Allowed = Allowed { least: -30.0, most: 30.0 };
+/// Rows of other sensors: the work grows with the cube of all rows.
+const ROWS: std::ops::RangeInclusive<usize> = 2..=500;
+/// Weights of a law: three of the gauge, two dash-pots, four of a branch.
+const WITHOUT_BRANCHES: usize = 5;
+const OF_BRANCH: usize = 4;
+/// Numbers of a filter's noise and motion, without phases and with them.
+const SIZES: [usize; 2] = [7, 11];
+
+impl Prior {
+    /// Checks every number.
+    ///
+    /// # Errors
+    /// Names the first that is outside of its range.
+    pub fn validate(&self) -> Result<(), FieldError> {
+        let root = Table::root();
+        if self.sensors < FEWEST_SENSORS {
+            return Err(root.wrong("sensors", format!("at least {FEWEST_SENSORS}"), self.sensors));
+        }
+        self.validity.validate(&root.table("validity"))?;
+        self.law.validate(&root.table("law"))?;
+        for (kind, estimator) in &self.estimators {
+            estimator.validate(&root.table("estimators").table(kind.name()))?;
+        }
+        self.correction.as_ref().map_or(Ok(()), |correction| correction.validate(&root.table("correction")))
+    }
+}
+
+impl LawPrior {
+    fn validate(&self, table: &Table) -> Result<(), FieldError> {
+        self.range.validate(&table.table("range"))?;
+        table.numbers("tau_s", &self.tau_s, POSITIVE)?;
+        table.number("error_density_s", self.error_density_s, POSITIVE)?;
+        if self.tau_s.len() > MOST_BRANCHES {
+            let expected = format!("at most {} entries", MOST_BRANCHES);
+            return Err(table.wrong("tau_s", expected, self.tau_s.len()));
+        }
+        let size = WITHOUT_BRANCHES + OF_BRANCH * self.tau_s.len();
+        table.length("mean", size, self.mean.len())?;
+        table.numbers("mean", &self.mean, GAIN)?;
+        table.length("covariance", size, self.covariance.len())?;
+        for (index, row) in self.covariance.iter().enumerate() {
+            let name = format!("covariance[{index}]");
+            table.length(&name, size, row.len())?;
+            table.numbers(&name, row, SIGNED)?;
+        }
+        if is_covariance(&self.covariance) {
+            return Ok(());
+        }
+        Err(table.wrong("covariance", "a symmetric matrix that is positive definite", "another"))
+    }
+}
+
+impl EstimatorPrior {
+    fn validate(&self, table: &Table) -> Result<(), FieldError> {
+        if !SIZES.contains(&self.ln_mean.len()) {
+            return Err(table.wrong("ln_mean", format!("{} or {} entries", SIZES[0], SIZES[1]), self.ln_mean.len()));
+        }
+        table.numbers("ln_mean", &self.ln_mean, LOGARITHM)?;
+        table.length("ln_sd", self.ln_mean.len(), self.ln_sd.len())?;
+        table.numbers("ln_sd", &self.ln_sd, POSITIVE)?;
+        table.number("reading_time_s", self.reading_time_s, AMOUNT)?;
+        table.number("strain_mean", self.strain_mean, SIGNED)?;
+        table.number("reversal", self.reversal, SHARE)?;
+        table.number("strain_sd_scale", self.strain_sd_scale, FACTOR)
+    }
+}
+
+impl CorrectionPrior {
+    fn validate(&self, table: &Table) -> Result<(), FieldError> {
+        if self.corrects == EstimatorKind::Corrected {
+            return Err(table.wrong("corrects", "a filter", self.corrects.name()));
+        }
+        self.readings.validate(&table.table("readings"))?;
+        if !ROWS.contains(&self.rows.len()) {
+            let expected = format!("{} to {} entries", ROWS.start(), ROWS.end());
+            return Err(table.wrong("rows", expected, self.rows.len()));
+        }
+        self.rows.iter().enumerate().try_for_each(|(index, row)| row.validate(&table.entry("rows", index)))
+    }
+}

@@ -1,0 +1,207 @@
+use nalgebra::DVector;
+
+use crate::law::design::BRANCH_COLUMNS;
+use crate::law::regression::LawRegression;
+use crate::law::robust_loss::preliminary;
+use crate::low_pass::LowPass;
+use crate::motion_stats::MotionStats;
+use crate::samples::{FEWEST_ROWS, Samples};
+
+/// Where lags are looked for.
+#[derive(Clone, Copy)]
+struct Search {
+    /// In the middle of the lags tried, s.
+    around_s: f64,
+    /// Lags tried reach this far to both sides, s.
+    reach_s: f64,
+    /// Lags tried to each side.
+    steps: u32,
+    /// Rows kept of the recording.
+    rows: usize,
+}
+
+/// The first look, as far as a reference is late or early where clocks were started by hand.
+const FAR: Search = Search { around_s: 0.0, reach_s: 12.0, steps: 24, rows: 1500 };
+/// The second look, around what the first one has found.
+const NEAR: Search = Search { around_s: 0.0, reach_s: 1.0, steps: 20, rows: 6000 };
+/// The first look reaches no further than this share of the recording.
+const LARGEST_SHARE: f64 = 0.1;
+/// Movements that repeat look alike one period later: of lags about as good as the best one, in squared error, the
+/// smallest is taken.
+const AS_GOOD: f64 = 1.2;
+/// Ridge of the law, in the middle of those that calibration tries.
+const RIDGE: f64 = 0.01;
+/// By this factor a lag has to lower the law's squared error to be believed far from zero. Public recordings as they are,
+/// of three materials, show gains of up to 1.9, for lags of seconds where one part of a sine looks like another; moved by
+/// 2 s, gains of 1.9 to 135, mostly above 3.
+const SURE: f64 = 2.5;
+/// Dash-pots: the two columns between gauge and branches.
+const DASH_POTS: usize = 2;
+/// Coefficients of the polynomial gauge.
+const GAUGE: usize = 3;
+
+/// How late a reference is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lag {
+    /// Positive if what the reading shows now stands in the reference later, s.
+    pub lag_s: f64,
+    /// Mean duration of a movement in one direction, s.
+    pub movement_s: f64,
+    /// Squared error of the law on blocks left out without the lag, over that with it.
+    pub gain: f64,
+}
+
+/// How far the reference lags behind the reading.
+///
+/// The lag, within ±12 s (or a tenth of the recording) if it is [sure](Lag::is_sure) and ±1 s if not, at which a law with
+/// two branches, a cubic gauge and no dash-pots explains the readings best, on blocks left out. Law and readings are compared through a high-pass as long as the lags
+/// reach: a lag shows where the movement changes, and slow errors of the law, which are larger, would move it by half a
+/// second and more. A dash-pot is left out because it looks like a lag: what a sensor has of one is part of the answer. A
+/// movement that repeats cannot tell a lag from one that is a period longer; the smaller one is given.
+///
+/// `None` if no lag within reach is best, or the recording is too short or too plain to tell.
+#[must_use]
+pub fn reference_lag(samples: &Samples) -> Option<Lag> {
+    let far = far(samples)?;
+    let found = best_lag(samples, far).and_then(|(around_s, _)| examined(samples, around_s, far.reach_s));
+    found.filter(Lag::is_sure).or_else(|| examined(samples, 0.0, far.reach_s))
+}
+
+/// The end of the lags that are looked for, s (negative: the reference is early), if the readings are explained best there, and
+/// surely better than without a lag: the clocks are further apart than that.
+#[must_use]
+pub fn lag_out_of_reach(samples: &Samples) -> Option<f64> {
+    let far = far(samples)?;
+    let errors = errors(samples, far)?;
+    let least = errors.iter().copied().fold(f64::INFINITY, f64::min);
+    let is_sure = *errors.get(far.steps as usize)? >= SURE * least;
+    let is_least = |error: Option<&f64>| is_sure && error == Some(&least);
+    match (is_least(errors.first()), is_least(errors.last())) {
+        (true, false) => Some(-far.reach_s),
+        (false, true) => Some(far.reach_s),
+        _ => None,
+    }
+}
+
+/// The first look, in a recording of that length.
+fn far(samples: &Samples) -> Option<Search> {
+    let duration_s = samples.time_s.last()? - samples.time_s.first()?;
+    Some(Search { reach_s: FAR.reach_s.min(LARGEST_SHARE * duration_s), ..FAR })
+}
+
+/// The best lag near `around_s`.
+fn examined(samples: &Samples, around_s: f64, farthest_s: f64) -> Option<Lag> {
+    let search = Search { around_s, reach_s: NEAR.reach_s.min(farthest_s), ..NEAR };
+    let (lag_s, least) = best_lag(samples, search)?;
+    let now = left_out_error(samples, 0.0, search)?;
+    Some(Lag { lag_s, movement_s: MotionStats::new(&[*samples]).move_s, gain: now / least })
+}
+
+impl Lag {
+    /// Whether the lag is believed wherever it is: the readings are explained so much better with it.
+    #[must_use]
+    pub fn is_sure(&self) -> bool {
+        self.gain >= SURE
+    }
+}
+
+/// The reference of each row, moved by `-lag_s`: what it says that much later, interpolated; NaN beyond its ends.
+#[must_use]
+pub fn aligned(samples: &Samples, lag_s: f64) -> Vec<f64> {
+    let known: Vec<(f64, f64)> = samples
+        .time_s
+        .iter()
+        .zip(samples.strain)
+        .filter_map(|(&time_s, &strain)| strain.is_finite().then_some((time_s, strain)))
+        .collect();
+    let at = |time_s: f64| {
+        let after = known.partition_point(|(known_s, _)| *known_s < time_s);
+        match (after.checked_sub(1).and_then(|before| known.get(before)), known.get(after)) {
+            (_, Some((b_s, b))) if *b_s == time_s => *b,
+            (Some((a_s, a)), Some((b_s, b))) => a + (time_s - a_s) / (b_s - a_s) * (b - a),
+            _ => f64::NAN,
+        }
+    };
+    samples.time_s.iter().map(|time_s| at(time_s + lag_s)).collect()
+}
+
+/// The best lag of a search, between those tried, and its error; `None` if it lies at an end.
+fn best_lag(samples: &Samples, search: Search) -> Option<(f64, f64)> {
+    let offset_s = |i: usize| search.offset_s(i);
+    let errors = errors(samples, search)?;
+    let least = errors.iter().copied().fold(f64::INFINITY, f64::min);
+    let is_valley =
+        |i: usize| i > 0 && i + 1 < errors.len() && errors[i] <= errors[i - 1] && errors[i] <= errors[i + 1];
+    let good = (0..errors.len()).filter(|&i| errors[i] <= AS_GOOD * least);
+    let best = good.filter(|&i| is_valley(i) || errors[i] == least).min_by(|a, b| {
+        let size = |i: usize| (search.around_s + offset_s(i)).abs();
+        size(*a).total_cmp(&size(*b))
+    })?;
+    let (before, after) = (errors.get(best.checked_sub(1)?)?, errors.get(best + 1)?);
+    // The minimum of the parabola through the best lag and its neighbours.
+    let curvature = before - 2.0 * errors[best] + after;
+    let offset = if curvature > 0.0 { 0.5 * (before - after) / curvature } else { 0.0 };
+    Some((search.around_s + offset_s(best) + offset * search.step_s(), errors[best]))
+}
+
+/// The law's error at every lag of a search.
+fn errors(samples: &Samples, search: Search) -> Option<Vec<f64>> {
+    let lags = 0..=2 * search.steps as usize;
+    lags.map(|i| left_out_error(samples, search.around_s + search.offset_s(i), search)).collect()
+}
+
+impl Search {
+    fn step_s(&self) -> f64 {
+        self.reach_s / f64::from(self.steps)
+    }
+
+    /// How far the i-th lag is from the middle, s.
+    fn offset_s(&self, i: usize) -> f64 {
+        (i as f64 - f64::from(self.steps)) * self.step_s()
+    }
+}
+
+/// Mean squared error of the law behind the high-pass, on blocks left out, if the reference is read `lag_s` later.
+fn left_out_error(samples: &Samples, lag_s: f64, search: Search) -> Option<f64> {
+    let strain = aligned(samples, lag_s);
+    // Every lag is judged by the same rows: those that have a reference within reach on both sides.
+    let reach_s = search.around_s.abs() + search.reach_s;
+    let (first_s, last_s) = (samples.time_s.first()? + reach_s, samples.time_s.last()? - reach_s);
+    let stride = samples.len().div_ceil(search.rows);
+    let within = |k: &usize| (first_s..=last_s).contains(&samples.time_s[*k]);
+    let rows: Vec<usize> = (0..samples.len()).step_by(stride).filter(within).collect();
+    if rows.len() < FEWEST_ROWS {
+        return None;
+    }
+    let pick = |values: &[f64]| rows.iter().map(|&k| values[k]).collect::<Vec<f64>>();
+    let (time_s, strain) = (pick(samples.time_s), pick(&strain));
+    let reading: Vec<f64> =
+        rows.iter().map(|&k| if samples.strain[k].is_finite() { samples.reading[k] } else { f64::NAN }).collect();
+    let shifted = Samples { time_s: &time_s, reading: &reading, strain: &strain };
+    let regression = LawRegression::new(&[shifted]).ok()?;
+    let structure = preliminary(&regression);
+    let mut design = structure.design(&regression);
+    let times: Vec<f64> = regression.recordings[0].complete.iter().map(|&k| time_s[k]).collect();
+    let rest_readings = regression.median_readings();
+    let response = regression.response(&rest_readings);
+    // As long as the lags reach from one side to the other.
+    let high_pass = |column: &DVector<f64>| high_pass(&times, column, 2.0 * search.reach_s);
+    design.offset = &response - high_pass(&response);
+    // The constant stays: it is the regression's own.
+    for column in design.columns.iter_mut().skip(1) {
+        *column = high_pass(column);
+    }
+    let normal = regression.normal(&design, &rest_readings);
+    let branches = 1 + GAUGE + DASH_POTS;
+    let columns: Vec<usize> = (0..=GAUGE).chain(branches..branches + structure.taus * BRANCH_COLUMNS).collect();
+    normal.cross_validate(&columns, RIDGE)
+}
+
+/// What of a column is faster than `tau_s`.
+fn high_pass(time_s: &[f64], column: &DVector<f64>, tau_s: f64) -> DVector<f64> {
+    let mut low_pass = LowPass::new(tau_s);
+    DVector::from_iterator(
+        column.len(),
+        time_s.iter().zip(column.iter()).map(|(&time_s, &value)| value - low_pass.next(time_s, value)),
+    )
+}

@@ -1,0 +1,5 @@
+//! What is asked of recordings before anything is fitted to them.
+
+pub(crate) mod lag;
+pub(crate) mod rest;
+pub(crate) mod screen;

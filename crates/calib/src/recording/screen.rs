@@ -1,0 +1,261 @@
+use std::fmt;
+
+use crate::CalibrationError;
+use crate::law::regression::LawRegression;
+use crate::law::robust_loss;
+use crate::order::median;
+use crate::samples::Samples;
+
+/// A row that calibration does not believe.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Distrusted {
+    /// Which recording, from zero.
+    pub recording: usize,
+    /// Which row of it, from zero.
+    pub row: usize,
+    /// Its time, s.
+    pub time_s: f64,
+    /// What is wrong with it.
+    pub doubt: Doubt,
+}
+
+/// Why a row is not believed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Doubt {
+    /// The reading stands far from its neighbours.
+    Reading {
+        /// What was read.
+        found: f64,
+        /// The median of the rows around.
+        around: f64,
+    },
+    /// The reference stands far from its neighbours.
+    Reference {
+        /// What it says.
+        found: f64,
+        /// The median of the rows around.
+        around: f64,
+    },
+    /// Reading and reference do not go together: which of them is wrong cannot be told.
+    Law {
+        /// Distance from the preliminary law in robust deviations.
+        deviations: f64,
+    },
+}
+
+impl fmt::Display for Doubt {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            Self::Reading { found, around } => write!(f, "reading {found:.6} among readings of {around:.6}"),
+            Self::Reference { found, around } => write!(f, "reference {found:.6} among references of {around:.6}"),
+            Self::Law { deviations } => {
+                write!(
+                    f,
+                    "reading and reference do not go together, {deviations:.0} deviations from what the others say"
+                )
+            }
+        }
+    }
+}
+
+/// Recordings without what calibration does not believe: such values are missing.
+#[derive(Clone, Debug)]
+pub struct Screened {
+    recordings: Vec<Columns>,
+    /// What was left out, recording by recording and row by row.
+    pub distrusted: Vec<Distrusted>,
+}
+
+#[derive(Clone, Debug)]
+struct Columns {
+    time_s: Vec<f64>,
+    reading: Vec<f64>,
+    strain: Vec<f64>,
+}
+
+/// Rows to each side that a row is compared with.
+const NEIGHBOURS: usize = 3;
+/// A spike stands away from the median of its neighbours by this share of the column's span, at least; by so many times the
+/// spread of those neighbours; and by so many times what one row in ten stands away by, so that a movement of few rows is
+/// none. On eleven public recordings of three materials nothing reaches 0.1 of the span.
+const SPIKE: (f64, f64, f64) = (0.25, 8.0, 3.0);
+/// Shares of the sorted values between which the span lies.
+const SPAN: (f64, f64) = (0.02, 0.98);
+/// Rows with a smaller weight in the preliminary law, five robust deviations over the row's own, are not believed if they
+/// are off by this share of the readings' span, too. On those recordings no weight is below 0.57.
+const LEAST_WEIGHT: f64 = 0.2;
+const LEAST_MISFIT: f64 = 0.1;
+/// More rows than this share are no outliers: it is the law that is wrong.
+const MOST_OUTLIERS: f64 = 0.05;
+/// What the law leaves of the readings' variance on blocks left out, at most. Those recordings leave 0.47 and less,
+/// readings that have nothing to do with the reference 0.98 and more.
+const MOST_UNEXPLAINED: f64 = 0.9;
+/// Ridges tried for that: strong ones extrapolate least.
+const RIDGES: [f64; 3] = [0.1, 0.01, 0.001];
+
+/// Looks for values that stand far from their neighbours, then for rows whose reading and reference do not go together,
+/// and asks whether the readings have anything to do with the reference at all. Screening what has been screened finds
+/// nothing more but what the first screening uncovered.
+///
+/// # Errors
+/// If the recordings are too short or too plain to learn a law from, or the best law explains nothing of them.
+pub fn screen(recordings: &[Samples]) -> Result<Screened, CalibrationError> {
+    let mut screened = Screened { recordings: Vec::new(), distrusted: Vec::new() };
+    for (recording, samples) in recordings.iter().enumerate() {
+        let (mut reading, mut strain) = (samples.reading.to_vec(), samples.strain.to_vec());
+        for (row, found, around) in spikes(&reading) {
+            let doubt = Doubt::Reading { found, around };
+            screened.distrusted.push(Distrusted { recording, row, time_s: samples.time_s[row], doubt });
+            reading[row] = f64::NAN;
+        }
+        for (row, found, around) in spikes(&strain) {
+            let doubt = Doubt::Reference { found, around };
+            screened.distrusted.push(Distrusted { recording, row, time_s: samples.time_s[row], doubt });
+            strain[row] = f64::NAN;
+        }
+        screened.recordings.push(Columns { time_s: samples.time_s.to_vec(), reading, strain });
+    }
+    screened.leave_out_misfits()?;
+    screened.distrusted.sort_by_key(|one| (one.recording, one.row));
+    let samples = screened.samples();
+    let unexplained = unexplained(&LawRegression::new(&samples)?).ok_or(CalibrationError::Singular)?;
+    if unexplained > MOST_UNEXPLAINED {
+        return Err(CalibrationError::NothingExplained { unexplained });
+    }
+    Ok(screened)
+}
+
+impl Columns {
+    fn samples(&self) -> Samples<'_> {
+        Samples { time_s: &self.time_s, reading: &self.reading, strain: &self.strain }
+    }
+}
+
+impl Screened {
+    /// What is left of the recordings.
+    #[must_use]
+    pub fn samples(&self) -> Vec<Samples<'_>> {
+        self.recordings.iter().map(Columns::samples).collect()
+    }
+
+    /// Leaves out the rows that the preliminary law gives next to no weight.
+    fn leave_out_misfits(&mut self) -> Result<(), CalibrationError> {
+        let misfits = misfits(&self.samples())?;
+        for one in misfits {
+            let columns = &mut self.recordings[one.recording];
+            (columns.reading[one.row], columns.strain[one.row]) = (f64::NAN, f64::NAN);
+            self.distrusted.push(one);
+        }
+        Ok(())
+    }
+}
+
+/// Rows whose reading and reference do not go together.
+fn misfits(samples: &[Samples]) -> Result<Vec<Distrusted>, CalibrationError> {
+    let regression = LawRegression::new(samples)?;
+    let weights: Vec<f64> = regression.root_weights().iter().map(|root| root * root).collect();
+    if weights.iter().all(|weight| *weight >= LEAST_WEIGHT) {
+        return Ok(Vec::new());
+    }
+    let Some(misfits) = robust_loss::misfits(&regression) else { return Ok(Vec::new()) };
+    let mut off: Vec<Distrusted> = Vec::new();
+    let mut place = 0;
+    for (recording, (samples, of)) in samples.iter().zip(&regression.recordings).enumerate() {
+        let most = LEAST_MISFIT * span(samples.reading).unwrap_or(0.0) / of.median_reading();
+        let mut row_before = None;
+        for &row in &of.complete {
+            let (weight, misfit) = (weights[place], misfits[place].abs());
+            place += 1;
+            if weight >= LEAST_WEIGHT || misfit <= most {
+                row_before = None;
+                continue;
+            }
+            // Long recordings are thinned: what lies between two rows that are off is off.
+            let doubt = Doubt::Law { deviations: robust_loss::HUBER / weight };
+            let rows = row_before.map_or(row, |before| before + 1)..=row;
+            off.extend(rows.map(|row| Distrusted { recording, row, time_s: samples.time_s[row], doubt }));
+            row_before = Some(row);
+        }
+    }
+    let rows: usize = samples.iter().map(|samples| samples.complete_rows().count()).sum();
+    Ok(if off.len() as f64 > MOST_OUTLIERS * rows as f64 { Vec::new() } else { off })
+}
+
+/// Rows whose value stands alone, with the value and the median of those around.
+///
+/// Source: Hampel, *J. Am. Stat. Assoc.* 69 (1974) 383, for median and median deviation.
+fn spikes(values: &[f64]) -> Vec<(usize, f64, f64)> {
+    let known: Vec<usize> = (0..values.len()).filter(|&k| values[k].is_finite()).collect();
+    let Some(span) = span(values) else { return Vec::new() };
+    let around: Vec<(f64, f64)> = (0..known.len())
+        .filter_map(|i| {
+            let window = &known[i.saturating_sub(NEIGHBOURS)..(i + NEIGHBOURS + 1).min(known.len())];
+            let middle = median(window.iter().map(|&k| values[k]))?;
+            Some((middle, median(window.iter().map(|&k| (values[k] - middle).abs()))?))
+        })
+        .collect();
+    let mut away: Vec<f64> = known.iter().zip(&around).map(|(&k, (median, _))| (values[k] - median).abs()).collect();
+    let distances = away.clone();
+    away.sort_by(f64::total_cmp);
+    let usual = away.get(away.len() * 9 / 10).copied().unwrap_or(0.0);
+    let (of_span, of_spread, of_usual) = SPIKE;
+    let is_spike = |i: usize| {
+        let distance = distances[i];
+        distance > 0.0 && distance > of_span * span && distance > of_spread * around[i].1 && distance > of_usual * usual
+    };
+    (0..known.len()).filter(|&i| is_spike(i)).map(|i| (known[i], values[known[i]], around[i].0)).collect()
+}
+
+/// What nearly all known values lie within; `None` without any.
+fn span(values: &[f64]) -> Option<f64> {
+    let mut known: Vec<f64> = values.iter().copied().filter(|value| value.is_finite()).collect();
+    known.sort_by(f64::total_cmp);
+    let last = known.len().checked_sub(1)?;
+    let at = |share: f64| known[(last as f64 * share).round() as usize];
+    Some(at(SPAN.1) - at(SPAN.0))
+}
+
+/// The law's squared error on blocks left out over that of a constant.
+fn unexplained(regression: &LawRegression) -> Option<f64> {
+    let design = robust_loss::preliminary(regression).design(regression);
+    let normal = regression.normal(&design, &regression.median_readings());
+    let all: Vec<usize> = (0..design.columns.len()).collect();
+    let constants: Vec<usize> = (0..design.free).collect();
+    let constant = normal.cross_validate(&constants, 0.0)?;
+    let law = RIDGES.iter().filter_map(|&ridge| normal.cross_validate(&all, ridge)).reduce(f64::min)?;
+    Some(law / constant)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::spikes;
+
+    fn sine(rows: u32, per_cycle: f64) -> Vec<f64> {
+        (0..rows).map(|k| (f64::from(k) * std::f64::consts::TAU / per_cycle).sin()).collect()
+    }
+
+    #[test]
+    fn movements_are_no_spikes() {
+        for per_cycle in [4.3, 7.0, 20.0, 400.0] {
+            assert_eq!(spikes(&sine(400, per_cycle)), [], "{per_cycle} rows a cycle");
+        }
+        let steps: Vec<f64> = (0..400).map(|k| f64::from(k / 50 % 2)).collect();
+        // At rest but for three taps, each up and down within ten rows.
+        let taps: Vec<f64> = (0..400).map(|k| (5.0 - (f64::from(k % 130) - 60.0).abs()).max(0.0)).collect();
+        assert_eq!((spikes(&steps), spikes(&taps), spikes(&[1.0; 99])), (vec![], vec![], vec![]));
+    }
+
+    #[test]
+    fn lone_rows_are_found_wherever_they_are() {
+        let rows = |values: &[f64]| spikes(values).iter().map(|spike| spike.0).collect::<Vec<_>>();
+        for at in [0, 1, 57, 200, 398, 399] {
+            let mut values = sine(400, 90.0);
+            values[at] = 20.0;
+            assert_eq!(rows(&values), [at]);
+        }
+        let mut two = sine(400, 90.0);
+        (two[100], two[101], two[300]) = (-9.0, -9.0, f64::NAN);
+        assert_eq!(rows(&two), [100, 101]);
+    }
+}
