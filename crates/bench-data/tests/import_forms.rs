@@ -8,7 +8,7 @@ use ohmstrain_bench_data::Trace;
 use ohmstrain_bench_data::import::{ImportError, Imported, Plan, Preset, Recipe, Table, read_table};
 
 /// Numbers with few decimals, so that every unit writes them exactly.
-struct Truth {
+pub struct Truth {
     time_ms: Vec<i64>,
     /// Tenths of an ohm.
     decaohm: Vec<i64>,
@@ -16,7 +16,7 @@ struct Truth {
     strain: Vec<i64>,
 }
 
-fn truth() -> Truth {
+pub fn truth() -> Truth {
     let rows = 60;
     Truth {
         time_ms: (0..rows).map(|k| 250 + 50 * k + k % 3).collect(),
@@ -34,20 +34,20 @@ impl Truth {
         self.decaohm.iter().map(|tenths| *tenths as f64 / 10.0).collect()
     }
 
-    fn strain(&self) -> Vec<f64> {
+    pub fn strain(&self) -> Vec<f64> {
         self.strain.iter().map(|hundredths| *hundredths as f64 / 1e4).collect()
     }
 }
 
 /// A whole number of 10^-`digits` as text: `1600.1`.
-fn decimal(value: i64, digits: usize, mark: char) -> String {
+pub fn decimal(value: i64, digits: usize, mark: char) -> String {
     let text = format!("{:0>width$}", value, width = digits + 1);
     let (whole, fraction) = text.split_at(text.len() - digits);
     if digits == 0 { text } else { format!("{whole}{mark}{fraction}") }
 }
 
 /// A file with these lines above the rows; a row is made of time in ms, tenths of an ohm, hundredths of a percent.
-fn file(above: &str, row: impl Fn(i64, i64, i64) -> String) -> String {
+pub fn file(above: &str, row: impl Fn(i64, i64, i64) -> String) -> String {
     let truth = truth();
     let mut out = above.to_owned();
     for k in 0..truth.time_ms.len() {
@@ -56,7 +56,7 @@ fn file(above: &str, row: impl Fn(i64, i64, i64) -> String) -> String {
     out
 }
 
-fn tables(files: &[(&str, Vec<u8>)], recipe: &Recipe) -> Result<Vec<Table>, ImportError> {
+pub fn tables(files: &[(&str, Vec<u8>)], recipe: &Recipe) -> Result<Vec<Table>, ImportError> {
     let read = |(index, (name, bytes)): (usize, &(&str, Vec<u8>))| {
         read_table(bytes.clone(), name, &recipe.read_options(index))
     };
@@ -64,7 +64,7 @@ fn tables(files: &[(&str, Vec<u8>)], recipe: &Recipe) -> Result<Vec<Table>, Impo
 }
 
 /// What is proposed, run as it is proposed.
-fn proposed(files: &[(&str, Vec<u8>)], known: &Recipe) -> Result<(Recipe, Imported), ImportError> {
+pub fn proposed(files: &[(&str, Vec<u8>)], known: &Recipe) -> Result<(Recipe, Imported), ImportError> {
     let first = tables(files, known)?;
     let recipe = Plan::propose(&first, known)?.recipe(&first);
     let again = tables(files, &recipe)?;
@@ -80,7 +80,7 @@ fn proposed(files: &[(&str, Vec<u8>)], known: &Recipe) -> Result<(Recipe, Import
 
 /// The file is imported as proposed, to the last bit of its numbers.
 #[track_caller]
-fn is_imported(name: &str, bytes: impl Into<Vec<u8>>, known: &Recipe) -> Imported {
+pub fn is_imported(name: &str, bytes: impl Into<Vec<u8>>, known: &Recipe) -> Imported {
     let (_, imported) = proposed(&[(name, bytes.into())], known).unwrap_or_else(|error| panic!("{error}"));
     let truth = truth();
     let trace = &imported.trace;
@@ -98,7 +98,7 @@ fn is_imported(name: &str, bytes: impl Into<Vec<u8>>, known: &Recipe) -> Importe
 }
 
 #[track_caller]
-fn asks(files: &[(&str, &str)], known: &Recipe, words: &[&str]) {
+pub fn asks(files: &[(&str, &str)], known: &Recipe, words: &[&str]) {
     let files: Vec<(&str, Vec<u8>)> = files.iter().map(|(name, text)| (*name, text.as_bytes().to_vec())).collect();
     let error = proposed(&files, known).map(|(recipe, _)| recipe.arguments()).unwrap_err().to_string();
     assert!(words.iter().all(|word| error.contains(word)) && error.lines().count() == 1, "{error}");

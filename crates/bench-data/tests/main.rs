@@ -10,6 +10,8 @@ mod import_clocks;
 mod import_containers;
 #[cfg(feature = "import")]
 mod import_forms;
+#[cfg(feature = "import")]
+mod import_units;
 mod reader;
 mod round_trip;
 mod segment;

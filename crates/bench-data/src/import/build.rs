@@ -118,6 +118,10 @@ impl Work<'_> {
                 );
             }
         }
+        if let Some((_, zero)) = recipe.zero.iter().rev().find(|(role, _)| *role == channel.role) {
+            let zero = channel.convert(*zero);
+            values.iter_mut().for_each(|value| *value -= zero);
+        }
         match channel.role {
             Role::Resistance | Role::Ratio => self.positive(channel, values),
             _ => Ok(values),

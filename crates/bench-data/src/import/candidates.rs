@@ -1,7 +1,7 @@
 use crate::import::channel::name;
 use crate::import::error::ImportError;
 use crate::import::names::{self, Sureness};
-use crate::import::number::number;
+use crate::import::number::{number, ohms};
 use crate::import::questions::quoted;
 use crate::import::recipe::{ColumnName, NO_COLUMN, Recipe};
 use crate::import::roles::Role;
@@ -55,8 +55,12 @@ fn is_date_only(table: &Table, column: usize) -> bool {
 
 /// Whether a column has a number or a date at all.
 fn has_values(table: &Table, column: usize) -> bool {
-    let is_value =
-        |cell: &str| number(cell.trim(), table.layout.decimal, 0).is_some() || crate::import::stamp::is_stamp(cell);
+    let decimal = table.layout.decimal;
+    let is_value = |cell: &str| {
+        number(cell.trim(), decimal, 0).is_some()
+            || crate::import::stamp::is_stamp(cell)
+            || ohms(cell.trim(), decimal).is_some()
+    };
     table.columns[column].cells.iter().any(is_value)
 }
 

@@ -1,6 +1,6 @@
 use crate::error::{Fault, quote};
 use crate::import::error::ImportError;
-use crate::import::number::{Value, value};
+use crate::import::number::{DecimalMark, Value, number, ohms, value};
 use crate::import::questions::quoted;
 use crate::import::roles::Role;
 use crate::import::table::Table;
@@ -43,11 +43,20 @@ impl Values {
                         None => out.missing.push((cell.to_owned(), 1)),
                     }
                 }
-                Value::Text => return Err(no_number(table, channel, row, cell)),
+                Value::Text => out.values.push(ohms_of(table, channel, row, cell)?),
             }
         }
         out.missing.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
         Ok(out)
+    }
+}
+
+impl Channel {
+    /// A number of the column in the trace's unit.
+    pub(crate) fn convert(&self, value: f64) -> f64 {
+        let shift = if let Scale::Shift(shift) | Scale::ChangeShift(shift) = self.unit.scale { shift } else { 0 };
+        let shifted = number(&value.to_string(), DecimalMark::Point, shift).unwrap_or(value);
+        in_trace_unit(shifted, self.unit.scale)
     }
 }
 
@@ -57,6 +66,23 @@ fn in_trace_unit(number: f64, scale: Scale) -> f64 {
         Scale::ChangeShift(_) => 1.0 + number,
         Scale::Shift(_) | Scale::Stamp => number,
     }
+}
+
+/// A number of ohms with a unit of its own.
+fn ohms_of(table: &Table, channel: &Channel, row: usize, cell: &str) -> Result<f64, ImportError> {
+    let found = ohms(cell.trim(), table.layout.decimal).filter(|_| channel.role == Role::Resistance);
+    let found = found.ok_or_else(|| no_number(table, channel, row, cell))?;
+    if channel.unit.scale != Scale::Shift(0) {
+        let (column, unit) = (name(table, channel.column), channel.unit.name);
+        let what = format!("column {column}: {} has a unit of its own, and the column another, {unit}", quote(cell));
+        let place = format!("{}:{}", table.file, table.lines[row]);
+        return Err(ImportError::question(
+            &place,
+            what,
+            ["--unit resistance=ohm if numbers without one are ohms".into()],
+        ));
+    }
+    Ok(found)
 }
 
 /// A text among numbers: is it a missing value?

@@ -2,7 +2,7 @@ use crate::error::{Fault, quote};
 use crate::import::error::ImportError;
 use crate::import::grid::Grid;
 use crate::import::names::{self, Sureness};
-use crate::import::number::{DecimalMark, Value, value};
+use crate::import::number::{DecimalMark, Value, ohms, value};
 use crate::import::stamp::is_stamp;
 use crate::import::units;
 use crate::metadata::Metadata;
@@ -26,12 +26,18 @@ pub(crate) struct Shape {
 impl Shape {
     pub(crate) fn of(cells: &[impl AsRef<str>], decimal: DecimalMark) -> Self {
         let mut shape = Self { width: cells.len(), ..Self::default() };
+        let mut prefixed = 0;
         for cell in cells.iter().map(AsRef::as_ref) {
             if is_number(cell, decimal) {
                 shape.numbers += 1;
             } else if value(cell, decimal, 0, &[]) == Value::Text {
                 shape.texts += 1;
+                prefixed += usize::from(ohms(cell, decimal).is_some());
             }
+        }
+        // `time,10k,22k` are names of columns.
+        if shape.numbers > 0 {
+            (shape.numbers, shape.texts) = (shape.numbers + prefixed, shape.texts - prefixed);
         }
         shape
     }

@@ -3,7 +3,7 @@ use std::borrow::Cow;
 use encoding_rs::{Encoding, UTF_8, UTF_16BE, UTF_16LE, WINDOWS_1252};
 
 use crate::import::grid::{Separator, behind_arrow, is_monitor, labelled, split};
-use crate::import::number::{DecimalMark, Value, value};
+use crate::import::number::{DecimalMark, Value, ohms, value};
 use crate::import::stamp::is_stamp;
 
 /// Lines looked at to find out how a file is written.
@@ -127,10 +127,18 @@ fn kind(cell: &str, mark: DecimalMark, groups: bool) -> Value {
     if is_stamp(cell) {
         return Value::Number(0.0);
     }
-    match value(cell, mark, 0, &[]) {
+    match amount(cell, mark) {
         // Unless the mark is known, the other one is taken for the mark, not for thousands.
         Value::Number(_) if !groups && cell.contains(other) && !cell.contains(own) => Value::Text,
         kind => kind,
+    }
+}
+
+/// What a cell is where ohms may have a prefix.
+fn amount(cell: &str, mark: DecimalMark) -> Value {
+    match value(cell, mark, 0, &[]) {
+        Value::Text => ohms(cell, mark).map_or(Value::Text, Value::Number),
+        known => known,
     }
 }
 
@@ -143,8 +151,8 @@ fn mark_is_open(lines: &[(u64, &str)], separator: Separator, mark: DecimalMark) 
     let mut some = false;
     for (_, line) in lines {
         for cell in split(line, separator, &[]) {
-            if cell.contains(',') && matches!(value(&cell, DecimalMark::Comma, 0, &[]), Value::Number(_)) {
-                let grouped = matches!(value(&cell, DecimalMark::Point, 0, &[]), Value::Number(_));
+            if cell.contains(',') && matches!(amount(&cell, DecimalMark::Comma), Value::Number(_)) {
+                let grouped = matches!(amount(&cell, DecimalMark::Point), Value::Number(_));
                 if !grouped || cell.trim_start_matches(['-', '+']).starts_with('0') {
                     return false;
                 }

@@ -1,6 +1,9 @@
 use std::fmt;
 use std::str::FromStr;
 
+use crate::import::roles::Role;
+use crate::import::units::{self, Scale};
+
 /// What stands before the fraction of a number.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum DecimalMark {
@@ -130,6 +133,24 @@ pub(crate) fn number(text: &str, mark: DecimalMark, shift: i32) -> Option<f64> {
     format!("{mantissa}e{}", exponent.checked_add(shift)?).parse().ok()
 }
 
+/// Ohms of a number with a prefix or a unit behind it, as instruments with ranges of their own write them: `1.28k`,
+/// `980.1 Ω`.
+pub(crate) fn ohms(text: &str, mark: DecimalMark) -> Option<f64> {
+    let end = text.rfind(|c: char| c.is_ascii_digit() || c == mark.character())? + 1;
+    let shift = match text[end..].trim() {
+        "" => return None,
+        "k" | "K" => 3,
+        "M" => 6,
+        "m" => -3,
+        "R" => 0,
+        unit => match units::unit(Role::Resistance, unit)?.scale {
+            Scale::Shift(shift) => shift,
+            _ => return None,
+        },
+    };
+    number(text[..end].trim(), mark, shift)
+}
+
 /// A number as Rust writes it: a point, no thousands; `None` for what is no number.
 fn plain(text: &str, mark: DecimalMark) -> Option<std::borrow::Cow<'_, str>> {
     if !text.bytes().any(|byte| byte.is_ascii_digit()) {
@@ -196,6 +217,17 @@ mod tests {
         assert_eq!(number("\u{2212}2.5", DecimalMark::Point, 0), Some(-2.5));
         for text in ["1,60", "1;2", "12:30", "1.2.3", "abc", "", "-", "e5"] {
             assert_eq!(number(text, DecimalMark::Point, 0), None, "{text}");
+        }
+    }
+
+    #[test]
+    fn instruments_write_ohms_with_a_prefix() {
+        for (text, ohm) in [("1.28k", 1280.0), ("1.1 kΩ", 1100.0), ("0.9M", 9e5), ("12R", 12.0), ("-1e1 Ohm", -10.0)] {
+            assert_eq!(ohms(text, DecimalMark::Point), Some(ohm), "{text}");
+        }
+        assert_eq!(ohms("1,28k", DecimalMark::Comma), Some(1280.0));
+        for text in ["1.28", "k", "3.2 s", "5 %", "1.2 mm", "R1"] {
+            assert_eq!(ohms(text, DecimalMark::Point), None, "{text}");
         }
     }
 

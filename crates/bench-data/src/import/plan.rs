@@ -5,6 +5,7 @@ use crate::import::candidates::{candidates, choose, find, refer};
 use crate::import::channel::{Channel, name};
 use crate::import::clock::Clock;
 use crate::import::error::ImportError;
+use crate::import::names;
 use crate::import::plan_clock::{clock, no_readings};
 use crate::import::plan_units::channel;
 use crate::import::preset::Preset;
@@ -13,6 +14,7 @@ use crate::import::recipe::{Align, PerFile, Recipe};
 use crate::import::roles::Role;
 use crate::import::survey::alternation;
 use crate::import::table::Table;
+use crate::import::units::{SCALED, scale_of_a_reference};
 
 /// Signs are arbitrary where a larger share of the readings than this is negative.
 const FEW_SIGNS: f64 = 0.1;
@@ -110,7 +112,7 @@ impl Plan {
         let mut out = Recipe { columns: Vec::new(), units: Vec::new(), ..self.given.clone() };
         let mut pin = |channel: &Channel| {
             out.columns.push((channel.role, refer(tables, (channel.table, channel.column))));
-            out.units.push((channel.role, channel.unit.name.to_owned()));
+            out.units.push((channel.role, self.unit_text(channel).to_owned()));
         };
         if let Clock::Column(channel) = &self.time {
             pin(channel);
@@ -160,7 +162,7 @@ impl Plan {
 
     /// The column that a role was given, as messages call it, with its file and unit.
     #[must_use]
-    pub fn columns(&self, tables: &[Table]) -> Vec<(Role, usize, usize, String, &'static str)> {
+    pub fn columns(&self, tables: &[Table]) -> Vec<(Role, usize, usize, String, &str)> {
         let mut all: Vec<Channel> = Vec::new();
         if let Clock::Column(time) = &self.time {
             all.push(*time);
@@ -175,8 +177,17 @@ impl Plan {
             all.push(*reference);
         }
         all.extend(self.temperature);
-        let describe = |of: &Channel| (of.role, of.table, of.column, name(&tables[of.table], of.column), of.unit.name);
+        let describe =
+            |of: &Channel| (of.role, of.table, of.column, name(&tables[of.table], of.column), self.unit_text(of));
         all.iter().map(describe).collect()
+    }
+
+    /// The unit as flags have it.
+    fn unit_text(&self, channel: &Channel) -> &str {
+        match channel.unit.name {
+            SCALED => self.recipe.unit(channel.role).unwrap_or(SCALED),
+            name => name,
+        }
     }
 
     fn check(&self, tables: &[Table]) -> Result<(), ImportError> {
@@ -215,16 +226,30 @@ fn no_reference(tables: &[Table], recipe: &Recipe) -> Option<String> {
         return None;
     }
     let weak = candidates(tables).into_iter().find(|found| Role::REFERENCES.contains(&found.role));
-    let (role, column) = weak.map_or(("strain".to_owned(), "NAME".to_owned()), |found| {
-        (found.role.to_string(), refer(tables, (found.table, found.column)).to_string())
-    });
-    let answer = quoted(&format!("{role}={column}"));
+    let weak = weak.map(|found| (found.role, (found.table, found.column), None));
+    let (role, column, scale) = weak
+        .or_else(|| in_another_unit(tables))
+        .map_or((Role::Strain, "NAME".to_owned(), None), |(role, place, scale)| {
+            (role, refer(tables, place).to_string(), scale)
+        });
+    let scale = scale.map_or_else(String::new, |scale| format!(" --unit {role}={scale} with its scale"));
+    let answer = quoted(&format!("{role}={column}")) + &scale;
     let files: Vec<&str> = tables.iter().map(|table| table.file.as_str()).collect();
     Some(format!(
         "{}: no column is taken for strain, displacement or angle, without which nothing can be calibrated; if one is, say \
          --column {answer}",
         files.join(", ")
     ))
+}
+
+/// A column that is called as a reference is, but has the unit of something else: `Position (V)`.
+fn in_another_unit(tables: &[Table]) -> Option<(Role, (usize, usize), Option<&'static str>)> {
+    let places = tables.iter().enumerate().flat_map(|(table, of)| (0..of.columns.len()).map(move |at| (table, at)));
+    places.into_iter().find_map(|(table, at)| {
+        let column = &tables[table].columns[at];
+        let (role, _) = names::role(&column.name, None).filter(|_| column.unit.is_some())?;
+        scale_of_a_reference(role).map(|scale| (role, (table, at), Some(scale)))
+    })
 }
 
 /// Point or comma?

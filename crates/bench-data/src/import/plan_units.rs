@@ -1,6 +1,7 @@
+use crate::error::quote;
 use crate::import::channel::{Channel, name};
 use crate::import::error::ImportError;
-use crate::import::number::number;
+use crate::import::number::{number, ohms};
 use crate::import::questions::quoted;
 use crate::import::recipe::Recipe;
 use crate::import::roles::Role;
@@ -37,7 +38,7 @@ struct Asked<'a> {
 impl Asked<'_> {
     fn unit(&self, recipe: &Recipe, remarks: &mut Vec<String>) -> Result<Unit, ImportError> {
         if let Some(text) = recipe.unit(self.role) {
-            return units::unit(self.role, text).ok_or_else(|| {
+            return units::unit_or_scale(self.role, text).ok_or_else(|| {
                 let what = format!(
                     "--unit {}: there is no such unit of {}",
                     quoted(&format!("{}={text}", self.role)),
@@ -61,7 +62,8 @@ impl Asked<'_> {
                                 ground: R_ref·V/(V_supply − V)), or take the converter's codes, --column adc=NAME";
                     return ImportError::unreadable(&self.table.file, format!("{}: {what}", self.name()));
                 }
-                let what = format!("{}: the unit `{text}` is none of {}", self.name(), self.role);
+                let convert = if units::scale_of_a_reference(self.role).is_some() { "" } else { ": convert it first" };
+                let what = format!("{}: the unit `{text}` is none of {}{convert}", self.name(), self.role);
                 self.question(what, &units::names(self.role))
             });
         }
@@ -73,8 +75,10 @@ impl Asked<'_> {
     }
 
     fn question(&self, what: String, names: &[&str]) -> ImportError {
+        let scale = units::scale_of_a_reference(self.role);
         let answers = names.iter().map(|unit| format!("--unit {}={unit}", self.role));
-        ImportError::question(&self.table.file, what, answers)
+        let of_scale = scale.map(|scale| format!("--unit {}={scale} if 1 V is that much", self.role));
+        ImportError::question(&self.table.file, what, of_scale.into_iter().chain(answers))
     }
 
     /// What a line `# strain_unit = …` or `# resistance_unit = …` says, whatever the column is called.
@@ -131,6 +135,8 @@ impl Asked<'_> {
                 let seconds = has_fractions && (SHORTEST_STEP_S..=LONGEST_STEP_S).contains(&step);
                 (seconds.then_some("s"), format!("steps of {step:.3}"))
             }
+            // What has a unit in each cell has it there.
+            Role::Resistance if let Some(cell) = self.prefixed() => (Some("ohm"), format!("cells such as {cell} have")),
             Role::Resistance => {
                 let middle = median(numbers.iter().map(|number| number.abs()).collect()).unwrap_or(f64::NAN);
                 ((middle >= LEAST_OHM).then_some("ohm"), format!("about {middle:.0}"))
@@ -155,6 +161,13 @@ impl Asked<'_> {
         };
         remarks.push(format!("{}: {} has no unit; {why}: taken for `{}`", self.table.file, self.name(), unit.name));
         Ok(unit)
+    }
+
+    /// A cell with a unit of its own.
+    fn prefixed(&self) -> Option<String> {
+        let decimal = self.table.layout.decimal;
+        let mut cells = self.table.columns[self.column].cells.iter();
+        cells.find(|cell| ohms(cell.trim(), decimal).is_some()).map(quote)
     }
 
     /// `R/R0` is a ratio; `dR/R0` is a change.

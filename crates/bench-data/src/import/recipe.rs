@@ -141,6 +141,8 @@ pub struct Recipe {
     pub magnitude: Vec<Role>,
     /// Roles in which a lone 0 between larger values is a missing one.
     pub drop_zeros: Vec<Role>,
+    /// What columns read at rest, in their own units.
+    pub zero: Vec<(Role, f64)>,
     /// Neighbouring readings were taken with the current's sign changed: their means are the readings.
     pub fold_polarity: bool,
     /// How two clocks come together.
@@ -192,6 +194,7 @@ impl Recipe {
         self.missing.iter().for_each(|text| flag("missing", text.clone()));
         self.magnitude.iter().for_each(|role| flag("magnitude", role.to_string()));
         self.drop_zeros.iter().for_each(|role| flag("drop-zeros", role.to_string()));
+        self.zero.iter().for_each(|(role, zero)| flag("zero", format!("{role}={zero}")));
         self.align.iter().for_each(|align| flag("align", align.to_string()));
         self.rate_hz.iter().for_each(|rate| flag("rate-hz", rate.to_string()));
         self.gauge_length_mm.iter().for_each(|length| flag("gauge-length-mm", length.to_string()));

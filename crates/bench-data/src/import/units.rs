@@ -75,6 +75,38 @@ pub(crate) fn unit(role: Role, text: &str) -> Option<Unit> {
     found.next().map(|(_, name, scale, _)| Unit { name, scale: *scale })
 }
 
+/// The name of units that have none.
+pub(crate) const SCALED: &str = "scaled";
+
+/// A unit, or so much of one per unit of what the column has: `inch`, `4mm/V`, `-0.9deg/step`, `0.1ms`.
+pub(crate) fn unit_or_scale(role: Role, text: &str) -> Option<Unit> {
+    if let Some(unit) = unit(role, text) {
+        return Some(unit);
+    }
+    let text = text.trim();
+    let end = text.find(|c: char| !(c.is_ascii_digit() || "+-.".contains(c)))?;
+    let times = text[..end].parse::<f64>().ok().filter(|times| times.is_finite() && *times != 0.0)?;
+    let rest = &text[end..];
+    let found = unit(role, rest).or_else(|| unit(role, rest.rsplit_once('/')?.0))?;
+    let scale = match found.scale {
+        Scale::Shift(shift) => Scale::Affine(times * 10_f64.powi(shift), 0.0),
+        Scale::ChangeShift(shift) => Scale::Affine(times * 10_f64.powi(shift), 1.0),
+        Scale::Affine(factor, offset) => Scale::Affine(times * factor, offset),
+        Scale::Stamp => return None,
+    };
+    Some(Unit { name: SCALED, scale })
+}
+
+/// How a reference is told that an instrument gives in volts or counts.
+pub(crate) const fn scale_of_a_reference(role: Role) -> Option<&'static str> {
+    match role {
+        Role::Strain => Some("10percent/V"),
+        Role::Displacement => Some("4mm/V"),
+        Role::Angle => Some("36deg/V"),
+        _ => None,
+    }
+}
+
 /// The quantities in which a text is a unit.
 pub(crate) fn quantities(text: &str) -> Vec<Role> {
     let mut roles: Vec<Role> = Vec::new();
@@ -113,6 +145,19 @@ mod tests {
         assert_eq!(name("[k\u{2126}]"), Some("kohm"));
         assert_eq!(name("(Ohm)"), Some("ohm"));
         assert_eq!(name("N"), None);
+    }
+
+    #[test]
+    fn a_scale_is_so_much_of_a_unit_per_anything() {
+        let scale = |role, text| unit_or_scale(role, text).map(|unit| unit.scale);
+        assert_eq!(scale(Role::Displacement, "4mm/V"), Some(Scale::Affine(4.0, 0.0)));
+        assert_eq!(scale(Role::Displacement, "-0.5 cm/V"), Some(Scale::Affine(-5.0, 0.0)));
+        assert_eq!(scale(Role::Displacement, "2inch/turn"), Some(Scale::Affine(50.8, 0.0)));
+        assert_eq!(scale(Role::Strain, "0.25%/step"), Some(Scale::Affine(0.0025, 0.0)));
+        assert_eq!(scale(Role::Strain, "mm/mm"), Some(Scale::Shift(0)));
+        for text in ["4/V", "V", "0mm/V", "4kg/V", "", "1e999mm/V"] {
+            assert_eq!(scale(Role::Displacement, text), None, "{text}");
+        }
     }
 
     #[test]

@@ -47,7 +47,8 @@ pub struct FilesArgs {
     /// angle=none. Roles: time, reference-time, resistance, ratio, adc, strain, displacement, angle, temperature
     #[arg(long = "column", value_name = "ROLE=COLUMN", value_parser = column)]
     pub columns: Vec<(Role, ColumnName)>,
-    /// The unit of a column: time=ms, resistance=kohm, strain=percent, displacement=inch
+    /// The unit of a column: time=ms, resistance=kohm, strain=percent, displacement=inch; of a reference in volts or counts
+    /// its scale: displacement=4mm/V, angle=0.9deg/step
     #[arg(long = "unit", value_name = "ROLE=UNIT", value_parser = unit)]
     pub units: Vec<(Role, String)>,
     /// Decimal mark: . or , (2:, for the second file alone)
@@ -68,6 +69,9 @@ pub struct FilesArgs {
     /// A role in which a lone 0 between larger values is a missing one
     #[arg(long, value_name = "ROLE")]
     pub drop_zeros: Vec<Role>,
+    /// What a reference reads at rest, in the unit of its column: displacement=0.52
+    #[arg(long, value_name = "ROLE=VALUE", value_parser = zero)]
+    pub zero: Vec<(Role, f64)>,
     /// The current's polarity flips with every reading: take means of neighbours
     #[arg(long)]
     pub fold_polarity: bool,
@@ -99,6 +103,7 @@ impl FilesArgs {
             missing: self.missing.clone(),
             magnitude: self.magnitude.clone(),
             drop_zeros: self.drop_zeros.clone(),
+            zero: self.zero.clone(),
             fold_polarity: self.fold_polarity,
             align: self.align,
             rate_hz: self.rate_hz,
@@ -117,4 +122,13 @@ fn column(text: &str) -> Result<(Role, ColumnName), String> {
 fn unit(text: &str) -> Result<(Role, String), String> {
     let (role, unit) = text.split_once('=').ok_or("expected ROLE=UNIT")?;
     Ok((role.parse()?, unit.to_owned()))
+}
+
+fn zero(text: &str) -> Result<(Role, f64), String> {
+    let (role, zero) = text.split_once('=').ok_or("expected ROLE=VALUE")?;
+    let zero = zero.parse().ok().filter(|zero: &f64| zero.is_finite()).ok_or("expected a number behind the =")?;
+    match role.parse()? {
+        role @ (Role::Strain | Role::Displacement | Role::Angle) => Ok((role, zero)),
+        _ => Err("expected strain, displacement or angle before the =".into()),
+    }
 }
