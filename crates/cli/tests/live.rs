@@ -172,12 +172,24 @@ fn garbage_resizing_and_unplugging_stop_nothing() {
     terminal.wait_for("1 missing, 0 gaps");
     // `00,16` is a row by chance: 16 ohms at 0 s, which the sensor cannot read.
     terminal.wait_for("4 lines");
-    for (rows, cols) in [(3, 10), (1, 1), (200, 20), (12, 300), (30, 110)] {
+    // A line that does not end is one, and what stands at its end is no row.
+    for part in ["9".repeat(8192), "9".repeat(4000)] {
+        port.send(&part);
+        thread::sleep(Duration::from_millis(50));
+    }
+    port.send("\n1.6,1602\n");
+    terminal.wait_for("5 lines");
+    for (rows, cols) in [(3, 10), (1, 1), (200, 20), (12, 300), (5, 20), (30, 110)] {
         terminal.resize(rows, cols);
         thread::sleep(Duration::from_millis(120));
+        // Five rows: the heading, and numbers.
+        if rows == 5 {
+            terminal.wait_for("\nreading");
+        }
     }
     terminal.wait_for("z zero at rest");
-    terminal.wait_for("4 lines");
+    terminal.wait_for("5 lines");
+    terminal.wait_for("silent     for ");
     drop(port);
     terminal.wait_for("waiting for the port");
     let mut port = Port::plug_in(&port_path);
@@ -186,7 +198,7 @@ fn garbage_resizing_and_unplugging_stop_nothing() {
     port.send("0.2,1600\n0.4,1600\n0.6,1600\n0.8,1601\n1.0,1601\n");
     terminal.wait_for("the clock has started again");
     let left = terminal.quit();
-    assert!(left.contains("6 lines skipped, 1 restart of the clock"), "{left}");
+    assert!(left.contains("7 lines skipped, 1 restart of the clock"), "{left}");
 }
 
 #[test]
@@ -203,6 +215,14 @@ fn a_recording_is_played_back_recorded_marked_and_zeroed() {
     terminal.wait_for("it starts again at zero");
     terminal.press("r");
     terminal.wait_for("recorded live-1.csv (");
+    // Whatever ends the program, what was recorded has whole rows.
+    terminal.press("r");
+    terminal.wait_for("recording to live-2.csv");
+    terminal.wait_for("record     1");
+    let killed = bench.read("live-2.csv");
+    assert!(killed.ends_with('\n') && killed.lines().count() > 2, "{killed}");
+    terminal.press("r");
+    terminal.wait_for("recorded live-2.csv (");
     let left = terminal.quit();
     assert!(left.contains("0 lines skipped"), "{left}");
 
@@ -233,6 +253,42 @@ fn readings_on_stdin_leave_the_keys_to_the_terminal() {
     terminal.wait_for("drop-outs");
     let left = terminal.quit();
     assert!(left.contains("30 rows, 0 readings missing, 0 gaps, 0 lines skipped"), "{left}");
+}
+
+/// The keys are of the view: readings cannot come from the keyboard.
+#[test]
+fn the_keyboard_is_no_port() {
+    let bench = Bench::calibrated();
+    let mut terminal = Terminal::live(&bench, "-", &[]);
+    terminal.wait_for("stdin is the terminal: pipe readings into it");
+    assert_eq!(terminal.child.wait().unwrap().exit_code(), 2);
+    let mut terminal = Terminal::live(&bench, ".", &[]);
+    terminal.wait_for("cannot read .: ");
+    assert_eq!(terminal.child.wait().unwrap().exit_code(), 1);
+    bench.write("trace.csv.gz", b"\x1f\x8b\x08\x00");
+    let mut terminal = Terminal::live(&bench, "trace.csv.gz", &[]);
+    terminal.wait_for("`ohmstrain import trace.csv.gz -o trace.csv`");
+    assert_eq!(terminal.child.wait().unwrap().exit_code(), 4);
+}
+
+#[test]
+fn a_pipe_is_read_again_when_another_program_writes_into_it() {
+    let bench = Bench::calibrated();
+    let pipe = bench.path("pipe");
+    assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    let mut terminal = Terminal::live(&bench, "pipe", &["--header", "time_s,resistance_ohm"]);
+    terminal.wait_for("no reading yet");
+    terminal.press("r");
+    terminal.wait_for("there is nothing to record yet");
+    for (first, words) in [(1, "5 at 10.0/s"), (6, "10 at 10.0/s")] {
+        let rows: String = (first..first + 5).map(|row| format!("{}.{},1600\n", row / 10, row % 10)).collect();
+        std::fs::write(&pipe, rows).unwrap();
+        terminal.wait_for(words);
+        terminal.wait_for("the readings have ended");
+    }
+    terminal.press("z");
+    terminal.wait_for("R0 is 1600 now, the median of 10 readings");
+    assert!(terminal.quit().contains("10 rows, 0 readings missing, 0 gaps, 0 lines skipped"));
 }
 
 #[test]

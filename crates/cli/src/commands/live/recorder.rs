@@ -45,6 +45,7 @@ impl Recorder {
         });
         ["time_s", reading].into_iter().chain(reference).chain(["mark"]).for_each(|name| rows.text(name));
         rows.end()?;
+        rows.flush()?;
         Ok(Self { rows, path, count: 0, has_codes: lines.has_codes(), has_reference: reference.is_some() })
     }
 
@@ -64,14 +65,8 @@ impl Recorder {
         }
         self.rows.number(mark.map_or(f64::NAN, f64::from));
         self.count += 1;
-        self.rows.end()
-    }
-
-    /// Hands everything to the file.
-    ///
-    /// # Errors
-    /// If it cannot be written.
-    pub fn finish(mut self) -> io::Result<()> {
+        self.rows.end()?;
+        // Whatever ends the program, the file has whole rows.
         self.rows.flush()
     }
 }

@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 use std::time::Instant;
 
+use ohmstrain::number::significant;
 use ohmstrain::{Error, Estimate, Filter, Sensor, ValidityWatch};
 use ohmstrain_bench_data::{Line, LineParser, Row, counted};
 
@@ -17,6 +18,8 @@ use crate::suits::{self, FIRST_LIVE_READINGS};
 const MOST_POINTS: usize = 1 << 16;
 /// A step this many times as long as steps usually are is a gap.
 const GAP: f64 = 5.0;
+/// Shorter pauses are not told, s.
+const SILENCE_S: f64 = 2.0;
 /// Between lines that arrive at once, s: two digits above what is written.
 const LEAST_STEP_S: f64 = 1e-4;
 /// Share of a new step in what steps usually are.
@@ -84,6 +87,8 @@ pub struct Session<'a> {
     /// Times of the marks, s.
     pub marks: VecDeque<f64>,
     pub last: Option<Estimate>,
+    /// When the last row was taken.
+    taken: Option<Instant>,
     pub counts: Counts,
     pub recorder: Option<Recorder>,
     /// The last thing that there was to say.
@@ -118,6 +123,7 @@ impl<'a> Session<'a> {
             points: VecDeque::new(),
             marks: VecDeque::new(),
             last: None,
+            taken: None,
             counts: Counts::default(),
             recorder: None,
             message: String::new(),
@@ -172,6 +178,8 @@ impl<'a> Session<'a> {
         if let Some(joint) = input::joint(&self.lines.metadata()) {
             self.sensor = self.calibrated.clone().on_joint(joint)?;
         }
+        // What was said of lines above it is settled.
+        self.message.clear();
         if self.counts.rows > 0 { self.restart() } else { Ok(self.begin()?) }
     }
 
@@ -215,6 +223,7 @@ impl<'a> Session<'a> {
             }
         };
         self.count(row);
+        self.taken = Some(Instant::now());
         let (reading, half_width) = (row.reading.value, 1.96 * estimate.strain_sd);
         self.points.push_back(Point { time_s: row.time_s, reading, strain: estimate.strain, half_width });
         let oldest_s = row.time_s - self.args.window_s.max(REST_S);
@@ -248,6 +257,12 @@ impl<'a> Session<'a> {
     /// Rows per second, as they usually come.
     pub fn rate_hz(&self) -> Option<f64> {
         self.usual_step_s.filter(|step_s| *step_s > 0.0).map(f64::recip)
+    }
+
+    /// How long ago the last row came, s, where that is longer than rows usually take.
+    pub fn silent_s(&self) -> Option<f64> {
+        let longest_s = SILENCE_S.max(GAP * self.usual_step_s.unwrap_or(0.0));
+        self.taken.map(|taken| taken.elapsed().as_secs_f64()).filter(|silent_s| *silent_s > longest_s)
     }
 
     /// Doubts the unit of the readings, and takes R₀ of the first ones if that is wanted.
@@ -294,7 +309,7 @@ impl<'a> Session<'a> {
         let at_zero = wanted.initial_strain(0.0).build();
         let starts = if at_zero.is_ok() { "; it starts again at zero" } else { "" };
         self.filter = at_zero.unwrap_or(wanted.build()?);
-        self.message = format!("R0 is {rest:.5} now, the median of {count} readings{starts}");
+        self.message = format!("R0 is {} now, the median of {count} readings{starts}", significant(rest, 5));
         Ok(())
     }
 
@@ -312,8 +327,9 @@ impl<'a> Session<'a> {
         self.message = match self.recorder.take() {
             Some(recorder) => {
                 let said = format!("recorded {} ({})", recorder.path.display(), counted(recorder.count, "row"));
-                recorder.finish().map_or_else(|error| format!("cannot record: {error}"), |()| said)
+                said
             }
+            None if self.counts.rows == 0 => "there is nothing to record yet".into(),
             None => match Recorder::begin(&self.args.record, &self.lines) {
                 Ok(recorder) => {
                     let said = format!("recording to {}", recorder.path.display());

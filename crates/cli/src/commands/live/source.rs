@@ -1,18 +1,18 @@
 //! Where lines come from: a serial port, a pipe, stdin, or a recording. A thread reads, so that the view never waits.
 
 use std::fs::File;
-use std::io::{self, ErrorKind, Read};
+use std::io::{self, ErrorKind, IsTerminal, Read, Seek};
 use std::path::Path;
 use std::sync::mpsc::{Receiver, SendError, SyncSender, sync_channel};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use crate::error::CliError;
+use crate::error::{CliError, shell_word};
 use crate::input::is_stdin;
 
 /// Lines that wait at most; then the source waits.
 const WAITING: usize = 1 << 12;
-/// A line is cut here: nothing that a device sends is that long, and the rest of it is garbage, too.
+/// A line is cut here, and the rest of it dropped: nothing that a device sends is that long.
 const LONGEST_LINE: usize = 1 << 13;
 /// How long a read of a port waits, and how long a port that is gone is left alone.
 const READ_TIMEOUT: Duration = Duration::from_millis(100);
@@ -42,21 +42,35 @@ impl Source {
     /// Starts to read.
     ///
     /// # Errors
-    /// If a file cannot be opened. A port that cannot is waited for.
+    /// If a file cannot be opened, or stdin is the keyboard. A port that cannot is waited for.
     pub fn open(path: &Path, baud: u32) -> Result<Self, CliError> {
         let (send, events) = sync_channel(WAITING);
         let is_recording = path.is_file();
         if is_stdin(path) {
-            thread::spawn(move || read_to_end(&mut io::stdin().lock(), &send));
-        } else if is_recording || is_pipe(path) {
+            // The keys are of the view.
+            if io::stdin().is_terminal() {
+                let what = "--port -: stdin is the terminal: pipe readings into it, or name a port or a recording";
+                return Err(CliError::Arguments(what.into()));
+            }
+            thread::spawn(move || drop(read_to_end(&mut io::stdin().lock(), &send)));
+        } else if is_recording || path.is_dir() {
+            let unreadable = |error| CliError::file("read", path, &error);
+            let mut file = File::open(path).map_err(unreadable)?;
+            let mut magic = [0; 4];
+            // A folder can be opened, and not be read.
+            let known = file.read(&mut magic).map_err(unreadable)?;
+            if magic[..known].starts_with(&[0x1f, 0x8b]) || &magic == b"PAR1" {
+                let (name, word) = (path.display(), shell_word(&path.display().to_string()));
+                let import = format!("`ohmstrain import {word} -o trace.csv` makes lines of it");
+                return Err(CliError::Input(format!(
+                    "{name}: expected lines of text, found gzip or Parquet; {import}"
+                )));
+            }
+            file.rewind().map_err(unreadable)?;
+            thread::spawn(move || drop(read_to_end(&mut file, &send)));
+        } else if is_pipe(path) {
             let path = path.to_path_buf();
-            let unreadable = |error| CliError::file("read", &path, &error);
-            // Opening a pipe waits for its writer.
-            let opened = if is_recording { Some(File::open(&path).map_err(unreadable)?) } else { None };
-            thread::spawn(move || match opened.map_or_else(|| File::open(&path), Ok) {
-                Ok(mut file) => read_to_end(&mut file, &send),
-                Err(error) => drop(send.send(Event::Away(error.to_string()))),
-            });
+            thread::spawn(move || read_pipe(&path, &send));
         } else {
             let path = path.to_path_buf();
             thread::spawn(move || read_port(&path, baud, &send));
@@ -76,19 +90,35 @@ fn is_pipe(_: &Path) -> bool {
     false
 }
 
-fn read_to_end(source: &mut dyn Read, send: &SyncSender<Event>) {
+/// Reads for as long as anybody listens.
+fn read_to_end(source: &mut dyn Read, send: &SyncSender<Event>) -> Result<(), SendError<Event>> {
     let mut lines = Lines::default();
-    let _ = send.send(Event::Connected);
+    send.send(Event::Connected)?;
     let failed = loop {
         match lines.read(source, send) {
-            Err(Stop::Unheard) => return,
+            Err(Stop::Unheard) => return Ok(()),
             Err(Stop::Failed(error)) => break Some(error),
             Ok(0) => break None,
             Ok(_) => {}
         }
     };
-    let _ = lines.finish(send);
-    let _ = send.send(failed.map_or(Event::Ended, |error| Event::Away(error.to_string())));
+    lines.finish(send)?;
+    send.send(failed.map_or(Event::Ended, |error| Event::Away(error.to_string())))
+}
+
+/// Reads a pipe again and again: another program may write into it when one has ended.
+fn read_pipe(path: &Path, send: &SyncSender<Event>) {
+    loop {
+        // Opening it waits for a writer.
+        let read = match File::open(path) {
+            Ok(mut file) => read_to_end(&mut file, send),
+            Err(error) => send.send(Event::Away(error.to_string())),
+        };
+        if read.is_err() {
+            return;
+        }
+        thread::sleep(RETRY);
+    }
 }
 
 /// Reads a serial port for as long as anybody listens, and opens it again when it comes back.
@@ -135,6 +165,8 @@ impl From<SendError<Event>> for Stop {
 #[derive(Default)]
 struct Lines {
     begun: Vec<u8>,
+    /// What comes until the end of the line is the rest of one that was cut.
+    is_cut: bool,
 }
 
 impl Lines {
@@ -152,9 +184,14 @@ impl Lines {
         };
         let arrived = Instant::now();
         for byte in &bytes[..count] {
-            if *byte == b'\n' || self.begun.len() >= LONGEST_LINE {
+            let is_end = *byte == b'\n';
+            if !self.is_cut && (is_end || self.begun.len() >= LONGEST_LINE) {
                 send.send(Event::Line(std::mem::take(&mut self.begun), arrived))?;
-            } else {
+                self.is_cut = true;
+            }
+            if is_end {
+                self.is_cut = false;
+            } else if !self.is_cut {
                 self.begun.push(*byte);
             }
         }
@@ -162,7 +199,7 @@ impl Lines {
     }
 
     /// Sends what has no end.
-    fn finish(self, send: &SyncSender<Event>) -> Result<(), Stop> {
-        if self.begun.is_empty() { Ok(()) } else { Ok(send.send(Event::Line(self.begun, Instant::now()))?) }
+    fn finish(self, send: &SyncSender<Event>) -> Result<(), SendError<Event>> {
+        if self.begun.is_empty() { Ok(()) } else { send.send(Event::Line(self.begun, Instant::now())) }
     }
 }

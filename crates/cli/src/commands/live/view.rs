@@ -17,6 +17,8 @@ use crate::args::LiveArgs;
 const NUMBERS_WIDTH: u16 = 38;
 const PLOT_WIDTH: u16 = 30;
 const PLOT_HEIGHT: u16 = 6;
+/// Rows of a terminal that is short of them.
+const LOW: u16 = 10;
 /// Points that are drawn: a few per dot of a wide terminal.
 const MOST_DRAWN: usize = 2000;
 /// Width of a bar that stands for a probability.
@@ -24,7 +26,11 @@ const BAR: usize = 10;
 
 /// Draws everything.
 pub fn draw(frame: &mut Frame, session: &Session, status: &str, args: &LiveArgs) {
-    let rows = [Constraint::Length(1), Constraint::Min(0), Constraint::Length(2), Constraint::Length(1)];
+    // A small terminal has room for numbers, and for what there is to say instead of the keys.
+    let is_low = frame.area().height < LOW;
+    let said = if session.message.is_empty() { 0 } else { 1 };
+    let (message, keys) = if is_low { (said, 1 - said) } else { (2, 1) };
+    let rows = [Constraint::Length(1), Constraint::Min(0), Constraint::Length(message), Constraint::Length(keys)];
     let [title, middle, message, keys] = Layout::vertical(rows).areas(frame.area());
     let sensor = args.estimate.sensor.file_name().unwrap_or_default().to_string_lossy();
     let heading = format!("ohmstrain live · {} · {sensor} · {status}", args.port.display());
@@ -91,6 +97,10 @@ fn numbers(session: &Session) -> Vec<Line<'static>> {
     let mut lines = vec![];
     let mut line =
         |name: &str, text: String| lines.push(Line::from(vec![Span::from(format!("{name:<11}")).dim(), text.into()]));
+    // What stands below is as old.
+    if let Some(silent_s) = session.silent_s() {
+        line("silent", format!("for {silent_s:.0} s"));
+    }
     if let Some(row) = &session.last {
         of_estimate(session, row, &mut line);
     } else {
