@@ -42,16 +42,22 @@ use crate::verbosity::Verbosity;
 
 /// From the resistance of a soft strain sensor to strain, with an honest error bar.
 #[derive(Debug, Parser)]
-#[command(name = "ohmstrain", version, about, propagate_version = true, max_term_width = 100)]
+#[command(
+    name = "ohmstrain",
+    version,
+    propagate_version = true,
+    max_term_width = 100,
+    after_help = "`ohmstrain inspect FILE` says how to begin with a file of yours; `ohmstrain demo` needs none."
+)]
 pub struct Args {
     /// What to do.
     #[command(subcommand)]
     pub command: Command,
     /// Say nothing on stderr but errors, and nothing at the end of a calibration
-    #[arg(short, long, global = true, conflicts_with = "verbose")]
+    #[arg(short, long, global = true, conflicts_with = "verbose", display_order = 900)]
     pub quiet: bool,
     /// Say on stderr what is being done
-    #[arg(short, long, global = true)]
+    #[arg(short, long, global = true, display_order = 900)]
     pub verbose: bool,
 }
 

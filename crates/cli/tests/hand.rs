@@ -34,6 +34,11 @@ fn hand() -> (Bench, usize) {
     (bench, rows)
 }
 
+fn in_kiloohm(number: f64) -> String {
+    // Times stay as they are.
+    if number > 1000.0 { (number / 1000.0).to_string() } else { number.to_string() }
+}
+
 #[test]
 fn all_angles_of_a_hand() {
     let (bench, rows) = hand();
@@ -64,11 +69,33 @@ fn all_angles_of_a_hand() {
     bench.write("broken.csv", bench.read("hand.csv") + "1e9,1,2\n");
     assert_eq!(bench.run(&["hand", "hand.toml", "broken.csv", "-o", "angles.csv"]).code, Some(4));
     assert_eq!(bench.read("angles.csv"), shown);
-    assert!(skipping.warnings.concat().contains("1 lines were skipped"));
+    assert!(skipping.warnings.concat().contains("1 line was skipped"));
     assert_eq!(Csv::new(&skipping.ok()).len(), angles.len());
 
     let refused = bench.run(&["hand", "hand.toml", "thumb.csv"]);
     assert!(refused.code == Some(4) && refused.stderr.contains("expected a column `thumb_ohm`"), "{}", refused.stderr);
+    // Another unit is asked about, a file that is something else is called so.
+    let column =
+        |row: &str| row.split(',').map(|cell| cell.parse().map_or(cell.to_owned(), in_kiloohm)).collect::<Vec<_>>();
+    let kohm: Vec<String> = bench.read("hand.csv").lines().map(|row| column(row).join(",")).collect();
+    bench.write("kohm.csv", kohm.join("\n"));
+    bench.write("binary.csv", b"\x1f\x8b\x08\x08\xff\xfe\x01\n");
+    bench.write("nothing.csv", "time_s,thumb_ohm\n");
+    let named: String = FINGERS.iter().map(|finger| format!("{finger}_ohm,")).collect();
+    bench.write("timeless.csv", format!("{named}\n1,2,3,4,5,\n"));
+    bench.write("empty.csv", format!("time_s,{named}\n"));
+    for (arguments, message) in [
+        (["hand.toml", "kohm.csv"], "kohm.csv: joint `thumb`: "),
+        (["hand.toml", "binary.csv"], "binary.csv:1: expected a header with the column `time_s` or `time_us`, found `"),
+        (["hand.toml", "timeless.csv"], "timeless.csv:1: expected a header with the column `time_s`"),
+        (["hand.toml", "nothing.csv"], "nothing.csv:1: joint `index`: expected a column `index_ohm`"),
+        (["hand.toml", "empty.csv"], "empty.csv:2: expected at least one row of data"),
+        (["thumb.toml", "hand.csv"], "thumb.toml is a sensor file: hand.toml names it"),
+    ] {
+        let refused = bench.run(&["hand", arguments[0], arguments[1], "-o", "none.csv"]);
+        assert!(refused.code == Some(4) && refused.stderr.contains(message), "{message}: {}", refused.stderr);
+        assert!(!refused.stderr.trim_end().contains(char::is_control), "{:?}", refused.stderr);
+    }
     bench.write("odd.toml", "format = 1\n[[joints]]\nname = \"a\"\ncolum = \"a\"\n");
     let refused = bench.run(&["hand", "odd.toml", "hand.csv"]);
     assert!(refused.code == Some(4) && refused.stderr.contains("odd.toml:4: unknown field"), "{}", refused.stderr);

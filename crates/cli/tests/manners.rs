@@ -2,18 +2,24 @@
 
 use crate::common::{Bench, SIMULATE, files_in};
 
-const COMMANDS: [&str; 13] = [
+const COMMANDS: [&str; 19] = [
     "demo",
     "inspect",
     "import",
+    "plan",
     "simulate",
     "calibrate",
     "refine",
     "fit-law",
     "filter",
+    "live",
+    "hand",
     "smooth",
     "evaluate",
+    "batch",
+    "fleet",
     "export",
+    "serial-check",
     "completions",
     "man",
 ];
@@ -27,6 +33,10 @@ fn help_leads_with_an_example() {
             assert!(help.starts_with(&format!("Example: ohmstrain {command} ")), "{help}");
         }
     }
+    let all = bench.run(&["--help"]).ok();
+    let listed = |line: &&str| line.starts_with("  ") && line.as_bytes()[2].is_ascii_lowercase();
+    let names = all.lines().filter(listed).map(|line| line.split_whitespace().next().unwrap());
+    assert_eq!(names.collect::<Vec<_>>(), [&COMMANDS[..], &["help"]].concat(), "{all}");
 }
 
 #[test]
@@ -63,6 +73,8 @@ fn times_outside_of_a_recording_are_answered_with_its_range() {
     ] {
         let message = format!("trace.csv: no row is left by {said}; {range}");
         bench.run(&[&calibrate[..], flags].concat()).fails(4, &message);
+        let refine = ["refine", "trace.csv", "--sensor", "sensor.toml", "-o", "new.toml"];
+        bench.run(&[&refine[..], flags].concat()).fails(4, &message);
     }
 }
 

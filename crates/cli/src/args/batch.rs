@@ -96,13 +96,13 @@ impl SummaryForm {
 
 /// What the long help says after the flags.
 const DETAILS: &str = "\
-Every recording is done by a process of its own, which prints and writes what COMMAND does: one that cannot be read, or
-needs more memory than there is, is reported and leaves the others alone. Exit code 5 says that there were such. Outputs
+Every recording is done by a process of its own, which prints and writes what COMMAND does: one that cannot be read, or \
+needs more memory than there is, is reported and leaves the others alone. Exit code 5 says that there were such. Outputs \
 lie in DIR as the recordings lie below the folder that all of them share.
 
-DIR/summary.csv has a row per recording: state, messages and warnings, scores, SHA-256 of recording,
-sensor, prior and output, flags and version. DIR/batch.jsonl grows by a line with each recording
-that is done. Another run with the same DIR does what is not there yet, or has changed: recording,
+DIR/summary.csv has a row per recording: state, messages and warnings, scores, SHA-256 of recording, \
+sensor, prior and output, flags and version. DIR/batch.jsonl grows by a line with each recording \
+that is done. Another run with the same DIR does what is not there yet, or has changed: recording, \
 sensor, prior, flags, version or output.
 
 Paths in a manifest start at its folder. An empty cell is a flag that is not given; `true` gives one without a value.";

@@ -26,7 +26,8 @@ pub struct EstimateArgs {
     /// unit, or first:N for the median of the first N readings
     #[arg(long, value_name = "OHM|first:N")]
     pub rest_resistance: Option<RestResistance>,
-    /// Turn down readings whose normalised innovation squared (column nis) is above X, two in a row at most
+    /// Turn down readings whose normalised innovation squared (column nis) is above X, two in a row at most; 10.8
+    /// is one in a thousand by chance
     #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = positive)]
     pub gate: Option<f64>,
     /// How surprising readings are taken: redescending:K, the less the farther beyond K standard deviations, huber:K,
@@ -91,7 +92,7 @@ pub struct FilterArgs {
     /// Recording, or - for stdin
     #[arg(default_value = "-")]
     pub trace_file: PathBuf,
-    /// Estimate every row from the readings up to S seconds after it; rows come out that much later
+    /// Estimate every row from the readings up to S seconds after it, 0.5 for instance; rows come out that much later
     #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = positive)]
     pub lag_s: Option<f64>,
     /// The strain (or angle) is known to be X at the first row from T seconds on, to SD (0.5 % of the limits); repeatable.

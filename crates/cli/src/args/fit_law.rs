@@ -68,25 +68,29 @@ pub enum TableFormat {
 /// What the long help says after the flags.
 const LAWS: &str = "\
 Laws, t the time since the segment began:
-  eq1         R = r_inf + r1 exp(-lambda1 t) + r2 exp(-lambda2 t)                       hold
-  eq2         R/R0 - 1 = a + b exp(-t/tau) + c t                                        hold
-  eq5:N       R = sum a_i exp(-t/tau_i)                                                 hold
-  eq6         R = scale (exp(-t/tau) + e0)                                              hold
-  eq7:N       R = e_inf + sum e_i exp(-t/tau_i); prony:N is the same                    hold
-  eq8         R = r0 exp(-t/tau0) v t + v eta + r1; v t is the measured travel          extend, retract
-  eq9         R = r0_hold r_start exp(-t/tau0) + r1_hold, r1_hold = r_start (1 - r0_hold)    hold
-  eq8+eq9     a movement and the hold after it, with one tau0, without a jump           extend or retract, hold
-  kww         R = r_inf + r exp(-(t/tau)^beta)                                          hold
-  tunnelling  R = rest_reading (1 + gap x) exp(barrier x + path_loss x^2), x the strain extend, retract
+  of a hold
+  eq1         R = r_inf + r1 exp(-lambda1 t) + r2 exp(-lambda2 t)
+  eq2         R/R0 - 1 = a + b exp(-t/tau) + c t
+  eq5:N       R = sum a_i exp(-t/tau_i)
+  eq6         R = scale (exp(-t/tau) + e0)
+  eq7:N       R = e_inf + sum e_i exp(-t/tau_i); prony:N is the same
+  eq9         R = r0_hold r_start exp(-t/tau0) + r1_hold, r1_hold = r_start (1 - r0_hold)
+  kww         R = r_inf + r exp(-(t/tau)^beta)
+  of a movement, extend or retract
+  eq8         R = r0 exp(-t/tau0) v t + v eta + r1; v t is the measured travel
+  tunnelling  R = rest_reading (1 + gap x) exp(barrier x + path_loss x^2), x the strain
+  of both
+  eq8+eq9     a movement and the hold after it, with one tau0, without a jump
 
-At one speed v eta and r1 cannot be told apart and are one parameter. A parameter that the readings do not tell has no
-standard error. Standard errors take the residuals for white; the column `neighbours` is the correlation of neighbouring
-residuals: near 1 the errors are several times too small. A hold before the first movement is fitted only if it is
-asked for.
+At one speed v eta and r1 cannot be told apart and are one parameter. A parameter that the \
+readings do not tell has no standard error. Standard errors take the residuals for white; the \
+column `neighbours` is the correlation of neighbouring residuals: near 1 the errors are several \
+times too small. A hold before the first movement is fitted only if it is asked for.
 
---table: a row is the mean over the segments of that material, speed (within 10 %) and phase. With two or more, ± is the
-standard error from their scatter. A movement without a hold after it is fitted by eq8 alone. R^2 is that of the phase, the smallest of the row's segments.
-`rest` is a hold after a release.";
+--table: a row is the mean over the segments of that material, speed (within 10 %) and phase. \
+With two or more, ± is the standard error from their scatter. A movement without a hold after it \
+is fitted by eq8 alone. R^2 is that of the phase, the smallest of the row's segments. `rest` is a \
+hold after a release.";
 
 /// Which segments to fit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

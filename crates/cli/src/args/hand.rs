@@ -33,6 +33,8 @@ hand.toml:
   name = \"index\"                  # of its columns in the output
   column = \"index_ohm\"            # of its readings in the recording
   sensor = \"index.toml\"           # as calibrate wrote it; the path goes from hand.toml
-  joint = \"prestrain=0.05 moment_arm_mm=4.4 gauge_length_mm=30\"   # unless the sensor knows its joint, or an angle
+  # unless the sensor knows its joint, or an angle:
+  joint = \"prestrain=0.05 moment_arm_mm=4.4 gauge_length_mm=30\"
   rest_resistance = 1612.0        # R0 of today, if it is not the calibration's
-  front_end = \"divider reference_ohm=10000 side=low bits=12 noise_codes=0.5\"   # if the column has converter codes";
+  # if the column has converter codes:
+  front_end = \"divider reference_ohm=10000 side=low bits=12 noise_codes=0.5\"";

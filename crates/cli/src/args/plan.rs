@@ -13,7 +13,7 @@ pub struct PlanArgs {
     /// Illustrative material: ecoflex-00-30, ecoflex-00-50, vytaflex-10 or representative
     #[arg(long, default_value = "representative", conflicts_with = "sensor")]
     pub material: Material,
-    /// Joint, as in `# joint = …`, to tell the error of its angle
+    /// Joint, to tell the error of its angle, as in `# joint = …`: 'prestrain=0.05 moment_arm_mm=4.4 gauge_length_mm=30'
     #[arg(long, value_name = "SPEC")]
     pub joint: Option<JointSpec>,
     /// Print JSON

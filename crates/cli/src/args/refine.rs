@@ -59,12 +59,12 @@ impl FromStr for Moved {
 
 /// What the long help says after the flags.
 const TRUST: &str = "\
-Finds the noise and motion of the extended Kalman filter that make the readings most likely, where no strain was recorded.
-The likelihood sees how well each reading is predicted from those before it, and trusts the law for the rest. A law that
-is wrong by more than its noise makes errors of strain that readings do not show: intervals fitted this way are then too
+Finds the noise and motion of the extended Kalman filter that make the readings most likely, where no strain was recorded. \
+The likelihood sees how well each reading is predicted from those before it, and trusts the law for the rest. A law that \
+is wrong by more than its noise makes errors of strain that readings do not show: intervals fitted this way are then too \
 narrow. Where a reference exists, use calibrate.
 
-The standard error is that of the parameter's logarithm, 0.1 is 10 %; the interval is the profile likelihood's. A parameter
-that is zero in the sensor file stays zero. Moving the motion alone, --parameters rate_sd_per_s,rate_time_s, keeps what
-calibrate knows of the law's error. More than 3000 rows are thinned to every k-th. Law, R0, limits, the factor
+The standard error is that of the parameter's logarithm, 0.1 is 10 %; the interval is the profile likelihood's. A parameter \
+that is zero in the sensor file stays zero. Moving the motion alone, --parameters rate_sd_per_s,rate_time_s, keeps what \
+calibrate knows of the law's error. More than 3000 rows are thinned to every k-th. Law, R0, limits, the factor \
 strain_sd_scale and the other estimators stay as they are in the sensor file.";

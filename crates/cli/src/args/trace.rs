@@ -9,10 +9,12 @@ pub struct SetupArgs {
     /// Length of the unstretched sensor, mm: turns a displacement into strain
     #[arg(long, value_name = "MM", allow_negative_numbers = true, value_parser = positive)]
     pub gauge_length_mm: Option<f64>,
-    /// Electronics, as in `# front_end = …`: turns converter codes into ohms
+    /// Electronics, which turn converter codes into ohms, as in `# front_end = …`:
+    /// 'divider reference_ohm=10000 side=low bits=12 noise_codes=0.5'
     #[arg(long, value_name = "SPEC")]
     pub front_end: Option<FrontEndSpec>,
-    /// Joint, as in `# joint = …`: turns an angle into strain
+    /// Joint, which turns an angle into strain, as in `# joint = …`:
+    /// 'prestrain=0.05 moment_arm_mm=4.4 gauge_length_mm=30'
     #[arg(long, value_name = "SPEC")]
     pub joint: Option<JointSpec>,
 }

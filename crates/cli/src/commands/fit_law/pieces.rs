@@ -225,5 +225,12 @@ fn nothing(file: &str, args: &FitLawArgs, segments: &[Numbered]) -> String {
         let count = segments.iter().filter(|own| own.segment.phase == phase).count();
         format!("{count} {}", phase_name(phase))
     };
-    format!("{file}: expected {wanted} for {}, found {}", args.law, Phase::ALL.map(found).join(", "))
+    let is_hold = |own: &Numbered| own.is_hold();
+    let instead = match args.law {
+        ClosedForm::Eq8And9 if args.segment.is_empty() && !segments.iter().any(is_hold) => {
+            "; --law eq8 is about movements alone"
+        }
+        _ => "",
+    };
+    format!("{file}: expected {wanted} for {}, found {}{instead}", args.law, Phase::ALL.map(found).join(", "))
 }

@@ -58,6 +58,10 @@ impl Description {
                 "{name} is a recording, not the description of a hand: give hand.toml first, and the recording after it"
             )));
         }
+        if text.contains("\ndefault_estimator = ") {
+            let what = "is a sensor file: hand.toml names it as the `sensor` of a joint";
+            return Err(CliError::Input(format!("{name} {what}")));
+        }
         let wrong = |error: toml::de::Error| {
             let line = error.span().map_or(1, |span| 1 + text[..span.start].matches('\n').count());
             CliError::Input(format!("{name}:{line}: {}", error.message().replace('\n', " ")))

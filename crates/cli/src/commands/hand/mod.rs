@@ -5,18 +5,22 @@
 
 mod description;
 
-use std::io::{self, BufRead, BufReader, Write};
+use std::io::{self, BufRead, BufReader, Read, Write};
 use std::path::Path;
 
-use ohmstrain::{Estimate, Filter, Quantity, Sensor};
-use ohmstrain_bench_data::{Line, LineParser, Metadata, Row, RowWriter};
+use ohmstrain::{Estimate, Filter, Quantity, Sensor, UnitGuess};
+use ohmstrain_bench_data::{Line, LineParser, Metadata, Row, RowWriter, counted};
 
 use crate::args::HandArgs;
 use crate::error::CliError;
 use crate::input::{self, is_stdin, reading_column};
 use crate::output::RowsOut;
 use crate::sensor_file;
+use crate::suits::FIRST_LIVE_READINGS;
 use description::{Description, Joint};
+
+/// Longer lines are no rows, however they go on.
+const LONGEST_LINE: u64 = 64 * 1024;
 
 /// Turns readings of all joints into angles, row by row as they arrive.
 pub fn run(args: &HandArgs) -> Result<(), CliError> {
@@ -38,7 +42,6 @@ pub fn run(args: &HandArgs) -> Result<(), CliError> {
     let mut rows_out = RowsOut::claim(args.output.as_deref(), args.replace.force, inputs)?;
     let live = is_stdin(&args.trace_file) || !args.trace_file.is_file();
     let mut out = RowWriter::new(rows_out.open(live)?);
-    header(&channels, &mut out)?;
     let streamed = stream(args, &name, source, &mut channels, &mut out, live);
     out.flush()?;
     streamed?;
@@ -51,6 +54,8 @@ struct Channel<'a> {
     sensor: Sensor,
     filter: Filter,
     lines: LineParser,
+    /// The first known readings.
+    early: Vec<f64>,
 }
 
 impl<'a> Channel<'a> {
@@ -72,17 +77,18 @@ impl<'a> Channel<'a> {
         let wanted = sensor.filter();
         let filter = joint.rest_resistance.map_or(wanted, |measured| wanted.rest_resistance(measured)).build()?;
         let lines = LineParser::new(file, Metadata { front_end: joint.front_end, ..Metadata::default() });
-        Ok(Self { joint, sensor, filter, lines })
+        Ok(Self { joint, sensor, filter, lines, early: vec![] })
     }
 
     /// The header as this joint sees it: its column is the reading, those of others are passed over.
-    fn header(&self, header: &str) -> Result<String, CliError> {
-        let has = header.split(',').any(|name| name.trim() == self.joint.column);
-        if !has {
-            return Err(CliError::Input(format!(
-                "joint `{}`: expected a column `{}`, found `{header}`",
-                self.joint.name, self.joint.column
-            )));
+    fn header(&self, header: &str) -> Result<String, String> {
+        let has = |column: &str| header.split(',').any(|name| name.trim() == column);
+        if !has("time_s") && !has("time_us") {
+            return Err(format!("expected a header with the column `time_s` or `time_us`, found {}", quoted(header)));
+        }
+        if !has(&self.joint.column) {
+            let Joint { name, column, .. } = self.joint;
+            return Err(format!("joint `{name}`: expected a column `{column}`, found {}", quoted(header)));
         }
         let own = match (self.joint.front_end, self.sensor.params().reading) {
             (Some(_), _) => "adc",
@@ -95,6 +101,30 @@ impl<'a> Channel<'a> {
         };
         Ok(header.split(',').map(cell).collect::<Vec<_>>().join(","))
     }
+
+    /// Doubts the unit of the readings once there are enough of them.
+    fn doubt(&mut self, reading: f64) -> Option<String> {
+        if !reading.is_finite() || self.early.len() >= FIRST_LIVE_READINGS {
+            return None;
+        }
+        self.early.push(reading);
+        let early = self.early.iter().copied().filter(|_| self.early.len() == FIRST_LIVE_READINGS);
+        let doubt = self.sensor.check_unit(early, self.joint.rest_resistance).err()?;
+        let answer = if doubt.guess == UnitGuess::KiloOhm {
+            "Then say so with a line `# resistance_unit = kohm` above the header"
+        } else {
+            "Bring them to the sensor's unit"
+        };
+        let other = "if another sensor, or another day, is to explain it, give its R0 as the joint's rest_resistance";
+        Some(format!("joint `{}`: {doubt} {answer}; {other}", self.joint.name))
+    }
+}
+
+/// A header that can be shown.
+fn quoted(header: &str) -> String {
+    const LONGEST: usize = 80;
+    let shown: String = header.chars().take(LONGEST).flat_map(char::escape_debug).collect();
+    if header.chars().count() > LONGEST { format!("`{shown}…`") } else { format!("`{shown}`") }
 }
 
 fn header<W: Write>(channels: &[Channel], out: &mut RowWriter<W>) -> Result<(), CliError> {
@@ -115,21 +145,24 @@ fn stream<W: Write>(
     out: &mut RowWriter<W>,
     live: bool,
 ) -> Result<(), CliError> {
-    let (mut has_header, mut skipped, mut line) = (false, 0_u64, Vec::new());
+    let (mut has_header, mut skipped, mut number, mut line) = (false, 0_u64, 0_u64, Vec::new());
+    let mut is_empty = true;
     let mut source = BufReader::new(source);
     loop {
         line.clear();
         let unreadable = |error| CliError::file("read", &args.trace_file, &error);
-        if source.read_until(b'\n', &mut line).map_err(unreadable)? == 0 {
+        if (&mut source).take(LONGEST_LINE).read_until(b'\n', &mut line).map_err(unreadable)? == 0 {
             break;
         }
+        number += 1;
         let text = String::from_utf8_lossy(&line);
         let is_header = !has_header && !text.starts_with('#') && !text.trim().is_empty();
         let mut rows = Vec::new();
         let mut refused = None;
         for channel in channels.iter_mut() {
             let taken = if is_header {
-                let own = channel.header(text.trim())?;
+                let own = channel.header(text.trim());
+                let own = own.map_err(|what| CliError::Input(format!("{file}:{number}: {what}")))?;
                 channel.lines.take(own.as_bytes())
             } else {
                 channel.lines.take(&line)
@@ -141,13 +174,24 @@ fn stream<W: Write>(
                 Err(fault) => refused = Some(format!("joint `{}`: {fault}", channel.joint.name)),
             }
         }
-        has_header |= is_header;
+        if is_header {
+            header(channels, out)?;
+            has_header = true;
+        }
         if let Some(refused) = refused {
             if is_header || !args.skip_bad {
                 return Err(CliError::Input(refused));
             }
             skipped += 1;
         } else if rows.len() == channels.len() && !rows.is_empty() {
+            is_empty = false;
+            for (channel, row) in channels.iter_mut().zip(&rows) {
+                match channel.doubt(row.reading.value) {
+                    Some(doubt) if live => CliError::warning(&format!("{file}: {doubt}")),
+                    Some(doubt) => return Err(CliError::Input(format!("{file}: {doubt}"))),
+                    None => {}
+                }
+            }
             write(channels, &rows, out)?;
             if live {
                 out.flush()?;
@@ -155,7 +199,12 @@ fn stream<W: Write>(
         }
     }
     if skipped > 0 {
-        CliError::warning(&format!("{skipped} lines were skipped"));
+        let were = if skipped == 1 { "was" } else { "were" };
+        CliError::warning(&format!("{} {were} skipped", counted(skipped, "line")));
+    }
+    if is_empty {
+        let none = "expected at least one row of data, found the end of the file";
+        return Err(CliError::Input(format!("{file}:{}: {none}", number + 1)));
     }
     Ok(())
 }

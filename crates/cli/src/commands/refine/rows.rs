@@ -33,6 +33,9 @@ impl RelativeRows {
         if let Some(from) = from {
             trace = trace.since(from);
         }
+        if trace.is_empty() {
+            return Err(recording.no_rows(from, until));
+        }
         let stride = trace.len().div_ceil(MOST_ROWS).max(1);
         let rows = Recording { trace, ..recording.rows(0..0) };
         let relative = |row: usize| rows.reading(row).1.relative(rest_reading);
