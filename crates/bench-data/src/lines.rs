@@ -19,11 +19,13 @@ pub(crate) struct Lines<R> {
     buffer: Vec<u8>,
     /// Number of the line delivered last, counted from 1.
     number: u64,
+    /// The line delivered last was too long: its rest is still to come.
+    is_cut: bool,
 }
 
 impl<R: Read> Lines<R> {
     pub(crate) fn new(source: R) -> Self {
-        Self { source: BufReader::new(source), buffer: Vec::new(), number: 0 }
+        Self { source: BufReader::new(source), buffer: Vec::new(), number: 0, is_cut: false }
     }
 
     pub(crate) const fn number(&self) -> u64 {
@@ -32,6 +34,9 @@ impl<R: Read> Lines<R> {
 
     /// The next line that is not blank, without its end; `None` at the end of the source.
     pub(crate) fn next(&mut self) -> Result<Option<&str>, LineFault> {
+        if std::mem::take(&mut self.is_cut) {
+            self.source.skip_until(b'\n').map_err(LineFault::Io)?;
+        }
         loop {
             self.buffer.clear();
             let mut bounded = (&mut self.source).take(LONGEST_LINE);
@@ -39,6 +44,7 @@ impl<R: Read> Lines<R> {
                 return Ok(None);
             }
             self.number += 1;
+            self.is_cut = self.buffer.len() as u64 == LONGEST_LINE && !self.buffer.ends_with(b"\n");
             check_bytes(&self.buffer, self.number).map_err(LineFault::Content)?;
             if !content(&self.buffer, self.number).trim_ascii().is_empty() {
                 break;
@@ -202,5 +208,13 @@ mod tests {
         let mut lines = Lines::new(io::repeat(b'x'));
         assert!(matches!(lines.next(), Err(LineFault::Content(_))));
         assert_eq!(lines.buffer.len() as u64, LONGEST_LINE);
+    }
+
+    #[test]
+    fn the_end_of_a_line_that_was_too_long_is_no_line() {
+        let text = format!("{},1600\nb\n", "9".repeat(3 * LONGEST_LINE as usize));
+        let mut lines = Lines::new(text.as_bytes());
+        assert!(matches!(lines.next(), Err(LineFault::Content(_))));
+        assert!(matches!(lines.next(), Ok(Some("b"))) && lines.number() == 2);
     }
 }

@@ -53,8 +53,8 @@ pub fn open_at(
     let source: Box<dyn Read> = if is_stdin(path) {
         let mut stdin = io::stdin().lock();
         // Waits for the first bytes, and leaves them where they are.
-        if stdin.fill_buf().is_ok_and(sensor_file::is_one) {
-            return Err(is_a_sensor(path));
+        if let Ok(first) = stdin.fill_buf() {
+            refuse_parameters(path, first)?;
         }
         Box::new(stdin)
     } else {
@@ -64,9 +64,7 @@ pub fn open_at(
         if ParquetText::is_one(first) {
             return open_parquet(path, overrides);
         }
-        if sensor_file::is_one(first) {
-            return Err(is_a_sensor(path));
-        }
+        refuse_parameters(path, first)?;
         Box::new(file)
     };
     let name = path.display().to_string();
@@ -128,9 +126,7 @@ pub fn read(path: &Path, overrides: &Metadata) -> Result<Recording, CliError> {
 
 /// A whole recording of these bytes.
 pub fn parse(bytes: &[u8], path: &Path, overrides: &Metadata) -> Result<Recording, CliError> {
-    if sensor_file::is_one(bytes) {
-        return Err(is_a_sensor(path));
-    }
+    refuse_parameters(path, bytes)?;
     let sha256 = sha256(bytes);
     if ParquetText::is_one(bytes) {
         return collect(open_parquet(path, overrides)?, sha256);
@@ -153,9 +149,17 @@ pub fn hexadecimal(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-fn is_a_sensor(path: &Path) -> CliError {
-    let name = path.display();
-    CliError::Input(format!("{name} is a sensor file, not a recording: give it to --sensor, and the recording here"))
+/// Refuses a sensor's file, or a hand's, by its first bytes.
+fn refuse_parameters(path: &Path, bytes: &[u8]) -> Result<(), CliError> {
+    if !sensor_file::is_one(bytes) {
+        return Ok(());
+    }
+    let what = if sensor_file::is_hand(&String::from_utf8_lossy(bytes)) {
+        sensor_file::A_HAND
+    } else {
+        "is a sensor file, not a recording: give it to --sensor, and the recording here"
+    };
+    Err(CliError::Input(format!("{} {what}", path.display())))
 }
 
 /// What messages call the header of a recording of which no row has been read yet.

@@ -16,6 +16,8 @@ pub fn refuse_results(path: &Path) -> Result<(), CliError> {
     let Some(head) = std::fs::File::open(path).ok().filter(|_| path.is_file()).and_then(head) else { return Ok(()) };
     let what = if Kind::Prior.wrote(&head) {
         "is a prior: give it to `calibrate --prior`"
+    } else if sensor_file::is_hand(&head) {
+        sensor_file::A_HAND
     } else if sensor_file::is_one(head.as_bytes()) {
         "is a sensor file: give it to --sensor of `filter`, `smooth`, `evaluate` or `live`"
     } else if Kind::Estimates.wrote(&head) {

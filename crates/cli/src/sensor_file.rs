@@ -6,6 +6,9 @@ use ohmstrain::{EstimatorKind, Sensor, SensorParams};
 
 use crate::error::CliError;
 
+/// What a file is in which joints are described.
+pub const A_HAND: &str = "is the description of a hand, not of a sensor: give it to `ohmstrain hand`";
+
 /// Reads a sensor and checks that the estimator (or the file's choice) can be made of it.
 pub fn read(path: &Path, estimator: Option<EstimatorKind>) -> Result<Sensor, CliError> {
     let name = path.display().to_string();
@@ -17,6 +20,9 @@ pub fn read(path: &Path, estimator: Option<EstimatorKind>) -> Result<Sensor, Cli
             "{name} is a recording, not a sensor file: give --sensor what `ohmstrain calibrate` wrote, and the recording by itself"
         )));
     }
+    if is_hand(&text) {
+        return Err(CliError::Input(format!("{name} {A_HAND}")));
+    }
     let sensor = match estimator {
         Some(kind) => Sensor::from_toml_for(&text, kind),
         None => Sensor::from_toml(&text),
@@ -24,9 +30,14 @@ pub fn read(path: &Path, estimator: Option<EstimatorKind>) -> Result<Sensor, Cli
     sensor.map_err(|error| CliError::Input(error.in_file(&name)))
 }
 
-/// Whether these are the first bytes of a sensor's parameters.
+/// Whether these are the first bytes of a sensor's parameters, or of a hand's description.
 pub fn is_one(bytes: &[u8]) -> bool {
     bytes.starts_with(b"format = ")
+}
+
+/// Whether this is the description of a hand.
+pub fn is_hand(text: &str) -> bool {
+    is_one(text.as_bytes()) && text.lines().any(|line| line.trim() == "[[joints]]")
 }
 
 /// Whether this is a recording: its first line that is no comment has names of columns.

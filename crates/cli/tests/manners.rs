@@ -167,6 +167,15 @@ fn what_a_file_is_and_what_is_missing_is_said() {
     let bench = Bench::calibrated();
     let estimates = bench.run(&["filter", "trace.csv", "--sensor", "sensor.toml"]).stdout;
     bench.write("estimates.csv", estimates);
+    bench.write("hand.toml", "format = 1\n[[joints]]\nname = \"a\"\n");
+    let hand = "hand.toml is the description of a hand, not of a sensor: give it to `ohmstrain hand`";
+    for arguments in [
+        &["inspect", "hand.toml"][..],
+        &["filter", "trace.csv", "--sensor", "hand.toml"],
+        &["smooth", "hand.toml", "--sensor", "sensor.toml"],
+    ] {
+        bench.run(arguments).fails(4, hand);
+    }
     let cases: [(&[&str], i32, &str); 5] = [
         (&["simulate", "-o", "no/such/s.csv"], 1, "cannot write no/such/s.csv: there is no folder no/such"),
         (

@@ -289,7 +289,7 @@ fn what_cannot_be_refined_is_refused_and_nothing_is_written() {
         (
             &["trace.csv", "--sensor", "sensor.toml", "--from", "500"],
             4,
-            "trace.csv: expected at least 60 readings, found none",
+            "trace.csv: no row is left by --from 500; the recording goes from 0 to 400 s",
         ),
         (&["ratio.csv", "--sensor", "sensor.toml"], 4, &unit),
         (

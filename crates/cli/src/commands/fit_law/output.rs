@@ -108,12 +108,15 @@ pub fn table(recordings: &[Fits]) -> Rows {
     let quality = ["R^2", "AIC", "n", "neighbours"].map(String::from);
     let header = header.chain(with_units(&names, fits())).chain(quality).collect();
     let row = |(recording, Fitted { piece, fit }): (&Fits, &Fitted)| {
-        let speed = piece.speed_per_s.map_or_else(String::new, plain);
-        let mut row: Vec<Cell> = [recording.name.clone(), piece.label.clone(), speed].map(Cell::from).into();
+        let speed = piece.speed_per_s.map_or(Cell::Nothing, |speed| Cell::Number(speed, plain(speed)));
+        let mut row: Vec<Cell> = vec![recording.name.clone().into(), piece.label.clone().into(), speed];
         row.extend(names.iter().map(|name| Cell::of(fit.get(name))));
-        let (r_squared, aic) = (format!("{:.5}", fit.r_squared), format!("{:.1}", fit.aic));
-        let (readings, neighbours) = (fit.readings.to_string(), format!("{:.2}", fit.residual_autocorrelation));
-        row.extend([r_squared, aic, readings, neighbours].map(Cell::from));
+        row.extend([
+            Cell::Number(fit.r_squared, format!("{:.5}", fit.r_squared)),
+            Cell::Number(fit.aic, format!("{:.1}", fit.aic)),
+            Cell::from(fit.readings.to_string()),
+            Cell::Number(fit.residual_autocorrelation, format!("{:.2}", fit.residual_autocorrelation)),
+        ]);
         row
     };
     let rows = fits().map(row).collect();

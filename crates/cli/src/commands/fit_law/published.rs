@@ -128,9 +128,10 @@ fn belongs(name: &str, phase: &str) -> bool {
 fn row(group: &[Entry], names: &[String]) -> Vec<Cell> {
     let first = &group[0];
     let speeds: Vec<f64> = group.iter().filter_map(|entry| entry.speed).collect();
-    let speed = if speeds.is_empty() { String::new() } else { plain(speeds.iter().sum::<f64>() / speeds.len() as f64) };
-    let head = [first.material.to_string(), speed, first.phase.to_string(), group.len().to_string()];
-    let mut out: Vec<Cell> = head.map(Cell::from).into();
+    let mean_speed = speeds.iter().sum::<f64>() / speeds.len() as f64;
+    let speed = if speeds.is_empty() { Cell::Nothing } else { Cell::Number(mean_speed, plain(mean_speed)) };
+    let text = |text: &str| Cell::from(text.to_owned());
+    let mut out = vec![text(first.material), speed, text(first.phase), text(&group.len().to_string())];
     for name in names {
         let is_here = belongs(name, first.phase);
         let own: Vec<&Estimated> =
@@ -140,7 +141,7 @@ fn row(group: &[Entry], names: &[String]) -> Vec<Cell> {
         out.push(if told.is_empty() && !own.is_empty() { Cell::NotTold } else { mean(&told) });
     }
     let worst = group.iter().map(|entry| entry.r_squared).fold(f64::INFINITY, f64::min);
-    out.push(fixed(worst, 4).into());
+    out.push(Cell::Number(worst, fixed(worst, 4)));
     out
 }
 

@@ -10,8 +10,10 @@ use ohmstrain::number::{plain, with_error};
 
 /// A cell.
 pub enum Cell {
-    /// Words, or a number as it is to be read.
+    /// Words.
     Text(String),
+    /// A number, and how it is to be read.
+    Number(f64, String),
     /// A value with its standard error.
     Estimate(f64, f64),
     /// A value at the limit of the search.
@@ -35,7 +37,7 @@ impl Cell {
 
     fn text(&self) -> String {
         match self {
-            Self::Text(text) => text.clone(),
+            Self::Text(text) | Self::Number(_, text) => text.clone(),
             Self::Estimate(value, error) => with_error(*value, *error),
             Self::AtLimit(value) => format!("{} (limit)", plain(*value)),
             Self::NotTold => "not told".into(),
@@ -46,9 +48,9 @@ impl Cell {
     /// Value and standard error, with all digits.
     fn csv(&self, has_error: bool) -> String {
         let value = match self {
-            Self::Text(text) => quoted(&text.replace('−', "-")),
+            Self::Text(text) => quoted(text),
             Self::Estimate(value, error) => return format!("{value},{error}"),
-            Self::AtLimit(value) => value.to_string(),
+            Self::AtLimit(value) | Self::Number(value, _) => value.to_string(),
             Self::NotTold | Self::Nothing => String::new(),
         };
         if has_error { value + "," } else { value }
@@ -210,12 +212,13 @@ mod tests {
         let rows = vec![
             vec![Cell::from("a, b".to_string()), Cell::Estimate(-1.23456789e-9, 1e-10)],
             vec![Cell::from("c_1".to_string()), Cell::NotTold],
+            vec![Cell::from("d".to_string()), Cell::Number(-1.5e-7, "−1.5·10⁻⁷".into())],
         ];
         let table = Rows { keys: 1, header, rows };
         let csv = table.csv();
         let lines: Vec<&str> = csv.lines().collect();
         assert_eq!(lines[0], "segment,\"tau_0, s\",\"standard error of tau_0, s\"");
-        assert_eq!(lines[1..], ["\"a, b\",-0.00000000123456789,0.0000000001", "c_1,,"]);
+        assert_eq!(lines[1..], ["\"a, b\",-0.00000000123456789,0.0000000001", "c_1,,", "d,-0.00000015,"]);
         let latex = table.latex();
         assert!(latex.contains("tau\\_0, s") && latex.contains("$-$1.235$\\cdot$10$^{-9}$ $\\pm$"), "{latex}");
     }

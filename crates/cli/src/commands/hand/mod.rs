@@ -149,8 +149,11 @@ fn stream<W: Write>(
     let mut is_empty = true;
     let mut source = BufReader::new(source);
     loop {
-        line.clear();
         let unreadable = |error| CliError::file("read", &args.trace_file, &error);
+        if line.len() as u64 == LONGEST_LINE && !line.ends_with(b"\n") {
+            source.skip_until(b'\n').map_err(unreadable)?;
+        }
+        line.clear();
         if (&mut source).take(LONGEST_LINE).read_until(b'\n', &mut line).map_err(unreadable)? == 0 {
             break;
         }
