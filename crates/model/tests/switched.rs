@@ -121,6 +121,27 @@ proptest! {
         }
     }
 
+    /// Curve, dash-pot, branches and baseline, in every phase; a path there and back adds to it what the law says of both ways.
+    #[test]
+    fn a_reading_is_that_of_the_law(state in state(), excess in 0.0..0.1_f64) {
+        let model = model::<f64>(polynomial(), 1.0);
+        let [strain, rate, first, second, baseline] = *state.as_ref();
+        let law = |phase| model.law().relative_change(strain, rate, &[first, second], baseline, phase);
+        for phase in Phase::ALL {
+            let known = model.observe(&state, Direction::Known(phase));
+            prop_assert!((known.value - law(phase)).abs() < 1e-15);
+            prop_assert_eq!(known.variance, 1e-6);
+            if phase == Phase::Hold {
+                continue;
+            }
+            let turning = Turning { excess, variance: 0.04 };
+            let turned = model.observe(&state, Direction::Within { phase, turning });
+            let there_and_back = model.law().extend_viscosity_s - model.law().retract_viscosity_s;
+            prop_assert!((turned.value - law(phase) - there_and_back * 0.5 * excess).abs() < 1e-15);
+            prop_assert!((turned.variance - 1e-6 - (there_and_back * 0.5).powi(2) * 0.04).abs() < 1e-18);
+        }
+    }
+
     /// With constant gains and a given phase one step is two: exact in mean, Jacobian and noise.
     #[test]
     fn splitting_a_step_changes_nothing(state in state(), first in 0.001..2.0_f64, second in 0.001..2.0_f64) {
@@ -157,6 +178,10 @@ proptest! {
             let sparse = model.propagate(&covariance, &step);
             let size = full.to_matrix().amax();
             prop_assert!((full.to_matrix() - sparse.to_matrix()).amax() < 25.0 * f64::EPSILON * size);
+            if direction != Direction::Known(Phase::Hold) {
+                let rate_variance = model.rate_variance(&model.prepare(dt), &covariance);
+                prop_assert!((rate_variance - full[(1, 1)]).abs() < 25.0 * f64::EPSILON * size);
+            }
         }
     }
 
@@ -195,6 +220,85 @@ fn an_uncertain_direction_drives_both_gains() {
         model.transition(&model.prepare(dt), &moving, Direction::Uncertain { rate_sd: 0.01, persistence: 1.0 });
     let known: Transition<f64, 5, 15> = model.transition(&model.prepare(dt), &moving, Direction::Known(Phase::Extend));
     assert!((certain.mean - known.mean).amax() < 1e-15);
+}
+
+/// At rest a rate of deviation s leaves s² (1/4 - 1/(2π)) of the variance of its stretching half unexplained, from the moments
+/// of the half-normal distribution: through the dash-pots in the reading, and through all gains in the branches, over the
+/// time for which each remembers.
+#[test]
+fn an_uncertain_direction_leaves_what_the_half_normal_distribution_says() {
+    let model = model::<f64>(polynomial(), 0.0);
+    let (rate_sd, dt) = (0.05, 0.4);
+    let open = rate_sd * rate_sd * (0.25 - 1.0 / std::f64::consts::TAU);
+    // At the mean strain, so that nothing pulls.
+    let rest = SVector::from([0.1, 0.0, 0.0, 0.0, 0.0]);
+    let seen = model.observe(&rest, Direction::Uncertain { rate_sd, persistence: 1.0 });
+    assert!((seen.variance - 1e-6 - 0.05_f64.powi(2) * open).abs() < 1e-18);
+    let noise = |persistence: f64| {
+        let direction = Direction::Uncertain { rate_sd, persistence };
+        let step: Transition<f64, 5, 15> = model.transition(&model.prepare(dt), &rest, direction);
+        step.noise
+    };
+    let (once, never) = (noise(1.0), noise(0.0));
+    let jump = [(2.0, 0.9 + 0.6), (40.0, 0.9 - 0.6)]
+        .map(|(tau_s, gains): (f64, f64)| tau_s * (1.0 - (-dt / tau_s).exp()) * gains);
+    for i in 0..5 {
+        for j in 0..5 {
+            let expected =
+                if (2..4).contains(&i) && (2..4).contains(&j) { open * jump[i - 2] * jump[j - 2] } else { 0.0 };
+            assert!((once[(i, j)] - never[(i, j)] - expected).abs() < 1e-15, "{i} {j}");
+            assert!((noise(3.0)[(i, j)] - never[(i, j)] - 3.0 * expected).abs() < 1e-15, "{i} {j}");
+        }
+    }
+}
+
+/// A rate with white acceleration correlates as exp(-t/T) and its direction as the square of that: over steps of h that sums
+/// up to `h Σ exp(-2 |k| h/T)`, of which every step shall have as much that the whole is T, whatever h.
+#[test]
+fn what_a_direction_leaves_grows_at_one_rate_whatever_the_step() {
+    let model = model::<f64>(polynomial(), 0.0);
+    for h in [1e-4, 0.01, 0.3, 2.0] {
+        let all: f64 = 1.0 + 2.0 * (1..400_000).map(|k| (-2.0 * f64::from(k) * h / 0.8).exp()).sum::<f64>();
+        // Below a thousandth of T the sum is one, which is off by x²/3 < 4e-7.
+        assert!((model.prepare(h).averaging() * h * all / 0.8 - 1.0).abs() < 4e-7, "{h}");
+    }
+}
+
+/// After a minute nothing is left of the start.
+#[test]
+fn motion_tends_to_its_means() {
+    let motion =
+        |strain_sd| Motion::ornstein_uhlenbeck(0.8, 0.05, 0.1, strain_sd).unwrap().with_phase_rate(0.04).unwrap();
+    let law = SensorLaw { range: StrainRange { lower: -0.2, upper: 0.3 }, ..law(polynomial(), 0.0) };
+    let model = |strain_sd| SwitchedModel::<f64, 2, 5>::new(law, motion(strain_sd), noise()).unwrap();
+    let late = |model: &SwitchedModel<f64, 2, 5>, direction| -> SVector<f64, 5> {
+        let from = SVector::from([0.2, 0.3, 0.0, 0.0, 0.0]);
+        model.transition::<15>(&model.prepare(60.0), &from, direction).mean
+    };
+    let (bound, free) = (model(0.12), model(f64::INFINITY));
+    for (direction, rate) in DIRECTIONS.into_iter().zip([0.04, 0.0, -0.04, 0.0, -0.04]) {
+        assert!((late(&free, direction)[1] - rate).abs() < 1e-15, "{direction:?}");
+        if direction != Direction::Known(Phase::Hold) {
+            // The push of a phase's rate is held by the pull toward the mean strain.
+            let pushed = rate / (0.8 * (0.05_f64 / 0.12).powi(2));
+            assert!((late(&bound, direction)[0] - 0.1 - pushed).abs() < 1e-3, "{direction:?}");
+        }
+    }
+    // Where strain has no mean, the law's range says what is likely.
+    assert_eq!(free.initial_distribution().1[0], 0.25);
+    assert_eq!(bound.initial_distribution().1[0], 0.12 * 0.12);
+}
+
+/// Beyond the range gains keep their border values.
+#[test]
+fn gains_are_affine_within_the_range() {
+    let law = law::<f64>(polynomial(), 1.0);
+    for (strain, at, slope) in [(-0.7, -0.5, 0.0), (-0.5, -0.5, 1.0), (0.2, 0.2, 1.0), (0.5, 0.5, 1.0), (0.7, 0.5, 0.0)]
+    {
+        assert_eq!(law.gain(0, strain, Phase::Extend), (0.9 - 0.8 * at, -0.8 * slope));
+        assert_eq!(law.gain(1, strain, Phase::Retract), (0.6 + 0.5 * at, 0.5 * slope));
+        assert_eq!(law.gain(1, strain, Phase::Hold), (0.0, 0.0));
+    }
 }
 
 #[test]
@@ -240,6 +344,16 @@ fn wrong_parameters_are_named() {
     let mut bad = good;
     bad.branches[1].tau_s = 0.0;
     assert_eq!(refuse(bad, noise()), "tau_s");
+    bad.branches[1].tau_s = f64::INFINITY;
+    assert_eq!(refuse(bad, noise()), "tau_s");
+    bad.branches[1] = Branch { tau_s: 0.5, retract_gain_slope: f64::NAN, ..good.branches[1] };
+    assert_eq!(refuse(bad, noise()), "branch gain");
+    assert_eq!(refuse(SensorLaw { retract_viscosity_s: f64::NAN, ..good }, noise()), "viscosity_s");
+    let without = SwitchedModel::<f64, 2, 4>::new(good, motion, noise());
+    assert_eq!(without.unwrap_err().parameter, "baseline_sd");
+    for (mean, sd, culprit) in [(f64::NAN, 0.1, "strain_mean"), (0.0, 0.0, "strain_sd"), (0.0, -0.1, "strain_sd")] {
+        assert_eq!(Motion::<f64>::ornstein_uhlenbeck(1.0, 0.05, mean, sd).unwrap_err().parameter, culprit);
+    }
     assert_eq!(
         refuse(SensorLaw { gauge: Gauge::DecayingExponential { slope: 1.0, decay_strain: 0.0 }, ..good }, noise()),
         "gauge.decay_strain"
