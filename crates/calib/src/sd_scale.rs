@@ -3,7 +3,7 @@ use crate::params::LARGEST_SD_SCALE;
 /// No narrowing: an easy recording is no promise for the next one.
 const SCALES: std::ops::RangeInclusive<f64> = 1.0..=LARGEST_SD_SCALE;
 /// What has been widened to cover the worst block may be narrowed to cover all of them.
-const JOINT_SCALES: std::ops::RangeInclusive<f64> = 0.5..=3.0;
+const JOINT_SCALES: std::ops::RangeInclusive<f64> = 0.35..=3.0;
 /// Half-widths of the 50, 90 and 95 % intervals of a standard normal.
 const LEVELS: [(usize, f64); 3] = [(50, 0.674_489_750_196_081_7), (90, 1.644_853_626_951_472_2), (95, Z_95)];
 /// Half-width of the 95 % interval of a standard normal.

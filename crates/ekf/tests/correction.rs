@@ -2,7 +2,7 @@
 
 use ohmstrain_ekf::Gaussian;
 use ohmstrain_ekf::correction::{
-    Correction, FEATURES, FeatureScale, InputScale, LowPass, Process, ReadingFeatures, Weighting, mixture, settled,
+    Correction, FEATURES, FeatureScale, InputScale, LowPass, Process, ReadingFeatures, mixture, settled,
 };
 use ohmstrain_model::StrainRange;
 
@@ -169,22 +169,19 @@ fn single_precision_says_the_same() {
 fn a_mixture_of_any_scale() {
     let at = |mean: f64, variance: f64| Gaussian { mean, variance };
     // Equal variances: the middle, and the distance of both from it.
-    assert_eq!(mixture(Weighting::Mild, [at(-1.0, 0.25), at(1.0, 0.25)]), at(0.0, 1.25));
-    // 16 times the variance: an eighth of the weight.
-    let mixed = mixture(Weighting::Mild, [at(0.0, 1.0), at(9.0, 16.0)]);
-    assert!((mixed.mean - 1.0).abs() < 1e-15);
+    assert_eq!(mixture([at(-1.0, 0.25), at(1.0, 0.25)]), at(0.0, 1.25));
+    // 16 times the variance: a 64th of the weight.
+    let mixed = mixture([at(0.0, 1.0), at(65.0, 16.0)]);
+    assert!((mixed.mean - 1.0).abs() < 1e-14);
     for scale in [1e-30_f64, 1e30] {
-        let scaled = mixture(Weighting::Mild, [at(0.0, scale * scale), at(9.0 * scale, 16.0 * scale * scale)]);
+        let scaled = mixture([at(0.0, scale * scale), at(65.0 * scale, 16.0 * scale * scale)]);
         assert!(
             (scaled.mean / scale - 1.0).abs() < 1e-12
                 && (scaled.variance / (scale * scale) / mixed.variance - 1.0).abs() < 1e-12
         );
     }
-    // 16 times the variance, sharply: a 64th of the weight.
-    let sharp = mixture(Weighting::Sharp, [at(0.0, 1.0), at(65.0, 16.0)]);
-    assert!((sharp.mean - 1.0).abs() < 1e-14);
     // Exact knowledge drowns the rest.
-    assert_eq!(mixture(Weighting::Mild, [at(0.3, 0.0), at(0.5, 1.0)]), at(0.3, 0.0));
+    assert_eq!(mixture([at(0.3, 0.0), at(0.5, 1.0)]), at(0.3, 0.0));
 }
 
 /// A low-pass of a reading that goes straight from one known row to the next, against ten thousand small steps.

@@ -4,7 +4,7 @@ pub(crate) mod gaussian_process;
 pub(crate) mod owned;
 
 use ohmstrain_ekf::Gaussian;
-use ohmstrain_ekf::correction::{FEATURES, INDUCING, InputScale, OUTPUTS, Process, Weighting, mixture};
+use ohmstrain_ekf::correction::{FEATURES, INDUCING, InputScale, OUTPUTS, Process, mixture};
 use owned::{OwnedCorrection, OwnedProcess};
 
 use crate::order::extent;
@@ -143,8 +143,7 @@ impl CorrectorParams {
         let sides: Vec<_> = ONE_SIDED[..S].iter().map(|side| prepared.chosen(*side)).collect::<Option<_>>()?;
         let voices =
             |k: usize| [of_direct[k], of_residual[k]].into_iter().chain(sides.iter().map(move |(_, of)| of[k]));
-        let mixed: Vec<Gaussian<f64>> =
-            (0..examples.strain.len()).map(|k| mixture(Weighting::of(S), voices(k))).collect();
+        let mixed: Vec<Gaussian<f64>> = (0..examples.strain.len()).map(|k| mixture(voices(k))).collect();
         let sd_scale = joint_scale(&deviations(&mixed, examples.strain).concat());
         Some(Self { sd_scale, direct, residual, one_sided: sides.into_iter().map(|(params, _)| params).collect() })
     }

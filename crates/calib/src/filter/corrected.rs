@@ -1,7 +1,7 @@
 use std::collections::VecDeque;
 use std::ops::Range;
 
-use ohmstrain_ekf::correction::{FEATURES, FeatureScale, OUTPUTS, ReadingFeatures, Weighting, mixture};
+use ohmstrain_ekf::correction::{FEATURES, FeatureScale, OUTPUTS, ReadingFeatures, mixture};
 use ohmstrain_ekf::{Gaussian, Guard, Reading, ReadingVerdict, StepError};
 
 use crate::CalibrationError;
@@ -122,7 +122,7 @@ impl Corrected {
     fn hand_out(&mut self, out: &mut dyn FnMut(Output)) {
         for mut output in self.lagged.drain(..) {
             if let Some(corrected) = self.waiting.pop_front() {
-                output.estimate.strain = mixture(Weighting::Mild, [corrected, output.estimate.strain]);
+                output.estimate.strain = mixture([corrected, output.estimate.strain]);
             }
             out(output);
         }

@@ -160,7 +160,7 @@ impl<T: Real, const D: usize, const S: usize> Correction<'_, T, D, S> {
         let said = residual.said(&of_residual, strain);
         let novelty = T::one() - (T::one() - said.unknown) * (-outside.of_all() / T::of(NEW)).exp();
         let residual = self.widened(said, &self.residual, outside.of_all(), filtered.mean);
-        let mixed = mixture(Weighting::of(S), [direct, residual].into_iter().chain(one_sided));
+        let mixed = mixture([direct, residual].into_iter().chain(one_sided));
         let variance = mixed.variance * self.variance_factor + T::of(NOVEL) * self.strain_variance * novelty;
         Corrected { strain: Gaussian { mean: mixed.mean, variance }, direct, one_sided, residual, novelty }
     }
@@ -182,31 +182,11 @@ impl<T: Real, const D: usize, const S: usize> Correction<'_, T, D, S> {
     }
 }
 
-/// How much voices of a mixture are believed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Weighting {
-    /// By variance to the power −3/4, less than the inverse variance that is due to independent voices: two may be wrong
-    /// together.
-    Mild,
-    /// By variance to the power −3/2, more than that: of four voices, of which three are much the same, the surest counts.
-    Sharp,
-}
-
-impl Weighting {
-    /// Of a correction with so many one-sided processes.
-    #[must_use]
-    pub const fn of(one_sided: usize) -> Self {
-        if one_sided == 0 { Self::Mild } else { Self::Sharp }
-    }
-}
-
-/// Mean and variance of the mixture of Gaussians, weighted by their variances. One that is exact is all that counts;
-/// nothing mixed is exactly zero.
+/// Mean and variance of the mixture of Gaussians, each weighted by its variance to the power −3/2: more than the inverse
+/// variance that is due to independent voices, since several may be wrong together, and the surest is the least so. One that is
+/// exact is all that counts; nothing mixed is exactly zero.
 #[must_use]
-pub fn mixture<T: Real>(
-    weighting: Weighting,
-    voices: impl IntoIterator<Item = Gaussian<T>, IntoIter: Clone>,
-) -> Gaussian<T> {
+pub fn mixture<T: Real>(voices: impl IntoIterator<Item = Gaussian<T>, IntoIter: Clone>) -> Gaussian<T> {
     let voices = voices.into_iter();
     let none = Gaussian { mean: T::zero(), variance: T::zero() };
     let surest = voices.clone().reduce(|a, b| if b.variance < a.variance { b } else { a }).unwrap_or(none);
@@ -214,9 +194,8 @@ pub fn mixture<T: Real>(
         return surest;
     }
     let weighted = |voice: Gaussian<T>| {
-        let ratio = (surest.variance / voice.variance).sqrt();
-        let factor = if weighting == Weighting::Mild { ratio.sqrt() } else { ratio * ratio };
-        (ratio * factor, voice)
+        let ratio = surest.variance / voice.variance;
+        (ratio * ratio.sqrt(), voice)
     };
     let weighted = voices.map(weighted);
     let total = weighted.clone().fold(T::zero(), |sum, (weight, _)| sum + weight);

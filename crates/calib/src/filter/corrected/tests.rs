@@ -1,6 +1,6 @@
 use std::ops::Range;
 
-use ohmstrain_ekf::correction::{FEATURES, FeatureScale, ReadingFeatures, Starts, Weighting, mixture};
+use ohmstrain_ekf::correction::{FEATURES, FeatureScale, ReadingFeatures, Starts, mixture};
 use ohmstrain_ekf::{Estimate, Gaussian, Guard, Reading, ReadingVerdict, StepError};
 
 use super::{Corrected, future_features, outputs};
@@ -283,7 +283,6 @@ fn a_lagged_row_is_mixed_with_what_was_said_of_it() {
     }
     assert_eq!(out.len(), 48);
     lagging.flush_lagged(&mut |output| out.push(output)).unwrap();
-    let expected: Vec<Gaussian<f64>> =
-        said.iter().map(|said| mixture(Weighting::Mild, [*said, lagged().estimate.strain])).collect();
+    let expected: Vec<Gaussian<f64>> = said.iter().map(|said| mixture([*said, lagged().estimate.strain])).collect();
     assert_eq!(out.iter().map(|output| output.estimate.strain).collect::<Vec<_>>(), expected);
 }

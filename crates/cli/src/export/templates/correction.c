@@ -199,10 +199,10 @@ static void correct(const summary *all, const readings *seen, float filtered, fl
     spread[1] = spread[1] * RESIDUAL.widening + << correction.far >>f * << correction.strain_variance >>f * beyond;
     said[1] = clamped(filtered + said[1], OHMSTRAIN_LOWER, OHMSTRAIN_UPPER);
 
-    /* Their mixture, each weighted by its variance to the power -3/4; an exact one is all that counts. */
+    /* Their mixture, each weighted by its variance to the power -3/2; an exact one is all that counts. */
     least = spread[1] < spread[0] ? spread[1] : spread[0];
     for (i = 0; i < 2; i++) {
-        const float ratio = sqrtf(least / spread[i]);
+        const float ratio = least / spread[i];
         share[i] = least > 0.0f ? ratio * sqrtf(ratio) : (float)(spread[i] <= least && (i == 0 || spread[0] > least));
     }
     total = share[0] + share[1];
