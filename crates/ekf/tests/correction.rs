@@ -182,6 +182,7 @@ fn a_mixture_of_any_scale() {
     }
     // Exact knowledge drowns the rest.
     assert_eq!(mixture([at(0.3, 0.0), at(0.5, 1.0)]), at(0.3, 0.0));
+    assert_eq!(mixture([at(0.5, 1.0), at(0.3, 0.0)]), at(0.3, 0.0));
 }
 
 /// A low-pass of a reading that goes straight from one known row to the next, against ten thousand small steps.
@@ -247,6 +248,24 @@ fn a_few_surprising_readings_are_passed_over() {
     features.step_unless(false, 0.1, Some(0.3));
     let before = features.step(0.0, None);
     assert_eq!(features.step_unless(true, 0.1, Some(5.0)), before, "after one that does not surprise");
+}
+
+/// Rates as tanh of thrice their usual sizes, and a gross error as what is three half ranges away.
+#[test]
+fn features_are_bounded() {
+    let scale = FeatureScale { centre: 0.1, half_range: 0.5, rates: [0.3, 0.7], starts: settled() };
+    let after = |reading: f64| {
+        let mut features = ReadingFeatures::new(scale);
+        features.step_unless(false, 0.0, Some(0.2));
+        let seen = features.step_unless(false, 0.4, Some(reading)).unwrap();
+        (seen, features.low_passes())
+    };
+    let (seen, low) = after(0.45);
+    assert_eq!(seen[5], (3.0 * (low[0] - low[1]) / 0.3).tanh());
+    assert_eq!(seen[6], (3.0 * (low[2] - low[3]) / 0.7).tanh());
+    assert_eq!(after(40.0), after(0.1 + 3.0 * 0.5));
+    assert_eq!(after(-40.0), after(0.1 - 3.0 * 0.5));
+    assert!(after(0.1 + 2.9 * 0.5) != after(40.0) && after(0.1 - 2.9 * 0.5) != after(-40.0));
 }
 
 /// What a start is off by fades as exp(−t/τ) and nothing else changes, since low-passes are linear.

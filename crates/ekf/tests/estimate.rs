@@ -55,6 +55,24 @@ fn relaxation_and_baseline_are_told_apart() {
     assert_eq!((estimate.relaxation.mean, estimate.baseline), (0.02, 0.03));
 }
 
+/// On a straight curve a mixture settles at its slope times the strain, with the wander of branch and baseline on top.
+#[test]
+fn a_held_strain_settles_on_the_curve() {
+    let (model, wide) = (model([2.0, 0.0, 0.0], [0.6, -0.4]), StrainRange { lower: -9.0, upper: 9.0 });
+    let filter = SignSplit::<_, 1, 4, 4>::new(model, 0.1, None, Evidence::new(wide, 1.0).unwrap()).unwrap();
+    let mut state = Mixture::single(belief([0.15, 0.0, 0.02, 0.0], [0.05, 0.1, 0.02, 0.01]), Phase::Extend);
+    for reading in [0.32, 0.35, 0.33] {
+        filter.step(&mut state, Some(reading.into())).unwrap();
+    }
+    assert!(state.shares().len() > 1);
+    let (estimate, all) = (Estimate::new(&model, &state, &wide, 1.0), state.moments());
+    assert!((estimate.settled.mean - 2.0 * all.mean[0]).abs() < 1e-14);
+    let expected = 4.0 * all.covariance[(0, 0)] + 0.02 * 0.02 + 5e-3 * 5e-3;
+    // The square of a reading of 0.3 is a hundred times larger than what is left.
+    assert!((estimate.settled.variance - expected).abs() < 1e-14);
+    assert_eq!(estimate.relaxation, Gaussian { mean: all.mean[2], variance: all.covariance[(2, 2)] });
+}
+
 /// On a ramp dρ/dε = 1.9 - 5.6 ε + k - c/(τ v), which is zero at one strain.
 #[test]
 fn the_ramp_border_is_where_the_reading_stops_changing() {

@@ -1,8 +1,14 @@
 //! What every step must keep, whatever the model.
 
 use nalgebra::SVector;
-use ohmstrain_ekf::{Belief, Ekf, Reading, StepError};
-use ohmstrain_model::{Branch, Gauge, ModelNoise, Motion, Scalar, SensorLaw, StrainRange, SwitchedModel, Symmetric};
+use ohmstrain_ekf::{
+    AnyCurve, Belief, Compact, Cubic, Curve, Ekf, Estimator, Gaussian, LogLikelihood, Logistic, Reading, Residual,
+    SparseEkf, State, StepError, Substeps, Switch,
+};
+use ohmstrain_model::{
+    Branch, Direction, Gauge, ModelNoise, Motion, Phase, Scalar, SensorLaw, StrainRange, SwitchedModel, Symmetric,
+    Transition, unexplained,
+};
 use proptest::prelude::*;
 
 /// A sensor whose strains are counted in units of `1/unit` and whose readings are relative to R₀.
@@ -140,4 +146,103 @@ fn a_coarser_reading_moves_the_belief_less() {
         (step.posterior.mean - step.prior.mean).norm()
     };
     assert!(moved(0.0) > moved(1e-3) && moved(1e-3) > moved(1.0));
+}
+
+/// Forward and back, over an even and an odd number of them; with a reading at the end.
+#[test]
+fn a_long_step_is_many_short_ones() {
+    let model = sensor::<f64>(1.0);
+    let (ekf, substeps) = (Ekf::new(model), Substeps(Ekf::new(model)));
+    let start: Belief<f64, 5, 15> = Belief::initial(&model);
+    let short_s = model.longest_step_s();
+    let short = Estimator::<f64, 5, 15>::prepare(&ekf, short_s);
+    let reading = Some(Reading::from(0.2));
+    // A length divided and multiplied again is off by a rounding, and ten steps by some hundreds.
+    let same = |a: &Belief<f64, 5, 15>, b: &Belief<f64, 5, 15>| {
+        (a.mean - b.mean).amax() < 1e-12 && (a.covariance.to_matrix() - b.covariance.to_matrix()).amax() < 1e-12
+    };
+    for count in 2..=9 {
+        let dt_s = f64::from(count) * short_s;
+        let mut states = vec![start];
+        for k in 1..=count {
+            let taken = ekf.advance(&states[k as usize - 1], &short, reading.filter(|_| k == count)).unwrap();
+            states.push(taken.state);
+        }
+        let prepared = Estimator::<f64, 5, 15>::prepare(&substeps, dt_s);
+        let whole = substeps.advance(&start, &prepared, reading).unwrap().state;
+        assert!(same(&whole, &states[count as usize]), "{count}");
+        assert!(same(&ekf.step(&start, dt_s, reading).unwrap().posterior, &whole), "{count}");
+        let told = whole.pinned(0, &Gaussian { mean: 0.15, variance: 1e-4 }).unwrap();
+        let (mut back, mut heard) = (told, reading);
+        for state in states[..count as usize].iter().rev() {
+            back = ekf.smooth_back(state, &short, heard, &back).unwrap().unwrap();
+            heard = None;
+        }
+        assert!(same(&substeps.smooth_back(&start, &prepared, reading, &told).unwrap().unwrap(), &back), "{count}");
+    }
+}
+
+/// The kernel's own curves, within the range and along the tangents beyond; Horner's scheme rounds a few times.
+#[test]
+fn the_kernels_curves_are_those_of_the_law() {
+    let range = StrainRange { lower: -0.1, upper: 0.3 };
+    let cubic = Gauge::Polynomial { coefficients: [1.4, -2.0, 0.7] };
+    let peak = Gauge::DecayingExponential { slope: 3.0, decay_strain: 0.2 };
+    let tunnel = Gauge::Tunnelling { gap: 1.5, barrier: 1.5, path_loss: -4.0 };
+    for gauge in [cubic, peak, tunnel] {
+        let law = SensorLaw::<f64, 0> { gauge, extend_viscosity_s: 0.0, retract_viscosity_s: 0.0, branches: [], range };
+        let (any, only) = (AnyCurve::new(&gauge, &range).unwrap(), Cubic::new(&gauge, &range));
+        assert_eq!(only.is_some(), gauge == cubic);
+        for k in -60..=60 {
+            let strain = 0.01 * f64::from(k);
+            let (value, slope) = law.gauge_value_and_slope(strain);
+            for found in [Some(any.value_and_slope(strain)), only.map(|only| only.value_and_slope(strain))] {
+                let (of_value, of_slope) = found.unwrap_or((value, slope));
+                assert!((of_value - value).abs() < 1e-14 && (of_slope - slope).abs() < 1e-14, "{gauge:?} at {strain}");
+            }
+        }
+    }
+}
+
+/// At rest it is that of half a normal distribution; elsewhere as the model has it.
+#[test]
+fn a_compact_split_leaves_the_variance_of_its_probabilities() {
+    for sd in [0.02_f64, 3.0] {
+        let split = |u: f64| Compact::blend(u * sd, Compact::width(sd * sd));
+        assert!((split(0.0).variance / (sd * sd * (0.25 - 1.0 / std::f64::consts::TAU)) - 1.0).abs() < 1e-14);
+        for u in [-2.5, -0.8, 0.4, 1.9] {
+            let found = split(u);
+            let expected = unexplained(found.extend_probability, found.retract_probability, sd * sd);
+            assert!((found.variance / expected - 1.0).abs() < 1e-14, "{u}");
+        }
+    }
+}
+
+/// Many deviations from zero a rate drives as if its direction were known, in the branches and in the dash-pots.
+#[test]
+fn a_clear_direction_is_a_known_one() {
+    let model = sensor::<f64>(1.0);
+    let sparse = SparseEkf::<f64, Logistic, 2, 5>::new(model, 0.01).unwrap();
+    for (rate, phase) in [(1.0, Phase::Extend), (-1.0, Phase::Retract)] {
+        let start = SVector::from([0.15, rate, 0.02, -0.01, 0.0]);
+        let known: Transition<f64, 5, 15> = model.transition(&model.prepare(0.01), &start, Direction::Known(phase));
+        let mut belief = Belief::<f64, 5, 15>::independent(start, &[1e-4; 5]);
+        let mut predicted = belief;
+        sparse.step(&mut predicted, None).unwrap();
+        assert!((predicted.mean - known.mean).amax() < 1e-15, "{phase:?}");
+        let residual = sparse.step(&mut belief, Some(Reading::from(0.3))).unwrap().unwrap();
+        let expected = model.observe(&known.mean, Direction::Known(phase)).value;
+        assert!((residual.innovation - (0.3 - expected)).abs() < 1e-14, "{phase:?}");
+    }
+}
+
+/// The product of their variances is beyond the numbers of `f32`. A term of 10 is rounded by 1e-6, a sum of 600 by 6e-5.
+#[test]
+fn a_likelihood_of_many_readings_is_the_sum_of_theirs() {
+    for variance in [1e4_f32, 1e-4] {
+        let residual = Residual { innovation: variance.sqrt(), variance, nis: 1.0 };
+        let mut all = LogLikelihood::new();
+        (0..60).for_each(|_| all.add(&residual));
+        assert!((all.value() - 60.0 * residual.log_likelihood()).abs() < 60.0 * 6e-5, "{variance}");
+    }
 }

@@ -351,6 +351,8 @@ fn wrong_parameters_are_named() {
     assert_eq!(refuse(SensorLaw { retract_viscosity_s: f64::NAN, ..good }, noise()), "viscosity_s");
     let without = SwitchedModel::<f64, 2, 4>::new(good, motion, noise());
     assert_eq!(without.unwrap_err().parameter, "baseline_sd");
+    assert!(SwitchedModel::<f64, 2, 4>::new(good, motion, ModelNoise { baseline_sd: 0.0, ..noise() }).is_ok());
+    assert_eq!(Motion::ornstein_uhlenbeck(f64::INFINITY, 0.05, 0.0, 0.1).unwrap_err().parameter, "rate_time_s");
     for (mean, sd, culprit) in [(f64::NAN, 0.1, "strain_mean"), (0.0, 0.0, "strain_sd"), (0.0, -0.1, "strain_sd")] {
         assert_eq!(Motion::<f64>::ornstein_uhlenbeck(1.0, 0.05, mean, sd).unwrap_err().parameter, culprit);
     }
