@@ -4,7 +4,6 @@ use ohmstrain_calib::closed_form::{
     Burgers, Datum, Exponentials, Hold, ModulusShape, Moment, Movement, Moving, MovingHold, SeparableLaw,
     StretchedExponential, TunnellingCurve, value_and_gradient,
 };
-use ohmstrain_model::{Modulus, Phase, PhaseStart, RelaxingModulus};
 
 const WITH_FLOOR: ModulusShape = ModulusShape { terms: 1, floor: true };
 const TWO_TERMS: ModulusShape = ModulusShape { terms: 2, floor: true };
@@ -149,26 +148,6 @@ fn gradients_are_slopes() {
             let truncation = 1e-8 * 25.0 * (slope.abs() + value.abs() * 1e-3 / parameters[k].abs());
             assert!((slope - difference).abs() <= rounding + truncation, "case {i}, {k}: {slope} for {difference}");
         }
-    }
-}
-
-#[test]
-fn one_movement_and_hold_are_the_relaxing_modulus() {
-    let model =
-        RelaxingModulus::new(900.0, 40.0, 0.1, Modulus::<f64, 1>::WithFloor { tau_s: 5.0, floor: 0.3 / 0.7 }).unwrap();
-    let law = MovingHold { modulus: WITH_FLOOR, several_speeds: true };
-    let read = |at: &Moment| value_and_gradient(&law, &[9000.0, 270.0, 40.0, 1500.0], &[5.0, 0.07], at).0;
-    let start = PhaseStart { phase: Phase::Extend, strain: 0.05, resistance_ohm: 1500.0 };
-    for elapsed_s in [0.0, 0.4, 3.0, 7.0] {
-        let at = moving(elapsed_s);
-        let (expected, _) = model.resistance_ohm(&start, elapsed_s, at.strain, at.rate);
-        assert!((read(&at) - expected).abs() <= 1e-14 * expected);
-    }
-    let (end, _) = model.resistance_ohm(&start, 7.0, 0.19, 0.02);
-    let hold = model.begin(Phase::Hold, 0.19, 0.02, end);
-    for elapsed_s in [0.0, 0.4, 3.0, 70.0] {
-        let (expected, _) = model.resistance_ohm(&hold, elapsed_s, 0.19, 0.0);
-        assert!((read(&holding(elapsed_s)) - expected).abs() <= 1e-14 * expected);
     }
 }
 

@@ -4,7 +4,6 @@
 //! relaxing branches that stretching and releasing drive with different gains. [`SwitchedModel`] joins it with a
 //! prior on how the body moves ([`Motion`]) and with drift ([`ModelNoise`]), and gives the transition, process noise
 //! and measurement gradient that a Kalman-type filter needs.
-//! [`RelaxingModulus`] is the published law taken literally.
 //!
 //! # Policy
 //! - `no_std`, no heap, no unsafe code, no panic: constructors validate and return [`ParameterError`]; evaluation of a
@@ -33,7 +32,6 @@ mod motion;
 mod noise;
 mod path;
 mod phase;
-mod relaxing_modulus;
 mod response;
 mod reversal;
 mod scalar;
@@ -48,7 +46,6 @@ pub use law::{Branch, SensorLaw, StrainRange};
 pub use motion::{MOTION_STATES, Motion};
 pub use noise::ModelNoise;
 pub use phase::{Direction, Phase, SplitRate, Turning, UNEXPLAINED, UNEXPLAINED_SHAPE, unexplained};
-pub use relaxing_modulus::{Modulus, PhaseStart, RelaxingModulus, ResistanceGradient};
 pub use response::Response;
 pub use reversal::{LEAST_LEFT, RateChange, TURNING, TurningNumbers, correlated_steps};
 pub use scalar::Scalar;

@@ -1,9 +1,7 @@
-//! Gauge curves, front ends, the joint map and the relaxing-modulus law.
+//! Gauge curves, front ends and the joint map.
 
-use num_dual::Dual64;
 use ohmstrain_model::{
-    AdcCode, Branch, ConstantCurrent, Divider, Gauge, Joint, Modulus, Phase, PhaseStart, RelaxingModulus, SensorLaw,
-    SensorSide, StrainRange,
+    AdcCode, Branch, ConstantCurrent, Divider, Gauge, Joint, Phase, SensorLaw, SensorSide, StrainRange,
 };
 use proptest::prelude::*;
 
@@ -106,76 +104,4 @@ fn converters_saturate_at_both_ends() {
     assert!((reading.resistance_ohm - 2048.0 * 3.3 / 4095.0 / 1e-3).abs() < 1e-9);
     assert!(Divider::new(-1.0, SensorSide::Low, 12, 0.0).is_err());
     assert!(ConstantCurrent::new(1e-4, 10.0, 3.3, 0, 0.5).is_err());
-}
-
-fn relaxing() -> RelaxingModulus<f64, 0> {
-    RelaxingModulus::new(9_000.0, 150.0, 0.12, Modulus::Single { tau_s: 20.0 }).unwrap()
-}
-
-/// Equation 8 while stretching from rest at a constant speed: R = r₀ e^(-t/τ₀) v t + v η + r₁.
-#[test]
-fn relaxing_modulus_is_equation_8_while_stretching() {
-    let (law, v, r1) = (relaxing(), 0.03, 5_500.0);
-    let start = law.begin(Phase::Extend, 0.0, 0.0, r1);
-    for t in [0.0, 1.0, 5.0, 11.0] {
-        let (ohm, [slope, viscosity]) = law.resistance_ohm(&start, t, v * t, v);
-        let expected = 9_000.0 * (-t / 20.0_f64).exp() * v * t + v * 150.0 + r1;
-        assert!((ohm - expected).abs() < 1e-9);
-        assert!((slope - 9_000.0 * (-t / 20.0_f64).exp()).abs() < 1e-9);
-        assert_eq!(viscosity, 150.0);
-    }
-}
-
-/// Equation 9 in a hold, R′ = r₀′ R₀ e^(-t/τ₀) + r₁′, where R₀ is the resistance at the start of the hold and continuity
-/// asks r₁′ = R₀ (1 - r₀′).
-#[test]
-fn relaxing_modulus_is_equation_9_in_a_hold() {
-    let law = relaxing();
-    let at_stop = law.resistance_ohm(&law.begin(Phase::Extend, 0.0, 0.0, 5_500.0), 11.0, 0.33, 0.03).0;
-    let start = law.begin(Phase::Hold, 0.33, 0.0, at_stop);
-    assert_eq!(law.resistance_ohm(&start, 0.0, 0.33, 0.0).0, at_stop);
-    for t in [1.0, 30.0, 300.0] {
-        let (ohm, gradient) = law.resistance_ohm(&start, t, 0.33, 0.0);
-        let expected = 0.12 * at_stop * (-t / 20.0_f64).exp() + at_stop * (1.0 - 0.12);
-        assert!((ohm - expected).abs() < 1e-9);
-        assert_eq!(gradient, [0.0, 0.0]);
-    }
-}
-
-/// For a ramp from zero strain equation 8 is a decaying-exponential gauge curve with ε₀ = v τ₀.
-#[test]
-fn on_a_ramp_equation_8_is_a_gauge_curve() {
-    let (law, v) = (relaxing(), 0.03);
-    let gauge = Gauge::DecayingExponential { slope: 9_000.0, decay_strain: v * 20.0 };
-    let start = PhaseStart { phase: Phase::Extend, strain: 0.0, resistance_ohm: 0.0 };
-    for t in [0.5, 3.0, 8.0] {
-        let (ohm, _) = law.resistance_ohm(&start, t, v * t, v);
-        assert!((ohm - (gauge.value_and_slope(v * t).0 + 150.0 * v)).abs() < 1e-9);
-    }
-}
-
-/// Its gradient against dual numbers, with the Prony modulus of equation 7.
-#[test]
-fn relaxing_modulus_gradient_equals_dual_numbers() {
-    let exact = RelaxingModulus::new(
-        9_000.0,
-        150.0,
-        0.12,
-        Modulus::Prony { floor: 0.4, weights: [0.4, 0.2], taus_s: [2.0, 40.0] },
-    )
-    .unwrap();
-    let dual = RelaxingModulus::<Dual64, 2>::new(
-        9_000.0.into(),
-        150.0.into(),
-        0.12.into(),
-        Modulus::Prony { floor: 0.4.into(), weights: [0.4.into(), 0.2.into()], taus_s: [2.0.into(), 40.0.into()] },
-    )
-    .unwrap();
-    let start = exact.begin(Phase::Retract, 0.3, 0.02, 7_000.0);
-    let dual_start = dual.begin(Phase::Retract, 0.3.into(), 0.02.into(), 7_000.0.into());
-    let (_, [by_strain, by_rate]) = exact.resistance_ohm(&start, 3.0, 0.25, -0.02);
-    let strain = Dual64::from(0.25).derivative();
-    let rate = Dual64::from(-0.02).derivative();
-    assert!((dual.resistance_ohm(&dual_start, 3.0.into(), strain, (-0.02).into()).0.eps - by_strain).abs() < 1e-9);
-    assert!((dual.resistance_ohm(&dual_start, 3.0.into(), 0.25.into(), rate).0.eps - by_rate).abs() < 1e-9);
 }

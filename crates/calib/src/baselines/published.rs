@@ -1,7 +1,7 @@
 use std::ops::Range;
 
 use nalgebra::{Matrix2, Vector2};
-use ohmstrain_model::{Modulus, Phase, PhaseStart, RelaxingModulus};
+use ohmstrain_model::Phase;
 
 use super::{Baseline, Held};
 use crate::CalibrationError;
@@ -18,17 +18,39 @@ const SHORTEST: f64 = 0.01;
 /// A phase and its rows.
 pub type PhaseRows = (Phase, Range<usize>);
 
-/// The published law taken literally ([`RelaxingModulus`]), solved for the strain: `R = R_s + r₀ exp(-t/τ₀) u + η v` in a
-/// movement, at the constant speed `v = u/t` of the paper's ramps. In a hold its readings say nothing of the strain, which
-/// stays. Each direction has numbers of its own.
+/// The published law taken literally, equation 8 of NOTATION.md, solved for the strain: `R = R_s + r₀ exp(-t/τ₀) u + η v` in a
+/// movement, t, R_s and the way u since it began, at the constant speed `v = u/t` of the paper's ramps. In a hold its readings
+/// say nothing of the strain, which stays. Each direction has numbers of its own. On recordings τ₀ goes as 1/v: the exponential
+/// mostly stands for the bend of the gauge curve.
 ///
 /// It is told when phases begin, and the strain of the first row, which no body that wears a sensor says: this is how far
 /// the law itself carries.
 #[derive(Clone, Copy, Debug)]
 pub struct PublishedLaw {
-    extend: RelaxingModulus<f64, 0>,
-    retract: RelaxingModulus<f64, 0>,
+    extend: Movement,
+    retract: Movement,
     range: RangeParams,
+}
+
+/// The law in one direction.
+#[derive(Clone, Copy, Debug)]
+struct Movement {
+    /// r₀: reading per strain at the start.
+    stiffness: f64,
+    /// η, reading · s.
+    viscosity_s: f64,
+    /// τ₀, s.
+    tau_s: f64,
+}
+
+/// A movement that goes on.
+#[derive(Clone, Copy)]
+struct Started {
+    since_s: f64,
+    strain: f64,
+    /// R_s, without the dash-pot's reading: the next movement adds its own.
+    reading: f64,
+    law: Movement,
 }
 
 /// A row of a movement, from its start and beyond the dash-pot's reading of the phase before.
@@ -88,7 +110,7 @@ fn moving_rows(samples: &Samples, phases: &[PhaseRows], direction: Phase) -> Vec
 }
 
 /// r₀ and η by linear least squares for every time constant, and the one that leaves least.
-fn best_law(rows: &[MovingRow]) -> Option<RelaxingModulus<f64, 0>> {
+fn best_law(rows: &[MovingRow]) -> Option<Movement> {
     let longest_s = rows.iter().map(|row| row.elapsed_s).fold(0.0, f64::max);
     let tau_s = |i: usize| longest_s * SHORTEST * (LONGEST / SHORTEST).powf(i as f64 / (TIME_CONSTANTS - 1) as f64);
     let fitted = |tau_s: f64| {
@@ -103,7 +125,8 @@ fn best_law(rows: &[MovingRow]) -> Option<RelaxingModulus<f64, 0>> {
     };
     let (_, tau_s, weights) =
         (0..TIME_CONSTANTS).filter_map(|i| fitted(tau_s(i))).max_by(|a, b| a.0.total_cmp(&b.0))?;
-    RelaxingModulus::new(weights[0], weights[1], 0.0, Modulus::Single { tau_s }).ok()
+    let is_law = tau_s > 0.0 && weights.iter().all(|weight| weight.is_finite());
+    is_law.then_some(Movement { stiffness: weights[0], viscosity_s: weights[1], tau_s })
 }
 
 struct Running {
@@ -112,32 +135,30 @@ struct Running {
     phases: Vec<(f64, Phase)>,
     next: usize,
     held: Held,
-    /// The movement that goes on: since when, s, with which law.
-    started: Option<(f64, PhaseStart<f64>, RelaxingModulus<f64, 0>)>,
+    started: Option<Started>,
     /// Time, reading and rate at the last reading.
     before: Option<(f64, f64, f64)>,
 }
 
 impl Running {
     fn begin(&mut self, phase: Phase, time_s: f64, reading: f64) {
-        let (start_s, start_reading, rate) = self.before.unwrap_or((time_s, reading, 0.0));
+        let (since_s, before, rate) = self.before.unwrap_or((time_s, reading, 0.0));
         let law = match phase {
             Phase::Hold => None,
             Phase::Extend => Some(self.law.extend),
             Phase::Retract => Some(self.law.retract),
         };
-        let of_movement =
-            |law: RelaxingModulus<f64, 0>| (start_s, law.begin(phase, self.held.last, rate, start_reading), law);
-        self.started = law.map(of_movement);
+        let strain = self.held.last;
+        self.started = law.map(|law| Started { since_s, strain, reading: before - law.viscosity_s * rate, law });
     }
 
     /// Strain and rate.
     fn solved(&self, time_s: f64, reading: f64) -> Option<(f64, f64)> {
-        let (start_s, start, law) = self.started?;
-        let elapsed_s = time_s - start_s;
-        let (at_start, [slope, viscosity]) = law.resistance_ohm(&start, elapsed_s, start.strain, 0.0);
-        let travel = (reading - at_start) / (slope + viscosity / elapsed_s);
-        (elapsed_s > 0.0 && travel.is_finite()).then(|| (start.strain + travel, travel / elapsed_s))
+        let Started { since_s, strain, reading: at_start, law } = self.started?;
+        let elapsed_s = time_s - since_s;
+        let slope = law.stiffness * (-elapsed_s / law.tau_s).exp();
+        let travel = (reading - at_start) / (slope + law.viscosity_s / elapsed_s);
+        (elapsed_s > 0.0 && travel.is_finite()).then(|| (strain + travel, travel / elapsed_s))
     }
 }
 

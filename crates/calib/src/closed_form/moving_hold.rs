@@ -7,8 +7,7 @@ use super::search::{Extent, Search};
 /// Equations 8 and 9 in one: a movement and the hold after it share the modulus, and the hold starts where the movement
 /// ends: `R′ = R_s (1 - r₀′ + r₀′ E(t))` with `R_s = r₀ E(t_s) v t_s + v η + r₁`, t_s the movement's duration.
 ///
-/// A [`Moment`] with a movement before it is in the hold. For one movement and hold this is
-/// `ohmstrain_model::RelaxingModulus`.
+/// A [`Moment`] with a movement before it is in the hold.
 ///
 /// A modulus with a floor, `E = E∞ + Σ Eᵢ exp(-t/τᵢ)` with E(0) = 1, is fitted by `bᵢ = r₀′ Eᵢ`, `κ = r₀/r₀′` and
 /// `r₀ E∞`, which stay finite where the stiffness changes its sign on the way; r₀, r₀′ and Eᵢ are derived from them.
