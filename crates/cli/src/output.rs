@@ -12,12 +12,15 @@ use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
+use serde::Serialize;
+
 pub use kind::{IMPORT, Kind, SIMULATE};
 use place::{Identity, Place, Prepared};
 pub use rows::RowsOut;
-pub use wide::{COLUMNS, table, wrapped};
+pub use wide::{COLUMNS, table, wrapped, wrapped_table};
 
 use crate::error::CliError;
+use ohmstrain::MADE_BY;
 
 /// The files that a command writes.
 pub struct Outputs {
@@ -123,6 +126,17 @@ impl Outputs {
         Ok((file, claimed.path.clone()))
     }
 
+    /// Publishes this content of a file; prints it if none was claimed.
+    pub fn publish_or_print(mut self, claim: Option<Claim>, content: Vec<u8>) -> Result<(), CliError> {
+        match claim {
+            Some(claim) => {
+                self.put(claim, content);
+                self.publish()
+            }
+            None => print(|out| Ok(out.write_all(&content)?)),
+        }
+    }
+
     /// Writes all that was put: each file whole, and nothing before everything lies ready beside its place.
     pub fn publish(mut self) -> Result<(), CliError> {
         let mut ready = Vec::new();
@@ -156,6 +170,22 @@ impl Drop for Outputs {
             self.folders.iter().rev().for_each(|folder| drop(fs::remove_dir(folder)));
         }
     }
+}
+
+/// Writes an object as JSON. `schema` is the version of what it has: names are added without another version; one that
+/// goes or changes its meaning brings the next.
+pub fn json(out: &mut dyn Write, schema: u32, content: &impl Serialize) -> Result<(), CliError> {
+    #[derive(Serialize)]
+    struct Versioned<'a, T> {
+        schema: u32,
+        /// Program and version.
+        made_by: &'static str,
+        #[serde(flatten)]
+        content: &'a T,
+    }
+    let all = Versioned { schema, made_by: MADE_BY, content };
+    serde_json::to_writer_pretty(&mut *out, &all).map_err(io::Error::from)?;
+    Ok(writeln!(out)?)
 }
 
 /// Writes to stdout.

@@ -10,7 +10,7 @@ use parquet::file::properties::WriterProperties;
 use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
 use parquet::schema::types::Type;
 
-use crate::sensor_file::MADE_BY;
+use ohmstrain::MADE_BY;
 
 /// Rows that are held until they are written.
 const ROWS_AT_ONCE: usize = 1 << 16;

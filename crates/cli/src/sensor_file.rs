@@ -1,7 +1,6 @@
 use std::fs;
 use std::path::Path;
 
-pub use ohmstrain::MADE_BY;
 use ohmstrain::{EstimatorKind, Sensor, SensorParams};
 
 use crate::error::CliError;

@@ -169,10 +169,10 @@ pub(crate) fn calibrate_once(
     };
     let corrected = cheapest(surveyed.iter().filter(|one| asked.candidates.contains(&one.kind))).map(|one| one.kind);
     // One filter is corrected: no other one needs to be refined.
-    let wanted = distinct(corrected.into_iter().chain(asked.named.iter().copied()));
+    let wanted = EstimatorKind::distinct(corrected.into_iter().chain(asked.named.iter().copied()));
     let smoothers = wanted.iter().map(|kind| kind.smoother());
     let mut estimators = BTreeMap::new();
-    for kind in distinct(wanted.iter().copied().chain(smoothers).chain([EstimatorKind::Ekf])) {
+    for kind in EstimatorKind::distinct(wanted.iter().copied().chain(smoothers).chain([EstimatorKind::Ekf])) {
         let known = surveyed.iter().find(|one| one.kind == kind && std::ptr::eq(one.law, fit));
         let params = refined(recordings, (fit, stats), (kind, prior), known, &mut || steps.evaluated())?;
         estimators.insert(kind, params);
@@ -227,7 +227,7 @@ impl<'a> Asked<'a> {
     }
 
     fn all(&self) -> Vec<EstimatorKind> {
-        distinct(self.candidates.iter().chain(&self.named).copied())
+        EstimatorKind::distinct(self.candidates.iter().chain(&self.named).copied())
     }
 
     /// Near enough for a progress bar: surveys, and one refinement of the best filter and of the EKF.
@@ -320,14 +320,4 @@ fn refined(
         None => problem.search(None, SURVEY, &mut *evaluated)?,
     };
     problem.refine(&tuned, &mut *evaluated)
-}
-
-fn distinct(kinds: impl Iterator<Item = EstimatorKind>) -> Vec<EstimatorKind> {
-    let mut seen = Vec::new();
-    for kind in kinds {
-        if !seen.contains(&kind) {
-            seen.push(kind);
-        }
-    }
-    seen
 }

@@ -27,6 +27,18 @@ impl EstimatorKind {
     pub const ALL: [Self; 7] =
         [Self::Ekf, Self::Ukf, Self::Imm, Self::SignSplit, Self::Hypotheses, Self::Particles, Self::Corrected];
 
+    /// Each of them once, in the order in which they first come.
+    #[must_use]
+    pub fn distinct(kinds: impl IntoIterator<Item = Self>) -> Vec<Self> {
+        let mut seen = Vec::new();
+        for kind in kinds {
+            if !seen.contains(&kind) {
+                seen.push(kind);
+            }
+        }
+        seen
+    }
+
     /// Whether it keeps hypotheses about the phase; the others are one Gaussian.
     #[must_use]
     pub const fn has_phases(self) -> bool {

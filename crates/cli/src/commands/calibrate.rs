@@ -1,4 +1,3 @@
-use std::io;
 use std::path::Path;
 use std::time::Instant;
 
@@ -84,16 +83,13 @@ pub fn run(args: &CalibrateArgs) -> Result<(), CliError> {
     }
     let explained = explain::text(args, &recordings, &params.law)?;
     outputs.publish()?;
-    let said = if Verbosity::chosen() == Verbosity::Quiet && !args.json {
-        vec![]
-    } else if args.json {
-        closing::json(&closing, &file).map_err(io::Error::from)?
-    } else {
-        closing.text().into_bytes()
-    };
     print(|out| {
         out.write_all(explained.as_bytes())?;
-        Ok(out.write_all(&said)?)
+        match Verbosity::chosen() {
+            _ if args.json => closing::json(out, &closing, &file),
+            Verbosity::Quiet => Ok(()),
+            _ => Ok(out.write_all(closing.text().as_bytes())?),
+        }
     })
 }
 

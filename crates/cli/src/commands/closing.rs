@@ -1,17 +1,19 @@
 //! What `calibrate --json` prints.
 
-use ohmstrain::{Closing, Findings, MADE_BY, Tested};
+use std::io::Write;
+
+use ohmstrain::{Closing, Findings, Tested};
 use ohmstrain_calib::{ErrorShares, Limit};
 use serde::Serialize;
 
-/// Version of what `--json` prints. Names are added without another version; one that goes or changes its meaning brings
-/// the next.
+use crate::error::CliError;
+use crate::output;
+
+/// Version of what `--json` prints.
 const SCHEMA: u32 = 1;
 /// What `--json` prints.
 #[derive(Serialize)]
 struct Json<'a> {
-    schema: u32,
-    made_by: &'static str,
     sensor: &'a str,
     estimator: &'static str,
     branches: usize,
@@ -27,12 +29,10 @@ struct Json<'a> {
     verdict: Option<String>,
 }
 
-/// As JSON, with an end of line.
-pub fn json(closing: &Closing, file: &str) -> serde_json::Result<Vec<u8>> {
+/// Writes it.
+pub fn json(out: &mut dyn Write, closing: &Closing, file: &str) -> Result<(), CliError> {
     let (params, findings) = (closing.params, closing.findings);
     let json = Json {
-        schema: SCHEMA,
-        made_by: MADE_BY,
         sensor: file,
         estimator: params.default_estimator.name(),
         branches: params.law.branches.len(),
@@ -44,7 +44,5 @@ pub fn json(closing: &Closing, file: &str) -> serde_json::Result<Vec<u8>> {
         tested: closing.tested,
         verdict: closing.verdict(),
     };
-    let mut bytes = serde_json::to_vec_pretty(&json)?;
-    bytes.push(b'\n');
-    Ok(bytes)
+    output::json(out, SCHEMA, &json)
 }

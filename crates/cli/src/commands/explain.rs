@@ -27,7 +27,7 @@ pub fn text(args: &CalibrateArgs, recordings: &[Recording], law: &LawParams) -> 
     }
     if let Some(replicates) = args.bootstrap {
         let found = bootstrap_law(&samples, law, replicates as usize, args.seed).map_err(failed)?;
-        let mut table = table(["parameter", "without ridge", "2.5 %", "97.5 %"]);
+        let mut table = output::wrapped_table(["parameter", "without ridge", "2.5 %", "97.5 %"]);
         for (i, name) in found.names.iter().enumerate() {
             let cells = [found.values[i], found.lower[i], found.upper[i]].map(|x| format!("{x:.4e}"));
             table.add_row([name.clone()].into_iter().chain(cells));
@@ -41,7 +41,8 @@ pub fn text(args: &CalibrateArgs, recordings: &[Recording], law: &LawParams) -> 
 fn structures(scores: &[StructureScore]) -> Table {
     let least = |of: fn(&StructureScore) -> f64| scores.iter().map(of).fold(f64::INFINITY, f64::min);
     let (aic, bic) = (least(|score| score.aic), least(|score| score.bic));
-    let mut table = table(["gauge", "branches", "parameters", "error, % of R0", "left out, %", "AIC", "BIC"]);
+    let mut table =
+        output::wrapped_table(["gauge", "branches", "parameters", "error, % of R0", "left out, %", "AIC", "BIC"]);
     for score in scores {
         table.add_row([
             family(score.options.gauge).to_string(),
@@ -53,12 +54,6 @@ fn structures(scores: &[StructureScore]) -> Table {
             format!("{:+.1}", score.bic - bic),
         ]);
     }
-    table
-}
-
-fn table<const N: usize>(header: [&str; N]) -> Table {
-    let mut table = output::table();
-    table.set_header(header);
     table
 }
 

@@ -1,6 +1,5 @@
 //! What an exported filter is worth on a recording, beside what was promised and what this computer makes of it.
 
-use comfy_table::{Table, presets};
 use ohmstrain::Sensor;
 use ohmstrain_calib::{Baseline, ScoredRow, Scores, SensorParams};
 
@@ -9,7 +8,7 @@ use crate::commands::score_table::covered;
 use crate::error::CliError;
 use crate::export::{self, ChipFilter, Cost, Plan, ReplayedRow};
 use crate::input::Recording;
-use crate::output::print;
+use crate::output::{self, print};
 
 /// A recording with a reference, and what this computer and a static cubic make of it, as they would live.
 pub struct OnRecording {
@@ -90,9 +89,7 @@ impl Promise {
         let name = args.sensor.display().to_string();
         let chip = ChipFilter::new(params, plan).map_err(|error| error.into_cli(&name))?;
         let cost = export::cost(params, plan, args.dt_s).map_err(|error| error.into_cli(&name))?;
-        let mut table = Table::new();
-        table.load_style(presets::ASCII_MARKDOWN);
-        table.set_header(["estimate", "%FS", "50/90/95 %"]);
+        let mut table = output::table(["estimate", "%FS", "50/90/95 %"]);
         let mut worse_on = None;
         if let Some(summary) = &params.summary {
             let coverage = format!("{:.0}", summary.coverage_95_percent);

@@ -3,8 +3,8 @@ use ohmstrain_bench_data::import::{Plan, Table};
 use crate::args::ImportArgs;
 use crate::error::CliError;
 use crate::lab_files;
-use crate::output::{IMPORT, Kind, Outputs, print};
-use crate::sensor_file::MADE_BY;
+use crate::output::{IMPORT, Kind, Outputs};
+use ohmstrain::MADE_BY;
 
 /// Makes a trace of a lab's files. What was taken for what, and what was left out, goes to stderr.
 pub fn run(args: &ImportArgs) -> Result<(), CliError> {
@@ -21,13 +21,7 @@ pub fn run(args: &ImportArgs) -> Result<(), CliError> {
     imported.remarks.iter().for_each(|remark| CliError::remark(remark));
     let mut bytes = Vec::new();
     imported.trace.write(&mut bytes)?;
-    match output {
-        Some(output) => {
-            outputs.put(output, bytes);
-            outputs.publish()
-        }
-        None => print(|out| Ok(out.write_all(&bytes)?)),
-    }
+    outputs.publish_or_print(output, bytes)
 }
 
 /// What is what, on one line.

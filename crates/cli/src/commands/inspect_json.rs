@@ -5,15 +5,15 @@ use serde_json::{Value, json};
 
 use crate::commands::inspect::{Findings, Proposal};
 use crate::error::CliError;
-use crate::sensor_file::MADE_BY;
+use crate::output;
 
-/// Version of what is printed: a field that changes its meaning or goes raises it.
+/// Version of what `--json` prints.
 const SCHEMA: u32 = 1;
 
 /// Prints what was found as JSON.
 pub fn write(out: &mut dyn Write, findings: &Findings) -> Result<(), CliError> {
     let files: Vec<Value> = (0..findings.tables.len()).map(|index| file(findings, index)).collect();
-    let mut all = json!({ "schema": SCHEMA, "made_by": MADE_BY, "files": files });
+    let mut all = json!({ "files": files });
     match &findings.plan {
         Ok(proposal) => {
             all["command"] = json!(proposal.command);
@@ -23,8 +23,7 @@ pub fn write(out: &mut dyn Write, findings: &Findings) -> Result<(), CliError> {
         }
         Err(question) => all["question"] = json!(question.to_string()),
     }
-    let text = serde_json::to_string_pretty(&all).map_err(|error| CliError::Other(error.to_string()))?;
-    Ok(writeln!(out, "{text}")?)
+    output::json(out, SCHEMA, &all)
 }
 
 fn file(findings: &Findings, index: usize) -> Value {

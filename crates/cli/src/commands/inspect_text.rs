@@ -1,11 +1,12 @@
 use std::io::Write;
 
-use comfy_table::{Table as TextTable, presets};
+use comfy_table::Table as TextTable;
 use ohmstrain_bench_data::counted;
 use ohmstrain_bench_data::import::{ChannelSurvey, ClockSurvey, PhaseSurvey, Role, Survey, Table, candidates};
 
 use crate::commands::inspect::{Findings, Proposal};
 use crate::error::CliError;
+use crate::output;
 
 /// Characters of a cell that are shown.
 const WIDEST: usize = 24;
@@ -87,9 +88,7 @@ fn layout(table: &Table) -> String {
 /// A row for each column: what it may be, or is proposed to be.
 fn columns(findings: &Findings, index: usize) -> TextTable {
     let table = &findings.tables[index];
-    let mut text = TextTable::new();
-    text.load_style(presets::ASCII_MARKDOWN);
-    text.set_header(["#", "column", "unit", "taken for", "first", "last"]);
+    let mut text = output::table(["#", "column", "unit", "taken for", "first", "last"]);
     let taken = findings.plan.as_ref().map(|proposal| proposal.plan.columns(&findings.tables)).unwrap_or_default();
     let found = candidates(&findings.tables);
     for (place, column) in table.columns.iter().enumerate() {

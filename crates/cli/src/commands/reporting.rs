@@ -10,7 +10,7 @@ use crate::input::Recording;
 use crate::output::{Claim, Kind, Outputs};
 use crate::report::{FigureFiles, Report, ReportInput, Sample, ScoreRow, Scored};
 use crate::run::estimate;
-use crate::sensor_file::MADE_BY;
+use ohmstrain::MADE_BY;
 
 /// What a report is about.
 pub struct Reporting<'a> {

@@ -1,5 +1,7 @@
-use comfy_table::{Table, presets};
+use comfy_table::Table;
 use ohmstrain_calib::Scores;
+
+use crate::output::table;
 
 /// What the columns mean, for under the tables; no line is wider than a terminal.
 pub const KEY: &str = "\
@@ -11,10 +13,7 @@ wrong branch, more than 20 %FS off for 2 s or longer.";
 
 /// An empty table for [`add_scores`].
 pub fn score_table() -> Table {
-    let mut table = Table::new();
-    table.load_style(presets::ASCII_MARKDOWN);
-    table.set_header(["estimate", "%FS", "RMSE", "MAE", "bias", "50/90/95 %", "width", "CRPS", "log", "wrong"]);
-    table
+    table(["estimate", "%FS", "RMSE", "MAE", "bias", "50/90/95 %", "width", "CRPS", "log", "wrong"])
 }
 
 /// One row of scores.

@@ -3,8 +3,8 @@ use ohmstrain_bench_data::simulate::{SimulationSettings, simulate};
 
 use crate::args::SimulateArgs;
 use crate::error::CliError;
-use crate::output::{Kind, Outputs, SIMULATE, print};
-use crate::sensor_file::MADE_BY;
+use crate::output::{Kind, Outputs, SIMULATE};
+use ohmstrain::MADE_BY;
 
 /// Simulates a recording and writes it.
 pub fn run(args: &SimulateArgs) -> Result<(), CliError> {
@@ -21,13 +21,7 @@ pub fn run(args: &SimulateArgs) -> Result<(), CliError> {
         ..SimulationSettings::new(args.material, args.protocol)
     };
     let bytes = bytes(&settings).map_err(CliError::Arguments)?;
-    match output {
-        Some(output) => {
-            outputs.put(output, bytes);
-            outputs.publish()
-        }
-        None => print(|out| Ok(out.write_all(&bytes)?)),
-    }
+    outputs.publish_or_print(output, bytes)
 }
 
 /// A simulated recording as it is written: it says that it is one, so that it may be replaced by another.

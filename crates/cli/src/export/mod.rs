@@ -29,10 +29,10 @@ use ohmstrain_calib::{EstimatorKind, SensorParams};
 
 use crate::args::ExportTarget;
 use crate::error::CliError;
-use crate::sensor_file::MADE_BY;
 pub use budget::{Budget, fitting};
 use constants::Exported;
 pub use cost::{Cost, cost};
+use ohmstrain::MADE_BY;
 pub use plan::{ChipFilter, Plan};
 pub use prefix::Prefix;
 pub use replay::{ReplayedRow, Said, replay};

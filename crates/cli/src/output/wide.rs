@@ -1,13 +1,20 @@
 //! Text that fits a terminal.
 
-use comfy_table::{ContentArrangement, Table, presets};
+use comfy_table::{ContentArrangement, Row, Table, presets};
 
 pub use ohmstrain::wrap::COLUMNS;
 
-/// An empty table whose cells are wrapped where it would be too wide.
-pub fn table() -> Table {
+/// A table without rows.
+pub fn table(header: impl Into<Row>) -> Table {
     let mut table = Table::new();
     table.load_style(presets::ASCII_MARKDOWN);
+    table.set_header(header);
+    table
+}
+
+/// The same, of which cells are wrapped where it would be too wide.
+pub fn wrapped_table(header: impl Into<Row>) -> Table {
+    let mut table = table(header);
     table.set_content_arrangement(ContentArrangement::Dynamic).set_width(COLUMNS as u16);
     table
 }

@@ -16,7 +16,7 @@ use super::scores::Figures;
 use crate::args::{BatchArgs, BatchCommand, Format};
 use crate::error::CliError;
 use crate::input::hexadecimal;
-use crate::sensor_file::MADE_BY;
+use ohmstrain::MADE_BY;
 
 /// Exit code of `evaluate --check` for estimates that are found wanting: there is an output all the same.
 const WANTING: i32 = 3;

@@ -1,4 +1,4 @@
-use std::io::{Error, Write};
+use std::io::Write;
 
 use ohmstrain_calib::{PARTICLE_SEED, Quantity, Scores};
 use serde::Serialize;
@@ -7,11 +7,10 @@ use super::summary::{self, Summary, summaries};
 use crate::commands::reporting::Drawn;
 use crate::commands::score_table::{KEY, add_scores, score_table};
 use crate::error::CliError;
+use crate::output;
 use crate::report::Sample;
-use crate::sensor_file::MADE_BY;
 
-/// Version of what `--json` prints. Names are added without another version; one that goes or changes its meaning brings
-/// the next.
+/// Version of what `--json` prints.
 const SCHEMA: u32 = 2;
 
 /// All scores, recording by recording.
@@ -25,9 +24,6 @@ pub struct Evaluation {
 /// What `--json` prints.
 #[derive(Serialize)]
 struct Json<'a> {
-    schema: u32,
-    /// Program and version.
-    made_by: &'static str,
     /// Seed of the particles; nothing else draws, neither in calibration nor in the filters.
     particle_seed: u64,
     /// All cases summed up, estimate by estimate.
@@ -121,14 +117,11 @@ impl Evaluation {
     pub fn write(&self, out: &mut dyn Write, json: bool) -> Result<(), CliError> {
         if json {
             let json = Json {
-                schema: SCHEMA,
-                made_by: MADE_BY,
                 particle_seed: PARTICLE_SEED,
                 summary: self.summaries(),
                 recordings: self.recordings().collect(),
             };
-            serde_json::to_writer_pretty(&mut *out, &json).map_err(Error::from)?;
-            Ok(writeln!(out)?)
+            output::json(out, SCHEMA, &json)
         } else {
             self.write_tables(out)?;
             if self.recordings.len() > 1 {

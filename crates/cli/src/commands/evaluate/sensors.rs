@@ -52,8 +52,9 @@ impl Sensor {
             Estimators::All => EstimatorKind::ALL.into_iter().filter(can_be_built).collect(),
             _ => vec![wanted.unwrap_or(sensor.params().default_estimator)],
         };
-        let kinds =
-            distinct(kinds.into_iter().map(|kind| if corrects { kind } else { sensor.params().filter_of(kind) }));
+        let kinds = EstimatorKind::distinct(
+            kinds.into_iter().map(|kind| if corrects { kind } else { sensor.params().filter_of(kind) }),
+        );
         let judged = |kind| Self { sensor: sensor.clone(), kind, calibration_s: None, is_part: false };
         Ok(kinds.into_iter().map(judged).collect())
     }
@@ -129,16 +130,6 @@ impl Sensor {
             quantity: self.sensor.params().quantity,
         }))
     }
-}
-
-fn distinct(kinds: impl Iterator<Item = EstimatorKind>) -> Vec<EstimatorKind> {
-    let mut seen = Vec::new();
-    for kind in kinds {
-        if !seen.contains(&kind) {
-            seen.push(kind);
-        }
-    }
-    seen
 }
 
 impl Rivals {

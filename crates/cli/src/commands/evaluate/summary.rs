@@ -1,12 +1,12 @@
 use std::io::Write;
 
-use comfy_table::{Table, presets};
 use ohmstrain_calib::Scores;
 use serde::Serialize;
 
 use super::evaluation::RecordingScores;
 use crate::commands::score_table::covered;
 use crate::error::CliError;
+use crate::output::table;
 
 /// All cases of one estimate in a row of figures. A case is a recording and a split of it.
 #[derive(Debug, Serialize)]
@@ -96,9 +96,7 @@ fn summary(estimate: &str, cases: Vec<&Case>) -> Option<Summary> {
 
 /// A table, one estimate per row.
 pub fn write(summaries: &[Summary], out: &mut dyn Write) -> Result<(), CliError> {
-    let mut table = Table::new();
-    table.load_style(presets::ASCII_MARKDOWN);
-    table.set_header(["all cases", "cases", "/ cubic", "worst", "50/90/95 %", "least 95 %", "width", "CRPS"]);
+    let mut table = table(["all cases", "cases", "/ cubic", "worst", "50/90/95 %", "least 95 %", "width", "CRPS"]);
     for summary in summaries {
         table.add_row([
             summary.estimate.clone(),

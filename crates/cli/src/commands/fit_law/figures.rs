@@ -7,7 +7,7 @@ use crate::commands::reporting::put_figures;
 use crate::error::CliError;
 use crate::output::Outputs;
 use crate::report::{Axis, Chart, Ink, ReportError, WIDE, files, slug};
-use crate::sensor_file::MADE_BY;
+use ohmstrain::MADE_BY;
 
 /// Figures of all fits into a folder.
 pub fn put(folder: &Path, recordings: &[Fits], force: bool) -> Result<(), CliError> {

@@ -7,19 +7,15 @@ use super::rows::{Cell, Rows};
 use super::{Fits, Fitted, phase_of};
 use crate::args::FitLawArgs;
 use crate::error::CliError;
-use crate::output::print;
-use crate::sensor_file::MADE_BY;
+use crate::output::{self, print};
 use ohmstrain::number::plain;
 
-/// Version of what `--json` prints. Names are added without another version; one that goes or changes its meaning brings
-/// the next.
+/// Version of what `--json` prints.
 const SCHEMA: u32 = 1;
 
 /// What `--json` prints.
 #[derive(Serialize)]
 struct Report<'a> {
-    schema: u32,
-    made_by: &'static str,
     fits: Vec<FitReport<'a>>,
 }
 
@@ -61,11 +57,7 @@ struct ParameterReport<'a> {
 pub fn json(recordings: &[Fits], args: &FitLawArgs) -> Result<(), CliError> {
     let of = |recording| move |fitted| fit_report(recording, fitted, args);
     let fits = recordings.iter().flat_map(|recording| recording.fits.iter().map(of(recording))).collect();
-    print(|out| {
-        serde_json::to_writer_pretty(&mut *out, &Report { schema: SCHEMA, made_by: MADE_BY, fits })
-            .map_err(std::io::Error::from)?;
-        Ok(writeln!(out)?)
-    })
+    print(|out| output::json(out, SCHEMA, &Report { fits }))
 }
 
 fn fit_report<'a>(recording: &'a Fits, Fitted { piece, fit }: &'a Fitted, args: &FitLawArgs) -> FitReport<'a> {

@@ -1,11 +1,10 @@
 //! A table as text, CSV or LaTeX.
 
-use comfy_table::{Table, presets};
 use ohmstrain_calib::closed_form::Estimated;
 
 use crate::args::TableFormat;
 use crate::error::CliError;
-use crate::output::{COLUMNS, print};
+use crate::output::{self, COLUMNS, print};
 use ohmstrain::number::{plain, with_error};
 
 /// A cell.
@@ -94,9 +93,7 @@ impl Rows {
         let keys: Vec<usize> = (usize::from(shared.is_some())..self.keys).collect();
         for columns in self.blocks(&rows, &keys) {
             let columns = || keys.iter().chain(&columns);
-            let mut table = Table::new();
-            table.load_style(presets::ASCII_MARKDOWN);
-            table.set_header(columns().map(|column| &self.header[*column]));
+            let mut table = output::table(columns().map(|column| &self.header[*column]));
             for row in &rows {
                 table.add_row(columns().map(|column| &row[*column]));
             }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use ohmstrain_bench_data::{LineParser, Quantity, ReadingKind, Row, RowWriter};
 
-use crate::sensor_file::MADE_BY;
+use ohmstrain::MADE_BY;
 
 /// Names that are tried.
 const MOST_FILES: u32 = 10_000;

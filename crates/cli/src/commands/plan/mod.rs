@@ -3,7 +3,7 @@
 mod motion;
 mod worth;
 
-use comfy_table::{ColumnConstraint, Table};
+use comfy_table::ColumnConstraint;
 use ohmstrain::{Calibration, EstimatorKind, JointParams, Quantity, Sensor};
 use ohmstrain_bench_data::Metadata;
 use ohmstrain_bench_data::simulate::{Protocol, SimulationSettings};
@@ -16,19 +16,17 @@ use crate::error::CliError;
 use crate::input;
 use crate::output::{self, print, wrapped};
 use crate::progress::Progress;
-use crate::sensor_file::{self, MADE_BY};
+use crate::sensor_file;
 use motion::Protocols;
 use ohmstrain::number::{fixed, significant};
 use worth::{Sampling, Told, Worth};
 
-/// Version of what `--json` prints. Names are added without another version.
+/// Version of what `--json` prints.
 const SCHEMA: u32 = 1;
 
 /// What `--json` prints.
 #[derive(Serialize)]
 struct Json<'a> {
-    schema: u32,
-    made_by: &'static str,
     sensor: String,
     recordings: &'a [Told],
     sampling: &'a [Worth],
@@ -59,8 +57,6 @@ pub fn run(args: &PlanArgs) -> Result<(), CliError> {
         if args.json {
             let Sampling { cases, drift_alone_percent, noise_alone_percent, neither_percent } = &worth;
             let json = Json {
-                schema: SCHEMA,
-                made_by: MADE_BY,
                 sensor: name,
                 recordings: &told,
                 sampling: cases,
@@ -68,8 +64,7 @@ pub fn run(args: &PlanArgs) -> Result<(), CliError> {
                 noise_alone_percent: *noise_alone_percent,
                 neither_percent: *neither_percent,
             };
-            serde_json::to_writer_pretty(&mut *out, &json).map_err(std::io::Error::from)?;
-            return Ok(writeln!(out)?);
+            return output::json(out, SCHEMA, &json);
         }
         Ok(out.write_all(text(&sensor, &name, &protocols, &told, &worth).as_bytes())?)
     })
@@ -105,7 +100,7 @@ fn text(sensor: &Sensor, name: &str, protocols: &Protocols, told: &[Told], worth
         significant(protocols.slowest_s, 2),
         speeds.join(", ")
     ));
-    let mut recordings = table(["recording", "minutes", "told", "worst", "condition", "left open"]);
+    let mut recordings = output::wrapped_table(["recording", "minutes", "told", "worst", "condition", "left open"]);
     for one in told {
         recordings.add_row([
             one.protocol.to_string(),
@@ -126,7 +121,8 @@ fn text(sensor: &Sensor, name: &str, protocols: &Protocols, told: &[Told], worth
         "Error of strain by the filter {estimator}, % of the range (share of rows in the 95 % interval), by sampling and \
          converter:"
     ));
-    let mut errors = table(["readings per s", "as good as the sensor", "16 bits", "12 bits", "10 bits"]);
+    let mut errors =
+        output::wrapped_table(["readings per s", "as good as the sensor", "16 bits", "12 bits", "10 bits"]);
     for rate in worth::RATES_HZ {
         let of_rate = worth.cases.iter().filter(|one| one.rate_hz == rate);
         let cells = of_rate.map(|one| format!("{} ({:.0})", fixed(one.error_percent, 1), one.coverage_percent));
@@ -162,10 +158,4 @@ fn floor(worth: &Sampling) -> String {
         shown(noise_alone_percent),
         shown(neither_percent)
     )
-}
-
-fn table<const N: usize>(header: [&str; N]) -> Table {
-    let mut table = output::table();
-    table.set_header(header);
-    table
 }

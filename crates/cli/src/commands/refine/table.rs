@@ -22,8 +22,8 @@ pub struct Refinement {
 /// Prints what was found.
 pub fn write(out: &mut dyn Write, refinement: &Refinement) -> Result<(), CliError> {
     let Refinement { start, free, before, found, profiles } = refinement;
-    let mut table = output::table();
-    table.set_header(["parameter", "before", "after", "s.e. of ln", "95 % profile interval", "on bound"]);
+    let mut table =
+        output::wrapped_table(["parameter", "before", "after", "s.e. of ln", "95 % profile interval", "on bound"]);
     for ((parameter, fitted), profile) in free.iter().zip(&found.fit.parameters).zip(profiles) {
         table.add_row([
             fitted.name.to_string(),
