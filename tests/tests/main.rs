@@ -2,6 +2,7 @@
 
 mod adskalman_bridge;
 mod adskalman_vectors;
+mod another_day;
 mod bank;
 mod capacity;
 mod consistency;

@@ -28,16 +28,17 @@ pub fn builder<'a>(sensor: &'a Sensor, args: &EstimateArgs) -> FilterBuilder<'a>
     builder
 }
 
-/// What the rested sensor reads in a recording whose first readings are `first`; `None` if nobody says other than the
-/// calibration.
+/// What the rested sensor reads in a recording whose first readings are `first`; `None` if nobody says, so that R₀ follows.
 pub fn rest_resistance(
     wanted: Option<RestResistance>,
+    sensor: &Sensor,
     first: impl Iterator<Item = f64>,
     file: &str,
 ) -> Result<Option<f64>, CliError> {
     match wanted {
         None => Ok(None),
         Some(RestResistance::Value(value)) => Ok(Some(value)),
+        Some(RestResistance::Calibrated) => Ok(Some(sensor.params().rested())),
         Some(RestResistance::First(count)) => median_of_first(count, first, file).map(Some),
     }
 }

@@ -260,7 +260,7 @@ fn what_has_no_exported_form_is_refused_and_nothing_is_written() {
     assert!(!bench.path("out").exists());
 }
 
-/// Another day's R₀: every reading is 1.15 times what it was. Told so, the exported code says what it said: R/R₀ is the same to a
+/// Another day's R₀: every reading is 1.15 times what it was. Not told so, R₀ follows, in the exported code as in the program. Told so, the exported code says what it said: R/R₀ is the same to a
 /// rounding of 6e-8. (R₀ of the law is not what the rested sensor reads, here by some per cent.)
 #[test]
 fn another_days_resistance_at_rest_can_be_told() {
@@ -274,6 +274,8 @@ fn another_days_resistance_at_rest_can_be_told() {
         let rows = trace.numbers("time_s").into_iter().zip(trace.numbers("resistance_ohm"));
         rows.map(|(time_s, ohm)| format!("{time_s},{}\n", factor * ohm)).collect::<String>()
     };
+    bench.write("larger.csv", format!("time_s,resistance_ohm\n{}", rows(1.15)));
+    let program = Csv::new(&bench.run(&["filter", "larger.csv", "--sensor", "corrected.toml"]).ok()).numbers("strain");
     for compiler in compilers() {
         let sources = ["src/ohmstrain.c", "selftest/replay.c"];
         let replay = |factor: f64, told: &[&str]| {
@@ -282,12 +284,21 @@ fn another_days_resistance_at_rest_can_be_told() {
             Csv::new(&printed).numbers("strain")
         };
         let (expected, told, untold) = (replay(1.0, &[]), replay(1.15, &[&today.to_string()]), replay(1.15, &[]));
-        let farthest = |strains: &[f64]| {
-            strains.iter().zip(&expected).map(|(strain, expected)| (strain - expected).abs()).fold(0.0, f64::max)
+        let farthest = |strains: &[f64], expected: &[f64]| {
+            strains.iter().zip(expected).map(|(strain, expected)| (strain - expected).abs()).fold(0.0, f64::max)
         };
         // Two hypotheses may be merged a row earlier or later; without being told it is off by more than a tenth.
-        println!("{compiler}: {} {}", farthest(&told), farthest(&untold));
-        assert!(farthest(&told) < 0.01 && farthest(&untold) > 0.03, "{} {}", farthest(&told), farthest(&untold));
+        let off = [farthest(&told, &expected), farthest(&untold, &expected)];
+        // Where R₀ is off hypotheses are nearly as likely as each other for longer: some rows may have another one, most may not.
+        let unlike = |others: &[f64]| untold.iter().zip(others).filter(|(a, b)| (*a - *b).abs() > 0.003).count();
+        let rows = untold.len();
+        println!(
+            "{compiler}: {off:?}, of {rows} rows {} are not the program's, {} not those told",
+            unlike(&program),
+            unlike(&told)
+        );
+        assert!(off[0] < 0.01 && off[1] > 0.03, "{off:?}");
+        assert!(10 * unlike(&program) < rows && 2 * unlike(&told) > rows);
     }
 }
 

@@ -65,9 +65,11 @@ fn the_answer_is_the_unit_or_r0_in_it() {
         let strains = |arguments: &[&str]| {
             Csv::new(&bench.run(&[&[command], arguments, &SENSOR].concat()).ok()).numbers("strain")
         };
-        let in_ohm = strains(&["trace.csv"]);
-        for answer in [["--rest-resistance", &rest], ["--resistance-unit", "kohm"]] {
-            let in_kohm = strains(&[&["other.csv"][..], &answer].concat());
+        let calibrated = ["--rest-resistance", "calibrated"];
+        let in_ohm = strains(&[&["trace.csv"][..], &calibrated].concat());
+        let in_unit = [&calibrated[..], &["--resistance-unit", "kohm"]].concat();
+        for answer in [&["--rest-resistance", &rest][..], &in_unit] {
+            let in_kohm = strains(&[&["other.csv"][..], answer].concat());
             // Rounding of the scaled readings, 1e-16, times what a filter makes of it.
             assert!(in_ohm.iter().zip(&in_kohm).all(|(a, b)| (a - b).abs() < 1e-8), "{command} {answer:?}");
         }
@@ -157,7 +159,7 @@ fn evaluate_takes_a_rest_resistance_as_filter_does() {
         [&scores["rmse"], &scores["smoother"]["rmse"], &scores["baselines"]["static_cubic"]["rmse"]]
             .map(|rmse| rmse.as_f64().unwrap())
     };
-    let expected = rmse(&["trace.csv"]);
+    let expected = rmse(&["trace.csv", "--rest-resistance", "calibrated"]);
     let alike = |found: [f64; 3]| found.iter().zip(&expected).all(|(a, b)| (a - b).abs() < 1e-8);
     let rest = (1.2 * rest_reading(&bench)).to_string();
     assert!(alike(rmse(&["larger.csv", "--rest-resistance", &rest])));

@@ -4,8 +4,10 @@ use ohmstrain_calib::{EstimatorKind, Rows, Start, build_filter};
 use ohmstrain_ekf::{Guard, Influence, StepError};
 
 use crate::estimate::Scale;
-use crate::filter::{Kernel, taken};
-use crate::{DOUBT, DoubtParts, Doubts, Error, Estimate, Filter, Flags, LaggedFilter, Reading, Sensor};
+use crate::filter::{Kernel, Known, followed, taken};
+use crate::{
+    DOUBT, DoubtParts, Doubts, Error, Estimate, Filter, Flags, LaggedFilter, Reading, RestBounds, RestFollower, Sensor,
+};
 
 /// How many readings in a row a gate turns down before it is the state that is doubted: outliers come alone, a body that sets off
 /// surprises until it is followed. With ten a knee that bent within half a second was missed.
@@ -91,7 +93,8 @@ impl<'a> FilterBuilder<'a> {
     }
 
     /// What the rested, unstretched sensor reads now, in place of what it read in calibration: another day, or another
-    /// sensor of the same make.
+    /// sensor of the same make. Where it is not told, R₀ follows readings that stay outside of the calibration's
+    /// ([`RestFollower`](crate::RestFollower)).
     ///
     /// ```
     /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
@@ -260,11 +263,22 @@ impl<'a> FilterBuilder<'a> {
         mut take: impl FnMut(Range<usize>, &[Estimate]) -> Result<(), E>,
     ) -> Result<(), E> {
         let starts_known = self.initial_strain.is_some();
-        let Kernel { mut filter, scale, mut doubts, .. } = self.kernel(self.kind().smoother())?;
+        let Kernel { mut filter, known } = self.kernel(self.kind().smoother())?;
+        let Known { scale, mut doubts, follower, .. } = known;
         let failed = |(row, source): (usize, StepError)| Error::Row { row, source };
-        let relative = |k: usize| {
+        let calibrated = |k: usize| {
             let (time_s, reading) = row(k);
             (time_s, reading.relative(scale.rest_reading))
+        };
+        let value = |k| {
+            let (time_s, reading) = calibrated(k);
+            (time_s, reading.map(|reading| reading.value))
+        };
+        let follower = follower.map(|follower| follower.settled(len, value));
+        let off = follower.map_or(0.0, |follower| follower.off());
+        let relative = |k| {
+            let (time_s, reading) = calibrated(k);
+            (time_s, followed(follower.as_ref(), reading))
         };
         let mut back = filter.way_back(Rows::new(len, &relative)).map_err(failed)?;
         let (mut outputs, mut estimates, mut first) = (Vec::new(), Vec::new(), len);
@@ -284,7 +298,7 @@ impl<'a> FilterBuilder<'a> {
                     (strain.variance, flags) = doubts.widened(output.estimate.rate.mean, strain.variance);
                 }
                 next_s = time_s;
-                let mut estimate = scale.row(time_s, reading, output);
+                let mut estimate = scale.row(time_s, reading, off, output);
                 estimate.flags = estimate.flags.and(flags);
                 estimate
             }));
@@ -313,7 +327,9 @@ impl<'a> FilterBuilder<'a> {
             let doubts = Doubts::new(DoubtParts::new(params, motion));
             self.initial_strain.map_or(doubts, |strain| doubts.of_known_strain(is_none(strain)))
         });
-        Ok(Kernel { filter, scale, doubts, seen_s: 0.0 })
+        let is_told = self.rest_resistance.is_some();
+        let follower = (!is_told).then(|| RestFollower::new(RestBounds::of(params)));
+        Ok(Kernel { filter, known: Known { scale, doubts, follower, seen_s: 0.0 } })
     }
 
     fn start_at(&self, strain: f64) -> Result<Start, Error> {

@@ -126,7 +126,7 @@ impl Scale {
     pub(crate) fn new(sensor: &Sensor) -> Result<Self, Error> {
         let params: &SensorParams = sensor.params();
         let rest_reading = params.rest_reading;
-        let calibrated = (rest_reading, params.measured_rest.unwrap_or(rest_reading));
+        let calibrated = (rest_reading, params.rested());
         let limits = (params.limits.lower, params.limits.upper);
         let quantity = params.quantity;
         Ok(Self { rest_reading, calibrated, limits, quantity, joint: sensor.joint()?, header: Header::of(params) })
@@ -154,8 +154,9 @@ impl Scale {
         Ok(Gaussian { mean: strain, variance: sd * sd })
     }
 
-    /// The row of a reading and what the kernel says of it.
-    pub(crate) fn row(&self, time_s: f64, reading: Reading, output: &Output) -> Estimate {
+    /// The row of a reading and what the kernel says of it, of an R₀ that is off by a share.
+    pub(crate) fn row(&self, time_s: f64, reading: Reading, off: f64, output: &Output) -> Estimate {
+        let rest_reading = self.rest_reading * (1.0 + off);
         let estimate = &output.estimate;
         let strain = (estimate.strain.mean, estimate.strain.sd());
         let angle = self.joint.map(|joint| joint.angle_rad(strain.0, strain.1));
@@ -169,8 +170,8 @@ impl Scale {
             relaxation: estimate.relaxation.mean,
             relaxation_sd: estimate.relaxation.sd(),
             baseline: estimate.baseline,
-            settled_resistance: self.rest_reading * (1.0 + estimate.settled.mean),
-            settled_resistance_sd: self.rest_reading * estimate.settled.sd(),
+            settled_resistance: rest_reading * (1.0 + estimate.settled.mean),
+            settled_resistance_sd: rest_reading * estimate.settled.sd(),
             p_extend: output.phases.map(|phases| phases[0]),
             p_hold: output.phases.map(|phases| phases[1]),
             p_retract: output.phases.map(|phases| phases[2]),

@@ -5,36 +5,76 @@ use ohmstrain_calib::Output;
 use ohmstrain_ekf::ReadingVerdict;
 
 use crate::estimate::Scale;
-use crate::{Doubts, Error, Estimate, Flags, Reading};
+use crate::{Doubts, Error, Estimate, Flags, Reading, RestFollower};
 
 /// A filter for the sizes of the sensor's law, and the way to it from readings and from it to rows.
 pub(crate) struct Kernel {
     pub filter: Box<dyn ohmstrain_calib::Filter>,
+    pub known: Known,
+}
+
+/// What is known of the sensor besides what the filter knows.
+pub(crate) struct Known {
     pub scale: Scale,
     /// None if intervals are to be as the filter states them.
     pub doubts: Option<Doubts<f64>>,
-    /// Time of the row that doubts have seen last, s.
+    /// None where R₀ is told.
+    pub follower: Option<RestFollower<f64>>,
+    /// Time of the row that was seen last, s.
     pub seen_s: f64,
 }
 
-/// The row of a reading and what the filter says of it, in doubt.
-fn doubted(
-    doubts: &mut Option<Doubts<f64>>,
-    seen_s: &mut f64,
-    scale: &Scale,
-    (time_s, reading): (f64, Reading),
-    mut output: Output,
-) -> Estimate {
-    let dt_s = time_s - mem::replace(seen_s, time_s);
-    let mut flags = Flags::NONE;
-    if let Some(doubts) = doubts {
-        let (taken, strain) = (taken(scale, reading, &output), &mut output.estimate.strain);
-        let variance = doubts.see(dt_s, taken, *strain);
-        (strain.variance, flags) = doubts.widened(output.estimate.rate.mean, variance);
+impl Known {
+    /// A reading as the filter is to see it.
+    fn relative(&self, reading: Reading) -> Option<ohmstrain_ekf::Reading<f64>> {
+        followed(self.follower.as_ref(), reading.relative(self.scale.rest_reading))
     }
-    let mut row = scale.row(time_s, reading, &output);
-    row.flags = row.flags.and(flags);
-    row
+
+    /// The row of a reading and what the filter says of it, in doubt. Doubts are of readings as calibration would have had them.
+    fn row(&mut self, (time_s, reading): (f64, Reading), mut output: Output) -> Estimate {
+        let dt_s = time_s - mem::replace(&mut self.seen_s, time_s);
+        let (taken, off) = (taken(&self.scale, reading, &output), self.off());
+        if let (Some(follower), Some((relative, _))) = (&mut self.follower, taken) {
+            follower.see(dt_s, relative);
+        }
+        let mut flags = Flags::NONE;
+        if let Some(doubts) = &mut self.doubts {
+            let strain = &mut output.estimate.strain;
+            let variance = doubts.see(dt_s, taken, *strain);
+            (strain.variance, flags) = doubts.widened(output.estimate.rate.mean, variance);
+        }
+        let mut row = self.scale.row(time_s, reading, off, &output);
+        row.flags = row.flags.and(flags);
+        row
+    }
+
+    /// By what share R₀ has been followed.
+    pub fn off(&self) -> f64 {
+        self.follower.map_or(0.0, |follower| follower.off())
+    }
+
+    /// R₀ is told: nothing follows any more.
+    fn rest_resistance(&mut self, measured: f64) -> Result<(), Error> {
+        self.scale.rest_at(measured)?;
+        self.follower = None;
+        self.doubts.iter_mut().for_each(Doubts::told_rest);
+        Ok(())
+    }
+
+    /// The strain is known, to `sd`.
+    fn know(&mut self, filter: &mut dyn ohmstrain_calib::Filter, strain: f64, sd: f64) -> Result<(), Error> {
+        filter.know(&self.scale.known(strain, sd)?)?;
+        self.doubts.iter_mut().for_each(Doubts::settle);
+        Ok(())
+    }
+}
+
+/// A reading relative to R₀ as it is followed.
+pub(crate) fn followed(
+    follower: Option<&RestFollower<f64>>,
+    reading: Option<ohmstrain_ekf::Reading<f64>>,
+) -> Option<ohmstrain_ekf::Reading<f64>> {
+    reading.map(|reading| follower.map_or(reading, |follower| follower.relative(reading)))
 }
 
 /// A reading R/R₀ - 1 that has told the filter something, and its normalised innovation squared.
@@ -87,11 +127,10 @@ impl Filter {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn step(&mut self, time_s: f64, reading: impl Into<Reading>) -> Result<Estimate, Error> {
-        let Kernel { filter, scale, doubts, seen_s } = &mut self.kernel;
-        let reading = reading.into();
-        filter.step(time_s, reading.relative(scale.rest_reading))?;
+        let (Kernel { filter, known }, reading) = (&mut self.kernel, reading.into());
+        filter.step(time_s, known.relative(reading))?;
         self.last = (time_s, reading);
-        Ok(doubted(doubts, seen_s, scale, self.last, filter.output()))
+        Ok(known.row(self.last, filter.output()))
     }
 
     /// Takes in that the strain (or angle) is known now, to `sd`: the estimate of the last row, and those after it, follow.
@@ -109,11 +148,9 @@ impl Filter {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn know(&mut self, strain: f64, sd: f64) -> Result<Estimate, Error> {
-        let Kernel { filter, scale, doubts, .. } = &mut self.kernel;
-        filter.know(&scale.known(strain, sd)?)?;
-        doubts.iter_mut().for_each(Doubts::settle);
-        let (time_s, reading) = self.last;
-        Ok(scale.row(time_s, reading, &filter.output()))
+        let (Kernel { filter, known }, (time_s, reading)) = (&mut self.kernel, self.last);
+        known.know(filter.as_mut(), strain, sd)?;
+        Ok(known.scale.row(time_s, reading, known.off(), &filter.output()))
     }
 
     /// What the rested, unstretched sensor is found to read from now on, in place of what it read in calibration.
@@ -130,10 +167,7 @@ impl Filter {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn rest_resistance(&mut self, measured: f64) -> Result<(), Error> {
-        let Kernel { scale, doubts, .. } = &mut self.kernel;
-        scale.rest_at(measured)?;
-        doubts.iter_mut().for_each(Doubts::told_rest);
-        Ok(())
+        self.kernel.known.rest_resistance(measured)
     }
 }
 
@@ -185,10 +219,11 @@ impl LaggedFilter {
         let (reading, lag_s) = (reading.into(), self.lag_s);
         self.forget_handed_out();
         self.waiting.push_back((time_s, reading));
-        let Kernel { filter, scale, doubts, seen_s } = &mut self.kernel;
+        let Kernel { filter, known } = &mut self.kernel;
+        let relative = known.relative(reading);
         let (waiting, due) = (&mut self.waiting, &mut self.due);
-        let mut out = |output| due.extend(waiting.pop_front().map(|row| doubted(doubts, seen_s, scale, row, output)));
-        let taken = filter.step_lagged(time_s, reading.relative(scale.rest_reading), lag_s, &mut out);
+        let mut out = |output| due.extend(waiting.pop_front().map(|row| known.row(row, output)));
+        let taken = filter.step_lagged(time_s, relative, lag_s, &mut out);
         if taken.is_err() {
             self.waiting.pop_back();
         }
@@ -212,11 +247,9 @@ impl LaggedFilter {
     /// ```
     pub fn finish(&mut self) -> Result<&[Estimate], Error> {
         self.forget_handed_out();
-        let Kernel { filter, scale, doubts, seen_s } = &mut self.kernel;
+        let Kernel { filter, known } = &mut self.kernel;
         let (waiting, due) = (&mut self.waiting, &mut self.due);
-        filter.flush_lagged(&mut |output| {
-            due.extend(waiting.pop_front().map(|row| doubted(doubts, seen_s, scale, row, output)))
-        })?;
+        filter.flush_lagged(&mut |output| due.extend(waiting.pop_front().map(|row| known.row(row, output))))?;
         self.are_out = true;
         Ok(&self.due)
     }
@@ -236,10 +269,8 @@ impl LaggedFilter {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn know(&mut self, strain: f64, sd: f64) -> Result<(), Error> {
-        let Kernel { filter, scale, doubts, .. } = &mut self.kernel;
-        filter.know(&scale.known(strain, sd)?)?;
-        doubts.iter_mut().for_each(Doubts::settle);
-        Ok(())
+        let Kernel { filter, known } = &mut self.kernel;
+        known.know(filter.as_mut(), strain, sd)
     }
 
     /// As [`Filter::rest_resistance`].
@@ -255,10 +286,7 @@ impl LaggedFilter {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn rest_resistance(&mut self, measured: f64) -> Result<(), Error> {
-        let Kernel { scale, doubts, .. } = &mut self.kernel;
-        scale.rest_at(measured)?;
-        doubts.iter_mut().for_each(Doubts::told_rest);
-        Ok(())
+        self.kernel.known.rest_resistance(measured)
     }
 
     fn forget_handed_out(&mut self) {
@@ -271,13 +299,13 @@ impl LaggedFilter {
 
 impl fmt::Debug for Filter {
     fn fmt(&self, out: &mut fmt::Formatter) -> fmt::Result {
-        out.debug_struct("Filter").field("scale", &self.kernel.scale).finish_non_exhaustive()
+        out.debug_struct("Filter").field("scale", &self.kernel.known.scale).finish_non_exhaustive()
     }
 }
 
 impl fmt::Debug for LaggedFilter {
     fn fmt(&self, out: &mut fmt::Formatter) -> fmt::Result {
-        let (scale, lag_s, waiting) = (&self.kernel.scale, &self.lag_s, &self.waiting.len());
+        let (scale, lag_s, waiting) = (&self.kernel.known.scale, &self.lag_s, &self.waiting.len());
         let mut out = out.debug_struct("LaggedFilter");
         out.field("scale", scale).field("lag_s", lag_s).field("waiting", waiting).finish_non_exhaustive()
     }

@@ -27,8 +27,9 @@ pub struct ValidityWatch {
     validity: Validity,
     quantity: Quantity,
     reading: &'static str,
-    /// Readings that calibration has seen, moved to the R₀ in use.
+    /// Readings that calibration has seen, moved to the R₀ that is told, and whether none is.
     readings: (f64, f64),
+    follows: bool,
     start_s: Option<f64>,
     long: bool,
     fast: Outside,
@@ -80,6 +81,8 @@ pub enum Beyond {
         least: f64,
         /// The largest.
         most: f64,
+        /// Whether R₀ follows them, as nobody has told it.
+        follows: bool,
     },
     /// At other strains.
     Strain {
@@ -142,6 +145,7 @@ impl ValidityWatch {
             quantity: params.quantity,
             reading: reading_column(params.reading),
             readings: (moved * seen.reading_lower, moved * seen.reading_upper),
+            follows: rest_resistance.is_none(),
             start_s: None,
             long: false,
             fast: Outside::default(),
@@ -178,7 +182,7 @@ impl ValidityWatch {
         let said = [
             (is_long, Beyond::Duration { longest_s }),
             (is_fast, Beyond::Rate { quantity, fastest_per_s }),
-            (is_other, Beyond::Readings { column, least, most }),
+            (is_other, Beyond::Readings { column, least, most, follows: self.follows }),
             (is_beyond, Beyond::Strain { quantity, least: lower, most: upper }),
         ];
         said.into_iter().filter_map(move |(now, beyond)| now.then_some(Extrapolation { time_s, beyond }))
@@ -194,8 +198,9 @@ impl fmt::Display for Extrapolation {
                 let quantity = quantity.name();
                 write!(out, "{quantity} changes faster than the calibration's {fastest_per_s:.4} per second")
             }
-            Beyond::Readings { column, least, most } => {
-                write!(out, "{column} is outside of the calibration's {least:.5} to {most:.5}")
+            Beyond::Readings { column, least, most, follows } => {
+                let rest = if follows { ", R0 is taken to be another until it is told" } else { "" };
+                write!(out, "{column} is outside of the calibration's {least:.5} to {most:.5}{rest}")
             }
             Beyond::Strain { quantity, least, most } => {
                 let quantity = quantity.name();

@@ -1,5 +1,6 @@
 //! The library as its users see it. One test program; a module for each subject.
 
+mod another_day;
 mod doubts;
 mod lag;
 mod rows;

@@ -230,10 +230,16 @@ impl SensorParams {
         widened.into_iter().filter(|(_, scale)| at_most(*scale)).map(|(name, _)| name).collect()
     }
 
+    /// What the rested sensor read in calibration, in its unit: R₀ of the law where nothing was read at rest.
+    #[must_use]
+    pub fn rested(&self) -> f64 {
+        self.measured_rest.unwrap_or(self.rest_reading)
+    }
+
     /// R₀ of the law on a day on which the rested sensor reads `measured`, in its unit.
     #[must_use]
     pub fn rest_reading_of(&self, measured: f64) -> f64 {
-        self.rest_reading * (measured / self.measured_rest.unwrap_or(self.rest_reading))
+        self.rest_reading * (measured / self.rested())
     }
 
     /// The parameters of an estimator.

@@ -22,9 +22,10 @@ pub struct EstimateArgs {
     /// Strain (or angle) at the first row, if it is known; the body is at rest there
     #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = finite)]
     pub initial_strain: Option<f64>,
-    /// What the rested, unstretched sensor reads now, in place of what it read in calibration: a number in the readings'
-    /// unit, or first:N for the median of the first N readings
-    #[arg(long, value_name = "OHM|first:N")]
+    /// What the rested, unstretched sensor reads now: a number in the readings' unit, first:N for the median of the first
+    /// N readings, or calibrated for what it read in calibration. Without this flag R₀ is that too, but follows readings
+    /// that stay beyond those of the calibration
+    #[arg(long, value_name = "OHM|first:N|calibrated")]
     pub rest_resistance: Option<RestResistance>,
     /// Turn down readings whose normalised innovation squared (column nis) is above X, two in a row at most; 10.8
     /// is one in a thousand by chance
@@ -184,13 +185,18 @@ pub enum RestResistance {
     Value(f64),
     /// Median of the first readings.
     First(usize),
+    /// What it was in calibration, whatever is read.
+    Calibrated,
 }
 
 impl FromStr for RestResistance {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let expected = || "expected a positive number or first:N".to_string();
+        let expected = || "expected a positive number, first:N or calibrated".to_string();
+        if text == "calibrated" {
+            return Ok(Self::Calibrated);
+        }
         if let Some(count) = text.strip_prefix("first:") {
             return match count.parse() {
                 Ok(count @ 1..) => Ok(Self::First(count)),

@@ -28,9 +28,10 @@ pub struct EvaluateArgs {
     /// Score rows with time_s >= T only; the filter still starts at the first row
     #[arg(long, value_name = "T", allow_negative_numbers = true, value_parser = finite, conflicts_with = "split")]
     pub from: Option<f64>,
-    /// Resistance at rest instead of the calibration's: a number in the readings' unit, or first:N for the median of each
-    /// recording's first N readings; what the estimates are compared with has its readings scaled alike
-    #[arg(long, value_name = "OHM|first:N")]
+    /// What the rested, unstretched sensor reads: a number in the readings' unit, first:N for the median of each recording's
+    /// first N readings, or calibrated; what the estimates are compared with has its readings scaled alike. Without this flag
+    /// R₀ follows the readings, as in filter
+    #[arg(long, value_name = "OHM|first:N|calibrated")]
     pub rest_resistance: Option<RestResistance>,
     /// Exit with code 3 unless every recording is estimated better than by the static cubic and its 95 % interval covers
     /// 80 % or more

@@ -167,7 +167,7 @@ fn stream<W: io::Write + Send>(
         return Err(fault.map_or_else(|| no_row(&rows), CliError::from));
     }
     let known = || first.iter().flatten().map(|row| row.reading.value);
-    let rest = rest_resistance(wanted, known(), &sink.file)?;
+    let rest = rest_resistance(wanted, sink.sensor, known(), &sink.file)?;
     rest.map_or(Ok(()), |measured| filter.rest_resistance(measured))?;
     (sink.rest, sink.watch) = (rest, ValidityWatch::new(sink.sensor, rest));
     if !sink.live {

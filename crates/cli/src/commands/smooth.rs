@@ -29,7 +29,7 @@ pub fn run(args: &SmoothArgs) -> Result<(), CliError> {
     }
     let name = rows.file().to_string();
     let readings = Readings::collect(rows)?;
-    let rest = rest_resistance(args.estimate.rest_resistance, readings.values(), &name)?;
+    let rest = rest_resistance(args.estimate.rest_resistance, &sensor, readings.values(), &name)?;
     suits::check_readings(&header, &sensor, rest, readings.values())?;
     let builder = builder(&sensor, &args.estimate);
     let builder = rest.map_or(builder, |measured| builder.rest_resistance(measured));

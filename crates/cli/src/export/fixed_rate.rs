@@ -1,6 +1,6 @@
 //! A sensor's filter at a fixed rate, in single and in double precision.
 
-use ohmstrain::{DOUBT, DoubtParts, KNOWN_BEYOND};
+use ohmstrain::{DOUBT, DoubtParts, KNOWN_BEYOND, RestBounds};
 use ohmstrain_calib::{EstimatorKind, EstimatorParams, HISTORIES, HYPOTHESES, SensorParams};
 use ohmstrain_ekf::{Compact, Ekf, Estimator, Evidence, Hypotheses, STEP_GRACE, SignSplit, SparseEkf, StepError};
 use ohmstrain_model::{Motion, SensorLaw, StrainRange, SwitchedModel};
@@ -79,6 +79,7 @@ impl<'a, const B: usize, const N: usize> FixedRate<'a, B, N> {
             correction: filter.correction.as_ref(),
             quadratics: quadratics.as_ref(),
             doubt: DoubtParts::new(params, &motion),
+            rest: RestBounds::of(params),
         };
         let longest_s = longest_step_s::<B, N, L>(&reference, &parts)?;
         let usual_s = f64::from(dt_s) / (f64::from(dt_s) / longest_s).ceil().max(1.0);
@@ -88,7 +89,7 @@ impl<'a, const B: usize, const N: usize> FixedRate<'a, B, N> {
         // Not longer than the table either.
         parts.longest_step_s = longest_s.min(table.range.1) as f32;
         let rest_reading = params.rest_reading as f32;
-        let rested = params.measured_rest.map_or(rest_reading, |measured| measured as f32);
+        let rested = params.rested() as f32;
         Ok(Self { reference, model, hypotheses: filter.hypotheses, rest_reading, rested, parts, table })
     }
 

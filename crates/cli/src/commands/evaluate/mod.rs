@@ -158,7 +158,7 @@ fn judge(
     recording.samples()?;
     recording.check_quantity(first.params().quantity)?;
     let readings = || recording.trace.readings.values.iter().copied();
-    let rest = rest_resistance(args.rest_resistance, readings(), &recording.name)?;
+    let rest = rest_resistance(args.rest_resistance, first, readings(), &recording.name)?;
     suits::check_readings(&recording.header, first, rest, readings())?;
     suits::check_reference(recording, first)?;
     let last_s = recording.trace.time_s.last().copied();

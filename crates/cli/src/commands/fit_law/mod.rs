@@ -74,6 +74,10 @@ fn fit_recording(recording: &Recording, args: &FitLawArgs) -> Result<Fits, CliEr
     let trace = &recording.trace;
     let rest_reading = match args.rest_resistance {
         RestResistance::Value(value) => value,
+        RestResistance::Calibrated => {
+            let said = "--rest-resistance: expected a positive number or first:N, as there is no calibration";
+            return Err(CliError::Arguments(said.into()));
+        }
         RestResistance::First(count) => median_of_first(count, trace.readings.values.iter().copied(), &recording.name)?,
     };
     let mut pieces = pieces(recording, args)?;

@@ -103,6 +103,7 @@ impl<'a> Session<'a> {
     pub fn new(args: &'a LiveArgs, sensor: Sensor) -> Result<Self, CliError> {
         let rest = match args.estimate.rest_resistance {
             Some(RestResistance::Value(value)) => Some(value),
+            Some(RestResistance::Calibrated) => Some(sensor.params().rested()),
             _ => None,
         };
         let name = args.port.display().to_string();

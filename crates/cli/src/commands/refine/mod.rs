@@ -34,7 +34,7 @@ pub fn run(args: &RefineArgs) -> Result<(), CliError> {
     let recording = input::read(&args.trace_file, &args.trace.metadata())?;
     check_unit(&recording.header, recording.trace.readings.kind, sensor.params().reading)?;
     let readings = || recording.trace.readings.values.iter().copied();
-    let rest = rest_resistance(args.rest_resistance, readings(), &recording.name)?;
+    let rest = rest_resistance(args.rest_resistance, &sensor, readings(), &recording.name)?;
     suits::check_readings(&recording.header, &sensor, rest, readings())?;
     let rows = RelativeRows::new(&recording, args.from, args.until, sensor.rest_reading(rest))?;
     let mut params = sensor.into_params();

@@ -19,7 +19,7 @@ use super::twin::Parts;
 use super::vectors::Vectors;
 use super::{ExportError, too_many_branches};
 use kernel::{Recorded, SharedConstants, StepConstants, TurningConstants};
-use readings::{DoubtConstants, SieveConstants};
+use readings::{DoubtConstants, FollowConstants, SieveConstants};
 
 /// A sensor as the templates have it.
 #[derive(Debug, Serialize)]
@@ -57,6 +57,7 @@ pub struct Exported {
     reading_variance: Literal,
     sieve: SieveConstants,
     doubt: DoubtConstants,
+    follow: FollowConstants,
     steps: StepConstants,
     fresh_mean: Vec<Literal>,
     fresh_variance: Vec<Literal>,
@@ -162,6 +163,7 @@ impl Exported {
             known_beyond: Literal((KNOWN_BEYOND * params.limits.span()) as f32),
             reading_variance: Literal(reading_sd * reading_sd),
             sieve: SieveConstants::new(&filter.readings),
+            follow: FollowConstants::new(sensor.parts.rest),
             doubt: DoubtConstants::new(&sensor.parts.doubt, Literal(sensor.parts.zero)),
             steps: StepConstants::new(&sensor, &names),
             fresh_mean: numbers.fresh.iter().map(|rate| Literal(rate.mean)).collect(),

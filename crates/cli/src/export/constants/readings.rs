@@ -1,6 +1,6 @@
 //! What a reading must be, and when an interval is wider than the filter says.
 
-use ohmstrain::{DOUBT, DoubtParts, NEVER_READ_S};
+use ohmstrain::{DOUBT, DoubtParts, FOLLOWING, NEVER_READ_S, RestBounds};
 use ohmstrain_calib::PortableSieve;
 use serde::Serialize;
 
@@ -39,6 +39,20 @@ pub struct DoubtConstants {
     zero: Literal,
     unread: UnreadConstants,
     rest: Option<RestConstants>,
+}
+
+/// How R₀ follows the readings.
+#[derive(Debug, Serialize)]
+pub struct FollowConstants {
+    low: Option<Literal>,
+    of_low: Option<Literal>,
+    high: Option<Literal>,
+    of_high: Option<Literal>,
+    leaves_s: Literal,
+    returns_s: Literal,
+    longest_s: Literal,
+    least: Literal,
+    most: Literal,
 }
 
 /// What is known without a reading.
@@ -94,6 +108,25 @@ impl DoubtConstants {
                 lasts_s: narrow(rest.lasts_s),
                 end: narrow(rest.end),
             }),
+        }
+    }
+}
+
+impl FollowConstants {
+    /// Of a sensor.
+    pub fn new(bounds: RestBounds) -> Self {
+        let narrow = |number: f64| Literal(number as f32);
+        let rest = |bound: f64| narrow(1.0 + bound);
+        Self {
+            low: bounds.low.map(narrow),
+            of_low: bounds.low.map(rest),
+            high: bounds.high.map(narrow),
+            of_high: bounds.high.map(rest),
+            leaves_s: narrow(FOLLOWING.leaves_s),
+            returns_s: narrow(FOLLOWING.returns_s),
+            longest_s: narrow(FOLLOWING.longest_s),
+            least: narrow(1.0 / FOLLOWING.farthest - 1.0),
+            most: narrow(FOLLOWING.farthest - 1.0),
         }
     }
 }

@@ -78,6 +78,13 @@ static const float CENTRE = << doubt.unread.centre >>f, ANYWHERE = << doubt.unre
 static const float AT_REST = << doubt.rest.rested >>f, REST_TOLERANCE = << doubt.rest.tolerance >>f, REST_LASTS_S = << doubt.rest.lasts_s >>f;
 static const float REST_END = << doubt.rest.end >>f;
 {% endif %}
+/* Between which readings, relative, the sensor stays while R0 is calibration's, and R0 of each in calibration's. */
+{% if follow.low is not none %}
+static const float REST_LOW = << follow.low >>f, OF_LOW = << follow.of_low >>f;
+{% endif %}
+{% if follow.high is not none %}
+static const float REST_HIGH = << follow.high >>f, OF_HIGH = << follow.of_high >>f;
+{% endif %}
 /* Factor on the standard deviation of strain that the calibration found necessary. */
 static const float STRAIN_SD_SCALE = << strain_sd_scale >>f;
 /* The square of the rounding of a relative reading of order one, and the most tries with more noise after the first. */
@@ -433,6 +440,37 @@ static void watch_rest(readings *seen, float dt_s, float rho)
 }
 
 {% endif %}
+/* R0 follows the readings: one beyond those of calibration draws it after itself, slowly, and one beyond the other end back, soon.
+ * A number that comes again says nothing until another one comes. */
+static void follow(readings *seen, float dt_s, float rho)
+{
+    const int is_news = seen->has_drawn && seen->drawn_by != rho;
+    float wanted = seen->off, passed_s, time_s;
+
+    seen->undrawn_s = seen->has_drawn ? seen->undrawn_s + dt_s : 0.0f;
+    seen->has_drawn = 1;
+    seen->drawn_by = rho;
+    if (!seen->follows || !is_news) {
+        return;
+    }
+    passed_s = seen->undrawn_s < << follow.longest_s >>f ? seen->undrawn_s : << follow.longest_s >>f;
+    seen->undrawn_s = 0.0f;
+{% if follow.low is not none %}
+    if ((rho - REST_LOW) / OF_LOW < seen->off) {
+        wanted = (rho - REST_LOW) / OF_LOW;
+    }
+{% endif %}
+{% if follow.high is not none %}
+    if ((rho - REST_HIGH) / OF_HIGH > seen->off) {
+        wanted = (rho - REST_HIGH) / OF_HIGH;
+    }
+{% endif %}
+    if (<< follow.least >>f < wanted && wanted < << follow.most >>f) {
+        time_s = fabsf(wanted) > fabsf(seen->off) ? << follow.leaves_s >>f : << follow.returns_s >>f;
+        seen->off += passed_s / (time_s + passed_s) * (wanted - seen->off);
+    }
+}
+
 /* The strain's variance without a reading for a while: it has moved without the pull toward its mean, but not beyond the limits. */
 static float unread_variance(float seconds, float strain, float variance)
 {
@@ -530,14 +568,18 @@ static ohmstrain_status step(ohmstrain_state *state, float dt_s, const float *rh
     unsigned flags = rho ? 0 : OHMSTRAIN_MISSING;
     ohmstrain_residual of_step = {0.0f, 0.0f, 0.0f};
     summary all;
-    float strain, variance;
+    const float *believed = rho;
+    float strain, variance, shown = 0.0f;
     int status;
 
     seen.since_s += dt_s;
     seen.repeated_s += dt_s;
     if (rho) {
-        flags = sieve(&seen, *rho, &extra_variance);
-        rho = flags ? (const float *)0 : rho;
+        const float rest = 1.0f + seen.off;
+        shown = (*rho - seen.off) / rest;
+        extra_variance /= rest * rest;
+        flags = sieve(&seen, shown, &extra_variance);
+        rho = flags ? (const float *)0 : &shown;
     }
     status = advance(state, dt_s, rho, extra_variance, &flags, &of_step);
     if (status != OHMSTRAIN_OK) {
@@ -547,6 +589,7 @@ static ohmstrain_status step(ohmstrain_state *state, float dt_s, const float *rh
         *residual = of_step;
     }
     rho = flags & NO_READING ? (const float *)0 : rho;
+    believed = rho ? believed : rho;
     summarise(state, &all);
     strain = strain_of(&all, &variance);
 {% if correction %}
@@ -559,7 +602,10 @@ static ohmstrain_status step(ohmstrain_state *state, float dt_s, const float *rh
         correct(&all, &seen, filtered, filtered_variance, &strain, &variance);
     }
 {% endif %}
-    variance = doubt_reading(&seen, dt_s, rho, of_step.nis, strain, variance);
+    if (believed) {
+        follow(&seen, dt_s, *believed);
+    }
+    variance = doubt_reading(&seen, dt_s, believed, of_step.nis, strain, variance);
     state->strain = strain;
     state->variance = doubted(&seen, all.mean[1], variance, &flags);
     seen.flags = flags;
@@ -577,6 +623,7 @@ static ohmstrain_status start(ohmstrain_state *state, const float *strain, float
     start_mixture(state, strain);
     state->readings = none;
     state->readings.starts = !strain;
+    state->readings.follows = 1;
 {% if doubt.rest %}
     state->readings.rests = strain && fabsf(*strain) <= << doubt.zero >>f;
 {% endif %}
@@ -617,6 +664,8 @@ ohmstrain_status ohmstrain_rest(ohmstrain_state *state, float measured)
         return OHMSTRAIN_ERR_NOT_FINITE;
     }
     state->rest_reading = rest_reading_at(measured);
+    state->readings.follows = 0;
+    state->readings.off = 0.0f;
 {% if doubt.rest %}
     state->readings.rest_off = state->readings.beyond_s = state->readings.near_s = 0.0f;
 {% endif %}
@@ -639,7 +688,9 @@ ohmstrain_status ohmstrain_rezero(ohmstrain_state *state, float measured)
     if (!usable(rest_reading_at(measured))) {
         return OHMSTRAIN_ERR_NOT_FINITE;
     }
-    return start(state, strain, rest_reading_at(measured));
+    start(state, strain, rest_reading_at(measured));
+    state->readings.follows = 0;
+    return OHMSTRAIN_OK;
 }
 
 ohmstrain_status ohmstrain_step_after(ohmstrain_state *state, float dt_s, float reading, float reading_sd,

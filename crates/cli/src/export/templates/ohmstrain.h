@@ -91,6 +91,7 @@ typedef struct ohmstrain_readings {
     unsigned char has_reading;
     /* Doubts of the interval. */
     unsigned char runs, starts, is_lost, has_believed, rests;
+    unsigned char follows, has_drawn; /* whether R0 follows the readings, and whether there has been one */
     float run_s;    /* time since the first step */
     float fading;   /* variance that fades while readings are believed */
     float unread_s; /* time without a reading */
@@ -99,6 +100,9 @@ typedef struct ohmstrain_readings {
     float near_off, far_off; /* how far readings have been outside of calibration's on the side of rest, and on the other one */
     float misfit;   /* mean of the normalised innovations squared, lately */
     float rest_off; /* how far R0 is off, as a share of it */
+    float off;      /* by what share R0 is another than OHMSTRAIN_REST_READING, as far as it has followed */
+    float drawn_by; /* the last reading that was believed, of an R0 that has not followed */
+    float undrawn_s; /* time since it came */
     float beyond_s, near_s, least; /* time for which readings have been beyond those at rest, and near them; how far beyond */
 {% if correction %}
     unsigned char has_feature;
@@ -176,7 +180,8 @@ typedef struct ohmstrain_estimate {
  * ohmstrain_start:   before any reading; ohmstrain_start_at: where the << quantity >> is known, at rest.
  * ohmstrain_rest:    the rested, unstretched sensor is found to read `measured`, in place of what it read in calibration: R0 of
  *                    today, from the next reading on.
- * ohmstrain_rezero:  the same, and the sensor rests now: the filter starts again, at zero.
+ * ohmstrain_rezero:  the same, and the sensor rests now: the filter starts again, at zero. Until one of the two is called R0 follows
+ *                    readings that stay beyond those of the calibration, within a minute or two: another day is not a fault.
  * ohmstrain_step:    one interval on, with a reading in << reading_unit >>. `reading_sd` is what the electronics add to its
  *                    noise, 0 for nothing beyond the calibration; `residual` may be null. A reading that no working sensor
  *                    gives is no error: it is taken for missing, and the estimate's flags say so.

@@ -3,7 +3,7 @@
 mod parts;
 mod seen;
 
-use ohmstrain::Doubts;
+use ohmstrain::{Doubts, RestFollower};
 use ohmstrain_calib::EstimatorKind;
 use ohmstrain_ekf::correction::{FEATURES, FeatureScale, ReadingFeatures};
 use ohmstrain_ekf::{Belief, Gaussian, Hypotheses, Mixture, Reading, Real, SignSplit, SparseEkf, StepError};
@@ -52,6 +52,8 @@ struct Memory<T, const B: usize, const N: usize, const L: usize, const K: usize>
     known_variance: T,
     missing: bool,
     doubts: Doubts<T>,
+    /// None where R₀ is told.
+    follower: Option<RestFollower<T>>,
     /// As it is reported.
     strain: Gaussian<T>,
 }
@@ -96,6 +98,7 @@ impl<'a, T: Real, const B: usize, const N: usize, const L: usize, const K: usize
             known_variance: T::zero(),
             missing: true,
             doubts: Doubts::new(parts.doubt),
+            follower: Some(RestFollower::new(parts.rest)),
             strain: Gaussian { mean: T::zero(), variance: T::zero() },
         };
         Ok(Self {
@@ -114,9 +117,10 @@ impl<'a, T: Real, const B: usize, const N: usize, const L: usize, const K: usize
         })
     }
 
-    /// Begins again, at a strain that is known if there is one.
+    /// Begins again with an R₀ that has been told, at a strain that is known if there is one.
     pub fn restart(&mut self, strain: Option<T>) {
         self.now = self.fresh;
+        self.now.follower = None;
         let Some(strain) = strain else { return };
         let (mut mean, mut variance) = self.model.initial_distribution();
         (mean[0], variance[0]) = (strain, self.start_variance);
@@ -139,8 +143,9 @@ impl<'a, T: Real, const B: usize, const N: usize, const L: usize, const K: usize
     pub fn step_after(&mut self, dt_s: T, reading: Option<Reading<T>>) -> Result<u32, StepError> {
         self.now.seen.pass(dt_s);
         let (mut flags, mut used) = (flag::MISSING, None);
-        if let Some(reading) = reading {
-            (flags, used) = match self.now.seen.sieved(reading) {
+        let relative = reading.map(|reading| self.now.follower.map_or(reading, |follower| follower.relative(reading)));
+        if let Some(relative) = relative {
+            (flags, used) = match self.now.seen.sieved(relative) {
                 Ok(reading) => (0, Some(reading)),
                 Err(flag) => (flag, None),
             };
@@ -152,7 +157,7 @@ impl<'a, T: Real, const B: usize, const N: usize, const L: usize, const K: usize
         let (taken, nis) = self.taken(used)?;
         flags |= taken;
         let surprises = flags == flag::DOWNWEIGHTED;
-        let shown = reading.filter(|_| flags == 0 || surprises).map(|reading| reading.value);
+        let shown = relative.filter(|_| flags == 0 || surprises).map(|reading| reading.value);
         let filtered = self.filtered();
         if let Some(watched) = &mut self.now.watched {
             self.now.features = watched.step_unless(surprises, dt_s, shown);
@@ -161,6 +166,9 @@ impl<'a, T: Real, const B: usize, const N: usize, const L: usize, const K: usize
         }
         let Gaussian { mean, variance } = self.corrected();
         let used = reading.filter(|_| flags & flag::NO_READING == 0).map(|reading| (reading.value, nis));
+        if let (Some(follower), Some((reading, _))) = (&mut self.now.follower, used) {
+            follower.see(dt_s, reading);
+        }
         let variance = self.now.doubts.see(dt_s, used, Gaussian { mean, variance });
         let (variance, doubts) = self.now.doubts.widened(self.now.moving.moments().mean[1], variance);
         self.now.strain = Gaussian { mean, variance };

@@ -1,6 +1,6 @@
 //! What an exported program is made of.
 
-use ohmstrain::DoubtParts;
+use ohmstrain::{DoubtParts, RestBounds};
 use ohmstrain_calib::{EstimatorKind, PortableCorrection, PortableSieve};
 use ohmstrain_ekf::{Dwell, Evidence, Real, StepError};
 use ohmstrain_model::StrainRange;
@@ -58,6 +58,7 @@ pub struct Parts<'a> {
     /// What stands for rows of the correction that were left out.
     pub quadratics: Option<&'a [Quadratic; 2]>,
     pub doubt: DoubtParts,
+    pub rest: RestBounds,
 }
 
 /// Phases, as a file has them.

@@ -1,0 +1,179 @@
+//! R₀ of the day, as far as readings alone tell it, in any precision.
+
+use ohmstrain_calib::SensorParams;
+use ohmstrain_ekf::{Reading, Real};
+
+use crate::{DOUBT, RestSeen};
+
+/// The numbers behind an R₀ that follows the readings, also for programs that write a filter in another language.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Following {
+    /// Time constant with which R₀ leaves calibration's for where the readings want it, s.
+    pub leaves_s: f64,
+    /// The same, where a whole recording is gone through for the one R₀ of all its rows.
+    pub settles_s: f64,
+    /// Time constant with which it comes back, s.
+    pub returns_s: f64,
+    /// A reading counts for no more than this time, s, however long nothing was read before.
+    pub longest_s: f64,
+    /// By what factor a reading may want R₀ to be another: beyond it, it is no reading of this sensor.
+    pub farthest: f64,
+}
+
+/// `docs/another-day.md` has what these were chosen on. A faster start follows another day sooner, and a fault of 10 s farther.
+///
+/// ```
+/// assert!(ohmstrain::FOLLOWING.leaves_s > ohmstrain::FOLLOWING.returns_s);
+/// ```
+pub const FOLLOWING: Following =
+    Following { leaves_s: 40.0, settles_s: 10.0, returns_s: 1.0, longest_s: 2.0, farthest: 2.0 };
+
+/// Between which readings, R/R₀ - 1, a sensor stays while R₀ is what it was in calibration: the strain is within its limits.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RestBounds {
+    /// The least; none where nobody knows.
+    pub low: Option<f64>,
+    /// The largest.
+    pub high: Option<f64>,
+}
+
+impl RestBounds {
+    /// On the side of the largest strain the last reading of the calibration, or a little more; on the other side that at rest, with what is left
+    /// open to it, if the calibration has one and it is an end of its readings: a sensor that was never at rest then may get there.
+    ///
+    /// ```
+    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+    /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
+    /// let bounds = ohmstrain::RestBounds::of(sensor.params());
+    /// assert!(bounds.low < Some(0.0) && bounds.high > Some(0.1));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn of(params: &SensorParams) -> Self {
+        let seen = &params.validity;
+        let relative = |reading: f64| reading / params.rest_reading - 1.0;
+        let (low, high) = (relative(seen.reading_lower), relative(seen.reading_upper));
+        let margin = DOUBT.margin * (high - low);
+        let grows = params.static_cubic.strain(seen.reading_upper) > params.static_cubic.strain(seen.reading_lower);
+        let sign = if grows { 1.0 } else { -1.0 };
+        let rest = RestSeen::of(params).filter(|rest| rest.sign == sign);
+        let near = rest.map(|rest| rest.end - sign * rest.tolerance);
+        if grows { Self { low: near, high: Some(high + margin) } } else { Self { low: Some(low - margin), high: near } }
+    }
+}
+
+/// R₀ that follows the readings: it is calibration's as long as they stay where they were then; one that lies beyond them
+/// slowly draws it after itself, and one beyond the other end soon draws it back (a play as wide as calibration's readings, with a lag).
+/// That is right where the sensor moves between the same strains as in calibration, on another day. Where it is stretched
+/// farther, the strain is at its limit in any case.
+///
+/// ```
+/// use ohmstrain::{RestBounds, RestFollower};
+///
+/// let mut follower = RestFollower::<f64>::new(RestBounds { low: Some(-0.05), high: Some(1.5) });
+/// for k in 0..6000 {
+///     follower.see(0.05, 2.0 - 1e-9 * f64::from(k % 2));
+/// }
+/// // 3 R₀ are to be the 2.5 R₀ of calibration.
+/// assert!((follower.off() - 0.2).abs() < 1e-3);
+/// assert!((follower.relative(2.0.into()).value - 1.5).abs() < 3e-3);
+/// ```
+#[derive(Clone, Copy, Debug)]
+pub struct RestFollower<T> {
+    bounds: RestBounds,
+    /// By what share of calibration's R₀ it is another.
+    off: T,
+    /// The last reading, none before the first one, and the time since it came, s.
+    last: Option<T>,
+    since_s: T,
+}
+
+impl<T: Real> RestFollower<T> {
+    /// Before any reading, R₀ is calibration's.
+    ///
+    /// ```
+    /// let bounds = ohmstrain::RestBounds { low: None, high: Some(1.5) };
+    /// assert_eq!(ohmstrain::RestFollower::<f64>::new(bounds).off(), 0.0);
+    /// ```
+    #[must_use]
+    pub fn new(bounds: RestBounds) -> Self {
+        Self { bounds, off: T::zero(), last: None, since_s: T::zero() }
+    }
+
+    /// By what share of calibration's R₀ it is another.
+    ///
+    /// ```
+    /// let mut follower = ohmstrain::RestFollower::<f64>::new(ohmstrain::RestBounds { low: None, high: None });
+    /// follower.see(1.0, 2.0);
+    /// assert_eq!(follower.off(), 0.0);
+    /// ```
+    #[must_use]
+    pub fn off(&self) -> T {
+        self.off
+    }
+
+    /// A reading relative to R₀ as it is, from one relative to calibration's.
+    ///
+    /// ```
+    /// let follower = ohmstrain::RestFollower::<f64>::new(ohmstrain::RestBounds { low: None, high: None });
+    /// assert_eq!(follower.relative(0.5.into()).value, 0.5);
+    /// ```
+    #[must_use]
+    pub fn relative(&self, reading: Reading<T>) -> Reading<T> {
+        let rest = T::one() + self.off;
+        let extra_variance = reading.extra_variance / (rest * rest);
+        Reading { value: (reading.value - self.off) / rest, extra_variance }
+    }
+
+    /// Takes a reading R/R₀ - 1, of calibration's R₀, `dt_s` seconds after the row before. A number that comes again says nothing until another one comes:
+    /// it may be stuck.
+    ///
+    /// ```
+    /// let bounds = ohmstrain::RestBounds { low: None, high: Some(1.5) };
+    /// let mut follower = ohmstrain::RestFollower::<f64>::new(bounds);
+    /// [1.4, 2.0, 2.0].into_iter().for_each(|reading| follower.see(2.0, reading));
+    /// // 0.2, by 2 s of 40.
+    /// assert!((follower.off() - 0.2 * 2.0 / 42.0).abs() < 1e-12);
+    /// ```
+    pub fn see(&mut self, dt_s: T, reading: T) {
+        self.draw(FOLLOWING.leaves_s, dt_s, reading);
+    }
+
+    fn draw(&mut self, leaves_s: f64, dt_s: T, reading: T) {
+        let last = self.last.replace(reading);
+        self.since_s = if last.is_none() { T::zero() } else { self.since_s + dt_s };
+        if last.is_none_or(|last| last == reading) {
+            return;
+        }
+        let (since_s, longest_s) = (core::mem::replace(&mut self.since_s, T::zero()), T::of(FOLLOWING.longest_s));
+        let passed_s = if since_s < longest_s { since_s } else { longest_s };
+        let wanted = |bound: f64| (reading - T::of(bound)) / T::of(1.0 + bound);
+        let (low, high) = (self.bounds.low.map(wanted), self.bounds.high.map(wanted));
+        let Some(wanted) = high.filter(|&high| high > self.off).or(low.filter(|&low| low < self.off)) else { return };
+        if T::of(1.0 / FOLLOWING.farthest - 1.0) < wanted && wanted < T::of(FOLLOWING.farthest - 1.0) {
+            let time_s = T::of(if wanted.abs() > self.off.abs() { leaves_s } else { FOLLOWING.returns_s });
+            self.off += passed_s / (time_s + passed_s) * (wanted - self.off);
+        }
+    }
+}
+
+impl RestFollower<f64> {
+    /// The one R₀ of a recording: what is left when it has been gone through, and once more with that.
+    pub(crate) fn settled(mut self, len: usize, row: impl Fn(usize) -> (f64, Option<f64>)) -> Self {
+        for _ in 0..2 {
+            let mut last_s = f64::NAN;
+            self.last = None;
+            for k in 0..len {
+                let (time_s, reading) = row(k);
+                if let Some(reading) = reading {
+                    self.draw(FOLLOWING.settles_s, time_s - last_s, reading);
+                    last_s = time_s;
+                }
+            }
+            if self.off == 0.0 {
+                break;
+            }
+        }
+        self
+    }
+}
