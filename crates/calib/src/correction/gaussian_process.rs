@@ -71,7 +71,7 @@ impl Lessons<'_> {
     fn squared_distances(self) -> DMatrix<f64> {
         let n = self.inputs.len();
         let square = |i: usize, j: usize| self.inputs[i].iter().zip(self.inputs[j]).map(|(a, b)| (a - b).powi(2)).sum();
-        DMatrix::from_fn(n, n, square)
+        symmetric(n, square)
     }
 }
 
@@ -87,7 +87,7 @@ impl GaussianProcess {
         let centre = targets.iter().sum::<f64>() / n as f64;
         let size = (targets.iter().map(|y| (y - centre).powi(2)).sum::<f64>() / n as f64).sqrt().max(f64::MIN_POSITIVE);
         let targets = DVector::from_iterator(n, targets.iter().map(|y| (y - centre) / size));
-        let kernel = DMatrix::from_fn(n, n, |i, j| kernel(params.length, squares[(i, j)], inputs[i][0] * inputs[j][0]));
+        let kernel = symmetric(n, |i, j| kernel(params.length, squares[(i, j)], inputs[i][0] * inputs[j][0]));
         let covariance = (&kernel + noise_covariance(time_s, params)).cholesky()?;
         let weights = covariance.solve(&targets);
         let scale = targets.dot(&weights) / n as f64;
@@ -156,10 +156,22 @@ impl GaussianProcess {
 /// Covariance of the noise, in variances of the targets.
 fn noise_covariance(time_s: &[f64], params: ProcessParams) -> DMatrix<f64> {
     let variance = params.noise.powi(2);
-    DMatrix::from_fn(time_s.len(), time_s.len(), |i, j| {
+    symmetric(time_s.len(), |i, j| {
         let white = if i == j { WHITE * variance + JITTER } else { 0.0 };
         variance * (-(time_s[i] - time_s[j]).abs() / params.noise_time_s).exp() + white
     })
+}
+
+/// A symmetric matrix; `entry` is asked for those of the lower triangle.
+fn symmetric(n: usize, entry: impl Fn(usize, usize) -> f64) -> DMatrix<f64> {
+    let mut matrix = DMatrix::zeros(n, n);
+    for j in 0..n {
+        for i in j..n {
+            matrix[(i, j)] = entry(i, j);
+        }
+    }
+    matrix.fill_upper_triangle_with_lower_triangle();
+    matrix
 }
 
 /// The rows that say most about all others, by a pivoted Cholesky decomposition of a kernel (Fine & Scheinberg, *J. Mach.

@@ -1,3 +1,4 @@
+use std::mem;
 use std::ops::Range;
 
 use ohmstrain_ekf::{Estimator, Reading, StepError};
@@ -10,7 +11,7 @@ use crate::filter::{Output, Rows, WayBack};
 /// ten million rows that leaves 2441 states to begin again from, fewer than the rows of one segment.
 pub(crate) const SEGMENT: usize = 4096;
 
-/// The way back through a recording: every segment is filtered once more, from the state kept before its first row.
+/// The way back through a recording: every segment but the last is filtered once more, from the state kept before its first row.
 pub(crate) struct Segments<'a, E: Estimator<f64, N, L>, const B: usize, const N: usize, const L: usize> {
     running: &'a mut Running<E, B, N, L>,
     rows: Rows<'a>,
@@ -20,6 +21,8 @@ pub(crate) struct Segments<'a, E: Estimator<f64, N, L>, const B: usize, const N:
     smoothed: E::State,
     /// The present segment.
     steps: Vec<(Seen, Taken<E, N, L>)>,
+    /// Whether that is the last, whose steps are there already.
+    is_last: bool,
 }
 
 impl<'a, E, const B: usize, const N: usize, const L: usize> Segments<'a, E, B, N, L>
@@ -30,29 +33,40 @@ where
     pub(crate) fn new(running: &'a mut Running<E, B, N, L>, rows: Rows<'a>) -> Result<Self, (usize, StepError)> {
         let mut now = running.now.clone();
         let mut starts = Vec::with_capacity(rows.len() / SEGMENT + 1);
-        for row in 0..rows.len() {
+        let last = rows.len().saturating_sub(1) / SEGMENT * SEGMENT;
+        for row in 0..last {
             if row % SEGMENT == 0 {
                 starts.push(now.clone());
             }
             let (time_s, reading): (f64, Option<Reading<f64>>) = rows.get(row);
             running.stepper.advance_only(&mut now, time_s, reading).map_err(|error| (row, error))?;
         }
-        let smoothed = now.state.clone();
-        running.now = now;
-        Ok(Self { running, rows, starts, smoothed, steps: Vec::new() })
-    }
-
-    fn replay(&mut self, start: Moment<E::State>, rows: Range<usize>) -> Result<(), (usize, StepError)> {
-        self.steps.clear();
-        let mut now = start;
-        for row in rows {
-            let (time_s, reading) = self.rows.get(row);
-            let (next, step) = self.running.stepper.advance(&now, time_s, reading).map_err(|error| (row, error))?;
-            self.steps.push((next.seen, step));
-            now = next;
+        if last < rows.len() {
+            starts.push(now.clone());
         }
-        Ok(())
+        let mut steps = Vec::new();
+        running.now = steps_of(running, now, rows, last..rows.len(), &mut steps)?;
+        let smoothed = running.now.state.clone();
+        Ok(Self { running, rows, starts, smoothed, steps, is_last: true })
     }
+}
+
+/// Filters a segment from where it begins, and keeps its steps.
+fn steps_of<E: Estimator<f64, N, L>, const B: usize, const N: usize, const L: usize>(
+    running: &mut Running<E, B, N, L>,
+    mut now: Moment<E::State>,
+    rows: Rows<'_>,
+    segment: Range<usize>,
+    steps: &mut Vec<(Seen, Taken<E, N, L>)>,
+) -> Result<Moment<E::State>, (usize, StepError)> {
+    steps.clear();
+    for row in segment {
+        let (time_s, reading) = rows.get(row);
+        let (next, step) = running.stepper.advance(&now, time_s, reading).map_err(|error| (row, error))?;
+        steps.push((next.seen, step));
+        now = next;
+    }
+    Ok(now)
 }
 
 impl<E, const B: usize, const N: usize, const L: usize> WayBack for Segments<'_, E, B, N, L>
@@ -64,7 +78,9 @@ where
         let Some(start) = self.starts.pop() else { return Ok(None) };
         let first = self.starts.len() * SEGMENT;
         let rows = first..self.rows.len().min(first + SEGMENT);
-        self.replay(start, rows.clone())?;
+        if !mem::take(&mut self.is_last) {
+            steps_of(self.running, start, self.rows, rows.clone(), &mut self.steps)?;
+        }
         for (row, (seen, step)) in rows.clone().zip(&self.steps).rev() {
             out.push(self.running.smoothed_output(&self.smoothed, *seen));
             let estimator = &self.running.stepper.estimator;

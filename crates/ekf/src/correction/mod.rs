@@ -20,6 +20,7 @@ mod process;
 
 use ohmstrain_model::StrainRange;
 
+use crate::kernel::{Lanes, MOST_LANES, Several, Work};
 use crate::{Gaussian, Real};
 pub use features::{
     FARTHEST, FEATURES, FeatureScale, PASSED_OVER, RATE_GAIN, ReadingFeatures, Starts, TIME_CONSTANTS_S, settled,
@@ -31,6 +32,8 @@ pub use process::{LINEAR, Process, kernel};
 /// Number of a filter's outputs that a correction sees: strain, its rate, relaxation, baseline, and the probabilities of
 /// stretching and releasing.
 pub const OUTPUTS: usize = 6;
+/// With the features of the readings up to now.
+const FILTER_INPUTS: usize = OUTPUTS + FEATURES;
 /// Most inducing rows.
 pub const INDUCING: usize = 48;
 
@@ -108,25 +111,39 @@ struct SquaredDistance<T> {
     future: T,
 }
 
-impl<T: Real> SquaredDistance<T> {
-    fn new(mut squares: impl Iterator<Item = T>) -> Self {
-        let sum = |sum: T, square: T| sum + square;
-        let outputs = squares.by_ref().take(OUTPUTS).fold(T::zero(), sum);
-        let reading = squares.next().unwrap_or(T::zero());
-        let past = squares.by_ref().take(FEATURES - 1).fold(reading, sum);
-        Self { outputs, reading, past, future: squares.fold(T::zero(), sum) }
+impl<V: Lanes> SquaredDistance<V> {
+    /// Of inputs, of which there are `D`, that are so far apart.
+    #[inline(always)]
+    fn new<const D: usize>(zero: V, apart: impl Fn(usize) -> V) -> Self {
+        let (mut outputs, mut reading, mut past, mut future) = (zero, zero, zero, zero);
+        for i in 0..D {
+            let square = apart(i) * apart(i);
+            if i < OUTPUTS {
+                outputs += square;
+            } else if i == OUTPUTS {
+                (reading, past) = (square, square);
+            } else if i < FILTER_INPUTS {
+                past += square;
+            } else {
+                future += square;
+            }
+        }
+        Self { outputs, reading, past, future }
     }
 
-    fn of_features(&self) -> T {
+    #[inline(always)]
+    fn of_features(&self) -> V {
         self.past + self.future
     }
 
-    fn of_all(&self) -> T {
+    #[inline(always)]
+    fn of_all(&self) -> V {
         self.outputs + self.of_features()
     }
 
     /// Of what the one-sided processes see.
-    fn of_sides(&self) -> [T; 2] {
+    #[inline(always)]
+    fn of_sides(&self) -> [V; 2] {
         [self.past, self.reading + self.future]
     }
 }
@@ -136,35 +153,11 @@ impl<T: Real, const D: usize, const S: usize> Correction<'_, T, D, S> {
     /// readings; `filtered` is the filter's strain with its deviation.
     #[must_use]
     pub fn correct(&self, inputs: &[T; D], filtered: Gaussian<T>) -> Corrected<T, S> {
-        let Standardised { inputs: x, outside } = self.standardised(inputs);
-        let (mut direct, mut residual) = (Kernels::new(&self.direct), Kernels::new(&self.residual));
-        let mut sides = self.one_sided.each_ref().map(Kernels::new);
-        let of_residual =
-            Process { least_variance: self.residual.least_variance.max(filtered.variance), ..self.residual };
-        let (reading, strain) = (x.get(OUTPUTS).copied().unwrap_or(T::zero()), x[0]);
-        for row in self.rows {
-            let distance = SquaredDistance::new(x.iter().zip(row).map(|(a, b)| (*a - *b) * (*a - *b)));
-            let readings = reading * row.get(OUTPUTS).copied().unwrap_or(T::zero());
-            direct.add(&self.direct, distance.of_features(), readings);
-            for ((kernels, process), square) in sides.iter_mut().zip(&self.one_sided).zip(distance.of_sides()) {
-                kernels.add(process, square, readings);
-            }
-            residual.add(&self.residual, distance.of_all(), strain * row[0]);
-        }
-        let direct = self.widened(direct.said(&self.direct, reading), &self.direct, outside.of_features(), T::zero());
-        let mut of_sides = self.one_sided.iter().zip(outside.of_sides());
-        let one_sided = sides.map(|kernels| match of_sides.next() {
-            Some((process, outside)) => self.widened(kernels.said(process, reading), process, outside, T::zero()),
-            None => direct,
-        });
-        let said = residual.said(&of_residual, strain);
-        let novelty = T::one() - (T::one() - said.unknown) * (-outside.of_all() / T::of(NEW)).exp();
-        let residual = self.widened(said, &self.residual, outside.of_all(), filtered.mean);
-        let mixed = mixture([direct, residual].into_iter().chain(one_sided));
-        let variance = mixed.variance * self.variance_factor + T::of(NOVEL) * self.strain_variance * novelty;
-        Corrected { strain: Gaussian { mean: mixed.mean, variance }, direct, one_sided, residual, novelty }
+        let work = Correcting { correction: self, inputs, filtered };
+        T::in_vectors(work).unwrap_or_else(|| work.with_lanes(T::zero()))
     }
 
+    #[inline(always)]
     fn standardised(&self, inputs: &[T; D]) -> Standardised<T, D> {
         let (mut x, mut excess) = ([T::zero(); D], [T::zero(); D]);
         for ((x, excess), (input, scale)) in x.iter_mut().zip(&mut excess).zip(inputs.iter().zip(self.scales)) {
@@ -172,13 +165,66 @@ impl<T: Real, const D: usize, const S: usize> Correction<'_, T, D, S> {
             *x = (inside - scale.mean) / scale.sd;
             *excess = (*input - inside) / scale.sd;
         }
-        Standardised { inputs: x, outside: SquaredDistance::new(excess.into_iter().map(|excess| excess * excess)) }
+        Standardised { inputs: x, outside: SquaredDistance::new::<D>(T::zero(), |i| excess[i]) }
     }
 
     /// A process' strain on top of `base`, within the limits, with all that its variance gets.
     fn widened(&self, said: Said<T>, process: &Process<'_, T>, outside: T, base: T) -> Gaussian<T> {
         let variance = said.strain.variance * process.widening + T::of(FAR) * self.strain_variance * outside;
         Gaussian { mean: self.limits.clamp(base + said.strain.mean), variance }
+    }
+}
+
+/// The correction of one strain; training rows stand in lanes.
+#[derive(Clone, Copy)]
+struct Correcting<'a, T, const D: usize, const S: usize> {
+    correction: &'a Correction<'a, T, D, S>,
+    inputs: &'a [T; D],
+    filtered: Gaussian<T>,
+}
+
+impl<T: Real, const D: usize, const S: usize> Work<T> for Correcting<'_, T, D, S> {
+    type Said = Corrected<T, S>;
+
+    #[inline(always)]
+    fn with_lanes<V: Several<Number = T>>(self, like: V) -> Corrected<T, S> {
+        let Self { correction: of, inputs, filtered } = self;
+        let Standardised { inputs: x, outside } = of.standardised(inputs);
+        let (mut direct, mut residual) = (Kernels::new(&of.direct), Kernels::new(&of.residual));
+        let mut sides = of.one_sided.each_ref().map(Kernels::new);
+        let of_residual = Process { least_variance: of.residual.least_variance.max(filtered.variance), ..of.residual };
+        let (reading, strain) = (x.get(OUTPUTS).copied().unwrap_or(T::zero()), x[0]);
+        for rows in of.rows.chunks(V::WIDTH) {
+            let Some(first) = rows.first() else { break };
+            // Lanes that are left have the first one's numbers.
+            let mut side_by_side = [first; MOST_LANES];
+            for lane in 1..V::WIDTH {
+                side_by_side[lane] = rows.get(lane).unwrap_or(first);
+            }
+            let mut inputs = [like; D];
+            for i in 0..D {
+                [inputs[i]] = like.build(|lane| [side_by_side[lane][i]]);
+            }
+            let distance = SquaredDistance::new::<D>(like.nothing(), |i| like.with(x[i]) - inputs[i]);
+            let readings = inputs.get(OUTPUTS).copied().unwrap_or(like.nothing()).scale(reading);
+            direct.add(&of.direct, distance.of_features(), readings, rows.len());
+            for ((kernels, process), square) in sides.iter_mut().zip(&of.one_sided).zip(distance.of_sides()) {
+                kernels.add(process, square, readings, rows.len());
+            }
+            residual.add(&of.residual, distance.of_all(), inputs[0].scale(strain), rows.len());
+        }
+        let direct = of.widened(direct.said(like, &of.direct, reading), &of.direct, outside.of_features(), T::zero());
+        let mut of_sides = of.one_sided.iter().zip(outside.of_sides());
+        let one_sided = sides.map(|kernels| match of_sides.next() {
+            Some((process, outside)) => of.widened(kernels.said(like, process, reading), process, outside, T::zero()),
+            None => direct,
+        });
+        let said = residual.said(like, &of_residual, strain);
+        let novelty = T::one() - (T::one() - said.unknown) * (-outside.of_all() / T::of(NEW)).exp();
+        let residual = of.widened(said, &of.residual, outside.of_all(), filtered.mean);
+        let mixed = mixture([direct, residual].into_iter().chain(one_sided));
+        let variance = mixed.variance * of.variance_factor + T::of(NOVEL) * of.strain_variance * novelty;
+        Corrected { strain: Gaussian { mean: mixed.mean, variance }, direct, one_sided, residual, novelty }
     }
 }
 
@@ -203,4 +249,48 @@ pub fn mixture<T: Real>(voices: impl IntoIterator<Item = Gaussian<T>, IntoIter: 
     let spread = |voice: Gaussian<T>| voice.variance + (voice.mean - mean) * (voice.mean - mean);
     let variance = weighted.fold(T::zero(), |sum, (weight, voice)| sum + weight / total * spread(voice));
     Gaussian { mean, variance }
+}
+
+#[cfg(all(test, feature = "simd"))]
+mod tests {
+    use super::{Correcting, Correction, FILTER_INPUTS, INDUCING, InputScale, Process, StrainRange};
+    use crate::Gaussian;
+    use crate::kernel::Work;
+
+    /// Three rows more than fill vectors, inducing rows that do not.
+    #[test]
+    fn vectors_of_training_rows_say_what_numbers_say() {
+        const ROWS: usize = 4 * INDUCING + 3;
+        let number = |k: usize| (0.37 * k as f64).sin() + 0.5 * (1.93 * k as f64).sin();
+        let rows: [[f64; FILTER_INPUTS + 2]; ROWS] =
+            core::array::from_fn(|k| core::array::from_fn(|i| number(29 * k + i)));
+        let weights: [f64; ROWS] = core::array::from_fn(|k| number(7 * k));
+        let explained: [f64; 21 * 11] = core::array::from_fn(|k| 0.2 * number(3 * k));
+        let process = |length: f64| Process {
+            length,
+            mean: 0.1,
+            weights: &weights,
+            explained: &explained,
+            variance: 0.4,
+            noise: 0.01,
+            widening: 1.2,
+            least_variance: 0.3,
+        };
+        let correction = Correction {
+            rows: &rows,
+            scales: &[InputScale { mean: 0.1, sd: 0.8, lower: -1.0, upper: 1.2 }; FILTER_INPUTS + 2],
+            direct: process(2.0),
+            one_sided: [process(1.5), process(0.7)],
+            residual: process(3.0),
+            limits: StrainRange { lower: -9.0, upper: 9.0 },
+            strain_variance: 0.7,
+            variance_factor: 1.1,
+        };
+        for trial in 0..100 {
+            let inputs = core::array::from_fn(|i| number(1000 + 31 * trial + i));
+            let filtered = Gaussian { mean: inputs[0], variance: 0.1 };
+            let number_by_number = Correcting { correction: &correction, inputs: &inputs, filtered }.with_lanes(0.0);
+            assert_eq!(correction.correct(&inputs, filtered), number_by_number, "{trial}");
+        }
+    }
 }

@@ -1,4 +1,5 @@
 use super::INDUCING;
+use crate::kernel::Several;
 use crate::{Gaussian, Real};
 
 /// Weight of the linear part of the kernel, relative to the squared exponential.
@@ -52,28 +53,43 @@ impl<T: Real> Kernels<T> {
         Self { mean: process.mean, inducing: [T::zero(); INDUCING], rows: 0 }
     }
 
-    /// Adds the next training row; `square` is its squared distance, `product` that of the first inputs.
-    pub(super) fn add(&mut self, process: &Process<'_, T>, square: T, product: T) {
-        let kernel = kernel(process.length, square, product);
-        if let Some(weight) = process.weights.get(self.rows) {
-            self.mean += *weight * kernel;
+    /// Adds the next training rows, as many as there are lanes or fewer; `square` is their squared distance, `product` that
+    /// of the first inputs.
+    #[inline(always)]
+    pub(super) fn add<V: Several<Number = T>>(
+        &mut self,
+        process: &Process<'_, T>,
+        square: V,
+        product: V,
+        count: usize,
+    ) {
+        let exponent = (square * square.literal(-0.5)).over(square.with(process.length * process.length));
+        let kernel = T::falling(exponent) + (product + product.literal(1.0)).scale(T::of(LINEAR));
+        let weights = process.weights.get(self.rows..).unwrap_or(&[]);
+        let [weights] = kernel.build(|lane| [weights.get(lane).copied().unwrap_or(T::zero())]);
+        let weighted = weights * kernel;
+        // One after the other: the same sum whatever the lanes.
+        for lane in 0..V::WIDTH {
+            self.mean += weighted.at(lane);
+            if let Some(place) = self.inducing.get_mut(self.rows + lane) {
+                *place = kernel.at(lane);
+            }
         }
-        if let Some(place) = self.inducing.get_mut(self.rows) {
-            *place = kernel;
-        }
-        self.rows += 1;
+        self.rows += count;
     }
 
     /// What the process says; `first` is the first input.
-    pub(super) fn said(&self, process: &Process<'_, T>, first: T) -> Said<T> {
+    #[inline(always)]
+    pub(super) fn said<V: Several<Number = T>>(&self, like: V, process: &Process<'_, T>, first: T) -> Said<T> {
         let prior = T::one() + linear(first * first);
-        let unknown = ((prior - self.explained(process.explained)) / prior).max(T::zero()).min(T::one());
+        let unknown = ((prior - self.explained(like, process.explained)) / prior).max(T::zero()).min(T::one());
         let latent = (prior * process.variance).max(process.least_variance) * unknown;
         Said { strain: Gaussian { mean: self.mean, variance: latent + process.noise }, unknown }
     }
 
     /// |W k|².
-    fn explained(&self, mut triangle: &[T]) -> T {
+    #[inline(always)]
+    fn explained<V: Several<Number = T>>(&self, like: V, mut triangle: &[T]) -> T {
         let mut explained = T::zero();
         // m rows of the triangle are m (m + 1) / 2 numbers.
         let rows = ((8 * triangle.len() + 1).isqrt() - 1) / 2;
@@ -82,7 +98,7 @@ impl<T: Real> Kernels<T> {
             if row.is_empty() {
                 break;
             }
-            let product = row.iter().zip(kernels).fold(T::zero(), |sum, (w, k)| sum + *w * *k);
+            let product = T::dot(like, row, kernels);
             explained += product * product;
             triangle = rest;
             kernels = kernels.get(1..).unwrap_or(&[]);

@@ -1,5 +1,6 @@
 //! Lanes whose numbers are at hand one by one, for what vectors do not compute.
 
+use nalgebra::ComplexField;
 use ohmstrain_model::Scalar;
 
 use super::{Lanes, Parts};
@@ -144,7 +145,6 @@ pub(crate) trait Work<T> {
     type Said;
 
     /// Does it with lanes as these.
-    #[cfg_attr(not(all(feature = "simd", target_arch = "x86_64")), expect(dead_code, reason = "only vectors ask"))]
     fn with_lanes<V: Several<Number = T>>(self, like: V) -> Self::Said;
 }
 
@@ -153,6 +153,10 @@ pub(crate) trait InVectors: Scalar {
     /// Does work with vectors where the processor has some that are worth it. They round as numbers do: results are the same
     /// to the last bit.
     fn in_vectors<W: Work<Self>>(work: W) -> Option<W::Said>;
+    /// Exponentials of what is not above zero.
+    fn falling<V: Several<Number = Self>>(exponents: V) -> V;
+    /// `Σ aᵢ bᵢ`, the same to the last bit whatever the lanes.
+    fn dot<V: Several<Number = Self>>(like: V, a: &[Self], b: &[Self]) -> Self;
 }
 
 impl InVectors for f32 {
@@ -160,9 +164,72 @@ impl InVectors for f32 {
     fn in_vectors<W: Work<Self>>(_: W) -> Option<W::Said> {
         None
     }
+
+    /// As exported C does it.
+    #[inline(always)]
+    fn falling<V: Several<Number = Self>>(exponents: V) -> V {
+        let [powers] = exponents.build(|lane| [ComplexField::exp(exponents.at(lane))]);
+        powers
+    }
+
+    /// One after the other, as exported C does it.
+    #[inline(always)]
+    fn dot<V: Several<Number = Self>>(_: V, a: &[Self], b: &[Self]) -> Self {
+        a.iter().zip(b).fold(0.0, |sum, (a, b)| sum + *a * *b)
+    }
 }
 
+/// 1/k! for k up to 13.
+const INVERSE_FACTORIALS: [f64; 14] = {
+    let mut inverses = [1.0; 14];
+    let mut k = 1;
+    while k < 14 {
+        inverses[k] = inverses[k - 1] / k as f64;
+        k += 1;
+    }
+    inverses
+};
+
 impl InVectors for f64 {
+    /// `2ⁿ eʳ` with |r| ≤ ln(2)/2, where Taylor's series to r¹³ leaves r¹⁴/14! < 5e-18; nothing below e⁻⁷⁰⁸, the last that is
+    /// a normal number.
+    #[inline(always)]
+    fn falling<V: Several<Number = Self>>(exponents: V) -> V {
+        // Added to a number, this leaves the nearest integer, plus the exponent's bias, in the lowest bits: 1.5 · 2⁵² + 1023.
+        const ROUNDS: f64 = 6_755_399_441_056_767.0;
+        // ln 2 as fdlibm has it: the first has so few bits that its products with n are exact.
+        const LN_2: [f64; 2] = [6.931_471_803_691_238e-1, 1.908_214_929_270_587_7e-10];
+        let least = exponents.literal(-708.0);
+        let x = V::pick(exponents.less(least), least, exponents);
+        let rounded = x.scale_add(core::f64::consts::LOG2_E, x.literal(ROUNDS));
+        let n = rounded - x.literal(ROUNDS);
+        let r = x - n.scale(LN_2[0]) - n.scale(LN_2[1]);
+        let mut sum = x.literal(INVERSE_FACTORIALS[13]);
+        for k in (0..13).rev() {
+            sum = sum.mul_add(r, x.literal(INVERSE_FACTORIALS[k]));
+        }
+        let [power] = x.build(|lane| [Self::from_bits(rounded.at(lane).to_bits() << 52)]);
+        sum * power
+    }
+
+    /// In four sums, of every fourth product each.
+    #[inline(always)]
+    fn dot<V: Several<Number = Self>>(like: V, a: &[Self], b: &[Self]) -> Self {
+        let mut sums = [like.nothing(); 4];
+        let mut add = |a: [Self; 4], b: [Self; 4]| {
+            for i in 0..4 / V::WIDTH {
+                let [a, b] = like.build(|lane| [a[i * V::WIDTH + lane], b[i * V::WIDTH + lane]]);
+                sums[i] = a.mul_add(b, sums[i]);
+            }
+        };
+        let ((fours_a, last_a), (fours_b, last_b)) = (a.as_chunks(), b.as_chunks());
+        fours_a.iter().zip(fours_b).for_each(|(a, b)| add(*a, *b));
+        let filled = |last: &[Self]| core::array::from_fn(|i| last.get(i).copied().unwrap_or(0.0));
+        add(filled(last_a), filled(last_b));
+        let sum = |i: usize| sums[i / V::WIDTH].at(i % V::WIDTH);
+        (sum(0) + sum(1)) + (sum(2) + sum(3))
+    }
+
     #[cfg(all(feature = "simd", target_arch = "x86_64"))]
     #[inline(always)]
     fn in_vectors<W: Work<Self>>(work: W) -> Option<W::Said> {
@@ -179,5 +246,24 @@ impl InVectors for f64 {
     #[inline(always)]
     fn in_vectors<W: Work<Self>>(_: W) -> Option<W::Said> {
         None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::InVectors;
+
+    /// The reduced argument is off by half a rounding of 0.35, the series by one of each of 1 and 0.35 and by r times what its inner
+    /// sums are off by; the result is 0.7 or more. libm's is off by one.
+    #[test]
+    fn exponentials_of_what_is_not_above_zero() {
+        for k in 0..70_800 {
+            let x = -0.01 * f64::from(k);
+            let (found, expected) = (f64::falling(x), x.exp());
+            assert!((found - expected).abs() <= 3.0 * f64::EPSILON * expected, "{x}: {found} {expected}");
+        }
+        assert_eq!(f64::falling(0.0), 1.0);
+        assert_eq!(f64::falling(f64::NEG_INFINITY), f64::falling(-708.0));
+        assert!(f64::falling(f64::NAN).is_nan());
     }
 }

@@ -177,8 +177,12 @@ impl<T: Real, const N: usize, const L: usize, const K: usize> Lineage<T, N, L, K
     }
 
     fn renumber(&mut self, new_place: impl Fn(usize) -> Option<usize>) {
-        for child in self.children.iter_mut().flatten() {
-            *child = child.take().and_then(|child| Some(Descent { heir: new_place(child.heir)?, ..child }));
+        for place in self.children.iter_mut().flatten() {
+            let Some(child) = place else { continue };
+            match new_place(child.heir) {
+                Some(heir) => child.heir = heir,
+                None => *place = None,
+            }
         }
     }
 
