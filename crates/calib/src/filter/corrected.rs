@@ -12,8 +12,8 @@ use crate::filter::way_back::SEGMENT;
 use crate::filter::{Filter, Output, Rows, WayBack};
 use crate::params::RangeParams;
 use crate::params::correction::{
-    CorrectionParams, CorrectionScale, CorrectorParams, FILTER_INPUTS, FUTURE_FEATURES, SIDES, SMOOTHER_INPUTS,
-    TrainingRow, filter_inputs, smoother_inputs,
+    CorrectionParams, CorrectorParams, FILTER_INPUTS, FUTURE_FEATURES, SIDES, SMOOTHER_INPUTS, TrainingRow,
+    filter_inputs, smoother_inputs,
 };
 
 /// A reading that a guard has weighed down and whose normalised innovation squared is above this surprises: three standard
@@ -27,13 +27,12 @@ pub const SURPRISING_NIS: f64 = 9.0;
 pub(crate) struct Corrected {
     filter: Box<dyn Filter>,
     of_filter: OwnedCorrection<f64, FILTER_INPUTS>,
-    of_smoother: OwnedCorrection<f64, SMOOTHER_INPUTS, SIDES>,
-    scale: CorrectionScale,
+    /// What a smoother's correction is learned from when it is asked for: that takes as long as filtering 1000 rows.
+    params: CorrectionParams,
+    limits: RangeParams,
     readings: Readings,
     /// What the filter has said of the last row.
     said: Option<Output>,
-    /// For how long errors of the correction hang together, s.
-    errors_last_s: f64,
     /// What is left of a moment at which the strain was known.
     known: Option<KnownError>,
     /// Corrected strains of the rows that wait for a fixed lag.
@@ -75,15 +74,13 @@ impl Corrected {
         params: &CorrectionParams,
         limits: RangeParams,
     ) -> Result<Self, CalibrationError> {
-        let scale = params.readings;
         Ok(Self {
             filter,
             of_filter: learned_for_filter(params, limits)?,
-            of_smoother: learned(&params.smoother, &params.rows, TrainingRow::smoother_inputs, limits)?,
-            scale,
-            readings: Readings::new(scale.past()),
+            params: params.clone(),
+            limits,
+            readings: Readings::new(params.readings.past()),
             said: None,
-            errors_last_s: params.filter.residual.noise_time_s,
             known: None,
             waiting: VecDeque::new(),
             lagged: Vec::new(),
@@ -135,6 +132,14 @@ pub(crate) fn learned_for_filter(
     limits: RangeParams,
 ) -> Result<OwnedCorrection<f64, FILTER_INPUTS>, CalibrationError> {
     learned(&params.filter, &params.rows, TrainingRow::filter_inputs, limits)
+}
+
+/// What corrects the smoother's.
+fn learned_for_smoother(
+    params: &CorrectionParams,
+    limits: RangeParams,
+) -> Result<OwnedCorrection<f64, SMOOTHER_INPUTS, SIDES>, CalibrationError> {
+    learned(&params.smoother, &params.rows, TrainingRow::smoother_inputs, limits)
 }
 
 fn learned<const D: usize, const S: usize>(
@@ -198,7 +203,8 @@ impl Filter for Corrected {
         self.filter.know(strain)?;
         let said = self.filter.output();
         let learned = self.learned(&said);
-        let lasts_s = self.errors_last_s;
+        // For how long errors of the correction hang together.
+        let lasts_s = self.params.filter.residual.noise_time_s;
         self.known = self.readings.time_s.map(|time_s| KnownError::new(time_s, lasts_s, strain, &learned));
         self.said = Some(said);
         Ok(())
@@ -240,6 +246,7 @@ impl Filter for Corrected {
     }
 
     fn way_back<'a>(&'a mut self, rows: Rows<'a>) -> Result<Box<dyn WayBack + 'a>, (usize, StepError)> {
+        let correction = learned_for_smoother(&self.params, self.limits).map_err(|_| (0, StepError::NoSmoother))?;
         let mut starts = Vec::with_capacity(rows.len() / SEGMENT + 1);
         let mut past = self.readings;
         for row in 0..rows.len() {
@@ -252,7 +259,7 @@ impl Filter for Corrected {
         // The filter says what it says at the end of the recording.
         (self.readings, self.said, self.known) = (past, None, None);
         let back = self.filter.way_back(rows)?;
-        let (correction, ahead) = (&self.of_smoother, Readings::new(self.scale.future()));
+        let ahead = Readings::new(self.params.readings.future());
         Ok(Box::new(CorrectedWayBack { back, correction, rows, starts, ahead }))
     }
 }
@@ -260,7 +267,7 @@ impl Filter for Corrected {
 /// A smoother on its way back, corrected segment by segment.
 struct CorrectedWayBack<'a> {
     back: Box<dyn WayBack + 'a>,
-    correction: &'a OwnedCorrection<f64, SMOOTHER_INPUTS, SIDES>,
+    correction: OwnedCorrection<f64, SMOOTHER_INPUTS, SIDES>,
     rows: Rows<'a>,
     /// What had been seen of the past before each segment that is still to come. Readings that were kept from the filter
     /// were seen here, as far as features go: within a segment they are not, and what was before it fades in seconds.

@@ -11,7 +11,7 @@ use crate::filter::{Output, Rows, WayBack};
 /// ten million rows that leaves 2441 states to begin again from, fewer than the rows of one segment.
 pub(crate) const SEGMENT: usize = 4096;
 
-/// The way back through a recording: every segment but the last is filtered once more, from the state kept before its first row.
+/// The way back through a recording: segments but the last are filtered once more, from the state before their first rows.
 pub(crate) struct Segments<'a, E: Estimator<f64, N, L>, const B: usize, const N: usize, const L: usize> {
     running: &'a mut Running<E, B, N, L>,
     rows: Rows<'a>,

@@ -117,7 +117,8 @@ impl<V: Lanes> SquaredDistance<V> {
     fn new<const D: usize>(zero: V, apart: impl Fn(usize) -> V) -> Self {
         let (mut outputs, mut reading, mut past, mut future) = (zero, zero, zero, zero);
         for i in 0..D {
-            let square = apart(i) * apart(i);
+            let apart = apart(i);
+            let square = apart * apart;
             if i < OUTPUTS {
                 outputs += square;
             } else if i == OUTPUTS {
@@ -201,17 +202,17 @@ impl<T: Real, const D: usize, const S: usize> Work<T> for Correcting<'_, T, D, S
             for lane in 1..V::WIDTH {
                 side_by_side[lane] = rows.get(lane).unwrap_or(first);
             }
-            let mut inputs = [like; D];
-            for i in 0..D {
-                [inputs[i]] = like.build(|lane| [side_by_side[lane][i]]);
-            }
-            let distance = SquaredDistance::new::<D>(like.nothing(), |i| like.with(x[i]) - inputs[i]);
-            let readings = inputs.get(OUTPUTS).copied().unwrap_or(like.nothing()).scale(reading);
+            let column = |i: usize| {
+                let [column] = like.build(|lane| [side_by_side[lane].get(i).copied().unwrap_or(T::zero())]);
+                column
+            };
+            let distance = SquaredDistance::new::<D>(like.nothing(), |i| like.with(x[i]) - column(i));
+            let readings = column(OUTPUTS).scale(reading);
             direct.add(&of.direct, distance.of_features(), readings, rows.len());
             for ((kernels, process), square) in sides.iter_mut().zip(&of.one_sided).zip(distance.of_sides()) {
                 kernels.add(process, square, readings, rows.len());
             }
-            residual.add(&of.residual, distance.of_all(), inputs[0].scale(strain), rows.len());
+            residual.add(&of.residual, distance.of_all(), column(0).scale(strain), rows.len());
         }
         let direct = of.widened(direct.said(like, &of.direct, reading), &of.direct, outside.of_features(), T::zero());
         let mut of_sides = of.one_sided.iter().zip(outside.of_sides());

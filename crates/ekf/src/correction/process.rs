@@ -53,8 +53,8 @@ impl<T: Real> Kernels<T> {
         Self { mean: process.mean, inducing: [T::zero(); INDUCING], rows: 0 }
     }
 
-    /// Adds the next training rows, as many as there are lanes or fewer; `square` is their squared distance, `product` that
-    /// of the first inputs.
+    /// Adds the next training rows, `count` of which there are; `square` is their squared distance, `product` that of the
+    /// first inputs.
     #[inline(always)]
     pub(super) fn add<V: Several<Number = T>>(
         &mut self,

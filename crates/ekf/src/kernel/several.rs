@@ -191,11 +191,11 @@ const INVERSE_FACTORIALS: [f64; 14] = {
 };
 
 impl InVectors for f64 {
-    /// `2ⁿ eʳ` with |r| ≤ ln(2)/2, where Taylor's series to r¹³ leaves r¹⁴/14! < 5e-18; nothing below e⁻⁷⁰⁸, the last that is
-    /// a normal number.
+    /// `2ⁿ eʳ` with |r| ≤ ln(2)/2, where Taylor's series to r¹³ leaves r¹⁴/14! < 5e-18; nothing below e⁻⁷⁰⁸, which still is a
+    /// normal number.
     #[inline(always)]
     fn falling<V: Several<Number = Self>>(exponents: V) -> V {
-        // Added to a number, this leaves the nearest integer, plus the exponent's bias, in the lowest bits: 1.5 · 2⁵² + 1023.
+        // Added to a number, 1.5 · 2⁵² + 1023 leaves the nearest integer, plus the exponent's bias, in the lowest bits.
         const ROUNDS: f64 = 6_755_399_441_056_767.0;
         // ln 2 as fdlibm has it: the first has so few bits that its products with n are exact.
         const LN_2: [f64; 2] = [6.931_471_803_691_238e-1, 1.908_214_929_270_587_7e-10];
@@ -224,8 +224,10 @@ impl InVectors for f64 {
         };
         let ((fours_a, last_a), (fours_b, last_b)) = (a.as_chunks(), b.as_chunks());
         fours_a.iter().zip(fours_b).for_each(|(a, b)| add(*a, *b));
-        let filled = |last: &[Self]| core::array::from_fn(|i| last.get(i).copied().unwrap_or(0.0));
-        add(filled(last_a), filled(last_b));
+        if !last_a.is_empty() {
+            let filled = |last: &[Self]| core::array::from_fn(|i| last.get(i).copied().unwrap_or(0.0));
+            add(filled(last_a), filled(last_b));
+        }
         let sum = |i: usize| sums[i / V::WIDTH].at(i % V::WIDTH);
         (sum(0) + sum(1)) + (sum(2) + sum(3))
     }
@@ -253,8 +255,8 @@ impl InVectors for f64 {
 mod tests {
     use super::InVectors;
 
-    /// The reduced argument is off by half a rounding of 0.35, the series by one of each of 1 and 0.35 and by r times what its inner
-    /// sums are off by; the result is 0.7 or more. libm's is off by one.
+    /// The reduced argument is off by half a rounding of 0.35, the series by one of each of 1 and 0.35 and by r times what
+    /// its inner sums are off by; the result is 0.7 or more. libm's is off by one.
     #[test]
     fn exponentials_of_what_is_not_above_zero() {
         for k in 0..70_800 {

@@ -3,7 +3,7 @@ use std::ops::Range;
 use ohmstrain_ekf::correction::{FEATURES, FeatureScale, ReadingFeatures, Starts, mixture};
 use ohmstrain_ekf::{Estimate, Gaussian, Guard, Reading, ReadingVerdict, StepError};
 
-use super::{Corrected, future_features, outputs};
+use super::{Corrected, future_features, learned_for_smoother, outputs};
 use crate::EstimatorKind;
 use crate::filter::way_back::SEGMENT;
 use crate::filter::{Filter, Output, Rows, WayBack};
@@ -204,7 +204,7 @@ fn segments_say_what_the_whole_recording_says() {
     let (time_s, readings) = recording();
     let (past, future) = both_ways(&time_s, &readings);
     let smoothed = corrected().smooth(&time_s, &readings).unwrap().unwrap();
-    let correction = corrected().of_smoother;
+    let correction = learned_for_smoother(&params(), LIMITS).unwrap();
     assert_eq!(smoothed.len(), time_s.len());
     let mut plain = Fake::default();
     for k in 0..time_s.len() {
