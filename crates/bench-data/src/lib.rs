@@ -46,6 +46,7 @@ mod order;
 #[cfg(feature = "import")]
 mod parquet_text;
 mod reader;
+mod row;
 mod row_parser;
 mod rows;
 mod segment;
@@ -60,9 +61,10 @@ pub use line_parser::{Line, LineParser};
 pub use metadata::{Metadata, ResistanceUnit, StrainUnit};
 #[cfg(feature = "import")]
 pub use parquet_text::ParquetText;
-pub use reader::{Reading, Row, TraceReader};
+pub use reader::TraceReader;
+pub use row::{Quantity, Reading, ReadingKind, Row};
 pub use rows::RowWriter;
 pub use segment::{Segment, segment};
 pub use simulate::simulate;
 pub use spec::{FrontEndSpec, JointSpec};
-pub use trace::{ConverterReadings, Quantity, ReadingKind, Readings, Reference, Trace};
+pub use trace::{ConverterReadings, Readings, Reference, Trace};

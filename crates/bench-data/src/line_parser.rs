@@ -4,9 +4,8 @@ use crate::columns::Columns;
 use crate::error::{BadContent, Fault};
 use crate::lines::take_apart;
 use crate::metadata::Metadata;
-use crate::reader::Row;
+use crate::row::{Quantity, ReadingKind, Row};
 use crate::row_parser::RowParser;
-use crate::trace::{Quantity, ReadingKind};
 
 /// Lines in a row whose times go on from each other, but not from the last row's: then the clock has started again.
 const LATE_LINES: u32 = 3;

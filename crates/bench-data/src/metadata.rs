@@ -42,6 +42,13 @@ pub enum ResistanceUnit {
 }
 
 impl StrainUnit {
+    pub(crate) const fn name(self) -> &'static str {
+        match self {
+            Self::Fraction => "fraction",
+            Self::Percent => "percent",
+        }
+    }
+
     /// What a number in the file is multiplied with.
     pub(crate) const fn factor(self) -> f64 {
         match self {
@@ -52,6 +59,13 @@ impl StrainUnit {
 }
 
 impl ResistanceUnit {
+    pub(crate) const fn name(self) -> &'static str {
+        match self {
+            Self::Ohm => "ohm",
+            Self::Kohm => "kohm",
+        }
+    }
+
     /// What a number in the file is multiplied with.
     pub(crate) const fn factor(self) -> f64 {
         match self {
@@ -65,11 +79,8 @@ impl FromStr for StrainUnit {
     type Err = SpecError;
 
     fn from_str(text: &str) -> Result<Self, SpecError> {
-        match text {
-            "fraction" => Ok(Self::Fraction),
-            "percent" => Ok(Self::Percent),
-            _ => Err(SpecError::new("`strain_unit` to be `fraction` or `percent`", quote(text))),
-        }
+        let found = [Self::Fraction, Self::Percent].into_iter().find(|unit| unit.name() == text);
+        found.ok_or_else(|| SpecError::new("`strain_unit` to be `fraction` or `percent`", quote(text)))
     }
 }
 
@@ -77,17 +88,13 @@ impl FromStr for ResistanceUnit {
     type Err = SpecError;
 
     fn from_str(text: &str) -> Result<Self, SpecError> {
-        match text {
-            "ohm" => Ok(Self::Ohm),
-            "kohm" => Ok(Self::Kohm),
-            _ => Err(SpecError::new("`resistance_unit` to be `ohm` or `kohm`", quote(text))),
-        }
+        let found = [Self::Ohm, Self::Kohm].into_iter().find(|unit| unit.name() == text);
+        found.ok_or_else(|| SpecError::new("`resistance_unit` to be `ohm` or `kohm`", quote(text)))
     }
 }
 
 impl Metadata {
     /// The keys that mean something.
-    #[cfg(feature = "import")]
     pub(crate) const KEYS: [&str; 6] =
         ["material", "gauge_length_mm", "front_end", "joint", "strain_unit", "resistance_unit"];
 
@@ -155,32 +162,19 @@ fn length_mm(text: &str) -> Result<f64, Fault> {
 /// The lines as they stand above a header, each with its end.
 impl fmt::Display for Metadata {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let mut line = |key: &str, value: &dyn fmt::Display| {
-            // A line break in a value would end the comment and become a row.
-            writeln!(out, "# {key} = {}", value.to_string().replace(char::is_control, " "))
-        };
-        if let Some(material) = &self.material {
-            line("material", material)?;
-        }
-        if let Some(length) = &self.gauge_length_mm {
-            line("gauge_length_mm", length)?;
-        }
-        if let Some(front_end) = &self.front_end {
-            line("front_end", front_end)?;
-        }
-        if let Some(joint) = &self.joint {
-            line("joint", joint)?;
-        }
-        match self.strain_unit {
-            Some(StrainUnit::Fraction) => line("strain_unit", &"fraction")?,
-            Some(StrainUnit::Percent) => line("strain_unit", &"percent")?,
-            None => {}
-        }
-        match self.resistance_unit {
-            Some(ResistanceUnit::Ohm) => line("resistance_unit", &"ohm")?,
-            Some(ResistanceUnit::Kohm) => line("resistance_unit", &"kohm")?,
-            None => {}
-        }
-        self.other.iter().try_for_each(|(key, value)| line(key, value))
+        let known = [
+            self.material.clone(),
+            self.gauge_length_mm.map(|length| length.to_string()),
+            self.front_end.map(|front_end| front_end.to_string()),
+            self.joint.map(|joint| joint.to_string()),
+            self.strain_unit.map(|unit| unit.name().to_owned()),
+            self.resistance_unit.map(|unit| unit.name().to_owned()),
+        ];
+        let known = Self::KEYS.into_iter().zip(&known).filter_map(|(key, value)| Some((key, value.as_ref()?)));
+        let other = self.other.iter().map(|(key, value)| (key.as_str(), value));
+        // A line break in a value would end the comment and become a row.
+        known
+            .chain(other)
+            .try_for_each(|(key, value)| writeln!(out, "# {key} = {}", value.replace(char::is_control, " ")))
     }
 }

@@ -9,3 +9,9 @@ pub(crate) fn median(mut values: Vec<f64>) -> Option<f64> {
 pub(crate) fn extent(values: impl Iterator<Item = f64>) -> (f64, f64) {
     values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)))
 }
+
+/// The typical step of times, if they rise.
+#[cfg(feature = "import")]
+pub(crate) fn typical_step(times: &[f64]) -> Option<f64> {
+    median(times.windows(2).map(|pair| pair[1] - pair[0]).collect()).filter(|step| *step > 0.0)
+}

@@ -143,6 +143,7 @@ fn end_line(out: &mut [u8]) {
     }
 }
 
-fn broken(error: ParquetError) -> io::Error {
+/// What is said of a file that is no Parquet, or another kind of it.
+pub(crate) fn broken(error: ParquetError) -> io::Error {
     io::Error::other(format!("cannot be read as Parquet (uncompressed, Snappy or gzip): {error}"))
 }

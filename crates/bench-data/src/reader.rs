@@ -5,37 +5,9 @@ use crate::columns::Columns;
 use crate::error::{BadContent, Fault, TraceError};
 use crate::lines::{LineFault, LineFeed, Lines, is_plain, take_apart};
 use crate::metadata::Metadata;
+use crate::row::{Quantity, ReadingKind, Row};
 use crate::row_parser::RowParser;
-use crate::trace::{Quantity, ReadingKind};
 use csv::StringRecord;
-
-/// One reading. NaN is a missing one.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Reading {
-    /// Ω or R/R₀, as [`TraceReader::reading_kind`] says; NaN if missing or saturated.
-    pub value: f64,
-    /// Standard deviation that the front end gives the reading, Ω; known for converter codes only.
-    pub sd_ohm: Option<f64>,
-    /// The converter's code, if the file has codes and this one is not missing.
-    pub code: Option<u32>,
-    /// The converter stood at an end of its scale.
-    pub saturated: bool,
-}
-
-/// One row of a trace.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Row {
-    /// Physical line in the file, counted from 1.
-    pub line: u64,
-    /// Time on the file's clock, s.
-    pub time_s: f64,
-    /// The sensor.
-    pub reading: Reading,
-    /// The reference, as [`TraceReader::reference_quantity`] says; NaN if missing.
-    pub reference: f64,
-    /// Temperature, °C; NaN if missing.
-    pub temperature_c: f64,
-}
 
 /// Reads a trace row by row, in constant memory.
 ///

@@ -6,8 +6,7 @@ use crate::clock::Clock;
 use crate::columns::{Column, Columns, Place};
 use crate::error::Fault;
 use crate::metadata::{Metadata, ResistanceUnit, StrainUnit};
-use crate::reader::{Reading, Row};
-use crate::trace::{Quantity, ReadingKind};
+use crate::row::{Quantity, Reading, ReadingKind, Row};
 
 /// Turns the cells of a line into a row; knows the time of the row before.
 pub(crate) struct RowParser {

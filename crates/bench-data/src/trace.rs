@@ -3,25 +3,8 @@ use std::ops::Range;
 
 use crate::error::{Fault, TraceError};
 use crate::metadata::Metadata;
-use crate::reader::{Row, TraceReader};
-
-/// What the readings of a trace are.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum ReadingKind {
-    /// Resistance, Ω.
-    Ohm,
-    /// Resistance over resistance at rest, R/R₀.
-    Ratio,
-}
-
-/// What the reference of a trace is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Quantity {
-    /// Engineering strain.
-    Strain,
-    /// Angle of a joint of unknown geometry, degrees.
-    AngleDeg,
-}
+use crate::reader::TraceReader;
+use crate::row::{Quantity, ReadingKind, Row};
 
 /// The sensor's readings, one per row.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,8 +1,9 @@
 use std::io::{self, Write};
 
 use crate::columns::Column;
+use crate::row::{Quantity, ReadingKind};
 use crate::rows::RowWriter;
-use crate::trace::{Quantity, ReadingKind, Trace};
+use crate::trace::Trace;
 
 impl Trace {
     /// Writes the recording in the schema that [`Trace::read`] reads: metadata lines, header, rows.

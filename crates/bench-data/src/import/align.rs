@@ -1,5 +1,4 @@
 use crate::import::motion_fit::{Blocks, Motion, Pull};
-use crate::order::median;
 
 /// Blocks of the jackknife.
 const BLOCKS: usize = 10;
@@ -151,9 +150,4 @@ fn is_worse(motion: &Motion, pull: &Pull, other: &Offset, best: &Offset) -> bool
     let mean = more.iter().sum::<f64>() / n;
     let variance = more.iter().map(|more| (more - mean).powi(2)).sum::<f64>() / (n - 1.0);
     mean > SURE * (variance / n).sqrt()
-}
-
-/// The typical step of times.
-pub(crate) fn typical_step(times: &[f64]) -> Option<f64> {
-    median(times.windows(2).map(|pair| pair[1] - pair[0]).collect()).filter(|step| *step > 0.0)
 }

@@ -1,6 +1,7 @@
 use std::fmt::Write as _;
 
 use crate::Trace;
+use crate::columns::Column;
 use crate::counted::counted;
 use crate::error::{Fault, TraceError, quote};
 use crate::import::align::{Offset, motion_offset};
@@ -12,8 +13,7 @@ use crate::import::plan::Plan;
 use crate::import::questions::quoted;
 use crate::import::recipe::Align;
 use crate::import::roles::Role;
-use crate::import::series::{Series, folded, spurious_zeros};
-use crate::import::survey::alternation;
+use crate::import::series::{Series, alternation, folded, spurious_zeros};
 use crate::import::table::Table;
 use crate::metadata::{Metadata, ResistanceUnit, StrainUnit};
 use crate::rows::RowWriter;
@@ -36,8 +36,17 @@ pub struct Imported {
     pub alternation: Option<f64>,
 }
 
-/// Runs a plan.
-pub(crate) fn build(plan: &Plan, tables: &[Table]) -> Result<Imported, ImportError> {
+impl Plan {
+    /// The trace, and what was done to get it.
+    ///
+    /// # Errors
+    /// [`ImportError`] for cells that are no numbers, times that go back, and motion that does not tell the clocks apart.
+    pub fn import(&self, tables: &[Table]) -> Result<Imported, ImportError> {
+        build(self, tables)
+    }
+}
+
+fn build(plan: &Plan, tables: &[Table]) -> Result<Imported, ImportError> {
     let mut work = Work { plan, tables, remarks: plan.remarks.clone(), offset: None, duplicates: 0, alternation: None };
     let (readings, zero) = work.readings()?;
     let reference = work.reference(&readings, zero.as_ref().map(|(zero, _)| *zero))?;
@@ -307,13 +316,10 @@ impl Work<'_> {
         let mut text = String::new();
         let _ = write!(text, "{metadata}");
         let mut rows = RowWriter::new(text.into_bytes());
-        let header = [
-            Some("time_s"),
-            Some(schema_name(self.plan.readings.role)),
-            self.plan.reference.as_ref().map(|(channel, _)| schema_name(channel.role)),
-            self.plan.temperature.map(|channel| schema_name(channel.role)),
-        ];
-        header.into_iter().flatten().for_each(|name| rows.text(name));
+        let reference_role = self.plan.reference.as_ref().map(|(channel, _)| channel.role);
+        let of_values = [Some(self.plan.readings.role), reference_role, self.plan.temperature.map(|of| of.role)];
+        let roles = [Role::Time].into_iter().chain(of_values.into_iter().flatten());
+        roles.for_each(|role| rows.text(column(role).name()));
         let io = |error: std::io::Error| ImportError::unreadable("import", error.to_string());
         rows.end().map_err(io)?;
         for (row, (&time, &value)) in readings.time.iter().zip(&readings.value).enumerate() {
@@ -336,15 +342,16 @@ impl Work<'_> {
     }
 }
 
-const fn schema_name(role: Role) -> &'static str {
+/// The column of a trace that a role becomes.
+const fn column(role: Role) -> Column {
     match role {
-        Role::Time | Role::ReferenceTime => "time_s",
-        Role::Resistance => "resistance_ohm",
-        Role::Ratio => "resistance_ratio",
-        Role::Adc => "adc",
-        Role::Strain => "strain",
-        Role::Displacement => "displacement_mm",
-        Role::Angle => "angle_deg",
-        Role::Temperature => "temperature_c",
+        Role::Time | Role::ReferenceTime => Column::TimeS,
+        Role::Resistance => Column::ResistanceOhm,
+        Role::Ratio => Column::ResistanceRatio,
+        Role::Adc => Column::Adc,
+        Role::Strain => Column::Strain,
+        Role::Displacement => Column::DisplacementMm,
+        Role::Angle => Column::AngleDeg,
+        Role::Temperature => Column::TemperatureC,
     }
 }

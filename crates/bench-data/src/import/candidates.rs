@@ -45,11 +45,7 @@ pub fn candidates(tables: &[Table]) -> Vec<Candidate> {
 /// A column of dates beside one of times of day.
 fn is_date_only(table: &Table, column: usize) -> bool {
     let mut filled = table.columns[column].cells.iter().filter(|cell| !cell.is_empty()).take(5).peekable();
-    let bare = |cell: &str| {
-        [Order::Iso, Order::Dmy, Order::Mdy]
-            .iter()
-            .any(|order| stamp(cell, *order).is_some_and(|stamp| !stamp.has_time))
-    };
+    let bare = |cell: &str| Order::ALL.iter().any(|order| stamp(cell, *order).is_some_and(|stamp| !stamp.has_time));
     filled.peek().is_some() && filled.all(bare)
 }
 
@@ -100,28 +96,19 @@ pub(crate) fn find(tables: &[Table], role: Role, wanted: &ColumnName) -> Result<
 
 /// Several columns might be one thing.
 pub(crate) fn several(tables: &[Table], role: Role, found: &[(usize, usize)]) -> ImportError {
-    let names: Vec<String> = found.iter().map(|(table, column)| name(&tables[*table], *column)).collect();
-    let what = format!("{} may be the {role}", names.join(" and "));
-    let answers =
-        found.iter().map(|place| format!("--column {}", quoted(&format!("{role}={}", refer(tables, *place)))));
-    ImportError::question(&files(tables, found), what, answers)
+    let found: Vec<(Role, (usize, usize))> = found.iter().map(|place| (role, *place)).collect();
+    several_roles(tables, &format!("the {role}"), &found)
 }
 
 /// Several columns might be what they are named.
-pub(crate) fn several_roles(tables: &[Table], what: &str, found: &[Candidate]) -> ImportError {
-    let places: Vec<(usize, usize)> = found.iter().map(|found| (found.table, found.column)).collect();
-    let names: Vec<String> = places.iter().map(|(table, column)| name(&tables[*table], *column)).collect();
-    let answers = found
-        .iter()
-        .zip(&places)
-        .map(|(found, place)| format!("--column {}", quoted(&format!("{}={}", found.role, refer(tables, *place)))));
-    ImportError::question(&files(tables, &places), format!("{} may be {what}", names.join(" and ")), answers)
-}
-
-fn files(tables: &[Table], places: &[(usize, usize)]) -> String {
-    let mut names: Vec<&str> = places.iter().map(|(table, _)| tables[*table].file.as_str()).collect();
-    names.dedup();
-    names.join(", ")
+fn several_roles(tables: &[Table], what: &str, found: &[(Role, (usize, usize))]) -> ImportError {
+    let names: Vec<String> = found.iter().map(|(_, (table, column))| name(&tables[*table], *column)).collect();
+    let answer =
+        |(role, place): &(Role, _)| format!("--column {}", quoted(&format!("{role}={}", refer(tables, *place))));
+    let mut files: Vec<&str> = found.iter().map(|(_, (table, _))| tables[*table].file.as_str()).collect();
+    files.dedup();
+    let what = format!("{} may be {what}", names.join(" and "));
+    ImportError::question(&files.join(", "), what, found.iter().map(answer))
 }
 
 /// The shortest sure way to name a column: its heading if that is the only one and can be typed, its number otherwise.
@@ -173,6 +160,9 @@ pub(crate) fn choose(
     match found[..] {
         [] => Ok(None),
         [one] => Ok(Some((one.role, one.table, one.column))),
-        _ => Err(several_roles(tables, what, &found)),
+        _ => {
+            let found: Vec<_> = found.iter().map(|of| (of.role, (of.table, of.column))).collect();
+            Err(several_roles(tables, what, &found))
+        }
     }
 }

@@ -93,11 +93,7 @@ fn counts(table: &Table, channel: &Channel, own_missing: &[String]) -> Result<Ti
 }
 
 fn stamps(table: &Table, channel: &Channel) -> Result<Times, ImportError> {
-    let order = match channel.unit.name {
-        "dmy" => Order::Dmy,
-        "mdy" => Order::Mdy,
-        _ => Order::Iso,
-    };
+    let order = Order::ALL.into_iter().find(|order| order.unit() == channel.unit.name).unwrap_or(Order::Iso);
     let cells = &table.columns[channel.column].cells;
     let mut found: Vec<Option<i128>> = Vec::with_capacity(cells.len());
     let mut has_dates = false;

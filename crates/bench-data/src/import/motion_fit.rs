@@ -1,6 +1,6 @@
 use nalgebra::{SMatrix, SVector};
 
-use crate::import::align::typical_step;
+use crate::order::typical_step;
 use crate::segment::typical_rate_of;
 
 /// Regressors and a constant.

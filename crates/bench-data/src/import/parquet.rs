@@ -7,12 +7,11 @@ use parquet::schema::types::Type;
 use crate::import::error::ImportError;
 use crate::import::names;
 use crate::import::table::{Cells, Column, Layout, Table};
+use crate::parquet_text::broken;
 
 /// Reads the flat columns of a Parquet file: uncompressed, Snappy or gzip, which is what most programs write.
 pub(crate) fn read(bytes: Vec<u8>, name: &str) -> Result<Table, ImportError> {
-    let broken = |error: parquet::errors::ParquetError| {
-        ImportError::unreadable(name, format!("cannot be read as Parquet (uncompressed, Snappy or gzip): {error}"))
-    };
+    let broken = |error| ImportError::unreadable(name, broken(error).to_string());
     let reader = SerializedFileReader::new(Bytes::from(bytes)).map_err(broken)?;
     let fields = reader.metadata().file_metadata().schema().get_fields();
     let mut columns: Vec<Column> = fields.iter().map(|field| column(field)).collect();

@@ -1,6 +1,5 @@
 use std::collections::BTreeSet;
 
-use crate::import::build::{Imported, build};
 use crate::import::candidates::{candidates, choose, find, refer};
 use crate::import::channel::{Channel, name};
 use crate::import::clock::Clock;
@@ -12,7 +11,7 @@ use crate::import::preset::Preset;
 use crate::import::questions::quoted;
 use crate::import::recipe::{Align, PerFile, Recipe};
 use crate::import::roles::Role;
-use crate::import::survey::alternation;
+use crate::import::series::alternation;
 use crate::import::table::Table;
 use crate::import::units::{SCALED, scale_of_a_reference};
 
@@ -38,7 +37,7 @@ impl Plan {
     /// # Errors
     /// [`ImportError::Question`] for the first thing that nothing decides.
     pub fn new(tables: &[Table], given: &Recipe) -> Result<Self, ImportError> {
-        let recipe = given.preset.map_or_else(|| given.clone(), |preset| preset.complete(given));
+        let recipe = given.completed();
         check_decimal(tables)?;
         let mut remarks = Vec::new();
         let readings = choose(tables, &recipe, &Role::READINGS, "the readings")?.ok_or_else(|| no_readings(tables))?;
@@ -110,23 +109,10 @@ impl Plan {
             return self.given.clone();
         }
         let mut out = Recipe { columns: Vec::new(), units: Vec::new(), ..self.given.clone() };
-        let mut pin = |channel: &Channel| {
+        for channel in &self.channels() {
             out.columns.push((channel.role, refer(tables, (channel.table, channel.column))));
             out.units.push((channel.role, self.unit_text(channel).to_owned()));
-        };
-        if let Clock::Column(channel) = &self.time {
-            pin(channel);
         }
-        pin(&self.readings);
-        if let Some((reference, own)) = &self.reference {
-            if let Clock::Column(channel) = own
-                && !self.is_one_clock()
-            {
-                pin(&Channel { role: Role::ReferenceTime, ..*channel });
-            }
-            pin(reference);
-        }
-        self.temperature.iter().for_each(pin);
         // What is to be left out stays so.
         out.columns.extend(self.given.columns.iter().filter(|(_, name)| name.is_none()).cloned());
         for (index, table) in tables.iter().enumerate() {
@@ -143,14 +129,6 @@ impl Plan {
         out
     }
 
-    /// The trace, and what was done to get it.
-    ///
-    /// # Errors
-    /// [`ImportError`] for cells that are no numbers, times that go back, and motion that does not tell the clocks apart.
-    pub fn import(&self, tables: &[Table]) -> Result<Imported, ImportError> {
-        build(self, tables)
-    }
-
     /// Whether readings and reference stand in the same rows with the same times.
     pub(crate) fn is_one_clock(&self) -> bool {
         let same = |own: &Clock| match (own, &self.time) {
@@ -160,26 +138,28 @@ impl Plan {
         self.reference.as_ref().is_none_or(|(_, own)| same(own))
     }
 
-    /// The column that a role was given, as messages call it, with its file and unit.
-    #[must_use]
-    pub fn columns(&self, tables: &[Table]) -> Vec<(Role, usize, usize, String, &str)> {
-        let mut all: Vec<Channel> = Vec::new();
-        if let Clock::Column(time) = &self.time {
-            all.push(*time);
-        }
-        all.push(self.readings);
+    /// The columns that something is taken from.
+    fn channels(&self) -> Vec<Channel> {
+        let column = |clock: &Clock| match clock {
+            Clock::Column(channel) => Some(*channel),
+            Clock::Rate { .. } => None,
+        };
+        let mut all: Vec<Channel> = column(&self.time).into_iter().chain([self.readings]).collect();
         if let Some((reference, own)) = &self.reference {
-            if let Clock::Column(own) = own
-                && !self.is_one_clock()
-            {
-                all.push(Channel { role: Role::ReferenceTime, ..*own });
-            }
+            let own = column(own).filter(|_| !self.is_one_clock());
+            all.extend(own.map(|own| Channel { role: Role::ReferenceTime, ..own }));
             all.push(*reference);
         }
         all.extend(self.temperature);
+        all
+    }
+
+    /// The column that a role was given, as messages call it, with its file and unit.
+    #[must_use]
+    pub fn columns(&self, tables: &[Table]) -> Vec<(Role, usize, usize, String, &str)> {
         let describe =
             |of: &Channel| (of.role, of.table, of.column, name(&tables[of.table], of.column), self.unit_text(of));
-        all.iter().map(describe).collect()
+        self.channels().iter().map(describe).collect()
     }
 
     /// The unit as flags have it.

@@ -8,7 +8,6 @@ use crate::import::roles::Role;
 use crate::import::stamp::{Order, has_points, orders};
 use crate::import::table::Table;
 use crate::import::units::{self, Scale, Unit};
-use crate::metadata::{ResistanceUnit, StrainUnit};
 use crate::order::median;
 
 /// Steps of times with fractions are taken for seconds up to this, s: slower than that, they may be milliseconds.
@@ -85,14 +84,8 @@ impl Asked<'_> {
     fn by_metadata(&self) -> Option<Unit> {
         let metadata = &self.table.metadata;
         let name = match self.role {
-            Role::Strain => match metadata.strain_unit? {
-                StrainUnit::Fraction => "1",
-                StrainUnit::Percent => "percent",
-            },
-            Role::Resistance => match metadata.resistance_unit? {
-                ResistanceUnit::Ohm => "ohm",
-                ResistanceUnit::Kohm => "kohm",
-            },
+            Role::Strain => metadata.strain_unit?.name(),
+            Role::Resistance => metadata.resistance_unit?.name(),
             _ => return None,
         };
         units::unit(self.role, name)
@@ -104,17 +97,18 @@ impl Asked<'_> {
         let missing = |cell: &&str| !crate::import::number::is_missing(cell, &[]);
         let filled: Vec<&str> = cells.iter().filter(missing).collect();
         let orders = orders(filled.iter().copied());
-        let named = |name| Ok(units::unit(Role::Time, name));
-        match orders[..] {
-            [] => Ok(None),
-            [Order::Iso, ..] => named("iso"),
-            [Order::Dmy] => named("dmy"),
-            [Order::Mdy] => named("mdy"),
-            _ if filled.iter().all(|cell| has_points(cell)) => named("dmy"),
+        let order = match orders[..] {
+            [] => return Ok(None),
+            [order @ Order::Iso, ..] | [order] => order,
+            _ if filled.iter().all(|cell| has_points(cell)) => Order::Dmy,
             // On one day it does not matter which number is the month.
-            _ if one_day(&filled) => named("dmy"),
-            _ => Err(self.question(format!("{}: day and month cannot be told apart", self.name()), &["dmy", "mdy"])),
-        }
+            _ if one_day(&filled) => Order::Dmy,
+            _ => {
+                let what = format!("{}: day and month cannot be told apart", self.name());
+                return Err(self.question(what, &[Order::Dmy, Order::Mdy].map(Order::unit)));
+            }
+        };
+        Ok(units::unit(Role::Time, order.unit()))
     }
 
     /// A unit that names or numbers leave no doubt of; otherwise a question.

@@ -2,7 +2,6 @@ use std::fmt;
 use std::str::FromStr;
 
 use crate::import::number::number;
-use crate::import::recipe::{ColumnName, Recipe};
 use crate::import::roles::Role;
 use crate::import::table::Table;
 
@@ -39,32 +38,23 @@ impl Preset {
         fits.then_some(Self::ElectromechStretcher)
     }
 
-    /// A recipe with what the preset knows where the recipe says nothing.
-    pub(crate) fn complete(self, recipe: &Recipe) -> Recipe {
-        let mut out = recipe.clone();
-        let number = |number: usize| ColumnName { file: None, column: number.to_string() };
-        let references = Role::REFERENCES.iter().any(|role| recipe.column(*role).is_some());
-        let columns: &[(Role, usize, &str)] = &[
-            (Role::Time, 3, "s"),
-            (Role::Resistance, 2, "ohm"),
-            (Role::Displacement, 4, "mm"),
-            (Role::ReferenceTime, 5, "s"),
-        ];
-        for &(role, column, unit) in columns {
-            if recipe.column(role).is_none() && !(role == Role::Displacement && references) {
-                out.columns.push((role, number(column)));
-            }
-            if recipe.unit(role).is_none() {
-                out.units.push((role, unit.to_owned()));
-            }
+    /// Roles of its columns, counted from 1, and their units.
+    pub(crate) const fn columns(self) -> [(Role, usize, &'static str); 4] {
+        match self {
+            Self::ElectromechStretcher => [
+                (Role::Time, 3, "s"),
+                (Role::Resistance, 2, "ohm"),
+                (Role::Displacement, 4, "mm"),
+                (Role::ReferenceTime, 5, "s"),
+            ],
         }
-        for role in [Role::Resistance, Role::Displacement] {
-            out.magnitude.push(role);
+    }
+
+    /// Length of its sensors, mm.
+    pub(crate) const fn gauge_length_mm(self) -> f64 {
+        match self {
+            Self::ElectromechStretcher => 40.0,
         }
-        out.drop_zeros.push(Role::Displacement);
-        out.fold_polarity = true;
-        out.gauge_length_mm = recipe.gauge_length_mm.or(Some(40.0));
-        out
     }
 }
 

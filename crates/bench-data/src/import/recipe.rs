@@ -4,7 +4,6 @@ use std::str::FromStr;
 use crate::import::number::DecimalMark;
 use crate::import::preset::Preset;
 use crate::import::roles::Role;
-use crate::import::source::ReadOptions;
 use crate::{FrontEndSpec, JointSpec};
 
 /// A flag's value that cannot be understood.
@@ -120,6 +119,17 @@ impl FromStr for Align {
     }
 }
 
+/// What is known of a file before it is read; what is not is found out.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ReadOptions {
+    /// The decimal mark.
+    pub decimal: Option<DecimalMark>,
+    /// Lines above header and data.
+    pub skip: Option<usize>,
+    /// The sheet of a workbook.
+    pub sheet: Option<String>,
+}
+
 /// What is said about files beforehand; what is not is found out or asked.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Recipe {
@@ -166,6 +176,26 @@ impl Recipe {
             skip: for_file(&self.skip, file),
             sheet: self.sheet.clone(),
         }
+    }
+
+    /// The recipe with what its preset knows where it says nothing.
+    pub(crate) fn completed(&self) -> Self {
+        let mut out = self.clone();
+        let Some(preset) = self.preset else { return out };
+        let has_reference = Role::REFERENCES.iter().any(|role| self.column(*role).is_some());
+        for (role, column, unit) in preset.columns() {
+            if self.column(role).is_none() && !(role == Role::Displacement && has_reference) {
+                out.columns.push((role, ColumnName { file: None, column: column.to_string() }));
+            }
+            if self.unit(role).is_none() {
+                out.units.push((role, unit.to_owned()));
+            }
+        }
+        out.magnitude.extend([Role::Resistance, Role::Displacement]);
+        out.drop_zeros.push(Role::Displacement);
+        out.fold_polarity = true;
+        out.gauge_length_mm = self.gauge_length_mm.or(Some(preset.gauge_length_mm()));
+        out
     }
 
     /// The column that is said to have a role; `Some(None)` if there is to be none.

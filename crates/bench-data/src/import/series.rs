@@ -1,4 +1,4 @@
-use crate::order::median;
+use crate::order::{median, typical_step};
 
 /// A gap of more typical steps is not bridged, unless the values on both sides are the same.
 const LONGEST_GAP: f64 = 10.0;
@@ -24,7 +24,7 @@ impl Series {
     /// The known values, interpolated by straight lines; NaN outside of them and in gaps.
     pub(crate) fn at(&self, times: &[f64]) -> Vec<f64> {
         let known: Vec<usize> = (0..self.time.len()).filter(|row| !self.value[*row].is_nan()).collect();
-        let step = median(self.time.windows(2).map(|pair| pair[1] - pair[0]).collect()).unwrap_or(0.0);
+        let step = typical_step(&self.time).unwrap_or(0.0);
         let mut next = 0;
         let value = |&time: &f64| {
             while next < known.len() && self.time[known[next]] < time {
@@ -76,6 +76,26 @@ pub(crate) fn spurious_zeros(values: &[f64], never_zero: bool) -> Vec<usize> {
     (0..values.len()).filter(|row| values[*row] == 0.0).filter(is_spurious).collect()
 }
 
+/// By how much neighbouring readings alternate, relative to their size, if they do: in most stretches of twenty, nearly
+/// every reading lies on the other side of its neighbours' mean than the one before. Noise does that in four of five.
+pub(crate) fn alternation(values: &[f64]) -> Option<f64> {
+    const STRETCH: usize = 20;
+    const SHARE: f64 = 0.8;
+    // Of simulated white noise 1.3 % of the stretches are filled, two of two in 2e-4 of the recordings, three of four in 1e-5.
+    const FEWEST: usize = 4;
+    let known: Vec<f64> = values.iter().copied().filter(|value| !value.is_nan()).collect();
+    let off = |i: usize| known[i] - 0.5 * (known[i - 1] + known[i + 1]);
+    let sides: Vec<f64> =
+        (1..known.len().saturating_sub(1)).map(|i| if i % 2 == 0 { off(i) } else { -off(i) }).collect();
+    let stretches: Vec<&[f64]> = sides.chunks_exact(STRETCH).collect();
+    let strict =
+        |stretch: &&[f64]| stretch.iter().map(|side| side.signum()).sum::<f64>().abs() >= SHARE * STRETCH as f64;
+    let count = stretches.iter().filter(|stretch| strict(stretch)).count();
+    let half = median(sides.iter().map(|side| side.abs()).collect())?;
+    let size = median(known.iter().map(|value| value.abs()).collect())?;
+    (stretches.len() >= FEWEST && count * 2 > stretches.len() && half > 0.0).then(|| half / size)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -102,5 +122,17 @@ mod tests {
         assert_eq!(at[1..4], [0.0, 2.5, 19.0]);
         assert_eq!(at[5], 50.0);
         assert!([0, 4, 6].iter().all(|i| at[*i].is_nan()));
+    }
+
+    /// A slow rise by 20 %, every other reading of it larger by 2 %.
+    fn flipping(rows: u32) -> Vec<f64> {
+        (0..rows).map(|k| (1.0 + 1e-3 * f64::from(k)) * if k % 2 == 0 { 1600.0 } else { 1632.0 }).collect()
+    }
+
+    #[test]
+    fn polarity_is_not_told_from_a_few_readings() {
+        assert_eq!(alternation(&flipping(60)), None);
+        let share = alternation(&flipping(200)).unwrap();
+        assert!((share - 0.02).abs() < 0.001, "{share}");
     }
 }

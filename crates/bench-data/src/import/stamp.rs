@@ -14,6 +14,19 @@ pub(crate) enum Order {
     Mdy,
 }
 
+impl Order {
+    pub(crate) const ALL: [Self; 3] = [Self::Iso, Self::Dmy, Self::Mdy];
+
+    /// The name of such dates among units of time.
+    pub(crate) const fn unit(self) -> &'static str {
+        match self {
+            Self::Iso => "iso",
+            Self::Dmy => "dmy",
+            Self::Mdy => "mdy",
+        }
+    }
+}
+
 /// A text with a date, a time of day or both.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Stamp {
@@ -121,7 +134,7 @@ fn nanoseconds(seconds: &str) -> Option<i128> {
 
 /// Whether a cell is a date or a time of day in some order.
 pub(crate) fn is_stamp(text: &str) -> bool {
-    [Order::Iso, Order::Dmy, Order::Mdy].into_iter().any(|order| stamp(text, order).is_some())
+    Order::ALL.into_iter().any(|order| stamp(text, order).is_some())
 }
 
 /// The orders in which all cells are dates or times of day; none if some are not.
@@ -130,7 +143,7 @@ pub(crate) fn orders<'a>(cells: impl Iterator<Item = &'a str> + Clone) -> Vec<Or
         let mut filled = cells.clone().filter(|cell| !cell.trim().is_empty()).peekable();
         filled.peek().is_some() && filled.all(|cell| stamp(cell, *order).is_some())
     };
-    [Order::Iso, Order::Dmy, Order::Mdy].into_iter().filter(all).collect()
+    Order::ALL.into_iter().filter(all).collect()
 }
 
 /// Whether the parts of dates stand apart by points, as in countries where the day comes first.

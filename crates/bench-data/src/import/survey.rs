@@ -1,8 +1,8 @@
 use ohmstrain_model::Phase;
 
-use crate::import::align::{Offset, motion_offset, typical_step};
+use crate::import::align::{Offset, motion_offset};
 use crate::import::build::Imported;
-use crate::order::{extent, median};
+use crate::order::{extent, median, typical_step};
 use crate::segment::{Segment, noise_sd, segment};
 
 /// A step longer than so many typical ones is a gap.
@@ -209,41 +209,4 @@ fn drift(readings: &[f64], reference: Option<&[f64]>) -> Option<f64> {
     let tenth = at_rest.len() / 10;
     let first = median(at_rest.get(..tenth)?.to_vec())?;
     Some(median(at_rest[at_rest.len() - tenth..].to_vec())? / first - 1.0)
-}
-
-/// By how much neighbouring readings alternate, relative to their size, if they do: in most stretches of twenty, nearly
-/// every reading lies on the other side of its neighbours' mean than the one before. Noise does that in four of five.
-pub(crate) fn alternation(values: &[f64]) -> Option<f64> {
-    const STRETCH: usize = 20;
-    const SHARE: f64 = 0.8;
-    // Of simulated white noise 1.3 % of the stretches are filled, two of two in 2e-4 of the recordings, three of four in 1e-5.
-    const FEWEST: usize = 4;
-    let known: Vec<f64> = values.iter().copied().filter(|value| !value.is_nan()).collect();
-    let off = |i: usize| known[i] - 0.5 * (known[i - 1] + known[i + 1]);
-    let sides: Vec<f64> =
-        (1..known.len().saturating_sub(1)).map(|i| if i % 2 == 0 { off(i) } else { -off(i) }).collect();
-    let stretches: Vec<&[f64]> = sides.chunks_exact(STRETCH).collect();
-    let strict =
-        |stretch: &&[f64]| stretch.iter().map(|side| side.signum()).sum::<f64>().abs() >= SHARE * STRETCH as f64;
-    let count = stretches.iter().filter(|stretch| strict(stretch)).count();
-    let half = median(sides.iter().map(|side| side.abs()).collect())?;
-    let size = median(known.iter().map(|value| value.abs()).collect())?;
-    (stretches.len() >= FEWEST && count * 2 > stretches.len() && half > 0.0).then(|| half / size)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::alternation;
-
-    /// A slow rise by 20 %, every other reading of it larger by 2 %.
-    fn flipping(rows: u32) -> Vec<f64> {
-        (0..rows).map(|k| (1.0 + 1e-3 * f64::from(k)) * if k % 2 == 0 { 1600.0 } else { 1632.0 }).collect()
-    }
-
-    #[test]
-    fn polarity_is_not_told_from_a_few_readings() {
-        assert_eq!(alternation(&flipping(60)), None);
-        let share = alternation(&flipping(200)).unwrap();
-        assert!((share - 0.02).abs() < 0.001, "{share}");
-    }
 }

@@ -1,5 +1,8 @@
 use crate::Metadata;
-use crate::import::number::DecimalMark;
+use crate::import::grid::Grid;
+use crate::import::header::{Header, Shape};
+use crate::import::names;
+use crate::import::number::{DecimalMark, has_groups};
 
 /// Texts, one after the other in one allocation: a million short cells cost little more than their characters.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -99,6 +102,42 @@ pub struct Table {
 }
 
 impl Table {
+    /// A table out of lines of cells.
+    pub(crate) fn of_grid(file: &str, grid: &Grid, header: Header, layout: Layout) -> Self {
+        let mut layout =
+            Layout { skip: header.skip, header_lines: header.header_lines, unit_line: header.unit_line, ..layout };
+        let mut cells = vec![Cells::default(); header.shape.width];
+        let (mut numbers, mut widths) = (Vec::new(), Vec::new());
+        let end = end_of_data(grid, &header, layout.decimal);
+        for row in header.first_row..grid.len() {
+            let line = grid.cells(row);
+            if row >= end || grid.comment(row).is_some() || Shape::of(&line, layout.decimal).numbers == 0 {
+                layout.text_lines += 1;
+                layout.first_text_line.get_or_insert(grid.line(row));
+                continue;
+            }
+            widths.push(line.len());
+            if !layout.has_groups {
+                layout.has_groups = line.iter().any(|cell| has_groups(cell, layout.decimal));
+            }
+            numbers.push(grid.line(row));
+            for (column, cells) in cells.iter_mut().enumerate() {
+                cells.push(line.get(column).map_or("", |cell| cell));
+            }
+        }
+        let columns = header.headings.iter().zip(&header.units).zip(cells).map(|((heading, unit), cells)| {
+            let (name, own) = names::take_apart(heading);
+            Column { name, heading: heading.clone(), unit: unit.clone().or(own), cells }
+        });
+        // A separator at the end of each line makes a column of nothing.
+        let mut columns: Vec<Column> = columns.collect();
+        while columns.last().is_some_and(|last| last.heading.is_empty() && last.cells.iter().all(str::is_empty)) {
+            columns.pop();
+        }
+        layout.short_lines = widths.into_iter().filter(|width| *width < columns.len()).count();
+        Self { file: file.to_owned(), layout, metadata: header.metadata, columns, lines: numbers }
+    }
+
     /// Number of rows.
     #[must_use]
     pub fn len(&self) -> usize {
@@ -116,4 +155,17 @@ impl Table {
     pub fn has_names(&self) -> bool {
         self.columns.iter().any(|column| !column.heading.is_empty())
     }
+}
+
+/// Where the lines begin that stand behind the data: text, sums with a word before them, and a line that was cut.
+fn end_of_data(grid: &Grid, header: &Header, decimal: DecimalMark) -> usize {
+    let is_behind = |row: &usize| {
+        let shape = Shape::of(&grid.cells(*row), decimal);
+        let is_cut = *row + 1 == grid.len()
+            && matches!(grid, Grid::Text { is_open: true, .. })
+            && shape.width < header.shape.width
+            && shape.numbers < header.shape.numbers;
+        grid.comment(*row).is_some() || shape.numbers == 0 || shape.is_worded(header.shape) || is_cut
+    };
+    (header.first_row..grid.len()).rev().take_while(is_behind).last().unwrap_or(grid.len())
 }

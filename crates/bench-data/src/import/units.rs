@@ -60,10 +60,14 @@ const UNITS: &[Entry] = &[
     (Role::Temperature, "fahrenheit", Scale::Affine(5.0 / 9.0, -160.0 / 9.0), &["°f", "f", "degf"]),
 ];
 
+/// A text without the brackets around it.
+fn bare(text: &str) -> &str {
+    text.trim().trim_matches(['(', ')', '[', ']', '{', '}', '<', '>']).trim()
+}
+
 /// The unit of a quantity that a text spells.
 pub(crate) fn unit(role: Role, text: &str) -> Option<Unit> {
-    let text = text.trim().trim_matches(['(', ')', '[', ']', '{', '}', '<', '>']).trim();
-    let text = text.replace('\u{2126}', "Ω");
+    let text = bare(text).replace('\u{2126}', "Ω");
     let lower = text.to_lowercase();
     let of_role = UNITS.iter().filter(|(of, ..)| *of == role.quantity());
     let mut found = of_role.filter(|(_, name, _, spellings)| {
@@ -124,7 +128,7 @@ pub(crate) fn is_unit(text: &str) -> bool {
         "n", "kn", "mn", "g", "kg", "v", "mv", "µv", "uv", "a", "ma", "µa", "ua", "na", "w", "hz", "khz", "pa", "kpa",
         "mpa", "mm/s", "mm/min", "1/s", "%/s", "s/m", "lbf",
     ];
-    let bare = text.trim().trim_matches(['(', ')', '[', ']', '{', '}', '<', '>']).trim();
+    let bare = bare(text);
     !quantities(bare).is_empty() || OTHER.contains(&bare.to_lowercase().as_str())
 }
 

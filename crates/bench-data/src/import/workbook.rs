@@ -7,7 +7,8 @@ use crate::import::error::ImportError;
 use crate::import::grid::Grid;
 use crate::import::header::Header;
 use crate::import::number::DecimalMark;
-use crate::import::source::{ReadOptions, table};
+use crate::import::questions::quoted;
+use crate::import::recipe::ReadOptions;
 use crate::import::table::{Layout, Table};
 
 /// Reads a sheet of a workbook: XLSX, XLSM, XLSB, XLS or ODS.
@@ -26,7 +27,7 @@ pub(crate) fn read(bytes: Vec<u8>, name: &str, options: &ReadOptions) -> Result<
         let decimal = options.decimal.unwrap_or(DecimalMark::Point);
         let layout = Layout { format: format!("workbook, sheet `{sheet}`"), decimal, ..Layout::default() };
         match Header::find(name, &grid, decimal, options.skip.unwrap_or(0)) {
-            Ok(header) => found.push((sheet.clone(), table(name, &grid, header, layout))),
+            Ok(header) => found.push((sheet.clone(), Table::of_grid(name, &grid, header, layout))),
             Err(error) => last_error = Some(error),
         }
     }
@@ -38,7 +39,7 @@ pub(crate) fn read(bytes: Vec<u8>, name: &str, options: &ReadOptions) -> Result<
             Err(ImportError::unreadable(name, format!("expected a sheet that is there, found {}", all.join(", "))))
         }
         _ => {
-            let answers = found.iter().map(|(sheet, _)| format!("--sheet {}", crate::import::questions::quoted(sheet)));
+            let answers = found.iter().map(|(sheet, _)| format!("--sheet {}", quoted(sheet)));
             Err(ImportError::question(name, "several sheets have rows of numbers", answers))
         }
     }

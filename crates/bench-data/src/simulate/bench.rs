@@ -1,51 +1,19 @@
-use ohmstrain_model::{AdcCode, FrontEnd, Phase};
-use rand_chacha::ChaCha8Rng;
-use rand_chacha::rand_core::SeedableRng;
+use ohmstrain_model::{AdcCode, FrontEnd};
 
 use super::individual::{Individual, REST_SPREAD};
 use super::matched::Matched;
 use super::mismatched::Mismatched;
-use super::noise::{Drift, conditioning, normal};
+use super::noise::{Drift, Stream, conditioning, normal, random};
 use super::profile::Profile;
+use super::sensor::{Movement, Sensor};
 use super::{GAUGE_LENGTH_MM, SettingsError, SimulationSettings};
 use crate::metadata::Metadata;
+use crate::row::{Quantity, ReadingKind};
 use crate::spec::FrontEndSpec;
-use crate::trace::{ConverterReadings, Quantity, ReadingKind, Readings, Reference, Trace};
+use crate::trace::{ConverterReadings, Readings, Reference, Trace};
 
 /// Longest step of the integration, s, whatever the rate of the recording.
 const LONGEST_STEP_S: f64 = 0.01;
-
-/// A short movement at constant rate.
-pub(super) struct Movement {
-    pub from_strain: f64,
-    pub to_strain: f64,
-    /// Strain rate, 1/s.
-    pub rate: f64,
-    pub duration_s: f64,
-}
-
-impl Movement {
-    pub(super) fn phase(&self) -> Phase {
-        match self.rate {
-            rate if rate > 0.0 => Phase::Extend,
-            rate if rate < 0.0 => Phase::Retract,
-            _ => Phase::Hold,
-        }
-    }
-
-    pub(super) fn mid_strain(&self) -> f64 {
-        f64::midpoint(self.from_strain, self.to_strain)
-    }
-}
-
-/// What the bench stretches.
-pub(super) trait Sensor {
-    /// Goes through a movement.
-    fn advance(&mut self, movement: &Movement);
-
-    /// R/R₀ - 1 at the end of the movement it went through last.
-    fn relative_change(&self, movement: &Movement) -> f64;
-}
 
 /// Simulates a recording: resistance (codes, too, with a front end) and the exact strain, rounded to 1e-5.
 ///
@@ -181,22 +149,6 @@ fn metadata(settings: &SimulationSettings) -> Metadata {
             .collect(),
         ..Metadata::default()
     }
-}
-
-/// Independent random numbers for each use, so that switching one off leaves the others as they are.
-#[derive(Clone, Copy)]
-pub(super) enum Stream {
-    Profile = 1,
-    White,
-    Drift,
-    Converter,
-    Individual,
-}
-
-pub(super) fn random(seed: u64, stream: Stream) -> ChaCha8Rng {
-    let mut random = ChaCha8Rng::seed_from_u64(seed);
-    random.set_stream(stream as u64);
-    random
 }
 
 /// Rounds to a decimal resolution, `per_unit` of it to one, so that files hold short numbers.

@@ -1,7 +1,6 @@
 use rand_chacha::ChaCha8Rng;
 
-use super::bench::{Stream, random};
-use super::noise::normal;
+use super::noise::{Stream, normal, random};
 
 /// By how much R₀ differs between sensors of one make: standard deviation of its logarithm.
 pub(super) const REST_SPREAD: f64 = 0.2;

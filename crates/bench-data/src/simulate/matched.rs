@@ -1,7 +1,7 @@
 use ohmstrain_model::{Branch, Gauge, SensorLaw, StrainRange};
 
 use super::Material;
-use super::bench::{Movement, Sensor};
+use super::sensor::{Movement, Sensor};
 
 /// A sensor of the family that is fitted: the switched Kelvin-Voigt law with two branches.
 pub(super) struct Matched {

@@ -1,8 +1,8 @@
 use ohmstrain_model::Phase;
 
 use super::Material;
-use super::bench::{Movement, Sensor};
 use super::individual::{CHARACTER_SPREAD, Individual};
+use super::sensor::{Movement, Sensor};
 
 const BRANCHES: usize = 9;
 const PLAYS: usize = 3;

@@ -24,6 +24,7 @@ mod mismatched;
 mod noise;
 mod profile;
 mod protocol;
+mod sensor;
 mod settings;
 
 pub use bench::simulate;

@@ -1,4 +1,5 @@
 use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::settings::{SettingsError, within};
@@ -67,6 +68,22 @@ impl Drift {
     }
 }
 
+/// Independent random numbers for each use, so that switching one off leaves the others as they are.
+#[derive(Clone, Copy)]
+pub(super) enum Stream {
+    Profile = 1,
+    White,
+    Drift,
+    Converter,
+    Individual,
+}
+
+pub(super) fn random(seed: u64, stream: Stream) -> ChaCha8Rng {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    random.set_stream(stream as u64);
+    random
+}
+
 pub(super) fn normal(random: &mut ChaCha8Rng) -> f64 {
     StandardNormal.sample(random)
 }
@@ -85,7 +102,6 @@ pub(super) fn conditioning(cycles: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rand_chacha::rand_core::SeedableRng;
 
     #[test]
     fn conditioning_follows_the_cycles() {

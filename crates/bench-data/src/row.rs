@@ -1,0 +1,45 @@
+/// What the readings of a trace are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum ReadingKind {
+    /// Resistance, Ω.
+    Ohm,
+    /// Resistance over resistance at rest, R/R₀.
+    Ratio,
+}
+
+/// What the reference of a trace is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Quantity {
+    /// Engineering strain.
+    Strain,
+    /// Angle of a joint of unknown geometry, degrees.
+    AngleDeg,
+}
+
+/// One reading. NaN is a missing one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reading {
+    /// Ω or R/R₀, as [`reading_kind`](crate::TraceReader::reading_kind) says; NaN if missing or saturated.
+    pub value: f64,
+    /// Standard deviation that the front end gives the reading, Ω; known for converter codes only.
+    pub sd_ohm: Option<f64>,
+    /// The converter's code, if the file has codes and this one is not missing.
+    pub code: Option<u32>,
+    /// The converter stood at an end of its scale.
+    pub saturated: bool,
+}
+
+/// One row of a trace.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Row {
+    /// Physical line in the file, counted from 1.
+    pub line: u64,
+    /// Time on the file's clock, s.
+    pub time_s: f64,
+    /// The sensor.
+    pub reading: Reading,
+    /// The reference, as [`reference_quantity`](crate::TraceReader::reference_quantity) says; NaN if missing.
+    pub reference: f64,
+    /// Temperature, °C; NaN if missing.
+    pub temperature_c: f64,
+}
