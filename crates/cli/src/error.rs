@@ -2,12 +2,11 @@ use std::io::{self, Write};
 use std::path::Path;
 use std::process::ExitCode;
 
-use ohmstrain::Error as LibraryError;
+use ohmstrain::{Error as LibraryError, Quantity};
 use ohmstrain_bench_data::TraceError;
 use ohmstrain_calib::CalibrationError;
 use thiserror::Error;
 
-use crate::suits;
 use crate::verbosity::Verbosity;
 
 /// Why a command stopped; each kind has its exit code.
@@ -98,7 +97,7 @@ impl From<LibraryError> for CliError {
             LibraryError::KnownStrain { quantity, name, .. } => {
                 let flag = if name == "known strain" { "--known" } else { "--initial-strain" };
                 let refused = error.to_string().replacen(name, flag, 1);
-                Self::Arguments(refused + suits::start_hint(quantity))
+                Self::Arguments(refused + if quantity == Quantity::Strain { "; 10 % is 0.1" } else { "" })
             }
             LibraryError::Guard(_) | LibraryError::NotPositive { .. } => Self::Arguments(error.to_string()),
             LibraryError::Row { row, source } => Self::Input(format!("data row {}: {source}", row + 1)),

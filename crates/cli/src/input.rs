@@ -14,6 +14,9 @@ use sha2::{Digest, Sha256};
 use crate::error::CliError;
 use crate::sensor_file;
 
+/// Bytes of a file that is not kept in memory as a whole.
+const READ_AT_ONCE: usize = 1 << 16;
+
 /// A recording in memory.
 pub struct Recording {
     /// What messages call it.
@@ -127,7 +130,7 @@ pub fn read(path: &Path, overrides: &Metadata) -> Result<Recording, CliError> {
 /// A whole recording of these bytes.
 pub fn parse(bytes: &[u8], path: &Path, overrides: &Metadata) -> Result<Recording, CliError> {
     refuse_parameters(path, bytes)?;
-    let sha256 = sha256(bytes);
+    let sha256 = hexadecimal(&Sha256::digest(bytes));
     if ParquetText::is_one(bytes) {
         return collect(open_parquet(path, overrides)?, sha256);
     }
@@ -139,14 +142,19 @@ fn collect<R: Read>(rows: TraceReader<R>, sha256: String) -> Result<Recording, C
     Ok(Recording { name, header, sha256, first_row: 0, trace: Trace::collect(rows)? })
 }
 
-/// SHA-256, hexadecimal.
-pub fn sha256(bytes: &[u8]) -> String {
-    hexadecimal(Sha256::digest(bytes).as_slice())
+fn hexadecimal(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// Bytes in hexadecimal.
-pub fn hexadecimal(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+/// SHA-256 of a file's bytes, hexadecimal.
+pub fn sha256_of(path: &Path) -> io::Result<String> {
+    let (mut file, mut digest, mut bytes) = (File::open(path)?, Sha256::new(), vec![0; READ_AT_ONCE]);
+    loop {
+        match file.read(&mut bytes)? {
+            0 => return Ok(hexadecimal(&digest.finalize())),
+            count => digest.update(&bytes[..count]),
+        }
+    }
 }
 
 /// Refuses a sensor's file, or a hand's, by its first bytes.

@@ -1,6 +1,6 @@
 //! What the command line says to doubts about what a sensor is given: which flag, or which line of a file, answers them.
 
-use ohmstrain::{Quantity, Sensor, UnitDoubt, UnitGuess};
+use ohmstrain::{Sensor, UnitDoubt, UnitGuess};
 
 use crate::error::CliError;
 use crate::input::Recording;
@@ -55,13 +55,5 @@ pub fn warn_of_start(start: Option<f64>, sensor: &Sensor) {
         CliError::warning(&format!(
             "--initial-strain: {start} is outside of the sensor's limits, {lower:.4} to {upper:.4}; what is reported stops there"
         ));
-    }
-}
-
-/// What else to say of a strain to start at that was refused.
-pub const fn start_hint(quantity: Quantity) -> &'static str {
-    match quantity {
-        Quantity::Strain => "; 10 % is 0.1",
-        Quantity::AngleDeg => "",
     }
 }

@@ -15,8 +15,6 @@ mod fleet;
 mod hand;
 mod import;
 mod inspect;
-mod inspect_json;
-mod inspect_text;
 mod live;
 mod plan;
 mod refine;

@@ -6,9 +6,9 @@ use std::sync::Mutex;
 
 use serde::{Deserialize, Serialize};
 
-use super::process::sha256_of;
 use super::scores::Figures;
 use crate::error::CliError;
+use crate::input::sha256_of;
 
 /// What became of a job: a line of the journal, a row of the summary.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]

@@ -1,13 +1,12 @@
 use std::collections::HashMap;
 use std::fs::{self, File};
-use std::io::{self, BufRead, BufReader, Read};
+use std::io::{self, BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::{Mutex, PoisonError};
 use std::thread;
 use std::time::Instant;
 
-use sha2::{Digest, Sha256};
 use tempfile::TempDir;
 
 use super::journal::{Entry, Journal, State};
@@ -15,15 +14,13 @@ use super::plan::Job;
 use super::scores::Figures;
 use crate::args::{BatchArgs, BatchCommand, Format};
 use crate::error::CliError;
-use crate::input::hexadecimal;
+use crate::input::sha256_of;
 use ohmstrain::MADE_BY;
 
 /// Exit code of `evaluate --check` for estimates that are found wanting: there is an output all the same.
 const WANTING: i32 = 3;
 /// What this program's messages begin with.
 const SPEAKER: &str = "ohmstrain: ";
-/// Bytes of a file in memory.
-const READ_AT_ONCE: usize = 1 << 16;
 
 /// Where jobs are done.
 pub struct Workshop<'a> {
@@ -198,16 +195,4 @@ fn said_beside(draft: &Path) -> PathBuf {
     let mut name = draft.as_os_str().to_owned();
     name.push(".said");
     name.into()
-}
-
-/// SHA-256 of a file's bytes, hexadecimal.
-pub fn sha256_of(path: &Path) -> io::Result<String> {
-    let (mut file, mut digest, mut bytes) = (File::open(path)?, Sha256::new(), vec![0; READ_AT_ONCE]);
-    loop {
-        match file.read(&mut bytes)? {
-            0 => break,
-            count => digest.update(&bytes[..count]),
-        }
-    }
-    Ok(hexadecimal(digest.finalize().as_slice()))
 }

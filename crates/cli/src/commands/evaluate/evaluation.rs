@@ -1,14 +1,14 @@
 use std::io::Write;
 
-use ohmstrain_calib::{PARTICLE_SEED, Quantity, Scores};
+use ohmstrain_calib::PARTICLE_SEED;
 use serde::Serialize;
 
+use super::scores::{PUBLISHED, RecordingScores};
 use super::summary::{self, Summary, summaries};
 use crate::commands::reporting::Drawn;
 use crate::commands::score_table::{KEY, add_scores, score_table};
 use crate::error::CliError;
 use crate::output;
-use crate::report::Sample;
 
 /// Version of what `--json` prints.
 const SCHEMA: u32 = 2;
@@ -29,72 +29,6 @@ struct Json<'a> {
     /// All cases summed up, estimate by estimate.
     summary: Vec<Summary>,
     recordings: Vec<&'a RecordingScores>,
-}
-
-/// One recording and one estimator: the filter's scores, the smoother's, and those they are compared with.
-#[derive(Serialize)]
-pub struct RecordingScores {
-    pub file: String,
-    /// SHA-256 of the recording's bytes, hexadecimal.
-    pub sha256: String,
-    /// Share of the rows that calibrated, if the rest of them was scored.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub split: Option<String>,
-    pub estimator: &'static str,
-    /// Whether the rows that are scored were calibrated on.
-    #[serde(skip)]
-    pub sample: Sample,
-    /// Whether it is shown to say what the estimator before it is made of.
-    #[serde(skip)]
-    pub is_part: bool,
-    #[serde(flatten)]
-    pub filter: Scores,
-    pub smoother: Scores,
-    /// Wall-clock time of the calibration, s; `None` if it was read from a file.
-    pub calibration_s: Option<f64>,
-    /// Lag of the reference, where it was looked for; `None` inside if it cannot be told.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub lag_s: Option<Option<f64>>,
-    pub baselines: BaselineScores,
-    /// What the errors are errors of, for the table's header.
-    #[serde(skip)]
-    pub quantity: Quantity,
-}
-
-/// The name of the published law in tables.
-const PUBLISHED: &str = "published law";
-
-/// Scores of the baselines; a sensor file holds the first one only.
-#[derive(Clone, Copy, Serialize)]
-pub struct BaselineScores {
-    pub static_cubic: Scores,
-    #[serde(flatten)]
-    pub learned: Option<LearnedScores>,
-}
-
-/// Scores of what is fitted for comparison and written nowhere.
-#[derive(Clone, Copy, Serialize)]
-pub struct LearnedScores {
-    pub fir_20s: Scores,
-    pub low_pass_mode: Scores,
-    pub leaky_bank: Scores,
-    /// Of the published law, told its phases; none where calibration did not move both ways.
-    pub relaxing_modulus: Option<Scores>,
-}
-
-impl BaselineScores {
-    /// With the names of the table.
-    pub fn named(&self) -> impl Iterator<Item = (&'static str, Scores)> {
-        let learned = self.learned.map(|learned| {
-            [
-                Some(("20 s FIR", learned.fir_20s)),
-                Some(("low-pass mode", learned.low_pass_mode)),
-                Some(("leaky bank", learned.leaky_bank)),
-                learned.relaxing_modulus.map(|scores| (PUBLISHED, scores)),
-            ]
-        });
-        std::iter::once(("static cubic", self.static_cubic)).chain(learned.into_iter().flatten().flatten())
-    }
 }
 
 impl Evaluation {
@@ -156,34 +90,5 @@ impl Evaluation {
             writeln!(out, "{table}\n")?;
         }
         Ok(())
-    }
-}
-
-impl RecordingScores {
-    /// The recording and, where there is one, the split.
-    pub fn case(&self) -> String {
-        self.split.as_ref().map_or_else(|| self.file.clone(), |split| format!("{} {split}", self.file))
-    }
-
-    /// The case, what its errors are errors of, and what else is known of it.
-    fn heading(&self) -> String {
-        let unit = match self.quantity {
-            Quantity::Strain => "strain",
-            Quantity::AngleDeg => "degrees",
-        };
-        let seconds = self.calibration_s.map(|seconds| format!("calibrated in {seconds:.1} s"));
-        let lag = self.lag_s.map(|lag| match lag {
-            Some(lag_s) => format!("the reference is {lag_s:+.2} s late"),
-            None => "how late the reference is cannot be told".into(),
-        });
-        let sample = (self.sample != Sample::Out).then(|| self.sample.name().to_owned());
-        let more = [format!("errors in {unit}")]
-            .into_iter()
-            .chain(sample)
-            .chain(seconds)
-            .chain(lag)
-            .collect::<Vec<_>>()
-            .join(", ");
-        format!("{}: {more}", self.case())
     }
 }

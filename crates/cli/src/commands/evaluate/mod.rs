@@ -1,12 +1,14 @@
 mod evaluation;
+mod scores;
 mod sensors;
 mod summary;
 
 use std::path::{Path, PathBuf};
 
-use evaluation::{Evaluation, RecordingScores};
+use evaluation::Evaluation;
 use ohmstrain_calib::{Baselines, PublishedLaw, Samples, reference_lag, screen};
 use rayon::prelude::*;
+use scores::RecordingScores;
 use sensors::{Rivals, Sensor, phases};
 
 use crate::args::{EvaluateArgs, Split};

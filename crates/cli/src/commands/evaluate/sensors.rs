@@ -5,7 +5,7 @@ use ohmstrain::{Calibrated, Calibration, ValidityWatch};
 use ohmstrain_bench_data::segment;
 use ohmstrain_calib::{Baselines, EstimatorKind, PhaseRows, PublishedLaw, RECIPE, StaticCubic};
 
-use super::evaluation::{BaselineScores, LearnedScores, RecordingScores};
+use super::scores::{BaselineScores, LearnedScores, RecordingScores};
 use crate::args::Estimators;
 use crate::commands::calibrate::calibrate_recordings;
 use crate::commands::scoring::{self, Part};

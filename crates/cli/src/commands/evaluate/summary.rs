@@ -3,7 +3,7 @@ use std::io::Write;
 use ohmstrain_calib::Scores;
 use serde::Serialize;
 
-use super::evaluation::RecordingScores;
+use super::scores::RecordingScores;
 use crate::commands::score_table::covered;
 use crate::error::CliError;
 use crate::output::table;

@@ -4,7 +4,7 @@ use comfy_table::Table as TextTable;
 use ohmstrain_bench_data::counted;
 use ohmstrain_bench_data::import::{ChannelSurvey, ClockSurvey, PhaseSurvey, Role, Survey, Table, candidates};
 
-use crate::commands::inspect::{Findings, Proposal};
+use super::{Findings, Proposal};
 use crate::error::CliError;
 use crate::output;
 

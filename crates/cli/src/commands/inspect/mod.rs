@@ -1,11 +1,12 @@
+mod json;
+mod text;
+
 use std::path::PathBuf;
 
 use ohmstrain_bench_data::import::{ImportError, Imported, Plan, Recipe, Survey, Table};
 use ohmstrain_bench_data::{Metadata, Trace};
 
 use crate::args::InspectArgs;
-use crate::commands::inspect_json;
-use crate::commands::inspect_text;
 use crate::error::{CliError, shell_word};
 use crate::input::{self, is_stdin};
 use crate::lab_files;
@@ -52,7 +53,7 @@ pub fn run(args: &InspectArgs) -> Result<(), CliError> {
         Err(error) => Err(error),
     };
     let findings = Findings { tables, plan };
-    print(|out| if args.json { inspect_json::write(out, &findings) } else { inspect_text::write(out, &findings) })
+    print(|out| if args.json { json::write(out, &findings) } else { text::write(out, &findings) })
 }
 
 /// A plan that has been tried.

@@ -3,7 +3,7 @@ use std::io::Write;
 use ohmstrain_bench_data::import::{ChannelSurvey, Role, Survey, Table, candidates};
 use serde_json::{Value, json};
 
-use crate::commands::inspect::{Findings, Proposal};
+use super::{Findings, Proposal};
 use crate::error::CliError;
 use crate::output;
 
