@@ -40,16 +40,18 @@ pub use filter::build::{HISTORIES, HYPOTHESES, PARTICLE_SEED, build_filter};
 pub use filter::corrected::SURPRISING_NIS;
 pub use filter::portable::{PortableCorrection, PortableFilter, PortableSieve};
 pub use filter::{Filter, Output, Rows, Start, WayBack};
+pub use law::advice::OnBound;
 #[cfg(feature = "bootstrap")]
 pub use law::bootstrap::{Bootstrap, bootstrap_law};
 pub use law::compare::{StructureScore, compare_structures};
-pub use law::fit::{CrossFit, GaugeFamily, LawFit, LawOptions, fit_law};
-pub use law::identifiability::{Identifiability, OnBound, identifiability};
+pub use law::fit::{CrossFit, LawOptions, fit_law};
+pub use law::identifiability::{Identifiability, identifiability};
+pub use law::structure::{GaugeFamily, LawFit};
 pub use params::correction::{
     CorrectionParams, CorrectionScale, CorrectorParams, FUTURE_FEATURES, ProcessParams, TrainingRow,
 };
 pub use params::estimator::{EstimatorKind, EstimatorParams, MotionParams, NoiseParams, PhaseParams};
-pub use params::law::{BranchParams, GaugeParams, LawParams};
+pub use params::law::{BranchParams, GaugeParams, LawParameter, LawParams};
 pub use params::recipe::{RECIPE, Recipe};
 pub use params::static_cubic::StaticCubic;
 pub use params::summary::{Limit, Summary};

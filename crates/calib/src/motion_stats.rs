@@ -1,3 +1,4 @@
+use crate::order::sorted;
 use crate::samples::central_rate;
 use crate::samples::{Samples, filled_strain};
 
@@ -46,8 +47,7 @@ impl MotionStats {
         }
         let strain_mean = mean(&strains);
         let deviations: Vec<f64> = strains.iter().map(|x| x - strain_mean).collect();
-        let mut speeds: Vec<f64> = rates.iter().map(|v| v.abs()).collect();
-        speeds.sort_by(f64::total_cmp);
+        let speeds = sorted(rates.iter().map(|v| v.abs()));
         Self {
             strain_mean,
             strain_sd: root_mean_square(&deviations),
@@ -84,8 +84,7 @@ const FEWEST_PHASE_ROWS: usize = 2;
 
 impl PhaseDurations {
     fn add(&mut self, time_s: &[f64], rate: &[f64]) {
-        let mut speeds: Vec<f64> = rate.iter().map(|v| v.abs()).collect();
-        speeds.sort_by(f64::total_cmp);
+        let speeds = sorted(rate.iter().map(|v| v.abs()));
         let rest = REST_SHARE * speeds[(speeds.len() - 1) * 9 / 10];
         let phase = |v: f64| i8::from(v > rest) - i8::from(v < -rest);
         let mut start = 0;
@@ -115,8 +114,7 @@ impl PhaseDurations {
 
     /// The speed that `share / of` of the moving rows are below.
     fn speed_at(&self, share: usize, of: usize) -> f64 {
-        let mut speeds = self.speeds.clone();
-        speeds.sort_by(f64::total_cmp);
+        let speeds = sorted(self.speeds.iter().copied());
         speeds.get(speeds.len() * share / of).copied().unwrap_or(0.0)
     }
 }

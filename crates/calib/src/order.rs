@@ -1,7 +1,13 @@
-/// The middle one of known values, the upper one of two; `None` without any.
-pub(crate) fn median(values: impl IntoIterator<Item = f64>) -> Option<f64> {
+/// From the least to the largest.
+pub(crate) fn sorted(values: impl IntoIterator<Item = f64>) -> Vec<f64> {
     let mut sorted: Vec<f64> = values.into_iter().collect();
     sorted.sort_by(f64::total_cmp);
+    sorted
+}
+
+/// The middle one of known values, the upper one of two; `None` without any.
+pub(crate) fn median(values: impl IntoIterator<Item = f64>) -> Option<f64> {
+    let sorted = sorted(values);
     sorted.get(sorted.len() / 2).copied()
 }
 

@@ -1,3 +1,4 @@
+use crate::order::sorted;
 use crate::params::LARGEST_SD_SCALE;
 
 /// No narrowing: an easy recording is no promise for the next one.
@@ -35,8 +36,7 @@ pub(crate) fn joint_scale(deviations: &[f64]) -> f64 {
 }
 
 fn quantile(deviations: &[f64], percent: usize) -> Option<f64> {
-    let mut sorted = deviations.to_vec();
-    sorted.sort_by(f64::total_cmp);
+    let sorted = sorted(deviations.iter().copied());
     let rank = (sorted.len().saturating_sub(1) * percent).div_ceil(100);
     sorted.get(rank).copied()
 }

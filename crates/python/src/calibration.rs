@@ -42,17 +42,12 @@ impl Choices {
             }
             calibration = calibration.branches(branches);
         }
-        let family = match self.gauge.as_deref() {
-            None | Some("auto") => return Ok(calibration),
-            Some("polynomial") => GaugeFamily::Polynomial,
-            Some("decaying-exponential") => GaugeFamily::DecayingExponential,
-            Some("tunnelling") => GaugeFamily::Tunnelling,
-            Some(other) => {
-                let text =
-                    format!("gauge: expected auto, polynomial, decaying-exponential or tunnelling, found `{other}`");
-                return Err(raise(&Place::default(), &text));
-            }
-        };
+        let Some(wanted) = self.gauge.as_deref().filter(|wanted| *wanted != "auto") else { return Ok(calibration) };
+        let family = GaugeFamily::ALL.into_iter().find(|family| family.name() == wanted).ok_or_else(|| {
+            let text =
+                format!("gauge: expected auto, polynomial, decaying-exponential or tunnelling, found `{wanted}`");
+            raise(&Place::default(), &text)
+        })?;
         Ok(calibration.gauge(family))
     }
 }

@@ -19,6 +19,7 @@ pub use published::{PhaseRows, PublishedLaw};
 pub use regression::{Features, Regression};
 
 use crate::CalibrationError;
+use crate::order::median;
 use crate::params::RangeParams;
 use crate::params::static_cubic::StaticCubic;
 use crate::samples::{Samples, check};
@@ -81,10 +82,6 @@ impl Held {
 
 /// Largest of the recordings' median steps, s: what all of them can resolve.
 fn sampling_interval_s(recordings: &[Samples]) -> f64 {
-    let median = |samples: &Samples| {
-        let mut steps: Vec<f64> = samples.time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
-        steps.sort_by(f64::total_cmp);
-        steps.get(steps.len() / 2).copied().unwrap_or(0.0)
-    };
-    recordings.iter().map(median).fold(0.0, f64::max)
+    let step = |samples: &Samples| median(samples.time_s.windows(2).map(|pair| pair[1] - pair[0]));
+    recordings.iter().filter_map(step).fold(0.0, f64::max)
 }

@@ -2,7 +2,7 @@ use serde::Serialize;
 
 use crate::law::fit::CrossFit;
 use crate::motion_stats::{REST_SHARE, moving_mean};
-use crate::order::extent;
+use crate::order::{extent, median, sorted};
 use crate::params::summary::Limit;
 use crate::samples::central_rate;
 use crate::samples::{Samples, filled_strain};
@@ -116,9 +116,8 @@ const CHI_SQUARE_MEDIAN: f64 = 0.454_936;
 /// Variance of what is independent from row to row, from the median square of second differences, which a steady change
 /// does not touch: (x₋ − 2 x + x₊)² is 6 σ² on average.
 fn white_variance(x: &[f64]) -> f64 {
-    let mut squares: Vec<f64> = x.windows(3).map(|w| (w[0] - 2.0 * w[1] + w[2]).powi(2)).collect();
-    squares.sort_by(f64::total_cmp);
-    squares.get(squares.len() / 2).map_or(0.0, |median| median / (6.0 * CHI_SQUARE_MEDIAN))
+    let squares = x.windows(3).map(|w| (w[0] - 2.0 * w[1] + w[2]).powi(2));
+    median(squares).map_or(0.0, |median| median / (6.0 * CHI_SQUARE_MEDIAN))
 }
 
 /// Which way the body moves in a row; zero at rest.
@@ -129,8 +128,7 @@ impl Direction {
     /// Of every row of a recording.
     pub(crate) fn of_rows(samples: &Samples) -> Vec<Self> {
         let rate = moving_mean(&central_rate(samples.time_s, &filled_strain(samples)));
-        let mut speeds: Vec<f64> = rate.iter().map(|v| v.abs()).collect();
-        speeds.sort_by(f64::total_cmp);
+        let speeds = sorted(rate.iter().map(|v| v.abs()));
         let rest = REST_SHARE * speeds.get(speeds.len().saturating_sub(1) * 9 / 10).copied().unwrap_or(0.0);
         rate.iter().map(|v| Self(i8::from(*v > rest) - i8::from(*v < -rest))).collect()
     }

@@ -1,7 +1,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-use super::exponentials::{Burgers, Exponentials};
+use super::exponentials::{Burgers, Exponentials, ModulusShape};
 use super::law::SeparableLaw;
 use super::moving::{Hold, Moving};
 use super::moving_hold::MovingHold;
@@ -41,20 +41,6 @@ pub enum ClosedForm {
     Kww,
     /// `tunnelling`: [`TunnellingCurve`].
     Tunnelling,
-}
-
-/// The modulus in equations 8 and 9, relative to its start.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ModulusShape {
-    /// Number of exponentials, at least 1.
-    pub terms: usize,
-    /// Whether it relaxes to a floor instead of to nothing; more than one term always has one.
-    pub floor: bool,
-}
-
-impl ModulusShape {
-    /// `exp(-t/τ₀)`, as equations 8 and 9 are printed.
-    pub const SINGLE: Self = Self { terms: 1, floor: false };
 }
 
 /// The name that [`FromStr`] reads; `single` for the exponential that equations 8 and 9 are printed with.

@@ -1,5 +1,20 @@
-use super::law::{Datum, Derived, Moment, Parameter, SeparableLaw, Unit, sort_terms};
+use super::datum::{Datum, Moment};
+use super::law::{Derived, Parameter, SeparableLaw, Unit, sort_terms};
 use super::search::{Extent, Search};
+
+/// The modulus in equations 8 and 9, relative to its start.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ModulusShape {
+    /// Number of exponentials, at least 1.
+    pub terms: usize,
+    /// Whether it relaxes to a floor instead of to nothing; more than one term always has one.
+    pub floor: bool,
+}
+
+impl ModulusShape {
+    /// `exp(-t/τ₀)`, as equations 8 and 9 are printed.
+    pub const SINGLE: Self = Self { terms: 1, floor: false };
+}
 
 /// Sums of decaying exponentials of the time since a phase began: equations 1, 5, 6 and 7 and the Prony series.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,6 +1,7 @@
 use rmpfit::{MPConfig, MPError, MPFitter, MPPar, MPResult, MPSide, MPSuccess};
 
-use super::law::{ClosedFormError, Datum, SeparableLaw};
+use super::datum::Datum;
+use super::law::{ClosedFormError, SeparableLaw};
 use super::projection::{Projection, least_squares};
 use super::search::{Extent, Search, starts};
 use super::statistics::ClosedFormFit;

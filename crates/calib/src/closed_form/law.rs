@@ -1,39 +1,7 @@
 use thiserror::Error;
 
+use super::datum::{Datum, Moment};
 use super::search::{Extent, Search};
-
-/// Where on a recording a law is asked for its reading. What a law does not use may be zero.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Moment {
-    /// Time since the phase began, s.
-    pub elapsed_s: f64,
-    /// Strain since the phase began, ε − ε_s: the `v t` of equation 8.
-    pub travel: f64,
-    /// Mean strain rate v of the movement, 1/s, negative on release; in a hold that of the movement before.
-    pub rate: f64,
-    /// Strain ε.
-    pub strain: f64,
-    /// In a hold: the movement that led to it, where one is known.
-    pub before: Option<Movement>,
-}
-
-/// A whole movement, as seen from the hold after it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Movement {
-    /// How long it took, s.
-    pub duration_s: f64,
-    /// How far it went, in strain.
-    pub travel: f64,
-}
-
-/// One reading and where it was taken.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Datum {
-    /// Where.
-    pub at: Moment,
-    /// Reading, Ω or a ratio.
-    pub reading: f64,
-}
 
 /// Unit of a parameter, in terms of the units of reading (Ω or 1) and strain (1 or degrees).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

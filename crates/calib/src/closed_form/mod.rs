@@ -10,6 +10,7 @@
 //! - Standard errors take residuals for white. [`ClosedFormFit::residual_autocorrelation`] says how far they are from it.
 
 mod catalogue;
+mod datum;
 mod exponentials;
 mod fit;
 mod law;
@@ -22,10 +23,11 @@ mod statistics;
 mod stretched;
 mod tunnelling;
 
-pub use catalogue::{ClosedForm, ModulusShape};
-pub use exponentials::{Burgers, Exponentials};
+pub use catalogue::ClosedForm;
+pub use datum::{Datum, Moment, Movement};
+pub use exponentials::{Burgers, Exponentials, ModulusShape};
 pub use fit::fit_closed_form;
-pub use law::{ClosedFormError, Datum, Derived, Moment, Movement, Parameter, SeparableLaw, Unit, value_and_gradient};
+pub use law::{ClosedFormError, Derived, Parameter, SeparableLaw, Unit, value_and_gradient};
 pub use moving::{Hold, Moving};
 pub use moving_hold::MovingHold;
 pub use pieces::{hold_data, moving_data, whole_data};

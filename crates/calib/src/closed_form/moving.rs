@@ -1,6 +1,6 @@
-use super::catalogue::ModulusShape;
-use super::exponentials::decay;
-use super::law::{Datum, Derived, Moment, Parameter, SeparableLaw, Unit, sort_terms};
+use super::datum::{Datum, Moment};
+use super::exponentials::{ModulusShape, decay};
+use super::law::{Derived, Parameter, SeparableLaw, Unit, sort_terms};
 use super::search::{Extent, Search};
 
 /// Equation 8, a movement: `R = r₀ E(t) v t + v η + r₁`, E the modulus relative to its start.

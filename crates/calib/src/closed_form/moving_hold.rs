@@ -1,6 +1,6 @@
-use super::catalogue::ModulusShape;
-use super::exponentials::decay;
-use super::law::{Datum, Derived, Moment, Parameter, SeparableLaw, Unit, sort_terms, value_and_gradient};
+use super::datum::{Datum, Moment};
+use super::exponentials::{ModulusShape, decay};
+use super::law::{Derived, Parameter, SeparableLaw, Unit, sort_terms, value_and_gradient};
 use super::moving::{intercept, time_constants};
 use super::search::{Extent, Search};
 

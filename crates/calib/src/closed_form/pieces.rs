@@ -3,7 +3,7 @@ use std::ops::Range;
 use crate::Samples;
 use crate::samples::filled_strain;
 
-use super::law::{Datum, Moment, Movement};
+use super::datum::{Datum, Moment, Movement};
 
 /// Readings of the given rows by the time since the first one alone, for laws of time.
 #[must_use]

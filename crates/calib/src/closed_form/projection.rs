@@ -1,6 +1,7 @@
 use nalgebra::{DMatrix, DVector};
 
-use super::law::{Datum, SeparableLaw};
+use super::datum::Datum;
+use super::law::SeparableLaw;
 
 /// Singular values below this share of the largest are rounding: n ε with room for the thousands of rows of a recording.
 const RANK: f64 = 1e-13;

@@ -1,4 +1,5 @@
-use super::law::Datum;
+use super::datum::Datum;
+use crate::order::median;
 
 /// Points per time constant on the grid of starts.
 const GRID: usize = 8;
@@ -21,14 +22,12 @@ pub struct Extent {
 impl Extent {
     /// Of data in the order of their times.
     pub(super) fn of(data: &[Datum]) -> Self {
-        let mut steps: Vec<f64> = data.windows(2).map(|pair| pair[1].at.elapsed_s - pair[0].at.elapsed_s).collect();
-        steps.retain(|step| *step > 0.0);
-        steps.sort_by(f64::total_cmp);
+        let steps = data.windows(2).map(|pair| pair[1].at.elapsed_s - pair[0].at.elapsed_s);
         let largest = |value: fn(&Datum) -> f64| data.iter().map(value).fold(0.0, f64::max);
         let duration_s = largest(|datum| datum.at.elapsed_s).max(f64::MIN_POSITIVE);
         let strain = largest(|datum| datum.at.strain.abs());
         Self {
-            step_s: steps.get(steps.len() / 2).copied().unwrap_or(duration_s),
+            step_s: median(steps.filter(|step| *step > 0.0)).unwrap_or(duration_s),
             duration_s,
             strain: if strain > 0.0 { strain } else { 1.0 },
         }

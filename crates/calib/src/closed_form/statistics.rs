@@ -1,6 +1,7 @@
 use nalgebra::{DMatrix, DVector};
 
-use super::law::{Datum, Parameter, SeparableLaw};
+use super::datum::Datum;
+use super::law::{Parameter, SeparableLaw};
 use super::projection::Projection;
 use super::search::Search;
 

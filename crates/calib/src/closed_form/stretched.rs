@@ -1,4 +1,5 @@
-use super::law::{Moment, Parameter, SeparableLaw, Unit};
+use super::datum::Moment;
+use super::law::{Parameter, SeparableLaw, Unit};
 use super::search::{Extent, Search};
 
 /// Stretched exponential (Kohlrausch-Williams-Watts): `R∞ + r exp(-(t/τ)^β)`.

@@ -1,4 +1,5 @@
-use super::law::{Moment, Parameter, SeparableLaw, Unit};
+use super::datum::Moment;
+use super::law::{Parameter, SeparableLaw, Unit};
 use super::search::{Extent, Search};
 
 /// Tunnelling between particles whose gaps grow with strain: `R₀ (1 + C ε) exp(A ε + W ε²)`, C ≥ 0.

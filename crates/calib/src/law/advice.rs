@@ -1,6 +1,5 @@
 use nalgebra::{Cholesky, DMatrix};
 
-use crate::law::identifiability::{OnBound, scaled_normal};
 use crate::likelihood::Bound;
 use crate::motion_stats::MotionStats;
 use crate::params::{RangeParams, Uncertainty};
@@ -14,6 +13,17 @@ const ONE_SPEED: f64 = 1.15;
 const LARGEST_INFLATION: f64 = 10.0;
 /// Strain not recorded between zero and the least strain, in spans, beyond which R₀ is an extrapolation.
 const FAR_FROM_REST: f64 = 0.1;
+
+/// A time constant that ends on a bound of its search.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OnBound {
+    /// Its name.
+    pub name: String,
+    /// Its value, s.
+    pub value: f64,
+    /// The bound: the pace of the motion below, a quarter of the longest recording above.
+    pub bound: Bound,
+}
 
 /// What to record next, most important first.
 pub(crate) fn advice(
@@ -97,6 +107,13 @@ fn trailing_columns(parameters: &Uncertainty) -> usize {
     let count = |wanted: &dyn Fn(&str) -> bool| parameters.names.iter().filter(|name| wanted(name)).count();
     let gauge = count(&|name| matches!(name, "gauge.decay_strain" | "gauge.gap" | "gauge.barrier" | "gauge.path_loss"));
     2 + count(&|name| name.starts_with("branches[")) + gauge
+}
+
+/// JᵀJ with columns of unit length; a column of zeros stays one.
+pub(crate) fn scaled_normal(jacobian: &DMatrix<f64>) -> DMatrix<f64> {
+    let lengths: Vec<f64> = jacobian.column_iter().map(|column| column.norm().max(f64::MIN_POSITIVE)).collect();
+    let normal = jacobian.tr_mul(jacobian);
+    DMatrix::from_fn(normal.nrows(), normal.ncols(), |i, j| normal[(i, j)] / (lengths[i] * lengths[j]))
 }
 
 /// Diagonal of the inverse of the scaled normal matrix: 1 for a column at right angles to all others.

@@ -5,6 +5,7 @@ use crate::CalibrationError;
 use crate::law::least_squares::{settle, without_ridge};
 use crate::law::regression::LawRegression;
 use crate::law::uncertainty::Linearised;
+use crate::order::sorted;
 use crate::params::law::LawParams;
 use crate::samples::Samples;
 
@@ -75,8 +76,7 @@ fn draw(rows: &[usize], rng: &mut ChaCha12Rng) -> Vec<usize> {
 
 /// Linear between order statistics.
 fn quantile(values: impl Iterator<Item = f64>, share: f64) -> f64 {
-    let mut sorted: Vec<f64> = values.collect();
-    sorted.sort_by(f64::total_cmp);
+    let sorted = sorted(values);
     let at = share * (sorted.len() - 1) as f64;
     let (low, high) = (at.floor() as usize, at.ceil() as usize);
     sorted[low] + (sorted[high] - sorted[low]) * (at - at.floor())

@@ -1,6 +1,7 @@
 use crate::CalibrationError;
-use crate::law::fit::{GaugeFamily, LawOptions, fit_structure};
+use crate::law::fit::{LawOptions, fit_structure};
 use crate::law::regression::LawRegression;
+use crate::law::structure::GaugeFamily;
 use crate::law::structure::LawStructure;
 use crate::samples::Samples;
 
@@ -23,7 +24,6 @@ pub struct StructureScore {
 
 /// Most branches compared.
 const MOST_BRANCHES: usize = 3;
-const FAMILIES: [GaugeFamily; 3] = [GaugeFamily::Polynomial, GaugeFamily::DecayingExponential, GaugeFamily::Tunnelling];
 
 /// Every structure with up to three branches, fitted with the least ridge and compared; structures that do not fit are
 /// left out.
@@ -37,7 +37,7 @@ const FAMILIES: [GaugeFamily; 3] = [GaugeFamily::Polynomial, GaugeFamily::Decayi
 pub fn compare_structures(recordings: &[Samples]) -> Result<Vec<StructureScore>, CalibrationError> {
     let regression = LawRegression::new(recordings)?;
     let mut fitted = Vec::new();
-    for gauge in FAMILIES {
+    for gauge in GaugeFamily::ALL {
         for branches in 0..=MOST_BRANCHES {
             let options = LawOptions { branches, gauge };
             let Ok((structure, fit)) = fit_structure(&regression, options) else { continue };

@@ -2,10 +2,10 @@ use crate::CalibrationError;
 use crate::law::blocked_normal::BlockedNormal;
 use crate::law::design::BRANCH_COLUMNS;
 use crate::law::regression::{BLOCKS, LawRegression};
-use crate::law::structure::LawStructure;
+use crate::law::structure::{GaugeFamily, LawFit, LawStructure};
 use crate::optimise;
 use crate::params::estimator::EstimatorKind;
-use crate::params::law::{LawParams, MOST_BRANCHES};
+use crate::params::law::MOST_BRANCHES;
 use crate::samples::Samples;
 
 /// What the fit of the law may choose from.
@@ -15,32 +15,6 @@ pub struct LawOptions {
     pub branches: usize,
     /// Family of the gauge curve.
     pub gauge: GaugeFamily,
-}
-
-/// Families of gauge curves.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum GaugeFamily {
-    /// Cubic polynomial.
-    Polynomial,
-    /// `G ε exp(-ε/ε₀)`.
-    DecayingExponential,
-    /// `(1 + C ε) exp(A ε + W ε²) - 1`.
-    Tunnelling,
-}
-
-/// A law fitted to recordings with known strain.
-#[derive(Clone, Debug)]
-pub struct LawFit {
-    /// The law.
-    pub law: LawParams,
-    /// R₀ of each recording.
-    pub rest_readings: Vec<f64>,
-    /// Reading over R₀ minus 1 minus the law, row by row of each recording; NaN where the reading is missing.
-    pub residuals: Vec<Vec<f64>>,
-    /// Root mean squared error on blocks left out, relative to R₀.
-    pub cross_validated_error: f64,
-    /// The ridge that cross-validation chose.
-    pub ridge: f64,
 }
 
 impl Default for LawOptions {
@@ -89,8 +63,6 @@ const GRID: usize = 12;
 /// Ridges tried, relative to the variance of each column. The least one explains most and often makes a filter lock onto
 /// the wrong direction; which one an estimator stands is for its own score to say.
 const RIDGES: [f64; 5] = [0.1, 0.03, 0.01, 0.003, 0.001];
-/// Rows that a regression uses at most: its residuals are correlated over seconds, and more rows tell nothing new.
-pub(crate) const MOST_ROWS: usize = 6000;
 /// Steps of the polish of the time constants, and the side of its first simplex in ln τ.
 const POLISH_STEPS: u64 = 40;
 const POLISH_SIDE: f64 = 0.3;

@@ -3,7 +3,7 @@ use std::fmt;
 use nalgebra::DMatrix;
 
 use crate::CalibrationError;
-use crate::law::advice::advice;
+use crate::law::advice::{OnBound, advice, scaled_normal};
 use crate::law::least_squares::without_ridge;
 use crate::law::regression::LawRegression;
 use crate::law::uncertainty::Linearised;
@@ -27,17 +27,6 @@ pub struct Identifiability {
     pub on_bound: Vec<OnBound>,
     /// What to record next, in words; empty if nothing stands out.
     pub advice: Vec<String>,
-}
-
-/// A time constant that ends on a bound of its search.
-#[derive(Clone, Debug, PartialEq)]
-pub struct OnBound {
-    /// Its name.
-    pub name: String,
-    /// Its value, s.
-    pub value: f64,
-    /// The bound: the pace of the motion below, a quarter of the longest recording above.
-    pub bound: Bound,
 }
 
 /// A time constant this near to a bound, in its logarithm, ends there.
@@ -70,13 +59,6 @@ pub fn identifiability(recordings: &[Samples], law: &LawParams) -> Result<Identi
         on_bound,
         parameters,
     })
-}
-
-/// JᵀJ with columns of unit length; a column of zeros stays one.
-pub(crate) fn scaled_normal(jacobian: &DMatrix<f64>) -> DMatrix<f64> {
-    let lengths: Vec<f64> = jacobian.column_iter().map(|column| column.norm().max(f64::MIN_POSITIVE)).collect();
-    let normal = jacobian.tr_mul(jacobian);
-    DMatrix::from_fn(normal.nrows(), normal.ncols(), |i, j| normal[(i, j)] / (lengths[i] * lengths[j]))
 }
 
 fn condition_number(jacobian: &DMatrix<f64>) -> f64 {

@@ -5,7 +5,6 @@ use nalgebra::DVector;
 use crate::CalibrationError;
 use crate::law::blocked_normal::BlockedNormal;
 use crate::law::design::{Regressors, StrainScale};
-use crate::law::fit::MOST_ROWS;
 use crate::law::robust_loss;
 use crate::motion_stats::MotionStats;
 use crate::order::median;
@@ -14,6 +13,8 @@ use crate::samples::{Samples, check};
 
 /// Contiguous blocks of each recording that are left out in turn.
 pub(crate) const BLOCKS: usize = 4;
+/// Rows that a regression uses at most: its residuals are correlated over seconds, and more rows tell nothing new.
+const MOST_ROWS: usize = 6000;
 /// Passes that rescale recordings by their own R₀; each one squares the relative error of the one before.
 const SCALING_PASSES: usize = 3;
 

@@ -1,8 +1,8 @@
 use nalgebra::DVector;
 
-use crate::law::fit::GaugeFamily;
 use crate::law::regression::{Design, LawRegression};
-use crate::law::structure::LawStructure;
+use crate::law::structure::{GaugeFamily, LawStructure};
+use crate::order::median;
 
 /// Residuals beyond this many robust deviations count by their size instead of its square. Laws of this kind are wrong by
 /// several deviations for seconds, which they are to learn from; a contact that fails for a row is off by far more.
@@ -44,9 +44,7 @@ pub(crate) fn weigh(regression: &mut LawRegression) {
     for _ in 0..PASSES {
         // Without a preliminary law every row counts the same; whether there is a law at all is for others to say.
         let Some((residual, _)) = residuals(regression, &design) else { return };
-        let mut sizes: Vec<f64> = residual.iter().map(|r| r.abs()).collect();
-        sizes.sort_by(f64::total_cmp);
-        let most = HUBER * PER_MEDIAN * sizes.get(sizes.len() / 2).copied().unwrap_or(0.0);
+        let most = HUBER * PER_MEDIAN * median(residual.iter().map(|r| r.abs())).unwrap_or(0.0);
         if !(most > 0.0) {
             return;
         }

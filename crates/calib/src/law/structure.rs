@@ -2,9 +2,49 @@ use nalgebra::DVector;
 
 use crate::CalibrationError;
 use crate::law::design::{BRANCH_COLUMNS, StrainScale};
-use crate::law::fit::{GaugeFamily, LawFit};
 use crate::law::regression::{Design, LawRegression};
 use crate::params::law::{BranchParams, GaugeParams, LawParams};
+
+/// Families of gauge curves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum GaugeFamily {
+    /// Cubic polynomial.
+    Polynomial,
+    /// `G ε exp(-ε/ε₀)`.
+    DecayingExponential,
+    /// `(1 + C ε) exp(A ε + W ε²) - 1`.
+    Tunnelling,
+}
+
+impl GaugeFamily {
+    /// All families.
+    pub const ALL: [Self; 3] = [Self::Polynomial, Self::DecayingExponential, Self::Tunnelling];
+
+    /// Its name on the command line and in files.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Polynomial => "polynomial",
+            Self::DecayingExponential => "decaying-exponential",
+            Self::Tunnelling => "tunnelling",
+        }
+    }
+}
+
+/// A law fitted to recordings with known strain.
+#[derive(Clone, Debug)]
+pub struct LawFit {
+    /// The law.
+    pub law: LawParams,
+    /// R₀ of each recording.
+    pub rest_readings: Vec<f64>,
+    /// Reading over R₀ minus 1 minus the law, row by row of each recording; NaN where the reading is missing.
+    pub residuals: Vec<Vec<f64>>,
+    /// Root mean squared error on blocks left out, relative to R₀.
+    pub cross_validated_error: f64,
+    /// The ridge that cross-validation chose.
+    pub ridge: f64,
+}
 
 /// Smallest R₀ that is believed, relative to the median reading.
 const LEAST_REST_SHARE: f64 = 0.05;

@@ -4,7 +4,7 @@ use crate::CalibrationError;
 use crate::law::regression::{LawRegression, Solution};
 use crate::law::structure::LawStructure;
 use crate::params::Uncertainty;
-use crate::params::law::{GaugeParams, LawParams};
+use crate::params::law::{LawParameter, LawParams};
 
 /// Contiguous blocks over which residuals may be correlated as they like.
 const BLOCKS: usize = 40;
@@ -110,7 +110,7 @@ impl<'a> Linearised<'a> {
             let mut moved = self.structure.clone();
             moved.nonlinear.copy_from_slice(&point[linear..]);
             let law = moved.law(self.regression, &point[..linear]);
-            in_own_units(&law, point[0] * self.solution.rest_readings[0], point[0])
+            in_own_units(law, point[0] * self.solution.rest_readings[0], point[0])
         };
         carry_over(covariance, &point, physical)
     }
@@ -125,7 +125,7 @@ impl<'a> Linearised<'a> {
     /// The parameters by name, in the law's own units.
     pub(crate) fn named(&self) -> Vec<(String, f64)> {
         let law = self.structure.law(self.regression, self.solution.weights.as_slice());
-        in_own_units(&law, self.solution.weights[0] * self.solution.rest_readings[0], self.solution.weights[0])
+        in_own_units(law, self.solution.weights[0] * self.solution.rest_readings[0], self.solution.weights[0])
     }
 }
 
@@ -158,33 +158,10 @@ fn carry_over(
 }
 
 /// The law's parameters by name; everything is relative to R₀, which is `share` of what the law was fitted with.
-fn in_own_units(law: &LawParams, rest_reading: f64, share: f64) -> Vec<(String, f64)> {
-    let mut named = vec![("rest_reading".to_string(), rest_reading)];
-    let mut push = |name: String, value: f64| named.push((name, value));
-    match law.gauge {
-        GaugeParams::Polynomial { coefficients } => {
-            for (power, coefficient) in coefficients.iter().enumerate() {
-                push(format!("gauge.coefficients[{power}]"), coefficient / share);
-            }
-        }
-        GaugeParams::DecayingExponential { slope, decay_strain } => {
-            push("gauge.slope".into(), slope / share);
-            push("gauge.decay_strain".into(), decay_strain);
-        }
-        GaugeParams::Tunnelling { gap, barrier, path_loss } => {
-            push("gauge.gap".into(), gap);
-            push("gauge.barrier".into(), barrier);
-            push("gauge.path_loss".into(), path_loss);
-        }
-    }
-    push("extend_viscosity_s".into(), law.extend_viscosity_s / share);
-    push("retract_viscosity_s".into(), law.retract_viscosity_s / share);
-    for (i, branch) in law.branches.iter().enumerate() {
-        push(format!("branches[{i}].tau_s"), branch.tau_s);
-        push(format!("branches[{i}].extend_gain"), branch.extend_gain / share);
-        push(format!("branches[{i}].retract_gain"), branch.retract_gain / share);
-        push(format!("branches[{i}].extend_gain_slope"), branch.extend_gain_slope / share);
-        push(format!("branches[{i}].retract_gain_slope"), branch.retract_gain_slope / share);
-    }
-    named
+fn in_own_units(mut law: LawParams, rest_reading: f64, share: f64) -> Vec<(String, f64)> {
+    let of_law = law.parameters_mut().into_iter().map(|LawParameter { name, value, is_over_rest }| {
+        let value = *value;
+        (name, if is_over_rest { value / share } else { value })
+    });
+    [("rest_reading".to_owned(), rest_reading)].into_iter().chain(of_law).collect()
 }

@@ -62,6 +62,16 @@ impl GaugeParams {
     }
 }
 
+/// A number of a law under its name in `sensor.toml`: `branches[0].tau_s`.
+pub struct LawParameter<'a> {
+    /// The name.
+    pub name: String,
+    /// The number.
+    pub value: &'a mut f64,
+    /// Whether it stands for readings over R₀, so that with twice the R₀ it is half as large.
+    pub is_over_rest: bool,
+}
+
 /// One relaxing branch.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -79,6 +89,46 @@ pub struct BranchParams {
 }
 
 impl LawParams {
+    /// All its numbers but the range: gauge, dash-pots, branches.
+    pub fn parameters_mut(&mut self) -> Vec<LawParameter<'_>> {
+        let (over_rest, not) = (true, false);
+        let gauge = match &mut self.gauge {
+            GaugeParams::Polynomial { coefficients: [first, second, third] } => vec![
+                ("gauge.coefficients[0]", first, over_rest),
+                ("gauge.coefficients[1]", second, over_rest),
+                ("gauge.coefficients[2]", third, over_rest),
+            ],
+            GaugeParams::DecayingExponential { slope, decay_strain } => {
+                vec![("gauge.slope", slope, over_rest), ("gauge.decay_strain", decay_strain, not)]
+            }
+            GaugeParams::Tunnelling { gap, barrier, path_loss } => {
+                vec![("gauge.gap", gap, not), ("gauge.barrier", barrier, not), ("gauge.path_loss", path_loss, not)]
+            }
+        };
+        let dash_pots = [
+            ("extend_viscosity_s", &mut self.extend_viscosity_s, over_rest),
+            ("retract_viscosity_s", &mut self.retract_viscosity_s, over_rest),
+        ];
+        let named = |(name, value, is_over_rest)| LawParameter { name: String::from(name), value, is_over_rest };
+        let mut all: Vec<LawParameter<'_>> = gauge.into_iter().chain(dash_pots).map(named).collect();
+        for (index, branch) in self.branches.iter_mut().enumerate() {
+            let own = [
+                ("tau_s", &mut branch.tau_s, not),
+                ("extend_gain", &mut branch.extend_gain, over_rest),
+                ("retract_gain", &mut branch.retract_gain, over_rest),
+                ("extend_gain_slope", &mut branch.extend_gain_slope, over_rest),
+                ("retract_gain_slope", &mut branch.retract_gain_slope, over_rest),
+            ];
+            let named = |(name, value, is_over_rest)| LawParameter {
+                name: format!("branches[{index}].{name}"),
+                value,
+                is_over_rest,
+            };
+            all.extend(own.map(named));
+        }
+        all
+    }
+
     /// As the model has it; `None` unless there are exactly `B` branches.
     #[must_use]
     pub fn to_model<const B: usize>(&self) -> Option<SensorLaw<f64, B>> {

@@ -4,9 +4,9 @@ use serde::{Deserialize, Serialize};
 use super::probe::common;
 use crate::CalibrationError;
 use crate::law::design::StrainScale;
-use crate::law::fit::{CrossFit, LawFit};
+use crate::law::fit::CrossFit;
 use crate::law::regression::{BLOCKS, Design, LawRegression};
-use crate::law::structure::LawStructure;
+use crate::law::structure::{LawFit, LawStructure};
 use crate::params::RangeParams;
 use crate::samples::{Samples, usual_step_s};
 

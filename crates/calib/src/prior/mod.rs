@@ -7,7 +7,6 @@
 mod law;
 mod learn;
 mod noise;
-mod parameters;
 mod population;
 mod probe;
 mod rows;

@@ -1,10 +1,10 @@
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use crate::CalibrationError;
-use crate::law::fit::GaugeFamily;
 use crate::law::regression::LawRegression;
+use crate::law::structure::GaugeFamily;
 use crate::law::structure::LawStructure;
-use crate::params::law::LawParams;
+use crate::params::law::{LawParameter, LawParams};
 use crate::params::{RangeParams, Uncertainty};
 use crate::samples::Samples;
 
@@ -62,7 +62,7 @@ impl Probe {
         for (j, name) in told.names.iter().enumerate() {
             let moved = |sign: f64| {
                 let mut law = law.clone();
-                let value = law.parameter(name)?;
+                let LawParameter { value, .. } = law.parameters_mut().into_iter().find(|own| own.name == *name)?;
                 let step = STEP * value.abs().max(STEP);
                 *value += sign * step;
                 Some((self.weights(&law), step))

@@ -3,7 +3,7 @@ use std::fmt;
 use crate::CalibrationError;
 use crate::law::regression::LawRegression;
 use crate::law::robust_loss;
-use crate::order::median;
+use crate::order::{median, sorted};
 use crate::samples::Samples;
 
 /// A row that calibration does not believe.
@@ -195,10 +195,8 @@ fn spikes(values: &[f64]) -> Vec<(usize, f64, f64)> {
             Some((middle, median(window.iter().map(|&k| (values[k] - middle).abs()))?))
         })
         .collect();
-    let mut away: Vec<f64> = known.iter().zip(&around).map(|(&k, (median, _))| (values[k] - median).abs()).collect();
-    let distances = away.clone();
-    away.sort_by(f64::total_cmp);
-    let usual = away.get(away.len() * 9 / 10).copied().unwrap_or(0.0);
+    let distances: Vec<f64> = known.iter().zip(&around).map(|(&k, (median, _))| (values[k] - median).abs()).collect();
+    let usual = sorted(distances.iter().copied()).get(distances.len() * 9 / 10).copied().unwrap_or(0.0);
     let (of_span, of_spread, of_usual) = SPIKE;
     let is_spike = |i: usize| {
         let distance = distances[i];
@@ -209,8 +207,7 @@ fn spikes(values: &[f64]) -> Vec<(usize, f64, f64)> {
 
 /// What nearly all known values lie within; `None` without any.
 fn span(values: &[f64]) -> Option<f64> {
-    let mut known: Vec<f64> = values.iter().copied().filter(|value| value.is_finite()).collect();
-    known.sort_by(f64::total_cmp);
+    let known = sorted(values.iter().copied().filter(|value| value.is_finite()));
     let last = known.len().checked_sub(1)?;
     let at = |share: f64| known[(last as f64 * share).round() as usize];
     Some(at(SPAN.1) - at(SPAN.0))

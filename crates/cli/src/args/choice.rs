@@ -1,6 +1,5 @@
 use std::str::FromStr;
 
-use clap::ValueEnum;
 use ohmstrain_calib::{EstimatorKind, GaugeFamily};
 
 /// `auto`, or a value.
@@ -46,32 +45,15 @@ impl FromStr for Branches {
 }
 
 /// A family of gauge curves.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-pub enum Gauge {
-    /// Cubic polynomial.
-    Polynomial,
-    /// Rises to a peak and falls.
-    DecayingExponential,
-    /// Tunnelling between particles.
-    Tunnelling,
-}
+#[derive(Clone, Copy, Debug)]
+pub struct Gauge(pub GaugeFamily);
 
 impl FromStr for Gauge {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        <Self as ValueEnum>::from_str(text, false)
-            .map_err(|_| "expected auto, polynomial, decaying-exponential or tunnelling".into())
-    }
-}
-
-impl From<Gauge> for GaugeFamily {
-    fn from(gauge: Gauge) -> Self {
-        match gauge {
-            Gauge::Polynomial => Self::Polynomial,
-            Gauge::DecayingExponential => Self::DecayingExponential,
-            Gauge::Tunnelling => Self::Tunnelling,
-        }
+        let found = GaugeFamily::ALL.into_iter().find(|family| family.name() == text);
+        found.map(Self).ok_or_else(|| "expected auto, polynomial, decaying-exponential or tunnelling".into())
     }
 }
 

@@ -100,7 +100,7 @@ fn calibration(args: &CalibrateArgs) -> Calibration<'static> {
         calibration = calibration.estimator(estimator.0);
     }
     if let Some(gauge) = args.gauge.chosen() {
-        calibration = calibration.gauge(gauge.into());
+        calibration = calibration.gauge(gauge.0);
     }
     args.branches.chosen().map_or(calibration, |branches| calibration.branches(branches.0))
 }

@@ -1,7 +1,5 @@
 use comfy_table::Table;
-use ohmstrain_calib::{
-    GaugeFamily, LawParams, Samples, StructureScore, bootstrap_law, compare_structures, identifiability, screen,
-};
+use ohmstrain_calib::{LawParams, Samples, StructureScore, bootstrap_law, compare_structures, identifiability, screen};
 
 use crate::args::CalibrateArgs;
 use crate::error::CliError;
@@ -45,7 +43,7 @@ fn structures(scores: &[StructureScore]) -> Table {
         output::wrapped_table(["gauge", "branches", "parameters", "error, % of R0", "left out, %", "AIC", "BIC"]);
     for score in scores {
         table.add_row([
-            family(score.options.gauge).to_string(),
+            score.options.gauge.name().to_string(),
             score.options.branches.to_string(),
             score.parameters.to_string(),
             format!("{:.3}", 100.0 * score.error),
@@ -55,13 +53,4 @@ fn structures(scores: &[StructureScore]) -> Table {
         ]);
     }
     table
-}
-
-/// Its name on the command line.
-const fn family(gauge: GaugeFamily) -> &'static str {
-    match gauge {
-        GaugeFamily::Polynomial => "polynomial",
-        GaugeFamily::DecayingExponential => "decaying-exponential",
-        GaugeFamily::Tunnelling => "tunnelling",
-    }
 }

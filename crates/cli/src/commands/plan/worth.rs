@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 use ohmstrain::{JointParams, Reading, ReadingUnit, Sensor};
 use ohmstrain_bench_data::FrontEndSpec;
-use ohmstrain_calib::{GaugeParams, LawParams, NoiseParams};
+use ohmstrain_calib::{LawParams, NoiseParams};
 use ohmstrain_model::AdcCode;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
@@ -153,37 +153,7 @@ pub fn told(sensor: &Sensor, protocol: &Protocol) -> Told {
 /// The parameters of a law that are not zero, by name.
 fn parameters(law: &LawParams) -> (Vec<String>, Vec<f64>) {
     let mut law = law.clone();
-    let found: Vec<(String, f64)> = places(&mut law).into_iter().map(|(name, place)| (name, *place)).collect();
-    found.into_iter().filter(|(_, value)| *value != 0.0).unzip()
-}
-
-/// Every parameter of a law with its place.
-fn places(law: &mut LawParams) -> Vec<(String, &mut f64)> {
-    let mut found: Vec<(String, &mut f64)> = match &mut law.gauge {
-        GaugeParams::Polynomial { coefficients } => {
-            coefficients.iter_mut().enumerate().map(|(i, x)| (format!("gauge.coefficients[{i}]"), x)).collect()
-        }
-        GaugeParams::DecayingExponential { slope, decay_strain } => {
-            vec![("gauge.slope".into(), slope), ("gauge.decay_strain".into(), decay_strain)]
-        }
-        GaugeParams::Tunnelling { gap, barrier, path_loss } => {
-            let own = [("gauge.gap", gap), ("gauge.barrier", barrier), ("gauge.path_loss", path_loss)];
-            own.map(|(name, place)| (name.into(), place)).into()
-        }
-    };
-    found.push(("extend_viscosity_s".into(), &mut law.extend_viscosity_s));
-    found.push(("retract_viscosity_s".into(), &mut law.retract_viscosity_s));
-    for (i, branch) in law.branches.iter_mut().enumerate() {
-        let own = [
-            ("tau_s", &mut branch.tau_s),
-            ("extend_gain", &mut branch.extend_gain),
-            ("retract_gain", &mut branch.retract_gain),
-            ("extend_gain_slope", &mut branch.extend_gain_slope),
-            ("retract_gain_slope", &mut branch.retract_gain_slope),
-        ];
-        found.extend(own.map(|(name, place)| (format!("branches[{i}].{name}"), place)));
-    }
-    found
+    law.parameters_mut().into_iter().map(|own| (own.name, *own.value)).filter(|(_, value)| *value != 0.0).unzip()
 }
 
 /// JᵀJ of the whitened readings by central differences. The drift is an Ornstein-Uhlenbeck process: a reading less what is left of
@@ -196,15 +166,14 @@ fn information(sensor: &Sensor, strain: &[f64]) -> DMatrix<f64> {
         noise.map_or((1e-3, 0.0, 1.0), |noise| (noise.reading_sd, noise.baseline_sd, noise.baseline_time_s));
     let kept = (-1.0 / RATE_HZ / drift_s).exp();
     let sd = (drift * drift * (1.0 - kept * kept) + white * white * (1.0 + kept * kept)).sqrt();
-    let names = parameters(&params.law).0;
+    let (names, values) = parameters(&params.law);
     let driven = |name: &str, factor: f64| {
         let mut moved = params.clone();
-        if let Some((_, place)) = places(&mut moved.law).into_iter().find(|(own, _)| own == name) {
-            *place *= factor;
+        if let Some(own) = moved.law.parameters_mut().into_iter().find(|own| own.name == name) {
+            *own.value *= factor;
         }
         Law::new(&moved, 1.0).driven(&time_s, strain, &[]).reading
     };
-    let values = parameters(&params.law).1;
     let mut jacobian = DMatrix::zeros(strain.len(), names.len());
     for (column, (name, value)) in names.iter().zip(&values).enumerate() {
         let (above, below) = (driven(name, 1.0 + STEP), driven(name, 1.0 - STEP));
