@@ -27,7 +27,7 @@ pub fn with_sensor(
     }
     let checked = sensor.check_reference(truth.iter().copied());
     checked.map_err(|doubt| of_library(&doubt.into(), file))?;
-    let moved = params.rest_reading / sensor.rest_reading(options.rest_resistance);
+    let moved = params.rest_reading / sensor.rest_reading(options.rest_resistance(sensor)?);
     let part = Part { recording, truth, first: recording.time_s.partition_point(|time_s| *time_s < from_s) };
     let scores = py.detach(|| {
         let mut scores = part.of_estimates(sensor, options)?;

@@ -10,13 +10,32 @@ pub struct Options {
     estimator: Option<String>,
     correction: bool,
     initial_strain: Option<f64>,
-    /// What the rested sensor reads now.
-    pub rest_resistance: Option<f64>,
+    rest_resistance: Option<Rest>,
     gate: Option<f64>,
     influence: Option<String>,
 }
 
+/// What the rested sensor reads now.
+#[derive(Clone, Debug, FromPyObject)]
+enum Rest {
+    Reading(f64),
+    Named(String),
+}
+
 impl Options {
+    /// What the rested sensor reads now, if that is said.
+    pub fn rest_resistance(&self, sensor: &Sensor) -> PyResult<Option<f64>> {
+        match &self.rest_resistance {
+            None => Ok(None),
+            Some(Rest::Reading(measured)) => Ok(Some(*measured)),
+            Some(Rest::Named(name)) if name == "calibrated" => Ok(Some(sensor.params().rested())),
+            Some(Rest::Named(name)) => {
+                let said = format!("rest_resistance: expected a positive number or calibrated, found `{name}`");
+                Err(raise(&Place::default(), &said))
+            }
+        }
+    }
+
     /// With the learned correction, if the sensor has one.
     pub fn with_correction(self) -> Self {
         Self { correction: true, ..self }
@@ -34,7 +53,7 @@ impl Options {
         if let Some(strain) = self.initial_strain {
             builder = builder.initial_strain(strain);
         }
-        if let Some(measured) = self.rest_resistance {
+        if let Some(measured) = self.rest_resistance(sensor)? {
             builder = builder.rest_resistance(measured);
         }
         if let Some(nis) = self.gate {

@@ -25,7 +25,7 @@ type Doubtful = (PyTable, Vec<String>);
 impl Sensor {
     /// On the joint of a recording, if it has one; with its readings checked.
     fn for_recording(&self, recording: &Recording, options: &Options) -> PyResult<Cow<'_, ohmstrain::Sensor>> {
-        recording.check_unit(&self.sensor, options.rest_resistance)?;
+        recording.check_unit(&self.sensor, options.rest_resistance(&self.sensor)?)?;
         let Some(joint) = recording.joint else { return Ok(Cow::Borrowed(&self.sensor)) };
         let moved = self.sensor.clone().on_joint(joint);
         moved.map(Cow::Owned).map_err(|error| recording.refused(&error))
@@ -91,7 +91,8 @@ impl Sensor {
 
     fn live(&self, options: Options) -> PyResult<LiveFilter> {
         let filter = options.builder(&self.sensor)?.build().map_err(|error| of_library(&error, None))?;
-        Ok(LiveFilter::new(filter, self.sensor.clone(), options.rest_resistance))
+        let rest = options.rest_resistance(&self.sensor)?;
+        Ok(LiveFilter::new(filter, self.sensor.clone(), rest))
     }
 
     fn lagged(&self, options: Options, lag_s: f64) -> PyResult<LaggedFilter> {
@@ -102,10 +103,11 @@ impl Sensor {
     fn filter(&self, py: Python, table: PyTable, about: About, options: Options) -> PyResult<Doubtful> {
         let recording = Recording::new(table, about)?;
         let sensor = self.for_recording(&recording, &options)?;
+        let rest = options.rest_resistance(&sensor)?;
         let mut filter = options.builder(&sensor)?.build().map_err(|error| recording.refused(&error))?;
         let (estimates, warnings) = py.detach(|| {
             let mut estimates = Estimates::new(sensor.columns(), recording.time_s.len());
-            let mut watch = Watch::new(&sensor, &recording, &options);
+            let mut watch = Watch::new(&sensor, &recording, rest);
             recording.filtered(&mut filter, |row, estimate| {
                 estimates.put(row, std::slice::from_ref(estimate));
                 watch.see(row, estimate.strain_rate);
@@ -118,7 +120,7 @@ impl Sensor {
     fn smooth(&self, py: Python, table: PyTable, about: About, options: Options) -> PyResult<Doubtful> {
         let recording = Recording::new(table, about)?;
         let sensor = self.for_recording(&recording, &options)?;
-        let builder = options.builder(&sensor)?;
+        let (builder, rest) = (options.builder(&sensor)?, options.rest_resistance(&sensor)?);
         let (estimates, warnings) = py.detach(|| {
             let len = recording.time_s.len();
             let mut estimates = Estimates::new(sensor.columns(), len);
@@ -127,7 +129,7 @@ impl Sensor {
                 estimates.put(rows.start, segment);
                 rates[rows].iter_mut().zip(segment).for_each(|(rate, row)| *rate = row.strain_rate);
             })?;
-            let mut watch = Watch::new(&sensor, &recording, &options);
+            let mut watch = Watch::new(&sensor, &recording, rest);
             rates.iter().enumerate().for_each(|(row, rate)| watch.see(row, *rate));
             Ok::<_, PyErr>((estimates, watch.warnings))
         })?;
@@ -149,8 +151,8 @@ struct Watch<'a> {
 }
 
 impl<'a> Watch<'a> {
-    fn new(sensor: &ohmstrain::Sensor, recording: &'a Recording, options: &Options) -> Self {
-        Self { watch: ValidityWatch::new(sensor, options.rest_resistance), recording, warnings: Vec::new() }
+    fn new(sensor: &ohmstrain::Sensor, recording: &'a Recording, rest_resistance: Option<f64>) -> Self {
+        Self { watch: ValidityWatch::new(sensor, rest_resistance), recording, warnings: Vec::new() }
     }
 
     fn see(&mut self, row: usize, rate: f64) {

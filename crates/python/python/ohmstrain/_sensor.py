@@ -37,7 +37,7 @@ def _options(
     estimator: str = "auto",
     correction: bool = True,
     initial_strain: float | None = None,
-    rest_resistance: float | None = None,
+    rest_resistance: float | str | None = None,
     gate: float | None = None,
     influence: str | None = None,
 ) -> dict[str, Any]:
@@ -184,8 +184,9 @@ class Sensor:
             With the learned correction of the strain, the default.
         initial_strain : float
             Strain at the first row, if it is known; the body is at rest there.
-        rest_resistance : float
-            What the rested, unstretched sensor reads now, in place of what it read in calibration.
+        rest_resistance : float or str
+            What the rested, unstretched sensor reads now, or ``calibrated`` for what it read in calibration. Without it
+            R₀ is that too, but follows readings that stay beyond those of the calibration.
         gate : float
             Turn down readings whose normalised innovation squared is above this, two in a row at most.
         influence : str
