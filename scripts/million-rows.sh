@@ -23,7 +23,7 @@ if [[ -n ${SENSOR:-} ]]; then
     cp "$SENSOR" "$folder/sensor.toml"
 else
     $ohmstrain simulate --protocol mixed -o "$folder/training.csv"
-    $ohmstrain calibrate "$folder/training.csv" -o "$folder/sensor.toml" 2>/dev/null
+    $ohmstrain calibrate --quiet "$folder/training.csv" -o "$folder/sensor.toml"
 fi
 $ohmstrain simulate --protocol long-holds --sample-rate-hz 400 -o "$folder/hour.csv"
 recording() {
