@@ -199,8 +199,9 @@ impl fmt::Display for Extrapolation {
                 write!(out, "{quantity} changes faster than the calibration's {fastest_per_s:.4} per second")
             }
             Beyond::Readings { column, least, most, follows } => {
-                let rest = if follows { ", R0 is taken to be another until it is told" } else { "" };
-                write!(out, "{column} is outside of the calibration's {least:.5} to {most:.5}{rest}")
+                let (least, most) = (significant(least, 5), significant(most, 5));
+                let rest = if follows { "; R0 follows until today's resistance at rest is told" } else { "" };
+                write!(out, "{column} is outside of the calibration's {least} to {most}{rest}")
             }
             Beyond::Strain { quantity, least, most } => {
                 let quantity = quantity.name();
