@@ -4,7 +4,7 @@ use ohmstrain_calib::{EstimatorKind, Rows, Start, build_filter};
 use ohmstrain_ekf::{Guard, Influence, StepError};
 
 use crate::estimate::Scale;
-use crate::filter::{Kernel, Known, followed, taken};
+use crate::filter::{Kernel, Translator, followed, taken};
 use crate::{
     DOUBT, DoubtParts, Doubts, Error, Estimate, Filter, Flags, LaggedFilter, Reading, RestBounds, RestFollower, Sensor,
 };
@@ -263,18 +263,14 @@ impl<'a> FilterBuilder<'a> {
         mut take: impl FnMut(Range<usize>, &[Estimate]) -> Result<(), E>,
     ) -> Result<(), E> {
         let starts_known = self.initial_strain.is_some();
-        let Kernel { mut filter, known } = self.kernel(self.kind().smoother())?;
-        let Known { scale, mut doubts, follower, .. } = known;
+        let Kernel { mut filter, translator } = self.kernel(self.kind().smoother())?;
+        let Translator { scale, mut doubts, follower, .. } = translator;
         let failed = |(row, source): (usize, StepError)| Error::Row { row, source };
         let calibrated = |k: usize| {
             let (time_s, reading) = row(k);
             (time_s, reading.relative(scale.rest_reading))
         };
-        let value = |k| {
-            let (time_s, reading) = calibrated(k);
-            (time_s, reading.map(|reading| reading.value))
-        };
-        let follower = follower.map(|follower| follower.settled(len, value));
+        let follower = follower.map(|follower| follower.settled(len, calibrated));
         let off = follower.map_or(0.0, |follower| follower.off());
         let relative = |k| {
             let (time_s, reading) = calibrated(k);
@@ -329,7 +325,7 @@ impl<'a> FilterBuilder<'a> {
         });
         let is_told = self.rest_resistance.is_some();
         let follower = (!is_told).then(|| RestFollower::new(RestBounds::of(params)));
-        Ok(Kernel { filter, known: Known { scale, doubts, follower, seen_s: 0.0 } })
+        Ok(Kernel { filter, translator: Translator { scale, doubts, follower, seen_s: 0.0 } })
     }
 
     fn start_at(&self, strain: f64) -> Result<Start, Error> {

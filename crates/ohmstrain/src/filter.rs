@@ -10,11 +10,11 @@ use crate::{Doubts, Error, Estimate, Flags, Reading, RestFollower};
 /// A filter for the sizes of the sensor's law, and the way to it from readings and from it to rows.
 pub(crate) struct Kernel {
     pub filter: Box<dyn ohmstrain_calib::Filter>,
-    pub known: Known,
+    pub translator: Translator,
 }
 
-/// What is known of the sensor besides what the filter knows.
-pub(crate) struct Known {
+/// From readings to what the filter sees, and from what it says to rows.
+pub(crate) struct Translator {
     pub scale: Scale,
     /// None if intervals are to be as the filter states them.
     pub doubts: Option<Doubts<f64>>,
@@ -24,13 +24,14 @@ pub(crate) struct Known {
     pub seen_s: f64,
 }
 
-impl Known {
+impl Translator {
     /// A reading as the filter is to see it.
     fn relative(&self, reading: Reading) -> Option<ohmstrain_ekf::Reading<f64>> {
         followed(self.follower.as_ref(), reading.relative(self.scale.rest_reading))
     }
 
-    /// The row of a reading and what the filter says of it, in doubt. Doubts are of readings as calibration would have had them.
+    /// The row of a reading and what the filter says of it, in doubt. Doubts are of readings as calibration would have had
+    /// them.
     fn row(&mut self, (time_s, reading): (f64, Reading), mut output: Output) -> Estimate {
         let dt_s = time_s - mem::replace(&mut self.seen_s, time_s);
         let (taken, off) = (taken(&self.scale, reading, &output), self.off());
@@ -127,10 +128,10 @@ impl Filter {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn step(&mut self, time_s: f64, reading: impl Into<Reading>) -> Result<Estimate, Error> {
-        let (Kernel { filter, known }, reading) = (&mut self.kernel, reading.into());
-        filter.step(time_s, known.relative(reading))?;
+        let (Kernel { filter, translator }, reading) = (&mut self.kernel, reading.into());
+        filter.step(time_s, translator.relative(reading))?;
         self.last = (time_s, reading);
-        Ok(known.row(self.last, filter.output()))
+        Ok(translator.row(self.last, filter.output()))
     }
 
     /// Takes in that the strain (or angle) is known now, to `sd`: the estimate of the last row, and those after it, follow.
@@ -148,9 +149,9 @@ impl Filter {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn know(&mut self, strain: f64, sd: f64) -> Result<Estimate, Error> {
-        let (Kernel { filter, known }, (time_s, reading)) = (&mut self.kernel, self.last);
-        known.know(filter.as_mut(), strain, sd)?;
-        Ok(known.scale.row(time_s, reading, known.off(), &filter.output()))
+        let (Kernel { filter, translator }, (time_s, reading)) = (&mut self.kernel, self.last);
+        translator.know(filter.as_mut(), strain, sd)?;
+        Ok(translator.scale.row(time_s, reading, translator.off(), &filter.output()))
     }
 
     /// What the rested, unstretched sensor is found to read from now on, in place of what it read in calibration.
@@ -167,7 +168,7 @@ impl Filter {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn rest_resistance(&mut self, measured: f64) -> Result<(), Error> {
-        self.kernel.known.rest_resistance(measured)
+        self.kernel.translator.rest_resistance(measured)
     }
 }
 
@@ -219,10 +220,10 @@ impl LaggedFilter {
         let (reading, lag_s) = (reading.into(), self.lag_s);
         self.forget_handed_out();
         self.waiting.push_back((time_s, reading));
-        let Kernel { filter, known } = &mut self.kernel;
-        let relative = known.relative(reading);
+        let Kernel { filter, translator } = &mut self.kernel;
+        let relative = translator.relative(reading);
         let (waiting, due) = (&mut self.waiting, &mut self.due);
-        let mut out = |output| due.extend(waiting.pop_front().map(|row| known.row(row, output)));
+        let mut out = |output| due.extend(waiting.pop_front().map(|row| translator.row(row, output)));
         let taken = filter.step_lagged(time_s, relative, lag_s, &mut out);
         if taken.is_err() {
             self.waiting.pop_back();
@@ -247,9 +248,9 @@ impl LaggedFilter {
     /// ```
     pub fn finish(&mut self) -> Result<&[Estimate], Error> {
         self.forget_handed_out();
-        let Kernel { filter, known } = &mut self.kernel;
+        let Kernel { filter, translator } = &mut self.kernel;
         let (waiting, due) = (&mut self.waiting, &mut self.due);
-        filter.flush_lagged(&mut |output| due.extend(waiting.pop_front().map(|row| known.row(row, output))))?;
+        filter.flush_lagged(&mut |output| due.extend(waiting.pop_front().map(|row| translator.row(row, output))))?;
         self.are_out = true;
         Ok(&self.due)
     }
@@ -269,8 +270,8 @@ impl LaggedFilter {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn know(&mut self, strain: f64, sd: f64) -> Result<(), Error> {
-        let Kernel { filter, known } = &mut self.kernel;
-        known.know(filter.as_mut(), strain, sd)
+        let Kernel { filter, translator } = &mut self.kernel;
+        translator.know(filter.as_mut(), strain, sd)
     }
 
     /// As [`Filter::rest_resistance`].
@@ -286,7 +287,7 @@ impl LaggedFilter {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn rest_resistance(&mut self, measured: f64) -> Result<(), Error> {
-        self.kernel.known.rest_resistance(measured)
+        self.kernel.translator.rest_resistance(measured)
     }
 
     fn forget_handed_out(&mut self) {
@@ -299,13 +300,13 @@ impl LaggedFilter {
 
 impl fmt::Debug for Filter {
     fn fmt(&self, out: &mut fmt::Formatter) -> fmt::Result {
-        out.debug_struct("Filter").field("scale", &self.kernel.known.scale).finish_non_exhaustive()
+        out.debug_struct("Filter").field("scale", &self.kernel.translator.scale).finish_non_exhaustive()
     }
 }
 
 impl fmt::Debug for LaggedFilter {
     fn fmt(&self, out: &mut fmt::Formatter) -> fmt::Result {
-        let (scale, lag_s, waiting) = (&self.kernel.known.scale, &self.lag_s, &self.waiting.len());
+        let (scale, lag_s, waiting) = (&self.kernel.translator.scale, &self.lag_s, &self.waiting.len());
         let mut out = out.debug_struct("LaggedFilter");
         out.field("scale", scale).field("lag_s", lag_s).field("waiting", waiting).finish_non_exhaustive()
     }

@@ -38,8 +38,9 @@ pub struct RestBounds {
 }
 
 impl RestBounds {
-    /// On the side of the largest strain the last reading of the calibration, or a little more; on the other side that at rest, with what is left
-    /// open to it, if the calibration has one and it is an end of its readings: a sensor that was never at rest then may get there.
+    /// On the side of the largest strain the last reading of the calibration, or a little more; on the other side that at
+    /// rest, with what is left open to it, if the calibration has one and it is an end of its readings: a sensor that was
+    /// never at rest then may get there.
     ///
     /// ```
     /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
@@ -63,8 +64,8 @@ impl RestBounds {
 }
 
 /// R₀ that follows the readings: it is calibration's as long as they stay where they were then; one that lies beyond them
-/// slowly draws it after itself, and one beyond the other end soon draws it back (a play as wide as calibration's readings, with a lag).
-/// That is right where the sensor moves between the same strains as in calibration, on another day. Where it is stretched
+/// slowly draws it after itself, and one beyond the other end soon draws it back (a play as wide as calibration's readings,
+/// with a lag). That is right where the sensor moves between the same strains as in calibration, on another day. Where it is stretched
 /// farther, the strain is at its limit in any case.
 ///
 /// ```
@@ -125,8 +126,8 @@ impl<T: Real> RestFollower<T> {
         Reading { value: (reading.value - self.off) / rest, extra_variance }
     }
 
-    /// Takes a reading R/R₀ - 1, of calibration's R₀, `dt_s` seconds after the row before. A number that comes again says nothing until another one comes:
-    /// it may be stuck.
+    /// Takes a reading R/R₀ - 1, of calibration's R₀, `dt_s` seconds after the row before. A number that comes again says
+    /// nothing until another one comes: it may be stuck.
     ///
     /// ```
     /// let bounds = ohmstrain::RestBounds { low: None, high: Some(1.5) };
@@ -159,14 +160,14 @@ impl<T: Real> RestFollower<T> {
 
 impl RestFollower<f64> {
     /// The one R₀ of a recording: what is left when it has been gone through, and once more with that.
-    pub(crate) fn settled(mut self, len: usize, row: impl Fn(usize) -> (f64, Option<f64>)) -> Self {
+    pub(crate) fn settled(mut self, len: usize, row: impl Fn(usize) -> (f64, Option<Reading<f64>>)) -> Self {
         for _ in 0..2 {
             let mut last_s = f64::NAN;
             self.last = None;
             for k in 0..len {
                 let (time_s, reading) = row(k);
                 if let Some(reading) = reading {
-                    self.draw(FOLLOWING.settles_s, time_s - last_s, reading);
+                    self.draw(FOLLOWING.settles_s, time_s - last_s, reading.value);
                     last_s = time_s;
                 }
             }
