@@ -210,6 +210,16 @@ fn laws_are_compared_on_the_same_readings() {
     // With all digits: what a terminal shows is fewer.
     assert!(rows.iter().all(|row| row[5].parse::<f64>().is_ok()) && rows[1][6].len() > 6, "{csv}");
     assert!(csv.starts_with("recording,segment,law,parameters,R^2,\"residual sd, ohm\","), "{csv}");
+    let json = bench.run(&["fit-law", "trace.csv", "--compare", "prony:2,prony:1,kww", "--json"]).ok();
+    let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+    let ranked = json["ranked"].as_array().unwrap();
+    assert!(json["schema"] == 1 && ranked.len() == rows.len() && ranked[0]["unit"] == "ohm", "{json}");
+    for (one, row) in ranked.iter().zip(&rows) {
+        let number = |value: &serde_json::Value| value.as_f64().unwrap();
+        let above = number(&one["aicc"]) - number(&ranked[0]["aicc"]);
+        assert!(one["law"] == row[2] && (number(&one["delta_aicc"]) - above).abs() < 1e-6, "{json}");
+        assert!((row[6].parse::<f64>().unwrap() - above).abs() < 1e-6, "{json}");
+    }
     for laws in ["eq8,kww,eq8+eq9", "eq1,eq8"] {
         let refused = bench.run(&["fit-law", "trace.csv", "--compare", laws]);
         assert!(refused.code == Some(2) && refused.stderr.contains("choose laws of one phase"), "{}", refused.stderr);

@@ -32,7 +32,7 @@ pub struct FitLawArgs {
     #[arg(long, value_name = "OHM|first:N", default_value = "first:20")]
     pub rest_resistance: RestResistance,
     /// Fit several laws of one phase to the same segments and rank them by AICc and BIC: eq1,eq2,kww,prony:3
-    #[arg(long, value_name = "LAWS", value_delimiter = ',', conflicts_with_all = ["law", "json", "table", "figures"])]
+    #[arg(long, value_name = "LAWS", value_delimiter = ',', conflicts_with_all = ["law", "table", "figures"])]
     pub compare: Vec<ClosedForm>,
     /// Print JSON
     #[arg(long)]

@@ -1,78 +1,128 @@
 //! Several laws on the same segments, by what Akaike's and the Bayesian criterion say of them.
 
-use std::collections::BTreeSet;
+use serde::Serialize;
 
 use super::rows::{Cell, Rows};
-use super::{Fits, fit_recording, output};
+use super::{Fits, Fitted, fit_recording, output};
 use crate::args::FitLawArgs;
 use crate::error::CliError;
 use crate::input::Recording;
+use crate::output::{json, print};
 use ohmstrain::number::{fixed, significant};
+
+/// Version of what `--json` prints.
+const SCHEMA: u32 = 1;
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Json<'a> {
+    ranked: &'a [Ranked],
+}
+
+/// What the criteria say of a law on a segment.
+#[derive(Serialize)]
+struct Ranked {
+    recording: String,
+    segment: String,
+    law: String,
+    parameters: usize,
+    r2: f64,
+    residual_sd: f64,
+    unit: &'static str,
+    aicc: f64,
+    bic: f64,
+    /// Above the least of the segment.
+    delta_aicc: f64,
+    delta_bic: f64,
+    residual_autocorrelation: f64,
+}
 
 /// One row per segment and law, the best of a segment first.
 pub fn compare(recordings: &[Recording], args: &FitLawArgs) -> Result<(), CliError> {
-    let (mut rows, mut units) = (Vec::new(), BTreeSet::new());
+    let mut ranked = Vec::new();
     for recording in recordings {
         let mut tried: Vec<(String, Fits)> = Vec::new();
         for law in &args.compare {
             let own = FitLawArgs { law: *law, compare: vec![], ..args.clone() };
             tried.push((law.to_string(), fit_recording(recording, &own)?));
         }
-        units.extend(tried.iter().map(|(_, fits)| fits.reading_unit));
         tried.iter().for_each(|(law, fits)| output::warn_of_law(fits, law));
-        rows.extend(rows_of(&tried)?);
+        ranked.extend(rank(&tried)?);
     }
-    let unit = units.first().filter(|unit| units.len() == 1 && **unit != "1");
-    let left = unit.map_or("residual sd".to_owned(), |unit| format!("residual sd, {unit}"));
-    let header = ["recording", "segment", "law", "parameters", "R^2", &left, "ΔAICc", "ΔBIC", "neighbours"];
-    Rows { keys: 3, header: header.map(String::from).to_vec(), rows }.print(args.format)
+    if args.json {
+        print(|out| json(out, SCHEMA, &Json { ranked: &ranked }))
+    } else {
+        table(&ranked).print(args.format)
+    }
 }
 
-fn rows_of(tried: &[(String, Fits)]) -> Result<Vec<Vec<Cell>>, CliError> {
+fn table(ranked: &[Ranked]) -> Rows {
+    let unit = ranked.first().map(|first| first.unit);
+    let unit = unit.filter(|unit| *unit != "1" && ranked.iter().all(|one| one.unit == *unit));
+    let left = unit.map_or("residual sd".to_owned(), |unit| format!("residual sd, {unit}"));
+    let header = ["recording", "segment", "law", "parameters", "R^2", &left, "ΔAICc", "ΔBIC", "neighbours"];
+    let number = |value: f64, decimals| Cell::Number(value, fixed(value, decimals));
+    let row = |one: &Ranked| -> Vec<Cell> {
+        vec![
+            one.recording.clone().into(),
+            one.segment.clone().into(),
+            one.law.clone().into(),
+            one.parameters.to_string().into(),
+            number(one.r2, 5),
+            Cell::Number(one.residual_sd, significant(one.residual_sd, 3)),
+            number(one.delta_aicc, 1),
+            number(one.delta_bic, 1),
+            number(one.residual_autocorrelation, 2),
+        ]
+    };
+    Rows { keys: 3, header: header.map(String::from).to_vec(), rows: ranked.iter().map(row).collect() }
+}
+
+fn rank(tried: &[(String, Fits)]) -> Result<Vec<Ranked>, CliError> {
     let mut labels: Vec<&str> = vec![];
     for fitted in tried.iter().flat_map(|(_, fits)| &fits.fits) {
         if !labels.contains(&fitted.piece.label.as_str()) {
             labels.push(&fitted.piece.label);
         }
     }
-    let (mut rows, mut most) = (Vec::new(), 0);
+    let (mut ranked, mut most) = (Vec::new(), 0);
     for label in &labels {
         let of_law = |(law, fits): &'_ (String, Fits)| {
-            let found = fits.fits.iter().position(|fitted| fitted.piece.label == **label)?;
-            Some((law.clone(), found))
+            let Fitted { fit, .. } = fits.fits.iter().find(|fitted| fitted.piece.label == **label)?;
+            let one = Ranked {
+                recording: fits.name.clone(),
+                segment: (*label).to_owned(),
+                law: law.clone(),
+                parameters: fit.parameters.len(),
+                r2: fit.r_squared,
+                residual_sd: fit.residual_sd,
+                unit: fits.reading_unit,
+                aicc: fit.aicc,
+                bic: fit.bic,
+                delta_aicc: fit.aicc,
+                delta_bic: fit.bic,
+                residual_autocorrelation: fit.residual_autocorrelation,
+            };
+            Some((fit.readings, one))
         };
-        let mut own: Vec<(String, &Fits, usize)> =
-            tried.iter().filter_map(|one| of_law(one).map(|(law, at)| (law, &one.1, at))).collect();
-        let fit = |one: &(String, &Fits, usize)| one.1.fits[one.2].fit.clone();
-        if own.iter().any(|one| fit(one).readings != fit(&own[0]).readings) {
+        let (readings, mut own): (Vec<usize>, Vec<Ranked>) = tried.iter().filter_map(of_law).unzip();
+        if readings.iter().any(|count| *count != readings[0]) {
             return Err(of_several_phases(label));
         }
         most = most.max(own.len());
-        own.sort_by(|a, b| fit(a).aicc.total_cmp(&fit(b).aicc));
-        let least = |of: fn(&ohmstrain_calib::closed_form::ClosedFormFit) -> f64| {
-            own.iter().map(|one| of(&fit(one))).fold(f64::INFINITY, f64::min)
-        };
-        let (aicc, bic) = (least(|fit| fit.aicc), least(|fit| fit.bic));
-        for one in &own {
-            let fitted = fit(one);
-            let number = |value: f64, decimals| Cell::Number(value, fixed(value, decimals));
-            rows.push(vec![
-                one.1.name.clone().into(),
-                (*label).to_owned().into(),
-                one.0.clone().into(),
-                fitted.parameters.len().to_string().into(),
-                number(fitted.r_squared, 5),
-                Cell::Number(fitted.residual_sd, significant(fitted.residual_sd, 3)),
-                number(fitted.aicc - aicc, 1),
-                number(fitted.bic - bic, 1),
-                number(fitted.residual_autocorrelation, 2),
-            ]);
+        own.sort_by(|a, b| a.aicc.total_cmp(&b.aicc));
+        let least = |of: fn(&Ranked) -> f64| own.iter().map(of).fold(f64::INFINITY, f64::min);
+        let (aicc, bic) = (least(|one| one.aicc), least(|one| one.bic));
+        for one in &mut own {
+            one.delta_aicc -= aicc;
+            one.delta_bic -= bic;
         }
+        ranked.extend(own);
     }
     if most < tried.len().min(2) {
         return Err(of_several_phases("all segments"));
     }
-    Ok(rows)
+    Ok(ranked)
 }
 
 fn of_several_phases(label: &str) -> CliError {

@@ -40,7 +40,7 @@ struct Json<'a> {
 pub fn run(args: &PlanArgs) -> Result<(), CliError> {
     let (sensor, name) = match &args.sensor {
         Some(path) => (sensor_file::read(path, None)?, path.display().to_string()),
-        None => (illustrative(args)?, format!("an illustrative sensor of {}", args.material)),
+        None => (illustrative(args)?, format!("an illustrative sensor ({})", args.material)),
     };
     let joint = args.joint.map(|joint| JointParams {
         prestrain: joint.prestrain,
@@ -70,16 +70,17 @@ pub fn run(args: &PlanArgs) -> Result<(), CliError> {
     })
 }
 
-/// A sensor calibrated on a simulated bench session.
+/// A sensor calibrated on a simulated bench session, in which the law is as wrong as it is of real sensors.
 fn illustrative(args: &PlanArgs) -> Result<Sensor, CliError> {
     let settings = SimulationSettings {
         speed_mm_s: 5.0,
         sample_rate_hz: 5.0,
+        mismatched: true,
         ..SimulationSettings::new(args.material, Protocol::Mixed { duration_s: 400.0 })
     };
     let bytes = simulate::bytes(&settings).map_err(CliError::Other)?;
     let recording = input::parse(&bytes, "simulated.csv".as_ref(), &Metadata::default())?;
-    let calibration = Calibration::new().estimator(EstimatorKind::Ekf);
+    let calibration = Calibration::new().estimator(EstimatorKind::SignSplit);
     Ok(calibrate_recordings(&[recording], calibration, &Progress::new("simulating"))?.sensor)
 }
 
@@ -94,7 +95,8 @@ fn text(sensor: &Sensor, name: &str, protocols: &Protocols, told: &[Told], worth
     let (low, high) = (params.law.range.lower, params.law.range.upper);
     let mut text = wrapped(&format!(
         "{name}: {} to {}, relaxation within {} s. All of this is simulated with the sensor's own law: what the law gets wrong \
-         comes on top.\n\nWhat a recording tells, parameters and the worst of their errors, at speeds of {}:\n",
+         comes on top.\n\nHow many of the law's parameters a recording tells to a quarter of them or better, and the worst of \
+         their errors, at speeds of {} and levels of a quarter, a half, three quarters and all of the range:\n",
         shown(low),
         shown(high),
         significant(protocols.slowest_s, 2),
@@ -116,20 +118,29 @@ fn text(sensor: &Sensor, name: &str, protocols: &Protocols, told: &[Told], worth
     if let Some(left_open) = recordings.column_mut(5) {
         left_open.set_constraint(ColumnConstraint::ContentWidth);
     }
-    text += &format!("{recordings}\n\n");
+    text += &format!("{recordings}\n");
+    if let Some(best) = worth::best(told) {
+        text += &wrapped(&format!("No other tells more in less time: {}.\n", best.protocol));
+    }
     text += &wrapped(&format!(
-        "Error of strain by the filter {estimator}, % of the range (share of rows in the 95 % interval), by sampling and \
+        "\nError of strain by the filter {estimator}, % of the range (share of rows in the 95 % interval), by sampling and \
          converter:"
     ));
-    let mut errors =
-        output::wrapped_table(["readings per s", "as good as the sensor", "16 bits", "12 bits", "10 bits"]);
+    let converter = |bits| if bits == 0 { "as good as the sensor".into() } else { format!("{bits} bits") };
+    let header = ["readings per s".to_owned()].into_iter().chain(worth::BITS.map(converter));
+    let mut errors = output::wrapped_table(header);
     for rate in worth::RATES_HZ {
         let of_rate = worth.cases.iter().filter(|one| one.rate_hz == rate);
         let cells = of_rate.map(|one| format!("{} ({:.0})", fixed(one.error_percent, 1), one.coverage_percent));
         errors.add_row([format!("{rate}")].into_iter().chain(cells));
     }
     text += &format!("{errors}\n");
-    text += &wrapped("Medians of five draws of noise and drift, without a learned correction.\n");
+    text += "Medians of five draws of noise and drift, without a learned correction.\n";
+    if let Some(enough) = worth.enough() {
+        let bits = enough.bits.map_or("a converter as good as the sensor".into(), |bits| format!("{bits} bits"));
+        text +=
+            &wrapped(&format!("{} readings per s by {bits} come within a tenth of the least error.\n", enough.rate_hz));
+    }
     if let Some(summary) = params.summary.as_ref().filter(|_| params.correction.is_some()) {
         text += &wrapped(&format!(
             "With its correction this sensor's calibration left {} % on quarters left out.\n",

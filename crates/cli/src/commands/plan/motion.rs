@@ -1,6 +1,7 @@
 //! Recordings that could be made: strain over time.
 
 use ohmstrain::SensorParams;
+use ohmstrain::number::significant;
 
 /// Readings per second of these recordings.
 pub const RATE_HZ: f64 = 20.0;
@@ -9,6 +10,8 @@ const SPEEDS: [f64; 3] = [1.0, 0.4, 0.15];
 /// A hold is this many times as long as the slowest relaxation, and within these bounds, s.
 const HOLD: f64 = 3.0;
 const HOLD_S: (f64, f64) = (10.0, 300.0);
+/// A hold without waiting for what is slow.
+const SHORT_HOLD_S: f64 = 5.0;
 /// Levels of holds, as shares of the range.
 const LEVELS: [f64; 4] = [0.25, 0.5, 0.75, 1.0];
 /// Movements to and fro at each speed.
@@ -16,7 +19,7 @@ const CYCLES: usize = 6;
 
 /// A recording that could be made.
 pub struct Protocol {
-    pub name: &'static str,
+    pub name: String,
     pub strain: Vec<f64>,
 }
 
@@ -44,21 +47,18 @@ impl Protocols {
     /// The recordings, from the poorest to the best.
     pub fn all(&self) -> Vec<Protocol> {
         let hold_s = (HOLD * self.slowest_s).clamp(HOLD_S.0, HOLD_S.1);
-        let one = Protocol { name: "to and fro, one speed", strain: self.cycles(&self.speeds[..1], 3 * CYCLES) };
-        let several = Protocol { name: "to and fro, three speeds", strain: self.cycles(&self.speeds, CYCLES) };
-        let short = self.with_holds(CYCLES, 5.0);
-        let long = self.with_holds(CYCLES, hold_s);
-        vec![
-            one,
-            several,
-            Protocol { name: "three speeds, holds of 5 s at four levels", strain: short },
-            Protocol { name: "three speeds, long holds at four levels", strain: long },
-        ]
+        let one = Protocol { name: "to and fro, one speed".into(), strain: self.cycles(&self.speeds[..1], 3 * CYCLES) };
+        let several = Protocol { name: "to and fro, three speeds".into(), strain: self.cycles(&self.speeds, CYCLES) };
+        let held = |seconds: f64| Protocol {
+            name: format!("three speeds, holds of {} s at four levels", significant(seconds, 2)),
+            strain: self.with_holds(CYCLES, seconds),
+        };
+        vec![one, several, held(SHORT_HOLD_S), held(hold_s)]
     }
 
     /// What the sampling is judged by: all speeds, and short holds.
     pub fn usual(&self) -> Vec<f64> {
-        self.with_holds(CYCLES / 2, 5.0)
+        self.with_holds(CYCLES / 2, SHORT_HOLD_S)
     }
 
     fn cycles(&self, speeds: &[f64], count: usize) -> Vec<f64> {

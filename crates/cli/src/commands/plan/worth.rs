@@ -15,16 +15,18 @@ use crate::error::CliError;
 use crate::report::Law;
 
 /// Readings per second that are tried.
-pub const RATES_HZ: [f64; 4] = [5.0, 10.0, 20.0, FASTEST_HZ];
-/// The last of them, and a multiple of all.
+pub const RATES_HZ: [f64; 4] = [2.0, 5.0, 20.0, FASTEST_HZ];
+/// The last of them.
 pub const FASTEST_HZ: f64 = 50.0;
 const FINEST_HZ: f64 = 100.0;
 /// Bits of a converter; 0 for readings as good as the sensor.
-const BITS: [u32; 4] = [0, 16, 12, 10];
+pub const BITS: [u32; 4] = [0, 12, 10, 8];
 /// Draws of noise and drift; the median of their errors is stated. One that leads the filter astray says little about sampling.
 const DRAWS: u64 = 5;
 /// A parameter is told if its standard error is less than this share of it.
 const TOLD: f64 = 0.25;
+/// An error is hardly larger than another one up to this factor.
+const HARDLY: f64 = 1.1;
 /// Least reading, as a share of R₀: the drift stands for the law's errors too, and can be larger than a resistance.
 const LEAST_READING: f64 = 0.01;
 /// Relative step of a difference: errors of its square and of rounding over it are both about 1e-9.
@@ -35,7 +37,7 @@ const SETTLING_S: f64 = 5.0;
 /// What a recording tells.
 #[derive(Serialize)]
 pub struct Told {
-    pub protocol: &'static str,
+    pub protocol: String,
     pub minutes: f64,
     /// Parameters of the law.
     pub parameters: usize,
@@ -72,6 +74,23 @@ pub struct Sampling {
     pub noise_alone_percent: f64,
     /// And of such that have neither.
     pub neither_percent: f64,
+}
+
+impl Sampling {
+    /// The slowest and coarsest of the cases whose error is hardly larger than the least.
+    pub fn enough(&self) -> Option<&Worth> {
+        let least = self.cases.iter().map(|one| one.error_percent).reduce(f64::min)?;
+        // From the slowest on, and for each rate from the finest converter on.
+        let close = |one: &&Worth| one.error_percent < HARDLY * least;
+        let slowest = self.cases.iter().find(close)?;
+        self.cases.iter().filter(close).rfind(|one| one.rate_hz == slowest.rate_hz)
+    }
+}
+
+/// The shortest recording that tells as many parameters as any.
+pub fn best(recordings: &[Told]) -> Option<&Told> {
+    let most = recordings.iter().map(|one| one.told).max()?;
+    recordings.iter().filter(|one| one.told == most).min_by(|a, b| a.minutes.total_cmp(&b.minutes))
 }
 
 /// What is made of each kind of noise, relative to what the calibration found.
@@ -140,7 +159,7 @@ pub fn told(sensor: &Sensor, protocol: &Protocol) -> Told {
     let is_told = |share: &f64| *share < TOLD;
     let open = relative.iter().zip(&names).filter(|(share, _)| !is_told(share)).max_by(|a, b| a.0.total_cmp(b.0));
     Told {
-        protocol: protocol.name,
+        protocol: protocol.name.clone(),
         minutes,
         parameters: relative.len(),
         told: relative.iter().filter(|share| is_told(share)).count(),
