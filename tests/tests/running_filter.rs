@@ -3,6 +3,7 @@
 
 use std::collections::BTreeMap;
 
+use ohmstrain::Sensor;
 use ohmstrain_calib::{
     BranchParams, CorrectionParams, CorrectionScale, CorrectorParams, EstimatorKind, EstimatorParams, FORMAT, Filter,
     GaugeParams, LawParams, MotionParams, NoiseParams, PhaseParams, ProcessParams, Quantity, RangeParams, ReadingUnit,
@@ -195,4 +196,34 @@ fn a_long_recording_is_smoothed_as_if_all_states_were_kept() {
 fn no_row_is_smoothed_to_nothing() {
     let mut filter = build_filter(&sensor(), None, Start::Unknown).unwrap();
     assert_eq!(filter.smooth(&[], &[]), Ok(Some(vec![])));
+}
+
+/// Corrections are learned once for all filters of a sensor: what comes of it depends neither on the number of calls nor on
+/// who asked first.
+#[test]
+fn what_was_learned_is_shared() {
+    let params = SensorParams { default_estimator: EstimatorKind::Corrected, ..sensor() };
+    let time_s: Vec<f64> = (0..50).map(|k| 0.1 * f64::from(k)).collect();
+    let readings: Vec<f64> = time_s.iter().map(|time_s| 1.2 + 0.1 * time_s.sin()).collect();
+    let fresh = || Sensor::from_params(params.clone()).unwrap();
+    let smoothed = |sensor: &Sensor| format!("{:?}", sensor.smooth(&time_s, &readings).unwrap());
+    let used = fresh();
+    let expected = smoothed(&used);
+    for sensor in [&fresh(), &used, &used.clone()] {
+        assert_eq!(smoothed(sensor), expected);
+    }
+    assert_eq!(used, fresh());
+}
+
+/// A column that changes by less than its square can hold: only smoothers have it.
+#[test]
+fn a_smoother_that_cannot_learn_says_so() {
+    let mut params = SensorParams { default_estimator: EstimatorKind::Corrected, ..sensor() };
+    params.correction.iter_mut().flat_map(|correction| &mut correction.rows).enumerate().for_each(|(k, row)| {
+        row.future[0] = 1e-200 * k as f64;
+    });
+    let sensor = Sensor::from_params(params).unwrap();
+    assert!(sensor.filter().build().unwrap().step(0.0, 1.2).is_ok());
+    let said = sensor.smooth(&[0.0, 0.1], &[1.2, 1.21]).unwrap_err().to_string();
+    assert_eq!(said, "`correction.smoother`: nothing can be learned from its rows");
 }

@@ -1,6 +1,6 @@
 use std::ops::Range;
 
-use ohmstrain_calib::{EstimatorKind, Rows, Start, build_filter};
+use ohmstrain_calib::{EstimatorKind, Rows, Start};
 use ohmstrain_ekf::{Guard, Influence, StepError};
 
 use crate::estimate::Scale;
@@ -263,7 +263,11 @@ impl<'a> FilterBuilder<'a> {
         mut take: impl FnMut(Range<usize>, &[Estimate]) -> Result<(), E>,
     ) -> Result<(), E> {
         let starts_known = self.initial_strain.is_some();
-        let Kernel { mut filter, translator } = self.kernel(self.kind().smoother())?;
+        let kind = self.kind().smoother();
+        if kind == EstimatorKind::Corrected {
+            self.sensor.check_smoother()?;
+        }
+        let Kernel { mut filter, translator } = self.kernel(kind)?;
         let Translator { scale, mut doubts, follower, .. } = translator;
         let failed = |(row, source): (usize, StepError)| Error::Row { row, source };
         let calibrated = |k: usize| {
@@ -313,7 +317,7 @@ impl<'a> FilterBuilder<'a> {
     fn kernel(self, kind: EstimatorKind) -> Result<Kernel, Error> {
         let params = self.sensor.params();
         let start = self.initial_strain.map_or(Ok(Start::Unknown), |strain| self.start_at(strain))?;
-        let mut filter = build_filter(params, Some(kind), start)?;
+        let mut filter = self.sensor.build(Some(kind), start)?;
         filter.guard(self.guard()?);
         let mut scale = Scale::new(self.sensor)?;
         self.rest_resistance.map_or(Ok(()), |measured| scale.rest_at(measured))?;

@@ -1,4 +1,6 @@
-use ohmstrain_calib::{EstimatorKind, JointParams, Quantity, SensorParams, Start, build_filter};
+use std::sync::Arc;
+
+use ohmstrain_calib::{EstimatorKind, JointParams, Learned, Quantity, SensorParams, Start, build_filter_with};
 use ohmstrain_model::Joint;
 
 use crate::column::Header;
@@ -14,9 +16,17 @@ use crate::{Column, Error, Estimate, FilterBuilder, UnitDoubt};
 /// # Ok(())
 /// # }
 /// ```
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct Sensor {
     params: SensorParams,
+    /// For all its filters; `None` without a correction.
+    learned: Option<Arc<Learned>>,
+}
+
+impl PartialEq for Sensor {
+    fn eq(&self, other: &Self) -> bool {
+        self.params == other.params
+    }
 }
 
 impl Sensor {
@@ -51,9 +61,7 @@ impl Sensor {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn from_toml_for(text: &str, estimator: EstimatorKind) -> Result<Self, Error> {
-        let params = text::parse(text)?;
-        build_filter(&params, Some(estimator), Start::Unknown)?;
-        Ok(Self { params })
+        Self::for_estimator(text::parse(text)?, Some(estimator))
     }
 
     /// A sensor with these parameters.
@@ -71,8 +79,27 @@ impl Sensor {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn from_params(params: SensorParams) -> Result<Self, Error> {
-        build_filter(&params, None, Start::Unknown)?;
-        Ok(Self { params })
+        Self::for_estimator(params, None)
+    }
+
+    fn for_estimator(params: SensorParams, kind: Option<EstimatorKind>) -> Result<Self, Error> {
+        let sensor = Self { learned: Learned::of(&params), params };
+        sensor.build(kind, Start::Unknown)?;
+        Ok(sensor)
+    }
+
+    /// A filter that shares what the others have learned.
+    pub(crate) fn build(
+        &self,
+        kind: Option<EstimatorKind>,
+        start: Start,
+    ) -> Result<Box<dyn ohmstrain_calib::Filter>, Error> {
+        Ok(build_filter_with(&self.params, self.learned.as_ref(), kind, start)?)
+    }
+
+    /// That the correction of a smoother can be learned.
+    pub(crate) fn check_smoother(&self) -> Result<(), Error> {
+        Ok(self.learned.as_ref().map_or(Ok(()), |learned| learned.check_smoother())?)
     }
 
     /// The text of its `sensor.toml`: what [`Self::from_toml`] reads.

@@ -12,6 +12,7 @@ use crate::calibrate::left_out::relative_changes;
 use crate::calibrate::scores::{ScoredRow, Scores};
 use crate::filter::build::{Setting, filter_from_parts};
 use crate::filter::corrected::Corrected;
+use crate::filter::learned::Learned;
 use crate::filter::sieve::Sieve;
 use crate::filter::{Filter, Start};
 use crate::law::fit::CrossFit;
@@ -209,8 +210,9 @@ impl Check<'_> {
         } else {
             None
         };
-        Ok(move |smooths: bool| match &correction {
-            Some(correction) => Ok(Box::new(Corrected::new(bare(smooths)?, correction, limits)?) as Box<dyn Filter>),
+        let learned = correction.map(|correction| Learned::new(correction, limits));
+        Ok(move |smooths: bool| match &learned {
+            Some(learned) => Ok(Box::new(Corrected::new(bare(smooths)?, learned)?) as Box<dyn Filter>),
             None => bare(smooths),
         })
     }

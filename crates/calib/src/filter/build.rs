@@ -1,3 +1,5 @@
+use std::sync::Arc;
+
 #[cfg(feature = "particles")]
 use ohmstrain_ekf::Particles;
 use ohmstrain_ekf::{
@@ -6,6 +8,7 @@ use ohmstrain_ekf::{
 use ohmstrain_model::{Phase, SwitchedModel};
 
 use crate::filter::corrected::Corrected;
+use crate::filter::learned::Learned;
 use crate::filter::running::{Interval, Running};
 use crate::filter::sieve::Sieve;
 use crate::filter::sparse_estimator::SparseEstimator;
@@ -18,13 +21,26 @@ use crate::{CalibrationError, with_sizes};
 /// Share of the limits' span to which a given initial strain is believed.
 pub(crate) const START_SD: f64 = 1e-3;
 
-/// Builds the filter for a sensor.
+/// Builds a filter for a sensor.
 ///
 /// # Errors
 /// If a number is out of its range, the sensor has no parameters for the estimator, or it has a number of branches that no
 /// filter is built for.
 pub fn build_filter(
     params: &SensorParams,
+    kind: Option<EstimatorKind>,
+    start: Start,
+) -> Result<Box<dyn Filter>, CalibrationError> {
+    build_filter_with(params, Learned::of(params).as_ref(), kind, start)
+}
+
+/// The same with what the sensor's correction has learned already, or learns now: [`Learned::of`] these parameters.
+///
+/// # Errors
+/// As [`build_filter`].
+pub fn build_filter_with(
+    params: &SensorParams,
+    learned: Option<&Arc<Learned>>,
     kind: Option<EstimatorKind>,
     start: Start,
 ) -> Result<Box<dyn Filter>, CalibrationError> {
@@ -36,8 +52,8 @@ pub fn build_filter(
     if kind != EstimatorKind::Corrected {
         return Ok(filter);
     }
-    let correction = params.correction.as_ref().ok_or_else(|| CalibrationError::no_parameters(kind))?;
-    Ok(Box::new(Corrected::new(filter, correction, params.limits)?))
+    let learned = learned.ok_or_else(|| CalibrationError::no_parameters(kind))?;
+    Ok(Box::new(Corrected::new(filter, learned)?))
 }
 
 /// What a filter needs besides law, noise and motion.

@@ -1,20 +1,16 @@
 use std::collections::VecDeque;
 use std::ops::Range;
+use std::sync::Arc;
 
 use ohmstrain_ekf::correction::{FEATURES, FeatureScale, OUTPUTS, ReadingFeatures, mixture};
 use ohmstrain_ekf::{Gaussian, Guard, Reading, ReadingVerdict, StepError};
 
 use crate::CalibrationError;
-use crate::correction::owned::OwnedCorrection;
-use crate::correction::{self, Examples};
 use crate::filter::known::KnownError;
+use crate::filter::learned::{Learned, OfFilter, OfSmoother};
 use crate::filter::way_back::SEGMENT;
 use crate::filter::{Filter, Output, Rows, WayBack};
-use crate::params::RangeParams;
-use crate::params::correction::{
-    CorrectionParams, CorrectorParams, FILTER_INPUTS, FUTURE_FEATURES, SIDES, SMOOTHER_INPUTS, TrainingRow,
-    filter_inputs, smoother_inputs,
-};
+use crate::params::correction::{FUTURE_FEATURES, filter_inputs, smoother_inputs};
 
 /// A reading that a guard has weighed down and whose normalised innovation squared is above this surprises: three standard
 /// deviations.
@@ -26,10 +22,8 @@ pub const SURPRISING_NIS: f64 = 9.0;
 /// has grown since. With a fixed lag the strain is the mixture of the filter's corrected strain and the lagged one.
 pub(crate) struct Corrected {
     filter: Box<dyn Filter>,
-    of_filter: OwnedCorrection<f64, FILTER_INPUTS>,
-    /// What a smoother's correction is learned from when it is asked for: that takes as long as filtering 1000 rows.
-    params: CorrectionParams,
-    limits: RangeParams,
+    of_filter: Arc<OfFilter>,
+    learned: Arc<Learned>,
     readings: Readings,
     /// What the filter has said of the last row.
     said: Option<Output>,
@@ -69,17 +63,12 @@ impl Readings {
 }
 
 impl Corrected {
-    pub(crate) fn new(
-        filter: Box<dyn Filter>,
-        params: &CorrectionParams,
-        limits: RangeParams,
-    ) -> Result<Self, CalibrationError> {
+    pub(crate) fn new(filter: Box<dyn Filter>, learned: &Arc<Learned>) -> Result<Self, CalibrationError> {
         Ok(Self {
             filter,
-            of_filter: learned_for_filter(params, limits)?,
-            params: params.clone(),
-            limits,
-            readings: Readings::new(params.readings.past()),
+            of_filter: learned.for_filter()?,
+            learned: Arc::clone(learned),
+            readings: Readings::new(learned.params.readings.past()),
             said: None,
             known: None,
             waiting: VecDeque::new(),
@@ -124,35 +113,6 @@ impl Corrected {
             out(output);
         }
     }
-}
-
-/// What corrects the filter's strain.
-pub(crate) fn learned_for_filter(
-    params: &CorrectionParams,
-    limits: RangeParams,
-) -> Result<OwnedCorrection<f64, FILTER_INPUTS>, CalibrationError> {
-    learned(&params.filter, &params.rows, TrainingRow::filter_inputs, limits)
-}
-
-/// What corrects the smoother's.
-fn learned_for_smoother(
-    params: &CorrectionParams,
-    limits: RangeParams,
-) -> Result<OwnedCorrection<f64, SMOOTHER_INPUTS, SIDES>, CalibrationError> {
-    learned(&params.smoother, &params.rows, TrainingRow::smoother_inputs, limits)
-}
-
-fn learned<const D: usize, const S: usize>(
-    params: &CorrectorParams,
-    rows: &[TrainingRow],
-    inputs: impl Fn(&TrainingRow) -> [f64; D],
-    limits: RangeParams,
-) -> Result<OwnedCorrection<f64, D, S>, CalibrationError> {
-    let (strain, time_s): (Vec<f64>, Vec<f64>) = rows.iter().map(|row| (row.strain, row.time_s)).unzip();
-    let inputs: Vec<_> = rows.iter().map(inputs).collect();
-    let examples = Examples { inputs: &inputs, strain: &strain, time_s: &time_s, limits };
-    let singular = || CalibrationError::Unsupported("`correction` of rows that nothing can be learned from".into());
-    correction::learned(params, examples).ok_or_else(singular)
 }
 
 /// What the correction is shown of a row.
@@ -204,7 +164,7 @@ impl Filter for Corrected {
         let said = self.filter.output();
         let learned = self.learned(&said);
         // For how long errors of the correction hang together.
-        let lasts_s = self.params.filter.residual.noise_time_s;
+        let lasts_s = self.learned.params.filter.residual.noise_time_s;
         self.known = self.readings.time_s.map(|time_s| KnownError::new(time_s, lasts_s, strain, &learned));
         self.said = Some(said);
         Ok(())
@@ -246,7 +206,7 @@ impl Filter for Corrected {
     }
 
     fn way_back<'a>(&'a mut self, rows: Rows<'a>) -> Result<Box<dyn WayBack + 'a>, (usize, StepError)> {
-        let correction = learned_for_smoother(&self.params, self.limits).map_err(|_| (0, StepError::NoSmoother))?;
+        let correction = self.learned.for_smoother().map_err(|_| (0, StepError::NoSmoother))?;
         let mut starts = Vec::with_capacity(rows.len() / SEGMENT + 1);
         let mut past = self.readings;
         for row in 0..rows.len() {
@@ -259,7 +219,7 @@ impl Filter for Corrected {
         // The filter says what it says at the end of the recording.
         (self.readings, self.said, self.known) = (past, None, None);
         let back = self.filter.way_back(rows)?;
-        let ahead = Readings::new(self.params.readings.future());
+        let ahead = Readings::new(self.learned.params.readings.future());
         Ok(Box::new(CorrectedWayBack { back, correction, rows, starts, ahead }))
     }
 }
@@ -267,7 +227,7 @@ impl Filter for Corrected {
 /// A smoother on its way back, corrected segment by segment.
 struct CorrectedWayBack<'a> {
     back: Box<dyn WayBack + 'a>,
-    correction: OwnedCorrection<f64, SMOOTHER_INPUTS, SIDES>,
+    correction: Arc<OfSmoother>,
     rows: Rows<'a>,
     /// What had been seen of the past before each segment that is still to come. Readings that were kept from the filter
     /// were seen here, as far as features go: within a segment they are not, and what was before it fades in seconds.

@@ -3,6 +3,7 @@
 pub(crate) mod build;
 pub(crate) mod corrected;
 pub(crate) mod known;
+pub(crate) mod learned;
 pub(crate) mod portable;
 pub(crate) mod running;
 pub(crate) mod sieve;

@@ -1,11 +1,13 @@
 //! What a filter is made of as plain numbers: for programs that write it in another language.
 
+use std::sync::Arc;
+
 use ohmstrain_ekf::correction::FeatureScale;
 
 use crate::CalibrationError;
 use crate::correction::owned::OwnedCorrection;
 use crate::filter::build::{HISTORIES, HYPOTHESES, START_SD};
-use crate::filter::corrected::learned_for_filter;
+use crate::filter::learned::Learned;
 use crate::filter::sieve::{MOST_REPEATS, Sieve};
 use crate::params::SensorParams;
 use crate::params::correction::FILTER_INPUTS;
@@ -60,10 +62,10 @@ impl PortableFilter {
         let asked = kind.unwrap_or(params.default_estimator);
         let kind = params.filter_of(asked);
         let estimator = *params.estimator(kind)?;
-        let learned = params.correction.as_ref().filter(|_| asked == EstimatorKind::Corrected);
-        let correction = learned.map(|correction| {
-            let learned = learned_for_filter(correction, params.limits)?;
-            Ok::<_, CalibrationError>(PortableCorrection { features: correction.readings.past(), learned })
+        let learned = Learned::of(params).filter(|_| asked == EstimatorKind::Corrected);
+        let correction = learned.map(|learned| {
+            let (features, learned) = (learned.params.readings.past(), Arc::unwrap_or_clone(learned.for_filter()?));
+            Ok::<_, CalibrationError>(PortableCorrection { features, learned })
         });
         let hypotheses = match kind {
             EstimatorKind::SignSplit => HYPOTHESES,

@@ -3,7 +3,7 @@ use std::ops::Range;
 use ohmstrain_ekf::correction::{FEATURES, FeatureScale, ReadingFeatures, Starts, mixture};
 use ohmstrain_ekf::{Estimate, Gaussian, Guard, Reading, ReadingVerdict, StepError};
 
-use super::{Corrected, future_features, learned_for_smoother, outputs};
+use super::{Corrected, Learned, future_features, outputs};
 use crate::EstimatorKind;
 use crate::filter::way_back::SEGMENT;
 use crate::filter::{Filter, Output, Rows, WayBack};
@@ -186,7 +186,7 @@ fn params() -> CorrectionParams {
 }
 
 fn corrected() -> Corrected {
-    Corrected::new(Box::new(Fake::default()), &params(), LIMITS).unwrap()
+    Corrected::new(Box::new(Fake::default()), &Learned::new(params(), LIMITS)).unwrap()
 }
 
 /// Two whole segments and a short one. Readings are missing now and then, among others around a border of segments, at
@@ -204,7 +204,7 @@ fn segments_say_what_the_whole_recording_says() {
     let (time_s, readings) = recording();
     let (past, future) = both_ways(&time_s, &readings);
     let smoothed = corrected().smooth(&time_s, &readings).unwrap().unwrap();
-    let correction = learned_for_smoother(&params(), LIMITS).unwrap();
+    let correction = Learned::new(params(), LIMITS).for_smoother().unwrap();
     assert_eq!(smoothed.len(), time_s.len());
     let mut plain = Fake::default();
     for k in 0..time_s.len() {
