@@ -1,4 +1,4 @@
-//! The filters of hypotheses compute what filters written down naively compute.
+//! The filters of hypotheses, and their smoothers, compute what is written down naively.
 
 mod naive;
 
@@ -124,13 +124,15 @@ where
     most
 }
 
+fn each_mode<const N: usize, const L: usize>(state: &PhaseMixture<f64, N, L>) -> Vec<(f64, Phase, Belief<f64, N, L>)> {
+    state.modes().iter().zip(Phase::ALL).map(|(share, phase)| (share.weight, phase, share.belief)).collect()
+}
+
 fn imm<const B: usize, const N: usize, const L: usize>(phase_rate: f64, tempering: f64) -> Apart {
     let (model, evidence) = (model::<B, N>(phase_rate), evidence(tempering));
     let start = PhaseMixture::<f64, N, L>::single(Belief::initial(&model), Phase::Hold);
     let naive = Naive { model, rule: Rule::Imm(dwell()), evidence, room: 3 };
-    differences(&Imm::<f64, B, N>::new(model, DT_S, dwell(), evidence).unwrap(), start, &naive, |state| {
-        state.modes().iter().zip(Phase::ALL).map(|(share, phase)| (share.weight, phase, share.belief)).collect()
-    })
+    differences(&Imm::<f64, B, N>::new(model, DT_S, dwell(), evidence).unwrap(), start, &naive, each_mode)
 }
 
 fn each<const N: usize, const L: usize, const K: usize>(
@@ -177,6 +179,83 @@ fn agree_with_naive_filters_to_rounding() {
     let sixteen = histories::<3, 6, 21, 16>(0.0, 0.5);
     sixteen.check();
     assert_eq!(sixteen.hypotheses, 16);
+}
+
+/// Steps of the smoothers' runs, s, and how many.
+const SLOW_DT_S: f64 = 0.1;
+const PAST: usize = 150;
+
+/// Filters and goes back, both with what the other one says of later steps; the most hypotheses that one went back to, and the
+/// largest differences: of means in filtered deviations, of covariances relative to filtered variances, of probabilities.
+fn smoothed_apart<E, const B: usize, const N: usize, const L: usize>(
+    filter: &E,
+    start: E::State,
+    naive: &Naive<B, N>,
+    shares: impl Fn(&E::State) -> Vec<(f64, Phase, Belief<f64, N, L>)>,
+) -> (usize, f64)
+where
+    E: Estimator<f64, N, L>,
+{
+    let prepared = filter.prepare(SLOW_DT_S);
+    let first = shares(&start).into_iter().find(|share| share.0 > 0.0).unwrap();
+    let (mut states, mut own) = (vec![start], vec![naive::Hypotheses::single(&first.2, first.1)]);
+    for k in 0..PAST {
+        let taken = filter.advance(&states[k], &prepared, reading(10 * k)).unwrap();
+        states.push(taken.state);
+        own.push(naive.step::<L>(&own[k], SLOW_DT_S, reading(10 * k)).0);
+    }
+    let of = |state: &E::State| -> Vec<naive::Smoothed<N>> {
+        let followed = shares(state).into_iter();
+        followed.map(|(weight, _, belief)| (weight, belief.mean, belief.covariance.to_matrix())).collect()
+    };
+    let (mut next, mut apart, mut most) = (states[PAST].clone(), 0.0, 0);
+    for k in (0..PAST).rev() {
+        let followed: Vec<bool> = shares(&states[k]).iter().map(|share| share.0 > 0.0).collect();
+        let later: Vec<bool> = shares(&states[k + 1]).iter().map(|share| share.0 > 0.0).collect();
+        let heirs: Vec<_> = of(&next).into_iter().zip(&later).filter_map(|(one, on)| on.then_some(one)).collect();
+        let expected = naive.back::<L>(&own[k], (&own[k + 1], &heirs), SLOW_DT_S);
+        next = filter.smooth_back(&states[k], &prepared, reading(10 * k), &next).unwrap().unwrap();
+        let found: Vec<_> = of(&next).into_iter().zip(&followed).filter_map(|(one, on)| on.then_some(one)).collect();
+        assert_eq!(found.len(), expected.len(), "row {k}");
+        most = most.max(expected.len());
+        for ((found, expected), filtered) in found.iter().zip(&expected).zip(&own[k].all) {
+            larger(&mut apart, (found.0 - expected.0).abs());
+            // Of what has no weight nothing is said.
+            if expected.0 < 1e-6 {
+                continue;
+            }
+            let sd = filtered.covariance.diagonal().map(f64::sqrt);
+            for i in (0..N).filter(|i| sd[*i] > 0.0) {
+                larger(&mut apart, (found.1[i] - expected.1[i]).abs() / sd[i]);
+                for j in (0..=i).filter(|j| sd[*j] > 0.0) {
+                    larger(&mut apart, (found.2[(i, j)] - expected.2[(i, j)]).abs() / (sd[i] * sd[j]));
+                }
+            }
+        }
+    }
+    (most, apart)
+}
+
+#[test]
+fn smoothers_agree_with_naive_ones() {
+    let (model, evidence) = (model::<1, 4>(0.0), evidence(0.7));
+    let start = Belief::<f64, 4, 10>::initial(&model);
+    let naive = |rule, room| Naive { model, rule, evidence, room };
+    let imm = Imm::<f64, 1, 4>::new(model, SLOW_DT_S, dwell(), evidence).unwrap();
+    let phases = PhaseMixture::single(start, Phase::Hold);
+    let of_imm = smoothed_apart(&imm, phases, &naive(Rule::Imm(dwell()), 3), each_mode);
+    let split = SignSplit::<f64, 1, 4, 3>::new(model, SLOW_DT_S, None, evidence).unwrap();
+    let of_signs = smoothed_apart(&split, Mixture::single(start, Phase::Extend), &naive(Rule::Signs(None), 3), each);
+    let split = SignSplit::<f64, 1, 4, 6>::new(model, SLOW_DT_S, Some(dwell()), evidence).unwrap();
+    let rule = Rule::Signs(Some(dwell()));
+    let with_holds = smoothed_apart(&split, Mixture::single(start, Phase::Extend), &naive(rule, 6), each);
+    let histories = Hypotheses::<f64, 1, 4, 8>::new(model, SLOW_DT_S, dwell(), evidence).unwrap();
+    let rule = Rule::Histories(dwell());
+    let of_histories = smoothed_apart(&histories, Mixture::single(start, Phase::Hold), &naive(rule, 8), each);
+    for (most, apart) in [of_imm, of_signs, with_holds, of_histories] {
+        // What is told by nearly equal correlations is rounded by their condition, below 1e7 after a tenth of a second.
+        assert!(most >= 3 && apart < 1e7 * 10.0 * f64::EPSILON, "{most} {apart}");
+    }
 }
 
 /// The runs above come near the limits: without them the filters would say something else.

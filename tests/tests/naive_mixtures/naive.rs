@@ -1,4 +1,5 @@
-//! Filters of phase hypotheses, written down naively: dense matrices, logarithms of weights, one hypothesis after the other.
+//! Filters of phase hypotheses and their smoothers, written down naively: dense matrices, logarithms of weights, one hypothesis
+//! after the other.
 
 use libm::erfc;
 use nalgebra::{SMatrix, SVector};
@@ -29,8 +30,22 @@ pub struct Naive<const B: usize, const N: usize> {
     pub room: usize,
 }
 
-/// A phase and what is known of the state if it is the right one.
+/// Mean and covariance.
+pub type Moments<const N: usize> = (SVector<f64, N>, SMatrix<f64, N, N>);
+
+/// How a child came to be.
 #[derive(Clone, Copy, Debug)]
+struct Descent<const N: usize> {
+    parent: usize,
+    /// From the parent's state to the prediction, and the noise that this adds; a rate that is drawn anew is noise.
+    jacobian: SMatrix<f64, N, N>,
+    predicted: Moments<N>,
+    posterior: Moments<N>,
+    log_weight: f64,
+}
+
+/// A phase and what is known of the state if it is the right one.
+#[derive(Clone, Debug)]
 pub struct Hypothesis<const N: usize> {
     /// Logarithm of its probability.
     pub log_weight: f64,
@@ -41,6 +56,8 @@ pub struct Hypothesis<const N: usize> {
     /// Its covariance.
     pub covariance: SMatrix<f64, N, N>,
     per_inside: f64,
+    /// The children that were merged into it.
+    made_of: Vec<Descent<N>>,
 }
 
 /// All hypotheses, and for how long there has been no reading.
@@ -65,19 +82,20 @@ impl<const N: usize> Hypotheses<N> {
     /// One hypothesis that has all the weight.
     pub fn single<const L: usize>(belief: &Belief<f64, N, L>, phase: Phase) -> Self {
         let (mean, covariance) = (belief.mean, belief.covariance.to_matrix());
-        let one = Hypothesis { log_weight: 0.0, phase, mean, covariance, per_inside: 1.0 };
+        let one = Hypothesis { log_weight: 0.0, phase, mean, covariance, per_inside: 1.0, made_of: vec![] };
         Self { all: vec![one], pause_s: 0.0, open: false }
     }
 
     /// Mean and covariance of all.
-    pub fn moments(&self) -> (SVector<f64, N>, SMatrix<f64, N, N>) {
+    pub fn moments(&self) -> Moments<N> {
         moments(&self.all.iter().map(|one| (one.log_weight.exp(), one.mean, one.covariance)).collect::<Vec<_>>())
     }
 }
 
-fn moments<const N: usize>(
-    parts: &[(f64, SVector<f64, N>, SMatrix<f64, N, N>)],
-) -> (SVector<f64, N>, SMatrix<f64, N, N>) {
+/// Weight, mean and covariance given all readings.
+pub type Smoothed<const N: usize> = (f64, SVector<f64, N>, SMatrix<f64, N, N>);
+
+fn moments<const N: usize>(parts: &[Smoothed<N>]) -> Moments<N> {
     let total: f64 = parts.iter().map(|(weight, ..)| weight).sum();
     let mean = parts.iter().map(|(weight, mean, _)| mean * (weight / total)).sum::<SVector<f64, N>>();
     let around = |(weight, at, covariance): &(f64, SVector<f64, N>, SMatrix<f64, N, N>)| {
@@ -108,6 +126,7 @@ impl<const N: usize> Hypothesis<N> {
         (self.mean, self.covariance) = moments(&parts);
         self.per_inside += share * (other.per_inside - self.per_inside);
         self.log_weight = (mine + theirs).ln();
+        self.made_of.extend(&other.made_of);
     }
 
     /// Keeps the rates of a phase's sign; how much that leaves.
@@ -177,7 +196,7 @@ impl<const N: usize> Children<N> {
         if self.kept[lightest].log_weight >= child.log_weight - 1e-4 {
             return self.merge_into_nearest(&child, None);
         }
-        let displaced = self.kept[lightest];
+        let displaced = self.kept[lightest].clone();
         self.merge_into_nearest(&displaced, Some(lightest));
         self.kept[lightest] = child;
     }
@@ -213,8 +232,8 @@ impl<const B: usize, const N: usize> Naive<B, N> {
         let open = matches!(self.rule, Rule::Signs(_)) && pause_s > forgets_s * 1.0005;
         let mut children = Children { kept: Vec::new(), room: self.room, compared: Vec::new() };
         let parents = if let Rule::Imm(dwell) = self.rule { self.mixed(from, &dwell, dt_s) } else { from.all.clone() };
-        for parent in &parents {
-            for (phase, probability) in Phase::ALL.into_iter().zip(self.follows(parent.phase, dt_s, open)) {
+        for parent in parents.iter().enumerate() {
+            for (phase, probability) in Phase::ALL.into_iter().zip(self.follows(parent.1.phase, dt_s, open)) {
                 if probability > 0.0 {
                     self.child::<L>(parent, (phase, probability), (dt_s, from.open, open), reading, &mut children);
                 }
@@ -241,7 +260,7 @@ impl<const B: usize, const N: usize> Naive<B, N> {
 
     /// The state at the moment a moving phase begins: the rate is drawn anew.
     fn enter(&self, parent: &Hypothesis<N>, phase: Phase) -> Hypothesis<N> {
-        let (mut entered, sign) = (*parent, if phase == Phase::Retract { -1.0 } else { 1.0 });
+        let (mut entered, sign) = (parent.clone(), if phase == Phase::Retract { -1.0 } else { 1.0 });
         let (variance, speed) = (self.model.motion().stationary_variance()[1], self.model.motion().phase_rate());
         entered.covariance.fill_row(1, 0.0);
         entered.covariance.fill_column(1, 0.0);
@@ -258,21 +277,28 @@ impl<const B: usize, const N: usize> Naive<B, N> {
         let chain = dwell.probabilities(dt_s);
         let mix = |phase: Phase| {
             let begins = |one: &Hypothesis<N>| phase != Phase::Hold && one.phase != phase;
-            let entered = |one: &Hypothesis<N>| if begins(one) { self.enter(one, phase) } else { *one };
+            let entered = |one: &Hypothesis<N>| if begins(one) { self.enter(one, phase) } else { one.clone() };
             let weight = |one: &Hypothesis<N>| chain[one.phase.index()][phase.index()] * one.log_weight.exp();
             let total: f64 = from.all.iter().map(weight).sum();
             let parts: Vec<_> = from.all.iter().map(|one| (weight(one), entered(one))).collect();
+            let part = |(parent, (weight, one)): (usize, &(f64, Hypothesis<N>))| {
+                let mut jacobian = SMatrix::identity();
+                jacobian[(1, 1)] = f64::from(u8::from(!begins(&from.all[parent])));
+                let here = (one.mean, one.covariance);
+                Descent { parent, jacobian, predicted: here, posterior: here, log_weight: weight.ln() }
+            };
+            let made_of = parts.iter().enumerate().map(part).collect();
             let (mean, covariance) =
                 moments(&parts.iter().map(|(w, one)| (*w, one.mean, one.covariance)).collect::<Vec<_>>());
             let per_inside = parts.iter().map(|(w, one)| w / total * one.per_inside).sum();
-            Hypothesis { log_weight: total.ln(), phase, mean, covariance, per_inside }
+            Hypothesis { log_weight: total.ln(), phase, mean, covariance, per_inside, made_of }
         };
         Phase::ALL.map(mix).into_iter().filter(|one| one.log_weight.is_finite()).collect()
     }
 
     fn child<const L: usize>(
         &self,
-        parent: &Hypothesis<N>,
+        (place, parent): (usize, &Hypothesis<N>),
         (phase, probability): (Phase, f64),
         (dt_s, was_open, open): (f64, bool, bool),
         reading: Option<Reading<f64>>,
@@ -284,7 +310,7 @@ impl<const B: usize, const N: usize> Naive<B, N> {
             Rule::Signs(hold) => hold.is_some() && parent.phase == Phase::Hold && phase != Phase::Hold,
             Rule::Histories(_) => phase != Phase::Hold && parent.phase != phase,
         };
-        let mut child = if begins { self.enter(parent, phase) } else { *parent };
+        let mut child = if begins { self.enter(parent, phase) } else { parent.clone() };
         child.phase = phase;
         let step = self.model.prepare(dt_s);
         let packed = Symmetric::<f64, N, L>::from_lower(&child.covariance);
@@ -300,6 +326,10 @@ impl<const B: usize, const N: usize> Naive<B, N> {
         let moved: Transition<f64, N, L> = self.model.transition(&step, &child.mean, direction);
         child.mean = moved.mean;
         child.covariance = moved.jacobian * child.covariance * moved.jacobian.transpose() + moved.noise.to_matrix();
+        let (predicted, mut jacobian) = ((child.mean, child.covariance), moved.jacobian);
+        if begins {
+            jacobian.fill_column(1, 0.0);
+        }
         let mut mass = if signs && !open && phase != Phase::Hold { child.cut() } else { 1.0 };
         if mass <= 1e-3 {
             return;
@@ -321,6 +351,90 @@ impl<const B: usize, const N: usize> Naive<B, N> {
             child.log_weight += tempered;
         }
         child.weigh_limits(&self.evidence.limits);
+        let (posterior, log_weight) = ((child.mean, child.covariance), child.log_weight);
+        child.made_of = vec![Descent { parent: place, jacobian, predicted, posterior, log_weight }];
         children.add(child);
     }
+
+    /// The hypotheses before a step given all readings: those that were filtered, those that the step made of them, and the
+    /// same ones given all readings.
+    pub fn back<const L: usize>(
+        &self,
+        filtered: &Hypotheses<N>,
+        (heirs, next): (&Hypotheses<N>, &[Smoothed<N>]),
+        dt_s: f64,
+    ) -> Vec<Smoothed<N>> {
+        let Rule::Imm(dwell) = self.rule else { return through(&filtered.all, &heirs.all, next) };
+        let (mixed, step) = (self.mixed(filtered, &dwell, dt_s), self.model.prepare(dt_s));
+        let before = mixed.iter().map(|one| {
+            let here = (one.mean, one.covariance);
+            let Some(place) = heirs.all.iter().position(|heir| heir.phase == one.phase) else {
+                return (0.0, here.0, here.1);
+            };
+            let moved: Transition<f64, N, L> = self.model.transition(&step, &one.mean, Direction::Known(one.phase));
+            let covariance = moved.jacobian * here.1 * moved.jacobian.transpose() + moved.noise.to_matrix();
+            let (weight, mean, later) = next[place];
+            let back = retraced(&here, &moved.jacobian, &(moved.mean, covariance), &(mean, later));
+            (weight, back.0, back.1)
+        });
+        through(&filtered.all, &mixed, &before.collect::<Vec<_>>())
+    }
+}
+
+/// Rauch, Tung & Striebel: what is known before a step from what is known after it. States that are known exactly, as the rate
+/// of a hold, say nothing.
+fn retraced<const N: usize>(
+    before: &Moments<N>,
+    jacobian: &SMatrix<f64, N, N>,
+    predicted: &Moments<N>,
+    after: &Moments<N>,
+) -> Moments<N> {
+    let per_sd = SMatrix::<f64, N, N>::from_diagonal(
+        &predicted.1.diagonal().map(|variance| if variance > 0.0 { 1.0 / variance.sqrt() } else { 0.0 }),
+    );
+    // A dynamic matrix: the decomposition is not there for one whose size is a parameter.
+    let correlation = per_sd * predicted.1 * per_sd;
+    let inverse = nalgebra::DMatrix::from_column_slice(N, N, correlation.as_slice()).pseudo_inverse(1e-11).unwrap();
+    let inverse = per_sd * SMatrix::<f64, N, N>::from_column_slice(inverse.as_slice()) * per_sd;
+    let gain = before.1 * jacobian.transpose() * inverse;
+    (before.0 + gain * (after.0 - predicted.0), before.1 + gain * (after.1 - predicted.1) * gain.transpose())
+}
+
+/// Kim's smoother over hypotheses that were merged: each goes back to all whose children it is made of, with their shares.
+fn through<const N: usize>(
+    filtered: &[Hypothesis<N>],
+    heirs: &[Hypothesis<N>],
+    next: &[Smoothed<N>],
+) -> Vec<Smoothed<N>> {
+    let mut ways: Vec<Vec<Smoothed<N>>> = filtered.iter().map(|_| vec![]).collect();
+    for (heir, (weight, mean, covariance)) in heirs.iter().zip(next) {
+        let total: f64 = heir.made_of.iter().map(|child| child.log_weight.exp()).sum();
+        for child in &heir.made_of {
+            let share = weight * child.log_weight.exp() / total;
+            if share <= 1e-7 {
+                continue;
+            }
+            // The heir is the child and noise of the size of their distance.
+            let apart = heir.mean - child.posterior.0;
+            let merged = (heir.mean, child.posterior.1 + apart * apart.transpose());
+            let own = retraced(&child.posterior, &SMatrix::identity(), &merged, &(*mean, *covariance));
+            let parent = &filtered[child.parent];
+            let here = (parent.mean, parent.covariance);
+            let back = retraced(&here, &child.jacobian, &child.predicted, &own);
+            // What no later reading can have told is an error of merging.
+            let astray = (0..N).any(|i| {
+                let variance = here.1[(i, i)];
+                !(back.1[(i, i)] <= 4.0 * variance && (back.0[i] - here.0[i]).powi(2) <= 400.0 * variance)
+            });
+            let (mean, covariance) = if astray { here } else { back };
+            ways[child.parent].push((share, mean, covariance));
+        }
+    }
+    let total: f64 = ways.iter().flatten().map(|way| way.0).sum();
+    let gathered = |(ways, parent): (&Vec<Smoothed<N>>, &Hypothesis<N>)| {
+        let weight: f64 = ways.iter().map(|way| way.0).sum();
+        let (mean, covariance) = if weight > 0.0 { moments(ways) } else { (parent.mean, parent.covariance) };
+        (weight / total, mean, covariance)
+    };
+    ways.iter().zip(filtered).map(gathered).collect()
 }
