@@ -2,8 +2,8 @@ use std::io::{self, Write};
 
 /// Writes rows of numbers as CSV, one at a time, without an allocation per cell.
 ///
-/// Numbers are the shortest that read back as the same `f64`, without exponents, as `f64`'s `Display` has them (of two that
-/// are as short and as near, the even one); a cell without a number stays empty. Nothing that is written here needs quotation marks.
+/// Numbers are the shortest that read back as the same `f64`, as `f64`'s `Display` has them (of two that are as short and as
+/// near, the even one), without exponents but for those below 1e-30 in size, which are nothing that was measured; a cell without a number stays empty. Nothing that is written here needs quotation marks.
 ///
 /// ```
 /// use ohmstrain_bench_data::RowWriter;
@@ -95,7 +95,10 @@ impl<W: Write> RowWriter<W> {
     }
 }
 
-/// A number that is not NaN as `f64`'s `Display` has it, several times faster.
+/// What is smaller is all but zero, and without an exponent a line of hundreds of zeros.
+const TINY: f64 = 1e-30;
+
+/// A number that is not NaN as `f64`'s `Display` has it, several times faster; one below [`TINY`] with its exponent.
 #[inline]
 pub(crate) fn append_number(out: &mut Vec<u8>, value: f64) {
     if value.is_infinite() {
@@ -105,6 +108,7 @@ pub(crate) fn append_number(out: &mut Vec<u8>, value: f64) {
     let mut buffer = zmij::Buffer::new();
     let text = buffer.format_finite(value).as_bytes();
     match text.iter().rposition(|byte| *byte == b'e') {
+        Some(_) if value.abs() < TINY => out.extend_from_slice(text),
         Some(at) => append_without_exponent(out, &text[..at], &text[at + 1..]),
         None => out.extend_from_slice(text.strip_suffix(b".0").unwrap_or(text)),
     }
@@ -153,8 +157,12 @@ mod tests {
         for value in [0.0, -0.0, 1.0, -400.0, 0.1, 1e-5, 9.9e-6, 1e-7, -1.25e-7, 1e15, 1e16, 1.5e16, 1e17, 1e22] {
             assert_eq!(text(value), value.to_string());
         }
-        for value in [f64::MAX, f64::MIN_POSITIVE, 5e-324, f64::INFINITY, f64::NEG_INFINITY, 123456789012345680.0] {
+        for value in [f64::MAX, 1e-30, f64::INFINITY, f64::NEG_INFINITY, 123456789012345680.0] {
             assert_eq!(text(value), value.to_string());
+        }
+        // What a baseline is after hours without a reading.
+        for value in [9.9e-31, -f64::MIN_POSITIVE, 5e-324, -2.5e-323] {
+            assert_eq!(text(value), format!("{value:e}"));
         }
     }
 
@@ -168,8 +176,10 @@ mod tests {
                 let text = text(value);
                 prop_assert_eq!(text.parse::<f64>().map(f64::to_bits), Ok(bits));
                 // The last of 17 digits may differ: of two that are as near, one is taken here and the other one there.
-                prop_assert_eq!(text.len(), value.to_string().len());
-                prop_assert!(!text.contains(['e', 'E']));
+                if value == 0.0 || value.abs() >= TINY {
+                    prop_assert_eq!(text.len(), value.to_string().len());
+                    prop_assert!(!text.contains(['e', 'E']));
+                }
             }
         }
 
