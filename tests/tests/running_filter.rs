@@ -80,8 +80,14 @@ fn sensor() -> SensorParams {
 
 /// A correction that has learned something from rows that no two are alike.
 fn correction() -> CorrectionParams {
-    let process = ProcessParams { length: 4.0, noise: 0.1, noise_time_s: 2.0, sd_scale: 1.1 };
-    let corrector = |one_sided| CorrectorParams { sd_scale: 0.9, direct: process, residual: process, one_sided };
+    let process =
+        |inputs: usize| ProcessParams { lengths: vec![4.0; inputs], noise: 0.1, noise_time_s: 2.0, sd_scale: 1.1 };
+    let corrector = |future: usize, one_sided| CorrectorParams {
+        sd_scale: 0.9,
+        direct: process(7 + future),
+        residual: process(13 + future),
+        one_sided,
+    };
     let wave = |k: usize, i: usize| ((0.3 + 0.11 * i as f64) * k as f64 + i as f64).sin();
     let row = |k: usize| TrainingRow {
         time_s: k as f64,
@@ -94,8 +100,8 @@ fn correction() -> CorrectionParams {
     CorrectionParams {
         corrects: EstimatorKind::SignSplit,
         readings: CorrectionScale { centre: 0.2, half_range: 0.25, rates: [0.02, 0.05], starts: [[0.1, 0.6]; 6] },
-        filter: corrector(vec![]),
-        smoother: corrector(vec![process; 2]),
+        filter: corrector(0, vec![]),
+        smoother: corrector(6, vec![process(7), process(7)]),
         rows: (0..40).map(row).collect(),
     }
 }

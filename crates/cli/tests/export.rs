@@ -289,7 +289,8 @@ fn another_days_resistance_at_rest_can_be_told() {
         };
         // Two hypotheses may be merged a row earlier or later; without being told it is off by more than a tenth.
         let off = [farthest(&told, &expected), farthest(&untold, &expected)];
-        // Where R₀ is off hypotheses are nearly as likely as each other for longer: some rows may have another one, most may not.
+        // Where R₀ is off hypotheses are nearly as likely as each other for longer, and readings are outside of what the correction
+        // has learned from: some rows may have another hypothesis, far fewer than are another strain if R₀ is told.
         let unlike = |others: &[f64]| untold.iter().zip(others).filter(|(a, b)| (*a - *b).abs() > 0.003).count();
         let rows = untold.len();
         println!(
@@ -298,7 +299,7 @@ fn another_days_resistance_at_rest_can_be_told() {
             unlike(&told)
         );
         assert!(off[0] < 0.01 && off[1] > 0.03, "{off:?}");
-        assert!(10 * unlike(&program) < rows && 2 * unlike(&told) > rows);
+        assert!(5 * unlike(&program) < unlike(&told) && 2 * unlike(&told) > rows);
     }
 }
 

@@ -48,7 +48,10 @@ fn numbers() -> Numbers {
     }
 }
 
-const LENGTHS: [f64; 4] = [1.5, 2.5, 1.2, 1.9];
+/// The length scale of an input of a process.
+fn length(p: usize, i: usize) -> f64 {
+    [1.5, 2.5, 1.2, 1.9][p] * (1.0 + 0.3 * number(700 + 20 * p + i))
+}
 const MEANS: [f64; 4] = [0.2, -0.1, 0.3, 0.0];
 const VARIANCES: [f64; 4] = [0.5, 0.3, 0.4, 0.9];
 const NOISES: [f64; 4] = [0.02, 0.01, 0.03, 0.05];
@@ -59,16 +62,17 @@ const LEAST: [f64; 4] = [0.8, 0.1, 0.7, 0.6];
 fn written_out(numbers: &Numbers, input: &[f64; D], filtered: Gaussian<f64>) -> ([Gaussian<f64>; 4], f64) {
     let inside: Vec<f64> = (0..D).map(|i| input[i].clamp(numbers.scales[i].lower, numbers.scales[i].upper)).collect();
     let x: Vec<f64> = (0..D).map(|i| (inside[i] - numbers.scales[i].mean) / numbers.scales[i].sd).collect();
-    let outside = |places: &[usize]| -> f64 {
-        places.iter().map(|&i| ((input[i] - inside[i]) / numbers.scales[i].sd).powi(2)).sum()
+    let outside = |p: usize| -> f64 {
+        let by = |i: usize| length(p, sees(p)[0]) / length(p, i) / numbers.scales[i].sd;
+        sees(p).into_iter().map(|i| ((input[i] - inside[i]) * by(i)).powi(2)).sum()
     };
     let mut unknowns = [0.0; 4];
     let said = [0, 1, 2, 3].map(|p| {
         let places = sees(p);
         let first = places[0];
         let kernel = |k: usize| {
-            let square: f64 = places.iter().map(|&i| (x[i] - numbers.rows[k][i]).powi(2)).sum();
-            (-0.5 * square / LENGTHS[p].powi(2)).exp() + 0.09 * (1.0 + x[first] * numbers.rows[k][first])
+            let square: f64 = places.iter().map(|&i| ((x[i] - numbers.rows[k][i]) / length(p, i)).powi(2)).sum();
+            (-0.5 * square).exp() + 0.09 * (1.0 + x[first] * numbers.rows[k][first])
         };
         let mean = MEANS[p] + (0..ROWS).map(|k| numbers.weights[p][k] * kernel(k)).sum::<f64>();
         let mut explained = 0.0;
@@ -84,10 +88,10 @@ fn written_out(numbers: &Numbers, input: &[f64; D], filtered: Gaussian<f64>) -> 
         let least = if p == 1 { LEAST[p].max(filtered.variance) } else { LEAST[p] };
         let base = if p == 1 { filtered.mean } else { 0.0 };
         let variance =
-            ((prior * VARIANCES[p]).max(least) * unknown + NOISES[p]) * WIDENINGS[p] + 0.03 * 0.7 * outside(&places);
+            ((prior * VARIANCES[p]).max(least) * unknown + NOISES[p]) * WIDENINGS[p] + 0.03 * 0.7 * outside(p);
         Gaussian { mean: (base + mean).clamp(-2.0, 2.0), variance }
     });
-    (said, 1.0 - (1.0 - unknowns[1]) * (-outside(&sees(1)) / 5.0).exp())
+    (said, 1.0 - (1.0 - unknowns[1]) * (-outside(1) / 5.0).exp())
 }
 
 macro_rules! correction {
@@ -101,16 +105,19 @@ macro_rules! correction {
         });
         let $weights = $numbers.weights.map(|weights| weights.map(|x| x as $t));
         let $triangles = $numbers.triangles.map(|triangle| triangle.map(|x| x as $t));
-        let process = |p: usize| Process {
-            length: LENGTHS[p] as $t,
-            mean: MEANS[p] as $t,
-            weights: &$weights[p],
-            explained: &$triangles[p],
-            variance: VARIANCES[p] as $t,
-            noise: NOISES[p] as $t,
-            widening: WIDENINGS[p] as $t,
-            least_variance: LEAST[p] as $t,
-        };
+        let process =
+            |p: usize| Process {
+                relevance: std::array::from_fn(|i| {
+                    if sees(p).contains(&i) { (0.5 / length(p, i).powi(2)) as $t } else { 0.0 }
+                }),
+                mean: MEANS[p] as $t,
+                weights: &$weights[p],
+                explained: &$triangles[p],
+                variance: VARIANCES[p] as $t,
+                noise: NOISES[p] as $t,
+                widening: WIDENINGS[p] as $t,
+                least_variance: LEAST[p] as $t,
+            };
         let $correction = Correction {
             rows: &$rows,
             scales: &$scales,

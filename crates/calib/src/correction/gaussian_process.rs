@@ -9,11 +9,19 @@ const JITTER: f64 = 1e-6;
 /// A pivot of the inducing rows below this share of the prior variance says nothing new.
 const SMALLEST_PIVOT: f64 = 1e-6;
 
-/// Length scales, noises and correlation times tried: coarse, since the marginal likelihood of a few hundred rows whose
-/// errors hang together tells no more.
+/// Length scales, of all inputs alike, noises and correlation times tried: coarse, since the marginal likelihood of a few
+/// hundred rows whose errors hang together tells no more.
 const LENGTHS: [f64; 3] = [2.0, 4.0, 8.0];
 const NOISES: [f64; 3] = [0.03, 0.1, 0.3];
 const NOISE_TIMES_S: [f64; 2] = [2.0, 10.0];
+/// After that each input but the first, on which the linear part of the kernel depends, finds a length scale of its own, in
+/// steps of this factor, in turn, and once again.
+const STRETCH: f64 = 2.0;
+const TURNS: usize = 2;
+/// Prior of a length scale over that of all inputs: log-normal, with this factor for a standard deviation; and its limits.
+const SPREAD: f64 = 2.0;
+const LEAST_STRETCH: f64 = 0.25;
+const MOST_STRETCH: f64 = 8.0;
 
 /// Rows to learn from: standardised inputs, targets, times.
 #[derive(Clone, Copy)]
@@ -49,45 +57,107 @@ pub(crate) struct LeftOutRow {
 }
 
 impl Lessons<'_> {
-    /// The settings with the largest marginal likelihood; none if no covariance is positive definite.
+    /// The settings with the largest marginal likelihood, times the prior of the length scales; none if no covariance is
+    /// positive definite.
     pub(crate) fn best_settings(self) -> Option<ProcessParams> {
-        let squares = self.squared_distances();
+        self.alike().map(|(cost, params)| self.with_relevance(cost, params))
+    }
+
+    /// With one length scale of all inputs.
+    fn alike(self) -> Option<(f64, ProcessParams)> {
+        let inputs = self.inputs.first()?.len();
+        let squares = self.half_squares(&vec![1.0; inputs]);
         let mut best: Option<(f64, ProcessParams)> = None;
         for length in LENGTHS {
+            let sums = &squares / (length * length);
             for noise in NOISES {
                 for noise_time_s in NOISE_TIMES_S {
-                    let params = ProcessParams { length, noise, noise_time_s, sd_scale: 1.0 };
-                    let Some(process) = GaussianProcess::with_distances(self, &squares, params) else { continue };
-                    let cost = process.negative_log_evidence();
-                    if best.is_none_or(|(least, _)| cost < least) {
+                    let lengths = vec![length; inputs];
+                    let params = ProcessParams { lengths, noise, noise_time_s, sd_scale: 1.0 };
+                    let Some(cost) = self.cost(&sums, &params) else { continue };
+                    if best.as_ref().is_none_or(|(least, _)| cost < *least) {
                         best = Some((cost, params));
                     }
                 }
             }
         }
-        best.map(|(_, params)| params)
+        best
     }
 
-    fn squared_distances(self) -> DMatrix<f64> {
-        let n = self.inputs.len();
-        let square = |i: usize, j: usize| self.inputs[i].iter().zip(self.inputs[j]).map(|(a, b)| (a - b).powi(2)).sum();
-        symmetric(n, square)
+    /// Automatic relevance determination (Neal, *Bayesian Learning for Neural Networks*, 1996): inputs that tell little get long
+    /// length scales. Coordinates in turn, since a step of one is all that a few hundred rows can tell.
+    fn with_relevance(self, mut cost: f64, mut params: ProcessParams) -> ProcessParams {
+        let Some(&alike) = params.lengths.first() else { return params };
+        let prior = |length: f64| 0.5 * ((length / alike).ln() / SPREAD.ln()).powi(2);
+        let mut sums = self.half_squares(&params.lengths);
+        for input in (1..params.lengths.len()).cycle().take(TURNS * (params.lengths.len() - 1)) {
+            for factor in [1.0 / STRETCH, STRETCH] {
+                let before = cost;
+                loop {
+                    let (now, trial) = (params.lengths[input], factor * params.lengths[input]);
+                    if !(LEAST_STRETCH * alike..=MOST_STRETCH * alike).contains(&trial) {
+                        break;
+                    }
+                    let stretched = self.stretched(&sums, input, now, trial);
+                    let Some(evidence) = self.cost(&stretched, &params) else { break };
+                    let priors: f64 = params.lengths.iter().map(|length| prior(*length)).sum();
+                    let found = evidence + priors + prior(trial) - prior(now);
+                    if found >= cost {
+                        break;
+                    }
+                    (cost, sums) = (found, stretched);
+                    params.lengths[input] = trial;
+                }
+                if cost < before {
+                    break;
+                }
+            }
+        }
+        params
     }
+
+    /// The negative logarithm of the marginal likelihood, up to a constant.
+    fn cost(self, sums: &DMatrix<f64>, params: &ProcessParams) -> Option<f64> {
+        GaussianProcess::with_sums(self, sums, params).map(|process| process.negative_log_evidence())
+    }
+
+    /// `Σ (xᵢ - xᵢ')²/2ℓᵢ²` for all pairs of rows.
+    fn half_squares(self, lengths: &[f64]) -> DMatrix<f64> {
+        let relevance: Vec<f64> = lengths.iter().map(|length| relevance(*length)).collect();
+        let apart = |(a, b): (&f64, &f64)| (a - b).powi(2);
+        let sum = |i: usize, j: usize| {
+            let squares = self.inputs[i].iter().zip(self.inputs[j]).map(apart);
+            squares.zip(&relevance).map(|(square, relevance)| square * relevance).sum()
+        };
+        symmetric(self.inputs.len(), sum)
+    }
+
+    /// The same with another length scale of one input.
+    fn stretched(self, sums: &DMatrix<f64>, input: usize, from: f64, to: f64) -> DMatrix<f64> {
+        let change = relevance(to) - relevance(from);
+        let apart = |i: usize, j: usize| self.inputs[i][input] - self.inputs[j][input];
+        symmetric(self.inputs.len(), |i, j| sums[(i, j)] + change * apart(i, j).powi(2))
+    }
+}
+
+/// What an input counts in the kernel, 1/2ℓ².
+pub(crate) fn relevance(length: f64) -> f64 {
+    0.5 / (length * length)
 }
 
 impl GaussianProcess {
     /// Conditions a process on rows; none if its covariance is not positive definite.
-    pub(crate) fn new(lessons: Lessons, params: ProcessParams) -> Option<Self> {
-        Self::with_distances(lessons, &lessons.squared_distances(), params)
+    pub(crate) fn new(lessons: Lessons, params: &ProcessParams) -> Option<Self> {
+        Self::with_sums(lessons, &lessons.half_squares(&params.lengths), params)
     }
 
-    fn with_distances(lessons: Lessons, squares: &DMatrix<f64>, params: ProcessParams) -> Option<Self> {
+    fn with_sums(lessons: Lessons, sums: &DMatrix<f64>, params: &ProcessParams) -> Option<Self> {
         let Lessons { inputs, targets, time_s } = lessons;
         let n = targets.len();
         let centre = targets.iter().sum::<f64>() / n as f64;
         let size = (targets.iter().map(|y| (y - centre).powi(2)).sum::<f64>() / n as f64).sqrt().max(f64::MIN_POSITIVE);
         let targets = DVector::from_iterator(n, targets.iter().map(|y| (y - centre) / size));
-        let kernel = symmetric(n, |i, j| kernel(params.length, squares[(i, j)], inputs[i][0] * inputs[j][0]));
+        let kernel = symmetric(n, |i, j| kernel(sums[(i, j)], inputs[i][0] * inputs[j][0]));
         let covariance = (&kernel + noise_covariance(time_s, params)).cholesky()?;
         let weights = covariance.solve(&targets);
         let scale = targets.dot(&weights) / n as f64;
@@ -154,7 +224,7 @@ impl GaussianProcess {
 }
 
 /// Covariance of the noise, in variances of the targets.
-fn noise_covariance(time_s: &[f64], params: ProcessParams) -> DMatrix<f64> {
+fn noise_covariance(time_s: &[f64], params: &ProcessParams) -> DMatrix<f64> {
     let variance = params.noise.powi(2);
     symmetric(time_s.len(), |i, j| {
         let white = if i == j { WHITE * variance + JITTER } else { 0.0 };

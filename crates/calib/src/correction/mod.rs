@@ -11,7 +11,7 @@ use crate::order::extent;
 use crate::params::RangeParams;
 use crate::params::correction::{CorrectorParams, ProcessParams, SIDES};
 use crate::sd_scale::{joint_scale, sd_scale_up_to};
-use gaussian_process::{GaussianProcess, LeftOutRow, Lessons, inducing_rows};
+use gaussian_process::{GaussianProcess, LeftOutRow, Lessons, inducing_rows, relevance};
 
 /// Blocks of rows that are left out in turn.
 const BLOCKS: usize = 5;
@@ -45,13 +45,13 @@ enum Which {
 const ONE_SIDED: [Which; SIDES] = [Which::Past, Which::Future];
 
 impl Which {
-    fn sees(self, row: &[f64]) -> Vec<f64> {
-        let (features, future) = (&row[OUTPUTS..], &row[row.len().min(OUTPUTS + FEATURES)..]);
+    /// Which of so many inputs it sees.
+    fn places(self, inputs: usize) -> Vec<usize> {
         match self {
-            Which::Direct => features.to_vec(),
-            Which::Past => features[..FEATURES].to_vec(),
-            Which::Future => [&features[..1], future].concat(),
-            Which::Residual => row.to_vec(),
+            Which::Direct => (OUTPUTS..inputs).collect(),
+            Which::Past => (OUTPUTS..OUTPUTS + FEATURES).collect(),
+            Which::Future => std::iter::once(OUTPUTS).chain(OUTPUTS + FEATURES..inputs).collect(),
+            Which::Residual => (0..inputs).collect(),
         }
     }
 
@@ -62,12 +62,12 @@ impl Which {
         }
     }
 
-    fn params(self, of: &CorrectorParams) -> Option<ProcessParams> {
+    fn params(self, of: &CorrectorParams) -> Option<&ProcessParams> {
         match self {
-            Which::Direct => Some(of.direct),
-            Which::Past => of.one_sided.first().copied(),
-            Which::Future => of.one_sided.get(1).copied(),
-            Which::Residual => Some(of.residual),
+            Which::Direct => Some(&of.direct),
+            Which::Past => of.one_sided.first(),
+            Which::Future => of.one_sided.get(1),
+            Which::Residual => Some(&of.residual),
         }
     }
 }
@@ -99,7 +99,9 @@ impl<'a, const D: usize> Prepared<'a, D> {
 
     /// Lets `learn` see the examples of a process.
     fn taught<X>(&self, which: Which, learn: impl Fn(Lessons) -> Option<X>) -> Option<X> {
-        let inputs: Vec<Vec<f64>> = self.rows.iter().map(|row| which.sees(row)).collect();
+        let places = which.places(D);
+        let seen = |row: &[f64; D]| places.iter().map(|&i| row[i]).collect();
+        let inputs: Vec<Vec<f64>> = self.rows.iter().map(seen).collect();
         let inputs: Vec<&[f64]> = inputs.iter().map(Vec::as_slice).collect();
         let target = |(row, strain): (usize, &f64)| strain - self.base(which, row);
         let targets: Vec<f64> = self.examples.strain.iter().enumerate().map(target).collect();
@@ -110,7 +112,7 @@ impl<'a, const D: usize> Prepared<'a, D> {
     fn chosen(&self, which: Which) -> Option<(ProcessParams, Vec<Gaussian<f64>>)> {
         self.taught(which, |lessons| {
             let settings = lessons.best_settings()?;
-            let process = GaussianProcess::new(lessons, settings)?;
+            let process = GaussianProcess::new(lessons, &settings)?;
             let (limits, least) = (self.examples.limits, self.least_variance(which));
             let said = |(k, row): (usize, LeftOutRow)| {
                 let variance = row.unknown * row.prior.max(least) + process.noise * process.variance();
@@ -171,8 +173,12 @@ pub(crate) fn learned<const D: usize, const S: usize>(
     let owned = |which: Which, process: &GaussianProcess| {
         let settings = which.params(params)?;
         let weights: Vec<f64> = process.weights().collect();
+        let mut of_inputs = [0.0; D];
+        for (place, length) in which.places(D).into_iter().zip(&settings.lengths) {
+            of_inputs[place] = relevance(*length);
+        }
         let numbers = Process {
-            length: settings.length,
+            relevance: of_inputs,
             mean: process.centre,
             weights: &[],
             explained: &[],

@@ -10,11 +10,11 @@ pub struct OwnedCorrection<T: 'static, const D: usize, const S: usize = 0> {
     /// Scales of the inputs.
     pub scales: [InputScale<T>; D],
     /// Strain from the features.
-    pub direct: OwnedProcess<T>,
+    pub direct: OwnedProcess<T, D>,
     /// Strain from the features of one side of time.
-    pub one_sided: [OwnedProcess<T>; S],
+    pub one_sided: [OwnedProcess<T, D>; S],
     /// What the filter's strain lacks, from all inputs.
-    pub residual: OwnedProcess<T>,
+    pub residual: OwnedProcess<T, D>,
     /// Limits of the output.
     pub limits: StrainRange<T>,
     /// Variance of the strain over the training rows.
@@ -25,13 +25,13 @@ pub struct OwnedCorrection<T: 'static, const D: usize, const S: usize = 0> {
 
 /// A [`Process`] with everything that it borrows.
 #[derive(Clone, Debug, PartialEq)]
-pub struct OwnedProcess<T: 'static> {
+pub struct OwnedProcess<T: 'static, const D: usize> {
     /// Weight of each training row.
     pub weights: Vec<T>,
     /// The upper triangle of what the inducing rows explain, row by row.
     pub explained: Vec<T>,
     /// Its other numbers.
-    pub numbers: Process<'static, T>,
+    pub numbers: Process<'static, T, D>,
 }
 
 impl<T: Real + 'static, const D: usize, const S: usize> OwnedCorrection<T, D, S> {
@@ -70,18 +70,18 @@ impl<T: Real + 'static, const D: usize, const S: usize> OwnedCorrection<T, D, S>
     }
 }
 
-impl<T: Real + 'static> OwnedProcess<T> {
-    fn process(&self) -> Process<'_, T> {
+impl<T: Real + 'static, const D: usize> OwnedProcess<T, D> {
+    fn process(&self) -> Process<'_, T, D> {
         Process { weights: &self.weights, explained: &self.explained, ..self.numbers }
     }
 
-    fn map<U: Real + 'static>(&self, number: impl Fn(T) -> U) -> OwnedProcess<U> {
-        let Process { length, mean, variance, noise, widening, least_variance, .. } = self.numbers;
+    fn map<U: Real + 'static>(&self, number: impl Fn(T) -> U) -> OwnedProcess<U, D> {
+        let Process { relevance, mean, variance, noise, widening, least_variance, .. } = self.numbers;
         OwnedProcess {
             weights: self.weights.iter().copied().map(&number).collect(),
             explained: self.explained.iter().copied().map(&number).collect(),
             numbers: Process {
-                length: number(length),
+                relevance: relevance.map(&number),
                 mean: number(mean),
                 weights: &[],
                 explained: &[],

@@ -42,13 +42,13 @@ fn standardised(rows: &[Vec<f64>], row: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-fn textbook(rows: &[Vec<f64>], targets: &[f64], time_s: &[f64], settings: ProcessParams, at: &[f64]) -> Textbook {
+fn textbook(rows: &[Vec<f64>], targets: &[f64], time_s: &[f64], settings: &ProcessParams, at: &[f64]) -> Textbook {
     let n = rows.len();
     let x: Vec<Vec<f64>> = rows.iter().map(|row| standardised(rows, row)).collect();
     let at = standardised(rows, at);
     let kernel = |a: &[f64], b: &[f64]| {
-        let square: f64 = a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum();
-        (-square / (2.0 * settings.length * settings.length)).exp() + 0.09 * (1.0 + a[0] * b[0])
+        let square: f64 = (0..a.len()).map(|i| ((a[i] - b[i]) / settings.lengths[i]).powi(2)).sum();
+        (-square / 2.0).exp() + 0.09 * (1.0 + a[0] * b[0])
     };
     let covariance = DMatrix::from_fn(n, n, |i, j| {
         let correlated = settings.noise.powi(2) * (-(time_s[i] - time_s[j]).abs() / settings.noise_time_s).exp();
@@ -70,14 +70,20 @@ fn textbook(rows: &[Vec<f64>], targets: &[f64], time_s: &[f64], settings: Proces
     }
 }
 
+/// Around one length, no two alike.
+fn lengths(around: f64, inputs: usize) -> Vec<f64> {
+    (0..inputs).map(|i| around * (1.0 + 0.3 * (i as f64).sin())).collect()
+}
+
 #[test]
 fn a_correction_says_what_the_textbook_says() {
     // As many rows as may be inducing: nothing is left out of the variance.
     let (inputs, strain, time_s) = examples(40, 1.7);
     let examples = Examples { inputs: &inputs, strain: &strain, time_s: &time_s, limits: LIMITS };
-    let direct = ProcessParams { length: 2.0, noise: 0.1, noise_time_s: 2.0, sd_scale: 1.5 };
-    let residual = ProcessParams { length: 4.0, noise: 0.3, noise_time_s: 10.0, sd_scale: 1.0 };
-    let params = CorrectorParams { sd_scale: 0.8, direct, residual, one_sided: Vec::new() };
+    let direct = ProcessParams { lengths: vec![2.0, 3.0], noise: 0.1, noise_time_s: 2.0, sd_scale: 1.5 };
+    let residual = ProcessParams { lengths: lengths(4.0, D), noise: 0.3, noise_time_s: 10.0, sd_scale: 1.0 };
+    let params =
+        CorrectorParams { sd_scale: 0.8, direct: direct.clone(), residual: residual.clone(), one_sided: Vec::new() };
     let correction: OwnedCorrection<f64, D> = learned(&params, examples).unwrap();
     let all: Vec<Vec<f64>> = inputs.iter().map(|row| row.to_vec()).collect();
     let features: Vec<Vec<f64>> = inputs.iter().map(|row| row[6..].to_vec()).collect();
@@ -93,10 +99,10 @@ fn a_correction_says_what_the_textbook_says() {
         };
         // Matrices of condition 1e6, and what keeps the 40 kernels apart: 1e-8.
         let close = |a: f64, b: f64| (a - b).abs() < 1e-6;
-        let book = textbook(&features, &strain, &time_s, direct, &input[6..]);
+        let book = textbook(&features, &strain, &time_s, &direct, &input[6..]);
         assert!(close(said.direct.mean, book.mean), "{k}: {} {}", said.direct.mean, book.mean);
         assert!(close(said.direct.variance, 2.25 * (least(&book, 0.5) + book.noise)), "{k}");
-        let book = textbook(&all, &residuals, &time_s, residual, &input);
+        let book = textbook(&all, &residuals, &time_s, &residual, &input);
         assert!(close(said.residual.mean, input[0] + book.mean), "{k}");
         assert!(close(said.residual.variance, least(&book, 0.07) + book.noise), "{k}");
         assert!(close(1.0 - said.novelty, 1.0 - book.latent / book.prior), "{k}");
@@ -109,9 +115,11 @@ fn one_sided_processes_see_their_side_alone() {
     const BOTH: usize = 16;
     let (inputs, strain, time_s) = examples::<BOTH>(40, 1.7);
     let examples = Examples { inputs: &inputs, strain: &strain, time_s: &time_s, limits: LIMITS };
-    let [direct, residual, past, future] = [(4.0, 0.1), (4.0, 0.3), (2.0, 0.1), (8.0, 0.03)]
-        .map(|(length, noise)| ProcessParams { length, noise, noise_time_s: 2.0, sd_scale: 1.0 });
-    let params = CorrectorParams { sd_scale: 1.0, direct, residual, one_sided: vec![past, future] };
+    let [direct, residual, past, future] =
+        [(4.0, 10, 0.1), (4.0, BOTH, 0.3), (2.0, 7, 0.1), (8.0, 4, 0.03)].map(|(length, inputs, noise)| {
+            ProcessParams { lengths: lengths(length, inputs), noise, noise_time_s: 2.0, sd_scale: 1.0 }
+        });
+    let params = CorrectorParams { sd_scale: 1.0, direct, residual, one_sided: vec![past.clone(), future.clone()] };
     let correction: OwnedCorrection<f64, BOTH, 2> = learned(&params, examples).unwrap();
     // Six outputs, the reading, six features of the past, three of the future.
     let of_past = |row: &[f64; BOTH]| row[6..13].to_vec();
@@ -122,8 +130,8 @@ fn one_sided_processes_see_their_side_alone() {
         let input: [f64; BOTH] = std::array::from_fn(|i| 0.5 * (inputs[k][i] + inputs[k + 1][i]));
         let said = correction.correction().correct(&input, Gaussian { mean: input[0], variance: 0.0 });
         let books = [
-            textbook(&pasts, &strain, &time_s, past, &of_past(&input)),
-            textbook(&futures, &strain, &time_s, future, &of_future(&input)),
+            textbook(&pasts, &strain, &time_s, &past, &of_past(&input)),
+            textbook(&futures, &strain, &time_s, &future, &of_future(&input)),
         ];
         for (said, book) in said.one_sided.iter().zip(books) {
             assert!((said.mean - book.mean).abs() < 1e-6, "{k}: {} {}", said.mean, book.mean);
@@ -136,18 +144,47 @@ fn one_sided_processes_see_their_side_alone() {
 fn inducing_rows_cost_no_certainty_that_is_not_there() {
     let (inputs, strain, time_s) = examples(200, 1.7);
     let examples = Examples { inputs: &inputs, strain: &strain, time_s: &time_s, limits: LIMITS };
-    let settings = ProcessParams { length: 4.0, noise: 0.1, noise_time_s: 2.0, sd_scale: 1.0 };
-    let params = CorrectorParams { sd_scale: 1.0, direct: settings, residual: settings, one_sided: Vec::new() };
+    let settings =
+        |inputs: usize| ProcessParams { lengths: vec![4.0; inputs], noise: 0.1, noise_time_s: 2.0, sd_scale: 1.0 };
+    let (direct, settings) = (settings(D - 6), settings(D));
+    let params = CorrectorParams { sd_scale: 1.0, direct, residual: settings.clone(), one_sided: Vec::new() };
     let correction: OwnedCorrection<f64, D> = learned(&params, examples).unwrap();
     let all: Vec<Vec<f64>> = inputs.iter().map(|row| row.to_vec()).collect();
     let residuals: Vec<f64> = inputs.iter().zip(&strain).map(|(row, strain)| strain - row[0]).collect();
     for k in (0..199).step_by(7) {
         let input: [f64; D] = std::array::from_fn(|i| 0.5 * (inputs[k][i] + inputs[k + 1][i]));
         let said = correction.correction().correct(&input, Gaussian { mean: input[0], variance: 0.0 });
-        let book = textbook(&all, &residuals, &time_s, settings, &input);
+        let book = textbook(&all, &residuals, &time_s, &settings, &input);
         assert!((said.residual.mean - input[0] - book.mean).abs() < 1e-6, "{k}");
         assert!(said.novelty > book.latent / book.prior - 1e-6, "{k}");
     }
+}
+
+/// Of eight inputs of rows that have nothing to do with each other the target depends on the first and the third. The third gets
+/// the shortest length scale, and rows that were not learned from are explained better than with any one length scale of all.
+#[test]
+fn inputs_that_tell_nothing_get_long_length_scales() {
+    const SETTINGS: ProcessParams =
+        ProcessParams { lengths: Vec::new(), noise: 0.03, noise_time_s: 2.0, sd_scale: 1.0 };
+    let number = |seed: usize| ((seed as f64 * 12.9898).sin() * 43758.5453).rem_euclid(1.0);
+    let all: Vec<Vec<f64>> = (0..160).map(|k| (0..D).map(|i| number(17 * k + i + 1)).collect()).collect();
+    let rows: Vec<Vec<f64>> = all.iter().map(|row| standardised(&all, row)).collect();
+    let target: Vec<f64> = rows.iter().map(|x| (1.5 * x[2]).sin() + 0.5 * x[0]).collect();
+    let time_s: Vec<f64> = (0..160).map(|k| 100.0 * f64::from(k)).collect();
+    let (learned, others) = (0..100, 100..160);
+    let inputs: Vec<&[f64]> = rows[learned.clone()].iter().map(Vec::as_slice).collect();
+    let (targets, times) = (&target[learned.clone()], &time_s[learned.clone()]);
+    let found = Lessons { inputs: &inputs, targets, time_s: times }.best_settings().unwrap();
+    let tells_most = |(i, length): (usize, &f64)| i == 0 || i == 2 || *length > found.lengths[2];
+    assert!(found.lengths.iter().enumerate().all(tells_most), "{:?}", found.lengths);
+    let error = |settings: ProcessParams| -> f64 {
+        let of = |k: usize| textbook(&rows[learned.clone()], targets, times, &settings, &rows[k]).mean - target[k];
+        others.clone().map(|k| of(k).powi(2)).sum()
+    };
+    let alike = |length: f64| error(ProcessParams { lengths: vec![length; D], ..SETTINGS });
+    let best_alike = [1.0, 2.0, 4.0, 8.0].map(alike).into_iter().fold(f64::INFINITY, f64::min);
+    let relevant = error(found);
+    assert!(relevant < 0.25 * best_alike, "{relevant} {best_alike}");
 }
 
 /// What a process says of a block in closed form is what one says that was never told of it, centre and scale aside.
@@ -155,8 +192,9 @@ fn inducing_rows_cost_no_certainty_that_is_not_there() {
 fn blocks_left_out_are_predicted_from_the_others() {
     let (inputs, strain, time_s) = examples::<D>(50, 1.7);
     let rows: Vec<&[f64]> = inputs.iter().map(|row| row.as_slice()).collect();
-    let settings = ProcessParams { length: 4.0, noise: 0.1, noise_time_s: 2.0, sd_scale: 1.0 };
-    let process = GaussianProcess::new(Lessons { inputs: &rows, targets: &strain, time_s: &time_s }, settings).unwrap();
+    let settings = ProcessParams { lengths: vec![4.0; D], noise: 0.1, noise_time_s: 2.0, sd_scale: 1.0 };
+    let process =
+        GaussianProcess::new(Lessons { inputs: &rows, targets: &strain, time_s: &time_s }, &settings).unwrap();
     let left_out = process.left_out(5).unwrap();
     let kernel = |a: &[f64], b: &[f64]| {
         let square: f64 = a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum();

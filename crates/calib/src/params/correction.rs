@@ -127,11 +127,11 @@ fn joined<const D: usize>(parts: [&[f64]; 3]) -> [f64; D] {
 }
 
 /// What a Gaussian process was chosen to be.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ProcessParams {
-    /// Length scale, in standard deviations of the inputs.
-    pub length: f64,
+    /// Length scale of each input that the process sees, in standard deviations of the input: the longer, the less it counts.
+    pub lengths: Vec<f64>,
     /// Noise that is correlated in time, relative to the targets' standard deviation.
     pub noise: f64,
     /// For how long it is, s.

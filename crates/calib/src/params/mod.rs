@@ -24,7 +24,7 @@ use crate::params::summary::Summary;
 /// where they reach it.
 pub const LARGEST_SD_SCALE: f64 = 5.0;
 /// Version of the parameter file this code reads and writes.
-pub const FORMAT: u32 = 6;
+pub const FORMAT: u32 = 7;
 
 /// Everything a filter needs to know of a sensor: the content of `sensor.toml`.
 ///

@@ -5,6 +5,7 @@ use ohmstrain_ekf::Real;
 use ohmstrain_ekf::correction::{FAR, FARTHEST, LINEAR, NEW, NOVEL, PASSED_OVER, RATE_GAIN, TIME_CONSTANTS_S};
 use serde::Serialize;
 
+use super::learned::INPUTS;
 use super::literal::Literal;
 use super::quadratic::Quadratic;
 
@@ -45,8 +46,7 @@ pub struct CorrectionConstants {
 struct ProcessConstants {
     name: &'static str,
     comment: &'static str,
-    length: Literal,
-    length_square: Literal,
+    relevance: Vec<Literal>,
     mean: Literal,
     variance: Literal,
     noise: Literal,
@@ -139,14 +139,12 @@ impl CorrectionConstants {
 }
 
 impl ProcessConstants {
-    fn new(name: &'static str, comment: &'static str, process: &OwnedProcess<f64>) -> Self {
+    fn new(name: &'static str, comment: &'static str, process: &OwnedProcess<f64, INPUTS>) -> Self {
         let numbers = &process.numbers;
-        let length = numbers.length as f32;
         Self {
             name,
             comment,
-            length: Literal(length),
-            length_square: Literal(length * length),
+            relevance: narrowed(&numbers.relevance),
             mean: narrow(numbers.mean),
             variance: narrow(numbers.variance),
             noise: narrow(numbers.noise),

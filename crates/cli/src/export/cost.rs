@@ -79,7 +79,7 @@ const HISTORIES: OfKind = OfKind {
 };
 
 /// Instructions of a correction for each row, for each entry of the two triangles, for its quadratic functions.
-const ROW: f64 = 214.5;
+const ROW: f64 = 235.3;
 const ENTRY: f64 = 12.7;
 const QUADRATIC: f64 = 1930.0;
 /// Bytes of code of a correction and of its quadratic functions; bytes of the stack.
@@ -110,8 +110,8 @@ impl Cost {
             let (rows, entries) = (learned.rows.len() as f64, learned.direct.explained.len() as f64);
             instructions += ROW * rows + ENTRY * entries;
             let inputs = (OUTPUTS + FEATURES) as f64;
-            // Inputs and two weights a row, two triangles, four numbers of each input's scale.
-            flash += CORRECTION_CODE + FLOAT as f64 * ((inputs + 2.0) * rows + 2.0 * entries + 4.0 * inputs);
+            // Inputs and two weights a row, two triangles, of each input four numbers of its scale and two relevances.
+            flash += CORRECTION_CODE + FLOAT as f64 * ((inputs + 2.0) * rows + 2.0 * entries + 6.0 * inputs);
             stack += CORRECTION_STACK;
         }
         if quadratics.is_some() {

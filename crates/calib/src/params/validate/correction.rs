@@ -1,6 +1,8 @@
+use ohmstrain_ekf::correction::{FEATURES, OUTPUTS};
+
 use super::table::{FACTOR, FieldError, POSITIVE, SIGNED, Table};
 use crate::params::correction::{
-    CorrectionParams, CorrectionScale, CorrectorParams, ProcessParams, SIDES, TrainingRow,
+    CorrectionParams, CorrectionScale, CorrectorParams, FUTURE_FEATURES, ProcessParams, SIDES, TrainingRow,
 };
 use crate::params::estimator::EstimatorKind;
 
@@ -35,19 +37,21 @@ impl CorrectionScale {
 impl CorrectorParams {
     fn validate(&self, table: &Table, sides: usize) -> Result<(), FieldError> {
         table.number("sd_scale", self.sd_scale, FACTOR)?;
-        self.direct.validate(&table.table("direct"))?;
-        self.residual.validate(&table.table("residual"))?;
+        let future = if sides == 0 { 0 } else { FUTURE_FEATURES };
+        self.direct.validate(&table.table("direct"), FEATURES + future)?;
+        self.residual.validate(&table.table("residual"), OUTPUTS + FEATURES + future)?;
         if self.one_sided.len() != sides {
             return Err(table.wrong("one_sided", format!("{sides} entries"), self.one_sided.len()));
         }
-        let mut one_sided = self.one_sided.iter().enumerate();
-        one_sided.try_for_each(|(index, side)| side.validate(&table.entry("one_sided", index)))
+        let mut one_sided = self.one_sided.iter().zip([FEATURES, 1 + FUTURE_FEATURES]).enumerate();
+        one_sided.try_for_each(|(index, (side, inputs))| side.validate(&table.entry("one_sided", index), inputs))
     }
 }
 
 impl ProcessParams {
-    fn validate(&self, table: &Table) -> Result<(), FieldError> {
-        table.number("length", self.length, FACTOR)?;
+    fn validate(&self, table: &Table, inputs: usize) -> Result<(), FieldError> {
+        table.length("lengths", inputs, self.lengths.len())?;
+        table.numbers("lengths", &self.lengths, FACTOR)?;
         table.number("noise", self.noise, FACTOR)?;
         table.number("noise_time_s", self.noise_time_s, POSITIVE)?;
         table.number("sd_scale", self.sd_scale, FACTOR)

@@ -26,7 +26,7 @@ static const float ROW[ROWS][INPUTS] = {
 
 /* A Gaussian process: see the Rust crate `ohmstrain-ekf`, module `correction`. */
 typedef struct process {
-    float length_square; /* squared length scale, in standard deviations of the inputs */
+    float relevance[INPUTS]; /* 1/2l^2 with the length scale l of an input, in its standard deviations; 0: not seen */
     float mean;
     float variance;
     float noise;
@@ -39,7 +39,8 @@ typedef struct process {
 {% for p in correction.processes %}
 /* << p.comment >> */
 static const process << p.name >> = {
-    << p.length_square >>f, << p.mean >>f, << p.variance >>f, << p.noise >>f, << p.widening >>f, << p.least_variance >>f,
+    {<< p.relevance|join("f, ") >>f},
+    << p.mean >>f, << p.variance >>f, << p.noise >>f, << p.widening >>f, << p.least_variance >>f,
     {<< p.weights|join("f, ") >>f},
     {<< p.explained|join("f, ") >>f},
 };
@@ -140,7 +141,7 @@ static void correct(const summary *all, const readings *seen, float filtered, fl
                     float *variance)
 {
     float x[INPUTS], kernel[2][INDUCING], said[2], spread[2], unknown, outside[2] = {0.0f, 0.0f};
-    float least, beyond, novelty, total, mean, share[2];
+    float least, novelty, total, mean, share[2];
     int i, k;
 
     x[0] = filtered;
@@ -158,9 +159,12 @@ static void correct(const summary *all, const readings *seen, float filtered, fl
     for (i = 0; i < INPUTS; i++) {
         const float inside = clamped(x[i], INPUT_LOWER[i], INPUT_UPPER[i]);
         const float excess = (x[i] - inside) / INPUT_SD[i];
-        outside[i >= OUTPUTS] += excess * excess;
+        outside[0] += excess * excess * DIRECT.relevance[i];
+        outside[1] += excess * excess * RESIDUAL.relevance[i];
         x[i] = (inside - INPUT_MEAN[i]) / INPUT_SD[i];
     }
+    outside[0] /= DIRECT.relevance[OUTPUTS];
+    outside[1] /= RESIDUAL.relevance[0];
 
 {% if correction.quadratics %}
     said[0] = DIRECT.mean + quadratic_of_direct(x + OUTPUTS);
@@ -171,16 +175,17 @@ static void correct(const summary *all, const readings *seen, float filtered, fl
 {% endif %}
     for (k = 0; k < ROWS; k++) {
         const float *row = ROW[k];
-        float outputs = 0.0f, features = 0.0f, k0, k1;
+        float square, direct = 0.0f, residual = 0.0f, k0, k1;
         /* Written out: a loop takes as long again. */
-{% for i in range(6) %}
-        outputs += (x[<< i >>] - row[<< i >>]) * (x[<< i >>] - row[<< i >>]);
+{% for i in range(13) %}
+        square = (x[<< i >>] - row[<< i >>]) * (x[<< i >>] - row[<< i >>]);
+{% if i >= 6 %}
+        direct += square * DIRECT.relevance[<< i >>];
+{% endif %}
+        residual += square * RESIDUAL.relevance[<< i >>];
 {% endfor %}
-{% for i in range(6, 13) %}
-        features += (x[<< i >>] - row[<< i >>]) * (x[<< i >>] - row[<< i >>]);
-{% endfor %}
-        k0 = expf(-0.5f * features / DIRECT.length_square) + linear(x[OUTPUTS] * row[OUTPUTS]);
-        k1 = expf(-0.5f * (outputs + features) / RESIDUAL.length_square) + linear(x[0] * row[0]);
+        k0 = expf(-direct) + linear(x[OUTPUTS] * row[OUTPUTS]);
+        k1 = expf(-residual) + linear(x[0] * row[0]);
         said[0] += DIRECT.weight[k] * k0;
         said[1] += RESIDUAL.weight[k] * k1;
         if (k < INDUCING) {
@@ -190,13 +195,12 @@ static void correct(const summary *all, const readings *seen, float filtered, fl
     }
 
     spread[0] = variance_of(&DIRECT, kernel[0], x[OUTPUTS], DIRECT.least_variance, &unknown);
-    spread[0] = spread[0] * DIRECT.widening + << correction.far >>f * << correction.strain_variance >>f * outside[1];
+    spread[0] = spread[0] * DIRECT.widening + << correction.far >>f * << correction.strain_variance >>f * outside[0];
     said[0] = clamped(0.0f + said[0], OHMSTRAIN_LOWER, OHMSTRAIN_UPPER);
     least = filtered_variance > RESIDUAL.least_variance ? filtered_variance : RESIDUAL.least_variance;
     spread[1] = variance_of(&RESIDUAL, kernel[1], x[0], least, &unknown);
-    beyond = outside[0] + outside[1];
-    novelty = 1.0f - (1.0f - unknown) * expf(-beyond / << correction.new >>f);
-    spread[1] = spread[1] * RESIDUAL.widening + << correction.far >>f * << correction.strain_variance >>f * beyond;
+    novelty = 1.0f - (1.0f - unknown) * expf(-outside[1] / << correction.new >>f);
+    spread[1] = spread[1] * RESIDUAL.widening + << correction.far >>f * << correction.strain_variance >>f * outside[1];
     said[1] = clamped(filtered + said[1], OHMSTRAIN_LOWER, OHMSTRAIN_UPPER);
 
     /* Their mixture, each weighted by its variance to the power -3/2; an exact one is all that counts. */

@@ -200,7 +200,7 @@ pub const CORRECTION: Correction<'static, f32, INPUTS> = Correction {
     one_sided: [],
 {% for p in correction.processes %}
     << p.name|lower >>: Process {
-        length: << p.length >>,
+        relevance: [<< p.relevance|join(", ") >>],
         mean: << p.mean >>,
         weights: &<< p.name >>_WEIGHTS,
         explained: &<< p.name >>_EXPLAINED,
