@@ -1,5 +1,6 @@
 //! What recordings given to a calibration say about their units, and about being of one sensor.
 
+use ohmstrain::number::{plain, significant};
 use ohmstrain_bench_data::{Quantity, ReadingKind};
 use ohmstrain_calib::{Distrusted, LARGEST_SD_SCALE, Screened, SensorParams};
 
@@ -64,10 +65,12 @@ pub fn check(recordings: &[Recording], screened: &Screened) -> Result<(), CliErr
         pair(|figures| figures.median_reading).filter(|pair| pair.3 > UNIT_RATIO * pair.1)
     {
         return Err(CliError::Input(format!(
-            "{} and {}: readings of about {least:.4} and {most:.4}, {:.0} times as much; expected one sensor in one unit; is \
+            "{} and {}: readings of about {} and {}, {:.0} times as much; expected one sensor in one unit; is \
              one of them in kilo-ohms? Then put `# resistance_unit = kohm` above its header",
             a.name,
             b.name,
+            plain(least),
+            plain(most),
             most / least
         )));
     }
@@ -98,19 +101,21 @@ fn check_units(recording: &Recording, figures: &Figures) -> Result<(), CliError>
     let percent = *largest > LARGEST_STRAIN || (*largest > 1.0 && *gauge < LEAST_GAUGE);
     if is_strain && trace.metadata.strain_unit.is_none() && percent {
         return Err(CliError::Input(format!(
-            "{}: expected the reference as a fraction of the length, found strains of up to {largest:.4}, over which the \
+            "{}: expected the reference as a fraction of the length, found strains of up to {}, over which the \
              readings change by {gauge:.3} of their median per strain; if they are in percent, say so with `--strain-unit \
              percent` or a line `# strain_unit = percent` above the header, if not with `fraction`",
-            recording.header
+            recording.header,
+            plain(*largest)
         )));
     }
     let is_ohm = trace.readings.kind == ReadingKind::Ohm && trace.readings.converter.is_none();
     if is_ohm && trace.metadata.resistance_unit.is_none() && *median_reading < LEAST_OHM {
         return Err(CliError::Input(format!(
-            "{}: column `resistance_ohm`: expected ohms, found readings of about {median_reading:.4}; if they are in \
+            "{}: column `resistance_ohm`: expected ohms, found readings of about {}; if they are in \
              kilo-ohms, say so with `--resistance-unit kohm` or a line `# resistance_unit = kohm` above the header, if not \
              with `ohm`",
-            recording.header
+            recording.header,
+            plain(*median_reading)
         )));
     }
     Ok(())
@@ -134,8 +139,10 @@ pub fn warn_of_rests(recordings: &[Recording], params: &SensorParams) {
     let (Some((a, least)), Some((b, most))) = (least, most) else { return };
     if most > REST_RATIO * least {
         CliError::warning(&format!(
-            "R0 comes out as {least:.5} in {}, as {most:.5} in {}, {:.0} % more: one sensor?",
+            "R0 comes out as {} in {}, as {} in {}, {:.0} % more: one sensor?",
+            significant(least, 5),
             a.name,
+            significant(most, 5),
             b.name,
             100.0 * (most / least - 1.0)
         ));

@@ -1,5 +1,6 @@
 //! What the command line says to doubts about what a sensor is given: which flag, or which line of a file, answers them.
 
+use ohmstrain::number::plain;
 use ohmstrain::{Sensor, UnitDoubt, UnitGuess};
 
 use crate::error::CliError;
@@ -53,7 +54,9 @@ pub fn warn_of_start(start: Option<f64>, sensor: &Sensor) {
     let (lower, upper) = (limits.lower, limits.upper);
     if !(lower..=upper).contains(&start) {
         CliError::warning(&format!(
-            "--initial-strain: {start} is outside of the sensor's limits, {lower:.4} to {upper:.4}; what is reported stops there"
+            "--initial-strain: {start} is outside of the sensor's limits, {} to {}; what is reported stops there",
+            plain(lower),
+            plain(upper)
         ));
     }
 }

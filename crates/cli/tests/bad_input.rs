@@ -346,7 +346,7 @@ fn an_argument_that_cannot_be_is_named() {
         (&filter, &["--known", "3"], "'3' for '--known"),
         (&filter, &["--known", "3:0.1:0"], "'3:0.1:0' for '--known"),
         (&filter, &["--rest-resistance", "0"], "'0' for '--rest-resistance"),
-        (&filter, &["--rest-resistance=-5"], "'-5' for '--rest-resistance"),
+        (&filter, &["--rest-resistance", "-5"], "'-5' for '--rest-resistance"),
         (&filter, &["--rest-resistance", "first:0"], "'first:0' for '--rest-resistance"),
         (&filter, &["--rest-resistance", "last:5"], "'last:5' for '--rest-resistance"),
         (&filter, &["--front-end", "bridge"], "'bridge' for '--front-end"),

@@ -59,6 +59,8 @@ fn one_bad_row_is_named_and_changes_nothing() {
         assert!(run.stdout.lines().next().unwrap().starts_with(&named), "{}", run.stdout);
         let warning = run.warnings.first().unwrap();
         assert!(run.warnings.len() == 1 && warning.contains(&named) && warning.contains(what), "{:?}", run.warnings);
+        // Numbers as they were recorded, without zeros behind them.
+        assert!(!warning.contains("000 "), "{warning}");
         let error = error_on_the_rest(&bench);
         bench.write("missing.csv", spiked(&bench, row, column, f64::NAN));
         calibrate(&bench, "missing.csv", &[]).ok();

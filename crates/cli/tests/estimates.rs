@@ -250,7 +250,7 @@ fn a_strain_that_is_known_is_taken_in() {
         assert!(late.warnings.iter().any(|warning| warning.contains(warned)), "{:?}", late.warnings);
     }
     let far = bench.run(&["filter", "trace.csv", "--sensor", "sensor.toml", "--known", "3:12"]);
-    far.fails(2, "--known: expected 0.0000 to 0.3333, the limits of the sensor's strain, found 12; 10 % is 0.1");
+    far.fails(2, "--known: expected 0 to 0.3333, the limits of the sensor's strain, found 12; 10 % is 0.1");
 }
 
 #[test]

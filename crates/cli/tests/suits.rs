@@ -136,7 +136,7 @@ fn a_strain_to_start_at_lies_within_the_limits() {
     for command in ["filter", "smooth"] {
         for far in ["10", "-0.1"] {
             let start = format!(
-                "--initial-strain: expected 0.0000 to 0.3333, the limits of the sensor's strain, found {far}; 10 % is 0.1\n"
+                "--initial-strain: expected 0 to 0.3333, the limits of the sensor's strain, found {far}; 10 % is 0.1\n"
             );
             asks(&bench, &[command, "trace.csv", "--initial-strain", far], 2, &start, "");
         }

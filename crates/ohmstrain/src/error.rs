@@ -5,6 +5,7 @@ use ohmstrain_ekf::StepError;
 use ohmstrain_model::ParameterError;
 use thiserror::Error;
 
+use crate::number::plain;
 use crate::{ReferenceDoubt, UnitDoubt};
 
 /// Why there is no sensor, no filter or no estimate.
@@ -32,7 +33,7 @@ pub enum Error {
     #[error("the sensor's joint: {0}")]
     Joint(ParameterError),
     /// A strain to start at, or that is known later, that the sensor never reports.
-    #[error("{name}: expected {lower:.4} to {upper:.4}, the limits of the sensor's {}, found {found}", quantity.name())]
+    #[error("{name}: expected {} to {}, the limits of the sensor's {}, found {found}", plain(*lower), plain(*upper), quantity.name())]
     KnownStrain {
         /// What it is.
         name: &'static str,

@@ -4,6 +4,7 @@ use std::ops::RangeInclusive;
 use ohmstrain_calib::Quantity;
 
 use crate::Sensor;
+use crate::number::plain;
 use crate::unit_doubt::quantile;
 
 /// References whose 95th percentile is this many times the largest strain of the calibration are a hundred times too large.
@@ -35,9 +36,10 @@ impl fmt::Display for ReferenceDoubt {
     fn fmt(&self, out: &mut fmt::Formatter) -> fmt::Result {
         let Self { expected, found, is_of_calibration } = self;
         let question = if *is_of_calibration { "was the calibration in percent?" } else { "are they in percent?" };
+        let (expected, found) = (plain(*expected), plain(*found));
         write!(
             out,
-            "column `strain`: expected strains of up to {expected:.4}, as in the calibration, found {found:.4}: {question}"
+            "column `strain`: expected strains of up to {expected}, as in the calibration, found {found}: {question}"
         )
     }
 }

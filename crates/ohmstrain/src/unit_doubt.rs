@@ -2,6 +2,8 @@ use std::fmt;
 
 use ohmstrain_calib::{ReadingUnit, SensorParams};
 
+use crate::number::significant;
+
 /// Readings may go this far beyond those of the calibration, and in another unit they would not: sensors of one kind differ
 /// by less, units by more.
 const READINGS_BEYOND: f64 = 2.0;
@@ -72,9 +74,10 @@ impl UnitDoubt {
 impl fmt::Display for UnitDoubt {
     fn fmt(&self, out: &mut fmt::Formatter) -> fmt::Result {
         let Self { column, expected: (low, high), median, guess, .. } = self;
-        write!(out, "column `{column}`: expected readings of {low:.5} to {high:.5}, as in the calibration")?;
-        self.rest_reading.map_or(Ok(()), |rest| write!(out, " with R0 = {rest:.5}"))?;
-        write!(out, ", found {median:.5} at the median, {guess}")
+        let (low, high, median) = (significant(*low, 5), significant(*high, 5), significant(*median, 5));
+        write!(out, "column `{column}`: expected readings of {low} to {high}, as in the calibration")?;
+        self.rest_reading.map_or(Ok(()), |rest| write!(out, " with R0 = {}", significant(rest, 5)))?;
+        write!(out, ", found {median} at the median, {guess}")
     }
 }
 

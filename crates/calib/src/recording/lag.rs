@@ -35,6 +35,9 @@ const RIDGE: f64 = 0.01;
 /// of three materials, show gains of up to 1.9, for lags of seconds where one part of a sine looks like another; moved by
 /// 2 s, gains of 1.9 to 135, mostly above 3.
 const SURE: f64 = 2.5;
+/// What a law with a ridge leaves of the readings' mean square even if it is the sensor's: less is as good. Half a period late one
+/// part of a sine is explained by another, and no worse. Public recordings leave 0.006 and more.
+const EXPLAINED: f64 = 1e-3;
 /// Dash-pots: the two columns between gauge and branches.
 const DASH_POTS: usize = 2;
 /// Coefficients of the polynomial gauge.
@@ -47,7 +50,7 @@ pub struct Lag {
     pub lag_s: f64,
     /// Mean duration of a movement in one direction, s.
     pub movement_s: f64,
-    /// Squared error of the law on blocks left out without the lag, over that with it.
+    /// Squared error of the law on blocks left out without the lag, over that with it, or over what is no error.
     pub gain: f64,
 }
 
@@ -74,7 +77,7 @@ pub fn lag_out_of_reach(samples: &Samples) -> Option<f64> {
     let far = far(samples)?;
     let errors = errors(samples, far)?;
     let least = errors.iter().copied().fold(f64::INFINITY, f64::min);
-    let is_sure = *errors.get(far.steps as usize)? >= SURE * least;
+    let is_sure = *errors.get(far.steps as usize)? >= SURE * least.max(EXPLAINED);
     let is_least = |error: Option<&f64>| is_sure && error == Some(&least);
     match (is_least(errors.first()), is_least(errors.last())) {
         (true, false) => Some(-far.reach_s),
@@ -94,7 +97,7 @@ fn examined(samples: &Samples, around_s: f64, farthest_s: f64) -> Option<Lag> {
     let search = Search { around_s, reach_s: NEAR.reach_s.min(farthest_s), ..NEAR };
     let (lag_s, least) = best_lag(samples, search)?;
     let now = left_out_error(samples, 0.0, search)?;
-    Some(Lag { lag_s, movement_s: MotionStats::new(&[*samples]).move_s, gain: now / least })
+    Some(Lag { lag_s, movement_s: MotionStats::new(&[*samples]).move_s, gain: now / least.max(EXPLAINED) })
 }
 
 impl Lag {
@@ -132,7 +135,7 @@ fn best_lag(samples: &Samples, search: Search) -> Option<(f64, f64)> {
     let least = errors.iter().copied().fold(f64::INFINITY, f64::min);
     let is_valley =
         |i: usize| i > 0 && i + 1 < errors.len() && errors[i] <= errors[i - 1] && errors[i] <= errors[i + 1];
-    let good = (0..errors.len()).filter(|&i| errors[i] <= AS_GOOD * least);
+    let good = (0..errors.len()).filter(|&i| errors[i] <= AS_GOOD * least.max(EXPLAINED));
     let best = good.filter(|&i| is_valley(i) || errors[i] == least).min_by(|a, b| {
         let size = |i: usize| (search.around_s + offset_s(i)).abs();
         size(*a).total_cmp(&size(*b))
@@ -161,7 +164,8 @@ impl Search {
     }
 }
 
-/// Mean squared error of the law behind the high-pass, on blocks left out, if the reference is read `lag_s` later.
+/// Squared error of the law, on blocks left out, as a share of the readings' mean square, both behind the high-pass, if the reference
+/// is read `lag_s` later.
 fn left_out_error(samples: &Samples, lag_s: f64, search: Search) -> Option<f64> {
     let strain = aligned(samples, lag_s);
     // Every lag is judged by the same rows: those that have a reference within reach on both sides.
@@ -186,7 +190,9 @@ fn left_out_error(samples: &Samples, lag_s: f64, search: Search) -> Option<f64> 
     let response = regression.response(&rest_readings);
     // As long as the lags reach from one side to the other.
     let high_pass = |column: &DVector<f64>| high_pass(&times, column, 2.0 * search.reach_s);
-    design.offset = &response - high_pass(&response);
+    let changes = high_pass(&response);
+    let mean_square = changes.norm_squared() / changes.len() as f64;
+    design.offset = &response - changes;
     // The constant stays: it is the regression's own.
     for column in design.columns.iter_mut().skip(1) {
         *column = high_pass(column);
@@ -194,7 +200,7 @@ fn left_out_error(samples: &Samples, lag_s: f64, search: Search) -> Option<f64> 
     let normal = regression.normal(&design, &rest_readings);
     let branches = 1 + GAUGE + DASH_POTS;
     let columns: Vec<usize> = (0..=GAUGE).chain(branches..branches + structure.taus * BRANCH_COLUMNS).collect();
-    normal.cross_validate(&columns, RIDGE)
+    Some(normal.cross_validate(&columns, RIDGE)? / mean_square)
 }
 
 /// What of a column is faster than `tau_s`.

@@ -44,11 +44,20 @@ pub enum Doubt {
     },
 }
 
+/// Seven significant digits: what a conversion of units adds to a number is not shown.
+fn short(value: &f64) -> f64 {
+    format!("{value:.6e}").parse().unwrap_or(*value)
+}
+
 impl fmt::Display for Doubt {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
-            Self::Reading { found, around } => write!(f, "reading {found:.6} among readings of {around:.6}"),
-            Self::Reference { found, around } => write!(f, "reference {found:.6} among references of {around:.6}"),
+            Self::Reading { found, around } => {
+                write!(f, "reading {} among readings of {}", short(found), short(around))
+            }
+            Self::Reference { found, around } => {
+                write!(f, "reference {} among references of {}", short(found), short(around))
+            }
             Self::Law { deviations } => {
                 write!(
                     f,

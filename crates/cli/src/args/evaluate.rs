@@ -31,7 +31,7 @@ pub struct EvaluateArgs {
     /// What the rested, unstretched sensor reads: a number in the readings' unit, first:N for the median of each recording's
     /// first N readings, or calibrated; what the estimates are compared with has its readings scaled alike. Without this flag
     /// R₀ follows the readings, as in filter
-    #[arg(long, value_name = "OHM|first:N|calibrated")]
+    #[arg(long, value_name = "OHM|first:N|calibrated", allow_negative_numbers = true)]
     pub rest_resistance: Option<RestResistance>,
     /// Exit with code 3 unless every recording is estimated better than by the static cubic and its 95 % interval covers
     /// 80 % or more

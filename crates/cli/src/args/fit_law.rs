@@ -29,7 +29,7 @@ pub struct FitLawArgs {
     #[arg(long)]
     pub pool: bool,
     /// Resistance at rest for eq2: a number in the readings' unit, or first:N for the median of the first N readings
-    #[arg(long, value_name = "OHM|first:N", default_value = "first:20")]
+    #[arg(long, value_name = "OHM|first:N", default_value = "first:20", allow_negative_numbers = true)]
     pub rest_resistance: RestResistance,
     /// Fit several laws of one phase to the same segments and rank them by AICc and BIC: eq1,eq2,kww,prony:3
     #[arg(long, value_name = "LAWS", value_delimiter = ',', conflicts_with_all = ["law", "table", "figures"])]

@@ -36,7 +36,7 @@ pub struct RefineArgs {
     pub parameters: Vec<Moved>,
     /// Resistance at rest instead of the sensor file's: a number in the readings' unit, or first:N for the median of
     /// the recording's first N readings; it is not written
-    #[arg(long, value_name = "OHM|first:N")]
+    #[arg(long, value_name = "OHM|first:N", allow_negative_numbers = true)]
     pub rest_resistance: Option<RestResistance>,
     /// Overrides of the recording's metadata
     #[command(flatten)]

@@ -1,11 +1,16 @@
 use comfy_table::Table;
-use ohmstrain_calib::{LawParams, Samples, StructureScore, bootstrap_law, compare_structures, identifiability, screen};
+use ohmstrain_calib::{
+    CalibrationError, LawParams, Samples, StructureScore, bootstrap_law, compare_structures, identifiability, screen,
+};
 
 use crate::args::CalibrateArgs;
 use crate::error::CliError;
 use crate::input::Recording;
 use crate::output;
 use crate::plausible;
+
+const NOT_TOLD: &str =
+    "parameters without the ridge: not told; without it the equations of the law are singular on these recordings\n";
 
 /// What `calibrate --explain` and `--bootstrap` print.
 pub fn text(args: &CalibrateArgs, recordings: &[Recording], law: &LawParams) -> Result<String, CliError> {
@@ -19,9 +24,14 @@ pub fn text(args: &CalibrateArgs, recordings: &[Recording], law: &LawParams) -> 
         for row in plausible::distrusted(recordings, &screened.distrusted) {
             text += &(row + "\n");
         }
-        let found = identifiability(&samples, law).map_err(failed)?;
+        let found = match identifiability(&samples, law) {
+            Ok(found) => found.to_string(),
+            // A law that only its ridge holds up is an answer.
+            Err(CalibrationError::Singular) => NOT_TOLD.to_owned(),
+            Err(error) => return Err(failed(error)),
+        };
         let structures = structures(&compare_structures(&samples).map_err(failed)?);
-        text += &format!("{}\n{structures}\n", output::wrapped(&found.to_string()));
+        text += &format!("{}\n{structures}\n", output::wrapped(&found));
     }
     if let Some(replicates) = args.bootstrap {
         let found = bootstrap_law(&samples, law, replicates as usize, args.seed).map_err(failed)?;
