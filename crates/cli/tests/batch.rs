@@ -90,6 +90,41 @@ fn what_is_done_is_done_once() {
     assert_eq!((last.matches("done").count(), last.matches("kept").count()), (1, 2), "{last}");
 }
 
+/// One mistyped name is one message.
+#[test]
+fn a_sensor_that_is_none_is_said_once() {
+    let bench = folder();
+    bench.write("old.toml", "format = 1\n");
+    for (sensor, why) in [("mistyped.toml", "cannot read mistyped.toml"), ("old.toml", "old.toml:1: field `format`")] {
+        let run = bench.run(&["-q", "batch", "smooth", "in/a.csv", "in/b.csv", "--sensor", sensor, "-o", "out"]);
+        let single = bench.run(&["-q", "smooth", "in/a.csv", "--sensor", sensor]);
+        assert_eq!((run.code, &run.stderr), (single.code, &single.stderr));
+        assert!(run.stderr.contains(why) && run.stderr.lines().count() == 1, "{}", run.stderr);
+        assert!(!bench.path("out").exists());
+    }
+}
+
+#[test]
+fn a_folder_is_pointed_to_a_pattern() {
+    let bench = folder();
+    let run = bench.run(&["batch", "smooth", "in/", "--sensor", "sensor.toml", "-o", "out"]);
+    run.fails(2, "in is a folder: --glob 'in/**/*.csv' takes the recordings in it");
+    assert!(!bench.path("out").exists());
+}
+
+#[test]
+fn what_is_left_of_an_earlier_run_is_said_to_be() {
+    let bench = folder();
+    bench.run(&SMOOTH).ok();
+    let before = bench.read("out/b.csv");
+    bench.write("in/b.csv", "time_s,resistance_ohm\n0,1600\n1,oops\n");
+    let run = bench.run(&[&SMOOTH[..], &["--summary", "json"]].concat());
+    assert_eq!(run.code, Some(5), "{}", run.stderr);
+    assert_eq!(bench.read("out/b.csv"), before);
+    assert!(run.stderr.contains("b.csv is from before this run"), "{}", run.stderr);
+    assert!(summary(&bench)[1]["message"].as_str().unwrap().ends_with("b.csv is from before this run"));
+}
+
 #[test]
 fn inputs_and_other_peoples_files_stay() {
     let bench = folder();

@@ -26,6 +26,7 @@ use crate::verbosity::Verbosity;
 /// Does all recordings that are not done yet, and sums up.
 pub fn run(args: &BatchArgs) -> Result<(), CliError> {
     let jobs = plan::jobs(args)?;
+    plan::check_sensor(&jobs, args)?;
     fs::create_dir_all(&args.output).map_err(|error| CliError::file("make the folder", &args.output, &error))?;
     let journal = Journal::open(&args.output)?;
     plan::check_outputs(&jobs, args, &journal)?;
@@ -87,11 +88,15 @@ impl Work<'_> {
         {
             return Ok(Entry { state: State::Kept, ..done });
         }
-        let entry = match started {
+        let mut entry = match started {
             Ok(started) => started.finish(self.journal)?,
             Err(entry) => *entry,
         };
         if entry.state == State::Failed {
+            let output = self.args.output.join(&entry.output);
+            if entry.output_sha256.is_none() && output.exists() {
+                entry.message = format!("{}; {} is from before this run", entry.message, output.display());
+            }
             self.progress.around(|| CliError::error(&entry.message));
         }
         Ok(entry)

@@ -8,6 +8,7 @@ use csv::{Reader, StringRecord};
 use super::journal::Journal;
 use crate::args::{Args, BatchArgs, BatchCommand, Command};
 use crate::error::CliError;
+use crate::sensor_file;
 
 /// Recordings that are done together, and what comes of them.
 #[derive(Clone, Debug, Default)]
@@ -59,6 +60,12 @@ pub fn jobs(args: &BatchArgs) -> Result<Vec<Job>, CliError> {
     let sensor = args.sensor.clone().filter(|_| args.command != BatchCommand::Calibrate);
     let plain =
         |file: PathBuf| Job { files: vec![file], sensor: sensor.clone(), flags: args.flags.clone(), ..Job::default() };
+    if let Some(folder) = args.files.iter().find(|file| file.is_dir()) {
+        let folder = folder.components().as_path().display();
+        return Err(CliError::Arguments(format!(
+            "{folder} is a folder: --glob '{folder}/**/*.csv' takes the recordings in it"
+        )));
+    }
     let mut jobs: Vec<Job> = args.files.iter().cloned().map(plain).collect();
     for pattern in &args.glob {
         jobs.extend(matching(pattern)?.into_iter().map(plain));
@@ -195,6 +202,15 @@ fn check_arguments(job: &mut Job, args: &BatchArgs) -> Result<(), CliError> {
             Err(CliError::Arguments("batch names the outputs itself, or as the manifest's `output` says".into()))
         }
     }
+}
+
+/// A sensor that recordings share is said to be none before anything is done, and once. With an estimator among the flags it may
+/// be one for that alone: those recordings' own processes say so.
+pub fn check_sensor(jobs: &[Job], args: &BatchArgs) -> Result<(), CliError> {
+    let plain = |job: &&Job| !job.flags.iter().any(|flag| flag.starts_with("--estimator"));
+    let mut shared = jobs.iter().filter(plain).filter_map(|job| job.sensor.as_ref());
+    let shared = shared.find(|sensor| args.sensor.as_ref() == Some(*sensor));
+    shared.map_or(Ok(()), |sensor| sensor_file::read(sensor, None).map(|_| ()))
 }
 
 /// Refuses outputs that would replace each other, an input, or what no earlier run wrote.
