@@ -193,6 +193,48 @@ fn two_sensors_with_prefixes_live_in_one_program() {
     }
 }
 
+/// Who promised what stands in the header, and the compiler's flags that would break it are refused.
+#[test]
+fn a_promise_is_of_the_default() {
+    let bench = every_filter();
+    let export = ["export", "--sensor", "corrected.toml", "--dt-s", DT_S, "--target", "c", "--force", "-o", "out"];
+    for (more, promised) in [
+        (&[][..], "| promised: left out "),
+        (&["--estimator", "corrected"], "| promised: left out "),
+        (&["--estimator", "ekf"], "| promised of the default: left out "),
+        (&["--estimator", "sign-split"], "| promised of the default: left out "),
+        (&["--budget", "lean"], "| promised of the default: left out "),
+    ] {
+        let printed = bench.run(&[&export[..], more].concat()).ok();
+        let line = printed.lines().find(|line| line.starts_with(promised)).unwrap_or_else(|| panic!("{printed}"));
+        assert!(line.contains("| -/-/"), "{line}");
+        assert!(bench.read("out/src/ohmstrain.h").contains(&format!(" * {line}\n")));
+    }
+    for compiler in compilers() {
+        for flag in ["-ffast-math", "-ffinite-math-only"] {
+            let compile = [flag, "-std=c99", "-fsyntax-only", "src/ohmstrain.c"];
+            let compiled = Command::new(compiler).current_dir(bench.path("out")).args(compile).output().unwrap();
+            let said = String::from_utf8_lossy(&compiled.stderr);
+            assert!(!compiled.status.success() && said.contains("not finite"), "{compiler}, {flag}: {said}");
+        }
+    }
+}
+
+/// A byte order mark, and spaces around cells.
+#[test]
+fn a_recording_is_replayed_as_spreadsheets_write_it() {
+    let bench = every_filter();
+    scored_export(&bench, "ekf");
+    let plain = "time_s,resistance_ohm\n0.0,1600\n0.2,\n0.4,1610\n";
+    let spaced = "\u{feff}time_s , resistance_ohm \r\n0.0, 1600\r\n0.2 , \r\n0.4,\t1610\r\n";
+    for compiler in compilers() {
+        let sources = ["src/ohmstrain.c", "selftest/replay.c"];
+        let replay = |text: &str| compile_and_run(compiler, &bench.path("ekf"), &sources, text);
+        assert_eq!(replay(spaced), replay(plain));
+        assert_eq!(replay(plain).lines().count(), 4);
+    }
+}
+
 /// A recording that pulls the plug: zero, an open circuit, an overload, a number that comes again.
 #[test]
 fn no_reading_stops_what_was_exported() {

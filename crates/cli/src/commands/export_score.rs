@@ -92,8 +92,10 @@ impl Promise {
         let mut table = output::table(["estimate", "%FS", "50/90/95 %"]);
         let mut worse_on = None;
         if let Some(summary) = &params.summary {
-            let coverage = format!("{:.0}", summary.coverage_95_percent);
-            table.add_row(["promised: left out".into(), format!("{:.2}", summary.left_out_percent_fs), coverage]);
+            let is_default = plan.kind.is_none_or(|kind| kind == params.default_estimator) && !chip.is_smaller();
+            let promised = if is_default { "promised: left out" } else { "promised of the default: left out" };
+            let coverage = format!("-/-/{:.0}", summary.coverage_95_percent);
+            table.add_row([promised.into(), format!("{:.2}", summary.left_out_percent_fs), coverage]);
             let cubic = format!("{:.2}", summary.static_cubic_percent_fs);
             table.add_row(["static cubic: left out".into(), cubic, String::new()]);
         }

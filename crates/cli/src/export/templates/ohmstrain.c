@@ -17,8 +17,8 @@
 #pragma STDC FP_CONTRACT OFF
 #endif
 
-#ifdef __FAST_MATH__
-#error "-ffast-math removes the checks for numbers that are not finite"
+#if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__)
+#error "-ffast-math and -ffinite-math-only remove the checks for numbers that are not finite"
 #endif
 
 #ifdef __AVR__
