@@ -60,29 +60,31 @@ fn about_time_constant(
     let (tau, hold_s) = (number(tau_s), stats.longest_hold_s);
     if bound == Some(Bound::Lower) {
         return Some(format!(
-            "{name} ends on its lower bound, {tau} s, the pace of the motion: a branch so fast cannot be told from the \
-             dash-pot; move faster, sample faster, or fit one branch fewer"
+            "{name} = {tau} s, its lower bound, is too fast to tell from the dash-pot: move or sample faster, or fit a \
+             branch fewer"
         ));
     }
-    let unsure = bound.is_some() || !(error_s < LEAST_SURE * tau_s);
-    if !unsure {
+    if bound == Some(Bound::Upper) {
+        let hold = match hold_s {
+            _ if hold_s <= 0.0 => format!("; hold for {tau} s or more"),
+            _ if hold_s < tau_s => format!("; hold {} s longer than {} s", number(tau_s - hold_s), number(hold_s)),
+            _ => String::new(),
+        };
+        let longest = number(stats.longest_s);
+        return Some(format!(
+            "{name} = {tau} s, its upper bound, a quarter of the longest recording: record more than {longest} s{hold}"
+        ));
+    }
+    if error_s < LEAST_SURE * tau_s {
         return None;
     }
-    let what_else = if bound.is_some() {
-        format!(
-            "; it ends on its upper bound, a quarter of the longest recording: record more than {} s",
-            number(stats.longest_s)
-        )
-    } else {
-        String::new()
-    };
     Some(if hold_s <= 0.0 {
-        format!("{name} = {tau} s is not identifiable from motion without a hold: hold for {tau} s or more{what_else}")
+        format!("{name} = {tau} s cannot be told without a hold: hold for {tau} s or more")
     } else if hold_s < tau_s {
         let (hold, more) = (number(hold_s), number(tau_s - hold_s));
-        format!("{name} = {tau} s is not identifiable from holds of at most {hold} s: hold {more} s longer{what_else}")
+        format!("{name} = {tau} s cannot be told by holds of at most {hold} s: hold {more} s longer")
     } else {
-        format!("{name} = {tau} s is not identifiable although holds are long enough: record more of them{what_else}")
+        format!("{name} = {tau} s is uncertain although holds are long enough: record more of them")
     })
 }
 
@@ -134,5 +136,36 @@ fn number(x: f64) -> String {
         format!("{x:.1}")
     } else {
         format!("{x:.3}")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// With a count of what else there is, it takes two of the ten lines that end a calibration: twice 87 columns, without the
+    /// count and a word that may not fit.
+    #[test]
+    fn advice_is_short() {
+        let stats = |longest_hold_s| MotionStats {
+            strain_mean: 0.1,
+            strain_sd: 0.1,
+            rate_sd: 0.1,
+            rate_time_s: 1.0,
+            hold_s: None,
+            move_s: 1.0,
+            reversal: 1.0,
+            speed: 0.1,
+            quartile_speeds: (0.1, 0.1),
+            longest_hold_s,
+            fastest_rate: 0.1,
+            longest_s: 12_345.0,
+        };
+        for hold_s in [0.0, 0.123, 5000.0] {
+            for bound in [None, Some(Bound::Lower), Some(Bound::Upper)] {
+                let advice = about_time_constant("branches[0].tau_s", 3086.4, 4000.0, bound, &stats(hold_s)).unwrap();
+                assert!(advice.chars().count() <= 140, "{advice}");
+            }
+        }
     }
 }
