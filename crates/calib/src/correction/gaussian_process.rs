@@ -86,34 +86,15 @@ impl Lessons<'_> {
 
     /// Automatic relevance determination (Neal, *Bayesian Learning for Neural Networks*, 1996): inputs that tell little get long
     /// length scales. Coordinates in turn, since a step of one is all that a few hundred rows can tell.
-    fn with_relevance(self, mut cost: f64, mut params: ProcessParams) -> ProcessParams {
-        let Some(&alike) = params.lengths.first() else { return params };
-        let prior = |length: f64| 0.5 * ((length / alike).ln() / SPREAD.ln()).powi(2);
-        let mut sums = self.half_squares(&params.lengths);
-        for input in (1..params.lengths.len()).cycle().take(TURNS * (params.lengths.len() - 1)) {
-            for factor in [1.0 / STRETCH, STRETCH] {
-                let before = cost;
-                loop {
-                    let (now, trial) = (params.lengths[input], factor * params.lengths[input]);
-                    if !(LEAST_STRETCH * alike..=MOST_STRETCH * alike).contains(&trial) {
-                        break;
-                    }
-                    let stretched = self.stretched(&sums, input, now, trial);
-                    let Some(evidence) = self.cost(&stretched, &params) else { break };
-                    let priors: f64 = params.lengths.iter().map(|length| prior(*length)).sum();
-                    let found = evidence + priors + prior(trial) - prior(now);
-                    if found >= cost {
-                        break;
-                    }
-                    (cost, sums) = (found, stretched);
-                    params.lengths[input] = trial;
-                }
-                if cost < before {
-                    break;
-                }
-            }
+    fn with_relevance(self, cost: f64, params: ProcessParams) -> ProcessParams {
+        let inputs = params.lengths.len();
+        let mut search = RelevanceSearch { lessons: self, sums: self.half_squares(&params.lengths), params, cost };
+        for input in (1..inputs).cycle().take(TURNS * (inputs - 1)) {
+            // Shorter for as long as it pays; if it does not at all, longer.
+            let shorter = (0..).take_while(|_| search.step(input, 1.0 / STRETCH)).count();
+            while shorter == 0 && search.step(input, STRETCH) {}
         }
-        params
+        search.params
     }
 
     /// The negative logarithm of the marginal likelihood, up to a constant.
@@ -137,6 +118,39 @@ impl Lessons<'_> {
         let change = relevance(to) - relevance(from);
         let apart = |i: usize, j: usize| self.inputs[i][input] - self.inputs[j][input];
         symmetric(self.inputs.len(), |i, j| sums[(i, j)] + change * apart(i, j).powi(2))
+    }
+}
+
+/// Settings on the way to better ones.
+struct RelevanceSearch<'a> {
+    lessons: Lessons<'a>,
+    params: ProcessParams,
+    /// `Σ (xᵢ - xᵢ')²/2ℓᵢ²` for all pairs of rows.
+    sums: DMatrix<f64>,
+    /// Negative logarithm of marginal likelihood and prior.
+    cost: f64,
+}
+
+impl RelevanceSearch<'_> {
+    /// Multiplies the length scale of an input, if that is better.
+    fn step(&mut self, input: usize, factor: f64) -> bool {
+        let (now, alike) = (self.params.lengths[input], self.params.lengths[0]);
+        let trial = factor * now;
+        if !(LEAST_STRETCH * alike..=MOST_STRETCH * alike).contains(&trial) {
+            return false;
+        }
+        let sums = self.lessons.stretched(&self.sums, input, now, trial);
+        self.params.lengths[input] = trial;
+        let prior = |length: &f64| 0.5 * ((length / alike).ln() / SPREAD.ln()).powi(2);
+        let priors: f64 = self.params.lengths.iter().map(prior).sum();
+        let cost = self.lessons.cost(&sums, &self.params).map_or(f64::INFINITY, |cost| cost + priors);
+        let is_better = cost < self.cost;
+        if is_better {
+            (self.cost, self.sums) = (cost, sums);
+        } else {
+            self.params.lengths[input] = now;
+        }
+        is_better
     }
 }
 
