@@ -13,6 +13,7 @@ mod baselines;
 mod calibrate;
 pub mod closed_form;
 mod correction;
+mod digits;
 mod error;
 mod filter;
 mod law;

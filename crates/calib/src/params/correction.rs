@@ -1,6 +1,7 @@
 use ohmstrain_ekf::correction::{FEATURES, FeatureScale, OUTPUTS, Starts, settled};
 use serde::{Deserialize, Serialize};
 
+use crate::digits::significant;
 use crate::params::estimator::EstimatorKind;
 
 /// Pause between recordings, s: noise that lasts for seconds is not shared by them.
@@ -155,5 +156,5 @@ impl TrainingRow {
 }
 
 pub(crate) fn digits(value: f64) -> f64 {
-    format!("{value:.*e}", DIGITS - 1).parse().unwrap_or(value)
+    significant(value, DIGITS)
 }

@@ -1,6 +1,7 @@
 use std::fmt;
 
 use crate::CalibrationError;
+use crate::digits::significant;
 use crate::law::regression::LawRegression;
 use crate::law::robust_loss;
 use crate::order::{median, sorted};
@@ -44,13 +45,12 @@ pub enum Doubt {
     },
 }
 
-/// Seven significant digits: what a conversion of units adds to a number is not shown.
-fn short(value: &f64) -> f64 {
-    format!("{value:.6e}").parse().unwrap_or(*value)
-}
+/// Digits of a number that is named: what a conversion of units adds to it is not shown.
+const DIGITS: usize = 7;
 
 impl fmt::Display for Doubt {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let short = |value: &f64| significant(*value, DIGITS);
         match self {
             Self::Reading { found, around } => {
                 write!(f, "reading {} among readings of {}", short(found), short(around))
