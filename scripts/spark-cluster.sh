@@ -8,12 +8,12 @@
 # As root it says the processor time of all processes, too.
 #
 # Wants Java, a Python with the ohmstrain wheel, pyspark and ray (PYTHON; default: `scripts/python.sh --engines` makes one and
-# installs Java), and the program (OHMSTRAIN; default: built by cargo).
+# installs Java), and the program (OHMSTRAIN; default: built by cargo). ENGINES, `spark ray` by default, says which.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 scaling=
 if [[ ${1:-} == --scaling ]]; then scaling=yes; shift; fi
-readonly recordings=${1:-200} after_files=${2:-8} estimator=${3:-auto} rows=${4:-1000}
+readonly recordings=${1:-200} after_files=${2:-8} estimator=${3:-auto} rows=${4:-1000} engines=" ${ENGINES:-spark ray} "
 readonly fleet=crates/python/examples/fleet.py
 work=$(mktemp -d)
 started=()
@@ -50,16 +50,19 @@ service() {
     "$SPARK_HOME/bin/spark-class" "org.apache.spark.deploy.$1" --host 127.0.0.1 "${@:2}" >"$work/$1-${#started[@]}.log" 2>&1 &
     started+=("$!")
 }
-service master.Master --port "$port" --webui-port 0
-service worker.Worker --cores 1 --memory 1g --webui-port 0 "$url"
-service worker.Worker --cores 1 --memory 1g --webui-port 0 "$url"
-for _ in $(seq 60); do
-    [[ $(cat "$work"/worker.Worker-*.log | grep -c 'Successfully registered') -eq 2 ]] && break
-    sleep 1
-done
+if [[ $engines = *" spark "* ]]; then
+    service master.Master --port "$port" --webui-port 0
+    service worker.Worker --cores 1 --memory 1g --webui-port 0 "$url"
+    service worker.Worker --cores 1 --memory 1g --webui-port 0 "$url"
+    for _ in $(seq 60); do
+        [[ $(cat "$work"/worker.Worker-*.log | grep -c 'Successfully registered') -eq 2 ]] && break
+        sleep 1
+    done
+fi
 
 # run ENGINE FLAG...: with what it says only where it fails.
 run() {
+    [[ " plain$engines" = *" $1 "* ]] || return 0
     "$python" $fleet run "$work/fleet" "$1" --estimator "$estimator" "${@:2}" 2>"$work/$1.log" || { cat "$work/$1.log" >&2; exit 1; }
     [[ $1 = plain ]] && return
     "$python" $fleet check "$work/fleet" "$1"
@@ -74,7 +77,7 @@ if [[ -n $scaling ]]; then
     done
     exit
 fi
-run plain
+run plain --checked-only
 run spark --master "$url"
-run spark --master "$url" --kill "${started[2]}" --after-files "$after_files"
+run spark --master "$url" --kill "${started[2]:-}" --after-files "$after_files"
 run ray --kill any --after-files "$after_files"

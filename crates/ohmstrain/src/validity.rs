@@ -179,13 +179,17 @@ impl ValidityWatch {
         let is_fast = lasted_s >= FOUND_S && self.fast.see(rate.abs() > FASTER * fastest_per_s, FAST_BY_CHANCE);
         let is_other = reading.is_finite() && self.beyond_readings.see(!(least..=most).contains(&reading), CHANCE);
         let is_beyond = truth.is_finite() && self.beyond_strains.see(!(lower..=upper).contains(&truth), CHANCE);
-        let said = [
-            (is_long, Beyond::Duration { longest_s }),
-            (is_fast, Beyond::Rate { quantity, fastest_per_s }),
-            (is_other, Beyond::Readings { column, least, most, follows: self.follows }),
-            (is_beyond, Beyond::Strain { quantity, least: lower, most: upper }),
-        ];
-        said.into_iter().filter_map(move |(now, beyond)| now.then_some(Extrapolation { time_s, beyond }))
+        let follows = self.follows;
+        // Mostly there is nothing to say, and nothing is made ready for it.
+        let said = (is_long || is_fast || is_other || is_beyond).then(|| {
+            [
+                (is_long, Beyond::Duration { longest_s }),
+                (is_fast, Beyond::Rate { quantity, fastest_per_s }),
+                (is_other, Beyond::Readings { column, least, most, follows }),
+                (is_beyond, Beyond::Strain { quantity, least: lower, most: upper }),
+            ]
+        });
+        said.into_iter().flatten().filter_map(move |(now, beyond)| now.then_some(Extrapolation { time_s, beyond }))
     }
 }
 

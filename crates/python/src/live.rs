@@ -8,14 +8,20 @@ use pyo3_arrow::PyTable;
 
 use crate::error::of_library;
 use crate::recording::{About, Recording};
+use crate::sensor::{Doubtful, Watch};
 use crate::table::Estimates;
 
 /// A running filter.
 #[pyclass(frozen, module = "ohmstrain._core")]
 pub struct LiveFilter {
-    filter: Mutex<ohmstrain::Filter>,
+    running: Mutex<Running>,
     sensor: ohmstrain::Sensor,
     columns: Vec<Column>,
+}
+
+struct Running {
+    filter: ohmstrain::Filter,
+    watch: Watch,
     /// What the rested sensor reads, if not what it read in calibration.
     rest_resistance: Option<f64>,
 }
@@ -54,7 +60,8 @@ fn row<'py>(py: Python<'py>, columns: &[Column], row: &Estimate) -> PyResult<Bou
 impl LiveFilter {
     pub(crate) fn new(filter: ohmstrain::Filter, sensor: ohmstrain::Sensor, rest_resistance: Option<f64>) -> Self {
         let columns = sensor.columns();
-        Self { filter: Mutex::new(filter), sensor, columns, rest_resistance }
+        let watch = Watch::new(&sensor, rest_resistance);
+        Self { running: Mutex::new(Running { filter, watch, rest_resistance }), sensor, columns }
     }
 }
 
@@ -68,23 +75,32 @@ impl LaggedFilter {
 impl LiveFilter {
     #[pyo3(signature = (time_s, reading=None))]
     fn step<'py>(&self, py: Python<'py>, time_s: f64, reading: Option<f64>) -> PyResult<Bound<'py, PyDict>> {
-        let estimate = locked(&self.filter, py).step(time_s, reading).map_err(refused)?;
+        let estimate = locked(&self.running, py).filter.step(time_s, reading).map_err(refused)?;
         row(py, &self.columns, &estimate)
     }
 
     /// Takes the rows of a table, and goes on from the last one with the next.
-    fn run(&self, py: Python, table: PyTable, about: About) -> PyResult<PyTable> {
+    fn run(&self, py: Python, table: PyTable, about: About) -> PyResult<Doubtful> {
         let recording = Recording::new(table, about)?;
-        recording.check_unit(&self.sensor, self.rest_resistance)?;
+        let mut running = locked(&self.running, py);
+        let Running { filter, watch, rest_resistance } = &mut *running;
+        recording.check_unit(&self.sensor, *rest_resistance)?;
         let mut estimates = Estimates::new(self.columns.clone(), recording.time_s.len());
-        let mut filter = locked(&self.filter, py);
-        let filter = &mut *filter;
-        py.detach(|| recording.filtered(filter, |row, one| estimates.put(row, std::slice::from_ref(one))))?;
-        estimates.into_table()
+        py.detach(|| {
+            recording.filtered(filter, |row, estimate| {
+                estimates.put(row, std::slice::from_ref(estimate));
+                watch.see(&recording, row, estimate.strain_rate);
+            })
+        })?;
+        Ok((estimates.into_batch()?, std::mem::take(&mut watch.warnings)))
     }
 
     fn rest_resistance(&self, py: Python, measured: f64) -> PyResult<()> {
-        locked(&self.filter, py).rest_resistance(measured).map_err(refused)
+        let mut running = locked(&self.running, py);
+        running.filter.rest_resistance(measured).map_err(refused)?;
+        running.rest_resistance = Some(measured);
+        running.watch = Watch::new(&self.sensor, Some(measured));
+        Ok(())
     }
 }
 

@@ -2,7 +2,7 @@ use std::borrow::Cow;
 
 use ohmstrain::{Closing, EstimatorKind, Findings, Quantity, ReadingUnit, ValidityWatch};
 use pyo3::prelude::*;
-use pyo3_arrow::PyTable;
+use pyo3_arrow::{PyRecordBatch, PyTable};
 
 use crate::error::{Place, of_library, raise};
 use crate::evaluation::{self, Scored};
@@ -20,7 +20,7 @@ pub struct Sensor {
 }
 
 /// Estimates and what casts doubt on them.
-type Doubtful = (PyTable, Vec<String>);
+pub type Doubtful = (PyRecordBatch, Vec<String>);
 
 impl Sensor {
     /// On the joint of a recording, if it has one; with its readings checked.
@@ -107,14 +107,14 @@ impl Sensor {
         let mut filter = options.builder(&sensor)?.build().map_err(|error| recording.refused(&error))?;
         let (estimates, warnings) = py.detach(|| {
             let mut estimates = Estimates::new(sensor.columns(), recording.time_s.len());
-            let mut watch = Watch::new(&sensor, &recording, rest);
+            let mut watch = Watch::new(&sensor, rest);
             recording.filtered(&mut filter, |row, estimate| {
                 estimates.put(row, std::slice::from_ref(estimate));
-                watch.see(row, estimate.strain_rate);
+                watch.see(&recording, row, estimate.strain_rate);
             })?;
             Ok::<_, PyErr>((estimates, watch.warnings))
         })?;
-        Ok((estimates.into_table()?, warnings))
+        Ok((estimates.into_batch()?, warnings))
     }
 
     fn smooth(&self, py: Python, table: PyTable, about: About, options: Options) -> PyResult<Doubtful> {
@@ -129,11 +129,11 @@ impl Sensor {
                 estimates.put(rows.start, segment);
                 rates[rows].iter_mut().zip(segment).for_each(|(rate, row)| *rate = row.strain_rate);
             })?;
-            let mut watch = Watch::new(&sensor, &recording, rest);
-            rates.iter().enumerate().for_each(|(row, rate)| watch.see(row, *rate));
+            let mut watch = Watch::new(&sensor, rest);
+            rates.iter().enumerate().for_each(|(row, rate)| watch.see(&recording, row, *rate));
             Ok::<_, PyErr>((estimates, watch.warnings))
         })?;
-        Ok((estimates.into_table()?, warnings))
+        Ok((estimates.into_batch()?, warnings))
     }
 
     fn evaluate(&self, py: Python, table: PyTable, about: About, options: Options, from_s: f64) -> PyResult<Scored> {
@@ -144,21 +144,23 @@ impl Sensor {
 }
 
 /// Says when the calibration does not reach.
-struct Watch<'a> {
+pub struct Watch {
     watch: ValidityWatch,
-    recording: &'a Recording,
-    warnings: Vec<String>,
+    /// What it has said.
+    pub warnings: Vec<String>,
 }
 
-impl<'a> Watch<'a> {
-    fn new(sensor: &ohmstrain::Sensor, recording: &'a Recording, rest_resistance: Option<f64>) -> Self {
-        Self { watch: ValidityWatch::new(sensor, rest_resistance), recording, warnings: Vec::new() }
+impl Watch {
+    /// Of a sensor, and what it reads at rest, if that is said.
+    pub fn new(sensor: &ohmstrain::Sensor, rest_resistance: Option<f64>) -> Self {
+        Self { watch: ValidityWatch::new(sensor, rest_resistance), warnings: Vec::new() }
     }
 
-    fn see(&mut self, row: usize, rate: f64) {
-        let (time_s, reading) = self.recording.row(row);
+    /// Takes a row of a recording with its estimated rate.
+    pub fn see(&mut self, recording: &Recording, row: usize, rate: f64) {
+        let (time_s, reading) = recording.row(row);
+        let name = || recording.name.as_deref().map_or_else(String::new, |name| format!("{name}: "));
         let seen = self.watch.see(time_s, reading.value, rate, f64::NAN);
-        let name = self.recording.name.as_deref().map_or_else(String::new, |name| format!("{name}: "));
-        self.warnings.extend(seen.map(|warning| format!("{name}{warning}")));
+        self.warnings.extend(seen.map(|warning| format!("{}{warning}", name())));
     }
 }

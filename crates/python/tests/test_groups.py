@@ -53,7 +53,7 @@ def test_work(trace, sensor):
     assert "other" not in work.needed(table.columns)
     groups = [pa.Table.from_pandas(group, preserve_index=False) for _, group in table.groupby(list(BY))]
     done = pa.concat_tables([work(group) for group in groups])
-    assert done.schema.names == [*BY, *sensor.columns, "error"]
+    assert done.schema.names == [*BY, *sensor.columns, "warnings", "error"]
     check(done.to_pandas(), table, sensor)
 
 
@@ -66,6 +66,19 @@ def test_pieces_are_the_whole(trace, sensor):
     backwards = list(work.stream(iter(batches[::-1])))
     errors = pa.Table.from_batches(backwards).to_pandas()["error"].dropna()
     assert len(errors) == 1 and "time" in errors.iloc[0]
+
+
+def test_doubts_stand_in_a_column(trace, sensor):
+    rows = trace.head(250)[["resistance_ohm"]].assign(time_s=10 * trace["time_s"], sensor_id="left", recording_id=1)
+    with pytest.warns(oh.OhmstrainWarning) as said:
+        sensor.filter(rows)
+    table = pa.Table.from_pandas(rows, preserve_index=False)
+    found = Work("filter", BY, sensor)(table)["warnings"]
+    assert found[0].as_py() == "; ".join(str(one.message) for one in said) and found.null_count == 249
+    pieces = list(Work("filter", BY, sensor).stream(iter(table.to_batches(max_chunksize=64))))
+    assert "".join(text for piece in pieces for text in piece["warnings"].drop_null().to_pylist()) == found[0].as_py()
+    with pytest.warns(oh.OhmstrainWarning):
+        sensor.filter().run(rows)
 
 
 def test_scores_and_sensors(trace, sensor):

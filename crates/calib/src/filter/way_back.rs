@@ -60,6 +60,7 @@ fn steps_of<E: Estimator<f64, N, L>, const B: usize, const N: usize, const L: us
     steps: &mut Vec<(Seen, Taken<E, N, L>)>,
 ) -> Result<Moment<E::State>, (usize, StepError)> {
     steps.clear();
+    steps.reserve_exact(segment.len());
     for row in segment {
         let (time_s, reading) = rows.get(row);
         let (next, step) = running.stepper.advance(&now, time_s, reading).map_err(|error| (row, error))?;
@@ -78,6 +79,7 @@ where
         let Some(start) = self.starts.pop() else { return Ok(None) };
         let first = self.starts.len() * SEGMENT;
         let rows = first..self.rows.len().min(first + SEGMENT);
+        out.reserve_exact(rows.len());
         if !mem::take(&mut self.is_last) {
             steps_of(self.running, start, self.rows, rows.clone(), &mut self.steps)?;
         }

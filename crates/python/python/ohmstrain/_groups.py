@@ -17,6 +17,8 @@ from ._sensor import Sensor, _choices, _options, _split
 
 #: Column that says what is wrong with a recording; null in rows of good ones.
 ERROR = "error"
+#: Column with what a notebook warns of, in the first row of a recording; null where there is nothing.
+WARNINGS = "warnings"
 
 #: What ``evaluate`` and ``calibrate`` say of each recording or sensor, beside its keys.
 SCORES = ("n", "filter_percent_fs", "smoother_percent_fs", "static_cubic_percent_fs", "coverage_95")
@@ -75,14 +77,14 @@ class Work:
         return [name for name in names if name in self.by or name in _tables.COLUMNS]
 
     def schema(self, keys: Mapping[str, pa.DataType]) -> pa.Schema:
-        """Columns of the result: keys, what the task gives, and the error."""
+        """Columns of the result: keys, what the task gives, warnings and the error."""
         fields = [pa.field(key, keys[key]) for key in self.by]
         if self.task in ("filter", "smooth"):
             fields += [pa.field(name, pa.string() if name == "flags" else pa.float64()) for name in self.columns]
         else:
             fields += [pa.field("sensor_toml", pa.string())] * (self.task == "calibrate")
             fields += [pa.field(name, pa.float64()) for name in SCORES]
-        return pa.schema([*fields, pa.field(ERROR, pa.string())])
+        return pa.schema([*fields, pa.field(WARNINGS, pa.string()), pa.field(ERROR, pa.string())])
 
     def __call__(self, group: pa.Table) -> pa.Table:
         """The rows that come of one group; of a bad one, a row that says why."""
@@ -91,16 +93,8 @@ class Work:
         try:
             columns = self._columns(keys, in_order(group))
         except Exception as error:  # noqa: BLE001: whatever it is, it is this recording's alone.
-            columns = {ERROR: pa.array([f"{type(error).__name__}: {error}"])}
-        rows = len(next(iter(columns.values())))
-        arrays = []
-        for field in schema:
-            if field.name in keys:
-                arrays.append(pa.repeat(keys[field.name], rows))
-            else:
-                cells = columns.get(field.name)
-                arrays.append(pa.nulls(rows, field.type) if cells is None else cells)
-        return pa.table(arrays, schema=schema)
+            columns = _failed(error)
+        return _rows(keys, columns, schema)
 
     def stream(self, batches: Iterator[pa.RecordBatch]) -> Iterator[pa.RecordBatch]:
         """The same of a group that comes in pieces, in order of time: one piece is held at a time. For ``filter``."""
@@ -110,15 +104,11 @@ class Work:
             keys = {key: group[key][0] for key in self.by}
             schema = self.schema({key: group.schema.field(key).type for key in self.by})
             try:
-                live = live or self._sensor(keys).filter(**self.options)
-                found = live.run(group, **self.about)
-                arrays = [pa.repeat(keys[name], len(group)) if name in keys else found[name] for name in schema.names[:-1]]
-                arrays.append(pa.nulls(len(group), pa.string()))
-                yield from pa.table(arrays, schema=schema).combine_chunks().to_batches()
+                live = live or self._sensor(keys)._core.live(_options(**self.options))
+                recording = group.select([name for name in group.column_names if name in _tables.COLUMNS])
+                yield from _rows(keys, _estimates(*live.run(recording, self.about)), schema).combine_chunks().to_batches()
             except Exception as error:  # noqa: BLE001: as above
-                row = [pa.repeat(keys[field.name], 1) if field.name in keys else pa.nulls(1, field.type) for field in schema]
-                row[-1] = pa.array([f"{type(error).__name__}: {error}"])
-                yield from pa.table(row, schema=schema).to_batches()
+                yield from _rows(keys, _failed(error), schema).to_batches()
                 for _ in batches:  # The rest of a bad recording is passed over.
                     pass
                 return
@@ -135,19 +125,40 @@ class Work:
         recording = group.select([name for name in group.column_names if name in _tables.COLUMNS])
         if self.task in ("filter", "smooth"):
             core = self._sensor(keys)._core
-            table, _ = getattr(core, self.task)(recording, self.about, _options(**self.options))
-            table = pa.table(table)
-            return dict(zip(table.column_names, table.columns))
+            return _estimates(*getattr(core, self.task)(recording, self.about, _options(**self.options)))
         if self.task == "evaluate":
             core = self._sensor(keys)._core
             scored = dict(core.evaluate(recording, self.about, _options(**self.options), float("-inf")))
             scores = {of: json.loads(text) for of, text in scored.items()}
             return _figures(scores["filter"], scores["smoother"], scores["static_cubic"])
-        core, _ = _core.calibrate([(recording, self.about)], _choices(**self.options))
+        core, doubts = _core.calibrate([(recording, self.about)], _choices(**self.options))
         sensor = Sensor(core)
         found = sensor.findings or {}
         figures = _figures(found.get("filter"), found.get("smoother"), found.get("static_cubic"))
-        return {"sensor_toml": pa.array([sensor.to_toml()]), **figures}
+        return {"sensor_toml": pa.array([sensor.to_toml()]), **figures, WARNINGS: _first(doubts, 1)}
+
+
+def _rows(keys: Mapping[str, Any], columns: Mapping[str, Any], schema: pa.Schema) -> pa.Table:
+    """Rows of the result: keys repeated, null where there is no column."""
+    rows = len(next(iter(columns.values())))
+    found = {**{name: pa.repeat(key, rows) for name, key in keys.items()}, **columns}
+    return pa.table([found[f.name] if f.name in found else pa.nulls(rows, f.type) for f in schema], schema=schema)
+
+
+def _estimates(table: Any, doubts: list[str]) -> dict[str, Any]:
+    table = _tables.from_core(table)
+    return {**dict(zip(table.column_names, table.columns)), WARNINGS: _first(doubts, len(table))}
+
+
+def _failed(error: Exception) -> dict[str, Any]:
+    return {ERROR: pa.array([f"{type(error).__name__}: {error}"])}
+
+
+def _first(doubts: list[str], rows: int) -> Any:
+    """Doubts in the first of so many rows."""
+    if not doubts:
+        return pa.nulls(rows, pa.string())
+    return pa.concat_arrays([pa.array(["; ".join(doubts)]), pa.nulls(rows - 1, pa.string())])
 
 
 def in_order(group: pa.Table) -> pa.Table:

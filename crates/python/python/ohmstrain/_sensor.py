@@ -10,8 +10,6 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-import pyarrow as pa
-
 from . import _core, _tables
 
 
@@ -236,7 +234,7 @@ class Sensor:
         about, options = _split(options)
         table, doubts = method(_tables.to_arrow(recording), about, _options(**options))
         _warn(doubts)
-        return _tables.converter(recording)(pa.table(table))
+        return _tables.converter(recording)(_tables.from_core(table))
 
     @property
     def plot(self) -> Any:
@@ -280,8 +278,9 @@ class LiveFilter:
 
     def run(self, rows: Any, **about: Any) -> Any:
         """Take the rows of a table, and go on from the last one with the next: a recording in pieces."""
-        table = self._core.run(_tables.to_arrow(rows), _about(**about))
-        return _tables.converter(rows)(pa.table(table))
+        table, doubts = self._core.run(_tables.to_arrow(rows), _about(**about))
+        _warn(doubts)
+        return _tables.converter(rows)(_tables.from_core(table))
 
     def rest_resistance(self, measured: float) -> None:
         """What the rested, unstretched sensor is found to read from now on."""

@@ -42,6 +42,11 @@ def to_arrow(table: Any) -> pa.Table:
     return arrow.select(known) if known else arrow
 
 
+def from_core(batch: Any) -> pa.Table:
+    """What the compiled part gives back."""
+    return pa.Table.from_batches([pa.record_batch(batch)])
+
+
 def converter(like: Any) -> Callable[[Any], Any]:
     """What turns an Arrow table into one of the kind of ``like``."""
     if isinstance(like, Mapping):

@@ -1,7 +1,7 @@
 """Recordings in a Dask dataframe: ``pip install 'ohmstrain[dask]'``.
 
 As :mod:`ohmstrain.spark`: each group of rows with the same keys is a recording, a bad one is a row with a text in the
-column ``error``.
+column ``error``, doubts stand in ``warnings``.
 
 >>> from ohmstrain import dask as oh_dask
 >>> oh_dask.smooth(dask.dataframe.read_parquet("recordings"), sensors).to_parquet("estimates")     # doctest: +SKIP

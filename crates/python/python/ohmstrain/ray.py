@@ -1,7 +1,7 @@
 """Recordings in a Ray dataset: ``pip install 'ohmstrain[ray]'``.
 
 As :mod:`ohmstrain.spark`: each group of rows with the same keys is a recording, a bad one is a row with a text in the
-column ``error``.
+column ``error``, doubts stand in ``warnings``.
 
 >>> from ohmstrain import ray as oh_ray
 >>> oh_ray.smooth(ray.data.read_parquet("recordings"), sensors).write_parquet("estimates")     # doctest: +SKIP

@@ -2,11 +2,12 @@
 
 Each group of rows with the same keys is a recording. Rows may come in any order; they are put in order of time inside the
 group. What comes of it is the same as on one machine, to the bit. A recording that cannot be done is a row with a text in
-the column ``error``, and the job goes on.
+the column ``error``, and the job goes on. What a notebook warns of stands in the column ``warnings``, in the recording's
+first row.
 
 >>> from ohmstrain import spark as oh_spark
 >>> done = oh_spark.smooth(df, sensors, by=["sensor_id", "recording_id"])     # doctest: +SKIP
->>> done.where("error is null").drop("error").write.parquet("estimates")      # doctest: +SKIP
+>>> done.where("error is null").drop("error", "warnings").write.parquet("estimates")      # doctest: +SKIP
 """
 
 from __future__ import annotations
@@ -46,7 +47,9 @@ def filter(df: DataFrame, sensors: Any, by: Iterable[str] = BY, *, streaming: bo
     Returns
     -------
     DataFrame
-        Keys, columns of ``estimates.csv``, and ``error``: null but in the one row of a recording that cannot be done.
+        Keys, columns of ``estimates.csv``, ``warnings``: null but in the first row of a recording that is doubted (of the
+        batch in which that is found, if ``streaming``), and ``error``: null but in the one row of a recording that cannot
+        be done.
     """
     work = Work("filter", by, sensors, **options)
     return _streamed(df, work) if streaming else _grouped(df, work)
