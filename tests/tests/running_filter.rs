@@ -58,6 +58,7 @@ fn sensor() -> SensorParams {
         measured_rest: None,
         default_estimator: EstimatorKind::Ekf,
         summary: None,
+        tested: None,
         limits,
         validity: Validity {
             lower: 0.0,

@@ -56,7 +56,7 @@ pub use params::estimator::{EstimatorKind, EstimatorParams, MotionParams, NoiseP
 pub use params::law::{BranchParams, GaugeParams, LawParameter, LawParams};
 pub use params::recipe::{RECIPE, Recipe};
 pub use params::static_cubic::StaticCubic;
-pub use params::summary::{Limit, Summary};
+pub use params::summary::{Limit, Summary, TestedSummary};
 pub use params::validate::FieldError;
 pub use params::{
     FORMAT, JointParams, LARGEST_SD_SCALE, Quantity, RangeParams, ReadingUnit, RecordingInfo, SensorParams,

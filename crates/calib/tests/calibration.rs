@@ -214,7 +214,7 @@ fn a_refused_row_changes_nothing() {
     let calibration =
         calibrate(&[bench.samples().head(700)], &[LawOptions::default()], &[EstimatorKind::Ekf], |_| ()).unwrap();
     let text = format!(
-        "format = 7\nmade_by = 'test'\nquantity = 'strain'\nreading = 'ohm'\nrest_reading = {}\ndefault_estimator = 'ekf'\n",
+        "format = 8\nmade_by = 'test'\nquantity = 'strain'\nreading = 'ohm'\nrest_reading = {}\ndefault_estimator = 'ekf'\n",
         calibration.rest_readings[0]
     );
     assert!(toml::from_str::<SensorParams>(&text).is_err(), "a file without a law must be refused");

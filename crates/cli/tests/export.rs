@@ -51,7 +51,26 @@ fn compile_and_run_with(compiler: &str, folder: &Path, sources: &[&str], stdin: 
 fn c_is_an_arduino_library_a_self_test_and_a_readme_and_the_same_every_time() {
     let bench = Bench::calibrated();
     let printed = export(&bench, "c", "once");
-    assert!(printed.contains(" instructions a step, ") && printed.contains(" of RAM"), "{printed}");
+    // What it costs stands in the table, in the row of the exported code, and in the header.
+    let row = |name: &str| {
+        let row = printed.lines().find(|line| line.starts_with(&format!("| {name}")));
+        row.unwrap_or_else(|| panic!("{printed}"))
+            .split('|')
+            .map(str::trim)
+            .skip(2)
+            .map(String::from)
+            .collect::<Vec<_>>()
+    };
+    let exported = row("exported");
+    assert!(
+        exported[..2].iter().all(String::is_empty) && exported[2..6].iter().all(|cell| cell.parse::<u32>().is_ok())
+    );
+    let header = bench.read("once/src/ohmstrain.h");
+    assert!(printed.lines().filter(|line| line.starts_with('|')).all(|line| header.contains(&format!(" * {line}\n"))));
+    // `calibrate` has tested the rows that were kept from it.
+    let tested = bench.read("sensor.toml");
+    let tested = tested.split("[tested]\nfilter_percent_fs = ").nth(1).unwrap().lines().next().unwrap();
+    assert_eq!(row("tested: rows kept from calibration")[0], format!("{:.2}", tested.parse::<f64>().unwrap()));
     assert_eq!(export(&bench, "c", "twice"), printed);
     assert_eq!(export(&bench, "c", "twice"), printed);
     for (folder, names) in [

@@ -15,13 +15,13 @@ fn evaluate_draws_the_part_that_is_scored() {
     assert!(report.contains("not calibrated on, scored from 300 s on") && report.contains("estimator “ekf”"));
     assert!(report.contains("scored part") && !report.contains("in-sample"));
     bench.run(&flags).ok();
-    assert!(bench.read("report.html").contains("perhaps in-sample"));
+    assert!(bench.read("report.html").contains("partly in-sample"));
     for name in ["strain-against-time.svg", "strain-against-time.csv"] {
         let first = bench.read(&format!("figures/{name}")).lines().next().unwrap().to_owned();
-        assert!(first.contains(", perhaps in-sample"), "{first}");
+        assert!(first.contains(", partly in-sample"), "{first}");
     }
     let sensor = bench.run(&flags[..4]).ok();
-    assert!(sensor.starts_with("trace.csv: errors in strain, perhaps in-sample\n"), "{sensor}");
+    assert!(sensor.starts_with("trace.csv: errors in strain, partly in-sample\n"), "{sensor}");
     let kept = bench.run(&[&flags[..4], &from].concat()).ok();
     assert!(kept.starts_with("trace.csv: errors in strain\n"), "{kept}");
 

@@ -306,7 +306,7 @@ fn what_cannot_be_refined_is_refused_and_nothing_is_written() {
              itself",
         ),
     ];
-    let old = "format = 7\nmade_by = \"ohmstrain 0.0.1\"\n";
+    let old = "format = 8\nmade_by = \"ohmstrain 0.0.1\"\n";
     bench.write("old.toml", old);
     let before = bench.files();
     for (flags, code, message) in cases {

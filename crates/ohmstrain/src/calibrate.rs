@@ -179,7 +179,9 @@ impl<'a> Calibration<'a> {
         let rest_readings = calibration.rest_readings.clone();
         let info = |(recording, rest_reading): (&Recording, &f64)| {
             let (file, sha256) = recording.file.map(|(file, sha256)| (file.to_string(), sha256.to_string()))?;
-            Some(RecordingInfo { file, sha256, rows: recording.samples.len(), rest_reading: *rest_reading })
+            let (rows, time_s) = (recording.samples.len(), recording.samples.time_s());
+            let (first_s, last_s) = (*time_s.first()?, *time_s.last()?);
+            Some(RecordingInfo { file, sha256, rows, first_s, last_s, rest_reading: *rest_reading })
         };
         let infos = recordings.iter().zip(&rest_readings).filter_map(info).collect();
         let joint = recordings.iter().find_map(|recording| recording.joint);

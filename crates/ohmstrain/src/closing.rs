@@ -1,6 +1,6 @@
 //! What a calibration came to, in words.
 
-use ohmstrain_calib::{Findings, Limit, Quantity, Scores, Seen, SensorParams};
+use ohmstrain_calib::{Findings, Limit, Quantity, Scores, Seen, SensorParams, TestedSummary};
 use serde::Serialize;
 
 use crate::number::{fixed, significant};
@@ -47,6 +47,16 @@ pub struct Tested {
     pub filter: Scores,
     /// The static cubic.
     pub static_cubic: Scores,
+}
+
+impl From<&Tested> for TestedSummary {
+    fn from(tested: &Tested) -> Self {
+        Self {
+            filter_percent_fs: tested.filter.rmse_percent_fs,
+            static_cubic_percent_fs: tested.static_cubic.rmse_percent_fs,
+            coverage_95_percent: 100.0 * tested.filter.coverage_95.unwrap_or(0.0),
+        }
+    }
 }
 
 impl From<&Tested> for Known {

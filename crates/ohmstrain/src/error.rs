@@ -12,7 +12,7 @@ use crate::{ReferenceDoubt, UnitDoubt};
 ///
 /// ```
 /// let error = ohmstrain::Sensor::from_toml("format = 3").unwrap_err();
-/// assert_eq!(error.to_string(), "line 1: field `format`: expected version 7, found 3");
+/// assert_eq!(error.to_string(), "line 1: field `format`: expected version 8, found 3");
 /// ```
 #[derive(Debug, Error)]
 #[non_exhaustive]
@@ -103,7 +103,7 @@ impl Error {
     ///
     /// ```
     /// let error = ohmstrain::Sensor::from_toml("format = 3").unwrap_err();
-    /// assert_eq!(error.in_file("s.toml"), "s.toml:1: field `format`: expected version 7, found 3");
+    /// assert_eq!(error.in_file("s.toml"), "s.toml:1: field `format`: expected version 8, found 3");
     /// ```
     #[must_use]
     pub fn in_file(&self, name: &str) -> String {

@@ -98,6 +98,7 @@ impl Calibration {
             measured_rest: self.rest_share.map(|share| share * rest_reading),
             default_estimator: self.default_estimator,
             summary: self.findings.as_ref().map(Summary::from),
+            tested: None,
             limits: self.limits,
             validity: self.validity,
             static_cubic: self.static_cubic,

@@ -18,13 +18,13 @@ use crate::params::correction::CorrectionParams;
 use crate::params::estimator::{EstimatorKind, EstimatorParams};
 use crate::params::law::LawParams;
 use crate::params::static_cubic::StaticCubic;
-use crate::params::summary::Summary;
+use crate::params::summary::{Summary, TestedSummary};
 
 /// Largest factor on the deviations of a calibrated filter. One beyond it says that something else is wrong: calibrations say so
 /// where they reach it.
 pub const LARGEST_SD_SCALE: f64 = 5.0;
 /// Version of the parameter file this code reads and writes.
-pub const FORMAT: u32 = 7;
+pub const FORMAT: u32 = 8;
 
 /// Everything a filter needs to know of a sensor: the content of `sensor.toml`.
 ///
@@ -51,6 +51,9 @@ pub struct SensorParams {
     /// What the calibration came to; `None` if nothing could be scored on parts left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub summary: Option<Summary>,
+    /// What it is worth on rows that were kept from the calibration; `None` if there were none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tested: Option<TestedSummary>,
     /// Range of the output: the reference's range in calibration, or a joint's stops.
     pub limits: RangeParams,
     /// What calibration has seen.
@@ -171,8 +174,12 @@ pub struct RecordingInfo {
     pub file: String,
     /// SHA-256 of its bytes, hexadecimal.
     pub sha256: String,
-    /// Rows used.
+    /// Rows used, and the times of the first and the last of them, s.
     pub rows: usize,
+    /// See [`Self::rows`].
+    pub first_s: f64,
+    /// See [`Self::rows`].
+    pub last_s: f64,
     /// R₀ of this recording.
     pub rest_reading: f64,
 }

@@ -20,6 +20,18 @@ pub struct Summary {
     pub limited_by: Limit,
 }
 
+/// What a sensor is worth on rows that its calibration never saw, percent. Nothing computes with it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TestedSummary {
+    /// Root mean squared error of the default estimator's filter, percent of full scale.
+    pub filter_percent_fs: f64,
+    /// The static cubic's.
+    pub static_cubic_percent_fs: f64,
+    /// Share of the rows that the filter's 95 % interval holds.
+    pub coverage_95_percent: f64,
+}
+
 /// What limits a filter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]

@@ -15,7 +15,7 @@ use table::{
 use crate::params::estimator::{EstimatorParams, MotionParams, NoiseParams, PhaseParams};
 use crate::params::law::{GaugeParams, LawParams};
 use crate::params::static_cubic::StaticCubic;
-use crate::params::summary::Summary;
+use crate::params::summary::{Summary, TestedSummary};
 use crate::params::{JointParams, RangeParams, RecordingInfo, SensorParams, Uncertainty, Validity};
 
 /// Shortest range of strains, relative to its larger end.
@@ -39,6 +39,7 @@ impl SensorParams {
         if let Some(summary) = &self.summary {
             summary.validate(&root.table("summary"))?;
         }
+        self.tested.map_or(Ok(()), |tested| tested.validate(&root.table("tested")))?;
         self.limits.validate(&root.table("limits"))?;
         self.validity.validate(&root.table("validity"))?;
         self.check_rest(&root)?;
@@ -90,6 +91,14 @@ impl Summary {
         table.number("static_cubic_percent_fs", self.static_cubic_percent_fs, TOLD_AMOUNT)?;
         table.number("coverage_95_percent", self.coverage_95_percent, TOLD_AMOUNT)?;
         table.number("width_95_percent_fs", self.width_95_percent_fs, TOLD_AMOUNT)
+    }
+}
+
+impl TestedSummary {
+    fn validate(&self, table: &Table) -> Result<(), FieldError> {
+        table.number("filter_percent_fs", self.filter_percent_fs, TOLD_AMOUNT)?;
+        table.number("static_cubic_percent_fs", self.static_cubic_percent_fs, TOLD_AMOUNT)?;
+        table.number("coverage_95_percent", self.coverage_95_percent, TOLD_AMOUNT)
     }
 }
 
@@ -227,6 +236,8 @@ impl PhaseParams {
 
 impl RecordingInfo {
     fn validate(&self, table: &Table) -> Result<(), FieldError> {
+        table.number("first_s", self.first_s, TOLD)?;
+        table.number("last_s", self.last_s, TOLD)?;
         table.number("rest_reading", self.rest_reading, POSITIVE)
     }
 }

@@ -1,7 +1,7 @@
 use std::path::Path;
 use std::time::Instant;
 
-use ohmstrain::{Calibrated, Calibration, Closing, Error, EstimatorKind, Quantity, ReadingUnit};
+use ohmstrain::{Calibrated, Calibration, Closing, Error, EstimatorKind, Quantity, ReadingUnit, Sensor, SensorParams};
 use ohmstrain_calib::{Samples, screen};
 
 use super::closing;
@@ -55,6 +55,10 @@ pub fn run(args: &CalibrateArgs) -> Result<(), CliError> {
         alignment::shift(&mut kept.whole, lags_s[*recording])?;
     }
     let tested = tested(&kept.into_iter().map(|(_, kept)| kept).collect::<Vec<_>>(), &sensor);
+    let sensor = match &tested {
+        Some(tested) => Sensor::from_params(SensorParams { tested: Some(tested.into()), ..sensor.into_params() })?,
+        None => sensor,
+    };
     let params = sensor.params();
     outputs.put(sensor_output, sensor_file::text(&sensor)?);
     let file = args.output.display().to_string();

@@ -6,7 +6,7 @@ use ohmstrain_calib::{Baseline, ScoredRow, Scores, SensorParams};
 use crate::args::ExportArgs;
 use crate::commands::score_table::covered;
 use crate::error::CliError;
-use crate::export::{self, ChipFilter, Cost, Plan, ReplayedRow};
+use crate::export::{self, ChipFilter, Plan, ReplayedRow};
 use crate::input::Recording;
 use crate::output::{self, print};
 
@@ -70,10 +70,9 @@ impl OnRecording {
 
 /// What is exported, what it is worth and what it costs.
 pub struct Promise {
-    /// A table of errors, for the header of the exported code, too.
+    /// A table of errors and costs, for the header of the exported code, too.
     pub lines: Vec<String>,
     words: String,
-    cost: Cost,
     /// The recording on which it is worse than a static cubic.
     worse_on: Option<String>,
 }
@@ -89,27 +88,43 @@ impl Promise {
         let name = args.sensor.display().to_string();
         let chip = ChipFilter::new(params, plan).map_err(|error| error.into_cli(&name))?;
         let cost = export::cost(params, plan, args.dt_s).map_err(|error| error.into_cli(&name))?;
-        let mut table = output::table(["estimate", "%FS", "50/90/95 %"]);
+        let mut table =
+            output::table(["estimate", "%FS", "50/90/95 %", "instructions", "flash, B", "RAM, B", "of it stack, B"]);
         let mut worse_on = None;
+        let of = |error: f64, coverage: String| vec![format!("{error:.2}"), coverage];
+        let of_95 = |percent: f64| format!("-/-/{percent:.0}");
+        let of_all = |scores: &Scores| {
+            of(scores.rmse_percent_fs, covered([scores.coverage_50, scores.coverage_90, scores.coverage_95]))
+        };
+        let mut add = |name: &str, cells: Vec<String>| {
+            table.add_row(std::iter::once(name.to_owned()).chain(cells));
+        };
+        let is_default = plan.kind.is_none_or(|kind| kind == params.default_estimator) && !chip.is_smaller();
+        let whose = if is_default { "" } else { " of the default" };
         if let Some(summary) = &params.summary {
-            let is_default = plan.kind.is_none_or(|kind| kind == params.default_estimator) && !chip.is_smaller();
-            let promised = if is_default { "promised: left out" } else { "promised of the default: left out" };
-            let coverage = format!("-/-/{:.0}", summary.coverage_95_percent);
-            table.add_row([promised.into(), format!("{:.2}", summary.left_out_percent_fs), coverage]);
-            let cubic = format!("{:.2}", summary.static_cubic_percent_fs);
-            table.add_row(["static cubic: left out".into(), cubic, String::new()]);
+            let promised = of(summary.left_out_percent_fs, of_95(summary.coverage_95_percent));
+            add(&format!("promised{whose}: left out"), promised);
+            add("static cubic: left out", of(summary.static_cubic_percent_fs, String::new()));
         }
+        if let Some(tested) = &params.tested {
+            add(
+                &format!("tested{whose}: rows kept from calibration"),
+                of(tested.filter_percent_fs, of_95(tested.coverage_95_percent)),
+            );
+            add("static cubic: these rows", of(tested.static_cubic_percent_fs, String::new()));
+        }
+        let mut exported = vec![String::new(); 2];
         if let Some(recording) = recording {
-            let exported = recording.exported(params, plan, args)?;
+            let scores = recording.exported(params, plan, args)?;
             let (program, cubic) = (recording.scores(&recording.program)?, recording.scores(&recording.static_cubic)?);
-            for (estimate, scores) in [("this computer", &program), ("exported", &exported), ("static cubic", &cubic)] {
-                let coverage = covered([scores.coverage_50, scores.coverage_90, scores.coverage_95]);
-                table.add_row([estimate.to_owned(), format!("{:.2}", scores.rmse_percent_fs), coverage]);
-            }
-            worse_on = (exported.rmse > cubic.rmse).then(|| recording.name.clone());
+            add("static cubic", of_all(&cubic));
+            add("this computer", of_all(&program));
+            exported = of_all(&scores);
+            worse_on = (scores.rmse > cubic.rmse).then(|| recording.name.clone());
         }
-        let lines = if table.row_count() > 0 { table.lines().collect() } else { Vec::new() };
-        Ok(Self { lines, words: chip.words(), cost, worse_on })
+        exported.extend([cost.instructions, cost.flash, cost.ram(), cost.stack].map(|number| number.to_string()));
+        add("exported", exported);
+        Ok(Self { lines: table.lines().collect(), words: chip.words(), worse_on })
     }
 
     /// Prints it; refuses what is worse than a static cubic, unless it is forced.
@@ -118,7 +133,7 @@ impl Promise {
             for line in &self.lines {
                 writeln!(out, "{line}")?;
             }
-            Ok(writeln!(out, "{}\n{}", self.words, costs(&self.cost))?)
+            Ok(writeln!(out, "{}; instructions a step of a Cortex-M4F, estimated as is the rest", self.words)?)
         })?;
         match &self.worse_on {
             Some(name) if !args.force => Err(CliError::Input(format!(
@@ -127,16 +142,4 @@ impl Promise {
             _ => Ok(()),
         }
     }
-}
-
-/// What a filter costs, in words.
-fn costs(cost: &Cost) -> String {
-    format!(
-        "on a Cortex-M4F about {} instructions a step, {:.1} kB of flash, {} B of RAM (state {} B, stack {} B)",
-        cost.instructions,
-        cost.flash as f64 / 1e3,
-        cost.ram(),
-        cost.state,
-        cost.stack
-    )
 }

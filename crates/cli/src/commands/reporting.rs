@@ -123,14 +123,18 @@ impl Reporting<'_> {
     }
 }
 
-/// Whether the rows of `part` were calibrated on, as far as a sensor file knows: it has the number of rows that were.
+/// Whether the rows of `part` were calibrated on, by the times that a sensor file has of each recording.
 pub fn sample(recording: &Recording, params: &SensorParams, part: Part) -> Sample {
-    let rows_before = |from_s: f64| recording.trace.time_s.partition_point(|time_s| *time_s < from_s);
-    match params.recordings.iter().find(|info| info.sha256 == recording.sha256) {
-        None => Sample::Out,
-        Some(info) if info.rows == recording.trace.len() => Sample::In,
-        Some(info) if part.from_s.is_some_and(|from_s| rows_before(from_s) == info.rows) => Sample::Out,
-        Some(_) => Sample::Perhaps,
+    let of_it = params.recordings.iter().filter(|info| info.sha256 == recording.sha256);
+    let scored = |time_s: &&f64| {
+        part.from_s.is_none_or(|from_s| **time_s >= from_s) && part.until_s.is_none_or(|until_s| **time_s < until_s)
+    };
+    let seen = |time_s: &&f64| of_it.clone().any(|info| (info.first_s..=info.last_s).contains(*time_s));
+    let rows = recording.trace.time_s.iter().filter(scored);
+    match rows.clone().filter(seen).count() {
+        0 => Sample::Out,
+        all if all == rows.count() => Sample::In,
+        _ => Sample::Partly,
     }
 }
 

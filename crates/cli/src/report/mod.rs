@@ -86,8 +86,8 @@ pub struct Scored {
 pub enum Sample {
     /// All of them.
     In,
-    /// Some of them, or perhaps some: the sensor's file does not say which rows of the recording it is from.
-    Perhaps,
+    /// Some of them.
+    Partly,
     /// None.
     Out,
 }
@@ -97,7 +97,7 @@ impl Sample {
     pub const fn name(self) -> &'static str {
         match self {
             Self::In => "in-sample",
-            Self::Perhaps => "perhaps in-sample",
+            Self::Partly => "partly in-sample",
             Self::Out => "not calibrated on",
         }
     }

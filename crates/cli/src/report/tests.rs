@@ -40,6 +40,7 @@ fn sensor() -> SensorParams {
         measured_rest: None,
         default_estimator: EstimatorKind::Ekf,
         summary: None,
+        tested: None,
         limits: range,
         validity: Validity {
             lower: 0.0,
