@@ -19,7 +19,7 @@ struct SerialPort {
   void print(unsigned long number);
   void print(double number, int digits);
   void println(int number);
-  void println(double number, int digits);
+  void println(unsigned number);
 };
 extern SerialPort Serial;
 

@@ -13,11 +13,12 @@ void SerialPort::print(const char *text) { std::printf("%s", text); }
 void SerialPort::print(unsigned long number) { std::printf("%lu", number); }
 void SerialPort::print(double number, int digits) { std::printf("%.*f", digits, number); }
 void SerialPort::println(int number) { std::printf("%d\r\n", number); }
-void SerialPort::println(double number, int digits) { std::printf("%.*f\r\n", digits, number); }
+void SerialPort::println(unsigned number) { std::printf("%u\r\n", number); }
 
+/* About 50 ms from one look to the next, and soon beyond 32 bits. */
 unsigned long micros(void) {
-  static unsigned long now = 4294000000UL;
-  return now += 50000UL;
+  static uint32_t now = 4294000000UL, looks = 0;
+  return now += 45000 + looks++ * 7919 % 10000;
 }
 
 void delay(unsigned long) {}

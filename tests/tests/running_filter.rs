@@ -7,7 +7,7 @@ use ohmstrain::Sensor;
 use ohmstrain_calib::{
     BranchParams, CorrectionParams, CorrectionScale, CorrectorParams, EstimatorKind, EstimatorParams, FORMAT, Filter,
     GaugeParams, LawParams, MotionParams, NoiseParams, PhaseParams, ProcessParams, Quantity, RangeParams, ReadingUnit,
-    Rows, SensorParams, Start, StaticCubic, TrainingRow, Validity, build_filter,
+    Rows, SensorParams, SimulatedParams, SimulatedRow, Start, StaticCubic, TrainingRow, Validity, build_filter,
 };
 use ohmstrain_ekf::{Guard, Reading, StepError};
 use proptest::prelude::*;
@@ -98,12 +98,14 @@ fn correction() -> CorrectionParams {
         filtered: std::array::from_fn(|i| 0.2 + 0.1 * wave(k, 20 + i)),
         smoothed: std::array::from_fn(|i| 0.2 + 0.1 * wave(k, 30 + i)),
     };
+    let simulated = |k: usize| SimulatedRow { past: row(k).past, strain: row(k).strain };
     CorrectionParams {
         corrects: EstimatorKind::SignSplit,
         readings: CorrectionScale { centre: 0.2, half_range: 0.25, rates: [0.02, 0.05], starts: [[0.1, 0.6]; 6] },
         filter: corrector(0, vec![]),
         smoother: corrector(6, vec![process(7), process(7)]),
         rows: (0..40).map(row).collect(),
+        simulated: SimulatedParams { sd: 0.03, rows: (40..60).map(simulated).collect() },
     }
 }
 

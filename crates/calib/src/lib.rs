@@ -35,7 +35,7 @@ pub use calibrate::findings::{Findings, Seen};
 pub use calibrate::scores::{ScoredRow, Scores};
 pub use calibrate::with_prior::calibrate_with_prior;
 pub use calibrate::{Calibration, Stage, calibrate};
-pub use correction::owned::{OwnedCorrection, OwnedProcess};
+pub use correction::owned::{OwnedCorrection, OwnedProcess, OwnedSimulated};
 pub use error::CalibrationError;
 pub use filter::build::{HISTORIES, HYPOTHESES, PARTICLE_SEED, build_filter, build_filter_with};
 pub use filter::corrected::SURPRISING_NIS;
@@ -50,7 +50,8 @@ pub use law::fit::{CrossFit, LawOptions, fit_law};
 pub use law::identifiability::{Identifiability, identifiability};
 pub use law::structure::{GaugeFamily, LawFit};
 pub use params::correction::{
-    CorrectionParams, CorrectionScale, CorrectorParams, FUTURE_FEATURES, ProcessParams, TrainingRow,
+    CorrectionParams, CorrectionScale, CorrectorParams, FUTURE_FEATURES, ProcessParams, SimulatedParams, SimulatedRow,
+    TrainingRow,
 };
 pub use params::estimator::{EstimatorKind, EstimatorParams, MotionParams, NoiseParams, PhaseParams};
 pub use params::law::{BranchParams, GaugeParams, LawParameter, LawParams};

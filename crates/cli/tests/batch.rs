@@ -102,6 +102,11 @@ fn a_sensor_that_is_none_is_said_once() {
         assert!(run.stderr.contains(why) && run.stderr.lines().count() == 1, "{}", run.stderr);
         assert!(!bench.path("out").exists());
     }
+    let flagged =
+        ["-q", "batch", "smooth", "in/a.csv", "--sensor", "sensor.toml", "-o", "out", "--", "--estimator", "ukf"];
+    let run = bench.run(&flagged);
+    assert!(run.code == Some(4) && run.stderr.contains("ukf"), "{:?} {}", run.code, run.stderr);
+    assert!(!bench.path("out").exists());
 }
 
 #[test]
@@ -122,6 +127,7 @@ fn what_is_left_of_an_earlier_run_is_said_to_be() {
     assert_eq!(run.code, Some(5), "{}", run.stderr);
     assert_eq!(bench.read("out/b.csv"), before);
     assert!(run.stderr.contains("b.csv is from before this run"), "{}", run.stderr);
+    assert!(run.stderr.contains("summary.json; out/summary.csv is from before this run"), "{}", run.stderr);
     assert!(summary(&bench)[1]["message"].as_str().unwrap().ends_with("b.csv is from before this run"));
 }
 

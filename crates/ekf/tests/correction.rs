@@ -2,7 +2,7 @@
 
 use ohmstrain_ekf::Gaussian;
 use ohmstrain_ekf::correction::{
-    Correction, FEATURES, FeatureScale, InputScale, LowPass, Process, ReadingFeatures, mixture, settled,
+    Correction, FEATURES, FeatureScale, InputScale, LowPass, Process, ReadingFeatures, Simulated, mixture, settled,
 };
 use ohmstrain_model::StrainRange;
 
@@ -124,6 +124,7 @@ macro_rules! correction {
             direct: process(0),
             one_sided: $sides.map(process),
             residual: process(1),
+            simulated: None,
             limits: StrainRange { lower: -2.0, upper: 2.0 },
             strain_variance: 0.7,
             variance_factor: 0.6,
@@ -153,6 +154,45 @@ fn all_processes_their_mixture_and_novelty() {
         let second: f64 = (0..4).map(|p| share(p) * (voices[p].variance + voices[p].mean.powi(2))).sum();
         let variance = 0.6 * (second - mean * mean) + 0.06 * 0.7 * novelty;
         assert!(close(said.strain.mean, mean) && (said.strain.variance - variance).abs() < 1e-11, "{trial}");
+    }
+}
+
+/// Features of twelve more rows, with the variance of the noise alone, heard beside what the others say together.
+#[test]
+fn simulated_rows_are_mixed_in_last() {
+    const RELEVANCE: f64 = 0.07;
+    let numbers = numbers();
+    correction!(f64, numbers, [2, 3], rows, scales, weights, triangles, learned);
+    let wider = numbers.scales.map(|scale| InputScale { lower: scale.lower - 0.5, upper: scale.upper + 0.2, ..scale });
+    let process = Process {
+        relevance: std::array::from_fn(|i| if i < 6 { 0.0 } else { RELEVANCE }),
+        mean: 0.25,
+        weights: &weights[1],
+        explained: &[],
+        variance: 0.0,
+        noise: 0.08,
+        widening: 1.0,
+        least_variance: 0.0,
+    };
+    let with = Correction { simulated: Some(Simulated { rows: &rows, scales: &wider, process }), ..learned };
+    for trial in 0..50 {
+        let input: [f64; D] = std::array::from_fn(|i| 3.0 * number(3000 + 10 * trial + i));
+        let filtered = Gaussian { mean: input[0], variance: 0.05 };
+        let inside: Vec<f64> = (0..D).map(|i| input[i].clamp(wider[i].lower, wider[i].upper)).collect();
+        let x = |i: usize| (inside[i] - wider[i].mean) / wider[i].sd;
+        let kernel = |row: &[f64; D]| {
+            let square: f64 = (6..D).map(|i| (x(i) - row[i]).powi(2)).sum();
+            (-RELEVANCE * square).exp() + 0.09 * (1.0 + x(6) * row[6])
+        };
+        let mean = 0.25 + rows.iter().zip(&weights[1]).map(|(row, weight)| weight * kernel(row)).sum::<f64>();
+        let outside: f64 = (6..D).map(|i| ((input[i] - inside[i]) / wider[i].sd).powi(2)).sum();
+        let expected = Gaussian { mean: mean.clamp(-2.0, 2.0), variance: 0.08 + 0.03 * 0.7 * outside };
+        let (said, alone) = (with.correct(&input, filtered), learned.correct(&input, filtered));
+        let close = |a: f64, b: f64| (a - b).abs() < 1e-12 * (1.0 + b.abs());
+        let heard = said.simulated.unwrap();
+        assert!(close(heard.mean, expected.mean) && close(heard.variance, expected.variance), "{trial}: {heard:?}");
+        assert_eq!(said.strain, mixture([alone.strain, heard]), "{trial}");
+        assert_eq!((said.direct, said.residual, said.novelty), (alone.direct, alone.residual, alone.novelty));
     }
 }
 

@@ -123,7 +123,7 @@ impl Error {
 /// use ohmstrain::{Error, Sensor, TextCause};
 ///
 /// let Err(Error::Text(error)) = Sensor::from_toml("format = 4") else { panic!() };
-/// assert!(matches!(error.cause, TextCause::Format { expected: 7, found: 4 }));
+/// assert!(matches!(error.cause, TextCause::Format { expected: 8, found: 4 }));
 /// assert_eq!(error.place.unwrap().line, 1);
 /// ```
 #[derive(Debug)]

@@ -180,15 +180,14 @@ impl ValidityWatch {
         let is_other = reading.is_finite() && self.beyond_readings.see(!(least..=most).contains(&reading), CHANCE);
         let is_beyond = truth.is_finite() && self.beyond_strains.see(!(lower..=upper).contains(&truth), CHANCE);
         let follows = self.follows;
-        // Mostly there is nothing to say, and nothing is made ready for it.
-        let said = (is_long || is_fast || is_other || is_beyond).then(|| {
-            [
-                (is_long, Beyond::Duration { longest_s }),
-                (is_fast, Beyond::Rate { quantity, fastest_per_s }),
-                (is_other, Beyond::Readings { column, least, most, follows }),
-                (is_beyond, Beyond::Strain { quantity, least: lower, most: upper }),
-            ]
-        });
+        let all = [
+            (is_long, Beyond::Duration { longest_s }),
+            (is_fast, Beyond::Rate { quantity, fastest_per_s }),
+            (is_other, Beyond::Readings { column, least, most, follows }),
+            (is_beyond, Beyond::Strain { quantity, least: lower, most: upper }),
+        ];
+        // Mostly there is nothing to say.
+        let said = (is_long || is_fast || is_other || is_beyond).then_some(all);
         said.into_iter().flatten().filter_map(move |(now, beyond)| now.then_some(Extrapolation { time_s, beyond }))
     }
 }

@@ -1,3 +1,6 @@
+use crate::calibrate::simulated_motions::simulated_rows;
+use crate::law::structure::LawFit;
+use crate::motion_stats::MotionStats;
 use ohmstrain_ekf::Reading;
 use ohmstrain_ekf::correction::FEATURES;
 
@@ -6,8 +9,11 @@ use crate::calibrate::correction_scale::{each_row, reading_scale};
 use crate::correction::Examples;
 use crate::filter::Filter;
 use crate::filter::corrected::{future_features, outputs};
+use crate::order::median;
 use crate::params::RangeParams;
-use crate::params::correction::{CorrectionParams, CorrectionScale, CorrectorParams, PAUSE_S, SIDES, TrainingRow};
+use crate::params::correction::{
+    CorrectionParams, CorrectionScale, CorrectorParams, PAUSE_S, SIDES, SimulatedParams, SimulatedRow, TrainingRow,
+};
 use crate::params::estimator::EstimatorKind;
 use crate::prior::{self, CorrectionPrior};
 use crate::samples::Samples;
@@ -21,12 +27,12 @@ const BY_WAY: f64 = 0.8;
 /// Makes a filter.
 type Build<'a> = dyn Fn() -> Result<Box<dyn Filter>, CalibrationError> + 'a;
 
-/// Learns the correction of a filter from the recordings that it was calibrated on; `rest_readings` are their R₀, `build`
+/// Learns the correction of a filter from the recordings that it was calibrated on, whose law is `fit`; `build`
 /// makes the filter, `corrects` names it. With a prior of that filter the rows of other sensors come first, and half as many
 /// of their own follow. None if nothing can be learned from them.
 pub(crate) fn fit_correction(
     recordings: &[Samples],
-    rest_readings: &[f64],
+    fit: &LawFit,
     limits: RangeParams,
     (corrects, build): (EstimatorKind, &Build),
     of_make: Option<&CorrectionPrior>,
@@ -36,7 +42,7 @@ pub(crate) fn fit_correction(
         let relative = |r: &f64| r.is_finite().then(|| Reading::from(r / rest - 1.0));
         samples.reading.iter().map(relative).collect::<Vec<Option<Reading<f64>>>>()
     };
-    let readings: Vec<Vec<Option<Reading<f64>>>> = recordings.iter().zip(rest_readings).map(relative).collect();
+    let readings: Vec<Vec<Option<Reading<f64>>>> = recordings.iter().zip(&fit.rest_readings).map(relative).collect();
     let own_scale = || reading_scale(recordings, &readings);
     let Some(scale) = of_make.map_or_else(own_scale, |prior| Some(prior.readings)) else { return Ok(None) };
     let mut rows: Vec<TrainingRow> = of_make.map_or_else(Vec::new, |prior| prior.rows.clone());
@@ -49,13 +55,16 @@ pub(crate) fn fit_correction(
     }
     let most = if rows.is_empty() { ROWS } else { prior::ROWS };
     rows.extend(chosen(&candidates, most).into_iter().map(TrainingRow::rounded));
-    Ok(learn(corrects, scale, rows, limits))
+    let steps_s = recordings.iter().flat_map(|of| of.time_s.windows(2).map(|pair| pair[1] - pair[0]));
+    let simulated = simulated_rows(fit, &MotionStats::new(recordings), &scale, median(steps_s).unwrap_or(0.0));
+    Ok(learn(corrects, scale, rows, &simulated, limits))
 }
 
 fn learn(
     corrects: EstimatorKind,
     readings: CorrectionScale,
     rows: Vec<TrainingRow>,
+    simulated: &[SimulatedRow],
     limits: RangeParams,
 ) -> Option<CorrectionParams> {
     let (strain, time_s): (Vec<f64>, Vec<f64>) = rows.iter().map(|row| (row.strain, row.time_s)).unzip();
@@ -64,7 +73,8 @@ fn learn(
     let of_smoother: Vec<_> = rows.iter().map(TrainingRow::smoother_inputs).collect();
     let filter = CorrectorParams::fit::<_, 0>(Examples { inputs: &of_filter, strain, time_s, limits })?;
     let smoother = CorrectorParams::fit::<_, SIDES>(Examples { inputs: &of_smoother, strain, time_s, limits })?;
-    Some(CorrectionParams { corrects, readings, filter, smoother, rows })
+    let simulated = SimulatedParams::fit(simulated, &rows, limits)?;
+    Some(CorrectionParams { corrects, readings, filter, smoother, rows, simulated })
 }
 
 /// All rows of a recording with reading and strain, as the calibrated filter and smoother see them; none if the estimator

@@ -206,7 +206,7 @@ impl Check<'_> {
             filter_from_parts(kind, &law.law, params, setting)
         };
         let correction = if self.kind == EstimatorKind::Corrected {
-            fit_correction(training, &law.rest_readings, limits, (self.filter, &|| bare(false)), self.of_make)?
+            fit_correction(training, law, limits, (self.filter, &|| bare(false)), self.of_make)?
         } else {
             None
         };

@@ -8,6 +8,7 @@ pub(crate) mod findings;
 pub(crate) mod left_out;
 pub(crate) mod noise_fit;
 pub(crate) mod scores;
+pub(crate) mod simulated_motions;
 pub(crate) mod with_prior;
 
 use std::collections::BTreeMap;
@@ -269,7 +270,7 @@ fn correction(
     let Some(params) = estimators.get(&kind) else { return Ok(None) };
     let setting = Setting { limits, start: Start::Unknown, sieve: Sieve::OPEN };
     let build = || filter_from_parts(kind, &fit.law.law, params, setting);
-    fit_correction(recordings, &fit.law.rest_readings, limits, (kind, &build), of_make)
+    fit_correction(recordings, &fit.law, limits, (kind, &build), of_make)
 }
 
 /// Counts evaluations of the score.

@@ -2,6 +2,7 @@
 
 pub(crate) mod gaussian_process;
 pub(crate) mod owned;
+pub(crate) mod simulated;
 
 use ohmstrain_ekf::Gaussian;
 use ohmstrain_ekf::correction::{FEATURES, INDUCING, InputScale, OUTPUTS, Process, mixture};
@@ -9,7 +10,7 @@ use owned::{OwnedCorrection, OwnedProcess};
 
 use crate::order::extent;
 use crate::params::RangeParams;
-use crate::params::correction::{CorrectorParams, ProcessParams, SIDES};
+use crate::params::correction::{CorrectorParams, FILTER_INPUTS, ProcessParams, SIDES, SimulatedParams};
 use crate::sd_scale::{joint_scale, sd_scale_up_to};
 use gaussian_process::{GaussianProcess, LeftOutRow, Lessons, inducing_rows, relevance};
 
@@ -83,9 +84,13 @@ struct Prepared<'a, const D: usize> {
 impl<'a, const D: usize> Prepared<'a, D> {
     fn new(examples: Examples<'a, D>) -> Self {
         let scales: [InputScale<f64>; D] = std::array::from_fn(|i| scale(examples.inputs.iter().map(|row| row[i])));
-        let standardised = |row: &[f64; D]| std::array::from_fn(|i| (row[i] - scales[i].mean) / scales[i].sd);
         let strain_variance = scale(examples.strain.iter().copied()).sd.powi(2);
-        Self { examples, rows: examples.inputs.iter().map(standardised).collect(), scales, strain_variance }
+        let prepared = Self { examples, rows: vec![], scales, strain_variance };
+        Self { rows: examples.inputs.iter().map(|row| prepared.on_scale(row)).collect(), ..prepared }
+    }
+
+    fn on_scale(&self, row: &[f64; D]) -> [f64; D] {
+        std::array::from_fn(|i| (row[i] - self.scales[i].mean) / self.scales[i].sd)
     }
 
     /// What a process adds its mean to.
@@ -158,6 +163,16 @@ fn deviations(said: &[Gaussian<f64>], strain: &[f64]) -> Vec<Vec<f64>> {
     (0..BLOCKS).map(|block| (block * n / BLOCKS..(block + 1) * n / BLOCKS).map(of_row).collect()).collect()
 }
 
+/// [`learned`] for the filter, beside what simulated rows say.
+pub(crate) fn learned_with_simulated(
+    params: &CorrectorParams,
+    examples: Examples<FILTER_INPUTS>,
+    simulated: &SimulatedParams,
+) -> Option<OwnedCorrection<f64, FILTER_INPUTS>> {
+    let simulated = Prepared::new(examples).simulated(simulated)?;
+    Some(OwnedCorrection { simulated: Some(simulated), ..learned(params, examples)? })
+}
+
 /// Makes weights of examples; none if the covariances are not positive definite.
 pub(crate) fn learned<const D: usize, const S: usize>(
     params: &CorrectorParams,
@@ -197,6 +212,7 @@ pub(crate) fn learned<const D: usize, const S: usize>(
         direct: owned(Which::Direct, &direct)?,
         one_sided: one_sided.collect::<Option<Vec<_>>>()?.try_into().ok()?,
         residual: owned(Which::Residual, &residual)?,
+        simulated: None,
         limits: examples.limits.to_model(),
         strain_variance: prepared.strain_variance,
         variance_factor: params.sd_scale.powi(2),

@@ -1,5 +1,5 @@
 use ohmstrain_ekf::Real;
-use ohmstrain_ekf::correction::{Correction, InputScale, Process};
+use ohmstrain_ekf::correction::{Correction, InputScale, Process, Simulated};
 use ohmstrain_model::StrainRange;
 
 /// A [`Correction`] with everything that it borrows.
@@ -15,12 +15,25 @@ pub struct OwnedCorrection<T: 'static, const D: usize, const S: usize = 0> {
     pub one_sided: [OwnedProcess<T, D>; S],
     /// What the filter's strain lacks, from all inputs.
     pub residual: OwnedProcess<T, D>,
+    /// Strain from the features, by rows of simulated motions.
+    pub simulated: Option<OwnedSimulated<T, D>>,
     /// Limits of the output.
     pub limits: StrainRange<T>,
     /// Variance of the strain over the training rows.
     pub strain_variance: T,
     /// Factor on the mixture's variance.
     pub variance_factor: T,
+}
+
+/// A [`Simulated`] with everything that it borrows.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OwnedSimulated<T: 'static, const D: usize> {
+    /// Standardised inputs.
+    pub rows: Vec<[T; D]>,
+    /// Scales of the inputs.
+    pub scales: [InputScale<T>; D],
+    /// What the rows say.
+    pub process: OwnedProcess<T, D>,
 }
 
 /// A [`Process`] with everything that it borrows.
@@ -43,6 +56,7 @@ impl<T: Real + 'static, const D: usize, const S: usize> OwnedCorrection<T, D, S>
             direct: self.direct.process(),
             one_sided: self.one_sided.each_ref().map(OwnedProcess::process),
             residual: self.residual.process(),
+            simulated: self.simulated.as_ref().map(OwnedSimulated::simulated),
             limits: self.limits,
             strain_variance: self.strain_variance,
             variance_factor: self.variance_factor,
@@ -51,21 +65,42 @@ impl<T: Real + 'static, const D: usize, const S: usize> OwnedCorrection<T, D, S>
 
     /// In another precision.
     pub fn map<U: Real + 'static>(&self, number: impl Fn(T) -> U + Copy) -> OwnedCorrection<U, D, S> {
-        let scale = |scale: InputScale<T>| InputScale {
-            mean: number(scale.mean),
-            sd: number(scale.sd),
-            lower: number(scale.lower),
-            upper: number(scale.upper),
-        };
         OwnedCorrection {
             rows: self.rows.iter().map(|row| row.map(number)).collect(),
-            scales: self.scales.map(scale),
+            scales: in_precision(&self.scales, number),
             direct: self.direct.map(number),
             one_sided: self.one_sided.each_ref().map(|side| side.map(number)),
             residual: self.residual.map(number),
+            simulated: self.simulated.as_ref().map(|simulated| simulated.map(number)),
             limits: StrainRange { lower: number(self.limits.lower), upper: number(self.limits.upper) },
             strain_variance: number(self.strain_variance),
             variance_factor: number(self.variance_factor),
+        }
+    }
+}
+
+fn in_precision<T: Copy, U, const D: usize>(
+    scales: &[InputScale<T>; D],
+    number: impl Fn(T) -> U + Copy,
+) -> [InputScale<U>; D] {
+    scales.map(|InputScale { mean, sd, lower, upper }| InputScale {
+        mean: number(mean),
+        sd: number(sd),
+        lower: number(lower),
+        upper: number(upper),
+    })
+}
+
+impl<T: Real + 'static, const D: usize> OwnedSimulated<T, D> {
+    fn simulated(&self) -> Simulated<'_, T, D> {
+        Simulated { rows: &self.rows, scales: &self.scales, process: self.process.process() }
+    }
+
+    fn map<U: Real + 'static>(&self, number: impl Fn(T) -> U + Copy) -> OwnedSimulated<U, D> {
+        OwnedSimulated {
+            rows: self.rows.iter().map(|row| row.map(number)).collect(),
+            scales: in_precision(&self.scales, number),
+            process: self.process.map(number),
         }
     }
 }

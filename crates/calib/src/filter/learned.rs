@@ -3,9 +3,7 @@ use std::sync::{Arc, OnceLock};
 use crate::CalibrationError;
 use crate::correction::owned::OwnedCorrection;
 use crate::correction::{self, Examples};
-use crate::params::correction::{
-    CorrectionParams, CorrectorParams, FILTER_INPUTS, SIDES, SMOOTHER_INPUTS, TrainingRow,
-};
+use crate::params::correction::{CorrectionParams, FILTER_INPUTS, SIDES, SMOOTHER_INPUTS, TrainingRow};
 use crate::params::{RangeParams, SensorParams};
 
 /// What corrects the strain of a sensor's filters and smoothers. Either is learned when it is first asked for, and then
@@ -43,25 +41,30 @@ impl Learned {
     }
 
     pub(crate) fn for_filter(&self) -> Result<Arc<OfFilter>, CalibrationError> {
-        let learn = || self.learn(&self.params.filter, TrainingRow::filter_inputs);
+        let CorrectionParams { filter, simulated, .. } = &self.params;
+        let learn = || {
+            self.of_examples(TrainingRow::filter_inputs, |rows| {
+                correction::learned_with_simulated(filter, rows, simulated)
+            })
+        };
         self.of_filter.get_or_init(learn).clone().ok_or_else(|| nothing("filter"))
     }
 
     pub(crate) fn for_smoother(&self) -> Result<Arc<OfSmoother>, CalibrationError> {
-        let learn = || self.learn(&self.params.smoother, TrainingRow::smoother_inputs);
+        let params = &self.params.smoother;
+        let learn = || self.of_examples(TrainingRow::smoother_inputs, |rows| correction::learned(params, rows));
         self.of_smoother.get_or_init(learn).clone().ok_or_else(|| nothing("smoother"))
     }
 
-    fn learn<const D: usize, const S: usize>(
+    fn of_examples<const D: usize, X>(
         &self,
-        params: &CorrectorParams,
         inputs: impl Fn(&TrainingRow) -> [f64; D],
-    ) -> Option<Arc<OwnedCorrection<f64, D, S>>> {
+        learn: impl Fn(Examples<D>) -> Option<X>,
+    ) -> Option<Arc<X>> {
         let rows = &self.params.rows;
         let (strain, time_s): (Vec<f64>, Vec<f64>) = rows.iter().map(|row| (row.strain, row.time_s)).unzip();
         let inputs: Vec<_> = rows.iter().map(inputs).collect();
-        let examples = Examples { inputs: &inputs, strain: &strain, time_s: &time_s, limits: self.limits };
-        correction::learned(params, examples).map(Arc::new)
+        learn(Examples { inputs: &inputs, strain: &strain, time_s: &time_s, limits: self.limits }).map(Arc::new)
     }
 }
 

@@ -27,6 +27,28 @@ pub struct CorrectionParams {
     pub smoother: CorrectorParams,
     /// What both learn from, in order of time.
     pub rows: Vec<TrainingRow>,
+    /// What the law says of motions that the sensor was not seen in, for the filter.
+    pub simulated: SimulatedParams,
+}
+
+/// What a law says of motions that were simulated: of a few rows that stand for all.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SimulatedParams {
+    /// Standard deviation of the strain that they leave.
+    pub sd: f64,
+    /// The rows.
+    pub rows: Vec<SimulatedRow>,
+}
+
+/// A row of a simulated motion.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SimulatedRow {
+    /// Features of the readings up to this row.
+    pub past: [f64; FEATURES],
+    /// The strain, or what is said of it.
+    pub strain: f64,
 }
 
 /// The scale on which a correction sees readings.

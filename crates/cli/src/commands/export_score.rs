@@ -31,9 +31,12 @@ impl OnRecording {
         let mut cubic = sensor.params().static_cubic.start();
         let mut rows = Vec::new();
         let [mut program, mut static_cubic] = [const { Vec::new() }; 2];
+        let mut last_s = None;
         for row in 0..recording.trace.len() {
             let (time_s, reading) = recording.reading(row);
-            rows.push(ReplayedRow { time_s, reading: reading.value, reading_sd: reading.sd });
+            // What is exported takes an interval for its first step.
+            let since_s = last_s.replace(time_s).map_or(args.dt_s, |last_s| time_s - last_s) as f32;
+            rows.push(ReplayedRow { since_s, reading: reading.value, reading_sd: reading.sd });
             let estimate = filter.step(time_s, reading).map_err(|error| refused(&error))?;
             let truth = recording.truth(row);
             program.push(ScoredRow { time_s, truth, strain: estimate.strain, sd: Some(estimate.strain_sd) });

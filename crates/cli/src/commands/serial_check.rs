@@ -20,6 +20,8 @@ const HALF_WIDTH: f64 = 1.96;
 const PRINTED_TO: f64 = 1e-5;
 /// Another library's `expf` moves an estimate by far less than this share of its deviation.
 const SHARE_OF_DEVIATION: f64 = 0.01;
+/// Share of the steps whose flags may differ, since they lie on a threshold.
+const OTHER_FLAGS: f64 = 0.01;
 
 /// Compares a board's estimates with those of the exported code's twin, given the board's readings.
 pub fn run(args: &SerialCheckArgs) -> Result<(), CliError> {
@@ -41,24 +43,31 @@ pub fn run(args: &SerialCheckArgs) -> Result<(), CliError> {
         writeln!(out, "{} steps, {} other lines", heard.steps.len(), heard.others)?;
         writeln!(
             out,
-            "largest difference: strain {:.1e}, its deviation {:.1e}; the deviation is {:.1e} at least",
-            farthest.strain, farthest.sd, farthest.least_sd
+            "largest difference: strain {:.1e}, its deviation {:.1e}; the deviation is {:.1e} at least; \
+             other flags in {} steps",
+            farthest.strain, farthest.sd, farthest.least_sd, farthest.other_flags
         )?;
         Ok(writeln!(out, "The board computes what this computer does.")?)
     })
 }
 
+/// What the sketch prints.
+const LINE: &str = "step:0,us:50000,ohm:1600.0000,strain:0.10000,lo:0.08000,hi:0.12000,flags:0";
+
 /// A step as the board printed it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Step {
     number: u64,
+    /// Since the step before, µs.
+    since_us: u32,
     ohm: f64,
     strain: f64,
     sd: f64,
+    flags: u32,
 }
 
 impl Step {
-    /// Of a line `step:0,ohm:1600.0000,strain:0.10000,lo:0.08000,hi:0.12000`; `None` of any other.
+    /// Of a line like [`LINE`]; `None` of any other.
     fn of(line: &[u8]) -> Option<Self> {
         let line = std::str::from_utf8(line).ok()?.trim();
         let parts: Vec<(&str, &str)> = line.split(',').map(|part| part.split_once(':')).collect::<Option<_>>()?;
@@ -71,7 +80,8 @@ impl Step {
             other => other.parse().ok()?,
         };
         let sd = (number("hi")? - number("lo")?) / (2.0 * HALF_WIDTH);
-        Some(Self { number: text("step")?.parse().ok()?, ohm, strain: number("strain")?, sd })
+        let (since_us, flags) = (text("us")?.parse().ok()?, text("flags")?.parse().ok()?);
+        Some(Self { number: text("step")?.parse().ok()?, since_us, ohm, strain: number("strain")?, sd, flags })
     }
 }
 
@@ -121,8 +131,7 @@ fn listen(args: &SerialCheckArgs) -> Result<Heard, CliError> {
             "{name}: expected step 0 first, found step {number}: reset the board while it is listened to"
         ))),
         (true, None) => Err(CliError::Input(format!(
-            "{name}: expected lines like step:0,ohm:1600.0000,strain:0.10000,lo:0.08000,hi:0.12000, found none in {}; \
-             is OHMSTRAIN_CHECK 1 in the sketch?",
+            "{name}: expected lines like {LINE}, found none in {}; is OHMSTRAIN_CHECK 1 in the sketch?",
             heard.others
         ))),
     }
@@ -130,10 +139,10 @@ fn listen(args: &SerialCheckArgs) -> Result<Heard, CliError> {
 
 /// The twin's estimates from the board's readings.
 fn replayed(params: &SensorParams, plan: &Plan, dt_s: f64, steps: &[Step]) -> Result<Vec<Said>, export::ExportError> {
-    // Multiples of what single precision makes of the interval: their differences are it, exactly.
-    let dt_s = f64::from(dt_s as f32);
-    let row = |(k, step): (usize, &Step)| ReplayedRow { time_s: dt_s * k as f64, reading: step.ohm, reading_sd: 0.0 };
-    let rows: Vec<ReplayedRow> = steps.iter().enumerate().map(row).collect();
+    // As the sketch rounds it.
+    let row =
+        |step: &Step| ReplayedRow { since_s: 1e-6_f32 * step.since_us as f32, reading: step.ohm, reading_sd: 0.0 };
+    let rows: Vec<ReplayedRow> = steps.iter().map(row).collect();
     export::replay(params, plan, dt_s, &rows)
 }
 
@@ -142,10 +151,12 @@ struct Farthest {
     strain: f64,
     sd: f64,
     least_sd: f64,
+    /// Steps whose flags are others: what lies on a threshold.
+    other_flags: usize,
 }
 
 fn compared(steps: &[Step], said: &[Said]) -> Result<Farthest, CliError> {
-    let mut farthest = Farthest { strain: 0.0, sd: 0.0, least_sd: f64::INFINITY };
+    let mut farthest = Farthest { strain: 0.0, sd: 0.0, least_sd: f64::INFINITY, other_flags: 0 };
     for (step, said) in steps.iter().zip(said) {
         let (strain, sd) = (f64::from(said.strain), f64::from(said.sd));
         let (of_strain, of_sd) = ((step.strain - strain).abs(), (step.sd - sd).abs());
@@ -154,29 +165,36 @@ fn compared(steps: &[Step], said: &[Said]) -> Result<Farthest, CliError> {
         if !(of_strain <= least && of_sd <= least) {
             return Err(CliError::Check(format!(
                 "step {}: expected strain {strain:.5} ± {sd:.5} for {} ohm, found {:.5} ± {:.5} on the board; was it \
-                 exported from this sensor, with this --dt-s and this estimator?",
+                 exported from this sensor, with this estimator?",
                 step.number, step.ohm, step.strain, step.sd
             )));
         }
         farthest.strain = farthest.strain.max(of_strain);
         farthest.sd = farthest.sd.max(of_sd);
         farthest.least_sd = farthest.least_sd.min(sd);
+        farthest.other_flags += usize::from(step.flags != said.flags);
+    }
+    if farthest.other_flags as f64 > OTHER_FLAGS * steps.len() as f64 {
+        let count = farthest.other_flags;
+        return Err(CliError::Check(format!("{count} of {} steps: other flags on the board", steps.len())));
     }
     Ok(farthest)
 }
 
 #[cfg(test)]
 mod tests {
-    use super::Step;
+    use super::{LINE, Step};
 
     #[test]
     fn a_line_is_a_step_or_something_else() {
-        let step = Step::of(b"step:3,ohm:1600.5000,strain:0.10000,lo:0.08040,hi:0.11960\r").unwrap();
-        assert_eq!((step.number, step.ohm, step.strain), (3, 1600.5, 0.1));
-        assert!((step.sd - 0.01).abs() < 1e-12);
-        let open = Step::of(b"step:4,ohm:ovf,strain:0.1,lo:0.0,hi:0.2").unwrap();
+        let step = Step::of(b"step:3,us:50012,ohm:1600.5000,strain:0.10000,lo:0.08040,hi:0.11960,flags:16\r").unwrap();
+        assert_eq!((step.number, step.since_us, step.ohm, step.strain, step.flags), (3, 50012, 1600.5, 0.1, 16));
+        assert!((step.sd - 0.01).abs() < 1e-12 && Step::of(LINE.as_bytes()).is_some());
+        let open = Step::of(b"step:4,us:50000,ohm:ovf,strain:0.1,lo:0.0,hi:0.2,flags:2").unwrap();
         assert_eq!(open.ohm, f64::INFINITY);
-        for other in ["", "ets Jul 29 2019", "strain:0.1,lo:0.0,hi:0.2", "step:4,ohm:16", "time_s,resistance_ohm"] {
+        for other in
+            ["", "ets Jul 29 2019", "strain:0.1,lo:0.0,hi:0.2,flags:0", "step:4,us:5,ohm:16", "time_s,resistance_ohm"]
+        {
             assert_eq!(Step::of(other.as_bytes()), None, "{other}");
         }
     }

@@ -1,8 +1,8 @@
 //! The learned correction as the templates have it.
 
-use ohmstrain_calib::{OwnedProcess, PortableCorrection};
+use ohmstrain_calib::{OwnedProcess, OwnedSimulated, PortableCorrection};
 use ohmstrain_ekf::Real;
-use ohmstrain_ekf::correction::{FAR, FARTHEST, LINEAR, NEW, NOVEL, PASSED_OVER, RATE_GAIN, TIME_CONSTANTS_S};
+use ohmstrain_ekf::correction::{FAR, FARTHEST, LINEAR, NEW, NOVEL, OUTPUTS, PASSED_OVER, RATE_GAIN, TIME_CONSTANTS_S};
 use serde::Serialize;
 
 use super::learned::INPUTS;
@@ -33,6 +33,7 @@ pub struct CorrectionConstants {
     inducing: usize,
     processes: [ProcessConstants; 2],
     quadratics: Option<[QuadraticConstants; 2]>,
+    simulated: Option<SimulatedConstants>,
     far: Literal,
     novel: Literal,
     new: Literal,
@@ -54,6 +55,30 @@ struct ProcessConstants {
     least_variance: Literal,
     weights: Vec<Literal>,
     explained: Vec<Literal>,
+}
+
+/// What simulated rows say.
+#[derive(Debug, Serialize)]
+struct SimulatedConstants {
+    rows: Vec<Vec<Literal>>,
+    lower: Vec<Literal>,
+    upper: Vec<Literal>,
+    /// Of each of the features.
+    relevance: Literal,
+    process: ProcessConstants,
+}
+
+impl SimulatedConstants {
+    fn new(of: &OwnedSimulated<f64, INPUTS>) -> Self {
+        let process = ProcessConstants::new("SIMULATED", "Strain from the features, as the law has it.", &of.process);
+        Self {
+            rows: of.rows.iter().map(narrowed).collect(),
+            lower: of.scales.iter().map(|scale| narrow(scale.lower)).collect(),
+            upper: of.scales.iter().map(|scale| narrow(scale.upper)).collect(),
+            relevance: narrow(of.process.numbers.relevance[OUTPUTS]),
+            process,
+        }
+    }
 }
 
 /// A quadratic function.
@@ -128,6 +153,7 @@ impl CorrectionConstants {
                 ),
             ],
             quadratics: quadratics.map(|both| both.each_ref().map(QuadraticConstants::new)),
+            simulated: learned.simulated.as_ref().map(SimulatedConstants::new),
             far: narrow(FAR),
             novel: narrow(NOVEL),
             new: narrow(NEW),

@@ -73,18 +73,20 @@ const HISTORIES: OfKind = OfKind {
     hypothesis: 2150.0,
     branch: 740.0,
     curve: 1050.0,
-    flash: 10_100.0,
+    flash: 11_900.0,
     flash_branch: 2600.0,
     stack: [740.0, 154.0, 100.0, 49.0],
 };
 
-/// Instructions of a correction for each row, for each entry of the two triangles, for its quadratic functions.
+/// Instructions of a correction for each row, for each simulated one, for each entry of the two triangles, for its quadratic functions.
 const ROW: f64 = 235.3;
+const SIMULATED_ROW: f64 = 110.0;
 const ENTRY: f64 = 12.7;
 const QUADRATIC: f64 = 1930.0;
 /// Bytes of code of a correction and of its quadratic functions; bytes of the stack.
 const CORRECTION_CODE: f64 = 2490.0;
 const QUADRATIC_CODE: f64 = 2000.0;
+const SIMULATED_CODE: f64 = 400.0;
 const CORRECTION_STACK: f64 = 270.0;
 
 const FLOAT: usize = 4;
@@ -113,6 +115,12 @@ impl Cost {
             // Inputs and two weights a row, two triangles, of each input four numbers of its scale and two relevances.
             flash += CORRECTION_CODE + FLOAT as f64 * ((inputs + 2.0) * rows + 2.0 * entries + 6.0 * inputs);
             stack += CORRECTION_STACK;
+            if let Some(simulated) = &learned.simulated {
+                let rows = simulated.rows.len() as f64;
+                instructions += SIMULATED_ROW * rows;
+                // Features and a weight a row, two ends of the range of each.
+                flash += SIMULATED_CODE + FLOAT as f64 * ((FEATURES as f64 + 1.0) * rows + 2.0 * FEATURES as f64);
+            }
         }
         if quadratics.is_some() {
             instructions += QUADRATIC;

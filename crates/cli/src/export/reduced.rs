@@ -3,7 +3,8 @@
 //! The mean of a process with a long length scale is nearly quadratic within the range of its rows. So the means become a
 //! quadratic function and kernels of the rows that say most (the first ones: a correction lists its inducing rows first, in
 //! the order of a pivoted Cholesky decomposition), fitted to the processes' own means. Variances take the kernels of
-//! fewer inducing rows, onto which those of the others are projected, as the others are projected already (Nyström).
+//! fewer inducing rows, onto which those of the others are projected, as the others are projected already (Nyström). What simulated
+//! rows say is left out.
 
 use nalgebra::{DMatrix, DVector};
 use ohmstrain_calib::{OwnedCorrection, OwnedProcess};
@@ -62,7 +63,7 @@ pub fn reduced(full: &Correction, to: Rows) -> Option<(Correction, [Quadratic; 2
     let (direct, of_direct) = process(&full.direct, Which::Direct, &full.rows, &points, to)?;
     let (residual, of_residual) = process(&full.residual, Which::Residual, &full.rows, &points, to)?;
     let rows = full.rows[..rows].to_vec();
-    Some((Correction { rows, direct, residual, ..full.clone() }, [of_direct, of_residual]))
+    Some((Correction { rows, direct, residual, simulated: None, ..full.clone() }, [of_direct, of_residual]))
 }
 
 /// Rows of a triangle of so many numbers.

@@ -13,8 +13,8 @@ use super::{ExportError, too_many_branches};
 
 /// A row of a recording; a missing reading is NaN.
 pub struct ReplayedRow {
-    /// Time, s.
-    pub time_s: f64,
+    /// Since the row before, or the first since the start, s.
+    pub since_s: f32,
     /// The reading, in the sensor's unit.
     pub reading: f64,
     /// The deviation that its electronics add, in the same unit.
@@ -60,14 +60,12 @@ fn run<T: Real, const B: usize, const N: usize, const L: usize, const K: usize>(
 ) -> Result<Vec<Said<T>>, ExportError> {
     let exactly = |x: f32| T::of(x.into());
     let mut twin: Twin<T, B, N, L, K> = Twin::new(model, &sensor.parts, numbers).map_err(refused)?;
-    let mut last_s = None;
     let said = |row: &ReplayedRow| {
-        let since_s = last_s.replace(row.time_s).map_or(sensor.parts.dt_s, |last_s| (row.time_s - last_s) as f32);
         let reading = (!row.reading.is_nan()).then_some(row.reading as f32);
         let input = Input { reading, reading_sd: row.reading_sd as f32 };
         let reading = relative(sensor.rest_reading, &input)
             .map(|reading| Reading { value: exactly(reading.value), extra_variance: exactly(reading.extra_variance) });
-        let flags = twin.step_after(exactly(since_s), reading).map_err(refused)?;
+        let flags = twin.step_after(exactly(row.since_s), reading).map_err(refused)?;
         let strain = twin.strain();
         Ok(Said { strain: strain.mean, sd: strain.sd(), flags })
     };
@@ -92,10 +90,11 @@ mod tests {
         let dt_s = |k: u32| 0.05 + 0.03 * (1.7 * f64::from(k)).sin();
         let mut time_s = 0.0;
         let row = |k: u32| {
-            time_s += dt_s(k);
+            let since_s = dt_s(k) as f32;
+            time_s += f64::from(since_s);
             let strain = 0.5 * params.limits.span() * (1.0 - (0.9 * time_s).cos());
             let rho = law.gauge_value_and_slope(strain).0 + 1e-3 * (5.3 * f64::from(k)).sin();
-            ReplayedRow { time_s, reading: params.rest_reading * (1.0 + rho), reading_sd: 0.0 }
+            ReplayedRow { since_s, reading: params.rest_reading * (1.0 + rho), reading_sd: 0.0 }
         };
         (0..1500).map(row).collect()
     }
@@ -151,9 +150,10 @@ mod tests {
             let fixed = FixedRate::<2, 5>::new::<15>(params, &parts, 0.05).unwrap();
             let twin = run::<f64, 2, 5, 15, HYPOTHESES>(fixed.reference, &fixed, fixed.exact(), &rows).unwrap();
             let mut filter = sensor.filter().estimator(kind).build().unwrap();
-            let mut largest = 0.0_f64;
+            let (mut largest, mut time_s) = (0.0_f64, 0.0);
             for (k, (row, said)) in rows.iter().zip(twin).enumerate() {
-                let expected = filter.step(row.time_s, row.reading).unwrap();
+                time_s += f64::from(row.since_s);
+                let expected = filter.step(time_s, row.reading).unwrap();
                 if k < SETTLED {
                     continue;
                 }

@@ -4,8 +4,9 @@
 //! calibrated on. A *direct* process says strain from features of the readings alone; a *residual* process says what the
 //! filter's strain lacks, from what the filter says and the same features. A smoother has two more direct processes, one
 //! of the readings' past and one of their future: neither is as easily led astray by a motion that begins as a known one
-//! and ends as none. The result is the [`mixture`] of all. Far from the training rows the residual process says what the
-//! filter says, its variance is no smaller than the filter's, and the result's grows.
+//! and ends as none. They are a [`mixture`]. Far from the training rows the residual process says what the
+//! filter says, its variance is no smaller than the filter's, and the mixture's grows; so that a last process is heard there, which
+//! has learned what the law says of motions that the sensor was not seen in. It cannot lose its way as a filter can.
 //!
 //! # Policy
 //! - Configuration, borrowed as slices that may lie in flash, is apart from state ([`ReadingFeatures`]); no heap, no panic.
@@ -20,7 +21,7 @@ mod process;
 
 use ohmstrain_model::StrainRange;
 
-use crate::kernel::{MOST_LANES, Several, Work};
+use crate::kernel::{Several, Work};
 use crate::{Gaussian, Real};
 pub use features::{
     FARTHEST, FEATURES, FeatureScale, PASSED_OVER, RATE_GAIN, ReadingFeatures, Starts, TIME_CONSTANTS_S, settled,
@@ -70,12 +71,25 @@ pub struct Correction<'a, T, const D: usize, const S: usize = 0> {
     pub one_sided: [Process<'a, T, D>; S],
     /// Strain minus the filter's strain, from all inputs.
     pub residual: Process<'a, T, D>,
+    /// Strain from the features, as the law has it where the sensor has not been.
+    pub simulated: Option<Simulated<'a, T, D>>,
     /// Limits of the output.
     pub limits: StrainRange<T>,
     /// Variance of the strain over the training rows.
     pub strain_variance: T,
     /// Factor on the mixture's variance, from training rows left out.
     pub variance_factor: T,
+}
+
+/// A process that sees features alone, of readings that a law gave in simulated motions. Its variance is its noise.
+#[derive(Clone, Copy, Debug)]
+pub struct Simulated<'a, T, const D: usize> {
+    /// Standardised inputs of the rows; outputs of a filter are not seen.
+    pub rows: &'a [[T; D]],
+    /// Scales of the inputs.
+    pub scales: &'a [InputScale<T>; D],
+    /// What the rows say.
+    pub process: Process<'a, T, D>,
 }
 
 /// A corrected strain and what it was made of.
@@ -89,6 +103,8 @@ pub struct Corrected<T, const S: usize = 0> {
     pub one_sided: [Gaussian<T>; S],
     /// What filter and residual process say together.
     pub residual: Gaussian<T>,
+    /// What the simulated rows say.
+    pub simulated: Option<Gaussian<T>>,
     /// How little the inputs resemble the training rows, 0 to 1.
     pub novelty: T,
 }
@@ -110,22 +126,78 @@ impl<T: Real, const D: usize, const S: usize> Correction<'_, T, D, S> {
         T::in_vectors(work).unwrap_or_else(|| work.with_lanes(T::zero()))
     }
 
+    /// What the simulated rows say.
     #[inline(always)]
-    fn standardised(&self, inputs: &[T; D]) -> Standardised<T, D> {
-        let (mut x, mut outside) = ([T::zero(); D], [T::zero(); D]);
-        for ((x, outside), (input, scale)) in x.iter_mut().zip(&mut outside).zip(inputs.iter().zip(self.scales)) {
-            let inside = input.max(scale.lower).min(scale.upper);
-            *x = (inside - scale.mean) / scale.sd;
-            let excess = (*input - inside) / scale.sd;
-            *outside = excess * excess;
-        }
-        Standardised { inputs: x, outside }
+    fn of_simulated<V: Several<Number = T>>(&self, like: V, inputs: &[T; D], of: &Simulated<'_, T, D>) -> Gaussian<T> {
+        let Standardised { inputs: x, outside } = standardised(of.scales, inputs);
+        let reading = x.get(OUTPUTS).copied().unwrap_or(T::zero());
+        let mut kernels = Kernels::new(&of.process);
+        visit(like, of.rows, &x, |rows| {
+            kernels.add(&of.process, &rows.squares, rows.column(OUTPUTS).scale(reading), rows.count());
+        });
+        let said = kernels.said(like, &of.process, reading);
+        self.widened(said, &of.process, of.process.distance(&outside, OUTPUTS), T::zero())
     }
 
     /// A process' strain on top of `base`, within the limits, with all that its variance gets.
     fn widened(&self, said: Said<T>, process: &Process<'_, T, D>, outside: T, base: T) -> Gaussian<T> {
         let variance = said.strain.variance * process.widening + T::of(FAR) * self.strain_variance * outside;
         Gaussian { mean: self.limits.clamp(base + said.strain.mean), variance }
+    }
+}
+
+#[inline(always)]
+fn standardised<T: Real, const D: usize>(scales: &[InputScale<T>; D], inputs: &[T; D]) -> Standardised<T, D> {
+    let (mut x, mut outside) = ([T::zero(); D], [T::zero(); D]);
+    for ((x, outside), (input, scale)) in x.iter_mut().zip(&mut outside).zip(inputs.iter().zip(scales)) {
+        let inside = input.max(scale.lower).min(scale.upper);
+        *x = (inside - scale.mean) / scale.sd;
+        let excess = (*input - inside) / scale.sd;
+        *outside = excess * excess;
+    }
+    Standardised { inputs: x, outside }
+}
+
+/// Training rows side by side, one in each lane, and the squares of how far they are from the inputs.
+struct SideBySide<'r, V: Several, const D: usize> {
+    like: V,
+    rows: &'r [[V::Number; D]],
+    first: &'r [V::Number; D],
+    squares: [V; D],
+}
+
+impl<V: Several, const D: usize> SideBySide<'_, V, D> {
+    fn count(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// An input of all of them; lanes that are left have the first one's.
+    #[inline(always)]
+    fn column(&self, i: usize) -> V {
+        let of_lane = |lane: usize| {
+            [self.rows.get(lane).unwrap_or(self.first).get(i).copied().unwrap_or(self.like.nothing().at(0))]
+        };
+        let [column] = self.like.build(of_lane);
+        column
+    }
+}
+
+/// Visits training rows, as many at a time as there are lanes.
+#[inline(always)]
+fn visit<V: Several<Number = T>, T: Real, const D: usize>(
+    like: V,
+    rows: &[[T; D]],
+    x: &[T; D],
+    mut see: impl FnMut(&SideBySide<'_, V, D>),
+) {
+    for rows in rows.chunks(V::WIDTH) {
+        let Some(first) = rows.first() else { break };
+        let mut now = SideBySide { like, rows, first, squares: [like.nothing(); D] };
+        for i in 0..D {
+            let apart = like.with(x[i]) - now.column(i);
+            now.squares[i] = apart * apart;
+        }
+        see(&now);
     }
 }
 
@@ -143,34 +215,19 @@ impl<T: Real, const D: usize, const S: usize> Work<T> for Correcting<'_, T, D, S
     #[inline(always)]
     fn with_lanes<V: Several<Number = T>>(self, like: V) -> Corrected<T, S> {
         let Self { correction: of, inputs, filtered } = self;
-        let Standardised { inputs: x, outside } = of.standardised(inputs);
+        let Standardised { inputs: x, outside } = standardised(of.scales, inputs);
         let (mut direct, mut residual) = (Kernels::new(&of.direct), Kernels::new(&of.residual));
         let mut sides = of.one_sided.each_ref().map(Kernels::new);
         let of_residual = Process { least_variance: of.residual.least_variance.max(filtered.variance), ..of.residual };
         let (reading, strain) = (x.get(OUTPUTS).copied().unwrap_or(T::zero()), x[0]);
-        for rows in of.rows.chunks(V::WIDTH) {
-            let Some(first) = rows.first() else { break };
-            // Lanes that are left have the first one's numbers.
-            let mut side_by_side = [first; MOST_LANES];
-            for lane in 1..V::WIDTH {
-                side_by_side[lane] = rows.get(lane).unwrap_or(first);
-            }
-            let column = |i: usize| {
-                let [column] = like.build(|lane| [side_by_side[lane].get(i).copied().unwrap_or(T::zero())]);
-                column
-            };
-            let mut squares = [like.nothing(); D];
-            for i in 0..D {
-                let apart = like.with(x[i]) - column(i);
-                squares[i] = apart * apart;
-            }
-            let readings = column(OUTPUTS).scale(reading);
-            direct.add(&of.direct, &squares, readings, rows.len());
+        visit(like, of.rows, &x, |rows| {
+            let readings = rows.column(OUTPUTS).scale(reading);
+            direct.add(&of.direct, &rows.squares, readings, rows.count());
             for (kernels, process) in sides.iter_mut().zip(&of.one_sided) {
-                kernels.add(process, &squares, readings, rows.len());
+                kernels.add(process, &rows.squares, readings, rows.count());
             }
-            residual.add(&of.residual, &squares, column(0).scale(strain), rows.len());
-        }
+            residual.add(&of.residual, &rows.squares, rows.column(0).scale(strain), rows.count());
+        });
         let of_readings = |kernels: Kernels<T>, process| {
             let said = kernels.said(like, process, reading);
             of.widened(said, process, process.distance(&outside, OUTPUTS), T::zero())
@@ -184,7 +241,10 @@ impl<T: Real, const D: usize, const S: usize> Work<T> for Correcting<'_, T, D, S
         let residual = of.widened(said, &of.residual, outside, filtered.mean);
         let mixed = mixture([direct, residual].into_iter().chain(one_sided));
         let variance = mixed.variance * of.variance_factor + T::of(NOVEL) * of.strain_variance * novelty;
-        Corrected { strain: Gaussian { mean: mixed.mean, variance }, direct, one_sided, residual, novelty }
+        let learned = Gaussian { mean: mixed.mean, variance };
+        let simulated = of.simulated.map(|simulated| of.of_simulated(like, inputs, &simulated));
+        let strain = simulated.map_or(learned, |simulated| mixture([learned, simulated]));
+        Corrected { strain, direct, one_sided, residual, simulated, novelty }
     }
 }
 
@@ -213,7 +273,7 @@ pub fn mixture<T: Real>(voices: impl IntoIterator<Item = Gaussian<T>, IntoIter: 
 
 #[cfg(all(test, feature = "simd"))]
 mod tests {
-    use super::{Correcting, Correction, FEATURES, INDUCING, InputScale, OUTPUTS, Process, StrainRange};
+    use super::{Correcting, Correction, FEATURES, INDUCING, InputScale, OUTPUTS, Process, Simulated, StrainRange};
     use crate::Gaussian;
     use crate::kernel::Work;
 
@@ -236,12 +296,14 @@ mod tests {
             widening: 1.2,
             least_variance: 0.3,
         };
+        let scales = [InputScale { mean: 0.1, sd: 0.8, lower: -1.0, upper: 1.2 }; INPUTS];
         let correction = Correction {
             rows: &rows,
-            scales: &[InputScale { mean: 0.1, sd: 0.8, lower: -1.0, upper: 1.2 }; INPUTS],
+            scales: &scales,
             direct: process(2.0),
             one_sided: [process(1.5), process(0.7)],
             residual: process(3.0),
+            simulated: Some(Simulated { rows: &rows[3..], scales: &scales, process: process(2.5) }),
             limits: StrainRange { lower: -9.0, upper: 9.0 },
             strain_variance: 0.7,
             variance_factor: 1.1,

@@ -2,7 +2,8 @@ use ohmstrain_ekf::correction::{FEATURES, OUTPUTS};
 
 use super::table::{FACTOR, FieldError, POSITIVE, SIGNED, Table};
 use crate::params::correction::{
-    CorrectionParams, CorrectionScale, CorrectorParams, FUTURE_FEATURES, ProcessParams, SIDES, TrainingRow,
+    CorrectionParams, CorrectionScale, CorrectorParams, FUTURE_FEATURES, ProcessParams, SIDES, SimulatedParams,
+    SimulatedRow, TrainingRow,
 };
 use crate::params::estimator::EstimatorKind;
 
@@ -17,11 +18,29 @@ impl CorrectionParams {
         self.readings.validate(&table.table("readings"))?;
         self.filter.validate(&table.table("filter"), 0)?;
         self.smoother.validate(&table.table("smoother"), SIDES)?;
-        if !ROWS.contains(&self.rows.len()) {
-            let expected = format!("{} to {} entries", ROWS.start(), ROWS.end());
-            return Err(table.wrong("rows", expected, self.rows.len()));
-        }
+        count(table, self.rows.len())?;
+        self.rows.iter().enumerate().try_for_each(|(index, row)| row.validate(&table.entry("rows", index)))?;
+        self.simulated.validate(&table.table("simulated"))
+    }
+}
+
+fn count(table: &Table, rows: usize) -> Result<(), FieldError> {
+    let expected = || format!("{} to {} entries", ROWS.start(), ROWS.end());
+    if ROWS.contains(&rows) { Ok(()) } else { Err(table.wrong("rows", expected(), rows)) }
+}
+
+impl SimulatedParams {
+    fn validate(&self, table: &Table) -> Result<(), FieldError> {
+        table.number("sd", self.sd, POSITIVE)?;
+        count(table, self.rows.len())?;
         self.rows.iter().enumerate().try_for_each(|(index, row)| row.validate(&table.entry("rows", index)))
+    }
+}
+
+impl SimulatedRow {
+    fn validate(&self, table: &Table) -> Result<(), FieldError> {
+        table.numbers("past", &self.past, SIGNED)?;
+        table.number("strain", self.strain, SIGNED)
     }
 }
 

@@ -10,15 +10,16 @@ mod scores;
 mod summary;
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 
+use clap::ValueEnum;
 use journal::{Entry, Journal, State};
 use plan::Job;
 use process::Workshop;
 
-use crate::args::BatchArgs;
+use crate::args::{BatchArgs, SummaryForm};
 use crate::error::CliError;
 use crate::progress::Progress;
 use crate::verbosity::Verbosity;
@@ -36,9 +37,11 @@ pub fn run(args: &BatchArgs) -> Result<(), CliError> {
     let work = Work { args, jobs: &jobs, journal: &journal, workshop: &workshop, progress: &progress };
     let entries = work.all()?;
     drop(progress);
-    let path = args.output.join(format!("summary.{}", args.summary.name()));
-    summary::write(&entries, args.summary, &path)?;
-    closing(&entries, &path)
+    let path = |form: SummaryForm| args.output.join(format!("summary.{}", form.name()));
+    summary::write(&entries, args.summary, &path(args.summary))?;
+    let others = SummaryForm::value_variants().iter().filter(|form| **form != args.summary);
+    let stale: Vec<PathBuf> = others.map(|form| path(*form)).filter(|path| path.exists()).collect();
+    closing(&entries, &path(args.summary), &stale)
 }
 
 struct Work<'a> {
@@ -103,13 +106,14 @@ impl Work<'_> {
     }
 }
 
-/// Says how many there are of each kind.
-fn closing(entries: &[Entry], summary: &Path) -> Result<(), CliError> {
+/// Says how many there are of each kind, and which summaries are not of this run.
+fn closing(entries: &[Entry], summary: &Path, stale: &[PathBuf]) -> Result<(), CliError> {
     let count = |state| entries.iter().filter(|entry| entry.state == state).count();
     let (done, kept, failed) = (count(State::Done), count(State::Kept), count(State::Failed));
     let warned = entries.iter().filter(|entry| !entry.warnings.is_empty()).count();
-    let text =
+    let mut text =
         format!("{done} done, {kept} done before, {failed} failed, {warned} with warnings: {}", summary.display());
+    stale.iter().for_each(|path| text += &format!("; {} is from before this run", path.display()));
     if failed > 0 {
         return Err(CliError::Batch(text));
     }

@@ -4,9 +4,10 @@ use std::path::{Component, Path, PathBuf};
 
 use clap::Parser;
 use csv::{Reader, StringRecord};
+use ohmstrain_calib::EstimatorKind;
 
 use super::journal::Journal;
-use crate::args::{Args, BatchArgs, BatchCommand, Command};
+use crate::args::{Args, BatchArgs, BatchCommand, Command, Estimators};
 use crate::error::CliError;
 use crate::sensor_file;
 
@@ -19,6 +20,8 @@ pub struct Job {
     pub sensor: Option<PathBuf>,
     /// What `--prior` among the flags names.
     pub prior: Option<PathBuf>,
+    /// What `--estimator` among the flags names.
+    estimator: Option<EstimatorKind>,
     /// Flags besides.
     pub flags: Vec<String>,
     /// The output below the folder of outputs.
@@ -192,8 +195,18 @@ fn check_arguments(job: &mut Job, args: &BatchArgs) -> Result<(), CliError> {
             job.prior = calibrate.prior;
             None
         }
-        Command::Filter(filter) => filter.written.output,
-        Command::Smooth(smooth) => smooth.written.output,
+        Command::Filter(filter) => {
+            job.estimator = filter.estimate.estimator.chosen().map(|estimator| estimator.0);
+            filter.written.output
+        }
+        Command::Smooth(smooth) => {
+            job.estimator = smooth.estimate.estimator.chosen().map(|estimator| estimator.0);
+            smooth.written.output
+        }
+        Command::Evaluate(evaluate) => {
+            job.estimator = if let Estimators::One(kind) = evaluate.estimator { Some(kind) } else { None };
+            None
+        }
         _ => None,
     };
     match output {
@@ -204,13 +217,11 @@ fn check_arguments(job: &mut Job, args: &BatchArgs) -> Result<(), CliError> {
     }
 }
 
-/// A sensor that recordings share is said to be none before anything is done, and once. With an estimator among the flags it may
-/// be one for that alone: those recordings' own processes say so.
+/// A sensor that recordings share is said to be none, or none for their estimator, before anything is done, and once.
 pub fn check_sensor(jobs: &[Job], args: &BatchArgs) -> Result<(), CliError> {
-    let plain = |job: &&Job| !job.flags.iter().any(|flag| flag.starts_with("--estimator"));
-    let mut shared = jobs.iter().filter(plain).filter_map(|job| job.sensor.as_ref());
-    let shared = shared.find(|sensor| args.sensor.as_ref() == Some(*sensor));
-    shared.map_or(Ok(()), |sensor| sensor_file::read(sensor, None).map(|_| ()))
+    let shared = jobs.iter().filter_map(|job| job.sensor.as_ref().map(|sensor| (sensor, job.estimator)));
+    let shared: HashSet<_> = shared.filter(|(sensor, _)| args.sensor.as_ref() == Some(*sensor)).collect();
+    shared.into_iter().try_for_each(|(sensor, estimator)| sensor_file::read(sensor, estimator).map(|_| ()))
 }
 
 /// Refuses outputs that would replace each other, an input, or what no earlier run wrote.

@@ -136,12 +136,71 @@ static float variance_of(const process *p, const float kernel[INDUCING], float f
     return (latent > least ? latent : least) * *unknown + p->noise;
 }
 
+{% if correction.simulated %}
+enum { SIMULATED_ROWS = << correction.simulated.rows|length >> };
+
+/* Standardised features of readings that the law gave in simulated motions, what they say, and their range. */
+static const float SIMULATED_ROW[SIMULATED_ROWS][FEATURES] = {
+{% for row in correction.simulated.rows %}
+    {<< row[6:]|join("f, ") >>f},
+{% endfor %}
+};
+static const float SIMULATED_WEIGHT[SIMULATED_ROWS] = {<< correction.simulated.process.weights|join("f, ") >>f};
+static const float SIMULATED_LOWER[FEATURES] = {<< correction.simulated.lower[6:]|join("f, ") >>f};
+static const float SIMULATED_UPPER[FEATURES] = {<< correction.simulated.upper[6:]|join("f, ") >>f};
+
+/* The strain, as the law has it where the sensor was not seen, and its variance. */
+static float simulated(const float feature[FEATURES], float *variance)
+{
+    float x[FEATURES], said = << correction.simulated.process.mean >>f, outside = 0.0f;
+    int i, k;
+
+    for (i = 0; i < FEATURES; i++) {
+        const float inside = clamped(feature[i], SIMULATED_LOWER[i], SIMULATED_UPPER[i]);
+        const float excess = (feature[i] - inside) / INPUT_SD[OUTPUTS + i];
+        outside += excess * excess * << correction.simulated.relevance >>f;
+        x[i] = (inside - INPUT_MEAN[OUTPUTS + i]) / INPUT_SD[OUTPUTS + i];
+    }
+    for (k = 0; k < SIMULATED_ROWS; k++) {
+        const float *row = SIMULATED_ROW[k];
+        float sum = 0.0f;
+{% for i in range(7) %}
+        sum += (x[<< i >>] - row[<< i >>]) * (x[<< i >>] - row[<< i >>]) * << correction.simulated.relevance >>f;
+{% endfor %}
+        said += SIMULATED_WEIGHT[k] * (expf(-sum) + linear(x[0] * row[0]));
+    }
+    outside /= << correction.simulated.relevance >>f;
+    *variance = << correction.simulated.process.noise >>f + << correction.far >>f * << correction.strain_variance >>f * outside;
+    return clamped(said, OHMSTRAIN_LOWER, OHMSTRAIN_UPPER);
+}
+
+{% endif %}
+/* The mixture of two, each weighted by its variance to the power -3/2; an exact one is all that counts. */
+static float mixture(const float said[2], const float spread[2], float *variance)
+{
+    const float least = spread[1] < spread[0] ? spread[1] : spread[0];
+    float share[2], total, mean;
+    int i;
+
+    for (i = 0; i < 2; i++) {
+        const float ratio = least / spread[i];
+        share[i] = least > 0.0f ? ratio * sqrtf(ratio) : (float)(spread[i] <= least && (i == 0 || spread[0] > least));
+    }
+    total = share[0] + share[1];
+    share[0] /= total;
+    share[1] /= total;
+    mean = share[0] * said[0] + share[1] * said[1];
+    *variance = share[0] * (spread[0] + (said[0] - mean) * (said[0] - mean)) +
+                share[1] * (spread[1] + (said[1] - mean) * (said[1] - mean));
+    return mean;
+}
+
 /* The strain and its variance, corrected. `filtered` is the filter's strain, moved into the limits. */
 static void correct(const summary *all, const readings *seen, float filtered, float filtered_variance, float *strain,
                     float *variance)
 {
     float x[INPUTS], kernel[2][INDUCING], said[2], spread[2], unknown, outside[2] = {0.0f, 0.0f};
-    float least, novelty, total, mean, share[2];
+    float least, novelty;
     int i, k;
 
     x[0] = filtered;
@@ -203,21 +262,16 @@ static void correct(const summary *all, const readings *seen, float filtered, fl
     spread[1] = spread[1] * RESIDUAL.widening + << correction.far >>f * << correction.strain_variance >>f * outside[1];
     said[1] = clamped(filtered + said[1], OHMSTRAIN_LOWER, OHMSTRAIN_UPPER);
 
-    /* Their mixture, each weighted by its variance to the power -3/2; an exact one is all that counts. */
-    least = spread[1] < spread[0] ? spread[1] : spread[0];
-    for (i = 0; i < 2; i++) {
-        const float ratio = least / spread[i];
-        share[i] = least > 0.0f ? ratio * sqrtf(ratio) : (float)(spread[i] <= least && (i == 0 || spread[0] > least));
-    }
-    total = share[0] + share[1];
-    share[0] /= total;
-    share[1] /= total;
-    mean = share[0] * said[0] + share[1] * said[1];
-    *variance = (share[0] * (spread[0] + (said[0] - mean) * (said[0] - mean)) +
-                 share[1] * (spread[1] + (said[1] - mean) * (said[1] - mean))) *
-                    << correction.variance_factor >>f +
+    said[0] = mixture(said, spread, &spread[0]);
+    spread[0] = spread[0] * << correction.variance_factor >>f +
                 << correction.novel >>f * << correction.strain_variance >>f * novelty;
-    *strain = mean;
+{% if correction.simulated %}
+    said[1] = simulated(seen->feature, &spread[1]);
+    *strain = mixture(said, spread, variance);
+{% else %}
+    *strain = said[0];
+    *variance = spread[0];
+{% endif %}
     /* Without a reading the deviation grows as that of the filter. */
     if (seen->missing && filtered_variance > seen->known_variance) {
         *variance += filtered_variance - seen->known_variance;

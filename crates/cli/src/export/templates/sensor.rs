@@ -6,7 +6,7 @@
 #![allow(dead_code, clippy::excessive_precision, clippy::unreadable_literal, reason = "generated")]
 
 {% if correction %}
-use ohmstrain_ekf::correction::{Correction, FEATURES, FeatureScale, InputScale, OUTPUTS, Process, ReadingFeatures};
+use ohmstrain_ekf::correction::{Correction, FEATURES, FeatureScale, InputScale, OUTPUTS, Process, ReadingFeatures{% if correction.simulated %}, Simulated{% endif %}};
 {% endif %}
 {% if splits %}
 use ohmstrain_ekf::{Belief, Compact, {% if rests %}Dwell, {% endif %}Evidence, Mixture, Reading, SignSplit, SparseEkf, StepError};
@@ -210,6 +210,25 @@ pub const CORRECTION: Correction<'static, f32, INPUTS> = Correction {
         least_variance: << p.least_variance >>,
     },
 {% endfor %}
+{% if correction.simulated %}
+{% set p = correction.simulated.process %}
+    simulated: Some(Simulated {
+        rows: &SIMULATED_ROWS,
+        scales: &SIMULATED_SCALES,
+        process: Process {
+            relevance: [<< p.relevance|join(", ") >>],
+            mean: << p.mean >>,
+            weights: &SIMULATED_WEIGHTS,
+            explained: &[],
+            variance: << p.variance >>,
+            noise: << p.noise >>,
+            widening: << p.widening >>,
+            least_variance: << p.least_variance >>,
+        },
+    }),
+{% else %}
+    simulated: None,
+{% endif %}
     limits: LIMITS,
     strain_variance: << correction.strain_variance >>,
     variance_factor: << correction.variance_factor >>,
@@ -229,4 +248,17 @@ static ROWS: [[f32; INPUTS]; << correction.rows|length >>] = [
 static << p.name >>_WEIGHTS: [f32; << p.weights|length >>] = [<< p.weights|join(", ") >>];
 static << p.name >>_EXPLAINED: [f32; << p.explained|length >>] = [<< p.explained|join(", ") >>];
 {% endfor %}
+{% if correction.simulated %}
+static SIMULATED_SCALES: [InputScale<f32>; INPUTS] = [
+{% for mean in correction.mean %}
+    InputScale { mean: << mean >>, sd: {% if correction.sd[loop.index0] is none %}f32::INFINITY{% else %}<< correction.sd[loop.index0] >>{% endif %}, lower: << correction.simulated.lower[loop.index0] >>, upper: << correction.simulated.upper[loop.index0] >> },
+{% endfor %}
+];
+static SIMULATED_ROWS: [[f32; INPUTS]; << correction.simulated.rows|length >>] = [
+{% for row in correction.simulated.rows %}
+    [<< row|join(", ") >>],
+{% endfor %}
+];
+static SIMULATED_WEIGHTS: [f32; << correction.simulated.process.weights|length >>] = [<< correction.simulated.process.weights|join(", ") >>];
+{% endif %}
 {% endif %}
