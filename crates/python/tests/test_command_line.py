@@ -55,6 +55,8 @@ def test_gaps_and_codes(folder, trace, sensor):
 def test_calibrate(folder, trace):
     made = oh.calibrate([trace[trace["time_s"] < 300]], estimator="sign-split")
     written = oh.Sensor.load(folder / "sensor.toml").params
+    # The command tested it on the rows after 300 s, which Python was not given.
+    assert written.pop("tested")["coverage_95_percent"] > 0
     assert {**made.params, "recordings": None} == {**written, "recordings": None}
     lines = repr(made).splitlines()
     assert lines[0].startswith("Verdict ") and lines[-1].startswith("Sensor ") and len(lines) <= 10
