@@ -1,14 +1,14 @@
-use crate::calibrate::simulated_motions::simulated_rows;
-use crate::law::structure::LawFit;
-use crate::motion_stats::MotionStats;
 use ohmstrain_ekf::Reading;
 use ohmstrain_ekf::correction::FEATURES;
 
 use crate::CalibrationError;
 use crate::calibrate::correction_scale::{each_row, reading_scale};
+use crate::calibrate::simulated_motions::simulated_rows;
 use crate::correction::Examples;
 use crate::filter::Filter;
 use crate::filter::corrected::{future_features, outputs};
+use crate::law::structure::LawFit;
+use crate::motion_stats::MotionStats;
 use crate::order::median;
 use crate::params::RangeParams;
 use crate::params::correction::{
