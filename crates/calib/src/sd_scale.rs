@@ -5,6 +5,8 @@ use crate::params::LARGEST_SD_SCALE;
 const SCALES: std::ops::RangeInclusive<f64> = 1.0..=LARGEST_SD_SCALE;
 /// What has been widened to cover the worst block may be narrowed to cover all of them.
 const JOINT_SCALES: std::ops::RangeInclusive<f64> = 0.35..=3.0;
+/// Turns in which a factor is found. Each leaves less than half of what was wrong.
+const TURNS: usize = 6;
 /// Half-widths of the 50, 90 and 95 % intervals of a standard normal.
 const LEVELS: [(usize, f64); 3] = [(50, 0.674_489_750_196_081_7), (90, 1.644_853_626_951_472_2), (95, Z_95)];
 /// Half-width of the 95 % interval of a standard normal.
@@ -35,6 +37,12 @@ pub(crate) fn joint_scale(deviations: &[f64]) -> f64 {
     mean.map_or(1.0, |mean| mean.exp().clamp(*JOINT_SCALES.start(), *JOINT_SCALES.end()))
 }
 
+/// The same where deviations are no multiple of what they are multiplied with: found in turns from the errors that a factor leaves.
+pub(crate) fn joint_scale_of(deviations: impl Fn(f64) -> Vec<f64>) -> f64 {
+    let next = |scale: f64| (scale * joint_scale(&deviations(scale))).clamp(*JOINT_SCALES.start(), *JOINT_SCALES.end());
+    (0..TURNS).fold(1.0, |scale, _| next(scale))
+}
+
 fn quantile(deviations: &[f64], percent: usize) -> Option<f64> {
     let sorted = sorted(deviations.iter().copied());
     let rank = (sorted.len().saturating_sub(1) * percent).div_ceil(100);
@@ -43,7 +51,7 @@ fn quantile(deviations: &[f64], percent: usize) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::{LEVELS, Z_95, joint_scale, sd_scale};
+    use super::{LEVELS, Z_95, joint_scale, joint_scale_of, sd_scale};
 
     /// Deviations 1/100, 2/100, … 1 in units of `factor` interval widths: the 95 % quantile is 0.95 of them.
     fn deviations(factor: f64) -> Vec<Vec<f64>> {
@@ -69,6 +77,19 @@ mod tests {
         let two = |share: f64| if share < 0.925 { 1.0 } else { 2.0 };
         let uneven: Vec<f64> = (0..10_000).map(|k| two(k as f64 / 1e4) * half(k)).collect();
         assert!((joint_scale(&uneven) - 2.0_f64.powf(1.0 / LEVELS.len() as f64)).abs() < 1e-3);
+    }
+
+    /// Variances of which half is no multiple of the factor's: errors 1.3 times a normal one, so that 0.5 + 0.5 s² = 1.69.
+    #[test]
+    fn a_factor_on_a_part_is_found() {
+        let normal = deviations(1.0).concat();
+        let whole = joint_scale(&normal);
+        let left = |scale: f64| {
+            let sd = whole * (0.5 + 0.5 * scale * scale).sqrt() / 1.3;
+            normal.iter().map(|x| x / sd).collect()
+        };
+        let expected = 2.38_f64.sqrt();
+        assert!((joint_scale_of(left) / expected - 1.0).abs() < 0.02, "{}", joint_scale_of(left));
     }
 
     #[test]

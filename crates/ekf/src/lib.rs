@@ -68,6 +68,7 @@ mod ekf;
 mod error;
 mod estimator;
 mod guard;
+mod innovations;
 mod kernel;
 mod mixture;
 #[cfg(feature = "particles")]
@@ -92,6 +93,7 @@ pub use ekf::{Ekf, Step, Update};
 pub use error::StepError;
 pub use estimator::{Advanced, Estimator, Innovation, State};
 pub use guard::{Guard, Guarded, Influence, ReadingVerdict, Streak};
+pub use innovations::Innovations;
 pub use kernel::{AnyCurve, Compact, CompactWidth, Cubic, Curve, Lanes, Logistic, Switch};
 pub use mixture::{Dwell, Evidence, Hypotheses, Imm, Mixture, MixtureResidual, PhaseMixture, Share, SignSplit};
 #[cfg(feature = "particles")]

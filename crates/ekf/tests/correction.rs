@@ -139,7 +139,7 @@ fn all_processes_their_mixture_and_novelty() {
     for trial in 0..50 {
         let input: [f64; D] = std::array::from_fn(|i| 3.0 * number(1000 + 10 * trial + i));
         let filtered = Gaussian { mean: input[0], variance: 0.05 * (1.0 + number(9000 + trial)) };
-        let said = correction.correct(&input, filtered);
+        let said = correction.correct(&input, filtered, 1.0);
         let (voices, novelty) = written_out(&numbers, &input, filtered);
         // Tens of sums of products of numbers of order one.
         let close = |a: f64, b: f64| (a - b).abs() < 1e-12 * (1.0 + b.abs());
@@ -187,11 +187,18 @@ fn simulated_rows_are_mixed_in_last() {
         let mean = 0.25 + rows.iter().zip(&weights[1]).map(|(row, weight)| weight * kernel(row)).sum::<f64>();
         let outside: f64 = (6..D).map(|i| ((input[i] - inside[i]) / wider[i].sd).powi(2)).sum();
         let expected = Gaussian { mean: mean.clamp(-2.0, 2.0), variance: 0.08 + 0.03 * 0.7 * outside };
-        let (said, alone) = (with.correct(&input, filtered), learned.correct(&input, filtered));
+        let (said, alone) = (with.correct(&input, filtered, 1.0), learned.correct(&input, filtered, 1.0));
         let close = |a: f64, b: f64| (a - b).abs() < 1e-12 * (1.0 + b.abs());
         let heard = said.simulated.unwrap();
         assert!(close(heard.mean, expected.mean) && close(heard.variance, expected.variance), "{trial}: {heard:?}");
         assert_eq!(said.strain, mixture([alone.strain, heard]), "{trial}");
+        // Innovations four times as large as stated: so is the variance of what has learned from the filter, up to that of a strain
+        // anywhere within ±2.
+        let Gaussian { mean, variance } = alone.strain;
+        let less_sure = Gaussian { mean, variance: (4.0 * variance).min(16.0 / 12.0).max(variance) };
+        let surprised = with.correct(&input, filtered, 4.0);
+        let expected = mixture([less_sure, heard]);
+        assert!(close(surprised.strain.mean, expected.mean) && close(surprised.strain.variance, expected.variance));
         assert_eq!((said.direct, said.residual, said.novelty), (alone.direct, alone.residual, alone.novelty));
     }
 }
@@ -203,8 +210,8 @@ fn single_precision_says_the_same() {
     correction!(f32, numbers, [], rows_32, scales_32, weights_32, triangles_32, narrow);
     for trial in 0..50 {
         let input: [f64; D] = std::array::from_fn(|i| 3.0 * number(2000 + 10 * trial + i));
-        let said = wide.correct(&input, Gaussian { mean: input[0], variance: 0.05 });
-        let said_32 = narrow.correct(&input.map(|x| x as f32), Gaussian { mean: input[0] as f32, variance: 0.05 });
+        let said = wide.correct(&input, Gaussian { mean: input[0], variance: 0.05 }, 1.0);
+        let said_32 = narrow.correct(&input.map(|x| x as f32), Gaussian { mean: input[0] as f32, variance: 0.05 }, 1.0);
         // Squared distances reach 30, in which 2⁻²⁴ is 2e-6; a dozen rows add up.
         let close = |a: f32, b: f64| (f64::from(a) - b).abs() < 3e-5 * (1.0 + b.abs());
         assert!(close(said_32.strain.mean, said.strain.mean), "{trial}: {said:?} {said_32:?}");

@@ -180,7 +180,8 @@ impl<'a> FilterBuilder<'a> {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn build(self) -> Result<Filter, Error> {
-        Ok(Filter::new(self.kernel(self.kind())?))
+        let kind = self.kind();
+        Ok(Filter::new(self.forward(kind)?))
     }
 
     /// A filter that estimates each row from the readings up to `lag_s` seconds after it.
@@ -205,7 +206,7 @@ impl<'a> FilterBuilder<'a> {
         if kind.smoother() != kind {
             return Err(Error::NoSmoother);
         }
-        Ok(LaggedFilter::new(self.kernel(kind)?, lag_s))
+        Ok(LaggedFilter::new(self.forward(kind)?, lag_s))
     }
 
     /// Estimates of a whole recording, each from all readings; NaN stands for a missing one.
@@ -312,6 +313,16 @@ impl<'a> FilterBuilder<'a> {
     fn kind(&self) -> EstimatorKind {
         let kind = self.estimator.unwrap_or(self.sensor.params().default_estimator);
         if self.corrects { kind } else { self.sensor.params().filter_of(kind) }
+    }
+
+    /// What runs forward. Its correction, if it has one, counts how large innovations have been: a doubt less.
+    fn forward(self, kind: EstimatorKind) -> Result<Kernel, Error> {
+        let mut kernel = self.kernel(kind)?;
+        if kind == EstimatorKind::Corrected {
+            let doubts = &mut kernel.translator.doubts;
+            *doubts = doubts.take().map(Doubts::of_corrected);
+        }
+        Ok(kernel)
     }
 
     fn kernel(self, kind: EstimatorKind) -> Result<Kernel, Error> {

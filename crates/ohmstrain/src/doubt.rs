@@ -1,7 +1,7 @@
 //! When an interval is wider than the filter says, in any precision.
 
 use ohmstrain_calib::{MotionParams, SURPRISING_NIS, SensorParams};
-use ohmstrain_ekf::{Gaussian, Real};
+use ohmstrain_ekf::{Gaussian, Innovations, Real};
 
 use crate::pauses::Pauses;
 use crate::rest_watch::ZERO;
@@ -20,8 +20,6 @@ pub struct DoubtNumbers {
     /// The same on the other side, where nothing leads but another R₀, another gain or a strain beyond calibration's: if all readings
     /// are off, only those at an end of their range show it, and not all of it.
     pub far_counts: f64,
-    /// As much as a normalised innovation squared counts: one alone is an outlier, not a law that does not fit.
-    pub most_nis: f64,
     /// Share of calibration's range of readings by which they may lie outside for nothing.
     pub margin: f64,
     /// How many times the fastest rate of calibration, which is its 99th percentile, is beyond it.
@@ -37,7 +35,6 @@ pub const DOUBT: DoubtNumbers = DoubtNumbers {
     far_fades_s: 60.0,
     near_counts: 0.5,
     far_counts: 1.5,
-    most_nis: 30.0,
     margin: 0.02,
     faster: 1.5,
     worth: 0.2,
@@ -128,8 +125,7 @@ struct Misfit<T> {
     /// How far readings have been outside of calibration's on the side of rest, and on the other one, R/R₀ - 1, fading.
     near: T,
     far: T,
-    /// Mean of the normalised innovations squared.
-    nis: T,
+    innovations: Innovations<T>,
 }
 
 impl<T: Real> Misfit<T> {
@@ -146,7 +142,7 @@ impl<T: Real> Misfit<T> {
         };
         self.near = (self.near * left.lately).max(near);
         self.far = (self.far * left.far).max(far);
-        self.nis += (T::one() - left.lately) * (nis.min(T::of(DOUBT.most_nis)) - self.nis);
+        self.innovations.see(left.lately, nis);
     }
 
     /// The strain's variance for readings outside of calibration's.
@@ -193,6 +189,8 @@ pub struct Doubts<T> {
     /// The last reading that was believed, R/R₀ - 1.
     believed: Option<T>,
     misfit: Misfit<T>,
+    /// Whether the strain's variance knows of innovations that are larger than stated.
+    corrected: bool,
     /// Whether R₀ is calibration's; none where that one does not know what the sensor reads at rest.
     rest: Option<RestWatch<T>>,
 }
@@ -210,7 +208,8 @@ impl<T: Real> Doubts<T> {
             unread_s: T::of(NEVER_READ_S),
             lost: None,
             believed: None,
-            misfit: Misfit { near: T::zero(), far: T::zero(), nis: T::zero() },
+            misfit: Misfit { near: T::zero(), far: T::zero(), innovations: Innovations::none() },
+            corrected: false,
             rest: parts.rest.map(|seen| RestWatch::new(seen, false)),
         }
     }
@@ -220,6 +219,17 @@ impl<T: Real> Doubts<T> {
     pub fn of_known_strain(self, rests: bool) -> Self {
         let rest = self.parts.rest.map(|seen| RestWatch::new(seen, rests));
         Self { starts: false, fading: T::zero(), unread_s: T::zero(), rest, ..self }
+    }
+
+    /// The same for a filter whose correction counts how large innovations have been.
+    #[must_use]
+    pub fn of_corrected(self) -> Self {
+        Self { corrected: true, ..self }
+    }
+
+    /// How much larger innovations have been than stated, for the correction of the next row.
+    pub fn birge(&self) -> T {
+        self.misfit.innovations.birge()
     }
 
     /// The strain is known now: what was doubted of it is gone.
@@ -293,8 +303,9 @@ impl<T: Real> Doubts<T> {
         let (worth, most, per_reading) = (T::of(DOUBT.worth), T::of(self.parts.most), T::of(self.parts.per_reading));
         let faster = rate.abs() / T::of(self.parts.fastest_per_s);
         let is_fast = faster > T::of(DOUBT.faster);
-        let birge = self.misfit.nis.max(T::one());
-        let times = if is_fast { birge * (faster * faster) } else { birge };
+        let birge = self.birge();
+        let of_innovations = if self.corrected { T::one() } else { birge };
+        let times = if is_fast { of_innovations * (faster * faster) } else { of_innovations };
         let stated = (variance * times).min(most).max(variance);
         let outside = self.misfit.outside(&self.parts);
         let rest_off = self.rest.map_or(T::zero(), |rest| rest.off());
@@ -365,6 +376,14 @@ mod tests {
             assert!((variance / STATED.variance / times - 1.0).abs() < 1e-3, "{nis}: {variance}");
             assert_eq!(flags.has(Flag::Extrapolated), times > 1.0);
         }
+        // A correction has heard of them.
+        let mut doubts = Doubts::new(parts(1.0)).of_known_strain(false).of_corrected();
+        (0..2000).for_each(|_| {
+            doubts.see(0.1, Some((0.5, 4.0)), STATED);
+        });
+        let (variance, flags) = doubts.widened(0.0, STATED.variance);
+        assert!((doubts.birge() - 4.0).abs() < 1e-3 && (variance / STATED.variance - 1.0).abs() < 1e-9, "{variance}");
+        assert!(flags.has(Flag::Extrapolated));
         // One outlier among those that fit: 30 of it for a two-hundredth of the time.
         let outlier = |k: usize| (0.5, if k == 1990 { 1e6 } else { 0.5 });
         let (variance, flags) = said(parts(1.0), (0..2000).map(outlier));

@@ -12,7 +12,7 @@ use crate::motion_stats::MotionStats;
 use crate::order::median;
 use crate::params::RangeParams;
 use crate::params::correction::{
-    CorrectionParams, CorrectionScale, CorrectorParams, PAUSE_S, SIDES, SimulatedParams, SimulatedRow, TrainingRow,
+    CorrectionParams, CorrectionScale, CorrectorParams, PAUSE_S, SimulatedParams, SimulatedRow, TrainingRow,
 };
 use crate::params::estimator::EstimatorKind;
 use crate::prior::{self, CorrectionPrior};
@@ -71,9 +71,9 @@ fn learn(
     let (strain, time_s) = (strain.as_slice(), time_s.as_slice());
     let of_filter: Vec<_> = rows.iter().map(TrainingRow::filter_inputs).collect();
     let of_smoother: Vec<_> = rows.iter().map(TrainingRow::smoother_inputs).collect();
-    let filter = CorrectorParams::fit::<_, 0>(Examples { inputs: &of_filter, strain, time_s, limits })?;
-    let smoother = CorrectorParams::fit::<_, SIDES>(Examples { inputs: &of_smoother, strain, time_s, limits })?;
     let simulated = SimulatedParams::fit(simulated, &rows, limits)?;
+    let filter = CorrectorParams::of_filter(Examples { inputs: &of_filter, strain, time_s, limits }, &simulated)?;
+    let smoother = CorrectorParams::of_smoother(Examples { inputs: &of_smoother, strain, time_s, limits })?;
     Some(CorrectionParams { corrects, readings, filter, smoother, rows, simulated })
 }
 

@@ -10,8 +10,10 @@ use owned::{OwnedCorrection, OwnedProcess};
 
 use crate::order::extent;
 use crate::params::RangeParams;
-use crate::params::correction::{CorrectorParams, FILTER_INPUTS, ProcessParams, SIDES, SimulatedParams};
-use crate::sd_scale::{joint_scale, sd_scale_up_to};
+use crate::params::correction::{
+    CorrectorParams, FILTER_INPUTS, ProcessParams, SIDES, SMOOTHER_INPUTS, SimulatedParams,
+};
+use crate::sd_scale::{joint_scale_of, sd_scale_up_to};
 use gaussian_process::{GaussianProcess, LeftOutRow, Lessons, inducing_rows, relevance};
 
 /// Blocks of rows that are left out in turn.
@@ -142,18 +144,39 @@ fn scale(values: impl Iterator<Item = f64> + Clone) -> InputScale<f64> {
 }
 
 impl CorrectorParams {
-    /// Learns from examples, with S one-sided processes; none if there is nothing to learn from them.
-    pub(crate) fn fit<const D: usize, const S: usize>(examples: Examples<D>) -> Option<Self> {
+    /// What corrects a filter, from examples, beside what simulated rows say; none if there is nothing to learn from them.
+    pub(crate) fn of_filter(examples: Examples<FILTER_INPUTS>, simulated: &SimulatedParams) -> Option<Self> {
         let prepared = Prepared::new(examples);
+        Self::fit::<_, 0>(&prepared, &prepared.heard(&prepared.simulated(simulated)?))
+    }
+
+    /// The same of a smoother, with its one-sided processes.
+    pub(crate) fn of_smoother(examples: Examples<SMOOTHER_INPUTS>) -> Option<Self> {
+        Self::fit::<_, SIDES>(&Prepared::new(examples), &[])
+    }
+
+    /// With S one-sided processes; `last` is what is mixed in last of every row, if anything is.
+    fn fit<const D: usize, const S: usize>(prepared: &Prepared<D>, last: &[Gaussian<f64>]) -> Option<Self> {
+        let examples = prepared.examples;
         let (direct, of_direct) = prepared.chosen(Which::Direct)?;
         let (residual, of_residual) = prepared.chosen(Which::Residual)?;
         let sides: Vec<_> = ONE_SIDED[..S].iter().map(|side| prepared.chosen(*side)).collect::<Option<_>>()?;
         let voices =
             |k: usize| [of_direct[k], of_residual[k]].into_iter().chain(sides.iter().map(move |(_, of)| of[k]));
         let mixed: Vec<Gaussian<f64>> = (0..examples.strain.len()).map(|k| mixture(voices(k))).collect();
-        let sd_scale = joint_scale(&deviations(&mixed, examples.strain).concat());
+        let sd_scale = scale_beside(&mixed, last, examples.strain);
         Some(Self { sd_scale, direct, residual, one_sided: sides.into_iter().map(|(params, _)| params).collect() })
     }
+}
+
+/// The factor on the deviation of what is said of rows that makes intervals right, beside what is mixed in last.
+fn scale_beside(said: &[Gaussian<f64>], last: &[Gaussian<f64>], strain: &[f64]) -> f64 {
+    joint_scale_of(|scale| {
+        let scaled = |said: &Gaussian<f64>| Gaussian { variance: said.variance * scale.powi(2), ..*said };
+        let heard = |(k, of_row)| mixture(std::iter::once(scaled(of_row)).chain(last.get(k).copied()));
+        let mixed: Vec<Gaussian<f64>> = said.iter().enumerate().map(heard).collect();
+        deviations(&mixed, strain).concat()
+    })
 }
 
 /// Errors in units of their deviations, block by block.

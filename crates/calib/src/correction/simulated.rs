@@ -2,6 +2,7 @@
 //! stand for thousands.
 
 use nalgebra::{DMatrix, DVector};
+use ohmstrain_ekf::Gaussian;
 use ohmstrain_ekf::correction::{FEATURES, OUTPUTS, Process, kernel};
 
 use super::gaussian_process::relevance;
@@ -82,17 +83,13 @@ impl Prepared<'_, FILTER_INPUTS> {
     pub(super) fn simulated(&self, of: &SimulatedParams) -> Option<OwnedSimulated<f64, FILTER_INPUTS>> {
         let inputs: Vec<_> = of.rows.iter().map(|row| filter_inputs(&[0.0; OUTPUTS], &row.past)).collect();
         let rows: Vec<_> = inputs.iter().map(|row| self.on_scale(row)).collect();
-        let own: Vec<&[f64]> = rows.iter().map(|row| &row[OUTPUTS..]).collect();
-        let real: Vec<&[f64]> = self.rows.iter().map(|row| &row[OUTPUTS..]).collect();
-        let limits = self.examples.limits;
+        let own = features(&rows);
         let strain: Vec<f64> = of.rows.iter().map(|row| row.strain).collect();
-        let centre = centre(limits);
+        let centre = centre(self.examples.limits);
         let regular = kernels(&own, &own) + DMatrix::identity(own.len(), own.len()) * JITTER;
-        let weights = regular.cholesky()?.solve(&from_centre(&strain, centre));
-        let said = kernels(&real, &own) * &weights;
-        let square =
-            |(said, strain): (&f64, &f64)| ((centre + said).clamp(limits.lower, limits.upper) - strain).powi(2);
-        let squares: Vec<f64> = said.iter().zip(self.examples.strain).map(square).collect();
+        let weights: Vec<f64> = regular.cholesky()?.solve(&from_centre(&strain, centre)).iter().copied().collect();
+        let said = self.said(&rows, &weights);
+        let squares: Vec<f64> = said.zip(self.examples.strain).map(|(said, strain)| (said - strain).powi(2)).collect();
         let blocks = squares.chunks(squares.len().div_ceil(BLOCKS));
         let worst = blocks.map(|block| block.iter().sum::<f64>() / block.len() as f64).fold(0.0, f64::max);
         let mut scales = self.scales;
@@ -110,9 +107,26 @@ impl Prepared<'_, FILTER_INPUTS> {
             widening: 1.0,
             least_variance: 0.0,
         };
-        let process = OwnedProcess { weights: weights.iter().copied().collect(), explained: vec![], numbers };
+        let process = OwnedProcess { weights, explained: vec![], numbers };
         Some(OwnedSimulated { rows, scales, process })
     }
+
+    /// What the simulated rows say of each of the calibration's.
+    pub(super) fn heard(&self, of: &OwnedSimulated<f64, FILTER_INPUTS>) -> Vec<Gaussian<f64>> {
+        let variance = of.process.numbers.noise;
+        self.said(&of.rows, &of.process.weights).map(|mean| Gaussian { mean, variance }).collect()
+    }
+
+    fn said(&self, rows: &[[f64; FILTER_INPUTS]], weights: &[f64]) -> impl Iterator<Item = f64> {
+        let limits = self.examples.limits;
+        let said = kernels(&features(&self.rows), &features(rows)) * DVector::from_column_slice(weights);
+        let centre = centre(limits);
+        (0..self.rows.len()).map(move |k| (centre + said[k]).clamp(limits.lower, limits.upper))
+    }
+}
+
+fn features(rows: &[[f64; FILTER_INPUTS]]) -> Vec<&[f64]> {
+    rows.iter().map(|row| &row[OUTPUTS..]).collect()
 }
 
 #[cfg(test)]

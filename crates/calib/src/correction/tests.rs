@@ -2,7 +2,7 @@ use nalgebra::{DMatrix, DVector};
 use ohmstrain_ekf::Gaussian;
 
 use super::owned::OwnedCorrection;
-use super::{Examples, learned};
+use super::{Examples, Prepared, learned};
 use crate::correction::gaussian_process::{GaussianProcess, Lessons};
 use crate::params::RangeParams;
 use crate::params::correction::{CorrectorParams, ProcessParams};
@@ -91,7 +91,7 @@ fn a_correction_says_what_the_textbook_says() {
     for k in 0..39 {
         // Between two rows, within the range of all.
         let input: [f64; D] = std::array::from_fn(|i| 0.5 * (inputs[k][i] + inputs[k + 1][i]));
-        let said = correction.correction().correct(&input, Gaussian { mean: input[0], variance: 0.0 });
+        let said = correction.correction().correct(&input, Gaussian { mean: input[0], variance: 0.0 }, 1.0);
         let least = |book: &Textbook, share: f64| {
             let variance =
                 strain.iter().map(|x| x * x).sum::<f64>() / 40.0 - (strain.iter().sum::<f64>() / 40.0).powi(2);
@@ -128,7 +128,7 @@ fn one_sided_processes_see_their_side_alone() {
     let futures: Vec<Vec<f64>> = inputs.iter().map(of_future).collect();
     for k in 0..39 {
         let input: [f64; BOTH] = std::array::from_fn(|i| 0.5 * (inputs[k][i] + inputs[k + 1][i]));
-        let said = correction.correction().correct(&input, Gaussian { mean: input[0], variance: 0.0 });
+        let said = correction.correction().correct(&input, Gaussian { mean: input[0], variance: 0.0 }, 1.0);
         let books = [
             textbook(&pasts, &strain, &time_s, &past, &of_past(&input)),
             textbook(&futures, &strain, &time_s, &future, &of_future(&input)),
@@ -153,7 +153,7 @@ fn inducing_rows_cost_no_certainty_that_is_not_there() {
     let residuals: Vec<f64> = inputs.iter().zip(&strain).map(|(row, strain)| strain - row[0]).collect();
     for k in (0..199).step_by(7) {
         let input: [f64; D] = std::array::from_fn(|i| 0.5 * (inputs[k][i] + inputs[k + 1][i]));
-        let said = correction.correction().correct(&input, Gaussian { mean: input[0], variance: 0.0 });
+        let said = correction.correction().correct(&input, Gaussian { mean: input[0], variance: 0.0 }, 1.0);
         let book = textbook(&all, &residuals, &time_s, &settings, &input);
         assert!((said.residual.mean - input[0] - book.mean).abs() < 1e-6, "{k}");
         assert!(said.novelty > book.latent / book.prior - 1e-6, "{k}");
@@ -231,12 +231,12 @@ fn learning_helps_near_and_leaves_far_alone() {
     let seen: Vec<[f64; D]> = (0..160).filter(even).map(|k| inputs[k]).collect();
     let (known, times) = (pick(&strain), pick(&time_s));
     let examples = Examples { inputs: &seen, strain: &known, time_s: &times, limits: LIMITS };
-    let params = CorrectorParams::fit::<D, 0>(examples).unwrap();
+    let params = CorrectorParams::fit::<D, 0>(&Prepared::new(examples), &[]).unwrap();
     let correction: OwnedCorrection<f64, D> = learned(&params, examples).unwrap();
     let (mut before, mut after, mut covered) = (0.0, 0.0, 0);
     for k in (1..160).step_by(2) {
         let filtered = Gaussian { mean: inputs[k][0], variance: 0.01 };
-        let said = correction.correction().correct(&inputs[k], filtered).strain;
+        let said = correction.correction().correct(&inputs[k], filtered, 1.0).strain;
         before += (inputs[k][0] - strain[k]).powi(2);
         after += (said.mean - strain[k]).powi(2);
         covered += u32::from((said.mean - strain[k]).abs() <= 1.96 * said.sd());
@@ -246,7 +246,7 @@ fn learning_helps_near_and_leaves_far_alone() {
     assert!(covered >= 72, "{covered} of 80");
     let mut far = inputs[80].map(|x| x + 100.0);
     far[0] = 0.3;
-    let said = correction.correction().correct(&far, Gaussian { mean: 0.3, variance: 0.01 });
+    let said = correction.correction().correct(&far, Gaussian { mean: 0.3, variance: 0.01 }, 1.0);
     assert!(said.novelty > 0.99);
     // The strain has a deviation of 0.7; six per cent of its variance are allowed for at the least.
     assert!(said.strain.sd() > 0.17, "{}", said.strain.sd());

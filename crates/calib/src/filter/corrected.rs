@@ -3,7 +3,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use ohmstrain_ekf::correction::{FEATURES, FeatureScale, OUTPUTS, ReadingFeatures, mixture};
-use ohmstrain_ekf::{Gaussian, Guard, Reading, ReadingVerdict, StepError};
+use ohmstrain_ekf::{Gaussian, Guard, Innovations, Reading, ReadingVerdict, StepError};
 
 use crate::CalibrationError;
 use crate::filter::known::KnownError;
@@ -29,8 +29,8 @@ pub(crate) struct Corrected {
     said: Option<Output>,
     /// What is left of a moment at which the strain was known.
     known: Option<KnownError>,
-    /// Corrected strains of the rows that wait for a fixed lag.
-    waiting: VecDeque<Gaussian<f64>>,
+    /// Corrected strains of the rows that wait for a fixed lag, and how much larger innovations had been than stated.
+    waiting: VecDeque<(Gaussian<f64>, f64)>,
     /// Lagged estimates on their way out.
     lagged: Vec<Output>,
 }
@@ -44,18 +44,26 @@ struct Readings {
     /// The filter's variance at the last reading, once one has been missing since.
     known_variance: Option<f64>,
     missing: bool,
+    /// How much larger the filter's innovations had been than stated, before the row.
+    innovations: Innovations<f64>,
+    birge: f64,
 }
 
 impl Readings {
     fn new(scale: FeatureScale<f64>) -> Self {
         let features = ReadingFeatures::new(scale);
-        Self { features, time_s: None, now: None, known_variance: None, missing: false }
+        let innovations = Innovations::none();
+        Self { features, time_s: None, now: None, known_variance: None, missing: false, innovations, birge: 1.0 }
     }
 
     /// Takes a row in either direction of time.
-    fn step(&mut self, time_s: f64, Seen { reading, surprises }: Seen) -> Option<[f64; FEATURES]> {
+    fn step(&mut self, time_s: f64, Seen { reading, surprises, nis }: Seen) -> Option<[f64; FEATURES]> {
         let dt_s = (time_s - self.time_s.unwrap_or(time_s)).abs();
         self.time_s = Some(time_s);
+        self.birge = self.innovations.birge();
+        if let Some(nis) = nis {
+            self.innovations.see((-dt_s / Innovations::<f64>::LAST_S).exp(), nis);
+        }
         self.now = self.features.step_unless(surprises, dt_s, reading);
         self.missing = reading.is_none() || self.features.is_waiting();
         self.now
@@ -99,7 +107,7 @@ impl Corrected {
         let filtered = output.estimate.strain;
         let Some(past) = self.readings.now else { return filtered };
         let inputs = filter_inputs(&outputs(output), &past);
-        let strain = self.of_filter.correction().correct(&inputs, filtered).strain;
+        let strain = self.of_filter.correction().correct(&inputs, filtered, self.readings.birge).strain;
         let grown = self.readings.known_variance.map_or(0.0, |known| (filtered.variance - known).max(0.0));
         if self.readings.missing { Gaussian { variance: strain.variance + grown, ..strain } } else { strain }
     }
@@ -107,8 +115,9 @@ impl Corrected {
     /// Mixes lagged estimates with what was said of their rows.
     fn hand_out(&mut self, out: &mut dyn FnMut(Output)) {
         for mut output in self.lagged.drain(..) {
-            if let Some(corrected) = self.waiting.pop_front() {
-                output.estimate.strain = mixture([corrected, output.estimate.strain]);
+            if let Some((corrected, birge)) = self.waiting.pop_front() {
+                let lagged = output.estimate.strain;
+                output.estimate.strain = mixture([corrected, Gaussian { variance: lagged.variance * birge, ..lagged }]);
             }
             out(output);
         }
@@ -121,13 +130,15 @@ struct Seen {
     reading: Option<f64>,
     /// Whether the filter would rather not have seen it.
     surprises: bool,
+    /// Its normalised innovation squared.
+    nis: Option<f64>,
 }
 
 impl Seen {
     /// As it was read.
     fn plain(reading: Option<Reading<f64>>) -> Self {
         let finite = |reading: Reading<f64>| Some(reading.value).filter(|value| value.is_finite());
-        Self { reading: reading.and_then(finite), surprises: false }
+        Self { reading: reading.and_then(finite), surprises: false, nis: None }
     }
 
     /// As the filter has taken it: nothing, if it was kept from it.
@@ -137,7 +148,7 @@ impl Seen {
             ReadingVerdict::Downweighted => (true, output.nis.is_some_and(|nis| nis > SURPRISING_NIS)),
             _ => (false, false),
         };
-        Self { surprises, ..Self::plain(reading.filter(|_| is_seen)) }
+        Self { surprises, nis: output.nis.filter(|_| is_seen), ..Self::plain(reading.filter(|_| is_seen)) }
     }
 }
 
@@ -192,7 +203,7 @@ impl Filter for Corrected {
         if stepped.is_ok() {
             self.see(time_s, reading);
             let corrected = self.strain();
-            self.waiting.push_back(corrected);
+            self.waiting.push_back((corrected, self.readings.birge));
         }
         self.hand_out(out);
         stepped
@@ -273,7 +284,7 @@ impl CorrectedWayBack<'_> {
     fn correct(&self, output: &Output, past: &[f64; FEATURES], future: Option<[f64; FEATURES]>) -> Gaussian<f64> {
         let future = future.map_or([0.0; FUTURE_FEATURES], future_features);
         let inputs = smoother_inputs(&outputs(output), past, &future);
-        self.correction.correction().correct(&inputs, output.estimate.strain).strain
+        self.correction.correction().correct(&inputs, output.estimate.strain, 1.0).strain
     }
 }
 

@@ -32,14 +32,14 @@ impl<T: Real> Learned<T> {
     }
 
     /// The strain of a filter, corrected; `inputs` as [`ohmstrain_ekf::correction::Correction::correct`] has them.
-    pub fn correct(&self, inputs: &[T; INPUTS], filtered: Gaussian<T>) -> Gaussian<T> {
+    pub fn correct(&self, inputs: &[T; INPUTS], filtered: Gaussian<T>, birge: T) -> Gaussian<T> {
         let mut correction = self.rows.correction();
         if let Some([of_direct, of_residual]) = &self.quadratics {
             let x = self.standardised(inputs);
             correction.direct.mean += of_direct.value(&x[OUTPUTS..]);
             correction.residual.mean += of_residual.value(&x);
         }
-        correction.correct(inputs, filtered).strain
+        correction.correct(inputs, filtered, birge).strain
     }
 
     /// As the correction does it.

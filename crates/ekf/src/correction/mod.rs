@@ -119,10 +119,11 @@ struct Standardised<T, const D: usize> {
 
 impl<T: Real, const D: usize, const S: usize> Correction<'_, T, D, S> {
     /// Corrects the strain of a filter. `inputs` are the filter's outputs, the strain first, and the features of the
-    /// readings; `filtered` is the filter's strain with its deviation.
+    /// readings; `filtered` is the filter's strain with its deviation; `birge` is by how much its innovations have been larger than it
+    /// states, a factor on the variance of all that has learned from it.
     #[must_use]
-    pub fn correct(&self, inputs: &[T; D], filtered: Gaussian<T>) -> Corrected<T, S> {
-        let work = Correcting { correction: self, inputs, filtered };
+    pub fn correct(&self, inputs: &[T; D], filtered: Gaussian<T>, birge: T) -> Corrected<T, S> {
+        let work = Correcting { correction: self, inputs, filtered, birge };
         T::in_vectors(work).unwrap_or_else(|| work.with_lanes(T::zero()))
     }
 
@@ -207,6 +208,7 @@ struct Correcting<'a, T, const D: usize, const S: usize> {
     correction: &'a Correction<'a, T, D, S>,
     inputs: &'a [T; D],
     filtered: Gaussian<T>,
+    birge: T,
 }
 
 impl<T: Real, const D: usize, const S: usize> Work<T> for Correcting<'_, T, D, S> {
@@ -214,7 +216,7 @@ impl<T: Real, const D: usize, const S: usize> Work<T> for Correcting<'_, T, D, S
 
     #[inline(always)]
     fn with_lanes<V: Several<Number = T>>(self, like: V) -> Corrected<T, S> {
-        let Self { correction: of, inputs, filtered } = self;
+        let Self { correction: of, inputs, filtered, birge } = self;
         let Standardised { inputs: x, outside } = standardised(of.scales, inputs);
         let (mut direct, mut residual) = (Kernels::new(&of.direct), Kernels::new(&of.residual));
         let mut sides = of.one_sided.each_ref().map(Kernels::new);
@@ -241,7 +243,9 @@ impl<T: Real, const D: usize, const S: usize> Work<T> for Correcting<'_, T, D, S
         let residual = of.widened(said, &of.residual, outside, filtered.mean);
         let mixed = mixture([direct, residual].into_iter().chain(one_sided));
         let variance = mixed.variance * of.variance_factor + T::of(NOVEL) * of.strain_variance * novelty;
-        let learned = Gaussian { mean: mixed.mean, variance };
+        let span = of.limits.upper - of.limits.lower;
+        let anywhere = span * span * T::of(1.0 / 12.0);
+        let learned = Gaussian { mean: mixed.mean, variance: (variance * birge).min(anywhere).max(variance) };
         let simulated = of.simulated.map(|simulated| of.of_simulated(like, inputs, &simulated));
         let strain = simulated.map_or(learned, |simulated| mixture([learned, simulated]));
         Corrected { strain, direct, one_sided, residual, simulated, novelty }
@@ -311,8 +315,9 @@ mod tests {
         for trial in 0..100 {
             let inputs = core::array::from_fn(|i| number(1000 + 31 * trial + i));
             let filtered = Gaussian { mean: inputs[0], variance: 0.1 };
-            let number_by_number = Correcting { correction: &correction, inputs: &inputs, filtered }.with_lanes(0.0);
-            assert_eq!(correction.correct(&inputs, filtered), number_by_number, "{trial}");
+            let number_by_number =
+                Correcting { correction: &correction, inputs: &inputs, filtered, birge: 1.7 }.with_lanes(0.0);
+            assert_eq!(correction.correct(&inputs, filtered, 1.7), number_by_number, "{trial}");
         }
     }
 }

@@ -24,6 +24,7 @@ struct Fake {
     missing: bool,
     guarded: bool,
     waiting: usize,
+    nis: Option<f64>,
 }
 
 fn says(time_s: f64, gap: f64, verdict: ReadingVerdict) -> Output {
@@ -72,7 +73,8 @@ impl Filter for Fake {
     }
 
     fn output(&self) -> Output {
-        says(self.time_s, self.gap, self.verdict())
+        let said = says(self.time_s, self.gap, self.verdict());
+        Output { nis: self.nis.or(said.nis), ..said }
     }
 
     fn guard(&mut self, guard: Guard<f64>) {
@@ -226,7 +228,7 @@ fn segments_say_what_the_whole_recording_says() {
         if let Some(past) = past[k] {
             let future = future[k].map_or([0.0; FEATURES - 1], future_features);
             let inputs = smoother_inputs(&outputs(&said), &past, &future);
-            expected = correction.correction().correct(&inputs, expected).strain;
+            expected = correction.correction().correct(&inputs, expected, 1.0).strain;
             // At readings the filter's variance is 1e-4, whatever the side.
             expected.variance += said.estimate.strain.variance - 1e-4;
         }
@@ -254,12 +256,31 @@ fn a_missing_reading_is_held_and_the_variance_grows_with_the_filters() {
         filter.step(time_s, None).unwrap();
         let inputs = filter_inputs(&outputs(&says(time_s, 0.0, ReadingVerdict::Accepted)), &now.unwrap());
         let filtered = says(time_s, f64::from(k), ReadingVerdict::Missing).estimate.strain;
-        let expected = filter.of_filter.correction().correct(&inputs, filtered).strain;
+        let expected = filter.of_filter.correction().correct(&inputs, filtered, 1.0).strain;
         let strain = filter.strain();
         assert_eq!(strain.mean, expected.mean);
         // The filter's variance has grown by 1e-4 a second.
         assert!((strain.variance - expected.variance - 1e-4 * f64::from(k)).abs() < 1e-15);
         assert!(strain.variance > known.variance, "{k}");
+    }
+}
+
+/// The mean of normalised innovations squared of rows before, fading with 20 s, in the naive sum.
+#[test]
+fn what_has_learned_from_a_surprised_filter_is_less_sure() {
+    let fake = Fake { nis: Some(9.0), ..Fake::default() };
+    let mut filter = Corrected::new(Box::new(fake), &Learned::new(params(), LIMITS)).unwrap();
+    for k in 0..400 {
+        let time_s = 0.1 * f64::from(k);
+        filter.step(time_s, Some(reading(time_s))).unwrap();
+        // The first row has no interval before it, and a row does not know of its own innovation.
+        let weight = |row: i32| (1.0 - (-0.1_f64 / 20.0).exp()) * (-0.1 * f64::from(k - 1 - row) / 20.0).exp();
+        let mean: f64 = (1..k).map(|row| 9.0 * weight(row)).sum();
+        let (inputs, said) = (filter.readings.now.unwrap(), filter.filter.output());
+        let inputs = filter_inputs(&outputs(&said), &inputs);
+        let learned = filter.of_filter.correction().correct(&inputs, said.estimate.strain, mean.max(1.0)).strain;
+        let strain = filter.strain();
+        assert!((strain.mean - learned.mean).abs() < 1e-12 && (strain.variance / learned.variance - 1.0).abs() < 1e-9);
     }
 }
 

@@ -2,6 +2,7 @@
 
 use ohmstrain::{DOUBT, DoubtParts, FOLLOWING, NEVER_READ_S, RestBounds};
 use ohmstrain_calib::PortableSieve;
+use ohmstrain_ekf::Innovations;
 use serde::Serialize;
 
 use crate::export::literal::Literal;
@@ -90,7 +91,7 @@ impl DoubtConstants {
             near_counts: narrow(DOUBT.near_counts),
             far_counts: narrow(DOUBT.far_counts),
             sign: narrow(seen.rest.map_or(0.0, |rest| rest.sign)),
-            most_nis: narrow(DOUBT.most_nis),
+            most_nis: narrow(Innovations::<f64>::MOST),
             margin: narrow(DOUBT.margin),
             faster: narrow(DOUBT.faster),
             worth: narrow(DOUBT.worth),

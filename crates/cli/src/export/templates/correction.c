@@ -195,6 +195,16 @@ static float mixture(const float said[2], const float spread[2], float *variance
     return mean;
 }
 
+/* A variance that is larger by a factor, but not than that of a strain that is anywhere in the limits. */
+static float more_by(float factor, float variance)
+{
+    const float span = OHMSTRAIN_UPPER - OHMSTRAIN_LOWER, anywhere = span * span * (1.0f / 12.0f);
+    float more = variance * factor;
+
+    more = more < anywhere ? more : anywhere;
+    return more > variance ? more : variance;
+}
+
 /* The strain and its variance, corrected. `filtered` is the filter's strain, moved into the limits. */
 static void correct(const summary *all, const readings *seen, float filtered, float filtered_variance, float *strain,
                     float *variance)
@@ -265,6 +275,7 @@ static void correct(const summary *all, const readings *seen, float filtered, fl
     said[0] = mixture(said, spread, &spread[0]);
     spread[0] = spread[0] * << correction.variance_factor >>f +
                 << correction.novel >>f * << correction.strain_variance >>f * novelty;
+    spread[0] = more_by(birge_of(seen), spread[0]);
 {% if correction.simulated %}
     said[1] = simulated(seen->feature, &spread[1]);
     *strain = mixture(said, spread, variance);

@@ -259,6 +259,12 @@ static void summarise(const ohmstrain_state *state, summary *out)
 
 typedef ohmstrain_readings readings;
 
+/* By how much innovations have been larger of late than the filter states them. */
+static float birge_of(const readings *seen)
+{
+    return seen->misfit > 1.0f ? seen->misfit : 1.0f;
+}
+
 {% if correction %}
 enum { LOW_PASSES = OHMSTRAIN_LOW_PASSES };
 {% if not estimator.hypotheses %}
@@ -534,7 +540,7 @@ static float doubted(const readings *seen, float rate, float variance, unsigned 
 {
     const float near_off = << doubt.near_counts >>f * seen->near_off * PER_READING;
     const float far_off = << doubt.far_counts >>f * seen->far_off * PER_READING;
-    const float outside = near_off * near_off + far_off * far_off, birge = seen->misfit > 1.0f ? seen->misfit : 1.0f;
+    const float outside = near_off * near_off + far_off * far_off, birge = birge_of(seen);
     const float faster = (rate < 0.0f ? -rate : rate) / FASTEST_PER_S;
     const int is_fast = faster > << doubt.faster >>f;
 {% if doubt.rest %}
@@ -543,7 +549,12 @@ static float doubted(const readings *seen, float rate, float variance, unsigned 
 {% else %}
     const float more = seen->fading + outside;
 {% endif %}
+{% if correction %}
+    /* The correction knows of innovations. */
+    float stated = is_fast ? variance * (faster * faster) : variance;
+{% else %}
     float stated = variance * (is_fast ? birge * (faster * faster) : birge);
+{% endif %}
 
     *flags |= seen->starts && seen->fading > << doubt.worth >>f * START_DOUBT ? OHMSTRAIN_START_UP : 0;
     *flags |= !seen->starts && seen->fading > << doubt.worth >>f * variance ? OHMSTRAIN_RECOVERING : 0;

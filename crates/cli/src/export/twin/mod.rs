@@ -88,6 +88,7 @@ impl<'a, T: Real, const B: usize, const N: usize, const L: usize, const K: usize
             let (centre, half_range) = (number(centre), number(half_range));
             ReadingFeatures::new(FeatureScale { centre, half_range, rates: rates.map(number), starts })
         });
+        let doubts = Doubts::new(parts.doubt);
         let fresh = Memory {
             moving,
             // None yet.
@@ -97,7 +98,7 @@ impl<'a, T: Real, const B: usize, const N: usize, const L: usize, const K: usize
             features: None,
             known_variance: T::zero(),
             missing: true,
-            doubts: Doubts::new(parts.doubt),
+            doubts: if parts.correction.is_some() { doubts.of_corrected() } else { doubts },
             follower: Some(RestFollower::new(parts.rest)),
             strain: Gaussian { mean: T::zero(), variance: T::zero() },
         };
@@ -238,7 +239,7 @@ impl<'a, T: Real, const B: usize, const N: usize, const L: usize, const K: usize
         let outputs = [filtered.mean, belief.mean[1], relaxation, baseline, extend, retract];
         let mut inputs = [T::zero(); INPUTS];
         inputs.iter_mut().zip(outputs.iter().chain(&features)).for_each(|(place, input)| *place = *input);
-        let strain = learned.correct(&inputs, filtered);
+        let strain = learned.correct(&inputs, filtered, self.now.doubts.birge());
         let grown = (filtered.variance - self.now.known_variance).max(T::zero());
         if self.now.missing { Gaussian { variance: strain.variance + grown, ..strain } } else { strain }
     }
