@@ -22,7 +22,7 @@ const ONE_SPEED: f64 = 1.1;
 /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
 /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
 /// let closing = ohmstrain::Closing { file: Some("s.toml"), params: sensor.params(), findings: None, tested: None,
-///     calibration_s: 1.5 };
+///     calibration_s: 1.5, more: "advice" };
 /// assert!(closing.text().ends_with("Written      s.toml, estimator sign-split, a law of 3 branches; it took 1.5 s\n"));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -38,6 +38,8 @@ pub struct Closing<'a> {
     pub tested: Option<&'a Tested>,
     /// Wall-clock time, s.
     pub calibration_s: f64,
+    /// Where the advice stands that is not printed.
+    pub more: &'a str,
 }
 
 /// Scores of rows that a calibration never saw.
@@ -109,7 +111,7 @@ impl Closing<'_> {
     pub fn facts(&self) -> Vec<(&'static str, String)> {
         let tested = self.tested.map(|tested| ("Tested", error_in_test(tested)));
         let Some(found) = self.findings else { return tested.into_iter().collect() };
-        let next = if found.advice.is_empty() { advice(&found.advice) } else { found.advice.join("; ") };
+        let next = if found.advice.is_empty() { advice(&found.advice, self.more) } else { found.advice.join("; ") };
         let facts = [
             ("Seen", seen(&found.seen, self.params.quantity)),
             ("Limited by", limited_by_in_full(found)),
@@ -141,7 +143,7 @@ impl Closing<'_> {
         if let Some(found) = self.findings {
             lines.add("Seen", &seen(&found.seen, self.params.quantity));
             lines.add("Limited by", &limited_by(found));
-            lines.add("Record next", &advice(&found.advice));
+            lines.add("Record next", &advice(&found.advice, self.more));
         }
         let (estimator, branches) = (self.params.default_estimator.name(), self.params.law.branches.len());
         let law = if branches == 1 { "1 branch".into() } else { format!("{branches} branches") };
@@ -250,12 +252,12 @@ fn limited_by_in_full(found: &Findings) -> String {
     )
 }
 
-fn advice(advice: &[String]) -> String {
+fn advice(advice: &[String], elsewhere: &str) -> String {
     let first = advice.iter().take(PRINTED_ADVICE).cloned().collect::<Vec<_>>().join("; ");
     match advice.len().saturating_sub(PRINTED_ADVICE) {
         _ if advice.is_empty() => "another recording of another day: nothing stands out in this one".into(),
         0 => first,
-        more => format!("{first} ({more} more: --explain)"),
+        more => format!("{first} ({more} more: {elsewhere})"),
     }
 }
 

@@ -58,8 +58,12 @@ fn row<'py>(py: Python<'py>, columns: &[Column], row: &Estimate) -> PyResult<Bou
 }
 
 impl LiveFilter {
-    pub(crate) fn new(filter: ohmstrain::Filter, sensor: ohmstrain::Sensor, rest_resistance: Option<f64>) -> Self {
-        let columns = sensor.columns();
+    pub(crate) fn new(
+        filter: ohmstrain::Filter,
+        sensor: ohmstrain::Sensor,
+        columns: Vec<Column>,
+        rest_resistance: Option<f64>,
+    ) -> Self {
         let watch = Watch::new(&sensor, rest_resistance);
         Self { running: Mutex::new(Running { filter, watch, rest_resistance }), sensor, columns }
     }

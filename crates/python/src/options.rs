@@ -1,4 +1,4 @@
-use ohmstrain::{EstimatorKind, FilterBuilder, Influence, Sensor};
+use ohmstrain::{Column, EstimatorKind, FilterBuilder, Influence, Sensor};
 use pyo3::prelude::*;
 
 use crate::error::{Place, raise};
@@ -13,6 +13,7 @@ pub struct Options {
     rest_resistance: Option<Rest>,
     gate: Option<f64>,
     influence: Option<String>,
+    columns: Option<Vec<String>>,
 }
 
 /// What the rested sensor reads now.
@@ -34,6 +35,20 @@ impl Options {
                 Err(raise(&Place::default(), &said))
             }
         }
+    }
+
+    /// The columns of a sensor's estimates that are wanted, all if none is named.
+    pub fn columns(&self, sensor: &Sensor) -> PyResult<Vec<Column>> {
+        let known = sensor.columns();
+        let Some(chosen) = &self.columns else { return Ok(known) };
+        let column = |name: &String| {
+            known.iter().copied().find(|column| column.name() == name).ok_or_else(|| {
+                let names: Vec<&str> = known.iter().map(Column::name).collect();
+                let said = format!("columns: expected some of {}, found `{name}`", names.join(","));
+                raise(&Place::default(), &said)
+            })
+        };
+        chosen.iter().map(column).collect()
     }
 
     /// With the learned correction, if the sensor has one.

@@ -74,17 +74,13 @@ impl Recording {
         }
         check_times(&time_s, time, file)?;
         let (readings, converter) = about.readings(reading, column(reading)?)?;
-        let joint_spec = parsed::<JointSpec>("joint", about.joint.as_deref(), file)?;
+        let joint_spec = about.joint_spec()?;
         let reference = match reference {
             Some(name) => Some(about.reference(name, column(name)?, joint_spec.as_ref())?),
             None => None,
         };
         let unit = if reading == "resistance_ratio" { ReadingUnit::Ratio } else { ReadingUnit::Ohm };
-        let joint = joint_spec.map(|joint| JointParams {
-            prestrain: joint.prestrain,
-            moment_arm_mm: joint.moment_arm_mm,
-            gauge_length_mm: joint.gauge_length_mm,
-        });
+        let joint = about.joint()?;
         if time_s.is_empty() {
             return Err(raise(&Place { file, ..Place::default() }, "expected at least one row, found none"));
         }
@@ -154,6 +150,19 @@ impl Recording {
 impl About {
     fn place(&self) -> Place<'_> {
         Place { file: self.name.as_deref(), ..Place::default() }
+    }
+
+    fn joint_spec(&self) -> PyResult<Option<JointSpec>> {
+        parsed("joint", self.joint.as_deref(), self.name.as_deref())
+    }
+
+    /// The joint that the sensor sits on.
+    pub fn joint(&self) -> PyResult<Option<JointParams>> {
+        Ok(self.joint_spec()?.map(|joint| JointParams {
+            prestrain: joint.prestrain,
+            moment_arm_mm: joint.moment_arm_mm,
+            gauge_length_mm: joint.gauge_length_mm,
+        }))
     }
 
     #[expect(clippy::type_complexity, reason = "two columns of a recording")]

@@ -1,6 +1,6 @@
 use std::borrow::Cow;
 
-use ohmstrain::{Closing, EstimatorKind, Findings, Quantity, ReadingUnit, ValidityWatch};
+use ohmstrain::{Closing, EstimatorKind, Findings, JointParams, Quantity, ReadingUnit, ValidityWatch};
 use pyo3::prelude::*;
 use pyo3_arrow::{PyRecordBatch, PyTable};
 
@@ -26,9 +26,12 @@ impl Sensor {
     /// On the joint of a recording, if it has one; with its readings checked.
     fn for_recording(&self, recording: &Recording, options: &Options) -> PyResult<Cow<'_, ohmstrain::Sensor>> {
         recording.check_unit(&self.sensor, options.rest_resistance(&self.sensor)?)?;
-        let Some(joint) = recording.joint else { return Ok(Cow::Borrowed(&self.sensor)) };
-        let moved = self.sensor.clone().on_joint(joint);
-        moved.map(Cow::Owned).map_err(|error| recording.refused(&error))
+        self.on_joint(recording.joint, recording.name.as_deref())
+    }
+
+    fn on_joint(&self, joint: Option<JointParams>, file: Option<&str>) -> PyResult<Cow<'_, ohmstrain::Sensor>> {
+        let Some(joint) = joint else { return Ok(Cow::Borrowed(&self.sensor)) };
+        self.sensor.clone().on_joint(joint).map(Cow::Owned).map_err(|error| of_library(&error, file))
     }
 }
 
@@ -53,7 +56,7 @@ impl Sensor {
     fn closing(&self, file: Option<&str>) -> Option<String> {
         let (findings, calibration_s) = self.made.as_ref()?;
         let (findings, params) = (findings.as_ref(), self.sensor.params());
-        Some(Closing { file, params, findings, tested: None, calibration_s: *calibration_s }.text())
+        Some(Closing { file, params, findings, tested: None, calibration_s: *calibration_s, more: "findings" }.text())
     }
 
     /// All numbers, and what the calibration came to, as JSON.
@@ -85,28 +88,34 @@ impl Sensor {
         EstimatorKind::name(self.sensor.params().default_estimator)
     }
 
-    fn columns(&self) -> Vec<&'static str> {
-        self.sensor.columns().iter().map(ohmstrain::Column::name).collect()
+    /// Names of the columns of its estimates, of a recording with a joint if there is one.
+    fn columns(&self, about: About, options: Options) -> PyResult<Vec<&'static str>> {
+        let sensor = self.on_joint(about.joint()?, None)?;
+        Ok(options.columns(&sensor)?.iter().map(ohmstrain::Column::name).collect())
     }
 
-    fn live(&self, options: Options) -> PyResult<LiveFilter> {
-        let filter = options.builder(&self.sensor)?.build().map_err(|error| of_library(&error, None))?;
-        let rest = options.rest_resistance(&self.sensor)?;
-        Ok(LiveFilter::new(filter, self.sensor.clone(), rest))
+    /// Of readings as they come, on a joint if there is one.
+    #[pyo3(signature = (options, about=About::default()))]
+    fn live(&self, options: Options, about: About) -> PyResult<LiveFilter> {
+        let sensor = self.on_joint(about.joint()?, None)?;
+        let filter = options.builder(&sensor)?.build().map_err(|error| of_library(&error, None))?;
+        let (columns, rest) = (options.columns(&sensor)?, options.rest_resistance(&sensor)?);
+        Ok(LiveFilter::new(filter, sensor.into_owned(), columns, rest))
     }
 
     fn lagged(&self, options: Options, lag_s: f64) -> PyResult<LaggedFilter> {
         let filter = options.builder(&self.sensor)?.build_lagged(lag_s).map_err(|error| of_library(&error, None))?;
-        Ok(LaggedFilter::new(filter, self.sensor.columns()))
+        Ok(LaggedFilter::new(filter, options.columns(&self.sensor)?))
     }
 
     fn filter(&self, py: Python, table: PyTable, about: About, options: Options) -> PyResult<Doubtful> {
         let recording = Recording::new(table, about)?;
         let sensor = self.for_recording(&recording, &options)?;
         let rest = options.rest_resistance(&sensor)?;
+        let columns = options.columns(&sensor)?;
         let mut filter = options.builder(&sensor)?.build().map_err(|error| recording.refused(&error))?;
         let (estimates, warnings) = py.detach(|| {
-            let mut estimates = Estimates::new(sensor.columns(), recording.time_s.len());
+            let mut estimates = Estimates::new(columns, recording.time_s.len());
             let mut watch = Watch::new(&sensor, rest);
             recording.filtered(&mut filter, |row, estimate| {
                 estimates.put(row, std::slice::from_ref(estimate));
@@ -121,9 +130,10 @@ impl Sensor {
         let recording = Recording::new(table, about)?;
         let sensor = self.for_recording(&recording, &options)?;
         let (builder, rest) = (options.builder(&sensor)?, options.rest_resistance(&sensor)?);
+        let columns = options.columns(&sensor)?;
         let (estimates, warnings) = py.detach(|| {
             let len = recording.time_s.len();
-            let mut estimates = Estimates::new(sensor.columns(), len);
+            let mut estimates = Estimates::new(columns, len);
             let mut rates = vec![0.0; len];
             recording.smoothed(builder, |rows, segment| {
                 estimates.put(rows.start, segment);

@@ -53,8 +53,10 @@ impl Estimates {
 }
 
 fn nullable(numbers: Vec<f64>) -> ArrayRef {
-    let known = NullBuffer::new(BooleanBuffer::collect_bool(numbers.len(), |row| !numbers[row].is_nan()));
-    Arc::new(Float64Array::new(numbers.into(), Some(known).filter(|known| known.null_count() > 0)))
+    // Mostly all are known.
+    let unknown = numbers.iter().fold(false, |unknown, number| unknown | number.is_nan());
+    let known = unknown.then(|| BooleanBuffer::collect_bool(numbers.len(), |row| !numbers[row].is_nan()));
+    Arc::new(Float64Array::new(numbers.into(), known.map(NullBuffer::new)))
 }
 
 fn texts(flags: &[ohmstrain::Flags]) -> ArrayRef {

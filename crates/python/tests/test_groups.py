@@ -57,6 +57,21 @@ def test_work(trace, sensor):
     check(done.to_pandas(), table, sensor)
 
 
+def test_columns_that_are_wanted(trace, sensor):
+    group = pa.Table.from_pandas(trace.head(250).assign(sensor_id="left", recording_id=1), preserve_index=False)
+    whole, joint = sensor.smooth(group), "prestrain=0.05 moment_arm_mm=4.4 gauge_length_mm=30"
+    for columns, about in ((["time_s", "strain"], {}), (["strain", "flags"], {}), (["angle_deg"], {"joint": joint})):
+        found = Work("smooth", BY, sensor, columns=columns, **about)(group)
+        assert found.column_names == [*BY, *columns, "warnings", "error"]
+        assert all(found[name].equals(whole[name]) for name in columns if name in whole.column_names)
+    assert found["angle_deg"].null_count == 0
+    everything = Work("smooth", BY, sensor, joint=joint)(group)
+    assert everything["angle_deg"].equals(found["angle_deg"])
+    filtered = Work("filter", BY, sensor, joint=joint)(group)
+    pieces = Work("filter", BY, sensor, joint=joint).stream(iter(group.to_batches(max_chunksize=64)))
+    assert pa.Table.from_batches(list(pieces))["angle_deg"].to_pylist() == filtered["angle_deg"].to_pylist()
+
+
 def test_pieces_are_the_whole(trace, sensor):
     rows = trace.head(250)[["time_s", "resistance_ohm"]].assign(sensor_id="left", recording_id=1)
     batches = pa.Table.from_pandas(rows, preserve_index=False).to_batches(max_chunksize=64)
@@ -106,6 +121,8 @@ def test_what_cannot_work_is_refused_before(trace, sensor):
         Work("smooth", BY, {})
     with pytest.raises(oh.OhmstrainError, match="estimator"):
         Work("smooth", BY, sensor, estimator="kalman")
+    with pytest.raises(oh.OhmstrainError, match="columns"):
+        Work("smooth", BY, sensor, columns=["strian"])
     rows = trace.head(50).assign(sensor_id="unknown", recording_id=1)
     [row] = Work("smooth", BY, {"left": sensor})(pa.Table.from_pandas(rows, preserve_index=False)).to_pylist()
     assert "expected one for sensor_id `unknown`" in row["error"]

@@ -48,6 +48,8 @@ def test_wrong_options_are_named(sensor):
         sensor.filter(estimator="kalman")
     with pytest.raises(oh.OhmstrainError, match="huber:K"):
         sensor.filter(influence="huber")
+    with pytest.raises(oh.OhmstrainError, match="columns: expected some of time_s,.*found `strian`"):
+        sensor.filter(columns=["strian"])
     with pytest.raises(oh.OhmstrainError, match="initial strain"):
         sensor.filter(initial_strain=10.0)
     with pytest.raises(TypeError):
@@ -57,8 +59,9 @@ def test_wrong_options_are_named(sensor):
 @pytest.mark.filterwarnings("ignore::ohmstrain.OhmstrainWarning")
 def test_warns_beyond_the_calibration(trace, sensor):
     longer = trace.assign(time_s=trace["time_s"] * 3)
-    with pytest.warns(oh.OhmstrainWarning, match="longer than"):
+    with pytest.warns(oh.OhmstrainWarning, match="longer than") as said:
         sensor.filter(longer)
+    assert all(one.filename == __file__ for one in said)
 
 
 def test_the_interpreter_is_free_meanwhile(trace, sensor):
@@ -131,6 +134,10 @@ def test_plots(trace, sensor):
     estimates = sensor.smooth(trace.head(300))
     figure = oh.plot.strain(estimates, trace.head(300))
     assert {line.get_label() for line in figure.axes[0].lines} == {"estimate", "reference"}
+    moved = trace.head(300).rename(columns={"strain": "displacement_mm"}).assign(displacement_mm=30 * trace["strain"])
+    lines = [oh.plot.strain(estimates, moved, gauge_length_mm=length).axes[0].lines for length in (None, 30)]
+    assert [len(each) for each in lines] == [1, 2]
+    np.testing.assert_allclose(lines[1][1].get_ydata(), 100 * trace["strain"].head(300))
     assert len(sensor.plot.calibration().axes) == 1
     made = oh.calibrate(trace, estimator="ekf")
     assert len(made.plot.calibration().axes) == 3

@@ -62,8 +62,14 @@ pub fn run(args: &CalibrateArgs) -> Result<(), CliError> {
     let params = sensor.params();
     outputs.put(sensor_output, sensor_file::text(&sensor)?);
     let file = args.output.display().to_string();
-    let closing =
-        Closing { file: Some(&file), params, findings: findings.as_ref(), tested: tested.as_ref(), calibration_s };
+    let closing = Closing {
+        file: Some(&file),
+        params,
+        findings: findings.as_ref(),
+        tested: tested.as_ref(),
+        calibration_s,
+        more: "--explain",
+    };
     if let Some(wanted) = wanted {
         let reporting = Reporting {
             recording: &recordings[0],

@@ -54,8 +54,14 @@ pub fn run(args: &DemoArgs) -> Result<(), CliError> {
     outputs.put(smoothed_output, estimates(&sensor, &estimated.smoothed)?);
     progress.doing("writing the report");
     let part = Part::since(Some(test_from));
-    let closing =
-        Closing { file: Some("sensor.toml"), params, findings: findings.as_ref(), tested: None, calibration_s };
+    let closing = Closing {
+        file: Some("sensor.toml"),
+        params,
+        findings: findings.as_ref(),
+        tested: None,
+        calibration_s,
+        more: "--explain",
+    };
     let reporting = Reporting {
         recording: &recording,
         sensor: &sensor,

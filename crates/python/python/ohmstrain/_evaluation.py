@@ -58,13 +58,13 @@ class Evaluation:
         return iter(self.scores)
 
     def __repr__(self) -> str:
-        head = f"{'estimate':14}{'%FS':>8}{'RMSE':>10}{'bias':>10}  50/90/95 %"
+        head = f"{'estimate':16}{'%FS':>8}{'RMSE':>10}{'bias':>10}  50/90/95 %"
         lines = [head]
         for of, scores in self.scores.items():
             covered = [scores.coverage_50, scores.coverage_90, scores.coverage_95]
             shares = "/".join(f"{100 * share:.0f}" for share in covered if share is not None)
             lines.append(
-                f"{of:14}{scores.rmse_percent_fs:8.2f}{scores.rmse:10.4f}{scores.bias:+10.4f}  {shares}".rstrip()
+                f"{of:16}{scores.rmse_percent_fs:8.2f}{scores.rmse:10.4f}{scores.bias:+10.4f}  {shares}".rstrip()
             )
         return "\n".join(lines)
 

@@ -39,13 +39,12 @@ class Work:
         if task == "calibrate":
             _choices(**self.options)
         else:
-            columns = {key: tuple(Sensor.from_toml(text).columns) for key, text in self.texts.items()}
-            if len(set(columns.values())) > 1:
+            given = [Sensor.from_toml(text) for text in self.texts.values()]
+            columns = [sensor._core.columns(self.about, _options(**self.options)) for sensor in given]
+            if any(names != columns[0] for names in columns):
                 raise _core.OhmstrainError("sensors: expected sensors of one quantity and one unit of readings")
-            self.columns = next(iter(columns.values()))
-            first = Sensor.from_toml(next(iter(self.texts.values())))
-            self.reading = first.reading
-            first._core.live(_options(**self.options))
+            self.columns, self.reading = columns[0], given[0].reading
+            given[0]._core.live(_options(**self.options), self.about)
 
     def __getstate__(self) -> dict[str, Any]:
         return {**self.__dict__, "_made": {}}
@@ -73,8 +72,9 @@ class Work:
             raise _core.OhmstrainError(f"expected readings as the sensors', `{self.reading}`, found `{','.join(names)}`")
 
     def needed(self, names: Iterable[str]) -> list[str]:
-        """The columns that are handed over; nothing else travels."""
-        return [name for name in names if name in self.by or name in _tables.COLUMNS]
+        """The columns that are handed over; nothing else travels, of a reference only where it is asked for."""
+        known = _tables.COLUMNS if self.task in ("evaluate", "calibrate") else _tables.READINGS
+        return [name for name in names if name in self.by or name in known]
 
     def schema(self, keys: Mapping[str, pa.DataType]) -> pa.Schema:
         """Columns of the result: keys, what the task gives, warnings and the error."""
@@ -104,7 +104,7 @@ class Work:
             keys = {key: group[key][0] for key in self.by}
             schema = self.schema({key: group.schema.field(key).type for key in self.by})
             try:
-                live = live or self._sensor(keys)._core.live(_options(**self.options))
+                live = live or self._sensor(keys)._core.live(_options(**self.options), self.about)
                 recording = group.select([name for name in group.column_names if name in _tables.COLUMNS])
                 yield from _rows(keys, _estimates(*live.run(recording, self.about)), schema).combine_chunks().to_batches()
             except Exception as error:  # noqa: BLE001: as above

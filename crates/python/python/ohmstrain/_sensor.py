@@ -17,9 +17,10 @@ class OhmstrainWarning(UserWarning):
     """What casts doubt on a result: a use outside of what the calibration has seen, rows that were left out."""
 
 
-def _warn(messages: Iterable[str]) -> None:
+def _warn(messages: Iterable[str], depth: int = 1) -> None:
+    """Warn at the line of the user, so many calls above the one that asks for it."""
     for message in messages:
-        warnings.warn(message, OhmstrainWarning, stacklevel=3)
+        warnings.warn(message, OhmstrainWarning, stacklevel=depth + 2)
 
 
 def _about(
@@ -38,6 +39,7 @@ def _options(
     rest_resistance: float | str | None = None,
     gate: float | None = None,
     influence: str | None = None,
+    columns: Iterable[str] | None = None,
 ) -> dict[str, Any]:
     return {
         "estimator": estimator,
@@ -46,6 +48,7 @@ def _options(
         "rest_resistance": rest_resistance,
         "gate": gate,
         "influence": influence,
+        "columns": None if columns is None else list(columns),
     }
 
 
@@ -165,7 +168,7 @@ class Sensor:
     @property
     def columns(self) -> list[str]:
         """Columns of its estimates."""
-        return self._core.columns()
+        return self._core.columns(_about(), _options())
 
     def filter(self, recording: Any = None, *, lag_s: float | None = None, **options: Any) -> Any:
         """Estimates of a recording, each from the readings up to it; or, without one, a filter for readings as they come.
@@ -190,6 +193,8 @@ class Sensor:
         influence : str
             How surprising readings are taken: ``redescending:K`` (``redescending:3`` by default), ``huber:K``,
             ``student-t:DOF`` or ``none``, as they are.
+        columns : list of str
+            Columns of the estimates that are wanted, of :attr:`columns`; all by default.
         name, gauge_length_mm, front_end, joint
             What messages call the recording, and what stands above the header of a trace CSV.
 
@@ -233,7 +238,7 @@ class Sensor:
     def _estimate(self, method: Any, recording: Any, options: dict[str, Any]) -> Any:
         about, options = _split(options)
         table, doubts = method(_tables.to_arrow(recording), about, _options(**options))
-        _warn(doubts)
+        _warn(doubts, 2)
         return _tables.converter(recording)(_tables.from_core(table))
 
     @property
@@ -251,7 +256,13 @@ class Sensor:
         lower, upper = params["limits"]["lower"], params["limits"]["upper"]
         branches = len(params["law"]["branches"])
         file = self._file or "made of parameters"
-        return (
+        known = params.get("summary")
+        left_out = known and (
+            f"Left out     {known['left_out_percent_fs']:.2g} % of full scale on quarters not fitted to, static cubic "
+            f"{known['static_cubic_percent_fs']:.2g} %; the\n             95 % interval, "
+            f"{known['width_95_percent_fs']:.3g} % wide, holds {known['coverage_95_percent']:.3g} % of their rows\n"
+        )
+        return (left_out or "") + (
             f"Sensor       {file}, estimator {self.estimator}, a law of {branches} branch{'es' * (branches != 1)}\n"
             f"Reports      {self.quantity} {lower:.4g} to {upper:.4g} of `{self.reading}`, "
             f"R0 {params['rest_reading']:.5g}"

@@ -7,17 +7,9 @@ from typing import Any
 
 import pyarrow as pa
 
-#: Columns of a recording; others are not handed over.
-COLUMNS = (
-    "time_s",
-    "time_us",
-    "resistance_ohm",
-    "resistance_ratio",
-    "adc",
-    "strain",
-    "displacement_mm",
-    "angle_deg",
-)
+#: Columns of readings, and of a recording; others are not handed over.
+READINGS = ("time_s", "time_us", "resistance_ohm", "resistance_ratio", "adc")
+COLUMNS = (*READINGS, "strain", "displacement_mm", "angle_deg")
 
 
 def to_arrow(table: Any) -> pa.Table:
@@ -39,7 +31,7 @@ def to_arrow(table: Any) -> pa.Table:
         raise refused
     known = [name for name in arrow.column_names if name in COLUMNS]
     # Without a known column all names go on, for the message that says what is missing.
-    return arrow.select(known) if known else arrow
+    return arrow if known in ([], arrow.column_names) else arrow.select(known)
 
 
 def from_core(batch: Any) -> pa.Table:

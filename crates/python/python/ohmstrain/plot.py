@@ -21,13 +21,17 @@ def _axes(ax: Any) -> Any:
     return plt.subplots(figsize=(8, 3.2), layout="constrained")[1]
 
 
+def _scale(quantity: str) -> tuple[float, str]:
+    return (100.0, "strain, %") if quantity == "strain" else (1.0, "angle, °")
+
+
 def _column(table: Any, name: str) -> np.ndarray:
     arrow = table if isinstance(table, pa.Table) else pa.table(table) if not hasattr(table, "to_numpy") else None
     cells = table[name].to_numpy() if arrow is None else arrow[name].to_numpy(zero_copy_only=False)
     return np.asarray(cells, dtype=float)
 
 
-def strain(estimates: Any, recording: Any = None, *, ax: Any = None) -> Any:
+def strain(estimates: Any, recording: Any = None, *, gauge_length_mm: float | None = None, ax: Any = None) -> Any:
     """Strain with its 95 % interval against time, and the reference, if the recording has one.
 
     Parameters
@@ -36,6 +40,8 @@ def strain(estimates: Any, recording: Any = None, *, ax: Any = None) -> Any:
         What :meth:`Sensor.filter` or :meth:`Sensor.smooth` returned.
     recording
         The recording, for its reference.
+    gauge_length_mm
+        Makes strain of a reference in ``displacement_mm``, which is not drawn without.
     ax
         Axes to draw in; new ones by default.
 
@@ -47,7 +53,7 @@ def strain(estimates: Any, recording: Any = None, *, ax: Any = None) -> Any:
     names = list(estimates.columns) if hasattr(estimates, "columns") else list(estimates)
     names = estimates.column_names if isinstance(estimates, pa.Table) else names
     quantity = "strain" if "strain" in names else "angle_deg"
-    scale, unit = (100.0, "strain, %") if quantity == "strain" else (1.0, "angle, °")
+    scale, unit = _scale(quantity)
     time_s = _column(estimates, "time_s")
     mean = scale * _column(estimates, quantity)
     sd = scale * _column(estimates, "strain_sd" if quantity == "strain" else "angle_sd")
@@ -55,10 +61,13 @@ def strain(estimates: Any, recording: Any = None, *, ax: Any = None) -> Any:
     ax.plot(time_s, mean, color=ESTIMATE, lw=1, label="estimate")
     if recording is not None:
         table = _tables.to_arrow(recording)
-        if quantity in table.column_names:
-            ax.plot(_column(table, "time_s"), scale * _column(table, quantity), color=REFERENCE, lw=0.8, label="reference")
+        reference, factor = quantity, scale
+        if gauge_length_mm is not None and quantity == "strain" and "displacement_mm" in table.column_names:
+            reference, factor = "displacement_mm", scale / gauge_length_mm
+        if reference in table.column_names:
+            ax.plot(_column(table, "time_s"), factor * _column(table, reference), color=REFERENCE, lw=0.8, label="reference")
     ax.set(xlabel="time, s", ylabel=unit)
-    ax.legend(loc="upper right", frameon=False, ncols=3)
+    ax.legend(loc="lower right", bbox_to_anchor=(1, 1), frameon=False, ncols=3)
     return ax.figure
 
 
@@ -78,9 +87,10 @@ class SensorPlots:
         params = self._sensor.params
         limits, gauge = params["limits"], params["law"]["gauge"]
         strain = np.linspace(limits["lower"], limits["upper"], 200)
+        scale, unit = _scale(self._sensor.quantity)
         ax = _axes(ax)
-        ax.plot(100 * strain, 100 * _gauge(gauge, strain), color=ESTIMATE, lw=1.2)
-        ax.set(xlabel="strain, %", ylabel="R/R₀ − 1, %")
+        ax.plot(scale * strain, 100 * _gauge(gauge, strain), color=ESTIMATE, lw=1.2)
+        ax.set(xlabel=unit, ylabel="R/R₀ − 1, %")
         return ax.figure
 
     def calibration(self) -> Any:
@@ -100,9 +110,10 @@ class SensorPlots:
         fig, (curve, seen, error) = plt.subplots(1, 3, figsize=(11, 3.2), layout="constrained")
         self.gauge(ax=curve)
         span = findings["seen"]["range"]
-        edges = 100 * np.linspace(span["lower"], span["upper"], len(findings["seen"]["tenths"]) + 1)
+        scale, unit = _scale(self._sensor.quantity)
+        edges = scale * np.linspace(span["lower"], span["upper"], len(findings["seen"]["tenths"]) + 1)
         seen.stairs(100 * np.asarray(findings["seen"]["tenths"]), edges, fill=True, color=ESTIMATE, alpha=0.6)
-        seen.set(xlabel="strain, %", ylabel="rows, %", title="seen")
+        seen.set(xlabel=unit, ylabel="rows, %", title="seen")
         bars = {"filter": findings["filter"], "smoother": findings["smoother"], "static cubic": findings["static_cubic"]}
         bars = {name: scores["rmse_percent_fs"] for name, scores in bars.items() if scores is not None}
         error.bar(list(bars), list(bars.values()), color=[ESTIMATE, ESTIMATE, OTHER][-len(bars) :])
