@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""What Python costs beside the Rust library: processor time of smoothing recordings of 1000 rows, and of one long recording.
+"""What Python costs beside the Rust library: processor time of smoothing recordings of 1000 rows, and of one long recording,
+from tables of pyarrow, polars and pandas.
 
 PYTHON scripts/overhead.py PROGRAM LIBRARY FOLDER [REPETITIONS, 3 [ESTIMATOR RECORDINGS]]
 
@@ -31,12 +32,17 @@ ids = pq.read_table(path)["recording_id"].to_numpy()
 table = pq.read_table(path, columns=["time_s", "resistance_ohm"])
 starts = [0, *(k + 1 for k in range(len(ids) - 1) if ids[k] != ids[k + 1]), len(ids)]
 parts = [table.slice(a, b - a).combine_chunks() for a, b in zip(starts, starts[1:])]
-for _ in range(int(sys.argv[4])):
-    start = time.process_time()
-    for part in parts:
-        sensor.smooth(part, estimator=estimator)
-    print(time.process_time() - start)
+if sys.argv[4] == "pandas":
+    parts = [part.to_pandas() for part in parts]
+if sys.argv[4] == "polars":
+    import polars
+    parts = [polars.from_arrow(part) for part in parts]
+start = time.process_time()
+for part in parts:
+    sensor.smooth(part, estimator=estimator)
+print(time.process_time() - start)
 """
+TABLES = ("pyarrow", "polars", "pandas")
 
 
 def flat(recordings, path):
@@ -84,11 +90,12 @@ def main():
         make(sys.executable, fleet, size)
         name = {"auto": "corrected"}.get(estimator, estimator)
         for of in ("short", "long"):
-            found = {"library": [], "python": []}
+            found = {what: [] for what in ("library", *TABLES)}
             for _ in range(repetitions):
                 found["library"].append(seconds(library, fleet / "sensor.toml", name, fleet / f"{of}.f64", 1))
-                python = (sys.executable, "-c", SMOOTH, fleet / "sensor.toml", estimator)
-                found["python"].append(seconds(*python, fleet / f"{of}.parquet", 1))
+                python = (sys.executable, "-c", SMOOTH, fleet / "sensor.toml", estimator, fleet / f"{of}.parquet")
+                for table in TABLES:
+                    found[table].append(seconds(*python, table))
             for what, each in found.items():
                 ratio = statistics.median(a / b for a, b in zip(each, found["library"]))
                 rows = ", ".join(f"{second / size * 1e3:.2f}" for second in each)

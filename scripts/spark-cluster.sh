@@ -8,7 +8,8 @@
 # As root it says the processor time of all processes, too.
 #
 # Wants Java, a Python with the ohmstrain wheel, pyspark and ray (PYTHON; default: `scripts/python.sh --engines` makes one and
-# installs Java), and the program (OHMSTRAIN; default: built by cargo). ENGINES, `spark ray` by default, says which.
+# installs Java), and the program (OHMSTRAIN; default: built by cargo). ENGINES, `spark ray` by default, says which;
+# TASK=copy computes nothing, so that what is left is the engines' own cost.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 scaling=
@@ -63,7 +64,7 @@ fi
 # run ENGINE FLAG...: with what it says only where it fails.
 run() {
     [[ " plain$engines" = *" $1 "* ]] || return 0
-    "$python" $fleet run "$work/fleet" "$1" --estimator "$estimator" "${@:2}" 2>"$work/$1.log" || { cat "$work/$1.log" >&2; exit 1; }
+    "$python" $fleet run "$work/fleet" "$1" --task "${TASK:-smooth}" --estimator "$estimator" "${@:2}" 2>"$work/$1.log" || { cat "$work/$1.log" >&2; exit 1; }
     [[ $1 = plain ]] && return
     "$python" $fleet check "$work/fleet" "$1"
     rm -rf "$work/fleet/estimates-$1"

@@ -6,7 +6,8 @@
     fleet.py run FOLDER ray --kill any
     fleet.py check FOLDER spark                  nothing lost, nothing doubled, the same numbers
 
-`--estimator ekf` takes the quick filter in place of the sensor's default.
+`--estimator ekf` takes the quick filter in place of the sensor's default. `--task copy` computes nothing: the reading stands in
+every column of the estimates, so that what is left is the engine's own cost.
 
 `make` needs the program `ohmstrain`: in PATH, or where the environment's OHMSTRAIN says.
 """
@@ -30,7 +31,7 @@ import pyarrow.dataset as ds
 import pyarrow.parquet as pq
 
 import ohmstrain as oh
-from ohmstrain._groups import Work
+from ohmstrain import _groups
 
 BY = ["sensor_id", "recording_id"]
 #: Rows of a recording that take 200 s, at 5 Hz; with more rows the sample rate is higher.
@@ -42,6 +43,20 @@ PER_FILE = 50
 #: Columns that are compared, and rows of them at a time.
 CHECKED = [*BY, "time_s", "strain", "strain_sd", "nis", "flags", "error"]
 COMPARED = 10_000_000
+
+
+class Copy(_groups.Work):
+    """As many columns as of estimates, and nothing computed."""
+
+    def _columns(self, keys, group):
+        flags = pa.repeat("", len(group))
+        return {name: flags if name == "flags" else group["resistance_ohm"] for name in self.columns}
+
+
+def work_of(task, folder, estimator):
+    sensor = oh.Sensor.load(folder / "sensor.toml")
+    made, task = (Copy, "smooth") if task == "copy" else (_groups.Work, task)
+    return made(task, BY, sensor, estimator=estimator)
 
 
 def program(*words):
@@ -84,7 +99,7 @@ def plain_file(work, path, to, columns):
 
 def plain(folder, task, estimator, workers, columns):
     """One recording after another, in each worker; writes some columns, or all."""
-    work = Work(task, BY, oh.Sensor.load(folder / "sensor.toml"), estimator=estimator)
+    work = work_of(task, folder, estimator)
     to = folder / "estimates-plain"
     to.mkdir(exist_ok=True)
     files = sorted((folder / "recordings").glob("*.parquet"))
@@ -115,7 +130,7 @@ def spark(folder, task, estimator, workers, partitions, master):
     session.sparkContext.setLogLevel("ERROR")
     with Clock() as clock:
         df = session.read.parquet(str((folder / "recordings").absolute()))
-        done = getattr(oh_spark, task)(df, oh.Sensor.load(folder / "sensor.toml"), estimator=estimator)
+        done = oh_spark._grouped(df, work_of(task, folder, estimator))
         done.write.mode("overwrite").parquet(str((folder / "estimates-spark").absolute()))
     session.stop()
     return clock
@@ -131,7 +146,7 @@ def ray(folder, task, estimator, workers, partitions):
     ray.data.DataContext.get_current().default_hash_shuffle_parallelism = partitions
     with Clock() as clock:
         dataset = ray.data.read_parquet(str(folder / "recordings"))
-        done = getattr(oh_ray, task)(dataset, oh.Sensor.load(folder / "sensor.toml"), estimator=estimator)
+        done = oh_ray._grouped(dataset, work_of(task, folder, estimator))
         done.write_parquet(str(folder / "estimates-ray"), mode=ray.data.SaveMode.OVERWRITE)
     ray.shutdown()
     return clock
@@ -265,7 +280,7 @@ def main():
     parser.add_argument("engine", nargs="?", choices=["plain", "spark", "ray"])
     parser.add_argument("--recordings", type=int, default=10_000)
     parser.add_argument("--rows", type=int, default=ROWS, help="of a recording")
-    parser.add_argument("--task", choices=["filter", "smooth"], default="smooth")
+    parser.add_argument("--task", choices=["filter", "smooth", "copy"], default="smooth")
     parser.add_argument("--estimator", default="auto", help="in place of the sensor's default")
     parser.add_argument("--workers", type=int, default=2, help="of one core each")
     parser.add_argument("--master", default="local[2]", help="of Spark")
