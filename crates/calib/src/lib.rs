@@ -41,6 +41,7 @@ pub use filter::build::{HISTORIES, HYPOTHESES, PARTICLE_SEED, build_filter, buil
 pub use filter::corrected::SURPRISING_NIS;
 pub use filter::learned::Learned;
 pub use filter::portable::{PortableCorrection, PortableFilter, PortableSieve};
+pub use filter::stepper::{BESIDE_AFTER, BESIDE_SHARE, STARTLING_NIS};
 pub use filter::{Filter, Output, Rows, Start, WayBack};
 pub use law::advice::OnBound;
 #[cfg(feature = "bootstrap")]

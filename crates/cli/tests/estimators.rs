@@ -18,8 +18,9 @@ fn calibrated_for(estimator: &str) -> Bench {
 /// and only if the estimator has them.
 fn check(estimator: &str, has_phases: bool) {
     let bench = calibrated_for(estimator);
-    // R₀ that follows the readings does so at their end only in the filter.
-    let calibrated = ["--sensor", "sensor.toml", "--rest-resistance", "calibrated"];
+    // R₀ that follows the readings does so at their end only in the filter, and only the filter looks again after a reading that it
+    // takes with less weight.
+    let calibrated = ["--sensor", "sensor.toml", "--rest-resistance", "calibrated", "--influence", "none"];
     let filter = [&["filter", "trace.csv"][..], &calibrated].concat();
     let printed = bench.run(&filter).ok();
     assert_eq!(bench.run(&[&filter[..], &["--estimator", estimator]].concat()).ok(), printed);

@@ -86,6 +86,13 @@ pub trait State<T: Scalar, const N: usize, const L: usize>: Clone {
     #[must_use]
     fn inflated(&self, factor: T) -> Self;
 
+    /// The same state with another one beside it that has `share` of the weight, 0 to 1, from which a filter that has lost its
+    /// way may find it. Hypotheses give it a free place or that of the lightest; what has no room for another stays as it is.
+    #[must_use]
+    fn beside(&self, _other: &Self, _share: T) -> Self {
+        self.clone()
+    }
+
     /// Takes in that component `index` of the state is known from elsewhere, to be `known`: a reference strain, a rate
     /// of zero, a joint on its stop. Everything that is correlated with it follows.
     ///

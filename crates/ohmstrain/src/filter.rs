@@ -36,6 +36,7 @@ impl Translator {
         let dt_s = time_s - mem::replace(&mut self.seen_s, time_s);
         let (taken, off) = (taken(&self.scale, reading, &output), self.off());
         if let (Some(follower), Some((relative, _))) = (&mut self.follower, taken) {
+            output.startled.into_iter().for_each(|jump| follower.jumped(jump));
             follower.see(dt_s, relative);
         }
         let mut flags = Flags::NONE;

@@ -16,6 +16,8 @@ pub struct Following {
     pub returns_s: f64,
     /// A reading counts for no more than this time, s, however long nothing was read before.
     pub longest_s: f64,
+    /// Readings that jump back within so long, s, were a fault in between, and not another day.
+    pub fault_s: f64,
     /// By what factor a reading may want R₀ to be another: beyond it, it is no reading of this sensor.
     pub farthest: f64,
 }
@@ -26,7 +28,7 @@ pub struct Following {
 /// assert!(ohmstrain::FOLLOWING.leaves_s > ohmstrain::FOLLOWING.returns_s);
 /// ```
 pub const FOLLOWING: Following =
-    Following { leaves_s: 40.0, settles_s: 10.0, returns_s: 1.0, longest_s: 2.0, farthest: 2.0 };
+    Following { leaves_s: 40.0, settles_s: 10.0, returns_s: 1.0, longest_s: 2.0, fault_s: 30.0, farthest: 2.0 };
 
 /// Between which readings, R/R₀ - 1, a sensor stays while R₀ is what it was in calibration: the strain is within its limits.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -87,6 +89,8 @@ pub struct RestFollower<T> {
     /// The last reading, none before the first one, and the time since it came, s.
     last: Option<T>,
     since_s: T,
+    /// What `off` was where readings last jumped, and how long ago that was, s, in rows that were read.
+    jumped: Option<(T, T)>,
 }
 
 impl<T: Real> RestFollower<T> {
@@ -98,7 +102,7 @@ impl<T: Real> RestFollower<T> {
     /// ```
     #[must_use]
     pub fn new(bounds: RestBounds) -> Self {
-        Self { bounds, off: T::zero(), last: None, since_s: T::zero() }
+        Self { bounds, off: T::zero(), last: None, since_s: T::zero(), jumped: None }
     }
 
     /// By what share of calibration's R₀ it is another.
@@ -137,7 +141,30 @@ impl<T: Real> RestFollower<T> {
     /// assert!((follower.off() - 0.2 * 2.0 / 42.0).abs() < 1e-12);
     /// ```
     pub fn see(&mut self, dt_s: T, reading: T) {
+        self.jumped.iter_mut().for_each(|(_, ago_s)| *ago_s += dt_s);
         self.draw(FOLLOWING.leaves_s, dt_s, reading);
+    }
+
+    /// Readings have jumped by so much. Where they had jumped shortly before, and back from where they have drawn R₀ since, that was a
+    /// fault: R₀ is what it was before.
+    ///
+    /// ```
+    /// let bounds = ohmstrain::RestBounds { low: Some(-0.05), high: Some(1.5) };
+    /// let mut follower = ohmstrain::RestFollower::<f64>::new(bounds);
+    /// [1.4, 2.0, 2.1].into_iter().for_each(|reading| follower.see(2.0, reading));
+    /// let before = follower.off();
+    /// follower.jumped(0.3);
+    /// [2.4, 2.5].into_iter().for_each(|reading| follower.see(2.0, reading));
+    /// assert!(follower.off() > before && before > 0.0);
+    /// follower.jumped(-0.3);
+    /// assert_eq!(follower.off(), before);
+    /// ```
+    pub fn jumped(&mut self, jump: T) {
+        match self.jumped.filter(|&(_, ago_s)| ago_s <= T::of(FOLLOWING.fault_s)) {
+            Some((before, _)) if jump * (self.off - before) < T::zero() => self.off = before,
+            Some(_) => {}
+            None => self.jumped = Some((self.off, T::zero())),
+        }
     }
 
     fn draw(&mut self, leaves_s: f64, dt_s: T, reading: T) {

@@ -96,14 +96,14 @@ fn of_size<const B: usize, const N: usize, const L: usize>(
     setting: Setting,
 ) -> Result<Box<dyn Filter>, CalibrationError> {
     let model = switched::<B, N>(law, estimator)?;
-    let belief: Belief<f64, N, L> = initial_belief(&model, setting);
+    let beliefs: [Belief<f64, N, L>; 2] = [initial_belief(&model, setting), Belief::initial(&model)];
     let interval = interval(estimator, setting);
     match kind {
         EstimatorKind::Ekf => {
-            return Ok(Box::new(Running::new(SparseEstimator::new(model), belief, model, interval)));
+            return Ok(Box::new(Running::new(SparseEstimator::new(model), beliefs, model, interval)));
         }
         EstimatorKind::Ukf => {
-            return Ok(Box::new(Running::new(Ukf::new(Unscented::new(model)), belief, model, interval)));
+            return Ok(Box::new(Running::new(Ukf::new(Unscented::new(model)), beliefs, model, interval)));
         }
         EstimatorKind::Corrected => return Err(CalibrationError::no_parameters(kind)),
         _ => {}
@@ -111,12 +111,12 @@ fn of_size<const B: usize, const N: usize, const L: usize>(
     let PhaseFilter { dwell, hold, evidence } = PhaseFilter::new(kind, estimator, setting.limits)?;
     Ok(match kind {
         EstimatorKind::Imm => {
-            let start = PhaseMixture::single(belief, Phase::Hold);
+            let start = beliefs.map(|belief| PhaseMixture::single(belief, Phase::Hold));
             let filter = Imm::<_, B, N>::new(model, NO_STEP_S, dwell, evidence).map_err(refused)?;
             Box::new(Running::new(filter, start, model, interval))
         }
         EstimatorKind::SignSplit => {
-            let start = Mixture::single(belief, Phase::Extend);
+            let start = beliefs.map(|belief| Mixture::single(belief, Phase::Extend));
             let filter = SignSplit::<_, B, N, HYPOTHESES>::new(model, NO_STEP_S, hold, evidence).map_err(refused)?;
             Box::new(Running::new(filter, start, model, interval))
         }
@@ -127,11 +127,11 @@ fn of_size<const B: usize, const N: usize, const L: usize>(
         #[cfg(feature = "particles")]
         EstimatorKind::Particles => {
             let filter = Particles::new(model, hold, evidence, PARTICLES, PARTICLE_SEED);
-            let start = filter.start(&belief, Phase::Extend);
+            let start = beliefs.map(|belief| filter.start(&belief, Phase::Extend));
             Box::new(Running::new(filter, start, model, interval))
         }
         _ => {
-            let start = Mixture::single(belief, Phase::Hold);
+            let start = beliefs.map(|belief| Mixture::single(belief, Phase::Hold));
             let filter = Hypotheses::<_, B, N, HISTORIES>::new(model, NO_STEP_S, dwell, evidence).map_err(refused)?;
             Box::new(Running::new(filter, start, model, interval))
         }

@@ -143,6 +143,9 @@ pub struct Output {
     pub verdict: ReadingVerdict,
     /// Probabilities of extend, hold and retract; `None` if the estimator has no phases.
     pub phases: Option<[f64; 3]>,
+    /// How far readings have jumped, where a filter looks again: at the second in a row that startles
+    /// ([`STARTLING_NIS`](crate::STARTLING_NIS)), 8 % of calibration's range away from the last that did not surprise.
+    pub startled: Option<f64>,
 }
 
 /// Where a filter starts.

@@ -39,6 +39,8 @@ pub struct PortableSieve {
     pub longest_repeat_s: f64,
     /// How often a number must have come again to be stuck.
     pub most_repeats: u32,
+    /// How far a reading is from another one, `R/R₀ - 1`, where it has jumped.
+    pub jump: f64,
     /// Time, s, over which errors of the readings are alike.
     pub error_time_s: f64,
 }
@@ -78,6 +80,7 @@ impl PortableFilter {
             plausible: sieve.plausible,
             longest_repeat_s: sieve.longest_repeat_s,
             most_repeats: MOST_REPEATS,
+            jump: sieve.jump,
             error_time_s: estimator.noise.reading_time_s,
         };
         let known_sd = START_SD * params.limits.span();

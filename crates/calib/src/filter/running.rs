@@ -7,7 +7,7 @@ use ohmstrain_ekf::{
 use ohmstrain_model::{StrainRange, SwitchedModel};
 
 use crate::filter::sieve::Sieve;
-use crate::filter::stepper::{Moment, Seen, Stepper};
+use crate::filter::stepper::{BESIDE_SHARE, Moment, Seen, Stepper};
 use crate::filter::way_back::Segments;
 use crate::filter::{Filter, Output, Rows, WayBack};
 
@@ -17,6 +17,8 @@ pub(crate) struct Running<E: Estimator<f64, N, L>, const B: usize, const N: usiz
     model: SwitchedModel<f64, B, N>,
     interval: Interval,
     pub now: Moment<E::State>,
+    /// Before any reading, where nothing is known.
+    unknown: E::State,
     pending: VecDeque<Pending<E::State, Repeated<E::Prepared>>>,
     /// Estimates on their way out, newest first.
     due: Vec<Output>,
@@ -44,11 +46,17 @@ impl<E, const B: usize, const N: usize, const L: usize> Running<E, B, N, L>
 where
     E: Estimator<f64, N, L>,
 {
-    pub(crate) fn new(estimator: E, state: E::State, model: SwitchedModel<f64, B, N>, interval: Interval) -> Self {
+    /// From a state, and that of an unknown start.
+    pub(crate) fn new(
+        estimator: E,
+        [start, unknown]: [E::State; 2],
+        model: SwitchedModel<f64, B, N>,
+        interval: Interval,
+    ) -> Self {
         let (pending, due) = (VecDeque::new(), Vec::new());
         let reading_variance = model.noise().reading_sd.powi(2);
         let stepper = Stepper::new(estimator, interval.sieve, reading_variance);
-        Self { stepper, model, interval, now: Moment::start(state), pending, due }
+        Self { stepper, model, interval, now: Moment::start(start), unknown, pending, due }
     }
 
     fn output(&self, state: &E::State, seen: Seen, sd_scale: f64) -> Output {
@@ -58,6 +66,15 @@ where
             nis: seen.innovation.map(|innovation| innovation.nis()),
             verdict: seen.verdict,
             phases: state.phases(),
+            startled: seen.startled,
+        }
+    }
+
+    /// Follows what was known before any reading, too, where readings have jumped. A smoother, which sees them from both sides,
+    /// does without.
+    fn look_again(&mut self) {
+        if self.now.seen.startled.is_some() {
+            self.now.state = self.now.state.beside(&self.unknown, BESIDE_SHARE);
         }
     }
 
@@ -108,7 +125,9 @@ where
     }
 
     fn step(&mut self, time_s: f64, reading: Option<Reading<f64>>) -> Result<(), StepError> {
-        self.stepper.advance_only(&mut self.now, time_s, reading)
+        self.stepper.advance_only(&mut self.now, time_s, reading)?;
+        self.look_again();
+        Ok(())
     }
 
     fn know(&mut self, strain: &Gaussian<f64>) -> Result<(), StepError> {
@@ -142,8 +161,12 @@ where
             before.onward = Some(step);
         }
         self.pending.push_back(Pending { time_s, seen: self.now.seen, onward: None });
-        let due = self.pending.partition_point(|row| row.time_s + lag_s <= time_s);
-        self.emit(due, out)
+        // Nothing leads back over a hypothesis that comes from nowhere: no row waits for what is after it.
+        let startled = self.now.seen.startled.is_some();
+        let due = self.pending.partition_point(|row| startled || row.time_s + lag_s <= time_s);
+        self.emit(due, out)?;
+        self.look_again();
+        Ok(())
     }
 
     fn flush_lagged(&mut self, out: &mut dyn FnMut(Output)) -> Result<(), StepError> {

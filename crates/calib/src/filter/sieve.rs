@@ -11,6 +11,8 @@ pub(crate) struct Sieve {
     pub(crate) plausible: (f64, f64),
     /// Longest time, s, for which a working sensor repeats one number.
     pub(crate) longest_repeat_s: f64,
+    /// How far a reading is from another one, R/R₀ - 1, where it has jumped.
+    pub(crate) jump: f64,
     /// Time, s, over which errors of the readings are alike.
     error_time_s: f64,
 }
@@ -29,14 +31,20 @@ pub(crate) struct Repeats {
 /// to the step from one reading to the next: a filter that takes surprising readings with less weight does as well without one
 /// against spikes, and better against what lasts, which such a limit has to let in after a while.
 const OUTSIDE: f64 = 2.0;
+/// Share of calibration's range of readings by which they have jumped.
+const JUMP: f64 = 0.08;
 /// A number that has come again for so many times the longest repetition in calibration, and so often, is stuck.
 const LONGER: f64 = 3.0;
 pub(crate) const MOST_REPEATS: u32 = 10;
 
 impl Sieve {
     /// For a calibration, which sees to its readings itself.
-    pub(crate) const OPEN: Self =
-        Self { plausible: (f64::NEG_INFINITY, f64::INFINITY), longest_repeat_s: f64::INFINITY, error_time_s: 0.0 };
+    pub(crate) const OPEN: Self = Self {
+        plausible: (f64::NEG_INFINITY, f64::INFINITY),
+        longest_repeat_s: f64::INFINITY,
+        jump: f64::INFINITY,
+        error_time_s: 0.0,
+    };
 
     /// What a sensor's calibration has seen, and far beyond it.
     pub(crate) fn new(params: &SensorParams) -> Self {
@@ -47,6 +55,7 @@ impl Sieve {
         Self {
             plausible: (relative(low / OUTSIDE), relative((high + beyond).max(high * OUTSIDE))),
             longest_repeat_s: LONGER * seen.longest_repeat_s,
+            jump: JUMP * (relative(high) - relative(low)),
             error_time_s: 0.0,
         }
     }

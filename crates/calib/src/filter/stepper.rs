@@ -5,6 +5,7 @@ use ohmstrain_ekf::{
     Substeps,
 };
 
+use crate::filter::corrected::SURPRISING_NIS;
 use crate::filter::sieve::{Repeats, Sieve};
 
 /// An estimator under guard, and the steps it has prepared.
@@ -38,12 +39,50 @@ pub(crate) struct Moment<S> {
 pub(crate) struct Seen {
     pub innovation: Option<Innovation<f64>>,
     pub verdict: ReadingVerdict,
+    /// Readings in a row that are beyond [`STARTLING_NIS`]; those that were kept from the filter do not count.
+    startling: u32,
+    /// The last one that did not surprise.
+    calm: Option<f64>,
+    /// See [`Output::startled`](crate::Output::startled).
+    pub startled: Option<f64>,
+}
+
+/// Normalised innovation squared of a reading that is weighed down and startles: five standard deviations.
+pub const STARTLING_NIS: f64 = 25.0;
+/// After so many startling readings in a row a filter looks again.
+pub const BESIDE_AFTER: u32 = 2;
+/// How much of the weight then has what it knew before any reading.
+pub const BESIDE_SHARE: f64 = 0.1;
+
+impl Seen {
+    /// A row after another one; readings that are farther apart than `jump` have jumped. A law that is wrong, on another day say,
+    /// surprises without a jump: a filter that looked again then would lose what it has learned since.
+    fn after(
+        before: &Self,
+        (innovation, verdict): (Option<Innovation<f64>>, ReadingVerdict),
+        reading: Option<Reading<f64>>,
+        jump: f64,
+    ) -> Self {
+        let same = Self { innovation, verdict, startled: None, ..*before };
+        let Some(Reading { value, .. }) = reading else { return same };
+        let nis = innovation.map_or(0.0, |innovation| innovation.nis());
+        let startling = match verdict {
+            ReadingVerdict::Downweighted if nis > STARTLING_NIS => before.startling.saturating_add(1),
+            ReadingVerdict::Accepted | ReadingVerdict::Downweighted => 0,
+            _ => return same,
+        };
+        let from_calm = before.calm.map(|calm| value - calm);
+        let startled = from_calm.filter(|moved| startling == BESIDE_AFTER && moved.abs() > jump);
+        let calm = if nis > SURPRISING_NIS { before.calm } else { Some(value) };
+        Self { startling, calm, startled, ..same }
+    }
 }
 
 impl<S> Moment<S> {
     /// Before the first row.
     pub(crate) fn start(state: S) -> Self {
-        let seen = Seen { innovation: None, verdict: ReadingVerdict::Missing };
+        let seen =
+            Seen { innovation: None, verdict: ReadingVerdict::Missing, startling: 0, calm: None, startled: None };
         Self { time_s: None, state, streak: Streak::default(), repeats: None, seen }
     }
 
@@ -91,7 +130,8 @@ impl<E: Estimator<f64, N, L>, const N: usize, const L: usize> Stepper<E, N, L> {
         let Guarded { advanced, from, used, verdict, streak } =
             self.guard.advance(&self.estimator, &now.state, now.streak, prepared, reading)?;
         let Advanced { state, innovation } = advanced;
-        let seen = Seen { innovation, verdict: decided.unwrap_or(verdict) };
+        let said = (innovation, decided.unwrap_or(verdict));
+        let seen = Seen::after(&now.seen, said, reading, self.sieve.jump);
         let next = Moment { time_s: Some(time_s), state, streak, repeats, seen };
         Ok((next, PastStep { from, prepared: *prepared, reading: used }))
     }
@@ -126,7 +166,7 @@ impl<E: Estimator<f64, N, L>, const N: usize, const L: usize> Stepper<E, N, L> {
             now.streak = Streak::default();
         }
         now.state.clone_from(next);
-        now.seen = Seen { innovation, verdict };
+        now.seen = Seen::after(&now.seen, (innovation, verdict), reading, self.sieve.jump);
         Ok(())
     }
 }

@@ -49,33 +49,33 @@ struct OfKind {
 }
 
 const EKF: OfKind = OfKind {
-    step: 1050.0,
+    step: 1150.0,
     hypothesis: 0.0,
     branch: 385.0,
     curve: 80.0,
-    flash: 6300.0,
+    flash: 6700.0,
     flash_branch: 2510.0,
-    stack: [770.0, 225.0, 0.0, 0.0],
+    stack: [840.0, 225.0, 0.0, 0.0],
 };
 /// Where the motion is clear fewer hypotheses part than in the motion of the self-test: then a step takes up to a third less. Two
 /// hypotheses are merged in less than their share of what eight take, which the step's negative number stands for.
 const SIGN_SPLIT: OfKind = OfKind {
-    step: -1000.0,
+    step: -900.0,
     hypothesis: 4180.0,
     branch: 800.0,
     curve: 150.0,
-    flash: 11_800.0,
+    flash: 12_200.0,
     flash_branch: 6100.0,
-    stack: [780.0, 191.0, 93.0, 56.0],
+    stack: [820.0, 191.0, 93.0, 56.0],
 };
 const HISTORIES: OfKind = OfKind {
-    step: 100.0,
+    step: 200.0,
     hypothesis: 2150.0,
     branch: 740.0,
     curve: 1050.0,
-    flash: 11_900.0,
+    flash: 12_300.0,
     flash_branch: 2600.0,
-    stack: [740.0, 154.0, 100.0, 49.0],
+    stack: [780.0, 154.0, 100.0, 49.0],
 };
 
 /// Instructions of a correction for each row, for each simulated one, for each entry of the two triangles, for its quadratic functions.
@@ -161,7 +161,7 @@ fn state(branches: usize, chip: &ChipFilter) -> usize {
         EstimatorKind::Hypotheses => filter.hypotheses * (gaussian + 3) + 1,
         _ => gaussian,
     };
-    // Readings and doubts: twenty-two words; of a correction four, low-passes and features. Strain, variance, rest reading.
+    // Readings and doubts: twenty-six words; of a correction four, low-passes and features. Strain, variance, rest reading.
     let correction = filter.correction.as_ref().map_or(0, |_| 4 + TIME_CONSTANTS_S.len() + FEATURES);
-    FLOAT * (words + 22 + correction + 3)
+    FLOAT * (words + 26 + correction + 3)
 }

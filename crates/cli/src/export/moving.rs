@@ -1,6 +1,6 @@
 //! The filter of the exported program with its state, in any precision.
 
-use ohmstrain_calib::SURPRISING_NIS;
+use ohmstrain_calib::{BESIDE_SHARE, SURPRISING_NIS};
 use ohmstrain_ekf::{
     Belief, Compact, Hypotheses, Mixture, Reading, Real, Residual, SignSplit, SparseEkf, State, StepError,
 };
@@ -65,6 +65,16 @@ impl<T: Real, const B: usize, const N: usize, const L: usize, const K: usize> Mo
             Self::Ekf(_, state) => *state = belief,
             Self::SignSplit(_, state) => *state = Mixture::single(belief, Phase::Extend),
             Self::Histories(_, state) => *state = Mixture::single(belief, Phase::Hold),
+        }
+    }
+
+    /// Follows what another one of its kind knows, too.
+    pub fn look_again(&mut self, other: &Self) {
+        let share = T::of(BESIDE_SHARE);
+        match (self, other) {
+            (Self::SignSplit(_, state), Self::SignSplit(_, other)) => *state = state.beside(other, share),
+            (Self::Histories(_, state), Self::Histories(_, other)) => *state = state.beside(other, share),
+            _ => {}
         }
     }
 

@@ -101,6 +101,9 @@ impl<T: Real, const N: usize, const L: usize> PhaseMixture<T, N, L> {
 
     /// What has no weight stays where it is.
     const fn drop_weightless(&mut self) {}
+
+    /// A phase has one place.
+    const fn take_beside(&mut self, _other: &Self, _share: T) {}
 }
 
 /// At most `K` Gaussians, each stretching, holding or releasing: what [`SignSplit`](crate::SignSplit) and
@@ -207,6 +210,23 @@ impl<T: Real, const N: usize, const L: usize, const K: usize> Mixture<T, N, L, K
     fn drop_weightless(&mut self) {
         self.retain(|share| share.weight > T::zero());
     }
+
+    /// Follows the first Gaussian of another mixture, too, in place of the lightest if there is no other.
+    fn take_beside(&mut self, other: &Self, share: T) {
+        let Some((beside, phase)) = other.at(0) else { return };
+        let weights = self.shares().iter().map(|share| share.weight).enumerate();
+        let lightest = weights.reduce(|a, b| if b.1 < a.1 { b } else { a }).map_or(0, |(place, _)| place);
+        let place = if self.len < K { self.len } else { lightest };
+        if let (Some(to), Some(of)) = (self.shares.get_mut(place), self.phases.get_mut(place)) {
+            (*to, *of) = (Share { weight: T::zero(), ..*beside }, phase);
+        }
+        self.len = self.len.max(place + 1);
+        let total = self.shares().iter().fold(T::zero(), |sum, share| sum + share.weight);
+        let left = (T::one() - share) / total;
+        for (at, to) in self.shares_mut().iter_mut().enumerate() {
+            to.weight = if at == place { share } else { to.weight * left };
+        }
+    }
 }
 
 /// What both have in common.
@@ -240,6 +260,12 @@ macro_rules! mixture_state {
                     share.belief = share.belief.inflated(factor);
                 }
                 inflated
+            }
+
+            fn beside(&self, other: &Self, share: T) -> Self {
+                let mut both = *self;
+                both.take_beside(other, share);
+                both
             }
 
             fn pinned(&self, index: usize, known: &Gaussian<T>) -> Result<Self, StepError> {

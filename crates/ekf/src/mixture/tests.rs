@@ -15,7 +15,7 @@ use super::evidence::{Weighed, Weighing, Weight};
 use super::state::Share;
 use super::*;
 use crate::kernel::Parts;
-use crate::{Estimator, Logistic, Reading, SignSplit};
+use crate::{Estimator, Logistic, Reading, SignSplit, State as _};
 
 /// Strain, rate, baseline.
 type One = (f64, Belief<f64, 3, 6>);
@@ -367,4 +367,26 @@ fn vectors_give_the_bits_of_numbers() {
         let histories = Hypotheses::<_, 2, 5, 8>::new(model, 0.01, dwell, evidence).unwrap();
         assert!(in_vectors_and_one_by_one(&histories, &start) > 4);
     }
+}
+
+/// One that is followed, too, gets the free place or that of the lightest, and its share; the others keep theirs to each other.
+#[test]
+fn what_is_followed_too_has_its_share_and_the_others_keep_theirs() {
+    let belief = |strain: f64| Belief::<f64, 3, 6>::independent(vector![strain, 0.0, 0.0], &[1e-4; 3]);
+    let mut mixture = Mixture::<f64, 3, 6, 2>::empty();
+    let mut children = Children::new(&mut mixture);
+    for (weight, strain) in [(0.25, 0.1), (1.0, 0.9)] {
+        add(&mut children, &(weight, belief(strain)), Phase::Extend);
+    }
+    let other = Mixture::single(belief(0.5), Phase::Hold);
+    let said = |mixture: &Mixture<f64, 3, 6, 2>| -> Vec<(f64, f64, Phase)> {
+        let phases = mixture.phases().iter();
+        mixture.shares().iter().zip(phases).map(|(share, phase)| (share.belief.mean[0], share.weight, *phase)).collect()
+    };
+    // No place is free: the lighter one goes.
+    assert_eq!(said(&mixture.beside(&other, 0.25)), [(0.5, 0.25, Phase::Hold), (0.9, 0.75, Phase::Extend)]);
+    let alone = Mixture::<f64, 3, 6, 2>::single(belief(0.1), Phase::Extend);
+    assert_eq!(said(&alone.beside(&other, 0.25)), [(0.1, 0.75, Phase::Extend), (0.5, 0.25, Phase::Hold)]);
+    // One Gaussian has no room.
+    assert_eq!(belief(0.1).beside(&belief(0.5), 0.25), belief(0.1));
 }

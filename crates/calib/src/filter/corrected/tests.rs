@@ -43,6 +43,7 @@ fn says(time_s: f64, gap: f64, verdict: ReadingVerdict) -> Output {
         nis: Some(1.0),
         verdict,
         phases: Some([0.7, 0.1, 0.2]),
+        startled: None,
     }
 }
 

@@ -4,7 +4,10 @@ mod kernel;
 mod readings;
 
 use ohmstrain::KNOWN_BEYOND;
-use ohmstrain_calib::{EstimatorKind, PortableFilter, Quantity, ReadingUnit, SensorParams, with_sizes};
+use ohmstrain_calib::{
+    BESIDE_AFTER, BESIDE_SHARE, EstimatorKind, PortableFilter, Quantity, ReadingUnit, STARTLING_NIS, SensorParams,
+    with_sizes,
+};
 use ohmstrain_ekf::Belief;
 use ohmstrain_ekf::record::shared;
 use serde::Serialize;
@@ -55,6 +58,10 @@ pub struct Exported {
     known_variance: Literal,
     known_beyond: Literal,
     reading_variance: Literal,
+    /// Squared deviations from which on a reading startles, after how many in a row a filter looks again, and with what share.
+    startling_nis: Literal,
+    beside_after: u32,
+    beside_share: Literal,
     sieve: SieveConstants,
     doubt: DoubtConstants,
     follow: FollowConstants,
@@ -162,6 +169,9 @@ impl Exported {
             known_variance: Literal(sensor.parts.start_variance),
             known_beyond: Literal((KNOWN_BEYOND * params.limits.span()) as f32),
             reading_variance: Literal(reading_sd * reading_sd),
+            startling_nis: Literal(STARTLING_NIS as f32),
+            beside_after: BESIDE_AFTER,
+            beside_share: Literal(BESIDE_SHARE as f32),
             sieve: SieveConstants::new(&filter.readings),
             follow: FollowConstants::new(sensor.parts.rest),
             doubt: DoubtConstants::new(&sensor.parts.doubt, Literal(sensor.parts.zero)),

@@ -14,6 +14,7 @@ pub struct SieveConstants {
     upper: Literal,
     longest_repeat_s: Option<Literal>,
     most_repeats: u32,
+    jump: Literal,
     error_time_s: Option<Literal>,
 }
 
@@ -52,6 +53,7 @@ pub struct FollowConstants {
     leaves_s: Literal,
     returns_s: Literal,
     longest_s: Literal,
+    fault_s: Literal,
     least: Literal,
     most: Literal,
 }
@@ -126,6 +128,7 @@ impl FollowConstants {
             leaves_s: narrow(FOLLOWING.leaves_s),
             returns_s: narrow(FOLLOWING.returns_s),
             longest_s: narrow(FOLLOWING.longest_s),
+            fault_s: narrow(FOLLOWING.fault_s),
             least: narrow(1.0 / FOLLOWING.farthest - 1.0),
             most: narrow(FOLLOWING.farthest - 1.0),
         }
@@ -141,6 +144,7 @@ impl SieveConstants {
             upper: Literal(sieve.plausible.1 as f32),
             longest_repeat_s: finite(sieve.longest_repeat_s as f32),
             most_repeats: sieve.most_repeats,
+            jump: Literal(sieve.jump as f32),
             error_time_s: Some(Literal(sieve.error_time_s as f32)).filter(|time_s| time_s.0 > 0.0),
         }
     }

@@ -573,9 +573,9 @@ static int attempt(ohmstrain_state *state, const interval *over, const float *rh
     return OHMSTRAIN_OK;
 }
 
-static void start_mixture(ohmstrain_state *state, const float *strain)
+/* Before any reading; at a strain that is known if there is one. */
+static void start_hypothesis(hypothesis *first, const float *strain)
 {
-    hypothesis *first = &state->mixture.hypothesis[0];
     int i, j;
 
     for (i = 0; i < STATES; i++) {
@@ -592,11 +592,43 @@ static void start_mixture(ohmstrain_state *state, const float *strain)
     first->weight = 1.0f;
     first->per_inside = 1.0f;
     first->phase = << "EXTEND" if splits else "HOLD" >>;
+}
+
+static void start_mixture(ohmstrain_state *state, const float *strain)
+{
+    start_hypothesis(&state->mixture.hypothesis[0], strain);
     state->mixture.count = 1;
 {% if splits %}
     state->mixture.pause_s = 0.0f;
     state->mixture.open = 0;
 {% endif %}
+}
+
+/* Follows what was known before any reading, too, in place of the lightest hypothesis if there is no other: where a filter has
+ * lost its way, that finds it. */
+static void look_again(ohmstrain_state *state)
+{
+    ohmstrain_mixture *all = &state->mixture;
+    float total = 0.0f, left;
+    int i, place = 0;
+
+    if (all->count < OHMSTRAIN_HYPOTHESES) {
+        place = all->count++;
+    } else {
+        for (i = 1; i < all->count; i++) {
+            place = all->hypothesis[i].weight < all->hypothesis[place].weight ? i : place;
+        }
+    }
+    start_hypothesis(&all->hypothesis[place], (const float *)0);
+    all->hypothesis[place].weight = 0.0f;
+    for (i = 0; i < all->count; i++) {
+        total += all->hypothesis[i].weight;
+    }
+    left = (1.0f - BESIDE_SHARE) / total;
+    for (i = 0; i < all->count; i++) {
+        all->hypothesis[i].weight *= left;
+    }
+    all->hypothesis[place].weight = BESIDE_SHARE;
 }
 
 /* What all hypotheses say together. */

@@ -92,6 +92,13 @@ static const float ROUNDING = 1.4210855e-14f;
 enum { MOST_TRIES = 12 };
 /* Squared deviations beyond which a reading counts the less the farther it is. */
 static const float SURPRISING = 9.0f;
+/* Squared deviations beyond which a reading startles. After so many in a row, so far from the last that did not surprise, the filter
+ * looks again, with this share of the weight. */
+static const float STARTLING = << startling_nis >>f, JUMP = << sieve.jump >>f;
+enum { BESIDE_AFTER = << beside_after >> };
+{% if estimator.hypotheses %}
+static const float BESIDE_SHARE = << beside_share >>f;
+{% endif %}
 /* Two-sided normal quantile of 95 %. */
 static const float NORMAL_95 = 1.959964f;
 {% if estimator.hypotheses %}
@@ -453,6 +460,7 @@ static void follow(readings *seen, float dt_s, float rho)
     const int is_news = seen->has_drawn && seen->drawn_by != rho;
     float wanted = seen->off, passed_s, time_s;
 
+    seen->jumped_s += dt_s;
     seen->undrawn_s = seen->has_drawn ? seen->undrawn_s + dt_s : 0.0f;
     seen->has_drawn = 1;
     seen->drawn_by = rho;
@@ -474,6 +482,18 @@ static void follow(readings *seen, float dt_s, float rho)
     if (<< follow.least >>f < wanted && wanted < << follow.most >>f) {
         time_s = fabsf(wanted) > fabsf(seen->off) ? << follow.leaves_s >>f : << follow.returns_s >>f;
         seen->off += passed_s / (time_s + passed_s) * (wanted - seen->off);
+    }
+}
+
+/* Readings have jumped. Where they had shortly before, and back from where they have drawn R0 since, that was a fault. */
+static void jumped(readings *seen, float jump)
+{
+    if (!seen->has_jumped || seen->jumped_s > << follow.fault_s >>f) {
+        seen->off_before = seen->off;
+        seen->jumped_s = 0.0f;
+        seen->has_jumped = 1;
+    } else if (jump * (seen->off - seen->off_before) < 0.0f) {
+        seen->off = seen->off_before;
     }
 }
 
@@ -601,6 +621,17 @@ static ohmstrain_status step(ohmstrain_state *state, float dt_s, const float *rh
     }
     rho = flags & NO_READING ? (const float *)0 : rho;
     believed = rho ? believed : rho;
+    if (rho) {
+        const float jump = *rho - seen.calm;
+        seen.startling = of_step.nis > STARTLING ? (unsigned char)(seen.startling + (seen.startling < 255)) : 0;
+        if (seen.startling == BESIDE_AFTER && seen.has_believed && fabsf(jump) > JUMP) {
+            jumped(&seen, jump);
+{% if estimator.hypotheses %}
+            look_again(state);
+{% endif %}
+        }
+        seen.calm = of_step.nis > SURPRISING ? seen.calm : *rho;
+    }
     summarise(state, &all);
     strain = strain_of(&all, &variance);
 {% if correction %}

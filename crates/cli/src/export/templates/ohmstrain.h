@@ -89,9 +89,12 @@ typedef struct ohmstrain_readings {
     unsigned count;   /* how often it came again */
     unsigned flags;   /* of the last step */
     unsigned char has_reading;
+    unsigned char startling; /* readings in a row that startled */
+    float calm;     /* the last one that did not surprise, relative to R0 as it has followed */
     /* Doubts of the interval. */
     unsigned char runs, starts, is_lost, has_believed, rests;
     unsigned char follows, has_drawn; /* whether R0 follows the readings, and whether there has been one */
+    unsigned char has_jumped; /* whether readings have */
     float run_s;    /* time since the first step */
     float fading;   /* variance that fades while readings are believed */
     float unread_s; /* time without a reading */
@@ -103,6 +106,7 @@ typedef struct ohmstrain_readings {
     float off;      /* by what share R0 is another than OHMSTRAIN_REST_READING, as far as it has followed */
     float drawn_by; /* the last reading that was believed, of an R0 that has not followed */
     float undrawn_s; /* time since it came */
+    float off_before, jumped_s; /* R0 as it was where readings last jumped, as `off`, and how long ago that was */
     float beyond_s, near_s, least; /* time for which readings have been beyond those at rest, and near them; how far beyond */
 {% if correction %}
     unsigned char has_feature;

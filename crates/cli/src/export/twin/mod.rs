@@ -4,7 +4,7 @@ mod parts;
 mod seen;
 
 use ohmstrain::{Doubts, RestFollower};
-use ohmstrain_calib::EstimatorKind;
+use ohmstrain_calib::{BESIDE_AFTER, EstimatorKind, STARTLING_NIS, SURPRISING_NIS};
 use ohmstrain_ekf::correction::{FEATURES, FeatureScale, ReadingFeatures};
 use ohmstrain_ekf::{Belief, Gaussian, Hypotheses, Mixture, Reading, Real, SignSplit, SparseEkf, StepError};
 use ohmstrain_model::{Phase, StrainRange, SwitchedModel};
@@ -51,6 +51,10 @@ struct Memory<T, const B: usize, const N: usize, const L: usize, const K: usize>
     features: Option<[T; FEATURES]>,
     known_variance: T,
     missing: bool,
+    /// Readings in a row that startled.
+    startling: u32,
+    /// The last one that did not surprise.
+    calm: Option<T>,
     doubts: Doubts<T>,
     /// None where R₀ is told.
     follower: Option<RestFollower<T>>,
@@ -98,6 +102,8 @@ impl<'a, T: Real, const B: usize, const N: usize, const L: usize, const K: usize
             features: None,
             known_variance: T::zero(),
             missing: true,
+            startling: 0,
+            calm: None,
             doubts: if parts.correction.is_some() { doubts.of_corrected() } else { doubts },
             follower: Some(RestFollower::new(parts.rest)),
             strain: Gaussian { mean: T::zero(), variance: T::zero() },
@@ -158,6 +164,11 @@ impl<'a, T: Real, const B: usize, const N: usize, const L: usize, const K: usize
         let (taken, nis) = self.taken(used)?;
         flags |= taken;
         let surprises = flags == flag::DOWNWEIGHTED;
+        let seen = used.filter(|_| flags & flag::NO_READING == 0).map(|used| used.value);
+        let startled = seen.and_then(|reading| self.startled(reading, nis));
+        if startled.is_some() {
+            self.now.moving.look_again(&self.fresh.moving);
+        }
         let shown = relative.filter(|_| flags == 0 || surprises).map(|reading| reading.value);
         let filtered = self.filtered();
         if let Some(watched) = &mut self.now.watched {
@@ -168,12 +179,22 @@ impl<'a, T: Real, const B: usize, const N: usize, const L: usize, const K: usize
         let Gaussian { mean, variance } = self.corrected();
         let used = reading.filter(|_| flags & flag::NO_READING == 0).map(|reading| (reading.value, nis));
         if let (Some(follower), Some((reading, _))) = (&mut self.now.follower, used) {
+            startled.into_iter().for_each(|jump| follower.jumped(jump));
             follower.see(dt_s, reading);
         }
         let variance = self.now.doubts.see(dt_s, used, Gaussian { mean, variance });
         let (variance, doubts) = self.now.doubts.widened(self.now.moving.moments().mean[1], variance);
         self.now.strain = Gaussian { mean, variance };
         Ok(flags | flag::of(doubts))
+    }
+
+    /// How far readings have jumped, where the filter is to look again.
+    fn startled(&mut self, reading: T, nis: T) -> Option<T> {
+        let now = &mut self.now;
+        now.startling = if nis > T::of(STARTLING_NIS) { now.startling.saturating_add(1) } else { 0 };
+        let jump = now.calm.map(|calm| reading - calm).filter(|jump| jump.abs() > now.seen.jump());
+        now.calm = if nis > T::of(SURPRISING_NIS) { now.calm } else { Some(reading) };
+        jump.filter(|_| now.startling == BESIDE_AFTER)
     }
 
     /// Prepares the steps that `dt_s` seconds are divided into; how many they are.

@@ -22,6 +22,11 @@ impl<T: Real> Seen<T> {
         Self { sieve, reading_variance, last: None, since_s: T::zero(), repeated_s: T::zero(), count: 0 }
     }
 
+    /// How far a reading is from another one where it has jumped.
+    pub fn jump(&self) -> T {
+        number(self.sieve.jump)
+    }
+
     /// Time has passed, s.
     pub fn pass(&mut self, dt_s: T) {
         self.since_s += dt_s;
