@@ -178,7 +178,7 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
 
 /// Growth of a reading's variance from one try to the next, and the most tries after the first.
 const COARSER: f64 = 16.0;
-const MOST_TRIES: u32 = 12;
+pub(crate) const MOST_TRIES: u32 = 12;
 
 /// Refuses what is no length of a step that moves.
 fn check_step_length<T: Scalar>(dt_s: T) -> Result<(), StepError> {

@@ -235,6 +235,34 @@ const QUIET: f64 = 1e-5;
 /// Some thirty operations of a step, one after the other, on sums of up to ten terms.
 const ROUNDING: f64 = 300.0;
 
+/// So do filters of hypotheses, however quiet the model: cut at rate zero and merged, correlations are rounded to more than they can
+/// be, and no noise of a reading mends that.
+#[test]
+fn mixtures_take_precise_readings_too() {
+    for quiet in [1.0, 3e-2, 1e-2, 1e-3, 1e-4] {
+        let mut draws = Draws(1);
+        let (mut refused, mut steps) = ([0; 2], 0);
+        for _ in 0..MODELS / 2 {
+            let (model, dt_s) = random_model::<f32>(&mut draws, quiet);
+            let evidence = Evidence { limits: StrainRange { lower: -1.0, upper: 2.0 }, tempering: 1.0 };
+            let dwell = Dwell::new(2.0, 2.0, 0.3).unwrap();
+            let start: Belief<f32, 5, 15> = Belief::initial(&model);
+            let split = SignSplit::<f32, 2, 5, 4>::new(model, dt_s, None, evidence).unwrap();
+            let histories = Hypotheses::<f32, 2, 5, 4>::new(model, dt_s, dwell, evidence).unwrap();
+            let mut signs = Mixture::<f32, 5, 15, 4>::single(start, Phase::Extend);
+            let mut known = Mixture::<f32, 5, 15, 4>::single(start, Phase::Hold);
+            for k in 0..200 {
+                let strain = 0.15 + 0.1 * (0.7 * dt_s * k as f32).sin();
+                let reading = Some(Reading::from(model.law().gauge_value_and_slope(strain).0)).filter(|_| k % 7 > 0);
+                refused[0] += u32::from(split.step(&mut signs, reading).is_err());
+                refused[1] += u32::from(histories.step(&mut known, reading).is_err());
+                steps += 1;
+            }
+        }
+        assert_eq!(refused, [0; 2], "quiet {quiet}, of {steps}");
+    }
+}
+
 #[test]
 fn what_limits_say_is_no_evidence_of_a_reading() {
     let model = model::<f64>(RISING);

@@ -63,3 +63,28 @@ fn a_gate_lets_a_body_set_off() {
         assert!(rows[200..208].iter().any(|row| row.flags.has(Flag::Readmitted)), "gate {gate}");
     }
 }
+
+/// Forward and smoothed: with a spike, an overload and a pause, to the last digit.
+#[test]
+fn a_gate_that_turns_nothing_down_is_no_gate() {
+    let time_s: Vec<f64> = (0..400).map(|k| 0.05 * f64::from(k)).collect();
+    let ohm: Vec<f64> = (0..400)
+        .map(|k| match k {
+            120 => 9.9e37,
+            200 => 3000.0,
+            300..=310 => f64::NAN,
+            _ => 2000.0 + f64::from(k % 3 - 1) + 100.0 * f64::from((k - 250).clamp(0, 8)),
+        })
+        .collect();
+    let sensor = sensor();
+    let rows = |builder: ohmstrain::FilterBuilder<'_>| {
+        let mut filter = builder.build().unwrap();
+        let forward: Vec<Estimate> =
+            time_s.iter().zip(&ohm).map(|(time_s, ohm)| filter.step(*time_s, *ohm).unwrap()).collect();
+        (forward, builder.smooth(&time_s, &ohm).unwrap())
+    };
+    let [without, wide] = [sensor.filter(), sensor.filter().gate(1e300)].map(rows);
+    let digits = |rows: &[Estimate]| rows.iter().map(|row| format!("{row:?}")).collect::<Vec<_>>();
+    assert_eq!(digits(&without.0), digits(&wide.0));
+    assert_eq!(digits(&without.1), digits(&wide.1));
+}

@@ -134,10 +134,58 @@ macro_rules! mixture_steps {
             state: &mut Mixture<T, N, L, K>,
             reading: Option<Reading<T>>,
         ) -> Result<Option<MixtureResidual<T>>, StepError> {
+            match reading {
+                Some(reading) => self.step_hearing(state, reading),
+                None => self.step_hearing(state, reading),
+            }
+        }
+
+        #[inline(always)]
+        fn step_hearing<const L: usize>(
+            &self,
+            state: &mut Mixture<T, N, L, K>,
+            heard: impl Hearing<T>,
+        ) -> Result<Option<MixtureResidual<T>>, StepError> {
+            match self.step_once(state, heard) {
+                Err(refused) => self.step_again(state, heard, refused),
+                taken => taken,
+            }
+        }
+
+        /// Never inlined: a program has it once, for the first try and for all others.
+        #[inline(never)]
+        fn step_once<const L: usize>(
+            &self,
+            state: &mut Mixture<T, N, L, K>,
+            heard: impl Hearing<T>,
+        ) -> Result<Option<MixtureResidual<T>>, StepError> {
             let mut next = Mixture::empty();
-            let residual = self.step_into(state, reading, &mut next)?;
+            let residual = self.step_recorded(state, heard.reading(), &mut next, &mut ())?;
             *state = next;
             Ok(residual)
+        }
+
+        #[cold]
+        #[inline(never)]
+        fn step_again<const L: usize>(
+            &self,
+            state: &mut Mixture<T, N, L, K>,
+            mut heard: impl Hearing<T>,
+            mut refused: StepError,
+        ) -> Result<Option<MixtureResidual<T>>, StepError> {
+            let (mut from, mut tries) = (*state, 0);
+            loop {
+                tries += 1;
+                heard = heard.again(&self.kernel, tries, refused)?;
+                loosen(from.shares_mut(), tries);
+                match self.step_once(&mut from, heard) {
+                    Err(error) => refused = error,
+                    taken => {
+                        *state = from;
+                        return taken;
+                    }
+                }
+            }
         }
 
         /// [`Self::step`] into a state that is there already, whatever it was: nothing need be moved.
@@ -151,41 +199,34 @@ macro_rules! mixture_steps {
             reading: Option<Reading<T>>,
             next: &mut Mixture<T, N, L, K>,
         ) -> Result<Option<MixtureResidual<T>>, StepError> {
-            self.step_heard(state, reading, next, &mut ())
-        }
-
-        /// A reading that is more exact than the numbers is taken again with more and more noise.
-        #[inline(always)]
-        fn step_heard<const L: usize>(
-            &self,
-            state: &Mixture<T, N, L, K>,
-            reading: Option<Reading<T>>,
-            next: &mut Mixture<T, N, L, K>,
-            recorder: &mut impl Recorder<T, B>,
-        ) -> Result<Option<MixtureResidual<T>>, StepError> {
-            let mut tries = 0;
-            let mut extra_variance = reading.map_or(T::zero(), |reading| reading.extra_variance);
-            loop {
-                let heard = reading.map(|reading| Reading { extra_variance, ..reading });
-                match self.step_recorded(state, heard, next, recorder) {
-                    Err(refused) if reading.is_some() => {
-                        tries += 1;
-                        extra_variance = self.kernel.coarser(heard, tries, refused)?.extra_variance;
-                    }
-                    taken => return taken,
+            match self.step_recorded(state, reading, next, &mut ()) {
+                Err(_) => {
+                    *next = *state;
+                    self.step_hearing(next, reading)
                 }
+                taken => taken,
             }
         }
 
         fn back<const L: usize>(
             &self,
             filtered: &Mixture<T, N, L, K>,
-            reading: Option<Reading<T>>,
+            mut reading: Option<Reading<T>>,
             next: &Mixture<T, N, L, K>,
         ) -> Result<Mixture<T, N, L, K>, StepError> {
-            let mut following = Following::<T, B, N, L, K>::new(self.model(), self.kernel.dt_s());
-            let (mut heirs, mut smoothed) = (Mixture::empty(), *filtered);
-            self.step_heard(filtered, reading, &mut heirs, &mut following)?;
+            let (mut heirs, mut smoothed, mut tries) = (Mixture::empty(), *filtered, 0);
+            // As forward, with every try.
+            let following = loop {
+                let mut following = Following::<T, B, N, L, K>::new(self.model(), self.kernel.dt_s());
+                match self.step_recorded(&smoothed, reading, &mut heirs, &mut following) {
+                    Ok(_) => break following,
+                    Err(refused) => {
+                        tries += 1;
+                        reading = reading.again(&self.kernel, tries, refused)?;
+                        loosen(smoothed.shares_mut(), tries);
+                    }
+                }
+            };
             following.lineage.smooth(smoothed.shares_mut(), heirs.shares(), next.shares());
             Ok(smoothed)
         }

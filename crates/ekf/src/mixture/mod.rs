@@ -1,3 +1,4 @@
+mod again;
 pub(crate) mod brood;
 mod children;
 mod estimator;

@@ -10,6 +10,7 @@ use ohmstrain_model::{Phase, SwitchedModel, Turning};
 
 use crate::belief::gaussian::Real;
 use crate::kernel::{Course, Parts, Several};
+use crate::mixture::again::{Hearing, loosen};
 use crate::mixture::brood::{Breeding, Breeds, Parents, Trail};
 use crate::mixture::estimator::{mixture_filter, mixture_steps};
 use crate::mixture::evidence::{Heard, Newborn, Weighing};

@@ -87,7 +87,10 @@ static const float REST_HIGH = << follow.high >>f, OF_HIGH = << follow.of_high >
 {% endif %}
 /* Factor on the standard deviation of strain that the calibration found necessary. */
 static const float STRAIN_SD_SCALE = << strain_sd_scale >>f;
-/* The square of the rounding of a relative reading of order one, and the most tries with more noise after the first. */
+/* The rounding of a number of order one, its square, and the most tries of a step after the first. */
+{% if estimator.hypotheses %}
+static const float ROOT_ROUNDING = 1.1920929e-7f;
+{% endif %}
 static const float ROUNDING = 1.4210855e-14f;
 enum { MOST_TRIES = 12 };
 /* Squared deviations beyond which a reading counts the less the farther it is. */
@@ -347,27 +350,87 @@ static int attempt_reading(ohmstrain_state *state, const interval *over, float r
     return status;
 }
 
-/* The last step of an interval. Where rounding makes a variance negative, the reading is more exact than the numbers: it is
- * taken again with more and more noise until it leaves none; one that is too far away for the numbers is left out. */
+{% if estimator.hypotheses %}
+/* Makes correlations smaller, by a share that grows from rounding to all of them over a few tries: what rounding has left of a
+ * covariance is one again. */
+static void loosen(ohmstrain_state *state, int tries)
+{
+    float share = ROOT_ROUNDING;
+    int i, j, k;
+
+    for (; tries > 0; tries--) {
+        share = 16.0f * share < 1.0f ? 16.0f * share : 1.0f;
+    }
+    for (k = 0; k < state->mixture.count; k++) {
+        float *p = state->mixture.hypothesis[k].covariance;
+        for (i = 1; i < STATES; i++) {
+            for (j = 0; j < i; j++) {
+                p[AT(i, j)] *= 1.0f - share;
+            }
+        }
+    }
+}
+
+{% endif %}
+/* A step that was refused. Where rounding makes a variance negative, the reading is more exact than the numbers: it is taken again
+ * with more and more noise until it leaves none{% if estimator.hypotheses %}, and from looser and looser correlations{% endif %}. */
+static int step_again(ohmstrain_state *state, const interval *over, const float *rho, float extra_variance, unsigned *flags,
+                      ohmstrain_residual *residual)
+{
+{% if estimator.hypotheses %}
+    ohmstrain_state loosened = *state, *from = &loosened;
+{% else %}
+    ohmstrain_state *from = state;
+{% endif %}
+    int status = OHMSTRAIN_ERR_STATE, tries;
+
+    for (tries = 1; status != OHMSTRAIN_OK && tries <= MOST_TRIES; tries++) {
+        if (rho) {
+            extra_variance = extra_variance + READING_VARIANCE + ROUNDING;
+            if (!isfinite(*rho * *rho / extra_variance)) {
+                break;
+            }
+            extra_variance = 16.0f * extra_variance;
+        }
+{% if estimator.hypotheses %}
+        loosen(from, tries);
+{% endif %}
+        status = rho ? attempt_reading(from, over, *rho, extra_variance, flags, residual)
+                     : attempt(from, over, (const float *)0, 0.0f, INFINITY, residual);
+    }
+{% if estimator.hypotheses %}
+    if (status == OHMSTRAIN_OK) {
+        *state = loosened;
+    }
+{% endif %}
+    return status;
+}
+
+/* A step without a reading. */
+static int pass(ohmstrain_state *state, const interval *over, ohmstrain_residual *residual)
+{
+    int status = attempt(state, over, (const float *)0, 0.0f, INFINITY, residual);
+
+{% if estimator.hypotheses %}
+    if (status != OHMSTRAIN_OK) {
+        status = step_again(state, over, (const float *)0, 0.0f, (unsigned *)0, residual);
+    }
+{% endif %}
+    return status;
+}
+
+/* The last step of an interval; a reading that is too far away for the numbers is left out. */
 static int last_step(ohmstrain_state *state, const interval *over, const float *rho, float extra_variance, unsigned *flags,
                      ohmstrain_residual *residual)
 {
-    int tries;
-
-    for (tries = 0; rho && tries <= MOST_TRIES; tries++) {
-        if (attempt_reading(state, over, *rho, extra_variance, flags, residual) == OHMSTRAIN_OK) {
+    if (rho) {
+        if (attempt_reading(state, over, *rho, extra_variance, flags, residual) == OHMSTRAIN_OK ||
+            step_again(state, over, rho, extra_variance, flags, residual) == OHMSTRAIN_OK) {
             return OHMSTRAIN_OK;
         }
-        extra_variance = extra_variance + READING_VARIANCE + ROUNDING;
-        if (!isfinite(*rho * *rho / extra_variance)) {
-            break;
-        }
-        extra_variance = 16.0f * extra_variance;
-    }
-    if (rho) {
         *flags |= OHMSTRAIN_REJECTED;
     }
-    return attempt(state, over, (const float *)0, 0.0f, INFINITY, residual);
+    return pass(state, over, residual);
 }
 
 /* An interval in several steps, of which the last one gets the reading. */
@@ -378,7 +441,7 @@ static int advance_by(ohmstrain_state *state, const interval *over, int count, c
     int status = OHMSTRAIN_OK;
 
     for (; count > 1 && status == OHMSTRAIN_OK; count--) {
-        status = attempt(&next, over, (const float *)0, 0.0f, INFINITY, residual);
+        status = pass(&next, over, residual);
     }
     if (status == OHMSTRAIN_OK) {
         status = last_step(&next, over, rho, extra_variance, flags, residual);

@@ -1,0 +1,71 @@
+//! A step that is refused is taken again: with more and more noise in its reading, which is more exact than the numbers, and from
+//! smaller and smaller correlations, which rounding may have made more than they can be.
+
+use ohmstrain_model::Scalar;
+
+use crate::mixture::state::Share;
+use crate::sparse::MOST_TRIES;
+use crate::{Curve, Reading, SparseEkf, StepError, Switch};
+
+/// Growth of what correlations lose from one try to the next.
+const LOOSER: f64 = 16.0;
+
+/// What a step hears. Of two types: a program that always has a reading has no code for pauses.
+pub(crate) trait Hearing<T: Scalar>: Copy {
+    fn reading(self) -> Option<Reading<T>>;
+
+    /// What a refused step hears at a further try; the refusal where that is of no use.
+    fn again<S: Switch<T>, const B: usize, const N: usize, G: Curve<T>>(
+        self,
+        kernel: &SparseEkf<T, S, B, N, G>,
+        tries: u32,
+        refused: StepError,
+    ) -> Result<Self, StepError>;
+}
+
+impl<T: Scalar> Hearing<T> for Reading<T> {
+    #[inline(always)]
+    fn reading(self) -> Option<Self> {
+        Some(self)
+    }
+
+    fn again<S: Switch<T>, const B: usize, const N: usize, G: Curve<T>>(
+        self,
+        kernel: &SparseEkf<T, S, B, N, G>,
+        tries: u32,
+        refused: StepError,
+    ) -> Result<Self, StepError> {
+        kernel.coarser(Some(self), tries, refused)
+    }
+}
+
+impl<T: Scalar> Hearing<T> for Option<Reading<T>> {
+    #[inline(always)]
+    fn reading(self) -> Self {
+        self
+    }
+
+    fn again<S: Switch<T>, const B: usize, const N: usize, G: Curve<T>>(
+        self,
+        kernel: &SparseEkf<T, S, B, N, G>,
+        tries: u32,
+        refused: StepError,
+    ) -> Result<Self, StepError> {
+        match self {
+            None if refused.is_of_the_reading() && tries <= MOST_TRIES => Ok(None),
+            heard => kernel.coarser(heard, tries, refused).map(Some),
+        }
+    }
+}
+
+/// Makes correlations smaller, by a share that grows from rounding to all of them over a few tries.
+pub(crate) fn loosen<T: Scalar, const N: usize, const L: usize>(shares: &mut [Share<T, N, L>], tries: u32) {
+    let share = (0..tries).fold(T::default_epsilon(), |share, _| share * T::of(LOOSER)).min(T::one());
+    for Share { belief, .. } in shares {
+        let mut row = belief.covariance.packed_mut().iter_mut();
+        for i in 0..N {
+            row.by_ref().take(i).for_each(|covariance| *covariance *= T::one() - share);
+            row.next();
+        }
+    }
+}
