@@ -298,7 +298,8 @@ impl<T: Real> Doubts<T> {
 
     /// The strain's variance with all doubts, and flags that say so. Readings outside of calibration's are off in strain by some
     /// multiple of what the mean slope says. Innovations that are larger than stated widen the interval as they would a weighted mean's (Birge,
-    /// *Phys. Rev.* 40 (1932) 207), and so does a rate beyond calibration's; to no more than is left open without readings.
+    /// *Phys. Rev.* 40 (1932) 207), unless a correction has counted them, and so does a rate beyond calibration's; to no more than is left open
+    /// without readings.
     pub fn widened(&self, rate: T, variance: T) -> (T, Flags) {
         let (worth, most, per_reading) = (T::of(DOUBT.worth), T::of(self.parts.most), T::of(self.parts.per_reading));
         let faster = rate.abs() / T::of(self.parts.fastest_per_s);
