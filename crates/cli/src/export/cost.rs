@@ -53,9 +53,9 @@ const EKF: OfKind = OfKind {
     hypothesis: 0.0,
     branch: 385.0,
     curve: 80.0,
-    flash: 6700.0,
+    flash: 6800.0,
     flash_branch: 2510.0,
-    stack: [840.0, 225.0, 0.0, 0.0],
+    stack: [890.0, 225.0, 0.0, 0.0],
 };
 /// Where the motion is clear fewer hypotheses part than in the motion of the self-test: then a step takes up to a third less. Two
 /// hypotheses are merged in less than their share of what eight take, which the step's negative number stands for.
@@ -64,18 +64,18 @@ const SIGN_SPLIT: OfKind = OfKind {
     hypothesis: 4180.0,
     branch: 800.0,
     curve: 150.0,
-    flash: 12_200.0,
+    flash: 12_500.0,
     flash_branch: 6100.0,
-    stack: [820.0, 191.0, 93.0, 56.0],
+    stack: [840.0, 191.0, 93.0, 56.0],
 };
 const HISTORIES: OfKind = OfKind {
     step: 200.0,
     hypothesis: 2150.0,
     branch: 740.0,
     curve: 1050.0,
-    flash: 12_300.0,
+    flash: 12_600.0,
     flash_branch: 2600.0,
-    stack: [780.0, 154.0, 100.0, 49.0],
+    stack: [800.0, 154.0, 100.0, 49.0],
 };
 
 /// Instructions of a correction for each row, for each simulated one, for each entry of the two triangles, for its quadratic functions.
