@@ -60,10 +60,7 @@ impl Readings {
     fn step(&mut self, time_s: f64, Seen { reading, surprises, nis }: Seen) -> Option<[f64; FEATURES]> {
         let dt_s = (time_s - self.time_s.unwrap_or(time_s)).abs();
         self.time_s = Some(time_s);
-        self.birge = self.innovations.birge();
-        if let Some(nis) = nis {
-            self.innovations.see((-dt_s / Innovations::<f64>::LAST_S).exp(), nis);
-        }
+        self.birge = self.innovations.step(dt_s, nis);
         self.now = self.features.step_unless(surprises, dt_s, reading);
         self.missing = reading.is_none() || self.features.is_waiting();
         self.now
