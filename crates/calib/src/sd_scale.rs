@@ -5,7 +5,7 @@ use crate::params::LARGEST_SD_SCALE;
 const SCALES: std::ops::RangeInclusive<f64> = 1.0..=LARGEST_SD_SCALE;
 /// What has been widened to cover the worst block may be narrowed to cover all of them.
 const JOINT_SCALES: std::ops::RangeInclusive<f64> = 0.35..=3.0;
-/// Turns in which a factor is found. Each leaves less than half of what was wrong.
+/// Turns in which a factor is found.
 const TURNS: usize = 6;
 /// Half-widths of the 50, 90 and 95 % intervals of a standard normal.
 const LEVELS: [(usize, f64); 3] = [(50, 0.674_489_750_196_081_7), (90, 1.644_853_626_951_472_2), (95, Z_95)];
