@@ -97,7 +97,7 @@ fn readmission_takes_no_more_confidence_than_it_needs() {
             let step: Guarded<Kalman, f64> = guard.advance(&ekf, &state, streak, &prepared, reading).unwrap();
             let factor = step.from.covariance[(0, 0)] / state.covariance[(0, 0)];
             if step.verdict == ReadingVerdict::Readmitted {
-                let nis = step.advanced.innovation.unwrap().nis();
+                let nis = step.advanced.innovation.unwrap().nis;
                 let expected = if factors.len() < 3 { (nis / gate).min(10.0) } else { 1.0 };
                 assert!((factor / expected - 1.0).abs() < 1e-12, "{jump}, readmission {}: {factor}", factors.len());
                 factors.push(factor);

@@ -114,7 +114,7 @@ impl Reliability {
                 let (truth, reading) = process.step();
                 let step = filter.advance(&state, &prepared, Some(Reading::from(reading))).unwrap();
                 state = step.state;
-                nis += step.innovation.unwrap().nis() - 1.0;
+                nis += step.innovation.unwrap().nis - 1.0;
                 for (phase, probability) in Phase::ALL.into_iter().zip(state.phases().unwrap()) {
                     let bin = ((probability * BINS as f64) as usize).min(BINS - 1);
                     surplus[phase.index()][bin] += f64::from(u8::from(truth == phase)) - probability;

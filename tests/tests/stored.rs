@@ -47,7 +47,7 @@ fn everything_returns<T: Real + Serialize + DeserializeOwned>() {
     returns(Estimate::new(&model, &belief, &model.law().range, third));
     returns(Evidence { limits: model.law().range, tempering: third });
     returns(Residual { innovation: third, variance: third, nis: third });
-    returns(Innovation { value: third, variance: third, log_likelihood: -third });
+    returns(Innovation { value: third, variance: third, nis: third, log_likelihood: -third });
     returns(Influence::Huber { threshold: third });
     returns((ReadingVerdict::Readmitted, Streak::default(), StepError::NonFiniteReading, Phase::Retract));
 }

@@ -39,7 +39,7 @@ impl<E: Estimator<f64, N, L>, const N: usize, const L: usize> Filter for Gated<E
             return false;
         };
         match taken.innovation {
-            Some(innovation) if innovation.nis() <= GATE => {
+            Some(innovation) if innovation.nis <= GATE => {
                 self.log_likelihood += innovation.log_likelihood;
                 self.state = taken.state;
                 true

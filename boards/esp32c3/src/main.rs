@@ -14,7 +14,6 @@ use esp_hal::analog::adc::{Adc, AdcCalCurve, AdcConfig, Attenuation};
 use esp_hal::peripherals::ADC1;
 use esp_hal::time::{Duration, Instant};
 use esp_hal::uart::{Config, UartTx};
-use ohmstrain_ekf::{Estimate, Innovations};
 use panic_halt as _;
 
 /// Resistor between the supply and the sensor, ohm; the sensor stands between GPIO2 and ground.
@@ -46,28 +45,14 @@ fn main() -> ! {
 
 /// Reads, filters and prints, for ever, unless the filter refuses its numbers.
 fn run(mut read: impl FnMut() -> f32, serial: &mut Option<impl Write>) -> Result<Infallible, &'static str> {
-    let model = sensor::model().map_err(|_| "the sensor's parameters are refused\r\n")?;
-    let filter = sensor::filter(model).map_err(|_| "the filter's numbers are refused\r\n")?;
-    let mut state = sensor::start(&model);
-    let mut features = sensor::features();
-    let mut innovations = Innovations::none();
+    let mut filter = sensor::filter().map_err(|_| "the sensor's numbers are refused\r\n")?;
     let interval = Duration::from_micros((sensor::DT_S * 1e6) as u64);
     let mut due = Instant::now();
     loop {
         due += interval;
         while Instant::now() < due {}
         let begun = Instant::now();
-        let reading = sensor::relative(read(), 0.0, sensor::REST_READING);
-        let heard = filter.step(&mut state, reading).map_err(|_| "a step is refused\r\n")?;
-        let birge = innovations.step(sensor::DT_S, heard.map(|heard| heard.residual.nis));
-        let estimate = Estimate::new(&model, &state, &sensor::LIMITS, sensor::STRAIN_SD_SCALE);
-        let mut strain = estimate.strain;
-        if let Some([a, b, c, d, e, f, g]) = features.step(sensor::DT_S, reading.map(|reading| reading.value)) {
-            let [extend, _, retract] = state.phase_probabilities();
-            let [h, i, j] = [strain.mean, estimate.rate.mean, estimate.relaxation.mean];
-            let inputs = [h, i, j, estimate.baseline, extend, retract, a, b, c, d, e, f, g];
-            strain = sensor::CORRECTION.correct(&inputs, strain, birge).strain;
-        }
+        let strain = filter.step(read()).map_err(|_| "a step is refused\r\n")?.strain;
         let half_width = 1.96 * strain.sd();
         let (low, high) = (strain.mean - half_width, strain.mean + half_width);
         let took_us = begun.elapsed().as_micros();

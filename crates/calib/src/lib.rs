@@ -38,10 +38,8 @@ pub use calibrate::{Calibration, Stage, calibrate};
 pub use correction::owned::{OwnedCorrection, OwnedProcess, OwnedSimulated};
 pub use error::CalibrationError;
 pub use filter::build::{HISTORIES, HYPOTHESES, PARTICLE_SEED, build_filter, build_filter_with};
-pub use filter::corrected::SURPRISING_NIS;
 pub use filter::learned::Learned;
-pub use filter::portable::{PortableCorrection, PortableFilter, PortableSieve};
-pub use filter::stepper::{BESIDE_AFTER, BESIDE_SHARE, STARTLING_NIS};
+pub use filter::portable::{PortableCorrection, PortableFilter};
 pub use filter::{Filter, Output, Rows, Start, WayBack};
 pub use law::advice::OnBound;
 #[cfg(feature = "bootstrap")]

@@ -19,6 +19,12 @@ pub fn builder<'a>(sensor: &'a Sensor, args: &EstimateArgs) -> FilterBuilder<'a>
     if let Some(nis) = args.gate {
         builder = builder.gate(nis);
     }
+    if args.no_plausibility {
+        builder = builder.without_plausibility();
+    }
+    if args.no_second_look {
+        builder = builder.without_second_look();
+    }
     if args.no_doubts {
         builder = builder.without_doubts();
     }

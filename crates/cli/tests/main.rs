@@ -14,6 +14,7 @@ mod evaluate_split;
 mod explain;
 mod export;
 mod export_budget;
+mod export_protections;
 mod figures;
 mod fit_law;
 mod fleet;

@@ -128,14 +128,8 @@ pub struct Innovation<T> {
     pub value: T,
     /// Its variance.
     pub variance: T,
+    /// Normalised innovation squared: χ² with one degree of freedom if the estimator is consistent.
+    pub nis: T,
     /// Log density of the reading before it was seen, constant included.
     pub log_likelihood: T,
-}
-
-impl<T: Scalar> Innovation<T> {
-    /// Normalised innovation squared: χ² with one degree of freedom if the estimator is consistent.
-    #[must_use]
-    pub fn nis(&self) -> T {
-        self.value * self.value / self.variance
-    }
 }

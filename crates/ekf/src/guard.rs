@@ -66,6 +66,14 @@ pub enum ReadingVerdict {
     Stuck,
 }
 
+impl ReadingVerdict {
+    /// Whether the reading has told the filter something.
+    #[must_use]
+    pub const fn is_taken(self) -> bool {
+        matches!(self, Self::Accepted | Self::Downweighted | Self::Readmitted)
+    }
+}
+
 /// Rejections in a row; the caller keeps it beside the state.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -166,7 +174,7 @@ impl<T: Scalar> Guard<T> {
             guarded(as_it_came(advanced), state.clone(), None, ReadingVerdict::Rejected, streak)
         };
         let Some((plain, innovation)) = seen else { return rejected() };
-        let nis = innovation.nis();
+        let nis = innovation.nis;
         // A NIS that is not a number, or below zero, must not pass.
         if nis >= T::zero() && nis <= self.gate {
             let weight = self.influence.weight(nis);
@@ -174,7 +182,7 @@ impl<T: Scalar> Guard<T> {
                 return guarded(plain, state.clone(), Some(reading), ReadingVerdict::Accepted, 0);
             }
             let used = reading.weighted(weight, innovation.variance);
-            let advanced = estimator.advance(state, prepared, Some(used))?;
+            let Some((advanced, _)) = taken_as(estimator, state, prepared, used)? else { return rejected() };
             return guarded(as_it_came(advanced), state.clone(), Some(used), ReadingVerdict::Downweighted, 0);
         }
         if streak.0 < self.patience || !(nis >= T::zero() && nis.is_finite()) {
@@ -184,7 +192,7 @@ impl<T: Scalar> Guard<T> {
         let factor = if inflates { (nis / self.gate).min(T::of(MOST_INFLATION)) } else { T::one() };
         let from = state.inflated(factor);
         let Some((_, wider)) = taken_as(estimator, &from, prepared, reading)? else { return rejected() };
-        let weight = (self.gate / wider.nis()).sqrt().min(T::one());
+        let weight = (self.gate / wider.nis).sqrt().min(T::one());
         let used = reading.weighted(weight, wider.variance);
         let advanced = estimator.advance(&from, prepared, Some(used))?;
         let streak = streak.0.saturating_add(1);

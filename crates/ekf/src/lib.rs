@@ -68,8 +68,8 @@ mod ekf;
 mod error;
 mod estimator;
 mod guard;
-mod innovations;
 mod kernel;
+pub mod live;
 mod mixture;
 #[cfg(feature = "particles")]
 mod particles;
@@ -93,7 +93,6 @@ pub use ekf::{Ekf, Step, Update};
 pub use error::StepError;
 pub use estimator::{Advanced, Estimator, Innovation, State};
 pub use guard::{Guard, Guarded, Influence, ReadingVerdict, Streak};
-pub use innovations::Innovations;
 pub use kernel::{AnyCurve, Compact, CompactWidth, Cubic, Curve, Lanes, Logistic, Switch};
 pub use mixture::{Dwell, Evidence, Hypotheses, Imm, Mixture, MixtureResidual, PhaseMixture, Share, SignSplit};
 #[cfg(feature = "particles")]

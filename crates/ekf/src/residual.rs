@@ -1,5 +1,7 @@
 use ohmstrain_model::Scalar;
 
+use crate::{Innovation, StepError};
+
 /// A reading compared with its prediction, without the logarithm that its density needs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -18,6 +20,13 @@ impl<T: Scalar> Residual<T> {
     #[must_use]
     pub fn log_likelihood(&self) -> T {
         T::of(-0.5) * (self.nis + self.variance.ln() + T::two_pi().ln())
+    }
+
+    /// The same for [`Estimator`](crate::Estimator). What overflows a square is no reading.
+    pub(crate) fn with_log_likelihood(self, log_likelihood: T) -> Result<Innovation<T>, StepError> {
+        let Self { innovation: value, variance, nis } = self;
+        let innovation = Innovation { value, variance, nis, log_likelihood };
+        if nis.is_finite() { Ok(innovation) } else { Err(StepError::NonFiniteState) }
     }
 }
 

@@ -17,7 +17,7 @@ use ohmstrain_model::{Scalar, SwitchedModel};
 
 use crate::ekf::check_time_step;
 use crate::kernel::{Course, Gains, Parts, RateSpread, ReadingLaw, Regions, StepConstants};
-use crate::{AnyCurve, Belief, Curve, Reading, Residual, StepError, Switch};
+use crate::{Advanced, AnyCurve, Belief, Curve, Estimator, Reading, Residual, StepError, Switch};
 
 /// The EKF of a [`SwitchedModel`] with Ornstein-Uhlenbeck motion, for steps of one length.
 ///
@@ -184,4 +184,48 @@ pub(crate) const MOST_TRIES: u32 = 12;
 fn check_step_length<T: Scalar>(dt_s: T) -> Result<(), StepError> {
     check_time_step(dt_s)?;
     if dt_s.is_zero() { Err(StepError::NegativeTimeStep) } else { Ok(()) }
+}
+
+/// The prepared step is the filter itself, made for that length. It has no smoother: that is [`Ekf`](crate::Ekf)'s.
+impl<T, S, const B: usize, const N: usize, G, const L: usize> Estimator<T, N, L> for SparseEkf<T, S, B, N, G>
+where
+    T: Scalar,
+    S: Switch<T>,
+    G: Curve<T>,
+{
+    type State = Belief<T, N, L>;
+    type Prepared = Self;
+
+    fn prepare(&self, dt_s: T) -> Self {
+        let mut other = *self;
+        other.set_length(dt_s);
+        other
+    }
+
+    fn longest_step_s(&self) -> T {
+        self.model.longest_step_s()
+    }
+
+    fn advance(
+        &self,
+        state: &Belief<T, N, L>,
+        prepared: &Self,
+        reading: Option<Reading<T>>,
+    ) -> Result<Advanced<Belief<T, N, L>, T>, StepError> {
+        let mut next = *state;
+        let residual = prepared.step(&mut next, reading)?;
+        let innovation =
+            residual.map(|residual| residual.with_log_likelihood(residual.log_likelihood())).transpose()?;
+        Ok(Advanced { state: next, innovation })
+    }
+
+    fn smooth_back(
+        &self,
+        _: &Belief<T, N, L>,
+        _: &Self,
+        _: Option<Reading<T>>,
+        _: &Belief<T, N, L>,
+    ) -> Result<Option<Belief<T, N, L>>, StepError> {
+        Ok(None)
+    }
 }

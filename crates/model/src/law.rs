@@ -51,6 +51,13 @@ impl<T: Scalar> StrainRange<T> {
     pub fn span(&self) -> T {
         self.upper - self.lower
     }
+
+    /// Variance of a strain that may be anywhere in the range.
+    #[must_use]
+    pub fn variance_of_anywhere(&self) -> T {
+        let span = self.span();
+        span * span * T::of(1.0 / 12.0)
+    }
 }
 
 /// The switched Kelvin-Voigt law with `B` branches:

@@ -1,13 +1,13 @@
 use std::ops::Range;
 
 use ohmstrain_calib::{EstimatorKind, Rows, Start};
+use ohmstrain_ekf::live::{DOUBT, Doubts, Flags, KNOWN_BEYOND, Protections, RestFollower};
 use ohmstrain_ekf::{Guard, Influence, StepError};
 
 use crate::estimate::Scale;
 use crate::filter::{Kernel, Translator, followed, taken};
-use crate::{
-    DOUBT, DoubtParts, Doubts, Error, Estimate, Filter, Flags, LaggedFilter, Reading, RestBounds, RestFollower, Sensor,
-};
+use crate::pauses::Pauses;
+use crate::{Error, Estimate, Filter, LaggedFilter, Reading, Sensor};
 
 /// How many readings in a row a gate turns down before it is the state that is doubted: outliers come alone, a body that sets off
 /// surprises until it is followed. With ten a knee that bent within half a second was missed.
@@ -15,13 +15,6 @@ const PATIENCE: u32 = 2;
 /// What a surprising reading may do unless somebody says otherwise. On five public recordings of two materials it costs at most
 /// one hundredth of the error where nothing is wrong (Student's t with four degrees of freedom costs a tenth on two of them).
 pub(crate) const INFLUENCE: Influence<f64> = Influence::Redescending { threshold: 3.0 };
-/// How far beyond the limits a strain may be that somebody knows, in spans.
-///
-/// ```
-/// // Of a sensor of 0 to 30 % one may know 33 %.
-/// assert!((0.3 * (1.0 + ohmstrain::KNOWN_BEYOND) - 0.33_f64).abs() < 1e-12);
-/// ```
-pub const KNOWN_BEYOND: f64 = 0.1;
 
 /// How a filter is to be; see [`Sensor::filter`]. Everything has a default.
 ///
@@ -49,7 +42,7 @@ pub struct FilterBuilder<'a> {
     initial_strain: Option<f64>,
     gate: Option<f64>,
     influence: Influence<f64>,
-    doubts: bool,
+    protections: Protections,
 }
 
 impl<'a> FilterBuilder<'a> {
@@ -62,7 +55,7 @@ impl<'a> FilterBuilder<'a> {
             initial_strain: None,
             gate: None,
             influence: INFLUENCE,
-            doubts: true,
+            protections: Protections::ALL,
         }
     }
 
@@ -94,7 +87,7 @@ impl<'a> FilterBuilder<'a> {
 
     /// What the rested, unstretched sensor reads now, in place of what it read in calibration: another day, or another
     /// sensor of the same make. Where it is not told, R₀ follows readings that stay outside of the calibration's
-    /// ([`RestFollower`](crate::RestFollower)).
+    /// ([`RestFollower`]).
     ///
     /// ```
     /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
@@ -152,6 +145,36 @@ impl<'a> FilterBuilder<'a> {
         Self { influence, ..self }
     }
 
+    /// Every finite reading is one, whatever calibration has seen, and a number that comes again and again is not stuck.
+    ///
+    /// ```
+    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+    /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
+    /// use ohmstrain::Flag;
+    ///
+    /// let unplugged = |row: ohmstrain::FilterBuilder| row.build()?.step(0.0, 210_000.0);
+    /// assert!(unplugged(sensor.filter())?.flags.has(Flag::Implausible));
+    /// assert!(!unplugged(sensor.filter().without_plausibility())?.flags.has(Flag::Implausible));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub const fn without_plausibility(self) -> Self {
+        Self { protections: Protections { plausibility: false, ..self.protections }, ..self }
+    }
+
+    /// What was known before any reading is not followed again where readings have jumped. A smoother never does.
+    ///
+    /// ```
+    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+    /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
+    /// let steady = sensor.filter().without_second_look().build()?;
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub const fn without_second_look(self) -> Self {
+        Self { protections: Protections { second_look: false, ..self.protections }, ..self }
+    }
+
     /// Intervals as the filter states them: not widened where it has just begun, finds its way back after a fault, or is used
     /// outside of what calibration has seen, or with another R₀. Smoothers never widen theirs; of these flags they have `long_run`.
     ///
@@ -164,7 +187,7 @@ impl<'a> FilterBuilder<'a> {
     /// ```
     #[must_use]
     pub const fn without_doubts(self) -> Self {
-        Self { doubts: false, ..self }
+        Self { protections: Protections { doubts: false, ..self.protections }, ..self }
     }
 
     /// A filter that estimates each row from the readings up to it.
@@ -285,7 +308,7 @@ impl<'a> FilterBuilder<'a> {
         let (mut outputs, mut estimates, mut first) = (Vec::new(), Vec::new(), len);
         let start_s = if len > 0 { row(0).0 } else { 0.0 };
         let mut next_s = if len > 0 { row(len - 1).0 } else { 0.0 };
-        let mut pauses = doubts.map(|doubts| doubts.pauses());
+        let mut pauses = doubts.map(|doubts| Pauses::new(doubts.unread()));
         while let Some(rows) = back.next_segment(&mut outputs).map_err(failed)? {
             first = rows.start;
             pauses.iter_mut().for_each(|pauses| pauses.widen(rows.clone(), |k| row(k).0, &mut outputs));
@@ -330,16 +353,17 @@ impl<'a> FilterBuilder<'a> {
         let start = self.initial_strain.map_or(Ok(Start::Unknown), |strain| self.start_at(strain))?;
         let mut filter = self.sensor.build(Some(kind), start)?;
         filter.guard(self.guard()?);
+        filter.sieve(params.sieve().under(self.protections));
         let mut scale = Scale::new(self.sensor)?;
         self.rest_resistance.map_or(Ok(()), |measured| scale.rest_at(measured))?;
         let motion = &params.estimator(params.filter_of(kind))?.motion;
         let is_none = |strain: f64| strain.abs() <= DOUBT.zero * params.limits.span();
-        let doubts = self.doubts.then(|| {
-            let doubts = Doubts::new(DoubtParts::new(params, motion));
+        let doubts = self.protections.doubts.then(|| {
+            let doubts = Doubts::new(params.doubt_parts(motion));
             self.initial_strain.map_or(doubts, |strain| doubts.of_known_strain(is_none(strain)))
         });
         let is_told = self.rest_resistance.is_some();
-        let follower = (!is_told).then(|| RestFollower::new(RestBounds::of(params)));
+        let follower = (!is_told).then(|| RestFollower::new(params.rest_bounds()));
         Ok(Kernel { filter, translator: Translator { scale, doubts, follower, seen_s: 0.0 } })
     }
 

@@ -1,10 +1,10 @@
-use ohmstrain_calib::{Output, Quantity, SURPRISING_NIS, SensorParams};
+use ohmstrain_calib::{Output, Quantity, SensorParams};
+use ohmstrain_ekf::live::{KNOWN_BEYOND, SURPRISING_NIS};
 use ohmstrain_ekf::{Gaussian, ReadingVerdict};
 use ohmstrain_model::Joint;
 use serde::ser::SerializeStruct;
 use serde::{Serialize, Serializer};
 
-use crate::builder::KNOWN_BEYOND;
 use crate::column::Header;
 use crate::{Error, Flag, Flags, Reading, Sensor};
 

@@ -2,10 +2,10 @@ use std::collections::VecDeque;
 use std::{fmt, mem};
 
 use ohmstrain_calib::Output;
-use ohmstrain_ekf::ReadingVerdict;
+use ohmstrain_ekf::live::{Doubts, Flags, RestFollower};
 
 use crate::estimate::Scale;
-use crate::{Doubts, Error, Estimate, Flags, Reading, RestFollower};
+use crate::{Error, Estimate, Reading};
 
 /// A filter for the sizes of the sensor's law, and the way to it from readings and from it to rows.
 pub(crate) struct Kernel {
@@ -81,13 +81,8 @@ pub(crate) fn followed(
 
 /// A reading R/R₀ - 1 that has told the filter something, and its normalised innovation squared.
 pub(crate) fn taken(scale: &Scale, reading: Reading, output: &Output) -> Option<(f64, f64)> {
-    let relative = reading.relative(scale.rest_reading).filter(|_| is_taken(output.verdict));
+    let relative = reading.relative(scale.rest_reading).filter(|_| output.verdict.is_taken());
     relative.map(|relative| (relative.value, output.nis.unwrap_or(0.0)))
-}
-
-/// Whether a reading has told the filter something.
-pub(crate) const fn is_taken(verdict: ReadingVerdict) -> bool {
-    matches!(verdict, ReadingVerdict::Accepted | ReadingVerdict::Downweighted | ReadingVerdict::Readmitted)
 }
 
 /// A running filter: readings in, estimates out. It can be sent to another thread, and owned by an asynchronous task.

@@ -26,47 +26,37 @@ mod builder;
 mod calibrate;
 mod closing;
 mod column;
-mod doubt;
 mod error;
 mod estimate;
 mod explain;
 mod filter;
-mod flags;
 pub mod number;
 mod pauses;
 mod prior;
 mod reading;
 mod recording;
 mod reference_doubt;
-mod rest_follow;
-mod rest_watch;
 mod sensor;
 mod text;
 mod unit_doubt;
-mod unread;
 mod validity;
 pub mod verdict;
 pub mod wrap;
 
-pub use builder::{FilterBuilder, KNOWN_BEYOND};
+pub use builder::FilterBuilder;
 pub use calibrate::{Calibrated, Calibration, calibrate};
 pub use closing::{Closing, Tested};
 pub use column::Column;
-pub use doubt::{DOUBT, DoubtNumbers, DoubtParts, Doubts};
 pub use error::{Error, Place, TextCause, TextError};
 pub use estimate::Estimate;
 pub use explain::{ReferenceLag, explain};
 pub use filter::{Filter, LaggedFilter};
-pub use flags::{Flag, Flags};
 pub use prior::Prior;
 pub use reading::Reading;
 pub use recording::{Evaluation, Recording};
 pub use reference_doubt::ReferenceDoubt;
-pub use rest_follow::{FOLLOWING, Following, RestBounds, RestFollower};
-pub use rest_watch::{RestSeen, RestWatch};
 pub use sensor::Sensor;
 pub use unit_doubt::{UnitDoubt, UnitGuess};
-pub use unread::{NEVER_READ_S, Unread};
 pub use validity::{Beyond, Extrapolation, ValidityWatch};
 
 #[doc(no_inline)]
@@ -74,6 +64,7 @@ pub use ohmstrain_calib::{
     CalibrationError, Distrusted, Doubt, EstimatorKind, FieldError, Findings, GaugeFamily, Identifiability,
     JointParams, Quantity, ReadingUnit, SamplesError, Scores, SensorParams, Stage,
 };
+pub use ohmstrain_ekf::live::{Flag, Flags, KNOWN_BEYOND};
 #[doc(no_inline)]
 pub use ohmstrain_ekf::{Influence, StepError};
 #[doc(no_inline)]

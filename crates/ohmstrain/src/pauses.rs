@@ -1,9 +1,7 @@
 use std::ops::Range;
 
 use ohmstrain_calib::Output;
-
-use crate::filter::is_taken;
-use crate::unread::{NEVER_READ_S, Unread};
+use ohmstrain_ekf::live::{NEVER_READ_S, Unread};
 
 /// Pauses of the readings in a recording that is smoothed, from its end to its beginning.
 pub(crate) struct Pauses {
@@ -15,7 +13,7 @@ pub(crate) struct Pauses {
 }
 
 impl Pauses {
-    pub(crate) const fn new(unread: Unread, before_s: f64) -> Self {
+    pub(crate) const fn new((unread, before_s): (Unread, f64)) -> Self {
         Self { unread, before_s, next: None }
     }
 
@@ -26,7 +24,7 @@ impl Pauses {
         for (k, (until_s, output)) in rows.clone().zip(until_s.iter_mut().zip(outputs.iter())).rev() {
             let now_s = time_s(k);
             *until_s = match self.next {
-                _ if is_taken(output.verdict) => 0.0,
+                _ if output.verdict.is_taken() => 0.0,
                 Some((next_s, after_s)) => next_s - now_s + after_s,
                 None => NEVER_READ_S,
             };
@@ -38,7 +36,7 @@ impl Pauses {
             let now_s = time_s(k);
             since_s += now_s - last_s;
             last_s = now_s;
-            if is_taken(output.verdict) {
+            if output.verdict.is_taken() {
                 since_s = 0.0;
                 continue;
             }

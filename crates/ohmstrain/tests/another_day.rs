@@ -1,6 +1,6 @@
 //! R₀ of another day.
 
-use ohmstrain::{RestBounds, RestFollower};
+use ohmstrain_ekf::live::{RestBounds, RestFollower};
 
 /// The same in resistances: R₀ goes to where the reading is an end of the range, in a step that is implicit in time.
 fn followed(bounds: (f64, f64), rows: impl Iterator<Item = (f64, f64)>) -> Vec<f64> {

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use ohmstrain_ekf::live::Sieve;
 use serde::Serialize;
 
 use crate::CalibrationError;
@@ -13,7 +14,6 @@ use crate::calibrate::scores::{ScoredRow, Scores};
 use crate::filter::build::{Setting, filter_from_parts};
 use crate::filter::corrected::Corrected;
 use crate::filter::learned::Learned;
-use crate::filter::sieve::Sieve;
 use crate::filter::{Filter, Start};
 use crate::law::fit::CrossFit;
 use crate::law::identifiability::Identifiability;

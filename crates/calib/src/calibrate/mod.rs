@@ -13,6 +13,8 @@ pub(crate) mod with_prior;
 
 use std::collections::BTreeMap;
 
+use ohmstrain_ekf::live::Sieve;
+
 use crate::CalibrationError;
 use crate::calibrate::correction_fit::fit_correction;
 use crate::calibrate::findings::{Check, Findings, Seen};
@@ -21,7 +23,6 @@ use crate::calibrate::noise_fit::{
 };
 use crate::filter::Start;
 use crate::filter::build::{Setting, filter_from_parts};
-use crate::filter::sieve::{Sieve, longest_repeat_s};
 use crate::law::fit::{CrossFit, LawOptions, fit_laws};
 use crate::law::identifiability::identifiability;
 use crate::motion_stats::MotionStats;
@@ -34,6 +35,7 @@ use crate::params::static_cubic::StaticCubic;
 use crate::params::summary::Summary;
 use crate::params::{FORMAT, Quantity, RangeParams, ReadingUnit, SensorParams, Uncertainty, Validity};
 use crate::prior::{CorrectionPrior, Prior};
+use crate::recording::repeats::longest_repeat_s;
 use crate::recording::rest::rest_share;
 use crate::recording::screen::{Distrusted, screen};
 use crate::samples::{Samples, reading_range};

@@ -1,15 +1,15 @@
 use std::collections::BTreeMap;
 
+use ohmstrain_ekf::live::{Sieve, news};
+
 use crate::CalibrationError;
 use crate::calibrate::left_out::{Fold, LeftOut};
 use crate::filter::build::{Setting, filter_from_parts};
-use crate::filter::sieve::Sieve;
 use crate::filter::{Filter, Start};
 use crate::law::fit::CrossFit;
 use crate::motion_stats::{MotionStats, root_mean_square};
 use crate::optimise;
 use crate::params::RangeParams;
-use crate::params::estimator::news;
 use crate::params::estimator::{EstimatorKind, EstimatorParams, MotionParams, NoiseParams, PhaseParams};
 use crate::prior::EstimatorPrior;
 use crate::samples::{Samples, usual_step_s};

@@ -5,14 +5,12 @@ pub(crate) mod owned;
 pub(crate) mod simulated;
 
 use ohmstrain_ekf::Gaussian;
-use ohmstrain_ekf::correction::{FEATURES, INDUCING, InputScale, OUTPUTS, Process, mixture};
+use ohmstrain_ekf::correction::{FEATURES, FILTER_INPUTS, INDUCING, InputScale, OUTPUTS, Process, mixture};
 use owned::{OwnedCorrection, OwnedProcess};
 
 use crate::order::extent;
 use crate::params::RangeParams;
-use crate::params::correction::{
-    CorrectorParams, FILTER_INPUTS, ProcessParams, SIDES, SMOOTHER_INPUTS, SimulatedParams,
-};
+use crate::params::correction::{CorrectorParams, ProcessParams, SIDES, SMOOTHER_INPUTS, SimulatedParams};
 use crate::sd_scale::{joint_scale_of, sd_scale_up_to};
 use gaussian_process::{GaussianProcess, LeftOutRow, Lessons, inducing_rows, relevance};
 

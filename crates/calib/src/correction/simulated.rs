@@ -3,14 +3,14 @@
 
 use nalgebra::{DMatrix, DVector};
 use ohmstrain_ekf::Gaussian;
-use ohmstrain_ekf::correction::{FEATURES, OUTPUTS, Process, kernel};
+use ohmstrain_ekf::correction::{FEATURES, FILTER_INPUTS, OUTPUTS, Process, filter_inputs, kernel};
 
 use super::gaussian_process::relevance;
 use super::owned::{OwnedProcess, OwnedSimulated};
 use super::{BLOCKS, Prepared, scale};
 use crate::order::extent;
 use crate::params::RangeParams;
-use crate::params::correction::{FILTER_INPUTS, SimulatedParams, SimulatedRow, TrainingRow, digits, filter_inputs};
+use crate::params::correction::{SimulatedParams, SimulatedRow, TrainingRow, digits};
 
 /// Rows that stand for all others. Two hundred say no more.
 const ROWS: usize = 64;

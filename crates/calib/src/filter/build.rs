@@ -2,6 +2,7 @@ use std::sync::Arc;
 
 #[cfg(feature = "particles")]
 use ohmstrain_ekf::Particles;
+use ohmstrain_ekf::live::Sieve;
 use ohmstrain_ekf::{
     Belief, Dwell, Evidence, Hypotheses, Imm, Mixture, PhaseMixture, SignSplit, StepError, Ukf, Unscented,
 };
@@ -10,7 +11,6 @@ use ohmstrain_model::{Phase, SwitchedModel};
 use crate::filter::corrected::Corrected;
 use crate::filter::learned::Learned;
 use crate::filter::running::{Interval, Running};
-use crate::filter::sieve::Sieve;
 use crate::filter::sparse_estimator::SparseEstimator;
 use crate::filter::{Filter, Start};
 use crate::params::estimator::{EstimatorKind, EstimatorParams};
@@ -46,7 +46,7 @@ pub fn build_filter_with(
 ) -> Result<Box<dyn Filter>, CalibrationError> {
     params.validate()?;
     let kind = kind.unwrap_or(params.default_estimator);
-    let setting = Setting { limits: params.limits, start, sieve: Sieve::new(params) };
+    let setting = Setting { limits: params.limits, start, sieve: params.sieve() };
     let of = params.filter_of(kind);
     let filter = filter_from_parts(of, &params.law, params.estimator(of)?, setting)?;
     if kind != EstimatorKind::Corrected {

@@ -2,19 +2,16 @@ use std::collections::VecDeque;
 use std::ops::Range;
 use std::sync::Arc;
 
-use ohmstrain_ekf::correction::{FEATURES, FeatureScale, OUTPUTS, ReadingFeatures, mixture};
-use ohmstrain_ekf::{Gaussian, Guard, Innovations, Reading, ReadingVerdict, StepError};
+use ohmstrain_ekf::correction::{FEATURES, FeatureScale, OUTPUTS, ReadingFeatures, filter_inputs, mixture};
+use ohmstrain_ekf::live::{Innovations, SURPRISING_NIS, Sieve};
+use ohmstrain_ekf::{Gaussian, Guard, Reading, ReadingVerdict, StepError};
 
 use crate::CalibrationError;
 use crate::filter::known::KnownError;
 use crate::filter::learned::{Learned, OfFilter, OfSmoother};
 use crate::filter::way_back::SEGMENT;
 use crate::filter::{Filter, Output, Rows, WayBack};
-use crate::params::correction::{FUTURE_FEATURES, filter_inputs, smoother_inputs};
-
-/// A reading that a guard has weighed down and whose normalised innovation squared is above this surprises: three standard
-/// deviations.
-pub const SURPRISING_NIS: f64 = 9.0;
+use crate::params::correction::{FUTURE_FEATURES, smoother_inputs};
 
 /// A filter with the learned correction of its strain. Everything else that it says is the filter's.
 ///
@@ -159,6 +156,10 @@ pub(crate) fn outputs(output: &Output) -> [f64; OUTPUTS] {
 impl Filter for Corrected {
     fn guard(&mut self, guard: Guard<f64>) {
         self.filter.guard(guard);
+    }
+
+    fn sieve(&mut self, sieve: Sieve) {
+        self.filter.sieve(sieve);
     }
 
     fn step(&mut self, time_s: f64, reading: Option<Reading<f64>>) -> Result<(), StepError> {

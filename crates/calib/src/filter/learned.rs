@@ -1,9 +1,11 @@
 use std::sync::{Arc, OnceLock};
 
+use ohmstrain_ekf::correction::FILTER_INPUTS;
+
 use crate::CalibrationError;
 use crate::correction::owned::OwnedCorrection;
 use crate::correction::{self, Examples};
-use crate::params::correction::{CorrectionParams, FILTER_INPUTS, SIDES, SMOOTHER_INPUTS, TrainingRow};
+use crate::params::correction::{CorrectionParams, SIDES, SMOOTHER_INPUTS, TrainingRow};
 use crate::params::{RangeParams, SensorParams};
 
 /// What corrects the strain of a sensor's filters and smoothers. Either is learned when it is first asked for, and then

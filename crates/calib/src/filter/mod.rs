@@ -6,13 +6,13 @@ pub(crate) mod known;
 pub(crate) mod learned;
 pub(crate) mod portable;
 pub(crate) mod running;
-pub(crate) mod sieve;
 pub(crate) mod sparse_estimator;
 pub(crate) mod stepper;
 pub(crate) mod way_back;
 
 use std::ops::Range;
 
+use ohmstrain_ekf::live::Sieve;
 use ohmstrain_ekf::{Estimate, Gaussian, Guard, Reading, ReadingVerdict, StepError};
 
 /// A filter for a sensor whose number of branches and kind of motion are known at run time only. Threads and tasks can own it.
@@ -39,6 +39,9 @@ pub trait Filter: Send {
 
     /// Protects the filter from outliers from now on.
     fn guard(&mut self, guard: Guard<f64>);
+
+    /// What a reading must be from now on; for how long errors are alike stays as it was calibrated.
+    fn sieve(&mut self, sieve: Sieve);
 
     /// Like [`Self::step`], but every row is estimated from the readings up to `lag_s` seconds after it; `out` gets the
     /// rows that have become due, in order. The cost of a step grows with the rows within the lag, not with time.
@@ -144,7 +147,7 @@ pub struct Output {
     /// Probabilities of extend, hold and retract; `None` if the estimator has no phases.
     pub phases: Option<[f64; 3]>,
     /// How far readings have jumped, where a filter looks again: at the second in a row that startles
-    /// ([`STARTLING_NIS`](crate::STARTLING_NIS)), 8 % of calibration's range away from the last that did not surprise.
+    /// ([`STARTLING_NIS`](ohmstrain_ekf::live::STARTLING_NIS)), 8 % of calibration's range away from the last that did not surprise.
     pub startled: Option<f64>,
 }
 

@@ -2,15 +2,14 @@
 
 use std::sync::Arc;
 
-use ohmstrain_ekf::correction::FeatureScale;
+use ohmstrain_ekf::correction::{FILTER_INPUTS, FeatureScale};
+use ohmstrain_ekf::live::{DoubtParts, RestBounds, Sieve};
 
 use crate::CalibrationError;
 use crate::correction::owned::OwnedCorrection;
 use crate::filter::build::{HISTORIES, HYPOTHESES, START_SD};
 use crate::filter::learned::Learned;
-use crate::filter::sieve::{MOST_REPEATS, Sieve};
 use crate::params::SensorParams;
-use crate::params::correction::FILTER_INPUTS;
 use crate::params::estimator::{EstimatorKind, EstimatorParams};
 
 /// A sensor's filter, with what stands around it.
@@ -23,26 +22,15 @@ pub struct PortableFilter {
     /// Its noise, motion and phases.
     pub estimator: EstimatorParams,
     /// What a reading must be for it to see it.
-    pub readings: PortableSieve,
+    pub sieve: Sieve,
+    /// When its interval is wider than it says.
+    pub doubt: DoubtParts,
+    /// Between which readings R₀ stays.
+    pub rest: RestBounds,
     /// What corrects its strain.
     pub correction: Option<PortableCorrection>,
     /// Deviation of a strain that is known when it starts.
     pub known_sd: f64,
-}
-
-/// What a reading must be for a filter to see it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PortableSieve {
-    /// Least and largest `R/R₀ - 1` that can be a reading.
-    pub plausible: (f64, f64),
-    /// Longest time, s, for which a working sensor repeats one number; infinite if that is not known.
-    pub longest_repeat_s: f64,
-    /// How often a number must have come again to be stuck.
-    pub most_repeats: u32,
-    /// How far a reading is from another one, `R/R₀ - 1`, where it has jumped.
-    pub jump: f64,
-    /// Time, s, over which errors of the readings are alike.
-    pub error_time_s: f64,
 }
 
 /// The learned correction of a filter's strain.
@@ -75,15 +63,17 @@ impl PortableFilter {
             EstimatorKind::Imm => 3,
             _ => 1,
         };
-        let sieve = Sieve::new(params);
-        let readings = PortableSieve {
-            plausible: sieve.plausible,
-            longest_repeat_s: sieve.longest_repeat_s,
-            most_repeats: MOST_REPEATS,
-            jump: sieve.jump,
-            error_time_s: estimator.noise.reading_time_s,
-        };
+        let sieve = params.sieve().with_error_time(estimator.noise.reading_time_s);
         let known_sd = START_SD * params.limits.span();
-        Ok(Self { kind, hypotheses, estimator, readings, correction: correction.transpose()?, known_sd })
+        Ok(Self {
+            kind,
+            hypotheses,
+            estimator,
+            sieve,
+            doubt: params.doubt_parts(&estimator.motion),
+            rest: params.rest_bounds(),
+            correction: correction.transpose()?,
+            known_sd,
+        })
     }
 }

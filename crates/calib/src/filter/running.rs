@@ -1,13 +1,13 @@
 use std::collections::VecDeque;
 use std::mem;
 
+use ohmstrain_ekf::live::{BESIDE_SHARE, Sieve};
 use ohmstrain_ekf::{
     Estimate, Estimator, Gaussian, Guard, PastStep, Reading, Repeated, State, StepError, smooth_back_through,
 };
 use ohmstrain_model::{StrainRange, SwitchedModel};
 
-use crate::filter::sieve::Sieve;
-use crate::filter::stepper::{BESIDE_SHARE, Moment, Seen, Stepper};
+use crate::filter::stepper::{Moment, Seen, Stepper};
 use crate::filter::way_back::Segments;
 use crate::filter::{Filter, Output, Rows, WayBack};
 
@@ -63,7 +63,7 @@ where
         let estimate = Estimate::new(&self.model, state, &self.interval.limits, sd_scale);
         Output {
             estimate,
-            nis: seen.innovation.map(|innovation| innovation.nis()),
+            nis: seen.innovation.map(|innovation| innovation.nis),
             verdict: seen.verdict,
             phases: state.phases(),
             startled: seen.startled,
@@ -122,6 +122,10 @@ where
 {
     fn guard(&mut self, guard: Guard<f64>) {
         self.stepper.guard = guard;
+    }
+
+    fn sieve(&mut self, sieve: Sieve) {
+        self.stepper.sieve = sieve.with_error_time(self.stepper.sieve.error_time_s);
     }
 
     fn step(&mut self, time_s: f64, reading: Option<Reading<f64>>) -> Result<(), StepError> {

@@ -51,6 +51,7 @@ impl<const B: usize, const N: usize, const L: usize> Estimator<f64, N, L> for Sp
                 let innovation = residual.map(|residual| Innovation {
                     value: residual.innovation,
                     variance: residual.variance,
+                    nis: residual.nis,
                     log_likelihood: residual.log_likelihood(),
                 });
                 Ok(Advanced { state: next, innovation })

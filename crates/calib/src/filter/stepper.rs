@@ -1,18 +1,16 @@
 use std::collections::HashMap;
 
+use ohmstrain_ekf::live::{Jumps, Repeats, Sieve};
 use ohmstrain_ekf::{
     Advanced, Estimator, Guard, Guarded, Innovation, PastStep, Reading, ReadingVerdict, Repeated, StepError, Streak,
     Substeps,
 };
 
-use crate::filter::corrected::SURPRISING_NIS;
-use crate::filter::sieve::{Repeats, Sieve};
-
 /// An estimator under guard, and the steps it has prepared.
 pub(crate) struct Stepper<E: Estimator<f64, N, L>, const N: usize, const L: usize> {
     pub estimator: Substeps<E>,
     pub guard: Guard<f64>,
-    sieve: Sieve,
+    pub sieve: Sieve,
     /// Of the model's own noise.
     reading_variance: f64,
     prepared: PreparedSteps<Repeated<E::Prepared>>,
@@ -30,7 +28,8 @@ pub(crate) struct Moment<S> {
     pub time_s: Option<f64>,
     pub state: S,
     pub streak: Streak,
-    pub repeats: Option<Repeats>,
+    repeats: Repeats<f64>,
+    jumps: Jumps<f64>,
     pub seen: Seen,
 }
 
@@ -39,51 +38,32 @@ pub(crate) struct Moment<S> {
 pub(crate) struct Seen {
     pub innovation: Option<Innovation<f64>>,
     pub verdict: ReadingVerdict,
-    /// Readings in a row that are beyond [`STARTLING_NIS`]; those that were kept from the filter do not count.
-    startling: u32,
-    /// The last one that did not surprise.
-    calm: Option<f64>,
     /// See [`Output::startled`](crate::Output::startled).
     pub startled: Option<f64>,
 }
 
-/// Normalised innovation squared of a reading that is weighed down and startles: five standard deviations.
-pub const STARTLING_NIS: f64 = 25.0;
-/// After so many startling readings in a row a filter looks again.
-pub const BESIDE_AFTER: u32 = 2;
-/// How much of the weight then has what it knew before any reading.
-pub const BESIDE_SHARE: f64 = 0.1;
-
 impl Seen {
-    /// A row after another one; readings that are farther apart than `jump` have jumped. A law that is wrong, on another day say,
-    /// surprises without a jump: a filter that looked again then would lose what it has learned since.
+    /// A row after other ones; readings that are farther apart than `jump` have jumped, where a guard has weighed them down.
     fn after(
-        before: &Self,
+        jumps: &mut Jumps<f64>,
         (innovation, verdict): (Option<Innovation<f64>>, ReadingVerdict),
         reading: Option<Reading<f64>>,
         jump: f64,
     ) -> Self {
-        let same = Self { innovation, verdict, startled: None, ..*before };
-        let Some(Reading { value, .. }) = reading else { return same };
-        let nis = innovation.map_or(0.0, |innovation| innovation.nis());
-        let startling = match verdict {
-            ReadingVerdict::Downweighted if nis > STARTLING_NIS => before.startling.saturating_add(1),
-            ReadingVerdict::Accepted | ReadingVerdict::Downweighted => 0,
-            _ => return same,
-        };
-        let from_calm = before.calm.map(|calm| value - calm);
-        let startled = from_calm.filter(|moved| startling == BESIDE_AFTER && moved.abs() > jump);
-        let calm = if nis > SURPRISING_NIS { before.calm } else { Some(value) };
-        Self { startling, calm, startled, ..same }
+        let is_weighed = matches!(verdict, ReadingVerdict::Accepted | ReadingVerdict::Downweighted);
+        let nis = innovation.map_or(0.0, |innovation| innovation.nis);
+        let taken = reading.filter(|_| is_weighed);
+        let jumped = taken.and_then(|reading| jumps.see(reading.value, nis, jump));
+        Self { innovation, verdict, startled: jumped.filter(|_| verdict == ReadingVerdict::Downweighted) }
     }
 }
 
 impl<S> Moment<S> {
     /// Before the first row.
     pub(crate) fn start(state: S) -> Self {
-        let seen =
-            Seen { innovation: None, verdict: ReadingVerdict::Missing, startling: 0, calm: None, startled: None };
-        Self { time_s: None, state, streak: Streak::default(), repeats: None, seen }
+        let seen = Seen { innovation: None, verdict: ReadingVerdict::Missing, startled: None };
+        let (repeats, jumps) = (Repeats::none(), Jumps::none());
+        Self { time_s: None, state, streak: Streak::default(), repeats, jumps, seen }
     }
 
     fn seconds_until(&self, time_s: f64) -> f64 {
@@ -103,17 +83,21 @@ impl<E: Estimator<f64, N, L>, const N: usize, const L: usize> Stepper<E, N, L> {
         }
     }
 
-    /// A reading as the estimator is to see it, and what became of it where that is decided already.
+    /// A reading as the estimator is to see it, and what became of it where that is decided already. What is no number is the
+    /// caller's error, which the estimator tells.
     fn sieved(
         &self,
-        repeats: &mut Option<Repeats>,
-        time_s: f64,
+        repeats: &mut Repeats<f64>,
+        dt_s: f64,
         reading: Option<Reading<f64>>,
     ) -> (Option<Reading<f64>>, Option<ReadingVerdict>) {
-        match reading.map(|reading| self.sieve.pass(repeats, time_s, reading, self.reading_variance)) {
-            None => (None, None),
-            Some(Ok(reading)) => (Some(reading), None),
-            Some(Err(verdict)) => (None, Some(verdict)),
+        repeats.pass(dt_s);
+        match reading {
+            Some(known) if known.value.is_finite() => match repeats.sieved(&self.sieve, known, self.reading_variance) {
+                Ok(known) => (Some(known), None),
+                Err(verdict) => (None, Some(verdict)),
+            },
+            _ => (reading, None),
         }
     }
 
@@ -124,15 +108,15 @@ impl<E: Estimator<f64, N, L>, const N: usize, const L: usize> Stepper<E, N, L> {
         time_s: f64,
         reading: Option<Reading<f64>>,
     ) -> Result<(Moment<E::State>, Taken<E, N, L>), StepError> {
-        let mut repeats = now.repeats;
-        let (reading, decided) = self.sieved(&mut repeats, time_s, reading);
-        let prepared = self.prepared.of(now.seconds_until(time_s), |dt_s| self.estimator.prepare(dt_s))?;
+        let (mut repeats, mut jumps, dt_s) = (now.repeats, now.jumps, now.seconds_until(time_s));
+        let (reading, decided) = self.sieved(&mut repeats, dt_s, reading);
+        let prepared = self.prepared.of(dt_s, |dt_s| self.estimator.prepare(dt_s))?;
         let Guarded { advanced, from, used, verdict, streak } =
             self.guard.advance(&self.estimator, &now.state, now.streak, prepared, reading)?;
         let Advanced { state, innovation } = advanced;
         let said = (innovation, decided.unwrap_or(verdict));
-        let seen = Seen::after(&now.seen, said, reading, self.sieve.jump);
-        let next = Moment { time_s: Some(time_s), state, streak, repeats, seen };
+        let seen = Seen::after(&mut jumps, said, reading, self.sieve.jump);
+        let next = Moment { time_s: Some(time_s), state, streak, repeats, jumps, seen };
         Ok((next, PastStep { from, prepared: *prepared, reading: used }))
     }
 
@@ -143,9 +127,9 @@ impl<E: Estimator<f64, N, L>, const N: usize, const L: usize> Stepper<E, N, L> {
         time_s: f64,
         reading: Option<Reading<f64>>,
     ) -> Result<(), StepError> {
-        let (came, mut repeats) = (reading, now.repeats);
-        let (reading, decided) = self.sieved(&mut repeats, time_s, reading);
-        let prepared = self.prepared.of(now.seconds_until(time_s), |dt_s| self.estimator.prepare(dt_s))?;
+        let (came, mut repeats, dt_s) = (reading, now.repeats, now.seconds_until(time_s));
+        let (reading, decided) = self.sieved(&mut repeats, dt_s, reading);
+        let prepared = self.prepared.of(dt_s, |dt_s| self.estimator.prepare(dt_s))?;
         let next = self.next.get_or_insert_with(|| Box::new(now.state.clone()));
         let (innovation, verdict) = match self.estimator.advance_into(&now.state, prepared, reading, next) {
             Err(error) if reading.is_some() && error.is_of_the_reading() => {
@@ -156,7 +140,7 @@ impl<E: Estimator<f64, N, L>, const N: usize, const L: usize> Stepper<E, N, L> {
                 (taken?, decided.unwrap_or(verdict))
             }
         };
-        if innovation.is_some_and(|innovation| !self.guard.takes_whole(innovation.nis())) {
+        if innovation.is_some_and(|innovation| !self.guard.takes_whole(innovation.nis)) {
             (*now, _) = self.advance(now, time_s, came)?;
             return Ok(());
         }
@@ -166,7 +150,7 @@ impl<E: Estimator<f64, N, L>, const N: usize, const L: usize> Stepper<E, N, L> {
             now.streak = Streak::default();
         }
         now.state.clone_from(next);
-        now.seen = Seen::after(&now.seen, (innovation, verdict), reading, self.sieve.jump);
+        now.seen = Seen::after(&mut now.jumps, (innovation, verdict), reading, self.sieve.jump);
         Ok(())
     }
 }

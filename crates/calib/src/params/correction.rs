@@ -1,4 +1,4 @@
-use ohmstrain_ekf::correction::{FEATURES, FeatureScale, OUTPUTS, Starts, settled};
+use ohmstrain_ekf::correction::{FEATURES, FILTER_INPUTS, FeatureScale, OUTPUTS, Starts, filter_inputs, settled};
 use serde::{Deserialize, Serialize};
 
 use crate::digits::significant;
@@ -98,8 +98,6 @@ pub struct TrainingRow {
     pub smoothed: [f64; OUTPUTS],
 }
 
-/// Inputs of the filter's correction.
-pub(crate) const FILTER_INPUTS: usize = OUTPUTS + FEATURES;
 /// Inputs of the smoother's.
 pub(crate) const SMOOTHER_INPUTS: usize = FILTER_INPUTS + FUTURE_FEATURES;
 /// One-sided processes of the smoother's.
@@ -131,22 +129,14 @@ impl TrainingRow {
     }
 }
 
-pub(crate) fn filter_inputs(outputs: &[f64; OUTPUTS], past: &[f64; FEATURES]) -> [f64; FILTER_INPUTS] {
-    joined([outputs, past, &[]])
-}
-
 pub(crate) fn smoother_inputs(
     outputs: &[f64; OUTPUTS],
     past: &[f64; FEATURES],
     future: &[f64; FUTURE_FEATURES],
 ) -> [f64; SMOOTHER_INPUTS] {
-    joined([outputs, past, future])
-}
-
-fn joined<const D: usize>(parts: [&[f64]; 3]) -> [f64; D] {
-    let mut joined = [0.0; D];
-    joined.iter_mut().zip(parts.into_iter().flatten()).for_each(|(place, value)| *place = *value);
-    joined
+    let mut inputs = [0.0; SMOOTHER_INPUTS];
+    inputs.iter_mut().zip(outputs.iter().chain(past).chain(future)).for_each(|(place, value)| *place = *value);
+    inputs
 }
 
 /// What a Gaussian process was chosen to be.

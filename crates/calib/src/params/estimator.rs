@@ -1,4 +1,5 @@
 use ohmstrain_ekf::Dwell;
+use ohmstrain_ekf::live::news;
 use ohmstrain_model::{ModelNoise, Motion, ParameterError};
 use serde::{Deserialize, Serialize};
 
@@ -213,10 +214,4 @@ impl MotionParams {
     pub fn to_model(self) -> Result<Motion<f64>, ParameterError> {
         Motion::ornstein_uhlenbeck(self.rate_time_s, self.rate_sd_per_s, self.strain_mean, self.strain_sd)
     }
-}
-
-/// The share of a reading's information that is new `dt_s` seconds after another one, if errors are alike over
-/// `error_time_s`: 1 - exp(-dt/T), at least as much as rounding leaves.
-pub(crate) fn news(dt_s: f64, error_time_s: f64) -> f64 {
-    if error_time_s > 0.0 { (-(-dt_s / error_time_s).exp_m1()).max(f64::EPSILON) } else { 1.0 }
 }

@@ -3,6 +3,7 @@
 pub(crate) mod correction;
 pub(crate) mod estimator;
 pub(crate) mod law;
+mod live;
 pub(crate) mod recipe;
 pub(crate) mod static_cubic;
 pub(crate) mod summary;

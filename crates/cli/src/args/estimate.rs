@@ -35,6 +35,12 @@ pub struct EstimateArgs {
     /// student-t:DOF, or none, as they are [default: redescending:3]
     #[arg(long, value_name = "redescending:K|huber:K|student-t:DOF|none")]
     pub influence: Option<BoundedInfluence>,
+    /// Take every finite reading for one, however far from those of the calibration, and however often it comes again
+    #[arg(long)]
+    pub no_plausibility: bool,
+    /// Where readings jump, do not follow what was known before any reading again (smoothers never do)
+    #[arg(long)]
+    pub no_second_look: bool,
     /// Leave intervals as the filter states them: not wider at a start, after a fault, or outside of the calibration
     #[arg(long)]
     pub no_doubts: bool,

@@ -2,7 +2,7 @@
 
 use ohmstrain_calib::SensorParams;
 
-use crate::args::{ExportArgs, ExportTarget};
+use crate::args::ExportArgs;
 use crate::commands::export_score::OnRecording;
 use crate::error::CliError;
 use crate::export::{self, Budget, Plan};
@@ -11,9 +11,6 @@ use crate::export::{self, Budget, Plan};
 pub fn plan(args: &ExportArgs, params: &SensorParams, recording: Option<&OnRecording>) -> Result<Plan, CliError> {
     let asked = args.estimator.chosen().map(|estimator| estimator.0);
     let Some(budget) = &args.budget else { return Ok(Plan { kind: asked, ..Plan::default() }) };
-    if args.target != ExportTarget::C {
-        return Err(CliError::Arguments("--budget: only C is written smaller, use --target c".into()));
-    }
     within(args, params, budget, recording)
 }
 

@@ -2,12 +2,13 @@
 
 use ohmstrain_calib::{OwnedProcess, OwnedSimulated, PortableCorrection};
 use ohmstrain_ekf::Real;
-use ohmstrain_ekf::correction::{FAR, FARTHEST, LINEAR, NEW, NOVEL, OUTPUTS, PASSED_OVER, RATE_GAIN, TIME_CONSTANTS_S};
+use ohmstrain_ekf::correction::{
+    FAR, FARTHEST, FILTER_INPUTS, LINEAR, NEW, NOVEL, OUTPUTS, PASSED_OVER, RATE_GAIN, TIME_CONSTANTS_S,
+};
 use serde::Serialize;
 
-use super::learned::INPUTS;
 use super::literal::Literal;
-use super::quadratic::Quadratic;
+use super::quadratic::OwnedQuadratic;
 
 /// Rows, weights and scales.
 #[derive(Debug, Serialize)]
@@ -69,7 +70,7 @@ struct SimulatedConstants {
 }
 
 impl SimulatedConstants {
-    fn new(of: &OwnedSimulated<f64, INPUTS>) -> Self {
+    fn new(of: &OwnedSimulated<f64, FILTER_INPUTS>) -> Self {
         let process = ProcessConstants::new("SIMULATED", "Strain from the features, as the law has it.", &of.process);
         Self {
             rows: of.rows.iter().map(narrowed).collect(),
@@ -95,7 +96,7 @@ struct QuadraticRow {
 }
 
 impl QuadraticConstants {
-    fn new(of: &Quadratic) -> Self {
+    fn new(of: &OwnedQuadratic) -> Self {
         let mut square = of.square.iter();
         let row = |(i, linear): (usize, &f64)| QuadraticRow {
             linear: narrow(*linear),
@@ -121,7 +122,7 @@ fn narrowed<'a>(numbers: impl IntoIterator<Item = &'a f64>) -> Vec<Literal> {
 
 impl CorrectionConstants {
     /// Of a correction.
-    pub fn new(correction: &PortableCorrection, quadratics: Option<&[Quadratic; 2]>, dt_s: f32) -> Self {
+    pub fn new(correction: &PortableCorrection, quadratics: Option<&[OwnedQuadratic; 2]>, dt_s: f32) -> Self {
         let PortableCorrection { features, learned } = correction;
         let scales = &learned.scales;
         let decays = TIME_CONSTANTS_S.map(|tau_s| decays(dt_s, tau_s as f32));
@@ -165,7 +166,7 @@ impl CorrectionConstants {
 }
 
 impl ProcessConstants {
-    fn new(name: &'static str, comment: &'static str, process: &OwnedProcess<f64, INPUTS>) -> Self {
+    fn new(name: &'static str, comment: &'static str, process: &OwnedProcess<f64, FILTER_INPUTS>) -> Self {
         let numbers = &process.numbers;
         Self {
             name,

@@ -1,8 +1,9 @@
 //! A sensor's filter at a fixed rate, in single and in double precision.
 
-use ohmstrain::{DOUBT, DoubtParts, KNOWN_BEYOND, RestBounds};
 use ohmstrain_calib::{EstimatorKind, EstimatorParams, HISTORIES, HYPOTHESES, SensorParams};
-use ohmstrain_ekf::{Compact, Ekf, Estimator, Evidence, Hypotheses, STEP_GRACE, SignSplit, SparseEkf, StepError};
+use ohmstrain_ekf::correction::FeatureScale;
+use ohmstrain_ekf::live::{DOUBT, Learned, LiveParts, may_be_unstretched};
+use ohmstrain_ekf::{Compact, Ekf, Estimator, Evidence, Hypotheses, Real, STEP_GRACE, SignSplit, SparseEkf, StepError};
 use ohmstrain_model::{Motion, SensorLaw, StrainRange, SwitchedModel};
 
 use super::law::{PriorConstants, narrow_law, narrow_noise, narrow_range};
@@ -73,21 +74,21 @@ impl<'a, const B: usize, const N: usize> FixedRate<'a, B, N> {
             phases,
             limits,
             strain_sd_scale: strain_sd_scale as f32,
-            sieve: filter.readings,
+            sieve: filter.sieve,
             zero: (DOUBT.zero * params.limits.span()) as f32,
             start_variance: (filter.known_sd * filter.known_sd) as f32,
             correction: filter.correction.as_ref(),
             quadratics: quadratics.as_ref(),
-            doubt: DoubtParts::new(params, &motion),
-            rest: RestBounds::of(params),
+            doubt: filter.doubt,
+            rest: filter.rest,
         };
-        let longest_s = longest_step_s::<B, N, L>(&reference, &parts)?;
+        let longest_s = longest_step_s::<B, N, L>(&reference, &parts)? * STEP_GRACE;
         let usual_s = f64::from(dt_s) / (f64::from(dt_s) / longest_s).ceil().max(1.0);
         let kernel = |step_s| SparseEkf::<f64, Compact, B, N>::new(reference, step_s).map_err(parameter);
         let numbers = |step_s| exact_numbers(&reference, phases, step_s).map_err(parameter);
         let table = StepTable::new(usual_s, &kernel(usual_s)?.step_names(), numbers)?;
         // Not longer than the table either.
-        parts.longest_step_s = longest_s.min(table.range.1) as f32;
+        parts.longest_step_s = (longest_s.min(table.range.1) / STEP_GRACE) as f32;
         let rest_reading = params.rest_reading as f32;
         let rested = params.rested() as f32;
         Ok(Self { reference, model, hypotheses: filter.hypotheses, rest_reading, rested, parts, table })
@@ -98,16 +99,40 @@ impl<'a, const B: usize, const N: usize> FixedRate<'a, B, N> {
         self.rest_reading * (measured / self.rested)
     }
 
-    /// The strain at which a sensor that has just been rested begins again: zero, if the limits allow for it.
-    pub fn rested_strain(&self) -> Option<f32> {
-        let StrainRange { lower, upper } = self.parts.limits;
-        let beyond = KNOWN_BEYOND as f32 * (upper - lower);
-        (lower.max(-upper) <= beyond).then_some(0.0)
+    /// What a live filter is made of beside the estimator.
+    pub fn live_parts<'l, T: Real>(&self, learned: Option<(FeatureScale<T>, Learned<'l, T>)>) -> LiveParts<'l, T> {
+        let exactly = |x: f32| number::<T>(x.into());
+        let parts = &self.parts;
+        let reading_sd = exactly(self.model.noise().reading_sd);
+        LiveParts {
+            rest_reading: exactly(self.rest_reading),
+            rested: exactly(self.rested),
+            dt_s: exactly(parts.dt_s),
+            limits: parts.limits_in(),
+            strain_sd_scale: exactly(parts.strain_sd_scale),
+            reading_variance: reading_sd * reading_sd,
+            known_variance: exactly(parts.start_variance),
+            zero: exactly(parts.zero),
+            sieve: parts.sieve,
+            doubt: parts.doubt,
+            rest: parts.rest,
+            learned,
+        }
+    }
+
+    /// Whether a sensor that has just been rested may be unstretched.
+    pub fn rests_at_zero(&self) -> bool {
+        may_be_unstretched(&self.parts.limits)
+    }
+
+    /// The longest step, with the grace that rounding is given, s.
+    pub fn longest_s(&self) -> f32 {
+        self.parts.longest_step_s * STEP_GRACE as f32
     }
 
     /// Length of the steps that the usual time between readings is divided into, s.
     pub fn usual_step_s(&self) -> f32 {
-        let (dt_s, longest_s) = (self.parts.dt_s, self.parts.longest_step_s);
+        let (dt_s, longest_s) = (self.parts.dt_s, self.longest_s());
         let (mut count, mut covered) = (1.0, longest_s);
         while covered < dt_s {
             covered += longest_s;
@@ -173,7 +198,7 @@ fn longest_step_s<const B: usize, const N: usize, const L: usize>(
             }
         }
     };
-    Ok(longest_s * STEP_GRACE)
+    Ok(longest_s)
 }
 
 fn longest<const N: usize, const L: usize>(estimator: &impl Estimator<f64, N, L>) -> f64 {

@@ -2,7 +2,7 @@
 
 use ohmstrain_calib::{EstimatorKind, HYPOTHESES, PortableFilter, SensorParams};
 
-use super::quadratic::Quadratic;
+use super::quadratic::OwnedQuadratic;
 use super::reduced::reduced;
 use super::{ExportError, parameter};
 
@@ -31,7 +31,7 @@ pub struct ChipFilter {
     /// The filter, with as many hypotheses and rows as are left.
     pub filter: PortableFilter,
     /// What stands for the other rows, of the direct and of the residual process.
-    pub quadratics: Option<[Quadratic; 2]>,
+    pub quadratics: Option<[OwnedQuadratic; 2]>,
 }
 
 impl ChipFilter {

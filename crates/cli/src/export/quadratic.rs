@@ -1,27 +1,21 @@
 //! A quadratic function of a correction's inputs: most of what a smooth Gaussian process says, at little cost.
 
 use nalgebra::{DMatrix, DVector};
-use ohmstrain_ekf::Real;
+use ohmstrain_ekf::correction::Quadratic;
 
-/// `Σ (lᵢ + Σⱼ≤ᵢ qᵢⱼ xⱼ) xᵢ`.
+/// What a [`Quadratic`] borrows.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Quadratic<T = f64> {
-    /// lᵢ.
+pub struct OwnedQuadratic<T = f64> {
+    /// Of the inputs.
     pub linear: Vec<T>,
-    /// qᵢⱼ, the lower triangle row by row.
+    /// Of their products, the lower triangle row by row.
     pub square: Vec<T>,
 }
 
-impl<T: Real> Quadratic<T> {
-    /// Its value, in the order in which the exported program adds.
-    pub fn value(&self, x: &[T]) -> T {
-        let mut square = self.square.iter();
-        let mut sum = T::zero();
-        for (i, (linear, input)) in self.linear.iter().zip(x).enumerate() {
-            let slope = square.by_ref().take(i + 1).zip(x).fold(*linear, |slope, (q, other)| slope + *q * *other);
-            sum += slope * *input;
-        }
-        sum
+impl<T> OwnedQuadratic<T> {
+    /// As a correction borrows it.
+    pub fn borrowed(&self) -> Quadratic<'_, T> {
+        Quadratic { linear: &self.linear, square: &self.square }
     }
 }
 
@@ -31,7 +25,7 @@ const RIDGE: f64 = 1e-5;
 /// A constant, a quadratic function and weights of further columns that come closest to values at points.
 pub struct Fit {
     pub constant: f64,
-    pub quadratic: Quadratic,
+    pub quadratic: OwnedQuadratic,
     pub weights: Vec<f64>,
 }
 
@@ -52,7 +46,7 @@ impl Fit {
         }
         let solved = normal.cholesky()?.solve(&design.tr_mul(&target));
         let part = |from: usize, until: usize| solved.rows(from, until - from).iter().copied().collect();
-        let quadratic = Quadratic { linear: part(1, 1 + inputs), square: part(1 + inputs, count) };
+        let quadratic = OwnedQuadratic { linear: part(1, 1 + inputs), square: part(1 + inputs, count) };
         Some(Self { constant: solved[0], quadratic, weights: part(count, solved.len()) })
     }
 }

@@ -8,15 +8,14 @@
 
 use nalgebra::{DMatrix, DVector};
 use ohmstrain_calib::{OwnedCorrection, OwnedProcess};
-use ohmstrain_ekf::correction::{OUTPUTS, Process as Numbers, kernel};
+use ohmstrain_ekf::correction::{self, FILTER_INPUTS, OUTPUTS, kernel};
 
-use super::learned::INPUTS;
 use super::plan::Rows;
-use super::quadratic::{Fit, Quadratic};
+use super::quadratic::{Fit, OwnedQuadratic};
 
-type Row = [f64; INPUTS];
-type Correction = OwnedCorrection<f64, INPUTS>;
-type Process = OwnedProcess<f64, INPUTS>;
+type Row = [f64; FILTER_INPUTS];
+type Correction = OwnedCorrection<f64, FILTER_INPUTS>;
+type Process = OwnedProcess<f64, FILTER_INPUTS>;
 
 /// Means are fitted in the rows, half-way to these of the nearest others, and from these as far beyond the row.
 const BETWEEN: [usize; 4] = [1, 2, 4, 8];
@@ -55,7 +54,7 @@ impl Which {
 }
 
 /// The correction with no more than these rows, and what stands for the others; none if kernels are singular.
-pub fn reduced(full: &Correction, to: Rows) -> Option<(Correction, [Quadratic; 2])> {
+pub fn reduced(full: &Correction, to: Rows) -> Option<(Correction, [OwnedQuadratic; 2])> {
     let inducing = side(full.direct.explained.len()).min(side(full.residual.explained.len()));
     let rows = to.mean.max(to.variance).min(inducing).max(1);
     let to = Rows { mean: rows, variance: to.variance.clamp(1, rows) };
@@ -77,7 +76,7 @@ fn process(
     rows: &[Row],
     points: &[(Row, f64)],
     to: Rows,
-) -> Option<(Process, Quadratic)> {
+) -> Option<(Process, OwnedQuadratic)> {
     let at: Vec<&[f64]> = points.iter().map(|(row, _)| which.inputs(row)).collect();
     let weights: Vec<f64> = points.iter().map(|(_, weight)| *weight).collect();
     let in_points: Vec<&Row> = points.iter().map(|(row, _)| row).collect();
@@ -86,7 +85,7 @@ fn process(
     let means = &kernels * DVector::from_column_slice(&full.weights);
     let fit = Fit::new(&at, &kernels.columns(0, to.mean).into_owned(), &means, &weights)?;
     let explained = explained(full, which, &all, to.variance)?;
-    let numbers = Numbers { mean: full.numbers.mean + fit.constant, ..full.numbers };
+    let numbers = correction::Process { mean: full.numbers.mean + fit.constant, ..full.numbers };
     let process = Process { weights: fit.weights, explained, numbers };
     Some((process, fit.quadratic))
 }
@@ -120,7 +119,7 @@ fn explained(full: &Process, which: Which, rows: &[&Row], few: usize) -> Option<
 
 /// Where means are to be right, and how much it matters.
 fn points(rows: &[Row]) -> Vec<(Row, f64)> {
-    let range: [(f64, f64); INPUTS] = std::array::from_fn(|i| {
+    let range: [(f64, f64); FILTER_INPUTS] = std::array::from_fn(|i| {
         let column = rows.iter().map(|row| row[i]);
         (column.clone().fold(f64::INFINITY, f64::min), column.fold(f64::NEG_INFINITY, f64::max))
     });

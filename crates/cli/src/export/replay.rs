@@ -1,14 +1,13 @@
 //! A recording through the exported program's twin.
 
 use ohmstrain_calib::{SensorParams, with_sizes};
-use ohmstrain_ekf::{Reading, Real};
-use ohmstrain_model::SwitchedModel;
+use ohmstrain_ekf::live::{LiveEstimate, LiveFilter, SensorEstimator};
+use ohmstrain_ekf::{Real, StepError};
 
 use super::fixed_rate::FixedRate;
-use super::moving::with_hypotheses;
 use super::plan::{ChipFilter, Plan};
-use super::twin::{Numbers, Twin};
-use super::vectors::{Input, refused, relative};
+use super::twin::{StepNumbers, Task, Twin, bits, with_twin};
+use super::vectors::{Input, relative};
 use super::{ExportError, too_many_branches};
 
 /// A row of a recording; a missing reading is NaN.
@@ -49,35 +48,43 @@ fn of<const B: usize, const N: usize, const L: usize>(
     rows: &[ReplayedRow],
 ) -> Result<Vec<Said>, ExportError> {
     let sensor = FixedRate::<B, N>::new::<L>(params, filter, dt_s as f32)?;
-    with_hypotheses!(sensor.hypotheses, K => run::<f32, B, N, L, K>(sensor.model, &sensor, sensor.interpolated(), rows))
+    let replay = Replay { rest_reading: sensor.rest_reading, rows };
+    with_twin::<_, B, N, L, _>(&sensor, sensor.model, sensor.interpolated(), replay)
 }
 
-fn run<T: Real, const B: usize, const N: usize, const L: usize, const K: usize>(
-    model: SwitchedModel<T, B, N>,
-    sensor: &FixedRate<'_, B, N>,
-    numbers: Numbers<'_, T>,
-    rows: &[ReplayedRow],
-) -> Result<Vec<Said<T>>, ExportError> {
-    let exactly = |x: f32| T::of(x.into());
-    let mut twin: Twin<T, B, N, L, K> = Twin::new(model, &sensor.parts, numbers).map_err(refused)?;
-    let said = |row: &ReplayedRow| {
-        let reading = (!row.reading.is_nan()).then_some(row.reading as f32);
-        let input = Input { reading, reading_sd: row.reading_sd as f32 };
-        let reading = relative(sensor.rest_reading, &input)
-            .map(|reading| Reading { value: exactly(reading.value), extra_variance: exactly(reading.extra_variance) });
-        let flags = twin.step_after(exactly(row.since_s), reading).map_err(refused)?;
-        let strain = twin.strain();
-        Ok(Said { strain: strain.mean, sd: strain.sd(), flags })
-    };
-    rows.iter().map(said).collect()
+struct Replay<'a> {
+    rest_reading: f32,
+    rows: &'a [ReplayedRow],
+}
+
+impl<T: Real> Task<T> for Replay<'_> {
+    type Said = Vec<Said<T>>;
+
+    fn run<F, const N: usize, const L: usize>(
+        self,
+        mut live: LiveFilter<'_, T, Twin<'_, T, F>, N, L>,
+    ) -> Result<Vec<Said<T>>, StepError>
+    where
+        F: SensorEstimator<T, N, L, Prepared = F> + StepNumbers<T>,
+    {
+        let said = |row: &ReplayedRow| {
+            let reading = (!row.reading.is_nan()).then_some(row.reading as f32);
+            let reading = relative(self.rest_reading, &Input { reading, reading_sd: row.reading_sd as f32 });
+            let LiveEstimate { strain, flags, .. } = live.step_after(T::of(row.since_s.into()), reading)?;
+            Ok(Said { strain: strain.mean, sd: strain.sd(), flags: bits(flags) })
+        };
+        self.rows.iter().map(said).collect()
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use ohmstrain::Sensor;
-    use ohmstrain_calib::{EstimatorKind, HYPOTHESES, SensorParams};
+    use ohmstrain_calib::{EstimatorKind, SensorParams};
+    use ohmstrain_ekf::live::{LiveFilter, SensorEstimator};
+    use ohmstrain_ekf::{Gaussian, StepError};
 
-    use super::{ChipFilter, FixedRate, Plan, ReplayedRow, Twin, run};
+    use super::{ChipFilter, FixedRate, Plan, Replay, ReplayedRow, Said, StepNumbers, Task, Twin, with_twin};
 
     /// A sensor and a recording of its law's own readings, at times that jitter.
     fn sensor() -> Sensor {
@@ -110,21 +117,45 @@ mod tests {
         let rows = rows(params);
         let parts = ChipFilter::new(params, &Plan::default()).unwrap();
         let fixed = FixedRate::<2, 5>::new::<15>(params, &parts, 0.05).unwrap();
-        let mut twin = Twin::<f64, 2, 5, 15, HYPOTHESES>::new(fixed.reference, &fixed.parts, fixed.exact()).unwrap();
-        for row in &rows[..SETTLED] {
-            twin.step(Some((row.reading / params.rest_reading - 1.0).into())).unwrap();
-        }
-        twin.restart(Some(0.0));
+        let elsewhere = ElsewhereAfter { rows: &rows, rest_reading: params.rest_reading, another_day, rested };
+        let said = with_twin::<_, 2, 5, 15, _>(&fixed, fixed.reference, fixed.exact(), elsewhere).unwrap();
         let mut filter = sensor.filter().rest_resistance(rested).initial_strain(0.0).build().unwrap();
         // They begin at rest.
-        for (k, row) in rows.iter().enumerate() {
-            let reading = another_day * row.reading;
-            let rest_reading = params.rest_reading * (rested / params.measured_rest.unwrap());
-            // The first row of a recording takes no time.
-            twin.step_after(if k > 0 { 0.05 } else { 0.0 }, Some((reading / rest_reading - 1.0).into())).unwrap();
-            let (said, expected) = (twin.strain(), filter.step(0.05 * k as f64, reading).unwrap());
+        for (k, (row, said)) in rows.iter().zip(said).enumerate() {
+            let expected = filter.step(0.05 * k as f64, another_day * row.reading).unwrap();
             let off = (said.mean - expected.strain).abs().max((said.sd() - expected.strain_sd).abs());
             assert!(off < 0.02 * expected.strain_sd, "{k}: {said:?} {expected:?}");
+        }
+    }
+
+    /// A twin that has run for a while, and rests on another day.
+    struct ElsewhereAfter<'a> {
+        rows: &'a [ReplayedRow],
+        rest_reading: f64,
+        another_day: f64,
+        rested: f64,
+    }
+
+    impl Task<f64> for ElsewhereAfter<'_> {
+        type Said = Vec<Gaussian<f64>>;
+
+        fn run<F, const N: usize, const L: usize>(
+            self,
+            mut live: LiveFilter<'_, f64, Twin<'_, f64, F>, N, L>,
+        ) -> Result<Vec<Gaussian<f64>>, StepError>
+        where
+            F: SensorEstimator<f64, N, L, Prepared = F> + StepNumbers<f64>,
+        {
+            for row in &self.rows[..SETTLED] {
+                live.step_after(0.05, Some((row.reading / self.rest_reading - 1.0).into()))?;
+            }
+            live.rezero(self.rested)?;
+            // The first row of a recording takes no time.
+            let said = |(k, row): (usize, &ReplayedRow)| {
+                let reading = live.relative(self.another_day * row.reading, 0.0);
+                live.step_after(if k > 0 { 0.05 } else { 0.0 }, Some(reading)).map(|said| said.strain)
+            };
+            self.rows.iter().enumerate().map(said).collect()
         }
     }
 
@@ -148,7 +179,9 @@ mod tests {
             let rows: Vec<ReplayedRow> = rows(params).into_iter().map(another_day).collect();
             let parts = ChipFilter::new(params, &Plan { kind: Some(kind), ..Plan::default() }).unwrap();
             let fixed = FixedRate::<2, 5>::new::<15>(params, &parts, 0.05).unwrap();
-            let twin = run::<f64, 2, 5, 15, HYPOTHESES>(fixed.reference, &fixed, fixed.exact(), &rows).unwrap();
+            let replay = Replay { rest_reading: fixed.rest_reading, rows: &rows };
+            let twin: Vec<Said<f64>> =
+                with_twin::<_, 2, 5, 15, _>(&fixed, fixed.reference, fixed.exact(), replay).unwrap();
             let mut filter = sensor.filter().estimator(kind).build().unwrap();
             let (mut largest, mut time_s) = (0.0_f64, 0.0);
             for (k, (row, said)) in rows.iter().zip(twin).enumerate() {

@@ -1,15 +1,14 @@
 //! What the Rust filters make of a short motion: what the exported filter must make of it too.
 
+use ohmstrain_ekf::live::{LiveFilter, SensorEstimator};
 use ohmstrain_ekf::{Reading, Real, StepError};
-use ohmstrain_model::SwitchedModel;
 use serde::Serialize;
 
 use super::ExportError;
 use super::fixed_rate::FixedRate;
 use super::literal::Literal;
 use super::motion;
-use super::moving::with_hypotheses;
-use super::twin::{Numbers, Twin};
+use super::twin::{StepNumbers, Task, Twin, with_twin};
 
 /// Readings and results, and how far other results may be off.
 #[derive(Debug, Serialize)]
@@ -58,11 +57,11 @@ impl Vectors {
         sensor: &FixedRate<'_, B, N>,
     ) -> Result<Self, ExportError> {
         let inputs = readings(sensor);
-        let ((estimates, work), (exact, _)) = with_hypotheses!(sensor.hypotheses, K => {
-            let estimates = run::<f32, B, N, L, K>(sensor.model, sensor, sensor.interpolated(), &inputs)?;
-            (estimates, run::<f64, B, N, L, K>(sensor.reference, sensor, sensor.exact(), &inputs)?)
-        });
-
+        let motion = || Motion { sensor, inputs: &inputs };
+        let (estimates, work): (Vec<(f32, f32)>, f64) =
+            with_twin::<_, B, N, L, _>(sensor, sensor.model, sensor.interpolated(), motion())?;
+        let (exact, _): (Vec<(f64, f64)>, f64) =
+            with_twin::<_, B, N, L, _>(sensor, sensor.reference, sensor.exact(), motion())?;
         let limits = sensor.parts.limits;
         let largest = limits.lower.abs().max(limits.upper.abs());
         let ulp = largest.next_up() - largest;
@@ -92,9 +91,10 @@ impl Vectors {
 /// Hypotheses moved on in a step of the motion, on average, each time that they are.
 pub fn work<const B: usize, const N: usize, const L: usize>(sensor: &FixedRate<'_, B, N>) -> Result<f64, ExportError> {
     let inputs = readings(sensor);
-    with_hypotheses!(sensor.hypotheses, K => {
-        run::<f32, B, N, L, K>(sensor.model, sensor, sensor.interpolated(), &inputs).map(|(_, work)| work)
-    })
+    let motion = Motion { sensor, inputs: &inputs };
+    let (_, work): (Vec<(f32, f32)>, f64) =
+        with_twin::<_, B, N, L, _>(sensor, sensor.model, sensor.interpolated(), motion)?;
+    Ok(work)
 }
 
 /// The readings of the motion, in the sensor's unit.
@@ -121,35 +121,44 @@ fn rested_elsewhere<const B: usize, const N: usize>(sensor: &FixedRate<'_, B, N>
 }
 
 /// A row relative to R₀, computed as on the microcontroller.
-pub fn relative(rest_reading: f32, input: &Input) -> Option<Reading<f32>> {
-    let sd = input.reading_sd / rest_reading;
-    input.reading.map(|reading| Reading { value: (reading - rest_reading) / rest_reading, extra_variance: sd * sd })
+pub fn relative<T: Real>(rest_reading: f32, input: &Input) -> Option<Reading<T>> {
+    let (sd, exactly) = (input.reading_sd / rest_reading, |x: f32| T::of(x.into()));
+    let value = |reading: f32| exactly((reading - rest_reading) / rest_reading);
+    input.reading.map(|reading| Reading { value: value(reading), extra_variance: exactly(sd * sd) })
 }
 
-/// Strain and deviation as they are reported, row by row.
-fn run<T: Real, const B: usize, const N: usize, const L: usize, const K: usize>(
-    model: SwitchedModel<T, B, N>,
-    sensor: &FixedRate<'_, B, N>,
-    numbers: Numbers<'_, T>,
-    inputs: &[Input],
-) -> Result<(Vec<(T, T)>, f64), ExportError> {
-    let exactly = |x: f32| T::of(x.into());
-    let mut twin: Twin<T, B, N, L, K> = Twin::new(model, &sensor.parts, numbers).map_err(refused)?;
-    let mut rest_reading = sensor.rest_reading;
-    let estimate = |(row, input): (usize, &Input)| {
-        if row + RESTED == inputs.len() {
-            rest_reading = sensor.rest_reading_at(rested_elsewhere(sensor));
-            twin.restart(sensor.rested_strain().map(exactly));
+/// Strain and deviation as they are reported, row by row; hypotheses moved on in a step.
+struct Motion<'a, const B: usize, const N: usize> {
+    sensor: &'a FixedRate<'a, B, N>,
+    inputs: &'a [Input],
+}
+
+impl<T: Real, const B: usize, const S: usize> Task<T> for Motion<'_, B, S> {
+    type Said = (Vec<(T, T)>, f64);
+
+    fn run<F, const N: usize, const L: usize>(
+        self,
+        mut live: LiveFilter<'_, T, Twin<'_, T, F>, N, L>,
+    ) -> Result<Self::Said, StepError>
+    where
+        F: SensorEstimator<T, N, L, Prepared = F> + StepNumbers<T>,
+    {
+        let Self { sensor, inputs } = self;
+        let exactly = |x: f32| T::of(x.into());
+        let mut rest_reading = sensor.rest_reading;
+        let mut estimates = Vec::with_capacity(inputs.len());
+        for (row, input) in inputs.iter().enumerate() {
+            if row + RESTED == inputs.len() {
+                rest_reading = sensor.rest_reading_at(rested_elsewhere(sensor));
+                live.rezero(exactly(rested_elsewhere(sensor)))?;
+            }
+            let reading = relative(rest_reading, input);
+            let strain = live.step_after(exactly(sensor.parts.dt_s), reading)?.strain;
+            estimates.push((strain.mean, strain.sd()));
         }
-        let reading = relative(rest_reading, input)
-            .map(|reading| Reading { value: exactly(reading.value), extra_variance: exactly(reading.extra_variance) });
-        twin.step(reading).map_err(refused)?;
-        let strain = twin.strain();
-        Ok((strain.mean, strain.sd()))
-    };
-    let estimates = inputs.iter().enumerate().map(estimate).collect::<Result<Vec<_>, ExportError>>()?;
-    let [updated, predicted] = twin.work().map(|count| count as f64 / inputs.len() as f64);
-    Ok((estimates, updated + PREDICTION * predicted))
+        let [updated, predicted] = live.estimator().work().map(|count| count as f64 / inputs.len() as f64);
+        Ok((estimates, updated + PREDICTION * predicted))
+    }
 }
 
 pub fn refused(error: StepError) -> ExportError {

@@ -18,6 +18,7 @@
 mod features;
 mod low_pass;
 mod process;
+mod quadratic;
 
 use ohmstrain_model::StrainRange;
 
@@ -29,10 +30,21 @@ pub use features::{
 pub use low_pass::LowPass;
 use process::{Kernels, Said};
 pub use process::{LINEAR, Process, kernel};
+pub use quadratic::Quadratic;
 
 /// Number of a filter's outputs that a correction sees: strain, its rate, relaxation, baseline, and the probabilities of
 /// stretching and releasing.
 pub const OUTPUTS: usize = 6;
+/// Inputs of a filter's correction: its outputs, and the features of the readings up to now.
+pub const FILTER_INPUTS: usize = OUTPUTS + FEATURES;
+/// The inputs of a filter's correction.
+#[must_use]
+pub fn filter_inputs<T: Real>(outputs: &[T; OUTPUTS], features: &[T; FEATURES]) -> [T; FILTER_INPUTS] {
+    let mut inputs = [T::zero(); FILTER_INPUTS];
+    inputs.iter_mut().zip(outputs.iter().chain(features)).for_each(|(place, input)| *place = *input);
+    inputs
+}
+
 /// Most inducing rows.
 pub const INDUCING: usize = 48;
 
@@ -125,6 +137,12 @@ impl<T: Real, const D: usize, const S: usize> Correction<'_, T, D, S> {
     pub fn correct(&self, inputs: &[T; D], filtered: Gaussian<T>, birge: T) -> Corrected<T, S> {
         let work = Correcting { correction: self, inputs, filtered, birge };
         T::in_vectors(work).unwrap_or_else(|| work.with_lanes(T::zero()))
+    }
+
+    /// Inputs on the scale of the training rows, moved into their range.
+    #[must_use]
+    pub fn standardised(&self, inputs: &[T; D]) -> [T; D] {
+        standardised(self.scales, inputs).inputs
     }
 
     /// What the simulated rows say.
@@ -243,8 +261,7 @@ impl<T: Real, const D: usize, const S: usize> Work<T> for Correcting<'_, T, D, S
         let residual = of.widened(said, &of.residual, outside, filtered.mean);
         let mixed = mixture([direct, residual].into_iter().chain(one_sided));
         let variance = mixed.variance * of.variance_factor + T::of(NOVEL) * of.strain_variance * novelty;
-        let span = of.limits.upper - of.limits.lower;
-        let anywhere = span * span * T::of(1.0 / 12.0);
+        let anywhere = of.limits.variance_of_anywhere();
         let learned = Gaussian { mean: mixed.mean, variance: (variance * birge).min(anywhere).max(variance) };
         let simulated = of.simulated.map(|simulated| of.of_simulated(like, inputs, &simulated));
         let strain = simulated.map_or(learned, |simulated| mixture([learned, simulated]));

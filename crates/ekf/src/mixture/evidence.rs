@@ -256,10 +256,8 @@ impl<T: Scalar> MixtureResidual<T> {
         self.factor.ln() + self.exponent - T::of(0.5) * self.tempering * T::two_pi().ln()
     }
 
-    /// The same for [`Estimator`](crate::Estimator). What overflows a square is no reading.
+    /// The same for [`Estimator`](crate::Estimator).
     pub(crate) fn innovation(&self) -> Result<Innovation<T>, StepError> {
-        let Residual { innovation, variance, nis } = self.residual;
-        let innovation = Innovation { value: innovation, variance, log_likelihood: self.log_likelihood() };
-        if nis.is_finite() { Ok(innovation) } else { Err(StepError::NonFiniteState) }
+        self.residual.with_log_likelihood(self.log_likelihood())
     }
 }

@@ -121,7 +121,7 @@ impl<T: Scalar, const B: usize, const N: usize> Particles<T, SwitchedModel<T, B,
         self.predict(&mut next, prepared, dt_s);
         let innovation = reading.map(|reading| self.take(&mut next, reading)).transpose()?;
         let log_likelihood = innovation.map_or(T::zero(), |innovation| innovation.log_likelihood);
-        let nis = innovation.map(|innovation| innovation.nis());
+        let nis = innovation.map(|innovation| innovation.nis);
         if !next.is_finite() {
             return Err(StepError::NonFiniteState);
         }
@@ -222,7 +222,8 @@ impl<T: Scalar, const B: usize, const N: usize> Particles<T, SwitchedModel<T, B,
         let height = -half * (variance.ln() + T::two_pi().ln());
         let log_likelihood = most + sum.ln() + self.evidence.tempering * height;
         let spread = (second - first * first).max(T::zero());
-        Ok(Innovation { value: first, variance: variance + spread, log_likelihood })
+        let variance = variance + spread;
+        Ok(Innovation { value: first, variance, nis: first * first / variance, log_likelihood })
     }
 }
 

@@ -1,6 +1,7 @@
 use std::ops::Range;
 
-use ohmstrain_ekf::correction::{FEATURES, FeatureScale, OUTPUTS, ReadingFeatures, Starts, mixture};
+use ohmstrain_ekf::correction::{FEATURES, FeatureScale, OUTPUTS, ReadingFeatures, Starts, filter_inputs, mixture};
+use ohmstrain_ekf::live::Sieve;
 use ohmstrain_ekf::{Estimate, Gaussian, Guard, Reading, ReadingVerdict, StepError};
 
 use super::{Corrected, Learned, future_features, outputs};
@@ -11,7 +12,7 @@ use crate::params::RangeParams;
 use crate::params::correction::ProcessParams;
 use crate::params::correction::{
     CorrectionParams, CorrectionScale, CorrectorParams, FUTURE_FEATURES, SimulatedParams, SimulatedRow, TrainingRow,
-    filter_inputs, smoother_inputs,
+    smoother_inputs,
 };
 
 const LIMITS: RangeParams = RangeParams { lower: 0.0, upper: 0.4 };
@@ -81,6 +82,8 @@ impl Filter for Fake {
     fn guard(&mut self, guard: Guard<f64>) {
         self.guarded = !guard.is_none();
     }
+
+    fn sieve(&mut self, _: Sieve) {}
 
     /// Hands every row out two rows later, as if it had said 0.3 of all.
     fn step_lagged(

@@ -82,7 +82,7 @@ impl StepConstants {
         Self {
             names: names.to_vec(),
             usual_s: Literal(sensor.usual_step_s()),
-            longest_s: Literal(sensor.parts.longest_step_s),
+            longest_s: Literal(sensor.longest_s()),
             usual: literals(&sensor.usual_numbers()),
             lower_s: Literal(table.range.0 as f32),
             upper_s: Literal(table.range.1 as f32),

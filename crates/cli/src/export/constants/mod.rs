@@ -3,12 +3,9 @@
 mod kernel;
 mod readings;
 
-use ohmstrain::KNOWN_BEYOND;
-use ohmstrain_calib::{
-    BESIDE_AFTER, BESIDE_SHARE, EstimatorKind, PortableFilter, Quantity, ReadingUnit, STARTLING_NIS, SensorParams,
-    with_sizes,
-};
+use ohmstrain_calib::{EstimatorKind, PortableFilter, Quantity, ReadingUnit, SensorParams, with_sizes};
 use ohmstrain_ekf::Belief;
+use ohmstrain_ekf::live::{BESIDE_AFTER, BESIDE_SHARE, KNOWN_BEYOND, STARTLING_NIS};
 use ohmstrain_ekf::record::shared;
 use serde::Serialize;
 
@@ -155,7 +152,7 @@ impl Exported {
             dt_ms: (dt_s * 1e6).round() / 1e3,
             rest_reading: Literal(sensor.rest_reading),
             rested: Literal(sensor.rested),
-            rests_at_zero: sensor.rested_strain().is_some(),
+            rests_at_zero: sensor.rests_at_zero(),
             lower: Literal(limits.lower),
             upper: Literal(limits.upper),
             strain_sd_scale: Literal(strain_sd_scale),
@@ -172,7 +169,7 @@ impl Exported {
             startling_nis: Literal(STARTLING_NIS as f32),
             beside_after: BESIDE_AFTER,
             beside_share: Literal(BESIDE_SHARE as f32),
-            sieve: SieveConstants::new(&filter.readings),
+            sieve: SieveConstants::new(&filter.sieve),
             follow: FollowConstants::new(sensor.parts.rest),
             doubt: DoubtConstants::new(&sensor.parts.doubt, Literal(sensor.parts.zero)),
             steps: StepConstants::new(&sensor, &names),

@@ -1,8 +1,6 @@
 //! What a reading must be, and when an interval is wider than the filter says.
 
-use ohmstrain::{DOUBT, DoubtParts, FOLLOWING, NEVER_READ_S, RestBounds};
-use ohmstrain_calib::PortableSieve;
-use ohmstrain_ekf::Innovations;
+use ohmstrain_ekf::live::{DOUBT, DoubtParts, FOLLOWING, Innovations, MOST_REPEATS, NEVER_READ_S, RestBounds, Sieve};
 use serde::Serialize;
 
 use crate::export::literal::Literal;
@@ -137,13 +135,13 @@ impl FollowConstants {
 
 impl SieveConstants {
     /// Of a filter.
-    pub fn new(sieve: &PortableSieve) -> Self {
+    pub fn new(sieve: &Sieve) -> Self {
         let finite = |number: f32| number.is_finite().then_some(Literal(number));
         Self {
             lower: Literal(sieve.plausible.0 as f32),
             upper: Literal(sieve.plausible.1 as f32),
             longest_repeat_s: finite(sieve.longest_repeat_s as f32),
-            most_repeats: sieve.most_repeats,
+            most_repeats: MOST_REPEATS,
             jump: Literal(sieve.jump as f32),
             error_time_s: Some(Literal(sieve.error_time_s as f32)).filter(|time_s| time_s.0 > 0.0),
         }

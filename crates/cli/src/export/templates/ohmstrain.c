@@ -21,6 +21,33 @@
 #error "-ffast-math and -ffinite-math-only remove the checks for numbers that are not finite"
 #endif
 
+/* Protections, unless somebody turns them off: see ohmstrain.h. */
+#ifdef OHMSTRAIN_WITHOUT_PLAUSIBILITY
+enum { PLAUSIBILITY = 0 };
+#else
+enum { PLAUSIBILITY = 1 };
+#endif
+#ifdef OHMSTRAIN_WITHOUT_INFLUENCE
+enum { INFLUENCE = 0 };
+#else
+enum { INFLUENCE = 1 };
+#endif
+#if defined(OHMSTRAIN_WITHOUT_SECOND_LOOK) || defined(OHMSTRAIN_WITHOUT_INFLUENCE)
+enum { SECOND_LOOK = 0 };
+#else
+enum { SECOND_LOOK = 1 };
+#endif
+#ifdef OHMSTRAIN_WITHOUT_FOLLOWING
+enum { FOLLOWING = 0 };
+#else
+enum { FOLLOWING = 1 };
+#endif
+#ifdef OHMSTRAIN_WITHOUT_DOUBTS
+enum { DOUBTS = 0 };
+#else
+enum { DOUBTS = 1 };
+#endif
+
 #ifdef __AVR__
 /* Its C library has none. What expf rounds off cancels in the quotient (Kahan). */
 static inline float expm1f(float x)
@@ -307,7 +334,7 @@ static unsigned sieve(readings *seen, float rho, float *extra_variance)
     const int is_first = !seen->has_reading;
 {% endif %}
 
-    if (!(PLAUSIBLE_LOWER <= rho && rho <= PLAUSIBLE_UPPER)) {
+    if (!(PLAUSIBILITY ? PLAUSIBLE_LOWER <= rho && rho <= PLAUSIBLE_UPPER : rho == rho)) {
         return OHMSTRAIN_IMPLAUSIBLE;
     }
     if (seen->has_reading && seen->rho == rho) {
@@ -320,7 +347,7 @@ static unsigned sieve(readings *seen, float rho, float *extra_variance)
     seen->rho = rho;
     seen->since_s = 0.0f;
 {% if sieve.longest_repeat_s is not none %}
-    if (seen->count >= MOST_REPEATS && seen->repeated_s > LONGEST_REPEAT_S) {
+    if (PLAUSIBILITY && seen->count >= MOST_REPEATS && seen->repeated_s > LONGEST_REPEAT_S) {
         return OHMSTRAIN_STUCK;
     }
 {% endif %}
@@ -338,7 +365,7 @@ static unsigned sieve(readings *seen, float rho, float *extra_variance)
 static int attempt_reading(ohmstrain_state *state, const interval *over, float rho, float extra_variance, unsigned *flags,
                            ohmstrain_residual *residual)
 {
-    int status = attempt(state, over, &rho, extra_variance, SURPRISING, residual);
+    int status = attempt(state, over, &rho, extra_variance, INFLUENCE ? SURPRISING : INFINITY, residual);
 
     if (status == SURPRISED) {
         const float weight = SURPRISING / residual->nis;
@@ -687,7 +714,7 @@ static ohmstrain_status step(ohmstrain_state *state, float dt_s, const float *rh
     if (rho) {
         const float jump = *rho - seen.calm;
         seen.startling = of_step.nis > STARTLING ? (unsigned char)(seen.startling + (seen.startling < 255)) : 0;
-        if (seen.startling == BESIDE_AFTER && seen.has_believed && fabsf(jump) > JUMP) {
+        if (SECOND_LOOK && seen.startling == BESIDE_AFTER && seen.has_believed && fabsf(jump) > JUMP) {
             jumped(&seen, jump);
 {% if estimator.hypotheses %}
             look_again(state);
@@ -710,9 +737,12 @@ static ohmstrain_status step(ohmstrain_state *state, float dt_s, const float *rh
     if (believed) {
         follow(&seen, dt_s, *believed);
     }
-    variance = doubt_reading(&seen, dt_s, believed, of_step.nis, strain, variance);
     state->strain = strain;
-    state->variance = doubted(&seen, all.mean[1], variance, &flags);
+    state->variance = variance;
+    variance = doubt_reading(&seen, dt_s, believed, of_step.nis, strain, variance);
+    if (DOUBTS) {
+        state->variance = doubted(&seen, all.mean[1], variance, &flags);
+    }
     seen.flags = flags;
     state->readings = seen;
     return OHMSTRAIN_OK;
@@ -728,7 +758,7 @@ static ohmstrain_status start(ohmstrain_state *state, const float *strain, float
     start_mixture(state, strain);
     state->readings = none;
     state->readings.starts = !strain;
-    state->readings.follows = 1;
+    state->readings.follows = FOLLOWING;
 {% if doubt.rest %}
     state->readings.rests = strain && fabsf(*strain) <= << doubt.zero >>f;
 {% endif %}
@@ -736,7 +766,7 @@ static ohmstrain_status start(ohmstrain_state *state, const float *strain, float
     state->readings.unread_s = strain ? 0.0f : NEVER_READ_S;
     summarise(state, &all);
     state->strain = strain_of(&all, &state->variance);
-    state->variance += state->readings.fading;
+    state->variance += DOUBTS ? state->readings.fading : 0.0f;
     state->rest_reading = rest_reading;
     return OHMSTRAIN_OK;
 }

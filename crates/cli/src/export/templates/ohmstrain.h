@@ -13,6 +13,12 @@
  *
  * - C99. No heap, no global that changes, nothing of the C library but <math.h>.
  * - Call a step once every OHMSTRAIN_DT_S seconds, or say how long it has been (ohmstrain_step_after).
+ * - It is protected from what no calibration has seen. To turn a protection off compile ohmstrain.c with -D and one of
+ *   OHMSTRAIN_WITHOUT_PLAUSIBILITY (readings that this sensor cannot give, or that are stuck, are none),
+ *   OHMSTRAIN_WITHOUT_INFLUENCE (what surprises counts less),
+ *   OHMSTRAIN_WITHOUT_SECOND_LOOK (where readings jump, what was known before any reading is followed, too),
+ *   OHMSTRAIN_WITHOUT_FOLLOWING (R0 follows readings that stay beyond the calibration's),
+ *   OHMSTRAIN_WITHOUT_DOUBTS (intervals are wider where there is something to doubt).
  * - Functions return 0 or a negative error code. After an error the caller's state is as it was before.
  */
 #ifndef OHMSTRAIN_H

@@ -1,7 +1,8 @@
 //! What is known of the strain while nothing is read.
 
-use ohmstrain_calib::{MotionParams, RangeParams};
-use ohmstrain_ekf::Real;
+use ohmstrain_model::StrainRange;
+
+use crate::Real;
 
 /// How far a body can have moved since it was last read.
 ///
@@ -27,26 +28,25 @@ pub struct Unread {
 pub const NEVER_READ_S: f64 = 1e9;
 
 impl Unread {
-    /// Of the motion that an estimator runs with.
+    /// Of a motion whose rate lasts for `rate_time_s`, with a standard deviation, 1/s.
     ///
     /// ```
-    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
-    /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
-    /// let params = sensor.params();
-    /// let of = params.filter_of(params.default_estimator);
-    /// let unread = ohmstrain::Unread::new(&params.estimator(of)?.motion, params.limits);
+    /// use ohmstrain_ekf::live::Unread;
+    /// use ohmstrain_model::StrainRange;
+    ///
+    /// let unread = Unread::new(2.0, 0.02, StrainRange { lower: 0.0, upper: 0.3 });
     /// // A second after the last reading, of an estimate in the middle of the limits, and six hours after it.
-    /// assert!(unread.variance(1.0, unread.centre, 1e-6).sqrt() < 0.05);
+    /// assert!(unread.variance(1.0_f64, unread.centre, 1e-6).sqrt() < 0.05);
     /// assert_eq!(unread.variance(21_600.0, unread.centre, 1e-6), unread.anywhere);
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     #[must_use]
-    pub fn new(motion: &MotionParams, limits: RangeParams) -> Self {
+    pub fn new(rate_time_s: f64, rate_sd_per_s: f64, limits: StrainRange<f64>) -> Self {
+        let (path, span) = (rate_sd_per_s * rate_time_s, limits.upper - limits.lower);
         Self {
-            rate_time_s: motion.rate_time_s,
-            path_variance: 2.0 * (motion.rate_sd_per_s * motion.rate_time_s).powi(2),
-            centre: limits.lower + 0.5 * limits.span(),
-            anywhere: limits.span().powi(2) / 12.0,
+            rate_time_s,
+            path_variance: 2.0 * (path * path),
+            centre: limits.lower + 0.5 * span,
+            anywhere: limits.variance_of_anywhere(),
         }
     }
 

@@ -1,11 +1,11 @@
-use std::fmt;
+use core::fmt;
 
-use serde::{Serialize, Serializer};
+use crate::ReadingVerdict;
 
 /// What there is to say about an estimate beside its numbers.
 ///
 /// ```
-/// use ohmstrain::{Flag, Flags};
+/// use ohmstrain_ekf::live::{Flag, Flags};
 ///
 /// let flags = Flags::NONE.with(Flag::AtLimit, true).with(Flag::Missing, true);
 /// assert!(flags.has(Flag::Missing) && !flags.has(Flag::Stuck));
@@ -17,7 +17,7 @@ pub struct Flags(u16);
 /// One of the [`Flags`], in the order in which they are written.
 ///
 /// ```
-/// assert_eq!(ohmstrain::Flag::RampBorder.name(), "ramp_border");
+/// assert_eq!(ohmstrain_ekf::live::Flag::RampBorder.name(), "ramp_border");
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
@@ -56,7 +56,7 @@ impl Flag {
     /// All of them.
     ///
     /// ```
-    /// assert_eq!(ohmstrain::Flag::ALL.len(), 14);
+    /// assert_eq!(ohmstrain_ekf::live::Flag::ALL.len(), 14);
     /// ```
     pub const ALL: [Self; 14] = [
         Self::Missing,
@@ -78,7 +78,7 @@ impl Flag {
     /// Its name in `estimates.csv`.
     ///
     /// ```
-    /// assert_eq!(ohmstrain::Flag::AtLimit.name(), "at_limit");
+    /// assert_eq!(ohmstrain_ekf::live::Flag::AtLimit.name(), "at_limit");
     /// ```
     #[must_use]
     pub const fn name(self) -> &'static str {
@@ -105,14 +105,35 @@ impl Flags {
     /// Nothing to say.
     ///
     /// ```
-    /// assert_eq!(ohmstrain::Flags::NONE.to_string(), "");
+    /// assert_eq!(ohmstrain_ekf::live::Flags::NONE.to_string(), "");
     /// ```
     pub const NONE: Self = Self(0);
+
+    /// What became of a reading.
+    ///
+    /// ```
+    /// use ohmstrain_ekf::{ReadingVerdict, live::Flags};
+    ///
+    /// assert_eq!(Flags::of(ReadingVerdict::Stuck).to_string(), "stuck");
+    /// assert_eq!(Flags::of(ReadingVerdict::Accepted), Flags::NONE);
+    /// ```
+    #[must_use]
+    pub const fn of(verdict: ReadingVerdict) -> Self {
+        match verdict {
+            ReadingVerdict::Accepted => Self::NONE,
+            ReadingVerdict::Missing => Self::NONE.with(Flag::Missing, true),
+            ReadingVerdict::Downweighted => Self::NONE.with(Flag::Downweighted, true),
+            ReadingVerdict::Rejected => Self::NONE.with(Flag::Rejected, true),
+            ReadingVerdict::Readmitted => Self::NONE.with(Flag::Readmitted, true),
+            ReadingVerdict::Implausible => Self::NONE.with(Flag::Implausible, true),
+            ReadingVerdict::Stuck => Self::NONE.with(Flag::Stuck, true),
+        }
+    }
 
     /// With one more raised, if `raised`.
     ///
     /// ```
-    /// use ohmstrain::{Flag, Flags};
+    /// use ohmstrain_ekf::live::{Flag, Flags};
     ///
     /// assert_eq!(Flags::NONE.with(Flag::Stuck, false), Flags::NONE);
     /// ```
@@ -124,7 +145,7 @@ impl Flags {
     /// Those of either.
     ///
     /// ```
-    /// use ohmstrain::{Flag, Flags};
+    /// use ohmstrain_ekf::live::{Flag, Flags};
     ///
     /// let either = Flags::NONE.with(Flag::Stuck, true).and(Flags::NONE.with(Flag::AtLimit, true));
     /// assert_eq!(either.to_string(), "stuck|at_limit");
@@ -137,7 +158,7 @@ impl Flags {
     /// Whether one is raised.
     ///
     /// ```
-    /// use ohmstrain::{Flag, Flags};
+    /// use ohmstrain_ekf::live::{Flag, Flags};
     ///
     /// assert!(Flags::NONE.with(Flag::Stuck, true).has(Flag::Stuck));
     /// ```
@@ -149,7 +170,7 @@ impl Flags {
     /// Names of those that are raised, in order.
     ///
     /// ```
-    /// use ohmstrain::{Flag, Flags};
+    /// use ohmstrain_ekf::live::{Flag, Flags};
     ///
     /// assert!(Flags::NONE.with(Flag::Stuck, true).names().eq(["stuck"]));
     /// ```
@@ -169,8 +190,9 @@ impl fmt::Display for Flags {
     }
 }
 
-impl Serialize for Flags {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+#[cfg(feature = "serde")]
+impl serde::Serialize for Flags {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.collect_str(self)
     }
 }

@@ -1,11 +1,7 @@
 //! When an interval is wider than the filter says, in any precision.
 
-use ohmstrain_calib::{MotionParams, SURPRISING_NIS, SensorParams};
-use ohmstrain_ekf::{Gaussian, Innovations, Real};
-
-use crate::pauses::Pauses;
-use crate::rest_watch::ZERO;
-use crate::{Flag, Flags, NEVER_READ_S, RestSeen, RestWatch, Unread};
+use super::{Flag, Flags, Innovations, NEVER_READ_S, RestSeen, RestWatch, SURPRISING_NIS, Unread};
+use crate::{Gaussian, Real};
 
 /// The numbers behind the widened intervals, also for programs that write a filter in another language.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,12 +34,8 @@ pub const DOUBT: DoubtNumbers = DoubtNumbers {
     margin: 0.02,
     faster: 1.5,
     worth: 0.2,
-    zero: ZERO,
+    zero: 0.01,
 };
-
-/// Standard deviation of the strain, in spans, that a filter has at its start besides what it states. Started in motion, on six
-/// recordings, its errors of the first two seconds are 9 to 15 %FS where it states 7 to 11, and all but settled after ten.
-const START: f64 = 0.1;
 
 /// What the doubts of a sensor depend on: what its calibration has seen.
 #[derive(Clone, Copy, Debug)]
@@ -66,38 +58,6 @@ pub struct DoubtParts {
     pub unread: Unread,
     /// What the sensor read at rest, if that is known.
     pub rest: Option<RestSeen>,
-}
-
-impl DoubtParts {
-    /// Of a sensor whose filter runs with that motion.
-    ///
-    /// ```
-    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
-    /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
-    /// let params = sensor.params();
-    /// let of = params.filter_of(params.default_estimator);
-    /// let parts = ohmstrain::DoubtParts::new(params, &params.estimator(of)?.motion);
-    /// assert!(parts.low < parts.high && parts.start < parts.most);
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
-    #[must_use]
-    pub fn new(params: &SensorParams, motion: &MotionParams) -> Self {
-        let (seen, span) = (&params.validity, params.limits.span());
-        let relative = |reading: f64| reading / params.rest_reading - 1.0;
-        let (low, high) = (relative(seen.reading_lower), relative(seen.reading_upper));
-        let unread = Unread::new(motion, params.limits);
-        Self {
-            low,
-            high,
-            fastest_per_s: seen.fastest_rate_per_s,
-            longest_s: seen.duration_s,
-            per_reading: if high > low { span / (high - low) } else { 0.0 },
-            start: (START * span).powi(2),
-            most: unread.anywhere,
-            unread,
-            rest: RestSeen::of(params),
-        }
-    }
 }
 
 /// What is left after a row of what was known before it, of three time constants: one exponential.
@@ -158,20 +118,27 @@ impl<T: Real> Misfit<T> {
 /// used outside of what its calibration has seen, or that its law does not fit. It widens the strain's interval, and says why.
 ///
 /// ```
-/// # let text = std::fs::read_to_string("examples/sensor.toml")?;
-/// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
-/// use ohmstrain::{DoubtParts, Doubts, Flag};
 /// use ohmstrain_ekf::Gaussian;
+/// use ohmstrain_ekf::live::{DoubtParts, Doubts, Flag, Unread};
+/// use ohmstrain_model::StrainRange;
 ///
-/// let params = sensor.params();
-/// let of = params.filter_of(params.default_estimator);
-/// let parts = DoubtParts::new(params, &params.estimator(of)?.motion);
+/// let unread = Unread::new(2.0, 0.02, StrainRange { lower: 0.0, upper: 0.3 });
+/// let parts = DoubtParts {
+///     low: 0.0,
+///     high: 1.0,
+///     fastest_per_s: 0.1,
+///     longest_s: 600.0,
+///     per_reading: 0.3,
+///     start: 0.03 * 0.03,
+///     most: unread.anywhere,
+///     unread,
+///     rest: None,
+/// };
 /// let mut doubts = Doubts::<f64>::new(parts);
 /// let stated = Gaussian { mean: 0.1, variance: 1e-5 };
 /// let variance = doubts.see(0.0, Some((parts.low, 1.0)), stated);
 /// let (variance, flags) = doubts.widened(0.0, variance);
 /// assert!(variance > stated.variance && flags.has(Flag::StartUp));
-/// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Doubts<T> {
@@ -250,6 +217,14 @@ impl<T: Real> Doubts<T> {
         }
     }
 
+    /// What is known without readings, and for how long there have been none, s.
+    pub const fn unread(&self) -> (Unread, T)
+    where
+        T: Copy,
+    {
+        (self.parts.unread, self.unread_s)
+    }
+
     /// A row has passed, with a reading that was used, R/R₀ - 1, and its normalised innovation squared, or without; the variance
     /// of the strain that is stated, or what a pause of the readings leaves open.
     pub fn see(&mut self, dt_s: T, reading: Option<(T, T)>, stated: Gaussian<T>) -> T {
@@ -323,19 +298,13 @@ impl<T: Real> Doubts<T> {
     }
 }
 
-impl Doubts<f64> {
-    /// What there is to doubt of pauses, for a smoother.
-    pub(crate) const fn pauses(&self) -> Pauses {
-        Pauses::new(self.parts.unread, self.unread_s)
-    }
-}
-
 #[cfg(test)]
 mod tests {
-    use ohmstrain_ekf::Gaussian;
+    extern crate std;
+    use std::vec;
 
-    use super::{DoubtParts, Doubts};
-    use crate::{Flag, Flags, RestSeen, Unread};
+    use super::{DoubtParts, Doubts, Flag, Flags, RestSeen, Unread};
+    use crate::Gaussian;
 
     const STATED: Gaussian<f64> = Gaussian { mean: 0.1, variance: 1e-6 };
 

@@ -1,9 +1,6 @@
 //! R₀ of the day, as far as readings alone tell it, in any precision.
 
-use ohmstrain_calib::SensorParams;
-use ohmstrain_ekf::{Reading, Real};
-
-use crate::{DOUBT, RestSeen};
+use crate::{Reading, Real};
 
 /// The numbers behind an R₀ that follows the readings, also for programs that write a filter in another language.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,7 +22,7 @@ pub struct Following {
 /// `docs/another-day.md` has what these were chosen on. A faster start follows another day sooner, and a fault of 10 s farther.
 ///
 /// ```
-/// assert!(ohmstrain::FOLLOWING.leaves_s > ohmstrain::FOLLOWING.returns_s);
+/// assert!(ohmstrain_ekf::live::FOLLOWING.leaves_s > ohmstrain_ekf::live::FOLLOWING.returns_s);
 /// ```
 pub const FOLLOWING: Following =
     Following { leaves_s: 40.0, settles_s: 10.0, returns_s: 1.0, longest_s: 2.0, fault_s: 30.0, farthest: 2.0 };
@@ -39,39 +36,13 @@ pub struct RestBounds {
     pub high: Option<f64>,
 }
 
-impl RestBounds {
-    /// On the side of the largest strain the last reading of the calibration, or a little more; on the other side that at
-    /// rest, with what is left open to it, if the calibration has one and it is an end of its readings: a sensor that was
-    /// never at rest then may get there.
-    ///
-    /// ```
-    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
-    /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
-    /// let bounds = ohmstrain::RestBounds::of(sensor.params());
-    /// assert!(bounds.low < Some(0.0) && bounds.high > Some(0.1));
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
-    #[must_use]
-    pub fn of(params: &SensorParams) -> Self {
-        let seen = &params.validity;
-        let relative = |reading: f64| reading / params.rest_reading - 1.0;
-        let (low, high) = (relative(seen.reading_lower), relative(seen.reading_upper));
-        let margin = DOUBT.margin * (high - low);
-        let grows = params.static_cubic.strain(seen.reading_upper) > params.static_cubic.strain(seen.reading_lower);
-        let sign = if grows { 1.0 } else { -1.0 };
-        let rest = RestSeen::of(params).filter(|rest| rest.sign == sign);
-        let near = rest.map(|rest| rest.end - sign * rest.tolerance);
-        if grows { Self { low: near, high: Some(high + margin) } } else { Self { low: Some(low - margin), high: near } }
-    }
-}
-
 /// R₀ that follows the readings: it is calibration's as long as they stay where they were then; one that lies beyond them
 /// slowly draws it after itself, and one beyond the other end soon draws it back (a play as wide as calibration's readings,
 /// with a lag). That is right where the sensor moves between the same strains as in calibration, on another day. Where it is stretched
 /// farther, the strain is at its limit in any case.
 ///
 /// ```
-/// use ohmstrain::{RestBounds, RestFollower};
+/// use ohmstrain_ekf::live::{RestBounds, RestFollower};
 ///
 /// let mut follower = RestFollower::<f64>::new(RestBounds { low: Some(-0.05), high: Some(1.5) });
 /// for k in 0..6000 {
@@ -97,8 +68,8 @@ impl<T: Real> RestFollower<T> {
     /// Before any reading, R₀ is calibration's.
     ///
     /// ```
-    /// let bounds = ohmstrain::RestBounds { low: None, high: Some(1.5) };
-    /// assert_eq!(ohmstrain::RestFollower::<f64>::new(bounds).off(), 0.0);
+    /// let bounds = ohmstrain_ekf::live::RestBounds { low: None, high: Some(1.5) };
+    /// assert_eq!(ohmstrain_ekf::live::RestFollower::<f64>::new(bounds).off(), 0.0);
     /// ```
     #[must_use]
     pub fn new(bounds: RestBounds) -> Self {
@@ -108,7 +79,7 @@ impl<T: Real> RestFollower<T> {
     /// By what share of calibration's R₀ it is another.
     ///
     /// ```
-    /// let mut follower = ohmstrain::RestFollower::<f64>::new(ohmstrain::RestBounds { low: None, high: None });
+    /// let mut follower = ohmstrain_ekf::live::RestFollower::<f64>::new(ohmstrain_ekf::live::RestBounds { low: None, high: None });
     /// follower.see(1.0, 2.0);
     /// assert_eq!(follower.off(), 0.0);
     /// ```
@@ -120,7 +91,7 @@ impl<T: Real> RestFollower<T> {
     /// A reading relative to R₀ as it is, from one relative to calibration's.
     ///
     /// ```
-    /// let follower = ohmstrain::RestFollower::<f64>::new(ohmstrain::RestBounds { low: None, high: None });
+    /// let follower = ohmstrain_ekf::live::RestFollower::<f64>::new(ohmstrain_ekf::live::RestBounds { low: None, high: None });
     /// assert_eq!(follower.relative(0.5.into()).value, 0.5);
     /// ```
     #[must_use]
@@ -134,8 +105,8 @@ impl<T: Real> RestFollower<T> {
     /// nothing until another one comes: it may be stuck.
     ///
     /// ```
-    /// let bounds = ohmstrain::RestBounds { low: None, high: Some(1.5) };
-    /// let mut follower = ohmstrain::RestFollower::<f64>::new(bounds);
+    /// let bounds = ohmstrain_ekf::live::RestBounds { low: None, high: Some(1.5) };
+    /// let mut follower = ohmstrain_ekf::live::RestFollower::<f64>::new(bounds);
     /// [1.4, 2.0, 2.0].into_iter().for_each(|reading| follower.see(2.0, reading));
     /// // 0.2, by 2 s of 40.
     /// assert!((follower.off() - 0.2 * 2.0 / 42.0).abs() < 1e-12);
@@ -149,8 +120,8 @@ impl<T: Real> RestFollower<T> {
     /// fault: R₀ is what it was before.
     ///
     /// ```
-    /// let bounds = ohmstrain::RestBounds { low: Some(-0.05), high: Some(1.5) };
-    /// let mut follower = ohmstrain::RestFollower::<f64>::new(bounds);
+    /// let bounds = ohmstrain_ekf::live::RestBounds { low: Some(-0.05), high: Some(1.5) };
+    /// let mut follower = ohmstrain_ekf::live::RestFollower::<f64>::new(bounds);
     /// [1.4, 2.0, 2.1].into_iter().for_each(|reading| follower.see(2.0, reading));
     /// let before = follower.off();
     /// follower.jumped(0.3);
@@ -187,7 +158,8 @@ impl<T: Real> RestFollower<T> {
 
 impl RestFollower<f64> {
     /// The one R₀ of a recording: what is left when it has been gone through, and once more with that.
-    pub(crate) fn settled(mut self, len: usize, row: impl Fn(usize) -> (f64, Option<Reading<f64>>)) -> Self {
+    #[must_use]
+    pub fn settled(mut self, len: usize, row: impl Fn(usize) -> (f64, Option<Reading<f64>>)) -> Self {
         for _ in 0..2 {
             let mut last_s = f64::NAN;
             self.last = None;

@@ -1,16 +1,6 @@
 //! Whether the sensor still rests where it rested in calibration.
 
-use ohmstrain_calib::SensorParams;
-use ohmstrain_ekf::Real;
-
-/// By what share a rested sensor may read something else than in calibration: half of what is to be noticed, a tenth.
-const TOLERANCE: f64 = 0.05;
-/// For how long readings must stay where they are to say something of R₀, s: twice as long as a doubt of a start lasts.
-const LASTS_S: f64 = 10.0;
-/// What a sensor reads at rest is an end of what it reads at all if it is no farther from it than this share of the range.
-const AT_END: f64 = 0.25;
-/// A strain within this share of the span of zero is zero.
-pub(crate) const ZERO: f64 = 0.01;
+use crate::Real;
 
 /// What calibration has seen of the sensor at rest, as R/R₀ - 1: for programs that write a filter in another language.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,30 +15,6 @@ pub struct RestSeen {
     pub sign: f64,
     /// The last of calibration's readings on that side.
     pub end: f64,
-}
-
-impl RestSeen {
-    /// `None` where no recording of the calibration begins at rest.
-    ///
-    /// ```
-    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
-    /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
-    /// let seen = ohmstrain::RestSeen::of(sensor.params()).unwrap();
-    /// assert!(seen.sign == 1.0 && seen.end <= seen.rested);
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
-    #[must_use]
-    pub fn of(params: &SensorParams) -> Option<Self> {
-        let relative = |reading: f64| reading / params.rest_reading - 1.0;
-        let rested = relative(params.measured_rest?);
-        let (low, high) = (relative(params.validity.reading_lower), relative(params.validity.reading_upper));
-        let (sign, end) = match AT_END * (high - low) {
-            near if rested - low <= near => (1.0, low.min(rested)),
-            near if high - rested <= near => (-1.0, high.max(rested)),
-            _ => (0.0, rested),
-        };
-        Some(Self { rested, tolerance: TOLERANCE * (1.0 + rested), lasts_s: LASTS_S, sign, end })
-    }
 }
 
 /// Watches readings for an R₀ that is not calibration's. Two things say so: a sensor that is known to rest and reads something
@@ -72,15 +38,12 @@ impl<T: Real> RestWatch<T> {
     /// Before any reading; `rests` if the sensor is known to rest then.
     ///
     /// ```
-    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
-    /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
-    /// use ohmstrain::{RestSeen, RestWatch};
+    /// use ohmstrain_ekf::live::{RestSeen, RestWatch};
     ///
-    /// let seen = RestSeen::of(sensor.params()).unwrap();
+    /// let seen = RestSeen { rested: 0.05, tolerance: 0.05, lasts_s: 10.0, sign: 1.0, end: 0.02 };
     /// let mut watch = RestWatch::<f64>::new(seen, true);
     /// assert!((watch.see(0.0, seen.rested + 0.1) - 0.1).abs() < 1e-12);
     /// assert_eq!(RestWatch::<f64>::new(seen, false).see(0.0, seen.rested + 0.1), 0.0);
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     #[must_use]
     pub fn new(seen: RestSeen, rests: bool) -> Self {
@@ -91,16 +54,13 @@ impl<T: Real> RestWatch<T> {
     /// nothing speaks against it.
     ///
     /// ```
-    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
-    /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
-    /// use ohmstrain::{RestSeen, RestWatch};
+    /// use ohmstrain_ekf::live::{RestSeen, RestWatch};
     ///
-    /// let seen = RestSeen::of(sensor.params()).unwrap();
+    /// let seen = RestSeen { rested: 0.05, tolerance: 0.05, lasts_s: 10.0, sign: 1.0, end: 0.02 };
     /// let mut watch = RestWatch::<f64>::new(seen, false);
     /// let off: Vec<f64> = (0..12).map(|_| watch.see(1.0, seen.end - 0.1)).collect();
     /// assert_eq!(off[..9], [0.0; 9]);
     /// assert!((off[9] - 0.1).abs() < 1e-12);
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn see(&mut self, dt_s: T, rho: T) -> T {
         let tolerance = T::of(self.seen.tolerance);
@@ -128,16 +88,13 @@ impl<T: Real> RestWatch<T> {
     /// R₀ of today has been told: what spoke against calibration's is gone.
     ///
     /// ```
-    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
-    /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
-    /// use ohmstrain::{RestSeen, RestWatch};
+    /// use ohmstrain_ekf::live::{RestSeen, RestWatch};
     ///
-    /// let seen = RestSeen::of(sensor.params()).unwrap();
+    /// let seen = RestSeen { rested: 0.05, tolerance: 0.05, lasts_s: 10.0, sign: 1.0, end: 0.02 };
     /// let mut watch = RestWatch::<f64>::new(seen, true);
     /// watch.see(0.0, seen.rested + 0.1);
     /// watch.told();
     /// assert_eq!(watch.off(), 0.0);
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn told(&mut self) {
         *self = Self::new(self.seen, self.rests);
@@ -146,13 +103,10 @@ impl<T: Real> RestWatch<T> {
     /// How far R₀ is off, as a share of it; 0 where nothing speaks against it.
     ///
     /// ```
-    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
-    /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
-    /// use ohmstrain::{RestSeen, RestWatch};
+    /// use ohmstrain_ekf::live::{RestSeen, RestWatch};
     ///
-    /// let seen = RestSeen::of(sensor.params()).unwrap();
+    /// let seen = RestSeen { rested: 0.05, tolerance: 0.05, lasts_s: 10.0, sign: 1.0, end: 0.02 };
     /// assert_eq!(RestWatch::<f64>::new(seen, true).off(), 0.0);
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     #[must_use]
     pub const fn off(&self) -> T

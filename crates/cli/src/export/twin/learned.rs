@@ -1,0 +1,45 @@
+//! The learned correction of the exported program, in any precision.
+
+use ohmstrain_calib::{OwnedCorrection, PortableCorrection};
+use ohmstrain_ekf::Real;
+use ohmstrain_ekf::correction::{FILTER_INPUTS, FeatureScale};
+use ohmstrain_ekf::live::Learned;
+use ohmstrain_model::StrainRange;
+
+use super::number;
+use crate::export::quadratic::OwnedQuadratic;
+
+/// A correction, and what stands for rows that were left out.
+pub struct OwnedLearned<T: Real> {
+    features: FeatureScale<T>,
+    rows: OwnedCorrection<T, FILTER_INPUTS>,
+    /// Of the direct process and of the residual one.
+    quadratics: Option<[OwnedQuadratic<T>; 2]>,
+}
+
+impl<T: Real> OwnedLearned<T> {
+    /// In the precision of the program, with its limits.
+    pub fn new(
+        correction: &PortableCorrection,
+        quadratics: Option<&[OwnedQuadratic; 2]>,
+        limits: StrainRange<T>,
+    ) -> Self {
+        let FeatureScale { centre, half_range, rates, starts } = correction.features;
+        let features = FeatureScale {
+            centre: number(centre),
+            half_range: number(half_range),
+            rates: rates.map(number),
+            starts: starts.map(|start| start.map(number)),
+        };
+        let numbers = |all: &[f64]| all.iter().copied().map(number).collect();
+        let narrow = |of: &OwnedQuadratic| OwnedQuadratic { linear: numbers(&of.linear), square: numbers(&of.square) };
+        let rows = OwnedCorrection { limits, ..correction.learned.map(number) };
+        Self { features, rows, quadratics: quadratics.map(|both| both.each_ref().map(narrow)) }
+    }
+
+    /// As a live filter borrows it.
+    pub fn learned(&self) -> (FeatureScale<T>, Learned<'_, T>) {
+        let quadratics = self.quadratics.as_ref().map(|both| both.each_ref().map(OwnedQuadratic::borrowed));
+        (self.features, Learned { correction: self.rows.correction(), quadratics })
+    }
+}

@@ -1,0 +1,65 @@
+use ohmstrain_model::{Phase, SwitchedModel};
+
+use crate::{Belief, Curve, Estimator, Gaussian, Hypotheses, Mixture, Real, SignSplit, SparseEkf, Switch};
+
+/// An estimator of the sensor's own model, which a [`LiveFilter`](super::LiveFilter) runs.
+pub trait SensorEstimator<T: Real, const N: usize, const L: usize>: Estimator<T, N, L> {
+    /// Relaxing branches of the law.
+    const BRANCHES: usize;
+
+    /// The state before any reading, at a strain that is known if there is one.
+    fn start(&self, strain: Option<Gaussian<T>>) -> Self::State;
+}
+
+/// What a model begins with.
+fn belief<T: Real, const B: usize, const N: usize, const L: usize>(
+    model: &SwitchedModel<T, B, N>,
+    strain: Option<Gaussian<T>>,
+) -> Belief<T, N, L> {
+    let (mut mean, mut variance) = model.initial_distribution();
+    if let Some(strain) = strain {
+        (mean[0], variance[0]) = (strain.mean, strain.variance);
+    }
+    Belief::independent(mean, &variance)
+}
+
+impl<T, S, G, const B: usize, const N: usize, const L: usize> SensorEstimator<T, N, L> for SparseEkf<T, S, B, N, G>
+where
+    T: Real,
+    S: Switch<T>,
+    G: Curve<T>,
+{
+    const BRANCHES: usize = B;
+
+    fn start(&self, strain: Option<Gaussian<T>>) -> Belief<T, N, L> {
+        belief(self.model(), strain)
+    }
+}
+
+impl<T, S, G, const B: usize, const N: usize, const L: usize, const K: usize> SensorEstimator<T, N, L>
+    for SignSplit<T, B, N, K, S, G>
+where
+    T: Real,
+    S: Switch<T>,
+    G: Curve<T>,
+{
+    const BRANCHES: usize = B;
+
+    fn start(&self, strain: Option<Gaussian<T>>) -> Mixture<T, N, L, K> {
+        Mixture::single(belief(self.model(), strain), Phase::Extend)
+    }
+}
+
+impl<T, S, G, const B: usize, const N: usize, const L: usize, const K: usize> SensorEstimator<T, N, L>
+    for Hypotheses<T, B, N, K, S, G>
+where
+    T: Real,
+    S: Switch<T>,
+    G: Curve<T>,
+{
+    const BRANCHES: usize = B;
+
+    fn start(&self, strain: Option<Gaussian<T>>) -> Mixture<T, N, L, K> {
+        Mixture::single(belief(self.model(), strain), Phase::Hold)
+    }
+}

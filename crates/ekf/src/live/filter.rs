@@ -1,0 +1,304 @@
+use ohmstrain_model::{MOTION_STATES, StrainRange};
+
+use super::{
+    BESIDE_SHARE, DoubtParts, Doubts, Flags, Jumps, Learned, Protections, Repeats, RestBounds, RestFollower,
+    SURPRISING_NIS, SensorEstimator, Sieve,
+};
+use crate::correction::{FEATURES, FeatureScale, ReadingFeatures, filter_inputs};
+use crate::ekf::check_time_step;
+use crate::substeps::Repeated;
+use crate::{
+    Belief, Estimator, Gaussian, Guard, Influence, Reading, ReadingVerdict, Real, State, StepError, Streak, Substeps,
+};
+
+/// How far beyond the limits a strain may be that somebody knows, in spans.
+///
+/// ```
+/// // Of a sensor of 0 to 30 % one may know 33 %.
+/// assert!((0.3 * (1.0 + ohmstrain_ekf::live::KNOWN_BEYOND) - 0.33_f64).abs() < 1e-12);
+/// ```
+pub const KNOWN_BEYOND: f64 = 0.1;
+
+/// What a [`LiveFilter`] is made of beside its estimator: all that a calibration says of the sensor.
+#[derive(Clone, Copy, Debug)]
+pub struct LiveParts<'a, T> {
+    /// R₀ of the law, in the unit of the readings.
+    pub rest_reading: T,
+    /// What the rested, unstretched sensor read in calibration: of the day, where R₀ is of the law.
+    pub rested: T,
+    /// Usual time between readings, s.
+    pub dt_s: T,
+    /// Range of the reported strain.
+    pub limits: StrainRange<T>,
+    /// Factor on the standard deviation of the filter's strain.
+    pub strain_sd_scale: T,
+    /// Variance of the model's own noise of R/R₀.
+    pub reading_variance: T,
+    /// Variance of a strain that is known at a start.
+    pub known_variance: T,
+    /// A strain that is less is none.
+    pub zero: T,
+    /// What a reading must be.
+    pub sieve: Sieve,
+    /// When the interval is wider than the filter says.
+    pub doubt: DoubtParts,
+    /// Between which readings R₀ stays.
+    pub rest: RestBounds,
+    /// The scale of the features that the correction sees, and the correction; `None` for the filter's own strain.
+    pub learned: Option<(FeatureScale<T>, Learned<'a, T>)>,
+}
+
+/// What a row says.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LiveEstimate<T> {
+    /// Strain, within the limits.
+    pub strain: Gaussian<T>,
+    /// Its rate, 1/s.
+    pub rate: Gaussian<T>,
+    /// What became of the reading, and what is to be doubted.
+    pub flags: Flags,
+}
+
+/// A sensor's filter with all that stands around it, in fixed memory.
+///
+/// An error leaves it as it was.
+pub struct LiveFilter<'a, T: Real, E: SensorEstimator<T, N, L>, const N: usize, const L: usize> {
+    estimator: Substeps<E>,
+    guard: Guard<T>,
+    parts: LiveParts<'a, T>,
+    protections: Protections,
+    /// What a reading must be, under them.
+    sieve: Sieve,
+    /// R₀ of the law as it has been told.
+    rest_reading: T,
+    /// Before any reading.
+    fresh: E::State,
+    /// A step, and its length, s.
+    prepared: (T, Repeated<E::Prepared>),
+    now: Memory<T, E::State>,
+}
+
+/// What changes from step to step.
+struct Memory<T, S> {
+    state: S,
+    repeats: Repeats<T>,
+    jumps: Jumps<T>,
+    /// What the correction sees of readings, if there is one.
+    watched: Option<ReadingFeatures<T>>,
+    /// Features at the last reading, and the filter's variance then.
+    features: Option<[T; FEATURES]>,
+    known_variance: T,
+    doubts: Doubts<T>,
+    /// `None` where R₀ is told, or does not follow.
+    follower: Option<RestFollower<T>>,
+}
+
+impl<'a, T: Real, E: SensorEstimator<T, N, L>, const N: usize, const L: usize> LiveFilter<'a, T, E, N, L> {
+    /// Before any reading.
+    #[must_use]
+    pub fn new(estimator: E, parts: LiveParts<'a, T>) -> Self {
+        let fresh = estimator.start(None);
+        let estimator = Substeps(estimator);
+        Self {
+            prepared: (parts.dt_s, estimator.prepare(parts.dt_s)),
+            now: Memory::new(&parts, Protections::ALL, fresh.clone()),
+            rest_reading: parts.rest_reading,
+            guard: guard(Protections::ALL),
+            protections: Protections::ALL,
+            sieve: parts.sieve,
+            estimator,
+            parts,
+            fresh,
+        }
+    }
+
+    /// The same before any reading, with some protections turned off.
+    #[must_use]
+    pub fn protected_by(self, protections: Protections) -> Self {
+        let now = Memory::new(&self.parts, protections, self.fresh.clone());
+        Self { guard: guard(protections), protections, sieve: self.parts.sieve.under(protections), now, ..self }
+    }
+
+    /// The estimator.
+    pub const fn estimator(&self) -> &E {
+        &self.estimator.0
+    }
+
+    /// What the filter knows, uncorrected.
+    pub const fn state(&self) -> &E::State {
+        &self.now.state
+    }
+
+    /// The usual time on, with a reading in the unit of the calibration.
+    ///
+    /// # Errors
+    /// If even a prediction is refused.
+    pub fn step(&mut self, reading: T) -> Result<LiveEstimate<T>, StepError> {
+        self.step_after(self.parts.dt_s, Some(self.relative(reading, T::zero())))
+    }
+
+    /// The usual time on, without a reading.
+    ///
+    /// # Errors
+    /// As [`Self::step`].
+    pub fn predict(&mut self) -> Result<LiveEstimate<T>, StepError> {
+        self.step_after(self.parts.dt_s, None)
+    }
+
+    /// A reading in the unit of the calibration, with the standard deviation that its electronics add, as R/R₀ - 1 of the R₀ that
+    /// was calibrated, or told since.
+    pub fn relative(&self, reading: T, reading_sd: T) -> Reading<T> {
+        let sd = reading_sd / self.rest_reading;
+        Reading { value: (reading - self.rest_reading) / self.rest_reading, extra_variance: sd * sd }
+    }
+
+    /// What the rested, unstretched sensor is found to read from now on.
+    ///
+    /// # Errors
+    /// If it is not a positive number.
+    pub fn rest(&mut self, measured: T) -> Result<(), StepError> {
+        self.rest_reading = self.rest_reading_at(measured)?;
+        self.now.follower = None;
+        self.now.doubts.told_rest();
+        Ok(())
+    }
+
+    /// The sensor rests now, unstretched, and reads `measured`: begins again from there.
+    ///
+    /// # Errors
+    /// As [`Self::rest`].
+    pub fn rezero(&mut self, measured: T) -> Result<(), StepError> {
+        self.rest_reading = self.rest_reading_at(measured)?;
+        // Where it is always stretched somewhat nobody knows by how much.
+        self.start_at(may_be_unstretched(&self.parts.limits).then(T::zero));
+        self.now.follower = None;
+        Ok(())
+    }
+
+    /// Begins again, at a strain that is known if there is one.
+    pub fn start_at(&mut self, strain: Option<T>) {
+        let known = strain.map(|mean| Gaussian { mean, variance: self.parts.known_variance });
+        self.now = Memory::new(&self.parts, self.protections, self.estimator.0.start(known));
+        if let Some(strain) = strain {
+            self.now.doubts = self.now.doubts.of_known_strain(strain.abs() <= self.parts.zero);
+        }
+    }
+
+    fn rest_reading_at(&self, measured: T) -> Result<T, StepError> {
+        let found = self.parts.rest_reading * (measured / self.parts.rested);
+        if found > T::zero() && found.is_finite() { Ok(found) } else { Err(StepError::NonFiniteReading) }
+    }
+
+    /// `dt_s` seconds on, with a reading ([`Self::relative`]) or without.
+    ///
+    /// # Errors
+    /// As [`Self::step`]; or if `dt_s` is no length of a step.
+    pub fn step_after(&mut self, dt_s: T, reading: Option<Reading<T>>) -> Result<LiveEstimate<T>, StepError> {
+        self.prepare(dt_s)?;
+        let mut repeats = self.now.repeats;
+        repeats.pass(dt_s);
+        let relative = reading.map(|reading| self.now.follower.map_or(reading, |follower| follower.relative(reading)));
+        let (used, turned_down) =
+            match relative.map(|relative| repeats.sieved(&self.sieve, relative, self.parts.reading_variance)) {
+                None => (None, None),
+                Some(Ok(reading)) => (Some(reading), None),
+                Some(Err(verdict)) => (None, Some(verdict)),
+            };
+        let (now, streak) = (&mut self.now, Streak::default());
+        let guarded = self.guard.advance(&self.estimator, &now.state, streak, &self.prepared.1, used)?;
+        (now.state, now.repeats) = (guarded.advanced.state, repeats);
+        let verdict = turned_down.unwrap_or(guarded.verdict);
+        let innovation = guarded.advanced.innovation.filter(|_| verdict.is_taken());
+        let nis = innovation.map_or(T::zero(), |innovation| innovation.nis);
+        let surprises = verdict == ReadingVerdict::Downweighted && nis > T::of(SURPRISING_NIS);
+        let used = used.filter(|_| verdict.is_taken()).map(|used| used.value);
+        let jumped = used.and_then(|used| now.jumps.see(used, nis, self.sieve.jump)).filter(|_| surprises);
+        if jumped.is_some() {
+            now.state = now.state.beside(&self.fresh, T::of(BESIDE_SHARE));
+        }
+        let moments = now.state.moments();
+        let filtered = self.filtered(&moments);
+        self.watch(dt_s, used, surprises, filtered);
+        let corrected = self.corrected(&moments, filtered);
+        let now = &mut self.now;
+        let taken = reading.filter(|_| verdict.is_taken()).map(|reading| (reading.value, nis));
+        if let (Some(follower), Some((reading, _))) = (&mut now.follower, taken) {
+            jumped.into_iter().for_each(|jump| follower.jumped(jump));
+            follower.see(dt_s, reading);
+        }
+        let open = now.doubts.see(dt_s, taken, corrected);
+        let (widened, doubts) = now.doubts.widened(moments.mean[1], open);
+        let (variance, doubts) =
+            if self.protections.doubts { (widened, doubts) } else { (corrected.variance, Flags::NONE) };
+        let strain = Gaussian { variance, ..corrected };
+        Ok(LiveEstimate { strain, rate: Gaussian::marginal(&moments, 1), flags: Flags::of(verdict).and(doubts) })
+    }
+
+    /// Prepares steps of `dt_s` seconds, unless they are.
+    fn prepare(&mut self, dt_s: T) -> Result<(), StepError> {
+        if dt_s != self.prepared.0 {
+            check_time_step(dt_s)?;
+            self.prepared = (dt_s, self.estimator.prepare(dt_s));
+        }
+        Ok(())
+    }
+
+    /// Lets the correction see a reading that the filter has used.
+    fn watch(&mut self, dt_s: T, used: Option<T>, surprises: bool, filtered: Gaussian<T>) {
+        if let Some(watched) = &mut self.now.watched {
+            self.now.features = watched.step_unless(surprises, dt_s, used);
+            if !watched.is_waiting() {
+                self.now.known_variance = filtered.variance;
+            }
+        }
+    }
+
+    /// The filter's strain, moved into the limits.
+    fn filtered(&self, belief: &Belief<T, N, L>) -> Gaussian<T> {
+        let scale = self.parts.strain_sd_scale;
+        let variance = belief.covariance[(0, 0)].max(T::zero()) * scale * scale;
+        Gaussian { mean: belief.mean[0], variance }.clamped(&self.parts.limits)
+    }
+
+    /// The filter's strain, corrected; where a reading is missing its variance grows by as much as the filter's has grown since.
+    fn corrected(&self, belief: &Belief<T, N, L>, filtered: Gaussian<T>) -> Gaussian<T> {
+        let (Some((_, learned)), Some(features)) = (&self.parts.learned, self.now.features) else { return filtered };
+        let (first, end) = (MOTION_STATES, MOTION_STATES + E::BRANCHES);
+        let relaxation = (first..end).fold(T::zero(), |sum, i| sum + belief.mean[i]);
+        let baseline = if N > end { belief.mean[end] } else { T::zero() };
+        let [extend, _, retract] = self.now.state.phases().unwrap_or([T::zero(); 3]);
+        let outputs = [filtered.mean, belief.mean[1], relaxation, baseline, extend, retract];
+        let strain = learned.correct(&filter_inputs(&outputs, &features), filtered, self.now.doubts.birge());
+        let is_waiting = self.now.watched.is_none_or(|watched| watched.is_waiting());
+        let grown = if is_waiting { (filtered.variance - self.now.known_variance).max(T::zero()) } else { T::zero() };
+        Gaussian { variance: strain.variance + grown, ..strain }
+    }
+}
+
+impl<T: Real, S> Memory<T, S> {
+    fn new(parts: &LiveParts<'_, T>, protections: Protections, state: S) -> Self {
+        let doubts = Doubts::new(parts.doubt);
+        Self {
+            state,
+            repeats: Repeats::none(),
+            jumps: Jumps::none(),
+            watched: parts.learned.as_ref().map(|(scale, _)| ReadingFeatures::new(*scale)),
+            features: None,
+            known_variance: T::zero(),
+            doubts: if parts.learned.is_some() { doubts.of_corrected() } else { doubts },
+            follower: protections.following.then(|| RestFollower::new(parts.rest)),
+        }
+    }
+}
+
+/// Whether the strain may be zero: within the limits, or a little beyond.
+#[must_use]
+pub fn may_be_unstretched<T: Real>(limits: &StrainRange<T>) -> bool {
+    limits.lower.max(-limits.upper) <= T::of(KNOWN_BEYOND) * limits.span()
+}
+
+fn guard<T: Real>(protections: Protections) -> Guard<T> {
+    let whole = Guard::none();
+    let influence = Influence::Redescending { threshold: T::of(SURPRISING_NIS).sqrt() };
+    if protections.influence { whole.with_influence(influence).unwrap_or(whole) } else { whole }
+}

@@ -1,0 +1,26 @@
+use crate::correction::{Correction, FILTER_INPUTS, OUTPUTS, Quadratic};
+use crate::{Gaussian, Real};
+
+/// What corrects a filter's strain: a correction, and what stands for training rows that a small chip has no room for.
+#[derive(Clone, Copy, Debug)]
+pub struct Learned<'a, T> {
+    /// The rows that are left.
+    pub correction: Correction<'a, T, FILTER_INPUTS>,
+    /// What is added to the means of the direct process and of the residual one.
+    pub quadratics: Option<[Quadratic<'a, T>; 2]>,
+}
+
+impl<T: Real> Learned<'_, T> {
+    /// The strain of a filter, corrected; arguments as of [`Correction::correct`].
+    #[must_use]
+    pub fn correct(&self, inputs: &[T; FILTER_INPUTS], filtered: Gaussian<T>, birge: T) -> Gaussian<T> {
+        let Some([of_direct, of_residual]) = &self.quadratics else {
+            return self.correction.correct(inputs, filtered, birge).strain;
+        };
+        let mut correction = self.correction;
+        let x = correction.standardised(inputs);
+        correction.direct.mean += of_direct.value(x.get(OUTPUTS..).unwrap_or(&[]));
+        correction.residual.mean += of_residual.value(&x);
+        correction.correct(inputs, filtered, birge).strain
+    }
+}

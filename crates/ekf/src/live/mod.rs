@@ -1,0 +1,29 @@
+//! A sensor's filter as it runs for days on a machine: what a reading must be for it, what is made of those that surprise or
+//! jump, R₀ of the day, the learned correction, and when its intervals are wider than it says. In any precision, so that what a
+//! computer runs is what a chip runs.
+
+mod doubt;
+mod estimator;
+mod filter;
+mod flags;
+mod innovations;
+mod jumps;
+mod learned;
+mod protections;
+mod rest_follow;
+mod rest_watch;
+mod sieve;
+mod unread;
+
+pub use doubt::{DOUBT, DoubtNumbers, DoubtParts, Doubts};
+pub use estimator::SensorEstimator;
+pub use filter::{KNOWN_BEYOND, LiveEstimate, LiveFilter, LiveParts, may_be_unstretched};
+pub use flags::{Flag, Flags};
+pub use innovations::Innovations;
+pub use jumps::{BESIDE_AFTER, BESIDE_SHARE, Jumps, STARTLING_NIS, SURPRISING_NIS};
+pub use learned::Learned;
+pub use protections::Protections;
+pub use rest_follow::{FOLLOWING, Following, RestBounds, RestFollower};
+pub use rest_watch::{RestSeen, RestWatch};
+pub use sieve::{MOST_REPEATS, Repeats, Sieve, news};
+pub use unread::{NEVER_READ_S, Unread};

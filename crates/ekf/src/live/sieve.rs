@@ -1,0 +1,145 @@
+use super::Protections;
+use crate::{Reading, ReadingVerdict, Real};
+
+/// What a reading must be for a filter to see it at all, and what is made of one that comes again and again.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sieve {
+    /// Least and largest R/R₀ - 1 that can be a reading of this sensor.
+    pub plausible: (f64, f64),
+    /// Longest time, s, for which a working sensor repeats one number; infinite if that is not known.
+    pub longest_repeat_s: f64,
+    /// How far a reading is from another one, R/R₀ - 1, where it has jumped.
+    pub jump: f64,
+    /// Time, s, over which errors of the readings are alike.
+    pub error_time_s: f64,
+}
+
+/// How often a number must have come again to be stuck.
+pub const MOST_REPEATS: u32 = 10;
+
+impl Sieve {
+    /// Lets everything pass.
+    pub const OPEN: Self = Self {
+        plausible: (f64::NEG_INFINITY, f64::INFINITY),
+        longest_repeat_s: f64::INFINITY,
+        jump: f64::INFINITY,
+        error_time_s: 0.0,
+    };
+
+    /// What is left of it where some protections are turned off: no number is implausible, or stuck; readings never jump.
+    #[must_use]
+    pub const fn under(self, protections: Protections) -> Self {
+        let open = Self { jump: self.jump, error_time_s: self.error_time_s, ..Self::OPEN };
+        let sieve = if protections.plausibility { self } else { open };
+        if protections.second_look { sieve } else { Self { jump: Self::OPEN.jump, ..sieve } }
+    }
+
+    /// For readings whose errors are alike over a time, s.
+    #[must_use]
+    pub const fn with_error_time(self, error_time_s: f64) -> Self {
+        Self { error_time_s, ..self }
+    }
+}
+
+/// The share of a reading's information that is new `since_s` seconds after another one, if errors are alike over
+/// `error_time_s`: 1 - exp(-t/T), at least as much as rounding leaves.
+pub fn news<T: Real>(since_s: T, error_time_s: f64) -> T {
+    if error_time_s > 0.0 {
+        let own = -(-since_s / T::of(error_time_s)).exp_m1();
+        own.max(T::of(f64::from(f32::EPSILON)))
+    } else {
+        T::one()
+    }
+}
+
+/// The last reading, how long ago it came, and how long the same number has been coming.
+#[derive(Clone, Copy, Debug)]
+pub struct Repeats<T> {
+    last: Option<T>,
+    since_s: T,
+    repeated_s: T,
+    count: u32,
+}
+
+impl<T: Real> Repeats<T> {
+    /// Before any reading.
+    #[must_use]
+    pub fn none() -> Self {
+        Self { last: None, since_s: T::zero(), repeated_s: T::zero(), count: 0 }
+    }
+
+    /// Time has passed, s.
+    pub fn pass(&mut self, dt_s: T) {
+        self.since_s += dt_s;
+        self.repeated_s += dt_s;
+    }
+
+    /// A reading as the filter is to see it, or why it is not to see it. A number that comes for the k-th time in a row is
+    /// given k times the variance: what k equal readings tell grows with the logarithm of k only, as their errors, which are
+    /// the same, do not average out. A reading soon after another one, whose error is still alike, is given so much more
+    /// variance that readings tell as much in a second however many there are. `reading_variance` is that of the model's own noise.
+    ///
+    /// # Errors
+    /// [`ReadingVerdict::Implausible`] or [`ReadingVerdict::Stuck`].
+    pub fn sieved(
+        &mut self,
+        sieve: &Sieve,
+        reading: Reading<T>,
+        reading_variance: T,
+    ) -> Result<Reading<T>, ReadingVerdict> {
+        let value = reading.value;
+        if !(T::of(sieve.plausible.0) <= value && value <= T::of(sieve.plausible.1)) {
+            return Err(ReadingVerdict::Implausible);
+        }
+        let (is_first, since_s) = (self.last.is_none(), self.since_s);
+        if self.last == Some(value) {
+            self.count = self.count.saturating_add(1);
+        } else {
+            (self.count, self.repeated_s) = (0, T::zero());
+        }
+        (self.last, self.since_s) = (Some(value), T::zero());
+        if self.count >= MOST_REPEATS && self.repeated_s > T::of(sieve.longest_repeat_s) {
+            return Err(ReadingVerdict::Stuck);
+        }
+        let variance = reading_variance + reading.extra_variance;
+        let mut extra_variance = reading.extra_variance + T::of(f64::from(self.count)) * variance;
+        if sieve.error_time_s > 0.0 && !is_first {
+            extra_variance += (T::one() / news(since_s, sieve.error_time_s) - T::one()) * reading_variance;
+        }
+        Ok(Reading { extra_variance, ..reading })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Repeats, Sieve};
+    use crate::Reading;
+
+    /// Information, in readings, that `seconds` of readings every `dt_s` bring if their errors are alike over `error_time_s`.
+    fn information(dt_s: f64, seconds: f64, error_time_s: f64) -> f64 {
+        let sieve = Sieve::OPEN.with_error_time(error_time_s);
+        let mut repeats = Repeats::none();
+        let rows = (seconds / dt_s).round() as usize;
+        let of_row = |k: usize| {
+            let reading = Reading { value: 0.1 + (k % 2) as f64, extra_variance: 0.0 };
+            repeats.pass(if k > 0 { dt_s } else { 0.0 });
+            repeats.sieved(&sieve, reading, 1.0).map_or(f64::NAN, |seen| 1.0 / (1.0 + seen.extra_variance))
+        };
+        (0..=rows).map(of_row).sum()
+    }
+
+    /// The first reading counts as one, each other one as 1 - exp(-dt/T): together 1 + t/T for small steps, to dt/2T.
+    #[test]
+    fn readings_with_errors_alike_tell_as_much_in_a_second_however_many() {
+        let (seconds, error_time_s) = (40.0, 2.0);
+        for dt_s in [0.001, 0.01, 0.1] {
+            let expected = 1.0 + seconds / error_time_s;
+            let relative = (information(dt_s, seconds, error_time_s) / expected - 1.0).abs();
+            assert!(relative <= 0.5 * dt_s / error_time_s, "{dt_s}: {relative}");
+        }
+        // Errors of their own: every reading is one.
+        assert_eq!(information(0.1, seconds, 0.0), 401.0);
+        // Far apart readings are, too: exp(-20) of one is left out, 40 s / 40 s + 1 of them.
+        assert!((information(40.0, seconds, 2.0) - 2.0).abs() < 1e-8);
+    }
+}
