@@ -63,7 +63,6 @@ fn what_does_not_fit_is_said() {
         "{}",
         nothing.stderr
     );
-    assert_eq!(c("lean", &["--target", "rust"]).code, Some(2));
     assert_eq!(c("lean", &["--target", "c", "--estimator", "ekf"]).code, Some(2));
     assert_eq!(c("fast", &["--target", "c"]).code, Some(2));
     assert!(!bench.path("none").exists());

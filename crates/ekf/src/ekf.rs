@@ -82,8 +82,8 @@ impl<M> Ekf<M> {
         if dt_s.is_zero() {
             return self.finish(stand_still(belief), *belief, reading);
         }
-        let count = substeps::count(dt_s, self.model.longest_step_s());
-        let prepared = self.model.prepare(dt_s / T::of(f64::from(count)));
+        let (count, counted) = substeps::count(dt_s, self.model.longest_step_s());
+        let prepared = self.model.prepare(dt_s / counted);
         let (mut transition, mut prior) = self.predict(belief, &prepared);
         for _ in 1..count {
             let onward;

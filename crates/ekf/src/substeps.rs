@@ -22,15 +22,17 @@ const MOST: u8 = 128;
 pub const GRACE: f64 = 1.0005;
 
 /// Into how many steps of `longest_s` seconds at most a step of `dt_s` seconds is divided.
-pub(crate) fn count<T: Scalar>(dt_s: T, longest_s: T) -> u8 {
-    let mut count = 1;
+pub(crate) fn count<T: Scalar>(dt_s: T, longest_s: T) -> (u8, T) {
+    // Twice, since a conversion would take double precision.
+    let (mut count, mut counted) = (1, T::one());
     let mut covered = longest_s * T::of(GRACE);
     let more = covered;
     while covered < dt_s && count < MOST {
         covered += more;
         count += 1;
+        counted += T::one();
     }
-    count
+    (count, counted)
 }
 
 impl<E> Substeps<E> {
@@ -68,8 +70,8 @@ where
     type Prepared = Repeated<E::Prepared>;
 
     fn prepare(&self, dt_s: T) -> Self::Prepared {
-        let count = count(dt_s, self.0.longest_step_s());
-        Repeated { step: self.0.prepare(dt_s / T::of(f64::from(count))), count }
+        let (count, counted) = count(dt_s, self.0.longest_step_s());
+        Repeated { step: self.0.prepare(dt_s / counted), count }
     }
 
     fn advance(
@@ -133,8 +135,8 @@ mod tests {
         for (dt_s, expected) in
             [(0.01, 1), (0.1, 1), (0.1001, 2), (0.1 + 0.1 + 0.1, 3), (0.95, 10), (6.0, 60), (1e9, MOST)]
         {
-            assert_eq!(count(dt_s, 0.1), expected, "{dt_s} s");
+            assert_eq!(count(dt_s, 0.1), (expected, f64::from(expected)), "{dt_s} s");
         }
-        assert_eq!(count(1e9, f64::INFINITY), 1);
+        assert_eq!(count(1e9, f64::INFINITY), (1, 1.0));
     }
 }

@@ -5,7 +5,7 @@ use ohmstrain_ekf::live::{NEVER_READ_S, Unread};
 
 /// Pauses of the readings in a recording that is smoothed, from its end to its beginning.
 pub(crate) struct Pauses {
-    unread: Unread,
+    unread: Unread<f64>,
     /// For how long there has been no reading before the first row, s.
     before_s: f64,
     /// Time of the row that was seen last, s, and how long after it the next reading comes.
@@ -13,7 +13,7 @@ pub(crate) struct Pauses {
 }
 
 impl Pauses {
-    pub(crate) const fn new((unread, before_s): (Unread, f64)) -> Self {
+    pub(crate) const fn new((unread, before_s): (Unread<f64>, f64)) -> Self {
         Self { unread, before_s, next: None }
     }
 

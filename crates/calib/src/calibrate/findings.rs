@@ -199,7 +199,7 @@ impl Check<'_> {
         training: &[Samples],
     ) -> Result<impl Fn(bool) -> Result<Box<dyn Filter>, CalibrationError> + 'b, CalibrationError> {
         let limits = self.fit.law.law.range;
-        let setting = Setting { limits, start: Start::Unknown, sieve: Sieve::OPEN };
+        let setting = Setting { limits, start: Start::Unknown, sieve: Sieve::open() };
         let bare = move |smooths: bool| {
             let kind = if smooths { self.filter.smoother() } else { self.filter };
             let params = self.estimators.get(&kind).ok_or_else(|| CalibrationError::no_parameters(kind))?;

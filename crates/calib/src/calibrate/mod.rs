@@ -270,7 +270,7 @@ fn correction(
 ) -> Result<Option<CorrectionParams>, CalibrationError> {
     let limits = fit.law.law.range;
     let Some(params) = estimators.get(&kind) else { return Ok(None) };
-    let setting = Setting { limits, start: Start::Unknown, sieve: Sieve::OPEN };
+    let setting = Setting { limits, start: Start::Unknown, sieve: Sieve::open() };
     let build = || filter_from_parts(kind, &fit.law.law, params, setting);
     fit_correction(recordings, &fit.law, limits, (kind, &build), of_make)
 }

@@ -212,7 +212,7 @@ impl<'a> NoiseProblem<'a> {
         fold: Fold,
         params: &EstimatorParams,
     ) -> Result<Box<dyn Filter>, CalibrationError> {
-        let setting = Setting { limits: self.limits, start: Start::Unknown, sieve: Sieve::OPEN };
+        let setting = Setting { limits: self.limits, start: Start::Unknown, sieve: Sieve::open() };
         filter_from_parts(kind, fold.law, params, setting)
     }
 

@@ -61,7 +61,7 @@ pub fn build_filter_with(
 pub(crate) struct Setting {
     pub limits: RangeParams,
     pub start: Start,
-    pub sieve: Sieve,
+    pub sieve: Sieve<f64>,
 }
 
 pub(crate) fn filter_from_parts(

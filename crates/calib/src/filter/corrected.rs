@@ -158,7 +158,7 @@ impl Filter for Corrected {
         self.filter.guard(guard);
     }
 
-    fn sieve(&mut self, sieve: Sieve) {
+    fn sieve(&mut self, sieve: Sieve<f64>) {
         self.filter.sieve(sieve);
     }
 

@@ -41,7 +41,7 @@ pub trait Filter: Send {
     fn guard(&mut self, guard: Guard<f64>);
 
     /// What a reading must be from now on; for how long errors are alike stays as it was calibrated.
-    fn sieve(&mut self, sieve: Sieve);
+    fn sieve(&mut self, sieve: Sieve<f64>);
 
     /// Like [`Self::step`], but every row is estimated from the readings up to `lag_s` seconds after it; `out` gets the
     /// rows that have become due, in order. The cost of a step grows with the rows within the lag, not with time.

@@ -22,11 +22,11 @@ pub struct PortableFilter {
     /// Its noise, motion and phases.
     pub estimator: EstimatorParams,
     /// What a reading must be for it to see it.
-    pub sieve: Sieve,
+    pub sieve: Sieve<f64>,
     /// When its interval is wider than it says.
-    pub doubt: DoubtParts,
+    pub doubt: DoubtParts<f64>,
     /// Between which readings R₀ stays.
-    pub rest: RestBounds,
+    pub rest: RestBounds<f64>,
     /// What corrects its strain.
     pub correction: Option<PortableCorrection>,
     /// Deviation of a strain that is known when it starts.

@@ -31,7 +31,7 @@ pub(crate) struct Interval {
     pub filtered_scale: f64,
     pub smoothed_scale: f64,
     /// What a reading must be for the filter to see it.
-    pub sieve: Sieve,
+    pub sieve: Sieve<f64>,
 }
 
 /// A row whose estimate waits for later readings.
@@ -124,7 +124,7 @@ where
         self.stepper.guard = guard;
     }
 
-    fn sieve(&mut self, sieve: Sieve) {
+    fn sieve(&mut self, sieve: Sieve<f64>) {
         self.stepper.sieve = sieve.with_error_time(self.stepper.sieve.error_time_s);
     }
 

@@ -10,7 +10,7 @@ use ohmstrain_ekf::{
 pub(crate) struct Stepper<E: Estimator<f64, N, L>, const N: usize, const L: usize> {
     pub estimator: Substeps<E>,
     pub guard: Guard<f64>,
-    pub sieve: Sieve,
+    pub sieve: Sieve<f64>,
     /// Of the model's own noise.
     reading_variance: f64,
     prepared: PreparedSteps<Repeated<E::Prepared>>,
@@ -72,7 +72,7 @@ impl<S> Moment<S> {
 }
 
 impl<E: Estimator<f64, N, L>, const N: usize, const L: usize> Stepper<E, N, L> {
-    pub(crate) fn new(estimator: E, sieve: Sieve, reading_variance: f64) -> Self {
+    pub(crate) fn new(estimator: E, sieve: Sieve<f64>, reading_variance: f64) -> Self {
         Self {
             estimator: Substeps(estimator),
             guard: Guard::none(),

@@ -39,7 +39,7 @@ impl SensorParams {
 
     /// What a reading must be: what the calibration has seen, and far beyond it.
     #[must_use]
-    pub fn sieve(&self) -> Sieve {
+    pub fn sieve(&self) -> Sieve<f64> {
         let seen = &self.validity;
         let (low, high) = (seen.reading_lower, seen.reading_upper);
         let beyond = OUTSIDE * (high - low);
@@ -53,7 +53,7 @@ impl SensorParams {
 
     /// What the sensor read at rest; `None` where no recording of the calibration begins there.
     #[must_use]
-    pub fn rest_seen(&self) -> Option<RestSeen> {
+    pub fn rest_seen(&self) -> Option<RestSeen<f64>> {
         let rested = self.relative(self.measured_rest?);
         let (low, high) = self.relative_readings();
         let (sign, end) = match AT_END * (high - low) {
@@ -68,7 +68,7 @@ impl SensorParams {
     /// little more; on the other side that at rest, with what is left open to it, if the calibration has one and it is an end of
     /// its readings: a sensor that was never at rest then may get there.
     #[must_use]
-    pub fn rest_bounds(&self) -> RestBounds {
+    pub fn rest_bounds(&self) -> RestBounds<f64> {
         let seen = &self.validity;
         let (low, high) = self.relative_readings();
         let margin = DOUBT.margin * (high - low);
@@ -85,7 +85,7 @@ impl SensorParams {
 
     /// What is to be doubted of a filter that runs with that motion.
     #[must_use]
-    pub fn doubt_parts(&self, motion: &MotionParams) -> DoubtParts {
+    pub fn doubt_parts(&self, motion: &MotionParams) -> DoubtParts<f64> {
         let (seen, span) = (&self.validity, self.limits.span());
         let (low, high) = self.relative_readings();
         let unread = Unread::new(motion.rate_time_s, motion.rate_sd_per_s, self.limits.to_model());

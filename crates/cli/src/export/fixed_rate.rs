@@ -113,9 +113,9 @@ impl<'a, const B: usize, const N: usize> FixedRate<'a, B, N> {
             reading_variance: reading_sd * reading_sd,
             known_variance: exactly(parts.start_variance),
             zero: exactly(parts.zero),
-            sieve: parts.sieve,
-            doubt: parts.doubt,
-            rest: parts.rest,
+            sieve: parts.sieve.to(),
+            doubt: parts.doubt.to(),
+            rest: parts.rest.to(),
             learned,
         }
     }

@@ -39,25 +39,43 @@ pub const DOUBT: DoubtNumbers = DoubtNumbers {
 
 /// What the doubts of a sensor depend on: what its calibration has seen.
 #[derive(Clone, Copy, Debug)]
-pub struct DoubtParts {
+pub struct DoubtParts<T> {
     /// Range of the readings, R/R₀ - 1.
-    pub low: f64,
+    pub low: T,
     /// See [`Self::low`].
-    pub high: f64,
+    pub high: T,
     /// Fastest rate, 1/s.
-    pub fastest_per_s: f64,
+    pub fastest_per_s: T,
     /// Longest recording, s.
-    pub longest_s: f64,
+    pub longest_s: T,
     /// Range of the strain over that of the readings.
-    pub per_reading: f64,
+    pub per_reading: T,
     /// Variance of the strain at an unknown start.
-    pub start: f64,
+    pub start: T,
     /// Variance of a strain that may be anywhere in the limits: there is no more to doubt.
-    pub most: f64,
+    pub most: T,
     /// What is known without a reading.
-    pub unread: Unread,
+    pub unread: Unread<T>,
     /// What the sensor read at rest, if that is known.
-    pub rest: Option<RestSeen>,
+    pub rest: Option<RestSeen<T>>,
+}
+
+impl DoubtParts<f64> {
+    /// The same in another precision.
+    #[must_use]
+    pub fn to<T: Real>(&self) -> DoubtParts<T> {
+        DoubtParts {
+            low: T::of(self.low),
+            high: T::of(self.high),
+            fastest_per_s: T::of(self.fastest_per_s),
+            longest_s: T::of(self.longest_s),
+            per_reading: T::of(self.per_reading),
+            start: T::of(self.start),
+            most: T::of(self.most),
+            unread: self.unread.to(),
+            rest: self.rest.map(|rest| rest.to()),
+        }
+    }
 }
 
 /// What is left after a row of what was known before it, of three time constants: one exponential.
@@ -90,14 +108,13 @@ struct Misfit<T> {
 
 impl<T: Real> Misfit<T> {
     /// Takes a reading R/R₀ - 1 and its normalised innovation squared.
-    fn see(&mut self, parts: &DoubtParts, left: &Left<T>, reading: T, nis: T) {
-        let (low, high) = (T::of(parts.low), T::of(parts.high));
+    fn see(&mut self, parts: &DoubtParts<T>, left: &Left<T>, reading: T, nis: T) {
+        let DoubtParts { low, high, .. } = *parts;
         let margin = T::of(DOUBT.margin) * (high - low);
         let (above, below) = (reading - high - margin, low - reading - margin);
-        let sign = parts.rest.map_or(0.0, |rest| rest.sign);
-        let (near, far) = match sign {
-            1.0 => (below, above),
-            -1.0 => (above, below),
+        let (near, far) = match parts.rest.map_or(T::zero(), |rest| rest.sign) {
+            grows if grows > T::zero() => (below, above),
+            falls if falls < T::zero() => (above, below),
             _ => (T::zero(), above.max(below)),
         };
         self.near = (self.near * left.lately).max(near);
@@ -106,8 +123,8 @@ impl<T: Real> Misfit<T> {
     }
 
     /// The strain's variance for readings outside of calibration's.
-    fn outside(&self, parts: &DoubtParts) -> T {
-        let per_reading = T::of(parts.per_reading);
+    fn outside(&self, parts: &DoubtParts<T>) -> T {
+        let per_reading = parts.per_reading;
         let (near, far) =
             (T::of(DOUBT.near_counts) * self.near * per_reading, T::of(DOUBT.far_counts) * self.far * per_reading);
         near * near + far * far
@@ -142,7 +159,7 @@ impl<T: Real> Misfit<T> {
 /// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Doubts<T> {
-    parts: DoubtParts,
+    parts: DoubtParts<T>,
     runs: bool,
     starts: bool,
     /// Time since the first row, s.
@@ -165,13 +182,13 @@ pub struct Doubts<T> {
 impl<T: Real> Doubts<T> {
     /// Before the first row.
     #[must_use]
-    pub fn new(parts: DoubtParts) -> Self {
+    pub fn new(parts: DoubtParts<T>) -> Self {
         Self {
             parts,
             runs: false,
             starts: true,
             run_s: T::zero(),
-            fading: T::of(parts.start),
+            fading: parts.start,
             unread_s: T::of(NEVER_READ_S),
             lost: None,
             believed: None,
@@ -211,14 +228,14 @@ impl<T: Real> Doubts<T> {
 
     /// There is more to doubt than what is left of a start.
     fn raise(&mut self, variance: T) {
-        let variance = variance.min(T::of(self.parts.most));
+        let variance = variance.min(self.parts.most);
         if variance > self.fading {
             (self.fading, self.starts) = (variance, false);
         }
     }
 
     /// What is known without readings, and for how long there have been none, s.
-    pub const fn unread(&self) -> (Unread, T)
+    pub const fn unread(&self) -> (Unread<T>, T)
     where
         T: Copy,
     {
@@ -240,7 +257,7 @@ impl<T: Real> Doubts<T> {
         };
         let (surprising, left) = (T::of(SURPRISING_NIS), Left::after(passed_s));
         if nis > surprising {
-            let jump = self.believed.map_or(T::zero(), |last| (rho - last) * T::of(self.parts.per_reading));
+            let jump = self.believed.map_or(T::zero(), |last| (rho - last) * self.parts.per_reading);
             let doubt = (T::one() - (surprising / nis).sqrt()) * jump;
             self.raise(doubt * doubt);
         } else {
@@ -276,8 +293,8 @@ impl<T: Real> Doubts<T> {
     /// *Phys. Rev.* 40 (1932) 207), unless a correction has counted them, and so does a rate beyond calibration's; to no more than is left open
     /// without readings.
     pub fn widened(&self, rate: T, variance: T) -> (T, Flags) {
-        let (worth, most, per_reading) = (T::of(DOUBT.worth), T::of(self.parts.most), T::of(self.parts.per_reading));
-        let faster = rate.abs() / T::of(self.parts.fastest_per_s);
+        let (worth, most, per_reading) = (T::of(DOUBT.worth), self.parts.most, self.parts.per_reading);
+        let faster = rate.abs() / self.parts.fastest_per_s;
         let is_fast = faster > T::of(DOUBT.faster);
         let birge = self.birge();
         let of_innovations = if self.corrected { T::one() } else { birge };
@@ -289,10 +306,10 @@ impl<T: Real> Doubts<T> {
         let more = (self.fading + outside + elsewhere * elsewhere).min(most);
         let is_beyond = is_fast || outside > worth * variance || birge > T::one() + worth;
         let flags = Flags::NONE
-            .with(Flag::StartUp, self.starts && self.fading > worth * T::of(self.parts.start))
+            .with(Flag::StartUp, self.starts && self.fading > worth * self.parts.start)
             .with(Flag::Recovering, !self.starts && self.fading > worth * variance)
             .with(Flag::Extrapolated, is_beyond)
-            .with(Flag::LongRun, self.run_s > T::of(self.parts.longest_s))
+            .with(Flag::LongRun, self.run_s > self.parts.longest_s)
             .with(Flag::RestMoved, rest_off > T::zero());
         (stated + more, flags)
     }
@@ -309,7 +326,7 @@ mod tests {
     const STATED: Gaussian<f64> = Gaussian { mean: 0.1, variance: 1e-6 };
 
     /// Readings of 0 to 1 for strains of 0 to 0.3, and a rest at the end that `sign` says.
-    fn parts(sign: f64) -> DoubtParts {
+    fn parts(sign: f64) -> DoubtParts<f64> {
         let anywhere = 0.3 * 0.3 / 12.0;
         let unread = Unread { rate_time_s: 1.0, path_variance: 1e-3, centre: 0.15, anywhere };
         let end = if sign < 0.0 { 1.0 } else { 0.0 };
@@ -329,7 +346,7 @@ mod tests {
     }
 
     /// What is said after rows every 0.1 s, of readings with normalised innovations squared.
-    fn said(parts: DoubtParts, rows: impl IntoIterator<Item = (f64, f64)>) -> (f64, Flags) {
+    fn said(parts: DoubtParts<f64>, rows: impl IntoIterator<Item = (f64, f64)>) -> (f64, Flags) {
         let mut doubts = Doubts::new(parts).of_known_strain(false);
         rows.into_iter().for_each(|row| {
             doubts.see(0.1, Some(row), STATED);

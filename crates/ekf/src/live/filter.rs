@@ -39,11 +39,11 @@ pub struct LiveParts<'a, T> {
     /// A strain that is less is none.
     pub zero: T,
     /// What a reading must be.
-    pub sieve: Sieve,
+    pub sieve: Sieve<T>,
     /// When the interval is wider than the filter says.
-    pub doubt: DoubtParts,
+    pub doubt: DoubtParts<T>,
     /// Between which readings R₀ stays.
-    pub rest: RestBounds,
+    pub rest: RestBounds<T>,
     /// The scale of the features that the correction sees, and the correction; `None` for the filter's own strain.
     pub learned: Option<(FeatureScale<T>, Learned<'a, T>)>,
 }
@@ -68,7 +68,7 @@ pub struct LiveFilter<'a, T: Real, E: SensorEstimator<T, N, L>, const N: usize, 
     parts: LiveParts<'a, T>,
     protections: Protections,
     /// What a reading must be, under them.
-    sieve: Sieve,
+    sieve: Sieve<T>,
     /// R₀ of the law as it has been told.
     rest_reading: T,
     /// Before any reading.
@@ -79,6 +79,7 @@ pub struct LiveFilter<'a, T: Real, E: SensorEstimator<T, N, L>, const N: usize, 
 }
 
 /// What changes from step to step.
+#[derive(Clone, Copy)]
 struct Memory<T, S> {
     state: S,
     repeats: Repeats<T>,
@@ -273,6 +274,22 @@ impl<'a, T: Real, E: SensorEstimator<T, N, L>, const N: usize, const L: usize> L
         let grown = if is_waiting { (filtered.variance - self.now.known_variance).max(T::zero()) } else { T::zero() };
         Gaussian { variance: strain.variance + grown, ..strain }
     }
+}
+
+impl<T: Real, E: SensorEstimator<T, N, L> + Clone, const N: usize, const L: usize> Clone
+    for LiveFilter<'_, T, E, N, L>
+{
+    fn clone(&self) -> Self {
+        let (estimator, fresh, now) = (self.estimator.clone(), self.fresh.clone(), self.now.clone());
+        Self { estimator, fresh, now, ..*self }
+    }
+}
+
+impl<T, E, const N: usize, const L: usize> Copy for LiveFilter<'_, T, E, N, L>
+where
+    T: Real,
+    E: SensorEstimator<T, N, L, State: Copy> + Copy,
+{
 }
 
 impl<T: Real, S> Memory<T, S> {

@@ -28,11 +28,11 @@ impl<T: Real> Jumps<T> {
 
     /// Takes a reading that the filter has used, and its normalised innovation squared; how far readings have jumped, where the
     /// filter is to look again: two in a row startle, farther than `jump` from the last that did not surprise.
-    pub fn see(&mut self, reading: T, nis: T, jump: f64) -> Option<T> {
+    pub fn see(&mut self, reading: T, nis: T, jump: T) -> Option<T> {
         self.startling = if nis > T::of(STARTLING_NIS) { self.startling.saturating_add(1) } else { 0 };
         let from_calm = self.calm.map(|calm| reading - calm);
         self.calm = if nis > T::of(SURPRISING_NIS) { self.calm } else { Some(reading) };
-        from_calm.filter(|moved| self.startling == BESIDE_AFTER && moved.abs() > T::of(jump))
+        from_calm.filter(|moved| self.startling == BESIDE_AFTER && moved.abs() > jump)
     }
 }
 

@@ -29,11 +29,19 @@ pub const FOLLOWING: Following =
 
 /// Between which readings, R/R₀ - 1, a sensor stays while R₀ is what it was in calibration: the strain is within its limits.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RestBounds {
+pub struct RestBounds<T> {
     /// The least; none where nobody knows.
-    pub low: Option<f64>,
+    pub low: Option<T>,
     /// The largest.
-    pub high: Option<f64>,
+    pub high: Option<T>,
+}
+
+impl RestBounds<f64> {
+    /// The same in another precision.
+    #[must_use]
+    pub fn to<T: Real>(&self) -> RestBounds<T> {
+        RestBounds { low: self.low.map(T::of), high: self.high.map(T::of) }
+    }
 }
 
 /// R₀ that follows the readings: it is calibration's as long as they stay where they were then; one that lies beyond them
@@ -54,7 +62,7 @@ pub struct RestBounds {
 /// ```
 #[derive(Clone, Copy, Debug)]
 pub struct RestFollower<T> {
-    bounds: RestBounds,
+    bounds: RestBounds<T>,
     /// By what share of calibration's R₀ it is another.
     off: T,
     /// The last reading, none before the first one, and the time since it came, s.
@@ -72,7 +80,7 @@ impl<T: Real> RestFollower<T> {
     /// assert_eq!(ohmstrain_ekf::live::RestFollower::<f64>::new(bounds).off(), 0.0);
     /// ```
     #[must_use]
-    pub fn new(bounds: RestBounds) -> Self {
+    pub fn new(bounds: RestBounds<T>) -> Self {
         Self { bounds, off: T::zero(), last: None, since_s: T::zero(), jumped: None }
     }
 
@@ -113,7 +121,7 @@ impl<T: Real> RestFollower<T> {
     /// ```
     pub fn see(&mut self, dt_s: T, reading: T) {
         self.jumped.iter_mut().for_each(|(_, ago_s)| *ago_s += dt_s);
-        self.draw(FOLLOWING.leaves_s, dt_s, reading);
+        self.draw(T::of(FOLLOWING.leaves_s), dt_s, reading);
     }
 
     /// Readings have jumped by so much. Where they had jumped shortly before, and back from where they have drawn R₀ since, that was a
@@ -138,7 +146,7 @@ impl<T: Real> RestFollower<T> {
         }
     }
 
-    fn draw(&mut self, leaves_s: f64, dt_s: T, reading: T) {
+    fn draw(&mut self, leaves_s: T, dt_s: T, reading: T) {
         let last = self.last.replace(reading);
         self.since_s = if last.is_none() { T::zero() } else { self.since_s + dt_s };
         if last.is_none_or(|last| last == reading) {
@@ -146,11 +154,11 @@ impl<T: Real> RestFollower<T> {
         }
         let (since_s, longest_s) = (core::mem::replace(&mut self.since_s, T::zero()), T::of(FOLLOWING.longest_s));
         let passed_s = if since_s < longest_s { since_s } else { longest_s };
-        let wanted = |bound: f64| (reading - T::of(bound)) / T::of(1.0 + bound);
+        let wanted = |bound: T| (reading - bound) / (T::one() + bound);
         let (low, high) = (self.bounds.low.map(wanted), self.bounds.high.map(wanted));
         let Some(wanted) = high.filter(|&high| high > self.off).or(low.filter(|&low| low < self.off)) else { return };
         if T::of(1.0 / FOLLOWING.farthest - 1.0) < wanted && wanted < T::of(FOLLOWING.farthest - 1.0) {
-            let time_s = T::of(if wanted.abs() > self.off.abs() { leaves_s } else { FOLLOWING.returns_s });
+            let time_s = if wanted.abs() > self.off.abs() { leaves_s } else { T::of(FOLLOWING.returns_s) };
             self.off += passed_s / (time_s + passed_s) * (wanted - self.off);
         }
     }

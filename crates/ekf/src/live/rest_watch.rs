@@ -4,17 +4,31 @@ use crate::Real;
 
 /// What calibration has seen of the sensor at rest, as R/R₀ - 1: for programs that write a filter in another language.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RestSeen {
+pub struct RestSeen<T> {
     /// What the rested, unstretched sensor read.
-    pub rested: f64,
+    pub rested: T,
     /// How far from there it may read at rest.
-    pub tolerance: f64,
+    pub tolerance: T,
     /// For how long readings must stay where they are to say something, s.
-    pub lasts_s: f64,
+    pub lasts_s: T,
     /// 1 where readings grow from rest on, -1 where they fall, 0 where rest is in their midst.
-    pub sign: f64,
+    pub sign: T,
     /// The last of calibration's readings on that side.
-    pub end: f64,
+    pub end: T,
+}
+
+impl RestSeen<f64> {
+    /// The same in another precision.
+    #[must_use]
+    pub fn to<T: Real>(&self) -> RestSeen<T> {
+        RestSeen {
+            rested: T::of(self.rested),
+            tolerance: T::of(self.tolerance),
+            lasts_s: T::of(self.lasts_s),
+            sign: T::of(self.sign),
+            end: T::of(self.end),
+        }
+    }
 }
 
 /// Watches readings for an R₀ that is not calibration's. Two things say so: a sensor that is known to rest and reads something
@@ -22,7 +36,7 @@ pub struct RestSeen {
 /// is held. A sensor that rests for a while where it rested in calibration ends it.
 #[derive(Clone, Copy, Debug)]
 pub struct RestWatch<T> {
-    seen: RestSeen,
+    seen: RestSeen<T>,
     /// Whether the next reading is one at rest.
     rests: bool,
     /// For how long readings have been beyond those at rest, and near them, s.
@@ -46,7 +60,7 @@ impl<T: Real> RestWatch<T> {
     /// assert_eq!(RestWatch::<f64>::new(seen, false).see(0.0, seen.rested + 0.1), 0.0);
     /// ```
     #[must_use]
-    pub fn new(seen: RestSeen, rests: bool) -> Self {
+    pub fn new(seen: RestSeen<T>, rests: bool) -> Self {
         Self { seen, rests, beyond_s: T::zero(), near_s: T::zero(), least: T::zero(), off: T::zero() }
     }
 
@@ -63,13 +77,13 @@ impl<T: Real> RestWatch<T> {
     /// assert!((off[9] - 0.1).abs() < 1e-12);
     /// ```
     pub fn see(&mut self, dt_s: T, rho: T) -> T {
-        let tolerance = T::of(self.seen.tolerance);
-        let from_rest = (rho - T::of(self.seen.rested)).abs();
+        let tolerance = self.seen.tolerance;
+        let from_rest = (rho - self.seen.rested).abs();
         if self.rests {
             self.rests = false;
             self.off = if from_rest > tolerance { from_rest } else { T::zero() };
         }
-        let beyond = T::of(self.seen.sign) * (T::of(self.seen.end) - rho);
+        let beyond = self.seen.sign * (self.seen.end - rho);
         if beyond > tolerance {
             self.least = if self.beyond_s > T::zero() { self.least.min(beyond) } else { beyond };
             self.beyond_s += dt_s;
@@ -77,9 +91,9 @@ impl<T: Real> RestWatch<T> {
             self.beyond_s = T::zero();
         }
         self.near_s = if from_rest > tolerance { T::zero() } else { self.near_s + dt_s };
-        if self.beyond_s >= T::of(self.seen.lasts_s) {
+        if self.beyond_s >= self.seen.lasts_s {
             self.off = self.off.max(self.least);
-        } else if self.near_s >= T::of(self.seen.lasts_s) {
+        } else if self.near_s >= self.seen.lasts_s {
             self.off = T::zero();
         }
         self.off

@@ -3,49 +3,66 @@ use crate::{Reading, ReadingVerdict, Real};
 
 /// What a reading must be for a filter to see it at all, and what is made of one that comes again and again.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sieve {
+pub struct Sieve<T> {
     /// Least and largest R/R₀ - 1 that can be a reading of this sensor.
-    pub plausible: (f64, f64),
+    pub plausible: (T, T),
     /// Longest time, s, for which a working sensor repeats one number; infinite if that is not known.
-    pub longest_repeat_s: f64,
+    pub longest_repeat_s: T,
     /// How far a reading is from another one, R/R₀ - 1, where it has jumped.
-    pub jump: f64,
+    pub jump: T,
     /// Time, s, over which errors of the readings are alike.
-    pub error_time_s: f64,
+    pub error_time_s: T,
+}
+
+impl Sieve<f64> {
+    /// The same in another precision.
+    #[must_use]
+    pub fn to<T: Real>(&self) -> Sieve<T> {
+        Sieve {
+            plausible: (T::of(self.plausible.0), T::of(self.plausible.1)),
+            longest_repeat_s: T::of(self.longest_repeat_s),
+            jump: T::of(self.jump),
+            error_time_s: T::of(self.error_time_s),
+        }
+    }
 }
 
 /// How often a number must have come again to be stuck.
 pub const MOST_REPEATS: u32 = 10;
 
-impl Sieve {
+impl<T: Real> Sieve<T> {
     /// Lets everything pass.
-    pub const OPEN: Self = Self {
-        plausible: (f64::NEG_INFINITY, f64::INFINITY),
-        longest_repeat_s: f64::INFINITY,
-        jump: f64::INFINITY,
-        error_time_s: 0.0,
-    };
+    #[must_use]
+    pub fn open() -> Self {
+        let endless = T::one() / T::zero();
+        Self { plausible: (-endless, endless), longest_repeat_s: endless, jump: endless, error_time_s: T::zero() }
+    }
 
     /// What is left of it where some protections are turned off: no number is implausible, or stuck; readings never jump.
     #[must_use]
-    pub const fn under(self, protections: Protections) -> Self {
-        let open = Self { jump: self.jump, error_time_s: self.error_time_s, ..Self::OPEN };
-        let sieve = if protections.plausibility { self } else { open };
-        if protections.second_look { sieve } else { Self { jump: Self::OPEN.jump, ..sieve } }
+    pub fn under(self, protections: Protections) -> Self {
+        let open = Self::open();
+        let (plausible, longest_repeat_s) = if protections.plausibility {
+            (self.plausible, self.longest_repeat_s)
+        } else {
+            (open.plausible, open.longest_repeat_s)
+        };
+        let jump = if protections.second_look { self.jump } else { open.jump };
+        Self { plausible, longest_repeat_s, jump, ..self }
     }
 
     /// For readings whose errors are alike over a time, s.
     #[must_use]
-    pub const fn with_error_time(self, error_time_s: f64) -> Self {
+    pub fn with_error_time(self, error_time_s: T) -> Self {
         Self { error_time_s, ..self }
     }
 }
 
 /// The share of a reading's information that is new `since_s` seconds after another one, if errors are alike over
 /// `error_time_s`: 1 - exp(-t/T), at least as much as rounding leaves.
-pub fn news<T: Real>(since_s: T, error_time_s: f64) -> T {
-    if error_time_s > 0.0 {
-        let own = -(-since_s / T::of(error_time_s)).exp_m1();
+pub fn news<T: Real>(since_s: T, error_time_s: T) -> T {
+    if error_time_s > T::zero() {
+        let own = -(-since_s / error_time_s).exp_m1();
         own.max(T::of(f64::from(f32::EPSILON)))
     } else {
         T::one()
@@ -58,14 +75,15 @@ pub struct Repeats<T> {
     last: Option<T>,
     since_s: T,
     repeated_s: T,
-    count: u32,
+    /// How often it has come again.
+    count: T,
 }
 
 impl<T: Real> Repeats<T> {
     /// Before any reading.
     #[must_use]
     pub fn none() -> Self {
-        Self { last: None, since_s: T::zero(), repeated_s: T::zero(), count: 0 }
+        Self { last: None, since_s: T::zero(), repeated_s: T::zero(), count: T::zero() }
     }
 
     /// Time has passed, s.
@@ -83,27 +101,27 @@ impl<T: Real> Repeats<T> {
     /// [`ReadingVerdict::Implausible`] or [`ReadingVerdict::Stuck`].
     pub fn sieved(
         &mut self,
-        sieve: &Sieve,
+        sieve: &Sieve<T>,
         reading: Reading<T>,
         reading_variance: T,
     ) -> Result<Reading<T>, ReadingVerdict> {
         let value = reading.value;
-        if !(T::of(sieve.plausible.0) <= value && value <= T::of(sieve.plausible.1)) {
+        if !(sieve.plausible.0 <= value && value <= sieve.plausible.1) {
             return Err(ReadingVerdict::Implausible);
         }
         let (is_first, since_s) = (self.last.is_none(), self.since_s);
         if self.last == Some(value) {
-            self.count = self.count.saturating_add(1);
+            self.count += T::one();
         } else {
-            (self.count, self.repeated_s) = (0, T::zero());
+            (self.count, self.repeated_s) = (T::zero(), T::zero());
         }
         (self.last, self.since_s) = (Some(value), T::zero());
-        if self.count >= MOST_REPEATS && self.repeated_s > T::of(sieve.longest_repeat_s) {
+        if self.count >= T::of(f64::from(MOST_REPEATS)) && self.repeated_s > sieve.longest_repeat_s {
             return Err(ReadingVerdict::Stuck);
         }
         let variance = reading_variance + reading.extra_variance;
-        let mut extra_variance = reading.extra_variance + T::of(f64::from(self.count)) * variance;
-        if sieve.error_time_s > 0.0 && !is_first {
+        let mut extra_variance = reading.extra_variance + self.count * variance;
+        if sieve.error_time_s > T::zero() && !is_first {
             extra_variance += (T::one() / news(since_s, sieve.error_time_s) - T::one()) * reading_variance;
         }
         Ok(Reading { extra_variance, ..reading })
@@ -117,7 +135,7 @@ mod tests {
 
     /// Information, in readings, that `seconds` of readings every `dt_s` bring if their errors are alike over `error_time_s`.
     fn information(dt_s: f64, seconds: f64, error_time_s: f64) -> f64 {
-        let sieve = Sieve::OPEN.with_error_time(error_time_s);
+        let sieve = Sieve::open().with_error_time(error_time_s);
         let mut repeats = Repeats::none();
         let rows = (seconds / dt_s).round() as usize;
         let of_row = |k: usize| {

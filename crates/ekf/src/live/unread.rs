@@ -13,21 +13,21 @@ use crate::Real;
 /// less than a tenth and does not cancel. In the end the strain may be anywhere in the limits, and no farther: its mean square
 /// distance from an estimate m is then span²/12 + (m - centre)².
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Unread {
+pub struct Unread<T> {
     /// How long a rate lasts, s.
-    pub rate_time_s: f64,
+    pub rate_time_s: T,
     /// Twice the variance of a path with the rate's deviation for that long.
-    pub path_variance: f64,
+    pub path_variance: T,
     /// Centre of the limits, and the variance of a strain that is anywhere in them.
-    pub centre: f64,
+    pub centre: T,
     /// See [`Self::centre`].
-    pub anywhere: f64,
+    pub anywhere: T,
 }
 
 /// Since when, s, nothing has been read before the first reading of all.
 pub const NEVER_READ_S: f64 = 1e9;
 
-impl Unread {
+impl<T: Real> Unread<T> {
     /// Of a motion whose rate lasts for `rate_time_s`, with a standard deviation, 1/s.
     ///
     /// ```
@@ -40,23 +40,36 @@ impl Unread {
     /// assert_eq!(unread.variance(21_600.0, unread.centre, 1e-6), unread.anywhere);
     /// ```
     #[must_use]
-    pub fn new(rate_time_s: f64, rate_sd_per_s: f64, limits: StrainRange<f64>) -> Self {
+    pub fn new(rate_time_s: T, rate_sd_per_s: T, limits: StrainRange<T>) -> Self {
         let (path, span) = (rate_sd_per_s * rate_time_s, limits.upper - limits.lower);
         Self {
             rate_time_s,
-            path_variance: 2.0 * (path * path),
-            centre: limits.lower + 0.5 * span,
+            path_variance: T::of(2.0) * (path * path),
+            centre: limits.lower + T::of(0.5) * span,
             anywhere: limits.variance_of_anywhere(),
         }
     }
 
     /// The variance of a strain of which nothing has been read for `seconds`, from what a filter states of it.
-    pub fn variance<T: Real>(&self, seconds: T, strain: T, stated: T) -> T {
-        let times = seconds / T::of(self.rate_time_s);
+    pub fn variance(&self, seconds: T, strain: T, stated: T) -> T {
+        let times = seconds / self.rate_time_s;
         let share = times * times / (T::of(3.0) + times * (T::of(1.5) + times));
-        let moved = T::of(self.path_variance) * (times * share);
-        let off = strain - T::of(self.centre);
-        stated.max(moved).min(off * off + T::of(self.anywhere))
+        let moved = self.path_variance * (times * share);
+        let off = strain - self.centre;
+        stated.max(moved).min(off * off + self.anywhere)
+    }
+}
+
+impl Unread<f64> {
+    /// The same in another precision.
+    #[must_use]
+    pub fn to<T: Real>(&self) -> Unread<T> {
+        Unread {
+            rate_time_s: T::of(self.rate_time_s),
+            path_variance: T::of(self.path_variance),
+            centre: T::of(self.centre),
+            anywhere: T::of(self.anywhere),
+        }
     }
 }
 

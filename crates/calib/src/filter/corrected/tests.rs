@@ -83,7 +83,7 @@ impl Filter for Fake {
         self.guarded = !guard.is_none();
     }
 
-    fn sieve(&mut self, _: Sieve) {}
+    fn sieve(&mut self, _: Sieve<f64>) {}
 
     /// Hands every row out two rows later, as if it had said 0.3 of all.
     fn step_lagged(

@@ -77,7 +77,7 @@ struct RestConstants {
 
 impl DoubtConstants {
     /// Of a sensor; a strain below `zero` is none.
-    pub fn new(seen: &DoubtParts, zero: Literal) -> Self {
+    pub fn new(seen: &DoubtParts<f64>, zero: Literal) -> Self {
         let narrow = |number: f64| Literal(number as f32);
         Self {
             low: narrow(seen.low),
@@ -115,9 +115,9 @@ impl DoubtConstants {
 
 impl FollowConstants {
     /// Of a sensor.
-    pub fn new(bounds: RestBounds) -> Self {
+    pub fn new(bounds: RestBounds<f64>) -> Self {
         let narrow = |number: f64| Literal(number as f32);
-        let rest = |bound: f64| narrow(1.0 + bound);
+        let rest = |bound: f64| Literal(1.0 + bound as f32);
         Self {
             low: bounds.low.map(narrow),
             of_low: bounds.low.map(rest),
@@ -135,7 +135,7 @@ impl FollowConstants {
 
 impl SieveConstants {
     /// Of a filter.
-    pub fn new(sieve: &Sieve) -> Self {
+    pub fn new(sieve: &Sieve<f64>) -> Self {
         let finite = |number: f32| number.is_finite().then_some(Literal(number));
         Self {
             lower: Literal(sieve.plausible.0 as f32),

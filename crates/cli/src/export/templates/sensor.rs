@@ -108,15 +108,15 @@ pub const TEMPERING: f32 = << phases.tempering >>;
 
 {% endif %}
 /// What a reading must be.
-pub const SIEVE: Sieve = Sieve {
+pub const SIEVE: Sieve<f32> = Sieve {
     plausible: (<< sieve.lower >>, << sieve.upper >>),
-    longest_repeat_s: {% if sieve.longest_repeat_s is none %}f64::INFINITY{% else %}<< sieve.longest_repeat_s >>{% endif %},
+    longest_repeat_s: {% if sieve.longest_repeat_s is none %}f32::INFINITY{% else %}<< sieve.longest_repeat_s >>{% endif %},
     jump: << sieve.jump >>,
     error_time_s: {% if sieve.error_time_s is none %}0.0{% else %}<< sieve.error_time_s >>{% endif %},
 };
 
 /// When intervals are wider than the filter says.
-pub const DOUBT: DoubtParts = DoubtParts {
+pub const DOUBT: DoubtParts<f32> = DoubtParts {
     low: << doubt.low >>,
     high: << doubt.high >>,
     fastest_per_s: << doubt.fastest_per_s >>,
@@ -144,7 +144,7 @@ pub const DOUBT: DoubtParts = DoubtParts {
 };
 
 /// Between which readings R₀ is calibration's.
-pub const REST: RestBounds = RestBounds {
+pub const REST: RestBounds<f32> = RestBounds {
     low: {% if follow.low is none %}None{% else %}Some(<< follow.low >>){% endif %},
     high: {% if follow.high is none %}None{% else %}Some(<< follow.high >>){% endif %},
 };

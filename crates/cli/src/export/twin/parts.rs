@@ -38,7 +38,7 @@ pub struct Parts<'a> {
     pub phases: Option<PhaseParts>,
     pub limits: StrainRange<f32>,
     pub strain_sd_scale: f32,
-    pub sieve: Sieve,
+    pub sieve: Sieve<f64>,
     /// Variance of a strain that is known at a start.
     pub start_variance: f32,
     /// A strain that is less is none.
@@ -46,8 +46,8 @@ pub struct Parts<'a> {
     pub correction: Option<&'a PortableCorrection>,
     /// What stands for rows of the correction that were left out.
     pub quadratics: Option<&'a [OwnedQuadratic; 2]>,
-    pub doubt: DoubtParts,
-    pub rest: RestBounds,
+    pub doubt: DoubtParts<f64>,
+    pub rest: RestBounds<f64>,
 }
 
 /// Phases, as a file has them.
