@@ -15,12 +15,12 @@ use naive::{Naive, Rule, Said};
 const DT_S: f64 = 0.01;
 const STEPS: usize = 3000;
 
-/// A slow sine with holds, near the limits of [`evidence`], with noise of two frequencies, and a second without readings.
+/// A slow sine with holds, near the limits of [`evidence`], with noise of two frequencies, and a second and a half without readings.
 fn reading<T: Real>(k: usize) -> Option<Reading<T>> {
     let t = k as f64;
     let slow = 0.22 + 0.24 * (t * 0.01).sin().clamp(-0.8, 0.8);
     let noise = 1e-3 * ((t * 2.9).sin() + (t * 7.3).cos());
-    (k % 7 != 3 && k / 100 != 12).then(|| Reading { value: T::of(slow + noise), extra_variance: T::of(1e-7) })
+    (k % 7 != 3 && k / 150 != 8).then(|| Reading { value: T::of(slow + noise), extra_variance: T::of(1e-7) })
 }
 
 fn evidence<T: Real>(tempering: f64) -> Evidence<T> {

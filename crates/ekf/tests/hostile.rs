@@ -1,8 +1,8 @@
 //! Readings and parameters that nobody should send, in the precision in which they hurt.
 
 use ohmstrain_ekf::{
-    Belief, Compact, Dwell, Ekf, Estimator, Evidence, Gaussian, Guard, Hypotheses, Influence, Mixture, Reading,
-    ReadingVerdict, SignSplit, SparseEkf, State, Streak,
+    Belief, Compact, Dwell, Ekf, Estimator, Evidence, Gaussian, Guard, Hypotheses, Imm, Influence, Mixture,
+    PhaseMixture, Reading, ReadingVerdict, SignSplit, SparseEkf, State, Streak,
 };
 use ohmstrain_model::{
     Branch, Gauge, ModelNoise, Motion, Phase, Scalar, SensorLaw, StrainRange, SwitchedModel, Symmetric,
@@ -241,7 +241,7 @@ const ROUNDING: f64 = 300.0;
 fn mixtures_take_precise_readings_too() {
     for quiet in [1.0, 3e-2, 1e-2, 1e-3, 1e-4] {
         let mut draws = Draws(1);
-        let (mut refused, mut steps) = ([0; 2], 0);
+        let (mut refused, mut steps) = ([0; 3], 0);
         for _ in 0..MODELS / 2 {
             let (model, dt_s) = random_model::<f32>(&mut draws, quiet);
             let evidence = Evidence { limits: StrainRange { lower: -1.0, upper: 2.0 }, tempering: 1.0 };
@@ -249,6 +249,8 @@ fn mixtures_take_precise_readings_too() {
             let start: Belief<f32, 5, 15> = Belief::initial(&model);
             let split = SignSplit::<f32, 2, 5, 4>::new(model, dt_s, None, evidence).unwrap();
             let histories = Hypotheses::<f32, 2, 5, 4>::new(model, dt_s, dwell, evidence).unwrap();
+            let imm = Imm::<f32, 2, 5>::new(model, dt_s, dwell, evidence).unwrap();
+            let mut phases = PhaseMixture::<f32, 5, 15>::single(start, Phase::Hold);
             let mut signs = Mixture::<f32, 5, 15, 4>::single(start, Phase::Extend);
             let mut known = Mixture::<f32, 5, 15, 4>::single(start, Phase::Hold);
             for k in 0..200 {
@@ -256,11 +258,38 @@ fn mixtures_take_precise_readings_too() {
                 let reading = Some(Reading::from(model.law().gauge_value_and_slope(strain).0)).filter(|_| k % 7 > 0);
                 refused[0] += u32::from(split.step(&mut signs, reading).is_err());
                 refused[1] += u32::from(histories.step(&mut known, reading).is_err());
+                refused[2] += u32::from(imm.step(&mut phases, reading).is_err());
                 steps += 1;
             }
         }
-        assert_eq!(refused, [0; 2], "quiet {quiet}, of {steps}");
+        assert_eq!(refused, [0; 3], "quiet {quiet}, of {steps}");
     }
+}
+
+/// However often a step is tried again from smaller correlations: one that is refused in the end leaves the state as it was.
+#[test]
+fn what_is_refused_every_time_leaves_the_state() {
+    let model = model::<f32>(RISING);
+    let mut start: Belief<f32, 4, 10> = Belief::initial(&model);
+    for i in 0..4 {
+        for j in 0..=i {
+            // The strain's variance overflows over the step, whatever correlations there are.
+            start.covariance[(i, j)] = if i == j { f32::MAX } else { 0.5 * f32::MAX };
+        }
+    }
+    let dwell = Dwell::new(2.0, 2.0, 0.3).unwrap();
+    let imm = Imm::<f32, 1, 4>::new(model, DT_S as f32, dwell, evidence()).unwrap();
+    let phases = PhaseMixture::<f32, 4, 10>::single(start, Phase::Extend);
+    let mut phases_after = phases;
+    assert!(imm.step(&mut phases_after, None).is_err());
+    assert_eq!(phases_after, phases);
+    let mixture = Mixture::<f32, 4, 10, 8>::single(start, Phase::Extend);
+    let mut after = mixture;
+    assert!(split::<f32>().step(&mut after, None).is_err());
+    assert_eq!(after, mixture);
+    let histories = Hypotheses::<f32, 1, 4, 8>::new(model, DT_S as f32, dwell, evidence()).unwrap();
+    assert!(histories.step(&mut after, None).is_err());
+    assert_eq!(after, mixture);
 }
 
 #[test]

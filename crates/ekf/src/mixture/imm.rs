@@ -12,6 +12,7 @@ use ohmstrain_model::{Phase, SwitchedModel};
 use crate::belief::gaussian::Real;
 use crate::kernel::{Course, Parts};
 use crate::mixture::LEAST_WEIGHT;
+use crate::mixture::again::{Hearing, loosen};
 use crate::mixture::estimator::{mixture_filter, over_phases};
 use crate::mixture::evidence::{Weighing, Weight};
 use crate::mixture::predicted::Predicted;
@@ -50,8 +51,7 @@ struct Mode<T, const B: usize> {
 }
 
 impl<T: Real, const B: usize, const N: usize, S: Switch<T>, G: Curve<T>> Imm<T, B, N, S, G> {
-    /// Predicts one step ahead and takes the reading; without one it is a prediction and returns `None`. A reading that is more
-    /// exact than the numbers is taken again with more and more noise.
+    /// Predicts one step ahead and takes the reading; without one it is a prediction and returns `None`.
     ///
     /// # Errors
     /// See [`StepError`]; the state is untouched.
@@ -61,18 +61,33 @@ impl<T: Real, const B: usize, const N: usize, S: Switch<T>, G: Curve<T>> Imm<T, 
         state: &mut PhaseMixture<T, N, L>,
         reading: Option<Reading<T>>,
     ) -> Result<Option<MixtureResidual<T>>, StepError> {
-        let mut tries = 0;
-        let mut extra_variance = reading.map_or(T::zero(), |reading| reading.extra_variance);
+        let (mut heard, mut before, mut tries) = (reading, None, 0);
+        // One place for the first try and for all others: a program has the step once.
         loop {
-            let heard = reading.map(|reading| Reading { extra_variance, ..reading });
             match self.step_once(state, heard) {
-                Err(refused) if reading.is_some() => {
+                Err(refused) => {
                     tries += 1;
-                    extra_variance = self.kernel.coarser(heard, tries, refused)?.extra_variance;
+                    let before = before.get_or_insert(*state);
+                    heard = self.again(state, heard, tries, refused).inspect_err(|_| *state = *before)?;
                 }
                 taken => return taken,
             }
         }
+    }
+
+    /// What a refused step starts from, and hears, at a further try.
+    #[cold]
+    #[inline(never)]
+    fn again<const L: usize>(
+        &self,
+        state: &mut PhaseMixture<T, N, L>,
+        heard: Option<Reading<T>>,
+        tries: u32,
+        refused: StepError,
+    ) -> Result<Option<Reading<T>>, StepError> {
+        let heard = heard.again(&self.kernel, tries, refused)?;
+        loosen(&mut state.modes, tries);
+        Ok(heard)
     }
 
     /// [`Self::step`] into a state that is there already, whatever it was.
