@@ -37,10 +37,8 @@ pub(crate) struct Corrected {
 struct Readings {
     features: ReadingFeatures<f64>,
     time_s: Option<f64>,
-    now: Option<[f64; FEATURES]>,
     /// The filter's variance at the last reading, once one has been missing since.
     known_variance: Option<f64>,
-    missing: bool,
     /// How much larger the filter's innovations had been than stated, before the row.
     innovations: Innovations<f64>,
     birge: f64,
@@ -50,7 +48,7 @@ impl Readings {
     fn new(scale: FeatureScale<f64>) -> Self {
         let features = ReadingFeatures::new(scale);
         let innovations = Innovations::none();
-        Self { features, time_s: None, now: None, known_variance: None, missing: false, innovations, birge: 1.0 }
+        Self { features, time_s: None, known_variance: None, innovations, birge: 1.0 }
     }
 
     /// Takes a row in either direction of time.
@@ -58,9 +56,12 @@ impl Readings {
         let dt_s = (time_s - self.time_s.unwrap_or(time_s)).abs();
         self.time_s = Some(time_s);
         self.birge = self.innovations.step(dt_s, nis);
-        self.now = self.features.step_unless(surprises, dt_s, reading);
-        self.missing = reading.is_none() || self.features.is_waiting();
-        self.now
+        self.features.step_unless(surprises, dt_s, reading)
+    }
+
+    /// Whether the last row had no reading that is seen here.
+    fn missing(&self) -> bool {
+        self.features.is_waiting()
     }
 }
 
@@ -82,7 +83,7 @@ impl Corrected {
     fn see(&mut self, time_s: f64, reading: Option<Reading<f64>>) {
         let said = self.filter.output();
         self.readings.step(time_s, Seen::new(&said, reading));
-        if !self.readings.missing {
+        if !self.readings.missing() {
             self.readings.known_variance = Some(said.estimate.strain.variance);
         }
         self.said = Some(said);
@@ -99,11 +100,11 @@ impl Corrected {
 
     fn learned(&self, output: &Output) -> Gaussian<f64> {
         let filtered = output.estimate.strain;
-        let Some(past) = self.readings.now else { return filtered };
+        let Some(past) = self.readings.features.now() else { return filtered };
         let inputs = filter_inputs(&outputs(output), &past);
         let strain = self.of_filter.correction().correct(&inputs, filtered, self.readings.birge).strain;
         let grown = self.readings.known_variance.map_or(0.0, |known| (filtered.variance - known).max(0.0));
-        if self.readings.missing { Gaussian { variance: strain.variance + grown, ..strain } } else { strain }
+        if self.readings.missing() { Gaussian { variance: strain.variance + grown, ..strain } } else { strain }
     }
 
     /// Mixes lagged estimates with what was said of their rows.
@@ -254,19 +255,19 @@ impl WayBack for CorrectedWayBack<'_> {
         for (row, output) in rows.clone().zip(out.iter()) {
             let (time_s, reading) = self.rows.get(row);
             let features = past.step(time_s, Seen::new(output, reading));
-            known = if past.missing { known } else { Some(output.estimate.strain.variance) };
+            known = if past.missing() { known } else { Some(output.estimate.strain.variance) };
             behind.push((features, known));
         }
         for ((row, output), (past, known)) in rows.clone().zip(out.iter_mut()).zip(behind).rev() {
             let (time_s, reading) = self.rows.get(row);
             let future = self.ahead.step(time_s, Seen::new(output, reading));
             let smoothed = output.estimate.strain;
-            if !self.ahead.missing {
+            if !self.ahead.missing() {
                 self.ahead.known_variance = Some(smoothed.variance);
             }
             let Some(past) = past else { continue };
             let mut strain = self.correct(output, &past, future);
-            if self.ahead.missing {
+            if self.ahead.missing() {
                 // The readings on both sides bound what the smoother knows in between.
                 let least = [known, self.ahead.known_variance].into_iter().flatten().reduce(f64::min).unwrap_or(0.0);
                 strain.variance += (smoothed.variance - least).max(0.0);

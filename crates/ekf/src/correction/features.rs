@@ -54,6 +54,8 @@ pub struct ReadingFeatures<T> {
     waited_s: T,
     /// How many surprising readings have come in a row, [`PASSED_OVER`] at most.
     surprises: u8,
+    /// Whether the last row had no reading, or one that was passed over.
+    waits: bool,
     now: Option<[T; FEATURES]>,
 }
 
@@ -62,13 +64,14 @@ impl<T: Real> ReadingFeatures<T> {
     #[must_use]
     pub fn new(scale: FeatureScale<T>) -> Self {
         let low_passes = TIME_CONSTANTS_S.map(|tau_s| LowPass::new(T::of(tau_s)));
-        Self { scale, low_passes, waited_s: T::zero(), surprises: 0, now: None }
+        Self { scale, low_passes, waited_s: T::zero(), surprises: 0, waits: false, now: None }
     }
 
     /// Takes the reading `R/R₀ - 1` of a row `dt_s` seconds after the one before, at least zero; `None` if it is missing.
     /// Returns the features: `None` before the first reading.
     pub fn step(&mut self, dt_s: T, reading: Option<T>) -> Option<[T; FEATURES]> {
         self.waited_s += dt_s;
+        self.waits = reading.is_none();
         if let Some(reading) = reading {
             let scaled = (reading - self.scale.centre) / self.scale.half_range;
             let scaled = scaled.max(-T::of(FARTHEST)).min(T::of(FARTHEST));
@@ -98,7 +101,13 @@ impl<T: Real> ReadingFeatures<T> {
     /// Whether the last row had no reading, or one that was passed over.
     #[must_use]
     pub fn is_waiting(&self) -> bool {
-        self.waited_s > T::zero()
+        self.waits
+    }
+
+    /// The features at the last reading; `None` before the first.
+    #[must_use]
+    pub fn now(&self) -> Option<[T; FEATURES]> {
+        self.now
     }
 
     fn features(&self, scaled: T, low: &[T; TIME_CONSTANTS_S.len()]) -> [T; FEATURES] {

@@ -4,7 +4,7 @@ use super::{
     BESIDE_SHARE, DoubtParts, Doubts, Flags, Jumps, Learned, Protections, Repeats, RestBounds, RestFollower,
     SURPRISING_NIS, SensorEstimator, Sieve,
 };
-use crate::correction::{FEATURES, FeatureScale, ReadingFeatures, filter_inputs};
+use crate::correction::{FeatureScale, ReadingFeatures, filter_inputs};
 use crate::ekf::check_time_step;
 use crate::substeps::Repeated;
 use crate::{
@@ -86,12 +86,23 @@ struct Memory<T, S> {
     jumps: Jumps<T>,
     /// What the correction sees of readings, if there is one.
     watched: Option<ReadingFeatures<T>>,
-    /// Features at the last reading, and the filter's variance then.
-    features: Option<[T; FEATURES]>,
+    /// The filter's variance at the last reading that it saw.
     known_variance: T,
     doubts: Doubts<T>,
     /// `None` where R₀ is told, or does not follow.
     follower: Option<RestFollower<T>>,
+}
+
+/// What became of a reading.
+struct Heard<T> {
+    verdict: ReadingVerdict,
+    /// R/R₀ - 1, of R₀ as it is followed, if the filter has used it.
+    used: Option<T>,
+    /// Its normalised innovation squared, as it came.
+    nis: T,
+    surprises: bool,
+    /// How far readings have jumped, where the filter has looked again.
+    jumped: Option<T>,
 }
 
 impl<'a, T: Real, E: SensorEstimator<T, N, L>, const N: usize, const L: usize> LiveFilter<'a, T, E, N, L> {
@@ -196,35 +207,15 @@ impl<'a, T: Real, E: SensorEstimator<T, N, L>, const N: usize, const L: usize> L
     /// As [`Self::step`]; or if `dt_s` is no length of a step.
     pub fn step_after(&mut self, dt_s: T, reading: Option<Reading<T>>) -> Result<LiveEstimate<T>, StepError> {
         self.prepare(dt_s)?;
-        let mut repeats = self.now.repeats;
-        repeats.pass(dt_s);
-        let relative = reading.map(|reading| self.now.follower.map_or(reading, |follower| follower.relative(reading)));
-        let (used, turned_down) =
-            match relative.map(|relative| repeats.sieved(&self.sieve, relative, self.parts.reading_variance)) {
-                None => (None, None),
-                Some(Ok(reading)) => (Some(reading), None),
-                Some(Err(verdict)) => (None, Some(verdict)),
-            };
-        let (now, streak) = (&mut self.now, Streak::default());
-        let guarded = self.guard.advance(&self.estimator, &now.state, streak, &self.prepared.1, used)?;
-        (now.state, now.repeats) = (guarded.advanced.state, repeats);
-        let verdict = turned_down.unwrap_or(guarded.verdict);
-        let innovation = guarded.advanced.innovation.filter(|_| verdict.is_taken());
-        let nis = innovation.map_or(T::zero(), |innovation| innovation.nis);
-        let surprises = verdict == ReadingVerdict::Downweighted && nis > T::of(SURPRISING_NIS);
-        let used = used.filter(|_| verdict.is_taken()).map(|used| used.value);
-        let jumped = used.and_then(|used| now.jumps.see(used, nis, self.sieve.jump)).filter(|_| surprises);
-        if jumped.is_some() {
-            now.state = now.state.beside(&self.fresh, T::of(BESIDE_SHARE));
-        }
-        let moments = now.state.moments();
+        let heard = self.hear(dt_s, reading)?;
+        let moments = self.now.state.moments();
         let filtered = self.filtered(&moments);
-        self.watch(dt_s, used, surprises, filtered);
+        self.watch(dt_s, &heard, filtered);
         let corrected = self.corrected(&moments, filtered);
         let now = &mut self.now;
-        let taken = reading.filter(|_| verdict.is_taken()).map(|reading| (reading.value, nis));
+        let taken = reading.filter(|_| heard.used.is_some()).map(|reading| (reading.value, heard.nis));
         if let (Some(follower), Some((reading, _))) = (&mut now.follower, taken) {
-            jumped.into_iter().for_each(|jump| follower.jumped(jump));
+            heard.jumped.into_iter().for_each(|jump| follower.jumped(jump));
             follower.see(dt_s, reading);
         }
         let open = now.doubts.see(dt_s, taken, corrected);
@@ -232,7 +223,32 @@ impl<'a, T: Real, E: SensorEstimator<T, N, L>, const N: usize, const L: usize> L
         let (variance, doubts) =
             if self.protections.doubts { (widened, doubts) } else { (corrected.variance, Flags::NONE) };
         let strain = Gaussian { variance, ..corrected };
-        Ok(LiveEstimate { strain, rate: Gaussian::marginal(&moments, 1), flags: Flags::of(verdict).and(doubts) })
+        Ok(LiveEstimate { strain, rate: Gaussian::marginal(&moments, 1), flags: Flags::of(heard.verdict).and(doubts) })
+    }
+
+    /// Takes a reading, if it is one, and looks again where readings have jumped.
+    fn hear(&mut self, dt_s: T, reading: Option<Reading<T>>) -> Result<Heard<T>, StepError> {
+        let mut repeats = self.now.repeats;
+        repeats.pass(dt_s);
+        let relative = reading.map(|reading| self.now.follower.map_or(reading, |follower| follower.relative(reading)));
+        let sieved = relative.map(|relative| repeats.sieved(&self.sieve, relative, self.parts.reading_variance));
+        let (seen, turned_down) = match sieved.transpose() {
+            Ok(seen) => (seen, None),
+            Err(verdict) => (None, Some(verdict)),
+        };
+        let (now, streak) = (&mut self.now, Streak::default());
+        let guarded = self.guard.advance(&self.estimator, &now.state, streak, &self.prepared.1, seen)?;
+        (now.state, now.repeats) = (guarded.advanced.state, repeats);
+        let verdict = turned_down.unwrap_or(guarded.verdict);
+        let innovation = guarded.advanced.innovation.filter(|_| verdict.is_taken());
+        let nis = innovation.map_or(T::zero(), |innovation| innovation.nis);
+        let surprises = verdict == ReadingVerdict::Downweighted && nis > T::of(SURPRISING_NIS);
+        let used = seen.filter(|_| verdict.is_taken()).map(|seen| seen.value);
+        let jumped = used.and_then(|used| now.jumps.see(used, nis, self.sieve.jump)).filter(|_| surprises);
+        if jumped.is_some() {
+            now.state = now.state.beside(&self.fresh, T::of(BESIDE_SHARE));
+        }
+        Ok(Heard { verdict, used, nis, surprises, jumped })
     }
 
     /// Prepares steps of `dt_s` seconds, unless they are.
@@ -245,9 +261,9 @@ impl<'a, T: Real, E: SensorEstimator<T, N, L>, const N: usize, const L: usize> L
     }
 
     /// Lets the correction see a reading that the filter has used.
-    fn watch(&mut self, dt_s: T, used: Option<T>, surprises: bool, filtered: Gaussian<T>) {
+    fn watch(&mut self, dt_s: T, heard: &Heard<T>, filtered: Gaussian<T>) {
         if let Some(watched) = &mut self.now.watched {
-            self.now.features = watched.step_unless(surprises, dt_s, used);
+            watched.step_unless(heard.surprises, dt_s, heard.used);
             if !watched.is_waiting() {
                 self.now.known_variance = filtered.variance;
             }
@@ -263,16 +279,16 @@ impl<'a, T: Real, E: SensorEstimator<T, N, L>, const N: usize, const L: usize> L
 
     /// The filter's strain, corrected; where a reading is missing its variance grows by as much as the filter's has grown since.
     fn corrected(&self, belief: &Belief<T, N, L>, filtered: Gaussian<T>) -> Gaussian<T> {
-        let (Some((_, learned)), Some(features)) = (&self.parts.learned, self.now.features) else { return filtered };
+        let (Some((_, learned)), Some(watched)) = (&self.parts.learned, &self.now.watched) else { return filtered };
+        let Some(features) = watched.now() else { return filtered };
         let (first, end) = (MOTION_STATES, MOTION_STATES + E::BRANCHES);
         let relaxation = (first..end).fold(T::zero(), |sum, i| sum + belief.mean[i]);
         let baseline = if N > end { belief.mean[end] } else { T::zero() };
         let [extend, _, retract] = self.now.state.phases().unwrap_or([T::zero(); 3]);
         let outputs = [filtered.mean, belief.mean[1], relaxation, baseline, extend, retract];
         let strain = learned.correct(&filter_inputs(&outputs, &features), filtered, self.now.doubts.birge());
-        let is_waiting = self.now.watched.is_none_or(|watched| watched.is_waiting());
-        let grown = if is_waiting { (filtered.variance - self.now.known_variance).max(T::zero()) } else { T::zero() };
-        Gaussian { variance: strain.variance + grown, ..strain }
+        let grown = (filtered.variance - self.now.known_variance).max(T::zero());
+        if watched.is_waiting() { Gaussian { variance: strain.variance + grown, ..strain } } else { strain }
     }
 }
 
@@ -300,7 +316,6 @@ impl<T: Real, S> Memory<T, S> {
             repeats: Repeats::none(),
             jumps: Jumps::none(),
             watched: parts.learned.as_ref().map(|(scale, _)| ReadingFeatures::new(*scale)),
-            features: None,
             known_variance: T::zero(),
             doubts: if parts.learned.is_some() { doubts.of_corrected() } else { doubts },
             follower: protections.following.then(|| RestFollower::new(parts.rest)),

@@ -250,10 +250,10 @@ fn a_missing_reading_is_held_and_the_variance_grows_with_the_filters() {
     filter.step(0.0, None).unwrap();
     assert_eq!(filter.strain(), says(0.0, 0.0, ReadingVerdict::Missing).estimate.strain);
     (1..200).for_each(|k| filter.step(0.1 * f64::from(k), Some(reading(0.1 * f64::from(k)))).unwrap());
-    let now = filter.readings.now;
+    let now = filter.readings.features.now();
     let known = filter.strain();
     filter.step(0.1 * 199.0, None).unwrap();
-    assert_eq!(filter.readings.now, now);
+    assert_eq!(filter.readings.features.now(), now);
     assert_eq!(filter.strain(), known);
     for k in 1..5 {
         let time_s = 19.9 + f64::from(k);
@@ -280,7 +280,7 @@ fn what_has_learned_from_a_surprised_filter_is_less_sure() {
         // The first row has no interval before it, and a row does not know of its own innovation.
         let weight = |row: i32| (1.0 - (-0.1_f64 / 20.0).exp()) * (-0.1 * f64::from(k - 1 - row) / 20.0).exp();
         let mean: f64 = (1..k).map(|row| 9.0 * weight(row)).sum();
-        let (inputs, said) = (filter.readings.now.unwrap(), filter.filter.output());
+        let (inputs, said) = (filter.readings.features.now().unwrap(), filter.filter.output());
         let inputs = filter_inputs(&outputs(&said), &inputs);
         let learned = filter.of_filter.correction().correct(&inputs, said.estimate.strain, mean.max(1.0)).strain;
         let strain = filter.strain();
@@ -292,13 +292,13 @@ fn what_has_learned_from_a_surprised_filter_is_less_sure() {
 fn what_a_guard_rejects_is_not_seen() {
     let mut filter = corrected();
     (0..100).for_each(|k| filter.step(0.1 * f64::from(k), Some(reading(0.1 * f64::from(k)))).unwrap());
-    let now = filter.readings.now;
+    let now = filter.readings.features.now();
     filter.guard(Guard::none().with_gate(9.0, 5).unwrap());
     filter.step(10.0, Some(Reading::from(100.0))).unwrap();
-    assert_eq!(filter.readings.now, now);
+    assert_eq!(filter.readings.features.now(), now);
     filter.guard(Guard::none());
     filter.step(10.1, Some(reading(10.1))).unwrap();
-    assert_ne!(filter.readings.now, now);
+    assert_ne!(filter.readings.features.now(), now);
 }
 
 /// With a fixed lag every row comes out once and in order, mixed with what was said of it when it came, whatever rows were
