@@ -17,7 +17,4 @@ impl Protections {
     /// Everything is on.
     pub const ALL: Self =
         Self { plausibility: true, influence: true, second_look: true, following: true, doubts: true };
-    /// Everything is off: the filter as its equations have it.
-    pub const NONE: Self =
-        Self { plausibility: false, influence: false, second_look: false, following: false, doubts: false };
 }
