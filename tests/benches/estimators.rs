@@ -9,10 +9,10 @@ use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
 use nalgebra::SVector;
 use ohmstrain_ekf::{
     Belief, Channel, Compact, Dwell, Dynamics, Ekf, Estimator, Evidence, Imm, LinearStep, Mixture, PhaseMixture,
-    Reading, SignSplit, SparseEkf, State, Step, Unscented, rts_smooth_vec,
+    Reading, SignSplit, SparseEkf, State, Step, Unscented,
 };
 use ohmstrain_model::{Phase, StrainRange, SwitchedModel};
-use ohmstrain_tests::sensor;
+use ohmstrain_tests::{rts_smooth, sensor};
 
 const DT_S: f64 = 0.01;
 const READINGS: usize = 512;
@@ -64,7 +64,7 @@ fn smoother(criterion: &mut Criterion, model: &SwitchedModel<f64, 1, 3>) {
                 Some(step)
             };
             let steps: Vec<Step<f64, 3, 6>> = readings.iter().map_while(taken).collect();
-            rts_smooth_vec(&steps)
+            rts_smooth(&steps)
         });
     });
 }

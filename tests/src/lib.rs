@@ -10,7 +10,7 @@ pub mod sweep;
 pub use draws::{Draws, square_root};
 pub use flow::Flow;
 use nalgebra::{SMatrix, SVector};
-use ohmstrain_ekf::{Belief, Channel, Dynamics};
+use ohmstrain_ekf::{Belief, Channel, Dynamics, Step, rts_step};
 use ohmstrain_model::{
     Branch, Gauge, ModelNoise, Motion, Observation, Phase, Scalar, SensorLaw, StrainRange, SwitchedModel, Symmetric,
     Transition,
@@ -78,6 +78,17 @@ impl<T: Scalar, M: Channel<T, N, L>, const N: usize, const L: usize> Channel<T, 
     fn observe(&self, at: &Belief<T, N, L>, _: Option<Phase>) -> Observation<T, N> {
         self.model.observe(at, Some(self.phase))
     }
+}
+
+/// The Rauch-Tung-Striebel smoother of a recording: beliefs at the times of `steps` given all readings.
+#[must_use]
+pub fn rts_smooth<T: Scalar, const N: usize, const L: usize>(steps: &[Step<T, N, L>]) -> Vec<Belief<T, N, L>> {
+    let mut smoothed: Vec<_> = steps.iter().map(|step| step.posterior).collect();
+    for k in (1..steps.len()).rev() {
+        let next = &steps[k];
+        smoothed[k - 1] = rts_step(&steps[k - 1].posterior, &next.transition, &next.prior, &smoothed[k]);
+    }
+    smoothed
 }
 
 /// A plausible sensor with `B` branches and Ornstein-Uhlenbeck motion; with a baseline if `N = B + 3`.

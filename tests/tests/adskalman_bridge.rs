@@ -3,9 +3,9 @@
 
 use adskalman::{KalmanFilterNoControl, StateAndCovariance};
 use nalgebra::SVector;
-use ohmstrain_ekf::{Belief, Channel, Dynamics, Ekf, LinearStep, Reading, rts_smooth_vec};
+use ohmstrain_ekf::{Belief, Channel, Dynamics, Ekf, LinearStep, Reading};
 use ohmstrain_model::{Observation, Phase, Transition};
-use ohmstrain_tests::{Draws, sensor};
+use ohmstrain_tests::{Draws, rts_smooth, sensor};
 
 type Linearised = (Transition<f64, 5, 15>, Observation<f64, 5>);
 
@@ -75,7 +75,7 @@ fn filter_and_smoother_agree_with_adskalman() {
         paths.push(path);
     }
     let smoothed = filter_without_offset(&step, &deviations);
-    for ((ours, theirs), path) in rts_smooth_vec(&steps).iter().zip(&smoothed).zip(&paths) {
+    for ((ours, theirs), path) in rts_smooth(&steps).iter().zip(&smoothed).zip(&paths) {
         assert_same(ours, &StateAndCovariance::new(theirs.state() + path, *theirs.covariance()));
     }
 }

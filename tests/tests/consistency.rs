@@ -4,9 +4,9 @@
 //! nothing.
 
 use nalgebra::{Cholesky, SVector};
-use ohmstrain_ekf::{Belief, Channel, Dynamics, Ekf, Reading, rts_smooth_vec};
+use ohmstrain_ekf::{Belief, Channel, Dynamics, Ekf, Reading};
 use ohmstrain_model::{Observation, Phase, SwitchedModel, Symmetric, Transition};
-use ohmstrain_tests::{Draws, KnownPhase, square_root, switching_sensor};
+use ohmstrain_tests::{Draws, KnownPhase, rts_smooth, square_root, switching_sensor};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 const RUNS: u64 = 400;
@@ -96,7 +96,7 @@ fn statistics(assumed: Told) -> Statistics {
             steps.push(step);
         }
         sums.filtered += nees(&state, &belief);
-        sums.smoothed += nees(&states[ROWS / 2], &rts_smooth_vec(&steps)[ROWS / 2]);
+        sums.smoothed += nees(&states[ROWS / 2], &rts_smooth(&steps)[ROWS / 2]);
     }
     sums
 }

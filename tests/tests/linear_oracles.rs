@@ -3,9 +3,9 @@
 //! Bryson-Frazier smoother, which inverts no covariance. Exactly known states make the smoother's priors singular.
 
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
-use ohmstrain_ekf::{Belief, Channel, Dynamics, Ekf, Reading, Step, rts_smooth_vec};
+use ohmstrain_ekf::{Belief, Channel, Dynamics, Ekf, Reading, Step};
 use ohmstrain_model::{Branch, Gauge, ModelNoise, Motion, Phase, SensorLaw, StrainRange, SwitchedModel, Symmetric};
-use ohmstrain_tests::{Draws, Flow, KnownPhase, Linear};
+use ohmstrain_tests::{Draws, Flow, KnownPhase, Linear, rts_smooth};
 
 /// A row as the oracles know it: `x' = F x + push + n`, `y = H x + offset + w`.
 struct Row<const N: usize> {
@@ -156,7 +156,7 @@ fn check<M, const N: usize, const L: usize>(
     let start = (start.mean, start.covariance.to_matrix());
     let (expected, sd, log_density) = dense(start, &rows);
     let bryson_frazier = bryson_frazier(start, &rows);
-    for (k, ours) in rts_smooth_vec(&steps).iter().enumerate() {
+    for (k, ours) in rts_smooth(&steps).iter().enumerate() {
         for (name, (mean, covariance)) in [("dense", &expected[k]), ("Bryson-Frazier", &bryson_frazier[k])] {
             for i in 0..N {
                 let off = (ours.mean[i] - mean[i]).abs();
@@ -264,9 +264,4 @@ fn a_constant_stays_what_it_is() {
     };
     let start = Belief::<f64, 2, 3>::independent(SVector::from([0.0, 2.0]), &[1.0, 0.0]);
     check("a constant", ROUNDING, &mut Draws::new(3), start, |_| model);
-}
-
-#[test]
-fn an_empty_recording_smooths_to_nothing() {
-    assert!(rts_smooth_vec::<f64, 2, 3>(&[]).is_empty());
 }

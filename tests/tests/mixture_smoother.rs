@@ -4,12 +4,12 @@
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 use ohmstrain_ekf::{
     Belief, Dwell, Ekf, Estimator, Evidence, Hypotheses, Imm, Mixture, PastStep, PhaseMixture, Reading, State,
-    rts_smooth_vec, smooth_back_through,
+    smooth_back_through,
 };
 use ohmstrain_model::{
     Branch, Direction, Gauge, ModelNoise, Motion, Phase, SensorLaw, StrainRange, SwitchedModel, Transition,
 };
-use ohmstrain_tests::KnownPhase;
+use ohmstrain_tests::{KnownPhase, rts_smooth};
 
 const N: usize = 4;
 const L: usize = 10;
@@ -224,7 +224,7 @@ fn check_one_phase<E: Estimator<f64, N, L>>(estimator: &E, from: E::State, phase
         let advanced = estimator.advance(&state, &prepared, reading).unwrap();
         past.push(PastStep { from: std::mem::replace(&mut state, advanced.state), prepared, reading });
     }
-    let expected = rts_smooth_vec(&steps);
+    let expected = rts_smooth(&steps);
     let mut row = expected.len() - 1;
     smooth_back_through(estimator, &state, past[1..].iter().rev(), |state| {
         row -= 1;

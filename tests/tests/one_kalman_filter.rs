@@ -6,9 +6,9 @@
 
 use adskalman::{KalmanFilterNoControl, StateAndCovariance};
 use nalgebra::{Const, SMatrix, SVector};
-use ohmstrain_ekf::{Belief, Channel, Dynamics, Ekf, LinearStep, Reading, Step, Ukf, Unscented, rts_smooth_vec};
+use ohmstrain_ekf::{Belief, Channel, Dynamics, Ekf, LinearStep, Reading, Step, Ukf, Unscented};
 use ohmstrain_model::{Observation, Phase, Symmetric, Transition};
-use ohmstrain_tests::{Draws, Linear};
+use ohmstrain_tests::{Draws, Linear, rts_smooth};
 
 const TOLERANCE: f64 = 1e-11;
 const ROWS: usize = 25;
@@ -128,9 +128,7 @@ impl<const N: usize, const L: usize> Case<N, L> {
 fn check_filters_of_one_gaussian<const N: usize, const L: usize>(seed: u64) {
     let case = Case::<N, L>::new(seed, SVector::zeros());
     let steps = case.check_one_gaussian("ekf", &Ekf::new(case.model));
-    case.check_one_gaussian("iterated", &Ekf::new(case.model).iterated(4));
     case.check_one_gaussian("ukf", &Ukf::new(Unscented::new(case.model)));
-    case.check_one_gaussian("iterated ukf", &Ukf::new(Unscented::new(case.model)).iterated(3));
     check_adskalman(&case, &steps);
 }
 
@@ -148,7 +146,7 @@ fn check_adskalman<const N: usize, const L: usize>(case: &Case<N, L>, steps: &[S
     for (row, theirs) in case.rows.iter().zip(&filtered) {
         row.check("adskalman", &belief_of::<N, L>(theirs));
     }
-    for (ours, theirs) in rts_smooth_vec(steps).iter().zip(&smoothed) {
+    for (ours, theirs) in rts_smooth(steps).iter().zip(&smoothed) {
         let ours = Row { mean: ours.mean, covariance: ours.covariance.to_matrix(), log_likelihood: 0.0 };
         ours.check("adskalman's smoother", &belief_of::<N, L>(theirs));
     }

@@ -1,11 +1,9 @@
 //! The sparse path computes what the generic one computes.
 
 use nalgebra::SVector;
-use ohmstrain_ekf::{
-    Belief, Compact, Cubic, Ekf, LogLikelihood, Logistic, Reading, SparseEkf, StepError, Switch, rts_smooth,
-};
+use ohmstrain_ekf::{Belief, Compact, Cubic, Ekf, LogLikelihood, Logistic, Reading, SparseEkf, StepError, Switch};
 use ohmstrain_model::{Gauge, Scalar, SensorLaw, SwitchedModel, Symmetric};
-use ohmstrain_tests::sensor;
+use ohmstrain_tests::{rts_smooth, sensor};
 
 const DT_S: f64 = 0.01;
 
@@ -174,8 +172,7 @@ fn smoothed_differences<const B: usize, const N: usize, const L: usize>() -> f64
             step
         })
         .collect();
-    let mut expected = vec![start; steps.len()];
-    rts_smooth(&steps, &mut expected);
+    let expected = rts_smooth(&steps);
 
     let sparse = SparseEkf::<f64, Logistic, B, N>::new(model, DT_S).unwrap();
     let mut beliefs = vec![start; readings.len()];

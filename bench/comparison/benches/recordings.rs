@@ -22,7 +22,6 @@ fn recordings(criterion: &mut Criterion) {
     group.bench_function("typed_kalman_smoother_3", |bencher| bencher.iter(|| theirs(black_box(&rows))));
     let ours = smoother(model);
     group.bench_function("smoother_3", |bencher| bencher.iter(|| ours.in_place(black_box(&rows))));
-    group.bench_function("smoother_3_steps_kept", |bencher| bencher.iter(|| ours.with_steps(black_box(&rows))));
     let ekf = SparseEkf::new(model, DT_S).expect("the step's length is positive");
     let start = Belief::initial(&model);
     let taken: Vec<_> = rows.iter().map(|y| Some(Reading::from(*y))).collect();

@@ -59,13 +59,12 @@ impl<E: Estimator<f64, N, L>, const N: usize, const L: usize> Filter for Gated<E
     }
 }
 
-/// The generic EKF from the model's long-run distribution; the reading is linearised `iterations` times.
+/// The generic EKF from the model's long-run distribution.
 #[must_use]
 pub fn ekf<const B: usize, const N: usize, const L: usize>(
     model: SwitchedModel<f64, B, N>,
-    iterations: usize,
 ) -> Gated<Ekf<SwitchedModel<f64, B, N>>, N, L> {
-    Gated::new(Ekf::new(model).iterated(iterations), Belief::initial(&model))
+    Gated::new(Ekf::new(model), Belief::initial(&model))
 }
 
 /// Shows every filter with a thousand readings of the sensor it is for; all but the linear ones are for a [`sensor`].
@@ -80,9 +79,8 @@ pub fn every_filter(visitor: &mut impl Visitor) {
     visitor.visit("sparse_ekf_3_linear", &readings, GatedSparse::<1, 3, 6>::new(linear_sensor()));
     visitor.visit("sparse_ekf_3", &readings, GatedSparse::<1, 3, 6>::new(three));
     visitor.visit("sparse_ekf_4", &readings, GatedSparse::<1, 4, 10>::new(sensor()));
-    visitor.visit("ekf_3", &readings, ekf::<1, 3, 6>(three, 1));
-    visitor.visit("ekf_4", &readings, ekf::<1, 4, 10>(sensor(), 1));
-    visitor.visit("iterated_ekf_3", &readings, ekf::<1, 3, 6>(three, 3));
+    visitor.visit("ekf_3", &readings, ekf::<1, 3, 6>(three));
+    visitor.visit("ekf_4", &readings, ekf::<1, 4, 10>(sensor()));
     let ukf = Ekf::new(Unscented::new(three));
     visitor.visit("ukf_3", &readings, Gated::<_, 3, 6>::new(ukf, Belief::initial(&three)));
     every_large_filter(visitor);
@@ -93,7 +91,7 @@ fn every_large_filter(visitor: &mut impl Visitor) {
     let readings = readings::<3>(STEPS);
     let (six, phased) = (sensor::<3, 6>(), phased_sensor::<3, 6>());
     visitor.visit("sparse_ekf_6", &readings, GatedSparse::<3, 6, 21>::new(six));
-    visitor.visit("ekf_6", &readings, ekf::<3, 6, 21>(six, 1));
+    visitor.visit("ekf_6", &readings, ekf::<3, 6, 21>(six));
     let evidence = Evidence { limits: RANGE, tempering: 1.0 };
     let dwell = Dwell::new(0.7, 1.5, 0.3).expect("the durations are valid");
     let start = Belief::<f64, 6, 21>::initial(&six);

@@ -1,6 +1,6 @@
 //! What is done with a whole recording at a fixed rate.
 
-use ohmstrain_ekf::{Belief, Compact, Dynamics, Ekf, Estimator, Reading, SparseEkf, rts_smooth_vec};
+use ohmstrain_ekf::{Belief, Compact, Dynamics, Ekf, Estimator, Reading, SparseEkf};
 use ohmstrain_model::{SwitchedModel, SwitchedStep};
 
 use crate::DT_S;
@@ -40,23 +40,6 @@ impl Smoother {
             beliefs[k - 1] = smoothed.expect("the step went forward").expect("the EKF has a smoother");
         }
         beliefs
-    }
-
-    /// Keeps everything that the forward steps computed.
-    ///
-    /// # Panics
-    /// If a step fails.
-    #[must_use]
-    pub fn with_steps(&self, readings: &[f64]) -> Vec<Belief<f64, 3, 6>> {
-        let mut steps = Vec::with_capacity(readings.len());
-        let mut belief = self.start;
-        for reading in readings {
-            let taken = self.ekf.step_prepared(&belief, &self.prepared, Some(Reading::from(*reading)));
-            let step = taken.expect("the reading is finite");
-            belief = step.posterior;
-            steps.push(step);
-        }
-        rts_smooth_vec(&steps)
     }
 }
 

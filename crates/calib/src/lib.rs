@@ -42,7 +42,6 @@ pub use filter::learned::Learned;
 pub use filter::portable::{PortableCorrection, PortableFilter};
 pub use filter::{Filter, Output, Rows, Start, WayBack};
 pub use law::advice::OnBound;
-#[cfg(feature = "bootstrap")]
 pub use law::bootstrap::{Bootstrap, bootstrap_law};
 pub use law::compare::{StructureScore, compare_structures};
 pub use law::fit::{CrossFit, LawOptions, fit_law};

@@ -12,7 +12,6 @@ use crate::{Advanced, Belief, Channel, Dynamics, Estimator, Gaussian, Innovation
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ekf<M> {
     model: M,
-    iterations: usize,
 }
 
 /// Everything one step computed.
@@ -48,16 +47,7 @@ pub struct Update<T, const N: usize> {
 impl<M> Ekf<M> {
     /// A filter for `model`.
     pub const fn new(model: M) -> Self {
-        Self { model, iterations: 1 }
-    }
-
-    /// Linearises the reading `iterations` times, each time where the update before led to: the iterated extended
-    /// Kalman filter. The reading counts once; on a linear channel every iteration gives the same.
-    ///
-    /// Source: Bell & Cathey, *IEEE Trans. Autom. Control* 38 (1993) 294.
-    #[must_use]
-    pub fn iterated(self, iterations: usize) -> Self {
-        Self { iterations, ..self }
+        Self { model }
     }
 
     /// The model.
@@ -139,33 +129,14 @@ impl<M> Ekf<M> {
         let (posterior, update) = match reading {
             None => (prior, None),
             Some(reading) => {
-                let mut updated = update(&prior, self.model.observe(&prior, None), reading)?;
-                for _ in 1..self.iterations {
-                    updated = self.update_at(&prior, updated.0.mean, reading)?;
-                }
-                (updated.0, Some(updated.1))
+                let (posterior, update) = update(&prior, self.model.observe(&prior, None), reading)?;
+                (posterior, Some(update))
             }
         };
         if !posterior.is_finite() {
             return Err(StepError::NonFiniteState);
         }
         Ok(Step { transition, prior, posterior, update })
-    }
-
-    /// The update with the channel linearised at another state than the prior's mean.
-    fn update_at<T: Scalar, const N: usize, const L: usize>(
-        &self,
-        prior: &Belief<T, N, L>,
-        at: SVector<T, N>,
-        reading: Reading<T>,
-    ) -> Result<(Belief<T, N, L>, Update<T, N>), StepError>
-    where
-        M: Channel<T, N, L>,
-    {
-        let mut observation = self.model.observe(&Belief { mean: at, ..*prior }, None);
-        // The tangent there, read off at the prior's mean.
-        observation.value += observation.gradient.dot(&(prior.mean - at));
-        update(prior, observation, reading)
     }
 }
 

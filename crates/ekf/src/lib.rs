@@ -3,7 +3,7 @@
 //! Configuration and state are apart: an estimator ([`Ekf`]) holds the model, a [`Belief`] goes in and a [`Step`] with
 //! a new belief comes out. An error leaves the caller's belief as it was, and one estimator serves many sensors.
 //!
-//! [`Ekf`] (plain, iterated, or unscented as [`Ukf`]) keeps one Gaussian and has a smoother. [`Imm`], [`SignSplit`] and
+//! [`Ekf`] (or, unscented, [`Ukf`]) keeps one Gaussian and has a smoother. [`Imm`], [`SignSplit`] and
 //! [`Hypotheses`] keep a [`Mixture`] of hypotheses about the phase, because stretching and releasing look alike.
 //! `Particles` (feature `particles`) samples the motion instead: slow, and the reference for all of them.
 //! [`correction`] makes a calibrated filter's strain better by what was learned in calibration. `Bank` (feature `simd`) steps many sensors at once, in vector registers.
@@ -12,8 +12,8 @@
 //! [`SwitchedModel`](ohmstrain_model::SwitchedModel) does.
 //!
 //! # Policy
-//! - `no_std`, no heap (the `std` feature adds helpers that return a `Vec`, and the particle filter, `simd` a `Bank` of
-//!   sensors), no unsafe code, no panic.
+//! - `no_std`, no heap (the features `particles` and `simd` add the particle filter and a `Bank` of sensors), no unsafe
+//!   code, no panic.
 //! - A missing reading is a prediction. A step of zero seconds is an update without a prediction. A NaN or infinite
 //!   reading, a negative step and a variance that is not positive are [`StepError`]s.
 //! - Everything computed is returned: prior, innovation, its variance, log-likelihood, gain.
@@ -21,7 +21,7 @@
 //!   filters on the kernel, which say so.
 //!
 //! # Features
-//! `std` (on by default) and `simd` are named above; `adskalman` hands linearised steps to that crate. Off by default and
+//! `particles` (on by default) and `simd` are named above; `adskalman` hands linearised steps to that crate. Off by default and
 //! without std:
 //! - `serde`: [`Belief`], [`Estimate`], [`Gaussian`], readings, innovations, verdicts of readings and errors as plain data. A
 //!   belief that comes back is not checked; the step that it cannot take is refused. Mixtures, and what is made
@@ -98,9 +98,7 @@ pub use mixture::{Dwell, Evidence, Hypotheses, Imm, Mixture, MixtureResidual, Ph
 #[cfg(feature = "particles")]
 pub use particles::{Particle, ParticleCloud, ParticleStep, Particles};
 pub use residual::{LogLikelihood, Residual};
-#[cfg(feature = "std")]
-pub use smooth::rts_smooth_vec;
-pub use smooth::{PastStep, rts_smooth, rts_step, smooth_back_through};
+pub use smooth::{PastStep, rts_step, smooth_back_through};
 pub use sparse::SparseEkf;
 pub use substeps::{GRACE as STEP_GRACE, Repeated, Substeps};
 pub use traits::{Channel, Dynamics, Reading};

@@ -47,23 +47,6 @@ impl<T: Scalar> Motion<T> {
         })
     }
 
-    /// Velocity as a random walk (T_v infinite) with noise of spectral density `noise_density`, (1/s)²/s;
-    /// `rate_sd` (1/s) is the prior standard deviation of the rate, as nothing stationary exists.
-    ///
-    /// # Errors
-    /// Names the parameter that is not positive.
-    pub fn random_walk(noise_density: T, rate_sd: T) -> Result<Self, ParameterError> {
-        positive("noise_density", noise_density)?;
-        positive("rate_sd", rate_sd)?;
-        Ok(Self {
-            restoring: [T::zero(); 2],
-            noise_density,
-            rest_strain: T::zero(),
-            phase_rate: T::zero(),
-            stationary_variance: [T::one() / T::zero(), rate_sd * rate_sd],
-        })
-    }
-
     /// Makes the rate revert to `+phase_rate` while stretching and `-phase_rate` while releasing, 1/s; zero for no such rate.
     ///
     /// # Errors

@@ -16,7 +16,6 @@ fn main() {
     let vectors: Vec<SVector<f64, 1>> = rows.iter().map(|y| SVector::from([*y])).collect();
     let ours = smoother(sensor::<1, 3>());
     peak("smoother_3", || ours.in_place(&rows));
-    peak("smoother_3_steps_kept", || ours.with_steps(&rows));
     let model = sensor::<1, 3>();
     let ekf = SparseEkf::new(model, DT_S).expect("the step's length is positive");
     let taken: Vec<_> = rows.iter().map(|y| Some(Reading::from(*y))).collect();

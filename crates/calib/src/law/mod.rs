@@ -2,7 +2,6 @@
 
 pub(crate) mod advice;
 pub(crate) mod blocked_normal;
-#[cfg(feature = "bootstrap")]
 pub(crate) mod bootstrap;
 pub(crate) mod compare;
 pub(crate) mod design;

@@ -121,7 +121,6 @@ impl<'a> Linearised<'a> {
         Ok(self.uncertainty(&covariance))
     }
 
-    #[cfg(feature = "bootstrap")]
     /// The parameters by name, in the law's own units.
     pub(crate) fn named(&self) -> Vec<(String, f64)> {
         let law = self.structure.law(self.regression, self.solution.weights.as_slice());

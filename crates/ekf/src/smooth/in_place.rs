@@ -22,8 +22,8 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
     /// readings. `readings` are those that the filter has taken, as many as beliefs; where they are fewer, the beliefs
     /// beyond stay as they are, and are not heeded.
     ///
-    /// It is the fixed-interval smoother of the filter that was run, as [`rts_smooth`](crate::rts_smooth), in 8 N (N + 3)/2
-    /// bytes a belief of `f64`.
+    /// It is the fixed-interval smoother of the filter that was run, as [`rts_step`](crate::rts_step) after [`rts_step`](crate::rts_step),
+    /// in 8 N (N + 3)/2 bytes a belief of `f64`.
     ///
     /// # Errors
     /// [`StepError::NonFiniteState`] if a smoothed belief is not finite or has a negative variance; later ones are smoothed

@@ -1,8 +1,8 @@
 use nalgebra::SMatrix;
 use ohmstrain_model::{Scalar, Transition};
 
+use crate::Belief;
 use crate::belief::psd::SemiDefinite;
-use crate::{Belief, Step};
 
 /// One step backwards of the Rauch-Tung-Striebel smoother.
 ///
@@ -38,32 +38,4 @@ pub fn rts_step<T: Scalar, const N: usize, const L: usize>(
     let I_GF = SMatrix::identity() - G * F;
     let ahead = transition.noise.plus(&smoothed_next.covariance).congruence(&G);
     Belief { mean, covariance: filtered.covariance.congruence(&I_GF).plus(&ahead) }
-}
-
-/// Smooths a recording: `smoothed[k]` becomes the belief at the time of `steps[k]` given all readings.
-///
-/// Writes as many beliefs as the shorter of both slices has; the last step of `steps` must be the last reading.
-pub fn rts_smooth<T: Scalar, const N: usize, const L: usize>(
-    steps: &[Step<T, N, L>],
-    smoothed: &mut [Belief<T, N, L>],
-) {
-    let mut next: Option<(&Step<T, N, L>, Belief<T, N, L>)> = None;
-    for (step, out) in steps.iter().zip(smoothed).rev() {
-        *out = match &next {
-            None => step.posterior,
-            Some((later, belief)) => rts_step(&step.posterior, &later.transition, &later.prior, belief),
-        };
-        next = Some((step, *out));
-    }
-}
-
-/// [`rts_smooth`] into a new `Vec`.
-#[cfg(feature = "std")]
-#[must_use]
-pub fn rts_smooth_vec<T: Scalar, const N: usize, const L: usize>(
-    steps: &[Step<T, N, L>],
-) -> std::vec::Vec<Belief<T, N, L>> {
-    let mut smoothed: std::vec::Vec<_> = steps.iter().map(|step| step.posterior).collect();
-    rts_smooth(steps, &mut smoothed);
-    smoothed
 }

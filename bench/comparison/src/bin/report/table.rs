@@ -107,7 +107,7 @@ fn ratios(ratios: &[Ratio], builds: &[Build]) -> String {
     out
 }
 
-const STEPS: [(&str, &str); 25] = [
+const STEPS: [(&str, &str); 24] = [
     ("hand-written reference, linear, without checks", "reference_3"),
     ("hand-written reference, without checks", "nonlinear_reference_3"),
     ("**EKF, sparse**", "sparse_ekf_3"),
@@ -117,7 +117,6 @@ const STEPS: [(&str, &str); 25] = [
     ("EKF, generic", "ekf_3"),
     ("EKF, generic, four states", "ekf_4"),
     ("EKF, generic, six states", "ekf_6"),
-    ("iterated EKF, three linearisations", "iterated_ekf_3"),
     ("UKF", "ukf_3"),
     ("IMM, six states", "imm_6"),
     ("sign-split of 8, six states", "sign_split_6"),
@@ -164,9 +163,8 @@ pub fn banks(builds: &[Build]) -> String {
     out
 }
 
-const SMOOTHERS: [(&str, &str); 5] = [
+const SMOOTHERS: [(&str, &str); 4] = [
     ("smoother, in place", "smoother_3"),
-    ("smoother, steps kept", "smoother_3_steps_kept"),
     ("smoother, sparse", "sparse_smoother_3"),
     ("adskalman 0.18's", "adskalman_smoother_3"),
     ("typed-kalman 0.1's", "typed_kalman_smoother_3"),

@@ -69,9 +69,6 @@ fn each(see: &mut dyn FnMut(&'static str, &mut dyn FnMut())) {
     see("smoother_3", &mut || {
         black_box(counted(|| smoother.in_place(black_box(&recording))));
     });
-    see("smoother_3_steps_kept", &mut || {
-        black_box(counted(|| smoother.with_steps(black_box(&recording))));
-    });
     let ekf = SparseEkf::new(model, DT_S).expect("the step's length is positive");
     let start = Belief::initial(&model);
     let taken: Vec<_> = recording.iter().map(|y| Some(Reading::from(*y))).collect();
