@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use proptest::prelude::*;
 use proptest::sample::select;
 
-use crate::import_forms::{asks, decimal, file, is_imported, proposed, tables, truth};
+use crate::import_files::{asks, decimal, file, is_imported, proposed, tables, truth};
 use ohmstrain_bench_data::import::{Plan, Recipe};
 
 const ROW: &str = "Time (s),R,Strain (%)\n";

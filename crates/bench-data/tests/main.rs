@@ -9,7 +9,13 @@ mod import_clocks;
 #[cfg(feature = "import")]
 mod import_containers;
 #[cfg(feature = "import")]
+mod import_files;
+#[cfg(feature = "import")]
 mod import_forms;
+#[cfg(feature = "import")]
+mod import_rig;
+#[cfg(feature = "import")]
+mod import_times;
 #[cfg(feature = "import")]
 mod import_units;
 mod reader;

@@ -1,5 +1,9 @@
-//! Filters of phase hypotheses and their smoothers, written down naively: dense matrices, logarithms of weights, one hypothesis
-//! after the other.
+//! Filters of phase hypotheses, written down naively: dense matrices, logarithms of weights, one hypothesis after the other.
+//! Their smoothers are in `back.rs`.
+
+mod back;
+
+pub use back::Smoothed;
 
 use libm::erfc;
 use nalgebra::{SMatrix, SVector};
@@ -92,10 +96,8 @@ impl<const N: usize> Hypotheses<N> {
     }
 }
 
-/// Weight, mean and covariance given all readings.
-pub type Smoothed<const N: usize> = (f64, SVector<f64, N>, SMatrix<f64, N, N>);
-
-fn moments<const N: usize>(parts: &[Smoothed<N>]) -> Moments<N> {
+/// Mean and covariance of weighted ones.
+fn moments<const N: usize>(parts: &[(f64, SVector<f64, N>, SMatrix<f64, N, N>)]) -> Moments<N> {
     let total: f64 = parts.iter().map(|(weight, ..)| weight).sum();
     let mean = parts.iter().map(|(weight, mean, _)| mean * (weight / total)).sum::<SVector<f64, N>>();
     let around = |(weight, at, covariance): &(f64, SVector<f64, N>, SMatrix<f64, N, N>)| {
@@ -355,86 +357,4 @@ impl<const B: usize, const N: usize> Naive<B, N> {
         child.made_of = vec![Descent { parent: place, jacobian, predicted, posterior, log_weight }];
         children.add(child);
     }
-
-    /// The hypotheses before a step given all readings: those that were filtered, those that the step made of them, and the
-    /// same ones given all readings.
-    pub fn back<const L: usize>(
-        &self,
-        filtered: &Hypotheses<N>,
-        (heirs, next): (&Hypotheses<N>, &[Smoothed<N>]),
-        dt_s: f64,
-    ) -> Vec<Smoothed<N>> {
-        let Rule::Imm(dwell) = self.rule else { return through(&filtered.all, &heirs.all, next) };
-        let (mixed, step) = (self.mixed(filtered, &dwell, dt_s), self.model.prepare(dt_s));
-        let before = mixed.iter().map(|one| {
-            let here = (one.mean, one.covariance);
-            let Some(place) = heirs.all.iter().position(|heir| heir.phase == one.phase) else {
-                return (0.0, here.0, here.1);
-            };
-            let moved: Transition<f64, N, L> = self.model.transition(&step, &one.mean, Direction::Known(one.phase));
-            let covariance = moved.jacobian * here.1 * moved.jacobian.transpose() + moved.noise.to_matrix();
-            let (weight, mean, later) = next[place];
-            let back = retraced(&here, &moved.jacobian, &(moved.mean, covariance), &(mean, later));
-            (weight, back.0, back.1)
-        });
-        through(&filtered.all, &mixed, &before.collect::<Vec<_>>())
-    }
-}
-
-/// Rauch, Tung & Striebel: what is known before a step from what is known after it. States that are known exactly, as the rate
-/// of a hold, say nothing.
-fn retraced<const N: usize>(
-    before: &Moments<N>,
-    jacobian: &SMatrix<f64, N, N>,
-    predicted: &Moments<N>,
-    after: &Moments<N>,
-) -> Moments<N> {
-    let per_sd = SMatrix::<f64, N, N>::from_diagonal(
-        &predicted.1.diagonal().map(|variance| if variance > 0.0 { 1.0 / variance.sqrt() } else { 0.0 }),
-    );
-    // A dynamic matrix: the decomposition is not there for one whose size is a parameter.
-    let correlation = per_sd * predicted.1 * per_sd;
-    let inverse = nalgebra::DMatrix::from_column_slice(N, N, correlation.as_slice()).pseudo_inverse(1e-11).unwrap();
-    let inverse = per_sd * SMatrix::<f64, N, N>::from_column_slice(inverse.as_slice()) * per_sd;
-    let gain = before.1 * jacobian.transpose() * inverse;
-    (before.0 + gain * (after.0 - predicted.0), before.1 + gain * (after.1 - predicted.1) * gain.transpose())
-}
-
-/// Kim's smoother over hypotheses that were merged: each goes back to all whose children it is made of, with their shares.
-fn through<const N: usize>(
-    filtered: &[Hypothesis<N>],
-    heirs: &[Hypothesis<N>],
-    next: &[Smoothed<N>],
-) -> Vec<Smoothed<N>> {
-    let mut ways: Vec<Vec<Smoothed<N>>> = filtered.iter().map(|_| vec![]).collect();
-    for (heir, (weight, mean, covariance)) in heirs.iter().zip(next) {
-        let total: f64 = heir.made_of.iter().map(|child| child.log_weight.exp()).sum();
-        for child in &heir.made_of {
-            let share = weight * child.log_weight.exp() / total;
-            if share <= 1e-7 {
-                continue;
-            }
-            // The heir is the child and noise of the size of their distance.
-            let apart = heir.mean - child.posterior.0;
-            let merged = (heir.mean, child.posterior.1 + apart * apart.transpose());
-            let own = retraced(&child.posterior, &SMatrix::identity(), &merged, &(*mean, *covariance));
-            let parent = &filtered[child.parent];
-            let here = (parent.mean, parent.covariance);
-            let back = retraced(&here, &child.jacobian, &child.predicted, &own);
-            // What no later reading can have told is an error of merging.
-            let astray = (0..N).any(|i| {
-                let variance = here.1[(i, i)];
-                !(back.1[(i, i)] <= 4.0 * variance && (back.0[i] - here.0[i]).powi(2) <= 400.0 * variance)
-            });
-            let (mean, covariance) = if astray { here } else { back };
-            ways[child.parent].push((share, mean, covariance));
-        }
-    }
-    let total: f64 = ways.iter().flatten().map(|way| way.0).sum();
-    let gathered = |(ways, parent): (&Vec<Smoothed<N>>, &Hypothesis<N>)| {
-        let weight: f64 = ways.iter().map(|way| way.0).sum();
-        let (mean, covariance) = if weight > 0.0 { moments(ways) } else { (parent.mean, parent.covariance) };
-        (weight / total, mean, covariance)
-    };
-    ways.iter().zip(filtered).map(gathered).collect()
 }
