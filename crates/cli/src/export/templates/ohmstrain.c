@@ -361,22 +361,6 @@ static unsigned sieve(readings *seen, float rho, float *extra_variance)
     return 0;
 }
 
-/* Takes a reading, with less weight if it surprises. */
-static int attempt_reading(ohmstrain_state *state, const interval *over, float rho, float extra_variance, unsigned *flags,
-                           ohmstrain_residual *residual)
-{
-    int status = attempt(state, over, &rho, extra_variance, INFLUENCE ? SURPRISING : INFINITY, residual);
-
-    if (status == SURPRISED) {
-        const float weight = SURPRISING / residual->nis;
-        ohmstrain_residual again;
-        const float more = residual->variance * (1.0f / weight - 1.0f);
-        status = attempt(state, over, &rho, extra_variance + more, INFINITY, &again);
-        *flags |= status == OHMSTRAIN_OK ? OHMSTRAIN_DOWNWEIGHTED : 0;
-    }
-    return status;
-}
-
 {% if estimator.hypotheses %}
 /* Makes correlations smaller, by a share that grows from rounding to all of them over a few tries: what rounding has left of a
  * covariance is one again. */
@@ -401,7 +385,7 @@ static void loosen(ohmstrain_state *state, int tries)
 {% endif %}
 /* A step that was refused. Where rounding makes a variance negative, the reading is more exact than the numbers: it is taken again
  * with more and more noise until it leaves none{% if estimator.hypotheses %}, and from looser and looser correlations{% endif %}. */
-static int step_again(ohmstrain_state *state, const interval *over, const float *rho, float extra_variance, unsigned *flags,
+static int step_again(ohmstrain_state *state, const interval *over, const float *rho, float extra_variance, float most,
                       ohmstrain_residual *residual)
 {
 {% if estimator.hypotheses %}
@@ -411,7 +395,7 @@ static int step_again(ohmstrain_state *state, const interval *over, const float 
 {% endif %}
     int status = OHMSTRAIN_ERR_STATE, tries;
 
-    for (tries = 1; status != OHMSTRAIN_OK && tries <= MOST_TRIES; tries++) {
+    for (tries = 1; status == OHMSTRAIN_ERR_STATE && tries <= MOST_TRIES; tries++) {
         if (rho) {
             extra_variance = extra_variance + READING_VARIANCE + ROUNDING;
             if (!isfinite(*rho * *rho / extra_variance)) {
@@ -422,8 +406,7 @@ static int step_again(ohmstrain_state *state, const interval *over, const float 
 {% if estimator.hypotheses %}
         loosen(from, tries);
 {% endif %}
-        status = rho ? attempt_reading(from, over, *rho, extra_variance, flags, residual)
-                     : attempt(from, over, (const float *)0, 0.0f, INFINITY, residual);
+        status = attempt(from, over, rho, extra_variance, most, residual);
     }
 {% if estimator.hypotheses %}
     if (status == OHMSTRAIN_OK) {
@@ -433,30 +416,45 @@ static int step_again(ohmstrain_state *state, const interval *over, const float 
     return status;
 }
 
+/* A step, again if it is refused. */
+static int step_on(ohmstrain_state *state, const interval *over, const float *rho, float extra_variance, float most,
+                   ohmstrain_residual *residual)
+{
+    const int status = attempt(state, over, rho, extra_variance, most, residual);
+
+    if (status != OHMSTRAIN_ERR_STATE<< "" if estimator.hypotheses else " || !rho" >>) {
+        return status;
+    }
+    return step_again(state, over, rho, extra_variance, most, residual);
+}
+
 /* A step without a reading. */
 static int pass(ohmstrain_state *state, const interval *over, ohmstrain_residual *residual)
 {
-    int status = attempt(state, over, (const float *)0, 0.0f, INFINITY, residual);
-
-{% if estimator.hypotheses %}
-    if (status != OHMSTRAIN_OK) {
-        status = step_again(state, over, (const float *)0, 0.0f, (unsigned *)0, residual);
-    }
-{% endif %}
-    return status;
+    return step_on(state, over, (const float *)0, 0.0f, INFINITY, residual);
 }
 
-/* The last step of an interval; a reading that is too far away for the numbers is left out. */
+/* The last step of an interval. A reading that surprises has less weight; one that is too far away for the numbers is left out. */
 static int last_step(ohmstrain_state *state, const interval *over, const float *rho, float extra_variance, unsigned *flags,
                      ohmstrain_residual *residual)
 {
-    if (rho) {
-        if (attempt_reading(state, over, *rho, extra_variance, flags, residual) == OHMSTRAIN_OK ||
-            step_again(state, over, rho, extra_variance, flags, residual) == OHMSTRAIN_OK) {
-            return OHMSTRAIN_OK;
-        }
-        *flags |= OHMSTRAIN_REJECTED;
+    int status;
+
+    if (!rho) {
+        return pass(state, over, residual);
     }
+    status = step_on(state, over, rho, extra_variance, INFLUENCE ? SURPRISING : INFINITY, residual);
+    if (status == SURPRISED) {
+        const float weight = SURPRISING / residual->nis;
+        const float more = residual->variance * (1.0f / weight - 1.0f);
+        ohmstrain_residual again;
+        status = step_on(state, over, rho, extra_variance + more, INFINITY, &again);
+        *flags |= status == OHMSTRAIN_OK ? OHMSTRAIN_DOWNWEIGHTED : 0;
+    }
+    if (status == OHMSTRAIN_OK) {
+        return status;
+    }
+    *flags |= OHMSTRAIN_REJECTED;
     return pass(state, over, residual);
 }
 
