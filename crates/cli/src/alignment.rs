@@ -6,8 +6,9 @@ use crate::error::CliError;
 use crate::input::Recording;
 use crate::verbosity::Verbosity;
 
-/// Says how late the reference of a recording is; moves it if that is wanted, and refuses one that is too late to be used
-/// otherwise; says how late it is where that does not matter if `explain`. By how much it was moved, s.
+/// Says how late the reference of a recording is; moves it if that is wanted, refuses one that is certainly too late to be used
+/// otherwise, and warns of one that probably is; says how late it is where that does not matter if `explain`. By how much it was
+/// moved, s.
 pub fn check(recording: &mut Recording, align: bool, explain: bool) -> Result<f64, CliError> {
     let samples = recording.samples()?;
     let known = ohmstrain::Recording::new(samples.time_s(), samples.reading(), samples.strain())?;
@@ -22,7 +23,12 @@ pub fn check(recording: &mut Recording, align: bool, explain: bool) -> Result<f6
         }
         return Ok(0.0);
     };
-    let late = late(lag.lag_s);
+    let own = if lag.own_s > 0.0 {
+        format!(", give or take {:.1} s that the sensor may lag itself", lag.own_s)
+    } else {
+        String::new()
+    };
+    let late = late(lag.lag_s) + &own;
     if align {
         CliError::warning(&format!("{name}: the reference is {late}; it was moved by that"));
         shift(recording, lag.lag_s)?;
@@ -36,6 +42,14 @@ pub fn check(recording: &mut Recording, align: bool, explain: bool) -> Result<f6
         } else {
             Verbosity::detail(&text)
         }
+        return Ok(0.0);
+    }
+    if !lag.is_certain {
+        CliError::warning(&format!(
+            "{name}: the reference seems to be {late}, where a movement takes {:.1} s; the readings do not tell for certain, and it \
+             was not moved: are both on one clock? --align moves it",
+            lag.movement_s
+        ));
         return Ok(0.0);
     }
     Err(CliError::Input(format!(

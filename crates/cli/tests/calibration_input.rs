@@ -201,6 +201,30 @@ fn a_late_reference_is_refused_or_moved() {
     assert!(moved < 1.1 * plain, "{moved} %FS instead of {plain}");
 }
 
+/// Where readings hardly tell, of a few movements to and fro, a reference that is 1.5 s early is warned of; one that is on time is not.
+#[test]
+fn a_reference_that_may_be_early_is_warned_of() {
+    let bench = Bench::new();
+    let simulate = ["simulate", "--protocol", "extend-retract", "--speed-mm-s", "2", "--sample-rate-hz", "10"];
+    bench.run(&[&simulate[..], &["-o", "trace.csv"]].concat()).ok();
+    let mut strains: Vec<String> = Vec::new();
+    change_rows(&bench.read("trace.csv"), |_, cells| strains.push(cells[2].clone()));
+    let last = strains.len() - 1;
+    let early = change_rows(&bench.read("trace.csv"), |k, cells| cells[2].clone_from(&strains[last.min(k + 15)]));
+    bench.write("early.csv", early);
+    let of_the_reference = |trace: &str, more: &[&str]| {
+        let run = bench.run(&[&["calibrate", trace, "-o", "sensor.toml", "--force"], &EKF[..], more].concat());
+        assert_eq!(run.code, Some(0), "{}", run.stderr);
+        run.warnings.into_iter().filter(|warning| warning.contains("the reference")).collect::<Vec<_>>()
+    };
+    assert!(of_the_reference("trace.csv", &[]).is_empty());
+    let warned = of_the_reference("early.csv", &[]);
+    assert!(warned.len() == 1 && warned[0].contains("early.csv: the reference seems to be 1.5"), "{warned:?}");
+    assert!(warned[0].contains(" s early") && warned[0].contains("--align moves it"), "{warned:?}");
+    let moved = of_the_reference("early.csv", &["--align"]);
+    assert!(moved.len() == 1 && moved[0].contains("early; it was moved by that"), "{moved:?}");
+}
+
 /// Two rows, 0.4 s, where a movement takes 7: too little to refuse, and said where everything is.
 #[test]
 fn a_reference_that_is_a_little_late_is_told_of() {

@@ -24,10 +24,15 @@ pub struct ReferenceLag {
     pub lag_s: f64,
     /// Mean duration of a movement in one direction, s.
     pub movement_s: f64,
+    /// By how much that may be off, s, where what the sensor lags itself cannot be told apart; 0 where it can.
+    pub own_s: f64,
+    /// Whether hardly any recording without a lag looks like that; if not, few do.
+    pub is_certain: bool,
 }
 
 impl ReferenceLag {
-    /// Whether it is more than a tenth of a movement: such a recording is not to be calibrated on as it is.
+    /// Whether it is more than a tenth of a movement: such a recording, if that [is certain](Self::is_certain), is not to be
+    /// calibrated on as it is.
     ///
     /// ```
     /// # let (time_s, ohm, strain) = ([0.0, 0.1], [1600.0, 1610.0], [0.00, 0.01]);
@@ -52,7 +57,12 @@ impl Recording<'_> {
     #[must_use]
     pub fn reference_lag(&self) -> Option<ReferenceLag> {
         let lag = self.screened(reference_lag).filter(Lag::is_sure)?;
-        Some(ReferenceLag { lag_s: lag.lag_s, movement_s: lag.movement_s })
+        Some(ReferenceLag {
+            lag_s: lag.lag_s,
+            movement_s: lag.movement_s,
+            own_s: lag.own_s,
+            is_certain: lag.is_certain(),
+        })
     }
 
     /// How far lags are looked for, s, with its sign, if the reference seems to be as late as that or later (negative: early);
