@@ -48,3 +48,48 @@ fn a_moved_reference_is_found_out() {
         assert!((found - lag_s).abs() < 0.1, "{found} for {lag_s}");
     }
 }
+
+/// A sine of 30 s of a sensor that relaxes over half a second to two minutes, and drifts: more than the law that is fitted has,
+/// which takes a lag for relaxation there.
+#[test]
+fn a_law_does_not_absorb_the_lag_of_a_slow_sine() {
+    for lag_s in [-6.0, -4.0, 0.0, 4.0, 6.0] {
+        let (time_s, reading, strain) = of_relaxing(|t| 0.15 * (1.0 - (TAU * t / 30.0).cos()), 300, lag_s);
+        let found = reference_lag(&Samples::new(&time_s, &reading, &strain).unwrap()).unwrap();
+        println!("{found:?} for {lag_s}");
+        assert_eq!(found.is_sure(), lag_s != 0.0, "{found:?} for {lag_s}");
+        // Half a step of the search, and what the sensor may lag itself.
+        assert!((found.lag_s - lag_s).abs() < 0.25 + found.own_s, "{found:?} for {lag_s}");
+    }
+}
+
+/// Six movements of 5 s between holds of 45 s: there a gauge alone takes relaxation for a lag.
+#[test]
+fn a_gauge_has_no_say_where_a_body_rests() {
+    let ramps = |t: f64| 0.3 * ((t % 100.0) / 5.0).min(1.0).min((55.0 - t % 100.0) / 5.0).max(0.0);
+    let (time_s, reading, strain) = of_relaxing(ramps, 300, 0.0);
+    let found = reference_lag(&Samples::new(&time_s, &reading, &strain).unwrap());
+    assert!(found.is_none_or(|lag| !lag.is_sure() && lag.own_s == 0.0), "{found:?}");
+}
+
+fn of_relaxing(strain_at: impl Fn(f64) -> f64, seconds: u32, lag_s: f64) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
+    const TAU_S: [f64; 4] = [0.5, 3.0, 20.0, 120.0];
+    const GAINS: [[f64; 2]; 4] = [[0.5, -0.2], [0.35, -0.3], [0.3, -0.15], [0.3, 0.1]];
+    let (mut time_s, mut reading, mut strain, mut branches) = (vec![], vec![], vec![], [0.0; 4]);
+    let inner = 1e-2;
+    for step in 0..100 * seconds {
+        let t = f64::from(step) * inner;
+        let (x, rate) = (strain_at(t), (strain_at(t + inner) - strain_at(t)) / inner);
+        if step % 10 == 0 {
+            let noise = 1e-3 * (2.0 * (f64::from(step) / 10.0 * 0.618_033_988_749_895).fract() - 1.0);
+            let drift = 0.01 * (TAU * t / 173.0).sin();
+            time_s.push(t);
+            reading.push(1500.0 * (1.0 + 1.8 * x - 1.1 * x * x + branches.iter().sum::<f64>() + drift + noise));
+            strain.push(strain_at(t - lag_s));
+        }
+        for ((branch, tau_s), gains) in branches.iter_mut().zip(TAU_S).zip(GAINS) {
+            *branch += inner * (-*branch / tau_s + gains[usize::from(rate < 0.0)] * rate);
+        }
+    }
+    (time_s, reading, strain)
+}
