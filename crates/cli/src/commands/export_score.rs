@@ -3,7 +3,7 @@
 use ohmstrain::Sensor;
 use ohmstrain_calib::{Baseline, ScoredRow, Scores, SensorParams};
 
-use crate::args::ExportArgs;
+use crate::args::{ExportArgs, ExportTarget};
 use crate::commands::score_table::covered;
 use crate::error::CliError;
 use crate::export::{self, ChipFilter, Plan, ReplayedRow};
@@ -136,7 +136,12 @@ impl Promise {
             for line in &self.lines {
                 writeln!(out, "{line}")?;
             }
-            Ok(writeln!(out, "{}; instructions a step of a Cortex-M4F, estimated as is the rest", self.words)?)
+            // Rust was counted once, by scripts/exported-c.sh, for docs/chip.md.
+            let of = match args.target {
+                ExportTarget::C => "",
+                ExportTarget::Rust => " of the same in C",
+            };
+            Ok(writeln!(out, "{}; instructions a step of a Cortex-M4F{of}, estimated as is the rest", self.words)?)
         })?;
         match &self.worse_on {
             Some(name) if !args.force => Err(CliError::Input(format!(
