@@ -1,5 +1,5 @@
-//! The exported filter on a board of QEMU, over the readings of the self-test as `count.c` takes them. Reports words: readings,
-//! instructions of all steps, bytes of the filter; then the bits of every strain.
+//! The exported filter on a board of QEMU, over the readings of the self-test up to its rest. Reports words: readings, instructions of
+//! all steps, bytes of the filter; then the bits of every strain.
 #![no_std]
 #![no_main]
 
@@ -12,8 +12,8 @@ use cortex_m_semihosting::debug::{self, EXIT_FAILURE, EXIT_SUCCESS};
 use cortex_m_semihosting::hio;
 use exported::counted as sensor;
 
-/// In the unit of the sensor; NaN where missing.
-static READINGS: &[f32] = include!("readings.rs");
+/// In the unit of the sensor, with their deviations; NaN where missing.
+static READINGS: &[(f32, f32)] = include!("readings.rs");
 const MOST: usize = 512;
 /// The board's timer has 25 MHz, QEMU counts one nanosecond per instruction.
 const PER_TICK: u32 = 40;
@@ -25,9 +25,9 @@ fn main() -> ! {
 }
 
 #[inline(never)]
-fn step(filter: &mut sensor::Filter, reading: f32) -> Option<f32> {
-    let now = if reading.is_nan() { filter.predict() } else { filter.step(reading) };
-    now.ok().map(|now| now.strain.mean)
+fn step(filter: &mut sensor::Filter, (reading, sd): (f32, f32)) -> Option<f32> {
+    let reading = (!reading.is_nan()).then(|| filter.relative(reading, sd));
+    filter.step_after(sensor::DT_S, reading).ok().map(|now| now.strain.mean)
 }
 
 fn run() -> Option<()> {

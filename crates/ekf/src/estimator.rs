@@ -57,11 +57,13 @@ pub trait Estimator<T: Scalar, const N: usize, const L: usize> {
     /// See [`StepError`]; a step that went forward goes backward.
     fn smooth_back(
         &self,
-        filtered: &Self::State,
-        prepared: &Self::Prepared,
-        reading: Option<Reading<T>>,
-        next: &Self::State,
-    ) -> Result<Option<Self::State>, StepError>;
+        _filtered: &Self::State,
+        _prepared: &Self::Prepared,
+        _reading: Option<Reading<T>>,
+        _next: &Self::State,
+    ) -> Result<Option<Self::State>, StepError> {
+        Ok(None)
+    }
 }
 
 /// What an estimator carries from step to step.

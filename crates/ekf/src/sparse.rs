@@ -218,14 +218,4 @@ where
             residual.map(|residual| residual.with_log_likelihood(residual.log_likelihood())).transpose()?;
         Ok(Advanced { state: next, innovation })
     }
-
-    fn smooth_back(
-        &self,
-        _: &Belief<T, N, L>,
-        _: &Self,
-        _: Option<Reading<T>>,
-        _: &Belief<T, N, L>,
-    ) -> Result<Option<Belief<T, N, L>>, StepError> {
-        Ok(None)
-    }
 }

@@ -112,7 +112,6 @@ impl<'a, const B: usize, const N: usize> FixedRate<'a, B, N> {
             strain_sd_scale: exactly(parts.strain_sd_scale),
             reading_variance: reading_sd * reading_sd,
             known_variance: exactly(parts.start_variance),
-            zero: exactly(parts.zero),
             sieve: parts.sieve.to(),
             doubt: parts.doubt.to(),
             rest: parts.rest.to(),

@@ -1,7 +1,7 @@
 use ohmstrain_model::{MOTION_STATES, StrainRange};
 
 use super::{
-    BESIDE_SHARE, DoubtParts, Doubts, Flags, Jumps, Learned, Protections, Repeats, RestBounds, RestFollower,
+    BESIDE_SHARE, DOUBT, DoubtParts, Doubts, Flags, Jumps, Learned, Protections, Repeats, RestBounds, RestFollower,
     SURPRISING_NIS, SensorEstimator, Sieve,
 };
 use crate::correction::{FeatureScale, ReadingFeatures, filter_inputs};
@@ -36,8 +36,6 @@ pub struct LiveParts<'a, T> {
     pub reading_variance: T,
     /// Variance of a strain that is known at a start.
     pub known_variance: T,
-    /// A strain that is less is none.
-    pub zero: T,
     /// What a reading must be.
     pub sieve: Sieve<T>,
     /// When the interval is wider than the filter says.
@@ -192,7 +190,8 @@ impl<'a, T: Real, E: SensorEstimator<T, N, L>, const N: usize, const L: usize> L
         let known = strain.map(|mean| Gaussian { mean, variance: self.parts.known_variance });
         self.now = Memory::new(&self.parts, self.protections, self.estimator.0.start(known));
         if let Some(strain) = strain {
-            self.now.doubts = self.now.doubts.of_known_strain(strain.abs() <= self.parts.zero);
+            self.now.doubts =
+                self.now.doubts.of_known_strain(strain.abs() <= T::of(DOUBT.zero) * self.parts.limits.span());
         }
     }
 

@@ -252,15 +252,4 @@ impl<T: Scalar, const B: usize, const N: usize, const L: usize> Estimator<T, N, 
         let step = self.step_prepared(state, prepared, *dt_s, reading)?;
         Ok(Advanced { state: step.posterior, innovation: step.innovation })
     }
-
-    /// There is none: the filters of Gaussian hypotheses smooth.
-    fn smooth_back(
-        &self,
-        _: &Self::State,
-        _: &Self::Prepared,
-        _: Option<Reading<T>>,
-        _: &Self::State,
-    ) -> Result<Option<Self::State>, StepError> {
-        Ok(None)
-    }
 }

@@ -158,7 +158,6 @@ pub const PARTS: LiveParts<'static, f32> = LiveParts {
     strain_sd_scale: STRAIN_SD_SCALE,
     reading_variance: << reading_variance >>,
     known_variance: << known_variance >>,
-    zero: << doubt.zero >>,
     sieve: SIEVE,
     doubt: DOUBT,
     rest: REST,

@@ -9,8 +9,7 @@ use std::cell::Cell;
 use ohmstrain_calib::EstimatorKind;
 use ohmstrain_ekf::live::{LiveFilter, SensorEstimator};
 use ohmstrain_ekf::{
-    Advanced, Compact, Estimator, Gaussian, Hypotheses, Innovation, Reading, Real, SignSplit, SparseEkf, State,
-    StepError,
+    Advanced, Compact, Estimator, Gaussian, Hypotheses, Reading, Real, SignSplit, SparseEkf, State, StepError,
 };
 use ohmstrain_model::SwitchedModel;
 
@@ -118,31 +117,9 @@ where
         prepared: &F,
         reading: Option<Reading<T>>,
     ) -> Result<Advanced<F::State, T>, StepError> {
-        let mut next = state.clone();
-        let innovation = self.advance_into(state, prepared, reading, &mut next)?;
-        Ok(Advanced { state: next, innovation })
-    }
-
-    fn advance_into(
-        &self,
-        state: &F::State,
-        prepared: &F,
-        reading: Option<Reading<T>>,
-        next: &mut F::State,
-    ) -> Result<Option<Innovation<T>>, StepError> {
         let work = &self.work[usize::from(reading.is_none())];
         state.each(&mut |_, _| work.set(work.get() + 1));
-        self.filter.advance_into(state, prepared, reading, next)
-    }
-
-    fn smooth_back(
-        &self,
-        _: &F::State,
-        _: &F,
-        _: Option<Reading<T>>,
-        _: &F::State,
-    ) -> Result<Option<F::State>, StepError> {
-        Ok(None)
+        self.filter.advance(state, prepared, reading)
     }
 }
 
