@@ -11,6 +11,7 @@ mod direction;
 mod faults;
 mod guards;
 mod linear_oracles;
+mod linear_sensor;
 mod long_run;
 mod mixture_smoother;
 mod mixtures;
@@ -23,6 +24,7 @@ mod properties;
 mod published_numbers;
 mod representative;
 mod running_filter;
+mod sigma_points;
 mod sparse;
 mod stored;
 

@@ -111,6 +111,30 @@ fn stays_a_covariance_in_single_precision() {
     assert!(least > -12.0 * f64::from(f32::EPSILON), "{least:e}");
 }
 
+/// Within the gate it is the step, beyond it the prediction, and what is refused is refused.
+#[test]
+fn a_gated_step_is_a_step_or_a_prediction() {
+    let model: SwitchedModel<f64, 3, 6> = sensor();
+    let ekf = SparseEkf::<f64, Compact, 3, 6, Cubic<f64>>::new(model, DT_S).unwrap();
+    let mut belief = Belief::<f64, 6, 21>::initial(&model);
+    let mut turned_down = 0;
+    for k in 0..1000 {
+        let spike = if k % 50 == 49 { 0.5 } else { 0.0 };
+        let reading = Reading { value: reading(k) + spike, extra_variance: 1e-7 };
+        let (mut plain, mut ahead) = (belief, belief);
+        let seen = ekf.step(&mut plain, Some(reading)).unwrap().unwrap();
+        ekf.step(&mut ahead, None).unwrap();
+        let residual = ekf.step_gated(&mut belief, reading, 10.8).unwrap();
+        assert_eq!(residual, seen);
+        assert_eq!(belief, if residual.nis <= 10.8 { plain } else { ahead }, "step {k}");
+        turned_down += u32::from(residual.nis > 10.8);
+    }
+    assert!((20..200).contains(&turned_down), "{turned_down}");
+    let before = belief;
+    let refused = ekf.step_gated(&mut belief, Reading::from(f64::NAN), 10.8);
+    assert_eq!((refused, belief), (Err(StepError::NonFiniteReading), before));
+}
+
 #[test]
 fn an_error_leaves_the_belief() {
     let model: SwitchedModel<f64, 1, 3> = sensor();

@@ -6,8 +6,10 @@ use std::hint::black_box;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use nalgebra::SVector;
 use ohmstrain_bench_comparison::{RecordingPass, adskalman_smoother, simulated_recording, typed_kalman_smoother};
-use ohmstrain_bench_filters::{DT_S, linearised, log_likelihood, readings, sensor, smoother, sparse_smooth};
-use ohmstrain_ekf::{Belief, Reading, SparseEkf};
+use ohmstrain_bench_filters::{
+    DT_S, linear_sensor, linearised, log_likelihood, readings, sensor, smoother, sparse_smooth,
+};
+use ohmstrain_ekf::{Belief, Compact, Cubic, LinearFilter, Reading, SparseEkf};
 
 const ROWS: usize = 10_000;
 
@@ -22,11 +24,17 @@ fn recordings(criterion: &mut Criterion) {
     group.bench_function("typed_kalman_smoother_3", |bencher| bencher.iter(|| theirs(black_box(&rows))));
     let ours = smoother(model);
     group.bench_function("smoother_3", |bencher| bencher.iter(|| ours.in_place(black_box(&rows))));
-    let ekf = SparseEkf::new(model, DT_S).expect("the step's length is positive");
+    let ekf = SparseEkf::<_, Compact, 1, 3, Cubic<f64>>::new(model, DT_S).expect("the gauge is cubic");
     let start = Belief::initial(&model);
     let taken: Vec<_> = rows.iter().map(|y| Some(Reading::from(*y))).collect();
     group.bench_function("sparse_smoother_3", |bencher| {
         bencher.iter(|| sparse_smooth(black_box(&ekf), &start, black_box(&taken)));
+    });
+    let (linear, linear_model) =
+        (LinearFilter::new(linear_sensor(), DT_S).expect("the sensor is linear"), linear_sensor());
+    let start_of_linear = Belief::initial(&linear_model);
+    group.bench_function("linear_smoother_3", |bencher| {
+        bencher.iter(|| sparse_smooth(black_box(&linear), &start_of_linear, black_box(&taken)));
     });
     group.bench_function("log_likelihood_3", |bencher| {
         bencher.iter(|| log_likelihood(black_box(&ekf), &start, black_box(&rows)));

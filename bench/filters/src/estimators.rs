@@ -1,13 +1,13 @@
 use ohmstrain_ekf::{
-    Belief, Dwell, Ekf, Estimator, Evidence, Hypotheses, Imm, Mixture, PhaseMixture, Reading, SignSplit, State,
-    Unscented,
+    Belief, Compact, Dwell, Ekf, Estimator, Evidence, Hypotheses, Imm, Mixture, PhaseMixture, Reading, SignSplit,
+    State, Unscented,
 };
 use ohmstrain_model::{Phase, SwitchedModel};
 
 use crate::mixtures::GatedMixture;
 use crate::{
-    DT_S, Filter, GatedSparse, NonlinearReference, PackedReference, RANGE, Visitor, linear_sensor, linearised,
-    phased_sensor, readings, sensor,
+    DT_S, Filter, FrozenLinear, GatedLinear, GatedSparse, GatedUnscented, NonlinearReference, PackedReference, RANGE,
+    Visitor, linear_sensor, linearised, phased_sensor, readings, sensor,
 };
 
 /// Two periods of the readings, so that they can be repeated.
@@ -76,9 +76,11 @@ pub fn every_filter(visitor: &mut impl Visitor) {
     let three = sensor::<1, 3>();
     visitor.visit("reference_3", &readings, PackedReference::new(&linearised()));
     visitor.visit("nonlinear_reference_3", &readings, NonlinearReference::new());
-    visitor.visit("sparse_ekf_3_linear", &readings, GatedSparse::<1, 3, 6>::new(linear_sensor()));
-    visitor.visit("sparse_ekf_3", &readings, GatedSparse::<1, 3, 6>::new(three));
-    visitor.visit("sparse_ekf_4", &readings, GatedSparse::<1, 4, 10>::new(sensor()));
+    visitor.visit("linear_3", &readings, GatedLinear::<1, 3, 6>::new(linear_sensor()));
+    visitor.visit("frozen_3", &readings, FrozenLinear::new(linear_sensor()));
+    visitor.visit("sparse_ekf_3", &readings, GatedSparse::<1, 3, 6, Compact>::new(three));
+    visitor.visit("sparse_ekf_4", &readings, GatedSparse::<1, 4, 10, Compact>::new(sensor()));
+    visitor.visit("sparse_ukf_3", &readings, GatedUnscented::<1, 3, 6>::new(three));
     visitor.visit("ekf_3", &readings, ekf::<1, 3, 6>(three));
     visitor.visit("ekf_4", &readings, ekf::<1, 4, 10>(sensor()));
     let ukf = Ekf::new(Unscented::new(three));
@@ -90,7 +92,7 @@ pub fn every_filter(visitor: &mut impl Visitor) {
 fn every_large_filter(visitor: &mut impl Visitor) {
     let readings = readings::<3>(STEPS);
     let (six, phased) = (sensor::<3, 6>(), phased_sensor::<3, 6>());
-    visitor.visit("sparse_ekf_6", &readings, GatedSparse::<3, 6, 21>::new(six));
+    visitor.visit("sparse_ekf_6", &readings, GatedSparse::<3, 6, 21, Compact>::new(six));
     visitor.visit("ekf_6", &readings, ekf::<3, 6, 21>(six));
     let evidence = Evidence { limits: RANGE, tempering: 1.0 };
     let dwell = Dwell::new(0.7, 1.5, 0.3).expect("the durations are valid");

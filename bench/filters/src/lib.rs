@@ -1,6 +1,7 @@
 //! What is measured of ohmstrain: its estimators at a fixed rate, each with its state, one reading at a time; and a
 //! hand-written filter without checks to measure them by.
 
+mod correction;
 mod estimators;
 mod mixtures;
 mod nonlinear;
@@ -10,13 +11,14 @@ mod reference;
 mod sensor;
 mod sparse;
 
+pub use correction::Corrected;
 pub use estimators::{Gated, STEPS, ekf, every_filter};
 pub use nonlinear::{Ahead, Expected, NonlinearModel};
 pub use readings::{readings, strain_at};
 pub use recordings::{Smoother, log_likelihood, smoother, sparse_smooth};
 pub use reference::{NonlinearReference, PackedReference};
 pub use sensor::{DT_S, LinearModel, RANGE, linear_sensor, linearised, phased_sensor, sensor, sensor_of};
-pub use sparse::GatedSparse;
+pub use sparse::{FrozenLinear, GatedLinear, GatedSparse, GatedUnscented};
 
 /// A filter with its state.
 pub trait Filter {

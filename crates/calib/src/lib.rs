@@ -35,7 +35,7 @@ pub use calibrate::findings::{Findings, Seen};
 pub use calibrate::scores::{ScoredRow, Scores};
 pub use calibrate::with_prior::calibrate_with_prior;
 pub use calibrate::{Calibration, Stage, calibrate};
-pub use correction::owned::{OwnedCorrection, OwnedProcess, OwnedSimulated};
+pub use correction::owned::{OwnedCorrection, OwnedProcess, OwnedRows, OwnedSimulated};
 pub use error::CalibrationError;
 pub use filter::build::{HISTORIES, HYPOTHESES, PARTICLE_SEED, build_filter, build_filter_with};
 pub use filter::learned::Learned;

@@ -69,6 +69,7 @@ mod error;
 mod estimator;
 mod guard;
 mod kernel;
+mod linear;
 pub mod live;
 mod mixture;
 #[cfg(feature = "particles")]
@@ -93,7 +94,10 @@ pub use ekf::{Ekf, Step, Update};
 pub use error::StepError;
 pub use estimator::{Advanced, Estimator, Innovation, State};
 pub use guard::{Guard, Guarded, Influence, ReadingVerdict, Streak};
-pub use kernel::{AnyCurve, Compact, CompactWidth, Cubic, Curve, Lanes, Logistic, Switch};
+pub use kernel::{
+    AnyCurve, Compact, CompactWidth, Cubic, Curve, CurveLine, Lanes, Line, Logistic, SigmaPoints, Switch, Undirected,
+};
+pub use linear::{Frozen, LinearFilter};
 pub use mixture::{Dwell, Evidence, Hypotheses, Imm, Mixture, MixtureResidual, PhaseMixture, Share, SignSplit};
 #[cfg(feature = "particles")]
 pub use particles::{Particle, ParticleCloud, ParticleStep, Particles};

@@ -40,8 +40,12 @@ pub struct LogLikelihood<T> {
     readings: u32,
 }
 
-/// The product is kept between 10⁻¹⁶ and 10¹⁶: one more variance in that range cannot leave `f32`, which ends at 10±³⁸.
-const LARGEST: f64 = 1e16;
+/// The product is kept between one over this and this: one more variance in that range cannot leave the numbers, which end at
+/// 10±³⁸ in `f32` and at 10±³⁰⁸ in `f64`.
+#[inline(always)]
+fn largest<T: Scalar>() -> T {
+    T::of(if T::default_epsilon() < T::of(1e-12) { 1e150 } else { 1e16 })
+}
 
 impl<T: Scalar> LogLikelihood<T> {
     /// Of no reading.
@@ -56,7 +60,7 @@ impl<T: Scalar> LogLikelihood<T> {
         self.nis += residual.nis;
         self.product *= residual.variance;
         self.readings += 1;
-        if !(self.product > T::of(1.0 / LARGEST) && self.product < T::of(LARGEST)) {
+        if !(self.product > T::one() / largest() && self.product < largest()) {
             self.settle();
         }
     }

@@ -13,7 +13,7 @@
 
 use core::marker::PhantomData;
 
-use ohmstrain_model::{Scalar, SwitchedModel};
+use ohmstrain_model::{Scalar, SensorLaw, SwitchedModel};
 
 use crate::ekf::check_time_step;
 use crate::kernel::{Course, Gains, Parts, RateSpread, ReadingLaw, Regions, StepConstants};
@@ -22,7 +22,9 @@ use crate::{Advanced, AnyCurve, Belief, Curve, Estimator, Reading, Residual, Ste
 /// The EKF of a [`SwitchedModel`] with Ornstein-Uhlenbeck motion, for steps of one length.
 ///
 /// `S` is [`Compact`](crate::Compact) or, to agree with [`Ekf`](crate::Ekf) to rounding, [`Logistic`](crate::Logistic). `G`
-/// is the family of the gauge: [`Cubic`](crate::Cubic) saves the code of the others.
+/// is the family of the gauge: [`Cubic`](crate::Cubic) saves the code of the others. A sensor to which stretching and releasing
+/// are alike has [`Undirected`](crate::Undirected), and with a straight gauge [`Line`](crate::Line): its filter is a
+/// [`LinearFilter`](crate::LinearFilter).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SparseEkf<T, S, const B: usize, const N: usize, G = AnyCurve<T>> {
     pub(crate) step: StepConstants<T, B>,
@@ -46,6 +48,9 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
     /// The same; a step of no length is an update without a prediction.
     pub(crate) fn of_any_length(model: SwitchedModel<T, B, N>, dt_s: T) -> Result<Self, StepError> {
         check_time_step(dt_s)?;
+        if !S::DIRECTED && is_directed(model.law()) {
+            return Err(StepError::Directed);
+        }
         Ok(Self {
             step: StepConstants::new(&model, dt_s, RateSpread::<T, S>::clear()),
             gains: Gains::by_region(model.law()),
@@ -100,14 +105,35 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
         reading: Option<Reading<T>>,
     ) -> Result<Option<Residual<T>>, StepError> {
         match self.step_once(belief, reading) {
-            Err(refused) => self.step_again(belief, reading, refused),
+            Err(refused) => self.step_again(belief, reading, refused, Self::step_once),
+            taken => taken,
+        }
+    }
+
+    /// The same with a gate: a reading whose normalised innovation squared is above `gate` is compared, and not taken. Decided
+    /// before the belief is written, so that a reading turned down costs no second step. χ² with one degree of freedom exceeds
+    /// 10.8 once in a thousand.
+    ///
+    /// A gate without a way back can lock a filter out; [`Guard`](crate::Guard) has one.
+    ///
+    /// # Errors
+    /// See [`StepError`]; the belief is untouched.
+    #[inline]
+    pub fn step_gated<const L: usize>(
+        &self,
+        belief: &mut Belief<T, N, L>,
+        reading: Reading<T>,
+        gate: T,
+    ) -> Result<Residual<T>, StepError> {
+        match self.gated_once(belief, reading, gate) {
+            Err(refused) => self.gated_again(belief, reading, gate, refused),
             taken => taken,
         }
     }
 
     /// Never inlined: beside a second try a compiler would compute in advance, and store, what both have in common.
     #[inline(never)]
-    fn step_once<const L: usize>(
+    pub(crate) fn step_once<const L: usize>(
         &self,
         belief: &mut Belief<T, N, L>,
         reading: Option<Reading<T>>,
@@ -118,6 +144,36 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
         Ok(residual)
     }
 
+    /// As [`Self::step_once`].
+    #[inline(never)]
+    fn gated_once<const L: usize>(
+        &self,
+        belief: &mut Belief<T, N, L>,
+        reading: Reading<T>,
+        gate: T,
+    ) -> Result<Residual<T>, StepError> {
+        let mut parts = Parts::of(belief);
+        let spread = self.predict(&mut parts, Course::Uncertain);
+        let residual = self.update(&mut parts, reading, None, spread, Some(gate))?;
+        parts.put_into(belief);
+        Ok(residual)
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn gated_again<const L: usize>(
+        &self,
+        belief: &mut Belief<T, N, L>,
+        reading: Reading<T>,
+        gate: T,
+        refused: StepError,
+    ) -> Result<Residual<T>, StepError> {
+        let gated = |_: &Self, belief: &mut Belief<T, N, L>, reading: Option<Reading<T>>| {
+            reading.map(|reading| self.gated_once(belief, reading, gate)).transpose()
+        };
+        self.step_again(belief, Some(reading), refused, gated)?.ok_or(refused)
+    }
+
     /// A step that was `refused`, with more and more noise in its reading.
     #[cold]
     #[inline(never)]
@@ -126,12 +182,13 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
         belief: &mut Belief<T, N, L>,
         mut reading: Option<Reading<T>>,
         mut refused: StepError,
+        once: impl Fn(&Self, &mut Belief<T, N, L>, Option<Reading<T>>) -> Result<Option<Residual<T>>, StepError>,
     ) -> Result<Option<Residual<T>>, StepError> {
         let mut tries = 0;
         loop {
             tries += 1;
             reading = Some(self.coarser(reading, tries, refused)?);
-            match self.step_once(belief, reading) {
+            match once(self, belief, reading) {
                 Err(error) => refused = error,
                 taken => return taken,
             }
@@ -147,7 +204,7 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
     ) -> Result<Option<Residual<T>>, StepError> {
         let spread = self.predict(parts, Course::Uncertain);
         match reading {
-            Some(reading) => self.update(parts, reading, None, spread).map(Some),
+            Some(reading) => self.update(parts, reading, None, spread, None).map(Some),
             None if parts.is_sound::<N>(parts.variances::<N>()) => Ok(None),
             None => Err(StepError::NonFiniteState),
         }
@@ -174,6 +231,14 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
         }
         Ok(Reading { extra_variance: T::of(COARSER) * noise, ..reading })
     }
+}
+
+fn is_directed<T: Scalar, const B: usize>(law: &SensorLaw<T, B>) -> bool {
+    law.extend_viscosity_s != law.retract_viscosity_s
+        || law.branches.iter().any(|branch| {
+            branch.extend_gain != branch.retract_gain
+                || !(branch.extend_gain_slope.is_zero() && branch.retract_gain_slope.is_zero())
+        })
 }
 
 /// Growth of a reading's variance from one try to the next, and the most tries after the first.

@@ -58,7 +58,7 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
         };
         let mut belief = Belief { mean: SVector::zeros(), covariance: Symmetric::<T, N, L>::zeros() };
         before.put_into(&mut belief);
-        let taken = self.step_again(&mut belief, reading, refused)?;
+        let taken = self.step_again(&mut belief, reading, refused, Self::step_once)?;
         *parts = Parts::of(&belief);
         Ok(taken)
     }

@@ -2,7 +2,8 @@
 
 use ohmstrain_ekf::Gaussian;
 use ohmstrain_ekf::correction::{
-    Correction, FEATURES, FeatureScale, InputScale, LowPass, Process, ReadingFeatures, Simulated, mixture, settled,
+    BLOCK, Correction, FEATURES, FeatureScale, InputScale, LowPass, Process, ReadingFeatures, RowBlock, Rows,
+    Simulated, block_of, mixture, settled,
 };
 use ohmstrain_model::StrainRange;
 
@@ -94,9 +95,13 @@ fn written_out(numbers: &Numbers, input: &[f64; D], filtered: Gaussian<f64>) -> 
     (said, 1.0 - (1.0 - unknowns[1]) * (-outside(1) / 5.0).exp())
 }
 
+fn blocks<T: Copy>(rows: &[[T; D]; ROWS]) -> Vec<RowBlock<T, D>> {
+    rows.chunks(BLOCK).filter_map(block_of).collect()
+}
+
 macro_rules! correction {
     ($t:ty, $numbers:expr, $sides:expr, $rows:ident, $scales:ident, $weights:ident, $triangles:ident, $correction:ident) => {
-        let $rows = $numbers.rows.map(|row| row.map(|x| x as $t));
+        let $rows = blocks(&$numbers.rows.map(|row| row.map(|x| x as $t)));
         let $scales = $numbers.scales.map(|scale| InputScale {
             mean: scale.mean as $t,
             sd: scale.sd as $t,
@@ -119,7 +124,7 @@ macro_rules! correction {
                 least_variance: LEAST[p] as $t,
             };
         let $correction = Correction {
-            rows: &$rows,
+            rows: Rows::new(&$rows, ROWS),
             scales: &$scales,
             direct: process(0),
             one_sided: $sides.map(process),
@@ -174,7 +179,8 @@ fn simulated_rows_are_mixed_in_last() {
         widening: 1.0,
         least_variance: 0.0,
     };
-    let with = Correction { simulated: Some(Simulated { rows: &rows, scales: &wider, process }), ..learned };
+    let with =
+        Correction { simulated: Some(Simulated { rows: Rows::new(&rows, ROWS), scales: &wider, process }), ..learned };
     for trial in 0..50 {
         let input: [f64; D] = std::array::from_fn(|i| 3.0 * number(3000 + 10 * trial + i));
         let filtered = Gaussian { mean: input[0], variance: 0.05 };
@@ -184,7 +190,7 @@ fn simulated_rows_are_mixed_in_last() {
             let square: f64 = (6..D).map(|i| (x(i) - row[i]).powi(2)).sum();
             (-RELEVANCE * square).exp() + 0.09 * (1.0 + x(6) * row[6])
         };
-        let mean = 0.25 + rows.iter().zip(&weights[1]).map(|(row, weight)| weight * kernel(row)).sum::<f64>();
+        let mean = 0.25 + numbers.rows.iter().zip(&weights[1]).map(|(row, weight)| weight * kernel(row)).sum::<f64>();
         let outside: f64 = (6..D).map(|i| ((input[i] - inside[i]) / wider[i].sd).powi(2)).sum();
         let expected = Gaussian { mean: mean.clamp(-2.0, 2.0), variance: 0.08 + 0.03 * 0.7 * outside };
         let (said, alone) = (with.correct(&input, filtered, 1.0), learned.correct(&input, filtered, 1.0));

@@ -3,7 +3,7 @@
 use nalgebra::SVector;
 use ohmstrain_bench_comparison::{adskalman_smoother, typed_kalman_smoother};
 use ohmstrain_bench_filters::{DT_S, linearised, readings, sensor, smoother, sparse_smooth};
-use ohmstrain_ekf::{Belief, Reading, SparseEkf};
+use ohmstrain_ekf::{Belief, Compact, Reading, SparseEkf};
 use peak_alloc::PeakAlloc;
 
 #[global_allocator]
@@ -17,7 +17,7 @@ fn main() {
     let ours = smoother(sensor::<1, 3>());
     peak("smoother_3", || ours.in_place(&rows));
     let model = sensor::<1, 3>();
-    let ekf = SparseEkf::new(model, DT_S).expect("the step's length is positive");
+    let ekf = SparseEkf::<_, Compact, 1, 3>::new(model, DT_S).expect("the step's length is positive");
     let taken: Vec<_> = rows.iter().map(|y| Some(Reading::from(*y))).collect();
     peak("sparse_smoother_3", || sparse_smooth(&ekf, &Belief::initial(&model), &taken));
     let theirs = adskalman_smoother(&linearised());

@@ -1,12 +1,52 @@
+use std::ops::Deref;
+
 use ohmstrain_ekf::Real;
-use ohmstrain_ekf::correction::{Correction, InputScale, Process, Simulated};
+use ohmstrain_ekf::correction::{BLOCK, Correction, InputScale, Process, RowBlock, Rows, Simulated, block_of};
 use ohmstrain_model::StrainRange;
+
+/// Rows one after another, and the same side by side, as a [`Correction`] wants them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OwnedRows<T, const D: usize> {
+    rows: Vec<[T; D]>,
+    blocks: Vec<RowBlock<T, D>>,
+}
+
+impl<T: Copy, const D: usize> OwnedRows<T, D> {
+    /// The same in blocks.
+    pub fn blocks(&self) -> &[RowBlock<T, D>] {
+        &self.blocks
+    }
+
+    fn as_rows(&self) -> Rows<'_, T, D> {
+        Rows::new(&self.blocks, self.rows.len())
+    }
+
+    fn map<U: Copy>(&self, number: impl Fn(T) -> U + Copy) -> OwnedRows<U, D> {
+        self.rows.iter().map(|row| row.map(number)).collect()
+    }
+}
+
+impl<T: Copy, const D: usize> FromIterator<[T; D]> for OwnedRows<T, D> {
+    fn from_iter<I: IntoIterator<Item = [T; D]>>(rows: I) -> Self {
+        let rows: Vec<[T; D]> = rows.into_iter().collect();
+        Self { blocks: rows.chunks(BLOCK).filter_map(block_of).collect(), rows }
+    }
+}
+
+/// One after another.
+impl<T, const D: usize> Deref for OwnedRows<T, D> {
+    type Target = [[T; D]];
+
+    fn deref(&self) -> &[[T; D]] {
+        &self.rows
+    }
+}
 
 /// A [`Correction`] with everything that it borrows.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OwnedCorrection<T: 'static, const D: usize, const S: usize = 0> {
     /// Standardised inputs of the training rows; the first of them are the inducing rows.
-    pub rows: Vec<[T; D]>,
+    pub rows: OwnedRows<T, D>,
     /// Scales of the inputs.
     pub scales: [InputScale<T>; D],
     /// Strain from the features.
@@ -29,7 +69,7 @@ pub struct OwnedCorrection<T: 'static, const D: usize, const S: usize = 0> {
 #[derive(Clone, Debug, PartialEq)]
 pub struct OwnedSimulated<T: 'static, const D: usize> {
     /// Standardised inputs.
-    pub rows: Vec<[T; D]>,
+    pub rows: OwnedRows<T, D>,
     /// Scales of the inputs.
     pub scales: [InputScale<T>; D],
     /// What the rows say.
@@ -51,7 +91,7 @@ impl<T: Real + 'static, const D: usize, const S: usize> OwnedCorrection<T, D, S>
     /// As it runs.
     pub fn correction(&self) -> Correction<'_, T, D, S> {
         Correction {
-            rows: &self.rows,
+            rows: self.rows.as_rows(),
             scales: &self.scales,
             direct: self.direct.process(),
             one_sided: self.one_sided.each_ref().map(OwnedProcess::process),
@@ -66,7 +106,7 @@ impl<T: Real + 'static, const D: usize, const S: usize> OwnedCorrection<T, D, S>
     /// In another precision.
     pub fn map<U: Real + 'static>(&self, number: impl Fn(T) -> U + Copy) -> OwnedCorrection<U, D, S> {
         OwnedCorrection {
-            rows: self.rows.iter().map(|row| row.map(number)).collect(),
+            rows: self.rows.map(number),
             scales: in_precision(&self.scales, number),
             direct: self.direct.map(number),
             one_sided: self.one_sided.each_ref().map(|side| side.map(number)),
@@ -93,12 +133,12 @@ fn in_precision<T: Copy, U, const D: usize>(
 
 impl<T: Real + 'static, const D: usize> OwnedSimulated<T, D> {
     fn simulated(&self) -> Simulated<'_, T, D> {
-        Simulated { rows: &self.rows, scales: &self.scales, process: self.process.process() }
+        Simulated { rows: self.rows.as_rows(), scales: &self.scales, process: self.process.process() }
     }
 
     fn map<U: Real + 'static>(&self, number: impl Fn(T) -> U + Copy) -> OwnedSimulated<U, D> {
         OwnedSimulated {
-            rows: self.rows.iter().map(|row| row.map(number)).collect(),
+            rows: self.rows.map(number),
             scales: in_precision(&self.scales, number),
             process: self.process.map(number),
         }

@@ -108,7 +108,7 @@ impl Prepared<'_, FILTER_INPUTS> {
             least_variance: 0.0,
         };
         let process = OwnedProcess { weights, explained: vec![], numbers };
-        Some(OwnedSimulated { rows, scales, process })
+        Some(OwnedSimulated { rows: rows.into_iter().collect(), scales, process })
     }
 
     /// What the simulated rows say of each of the calibration's.

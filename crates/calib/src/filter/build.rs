@@ -3,9 +3,7 @@ use std::sync::Arc;
 #[cfg(feature = "particles")]
 use ohmstrain_ekf::Particles;
 use ohmstrain_ekf::live::Sieve;
-use ohmstrain_ekf::{
-    Belief, Dwell, Evidence, Hypotheses, Imm, Mixture, PhaseMixture, SignSplit, StepError, Ukf, Unscented,
-};
+use ohmstrain_ekf::{Belief, Dwell, Evidence, Hypotheses, Imm, Mixture, PhaseMixture, SignSplit, StepError};
 use ohmstrain_model::{Phase, SwitchedModel};
 
 use crate::filter::corrected::Corrected;
@@ -100,10 +98,10 @@ fn of_size<const B: usize, const N: usize, const L: usize>(
     let interval = interval(estimator, setting);
     match kind {
         EstimatorKind::Ekf => {
-            return Ok(Box::new(Running::new(SparseEstimator::new(model), beliefs, model, interval)));
+            return Ok(Box::new(Running::new(SparseEstimator::extended(model), beliefs, model, interval)));
         }
         EstimatorKind::Ukf => {
-            return Ok(Box::new(Running::new(Ukf::new(Unscented::new(model)), beliefs, model, interval)));
+            return Ok(Box::new(Running::new(SparseEstimator::unscented(model), beliefs, model, interval)));
         }
         EstimatorKind::Corrected => return Err(CalibrationError::no_parameters(kind)),
         _ => {}

@@ -1,47 +1,64 @@
-use ohmstrain_ekf::{Advanced, Belief, Ekf, Estimator, Innovation, Logistic, Reading, SparseEkf, StepError};
+use std::marker::PhantomData;
+
+use ohmstrain_ekf::{
+    Advanced, AnyCurve, Belief, Channel, Curve, Dynamics, Ekf, Estimator, Innovation, Logistic, Reading, SigmaPoints,
+    SparseEkf, StepError, Unscented,
+};
 use ohmstrain_model::{SwitchedModel, SwitchedStep};
 
-/// The EKF of a sensor on Ornstein-Uhlenbeck motion, stepped forward without multiplying zeros. Agrees with
-/// [`Ekf`] to rounding; where it refuses a step, and on the way back, `Ekf` decides.
+/// The EKF of a sensor on Ornstein-Uhlenbeck motion, stepped forward without multiplying zeros: by tangents of the gauge, or by its
+/// sigma points `G`. Where it refuses a step, and on the way back, the [`Ekf`] of matrices of model `M` decides.
 #[derive(Clone, Copy)]
-pub(crate) struct SparseEstimator<const B: usize, const N: usize> {
+pub(crate) struct SparseEstimator<M, G, const B: usize, const N: usize> {
     model: SwitchedModel<f64, B, N>,
+    dense: Ekf<M>,
+    curve: PhantomData<G>,
 }
 
 /// A step of one length for both.
 #[derive(Clone, Copy)]
-pub(crate) struct SparseStep<const B: usize, const N: usize> {
+pub(crate) struct SparseStep<G, const B: usize, const N: usize> {
     dense: SwitchedStep<f64, B>,
     /// `None` for what is no length of a step.
-    sparse: Option<SparseEkf<f64, Logistic, B, N>>,
+    sparse: Option<SparseEkf<f64, Logistic, B, N, G>>,
 }
 
-impl<const B: usize, const N: usize> SparseEstimator<B, N> {
-    pub(crate) const fn new(model: SwitchedModel<f64, B, N>) -> Self {
-        Self { model }
-    }
-
-    const fn dense(&self) -> Ekf<SwitchedModel<f64, B, N>> {
-        Ekf::new(self.model)
+impl<const B: usize, const N: usize> SparseEstimator<SwitchedModel<f64, B, N>, AnyCurve<f64>, B, N> {
+    /// The extended filter; agrees with [`Ekf`] to rounding.
+    pub(crate) const fn extended(model: SwitchedModel<f64, B, N>) -> Self {
+        Self { model, dense: Ekf::new(model), curve: PhantomData }
     }
 }
 
-impl<const B: usize, const N: usize, const L: usize> Estimator<f64, N, L> for SparseEstimator<B, N> {
+impl<const B: usize, const N: usize>
+    SparseEstimator<Unscented<SwitchedModel<f64, B, N>>, SigmaPoints<AnyCurve<f64>>, B, N>
+{
+    /// The unscented filter.
+    pub(crate) const fn unscented(model: SwitchedModel<f64, B, N>) -> Self {
+        Self { model, dense: Ekf::new(Unscented::new(model)), curve: PhantomData }
+    }
+}
+
+impl<M, G, const B: usize, const N: usize, const L: usize> Estimator<f64, N, L> for SparseEstimator<M, G, B, N>
+where
+    M: Dynamics<f64, N, L, Prepared = SwitchedStep<f64, B>> + Channel<f64, N, L>,
+    G: Curve<f64>,
+{
     type State = Belief<f64, N, L>;
-    type Prepared = SparseStep<B, N>;
+    type Prepared = SparseStep<G, B, N>;
 
     fn longest_step_s(&self) -> f64 {
         self.model.longest_step_s()
     }
 
-    fn prepare(&self, dt_s: f64) -> SparseStep<B, N> {
+    fn prepare(&self, dt_s: f64) -> SparseStep<G, B, N> {
         SparseStep { dense: self.model.prepare(dt_s), sparse: SparseEkf::new(self.model, dt_s).ok() }
     }
 
     fn advance(
         &self,
         state: &Belief<f64, N, L>,
-        prepared: &SparseStep<B, N>,
+        prepared: &SparseStep<G, B, N>,
         reading: Option<Reading<f64>>,
     ) -> Result<Advanced<Belief<f64, N, L>, f64>, StepError> {
         let mut next = *state;
@@ -56,17 +73,17 @@ impl<const B: usize, const N: usize, const L: usize> Estimator<f64, N, L> for Sp
                 });
                 Ok(Advanced { state: next, innovation })
             }
-            _ => self.dense().advance(state, &prepared.dense, reading),
+            _ => self.dense.advance(state, &prepared.dense, reading),
         }
     }
 
     fn smooth_back(
         &self,
         filtered: &Belief<f64, N, L>,
-        prepared: &SparseStep<B, N>,
+        prepared: &SparseStep<G, B, N>,
         reading: Option<Reading<f64>>,
         next: &Belief<f64, N, L>,
     ) -> Result<Option<Belief<f64, N, L>>, StepError> {
-        self.dense().smooth_back(filtered, &prepared.dense, reading, next)
+        self.dense.smooth_back(filtered, &prepared.dense, reading, next)
     }
 }

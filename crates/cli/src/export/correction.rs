@@ -1,6 +1,6 @@
 //! The learned correction as the templates have it.
 
-use ohmstrain_calib::{OwnedProcess, OwnedSimulated, PortableCorrection};
+use ohmstrain_calib::{OwnedProcess, OwnedRows, OwnedSimulated, PortableCorrection};
 use ohmstrain_ekf::Real;
 use ohmstrain_ekf::correction::{
     FAR, FARTHEST, FILTER_INPUTS, LINEAR, NEW, NOVEL, OUTPUTS, PASSED_OVER, RATE_GAIN, TIME_CONSTANTS_S,
@@ -25,7 +25,7 @@ pub struct CorrectionConstants {
     rate_gain: Literal,
     farthest: Literal,
     passed_over: u8,
-    rows: Vec<Vec<Literal>>,
+    rows: RowConstants,
     mean: Vec<Literal>,
     /// `None` for an input that never changes: infinite.
     sd: Vec<Option<Literal>>,
@@ -41,6 +41,24 @@ pub struct CorrectionConstants {
     linear: Literal,
     strain_variance: Literal,
     variance_factor: Literal,
+}
+
+/// Rows for C, and in blocks for Rust.
+#[derive(Debug, Serialize)]
+struct RowConstants {
+    count: usize,
+    one_by_one: Vec<Vec<Literal>>,
+    blocks: Vec<Vec<Vec<Literal>>>,
+}
+
+impl RowConstants {
+    fn new(rows: &OwnedRows<f64, FILTER_INPUTS>) -> Self {
+        Self {
+            count: rows.len(),
+            one_by_one: rows.iter().map(narrowed).collect(),
+            blocks: rows.blocks().iter().map(|block| block.iter().map(narrowed).collect()).collect(),
+        }
+    }
 }
 
 /// A Gaussian process.
@@ -61,7 +79,7 @@ struct ProcessConstants {
 /// What simulated rows say.
 #[derive(Debug, Serialize)]
 struct SimulatedConstants {
-    rows: Vec<Vec<Literal>>,
+    rows: RowConstants,
     lower: Vec<Literal>,
     upper: Vec<Literal>,
     /// Of each of the features.
@@ -73,7 +91,7 @@ impl SimulatedConstants {
     fn new(of: &OwnedSimulated<f64, FILTER_INPUTS>) -> Self {
         let process = ProcessConstants::new("SIMULATED", "Strain from the features, as the law has it.", &of.process);
         Self {
-            rows: of.rows.iter().map(narrowed).collect(),
+            rows: RowConstants::new(&of.rows),
             lower: of.scales.iter().map(|scale| narrow(scale.lower)).collect(),
             upper: of.scales.iter().map(|scale| narrow(scale.upper)).collect(),
             relevance: narrow(of.process.numbers.relevance[OUTPUTS]),
@@ -138,7 +156,7 @@ impl CorrectionConstants {
             rate_gain: narrow(RATE_GAIN),
             farthest: narrow(FARTHEST),
             passed_over: PASSED_OVER,
-            rows: learned.rows.iter().map(narrowed).collect(),
+            rows: RowConstants::new(&learned.rows),
             mean: scales.iter().map(|scale| narrow(scale.mean)).collect(),
             sd: scales.iter().map(|scale| Some(narrow(scale.sd)).filter(|sd| sd.0.is_finite())).collect(),
             lower: scales.iter().map(|scale| narrow(scale.lower)).collect(),

@@ -61,7 +61,7 @@ pub fn reduced(full: &Correction, to: Rows) -> Option<(Correction, [OwnedQuadrat
     let points = points(&full.rows);
     let (direct, of_direct) = process(&full.direct, Which::Direct, &full.rows, &points, to)?;
     let (residual, of_residual) = process(&full.residual, Which::Residual, &full.rows, &points, to)?;
-    let rows = full.rows[..rows].to_vec();
+    let rows = full.rows[..rows].iter().copied().collect();
     Some((Correction { rows, direct, residual, simulated: None, ..full.clone() }, [of_direct, of_residual]))
 }
 

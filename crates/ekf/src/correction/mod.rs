@@ -19,6 +19,7 @@ mod features;
 mod low_pass;
 mod process;
 mod quadratic;
+mod rows;
 
 use ohmstrain_model::StrainRange;
 
@@ -31,6 +32,7 @@ pub use low_pass::LowPass;
 use process::{Kernels, Said};
 pub use process::{LINEAR, Process, kernel};
 pub use quadratic::Quadratic;
+pub use rows::{BLOCK, RowBlock, Rows, block_of};
 
 /// Number of a filter's outputs that a correction sees: strain, its rate, relaxation, baseline, and the probabilities of
 /// stretching and releasing.
@@ -74,7 +76,7 @@ pub struct InputScale<T> {
 #[derive(Clone, Copy, Debug)]
 pub struct Correction<'a, T, const D: usize, const S: usize = 0> {
     /// Standardised inputs of the training rows; the first are the inducing rows, at most [`INDUCING`].
-    pub rows: &'a [[T; D]],
+    pub rows: Rows<'a, T, D>,
     /// Scales of the inputs.
     pub scales: &'a [InputScale<T>; D],
     /// Strain from all features.
@@ -97,7 +99,7 @@ pub struct Correction<'a, T, const D: usize, const S: usize = 0> {
 #[derive(Clone, Copy, Debug)]
 pub struct Simulated<'a, T, const D: usize> {
     /// Standardised inputs of the rows; outputs of a filter are not seen.
-    pub rows: &'a [[T; D]],
+    pub rows: Rows<'a, T, D>,
     /// Scales of the inputs.
     pub scales: &'a [InputScale<T>; D],
     /// What the rows say.
@@ -151,9 +153,17 @@ impl<T: Real, const D: usize, const S: usize> Correction<'_, T, D, S> {
         let Standardised { inputs: x, outside } = standardised(of.scales, inputs);
         let reading = x.get(OUTPUTS).copied().unwrap_or(T::zero());
         let mut kernels = Kernels::new(&of.process);
-        visit(like, of.rows, &x, |rows| {
-            kernels.add(&of.process, &rows.squares, rows.column(OUTPUTS).scale(reading), rows.count());
-        });
+        for rows in of.rows.side_by_side(like) {
+            let mut squares = [like.nothing(); D];
+            for i in 0..D {
+                squares[i] = rows.squares(i, x[i]);
+            }
+            let mut distance = like.nothing();
+            for i in 0..D {
+                distance += squares[i].scale(of.process.relevance[i]);
+            }
+            kernels.add(&of.process, distance, rows.column(OUTPUTS).scale(reading), rows.count);
+        }
         let said = kernels.said(like, &of.process, reading);
         self.widened(said, &of.process, of.process.distance(&outside, OUTPUTS), T::zero())
     }
@@ -177,49 +187,6 @@ fn standardised<T: Real, const D: usize>(scales: &[InputScale<T>; D], inputs: &[
     Standardised { inputs: x, outside }
 }
 
-/// Training rows side by side, one in each lane, and the squares of how far they are from the inputs.
-struct SideBySide<'r, V: Several, const D: usize> {
-    like: V,
-    rows: &'r [[V::Number; D]],
-    first: &'r [V::Number; D],
-    squares: [V; D],
-}
-
-impl<V: Several, const D: usize> SideBySide<'_, V, D> {
-    fn count(&self) -> usize {
-        self.rows.len()
-    }
-
-    /// An input of all of them; lanes that are left have the first one's.
-    #[inline(always)]
-    fn column(&self, i: usize) -> V {
-        let of_lane = |lane: usize| {
-            [self.rows.get(lane).unwrap_or(self.first).get(i).copied().unwrap_or(self.like.nothing().at(0))]
-        };
-        let [column] = self.like.build(of_lane);
-        column
-    }
-}
-
-/// Visits training rows, as many at a time as there are lanes.
-#[inline(always)]
-fn visit<V: Several<Number = T>, T: Real, const D: usize>(
-    like: V,
-    rows: &[[T; D]],
-    x: &[T; D],
-    mut see: impl FnMut(&SideBySide<'_, V, D>),
-) {
-    for rows in rows.chunks(V::WIDTH) {
-        let Some(first) = rows.first() else { break };
-        let mut now = SideBySide { like, rows, first, squares: [like.nothing(); D] };
-        for i in 0..D {
-            let apart = like.with(x[i]) - now.column(i);
-            now.squares[i] = apart * apart;
-        }
-        see(&now);
-    }
-}
-
 /// The correction of one strain; training rows stand in lanes.
 #[derive(Clone, Copy)]
 struct Correcting<'a, T, const D: usize, const S: usize> {
@@ -240,14 +207,30 @@ impl<T: Real, const D: usize, const S: usize> Work<T> for Correcting<'_, T, D, S
         let mut sides = of.one_sided.each_ref().map(Kernels::new);
         let of_residual = Process { least_variance: of.residual.least_variance.max(filtered.variance), ..of.residual };
         let (reading, strain) = (x.get(OUTPUTS).copied().unwrap_or(T::zero()), x[0]);
-        visit(like, of.rows, &x, |rows| {
-            let readings = rows.column(OUTPUTS).scale(reading);
-            direct.add(&of.direct, &rows.squares, readings, rows.count());
-            for (kernels, process) in sides.iter_mut().zip(&of.one_sided) {
-                kernels.add(process, &rows.squares, readings, rows.count());
+        for rows in of.rows.side_by_side(like) {
+            let (mut to_direct, mut to_residual, mut to_sides) = (like.nothing(), like.nothing(), [like.nothing(); S]);
+            let mut squares = [like.nothing(); D];
+            for i in 0..D {
+                squares[i] = rows.squares(i, x[i]);
             }
-            residual.add(&of.residual, &rows.squares, rows.column(0).scale(strain), rows.count());
-        });
+            for i in 0..D {
+                to_direct += squares[i].scale(of.direct.relevance[i]);
+            }
+            for i in 0..D {
+                to_residual += squares[i].scale(of.residual.relevance[i]);
+            }
+            for k in 0..S {
+                for i in 0..D {
+                    to_sides[k] += squares[i].scale(of.one_sided[k].relevance[i]);
+                }
+            }
+            let readings = rows.column(OUTPUTS).scale(reading);
+            direct.add(&of.direct, to_direct, readings, rows.count);
+            for k in 0..S {
+                sides[k].add(&of.one_sided[k], to_sides[k], readings, rows.count);
+            }
+            residual.add(&of.residual, to_residual, rows.column(0).scale(strain), rows.count);
+        }
         let of_readings = |kernels: Kernels<T>, process| {
             let said = kernels.said(like, process, reading);
             of.widened(said, process, process.distance(&outside, OUTPUTS), T::zero())
@@ -294,7 +277,12 @@ pub fn mixture<T: Real>(voices: impl IntoIterator<Item = Gaussian<T>, IntoIter: 
 
 #[cfg(all(test, feature = "simd"))]
 mod tests {
-    use super::{Correcting, Correction, FEATURES, INDUCING, InputScale, OUTPUTS, Process, Simulated, StrainRange};
+    #![allow(clippy::unwrap_used, reason = "tests")]
+
+    use super::{
+        BLOCK, Correcting, Correction, FEATURES, INDUCING, InputScale, OUTPUTS, Process, RowBlock, Rows, Simulated,
+        StrainRange, block_of,
+    };
     use crate::Gaussian;
     use crate::kernel::Work;
 
@@ -304,7 +292,9 @@ mod tests {
         const ROWS: usize = 4 * INDUCING + 3;
         const INPUTS: usize = OUTPUTS + FEATURES + 2;
         let number = |k: usize| (0.37 * k as f64).sin() + 0.5 * (1.93 * k as f64).sin();
-        let rows: [[f64; INPUTS]; ROWS] = core::array::from_fn(|k| core::array::from_fn(|i| number(29 * k + i)));
+        let row = |k: usize| core::array::from_fn(|i| number(29 * k + i));
+        let block = |k: usize| block_of::<_, INPUTS>(&[0, 1, 2, 3].map(|lane| row(BLOCK * k + lane))).unwrap();
+        let rows: [RowBlock<f64, INPUTS>; ROWS.div_ceil(BLOCK)] = core::array::from_fn(block);
         let weights: [f64; ROWS] = core::array::from_fn(|k| number(7 * k));
         let explained: [f64; 21 * 11] = core::array::from_fn(|k| 0.2 * number(3 * k));
         let process = |length: f64| Process {
@@ -319,12 +309,16 @@ mod tests {
         };
         let scales = [InputScale { mean: 0.1, sd: 0.8, lower: -1.0, upper: 1.2 }; INPUTS];
         let correction = Correction {
-            rows: &rows,
+            rows: Rows::new(&rows, ROWS),
             scales: &scales,
             direct: process(2.0),
             one_sided: [process(1.5), process(0.7)],
             residual: process(3.0),
-            simulated: Some(Simulated { rows: &rows[3..], scales: &scales, process: process(2.5) }),
+            simulated: Some(Simulated {
+                rows: Rows::new(&rows[3..], ROWS - 3 * BLOCK),
+                scales: &scales,
+                process: process(2.5),
+            }),
             limits: StrainRange { lower: -9.0, upper: 9.0 },
             strain_variance: 0.7,
             variance_factor: 1.1,

@@ -1,5 +1,5 @@
 use super::INDUCING;
-use crate::kernel::Several;
+use crate::kernel::{MOST_LANES, Several};
 use crate::{Gaussian, Real};
 
 /// Weight of the linear part of the kernel, relative to the squared exponential.
@@ -48,43 +48,41 @@ pub(super) struct Said<T> {
     pub unknown: T,
 }
 
+/// Inducing rows in whole vectors, wherever in them the first one of a vector is.
+const ROOM: usize = INDUCING + MOST_LANES - 1;
+
 /// Kernels with the training rows, row by row.
 pub(super) struct Kernels<T> {
     mean: T,
-    /// With the inducing rows.
-    inducing: [T; INDUCING],
+    /// With the inducing rows, and room for what fills the last vector.
+    inducing: [T; ROOM],
     rows: usize,
 }
 
 impl<T: Real> Kernels<T> {
     pub(super) fn new<const D: usize>(process: &Process<'_, T, D>) -> Self {
-        Self { mean: process.mean, inducing: [T::zero(); INDUCING], rows: 0 }
+        Self { mean: process.mean, inducing: [T::zero(); ROOM], rows: 0 }
     }
 
-    /// Adds the next training rows, `count` of which there are, with the squares of their distances in each input and the
-    /// product of the first inputs.
+    /// Adds the next training rows, `count` of which there are, with their distances by relevance and the product of the first
+    /// inputs.
     #[inline(always)]
     pub(super) fn add<V: Several<Number = T>, const D: usize>(
         &mut self,
         process: &Process<'_, T, D>,
-        squares: &[V; D],
+        distance: V,
         product: V,
         count: usize,
     ) {
-        let mut exponent = product.nothing();
-        for i in 0..D {
-            exponent += squares[i].scale(process.relevance[i]);
-        }
-        let kernel = T::falling(-exponent) + (product + product.literal(1.0)).scale(T::of(LINEAR));
-        let weights = process.weights.get(self.rows..).unwrap_or(&[]);
-        let [weights] = kernel.build(|lane| [weights.get(lane).copied().unwrap_or(T::zero())]);
-        let weighted = weights * kernel;
+        let kernel = T::falling(-distance) + (product + product.literal(1.0)).scale(T::of(LINEAR));
+        let weights = process.weights.get(self.rows..self.rows + count).unwrap_or(&[]);
+        let weighted = kernel.first_of(weights) * kernel;
         // One after the other: the same sum whatever the lanes.
         for lane in 0..V::WIDTH {
             self.mean += weighted.at(lane);
-            if let Some(place) = self.inducing.get_mut(self.rows + lane) {
-                *place = kernel.at(lane);
-            }
+        }
+        if let Some(places) = self.inducing.get_mut(self.rows..) {
+            kernel.put_first(places);
         }
         self.rows += count;
     }
@@ -106,18 +104,19 @@ impl<T: Real> Kernels<T> {
     /// |W k|².
     #[inline(always)]
     fn explained<V: Several<Number = T>>(&self, like: V, mut triangle: &[T]) -> T {
-        let mut explained = T::zero();
         // m rows of the triangle are m (m + 1) / 2 numbers.
         let rows = ((8 * triangle.len() + 1).isqrt() - 1) / 2;
-        let mut kernels = &self.inducing[..rows.min(self.rows).min(INDUCING)];
-        while let Some((row, rest)) = triangle.split_at_checked(kernels.len().min(triangle.len())) {
-            if row.is_empty() {
-                break;
-            }
-            let product = T::dot(like, row, kernels);
+        let rows = rows.min(self.rows).min(INDUCING);
+        // Nothing follows the kernels, so that a row may be read on into the next one to the end of a vector.
+        let mut kernels = self.inducing;
+        kernels.iter_mut().skip(rows).for_each(|kernel| *kernel = T::zero());
+        let mut explained = T::zero();
+        for k in 0..rows {
+            let count = (rows - k).next_multiple_of(V::WIDTH);
+            let (row, with) = (triangle.get(..count).unwrap_or(triangle), kernels.get(k..).unwrap_or(&[]));
+            let product = T::dot(like, row, with.get(..row.len()).unwrap_or(with));
             explained += product * product;
-            triangle = rest;
-            kernels = kernels.get(1..).unwrap_or(&[]);
+            triangle = triangle.get(rows - k..).unwrap_or(&[]);
         }
         explained
     }

@@ -9,6 +9,24 @@ pub trait Curve<T: Scalar>: Copy {
 
     /// g(ε) and g′(ε).
     fn value_and_slope<V: Lanes<Number = T>>(&self, strain: V) -> (V, V);
+
+    /// The line that stands for g where strain has a variance: without a say in it, the tangent at the mean.
+    #[inline(always)]
+    fn line<V: Lanes<Number = T>>(&self, strain: V, _variance: V) -> CurveLine<V> {
+        let (value, slope) = self.value_and_slope(strain);
+        CurveLine { value, slope, left: None }
+    }
+}
+
+/// What stands for a curve in an update.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CurveLine<V> {
+    /// Expected value.
+    pub value: V,
+    /// Slope.
+    pub slope: V,
+    /// Variance of what the line leaves over, if that is known.
+    pub left: Option<V>,
 }
 
 /// Any gauge, chosen while running.
@@ -91,6 +109,60 @@ impl<T: Scalar> Curve<T> for Cubic<T> {
         let b2 = strain.mul_add(a3, a2);
         let b1 = strain.mul_add(b2, a1);
         (strain.mul_add(b1, a0), strain.mul_add(strain.mul_add(a3, b2), b1))
+    }
+}
+
+/// A gauge seen through the unscented transform: three points of strain, at the mean (weight 2/3) and √3 deviations to either
+/// side (1/6 each), which have the moments of a normal distribution up to the fifth. Nothing but the gauge is curved, so that a
+/// [`SparseEkf`](crate::SparseEkf) with this curve is the unscented Kalman filter.
+///
+/// Source: Julier & Uhlmann, *Proc. IEEE* 92 (2004) 401, with one dimension and κ = 2.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SigmaPoints<G>(G);
+
+impl<T: Scalar, G: Curve<T>> Curve<T> for SigmaPoints<G> {
+    fn new(gauge: &Gauge<T>, range: &StrainRange<T>) -> Option<Self> {
+        G::new(gauge, range).map(Self)
+    }
+
+    #[inline(always)]
+    fn value_and_slope<V: Lanes<Number = T>>(&self, strain: V) -> (V, V) {
+        self.0.value_and_slope(strain)
+    }
+
+    #[inline(always)]
+    fn line<V: Lanes<Number = T>>(&self, strain: V, variance: V) -> CurveLine<V> {
+        let (here, tangent) = self.0.value_and_slope(strain);
+        let spreads = variance.nothing().less(variance);
+        let triple = variance * variance.literal(3.0);
+        let (offset, per_square) = (triple.root(), triple.recip());
+        let (up, _) = self.0.value_and_slope(strain + offset);
+        let (down, _) = self.0.value_and_slope(strain - offset);
+        let half = variance.literal(0.5);
+        let bend = V::pick(spreads, (up + down) * half - here, variance.nothing());
+        let slope = V::pick(spreads, (up - down) * half * (offset * per_square), tangent);
+        let left = bend * bend * bend.literal(2.0 / 9.0);
+        CurveLine { value: bend.mul_add(bend.literal(1.0 / 3.0), here), slope, left: Some(left) }
+    }
+}
+
+/// A gauge that is a line: its slope is the same everywhere.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Line<T> {
+    slope: T,
+}
+
+impl<T: Scalar> Curve<T> for Line<T> {
+    fn new(gauge: &Gauge<T>, _: &StrainRange<T>) -> Option<Self> {
+        match *gauge {
+            Gauge::Polynomial { coefficients: [slope, a2, a3] } if a2.is_zero() && a3.is_zero() => Some(Self { slope }),
+            _ => None,
+        }
+    }
+
+    #[inline(always)]
+    fn value_and_slope<V: Lanes<Number = T>>(&self, strain: V) -> (V, V) {
+        (strain.scale(self.slope), strain.with(self.slope))
     }
 }
 

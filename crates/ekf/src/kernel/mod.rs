@@ -20,7 +20,7 @@ mod update;
 
 pub(crate) use constants::{Gains, StepConstants};
 pub(crate) use curve::Regions;
-pub use curve::{AnyCurve, Cubic, Curve};
+pub use curve::{AnyCurve, Cubic, Curve, CurveLine, Line, SigmaPoints};
 pub use lanes::Lanes;
 #[cfg(feature = "simd")]
 pub(crate) use lanes::Vector;
@@ -28,5 +28,5 @@ pub(crate) use parts::{Part, Parts};
 pub(crate) use predict::{Course, Driven};
 pub(crate) use several::{InVectors, MOST_LANES, Several, Work};
 pub(crate) use switch::RateSpread;
-pub use switch::{Compact, CompactWidth, Logistic, Switch};
+pub use switch::{Compact, CompactWidth, Logistic, Switch, Undirected};
 pub(crate) use update::{Compared, ReadingLaw, refusal};

@@ -140,6 +140,10 @@ impl<T: Scalar, S, const B: usize, const N: usize, G> SparseEkf<T, S, B, N, G> {
             let push = course.input(strain, branch.input, branch.phase_input);
             let unit = sum(push, before, pair(strain, branch.drive));
             drives[i] = match course {
+                _ if !X::DIRECTED => {
+                    let gain = gains.of(i).only();
+                    Drive { change: gain * unit, gain, ..nothing }
+                }
                 Course::Uncertain => split(branch, gains.of(i), unit, &mut spread),
                 Course::Known(phase) => known(gains.of(i), unit, phase),
                 Course::Within(phase, turning) => within(branch, gains.of(i), unit, (phase, &turning)),
@@ -148,7 +152,7 @@ impl<T: Scalar, S, const B: usize, const N: usize, G> SparseEkf<T, S, B, N, G> {
         // All branches are driven by about the same rate: what its direction leaves open is taken from the first.
         let mut unexplained = if B > 0 { drives[0].left } else { zero };
         let opens = zero.less(unexplained);
-        if matches!(course, Course::Uncertain) && !V::none(opens) {
+        if X::DIRECTED && matches!(course, Course::Uncertain) && !V::none(opens) {
             let [with_strain, together] = [dot(with_strain, b), dot(with_rate, b)];
             let fresh = sum(strain.with(step.noise[2]), [with_strain, together], pair(strain, step.rate_change));
             let steps = correlated_steps(parts.rate_variance, together, fresh);
@@ -167,17 +171,19 @@ impl<T: Scalar, S, const B: usize, const N: usize, G> SparseEkf<T, S, B, N, G> {
         for i in 0..B {
             let (branch, part, Drive { change, gain, pull, jump, .. }) =
                 (&step.branches[i], &parts.branches[i], drives[i]);
-            let row = [gain.scale_add(branch.drive[0], pull), gain.scale(branch.drive[1])];
+            let [from_strain, from_rate] = branch.drive;
+            let grown = if X::DIRECTED { gain.scale_add(from_strain, pull) } else { gain.scale(from_strain) };
+            let row = [grown, gain.scale(from_rate)];
             let kept = [part.with_strain.scale(branch.decay), part.with_rate.scale(branch.decay)];
             let carried = [sum(kept[0], row, with_strain), sum(kept[1], row, with_rate)];
             driven[i] = Driven { change, gain, pull, row, kept, carried, jump };
         }
-        predict_branches(step, parts, &driven, [a, b]);
-        if !V::none(zero.less(unexplained)) {
+        predict_branches::<V, X, B>(step, parts, &driven, [a, b]);
+        if X::DIRECTED && !V::none(zero.less(unexplained)) {
             leave_open(parts, &driven, unexplained);
         }
         if Self::HAS_BASELINE {
-            predict_baseline(step, &mut parts.baseline, &driven, [a, b]);
+            predict_baseline::<V, X, B>(step, &mut parts.baseline, &driven, [a, b]);
         }
         (RateSpread::new(parts.rate_variance), driven)
     }
@@ -296,6 +302,12 @@ fn split<V: Lanes, S: Switch<V>, const B: usize>(
     }
 }
 
+/// `pull · factor + term`: without a direction no gain grows, and nothing is pulled.
+#[inline(always)]
+fn pulled<V: Lanes, X: Switch<V>>(pull: V, factor: V, term: V) -> V {
+    if X::DIRECTED { pull.mul_add(factor, term) } else { term }
+}
+
 /// Adds what the direction leaves open: one number for all branches.
 #[inline(always)]
 fn leave_open<V: Lanes, const B: usize>(parts: &mut Parts<V, B>, driven: &[Driven<V>; B], unexplained: V) {
@@ -311,7 +323,7 @@ fn leave_open<V: Lanes, const B: usize>(parts: &mut Parts<V, B>, driven: &[Drive
 
 /// The branches' covariances with the new motion, which is in `parts` already, and with each other.
 #[inline(always)]
-fn predict_branches<V: Lanes, const B: usize>(
+fn predict_branches<V: Lanes, X: Switch<V>, const B: usize>(
     step: &StepConstants<V::Number, B>,
     parts: &mut Parts<V, B>,
     driven: &[Driven<V>; B],
@@ -322,29 +334,29 @@ fn predict_branches<V: Lanes, const B: usize>(
         // Without the new strain's share in the gain.
         let strain = sum(gain.scale(branch.cross_noise[0]), carried, a);
         let rate = sum(gain.scale(branch.cross_noise[1]), carried, b);
-        let with_strain = pull.mul_add(parts.strain_variance, strain);
+        let with_strain = pulled::<V, X>(pull, parts.strain_variance, strain);
         for k in 0..i {
             let (other, others_strain) = (&driven[k], parts.branches[k].with_strain);
             let with = &mut parts.branches[i].with[k];
             let from_motion = sum(other.gain * gain.scale(branch.noise[k]), other.row, carried);
             let from_both = sum(from_motion, row, other.kept);
             let own = with.scale_add(branch.decays[k], from_both);
-            *with = sum(own, [other.pull, pull], [strain, others_strain]);
+            *with = pulled::<V, X>(pull, others_strain, pulled::<V, X>(other.pull, strain, own));
         }
         let part = &mut parts.branches[i];
         let noise = gain.mul_add(gain.scale(branch.noise[i]), gain.with(branch.variance));
         let from_motion = sum(noise, row, [carried[0] + kept[0], carried[1] + kept[1]]);
         let own = part.variance.scale_add(branch.decays[i], from_motion);
-        part.variance = pull.mul_add(strain + with_strain, own);
+        part.variance = pulled::<V, X>(pull, strain + with_strain, own);
         part.mean = part.mean.scale_add(branch.decay, change);
         part.with_strain = with_strain;
-        part.with_rate = pull.mul_add(parts.strain_rate, rate);
+        part.with_rate = pulled::<V, X>(pull, parts.strain_rate, rate);
     }
 }
 
 /// The baseline's covariances, from its own old ones.
 #[inline(always)]
-fn predict_baseline<V: Lanes, const B: usize>(
+fn predict_baseline<V: Lanes, X: Switch<V>, const B: usize>(
     step: &StepConstants<V::Number, B>,
     part: &mut Part<V, B>,
     driven: &[Driven<V>; B],
@@ -357,7 +369,7 @@ fn predict_baseline<V: Lanes, const B: usize>(
     for i in 0..B {
         let Driven { pull, row, .. } = driven[i];
         let own = part.with[i].scale_add(step.baseline_decays[i], dot(row, kept));
-        part.with[i] = pull.mul_add(part.with_strain, own);
+        part.with[i] = pulled::<V, X>(pull, part.with_strain, own);
     }
     part.mean = part.mean.scale(decay);
     part.variance = part.variance.scale_add(step.baseline_square, part.mean.with(step.baseline_variance));

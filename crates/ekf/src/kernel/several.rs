@@ -17,6 +17,14 @@ pub(crate) trait Several: Lanes {
     fn at(&self, lane: usize) -> Self::Number;
     /// Numbers made lane by lane.
     fn build<const K: usize>(self, numbers: impl FnMut(usize) -> [Self::Number; K]) -> [Self; K];
+    /// The numbers with which a slice begins, zero where it has fewer than there are lanes.
+    #[must_use]
+    fn first_of(self, numbers: &[Self::Number]) -> Self;
+    /// Writes the numbers to where a slice begins, as many as it has room for.
+    fn put_first(&self, places: &mut [Self::Number]);
+    /// The bits of the numbers shifted to the left; `shifted` does it with one of them.
+    #[must_use]
+    fn bits_shifted(self, by: u32, shifted: impl FnOnce(Self::Number) -> Self::Number) -> Self;
     /// Where something is true.
     fn mask(self, truth: impl FnMut(usize) -> bool) -> Self::Mask;
     /// The numbers in a lane.
@@ -44,6 +52,23 @@ impl<T: Scalar> Several for T {
     #[inline(always)]
     fn build<const K: usize>(self, mut numbers: impl FnMut(usize) -> [T; K]) -> [T; K] {
         numbers(0)
+    }
+
+    #[inline(always)]
+    fn first_of(self, numbers: &[T]) -> T {
+        numbers.first().copied().unwrap_or(T::zero())
+    }
+
+    #[inline(always)]
+    fn put_first(&self, places: &mut [T]) {
+        if let Some(place) = places.first_mut() {
+            *place = *self;
+        }
+    }
+
+    #[inline(always)]
+    fn bits_shifted(self, _: u32, shifted: impl FnOnce(T) -> T) -> T {
+        shifted(self)
     }
 
     #[inline(always)]
@@ -102,6 +127,31 @@ mod vector {
                 built[k].numbers = V::from_slice(self.simd, &rows[k][..V::LEN]);
             }
             built
+        }
+
+        #[inline(always)]
+        fn first_of(self, numbers: &[V::Element]) -> Self {
+            if let Some(all) = numbers.get(..V::LEN) {
+                return Self { numbers: V::from_slice(self.simd, all), ..self };
+            }
+            let [some] = self.build(|lane| [numbers.get(lane).copied().unwrap_or(V::Element::of(0.0))]);
+            some
+        }
+
+        #[inline(always)]
+        fn put_first(&self, places: &mut [V::Element]) {
+            if let Some(all) = places.get_mut(..V::LEN) {
+                self.numbers.store_slice(all);
+                return;
+            }
+            for (place, number) in places.iter_mut().zip(self.numbers.as_slice()) {
+                *place = *number;
+            }
+        }
+
+        #[inline(always)]
+        fn bits_shifted(self, by: u32, _: impl FnOnce(V::Element) -> V::Element) -> Self {
+            Self { numbers: V::from_bits(self.numbers.to_bits() << by), ..self }
         }
 
         #[inline(always)]
@@ -208,8 +258,8 @@ impl InVectors for f64 {
         for k in (0..13).rev() {
             sum = sum.mul_add(r, x.literal(INVERSE_FACTORIALS[k]));
         }
-        let [power] = x.build(|lane| [Self::from_bits(rounded.at(lane).to_bits() << 52)]);
-        sum * power
+        // The integer in the lowest bits becomes an exponent.
+        sum * rounded.bits_shifted(52, |one| Self::from_bits(one.to_bits() << 52))
     }
 
     /// In four sums, of every fourth product each.
@@ -218,8 +268,7 @@ impl InVectors for f64 {
         let mut sums = [like.nothing(); 4];
         let mut add = |a: [Self; 4], b: [Self; 4]| {
             for i in 0..4 / V::WIDTH {
-                let [a, b] = like.build(|lane| [a[i * V::WIDTH + lane], b[i * V::WIDTH + lane]]);
-                sums[i] = a.mul_add(b, sums[i]);
+                sums[i] = like.first_of(&a[i * V::WIDTH..]).mul_add(like.first_of(&b[i * V::WIDTH..]), sums[i]);
             }
         };
         let ((fours_a, last_a), (fours_b, last_b)) = (a.as_chunks(), b.as_chunks());

@@ -2,6 +2,7 @@
 
 use ohmstrain_model::{Phase, Scalar, SwitchedModel};
 
+use super::curve::CurveLine;
 use super::predict::{dot, sum};
 use super::{Curve, Lanes, Part, Parts, RateSpread, Several, Switch};
 use crate::{Reading, Residual, SparseEkf, StepError};
@@ -37,7 +38,7 @@ struct OfMotion<V> {
     /// Its derivatives by strain and rate.
     slope: V,
     viscosity: V,
-    /// Variance of what an uncertain direction leaves of the dash-pot.
+    /// Variance of what lines leave of the gauge, and an uncertain direction of the dash-pot.
     open: V,
 }
 
@@ -55,19 +56,20 @@ impl<T: Scalar, G: Curve<T>> ReadingLaw<T, G> {
     #[inline(always)]
     fn of_motion<V: Lanes<Number = T>, S: Switch<V>>(
         &self,
-        strain: V,
+        (strain, strain_variance): (V, V),
         rate: V,
         phase: Option<Phase>,
         spread: &mut RateSpread<V, S>,
     ) -> OfMotion<V> {
-        let (gauge, slope) = self.curve.value_and_slope(strain);
+        let CurveLine { value: gauge, slope, left } = self.curve.line(strain, strain_variance);
         let zero = strain.nothing();
         let (extend, retract) = (strain.with(self.extend_viscosity_s), strain.with(self.retract_viscosity_s));
-        let still = OfMotion { expected: gauge, slope, viscosity: zero, open: zero };
+        let still = OfMotion { expected: gauge, slope, viscosity: zero, open: left.unwrap_or(zero) };
         match phase {
             Some(Phase::Hold) => return still,
             Some(Phase::Extend) => return still.moving(extend, rate),
             Some(Phase::Retract) => return still.moving(retract, rate),
+            None if !S::DIRECTED => return still.moving(extend, rate),
             None => {}
         }
         let uncertain = (rate * rate).less(spread.variance.scale(RateSpread::<V, S>::clear()));
@@ -77,7 +79,8 @@ impl<T: Scalar, G: Curve<T>> ReadingLaw<T, G> {
         let (split, jump) = (spread.blend(rate), extend - retract);
         let expected = sum(gauge, [split.extend, split.retract], [extend, retract]);
         let viscosity = dot([split.extend_probability, split.retract_probability], [extend, retract]);
-        let open = OfMotion { expected, slope, viscosity, open: jump * jump * split.variance };
+        let of_split = jump * jump * split.variance;
+        let open = OfMotion { expected, slope, viscosity, open: left.map_or(of_split, |left| left + of_split) };
         if V::all(uncertain) {
             return open;
         }
@@ -86,8 +89,16 @@ impl<T: Scalar, G: Curve<T>> ReadingLaw<T, G> {
             expected: V::pick(uncertain, open.expected, clear.expected),
             slope,
             viscosity: V::pick(uncertain, open.viscosity, clear.viscosity),
-            open: V::pick(uncertain, open.open, zero),
+            open: V::pick(uncertain, open.open, clear.open),
         }
+    }
+}
+
+impl<V: Lanes, const B: usize> Compared<V, B> {
+    /// Normalised innovation squared.
+    #[inline(always)]
+    pub(crate) fn nis(&self) -> V {
+        self.innovation * (self.innovation * self.variance.recip())
     }
 }
 
@@ -100,8 +111,9 @@ impl<V: Lanes> OfMotion<V> {
 }
 
 impl<T: Scalar, S, const B: usize, const N: usize, G: Curve<T>> SparseEkf<T, S, B, N, G> {
-    /// Takes a reading. `phase` is a hypothesis, as for [`Channel::observe`](crate::Channel::observe); with `None` the rate
-    /// is split by its variance, which is in `spread`. After an error `parts` means nothing.
+    /// Takes a reading, unless there is a `gate` and its NIS is beyond. `phase` is a hypothesis, as for
+    /// [`Channel::observe`](crate::Channel::observe); with `None` the rate is split by its variance, which is in `spread`. After
+    /// an error `parts` means nothing.
     #[inline(always)]
     pub(crate) fn update(
         &self,
@@ -109,13 +121,17 @@ impl<T: Scalar, S, const B: usize, const N: usize, G: Curve<T>> SparseEkf<T, S, 
         reading: Reading<T>,
         phase: Option<Phase>,
         spread: RateSpread<T, S>,
+        gate: Option<T>,
     ) -> Result<Residual<T>, StepError>
     where
         S: Switch<T>,
     {
         let compared = self.compare(parts, reading, phase, spread);
-        let nis = Self::correct(parts, &compared, true);
         let Compared { innovation, variance, .. } = compared;
+        let nis = compared.nis();
+        if gate.is_none_or(|gate| nis <= gate) {
+            Self::correct(parts, &compared, true);
+        }
         let residual = Residual { innovation, variance, nis };
         // S and ν²/S finite, S above zero: then everything before was finite. No variance below zero: then no gain can have
         // left the range of the numbers (Cauchy-Schwarz), and the means are all that is left to look at.
@@ -157,7 +173,8 @@ impl<T: Scalar, S, const B: usize, const N: usize, G: Curve<T>> SparseEkf<T, S, 
         phase: Option<Phase>,
         mut spread: RateSpread<V, X>,
     ) -> Compared<V, B> {
-        let of_motion = self.reading.of_motion(parts.strain, parts.rate, phase, &mut spread);
+        let strain = (parts.strain, parts.strain_variance);
+        let of_motion = self.reading.of_motion(strain, parts.rate, phase, &mut spread);
         let OfMotion { mut expected, slope, viscosity, open } = of_motion;
 
         // P Hᵀ, and S = H P Hᵀ + R.

@@ -144,7 +144,7 @@ impl<T: Real, const B: usize, const N: usize, S: Switch<T>, G: Curve<T>> Imm<T, 
         }
         let spread = self.kernel.predict(&mut mode.parts, Course::Known(phase));
         if let Some(reading) = reading {
-            let residual = self.kernel.update(&mut mode.parts, reading, Some(phase), spread)?;
+            let residual = self.kernel.update(&mut mode.parts, reading, Some(phase), spread, None)?;
             mode.weight = self.weighing.likelihood::<T, S>(mode.prior, &residual);
             mode.residual = Some(residual);
         } else if !mode.parts.is_sound::<N>(mode.parts.variances::<N>()) {

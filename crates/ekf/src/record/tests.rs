@@ -118,7 +118,7 @@ fn what_is_written_down_is_what_the_kernel_does() {
                 let mut parts = Parts::of(&state);
                 let reading = Reading { value: 0.3, extra_variance: 1e-6 };
                 let spread = RateSpread::new(parts.rate_variance);
-                let taken = filter.update(&mut parts, reading, phase, spread).unwrap();
+                let taken = filter.update(&mut parts, reading, phase, spread, None).unwrap();
                 let mut expected = numbers(&parts, &state);
                 expected.extend([taken.innovation, taken.variance, taken.nis, 1.0]);
                 compare(&filter, Piece::Take(phase), &state, [0.3, 1e-6], &expected);

@@ -1,6 +1,6 @@
 /* ---- The learned correction ---------------------------------------------------------------------------------------- */
 
-enum { INPUTS = 13, OUTPUTS = 6, FEATURES = 7, ROWS = << correction.rows|length >>, INDUCING = << correction.inducing >> };
+enum { INPUTS = 13, OUTPUTS = 6, FEATURES = 7, ROWS = << correction.rows.count >>, INDUCING = << correction.inducing >> };
 
 /* Scales of the inputs: the filter's strain, rate, relaxation, baseline, probabilities of stretching and releasing; then
  * the reading, its distances from low-passes, and two rates. */
@@ -19,7 +19,7 @@ static const float RATE_SCALE[2] = {<< correction.rates|join("f, ") >>f};
 
 /* Standardised inputs of rows of the calibration; the first are the inducing rows. */
 static const float ROW[ROWS][INPUTS] = {
-{% for row in correction.rows %}
+{% for row in correction.rows.one_by_one %}
     {<< row|join("f, ") >>f},
 {% endfor %}
 };
@@ -137,11 +137,11 @@ static float variance_of(const process *p, const float kernel[INDUCING], float f
 }
 
 {% if correction.simulated %}
-enum { SIMULATED_ROWS = << correction.simulated.rows|length >> };
+enum { SIMULATED_ROWS = << correction.simulated.rows.count >> };
 
 /* Standardised features of readings that the law gave in simulated motions, what they say, and their range. */
 static const float SIMULATED_ROW[SIMULATED_ROWS][FEATURES] = {
-{% for row in correction.simulated.rows %}
+{% for row in correction.simulated.rows.one_by_one %}
     {<< row[6:]|join("f, ") >>f},
 {% endfor %}
 };

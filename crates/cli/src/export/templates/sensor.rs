@@ -6,7 +6,7 @@
 #![allow(dead_code, clippy::excessive_precision, clippy::unreadable_literal, reason = "generated")]
 
 {% if correction %}
-use ohmstrain_ekf::correction::{Correction, FILTER_INPUTS, FeatureScale, InputScale, Process{% if correction.quadratics %}, Quadratic{% endif %}{% if correction.simulated %}, Simulated{% endif %}};
+use ohmstrain_ekf::correction::{Correction, FILTER_INPUTS, FeatureScale, InputScale, Process{% if correction.quadratics %}, Quadratic{% endif %}, RowBlock, Rows{% if correction.simulated %}, Simulated{% endif %}};
 use ohmstrain_ekf::live::{DoubtParts, Learned, LiveFilter, LiveParts, RestBounds, {% if doubt.rest %}RestSeen, {% endif %}Sieve, Unread};
 {% else %}
 use ohmstrain_ekf::live::{DoubtParts, LiveFilter, LiveParts, RestBounds, {% if doubt.rest %}RestSeen, {% endif %}Sieve, Unread};
@@ -227,7 +227,7 @@ pub const LEARNED: Learned<'static, f32> = Learned {
 
 /// What was learned in calibration.
 pub const CORRECTION: Correction<'static, f32, FILTER_INPUTS> = Correction {
-    rows: &ROWS,
+    rows: Rows::new(&ROWS, << correction.rows.count >>),
     scales: &SCALES,
     one_sided: [],
 {% for p in correction.processes %}
@@ -245,7 +245,7 @@ pub const CORRECTION: Correction<'static, f32, FILTER_INPUTS> = Correction {
 {% if correction.simulated %}
 {% set p = correction.simulated.process %}
     simulated: Some(Simulated {
-        rows: &SIMULATED_ROWS,
+        rows: Rows::new(&SIMULATED_ROWS, << correction.simulated.rows.count >>),
         scales: &SIMULATED_SCALES,
         process: Process {
             relevance: [<< p.relevance|join(", ") >>],
@@ -271,9 +271,9 @@ static SCALES: [InputScale<f32>; FILTER_INPUTS] = [
     InputScale { mean: << mean >>, sd: {% if correction.sd[loop.index0] is none %}f32::INFINITY{% else %}<< correction.sd[loop.index0] >>{% endif %}, lower: << correction.lower[loop.index0] >>, upper: << correction.upper[loop.index0] >> },
 {% endfor %}
 ];
-static ROWS: [[f32; FILTER_INPUTS]; << correction.rows|length >>] = [
-{% for row in correction.rows %}
-    [<< row|join(", ") >>],
+static ROWS: [RowBlock<f32, FILTER_INPUTS>; << correction.rows.blocks|length >>] = [
+{% for block in correction.rows.blocks %}
+    [{% for input in block %}[<< input|join(", ") >>]{% if not loop.last %}, {% endif %}{% endfor %}],
 {% endfor %}
 ];
 {% for p in correction.processes %}
@@ -286,9 +286,9 @@ static SIMULATED_SCALES: [InputScale<f32>; FILTER_INPUTS] = [
     InputScale { mean: << mean >>, sd: {% if correction.sd[loop.index0] is none %}f32::INFINITY{% else %}<< correction.sd[loop.index0] >>{% endif %}, lower: << correction.simulated.lower[loop.index0] >>, upper: << correction.simulated.upper[loop.index0] >> },
 {% endfor %}
 ];
-static SIMULATED_ROWS: [[f32; FILTER_INPUTS]; << correction.simulated.rows|length >>] = [
-{% for row in correction.simulated.rows %}
-    [<< row|join(", ") >>],
+static SIMULATED_ROWS: [RowBlock<f32, FILTER_INPUTS>; << correction.simulated.rows.blocks|length >>] = [
+{% for block in correction.simulated.rows.blocks %}
+    [{% for input in block %}[<< input|join(", ") >>]{% if not loop.last %}, {% endif %}{% endfor %}],
 {% endfor %}
 ];
 static SIMULATED_WEIGHTS: [f32; << correction.simulated.process.weights|length >>] = [<< correction.simulated.process.weights|join(", ") >>];
