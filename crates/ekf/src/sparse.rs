@@ -17,7 +17,7 @@ use ohmstrain_model::{Scalar, SensorLaw, SwitchedModel};
 
 use crate::ekf::check_time_step;
 use crate::kernel::{Course, Gains, Parts, RateSpread, ReadingLaw, Regions, StepConstants};
-use crate::{Advanced, AnyCurve, Belief, Curve, Estimator, Reading, Residual, StepError, Switch};
+use crate::{Advanced, AnyCurve, Belief, Curve, Estimator, Reading, Residual, StepError, Switch, rts_step};
 
 /// The EKF of a [`SwitchedModel`] with Ornstein-Uhlenbeck motion, for steps of one length.
 ///
@@ -45,7 +45,16 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
         Self::of_any_length(model, dt_s)
     }
 
-    /// The same; a step of no length is an update without a prediction.
+    /// A filter whose own step has no length, and is an update without a prediction; steps are those that it
+    /// [prepares](Estimator::prepare).
+    ///
+    /// # Errors
+    /// If the model's law is of another family than the filter.
+    pub fn at_a_moment(model: SwitchedModel<T, B, N>) -> Result<Self, StepError> {
+        Self::of_any_length(model, T::zero())
+    }
+
+    /// A filter for steps of `dt_s` seconds, or of no length.
     pub(crate) fn of_any_length(model: SwitchedModel<T, B, N>, dt_s: T) -> Result<Self, StepError> {
         check_time_step(dt_s)?;
         if !S::DIRECTED && is_directed(model.law()) {
@@ -251,7 +260,7 @@ fn check_step_length<T: Scalar>(dt_s: T) -> Result<(), StepError> {
     if dt_s.is_zero() { Err(StepError::NegativeTimeStep) } else { Ok(()) }
 }
 
-/// The prepared step is the filter itself, made for that length. It has no smoother: that is [`Ekf`](crate::Ekf)'s.
+/// The prepared step is the filter itself, made for that length.
 impl<T, S, const B: usize, const N: usize, G, const L: usize> Estimator<T, N, L> for SparseEkf<T, S, B, N, G>
 where
     T: Scalar,
@@ -282,5 +291,16 @@ where
         let innovation =
             residual.map(|residual| residual.with_log_likelihood(residual.log_likelihood())).transpose()?;
         Ok(Advanced { state: next, innovation })
+    }
+
+    fn smooth_back(
+        &self,
+        filtered: &Belief<T, N, L>,
+        prepared: &Self,
+        _: Option<Reading<T>>,
+        next: &Belief<T, N, L>,
+    ) -> Result<Option<Belief<T, N, L>>, StepError> {
+        let (transition, prior) = prepared.transition(filtered);
+        Ok(Some(rts_step(filtered, &transition, &prior, next)))
     }
 }

@@ -1,7 +1,6 @@
 //! Whole series of readings, without memory of its own: the belief stays taken apart from step to step.
 
-use nalgebra::SVector;
-use ohmstrain_model::{Scalar, Symmetric};
+use ohmstrain_model::Scalar;
 
 use crate::kernel::Parts;
 use crate::{Belief, Curve, LogLikelihood, Reading, Residual, SparseEkf, StepError, Switch};
@@ -56,8 +55,7 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
             Err(refused) => refused,
             taken => return taken,
         };
-        let mut belief = Belief { mean: SVector::zeros(), covariance: Symmetric::<T, N, L>::zeros() };
-        before.put_into(&mut belief);
+        let mut belief: Belief<T, N, L> = before.together();
         let taken = self.step_again(&mut belief, reading, refused, Self::step_once)?;
         *parts = Parts::of(&belief);
         Ok(taken)

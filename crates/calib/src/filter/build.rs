@@ -3,13 +3,15 @@ use std::sync::Arc;
 #[cfg(feature = "particles")]
 use ohmstrain_ekf::Particles;
 use ohmstrain_ekf::live::Sieve;
-use ohmstrain_ekf::{Belief, Dwell, Evidence, Hypotheses, Imm, Mixture, PhaseMixture, SignSplit, StepError};
+use ohmstrain_ekf::{
+    AnyCurve, Belief, Compact, Dwell, Evidence, Hypotheses, Imm, Mixture, PhaseMixture, SigmaPoints, SignSplit,
+    SparseEkf, StepError,
+};
 use ohmstrain_model::{Phase, SwitchedModel};
 
 use crate::filter::corrected::Corrected;
 use crate::filter::learned::Learned;
 use crate::filter::running::{Interval, Running};
-use crate::filter::sparse_estimator::SparseEstimator;
 use crate::filter::{Filter, Start};
 use crate::params::estimator::{EstimatorKind, EstimatorParams};
 use crate::params::law::LawParams;
@@ -98,10 +100,12 @@ fn of_size<const B: usize, const N: usize, const L: usize>(
     let interval = interval(estimator, setting);
     match kind {
         EstimatorKind::Ekf => {
-            return Ok(Box::new(Running::new(SparseEstimator::extended(model), beliefs, model, interval)));
+            let filter = SparseEkf::<_, Compact, B, N>::at_a_moment(model).map_err(refused)?;
+            return Ok(Box::new(Running::new(filter, beliefs, model, interval)));
         }
         EstimatorKind::Ukf => {
-            return Ok(Box::new(Running::new(SparseEstimator::unscented(model), beliefs, model, interval)));
+            let filter = SparseEkf::<_, Compact, B, N, SigmaPoints<AnyCurve<f64>>>::at_a_moment(model);
+            return Ok(Box::new(Running::new(filter.map_err(refused)?, beliefs, model, interval)));
         }
         EstimatorKind::Corrected => return Err(CalibrationError::no_parameters(kind)),
         _ => {}

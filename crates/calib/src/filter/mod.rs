@@ -6,7 +6,6 @@ pub(crate) mod known;
 pub(crate) mod learned;
 pub(crate) mod portable;
 pub(crate) mod running;
-pub(crate) mod sparse_estimator;
 pub(crate) mod stepper;
 pub(crate) mod way_back;
 

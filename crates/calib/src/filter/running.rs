@@ -74,7 +74,7 @@ where
     /// does without.
     fn look_again(&mut self) {
         if self.now.seen.startled.is_some() {
-            self.now.state = self.now.state.beside(&self.unknown, BESIDE_SHARE);
+            *self.now.state = self.now.state.beside(&self.unknown, BESIDE_SHARE);
         }
     }
 
@@ -135,7 +135,7 @@ where
     }
 
     fn know(&mut self, strain: &Gaussian<f64>) -> Result<(), StepError> {
-        self.now.state = self.now.state.pinned(0, strain)?;
+        *self.now.state = self.now.state.pinned(0, strain)?;
         Ok(())
     }
 

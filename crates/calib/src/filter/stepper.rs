@@ -26,7 +26,7 @@ pub(crate) type Taken<E, const N: usize, const L: usize> =
 #[derive(Clone)]
 pub(crate) struct Moment<S> {
     pub time_s: Option<f64>,
-    pub state: S,
+    pub state: Box<S>,
     pub streak: Streak,
     repeats: Repeats<f64>,
     jumps: Jumps<f64>,
@@ -63,7 +63,7 @@ impl<S> Moment<S> {
     pub(crate) fn start(state: S) -> Self {
         let seen = Seen { innovation: None, verdict: ReadingVerdict::Missing, startled: None };
         let (repeats, jumps) = (Repeats::none(), Jumps::none());
-        Self { time_s: None, state, streak: Streak::default(), repeats, jumps, seen }
+        Self { time_s: None, state: Box::new(state), streak: Streak::default(), repeats, jumps, seen }
     }
 
     fn seconds_until(&self, time_s: f64) -> f64 {
@@ -116,7 +116,7 @@ impl<E: Estimator<f64, N, L>, const N: usize, const L: usize> Stepper<E, N, L> {
         let Advanced { state, innovation } = advanced;
         let said = (innovation, decided.unwrap_or(verdict));
         let seen = Seen::after(&mut jumps, said, reading, self.sieve.jump);
-        let next = Moment { time_s: Some(time_s), state, streak, repeats, jumps, seen };
+        let next = Moment { time_s: Some(time_s), state: Box::new(state), streak, repeats, jumps, seen };
         Ok((next, PastStep { from, prepared: *prepared, reading: used }))
     }
 
@@ -130,7 +130,7 @@ impl<E: Estimator<f64, N, L>, const N: usize, const L: usize> Stepper<E, N, L> {
         let (came, mut repeats, dt_s) = (reading, now.repeats, now.seconds_until(time_s));
         let (reading, decided) = self.sieved(&mut repeats, dt_s, reading);
         let prepared = self.prepared.of(dt_s, |dt_s| self.estimator.prepare(dt_s))?;
-        let next = self.next.get_or_insert_with(|| Box::new(now.state.clone()));
+        let next = self.next.get_or_insert_with(|| now.state.clone());
         let (innovation, verdict) = match self.estimator.advance_into(&now.state, prepared, reading, next) {
             Err(error) if reading.is_some() && error.is_of_the_reading() => {
                 (self.estimator.advance_into(&now.state, prepared, None, next)?, ReadingVerdict::Rejected)
@@ -149,7 +149,7 @@ impl<E: Estimator<f64, N, L>, const N: usize, const L: usize> Stepper<E, N, L> {
         if reading.is_some() && verdict == ReadingVerdict::Accepted {
             now.streak = Streak::default();
         }
-        now.state.clone_from(next);
+        std::mem::swap(&mut now.state, next);
         now.seen = Seen::after(&mut now.jumps, (innovation, verdict), reading, self.sieve.jump);
         Ok(())
     }

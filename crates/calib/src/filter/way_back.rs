@@ -46,7 +46,7 @@ where
         }
         let mut steps = Vec::new();
         running.now = steps_of(running, now, rows, last..rows.len(), &mut steps)?;
-        let smoothed = running.now.state.clone();
+        let smoothed = (*running.now.state).clone();
         Ok(Self { running, rows, starts, smoothed, steps, is_last: true })
     }
 }

@@ -3,7 +3,7 @@
 
 use ohmstrain_model::Scalar;
 
-use crate::kernel::InVectors;
+use crate::kernel::{InVectors, Lanes, Several};
 
 /// `f32` or `f64`: what filters of hypotheses compute with.
 #[allow(private_bounds, reason = "sealed: what a vector holds")]
@@ -18,41 +18,38 @@ pub(crate) struct Tail<T> {
     pub hazard: T,
 }
 
-impl<T: Scalar> Tail<T> {
-    /// Of a standard normal above `border`. The mass is off by up to about `border²` roundings.
+impl<V: Several<Number: Real>> Tail<V> {
+    /// Of a standard normal above `border`, where it is `wanted`. The mass is off by up to about `border²` roundings.
     #[inline(always)]
-    pub(crate) fn above(border: T) -> Self {
-        let (half, x) = (T::of(0.5), border * T::of(core::f64::consts::FRAC_1_SQRT_2));
+    pub(crate) fn above(border: V, wanted: V::Mask) -> Self {
+        let (half, one, zero) = (border.literal(0.5), border.literal(1.0), border.nothing());
+        let x = border * border.literal(core::f64::consts::FRAC_1_SQRT_2);
         let square = x * x;
-        let falls = (-square).exp();
-        let density = falls * T::of(PER_ROOT_TWO_PI);
-        if square < T::of(NEAR) {
-            let mass = half - half * x * near(square);
-            return Self { mass, hazard: density / mass };
+        let falls = V::Number::falling(-square);
+        let density = falls * border.literal(PER_ROOT_TWO_PI);
+        let (is_near, below) = (square.less(border.literal(NEAR)), x.less(zero));
+        let mut mass = one;
+        if !V::none(V::both(wanted, is_near)) {
+            mass = half - half * x * near(square);
+            if V::all(is_near) {
+                return Self { mass, hazard: density.over(mass) };
+            }
         }
-        let scaled = if x < T::zero() { scaled(-x, square) } else { scaled(x, square) };
+        let scaled = scaled(V::pick(below, -x, x), square);
         let beyond = half * falls * scaled;
-        if x < T::zero() {
-            let mass = T::one() - beyond;
-            return Self { mass, hazard: density / mass };
-        }
-        Self { mass: beyond, hazard: T::of(ROOT_TWO_PER_PI) / scaled }
+        mass = V::pick(is_near, mass, V::pick(below, one - beyond, beyond));
+        // Far above, both density and mass vanish, and their ratio is that of what they are in units of the exponential.
+        let by_mass = V::either(is_near, below);
+        let (above, under) =
+            (V::pick(by_mass, density, border.literal(ROOT_TWO_PER_PI)), V::pick(by_mass, mass, scaled));
+        Self { mass, hazard: above.over(under) }
     }
 }
 
-/// Probability of a standard normal above `x`, as [`Tail::above`].
+/// Probability of a standard normal above `x`.
 #[inline]
-pub(crate) fn upper_tail<T: Scalar>(x: T) -> T {
-    let (half, x) = (T::of(0.5), x * T::of(core::f64::consts::FRAC_1_SQRT_2));
-    let square = x * x;
-    if square < T::of(NEAR) {
-        return half - half * x * near(square);
-    }
-    if x < T::zero() {
-        T::one() - half * (-square).exp() * scaled(-x, square)
-    } else {
-        half * (-square).exp() * scaled(x, square)
-    }
+pub(crate) fn upper_tail<T: Real>(x: T) -> T {
+    Tail::above(x, true).mass
 }
 
 const PER_ROOT_TWO_PI: f64 = 0.398_942_280_401_432_7;
@@ -66,86 +63,91 @@ const NEAR: f64 = 0.219_726_562_5;
 
 /// `erf(x)/x`, for small squares.
 #[inline(always)]
-fn near<T: Scalar>(square: T) -> T {
+fn near<V: Lanes>(square: V) -> V {
+    let c = <V::Number as Scalar>::of;
     let above = [
-        T::of(1.857_777_061_846_031_53e-1),
-        T::of(3.161_123_743_870_565_60),
-        T::of(1.138_641_541_510_501_56e2),
-        T::of(3.774_852_376_853_020_21e2),
-        T::of(3.209_377_589_138_469_47e3),
+        c(1.857_777_061_846_031_53e-1),
+        c(3.161_123_743_870_565_60),
+        c(1.138_641_541_510_501_56e2),
+        c(3.774_852_376_853_020_21e2),
+        c(3.209_377_589_138_469_47e3),
     ];
     let below = [
-        T::of(1.0),
-        T::of(2.360_129_095_234_412_09e1),
-        T::of(2.440_246_379_344_441_73e2),
-        T::of(1.282_616_526_077_372_28e3),
-        T::of(2.844_236_833_439_170_62e3),
+        c(1.0),
+        c(2.360_129_095_234_412_09e1),
+        c(2.440_246_379_344_441_73e2),
+        c(1.282_616_526_077_372_28e3),
+        c(2.844_236_833_439_170_62e3),
     ];
-    polynomial(above, square) / polynomial(below, square)
+    polynomial(above, square).over(polynomial(below, square))
 }
 
 /// `exp(x²) erfc(x)` from 0.46875 on.
 #[inline(always)]
-fn scaled<T: Scalar>(x: T, square: T) -> T {
-    if x > T::of(4.0) {
+fn scaled<V: Lanes>(x: V, square: V) -> V {
+    let is_far = x.literal(4.0).less(x);
+    if V::all(is_far) {
         return far(x, square);
     }
+    let c = <V::Number as Scalar>::of;
     let above = [
-        T::of(2.153_115_354_744_038_46e-8),
-        T::of(5.641_884_969_886_700_89e-1),
-        T::of(8.883_149_794_388_375_94),
-        T::of(6.611_919_063_714_162_95e1),
-        T::of(2.986_351_381_974_001_31e2),
-        T::of(8.819_522_212_417_690_90e2),
-        T::of(1.712_047_612_634_070_58e3),
-        T::of(2.051_078_377_826_071_47e3),
-        T::of(1.230_339_354_797_997_25e3),
+        c(2.153_115_354_744_038_46e-8),
+        c(5.641_884_969_886_700_89e-1),
+        c(8.883_149_794_388_375_94),
+        c(6.611_919_063_714_162_95e1),
+        c(2.986_351_381_974_001_31e2),
+        c(8.819_522_212_417_690_90e2),
+        c(1.712_047_612_634_070_58e3),
+        c(2.051_078_377_826_071_47e3),
+        c(1.230_339_354_797_997_25e3),
     ];
     let below = [
-        T::of(1.0),
-        T::of(1.574_492_611_070_983_47e1),
-        T::of(1.176_939_508_913_124_99e2),
-        T::of(5.371_811_018_620_098_58e2),
-        T::of(1.621_389_574_566_690_19e3),
-        T::of(3.290_799_235_733_459_63e3),
-        T::of(4.362_619_090_143_247_16e3),
-        T::of(3.439_367_674_143_721_64e3),
-        T::of(1.230_339_354_803_749_42e3),
+        c(1.0),
+        c(1.574_492_611_070_983_47e1),
+        c(1.176_939_508_913_124_99e2),
+        c(5.371_811_018_620_098_58e2),
+        c(1.621_389_574_566_690_19e3),
+        c(3.290_799_235_733_459_63e3),
+        c(4.362_619_090_143_247_16e3),
+        c(3.439_367_674_143_721_64e3),
+        c(1.230_339_354_803_749_42e3),
     ];
-    polynomial(above, x) / polynomial(below, x)
+    let middle = polynomial(above, x).over(polynomial(below, x));
+    if V::none(is_far) { middle } else { V::pick(is_far, far(x, square), middle) }
 }
 
 /// The same beyond 4.
-#[inline(never)]
-fn far<T: Scalar>(x: T, square: T) -> T {
+#[inline(always)]
+fn far<V: Lanes>(x: V, square: V) -> V {
+    let c = <V::Number as Scalar>::of;
     let above = [
-        T::of(1.631_538_713_730_209_78e-2),
-        T::of(3.053_266_349_612_323_44e-1),
-        T::of(3.603_448_999_498_044_39e-1),
-        T::of(1.257_817_261_112_292_46e-1),
-        T::of(1.608_378_514_874_227_66e-2),
-        T::of(6.587_491_615_298_378_03e-4),
+        c(1.631_538_713_730_209_78e-2),
+        c(3.053_266_349_612_323_44e-1),
+        c(3.603_448_999_498_044_39e-1),
+        c(1.257_817_261_112_292_46e-1),
+        c(1.608_378_514_874_227_66e-2),
+        c(6.587_491_615_298_378_03e-4),
     ];
     let below = [
-        T::of(1.0),
-        T::of(2.568_520_192_289_822_42),
-        T::of(1.872_952_849_923_467_25),
-        T::of(5.279_051_029_514_284_12e-1),
-        T::of(6.051_834_131_244_131_91e-2),
-        T::of(2.335_204_976_268_691_85e-3),
+        c(1.0),
+        c(2.568_520_192_289_822_42),
+        c(1.872_952_849_923_467_25),
+        c(5.279_051_029_514_284_12e-1),
+        c(6.051_834_131_244_131_91e-2),
+        c(2.335_204_976_268_691_85e-3),
     ];
-    let w = T::one() / square;
-    let less = w * polynomial(above, w) / polynomial(below, w);
-    (T::of(core::f64::consts::FRAC_2_SQRT_PI) * T::of(0.5) - less) / x
+    let w = square.recip();
+    let less = (w * polynomial(above, w)).over(polynomial(below, w));
+    (x.literal(core::f64::consts::FRAC_2_SQRT_PI) * x.literal(0.5) - less).over(x)
 }
 
-/// By Horner's scheme, the coefficient of the highest power first: numbers of their own type, which a microcontroller without
+/// By Horner's scheme, the coefficient of the highest power first: numbers of the lanes' own type, which a microcontroller without
 /// double precision need not convert.
 #[inline(always)]
-fn polynomial<T: Scalar, const N: usize>(coefficients: [T; N], x: T) -> T {
-    let mut sum = T::zero();
-    for coefficient in coefficients {
-        sum = sum * x + coefficient;
+fn polynomial<V: Lanes, const N: usize>(coefficients: [V::Number; N], x: V) -> V {
+    let mut sum = x.with(coefficients[0]);
+    for k in 1..N {
+        sum = sum.mul_add(x, x.with(coefficients[k]));
     }
     sum
 }
@@ -161,13 +163,12 @@ mod tests {
         for k in -900..=3700 {
             let z = f64::from(k) * 0.01 + 1e-3;
             let expected = 0.5 * libm::erfc(z * core::f64::consts::FRAC_1_SQRT_2);
-            let tail = Tail::above(z);
+            let tail = Tail::above(z, true);
             let rounding = (16.0 + z * z) * f64::EPSILON;
-            assert_eq!(tail.mass, upper_tail(z), "{z}");
             assert!((tail.mass / expected - 1.0).abs() < rounding, "{z}: {} {expected}", tail.mass);
             let hazard = (-0.5 * z * z).exp() / core::f64::consts::TAU.sqrt() / expected;
             assert!((tail.hazard / hazard - 1.0).abs() < 2.0 * rounding, "{z}: {} {hazard}", tail.hazard);
-            let single = Tail::above(z as f32);
+            let single = Tail::above(z as f32, true);
             let z = f64::from(z as f32);
             let expected = 0.5 * libm::erfc(z * core::f64::consts::FRAC_1_SQRT_2);
             let rounding = (16.0 + z * z) * f64::from(f32::EPSILON);
@@ -177,7 +178,9 @@ mod tests {
         }
         assert_eq!((upper_tail(0.0), upper_tail(f64::INFINITY), upper_tail(f64::NEG_INFINITY)), (0.5, 0.0, 1.0));
         assert!(
-            Tail::above(f64::NAN).mass.is_nan() && Tail::above(60.0).mass == 0.0 && Tail::above(60.0).hazard > 60.0
+            Tail::above(f64::NAN, true).mass.is_nan()
+                && Tail::above(60.0_f64, true).mass == 0.0
+                && Tail::above(60.0_f64, true).hazard > 60.0
         );
     }
 }

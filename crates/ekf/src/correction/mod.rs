@@ -79,9 +79,9 @@ pub struct Correction<'a, T, const D: usize, const S: usize = 0> {
     pub rows: Rows<'a, T, D>,
     /// Scales of the inputs.
     pub scales: &'a [InputScale<T>; D],
-    /// Strain from all features.
+    /// Strain from all features; outputs of the filter are not seen, whatever their relevance.
     pub direct: Process<'a, T, D>,
-    /// Strain from the features of the past, and strain from the reading and the features of the future.
+    /// Strain from the features of the past, and strain from the reading and the features of the future. Neither sees outputs.
     pub one_sided: [Process<'a, T, D>; S],
     /// Strain minus the filter's strain, from all inputs.
     pub residual: Process<'a, T, D>,
@@ -154,13 +154,9 @@ impl<T: Real, const D: usize, const S: usize> Correction<'_, T, D, S> {
         let reading = x.get(OUTPUTS).copied().unwrap_or(T::zero());
         let mut kernels = Kernels::new(&of.process);
         for rows in of.rows.side_by_side(like) {
-            let mut squares = [like.nothing(); D];
-            for i in 0..D {
-                squares[i] = rows.squares(i, x[i]);
-            }
             let mut distance = like.nothing();
-            for i in 0..D {
-                distance += squares[i].scale(of.process.relevance[i]);
+            for i in OUTPUTS..D {
+                distance += rows.squares(i, x[i]).scale(of.process.relevance[i]);
             }
             kernels.add(&of.process, distance, rows.column(OUTPUTS).scale(reading), rows.count);
         }
@@ -213,14 +209,14 @@ impl<T: Real, const D: usize, const S: usize> Work<T> for Correcting<'_, T, D, S
             for i in 0..D {
                 squares[i] = rows.squares(i, x[i]);
             }
-            for i in 0..D {
+            for i in OUTPUTS..D {
                 to_direct += squares[i].scale(of.direct.relevance[i]);
             }
             for i in 0..D {
                 to_residual += squares[i].scale(of.residual.relevance[i]);
             }
             for k in 0..S {
-                for i in 0..D {
+                for i in OUTPUTS..D {
                     to_sides[k] += squares[i].scale(of.one_sided[k].relevance[i]);
                 }
             }

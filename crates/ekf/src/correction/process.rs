@@ -110,13 +110,13 @@ impl<T: Real> Kernels<T> {
         // Nothing follows the kernels, so that a row may be read on into the next one to the end of a vector.
         let mut kernels = self.inducing;
         kernels.iter_mut().skip(rows).for_each(|kernel| *kernel = T::zero());
-        let mut explained = T::zero();
-        for k in 0..rows {
-            let count = (rows - k).next_multiple_of(V::WIDTH);
-            let (row, with) = (triangle.get(..count).unwrap_or(triangle), kernels.get(k..).unwrap_or(&[]));
-            let product = T::dot(like, row, with.get(..row.len()).unwrap_or(with));
+        let (mut explained, mut with) = (T::zero(), kernels.as_slice());
+        for left in (1..=rows).rev() {
+            let whole = left.next_multiple_of(V::WIDTH);
+            let row = triangle.get(..whole).unwrap_or(triangle);
+            let product = T::dot(like, row, with);
             explained += product * product;
-            triangle = triangle.get(rows - k..).unwrap_or(&[]);
+            (triangle, with) = (triangle.get(left..).unwrap_or(&[]), with.get(1..).unwrap_or(&[]));
         }
         explained
     }

@@ -1,4 +1,5 @@
-use ohmstrain_model::Scalar;
+use nalgebra::SVector;
+use ohmstrain_model::{Scalar, Symmetric};
 
 use super::{Lanes, Several};
 use crate::Belief;
@@ -93,6 +94,19 @@ fn put<'a, V: Lanes + 'a>(places: &mut impl Iterator<Item = &'a mut V>, number: 
 }
 
 impl<V: Lanes, const B: usize> Parts<V, B> {
+    /// Everything known to be `nothing`.
+    pub(crate) const fn certain(nothing: V) -> Self {
+        Self {
+            strain: nothing,
+            rate: nothing,
+            strain_variance: nothing,
+            strain_rate: nothing,
+            rate_variance: nothing,
+            branches: [Part::vacant(nothing); B],
+            baseline: Part::vacant(nothing),
+        }
+    }
+
     /// Whether the last of `n` states is a baseline.
     pub(crate) const fn has_baseline(n: usize) -> bool {
         n == B + 3
@@ -238,6 +252,14 @@ impl<T: Scalar, const B: usize> Parts<T, B> {
     #[inline(always)]
     pub(crate) fn of<const N: usize, const L: usize>(belief: &Belief<T, N, L>) -> Self {
         Self::read::<N>(&mut belief.mean.iter(), &mut belief.covariance.packed().iter(), T::zero())
+    }
+
+    /// A belief of these parts.
+    #[inline(always)]
+    pub(crate) fn together<const N: usize, const L: usize>(&self) -> Belief<T, N, L> {
+        let mut belief = Belief { mean: SVector::zeros(), covariance: Symmetric::zeros() };
+        self.put_into(&mut belief);
+        belief
     }
 
     #[inline(always)]

@@ -1,10 +1,11 @@
 //! The prediction, in place. Sums are written with what does not depend on the belief first.
 
-use ohmstrain_model::{LEAST_LEFT, Phase, Scalar, Turning};
+use nalgebra::SMatrix;
+use ohmstrain_model::{LEAST_LEFT, Phase, Scalar, Transition, Turning};
 
 use super::constants::{BranchConstants, Gain, GainsAt, StepConstants};
 use super::{Lanes, Part, Parts, RateSpread, Switch};
-use crate::SparseEkf;
+use crate::{Belief, SparseEkf};
 
 /// What a step does to one branch. The gain grows with the sum of old and new strain: the old one's share is in `row`, the
 /// new one's is added when its covariances are known.
@@ -31,6 +32,13 @@ struct Drive<V> {
     pull: V,
     jump: V,
     left: V,
+}
+
+/// How all branches are driven.
+struct Driving<V, const B: usize> {
+    drives: [Drive<V>; B],
+    /// Variance of the path whose direction stays open.
+    unexplained: V,
 }
 
 /// What is known of the direction of a step that moves.
@@ -113,6 +121,50 @@ impl<T: Scalar, S, const B: usize, const N: usize, G> SparseEkf<T, S, B, N, G> {
         parts: &mut Parts<V, B>,
         course: Course<V>,
     ) -> (RateSpread<V, X>, [Driven<V>; B]) {
+        let Parts { strain_variance, strain_rate, rate_variance, .. } = *parts;
+        let driving = self.drive::<V, X>(parts, course);
+        let driven = self.spread_on::<V, X>(parts, &driving, [strain_variance, strain_rate, rate_variance]);
+        (RateSpread::new(parts.rate_variance), driven)
+    }
+
+    /// F and Q of a step with an uncertain direction, and where it leads: what [`rts_step`](crate::rts_step) goes back by.
+    pub(crate) fn transition<const L: usize>(&self, from: &Belief<T, N, L>) -> (Transition<T, N, L>, Belief<T, N, L>)
+    where
+        S: Switch<T>,
+    {
+        let mut parts = Parts::of(from);
+        let Parts { strain_variance, strain_rate, rate_variance, .. } = parts;
+        let driving = self.drive::<T, S>(&mut parts, Course::Uncertain);
+        let driven = self.spread_on::<T, S>(&mut parts, &driving, [strain_variance, strain_rate, rate_variance]);
+        // The same from a state that is known is the noise alone.
+        let [strain_variance, strain_rate, rate_variance] = self.step.noise;
+        let mut noise = Parts { strain_variance, strain_rate, rate_variance, ..Parts::certain(T::zero()) };
+        self.spread_on::<T, S>(&mut noise, &driving, [T::zero(); 3]);
+        let (prior, noise): (Belief<T, N, L>, Belief<T, N, L>) = (parts.together(), noise.together());
+        let jacobian = self.jacobian(&driven);
+        (Transition { mean: prior.mean, jacobian, noise: noise.covariance }, prior)
+    }
+
+    fn jacobian(&self, driven: &[Driven<T>; B]) -> SMatrix<T, N, N> {
+        let (mut jacobian, [a, b]) = (SMatrix::zeros(), self.step.motion);
+        for j in 0..2 {
+            (jacobian[(0, j)], jacobian[(1, j)]) = (a[j], b[j]);
+            for i in 0..B {
+                jacobian[(i + 2, j)] = driven[i].row[j] + driven[i].pull * a[j];
+            }
+        }
+        for i in 0..B {
+            jacobian[(i + 2, i + 2)] = self.step.branches[i].decay;
+        }
+        if Self::HAS_BASELINE {
+            jacobian[(N - 1, N - 1)] = self.step.baseline_decay;
+        }
+        jacobian
+    }
+
+    /// Moves strain and rate, means and covariances of theirs, and says how the branches are driven meanwhile.
+    #[inline(always)]
+    fn drive<V: Lanes<Number = T>, X: Switch<V>>(&self, parts: &mut Parts<V, B>, course: Course<V>) -> Driving<V, B> {
         let step = &self.step;
         let Parts { strain, rate, strain_variance, strain_rate, rate_variance, .. } = *parts;
         let [a, b] = [pair(strain, step.motion[0]), pair(strain, step.motion[1])];
@@ -134,7 +186,6 @@ impl<T: Scalar, S, const B: usize, const N: usize, G> SparseEkf<T, S, B, N, G> {
         let gains = self.gains.gains(strain_sum);
         let nothing = Drive { change: zero, gain: zero, pull: zero, jump: zero, left: zero };
         let mut drives = [nothing; B];
-        // Two loops: one short enough to be unrolled, and one that holds the choices.
         for i in 0..B {
             let branch = &step.branches[i];
             let push = course.input(strain, branch.input, branch.phase_input);
@@ -158,6 +209,20 @@ impl<T: Scalar, S, const B: usize, const N: usize, G> SparseEkf<T, S, B, N, G> {
             let steps = correlated_steps(parts.rate_variance, together, fresh);
             unexplained = V::pick(opens, unexplained * steps.scale(step.averaging), zero);
         }
+        Driving { drives, unexplained }
+    }
+
+    /// Moves the branches and the baseline, after the motion, whose covariances were the last.
+    #[inline(always)]
+    fn spread_on<V: Lanes<Number = T>, X: Switch<V>>(
+        &self,
+        parts: &mut Parts<V, B>,
+        Driving { drives, unexplained }: &Driving<V, B>,
+        [strain_variance, strain_rate, rate_variance]: [V; 3],
+    ) -> [Driven<V>; B] {
+        let (step, zero) = (&self.step, strain_variance.nothing());
+        let [a, b] = [pair(zero, step.motion[0]), pair(zero, step.motion[1])];
+        let (with_strain, with_rate) = ([strain_variance, strain_rate], [strain_rate, rate_variance]);
         let idle = Driven {
             change: zero,
             gain: zero,
@@ -179,13 +244,13 @@ impl<T: Scalar, S, const B: usize, const N: usize, G> SparseEkf<T, S, B, N, G> {
             driven[i] = Driven { change, gain, pull, row, kept, carried, jump };
         }
         predict_branches::<V, X, B>(step, parts, &driven, [a, b]);
-        if X::DIRECTED && !V::none(zero.less(unexplained)) {
-            leave_open(parts, &driven, unexplained);
+        if X::DIRECTED && !V::none(zero.less(*unexplained)) {
+            leave_open(parts, &driven, *unexplained);
         }
         if Self::HAS_BASELINE {
             predict_baseline::<V, X, B>(step, &mut parts.baseline, &driven, [a, b]);
         }
-        (RateSpread::new(parts.rate_variance), driven)
+        driven
     }
 
     /// Predicts one step of a hold: strain stays, there is no rate, branches and baseline relax.

@@ -91,13 +91,7 @@ impl<V: Several<Number: Real>, const B: usize> Parts<V, B> {
         }
         let per_sd = X::root(variance).recip();
         let border = -toward * per_sd;
-        let [mass, shift] = border.build(|lane| {
-            if !V::holds(cut, lane) {
-                return [<V::Number as Scalar>::of(0.0); 2];
-            }
-            let Tail { mass, hazard } = Tail::above(border.at(lane));
-            [mass, hazard]
-        });
+        let Tail { mass, hazard: shift } = Tail::above(border, cut);
         let (narrowed, gone) = (border * shift - shift * shift, -one);
         // By comparisons, which cost less than calls of `fmax` and `fmin`.
         let narrowed = V::pick(zero.less(narrowed), zero, V::pick(narrowed.less(gone), gone, narrowed));

@@ -128,7 +128,7 @@ impl<'a, T: Real, const N: usize, const L: usize, const K: usize> Children<'a, T
     fn raise_to(&mut self, exponent: T) {
         let first = self.kept.shares().is_empty();
         if first || exponent > self.exponent {
-            let fewer = if first { T::one() } else { (self.exponent - exponent).exp() };
+            let fewer = if first { T::one() } else { T::falling(self.exponent - exponent) };
             for (share, _) in self.kept.iter_mut() {
                 share.weight *= fewer;
             }

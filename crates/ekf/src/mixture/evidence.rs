@@ -1,7 +1,7 @@
 use ohmstrain_model::{ParameterError, Phase, Problem, Scalar, StrainRange};
 
 use crate::belief::gaussian::Real;
-use crate::belief::tail::upper_tail;
+use crate::belief::tail::Tail;
 use crate::kernel::{Lanes, Parts, RateSpread, Several};
 use crate::mixture::LEAST_INSIDE;
 use crate::mixture::predicted::Predicted;
@@ -56,7 +56,7 @@ impl<T: Real> Weight<T> {
     #[inline(always)]
     pub(crate) fn relative_to(&self, exponent: T) -> T {
         let below = self.exponent - exponent;
-        if below.is_zero() || self.factor.is_zero() { self.factor } else { self.factor * below.exp() }
+        if below.is_zero() || self.factor.is_zero() { self.factor } else { self.factor * T::falling(below) }
     }
 }
 
@@ -83,69 +83,67 @@ impl<T: Real> Weighing<T> {
         Weight { factor: prior, exponent: (nis + logarithm).scale(half) }
     }
 
-    /// Probability that a strain lies within the limits.
+    /// Probability of the limits over what `per_inside` is one over, and one over the probability itself, where it is `wanted`.
     #[inline(always)]
-    fn inside<S: Switch<T>>(&self, strain: T, variance: T) -> T {
-        let (above_lower, below_upper) = (strain - self.limits.lower, self.limits.upper - strain);
-        let reach = self.clear * variance;
-        let clear = |distance: T| distance > T::zero() && distance * distance > reach;
-        if variance <= T::zero() || (clear(above_lower) && clear(below_upper)) {
-            return T::one();
-        }
-        self.inside_near::<S>(above_lower, below_upper, variance)
-    }
-
-    /// Probability of the limits over what `per_inside` is one over, and one over the probability itself.
-    #[inline(always)]
-    pub(crate) fn of_limits<S: Switch<T>>(&self, strain: T, variance: T, per_inside: T) -> [T; 2] {
-        let inside = self.inside::<S>(strain, variance);
-        // Mostly nothing is near a limit.
-        if inside == T::one() { [per_inside, inside] } else { [inside * per_inside, T::one() / inside] }
-    }
-
-    /// The same in lanes, where it is `wanted`.
-    #[inline(always)]
-    fn of_limits_in_lanes<V, S>(&self, (strain, variance): (V, V), per_inside: V, wanted: V::Mask) -> [V; 2]
+    pub(crate) fn of_limits<V, X>(&self, (strain, variance): (V, V), per_inside: V, wanted: V::Mask) -> [V; 2]
     where
         V: Several<Number = T>,
-        S: Switch<T>,
+        X: Switch<V>,
     {
-        if V::WIDTH > 1 {
-            let zero = strain.nothing();
-            let reach = variance.scale(self.clear);
-            let (lower, upper) = (strain.with(self.limits.lower), strain.with(self.limits.upper));
-            let (above_lower, below_upper) = (strain - lower, upper - strain);
-            let within = V::both(zero.less(above_lower), zero.less(below_upper));
-            let clear = V::both(reach.less(above_lower * above_lower), reach.less(below_upper * below_upper));
-            if V::none(V::without(wanted, V::both(within, clear))) {
-                return [per_inside, strain.literal(1.0)];
-            }
+        let one = strain.literal(1.0);
+        let (lower, upper) = (strain.with(self.limits.lower), strain.with(self.limits.upper));
+        let ends = [strain - lower, upper - strain];
+        let reach = variance.scale(self.clear);
+        let [from_lower, from_upper] = [self.is_clear(ends[0], reach), self.is_clear(ends[1], reach)];
+        // Mostly nothing is near a limit.
+        let near = V::without(wanted, V::either(V::both(from_lower, from_upper), (-variance).not_negative()));
+        if V::none(near) {
+            return [per_inside, one];
         }
-        strain.build(|lane| {
-            let per_inside = per_inside.at(lane);
-            if !V::holds(wanted, lane) {
-                return [per_inside, T::one()];
-            }
-            self.of_limits::<S>(strain.at(lane), variance.at(lane), per_inside)
-        })
+        let inside = if V::WIDTH > 1 {
+            self.inside_near::<V, X>(ends, variance, near)
+        } else {
+            self.inside_near_apart::<V, X>(ends, variance, near)
+        };
+        let inside = V::pick(near, inside, one);
+        [inside * per_inside, one.over(inside)]
     }
 
-    /// The same where a tail counts. What has left the limits altogether is no less likely than [`LEAST_INSIDE`].
+    #[inline(always)]
+    fn is_clear<V: Several<Number = T>>(&self, distance: V, reach: V) -> V::Mask {
+        V::both(distance.nothing().less(distance), reach.less(distance * distance))
+    }
+
+    /// Out of the way of numbers that are not near a limit.
     #[inline(never)]
-    fn inside_near<S: Switch<T>>(&self, above_lower: T, below_upper: T, variance: T) -> T {
-        let per_sd = T::one() / S::root(variance);
-        let (near, far) =
-            if above_lower < below_upper { (above_lower, below_upper) } else { (below_upper, above_lower) };
-        let far_is_clear = far > T::zero() && far * far > self.clear * variance;
-        let beyond_far = if far_is_clear { T::zero() } else { upper_tail(far * per_sd) };
+    fn inside_near_apart<V: Several<Number = T>, X: Switch<V>>(&self, ends: [V; 2], variance: V, near: V::Mask) -> V {
+        self.inside_near::<V, X>(ends, variance, near)
+    }
+
+    /// Probability that a strain lies within the limits, so far above the lower and below the upper, where a tail counts. What has
+    /// left the limits altogether is no less likely than [`LEAST_INSIDE`].
+    #[inline(always)]
+    fn inside_near<V, X>(&self, [above_lower, below_upper]: [V; 2], variance: V, wanted: V::Mask) -> V
+    where
+        V: Several<Number = T>,
+        X: Switch<V>,
+    {
+        let (zero, one) = (variance.nothing(), variance.literal(1.0));
+        let per_sd = X::root(variance).recip();
+        let lower_is_near = above_lower.less(below_upper);
+        let near = V::pick(lower_is_near, above_lower, below_upper);
+        let far = V::pick(lower_is_near, below_upper, above_lower);
+        let far_counts = V::without(wanted, self.is_clear(far, variance.scale(self.clear)));
+        let mut beyond_far = zero;
+        if !V::none(far_counts) {
+            beyond_far = V::pick(far_counts, Tail::above(far * per_sd, far_counts).mass, zero);
+        }
         // Beyond the near end the mass inside is the small number, and is to keep its digits.
-        let inside = if near > T::zero() {
-            T::one() - (upper_tail(near * per_sd) + beyond_far)
-        } else {
-            upper_tail(-near * per_sd) - beyond_far
-        };
-        let least = T::of(LEAST_INSIDE);
-        if inside > least { inside } else { least }
+        let is_inside = zero.less(near);
+        let beyond_near = Tail::above(V::pick(is_inside, near, -near) * per_sd, wanted).mass;
+        let inside = V::pick(is_inside, one - (beyond_near + beyond_far), beyond_near - beyond_far);
+        let least = variance.literal(LEAST_INSIDE);
+        V::pick(least.less(inside), inside, least)
     }
 
     pub(crate) fn tempering(&self) -> T {
@@ -226,7 +224,7 @@ impl<T: Real, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> SparseE
             sound = parts.is_sound::<N>(parts.variances::<N>());
         }
         let strain = (parts.strain, parts.strain_variance);
-        let [more_inside, per_inside] = weighing.of_limits_in_lanes::<V, S>(strain, per_inside, alive);
+        let [more_inside, per_inside] = weighing.of_limits::<V, X>(strain, per_inside, alive);
         Heard { prior, alive, sound, residual, weighed: Weighed { weight, more_inside, per_inside } }
     }
 }

@@ -151,7 +151,8 @@ impl<T: Real, const B: usize, const N: usize, S: Switch<T>, G: Curve<T>> Imm<T, 
             return Err(StepError::NonFiniteState);
         }
         let Parts { strain, strain_variance, .. } = mode.parts;
-        [mode.more_inside, mode.per_inside] = self.weighing.of_limits::<S>(strain, strain_variance, mode.per_inside);
+        [mode.more_inside, mode.per_inside] =
+            self.weighing.of_limits::<T, S>((strain, strain_variance), mode.per_inside, true);
         Ok(mode)
     }
 

@@ -168,7 +168,8 @@ fn what_limits_took_is_given_back_after_merging() {
     let at = |strain: f64, variance: f64, per_inside: f64| {
         let belief: Belief<f64, 3, 6> = Belief::independent(vector![strain, 0.0, 0.0], &[variance, 1.0, 1.0]);
         let parts = Parts::<f64, 0>::of(&belief);
-        let [more_inside, per_inside] = weighing.of_limits::<Logistic>(parts.strain, parts.strain_variance, per_inside);
+        let [more_inside, per_inside] =
+            weighing.of_limits::<f64, Logistic>((parts.strain, parts.strain_variance), per_inside, true);
         (parts, more_inside, per_inside)
     };
     let mut mixture = Mixture::<f64, 3, 6, 2>::empty();
