@@ -62,7 +62,7 @@ pub use metadata::{Metadata, ResistanceUnit, StrainUnit};
 #[cfg(feature = "import")]
 pub use parquet_text::ParquetText;
 pub use reader::TraceReader;
-pub use row::{Quantity, Reading, ReadingKind, Row};
+pub use row::{Reading, ReadingKind, ReferenceQuantity, Row};
 pub use rows::RowWriter;
 pub use segment::{Segment, segment};
 pub use simulate::simulate;

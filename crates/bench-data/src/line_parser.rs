@@ -4,7 +4,7 @@ use crate::columns::Columns;
 use crate::error::{BadContent, Fault};
 use crate::lines::take_apart;
 use crate::metadata::Metadata;
-use crate::row::{Quantity, ReadingKind, Row};
+use crate::row::{ReadingKind, ReferenceQuantity, Row};
 use crate::row_parser::RowParser;
 
 /// Lines in a row whose times go on from each other, but not from the last row's: then the clock has started again.
@@ -78,7 +78,7 @@ impl LineParser {
 
     /// What the reference is, if there is one.
     #[must_use]
-    pub fn reference_quantity(&self) -> Option<Quantity> {
+    pub fn reference_quantity(&self) -> Option<ReferenceQuantity> {
         self.parser.as_ref().and_then(|(parser, _)| parser.reference_quantity())
     }
 

@@ -5,7 +5,7 @@ use crate::columns::Columns;
 use crate::error::{BadContent, Fault, TraceError};
 use crate::lines::{LineFault, LineFeed, Lines, is_plain, take_apart};
 use crate::metadata::Metadata;
-use crate::row::{Quantity, ReadingKind, Row};
+use crate::row::{ReadingKind, ReferenceQuantity, Row};
 use crate::row_parser::RowParser;
 use csv::StringRecord;
 
@@ -148,7 +148,7 @@ impl<R: Read> TraceReader<R> {
 
     /// What the reference is, if there is one. A displacement becomes strain, and so does an angle with a joint.
     #[must_use]
-    pub fn reference_quantity(&self) -> Option<Quantity> {
+    pub fn reference_quantity(&self) -> Option<ReferenceQuantity> {
         self.parser.reference_quantity()
     }
 

@@ -9,7 +9,7 @@ pub enum ReadingKind {
 
 /// What the reference of a trace is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Quantity {
+pub enum ReferenceQuantity {
     /// Engineering strain.
     Strain,
     /// Angle of a joint of unknown geometry, degrees.

@@ -6,7 +6,7 @@ use crate::clock::Clock;
 use crate::columns::{Column, Columns, Place};
 use crate::error::Fault;
 use crate::metadata::{Metadata, ResistanceUnit, StrainUnit};
-use crate::row::{Quantity, Reading, ReadingKind, Row};
+use crate::row::{Reading, ReadingKind, ReferenceQuantity, Row};
 
 /// Turns the cells of a line into a row; knows the time of the row before.
 pub(crate) struct RowParser {
@@ -39,9 +39,9 @@ impl RowParser {
         self.columns.reading.column == Column::Adc
     }
 
-    pub(crate) fn reference_quantity(&self) -> Option<Quantity> {
+    pub(crate) fn reference_quantity(&self) -> Option<ReferenceQuantity> {
         let is_angle = self.columns.reference?.column == Column::AngleDeg && self.conversion.joint.is_none();
-        Some(if is_angle { Quantity::AngleDeg } else { Quantity::Strain })
+        Some(if is_angle { ReferenceQuantity::AngleDeg } else { ReferenceQuantity::Strain })
     }
 
     pub(crate) const fn has_temperature(&self) -> bool {

@@ -4,7 +4,7 @@ use std::ops::Range;
 use crate::error::{Fault, TraceError};
 use crate::metadata::Metadata;
 use crate::reader::TraceReader;
-use crate::row::{Quantity, ReadingKind, Row};
+use crate::row::{ReadingKind, ReferenceQuantity, Row};
 
 /// The sensor's readings, one per row.
 #[derive(Clone, Debug, PartialEq)]
@@ -32,7 +32,7 @@ pub struct ConverterReadings {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reference {
     /// What the values are.
-    pub quantity: Quantity,
+    pub quantity: ReferenceQuantity,
     /// The values; NaN is a missing one.
     pub values: Vec<f64>,
 }

@@ -1,7 +1,7 @@
 use std::io::{self, Write};
 
 use crate::columns::Column;
-use crate::row::{Quantity, ReadingKind};
+use crate::row::{ReadingKind, ReferenceQuantity};
 use crate::rows::RowWriter;
 use crate::trace::Trace;
 
@@ -33,8 +33,8 @@ impl Trace {
             (None, ReadingKind::Ratio) => Column::ResistanceRatio,
         };
         let reference = self.reference.as_ref().map(|reference| match reference.quantity {
-            Quantity::Strain => Column::Strain,
-            Quantity::AngleDeg => Column::AngleDeg,
+            ReferenceQuantity::Strain => Column::Strain,
+            ReferenceQuantity::AngleDeg => Column::AngleDeg,
         });
         let temperature = self.temperature_c.as_ref().map(|_| Column::TemperatureC);
         [Some(Column::TimeS), Some(reading), reference, temperature].into_iter().flatten().collect()

@@ -1,6 +1,6 @@
 //! What the reader accepts, and what it says about the rest.
 
-use ohmstrain_bench_data::{FrontEndSpec, Metadata, Quantity, ReadingKind, Trace, TraceError};
+use ohmstrain_bench_data::{FrontEndSpec, Metadata, ReadingKind, ReferenceQuantity, Trace, TraceError};
 
 fn read(text: impl AsRef<[u8]>) -> Result<Trace, TraceError> {
     Trace::read(text.as_ref(), "t.csv")
@@ -153,12 +153,12 @@ fn codes_become_ohms_with_a_standard_deviation_and_a_saturated_one_is_missing() 
 fn references_in_other_units_become_strain_where_the_geometry_is_known() {
     let reference = |text: &str| read(text).unwrap().reference.unwrap();
     let strain = reference("# gauge_length_mm = 40\ntime_s,resistance_ohm,displacement_mm\n0,1,8\n");
-    assert_eq!((strain.quantity, strain.values[0]), (Quantity::Strain, 0.2));
+    assert_eq!((strain.quantity, strain.values[0]), (ReferenceQuantity::Strain, 0.2));
     let angle = reference("time_s,resistance_ohm,angle_deg\n0,1,90\n");
-    assert_eq!((angle.quantity, angle.values[0]), (Quantity::AngleDeg, 90.0));
+    assert_eq!((angle.quantity, angle.values[0]), (ReferenceQuantity::AngleDeg, 90.0));
     let joint = "# joint = prestrain=0.05 moment_arm_mm=4.4 gauge_length_mm=30\n";
     let strain = reference(&format!("{joint}time_s,resistance_ohm,angle_deg\n0,1,90\n"));
-    assert_eq!(strain.quantity, Quantity::Strain);
+    assert_eq!(strain.quantity, ReferenceQuantity::Strain);
     assert!((strain.values[0] - (0.05 + 4.4 * std::f64::consts::FRAC_PI_2 / 30.0)).abs() < 1e-15);
 }
 

@@ -1,7 +1,7 @@
 //! What is written is read back, bit by bit.
 
 use ohmstrain_bench_data::{
-    ConverterReadings, FrontEndSpec, JointSpec, Metadata, Quantity, ReadingKind, Readings, Reference, Trace,
+    ConverterReadings, FrontEndSpec, JointSpec, Metadata, ReadingKind, Readings, Reference, ReferenceQuantity, Trace,
 };
 use ohmstrain_model::{AdcCode, SensorSide};
 use proptest::collection::vec;
@@ -99,7 +99,7 @@ fn trace() -> impl Strategy<Value = Trace> {
             // With a joint an angle is read as strain.
             metadata.joint = None;
         }
-        let reference = [Some(Quantity::Strain), Some(Quantity::AngleDeg), None][quantity]
+        let reference = [Some(ReferenceQuantity::Strain), Some(ReferenceQuantity::AngleDeg), None][quantity]
             .map(|quantity| Reference { quantity, values: column(|row| row.1) });
         let time_s = rows
             .iter()

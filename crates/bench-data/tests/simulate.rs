@@ -1,7 +1,7 @@
 //! Seeds, settings, disturbances and what the recordings look like.
 
 use ohmstrain_bench_data::simulate::{Disturbances, Material, Protocol, SimulationSettings, simulate};
-use ohmstrain_bench_data::{FrontEndSpec, Quantity, ReadingKind, Trace, segment};
+use ohmstrain_bench_data::{FrontEndSpec, ReadingKind, ReferenceQuantity, Trace, segment};
 use ohmstrain_model::Phase::{self, Extend, Hold, Retract};
 
 fn settings(protocol: Protocol) -> SimulationSettings {
@@ -47,7 +47,10 @@ fn recordings_say_what_they_are() {
     let trace = simulate(&settings(SHORT_HOLD)).unwrap();
     assert_eq!(trace.metadata.material.as_deref(), Some("ecoflex-00-30"));
     assert_eq!(trace.metadata.gauge_length_mm, Some(30.0));
-    assert_eq!((trace.readings.kind, trace.reference.as_ref().unwrap().quantity), (ReadingKind::Ohm, Quantity::Strain));
+    assert_eq!(
+        (trace.readings.kind, trace.reference.as_ref().unwrap().quantity),
+        (ReadingKind::Ohm, ReferenceQuantity::Strain)
+    );
     // 2 s of rest, 10 s of ramp, 20 s of hold, 10 s of release, 5 s of rest at 20 Hz, both ends included.
     assert_eq!((trace.len(), trace.time_s[940]), (941, 47.0));
     assert_eq!(strain(&trace)[240], 0.33333);

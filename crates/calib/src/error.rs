@@ -58,13 +58,16 @@ pub enum CalibrationError {
     #[error("fitted parameter: {0}")]
     Parameter(#[from] ParameterError),
     /// The filter failed on the recording.
-    #[error("the filter fails on the recording at {time_s} s: {error}")]
+    #[error("the filter fails on the recording at {time_s} s: {source}")]
     Filter {
         /// Time of the failing row, s.
         time_s: f64,
         /// What it said.
-        error: StepError,
+        source: StepError,
     },
+    /// No filter can be made of the parameters.
+    #[error("{0}")]
+    NoFilter(#[source] StepError),
     /// The optimiser failed.
     #[error("optimiser: {0}")]
     Optimiser(String),

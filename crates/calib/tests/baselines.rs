@@ -160,7 +160,7 @@ fn assert_close(a: &[f64], b: &[f64], tolerance: f64) {
     }
 }
 
-const RIDGES: [f64; 7] = [1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0];
+const BASELINE_RIDGES: [f64; 7] = [1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0];
 
 /// What Simpson's rule leaves in a feature, 4e-8, times weights of at most 1 on twenty features.
 const TOLERANCE: f64 = 1e-6;
@@ -179,7 +179,7 @@ fn the_leaky_bank_is_ridge_regression_on_products_of_convolutions() {
         }
         row
     };
-    let naive = naive(&benches, &RIDGES, &features);
+    let naive = naive(&benches, &BASELINE_RIDGES, &features);
     let fitted = LeakyBank::fit(&[benches[0].samples(), benches[1].samples()]).unwrap();
     assert_eq!(fitted.ridge, naive.ridge);
     assert!((fitted.cross_validated_rmse - naive.cross_validated_rmse).abs() < TOLERANCE);
@@ -201,7 +201,7 @@ fn the_fir_is_ridge_regression_on_interpolated_readings() {
         let taps = (0..fitted.features.taps()).map(|tap| interpolated(known, end_s - lag_s(tap)));
         std::iter::once(1.0).chain(taps).collect()
     };
-    let naive = naive(&benches, &RIDGES, &features);
+    let naive = naive(&benches, &BASELINE_RIDGES, &features);
     assert_eq!(fitted.ridge, naive.ridge);
     // Normal equations square the condition number: with the least ridge 1e-6 they lose 2⁻⁵² · 1e6 · 33 = 7e-9.
     assert!((fitted.cross_validated_rmse - naive.cross_validated_rmse).abs() < 1e-8);

@@ -1,7 +1,7 @@
 //! The likelihood on readings alone: the Nile as other programs have it.
 
 use nalgebra::{matrix, vector};
-use ohmstrain_calib::likelihood::{Bound, Likelihood, ModelFamily, Parameter, Readings};
+use ohmstrain_calib::likelihood::{Bound, Likelihood, ModelFamily, Parameter, ReadingSeries};
 use ohmstrain_ekf::{Belief, Channel, Dynamics};
 use ohmstrain_model::{Observation, ParameterError, Phase, Scalar, Symmetric, Transition};
 
@@ -79,7 +79,7 @@ fn assert_close(got: f64, expected: f64, relative: f64, what: &str) {
 fn the_nile() {
     let time_s: Vec<f64> = (0..100).map(f64::from).collect();
     let parameters = [Parameter::around("reading", 5e3), Parameter::around("level", 5e3)];
-    let recordings = [Readings { time_s: &time_s, value: &after_the_first(), extra_sd: &[] }];
+    let recordings = [ReadingSeries { time_s: &time_s, value: &after_the_first(), extra_sd: &[] }];
     let likelihood = Likelihood::<_, 1, 1> { family: &LocalLevel, parameters: &parameters, recordings: &recordings };
     let fit = likelihood.fit().unwrap();
     assert!(fit.converged && fit.gradient_norm < 1e-8, "{fit:?}");
@@ -100,7 +100,7 @@ fn the_nile() {
 #[test]
 fn the_start_of_the_search_does_not_matter() {
     let time_s: Vec<f64> = (0..100).map(f64::from).collect();
-    let recordings = [Readings { time_s: &time_s, value: &after_the_first(), extra_sd: &[] }];
+    let recordings = [ReadingSeries { time_s: &time_s, value: &after_the_first(), extra_sd: &[] }];
     for (reading, level) in [(1.0, 1.0), (1e7, 1e-2), (1e-1, 1e6), (1e4, 1e3)] {
         let parameters = [("reading", reading), ("level", level)].map(|(name, start)| Parameter {
             name,
@@ -121,7 +121,7 @@ fn the_start_of_the_search_does_not_matter() {
 #[test]
 fn a_parameter_on_its_bound_is_reported_and_the_others_are_maximal() {
     let time_s: Vec<f64> = (0..100).map(f64::from).collect();
-    let recordings = [Readings { time_s: &time_s, value: &after_the_first(), extra_sd: &[] }];
+    let recordings = [ReadingSeries { time_s: &time_s, value: &after_the_first(), extra_sd: &[] }];
     let bounded = Parameter { name: "level", start: 2500.0, lower: 2000.0, upper: 1e5 };
     let parameters = [Parameter::around("reading", 1e4), bounded];
     let likelihood = Likelihood::<_, 1, 1> { family: &LocalLevel, parameters: &parameters, recordings: &recordings };

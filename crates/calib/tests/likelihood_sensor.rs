@@ -1,7 +1,7 @@
 //! Noise and motion of a sensor from its readings alone.
 
 use ohmstrain_calib::likelihood::{
-    Likelihood, ModelFamily, NoiseFit, NoiseParameter, NoiseProblem, NoiseStart, Parameter, Readings,
+    Likelihood, LikelihoodProblem, ModelFamily, NoiseFit, NoiseParameter, NoiseStart, Parameter, ReadingSeries,
 };
 use ohmstrain_calib::{BranchParams, CalibrationError, GaugeParams, LawParams, MotionParams, NoiseParams, RangeParams};
 use ohmstrain_ekf::{Belief, StepError, Unscented};
@@ -82,17 +82,17 @@ fn start() -> NoiseStart {
 }
 
 fn noise_of(
-    recordings: &[Readings],
+    recordings: &[ReadingSeries],
     law: &LawParams,
     start: &NoiseStart,
     free: &[NoiseParameter],
 ) -> Result<NoiseFit, CalibrationError> {
-    NoiseProblem { recordings, law, start, free }.fit()
+    LikelihoodProblem { recordings, law, start, free }.fit()
 }
 
 fn fit(seed: u64, rows: usize) -> NoiseFit {
     let (time_s, value) = simulate(seed, rows);
-    let recordings = [Readings { time_s: &time_s, value: &value, extra_sd: &[] }];
+    let recordings = [ReadingSeries { time_s: &time_s, value: &value, extra_sd: &[] }];
     noise_of(&recordings, &law(0.0), &start(), &FREE).unwrap()
 }
 
@@ -126,9 +126,9 @@ fn what_the_electronics_add_is_not_found_again() {
     let at = |own: f64, extra_sd: &[f64]| {
         let mut start = NoiseStart { noise: TRUE_NOISE, motion: TRUE_MOTION };
         start.noise.reading_sd = own;
-        let recordings = [Readings { time_s: &time_s, value: &value, extra_sd }];
+        let recordings = [ReadingSeries { time_s: &time_s, value: &value, extra_sd }];
         let (law, free) = (law(0.0), [NoiseParameter::ReadingSd]);
-        let problem = NoiseProblem { recordings: &recordings, law: &law, start: &start, free: &free };
+        let problem = LikelihoodProblem { recordings: &recordings, law: &law, start: &start, free: &free };
         problem.log_likelihood().unwrap().value
     };
     // 3² + 4² = 5². Half of the rows say nothing of their electronics, and a missing cell adds nothing.
@@ -141,7 +141,7 @@ fn what_the_electronics_add_is_not_found_again() {
 #[test]
 fn what_the_readings_do_not_say_is_warned_of() {
     let (time_s, value) = simulate(1, 1000);
-    let recordings = [Readings { time_s: &time_s, value: &value, extra_sd: &[] }];
+    let recordings = [ReadingSeries { time_s: &time_s, value: &value, extra_sd: &[] }];
     let mut start = NoiseStart { noise: TRUE_NOISE, motion: TRUE_MOTION };
     // The simulated branch does not wander.
     start.noise.branch_sd = 1e-3;
@@ -209,7 +209,7 @@ const POINT: [f64; 5] = [3e-3, 0.25, 0.4, 0.015, 2.0];
 fn check_derivatives<F: ModelFamily<4, 10>>(family: &F) {
     let (time_s, mut value) = simulate(3, 300);
     value[40..60].fill(f64::NAN);
-    let recordings = [Readings { time_s: &time_s, value: &value, extra_sd: &[] }];
+    let recordings = [ReadingSeries { time_s: &time_s, value: &value, extra_sd: &[] }];
     let parameters = ["reading", "rate", "time", "baseline", "baseline time"].map(|name| Parameter::around(name, 1.0));
     let likelihood = Likelihood::<_, 4, 10> { family, parameters: &parameters, recordings: &recordings };
     let at = |point: &[f64; 5]| likelihood.log_likelihood(point).unwrap().value;
@@ -247,12 +247,13 @@ fn derivatives_are_exact() {
 fn errors_name_the_culprit() {
     let time_s = [0.0, 0.1, 0.2];
     let value = [0.3, f64::INFINITY, 0.3];
-    let recordings = [Readings { time_s: &time_s, value: &value, extra_sd: &[] }];
-    let at =
-        |recordings: &[Readings], free: &[NoiseParameter]| noise_of(recordings, &law(0.0), &start(), free).unwrap_err();
-    let failed = |time_s: f64, error: StepError| CalibrationError::Filter { time_s, error };
+    let recordings = [ReadingSeries { time_s: &time_s, value: &value, extra_sd: &[] }];
+    let at = |recordings: &[ReadingSeries], free: &[NoiseParameter]| {
+        noise_of(recordings, &law(0.0), &start(), free).unwrap_err()
+    };
+    let failed = |time_s: f64, source: StepError| CalibrationError::Filter { time_s, source };
     assert_eq!(at(&recordings, &FREE), failed(0.1, StepError::NonFiniteReading));
-    let backwards = [Readings { time_s: &[0.0, 0.2, 0.1], value: &[0.3; 3], extra_sd: &[] }];
+    let backwards = [ReadingSeries { time_s: &[0.0, 0.2, 0.1], value: &[0.3; 3], extra_sd: &[] }];
     assert_eq!(at(&backwards, &FREE), failed(0.1, StepError::NegativeTimeStep));
     assert!(at(&recordings, &[]).to_string().contains("no parameter is free"));
     assert!(at(&recordings, &[NoiseParameter::BranchSd]).to_string().contains("branch_sd"));

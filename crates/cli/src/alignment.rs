@@ -3,13 +3,13 @@
 use ohmstrain_calib::aligned;
 
 use crate::error::CliError;
-use crate::input::Recording;
+use crate::input::TraceFile;
 use crate::verbosity::Verbosity;
 
 /// Says how late the reference of a recording is; moves it if that is wanted, refuses one that is certainly too late to be used
 /// otherwise, and warns of one that probably is; says how late it is where that does not matter if `explain`. By how much it was
 /// moved, s.
-pub fn check(recording: &mut Recording, align: bool, explain: bool) -> Result<f64, CliError> {
+pub fn check(recording: &mut TraceFile, align: bool, explain: bool) -> Result<f64, CliError> {
     let samples = recording.samples()?;
     let known = ohmstrain::Recording::new(samples.time_s(), samples.reading(), samples.strain())?;
     let name = recording.name.clone();
@@ -60,7 +60,7 @@ pub fn check(recording: &mut Recording, align: bool, explain: bool) -> Result<f6
 }
 
 /// Moves a reference that is late by `lag_s`.
-pub fn shift(recording: &mut Recording, lag_s: f64) -> Result<(), CliError> {
+pub fn shift(recording: &mut TraceFile, lag_s: f64) -> Result<(), CliError> {
     let moved = aligned(&recording.samples()?, lag_s);
     if let Some(reference) = &mut recording.trace.reference {
         reference.values = moved;

@@ -18,7 +18,7 @@ use crate::sensor_file;
 const READ_AT_ONCE: usize = 1 << 16;
 
 /// A recording in memory.
-pub struct Recording {
+pub struct TraceFile {
     /// What messages call it.
     pub name: String,
     /// What messages call its header: name and line.
@@ -116,7 +116,7 @@ pub fn is_stdin(path: &Path) -> bool {
 }
 
 /// Reads a whole recording.
-pub fn read(path: &Path, overrides: &Metadata) -> Result<Recording, CliError> {
+pub fn read(path: &Path, overrides: &Metadata) -> Result<TraceFile, CliError> {
     let mut bytes = Vec::new();
     if is_stdin(path) {
         io::stdin().lock().read_to_end(&mut bytes)
@@ -128,7 +128,7 @@ pub fn read(path: &Path, overrides: &Metadata) -> Result<Recording, CliError> {
 }
 
 /// A whole recording of these bytes.
-pub fn parse(bytes: &[u8], path: &Path, overrides: &Metadata) -> Result<Recording, CliError> {
+pub fn parse(bytes: &[u8], path: &Path, overrides: &Metadata) -> Result<TraceFile, CliError> {
     refuse_parameters(path, bytes)?;
     let sha256 = hexadecimal(&Sha256::digest(bytes));
     if ParquetText::is_one(bytes) {
@@ -137,9 +137,9 @@ pub fn parse(bytes: &[u8], path: &Path, overrides: &Metadata) -> Result<Recordin
     collect(TraceReader::with_overrides(bytes, &path.display().to_string(), overrides)?, sha256)
 }
 
-fn collect<R: Read>(rows: TraceReader<R>, sha256: String) -> Result<Recording, CliError> {
+fn collect<R: Read>(rows: TraceReader<R>, sha256: String) -> Result<TraceFile, CliError> {
     let (name, header) = (rows.file().to_string(), header(&rows));
-    Ok(Recording { name, header, sha256, first_row: 0, trace: Trace::collect(rows)? })
+    Ok(TraceFile { name, header, sha256, first_row: 0, trace: Trace::collect(rows)? })
 }
 
 fn hexadecimal(bytes: &[u8]) -> String {
@@ -175,7 +175,7 @@ pub fn header<R: Read>(rows: &TraceReader<R>) -> String {
     if rows.line() == 0 { rows.file().to_owned() } else { format!("{}:{}", rows.file(), rows.line()) }
 }
 
-impl Recording {
+impl TraceFile {
     /// Some of its rows, under the same name.
     pub fn rows(&self, rows: Range<usize>) -> Self {
         let (name, header, sha256) = (self.name.clone(), self.header.clone(), self.sha256.clone());
@@ -228,8 +228,8 @@ impl Recording {
     /// What its reference measures.
     pub fn quantity(&self) -> Option<Quantity> {
         self.trace.reference.as_ref().map(|reference| match reference.quantity {
-            ohmstrain_bench_data::Quantity::Strain => Quantity::Strain,
-            ohmstrain_bench_data::Quantity::AngleDeg => Quantity::AngleDeg,
+            ohmstrain_bench_data::ReferenceQuantity::Strain => Quantity::Strain,
+            ohmstrain_bench_data::ReferenceQuantity::AngleDeg => Quantity::AngleDeg,
         })
     }
 

@@ -1,11 +1,11 @@
 //! What recordings given to a calibration say about their units, and about being of one sensor.
 
 use ohmstrain::number::{plain, significant};
-use ohmstrain_bench_data::{Quantity, ReadingKind};
+use ohmstrain_bench_data::{ReadingKind, ReferenceQuantity};
 use ohmstrain_calib::{Distrusted, LARGEST_SD_SCALE, Screened, SensorParams};
 
 use crate::error::CliError;
-use crate::input::Recording;
+use crate::input::TraceFile;
 
 /// Strains beyond this are taken for percent until somebody says that they are none: four times its own length.
 const LARGEST_STRAIN: f64 = 3.0;
@@ -49,8 +49,8 @@ impl Figures {
 }
 
 /// Asks about units that cannot be meant, and about recordings that cannot be of one sensor.
-pub fn check(recordings: &[Recording], screened: &Screened) -> Result<(), CliError> {
-    let mut known: Vec<(&Recording, Figures)> = Vec::new();
+pub fn check(recordings: &[TraceFile], screened: &Screened) -> Result<(), CliError> {
+    let mut known: Vec<(&TraceFile, Figures)> = Vec::new();
     for (recording, samples) in recordings.iter().zip(screened.samples()) {
         let Some(figures) = Figures::new(samples.reading(), samples.strain()) else { continue };
         check_units(recording, &figures)?;
@@ -95,9 +95,9 @@ pub fn check(recordings: &[Recording], screened: &Screened) -> Result<(), CliErr
     Ok(())
 }
 
-fn check_units(recording: &Recording, figures: &Figures) -> Result<(), CliError> {
+fn check_units(recording: &TraceFile, figures: &Figures) -> Result<(), CliError> {
     let (trace, Figures { median_reading, largest, gauge }) = (&recording.trace, figures);
-    let is_strain = trace.reference.as_ref().is_some_and(|reference| reference.quantity == Quantity::Strain);
+    let is_strain = trace.reference.as_ref().is_some_and(|reference| reference.quantity == ReferenceQuantity::Strain);
     let percent = *largest > LARGEST_STRAIN || (*largest > 1.0 && *gauge < LEAST_GAUGE);
     if is_strain && trace.metadata.strain_unit.is_none() && percent {
         return Err(CliError::Input(format!(
@@ -122,7 +122,7 @@ fn check_units(recording: &Recording, figures: &Figures) -> Result<(), CliError>
 }
 
 /// Says when one recording was given twice.
-pub fn warn_of_copies(recordings: &[Recording]) {
+pub fn warn_of_copies(recordings: &[TraceFile]) {
     for (k, recording) in recordings.iter().enumerate() {
         if let Some(first) = recordings[..k].iter().find(|first| first.sha256 == recording.sha256) {
             let text = format!("{} has the same content as {}: its rows count twice", recording.name, first.name);
@@ -132,7 +132,7 @@ pub fn warn_of_copies(recordings: &[Recording]) {
 }
 
 /// Says which recordings rest at a resistance that one sensor hardly has.
-pub fn warn_of_rests(recordings: &[Recording], params: &SensorParams) {
+pub fn warn_of_rests(recordings: &[TraceFile], params: &SensorParams) {
     let rests = || recordings.iter().zip(&params.recordings).map(|(recording, info)| (recording, info.rest_reading));
     let least = rests().min_by(|a, b| a.1.total_cmp(&b.1));
     let most = rests().max_by(|a, b| a.1.total_cmp(&b.1));
@@ -160,7 +160,7 @@ pub fn warn_of_intervals(params: &SensorParams) {
 }
 
 /// Says which rows took no part in a calibration; the first ones, or all of them.
-pub fn distrusted(recordings: &[Recording], distrusted: &[Distrusted]) -> Vec<String> {
+pub fn distrusted(recordings: &[TraceFile], distrusted: &[Distrusted]) -> Vec<String> {
     let line = |one: &Distrusted| {
         let recording = &recordings[one.recording];
         let row = recording.first_row + one.row + 1;
@@ -170,7 +170,7 @@ pub fn distrusted(recordings: &[Recording], distrusted: &[Distrusted]) -> Vec<St
 }
 
 /// The same on stderr, the first ones.
-pub fn warn_of_distrusted(recordings: &[Recording], rows: &[Distrusted]) {
+pub fn warn_of_distrusted(recordings: &[TraceFile], rows: &[Distrusted]) {
     let lines = distrusted(recordings, rows);
     lines.iter().take(NAMED_ROWS).for_each(|line| CliError::warning(line));
     if lines.len() > NAMED_ROWS {

@@ -12,7 +12,7 @@ pub const WAIT_IN_MEMORY: usize = 16 << 20;
 
 /// The readings of a recording that may be longer than memory, and nothing else of it: what exceeds 16 MB waits in a temporary
 /// file, and rows are taken out of it by the thousand.
-pub struct Readings {
+pub struct StoredReadings {
     /// Of a row: time, value and, for those of a converter, deviation and a byte that says whether it was saturated.
     has_codes: bool,
     len: usize,
@@ -33,7 +33,7 @@ struct Kept {
 const AT_ONCE: usize = 4096;
 const NUMBER: usize = size_of::<f64>();
 
-impl Readings {
+impl StoredReadings {
     /// Reads what is left in `rows`, at least one.
     pub fn collect<R: Read>(mut rows: TraceReader<R>) -> Result<Self, CliError> {
         let has_codes = rows.has_codes();
@@ -137,7 +137,7 @@ mod tests {
                 let cell = value(row).map_or_else(String::new, |value| value.to_string());
                 writeln!(text, "{row},{cell}").unwrap();
             }
-            let readings = Readings::collect(TraceReader::new(text.as_bytes(), "t.csv").unwrap()).unwrap();
+            let readings = StoredReadings::collect(TraceReader::new(text.as_bytes(), "t.csv").unwrap()).unwrap();
             assert_eq!(readings.len(), rows);
             assert_eq!(readings.kept.borrow().file.is_rolled(), rows > 10);
             let backwards = (0..rows.div_ceil(AT_ONCE)).rev().flat_map(|at| at * AT_ONCE..rows.min((at + 1) * AT_ONCE));

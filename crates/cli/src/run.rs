@@ -2,7 +2,7 @@ use ohmstrain::{Error, Estimate, EstimatorKind, FilterBuilder, Sensor};
 
 use crate::args::{EstimateArgs, RestResistance};
 use crate::error::CliError;
-use crate::input::Recording;
+use crate::input::TraceFile;
 
 /// A sensor's filter as the flags want it.
 pub fn builder<'a>(sensor: &'a Sensor, args: &EstimateArgs) -> FilterBuilder<'a> {
@@ -75,7 +75,7 @@ pub struct Estimated {
 
 /// Filters and smooths a recording; `kind` is the sensor's default unless another is wanted.
 pub fn estimate(
-    recording: &Recording,
+    recording: &TraceFile,
     sensor: &Sensor,
     rest_resistance: Option<f64>,
     kind: Option<EstimatorKind>,

@@ -4,7 +4,7 @@ use ohmstrain::number::plain;
 use ohmstrain::{Sensor, UnitDoubt, UnitGuess};
 
 use crate::error::CliError;
-use crate::input::Recording;
+use crate::input::TraceFile;
 
 /// Readings at the start of a file that are looked at before it is filtered.
 pub const FIRST_READINGS: usize = 100;
@@ -36,7 +36,7 @@ pub fn check_readings(
 }
 
 /// Refuses a reference in percent for a sensor calibrated with fractions, and the reverse.
-pub fn check_reference(recording: &Recording, sensor: &Sensor) -> Result<(), CliError> {
+pub fn check_reference(recording: &TraceFile, sensor: &Sensor) -> Result<(), CliError> {
     let truth = (0..recording.trace.len()).map(|row| recording.truth(row));
     sensor.check_reference(truth).map_err(|doubt| {
         let answer = if doubt.is_of_calibration {

@@ -43,6 +43,12 @@ pub struct Closing<'a> {
 }
 
 /// Scores of rows that a calibration never saw.
+///
+/// ```
+/// fn ratio(tested: &ohmstrain::Tested) -> f64 {
+///     tested.filter.rmse / tested.static_cubic.rmse
+/// }
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Tested {
     /// The default estimator's filter.

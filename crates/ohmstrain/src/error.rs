@@ -31,7 +31,7 @@ pub enum Error {
     Guard(ParameterError),
     /// A joint that no sensor can sit on.
     #[error("the sensor's joint: {0}")]
-    Joint(ParameterError),
+    Joint(#[source] ParameterError),
     /// A strain to start at, or that is known later, that the sensor never reports.
     #[error("{name}: expected {} to {}, the limits of the sensor's {}, found {found}", plain(*lower), plain(*upper), quantity.name())]
     KnownStrain {
@@ -150,12 +150,20 @@ impl std::error::Error for TextError {
 }
 
 /// What is wrong with the text of a sensor; see [`TextError`].
+///
+/// ```
+/// use std::error::Error;
+///
+/// let error = ohmstrain::Sensor::from_toml("format = 8\nrange").unwrap_err();
+/// let text = error.source().and_then(|text| text.source()).unwrap_or(&error);
+/// assert!(!text.to_string().is_empty());
+/// ```
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum TextCause {
     /// It is no TOML, or a field is unknown, missing or of the wrong type.
     #[error("{}", .0.message().replace('\n', ", "))]
-    Toml(toml::de::Error),
+    Toml(#[source] toml::de::Error),
     /// It is of another version of the format.
     #[error("field `format`: expected version {expected}, found {found}")]
     Format {

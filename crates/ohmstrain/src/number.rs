@@ -4,11 +4,22 @@
 const DIGITS: i32 = 4;
 
 /// `value` with four significant digits, trailing zeros of the fraction dropped; an en dash if it is not finite.
+///
+/// ```
+/// use ohmstrain::number::plain;
+///
+/// assert_eq!([1384.529, -0.012_345_6, 0.25, 3.2e-8].map(plain), ["1385", "−0.01235", "0.25", "3.2·10⁻⁸"]);
+/// assert_eq!(plain(f64::NAN), "–");
+/// ```
 pub fn plain(value: f64) -> String {
     significant(value, DIGITS)
 }
 
 /// `value` with the given number of significant digits.
+///
+/// ```
+/// assert_eq!(ohmstrain::number::significant(1384.529, 2), "1400");
+/// ```
 pub fn significant(value: f64, digits: i32) -> String {
     if !value.is_finite() {
         return if value.is_nan() { "–".into() } else { signed(if value > 0.0 { "∞" } else { "-∞" }.into()) };
@@ -21,6 +32,10 @@ pub fn significant(value: f64, digits: i32) -> String {
 }
 
 /// `value ± error`, both rounded to the error's second digit.
+///
+/// ```
+/// assert_eq!(ohmstrain::number::with_error(1.234_56, 0.034_9), "1.235 ± 0.035");
+/// ```
 pub fn with_error(value: f64, error: f64) -> String {
     if !(error > 0.0 && error.is_finite() && value.is_finite()) {
         return plain(value);
@@ -34,11 +49,20 @@ pub fn with_error(value: f64, error: f64) -> String {
 }
 
 /// A share as a percentage, one decimal.
+///
+/// ```
+/// assert_eq!(ohmstrain::number::percent(0.953_4), "95.3 %");
+/// ```
 pub fn percent(share: f64) -> String {
     if share.is_finite() { format!("{} %", fixed(100.0 * share, 1)) } else { plain(share) }
 }
 
 /// `value` with `decimals` digits after the point; a negative number of them rounds before the point.
+///
+/// ```
+/// assert_eq!(ohmstrain::number::fixed(-1234.567, 1), "−1234.6");
+/// assert_eq!(ohmstrain::number::fixed(1234.567, -2), "1200");
+/// ```
 pub fn fixed(value: f64, decimals: i32) -> String {
     if decimals < 0 {
         let unit = 10.0_f64.powi(-decimals);
@@ -50,11 +74,19 @@ pub fn fixed(value: f64, decimals: i32) -> String {
 }
 
 /// Whether a number of this size is better written with a power of ten.
+///
+/// ```
+/// assert_eq!([1e-6, 0.1, 1e8].map(ohmstrain::number::reads_better_in_powers), [true, false, true]);
+/// ```
 pub fn reads_better_in_powers(value: f64) -> bool {
     value != 0.0 && !(-5..7).contains(&exponent(value))
 }
 
 /// `m·10ⁿ`.
+///
+/// ```
+/// assert_eq!(ohmstrain::number::in_powers(123_456.0, 3), "1.23·10⁵");
+/// ```
 pub fn in_powers(value: f64, digits: i32) -> String {
     if value == 0.0 || !value.is_finite() {
         return significant(value, digits);
@@ -67,6 +99,10 @@ pub fn in_powers(value: f64, digits: i32) -> String {
 }
 
 /// Power of ten of the leading digit; 0 for zero.
+///
+/// ```
+/// assert_eq!([0.02, 0.0, 250.0].map(ohmstrain::number::exponent), [-2, 0, 2]);
+/// ```
 pub fn exponent(value: f64) -> i32 {
     if value == 0.0 || !value.is_finite() { 0 } else { value.abs().log10().floor() as i32 }
 }

@@ -13,7 +13,17 @@ const COVERED: f64 = 0.9;
 /// the middle of an evenly used range gives 113.
 const WIDE: f64 = 60.0;
 
-/// What is known of an estimate on some rows; errors in percent of full scale.
+/// What is known of an estimate on some rows; errors in percent of full scale. Of a calibrated sensor what it keeps says it.
+///
+/// ```
+/// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+/// use ohmstrain::verdict::{Known, is_better, verdict};
+///
+/// let sensor = ohmstrain::Sensor::from_toml(&text)?;
+/// let known: Vec<Known> = sensor.params().summary.iter().map(Known::from).collect();
+/// println!("{} ({:?})", verdict(&known), is_better(&known));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Known {
     error: f64,
@@ -26,6 +36,19 @@ pub struct Known {
 
 impl Known {
     /// From scores, and those of the static cubic on the same rows.
+    ///
+    /// ```
+    /// use ohmstrain::verdict::{Known, is_better};
+    /// use ohmstrain::{ScoredRow, Scores};
+    ///
+    /// let row = |k: u32, error: f64| {
+    ///     let truth = f64::from(k) / 100.0;
+    ///     ScoredRow { time_s: f64::from(k), truth, strain: truth + error, sd: Some(0.02) }
+    /// };
+    /// let scores = |error: f64| Scores::new(&(0..100).map(|k| row(k, error)).collect::<Vec<_>>());
+    /// let known = scores(0.01).map(|ours| Known::new(&ours, scores(0.1).as_ref()));
+    /// assert_eq!(known.and_then(|known| is_better(&[known])), Some(true));
+    /// ```
     pub fn new(scores: &Scores, static_cubic: Option<&Scores>) -> Self {
         Self {
             error: scores.rmse_percent_fs,
@@ -54,12 +77,20 @@ fn worst_ratio(known: &[Known]) -> Option<f64> {
 }
 
 /// Whether all errors are below the static cubic's, by more than chance makes them; `None` without one.
+///
+/// ```
+/// assert_eq!(ohmstrain::verdict::is_better(&[]), None);
+/// ```
 #[must_use]
 pub fn is_better(known: &[Known]) -> Option<bool> {
     Some(worst_ratio(known)? < BETTER)
 }
 
 /// What errors and their intervals are worth, in one sentence: the worst of what is known.
+///
+/// ```
+/// assert_eq!(ohmstrain::verdict::verdict(&[]), "No static curve to compare with; its error bars hold.");
+/// ```
 pub fn verdict(known: &[Known]) -> String {
     let better = match worst_ratio(known) {
         Some(ratio) if ratio < CLEARLY_BETTER => "Clearly better than a static curve",
@@ -80,6 +111,10 @@ fn of_intervals(known: &[Known]) -> &'static str {
 }
 
 /// A number in percent as people read it: two digits below ten, whole ones above.
+///
+/// ```
+/// assert_eq!([3.24, 40.2].map(ohmstrain::verdict::percent), ["3.2 %", "40 %"]);
+/// ```
 pub fn percent(value: f64) -> String {
     fixed(value, i32::from(value.abs() < 9.95)) + " %"
 }

@@ -1,6 +1,12 @@
 //! Lines that fit a terminal.
 
 /// Columns that no line exceeds where words can be wrapped.
+///
+/// ```
+/// use ohmstrain::wrap::{COLUMNS, wrapped};
+///
+/// assert!(wrapped(&["word"; 99].join(" "), "", "").lines().all(|line| line.len() <= COLUMNS));
+/// ```
 pub const COLUMNS: usize = 100;
 
 /// The words of one line, broken between them where a line would be longer than [`COLUMNS`]: the first line begins with

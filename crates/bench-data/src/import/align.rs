@@ -1,7 +1,7 @@
 use crate::import::motion_fit::{Blocks, Motion, Pull};
 
 /// Blocks of the jackknife.
-const BLOCKS: usize = 10;
+const ALIGNED_BLOCKS: usize = 10;
 /// Offsets tried in the time of one full stretch, at first …
 const COARSE_STEPS: f64 = 12.0;
 /// … and between two of those, about the best of them.
@@ -123,7 +123,7 @@ fn rival(shares: &[f64], best: usize, apart: usize) -> Option<usize> {
 fn refine(motion: &Motion, pull: &Pull, about: f64, coarse: f64) -> Offset {
     let step = coarse / f64::from(FINE_STEPS);
     let offsets: Vec<f64> = (-2 * FINE_STEPS..=2 * FINE_STEPS).map(|i| about + f64::from(i) * step).collect();
-    let all: Vec<Blocks> = offsets.iter().map(|offset| pull.blocks(motion, *offset, BLOCKS)).collect();
+    let all: Vec<Blocks> = offsets.iter().map(|offset| pull.blocks(motion, *offset, ALIGNED_BLOCKS)).collect();
     let without = |left_out: Option<usize>| {
         let shares: Vec<f64> = all.iter().map(|blocks| blocks.unexplained(left_out)).collect();
         let (best, least) = minimum(&shares).unwrap_or((2 * FINE_STEPS as usize, 1.0));
@@ -135,15 +135,15 @@ fn refine(motion: &Motion, pull: &Pull, about: f64, coarse: f64) -> Offset {
         (offsets[best] + moved * step, least)
     };
     let (seconds, unexplained) = without(None);
-    let left_out: Vec<f64> = (0..BLOCKS).map(|block| without(Some(block)).0).collect();
-    let mean = left_out.iter().sum::<f64>() / BLOCKS as f64;
+    let left_out: Vec<f64> = (0..ALIGNED_BLOCKS).map(|block| without(Some(block)).0).collect();
+    let mean = left_out.iter().sum::<f64>() / ALIGNED_BLOCKS as f64;
     let squares: f64 = left_out.iter().map(|offset| (offset - mean).powi(2)).sum();
-    Offset { seconds, sd_s: (squares * (BLOCKS - 1) as f64 / BLOCKS as f64).sqrt(), unexplained }
+    Offset { seconds, sd_s: (squares * (ALIGNED_BLOCKS - 1) as f64 / ALIGNED_BLOCKS as f64).sqrt(), unexplained }
 }
 
 /// Whether the blocks agree that one offset explains less than another.
 fn is_worse(motion: &Motion, pull: &Pull, other: &Offset, best: &Offset) -> bool {
-    let of = |offset: &Offset| pull.blocks(motion, offset.seconds, BLOCKS).by_block();
+    let of = |offset: &Offset| pull.blocks(motion, offset.seconds, ALIGNED_BLOCKS).by_block();
     let more: Vec<f64> =
         of(other).iter().zip(of(best)).map(|(other, best)| other - best).filter(|more| more.is_finite()).collect();
     let n = more.len() as f64;

@@ -8,7 +8,7 @@ use super::profile::Profile;
 use super::sensor::{Movement, Sensor};
 use super::{GAUGE_LENGTH_MM, SettingsError, SimulationSettings};
 use crate::metadata::Metadata;
-use crate::row::{Quantity, ReadingKind};
+use crate::row::{ReadingKind, ReferenceQuantity};
 use crate::spec::FrontEndSpec;
 use crate::trace::{ConverterReadings, Readings, Reference, Trace};
 
@@ -36,7 +36,7 @@ pub fn simulate(settings: &SimulationSettings) -> Result<Trace, SettingsError> {
         time_s: truth.iter().map(|sample| round(sample.time_s, 1e6)).collect(),
         readings: readings(settings, resistance_ohm)?,
         reference: Some(Reference {
-            quantity: Quantity::Strain,
+            quantity: ReferenceQuantity::Strain,
             values: truth.iter().map(|sample| round(sample.strain, 1e5)).collect(),
         }),
         temperature_c: None,

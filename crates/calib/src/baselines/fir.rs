@@ -1,6 +1,6 @@
 use std::collections::VecDeque;
 
-use super::regression::{Features, RIDGES, Regression};
+use super::regression::{BASELINE_RIDGES, Features, Regression};
 use super::sampling_interval_s;
 use crate::CalibrationError;
 use crate::samples::Samples;
@@ -29,7 +29,7 @@ impl Fir {
     pub fn fit(recordings: &[Samples]) -> Result<Regression<Self>, CalibrationError> {
         let spacing_s = sampling_interval_s(recordings).max(WINDOW_S / MOST_TAPS as f64);
         let taps = ((WINDOW_S / spacing_s) as usize).clamp(1, MOST_TAPS);
-        Regression::fit(recordings, [Self { spacing_s, taps, recent: VecDeque::new() }], 1, &RIDGES)
+        Regression::fit(recordings, [Self { spacing_s, taps, recent: VecDeque::new() }], 1, &BASELINE_RIDGES)
     }
 
     /// Seconds from one reading of the grid to the next.

@@ -1,4 +1,4 @@
-use super::regression::{Features, RIDGES, Regression};
+use super::regression::{BASELINE_RIDGES, Features, Regression};
 use crate::CalibrationError;
 use crate::low_pass::LowPass;
 use crate::samples::Samples;
@@ -19,7 +19,7 @@ impl LeakyBank {
     /// # Errors
     /// If a recording is too short, the strain is constant or the readings do not vary.
     pub fn fit(recordings: &[Samples]) -> Result<Regression<Self>, CalibrationError> {
-        Regression::fit(recordings, [Self(TIME_CONSTANTS_S.map(LowPass::new))], 1, &RIDGES)
+        Regression::fit(recordings, [Self(TIME_CONSTANTS_S.map(LowPass::new))], 1, &BASELINE_RIDGES)
     }
 }
 

@@ -82,7 +82,7 @@ impl PublishedLaw {
     pub fn start(&self, phases: Vec<(f64, Phase)>, strain: f64) -> impl Baseline + use<> {
         let mut held = Held::new(self.range);
         held.next(strain.is_finite().then_some(strain));
-        Running { law: *self, phases, next: 0, held, started: None, before: None }
+        RunningPublished { law: *self, phases, next: 0, held, started: None, before: None }
     }
 }
 
@@ -129,7 +129,7 @@ fn best_law(rows: &[MovingRow]) -> Option<Movement> {
     is_law.then_some(Movement { stiffness: weights[0], viscosity_s: weights[1], tau_s })
 }
 
-struct Running {
+struct RunningPublished {
     law: PublishedLaw,
     /// Starts of phases, s.
     phases: Vec<(f64, Phase)>,
@@ -140,7 +140,7 @@ struct Running {
     before: Option<(f64, f64, f64)>,
 }
 
-impl Running {
+impl RunningPublished {
     fn begin(&mut self, phase: Phase, time_s: f64, reading: f64) {
         let (since_s, before, rate) = self.before.unwrap_or((time_s, reading, 0.0));
         let law = match phase {
@@ -162,7 +162,7 @@ impl Running {
     }
 }
 
-impl Baseline for Running {
+impl Baseline for RunningPublished {
     fn strain(&mut self, time_s: f64, reading: f64) -> f64 {
         if !reading.is_finite() {
             return self.held.next(None);

@@ -4,7 +4,7 @@ use super::reading_scale::ReadingScale;
 use super::{Baseline, Held};
 use crate::CalibrationError;
 use crate::law::blocked_normal::BlockedNormal;
-use crate::law::regression::BLOCKS;
+use crate::law::regression::VALIDATION_BLOCKS;
 use crate::params::RangeParams;
 use crate::samples::{Samples, check};
 
@@ -31,7 +31,7 @@ pub struct Regression<F> {
 
 /// Ridges tried, for regressions with more features than the data need. A larger one would flatten a feature to less than
 /// half of what it says alone: a rival so weak is none, whatever few blocks of a short recording say.
-pub(super) const RIDGES: [f64; 7] = [1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0];
+pub(super) const BASELINE_RIDGES: [f64; 7] = [1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0];
 
 impl<F: Features> Regression<F> {
     /// The candidate and ridge with the least error on blocks left out. The first `free` features are not penalised.
@@ -65,7 +65,7 @@ impl<F: Features> Regression<F> {
     #[must_use]
     pub fn start(&self) -> impl Baseline + use<F> {
         let Self { features, scale, weights, range, .. } = self.clone();
-        Running { features, scale, weights, held: Held::new(range) }
+        RunningRegression { features, scale, weights, held: Held::new(range) }
     }
 }
 
@@ -88,22 +88,22 @@ fn normal_equations<F: Features>(
                 strain.push(samples.strain[k]);
             }
         }
-        let edge = |b: usize| start + b * (strain.len() - start) / BLOCKS;
-        blocks.extend((0..BLOCKS).map(|b| edge(b)..edge(b + 1)));
+        let edge = |b: usize| start + b * (strain.len() - start) / VALIDATION_BLOCKS;
+        blocks.extend((0..VALIDATION_BLOCKS).map(|b| edge(b)..edge(b + 1)));
     }
     let columns: Vec<DVector<f64>> = columns.into_iter().map(DVector::from_vec).collect();
     let normal = BlockedNormal::new(&columns, free, &DVector::from_vec(strain), &blocks);
     (normal, (0..columns.len()).collect())
 }
 
-struct Running<F> {
+struct RunningRegression<F> {
     features: F,
     scale: ReadingScale,
     weights: DVector<f64>,
     held: Held,
 }
 
-impl<F: Features> Baseline for Running<F> {
+impl<F: Features> Baseline for RunningRegression<F> {
     fn strain(&mut self, time_s: f64, reading: f64) -> f64 {
         let strain = reading.is_finite().then(|| {
             let row = self.features.next(time_s, self.scale.scaled(reading));

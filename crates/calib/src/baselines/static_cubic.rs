@@ -30,16 +30,16 @@ impl StaticCubic {
     /// The same, row by row.
     #[must_use]
     pub fn start(&self) -> impl Baseline + use<> {
-        Running { cubic: *self, held: Held::new(self.range) }
+        RunningCubic { cubic: *self, held: Held::new(self.range) }
     }
 }
 
-struct Running {
+struct RunningCubic {
     cubic: StaticCubic,
     held: Held,
 }
 
-impl Baseline for Running {
+impl Baseline for RunningCubic {
     fn strain(&mut self, _: f64, reading: f64) -> f64 {
         self.held.next(reading.is_finite().then(|| self.cubic.strain(reading)))
     }

@@ -86,7 +86,7 @@ fn candidate_rows(
     start_s: f64,
     build: &Build,
 ) -> Result<Option<Vec<TrainingRow>>, CalibrationError> {
-    let failed = |row: usize, error| CalibrationError::Filter { time_s: samples.time_s[row], error };
+    let failed = |row: usize, source| CalibrationError::Filter { time_s: samples.time_s[row], source };
     let mut filter = build()?;
     let mut filtered = Vec::with_capacity(readings.len());
     for (row, (&time_s, &reading)) in samples.time_s.iter().zip(readings).enumerate() {

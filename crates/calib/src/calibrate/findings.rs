@@ -158,7 +158,7 @@ impl Check<'_> {
         for (r, samples) in self.recordings.iter().enumerate() {
             let rows = self.fit.blocks[r][block].clone();
             let readings = relative_changes(samples.reading, law.rest_readings[r]);
-            let failed = |row: usize, error| CalibrationError::Filter { time_s: samples.time_s[row], error };
+            let failed = |row: usize, source| CalibrationError::Filter { time_s: samples.time_s[row], source };
             let mut filter = estimator(false)?;
             let smoothed = estimator(true)?.smooth(samples.time_s, &readings).map_err(|(row, e)| failed(row, e))?;
             let mut baseline = cubic.start();

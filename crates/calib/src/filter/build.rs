@@ -5,7 +5,7 @@ use ohmstrain_ekf::Particles;
 use ohmstrain_ekf::live::Sieve;
 use ohmstrain_ekf::{
     AnyCurve, Belief, Compact, Dwell, Evidence, Hypotheses, Imm, Mixture, PhaseMixture, SigmaPoints, SignSplit,
-    SparseEkf, StepError,
+    SparseEkf,
 };
 use ohmstrain_model::{Phase, SwitchedModel};
 
@@ -100,12 +100,12 @@ fn of_size<const B: usize, const N: usize, const L: usize>(
     let interval = interval(estimator, setting);
     match kind {
         EstimatorKind::Ekf => {
-            let filter = SparseEkf::<_, Compact, B, N>::at_a_moment(model).map_err(refused)?;
+            let filter = SparseEkf::<_, Compact, B, N>::at_a_moment(model).map_err(CalibrationError::NoFilter)?;
             return Ok(Box::new(Running::new(filter, beliefs, model, interval)));
         }
         EstimatorKind::Ukf => {
             let filter = SparseEkf::<_, Compact, B, N, SigmaPoints<AnyCurve<f64>>>::at_a_moment(model);
-            return Ok(Box::new(Running::new(filter.map_err(refused)?, beliefs, model, interval)));
+            return Ok(Box::new(Running::new(filter.map_err(CalibrationError::NoFilter)?, beliefs, model, interval)));
         }
         EstimatorKind::Corrected => return Err(CalibrationError::no_parameters(kind)),
         _ => {}
@@ -114,12 +114,13 @@ fn of_size<const B: usize, const N: usize, const L: usize>(
     Ok(match kind {
         EstimatorKind::Imm => {
             let start = beliefs.map(|belief| PhaseMixture::single(belief, Phase::Hold));
-            let filter = Imm::<_, B, N>::new(model, NO_STEP_S, dwell, evidence).map_err(refused)?;
+            let filter = Imm::<_, B, N>::new(model, NO_STEP_S, dwell, evidence).map_err(CalibrationError::NoFilter)?;
             Box::new(Running::new(filter, start, model, interval))
         }
         EstimatorKind::SignSplit => {
             let start = beliefs.map(|belief| Mixture::single(belief, Phase::Extend));
-            let filter = SignSplit::<_, B, N, HYPOTHESES>::new(model, NO_STEP_S, hold, evidence).map_err(refused)?;
+            let filter = SignSplit::<_, B, N, HYPOTHESES>::new(model, NO_STEP_S, hold, evidence)
+                .map_err(CalibrationError::NoFilter)?;
             Box::new(Running::new(filter, start, model, interval))
         }
         #[cfg(not(feature = "particles"))]
@@ -134,7 +135,8 @@ fn of_size<const B: usize, const N: usize, const L: usize>(
         }
         _ => {
             let start = beliefs.map(|belief| Mixture::single(belief, Phase::Hold));
-            let filter = Hypotheses::<_, B, N, HISTORIES>::new(model, NO_STEP_S, dwell, evidence).map_err(refused)?;
+            let filter = Hypotheses::<_, B, N, HISTORIES>::new(model, NO_STEP_S, dwell, evidence)
+                .map_err(CalibrationError::NoFilter)?;
             Box::new(Running::new(filter, start, model, interval))
         }
     })
@@ -166,10 +168,6 @@ fn interval(estimator: &EstimatorParams, setting: Setting) -> Interval {
         smoothed_scale: estimator.smoothed_sd_scale.unwrap_or(1.0),
         sieve: setting.sieve.with_error_time(estimator.noise.reading_time_s),
     }
-}
-
-fn refused(error: StepError) -> CalibrationError {
-    CalibrationError::Unsupported(error.to_string())
 }
 
 /// What filters are made for before they know the length of a step.

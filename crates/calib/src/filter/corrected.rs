@@ -21,7 +21,7 @@ pub(crate) struct Corrected {
     filter: Box<dyn Filter>,
     of_filter: Arc<OfFilter>,
     learned: Arc<Learned>,
-    readings: Readings,
+    readings: Watched,
     /// What the filter has said of the last row.
     said: Option<Output>,
     /// What is left of a moment at which the strain was known.
@@ -34,7 +34,7 @@ pub(crate) struct Corrected {
 
 /// What the correction has seen of the readings.
 #[derive(Clone, Copy)]
-struct Readings {
+struct Watched {
     features: ReadingFeatures<f64>,
     time_s: Option<f64>,
     /// The filter's variance at the last reading, once one has been missing since.
@@ -44,7 +44,7 @@ struct Readings {
     birge: f64,
 }
 
-impl Readings {
+impl Watched {
     fn new(scale: FeatureScale<f64>) -> Self {
         let features = ReadingFeatures::new(scale);
         let innovations = Innovations::none();
@@ -71,7 +71,7 @@ impl Corrected {
             filter,
             of_filter: learned.for_filter()?,
             learned: Arc::clone(learned),
-            readings: Readings::new(learned.params.readings.past()),
+            readings: Watched::new(learned.params.readings.past()),
             said: None,
             known: None,
             waiting: VecDeque::new(),
@@ -229,7 +229,7 @@ impl Filter for Corrected {
         // The filter says what it says at the end of the recording.
         (self.readings, self.said, self.known) = (past, None, None);
         let back = self.filter.way_back(rows)?;
-        let ahead = Readings::new(self.learned.params.readings.future());
+        let ahead = Watched::new(self.learned.params.readings.future());
         Ok(Box::new(CorrectedWayBack { back, correction, rows, starts, ahead }))
     }
 }
@@ -241,9 +241,9 @@ struct CorrectedWayBack<'a> {
     rows: Rows<'a>,
     /// What had been seen of the past before each segment that is still to come. Readings that were kept from the filter
     /// were seen here, as far as features go: within a segment they are not, and what was before it fades in seconds.
-    starts: Vec<Readings>,
+    starts: Vec<Watched>,
     /// What has been seen of the future.
-    ahead: Readings,
+    ahead: Watched,
 }
 
 impl WayBack for CorrectedWayBack<'_> {

@@ -25,7 +25,7 @@ pub struct Bootstrap {
 }
 
 /// Blocks that a recording is cut into. They must be longer than residuals remember and many enough to draw from.
-const BLOCKS: usize = 40;
+const BOOTSTRAP_BLOCKS: usize = 40;
 
 /// Draws the blocks of every recording with replacement, `replicates` times, and fits the structure of `law` to each draw
 /// by least squares without a ridge, which would pull all draws to the same side. A row keeps what the sensor remembered of
@@ -65,10 +65,10 @@ pub fn bootstrap_law(
 
 /// As many rows as there are, block by block.
 fn draw(rows: &[usize], rng: &mut ChaCha12Rng) -> Vec<usize> {
-    let mut out = Vec::with_capacity(rows.len() + rows.len() / BLOCKS);
+    let mut out = Vec::with_capacity(rows.len() + rows.len() / BOOTSTRAP_BLOCKS);
     while out.len() < rows.len() {
-        let block = (rng.next_u64() % BLOCKS as u64) as usize;
-        out.extend(&rows[block * rows.len() / BLOCKS..(block + 1) * rows.len() / BLOCKS]);
+        let block = (rng.next_u64() % BOOTSTRAP_BLOCKS as u64) as usize;
+        out.extend(&rows[block * rows.len() / BOOTSTRAP_BLOCKS..(block + 1) * rows.len() / BOOTSTRAP_BLOCKS]);
     }
     out.truncate(rows.len());
     out

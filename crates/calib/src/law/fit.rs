@@ -1,7 +1,7 @@
 use crate::CalibrationError;
 use crate::law::blocked_normal::BlockedNormal;
 use crate::law::design::BRANCH_COLUMNS;
-use crate::law::regression::{BLOCKS, LawRegression};
+use crate::law::regression::{LawRegression, VALIDATION_BLOCKS};
 use crate::law::structure::{GaugeFamily, LawFit, LawStructure};
 use crate::optimise;
 use crate::params::estimator::EstimatorKind;
@@ -62,7 +62,7 @@ const DEFAULT_GAUGE: GaugeFamily = GaugeFamily::Polynomial;
 const GRID: usize = 12;
 /// Ridges tried, relative to the variance of each column. The least one explains most and often makes a filter lock onto
 /// the wrong direction; which one an estimator stands is for its own score to say.
-const RIDGES: [f64; 5] = [0.1, 0.03, 0.01, 0.003, 0.001];
+const LAW_RIDGES: [f64; 5] = [0.1, 0.03, 0.01, 0.003, 0.001];
 /// Steps of the polish of the time constants, and the side of its first simplex in ln τ.
 const POLISH_STEPS: u64 = 40;
 const POLISH_SIDE: f64 = 0.3;
@@ -108,7 +108,7 @@ fn fit_ridges(recordings: &[Samples], options: LawOptions) -> Result<Vec<CrossFi
     }
     let regression = LawRegression::new(recordings)?;
     let grid = TauGrid::new(&regression, options.branches);
-    let fits = RIDGES.map(|ridge| cross_fit(&regression, &grid, options.gauge, ridge));
+    let fits = LAW_RIDGES.map(|ridge| cross_fit(&regression, &grid, options.gauge, ridge));
     if fits.iter().all(Result::is_err) {
         return fits.into_iter().collect();
     }
@@ -123,7 +123,8 @@ fn cross_fit(
 ) -> Result<CrossFit, CalibrationError> {
     let mut structure = polish(regression, gauge, &grid.best(ridge)?, ridge)?;
     structure.sort_branches();
-    let without_block = (0..BLOCKS).map(|block| structure.fit(regression, Some(block))).collect::<Result<_, _>>()?;
+    let without_block =
+        (0..VALIDATION_BLOCKS).map(|block| structure.fit(regression, Some(block))).collect::<Result<_, _>>()?;
     Ok(CrossFit { law: structure.fit(regression, None)?, without_block, blocks: regression.block_rows() })
 }
 
@@ -132,7 +133,7 @@ pub(crate) fn fit_structure(
     regression: &LawRegression,
     options: LawOptions,
 ) -> Result<(LawStructure, LawFit), CalibrationError> {
-    let ridge = RIDGES[RIDGES.len() - 1];
+    let ridge = LAW_RIDGES[LAW_RIDGES.len() - 1];
     let ln_taus = TauGrid::new(regression, options.branches).best(ridge)?;
     let structure = polish(regression, options.gauge, &ln_taus, ridge)?;
     let fit = structure.fit(regression, None)?;
@@ -150,7 +151,7 @@ struct TauGrid {
 impl TauGrid {
     fn new(regression: &LawRegression, branches: usize) -> Self {
         let ln_taus = log_grid(regression.tau_bounds, GRID);
-        let (family, nonlinear, ridge) = (GaugeFamily::Polynomial, ln_taus.clone(), RIDGES[0]);
+        let (family, nonlinear, ridge) = (GaugeFamily::Polynomial, ln_taus.clone(), LAW_RIDGES[0]);
         let everything = LawStructure { family, nonlinear, taus: GRID, ridge };
         let design = everything.design(regression);
         let spacing = LEAST_SPACING.min(0.7 * (ln_taus[GRID - 1] - ln_taus[0]) / (branches.max(2) - 1) as f64);

@@ -12,7 +12,7 @@ use crate::params::RangeParams;
 use crate::samples::{Samples, check};
 
 /// Contiguous blocks of each recording that are left out in turn.
-pub(crate) const BLOCKS: usize = 4;
+pub(crate) const VALIDATION_BLOCKS: usize = 4;
 /// Rows that a regression uses at most: its residuals are correlated over seconds, and more rows tell nothing new.
 const MOST_ROWS: usize = 6000;
 /// Passes that rescale recordings by their own R₀; each one squares the relative error of the one before.
@@ -20,14 +20,14 @@ const SCALING_PASSES: usize = 3;
 
 /// The recordings as one regression.
 pub(crate) struct LawRegression {
-    pub recordings: Vec<Recording>,
+    pub recordings: Vec<RecordingRows>,
     blocks: Vec<Range<usize>>,
     pub scale: StrainScale,
     pub range: RangeParams,
     pub tau_bounds: (f64, f64),
 }
 
-pub(crate) struct Recording {
+pub(crate) struct RecordingRows {
     /// Square roots of the rows' weights.
     root_weights: DVector<f64>,
     pub regressors: Regressors,
@@ -78,9 +78,9 @@ impl LawRegression {
 
     fn scaled(samples: &[Samples], scale: StrainScale, range: RangeParams) -> Self {
         let stride = samples.iter().map(Samples::len).sum::<usize>().div_ceil(MOST_ROWS);
-        let recordings: Vec<Recording> = samples
+        let recordings: Vec<RecordingRows> = samples
             .iter()
-            .map(|samples| Recording {
+            .map(|samples| RecordingRows {
                 root_weights: DVector::from_element(samples.len(), 1.0),
                 regressors: Regressors::new(samples, &scale),
                 complete: samples.complete_rows().step_by(stride).collect(),
@@ -91,7 +91,7 @@ impl LawRegression {
         let mut start = 0;
         for recording in &recordings {
             let rows = recording.complete.len();
-            let edges: Vec<usize> = (0..=BLOCKS).map(|b| start + b * rows / BLOCKS).collect();
+            let edges: Vec<usize> = (0..=VALIDATION_BLOCKS).map(|b| start + b * rows / VALIDATION_BLOCKS).collect();
             blocks.extend(edges.windows(2).map(|edge| edge[0]..edge[1]));
             start += rows;
         }
@@ -118,16 +118,18 @@ impl LawRegression {
 
     /// Rows of each block in its own recording, from the first complete row on to the next block.
     pub(crate) fn block_rows(&self) -> Vec<Vec<Range<usize>>> {
-        let of_recording = |recording: &Recording| {
+        let of_recording = |recording: &RecordingRows| {
             let rows = recording.complete.len();
-            let edge = |b: usize| recording.complete.get(b * rows / BLOCKS).copied().unwrap_or(recording.reading.len());
-            (0..BLOCKS).map(|b| edge(b)..edge(b + 1)).collect()
+            let edge = |b: usize| {
+                recording.complete.get(b * rows / VALIDATION_BLOCKS).copied().unwrap_or(recording.reading.len())
+            };
+            (0..VALIDATION_BLOCKS).map(|b| edge(b)..edge(b + 1)).collect()
         };
         self.recordings.iter().map(of_recording).collect()
     }
 
     /// One column over the complete rows of all recordings.
-    pub(crate) fn column(&self, mut of: impl FnMut(&Recording) -> DVector<f64>) -> DVector<f64> {
+    pub(crate) fn column(&self, mut of: impl FnMut(&RecordingRows) -> DVector<f64>) -> DVector<f64> {
         let mut values = Vec::with_capacity(self.blocks.last().map_or(0, |block| block.end));
         for recording in &self.recordings {
             let column = of(recording);
@@ -139,7 +141,7 @@ impl LawRegression {
     /// Values of the complete rows back in the rows of each recording, NaN elsewhere.
     pub(crate) fn by_recording(&self, values: &DVector<f64>) -> Vec<Vec<f64>> {
         let mut values = values.iter();
-        let spread = |recording: &Recording| {
+        let spread = |recording: &RecordingRows| {
             let mut rows = vec![f64::NAN; recording.reading.len()];
             for &k in &recording.complete {
                 rows[k] = values.next().copied().unwrap_or(f64::NAN);
@@ -149,7 +151,10 @@ impl LawRegression {
         self.recordings.iter().map(spread).collect()
     }
 
-    pub(crate) fn columns<const K: usize>(&self, of: impl Fn(&Recording) -> [DVector<f64>; K]) -> Vec<DVector<f64>> {
+    pub(crate) fn columns<const K: usize>(
+        &self,
+        of: impl Fn(&RecordingRows) -> [DVector<f64>; K],
+    ) -> Vec<DVector<f64>> {
         (0..K).map(|j| self.column(|recording| of(recording)[j].clone())).collect()
     }
 
@@ -191,7 +196,7 @@ impl LawRegression {
     }
 
     pub(crate) fn median_readings(&self) -> Vec<f64> {
-        self.recordings.iter().map(Recording::median_reading).collect()
+        self.recordings.iter().map(RecordingRows::median_reading).collect()
     }
 
     /// Fits a design without block `left_out` of every recording. R₀ multiplies everything, so each pass divides a
@@ -206,7 +211,7 @@ impl LawRegression {
 
     /// The blocks of the normal equations that a block of every recording is.
     pub(crate) fn left_out(&self, block: Option<usize>) -> Vec<usize> {
-        block.map_or(vec![], |block| (0..self.recordings.len()).map(|r| r * BLOCKS + block).collect())
+        block.map_or(vec![], |block| (0..self.recordings.len()).map(|r| r * VALIDATION_BLOCKS + block).collect())
     }
 
     /// Weights by some fit, R₀ of each recording, and the normal equations relative to those.
@@ -231,7 +236,7 @@ impl LawRegression {
     }
 }
 
-impl Recording {
+impl RecordingRows {
     pub(crate) fn median_reading(&self) -> f64 {
         median(self.complete.iter().map(|&k| self.reading[k])).unwrap_or(f64::NAN)
     }

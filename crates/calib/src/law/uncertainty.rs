@@ -7,7 +7,7 @@ use crate::params::Uncertainty;
 use crate::params::law::{LawParameter, LawParams};
 
 /// Contiguous blocks over which residuals may be correlated as they like.
-const BLOCKS: usize = 40;
+const JACKKNIFE_BLOCKS: usize = 40;
 /// Step of finite differences in parameters of order one.
 const STEP: f64 = 1e-4;
 
@@ -74,7 +74,7 @@ impl<'a> Linearised<'a> {
         }
         let factor = Cholesky::new(self.normal())?;
         let half = factor.solve(&spread);
-        Some(factor.solve(&half.transpose()) * (BLOCKS as f64 / (BLOCKS - 1) as f64))
+        Some(factor.solve(&half.transpose()) * (JACKKNIFE_BLOCKS as f64 / (JACKKNIFE_BLOCKS - 1) as f64))
     }
 
     /// `(B - 1)/B Σ d_b d_bᵀ`, d_b the change of the fit when block b is left out: the block jackknife. The sandwich takes
@@ -88,14 +88,14 @@ impl<'a> Linearised<'a> {
             let change = Cholesky::new(&normal - block)?.solve(&gradient);
             out += &change * change.transpose();
         }
-        Some(out * ((BLOCKS - 1) as f64 / BLOCKS as f64))
+        Some(out * ((JACKKNIFE_BLOCKS - 1) as f64 / JACKKNIFE_BLOCKS as f64))
     }
 
     /// JᵀJ and Jᵀr of each block.
     fn blocks(&self) -> impl Iterator<Item = (DMatrix<f64>, DVector<f64>)> {
         let rows = self.jacobian.nrows();
-        (0..BLOCKS).map(move |block| {
-            let (start, end) = (block * rows / BLOCKS, (block + 1) * rows / BLOCKS);
+        (0..JACKKNIFE_BLOCKS).map(move |block| {
+            let (start, end) = (block * rows / JACKKNIFE_BLOCKS, (block + 1) * rows / JACKKNIFE_BLOCKS);
             let jacobian = self.jacobian.rows(start, end - start);
             (jacobian.tr_mul(&jacobian), jacobian.tr_mul(&self.residual.rows(start, end - start)))
         })

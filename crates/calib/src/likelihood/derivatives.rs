@@ -2,14 +2,14 @@ use nalgebra::{ComplexField, DMatrix, DVector};
 use num_dual::HyperDual64;
 
 use super::log_likelihood::log_likelihood;
-use super::{LogLikelihood, ModelFamily, Readings};
+use super::{ModelFamily, ReadingSeries, ReadingsLikelihood};
 use crate::CalibrationError;
 
 /// The log-likelihood with its exact derivatives with respect to the logarithms of the parameters.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Derivatives {
     /// The log-likelihood.
-    pub log_likelihood: LogLikelihood<f64>,
+    pub log_likelihood: ReadingsLikelihood<f64>,
     /// ∂/∂ ln θᵢ.
     pub gradient: DVector<f64>,
     /// ∂²/∂ ln θᵢ ∂ ln θⱼ.
@@ -23,18 +23,18 @@ pub struct Derivatives {
 pub(super) fn derivatives<F: ModelFamily<N, L>, const N: usize, const L: usize>(
     family: &F,
     ln_parameters: &[f64],
-    recordings: &[Readings],
+    recordings: &[ReadingSeries],
 ) -> Result<Derivatives, CalibrationError> {
     let size = ln_parameters.len();
     let mut out = Derivatives {
-        log_likelihood: LogLikelihood { value: f64::NAN, readings: 0 },
+        log_likelihood: ReadingsLikelihood { value: f64::NAN, readings: 0 },
         gradient: DVector::zeros(size),
         hessian: DMatrix::zeros(size, size),
     };
     for i in 0..size {
         for j in 0..=i {
-            let LogLikelihood { value, readings } = seeded(family, ln_parameters, recordings, [i, j])?;
-            out.log_likelihood = LogLikelihood { value: value.re, readings };
+            let ReadingsLikelihood { value, readings } = seeded(family, ln_parameters, recordings, [i, j])?;
+            out.log_likelihood = ReadingsLikelihood { value: value.re, readings };
             out.gradient[i] = value.eps1;
             out.hessian[(i, j)] = value.eps1eps2;
             out.hessian[(j, i)] = value.eps1eps2;
@@ -51,7 +51,7 @@ pub(super) fn derivatives<F: ModelFamily<N, L>, const N: usize, const L: usize>(
 pub(super) fn gradient<F: ModelFamily<N, L>, const N: usize, const L: usize>(
     family: &F,
     ln_parameters: &[f64],
-    recordings: &[Readings],
+    recordings: &[ReadingSeries],
 ) -> Result<(f64, DVector<f64>), CalibrationError> {
     let size = ln_parameters.len();
     let (mut log_likelihood, mut slopes) = (f64::NAN, DVector::zeros(size));
@@ -71,9 +71,9 @@ pub(super) fn gradient<F: ModelFamily<N, L>, const N: usize, const L: usize>(
 fn seeded<F: ModelFamily<N, L>, const N: usize, const L: usize>(
     family: &F,
     ln_parameters: &[f64],
-    recordings: &[Readings],
+    recordings: &[ReadingSeries],
     seeds: [usize; 2],
-) -> Result<LogLikelihood<HyperDual64>, CalibrationError> {
+) -> Result<ReadingsLikelihood<HyperDual64>, CalibrationError> {
     let parameter = |(k, ln): (usize, &f64)| {
         let [first, second] = seeds.map(|seed| f64::from(u8::from(k == seed)));
         ComplexField::exp(HyperDual64::new(*ln, first, second, 0.0))

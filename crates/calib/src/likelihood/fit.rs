@@ -3,7 +3,7 @@ use nalgebra::DMatrix;
 use super::derivatives::derivatives;
 use super::log_likelihood::log_likelihood;
 use super::newton::{MOST_ITERATIONS, Objective, Optimum, covariance, maximise};
-use super::{Derivatives, LogLikelihood, ModelFamily, Parameter, Readings};
+use super::{Derivatives, ModelFamily, Parameter, ReadingSeries, ReadingsLikelihood};
 use crate::CalibrationError;
 
 /// The likelihood of recordings under a family of models. `L = N (N + 1) / 2`.
@@ -14,7 +14,7 @@ pub struct Likelihood<'a, F, const N: usize, const L: usize> {
     /// Their parameters, in the order in which the family takes them.
     pub parameters: &'a [Parameter],
     /// Recordings; each starts anew.
-    pub recordings: &'a [Readings<'a>],
+    pub recordings: &'a [ReadingSeries<'a>],
 }
 
 /// A bound of a parameter.
@@ -59,7 +59,7 @@ pub struct LikelihoodFit {
     /// The parameters, in the family's order.
     pub parameters: Vec<FittedParameter>,
     /// The log-likelihood there.
-    pub log_likelihood: LogLikelihood<f64>,
+    pub log_likelihood: ReadingsLikelihood<f64>,
     /// Euclidean norm of the gradient with respect to the logarithms of the parameters that are not on a bound.
     pub gradient_norm: f64,
     /// Covariance of the logarithms of the parameters, zero in rows and columns of those on a bound; `None` where the
@@ -76,7 +76,7 @@ impl<F: ModelFamily<N, L>, const N: usize, const L: usize> Likelihood<'_, F, N, 
     ///
     /// # Errors
     /// A parameter that no model can have, or the time at which the filter fails.
-    pub fn log_likelihood(&self, values: &[f64]) -> Result<LogLikelihood<f64>, CalibrationError> {
+    pub fn log_likelihood(&self, values: &[f64]) -> Result<ReadingsLikelihood<f64>, CalibrationError> {
         log_likelihood(self.family, values, self.recordings)
     }
 

@@ -8,7 +8,7 @@ use crate::CalibrationError;
 
 /// Readings without a reference. The shorter of times and readings counts.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Readings<'a> {
+pub struct ReadingSeries<'a> {
     /// Times, s, not decreasing.
     pub time_s: &'a [f64],
     /// Readings in the channel's unit; NaN where missing.
@@ -18,7 +18,7 @@ pub struct Readings<'a> {
     pub extra_sd: &'a [f64],
 }
 
-impl Readings<'_> {
+impl ReadingSeries<'_> {
     /// The reading of a row; `None` where it is missing.
     fn reading<T: Scalar>(&self, row: usize) -> Option<Reading<T>> {
         let value = self.value.get(row).filter(|value| !value.is_nan())?;
@@ -29,7 +29,7 @@ impl Readings<'_> {
 
 /// Log density of readings under a model.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LogLikelihood<T> {
+pub struct ReadingsLikelihood<T> {
     /// Every constant counted.
     pub value: T,
     /// Readings that were not missing.
@@ -40,16 +40,19 @@ pub struct LogLikelihood<T> {
 pub(super) fn log_likelihood<T, F, const N: usize, const L: usize>(
     family: &F,
     parameters: &[T],
-    recordings: &[Readings],
-) -> Result<LogLikelihood<T>, CalibrationError>
+    recordings: &[ReadingSeries],
+) -> Result<ReadingsLikelihood<T>, CalibrationError>
 where
     T: Scalar,
     F: ModelFamily<N, L>,
 {
     let model = family.model(parameters)?;
     let start = family.start(&model);
-    let mut run =
-        Run { filter: Ekf::new(model), prepared: HashMap::new(), sum: LogLikelihood { value: T::zero(), readings: 0 } };
+    let mut run = Run {
+        filter: Ekf::new(model),
+        prepared: HashMap::new(),
+        sum: ReadingsLikelihood { value: T::zero(), readings: 0 },
+    };
     for recording in recordings {
         let mut belief = start;
         let mut previous_s = None;
@@ -57,7 +60,7 @@ where
             let dt_s = previous_s.map_or(0.0, |previous_s| time_s - previous_s);
             belief = run
                 .step(&belief, dt_s, recording.reading(row))
-                .map_err(|error| CalibrationError::Filter { time_s, error })?;
+                .map_err(|source| CalibrationError::Filter { time_s, source })?;
             previous_s = Some(time_s);
         }
     }
@@ -69,7 +72,7 @@ struct Run<M, P, T> {
     filter: Ekf<M>,
     /// Prepared steps by their length in nanoseconds: differences of decimal times repeat to rounding only.
     prepared: HashMap<u64, P>,
-    sum: LogLikelihood<T>,
+    sum: ReadingsLikelihood<T>,
 }
 
 /// A recording whose steps never repeat must not fill the memory.

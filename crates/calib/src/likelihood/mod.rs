@@ -2,7 +2,7 @@
 //!
 //! [`Likelihood`] joins a family of models ([`ModelFamily`]), parameters and recordings. It gives the log-likelihood of
 //! the Kalman filter's innovations with exact gradient and Hessian on the logarithms of the parameters (hyper-dual
-//! numbers run through the same filter), the maximum, standard errors and profile intervals. [`NoiseProblem`] does it for a sensor
+//! numbers run through the same filter), the maximum, standard errors and profile intervals. [`LikelihoodProblem`] does it for a sensor
 //! whose law is known.
 //!
 //! The likelihood trusts the model. A law that is wrong by more than its noise says makes a filter overconfident, which
@@ -19,7 +19,7 @@ mod family;
 mod fit;
 mod log_likelihood;
 mod newton;
-mod noise_problem;
+mod problem;
 mod profile;
 mod sensor;
 mod sensor_family;
@@ -27,8 +27,8 @@ mod sensor_family;
 pub use derivatives::Derivatives;
 pub use family::{ModelFamily, Parameter};
 pub use fit::{Bound, FittedParameter, Likelihood, LikelihoodFit};
-pub use log_likelihood::{LogLikelihood, Readings};
-pub use noise_problem::NoiseProblem;
+pub use log_likelihood::{ReadingSeries, ReadingsLikelihood};
+pub use problem::LikelihoodProblem;
 pub use profile::ProfileInterval;
 pub use sensor::{NoiseFit, NoiseStart};
 pub use sensor_family::NoiseParameter;

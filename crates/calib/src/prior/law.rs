@@ -5,7 +5,7 @@ use super::probe::common;
 use crate::CalibrationError;
 use crate::law::design::StrainScale;
 use crate::law::fit::CrossFit;
-use crate::law::regression::{BLOCKS, Design, LawRegression};
+use crate::law::regression::{Design, LawRegression, VALIDATION_BLOCKS};
 use crate::law::structure::{LawFit, LawStructure};
 use crate::params::RangeParams;
 use crate::samples::{Samples, usual_step_s};
@@ -44,7 +44,7 @@ impl LawPrior {
     pub(crate) fn posterior(&self, recordings: &[Samples]) -> Result<CrossFit, CalibrationError> {
         let regression = LawRegression::on_scale(recordings, self.scale(), self.range)?;
         let problem = Posterior::new(self, &regression, row_step_s(recordings, &regression))?;
-        let without_block = (0..BLOCKS).map(|block| problem.fit(Some(block))).collect::<Result<_, _>>()?;
+        let without_block = (0..VALIDATION_BLOCKS).map(|block| problem.fit(Some(block))).collect::<Result<_, _>>()?;
         Ok(CrossFit { law: problem.fit(None)?, without_block, blocks: regression.block_rows() })
     }
 }

@@ -101,7 +101,7 @@ const MOST_OUTLIERS: f64 = 0.05;
 /// readings that have nothing to do with the reference 0.98 and more.
 const MOST_UNEXPLAINED: f64 = 0.9;
 /// Ridges tried for that: strong ones extrapolate least.
-const RIDGES: [f64; 3] = [0.1, 0.01, 0.001];
+const SCREENING_RIDGES: [f64; 3] = [0.1, 0.01, 0.001];
 
 /// Looks for values that stand far from their neighbours, then for rows whose reading and reference do not go together,
 /// and asks whether the readings have anything to do with the reference at all. Screening what has been screened finds
@@ -229,7 +229,7 @@ fn unexplained(regression: &LawRegression) -> Option<f64> {
     let all: Vec<usize> = (0..design.columns.len()).collect();
     let constants: Vec<usize> = (0..design.free).collect();
     let constant = normal.cross_validate(&constants, 0.0)?;
-    let law = RIDGES.iter().filter_map(|&ridge| normal.cross_validate(&all, ridge)).reduce(f64::min)?;
+    let law = SCREENING_RIDGES.iter().filter_map(|&ridge| normal.cross_validate(&all, ridge)).reduce(f64::min)?;
     Some(law / constant)
 }
 

@@ -96,7 +96,7 @@ impl WrittenArgs {
 /// Flags of `filter`.
 #[derive(Debug, ClapArgs)]
 pub struct FilterArgs {
-    /// Recording, or - for stdin
+    /// TraceFile, or - for stdin
     #[arg(default_value = "-")]
     pub trace_file: PathBuf,
     /// Estimate every row from the readings up to S seconds after it, 0.5 for instance; rows come out that much later
@@ -123,7 +123,7 @@ pub struct FilterArgs {
 /// Flags of `smooth`.
 #[derive(Debug, ClapArgs)]
 pub struct SmoothArgs {
-    /// Recording, or - for stdin
+    /// TraceFile, or - for stdin
     pub trace_file: PathBuf,
     /// What to write
     #[command(flatten)]

@@ -13,7 +13,7 @@ use super::tested::{Kept, tested};
 use crate::alignment;
 use crate::args::CalibrateArgs;
 use crate::error::CliError;
-use crate::input::{self, Recording, unit};
+use crate::input::{self, TraceFile, unit};
 use crate::output::{Kind, Outputs, print};
 use crate::plausible;
 use crate::progress::Progress;
@@ -117,11 +117,11 @@ fn calibration(args: &CalibrateArgs) -> Calibration<'static> {
 
 /// The sensor behind `recordings`.
 pub fn calibrate_recordings(
-    recordings: &[Recording],
+    recordings: &[TraceFile],
     calibration: Calibration,
     progress: &Progress,
 ) -> Result<Calibrated, CliError> {
-    let samples: Vec<Samples> = recordings.iter().map(Recording::samples).collect::<Result<_, _>>()?;
+    let samples: Vec<Samples> = recordings.iter().map(TraceFile::samples).collect::<Result<_, _>>()?;
     let (quantity, reading) = common_units(recordings)?;
     let names: Vec<&str> = recordings.iter().map(|recording| recording.name.as_str()).collect();
     let screened = screen(&samples).map_err(|error| CliError::calibration(&names, &error))?;
@@ -153,7 +153,7 @@ fn file_name(path: &str) -> String {
 }
 
 /// Quantity and unit that all recordings share.
-fn common_units(recordings: &[Recording]) -> Result<(Quantity, ReadingUnit), CliError> {
+fn common_units(recordings: &[TraceFile]) -> Result<(Quantity, ReadingUnit), CliError> {
     let first = &recordings[0];
     let (quantity, reading) = (first.quantity().unwrap_or(Quantity::Strain), unit(first.trace.readings.kind));
     for recording in recordings {

@@ -5,7 +5,7 @@ use ohmstrain_calib::{
 
 use crate::args::CalibrateArgs;
 use crate::error::CliError;
-use crate::input::Recording;
+use crate::input::TraceFile;
 use crate::output;
 use crate::plausible;
 
@@ -13,9 +13,9 @@ const NOT_TOLD: &str =
     "parameters without the ridge: not told; without it the equations of the law are singular on these recordings\n";
 
 /// What `calibrate --explain` and `--bootstrap` print.
-pub fn text(args: &CalibrateArgs, recordings: &[Recording], law: &LawParams) -> Result<String, CliError> {
+pub fn text(args: &CalibrateArgs, recordings: &[TraceFile], law: &LawParams) -> Result<String, CliError> {
     let mut text = String::new();
-    let samples: Vec<Samples> = recordings.iter().map(Recording::samples).collect::<Result<_, _>>()?;
+    let samples: Vec<Samples> = recordings.iter().map(TraceFile::samples).collect::<Result<_, _>>()?;
     let names: Vec<&str> = recordings.iter().map(|recording| recording.name.as_str()).collect();
     let failed = |error| CliError::calibration(&names, &error);
     let screened = screen(&samples).map_err(failed)?;

@@ -7,7 +7,7 @@ use crate::args::{ExportArgs, ExportTarget};
 use crate::commands::score_table::covered;
 use crate::error::CliError;
 use crate::export::{self, ChipFilter, Plan, ReplayedRow};
-use crate::input::Recording;
+use crate::input::TraceFile;
 use crate::output::{self, print};
 
 /// A recording with a reference, and what this computer and a static cubic make of it, as they would live.
@@ -21,7 +21,7 @@ pub struct OnRecording {
 
 impl OnRecording {
     /// Runs both over the whole recording.
-    pub fn new(args: &ExportArgs, sensor: &Sensor, recording: &Recording) -> Result<Self, CliError> {
+    pub fn new(args: &ExportArgs, sensor: &Sensor, recording: &TraceFile) -> Result<Self, CliError> {
         let refused = |error: &dyn std::fmt::Display| CliError::Input(format!("{}: {error}", recording.name));
         let mut builder = sensor.filter();
         if let Some(estimator) = args.estimator.chosen() {

@@ -27,7 +27,7 @@ pub fn run(args: &FilterArgs) -> Result<(), CliError> {
     let WrittenArgs { output, replace, columns, .. } = &args.written;
     let mut rows_out = RowsOut::claim(output.as_deref(), replace.force, [&args.trace_file, &args.estimate.sensor])?;
     let mut sensor = sensor_file::read(&args.estimate.sensor, kind)?;
-    let mut filter = Running::new(&sensor, args)?;
+    let mut filter = FilterRun::new(&sensor, args)?;
     suits::warn_of_start(args.estimate.initial_strain, &sensor);
     let beginning = match &args.header {
         Some(columns) => Beginning::Row(columns),
@@ -39,7 +39,7 @@ pub fn run(args: &FilterArgs) -> Result<(), CliError> {
     check_unit(&header, rows.reading_kind(), sensor.params().reading)?;
     if let Some(joint) = input::joint(rows.metadata()) {
         sensor = sensor.on_joint(joint)?;
-        filter = Running::new(&sensor, args)?;
+        filter = FilterRun::new(&sensor, args)?;
     }
     let columns = estimates::columns(&sensor, columns)?;
     let live = is_stdin(&args.trace_file) || !args.trace_file.is_file();
@@ -52,7 +52,7 @@ pub fn run(args: &FilterArgs) -> Result<(), CliError> {
 }
 
 /// A filter with or without a lag, and the strains that will be known to it.
-struct Running {
+struct FilterRun {
     filter: Lag,
     /// In order of time.
     known: VecDeque<KnownStrain>,
@@ -68,7 +68,7 @@ enum Lag {
     Some(LaggedFilter),
 }
 
-impl Running {
+impl FilterRun {
     fn new(sensor: &Sensor, args: &FilterArgs) -> Result<Self, Error> {
         let builder = builder(sensor, &args.estimate);
         let filter = match args.lag_s {
@@ -151,7 +151,7 @@ fn next_until(known: &mut VecDeque<KnownStrain>, time_s: f64) -> Option<KnownStr
 /// Filters row by row.
 fn stream<W: io::Write + Send>(
     args: &FilterArgs,
-    mut filter: Running,
+    mut filter: FilterRun,
     rows: TraceReader<Box<dyn Read>>,
     mut sink: Sink<W>,
 ) -> Result<(), CliError> {

@@ -6,7 +6,7 @@ use ohmstrain::{EstimatorKind, Scores, Sensor, SensorParams, Tested};
 use super::scoring::{self, Part};
 use crate::args::ReportArgs;
 use crate::error::CliError;
-use crate::input::Recording;
+use crate::input::TraceFile;
 use crate::output::{Claim, Kind, Outputs};
 use crate::report::{FigureFiles, Report, ReportInput, Sample, ScoreRow, Scored};
 use crate::run::estimate;
@@ -14,7 +14,7 @@ use ohmstrain::MADE_BY;
 
 /// What a report is about.
 pub struct Reporting<'a> {
-    pub recording: &'a Recording,
+    pub recording: &'a TraceFile,
     pub sensor: &'a Sensor,
     /// Estimator; the sensor's own choice if there is none.
     pub kind: Option<EstimatorKind>,
@@ -124,7 +124,7 @@ impl Reporting<'_> {
 }
 
 /// Whether the rows of `part` were calibrated on, by the times that a sensor file has of each recording.
-pub fn sample(recording: &Recording, params: &SensorParams, part: Part) -> Sample {
+pub fn sample(recording: &TraceFile, params: &SensorParams, part: Part) -> Sample {
     let of_it = params.recordings.iter().filter(|info| info.sha256 == recording.sha256);
     let scored = |time_s: &&f64| {
         part.from_s.is_none_or(|from_s| **time_s >= from_s) && part.until_s.is_none_or(|until_s| **time_s < until_s)

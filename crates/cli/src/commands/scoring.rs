@@ -1,7 +1,7 @@
 use ohmstrain::Estimate;
 use ohmstrain_calib::{Baseline, ScoredRow, Scores};
 
-use crate::input::Recording;
+use crate::input::TraceFile;
 
 /// The rows that are scored, by their times.
 #[derive(Clone, Copy, Debug, Default)]
@@ -24,7 +24,7 @@ impl Part {
 }
 
 /// Scores of the rows of `part`, of which `estimate` gives strain and deviation; `None` without a reference.
-fn scores(recording: &Recording, part: Part, estimate: impl Fn(usize) -> (f64, Option<f64>)) -> Option<Scores> {
+fn scores(recording: &TraceFile, part: Part, estimate: impl Fn(usize) -> (f64, Option<f64>)) -> Option<Scores> {
     let times = &recording.trace.time_s;
     let rows: Vec<ScoredRow> = (0..times.len())
         .filter(|&k| part.holds(times[k]))
@@ -37,12 +37,12 @@ fn scores(recording: &Recording, part: Part, estimate: impl Fn(usize) -> (f64, O
 }
 
 /// Scores of estimates; `None` without a reference.
-pub fn of_estimates(recording: &Recording, estimates: &[Estimate], part: Part) -> Option<Scores> {
+pub fn of_estimates(recording: &TraceFile, estimates: &[Estimate], part: Part) -> Option<Scores> {
     scores(recording, part, |k| (estimates[k].strain, Some(estimates[k].strain_sd)))
 }
 
 /// Scores of a baseline, which runs over the whole recording too; it is given the readings times `moved`.
-pub fn of_baseline(recording: &Recording, mut baseline: impl Baseline, part: Part, moved: f64) -> Option<Scores> {
+pub fn of_baseline(recording: &TraceFile, mut baseline: impl Baseline, part: Part, moved: f64) -> Option<Scores> {
     let trace = &recording.trace;
     let rows = trace.time_s.iter().zip(&trace.readings.values);
     let strains: Vec<f64> = rows.map(|(&time_s, &reading)| baseline.strain(time_s, moved * reading)).collect();

@@ -8,7 +8,7 @@ use crate::error::CliError;
 use crate::estimates::{EstimateWriter, Packed, columns};
 use crate::input::{self, check_unit};
 use crate::output::RowsOut;
-use crate::readings::{Readings, WAIT_IN_MEMORY, temporary};
+use crate::readings::{StoredReadings, WAIT_IN_MEMORY, temporary};
 use crate::run::{builder, rest_resistance};
 use crate::sensor_file;
 use crate::suits;
@@ -28,7 +28,7 @@ pub fn run(args: &SmoothArgs) -> Result<(), CliError> {
         sensor = sensor.on_joint(joint)?;
     }
     let name = rows.file().to_string();
-    let readings = Readings::collect(rows)?;
+    let readings = StoredReadings::collect(rows)?;
     let rest = rest_resistance(args.estimate.rest_resistance, &sensor, readings.values(), &name)?;
     suits::check_readings(&header, &sensor, rest, readings.values())?;
     let builder = builder(&sensor, &args.estimate);
@@ -52,7 +52,7 @@ pub fn run(args: &SmoothArgs) -> Result<(), CliError> {
     rows_out.publish()
 }
 
-fn smooth_into(packed: Packed, builder: FilterBuilder, readings: &Readings) -> Result<Segments, CliError> {
+fn smooth_into(packed: Packed, builder: FilterBuilder, readings: &StoredReadings) -> Result<Segments, CliError> {
     let mut segments = Segments::new(packed);
     builder.smooth_backward(readings.len(), |row| readings.row(row), |_, estimates| segments.push(estimates))?;
     Ok(segments)

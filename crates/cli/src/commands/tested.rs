@@ -5,7 +5,7 @@ use std::ops::Range;
 use ohmstrain::{Sensor, Tested};
 use ohmstrain_calib::{Baseline, ScoredRow, Scores};
 
-use crate::input::Recording;
+use crate::input::TraceFile;
 
 /// Fewer rows than this say nothing.
 const FEWEST_ROWS: usize = 10;
@@ -13,7 +13,7 @@ const FEWEST_ROWS: usize = 10;
 /// A recording of which only some rows were calibrated on.
 pub struct Kept {
     /// All of it.
-    pub whole: Recording,
+    pub whole: TraceFile,
     /// The rows that were calibrated on.
     pub seen: Range<usize>,
 }

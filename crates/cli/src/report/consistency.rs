@@ -6,11 +6,11 @@ use super::chart::{Chart, HALF, WIDE};
 use super::figures::{Figure, HALF_TICKS, HIGH_TICKS, mark_test, time_axis};
 use super::ink::Ink;
 use super::innovations::{BOUND, Innovations};
-use super::recording::Recording;
+use super::recording::PlottedRecording;
 use ohmstrain::number::plain;
 
 /// |z| against time.
-pub fn size(recording: &Recording, innovations: &Innovations) -> Result<Figure, ReportError> {
+pub fn size(recording: &PlottedRecording, innovations: &Innovations) -> Result<Figure, ReportError> {
     let top = 1.2 * innovations.usual_largest().max(1.25 * BOUND);
     let y = Axis::linear("|z| = √NIS", 0.0, top, HIGH_TICKS);
     let mut chart = Chart::new(WIDE, time_axis(recording), y);

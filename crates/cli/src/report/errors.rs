@@ -7,13 +7,13 @@ use super::axis::Axis;
 use super::chart::{Chart, WIDE};
 use super::figures::{Figure, HIGH_TICKS, against_time, mark_test, time_axis};
 use super::ink::Ink;
-use super::recording::{Recording, Z_95};
+use super::recording::{PlottedRecording, Z_95};
 
 /// Height of these plots, px.
 const HEIGHT_PX: f64 = 240.0;
 
 /// Estimate less reference against time; nothing without a reference.
-pub fn strain(recording: &Recording) -> Result<Option<Figure>, ReportError> {
+pub fn strain(recording: &PlottedRecording) -> Result<Option<Figure>, ReportError> {
     let Some(truth) = recording.truth else { return Ok(None) };
     let errors = |rows: &[Estimate]| -> Vec<f64> {
         rows.iter().zip(truth).map(|(row, truth)| recording.shown(row.strain - truth)).collect()
@@ -39,7 +39,7 @@ pub fn strain(recording: &Recording) -> Result<Option<Figure>, ReportError> {
 }
 
 /// Recorded readings less the law driven by the reference; nothing without a reference.
-pub fn reading(recording: &Recording) -> Result<Option<Figure>, ReportError> {
+pub fn reading(recording: &PlottedRecording) -> Result<Option<Figure>, ReportError> {
     let Some(driven) = &recording.driven else { return Ok(None) };
     let residual: Vec<f64> =
         recording.reading.iter().zip(&driven.reading).map(|(recorded, law)| recorded - law).collect();
@@ -57,6 +57,6 @@ pub fn reading(recording: &Recording) -> Result<Option<Figure>, ReportError> {
     Figure::new(chart, "Residual of the law", note, false).map(Some)
 }
 
-fn unit(recording: &Recording) -> &'static str {
+fn unit(recording: &PlottedRecording) -> &'static str {
     if recording.shown(1.0) > 1.0 { "% strain" } else { "°" }
 }

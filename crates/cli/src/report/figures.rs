@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::axis::{Axis, extent};
 use super::chart::{Chart, WIDE};
 use super::ink::{Ink, Key};
-use super::recording::Recording;
+use super::recording::PlottedRecording;
 use super::{ReportError, Scored, slug};
 
 /// A plot with what belongs to it.
@@ -47,13 +47,13 @@ pub const HALF_TICKS: usize = 6;
 pub const HIGH_TICKS: usize = 6;
 
 /// A time axis over the whole recording.
-pub fn time_axis(recording: &Recording) -> Axis {
+pub fn time_axis(recording: &PlottedRecording) -> Axis {
     let (first, last) = extent(recording.time_s.iter().copied()).unwrap_or((0.0, 1.0));
     Axis::linear("Time, s", first, last, WIDE_TICKS)
 }
 
 /// Marks the part that is scored.
-pub fn mark_test(chart: &mut Chart, recording: &Recording) {
+pub fn mark_test(chart: &mut Chart, recording: &PlottedRecording) {
     if recording.scored == Scored::default() {
         return;
     }
@@ -63,12 +63,12 @@ pub fn mark_test(chart: &mut Chart, recording: &Recording) {
 }
 
 /// Values with their times.
-pub fn against_time<'a>(recording: &Recording<'a>, values: impl Iterator<Item = f64> + 'a) -> Vec<(f64, f64)> {
+pub fn against_time<'a>(recording: &PlottedRecording<'a>, values: impl Iterator<Item = f64> + 'a) -> Vec<(f64, f64)> {
     recording.time_s.iter().copied().zip(values).collect()
 }
 
 /// Recorded readings, the filter's fit, and the law with its band.
-pub fn reading(recording: &Recording) -> Result<Figure, ReportError> {
+pub fn reading(recording: &PlottedRecording) -> Result<Figure, ReportError> {
     let fitted: Vec<f64> = recording.filtered.iter().map(|row| recording.law.fitted(row)).collect();
     let (centre, sd) = match &recording.driven {
         Some(driven) => (driven.reading.as_slice(), recording.law.model_error()),
@@ -98,7 +98,7 @@ pub fn reading(recording: &Recording) -> Result<Figure, ReportError> {
 }
 
 /// Reference, filter with band, smoother.
-pub fn strain(recording: &Recording) -> Result<Figure, ReportError> {
+pub fn strain(recording: &PlottedRecording) -> Result<Figure, ReportError> {
     let mut chart = strain_chart(recording, 0..recording.time_s.len(), WIDE);
     mark_test(&mut chart, recording);
     draw_strain(&mut chart, recording, 0..recording.time_s.len());
@@ -113,7 +113,7 @@ pub fn strain(recording: &Recording) -> Result<Figure, ReportError> {
 }
 
 /// An empty plot for the strain of some rows, on the scale of all of them.
-pub fn strain_chart(recording: &Recording, rows: Range<usize>, size_px: (f64, f64)) -> Chart {
+pub fn strain_chart(recording: &PlottedRecording, rows: Range<usize>, size_px: (f64, f64)) -> Chart {
     let mean = |row: &Estimate| recording.shown(row.strain);
     let (filtered, smoothed) = (recording.filtered.iter(), recording.smoothed.iter());
     let truth = recording.truth.unwrap_or(&[]).iter().map(|x| recording.shown(*x));
@@ -127,7 +127,7 @@ pub fn strain_chart(recording: &Recording, rows: Range<usize>, size_px: (f64, f6
 }
 
 /// The strain of some rows.
-pub fn draw_strain(chart: &mut Chart, recording: &Recording, rows: Range<usize>) {
+pub fn draw_strain(chart: &mut Chart, recording: &PlottedRecording, rows: Range<usize>) {
     let (skipped, count) = (rows.start, rows.len());
     let times = || recording.time_s.iter().copied().skip(skipped).take(count);
     let filtered = || recording.filtered.iter().skip(skipped).take(count);

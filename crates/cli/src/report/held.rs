@@ -6,14 +6,14 @@ use super::chart::{Chart, WIDE};
 use super::figures::{Figure, HIGH_TICKS};
 use super::ink::Ink;
 use super::motion::Hold;
-use super::recording::Recording;
+use super::recording::PlottedRecording;
 use ohmstrain::number::plain;
 
 /// Share of a hold that is plotted.
 const LAST: f64 = 0.99;
 
 /// The longest holds on a logarithmic time axis, or nothing if there is none.
-pub fn relaxation(recording: &Recording) -> Result<Option<Figure>, ReportError> {
+pub fn relaxation(recording: &PlottedRecording) -> Result<Option<Figure>, ReportError> {
     let held: Vec<(Curve, &Hold)> =
         recording.longest_holds().iter().filter_map(|hold| Some((Curve::new(recording, hold)?, hold))).collect();
     let points = || held.iter().flat_map(|(curve, _)| &curve.recorded);
@@ -40,7 +40,7 @@ pub fn relaxation(recording: &Recording) -> Result<Option<Figure>, ReportError> 
 const PER_DECADE: f64 = 8.0;
 
 /// How fast the readings change in the longest holds, or nothing if there is none.
-pub fn rate(recording: &Recording) -> Result<Option<Figure>, ReportError> {
+pub fn rate(recording: &PlottedRecording) -> Result<Option<Figure>, ReportError> {
     let held: Vec<(Curve, &Hold)> =
         recording.longest_holds().iter().filter_map(|hold| Some((Curve::new(recording, hold)?, hold))).collect();
     let rates: Vec<_> = held.iter().map(|(curve, _)| (slopes(&curve.recorded), slopes(&curve.predicted))).collect();
@@ -75,7 +75,7 @@ fn slopes(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
 }
 
 /// Readings at the beginning and at the end of every hold, level by level; nothing where fewer than three levels are held.
-pub fn levels(recording: &Recording) -> Result<Option<Figure>, ReportError> {
+pub fn levels(recording: &PlottedRecording) -> Result<Option<Figure>, ReportError> {
     let ends: Vec<(f64, f64, f64)> = recording.holds().iter().filter_map(|hold| ends_of(recording, hold)).collect();
     let mut levels: Vec<f64> = ends.iter().map(|(strain, ..)| *strain).collect();
     levels.sort_by(f64::total_cmp);
@@ -98,7 +98,7 @@ pub fn levels(recording: &Recording) -> Result<Option<Figure>, ReportError> {
 }
 
 /// Strain of a hold, and its first and last readings.
-fn ends_of(recording: &Recording, hold: &Hold) -> Option<(f64, f64, f64)> {
+fn ends_of(recording: &PlottedRecording, hold: &Hold) -> Option<(f64, f64, f64)> {
     let end_s = recording.time_s.get(hold.first)? + LAST * hold.duration_s;
     let rows = recording.time_s.iter().zip(recording.reading).take(hold.last + 1).skip(hold.first);
     let mut known =
@@ -115,7 +115,7 @@ struct Curve {
 }
 
 impl Curve {
-    fn new(recording: &Recording, hold: &Hold) -> Option<Self> {
+    fn new(recording: &PlottedRecording, hold: &Hold) -> Option<Self> {
         let start_s = *recording.time_s.get(hold.first)?;
         // The next movement begins in the readings before the reference has left the hold's tolerance.
         let end_s = start_s + LAST * hold.duration_s;

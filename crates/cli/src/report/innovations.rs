@@ -22,7 +22,7 @@ const LAGS: usize = 40;
 const BIN: f64 = 0.2;
 const BINS: usize = 20;
 /// Blocks of the moving mean over a recording.
-const BLOCKS: usize = 60;
+const SHOWN_BLOCKS: usize = 60;
 
 impl Innovations {
     /// From a filter's estimates.
@@ -56,7 +56,7 @@ impl Innovations {
 
     /// Root mean square of |z| over successive blocks: `(first row, last row, value)`.
     pub fn moving_rms(&self) -> Vec<(usize, usize, f64)> {
-        let length = self.size.len().div_ceil(BLOCKS).max(1);
+        let length = self.size.len().div_ceil(SHOWN_BLOCKS).max(1);
         let rms = |block: &[f64]| {
             let known: Vec<f64> = block.iter().copied().filter(|z| z.is_finite()).collect();
             (known.iter().map(|z| z * z).sum::<f64>() / known.len() as f64).sqrt()

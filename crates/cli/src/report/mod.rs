@@ -34,7 +34,7 @@ use figures::Figure;
 pub use ink::Ink;
 use innovations::Innovations;
 pub use law::Law;
-use recording::Recording;
+use recording::PlottedRecording;
 use tables::Table;
 
 /// What a report shows. All slices have one entry per row of the recording.
@@ -183,7 +183,7 @@ impl<'a> Report<'a> {
     /// # Errors
     /// If a plot cannot be drawn; no input is known that does this.
     pub fn new(input: &ReportInput<'a>) -> Result<Self, ReportError> {
-        let recording = Recording::new(input);
+        let recording = PlottedRecording::new(input);
         let innovations = Innovations::new(input.filtered);
         let scores =
             (!input.scores.is_empty()).then(|| tables::scores(input.scores, input.params.quantity, input.sample));
@@ -245,7 +245,7 @@ pub fn slug(title: &str) -> String {
     name.split('-').filter(|part| !part.is_empty()).collect::<Vec<_>>().join("-")
 }
 
-fn sections(recording: &Recording, innovations: &Innovations) -> Result<Vec<Section>, ReportError> {
+fn sections(recording: &PlottedRecording, innovations: &Innovations) -> Result<Vec<Section>, ReportError> {
     let mut sections = vec![];
     let plain = |title, figures| Section { title, folded: false, text: String::new(), figures, tables: vec![] };
     if recording.time_s.iter().any(|time| time.is_finite()) {
@@ -267,7 +267,7 @@ fn sections(recording: &Recording, innovations: &Innovations) -> Result<Vec<Sect
     Ok(sections)
 }
 
-fn sensor_behaviour(recording: &Recording) -> Result<Section, ReportError> {
+fn sensor_behaviour(recording: &PlottedRecording) -> Result<Section, ReportError> {
     let relaxation = held::relaxation(recording)?;
     let text = match relaxation {
         Some(_) => String::new(),
@@ -286,7 +286,7 @@ fn sensor_behaviour(recording: &Recording) -> Result<Section, ReportError> {
     Ok(Section { title: "The sensor", folded: false, text, figures, tables: vec![] })
 }
 
-fn consistency_of(recording: &Recording, innovations: &Innovations) -> Result<Section, ReportError> {
+fn consistency_of(recording: &PlottedRecording, innovations: &Innovations) -> Result<Section, ReportError> {
     let mut figures: Vec<Figure> = errors::reading(recording)?.into_iter().collect();
     if innovations.count > 0 {
         figures.push(consistency::size(recording, innovations)?);

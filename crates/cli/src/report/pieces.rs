@@ -5,7 +5,7 @@ use super::axis::extent;
 use super::chart::WIDE;
 use super::figures::{Figure, draw_strain, strain_chart};
 use super::motion::Motion;
-use super::recording::Recording;
+use super::recording::PlottedRecording;
 use ohmstrain::number::significant;
 
 /// Movements that one plot shows well, and most plots: a piece has some 30 kB.
@@ -17,7 +17,7 @@ const HEIGHT_PX: f64 = 220.0;
 const VISIBLE: f64 = 1.0 / 40.0;
 
 /// The strain in pieces of equal numbers of rows, and what is to be said of them; none if one plot shows all movements.
-pub fn strain(recording: &Recording) -> Result<(Vec<Figure>, String), ReportError> {
+pub fn strain(recording: &PlottedRecording) -> Result<(Vec<Figure>, String), ReportError> {
     let wanted = count(&recording.motions, recording.time_s);
     let pieces = wanted.min(MOST_PIECES);
     if pieces < 2 {

@@ -17,7 +17,7 @@ const PLOTTED_HOLDS: usize = 4;
 const CURVE_POINTS: u32 = 200;
 
 /// The report's input and what follows from it.
-pub struct Recording<'a> {
+pub struct PlottedRecording<'a> {
     /// Times, s.
     pub time_s: &'a [f64],
     /// Readings; NaN where missing.
@@ -45,7 +45,7 @@ pub struct Recording<'a> {
     held_driven: Driven,
 }
 
-impl<'a> Recording<'a> {
+impl<'a> PlottedRecording<'a> {
     /// Everything that more than one plot needs.
     pub fn new(input: &ReportInput<'a>) -> Self {
         let truth = input.truth.filter(|truth| truth.iter().any(|x| x.is_finite()));

@@ -6,7 +6,7 @@ use super::chart::{Chart, HIGH, WIDE};
 use super::figures::{Figure, HIGH_TICKS};
 use super::ink::Ink;
 use super::motion::Motion;
-use super::recording::Recording;
+use super::recording::PlottedRecording;
 use super::thin::Point;
 use ohmstrain::number::{plain, significant};
 
@@ -14,7 +14,7 @@ use ohmstrain::number::{plain, significant};
 const MOST_ARROWS: usize = 24;
 
 /// Readings against strain in the course of time, with the gauge curve.
-pub fn hysteresis(recording: &Recording) -> Result<Figure, ReportError> {
+pub fn hysteresis(recording: &PlottedRecording) -> Result<Figure, ReportError> {
     let strain = recording.known_strain();
     let shown = |x: f64| recording.shown(x);
     let x = Axis::holding(&recording.known_strain_label(), strain.iter().map(|x| shown(*x)), HIGH_TICKS + 2);
@@ -48,7 +48,7 @@ pub fn hysteresis(recording: &Recording) -> Result<Figure, ReportError> {
 }
 
 /// A step in the middle of each movement, of some of them if there are many.
-fn arrows(recording: &Recording) -> Vec<(Point, Point)> {
+fn arrows(recording: &PlottedRecording) -> Vec<(Point, Point)> {
     let (motions, strain) = (&recording.motions, recording.known_strain());
     let mut movements: Vec<(usize, usize)> = vec![];
     let mut first = 0;
@@ -73,7 +73,7 @@ fn arrows(recording: &Recording) -> Vec<(Point, Point)> {
 }
 
 /// The gauge curve where it was fitted, with what the recording says of it, and its slopes.
-pub fn gauge(recording: &Recording) -> Result<Figure, ReportError> {
+pub fn gauge(recording: &PlottedRecording) -> Result<Figure, ReportError> {
     let range = recording.params.law.range;
     let curve = recording.gauge_curve(Some((range.lower, range.upper)));
     let settled = settled_readings(recording);
@@ -113,7 +113,7 @@ fn plain_slope(slope: f64) -> String {
 
 /// Strain and relative change of every reading, less what the law, driven by the reference, adds for movement and
 /// relaxation; nothing without a reference.
-fn settled_readings(recording: &Recording) -> Vec<(f64, f64)> {
+fn settled_readings(recording: &PlottedRecording) -> Vec<(f64, f64)> {
     let Some(driven) = &recording.driven else { return vec![] };
     let rows = recording.known_strain().iter().zip(recording.reading).zip(&driven.reading);
     let of_row = |((strain, reading), law): ((&f64, &f64), &f64)| {

@@ -6,7 +6,7 @@ use super::chart::{Chart, HIGH};
 use super::figures::{Figure, HIGH_TICKS};
 use super::ink::Ink;
 use super::motion::Motion;
-use super::recording::Recording;
+use super::recording::PlottedRecording;
 use ohmstrain::number::significant;
 
 /// Classes of speed, at most.
@@ -28,7 +28,7 @@ struct Movement {
 }
 
 /// Readings against strain, coloured by the speed of each movement; nothing where all movements are alike.
-pub fn loops(recording: &Recording) -> Result<Option<Figure>, ReportError> {
+pub fn loops(recording: &PlottedRecording) -> Result<Option<Figure>, ReportError> {
     let movements = movements(recording);
     let mut speeds: Vec<f64> = movements.iter().map(|movement| movement.speed).collect();
     speeds.sort_by(f64::total_cmp);
@@ -90,7 +90,7 @@ fn natural_classes(speeds: &[f64]) -> Vec<(f64, f64)> {
     best.windows(2).filter(|pair| pair[1] > pair[0]).map(|pair| (speeds[pair[0]], speeds[pair[1] - 1])).collect()
 }
 
-fn movements(recording: &Recording) -> Vec<Movement> {
+fn movements(recording: &PlottedRecording) -> Vec<Movement> {
     let (motions, strain, time_s) = (&recording.motions, recording.known_strain(), recording.time_s);
     let Some((low, high)) = extent(strain.iter().copied()) else { return vec![] };
     let mut found = vec![];

@@ -3,12 +3,12 @@
 use ohmstrain_calib::Quantity;
 
 use super::innovations::Innovations;
-use super::recording::Recording;
+use super::recording::PlottedRecording;
 use super::{ReportInput, ScoreRow, Scored, axis};
 use ohmstrain::number::{percent, plain, significant};
 
 /// The result in words.
-pub fn headline(input: &ReportInput, recording: &Recording) -> String {
+pub fn headline(input: &ReportInput, recording: &PlottedRecording) -> String {
     match input.scores.first() {
         Some(score) => scored(score, input),
         None if recording.truth.is_some() => "Nothing was scored against the reference.".into(),
@@ -41,7 +41,7 @@ fn scored(score: &ScoreRow, input: &ReportInput) -> String {
 }
 
 /// How long the recording is, and what is missing.
-pub fn extent_of(recording: &Recording) -> String {
+pub fn extent_of(recording: &PlottedRecording) -> String {
     let rows = recording.time_s.len();
     let missing = rows.saturating_sub(recording.reading.iter().filter(|reading| reading.is_finite()).count());
     let duration = axis::extent(recording.time_s.iter().copied()).map_or(0.0, |(first, last)| last - first);

@@ -15,7 +15,7 @@ use crate::args::{EvaluateArgs, Split};
 use crate::commands::reporting::{Drawn, Reporting, Wanted, sample};
 use crate::commands::scoring::Part;
 use crate::error::CliError;
-use crate::input::{self, Recording, check_unit};
+use crate::input::{self, TraceFile, check_unit};
 use crate::output::{Outputs, print};
 use crate::progress::Progress;
 use crate::report::Sample;
@@ -74,7 +74,7 @@ fn with_splits(args: &EvaluateArgs, evaluation: &mut Evaluation) -> Result<(), C
 /// A recording with parameters from some of its rows, scored on the others.
 fn with_split(
     args: &EvaluateArgs,
-    recording: &Recording,
+    recording: &TraceFile,
     split: Split,
     progress: &Progress,
 ) -> Result<(Vec<RecordingScores>, Option<Drawn>), CliError> {
@@ -96,12 +96,12 @@ fn with_split(
 fn with_training(args: &EvaluateArgs, evaluation: &mut Evaluation) -> Result<(), CliError> {
     let progress = Progress::new("calibrating");
     let read = |path| read(args, path);
-    let training: Vec<Recording> = args.calibration.train.iter().map(|path| read(path)).collect::<Result<_, _>>()?;
+    let training: Vec<TraceFile> = args.calibration.train.iter().map(|path| read(path)).collect::<Result<_, _>>()?;
     // All are read before anything is calibrated, so that a wrong name costs no time.
-    let tests: Vec<Recording> = args.test.iter().map(|path| read(path)).collect::<Result<_, _>>()?;
+    let tests: Vec<TraceFile> = args.test.iter().map(|path| read(path)).collect::<Result<_, _>>()?;
     let (sensors, rivals) = calibrated(&training, args, &progress)?;
     progress.doing("scoring");
-    let judged = |recording: &Recording| judge(args, recording, Part::since(args.from), &sensors, &rivals);
+    let judged = |recording: &TraceFile| judge(args, recording, Part::since(args.from), &sensors, &rivals);
     add_until_error(evaluation, tests.par_iter().map(judged).collect())
 }
 
@@ -117,18 +117,18 @@ fn add_until_error(evaluation: &mut Evaluation, judged: Vec<Result<Judged, CliEr
     Ok(())
 }
 
-fn read(args: &EvaluateArgs, path: &Path) -> Result<Recording, CliError> {
+fn read(args: &EvaluateArgs, path: &Path) -> Result<TraceFile, CliError> {
     input::read(path, &args.trace.metadata())
 }
 
 /// One sensor per estimator, and the baselines, from the same rows.
 fn calibrated(
-    training: &[Recording],
+    training: &[TraceFile],
     args: &EvaluateArgs,
     progress: &Progress,
 ) -> Result<(Vec<Sensor>, Rivals), CliError> {
     let sensors = Sensor::calibrated(training, args.estimator, !args.no_correction, progress)?;
-    let samples: Vec<Samples> = training.iter().map(Recording::samples).collect::<Result<_, _>>()?;
+    let samples: Vec<Samples> = training.iter().map(TraceFile::samples).collect::<Result<_, _>>()?;
     let names: Vec<&str> = training.iter().map(|recording| recording.name.as_str()).collect();
     let failed = |error| CliError::calibration(&names, &error);
     let baselines = Baselines::fit(&screen(&samples).map_err(failed)?.samples()).map_err(failed)?;
@@ -149,7 +149,7 @@ struct Judged {
 /// Scores of every sensor on some rows of a recording.
 fn judge(
     args: &EvaluateArgs,
-    recording: &Recording,
+    recording: &TraceFile,
     part: Part,
     sensors: &[Sensor],
     rivals: &Rivals,

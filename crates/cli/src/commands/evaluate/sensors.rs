@@ -10,7 +10,7 @@ use crate::args::Estimators;
 use crate::commands::calibrate::calibrate_recordings;
 use crate::commands::scoring::{self, Part};
 use crate::error::CliError;
-use crate::input::Recording;
+use crate::input::TraceFile;
 use crate::progress::Progress;
 use crate::report::Sample;
 use crate::run::estimate;
@@ -62,7 +62,7 @@ impl Sensor {
     /// One per estimator asked for, each calibrated as `calibrate --estimator` does; at least one. What a correction
     /// corrects comes after it, as a part.
     pub fn calibrated(
-        training: &[Recording],
+        training: &[TraceFile],
         estimators: Estimators,
         corrects: bool,
         progress: &Progress,
@@ -96,7 +96,7 @@ impl Sensor {
     /// casts doubt on them is added to `warnings`.
     pub fn judge(
         &self,
-        recording: &Recording,
+        recording: &TraceFile,
         part: Part,
         rest_resistance: Option<f64>,
         baselines: BaselineScores,
@@ -135,7 +135,7 @@ impl Sensor {
 impl Rivals {
     /// Scores on some rows of a recording, whose readings times `moved` are as those of the calibration; `None` without a
     /// reference.
-    pub fn scores(&self, recording: &Recording, part: Part, moved: f64) -> Option<BaselineScores> {
+    pub fn scores(&self, recording: &TraceFile, part: Part, moved: f64) -> Option<BaselineScores> {
         let learned = match &self.learned {
             None => None,
             Some(learned) => Some(LearnedScores {
@@ -149,7 +149,7 @@ impl Rivals {
         Some(BaselineScores { static_cubic, learned })
     }
 
-    fn of_published(&self, recording: &Recording, part: Part, moved: f64) -> Option<ohmstrain::Scores> {
+    fn of_published(&self, recording: &TraceFile, part: Part, moved: f64) -> Option<ohmstrain::Scores> {
         let time_s = &recording.trace.time_s;
         let strain: Vec<f64> = (0..time_s.len()).map(|row| recording.truth(row)).collect();
         let phases = phases(time_s, &strain).into_iter().map(|(phase, rows)| (time_s[rows.start], phase)).collect();

@@ -6,7 +6,7 @@ use super::rows::{Cell, Rows};
 use super::{Fits, Fitted, fit_recording, output};
 use crate::args::FitLawArgs;
 use crate::error::CliError;
-use crate::input::Recording;
+use crate::input::TraceFile;
 use crate::output::{json, print};
 use ohmstrain::number::{fixed, significant};
 
@@ -38,7 +38,7 @@ struct Ranked {
 }
 
 /// One row per segment and law, the best of a segment first.
-pub fn compare(recordings: &[Recording], args: &FitLawArgs) -> Result<(), CliError> {
+pub fn compare(recordings: &[TraceFile], args: &FitLawArgs) -> Result<(), CliError> {
     let mut ranked = Vec::new();
     for recording in recordings {
         let mut tried: Vec<(String, Fits)> = Vec::new();

@@ -12,7 +12,7 @@ use ohmstrain_calib::closed_form::{ClosedForm, ClosedFormFit, ModulusShape, fit_
 
 use crate::args::{FitLawArgs, RestResistance, phase_name};
 use crate::error::CliError;
-use crate::input::{self, Recording};
+use crate::input::{self, TraceFile};
 use crate::run::median_of_first;
 use pieces::{Piece, pieces};
 
@@ -50,7 +50,7 @@ pub fn run(args: &FitLawArgs) -> Result<(), CliError> {
     }
     let overrides = args.trace.metadata();
     let read = |path: &std::path::PathBuf| input::read(path, &overrides);
-    let recordings: Vec<Recording> = args.traces.iter().map(read).collect::<Result<_, _>>()?;
+    let recordings: Vec<TraceFile> = args.traces.iter().map(read).collect::<Result<_, _>>()?;
     if !args.compare.is_empty() {
         return compare::compare(&recordings, args);
     }
@@ -70,7 +70,7 @@ pub fn run(args: &FitLawArgs) -> Result<(), CliError> {
     }
 }
 
-fn fit_recording(recording: &Recording, args: &FitLawArgs) -> Result<Fits, CliError> {
+fn fit_recording(recording: &TraceFile, args: &FitLawArgs) -> Result<Fits, CliError> {
     let trace = &recording.trace;
     let rest_reading = match args.rest_resistance {
         RestResistance::Value(value) => value,

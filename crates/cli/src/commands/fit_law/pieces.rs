@@ -7,7 +7,7 @@ use ohmstrain_model::Phase;
 
 use crate::args::{FitLawArgs, SegmentChoice, phase_name};
 use crate::error::CliError;
-use crate::input::Recording;
+use crate::input::TraceFile;
 
 /// What one fit is about: a segment, or a movement with the hold after it.
 pub struct Piece {
@@ -48,7 +48,7 @@ struct Numbered {
 }
 
 /// What the arguments choose of a recording.
-pub fn pieces(recording: &Recording, args: &FitLawArgs) -> Result<Vec<Piece>, CliError> {
+pub fn pieces(recording: &TraceFile, args: &FitLawArgs) -> Result<Vec<Piece>, CliError> {
     if args.segment.contains(&SegmentChoice::Whole) {
         return whole(recording, args).map(|piece| vec![piece]);
     }
@@ -85,7 +85,7 @@ fn check(law: ClosedForm, choice: SegmentChoice) -> Result<(), CliError> {
     }
 }
 
-fn whole(recording: &Recording, args: &FitLawArgs) -> Result<Piece, CliError> {
+fn whole(recording: &TraceFile, args: &FitLawArgs) -> Result<Piece, CliError> {
     if args.segment.len() > 1 || matches!(args.law, ClosedForm::Eq8 | ClosedForm::Eq8And9) {
         return Err(CliError::Arguments(format!("--segment whole goes alone, and not with eq8 (law {})", args.law)));
     }

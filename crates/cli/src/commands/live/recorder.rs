@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use ohmstrain_bench_data::{LineParser, Quantity, ReadingKind, Row, RowWriter};
+use ohmstrain_bench_data::{LineParser, ReadingKind, ReferenceQuantity, Row, RowWriter};
 
 use ohmstrain::MADE_BY;
 
@@ -40,8 +40,8 @@ impl Recorder {
             _ => "resistance_ohm",
         };
         let reference = lines.reference_quantity().map(|quantity| match quantity {
-            Quantity::Strain => "strain",
-            Quantity::AngleDeg => "angle_deg",
+            ReferenceQuantity::Strain => "strain",
+            ReferenceQuantity::AngleDeg => "angle_deg",
         });
         ["time_s", reading].into_iter().chain(reference).chain(["mark"]).for_each(|name| rows.text(name));
         rows.end()?;

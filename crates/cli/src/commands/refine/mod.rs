@@ -3,12 +3,12 @@
 mod rows;
 mod table;
 
-use ohmstrain_calib::likelihood::{NoiseParameter, NoiseProblem, NoiseStart, ProfileInterval, Readings};
+use ohmstrain_calib::likelihood::{LikelihoodProblem, NoiseParameter, NoiseStart, ProfileInterval, ReadingSeries};
 use ohmstrain_calib::{CalibrationError, EstimatorKind, LawParams, SensorParams};
 
 use crate::args::RefineArgs;
 use crate::error::CliError;
-use crate::input::{self, Recording, check_unit, reading_column};
+use crate::input::{self, TraceFile, check_unit, reading_column};
 use crate::output::{Kind, Outputs, print};
 use crate::progress::Progress;
 use crate::run::rest_resistance;
@@ -66,8 +66,8 @@ fn refine(
     free: Vec<NoiseParameter>,
     rows: &RelativeRows,
 ) -> Result<Refinement, CalibrationError> {
-    let recordings = [Readings { time_s: &rows.time_s, value: &rows.value, extra_sd: &rows.extra_sd }];
-    let problem = NoiseProblem { recordings: &recordings, law, start: &start, free: &free };
+    let recordings = [ReadingSeries { time_s: &rows.time_s, value: &rows.value, extra_sd: &rows.extra_sd }];
+    let problem = LikelihoodProblem { recordings: &recordings, law, start: &start, free: &free };
     let progress = Progress::new("maximising the likelihood");
     let before = problem.log_likelihood()?;
     let found = problem.fit()?;
@@ -110,7 +110,7 @@ fn movable(law: &LawParams, start: &NoiseStart) -> Vec<NoiseParameter> {
 }
 
 /// Says what of the recording was left aside.
-fn remark_on_input(recording: &Recording, rows: &RelativeRows, params: &SensorParams) {
+fn remark_on_input(recording: &TraceFile, rows: &RelativeRows, params: &SensorParams) {
     if let Some(quantity) = recording.quantity() {
         let (header, name) = (&recording.header, quantity.name());
         CliError::remark(&format!("{header}: the reference in `{name}` is not used; calibrate would use it"));

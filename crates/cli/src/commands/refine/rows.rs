@@ -1,5 +1,5 @@
 use crate::error::CliError;
-use crate::input::Recording;
+use crate::input::TraceFile;
 
 /// Rows for which a maximum and its intervals take seconds; more of them are thinned, since the model is continuous in
 /// time.
@@ -24,7 +24,7 @@ pub struct RelativeRows {
 impl RelativeRows {
     /// The rows of `recording` with `from <= time_s < until`, thinned if there are many.
     pub fn new(
-        recording: &Recording,
+        recording: &TraceFile,
         from: Option<f64>,
         until: Option<f64>,
         rest_reading: f64,
@@ -37,7 +37,7 @@ impl RelativeRows {
             return Err(recording.no_rows(from, until));
         }
         let stride = trace.len().div_ceil(MOST_ROWS).max(1);
-        let rows = Recording { trace, ..recording.rows(0..0) };
+        let rows = TraceFile { trace, ..recording.rows(0..0) };
         let relative = |row: usize| rows.reading(row).1.relative(rest_reading);
         let readings: Vec<_> = (0..rows.trace.len()).step_by(stride).map(relative).collect();
         let known = readings.iter().flatten().count();

@@ -1,6 +1,6 @@
 use std::io::Write;
 
-use ohmstrain_calib::likelihood::{Bound, LogLikelihood, NoiseFit, NoiseParameter, NoiseStart, ProfileInterval};
+use ohmstrain_calib::likelihood::{Bound, NoiseFit, NoiseParameter, NoiseStart, ProfileInterval, ReadingsLikelihood};
 
 use crate::error::CliError;
 use crate::output;
@@ -12,7 +12,7 @@ pub struct Refinement {
     /// The parameters that were moved.
     pub free: Vec<NoiseParameter>,
     /// The log-likelihood with the sensor file's noise.
-    pub before: LogLikelihood<f64>,
+    pub before: ReadingsLikelihood<f64>,
     /// The maximum.
     pub found: NoiseFit,
     /// An interval for each parameter in `free`.

@@ -1,8 +1,8 @@
 use super::sensor::{found, warnings};
 use super::sensor_family::SensorFamily;
 use super::{
-    Likelihood, LikelihoodFit, LogLikelihood, ModelFamily, NoiseFit, NoiseParameter, NoiseStart, Parameter,
-    ProfileInterval, Readings,
+    Likelihood, LikelihoodFit, ModelFamily, NoiseFit, NoiseParameter, NoiseStart, Parameter, ProfileInterval,
+    ReadingSeries, ReadingsLikelihood,
 };
 use crate::CalibrationError;
 use crate::optimise::polish;
@@ -13,9 +13,9 @@ use crate::params::law::LawParams;
 ///
 /// The strain is not needed. In exchange the law is trusted: its error goes into whatever noise fits it best.
 #[derive(Clone, Copy, Debug)]
-pub struct NoiseProblem<'a> {
+pub struct LikelihoodProblem<'a> {
     /// Recordings; each starts anew.
-    pub recordings: &'a [Readings<'a>],
+    pub recordings: &'a [ReadingSeries<'a>],
     /// The law; at most four branches.
     pub law: &'a LawParams,
     /// Noise and motion to start from.
@@ -37,12 +37,12 @@ macro_rules! asked {
     }};
 }
 
-impl NoiseProblem<'_> {
+impl LikelihoodProblem<'_> {
     /// The log-likelihood where the search starts.
     ///
     /// # Errors
     /// As [`Self::fit`].
-    pub fn log_likelihood(&self) -> Result<LogLikelihood<f64>, CalibrationError> {
+    pub fn log_likelihood(&self) -> Result<ReadingsLikelihood<f64>, CalibrationError> {
         let start: Vec<f64> = self.parameters().iter().map(|parameter| parameter.start).collect();
         asked!(self, likelihood => likelihood.log_likelihood(&start))
     }
