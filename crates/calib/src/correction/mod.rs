@@ -1,7 +1,9 @@
 //! The learned correction: choosing its processes, and making of a sensor's rows what `ohmstrain_ekf::correction` runs.
 
-pub(crate) mod gaussian_process;
+mod criterion;
+mod gaussian_process;
 pub(crate) mod owned;
+mod settings;
 pub(crate) mod simulated;
 
 use ohmstrain_ekf::Gaussian;
@@ -12,6 +14,7 @@ use crate::order::extent;
 use crate::params::RangeParams;
 use crate::params::correction::{CorrectorParams, ProcessParams, SIDES, SMOOTHER_INPUTS, SimulatedParams};
 use crate::sd_scale::{joint_scale_of, sd_scale_up_to};
+use criterion::Criterion;
 use gaussian_process::{GaussianProcess, LeftOutRow, Lessons, inducing_rows, relevance};
 
 /// Blocks of rows that are left out in turn.
@@ -114,9 +117,9 @@ impl<'a, const D: usize> Prepared<'a, D> {
     }
 
     /// Chooses a process, and says what it says of every row from the blocks that the row is not in.
-    fn chosen(&self, which: Which) -> Option<(ProcessParams, Vec<Gaussian<f64>>)> {
+    fn chosen(&self, which: Which, criterion: Criterion) -> Option<(ProcessParams, Vec<Gaussian<f64>>)> {
         self.taught(which, |lessons| {
-            let settings = lessons.best_settings()?;
+            let settings = lessons.best_settings(criterion)?;
             let process = GaussianProcess::new(lessons, &settings)?;
             let (limits, least) = (self.examples.limits, self.least_variance(which));
             let said = |(k, row): (usize, LeftOutRow)| {
@@ -156,9 +159,11 @@ impl CorrectorParams {
     /// With S one-sided processes; `last` is what is mixed in last of every row, if anything is.
     fn fit<const D: usize, const S: usize>(prepared: &Prepared<D>, last: &[Gaussian<f64>]) -> Option<Self> {
         let examples = prepared.examples;
-        let (direct, of_direct) = prepared.chosen(Which::Direct)?;
-        let (residual, of_residual) = prepared.chosen(Which::Residual)?;
-        let sides: Vec<_> = ONE_SIDED[..S].iter().map(|side| prepared.chosen(*side)).collect::<Option<_>>()?;
+        let criterion = if S == 0 { Criterion::LeftOutAndEvidence } else { Criterion::LeftOut };
+        let chosen = |which: Which| prepared.chosen(which, criterion);
+        let (direct, of_direct) = chosen(Which::Direct)?;
+        let (residual, of_residual) = chosen(Which::Residual)?;
+        let sides: Vec<_> = ONE_SIDED[..S].iter().map(|side| chosen(*side)).collect::<Option<_>>()?;
         let voices =
             |k: usize| [of_direct[k], of_residual[k]].into_iter().chain(sides.iter().map(move |(_, of)| of[k]));
         let mixed: Vec<Gaussian<f64>> = (0..examples.strain.len()).map(|k| mixture(voices(k))).collect();

@@ -3,6 +3,7 @@ use ohmstrain_ekf::Gaussian;
 
 use super::owned::OwnedCorrection;
 use super::{Examples, Prepared, learned};
+use crate::correction::criterion::Criterion;
 use crate::correction::gaussian_process::{GaussianProcess, Lessons};
 use crate::params::RangeParams;
 use crate::params::correction::{CorrectorParams, ProcessParams};
@@ -174,17 +175,20 @@ fn inputs_that_tell_nothing_get_long_length_scales() {
     let (learned, others) = (0..100, 100..160);
     let inputs: Vec<&[f64]> = rows[learned.clone()].iter().map(Vec::as_slice).collect();
     let (targets, times) = (&target[learned.clone()], &time_s[learned.clone()]);
-    let found = Lessons { inputs: &inputs, targets, time_s: times }.best_settings().unwrap();
-    let tells_most = |(i, length): (usize, &f64)| i == 0 || i == 2 || *length > found.lengths[2];
-    assert!(found.lengths.iter().enumerate().all(tells_most), "{:?}", found.lengths);
+    let lessons = Lessons { inputs: &inputs, targets, time_s: times };
     let error = |settings: ProcessParams| -> f64 {
         let of = |k: usize| textbook(&rows[learned.clone()], targets, times, &settings, &rows[k]).mean - target[k];
         others.clone().map(|k| of(k).powi(2)).sum()
     };
     let alike = |length: f64| error(ProcessParams { lengths: vec![length; D], ..SETTINGS });
     let best_alike = [1.0, 2.0, 4.0, 8.0].map(alike).into_iter().fold(f64::INFINITY, f64::min);
-    let relevant = error(found);
-    assert!(relevant < 0.25 * best_alike, "{relevant} {best_alike}");
+    for criterion in [Criterion::LeftOutAndEvidence, Criterion::LeftOut] {
+        let found = lessons.best_settings(criterion).unwrap();
+        let tells_most = |(i, length): (usize, &f64)| i == 0 || i == 2 || *length > found.lengths[2];
+        assert!(found.lengths.iter().enumerate().all(tells_most), "{criterion:?}: {:?}", found.lengths);
+        let relevant = error(found);
+        assert!(relevant < 0.25 * best_alike, "{criterion:?}: {relevant} {best_alike}");
+    }
 }
 
 /// What a process says of a block in closed form is what one says that was never told of it, centre and scale aside.
@@ -218,6 +222,83 @@ fn blocks_left_out_are_predicted_from_the_others() {
             let unknown = ((variance - 0.0109 - 1e-6) / kernel(&inputs[k], &inputs[k])).clamp(0.0, 1.0);
             assert!((left_out[k].unknown - unknown).abs() < 1e-6, "{k}");
         }
+    }
+}
+
+/// The least of a function of one number with one minimum, between 1e-6 and 1e6 on a logarithmic scale.
+fn least(of: impl Fn(f64) -> f64) -> f64 {
+    let (mut low, mut high) = (-6.0 * 10f64.ln(), 6.0 * 10f64.ln());
+    while high - low > 1e-9 {
+        let (a, b) = (low + (high - low) / 3.0, high - (high - low) / 3.0);
+        if of(a.exp()) < of(b.exp()) { high = b } else { low = a }
+    }
+    of(low.exp())
+}
+
+/// The negative logarithm of a normal density.
+fn surprise(error: &DVector<f64>, covariance: &DMatrix<f64>) -> f64 {
+    let inverse = covariance.clone().try_inverse().unwrap();
+    let logs = covariance.determinant().ln() + error.len() as f64 * std::f64::consts::TAU.ln();
+    0.5 * (error.dot(&(inverse * error)) + logs)
+}
+
+/// Costs of two settings differ as negative logarithms of densities do that are summed over blocks which a process that was never
+/// told of them predicts, each with the prior variance that makes the sum least.
+#[test]
+fn settings_are_judged_by_evidence_and_by_what_was_left_out() {
+    const ROWS: usize = 23;
+    let (inputs, strain, time_s) = examples::<D>(ROWS, 1.7);
+    let rows: Vec<&[f64]> = inputs.iter().map(|row| row.as_slice()).collect();
+    let lessons = Lessons { inputs: &rows, targets: &strain, time_s: &time_s };
+    let mean = strain.iter().sum::<f64>() / ROWS as f64;
+    let sd = (strain.iter().map(|y| (y - mean).powi(2)).sum::<f64>() / ROWS as f64).sqrt();
+    let y = DVector::from_iterator(ROWS, strain.iter().map(|y| (y - mean) / sd));
+    let naive = |settings: &ProcessParams| -> [f64; 2] {
+        let covariance = DMatrix::from_fn(ROWS, ROWS, |i, j| {
+            let square: f64 = (0..D).map(|k| ((inputs[i][k] - inputs[j][k]) / settings.lengths[k]).powi(2)).sum();
+            let correlated = (-(time_s[i] - time_s[j]).abs() / settings.noise_time_s).exp();
+            let white = if i == j { 0.09 * settings.noise.powi(2) + 1e-6 } else { 0.0 };
+            (-square / 2.0).exp()
+                + 0.09 * (1.0 + inputs[i][0] * inputs[j][0])
+                + settings.noise.powi(2) * correlated
+                + white
+        });
+        // Of 23 rows five blocks begin at 0, 4, 9, 13 and 18.
+        let predicted = [0..4, 4..9, 9..13, 13..18, 18..23].map(|block| {
+            let (own, others): (Vec<usize>, Vec<usize>) = (0..ROWS).partition(|k| block.contains(k));
+            let between = |a: &[usize], b: &[usize]| covariance.select_rows(a).select_columns(b);
+            let known = between(&others, &others).try_inverse().unwrap();
+            let error = y.select_rows(&own) - between(&own, &others) * &known * y.select_rows(&others);
+            (error, between(&own, &own) - between(&own, &others) * &known * between(&others, &own))
+        });
+        let blocks = |scale: f64| predicted.iter().map(|(error, left)| surprise(error, &(left * scale))).sum::<f64>();
+        let row =
+            |error: f64, variance: f64| 0.5 * (error * error / variance + (std::f64::consts::TAU * variance).ln());
+        let rows = |scale: f64| -> f64 {
+            let of = |(error, left): &(DVector<f64>, DMatrix<f64>)| {
+                (0..error.len()).map(|k| row(error[k], scale * left[(k, k)])).sum::<f64>()
+            };
+            predicted.iter().map(of).sum()
+        };
+        let evidence = least(|scale| surprise(&y, &(&covariance * scale)));
+        let left_out = least(rows);
+        [(evidence + least(blocks) + left_out) / 3.0, left_out]
+    };
+    let settings = [(4.0, 0.1, 2.0), (3.0, 0.3, 10.0)].map(|(around, noise, noise_time_s)| ProcessParams {
+        lengths: lengths(around, D),
+        noise,
+        noise_time_s,
+        sd_scale: 1.0,
+    });
+    let expected = settings.each_ref().map(naive);
+    for (place, criterion) in [Criterion::LeftOutAndEvidence, Criterion::LeftOut].into_iter().enumerate() {
+        let cost = |of: &ProcessParams| criterion.cost(&GaussianProcess::new(lessons, of).unwrap()).unwrap();
+        let differ = cost(&settings[0]) - cost(&settings[1]);
+        // Matrices of condition 1e5, and a minimum that is found where a function is flat to the last digit.
+        assert!(
+            (differ - (expected[0][place] - expected[1][place])).abs() < 1e-7,
+            "{criterion:?}: {differ} {expected:?}"
+        );
     }
 }
 
