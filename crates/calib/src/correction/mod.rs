@@ -45,6 +45,25 @@ enum Which {
     Residual,
 }
 
+/// How the processes of a corrector are chosen.
+#[derive(Clone, Copy)]
+struct Choosing {
+    criterion: Criterion,
+    /// Whether the factor on a process' deviation is the one that covers the worst block, or all of them together.
+    covers_worst: bool,
+}
+
+impl Choosing {
+    /// Factors weigh voices against each other; the mixture's own sees to its interval. Of a filter's two voices one is not to be
+    /// silenced everywhere by a block that is a world of its own. A smoother has four, one of which is mostly better: there the
+    /// caution pays.
+    const fn of_sides(sides: usize) -> Self {
+        let is_smoother = sides > 0;
+        let criterion = if is_smoother { Criterion::LeftOut } else { Criterion::LeftOutAndEvidence };
+        Self { criterion, covers_worst: is_smoother }
+    }
+}
+
 /// Direct processes that see one side of time, in order.
 const ONE_SIDED: [Which; SIDES] = [Which::Past, Which::Future];
 
@@ -117,9 +136,9 @@ impl<'a, const D: usize> Prepared<'a, D> {
     }
 
     /// Chooses a process, and says what it says of every row from the blocks that the row is not in.
-    fn chosen(&self, which: Which, criterion: Criterion) -> Option<(ProcessParams, Vec<Gaussian<f64>>)> {
+    fn chosen(&self, which: Which, by: Choosing) -> Option<(ProcessParams, Vec<Gaussian<f64>>)> {
         self.taught(which, |lessons| {
-            let settings = lessons.best_settings(criterion)?;
+            let settings = lessons.best_settings(by.criterion)?;
             let process = GaussianProcess::new(lessons, &settings)?;
             let (limits, least) = (self.examples.limits, self.least_variance(which));
             let said = |(k, row): (usize, LeftOutRow)| {
@@ -128,7 +147,9 @@ impl<'a, const D: usize> Prepared<'a, D> {
                 Gaussian { mean, variance }
             };
             let mut said: Vec<Gaussian<f64>> = process.left_out(BLOCKS)?.into_iter().enumerate().map(said).collect();
-            let sd_scale = sd_scale_up_to(&deviations(&said, self.examples.strain), WIDEST_PROCESS);
+            let blocks = deviations(&said, self.examples.strain);
+            let blocks = if by.covers_worst { blocks } else { vec![blocks.concat()] };
+            let sd_scale = sd_scale_up_to(&blocks, WIDEST_PROCESS);
             said.iter_mut().for_each(|said| said.variance *= sd_scale.powi(2));
             Some((ProcessParams { sd_scale, ..settings }, said))
         })
@@ -159,8 +180,7 @@ impl CorrectorParams {
     /// With S one-sided processes; `last` is what is mixed in last of every row, if anything is.
     fn fit<const D: usize, const S: usize>(prepared: &Prepared<D>, last: &[Gaussian<f64>]) -> Option<Self> {
         let examples = prepared.examples;
-        let criterion = if S == 0 { Criterion::LeftOutAndEvidence } else { Criterion::LeftOut };
-        let chosen = |which: Which| prepared.chosen(which, criterion);
+        let chosen = |which: Which| prepared.chosen(which, Choosing::of_sides(S));
         let (direct, of_direct) = chosen(Which::Direct)?;
         let (residual, of_residual) = chosen(Which::Residual)?;
         let sides: Vec<_> = ONE_SIDED[..S].iter().map(|side| chosen(*side)).collect::<Option<_>>()?;
