@@ -7,7 +7,7 @@ mod settings;
 pub(crate) mod simulated;
 
 use ohmstrain_ekf::Gaussian;
-use ohmstrain_ekf::correction::{FEATURES, FILTER_INPUTS, INDUCING, InputScale, OUTPUTS, Process, mixture};
+use ohmstrain_ekf::correction::{FEATURES, FILTER_INPUTS, INDUCING, InputScale, OUTPUTS, Process, consensus, mixture};
 use owned::{OwnedCorrection, OwnedProcess};
 
 use crate::order::extent;
@@ -184,9 +184,9 @@ impl CorrectorParams {
         let (direct, of_direct) = chosen(Which::Direct)?;
         let (residual, of_residual) = chosen(Which::Residual)?;
         let sides: Vec<_> = ONE_SIDED[..S].iter().map(|side| chosen(*side)).collect::<Option<_>>()?;
-        let voices =
-            |k: usize| [of_direct[k], of_residual[k]].into_iter().chain(sides.iter().map(move |(_, of)| of[k]));
-        let mixed: Vec<Gaussian<f64>> = (0..examples.strain.len()).map(|k| mixture(voices(k))).collect();
+        let one_sided = |k: usize| std::array::from_fn::<_, S, _>(|side| sides[side].1[k]);
+        let mixed = |k: usize| consensus(of_direct[k], of_residual[k], one_sided(k));
+        let mixed: Vec<Gaussian<f64>> = (0..examples.strain.len()).map(mixed).collect();
         let sd_scale = scale_beside(&mixed, last, examples.strain);
         Some(Self { sd_scale, direct, residual, one_sided: sides.into_iter().map(|(params, _)| params).collect() })
     }
