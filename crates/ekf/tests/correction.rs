@@ -3,7 +3,7 @@
 use ohmstrain_ekf::Gaussian;
 use ohmstrain_ekf::correction::{
     BLOCK, Correction, FEATURES, FeatureScale, InputScale, LowPass, Process, ReadingFeatures, RowBlock, Rows,
-    Simulated, block_of, mixture, settled,
+    Simulated, block_of, consensus, mixture, settled,
 };
 use ohmstrain_model::StrainRange;
 
@@ -137,10 +137,22 @@ macro_rules! correction {
     };
 }
 
+/// A mixture by its moments.
+fn mixed(voices: &[Gaussian<f64>]) -> Gaussian<f64> {
+    let weights: Vec<f64> = voices.iter().map(|voice| voice.variance.powf(-1.5)).collect();
+    let moment = |of: &dyn Fn(&Gaussian<f64>) -> f64| {
+        let weighted = voices.iter().zip(&weights).map(|(voice, weight)| weight * of(voice));
+        weighted.sum::<f64>() / weights.iter().sum::<f64>()
+    };
+    let mean = moment(&|voice| voice.mean);
+    Gaussian { mean, variance: moment(&|voice| voice.variance + voice.mean.powi(2)) - mean * mean }
+}
+
 #[test]
 fn all_processes_their_mixture_and_novelty() {
     let numbers = numbers();
     correction!(f64, numbers, [2, 3], rows, scales, weights, triangles, correction);
+    let mut contradicted = 0;
     for trial in 0..50 {
         let input: [f64; D] = std::array::from_fn(|i| 3.0 * number(1000 + 10 * trial + i));
         let filtered = Gaussian { mean: input[0], variance: 0.05 * (1.0 + number(9000 + trial)) };
@@ -153,13 +165,18 @@ fn all_processes_their_mixture_and_novelty() {
         let expected = [said.direct, said.residual, past, future];
         assert!(voices.into_iter().zip(expected).all(|(a, b)| same(b, a)), "{trial}: {said:?}");
         assert!(close(said.novelty, novelty), "{trial}");
-        let weights = voices.map(|voice| voice.variance.powf(-1.5));
-        let share = |p: usize| weights[p] / weights.iter().sum::<f64>();
-        let mean: f64 = (0..4).map(|p| share(p) * voices[p].mean).sum();
-        let second: f64 = (0..4).map(|p| share(p) * (voices[p].variance + voices[p].mean.powi(2))).sum();
-        let variance = 0.6 * (second - mean * mean) + 0.06 * 0.7 * novelty;
+        let doubted = [0, 1, 2, 3].map(|p| {
+            let others: Vec<Gaussian<f64>> = (0..4).filter(|other| *other != p).map(|other| voices[other]).collect();
+            let (others, own) = (mixed(&others), voices[p]);
+            let unexplained = (own.mean - others.mean).powi(2) - own.variance - others.variance;
+            Gaussian { mean: own.mean, variance: own.variance + unexplained.max(0.0) }
+        });
+        contradicted += usize::from(doubted != voices);
+        let Gaussian { mean, variance } = mixed(&doubted);
+        let variance = 0.6 * variance + 0.06 * 0.7 * novelty;
         assert!(close(said.strain.mean, mean) && (said.strain.variance - variance).abs() < 1e-11, "{trial}");
     }
+    assert!(contradicted > 5, "{contradicted}");
 }
 
 /// Features of twelve more rows, with the variance of the noise alone, heard beside what the others say together.
@@ -243,6 +260,28 @@ fn a_mixture_of_any_scale() {
     // Exact knowledge drowns the rest.
     assert_eq!(mixture([at(0.3, 0.0), at(0.5, 1.0)]), at(0.3, 0.0));
     assert_eq!(mixture([at(0.5, 1.0), at(0.3, 0.0)]), at(0.3, 0.0));
+}
+
+#[test]
+fn a_voice_that_contradicts_all_others_counts_less() {
+    let at = |mean: f64, variance: f64| Gaussian { mean, variance };
+    // Three at 0 say 0 with a variance of 1: of 100, the square of the distance to the fourth, 98 are left. Two at 0 and the one at 10
+    // say 10/3 with a variance of 1 + 200/9, which explains the 100/9 to the third.
+    let said = consensus(at(0.0, 1.0), at(0.0, 1.0), [at(0.0, 1.0), at(10.0, 1.0)]);
+    let weight = 99.0_f64.powf(-1.5);
+    let mean = 10.0 * weight / (3.0 + weight);
+    let second = (3.0 + weight * (99.0 + 100.0)) / (3.0 + weight);
+    assert!((said.mean - mean).abs() < 1e-14 && (said.variance - (second - mean * mean)).abs() < 1e-14, "{said:?}");
+    // Whichever it is.
+    for (direct, residual) in [(10.0, 0.0), (0.0, 10.0)] {
+        let again = consensus(at(direct, 1.0), at(residual, 1.0), [at(0.0, 1.0); 2]);
+        assert!((again.mean - mean).abs() < 1e-14, "{again:?}");
+    }
+    // What their variances explain is no contradiction.
+    let near = [at(0.0, 1.0), at(1.0, 2.0), at(0.5, 0.5), at(-0.5, 1.5)];
+    assert_eq!(consensus(near[0], near[1], [near[2], near[3]]), mixture(near));
+    // Of two nobody knows which is wrong.
+    assert_eq!(consensus(at(0.0, 1.0), at(10.0, 1.0), []), mixture([at(0.0, 1.0), at(10.0, 1.0)]));
 }
 
 /// A low-pass of a reading that goes straight from one known row to the next, against ten thousand small steps.

@@ -9,20 +9,6 @@ const JITTER: f64 = 1e-6;
 /// A pivot of the inducing rows below this share of the prior variance says nothing new.
 const SMALLEST_PIVOT: f64 = 1e-6;
 
-/// Length scales, of all inputs alike, noises and correlation times tried: coarse, since the marginal likelihood of a few
-/// hundred rows whose errors hang together tells no more.
-const LENGTHS: [f64; 3] = [2.0, 4.0, 8.0];
-const NOISES: [f64; 3] = [0.03, 0.1, 0.3];
-const NOISE_TIMES_S: [f64; 2] = [2.0, 10.0];
-/// After that each input but the first, on which the linear part of the kernel depends, finds a length scale of its own, in
-/// steps of this factor, in turn, and once again.
-const STRETCH: f64 = 2.0;
-const TURNS: usize = 2;
-/// Prior of a length scale over that of all inputs: log-normal, with this factor for a standard deviation; and its limits.
-const SPREAD: f64 = 2.0;
-const LEAST_STRETCH: f64 = 0.25;
-const MOST_STRETCH: f64 = 8.0;
-
 /// Rows to learn from: standardised inputs, targets, times.
 #[derive(Clone, Copy)]
 pub(crate) struct Lessons<'a> {
@@ -56,54 +42,19 @@ pub(crate) struct LeftOutRow {
     pub prior: f64,
 }
 
+/// A block without its own rows.
+pub(super) struct BlockLeftOut {
+    /// Its first row.
+    pub start: usize,
+    /// Targets less what the other rows say, in their standard deviations.
+    pub errors: DVector<f64>,
+    /// The inverse of their covariance, for a prior variance of 1.
+    pub precision: Cholesky<f64, Dyn>,
+}
+
 impl Lessons<'_> {
-    /// The settings with the largest marginal likelihood, times the prior of the length scales; none if no covariance is
-    /// positive definite.
-    pub(crate) fn best_settings(self) -> Option<ProcessParams> {
-        self.alike().map(|(cost, params)| self.with_relevance(cost, params))
-    }
-
-    /// With one length scale of all inputs.
-    fn alike(self) -> Option<(f64, ProcessParams)> {
-        let inputs = self.inputs.first()?.len();
-        let squares = self.half_squares(&vec![1.0; inputs]);
-        let mut best: Option<(f64, ProcessParams)> = None;
-        for length in LENGTHS {
-            let sums = &squares / (length * length);
-            for noise in NOISES {
-                for noise_time_s in NOISE_TIMES_S {
-                    let lengths = vec![length; inputs];
-                    let params = ProcessParams { lengths, noise, noise_time_s, sd_scale: 1.0 };
-                    let Some(cost) = self.cost(&sums, &params) else { continue };
-                    if best.as_ref().is_none_or(|(least, _)| cost < *least) {
-                        best = Some((cost, params));
-                    }
-                }
-            }
-        }
-        best
-    }
-
-    /// Automatic relevance determination (Neal, *Bayesian Learning for Neural Networks*, 1996): inputs that tell little get long
-    /// length scales. Coordinates in turn, since a step of one is all that a few hundred rows can tell.
-    fn with_relevance(self, cost: f64, params: ProcessParams) -> ProcessParams {
-        let inputs = params.lengths.len();
-        let mut search = RelevanceSearch { lessons: self, sums: self.half_squares(&params.lengths), params, cost };
-        for input in (1..inputs).cycle().take(TURNS * (inputs - 1)) {
-            // Shorter for as long as it pays; if it does not at all, longer.
-            let shorter = (0..).take_while(|_| search.step(input, 1.0 / STRETCH)).count();
-            while shorter == 0 && search.step(input, STRETCH) {}
-        }
-        search.params
-    }
-
-    /// The negative logarithm of the marginal likelihood, up to a constant.
-    fn cost(self, sums: &DMatrix<f64>, params: &ProcessParams) -> Option<f64> {
-        GaussianProcess::with_sums(self, sums, params).map(|process| process.negative_log_evidence())
-    }
-
     /// `Σ (xᵢ - xᵢ')²/2ℓᵢ²` for all pairs of rows.
-    fn half_squares(self, lengths: &[f64]) -> DMatrix<f64> {
+    pub(super) fn half_squares(self, lengths: &[f64]) -> DMatrix<f64> {
         let relevance: Vec<f64> = lengths.iter().map(|length| relevance(*length)).collect();
         let apart = |(a, b): (&f64, &f64)| (a - b).powi(2);
         let sum = |i: usize, j: usize| {
@@ -111,46 +62,6 @@ impl Lessons<'_> {
             squares.zip(&relevance).map(|(square, relevance)| square * relevance).sum()
         };
         symmetric(self.inputs.len(), sum)
-    }
-
-    /// The same with another length scale of one input.
-    fn stretched(self, sums: &DMatrix<f64>, input: usize, from: f64, to: f64) -> DMatrix<f64> {
-        let change = relevance(to) - relevance(from);
-        let apart = |i: usize, j: usize| self.inputs[i][input] - self.inputs[j][input];
-        symmetric(self.inputs.len(), |i, j| sums[(i, j)] + change * apart(i, j).powi(2))
-    }
-}
-
-/// Settings on the way to better ones.
-struct RelevanceSearch<'a> {
-    lessons: Lessons<'a>,
-    params: ProcessParams,
-    /// `Σ (xᵢ - xᵢ')²/2ℓᵢ²` for all pairs of rows.
-    sums: DMatrix<f64>,
-    /// Negative logarithm of marginal likelihood and prior.
-    cost: f64,
-}
-
-impl RelevanceSearch<'_> {
-    /// Multiplies the length scale of an input, if that is better.
-    fn step(&mut self, input: usize, factor: f64) -> bool {
-        let (now, alike) = (self.params.lengths[input], self.params.lengths[0]);
-        let trial = factor * now;
-        if !(LEAST_STRETCH * alike..=MOST_STRETCH * alike).contains(&trial) {
-            return false;
-        }
-        let sums = self.lessons.stretched(&self.sums, input, now, trial);
-        self.params.lengths[input] = trial;
-        let prior = |length: &f64| 0.5 * ((length / alike).ln() / SPREAD.ln()).powi(2);
-        let priors: f64 = self.params.lengths.iter().map(prior).sum();
-        let cost = self.lessons.cost(&sums, &self.params).map_or(f64::INFINITY, |cost| cost + priors);
-        let is_better = cost < self.cost;
-        if is_better {
-            (self.cost, self.sums) = (cost, sums);
-        } else {
-            self.params.lengths[input] = now;
-        }
-        is_better
     }
 }
 
@@ -165,7 +76,8 @@ impl GaussianProcess {
         Self::with_sums(lessons, &lessons.half_squares(&params.lengths), params)
     }
 
-    fn with_sums(lessons: Lessons, sums: &DMatrix<f64>, params: &ProcessParams) -> Option<Self> {
+    /// The same, of sums by [`Lessons::half_squares`].
+    pub(super) fn with_sums(lessons: Lessons, sums: &DMatrix<f64>, params: &ProcessParams) -> Option<Self> {
         let Lessons { inputs, targets, time_s } = lessons;
         let n = targets.len();
         let centre = targets.iter().sum::<f64>() / n as f64;
@@ -180,7 +92,7 @@ impl GaussianProcess {
     }
 
     /// Up to a constant, with the scale that makes it least.
-    fn negative_log_evidence(&self) -> f64 {
+    pub(super) fn negative_log_evidence(&self) -> f64 {
         let n = self.targets.len() as f64;
         let half_log_determinant: f64 = self.covariance.l_dirty().diagonal().iter().map(|pivot| pivot.ln()).sum();
         0.5 * n * self.scale.ln() + half_log_determinant
@@ -205,23 +117,42 @@ impl GaussianProcess {
     /// Williams, *Gaussian Processes for Machine Learning*, 2006, eq. 5.12, for blocks). Blocks are of rows in order.
     pub(crate) fn left_out(&self, blocks: usize) -> Option<Vec<LeftOutRow>> {
         let n = self.targets.len();
-        let inverse = self.covariance.inverse();
         let mut rows = Vec::with_capacity(n);
-        for block in 0..blocks {
-            let (start, end) = (block * n / blocks, (block + 1) * n / blocks);
-            let len = end - start;
-            let conditional = inverse.view((start, start), (len, len)).into_owned().cholesky()?.inverse();
-            let errors = &conditional * self.weights.rows(start, len);
-            for k in 0..len {
+        for BlockLeftOut { start, errors, precision } in self.blocks_left_out(blocks)? {
+            let covariance = precision.inverse();
+            for (k, error) in errors.iter().enumerate() {
                 let prior = self.kernel[(start + k, start + k)];
                 rows.push(LeftOutRow {
-                    mean: self.centre + self.size * (self.targets[start + k] - errors[k]),
-                    unknown: ((conditional[(k, k)] - self.noise - JITTER) / prior).clamp(0.0, 1.0),
+                    mean: self.centre + self.size * (self.targets[start + k] - error),
+                    unknown: ((covariance[(k, k)] - self.noise - JITTER) / prior).clamp(0.0, 1.0),
                     prior: prior * self.variance(),
                 });
             }
         }
         Some(rows)
+    }
+
+    /// Each block as the rows of the others say it, in order; none if a covariance is not positive definite.
+    pub(super) fn blocks_left_out(&self, blocks: usize) -> Option<Vec<BlockLeftOut>> {
+        let n = self.targets.len();
+        let triangle = self.covariance.l_dirty();
+        let mut inverse: DMatrix<f64> = DMatrix::zeros(n, n);
+        let mut left_out = Vec::with_capacity(blocks);
+        // The inverse of the triangle grows from its end: of a block's columns nothing is above the block, and what is below takes
+        // the inverse that there is. Products of matrices are several times as fast as triangular equations.
+        for block in (0..blocks).rev() {
+            let (start, end) = (block * n / blocks, (block + 1) * n / blocks);
+            let (len, later) = (end - start, n - end);
+            let own = triangle.view((start, start), (len, len)).solve_lower_triangular(&DMatrix::identity(len, len))?;
+            let below = triangle.view((end, start), (later, len)) * -&own;
+            let below = inverse.view((end, end), (later, later)) * below;
+            let precision = (own.transpose() * &own + below.transpose() * &below).cholesky()?;
+            inverse.view_mut((start, start), (len, len)).copy_from(&own);
+            inverse.view_mut((end, start), (later, len)).copy_from(&below);
+            left_out.push(BlockLeftOut { start, errors: precision.solve(&self.weights.rows(start, len)), precision });
+        }
+        left_out.reverse();
+        Some(left_out)
     }
 
     /// The upper triangle, row by row, of W: |W k|² is the share of the prior variance that all rows explain where their
@@ -247,7 +178,7 @@ fn noise_covariance(time_s: &[f64], params: &ProcessParams) -> DMatrix<f64> {
 }
 
 /// A symmetric matrix; `entry` is asked for those of the lower triangle.
-fn symmetric(n: usize, entry: impl Fn(usize, usize) -> f64) -> DMatrix<f64> {
+pub(super) fn symmetric(n: usize, entry: impl Fn(usize, usize) -> f64) -> DMatrix<f64> {
     let mut matrix = DMatrix::zeros(n, n);
     for j in 0..n {
         for i in j..n {

@@ -1,17 +1,20 @@
 //! The learned correction: choosing its processes, and making of a sensor's rows what `ohmstrain_ekf::correction` runs.
 
-pub(crate) mod gaussian_process;
+mod criterion;
+mod gaussian_process;
 pub(crate) mod owned;
+mod settings;
 pub(crate) mod simulated;
 
 use ohmstrain_ekf::Gaussian;
-use ohmstrain_ekf::correction::{FEATURES, FILTER_INPUTS, INDUCING, InputScale, OUTPUTS, Process, mixture};
+use ohmstrain_ekf::correction::{FEATURES, FILTER_INPUTS, INDUCING, InputScale, OUTPUTS, Process, consensus, mixture};
 use owned::{OwnedCorrection, OwnedProcess};
 
 use crate::order::extent;
 use crate::params::RangeParams;
 use crate::params::correction::{CorrectorParams, ProcessParams, SIDES, SMOOTHER_INPUTS, SimulatedParams};
 use crate::sd_scale::{joint_scale_of, sd_scale_up_to};
+use criterion::Criterion;
 use gaussian_process::{GaussianProcess, LeftOutRow, Lessons, inducing_rows, relevance};
 
 /// Blocks of rows that are left out in turn.
@@ -40,6 +43,25 @@ enum Which {
     Past,
     Future,
     Residual,
+}
+
+/// How the processes of a corrector are chosen.
+#[derive(Clone, Copy)]
+struct Choosing {
+    criterion: Criterion,
+    /// Whether the factor on a process' deviation is the one that covers the worst block, or all of them together.
+    covers_worst: bool,
+}
+
+impl Choosing {
+    /// Factors weigh voices against each other; the mixture's own sees to its interval. Of a filter's two voices one is not to be
+    /// silenced everywhere by a block that is a world of its own. A smoother has four, one of which is mostly better: there the
+    /// caution pays.
+    const fn of_sides(sides: usize) -> Self {
+        let is_smoother = sides > 0;
+        let criterion = if is_smoother { Criterion::LeftOut } else { Criterion::LeftOutAndEvidence };
+        Self { criterion, covers_worst: is_smoother }
+    }
 }
 
 /// Direct processes that see one side of time, in order.
@@ -114,9 +136,9 @@ impl<'a, const D: usize> Prepared<'a, D> {
     }
 
     /// Chooses a process, and says what it says of every row from the blocks that the row is not in.
-    fn chosen(&self, which: Which) -> Option<(ProcessParams, Vec<Gaussian<f64>>)> {
+    fn chosen(&self, which: Which, by: Choosing) -> Option<(ProcessParams, Vec<Gaussian<f64>>)> {
         self.taught(which, |lessons| {
-            let settings = lessons.best_settings()?;
+            let settings = lessons.best_settings(by.criterion)?;
             let process = GaussianProcess::new(lessons, &settings)?;
             let (limits, least) = (self.examples.limits, self.least_variance(which));
             let said = |(k, row): (usize, LeftOutRow)| {
@@ -125,7 +147,9 @@ impl<'a, const D: usize> Prepared<'a, D> {
                 Gaussian { mean, variance }
             };
             let mut said: Vec<Gaussian<f64>> = process.left_out(BLOCKS)?.into_iter().enumerate().map(said).collect();
-            let sd_scale = sd_scale_up_to(&deviations(&said, self.examples.strain), WIDEST_PROCESS);
+            let blocks = deviations(&said, self.examples.strain);
+            let blocks = if by.covers_worst { blocks } else { vec![blocks.concat()] };
+            let sd_scale = sd_scale_up_to(&blocks, WIDEST_PROCESS);
             said.iter_mut().for_each(|said| said.variance *= sd_scale.powi(2));
             Some((ProcessParams { sd_scale, ..settings }, said))
         })
@@ -156,12 +180,13 @@ impl CorrectorParams {
     /// With S one-sided processes; `last` is what is mixed in last of every row, if anything is.
     fn fit<const D: usize, const S: usize>(prepared: &Prepared<D>, last: &[Gaussian<f64>]) -> Option<Self> {
         let examples = prepared.examples;
-        let (direct, of_direct) = prepared.chosen(Which::Direct)?;
-        let (residual, of_residual) = prepared.chosen(Which::Residual)?;
-        let sides: Vec<_> = ONE_SIDED[..S].iter().map(|side| prepared.chosen(*side)).collect::<Option<_>>()?;
-        let voices =
-            |k: usize| [of_direct[k], of_residual[k]].into_iter().chain(sides.iter().map(move |(_, of)| of[k]));
-        let mixed: Vec<Gaussian<f64>> = (0..examples.strain.len()).map(|k| mixture(voices(k))).collect();
+        let chosen = |which: Which| prepared.chosen(which, Choosing::of_sides(S));
+        let (direct, of_direct) = chosen(Which::Direct)?;
+        let (residual, of_residual) = chosen(Which::Residual)?;
+        let sides: Vec<_> = ONE_SIDED[..S].iter().map(|side| chosen(*side)).collect::<Option<_>>()?;
+        let one_sided = |k: usize| std::array::from_fn::<_, S, _>(|side| sides[side].1[k]);
+        let mixed = |k: usize| consensus(of_direct[k], of_residual[k], one_sided(k));
+        let mixed: Vec<Gaussian<f64>> = (0..examples.strain.len()).map(mixed).collect();
         let sd_scale = scale_beside(&mixed, last, examples.strain);
         Some(Self { sd_scale, direct, residual, one_sided: sides.into_iter().map(|(params, _)| params).collect() })
     }

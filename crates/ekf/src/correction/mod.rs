@@ -4,7 +4,7 @@
 //! calibrated on. A *direct* process says strain from features of the readings alone; a *residual* process says what the
 //! filter's strain lacks, from what the filter says and the same features. A smoother has two more direct processes, one
 //! of the readings' past and one of their future: neither is as easily led astray by a motion that begins as a known one
-//! and ends as none. They are a [`mixture`]. Far from the training rows the residual process says what the
+//! and ends as none. They say their [`consensus`]. Far from the training rows the residual process says what the
 //! filter says, its variance is no smaller than the filter's, and the mixture's grows; so that a last process is heard there, which
 //! has learned what the law says of motions that the sensor was not seen in. It cannot lose its way as a filter can.
 //!
@@ -238,7 +238,7 @@ impl<T: Real, const D: usize, const S: usize> Work<T> for Correcting<'_, T, D, S
         let outside = of.residual.distance(&outside, 0);
         let novelty = T::one() - (T::one() - said.unknown) * (-outside / T::of(NEW)).exp();
         let residual = of.widened(said, &of.residual, outside, filtered.mean);
-        let mixed = mixture([direct, residual].into_iter().chain(one_sided));
+        let mixed = consensus(direct, residual, one_sided);
         let variance = mixed.variance * of.variance_factor + T::of(NOVEL) * of.strain_variance * novelty;
         let anywhere = of.limits.variance_of_anywhere();
         let learned = Gaussian { mean: mixed.mean, variance: (variance * birge).min(anywhere).max(variance) };
@@ -246,6 +246,31 @@ impl<T: Real, const D: usize, const S: usize> Work<T> for Correcting<'_, T, D, S
         let strain = simulated.map_or(learned, |simulated| mixture([learned, simulated]));
         Corrected { strain, direct, one_sided, residual, simulated, novelty }
     }
+}
+
+/// What the voices of a correction say together. A filter's two are a [`mixture`]. A smoother's are one, too, after the variance of
+/// each has grown by what is left of its distance from the mixture of the others, squared, once both variances have explained what
+/// they can: of four voices that see different things one that contradicts all others is more likely wrong than it says, of two
+/// nobody knows which.
+#[must_use]
+pub fn consensus<T: Real, const S: usize>(
+    direct: Gaussian<T>,
+    residual: Gaussian<T>,
+    one_sided: [Gaussian<T>; S],
+) -> Gaussian<T> {
+    let voices = [direct, residual].into_iter().chain(one_sided);
+    if S == 0 {
+        return mixture(voices);
+    }
+    let doubted = |place: usize, voice: Gaussian<T>| {
+        let others = voices.clone().enumerate().filter(|(other, _)| *other != place).map(|(_, other)| other);
+        let others = mixture(others);
+        let apart = voice.mean - others.mean;
+        let unexplained = (apart * apart - voice.variance - others.variance).max(T::zero());
+        Gaussian { variance: voice.variance + unexplained, ..voice }
+    };
+    let sides = core::array::from_fn::<_, S, _>(|side| doubted(2 + side, one_sided[side]));
+    mixture([doubted(0, direct), doubted(1, residual)].into_iter().chain(sides))
 }
 
 /// Mean and variance of the mixture of Gaussians, each weighted by its variance to the power −3/2: more than the inverse

@@ -1,0 +1,67 @@
+//! By what the settings of a process are chosen.
+
+use super::BLOCKS;
+use super::gaussian_process::{BlockLeftOut, GaussianProcess};
+
+/// What good settings make large. Rows lie closer together in time than their errors hang together, so that marginal likelihood
+/// alone takes what neighbours share for what the inputs say: little noise, short length scales. A block that was left out has
+/// no such neighbours.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Criterion {
+    /// The densities of rows without their blocks, each by itself.
+    LeftOut,
+    /// The geometric mean of that, of the joint densities of the blocks, and of marginal likelihood.
+    LeftOutAndEvidence,
+}
+
+impl Criterion {
+    /// Its negative logarithm, up to a constant; none if a covariance is not positive definite.
+    pub(super) fn cost(self, process: &GaussianProcess) -> Option<f64> {
+        let left_out = LeftOutCosts::new(process)?;
+        let of_all = || (left_out.rows + left_out.blocks + process.negative_log_evidence()) / 3.0;
+        Some(if self == Criterion::LeftOut { left_out.rows } else { of_all() })
+    }
+}
+
+/// Negative logarithms of densities, up to a constant, each with the prior variance that makes it least.
+struct LeftOutCosts {
+    rows: f64,
+    blocks: f64,
+}
+
+impl LeftOutCosts {
+    fn new(process: &GaussianProcess) -> Option<Self> {
+        let (mut of_rows, mut of_blocks) = (NormalSum::default(), NormalSum::default());
+        for BlockLeftOut { errors, precision, .. } in process.blocks_left_out(BLOCKS)? {
+            let triangle = precision.l();
+            let half_log_determinant = -triangle.diagonal().iter().map(|pivot| pivot.ln()).sum::<f64>();
+            of_blocks.add(errors.len(), triangle.tr_mul(&errors).norm_squared(), half_log_determinant);
+            for (error, variance) in errors.iter().zip(&precision.inverse().diagonal()) {
+                of_rows.add(1, error * error / variance, 0.5 * variance.ln());
+            }
+        }
+        Some(Self { rows: of_rows.cost(), blocks: of_blocks.cost() })
+    }
+}
+
+/// Normal densities whose covariances share a factor.
+#[derive(Clone, Copy, Default)]
+struct NormalSum {
+    count: usize,
+    /// Of errors over the root of their covariance.
+    squares: f64,
+    half_log_determinants: f64,
+}
+
+impl NormalSum {
+    fn add(&mut self, count: usize, square: f64, half_log_determinant: f64) {
+        self.count += count;
+        self.squares += square;
+        self.half_log_determinants += half_log_determinant;
+    }
+
+    fn cost(self) -> f64 {
+        let count = self.count as f64;
+        0.5 * count * (self.squares / count).ln() + self.half_log_determinants
+    }
+}

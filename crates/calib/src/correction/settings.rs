@@ -1,0 +1,109 @@
+//! The search for the settings of a process.
+
+use nalgebra::DMatrix;
+
+use super::criterion::Criterion;
+use super::gaussian_process::{GaussianProcess, Lessons, relevance, symmetric};
+use crate::params::correction::ProcessParams;
+
+/// Length scales, of all inputs alike, noises and correlation times tried: coarse, since a few hundred rows whose errors hang
+/// together tell no more.
+const LENGTHS: [f64; 3] = [2.0, 4.0, 8.0];
+const NOISES: [f64; 3] = [0.03, 0.1, 0.3];
+const NOISE_TIMES_S: [f64; 2] = [2.0, 10.0];
+/// After that each input but the first, on which the linear part of the kernel depends, finds a length scale of its own, in
+/// steps of this factor, in turn, and once again.
+const STRETCH: f64 = 2.0;
+const TURNS: usize = 2;
+/// Prior of a length scale over that of all inputs: log-normal, with this factor for a standard deviation; and its limits.
+const SPREAD: f64 = 2.0;
+const LEAST_STRETCH: f64 = 0.25;
+const MOST_STRETCH: f64 = 8.0;
+
+impl Lessons<'_> {
+    /// The settings that are best by a criterion times the prior of the length scales; none if no covariance is positive
+    /// definite.
+    pub(crate) fn best_settings(self, criterion: Criterion) -> Option<ProcessParams> {
+        self.alike(criterion).map(|(cost, params)| self.with_relevance(criterion, cost, params))
+    }
+
+    /// With one length scale of all inputs.
+    fn alike(self, criterion: Criterion) -> Option<(f64, ProcessParams)> {
+        let inputs = self.inputs.first()?.len();
+        let squares = self.half_squares(&vec![1.0; inputs]);
+        let mut best: Option<(f64, ProcessParams)> = None;
+        for length in LENGTHS {
+            let sums = &squares / (length * length);
+            for noise in NOISES {
+                for noise_time_s in NOISE_TIMES_S {
+                    let lengths = vec![length; inputs];
+                    let params = ProcessParams { lengths, noise, noise_time_s, sd_scale: 1.0 };
+                    let Some(cost) = self.cost(criterion, &sums, &params) else { continue };
+                    if best.as_ref().is_none_or(|(least, _)| cost < *least) {
+                        best = Some((cost, params));
+                    }
+                }
+            }
+        }
+        best
+    }
+
+    /// Automatic relevance determination (Neal, *Bayesian Learning for Neural Networks*, 1996): inputs that tell little get long
+    /// length scales. Coordinates in turn, since a step of one is all that a few hundred rows can tell.
+    fn with_relevance(self, criterion: Criterion, cost: f64, params: ProcessParams) -> ProcessParams {
+        let inputs = params.lengths.len();
+        let mut search =
+            RelevanceSearch { lessons: self, criterion, sums: self.half_squares(&params.lengths), params, cost };
+        for input in (1..inputs).cycle().take(TURNS * (inputs - 1)) {
+            // Shorter for as long as it pays; if it does not at all, longer.
+            let shorter = (0..).take_while(|_| search.step(input, 1.0 / STRETCH)).count();
+            while shorter == 0 && search.step(input, STRETCH) {}
+        }
+        search.params
+    }
+
+    fn cost(self, criterion: Criterion, sums: &DMatrix<f64>, params: &ProcessParams) -> Option<f64> {
+        criterion.cost(&GaussianProcess::with_sums(self, sums, params)?)
+    }
+
+    /// The same with another length scale of one input.
+    fn stretched(self, sums: &DMatrix<f64>, input: usize, from: f64, to: f64) -> DMatrix<f64> {
+        let change = relevance(to) - relevance(from);
+        let apart = |i: usize, j: usize| self.inputs[i][input] - self.inputs[j][input];
+        symmetric(self.inputs.len(), |i, j| sums[(i, j)] + change * apart(i, j).powi(2))
+    }
+}
+
+/// Settings on the way to better ones.
+struct RelevanceSearch<'a> {
+    lessons: Lessons<'a>,
+    criterion: Criterion,
+    params: ProcessParams,
+    /// `Σ (xᵢ - xᵢ')²/2ℓᵢ²` for all pairs of rows.
+    sums: DMatrix<f64>,
+    /// Negative logarithm of criterion and prior.
+    cost: f64,
+}
+
+impl RelevanceSearch<'_> {
+    /// Multiplies the length scale of an input, if that is better.
+    fn step(&mut self, input: usize, factor: f64) -> bool {
+        let (now, alike) = (self.params.lengths[input], self.params.lengths[0]);
+        let trial = factor * now;
+        if !(LEAST_STRETCH * alike..=MOST_STRETCH * alike).contains(&trial) {
+            return false;
+        }
+        let sums = self.lessons.stretched(&self.sums, input, now, trial);
+        self.params.lengths[input] = trial;
+        let prior = |length: &f64| 0.5 * ((length / alike).ln() / SPREAD.ln()).powi(2);
+        let priors: f64 = self.params.lengths.iter().map(prior).sum();
+        let cost = self.lessons.cost(self.criterion, &sums, &self.params).map_or(f64::INFINITY, |cost| cost + priors);
+        let is_better = cost < self.cost;
+        if is_better {
+            (self.cost, self.sums) = (cost, sums);
+        } else {
+            self.params.lengths[input] = now;
+        }
+        is_better
+    }
+}
