@@ -16,6 +16,7 @@ mod predict;
 mod rate;
 mod several;
 mod switch;
+mod transition;
 mod update;
 
 pub(crate) use constants::{Gains, StepConstants};

@@ -1,11 +1,10 @@
 //! The prediction, in place. Sums are written with what does not depend on the belief first.
 
-use nalgebra::SMatrix;
-use ohmstrain_model::{LEAST_LEFT, Phase, Scalar, Transition, Turning};
+use ohmstrain_model::{LEAST_LEFT, Phase, Scalar, Turning};
 
 use super::constants::{BranchConstants, Gain, GainsAt, StepConstants};
 use super::{Lanes, Part, Parts, RateSpread, Switch};
-use crate::{Belief, SparseEkf};
+use crate::SparseEkf;
 
 /// What a step does to one branch. The gain grows with the sum of old and new strain: the old one's share is in `row`, the
 /// new one's is added when its covariances are known.
@@ -35,7 +34,7 @@ struct Drive<V> {
 }
 
 /// How all branches are driven.
-struct Driving<V, const B: usize> {
+pub(super) struct Driving<V, const B: usize> {
     drives: [Drive<V>; B],
     /// Variance of the path whose direction stays open.
     unexplained: V,
@@ -127,44 +126,13 @@ impl<T: Scalar, S, const B: usize, const N: usize, G> SparseEkf<T, S, B, N, G> {
         (RateSpread::new(parts.rate_variance), driven)
     }
 
-    /// F and Q of a step with an uncertain direction, and where it leads: what [`rts_step`](crate::rts_step) goes back by.
-    pub(crate) fn transition<const L: usize>(&self, from: &Belief<T, N, L>) -> (Transition<T, N, L>, Belief<T, N, L>)
-    where
-        S: Switch<T>,
-    {
-        let mut parts = Parts::of(from);
-        let Parts { strain_variance, strain_rate, rate_variance, .. } = parts;
-        let driving = self.drive::<T, S>(&mut parts, Course::Uncertain);
-        let driven = self.spread_on::<T, S>(&mut parts, &driving, [strain_variance, strain_rate, rate_variance]);
-        // The same from a state that is known is the noise alone.
-        let [strain_variance, strain_rate, rate_variance] = self.step.noise;
-        let mut noise = Parts { strain_variance, strain_rate, rate_variance, ..Parts::certain(T::zero()) };
-        self.spread_on::<T, S>(&mut noise, &driving, [T::zero(); 3]);
-        let (prior, noise): (Belief<T, N, L>, Belief<T, N, L>) = (parts.together(), noise.together());
-        let jacobian = self.jacobian(&driven);
-        (Transition { mean: prior.mean, jacobian, noise: noise.covariance }, prior)
-    }
-
-    fn jacobian(&self, driven: &[Driven<T>; B]) -> SMatrix<T, N, N> {
-        let (mut jacobian, [a, b]) = (SMatrix::zeros(), self.step.motion);
-        for j in 0..2 {
-            (jacobian[(0, j)], jacobian[(1, j)]) = (a[j], b[j]);
-            for i in 0..B {
-                jacobian[(i + 2, j)] = driven[i].row[j] + driven[i].pull * a[j];
-            }
-        }
-        for i in 0..B {
-            jacobian[(i + 2, i + 2)] = self.step.branches[i].decay;
-        }
-        if Self::HAS_BASELINE {
-            jacobian[(N - 1, N - 1)] = self.step.baseline_decay;
-        }
-        jacobian
-    }
-
     /// Moves strain and rate, means and covariances of theirs, and says how the branches are driven meanwhile.
     #[inline(always)]
-    fn drive<V: Lanes<Number = T>, X: Switch<V>>(&self, parts: &mut Parts<V, B>, course: Course<V>) -> Driving<V, B> {
+    pub(super) fn drive<V: Lanes<Number = T>, X: Switch<V>>(
+        &self,
+        parts: &mut Parts<V, B>,
+        course: Course<V>,
+    ) -> Driving<V, B> {
         let step = &self.step;
         let Parts { strain, rate, strain_variance, strain_rate, rate_variance, .. } = *parts;
         let [a, b] = [pair(strain, step.motion[0]), pair(strain, step.motion[1])];
@@ -214,7 +182,7 @@ impl<T: Scalar, S, const B: usize, const N: usize, G> SparseEkf<T, S, B, N, G> {
 
     /// Moves the branches and the baseline, after the motion, whose covariances were the last.
     #[inline(always)]
-    fn spread_on<V: Lanes<Number = T>, X: Switch<V>>(
+    pub(super) fn spread_on<V: Lanes<Number = T>, X: Switch<V>>(
         &self,
         parts: &mut Parts<V, B>,
         Driving { drives, unexplained }: &Driving<V, B>,

@@ -1,0 +1,41 @@
+//! A step as matrices, for smoothers: of the kernel that ran forward.
+
+use nalgebra::SMatrix;
+use ohmstrain_model::{Scalar, Transition};
+
+use super::{Course, Driven, Parts, Switch};
+use crate::{Belief, SparseEkf};
+
+impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G> SparseEkf<T, S, B, N, G> {
+    /// F and Q of a step with an uncertain direction, and where it leads: what [`rts_step`](crate::rts_step) goes back by.
+    pub(crate) fn transition<const L: usize>(&self, from: &Belief<T, N, L>) -> (Transition<T, N, L>, Belief<T, N, L>) {
+        let mut parts = Parts::of(from);
+        let Parts { strain_variance, strain_rate, rate_variance, .. } = parts;
+        let driving = self.drive::<T, S>(&mut parts, Course::Uncertain);
+        let driven = self.spread_on::<T, S>(&mut parts, &driving, [strain_variance, strain_rate, rate_variance]);
+        // The same from a state that is known is the noise alone.
+        let [strain_variance, strain_rate, rate_variance] = self.step.noise;
+        let mut noise = Parts { strain_variance, strain_rate, rate_variance, ..Parts::certain(T::zero()) };
+        self.spread_on::<T, S>(&mut noise, &driving, [T::zero(); 3]);
+        let (prior, noise): (Belief<T, N, L>, Belief<T, N, L>) = (parts.together(), noise.together());
+        let jacobian = self.jacobian(&driven);
+        (Transition { mean: prior.mean, jacobian, noise: noise.covariance }, prior)
+    }
+
+    fn jacobian(&self, driven: &[Driven<T>; B]) -> SMatrix<T, N, N> {
+        let (mut jacobian, [a, b]) = (SMatrix::zeros(), self.step.motion);
+        for j in 0..2 {
+            (jacobian[(0, j)], jacobian[(1, j)]) = (a[j], b[j]);
+            for i in 0..B {
+                jacobian[(i + 2, j)] = driven[i].row[j] + driven[i].pull * a[j];
+            }
+        }
+        for i in 0..B {
+            jacobian[(i + 2, i + 2)] = self.step.branches[i].decay;
+        }
+        if Self::HAS_BASELINE {
+            jacobian[(N - 1, N - 1)] = self.step.baseline_decay;
+        }
+        jacobian
+    }
+}
