@@ -60,20 +60,20 @@ const EKF: OfKind = OfKind {
 /// Where the motion is clear fewer hypotheses part than in the motion of the self-test: then a step takes up to a third less. Two
 /// hypotheses are merged in less than their share of what eight take, which the step's negative number stands for.
 const SIGN_SPLIT: OfKind = OfKind {
-    step: -900.0,
-    hypothesis: 4180.0,
+    step: -1900.0,
+    hypothesis: 3900.0,
     branch: 800.0,
     curve: 150.0,
-    flash: 12_500.0,
+    flash: 13_300.0,
     flash_branch: 6100.0,
     stack: [840.0, 191.0, 93.0, 56.0],
 };
 const HISTORIES: OfKind = OfKind {
     step: 200.0,
-    hypothesis: 2150.0,
+    hypothesis: 1750.0,
     branch: 740.0,
     curve: 1050.0,
-    flash: 12_600.0,
+    flash: 13_700.0,
     flash_branch: 2600.0,
     stack: [800.0, 154.0, 100.0, 49.0],
 };

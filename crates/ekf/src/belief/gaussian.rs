@@ -1,7 +1,8 @@
-use ohmstrain_model::StrainRange;
+use ohmstrain_model::{Scalar, StrainRange};
 
 pub use crate::belief::tail::Real;
 use crate::belief::tail::upper_tail;
+use crate::kernel::Lanes;
 
 /// A Gaussian in one dimension.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -12,6 +13,14 @@ pub struct Gaussian<T> {
     pub mean: T,
     /// Variance, not negative.
     pub variance: T,
+}
+
+impl<T: Scalar> Gaussian<T> {
+    /// The same in all lanes, of which there are as many as here.
+    #[inline(always)]
+    pub(crate) fn in_lanes<V: Lanes<Number = T>>(self, like: V) -> Gaussian<V> {
+        Gaussian { mean: like.with(self.mean), variance: like.with(self.variance) }
+    }
 }
 
 impl<T: Real> Gaussian<T> {

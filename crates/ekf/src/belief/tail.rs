@@ -3,7 +3,7 @@
 
 use ohmstrain_model::Scalar;
 
-use crate::kernel::{InVectors, Lanes, Several};
+use crate::kernel::{Falls, InVectors, Lanes};
 
 /// `f32` or `f64`: what filters of hypotheses compute with.
 #[allow(private_bounds, reason = "sealed: what a vector holds")]
@@ -18,14 +18,14 @@ pub(crate) struct Tail<T> {
     pub hazard: T,
 }
 
-impl<V: Several<Number: Real>> Tail<V> {
+impl<V: Falls> Tail<V> {
     /// Of a standard normal above `border`, where it is `wanted`. The mass is off by up to about `border²` roundings.
     #[inline(always)]
     pub(crate) fn above(border: V, wanted: V::Mask) -> Self {
         let (half, one, zero) = (border.literal(0.5), border.literal(1.0), border.nothing());
         let x = border * border.literal(core::f64::consts::FRAC_1_SQRT_2);
         let square = x * x;
-        let falls = V::Number::falling(-square);
+        let falls = (-square).falling();
         let density = falls * border.literal(PER_ROOT_TWO_PI);
         let (is_near, below) = (square.less(border.literal(NEAR)), x.less(zero));
         let mut mass = one;

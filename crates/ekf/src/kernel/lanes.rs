@@ -18,6 +18,9 @@ pub trait Lanes:
     /// A truth for every lane.
     type Mask: Copy;
 
+    /// How many lanes there are.
+    const WIDTH: usize;
+
     /// The same number in all lanes, of which there are as many as here.
     #[must_use]
     fn with(self, number: Self::Number) -> Self;
@@ -41,6 +44,10 @@ pub trait Lanes:
     fn finite(self) -> Self::Mask;
     /// Where both are true.
     fn both(a: Self::Mask, b: Self::Mask) -> Self::Mask;
+    /// Where one of both is true.
+    fn either(a: Self::Mask, b: Self::Mask) -> Self::Mask;
+    /// Where the first is true and the second is not.
+    fn without(a: Self::Mask, b: Self::Mask) -> Self::Mask;
     /// Whether it is true nowhere.
     fn none(mask: Self::Mask) -> bool;
     /// Whether it is true everywhere.
@@ -88,6 +95,8 @@ impl<T: Scalar> Lanes for T {
     type Number = T;
     type Mask = bool;
 
+    const WIDTH: usize = 1;
+
     #[inline(always)]
     fn with(self, number: T) -> T {
         number
@@ -132,6 +141,16 @@ impl<T: Scalar> Lanes for T {
     #[inline(always)]
     fn both(a: bool, b: bool) -> bool {
         a && b
+    }
+
+    #[inline(always)]
+    fn either(a: bool, b: bool) -> bool {
+        a || b
+    }
+
+    #[inline(always)]
+    fn without(a: bool, b: bool) -> bool {
+        a && !b
     }
 
     #[inline(always)]
@@ -222,6 +241,8 @@ mod vector {
         type Number = V::Element;
         type Mask = V::Mask;
 
+        const WIDTH: usize = V::LEN;
+
         #[inline(always)]
         fn with(self, number: V::Element) -> Self {
             Self { numbers: V::splat(self.simd, number), ..self }
@@ -269,6 +290,16 @@ mod vector {
         #[inline(always)]
         fn both(a: V::Mask, b: V::Mask) -> V::Mask {
             a & b
+        }
+
+        #[inline(always)]
+        fn either(a: V::Mask, b: V::Mask) -> V::Mask {
+            a | b
+        }
+
+        #[inline(always)]
+        fn without(a: V::Mask, b: V::Mask) -> V::Mask {
+            a & !b
         }
 
         #[inline(always)]

@@ -1,47 +1,90 @@
 //! What a sign-split filter does to the rate alone.
 
-use ohmstrain_model::{Phase, RateChange, Scalar, Turning};
+use ohmstrain_model::{Phase, RateChange, Scalar, TURNING, Turning, TurningNumbers};
 
 use super::predict::{dot, sum};
-use super::{Lanes, Part, Parts, Several};
-use crate::belief::gaussian::Real;
+use super::{Falls, Lanes, Part, Parts};
 use crate::belief::tail::Tail;
 use crate::{Curve, Gaussian, SparseEkf, Switch};
 
 impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> SparseEkf<T, S, B, N, G> {
-    /// What the pull toward the mean strain and the mean rate of a phase add to the rate.
+    /// What the pull toward the mean strain and the mean rate of the phase on a `side` of zero, 1 or -1, add to the rate.
     #[inline(always)]
-    fn push<V: Lanes<Number = T>>(&self, extends: bool, like: V) -> V {
-        let (input, toward) = (like.with(self.step.input[1]), like.with(self.step.phase_input[1]));
-        if extends { input + toward } else { input - toward }
+    fn push<V: Lanes<Number = T>>(&self, side: V) -> V {
+        side.scale_add(self.step.phase_input[1], side.with(self.step.input[1]))
     }
 
-    /// The rate after a step in a moving phase.
+    /// The rate after a step in the moving phase on a `side` of zero.
     #[inline(always)]
-    pub(crate) fn rate_ahead<V: Lanes<Number = T>>(&self, phase: Phase, from: &Parts<V, B>) -> Gaussian<V> {
-        let (step, b) = (&self.step, self.step.motion[1]);
-        let push = self.push(phase == Phase::Extend, from.rate);
-        let (mean, variance) = answered(b, (push, from.rate.with(step.noise[2])), from);
+    pub(crate) fn rate_ahead<V: Lanes<Number = T>>(&self, side: V, from: &Parts<V, B>) -> Gaussian<V> {
+        let step = &self.step;
+        let (mean, variance) = answered(step.motion[1], (self.push(side), side.with(step.noise[2])), from);
         Gaussian { mean, variance }
     }
 
-    /// How a rate of the sign of `before` changes over a step, positive away from zero.
+    /// Where next to nothing of a prediction is on its `side` of zero.
     #[inline(always)]
-    pub(crate) fn rate_change<V: Lanes<Number = T>>(&self, before: Phase, from: &Parts<V, B>) -> RateChange<V> {
-        let (step, like) = (&self.step, from.rate);
-        let push = self.push(before != Phase::Retract, like);
-        let (expected, spread) = answered(step.rate_change, (push, like.nothing()), from);
-        let expected = if before == Phase::Retract { -expected } else { expected };
-        RateChange { expected, spread, noise: like.with(step.noise[2]) }
+    pub(crate) fn is_hopeless<V: Lanes<Number = T>>(&self, side: V, from: &Parts<V, B>) -> V::Mask {
+        let ahead = self.rate_ahead(side, from);
+        let toward = side * ahead.mean;
+        let behind = toward.less(toward.nothing());
+        if V::none(behind) {
+            return behind;
+        }
+        V::both(behind, ahead.variance.scale(T::of(HOPELESS * HOPELESS)).less(toward * toward))
     }
-    /// What a rate of the sign of `before` leaves open over a step, as
-    /// [`SwitchedModel::turning`](ohmstrain_model::SwitchedModel::turning).
+
+    /// How a rate on a `side` of zero changes over a step, positive away from zero.
     #[inline(always)]
-    pub(crate) fn turning(&self, before: Phase, from: &Parts<T, B>) -> Turning<T> {
-        let side = if before == Phase::Retract { -T::one() } else { T::one() };
-        let change = self.rate_change(before, from);
-        Turning::new(side * from.rate, from.rate_variance, &change, S::root)
+    fn rate_change<V: Lanes<Number = T>>(&self, side: V, from: &Parts<V, B>) -> RateChange<V> {
+        let (step, none) = (&self.step, side.nothing());
+        let (expected, spread) = answered(step.rate_change, (self.push(side), none), from);
+        RateChange { expected: side * expected, spread, noise: side.with(step.noise[2]) }
     }
+
+    /// What a rate on a `side` of zero leaves open over a step where it is `wanted`, as
+    /// [`SwitchedModel::turning`](ohmstrain_model::SwitchedModel::turning) of the model.
+    #[inline(always)]
+    pub(crate) fn turning<V: Falls<Number = T>, X: Switch<V>>(
+        &self,
+        side: V,
+        from: &Parts<V, B>,
+        wanted: V::Mask,
+    ) -> Turning<V> {
+        let (zero, one, half) = (side.nothing(), side.literal(1.0), side.literal(0.5));
+        let TurningNumbers { clear, reach, even_excess, brownian, normal_density } = TURNING;
+        let (rate, variance) = (side * from.rate, from.rate_variance);
+        let is_clear = V::both(zero.less(rate), (variance.literal(clear * clear) * variance).less(rate * rate));
+        let turns = V::both(wanted, V::without(zero.less(variance), is_clear));
+        if V::none(turns) {
+            return Turning { excess: zero, variance: zero };
+        }
+        let per_sd = X::root(variance).recip();
+        let u = rate * per_sd;
+        let square = V::pick(one.less(u), u * u, one);
+        let (cut, gaussian) = ((one - square).falling(), side.literal(normal_density) * (-half * square).falling());
+        let density = V::pick(gaussian.less(cut), cut, gaussian) * per_sd;
+
+        let RateChange { expected, spread, noise } = self.rate_change(side, from);
+        let even = V::pick(expected.less(zero), expected * expected, zero);
+        let total = noise + even + spread;
+        let change_sd = X::root(total);
+        let thinner = one + side.literal(reach) * change_sd * per_sd;
+        // Half of an even change of unknown sign leads toward zero.
+        let evenly = side.literal(even_excess) * (even + half * spread);
+        let excess = density * (evenly + side.literal(brownian.0) * noise);
+        let open = (side.literal(brownian.1) * density * total * change_sd).over(thinner);
+        Turning { excess: V::pick(turns, excess, zero), variance: V::pick(turns, open, zero) }
+    }
+}
+
+/// Deviations of the rate beyond zero at which less than a thousandth of the prediction is left, too little to follow.
+const HOPELESS: f64 = 3.090_232_306_167_813_5;
+
+/// On which side of zero the rates of a moving phase are, 1 or -1.
+#[inline(always)]
+pub(crate) fn side_of<V: Lanes>(phase: Phase, like: V) -> V {
+    like.literal(if phase == Phase::Retract { -1.0 } else { 1.0 })
 }
 
 /// What motion by `by` from a belief adds to a mean, and to a variance.
@@ -53,52 +96,60 @@ fn answered<V: Lanes, const B: usize>(by: [V::Number; 2], (mean, variance): (V, 
     (sum(mean, by, [from.strain, from.rate]), sum(variance, by, spread))
 }
 
-impl<V: Several<Number: Real>, const B: usize> Parts<V, B> {
+impl<V: Lanes, const B: usize> Parts<V, B> {
     /// Draws the rate anew where a phase `begins`, independent of everything else.
     #[inline(always)]
-    pub(crate) fn renew_rate(&mut self, fresh: &Gaussian<V::Number>, begins: V::Mask) {
-        let (like, zero) = (self.rate, self.rate.nothing());
-        self.rate = V::pick(begins, like.with(fresh.mean), self.rate);
-        self.rate_variance = V::pick(begins, like.with(fresh.variance), self.rate_variance);
+    pub(crate) fn renew_rate(&mut self, fresh: Gaussian<V>, begins: V::Mask) {
+        let zero = self.rate.nothing();
+        self.rate = V::pick(begins, fresh.mean, self.rate);
+        self.rate_variance = V::pick(begins, fresh.variance, self.rate_variance);
         self.strain_rate = V::pick(begins, zero, self.strain_rate);
         for part in self.branches.iter_mut().chain([&mut self.baseline]) {
             part.with_rate = V::pick(begins, zero, part.with_rate);
         }
     }
 
-    /// Restricts the rate to the sign of a moving phase where that is `wanted`; what it leaves of the Gaussian. Tails beyond
-    /// `clear` squared deviations are not cut off.
+    /// What a `side` of zero has of rates that are certain to be on it or not, or so far away that the tail beyond zero, `clear`
+    /// squared deviations off, is not cut off; and where, of what is `wanted`, it is.
     #[inline(always)]
-    pub(crate) fn cut_rate<X: Switch<V>, const N: usize>(
-        &mut self,
-        phase: Phase,
-        clear: V::Number,
-        wanted: V::Mask,
-    ) -> V {
+    pub(crate) fn certain_of_side(&self, side: V, clear: V::Number, wanted: V::Mask) -> (V, V::Mask) {
         let variance = self.rate_variance;
-        let (zero, one) = (variance.nothing(), variance.literal(1.0));
-        let toward = if phase == Phase::Retract { -self.rate } else { self.rate };
+        let (zero, one, toward) = (variance.nothing(), variance.literal(1.0), side * self.rate);
         let known = (-variance).not_negative();
-        let certain = V::pick(toward.less(zero), zero, one);
+        let certain = V::pick(known, V::pick(toward.less(zero), zero, one), one);
         if V::all(known) {
-            return certain;
+            return (certain, V::without(known, known));
         }
         let far = V::both(zero.less(toward), variance.scale(clear).less(toward * toward));
-        let certain = V::pick(known, certain, one);
-        let cut = V::without(wanted, V::either(known, far));
+        (certain, V::without(wanted, V::either(known, far)))
+    }
+}
+
+impl<V: Falls, const B: usize> Parts<V, B> {
+    /// Restricts the rate to a `side` of zero where that is `wanted`; what it leaves of the Gaussian. Tails beyond `clear` squared
+    /// deviations are not cut off.
+    #[inline(always)]
+    pub(crate) fn cut_rate<X: Switch<V>, const N: usize>(&mut self, side: V, clear: V::Number, wanted: V::Mask) -> V {
+        let (certain, cut) = self.certain_of_side(side, clear, wanted);
         if V::none(cut) {
             return certain;
         }
-        let per_sd = X::root(variance).recip();
-        let border = -toward * per_sd;
-        let Tail { mass, hazard: shift } = Tail::above(border, cut);
-        let (narrowed, gone) = (border * shift - shift * shift, -one);
+        V::pick(cut, self.cut_off::<X, N>(side, cut), certain)
+    }
+
+    /// The same where there is something to `cut` off.
+    #[inline(always)]
+    pub(crate) fn cut_off<X: Switch<V>, const N: usize>(&mut self, side: V, cut: V::Mask) -> V {
+        let (zero, gone) = (side.nothing(), side.literal(-1.0));
+        let per_sd = X::root(self.rate_variance).recip();
+        let border = -(side * self.rate) * per_sd;
+        let Tail { mass, hazard: shift } = border.tail(cut);
+        let narrowed = border * shift - shift * shift;
         // By comparisons, which cost less than calls of `fmax` and `fmin`.
         let narrowed = V::pick(zero.less(narrowed), zero, V::pick(narrowed.less(gone), gone, narrowed));
-        let (toward, narrows) = (shift * per_sd, narrowed * per_sd * per_sd);
-        let moves = if phase == Phase::Retract { -toward } else { toward };
+        let (moves, narrows) = (side * (shift * per_sd), narrowed * per_sd * per_sd);
         self.regress::<N>(V::pick(cut, moves, zero), V::pick(cut, narrows, zero));
-        V::pick(cut, mass, certain)
+        mass
     }
 }
 

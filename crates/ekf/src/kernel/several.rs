@@ -4,15 +4,13 @@ use nalgebra::ComplexField;
 use ohmstrain_model::Scalar;
 
 use super::{Lanes, Parts};
+use crate::belief::tail::Tail;
 
 /// The most lanes that there are.
 pub(crate) const MOST_LANES: usize = 8;
 
 /// A number, or a vector of numbers that can be looked at.
 pub(crate) trait Several: Lanes {
-    /// How many lanes there are, [`MOST_LANES`] at most.
-    const WIDTH: usize;
-
     /// The number in a lane.
     fn at(&self, lane: usize) -> Self::Number;
     /// Numbers made lane by lane.
@@ -33,17 +31,11 @@ pub(crate) trait Several: Lanes {
         lane: usize,
         see: impl FnOnce(&Parts<Self::Number, B>) -> R,
     ) -> R;
-    /// Where one of both is true.
-    fn either(a: Self::Mask, b: Self::Mask) -> Self::Mask;
-    /// Where the first is true and the second is not.
-    fn without(a: Self::Mask, b: Self::Mask) -> Self::Mask;
     /// Whether it is true in a lane.
     fn holds(mask: Self::Mask, lane: usize) -> bool;
 }
 
 impl<T: Scalar> Several for T {
-    const WIDTH: usize = 1;
-
     #[inline(always)]
     fn at(&self, _: usize) -> T {
         *self
@@ -82,16 +74,6 @@ impl<T: Scalar> Several for T {
     }
 
     #[inline(always)]
-    fn either(a: bool, b: bool) -> bool {
-        a || b
-    }
-
-    #[inline(always)]
-    fn without(a: bool, b: bool) -> bool {
-        a && !b
-    }
-
-    #[inline(always)]
     fn holds(mask: bool, _: usize) -> bool {
         mask
     }
@@ -106,8 +88,6 @@ mod vector {
     use crate::kernel::{Parts, Vector};
 
     impl<S: Simd, V: SimdFloat<S, Element: Scalar>, const FUSED: bool> Several for Vector<V, S, FUSED> {
-        const WIDTH: usize = V::LEN;
-
         #[inline(always)]
         fn at(&self, lane: usize) -> V::Element {
             self.numbers.as_slice()[lane % V::LEN]
@@ -173,19 +153,30 @@ mod vector {
         }
 
         #[inline(always)]
-        fn either(a: V::Mask, b: V::Mask) -> V::Mask {
-            a | b
-        }
-
-        #[inline(always)]
-        fn without(a: V::Mask, b: V::Mask) -> V::Mask {
-            a & !b
-        }
-
-        #[inline(always)]
         fn holds(mask: V::Mask, lane: usize) -> bool {
             mask.to_bitmask() >> lane & 1 == 1
         }
+    }
+}
+
+/// Lanes with the exponentials and tails that hypotheses take.
+pub(crate) trait Falls: Lanes {
+    /// Exponentials of what is not above zero: those of [`InVectors::falling`].
+    #[must_use]
+    fn falling(self) -> Self;
+
+    /// What a standard normal has above these borders, where it is `wanted`.
+    #[must_use]
+    #[inline(always)]
+    fn tail(self, wanted: Self::Mask) -> Tail<Self> {
+        Tail::above(self, wanted)
+    }
+}
+
+impl<V: Several<Number: InVectors>> Falls for V {
+    #[inline(always)]
+    fn falling(self) -> Self {
+        <V::Number as InVectors>::falling(self)
     }
 }
 

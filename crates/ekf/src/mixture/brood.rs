@@ -74,8 +74,14 @@ pub(crate) trait Breeds<T: Real, const B: usize, const N: usize> {
     /// Probabilities of the phases that follow one; `open` if its direction is not asked.
     fn follows(&self, from: Phase, open: bool) -> [T; 3];
 
-    /// What a hypothesis leaves open whose rate may turn around; `was_open` if its direction was not asked in the step before.
-    fn turning(&self, from: Phase, belief: &Parts<T, B>, was_open: bool) -> Turning<T>;
+    /// What hypotheses leave open whose rates may turn around, of those that come `from` each phase; `was_open` if their directions were
+    /// not asked in the step before.
+    fn turning<V: Several<Number = T>, X: Switch<V>>(
+        &self,
+        from: &[V::Mask; 3],
+        belief: &Parts<V, B>,
+        was_open: bool,
+    ) -> Turning<V>;
 
     /// Makes the children of one phase of their parents' beliefs; `None` if there are none.
     fn brood<V: Several<Number = T>, X: Switch<V>>(
@@ -124,12 +130,14 @@ impl<F: Breeds<T, B, N>, T: Real, const B: usize, const N: usize, const L: usize
         let Self { filter, state, reading, next, open, .. } = self;
         let (mut children, mut predicted) = (Children::new(next), Predicted::new());
         for (place, (share, from)) in state.shares().iter().zip(state.phases()).enumerate() {
-            let turning = (!open).then(|| filter.turning(*from, &Parts::of(&share.belief), state.pause().open));
+            let comes = Phase::ALL.map(|phase| *from == phase);
+            let turning = |before| filter.turning::<T, F::Switch>(&comes, &before, state.pause().open);
+            let turning = (!open).then(|| turning(Parts::of(&share.belief)));
             let parents = Parents {
                 weight: share.weight,
                 per_inside: share.per_inside,
                 there: true,
-                from: Phase::ALL.map(|phase| *from == phase),
+                from: comes,
                 follows: filter.follows(*from, open),
                 turning,
             };
@@ -190,8 +198,8 @@ impl<F: Breeds<T, B, N>, T: Real, const B: usize, const N: usize, const L: usize
                 of[lane] = state.at(place + lane).unwrap_or(first);
             }
             let there = like.mask(|lane| place + lane < state.shares().len());
-            let parents = side_by_side(filter, like, &of, (there, state.pause().open));
             let start = Parts::gathered(like, |lane| &of[lane].0.belief);
+            let parents = side_by_side(filter, &start, &of, (there, state.pause().open));
             let [mut extend, mut hold, mut retract] = [start; 3];
             let broods = [
                 filter.brood::<V, Compact>(&mut extend, &parents, Phase::Extend, in_lanes, &mut ()),
@@ -222,7 +230,7 @@ impl<F: Breeds<T, B, N>, T: Real, const B: usize, const N: usize, const L: usize
 #[inline(always)]
 fn side_by_side<F, V, const B: usize, const N: usize, const L: usize>(
     filter: &F,
-    like: V,
+    beliefs: &Parts<V, B>,
     of: &[(&Share<V::Number, N, L>, Phase); MOST_LANES],
     (there, was_open): (V::Mask, bool),
 ) -> Parents<V>
@@ -230,21 +238,15 @@ where
     V: Several<Number: Real>,
     F: Breeds<V::Number, B, N>,
 {
-    let [weight, per_inside, extend, hold, retract, excess, variance] = like.build(|lane| {
+    let [weight, per_inside, extend, hold, retract] = beliefs.strain.build(|lane| {
         let (share, from) = of[lane];
         let [extend, hold, retract] = filter.follows(from, false);
-        let turning = filter.turning(from, &Parts::of(&share.belief), was_open);
-        [share.weight, share.per_inside, extend, hold, retract, turning.excess, turning.variance]
+        [share.weight, share.per_inside, extend, hold, retract]
     });
-    let comes = |phase| like.mask(|lane| of[lane].1 == phase);
-    Parents {
-        weight,
-        per_inside,
-        there,
-        from: [comes(Phase::Extend), comes(Phase::Hold), comes(Phase::Retract)],
-        follows: [extend, hold, retract],
-        turning: Some(Turning { excess, variance }),
-    }
+    let comes = |phase| beliefs.strain.mask(|lane| of[lane].1 == phase);
+    let from = [comes(Phase::Extend), comes(Phase::Hold), comes(Phase::Retract)];
+    let turning = Some(filter.turning::<V, Compact>(&from, beliefs, was_open));
+    Parents { weight, per_inside, there, from, follows: [extend, hold, retract], turning }
 }
 
 /// Puts the child in a lane among the others.

@@ -1,32 +1,13 @@
 use ohmstrain_model::Phase;
 
-use crate::StepError;
 use crate::belief::gaussian::Real;
 use crate::kernel::{Parts, Several};
 use crate::mixture::evidence::{Weighed, Weight};
 use crate::mixture::lineage::Recorder;
+use crate::mixture::pair::{self, About};
 use crate::mixture::state::{Mixture, Share};
-use crate::mixture::{ALIKE, Added, LEAST_WEIGHT, LIGHTER};
-
-/// What tells whether two hypotheses are alike.
-struct About<T> {
-    strain: T,
-    strain_variance: T,
-    rate: T,
-    rate_variance: T,
-}
-
-impl<T: Real> About<T> {
-    #[inline(always)]
-    fn of<V: Several<Number = T>, const B: usize>(parts: &Parts<V, B>, lane: usize) -> Self {
-        Self {
-            strain: parts.strain.at(lane),
-            strain_variance: parts.strain_variance.at(lane),
-            rate: parts.rate.at(lane),
-            rate_variance: parts.rate_variance.at(lane),
-        }
-    }
-}
+use crate::mixture::{Added, LEAST_WEIGHT, LIGHTER};
+use crate::{Belief, StepError};
 
 /// Collects the children of a step: keeps, merges and drops them.
 pub(crate) struct Children<'a, T, const N: usize, const L: usize, const K: usize> {
@@ -56,14 +37,14 @@ impl<'a, T: Real, const N: usize, const L: usize, const K: usize> Children<'a, T
         phase: Phase,
         weighed: &Weighed<T>,
     ) -> Added {
-        let about = About::of(children, lane);
+        let about = About::in_lane(children, lane);
         let Weighed { weight, more_inside, per_inside } = *weighed;
         self.raise_to(weight.exponent);
         let likelihood = weight.relative_to(self.exponent);
         self.density += likelihood;
         let weight = likelihood * more_inside;
         let like = |(_, (share, known)): &(usize, (&mut Share<T, N, L>, &mut Phase))| {
-            **known == phase && share.is_like(&about)
+            **known == phase && share.about().is_like(&about)
         };
         if let Some((place, (like, _))) = self.kept.iter_mut().enumerate().find(like) {
             V::parts(children, lane, |child| like.merge(child, weight, per_inside));
@@ -117,8 +98,8 @@ impl<'a, T: Real, const N: usize, const L: usize, const K: usize> Children<'a, T
             return None;
         }
         let others = self.kept.iter_mut().enumerate().filter(|(at, (_, of))| Some(*at) != but && **of == phase);
-        let about = About::of(child, 0);
-        let distances = others.map(|(at, (share, _))| (share.distance(&about), at, share));
+        let about = About::of(child);
+        let distances = others.map(|(at, (share, _))| (share.about().distance(&about), at, share));
         let (_, at, share) = distances.reduce(|a, b| if b.0 < a.0 { b } else { a })?;
         share.merge(child, weight, per_inside);
         Some(at)
@@ -167,30 +148,23 @@ impl<'a, T: Real, const N: usize, const L: usize, const K: usize> Children<'a, T
     }
 }
 
-impl<T: Real, const N: usize, const L: usize> Share<T, N, L> {
-    /// Whether two hypotheses of one phase count as one.
+impl<T: Real> About<T> {
     #[inline(always)]
-    fn is_like(&self, other: &About<T>) -> bool {
-        // Mostly they are not, which the strain tells without a division.
-        let (apart, variance) = (self.belief.mean[0] - other.strain, self.belief.covariance[(0, 0)]);
-        if apart * apart > T::of(ALIKE) * (variance + other.strain_variance) {
-            return false;
+    fn in_lane<V: Several<Number = T>, const B: usize>(parts: &Parts<V, B>, lane: usize) -> Self {
+        Self {
+            strain: parts.strain.at(lane),
+            strain_variance: parts.strain_variance.at(lane),
+            rate: parts.rate.at(lane),
+            rate_variance: parts.rate_variance.at(lane),
         }
-        let strain = self.apart(0, other.strain, other.strain_variance);
-        strain < T::of(ALIKE) && strain + self.apart(1, other.rate, other.rate_variance) < T::of(ALIKE)
     }
+}
 
-    fn distance(&self, other: &About<T>) -> T {
-        self.apart(0, other.strain, other.strain_variance) + self.apart(1, other.rate, other.rate_variance)
-    }
-
-    /// Squared distance of a state from another one's, in units of the larger variance.
+impl<T: Real, const N: usize, const L: usize> Share<T, N, L> {
     #[inline(always)]
-    fn apart(&self, i: usize, mean: T, other_variance: T) -> T {
-        let (apart, variance) = (self.belief.mean[i] - mean, self.belief.covariance[(i, i)]);
-        let variance = if other_variance > variance { other_variance } else { variance };
-        // What is known exactly is the same or is not; a difference has no size without a unit.
-        if apart.is_zero() { T::zero() } else { apart * apart / variance }
+    fn about(&self) -> About<T> {
+        let Belief { mean, covariance } = &self.belief;
+        About { strain: mean[0], strain_variance: covariance[(0, 0)], rate: mean[1], rate_variance: covariance[(1, 1)] }
     }
 
     /// Takes in another one, with the mean and covariance of the pair.
@@ -200,20 +174,10 @@ impl<T: Real, const N: usize, const L: usize> Share<T, N, L> {
             return;
         }
         let (mine, theirs) = (self.weight / total, weight / total);
-        let both = mine * theirs;
-        // By iterators throughout: an index could panic.
         let (mut mean, mut covariance) = ([T::zero(); N], [T::zero(); L]);
         other.write::<N>(&mut mean.iter_mut(), &mut covariance.iter_mut());
-        for (apart, mine) in mean.iter_mut().zip(self.belief.mean.iter_mut()) {
-            *apart -= *mine;
-            *mine += *apart * theirs;
-        }
-        let mut entries = self.belief.covariance.packed_mut().iter_mut().zip(&covariance);
-        for (i, a) in mean.iter().enumerate() {
-            for (b, (p, q)) in mean.iter().take(i + 1).zip(&mut entries) {
-                *p = mine * *p + theirs * *q + both * *a * *b;
-            }
-        }
+        let own = (self.belief.mean.iter_mut(), self.belief.covariance.packed_mut().iter_mut());
+        pair::merge(own, (&mean, covariance.iter()), [mine, theirs]);
         self.weight = total;
         self.per_inside = mine * self.per_inside + theirs * per_inside;
     }

@@ -1,8 +1,7 @@
 use ohmstrain_model::{ParameterError, Phase, Problem, Scalar, StrainRange};
 
 use crate::belief::gaussian::Real;
-use crate::belief::tail::Tail;
-use crate::kernel::{Lanes, Parts, RateSpread, Several};
+use crate::kernel::{Falls, Lanes, Parts, RateSpread, Several};
 use crate::mixture::LEAST_INSIDE;
 use crate::mixture::predicted::Predicted;
 use crate::{Curve, Innovation, Reading, Residual, SparseEkf, StepError, Switch};
@@ -67,6 +66,12 @@ impl<T: Real> Weighing<T> {
         Self { limits: evidence.limits, tempering: evidence.tempering, clear }
     }
 
+    /// Of limits that nobody has checked, in `f32` an input's place each.
+    #[cfg(feature = "record")]
+    pub(crate) fn of_any_limits(lower: T, upper: T) -> Self {
+        Self::new(Evidence { limits: StrainRange { lower, upper }, tempering: T::one() })
+    }
+
     /// A prior probability times the likelihood of a reading to the power of the tempering, without the constant
     /// `(2π)^(-tempering/2)`.
     #[inline(always)]
@@ -87,7 +92,7 @@ impl<T: Real> Weighing<T> {
     #[inline(always)]
     pub(crate) fn of_limits<V, X>(&self, (strain, variance): (V, V), per_inside: V, wanted: V::Mask) -> [V; 2]
     where
-        V: Several<Number = T>,
+        V: Falls<Number = T>,
         X: Switch<V>,
     {
         let one = strain.literal(1.0);
@@ -110,13 +115,13 @@ impl<T: Real> Weighing<T> {
     }
 
     #[inline(always)]
-    fn is_clear<V: Several<Number = T>>(&self, distance: V, reach: V) -> V::Mask {
+    fn is_clear<V: Falls<Number = T>>(&self, distance: V, reach: V) -> V::Mask {
         V::both(distance.nothing().less(distance), reach.less(distance * distance))
     }
 
     /// Out of the way of numbers that are not near a limit.
     #[inline(never)]
-    fn inside_near_apart<V: Several<Number = T>, X: Switch<V>>(&self, ends: [V; 2], variance: V, near: V::Mask) -> V {
+    fn inside_near_apart<V: Falls<Number = T>, X: Switch<V>>(&self, ends: [V; 2], variance: V, near: V::Mask) -> V {
         self.inside_near::<V, X>(ends, variance, near)
     }
 
@@ -125,7 +130,7 @@ impl<T: Real> Weighing<T> {
     #[inline(always)]
     fn inside_near<V, X>(&self, [above_lower, below_upper]: [V; 2], variance: V, wanted: V::Mask) -> V
     where
-        V: Several<Number = T>,
+        V: Falls<Number = T>,
         X: Switch<V>,
     {
         let (zero, one) = (variance.nothing(), variance.literal(1.0));
@@ -136,11 +141,11 @@ impl<T: Real> Weighing<T> {
         let far_counts = V::without(wanted, self.is_clear(far, variance.scale(self.clear)));
         let mut beyond_far = zero;
         if !V::none(far_counts) {
-            beyond_far = V::pick(far_counts, Tail::above(far * per_sd, far_counts).mass, zero);
+            beyond_far = V::pick(far_counts, (far * per_sd).tail(far_counts).mass, zero);
         }
         // Beyond the near end the mass inside is the small number, and is to keep its digits.
         let is_inside = zero.less(near);
-        let beyond_near = Tail::above(V::pick(is_inside, near, -near) * per_sd, wanted).mass;
+        let beyond_near = (V::pick(is_inside, near, -near) * per_sd).tail(wanted).mass;
         let inside = V::pick(is_inside, one - (beyond_near + beyond_far), beyond_near - beyond_far);
         let least = variance.literal(LEAST_INSIDE);
         V::pick(least.less(inside), inside, least)

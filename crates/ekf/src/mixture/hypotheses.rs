@@ -68,8 +68,13 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
 
     /// Nothing: a phase has the direction of its net move.
     #[inline(always)]
-    fn turning(&self, _: Phase, _: &Parts<T, B>, _: bool) -> Turning<T> {
-        Turning { excess: T::zero(), variance: T::zero() }
+    fn turning<V: Several<Number = T>, X: Switch<V>>(
+        &self,
+        _: &[V::Mask; 3],
+        belief: &Parts<V, B>,
+        _: bool,
+    ) -> Turning<V> {
+        Turning { excess: belief.rate.nothing(), variance: belief.rate.nothing() }
     }
 
     #[inline(always)]
@@ -90,7 +95,7 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
         if phase != Phase::Hold {
             begins = V::without(parents.there, parents.from[phase.index()]);
             if !V::none(begins) {
-                parts.renew_rate(&self.fresh[phase.index()], begins);
+                parts.renew_rate(self.fresh[phase.index()].in_lanes(parts.rate), begins);
             }
         }
         let course = Course::Known(phase);

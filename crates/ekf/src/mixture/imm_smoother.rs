@@ -74,7 +74,7 @@ impl<T: Real, const B: usize, const N: usize, S: Switch<T>, G: Curve<T>> Imm<T, 
         let mut belief = mode.belief;
         if begins(from, phase) {
             let mut parts = Parts::<T, B>::of(&belief);
-            parts.renew_rate(&self.fresh[phase.index()], true);
+            parts.renew_rate(self.fresh[phase.index()], true);
             parts.put_into(&mut belief);
         }
         belief

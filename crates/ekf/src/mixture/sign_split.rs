@@ -9,7 +9,7 @@ use core::marker::PhantomData;
 use ohmstrain_model::{Phase, SwitchedModel, Turning};
 
 use crate::belief::gaussian::Real;
-use crate::kernel::{Course, Parts, Several};
+use crate::kernel::{Course, Parts, Several, side_of};
 use crate::mixture::again::{Hearing, loosen};
 use crate::mixture::brood::{Breeding, Breeds, Parents, Trail};
 use crate::mixture::estimator::{mixture_filter, mixture_steps};
@@ -109,18 +109,6 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
         next.set_pause(pause);
         Ok(said)
     }
-
-    /// Where next to nothing of a prediction has the sign of a moving phase.
-    #[inline(always)]
-    fn is_hopeless<V: Several<Number = T>>(&self, phase: Phase, from: &Parts<V, B>) -> V::Mask {
-        let ahead = self.kernel.rate_ahead(phase, from);
-        let toward = if phase == Phase::Retract { -ahead.mean } else { ahead.mean };
-        let behind = toward.less(toward.nothing());
-        if V::none(behind) {
-            return behind;
-        }
-        V::both(behind, ahead.variance.scale(T::of(HOPELESS * HOPELESS)).less(toward * toward))
-    }
 }
 
 impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: Curve<T>> Breeds<T, B, N>
@@ -137,14 +125,18 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
         if open { goes_on(self.chain.as_ref(), from) } else { follows(self.chain.as_ref(), from) }
     }
 
-    /// Nothing of what rested.
+    /// Nothing of what rested. What was left open has the phase of its rate.
     #[inline(always)]
-    fn turning(&self, from: Phase, belief: &Parts<T, B>, was_open: bool) -> Turning<T> {
-        let before = if was_open { toward(from, belief.rate) } else { from };
-        match before {
-            Phase::Hold => Turning { excess: T::zero(), variance: T::zero() },
-            moving => self.kernel.turning(moving, belief),
-        }
+    fn turning<V: Several<Number = T>, X: Switch<V>>(
+        &self,
+        from: &[V::Mask; 3],
+        belief: &Parts<V, B>,
+        was_open: bool,
+    ) -> Turning<V> {
+        let (ahead, back) = (side_of(Phase::Extend, belief.rate), side_of(Phase::Retract, belief.rate));
+        let retracts = if was_open { belief.rate.less(belief.rate.nothing()) } else { from[Phase::Retract.index()] };
+        let moves = V::either(from[Phase::Extend.index()], from[Phase::Retract.index()]);
+        self.kernel.turning::<V, X>(V::pick(retracts, back, ahead), belief, moves)
     }
 
     #[inline(always)]
@@ -161,17 +153,17 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
         if V::none(alive) {
             return None;
         }
-        let moves = phase != Phase::Hold;
+        let (moves, side) = (phase != Phase::Hold, side_of(phase, parts.rate));
         let mut begins = V::without(parents.there, parents.there);
         if moves && self.chain.is_some() {
             begins = parents.from[Phase::Hold.index()];
             if !V::none(begins) {
-                parts.renew_rate(&self.fresh[phase.index()], begins);
+                parts.renew_rate(self.fresh[phase.index()].in_lanes(parts.rate), begins);
             }
         }
         let course = match parents.turning {
             Some(turning) if moves => {
-                alive = V::without(alive, self.is_hopeless(phase, parts));
+                alive = V::without(alive, self.kernel.is_hopeless(side, parts));
                 if V::none(alive) {
                     return None;
                 }
@@ -185,7 +177,7 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
         trail.ahead(parts);
         let mut prior = parents.weight * probability;
         if moves && parents.turning.is_some() {
-            let mass = parts.cut_rate::<X, N>(phase, self.weighing.clear(), alive);
+            let mass = parts.cut_rate::<X, N>(side, self.weighing.clear(), alive);
             alive = V::both(alive, mass.literal(LEAST_MASS).less(mass));
             if V::none(alive) {
                 return None;
@@ -201,8 +193,6 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
 
 /// A cut that leaves less than this of a prediction is not followed: its moments would be those of a far tail.
 pub(crate) const LEAST_MASS: f64 = 1e-3;
-/// Deviations of the rate beyond zero at which less than a thousandth of the prediction is left, too little to follow.
-pub(crate) const HOPELESS: f64 = 3.090_232_306_167_813_5;
 
 /// Probabilities of the phases that follow `phase`, in the order of [`Phase::ALL`]. Whether a moving body stretches or
 /// releases is for the cut to say.
@@ -221,15 +211,6 @@ fn goes_on<T: Real>(chain: Option<&[[T; 3]; 3]>, phase: Phase) -> [T; 3] {
         (Some(chain), Phase::Hold) => chain[1],
         (_, Phase::Retract) => [zero, stops, T::one() - stops],
         _ => [T::one() - stops, stops, zero],
-    }
-}
-
-/// The phase of a rate that was left open; what holds has none.
-fn toward<T: Real>(phase: Phase, rate: T) -> Phase {
-    match phase {
-        Phase::Hold => Phase::Hold,
-        _ if rate < T::zero() => Phase::Retract,
-        _ => Phase::Extend,
     }
 }
 

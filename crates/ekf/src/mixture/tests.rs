@@ -14,7 +14,7 @@ use super::children::Children;
 use super::evidence::{Weighed, Weighing, Weight};
 use super::state::Share;
 use super::*;
-use crate::kernel::Parts;
+use crate::kernel::{Parts, side_of};
 use crate::{Estimator, Logistic, Reading, SignSplit, State as _};
 
 /// Strain, rate, baseline.
@@ -93,7 +93,7 @@ proptest! {
     fn halves_of_a_cut_belief_make_the_whole((_, whole) in one()) {
         let halves = [Phase::Extend, Phase::Retract].map(|phase| {
             let (mut parts, mut half) = (Parts::<f64, 0>::of(&whole), whole);
-            let mass = parts.cut_rate::<Logistic, 3>(phase, f64::INFINITY, true);
+            let mass = parts.cut_rate::<Logistic, 3>(side_of(phase, 0.0), f64::INFINITY, true);
             parts.put_into(&mut half);
             (mass, half)
         });

@@ -2,7 +2,8 @@ use core::cell::RefCell;
 use core::ops::{Add, AddAssign, Mul, MulAssign, Neg, Sub, SubAssign};
 use std::vec::Vec;
 
-use crate::kernel::Lanes;
+use crate::belief::tail::Tail;
+use crate::kernel::{Falls, Lanes};
 
 /// Where an earlier operation stands in [`Recorded::operations`].
 pub type Place = usize;
@@ -28,6 +29,10 @@ pub enum Operation {
     Root(Place),
     /// An exponential.
     Exponential(Place),
+    /// What a standard normal has above a border.
+    Tail(Place),
+    /// Its density at the border of such a tail, over the tail.
+    Hazard(Place),
     /// Whether the first is less than the second.
     Less(Place, Place),
     /// Whether a number is zero or more; not if it is not a number.
@@ -36,6 +41,10 @@ pub enum Operation {
     Finite(Place),
     /// Whether both are true.
     Both(Place, Place),
+    /// Whether one of both is true.
+    Either(Place, Place),
+    /// Whether it is not true.
+    Not(Place),
     /// What is known to be true, or false.
     Known(bool),
     /// The second where the first is true, else the third.
@@ -47,15 +56,21 @@ impl Operation {
     pub fn operands(self) -> impl Iterator<Item = Place> {
         let (a, b, c) = match self {
             Self::Input(_) | Self::Constant(_) | Self::Known(_) => (None, None, None),
-            Self::Negate(a) | Self::Root(a) | Self::Exponential(a) | Self::NotNegative(a) | Self::Finite(a) => {
-                (Some(a), None, None)
-            }
+            Self::Negate(a)
+            | Self::Root(a)
+            | Self::Exponential(a)
+            | Self::Tail(a)
+            | Self::Hazard(a)
+            | Self::NotNegative(a)
+            | Self::Finite(a)
+            | Self::Not(a) => (Some(a), None, None),
             Self::Add(a, b)
             | Self::Subtract(a, b)
             | Self::Multiply(a, b)
             | Self::Divide(a, b)
             | Self::Less(a, b)
-            | Self::Both(a, b) => (Some(a), Some(b), None),
+            | Self::Both(a, b)
+            | Self::Either(a, b) => (Some(a), Some(b), None),
             Self::Pick(a, b, c) => (Some(a), Some(b), Some(c)),
         };
         [a, b, c].into_iter().flatten()
@@ -97,6 +112,11 @@ impl Tape {
             operations.push(operation);
         }
         Expression { tape: self, place }
+    }
+
+    /// A truth.
+    pub(super) fn known(&self, truth: bool) -> Expression<'_> {
+        self.put(Operation::Known(truth))
     }
 
     pub(super) fn recorded<'a>(&self, results: impl IntoIterator<Item = Expression<'a>>) -> Recorded {
@@ -183,6 +203,8 @@ impl Lanes for Expression<'_> {
     type Number = f32;
     type Mask = Self;
 
+    const WIDTH: usize = 1;
+
     fn with(self, number: f32) -> Self {
         self.tape.put(stood_for(number).map_or(Operation::Constant(number), Operation::Input))
     }
@@ -224,10 +246,26 @@ impl Lanes for Expression<'_> {
 
     fn both(a: Self, b: Self) -> Self {
         match (a.truth(), b.truth()) {
-            (Some(true), _) => b,
-            (_, Some(true)) => a,
+            (Some(true), _) | (_, Some(false)) => b,
+            (_, Some(true)) | (Some(false), _) => a,
             _ => a.with(Operation::Both(a.place, b.place)),
         }
+    }
+
+    fn either(a: Self, b: Self) -> Self {
+        match (a.truth(), b.truth()) {
+            (Some(true), _) | (_, Some(false)) => a,
+            (_, Some(true)) | (Some(false), _) => b,
+            _ => a.with(Operation::Either(a.place, b.place)),
+        }
+    }
+
+    fn without(a: Self, b: Self) -> Self {
+        let others = match b.truth() {
+            Some(truth) => b.with(Operation::Known(!truth)),
+            None => b.with(Operation::Not(b.place)),
+        };
+        if a.place == b.place { a.with(Operation::Known(false)) } else { Self::both(a, others) }
     }
 
     fn none(mask: Self) -> bool {
@@ -253,5 +291,18 @@ impl Lanes for Expression<'_> {
 
     fn region<R>(self, _: f32, _: f32, _: [&R; 3]) -> Option<&R> {
         None
+    }
+}
+
+/// As numbers in single precision have it.
+impl Falls for Expression<'_> {
+    fn falling(self) -> Self {
+        self.exponential()
+    }
+
+    /// A function of its own.
+    fn tail(self, _: Self) -> Tail<Self> {
+        let mass = self.with(Operation::Tail(self.place));
+        Tail { mass, hazard: mass.with(Operation::Hazard(mass.place)) }
     }
 }

@@ -1,7 +1,5 @@
-use ohmstrain_model::TURNING;
-
-use crate::mixture::sign_split::{HOPELESS, LEAST_MASS};
-use crate::mixture::{ALIKE, LEAST_INSIDE, LEAST_WEIGHT, LIGHTER};
+use crate::mixture::sign_split::LEAST_MASS;
+use crate::mixture::{LEAST_WEIGHT, LIGHTER};
 use crate::substeps::GRACE;
 use crate::{Curve, Gaussian, Hypotheses, SignSplit, Switch};
 
@@ -12,30 +10,20 @@ pub struct MixtureNumbers {
     pub fresh: [Gaussian<f32>; 3],
     /// Power to which a reading's likelihood enters the weights.
     pub tempering: f32,
-    /// Squared deviations beyond which a tail does not count.
-    pub clear: f32,
     /// Seconds without a reading from which on the direction is left open; infinite where it never is.
     pub forgets_direction_s: f32,
 }
 
 /// What is the same in all filters of hypotheses.
 pub mod shared {
-    use super::{ALIKE, HOPELESS, LEAST_INSIDE, LEAST_MASS, LEAST_WEIGHT, LIGHTER, TURNING};
+    use super::{LEAST_MASS, LEAST_WEIGHT, LIGHTER};
 
-    /// When two hypotheses of one phase count as one: squared distance of their strains plus that of their rates.
-    pub const ALIKE_BELOW: f32 = ALIKE as f32;
     /// Hypotheses lighter than this share of the heaviest are dropped.
     pub const LEAST_WEIGHT_KEPT: f32 = LEAST_WEIGHT as f32;
     /// Of two hypotheses one is the lighter if it is lighter than this share of the other.
     pub const NOT_LIGHTER: f32 = (1.0 - LIGHTER) as f32;
-    /// A hypothesis that has left the limits is no less likely than this.
-    pub const LEAST_INSIDE_LIMITS: f32 = LEAST_INSIDE as f32;
     /// What a cut leaves must be more than this.
     pub const LEAST_MASS_LEFT: f32 = LEAST_MASS as f32;
-    /// Squared deviations beyond zero at which a prediction is hopeless.
-    pub const HOPELESS_SQUARE: f32 = (HOPELESS * HOPELESS) as f32;
-    /// Squared deviations from zero at which no rate turns around.
-    pub const TURNING_CLEAR_SQUARE: f32 = (TURNING.clear * TURNING.clear) as f32;
 }
 
 impl<const B: usize, const N: usize, const K: usize, S: Switch<f32>, G: Curve<f32>> SignSplit<f32, B, N, K, S, G> {
@@ -43,8 +31,7 @@ impl<const B: usize, const N: usize, const K: usize, S: Switch<f32>, G: Curve<f3
     #[must_use]
     pub fn numbers(&self) -> MixtureNumbers {
         let forgets = self.forgets_direction_s * GRACE as f32;
-        let (tempering, clear) = (self.weighing.tempering(), self.weighing.clear());
-        MixtureNumbers { fresh: self.fresh, tempering, clear, forgets_direction_s: forgets }
+        MixtureNumbers { fresh: self.fresh, tempering: self.weighing.tempering(), forgets_direction_s: forgets }
     }
 
     /// The filter of each hypothesis.
@@ -58,8 +45,8 @@ impl<const B: usize, const N: usize, const K: usize, S: Switch<f32>, G: Curve<f3
     /// What it has besides the kernel.
     #[must_use]
     pub fn numbers(&self) -> MixtureNumbers {
-        let (tempering, clear) = (self.weighing.tempering(), self.weighing.clear());
-        MixtureNumbers { fresh: self.fresh, tempering, clear, forgets_direction_s: f32::INFINITY }
+        let tempering = self.weighing.tempering();
+        MixtureNumbers { fresh: self.fresh, tempering, forgets_direction_s: f32::INFINITY }
     }
 
     /// The filter of each history.

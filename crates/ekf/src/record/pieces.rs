@@ -3,13 +3,17 @@ use std::vec::Vec;
 
 use super::expression::standing_for;
 use super::{Expression, Recorded, Tape};
+use crate::belief::tail::Tail;
 use crate::kernel::{Course, Lanes, Parts, RateSpread};
-use crate::{Compact, Curve, Reading, SparseEkf};
+use crate::mixture::evidence::Weighing;
+use crate::mixture::pair::{About, merge};
+use crate::{Compact, Curve, Gaussian, Reading, SparseEkf};
 
 /// A part of a step that goes from one end to the other without asking which way.
 ///
-/// The first inputs are the state's means, then the lower triangle of its covariance row by row, then two more (what
-/// they are stands with each), then what depends on the length of the step ([`SparseEkf::step_names`]).
+/// The first inputs are the state's means, then the lower triangle of its covariance row by row, then those that stand with each piece
+/// ([`Piece::inputs`]), then what depends on the length of the step ([`SparseEkf::step_names`]). A *side* is that of zero on
+/// which a moving phase has its rates: 1 or -1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Piece {
     /// The prediction of a hypothesis: out comes the state.
@@ -24,13 +28,43 @@ pub enum Piece {
     Take(Option<Phase>),
     /// Whether a state is sound. It stays.
     Sound,
-    /// The rate moves by its variance times an input, which the other states follow; its variance changes by its square
-    /// times another. Out comes the state.
-    Regress,
-    /// The rate that a moving phase leads to: its mean and variance.
-    RateAhead(Phase),
-    /// How a rate of a phase's sign changes: the expected change away from zero, and its variance from what is not known.
-    RateChange(Phase),
+    /// The rate drawn anew, of a mean (input) and a variance (input): out comes the state.
+    Renew,
+    /// What a rate on a side (input) may turn around: the excess of path, and its variance.
+    Turns,
+    /// Whether next to nothing of what a moving phase of a side (input) leads to is on that side.
+    Hopeless,
+    /// What a side (input) has of a rate that is certain to be there or not, and whether there is more to say.
+    CertainOfSide,
+    /// The state restricted to rates of a side (input), and what that leaves of it.
+    CutOff,
+    /// The limits' probability over what the first input is one over, and one over the probability; of a lower and an upper limit
+    /// (inputs).
+    OfLimits,
+    /// The density of a standard normal at a border (input) over what it has above, and that.
+    Tail,
+    /// Whether another state (inputs) says the same.
+    Alike,
+    /// The squared distance of another state (inputs) in strain and rate.
+    Distance,
+    /// The mean and covariance of this state and another one (inputs), of which the pair has two shares (inputs).
+    Merge,
+}
+
+impl Piece {
+    /// How many inputs stand between the state and the step.
+    #[must_use]
+    pub const fn inputs(self, carried: Carried) -> usize {
+        let another = carried.means + carried.covariances;
+        match self {
+            Self::Predict(_) | Self::PredictOpen | Self::Sound => 0,
+            Self::Turns | Self::Hopeless | Self::CertainOfSide | Self::CutOff | Self::Tail => 1,
+            Self::PredictTurning(_) | Self::Take(_) | Self::Renew => 2,
+            Self::OfLimits => 3,
+            Self::Alike | Self::Distance => another,
+            Self::Merge => another + 2,
+        }
+    }
 }
 
 /// The sizes of a state.
@@ -40,6 +74,19 @@ pub struct Carried {
     pub means: usize,
     /// Number of entries of the covariance.
     pub covariances: usize,
+}
+
+/// What a piece takes besides the state, and what takes it.
+struct Inputs<'a, 't> {
+    tape: &'t Tape,
+    more: &'a [Expression<'t>],
+}
+
+impl<'t> Inputs<'_, 't> {
+    /// Of this number; a piece that has fewer does not ask for it.
+    fn at(&self, number: usize) -> Expression<'t> {
+        self.more.get(number).copied().unwrap_or_else(|| self.tape.input(0).literal(0.0))
+    }
 }
 
 impl<const B: usize, const N: usize, G: Curve<f32>> SparseEkf<f32, Compact, B, N, G> {
@@ -52,9 +99,8 @@ impl<const B: usize, const N: usize, G: Curve<f32>> SparseEkf<f32, Compact, B, N
     /// Writes down what the filter does, with the numbers of this sensor as constants.
     #[must_use]
     pub fn record(&self, piece: Piece) -> Recorded {
-        let Carried { means, covariances } = Self::carried();
-        let state = means + covariances;
-        let (mut open, mut input) = (*self, state + 2);
+        let carried = Self::carried();
+        let (mut open, mut input) = (*self, carried.means + carried.covariances + piece.inputs(carried));
         open.step.visit(&mut |_, _, number| {
             *number = standing_for(input);
             input += 1;
@@ -65,52 +111,107 @@ impl<const B: usize, const N: usize, G: Curve<f32>> SparseEkf<f32, Compact, B, N
     /// With a step of numbers that stand for inputs.
     fn write_down(&self, piece: Piece) -> Recorded {
         let tape = Tape::default();
-        let Carried { means, covariances } = Self::carried();
-        let state = means + covariances;
-        let inputs: Vec<_> = (0..state + 2).map(|number| tape.input(number)).collect();
-        let (mean, rest) = inputs.split_at(means);
-        let (covariance, more) = rest.split_at(covariances);
-        let (first, second) = (more[0], more[1]);
-        let mut parts = Parts::read::<N>(&mut mean.iter(), &mut covariance.iter(), first.literal(0.0));
-        let spread = RateSpread::<_, Compact>::new(parts.rate_variance);
-        match piece {
-            Piece::Predict(phase) => drop(self.predict(&mut parts, Course::Known(phase))),
-            Piece::PredictTurning(phase) => {
-                let turning = Turning { excess: first, variance: second };
-                self.predict(&mut parts, Course::Within(phase, turning));
-            }
-            Piece::PredictOpen => drop(self.predict(&mut parts, Course::Uncertain)),
-            Piece::Regress => parts.regress::<N>(first, second),
-            Piece::Sound => {
-                let sound = parts.is_sound::<N>(parts.variances::<N>());
-                return tape.recorded([sound]);
-            }
-            Piece::Take(phase) => {
-                let reading = Reading { value: first, extra_variance: second };
-                let compared = self.compare(&parts, reading, phase, spread);
-                let present = first.literal(0.0).less(first.literal(1.0));
-                let nis = Self::correct(&mut parts, &compared, present);
-                let sound = parts.is_sound::<N>(compared.variance + nis);
-                let results = [compared.innovation, compared.variance, nis, sound];
-                return tape.recorded(Self::written(&parts, first).into_iter().chain(results));
-            }
-            Piece::RateAhead(phase) => {
-                let ahead = self.rate_ahead(phase, &parts);
-                return tape.recorded([ahead.mean, ahead.variance]);
-            }
-            Piece::RateChange(phase) => {
-                let change = self.rate_change(phase, &parts);
-                return tape.recorded([change.expected, change.spread]);
-            }
-        }
-        tape.recorded(Self::written(&parts, first))
+        let carried = Self::carried();
+        let state = carried.means + carried.covariances;
+        let numbers: Vec<_> = (0..state + piece.inputs(carried)).map(|number| tape.input(number)).collect();
+        let (own, more) = numbers.split_at(state);
+        let (mut parts, inputs) = (Self::state_of(own), Inputs { tape: &tape, more });
+        let results = self.results_of(piece, &mut parts, &inputs);
+        let changed = if piece.changes_state() { Self::written(&parts) } else { Vec::new() };
+        tape.recorded(changed.into_iter().chain(results))
     }
 
-    fn written<'a>(parts: &Parts<Expression<'a>, B>, like: Expression<'a>) -> Vec<Expression<'a>> {
+    /// What comes of a piece besides the state, which it changes.
+    fn results_of<'t>(
+        &self,
+        piece: Piece,
+        parts: &mut Parts<Expression<'t>, B>,
+        inputs: &Inputs<'_, 't>,
+    ) -> Vec<Expression<'t>> {
+        let (first, second, always) = (inputs.at(0), inputs.at(1), inputs.tape.known(true));
+        let mut results = Vec::new();
+        match piece {
+            Piece::Predict(phase) => drop(self.predict(parts, Course::Known(phase))),
+            Piece::PredictTurning(phase) => {
+                let turning = Turning { excess: first, variance: second };
+                self.predict(parts, Course::Within(phase, turning));
+            }
+            Piece::PredictOpen => drop(self.predict(parts, Course::Uncertain)),
+            Piece::Take(phase) => {
+                let spread = RateSpread::<_, Compact>::new(parts.rate_variance);
+                let reading = Reading { value: first, extra_variance: second };
+                let compared = self.compare(parts, reading, phase, spread);
+                let nis = Self::correct(parts, &compared, always);
+                let sound = parts.is_sound::<N>(compared.variance + nis);
+                results.extend([compared.innovation, compared.variance, nis, sound]);
+            }
+            Piece::Sound => results.push(parts.is_sound::<N>(parts.variances::<N>())),
+            Piece::Renew => parts.renew_rate(Gaussian { mean: first, variance: second }, always),
+            Piece::Turns => {
+                let turning = self.turning::<_, Compact>(first, parts, always);
+                results.extend([turning.excess, turning.variance]);
+            }
+            Piece::Hopeless => results.push(self.is_hopeless(first, parts)),
+            Piece::CertainOfSide => results.extend(<[_; 2]>::from(parts.certain_of_side(first, clear(), always))),
+            Piece::CutOff => results.push(parts.cut_off::<Compact, N>(first, always)),
+            Piece::OfLimits => {
+                let limits =
+                    [1, 2].map(|input| standing_for(Self::carried().means + Self::carried().covariances + input));
+                let weighing = Weighing::of_any_limits(limits[0], limits[1]);
+                let strain = (parts.strain, parts.strain_variance);
+                results.extend(weighing.of_limits::<_, Compact>(strain, first, always));
+            }
+            Piece::Tail => {
+                let Tail { mass, hazard } = Tail::above(first, always);
+                results.extend([hazard, mass]);
+            }
+            Piece::Alike => results.push(About::of(parts).is_like(&About::of(&Self::state_of(inputs.more)))),
+            Piece::Distance => results.push(About::of(parts).distance(&About::of(&Self::state_of(inputs.more)))),
+            Piece::Merge => {
+                let (mut pair, others) = (Self::written(parts), Self::written(&Self::state_of(inputs.more)));
+                let (mean, covariance) = pair.split_at_mut(N);
+                let shares = [inputs.at(others.len()), inputs.at(others.len() + 1)];
+                let other_mean: &[_; N] = &core::array::from_fn(|i| inputs.at(i));
+                merge((mean.iter_mut(), covariance.iter_mut()), (other_mean, others[N..].iter()), shares);
+                *parts = Self::state_of(&pair);
+            }
+        }
+        results
+    }
+
+    /// A state of the numbers with which a list begins.
+    fn state_of<'t>(numbers: &[Expression<'t>]) -> Parts<Expression<'t>, B> {
+        let (mean, covariance) = numbers.split_at(Self::carried().means);
+        Parts::read::<N>(&mut mean.iter(), &mut covariance.iter(), mean[0].literal(0.0))
+    }
+
+    fn written<'t>(parts: &Parts<Expression<'t>, B>) -> Vec<Expression<'t>> {
         let Carried { means, covariances } = Self::carried();
-        let mut written = std::vec![like; means + covariances];
+        let mut written = std::vec![parts.strain; means + covariances];
         let (mean, covariance) = written.split_at_mut(means);
         parts.write::<N>(&mut mean.iter_mut(), &mut covariance.iter_mut());
         written
+    }
+}
+
+/// Squared deviations beyond which a tail does not count, in single precision.
+fn clear() -> f32 {
+    Weighing::of_any_limits(0.0, 0.0).clear()
+}
+
+impl Piece {
+    /// Whether the state is among what comes out.
+    #[must_use]
+    pub const fn changes_state(self) -> bool {
+        matches!(
+            self,
+            Self::Predict(_)
+                | Self::PredictTurning(_)
+                | Self::PredictOpen
+                | Self::Take(_)
+                | Self::Renew
+                | Self::CutOff
+                | Self::Merge
+        )
     }
 }

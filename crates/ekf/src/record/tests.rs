@@ -6,8 +6,11 @@ use ohmstrain_model::{Branch, Gauge, ModelNoise, Motion, Phase, SensorLaw, Strai
 use std::vec::Vec;
 
 use super::{Operation, Piece, Recorded};
-use crate::kernel::{Course, Parts, RateSpread};
-use crate::{Belief, Compact, Reading, SparseEkf};
+use crate::belief::tail::Tail;
+use crate::kernel::{Course, Parts, RateSpread, side_of};
+use crate::mixture::evidence::Weighing;
+use crate::mixture::pair::{About, merge};
+use crate::{Belief, Compact, Evidence, Gaussian, Reading, SparseEkf};
 
 type Filter = SparseEkf<f32, Compact, 2, 5>;
 type State = Belief<f32, 5, 15>;
@@ -28,10 +31,17 @@ fn run(recorded: &Recorded, inputs: &[f32]) -> Vec<f32> {
             Operation::Negate(a) => -at(a),
             Operation::Root(a) => at(a).sqrt(),
             Operation::Exponential(a) => at(a).exp(),
+            Operation::Tail(a) => Tail::above(at(a), true).mass,
+            Operation::Hazard(tail) => match recorded.operations[tail] {
+                Operation::Tail(a) => Tail::above(at(a), true).hazard,
+                _ => f32::NAN,
+            },
             Operation::Less(a, b) => truth(at(a) < at(b)),
             Operation::NotNegative(a) => truth(at(a) >= 0.0),
             Operation::Finite(a) => truth(at(a).is_finite()),
             Operation::Both(a, b) => truth(at(a) * at(b) == 1.0),
+            Operation::Either(a, b) => truth(at(a) + at(b) > 0.0),
+            Operation::Not(a) => 1.0 - at(a),
             Operation::Known(known) => truth(known),
             Operation::Pick(mask, yes, no) => at(if at(mask) == 1.0 { yes } else { no }),
         };
@@ -72,7 +82,8 @@ fn states(filter: &Filter) -> Vec<State> {
 }
 
 #[track_caller]
-fn compare(filter: &Filter, piece: Piece, state: &State, more: [f32; 2], expected: &[f32]) {
+fn compare(filter: &Filter, piece: Piece, state: &State, more: &[f32], expected: &[f32]) {
+    assert_eq!(more.len(), piece.inputs(Filter::carried()));
     let mut inputs: Vec<f32> = state.mean.iter().chain(state.covariance.packed()).copied().collect();
     inputs.extend(more);
     inputs.extend(filter.step_numbers());
@@ -103,17 +114,16 @@ fn what_is_written_down_is_what_the_kernel_does() {
                 numbers(&parts, &state)
             };
             for phase in Phase::ALL {
-                compare(&filter, Piece::Predict(phase), &state, [0.0; 2], &predicted(Course::Known(phase)));
+                compare(&filter, Piece::Predict(phase), &state, &[], &predicted(Course::Known(phase)));
             }
             for phase in [Phase::Extend, Phase::Retract] {
                 let turning = Turning { excess: 2e-3, variance: 3e-5 };
                 let expected = predicted(Course::Within(phase, turning));
                 let more = [turning.excess, turning.variance];
-                compare(&filter, Piece::PredictTurning(phase), &state, more, &expected);
-                let ahead = filter.rate_ahead(phase, &Parts::of(&state));
-                compare(&filter, Piece::RateAhead(phase), &state, more, &[ahead.mean, ahead.variance]);
+                compare(&filter, Piece::PredictTurning(phase), &state, &more, &expected);
+                compare_side(&filter, &state, side_of(phase, 0.0));
             }
-            compare(&filter, Piece::PredictOpen, &state, [0.0; 2], &predicted(Course::Uncertain));
+            compare(&filter, Piece::PredictOpen, &state, &[], &predicted(Course::Uncertain));
             for phase in Phase::ALL.map(Some).into_iter().chain([None]) {
                 let mut parts = Parts::of(&state);
                 let reading = Reading { value: 0.3, extra_variance: 1e-6 };
@@ -121,16 +131,69 @@ fn what_is_written_down_is_what_the_kernel_does() {
                 let taken = filter.update(&mut parts, reading, phase, spread, None).unwrap();
                 let mut expected = numbers(&parts, &state);
                 expected.extend([taken.innovation, taken.variance, taken.nis, 1.0]);
-                compare(&filter, Piece::Take(phase), &state, [0.3, 1e-6], &expected);
+                compare(&filter, Piece::Take(phase), &state, &[0.3, 1e-6], &expected);
             }
             let mut parts = Parts::of(&state);
-            parts.regress::<5>(0.4, -0.1);
-            compare(&filter, Piece::Regress, &state, [0.4, -0.1], &numbers(&parts, &state));
-            compare(&filter, Piece::Sound, &state, [0.0; 2], &[1.0]);
+            parts.renew_rate(Gaussian { mean: 0.4, variance: 0.1 }, true);
+            compare(&filter, Piece::Renew, &state, &[0.4, 0.1], &numbers(&parts, &state));
+            compare(&filter, Piece::Sound, &state, &[], &[1.0]);
             clear += usize::from(state.mean[1].powi(2) > 9.0 * state.covariance[(1, 1)]);
         }
         // Rates whose direction is clear, and others.
         assert!(clear > 5 && clear < 70, "{clear}");
+    }
+}
+
+/// What hypotheses on a side of zero ask of a state.
+fn compare_side(filter: &Filter, state: &State, side: f32) {
+    let (parts, clear) = (Parts::of(state), -2.0 * f32::EPSILON.ln());
+    let truth = |truth: bool| f32::from(u8::from(truth));
+    let turning = filter.turning::<_, Compact>(side, &parts, true);
+    compare(filter, Piece::Turns, state, &[side], &[turning.excess, turning.variance]);
+    compare(filter, Piece::Hopeless, state, &[side], &[truth(filter.is_hopeless(side, &parts))]);
+    let (certain, cut) = parts.certain_of_side(side, clear, true);
+    compare(filter, Piece::CertainOfSide, state, &[side], &[certain, truth(cut)]);
+    if cut {
+        let mut left = parts;
+        let mass = left.cut_off::<Compact, 5>(side, true);
+        let mut expected = numbers(&left, state);
+        expected.push(mass);
+        compare(filter, Piece::CutOff, state, &[side], &expected);
+    }
+}
+
+/// States of the same motion, near each other and far apart, and limits that states are within, at and beyond.
+#[test]
+fn what_is_written_down_of_pairs_and_limits_is_what_hypotheses_do() {
+    let filter = filter(Gauge::Polynomial { coefficients: [1.9, -2.8, 1.0] });
+    let states = states(&filter);
+    let truth = |truth: bool| f32::from(u8::from(truth));
+    let (mut alike, mut near) = (0, 0);
+    for (k, state) in states.iter().enumerate() {
+        let other = &states[(k + 1 + 7 * (k % 2)) % states.len()];
+        let (parts, others): (Parts<f32, 2>, Parts<f32, 2>) = (Parts::of(state), Parts::of(other));
+        let mut more: Vec<f32> = other.mean.iter().chain(other.covariance.packed()).copied().collect();
+        let said = About::of(&parts).is_like(&About::of(&others));
+        compare(&filter, Piece::Alike, state, &more, &[truth(said)]);
+        let distance = About::of(&parts).distance(&About::of(&others));
+        compare(&filter, Piece::Distance, state, &more, &[distance]);
+        let mut pair = *state;
+        let own = (pair.mean.iter_mut(), pair.covariance.packed_mut().iter_mut());
+        merge(own, (&other.mean.into(), other.covariance.packed().iter()), [0.3, 0.7]);
+        more.extend([0.3, 0.7]);
+        compare(&filter, Piece::Merge, state, &more, &numbers(&Parts::of(&pair), state));
+        let limits = StrainRange { lower: 0.01, upper: 0.2 };
+        let weighing = Weighing::new(Evidence { limits, tempering: 1.0 });
+        let strain = (parts.strain, parts.strain_variance);
+        let expected = weighing.of_limits::<_, Compact>(strain, 1.5, true);
+        compare(&filter, Piece::OfLimits, state, &[1.5, limits.lower, limits.upper], &expected);
+        alike += usize::from(said);
+        near += usize::from(expected[1] != 1.0);
+    }
+    assert!(alike > 2 && alike < 75 && near > 5 && near < 75, "{alike} {near}");
+    for border in [-5.0, -0.3, 0.4, 2.0, 7.0, f32::INFINITY] {
+        let Tail { mass, hazard } = Tail::above(border, true);
+        compare(&filter, Piece::Tail, &states[0], &[border], &[hazard, mass]);
     }
 }
 
@@ -139,9 +202,9 @@ fn a_state_that_is_none_is_not_sound() {
     let filter = filter(Gauge::Polynomial { coefficients: [1.9, -2.8, 1.0] });
     let mut state = states(&filter)[3];
     state.covariance[(2, 2)] = -1e-9;
-    compare(&filter, Piece::Sound, &state, [0.0; 2], &[0.0]);
+    compare(&filter, Piece::Sound, &state, &[], &[0.0]);
     state.covariance[(2, 2)] = f32::NAN;
-    compare(&filter, Piece::Sound, &state, [0.0; 2], &[0.0]);
+    compare(&filter, Piece::Sound, &state, &[], &[0.0]);
 }
 
 /// Numbers of another length, set one by one, make the filter of that length.

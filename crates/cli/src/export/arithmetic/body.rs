@@ -1,16 +1,20 @@
 //! What was recorded as lines of C.
 
+mod scopes;
+
 use std::fmt::Write;
 
 use ohmstrain_ekf::record::{Operation, Place, Recorded};
 
 use crate::export::literal::Literal;
+use scopes::Scopes;
 
-/// The lines of a function; what is used once stands where it is used.
+/// The lines of a function; what is used once stands where it is used, and what only one way of a choice needs is done on that way.
 pub struct Body<'a> {
     operations: &'a [Operation],
     /// How often each result is used.
     pub uses: Vec<usize>,
+    scopes: Scopes,
     /// Its expression, once it has one, and how tightly that binds.
     values: Vec<Option<(String, Binds)>>,
     name_of: &'a dyn Fn(usize) -> String,
@@ -20,6 +24,7 @@ pub struct Body<'a> {
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Binds {
     Choice,
+    Either,
     Truth,
     Less,
     Sum,
@@ -34,9 +39,11 @@ impl<'a> Body<'a> {
     /// Of what was recorded, its inputs named by `name_of`.
     pub fn new(recorded: &'a Recorded, name_of: &'a dyn Fn(usize) -> String) -> Self {
         let operations = recorded.operations.as_slice();
+        let uses = uses_of_needed(operations, &recorded.results);
         Self {
             operations,
-            uses: uses_of_needed(operations, &recorded.results),
+            scopes: Scopes::new(operations, &uses, &recorded.results),
+            uses,
             values: vec![None; operations.len()],
             name_of,
             lines: String::new(),
@@ -62,6 +69,16 @@ impl<'a> Body<'a> {
     }
 
     fn made(&mut self, place: Place) -> (String, Binds) {
+        if let (Operation::Pick(mask, yes, no), Some(arms)) = (self.operations[place], self.scopes.arms(place)) {
+            return self.chosen(place, mask, [(yes, arms[0]), (no, arms[1])]);
+        }
+        if let Operation::Tail(border) = self.operations[place] {
+            let border = self.value(border);
+            let (name, hazard) = (format!("t{place}"), hazard(place));
+            let _ =
+                writeln!(self.lines, "    float {hazard};\n    const float {name} = tail_above({border}, &{hazard});");
+            return (name, Binds::Atom);
+        }
         let (text, binds) = self.expression(place);
         let operation = self.operations[place];
         let is_plain = matches!(operation, Operation::Constant(_) | Operation::Known(_));
@@ -88,8 +105,31 @@ impl<'a> Body<'a> {
         (name, Binds::Atom)
     }
 
+    /// A choice whose ways are worth a branch.
+    fn chosen(&mut self, place: Place, mask: Place, ways: [(Place, usize); 2]) -> (String, Binds) {
+        let mask = self.value(mask);
+        // What is used elsewhere too is done before.
+        for shared in self.scopes.shared(self.operations, &self.uses, place, ways) {
+            self.value(shared);
+        }
+        let name = format!("t{place}");
+        let _ = writeln!(self.lines, "    float {name};\n    if ({mask}) {{");
+        for (k, (result, _)) in ways.into_iter().enumerate() {
+            let outer = std::mem::take(&mut self.lines);
+            let value = self.value(result);
+            let inner = std::mem::replace(&mut self.lines, outer);
+            self.lines.push_str(if k == 0 { "" } else { "    } else {\n" });
+            for line in inner.lines() {
+                let _ = writeln!(self.lines, "    {line}");
+            }
+            let _ = writeln!(self.lines, "        {name} = {value};");
+        }
+        self.lines.push_str("    }\n");
+        (name, Binds::Atom)
+    }
+
     fn expression(&mut self, place: Place) -> (String, Binds) {
-        use Binds::{Atom, Choice, Less, Product, Sum, Truth};
+        use Binds::{Atom, Choice, Either, Less, Product, Sum, Truth};
         let (text, binds) = match self.operations[place] {
             Operation::Input(number) => ((self.name_of)(number), Atom),
             Operation::Constant(number) => {
@@ -103,17 +143,30 @@ impl<'a> Body<'a> {
             Operation::Negate(a) => (format!("-{}", self.bound(a, Atom)), Product),
             Operation::Root(a) => (format!("sqrtf({})", self.value(a)), Atom),
             Operation::Exponential(a) => (format!("expf({})", self.value(a)), Atom),
+            Operation::Tail(a) => (self.value(a), Atom),
+            Operation::Hazard(tail) => {
+                self.value(tail);
+                (hazard(tail), Atom)
+            }
             Operation::Less(a, b) => (format!("{} < {}", self.bound(a, Sum), self.bound(b, Sum)), Less),
             Operation::NotNegative(a) => (format!("{} >= 0.0f", self.bound(a, Sum)), Less),
             Operation::Finite(a) => (format!("isfinite({})", self.value(a)), Atom),
             Operation::Both(a, b) => (format!("{} && {}", self.bound(a, Truth), self.bound(b, Less)), Truth),
+            // Compilers want brackets around what is both in either.
+            Operation::Either(a, b) => (format!("{} || {}", self.bound(a, Less), self.bound(b, Less)), Either),
+            Operation::Not(a) => (format!("!{}", self.bound(a, Atom)), Product),
             Operation::Pick(mask, yes, no) => {
-                let [mask, yes, no] = [self.bound(mask, Truth), self.bound(yes, Truth), self.bound(no, Truth)];
+                let [mask, yes, no] = [self.bound(mask, Either), self.bound(yes, Either), self.bound(no, Either)];
                 (format!("{mask} ? {yes} : {no}"), Choice)
             }
         };
         (text, binds)
     }
+}
+
+/// What the hazard of a tail is written to.
+fn hazard(tail: Place) -> String {
+    format!("hazard{tail}")
 }
 
 fn is_truth(operation: Operation) -> bool {
@@ -123,6 +176,8 @@ fn is_truth(operation: Operation) -> bool {
             | Operation::NotNegative(_)
             | Operation::Finite(_)
             | Operation::Both(..)
+            | Operation::Either(..)
+            | Operation::Not(_)
             | Operation::Known(_)
     )
 }

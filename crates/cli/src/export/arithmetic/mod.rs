@@ -9,20 +9,42 @@ use ohmstrain_model::Phase;
 
 use body::Body;
 
-/// Inputs between the state and the step.
-const MORE: usize = 2;
-
 /// A function to be printed.
 struct Function {
     name: &'static str,
     comment: &'static str,
     piece: Piece,
     /// Parameters after the state, and what the results after the state's are written to.
-    inputs: &'static [&'static str],
+    inputs: &'static [Input],
     outputs: &'static [&'static str],
-    /// Whether the state comes out, and whether the last result is returned as a truth.
-    changes_state: bool,
-    is_truth: bool,
+    /// Whether a state comes in.
+    has_state: bool,
+    /// What the last result is returned as.
+    returns: Returns,
+}
+
+/// A parameter after the state.
+enum Input {
+    Number(&'static str),
+    /// Another state.
+    State,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Returns {
+    Nothing,
+    Truth,
+    Number,
+}
+
+impl Returns {
+    const fn kind(self) -> &'static str {
+        match self {
+            Self::Nothing => "void",
+            Self::Truth => "int",
+            Self::Number => "float",
+        }
+    }
 }
 
 const MOVES: Function = Function {
@@ -31,16 +53,19 @@ const MOVES: Function = Function {
     piece: Piece::PredictOpen,
     inputs: &[],
     outputs: &[],
-    changes_state: true,
-    is_truth: false,
+    has_state: true,
+    returns: Returns::Nothing,
 };
 
 const TAKES: Function = Function {
-    inputs: &["reading", "extra_variance"],
-    outputs: &["*innovation", "*variance", "*nis"],
-    is_truth: true,
+    inputs: &[Input::Number("reading"), Input::Number("extra_variance")],
+    outputs: &["innovation", "variance", "nis"],
+    returns: Returns::Truth,
     ..MOVES
 };
+
+/// What is asked of rates on a side of zero.
+const SIDE: Function = Function { inputs: &[Input::Number("side")], ..MOVES };
 
 /// A prediction and an update whose direction is left to the rate's distribution.
 const OPEN: [Function; 3] = [
@@ -58,13 +83,12 @@ const SOUND: Function = Function {
     name: "is_sound",
     comment: "Whether nothing is infinite or no number, and no variance negative.",
     piece: Piece::Sound,
-    changes_state: false,
-    is_truth: true,
+    returns: Returns::Truth,
     ..MOVES
 };
 
 /// What a hypothesis of a phase needs.
-const PHASES: [Function; 7] = [
+const PHASES: [Function; 13] = [
     Function {
         name: "predict_extend",
         comment: "One interval on, stretching.",
@@ -97,63 +121,100 @@ const PHASES: [Function; 7] = [
         ..TAKES
     },
     SOUND,
+    Function {
+        name: "renew_rate",
+        comment: "Draws the rate anew, independent of everything else.",
+        piece: Piece::Renew,
+        inputs: &[Input::Number("rate"), Input::Number("rate_variance")],
+        ..MOVES
+    },
+    Function {
+        name: "tail_above",
+        comment: "What a standard normal has above a border; the density at the border over it is its hazard.",
+        piece: Piece::Tail,
+        inputs: &[Input::Number("border")],
+        outputs: &["hazard"],
+        has_state: false,
+        returns: Returns::Number,
+    },
+    Function {
+        name: "of_limits",
+        comment: "Probability of the limits over what per_inside is one over, and one over the probability itself.",
+        piece: Piece::OfLimits,
+        inputs: &[Input::Number("per_inside"), Input::Number("lower"), Input::Number("upper")],
+        outputs: &["more_inside", "per_inside_now"],
+        ..MOVES
+    },
+    Function {
+        name: "is_like",
+        comment: "Whether another state says the same of strain and rate.",
+        piece: Piece::Alike,
+        inputs: &[Input::State],
+        returns: Returns::Truth,
+        ..MOVES
+    },
+    Function {
+        name: "distance_of",
+        comment: "Squared distance of strains and rates, each in units of the larger variance.",
+        piece: Piece::Distance,
+        inputs: &[Input::State],
+        returns: Returns::Number,
+        ..MOVES
+    },
+    Function {
+        name: "merge_states",
+        comment: "Takes another state in, with the mean and covariance of the pair.",
+        piece: Piece::Merge,
+        inputs: &[Input::State, Input::Number("mine"), Input::Number("theirs")],
+        ..MOVES
+    },
 ];
 
 /// What splitting by the rate's sign needs besides.
-const SPLITS: [Function; 8] = [
+const SPLITS: [Function; 7] = [
     Function { name: "predict_open", comment: "One interval on; the direction is as uncertain as the rate.", ..MOVES },
     Function {
         name: "predict_extend_turning",
         comment: "One interval on, stretching in the end, where the rate may have turned around on the way.",
         piece: Piece::PredictTurning(Phase::Extend),
-        inputs: &["excess", "turning_variance"],
+        inputs: &[Input::Number("excess"), Input::Number("turning_variance")],
         ..MOVES
     },
     Function {
         name: "predict_retract_turning",
         comment: "The same, releasing in the end.",
         piece: Piece::PredictTurning(Phase::Retract),
-        inputs: &["excess", "turning_variance"],
+        inputs: &[Input::Number("excess"), Input::Number("turning_variance")],
         ..MOVES
     },
     Function {
-        name: "regress",
-        comment: "Moves the rate by so many of its variances, everything else along its regression.",
-        piece: Piece::Regress,
-        inputs: &["moves", "narrows"],
-        ..MOVES
+        name: "is_hopeless",
+        comment: "Whether next to nothing of a prediction is on its side of zero, 1 or -1.",
+        piece: Piece::Hopeless,
+        returns: Returns::Truth,
+        ..SIDE
     },
     Function {
-        name: "rate_ahead_extend",
-        comment: "The rate that stretching leads to.",
-        piece: Piece::RateAhead(Phase::Extend),
-        outputs: &["*mean", "*variance"],
-        changes_state: false,
-        ..MOVES
+        name: "turning_of",
+        comment: "Where the rate may turn around on the way: path beyond the net move's, and its variance.",
+        piece: Piece::Turns,
+        outputs: &["excess", "turning_variance"],
+        ..SIDE
     },
     Function {
-        name: "rate_ahead_retract",
-        comment: "The rate that releasing leads to.",
-        piece: Piece::RateAhead(Phase::Retract),
-        outputs: &["*mean", "*variance"],
-        changes_state: false,
-        ..MOVES
+        name: "is_uncertain_of_side",
+        comment: "Whether a side of zero has more than nothing, and less than all, of the rate; otherwise what it has.",
+        piece: Piece::CertainOfSide,
+        outputs: &["certain"],
+        returns: Returns::Truth,
+        ..SIDE
     },
     Function {
-        name: "rate_change_extend",
-        comment: "How a rate above zero changes in one interval: away from zero, and the variance of that.",
-        piece: Piece::RateChange(Phase::Extend),
-        outputs: &["*expected", "*spread"],
-        changes_state: false,
-        ..MOVES
-    },
-    Function {
-        name: "rate_change_retract",
-        comment: "The same of a rate below zero.",
-        piece: Piece::RateChange(Phase::Retract),
-        outputs: &["*expected", "*spread"],
-        changes_state: false,
-        ..MOVES
+        name: "cut_off",
+        comment: "Restricts the rate to a side of zero; what that leaves of the hypothesis.",
+        piece: Piece::CutOff,
+        returns: Returns::Number,
+        ..SIDE
     },
 ];
 
@@ -174,38 +235,69 @@ fn printed(functions: &[&[Function]], state: (Carried, &[String]), record: impl 
 
 impl Function {
     fn text(&self, (carried, steps): (Carried, &[String]), recorded: &Recorded) -> String {
-        let Carried { means, covariances } = carried;
-        let more = means + covariances;
-        let constant = if self.changes_state { "" } else { "const " };
-        let mut parameters = format!("{constant}float x[STATES], {constant}float p[ENTRIES]");
-        self.inputs.iter().for_each(|name| parameters.push_str(&format!(", float {name}")));
-        self.outputs.iter().for_each(|name| parameters.push_str(&format!(", float {name}")));
+        let (state, changes) = (carried.means + carried.covariances, self.piece.changes_state());
+        let inputs = self.names_of_inputs(carried);
+        let of_step = state + inputs.len();
         let name_of = |input: usize| match input {
-            input if input < means => format!("x[{input}]"),
-            input if input < more => format!("p[{}]", input - means),
-            input if input < more + MORE => self.inputs.get(input - more).copied().unwrap_or("0.0f").to_owned(),
-            input => format!("s[{}]", steps.get(input - more - MORE).map_or("0", String::as_str)),
+            input if input < state => entry(["x", "p"], carried, input),
+            input if input < of_step => inputs[input - state].clone(),
+            input => format!("s[{}]", steps.get(input - of_step).map_or("0", String::as_str)),
         };
-        let state = (0..if self.changes_state { means + covariances } else { 0 }).map(name_of);
-        let targets: Vec<String> = state.chain(self.outputs.iter().map(|name| (*name).to_owned())).collect();
+        let own = (0..if changes { state } else { 0 }).map(name_of);
+        let targets: Vec<String> = own.chain(self.outputs.iter().map(|name| format!("*{name}"))).collect();
         let mut body = Body::new(recorded, &name_of);
         let is_of_step = |(place, operation): (usize, &Operation)| {
-            matches!(operation, Operation::Input(input) if *input >= more + MORE) && body.uses[place] > 0
+            matches!(operation, Operation::Input(input) if *input >= of_step) && body.uses[place] > 0
         };
-        if recorded.operations.iter().enumerate().any(is_of_step) {
-            parameters.push_str(", const float s[STEP]");
-        }
+        let parameters = self.parameters(recorded.operations.iter().enumerate().any(is_of_step));
         let mut results = String::new();
         for (k, (target, place)) in targets.iter().zip(&recorded.results).enumerate() {
             // What stays as it is need not be written.
-            if !(self.changes_state && recorded.operations[*place] == Operation::Input(k)) {
+            if !(changes && recorded.operations[*place] == Operation::Input(k)) {
                 let _ = writeln!(results, "    {target} = {};", body.value(*place));
             }
         }
-        if let Some(place) = recorded.results.last().filter(|_| self.is_truth) {
+        if let Some(place) = recorded.results.last().filter(|_| self.returns != Returns::Nothing) {
             let _ = writeln!(results, "    return {};", body.value(*place));
         }
-        let kind = if self.is_truth { "int" } else { "void" };
+        let kind = self.returns.kind();
         format!("/* {} */\nstatic {kind} {}({parameters})\n{{\n{}{results}}}\n", self.comment, self.name, body.lines)
+    }
+
+    fn parameters(&self, takes_step: bool) -> String {
+        let constant = if self.piece.changes_state() { "" } else { "const " };
+        let mut all = Vec::new();
+        if self.has_state {
+            all.extend([format!("{constant}float x[STATES]"), format!("{constant}float p[ENTRIES]")]);
+        }
+        for input in self.inputs {
+            match input {
+                Input::Number(name) => all.push(format!("float {name}")),
+                Input::State => {
+                    all.extend(["const float y[STATES]".to_owned(), "const float q[ENTRIES]".to_owned()]);
+                }
+            }
+        }
+        all.extend(self.outputs.iter().map(|name| format!("float *{name}")));
+        all.extend(takes_step.then(|| "const float s[STEP]".to_owned()));
+        all.join(", ")
+    }
+
+    /// What the inputs between state and step are called.
+    fn names_of_inputs(&self, carried: Carried) -> Vec<String> {
+        let state = carried.means + carried.covariances;
+        let names = |input: &Input| match input {
+            Input::Number(name) => vec![(*name).to_owned()],
+            Input::State => (0..state).map(|number| entry(["y", "q"], carried, number)).collect(),
+        };
+        self.inputs.iter().flat_map(names).collect()
+    }
+}
+
+/// A number of a state, of means and covariances that are called so.
+fn entry([means, covariances]: [&str; 2], carried: Carried, number: usize) -> String {
+    match number.checked_sub(carried.means) {
+        None => format!("{means}[{number}]"),
+        Some(number) => format!("{covariances}[{number}]"),
     }
 }

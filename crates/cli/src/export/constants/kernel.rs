@@ -3,7 +3,6 @@
 use ohmstrain_calib::{EstimatorKind, HISTORIES, HYPOTHESES};
 use ohmstrain_ekf::record::{MixtureNumbers, shared};
 use ohmstrain_ekf::{Compact, Gaussian, Hypotheses, SignSplit, SparseEkf};
-use ohmstrain_model::TURNING;
 use serde::Serialize;
 
 use crate::export::fixed_rate::FixedRate;
@@ -29,47 +28,18 @@ pub struct StepConstants {
 /// What is the same in all filters of hypotheses.
 #[derive(Debug, Serialize)]
 pub struct SharedConstants {
-    alike: Literal,
     least_weight: Literal,
     not_lighter: Literal,
-    least_inside: Literal,
     least_mass: Literal,
-}
-
-/// How often a rate turns around within a step.
-#[derive(Debug, Serialize)]
-pub struct TurningConstants {
-    clear: Literal,
-    normal_density: Literal,
-    reach: Literal,
-    even_excess: Literal,
-    brownian_excess: Literal,
-    brownian_variance: Literal,
 }
 
 impl SharedConstants {
     /// The same for every sensor.
     pub fn new() -> Self {
         Self {
-            alike: Literal(shared::ALIKE_BELOW),
             least_weight: Literal(shared::LEAST_WEIGHT_KEPT),
             not_lighter: Literal(shared::NOT_LIGHTER),
-            least_inside: Literal(shared::LEAST_INSIDE_LIMITS),
             least_mass: Literal(shared::LEAST_MASS_LEFT),
-        }
-    }
-}
-
-impl TurningConstants {
-    /// The same for every sensor.
-    pub fn new() -> Self {
-        Self {
-            clear: Literal(shared::TURNING_CLEAR_SQUARE),
-            normal_density: Literal(TURNING.normal_density as f32),
-            reach: Literal(TURNING.reach as f32),
-            even_excess: Literal(TURNING.even_excess as f32),
-            brownian_excess: Literal(TURNING.brownian.0 as f32),
-            brownian_variance: Literal(TURNING.brownian.1 as f32),
         }
     }
 }
@@ -116,7 +86,6 @@ impl Recorded {
         let none = MixtureNumbers {
             fresh: [Gaussian { mean: 0.0, variance: 0.0 }; 3],
             tempering: 1.0,
-            clear: 0.0,
             forgets_direction_s: f32::INFINITY,
         };
         let record = |piece| kernel.record(piece);

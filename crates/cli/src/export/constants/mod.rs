@@ -6,7 +6,6 @@ mod readings;
 use ohmstrain_calib::{EstimatorKind, PortableFilter, Quantity, ReadingUnit, SensorParams, with_sizes};
 use ohmstrain_ekf::Belief;
 use ohmstrain_ekf::live::{BESIDE_AFTER, BESIDE_SHARE, KNOWN_BEYOND, STARTLING_NIS};
-use ohmstrain_ekf::record::shared;
 use serde::Serialize;
 
 use super::correction::CorrectionConstants;
@@ -18,7 +17,7 @@ use super::plan::{ChipFilter, Plan};
 use super::twin::Parts;
 use super::vectors::Vectors;
 use super::{ExportError, too_many_branches};
-use kernel::{Recorded, SharedConstants, StepConstants, TurningConstants};
+use kernel::{Recorded, SharedConstants, StepConstants};
 use readings::{DoubtConstants, FollowConstants, SieveConstants};
 
 /// A sensor as the templates have it.
@@ -69,10 +68,7 @@ pub struct Exported {
     tempering: Option<Literal>,
     /// `None` where the direction never is left open.
     forgets_s: Option<Literal>,
-    clear_tail: Literal,
-    hopeless: Literal,
     limits: SharedConstants,
-    turning: TurningConstants,
     correction: Option<CorrectionConstants>,
     /// The kernel as functions in C.
     arithmetic: String,
@@ -177,10 +173,7 @@ impl Exported {
             fresh_variance: numbers.fresh.iter().map(|rate| Literal(rate.variance)).collect(),
             tempering: (numbers.tempering != 1.0).then_some(Literal(-0.5 * numbers.tempering)),
             forgets_s: finite(numbers.forgets_direction_s),
-            clear_tail: Literal(numbers.clear),
-            hopeless: Literal(shared::HOPELESS_SQUARE),
             limits: SharedConstants::new(),
-            turning: TurningConstants::new(),
             correction: filter
                 .correction
                 .as_ref()

@@ -1,170 +1,23 @@
-/* ---- The normal distribution ------------------------------------------------------------------------------------- */
-
-/* Rational approximations of W. J. Cody, Math. Comp. 23 (1969) 631. */
-static float polynomial(const float *coefficient, int count, float x)
-{
-    float sum = 0.0f;
-    int i;
-
-    for (i = 0; i < count; i++) {
-        sum = sum * x + coefficient[i];
-    }
-    return sum;
-}
-
-/* Argument below whose square erf is taken, and the constants of the tails. */
-static const float NEAR_ZERO = 0.21972656f;
-static const float ROOT_HALF = 0.70710677f, PER_ROOT_TWO_PI = 0.3989423f, ROOT_TWO_PER_PI = 0.7978846f;
-static const float ROOT_PER_PI = 0.5641896f;
-
-/* erf(x) / x for small squares. */
-static float near_zero(float square)
-{
-    static const float above[5] = {1.857777061846031526730e-1f, 3.161123743870565597f, 1.138641541510501556e2f,
-                                   3.774852376853020208e2f, 3.209377589138469472562e3f};
-    static const float below[5] = {1.0f, 2.360129095234412094e1f, 2.440246379344441733e2f, 1.282616526077372276e3f,
-                                   2.844236833439170622e3f};
-    return polynomial(above, 5, square) / polynomial(below, 5, square);
-}
-
-/* exp(x^2) erfc(x) for x from 0.47 on. */
-static float scaled_tail(float x, float square)
-{
-    static const float above[9] = {2.15311535474403846e-8f, 5.64188496988670089e-1f, 8.88314979438837594f,
-                                   6.61191906371416295e1f, 2.98635138197400131e2f, 8.81952221241769090e2f,
-                                   1.71204761263407058e3f, 2.05107837782607147e3f, 1.23033935479799725e3f};
-    static const float below[9] = {1.0f, 1.57449261107098347e1f, 1.17693950891312499e2f, 5.37181101862009858e2f,
-                                   1.62138957456669019e3f, 3.29079923573345963e3f, 4.36261909014324716e3f,
-                                   3.43936767414372164e3f, 1.23033935480374942e3f};
-    static const float far_above[6] = {1.63153871373020978e-2f, 3.05326634961232344e-1f, 3.60344899949804439e-1f,
-                                       1.25781726111229246e-1f, 1.60837851487422766e-2f, 6.58749161529837803e-4f};
-    static const float far_below[6] = {1.0f, 2.56852019228982242f, 1.87295284992346725f, 5.27905102951428412e-1f,
-                                       6.05183413124413191e-2f, 2.33520497626869185e-3f};
-    float w, less;
-
-    if (!(x > 4.0f)) {
-        return polynomial(above, 9, x) / polynomial(below, 9, x);
-    }
-    w = 1.0f / square;
-    less = w * polynomial(far_above, 6, w) / polynomial(far_below, 6, w);
-    return (ROOT_PER_PI - less) / x;
-}
-
-/* What is above a border: its probability, and the density at the border over it. */
-static float tail_above(float border, float *hazard)
-{
-    const float x = border * ROOT_HALF, square = x * x, falls = expf(-square);
-    const float density = falls * PER_ROOT_TWO_PI;
-    float mass, scaled, beyond;
-
-    if (square < NEAR_ZERO) {
-        mass = 0.5f - 0.5f * x * near_zero(square);
-        *hazard = density / mass;
-        return mass;
-    }
-    scaled = scaled_tail(x < 0.0f ? -x : x, square);
-    beyond = 0.5f * falls * scaled;
-    if (x < 0.0f) {
-        mass = 1.0f - beyond;
-        *hazard = density / mass;
-        return mass;
-    }
-    *hazard = ROOT_TWO_PER_PI / scaled;
-    return beyond;
-}
-
-static float upper_tail(float x)
-{
-    float hazard;
-
-    return tail_above(x, &hazard);
-}
-
 /* ---- Hypotheses -------------------------------------------------------------------------------------------------- */
 
 {% if splits %}
-/* Where the rate may turn around on the way: path beyond the net move's, and its variance. */
-typedef struct turning {
-    float excess;
-    float variance;
-} turning;
-
-/* Of a rate, positive away from zero: how often it turns around is told by its density at zero. */
-static turning turning_of(float rate, float rate_variance, float expected, float spread, float noise)
+/* The side of zero on which a moving phase has its rates. */
+static float side_of(int phase)
 {
-    const turning none = {0.0f, 0.0f};
-    float per_sd, u, square, cut, gaussian, density, even, total, change_sd, thinner, evenly;
-    turning out;
-
-    if (!(rate_variance > 0.0f) || (rate > 0.0f && rate * rate > << turning.clear >>f * rate_variance)) {
-        return none;
-    }
-    per_sd = 1.0f / sqrtf(rate_variance);
-    u = rate * per_sd;
-    square = u > 1.0f ? u * u : 1.0f;
-    cut = expf(1.0f - square);
-    gaussian = << turning.normal_density >>f * expf(-0.5f * square);
-    density = (cut > gaussian ? cut : gaussian) * per_sd;
-    even = expected < 0.0f ? expected * expected : 0.0f;
-    total = noise + even + spread;
-    change_sd = sqrtf(total);
-    thinner = 1.0f + << turning.reach >>f * change_sd * per_sd;
-    evenly = << turning.even_excess >>f * (even + 0.5f * spread);
-    out.excess = density * (evenly + << turning.brownian_excess >>f * noise);
-    out.variance = << turning.brownian_variance >>f * density * total * change_sd / thinner;
-    return out;
+    return phase == RETRACT ? -1.0f : 1.0f;
 }
 
 /* Restricts the rate to the sign of a moving phase; what that leaves of the hypothesis. */
 static float cut_rate(hypothesis *h, int phase)
 {
-    const float variance = h->covariance[AT(1, 1)], side = phase == RETRACT ? -1.0f : 1.0f;
-    const float toward = side * h->mean[1];
-    float per_sd, border, mass, shift, narrowed;
+    float certain;
 
-    if (variance <= 0.0f) {
-        return toward < 0.0f ? 0.0f : 1.0f;
-    }
-    if (toward > 0.0f && toward * toward > CLEAR_TAIL * variance) {
-        return 1.0f;
-    }
-    per_sd = 1.0f / sqrtf(variance);
-    border = -toward * per_sd;
-    mass = tail_above(border, &shift);
-    narrowed = border * shift - shift * shift;
-    narrowed = narrowed > 0.0f ? 0.0f : narrowed < -1.0f ? -1.0f : narrowed;
-    regress(h->mean, h->covariance, side * shift * per_sd, narrowed * per_sd * per_sd);
-    return mass;
-}
-
-/* Whether next to nothing of a prediction has the sign of a moving phase. */
-static int is_hopeless(const hypothesis *h, int phase, const float s[STEP])
-{
-    float mean, variance, toward;
-
-    if (phase == EXTEND) {
-        rate_ahead_extend(h->mean, h->covariance, &mean, &variance, s);
-    } else {
-        rate_ahead_retract(h->mean, h->covariance, &mean, &variance, s);
-    }
-    toward = phase == RETRACT ? -mean : mean;
-    return toward < 0.0f && toward * toward > << hopeless >>f * variance;
+    return is_uncertain_of_side(h->mean, h->covariance, side_of(phase), &certain)
+               ? cut_off(h->mean, h->covariance, side_of(phase))
+               : certain;
 }
 
 {% endif %}
-/* Draws the rate anew, independent of everything else. */
-static void renew_rate(hypothesis *h, int phase)
-{
-    int i;
-
-    h->mean[1] = FRESH_MEAN[phase];
-    h->covariance[AT(1, 0)] = 0.0f;
-    h->covariance[AT(1, 1)] = FRESH_VARIANCE[phase];
-    for (i = 2; i < STATES; i++) {
-        h->covariance[AT(i, 1)] = 0.0f;
-    }
-}
-
 /* Takes a reading; returns whether all is sound. */
 static int take(hypothesis *h, float rho, float extra_variance, float *innovation, float *variance, float *nis)
 {
@@ -180,25 +33,6 @@ static int take(hypothesis *h, float rho, float extra_variance, float *innovatio
     }
 }
 
-/* Probability of the limits where a tail counts; what has left them altogether is no less likely than a least one. */
-static float inside_limits(float strain, float variance)
-{
-    const float above_lower = strain - OHMSTRAIN_LOWER, below_upper = OHMSTRAIN_UPPER - strain;
-    const float reach = CLEAR_TAIL * variance;
-    float per_sd, near, far, beyond_far, inside;
-
-    if (variance <= 0.0f || (above_lower > 0.0f && above_lower * above_lower > reach && below_upper > 0.0f &&
-                             below_upper * below_upper > reach)) {
-        return 1.0f;
-    }
-    per_sd = 1.0f / sqrtf(variance);
-    near = above_lower < below_upper ? above_lower : below_upper;
-    far = above_lower < below_upper ? below_upper : above_lower;
-    beyond_far = far > 0.0f && far * far > reach ? 0.0f : upper_tail(far * per_sd);
-    inside = near > 0.0f ? 1.0f - (upper_tail(near * per_sd) + beyond_far) : upper_tail(-near * per_sd) - beyond_far;
-    return inside > LEAST_INSIDE ? inside : LEAST_INSIDE;
-}
-
 /* ---- Children of a step: kept, merged, dropped ------------------------------------------------------------------- */
 
 /* Weights are in units of the exponential of the largest exponent so far. */
@@ -210,56 +44,18 @@ typedef struct children {
     float weight, around, distance, square, variance;
 } children;
 
-/* Squared distance of two states, in units of the larger variance. */
-static float apart(const hypothesis *a, const hypothesis *b, int i)
-{
-    const float difference = a->mean[i] - b->mean[i];
-    const float mine = a->covariance[AT(i, i)], theirs = b->covariance[AT(i, i)];
-
-    return difference == 0.0f ? 0.0f : difference * difference / (theirs > mine ? theirs : mine);
-}
-
-static float distance_of(const hypothesis *a, const hypothesis *b)
-{
-    return apart(a, b, 0) + apart(a, b, 1);
-}
-
-static int is_like(const hypothesis *a, const hypothesis *b)
-{
-    const float difference = a->mean[0] - b->mean[0];
-    float strain;
-
-    if (a->phase != b->phase ||
-        difference * difference > ALIKE * (a->covariance[AT(0, 0)] + b->covariance[AT(0, 0)])) {
-        return 0;
-    }
-    strain = apart(a, b, 0);
-    return strain < ALIKE && strain + apart(a, b, 1) < ALIKE;
-}
-
-/* Takes another hypothesis in, with the mean and covariance of the pair. */
+/* Takes another hypothesis in. */
 static void merge(hypothesis *into, const hypothesis *other)
 {
     const float total = into->weight + other->weight;
-    float mine, theirs, both, difference[STATES];
-    int i, j;
+    float mine, theirs;
 
     if (!(total > 0.0f)) {
         return;
     }
     mine = into->weight / total;
     theirs = other->weight / total;
-    both = mine * theirs;
-    for (i = 0; i < STATES; i++) {
-        difference[i] = other->mean[i] - into->mean[i];
-        into->mean[i] += difference[i] * theirs;
-    }
-    for (i = 0; i < STATES; i++) {
-        for (j = 0; j <= i; j++) {
-            into->covariance[AT(i, j)] = mine * into->covariance[AT(i, j)] + theirs * other->covariance[AT(i, j)] +
-                                         both * difference[i] * difference[j];
-        }
-    }
+    merge_states(into->mean, into->covariance, other->mean, other->covariance, mine, theirs);
     into->weight = total;
     into->per_inside = mine * into->per_inside + theirs * other->per_inside;
 }
@@ -278,7 +74,8 @@ static void merge_into_nearest(ohmstrain_mixture *kept, const hypothesis *child,
     }
     for (i = 0; i < kept->count; i++) {
         if (i != but && kept->hypothesis[i].phase == child->phase) {
-            const float distance = distance_of(&kept->hypothesis[i], child);
+            const hypothesis *h = &kept->hypothesis[i];
+            const float distance = distance_of(h->mean, h->covariance, child->mean, child->covariance);
             if (nearest < 0 || distance < least) {
                 nearest = i;
                 least = distance;
@@ -310,8 +107,9 @@ static void add(children *all, hypothesis *child, float factor, float exponent, 
     all->density += likelihood;
     child->weight = likelihood * more_inside;
     for (i = 0; i < kept->count; i++) {
-        if (is_like(&kept->hypothesis[i], child)) {
-            merge(&kept->hypothesis[i], child);
+        hypothesis *h = &kept->hypothesis[i];
+        if (h->phase == child->phase && is_like(h->mean, h->covariance, child->mean, child->covariance)) {
+            merge(h, child);
             return;
         }
     }
@@ -365,7 +163,7 @@ static int normalise(ohmstrain_mixture *kept)
 /* Gives a predicted child the reading, if there is one, and adds it. Returns whether all is sound. */
 static int weigh(children *all, hypothesis *child, float prior, const float *rho, float extra_variance)
 {
-    float factor = prior, exponent = 0.0f, more_inside, inside;
+    float factor = prior, exponent = 0.0f, more_inside;
 
     if (rho) {
         float innovation, variance, nis, distance;
@@ -389,9 +187,8 @@ static int weigh(children *all, hypothesis *child, float prior, const float *rho
     } else if (!is_sound(child->mean, child->covariance)) {
         return 0;
     }
-    inside = inside_limits(child->mean[0], child->covariance[AT(0, 0)]);
-    more_inside = inside == 1.0f ? child->per_inside : inside * child->per_inside;
-    child->per_inside = inside == 1.0f ? inside : 1.0f / inside;
+    of_limits(child->mean, child->covariance, child->per_inside, OHMSTRAIN_LOWER, OHMSTRAIN_UPPER, &more_inside,
+              &child->per_inside);
     add(all, child, factor, exponent, more_inside);
     return 1;
 }
@@ -424,6 +221,12 @@ static float follows(int from, int to, int open, const float chain[PHASES * PHAS
 {% endif %}
 }
 
+/* Where the rate may turn around on the way: path beyond the net move's, and its variance. */
+typedef struct turning {
+    float excess;
+    float variance;
+} turning;
+
 /* A child of `parent` in a phase. Returns whether all is sound. */
 static int add_child(children *all, const hypothesis *parent, int phase, float probability, const turning *turns,
                      const float s[STEP], const float *rho, float extra_variance)
@@ -435,16 +238,16 @@ static int add_child(children *all, const hypothesis *parent, int phase, float p
 
     child.phase = (unsigned char)phase;
     if (rests) {
-        renew_rate(&child, phase);
+        renew_rate(x, p, FRESH_MEAN[phase], FRESH_VARIANCE[phase]);
     }
-    if (turns && moves && is_hopeless(&child, phase, s)) {
+    if (turns && moves && is_hopeless(x, p, side_of(phase), s)) {
         return 1;
     }
     if (!moves) {
         predict_hold(x, p, s);
     } else if (!rests && !turns) {
         predict_open(x, p, s);
-    } else if (!rests && parent->phase != HOLD && turns->variance > 0.0f) {
+    } else if (!rests && turns->variance > 0.0f) {
         if (phase == EXTEND) {
             predict_extend_turning(x, p, turns->excess, turns->variance, s);
         } else {
@@ -477,14 +280,9 @@ static int add_children(children *all, const ohmstrain_mixture *before, const hy
 
     if (!open) {
         const int from = before->open ? toward(parent) : parent->phase;
-        const float side = from == RETRACT ? -1.0f : 1.0f;
-        float expected, spread;
-        if (from == RETRACT) {
-            rate_change_retract(parent->mean, parent->covariance, &expected, &spread, s);
-        } else {
-            rate_change_extend(parent->mean, parent->covariance, &expected, &spread, s);
+        if (from != HOLD) {
+            turning_of(parent->mean, parent->covariance, side_of(from), &turns.excess, &turns.variance, s);
         }
-        turns = turning_of(side * parent->mean[1], parent->covariance[AT(1, 1)], expected, spread, s[NOISE_2]);
     }
     for (phase = 0; phase < PHASES; phase++) {
         const float probability = follows(parent->phase, phase, open, s + CHAIN);
@@ -510,7 +308,7 @@ static int add_children(children *all, const hypothesis *parent, const float s[S
         }
         child.phase = (unsigned char)phase;
         if (phase != HOLD && parent->phase != phase) {
-            renew_rate(&child, phase);
+            renew_rate(child.mean, child.covariance, FRESH_MEAN[phase], FRESH_VARIANCE[phase]);
         }
         if (phase == HOLD) {
             predict_hold(child.mean, child.covariance, s);
@@ -660,8 +458,9 @@ static void summarise(const ohmstrain_state *state, summary *out)
 {% if splits %}
         if (all->open && h->phase != HOLD) {
             const float variance = h->covariance[AT(1, 1)];
+            float hazard;
             const float stretches = variance <= 0.0f ? (h->mean[1] > 0.0f ? 1.0f : 0.0f)
-                                                     : upper_tail((0.0f - h->mean[1]) / sqrtf(variance));
+                                                     : tail_above((0.0f - h->mean[1]) / sqrtf(variance), &hazard);
             out->phase[EXTEND] += h->weight * stretches;
             out->phase[RETRACT] += h->weight * (1.0f - stretches);
             continue;

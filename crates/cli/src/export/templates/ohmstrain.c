@@ -139,11 +139,8 @@ typedef ohmstrain_hypothesis hypothesis;
 /* Rate of a movement that begins. */
 static const float FRESH_MEAN[PHASES] = {<< fresh_mean|join("f, ") >>f};
 static const float FRESH_VARIANCE[PHASES] = {<< fresh_variance|join("f, ") >>f};
-/* Squared deviations beyond which a tail does not count. */
-static const float CLEAR_TAIL = << clear_tail >>f;
-/* When two hypotheses are one, when one is negligible, when not lighter than another, and how unlikely one can become. */
-static const float ALIKE = << limits.alike >>f, LEAST_WEIGHT = << limits.least_weight >>f;
-static const float NOT_LIGHTER = << limits.not_lighter >>f, LEAST_INSIDE = << limits.least_inside >>f;
+/* When a hypothesis is negligible, and when not lighter than another. */
+static const float LEAST_WEIGHT = << limits.least_weight >>f, NOT_LIGHTER = << limits.not_lighter >>f;
 {% if splits %}
 static const float LEAST_MASS = << limits.least_mass >>f;
 {% endif %}

@@ -1,0 +1,147 @@
+//! Where results are needed: everywhere, or on one way of a choice only.
+
+use ohmstrain_ekf::record::{Operation, Place};
+
+/// What a way must cost to be worth a branch; a sum or a product costs one.
+const WORTH: usize = 10;
+
+/// The ways of choices, and on which of them each result is needed.
+pub struct Scopes {
+    /// Of each operation that is needed; the first scope is the whole function.
+    of: Vec<usize>,
+    /// The scope around each.
+    around: Vec<usize>,
+    /// The scopes of both ways of a choice that is worth a branch.
+    arms: Vec<Option<[usize; 2]>>,
+}
+
+impl Scopes {
+    /// Of what is used so often, and gives these results.
+    pub fn new(operations: &[Operation], uses: &[usize], results: &[Place]) -> Self {
+        let all = Self::of_all(operations, uses, results, |_| true);
+        let costs = all.costs(operations, uses);
+        Self::of_all(operations, uses, results, |place| {
+            all.arms[place].is_some_and(|arms| arms.iter().any(|arm| costs[*arm] >= WORTH))
+        })
+    }
+
+    /// With branches at these choices.
+    fn of_all(operations: &[Operation], uses: &[usize], results: &[Place], branches: impl Fn(Place) -> bool) -> Self {
+        let mut scopes = Self { of: vec![0; operations.len()], around: vec![0], arms: vec![None; operations.len()] };
+        let mut met = vec![false; operations.len()];
+        results.iter().for_each(|place| met[*place] = true);
+        for place in (0..operations.len()).rev().filter(|place| uses[*place] > 0) {
+            let own = scopes.of[place];
+            let mut needed = vec![own; 3];
+            if matches!(operations[place], Operation::Pick(..)) && branches(place) {
+                let arms = [scopes.inside(own), scopes.inside(own)];
+                scopes.arms[place] = Some(arms);
+                needed[1..].copy_from_slice(&arms);
+            }
+            for (operand, scope) in operations[place].operands().zip(needed) {
+                scopes.of[operand] = if met[operand] { scopes.both(scopes.of[operand], scope) } else { scope };
+                met[operand] = true;
+            }
+        }
+        scopes
+    }
+
+    /// A new scope.
+    fn inside(&mut self, around: usize) -> usize {
+        self.around.push(around);
+        self.around.len() - 1
+    }
+
+    /// The innermost scope around two; a scope comes after those around it.
+    fn both(&self, mut a: usize, mut b: usize) -> usize {
+        while a != b {
+            if a > b {
+                a = self.around[a];
+            } else {
+                b = self.around[b];
+            }
+        }
+        a
+    }
+
+    /// What is done in each scope and within it.
+    fn costs(&self, operations: &[Operation], uses: &[usize]) -> Vec<usize> {
+        let mut costs = vec![0; self.around.len()];
+        for (place, operation) in operations.iter().enumerate().filter(|(place, _)| uses[*place] > 0) {
+            costs[self.of[place]] += cost(*operation);
+        }
+        for scope in (1..costs.len()).rev() {
+            costs[self.around[scope]] += costs[scope];
+        }
+        costs
+    }
+
+    /// The scopes of both ways of a choice that is worth a branch.
+    pub fn arms(&self, place: Place) -> Option<[usize; 2]> {
+        self.arms[place]
+    }
+
+    /// What the ways of a choice take that is not theirs alone.
+    pub fn shared(
+        &self,
+        operations: &[Operation],
+        uses: &[usize],
+        choice: Place,
+        ways: [(Place, usize); 2],
+    ) -> Vec<Place> {
+        let within = |place: Place| ways.iter().any(|(_, arm)| self.both(self.of[place], *arm) == *arm);
+        let inner = (0..choice).filter(|place| uses[*place] > 0 && within(*place));
+        let taken = inner.flat_map(|place| operations[place].operands()).chain(ways.map(|(result, _)| result));
+        let mut shared: Vec<Place> = taken.filter(|place| !within(*place)).collect();
+        shared.sort_unstable();
+        shared.dedup();
+        shared
+    }
+}
+
+/// About how many sums an operation takes as long as.
+const fn cost(operation: Operation) -> usize {
+    match operation {
+        Operation::Input(_) | Operation::Constant(_) | Operation::Known(_) | Operation::Hazard(_) => 0,
+        Operation::Exponential(_) => 30,
+        Operation::Tail(_) => 80,
+        Operation::Root(_) | Operation::Divide(..) => 14,
+        _ => 1,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use ohmstrain_ekf::record::Operation;
+
+    use super::Scopes;
+
+    /// `input 0 < 0 ? exp(input 1) : sqrt(input 2 + input 1)`, and that sum once more; one result is on a way, too.
+    #[test]
+    fn what_one_way_needs_is_done_there() {
+        let operations = [
+            Operation::Input(0),
+            Operation::Constant(0.0),
+            Operation::Less(0, 1),
+            Operation::Input(1),
+            Operation::Exponential(3),
+            Operation::Input(2),
+            Operation::Add(5, 3),
+            Operation::Root(6),
+            Operation::Pick(2, 4, 7),
+            Operation::Add(8, 6),
+        ];
+        let uses = [1, 1, 1, 2, 1, 1, 2, 1, 1, 1];
+        let scopes = Scopes::new(&operations, &uses, &[9]);
+        let [yes, no] = scopes.arms(8).unwrap();
+        assert_eq!((scopes.of[4], scopes.of[7], scopes.of[6], scopes.of[3]), (yes, no, 0, 0));
+        assert_eq!(scopes.shared(&operations, &uses, 8, [(4, yes), (7, no)]), [3, 6]);
+        assert_eq!(Scopes::new(&operations, &uses, &[9, 4]).of[4], 0);
+    }
+
+    #[test]
+    fn a_choice_of_what_is_there_is_no_branch() {
+        let operations = [Operation::Input(0), Operation::Input(1), Operation::Less(0, 1), Operation::Pick(2, 0, 1)];
+        assert_eq!(Scopes::new(&operations, &[2, 2, 1, 1], &[3]).arms(3), None);
+    }
+}

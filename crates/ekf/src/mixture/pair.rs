@@ -1,0 +1,90 @@
+//! Two hypotheses: whether they say the same, and what they say together.
+
+use crate::kernel::{Lanes, Parts};
+use crate::mixture::ALIKE;
+
+/// What tells whether hypotheses are alike.
+#[derive(Clone, Copy)]
+pub(crate) struct About<V> {
+    pub strain: V,
+    pub strain_variance: V,
+    pub rate: V,
+    pub rate_variance: V,
+}
+
+impl<V: Lanes> About<V> {
+    #[inline(always)]
+    pub(crate) const fn of<const B: usize>(parts: &Parts<V, B>) -> Self {
+        let Parts { strain, strain_variance, rate, rate_variance, .. } = *parts;
+        Self { strain, strain_variance, rate, rate_variance }
+    }
+
+    /// Where two hypotheses of one phase count as one.
+    #[inline(always)]
+    pub(crate) fn is_like(&self, other: &Self) -> V::Mask {
+        let alike = self.strain.literal(ALIKE);
+        // Mostly they are not, which the strain tells without a division.
+        let apart = self.strain - other.strain;
+        let far = (alike * (self.strain_variance + other.strain_variance)).less(apart * apart);
+        if V::all(far) {
+            return V::without(far, far);
+        }
+        let strain = self.strain_apart(other);
+        let near = V::without(strain.less(alike), far);
+        if V::none(near) {
+            return near;
+        }
+        V::both(near, (strain + self.rate_apart(other)).less(alike))
+    }
+
+    /// Squared distance of strains and rates, each in units of the larger variance.
+    #[inline(always)]
+    pub(crate) fn distance(&self, other: &Self) -> V {
+        self.strain_apart(other) + self.rate_apart(other)
+    }
+
+    #[inline(always)]
+    fn strain_apart(&self, other: &Self) -> V {
+        apart(self.strain - other.strain, self.strain_variance, other.strain_variance)
+    }
+
+    #[inline(always)]
+    fn rate_apart(&self, other: &Self) -> V {
+        apart(self.rate - other.rate, self.rate_variance, other.rate_variance)
+    }
+}
+
+/// A squared difference in units of the larger variance.
+#[inline(always)]
+fn apart<V: Lanes>(difference: V, one: V, other: V) -> V {
+    let (none, square) = (difference.nothing(), difference * difference);
+    // What is known exactly is the same or is not; a difference has no size without a unit.
+    let differs = none.less(square);
+    if V::none(differs) {
+        return none;
+    }
+    V::pick(differs, square.over(V::pick(one.less(other), other, one)), none)
+}
+
+/// Takes another hypothesis in, with the mean and covariance of the pair, whose shares sum to one. Covariances are lower triangles,
+/// row by row.
+#[inline(always)]
+pub(crate) fn merge<'a, V: Lanes + 'a, const N: usize>(
+    (mean, covariance): (impl Iterator<Item = &'a mut V>, impl Iterator<Item = &'a mut V>),
+    (other_mean, other_covariance): (&[V; N], impl Iterator<Item = &'a V>),
+    [mine, theirs]: [V; 2],
+) {
+    let both = mine * theirs;
+    let mut apart = *other_mean;
+    // By iterators throughout: an index could panic.
+    for (apart, mine) in apart.iter_mut().zip(mean) {
+        *apart -= *mine;
+        *mine += *apart * theirs;
+    }
+    let mut entries = covariance.zip(other_covariance);
+    for (i, a) in apart.iter().enumerate() {
+        for (b, (p, q)) in apart.iter().take(i + 1).zip(&mut entries) {
+            *p = mine * *p + theirs * *q + both * *a * *b;
+        }
+    }
+}
