@@ -24,7 +24,7 @@ pub use calibrate::{CalibrateArgs, ReportArgs};
 pub use choice::{Auto, Branches, Estimator, Gauge};
 pub use estimate::{EstimateArgs, FilterArgs, Format, KnownStrain, RestResistance, SmoothArgs, WrittenArgs};
 pub use evaluate::{Estimators, EvaluateArgs};
-pub use export::{ExportArgs, ExportTarget};
+pub use export::ExportArgs;
 pub use files::{ImportArgs, InspectArgs};
 pub use fit_law::{FitLawArgs, SegmentChoice, TableFormat, phase_name};
 pub use fleet::{FleetArgs, FleetCommand, FleetFitArgs};

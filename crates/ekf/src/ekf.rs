@@ -1,9 +1,10 @@
 use nalgebra::SVector;
 use ohmstrain_model::{Observation, Scalar, Symmetric, Transition};
 
+use crate::clock::check_time_step;
 use crate::smooth::rts_step;
 use crate::substeps;
-use crate::{Advanced, Belief, Channel, Dynamics, Estimator, Gaussian, Innovation, Reading, StepError};
+use crate::{Advanced, Belief, Channel, Dynamics, Estimator, Gaussian, Innovation, Reading, State, StepError};
 
 /// Extended Kalman filter: one Gaussian, linearised at its mean.
 ///
@@ -195,14 +196,6 @@ pub(crate) fn pinned<T: Scalar, const N: usize, const L: usize>(
     update(belief, observation, Reading::from(known.mean))
 }
 
-/// Refuses a step that is no length of time.
-pub(crate) fn check_time_step<T: Scalar>(dt_s: T) -> Result<(), StepError> {
-    if !dt_s.is_finite() {
-        return Err(StepError::NonFiniteTimeStep);
-    }
-    if dt_s < T::zero() { Err(StepError::NegativeTimeStep) } else { Ok(()) }
-}
-
 /// One transition after another.
 fn followed_by<T: Scalar, const N: usize, const L: usize>(
     first: &Transition<T, N, L>,
@@ -274,4 +267,26 @@ pub(crate) fn joseph<T: Scalar, const N: usize, const L: usize>(
         }
     }
     out
+}
+
+impl<T: Scalar, const N: usize, const L: usize> State<T, N, L> for Belief<T, N, L> {
+    fn moments(&self) -> Self {
+        *self
+    }
+
+    fn each(&self, visit: &mut dyn FnMut(T, &Self)) {
+        visit(T::one(), self);
+    }
+
+    fn phases(&self) -> Option<[T; 3]> {
+        None
+    }
+
+    fn inflated(&self, factor: T) -> Self {
+        Self { covariance: self.covariance.scaled(factor), ..*self }
+    }
+
+    fn pinned(&self, index: usize, known: &Gaussian<T>) -> Result<Self, StepError> {
+        pinned(self, index, known).map(|(belief, _)| belief)
+    }
 }

@@ -66,6 +66,7 @@ mod clock;
 pub mod correction;
 mod ekf;
 mod error;
+mod estimate;
 mod estimator;
 mod guard;
 mod kernel;
@@ -88,14 +89,16 @@ mod unscented;
 pub use adskalman_bridge::LinearStep;
 #[cfg(feature = "simd")]
 pub use bank::{Bank, Lane, WrongLength};
-pub use belief::{Belief, Estimate, Gaussian, Real};
+pub use belief::{Belief, Gaussian};
 pub use clock::seconds_between;
 pub use ekf::{Ekf, Step, Update};
 pub use error::StepError;
+pub use estimate::Estimate;
 pub use estimator::{Advanced, Estimator, Innovation, State};
 pub use guard::{Guard, Guarded, Influence, ReadingVerdict, Streak};
 pub use kernel::{
-    AnyCurve, Compact, CompactWidth, Cubic, Curve, CurveLine, Lanes, Line, Logistic, SigmaPoints, Switch, Undirected,
+    AnyCurve, Compact, CompactWidth, Cubic, Curve, CurveLine, Lanes, Line, Logistic, Real, SigmaPoints, SparseEkf,
+    Switch, Undirected,
 };
 pub use linear::{Frozen, LinearFilter};
 pub use mixture::{Dwell, Evidence, Hypotheses, Imm, Mixture, MixtureResidual, PhaseMixture, Share, SignSplit};
@@ -103,7 +106,6 @@ pub use mixture::{Dwell, Evidence, Hypotheses, Imm, Mixture, MixtureResidual, Ph
 pub use particles::{Particle, ParticleCloud, ParticleStep, Particles};
 pub use residual::{LogLikelihood, Residual};
 pub use smooth::{PastStep, rts_step, smooth_back_through};
-pub use sparse::SparseEkf;
 pub use substeps::{GRACE as STEP_GRACE, Repeated, Substeps};
 pub use traits::{Channel, Dynamics, Reading};
 pub use unscented::{Ukf, Unscented};

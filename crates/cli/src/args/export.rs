@@ -1,9 +1,9 @@
 use std::path::PathBuf;
 
-use clap::{Args as ClapArgs, ValueEnum};
+use clap::Args as ClapArgs;
 
 use super::{Auto, Estimator, positive};
-use crate::export::{Budget, Prefix};
+use crate::export::{Budget, ExportTarget, Prefix};
 
 /// Flags of `export`.
 #[derive(Debug, ClapArgs)]
@@ -40,13 +40,4 @@ pub struct ExportArgs {
     /// Score the rows from this time on only, s
     #[arg(long, value_name = "S", requires = "score")]
     pub from: Option<f64>,
-}
-
-/// A language that sensors are exported to.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum ExportTarget {
-    /// C99 with an Arduino sketch and a self-test.
-    C,
-    /// A module of constants for a `no_std` crate.
-    Rust,
 }

@@ -3,10 +3,10 @@
 use ohmstrain::Sensor;
 use ohmstrain_calib::{Baseline, ScoredRow, Scores, SensorParams};
 
-use crate::args::{ExportArgs, ExportTarget};
+use crate::args::ExportArgs;
 use crate::commands::score_table::covered;
 use crate::error::CliError;
-use crate::export::{self, ChipFilter, Plan, ReplayedRow};
+use crate::export::{self, ChipFilter, ExportTarget, Plan, ReplayedRow};
 use crate::input::TraceFile;
 use crate::output::{self, print};
 

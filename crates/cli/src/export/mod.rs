@@ -25,7 +25,6 @@ use minijinja::syntax::SyntaxConfig;
 use minijinja::value::Serde;
 use ohmstrain_calib::{EstimatorKind, SensorParams};
 
-use crate::args::ExportTarget;
 use crate::error::CliError;
 pub use budget::{Budget, fitting};
 use constants::Exported;
@@ -34,6 +33,15 @@ use ohmstrain::MADE_BY;
 pub use plan::{ChipFilter, Plan};
 pub use prefix::Prefix;
 pub use replay::{ReplayedRow, Said, replay};
+
+/// A language that sensors are exported to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum ExportTarget {
+    /// C99 with an Arduino sketch and a self-test.
+    C,
+    /// A module of constants for a `no_std` crate.
+    Rust,
+}
 
 /// A file to write.
 pub struct SourceFile {

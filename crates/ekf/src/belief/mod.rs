@@ -1,16 +1,10 @@
-mod estimate;
-pub(crate) mod gaussian;
+mod gaussian;
 pub(crate) mod psd;
-pub(crate) mod tail;
 
-pub use estimate::Estimate;
-pub use gaussian::{Gaussian, Real};
+pub use gaussian::Gaussian;
 
 use nalgebra::SVector;
 use ohmstrain_model::{Scalar, SwitchedModel, Symmetric};
-
-use crate::ekf::pinned;
-use crate::{State, StepError};
 
 /// What is known of the state: mean and covariance of a Gaussian. `L = N (N + 1) / 2`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -45,27 +39,5 @@ impl<T: Scalar, const N: usize, const L: usize> Belief<T, N, L> {
     #[must_use]
     pub fn is_finite(&self) -> bool {
         self.mean.iter().all(|x| x.is_finite()) && self.covariance.is_finite()
-    }
-}
-
-impl<T: Scalar, const N: usize, const L: usize> State<T, N, L> for Belief<T, N, L> {
-    fn moments(&self) -> Self {
-        *self
-    }
-
-    fn each(&self, visit: &mut dyn FnMut(T, &Self)) {
-        visit(T::one(), self);
-    }
-
-    fn phases(&self) -> Option<[T; 3]> {
-        None
-    }
-
-    fn inflated(&self, factor: T) -> Self {
-        Self { covariance: self.covariance.scaled(factor), ..*self }
-    }
-
-    fn pinned(&self, index: usize, known: &Gaussian<T>) -> Result<Self, StepError> {
-        pinned(self, index, known).map(|(belief, _)| belief)
     }
 }

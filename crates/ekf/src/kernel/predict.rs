@@ -3,8 +3,7 @@
 use ohmstrain_model::{LEAST_LEFT, Phase, Scalar, Turning};
 
 use super::constants::{BranchConstants, Gain, GainsAt, StepConstants};
-use super::{Lanes, Part, Parts, RateSpread, Switch};
-use crate::SparseEkf;
+use super::{Lanes, Part, Parts, RateSpread, SparseEkf, Switch};
 
 /// What a step does to one branch. The gain grows with the sum of old and new strain: the old one's share is in `row`, the
 /// new one's is added when its covariances are known.

@@ -3,9 +3,9 @@
 use ohmstrain_model::{Phase, RateChange, Scalar, TURNING, Turning, TurningNumbers};
 
 use super::predict::{dot, sum};
-use super::{Falls, Lanes, Part, Parts};
-use crate::belief::tail::Tail;
-use crate::{Curve, Gaussian, SparseEkf, Switch};
+use super::tail::Tail;
+use super::{Curve, Falls, Lanes, Part, Parts, SparseEkf, Switch};
+use crate::Gaussian;
 
 impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> SparseEkf<T, S, B, N, G> {
     /// What the pull toward the mean strain and the mean rate of the phase on a `side` of zero, 1 or -1, add to the rate.
@@ -94,6 +94,14 @@ fn answered<V: Lanes, const B: usize>(by: [V::Number; 2], (mean, variance): (V, 
     let by = by.map(|factor| like.with(factor));
     let spread = [dot(by, [from.strain_variance, from.strain_rate]), dot(by, [from.strain_rate, from.rate_variance])];
     (sum(mean, by, [from.strain, from.rate]), sum(variance, by, spread))
+}
+
+impl<T: Scalar> Gaussian<T> {
+    /// The same in all lanes, of which there are as many as here.
+    #[inline(always)]
+    pub(crate) fn in_lanes<V: Lanes<Number = T>>(self, like: V) -> Gaussian<V> {
+        Gaussian { mean: like.with(self.mean), variance: like.with(self.variance) }
+    }
 }
 
 impl<V: Lanes, const B: usize> Parts<V, B> {

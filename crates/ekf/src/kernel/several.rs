@@ -3,8 +3,8 @@
 use nalgebra::ComplexField;
 use ohmstrain_model::Scalar;
 
+use super::tail::Tail;
 use super::{Lanes, Parts};
-use crate::belief::tail::Tail;
 
 /// The most lanes that there are.
 pub(crate) const MOST_LANES: usize = 8;

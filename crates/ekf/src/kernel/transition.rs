@@ -3,8 +3,8 @@
 use nalgebra::SMatrix;
 use ohmstrain_model::{Scalar, Transition};
 
-use super::{Course, Driven, Parts, Switch};
-use crate::{Belief, SparseEkf};
+use super::{Course, Driven, Parts, SparseEkf, Switch};
+use crate::Belief;
 
 impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G> SparseEkf<T, S, B, N, G> {
     /// F and Q of a step with an uncertain direction, and where it leads: what [`rts_step`](crate::rts_step) goes back by.

@@ -4,8 +4,8 @@ use ohmstrain_model::{Phase, Scalar, SwitchedModel};
 
 use super::curve::CurveLine;
 use super::predict::{dot, sum};
-use super::{Curve, Lanes, Part, Parts, RateSpread, Several, Switch};
-use crate::{Reading, Residual, SparseEkf, StepError};
+use super::{Curve, Lanes, Part, Parts, RateSpread, Several, SparseEkf, Switch};
+use crate::{Reading, Residual, StepError};
 
 /// A reading beside its prediction.
 #[derive(Clone, Copy)]

@@ -4,8 +4,8 @@ use super::{
     BESIDE_SHARE, DOUBT, DoubtParts, Doubts, Flags, Jumps, Learned, Protections, Repeats, RestBounds, RestFollower,
     SURPRISING_NIS, SensorEstimator, Sieve,
 };
+use crate::clock::check_time_step;
 use crate::correction::{FeatureScale, ReadingFeatures, filter_inputs};
-use crate::ekf::check_time_step;
 use crate::substeps::Repeated;
 use crate::{
     Belief, Estimator, Gaussian, Guard, Influence, Reading, ReadingVerdict, Real, State, StepError, Streak, Substeps,

@@ -3,8 +3,8 @@
 
 use ohmstrain_model::Scalar;
 
+use crate::kernel::MOST_TRIES;
 use crate::mixture::state::Share;
-use crate::sparse::MOST_TRIES;
 use crate::{Curve, Reading, SparseEkf, StepError, Switch};
 
 /// Growth of what correlations lose from one try to the next.

@@ -4,7 +4,7 @@ use core::marker::PhantomData;
 
 use ohmstrain_model::{Phase, Turning};
 
-use crate::belief::gaussian::Real;
+use crate::Real;
 use crate::kernel::{Course, Lanes, MOST_LANES, Parts, Several, Work, refusal};
 use crate::mixture::Added;
 use crate::mixture::children::Children;

@@ -1,6 +1,6 @@
 use ohmstrain_model::Phase;
 
-use crate::belief::gaussian::Real;
+use crate::Real;
 use crate::kernel::{Parts, Several};
 use crate::mixture::evidence::{Weighed, Weight};
 use crate::mixture::lineage::Recorder;

@@ -15,7 +15,7 @@ macro_rules! mixture_filter {
             /// # Errors
             /// If `dt_s` is negative or not finite; the filter stays as it was.
             pub fn retime(&mut self, dt_s: T) -> Result<(), StepError> {
-                $crate::ekf::check_time_step(dt_s)?;
+                $crate::clock::check_time_step(dt_s)?;
                 *self = self.every(dt_s);
                 Ok(())
             }

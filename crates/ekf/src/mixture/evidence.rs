@@ -1,6 +1,6 @@
 use ohmstrain_model::{ParameterError, Phase, Problem, Scalar, StrainRange};
 
-use crate::belief::gaussian::Real;
+use crate::Real;
 use crate::kernel::{Falls, Lanes, Parts, RateSpread, Several};
 use crate::mixture::LEAST_INSIDE;
 use crate::mixture::predicted::Predicted;

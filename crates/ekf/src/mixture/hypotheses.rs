@@ -8,7 +8,7 @@ use core::marker::PhantomData;
 
 use ohmstrain_model::{Phase, SwitchedModel, Turning};
 
-use crate::belief::gaussian::Real;
+use crate::Real;
 use crate::kernel::{Course, Parts, Several};
 use crate::mixture::again::{Hearing, loosen};
 use crate::mixture::brood::{Breeding, Breeds, Parents, Trail};

@@ -9,7 +9,7 @@
 
 use ohmstrain_model::{Phase, SwitchedModel};
 
-use crate::belief::gaussian::Real;
+use crate::Real;
 use crate::kernel::{Course, Parts};
 use crate::mixture::LEAST_WEIGHT;
 use crate::mixture::again::{Hearing, loosen};

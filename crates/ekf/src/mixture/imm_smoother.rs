@@ -3,7 +3,7 @@
 use nalgebra::SMatrix;
 use ohmstrain_model::{Direction, Phase, Symmetric, Transition};
 
-use crate::belief::gaussian::Real;
+use crate::Real;
 use crate::kernel::{Course, Parts};
 use crate::mixture::lineage::{Descent, Lineage, through_renewal};
 use crate::mixture::moment_match;

@@ -4,7 +4,7 @@ use nalgebra::{SMatrix, SVector};
 use ohmstrain_model::{Direction, Phase, SwitchedModel, SwitchedStep, Symmetric, Transition};
 
 use crate::Belief;
-use crate::belief::gaussian::Real;
+use crate::Real;
 use crate::kernel::{Course, Parts};
 use crate::mixture::evidence::Weighed;
 use crate::mixture::state::Share;

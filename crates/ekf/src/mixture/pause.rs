@@ -3,8 +3,8 @@
 use ohmstrain_model::{Phase, Scalar};
 
 use crate::Belief;
-use crate::belief::gaussian::{Gaussian, Real};
 use crate::substeps::GRACE;
+use crate::{Gaussian, Real};
 
 /// For how long there has been no reading.
 #[derive(Clone, Copy, Debug, PartialEq)]

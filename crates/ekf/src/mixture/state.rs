@@ -1,7 +1,7 @@
 use nalgebra::SVector;
 use ohmstrain_model::{Phase, Symmetric};
 
-use crate::belief::gaussian::Real;
+use crate::Real;
 use crate::ekf::pinned;
 use crate::mixture::pause::{Pause, PhaseSum};
 use crate::mixture::{LEAST_WEIGHT, marginal_match, moment_match};

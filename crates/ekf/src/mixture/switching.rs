@@ -1,6 +1,6 @@
 use ohmstrain_model::{Motion, ParameterError, Phase, Problem, Scalar, SwitchedModel};
 
-use crate::belief::gaussian::Gaussian;
+use crate::Gaussian;
 
 /// Longest step over the mean length of a phase.
 const LONGEST: f64 = 0.02;

@@ -2,7 +2,7 @@ use core::cell::RefCell;
 use core::ops::{Add, AddAssign, Mul, MulAssign, Neg, Sub, SubAssign};
 use std::vec::Vec;
 
-use crate::belief::tail::Tail;
+use crate::kernel::tail::Tail;
 use crate::kernel::{Falls, Lanes};
 
 /// Where an earlier operation stands in [`Recorded::operations`].

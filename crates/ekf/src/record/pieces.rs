@@ -3,7 +3,7 @@ use std::vec::Vec;
 
 use super::expression::standing_for;
 use super::{Expression, Recorded, Tape};
-use crate::belief::tail::Tail;
+use crate::kernel::tail::Tail;
 use crate::kernel::{Course, Lanes, Parts, RateSpread};
 use crate::mixture::evidence::Weighing;
 use crate::mixture::pair::{About, merge};

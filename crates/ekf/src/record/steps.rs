@@ -3,7 +3,7 @@ use std::vec::Vec;
 
 use ohmstrain_model::Scalar;
 
-use crate::belief::gaussian::Real;
+use crate::Real;
 use crate::{Curve, Hypotheses, SignSplit, SparseEkf, Switch};
 
 /// What depends on the length of a step, as a list of numbers: what a filter goes on with for steps of another length.

@@ -6,7 +6,7 @@ use ohmstrain_model::{Branch, Gauge, ModelNoise, Motion, Phase, SensorLaw, Strai
 use std::vec::Vec;
 
 use super::{Operation, Piece, Recorded};
-use crate::belief::tail::Tail;
+use crate::kernel::tail::Tail;
 use crate::kernel::{Course, Parts, RateSpread, side_of};
 use crate::mixture::evidence::Weighing;
 use crate::mixture::pair::{About, merge};

@@ -3,7 +3,8 @@
 
 use ohmstrain_model::Scalar;
 
-use crate::kernel::{Falls, InVectors, Lanes};
+use super::{Falls, InVectors, Lanes};
+use crate::Gaussian;
 
 /// `f32` or `f64`: what filters of hypotheses compute with.
 #[allow(private_bounds, reason = "sealed: what a vector holds")]
@@ -48,8 +49,19 @@ impl<V: Falls> Tail<V> {
 
 /// Probability of a standard normal above `x`.
 #[inline]
-pub(crate) fn upper_tail<T: Real>(x: T) -> T {
+fn upper_tail<T: Real>(x: T) -> T {
     Tail::above(x, true).mass
+}
+
+impl<T: Real> Gaussian<T> {
+    /// Probability of a value above `x`.
+    #[must_use]
+    pub fn probability_above(&self, x: T) -> T {
+        if self.variance <= T::zero() {
+            return if self.mean > x { T::one() } else { T::zero() };
+        }
+        upper_tail((x - self.mean) / self.variance.sqrt())
+    }
 }
 
 const PER_ROOT_TWO_PI: f64 = 0.398_942_280_401_432_7;

@@ -1,0 +1,261 @@
+//! The EKF of the sensor's own model at a fixed rate, without a multiplication by zero.
+//!
+//! Branches and baseline never touch each other in F, and a reading contains each of them with factor one. What depends on
+//! the step's length only is folded into constants beforehand. The variance of the rate after the step, which the choice of
+//! direction needs, is the one that the prediction computes anyway.
+//!
+//! # Policy
+//! As [`Ekf`](crate::Ekf), with two differences, both for microcontrollers: the belief is changed in place (an error leaves
+//! it as it was), and the covariance is updated as `P - (P Hᵀ)(P Hᵀ)ᵀ/S`, without Joseph's form. Where rounding makes a
+//! variance negative, the reading is more exact than the numbers: it is taken again with more and more noise until it leaves
+//! none. Only innovation, its variance and the NIS are returned; nothing takes a logarithm unless
+//! asked. Multiplications and additions are rounded one by one, in the order in which they are written.
+
+use core::marker::PhantomData;
+
+use ohmstrain_model::{Scalar, SensorLaw, SwitchedModel};
+
+use super::{AnyCurve, Course, Curve, Gains, Parts, RateSpread, ReadingLaw, Regions, StepConstants, Switch};
+use crate::clock::check_time_step;
+use crate::{Belief, Reading, Residual, StepError};
+
+/// The EKF of a [`SwitchedModel`] with Ornstein-Uhlenbeck motion, for steps of one length.
+///
+/// `S` is [`Compact`](crate::Compact) or, to agree with [`Ekf`](crate::Ekf) to rounding, [`Logistic`](crate::Logistic). `G`
+/// is the family of the gauge: [`Cubic`](crate::Cubic) saves the code of the others. A sensor to which stretching and releasing
+/// are alike has [`Undirected`](crate::Undirected), and with a straight gauge [`Line`](crate::Line): its filter is a
+/// [`LinearFilter`](crate::LinearFilter).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SparseEkf<T, S, const B: usize, const N: usize, G = AnyCurve<T>> {
+    pub(crate) step: StepConstants<T, B>,
+    pub(crate) gains: Regions<T, [Gains<T>; B]>,
+    pub(crate) reading: ReadingLaw<T, G>,
+    model: SwitchedModel<T, B, N>,
+    pub(crate) dt_s: T,
+    switch: PhantomData<S>,
+}
+
+impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> SparseEkf<T, S, B, N, G> {
+    /// A filter for steps of `dt_s` seconds.
+    ///
+    /// # Errors
+    /// If `dt_s` is not a positive number, or the model's gauge is of another family than `G`.
+    pub fn new(model: SwitchedModel<T, B, N>, dt_s: T) -> Result<Self, StepError> {
+        check_step_length(dt_s)?;
+        Self::of_any_length(model, dt_s)
+    }
+
+    /// A filter whose own step has no length, and is an update without a prediction; steps are those that it
+    /// [prepares](crate::Estimator::prepare).
+    ///
+    /// # Errors
+    /// If the model's law is of another family than the filter.
+    pub fn at_a_moment(model: SwitchedModel<T, B, N>) -> Result<Self, StepError> {
+        Self::of_any_length(model, T::zero())
+    }
+
+    /// A filter for steps of `dt_s` seconds, or of no length.
+    pub(crate) fn of_any_length(model: SwitchedModel<T, B, N>, dt_s: T) -> Result<Self, StepError> {
+        check_time_step(dt_s)?;
+        if !S::DIRECTED && is_directed(model.law()) {
+            return Err(StepError::Directed);
+        }
+        Ok(Self {
+            step: StepConstants::new(&model, dt_s, RateSpread::<T, S>::clear()),
+            gains: Gains::by_region(model.law()),
+            reading: ReadingLaw::new(&model).ok_or(StepError::OtherGauge)?,
+            model,
+            dt_s,
+            switch: PhantomData,
+        })
+    }
+
+    /// The model.
+    pub const fn model(&self) -> &SwitchedModel<T, B, N> {
+        &self.model
+    }
+
+    /// Length of a step, s.
+    pub const fn dt_s(&self) -> T {
+        self.dt_s
+    }
+
+    /// Goes on with steps of another length. The length it has costs a comparison; another one as much as a new filter.
+    ///
+    /// # Errors
+    /// If `dt_s` is not a positive number; the filter stays as it was.
+    #[inline]
+    pub fn retime(&mut self, dt_s: T) -> Result<(), StepError> {
+        if dt_s == self.dt_s { Ok(()) } else { self.set_time_step(dt_s) }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn set_time_step(&mut self, dt_s: T) -> Result<(), StepError> {
+        check_step_length(dt_s)?;
+        self.set_length(dt_s);
+        Ok(())
+    }
+
+    /// The same for a length that has been looked at, or is refused by its consequences.
+    pub(crate) fn set_length(&mut self, dt_s: T) {
+        self.step = StepConstants::new(&self.model, dt_s, RateSpread::<T, S>::clear());
+        self.dt_s = dt_s;
+    }
+
+    /// Predicts one step ahead and takes the reading; without one it is a prediction and returns `None`.
+    ///
+    /// # Errors
+    /// See [`StepError`]; the belief is untouched.
+    #[inline]
+    pub fn step<const L: usize>(
+        &self,
+        belief: &mut Belief<T, N, L>,
+        reading: Option<Reading<T>>,
+    ) -> Result<Option<Residual<T>>, StepError> {
+        match self.step_once(belief, reading) {
+            Err(refused) => self.step_again(belief, reading, refused, Self::step_once),
+            taken => taken,
+        }
+    }
+
+    /// The same with a gate: a reading whose normalised innovation squared is above `gate` is compared, and not taken. Decided
+    /// before the belief is written, so that a reading turned down costs no second step. χ² with one degree of freedom exceeds
+    /// 10.8 once in a thousand.
+    ///
+    /// A gate without a way back can lock a filter out; [`Guard`](crate::Guard) has one.
+    ///
+    /// # Errors
+    /// See [`StepError`]; the belief is untouched.
+    #[inline]
+    pub fn step_gated<const L: usize>(
+        &self,
+        belief: &mut Belief<T, N, L>,
+        reading: Reading<T>,
+        gate: T,
+    ) -> Result<Residual<T>, StepError> {
+        match self.gated_once(belief, reading, gate) {
+            Err(refused) => self.gated_again(belief, reading, gate, refused),
+            taken => taken,
+        }
+    }
+
+    /// Never inlined: beside a second try a compiler would compute in advance, and store, what both have in common.
+    #[inline(never)]
+    pub(crate) fn step_once<const L: usize>(
+        &self,
+        belief: &mut Belief<T, N, L>,
+        reading: Option<Reading<T>>,
+    ) -> Result<Option<Residual<T>>, StepError> {
+        let mut parts = Parts::of(belief);
+        let residual = self.advance(&mut parts, reading)?;
+        parts.put_into(belief);
+        Ok(residual)
+    }
+
+    /// As [`Self::step_once`].
+    #[inline(never)]
+    fn gated_once<const L: usize>(
+        &self,
+        belief: &mut Belief<T, N, L>,
+        reading: Reading<T>,
+        gate: T,
+    ) -> Result<Residual<T>, StepError> {
+        let mut parts = Parts::of(belief);
+        let spread = self.predict(&mut parts, Course::Uncertain);
+        let residual = self.update(&mut parts, reading, None, spread, Some(gate))?;
+        parts.put_into(belief);
+        Ok(residual)
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn gated_again<const L: usize>(
+        &self,
+        belief: &mut Belief<T, N, L>,
+        reading: Reading<T>,
+        gate: T,
+        refused: StepError,
+    ) -> Result<Residual<T>, StepError> {
+        let gated = |_: &Self, belief: &mut Belief<T, N, L>, reading: Option<Reading<T>>| {
+            reading.map(|reading| self.gated_once(belief, reading, gate)).transpose()
+        };
+        self.step_again(belief, Some(reading), refused, gated)?.ok_or(refused)
+    }
+
+    /// A step that was `refused`, with more and more noise in its reading.
+    #[cold]
+    #[inline(never)]
+    pub(crate) fn step_again<const L: usize>(
+        &self,
+        belief: &mut Belief<T, N, L>,
+        mut reading: Option<Reading<T>>,
+        mut refused: StepError,
+        once: impl Fn(&Self, &mut Belief<T, N, L>, Option<Reading<T>>) -> Result<Option<Residual<T>>, StepError>,
+    ) -> Result<Option<Residual<T>>, StepError> {
+        let mut tries = 0;
+        loop {
+            tries += 1;
+            reading = Some(self.coarser(reading, tries, refused)?);
+            match once(self, belief, reading) {
+                Err(error) => refused = error,
+                taken => return taken,
+            }
+        }
+    }
+
+    /// A step of a belief taken apart; after an error `parts` means nothing.
+    #[inline(always)]
+    pub(crate) fn advance(
+        &self,
+        parts: &mut Parts<T, B>,
+        reading: Option<Reading<T>>,
+    ) -> Result<Option<Residual<T>>, StepError> {
+        let spread = self.predict(parts, Course::Uncertain);
+        match reading {
+            Some(reading) => self.update(parts, reading, None, spread, None).map(Some),
+            None if parts.is_sound::<N>(parts.variances::<N>()) => Ok(None),
+            None => Err(StepError::NonFiniteState),
+        }
+    }
+
+    /// A refused reading with more noise; the refusal where noise is of no use.
+    #[cold]
+    #[inline(never)]
+    pub(crate) fn coarser(
+        &self,
+        reading: Option<Reading<T>>,
+        tries: u32,
+        refused: StepError,
+    ) -> Result<Reading<T>, StepError> {
+        let Some(reading) = reading.filter(|_| refused.is_of_the_reading() && tries <= MOST_TRIES) else {
+            return Err(refused);
+        };
+        // A relative reading of order one is not known better than this.
+        let rounding = T::default_epsilon() * T::default_epsilon();
+        let noise = reading.extra_variance + self.reading.variance + rounding;
+        // What is so far away that its square overflows is not too exact.
+        if !(reading.value * reading.value / noise).is_finite() {
+            return Err(refused);
+        }
+        Ok(Reading { extra_variance: T::of(COARSER) * noise, ..reading })
+    }
+}
+
+fn is_directed<T: Scalar, const B: usize>(law: &SensorLaw<T, B>) -> bool {
+    law.extend_viscosity_s != law.retract_viscosity_s
+        || law.branches.iter().any(|branch| {
+            branch.extend_gain != branch.retract_gain
+                || !(branch.extend_gain_slope.is_zero() && branch.retract_gain_slope.is_zero())
+        })
+}
+
+/// Growth of a reading's variance from one try to the next, and the most tries after the first.
+const COARSER: f64 = 16.0;
+pub(crate) const MOST_TRIES: u32 = 12;
+
+/// Refuses what is no length of a step that moves.
+fn check_step_length<T: Scalar>(dt_s: T) -> Result<(), StepError> {
+    check_time_step(dt_s)?;
+    if dt_s.is_zero() { Err(StepError::NegativeTimeStep) } else { Ok(()) }
+}
