@@ -1,13 +1,14 @@
 use std::ops::Range;
 
-use ohmstrain_calib::{EstimatorKind, Rows, Start};
+use ohmstrain_calib::{EstimatorKind, KnownErrors, KnownStrain, Rows, Start};
 use ohmstrain_ekf::live::{DOUBT, Doubts, Flags, KNOWN_BEYOND, Protections, RestFollower};
-use ohmstrain_ekf::{Guard, Influence, StepError};
+use ohmstrain_ekf::{Gaussian, Guard, Influence, StepError};
 
 use crate::estimate::Scale;
 use crate::filter::{Kernel, Translator, followed, taken};
+use crate::known::{KnownOfAll, in_order, next_until};
 use crate::pauses::Pauses;
-use crate::{Error, Estimate, Filter, LaggedFilter, Reading, Sensor};
+use crate::{Error, Estimate, Filter, Known, LaggedFilter, Reading, Sensor};
 
 /// How many readings in a row a gate turns down before it is the state that is doubted: outliers come alone, a body that sets off
 /// surprises until it is followed. With ten a knee that bent within half a second was missed.
@@ -40,6 +41,7 @@ pub struct FilterBuilder<'a> {
     corrects: bool,
     rest_resistance: Option<f64>,
     initial_strain: Option<f64>,
+    known: &'a [Known],
     gate: Option<f64>,
     influence: Influence<f64>,
     protections: Protections,
@@ -53,6 +55,7 @@ impl<'a> FilterBuilder<'a> {
             corrects: true,
             rest_resistance: None,
             initial_strain: None,
+            known: &[],
             gate: None,
             influence: INFLUENCE,
             protections: Protections::ALL,
@@ -112,6 +115,26 @@ impl<'a> FilterBuilder<'a> {
     #[must_use]
     pub const fn initial_strain(self, strain: f64) -> Self {
         Self { initial_strain: Some(strain), ..self }
+    }
+
+    /// Strains (or angles) that are known at times, in any order. What the estimates lack then is known, too, of the rows after it (a
+    /// smoother's: around it): for seconds, and for an hour as far as known strains show an offset or another gain.
+    ///
+    /// ```
+    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+    /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
+    /// use ohmstrain::Known;
+    ///
+    /// let known = [Known::new(0.0, 0.0), Known { sd: Some(0.002), ..Known::new(0.1, 0.10) }];
+    /// let rows = sensor.filter().known(&known).smooth(&[0.00, 0.05, 0.10], &[1600.0, 1632.0, 1660.0])?;
+    /// assert!(rows[0].strain < 0.005 && (rows[2].strain - 0.10).abs() < 0.005);
+    /// let mut filter = sensor.filter().known(&known).build()?;
+    /// assert!(filter.step(0.0, 1600.0)?.strain < 0.005);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub const fn known(self, known: &'a [Known]) -> Self {
+        Self { known, ..self }
     }
 
     /// Turns down readings whose squared innovation over its variance is above `nis`; two in a row at most. 10.8 turns down
@@ -284,6 +307,40 @@ impl<'a> FilterBuilder<'a> {
         self,
         len: usize,
         row: impl Fn(usize) -> (f64, Reading),
+        take: impl FnMut(Range<usize>, &[Estimate]) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let mut known = self.known_of_all(len, &row)?;
+        self.smooth_with(len, row, |_, time_s, said| known.correct(time_s, said), take)
+    }
+
+    /// What known strains say of all rows of a recording, which is smoothed once for what is said where they are known.
+    fn known_of_all(self, len: usize, row: &impl Fn(usize) -> (f64, Reading)) -> Result<KnownOfAll, Error> {
+        let scale = Scale::new(self.sensor)?;
+        let mut due = in_order(self.known, &scale)?;
+        let mut known: Vec<(usize, KnownStrain)> = Vec::new();
+        for k in 0..if due.is_empty() { 0 } else { len } {
+            let time_s = row(k).0;
+            while let Some(strain) = next_until(&mut due, time_s) {
+                known.push((k, KnownStrain { time_s, known: strain, said: strain }));
+            }
+        }
+        if !known.is_empty() {
+            let listen = |k: usize, _: f64, said: Gaussian<f64>| {
+                let first = known.partition_point(|known| known.0 < k);
+                known[first..].iter_mut().take_while(|known| known.0 == k).for_each(|known| known.1.said = said);
+                said
+            };
+            self.smooth_with(len, row, listen, |_, _| Ok::<(), Error>(()))?;
+        }
+        Ok(KnownOfAll::new(scale.limits(), known.into_iter().map(|known| known.1).collect()))
+    }
+
+    /// Smooths; `known` is shown row, time, s, and what is said of its strain, and says what is known of that.
+    fn smooth_with<E: From<Error>>(
+        self,
+        len: usize,
+        row: impl Fn(usize) -> (f64, Reading),
+        mut known: impl FnMut(usize, f64, Gaussian<f64>) -> Gaussian<f64>,
         mut take: impl FnMut(Range<usize>, &[Estimate]) -> Result<(), E>,
     ) -> Result<(), E> {
         let starts_known = self.initial_strain.is_some();
@@ -291,7 +348,7 @@ impl<'a> FilterBuilder<'a> {
         if kind == EstimatorKind::Corrected {
             self.sensor.check_smoother()?;
         }
-        let Kernel { mut filter, translator } = self.kernel(kind)?;
+        let Kernel { mut filter, translator, .. } = self.kernel(kind)?;
         let Translator { scale, mut doubts, follower, .. } = translator;
         let failed = |(row, source): (usize, StepError)| Error::Row { row, source };
         let calibrated = |k: usize| {
@@ -322,6 +379,7 @@ impl<'a> FilterBuilder<'a> {
                     (strain.variance, flags) = doubts.widened(output.estimate.rate.mean, strain.variance);
                 }
                 next_s = time_s;
+                output.estimate.strain = known(k, time_s, output.estimate.strain);
                 let mut estimate = scale.row(time_s, reading, off, output);
                 estimate.flags = estimate.flags.and(flags);
                 estimate
@@ -364,7 +422,8 @@ impl<'a> FilterBuilder<'a> {
         });
         let is_told = self.rest_resistance.is_some();
         let follower = (!is_told).then(|| RestFollower::new(params.rest_bounds()));
-        Ok(Kernel { filter, translator: Translator { scale, doubts, follower, seen_s: 0.0 } })
+        let (known, errors) = (in_order(self.known, &scale)?, KnownErrors::new(scale.limits()));
+        Ok(Kernel { filter, translator: Translator { scale, doubts, follower, seen_s: 0.0, errors }, known })
     }
 
     fn start_at(&self, strain: f64) -> Result<Start, Error> {
