@@ -4,8 +4,10 @@ use ohmstrain::{Estimate, KNOWN_BEYOND, Known, Sensor};
 const QUIET_S: f64 = 30.0;
 /// How far apart quiet readings are, in ranges of the calibration's readings.
 const BAND: f64 = 0.02;
-/// How near they are to what the rested sensor read, in the same ranges.
+/// How near they are to what the rested sensor read, or to the end of this run's readings on that side, in the same ranges.
 const NEAR: f64 = 0.1;
+/// How far readings must have gone for that end to be one, and how far they go from a hold before somebody is asked of another.
+const AWAY: f64 = 0.3;
 /// How far from none the strain must be said to be for a question to be worth it, in spans of the limits.
 const WORTH: f64 = 0.02;
 /// No reading for so long ends a quiet hold, s.
@@ -19,11 +21,17 @@ pub struct QuietWatch<'a> {
     rested: f64,
     /// Range of the calibration's readings.
     range: f64,
+    /// 1 where readings grow with the strain, -1 where they fall.
+    sign: f64,
+    /// The last readings of the run on the side of rest and on the other one, times that sign.
+    ends: (f64, f64),
     /// Least strain that is worth a question, none if the sensor never reports none.
     worth: Option<f64>,
     known: &'a [Known],
     hold: Option<Hold>,
     asked: usize,
+    /// The reading that was asked of last, as long as readings stay near it.
+    asked_at: Option<f64>,
 }
 
 /// Readings that have stayed within a band.
@@ -58,12 +66,17 @@ impl<'a> QuietWatch<'a> {
         let can_rest = params.limits.lower <= KNOWN_BEYOND * span && params.limits.upper >= 0.0;
         let worth = can_rest.then_some(WORTH * span);
         let range = moved * (seen.reading_upper - seen.reading_lower);
-        Self { rested, range, worth, known, hold: None, asked: 0 }
+        let strain_at = |reading| params.static_cubic.strain(reading);
+        let sign = if strain_at(seen.reading_upper) > strain_at(seen.reading_lower) { 1.0 } else { -1.0 };
+        let ends = (f64::INFINITY, f64::NEG_INFINITY);
+        Self { rested, range, sign, ends, worth, known, hold: None, asked: 0, asked_at: None }
     }
 
     /// Takes a row; what to ask of the hold that it belongs to, once.
     pub fn see(&mut self, row: &Estimate) -> Option<Quiet> {
         let (reading, time_s) = (row.resistance.filter(|reading| reading.is_finite())?, row.time_s);
+        self.ends = (self.ends.0.min(self.sign * reading), self.ends.1.max(self.sign * reading));
+        self.asked_at = self.asked_at.filter(|asked_at| (reading - asked_at).abs() <= AWAY * self.range);
         let hold = self.hold.and_then(|hold| hold.with(time_s, reading, BAND * self.range));
         let new = Hold { from_s: time_s, last_s: time_s, low: reading, high: reading, asked: false };
         let hold = self.hold.insert(hold.unwrap_or(new));
@@ -72,11 +85,16 @@ impl<'a> QuietWatch<'a> {
             return None;
         }
         hold.asked = true;
-        let is_near = (0.5 * (hold.low + hold.high) - self.rested).abs() <= NEAR * self.range;
+        let held = 0.5 * (hold.low + hold.high);
+        let (near, (rest_end, other_end)) = (NEAR * self.range, self.ends);
+        let is_end = other_end - rest_end >= AWAY * self.range && self.sign * held - rest_end <= near;
+        let is_near = (held - self.rested).abs() <= near || is_end;
         let is_worth = self.worth.is_some_and(|worth| row.strain.abs() > worth);
         let is_known = self.known.iter().any(|known| (hold.from_s..=time_s).contains(&known.time_s));
-        let asks = is_near && is_worth && !is_known && self.asked < MOST;
-        self.asked += usize::from(asks);
+        let asks = is_near && is_worth && !is_known && self.asked < MOST && self.asked_at.is_none();
+        if asks {
+            (self.asked, self.asked_at) = (self.asked + 1, Some(held));
+        }
         asks.then_some(Quiet { from_s: hold.from_s, now_s: time_s, strain: row.strain })
     }
 }
@@ -129,8 +147,13 @@ mod tests {
         // Motion, and a drift that never settles.
         assert_eq!(asked(&[], 0.03, |k| rested + 0.05 * range * (0.1 * f64::from(k)).sin()), []);
         assert_eq!(asked(&[], 0.03, |k| rested + range * (1e-4 * f64::from(k) - 0.6)), []);
-        // Twenty rests with motion in between: no more than three questions.
-        let rests = |k: u32| if k % 600 < 50 { rested + 0.5 * range } else { rested + noise(k) };
-        assert_eq!(asked(&[], 0.03, rests).len(), MOST);
+        // Twenty rests with motion in between, also where R0 is another: no more than three questions.
+        for moved in [0.0, 0.5 * range] {
+            let rests = |k: u32| rested + moved + if k % 600 < 50 { 0.5 * range } else { noise(k) };
+            assert_eq!(asked(&[], 0.03, rests).len(), MOST);
+            // Without motion all of them are one.
+            let broken = |k: u32| rested + if k % 600 < 50 { 0.05 * range } else { noise(k) };
+            assert_eq!(asked(&[], 0.03, broken).len(), 1);
+        }
     }
 }

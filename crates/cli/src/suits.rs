@@ -76,8 +76,8 @@ pub fn warn_of_unused(known: &[Known], (first_s, last_s): (f64, f64), file: &str
 pub fn of_rest(quiet: &Quiet) -> String {
     let Quiet { from_s, now_s, strain } = *quiet;
     format!(
-        "{} s of quiet from t = {} s near what the rested sensor reads, where the strain is said to be {}: if the body was at \
-         rest there, --known {now_s}:0 tells it",
+        "{} s of quiet from t = {} s that may be a rest, where the strain is said to be {}: if the body was at rest there, \
+         --known {now_s}:0 tells it",
         significant(now_s - from_s, 2),
         significant(from_s, 6),
         significant(strain, 2),

@@ -51,6 +51,7 @@ impl Translator {
             let variance = doubts.see(dt_s, taken, *strain);
             (strain.variance, flags) = doubts.widened(output.estimate.rate.mean, variance);
         }
+        self.errors.restate(time_s, output.estimate.strain);
         let mut row = self.known_row((time_s, reading), off, output);
         row.flags = row.flags.and(flags);
         row
@@ -71,6 +72,8 @@ impl Translator {
     /// R₀ is told: nothing follows any more.
     fn rest_resistance(&mut self, measured: f64) -> Result<(), Error> {
         self.scale.rest_at(measured)?;
+        // What errors were known of were those of another R₀.
+        self.errors = KnownErrors::new(self.scale.limits());
         self.follower = None;
         self.doubts.iter_mut().for_each(Doubts::told_rest);
         Ok(())

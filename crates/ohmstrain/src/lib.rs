@@ -38,6 +38,7 @@ mod reading;
 mod recording;
 mod reference_doubt;
 mod sensor;
+mod smoothing;
 mod text;
 mod unit_doubt;
 mod validity;

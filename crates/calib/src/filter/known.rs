@@ -10,8 +10,9 @@ pub const MOST_KNOWN: usize = 16;
 const FAST_S: f64 = 3.0;
 /// For how long offset and gain of a day do, s.
 const SLOW_S: f64 = 3600.0;
-/// Variance of the error of the gain, relative to that of the offset, for a strain that may be anywhere in the limits.
-const GAIN: f64 = 0.3;
+/// Variance of the error of the gain, relative to that of the offset, for a strain that may be anywhere in the limits: a
+/// strain that is known near one end of them tells little of the other one.
+const GAIN: f64 = 1.0;
 /// Beyond this distance from the middle of the limits, in spans, an error of the gain grows no more.
 const FARTHEST: f64 = 0.6;
 
@@ -46,13 +47,15 @@ pub struct KnownStrain {
 
 /// What strains that were known for a moment say of a filter's errors at other times.
 ///
-/// An error, in units of the deviation that is stated, is a Gaussian process of the time: a part that lasts for seconds, an
-/// offset and an error of the gain that last for an hour. How large these two are is one of [`SIZES`], weighed by how likely they
-/// make what was known (a mixture of Gaussian processes).
+/// An error is a Gaussian process of the time: a part that lasts for seconds, in units of the deviation that is stated, an
+/// offset and an error of the gain that last for an hour, in units of what is stated on average where strains are known. How large
+/// these two are is one of [`SIZES`], weighed by how likely they make what was known (a mixture of Gaussian processes).
 #[derive(Clone, Debug)]
 pub struct KnownErrors {
     limits: StrainRange<f64>,
     strains: VecDeque<KnownStrain>,
+    /// Mean of the variances that were stated of them.
+    usual: f64,
     /// One for each size.
     voices: Vec<Voice>,
 }
@@ -78,10 +81,11 @@ struct Place {
 }
 
 impl Size {
-    fn covariance(self, a: Place, b: Place) -> f64 {
+    /// Of errors at two places, where `usual` is the variance that the slow part is relative to.
+    fn covariance(self, usual: f64, a: Place, b: Place) -> f64 {
         let apart_s = (a.time_s - b.time_s).abs();
-        let slow = self.slow * (-apart_s / SLOW_S).exp() * (1.0 + GAIN * a.lever * b.lever);
-        a.sd * b.sd * (self.fast * (-apart_s / FAST_S).exp() + slow)
+        let fast = self.fast * a.sd * b.sd * (-apart_s / FAST_S).exp();
+        fast + self.slow * usual * (-apart_s / SLOW_S).exp() * (1.0 + GAIN * a.lever * b.lever)
     }
 }
 
@@ -89,7 +93,7 @@ impl KnownErrors {
     /// Before any strain is known.
     #[must_use]
     pub const fn new(limits: StrainRange<f64>) -> Self {
-        Self { limits, strains: VecDeque::new(), voices: Vec::new() }
+        Self { limits, strains: VecDeque::new(), usual: 0.0, voices: Vec::new() }
     }
 
     /// Of so many strains, the last [`MOST_KNOWN`] of them.
@@ -110,6 +114,17 @@ impl KnownErrors {
         self.condition();
     }
 
+    /// Something else is stated of the strain at a time than when it was told, as after a lag.
+    pub fn restate(&mut self, time_s: f64, said: Gaussian<f64>) {
+        let mut is_new = false;
+        for strain in self.strains.iter_mut().filter(|strain| strain.time_s == time_s) {
+            (strain.said, is_new) = (said, true);
+        }
+        if is_new {
+            self.condition();
+        }
+    }
+
     /// Whether no strain is known.
     #[must_use]
     pub fn is_empty(&self) -> bool {
@@ -123,7 +138,7 @@ impl KnownErrors {
             return said;
         }
         let here = self.place(time_s, &said);
-        let told = self.voices.iter().map(|voice| (voice.weight, voice.error(here, self.places())));
+        let told = self.voices.iter().map(|voice| (voice.weight, voice.error(self.usual, here, self.places())));
         let told: Vec<(f64, Gaussian<f64>)> = told.collect();
         let mean = told.iter().map(|(weight, error)| weight * error.mean).sum::<f64>();
         let spread = |error: &Gaussian<f64>| error.variance + (error.mean - mean).powi(2);
@@ -148,9 +163,11 @@ impl KnownErrors {
         let places: Vec<Place> = self.places().collect();
         let errors = self.strains.iter().map(|strain| strain.known.mean - strain.said.mean);
         let errors = DVector::from_iterator(places.len(), errors);
+        let usual = self.strains.iter().map(|strain| strain.said.variance).sum::<f64>() / places.len() as f64;
         let given = |size: Size| {
             let noise = |row: usize| self.strains[row].known.variance;
-            let of = |i: usize, j: usize| size.covariance(places[i], places[j]) + if i == j { noise(i) } else { 0.0 };
+            let of =
+                |i: usize, j: usize| size.covariance(usual, places[i], places[j]) + if i == j { noise(i) } else { 0.0 };
             let covariance = Cholesky::new(DMatrix::from_fn(places.len(), places.len(), of))?;
             let weighted = covariance.solve(&errors);
             let log_determinant: f64 = covariance.l_dirty().diagonal().iter().map(|root| root.ln()).sum();
@@ -162,18 +179,18 @@ impl KnownErrors {
         voices.iter_mut().for_each(|voice| voice.weight = (voice.weight - largest).exp());
         let total: f64 = voices.iter().map(|voice| voice.weight).sum();
         voices.iter_mut().for_each(|voice| voice.weight /= total);
-        self.voices = voices;
+        (self.usual, self.voices) = (usual, voices);
     }
 }
 
 impl Voice {
     /// The error of a statement, if errors are of this size.
-    fn error(&self, here: Place, known: impl Iterator<Item = Place>) -> Gaussian<f64> {
-        let shared = known.map(|place| self.size.covariance(here, place));
+    fn error(&self, usual: f64, here: Place, known: impl Iterator<Item = Place>) -> Gaussian<f64> {
+        let shared = known.map(|place| self.size.covariance(usual, here, place));
         let shared = DVector::from_iterator(self.weighted.len(), shared);
         let mean = shared.dot(&self.weighted);
         let told = self.covariance.l_dirty().solve_lower_triangular(&shared).map_or(0.0, |told| told.norm_squared());
-        Gaussian { mean, variance: (self.size.covariance(here, here) - told).max(0.0) }
+        Gaussian { mean, variance: (self.size.covariance(usual, here, here) - told).max(0.0) }
     }
 }
 
@@ -199,10 +216,10 @@ mod tests {
         let (lever, later_lever) = ((12.0_f64).sqrt() * -0.25, 12.0_f64.sqrt() * 0.125);
         for later_s in [0.0, 2.0, 60.0, 5000.0] {
             let of_size = |(probability, fast, slow): (f64, f64, f64)| {
-                let here = 4e-4 * (fast + slow * (1.0 + 0.3 * lever * lever)) + 4e-6;
-                let there = 4e-4 * (fast + slow * (1.0 + 0.3 * later_lever * later_lever));
-                let slow_now = slow * f64::exp(-later_s / 3600.0) * (1.0 + 0.3 * lever * later_lever);
-                let both = 4e-4 * (fast * f64::exp(-later_s / 3.0) + slow_now);
+                let here = 4e-4 * (fast + slow * (1.0 + lever * lever)) + 4e-6;
+                let there = 1e-4 * fast + 4e-4 * slow * (1.0 + later_lever * later_lever);
+                let slow_now = slow * f64::exp(-later_s / 3600.0) * (1.0 + lever * later_lever);
+                let both = 2e-4 * fast * f64::exp(-later_s / 3.0) + 4e-4 * slow_now;
                 let density = f64::exp(-0.5 * 0.03 * 0.03 / here) / here.sqrt();
                 (probability * density, both / here * 0.03, there - both * both / here)
             };
@@ -211,7 +228,7 @@ mod tests {
             let mean: f64 = parts.iter().map(|part| part.0 / total * part.1).sum();
             let variance: f64 =
                 parts.iter().map(|part| part.0 / total * (part.2 + (part.1 - mean).powi(2))).sum::<f64>();
-            let found = errors.correct(10.0 + later_s, said(0.25));
+            let found = errors.correct(10.0 + later_s, Gaussian { mean: 0.25, variance: 1e-4 });
             assert!((found.mean - 0.25 - mean).abs() < 1e-12, "{later_s} s: {found:?} {mean}");
             assert!((found.variance / variance - 1.0).abs() < 1e-9, "{later_s} s: {found:?} {variance}");
         }
@@ -254,5 +271,10 @@ mod tests {
         let at_once = KnownErrors::of(LIMITS, &strains[40 - MOST_KNOWN..]);
         assert_eq!(errors.correct(900.0, said(0.3)), at_once.correct(900.0, said(0.3)));
         assert_eq!(errors.correct(900.0, said(0.3)), KnownErrors::of(LIMITS, &strains).correct(900.0, said(0.3)));
+        // Where something else is stated later.
+        let mut restated = strains.clone();
+        restated[30].said.mean = 0.1;
+        errors.restate(600.0, said(0.1));
+        assert_eq!(errors.correct(900.0, said(0.3)), KnownErrors::of(LIMITS, &restated).correct(900.0, said(0.3)));
     }
 }

@@ -244,7 +244,7 @@ impl<'a> Session<'a> {
         }
         if let Some(quiet) = self.quiet.see(&estimate) {
             let quiet_s = significant(quiet.now_s - quiet.from_s, 2);
-            self.message = format!("{quiet_s} s of quiet near what the rested sensor reads: z, if it is at rest");
+            self.message = format!("{quiet_s} s of quiet that may be a rest: z, if it is one");
         }
         self.last = Some(estimate);
         self.doubt_early(reading)?;
