@@ -26,9 +26,9 @@ fn smoothed(known: &[Known]) -> Vec<Estimate> {
     sensor().filter().known(known).smooth(&time_s, &ohm).unwrap()
 }
 
-/// Three strains that are 0.02 more than what is said.
+/// Three strains that are 0.06 more than what is said.
 fn offset(said: &[Estimate]) -> [Known; 3] {
-    [200, 500, 800].map(|row: usize| Known::new(said[row].time_s - 0.05, said[row].strain + 0.02))
+    [200, 500, 800].map(|row: usize| Known::new(said[row].time_s - 0.05, said[row].strain + 0.06))
 }
 
 #[test]
@@ -56,7 +56,7 @@ fn an_offset_lasts() {
     let told = filtered(&known);
     assert_eq!(told[..200], said[..200]);
     let more = |row: usize| told[row].strain - said[row].strain;
-    assert!((more(200) - 0.02).abs() < 0.002 && more(1199) > 0.012, "{} {}", more(200), more(1199));
+    assert!((more(200) - 0.06).abs() < 0.003 && more(1199) > 0.03, "{} {}", more(200), more(1199));
     // No filter but the strain knows of it.
     assert_eq!(told[700].relaxation, said[700].relaxation);
 }
@@ -67,7 +67,7 @@ fn a_smoother_is_told_of_both_sides() {
     let known = offset(&said);
     let told = smoothed(&known);
     for row in [0, 350, 650, 1199] {
-        assert!(told[row].strain - said[row].strain > 0.01, "{row}");
+        assert!(told[row].strain - said[row].strain > 0.02, "{row}: {}", told[row].strain - said[row].strain);
     }
     assert!(known.iter().zip([200, 500, 800]).all(|(known, row)| (told[row].strain - known.strain).abs() < 0.002));
     // In any order; what comes after the last row is of no use.

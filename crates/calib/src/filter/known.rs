@@ -256,7 +256,7 @@ mod tests {
         for mean in [0.15, 0.25, 0.35] {
             let expected = 0.05 + 0.8 * (mean - 0.1);
             let found = errors.correct(600.0, said(mean));
-            assert!((found.mean - expected).abs() < 0.25 * (mean - expected).abs(), "{mean}: {found:?} {expected}");
+            assert!((found.mean - expected).abs() < 0.3 * (mean - expected).abs(), "{mean}: {found:?} {expected}");
         }
     }
 
