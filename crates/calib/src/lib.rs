@@ -38,6 +38,7 @@ pub use calibrate::{Calibration, Stage, calibrate};
 pub use correction::owned::{OwnedCorrection, OwnedProcess, OwnedRows, OwnedSimulated};
 pub use error::CalibrationError;
 pub use filter::build::{HISTORIES, HYPOTHESES, PARTICLE_SEED, build_filter, build_filter_with};
+pub use filter::known::{KnownErrors, KnownStrain, MOST_KNOWN};
 pub use filter::learned::Learned;
 pub use filter::portable::{PortableCorrection, PortableFilter};
 pub use filter::{Filter, Output, Rows, Start, WayBack};

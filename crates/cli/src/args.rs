@@ -22,7 +22,7 @@ use clap::{CommandFactory, Parser, Subcommand};
 pub use batch::{BatchArgs, BatchCommand, SummaryForm};
 pub use calibrate::{CalibrateArgs, ReportArgs};
 pub use choice::{Auto, Branches, Estimator, Gauge};
-pub use estimate::{EstimateArgs, FilterArgs, Format, KnownStrain, RestResistance, SmoothArgs, WrittenArgs};
+pub use estimate::{EstimateArgs, FilterArgs, Format, RestResistance, SmoothArgs, WrittenArgs};
 pub use evaluate::{Estimators, EvaluateArgs};
 pub use export::ExportArgs;
 pub use files::{ImportArgs, InspectArgs};

@@ -16,6 +16,7 @@ mod output;
 mod parquet_table;
 mod plausible;
 mod progress;
+mod quiet;
 mod readings;
 mod report;
 mod run;

@@ -1,12 +1,12 @@
-use ohmstrain::{Error, Estimate, EstimatorKind, FilterBuilder, Sensor};
+use ohmstrain::{Error, Estimate, EstimatorKind, FilterBuilder, Known, Sensor};
 
 use crate::args::{EstimateArgs, RestResistance};
 use crate::error::CliError;
 use crate::input::TraceFile;
 
 /// A sensor's filter as the flags want it.
-pub fn builder<'a>(sensor: &'a Sensor, args: &EstimateArgs) -> FilterBuilder<'a> {
-    let mut builder = sensor.filter();
+pub fn builder<'a>(sensor: &'a Sensor, args: &'a EstimateArgs) -> FilterBuilder<'a> {
+    let mut builder = sensor.filter().known(&args.known);
     if let Some(kind) = args.estimator.chosen() {
         builder = builder.estimator(kind.0);
     }
@@ -73,15 +73,16 @@ pub struct Estimated {
     pub smoothed: Vec<Estimate>,
 }
 
-/// Filters and smooths a recording; `kind` is the sensor's default unless another is wanted.
+/// Filters and smooths a recording of which some strains are `known`; `kind` is the sensor's default unless another is wanted.
 pub fn estimate(
     recording: &TraceFile,
     sensor: &Sensor,
     rest_resistance: Option<f64>,
     kind: Option<EstimatorKind>,
+    known: &[Known],
 ) -> Result<Estimated, CliError> {
     let len = recording.trace.len();
-    let mut builder = sensor.filter().estimator(kind.unwrap_or(sensor.params().default_estimator));
+    let mut builder = sensor.filter().known(known).estimator(kind.unwrap_or(sensor.params().default_estimator));
     if let Some(measured) = rest_resistance {
         builder = builder.rest_resistance(measured);
     }

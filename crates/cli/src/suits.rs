@@ -1,10 +1,11 @@
 //! What the command line says to doubts about what a sensor is given: which flag, or which line of a file, answers them.
 
-use ohmstrain::number::plain;
-use ohmstrain::{Sensor, UnitDoubt, UnitGuess};
+use ohmstrain::number::{plain, significant};
+use ohmstrain::{Known, Sensor, UnitDoubt, UnitGuess};
 
 use crate::error::CliError;
 use crate::input::TraceFile;
+use crate::quiet::Quiet;
 
 /// Readings at the start of a file that are looked at before it is filtered.
 pub const FIRST_READINGS: usize = 100;
@@ -59,4 +60,26 @@ pub fn warn_of_start(start: Option<f64>, sensor: &Sensor) {
             plain(upper)
         ));
     }
+}
+
+/// Warns of known strains that no row came for in a recording from the first to the last time, s.
+pub fn warn_of_unused(known: &[Known], (first_s, last_s): (f64, f64), file: &str) {
+    let (first, last) = (significant(first_s, 6), significant(last_s, 6));
+    for Known { time_s, strain, .. } in known.iter().filter(|known| known.time_s > last_s) {
+        CliError::warning(&format!(
+            "{file}: --known {time_s}:{strain} was not used: the recording goes from {first} to {last} s"
+        ));
+    }
+}
+
+/// Asks whether a long hold was a rest, and says how to tell.
+pub fn of_rest(quiet: &Quiet) -> String {
+    let Quiet { from_s, now_s, strain } = *quiet;
+    format!(
+        "{} s of quiet from t = {} s that may be a rest, where the strain is said to be {}: if the body was at rest there, \
+         --known {now_s}:0 tells it",
+        significant(now_s - from_s, 2),
+        significant(from_s, 6),
+        significant(strain, 2),
+    )
 }

@@ -249,8 +249,58 @@ fn a_strain_that_is_known_is_taken_in() {
         let warned = "warning: trace.csv: --known 5000:0.1 was not used: the recording goes from 0 to ";
         assert!(late.warnings.iter().any(|warning| warning.contains(warned)), "{:?}", late.warnings);
     }
-    let far = bench.run(&["filter", "trace.csv", "--sensor", "sensor.toml", "--known", "3:12"]);
-    far.fails(2, "--known: expected 0 to 0.3333, the limits of the sensor's strain, found 12; 10 % is 0.1");
+    for command in ["filter", "smooth"] {
+        let far = bench.run(&[command, "trace.csv", "--sensor", "sensor.toml", "--known", "3:12"]);
+        far.fails(2, "--known: expected 0 to 0.3333, the limits of the sensor's strain, found 12; 10 % is 0.1");
+    }
+}
+
+/// The smoother hears of it before and after, and says what is of no use.
+#[test]
+fn a_smoother_takes_in_a_strain_that_is_known() {
+    let bench = Bench::calibrated();
+    let smoothed = |flags: &[&str]| {
+        let run = bench.run(&[&["smooth", "trace.csv", "--sensor", "sensor.toml"], flags].concat());
+        (run.warnings.clone(), Csv::new(&run.ok()).numbers("strain"))
+    };
+    let (_, untold) = smoothed(&[]);
+    let known = format!("100:{}", untold[500] + 0.02);
+    let (warnings, told) = smoothed(&["--known", &known, "--known", "5000:0.1"]);
+    let more: Vec<f64> = told.iter().zip(&untold).map(|(told, untold)| told - untold).collect();
+    assert!((more[500] - 0.02).abs() < 0.003 && more[497] > 0.005 && more[503] > 0.005, "{:?}", &more[495..506]);
+    assert!(warnings.iter().any(|warning| warning.contains("--known 5000:0.1 was not used")), "{warnings:?}");
+}
+
+/// A stretch, and a rest that is a fifth of the readings' range above the calibration's: what is asked ends in the flag that answers
+/// it, which is taken.
+#[test]
+fn a_long_quiet_hold_is_asked_about() {
+    let bench = Bench::calibrated();
+    let sensor = bench.read("sensor.toml");
+    let number = |name: &str| -> f64 {
+        let value = sensor.lines().find_map(|line| line.strip_prefix(name)?.strip_prefix(" = "));
+        value.unwrap().parse().unwrap()
+    };
+    let range = number("reading_upper") - number("reading_lower");
+    let stretch = |k: u32| if k < 100 { 0.6 * range * (0.01 * f64::from(k) * std::f64::consts::PI).sin() } else { 0.0 };
+    let reading = |k: u32| number("measured_rest") + 0.2 * range + stretch(k) + 0.1 * f64::from(k * 7 % 11);
+    let rows = (0..400).map(|k| format!("{},{}\n", 0.2 * f64::from(k), reading(k)));
+    bench.write("rest.csv", format!("time_s,resistance_ohm\n{}", rows.collect::<String>()));
+    let asked = |flags: &[&str]| {
+        let run = bench.run(&[&["filter", "rest.csv", "--sensor", "sensor.toml"], flags].concat());
+        let questions = run.warnings.iter().filter(|warning| warning.contains("s of quiet")).cloned();
+        (questions.collect::<Vec<String>>(), Csv::new(&run.ok()).numbers("strain"))
+    };
+    let (questions, unanswered) = asked(&[]);
+    assert_eq!(questions.len(), 1, "{questions:?}");
+    let (_, answer) = questions[0].split_once("if the body was at rest there, ").unwrap();
+    let flags: Vec<&str> = answer.split_whitespace().take(2).collect();
+    let (questions, answered) = asked(&flags);
+    assert!(questions.is_empty(), "{questions:?}");
+    // From the row on that it names, thirty seconds after the stretch.
+    let first = answered.iter().zip(&unanswered).position(|(answered, unanswered)| answered != unanswered).unwrap();
+    assert!((245..255).contains(&first), "{first}");
+    assert!(answered[first] < 0.005 && answered[275] < 0.6 * unanswered[275], "{} {}", answered[275], unanswered[275]);
 }
 
 #[test]

@@ -60,6 +60,21 @@ fn a_split_is_a_calibration_on_the_first_rows_and_scores_of_the_rest() {
     assert!(by_hand[0]["calibration_s"].is_null() && by_hand[0].get("lag_s").is_none());
 }
 
+/// With strains that the reference tells: the same as it is, and two more, of which the smoother's is the better.
+#[test]
+fn known_strains_are_scored_beside() {
+    let bench = simulated(&["1"]);
+    let flags = ["--split", "0.5", "--estimator", "ekf", "1.csv"];
+    let alone = evaluate(&bench, &flags);
+    let told = evaluate(&bench, &[&flags[..], &["--known-every", "5"]].concat());
+    let names: Vec<&Value> = told.iter().map(|scores| &scores["known"]).collect();
+    assert_eq!(names, [&Value::Null, &Value::from("known every 5 s"), &Value::from("rest and stretch known")]);
+    assert_same_scores(&told[0], &alone[0]);
+    assert!(number(&told[1]["smoother"], "rmse") < number(&told[0]["smoother"], "rmse"));
+    let table = bench.run(&[&["evaluate", "--known-every", "5"], &flags[..]].concat()).ok();
+    assert!(table.contains("ekf, known every 5 s") && table.contains("known: the reference told"), "{table}");
+}
+
 /// Two shares and the halves exchanged: the same as each by itself, and what is summed up comes of the cases.
 #[test]
 fn several_splits_are_summed_up() {

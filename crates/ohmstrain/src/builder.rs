@@ -1,13 +1,11 @@
-use std::ops::Range;
-
-use ohmstrain_calib::{EstimatorKind, Rows, Start};
-use ohmstrain_ekf::live::{DOUBT, Doubts, Flags, KNOWN_BEYOND, Protections, RestFollower};
-use ohmstrain_ekf::{Guard, Influence, StepError};
+use ohmstrain_calib::{EstimatorKind, KnownErrors, Start};
+use ohmstrain_ekf::live::{DOUBT, Doubts, KNOWN_BEYOND, Protections, RestFollower};
+use ohmstrain_ekf::{Guard, Influence};
 
 use crate::estimate::Scale;
-use crate::filter::{Kernel, Translator, followed, taken};
-use crate::pauses::Pauses;
-use crate::{Error, Estimate, Filter, LaggedFilter, Reading, Sensor};
+use crate::filter::{Kernel, Translator};
+use crate::known::in_order;
+use crate::{Error, Filter, Known, LaggedFilter, Sensor};
 
 /// How many readings in a row a gate turns down before it is the state that is doubted: outliers come alone, a body that sets off
 /// surprises until it is followed. With ten a knee that bent within half a second was missed.
@@ -35,11 +33,12 @@ pub(crate) const INFLUENCE: Influence<f64> = Influence::Redescending { threshold
 /// ```
 #[derive(Clone, Copy, Debug)]
 pub struct FilterBuilder<'a> {
-    sensor: &'a Sensor,
+    pub(crate) sensor: &'a Sensor,
     estimator: Option<EstimatorKind>,
     corrects: bool,
-    rest_resistance: Option<f64>,
-    initial_strain: Option<f64>,
+    pub(crate) rest_resistance: Option<f64>,
+    pub(crate) initial_strain: Option<f64>,
+    pub(crate) known: &'a [Known],
     gate: Option<f64>,
     influence: Influence<f64>,
     protections: Protections,
@@ -53,6 +52,7 @@ impl<'a> FilterBuilder<'a> {
             corrects: true,
             rest_resistance: None,
             initial_strain: None,
+            known: &[],
             gate: None,
             influence: INFLUENCE,
             protections: Protections::ALL,
@@ -112,6 +112,26 @@ impl<'a> FilterBuilder<'a> {
     #[must_use]
     pub const fn initial_strain(self, strain: f64) -> Self {
         Self { initial_strain: Some(strain), ..self }
+    }
+
+    /// Strains (or angles) that are known at times, in any order. What the estimates lack then is known, too, of the rows after it (a
+    /// smoother's: around it): for seconds, and for an hour as far as known strains show an offset or another gain.
+    ///
+    /// ```
+    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+    /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
+    /// use ohmstrain::Known;
+    ///
+    /// let known = [Known::new(0.0, 0.0), Known { sd: Some(0.002), ..Known::new(0.1, 0.10) }];
+    /// let rows = sensor.filter().known(&known).smooth(&[0.00, 0.05, 0.10], &[1600.0, 1632.0, 1660.0])?;
+    /// assert!(rows[0].strain < 0.005 && (rows[2].strain - 0.10).abs() < 0.005);
+    /// let mut filter = sensor.filter().known(&known).build()?;
+    /// assert!(filter.step(0.0, 1600.0)?.strain < 0.005);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub const fn known(self, known: &'a [Known]) -> Self {
+        Self { known, ..self }
     }
 
     /// Turns down readings whose squared innovation over its variance is above `nis`; two in a row at most. 10.8 turns down
@@ -232,108 +252,8 @@ impl<'a> FilterBuilder<'a> {
         Ok(LaggedFilter::new(self.forward(kind)?, lag_s))
     }
 
-    /// Estimates of a whole recording, each from all readings; NaN stands for a missing one.
-    ///
-    /// # Errors
-    /// As [`Sensor::smooth`].
-    ///
-    /// ```
-    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
-    /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
-    /// let rows = sensor.filter().gate(10.8).smooth(&[0.00, 0.05], &[1600.0, 1632.0])?;
-    /// assert_eq!(rows.len(), 2);
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
-    pub fn smooth(self, time_s: &[f64], readings: &[f64]) -> Result<Vec<Estimate>, Error> {
-        if time_s.len() != readings.len() {
-            return Err(Error::Lengths { times: time_s.len(), readings: readings.len() });
-        }
-        self.sensor.check_unit(readings.iter().copied(), self.rest_resistance)?;
-        let mut rows = Vec::with_capacity(time_s.len());
-        self.smooth_backward(
-            time_s.len(),
-            |row| (time_s[row], Reading::from(readings[row])),
-            |_, segment| {
-                rows.extend(segment.iter().rev());
-                Ok::<(), Error>(())
-            },
-        )?;
-        rows.reverse();
-        Ok(rows)
-    }
-
-    /// Smooths a recording that is too long to hold its estimates in memory: `row` gives time, s, and reading of each of
-    /// `len` rows; `take` gets the estimates segment by segment, the last segment first, each in order of time.
-    ///
-    /// # Errors
-    /// As [`Self::build`]; the row that cannot be taken; or the error of `take`.
-    ///
-    /// ```
-    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
-    /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
-    /// use ohmstrain::{Error, Reading};
-    ///
-    /// let row = |k: usize| (0.05 * k as f64, Reading::from(1600.0 + k as f64));
-    /// sensor.filter().smooth_backward(10_000, row, |rows, estimates| {
-    ///     println!("rows {rows:?}: {} estimates", estimates.len());
-    ///     Ok::<(), Error>(())
-    /// })?;
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
-    pub fn smooth_backward<E: From<Error>>(
-        self,
-        len: usize,
-        row: impl Fn(usize) -> (f64, Reading),
-        mut take: impl FnMut(Range<usize>, &[Estimate]) -> Result<(), E>,
-    ) -> Result<(), E> {
-        let starts_known = self.initial_strain.is_some();
-        let kind = self.kind().smoother();
-        if kind == EstimatorKind::Corrected {
-            self.sensor.check_smoother()?;
-        }
-        let Kernel { mut filter, translator } = self.kernel(kind)?;
-        let Translator { scale, mut doubts, follower, .. } = translator;
-        let failed = |(row, source): (usize, StepError)| Error::Row { row, source };
-        let calibrated = |k: usize| {
-            let (time_s, reading) = row(k);
-            (time_s, reading.relative(scale.rest_reading))
-        };
-        let follower = follower.map(|follower| follower.settled(len, calibrated));
-        let off = follower.map_or(0.0, |follower| follower.off());
-        let relative = |k| {
-            let (time_s, reading) = calibrated(k);
-            (time_s, followed(follower.as_ref(), reading))
-        };
-        let mut back = filter.way_back(Rows::new(len, &relative)).map_err(failed)?;
-        let (mut outputs, mut estimates, mut first) = (Vec::new(), Vec::new(), len);
-        let start_s = if len > 0 { row(0).0 } else { 0.0 };
-        let mut next_s = if len > 0 { row(len - 1).0 } else { 0.0 };
-        let mut pauses = doubts.map(|doubts| Pauses::new(doubts.unread()));
-        while let Some(rows) = back.next_segment(&mut outputs).map_err(failed)? {
-            first = rows.start;
-            pauses.iter_mut().for_each(|pauses| pauses.widen(rows.clone(), |k| row(k).0, &mut outputs));
-            estimates.clear();
-            estimates.extend(rows.clone().zip(&mut outputs).rev().map(|(k, output)| {
-                let (time_s, reading) = row(k);
-                let mut flags = Flags::NONE;
-                if let Some(doubts) = doubts.as_mut().filter(|_| k > 0 || !starts_known) {
-                    let (taken, strain) = (taken(&scale, reading, output), &mut output.estimate.strain);
-                    doubts.see_back(time_s - start_s, next_s - time_s, taken);
-                    (strain.variance, flags) = doubts.widened(output.estimate.rate.mean, strain.variance);
-                }
-                next_s = time_s;
-                let mut estimate = scale.row(time_s, reading, off, output);
-                estimate.flags = estimate.flags.and(flags);
-                estimate
-            }));
-            estimates.reverse();
-            take(rows, &estimates)?;
-        }
-        if first == 0 { Ok(()) } else { Err(Error::NoSmoother.into()) }
-    }
-
     /// The estimator that was chosen.
-    fn kind(&self) -> EstimatorKind {
+    pub(crate) fn kind(&self) -> EstimatorKind {
         let kind = self.estimator.unwrap_or(self.sensor.params().default_estimator);
         if self.corrects { kind } else { self.sensor.params().filter_of(kind) }
     }
@@ -348,7 +268,7 @@ impl<'a> FilterBuilder<'a> {
         Ok(kernel)
     }
 
-    fn kernel(self, kind: EstimatorKind) -> Result<Kernel, Error> {
+    pub(crate) fn kernel(self, kind: EstimatorKind) -> Result<Kernel, Error> {
         let params = self.sensor.params();
         let start = self.initial_strain.map_or(Ok(Start::Unknown), |strain| self.start_at(strain))?;
         let mut filter = self.sensor.build(Some(kind), start)?;
@@ -364,7 +284,8 @@ impl<'a> FilterBuilder<'a> {
         });
         let is_told = self.rest_resistance.is_some();
         let follower = (!is_told).then(|| RestFollower::new(params.rest_bounds()));
-        Ok(Kernel { filter, translator: Translator { scale, doubts, follower, seen_s: 0.0 } })
+        let (known, errors) = (in_order(self.known, &scale)?, KnownErrors::new(scale.limits()));
+        Ok(Kernel { filter, translator: Translator { scale, doubts, follower, seen_s: 0.0, errors }, known })
     }
 
     fn start_at(&self, strain: f64) -> Result<Start, Error> {

@@ -1,7 +1,7 @@
 use ohmstrain_calib::{Output, Quantity, SensorParams};
 use ohmstrain_ekf::live::{KNOWN_BEYOND, SURPRISING_NIS};
 use ohmstrain_ekf::{Gaussian, ReadingVerdict};
-use ohmstrain_model::Joint;
+use ohmstrain_model::{Joint, StrainRange};
 use serde::ser::SerializeStruct;
 use serde::{Serialize, Serializer};
 
@@ -140,6 +140,16 @@ impl Scale {
         let (rest_reading, rested) = self.calibrated;
         self.rest_reading = rest_reading * (measured / rested);
         Ok(())
+    }
+
+    /// How far the limits of the strain are apart.
+    pub(crate) const fn span(&self) -> f64 {
+        self.limits.1 - self.limits.0
+    }
+
+    /// The limits of the strain.
+    pub(crate) const fn limits(&self) -> StrainRange<f64> {
+        StrainRange { lower: self.limits.0, upper: self.limits.1 }
     }
 
     /// A strain that is known to `sd`, within the limits or a little beyond.

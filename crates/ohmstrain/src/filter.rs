@@ -1,16 +1,20 @@
 use std::collections::VecDeque;
 use std::{fmt, mem};
 
-use ohmstrain_calib::Output;
+use ohmstrain_calib::{KnownErrors, KnownStrain, Output};
+use ohmstrain_ekf::Gaussian;
 use ohmstrain_ekf::live::{Doubts, Flags, RestFollower};
 
 use crate::estimate::Scale;
+use crate::known::next_until;
 use crate::{Error, Estimate, Reading};
 
 /// A filter for the sizes of the sensor's law, and the way to it from readings and from it to rows.
 pub(crate) struct Kernel {
     pub filter: Box<dyn ohmstrain_calib::Filter>,
     pub translator: Translator,
+    /// Strains that will be known, in order of time.
+    pub known: VecDeque<(f64, Gaussian<f64>)>,
 }
 
 /// From readings to what the filter sees, and from what it says to rows.
@@ -22,6 +26,8 @@ pub(crate) struct Translator {
     pub follower: Option<RestFollower<f64>>,
     /// Time of the row that was seen last, s.
     pub seen_s: f64,
+    /// What known strains say of other rows.
+    pub errors: KnownErrors,
 }
 
 impl Translator {
@@ -32,9 +38,9 @@ impl Translator {
 
     /// The row of a reading and what the filter says of it, in doubt. Doubts are of readings as calibration would have had
     /// them.
-    fn row(&mut self, (time_s, reading): (f64, Reading), mut output: Output) -> Estimate {
+    fn row(&mut self, (time_s, reading): (f64, Reading), output: &mut Output) -> Estimate {
         let dt_s = time_s - mem::replace(&mut self.seen_s, time_s);
-        let (taken, off) = (taken(&self.scale, reading, &output), self.off());
+        let (taken, off) = (taken(&self.scale, reading, output), self.off());
         if let (Some(follower), Some((relative, _))) = (&mut self.follower, taken) {
             output.startled.into_iter().for_each(|jump| follower.jumped(jump));
             follower.see(dt_s, relative);
@@ -45,9 +51,17 @@ impl Translator {
             let variance = doubts.see(dt_s, taken, *strain);
             (strain.variance, flags) = doubts.widened(output.estimate.rate.mean, variance);
         }
-        let mut row = self.scale.row(time_s, reading, off, &output);
+        self.errors.restate(time_s, output.estimate.strain);
+        let mut row = self.known_row((time_s, reading), off, output);
         row.flags = row.flags.and(flags);
         row
+    }
+
+    /// The row of what is said, with what is known of its error.
+    fn known_row(&self, (time_s, reading): (f64, Reading), off: f64, said: &Output) -> Estimate {
+        let mut output = *said;
+        output.estimate.strain = self.errors.correct(time_s, said.estimate.strain);
+        self.scale.row(time_s, reading, off, &output)
     }
 
     /// By what share R₀ has been followed.
@@ -58,16 +72,22 @@ impl Translator {
     /// R₀ is told: nothing follows any more.
     fn rest_resistance(&mut self, measured: f64) -> Result<(), Error> {
         self.scale.rest_at(measured)?;
+        // What errors were known of were those of another R₀.
+        self.errors = KnownErrors::new(self.scale.limits());
         self.follower = None;
         self.doubts.iter_mut().for_each(Doubts::told_rest);
         Ok(())
     }
 
-    /// The strain is known, to `sd`.
-    fn know(&mut self, filter: &mut dyn ohmstrain_calib::Filter, strain: f64, sd: f64) -> Result<(), Error> {
-        filter.know(&self.scale.known(strain, sd)?)?;
+    /// The strain of a row is known, of which something was said; the row as it is now.
+    fn told(&mut self, (time_s, reading, output): (f64, Reading, &Output), known: Gaussian<f64>) -> Estimate {
+        self.know(KnownStrain { time_s, known, said: output.estimate.strain });
+        self.known_row((time_s, reading), self.off(), output)
+    }
+
+    fn know(&mut self, strain: KnownStrain) {
+        self.errors.tell(strain);
         self.doubts.iter_mut().for_each(Doubts::settle);
-        Ok(())
     }
 }
 
@@ -97,13 +117,13 @@ pub(crate) fn taken(scale: &Scale, reading: Reading, output: &Output) -> Option<
 /// ```
 pub struct Filter {
     kernel: Kernel,
-    /// Time and reading of the last row.
-    last: (f64, Reading),
+    /// Time and reading of the last row, and what was said of it before known strains.
+    last: Option<(f64, Reading, Output)>,
 }
 
 impl Filter {
     pub(crate) const fn new(kernel: Kernel) -> Self {
-        Self { kernel, last: (0.0, Reading::MISSING) }
+        Self { kernel, last: None }
     }
 
     /// Takes the reading at `time_s` and tells what is known then. A missing reading is NaN, `None` or
@@ -124,13 +144,20 @@ impl Filter {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn step(&mut self, time_s: f64, reading: impl Into<Reading>) -> Result<Estimate, Error> {
-        let (Kernel { filter, translator }, reading) = (&mut self.kernel, reading.into());
+        let (Kernel { filter, translator, known }, reading) = (&mut self.kernel, reading.into());
         filter.step(time_s, translator.relative(reading))?;
-        self.last = (time_s, reading);
-        Ok(translator.row(self.last, filter.output()))
+        let mut said = filter.output();
+        let mut row = translator.row((time_s, reading), &mut said);
+        while let Some(known) = next_until(known, time_s) {
+            row = translator.told((time_s, reading, &said), known);
+        }
+        self.last = Some((time_s, reading, said));
+        Ok(row)
     }
 
-    /// Takes in that the strain (or angle) is known now, to `sd`: the estimate of the last row, and those after it, follow.
+    /// Takes in that the strain (or angle) is known now, to `sd`: the estimate of the last row, or of the first one if there is
+    /// none yet, and those after it follow. What the error was then counts for seconds, and for an hour as far as more than one known
+    /// strain, or one that is far from what was said, show an offset or another gain.
     ///
     /// # Errors
     /// If the strain lies beyond the limits by more than a tenth of them, or `sd` is not positive. The filter stays as it was.
@@ -145,9 +172,13 @@ impl Filter {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn know(&mut self, strain: f64, sd: f64) -> Result<Estimate, Error> {
-        let (Kernel { filter, translator }, (time_s, reading)) = (&mut self.kernel, self.last);
-        translator.know(filter.as_mut(), strain, sd)?;
-        Ok(translator.scale.row(time_s, reading, translator.off(), &filter.output()))
+        let Kernel { filter, translator, known } = &mut self.kernel;
+        let strain = translator.scale.known(strain, sd)?;
+        let Some((time_s, reading, said)) = &self.last else {
+            known.push_front((f64::NEG_INFINITY, strain));
+            return Ok(translator.scale.row(f64::NAN, Reading::MISSING, 0.0, &filter.output()));
+        };
+        Ok(translator.told((*time_s, *reading, said), strain))
     }
 
     /// What the rested, unstretched sensor is found to read from now on, in place of what it read in calibration.
@@ -186,6 +217,8 @@ impl Filter {
 pub struct LaggedFilter {
     kernel: Kernel,
     lag_s: f64,
+    /// Time of the last row, s.
+    last_s: Option<f64>,
     /// Rows whose estimates wait for later readings.
     waiting: VecDeque<(f64, Reading)>,
     /// Estimates that have become due.
@@ -196,7 +229,7 @@ pub struct LaggedFilter {
 
 impl LaggedFilter {
     pub(crate) const fn new(kernel: Kernel, lag_s: f64) -> Self {
-        Self { kernel, lag_s, waiting: VecDeque::new(), due: Vec::new(), are_out: true }
+        Self { kernel, lag_s, last_s: None, waiting: VecDeque::new(), due: Vec::new(), are_out: true }
     }
 
     /// Takes the reading at `time_s`, as [`Filter::step`] does, and hands out the rows that have become due, in order.
@@ -215,16 +248,18 @@ impl LaggedFilter {
     pub fn step(&mut self, time_s: f64, reading: impl Into<Reading>) -> Result<&[Estimate], Error> {
         let (reading, lag_s) = (reading.into(), self.lag_s);
         self.forget_handed_out();
+        self.take_known();
         self.waiting.push_back((time_s, reading));
-        let Kernel { filter, translator } = &mut self.kernel;
+        let Kernel { filter, translator, .. } = &mut self.kernel;
         let relative = translator.relative(reading);
         let (waiting, due) = (&mut self.waiting, &mut self.due);
-        let mut out = |output| due.extend(waiting.pop_front().map(|row| translator.row(row, output)));
+        let mut out = |mut output| due.extend(waiting.pop_front().map(|row| translator.row(row, &mut output)));
         let taken = filter.step_lagged(time_s, relative, lag_s, &mut out);
         if taken.is_err() {
             self.waiting.pop_back();
         }
         taken?;
+        self.last_s = Some(time_s);
         self.are_out = true;
         Ok(&self.due)
     }
@@ -244,9 +279,11 @@ impl LaggedFilter {
     /// ```
     pub fn finish(&mut self) -> Result<&[Estimate], Error> {
         self.forget_handed_out();
-        let Kernel { filter, translator } = &mut self.kernel;
+        self.take_known();
+        let Kernel { filter, translator, .. } = &mut self.kernel;
         let (waiting, due) = (&mut self.waiting, &mut self.due);
-        filter.flush_lagged(&mut |output| due.extend(waiting.pop_front().map(|row| translator.row(row, output))))?;
+        let mut out = |mut output| due.extend(waiting.pop_front().map(|row| translator.row(row, &mut output)));
+        filter.flush_lagged(&mut out)?;
         self.are_out = true;
         Ok(&self.due)
     }
@@ -266,8 +303,21 @@ impl LaggedFilter {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn know(&mut self, strain: f64, sd: f64) -> Result<(), Error> {
-        let Kernel { filter, translator } = &mut self.kernel;
-        translator.know(filter.as_mut(), strain, sd)
+        let strain = self.kernel.translator.scale.known(strain, sd)?;
+        self.kernel.known.push_front((f64::NEG_INFINITY, strain));
+        if self.last_s.is_some() {
+            self.take_known();
+        }
+        Ok(())
+    }
+
+    /// Takes in what is known by the last row. Rows are handed out as soon as they are due: it is after them.
+    fn take_known(&mut self) {
+        let Kernel { filter, translator, known } = &mut self.kernel;
+        let Some(time_s) = self.last_s else { return };
+        while let Some(known) = next_until(known, time_s) {
+            translator.know(KnownStrain { time_s, known, said: filter.strain() });
+        }
     }
 
     /// As [`Filter::rest_resistance`].

@@ -1,4 +1,4 @@
-use ohmstrain::{Column, EstimatorKind, FilterBuilder, Influence, Sensor};
+use ohmstrain::{Column, EstimatorKind, FilterBuilder, Influence, Known, Sensor};
 use pyo3::prelude::*;
 
 use crate::error::{Place, raise};
@@ -10,6 +10,8 @@ pub struct Options {
     estimator: Option<String>,
     correction: bool,
     initial_strain: Option<f64>,
+    #[pyo3(from_py_with = known)]
+    known: Vec<Known>,
     rest_resistance: Option<Rest>,
     gate: Option<f64>,
     influence: Option<String>,
@@ -57,8 +59,8 @@ impl Options {
     }
 
     /// A sensor's filter as they want it.
-    pub fn builder<'a>(&self, sensor: &'a Sensor) -> PyResult<FilterBuilder<'a>> {
-        let mut builder = sensor.filter();
+    pub fn builder<'a>(&'a self, sensor: &'a Sensor) -> PyResult<FilterBuilder<'a>> {
+        let mut builder = sensor.filter().known(&self.known);
         if let Some(kind) = self.estimator.as_deref().map(estimator).transpose()?.flatten() {
             builder = builder.estimator(kind);
         }
@@ -79,6 +81,12 @@ impl Options {
         }
         Ok(builder)
     }
+}
+
+/// Known strains: time, strain and deviation, if there is one.
+fn known(given: &Bound<PyAny>) -> PyResult<Vec<Known>> {
+    let strains: Vec<(f64, f64, Option<f64>)> = given.extract()?;
+    Ok(strains.into_iter().map(|(time_s, strain, sd)| Known { time_s, strain, sd }).collect())
 }
 
 /// An estimator by its name; `None` for `auto`.

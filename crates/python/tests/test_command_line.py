@@ -27,6 +27,7 @@ OPTIONS = [
     (("--estimator", "ekf"), {"estimator": "ekf"}),
     (("--gate", "10.8", "--initial-strain", "0"), {"gate": 10.8, "initial_strain": 0.0}),
     (("--influence", "huber:2", "--rest-resistance", "1580"), {"influence": "huber:2", "rest_resistance": 1580.0}),
+    (("--known", "3:0.1", "--known", "5:0.12:0.001"), {"known": [(3.0, 0.1), (5.0, 0.12, 0.001)]}),
     (("--rest-resistance", "calibrated"), {"rest_resistance": "calibrated"}),
 ]
 

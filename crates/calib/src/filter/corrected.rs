@@ -7,7 +7,6 @@ use ohmstrain_ekf::live::{Innovations, SURPRISING_NIS, Sieve};
 use ohmstrain_ekf::{Gaussian, Guard, Reading, ReadingVerdict, StepError};
 
 use crate::CalibrationError;
-use crate::filter::known::KnownError;
 use crate::filter::learned::{Learned, OfFilter, OfSmoother};
 use crate::filter::way_back::SEGMENT;
 use crate::filter::{Filter, Output, Rows, WayBack};
@@ -24,8 +23,6 @@ pub(crate) struct Corrected {
     readings: Watched,
     /// What the filter has said of the last row.
     said: Option<Output>,
-    /// What is left of a moment at which the strain was known.
-    known: Option<KnownError>,
     /// Corrected strains of the rows that wait for a fixed lag, and how much larger innovations had been than stated.
     waiting: VecDeque<(Gaussian<f64>, f64)>,
     /// Lagged estimates on their way out.
@@ -73,7 +70,6 @@ impl Corrected {
             learned: Arc::clone(learned),
             readings: Watched::new(learned.params.readings.past()),
             said: None,
-            known: None,
             waiting: VecDeque::new(),
             lagged: Vec::new(),
         })
@@ -91,14 +87,6 @@ impl Corrected {
 
     /// The filter's strain, corrected; as it is before the first reading.
     fn corrected(&self, output: &Output) -> Gaussian<f64> {
-        let strain = self.learned(output);
-        match (self.known, self.readings.time_s) {
-            (Some(known), Some(time_s)) => known.correct(time_s, strain),
-            _ => strain,
-        }
-    }
-
-    fn learned(&self, output: &Output) -> Gaussian<f64> {
         let filtered = output.estimate.strain;
         let Some(past) = self.readings.features.now() else { return filtered };
         let inputs = filter_inputs(&outputs(output), &past);
@@ -169,17 +157,6 @@ impl Filter for Corrected {
         Ok(())
     }
 
-    fn know(&mut self, strain: &Gaussian<f64>) -> Result<(), StepError> {
-        self.filter.know(strain)?;
-        let said = self.filter.output();
-        let learned = self.learned(&said);
-        // For how long errors of the correction hang together.
-        let lasts_s = self.learned.params.filter.residual.noise_time_s;
-        self.known = self.readings.time_s.map(|time_s| KnownError::new(time_s, lasts_s, strain, &learned));
-        self.said = Some(said);
-        Ok(())
-    }
-
     fn strain(&self) -> Gaussian<f64> {
         self.output().estimate.strain
     }
@@ -227,7 +204,7 @@ impl Filter for Corrected {
             past.step(time_s, Seen::plain(reading));
         }
         // The filter says what it says at the end of the recording.
-        (self.readings, self.said, self.known) = (past, None, None);
+        (self.readings, self.said) = (past, None);
         let back = self.filter.way_back(rows)?;
         let ahead = Watched::new(self.learned.params.readings.future());
         Ok(Box::new(CorrectedWayBack { back, correction, rows, starts, ahead }))

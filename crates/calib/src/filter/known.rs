@@ -1,55 +1,280 @@
-use ohmstrain_ekf::Gaussian;
+use std::collections::VecDeque;
 
-/// What a strain that was known for a moment says of the errors since: errors of a correction hang together for seconds, so
-/// that one which is known now is known in part a little later.
-///
-/// The error is taken for an Ornstein-Uhlenbeck process of the variance that was stated.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct KnownError {
-    time_s: f64,
-    /// For how long errors last, s.
-    lasts_s: f64,
-    /// Known strain minus what was said, as far as it is told from the uncertainty of what is known.
-    error: f64,
-    /// Share of the stated variance that knowing it takes away, 0 to 1.
-    told: f64,
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use ohmstrain_ekf::Gaussian;
+use ohmstrain_model::StrainRange;
+
+/// Known strains that count for a row: the last ones of a filter, half before and half after a smoother's row.
+pub const MOST_KNOWN: usize = 16;
+/// For how long errors hang together that come and go with the motion, s.
+const FAST_S: f64 = 3.0;
+/// For how long offset and gain of a day do, s.
+const SLOW_S: f64 = 3600.0;
+/// Variance of the error of the gain, relative to that of the offset, for a strain that may be anywhere in the limits: a
+/// strain that is known near one end of them tells little of the other one.
+const GAIN: f64 = 1.0;
+/// Beyond this distance from the middle of the limits, in spans, an error of the gain grows no more.
+const FARTHEST: f64 = 0.6;
+
+/// How large errors are that last, in stated variances: within a recording hardly anything, on another day many times what
+/// is stated. Which of them it is the known strains tell.
+#[derive(Clone, Copy, Debug)]
+struct Size {
+    /// How probable it is before any strain is known.
+    probability: f64,
+    fast: f64,
+    slow: f64,
 }
 
-impl KnownError {
-    /// At `time_s` the strain was `known`, where `said` was stated of it.
-    pub(crate) fn new(time_s: f64, lasts_s: f64, known: &Gaussian<f64>, said: &Gaussian<f64>) -> Self {
-        let told = said.variance / (said.variance + known.variance);
-        let told = if told.is_finite() { told } else { 0.0 };
-        Self { time_s, lasts_s, error: told * (known.mean - said.mean), told }
+/// `docs/another-day.md` has what they were chosen on.
+const SIZES: [Size; 4] = [
+    Size { probability: 0.85, fast: 0.97, slow: 0.03 },
+    Size { probability: 0.08, fast: 0.7, slow: 0.3 },
+    Size { probability: 0.04, fast: 1.0, slow: 3.0 },
+    Size { probability: 0.03, fast: 1.0, slow: 30.0 },
+];
+
+/// A strain that was known at a moment, and what had been stated of it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct KnownStrain {
+    /// When, s.
+    pub time_s: f64,
+    /// The strain, and how well it is known.
+    pub known: Gaussian<f64>,
+    /// The statement, without what earlier known strains say of it.
+    pub said: Gaussian<f64>,
+}
+
+/// What strains that were known for a moment say of a filter's errors at other times.
+///
+/// An error is a Gaussian process of the time: a part that lasts for seconds, in units of the deviation that is stated, an
+/// offset and an error of the gain that last for an hour, in units of what is stated on average where strains are known. How large
+/// these two are is one of [`SIZES`], weighed by how likely they make what was known (a mixture of Gaussian processes).
+#[derive(Clone, Debug)]
+pub struct KnownErrors {
+    limits: StrainRange<f64>,
+    strains: VecDeque<KnownStrain>,
+    /// Mean of the variances that were stated of them.
+    usual: f64,
+    /// One for each size.
+    voices: Vec<Voice>,
+}
+
+/// Errors of one size, conditioned on the known strains.
+#[derive(Clone, Debug)]
+struct Voice {
+    size: Size,
+    /// Probability that it is this size.
+    weight: f64,
+    covariance: Cholesky<f64, Dyn>,
+    /// Inverse covariance times known errors.
+    weighted: DVector<f64>,
+}
+
+/// A statement, as far as its error hangs together with that of another one.
+#[derive(Clone, Copy)]
+struct Place {
+    time_s: f64,
+    sd: f64,
+    /// Distance from the middle of the limits, of variance one if the strain may be anywhere in them.
+    lever: f64,
+}
+
+impl Size {
+    /// Of errors at two places, where `usual` is the variance that the slow part is relative to.
+    fn covariance(self, usual: f64, a: Place, b: Place) -> f64 {
+        let apart_s = (a.time_s - b.time_s).abs();
+        let fast = self.fast * a.sd * b.sd * (-apart_s / FAST_S).exp();
+        fast + self.slow * usual * (-apart_s / SLOW_S).exp() * (1.0 + GAIN * a.lever * b.lever)
+    }
+}
+
+impl KnownErrors {
+    /// Before any strain is known.
+    #[must_use]
+    pub const fn new(limits: StrainRange<f64>) -> Self {
+        Self { limits, strains: VecDeque::new(), usual: 0.0, voices: Vec::new() }
     }
 
-    /// A statement at a later time, without what is left of that error.
-    pub(crate) fn correct(&self, time_s: f64, said: Gaussian<f64>) -> Gaussian<f64> {
-        let left = (-(time_s - self.time_s).max(0.0) / self.lasts_s).exp();
-        Gaussian { mean: said.mean + left * self.error, variance: said.variance * (1.0 - left * left * self.told) }
+    /// Of so many strains, the last [`MOST_KNOWN`] of them.
+    #[must_use]
+    pub fn of(limits: StrainRange<f64>, strains: &[KnownStrain]) -> Self {
+        let last = strains.len().saturating_sub(MOST_KNOWN);
+        let mut errors = Self { strains: strains[last..].iter().copied().collect(), ..Self::new(limits) };
+        errors.condition();
+        errors
+    }
+
+    /// Another strain is known. The oldest of more than [`MOST_KNOWN`] is forgotten.
+    pub fn tell(&mut self, strain: KnownStrain) {
+        if self.strains.len() == MOST_KNOWN {
+            self.strains.pop_front();
+        }
+        self.strains.push_back(strain);
+        self.condition();
+    }
+
+    /// Something else is stated of the strain at a time than when it was told, as after a lag.
+    pub fn restate(&mut self, time_s: f64, said: Gaussian<f64>) {
+        let mut is_new = false;
+        for strain in self.strains.iter_mut().filter(|strain| strain.time_s == time_s) {
+            (strain.said, is_new) = (said, true);
+        }
+        if is_new {
+            self.condition();
+        }
+    }
+
+    /// Whether no strain is known.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.strains.is_empty()
+    }
+
+    /// A statement at a time, without what is known of its error.
+    #[must_use]
+    pub fn correct(&self, time_s: f64, said: Gaussian<f64>) -> Gaussian<f64> {
+        if self.voices.is_empty() {
+            return said;
+        }
+        let here = self.place(time_s, &said);
+        let told = self.voices.iter().map(|voice| (voice.weight, voice.error(self.usual, here, self.places())));
+        let told: Vec<(f64, Gaussian<f64>)> = told.collect();
+        let mean = told.iter().map(|(weight, error)| weight * error.mean).sum::<f64>();
+        let spread = |error: &Gaussian<f64>| error.variance + (error.mean - mean).powi(2);
+        let variance = told.iter().map(|(weight, error)| weight * spread(error)).sum();
+        Gaussian { mean: self.limits.clamp(said.mean + mean), variance }
+    }
+
+    fn place(&self, time_s: f64, said: &Gaussian<f64>) -> Place {
+        let StrainRange { lower, upper } = self.limits;
+        let off = (said.mean - 0.5 * (lower + upper)) / (upper - lower);
+        Place { time_s, sd: said.sd(), lever: 12.0_f64.sqrt() * off.clamp(-FARTHEST, FARTHEST) }
+    }
+
+    fn places(&self) -> impl Iterator<Item = Place> {
+        self.strains.iter().map(|strain| self.place(strain.time_s, &strain.said))
+    }
+
+    fn condition(&mut self) {
+        if self.strains.is_empty() {
+            return;
+        }
+        let places: Vec<Place> = self.places().collect();
+        let errors = self.strains.iter().map(|strain| strain.known.mean - strain.said.mean);
+        let errors = DVector::from_iterator(places.len(), errors);
+        let usual = self.strains.iter().map(|strain| strain.said.variance).sum::<f64>() / places.len() as f64;
+        let given = |size: Size| {
+            let noise = |row: usize| self.strains[row].known.variance;
+            let of =
+                |i: usize, j: usize| size.covariance(usual, places[i], places[j]) + if i == j { noise(i) } else { 0.0 };
+            let covariance = Cholesky::new(DMatrix::from_fn(places.len(), places.len(), of))?;
+            let weighted = covariance.solve(&errors);
+            let log_determinant: f64 = covariance.l_dirty().diagonal().iter().map(|root| root.ln()).sum();
+            let log_weight = size.probability.ln() - 0.5 * errors.dot(&weighted) - log_determinant;
+            Some(Voice { size, weight: log_weight, covariance, weighted })
+        };
+        let mut voices: Vec<Voice> = SIZES.into_iter().filter_map(given).collect();
+        let largest = voices.iter().map(|voice| voice.weight).fold(f64::NEG_INFINITY, f64::max);
+        voices.iter_mut().for_each(|voice| voice.weight = (voice.weight - largest).exp());
+        let total: f64 = voices.iter().map(|voice| voice.weight).sum();
+        voices.iter_mut().for_each(|voice| voice.weight /= total);
+        (self.usual, self.voices) = (usual, voices);
+    }
+}
+
+impl Voice {
+    /// The error of a statement, if errors are of this size.
+    fn error(&self, usual: f64, here: Place, known: impl Iterator<Item = Place>) -> Gaussian<f64> {
+        let shared = known.map(|place| self.size.covariance(usual, here, place));
+        let shared = DVector::from_iterator(self.weighted.len(), shared);
+        let mean = shared.dot(&self.weighted);
+        let told = self.covariance.l_dirty().solve_lower_triangular(&shared).map_or(0.0, |told| told.norm_squared());
+        Gaussian { mean, variance: (self.size.covariance(usual, here, here) - told).max(0.0) }
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use ohmstrain_ekf::Gaussian;
+    use super::*;
 
-    use super::KnownError;
+    const LIMITS: StrainRange<f64> = StrainRange { lower: 0.0, upper: 0.4 };
 
-    /// Against the conditional distribution of two Gaussian numbers, written out: error e₀ now and e₁ later, of variance v and
-    /// correlation exp(-t/T), and e₀ + n known with n of variance r.
+    fn strain(time_s: f64, known: f64, said: f64) -> KnownStrain {
+        let [known, said] = [(known, 4e-6), (said, 4e-4)].map(|(mean, variance)| Gaussian { mean, variance });
+        KnownStrain { time_s, known, said }
+    }
+
+    fn said(mean: f64) -> Gaussian<f64> {
+        Gaussian { mean, variance: 4e-4 }
+    }
+
+    /// Against the conditional distribution of two Gaussian numbers, for each size, and Bayes' rule.
     #[test]
-    fn a_known_error_is_conditioned_on() {
-        let (v, r, lasts_s) = (0.04, 0.01, 5.0);
-        let said = Gaussian { mean: 0.1, variance: v };
-        let known = KnownError::new(3.0, lasts_s, &Gaussian { mean: 0.25, variance: r }, &said);
-        for later_s in [0.0, 1.0, 5.0, 60.0] {
-            let covariance = v * f64::exp(-later_s / lasts_s);
-            let expected =
-                Gaussian { mean: 0.1 + covariance / (v + r) * 0.15, variance: v - covariance * covariance / (v + r) };
-            let found = known.correct(3.0 + later_s, said);
-            assert!((found.mean - expected.mean).abs() < 1e-15, "{later_s} s: {found:?} {expected:?}");
-            assert!((found.variance - expected.variance).abs() < 1e-15, "{later_s} s: {found:?} {expected:?}");
+    fn one_known_strain_is_conditioned_on() {
+        let errors = KnownErrors::of(LIMITS, &[strain(10.0, 0.13, 0.1)]);
+        let (lever, later_lever) = ((12.0_f64).sqrt() * -0.25, 12.0_f64.sqrt() * 0.125);
+        for later_s in [0.0, 2.0, 60.0, 5000.0] {
+            let of_size = |(probability, fast, slow): (f64, f64, f64)| {
+                let here = 4e-4 * (fast + slow * (1.0 + lever * lever)) + 4e-6;
+                let there = 1e-4 * fast + 4e-4 * slow * (1.0 + later_lever * later_lever);
+                let slow_now = slow * f64::exp(-later_s / 3600.0) * (1.0 + lever * later_lever);
+                let both = 2e-4 * fast * f64::exp(-later_s / 3.0) + 4e-4 * slow_now;
+                let density = f64::exp(-0.5 * 0.03 * 0.03 / here) / here.sqrt();
+                (probability * density, both / here * 0.03, there - both * both / here)
+            };
+            let parts = [(0.85, 0.97, 0.03), (0.08, 0.7, 0.3), (0.04, 1.0, 3.0), (0.03, 1.0, 30.0)].map(of_size);
+            let total: f64 = parts.iter().map(|part| part.0).sum();
+            let mean: f64 = parts.iter().map(|part| part.0 / total * part.1).sum();
+            let variance: f64 =
+                parts.iter().map(|part| part.0 / total * (part.2 + (part.1 - mean).powi(2))).sum::<f64>();
+            let found = errors.correct(10.0 + later_s, Gaussian { mean: 0.25, variance: 1e-4 });
+            assert!((found.mean - 0.25 - mean).abs() < 1e-12, "{later_s} s: {found:?} {mean}");
+            assert!((found.variance / variance - 1.0).abs() < 1e-9, "{later_s} s: {found:?} {variance}");
         }
+    }
+
+    /// An error that is as stated at one moment is one of that moment; the same one at eight moments lasts.
+    #[test]
+    fn an_error_lasts_if_it_comes_again() {
+        let off = |count: usize| {
+            let strains: Vec<_> = (0..count).map(|k| strain(60.0 * k as f64, 0.23, 0.2)).collect();
+            let last_s = 60.0 * (count - 1) as f64;
+            KnownErrors::of(LIMITS, &strains).correct(last_s + 30.0, said(0.2)).mean - 0.2
+        };
+        assert!(off(1) < 0.15 * 0.03 && off(8) > 0.7 * 0.03, "{} {}", off(1), off(8));
+        // One that is ten times what was stated can only be of another day.
+        let surprising = KnownErrors::of(LIMITS, &[strain(0.0, 0.3, 0.1)]).correct(30.0, said(0.1));
+        assert!(surprising.mean - 0.1 > 0.8 * 0.2, "{surprising:?}");
+    }
+
+    /// A gain of 0.8 that two strains tell, far from where they were known.
+    #[test]
+    fn two_strains_tell_the_gain() {
+        let strains = [(0.05, 0.1), (0.29, 0.4)].map(|(known, said)| strain(1000.0 * known, known, said));
+        let errors = KnownErrors::of(LIMITS, &strains);
+        for mean in [0.15, 0.25, 0.35] {
+            let expected = 0.05 + 0.8 * (mean - 0.1);
+            let found = errors.correct(600.0, said(mean));
+            assert!((found.mean - expected).abs() < 0.3 * (mean - expected).abs(), "{mean}: {found:?} {expected}");
+        }
+    }
+
+    /// Told one after another, forgetting the oldest, or all at once.
+    #[test]
+    fn the_last_ones_count() {
+        let strains: Vec<_> = (0..40).map(|k| strain(20.0 * f64::from(k), 0.2, 0.2 + 0.001 * f64::from(k))).collect();
+        let mut errors = KnownErrors::new(LIMITS);
+        assert!(errors.is_empty() && errors.correct(3.0, said(0.1)) == said(0.1));
+        assert_eq!(KnownErrors::of(LIMITS, &[]).correct(3.0, said(0.1)), said(0.1));
+        strains.iter().for_each(|strain| errors.tell(*strain));
+        let at_once = KnownErrors::of(LIMITS, &strains[40 - MOST_KNOWN..]);
+        assert_eq!(errors.correct(900.0, said(0.3)), at_once.correct(900.0, said(0.3)));
+        assert_eq!(errors.correct(900.0, said(0.3)), KnownErrors::of(LIMITS, &strains).correct(900.0, said(0.3)));
+        // Where something else is stated later.
+        let mut restated = strains.clone();
+        restated[30].said.mean = 0.1;
+        errors.restate(600.0, said(0.1));
+        assert_eq!(errors.correct(900.0, said(0.3)), KnownErrors::of(LIMITS, &restated).correct(900.0, said(0.3)));
     }
 }

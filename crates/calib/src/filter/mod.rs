@@ -29,13 +29,6 @@ pub trait Filter: Send {
     /// Everything that is reported.
     fn output(&self) -> Output;
 
-    /// Takes in that the strain is known now, after the last row: a stop, a mark on the bench, a joint whose angle is seen.
-    /// Rate, relaxation and baseline follow as far as they hang together with it.
-    ///
-    /// # Errors
-    /// If it is not finite, or has no variance where the filter has none. The filter stays as it was.
-    fn know(&mut self, strain: &Gaussian<f64>) -> Result<(), StepError>;
-
     /// Protects the filter from outliers from now on.
     fn guard(&mut self, guard: Guard<f64>);
 

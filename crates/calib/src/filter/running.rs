@@ -134,11 +134,6 @@ where
         Ok(())
     }
 
-    fn know(&mut self, strain: &Gaussian<f64>) -> Result<(), StepError> {
-        *self.now.state = self.now.state.pinned(0, strain)?;
-        Ok(())
-    }
-
     fn strain(&self) -> Gaussian<f64> {
         let Gaussian { mean, variance } = self.now.state.marginal(0);
         let variance = variance * self.interval.filtered_scale.powi(2);

@@ -2,6 +2,7 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use clap::{Args as ClapArgs, ValueEnum};
+use ohmstrain::Known;
 use ohmstrain_ekf::Influence;
 
 use super::{Auto, Estimator, ReplaceArgs, TraceArgs, finite, positive};
@@ -22,6 +23,11 @@ pub struct EstimateArgs {
     /// Strain (or angle) at the first row, if it is known; the body is at rest there
     #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = finite)]
     pub initial_strain: Option<f64>,
+    /// The strain (or angle) is known to be X at the first row from T seconds on, to SD (0.5 % of the limits); repeatable.
+    /// Estimates from there on follow (those of smooth before it, too): for seconds, and as far as known strains show an
+    /// offset or another gain for an hour
+    #[arg(long, value_name = "T:X[:SD]", allow_negative_numbers = true, value_parser = known)]
+    pub known: Vec<Known>,
     /// What the rested, unstretched sensor reads now: a number in the readings' unit, first:N for the median of the first
     /// N readings, or calibrated for what it read in calibration. Without this flag R₀ is that too, but follows readings
     /// that stay beyond those of the calibration
@@ -102,10 +108,6 @@ pub struct FilterArgs {
     /// Estimate every row from the readings up to S seconds after it, 0.5 for instance; rows come out that much later
     #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = positive)]
     pub lag_s: Option<f64>,
-    /// The strain (or angle) is known to be X at the first row from T seconds on, to SD (0.5 % of the limits); repeatable.
-    /// Estimates from there on follow
-    #[arg(long, value_name = "T:X[:SD]", allow_negative_numbers = true)]
-    pub known: Vec<KnownStrain>,
     /// Go on after lines that are none of a trace, as serial lines bring, before the header too; they are counted on stderr
     #[arg(long)]
     pub skip_bad: bool,
@@ -157,30 +159,16 @@ impl FromStr for BoundedInfluence {
     }
 }
 
-/// A strain that is known at a time.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct KnownStrain {
-    /// From when on, s.
-    pub time_s: f64,
-    /// The strain, or the angle in degrees.
-    pub strain: f64,
-    /// Its standard deviation, if it was given.
-    pub sd: Option<f64>,
-}
-
-impl FromStr for KnownStrain {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let expected =
-            || "expected T:X or T:X:SD, a time in seconds, a strain and its deviation, e.g. 12.5:0.10".to_string();
-        let mut parts = text.split(':');
-        let mut number = || parts.next().map(|part| finite(part).map_err(|_| expected())).transpose();
-        let (time_s, strain, sd) = (number()?, number()?, number()?);
-        match (time_s, strain, parts.next()) {
-            (Some(time_s), Some(strain), None) if sd.is_none_or(|sd| sd > 0.0) => Ok(Self { time_s, strain, sd }),
-            _ => Err(expected()),
-        }
+/// A strain that is known at a time, T:X or T:X:SD.
+fn known(text: &str) -> Result<Known, String> {
+    let expected =
+        || "expected T:X or T:X:SD, a time in seconds, a strain and its deviation, e.g. 12.5:0.10".to_string();
+    let mut parts = text.split(':');
+    let mut number = || parts.next().map(|part| finite(part).map_err(|_| expected())).transpose();
+    let (time_s, strain, sd) = (number()?, number()?, number()?);
+    match (time_s, strain, parts.next()) {
+        (Some(time_s), Some(strain), None) if sd.is_none_or(|sd| sd > 0.0) => Ok(Known { time_s, strain, sd }),
+        _ => Err(expected()),
     }
 }
 

@@ -4,7 +4,7 @@ use std::str::FromStr;
 use clap::Args as ClapArgs;
 use ohmstrain_calib::EstimatorKind;
 
-use super::{Estimator, ReplaceArgs, ReportArgs, RestResistance, Split, TraceArgs, finite};
+use super::{Estimator, ReplaceArgs, ReportArgs, RestResistance, Split, TraceArgs, finite, positive};
 
 /// Flags of `evaluate`.
 #[derive(Debug, ClapArgs)]
@@ -33,6 +33,10 @@ pub struct EvaluateArgs {
     /// R₀ follows the readings, as in filter
     #[arg(long, value_name = "OHM|first:N|calibrated", allow_negative_numbers = true)]
     pub rest_resistance: Option<RestResistance>,
+    /// Score also what known strains bring, which the reference tells to the estimator before it is scored with it: one
+    /// every S seconds, and one near each end of the range, at the start
+    #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = positive)]
+    pub known_every: Option<f64>,
     /// Exit with code 3 unless every recording is estimated better than by the static cubic and its 95 % interval covers
     /// 80 % or more
     #[arg(long)]

@@ -49,7 +49,7 @@ pub fn run(args: &DemoArgs) -> Result<(), CliError> {
     outputs.put(sensor_output, sensor_file::text(&sensor)?);
 
     progress.doing("filtering and smoothing");
-    let estimated = estimate(&recording, &sensor, None, None)?;
+    let estimated = estimate(&recording, &sensor, None, None, &[])?;
     outputs.put(filtered_output, estimates(&sensor, &estimated.filtered)?);
     outputs.put(smoothed_output, estimates(&sensor, &estimated.smoothed)?);
     progress.doing("writing the report");

@@ -1,22 +1,18 @@
-use std::collections::VecDeque;
 use std::io::{self, Read};
 
-use ohmstrain::number::significant;
 use ohmstrain::{Error, Estimate, Filter, LaggedFilter, Reading, Sensor, ValidityWatch};
 use ohmstrain_bench_data::{BadContent, Row, TraceError, TraceReader};
 
-use crate::args::{FilterArgs, KnownStrain, RestResistance, WrittenArgs};
+use crate::args::{FilterArgs, RestResistance, WrittenArgs};
 use crate::error::CliError;
 use crate::estimates::{self, EstimateWriter};
 use crate::input::{self, Beginning, check_unit, is_stdin};
 use crate::output::RowsOut;
+use crate::quiet::QuietWatch;
 use crate::readings::no_row;
 use crate::run::{builder, rest_resistance};
 use crate::sensor_file;
 use crate::suits::{self, FIRST_LIVE_READINGS, FIRST_READINGS};
-
-/// How well a known strain is known unless it says so, in spans of the limits.
-const KNOWN_TO: f64 = 0.005;
 
 /// Turns readings into strain as they arrive. Memory does not grow with the recording.
 pub fn run(args: &FilterArgs) -> Result<(), CliError> {
@@ -45,115 +41,67 @@ pub fn run(args: &FilterArgs) -> Result<(), CliError> {
     let live = is_stdin(&args.trace_file) || !args.trace_file.is_file();
     let writer = EstimateWriter::new(rows_out.open(live)?, args.written.format(), columns)?;
     let watch = ValidityWatch::new(&sensor, None);
-    let sink =
-        Sink { writer, watch, sensor: &sensor, rest: None, file: rows.file().into(), header, live, early: vec![] };
+    let quiet = QuietWatch::new(&sensor, None, &args.estimate.known);
+    let sink = Sink {
+        writer,
+        watch,
+        quiet,
+        sensor: &sensor,
+        rest: None,
+        file: rows.file().into(),
+        header,
+        live,
+        early: vec![],
+    };
     stream(args, filter, rows, sink)?;
     rows_out.publish()
 }
 
-/// A filter with or without a lag, and the strains that will be known to it.
-struct FilterRun {
-    filter: Lag,
-    /// In order of time.
-    known: VecDeque<KnownStrain>,
-    /// How well they are known, unless they say so themselves.
-    known_sd: f64,
-    /// Times of the first and the last row.
-    first_s: f64,
-    time_s: f64,
-}
-
-enum Lag {
-    None(Filter, Option<Estimate>),
-    Some(LaggedFilter),
+/// A filter with or without a lag.
+enum FilterRun {
+    AtOnce(Filter, Option<Estimate>),
+    Lagged(LaggedFilter),
 }
 
 impl FilterRun {
     fn new(sensor: &Sensor, args: &FilterArgs) -> Result<Self, Error> {
         let builder = builder(sensor, &args.estimate);
-        let filter = match args.lag_s {
-            None => Lag::None(builder.build()?, None),
-            Some(lag_s) => Lag::Some(builder.build_lagged(lag_s)?),
-        };
-        let mut known = args.known.clone();
-        known.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
-        let known_sd = KNOWN_TO * sensor.params().limits.span();
-        // What would be refused in the middle is refused before the first row.
-        let mut trial = builder.build()?;
-        for known in &known {
-            trial.know(known.strain, known.sd.unwrap_or(known_sd))?;
-        }
-        Ok(Self { filter, known: known.into(), known_sd, first_s: f64::NAN, time_s: f64::NEG_INFINITY })
+        Ok(match args.lag_s {
+            None => Self::AtOnce(builder.build()?, None),
+            Some(lag_s) => Self::Lagged(builder.build_lagged(lag_s)?),
+        })
     }
 
     /// Takes a row; the rows that are due.
     fn step(&mut self, time_s: f64, reading: Reading) -> Result<&[Estimate], Error> {
-        // Rows with a lag are handed out as soon as they are due: what is known at one of them is taken in after it.
-        self.know_with_lag()?;
-        if let Lag::None(filter, row) = &mut self.filter {
-            *row = Some(filter.step(time_s, reading)?);
-        }
-        self.first_s = self.first_s.min(time_s);
-        self.time_s = time_s;
-        match &mut self.filter {
-            Lag::None(filter, row) => {
-                while let Some(known) = next_until(&mut self.known, time_s) {
-                    *row = Some(filter.know(known.strain, known.sd.unwrap_or(self.known_sd))?);
-                }
-                Ok(row.as_slice())
-            }
-            Lag::Some(filter) => filter.step(time_s, reading),
+        match self {
+            Self::AtOnce(filter, row) => Ok(std::slice::from_ref(row.insert(filter.step(time_s, reading)?))),
+            Self::Lagged(filter) => filter.step(time_s, reading),
         }
     }
 
     /// The rows that still wait.
     fn finish(&mut self) -> Result<&[Estimate], Error> {
-        self.know_with_lag()?;
-        match &mut self.filter {
-            Lag::None(..) => Ok(&[]),
-            Lag::Some(filter) => filter.finish(),
+        match self {
+            Self::AtOnce(..) => Ok(&[]),
+            Self::Lagged(filter) => filter.finish(),
         }
-    }
-
-    /// Says which strains no row came for.
-    fn warn_of_unused(&self, file: &str) {
-        let (first, last) = (significant(self.first_s, 6), significant(self.time_s, 6));
-        for known in self.known.iter().filter(|known| known.time_s > self.time_s) {
-            let KnownStrain { time_s, strain, .. } = known;
-            CliError::warning(&format!(
-                "{file}: --known {time_s}:{strain} was not used: the recording goes from {first} to {last} s"
-            ));
-        }
-    }
-
-    fn know_with_lag(&mut self) -> Result<(), Error> {
-        if let Lag::Some(filter) = &mut self.filter {
-            while let Some(known) = next_until(&mut self.known, self.time_s) {
-                filter.know(known.strain, known.sd.unwrap_or(self.known_sd))?;
-            }
-        }
-        Ok(())
     }
 
     fn rest_resistance(&mut self, measured: f64) -> Result<(), Error> {
-        match &mut self.filter {
-            Lag::None(filter, _) => filter.rest_resistance(measured),
-            Lag::Some(filter) => filter.rest_resistance(measured),
+        match self {
+            Self::AtOnce(filter, _) => filter.rest_resistance(measured),
+            Self::Lagged(filter) => filter.rest_resistance(measured),
         }
     }
 }
 
-/// The next strain that is known by `time_s`.
-fn next_until(known: &mut VecDeque<KnownStrain>, time_s: f64) -> Option<KnownStrain> {
-    known.front().is_some_and(|known| known.time_s <= time_s).then(|| known.pop_front()).flatten()
-}
-
 /// Filters row by row.
-fn stream<W: io::Write + Send>(
-    args: &FilterArgs,
+fn stream<'a, W: io::Write + Send>(
+    args: &'a FilterArgs,
     mut filter: FilterRun,
     rows: TraceReader<Box<dyn Read>>,
-    mut sink: Sink<W>,
+    mut sink: Sink<'a, W>,
 ) -> Result<(), CliError> {
     let wanted = args.estimate.rest_resistance;
     // The rows that R₀ is taken from, at least one, are estimated too, once it is known.
@@ -170,10 +118,13 @@ fn stream<W: io::Write + Send>(
     let rest = rest_resistance(wanted, sink.sensor, known(), &sink.file)?;
     rest.map_or(Ok(()), |measured| filter.rest_resistance(measured))?;
     (sink.rest, sink.watch) = (rest, ValidityWatch::new(sink.sensor, rest));
+    sink.quiet = QuietWatch::new(sink.sensor, rest, &args.estimate.known);
     if !sink.live {
         suits::check_readings(&sink.header, sink.sensor, rest, known())?;
     }
+    let mut times: Option<(f64, f64)> = None;
     let mut take = |row: Row| -> Result<(), CliError> {
+        times = Some((times.map_or(row.time_s, |times| times.0), row.time_s));
         let at = |error| CliError::Input(format!("{}:{}: {error}", sink.file, row.line));
         sink.write(filter.step(row.time_s, input::reading(&row.reading)).map_err(at)?)
     };
@@ -186,8 +137,8 @@ fn stream<W: io::Write + Send>(
         row => take(row?),
     });
     skipped.say();
-    if streamed.is_ok() {
-        filter.warn_of_unused(&sink.file);
+    if let (Ok(()), Some(times)) = (&streamed, times) {
+        suits::warn_of_unused(&args.estimate.known, times, &sink.file);
     }
     // The rows that still wait get their estimates, whatever stopped the stream, and what was estimated is still good.
     let finished = match filter.finish() {
@@ -202,6 +153,7 @@ struct Sink<'a, W: io::Write + Send> {
     writer: EstimateWriter<W>,
     /// Says when the calibration does not reach.
     watch: ValidityWatch,
+    quiet: QuietWatch<'a>,
     sensor: &'a Sensor,
     /// What the rested sensor reads, if not what it read in calibration.
     rest: Option<f64>,
@@ -224,6 +176,9 @@ impl<W: io::Write + Send> Sink<'_, W> {
             }
             for warning in self.watch.see(row.time_s, reading, row.strain_rate, f64::NAN) {
                 CliError::warning(&format!("{}: {warning}", self.file));
+            }
+            if let Some(quiet) = self.quiet.see(row) {
+                CliError::warning(&format!("{}: {}", self.file, suits::of_rest(&quiet)));
             }
             self.writer.write(row)?;
         }

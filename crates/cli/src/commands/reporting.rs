@@ -81,7 +81,7 @@ impl Reporting<'_> {
     pub fn drawn(&self) -> Result<Drawn, CliError> {
         let Self { recording, sensor, part, .. } = *self;
         let (params, rest_reading) = (sensor.params(), sensor.rest_reading(self.rest_resistance));
-        let estimated = estimate(recording, sensor, self.rest_resistance, self.kind)?;
+        let estimated = estimate(recording, sensor, self.rest_resistance, self.kind, &[])?;
         let kind = self.kind.unwrap_or(params.default_estimator);
         let moved = params.rest_reading / rest_reading;
         let filter = scoring::of_estimates(recording, &estimated.filtered, part);

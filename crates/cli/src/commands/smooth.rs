@@ -38,6 +38,9 @@ pub fn run(args: &SmoothArgs) -> Result<(), CliError> {
     readings.whole()?;
     let segments = segments.map_err(|error| error.named(&name))?;
     suits::warn_of_start(args.estimate.initial_strain, &sensor);
+    if let Some(last) = readings.len().checked_sub(1) {
+        suits::warn_of_unused(&args.estimate.known, (readings.row(0).0, readings.row(last).0), &name);
+    }
     let mut watch = ValidityWatch::new(&sensor, rest);
     let see = |row: usize, rate: f32| {
         let (time_s, reading) = readings.row(row);

@@ -32,10 +32,15 @@ def _about(
     return {"name": name, "gauge_length_mm": gauge_length_mm, "front_end": front_end, "joint": joint}
 
 
+def _known(time_s: float, strain: float, sd: float | None = None) -> tuple[float, float, float | None]:
+    return (time_s, strain, sd)
+
+
 def _options(
     estimator: str = "auto",
     correction: bool = True,
     initial_strain: float | None = None,
+    known: Iterable[tuple[float, ...]] = (),
     rest_resistance: float | str | None = None,
     gate: float | None = None,
     influence: str | None = None,
@@ -45,6 +50,7 @@ def _options(
         "estimator": estimator,
         "correction": correction,
         "initial_strain": initial_strain,
+        "known": [_known(*strain) for strain in known],
         "rest_resistance": rest_resistance,
         "gate": gate,
         "influence": influence,
@@ -185,6 +191,9 @@ class Sensor:
             With the learned correction of the strain, the default.
         initial_strain : float
             Strain at the first row, if it is known; the body is at rest there.
+        known : list of tuples
+            Strains (or angles) that are known, ``(time_s, strain)`` or ``(time_s, strain, sd)``: of the first row from that
+            time on. What the estimates lack then is known of the rows after it, too (a smoother's: around it).
         rest_resistance : float or str
             What the rested, unstretched sensor reads now, or ``calibrated`` for what it read in calibration. Without it
             R₀ is that too, but follows readings that stay beyond those of the calibration.

@@ -66,10 +66,6 @@ impl Filter for Fake {
         Ok(())
     }
 
-    fn know(&mut self, _: &Gaussian<f64>) -> Result<(), StepError> {
-        Ok(())
-    }
-
     fn strain(&self) -> Gaussian<f64> {
         self.output().estimate.strain
     }

@@ -62,6 +62,12 @@ impl Evaluation {
                 summary::write(&self.summaries(), out)?;
             }
             writeln!(out, "{KEY}")?;
+            if self.recordings().any(|scores| scores.known.is_some()) {
+                writeln!(
+                    out,
+                    "known: the reference told the estimator the strain of these rows, which are scored, too."
+                )?;
+            }
             let has_published = |scores: &RecordingScores| scores.baselines.named().any(|(name, _)| name == PUBLISHED);
             if self.recordings().any(has_published) {
                 writeln!(out, "{PUBLISHED}: equations 8 and 9 solved for the strain, told when phases begin.")?;
@@ -81,7 +87,7 @@ impl Evaluation {
             writeln!(out, "{}", first.heading())?;
             let mut table = score_table();
             for of in scores {
-                add_scores(&mut table, of.estimator, &of.filter);
+                add_scores(&mut table, &of.name(), &of.filter);
                 add_scores(&mut table, "smoother", &of.smoother);
             }
             for (name, of) in first.baselines.named() {

@@ -2,6 +2,7 @@ mod evaluation;
 mod scores;
 mod sensors;
 mod summary;
+mod told;
 
 use std::path::{Path, PathBuf};
 
@@ -10,6 +11,7 @@ use ohmstrain_calib::{Baselines, PublishedLaw, Samples, reference_lag, screen};
 use rayon::prelude::*;
 use scores::RecordingScores;
 use sensors::{Rivals, Sensor, phases};
+use told::Told;
 
 use crate::args::{EvaluateArgs, Split};
 use crate::commands::reporting::{Drawn, Reporting, Wanted, sample};
@@ -176,8 +178,11 @@ fn judge(
     let has_split = !args.calibration.split.is_empty();
     let sample = if has_split { Sample::Out } else { sample(recording, first.params(), part) };
     for sensor in sensors {
-        let scores = sensor.judge(recording, part, rest, baselines, &mut judged.warnings)?;
-        judged.scores.push(RecordingScores { sample, ..scores.ok_or_else(nothing)? });
+        let of_whole = args.known_every.filter(|_| !sensor.is_part());
+        for told in Told::cases(recording, part, sensor.sensor.params().limits, of_whole) {
+            let scores = sensor.judge(recording, part, rest, &told, baselines, &mut judged.warnings)?;
+            judged.scores.push(RecordingScores { sample, ..scores.ok_or_else(nothing)? });
+        }
     }
     if args.draws(&recording.name) {
         let (kind, tested, facts) = (Some(*kind), None, &[]);

@@ -13,10 +13,13 @@ pub struct RecordingScores {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub split: Option<String>,
     pub estimator: &'static str,
+    /// Which strains the reference told to the estimator, if it told any.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub known: Option<String>,
     /// Whether the rows that are scored were calibrated on.
     #[serde(skip)]
     pub sample: Sample,
-    /// Whether it is shown to say what the estimator before it is made of.
+    /// Whether it is shown to say what the estimator before it is made of, or what known strains bring.
     #[serde(skip)]
     pub is_part: bool,
     #[serde(flatten)]
@@ -70,6 +73,11 @@ impl BaselineScores {
 }
 
 impl RecordingScores {
+    /// Its name in tables.
+    pub fn name(&self) -> String {
+        self.known.as_ref().map_or_else(|| self.estimator.into(), |known| format!("{}, {known}", self.estimator))
+    }
+
     /// The recording and, where there is one, the split.
     pub fn case(&self) -> String {
         self.split.as_ref().map_or_else(|| self.file.clone(), |split| format!("{} {split}", self.file))

@@ -6,6 +6,7 @@ use ohmstrain_bench_data::segment;
 use ohmstrain_calib::{Baselines, EstimatorKind, PhaseRows, PublishedLaw, RECIPE, StaticCubic};
 
 use super::scores::{BaselineScores, LearnedScores, RecordingScores};
+use super::told::Told;
 use crate::args::Estimators;
 use crate::commands::calibrate::calibrate_recordings;
 use crate::commands::scoring::{self, Part};
@@ -92,18 +93,24 @@ impl Sensor {
         Ok(sensors.filter(|sensor| !(sensor.is_part && wanted.contains(&sensor.kind))).collect())
     }
 
-    /// Scores on some rows of a recording, the filter started at the first; `None` without a reference. What
-    /// casts doubt on them is added to `warnings`.
+    /// Whether it is shown to say what another one is made of.
+    pub const fn is_part(&self) -> bool {
+        self.is_part
+    }
+
+    /// Scores on some rows of a recording, the filter started at the first, of strains that are `told`; `None` without a
+    /// reference. What casts doubt on them is added to `warnings`.
     pub fn judge(
         &self,
         recording: &TraceFile,
         part: Part,
         rest_resistance: Option<f64>,
+        told: &Told,
         baselines: BaselineScores,
         warnings: &mut Vec<String>,
     ) -> Result<Option<RecordingScores>, CliError> {
-        let estimated = estimate(recording, &self.sensor, rest_resistance, Some(self.kind))?;
-        if self.calibration_s.is_none() {
+        let estimated = estimate(recording, &self.sensor, rest_resistance, Some(self.kind), &told.known)?;
+        if self.calibration_s.is_none() && told.name.is_none() {
             let mut watch = ValidityWatch::new(&self.sensor, rest_resistance);
             for (k, row) in estimated.filtered.iter().enumerate() {
                 let reading = row.resistance.unwrap_or(f64::NAN);
@@ -121,7 +128,8 @@ impl Sensor {
             split: None,
             estimator: self.kind.name(),
             sample: Sample::Out,
-            is_part: self.is_part,
+            known: told.name.clone(),
+            is_part: self.is_part || told.name.is_some(),
             filter,
             smoother,
             calibration_s: self.calibration_s,

@@ -52,8 +52,8 @@ pub fn summaries<'a>(recordings: impl Iterator<Item = &'a [RecordingScores]>) ->
             cases.push(Case { estimate, name: name.clone(), scores, cubic_rmse });
         };
         for of in scores {
-            add(of.estimator.to_string(), of.filter);
-            add(format!("{}, smoother", of.estimator), of.smoother);
+            add(of.name(), of.filter);
+            add(format!("{}, smoother", of.name()), of.smoother);
         }
         for (baseline, scores) in first.baselines.named() {
             add(baseline.to_string(), scores);

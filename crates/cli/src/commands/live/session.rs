@@ -11,6 +11,7 @@ use super::recorder::Recorder;
 use crate::args::{LiveArgs, RestResistance};
 use crate::error::CliError;
 use crate::input::{self, check_unit};
+use crate::quiet::QuietWatch;
 use crate::run::{builder, median};
 use crate::suits::{self, FIRST_LIVE_READINGS};
 
@@ -75,6 +76,7 @@ pub struct Session<'a> {
     lines: LineParser,
     filter: Filter,
     watch: ValidityWatch,
+    quiet: QuietWatch<'a>,
     /// What the rested sensor reads, if that is not what it read in calibration.
     rest: Option<f64>,
     /// The first known readings.
@@ -109,6 +111,7 @@ impl<'a> Session<'a> {
         let name = args.port.display().to_string();
         let lines = LineParser::new(&name, args.estimate.trace.metadata());
         let (filter, watch) = (builder(&sensor, &args.estimate).build()?, ValidityWatch::new(&sensor, rest));
+        let quiet = QuietWatch::new(&sensor, rest, &args.estimate.known);
         let mut session = Self {
             args,
             calibrated: sensor.clone(),
@@ -116,6 +119,7 @@ impl<'a> Session<'a> {
             lines,
             filter,
             watch,
+            quiet,
             rest,
             early: vec![],
             arrivals: None,
@@ -189,6 +193,7 @@ impl<'a> Session<'a> {
         let wanted = builder(&self.sensor, &self.args.estimate);
         self.filter = self.rest.map_or(wanted, |measured| wanted.rest_resistance(measured)).build()?;
         self.watch = ValidityWatch::new(&self.sensor, self.rest);
+        self.quiet = QuietWatch::new(&self.sensor, self.rest, &self.args.estimate.known);
         self.usual_step_s = None;
         Ok(())
     }
@@ -236,6 +241,10 @@ impl<'a> Session<'a> {
         }
         if let Some(warning) = self.watch.see(row.time_s, reading, estimate.strain_rate, f64::NAN).last() {
             self.message = warning.to_string();
+        }
+        if let Some(quiet) = self.quiet.see(&estimate) {
+            let quiet_s = significant(quiet.now_s - quiet.from_s, 2);
+            self.message = format!("{quiet_s} s of quiet that may be a rest: z, if it is one");
         }
         self.last = Some(estimate);
         self.doubt_early(reading)?;

@@ -1,0 +1,70 @@
+use ohmstrain::{KNOWN_BEYOND, Known};
+use ohmstrain_calib::RangeParams;
+
+use crate::commands::scoring::Part;
+use crate::input::TraceFile;
+
+/// How near an end of the reference's range a strain is one at that end, in ranges.
+const NEAR_END: f64 = 0.1;
+
+/// Strains that the reference tells an estimator before it is scored with it.
+pub struct Told {
+    /// What tables call them; none if there is none.
+    pub name: Option<String>,
+    /// The strains.
+    pub known: Vec<Known>,
+}
+
+impl Told {
+    /// None, and, if a time between them is given, s, one after every such time, and the first ones near the ends of the range;
+    /// all of them in the part that is scored, and within what an estimator can be told.
+    pub fn cases(recording: &TraceFile, part: Part, limits: RangeParams, every_s: Option<f64>) -> Vec<Self> {
+        let mut cases = vec![Self { name: None, known: Vec::new() }];
+        if let Some(every_s) = every_s {
+            let reach = KNOWN_BEYOND * limits.span();
+            let can_be_told = |known: &Known| (limits.lower - reach..=limits.upper + reach).contains(&known.strain);
+            let rows =
+                (0..recording.trace.len()).map(|row| Known::new(recording.trace.time_s[row], recording.truth(row)));
+            let rows: Vec<Known> = rows.filter(|known| part.holds(known.time_s) && can_be_told(known)).collect();
+            cases.push(Self { name: Some(format!("known every {every_s} s")), known: every(&rows, every_s) });
+            cases.push(Self { name: Some("rest and stretch known".into()), known: ends(&rows) });
+        }
+        cases
+    }
+}
+
+fn every(rows: &[Known], every_s: f64) -> Vec<Known> {
+    let mut due_s = f64::NEG_INFINITY;
+    let is_due = |known: &&Known| {
+        let is_due = known.time_s >= due_s;
+        if is_due {
+            due_s = known.time_s + every_s;
+        }
+        is_due
+    };
+    rows.iter().filter(is_due).copied().collect()
+}
+
+fn ends(rows: &[Known]) -> Vec<Known> {
+    let least = rows.iter().map(|known| known.strain).fold(f64::INFINITY, f64::min);
+    let most = rows.iter().map(|known| known.strain).fold(f64::NEG_INFINITY, f64::max);
+    let near = NEAR_END * (most - least);
+    let low = rows.iter().find(|known| known.strain <= least + near);
+    let high = rows.iter().find(|known| known.strain >= most - near);
+    low.into_iter().chain(high).copied().collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn strains_are_told_every_so_often_or_near_the_ends() {
+        let rows: Vec<Known> = (0..100).map(|k| Known::new(f64::from(k), f64::from((k * 7) % 100))).collect();
+        let times: Vec<f64> = every(&rows, 30.0).iter().map(|known| known.time_s).collect();
+        assert_eq!(times, [0.0, 30.0, 60.0, 90.0]);
+        let strains: Vec<f64> = ends(&rows).iter().map(|known| known.strain).collect();
+        assert_eq!(strains, [0.0, 91.0]);
+        assert!(ends(&[]).is_empty() && every(&[], 1.0).is_empty());
+    }
+}

@@ -1,0 +1,159 @@
+use ohmstrain::{Estimate, KNOWN_BEYOND, Known, Sensor};
+
+/// For how long readings must be quiet before somebody is asked, s.
+const QUIET_S: f64 = 30.0;
+/// How far apart quiet readings are, in ranges of the calibration's readings.
+const BAND: f64 = 0.02;
+/// How near they are to what the rested sensor read, or to the end of this run's readings on that side, in the same ranges.
+const NEAR: f64 = 0.1;
+/// How far readings must have gone for that end to be one, and how far they go from a hold before somebody is asked of another.
+const AWAY: f64 = 0.3;
+/// How far from none the strain must be said to be for a question to be worth it, in spans of the limits.
+const WORTH: f64 = 0.02;
+/// No reading for so long ends a quiet hold, s.
+const PAUSE_S: f64 = 5.0;
+/// Questions in a run, at most.
+const MOST: usize = 3;
+
+/// Watches for long holds that may be rests: what the strain is then somebody may know.
+pub struct QuietWatch<'a> {
+    /// What the rested sensor reads.
+    rested: f64,
+    /// Range of the calibration's readings.
+    range: f64,
+    /// 1 where readings grow with the strain, -1 where they fall.
+    sign: f64,
+    /// The last readings of the run on the side of rest and on the other one, times that sign.
+    ends: (f64, f64),
+    /// Least strain that is worth a question, none if the sensor never reports none.
+    worth: Option<f64>,
+    known: &'a [Known],
+    hold: Option<Hold>,
+    asked: usize,
+    /// The reading that was asked of last, as long as readings stay near it.
+    asked_at: Option<f64>,
+}
+
+/// Readings that have stayed within a band.
+#[derive(Clone, Copy)]
+struct Hold {
+    from_s: f64,
+    last_s: f64,
+    low: f64,
+    high: f64,
+    asked: bool,
+}
+
+/// A hold that may be a rest.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Quiet {
+    /// When it began, s.
+    pub from_s: f64,
+    /// The row at which somebody is asked, s.
+    pub now_s: f64,
+    /// What the strain is said to be.
+    pub strain: f64,
+}
+
+impl<'a> QuietWatch<'a> {
+    /// For a sensor that reads `rest_resistance` at rest, if that is not what it read in calibration, and strains that are
+    /// known anyway.
+    pub fn new(sensor: &Sensor, rest_resistance: Option<f64>, known: &'a [Known]) -> Self {
+        let (params, seen) = (sensor.params(), sensor.params().validity);
+        let rested = rest_resistance.unwrap_or_else(|| params.rested());
+        let moved = rested / params.rested();
+        let span = params.limits.span();
+        let can_rest = params.limits.lower <= KNOWN_BEYOND * span && params.limits.upper >= 0.0;
+        let worth = can_rest.then_some(WORTH * span);
+        let range = moved * (seen.reading_upper - seen.reading_lower);
+        let strain_at = |reading| params.static_cubic.strain(reading);
+        let sign = if strain_at(seen.reading_upper) > strain_at(seen.reading_lower) { 1.0 } else { -1.0 };
+        let ends = (f64::INFINITY, f64::NEG_INFINITY);
+        Self { rested, range, sign, ends, worth, known, hold: None, asked: 0, asked_at: None }
+    }
+
+    /// Takes a row; what to ask of the hold that it belongs to, once.
+    pub fn see(&mut self, row: &Estimate) -> Option<Quiet> {
+        let (reading, time_s) = (row.resistance.filter(|reading| reading.is_finite())?, row.time_s);
+        self.ends = (self.ends.0.min(self.sign * reading), self.ends.1.max(self.sign * reading));
+        self.asked_at = self.asked_at.filter(|asked_at| (reading - asked_at).abs() <= AWAY * self.range);
+        let hold = self.hold.and_then(|hold| hold.with(time_s, reading, BAND * self.range));
+        let new = Hold { from_s: time_s, last_s: time_s, low: reading, high: reading, asked: false };
+        let hold = self.hold.insert(hold.unwrap_or(new));
+        let is_long = time_s - hold.from_s >= QUIET_S && hold.high > hold.low;
+        if !is_long || hold.asked {
+            return None;
+        }
+        hold.asked = true;
+        let held = 0.5 * (hold.low + hold.high);
+        let (near, (rest_end, other_end)) = (NEAR * self.range, self.ends);
+        let is_end = other_end - rest_end >= AWAY * self.range && self.sign * held - rest_end <= near;
+        let is_near = (held - self.rested).abs() <= near || is_end;
+        let is_worth = self.worth.is_some_and(|worth| row.strain.abs() > worth);
+        let is_known = self.known.iter().any(|known| (hold.from_s..=time_s).contains(&known.time_s));
+        let asks = is_near && is_worth && !is_known && self.asked < MOST && self.asked_at.is_none();
+        if asks {
+            (self.asked, self.asked_at) = (self.asked + 1, Some(held));
+        }
+        asks.then_some(Quiet { from_s: hold.from_s, now_s: time_s, strain: row.strain })
+    }
+}
+
+impl Hold {
+    /// With another reading; none if that one is not quiet.
+    fn with(self, time_s: f64, reading: f64, band: f64) -> Option<Self> {
+        let (low, high) = (self.low.min(reading), self.high.max(reading));
+        let is_quiet = high - low <= band && time_s - self.last_s <= PAUSE_S;
+        is_quiet.then_some(Self { last_s: time_s, low, high, ..self })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sensor() -> Sensor {
+        Sensor::from_toml(include_str!("../../ohmstrain/examples/sensor.toml")).unwrap()
+    }
+
+    /// What is asked of readings every 0.1 s, of which the strain is said to be `strain`.
+    fn asked(known: &[Known], strain: f64, reading: impl Fn(u32) -> f64) -> Vec<Quiet> {
+        let sensor = sensor();
+        let mut watch = QuietWatch::new(&sensor, None, known);
+        let row = |k: u32| {
+            let mut row = Estimate::default();
+            (row.time_s, row.resistance, row.strain) = (0.1 * f64::from(k), Some(reading(k)), strain);
+            row
+        };
+        (0..12_000).filter_map(|k| watch.see(&row(k))).collect()
+    }
+
+    #[test]
+    fn a_long_hold_near_rest_is_asked_about_once() {
+        let sensor = sensor();
+        let (rested, seen) = (sensor.params().rested(), sensor.params().validity);
+        let range = seen.reading_upper - seen.reading_lower;
+        let noise = |k: u32| 0.005 * range * f64::from(k * 7919 % 11) / 11.0;
+        // Twenty minutes of rest are one hold.
+        let rest = |k| rested + noise(k);
+        let quiet = asked(&[], 0.03, rest);
+        assert_eq!(quiet.len(), 1);
+        assert!((quiet[0].now_s - quiet[0].from_s - QUIET_S).abs() < 0.11 && quiet[0].strain == 0.03, "{quiet:?}");
+        // Where the strain is said to be none, or is known, or the number is stuck, or readings are far from rest: nothing.
+        assert_eq!(asked(&[], 0.0, rest), []);
+        assert_eq!(asked(&[Known::new(12.0, 0.0)], 0.03, rest), []);
+        assert_eq!(asked(&[], 0.03, |_| rested), []);
+        assert_eq!(asked(&[], 0.03, |k| rested + 0.3 * range + noise(k)), []);
+        // Motion, and a drift that never settles.
+        assert_eq!(asked(&[], 0.03, |k| rested + 0.05 * range * (0.1 * f64::from(k)).sin()), []);
+        assert_eq!(asked(&[], 0.03, |k| rested + range * (1e-4 * f64::from(k) - 0.6)), []);
+        // Twenty rests with motion in between, also where R0 is another: no more than three questions.
+        for moved in [0.0, 0.5 * range] {
+            let rests = |k: u32| rested + moved + if k % 600 < 50 { 0.5 * range } else { noise(k) };
+            assert_eq!(asked(&[], 0.03, rests).len(), MOST);
+            // Without motion all of them are one.
+            let broken = |k: u32| rested + if k % 600 < 50 { 0.05 * range } else { noise(k) };
+            assert_eq!(asked(&[], 0.03, broken).len(), 1);
+        }
+    }
+}

@@ -1,0 +1,151 @@
+use std::ops::Range;
+
+use ohmstrain_calib::{EstimatorKind, KnownStrain, Rows};
+use ohmstrain_ekf::live::Flags;
+use ohmstrain_ekf::{Gaussian, StepError};
+
+use crate::estimate::Scale;
+use crate::filter::{Kernel, Translator, followed, taken};
+use crate::known::{KnownOfAll, in_order, next_until};
+use crate::pauses::Pauses;
+use crate::{Error, Estimate, FilterBuilder, Reading};
+
+/// Whole recordings.
+impl FilterBuilder<'_> {
+    /// Estimates of a whole recording, each from all readings; NaN stands for a missing one.
+    ///
+    /// # Errors
+    /// As [`Sensor::smooth`].
+    ///
+    /// ```
+    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+    /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
+    /// let rows = sensor.filter().gate(10.8).smooth(&[0.00, 0.05], &[1600.0, 1632.0])?;
+    /// assert_eq!(rows.len(), 2);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn smooth(self, time_s: &[f64], readings: &[f64]) -> Result<Vec<Estimate>, Error> {
+        if time_s.len() != readings.len() {
+            return Err(Error::Lengths { times: time_s.len(), readings: readings.len() });
+        }
+        self.sensor.check_unit(readings.iter().copied(), self.rest_resistance)?;
+        let mut rows = Vec::with_capacity(time_s.len());
+        self.smooth_backward(
+            time_s.len(),
+            |row| (time_s[row], Reading::from(readings[row])),
+            |_, segment| {
+                rows.extend(segment.iter().rev());
+                Ok::<(), Error>(())
+            },
+        )?;
+        rows.reverse();
+        Ok(rows)
+    }
+
+    /// Smooths a recording that is too long to hold its estimates in memory: `row` gives time, s, and reading of each of
+    /// `len` rows; `take` gets the estimates segment by segment, the last segment first, each in order of time.
+    ///
+    /// # Errors
+    /// As [`Self::build`]; the row that cannot be taken; or the error of `take`.
+    ///
+    /// ```
+    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+    /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
+    /// use ohmstrain::{Error, Reading};
+    ///
+    /// let row = |k: usize| (0.05 * k as f64, Reading::from(1600.0 + k as f64));
+    /// sensor.filter().smooth_backward(10_000, row, |rows, estimates| {
+    ///     println!("rows {rows:?}: {} estimates", estimates.len());
+    ///     Ok::<(), Error>(())
+    /// })?;
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn smooth_backward<E: From<Error>>(
+        self,
+        len: usize,
+        row: impl Fn(usize) -> (f64, Reading),
+        take: impl FnMut(Range<usize>, &[Estimate]) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let mut known = self.known_of_all(len, &row)?;
+        self.smooth_with(len, row, |_, time_s, said| known.correct(time_s, said), take)
+    }
+
+    /// What known strains say of all rows of a recording, which is smoothed once for what is said where they are known.
+    fn known_of_all(self, len: usize, row: &impl Fn(usize) -> (f64, Reading)) -> Result<KnownOfAll, Error> {
+        let scale = Scale::new(self.sensor)?;
+        let mut due = in_order(self.known, &scale)?;
+        let mut known: Vec<(usize, KnownStrain)> = Vec::new();
+        let mut k = 0;
+        while k < len && !due.is_empty() {
+            let time_s = row(k).0;
+            while let Some(strain) = next_until(&mut due, time_s) {
+                known.push((k, KnownStrain { time_s, known: strain, said: strain }));
+            }
+            k += 1;
+        }
+        if !known.is_empty() {
+            let listen = |k: usize, _: f64, said: Gaussian<f64>| {
+                let first = known.partition_point(|known| known.0 < k);
+                known[first..].iter_mut().take_while(|known| known.0 == k).for_each(|known| known.1.said = said);
+                said
+            };
+            self.smooth_with(len, row, listen, |_, _| Ok::<(), Error>(()))?;
+        }
+        Ok(KnownOfAll::new(scale.limits(), known.into_iter().map(|known| known.1).collect()))
+    }
+
+    /// Smooths; `known` is shown row, time, s, and what is said of its strain, and says what is known of that.
+    fn smooth_with<E: From<Error>>(
+        self,
+        len: usize,
+        row: impl Fn(usize) -> (f64, Reading),
+        mut known: impl FnMut(usize, f64, Gaussian<f64>) -> Gaussian<f64>,
+        mut take: impl FnMut(Range<usize>, &[Estimate]) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let starts_known = self.initial_strain.is_some();
+        let kind = self.kind().smoother();
+        if kind == EstimatorKind::Corrected {
+            self.sensor.check_smoother()?;
+        }
+        let Kernel { mut filter, translator, .. } = self.kernel(kind)?;
+        let Translator { scale, mut doubts, follower, .. } = translator;
+        let failed = |(row, source): (usize, StepError)| Error::Row { row, source };
+        let calibrated = |k: usize| {
+            let (time_s, reading) = row(k);
+            (time_s, reading.relative(scale.rest_reading))
+        };
+        let follower = follower.map(|follower| follower.settled(len, calibrated));
+        let off = follower.map_or(0.0, |follower| follower.off());
+        let relative = |k| {
+            let (time_s, reading) = calibrated(k);
+            (time_s, followed(follower.as_ref(), reading))
+        };
+        let mut back = filter.way_back(Rows::new(len, &relative)).map_err(failed)?;
+        let (mut outputs, mut estimates, mut first) = (Vec::new(), Vec::new(), len);
+        let start_s = if len > 0 { row(0).0 } else { 0.0 };
+        let mut next_s = if len > 0 { row(len - 1).0 } else { 0.0 };
+        let mut pauses = doubts.map(|doubts| Pauses::new(doubts.unread()));
+        while let Some(rows) = back.next_segment(&mut outputs).map_err(failed)? {
+            first = rows.start;
+            pauses.iter_mut().for_each(|pauses| pauses.widen(rows.clone(), |k| row(k).0, &mut outputs));
+            estimates.clear();
+            estimates.extend(rows.clone().zip(&mut outputs).rev().map(|(k, output)| {
+                let (time_s, reading) = row(k);
+                let mut flags = Flags::NONE;
+                if let Some(doubts) = doubts.as_mut().filter(|_| k > 0 || !starts_known) {
+                    let (taken, strain) = (taken(&scale, reading, output), &mut output.estimate.strain);
+                    doubts.see_back(time_s - start_s, next_s - time_s, taken);
+                    (strain.variance, flags) = doubts.widened(output.estimate.rate.mean, strain.variance);
+                }
+                next_s = time_s;
+                output.estimate.strain = known(k, time_s, output.estimate.strain);
+                let mut estimate = scale.row(time_s, reading, off, output);
+                estimate.flags = estimate.flags.and(flags);
+                estimate
+            }));
+            estimates.reverse();
+            take(rows, &estimates)?;
+        }
+        if first == 0 { Ok(()) } else { Err(Error::NoSmoother.into()) }
+    }
+}
