@@ -13,7 +13,8 @@ case "${1:-}" in
     ;;
 esac
 target=${2:-$(rustc -vV | sed -n 's/^host: //p')}
-cargo build --locked --profile dist -p ohmstrain-cli --target "$target"
+OHMSTRAIN_COMMIT=$(git rev-parse HEAD 2>/dev/null || true) \
+    cargo build --locked --profile dist -p ohmstrain-cli --target "$target"
 binary=${CARGO_TARGET_DIR:-target}/$target/dist/ohmstrain
 
 name=ohmstrain-$("$binary" --version | cut -d' ' -f2)-$target

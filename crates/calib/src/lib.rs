@@ -33,6 +33,7 @@ pub use baselines::{Baseline, Baselines, Features, Fir, LeakyBank, LowPassMode, 
 pub use calibrate::error_budget::{ErrorBudget, ErrorShares};
 pub use calibrate::findings::{Findings, Seen};
 pub use calibrate::scores::{ScoredRow, Scores};
+pub use calibrate::simulated_motions::SIMULATED_SEED;
 pub use calibrate::with_prior::calibrate_with_prior;
 pub use calibrate::{Calibration, Stage, calibrate};
 pub use correction::owned::{OwnedCorrection, OwnedProcess, OwnedRows, OwnedSimulated};
@@ -54,7 +55,7 @@ pub use params::correction::{
 };
 pub use params::estimator::{EstimatorKind, EstimatorParams, MotionParams, NoiseParams, PhaseParams};
 pub use params::law::{BranchParams, GaugeParams, LawParameter, LawParams};
-pub use params::recipe::{RECIPE, Recipe};
+pub use params::recipe::{Parts, RECIPE, Recipe};
 pub use params::static_cubic::StaticCubic;
 pub use params::summary::{Limit, Summary, TestedSummary};
 pub use params::validate::FieldError;

@@ -65,7 +65,7 @@ pub use validity::{Beyond, Extrapolation, ValidityWatch};
 #[doc(no_inline)]
 pub use ohmstrain_calib::{
     CalibrationError, Distrusted, Doubt, EstimatorKind, FieldError, Findings, GaugeFamily, Identifiability,
-    JointParams, Quantity, ReadingUnit, SamplesError, ScoredRow, Scores, SensorParams, Stage,
+    JointParams, Parts, Quantity, ReadingUnit, SamplesError, ScoredRow, Scores, SensorParams, Stage,
 };
 pub use ohmstrain_ekf::live::{Flag, Flags, KNOWN_BEYOND};
 #[doc(no_inline)]

@@ -1,6 +1,6 @@
 use std::sync::Arc;
 
-use ohmstrain_calib::{EstimatorKind, JointParams, Learned, Quantity, SensorParams, Start, build_filter_with};
+use ohmstrain_calib::{EstimatorKind, JointParams, Learned, Parts, Quantity, SensorParams, Start, build_filter_with};
 use ohmstrain_model::Joint;
 
 use crate::column::Header;
@@ -86,6 +86,22 @@ impl Sensor {
         let sensor = Self { learned: Learned::of(&params), params };
         sensor.build(kind, Start::Unknown)?;
         Ok(sensor)
+    }
+
+    /// The same sensor with some parts of its learned correction only, to see what the others bring. Nothing is calibrated again but
+    /// the factor on the interval.
+    ///
+    /// ```
+    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+    /// use ohmstrain::{Parts, Sensor};
+    ///
+    /// let sensor = Sensor::from_toml(&text)?;
+    /// assert_eq!(sensor.with_parts(Parts { simulated: false, ..Parts::ALL }), sensor);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn with_parts(&self, parts: Parts) -> Self {
+        Self { learned: Learned::of_parts(&self.params, parts), params: self.params.clone() }
     }
 
     /// A filter that shares what the others have learned.

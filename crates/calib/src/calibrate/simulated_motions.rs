@@ -21,7 +21,7 @@ const FORGOTTEN_S: f64 = 20.0;
 const LEAST_STEP_S: f64 = 0.1;
 const LEAST_STEPS: usize = 200;
 /// The seed of all of them.
-const SEED: u64 = 1;
+pub const SIMULATED_SEED: u64 = 1;
 /// Rows that are learned from.
 const ROWS: usize = 4000;
 /// Spread of R₀ from one day to another, as a logarithm.
@@ -49,7 +49,7 @@ pub(crate) fn simulated_rows(
     step_s: f64,
 ) -> Vec<SimulatedRow> {
     let step_s = step_s.max(LEAST_STEP_S);
-    let mut rng = ChaCha12Rng::seed_from_u64(SEED);
+    let mut rng = ChaCha12Rng::seed_from_u64(SIMULATED_SEED);
     let fastest = FASTEST * stats.fastest_rate.max(stats.speed);
     let speeds = ((SLOWEST * stats.speed).max(LEAST_SPEED * fastest), fastest);
     let rows = ((LASTS_S / step_s) as usize).max(LEAST_STEPS);

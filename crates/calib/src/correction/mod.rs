@@ -13,6 +13,7 @@ use owned::{OwnedCorrection, OwnedProcess};
 use crate::order::extent;
 use crate::params::RangeParams;
 use crate::params::correction::{CorrectorParams, ProcessParams, SIDES, SMOOTHER_INPUTS, SimulatedParams};
+use crate::params::recipe::Parts;
 use crate::sd_scale::{joint_scale_of, sd_scale_up_to};
 use criterion::Criterion;
 use gaussian_process::{GaussianProcess, LeftOutRow, Lessons, inducing_rows, relevance};
@@ -26,6 +27,8 @@ const LEAST_DIRECT: f64 = 0.5;
 const LEAST_RESIDUAL: f64 = 0.07;
 /// Widest factor on a process' deviation: block left out of recordings that hold still for long are worlds of their own.
 const WIDEST_PROCESS: f64 = 3.0;
+/// Factor on the variance of a process that is switched off: its weight is nothing beside any other.
+const SILENT: f64 = 1e30;
 
 /// What a correction learns from: inputs with the filter's outputs first, the true strain, and times, s, row by row.
 #[derive(Clone, Copy)]
@@ -85,6 +88,16 @@ impl Which {
         }
     }
 
+    /// A factor on its variance, by whether it is heard.
+    const fn quiet(self, parts: Parts) -> f64 {
+        let is_heard = match self {
+            Which::Direct => parts.direct,
+            Which::Past | Which::Future => parts.one_sided,
+            Which::Residual => parts.residual,
+        };
+        if is_heard { 1.0 } else { SILENT }
+    }
+
     fn params(self, of: &CorrectorParams) -> Option<&ProcessParams> {
         match self {
             Which::Direct => Some(&of.direct),
@@ -135,23 +148,25 @@ impl<'a, const D: usize> Prepared<'a, D> {
         learn(Lessons { inputs: &inputs, targets: &targets, time_s: self.examples.time_s })
     }
 
-    /// Chooses a process, and says what it says of every row from the blocks that the row is not in.
-    fn chosen(&self, which: Which, by: Choosing) -> Option<(ProcessParams, Vec<Gaussian<f64>>)> {
+    /// Chooses a process.
+    fn chosen(&self, which: Which, by: Choosing) -> Option<ProcessParams> {
+        let settings = self.taught(which, |lessons| lessons.best_settings(by.criterion))?;
+        let blocks = deviations(&self.left_out(which, &settings)?, self.examples.strain);
+        let blocks = if by.covers_worst { blocks } else { vec![blocks.concat()] };
+        Some(ProcessParams { sd_scale: sd_scale_up_to(&blocks, WIDEST_PROCESS), ..settings })
+    }
+
+    /// What a process says of every row from the blocks that the row is not in.
+    fn left_out(&self, which: Which, settings: &ProcessParams) -> Option<Vec<Gaussian<f64>>> {
         self.taught(which, |lessons| {
-            let settings = lessons.best_settings(by.criterion)?;
-            let process = GaussianProcess::new(lessons, &settings)?;
+            let process = GaussianProcess::new(lessons, settings)?;
             let (limits, least) = (self.examples.limits, self.least_variance(which));
             let said = |(k, row): (usize, LeftOutRow)| {
                 let variance = row.unknown * row.prior.max(least) + process.noise * process.variance();
                 let mean = (self.base(which, k) + row.mean).clamp(limits.lower, limits.upper);
-                Gaussian { mean, variance }
+                Gaussian { mean, variance: variance * settings.sd_scale.powi(2) }
             };
-            let mut said: Vec<Gaussian<f64>> = process.left_out(BLOCKS)?.into_iter().enumerate().map(said).collect();
-            let blocks = deviations(&said, self.examples.strain);
-            let blocks = if by.covers_worst { blocks } else { vec![blocks.concat()] };
-            let sd_scale = sd_scale_up_to(&blocks, WIDEST_PROCESS);
-            said.iter_mut().for_each(|said| said.variance *= sd_scale.powi(2));
-            Some((ProcessParams { sd_scale, ..settings }, said))
+            Some(process.left_out(BLOCKS)?.into_iter().enumerate().map(said).collect())
         })
     }
 }
@@ -179,16 +194,44 @@ impl CorrectorParams {
 
     /// With S one-sided processes; `last` is what is mixed in last of every row, if anything is.
     fn fit<const D: usize, const S: usize>(prepared: &Prepared<D>, last: &[Gaussian<f64>]) -> Option<Self> {
-        let examples = prepared.examples;
         let chosen = |which: Which| prepared.chosen(which, Choosing::of_sides(S));
-        let (direct, of_direct) = chosen(Which::Direct)?;
-        let (residual, of_residual) = chosen(Which::Residual)?;
-        let sides: Vec<_> = ONE_SIDED[..S].iter().map(|side| chosen(*side)).collect::<Option<_>>()?;
-        let one_sided = |k: usize| std::array::from_fn::<_, S, _>(|side| sides[side].1[k]);
-        let mixed = |k: usize| consensus(of_direct[k], of_residual[k], one_sided(k));
-        let mixed: Vec<Gaussian<f64>> = (0..examples.strain.len()).map(mixed).collect();
-        let sd_scale = scale_beside(&mixed, last, examples.strain);
-        Some(Self { sd_scale, direct, residual, one_sided: sides.into_iter().map(|(params, _)| params).collect() })
+        let (direct, residual) = (chosen(Which::Direct)?, chosen(Which::Residual)?);
+        let one_sided = ONE_SIDED[..S].iter().map(|side| chosen(*side)).collect::<Option<_>>()?;
+        let of = Self { sd_scale: 1.0, direct, residual, one_sided };
+        Some(Self { sd_scale: of.scale_of::<_, S>(prepared, last, Parts::ALL)?, ..of })
+    }
+
+    /// The factor on the deviation of what some of its parts say together.
+    fn scale_of<const D: usize, const S: usize>(
+        &self,
+        prepared: &Prepared<D>,
+        last: &[Gaussian<f64>],
+        parts: Parts,
+    ) -> Option<f64> {
+        let said = |which: Which| {
+            let mut said = prepared.left_out(which, which.params(self)?)?;
+            said.iter_mut().for_each(|said| said.variance *= which.quiet(parts));
+            Some(said)
+        };
+        let (direct, residual) = (said(Which::Direct)?, said(Which::Residual)?);
+        let sides: Vec<_> = ONE_SIDED[..S].iter().map(|side| said(*side)).collect::<Option<_>>()?;
+        let one_sided = |k: usize| std::array::from_fn::<_, S, _>(|side| sides[side][k]);
+        let together = |k: usize| parts_together(parts, direct[k], residual[k], one_sided(k));
+        let said: Vec<Gaussian<f64>> = (0..prepared.rows.len()).map(together).collect();
+        Some(scale_beside(&said, if parts.simulated { last } else { &[] }, prepared.examples.strain))
+    }
+}
+
+fn parts_together<const S: usize>(
+    parts: Parts,
+    direct: Gaussian<f64>,
+    residual: Gaussian<f64>,
+    one_sided: [Gaussian<f64>; S],
+) -> Gaussian<f64> {
+    if parts.consensus {
+        consensus(direct, residual, one_sided)
+    } else {
+        mixture([direct, residual].into_iter().chain(one_sided))
     }
 }
 
@@ -217,6 +260,42 @@ pub(crate) fn learned_with_simulated(
 ) -> Option<OwnedCorrection<f64, FILTER_INPUTS>> {
     let simulated = Prepared::new(examples).simulated(simulated)?;
     Some(OwnedCorrection { simulated: Some(simulated), ..learned(params, examples)? })
+}
+
+impl OwnedCorrection<f64, FILTER_INPUTS> {
+    /// The same of some of its parts, with the factor that their interval then needs.
+    pub(crate) fn of_parts(
+        self,
+        parts: Parts,
+        params: &CorrectorParams,
+        examples: Examples<FILTER_INPUTS>,
+    ) -> Option<Self> {
+        let prepared = Prepared::new(examples);
+        let heard = self.simulated.as_ref().map_or_else(Vec::new, |of| prepared.heard(of));
+        let simulated = self.simulated.clone().filter(|_| parts.simulated);
+        Some(Self { simulated, ..self.quietened(parts, params.scale_of::<_, 0>(&prepared, &heard, parts)?) })
+    }
+}
+
+impl OwnedCorrection<f64, SMOOTHER_INPUTS, SIDES> {
+    /// The same of some of its parts, with the factor that their interval then needs.
+    pub(crate) fn of_parts(
+        self,
+        parts: Parts,
+        params: &CorrectorParams,
+        examples: Examples<SMOOTHER_INPUTS>,
+    ) -> Option<Self> {
+        Some(self.quietened(parts, params.scale_of::<_, SIDES>(&Prepared::new(examples), &[], parts)?))
+    }
+}
+
+impl<const D: usize, const S: usize> OwnedCorrection<f64, D, S> {
+    fn quietened(mut self, parts: Parts, sd_scale: f64) -> Self {
+        self.direct.numbers.widening *= Which::Direct.quiet(parts);
+        self.residual.numbers.widening *= Which::Residual.quiet(parts);
+        self.one_sided.iter_mut().for_each(|side| side.numbers.widening *= Which::Past.quiet(parts));
+        Self { variance_factor: sd_scale.powi(2), consensus: parts.consensus, ..self }
+    }
 }
 
 /// Makes weights of examples; none if the covariances are not positive definite.
@@ -262,6 +341,7 @@ pub(crate) fn learned<const D: usize, const S: usize>(
         limits: examples.limits.to_model(),
         strain_variance: prepared.strain_variance,
         variance_factor: params.sd_scale.powi(2),
+        consensus: true,
     })
 }
 

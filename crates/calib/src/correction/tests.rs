@@ -312,7 +312,8 @@ fn a_factor_covers_the_worst_block_or_all_together() {
     let prepared = Prepared::new(Examples { inputs: &inputs, strain: &strain, time_s: &time_s, limits: LIMITS });
     let covered = |covers_worst: bool| {
         let by = Choosing { criterion: Criterion::LeftOut, covers_worst };
-        let (params, said) = prepared.chosen(Which::Residual, by).unwrap();
+        let params = prepared.chosen(Which::Residual, by).unwrap();
+        let said = prepared.left_out(Which::Residual, &params).unwrap();
         // Neither of the factor's limits.
         assert!(params.sd_scale > 1.01 && params.sd_scale < 2.99, "{}", params.sd_scale);
         let is_covered = |k: &usize| (said[*k].mean - strain[*k]).abs() <= 1.959964 * said[*k].sd();

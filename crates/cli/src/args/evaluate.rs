@@ -25,6 +25,11 @@ pub struct EvaluateArgs {
     /// Do without the learned correction of the strain. Without this flag, calibrations are scored with and without it
     #[arg(long)]
     pub no_correction: bool,
+    /// What each part of the learned correction brings: scores without the direct process, without the residual one, without
+    /// simulated motions, and of the smoother without its one-sided processes and without their consensus. Nothing is
+    /// calibrated again
+    #[arg(long, conflicts_with = "no_correction")]
+    pub parts: bool,
     /// Score rows with time_s >= T only; the filter still starts at the first row
     #[arg(long, value_name = "T", allow_negative_numbers = true, value_parser = finite, conflicts_with = "split")]
     pub from: Option<f64>,

@@ -93,6 +93,8 @@ pub struct Correction<'a, T, const D: usize, const S: usize = 0> {
     pub strain_variance: T,
     /// Factor on the mixture's variance, from training rows left out.
     pub variance_factor: T,
+    /// Whether the voices say their [`consensus`], or what they are mixed to as they are: the same of two.
+    pub consensus: bool,
 }
 
 /// A process that sees features alone, of readings that a law gave in simulated motions. Its variance is its noise.
@@ -238,7 +240,11 @@ impl<T: Real, const D: usize, const S: usize> Work<T> for Correcting<'_, T, D, S
         let outside = of.residual.distance(&outside, 0);
         let novelty = T::one() - (T::one() - said.unknown) * (-outside / T::of(NEW)).exp();
         let residual = of.widened(said, &of.residual, outside, filtered.mean);
-        let mixed = consensus(direct, residual, one_sided);
+        let mixed = if of.consensus {
+            consensus(direct, residual, one_sided)
+        } else {
+            mixture([direct, residual].into_iter().chain(one_sided))
+        };
         let variance = mixed.variance * of.variance_factor + T::of(NOVEL) * of.strain_variance * novelty;
         let anywhere = of.limits.variance_of_anywhere();
         let learned = Gaussian { mean: mixed.mean, variance: (variance * birge).min(anywhere).max(variance) };
@@ -343,6 +349,7 @@ mod tests {
             limits: StrainRange { lower: -9.0, upper: 9.0 },
             strain_variance: 0.7,
             variance_factor: 1.1,
+            consensus: true,
         };
         for trial in 0..100 {
             let inputs = core::array::from_fn(|i| number(1000 + 31 * trial + i));

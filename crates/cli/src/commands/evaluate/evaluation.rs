@@ -1,6 +1,6 @@
 use std::io::Write;
 
-use ohmstrain_calib::PARTICLE_SEED;
+use ohmstrain_calib::{PARTICLE_SEED, SIMULATED_SEED};
 use serde::Serialize;
 
 use super::scores::{PUBLISHED, RecordingScores};
@@ -24,8 +24,11 @@ pub struct Evaluation {
 /// What `--json` prints.
 #[derive(Serialize)]
 struct Json<'a> {
-    /// Seed of the particles; nothing else draws, neither in calibration nor in the filters.
+    /// The commit that the program was built from, where it was said.
+    commit: Option<&'static str>,
+    /// Seed of the particles, and of the motions that calibration simulates; nothing else draws.
     particle_seed: u64,
+    simulated_seed: u64,
     /// All cases summed up, estimate by estimate.
     summary: Vec<Summary>,
     recordings: Vec<&'a RecordingScores>,
@@ -51,7 +54,9 @@ impl Evaluation {
     pub fn write(&self, out: &mut dyn Write, json: bool) -> Result<(), CliError> {
         if json {
             let json = Json {
+                commit: option_env!("OHMSTRAIN_COMMIT").filter(|commit| !commit.is_empty()),
                 particle_seed: PARTICLE_SEED,
+                simulated_seed: SIMULATED_SEED,
                 summary: self.summaries(),
                 recordings: self.recordings().collect(),
             };
@@ -87,8 +92,16 @@ impl Evaluation {
             writeln!(out, "{}", first.heading())?;
             let mut table = score_table();
             for of in scores {
-                add_scores(&mut table, &of.name(), &of.filter);
-                add_scores(&mut table, "smoother", &of.smoother);
+                // Without a part that only one of the two has the other one is as it was.
+                let has_filter = !of.is_part || of.filter != first.filter;
+                let has_smoother = !of.is_part || of.smoother != first.smoother;
+                if has_filter {
+                    add_scores(&mut table, &of.name(), &of.filter);
+                }
+                if has_smoother {
+                    let own_name = format!("{}, smoother", of.name());
+                    add_scores(&mut table, if has_filter { "smoother" } else { &own_name }, &of.smoother);
+                }
             }
             for (name, of) in first.baselines.named() {
                 add_scores(&mut table, name, &of);

@@ -3,7 +3,7 @@ use std::time::Instant;
 
 use ohmstrain::{Calibrated, Calibration, ValidityWatch};
 use ohmstrain_bench_data::segment;
-use ohmstrain_calib::{Baselines, EstimatorKind, PhaseRows, PublishedLaw, RECIPE, StaticCubic};
+use ohmstrain_calib::{Baselines, EstimatorKind, Parts, PhaseRows, PublishedLaw, RECIPE, StaticCubic};
 
 use super::scores::{BaselineScores, LearnedScores, RecordingScores};
 use super::told::Told;
@@ -27,6 +27,8 @@ pub struct Sensor {
     calibration_s: Option<f64>,
     /// Whether it is shown to say what another one is made of.
     is_part: bool,
+    /// What the scores are called: the estimator's name, or what it does without.
+    name: &'static str,
 }
 
 /// What the sensor is compared with.
@@ -56,7 +58,10 @@ impl Sensor {
         let kinds = EstimatorKind::distinct(
             kinds.into_iter().map(|kind| if corrects { kind } else { sensor.params().filter_of(kind) }),
         );
-        let judged = |kind| Self { sensor: sensor.clone(), kind, calibration_s: None, is_part: false };
+        let judged = |kind: EstimatorKind| {
+            let name = kind.name();
+            Self { sensor: sensor.clone(), kind, calibration_s: None, is_part: false, name }
+        };
         Ok(kinds.into_iter().map(judged).collect())
     }
 
@@ -82,8 +87,9 @@ impl Sensor {
             let calibration_s = Some(start.elapsed().as_secs_f64());
             let kind = sensor.params().default_estimator;
             let filter = sensor.params().filter_of(kind);
-            let part = Self { sensor: sensor.clone(), kind: filter, calibration_s, is_part: corrects };
-            let whole = Self { sensor, kind, calibration_s, is_part: false };
+            let (of_filter, name) = (filter.name(), kind.name());
+            let part = Self { sensor: sensor.clone(), kind: filter, calibration_s, is_part: corrects, name: of_filter };
+            let whole = Self { sensor, kind, calibration_s, is_part: false, name };
             let is_corrected = part.kind != whole.kind;
             Ok([Some(whole).filter(|_| corrects || !is_corrected), Some(part).filter(|_| is_corrected)])
         };
@@ -91,6 +97,21 @@ impl Sensor {
         let sensors = calibrated.into_iter().flatten().flatten();
         // A part that was asked for by itself is not shown twice.
         Ok(sensors.filter(|sensor| !(sensor.is_part && wanted.contains(&sensor.kind))).collect())
+    }
+
+    /// Each corrected one followed by the same without single parts of its correction.
+    pub fn and_parts(sensors: Vec<Self>) -> Vec<Self> {
+        let with_parts = |whole: Self| {
+            let is_corrected = whole.kind == EstimatorKind::Corrected;
+            let without = Parts::ALL_BUT_ONE.map(|(name, parts)| whole.with_parts(name, parts));
+            std::iter::once(whole).chain(without.into_iter().filter(move |_| is_corrected))
+        };
+        sensors.into_iter().flat_map(with_parts).collect()
+    }
+
+    fn with_parts(&self, name: &'static str, parts: Parts) -> Self {
+        let sensor = self.sensor.with_parts(parts);
+        Self { sensor, kind: self.kind, calibration_s: self.calibration_s, is_part: true, name }
     }
 
     /// Whether it is shown to say what another one is made of.
@@ -126,7 +147,7 @@ impl Sensor {
             file: recording.name.clone(),
             sha256: recording.sha256.clone(),
             split: None,
-            estimator: self.kind.name(),
+            estimator: self.name,
             sample: Sample::Out,
             known: told.name.clone(),
             is_part: self.is_part || told.name.is_some(),
