@@ -57,41 +57,47 @@ pub fn run(args: &FilterArgs) -> Result<(), CliError> {
     rows_out.publish()
 }
 
-/// A filter with or without a lag.
-enum FilterRun {
-    AtOnce(Filter, Option<Estimate>),
-    Lagged(LaggedFilter),
+/// A filter with or without a lag, and the last row of one without.
+struct FilterRun {
+    filter: Lag,
+    row: Option<Estimate>,
+}
+
+enum Lag {
+    None(Filter),
+    Some(LaggedFilter),
 }
 
 impl FilterRun {
     fn new(sensor: &Sensor, args: &FilterArgs) -> Result<Self, Error> {
         let builder = builder(sensor, &args.estimate);
-        Ok(match args.lag_s {
-            None => Self::AtOnce(builder.build()?, None),
-            Some(lag_s) => Self::Lagged(builder.build_lagged(lag_s)?),
-        })
+        let filter = match args.lag_s {
+            None => Lag::None(builder.build()?),
+            Some(lag_s) => Lag::Some(builder.build_lagged(lag_s)?),
+        };
+        Ok(Self { filter, row: None })
     }
 
     /// Takes a row; the rows that are due.
     fn step(&mut self, time_s: f64, reading: Reading) -> Result<&[Estimate], Error> {
-        match self {
-            Self::AtOnce(filter, row) => Ok(std::slice::from_ref(row.insert(filter.step(time_s, reading)?))),
-            Self::Lagged(filter) => filter.step(time_s, reading),
+        match &mut self.filter {
+            Lag::None(filter) => Ok(std::slice::from_ref(self.row.insert(filter.step(time_s, reading)?))),
+            Lag::Some(filter) => filter.step(time_s, reading),
         }
     }
 
     /// The rows that still wait.
     fn finish(&mut self) -> Result<&[Estimate], Error> {
-        match self {
-            Self::AtOnce(..) => Ok(&[]),
-            Self::Lagged(filter) => filter.finish(),
+        match &mut self.filter {
+            Lag::None(_) => Ok(&[]),
+            Lag::Some(filter) => filter.finish(),
         }
     }
 
     fn rest_resistance(&mut self, measured: f64) -> Result<(), Error> {
-        match self {
-            Self::AtOnce(filter, _) => filter.rest_resistance(measured),
-            Self::Lagged(filter) => filter.rest_resistance(measured),
+        match &mut self.filter {
+            Lag::None(filter) => filter.rest_resistance(measured),
+            Lag::Some(filter) => filter.rest_resistance(measured),
         }
     }
 }
