@@ -48,7 +48,7 @@ pub fn filter_inputs<T: Real>(outputs: &[T; OUTPUTS], features: &[T; FEATURES]) 
 }
 
 /// Most inducing rows.
-pub const INDUCING: usize = 48;
+pub const INDUCING: usize = 64;
 
 /// Variance per square of the inputs' distance from the training range, in variances of the strain; in this distance a standard
 /// deviation of the first input that a process sees counts as one, the others by their relevance.
