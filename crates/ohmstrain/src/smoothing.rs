@@ -15,7 +15,7 @@ impl FilterBuilder<'_> {
     /// Estimates of a whole recording, each from all readings; NaN stands for a missing one.
     ///
     /// # Errors
-    /// As [`Sensor::smooth`].
+    /// As [`Sensor::smooth`](crate::Sensor::smooth).
     ///
     /// ```
     /// # let text = std::fs::read_to_string("examples/sensor.toml")?;

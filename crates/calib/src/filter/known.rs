@@ -49,7 +49,7 @@ pub struct KnownStrain {
 ///
 /// An error is a Gaussian process of the time: a part that lasts for seconds, in units of the deviation that is stated, an
 /// offset and an error of the gain that last for an hour, in units of what is stated on average where strains are known. How large
-/// these two are is one of [`SIZES`], weighed by how likely they make what was known (a mixture of Gaussian processes).
+/// these two are is one of a few sizes, weighed by how likely they make what was known (a mixture of Gaussian processes).
 #[derive(Clone, Debug)]
 pub struct KnownErrors {
     limits: StrainRange<f64>,
