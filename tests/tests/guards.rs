@@ -1,4 +1,4 @@
-//! Outliers and re-zeroing, on any estimator: checked against the plain filter run differently.
+//! Outliers, on any estimator: checked against the plain filter run differently.
 
 use nalgebra::SVector;
 use ohmstrain_ekf::{
@@ -152,40 +152,4 @@ fn huber_bounds_the_influence() {
         let moved = step(expected + deviations * sd, student).advanced.state.mean - missing.mean;
         assert!((moved - gain * (weight * deviations * sd)).amax() < 1e-12, "{deviations}");
     }
-}
-
-/// Knowing a component is conditioning on it: dense formulas, written out.
-#[test]
-fn re_zeroing_conditions_on_what_is_known() {
-    let ekf = ekf();
-    let mut belief = start();
-    for k in 0..20 {
-        belief = ekf.step(&belief, DT_S, reading(k)).unwrap().posterior;
-    }
-    let known = Gaussian { mean: 0.05, variance: 1e-6 };
-    let pinned = belief.at_rest(&known, 1e-3).unwrap();
-    let (mut mean, mut covariance) = (belief.mean, belief.covariance.to_matrix());
-    for (index, value, variance) in [(0, 0.05, 1e-6), (1, 0.0, 1e-6)] {
-        let column: SVector<f64, 4> = covariance.column(index).into_owned();
-        let total = covariance[(index, index)] + variance;
-        mean += column * ((value - mean[index]) / total);
-        covariance -= column * column.transpose() / total;
-    }
-    assert!((pinned.mean - mean).amax() < 1e-13);
-    assert!((pinned.covariance.to_matrix() - covariance).amax() < 1e-13);
-    assert!((pinned.mean[0] - 0.05).abs() < 1e-3 && pinned.covariance[(0, 0)] < 1e-6);
-
-    // A mixture weighs its hypotheses by how well they agree.
-    let filter = sign_split();
-    let prepared = Estimator::<f64, 4, 10>::prepare(&filter, DT_S);
-    let mut mixture = Mixture::single(start(), Phase::Extend);
-    for k in 0..20 {
-        mixture = filter.advance(&mixture, &prepared, reading(k)).unwrap().state;
-    }
-    let pinned = State::at_rest(&mixture, &known, 1e-3).unwrap();
-    assert!((pinned.moments().mean[0] - 0.05).abs() < 2e-3);
-    let sum: f64 = pinned.phase_probabilities().iter().sum();
-    assert!((sum - 1.0).abs() < 1e-12);
-    let nowhere = Gaussian { mean: f64::NAN, variance: 1.0 };
-    assert_eq!(State::pinned(&mixture, 0, &nowhere), Err(StepError::NonFiniteReading));
 }

@@ -4,7 +4,7 @@ use ohmstrain_model::{Observation, Scalar, Symmetric, Transition};
 use crate::clock::check_time_step;
 use crate::smooth::rts_step;
 use crate::substeps;
-use crate::{Advanced, Belief, Channel, Dynamics, Estimator, Gaussian, Innovation, Reading, State, StepError};
+use crate::{Advanced, Belief, Channel, Dynamics, Estimator, Innovation, Reading, State, StepError};
 
 /// Extended Kalman filter: one Gaussian, linearised at its mean.
 ///
@@ -185,17 +185,6 @@ where
     }
 }
 
-/// Kalman's update with the knowledge that component `index` of the state is `known`.
-pub(crate) fn pinned<T: Scalar, const N: usize, const L: usize>(
-    belief: &Belief<T, N, L>,
-    index: usize,
-    known: &Gaussian<T>,
-) -> Result<(Belief<T, N, L>, Update<T, N>), StepError> {
-    let gradient = SVector::<T, N>::from_fn(|i, _| if i == index { T::one() } else { T::zero() });
-    let observation = Observation { value: gradient.dot(&belief.mean), gradient, variance: known.variance };
-    update(belief, observation, Reading::from(known.mean))
-}
-
 /// One transition after another.
 fn followed_by<T: Scalar, const N: usize, const L: usize>(
     first: &Transition<T, N, L>,
@@ -284,9 +273,5 @@ impl<T: Scalar, const N: usize, const L: usize> State<T, N, L> for Belief<T, N, 
 
     fn inflated(&self, factor: T) -> Self {
         Self { covariance: self.covariance.scaled(factor), ..*self }
-    }
-
-    fn pinned(&self, index: usize, known: &Gaussian<T>) -> Result<Self, StepError> {
-        pinned(self, index, known).map(|(belief, _)| belief)
     }
 }

@@ -94,22 +94,6 @@ pub trait State<T: Scalar, const N: usize, const L: usize>: Clone {
     fn beside(&self, _other: &Self, _share: T) -> Self {
         self.clone()
     }
-
-    /// Takes in that component `index` of the state is known from elsewhere, to be `known`: a reference strain, a rate
-    /// of zero, a joint on its stop. Everything that is correlated with it follows.
-    ///
-    /// # Errors
-    /// If `known` is not finite, or has no variance where the state has none.
-    fn pinned(&self, index: usize, known: &Gaussian<T>) -> Result<Self, StepError>;
-
-    /// Re-zero: the body is at rest at a known strain. Strain and rate are pinned; the baseline takes the difference to
-    /// what the reading says.
-    ///
-    /// # Errors
-    /// See [`Self::pinned`].
-    fn at_rest(&self, strain: &Gaussian<T>, rate_sd: T) -> Result<Self, StepError> {
-        self.pinned(0, strain)?.pinned(1, &Gaussian { mean: T::zero(), variance: rate_sd * rate_sd })
-    }
 }
 
 /// What one step of any estimator says.

@@ -29,7 +29,7 @@
 //! - `defmt`: `Format` for the same. It takes no text from the target, only numbers.
 //!
 //! ```
-//! use ohmstrain_ekf::{Belief, Ekf, Reading};
+//! use ohmstrain_ekf::{Ekf, Reading, Start};
 //! use ohmstrain_model::*;
 //! # let law = SensorLaw {
 //! #     gauge: Gauge::Polynomial { coefficients: [1.9, -2.8, 0.0] },
@@ -41,9 +41,9 @@
 //! # };
 //! # let motion = Motion::ornstein_uhlenbeck(1.0, 0.1, 0.15, 0.1)?;
 //! # let noise = ModelNoise { reading_sd: 2e-3, branch_sd: 5e-3, baseline_sd: 0.02, baseline_time_s: 30.0 };
-//! let model = SwitchedModel::<f64, 1, 4>::new(law, motion, noise)?;
+//! let model = WithBaseline::<f64, 1>::new(law, motion, noise)?;
 //! let ekf = Ekf::new(model);
-//! let mut belief: Belief<f64, 4, 10> = Belief::initial(ekf.model());
+//! let mut belief = model.start();
 //! for rho in [0.01, 0.03, 0.06] {
 //!     let step = ekf.step(&belief, 0.05, Some(Reading::from(rho)))?;
 //!     belief = step.posterior;
@@ -89,7 +89,7 @@ mod unscented;
 pub use adskalman_bridge::LinearStep;
 #[cfg(feature = "simd")]
 pub use bank::{Bank, Lane, WrongLength};
-pub use belief::{Belief, Gaussian};
+pub use belief::{Belief, BeliefOf, Gaussian, Start};
 pub use clock::seconds_between;
 pub use ekf::{Ekf, Step, Update};
 pub use error::StepError;

@@ -92,6 +92,16 @@ fn the_ramp_border_is_where_the_reading_stops_changing() {
     }
 }
 
+/// A belief whose rate has been told: regression on it.
+fn knowing_the_rate(belief: &Belief<f64, 4, 10>, told: &Gaussian<f64>) -> Belief<f64, 4, 10> {
+    let with_rate: SVector<f64, 4> = SVector::from_fn(|i, _| belief.covariance[(i, 1)]);
+    let variance = with_rate[1] + told.variance;
+    let mut known = *belief;
+    known.mean += with_rate * ((told.mean - belief.mean[1]) / variance);
+    known.covariance.add_outer(&with_rate, -1.0 / variance);
+    known
+}
+
 /// A prediction is cut at rate zero; then the rate is told. What that says of the state before is regression on the rate as
 /// it was predicted before the cut: `m + P Fᵀ e (v - v̂)/(e F P Fᵀ e + Q)`.
 #[test]
@@ -108,7 +118,8 @@ fn a_smoother_goes_back_through_the_prediction_before_its_cut() {
     let prepared = Estimator::<f64, 4, 10>::prepare(&filter, 0.2);
     let filtered = Mixture::single(start, Phase::Extend);
     let told = Gaussian { mean: 0.12, variance: 1e-14 };
-    let next = filter.advance(&filtered, &prepared, None).unwrap().state.pinned(1, &told).unwrap();
+    let next = filter.advance(&filtered, &prepared, None).unwrap().state;
+    let next = Mixture::single(knowing_the_rate(&next.shares()[0].belief, &told), Phase::Extend);
     let back = filter.smooth_back(&filtered, &prepared, None, &next).unwrap().unwrap().moments();
 
     let step = Dynamics::<f64, 4, 10>::prepare(&model, 0.2);

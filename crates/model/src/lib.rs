@@ -35,6 +35,7 @@ mod phase;
 mod response;
 mod reversal;
 mod scalar;
+mod sizes;
 mod switched;
 mod symmetric;
 
@@ -49,5 +50,6 @@ pub use phase::{Direction, Phase, SplitRate, Turning, UNEXPLAINED, UNEXPLAINED_S
 pub use response::Response;
 pub use reversal::{LEAST_LEFT, RateChange, TURNING, TurningNumbers, correlated_steps};
 pub use scalar::Scalar;
+pub use sizes::{Branches, Models, WithBaseline, WithoutBaseline};
 pub use switched::{Observation, SwitchedModel, SwitchedStep, Transition};
 pub use symmetric::Symmetric;

@@ -1,7 +1,9 @@
 mod gaussian;
 pub(crate) mod psd;
+mod start;
 
 pub use gaussian::Gaussian;
+pub use start::{BeliefOf, Start};
 
 use nalgebra::SVector;
 use ohmstrain_model::{Scalar, SwitchedModel, Symmetric};

@@ -2,10 +2,9 @@ use nalgebra::SVector;
 use ohmstrain_model::{Phase, Symmetric};
 
 use crate::Real;
-use crate::ekf::pinned;
 use crate::mixture::pause::{Pause, PhaseSum};
-use crate::mixture::{LEAST_WEIGHT, marginal_match, moment_match};
-use crate::{Belief, Gaussian, State, StepError};
+use crate::mixture::{marginal_match, moment_match};
+use crate::{Belief, Gaussian, State};
 
 /// A Gaussian and its share of a mixture. Shares are probabilities, not logarithms: nothing is to be converted at a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,38 +25,6 @@ impl<T: Real, const N: usize, const L: usize> Share<T, N, L> {
         let nothing = Belief { mean: SVector::zeros(), covariance: Symmetric::zeros() };
         Self { weight: T::zero(), belief: nothing, per_inside: T::one() }
     }
-}
-
-/// Pins a component of every Gaussian, and weighs them by how likely that made it; what is negligible has no weight.
-fn pin<T: Real, const N: usize, const L: usize>(
-    shares: &mut [Share<T, N, L>],
-    index: usize,
-    known: &Gaussian<T>,
-) -> Result<(), StepError> {
-    let mut most = T::zero().ln();
-    for share in shares.iter_mut() {
-        let mut logarithm = share.weight.ln();
-        if share.weight > T::zero() {
-            let (belief, update) = pinned(&share.belief, index, known)?;
-            logarithm += update.log_likelihood;
-            share.belief = belief;
-        }
-        share.weight = logarithm;
-        most = most.max(logarithm);
-    }
-    if !most.is_finite() {
-        return Err(StepError::NonFiniteState);
-    }
-    let mut total = T::zero();
-    for share in shares.iter_mut() {
-        let weight = (share.weight - most).exp();
-        share.weight = if weight > T::of(LEAST_WEIGHT) { weight } else { T::zero() };
-        total += share.weight;
-    }
-    for share in shares {
-        share.weight /= total;
-    }
-    Ok(())
 }
 
 /// One Gaussian per phase: what [`Imm`](crate::Imm) carries from step to step.
@@ -98,9 +65,6 @@ impl<T: Real, const N: usize, const L: usize> PhaseMixture<T, N, L> {
     pub(crate) fn empty() -> Self {
         Self { modes: [Share::vacant(); 3] }
     }
-
-    /// What has no weight stays where it is.
-    const fn drop_weightless(&mut self) {}
 
     /// A phase has one place.
     const fn take_beside(&mut self, _other: &Self, _share: T) {}
@@ -207,10 +171,6 @@ impl<T: Real, const N: usize, const L: usize, const K: usize> Mixture<T, N, L, K
         self.shares.get_mut(..self.len).unwrap_or(&mut [])
     }
 
-    fn drop_weightless(&mut self) {
-        self.retain(|share| share.weight > T::zero());
-    }
-
     /// Follows the first Gaussian of another mixture, too, in place of the lightest if there is no other.
     fn take_beside(&mut self, other: &Self, share: T) {
         let Some((beside, phase)) = other.at(0) else { return };
@@ -266,13 +226,6 @@ macro_rules! mixture_state {
                 let mut both = *self;
                 both.take_beside(other, share);
                 both
-            }
-
-            fn pinned(&self, index: usize, known: &Gaussian<T>) -> Result<Self, StepError> {
-                let mut pinned = *self;
-                pin(pinned.shares_mut(), index, known)?;
-                pinned.drop_weightless();
-                Ok(pinned)
             }
         }
     };

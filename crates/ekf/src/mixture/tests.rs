@@ -186,41 +186,6 @@ fn what_limits_took_is_given_back_after_merging() {
     assert!((merged.weight * more_inside - 1.0).abs() < 1e-14, "{}", merged.weight * more_inside);
 }
 
-/// Pinning a mixture weighs its parts by how likely each found what is known: Bayes' rule, written out.
-#[test]
-fn a_pinned_mixture_is_weighed() {
-    let parts = [(0.3, 0.0), (0.7, 0.3)];
-    let mut mixture = Mixture::<f64, 3, 6, 2>::empty();
-    for (weight, strain) in parts {
-        let (share, phase) = mixture.one_more().unwrap();
-        (share.weight, *phase) = (weight, Phase::Extend);
-        share.belief = Belief::independent(vector![strain, 0.0, 0.0], &[0.01, 1.0, 1.0]);
-    }
-    let pinned = crate::State::pinned(&mixture, 0, &Gaussian { mean: 0.1, variance: 0.02 }).unwrap();
-    let likelihood = |strain: f64| (-0.5 * (0.1 - strain) * (0.1 - strain) / 0.03).exp();
-    let total: f64 = parts.iter().map(|(weight, strain)| weight * likelihood(*strain)).sum();
-    for (share, (weight, strain)) in pinned.shares().iter().zip(parts) {
-        assert!((share.weight - weight * likelihood(strain) / total).abs() < 1e-14);
-        assert!((share.belief.mean[0] - (strain + (0.1 - strain) / 3.0)).abs() < 1e-14);
-    }
-    // With 0.0001 instead of 0.01, known to be at zero: the second part is lighter by exp(-0.09/(2 (0.0001 + known))) times 0.7/0.3,
-    // and is followed no longer where that is below e⁻¹², up to 0.0034.
-    for share in mixture.shares_mut() {
-        share.belief.covariance[(0, 0)] = 1e-4;
-    }
-    let followed = |variance: f64| {
-        let pinned = crate::State::pinned(&mixture, 0, &Gaussian { mean: 0.0, variance }).unwrap();
-        (pinned.shares().len(), pinned.shares().iter().map(|share| share.weight).sum::<f64>())
-    };
-    for (variance, expected) in [(0.0035, 2), (0.0033, 1), (0.0, 1)] {
-        let (parts, total) = followed(variance);
-        assert_eq!(parts, expected, "{variance}");
-        assert!((total - 1.0).abs() < 1e-15, "{variance}");
-    }
-    // No part can have been there.
-    assert!(crate::State::pinned(&mixture, 0, &Gaussian { mean: 1e200, variance: 0.0 }).is_err());
-}
-
 type Split = SignSplit<f64, 0, 3, 4>;
 type State = Mixture<f64, 3, 6, 4>;
 

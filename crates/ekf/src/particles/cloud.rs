@@ -5,8 +5,7 @@ use ohmstrain_model::{Phase, Scalar, Symmetric};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal, StandardUniform};
 
-use crate::ekf::pinned;
-use crate::{Belief, Gaussian, State, StepError};
+use crate::{Belief, State};
 
 /// One path of the motion, as far as it has come.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -116,29 +115,6 @@ impl<T: Scalar, const N: usize, const L: usize> State<T, N, L> for ParticleCloud
         }
         inflated.covariance = inflated.covariance.scaled(factor);
         inflated
-    }
-
-    /// Shifts every particle along the regression of the state on the known component and draws them together, so that
-    /// the cloud's moments become those of the conditioned Gaussian.
-    fn pinned(&self, index: usize, known: &Gaussian<T>) -> Result<Self, StepError> {
-        let before = self.moments();
-        let (after, _) = pinned(&before, index, known)?;
-        let variance = before.covariance[(index, index)];
-        if variance.is_zero() {
-            return Ok(self.clone());
-        }
-        let narrowed = (after.covariance[(index, index)] / variance).max(T::zero()).sqrt();
-        let regression = SVector::<T, N>::from_fn(|i, _| before.covariance[(i, index)]) / variance;
-        let mut conditioned = self.clone();
-        for particle in &mut conditioned.particles {
-            let deviation = particle.state[index] - before.mean[index];
-            let target = after.mean[index] + narrowed * deviation;
-            particle.state += regression * (target - particle.state[index]);
-        }
-        // What paths leave open shrinks along the same direction.
-        let own = conditioned.covariance[(index, index)];
-        conditioned.covariance.add_outer(&regression, own * (narrowed * narrowed - T::one()));
-        Ok(conditioned)
     }
 }
 
