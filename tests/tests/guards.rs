@@ -1,9 +1,8 @@
 //! Outliers, on any estimator: checked against the plain filter run differently.
 
-use nalgebra::SVector;
 use ohmstrain_ekf::{
-    Belief, Dwell, Ekf, Estimator, Evidence, Gaussian, Guard, Guarded, Influence, Mixture, Reading, ReadingVerdict,
-    SignSplit, State, StepError, Streak,
+    Belief, Dwell, Ekf, Estimator, Evidence, Guard, Guarded, Influence, Mixture, Reading, ReadingVerdict, SignSplit,
+    Streak,
 };
 use ohmstrain_model::{Phase, StrainRange, SwitchedModel};
 use ohmstrain_tests::sensor;
@@ -23,11 +22,6 @@ fn start() -> Kalman {
 fn sign_split() -> SignSplit<f64, 1, 4, 4> {
     let evidence = Evidence { limits: StrainRange { lower: -0.05, upper: 0.4 }, tempering: 0.8 };
     SignSplit::new(sensor(), DT_S, Some(Dwell::new(2.0, 3.0, 0.5).unwrap()), evidence).unwrap()
-}
-
-/// A reading every step but every seventh.
-fn reading(k: u32) -> Option<Reading<f64>> {
-    (k % 7 != 3).then(|| Reading::from(0.15 + 0.1 * (0.3 * f64::from(k)).sin()))
 }
 
 /// Runs a guard over readings; states and verdicts.

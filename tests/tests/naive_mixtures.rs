@@ -4,8 +4,8 @@ mod naive;
 
 use nalgebra::{SMatrix, SVector};
 use ohmstrain_ekf::{
-    Belief, Dwell, Estimator, Evidence, Gaussian, Hypotheses, Imm, Innovation, Mixture, PhaseMixture, Reading, Real,
-    SignSplit, State, StepError,
+    Belief, Dwell, Estimator, Evidence, Hypotheses, Imm, Innovation, Mixture, PhaseMixture, Reading, Real, SignSplit,
+    State, StepError,
 };
 use ohmstrain_model::{Phase, StrainRange, SwitchedModel};
 use ohmstrain_tests::sensor;

@@ -1,6 +1,6 @@
 use ohmstrain_ekf::Gaussian;
 use ohmstrain_ekf::correction::{
-    BLOCK, Correction, FILTER_INPUTS, INDUCING, InputScale, Process, RowBlock, Rows, Simulated, block_of,
+    BLOCK, Correction, FILTER_INPUTS, INDUCING, InputScale, Process, RowBlock, Rows, Simulated, Triangle, block_of, stripes,
 };
 use ohmstrain_model::StrainRange;
 
@@ -16,7 +16,7 @@ pub struct Corrected {
     rows: Vec<RowBlock<f64, FILTER_INPUTS>>,
     scales: [InputScale<f64>; FILTER_INPUTS],
     weights: Vec<f64>,
-    explained: Vec<f64>,
+    explained: Vec<[f64; BLOCK]>,
     strain: f64,
 }
 
@@ -30,7 +30,7 @@ impl Corrected {
             rows: rows.chunks(BLOCK).filter_map(block_of).collect(),
             scales: [InputScale { mean: 0.1, sd: 0.8, lower: -1.0, upper: 1.2 }; FILTER_INPUTS],
             weights: (0..ROWS).map(|k| 0.01 * number(7 * k)).collect(),
-            explained: (0..INDUCING * (INDUCING + 1) / 2).map(|k| 0.02 * number(3 * k)).collect(),
+            explained: stripes(INDUCING, |i, j| 0.02 * number(3 * (INDUCING * i + j))).collect(),
             strain: 0.0,
         }
     }
@@ -40,7 +40,7 @@ impl Corrected {
             relevance: std::array::from_fn(|i| (1.0 + 0.05 * i as f64) / (length * length)),
             mean: 0.1,
             weights: &self.weights,
-            explained: &self.explained,
+            explained: Triangle::new(&self.explained, INDUCING),
             variance: 0.4,
             noise: 0.01,
             widening: 1.2,
@@ -61,7 +61,7 @@ impl Filter for Corrected {
         let simulated = Simulated {
             rows: Rows::new(&self.rows, SIMULATED),
             scales: &self.scales,
-            process: Process { explained: &[], ..self.process(2.5) },
+            process: Process { explained: Triangle::NONE, ..self.process(2.5) },
         };
         let correction = Correction {
             rows: Rows::new(&self.rows, ROWS),

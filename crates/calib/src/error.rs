@@ -1,4 +1,4 @@
-use crate::params::estimator::EstimatorKind;
+use crate::params::estimator::NoParameters;
 use crate::params::law::MOST_BRANCHES;
 use crate::params::validate::FieldError;
 use crate::samples::SamplesError;
@@ -74,6 +74,9 @@ pub enum CalibrationError {
     /// A parameter file holds a number that no sensor can have.
     #[error("{0}")]
     Field(#[from] FieldError),
+    /// A parameter file has none for an estimator.
+    #[error("{0}")]
+    NoParameters(#[from] NoParameters),
     /// A parameter file asks for what this version does not have.
     #[error("{0}")]
     Unsupported(String),
@@ -82,12 +85,5 @@ pub enum CalibrationError {
 impl CalibrationError {
     pub(crate) fn branches(found: usize) -> Self {
         Self::Unsupported(format!("a law with {found} branches; at most {MOST_BRANCHES} are supported"))
-    }
-
-    pub(crate) fn no_parameters(kind: EstimatorKind) -> Self {
-        Self::Unsupported(format!(
-            "the sensor file has no parameters for `{0}`; calibrate with `{0}` as the estimator",
-            kind.name()
-        ))
     }
 }

@@ -14,6 +14,7 @@ mod calibrate;
 pub mod closed_form;
 mod correction;
 mod digits;
+mod enough;
 mod error;
 mod filter;
 mod law;
@@ -36,7 +37,7 @@ pub use calibrate::scores::{ScoredRow, Scores};
 pub use calibrate::simulated_motions::SIMULATED_SEED;
 pub use calibrate::with_prior::calibrate_with_prior;
 pub use calibrate::{Calibration, Stage, calibrate};
-pub use correction::owned::{OwnedCorrection, OwnedProcess, OwnedRows, OwnedSimulated};
+pub use correction::owned::{OwnedCorrection, OwnedProcess, OwnedRows, OwnedSimulated, OwnedTriangle};
 pub use error::CalibrationError;
 pub use filter::build::{HISTORIES, HYPOTHESES, PARTICLE_SEED, build_filter, build_filter_with};
 pub use filter::known::{KnownErrors, KnownStrain, MOST_KNOWN};
@@ -53,7 +54,7 @@ pub use params::correction::{
     CorrectionParams, CorrectionScale, CorrectorParams, FUTURE_FEATURES, ProcessParams, SimulatedParams, SimulatedRow,
     TrainingRow,
 };
-pub use params::estimator::{EstimatorKind, EstimatorParams, MotionParams, NoiseParams, PhaseParams};
+pub use params::estimator::{EstimatorKind, EstimatorParams, MotionParams, NoParameters, NoiseParams, PhaseParams};
 pub use params::law::{BranchParams, GaugeParams, LawParameter, LawParams};
 pub use params::recipe::{Parts, RECIPE, Recipe};
 pub use params::static_cubic::StaticCubic;

@@ -1,6 +1,5 @@
 use thiserror::Error;
 
-use crate::CalibrationError;
 use crate::order::extent;
 
 /// One recording: times, readings and, where it is known, the true strain.
@@ -154,32 +153,6 @@ impl<'a> Samples<'a> {
 
 /// Fewest complete rows a recording needs to be calibrated on: several per parameter of the smallest law.
 pub(crate) const FEWEST_ROWS: usize = 60;
-
-/// Checks what calibration relies on and returns the strain's range over all recordings.
-pub(crate) fn check(recordings: &[Samples]) -> Result<(f64, f64), CalibrationError> {
-    let mut range: Option<(f64, f64)> = None;
-    for (recording, samples) in recordings.iter().enumerate() {
-        let complete = samples.complete_rows().count();
-        if complete < FEWEST_ROWS {
-            return Err(CalibrationError::TooFewRows { recording, complete, needed: FEWEST_ROWS });
-        }
-        let Some((low, high)) = samples.strain_range() else { continue };
-        range = Some(range.map_or((low, high), |(l, h)| (l.min(low), h.max(high))));
-    }
-    match range {
-        None => Err(CalibrationError::NoRecording),
-        Some((low, high)) if !(high > low) => Err(CalibrationError::ConstantStrain),
-        Some(_) if recordings.iter().all(is_frozen) => Err(CalibrationError::ConstantReading),
-        Some(range) => Ok(range),
-    }
-}
-
-/// Whether the reading never changes.
-fn is_frozen(samples: &Samples) -> bool {
-    let mut readings = samples.complete_rows().map(|k| samples.reading[k]);
-    let first = readings.next();
-    readings.all(|reading| Some(reading) == first)
-}
 
 /// The known strain without gaps: missing values interpolated in time, the ends held.
 #[must_use]

@@ -3,7 +3,7 @@
 use ohmstrain_ekf::Gaussian;
 use ohmstrain_ekf::correction::{
     BLOCK, Correction, FEATURES, FeatureScale, InputScale, LowPass, Process, ReadingFeatures, RowBlock, Rows,
-    Simulated, block_of, consensus, mixture, settled,
+    Simulated, Triangle, block_of, consensus, mixture, settled, stripes,
 };
 use ohmstrain_model::StrainRange;
 
@@ -109,7 +109,11 @@ macro_rules! correction {
             upper: scale.upper as $t,
         });
         let $weights = $numbers.weights.map(|weights| weights.map(|x| x as $t));
-        let $triangles = $numbers.triangles.map(|triangle| triangle.map(|x| x as $t));
+        // Row i of the triangle starts after rows of 5, 4, … numbers.
+        let entry = |p: usize, i: usize, j: usize| {
+            $numbers.triangles[p][(0..i).map(|row| INDUCING - row).sum::<usize>() + j - i]
+        };
+        let $triangles = [0, 1, 2, 3].map(|p| stripes(INDUCING, |i, j| entry(p, i, j) as $t).collect::<Vec<_>>());
         let process =
             |p: usize| Process {
                 relevance: std::array::from_fn(|i| {
@@ -117,7 +121,7 @@ macro_rules! correction {
                 }),
                 mean: MEANS[p] as $t,
                 weights: &$weights[p],
-                explained: &$triangles[p],
+                explained: Triangle::new(&$triangles[p], INDUCING),
                 variance: VARIANCES[p] as $t,
                 noise: NOISES[p] as $t,
                 widening: WIDENINGS[p] as $t,
@@ -191,7 +195,7 @@ fn simulated_rows_are_mixed_in_last() {
         relevance: std::array::from_fn(|i| if i < 6 { 0.0 } else { RELEVANCE }),
         mean: 0.25,
         weights: &weights[1],
-        explained: &[],
+        explained: Triangle::NONE,
         variance: 0.0,
         noise: 0.08,
         widening: 1.0,

@@ -1,4 +1,4 @@
-use ohmstrain_calib::{EstimatorKind, KnownErrors, Start};
+use ohmstrain_calib::{CalibrationError, EstimatorKind, KnownErrors, Start};
 use ohmstrain_ekf::live::{DOUBT, Doubts, KNOWN_BEYOND, Protections, RestFollower};
 use ohmstrain_ekf::{Guard, Influence};
 
@@ -276,7 +276,7 @@ impl<'a> FilterBuilder<'a> {
         filter.sieve(params.sieve().under(self.protections));
         let mut scale = Scale::new(self.sensor)?;
         self.rest_resistance.map_or(Ok(()), |measured| scale.rest_at(measured))?;
-        let motion = &params.estimator(params.filter_of(kind))?.motion;
+        let motion = &params.estimator(params.filter_of(kind)).map_err(CalibrationError::from)?.motion;
         let is_none = |strain: f64| strain.abs() <= DOUBT.zero * params.limits.span();
         let doubts = self.protections.doubts.then(|| {
             let doubts = Doubts::new(params.doubt_parts(motion));

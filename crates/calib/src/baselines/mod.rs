@@ -19,10 +19,11 @@ pub use published::{PhaseRows, PublishedLaw};
 pub use regression::{Features, Regression};
 
 use crate::CalibrationError;
+use crate::enough::check;
 use crate::order::median;
 use crate::params::RangeParams;
 use crate::params::static_cubic::StaticCubic;
-use crate::samples::{Samples, check};
+use crate::samples::Samples;
 
 /// An inverse at work on one recording.
 pub trait Baseline {

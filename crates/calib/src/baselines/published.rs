@@ -5,8 +5,9 @@ use ohmstrain_model::Phase;
 
 use super::{Baseline, Held};
 use crate::CalibrationError;
+use crate::enough::check;
 use crate::params::RangeParams;
-use crate::samples::{Samples, check, filled_strain};
+use crate::samples::{Samples, filled_strain};
 
 /// Time constants tried for one direction.
 const TIME_CONSTANTS: usize = 80;

@@ -3,10 +3,11 @@ use nalgebra::DVector;
 use super::reading_scale::ReadingScale;
 use super::{Baseline, Held};
 use crate::CalibrationError;
+use crate::enough::check;
 use crate::law::blocked_normal::BlockedNormal;
 use crate::law::regression::VALIDATION_BLOCKS;
 use crate::params::RangeParams;
-use crate::samples::{Samples, check};
+use crate::samples::Samples;
 
 /// What a linear regression of strain sees of the readings up to now.
 pub trait Features: Clone {

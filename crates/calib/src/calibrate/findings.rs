@@ -20,7 +20,7 @@ use crate::law::identifiability::Identifiability;
 use crate::law::structure::LawFit;
 use crate::motion_stats::MotionStats;
 use crate::params::RangeParams;
-use crate::params::estimator::{EstimatorKind, EstimatorParams};
+use crate::params::estimator::{EstimatorKind, EstimatorParams, NoParameters};
 use crate::params::static_cubic::StaticCubic;
 use crate::params::summary::Summary;
 use crate::prior::CorrectionPrior;
@@ -202,7 +202,7 @@ impl Check<'_> {
         let setting = Setting { limits, start: Start::Unknown, sieve: Sieve::open() };
         let bare = move |smooths: bool| {
             let kind = if smooths { self.filter.smoother() } else { self.filter };
-            let params = self.estimators.get(&kind).ok_or_else(|| CalibrationError::no_parameters(kind))?;
+            let params = self.estimators.get(&kind).ok_or(NoParameters { kind })?;
             filter_from_parts(kind, &law.law, params, setting)
         };
         let correction = if self.kind == EstimatorKind::Corrected {

@@ -1,3 +1,4 @@
+use super::owned::OwnedTriangle;
 use crate::params::correction::ProcessParams;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use ohmstrain_ekf::correction::kernel;
@@ -155,16 +156,16 @@ impl GaussianProcess {
         Some(left_out)
     }
 
-    /// The upper triangle, row by row, of W: |W k|² is the share of the prior variance that all rows explain where their
+    /// The upper triangle W: |W k|² is the share of the prior variance that all rows explain where their
     /// kernels are projected onto those of these inducing rows, k (Nyström).
-    pub(crate) fn explained(&self, inducing: &[usize]) -> Option<Vec<f64>> {
+    pub(crate) fn explained(&self, inducing: &[usize]) -> Option<OwnedTriangle<f64>> {
         let m = inducing.len();
         let with_inducing = self.kernel.select_columns(inducing);
         let among = with_inducing.select_rows(inducing) + DMatrix::identity(m, m) * JITTER * 1e-2;
         // Kernels of all rows as weighted sums of those of the inducing rows.
         let projection = among.cholesky()?.solve(&with_inducing.transpose()).transpose();
         let triangle = self.covariance.l_dirty().solve_lower_triangular(&projection)?.qr().r();
-        Some((0..m).flat_map(|i| (i..m).map(move |j| (i, j))).map(|place| triangle[place]).collect())
+        Some(OwnedTriangle::new(m, |i, j| triangle[(i, j)]))
     }
 }
 

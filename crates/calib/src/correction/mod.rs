@@ -7,7 +7,9 @@ mod settings;
 pub(crate) mod simulated;
 
 use ohmstrain_ekf::Gaussian;
-use ohmstrain_ekf::correction::{FEATURES, FILTER_INPUTS, INDUCING, InputScale, OUTPUTS, Process, consensus, mixture};
+use ohmstrain_ekf::correction::{
+    FEATURES, FILTER_INPUTS, INDUCING, InputScale, OUTPUTS, Process, Triangle, consensus, mixture,
+};
 use owned::{OwnedCorrection, OwnedProcess};
 
 use crate::order::extent;
@@ -321,7 +323,7 @@ pub(crate) fn learned<const D: usize, const S: usize>(
             relevance: of_inputs,
             mean: process.centre,
             weights: &[],
-            explained: &[],
+            explained: Triangle::NONE,
             variance: process.variance(),
             noise: process.noise * process.variance(),
             widening: settings.sd_scale.powi(2),

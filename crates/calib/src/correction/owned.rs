@@ -1,7 +1,9 @@
 use std::ops::Deref;
 
 use ohmstrain_ekf::Real;
-use ohmstrain_ekf::correction::{BLOCK, Correction, InputScale, Process, RowBlock, Rows, Simulated, block_of};
+use ohmstrain_ekf::correction::{
+    BLOCK, Correction, InputScale, Process, RowBlock, Rows, Simulated, Triangle, block_of, stripes,
+};
 use ohmstrain_model::StrainRange;
 
 /// Rows one after another, and the same side by side, as a [`Correction`] wants them.
@@ -78,13 +80,55 @@ pub struct OwnedSimulated<T: 'static, const D: usize> {
     pub process: OwnedProcess<T, D>,
 }
 
+/// A [`Triangle`] with its columns.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct OwnedTriangle<T> {
+    columns: Vec<[T; BLOCK]>,
+    side: usize,
+}
+
+impl<T: Real> OwnedTriangle<T> {
+    /// Of the entries on and above the diagonal.
+    pub fn new(side: usize, entry: impl Fn(usize, usize) -> T) -> Self {
+        Self { columns: stripes(side, entry).collect(), side }
+    }
+
+    /// Stripe by stripe.
+    pub fn columns(&self) -> &[[T; BLOCK]] {
+        &self.columns
+    }
+
+    /// How many rows it has.
+    pub const fn side(&self) -> usize {
+        self.side
+    }
+
+    /// The whole matrix, row by row.
+    pub fn rows(&self) -> Vec<Vec<T>> {
+        let mut rows = vec![vec![T::zero(); self.side]; self.side];
+        let places = (0..self.side).step_by(BLOCK).flat_map(|first| (first..self.side).map(move |j| (first, j)));
+        for ((first, j), column) in places.zip(&self.columns) {
+            rows[first..].iter_mut().zip(column).for_each(|(row, entry)| row[j] = *entry);
+        }
+        rows
+    }
+
+    fn as_triangle(&self) -> Triangle<'_, T> {
+        Triangle::new(&self.columns, self.side)
+    }
+
+    fn map<U: Real>(&self, number: impl Fn(T) -> U + Copy) -> OwnedTriangle<U> {
+        OwnedTriangle { columns: self.columns.iter().map(|column| column.map(number)).collect(), side: self.side }
+    }
+}
+
 /// A [`Process`] with everything that it borrows.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OwnedProcess<T: 'static, const D: usize> {
     /// Weight of each training row.
     pub weights: Vec<T>,
-    /// The upper triangle of what the inducing rows explain, row by row.
-    pub explained: Vec<T>,
+    /// What the inducing rows explain.
+    pub explained: OwnedTriangle<T>,
     /// Its other numbers.
     pub numbers: Process<'static, T, D>,
 }
@@ -151,19 +195,19 @@ impl<T: Real + 'static, const D: usize> OwnedSimulated<T, D> {
 
 impl<T: Real + 'static, const D: usize> OwnedProcess<T, D> {
     fn process(&self) -> Process<'_, T, D> {
-        Process { weights: &self.weights, explained: &self.explained, ..self.numbers }
+        Process { weights: &self.weights, explained: self.explained.as_triangle(), ..self.numbers }
     }
 
-    fn map<U: Real + 'static>(&self, number: impl Fn(T) -> U) -> OwnedProcess<U, D> {
+    fn map<U: Real + 'static>(&self, number: impl Fn(T) -> U + Copy) -> OwnedProcess<U, D> {
         let Process { relevance, mean, variance, noise, widening, least_variance, .. } = self.numbers;
         OwnedProcess {
-            weights: self.weights.iter().copied().map(&number).collect(),
-            explained: self.explained.iter().copied().map(&number).collect(),
+            weights: self.weights.iter().copied().map(number).collect(),
+            explained: self.explained.map(number),
             numbers: Process {
-                relevance: relevance.map(&number),
+                relevance: relevance.map(number),
                 mean: number(mean),
                 weights: &[],
-                explained: &[],
+                explained: Triangle::NONE,
                 variance: number(variance),
                 noise: number(noise),
                 widening: number(widening),

@@ -3,10 +3,10 @@
 
 use nalgebra::{DMatrix, DVector};
 use ohmstrain_ekf::Gaussian;
-use ohmstrain_ekf::correction::{FEATURES, FILTER_INPUTS, OUTPUTS, Process, filter_inputs, kernel};
+use ohmstrain_ekf::correction::{FEATURES, FILTER_INPUTS, OUTPUTS, Process, Triangle, filter_inputs, kernel};
 
 use super::gaussian_process::relevance;
-use super::owned::{OwnedProcess, OwnedSimulated};
+use super::owned::{OwnedProcess, OwnedSimulated, OwnedTriangle};
 use super::{BLOCKS, Prepared, scale};
 use crate::order::extent;
 use crate::params::RangeParams;
@@ -101,13 +101,13 @@ impl Prepared<'_, FILTER_INPUTS> {
             relevance: std::array::from_fn(|i| if i < OUTPUTS { 0.0 } else { relevance(LENGTH) }),
             mean: centre,
             weights: &[],
-            explained: &[],
+            explained: Triangle::NONE,
             variance: 0.0,
             noise: of.sd.powi(2) + worst,
             widening: 1.0,
             least_variance: 0.0,
         };
-        let process = OwnedProcess { weights, explained: vec![], numbers };
+        let process = OwnedProcess { weights, explained: OwnedTriangle::default(), numbers };
         Some(OwnedSimulated { rows: rows.into_iter().collect(), scales, process })
     }
 

@@ -13,7 +13,7 @@ use crate::filter::corrected::Corrected;
 use crate::filter::learned::Learned;
 use crate::filter::running::{Interval, Running};
 use crate::filter::{Filter, Start};
-use crate::params::estimator::{EstimatorKind, EstimatorParams};
+use crate::params::estimator::{EstimatorKind, EstimatorParams, NoParameters};
 use crate::params::law::LawParams;
 use crate::params::{RangeParams, SensorParams};
 use crate::{CalibrationError, with_sizes};
@@ -52,7 +52,7 @@ pub fn build_filter_with(
     if kind != EstimatorKind::Corrected {
         return Ok(filter);
     }
-    let learned = learned.ok_or_else(|| CalibrationError::no_parameters(kind))?;
+    let learned = learned.ok_or(NoParameters { kind })?;
     Ok(Box::new(Corrected::new(filter, learned)?))
 }
 
@@ -107,7 +107,7 @@ fn of_size<const B: usize, const N: usize, const L: usize>(
             let filter = SparseEkf::<_, Compact, B, N, SigmaPoints<AnyCurve<f64>>>::at_a_moment(model);
             return Ok(Box::new(Running::new(filter.map_err(CalibrationError::NoFilter)?, beliefs, model, interval)));
         }
-        EstimatorKind::Corrected => return Err(CalibrationError::no_parameters(kind)),
+        EstimatorKind::Corrected => return Err(NoParameters { kind }.into()),
         _ => {}
     }
     let PhaseFilter { dwell, hold, evidence } = PhaseFilter::new(kind, estimator, setting.limits)?;

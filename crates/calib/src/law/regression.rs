@@ -3,13 +3,14 @@ use std::ops::Range;
 use nalgebra::DVector;
 
 use crate::CalibrationError;
+use crate::enough::check;
 use crate::law::blocked_normal::BlockedNormal;
 use crate::law::design::{Regressors, StrainScale};
 use crate::law::robust_loss;
 use crate::motion_stats::MotionStats;
 use crate::order::median;
 use crate::params::RangeParams;
-use crate::samples::{Samples, check};
+use crate::samples::Samples;
 
 /// Contiguous blocks of each recording that are left out in turn.
 pub(crate) const VALIDATION_BLOCKS: usize = 4;

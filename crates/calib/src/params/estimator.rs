@@ -2,6 +2,7 @@ use ohmstrain_ekf::Dwell;
 use ohmstrain_ekf::live::news;
 use ohmstrain_model::{ModelNoise, Motion, ParameterError};
 use serde::{Deserialize, Serialize};
+use thiserror::Error;
 
 /// The estimators, by the names used on the command line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -21,6 +22,14 @@ pub enum EstimatorKind {
     Particles,
     /// One of the filters of [`RECIPE`](crate::RECIPE) with the learned correction of its strain.
     Corrected,
+}
+
+/// A sensor file has no parameters for an estimator.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+#[error("the sensor file has no parameters for `{0}`; calibrate with `{0}` as the estimator", kind.name())]
+pub struct NoParameters {
+    /// Which.
+    pub kind: EstimatorKind,
 }
 
 impl EstimatorKind {

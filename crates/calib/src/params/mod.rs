@@ -14,9 +14,8 @@ use std::collections::BTreeMap;
 use ohmstrain_model::StrainRange;
 use serde::{Deserialize, Serialize};
 
-use crate::CalibrationError;
 use crate::params::correction::CorrectionParams;
-use crate::params::estimator::{EstimatorKind, EstimatorParams};
+use crate::params::estimator::{EstimatorKind, EstimatorParams, NoParameters};
 use crate::params::law::LawParams;
 use crate::params::static_cubic::StaticCubic;
 use crate::params::summary::{Summary, TestedSummary};
@@ -254,7 +253,7 @@ impl SensorParams {
     ///
     /// # Errors
     /// If the file has none for it.
-    pub fn estimator(&self, kind: EstimatorKind) -> Result<&EstimatorParams, CalibrationError> {
-        self.estimators.get(&kind).ok_or_else(|| CalibrationError::no_parameters(kind))
+    pub fn estimator(&self, kind: EstimatorKind) -> Result<&EstimatorParams, NoParameters> {
+        self.estimators.get(&kind).ok_or(NoParameters { kind })
     }
 }

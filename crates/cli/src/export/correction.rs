@@ -73,7 +73,8 @@ struct ProcessConstants {
     widening: Literal,
     least_variance: Literal,
     weights: Vec<Literal>,
-    explained: Vec<Literal>,
+    /// Column by column of stripes of four rows.
+    explained: Vec<Vec<Literal>>,
 }
 
 /// What simulated rows say.
@@ -144,7 +145,6 @@ impl CorrectionConstants {
         let PortableCorrection { features, learned } = correction;
         let scales = &learned.scales;
         let decays = TIME_CONSTANTS_S.map(|tau_s| decays(dt_s, tau_s as f32));
-        let explained = learned.direct.explained.len();
         Self {
             centre: narrow(features.centre),
             half_range: narrow(features.half_range),
@@ -161,8 +161,7 @@ impl CorrectionConstants {
             sd: scales.iter().map(|scale| Some(narrow(scale.sd)).filter(|sd| sd.0.is_finite())).collect(),
             lower: scales.iter().map(|scale| narrow(scale.lower)).collect(),
             upper: scales.iter().map(|scale| narrow(scale.upper)).collect(),
-            // m rows of the triangle are m (m + 1) / 2 numbers.
-            inducing: ((8 * explained + 1).isqrt() - 1) / 2,
+            inducing: learned.direct.explained.side(),
             processes: [
                 ProcessConstants::new("DIRECT", "Strain from the features.", &learned.direct),
                 ProcessConstants::new(
@@ -196,7 +195,7 @@ impl ProcessConstants {
             widening: narrow(numbers.widening),
             least_variance: narrow(numbers.least_variance),
             weights: narrowed(&process.weights),
-            explained: narrowed(&process.explained),
+            explained: process.explained.columns().iter().map(narrowed).collect(),
         }
     }
 }

@@ -6,7 +6,7 @@
 //! tenth from what it counts.
 
 use ohmstrain_calib::{EstimatorKind, GaugeParams, LawParams, PortableCorrection, SensorParams, with_sizes};
-use ohmstrain_ekf::correction::{FEATURES, OUTPUTS, TIME_CONSTANTS_S};
+use ohmstrain_ekf::correction::{BLOCK, FEATURES, OUTPUTS, TIME_CONSTANTS_S};
 use serde::Serialize;
 
 use super::fixed_rate::FixedRate;
@@ -79,9 +79,9 @@ const HISTORIES: OfKind = OfKind {
 };
 
 /// Instructions of a correction for each row, for each simulated one, for each entry of the two triangles, for its quadratic functions.
-const ROW: f64 = 235.3;
-const SIMULATED_ROW: f64 = 110.0;
-const ENTRY: f64 = 12.7;
+const ROW: f64 = 183.0;
+const SIMULATED_ROW: f64 = 84.0;
+const ENTRY: f64 = 8.4;
 const QUADRATIC: f64 = 1930.0;
 /// Bytes of code of a correction and of its quadratic functions; bytes of the stack.
 const CORRECTION_CODE: f64 = 2490.0;
@@ -109,7 +109,8 @@ impl Cost {
         let of_stack = [1.0, branches, hypotheses, hypotheses * branches];
         let mut stack: f64 = kind.stack.iter().zip(of_stack).map(|(bytes, count)| bytes * count).sum();
         if let Some(PortableCorrection { learned, .. }) = &filter.correction {
-            let (rows, entries) = (learned.rows.len() as f64, learned.direct.explained.len() as f64);
+            let (rows, stripes) = (learned.rows.len() as f64, learned.direct.explained.columns());
+            let entries = (BLOCK * stripes.len()) as f64;
             instructions += ROW * rows + ENTRY * entries;
             let inputs = (OUTPUTS + FEATURES) as f64;
             // Inputs and two weights a row, two triangles, of each input four numbers of its scale and two relevances.

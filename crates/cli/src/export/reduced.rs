@@ -7,7 +7,7 @@
 //! rows say is left out.
 
 use nalgebra::{DMatrix, DVector};
-use ohmstrain_calib::{OwnedCorrection, OwnedProcess};
+use ohmstrain_calib::{OwnedCorrection, OwnedProcess, OwnedTriangle};
 use ohmstrain_ekf::correction::{self, FILTER_INPUTS, OUTPUTS, kernel};
 
 use super::plan::Rows;
@@ -55,7 +55,7 @@ impl Which {
 
 /// The correction with no more than these rows, and what stands for the others; none if kernels are singular.
 pub fn reduced(full: &Correction, to: Rows) -> Option<(Correction, [OwnedQuadratic; 2])> {
-    let inducing = side(full.direct.explained.len()).min(side(full.residual.explained.len()));
+    let inducing = full.direct.explained.side().min(full.residual.explained.side());
     let rows = to.mean.max(to.variance).min(inducing).max(1);
     let to = Rows { mean: rows, variance: to.variance.clamp(1, rows) };
     let points = points(&full.rows);
@@ -63,11 +63,6 @@ pub fn reduced(full: &Correction, to: Rows) -> Option<(Correction, [OwnedQuadrat
     let (residual, of_residual) = process(&full.residual, Which::Residual, &full.rows, &points, to)?;
     let rows = full.rows[..rows].iter().copied().collect();
     Some((Correction { rows, direct, residual, simulated: None, ..full.clone() }, [of_direct, of_residual]))
-}
-
-/// Rows of a triangle of so many numbers.
-fn side(entries: usize) -> usize {
-    ((8 * entries + 1).isqrt() - 1) / 2
 }
 
 fn process(
@@ -101,20 +96,14 @@ fn kernels(of: &Process, which: Which, a: &[&Row], b: &[&Row]) -> DMatrix<f64> {
 }
 
 /// What the first few of the inducing rows explain.
-fn explained(full: &Process, which: Which, rows: &[&Row], few: usize) -> Option<Vec<f64>> {
-    let inducing = side(full.explained.len());
-    let mut numbers = full.explained.iter();
-    let mut triangle = DMatrix::zeros(inducing, inducing);
-    for i in 0..inducing {
-        for j in i..inducing {
-            triangle[(i, j)] = *numbers.next()?;
-        }
-    }
+fn explained(full: &Process, which: Which, rows: &[&Row], few: usize) -> Option<OwnedTriangle<f64>> {
+    let inducing = full.explained.side();
+    let triangle = DMatrix::from_row_iterator(inducing, inducing, full.explained.rows().into_iter().flatten());
     let among = kernels(full, which, &rows[..few], &rows[..few]) + DMatrix::identity(few, few) * JITTER;
     let with_others = kernels(full, which, &rows[..few], &rows[..inducing]);
     let projection = among.cholesky()?.solve(&with_others).transpose();
     let triangle = (triangle * projection).qr().r();
-    Some((0..few).flat_map(|i| (i..few).map(move |j| (i, j))).map(|place| triangle[place]).collect())
+    Some(OwnedTriangle::new(few, |i, j| triangle[(i, j)]))
 }
 
 /// Where means are to be right, and how much it matters.

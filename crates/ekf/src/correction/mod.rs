@@ -20,10 +20,11 @@ mod low_pass;
 mod process;
 mod quadratic;
 mod rows;
+mod triangle;
 
 use ohmstrain_model::StrainRange;
 
-use crate::kernel::{Several, Work};
+use crate::kernel::{Falls, Several, Work};
 use crate::{Gaussian, Real};
 pub use features::{
     FARTHEST, FEATURES, FeatureScale, PASSED_OVER, RATE_GAIN, ReadingFeatures, Starts, TIME_CONSTANTS_S, settled,
@@ -33,6 +34,7 @@ use process::{Kernels, Said};
 pub use process::{LINEAR, Process, kernel};
 pub use quadratic::Quadratic;
 pub use rows::{BLOCK, RowBlock, Rows, block_of};
+pub use triangle::{Triangle, stripes};
 
 /// Number of a filter's outputs that a correction sees: strain, its rate, relaxation, baseline, and the probabilities of
 /// stretching and releasing.
@@ -155,13 +157,13 @@ impl<T: Real, const D: usize, const S: usize> Correction<'_, T, D, S> {
         let Standardised { inputs: x, outside } = standardised(of.scales, inputs);
         let reading = x.get(OUTPUTS).copied().unwrap_or(T::zero());
         let mut kernels = Kernels::new(&of.process);
-        for rows in of.rows.side_by_side(like) {
+        of.rows.side_by_side(like, |rows| {
             let mut distance = like.nothing();
             for i in OUTPUTS..D {
                 distance += rows.squares(i, x[i]).scale(of.process.relevance[i]);
             }
             kernels.add(&of.process, distance, rows.column(OUTPUTS).scale(reading), rows.count);
-        }
+        });
         let said = kernels.said(like, &of.process, reading);
         self.widened(said, &of.process, of.process.distance(&outside, OUTPUTS), T::zero())
     }
@@ -205,7 +207,7 @@ impl<T: Real, const D: usize, const S: usize> Work<T> for Correcting<'_, T, D, S
         let mut sides = of.one_sided.each_ref().map(Kernels::new);
         let of_residual = Process { least_variance: of.residual.least_variance.max(filtered.variance), ..of.residual };
         let (reading, strain) = (x.get(OUTPUTS).copied().unwrap_or(T::zero()), x[0]);
-        for rows in of.rows.side_by_side(like) {
+        of.rows.side_by_side(like, |rows| {
             let (mut to_direct, mut to_residual, mut to_sides) = (like.nothing(), like.nothing(), [like.nothing(); S]);
             let mut squares = [like.nothing(); D];
             for i in 0..D {
@@ -228,7 +230,7 @@ impl<T: Real, const D: usize, const S: usize> Work<T> for Correcting<'_, T, D, S
                 sides[k].add(&of.one_sided[k], to_sides[k], readings, rows.count);
             }
             residual.add(&of.residual, to_residual, rows.column(0).scale(strain), rows.count);
-        }
+        });
         let of_readings = |kernels: Kernels<T>, process| {
             let said = kernels.said(like, process, reading);
             of.widened(said, process, process.distance(&outside, OUTPUTS), T::zero())
@@ -238,7 +240,7 @@ impl<T: Real, const D: usize, const S: usize> Work<T> for Correcting<'_, T, D, S
         let one_sided = sides.map(|kernels| of_sides.next().map_or(direct, |process| of_readings(kernels, process)));
         let said = residual.said(like, &of_residual, strain);
         let outside = of.residual.distance(&outside, 0);
-        let novelty = T::one() - (T::one() - said.unknown) * (-outside / T::of(NEW)).exp();
+        let novelty = T::one() - (T::one() - said.unknown) * (-outside / T::of(NEW)).falling();
         let residual = of.widened(said, &of.residual, outside, filtered.mean);
         let mixed = if of.consensus {
             consensus(direct, residual, one_sided)
@@ -308,7 +310,7 @@ mod tests {
 
     use super::{
         BLOCK, Correcting, Correction, FEATURES, INDUCING, InputScale, OUTPUTS, Process, RowBlock, Rows, Simulated,
-        StrainRange, block_of,
+        StrainRange, Triangle, block_of, stripes,
     };
     use crate::Gaussian;
     use crate::kernel::Work;
@@ -323,12 +325,14 @@ mod tests {
         let block = |k: usize| block_of::<_, INPUTS>(&[0, 1, 2, 3].map(|lane| row(BLOCK * k + lane))).unwrap();
         let rows: [RowBlock<f64, INPUTS>; ROWS.div_ceil(BLOCK)] = core::array::from_fn(block);
         let weights: [f64; ROWS] = core::array::from_fn(|k| number(7 * k));
-        let explained: [f64; 21 * 11] = core::array::from_fn(|k| 0.2 * number(3 * k));
+        // 21 rows: stripes of 21, 17, 13, 9, 5 columns and of one.
+        let mut columns = stripes(21, |i, j| 0.2 * number(3 * (21 * i + j)));
+        let explained: [[f64; BLOCK]; 66] = core::array::from_fn(|_| columns.next().unwrap());
         let process = |length: f64| Process {
             relevance: core::array::from_fn(|i| (1.0 + 0.5 * number(11 * i)) / (length * length)),
             mean: 0.1,
             weights: &weights,
-            explained: &explained,
+            explained: Triangle::new(&explained, 21),
             variance: 0.4,
             noise: 0.01,
             widening: 1.2,

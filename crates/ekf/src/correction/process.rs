@@ -1,5 +1,5 @@
-use super::INDUCING;
-use crate::kernel::{MOST_LANES, Several};
+use super::{INDUCING, Triangle};
+use crate::kernel::{Falls, MOST_LANES, Several};
 use crate::{Gaussian, Real};
 
 /// Weight of the linear part of the kernel, relative to the squared exponential.
@@ -19,9 +19,8 @@ pub struct Process<'a, T, const D: usize> {
     pub mean: T,
     /// Weight of each training row, in the unit of the target.
     pub weights: &'a [T],
-    /// The upper triangle of a matrix W, row by row, for kernels k of the inducing rows: |W k|² is what the training rows
-    /// explain of the prior variance.
-    pub explained: &'a [T],
+    /// W, for kernels k of the inducing rows: |W k|² is what the training rows explain of the prior variance.
+    pub explained: Triangle<'a, T>,
     /// Prior variance of the process where the kernel is 1.
     pub variance: T,
     /// Variance of the noise, white and correlated in time, which is not predicted.
@@ -74,15 +73,15 @@ impl<T: Real> Kernels<T> {
         product: V,
         count: usize,
     ) {
-        let kernel = T::falling(-distance) + (product + product.literal(1.0)).scale(T::of(LINEAR));
+        let kernel = (-distance).falling() + (product + product.literal(1.0)).scale(T::of(LINEAR));
         let weights = process.weights.get(self.rows..self.rows + count).unwrap_or(&[]);
         let weighted = kernel.first_of(weights) * kernel;
         // One after the other: the same sum whatever the lanes.
         for lane in 0..V::WIDTH {
             self.mean += weighted.at(lane);
         }
-        if let Some(places) = self.inducing.get_mut(self.rows..) {
-            kernel.put_first(places);
+        if let Some(places) = self.inducing.get_mut(self.rows..self.rows + V::WIDTH) {
+            kernel.put_into(places);
         }
         self.rows += count;
     }
@@ -96,29 +95,9 @@ impl<T: Real> Kernels<T> {
         first: T,
     ) -> Said<T> {
         let prior = T::one() + linear(first * first);
-        let unknown = ((prior - self.explained(like, process.explained)) / prior).max(T::zero()).min(T::one());
+        let unknown = ((prior - process.explained.square(like, &self.inducing)) / prior).max(T::zero()).min(T::one());
         let latent = (prior * process.variance).max(process.least_variance) * unknown;
         Said { strain: Gaussian { mean: self.mean, variance: latent + process.noise }, unknown }
-    }
-
-    /// |W k|².
-    #[inline(always)]
-    fn explained<V: Several<Number = T>>(&self, like: V, mut triangle: &[T]) -> T {
-        // m rows of the triangle are m (m + 1) / 2 numbers.
-        let rows = ((8 * triangle.len() + 1).isqrt() - 1) / 2;
-        let rows = rows.min(self.rows).min(INDUCING);
-        // Nothing follows the kernels, so that a row may be read on into the next one to the end of a vector.
-        let mut kernels = self.inducing;
-        kernels.iter_mut().skip(rows).for_each(|kernel| *kernel = T::zero());
-        let (mut explained, mut with) = (T::zero(), kernels.as_slice());
-        for left in (1..=rows).rev() {
-            let whole = left.next_multiple_of(V::WIDTH);
-            let row = triangle.get(..whole).unwrap_or(triangle);
-            let product = T::dot(like, row, with);
-            explained += product * product;
-            (triangle, with) = (triangle.get(left..).unwrap_or(&[]), with.get(1..).unwrap_or(&[]));
-        }
-        explained
     }
 }
 

@@ -20,16 +20,20 @@ impl<'a, T, const D: usize> Rows<'a, T, D> {
         Self { blocks, count }
     }
 
-    /// The rows, as many at a time as there are lanes.
+    /// Looks at the rows, as many at a time as there are lanes.
     #[inline(always)]
-    pub(super) fn side_by_side<V: Several<Number = T>>(self, like: V) -> impl Iterator<Item = SideBySide<'a, V, D>> {
-        let parts = BLOCK / V::WIDTH;
-        self.blocks.iter().enumerate().flat_map(move |(k, block)| {
-            (0..parts).map(move |part| part * V::WIDTH).filter_map(move |from| {
-                let count = self.count.checked_sub(k * BLOCK + from).filter(|left| *left > 0)?.min(V::WIDTH);
-                Some(SideBySide { like, block, from, count })
-            })
-        })
+    pub(super) fn side_by_side<V: Several<Number = T>>(self, like: V, mut see: impl FnMut(SideBySide<'a, V, D>)) {
+        let mut left = self.count;
+        for block in self.blocks {
+            // Of a block that fills a vector the compiler knows that this goes once, from 0 on.
+            let mut from = 0;
+            while from < BLOCK && left > 0 {
+                let count = left.min(V::WIDTH);
+                see(SideBySide { like, block, from, count });
+                left -= count;
+                from += V::WIDTH;
+            }
+        }
     }
 }
 

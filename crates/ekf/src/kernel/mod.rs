@@ -10,6 +10,7 @@
 
 mod constants;
 mod curve;
+pub(crate) mod falls;
 mod lanes;
 mod parts;
 mod predict;
@@ -24,13 +25,14 @@ mod update;
 pub(crate) use constants::{Gains, StepConstants};
 pub(crate) use curve::Regions;
 pub use curve::{AnyCurve, Cubic, Curve, CurveLine, Line, SigmaPoints};
+pub(crate) use falls::Falls;
 pub use lanes::Lanes;
 #[cfg(feature = "simd")]
 pub(crate) use lanes::Vector;
 pub(crate) use parts::{Part, Parts};
 pub(crate) use predict::{Course, Driven};
 pub(crate) use rate::side_of;
-pub(crate) use several::{Falls, InVectors, MOST_LANES, Several, Work};
+pub(crate) use several::{InVectors, MOST_LANES, Several, Work};
 pub(crate) use sparse::MOST_TRIES;
 pub use sparse::SparseEkf;
 pub(crate) use switch::RateSpread;

@@ -1,9 +1,8 @@
 //! Lanes whose numbers are at hand one by one, for what vectors do not compute.
 
-use nalgebra::ComplexField;
 use ohmstrain_model::Scalar;
 
-use super::tail::Tail;
+use super::falls::{Falling, INVERSE_FACTORIALS, INVERSE_FACTORIALS_F32};
 use super::{Lanes, Parts};
 
 /// The most lanes that there are.
@@ -18,8 +17,8 @@ pub(crate) trait Several: Lanes {
     /// The numbers with which a slice begins, zero where it has fewer than there are lanes.
     #[must_use]
     fn first_of(self, numbers: &[Self::Number]) -> Self;
-    /// Writes the numbers to where a slice begins, as many as it has room for.
-    fn put_first(&self, places: &mut [Self::Number]);
+    /// Writes the numbers to as many places as there are lanes.
+    fn put_into(&self, places: &mut [Self::Number]);
     /// The bits of the numbers shifted to the left; `shifted` does it with one of them.
     #[must_use]
     fn bits_shifted(self, by: u32, shifted: impl FnOnce(Self::Number) -> Self::Number) -> Self;
@@ -52,7 +51,7 @@ impl<T: Scalar> Several for T {
     }
 
     #[inline(always)]
-    fn put_first(&self, places: &mut [T]) {
+    fn put_into(&self, places: &mut [T]) {
         if let Some(place) = places.first_mut() {
             *place = *self;
         }
@@ -119,14 +118,8 @@ mod vector {
         }
 
         #[inline(always)]
-        fn put_first(&self, places: &mut [V::Element]) {
-            if let Some(all) = places.get_mut(..V::LEN) {
-                self.numbers.store_slice(all);
-                return;
-            }
-            for (place, number) in places.iter_mut().zip(self.numbers.as_slice()) {
-                *place = *number;
-            }
+        fn put_into(&self, places: &mut [V::Element]) {
+            self.numbers.store_slice(places);
         }
 
         #[inline(always)]
@@ -159,27 +152,6 @@ mod vector {
     }
 }
 
-/// Lanes with the exponentials and tails that hypotheses take.
-pub(crate) trait Falls: Lanes {
-    /// Exponentials of what is not above zero: those of [`InVectors::falling`].
-    #[must_use]
-    fn falling(self) -> Self;
-
-    /// What a standard normal has above these borders, where it is `wanted`.
-    #[must_use]
-    #[inline(always)]
-    fn tail(self, wanted: Self::Mask) -> Tail<Self> {
-        Tail::above(self, wanted)
-    }
-}
-
-impl<V: Several<Number: InVectors>> Falls for V {
-    #[inline(always)]
-    fn falling(self) -> Self {
-        <V::Number as InVectors>::falling(self)
-    }
-}
-
 /// Work that is done with numbers or with vectors of them.
 pub(crate) trait Work<T> {
     /// What comes of it.
@@ -194,10 +166,11 @@ pub(crate) trait InVectors: Scalar {
     /// Does work with vectors where the processor has some that are worth it. They round as numbers do: results are the same
     /// to the last bit.
     fn in_vectors<W: Work<Self>>(work: W) -> Option<W::Said>;
-    /// Exponentials of what is not above zero.
-    fn falling<V: Several<Number = Self>>(exponents: V) -> V;
-    /// `Σ aᵢ bᵢ` over the shorter of both, the same to the last bit whatever the lanes.
-    fn dot<V: Several<Number = Self>>(like: V, a: &[Self], b: &[Self]) -> Self;
+    /// What of a number [`falling`](super::Falls::falling) takes.
+    const FALLING: Falling<Self>;
+    /// The bits shifted to where an exponent stands.
+    #[must_use]
+    fn to_exponent(self) -> Self;
 }
 
 impl InVectors for f32 {
@@ -206,72 +179,34 @@ impl InVectors for f32 {
         None
     }
 
-    /// As exported C does it.
-    #[inline(always)]
-    fn falling<V: Several<Number = Self>>(exponents: V) -> V {
-        let [powers] = exponents.build(|lane| [ComplexField::exp(exponents.at(lane))]);
-        powers
-    }
+    /// Taylor's series to r⁷ leaves r⁸/8! < 6e-9. e⁻⁸⁷ still is a normal number.
+    const FALLING: Falling<Self> = Falling {
+        least: -87.0,
+        rounds: 12_583_039.0,
+        ln_2: [0.693_359_4, -2.121_944_4e-4],
+        series: &INVERSE_FACTORIALS_F32,
+        mantissa: 23,
+    };
 
-    /// One after the other, as exported C does it.
     #[inline(always)]
-    fn dot<V: Several<Number = Self>>(_: V, a: &[Self], b: &[Self]) -> Self {
-        a.iter().zip(b).fold(0.0, |sum, (a, b)| sum + *a * *b)
+    fn to_exponent(self) -> Self {
+        Self::from_bits(self.to_bits() << Self::FALLING.mantissa)
     }
 }
 
-/// 1/k! for k up to 13.
-const INVERSE_FACTORIALS: [f64; 14] = {
-    let mut inverses = [1.0; 14];
-    let mut k = 1;
-    while k < 14 {
-        inverses[k] = inverses[k - 1] / k as f64;
-        k += 1;
-    }
-    inverses
-};
-
 impl InVectors for f64 {
-    /// `2ⁿ eʳ` with |r| ≤ ln(2)/2, where Taylor's series to r¹³ leaves r¹⁴/14! < 5e-18; zero below e⁻⁷⁰⁸, which still is a normal
-    /// number.
-    #[inline(always)]
-    fn falling<V: Several<Number = Self>>(exponents: V) -> V {
-        // Added to a number, 1.5 · 2⁵² + 1023 leaves the nearest integer, plus the exponent's bias, in the lowest bits.
-        const ROUNDS: f64 = 6_755_399_441_056_767.0;
-        // ln 2 as fdlibm has it: the first has so few bits that its products with n are exact.
-        const LN_2: [f64; 2] = [6.931_471_803_691_238e-1, 1.908_214_929_270_587_7e-10];
-        let least = exponents.literal(-708.0);
-        let vanishes = exponents.less(least);
-        let x = V::pick(vanishes, least, exponents);
-        let rounded = x.scale_add(core::f64::consts::LOG2_E, x.literal(ROUNDS));
-        let n = rounded - x.literal(ROUNDS);
-        let r = x - n.scale(LN_2[0]) - n.scale(LN_2[1]);
-        let mut sum = x.literal(INVERSE_FACTORIALS[13]);
-        for k in (0..13).rev() {
-            sum = sum.mul_add(r, x.literal(INVERSE_FACTORIALS[k]));
-        }
-        // The integer in the lowest bits becomes an exponent.
-        V::pick(vanishes, x.nothing(), sum * rounded.bits_shifted(52, |one| Self::from_bits(one.to_bits() << 52)))
-    }
+    /// Taylor's series to r¹³ leaves r¹⁴/14! < 5e-18. e⁻⁷⁰⁸ still is a normal number.
+    const FALLING: Falling<Self> = Falling {
+        least: -708.0,
+        rounds: 6_755_399_441_056_767.0,
+        ln_2: [6.931_471_803_691_238e-1, 1.908_214_929_270_587_7e-10],
+        series: &INVERSE_FACTORIALS,
+        mantissa: 52,
+    };
 
-    /// In four sums, of every fourth product each.
     #[inline(always)]
-    fn dot<V: Several<Number = Self>>(like: V, a: &[Self], b: &[Self]) -> Self {
-        let mut sums = [like.nothing(); 4];
-        let mut add = |a: [Self; 4], b: [Self; 4]| {
-            for i in 0..4 / V::WIDTH {
-                sums[i] = like.first_of(&a[i * V::WIDTH..]).mul_add(like.first_of(&b[i * V::WIDTH..]), sums[i]);
-            }
-        };
-        let b = b.get(..a.len()).unwrap_or(b);
-        let ((fours_a, last_a), (fours_b, last_b)) = (a.as_chunks(), b.as_chunks());
-        fours_a.iter().zip(fours_b).for_each(|(a, b)| add(*a, *b));
-        if !last_a.is_empty() {
-            let filled = |last: &[Self]| core::array::from_fn(|i| last.get(i).copied().unwrap_or(0.0));
-            add(filled(last_a), filled(last_b));
-        }
-        let sum = |i: usize| sums[i / V::WIDTH].at(i % V::WIDTH);
-        (sum(0) + sum(1)) + (sum(2) + sum(3))
+    fn to_exponent(self) -> Self {
+        Self::from_bits(self.to_bits() << Self::FALLING.mantissa)
     }
 
     #[cfg(all(feature = "simd", target_arch = "x86_64"))]
@@ -290,24 +225,5 @@ impl InVectors for f64 {
     #[inline(always)]
     fn in_vectors<W: Work<Self>>(_: W) -> Option<W::Said> {
         None
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::InVectors;
-
-    /// The reduced argument is off by half a rounding of 0.35, the series by one of each of 1 and 0.35 and by r times what
-    /// its inner sums are off by; the result is 0.7 or more. libm's is off by one.
-    #[test]
-    fn exponentials_of_what_is_not_above_zero() {
-        for k in 0..70_800 {
-            let x = -0.01 * f64::from(k);
-            let (found, expected) = (f64::falling(x), x.exp());
-            assert!((found - expected).abs() <= 3.0 * f64::EPSILON * expected, "{x}: {found} {expected}");
-        }
-        assert_eq!(f64::falling(0.0), 1.0);
-        assert_eq!((f64::falling(f64::NEG_INFINITY), f64::falling(-709.0)), (0.0, 0.0));
-        assert!(f64::falling(f64::NAN).is_nan());
     }
 }

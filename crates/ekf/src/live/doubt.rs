@@ -1,6 +1,7 @@
 //! When an interval is wider than the filter says, in any precision.
 
 use super::{Flag, Flags, Innovations, NEVER_READ_S, RestSeen, RestWatch, SURPRISING_NIS, Unread};
+use crate::kernel::Falls;
 use crate::{Gaussian, Real};
 
 /// The numbers behind the widened intervals, also for programs that write a filter in another language.
@@ -90,7 +91,7 @@ struct Left<T> {
 
 impl<T: Real> Left<T> {
     fn after(passed_s: T) -> Self {
-        let far = (-passed_s / T::of(DOUBT.far_fades_s)).exp();
+        let far = (-passed_s / T::of(DOUBT.far_fades_s)).falling();
         let lately = far * far * far;
         let twice = lately * lately;
         Self { far, lately, soon: twice * twice }

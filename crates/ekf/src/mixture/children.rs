@@ -1,7 +1,7 @@
 use ohmstrain_model::Phase;
 
 use crate::Real;
-use crate::kernel::{Parts, Several};
+use crate::kernel::{Falls, Parts, Several};
 use crate::mixture::evidence::{Weighed, Weight};
 use crate::mixture::lineage::Recorder;
 use crate::mixture::pair::{self, About};
@@ -109,7 +109,7 @@ impl<'a, T: Real, const N: usize, const L: usize, const K: usize> Children<'a, T
     fn raise_to(&mut self, exponent: T) {
         let first = self.kept.shares().is_empty();
         if first || exponent > self.exponent {
-            let fewer = if first { T::one() } else { T::falling(self.exponent - exponent) };
+            let fewer = if first { T::one() } else { (self.exponent - exponent).falling() };
             for (share, _) in self.kept.iter_mut() {
                 share.weight *= fewer;
             }

@@ -55,7 +55,7 @@ impl<T: Real> Weight<T> {
     #[inline(always)]
     pub(crate) fn relative_to(&self, exponent: T) -> T {
         let below = self.exponent - exponent;
-        if below.is_zero() || self.factor.is_zero() { self.factor } else { self.factor * T::falling(below) }
+        if below.is_zero() || self.factor.is_zero() { self.factor } else { self.factor * below.falling() }
     }
 }
 

@@ -29,6 +29,10 @@ pub enum Operation {
     Root(Place),
     /// An exponential.
     Exponential(Place),
+    /// An exponential of what is not above zero.
+    Falling(Place),
+    /// The number with its bits shifted to where an exponent stands.
+    ToExponent(Place),
     /// What a standard normal has above a border.
     Tail(Place),
     /// Its density at the border of such a tail, over the tail.
@@ -59,6 +63,8 @@ impl Operation {
             Self::Negate(a)
             | Self::Root(a)
             | Self::Exponential(a)
+            | Self::Falling(a)
+            | Self::ToExponent(a)
             | Self::Tail(a)
             | Self::Hazard(a)
             | Self::NotNegative(a)
@@ -296,8 +302,13 @@ impl Lanes for Expression<'_> {
 
 /// As numbers in single precision have it.
 impl Falls for Expression<'_> {
+    fn to_exponent(self) -> Self {
+        self.with(Operation::ToExponent(self.place))
+    }
+
+    /// A function of its own.
     fn falling(self) -> Self {
-        self.exponential()
+        self.with(Operation::Falling(self.place))
     }
 
     /// A function of its own.

@@ -3,6 +3,7 @@ use std::vec::Vec;
 
 use super::expression::standing_for;
 use super::{Expression, Recorded, Tape};
+use crate::kernel::falls::exponential;
 use crate::kernel::tail::Tail;
 use crate::kernel::{Course, Lanes, Parts, RateSpread};
 use crate::mixture::evidence::Weighing;
@@ -41,6 +42,8 @@ pub enum Piece {
     /// The limits' probability over what the first input is one over, and one over the probability; of a lower and an upper limit
     /// (inputs).
     OfLimits,
+    /// The exponential of an exponent (input) that is not above zero.
+    Falling,
     /// The density of a standard normal at a border (input) over what it has above, and that.
     Tail,
     /// Whether another state (inputs) says the same.
@@ -58,7 +61,7 @@ impl Piece {
         let another = carried.means + carried.covariances;
         match self {
             Self::Predict(_) | Self::PredictOpen | Self::Sound => 0,
-            Self::Turns | Self::Hopeless | Self::CertainOfSide | Self::CutOff | Self::Tail => 1,
+            Self::Turns | Self::Hopeless | Self::CertainOfSide | Self::CutOff | Self::Falling | Self::Tail => 1,
             Self::PredictTurning(_) | Self::Take(_) | Self::Renew => 2,
             Self::OfLimits => 3,
             Self::Alike | Self::Distance => another,
@@ -161,6 +164,7 @@ impl<const B: usize, const N: usize, G: Curve<f32>> SparseEkf<f32, Compact, B, N
                 let strain = (parts.strain, parts.strain_variance);
                 results.extend(weighing.of_limits::<_, Compact>(strain, first, always));
             }
+            Piece::Falling => results.push(exponential(first)),
             Piece::Tail => {
                 let Tail { mass, hazard } = Tail::above(first, always);
                 results.extend([hazard, mass]);

@@ -7,7 +7,7 @@ use std::vec::Vec;
 
 use super::{Operation, Piece, Recorded};
 use crate::kernel::tail::Tail;
-use crate::kernel::{Course, Parts, RateSpread, side_of};
+use crate::kernel::{Course, Falls, Parts, RateSpread, side_of};
 use crate::mixture::evidence::Weighing;
 use crate::mixture::pair::{About, merge};
 use crate::{Belief, Compact, Evidence, Gaussian, Reading, SparseEkf};
@@ -31,6 +31,8 @@ fn run(recorded: &Recorded, inputs: &[f32]) -> Vec<f32> {
             Operation::Negate(a) => -at(a),
             Operation::Root(a) => at(a).sqrt(),
             Operation::Exponential(a) => at(a).exp(),
+            Operation::Falling(a) => at(a).falling(),
+            Operation::ToExponent(a) => at(a).to_exponent(),
             Operation::Tail(a) => Tail::above(at(a), true).mass,
             Operation::Hazard(tail) => match recorded.operations[tail] {
                 Operation::Tail(a) => Tail::above(at(a), true).hazard,

@@ -54,7 +54,10 @@ pub fn run(args: &RefineArgs) -> Result<(), CliError> {
 
 /// An error of the likelihood with the file that it is about: the law and where the search starts are the sensor's.
 fn named(args: &RefineArgs, error: &CalibrationError) -> CliError {
-    let of_sensor = matches!(error, CalibrationError::Unsupported(_) | CalibrationError::Parameter(_));
+    let of_sensor = matches!(
+        error,
+        CalibrationError::Unsupported(_) | CalibrationError::NoParameters(_) | CalibrationError::Parameter(_)
+    );
     let culprit = if of_sensor { &args.sensor } else { &args.trace_file };
     CliError::calibration(&[&culprit.display().to_string()], error)
 }
@@ -83,7 +86,7 @@ fn start(
     params: &SensorParams,
     time_s: &[f64],
 ) -> Result<(NoiseStart, Vec<NoiseParameter>), CliError> {
-    let ekf = params.estimator(EstimatorKind::Ekf).map_err(|error| named(args, &error))?;
+    let ekf = params.estimator(EstimatorKind::Ekf).map_err(|error| named(args, &error.into()))?;
     let start = NoiseStart::new(ekf, time_s);
     let movable = movable(&params.law, &start);
     let wanted: Vec<NoiseParameter> = args.parameters.iter().map(|moved| moved.0).collect();

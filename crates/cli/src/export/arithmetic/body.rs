@@ -143,6 +143,8 @@ impl<'a> Body<'a> {
             Operation::Negate(a) => (format!("-{}", self.bound(a, Atom)), Product),
             Operation::Root(a) => (format!("sqrtf({})", self.value(a)), Atom),
             Operation::Exponential(a) => (format!("expf({})", self.value(a)), Atom),
+            Operation::Falling(a) => (format!("falling({})", self.value(a)), Atom),
+            Operation::ToExponent(a) => (format!("to_exponent({})", self.value(a)), Atom),
             Operation::Tail(a) => (self.value(a), Atom),
             Operation::Hazard(tail) => {
                 self.value(tail);

@@ -87,6 +87,17 @@ const SOUND: Function = Function {
     ..MOVES
 };
 
+/// What doubts, hypotheses and corrections need.
+const FALLING: Function = Function {
+    name: "falling",
+    comment: "e^x of x that is not above zero: 2^n e^r with |r| <= ln(2)/2, and Taylor's series. The same bits everywhere.",
+    piece: Piece::Falling,
+    inputs: &[Input::Number("x")],
+    has_state: false,
+    returns: Returns::Number,
+    ..MOVES
+};
+
 /// What a hypothesis of a phase needs.
 const PHASES: [Function; 13] = [
     Function {
@@ -229,7 +240,7 @@ pub fn of_hypotheses(splits: bool, carried: Carried, steps: &[String], record: i
 }
 
 fn printed(functions: &[&[Function]], state: (Carried, &[String]), record: impl Fn(Piece) -> Recorded) -> String {
-    let functions = functions.iter().copied().flatten();
+    let functions = [FALLING].iter().chain(functions.iter().copied().flatten());
     functions.map(|function| function.text(state, &record(function.piece))).collect::<Vec<_>>().join("\n")
 }
 

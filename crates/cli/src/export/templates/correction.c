@@ -1,6 +1,7 @@
 /* ---- The learned correction ---------------------------------------------------------------------------------------- */
 
 enum { INPUTS = 13, OUTPUTS = 6, FEATURES = 7, ROWS = << correction.rows.count >>, INDUCING = << correction.inducing >> };
+enum { STRIPES = << correction.processes[0].explained|length >> };
 
 /* Scales of the inputs: the filter's strain, rate, relaxation, baseline, probabilities of stretching and releasing; then
  * the reading, its distances from low-passes, and two rates. */
@@ -33,7 +34,7 @@ typedef struct process {
     float widening;
     float least_variance;
     float weight[ROWS];
-    float explained[INDUCING * (INDUCING + 1) / 2];
+    float explained[STRIPES][4]; /* An upper triangle in stripes of four rows: of each the columns from the diagonal on. */
 } process;
 
 {% for p in correction.processes %}
@@ -42,7 +43,7 @@ static const process << p.name >> = {
     {<< p.relevance|join("f, ") >>f},
     << p.mean >>f, << p.variance >>f, << p.noise >>f, << p.widening >>f, << p.least_variance >>f,
     {<< p.weights|join("f, ") >>f},
-    {<< p.explained|join("f, ") >>f},
+    {{% for column in p.explained %}{<< column|join("f, ") >>f}<< ", " if not loop.last >>{% endfor %}},
 };
 {% endfor %}
 
@@ -120,16 +121,23 @@ static float linear(float product)
 /* What a process says of kernels: its variance, and the share of the prior that is not explained. */
 static float variance_of(const process *p, const float kernel[INDUCING], float first, float least, float *unknown)
 {
-    const float prior = 1.0f + linear(first * first), *w = p->explained;
+    const float prior = 1.0f + linear(first * first);
+    const float (*w)[4] = p->explained;
     float explained = 0.0f, latent;
     int i, j;
 
-    for (i = 0; i < INDUCING; i++) {
-        float product = 0.0f;
-        for (j = i; j < INDUCING; j++) {
-            product += *w++ * kernel[j];
+    for (i = 0; i < INDUCING; i += 4) {
+        float a = 0.0f, b = 0.0f, c = 0.0f, d = 0.0f;
+        for (j = i; j < INDUCING; j++, w++) {
+            a += (*w)[0] * kernel[j];
+            b += (*w)[1] * kernel[j];
+            c += (*w)[2] * kernel[j];
+            d += (*w)[3] * kernel[j];
         }
-        explained += product * product;
+        explained += a * a;
+        explained += b * b;
+        explained += c * c;
+        explained += d * d;
     }
     *unknown = clamped((prior - explained) / prior, 0.0f, 1.0f);
     latent = prior * p->variance;
@@ -167,7 +175,7 @@ static float simulated(const float feature[FEATURES], float *variance)
 {% for i in range(7) %}
         sum += (x[<< i >>] - row[<< i >>]) * (x[<< i >>] - row[<< i >>]) * << correction.simulated.relevance >>f;
 {% endfor %}
-        said += SIMULATED_WEIGHT[k] * (expf(-sum) + linear(x[0] * row[0]));
+        said += SIMULATED_WEIGHT[k] * (falling(-sum) + linear(x[0] * row[0]));
     }
     outside /= << correction.simulated.relevance >>f;
     *variance = << correction.simulated.process.noise >>f + << correction.far >>f * << correction.strain_variance >>f * outside;
@@ -253,8 +261,8 @@ static void correct(const summary *all, const readings *seen, float filtered, fl
 {% endif %}
         residual += square * RESIDUAL.relevance[<< i >>];
 {% endfor %}
-        k0 = expf(-direct) + linear(x[OUTPUTS] * row[OUTPUTS]);
-        k1 = expf(-residual) + linear(x[0] * row[0]);
+        k0 = falling(-direct) + linear(x[OUTPUTS] * row[OUTPUTS]);
+        k1 = falling(-residual) + linear(x[0] * row[0]);
         said[0] += DIRECT.weight[k] * k0;
         said[1] += RESIDUAL.weight[k] * k1;
         if (k < INDUCING) {
@@ -268,7 +276,7 @@ static void correct(const summary *all, const readings *seen, float filtered, fl
     said[0] = clamped(0.0f + said[0], OHMSTRAIN_LOWER, OHMSTRAIN_UPPER);
     least = filtered_variance > RESIDUAL.least_variance ? filtered_variance : RESIDUAL.least_variance;
     spread[1] = variance_of(&RESIDUAL, kernel[1], x[0], least, &unknown);
-    novelty = 1.0f - (1.0f - unknown) * expf(-outside[1] / << correction.new >>f);
+    novelty = 1.0f - (1.0f - unknown) * falling(-outside[1] / << correction.new >>f);
     spread[1] = spread[1] * RESIDUAL.widening + << correction.far >>f * << correction.strain_variance >>f * outside[1];
     said[1] = clamped(filtered + said[1], OHMSTRAIN_LOWER, OHMSTRAIN_UPPER);
 

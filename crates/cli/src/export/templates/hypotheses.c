@@ -95,7 +95,7 @@ static void add(children *all, hypothesis *child, float factor, float exponent, 
     int i, lightest = 0;
 
     if (kept->count == 0 || exponent > all->exponent) {
-        const float fewer = kept->count == 0 ? 1.0f : expf(all->exponent - exponent);
+        const float fewer = kept->count == 0 ? 1.0f : falling(all->exponent - exponent);
         for (i = 0; i < kept->count; i++) {
             kept->hypothesis[i].weight *= fewer;
         }
@@ -103,7 +103,7 @@ static void add(children *all, hypothesis *child, float factor, float exponent, 
         all->exponent = exponent;
     }
     below = exponent - all->exponent;
-    likelihood = below == 0.0f || factor == 0.0f ? factor : factor * expf(below);
+    likelihood = below == 0.0f || factor == 0.0f ? factor : factor * falling(below);
     all->density += likelihood;
     child->weight = likelihood * more_inside;
     for (i = 0; i < kept->count; i++) {

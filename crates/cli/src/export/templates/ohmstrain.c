@@ -11,6 +11,8 @@
 #include "ohmstrain.h"
 
 #include <math.h>
+#include <stdint.h>
+#include <string.h>
 
 /* Clang and most vendors' compilers heed this; GCC does not know it, and does not contract with -std=c99. */
 #ifdef __clang__
@@ -214,6 +216,17 @@ static void numbers_of(float step_s, float s[STEP])
 static float clamped(float x, float lower, float upper)
 {
     return x < lower ? lower : x > upper ? upper : x;
+}
+
+/* The number with its bits shifted to where an exponent stands. */
+static float to_exponent(float x)
+{
+    uint32_t bits;
+
+    memcpy(&bits, &x, sizeof bits);
+    bits *= 8388608u; /* 2^23 */
+    memcpy(&x, &bits, sizeof bits);
+    return x;
 }
 
 /* ---- The sensor's step: arithmetic as the Rust crate's kernel does it, with the calibration's numbers in it -------- */
@@ -609,7 +622,7 @@ static float doubt_reading(readings *seen, float dt_s, const float *rho, float n
         return open;
     }
     /* What is left of what was known before: of 60, 20 and 5 s. */
-    far_left = expf(-passed_s / << doubt.far_fades_s >>f);
+    far_left = falling(-passed_s / << doubt.far_fades_s >>f);
     lately = far_left * far_left * far_left;
     twice = lately * lately;
     if (nis > SURPRISING) {

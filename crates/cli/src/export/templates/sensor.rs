@@ -6,7 +6,7 @@
 #![allow(dead_code, clippy::excessive_precision, clippy::unreadable_literal, reason = "generated")]
 
 {% if correction %}
-use ohmstrain_ekf::correction::{Correction, FILTER_INPUTS, FeatureScale, InputScale, Process{% if correction.quadratics %}, Quadratic{% endif %}, RowBlock, Rows{% if correction.simulated %}, Simulated{% endif %}};
+use ohmstrain_ekf::correction::{Correction, FILTER_INPUTS, FeatureScale, InputScale, Process{% if correction.quadratics %}, Quadratic{% endif %}, RowBlock, Rows{% if correction.simulated %}, Simulated{% endif %}, Triangle};
 use ohmstrain_ekf::live::{DoubtParts, Learned, LiveFilter, LiveParts, RestBounds, {% if doubt.rest %}RestSeen, {% endif %}Sieve, Unread};
 {% else %}
 use ohmstrain_ekf::live::{DoubtParts, LiveFilter, LiveParts, RestBounds, {% if doubt.rest %}RestSeen, {% endif %}Sieve, Unread};
@@ -235,7 +235,7 @@ pub const CORRECTION: Correction<'static, f32, FILTER_INPUTS> = Correction {
         relevance: [<< p.relevance|join(", ") >>],
         mean: << p.mean >>,
         weights: &<< p.name >>_WEIGHTS,
-        explained: &<< p.name >>_EXPLAINED,
+        explained: Triangle::new(&<< p.name >>_EXPLAINED, << correction.inducing >>),
         variance: << p.variance >>,
         noise: << p.noise >>,
         widening: << p.widening >>,
@@ -251,7 +251,7 @@ pub const CORRECTION: Correction<'static, f32, FILTER_INPUTS> = Correction {
             relevance: [<< p.relevance|join(", ") >>],
             mean: << p.mean >>,
             weights: &SIMULATED_WEIGHTS,
-            explained: &[],
+            explained: Triangle::NONE,
             variance: << p.variance >>,
             noise: << p.noise >>,
             widening: << p.widening >>,
@@ -279,7 +279,7 @@ static ROWS: [RowBlock<f32, FILTER_INPUTS>; << correction.rows.blocks|length >>]
 ];
 {% for p in correction.processes %}
 static << p.name >>_WEIGHTS: [f32; << p.weights|length >>] = [<< p.weights|join(", ") >>];
-static << p.name >>_EXPLAINED: [f32; << p.explained|length >>] = [<< p.explained|join(", ") >>];
+static << p.name >>_EXPLAINED: [[f32; 4]; << p.explained|length >>] = [{% for column in p.explained %}[<< column|join(", ") >>]{% if not loop.last %}, {% endif %}{% endfor %}];
 {% endfor %}
 {% if correction.simulated %}
 static SIMULATED_SCALES: [InputScale<f32>; FILTER_INPUTS] = [

@@ -17,7 +17,7 @@
 /* The largest differences allowed, in ulp.
  *
  * Every operation but expf and its relatives is rounded as in Rust where no product is contracted with a sum (a * b + c in one
- * rounding); with the same expf there is no difference. The Rust filter's own distance from one in double precision
+ * rounding); with the same expf, which curves with an exponential and unusual intervals take, there is no difference. The Rust filter's own distance from one in double precision
  * is what rounding does. Another rounding may be three times as far from it, to the other side: four times that distance.
  */
 #ifndef VECTORS_TOLERANCE_ULP

@@ -103,7 +103,7 @@ impl Scopes {
 const fn cost(operation: Operation) -> usize {
     match operation {
         Operation::Input(_) | Operation::Constant(_) | Operation::Known(_) | Operation::Hazard(_) => 0,
-        Operation::Exponential(_) => 30,
+        Operation::Exponential(_) | Operation::Falling(_) => 30,
         Operation::Tail(_) => 80,
         Operation::Root(_) | Operation::Divide(..) => 14,
         _ => 1,

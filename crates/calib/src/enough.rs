@@ -1,0 +1,30 @@
+//! Whether recordings are enough to calibrate on.
+
+use crate::samples::FEWEST_ROWS;
+use crate::{CalibrationError, Samples};
+
+/// Checks what calibration relies on and returns the strain's range over all recordings.
+pub(crate) fn check(recordings: &[Samples]) -> Result<(f64, f64), CalibrationError> {
+    let mut range: Option<(f64, f64)> = None;
+    for (recording, samples) in recordings.iter().enumerate() {
+        let complete = samples.complete_rows().count();
+        if complete < FEWEST_ROWS {
+            return Err(CalibrationError::TooFewRows { recording, complete, needed: FEWEST_ROWS });
+        }
+        let Some((low, high)) = samples.strain_range() else { continue };
+        range = Some(range.map_or((low, high), |(l, h)| (l.min(low), h.max(high))));
+    }
+    match range {
+        None => Err(CalibrationError::NoRecording),
+        Some((low, high)) if !(high > low) => Err(CalibrationError::ConstantStrain),
+        Some(_) if recordings.iter().all(is_frozen) => Err(CalibrationError::ConstantReading),
+        Some(range) => Ok(range),
+    }
+}
+
+/// Whether the reading never changes.
+fn is_frozen(samples: &Samples) -> bool {
+    let mut readings = samples.complete_rows().map(|k| samples.reading[k]);
+    let first = readings.next();
+    readings.all(|reading| Some(reading) == first)
+}
