@@ -223,7 +223,7 @@ fn settled(reading: Option<ohmstrain_ekf::Reading<f64>>, output: &Output) -> Gau
     let estimate = &output.estimate;
     let falls = estimate.still_relaxes;
     let Some(reading) = reading.filter(|_| output.verdict.is_taken()) else { return estimate.settled() };
-    let doubt = if surprises(output) { reading.value - estimate.held.mean } else { 0.0 };
-    let variance = falls.variance + reading.extra_variance + doubt * doubt;
+    let surprise = if surprises(output) { reading.value - estimate.held.mean } else { 0.0 };
+    let variance = falls.variance.max(surprise * surprise) + reading.extra_variance;
     Gaussian { mean: reading.value - falls.mean, variance }
 }

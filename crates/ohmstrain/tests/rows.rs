@@ -151,3 +151,36 @@ fn options_that_make_no_sense_are_refused_by_name() {
     assert!(matches!(sensor.smooth(times, &[1.7, 1.7]), Err(Error::Unit(_))));
     assert!(matches!(sensor.smooth(&[0.1, 0.0], &[1700.0; 2]), Err(Error::Row { row: 1, .. })));
 }
+
+/// Ten seconds at one reading, then one row of something else.
+fn after_a_while(last: Reading) -> Estimate {
+    let mut filter = sensor().filter().build().unwrap();
+    for k in 0..200 {
+        filter.step(0.05 * f64::from(k), 1700.0).unwrap();
+    }
+    filter.step(10.0, last).unwrap()
+}
+
+/// In a hold a reading settles below or above itself by no more than all of the relaxation, whatever strain the filter
+/// believes in; where it is missing, what the filter expects to read takes its place, and is less certain.
+#[test]
+fn settling_starts_from_the_reading() {
+    let rest = sensor().params().rest_reading;
+    let (read, missing) = (after_a_while(1700.0.into()), after_a_while(Reading::MISSING));
+    for row in [read, missing] {
+        let most = rest * row.relaxation.abs() + 20.0;
+        assert!((row.settled_resistance - 1700.0).abs() < most, "{} of {most}", row.settled_resistance);
+    }
+    assert!(missing.settled_resistance_sd > read.settled_resistance_sd);
+    assert!((missing.settled_resistance - read.settled_resistance).abs() < 3.0 * missing.settled_resistance_sd);
+}
+
+/// A reading that nobody expected may be an outlier: one deviation reaches from it to what was expected.
+#[test]
+fn an_outlier_leaves_open_where_readings_settle() {
+    let (read, outlier) = (after_a_while(1700.0.into()), after_a_while(2100.0.into()));
+    assert!(outlier.flags.contains(Flag::Downweighted), "{}", outlier.flags);
+    assert!(outlier.settled_resistance_sd > 300.0, "{}", outlier.settled_resistance_sd);
+    let off = (outlier.settled_resistance - read.settled_resistance).abs();
+    assert!(off < 1.96 * outlier.settled_resistance_sd, "{off}");
+}

@@ -4,18 +4,16 @@ use ohmstrain_ekf::live::{Sieve, news};
 
 use crate::CalibrationError;
 use crate::calibrate::left_out::{Fold, LeftOut};
-use crate::calibrate::settling::settling;
+use crate::calibrate::settling::LongHolds;
 use crate::filter::build::{Setting, filter_from_parts};
 use crate::filter::{Filter, Start};
 use crate::law::fit::CrossFit;
-use crate::law::structure::LawFit;
 use crate::motion_stats::{MotionStats, root_mean_square};
 use crate::optimise;
 use crate::params::RangeParams;
 use crate::params::estimator::{
     EstimatorKind, EstimatorParams, MotionParams, NoiseParams, PhaseParams, SettlingParams,
 };
-use crate::params::law::LawParams;
 use crate::prior::EstimatorPrior;
 use crate::samples::{Samples, usual_step_s};
 use crate::sd_scale::sd_scale;
@@ -207,16 +205,16 @@ impl<'a> NoiseProblem<'a> {
             score,
             strain_sd_scale: filtered.map_or(1.0, |deviations| sd_scale(&deviations)).max(of_make),
             smoothed_sd_scale: smoothed.map(|deviations| sd_scale(&deviations)),
-            settling: self.settling(params),
+            settling: self.settling(left_out, params),
             ..params
         }
     }
 
-    /// What holds say of the filter of the law that has seen all.
-    fn settling(&self, params: EstimatorParams) -> Option<SettlingParams> {
-        let LawFit { law, rest_readings, .. } = &self.fit.law;
-        let build = |said| self.filter(self.kind, law, &EstimatorParams { settling: Some(said), ..params });
-        settling(self.samples, rest_readings, self.limits.span(), &build)
+    /// What holds say of the filter, block by block.
+    fn settling(&self, left_out: &LeftOut, params: EstimatorParams) -> Option<SettlingParams> {
+        let holds = LongHolds::new(self.samples, self.limits.span())?;
+        let params = EstimatorParams { settling: Some(holds.law()), ..params };
+        holds.settling(left_out, &|fold| self.build(self.kind, fold, &params))
     }
 
     fn build(
@@ -225,17 +223,8 @@ impl<'a> NoiseProblem<'a> {
         fold: Fold,
         params: &EstimatorParams,
     ) -> Result<Box<dyn Filter>, CalibrationError> {
-        self.filter(kind, fold.law, params)
-    }
-
-    fn filter(
-        &self,
-        kind: EstimatorKind,
-        law: &LawParams,
-        params: &EstimatorParams,
-    ) -> Result<Box<dyn Filter>, CalibrationError> {
         let setting = Setting { limits: self.limits, start: Start::Unknown, sieve: Sieve::open() };
-        filter_from_parts(kind, law, params, setting)
+        filter_from_parts(kind, fold.law, params, setting)
     }
 
     fn left_out(&self, stride: usize) -> LeftOut<'a> {
