@@ -2,7 +2,8 @@
 //! directions matter it agrees with Gaussians cut by direction; stops stop; and bad input is refused.
 
 use ohmstrain_ekf::{
-    Belief, Dwell, Estimate, Evidence, Mixture, ParticleCloud, Particles, Reading, SignSplit, State, StepError,
+    Belief, Dwell, Estimate, Evidence, Mixture, ParticleCloud, Particles, Reading, Settling, SignSplit, State,
+    StepError,
 };
 use ohmstrain_model::{Phase, Scalar, StrainRange};
 use ohmstrain_tests::sensor;
@@ -105,7 +106,8 @@ fn check_calibration(dwell_s: Option<(f64, f64)>) {
             sum += step.nis.unwrap();
         }
         averages.push(sum / 100.0);
-        let strain = Estimate::new(&model, &cloud.moments(), &StrainRange { lower: -10.0, upper: 10.0 }, 1.0).strain;
+        let (wide, settling) = (StrainRange { lower: -10.0, upper: 10.0 }, Settling::unseen(model.noise(), 1));
+        let strain = Estimate::new(&model, &cloud.moments(), &wide, 1.0, &settling).strain;
         covered += u32::from((strain.mean - process.strain).abs() < 1.96 * strain.sd());
     }
     let mean = averages.iter().sum::<f64>() / 100.0;

@@ -41,6 +41,7 @@ fn sensor() -> SensorParams {
             speed_per_s: 0.05,
             tempering: 0.7,
         }),
+        settling: None,
     };
     let law = |taus_s: &[f64]| LawParams {
         extend_viscosity_s: 0.02,

@@ -4,7 +4,7 @@ use std::fmt::Debug;
 
 use ohmstrain_ekf::{
     Belief, Ekf, Estimate, Evidence, Gaussian, Influence, Innovation, Reading, ReadingVerdict, Real, Residual,
-    StepError, Streak,
+    Settling, StepError, Streak,
 };
 use ohmstrain_model::{
     AdcCode, Gauge, ModelNoise, Ohms, Phase, Scalar, SensorLaw, StrainRange, SwitchedModel, Symmetric,
@@ -44,7 +44,9 @@ fn everything_returns<T: Real + Serialize + DeserializeOwned>() {
     returns(AdcCode::<T>::Saturated);
 
     returns(belief);
-    returns(Estimate::new(&model, &belief, &model.law().range, third));
+    let settling = Settling { horizon_s: third, share: third, share_sd: third, sd: third };
+    returns(settling);
+    returns(Estimate::new(&model, &belief, &model.law().range, third, &settling));
     returns(Evidence { limits: model.law().range, tempering: third });
     returns(Residual { innovation: third, variance: third, nis: third });
     returns(Innovation { value: third, variance: third, nis: third, log_likelihood: -third });

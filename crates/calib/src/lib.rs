@@ -54,7 +54,9 @@ pub use params::correction::{
     CorrectionParams, CorrectionScale, CorrectorParams, FUTURE_FEATURES, ProcessParams, SimulatedParams, SimulatedRow,
     TrainingRow,
 };
-pub use params::estimator::{EstimatorKind, EstimatorParams, MotionParams, NoParameters, NoiseParams, PhaseParams};
+pub use params::estimator::{
+    EstimatorKind, EstimatorParams, MotionParams, NoParameters, NoiseParams, PhaseParams, SettlingParams,
+};
 pub use params::law::{BranchParams, GaugeParams, LawParameter, LawParams};
 pub use params::recipe::{Parts, RECIPE, Recipe};
 pub use params::static_cubic::StaticCubic;
@@ -65,6 +67,7 @@ pub use params::{
     Uncertainty, Validity,
 };
 pub use prior::{CorrectionPrior, EstimatorPrior, FEWEST_SENSORS, LawPrior, PRIOR_FORMAT, Prior};
+pub use recording::holds::{Hold, holds};
 pub use recording::lag::{Lag, aligned, lag_out_of_reach, reference_lag};
 pub use recording::screen::{Distrusted, Doubt, Screened, screen};
 pub use samples::{Samples, SamplesError};

@@ -10,7 +10,7 @@ const TURNS: usize = 6;
 /// Half-widths of the 50, 90 and 95 % intervals of a standard normal.
 const LEVELS: [(usize, f64); 3] = [(50, 0.674_489_750_196_081_7), (90, 1.644_853_626_951_472_2), (95, Z_95)];
 /// Half-width of the 95 % interval of a standard normal.
-const Z_95: f64 = 1.959_963_984_540_054;
+pub(crate) const Z_95: f64 = 1.959_963_984_540_054;
 
 /// What the standard deviations are multiplied with so that 95 % of the errors of the worst block lie in the 95 %
 /// interval, from the errors of each block in units of their deviations: split conformal prediction (Papadopoulos et

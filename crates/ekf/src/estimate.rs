@@ -1,4 +1,4 @@
-use ohmstrain_model::{MOTION_STATES, Phase, Scalar, StrainRange, SwitchedModel};
+use ohmstrain_model::{MOTION_STATES, ModelNoise, Phase, Scalar, StrainRange, SwitchedModel};
 
 use crate::{Belief, Gaussian, Real, State};
 
@@ -15,15 +15,59 @@ pub struct Estimate<T> {
     pub relaxation: Gaussian<T>,
     /// Baseline, relative to R₀; zero where the model has none.
     pub baseline: T,
-    /// Where R/R₀ - 1 will settle if the strain is held from now on: g(ε) over all hypotheses, with the law's long-run
-    /// uncertainty.
-    pub settled: Gaussian<T>,
+    /// R/R₀ - 1 of the sensor if it stands still at this moment: g(ε), branches and baseline over all hypotheses. In a hold it
+    /// is what is read.
+    pub held: Gaussian<T>,
+    /// By how much that will fall if the strain is held from now on, as [`Settling`] has it.
+    pub still_relaxes: Gaussian<T>,
     /// Probability that the strain is beyond the static border, where one reading belongs to two strains; zero where
     /// the gauge curve has no peak in its range.
     pub beyond_border: T,
     /// Whether the *ramp* border is near: the strain at which the reading, at the present speed, stops rising or falling
     /// though the body goes on. The static border tells what a reading means at rest, this one what it tells now.
     pub near_ramp_border: bool,
+}
+
+/// How readings go on where the strain is held.
+///
+/// The law's branches say by how much a reading will have fallen after `horizon_s`. Of that `share` comes true: laws are fitted
+/// to motion and to what drifts, and their slow branches take up more than relaxes. How wrong it is grows with what is left to
+/// relax.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Settling<T> {
+    /// For how long the strain is held, s.
+    pub horizon_s: T,
+    /// Share of the branches' relaxation that comes true.
+    pub share: T,
+    /// Its standard deviation.
+    pub share_sd: T,
+    /// Standard deviation of what does not grow with the relaxation, relative to R₀.
+    pub sd: T,
+}
+
+/// Hold, s, of a sensor whose holds nobody has seen.
+const UNSEEN_HORIZON_S: f64 = 60.0;
+
+impl<T: Real> Settling<T> {
+    /// Of a sensor whose holds were not seen: any share is as likely as another, and branches and baseline wander.
+    #[must_use]
+    pub fn unseen(noise: &ModelNoise<T>, branches: usize) -> Self {
+        let wander = noise.baseline_sd * noise.baseline_sd + T::of(branches as f64) * noise.branch_sd * noise.branch_sd;
+        Self {
+            horizon_s: T::of(UNSEEN_HORIZON_S),
+            share: T::of(0.5),
+            share_sd: T::of(1.0 / 12.0).sqrt(),
+            sd: wander.sqrt(),
+        }
+    }
+
+    /// By how much a reading falls of which the branches say `relaxes`.
+    fn of(&self, relaxes: T) -> Gaussian<T> {
+        let unsure = self.share_sd * relaxes;
+        Gaussian { mean: self.share * relaxes, variance: self.sd * self.sd + unsure * unsure }
+    }
 }
 
 impl<T: Real> Estimate<T> {
@@ -35,6 +79,7 @@ impl<T: Real> Estimate<T> {
         state: &S,
         limits: &StrainRange<T>,
         strain_sd_scale: T,
+        settling: &Settling<T>,
     ) -> Self {
         let belief = &state.moments();
         let strain_of = |belief: &Belief<T, N, L>| {
@@ -44,27 +89,62 @@ impl<T: Real> Estimate<T> {
         let (strain, rate) = (strain_of(belief), Gaussian::marginal(belief, 1));
         let border = model.law().static_border();
         let mut beyond_border = T::zero();
-        let mut settled = (T::zero(), T::zero());
+        let mut held = (T::zero(), T::zero());
         state.each(&mut |weight, belief| {
             let strain = strain_of(belief);
             beyond_border += border.map_or(T::zero(), |border| weight * strain.probability_above(border));
-            let (gauge, slope) = model.law().gauge_value_and_slope(strain.mean);
-            settled.0 += weight * gauge;
-            settled.1 += weight * (gauge * gauge + slope * slope * strain.variance);
+            let Gaussian { mean, variance } = standing_still(model, belief);
+            held.0 += weight * mean;
+            held.1 += weight * (mean * mean + variance);
         });
-        let noise = model.noise();
-        let wander = noise.baseline_sd * noise.baseline_sd + T::of(B as f64) * noise.branch_sd * noise.branch_sd;
-        let spread = (settled.1 - settled.0 * settled.0).max(T::zero());
+        let spread = (held.1 - held.0 * held.0).max(T::zero());
         Self {
             strain,
             rate,
             relaxation: relaxation::<T, B, N, L>(belief),
             baseline: if N > MOTION_STATES + B { belief.mean[MOTION_STATES + B] } else { T::zero() },
-            settled: Gaussian { mean: settled.0, variance: spread + wander },
+            held: Gaussian { mean: held.0, variance: spread },
+            still_relaxes: settling.of(relaxes_within(model, belief, settling.horizon_s)),
             beyond_border,
             near_ramp_border: near_ramp_border(model, belief, &strain, &rate),
         }
     }
+
+    /// Where R/R₀ - 1 will be if the strain is held from now on, by the state alone. Where there is a reading, that one minus
+    /// [`Self::still_relaxes`] says it better: the law's errors up to now are in the reading.
+    #[must_use]
+    pub fn settled(&self) -> Gaussian<T> {
+        let (held, falls) = (self.held, self.still_relaxes);
+        Gaussian { mean: held.mean - falls.mean, variance: held.variance + falls.variance }
+    }
+}
+
+/// R/R₀ - 1 at rate zero. Its parts are known much worse than their sum, which is what is read.
+fn standing_still<T: Real, const B: usize, const N: usize, const L: usize>(
+    model: &SwitchedModel<T, B, N>,
+    belief: &Belief<T, N, L>,
+) -> Gaussian<T> {
+    let (mut mean, slope) = model.law().gauge_value_and_slope(belief.mean[0]);
+    let mut variance = slope * slope * belief.covariance[(0, 0)];
+    for i in MOTION_STATES..N {
+        mean += belief.mean[i];
+        variance += T::of(2.0) * slope * belief.covariance[(i, 0)];
+        for j in MOTION_STATES..N {
+            variance += belief.covariance[(i, j)];
+        }
+    }
+    Gaussian { mean, variance: variance.max(T::zero()) }
+}
+
+/// By how much the branches fall if nothing drives them: Σ cᵢ (1 - exp(-h/τᵢ)).
+fn relaxes_within<T: Real, const B: usize, const N: usize, const L: usize>(
+    model: &SwitchedModel<T, B, N>,
+    belief: &Belief<T, N, L>,
+    horizon_s: T,
+) -> T {
+    let branches = model.law().branches.iter().enumerate();
+    branches
+        .fold(T::zero(), |sum, (i, branch)| sum - belief.mean[MOTION_STATES + i] * (-horizon_s / branch.tau_s).exp_m1())
 }
 
 /// Sum of the branches.

@@ -93,7 +93,7 @@ pub use belief::{Belief, BeliefOf, Gaussian, Start};
 pub use clock::seconds_between;
 pub use ekf::{Ekf, Step, Update};
 pub use error::StepError;
-pub use estimate::Estimate;
+pub use estimate::{Estimate, Settling};
 pub use estimator::{Advanced, Estimator, Innovation, State};
 pub use guard::{Guard, Guarded, Influence, ReadingVerdict, Streak};
 pub use kernel::{

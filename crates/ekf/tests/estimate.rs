@@ -1,11 +1,12 @@
 //! What an estimate says of borders, and what a smoother makes of a prediction that was cut, against closed forms.
 
 use nalgebra::{SVector, vector};
-use ohmstrain_ekf::{Belief, Dynamics, Estimate, Estimator, Evidence, Gaussian, Mixture, SignSplit, State};
+use ohmstrain_ekf::{Belief, Dynamics, Estimate, Estimator, Evidence, Gaussian, Mixture, Settling, SignSplit, State};
 use ohmstrain_model::{Branch, Gauge, ModelNoise, Motion, Phase, SensorLaw, StrainRange, SwitchedModel};
 
 const RANGE: StrainRange<f64> = StrainRange { lower: 0.0, upper: 0.4 };
 const TAU_S: f64 = 20.0;
+const SETTLING: Settling<f64> = Settling { horizon_s: 30.0, share: 0.7, share_sd: 0.2, sd: 4e-3 };
 
 fn model(gauge: [f64; 3], gains: [f64; 2]) -> SwitchedModel<f64, 1, 4> {
     let [extend_gain, retract_gain] = gains;
@@ -34,30 +35,33 @@ const PHI: [f64; 2] = [0.841_344_746_068_542_9, 0.977_249_868_051_820_8];
 fn the_border_has_its_probability() {
     for sign in [1.0, -1.0] {
         let model = model([1.9 * sign, -3.8 * sign, 0.0], [0.6, -0.4]);
-        let beyond = |state: &Belief<f64, 4, 10>| Estimate::new(&model, state, &RANGE, 1.0).beyond_border;
+        let beyond = |state: &Belief<f64, 4, 10>| Estimate::new(&model, state, &RANGE, 1.0, &SETTLING).beyond_border;
         for (strain, expected) in [(0.25, 0.5), (0.30, PHI[0]), (0.20, 1.0 - PHI[0]), (0.15, 1.0 - PHI[1])] {
             let found = beyond(&belief([strain, 0.0, 0.0, 0.0], [0.05, 0.1, 0.01, 0.01]));
             // The complementary error function is good to a few roundings.
             assert!((found - expected).abs() < 1e-14, "{sign} {strain}: {found}");
         }
         // Twice the deviation, as a calibration may ask for.
-        let wide = Estimate::new(&model, &belief([0.30, 0.0, 0.0, 0.0], [0.025, 0.1, 0.01, 0.01]), &RANGE, 2.0);
+        let wide =
+            Estimate::new(&model, &belief([0.30, 0.0, 0.0, 0.0], [0.025, 0.1, 0.01, 0.01]), &RANGE, 2.0, &SETTLING);
         assert!((wide.beyond_border - PHI[0]).abs() < 1e-14);
     }
-    let straight = Estimate::new(&model([1.9, -1.0, 0.0], [0.6, -0.4]), &belief([0.3; 4], [0.1; 4]), &RANGE, 1.0);
+    let straight =
+        Estimate::new(&model([1.9, -1.0, 0.0], [0.6, -0.4]), &belief([0.3; 4], [0.1; 4]), &RANGE, 1.0, &SETTLING);
     assert_eq!(straight.beyond_border, 0.0);
 }
 
 #[test]
 fn relaxation_and_baseline_are_told_apart() {
     let belief = belief([0.1, 0.0, 0.02, 0.03], [0.1; 4]);
-    let estimate = Estimate::new(&model([1.9, -1.0, 0.0], [0.6, -0.4]), &belief, &RANGE, 1.0);
+    let estimate = Estimate::new(&model([1.9, -1.0, 0.0], [0.6, -0.4]), &belief, &RANGE, 1.0, &SETTLING);
     assert_eq!((estimate.relaxation.mean, estimate.baseline), (0.02, 0.03));
 }
 
-/// On a straight curve a mixture settles at its slope times the strain, with the wander of branch and baseline on top.
+/// On a straight curve what a mixture reads in a hold is a sum, whose variance is w P wᵀ of all hypotheses together, and falls
+/// by a share of the branch's relaxation.
 #[test]
-fn a_held_strain_settles_on_the_curve() {
+fn a_held_strain_settles_by_what_is_left_to_relax() {
     let (model, wide) = (model([2.0, 0.0, 0.0], [0.6, -0.4]), StrainRange { lower: -9.0, upper: 9.0 });
     let filter = SignSplit::<_, 1, 4, 4>::new(model, 0.1, None, Evidence::new(wide, 1.0).unwrap()).unwrap();
     let mut state = Mixture::single(belief([0.15, 0.0, 0.02, 0.0], [0.05, 0.1, 0.02, 0.01]), Phase::Extend);
@@ -65,12 +69,49 @@ fn a_held_strain_settles_on_the_curve() {
         filter.step(&mut state, Some(reading.into())).unwrap();
     }
     assert!(state.shares().len() > 1);
-    let (estimate, all) = (Estimate::new(&model, &state, &wide, 1.0), state.moments());
-    assert!((estimate.settled.mean - 2.0 * all.mean[0]).abs() < 1e-14);
-    let expected = 4.0 * all.covariance[(0, 0)] + 0.02 * 0.02 + 5e-3 * 5e-3;
+    let (estimate, all) = (Estimate::new(&model, &state, &wide, 1.0, &SETTLING), state.moments());
+    let parts = vector![2.0, 0.0, 1.0, 1.0];
+    assert!((estimate.held.mean - parts.dot(&all.mean)).abs() < 1e-14);
+    let variance = (parts.transpose() * all.covariance.to_matrix() * parts)[0];
     // The square of a reading of 0.3 is a hundred times larger than what is left.
-    assert!((estimate.settled.variance - expected).abs() < 1e-14);
+    assert!((estimate.held.variance - variance).abs() < 1e-14);
+    let relaxes = all.mean[2] * (1.0 - (-30.0 / TAU_S).exp());
+    assert!((estimate.still_relaxes.mean - 0.7 * relaxes).abs() < 1e-15);
+    assert!((estimate.still_relaxes.variance - (0.2 * relaxes).powi(2) - 4e-3 * 4e-3).abs() < 1e-15);
+    let settled = estimate.settled();
+    assert_eq!(settled.mean, estimate.held.mean - estimate.still_relaxes.mean);
+    assert_eq!(settled.variance, estimate.held.variance + estimate.still_relaxes.variance);
     assert_eq!(estimate.relaxation, Gaussian { mean: all.mean[2], variance: all.covariance[(2, 2)] });
+}
+
+/// Where the law is right, it is what a sensor reads that is held for that long: a hold of 30 s in steps of a millisecond,
+/// ċ = -c/τ by Euler's rule, on a curved gauge.
+#[test]
+fn a_law_that_is_right_says_what_is_read_after_the_hold() {
+    let model = model([1.9, -2.8, 0.0], [0.6, -0.4]);
+    let (strain, mut relaxed, baseline) = (0.12, 0.05, 0.01);
+    let settling = Settling { share: 1.0, share_sd: 0.0, sd: 0.0, ..SETTLING };
+    let state = belief([strain, 0.0, relaxed, baseline], [0.0; 4]);
+    let settled = Estimate::new(&model, &state, &RANGE, 1.0, &settling).settled();
+    for _ in 0..30_000 {
+        relaxed -= 1e-3 * relaxed / TAU_S;
+    }
+    let read = 1.9 * strain - 2.8 * strain * strain + relaxed + baseline;
+    // Euler's rule is off by t dt/(2 τ²) of the relaxation: 30 · 10⁻³/800 of 0.011.
+    assert!((settled.mean - read).abs() < 5e-7 && settled.variance == 0.0, "{settled:?} {read}");
+}
+
+/// A sensor whose holds nobody has seen: none or all of the relaxation is as likely as what lies between.
+#[test]
+fn an_unseen_hold_may_relax_by_any_share() {
+    let model = model([2.0, 0.0, 0.0], [0.6, -0.4]);
+    let unseen = Settling::unseen(model.noise(), 1);
+    let state = belief([0.1, 0.0, 0.05, 0.0], [0.0; 4]);
+    let falls = Estimate::new(&model, &state, &RANGE, 1.0, &unseen).still_relaxes;
+    let relaxes = 0.05 * (1.0 - (-60.0 / TAU_S).exp());
+    let wander = 0.02 * 0.02 + 5e-3 * 5e-3;
+    assert!((falls.mean - 0.5 * relaxes).abs() < 1e-15);
+    assert!((falls.variance - relaxes * relaxes / 12.0 - wander).abs() < 1e-15);
 }
 
 /// On a ramp dρ/dε = 1.9 - 5.6 ε + k - c/(τ v), which is zero at one strain.
@@ -79,7 +120,7 @@ fn the_ramp_border_is_where_the_reading_stops_changing() {
     let model = model([1.9, -2.8, 0.0], [-0.5, -0.2]);
     let near = |strain: f64, rate: f64, relaxed: f64| {
         let belief = belief([strain, rate, relaxed, 0.0], [0.01, 0.02, 1e-3, 1e-3]);
-        Estimate::new(&model, &belief, &RANGE, 1.0).near_ramp_border
+        Estimate::new(&model, &belief, &RANGE, 1.0, &SETTLING).near_ramp_border
     };
     for (rate, gain) in [(0.1, -0.5), (-0.1, -0.2)] {
         for relaxed in [-0.3, 0.0, 0.3] {

@@ -41,7 +41,9 @@ pub struct Estimate {
     pub relaxation_sd: f64,
     /// Slow drift and error of the law, relative to R₀.
     pub baseline: f64,
-    /// Where the reading will settle if the strain is held from now on, in the sensor's unit.
+    /// What will be read, in the sensor's unit, if the strain is held from now on for as long as in the longest hold of the
+    /// calibration (a minute, if it has seen none): a reading that was taken, or what the sensor would read, less what the law
+    /// says will relax, as far as that has come true in calibration.
     pub settled_resistance: f64,
     /// Its standard deviation.
     pub settled_resistance_sd: f64,
@@ -170,6 +172,7 @@ impl Scale {
         let estimate = &output.estimate;
         let strain = (estimate.strain.mean, estimate.strain.sd());
         let angle = self.joint.map(|joint| joint.angle_rad(strain.0, strain.1));
+        let settled = settled(reading.relative(rest_reading), output);
         Estimate {
             time_s,
             resistance: Some(reading.value).filter(|value| !value.is_nan()),
@@ -180,8 +183,8 @@ impl Scale {
             relaxation: estimate.relaxation.mean,
             relaxation_sd: estimate.relaxation.sd(),
             baseline: estimate.baseline,
-            settled_resistance: rest_reading * (1.0 + estimate.settled.mean),
-            settled_resistance_sd: rest_reading * estimate.settled.sd(),
+            settled_resistance: rest_reading * (1.0 + settled.mean),
+            settled_resistance_sd: rest_reading * settled.sd(),
             p_extend: output.phases.map(|phases| phases[0]),
             p_hold: output.phases.map(|phases| phases[1]),
             p_retract: output.phases.map(|phases| phases[2]),
@@ -196,16 +199,31 @@ impl Scale {
 
     fn flags(&self, reading: Reading, output: &Output) -> Flags {
         let (strain, verdict) = (output.estimate.strain.mean, output.verdict);
-        let surprising = output.nis.is_none_or(|nis| nis > SURPRISING_NIS);
         Flags::NONE
             .with(Flag::Missing, reading.value.is_nan() && !reading.saturated)
             .with(Flag::Saturated, reading.saturated)
             .with(Flag::Rejected, verdict == ReadingVerdict::Rejected)
-            .with(Flag::Downweighted, verdict == ReadingVerdict::Downweighted && surprising)
+            .with(Flag::Downweighted, surprises(output))
             .with(Flag::Implausible, verdict == ReadingVerdict::Implausible || reading.value.is_infinite())
             .with(Flag::Stuck, verdict == ReadingVerdict::Stuck)
             .with(Flag::Readmitted, verdict == ReadingVerdict::Readmitted)
             .with(Flag::RampBorder, output.estimate.near_ramp_border)
             .with(Flag::AtLimit, strain <= self.limits.0 || strain >= self.limits.1)
     }
+}
+
+/// Whether the row's reading was weighed down for standing far from what was expected.
+fn surprises(output: &Output) -> bool {
+    output.verdict == ReadingVerdict::Downweighted && output.nis.is_none_or(|nis| nis > SURPRISING_NIS)
+}
+
+/// R/R₀ - 1 after a hold. What is read knows better than the law where relaxation starts from; one reading that surprises may
+/// be wrong, and then the law is right.
+fn settled(reading: Option<ohmstrain_ekf::Reading<f64>>, output: &Output) -> Gaussian<f64> {
+    let estimate = &output.estimate;
+    let falls = estimate.still_relaxes;
+    let Some(reading) = reading.filter(|_| output.verdict.is_taken()) else { return estimate.settled() };
+    let surprise = if surprises(output) { reading.value - estimate.held.mean } else { 0.0 };
+    let variance = falls.variance.max(surprise * surprise) + reading.extra_variance;
+    Gaussian { mean: reading.value - falls.mean, variance }
 }

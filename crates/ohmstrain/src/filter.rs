@@ -47,9 +47,11 @@ impl Translator {
         }
         let mut flags = Flags::NONE;
         if let Some(doubts) = &mut self.doubts {
-            let strain = &mut output.estimate.strain;
-            let variance = doubts.see(dt_s, taken, *strain);
-            (strain.variance, flags) = doubts.widened(output.estimate.rate.mean, variance);
+            let stated = output.estimate.strain;
+            let variance = doubts.see(dt_s, taken, stated);
+            let (widened, of_doubts) = doubts.widened(output.estimate.rate.mean, variance);
+            flags = of_doubts;
+            doubt(&mut output.estimate, doubts, widened);
         }
         self.errors.restate(time_s, output.estimate.strain);
         let mut row = self.known_row((time_s, reading), off, output);
@@ -89,6 +91,12 @@ impl Translator {
         self.errors.tell(strain);
         self.doubts.iter_mut().for_each(Doubts::settle);
     }
+}
+
+/// Widens what is said of the strain to a variance, and by as much, on the mean slope, what is said of the reading after a hold.
+pub(crate) fn doubt(estimate: &mut ohmstrain_ekf::Estimate<f64>, doubts: &Doubts<f64>, widened: f64) {
+    estimate.still_relaxes.variance += doubts.of_reading(widened - estimate.strain.variance).max(0.0);
+    estimate.strain.variance = widened;
 }
 
 /// A reading relative to R₀ as it is followed.

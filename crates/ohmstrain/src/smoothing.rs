@@ -5,7 +5,7 @@ use ohmstrain_ekf::live::Flags;
 use ohmstrain_ekf::{Gaussian, StepError};
 
 use crate::estimate::Scale;
-use crate::filter::{Kernel, Translator, followed, taken};
+use crate::filter::{Kernel, Translator, doubt, followed, taken};
 use crate::known::{KnownOfAll, in_order, next_until};
 use crate::pauses::Pauses;
 use crate::{Error, Estimate, FilterBuilder, Reading};
@@ -133,9 +133,11 @@ impl FilterBuilder<'_> {
                 let (time_s, reading) = row(k);
                 let mut flags = Flags::NONE;
                 if let Some(doubts) = doubts.as_mut().filter(|_| k > 0 || !starts_known) {
-                    let (taken, strain) = (taken(&scale, reading, output), &mut output.estimate.strain);
-                    doubts.see_back(time_s - start_s, next_s - time_s, taken);
-                    (strain.variance, flags) = doubts.widened(output.estimate.rate.mean, strain.variance);
+                    let estimate = &output.estimate;
+                    doubts.see_back(time_s - start_s, next_s - time_s, taken(&scale, reading, output));
+                    let (widened, of_doubts) = doubts.widened(estimate.rate.mean, estimate.strain.variance);
+                    flags = of_doubts;
+                    doubt(&mut output.estimate, doubts, widened);
                 }
                 next_s = time_s;
                 output.estimate.strain = known(k, time_s, output.estimate.strain);

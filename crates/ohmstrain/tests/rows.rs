@@ -151,3 +151,39 @@ fn options_that_make_no_sense_are_refused_by_name() {
     assert!(matches!(sensor.smooth(times, &[1.7, 1.7]), Err(Error::Unit(_))));
     assert!(matches!(sensor.smooth(&[0.1, 0.0], &[1700.0; 2]), Err(Error::Row { row: 1, .. })));
 }
+
+/// Ten seconds at one reading, with noise, then one row of something else.
+fn after_a_while(last: Reading) -> Estimate {
+    let mut filter = sensor().filter().build().unwrap();
+    for k in 0..200 {
+        filter.step(0.05 * f64::from(k), 1700.0 + f64::from(k * 7 % 5)).unwrap();
+    }
+    filter.step(10.0, last).unwrap()
+}
+
+/// In a hold a reading settles no farther from itself than by all of the relaxation, whatever strain the filter believes in.
+/// Where readings end, what the filter expects to read takes their place, and is less and less certain.
+#[test]
+fn settling_starts_from_the_reading() {
+    let mut filter = sensor().filter().build().unwrap();
+    let read =
+        (0..200).map(|k| filter.step(0.05 * f64::from(k), 1700.0 + f64::from(k * 7 % 5)).unwrap()).last().unwrap();
+    let most = sensor().params().rest_reading * read.relaxation.abs() + 20.0;
+    assert!((read.settled_resistance - 1700.0).abs() < most, "{read:?}");
+    let missing: Vec<Estimate> = (200..300).map(|k| filter.step(0.05 * f64::from(k), None).unwrap()).collect();
+    for row in &missing {
+        let off = (row.settled_resistance - read.settled_resistance).abs();
+        assert!(off < 1.96 * row.settled_resistance_sd, "{row:?}");
+    }
+    assert!(missing[99].settled_resistance_sd > 1.5 * read.settled_resistance_sd, "{read:?} {:?}", missing[99]);
+}
+
+/// A reading that nobody expected may be an outlier: one deviation reaches from it to what was expected.
+#[test]
+fn an_outlier_leaves_open_where_readings_settle() {
+    let (read, outlier) = (after_a_while(1700.0.into()), after_a_while(2100.0.into()));
+    assert!(outlier.flags.has(Flag::Downweighted), "{}", outlier.flags);
+    assert!(outlier.settled_resistance_sd > 300.0, "{}", outlier.settled_resistance_sd);
+    let off = (outlier.settled_resistance - read.settled_resistance).abs();
+    assert!(off < 1.96 * outlier.settled_resistance_sd, "{off}");
+}

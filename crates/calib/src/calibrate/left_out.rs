@@ -33,9 +33,20 @@ pub(crate) struct Fold<'a> {
     pub rest_reading: f64,
 }
 
+/// By how much a reading is said to fall, by a law that has not seen it.
+pub(crate) struct SaidFall {
+    pub recording: usize,
+    pub row: usize,
+    /// Relative to R₀.
+    pub said: f64,
+    /// R₀ of that law.
+    pub rest_reading: f64,
+}
+
 /// One recording up to the end of the block that its law has not seen.
 struct Run<'a> {
     fold: Fold<'a>,
+    recording: usize,
     time_s: Vec<f64>,
     /// Relative to the R₀ of that law.
     reading: Vec<Option<Reading<f64>>>,
@@ -54,6 +65,7 @@ impl<'a> LeftOut<'a> {
                 let fold = Fold { law: &law.law, rest_reading: law.rest_readings[recording] };
                 runs.push(Run {
                     fold,
+                    recording,
                     time_s: pick(samples.time_s),
                     reading: relative_changes(&pick(samples.reading), fold.rest_reading),
                     strain: pick(samples.strain),
@@ -103,6 +115,28 @@ impl<'a> LeftOut<'a> {
             )
         };
         self.runs.iter().map(of_run).collect()
+    }
+
+    /// What a filter says in `rows` of each recording, in order, by how much readings will fall; `None` if it fails. Only where no
+    /// row was left out for a stride.
+    pub(crate) fn falls(&self, build: &Build, rows: &[Vec<usize>]) -> Option<Vec<SaidFall>> {
+        let mut falls = Vec::new();
+        for run in &self.runs {
+            let mut filter = build(run.fold).ok()?;
+            for k in 0..run.block.end {
+                filter.step(run.time_s[k], run.reading[k]).ok()?;
+                if k >= run.block.start && rows[run.recording].binary_search(&k).is_ok() {
+                    let said = filter.output().estimate.still_relaxes.mean;
+                    falls.push(SaidFall {
+                        recording: run.recording,
+                        row: k,
+                        said,
+                        rest_reading: run.fold.rest_reading,
+                    });
+                }
+            }
+        }
+        Some(falls)
     }
 
     /// Visits run, estimate and true strain in every row of every block: the filter runs from the first row to the end

@@ -8,6 +8,7 @@ pub(crate) mod findings;
 pub(crate) mod left_out;
 pub(crate) mod noise_fit;
 pub(crate) mod scores;
+pub(crate) mod settling;
 pub(crate) mod simulated_motions;
 pub(crate) mod with_prior;
 

@@ -4,13 +4,16 @@ use ohmstrain_ekf::live::{Sieve, news};
 
 use crate::CalibrationError;
 use crate::calibrate::left_out::{Fold, LeftOut};
+use crate::calibrate::settling::LongHolds;
 use crate::filter::build::{Setting, filter_from_parts};
 use crate::filter::{Filter, Start};
 use crate::law::fit::CrossFit;
 use crate::motion_stats::{MotionStats, root_mean_square};
 use crate::optimise;
 use crate::params::RangeParams;
-use crate::params::estimator::{EstimatorKind, EstimatorParams, MotionParams, NoiseParams, PhaseParams};
+use crate::params::estimator::{
+    EstimatorKind, EstimatorParams, MotionParams, NoiseParams, PhaseParams, SettlingParams,
+};
 use crate::prior::EstimatorPrior;
 use crate::samples::{Samples, usual_step_s};
 use crate::sd_scale::sd_scale;
@@ -202,8 +205,16 @@ impl<'a> NoiseProblem<'a> {
             score,
             strain_sd_scale: filtered.map_or(1.0, |deviations| sd_scale(&deviations)).max(of_make),
             smoothed_sd_scale: smoothed.map(|deviations| sd_scale(&deviations)),
+            settling: self.settling(left_out, params),
             ..params
         }
+    }
+
+    /// What holds say of the filter, block by block.
+    fn settling(&self, left_out: &LeftOut, params: EstimatorParams) -> Option<SettlingParams> {
+        let holds = LongHolds::new(self.samples, self.limits.span())?;
+        let params = EstimatorParams { settling: Some(holds.law()), ..params };
+        holds.settling(left_out, &|fold| self.build(self.kind, fold, &params))
     }
 
     fn build(
@@ -278,6 +289,7 @@ impl<'a> NoiseProblem<'a> {
                 branch_sd: p[3],
             },
             phases,
+            settling: None,
         }
     }
 }

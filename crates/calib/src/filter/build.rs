@@ -4,8 +4,8 @@ use std::sync::Arc;
 use ohmstrain_ekf::Particles;
 use ohmstrain_ekf::live::Sieve;
 use ohmstrain_ekf::{
-    AnyCurve, Belief, Compact, Dwell, Evidence, Hypotheses, Imm, Mixture, PhaseMixture, SigmaPoints, SignSplit,
-    SparseEkf,
+    AnyCurve, Belief, Compact, Dwell, Evidence, Hypotheses, Imm, Mixture, PhaseMixture, Settling, SigmaPoints,
+    SignSplit, SparseEkf,
 };
 use ohmstrain_model::{Phase, SwitchedModel};
 
@@ -13,7 +13,7 @@ use crate::filter::corrected::Corrected;
 use crate::filter::learned::Learned;
 use crate::filter::running::{Interval, Running};
 use crate::filter::{Filter, Start};
-use crate::params::estimator::{EstimatorKind, EstimatorParams, NoParameters};
+use crate::params::estimator::{EstimatorKind, EstimatorParams, NoParameters, SettlingParams};
 use crate::params::law::LawParams;
 use crate::params::{RangeParams, SensorParams};
 use crate::{CalibrationError, with_sizes};
@@ -97,7 +97,7 @@ fn of_size<const B: usize, const N: usize, const L: usize>(
 ) -> Result<Box<dyn Filter>, CalibrationError> {
     let model = switched::<B, N>(law, estimator)?;
     let beliefs: [Belief<f64, N, L>; 2] = [initial_belief(&model, setting), Belief::initial(&model)];
-    let interval = interval(estimator, setting);
+    let interval = interval(estimator, setting, B);
     match kind {
         EstimatorKind::Ekf => {
             let filter = SparseEkf::<_, Compact, B, N>::at_a_moment(model).map_err(CalibrationError::NoFilter)?;
@@ -161,8 +161,10 @@ impl PhaseFilter {
     }
 }
 
-fn interval(estimator: &EstimatorParams, setting: Setting) -> Interval {
+fn interval(estimator: &EstimatorParams, setting: Setting, branches: usize) -> Interval {
+    let unseen = || Settling::unseen(&estimator.noise.to_model(), branches);
     Interval {
+        settling: estimator.settling.map_or_else(unseen, SettlingParams::to_model),
         limits: setting.limits.to_model(),
         filtered_scale: estimator.strain_sd_scale,
         smoothed_scale: estimator.smoothed_sd_scale.unwrap_or(1.0),

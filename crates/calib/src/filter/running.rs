@@ -3,7 +3,7 @@ use std::mem;
 
 use ohmstrain_ekf::live::{BESIDE_SHARE, Sieve};
 use ohmstrain_ekf::{
-    Estimate, Estimator, Gaussian, Guard, PastStep, Reading, Repeated, State, StepError, smooth_back_through,
+    Estimate, Estimator, Gaussian, Guard, PastStep, Reading, Repeated, Settling, State, StepError, smooth_back_through,
 };
 use ohmstrain_model::{StrainRange, SwitchedModel};
 
@@ -30,6 +30,7 @@ pub(crate) struct Interval {
     pub limits: StrainRange<f64>,
     pub filtered_scale: f64,
     pub smoothed_scale: f64,
+    pub settling: Settling<f64>,
     /// What a reading must be for the filter to see it.
     pub sieve: Sieve<f64>,
 }
@@ -60,7 +61,7 @@ where
     }
 
     fn output(&self, state: &E::State, seen: Seen, sd_scale: f64) -> Output {
-        let estimate = Estimate::new(&self.model, state, &self.interval.limits, sd_scale);
+        let estimate = Estimate::new(&self.model, state, &self.interval.limits, sd_scale, &self.interval.settling);
         Output {
             estimate,
             nis: seen.innovation.map(|innovation| innovation.nis),

@@ -1,5 +1,5 @@
-use ohmstrain_ekf::Dwell;
 use ohmstrain_ekf::live::news;
+use ohmstrain_ekf::{Dwell, Settling};
 use ohmstrain_model::{ModelNoise, Motion, ParameterError};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -108,6 +108,32 @@ pub struct EstimatorParams {
     /// How phases follow each other, for estimators that keep phase hypotheses.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub phases: Option<PhaseParams>,
+    /// How readings go on where the strain is held; `None` if calibration has not seen holds.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub settling: Option<SettlingParams>,
+}
+
+/// What calibration has seen of holds: see [`Settling`].
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SettlingParams {
+    /// The longest of them, s.
+    pub horizon_s: f64,
+    /// Share of the branches' relaxation that came true.
+    pub share: f64,
+    /// Its standard deviation.
+    pub share_sd: f64,
+    /// Standard deviation of what does not grow with the relaxation, relative to R₀.
+    pub sd: f64,
+}
+
+impl SettlingParams {
+    /// As estimates have it.
+    #[must_use]
+    pub const fn to_model(self) -> Settling<f64> {
+        let Self { horizon_s, share, share_sd, sd } = self;
+        Settling { horizon_s, share, share_sd, sd }
+    }
 }
 
 /// How phases follow each other.

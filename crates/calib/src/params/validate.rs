@@ -12,7 +12,7 @@ use table::{
     short,
 };
 
-use crate::params::estimator::{EstimatorParams, MotionParams, NoiseParams, PhaseParams};
+use crate::params::estimator::{EstimatorParams, MotionParams, NoiseParams, PhaseParams, SettlingParams};
 use crate::params::law::{GaugeParams, LawParams};
 use crate::params::static_cubic::StaticCubic;
 use crate::params::summary::{Summary, TestedSummary};
@@ -195,7 +195,17 @@ impl EstimatorParams {
         }
         self.motion.validate(&table.table("motion"), limits)?;
         self.noise.validate(&table.table("noise"))?;
-        self.phases.map_or(Ok(()), |phases| phases.validate(&table.table("phases")))
+        self.phases.map_or(Ok(()), |phases| phases.validate(&table.table("phases")))?;
+        self.settling.map_or(Ok(()), |settling| settling.validate(&table.table("settling")))
+    }
+}
+
+impl SettlingParams {
+    fn validate(&self, table: &Table) -> Result<(), FieldError> {
+        table.number("horizon_s", self.horizon_s, POSITIVE)?;
+        table.number("share", self.share, SHARE)?;
+        table.number("share_sd", self.share_sd, AMOUNT)?;
+        table.number("sd", self.sd, AMOUNT)
     }
 }
 

@@ -1,5 +1,6 @@
 //! What is asked of recordings before anything is fitted to them.
 
+pub(crate) mod holds;
 pub(crate) mod lag;
 pub(crate) mod repeats;
 pub(crate) mod rest;

@@ -19,6 +19,7 @@ fn sensor() -> SensorParams {
     };
     let estimator = EstimatorParams {
         phases: None,
+        settling: None,
         score: 0.0,
         strain_sd_scale: 1.0,
         smoothed_sd_scale: None,

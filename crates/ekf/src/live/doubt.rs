@@ -314,6 +314,11 @@ impl<T: Real> Doubts<T> {
             .with(Flag::RestMoved, rest_off > T::zero());
         (stated + more, flags)
     }
+
+    /// The variance that a variance of the strain is, of a reading R/R₀ - 1 on the mean slope of calibration.
+    pub fn of_reading(&self, variance: T) -> T {
+        variance / (self.parts.per_reading * self.parts.per_reading)
+    }
 }
 
 #[cfg(test)]

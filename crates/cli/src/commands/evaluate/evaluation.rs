@@ -107,6 +107,11 @@ impl Evaluation {
                 add_scores(&mut table, name, &of);
             }
             writeln!(out, "{table}\n")?;
+            for of in scores.iter().filter(|of| !of.is_part) {
+                if let Some(settled) = of.settled {
+                    writeln!(out, "{}, {settled}\n", of.name())?;
+                }
+            }
         }
         Ok(())
     }

@@ -1,6 +1,7 @@
 mod evaluation;
 mod scores;
 mod sensors;
+mod settled;
 mod summary;
 mod told;
 

@@ -1,6 +1,7 @@
 use ohmstrain_calib::{Quantity, Scores};
 use serde::Serialize;
 
+use super::settled::SettledScores;
 use crate::report::Sample;
 
 /// One recording and one estimator: the filter's scores, the smoother's, and those they are compared with.
@@ -25,6 +26,9 @@ pub struct RecordingScores {
     #[serde(flatten)]
     pub filter: Scores,
     pub smoother: Scores,
+    /// What the filter says of where readings settle, where rows of long holds are scored.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub settled: Option<SettledScores>,
     /// Wall-clock time of the calibration, s; `None` if it was read from a file.
     pub calibration_s: Option<f64>,
     /// Lag of the reference, where it was looked for; `None` inside if it cannot be told.

@@ -6,6 +6,7 @@ use ohmstrain_bench_data::segment;
 use ohmstrain_calib::{Baselines, EstimatorKind, Parts, PhaseRows, PublishedLaw, RECIPE, StaticCubic};
 
 use super::scores::{BaselineScores, LearnedScores, RecordingScores};
+use super::settled::SettledScores;
 use super::told::Told;
 use crate::args::Estimators;
 use crate::commands::calibrate::calibrate_recordings;
@@ -143,6 +144,8 @@ impl Sensor {
         let (Some(filter), Some(smoother)) = (scores(&estimated.filtered), scores(&estimated.smoothed)) else {
             return Ok(None);
         };
+        let span = self.sensor.params().limits.span();
+        let settled = SettledScores::new(recording, &estimated.filtered, part, span)?;
         Ok(Some(RecordingScores {
             file: recording.name.clone(),
             sha256: recording.sha256.clone(),
@@ -153,6 +156,7 @@ impl Sensor {
             is_part: self.is_part || told.name.is_some(),
             filter,
             smoother,
+            settled,
             calibration_s: self.calibration_s,
             lag_s: None,
             baselines,

@@ -1,0 +1,154 @@
+//! How far readings fall in the holds of a calibration, against what the law says.
+
+use statrs::distribution::{ContinuousCDF, StudentsT};
+
+use crate::calibrate::left_out::{Build, LeftOut, SaidFall};
+use crate::params::estimator::SettlingParams;
+use crate::recording::holds::{Hold, LEAST_HOLD_S, holds};
+use crate::samples::Samples;
+use crate::sd_scale::Z_95;
+
+/// Holds shorter than this share of the longest are left out: they end before the others.
+const LEAST_SHARE: f64 = 1.0 / 3.0;
+/// One hold says nothing of the next one.
+const FEWEST_HOLDS: usize = 2;
+/// Rows of a hold are looked at from its first seconds to these before its end, in equal steps of the logarithm of time.
+const FIRST_S: f64 = 2.0;
+const BEFORE_END_S: f64 = 10.0;
+const ROWS: u32 = 12;
+/// Two or three holds tell a deviation badly, but not that badly.
+const MOST_WIDENED: f64 = 3.0;
+/// Ratios of the deviation that grows with the relaxation to the one that does not: none, and 30 from 0.1 to 100.
+const RATIOS: (u32, f64, f64) = (30, 0.1, 100.0);
+
+/// A row of a hold.
+struct Fall {
+    /// By how much its reading is above the last one.
+    read: f64,
+    /// By how much the law says that it is to fall.
+    said: f64,
+}
+
+/// Long holds of the recordings.
+pub(crate) struct LongHolds {
+    longest_s: f64,
+    count: usize,
+    /// Rows of each recording that are looked at, in order.
+    rows: Vec<Vec<usize>>,
+    /// By how much their readings are above the last one of their hold.
+    read: Vec<Vec<f64>>,
+}
+
+impl LongHolds {
+    /// Of recordings whose strains have a range of `span`; `None` if there are not enough of them.
+    pub(crate) fn new(recordings: &[Samples], span: f64) -> Option<Self> {
+        let every: Vec<Vec<Hold>> = recordings.iter().map(|samples| holds(samples, span, LEAST_HOLD_S)).collect();
+        let longest_s = every.iter().flatten().map(|hold| hold.duration_s).reduce(f64::max)?;
+        let long = |hold: &&Hold| hold.duration_s >= LEAST_SHARE * longest_s;
+        let count = every.iter().flatten().filter(long).count();
+        if count < FEWEST_HOLDS {
+            return None;
+        }
+        let of = |(samples, holds): (&Samples, &Vec<Hold>)| -> (Vec<usize>, Vec<f64>) {
+            holds.iter().filter(long).flat_map(|hold| rows_of(hold, samples)).unzip()
+        };
+        let (rows, read) = recordings.iter().zip(&every).map(of).unzip();
+        Some(Self { longest_s, count, rows, read })
+    }
+
+    /// For filters that are to say all that branches relax by within the longest hold.
+    pub(crate) const fn law(&self) -> SettlingParams {
+        SettlingParams { horizon_s: self.longest_s, share: 1.0, share_sd: 0.0, sd: 0.0 }
+    }
+
+    /// What they say; `None` if a filter fails. `build` makes filters with [`Self::law`].
+    ///
+    /// The share is that of least squares, the deviations are those under which the errors are likeliest. Errors of one hold
+    /// are alike, so that the number of holds says how far another hold may be off: Student's t.
+    pub(crate) fn settling(&self, left_out: &LeftOut, build: &Build) -> Option<SettlingParams> {
+        let fall = |of: SaidFall| {
+            let place = self.rows[of.recording].binary_search(&of.row).ok()?;
+            Some(Fall { read: self.read[of.recording][place] / of.rest_reading, said: of.said })
+        };
+        let falls: Vec<Fall> = left_out.falls(build, &self.rows)?.into_iter().filter_map(fall).collect();
+        (!falls.is_empty()).then(|| likeliest(&falls, self.count, self.longest_s))
+    }
+}
+
+/// Rows of a hold that have a reading, and by how much it is above the last one.
+fn rows_of(hold: &Hold, samples: &Samples) -> Vec<(usize, f64)> {
+    let start_s = samples.time_s[hold.rows.start];
+    let latest = (hold.duration_s - BEFORE_END_S) / FIRST_S;
+    let times = (0..ROWS).map(|k| start_s + FIRST_S * latest.powf(f64::from(k) / f64::from(ROWS - 1)));
+    let mut rows: Vec<usize> =
+        times.map(|time| samples.time_s.partition_point(|t| *t < time)).filter(|row| hold.rows.contains(row)).collect();
+    rows.dedup();
+    let above = |row: usize| (row, samples.reading[row] - hold.last_reading);
+    rows.into_iter().map(above).filter(|(_, above)| above.is_finite()).collect()
+}
+
+/// Share and deviations of the rows of `count` holds.
+fn likeliest(falls: &[Fall], count: usize, horizon_s: f64) -> SettlingParams {
+    let squares: f64 = falls.iter().map(|fall| fall.said * fall.said).sum();
+    let products: f64 = falls.iter().map(|fall| fall.read * fall.said).sum();
+    let share = (products / squares.max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+    let usual = (squares / falls.len() as f64).sqrt().max(f64::MIN_POSITIVE);
+    // Squared errors, and squares of what was said in units of its usual size.
+    let errors: Vec<(f64, f64)> =
+        falls.iter().map(|fall| ((fall.read - share * fall.said).powi(2), (fall.said / usual).powi(2))).collect();
+    let mean = |of: &dyn Fn(f64, f64) -> f64| errors.iter().map(|(e, s)| of(*e, *s)).sum::<f64>() / errors.len() as f64;
+    let constant = |ratio: f64| mean(&|error, said| error / (1.0 + ratio * ratio * said));
+    let cost = |ratio: &f64| constant(*ratio).ln() + mean(&|_, said| (ratio * ratio * said).ln_1p());
+    let (steps, least, most) = RATIOS;
+    let grid = (0..=steps).map(|k| least * (most / least).powf(f64::from(k) / f64::from(steps)));
+    let ratio = std::iter::once(0.0).chain(grid).min_by(|a, b| cost(a).total_cmp(&cost(b))).unwrap_or(0.0);
+    let sd = constant(ratio).sqrt() * widened(count);
+    SettlingParams { horizon_s, share, share_sd: ratio * sd / usual, sd }
+}
+
+/// How many times wider an interval must be whose deviation was told by so many holds.
+fn widened(count: usize) -> f64 {
+    let count = count as f64;
+    let quantile = |t: StudentsT| t.inverse_cdf(0.975);
+    let student = StudentsT::new(0.0, 1.0, count - 1.0).map_or(f64::INFINITY, quantile);
+    (student / Z_95 * (1.0 + 1.0 / count).sqrt()).min(MOST_WIDENED)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Fall, likeliest, widened};
+
+    /// Two of three of what is said comes true, with errors of 10 % of it in turn, and of 0.001 where nothing is said.
+    #[test]
+    fn share_and_deviations_are_found() {
+        let fall = |k: u32| {
+            let said = 0.4 * 0.7_f64.powi((k / 2) as i32);
+            let sign = if k.is_multiple_of(2) { 1.0 } else { -1.0 };
+            Fall { read: said * 2.0 / 3.0 + sign * (0.1 * said).hypot(1e-3), said }
+        };
+        let falls: Vec<Fall> = (0..60).map(fall).collect();
+        let found = likeliest(&falls, 1000, 300.0);
+        // A thousand holds widen by half a permille; the grid of ratios has steps of a quarter.
+        assert!((found.share - 2.0 / 3.0).abs() < 1e-12 && found.horizon_s == 300.0, "{found:?}");
+        assert!((found.share_sd / 0.1 - 1.0).abs() < 0.15 && (found.sd / 1e-3 - 1.0).abs() < 0.15, "{found:?}");
+    }
+
+    #[test]
+    fn branches_that_say_nothing_leave_the_readings_own_fall() {
+        let falls: Vec<Fall> = [0.01, 0.03].map(|read| Fall { read, said: 0.0 }).into();
+        let found = likeliest(&falls, 1_000_000, 60.0);
+        assert_eq!((found.share, found.share_sd), (0.0, 0.0));
+        // The quantile is good to 2e-5.
+        assert!((found.sd / 5e-4_f64.sqrt() - 1.0).abs() < 1e-4, "{found:?}");
+    }
+
+    /// Quantiles of Student's t with 4 and 9 degrees of freedom, from tables.
+    #[test]
+    fn few_holds_widen() {
+        for (count, quantile) in [(5_u32, 2.776), (10, 2.262)] {
+            let expected = quantile / 1.96 * (1.0 + 1.0 / f64::from(count)).sqrt();
+            assert!((widened(count as usize) - expected).abs() < 1e-3);
+        }
+        assert_eq!((widened(2), widened(1)), (3.0, 3.0));
+    }
+}

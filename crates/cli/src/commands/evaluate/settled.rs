@@ -1,0 +1,94 @@
+use std::fmt;
+
+use ohmstrain::Estimate;
+use ohmstrain_calib::{Hold, ScoredRow, Scores, holds};
+use serde::Serialize;
+
+use crate::commands::scoring::Part;
+use crate::error::CliError;
+use crate::input::TraceFile;
+
+/// Shorter holds, s, end before readings have settled.
+const LEAST_HOLD_S: f64 = 60.0;
+/// Rows are scored from so long after a hold's start, s, to so long before its end.
+const FROM_S: f64 = 2.0;
+const BEFORE_END_S: f64 = 10.0;
+/// What is told in this time, s, is told early.
+const EARLY_S: f64 = 30.0;
+
+/// How well the settled resistance of the rows of holds tells what is read at their ends. In the unit of the readings.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct SettledScores {
+    /// Holds of a minute or longer of which every row is scored.
+    holds: usize,
+    /// Rows in them, without the first seconds and the last ones.
+    n: usize,
+    /// Share of them whose 95 % interval holds the last reading.
+    coverage_95: f64,
+    /// The same of rows of the first half minute.
+    early_coverage_95: f64,
+    rmse: f64,
+    width_95: f64,
+    crps: f64,
+    /// RMSE of the rows' own readings.
+    reading_rmse: f64,
+}
+
+impl SettledScores {
+    /// Of the holds of a recording, whose strains have a range of `span`; `None` without a long one.
+    pub fn new(recording: &TraceFile, estimates: &[Estimate], part: Part, span: f64) -> Result<Option<Self>, CliError> {
+        let time_s = &recording.trace.time_s;
+        let mut holds = holds(&recording.samples()?, span, LEAST_HOLD_S);
+        holds.retain(|hold| hold.rows.clone().all(|row| part.holds(time_s[row])));
+        let until = |after_start_s: f64| -> Vec<(f64, &Estimate)> {
+            let of_hold = |hold: &Hold| {
+                let (start_s, last_reading) = (time_s[hold.rows.start], hold.last_reading);
+                let scored = FROM_S..=(hold.duration_s - BEFORE_END_S).min(after_start_s);
+                let rows = estimates[hold.rows.clone()].iter();
+                rows.filter(move |row| scored.contains(&(row.time_s - start_s))).map(move |row| (last_reading, row))
+            };
+            holds.iter().flat_map(of_hold).collect()
+        };
+        let (rows, early) = (until(f64::INFINITY), until(EARLY_S));
+        let told = |row: &Estimate| Some((row.settled_resistance, Some(row.settled_resistance_sd)));
+        let read = |row: &Estimate| Some((row.resistance?, None));
+        let (Some(all), Some(early), Some(read)) = (scores(&rows, told), scores(&early, told), scores(&rows, read))
+        else {
+            return Ok(None);
+        };
+        Ok(Some(Self {
+            holds: holds.len(),
+            n: all.n,
+            coverage_95: all.coverage_95.unwrap_or(0.0),
+            early_coverage_95: early.coverage_95.unwrap_or(0.0),
+            rmse: all.rmse,
+            width_95: all.width_95.unwrap_or(0.0),
+            crps: all.crps,
+            reading_rmse: read.rmse,
+        }))
+    }
+}
+
+/// Scores of what is said of rows, and its deviation, against the last reading of their hold.
+fn scores(rows: &[(f64, &Estimate)], said: impl Fn(&Estimate) -> Option<(f64, Option<f64>)>) -> Option<Scores> {
+    let scored = |(truth, row): &(f64, &Estimate)| {
+        let (strain, sd) = said(row)?;
+        Some(ScoredRow { time_s: row.time_s, truth: *truth, strain, sd })
+    };
+    Scores::new(&rows.iter().filter_map(scored).collect::<Vec<_>>())
+}
+
+impl fmt::Display for SettledScores {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { holds, n, coverage_95, early_coverage_95, rmse, width_95, reading_rmse, .. } = self;
+        let (all, early) = (100.0 * coverage_95, 100.0 * early_coverage_95);
+        let number = |value: &f64| if *value < 10.0 { format!("{value:.3}") } else { format!("{value:.0}") };
+        let (rmse, width, reading) = (number(rmse), number(width_95), number(reading_rmse));
+        writeln!(
+            out,
+            "settled resistance against the last reading of a hold ({holds} of a minute or longer, {n} rows):"
+        )?;
+        write!(out, "95 % interval {all:.0} %, in the first half minute {early:.0} %, width {width}; RMSE {rmse}, ")?;
+        write!(out, "of the row's own reading {reading}")
+    }
+}
