@@ -1,6 +1,7 @@
 use ohmstrain_ekf::Gaussian;
 use ohmstrain_ekf::correction::{
-    BLOCK, Correction, FILTER_INPUTS, INDUCING, InputScale, Process, RowBlock, Rows, Simulated, Triangle, block_of, stripes,
+    BLOCK, Correction, FILTER_INPUTS, INDUCING, InputScale, Process, RowBlock, Rows, Simulated, Triangle, block_of,
+    stripes,
 };
 use ohmstrain_model::StrainRange;
 
