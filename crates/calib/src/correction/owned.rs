@@ -2,7 +2,7 @@ use std::ops::Deref;
 
 use ohmstrain_ekf::Real;
 use ohmstrain_ekf::correction::{
-    BLOCK, Correction, InputScale, Process, RowBlock, Rows, Simulated, Triangle, block_of, stripes,
+    BLOCK, Correction, InputScale, Process, RowBlock, Rows, Simulated, Triangle, block_of, stripe_places, stripes,
 };
 use ohmstrain_model::StrainRange;
 
@@ -106,8 +106,7 @@ impl<T: Real> OwnedTriangle<T> {
     /// The whole matrix, row by row.
     pub fn rows(&self) -> Vec<Vec<T>> {
         let mut rows = vec![vec![T::zero(); self.side]; self.side];
-        let places = (0..self.side).step_by(BLOCK).flat_map(|first| (first..self.side).map(move |j| (first, j)));
-        for ((first, j), column) in places.zip(&self.columns) {
+        for ((first, j), column) in stripe_places(self.side).zip(&self.columns) {
             rows[first..].iter_mut().zip(column).for_each(|(row, entry)| row[j] = *entry);
         }
         rows

@@ -34,7 +34,7 @@ use process::{Kernels, Said};
 pub use process::{LINEAR, Process, kernel};
 pub use quadratic::Quadratic;
 pub use rows::{BLOCK, RowBlock, Rows, block_of};
-pub use triangle::{Triangle, stripes};
+pub use triangle::{Triangle, stripe_places, stripes};
 
 /// Number of a filter's outputs that a correction sees: strain, its rate, relaxation, baseline, and the probabilities of
 /// stretching and releasing.

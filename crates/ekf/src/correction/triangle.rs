@@ -53,8 +53,12 @@ impl<'a, T: Scalar> Triangle<'a, T> {
 
 /// The columns of a [`Triangle`], of its entries on and above the diagonal.
 pub fn stripes<T: Scalar>(side: usize, entry: impl Fn(usize, usize) -> T) -> impl Iterator<Item = [T; BLOCK]> {
-    let places = (0..side).step_by(BLOCK).flat_map(move |first| (first..side).map(move |j| (first, j)));
-    places.map(move |(first, j)| {
+    stripe_places(side).map(move |(first, j)| {
         core::array::from_fn(|row| if first + row <= j { entry(first + row, j) } else { T::zero() })
     })
+}
+
+/// Where the columns of [stripes] stand: the first of their rows, and the column.
+pub fn stripe_places(side: usize) -> impl Iterator<Item = (usize, usize)> {
+    (0..side).step_by(BLOCK).flat_map(move |first| (first..side).map(move |j| (first, j)))
 }

@@ -1,5 +1,4 @@
-//! Exponentials of what is not above zero, and tails of the normal distribution: the same bits on every machine, in every precision's
-//! own number of operations.
+//! Exponentials of what is not above zero, with the same bits on every machine, and what hypotheses make of them.
 
 use super::tail::Tail;
 use super::{InVectors, Lanes, Several};

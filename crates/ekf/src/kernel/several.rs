@@ -166,7 +166,7 @@ pub(crate) trait InVectors: Scalar {
     /// Does work with vectors where the processor has some that are worth it. They round as numbers do: results are the same
     /// to the last bit.
     fn in_vectors<W: Work<Self>>(work: W) -> Option<W::Said>;
-    /// What of a number [`falling`](super::Falls::falling) takes.
+    /// What [`falling`](super::Falls::falling) takes in this precision.
     const FALLING: Falling<Self>;
     /// The bits shifted to where an exponent stands.
     #[must_use]
