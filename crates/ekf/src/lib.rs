@@ -97,8 +97,8 @@ pub use estimate::{Estimate, Settling};
 pub use estimator::{Advanced, Estimator, Innovation, State};
 pub use guard::{Guard, Guarded, Influence, ReadingVerdict, Streak};
 pub use kernel::{
-    AnyCurve, Compact, CompactWidth, Cubic, Curve, CurveLine, Lanes, Line, Logistic, Real, SigmaPoints, SparseEkf,
-    Switch, Undirected,
+    AnyCurve, Compact, CompactWidth, Cubic, Curve, CurveLine, Lanes, Line, Logistic, Real, Recordable, SigmaPoints,
+    SparseEkf, Switch, Undirected,
 };
 pub use linear::{Frozen, LinearFilter};
 pub use mixture::{Dwell, Evidence, Hypotheses, Imm, Mixture, MixtureResidual, PhaseMixture, Share, SignSplit};

@@ -1,5 +1,5 @@
 use crate::error::{ParameterError, Problem};
-use crate::{Gauge, Phase, Scalar};
+use crate::{Gauge, Number, Phase, Scalar};
 
 /// One relaxing contribution to the resistance: `ċ = -c/τ + (k + κ ε) v`, with gains of their own for stretching and
 /// releasing.
@@ -33,7 +33,7 @@ pub struct StrainRange<T> {
     pub upper: T,
 }
 
-impl<T: Scalar> StrainRange<T> {
+impl<T: Number> StrainRange<T> {
     /// `strain`, moved to the nearer end if it lies outside.
     #[must_use]
     pub fn clamp(&self, strain: T) -> T {

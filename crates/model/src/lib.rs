@@ -49,7 +49,7 @@ pub use noise::ModelNoise;
 pub use phase::{Direction, Phase, SplitRate, Turning, UNEXPLAINED, UNEXPLAINED_SHAPE, unexplained};
 pub use response::Response;
 pub use reversal::{LEAST_LEFT, RateChange, TURNING, TurningNumbers, correlated_steps};
-pub use scalar::Scalar;
+pub use scalar::{Number, Scalar};
 pub use sizes::{Branches, Models, WithBaseline, WithoutBaseline};
 pub use switched::{Observation, SwitchedModel, SwitchedStep, Transition};
 pub use symmetric::Symmetric;

@@ -2,9 +2,7 @@
 
 use ohmstrain_calib::{OwnedProcess, OwnedRows, OwnedSimulated, PortableCorrection};
 use ohmstrain_ekf::Real;
-use ohmstrain_ekf::correction::{
-    FAR, FARTHEST, FILTER_INPUTS, LINEAR, NEW, NOVEL, OUTPUTS, PASSED_OVER, RATE_GAIN, TIME_CONSTANTS_S,
-};
+use ohmstrain_ekf::correction::{FAR, FILTER_INPUTS, LINEAR, NEW, NOVEL, OUTPUTS, TIME_CONSTANTS_S};
 use serde::Serialize;
 
 use super::literal::Literal;
@@ -22,9 +20,6 @@ pub struct CorrectionConstants {
     /// What low-passes forget in the usual time between readings, and the mean over it.
     decays: Vec<Literal>,
     mean_decays: Vec<Literal>,
-    rate_gain: Literal,
-    farthest: Literal,
-    passed_over: u8,
     rows: RowConstants,
     mean: Vec<Literal>,
     /// `None` for an input that never changes: infinite.
@@ -153,9 +148,6 @@ impl CorrectionConstants {
             time_constants_s: narrowed(&TIME_CONSTANTS_S),
             decays: decays.iter().map(|(decay, _)| Literal(*decay)).collect(),
             mean_decays: decays.iter().map(|(_, mean)| Literal(*mean)).collect(),
-            rate_gain: narrow(RATE_GAIN),
-            farthest: narrow(FARTHEST),
-            passed_over: PASSED_OVER,
             rows: RowConstants::new(&learned.rows),
             mean: scales.iter().map(|scale| narrow(scale.mean)).collect(),
             sd: scales.iter().map(|scale| Some(narrow(scale.sd)).filter(|sd| sd.0.is_finite())).collect(),

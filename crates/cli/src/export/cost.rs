@@ -49,11 +49,11 @@ struct OfKind {
 }
 
 const EKF: OfKind = OfKind {
-    step: 1150.0,
+    step: 1320.0,
     hypothesis: 0.0,
     branch: 385.0,
     curve: 80.0,
-    flash: 6800.0,
+    flash: 8500.0,
     flash_branch: 2510.0,
     stack: [890.0, 225.0, 0.0, 0.0],
 };
@@ -64,7 +64,7 @@ const SIGN_SPLIT: OfKind = OfKind {
     hypothesis: 3900.0,
     branch: 800.0,
     curve: 150.0,
-    flash: 13_300.0,
+    flash: 14_000.0,
     flash_branch: 6100.0,
     stack: [840.0, 191.0, 93.0, 56.0],
 };
@@ -73,7 +73,7 @@ const HISTORIES: OfKind = OfKind {
     hypothesis: 1750.0,
     branch: 740.0,
     curve: 1050.0,
-    flash: 13_700.0,
+    flash: 14_400.0,
     flash_branch: 2600.0,
     stack: [800.0, 154.0, 100.0, 49.0],
 };

@@ -1,4 +1,4 @@
-use ohmstrain_model::{Scalar, StrainRange};
+use ohmstrain_model::{Number, StrainRange};
 
 /// A Gaussian in one dimension.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -11,7 +11,7 @@ pub struct Gaussian<T> {
     pub variance: T,
 }
 
-impl<T: Scalar> Gaussian<T> {
+impl<T: Number> Gaussian<T> {
     /// The same Gaussian with its mean moved into a range.
     ///
     /// For reports: the moments of the restricted Gaussian are drawn off the limit, which at rest on a limit is a bias.

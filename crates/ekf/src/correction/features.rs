@@ -1,5 +1,5 @@
-use super::LowPass;
-use crate::Real;
+use super::Decay;
+use crate::Recordable;
 
 /// Number of features of the readings up to now.
 pub const FEATURES: usize = 7;
@@ -18,7 +18,7 @@ pub const FARTHEST: f64 = 3.0;
 
 /// How many readings in a row that surprise the filter are passed over: spikes. Where more do, the law is at fault, and what it is
 /// corrected by needs the readings most.
-pub const PASSED_OVER: u8 = 3;
+pub const PASSED_OVER: f64 = 3.0;
 
 /// The scale on which readings `R/R₀ - 1` are seen.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,12 +33,25 @@ pub struct FeatureScale<T> {
     pub starts: Starts<T>,
 }
 
+impl FeatureScale<f64> {
+    /// The same in another precision.
+    #[must_use]
+    pub fn to<T: Recordable>(&self) -> FeatureScale<T> {
+        FeatureScale {
+            centre: T::of(self.centre),
+            half_range: T::of(self.half_range),
+            rates: self.rates.map(T::of),
+            starts: self.starts.map(|line| line.map(T::of)),
+        }
+    }
+}
+
 /// Lines on which low-passes start.
 pub type Starts<T> = [[T; 2]; TIME_CONSTANTS_S.len()];
 
 /// All low-passes are at the first reading, as if it had been there for long.
 #[must_use]
-pub fn settled<T: Real>() -> Starts<T> {
+pub fn settled<T: Recordable>() -> Starts<T> {
     [[T::zero(), T::one()]; TIME_CONSTANTS_S.len()]
 }
 
@@ -49,53 +62,68 @@ pub fn settled<T: Real>() -> Starts<T> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ReadingFeatures<T> {
     scale: FeatureScale<T>,
-    low_passes: [LowPass<T>; TIME_CONSTANTS_S.len()],
+    pub(crate) low_passes: [T; TIME_CONSTANTS_S.len()],
     /// Time since the last reading.
-    waited_s: T,
+    pub(crate) waited_s: T,
     /// How many surprising readings have come in a row, [`PASSED_OVER`] at most.
-    surprises: u8,
+    pub(crate) surprises: T,
     /// Whether the last row had no reading, or one that was passed over.
-    waits: bool,
-    now: Option<[T; FEATURES]>,
+    pub(crate) waits: bool,
+    pub(crate) now: Option<[T; FEATURES]>,
 }
 
-impl<T: Real> ReadingFeatures<T> {
+impl<T: Recordable> ReadingFeatures<T> {
     /// Before the first reading.
     #[must_use]
     pub fn new(scale: FeatureScale<T>) -> Self {
-        let low_passes = TIME_CONSTANTS_S.map(|tau_s| LowPass::new(T::of(tau_s)));
-        Self { scale, low_passes, waited_s: T::zero(), surprises: 0, waits: false, now: None }
+        let low_passes = [T::zero(); TIME_CONSTANTS_S.len()];
+        Self { scale, low_passes, waited_s: T::zero(), surprises: T::zero(), waits: false, now: None }
     }
 
     /// Takes the reading `R/R₀ - 1` of a row `dt_s` seconds after the one before, at least zero; `None` if it is missing.
     /// Returns the features: `None` before the first reading.
     pub fn step(&mut self, dt_s: T, reading: Option<T>) -> Option<[T; FEATURES]> {
+        self.step_with(dt_s, reading, |waited_s| TIME_CONSTANTS_S.map(|tau_s| Decay::over(waited_s, T::of(tau_s))))
+    }
+
+    /// The same, where `decays` says what low-passes forget over a time, s.
+    pub fn step_with(
+        &mut self,
+        dt_s: T,
+        reading: Option<T>,
+        decays: impl FnOnce(T) -> [Decay<T>; TIME_CONSTANTS_S.len()],
+    ) -> Option<[T; FEATURES]> {
         self.waited_s += dt_s;
         self.waits = reading.is_none();
         if let Some(reading) = reading {
             let scaled = (reading - self.scale.centre) / self.scale.half_range;
             let scaled = scaled.max(-T::of(FARTHEST)).min(T::of(FARTHEST));
-            let waited_s = self.waited_s;
-            let low = if self.now.is_some() {
-                self.low_passes.each_mut().map(|low_pass| low_pass.next(waited_s, scaled))
+            if let Some([last, ..]) = self.now {
+                let all = self.low_passes.iter_mut().zip(decays(self.waited_s));
+                all.for_each(|(low_pass, decay)| *low_pass = decay.moved(*low_pass, last, scaled));
             } else {
-                let mut starts = self.scale.starts.into_iter();
-                let mut start = || starts.next().map_or(scaled, |[a, b]| a + b * scaled);
-                self.low_passes.each_mut().map(|low_pass| low_pass.start(scaled, start()))
-            };
+                let all = self.low_passes.iter_mut().zip(self.scale.starts);
+                all.for_each(|(low_pass, [a, b])| *low_pass = a + b * scaled);
+            }
             self.waited_s = T::zero();
-            self.now = Some(self.features(scaled, &low));
+            self.now = Some(self.features(scaled));
         }
         self.now
     }
 
     /// The same; a reading that surprises the filter is missing here, unless the [`PASSED_OVER`] readings before it did, too.
     pub fn step_unless(&mut self, surprises: bool, dt_s: T, reading: Option<T>) -> Option<[T; FEATURES]> {
-        let before = self.surprises;
-        if reading.is_some() {
-            self.surprises = if surprises { PASSED_OVER.min(before + 1) } else { 0 };
-        }
-        self.step(dt_s, reading.filter(|_| !surprises || before == PASSED_OVER))
+        let reading = self.unless(surprises, reading);
+        self.step(dt_s, reading)
+    }
+
+    /// What of a reading is for [`Self::step`]: one that surprises the filter is missing there, unless the [`PASSED_OVER`] readings
+    /// before it did, too.
+    pub fn unless(&mut self, surprises: bool, reading: Option<T>) -> Option<T> {
+        let (before, most) = (self.surprises, T::of(PASSED_OVER));
+        let reading = reading?;
+        self.surprises = if surprises { most.min(before + T::one()) } else { T::zero() };
+        if surprises && before < most { None } else { Some(reading) }
     }
 
     /// Whether the last row had no reading, or one that was passed over.
@@ -110,23 +138,24 @@ impl<T: Real> ReadingFeatures<T> {
         self.now
     }
 
-    fn features(&self, scaled: T, low: &[T; TIME_CONSTANTS_S.len()]) -> [T; FEATURES] {
+    fn features(&self, scaled: T) -> [T; FEATURES] {
+        let low = &self.low_passes;
         let [a, b, c, d] = FAR_FROM.map(|place| scaled - low[place]);
-        let [fast, slow] = RATES.map(|(sooner, later)| low[sooner] - low[later]);
+        let [fast, slow] = self.rates();
         let bounded = |rate: T, usual: T| (T::of(RATE_GAIN) * rate / usual).tanh();
         [scaled, a, b, c, d, bounded(fast, self.scale.rates[0]), bounded(slow, self.scale.rates[1])]
     }
 
     /// The low-passes at the last reading, in half ranges: what a calibration takes [`FeatureScale::starts`] from.
     #[must_use]
-    pub fn low_passes(&self) -> [T; TIME_CONSTANTS_S.len()] {
-        self.low_passes.each_ref().map(LowPass::value)
+    pub const fn low_passes(&self) -> [T; TIME_CONSTANTS_S.len()] {
+        self.low_passes
     }
 
     /// The two rates before they are bounded, in half ranges, of a row whose reading was the last: what a calibration
     /// takes [`FeatureScale::rates`] from.
     #[must_use]
     pub fn rates(&self) -> [T; 2] {
-        RATES.map(|(sooner, later)| self.low_passes[sooner].value() - self.low_passes[later].value())
+        RATES.map(|(sooner, later)| self.low_passes[sooner] - self.low_passes[later])
     }
 }

@@ -1,4 +1,4 @@
-use crate::Real;
+use crate::Recordable;
 
 /// Exponential low-pass, τ L′ = y − L, exact for readings that move linearly from one known reading to the next, however
 /// long the step. It starts settled on the first reading, unless it is told where.
@@ -9,7 +9,7 @@ pub struct LowPass<T> {
     value: T,
 }
 
-impl<T: Real> LowPass<T> {
+impl<T: Recordable> LowPass<T> {
     /// Before the first reading; the time constant, s, is positive.
     #[must_use]
     pub fn new(tau_s: T) -> Self {
@@ -28,24 +28,34 @@ impl<T: Real> LowPass<T> {
         self.value
     }
 
-    /// Takes the first reading, at which the low-pass is said to be at `value`, and returns that.
-    pub fn start(&mut self, reading: T, value: T) -> T {
-        (self.last, self.value) = (Some(reading), value);
-        value
-    }
-
     /// Takes a reading `dt_s` seconds after the one before, at least zero, and returns the low-pass at its time.
     pub fn next(&mut self, dt_s: T, reading: T) -> T {
-        self.value = match self.last {
-            None => reading,
-            Some(last) => {
-                let x = dt_s / self.tau_s;
-                // exp(-x), and its mean over the step.
-                let (decay, mean_decay) = ((-x).exp(), if x > T::zero() { -(-x).exp_m1() / x } else { T::one() });
-                decay * self.value + (mean_decay - decay) * last + (T::one() - mean_decay) * reading
-            }
-        };
+        self.value = self.last.map_or(reading, |last| Decay::over(dt_s, self.tau_s).moved(self.value, last, reading));
         self.last = Some(reading);
         self.value
+    }
+}
+
+/// What a low-pass forgets over a step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Decay<T> {
+    /// exp(-x), x the step in time constants.
+    pub end: T,
+    /// Its mean over the step.
+    pub mean: T,
+}
+
+impl<T: Recordable> Decay<T> {
+    /// Of a step, s, with a time constant, s.
+    #[must_use]
+    pub fn over(dt_s: T, tau_s: T) -> Self {
+        let x = dt_s / tau_s;
+        Self { end: (-x).exp(), mean: if x > T::zero() { -(-x).exp_m1() / x } else { T::one() } }
+    }
+
+    /// Where that takes a low-pass while readings go from one to the next.
+    #[must_use]
+    pub fn moved(self, low_pass: T, last: T, reading: T) -> T {
+        self.end * low_pass + (self.mean - self.end) * last + (T::one() - self.mean) * reading
     }
 }

@@ -24,12 +24,12 @@ mod triangle;
 
 use ohmstrain_model::StrainRange;
 
-use crate::kernel::{Falls, Several, Work};
-use crate::{Gaussian, Real};
+use crate::kernel::{Several, Work};
+use crate::{Gaussian, Real, Recordable};
 pub use features::{
     FARTHEST, FEATURES, FeatureScale, PASSED_OVER, RATE_GAIN, ReadingFeatures, Starts, TIME_CONSTANTS_S, settled,
 };
-pub use low_pass::LowPass;
+pub use low_pass::{Decay, LowPass};
 use process::{Kernels, Said};
 pub use process::{LINEAR, Process, kernel};
 pub use quadratic::Quadratic;
@@ -71,6 +71,16 @@ pub struct InputScale<T> {
     pub lower: T,
     /// Largest.
     pub upper: T,
+}
+
+impl<T: Recordable> InputScale<T> {
+    /// An input on this scale, moved into the range, and the square of how far it was outside.
+    #[inline(always)]
+    pub(crate) fn standardised(&self, input: T) -> (T, T) {
+        let inside = input.max(self.lower).min(self.upper);
+        let excess = (input - inside) / self.sd;
+        ((inside - self.mean) / self.sd, excess * excess)
+    }
 }
 
 /// A learned correction with D inputs: the filter's [`OUTPUTS`], then features of the readings, those of their future last.
@@ -158,31 +168,49 @@ impl<T: Real, const D: usize, const S: usize> Correction<'_, T, D, S> {
         let reading = x.get(OUTPUTS).copied().unwrap_or(T::zero());
         let mut kernels = Kernels::new(&of.process);
         of.rows.side_by_side(like, |rows| {
-            let mut distance = like.nothing();
+            let mut squares = [like.nothing(); D];
             for i in OUTPUTS..D {
-                distance += rows.squares(i, x[i]).scale(of.process.relevance[i]);
+                squares[i] = rows.squares(i, x[i]);
             }
-            kernels.add(&of.process, distance, rows.column(OUTPUTS).scale(reading), rows.count);
+            let kernel = of.process.kernels(&squares, OUTPUTS, rows.column(OUTPUTS).scale(reading));
+            kernels.add(&of.process, kernel, rows.count);
         });
         let said = kernels.said(like, &of.process, reading);
         self.widened(said, &of.process, of.process.distance(&outside, OUTPUTS), T::zero())
     }
+}
+
+impl<T: Recordable, const D: usize, const S: usize> Correction<'_, T, D, S> {
+    /// What filter and residual process say together, and how little the inputs resemble the training rows.
+    pub(crate) fn of_residual(&self, said: Said<T>, outside: T, filtered: T) -> (Gaussian<T>, T) {
+        let novelty = T::one() - (T::one() - said.unknown) * (-outside / T::of(NEW)).falling();
+        (self.widened(said, &self.residual, outside, filtered), novelty)
+    }
+
+    /// The residual process beside a filter: it knows no more than that one where nothing is known.
+    pub(crate) fn residual_beside(&self, filtered: Gaussian<T>) -> Process<'_, T, D> {
+        Process { least_variance: self.residual.least_variance.max(filtered.variance), ..self.residual }
+    }
+
+    /// What voices say that were mixed.
+    pub(crate) fn learned(&self, mixed: Gaussian<T>, novelty: T, birge: T) -> Gaussian<T> {
+        let variance = mixed.variance * self.variance_factor + T::of(NOVEL) * self.strain_variance * novelty;
+        let anywhere = self.limits.variance_of_anywhere();
+        Gaussian { mean: mixed.mean, variance: (variance * birge).min(anywhere).max(variance) }
+    }
 
     /// A process' strain on top of `base`, within the limits, with all that its variance gets.
-    fn widened(&self, said: Said<T>, process: &Process<'_, T, D>, outside: T, base: T) -> Gaussian<T> {
+    pub(crate) fn widened(&self, said: Said<T>, process: &Process<'_, T, D>, outside: T, base: T) -> Gaussian<T> {
         let variance = said.strain.variance * process.widening + T::of(FAR) * self.strain_variance * outside;
         Gaussian { mean: self.limits.clamp(base + said.strain.mean), variance }
     }
 }
 
 #[inline(always)]
-fn standardised<T: Real, const D: usize>(scales: &[InputScale<T>; D], inputs: &[T; D]) -> Standardised<T, D> {
+fn standardised<T: Recordable, const D: usize>(scales: &[InputScale<T>; D], inputs: &[T; D]) -> Standardised<T, D> {
     let (mut x, mut outside) = ([T::zero(); D], [T::zero(); D]);
     for ((x, outside), (input, scale)) in x.iter_mut().zip(&mut outside).zip(inputs.iter().zip(scales)) {
-        let inside = input.max(scale.lower).min(scale.upper);
-        *x = (inside - scale.mean) / scale.sd;
-        let excess = (*input - inside) / scale.sd;
-        *outside = excess * excess;
+        (*x, *outside) = scale.standardised(*input);
     }
     Standardised { inputs: x, outside }
 }
@@ -205,31 +233,21 @@ impl<T: Real, const D: usize, const S: usize> Work<T> for Correcting<'_, T, D, S
         let Standardised { inputs: x, outside } = standardised(of.scales, inputs);
         let (mut direct, mut residual) = (Kernels::new(&of.direct), Kernels::new(&of.residual));
         let mut sides = of.one_sided.each_ref().map(Kernels::new);
-        let of_residual = Process { least_variance: of.residual.least_variance.max(filtered.variance), ..of.residual };
+        let of_residual = of.residual_beside(filtered);
         let (reading, strain) = (x.get(OUTPUTS).copied().unwrap_or(T::zero()), x[0]);
         of.rows.side_by_side(like, |rows| {
-            let (mut to_direct, mut to_residual, mut to_sides) = (like.nothing(), like.nothing(), [like.nothing(); S]);
             let mut squares = [like.nothing(); D];
             for i in 0..D {
                 squares[i] = rows.squares(i, x[i]);
             }
-            for i in OUTPUTS..D {
-                to_direct += squares[i].scale(of.direct.relevance[i]);
-            }
-            for i in 0..D {
-                to_residual += squares[i].scale(of.residual.relevance[i]);
-            }
-            for k in 0..S {
-                for i in OUTPUTS..D {
-                    to_sides[k] += squares[i].scale(of.one_sided[k].relevance[i]);
-                }
-            }
             let readings = rows.column(OUTPUTS).scale(reading);
-            direct.add(&of.direct, to_direct, readings, rows.count);
+            direct.add(&of.direct, of.direct.kernels(&squares, OUTPUTS, readings), rows.count);
             for k in 0..S {
-                sides[k].add(&of.one_sided[k], to_sides[k], readings, rows.count);
+                let side = &of.one_sided[k];
+                sides[k].add(side, side.kernels(&squares, OUTPUTS, readings), rows.count);
             }
-            residual.add(&of.residual, to_residual, rows.column(0).scale(strain), rows.count);
+            let kernel = of.residual.kernels(&squares, 0, rows.column(0).scale(strain));
+            residual.add(&of.residual, kernel, rows.count);
         });
         let of_readings = |kernels: Kernels<T>, process| {
             let said = kernels.said(like, process, reading);
@@ -239,17 +257,13 @@ impl<T: Real, const D: usize, const S: usize> Work<T> for Correcting<'_, T, D, S
         let mut of_sides = of.one_sided.iter();
         let one_sided = sides.map(|kernels| of_sides.next().map_or(direct, |process| of_readings(kernels, process)));
         let said = residual.said(like, &of_residual, strain);
-        let outside = of.residual.distance(&outside, 0);
-        let novelty = T::one() - (T::one() - said.unknown) * (-outside / T::of(NEW)).falling();
-        let residual = of.widened(said, &of.residual, outside, filtered.mean);
+        let (residual, novelty) = of.of_residual(said, of.residual.distance(&outside, 0), filtered.mean);
         let mixed = if of.consensus {
             consensus(direct, residual, one_sided)
         } else {
             mixture([direct, residual].into_iter().chain(one_sided))
         };
-        let variance = mixed.variance * of.variance_factor + T::of(NOVEL) * of.strain_variance * novelty;
-        let anywhere = of.limits.variance_of_anywhere();
-        let learned = Gaussian { mean: mixed.mean, variance: (variance * birge).min(anywhere).max(variance) };
+        let learned = of.learned(mixed, novelty, birge);
         let simulated = of.simulated.map(|simulated| of.of_simulated(like, inputs, &simulated));
         let strain = simulated.map_or(learned, |simulated| mixture([learned, simulated]));
         Corrected { strain, direct, one_sided, residual, simulated, novelty }
@@ -285,15 +299,15 @@ pub fn consensus<T: Real, const S: usize>(
 /// variance that is due to independent voices, since several may be wrong together, and the surest is the least so. One that is
 /// exact is all that counts; nothing mixed is exactly zero.
 #[must_use]
-pub fn mixture<T: Real>(voices: impl IntoIterator<Item = Gaussian<T>, IntoIter: Clone>) -> Gaussian<T> {
+pub fn mixture<T: Recordable>(voices: impl IntoIterator<Item = Gaussian<T>, IntoIter: Clone>) -> Gaussian<T> {
     let voices = voices.into_iter();
     let none = Gaussian { mean: T::zero(), variance: T::zero() };
-    let surest = voices.clone().reduce(|a, b| if b.variance < a.variance { b } else { a }).unwrap_or(none);
-    if surest.variance <= T::zero() {
-        return surest;
+    let least = voices.clone().map(|voice| voice.variance).reduce(T::min).unwrap_or(T::zero());
+    if least <= T::zero() {
+        return voices.reduce(|a, b| if b.variance < a.variance { b } else { a }).unwrap_or(none);
     }
     let weighted = |voice: Gaussian<T>| {
-        let ratio = surest.variance / voice.variance;
+        let ratio = least / voice.variance;
         (ratio * ratio.sqrt(), voice)
     };
     let weighted = voices.map(weighted);

@@ -1,6 +1,6 @@
 use super::{INDUCING, Triangle};
 use crate::kernel::{Falls, MOST_LANES, Several};
-use crate::{Gaussian, Real};
+use crate::{Gaussian, Real, Recordable};
 
 /// Weight of the linear part of the kernel, relative to the squared exponential.
 pub const LINEAR: f64 = 0.09;
@@ -31,17 +31,38 @@ pub struct Process<'a, T, const D: usize> {
     pub least_variance: T,
 }
 
-impl<T: Real, const D: usize> Process<'_, T, D> {
+impl<T: Recordable, const D: usize> Process<'_, T, D> {
     /// Of squares in each input the sum, by relevance; one in the input `first` counts as one.
-    pub(super) fn distance(&self, squares: &[T; D], first: usize) -> T {
+    pub(crate) fn distance(&self, squares: &[T; D], first: usize) -> T {
         let sum = squares.iter().zip(&self.relevance).fold(T::zero(), |sum, (square, by)| sum + *square * *by);
         self.relevance.get(first).map_or(sum, |first| sum / *first)
+    }
+
+    /// What the process says, of the weighted sum of all kernels and of what those of the inducing rows explain; `first` is the first input.
+    pub(crate) fn said(&self, mean: T, explained: T, first: T) -> Said<T> {
+        let prior = T::one() + linear(first * first);
+        let unknown = ((prior - explained) / prior).max(T::zero()).min(T::one());
+        let latent = (prior * self.variance).max(self.least_variance) * unknown;
+        Said { strain: Gaussian { mean, variance: latent + self.noise }, unknown }
+    }
+}
+
+impl<T: Real, const D: usize> Process<'_, T, D> {
+    /// Kernels with rows, of the squares of how far they are, from the first input that the process sees on, and of the product of
+    /// that one.
+    #[inline(always)]
+    pub(crate) fn kernels<V: Falls<Number = T>>(&self, squares: &[V; D], first: usize, product: V) -> V {
+        let mut distance = product.nothing();
+        for i in first..D {
+            distance += squares[i].scale(self.relevance[i]);
+        }
+        (-distance).falling() + (product + product.literal(1.0)).scale(T::of(LINEAR))
     }
 }
 
 /// What a process says at one input.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Said<T> {
+pub(crate) struct Said<T> {
     pub strain: Gaussian<T>,
     /// Share of the prior variance that the training rows leave, 0 to 1.
     pub unknown: T,
@@ -63,17 +84,14 @@ impl<T: Real> Kernels<T> {
         Self { mean: process.mean, inducing: [T::zero(); ROOM], rows: 0 }
     }
 
-    /// Adds the next training rows, `count` of which there are, with their distances by relevance and the product of the first
-    /// inputs.
+    /// Adds the kernels of the next training rows, `count` of which there are.
     #[inline(always)]
     pub(super) fn add<V: Several<Number = T>, const D: usize>(
         &mut self,
         process: &Process<'_, T, D>,
-        distance: V,
-        product: V,
+        kernel: V,
         count: usize,
     ) {
-        let kernel = (-distance).falling() + (product + product.literal(1.0)).scale(T::of(LINEAR));
         let weights = process.weights.get(self.rows..self.rows + count).unwrap_or(&[]);
         let weighted = kernel.first_of(weights) * kernel;
         // One after the other: the same sum whatever the lanes.
@@ -94,10 +112,7 @@ impl<T: Real> Kernels<T> {
         process: &Process<'_, T, D>,
         first: T,
     ) -> Said<T> {
-        let prior = T::one() + linear(first * first);
-        let unknown = ((prior - process.explained.square(like, &self.inducing)) / prior).max(T::zero()).min(T::one());
-        let latent = (prior * process.variance).max(process.least_variance) * unknown;
-        Said { strain: Gaussian { mean: self.mean, variance: latent + process.noise }, unknown }
+        process.said(self.mean, process.explained.square(like, &self.inducing), first)
     }
 }
 
@@ -107,6 +122,6 @@ pub fn kernel<T: Real>(sum: T, product: T) -> T {
     (-sum).exp() + linear(product)
 }
 
-fn linear<T: Real>(product: T) -> T {
+fn linear<T: Recordable>(product: T) -> T {
     T::of(LINEAR) * (product + T::one())
 }

@@ -1,4 +1,4 @@
-use crate::Real;
+use crate::Recordable;
 
 /// `Σ (lᵢ + Σⱼ≤ᵢ qᵢⱼ xⱼ) xᵢ` of standardised inputs: most of what a smooth Gaussian process says, at little cost.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -9,7 +9,7 @@ pub struct Quadratic<'a, T> {
     pub square: &'a [T],
 }
 
-impl<T: Real> Quadratic<'_, T> {
+impl<T: Recordable> Quadratic<'_, T> {
     /// Its value, added in the order of the inputs.
     #[must_use]
     pub fn value(&self, x: &[T]) -> T {

@@ -11,7 +11,7 @@ pub struct Triangle<'a, T> {
     side: usize,
 }
 
-impl<'a, T: Scalar> Triangle<'a, T> {
+impl<'a, T> Triangle<'a, T> {
     /// A matrix without rows.
     pub const NONE: Self = Self { columns: &[], side: 0 };
 
@@ -26,7 +26,9 @@ impl<'a, T: Scalar> Triangle<'a, T> {
     pub const fn side(&self) -> usize {
         self.side
     }
+}
 
+impl<T: Scalar> Triangle<'_, T> {
     /// |W k|², of as many numbers k as there are columns. Each row is added up column by column, squares row by row: the same sums
     /// whatever the lanes.
     #[inline(always)]

@@ -37,5 +37,5 @@ pub(crate) use sparse::MOST_TRIES;
 pub use sparse::SparseEkf;
 pub(crate) use switch::RateSpread;
 pub use switch::{Compact, CompactWidth, Logistic, Switch, Undirected};
-pub use tail::Real;
+pub use tail::{Real, Recordable};
 pub(crate) use update::{Compared, ReadingLaw, refusal};

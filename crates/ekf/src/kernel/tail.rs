@@ -1,7 +1,7 @@
 //! Tails of the normal distribution, each from one exponential and one division of polynomials.
 #![allow(clippy::excessive_precision, reason = "coefficients as they were published")]
 
-use ohmstrain_model::Scalar;
+use ohmstrain_model::{Number, Scalar};
 
 use super::{Falls, InVectors, Lanes};
 use crate::Gaussian;
@@ -12,6 +12,13 @@ pub trait Real: Scalar + InVectors {}
 
 impl Real for f32 {}
 impl Real for f64 {}
+
+/// A [`Real`], or an expression that stands for one and writes down what is done with it (feature `record`): what is computed number by
+/// number, around the kernel.
+#[allow(private_bounds, reason = "sealed: what there are exponentials for")]
+pub trait Recordable: Number + Falls {}
+
+impl<T: Real> Recordable for T {}
 
 /// What is above a border: its probability, and the density at the border over it (the hazard, the inverse of Mills' ratio).
 pub(crate) struct Tail<T> {

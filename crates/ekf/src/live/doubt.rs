@@ -1,8 +1,7 @@
 //! When an interval is wider than the filter says, in any precision.
 
 use super::{Flag, Flags, Innovations, NEVER_READ_S, RestSeen, RestWatch, SURPRISING_NIS, Unread};
-use crate::kernel::Falls;
-use crate::{Gaussian, Real};
+use crate::{Gaussian, Recordable};
 
 /// The numbers behind the widened intervals, also for programs that write a filter in another language.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -64,7 +63,7 @@ pub struct DoubtParts<T> {
 impl DoubtParts<f64> {
     /// The same in another precision.
     #[must_use]
-    pub fn to<T: Real>(&self) -> DoubtParts<T> {
+    pub fn to<T: Recordable>(&self) -> DoubtParts<T> {
         DoubtParts {
             low: T::of(self.low),
             high: T::of(self.high),
@@ -89,7 +88,7 @@ struct Left<T> {
     soon: T,
 }
 
-impl<T: Real> Left<T> {
+impl<T: Recordable> Left<T> {
     fn after(passed_s: T) -> Self {
         let far = (-passed_s / T::of(DOUBT.far_fades_s)).falling();
         let lately = far * far * far;
@@ -100,14 +99,14 @@ impl<T: Real> Left<T> {
 
 /// How ill the sensor's law has fitted lately.
 #[derive(Clone, Copy, Debug)]
-struct Misfit<T> {
+pub(crate) struct Misfit<T> {
     /// How far readings have been outside of calibration's on the side of rest, and on the other one, R/R₀ - 1, fading.
-    near: T,
-    far: T,
-    innovations: Innovations<T>,
+    pub(crate) near: T,
+    pub(crate) far: T,
+    pub(crate) innovations: Innovations<T>,
 }
 
-impl<T: Real> Misfit<T> {
+impl<T: Recordable> Misfit<T> {
     /// Takes a reading R/R₀ - 1 and its normalised innovation squared.
     fn see(&mut self, parts: &DoubtParts<T>, left: &Left<T>, reading: T, nis: T) {
         let DoubtParts { low, high, .. } = *parts;
@@ -161,26 +160,26 @@ impl<T: Real> Misfit<T> {
 #[derive(Clone, Copy, Debug)]
 pub struct Doubts<T> {
     parts: DoubtParts<T>,
-    runs: bool,
-    starts: bool,
+    pub(crate) runs: bool,
+    pub(crate) starts: bool,
     /// Time since the first row, s.
-    run_s: T,
+    pub(crate) run_s: T,
     /// Variance of the strain that fades while readings are believed.
-    fading: T,
+    pub(crate) fading: T,
     /// For how long there has been no reading, s.
-    unread_s: T,
+    pub(crate) unread_s: T,
     /// The strain's variance where readings have not been believed since.
-    lost: Option<T>,
+    pub(crate) lost: Option<T>,
     /// The last reading that was believed, R/R₀ - 1.
-    believed: Option<T>,
-    misfit: Misfit<T>,
+    pub(crate) believed: Option<T>,
+    pub(crate) misfit: Misfit<T>,
     /// Whether the strain's variance knows of innovations that are larger than stated.
     corrected: bool,
     /// Whether R₀ is calibration's; none where that one does not know what the sensor reads at rest.
-    rest: Option<RestWatch<T>>,
+    pub(crate) rest: Option<RestWatch<T>>,
 }
 
-impl<T: Real> Doubts<T> {
+impl<T: Recordable> Doubts<T> {
     /// Before the first row.
     #[must_use]
     pub fn new(parts: DoubtParts<T>) -> Self {
@@ -246,21 +245,39 @@ impl<T: Real> Doubts<T> {
     /// A row has passed, with a reading that was used, R/R₀ - 1, and its normalised innovation squared, or without; the variance
     /// of the strain that is stated, or what a pause of the readings leaves open.
     pub fn see(&mut self, dt_s: T, reading: Option<(T, T)>, stated: Gaussian<T>) -> T {
+        let passed_s = self.pass(dt_s);
+        let Some((rho, nis)) = reading else { return self.pause(passed_s, stated) };
+        self.read(passed_s, rho, nis);
+        stated.variance
+    }
+
+    /// A row has come, `dt_s` seconds after the one before: how much time has passed since the first row was there.
+    pub fn pass(&mut self, dt_s: T) -> T {
         let passed_s = if self.runs { dt_s } else { T::zero() };
         self.runs = true;
         self.run_s += passed_s;
-        self.unread_s = if reading.is_some() { T::zero() } else { self.unread_s + passed_s };
-        let Some((rho, nis)) = reading else {
-            let variance = self.parts.unread.variance(self.unread_s, stated.mean, stated.variance);
-            let widest = variance.max(stated.variance);
-            self.lost = Some(self.lost.map_or(widest, |lost| lost.max(widest)));
-            return variance;
-        };
+        passed_s
+    }
+
+    /// It has no reading: the variance of the strain that this leaves open.
+    pub fn pause(&mut self, passed_s: T, stated: Gaussian<T>) -> T {
+        self.unread_s += passed_s;
+        let variance = self.parts.unread.variance(self.unread_s, stated.mean, stated.variance);
+        let widest = variance.max(stated.variance);
+        self.lost = Some(self.lost.map_or(widest, |lost| lost.max(widest)));
+        variance
+    }
+
+    /// It has one that was used.
+    pub fn read(&mut self, passed_s: T, rho: T, nis: T) {
+        self.unread_s = T::zero();
         let (surprising, left) = (T::of(SURPRISING_NIS), Left::after(passed_s));
         if nis > surprising {
-            let jump = self.believed.map_or(T::zero(), |last| (rho - last) * self.parts.per_reading);
-            let doubt = (T::one() - (surprising / nis).sqrt()) * jump;
-            self.raise(doubt * doubt);
+            if let Some(last) = self.believed {
+                let jump = (rho - last) * self.parts.per_reading;
+                let doubt = (T::one() - (surprising / nis).sqrt()) * jump;
+                self.raise(doubt * doubt);
+            }
         } else {
             self.fading *= left.soon;
             if let Some(lost) = self.lost.take() {
@@ -269,7 +286,6 @@ impl<T: Real> Doubts<T> {
             self.believed = Some(rho);
         }
         self.judge(&left, passed_s, rho, nis);
-        stated.variance
     }
 
     /// The same on a smoother's way back, which knows no start and nothing that fades: `run_s` after the first row, `dt_s`

@@ -1,12 +1,12 @@
-use crate::Real;
+use crate::Recordable;
 
 /// How much larger a filter's innovations have been of late than it states them: the mean of their normalised squares.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Innovations<T> {
-    mean: T,
+    pub(crate) mean: T,
 }
 
-impl<T: Real> Innovations<T> {
+impl<T: Recordable> Innovations<T> {
     /// For how long they count, s: after so long 37 % of the mean are left.
     pub const LAST_S: f64 = 20.0;
     /// As much as a normalised innovation squared counts: one alone is an outlier, not a law that does not fit.

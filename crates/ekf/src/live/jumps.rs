@@ -1,11 +1,11 @@
-use crate::Real;
+use crate::Recordable;
 
 /// Normalised innovation squared above which a reading surprises: three standard deviations.
 pub const SURPRISING_NIS: f64 = 9.0;
 /// The same of one that startles: five standard deviations.
 pub const STARTLING_NIS: f64 = 25.0;
 /// After so many startling readings in a row a filter looks again.
-pub const BESIDE_AFTER: u32 = 2;
+pub const BESIDE_AFTER: f64 = 2.0;
 /// How much of the weight then has what it knew before any reading.
 pub const BESIDE_SHARE: f64 = 0.1;
 
@@ -14,25 +14,25 @@ pub const BESIDE_SHARE: f64 = 0.1;
 #[derive(Clone, Copy, Debug)]
 pub struct Jumps<T> {
     /// Readings in a row that startled; those that were kept from the filter do not count.
-    startling: u32,
+    pub(crate) startling: T,
     /// The last one that did not surprise.
-    calm: Option<T>,
+    pub(crate) calm: Option<T>,
 }
 
-impl<T: Real> Jumps<T> {
+impl<T: Recordable> Jumps<T> {
     /// Before any reading.
     #[must_use]
-    pub const fn none() -> Self {
-        Self { startling: 0, calm: None }
+    pub fn none() -> Self {
+        Self { startling: T::zero(), calm: None }
     }
 
     /// Takes a reading that the filter has used, and its normalised innovation squared; how far readings have jumped, where the
     /// filter is to look again: two in a row startle, farther than `jump` from the last that did not surprise.
     pub fn see(&mut self, reading: T, nis: T, jump: T) -> Option<T> {
-        self.startling = if nis > T::of(STARTLING_NIS) { self.startling.saturating_add(1) } else { 0 };
+        self.startling = if nis > T::of(STARTLING_NIS) { self.startling + T::one() } else { T::zero() };
         let from_calm = self.calm.map(|calm| reading - calm);
         self.calm = if nis > T::of(SURPRISING_NIS) { self.calm } else { Some(reading) };
-        from_calm.filter(|moved| self.startling == BESIDE_AFTER && moved.abs() > jump)
+        from_calm.filter(|moved| self.startling == T::of(BESIDE_AFTER) && moved.abs() > jump)
     }
 }
 

@@ -1,6 +1,6 @@
 //! R₀ of the day, as far as readings alone tell it, in any precision.
 
-use crate::{Reading, Real};
+use crate::{Reading, Recordable};
 
 /// The numbers behind an R₀ that follows the readings, also for programs that write a filter in another language.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,7 +39,7 @@ pub struct RestBounds<T> {
 impl RestBounds<f64> {
     /// The same in another precision.
     #[must_use]
-    pub fn to<T: Real>(&self) -> RestBounds<T> {
+    pub fn to<T: Recordable>(&self) -> RestBounds<T> {
         RestBounds { low: self.low.map(T::of), high: self.high.map(T::of) }
     }
 }
@@ -64,15 +64,15 @@ impl RestBounds<f64> {
 pub struct RestFollower<T> {
     bounds: RestBounds<T>,
     /// By what share of calibration's R₀ it is another.
-    off: T,
+    pub(crate) off: T,
     /// The last reading, none before the first one, and the time since it came, s.
-    last: Option<T>,
-    since_s: T,
+    pub(crate) last: Option<T>,
+    pub(crate) since_s: T,
     /// What `off` was where readings last jumped, and how long ago that was, s, in rows that were read.
-    jumped: Option<(T, T)>,
+    pub(crate) jumped: Option<[T; 2]>,
 }
 
-impl<T: Real> RestFollower<T> {
+impl<T: Recordable> RestFollower<T> {
     /// Before any reading, R₀ is calibration's.
     ///
     /// ```
@@ -120,7 +120,7 @@ impl<T: Real> RestFollower<T> {
     /// assert!((follower.off() - 0.2 * 2.0 / 42.0).abs() < 1e-12);
     /// ```
     pub fn see(&mut self, dt_s: T, reading: T) {
-        self.jumped.iter_mut().for_each(|(_, ago_s)| *ago_s += dt_s);
+        self.jumped.iter_mut().for_each(|[_, ago_s]| *ago_s += dt_s);
         self.draw(T::of(FOLLOWING.leaves_s), dt_s, reading);
     }
 
@@ -139,10 +139,10 @@ impl<T: Real> RestFollower<T> {
     /// assert_eq!(follower.off(), before);
     /// ```
     pub fn jumped(&mut self, jump: T) {
-        match self.jumped.filter(|&(_, ago_s)| ago_s <= T::of(FOLLOWING.fault_s)) {
-            Some((before, _)) if jump * (self.off - before) < T::zero() => self.off = before,
+        match self.jumped.filter(|&[_, ago_s]| ago_s <= T::of(FOLLOWING.fault_s)) {
+            Some([before, _]) if jump * (self.off - before) < T::zero() => self.off = before,
             Some(_) => {}
-            None => self.jumped = Some((self.off, T::zero())),
+            None => self.jumped = Some([self.off, T::zero()]),
         }
     }
 

@@ -1,6 +1,6 @@
 //! Whether the sensor still rests where it rested in calibration.
 
-use crate::Real;
+use crate::Recordable;
 
 /// What calibration has seen of the sensor at rest, as R/R₀ - 1: for programs that write a filter in another language.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -20,7 +20,7 @@ pub struct RestSeen<T> {
 impl RestSeen<f64> {
     /// The same in another precision.
     #[must_use]
-    pub fn to<T: Real>(&self) -> RestSeen<T> {
+    pub fn to<T: Recordable>(&self) -> RestSeen<T> {
         RestSeen {
             rested: T::of(self.rested),
             tolerance: T::of(self.tolerance),
@@ -38,17 +38,17 @@ impl RestSeen<f64> {
 pub struct RestWatch<T> {
     seen: RestSeen<T>,
     /// Whether the next reading is one at rest.
-    rests: bool,
+    pub(crate) rests: bool,
     /// For how long readings have been beyond those at rest, and near them, s.
-    beyond_s: T,
-    near_s: T,
+    pub(crate) beyond_s: T,
+    pub(crate) near_s: T,
     /// How far they have been beyond all that time.
-    least: T,
+    pub(crate) least: T,
     /// How far R₀ is off, as a share of it.
-    off: T,
+    pub(crate) off: T,
 }
 
-impl<T: Real> RestWatch<T> {
+impl<T: Recordable> RestWatch<T> {
     /// Before any reading; `rests` if the sensor is known to rest then.
     ///
     /// ```

@@ -1,5 +1,5 @@
 use super::Protections;
-use crate::{Reading, ReadingVerdict, Real};
+use crate::{Reading, ReadingVerdict, Recordable};
 
 /// What a reading must be for a filter to see it at all, and what is made of one that comes again and again.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,7 +17,7 @@ pub struct Sieve<T> {
 impl Sieve<f64> {
     /// The same in another precision.
     #[must_use]
-    pub fn to<T: Real>(&self) -> Sieve<T> {
+    pub fn to<T: Recordable>(&self) -> Sieve<T> {
         Sieve {
             plausible: (T::of(self.plausible.0), T::of(self.plausible.1)),
             longest_repeat_s: T::of(self.longest_repeat_s),
@@ -30,7 +30,7 @@ impl Sieve<f64> {
 /// How often a number must have come again to be stuck.
 pub const MOST_REPEATS: u32 = 10;
 
-impl<T: Real> Sieve<T> {
+impl<T: Recordable> Sieve<T> {
     /// Lets everything pass.
     #[must_use]
     pub fn open() -> Self {
@@ -60,7 +60,7 @@ impl<T: Real> Sieve<T> {
 
 /// The share of a reading's information that is new `since_s` seconds after another one, if errors are alike over
 /// `error_time_s`: 1 - exp(-t/T), at least as much as rounding leaves.
-pub fn news<T: Real>(since_s: T, error_time_s: T) -> T {
+pub fn news<T: Recordable>(since_s: T, error_time_s: T) -> T {
     if error_time_s > T::zero() {
         let own = -(-since_s / error_time_s).exp_m1();
         own.max(T::of(f64::from(f32::EPSILON)))
@@ -72,14 +72,14 @@ pub fn news<T: Real>(since_s: T, error_time_s: T) -> T {
 /// The last reading, how long ago it came, and how long the same number has been coming.
 #[derive(Clone, Copy, Debug)]
 pub struct Repeats<T> {
-    last: Option<T>,
-    since_s: T,
-    repeated_s: T,
+    pub(crate) last: Option<T>,
+    pub(crate) since_s: T,
+    pub(crate) repeated_s: T,
     /// How often it has come again.
-    count: T,
+    pub(crate) count: T,
 }
 
-impl<T: Real> Repeats<T> {
+impl<T: Recordable> Repeats<T> {
     /// Before any reading.
     #[must_use]
     pub fn none() -> Self {

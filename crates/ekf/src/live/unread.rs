@@ -2,7 +2,7 @@
 
 use ohmstrain_model::StrainRange;
 
-use crate::Real;
+use crate::Recordable;
 
 /// How far a body can have moved since it was last read.
 ///
@@ -27,7 +27,7 @@ pub struct Unread<T> {
 /// Since when, s, nothing has been read before the first reading of all.
 pub const NEVER_READ_S: f64 = 1e9;
 
-impl<T: Real> Unread<T> {
+impl<T: Recordable> Unread<T> {
     /// Of a motion whose rate lasts for `rate_time_s`, with a standard deviation, 1/s.
     ///
     /// ```
@@ -63,7 +63,7 @@ impl<T: Real> Unread<T> {
 impl Unread<f64> {
     /// The same in another precision.
     #[must_use]
-    pub fn to<T: Real>(&self) -> Unread<T> {
+    pub fn to<T: Recordable>(&self) -> Unread<T> {
         Unread {
             rate_time_s: T::of(self.rate_time_s),
             path_variance: T::of(self.path_variance),

@@ -1,7 +1,11 @@
 use core::cell::RefCell;
-use core::ops::{Add, AddAssign, Mul, MulAssign, Neg, Sub, SubAssign};
+use core::cmp::Ordering;
+use core::ops::{Add, AddAssign, Div, Mul, MulAssign, Neg, Sub, SubAssign};
 use std::vec::Vec;
 
+use ohmstrain_model::Number;
+
+use crate::Recordable;
 use crate::kernel::tail::Tail;
 use crate::kernel::{Falls, Lanes};
 
@@ -13,6 +17,8 @@ pub type Place = usize;
 pub enum Operation {
     /// The input of this number.
     Input(usize),
+    /// The input of this number, a truth.
+    Flag(usize),
     /// A constant.
     Constant(f32),
     /// A sum.
@@ -25,10 +31,16 @@ pub enum Operation {
     Divide(Place, Place),
     /// The number with its sign turned.
     Negate(Place),
+    /// The number without its sign.
+    Absolute(Place),
     /// A square root.
     Root(Place),
     /// An exponential.
     Exponential(Place),
+    /// An exponential, less one.
+    ExponentialLessOne(Place),
+    /// A hyperbolic tangent.
+    Tangent(Place),
     /// An exponential of what is not above zero.
     Falling(Place),
     /// The number with its bits shifted to where an exponent stands.
@@ -39,6 +51,10 @@ pub enum Operation {
     Hazard(Place),
     /// Whether the first is less than the second.
     Less(Place, Place),
+    /// Whether the first is not more than the second.
+    AtMost(Place, Place),
+    /// Whether both are the same number.
+    Equal(Place, Place),
     /// Whether a number is zero or more; not if it is not a number.
     NotNegative(Place),
     /// Whether a number is finite.
@@ -56,13 +72,34 @@ pub enum Operation {
 }
 
 impl Operation {
+    /// Whether it is true or false, and no number.
+    #[must_use]
+    pub const fn is_truth(self) -> bool {
+        matches!(
+            self,
+            Self::Flag(_)
+                | Self::Less(..)
+                | Self::AtMost(..)
+                | Self::Equal(..)
+                | Self::NotNegative(_)
+                | Self::Finite(_)
+                | Self::Both(..)
+                | Self::Either(..)
+                | Self::Not(_)
+                | Self::Known(_)
+        )
+    }
+
     /// The places of what it takes.
     pub fn operands(self) -> impl Iterator<Item = Place> {
         let (a, b, c) = match self {
-            Self::Input(_) | Self::Constant(_) | Self::Known(_) => (None, None, None),
+            Self::Input(_) | Self::Flag(_) | Self::Constant(_) | Self::Known(_) => (None, None, None),
             Self::Negate(a)
+            | Self::Absolute(a)
             | Self::Root(a)
             | Self::Exponential(a)
+            | Self::ExponentialLessOne(a)
+            | Self::Tangent(a)
             | Self::Falling(a)
             | Self::ToExponent(a)
             | Self::Tail(a)
@@ -75,6 +112,8 @@ impl Operation {
             | Self::Multiply(a, b)
             | Self::Divide(a, b)
             | Self::Less(a, b)
+            | Self::AtMost(a, b)
+            | Self::Equal(a, b)
             | Self::Both(a, b)
             | Self::Either(a, b) => (Some(a), Some(b), None),
             Self::Pick(a, b, c) => (Some(a), Some(b), Some(c)),
@@ -92,17 +131,24 @@ pub struct Recorded {
     pub results: Vec<Place>,
 }
 
-/// Operations as they come.
+/// Operations as they come, and the ways that comparisons choose.
 #[derive(Default)]
 pub(super) struct Tape {
     operations: RefCell<Vec<Operation>>,
+    /// What has been asked on this way, and what was answered; answers that are given before are taken in turn.
+    asked: RefCell<Vec<Place>>,
+    answers: RefCell<Vec<bool>>,
 }
 
-/// A number, or a truth, that is known when the recorded function runs.
+/// A number that is known when the recorded function runs, or one of the source text.
 #[derive(Clone, Copy)]
-pub(super) struct Expression<'a> {
-    tape: &'a Tape,
-    place: Place,
+pub struct Expression<'a>(Kind<'a>);
+
+#[derive(Clone, Copy)]
+enum Kind<'a> {
+    /// Of no tape yet.
+    Literal(f32),
+    On(&'a Tape, Place),
 }
 
 impl Tape {
@@ -110,14 +156,19 @@ impl Tape {
         self.put(Operation::Input(number))
     }
 
-    /// The place of an operation: of the same one, if it was done before.
+    /// The operation, where its place is.
     fn put(&self, operation: Operation) -> Expression<'_> {
+        Expression(Kind::On(self, self.place(operation)))
+    }
+
+    /// The place of an operation: of the same one, if it was done before.
+    pub(super) fn place(&self, operation: Operation) -> Place {
         let mut operations = self.operations.borrow_mut();
         let place = operations.iter().position(|known| same(*known, operation)).unwrap_or(operations.len());
         if place == operations.len() {
             operations.push(operation);
         }
-        Expression { tape: self, place }
+        place
     }
 
     /// A truth.
@@ -125,9 +176,95 @@ impl Tape {
         self.put(Operation::Known(truth))
     }
 
-    pub(super) fn recorded<'a>(&self, results: impl IntoIterator<Item = Expression<'a>>) -> Recorded {
-        let results = results.into_iter().map(|result| result.place).collect();
+    pub(super) fn recorded<'a>(&'a self, results: impl IntoIterator<Item = Expression<'a>>) -> Recorded {
+        let results = results.into_iter().map(|result| result.place_on(self)).collect();
         Recorded { operations: self.operations.borrow().clone(), results }
+    }
+
+    /// Which way to go: as answered before, and otherwise that of the truth.
+    pub(super) fn ask(&self, operation: Operation) -> bool {
+        let place = self.place(operation);
+        let (mut asked, mut answers) = (self.asked.borrow_mut(), self.answers.borrow_mut());
+        let number = asked.iter().position(|known| *known == place).unwrap_or(asked.len());
+        if number == asked.len() {
+            asked.push(place);
+        }
+        if number == answers.len() {
+            answers.push(true);
+        }
+        answers.get(number).copied().unwrap_or(true)
+    }
+
+    /// Begins a way on which these are the first answers.
+    pub(super) fn answer(&self, answers: &[bool]) {
+        self.asked.borrow_mut().clear();
+        *self.answers.borrow_mut() = answers.to_vec();
+    }
+
+    /// What has been asked on this way.
+    pub(super) fn asked(&self) -> Vec<Place> {
+        self.asked.borrow().clone()
+    }
+
+    fn operation(&self, place: Place) -> Operation {
+        self.operations.borrow().get(place).copied().unwrap_or(Operation::Known(false))
+    }
+
+    fn not(&self, truth: Place) -> Place {
+        match self.operation(truth) {
+            Operation::Known(truth) => self.place(Operation::Known(!truth)),
+            Operation::Not(of) => of,
+            _ => self.place(Operation::Not(truth)),
+        }
+    }
+
+    /// Whether a truth is found without a division, a root or an exponential: such may be asked for where it does not matter.
+    fn is_cheap(&self, place: Place) -> bool {
+        let operation = self.operation(place);
+        let is_dear = matches!(
+            operation,
+            Operation::Divide(..)
+                | Operation::Root(_)
+                | Operation::Exponential(_)
+                | Operation::ExponentialLessOne(_)
+                | Operation::Tangent(_)
+                | Operation::Falling(_)
+                | Operation::Tail(_)
+        );
+        !is_dear && operation.operands().all(|operand| self.is_cheap(operand))
+    }
+
+    /// One of two results, numbers or truths.
+    pub(super) fn choose(&self, mask: Place, yes: Place, no: Place) -> Place {
+        let [both, either] = [Operation::Both, Operation::Either].map(|of| move |a, b| self.place(of(a, b)));
+        match (self.operation(yes), self.operation(no)) {
+            _ if yes == no => yes,
+            (Operation::Known(true), Operation::Known(false)) => mask,
+            (Operation::Known(false), Operation::Known(true)) => self.not(mask),
+            (Operation::Known(true), _) if self.is_cheap(no) => either(mask, no),
+            (Operation::Known(false), _) if self.is_cheap(no) => both(self.not(mask), no),
+            (_, Operation::Known(true)) if self.is_cheap(yes) => either(self.not(mask), yes),
+            (_, Operation::Known(false)) if self.is_cheap(yes) => both(mask, yes),
+            // A choice of the same result twice is one choice.
+            (Operation::Pick(further, a, b), _) if b == no && self.is_cheap(further) => {
+                self.choose(both(mask, further), a, no)
+            }
+            (Operation::Pick(further, a, b), _) if a == no && self.is_cheap(further) => {
+                self.choose(both(mask, self.not(further)), b, no)
+            }
+            (_, Operation::Pick(further, a, b)) if a == yes && self.is_cheap(further) => {
+                self.choose(either(mask, further), yes, b)
+            }
+            (_, Operation::Pick(further, a, b)) if b == yes && self.is_cheap(further) => {
+                self.choose(either(mask, self.not(further)), yes, a)
+            }
+            // So is one that both ways ask for.
+            (Operation::Pick(yes_if, a, b), Operation::Pick(no_if, c, d)) if yes_if == no_if && (a == c || b == d) => {
+                let (first, second) = (self.choose(mask, a, c), self.choose(mask, b, d));
+                self.choose(yes_if, first, second)
+            }
+            _ => self.place(Operation::Pick(mask, yes, no)),
+        }
     }
 }
 
@@ -154,12 +291,33 @@ fn same(a: Operation, b: Operation) -> bool {
 }
 
 impl<'a> Expression<'a> {
-    fn with(self, operation: Operation) -> Self {
-        self.tape.put(operation)
+    pub(super) const ZERO: Self = Self(Kind::Literal(0.0));
+
+    /// An operation of this number, on its tape.
+    fn then(self, done: impl Fn(f32) -> f32, operation: impl Fn(Place) -> Operation) -> Self {
+        match self.0 {
+            Kind::Literal(number) => Self(Kind::Literal(done(number))),
+            Kind::On(tape, place) => tape.put(operation(place)),
+        }
+    }
+
+    /// The same; of a constant it is written down as well.
+    fn noted(self, operation: impl Fn(Place) -> Operation) -> Self {
+        self.then(|_| f32::NAN, operation)
+    }
+
+    pub(super) fn place_on(self, tape: &Tape) -> Place {
+        match self.0 {
+            Kind::Literal(number) => tape.place(Operation::Constant(number)),
+            Kind::On(_, place) => place,
+        }
     }
 
     fn operation(self) -> Operation {
-        self.tape.operations.borrow().get(self.place).copied().unwrap_or(Operation::Known(false))
+        match self.0 {
+            Kind::Literal(number) => Operation::Constant(number),
+            Kind::On(tape, place) => tape.operations.borrow().get(place).copied().unwrap_or(Operation::Known(false)),
+        }
     }
 
     fn constant(self) -> Option<f32> {
@@ -170,11 +328,38 @@ impl<'a> Expression<'a> {
         if let Operation::Known(truth) = self.operation() { Some(truth) } else { None }
     }
 
+    /// The tape of one of both, if any.
+    fn tape(self, other: Self) -> Option<&'a Tape> {
+        match (self.0, other.0) {
+            (Kind::On(tape, _), _) | (_, Kind::On(tape, _)) => Some(tape),
+            _ => None,
+        }
+    }
+
     /// An operation on two numbers, done at once if both are known.
     fn on(self, other: Self, done: fn(f32, f32) -> f32, operation: fn(Place, Place) -> Operation) -> Self {
-        match (self.constant(), other.constant()) {
-            (Some(a), Some(b)) => self.with(Operation::Constant(done(a, b))),
-            _ => self.with(operation(self.place, other.place)),
+        let known = self.constant().zip(other.constant()).map(|(a, b)| done(a, b));
+        match (self.tape(other), known) {
+            (Some(tape), Some(known)) => tape.put(Operation::Constant(known)),
+            (Some(tape), None) => tape.put(operation(self.place_on(tape), other.place_on(tape))),
+            (None, known) => Self(Kind::Literal(known.unwrap_or(f32::NAN))),
+        }
+    }
+
+    /// The other one where a mask says so; of literals what is `done`.
+    fn either_of(self, other: Self, done: fn(f32, f32) -> f32, mask: Self) -> Self {
+        match (self.0, other.0) {
+            (Kind::Literal(a), Kind::Literal(b)) => Self(Kind::Literal(done(a, b))),
+            _ => Self::pick(mask, other, self),
+        }
+    }
+
+    /// Which way a comparison goes.
+    fn ask(self, other: Self, done: fn(f32, f32) -> bool, operation: fn(Place, Place) -> Operation) -> bool {
+        match (self.constant().zip(other.constant()), self.tape(other)) {
+            (Some((a, b)), _) => done(a, b),
+            (None, Some(tape)) => tape.ask(operation(self.place_on(tape), other.place_on(tape))),
+            (None, None) => false,
         }
     }
 }
@@ -196,14 +381,110 @@ macro_rules! operation {
 }
 operation!(Add add, AddAssign add_assign, Add);
 operation!(Sub sub, SubAssign sub_assign, Subtract);
-operation!(Mul mul, MulAssign mul_assign, Multiply);
+
+impl Mul for Expression<'_> {
+    type Output = Self;
+    /// Ones are left out.
+    fn mul(self, other: Self) -> Self {
+        match (self.constant(), other.constant()) {
+            (None, Some(1.0)) => self,
+            (Some(1.0), None) => other,
+            _ => self.on(other, |a, b| a * b, Operation::Multiply),
+        }
+    }
+}
+
+impl MulAssign for Expression<'_> {
+    fn mul_assign(&mut self, other: Self) {
+        *self = *self * other;
+    }
+}
+
+impl Div for Expression<'_> {
+    type Output = Self;
+    fn div(self, other: Self) -> Self {
+        self.on(other, |a, b| a / b, Operation::Divide)
+    }
+}
 
 impl Neg for Expression<'_> {
     type Output = Self;
     fn neg(self) -> Self {
-        self.constant().map_or(self.with(Operation::Negate(self.place)), |known| self.with(Operation::Constant(-known)))
+        match (self.0, self.constant()) {
+            (Kind::On(tape, _), Some(known)) => tape.put(Operation::Constant(-known)),
+            _ => self.then(|known| -known, Operation::Negate),
+        }
     }
 }
+
+impl PartialEq for Expression<'_> {
+    fn eq(&self, other: &Self) -> bool {
+        self.ask(*other, |a, b| a == b, Operation::Equal)
+    }
+}
+
+/// Each comparison is a question, whose answer is the way that is recorded.
+impl PartialOrd for Expression<'_> {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        let (less, more) = (self < other, self > other);
+        [(less, Ordering::Less), (more, Ordering::Greater)]
+            .into_iter()
+            .find_map(|(is, ordering)| is.then_some(ordering))
+            .or_else(|| (self == other).then_some(Ordering::Equal))
+    }
+
+    fn lt(&self, other: &Self) -> bool {
+        self.ask(*other, |a, b| a < b, Operation::Less)
+    }
+
+    fn gt(&self, other: &Self) -> bool {
+        other.lt(self)
+    }
+
+    fn le(&self, other: &Self) -> bool {
+        self.ask(*other, |a, b| a <= b, Operation::AtMost)
+    }
+
+    fn ge(&self, other: &Self) -> bool {
+        other.le(self)
+    }
+}
+
+impl Number for Expression<'_> {
+    fn of(value: f64) -> Self {
+        Self(Kind::Literal(value as f32))
+    }
+
+    fn max(self, other: Self) -> Self {
+        self.either_of(other, f32::max, self.less(other))
+    }
+
+    fn min(self, other: Self) -> Self {
+        self.either_of(other, f32::min, other.less(self))
+    }
+
+    fn abs(self) -> Self {
+        self.then(f32::abs, Operation::Absolute)
+    }
+
+    fn sqrt(self) -> Self {
+        self.then(f32::sqrt, Operation::Root)
+    }
+
+    fn exp(self) -> Self {
+        self.then(f32::exp, Operation::Exponential)
+    }
+
+    fn exp_m1(self) -> Self {
+        self.then(f32::exp_m1, Operation::ExponentialLessOne)
+    }
+
+    fn tanh(self) -> Self {
+        self.then(f32::tanh, Operation::Tangent)
+    }
+}
+
+impl Recordable for Expression<'_> {}
 
 impl Lanes for Expression<'_> {
     type Number = f32;
@@ -212,7 +493,10 @@ impl Lanes for Expression<'_> {
     const WIDTH: usize = 1;
 
     fn with(self, number: f32) -> Self {
-        self.tape.put(stood_for(number).map_or(Operation::Constant(number), Operation::Input))
+        match self.0 {
+            Kind::Literal(_) => Self(Kind::Literal(number)),
+            Kind::On(tape, _) => tape.put(stood_for(number).map_or(Operation::Constant(number), Operation::Input)),
+        }
     }
 
     fn mul_add(self, factor: Self, term: Self) -> Self {
@@ -220,41 +504,43 @@ impl Lanes for Expression<'_> {
     }
 
     fn recip(self) -> Self {
-        self.literal(1.0).over(self)
+        self.literal(1.0) / self
     }
 
     fn over(self, divisor: Self) -> Self {
-        self.on(divisor, |a, b| a / b, Operation::Divide)
+        self / divisor
     }
 
     fn root(self) -> Self {
-        self.with(Operation::Root(self.place))
+        self.sqrt()
     }
 
     fn exponential(self) -> Self {
-        self.with(Operation::Exponential(self.place))
+        self.exp()
     }
 
     fn less(self, other: Self) -> Self {
-        match (self.constant(), other.constant()) {
-            (Some(a), Some(b)) => self.with(Operation::Known(a < b)),
-            _ => self.with(Operation::Less(self.place, other.place)),
+        match (self.tape(other), self.constant().zip(other.constant())) {
+            (Some(tape), Some((a, b))) => tape.known(a < b),
+            (Some(tape), None) => tape.put(Operation::Less(self.place_on(tape), other.place_on(tape))),
+            // Literals alone are compared at once.
+            (None, _) => self,
         }
     }
 
     fn not_negative(self) -> Self {
-        self.with(Operation::NotNegative(self.place))
+        self.noted(Operation::NotNegative)
     }
 
     fn finite(self) -> Self {
-        self.with(Operation::Finite(self.place))
+        self.noted(Operation::Finite)
     }
 
     fn both(a: Self, b: Self) -> Self {
         match (a.truth(), b.truth()) {
             (Some(true), _) | (_, Some(false)) => b,
             (_, Some(true)) | (Some(false), _) => a,
-            _ => a.with(Operation::Both(a.place, b.place)),
+            _ => a.on(b, |_, _| f32::NAN, Operation::Both),
         }
     }
 
@@ -262,16 +548,18 @@ impl Lanes for Expression<'_> {
         match (a.truth(), b.truth()) {
             (Some(true), _) | (_, Some(false)) => a,
             (_, Some(true)) | (Some(false), _) => b,
-            _ => a.with(Operation::Either(a.place, b.place)),
+            _ => a.on(b, |_, _| f32::NAN, Operation::Either),
         }
     }
 
     fn without(a: Self, b: Self) -> Self {
-        let others = match b.truth() {
-            Some(truth) => b.with(Operation::Known(!truth)),
-            None => b.with(Operation::Not(b.place)),
+        let known = |truth: bool| match b.0 {
+            Kind::On(tape, _) => tape.known(truth),
+            Kind::Literal(_) => b,
         };
-        if a.place == b.place { a.with(Operation::Known(false)) } else { Self::both(a, others) }
+        let others = b.truth().map_or_else(|| b.noted(Operation::Not), |truth| known(!truth));
+        let is_same = a.tape(b).is_some_and(|tape| a.place_on(tape) == b.place_on(tape));
+        if is_same { known(false) } else { Self::both(a, others) }
     }
 
     fn none(mask: Self) -> bool {
@@ -283,11 +571,14 @@ impl Lanes for Expression<'_> {
     }
 
     fn pick(mask: Self, yes: Self, no: Self) -> Self {
-        match mask.truth() {
-            _ if yes.place == no.place => yes,
-            Some(true) => yes,
-            Some(false) => no,
-            None => mask.with(Operation::Pick(mask.place, yes.place, no.place)),
+        match (mask.truth(), mask.0) {
+            (Some(true), _) => yes,
+            (Some(false), _) => no,
+            (None, Kind::On(tape, place)) => {
+                let (yes_place, no_place) = (yes.place_on(tape), no.place_on(tape));
+                if yes_place == no_place { yes } else { tape.put(Operation::Pick(place, yes_place, no_place)) }
+            }
+            (None, Kind::Literal(_)) => no,
         }
     }
 
@@ -303,17 +594,17 @@ impl Lanes for Expression<'_> {
 /// As numbers in single precision have it.
 impl Falls for Expression<'_> {
     fn to_exponent(self) -> Self {
-        self.with(Operation::ToExponent(self.place))
+        self.noted(Operation::ToExponent)
     }
 
     /// A function of its own.
     fn falling(self) -> Self {
-        self.with(Operation::Falling(self.place))
+        self.then(Falls::falling, Operation::Falling)
     }
 
     /// A function of its own.
     fn tail(self, _: Self) -> Tail<Self> {
-        let mass = self.with(Operation::Tail(self.place));
-        Tail { mass, hazard: mass.with(Operation::Hazard(mass.place)) }
+        let mass = self.noted(Operation::Tail);
+        Tail { mass, hazard: mass.noted(Operation::Hazard) }
     }
 }

@@ -3,14 +3,23 @@
 //! A tape runs the kernel on expressions and keeps every operation, in the order in which the kernel does them. Where
 //! numbers would choose a way, both ways are kept and one of the results is chosen; results are the same.
 
+//!
+//! What stands around the kernel compares numbers and goes one way ([`write_down`]): it is run once for every way that it may go.
+
+mod correction;
 mod expression;
+mod fields;
 mod numbers;
 mod pieces;
 mod steps;
 #[cfg(test)]
 mod tests;
+mod ways;
 
-use expression::{Expression, Tape};
-pub use expression::{Operation, Place, Recorded};
+pub use correction::{write_mixture, write_scaled};
+use expression::Tape;
+pub use expression::{Expression, Operation, Place, Recorded};
+pub use fields::{Fields, See};
 pub use numbers::{MixtureNumbers, shared};
 pub use pieces::{Carried, Piece};
+pub use ways::{Function, Name, Writer, write_down};

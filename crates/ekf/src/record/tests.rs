@@ -16,13 +16,13 @@ type Filter = SparseEkf<f32, Compact, 2, 5>;
 type State = Belief<f32, 5, 15>;
 
 /// Does what is written down: truths as 1 and 0.
-fn run(recorded: &Recorded, inputs: &[f32]) -> Vec<f32> {
+pub(super) fn run(recorded: &Recorded, inputs: &[f32]) -> Vec<f32> {
     let truth = |truth: bool| f32::from(u8::from(truth));
     let mut values: Vec<f32> = Vec::new();
     for operation in &recorded.operations {
         let at = |place: usize| values[place];
         let value = match *operation {
-            Operation::Input(number) => inputs[number],
+            Operation::Input(number) | Operation::Flag(number) => inputs[number],
             Operation::Constant(number) => number,
             Operation::Add(a, b) => at(a) + at(b),
             Operation::Subtract(a, b) => at(a) - at(b),
@@ -30,6 +30,11 @@ fn run(recorded: &Recorded, inputs: &[f32]) -> Vec<f32> {
             Operation::Divide(a, b) => at(a) / at(b),
             Operation::Negate(a) => -at(a),
             Operation::Root(a) => at(a).sqrt(),
+            Operation::Absolute(a) => at(a).abs(),
+            Operation::ExponentialLessOne(a) => at(a).exp_m1(),
+            Operation::Tangent(a) => at(a).tanh(),
+            Operation::AtMost(a, b) => truth(at(a) <= at(b)),
+            Operation::Equal(a, b) => truth(at(a) == at(b)),
             Operation::Exponential(a) => at(a).exp(),
             Operation::Falling(a) => at(a).falling(),
             Operation::ToExponent(a) => at(a).to_exponent(),

@@ -55,6 +55,11 @@ impl<'a> Body<'a> {
         self.bound(place, Binds::Choice)
     }
 
+    /// The same, in brackets unless it is a name.
+    pub fn atom(&mut self, place: Place) -> String {
+        self.bound(place, Binds::Atom)
+    }
+
     /// The same, in brackets where it binds less tightly than what is around it.
     fn bound(&mut self, place: Place, least: Binds) -> String {
         if self.values[place].is_none() {
@@ -69,8 +74,9 @@ impl<'a> Body<'a> {
     }
 
     fn made(&mut self, place: Place) -> (String, Binds) {
-        if let (Operation::Pick(mask, yes, no), Some(arms)) = (self.operations[place], self.scopes.arms(place)) {
-            return self.chosen(place, mask, [(yes, arms[0]), (no, arms[1])]);
+        if self.scopes.branch_of(place).is_some() {
+            self.branch(place);
+            return (format!("t{place}"), Binds::Atom);
         }
         if let Operation::Tail(border) = self.operations[place] {
             let border = self.value(border);
@@ -83,55 +89,79 @@ impl<'a> Body<'a> {
         let operation = self.operations[place];
         let is_plain = matches!(operation, Operation::Constant(_) | Operation::Known(_));
         // What belongs to the state is overwritten in the end: it is read before.
-        let is_state = matches!(operation, Operation::Input(_)) && !text.starts_with("s[");
+        let is_state = matches!(operation, Operation::Input(_) | Operation::Flag(_)) && !text.starts_with("s[");
         if is_plain || !is_state && self.uses[place] <= 1 && text.len() <= LONGEST {
             return (text, binds);
         }
-        if let Operation::Input(number) = operation {
+        if let Operation::Input(number) | Operation::Flag(number) = operation {
             let own = (self.name_of)(number);
-            let inner = own.strip_prefix("s[").unwrap_or(&own);
+            let inner = ["s[", "seen->"].iter().find_map(|outer| own.strip_prefix(outer)).unwrap_or(&own);
             let name: String = inner.chars().filter(|c| c.is_alphanumeric() || *c == '_').collect();
             let name = name.to_lowercase();
             // A parameter has its name already.
             if name == own {
                 return (name, Binds::Atom);
             }
-            let _ = writeln!(self.lines, "    const float {name} = {own};");
+            let kind = if self.is_truth(place) { "int" } else { "float" };
+            let _ = writeln!(self.lines, "    const {kind} {name} = {own};");
             return (name, Binds::Atom);
         }
-        let (kind, letter) = if is_truth(operation) { ("int", 'm') } else { ("float", 't') };
+        let (kind, letter) = if self.is_truth(place) { ("int", 'm') } else { ("float", 't') };
         let name = format!("{letter}{place}");
         let _ = writeln!(self.lines, "    const {kind} {name} = {text};");
         (name, Binds::Atom)
     }
 
-    /// A choice whose ways are worth a branch.
-    fn chosen(&mut self, place: Place, mask: Place, ways: [(Place, usize); 2]) -> (String, Binds) {
+    /// A choice whose ways are worth a branch, with all that are made with it.
+    fn branch(&mut self, choice: Place) {
+        let Some(branch) = self.scopes.branch_of(choice) else { return };
+        let mut choices = branch.choices.clone();
+        choices.sort_unstable();
+        let shared = self.scopes.shared(self.operations, &self.uses, branch);
+        let picks: Vec<_> = choices.iter().map(|place| (*place, self.operations[*place])).collect();
+        let Operation::Pick(mask, ..) = self.operations[choice] else { return };
         let mask = self.value(mask);
         // What is used elsewhere too is done before.
-        for shared in self.scopes.shared(self.operations, &self.uses, place, ways) {
-            self.value(shared);
+        for place in shared {
+            self.value(place);
         }
-        let name = format!("t{place}");
-        let _ = writeln!(self.lines, "    float {name};\n    if ({mask}) {{");
-        for (k, (result, _)) in ways.into_iter().enumerate() {
+        for (place, _) in &picks {
+            let kind = if self.is_truth(*place) { "int" } else { "float" };
+            let _ = writeln!(self.lines, "    {kind} t{place};");
+            self.values[*place] = Some((format!("t{place}"), Binds::Atom));
+        }
+        let _ = writeln!(self.lines, "    if ({mask}) {{");
+        for way in 0..2 {
             let outer = std::mem::take(&mut self.lines);
-            let value = self.value(result);
+            let mut set = String::new();
+            for (place, pick) in &picks {
+                let Operation::Pick(_, yes, no) = pick else { continue };
+                let value = self.value([*yes, *no][way]);
+                let _ = writeln!(set, "        t{place} = {value};");
+            }
             let inner = std::mem::replace(&mut self.lines, outer);
-            self.lines.push_str(if k == 0 { "" } else { "    } else {\n" });
+            self.lines.push_str(if way == 0 { "" } else { "    } else {\n" });
             for line in inner.lines() {
                 let _ = writeln!(self.lines, "    {line}");
             }
-            let _ = writeln!(self.lines, "        {name} = {value};");
+            self.lines.push_str(&set);
         }
         self.lines.push_str("    }\n");
-        (name, Binds::Atom)
+    }
+
+    /// Whether a result is true or false, and no number.
+    pub fn is_truth(&self, place: Place) -> bool {
+        match self.operations[place] {
+            Operation::Pick(_, yes, _) => self.is_truth(yes),
+            operation => operation.is_truth(),
+        }
     }
 
     fn expression(&mut self, place: Place) -> (String, Binds) {
         use Binds::{Atom, Choice, Either, Less, Product, Sum, Truth};
         let (text, binds) = match self.operations[place] {
-            Operation::Input(number) => ((self.name_of)(number), Atom),
+            Operation::Input(number) | Operation::Flag(number) => ((self.name_of)(number), Atom),
+            Operation::Constant(number) if number == f32::INFINITY => ("INFINITY".into(), Atom),
             Operation::Constant(number) => {
                 (format!("{}f", Literal(number).text()), if number.is_sign_negative() { Product } else { Atom })
             }
@@ -142,6 +172,9 @@ impl<'a> Body<'a> {
             Operation::Divide(a, b) => (format!("{} / {}", self.bound(a, Product), self.bound(b, Atom)), Product),
             Operation::Negate(a) => (format!("-{}", self.bound(a, Atom)), Product),
             Operation::Root(a) => (format!("sqrtf({})", self.value(a)), Atom),
+            Operation::Absolute(a) => (format!("fabsf({})", self.value(a)), Atom),
+            Operation::ExponentialLessOne(a) => (format!("expm1f({})", self.value(a)), Atom),
+            Operation::Tangent(a) => (format!("tanhf({})", self.value(a)), Atom),
             Operation::Exponential(a) => (format!("expf({})", self.value(a)), Atom),
             Operation::Falling(a) => (format!("falling({})", self.value(a)), Atom),
             Operation::ToExponent(a) => (format!("to_exponent({})", self.value(a)), Atom),
@@ -151,6 +184,8 @@ impl<'a> Body<'a> {
                 (hazard(tail), Atom)
             }
             Operation::Less(a, b) => (format!("{} < {}", self.bound(a, Sum), self.bound(b, Sum)), Less),
+            Operation::AtMost(a, b) => (format!("{} <= {}", self.bound(a, Sum), self.bound(b, Sum)), Less),
+            Operation::Equal(a, b) => (format!("{} == {}", self.bound(a, Sum), self.bound(b, Sum)), Less),
             Operation::NotNegative(a) => (format!("{} >= 0.0f", self.bound(a, Sum)), Less),
             Operation::Finite(a) => (format!("isfinite({})", self.value(a)), Atom),
             Operation::Both(a, b) => (format!("{} && {}", self.bound(a, Truth), self.bound(b, Less)), Truth),
@@ -169,19 +204,6 @@ impl<'a> Body<'a> {
 /// What the hazard of a tail is written to.
 fn hazard(tail: Place) -> String {
     format!("hazard{tail}")
-}
-
-fn is_truth(operation: Operation) -> bool {
-    matches!(
-        operation,
-        Operation::Less(..)
-            | Operation::NotNegative(_)
-            | Operation::Finite(_)
-            | Operation::Both(..)
-            | Operation::Either(..)
-            | Operation::Not(_)
-            | Operation::Known(_)
-    )
 }
 
 /// How often each result is used by what leads to the results.

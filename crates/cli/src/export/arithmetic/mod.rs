@@ -1,12 +1,16 @@
 //! The kernel's arithmetic as functions in C, printed from what the kernel itself wrote down.
 
+mod around;
 mod body;
+mod correction;
+mod function;
 
 use std::fmt::Write;
 
 use ohmstrain_ekf::record::{Carried, Operation, Piece, Recorded};
 use ohmstrain_model::Phase;
 
+pub use around::Around;
 use body::Body;
 
 /// A function to be printed.

@@ -5,9 +5,10 @@ mod readings;
 
 use ohmstrain_calib::{EstimatorKind, PortableFilter, Quantity, ReadingUnit, SensorParams, with_sizes};
 use ohmstrain_ekf::Belief;
-use ohmstrain_ekf::live::{BESIDE_AFTER, BESIDE_SHARE, KNOWN_BEYOND, STARTLING_NIS};
+use ohmstrain_ekf::live::{BESIDE_SHARE, KNOWN_BEYOND};
 use serde::Serialize;
 
+use super::arithmetic::Around;
 use super::correction::CorrectionConstants;
 use super::cost::Cost;
 use super::fixed_rate::FixedRate;
@@ -54,9 +55,7 @@ pub struct Exported {
     known_variance: Literal,
     known_beyond: Literal,
     reading_variance: Literal,
-    /// Squared deviations from which on a reading startles, after how many in a row a filter looks again, and with what share.
-    startling_nis: Literal,
-    beside_after: u32,
+    /// With what share of the weight a filter looks again.
     beside_share: Literal,
     sieve: SieveConstants,
     doubt: DoubtConstants,
@@ -70,8 +69,11 @@ pub struct Exported {
     forgets_s: Option<Literal>,
     limits: SharedConstants,
     correction: Option<CorrectionConstants>,
-    /// The kernel as functions in C.
+    /// The kernel as functions in C, and what stands around it.
     arithmetic: String,
+    around: String,
+    /// What that keeps from step to step, as C declares it.
+    fields: Vec<String>,
     /// What is left of the filter, and about what it costs.
     words: String,
     /// Whether it is less than what a computer runs.
@@ -132,6 +134,7 @@ impl Exported {
         let model = &sensor.model;
         let start: Belief<f32, N, L> = Belief::initial(model);
         let reading_sd = model.noise().reading_sd;
+        let around = Around { parts: &sensor.parts, reading_variance: reading_sd * reading_sd };
         let finite = |number: f32| number.is_finite().then_some(Literal(number));
         let vectors = Vectors::new::<B, N, L>(&sensor)?;
         let exported = Self {
@@ -162,8 +165,6 @@ impl Exported {
             known_variance: Literal(sensor.parts.start_variance),
             known_beyond: Literal((KNOWN_BEYOND * params.limits.span()) as f32),
             reading_variance: Literal(reading_sd * reading_sd),
-            startling_nis: Literal(STARTLING_NIS as f32),
-            beside_after: BESIDE_AFTER,
             beside_share: Literal(BESIDE_SHARE as f32),
             sieve: SieveConstants::new(&filter.sieve),
             follow: FollowConstants::new(sensor.parts.rest),
@@ -179,6 +180,8 @@ impl Exported {
                 .as_ref()
                 .map(|correction| CorrectionConstants::new(correction, chip.quadratics.as_ref(), dt_s as f32)),
             arithmetic,
+            around: around.text(),
+            fields: around.fields(),
             words: chip.words(),
             is_smaller: chip.is_smaller(),
             promise: Vec::new(),

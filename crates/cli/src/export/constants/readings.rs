@@ -1,6 +1,6 @@
 //! What a reading must be, and when an interval is wider than the filter says.
 
-use ohmstrain_ekf::live::{DOUBT, DoubtParts, FOLLOWING, Innovations, MOST_REPEATS, NEVER_READ_S, RestBounds, Sieve};
+use ohmstrain_ekf::live::{DoubtParts, RestBounds, Sieve};
 use serde::Serialize;
 
 use crate::export::literal::Literal;
@@ -11,7 +11,6 @@ pub struct SieveConstants {
     lower: Literal,
     upper: Literal,
     longest_repeat_s: Option<Literal>,
-    most_repeats: u32,
     jump: Literal,
     error_time_s: Option<Literal>,
 }
@@ -27,33 +26,18 @@ pub struct DoubtConstants {
     /// Variances.
     start: Literal,
     most: Literal,
-    far_fades_s: Literal,
-    near_counts: Literal,
-    far_counts: Literal,
     /// 1 where readings grow from rest on, -1 where they fall, 0 where it is not known.
     sign: Literal,
-    most_nis: Literal,
-    margin: Literal,
-    faster: Literal,
-    worth: Literal,
     zero: Literal,
     unread: UnreadConstants,
     rest: Option<RestConstants>,
 }
 
-/// How R₀ follows the readings.
+/// Between which readings R₀ is calibration's.
 #[derive(Debug, Serialize)]
 pub struct FollowConstants {
     low: Option<Literal>,
-    of_low: Option<Literal>,
     high: Option<Literal>,
-    of_high: Option<Literal>,
-    leaves_s: Literal,
-    returns_s: Literal,
-    longest_s: Literal,
-    fault_s: Literal,
-    least: Literal,
-    most: Literal,
 }
 
 /// What is known without a reading.
@@ -63,7 +47,6 @@ struct UnreadConstants {
     path_variance: Literal,
     centre: Literal,
     anywhere: Literal,
-    never_s: Literal,
 }
 
 /// Where the sensor rests.
@@ -87,21 +70,13 @@ impl DoubtConstants {
             per_reading: narrow(seen.per_reading),
             start: narrow(seen.start),
             most: narrow(seen.most),
-            far_fades_s: narrow(DOUBT.far_fades_s),
-            near_counts: narrow(DOUBT.near_counts),
-            far_counts: narrow(DOUBT.far_counts),
             sign: narrow(seen.rest.map_or(0.0, |rest| rest.sign)),
-            most_nis: narrow(Innovations::<f64>::MOST),
-            margin: narrow(DOUBT.margin),
-            faster: narrow(DOUBT.faster),
-            worth: narrow(DOUBT.worth),
             zero,
             unread: UnreadConstants {
                 rate_time_s: narrow(seen.unread.rate_time_s),
                 path_variance: narrow(seen.unread.path_variance),
                 centre: narrow(seen.unread.centre),
                 anywhere: narrow(seen.unread.anywhere),
-                never_s: narrow(NEVER_READ_S),
             },
             rest: seen.rest.map(|rest| RestConstants {
                 rested: narrow(rest.rested),
@@ -117,19 +92,7 @@ impl FollowConstants {
     /// Of a sensor.
     pub fn new(bounds: RestBounds<f64>) -> Self {
         let narrow = |number: f64| Literal(number as f32);
-        let rest = |bound: f64| Literal(1.0 + bound as f32);
-        Self {
-            low: bounds.low.map(narrow),
-            of_low: bounds.low.map(rest),
-            high: bounds.high.map(narrow),
-            of_high: bounds.high.map(rest),
-            leaves_s: narrow(FOLLOWING.leaves_s),
-            returns_s: narrow(FOLLOWING.returns_s),
-            longest_s: narrow(FOLLOWING.longest_s),
-            fault_s: narrow(FOLLOWING.fault_s),
-            least: narrow(1.0 / FOLLOWING.farthest - 1.0),
-            most: narrow(FOLLOWING.farthest - 1.0),
-        }
+        Self { low: bounds.low.map(narrow), high: bounds.high.map(narrow) }
     }
 }
 
@@ -141,7 +104,6 @@ impl SieveConstants {
             lower: Literal(sieve.plausible.0 as f32),
             upper: Literal(sieve.plausible.1 as f32),
             longest_repeat_s: finite(sieve.longest_repeat_s as f32),
-            most_repeats: MOST_REPEATS,
             jump: Literal(sieve.jump as f32),
             error_time_s: Some(Literal(sieve.error_time_s as f32)).filter(|time_s| time_s.0 > 0.0),
         }

@@ -81,39 +81,8 @@ static const float READING_VARIANCE = << reading_variance >>f;
 /* Least and largest rho that can be a reading of this sensor: others are taken for missing. */
 static const float PLAUSIBLE_LOWER = << sieve.lower >>f;
 static const float PLAUSIBLE_UPPER = << sieve.upper >>f;
-{% if sieve.longest_repeat_s is not none %}
-/* A number that has come again so often, for longer than this, is stuck. */
-static const float LONGEST_REPEAT_S = << sieve.longest_repeat_s >>f;
-enum { MOST_REPEATS = << sieve.most_repeats >> };
-{% endif %}
-{% if sieve.error_time_s is not none %}
-/* Time over which errors of readings are alike, s. */
-static const float ERROR_TIME_S = << sieve.error_time_s >>f;
-{% endif %}
-/* What calibration has seen: readings, relative; the fastest rate, 1/s; the longest recording, s. */
-static const float SEEN_LOW = << doubt.low >>f, SEEN_HIGH = << doubt.high >>f;
-/* 1 where readings grow from rest on, -1 where they fall, 0 where that is not known. */
-static const float GROWS = << doubt.sign >>f;
-static const float FASTEST_PER_S = << doubt.fastest_per_s >>f, LONGEST_RUN_S = << doubt.longest_s >>f;
-/* Strain for a change of the reading over these ranges, and variances: of an unknown start, and of what is known least. */
-static const float PER_READING = << doubt.per_reading >>f, START_DOUBT = << doubt.start >>f, MOST_DOUBT = << doubt.most >>f;
-/* Without a reading: how long a rate lasts, s; twice the variance of a path with the rate's deviation for so long; centre of the
- * limits, and the variance of a strain that is anywhere in them; what is time without end, s. */
-static const float RATE_TIME_S = << doubt.unread.rate_time_s >>f, PATH_VARIANCE = << doubt.unread.path_variance >>f;
-static const float CENTRE = << doubt.unread.centre >>f, ANYWHERE = << doubt.unread.anywhere >>f, NEVER_READ_S = << doubt.unread.never_s >>f;
-{% if doubt.rest %}
-/* At rest: the reading, relative, and how far it may be from there; for how long readings must stay where they are, s; 1 where
- * they grow from rest on, -1 where they fall, 0 where nobody knows, and the last one on that side. */
-static const float AT_REST = << doubt.rest.rested >>f, REST_TOLERANCE = << doubt.rest.tolerance >>f, REST_LASTS_S = << doubt.rest.lasts_s >>f;
-static const float REST_END = << doubt.rest.end >>f;
-{% endif %}
-/* Between which readings, relative, the sensor stays while R0 is calibration's, and R0 of each in calibration's. */
-{% if follow.low is not none %}
-static const float REST_LOW = << follow.low >>f, OF_LOW = << follow.of_low >>f;
-{% endif %}
-{% if follow.high is not none %}
-static const float REST_HIGH = << follow.high >>f, OF_HIGH = << follow.of_high >>f;
-{% endif %}
+/* The longest time, s, for which a working sensor repeats one number, and how far a reading is from another one where it has jumped. */
+static const float LONGEST_REPEAT_S = {% if sieve.longest_repeat_s is none %}INFINITY{% else %}<< sieve.longest_repeat_s >>f{% endif %}, JUMP = << sieve.jump >>f;
 /* Factor on the standard deviation of strain that the calibration found necessary. */
 static const float STRAIN_SD_SCALE = << strain_sd_scale >>f;
 /* The rounding of a number of order one, its square, and the most tries of a step after the first. */
@@ -124,11 +93,8 @@ static const float ROUNDING = 1.4210855e-14f;
 enum { MOST_TRIES = 12 };
 /* Squared deviations beyond which a reading counts the less the farther it is. */
 static const float SURPRISING = 9.0f;
-/* Squared deviations beyond which a reading startles. After so many in a row, so far from the last that did not surprise, the filter
- * looks again, with this share of the weight. */
-static const float STARTLING = << startling_nis >>f, JUMP = << sieve.jump >>f;
-enum { BESIDE_AFTER = << beside_after >> };
 {% if estimator.hypotheses %}
+/* Share of the weight with which a filter looks again. */
 static const float BESIDE_SHARE = << beside_share >>f;
 {% endif %}
 /* Two-sided normal quantile of 95 %. */
@@ -305,19 +271,17 @@ static void summarise(const ohmstrain_state *state, summary *out)
 {% endif %}
 
 typedef ohmstrain_readings readings;
-
-/* By how much innovations have been larger of late than the filter states them. */
-static float birge_of(const readings *seen)
-{
-    return seen->misfit > 1.0f ? seen->misfit : 1.0f;
-}
-
 {% if correction %}
-enum { LOW_PASSES = OHMSTRAIN_LOW_PASSES };
+enum { LOW_PASSES = OHMSTRAIN_LOW_PASSES, OUTPUTS = 6, FEATURES = 7, INPUTS = OUTPUTS + FEATURES };
 {% if not estimator.hypotheses %}
 enum { EXTEND, HOLD, RETRACT };
 {% endif %}
+{% endif %}
 
+/* ---- Around the filter: as the Rust crate's `live` and `correction` do it ------------------------------------------------- */
+
+<< around >>
+{% if correction %}
 {% include "correction.c" %}
 {% endif %}
 /* ---- Readings ------------------------------------------------------------------------------------------------------ */
@@ -331,44 +295,6 @@ static int usable(float rest_reading)
 static float relative(float reading, float rest_reading)
 {
     return (reading - rest_reading) / rest_reading;
-}
-
-/* What becomes of a reading: a flag, or 0 where it is to be used, with the extra variance that repetition gives it. A number
- * that comes for the k-th time in a row is given k times the variance{% if sieve.error_time_s is not none %}, and a reading soon after another one, whose error is
- * still alike, so much that readings tell as much in a second however many there are{% endif %}. */
-static unsigned sieve(readings *seen, float rho, float *extra_variance)
-{
-    const float variance = READING_VARIANCE + *extra_variance;
-{% if sieve.error_time_s is not none %}
-    const float since_s = seen->since_s;
-    const int is_first = !seen->has_reading;
-{% endif %}
-
-    if (!(PLAUSIBILITY ? PLAUSIBLE_LOWER <= rho && rho <= PLAUSIBLE_UPPER : rho == rho)) {
-        return OHMSTRAIN_IMPLAUSIBLE;
-    }
-    if (seen->has_reading && seen->rho == rho) {
-        seen->count += seen->count < 0xffffu;
-    } else {
-        seen->count = 0;
-        seen->repeated_s = 0.0f;
-    }
-    seen->has_reading = 1;
-    seen->rho = rho;
-    seen->since_s = 0.0f;
-{% if sieve.longest_repeat_s is not none %}
-    if (PLAUSIBILITY && seen->count >= MOST_REPEATS && seen->repeated_s > LONGEST_REPEAT_S) {
-        return OHMSTRAIN_STUCK;
-    }
-{% endif %}
-    *extra_variance += (float)seen->count * variance;
-{% if sieve.error_time_s is not none %}
-    if (!is_first) {
-        const float news = -expm1f(-since_s / ERROR_TIME_S);
-        *extra_variance += (1.0f / (news > 1.1920929e-7f ? news : 1.1920929e-7f) - 1.0f) * READING_VARIANCE;
-    }
-{% endif %}
-    return 0;
 }
 
 {% if estimator.hypotheses %}
@@ -514,178 +440,6 @@ static float strain_of(const summary *all, float *variance)
     return clamped(all->mean[0], OHMSTRAIN_LOWER, OHMSTRAIN_UPPER);
 }
 
-/* ---- Doubts: what no filter knows by itself ------------------------------------------------------------------------ */
-
-/* There is more to doubt than what is left of a start. */
-static void raise_doubt(readings *seen, float variance)
-{
-    variance = variance < MOST_DOUBT ? variance : MOST_DOUBT;
-    if (variance > seen->fading) {
-        seen->fading = variance;
-        seen->starts = 0;
-    }
-}
-
-{% if doubt.rest %}
-/* Watches for another R0: a sensor that is known to rest and reads something else, or readings that stay where no strain leads. */
-static void watch_rest(readings *seen, float dt_s, float rho)
-{
-    const float from_rest = fabsf(rho - AT_REST), beyond = GROWS * (REST_END - rho);
-
-    if (seen->rests) {
-        seen->rests = 0;
-        seen->rest_off = from_rest > REST_TOLERANCE ? from_rest : 0.0f;
-    }
-    if (beyond > REST_TOLERANCE) {
-        seen->least = seen->beyond_s > 0.0f && seen->least < beyond ? seen->least : beyond;
-        seen->beyond_s += dt_s;
-    } else {
-        seen->beyond_s = 0.0f;
-    }
-    seen->near_s = from_rest > REST_TOLERANCE ? 0.0f : seen->near_s + dt_s;
-    if (seen->beyond_s >= REST_LASTS_S) {
-        seen->rest_off = seen->rest_off > seen->least ? seen->rest_off : seen->least;
-    } else if (seen->near_s >= REST_LASTS_S) {
-        seen->rest_off = 0.0f;
-    }
-}
-
-{% endif %}
-/* R0 follows the readings: one beyond those of calibration draws it after itself, slowly, and one beyond the other end back, soon.
- * A number that comes again says nothing until another one comes. */
-static void follow(readings *seen, float dt_s, float rho)
-{
-    const int is_news = seen->has_drawn && seen->drawn_by != rho;
-    float wanted = seen->off, passed_s, time_s;
-
-    seen->jumped_s += dt_s;
-    seen->undrawn_s = seen->has_drawn ? seen->undrawn_s + dt_s : 0.0f;
-    seen->has_drawn = 1;
-    seen->drawn_by = rho;
-    if (!seen->follows || !is_news) {
-        return;
-    }
-    passed_s = seen->undrawn_s < << follow.longest_s >>f ? seen->undrawn_s : << follow.longest_s >>f;
-    seen->undrawn_s = 0.0f;
-{% if follow.low is not none %}
-    if ((rho - REST_LOW) / OF_LOW < seen->off) {
-        wanted = (rho - REST_LOW) / OF_LOW;
-    }
-{% endif %}
-{% if follow.high is not none %}
-    if ((rho - REST_HIGH) / OF_HIGH > seen->off) {
-        wanted = (rho - REST_HIGH) / OF_HIGH;
-    }
-{% endif %}
-    if (<< follow.least >>f < wanted && wanted < << follow.most >>f) {
-        time_s = fabsf(wanted) > fabsf(seen->off) ? << follow.leaves_s >>f : << follow.returns_s >>f;
-        seen->off += passed_s / (time_s + passed_s) * (wanted - seen->off);
-    }
-}
-
-/* Readings have jumped. Where they had shortly before, and back from where they have drawn R0 since, that was a fault. */
-static void jumped(readings *seen, float jump)
-{
-    if (!seen->has_jumped || seen->jumped_s > << follow.fault_s >>f) {
-        seen->off_before = seen->off;
-        seen->jumped_s = 0.0f;
-        seen->has_jumped = 1;
-    } else if (jump * (seen->off - seen->off_before) < 0.0f) {
-        seen->off = seen->off_before;
-    }
-}
-
-/* The strain's variance without a reading for a while: it has moved without the pull toward its mean, but not beyond the limits. */
-static float unread_variance(float seconds, float strain, float variance)
-{
-    const float times = seconds / RATE_TIME_S, share = times * times / (3.0f + times * (1.5f + times));
-    const float moved = PATH_VARIANCE * (times * share), off = strain - CENTRE, most = off * off + ANYWHERE;
-    const float open = variance > moved ? variance : moved;
-
-    return open < most ? open : most;
-}
-
-/* A step has passed, with a reading that was used or without; the strain's variance, or what a pause leaves open of it. */
-static float doubt_reading(readings *seen, float dt_s, const float *rho, float nis, float strain, float variance)
-{
-    const float passed_s = seen->runs ? dt_s : 0.0f;
-    const float margin = << doubt.margin >>f * (SEEN_HIGH - SEEN_LOW);
-    float above, below, near_off, far_off, far_left, lately, twice;
-
-    seen->runs = 1;
-    seen->run_s += passed_s;
-    seen->unread_s = rho ? 0.0f : seen->unread_s + passed_s;
-    if (!rho) {
-        const float open = unread_variance(seen->unread_s, strain, variance), widest = open > variance ? open : variance;
-        seen->lost = seen->is_lost && seen->lost > widest ? seen->lost : widest;
-        seen->is_lost = 1;
-        return open;
-    }
-    /* What is left of what was known before: of 60, 20 and 5 s. */
-    far_left = falling(-passed_s / << doubt.far_fades_s >>f);
-    lately = far_left * far_left * far_left;
-    twice = lately * lately;
-    if (nis > SURPRISING) {
-        const float jump = seen->has_believed ? (*rho - seen->believed) * PER_READING : 0.0f;
-        const float doubt = (1.0f - sqrtf(SURPRISING / nis)) * jump;
-        raise_doubt(seen, doubt * doubt);
-    } else {
-        seen->fading *= twice * twice;
-        if (seen->is_lost) {
-            raise_doubt(seen, seen->lost);
-        }
-        seen->is_lost = 0;
-        seen->believed = *rho;
-        seen->has_believed = 1;
-    }
-    above = *rho - SEEN_HIGH - margin;
-    below = SEEN_LOW - *rho - margin;
-    near_off = GROWS > 0.0f ? below : GROWS < 0.0f ? above : 0.0f;
-    far_off = GROWS > 0.0f ? above : GROWS < 0.0f || below > above ? below : above;
-    seen->near_off *= lately;
-    seen->near_off = seen->near_off > near_off ? seen->near_off : near_off;
-    seen->far_off *= far_left;
-    seen->far_off = seen->far_off > far_off ? seen->far_off : far_off;
-    seen->misfit += (1.0f - lately) * ((nis < << doubt.most_nis >>f ? nis : << doubt.most_nis >>f) - seen->misfit);
-{% if doubt.rest %}
-    watch_rest(seen, passed_s, *rho);
-{% endif %}
-    return variance;
-}
-
-/* The strain's variance with all doubts, and flags that say so. */
-static float doubted(const readings *seen, float rate, float variance, unsigned *flags)
-{
-    const float near_off = << doubt.near_counts >>f * seen->near_off * PER_READING;
-    const float far_off = << doubt.far_counts >>f * seen->far_off * PER_READING;
-    const float outside = near_off * near_off + far_off * far_off, birge = birge_of(seen);
-    const float faster = (rate < 0.0f ? -rate : rate) / FASTEST_PER_S;
-    const int is_fast = faster > << doubt.faster >>f;
-{% if doubt.rest %}
-    const float elsewhere = seen->rest_off * PER_READING;
-    const float more = seen->fading + outside + elsewhere * elsewhere;
-{% else %}
-    const float more = seen->fading + outside;
-{% endif %}
-{% if correction %}
-    /* The correction knows of innovations. */
-    float stated = is_fast ? variance * (faster * faster) : variance;
-{% else %}
-    float stated = variance * (is_fast ? birge * (faster * faster) : birge);
-{% endif %}
-
-    *flags |= seen->starts && seen->fading > << doubt.worth >>f * START_DOUBT ? OHMSTRAIN_START_UP : 0;
-    *flags |= !seen->starts && seen->fading > << doubt.worth >>f * variance ? OHMSTRAIN_RECOVERING : 0;
-    *flags |= is_fast || outside > << doubt.worth >>f * variance || birge > 1.0f + << doubt.worth >>f ? OHMSTRAIN_EXTRAPOLATED : 0;
-    *flags |= seen->run_s > LONGEST_RUN_S ? OHMSTRAIN_LONG_RUN : 0;
-{% if doubt.rest %}
-    *flags |= seen->rest_off > 0.0f ? OHMSTRAIN_REST_MOVED : 0;
-{% endif %}
-    stated = stated < MOST_DOUBT ? stated : MOST_DOUBT;
-    stated = stated > variance ? stated : variance;
-    return stated + (more < MOST_DOUBT ? more : MOST_DOUBT);
-}
-
 /* Flags of intervals that were passed without a reading. */
 enum { NO_READING = OHMSTRAIN_MISSING | OHMSTRAIN_IMPLAUSIBLE | OHMSTRAIN_STUCK | OHMSTRAIN_REJECTED };
 
@@ -698,20 +452,17 @@ static ohmstrain_status step(ohmstrain_state *state, float dt_s, const float *rh
     ohmstrain_residual of_step = {0.0f, 0.0f, 0.0f};
     summary all;
     const float *believed = rho;
-    float strain, variance, shown = 0.0f;
-    int status;
+    float strain, variance, passed_s, shown = 0.0f, jump = 0.0f;
+    int surprises, has_jumped;
 
-    seen.since_s += dt_s;
-    seen.repeated_s += dt_s;
+    pass_time(&seen, dt_s);
     if (rho) {
-        const float rest = 1.0f + seen.off;
-        shown = (*rho - seen.off) / rest;
-        extra_variance /= rest * rest;
-        flags = sieve(&seen, shown, &extra_variance);
+        on_followed_rest(&seen, *rho, extra_variance, &shown, &extra_variance);
+        flags = sieve(&seen, PLAUSIBILITY ? PLAUSIBLE_LOWER : -INFINITY, PLAUSIBILITY ? PLAUSIBLE_UPPER : INFINITY,
+                      PLAUSIBILITY ? LONGEST_REPEAT_S : INFINITY, shown, extra_variance, &extra_variance);
         rho = flags ? (const float *)0 : &shown;
     }
-    status = advance(state, dt_s, rho, extra_variance, &flags, &of_step);
-    if (status != OHMSTRAIN_OK) {
+    if (advance(state, dt_s, rho, extra_variance, &flags, &of_step) != OHMSTRAIN_OK) {
         return OHMSTRAIN_ERR_STATE;
     }
     if (residual) {
@@ -719,37 +470,39 @@ static ohmstrain_status step(ohmstrain_state *state, float dt_s, const float *rh
     }
     rho = flags & NO_READING ? (const float *)0 : rho;
     believed = rho ? believed : rho;
-    if (rho) {
-        const float jump = *rho - seen.calm;
-        seen.startling = of_step.nis > STARTLING ? (unsigned char)(seen.startling + (seen.startling < 255)) : 0;
-        if (SECOND_LOOK && seen.startling == BESIDE_AFTER && seen.has_believed && fabsf(jump) > JUMP) {
-            jumped(&seen, jump);
+    surprises = (flags & OHMSTRAIN_DOWNWEIGHTED) && of_step.nis > SURPRISING;
+    has_jumped = rho && startles(&seen, *rho, of_step.nis, SECOND_LOOK ? JUMP : INFINITY, &jump) && surprises;
 {% if estimator.hypotheses %}
-            look_again(state);
-{% endif %}
-        }
-        seen.calm = of_step.nis > SURPRISING ? seen.calm : *rho;
+    if (has_jumped) {
+        look_again(state);
     }
+{% endif %}
     summarise(state, &all);
     strain = strain_of(&all, &variance);
 {% if correction %}
-    watch(&seen, dt_s, flags & ~(unsigned)OHMSTRAIN_DOWNWEIGHTED ? (const float *)0 : rho, flags & OHMSTRAIN_DOWNWEIGHTED);
-    if (!seen.missing) {
-        seen.known_variance = variance;
-    }
+    hear(&seen, dt_s, rho, surprises);
+    seen.known_variance = seen.waits ? seen.known_variance : variance;
     if (seen.has_feature) {
         const float filtered = strain, filtered_variance = variance;
         correct(&all, &seen, filtered, filtered_variance, &strain, &variance);
     }
 {% endif %}
-    if (believed) {
+    if (believed && seen.follows) {
+        if (has_jumped) {
+            jumped(&seen, jump);
+        }
         follow(&seen, dt_s, *believed);
     }
     state->strain = strain;
     state->variance = variance;
-    variance = doubt_reading(&seen, dt_s, believed, of_step.nis, strain, variance);
+    passed_s = run(&seen, dt_s);
+    if (believed) {
+        doubt_reading(&seen, passed_s, *believed, of_step.nis);
+    } else {
+        variance = doubt_pause(&seen, passed_s, strain, variance);
+    }
     if (DOUBTS) {
-        state->variance = doubted(&seen, all.mean[1], variance, &flags);
+        flags |= doubted(&seen, all.mean[1], variance, &state->variance);
     }
     seen.flags = flags;
     state->readings = seen;
@@ -765,13 +518,8 @@ static ohmstrain_status start(ohmstrain_state *state, const float *strain, float
 
     start_mixture(state, strain);
     state->readings = none;
-    state->readings.starts = !strain;
     state->readings.follows = FOLLOWING;
-{% if doubt.rest %}
-    state->readings.rests = strain && fabsf(*strain) <= << doubt.zero >>f;
-{% endif %}
-    state->readings.fading = strain ? 0.0f : START_DOUBT;
-    state->readings.unread_s = strain ? 0.0f : NEVER_READ_S;
+    begin(&state->readings, strain != 0, strain && fabsf(*strain) <= << doubt.zero >>f);
     summarise(state, &all);
     state->strain = strain_of(&all, &state->variance);
     state->variance += DOUBTS ? state->readings.fading : 0.0f;
@@ -809,9 +557,7 @@ ohmstrain_status ohmstrain_rest(ohmstrain_state *state, float measured)
     state->rest_reading = rest_reading_at(measured);
     state->readings.follows = 0;
     state->readings.off = 0.0f;
-{% if doubt.rest %}
-    state->readings.rest_off = state->readings.beyond_s = state->readings.near_s = 0.0f;
-{% endif %}
+    tell_rest(&state->readings);
     return OHMSTRAIN_OK;
 }
 

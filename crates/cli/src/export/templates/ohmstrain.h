@@ -87,43 +87,17 @@ enum ohmstrain_flag {
     OHMSTRAIN_REST_MOVED = 512
 };
 
-/* What was seen of the readings. */
+/* What was seen of the readings, and what is to be doubted: fields are those of the Rust crate `ohmstrain-ekf`, `live` and
+ * `correction::ReadingFeatures`. */
 typedef struct ohmstrain_readings {
-    float rho;        /* the last one, relative to the rest reading */
-    float since_s;    /* time since it */
-    float repeated_s; /* time for which the same number has been coming */
-    unsigned count;   /* how often it came again */
-    unsigned flags;   /* of the last step */
-    unsigned char has_reading;
-    unsigned char startling; /* readings in a row that startled */
-    float calm;     /* the last one that did not surprise, relative to R0 as it has followed */
-    /* Doubts of the interval. */
-    unsigned char runs, starts, is_lost, has_believed, rests;
-    unsigned char follows, has_drawn; /* whether R0 follows the readings, and whether there has been one */
-    unsigned char has_jumped; /* whether readings have */
-    float run_s;    /* time since the first step */
-    float fading;   /* variance that fades while readings are believed */
-    float unread_s; /* time without a reading */
-    float lost;     /* variance of the strain where readings have not been believed since */
-    float believed; /* the last reading that was */
-    float near_off, far_off; /* how far readings have been outside of calibration's on the side of rest, and on the other one */
-    float misfit;   /* mean of the normalised innovations squared, lately */
-    float rest_off; /* how far R0 is off, as a share of it */
-    float off;      /* by what share R0 is another than OHMSTRAIN_REST_READING, as far as it has followed */
-    float drawn_by; /* the last reading that was believed, of an R0 that has not followed */
-    float undrawn_s; /* time since it came */
-    float off_before, jumped_s; /* R0 as it was where readings last jumped, as `off`, and how long ago that was */
-    float beyond_s, near_s, least; /* time for which readings have been beyond those at rest, and near them; how far beyond */
+{% for field in fields %}
+    << field >>
+{% endfor %}
 {% if correction %}
-    unsigned char has_feature;
-    unsigned char missing;
-    unsigned char surprises; /* in a row, that the correction has passed over */
-    float waited_s; /* time since the last reading that the correction saw */
-    float scaled;   /* that reading, on the correction's scale */
-    float known_variance;
-    float low_pass[OHMSTRAIN_LOW_PASSES];
-    float feature[7];
+    float known_variance;  /* of the filter's strain, at the last reading that it saw */
 {% endif %}
+    unsigned flags;        /* of the last step */
+    unsigned char follows; /* whether R0 follows the readings */
 } ohmstrain_readings;
 
 {% if estimator.hypotheses %}

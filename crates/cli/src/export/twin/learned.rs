@@ -24,13 +24,7 @@ impl<T: Real> OwnedLearned<T> {
         quadratics: Option<&[OwnedQuadratic; 2]>,
         limits: StrainRange<T>,
     ) -> Self {
-        let FeatureScale { centre, half_range, rates, starts } = correction.features;
-        let features = FeatureScale {
-            centre: number(centre),
-            half_range: number(half_range),
-            rates: rates.map(number),
-            starts: starts.map(|start| start.map(number)),
-        };
+        let features = correction.features.to();
         let numbers = |all: &[f64]| all.iter().copied().map(number).collect();
         let narrow = |of: &OwnedQuadratic| OwnedQuadratic { linear: numbers(&of.linear), square: numbers(&of.square) };
         let rows = OwnedCorrection { limits, ..correction.learned.map(number) };

@@ -16,7 +16,7 @@ use ohmstrain_model::SwitchedModel;
 use super::ExportError;
 use super::fixed_rate::FixedRate;
 use super::vectors::refused;
-use learned::OwnedLearned;
+pub use learned::OwnedLearned;
 pub use parts::{Parts, PhaseParts, bits, number};
 
 /// What depends on the length of a step: the kernel's numbers, then nine probabilities of the chain.

@@ -11,8 +11,19 @@ pub struct Scopes {
     of: Vec<usize>,
     /// The scope around each.
     around: Vec<usize>,
-    /// The scopes of both ways of a choice that is worth a branch.
-    arms: Vec<Option<[usize; 2]>>,
+    /// The branch that each choice is made by, if it is worth one.
+    branch: Vec<Option<usize>>,
+    branches: Vec<Branch>,
+}
+
+/// Choices by the same truth at the same place, made together.
+pub struct Branch {
+    mask: Place,
+    around: usize,
+    /// The scopes of both ways.
+    pub arms: [usize; 2],
+    /// The choices, none of which takes another one's result.
+    pub choices: Vec<Place>,
 }
 
 impl Scopes {
@@ -21,22 +32,23 @@ impl Scopes {
         let all = Self::of_all(operations, uses, results, |_| true);
         let costs = all.costs(operations, uses);
         Self::of_all(operations, uses, results, |place| {
-            all.arms[place].is_some_and(|arms| arms.iter().any(|arm| costs[*arm] >= WORTH))
+            all.branch_of(place).is_some_and(|branch| branch.arms.iter().any(|arm| costs[*arm] >= WORTH))
         })
     }
 
     /// With branches at these choices.
-    fn of_all(operations: &[Operation], uses: &[usize], results: &[Place], branches: impl Fn(Place) -> bool) -> Self {
-        let mut scopes = Self { of: vec![0; operations.len()], around: vec![0], arms: vec![None; operations.len()] };
+    fn of_all(operations: &[Operation], uses: &[usize], results: &[Place], worth: impl Fn(Place) -> bool) -> Self {
+        let (of, branch) = (vec![0; operations.len()], vec![None; operations.len()]);
+        let mut scopes = Self { of, around: vec![0], branch, branches: Vec::new() };
         let mut met = vec![false; operations.len()];
         results.iter().for_each(|place| met[*place] = true);
         for place in (0..operations.len()).rev().filter(|place| uses[*place] > 0) {
             let own = scopes.of[place];
             let mut needed = vec![own; 3];
-            if matches!(operations[place], Operation::Pick(..)) && branches(place) {
-                let arms = [scopes.inside(own), scopes.inside(own)];
-                scopes.arms[place] = Some(arms);
-                needed[1..].copy_from_slice(&arms);
+            if let Operation::Pick(mask, ..) = operations[place]
+                && worth(place)
+            {
+                needed[1..].copy_from_slice(&scopes.join(operations, place, mask, own));
             }
             for (operand, scope) in operations[place].operands().zip(needed) {
                 scopes.of[operand] = if met[operand] { scopes.both(scopes.of[operand], scope) } else { scope };
@@ -44,6 +56,23 @@ impl Scopes {
             }
         }
         scopes
+    }
+
+    /// The ways of a choice: those of an earlier one by the same truth, if they can be made together.
+    fn join(&mut self, operations: &[Operation], choice: Place, mask: Place, around: usize) -> [usize; 2] {
+        let is_like = |branch: &Branch| {
+            (branch.mask, branch.around) == (mask, around)
+                && !branch.choices.iter().any(|other| takes(operations, *other, choice))
+        };
+        let found = self.branches.iter().position(is_like);
+        let number = found.unwrap_or_else(|| {
+            let arms = [self.inside(around), self.inside(around)];
+            self.branches.push(Branch { mask, around, arms, choices: Vec::new() });
+            self.branches.len() - 1
+        });
+        self.branch[choice] = Some(number);
+        self.branches[number].choices.push(choice);
+        self.branches[number].arms
     }
 
     /// A new scope.
@@ -76,22 +105,18 @@ impl Scopes {
         costs
     }
 
-    /// The scopes of both ways of a choice that is worth a branch.
-    pub fn arms(&self, place: Place) -> Option<[usize; 2]> {
-        self.arms[place]
+    /// The branch that a choice is made by, if it is worth one.
+    pub fn branch_of(&self, choice: Place) -> Option<&Branch> {
+        self.branch.get(choice).copied().flatten().and_then(|number| self.branches.get(number))
     }
 
-    /// What the ways of a choice take that is not theirs alone.
-    pub fn shared(
-        &self,
-        operations: &[Operation],
-        uses: &[usize],
-        choice: Place,
-        ways: [(Place, usize); 2],
-    ) -> Vec<Place> {
-        let within = |place: Place| ways.iter().any(|(_, arm)| self.both(self.of[place], *arm) == *arm);
-        let inner = (0..choice).filter(|place| uses[*place] > 0 && within(*place));
-        let taken = inner.flat_map(|place| operations[place].operands()).chain(ways.map(|(result, _)| result));
+    /// What the ways of a branch take that is not theirs alone.
+    pub fn shared(&self, operations: &[Operation], uses: &[usize], branch: &Branch) -> Vec<Place> {
+        let within = |place: Place| branch.arms.iter().any(|arm| self.both(self.of[place], *arm) == *arm);
+        let last = branch.choices.iter().copied().max().unwrap_or(0);
+        let inner = (0..last).filter(|place| uses[*place] > 0 && within(*place));
+        let ways = branch.choices.iter().flat_map(|choice| operations[*choice].operands().skip(1));
+        let taken = inner.flat_map(|place| operations[place].operands()).chain(ways);
         let mut shared: Vec<Place> = taken.filter(|place| !within(*place)).collect();
         shared.sort_unstable();
         shared.dedup();
@@ -99,11 +124,24 @@ impl Scopes {
     }
 }
 
+/// Whether a result is needed for another one.
+fn takes(operations: &[Operation], result: Place, needed: Place) -> bool {
+    result == needed
+        || result > needed && operations[result].operands().any(|operand| takes(operations, operand, needed))
+}
+
 /// About how many sums an operation takes as long as.
 const fn cost(operation: Operation) -> usize {
     match operation {
-        Operation::Input(_) | Operation::Constant(_) | Operation::Known(_) | Operation::Hazard(_) => 0,
-        Operation::Exponential(_) | Operation::Falling(_) => 30,
+        Operation::Input(_)
+        | Operation::Flag(_)
+        | Operation::Constant(_)
+        | Operation::Known(_)
+        | Operation::Hazard(_) => 0,
+        Operation::Exponential(_)
+        | Operation::ExponentialLessOne(_)
+        | Operation::Tangent(_)
+        | Operation::Falling(_) => 30,
         Operation::Tail(_) => 80,
         Operation::Root(_) | Operation::Divide(..) => 14,
         _ => 1,
@@ -133,15 +171,16 @@ mod tests {
         ];
         let uses = [1, 1, 1, 2, 1, 1, 2, 1, 1, 1];
         let scopes = Scopes::new(&operations, &uses, &[9]);
-        let [yes, no] = scopes.arms(8).unwrap();
+        let branch = scopes.branch_of(8).unwrap();
+        let [yes, no] = branch.arms;
         assert_eq!((scopes.of[4], scopes.of[7], scopes.of[6], scopes.of[3]), (yes, no, 0, 0));
-        assert_eq!(scopes.shared(&operations, &uses, 8, [(4, yes), (7, no)]), [3, 6]);
+        assert_eq!(scopes.shared(&operations, &uses, branch), [3, 6]);
         assert_eq!(Scopes::new(&operations, &uses, &[9, 4]).of[4], 0);
     }
 
     #[test]
     fn a_choice_of_what_is_there_is_no_branch() {
         let operations = [Operation::Input(0), Operation::Input(1), Operation::Less(0, 1), Operation::Pick(2, 0, 1)];
-        assert_eq!(Scopes::new(&operations, &[2, 2, 1, 1], &[3]).arms(3), None);
+        assert!(Scopes::new(&operations, &[2, 2, 1, 1], &[3]).branch_of(3).is_none());
     }
 }

@@ -1,0 +1,317 @@
+//! What stands around a filter as functions in C: what becomes of a reading, what is doubted, what the correction sees of readings.
+//! The library's own code is run on expressions, once for every way that it may go.
+
+use ohmstrain_ekf::correction::{Decay, FeatureScale, ReadingFeatures, TIME_CONSTANTS_S};
+use ohmstrain_ekf::live::{Doubts, Flag, Jumps, Repeats, RestFollower, Sieve};
+use ohmstrain_ekf::record::{Expression, Fields, See, Writer, write_down};
+use ohmstrain_ekf::{Gaussian, Reading, ReadingVerdict};
+use ohmstrain_model::Number;
+
+use super::correction;
+use super::function::{Printed, RETURNED};
+use crate::export::twin::{OwnedLearned, Parts};
+
+const LOW_PASSES: usize = TIME_CONSTANTS_S.len();
+
+/// What stands around the filter of a sensor.
+pub struct Around<'a> {
+    pub parts: &'a Parts<'a>,
+    /// Variance of the model's own noise of a reading, relative.
+    pub reading_variance: f32,
+}
+
+impl Around<'_> {
+    /// All functions.
+    pub fn text(&self) -> String {
+        let of_readings = [Self::pass_time(), self.sieve(), startles()];
+        let of_rest = [self.on_followed_rest(), self.follow(), self.jumped()];
+        let of_doubts =
+            [self.begin(), self.tell_rest(), self.run(), self.doubt_reading(), self.doubt_pause(), self.doubted()];
+        let mut all: Vec<_> = of_readings.into_iter().chain(of_rest).chain(of_doubts).collect();
+        if let Some(correction) = self.parts.correction {
+            all.extend([self.birge(), watch(&correction.features)]);
+            all.extend(correction::functions(&OwnedLearned::new(correction, self.parts.quadratics, self.parts.limits)));
+        }
+        all.iter().map(Printed::text).collect::<Vec<_>>().join("\n")
+    }
+
+    /// What they keep from step to step, as fields of a struct.
+    pub fn fields(&self) -> Vec<String> {
+        let mut fields = Declared::default();
+        Repeats::<Expression<'_>>::none().each(&mut fields);
+        Jumps::<Expression<'_>>::none().each(&mut fields);
+        self.follower().each(&mut fields);
+        self.doubts().each(&mut fields);
+        if let Some(correction) = self.parts.correction {
+            ReadingFeatures::<Expression<'_>>::new(correction.features.to()).each(&mut fields);
+        }
+        fields.numbers.into_iter().chain(fields.truths).collect()
+    }
+
+    fn doubts<'t>(&self) -> Doubts<Expression<'t>> {
+        let doubts = Doubts::new(self.parts.doubt.to());
+        if self.parts.correction.is_some() { doubts.of_corrected() } else { doubts }
+    }
+
+    fn follower<'t>(&self) -> RestFollower<Expression<'t>> {
+        RestFollower::new(self.parts.rest.to())
+    }
+}
+
+impl Around<'_> {
+    fn pass_time() -> Printed {
+        Printed {
+            name: "pass_time",
+            comment: "Time has passed.",
+            parameters: &["float dt_s"],
+            function: write_down(|writer| {
+                let mut repeats = writer.state(Repeats::none());
+                repeats.pass(writer.input("dt_s"));
+                writer.keep(repeats);
+            }),
+        }
+    }
+
+    fn sieve(&self) -> Printed {
+        Printed {
+            name: "sieve",
+            comment: "What becomes of a reading, relative: a flag, or 0 where it is to be used, with the extra variance that repetition, and errors\n * that are alike for a while, give it.",
+            parameters: &["float lower", "float upper", "float longest_repeat_s", "float rho", "float extra_variance"],
+            function: write_down(|writer| {
+                let mut repeats = writer.state(Repeats::none());
+                let sieve = Sieve {
+                    plausible: (writer.input("lower"), writer.input("upper")),
+                    longest_repeat_s: writer.input("longest_repeat_s"),
+                    ..self.parts.sieve.to()
+                };
+                let reading = of_reading(writer);
+                let sieved = repeats.sieved(&sieve, reading, number(self.reading_variance));
+                writer.keep(repeats);
+                writer.give("sieved_variance", sieved.map_or(reading.extra_variance, |seen| seen.extra_variance));
+                writer.tell("OHMSTRAIN_IMPLAUSIBLE", sieved.err() == Some(ReadingVerdict::Implausible));
+                writer.tell("OHMSTRAIN_STUCK", sieved.err() == Some(ReadingVerdict::Stuck));
+            }),
+        }
+    }
+
+    fn on_followed_rest(&self) -> Printed {
+        Printed {
+            name: "on_followed_rest",
+            comment: "A reading relative to R0 as it is followed, from one relative to calibration's.",
+            parameters: &["float rho", "float extra_variance"],
+            function: write_down(|writer| {
+                let shown = writer.state(self.follower()).relative(of_reading(writer));
+                writer.give("shown", shown.value);
+                writer.give("shown_variance", shown.extra_variance);
+            }),
+        }
+    }
+
+    fn follow(&self) -> Printed {
+        Printed {
+            name: "follow",
+            comment: "R0 follows the readings: one beyond those of calibration draws it after itself, slowly, and one beyond the other end back, soon.",
+            parameters: &["float dt_s", "float rho"],
+            function: write_down(|writer| {
+                let mut follower = writer.state(self.follower());
+                follower.see(writer.input("dt_s"), writer.input("rho"));
+                writer.keep(follower);
+            }),
+        }
+    }
+
+    fn jumped(&self) -> Printed {
+        Printed {
+            name: "jumped",
+            comment: "Readings have jumped. Where they had shortly before, and back from where they have drawn R0 since, that was a fault.",
+            parameters: &["float jump"],
+            function: write_down(|writer| {
+                let mut follower = writer.state(self.follower());
+                follower.jumped(writer.input("jump"));
+                writer.keep(follower);
+            }),
+        }
+    }
+
+    fn begin(&self) -> Printed {
+        Printed {
+            name: "begin",
+            comment: "Before any reading; where the strain is known, and rests.",
+            parameters: &["int is_known", "int is_at_rest"],
+            function: write_down(|writer| {
+                let doubts = self.doubts();
+                writer.keep(if writer.truth("is_known") {
+                    doubts.of_known_strain(writer.truth("is_at_rest"))
+                } else {
+                    doubts
+                });
+            }),
+        }
+    }
+
+    fn tell_rest(&self) -> Printed {
+        Printed {
+            name: "tell_rest",
+            comment: "R0 of today has been told.",
+            parameters: &[],
+            function: write_down(|writer| {
+                let mut doubts = writer.state(self.doubts());
+                doubts.told_rest();
+                writer.keep(doubts);
+            }),
+        }
+    }
+
+    fn birge(&self) -> Printed {
+        Printed {
+            name: "birge_of",
+            comment: "By how much innovations have been larger of late than the filter states them.",
+            parameters: &[],
+            function: write_down(|writer| {
+                let birge = writer.state(self.doubts()).birge();
+                writer.give(RETURNED, birge);
+            }),
+        }
+    }
+
+    fn run(&self) -> Printed {
+        Printed {
+            name: "run",
+            comment: "A step has come: the time since the one before, if there was one.",
+            parameters: &["float dt_s"],
+            function: write_down(|writer| {
+                let mut doubts = writer.state(self.doubts());
+                let passed_s = doubts.pass(writer.input("dt_s"));
+                writer.keep(doubts);
+                writer.give(RETURNED, passed_s);
+            }),
+        }
+    }
+
+    fn doubt_reading(&self) -> Printed {
+        Printed {
+            name: "doubt_reading",
+            comment: "It has a reading that was used, and its squared innovation in variances.",
+            parameters: &["float passed_s", "float rho", "float nis"],
+            function: write_down(|writer| {
+                let mut doubts = writer.state(self.doubts());
+                doubts.read(writer.input("passed_s"), writer.input("rho"), writer.input("nis"));
+                writer.keep(doubts);
+            }),
+        }
+    }
+
+    fn doubt_pause(&self) -> Printed {
+        Printed {
+            name: "doubt_pause",
+            comment: "It has none: the strain's variance that this leaves open.",
+            parameters: &["float passed_s", "float strain", "float variance"],
+            function: write_down(|writer| {
+                let mut doubts = writer.state(self.doubts());
+                let stated = Gaussian { mean: writer.input("strain"), variance: writer.input("variance") };
+                let open = doubts.pause(writer.input("passed_s"), stated);
+                writer.keep(doubts);
+                writer.give(RETURNED, open);
+            }),
+        }
+    }
+
+    fn doubted(&self) -> Printed {
+        Printed {
+            name: "doubted",
+            comment: "The strain's variance with all doubts, and flags that say so.",
+            parameters: &["float rate", "float variance"],
+            function: write_down(|writer| {
+                let doubts = writer.state(self.doubts());
+                let (variance, flags) = doubts.widened(writer.input("rate"), writer.input("variance"));
+                writer.give("widened", variance);
+                for (name, flag) in DOUBTS {
+                    writer.tell(name, flags.has(flag));
+                }
+            }),
+        }
+    }
+}
+
+/// The flags of doubts, as C has them.
+const DOUBTS: [(&str, Flag); 5] = [
+    ("OHMSTRAIN_START_UP", Flag::StartUp),
+    ("OHMSTRAIN_RECOVERING", Flag::Recovering),
+    ("OHMSTRAIN_EXTRAPOLATED", Flag::Extrapolated),
+    ("OHMSTRAIN_LONG_RUN", Flag::LongRun),
+    ("OHMSTRAIN_REST_MOVED", Flag::RestMoved),
+];
+
+fn startles() -> Printed {
+    Printed {
+        name: "startles",
+        comment: "Whether readings have jumped, farther than `farthest`, and by how much.",
+        parameters: &["float rho", "float nis", "float farthest"],
+        function: write_down(|writer| {
+            let mut jumps = writer.state(Jumps::none());
+            let jump = jumps.see(writer.input("rho"), writer.input("nis"), writer.input("farthest"));
+            writer.keep(jumps);
+            writer.give("jump", jump.unwrap_or(number(0.0)));
+            writer.tell(RETURNED, jump.is_some());
+        }),
+    }
+}
+
+/// What the correction sees of the readings.
+fn watch(scale: &FeatureScale<f64>) -> Printed {
+    Printed {
+        name: "watch",
+        comment: "Takes a reading, relative, into the low-passes, which forget so much; without one they wait. The first few that surprise are passed\n * over.",
+        parameters: &[
+            "float dt_s",
+            "int is_read",
+            "float rho",
+            "int is_surprising",
+            "const float decay[LOW_PASSES]",
+            "const float mean_decay[LOW_PASSES]",
+        ],
+        function: write_down(|writer| {
+            let mut features = writer.state(ReadingFeatures::new(scale.to()));
+            let reading = writer.truth("is_read").then(|| writer.input("rho"));
+            let reading = features.unless(writer.truth("is_surprising"), reading);
+            let [ends, means]: [[_; LOW_PASSES]; 2] = ["decay", "mean_decay"].map(|name| writer.inputs(name));
+            let decays = core::array::from_fn(|k| Decay { end: ends[k], mean: means[k] });
+            features.step_with(writer.input("dt_s"), reading, |_| decays);
+            writer.keep(features);
+        }),
+    }
+}
+
+fn of_reading<'t>(writer: &Writer<'t>) -> Reading<Expression<'t>> {
+    Reading { value: writer.input("rho"), extra_variance: writer.input("extra_variance") }
+}
+
+fn number<'t>(number: f32) -> Expression<'t> {
+    Number::of(number.into())
+}
+
+/// Fields as C declares them; truths last, since they are small.
+#[derive(Default)]
+struct Declared {
+    numbers: Vec<String>,
+    truths: Vec<String>,
+}
+
+impl<T> See<T> for Declared {
+    fn number(&mut self, name: &'static str, _: &mut T) {
+        self.numbers.push(format!("float {name};"));
+    }
+
+    fn truth(&mut self, name: &'static str, _: &mut bool) {
+        self.truths.push(format!("unsigned char {name};"));
+    }
+
+    fn maybe<const K: usize>(&mut self, name: &'static str, _: &mut Option<[T; K]>) {
+        self.truths.push(format!("unsigned char has_{name};"));
+        self.numbers.push(if K == 1 { format!("float {name};") } else { format!("float {name}[{K}];") });
+    }
+
+    fn numbers<const K: usize>(&mut self, name: &'static str, _: &mut [T; K]) {
+        self.numbers.push(format!("float {name}[{K}];"));
+    }
+}

@@ -1,0 +1,104 @@
+//! A function that was written down for all its ways, in C.
+
+use std::fmt::Write;
+
+use ohmstrain_ekf::record::{Function, Name, Operation};
+
+use super::body::Body;
+
+/// What a result is called that the function returns.
+pub const RETURNED: &str = "return";
+/// How results begin that are flags of what the function returns.
+const FLAG: &str = "OHMSTRAIN_";
+
+/// A function in C, of what is kept of the readings.
+pub struct Printed {
+    pub name: &'static str,
+    pub comment: &'static str,
+    /// Parameters between the readings and what results are written to.
+    pub parameters: &'static [&'static str],
+    pub function: Function,
+}
+
+impl Printed {
+    pub fn text(&self) -> String {
+        let Function { inputs, results, recorded } = &self.function;
+        let name_of = |input: usize| inputs.get(input).map_or_else(String::new, in_c);
+        let is_kept = |name: &Name, place: usize| match recorded.operations[place] {
+            Operation::Input(input) | Operation::Flag(input) => inputs.get(input) == Some(name),
+            _ => false,
+        };
+        let mut body = Body::new(recorded, &name_of);
+        let (mut written, mut returned, mut flags, mut kind) = (String::new(), None, Vec::new(), "void");
+        let (mut changes, mut outputs) = (false, Vec::new());
+        for (name, place) in results.iter().zip(&recorded.results) {
+            let is_truth = body.is_truth(*place);
+            match name {
+                Name::Field(_) if is_kept(name, *place) => {}
+                Name::Field(_) => {
+                    changes = true;
+                    let target = in_c(name);
+                    let value = body.value(*place);
+                    let _ = writeln!(written, "    {target} = {value};");
+                }
+                Name::Own(own) if own == RETURNED => {
+                    kind = if is_truth { "int" } else { "float" };
+                    returned = Some(body.value(*place));
+                }
+                Name::Own(own) if own.starts_with(FLAG) => {
+                    kind = "unsigned";
+                    flags.push(format!("({} ? (unsigned){own} : 0u)", body.atom(*place)));
+                }
+                Name::Own(own) => {
+                    outputs.push(format!("{} *{own}", if is_truth { "int" } else { "float" }));
+                    let value = body.value(*place);
+                    let _ = writeln!(written, "    *{own} = {value};");
+                }
+            }
+        }
+        if !flags.is_empty() {
+            returned = Some(flags.join(" |\n           "));
+        }
+        for parameter in self.parameters {
+            let name = parameter.rsplit(' ').next().and_then(|name| name.split('[').next()).unwrap_or(parameter);
+            if !takes(&self.function, &body.uses, name) {
+                let _ = writeln!(body.lines, "    (void){name};");
+            }
+        }
+        let returns = returned.map_or_else(String::new, |value| format!("    return {value};\n"));
+        let has_state = inputs.iter().any(|name| matches!(name, Name::Field(_))) || changes;
+        let seen = if changes { "readings *seen" } else { "const readings *seen" };
+        let parameters: Vec<String> = has_state
+            .then(|| seen.to_owned())
+            .into_iter()
+            .chain(self.parameters.iter().map(|parameter| (*parameter).to_owned()))
+            .chain(outputs)
+            .collect();
+        format!(
+            "/* {} */\nstatic {kind} {}({})\n{{\n{}{written}{returns}}}\n",
+            self.comment,
+            self.name,
+            parameters.join(", "),
+            body.lines
+        )
+    }
+}
+
+/// Whether a parameter of this name, or an entry of it, is used.
+fn takes(function: &Function, uses: &[usize], parameter: &str) -> bool {
+    let is_named = |input: &usize| match function.inputs.get(*input) {
+        Some(Name::Own(own)) => own.split('[').next() == Some(parameter),
+        _ => false,
+    };
+    function.recorded.operations.iter().zip(uses).any(|(operation, uses)| match operation {
+        Operation::Input(input) | Operation::Flag(input) => *uses > 0 && is_named(input),
+        _ => false,
+    })
+}
+
+fn in_c(name: &Name) -> String {
+    match name {
+        Name::Field(field) => format!("seen->{field}"),
+        Name::Own(own) => own.clone(),
+    }
+}

@@ -1,0 +1,90 @@
+use crate::correction::ReadingFeatures;
+use crate::live::{Doubts, Jumps, Repeats, RestFollower};
+
+/// What a state is made of, by name: what another language keeps from step to step.
+pub trait Fields<T> {
+    /// Shows all fields.
+    fn each(&mut self, see: &mut impl See<T>);
+}
+
+/// Looks at the fields of a state, and may change them.
+pub trait See<T> {
+    /// A number.
+    fn number(&mut self, name: &'static str, number: &mut T);
+    /// A truth.
+    fn truth(&mut self, name: &'static str, truth: &mut bool);
+    /// Numbers that may be missing.
+    fn maybe<const K: usize>(&mut self, name: &'static str, numbers: &mut Option<[T; K]>);
+
+    /// A number that may be missing.
+    fn maybe_one(&mut self, name: &'static str, number: &mut Option<T>)
+    where
+        T: Copy,
+    {
+        let mut numbers = number.map(|number| [number]);
+        self.maybe(name, &mut numbers);
+        *number = numbers.map(|[number]| number);
+    }
+
+    /// As many numbers as there always are.
+    fn numbers<const K: usize>(&mut self, name: &'static str, numbers: &mut [T; K]);
+}
+
+/// Writes down the fields of states as they are named there.
+macro_rules! fields {
+    ($($state:ident { $($kind:ident $name:literal $($field:ident).+),+ $(,)? })+) => {
+        $(impl<T: Copy> Fields<T> for $state<T> {
+            fn each(&mut self, see: &mut impl See<T>) {
+                $(see.$kind($name, &mut self.$($field).+);)+
+            }
+        })+
+    };
+}
+
+fields! {
+    Repeats {
+        maybe_one "last" last,
+        number "since_s" since_s,
+        number "repeated_s" repeated_s,
+        number "count" count,
+    }
+    Jumps {
+        number "startling" startling,
+        maybe_one "calm" calm,
+    }
+    ReadingFeatures {
+        numbers "low_pass" low_passes,
+        number "waited_s" waited_s,
+        number "surprises" surprises,
+        truth "waits" waits,
+        maybe "feature" now,
+    }
+    RestFollower {
+        number "off" off,
+        maybe_one "drawn_by" last,
+        number "undrawn_s" since_s,
+        maybe "jumped" jumped,
+    }
+}
+
+impl<T: Copy> Fields<T> for Doubts<T> {
+    fn each(&mut self, see: &mut impl See<T>) {
+        see.truth("runs", &mut self.runs);
+        see.truth("starts", &mut self.starts);
+        see.number("run_s", &mut self.run_s);
+        see.number("fading", &mut self.fading);
+        see.number("unread_s", &mut self.unread_s);
+        see.maybe_one("lost", &mut self.lost);
+        see.maybe_one("believed", &mut self.believed);
+        see.number("near_off", &mut self.misfit.near);
+        see.number("far_off", &mut self.misfit.far);
+        see.number("misfit", &mut self.misfit.innovations.mean);
+        if let Some(rest) = &mut self.rest {
+            see.truth("rests", &mut rest.rests);
+            see.number("beyond_s", &mut rest.beyond_s);
+            see.number("near_s", &mut rest.near_s);
+            see.number("least", &mut rest.least);
+            see.number("rest_off", &mut rest.off);
+        }
+    }
+}
