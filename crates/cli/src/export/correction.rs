@@ -1,8 +1,7 @@
 //! The learned correction as the templates have it.
 
 use ohmstrain_calib::{OwnedProcess, OwnedRows, OwnedSimulated, PortableCorrection};
-use ohmstrain_ekf::Real;
-use ohmstrain_ekf::correction::{FAR, FILTER_INPUTS, LINEAR, NEW, NOVEL, OUTPUTS, TIME_CONSTANTS_S};
+use ohmstrain_ekf::correction::{Decay, FILTER_INPUTS, TIME_CONSTANTS_S};
 use serde::Serialize;
 
 use super::literal::Literal;
@@ -30,10 +29,6 @@ pub struct CorrectionConstants {
     processes: [ProcessConstants; 2],
     quadratics: Option<[QuadraticConstants; 2]>,
     simulated: Option<SimulatedConstants>,
-    far: Literal,
-    novel: Literal,
-    new: Literal,
-    linear: Literal,
     strain_variance: Literal,
     variance_factor: Literal,
 }
@@ -78,8 +73,6 @@ struct SimulatedConstants {
     rows: RowConstants,
     lower: Vec<Literal>,
     upper: Vec<Literal>,
-    /// Of each of the features.
-    relevance: Literal,
     process: ProcessConstants,
 }
 
@@ -90,7 +83,6 @@ impl SimulatedConstants {
             rows: RowConstants::new(&of.rows),
             lower: of.scales.iter().map(|scale| narrow(scale.lower)).collect(),
             upper: of.scales.iter().map(|scale| narrow(scale.upper)).collect(),
-            relevance: narrow(of.process.numbers.relevance[OUTPUTS]),
             process,
         }
     }
@@ -99,31 +91,14 @@ impl SimulatedConstants {
 /// A quadratic function.
 #[derive(Debug, Serialize)]
 struct QuadraticConstants {
-    rows: Vec<QuadraticRow>,
-}
-
-/// What an input is multiplied by: `linear`, and `square` times this and earlier inputs.
-#[derive(Debug, Serialize)]
-struct QuadraticRow {
-    linear: Literal,
+    linear: Vec<Literal>,
     square: Vec<Literal>,
 }
 
 impl QuadraticConstants {
     fn new(of: &OwnedQuadratic) -> Self {
-        let mut square = of.square.iter();
-        let row = |(i, linear): (usize, &f64)| QuadraticRow {
-            linear: narrow(*linear),
-            square: narrowed(square.by_ref().take(i + 1)),
-        };
-        Self { rows: of.linear.iter().enumerate().map(row).collect() }
+        Self { linear: narrowed(&of.linear), square: narrowed(&of.square) }
     }
-}
-
-/// exp(-x) and its mean, as `ohmstrain_ekf::correction::LowPass` has them.
-fn decays<T: Real>(dt_s: T, tau_s: T) -> (T, T) {
-    let x = dt_s / tau_s;
-    ((-x).exp(), if x > T::zero() { -(-x).exp_m1() / x } else { T::one() })
 }
 
 fn narrow(number: f64) -> Literal {
@@ -139,15 +114,15 @@ impl CorrectionConstants {
     pub fn new(correction: &PortableCorrection, quadratics: Option<&[OwnedQuadratic; 2]>, dt_s: f32) -> Self {
         let PortableCorrection { features, learned } = correction;
         let scales = &learned.scales;
-        let decays = TIME_CONSTANTS_S.map(|tau_s| decays(dt_s, tau_s as f32));
+        let decays = TIME_CONSTANTS_S.map(|tau_s| Decay::over(dt_s, tau_s as f32));
         Self {
             centre: narrow(features.centre),
             half_range: narrow(features.half_range),
             rates: features.rates.map(narrow),
             starts: features.starts.iter().map(|start| start.map(narrow)).collect(),
             time_constants_s: narrowed(&TIME_CONSTANTS_S),
-            decays: decays.iter().map(|(decay, _)| Literal(*decay)).collect(),
-            mean_decays: decays.iter().map(|(_, mean)| Literal(*mean)).collect(),
+            decays: decays.iter().map(|decay| Literal(decay.end)).collect(),
+            mean_decays: decays.iter().map(|decay| Literal(decay.mean)).collect(),
             rows: RowConstants::new(&learned.rows),
             mean: scales.iter().map(|scale| narrow(scale.mean)).collect(),
             sd: scales.iter().map(|scale| Some(narrow(scale.sd)).filter(|sd| sd.0.is_finite())).collect(),
@@ -164,10 +139,6 @@ impl CorrectionConstants {
             ],
             quadratics: quadratics.map(|both| both.each_ref().map(QuadraticConstants::new)),
             simulated: learned.simulated.as_ref().map(SimulatedConstants::new),
-            far: narrow(FAR),
-            novel: narrow(NOVEL),
-            new: narrow(NEW),
-            linear: narrow(LINEAR),
             strain_variance: narrow(learned.strain_variance),
             variance_factor: narrow(learned.variance_factor),
         }

@@ -3,7 +3,7 @@
 
 use ohmstrain_ekf::correction::{Decay, FeatureScale, ReadingFeatures, TIME_CONSTANTS_S};
 use ohmstrain_ekf::live::{Doubts, Flag, Jumps, Repeats, RestFollower, Sieve};
-use ohmstrain_ekf::record::{Expression, Fields, See, Writer, write_down};
+use ohmstrain_ekf::record::{Expression, Fields, See, Writer};
 use ohmstrain_ekf::{Gaussian, Reading, ReadingVerdict};
 use ohmstrain_model::Number;
 
@@ -60,24 +60,19 @@ impl Around<'_> {
 
 impl Around<'_> {
     fn pass_time() -> Printed {
-        Printed {
-            name: "pass_time",
-            comment: "Time has passed.",
-            parameters: &["float dt_s"],
-            function: write_down(|writer| {
-                let mut repeats = writer.state(Repeats::none());
-                repeats.pass(writer.input("dt_s"));
-                writer.keep(repeats);
-            }),
-        }
+        Printed::new("pass_time", "Time has passed.", &["float dt_s"], |writer| {
+            let mut repeats = writer.state(Repeats::none());
+            repeats.pass(writer.input("dt_s"));
+            writer.keep(repeats);
+        })
     }
 
     fn sieve(&self) -> Printed {
-        Printed {
-            name: "sieve",
-            comment: "What becomes of a reading, relative: a flag, or 0 where it is to be used, with the extra variance that repetition, and errors\n * that are alike for a while, give it.",
-            parameters: &["float lower", "float upper", "float longest_repeat_s", "float rho", "float extra_variance"],
-            function: write_down(|writer| {
+        Printed::new(
+            "sieve",
+            "What becomes of a reading, relative: a flag, or 0 where it is to be used, with the extra variance that repetition, and errors\n * that are alike for a while, give it.",
+            &["float lower", "float upper", "float longest_repeat_s", "float rho", "float extra_variance"],
+            |writer| {
                 let mut repeats = writer.state(Repeats::none());
                 let sieve = Sieve {
                     plausible: (writer.input("lower"), writer.input("upper")),
@@ -90,146 +85,141 @@ impl Around<'_> {
                 writer.give("sieved_variance", sieved.map_or(reading.extra_variance, |seen| seen.extra_variance));
                 writer.tell("OHMSTRAIN_IMPLAUSIBLE", sieved.err() == Some(ReadingVerdict::Implausible));
                 writer.tell("OHMSTRAIN_STUCK", sieved.err() == Some(ReadingVerdict::Stuck));
-            }),
-        }
+            },
+        )
     }
 
     fn on_followed_rest(&self) -> Printed {
-        Printed {
-            name: "on_followed_rest",
-            comment: "A reading relative to R0 as it is followed, from one relative to calibration's.",
-            parameters: &["float rho", "float extra_variance"],
-            function: write_down(|writer| {
+        Printed::new(
+            "on_followed_rest",
+            "A reading relative to R0 as it is followed, from one relative to calibration's.",
+            &["float rho", "float extra_variance"],
+            |writer| {
                 let shown = writer.state(self.follower()).relative(of_reading(writer));
                 writer.give("shown", shown.value);
                 writer.give("shown_variance", shown.extra_variance);
-            }),
-        }
+            },
+        )
     }
 
     fn follow(&self) -> Printed {
-        Printed {
-            name: "follow",
-            comment: "R0 follows the readings: one beyond those of calibration draws it after itself, slowly, and one beyond the other end back, soon.",
-            parameters: &["float dt_s", "float rho"],
-            function: write_down(|writer| {
+        Printed::new(
+            "follow",
+            "R0 follows the readings: one beyond those of calibration draws it after itself, slowly, and one beyond the other end back, soon.",
+            &["float dt_s", "float rho"],
+            |writer| {
                 let mut follower = writer.state(self.follower());
                 follower.see(writer.input("dt_s"), writer.input("rho"));
                 writer.keep(follower);
-            }),
-        }
+            },
+        )
     }
 
     fn jumped(&self) -> Printed {
-        Printed {
-            name: "jumped",
-            comment: "Readings have jumped. Where they had shortly before, and back from where they have drawn R0 since, that was a fault.",
-            parameters: &["float jump"],
-            function: write_down(|writer| {
+        Printed::new(
+            "jumped",
+            "Readings have jumped. Where they had shortly before, and back from where they have drawn R0 since, that was a fault.",
+            &["float jump"],
+            |writer| {
                 let mut follower = writer.state(self.follower());
                 follower.jumped(writer.input("jump"));
                 writer.keep(follower);
-            }),
-        }
+            },
+        )
     }
 
     fn begin(&self) -> Printed {
-        Printed {
-            name: "begin",
-            comment: "Before any reading; where the strain is known, and rests.",
-            parameters: &["int is_known", "int is_at_rest"],
-            function: write_down(|writer| {
+        Printed::new(
+            "begin",
+            "Before any reading; where the strain is known, and rests.",
+            &["int is_known", "int is_at_rest"],
+            |writer| {
                 let doubts = self.doubts();
                 writer.keep(if writer.truth("is_known") {
                     doubts.of_known_strain(writer.truth("is_at_rest"))
                 } else {
                     doubts
                 });
-            }),
-        }
+            },
+        )
     }
 
     fn tell_rest(&self) -> Printed {
-        Printed {
-            name: "tell_rest",
-            comment: "R0 of today has been told.",
-            parameters: &[],
-            function: write_down(|writer| {
-                let mut doubts = writer.state(self.doubts());
-                doubts.told_rest();
-                writer.keep(doubts);
-            }),
-        }
+        Printed::new("tell_rest", "R0 of today has been told.", &[], |writer| {
+            let mut doubts = writer.state(self.doubts());
+            doubts.told_rest();
+            writer.keep(doubts);
+        })
     }
 
     fn birge(&self) -> Printed {
-        Printed {
-            name: "birge_of",
-            comment: "By how much innovations have been larger of late than the filter states them.",
-            parameters: &[],
-            function: write_down(|writer| {
+        Printed::new(
+            "birge_of",
+            "By how much innovations have been larger of late than the filter states them.",
+            &[],
+            |writer| {
                 let birge = writer.state(self.doubts()).birge();
                 writer.give(RETURNED, birge);
-            }),
-        }
+            },
+        )
     }
 
     fn run(&self) -> Printed {
-        Printed {
-            name: "run",
-            comment: "A step has come: the time since the one before, if there was one.",
-            parameters: &["float dt_s"],
-            function: write_down(|writer| {
+        Printed::new(
+            "run",
+            "A step has come: the time since the one before, if there was one.",
+            &["float dt_s"],
+            |writer| {
                 let mut doubts = writer.state(self.doubts());
                 let passed_s = doubts.pass(writer.input("dt_s"));
                 writer.keep(doubts);
                 writer.give(RETURNED, passed_s);
-            }),
-        }
+            },
+        )
     }
 
     fn doubt_reading(&self) -> Printed {
-        Printed {
-            name: "doubt_reading",
-            comment: "It has a reading that was used, and its squared innovation in variances.",
-            parameters: &["float passed_s", "float rho", "float nis"],
-            function: write_down(|writer| {
+        Printed::new(
+            "doubt_reading",
+            "It has a reading that was used, and its squared innovation in variances.",
+            &["float passed_s", "float rho", "float nis"],
+            |writer| {
                 let mut doubts = writer.state(self.doubts());
                 doubts.read(writer.input("passed_s"), writer.input("rho"), writer.input("nis"));
                 writer.keep(doubts);
-            }),
-        }
+            },
+        )
     }
 
     fn doubt_pause(&self) -> Printed {
-        Printed {
-            name: "doubt_pause",
-            comment: "It has none: the strain's variance that this leaves open.",
-            parameters: &["float passed_s", "float strain", "float variance"],
-            function: write_down(|writer| {
+        Printed::new(
+            "doubt_pause",
+            "It has none: the strain's variance that this leaves open.",
+            &["float passed_s", "float strain", "float variance"],
+            |writer| {
                 let mut doubts = writer.state(self.doubts());
                 let stated = Gaussian { mean: writer.input("strain"), variance: writer.input("variance") };
                 let open = doubts.pause(writer.input("passed_s"), stated);
                 writer.keep(doubts);
                 writer.give(RETURNED, open);
-            }),
-        }
+            },
+        )
     }
 
     fn doubted(&self) -> Printed {
-        Printed {
-            name: "doubted",
-            comment: "The strain's variance with all doubts, and flags that say so.",
-            parameters: &["float rate", "float variance"],
-            function: write_down(|writer| {
+        Printed::new(
+            "doubted",
+            "The strain's variance with all doubts, and flags that say so.",
+            &["float rate", "float variance"],
+            |writer| {
                 let doubts = writer.state(self.doubts());
                 let (variance, flags) = doubts.widened(writer.input("rate"), writer.input("variance"));
                 writer.give("widened", variance);
                 for (name, flag) in DOUBTS {
                     writer.tell(name, flags.has(flag));
                 }
-            }),
-        }
+            },
+        )
     }
 }
 
@@ -243,26 +233,26 @@ const DOUBTS: [(&str, Flag); 5] = [
 ];
 
 fn startles() -> Printed {
-    Printed {
-        name: "startles",
-        comment: "Whether readings have jumped, farther than `farthest`, and by how much.",
-        parameters: &["float rho", "float nis", "float farthest"],
-        function: write_down(|writer| {
+    Printed::new(
+        "startles",
+        "Whether readings have jumped, farther than `farthest`, and by how much.",
+        &["float rho", "float nis", "float farthest"],
+        |writer| {
             let mut jumps = writer.state(Jumps::none());
             let jump = jumps.see(writer.input("rho"), writer.input("nis"), writer.input("farthest"));
             writer.keep(jumps);
             writer.give("jump", jump.unwrap_or(number(0.0)));
             writer.tell(RETURNED, jump.is_some());
-        }),
-    }
+        },
+    )
 }
 
 /// What the correction sees of the readings.
 fn watch(scale: &FeatureScale<f64>) -> Printed {
-    Printed {
-        name: "watch",
-        comment: "Takes a reading, relative, into the low-passes, which forget so much; without one they wait. The first few that surprise are passed\n * over.",
-        parameters: &[
+    Printed::new(
+        "watch",
+        "Takes a reading, relative, into the low-passes, which forget so much; without one they wait. The first few that surprise are passed\n * over.",
+        &[
             "float dt_s",
             "int is_read",
             "float rho",
@@ -270,7 +260,7 @@ fn watch(scale: &FeatureScale<f64>) -> Printed {
             "const float decay[LOW_PASSES]",
             "const float mean_decay[LOW_PASSES]",
         ],
-        function: write_down(|writer| {
+        |writer| {
             let mut features = writer.state(ReadingFeatures::new(scale.to()));
             let reading = writer.truth("is_read").then(|| writer.input("rho"));
             let reading = features.unless(writer.truth("is_surprising"), reading);
@@ -278,8 +268,8 @@ fn watch(scale: &FeatureScale<f64>) -> Printed {
             let decays = core::array::from_fn(|k| Decay { end: ends[k], mean: means[k] });
             features.step_with(writer.input("dt_s"), reading, |_| decays);
             writer.keep(features);
-        }),
-    }
+        },
+    )
 }
 
 fn of_reading<'t>(writer: &Writer<'t>) -> Reading<Expression<'t>> {

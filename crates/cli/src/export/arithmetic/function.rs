@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use ohmstrain_ekf::record::{Function, Name, Operation};
+use ohmstrain_ekf::record::{Function, Name, Operation, Writer, write_down};
 
 use super::body::Body;
 
@@ -21,6 +21,16 @@ pub struct Printed {
 }
 
 impl Printed {
+    /// Of what is done with a writer.
+    pub fn new(
+        name: &'static str,
+        comment: &'static str,
+        parameters: &'static [&'static str],
+        done: impl for<'t> Fn(&mut Writer<'t>),
+    ) -> Self {
+        Self { name, comment, parameters, function: write_down(done) }
+    }
+
     pub fn text(&self) -> String {
         let Function { inputs, results, recorded } = &self.function;
         let name_of = |input: usize| inputs.get(input).map_or_else(String::new, in_c);

@@ -215,8 +215,8 @@ pub const LEARNED: Learned<'static, f32> = Learned {
     quadratics: Some([
 {% for quadratic in correction.quadratics %}
         Quadratic {
-            linear: &[{% for row in quadratic.rows %}<< row.linear >>{% if not loop.last %}, {% endif %}{% endfor %}],
-            square: &[{% for row in quadratic.rows %}<< row.square|join(", ") >>{% if not loop.last %}, {% endif %}{% endfor %}],
+            linear: &[<< quadratic.linear|join(", ") >>],
+            square: &[<< quadratic.square|join(", ") >>],
         },
 {% endfor %}
     ]),
