@@ -1,4 +1,4 @@
-use ohmstrain_model::{ParameterError, Problem, Scalar};
+use ohmstrain_model::{Number, ParameterError, Problem, Scalar};
 
 use crate::{Advanced, Estimator, Innovation, Reading, State, StepError};
 
@@ -217,17 +217,9 @@ fn taken_as<T: Scalar, E: Estimator<T, N, L>, const N: usize, const L: usize>(
     }
 }
 
-impl<T: Scalar> Reading<T> {
-    /// With so much more noise that the innovation's variance S becomes S/w: the gain, and with it the step, is w times as
-    /// large.
-    fn weighted(self, weight: T, variance: T) -> Self {
-        Self { extra_variance: self.extra_variance + variance * (T::one() / weight - T::one()), ..self }
-    }
-}
-
-impl<T: Scalar> Influence<T> {
-    /// Weight of an innovation, 0 to 1.
-    fn weight(&self, nis: T) -> T {
+impl<T: Number> Influence<T> {
+    /// Weight of an innovation with this square in its variances, 0 to 1.
+    pub fn weight(&self, nis: T) -> T {
         match *self {
             Self::Full => T::one(),
             Self::Huber { threshold } if nis > threshold * threshold => threshold / nis.sqrt(),

@@ -1,5 +1,7 @@
 use nalgebra::SVector;
-use ohmstrain_model::{Direction, Observation, Phase, Scalar, SwitchedModel, SwitchedStep, Symmetric, Transition};
+use ohmstrain_model::{
+    Direction, Number, Observation, Phase, Scalar, SwitchedModel, SwitchedStep, Symmetric, Transition,
+};
 
 use crate::Belief;
 
@@ -99,6 +101,29 @@ pub struct Reading<T> {
     /// Variance beyond the channel's own.
     pub extra_variance: T,
 }
+
+impl<T: Number> Reading<T> {
+    /// With so much more noise that the innovation's variance S becomes S/w: the gain, and with it the step, is w times as
+    /// large.
+    #[must_use]
+    pub fn weighted(self, weight: T, variance: T) -> Self {
+        Self { extra_variance: self.extra_variance + variance * (T::one() / weight - T::one()), ..self }
+    }
+
+    /// With more noise than it has beside a channel's own `variance`, by a factor, where it is more exact than numbers of such
+    /// a rounding; `None` if it is so far away that noise is of no use.
+    #[must_use]
+    pub fn coarser(self, variance: T, rounding: T) -> Option<Self> {
+        // A relative reading of order one is not known better than this.
+        let noise = self.extra_variance + variance + rounding * rounding;
+        // What is so far away that its square overflows is not too exact.
+        let is_near = (self.value * self.value / noise).is_finite();
+        is_near.then(|| Self { extra_variance: T::of(COARSER) * noise, ..self })
+    }
+}
+
+/// Growth of a reading's variance from one try to the next.
+const COARSER: f64 = 16.0;
 
 impl<T: Scalar> From<T> for Reading<T> {
     fn from(value: T) -> Self {

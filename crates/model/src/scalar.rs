@@ -53,6 +53,9 @@ pub trait Number:
     #[must_use]
     fn tanh(self) -> Self;
 
+    /// Whether it is neither infinite nor no number.
+    fn is_finite(self) -> bool;
+
     /// Zero.
     #[must_use]
     #[inline(always)]
@@ -72,6 +75,11 @@ impl<T: Scalar> Number for T {
     #[inline(always)]
     fn of(value: f64) -> Self {
         <T as Scalar>::of(value)
+    }
+
+    #[inline(always)]
+    fn is_finite(self) -> bool {
+        ComplexField::is_finite(&self)
     }
 
     #[inline(always)]

@@ -231,14 +231,7 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
         let Some(reading) = reading.filter(|_| refused.is_of_the_reading() && tries <= MOST_TRIES) else {
             return Err(refused);
         };
-        // A relative reading of order one is not known better than this.
-        let rounding = T::default_epsilon() * T::default_epsilon();
-        let noise = reading.extra_variance + self.reading.variance + rounding;
-        // What is so far away that its square overflows is not too exact.
-        if !(reading.value * reading.value / noise).is_finite() {
-            return Err(refused);
-        }
-        Ok(Reading { extra_variance: T::of(COARSER) * noise, ..reading })
+        reading.coarser(self.reading.variance, T::default_epsilon()).ok_or(refused)
     }
 }
 
@@ -250,8 +243,7 @@ fn is_directed<T: Scalar, const B: usize>(law: &SensorLaw<T, B>) -> bool {
         })
 }
 
-/// Growth of a reading's variance from one try to the next, and the most tries after the first.
-const COARSER: f64 = 16.0;
+/// The most tries of a step after the first.
 pub(crate) const MOST_TRIES: u32 = 12;
 
 /// Refuses what is no length of a step that moves.

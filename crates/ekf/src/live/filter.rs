@@ -8,7 +8,8 @@ use crate::clock::check_time_step;
 use crate::correction::{FeatureScale, ReadingFeatures, filter_inputs};
 use crate::substeps::Repeated;
 use crate::{
-    Belief, Estimator, Gaussian, Guard, Influence, Reading, ReadingVerdict, Real, State, StepError, Streak, Substeps,
+    Belief, Estimator, Gaussian, Guard, Influence, Reading, ReadingVerdict, Real, Recordable, State, StepError, Streak,
+    Substeps,
 };
 
 /// How far beyond the limits a strain may be that somebody knows, in spans.
@@ -271,9 +272,7 @@ impl<'a, T: Real, E: SensorEstimator<T, N, L>, const N: usize, const L: usize> L
 
     /// The filter's strain, moved into the limits.
     fn filtered(&self, belief: &Belief<T, N, L>) -> Gaussian<T> {
-        let scale = self.parts.strain_sd_scale;
-        let variance = belief.covariance[(0, 0)].max(T::zero()) * scale * scale;
-        Gaussian { mean: belief.mean[0], variance }.clamped(&self.parts.limits)
+        reported(Gaussian::marginal(belief, 0), self.parts.strain_sd_scale, &self.parts.limits)
     }
 
     /// The filter's strain, corrected; where a reading is missing its variance grows by as much as the filter's has grown since.
@@ -320,6 +319,13 @@ impl<T: Real, S> Memory<T, S> {
             follower: protections.following.then(|| RestFollower::new(parts.rest)),
         }
     }
+}
+
+/// A filter's strain as it is reported: moved into the limits, its deviation by a factor larger, and not less than zero.
+#[must_use]
+pub fn reported<T: Recordable>(strain: Gaussian<T>, sd_scale: T, limits: &StrainRange<T>) -> Gaussian<T> {
+    let variance = strain.variance.max(T::zero()) * sd_scale * sd_scale;
+    Gaussian { mean: strain.mean, variance }.clamped(limits)
 }
 
 /// Whether the strain may be zero: within the limits, or a little beyond.

@@ -17,7 +17,7 @@ mod unread;
 
 pub use doubt::{DOUBT, DoubtNumbers, DoubtParts, Doubts};
 pub use estimator::SensorEstimator;
-pub use filter::{KNOWN_BEYOND, LiveEstimate, LiveFilter, LiveParts, may_be_unstretched};
+pub use filter::{KNOWN_BEYOND, LiveEstimate, LiveFilter, LiveParts, may_be_unstretched, reported};
 pub use flags::{Flag, Flags};
 pub use innovations::Innovations;
 pub use jumps::{BESIDE_AFTER, BESIDE_SHARE, Jumps, STARTLING_NIS, SURPRISING_NIS};

@@ -482,6 +482,13 @@ impl Number for Expression<'_> {
     fn tanh(self) -> Self {
         self.then(f32::tanh, Operation::Tangent)
     }
+
+    fn is_finite(self) -> bool {
+        match self.0 {
+            Kind::Literal(number) => number.is_finite(),
+            Kind::On(tape, place) => tape.ask(Operation::Finite(place)),
+        }
+    }
 }
 
 impl Recordable for Expression<'_> {}

@@ -2,10 +2,10 @@
 //! The library's own code is run on expressions, once for every way that it may go.
 
 use ohmstrain_ekf::correction::{Decay, FeatureScale, ReadingFeatures, TIME_CONSTANTS_S};
-use ohmstrain_ekf::live::{Doubts, Flag, Jumps, Repeats, RestFollower, Sieve};
+use ohmstrain_ekf::live::{Doubts, Flag, Jumps, Repeats, RestFollower, SURPRISING_NIS, Sieve, reported};
 use ohmstrain_ekf::record::{Expression, Fields, See, Writer};
-use ohmstrain_ekf::{Gaussian, Reading, ReadingVerdict};
-use ohmstrain_model::Number;
+use ohmstrain_ekf::{Gaussian, Influence, Reading, ReadingVerdict};
+use ohmstrain_model::{Number, StrainRange};
 
 use super::correction;
 use super::function::{Printed, RETURNED};
@@ -23,7 +23,7 @@ pub struct Around<'a> {
 impl Around<'_> {
     /// All functions.
     pub fn text(&self) -> String {
-        let of_readings = [Self::pass_time(), self.sieve(), startles()];
+        let of_readings = [Self::pass_time(), self.sieve(), startles(), self.coarser(), weighted(), self.reported()];
         let of_rest = [self.on_followed_rest(), self.follow(), self.jumped()];
         let of_doubts =
             [self.begin(), self.tell_rest(), self.run(), self.doubt_reading(), self.doubt_pause(), self.doubted()];
@@ -85,6 +85,35 @@ impl Around<'_> {
                 writer.give("sieved_variance", sieved.map_or(reading.extra_variance, |seen| seen.extra_variance));
                 writer.tell("OHMSTRAIN_IMPLAUSIBLE", sieved.err() == Some(ReadingVerdict::Implausible));
                 writer.tell("OHMSTRAIN_STUCK", sieved.err() == Some(ReadingVerdict::Stuck));
+            },
+        )
+    }
+
+    fn coarser(&self) -> Printed {
+        Printed::new(
+            "coarser",
+            "A reading with more noise, where it is more exact than the numbers; whether that is of use.",
+            &["float rho", "float extra_variance"],
+            |writer| {
+                let reading = of_reading(writer);
+                let coarser = reading.coarser(number(self.reading_variance), number(f32::EPSILON));
+                writer.give("more_variance", coarser.unwrap_or(reading).extra_variance);
+                writer.tell(RETURNED, coarser.is_some());
+            },
+        )
+    }
+
+    fn reported(&self) -> Printed {
+        Printed::new(
+            "reported",
+            "The filter's strain as it is reported.",
+            &["float mean", "float variance"],
+            |writer| {
+                let strain = Gaussian { mean: writer.input("mean"), variance: writer.input("variance") };
+                let [lower, upper] = [self.parts.limits.lower, self.parts.limits.upper].map(number);
+                let reported = reported(strain, number(self.parts.strain_sd_scale), &StrainRange { lower, upper });
+                writer.give("reported_variance", reported.variance);
+                writer.give(RETURNED, reported.mean);
             },
         )
     }
@@ -231,6 +260,20 @@ const DOUBTS: [(&str, Flag); 5] = [
     ("OHMSTRAIN_LONG_RUN", Flag::LongRun),
     ("OHMSTRAIN_REST_MOVED", Flag::RestMoved),
 ];
+
+fn weighted() -> Printed {
+    Printed::new(
+        "weighted",
+        "The extra variance of a reading that surprises: it has less weight.",
+        &["float extra_variance", "float nis", "float variance"],
+        |writer| {
+            let weight =
+                Influence::Redescending { threshold: number(SURPRISING_NIS.sqrt() as f32) }.weight(writer.input("nis"));
+            let reading = Reading { value: number(0.0), extra_variance: writer.input("extra_variance") };
+            writer.give(RETURNED, reading.weighted(weight, writer.input("variance")).extra_variance);
+        },
+    )
+}
 
 fn startles() -> Printed {
     Printed::new(

@@ -76,20 +76,16 @@ static const float KNOWN_VARIANCE = << known_variance >>f, KNOWN_BEYOND = << kno
 /* What the rested, unstretched sensor read in calibration: of the day, where OHMSTRAIN_REST_READING is of the law. */
 static const float RESTED = << rested >>f;
 
-/* White noise of a reading, relative to the rest reading, squared. */
-static const float READING_VARIANCE = << reading_variance >>f;
 /* Least and largest rho that can be a reading of this sensor: others are taken for missing. */
 static const float PLAUSIBLE_LOWER = << sieve.lower >>f;
 static const float PLAUSIBLE_UPPER = << sieve.upper >>f;
 /* The longest time, s, for which a working sensor repeats one number, and how far a reading is from another one where it has jumped. */
 static const float LONGEST_REPEAT_S = {% if sieve.longest_repeat_s is none %}INFINITY{% else %}<< sieve.longest_repeat_s >>f{% endif %}, JUMP = << sieve.jump >>f;
-/* Factor on the standard deviation of strain that the calibration found necessary. */
-static const float STRAIN_SD_SCALE = << strain_sd_scale >>f;
-/* The rounding of a number of order one, its square, and the most tries of a step after the first. */
 {% if estimator.hypotheses %}
-static const float ROOT_ROUNDING = 1.1920929e-7f;
+/* The rounding of a number of order one. */
+static const float ROUNDING = 1.1920929e-7f;
 {% endif %}
-static const float ROUNDING = 1.4210855e-14f;
+/* The most tries of a step after the first. */
 enum { MOST_TRIES = 12 };
 /* Squared deviations beyond which a reading counts the less the farther it is. */
 static const float SURPRISING = 9.0f;
@@ -177,11 +173,6 @@ static void numbers_of(float step_s, float s[STEP])
 {% for pair in steps.reciprocals %}
     s[<< pair[0] >>] = 1.0f / s[<< pair[1] >>];
 {% endfor %}
-}
-
-static float clamped(float x, float lower, float upper)
-{
-    return x < lower ? lower : x > upper ? upper : x;
 }
 
 /* The number with its bits shifted to where an exponent stands. */
@@ -302,7 +293,7 @@ static float relative(float reading, float rest_reading)
  * covariance is one again. */
 static void loosen(ohmstrain_state *state, int tries)
 {
-    float share = ROOT_ROUNDING;
+    float share = ROUNDING;
     int i, j, k;
 
     for (; tries > 0; tries--) {
@@ -333,11 +324,9 @@ static int step_again(ohmstrain_state *state, const interval *over, const float 
 
     for (tries = 1; status == OHMSTRAIN_ERR_STATE && tries <= MOST_TRIES; tries++) {
         if (rho) {
-            extra_variance = extra_variance + READING_VARIANCE + ROUNDING;
-            if (!isfinite(*rho * *rho / extra_variance)) {
+            if (!coarser(*rho, extra_variance, &extra_variance)) {
                 break;
             }
-            extra_variance = 16.0f * extra_variance;
         }
 {% if estimator.hypotheses %}
         loosen(from, tries);
@@ -381,10 +370,8 @@ static int last_step(ohmstrain_state *state, const interval *over, const float *
     }
     status = step_on(state, over, rho, extra_variance, INFLUENCE ? SURPRISING : INFINITY, residual);
     if (status == SURPRISED) {
-        const float weight = SURPRISING / residual->nis;
-        const float more = residual->variance * (1.0f / weight - 1.0f);
         ohmstrain_residual again;
-        status = step_on(state, over, rho, extra_variance + more, INFINITY, &again);
+        status = step_on(state, over, rho, weighted(extra_variance, residual->nis, residual->variance), INFINITY, &again);
         *flags |= status == OHMSTRAIN_OK ? OHMSTRAIN_DOWNWEIGHTED : 0;
     }
     if (status == OHMSTRAIN_OK) {
@@ -434,12 +421,6 @@ static int advance(ohmstrain_state *state, float dt_s, const float *rho, float e
                      : last_step(state, &over, rho, extra_variance, flags, residual);
 }
 
-static float strain_of(const summary *all, float *variance)
-{
-    *variance = (all->variance[0] > 0.0f ? all->variance[0] : 0.0f) * STRAIN_SD_SCALE * STRAIN_SD_SCALE;
-    return clamped(all->mean[0], OHMSTRAIN_LOWER, OHMSTRAIN_UPPER);
-}
-
 /* Flags of intervals that were passed without a reading. */
 enum { NO_READING = OHMSTRAIN_MISSING | OHMSTRAIN_IMPLAUSIBLE | OHMSTRAIN_STUCK | OHMSTRAIN_REJECTED };
 
@@ -478,7 +459,7 @@ static ohmstrain_status step(ohmstrain_state *state, float dt_s, const float *rh
     }
 {% endif %}
     summarise(state, &all);
-    strain = strain_of(&all, &variance);
+    strain = reported(all.mean[0], all.variance[0], &variance);
 {% if correction %}
     hear(&seen, dt_s, rho, surprises);
     seen.known_variance = seen.waits ? seen.known_variance : variance;
@@ -521,7 +502,7 @@ static ohmstrain_status start(ohmstrain_state *state, const float *strain, float
     state->readings.follows = FOLLOWING;
     begin(&state->readings, strain != 0, strain && fabsf(*strain) <= << doubt.zero >>f);
     summarise(state, &all);
-    state->strain = strain_of(&all, &state->variance);
+    state->strain = reported(all.mean[0], all.variance[0], &state->variance);
     state->variance += DOUBTS ? state->readings.fading : 0.0f;
     state->rest_reading = rest_reading;
     return OHMSTRAIN_OK;
