@@ -1,271 +1,23 @@
-use core::cell::RefCell;
 use core::cmp::Ordering;
 use core::ops::{Add, AddAssign, Div, Mul, MulAssign, Neg, Sub, SubAssign};
-use std::vec::Vec;
 
 use ohmstrain_model::Number;
 
+use super::operation::{Operation, Place};
+use super::tape::Tape;
 use crate::Recordable;
 use crate::kernel::tail::Tail;
 use crate::kernel::{Falls, Lanes};
 
-/// Where an earlier operation stands in [`Recorded::operations`].
-pub type Place = usize;
-
-/// An operation on earlier results. Sums, products and quotients are rounded one by one.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Operation {
-    /// The input of this number.
-    Input(usize),
-    /// The input of this number, a truth.
-    Flag(usize),
-    /// A constant.
-    Constant(f32),
-    /// A sum.
-    Add(Place, Place),
-    /// A difference.
-    Subtract(Place, Place),
-    /// A product.
-    Multiply(Place, Place),
-    /// A quotient.
-    Divide(Place, Place),
-    /// The number with its sign turned.
-    Negate(Place),
-    /// The number without its sign.
-    Absolute(Place),
-    /// A square root.
-    Root(Place),
-    /// An exponential.
-    Exponential(Place),
-    /// An exponential, less one.
-    ExponentialLessOne(Place),
-    /// A hyperbolic tangent.
-    Tangent(Place),
-    /// An exponential of what is not above zero.
-    Falling(Place),
-    /// The number with its bits shifted to where an exponent stands.
-    ToExponent(Place),
-    /// What a standard normal has above a border.
-    Tail(Place),
-    /// Its density at the border of such a tail, over the tail.
-    Hazard(Place),
-    /// Whether the first is less than the second.
-    Less(Place, Place),
-    /// Whether the first is not more than the second.
-    AtMost(Place, Place),
-    /// Whether both are the same number.
-    Equal(Place, Place),
-    /// Whether a number is zero or more; not if it is not a number.
-    NotNegative(Place),
-    /// Whether a number is finite.
-    Finite(Place),
-    /// Whether both are true.
-    Both(Place, Place),
-    /// Whether one of both is true.
-    Either(Place, Place),
-    /// Whether it is not true.
-    Not(Place),
-    /// What is known to be true, or false.
-    Known(bool),
-    /// The second where the first is true, else the third.
-    Pick(Place, Place, Place),
-}
-
-impl Operation {
-    /// Whether it is true or false, and no number.
-    #[must_use]
-    pub const fn is_truth(self) -> bool {
-        matches!(
-            self,
-            Self::Flag(_)
-                | Self::Less(..)
-                | Self::AtMost(..)
-                | Self::Equal(..)
-                | Self::NotNegative(_)
-                | Self::Finite(_)
-                | Self::Both(..)
-                | Self::Either(..)
-                | Self::Not(_)
-                | Self::Known(_)
-        )
-    }
-
-    /// The places of what it takes.
-    pub fn operands(self) -> impl Iterator<Item = Place> {
-        let (a, b, c) = match self {
-            Self::Input(_) | Self::Flag(_) | Self::Constant(_) | Self::Known(_) => (None, None, None),
-            Self::Negate(a)
-            | Self::Absolute(a)
-            | Self::Root(a)
-            | Self::Exponential(a)
-            | Self::ExponentialLessOne(a)
-            | Self::Tangent(a)
-            | Self::Falling(a)
-            | Self::ToExponent(a)
-            | Self::Tail(a)
-            | Self::Hazard(a)
-            | Self::NotNegative(a)
-            | Self::Finite(a)
-            | Self::Not(a) => (Some(a), None, None),
-            Self::Add(a, b)
-            | Self::Subtract(a, b)
-            | Self::Multiply(a, b)
-            | Self::Divide(a, b)
-            | Self::Less(a, b)
-            | Self::AtMost(a, b)
-            | Self::Equal(a, b)
-            | Self::Both(a, b)
-            | Self::Either(a, b) => (Some(a), Some(b), None),
-            Self::Pick(a, b, c) => (Some(a), Some(b), Some(c)),
-        };
-        [a, b, c].into_iter().flatten()
-    }
-}
-
-/// A function from inputs to results without a choice of way.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Recorded {
-    /// Operations, each on results of earlier ones.
-    pub operations: Vec<Operation>,
-    /// Where the results stand.
-    pub results: Vec<Place>,
-}
-
-/// Operations as they come, and the ways that comparisons choose.
-#[derive(Default)]
-pub(super) struct Tape {
-    operations: RefCell<Vec<Operation>>,
-    /// What has been asked on this way, and what was answered; answers that are given before are taken in turn.
-    asked: RefCell<Vec<Place>>,
-    answers: RefCell<Vec<bool>>,
-}
-
 /// A number that is known when the recorded function runs, or one of the source text.
 #[derive(Clone, Copy)]
-pub struct Expression<'a>(Kind<'a>);
+pub struct Expression<'a>(pub(super) Kind<'a>);
 
 #[derive(Clone, Copy)]
-enum Kind<'a> {
+pub(super) enum Kind<'a> {
     /// Of no tape yet.
     Literal(f32),
     On(&'a Tape, Place),
-}
-
-impl Tape {
-    pub(super) fn input(&self, number: usize) -> Expression<'_> {
-        self.put(Operation::Input(number))
-    }
-
-    /// The operation, where its place is.
-    fn put(&self, operation: Operation) -> Expression<'_> {
-        Expression(Kind::On(self, self.place(operation)))
-    }
-
-    /// The place of an operation: of the same one, if it was done before.
-    pub(super) fn place(&self, operation: Operation) -> Place {
-        let mut operations = self.operations.borrow_mut();
-        let place = operations.iter().position(|known| same(*known, operation)).unwrap_or(operations.len());
-        if place == operations.len() {
-            operations.push(operation);
-        }
-        place
-    }
-
-    /// A truth.
-    pub(super) fn known(&self, truth: bool) -> Expression<'_> {
-        self.put(Operation::Known(truth))
-    }
-
-    pub(super) fn recorded<'a>(&'a self, results: impl IntoIterator<Item = Expression<'a>>) -> Recorded {
-        let results = results.into_iter().map(|result| result.place_on(self)).collect();
-        Recorded { operations: self.operations.borrow().clone(), results }
-    }
-
-    /// Which way to go: as answered before, and otherwise that of the truth.
-    pub(super) fn ask(&self, operation: Operation) -> bool {
-        let place = self.place(operation);
-        let (mut asked, mut answers) = (self.asked.borrow_mut(), self.answers.borrow_mut());
-        let number = asked.iter().position(|known| *known == place).unwrap_or(asked.len());
-        if number == asked.len() {
-            asked.push(place);
-        }
-        if number == answers.len() {
-            answers.push(true);
-        }
-        answers.get(number).copied().unwrap_or(true)
-    }
-
-    /// Begins a way on which these are the first answers.
-    pub(super) fn answer(&self, answers: &[bool]) {
-        self.asked.borrow_mut().clear();
-        *self.answers.borrow_mut() = answers.to_vec();
-    }
-
-    /// What has been asked on this way.
-    pub(super) fn asked(&self) -> Vec<Place> {
-        self.asked.borrow().clone()
-    }
-
-    fn operation(&self, place: Place) -> Operation {
-        self.operations.borrow().get(place).copied().unwrap_or(Operation::Known(false))
-    }
-
-    fn not(&self, truth: Place) -> Place {
-        match self.operation(truth) {
-            Operation::Known(truth) => self.place(Operation::Known(!truth)),
-            Operation::Not(of) => of,
-            _ => self.place(Operation::Not(truth)),
-        }
-    }
-
-    /// Whether a truth is found without a division, a root or an exponential: such may be asked for where it does not matter.
-    fn is_cheap(&self, place: Place) -> bool {
-        let operation = self.operation(place);
-        let is_dear = matches!(
-            operation,
-            Operation::Divide(..)
-                | Operation::Root(_)
-                | Operation::Exponential(_)
-                | Operation::ExponentialLessOne(_)
-                | Operation::Tangent(_)
-                | Operation::Falling(_)
-                | Operation::Tail(_)
-        );
-        !is_dear && operation.operands().all(|operand| self.is_cheap(operand))
-    }
-
-    /// One of two results, numbers or truths.
-    pub(super) fn choose(&self, mask: Place, yes: Place, no: Place) -> Place {
-        let [both, either] = [Operation::Both, Operation::Either].map(|of| move |a, b| self.place(of(a, b)));
-        match (self.operation(yes), self.operation(no)) {
-            _ if yes == no => yes,
-            (Operation::Known(true), Operation::Known(false)) => mask,
-            (Operation::Known(false), Operation::Known(true)) => self.not(mask),
-            (Operation::Known(true), _) if self.is_cheap(no) => either(mask, no),
-            (Operation::Known(false), _) if self.is_cheap(no) => both(self.not(mask), no),
-            (_, Operation::Known(true)) if self.is_cheap(yes) => either(self.not(mask), yes),
-            (_, Operation::Known(false)) if self.is_cheap(yes) => both(mask, yes),
-            // A choice of the same result twice is one choice.
-            (Operation::Pick(further, a, b), _) if b == no && self.is_cheap(further) => {
-                self.choose(both(mask, further), a, no)
-            }
-            (Operation::Pick(further, a, b), _) if a == no && self.is_cheap(further) => {
-                self.choose(both(mask, self.not(further)), b, no)
-            }
-            (_, Operation::Pick(further, a, b)) if a == yes && self.is_cheap(further) => {
-                self.choose(either(mask, further), yes, b)
-            }
-            (_, Operation::Pick(further, a, b)) if b == yes && self.is_cheap(further) => {
-                self.choose(either(mask, self.not(further)), yes, a)
-            }
-            // So is one that both ways ask for.
-            (Operation::Pick(yes_if, a, b), Operation::Pick(no_if, c, d)) if yes_if == no_if && (a == c || b == d) => {
-                let (first, second) = (self.choose(mask, a, c), self.choose(mask, b, d));
-                self.choose(yes_if, first, second)
-            }
-            _ => self.place(Operation::Pick(mask, yes, no)),
-        }
-    }
 }
 
 /// Numbers that are none have room for the number of an input that they stand for.
@@ -280,14 +32,6 @@ pub(super) fn standing_for(input: usize) -> f32 {
 
 fn stood_for(number: f32) -> Option<usize> {
     number.is_nan().then_some((number.to_bits() & ROOM) as usize)
-}
-
-/// Zeros of both signs compare as equal, and are not the same.
-fn same(a: Operation, b: Operation) -> bool {
-    match (a, b) {
-        (Operation::Constant(a), Operation::Constant(b)) => a.to_bits() == b.to_bits(),
-        _ => a == b,
-    }
 }
 
 impl<'a> Expression<'a> {
@@ -316,7 +60,7 @@ impl<'a> Expression<'a> {
     fn operation(self) -> Operation {
         match self.0 {
             Kind::Literal(number) => Operation::Constant(number),
-            Kind::On(tape, place) => tape.operations.borrow().get(place).copied().unwrap_or(Operation::Known(false)),
+            Kind::On(tape, place) => tape.operation(place),
         }
     }
 

@@ -2,8 +2,7 @@ use std::string::String;
 use std::vec::Vec;
 use std::{format, vec};
 
-use super::expression::{Expression, Operation, Place, Recorded, Tape};
-use super::{Fields, See};
+use super::{Expression, Fields, Operation, Place, Recorded, See, Tape};
 
 /// A function that has been written down for all ways that it may go, with what it is given and what it gives by name.
 #[derive(Clone, Debug, PartialEq)]

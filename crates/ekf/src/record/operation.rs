@@ -1,0 +1,123 @@
+use std::vec::Vec;
+
+/// Where an earlier operation stands in [`Recorded::operations`].
+pub type Place = usize;
+
+/// An operation on earlier results. Sums, products and quotients are rounded one by one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Operation {
+    /// The input of this number.
+    Input(usize),
+    /// The input of this number, a truth.
+    Flag(usize),
+    /// A constant.
+    Constant(f32),
+    /// A sum.
+    Add(Place, Place),
+    /// A difference.
+    Subtract(Place, Place),
+    /// A product.
+    Multiply(Place, Place),
+    /// A quotient.
+    Divide(Place, Place),
+    /// The number with its sign turned.
+    Negate(Place),
+    /// The number without its sign.
+    Absolute(Place),
+    /// A square root.
+    Root(Place),
+    /// An exponential.
+    Exponential(Place),
+    /// An exponential, less one.
+    ExponentialLessOne(Place),
+    /// A hyperbolic tangent.
+    Tangent(Place),
+    /// An exponential of what is not above zero.
+    Falling(Place),
+    /// The number with its bits shifted to where an exponent stands.
+    ToExponent(Place),
+    /// What a standard normal has above a border.
+    Tail(Place),
+    /// Its density at the border of such a tail, over the tail.
+    Hazard(Place),
+    /// Whether the first is less than the second.
+    Less(Place, Place),
+    /// Whether the first is not more than the second.
+    AtMost(Place, Place),
+    /// Whether both are the same number.
+    Equal(Place, Place),
+    /// Whether a number is zero or more; not if it is not a number.
+    NotNegative(Place),
+    /// Whether a number is finite.
+    Finite(Place),
+    /// Whether both are true.
+    Both(Place, Place),
+    /// Whether one of both is true.
+    Either(Place, Place),
+    /// Whether it is not true.
+    Not(Place),
+    /// What is known to be true, or false.
+    Known(bool),
+    /// The second where the first is true, else the third.
+    Pick(Place, Place, Place),
+}
+
+impl Operation {
+    /// Whether it is true or false, and no number.
+    #[must_use]
+    pub const fn is_truth(self) -> bool {
+        matches!(
+            self,
+            Self::Flag(_)
+                | Self::Less(..)
+                | Self::AtMost(..)
+                | Self::Equal(..)
+                | Self::NotNegative(_)
+                | Self::Finite(_)
+                | Self::Both(..)
+                | Self::Either(..)
+                | Self::Not(_)
+                | Self::Known(_)
+        )
+    }
+
+    /// The places of what it takes.
+    pub fn operands(self) -> impl Iterator<Item = Place> {
+        let (a, b, c) = match self {
+            Self::Input(_) | Self::Flag(_) | Self::Constant(_) | Self::Known(_) => (None, None, None),
+            Self::Negate(a)
+            | Self::Absolute(a)
+            | Self::Root(a)
+            | Self::Exponential(a)
+            | Self::ExponentialLessOne(a)
+            | Self::Tangent(a)
+            | Self::Falling(a)
+            | Self::ToExponent(a)
+            | Self::Tail(a)
+            | Self::Hazard(a)
+            | Self::NotNegative(a)
+            | Self::Finite(a)
+            | Self::Not(a) => (Some(a), None, None),
+            Self::Add(a, b)
+            | Self::Subtract(a, b)
+            | Self::Multiply(a, b)
+            | Self::Divide(a, b)
+            | Self::Less(a, b)
+            | Self::AtMost(a, b)
+            | Self::Equal(a, b)
+            | Self::Both(a, b)
+            | Self::Either(a, b) => (Some(a), Some(b), None),
+            Self::Pick(a, b, c) => (Some(a), Some(b), Some(c)),
+        };
+        [a, b, c].into_iter().flatten()
+    }
+}
+
+/// A function from inputs to results without a choice of way.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Recorded {
+    /// Operations, each on results of earlier ones.
+    pub operations: Vec<Operation>,
+    /// Where the results stand.
+    pub results: Vec<Place>,
+}

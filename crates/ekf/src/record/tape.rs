@@ -1,0 +1,139 @@
+use core::cell::RefCell;
+use std::vec::Vec;
+
+use super::expression::{Expression, Kind};
+use super::operation::{Operation, Place, Recorded};
+
+/// Operations as they come, and the ways that comparisons choose.
+#[derive(Default)]
+pub(super) struct Tape {
+    operations: RefCell<Vec<Operation>>,
+    /// What has been asked on this way, and what was answered; answers that are given before are taken in turn.
+    asked: RefCell<Vec<Place>>,
+    answers: RefCell<Vec<bool>>,
+}
+
+impl Tape {
+    pub(super) fn input(&self, number: usize) -> Expression<'_> {
+        self.put(Operation::Input(number))
+    }
+
+    /// The operation, where its place is.
+    pub(super) fn put(&self, operation: Operation) -> Expression<'_> {
+        Expression(Kind::On(self, self.place(operation)))
+    }
+
+    /// The place of an operation: of the same one, if it was done before.
+    pub(super) fn place(&self, operation: Operation) -> Place {
+        let mut operations = self.operations.borrow_mut();
+        let place = operations.iter().position(|known| same(*known, operation)).unwrap_or(operations.len());
+        if place == operations.len() {
+            operations.push(operation);
+        }
+        place
+    }
+
+    /// A truth.
+    pub(super) fn known(&self, truth: bool) -> Expression<'_> {
+        self.put(Operation::Known(truth))
+    }
+
+    pub(super) fn recorded<'a>(&'a self, results: impl IntoIterator<Item = Expression<'a>>) -> Recorded {
+        let results = results.into_iter().map(|result| result.place_on(self)).collect();
+        Recorded { operations: self.operations.borrow().clone(), results }
+    }
+
+    /// Which way to go: as answered before, and otherwise that of the truth.
+    pub(super) fn ask(&self, operation: Operation) -> bool {
+        let place = self.place(operation);
+        let (mut asked, mut answers) = (self.asked.borrow_mut(), self.answers.borrow_mut());
+        let number = asked.iter().position(|known| *known == place).unwrap_or(asked.len());
+        if number == asked.len() {
+            asked.push(place);
+        }
+        if number == answers.len() {
+            answers.push(true);
+        }
+        answers.get(number).copied().unwrap_or(true)
+    }
+
+    /// Begins a way on which these are the first answers.
+    pub(super) fn answer(&self, answers: &[bool]) {
+        self.asked.borrow_mut().clear();
+        *self.answers.borrow_mut() = answers.to_vec();
+    }
+
+    /// What has been asked on this way.
+    pub(super) fn asked(&self) -> Vec<Place> {
+        self.asked.borrow().clone()
+    }
+
+    pub(super) fn operation(&self, place: Place) -> Operation {
+        self.operations.borrow().get(place).copied().unwrap_or(Operation::Known(false))
+    }
+
+    fn not(&self, truth: Place) -> Place {
+        match self.operation(truth) {
+            Operation::Known(truth) => self.place(Operation::Known(!truth)),
+            Operation::Not(of) => of,
+            _ => self.place(Operation::Not(truth)),
+        }
+    }
+
+    /// Whether a truth is found without a division, a root or an exponential: such may be asked for where it does not matter.
+    fn is_cheap(&self, place: Place) -> bool {
+        let operation = self.operation(place);
+        let is_dear = matches!(
+            operation,
+            Operation::Divide(..)
+                | Operation::Root(_)
+                | Operation::Exponential(_)
+                | Operation::ExponentialLessOne(_)
+                | Operation::Tangent(_)
+                | Operation::Falling(_)
+                | Operation::Tail(_)
+        );
+        !is_dear && operation.operands().all(|operand| self.is_cheap(operand))
+    }
+
+    /// One of two results, numbers or truths.
+    pub(super) fn choose(&self, mask: Place, yes: Place, no: Place) -> Place {
+        let [both, either] = [Operation::Both, Operation::Either].map(|of| move |a, b| self.place(of(a, b)));
+        match (self.operation(yes), self.operation(no)) {
+            _ if yes == no => yes,
+            (Operation::Known(true), Operation::Known(false)) => mask,
+            (Operation::Known(false), Operation::Known(true)) => self.not(mask),
+            (Operation::Known(true), _) if self.is_cheap(no) => either(mask, no),
+            (Operation::Known(false), _) if self.is_cheap(no) => both(self.not(mask), no),
+            (_, Operation::Known(true)) if self.is_cheap(yes) => either(self.not(mask), yes),
+            (_, Operation::Known(false)) if self.is_cheap(yes) => both(mask, yes),
+            // A choice of the same result twice is one choice.
+            (Operation::Pick(further, a, b), _) if b == no && self.is_cheap(further) => {
+                self.choose(both(mask, further), a, no)
+            }
+            (Operation::Pick(further, a, b), _) if a == no && self.is_cheap(further) => {
+                self.choose(both(mask, self.not(further)), b, no)
+            }
+            (_, Operation::Pick(further, a, b)) if a == yes && self.is_cheap(further) => {
+                self.choose(either(mask, further), yes, b)
+            }
+            (_, Operation::Pick(further, a, b)) if b == yes && self.is_cheap(further) => {
+                self.choose(either(mask, self.not(further)), yes, a)
+            }
+            // So is one that both ways ask for.
+            (Operation::Pick(yes_if, a, b), Operation::Pick(no_if, c, d)) if yes_if == no_if && (a == c || b == d) => {
+                let (first, second) = (self.choose(mask, a, c), self.choose(mask, b, d));
+                self.choose(yes_if, first, second)
+            }
+            _ => self.place(Operation::Pick(mask, yes, no)),
+        }
+    }
+}
+
+/// Zeros of both signs compare as equal, and are not the same.
+fn same(a: Operation, b: Operation) -> bool {
+    match (a, b) {
+        (Operation::Constant(a), Operation::Constant(b)) => a.to_bits() == b.to_bits(),
+        _ => a == b,
+    }
+}
