@@ -154,6 +154,46 @@ proptest! {
     }
 }
 
+/// Rows without a reading say nothing: readings before and after them say the same, to the bit, where they are left out.
+#[test]
+fn rows_without_a_reading_leave_no_trace() {
+    let params = sensor();
+    let (time_s, all) = recording(600);
+    let losses: [fn(usize) -> bool; 3] =
+        [|k| k * 61 % 100 == 0, |k| k % 2 == 1, |k| k < 20 || (200..400).contains(&k) || k % 50 > 45];
+    for (kind, is_lost) in EstimatorKind::ALL.into_iter().flat_map(|kind| losses.map(|is_lost| (kind, is_lost))) {
+        let readings: Vec<_> = (0..600).map(|k| all[k].filter(|_| !is_lost(k))).collect();
+        let read = || (0..600).filter(|k| readings[*k].is_some());
+        for start in [Start::Unknown, Start::Strain(0.1)] {
+            // A strain is known at the first row.
+            let rows = || read().filter(|k| start == Start::Unknown || *k > 0);
+            let first = (start != Start::Unknown).then_some(0);
+            let mut filters = [0; 2].map(|_| build_filter(&params, Some(kind), start).unwrap());
+            let [empty, cut] = &mut filters;
+            let mut said = Vec::new();
+            for k in 0..600 {
+                empty.step(time_s[k], readings[k]).unwrap();
+                said.push(shown(&**empty));
+            }
+            for k in first.into_iter().chain(rows()) {
+                cut.step(time_s[k], readings[k]).unwrap();
+                assert_eq!(shown(&**cut), said[k], "{} row {k}", kind.name());
+            }
+        }
+        let smoothed = |rows: &[usize]| {
+            let times: Vec<f64> = rows.iter().map(|k| time_s[*k]).collect();
+            let readings: Vec<_> = rows.iter().map(|k| readings[*k]).collect();
+            build_filter(&params, Some(kind), Start::Unknown).unwrap().smooth(&times, &readings).unwrap()
+        };
+        let rows: Vec<usize> = read().collect();
+        if let (Some(empty), Some(cut)) = (smoothed(&(0..600).collect::<Vec<_>>()), smoothed(&rows)) {
+            for (k, expected) in rows.into_iter().zip(cut) {
+                assert_eq!(empty[k], expected, "{} smoothed, row {k}", kind.name());
+            }
+        }
+    }
+}
+
 /// A slow sine through a polynomial, with a reading missing now and then, at times that jitter in their last digits.
 fn recording(rows: usize) -> (Vec<f64>, Vec<Option<Reading<f64>>>) {
     let reading = |k: usize| {

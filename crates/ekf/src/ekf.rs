@@ -3,7 +3,7 @@ use ohmstrain_model::{Observation, Scalar, Symmetric, Transition};
 
 use crate::clock::check_time_step;
 use crate::smooth::rts_step;
-use crate::substeps;
+use crate::substeps::Pause;
 use crate::{Advanced, Belief, Channel, Dynamics, Estimator, Innovation, Reading, State, StepError};
 
 /// Extended Kalman filter: one Gaussian, linearised at its mean.
@@ -73,14 +73,12 @@ impl<M> Ekf<M> {
         if dt_s.is_zero() {
             return self.finish(stand_still(belief), *belief, reading);
         }
-        let (count, counted) = substeps::count(dt_s, self.model.longest_step_s());
-        let prepared = self.model.prepare(dt_s / counted);
-        let (mut transition, mut prior) = self.predict(belief, &prepared);
-        for _ in 1..count {
-            let onward;
-            (onward, prior) = self.predict(&prior, &prepared);
-            transition = followed_by(&transition, &onward);
+        let mut pause = Pause::none(self.model.longest_step_s()).after(dt_s);
+        let mut before = None;
+        while let Some(length_s) = pause.step_before_last() {
+            before = Some(self.predict_on(before, belief, length_s));
         }
+        let (transition, prior) = self.predict_on(before, belief, pause.ahead_s());
         self.finish(transition, prior, reading)
     }
 
@@ -100,6 +98,22 @@ impl<M> Ekf<M> {
     {
         let (transition, prior) = self.predict(belief, prepared);
         self.finish(transition, prior, reading)
+    }
+
+    /// One step more, from where steps before it led to, or else from a belief; all of them as one transition.
+    fn predict_on<T: Scalar, const N: usize, const L: usize>(
+        &self,
+        before: Option<(Transition<T, N, L>, Belief<T, N, L>)>,
+        belief: &Belief<T, N, L>,
+        dt_s: T,
+    ) -> (Transition<T, N, L>, Belief<T, N, L>)
+    where
+        M: Dynamics<T, N, L>,
+    {
+        let prepared = self.model.prepare(dt_s);
+        let Some((transition, prior)) = before else { return self.predict(belief, &prepared) };
+        let (onward, prior) = self.predict(&prior, &prepared);
+        (followed_by(&transition, &onward), prior)
     }
 
     /// The belief a prepared step later, and how it got there.

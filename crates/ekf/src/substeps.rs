@@ -2,45 +2,169 @@ use ohmstrain_model::Scalar;
 
 use crate::{Advanced, Estimator, Innovation, Reading, StepError};
 
-/// An estimator that takes a long step as several short ones, so that a pause in the readings may be written down as one step
-/// or as many rows without a reading.
+/// An estimator that takes a long step as several short ones.
 ///
-/// How long a step may be is for the estimator to say ([`Estimator::longest_step_s`]); a pause is divided into 128 at most.
+/// How long a step may be is for the estimator to say ([`Estimator::longest_step_s`]); the steps of a long pause grow with it
+/// ([`Pause`]).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Substeps<E>(pub E);
 
-/// A prepared step, and how many of it there are.
+/// A prepared way over a pause: the steps before the last one, and the last one, prepared.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Repeated<P> {
-    step: P,
-    count: u8,
+pub struct Repeated<P, T> {
+    before: Pause<T>,
+    count: u32,
+    last: P,
 }
 
-/// Into how many steps a pause is divided at most.
-const MOST: u8 = 128;
 /// A step of the longest length shall be one step, whatever rounding says.
 pub const GRACE: f64 = 1.0005;
+/// A step is no longer than this share of the pause that has passed.
+const SHARE: f64 = 1.0 / 8.0;
+/// Steps grow by this factor: few lengths, so that a program can have them in a table.
+pub const GROWTH: f64 = 4.0;
+/// The longest pause that is divided, s: twelve days. A longer one leaves as little.
+pub const LONGEST_PAUSE_S: f64 = 1_048_576.0;
 
-/// Into how many steps of `longest_s` seconds at most a step of `dt_s` seconds is divided.
-pub(crate) fn count<T: Scalar>(dt_s: T, longest_s: T) -> (u8, T) {
-    // Twice, since a conversion would take double precision.
-    let (mut count, mut counted) = (1, T::one());
-    let mut covered = longest_s * T::of(GRACE);
-    let more = covered;
-    while covered < dt_s && count < MOST {
-        covered += more;
-        count += 1;
-        counted += T::one();
+/// The time since the last reading, divided into steps.
+///
+/// The division depends on that time alone: steps of the longest length L, then of 4 L, 16 L and so on, each no longer than an
+/// eighth of the pause before it; what remains is divided into the same lengths, the longest first, and one that is not longer
+/// than L. So a pause may be one row, or many rows without a reading.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pause<T> {
+    /// L, s.
+    longest_s: T,
+    /// Time that has been passed in whole steps, in L.
+    passed: T,
+    /// Time since then, s.
+    ahead_s: T,
+}
+
+impl<T: Scalar> Pause<T> {
+    /// At a reading, of an estimator whose longest step is `longest_s`.
+    #[must_use]
+    pub fn none(longest_s: T) -> Self {
+        Self { longest_s, passed: T::zero(), ahead_s: T::zero() }
     }
-    (count, counted)
+
+    /// The pause `dt_s` seconds later.
+    #[must_use]
+    pub fn after(self, dt_s: T) -> Self {
+        let (ahead_s, most) = (self.ahead_s + dt_s, T::of(LONGEST_PAUSE_S));
+        let is_too_long = ahead_s > most && self.longest_s.is_finite();
+        Self { ahead_s: if is_too_long { most } else { ahead_s }, ..self }
+    }
+
+    /// Time that has not been passed in whole steps, s.
+    pub const fn ahead_s(&self) -> T
+    where
+        T: Copy,
+    {
+        self.ahead_s
+    }
+
+    /// Passes a whole step: its length, s, or `None` where less than that is ahead.
+    pub fn whole_step(&mut self) -> Option<T> {
+        let times = self.times();
+        (self.ahead_s > times * self.longest_s * T::of(GRACE)).then(|| self.pass(times))
+    }
+
+    /// Passes a step, one of those that remain; its length, s, or `None` where only the last one is ahead.
+    pub(crate) fn step_before_last(&mut self) -> Option<T> {
+        let mut times = self.times();
+        while !(self.ahead_s > times * self.longest_s * T::of(GRACE)) {
+            if !(times > T::one()) {
+                return None;
+            }
+            times = times * T::of(1.0 / GROWTH);
+        }
+        Some(self.pass(times))
+    }
+
+    /// Length of a whole step, in L.
+    fn times(&self) -> T {
+        let (mut times, growth) = (T::one(), T::of(GROWTH));
+        while times * growth <= self.passed * T::of(SHARE) {
+            times = times * growth;
+        }
+        times
+    }
+
+    fn pass(&mut self, times: T) -> T {
+        let step_s = times * self.longest_s;
+        self.passed += times;
+        self.ahead_s = self.ahead_s - step_s;
+        step_s
+    }
 }
 
 impl<E> Substeps<E> {
+    /// At a reading.
+    pub fn pause<T, const N: usize, const L: usize>(&self) -> Pause<T>
+    where
+        T: Scalar,
+        E: Estimator<T, N, L>,
+    {
+        Pause::none(self.0.longest_step_s())
+    }
+
+    /// Prepares the way over what is ahead of a pause.
+    pub fn prepare_over<T, const N: usize, const L: usize>(&self, pause: Pause<T>) -> Repeated<E::Prepared, T>
+    where
+        T: Scalar,
+        E: Estimator<T, N, L>,
+    {
+        let (mut end, mut count) = (pause, 0);
+        while end.step_before_last().is_some() {
+            count += 1;
+        }
+        Repeated { before: pause, count, last: self.0.prepare(end.ahead_s) }
+    }
+
+    /// Passes the whole steps of a pause.
+    ///
+    /// # Errors
+    /// See [`StepError`].
+    pub fn pass_whole<T, const N: usize, const L: usize>(
+        &self,
+        state: &mut E::State,
+        pause: &mut Pause<T>,
+    ) -> Result<(), StepError>
+    where
+        T: Scalar,
+        E: Estimator<T, N, L>,
+    {
+        self.predict_over(state, core::iter::from_fn(|| pause.whole_step()))
+    }
+
+    /// Predicts over steps of these lengths, s.
+    fn predict_over<T, const N: usize, const L: usize>(
+        &self,
+        state: &mut E::State,
+        lengths_s: impl Iterator<Item = T>,
+    ) -> Result<(), StepError>
+    where
+        T: Scalar,
+        E: Estimator<T, N, L>,
+    {
+        let mut prepared = None;
+        for length_s in lengths_s {
+            let step = match prepared {
+                Some((last_s, step)) if last_s == length_s => step,
+                _ => self.0.prepare(length_s),
+            };
+            prepared = Some((length_s, step));
+            *state = self.0.advance(state, &step, None)?.state;
+        }
+        Ok(())
+    }
+
     /// One step backwards over all that remain.
     fn smooth_back_over<T, const N: usize, const L: usize>(
         &self,
         filtered: &E::State,
-        prepared: &Repeated<E::Prepared>,
+        prepared: &Repeated<E::Prepared, T>,
         reading: Option<Reading<T>>,
         next: &E::State,
     ) -> Result<Option<E::State>, StepError>
@@ -48,16 +172,22 @@ impl<E> Substeps<E> {
         T: Scalar,
         E: Estimator<T, N, L>,
     {
-        if prepared.count <= 1 {
-            return self.0.smooth_back(filtered, &prepared.step, reading, next);
+        if prepared.count == 0 {
+            return self.0.smooth_back(filtered, &prepared.last, reading, next);
         }
         // Half of them forward, the rest backward, then the first half: few states at a time.
-        let half = prepared.count / 2;
-        let (first, rest) =
-            (Repeated { count: half, ..*prepared }, Repeated { count: prepared.count - half, ..*prepared });
-        let middle = self.advance(filtered, &first, None)?.state;
-        let Some(later) = self.smooth_back_over(&middle, &rest, reading, next)? else { return Ok(None) };
-        self.smooth_back_over(filtered, &first, None, &later)
+        let first = prepared.count.div_ceil(2);
+        let (mut middle, mut rest, mut last_s) = (filtered.clone(), prepared.before, T::zero());
+        let mut left = first;
+        let lengths = core::iter::from_fn(|| {
+            left = left.checked_sub(1)?;
+            rest.step_before_last().inspect(|length_s| last_s = *length_s)
+        });
+        self.predict_over(&mut middle, lengths)?;
+        let later = Repeated { before: rest, count: prepared.count - first, last: prepared.last };
+        let Some(later) = self.smooth_back_over(&middle, &later, reading, next)? else { return Ok(None) };
+        let sooner = Repeated { count: first - 1, last: self.0.prepare(last_s), ..*prepared };
+        self.smooth_back_over(filtered, &sooner, None, &later)
     }
 }
 
@@ -67,11 +197,10 @@ where
     E: Estimator<T, N, L>,
 {
     type State = E::State;
-    type Prepared = Repeated<E::Prepared>;
+    type Prepared = Repeated<E::Prepared, T>;
 
     fn prepare(&self, dt_s: T) -> Self::Prepared {
-        let (count, counted) = count(dt_s, self.0.longest_step_s());
-        Repeated { step: self.0.prepare(dt_s / counted), count }
+        self.prepare_over(self.pause().after(dt_s))
     }
 
     fn advance(
@@ -92,26 +221,12 @@ where
         reading: Option<Reading<T>>,
         next: &mut E::State,
     ) -> Result<Option<Innovation<T>>, StepError> {
-        if prepared.count <= 1 {
-            return self.0.advance_into(state, &prepared.step, reading, next);
+        if prepared.count == 0 {
+            return self.0.advance_into(state, &prepared.last, reading, next);
         }
-        // To and fro between two states: the last step ends in `next`.
-        let mut between = state.clone();
-        let mut remaining = prepared.count;
-        if remaining % 2 == 1 {
-            self.0.advance_into(state, &prepared.step, None, next)?;
-            self.0.advance_into(next, &prepared.step, None, &mut between)?;
-            remaining -= 2;
-        } else {
-            self.0.advance_into(state, &prepared.step, None, &mut between)?;
-            remaining -= 1;
-        }
-        while remaining > 1 {
-            self.0.advance_into(&between, &prepared.step, None, next)?;
-            self.0.advance_into(next, &prepared.step, None, &mut between)?;
-            remaining -= 2;
-        }
-        self.0.advance_into(&between, &prepared.step, reading, next)
+        let (mut between, mut before) = (state.clone(), prepared.before);
+        self.predict_over(&mut between, core::iter::from_fn(|| before.step_before_last()))?;
+        self.0.advance_into(&between, &prepared.last, reading, next)
     }
 
     fn smooth_back(
@@ -127,16 +242,57 @@ where
 
 #[cfg(test)]
 mod tests {
-    use super::{MOST, count};
+    extern crate std;
+    use std::vec::Vec;
 
-    /// As many as it takes, whatever rounding makes of a sum, and no more than there may be.
+    use super::{GROWTH, LONGEST_PAUSE_S, Pause};
+
+    /// Lengths of all steps of a pause, in L, the last one included.
+    fn lengths(mut pause: Pause<f64>) -> Vec<f64> {
+        let mut all: Vec<f64> = core::iter::from_fn(|| pause.step_before_last()).collect();
+        all.push(pause.ahead_s);
+        all.into_iter().map(|length_s| length_s / pause.longest_s).collect()
+    }
+
     #[test]
     fn a_long_step_is_divided_into_as_many_as_it_takes() {
-        for (dt_s, expected) in
-            [(0.01, 1), (0.1, 1), (0.1001, 2), (0.1 + 0.1 + 0.1, 3), (0.95, 10), (6.0, 60), (1e9, MOST)]
-        {
-            assert_eq!(count(dt_s, 0.1), (expected, f64::from(expected)), "{dt_s} s");
+        for (dt_s, expected) in [(0.0, 1), (0.01, 1), (0.1, 1), (0.1001, 2), (0.1 + 0.1 + 0.1, 3), (0.95, 10), (3.2, 32)] {
+            let lengths = lengths(Pause::none(0.1).after(dt_s));
+            assert_eq!(lengths.len(), expected, "{dt_s} s");
+            assert!((lengths.iter().sum::<f64>() * 0.1 - dt_s).abs() < 1e-9);
         }
-        assert_eq!(count(1e9, f64::INFINITY), (1, 1.0));
+        assert_eq!(lengths(Pause::none(f64::INFINITY).after(1e5)).len(), 1);
+        // Eight whole lengths, 24 more of each, and at most three of each of what remains.
+        let most = |seconds: f64| 8.0 + 27.0 * (seconds / 0.1 / 8.0).log(GROWTH).ceil() + 1.0;
+        for seconds in [60.0, 3600.0, 86_400.0, LONGEST_PAUSE_S] {
+            let found = lengths(Pause::none(0.1).after(seconds));
+            assert!(found.len() as f64 <= most(seconds), "{seconds} s: {}", found.len());
+            let mut passed = 0.0;
+            for length in &found {
+                assert!(*length <= 1.0005 || *length <= passed / 8.0, "{seconds} s: {length} after {passed}");
+                passed += length;
+            }
+            assert!((passed * 0.1 / seconds - 1.0).abs() < 1e-9);
+        }
+        assert_eq!(lengths(Pause::none(0.1).after(f64::MAX)), lengths(Pause::none(0.1).after(LONGEST_PAUSE_S)));
+    }
+
+    /// Many rows lead over the same steps as one.
+    #[test]
+    fn a_pause_is_divided_alike_however_it_is_written_down() {
+        for seconds in [0.05, 0.31, 7.0, 123.4, 5000.0] {
+            for rows in [1, 3, 100] {
+                let (mut pause, mut whole) = (Pause::none(0.125), Vec::new());
+                for _ in 0..rows {
+                    pause = pause.after(seconds / f64::from(rows));
+                    whole.extend(core::iter::from_fn(|| pause.whole_step()).map(|length_s| length_s / 0.125));
+                }
+                whole.extend(lengths(pause));
+                let at_once = lengths(Pause::none(0.125).after(seconds));
+                assert_eq!(whole.len(), at_once.len(), "{seconds} s in {rows} rows");
+                let apart = whole.iter().zip(&at_once).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+                assert!(apart < 1e-9, "{seconds} s in {rows} rows: {apart}");
+            }
+        }
     }
 }

@@ -24,8 +24,9 @@ pub(crate) struct Translator {
     pub doubts: Option<Doubts<f64>>,
     /// None where R₀ is told.
     pub follower: Option<RestFollower<f64>>,
-    /// Time of the row that was seen last, s.
+    /// Times of the last row, and of the last one whose reading was used, s.
     pub seen_s: f64,
+    pub read_s: f64,
     /// What known strains say of other rows.
     pub errors: KnownErrors,
 }
@@ -43,8 +44,9 @@ impl Translator {
         let (taken, off) = (taken(&self.scale, reading, output), self.off());
         if let (Some(follower), Some((relative, _))) = (&mut self.follower, taken) {
             output.startled.into_iter().for_each(|jump| follower.jumped(jump));
-            follower.see(dt_s, relative);
+            follower.see(time_s - self.read_s, relative);
         }
+        self.read_s = if taken.is_some() { time_s } else { self.read_s };
         let mut flags = Flags::NONE;
         if let Some(doubts) = &mut self.doubts {
             let stated = output.estimate.strain;

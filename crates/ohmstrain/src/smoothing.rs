@@ -123,6 +123,7 @@ impl FilterBuilder<'_> {
         let mut back = filter.way_back(Rows::new(len, &relative)).map_err(failed)?;
         let (mut outputs, mut estimates, mut first) = (Vec::new(), Vec::new(), len);
         let start_s = if len > 0 { row(0).0 } else { 0.0 };
+        // Time of the reading after the row.
         let mut next_s = if len > 0 { row(len - 1).0 } else { 0.0 };
         let mut pauses = doubts.map(|doubts| Pauses::new(doubts.unread()));
         while let Some(rows) = back.next_segment(&mut outputs).map_err(failed)? {
@@ -134,12 +135,13 @@ impl FilterBuilder<'_> {
                 let mut flags = Flags::NONE;
                 if let Some(doubts) = doubts.as_mut().filter(|_| k > 0 || !starts_known) {
                     let estimate = &output.estimate;
-                    doubts.see_back(time_s - start_s, next_s - time_s, taken(&scale, reading, output));
+                    let taken = taken(&scale, reading, output);
+                    doubts.see_back(time_s - start_s, next_s - time_s, taken);
+                    next_s = if taken.is_some() { time_s } else { next_s };
                     let (widened, of_doubts) = doubts.widened(estimate.rate.mean, estimate.strain.variance);
                     flags = of_doubts;
                     doubt(&mut output.estimate, doubts, widened);
                 }
-                next_s = time_s;
                 output.estimate.strain = known(k, time_s, output.estimate.strain);
                 let mut estimate = scale.row(time_s, reading, off, output);
                 estimate.flags = estimate.flags.and(flags);

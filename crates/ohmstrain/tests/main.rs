@@ -2,6 +2,7 @@
 
 mod another_day;
 mod doubts;
+mod empty_rows;
 mod known;
 mod lag;
 mod rows;

@@ -169,6 +169,7 @@ fn interval(estimator: &EstimatorParams, setting: Setting, branches: usize) -> I
         filtered_scale: estimator.strain_sd_scale,
         smoothed_scale: estimator.smoothed_sd_scale.unwrap_or(1.0),
         sieve: setting.sieve.with_error_time(estimator.noise.reading_time_s),
+        starts_known: matches!(setting.start, Start::Strain(_)),
     }
 }
 

@@ -36,8 +36,9 @@ struct Watched {
     time_s: Option<f64>,
     /// The filter's variance at the last reading, once one has been missing since.
     known_variance: Option<f64>,
-    /// How much larger the filter's innovations had been than stated, before the row.
+    /// How much larger the filter's innovations had been than stated, before the row; time of the last of them, s.
     innovations: Innovations<f64>,
+    innovated_s: Option<f64>,
     birge: f64,
 }
 
@@ -45,14 +46,18 @@ impl Watched {
     fn new(scale: FeatureScale<f64>) -> Self {
         let features = ReadingFeatures::new(scale);
         let innovations = Innovations::none();
-        Self { features, time_s: None, known_variance: None, innovations, birge: 1.0 }
+        Self { features, time_s: None, known_variance: None, innovations, innovated_s: None, birge: 1.0 }
     }
 
     /// Takes a row in either direction of time.
     fn step(&mut self, time_s: f64, Seen { reading, surprises, nis }: Seen) -> Option<[f64; FEATURES]> {
         let dt_s = (time_s - self.time_s.unwrap_or(time_s)).abs();
         self.time_s = Some(time_s);
-        self.birge = self.innovations.step(dt_s, nis);
+        self.birge = self.innovations.birge();
+        if let Some(nis) = nis {
+            let last_s = self.innovated_s.replace(time_s).unwrap_or(time_s);
+            self.innovations.step((time_s - last_s).abs(), nis);
+        }
         self.features.step_unless(surprises, dt_s, reading)
     }
 

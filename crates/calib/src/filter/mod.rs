@@ -1,5 +1,6 @@
 //! Any filter behind one trait: what the kernels of `ohmstrain-ekf` become once a sensor says which of them it needs.
 
+pub(crate) mod backward;
 pub(crate) mod build;
 pub(crate) mod corrected;
 pub(crate) mod known;

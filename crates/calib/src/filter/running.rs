@@ -2,12 +2,11 @@ use std::collections::VecDeque;
 use std::mem;
 
 use ohmstrain_ekf::live::{BESIDE_SHARE, Sieve};
-use ohmstrain_ekf::{
-    Estimate, Estimator, Gaussian, Guard, PastStep, Reading, Repeated, Settling, State, StepError, smooth_back_through,
-};
+use ohmstrain_ekf::{Estimate, Estimator, Gaussian, Guard, Reading, Settling, State, StepError};
 use ohmstrain_model::{StrainRange, SwitchedModel};
 
-use crate::filter::stepper::{Moment, Seen, Stepper};
+use crate::filter::backward::Backward;
+use crate::filter::stepper::{Moment, Row, Seen, Stepper};
 use crate::filter::way_back::Segments;
 use crate::filter::{Filter, Output, Rows, WayBack};
 
@@ -19,7 +18,7 @@ pub(crate) struct Running<E: Estimator<f64, N, L>, const B: usize, const N: usiz
     pub now: Moment<E::State>,
     /// Before any reading, where nothing is known.
     unknown: E::State,
-    pending: VecDeque<Pending<E::State, Repeated<E::Prepared>>>,
+    pending: VecDeque<Pending<E, N, L>>,
     /// Estimates on their way out, newest first.
     due: Vec<Output>,
 }
@@ -33,14 +32,15 @@ pub(crate) struct Interval {
     pub settling: Settling<f64>,
     /// What a reading must be for the filter to see it.
     pub sieve: Sieve<f64>,
+    /// Whether the strain is known at the first row.
+    pub starts_known: bool,
 }
 
 /// A row whose estimate waits for later readings.
-struct Pending<S, P> {
+struct Pending<E: Estimator<f64, N, L>, const N: usize, const L: usize> {
     time_s: f64,
     seen: Seen,
-    /// The step that leads to the next row, once there is one.
-    onward: Option<PastStep<S, P, f64>>,
+    row: Row<E, N, L>,
 }
 
 impl<E, const B: usize, const N: usize, const L: usize> Running<E, B, N, L>
@@ -57,10 +57,10 @@ where
         let (pending, due) = (VecDeque::new(), Vec::new());
         let reading_variance = model.noise().reading_sd.powi(2);
         let stepper = Stepper::new(estimator, interval.sieve, reading_variance);
-        Self { stepper, model, interval, now: Moment::start(start), unknown, pending, due }
+        Self { stepper, model, interval, now: Moment::start(start, interval.starts_known), unknown, pending, due }
     }
 
-    fn output(&self, state: &E::State, seen: Seen, sd_scale: f64) -> Output {
+    fn output_of(&self, state: &E::State, seen: Seen, sd_scale: f64) -> Output {
         let estimate = Estimate::new(&self.model, state, &self.interval.limits, sd_scale, &self.interval.settling);
         Output {
             estimate,
@@ -81,39 +81,33 @@ where
 
     /// What a smoother says at a row.
     pub(crate) fn smoothed_output(&self, state: &E::State, seen: Seen) -> Output {
-        self.output(state, seen, self.interval.smoothed_scale)
+        self.output_of(state, seen, self.interval.smoothed_scale)
     }
 
     /// Hands out the first `count` of the rows that wait, given everything up to now.
     fn emit(&mut self, count: usize, out: &mut dyn FnMut(Output)) -> Result<(), StepError> {
-        if count == 0 {
-            return Ok(());
-        }
         let scale = self.interval.filtered_scale.max(self.interval.smoothed_scale);
         let mut due = mem::take(&mut self.due);
-        let waiting = self.pending.len();
-        let mut row = waiting - 1;
-        let steps = self.pending.iter().rev().filter_map(|pending| pending.onward.as_ref());
-        let smoothed = smooth_back_through(&self.stepper.estimator, &self.now.state, steps, |state| {
-            row -= 1;
-            if row < count {
-                due.push(self.output(state, self.pending[row].seen, scale));
+        let mut back = Backward::new((*self.now.state).clone());
+        let mut smoothed = Ok(true);
+        for (place, Pending { time_s, seen, row }) in self.pending.iter().enumerate().rev().take_while(|_| count > 0) {
+            let show = |state: &E::State| {
+                if place < count {
+                    due.push(self.output_of(state, *seen, scale));
+                }
+            };
+            smoothed = back.over(&self.stepper.estimator, *time_s, row, place > 0, show);
+            if smoothed != Ok(true) {
+                break;
             }
-            row > 0
-        });
+        }
         if smoothed == Ok(true) {
             due.iter().rev().for_each(|output| out(*output));
+            self.pending.drain(..count);
         }
         due.clear();
         self.due = due;
-        if !smoothed? {
-            return Err(StepError::NoSmoother);
-        }
-        if count == waiting {
-            out(self.output(&self.now.state, self.now.seen, scale));
-        }
-        self.pending.drain(..count);
-        Ok(())
+        if smoothed? { Ok(()) } else { Err(StepError::NoSmoother) }
     }
 }
 
@@ -136,13 +130,13 @@ where
     }
 
     fn strain(&self) -> Gaussian<f64> {
-        let Gaussian { mean, variance } = self.now.state.marginal(0);
+        let Gaussian { mean, variance } = self.now.shown().marginal(0);
         let variance = variance * self.interval.filtered_scale.powi(2);
         Gaussian { mean, variance }.clamped(&self.interval.limits)
     }
 
     fn output(&self) -> Output {
-        self.output(&self.now.state, self.now.seen, self.interval.filtered_scale)
+        self.output_of(self.now.shown(), self.now.seen, self.interval.filtered_scale)
     }
 
     fn step_lagged(
@@ -155,12 +149,9 @@ where
         // Rows that fall due before this reading was taken do not get to see it.
         let overdue = self.pending.partition_point(|row| row.time_s + lag_s < time_s);
         self.emit(overdue, out)?;
-        let (now, step) = self.stepper.advance(&self.now, time_s, reading)?;
+        let (now, row) = self.stepper.advance(&self.now, time_s, reading)?;
         self.now = now;
-        if let Some(before) = self.pending.back_mut() {
-            before.onward = Some(step);
-        }
-        self.pending.push_back(Pending { time_s, seen: self.now.seen, onward: None });
+        self.pending.push_back(Pending { time_s, seen: self.now.seen, row });
         // Nothing leads back over a hypothesis that comes from nowhere: no row waits for what is after it.
         let startled = self.now.seen.startled.is_some();
         let due = self.pending.partition_point(|row| startled || row.time_s + lag_s <= time_s);

@@ -2,7 +2,7 @@ use std::collections::HashMap;
 
 use ohmstrain_ekf::live::{Jumps, Repeats, Sieve};
 use ohmstrain_ekf::{
-    Advanced, Estimator, Guard, Guarded, Innovation, PastStep, Reading, ReadingVerdict, Repeated, StepError, Streak,
+    Advanced, Estimator, Guard, Guarded, Innovation, PastStep, Pause, Reading, ReadingVerdict, Repeated, StepError, Streak,
     Substeps,
 };
 
@@ -13,24 +13,48 @@ pub(crate) struct Stepper<E: Estimator<f64, N, L>, const N: usize, const L: usiz
     pub sieve: Sieve<f64>,
     /// Of the model's own noise.
     reading_variance: f64,
-    prepared: PreparedSteps<Repeated<E::Prepared>>,
+    prepared: PreparedSteps<Repeated<E::Prepared, f64>>,
     /// Where the next state is made: two take turns.
     next: Option<Box<E::State>>,
 }
 
-/// A step as a smoother needs it.
+/// A step from reading to reading, as a smoother needs it.
 pub(crate) type Taken<E, const N: usize, const L: usize> =
-    PastStep<<E as Estimator<f64, N, L>>::State, Repeated<<E as Estimator<f64, N, L>>::Prepared>, f64>;
+    PastStep<<E as Estimator<f64, N, L>>::State, Repeated<<E as Estimator<f64, N, L>>::Prepared, f64>, f64>;
 
-/// Where a filter is.
+/// A row on the way forward, as a smoother needs it.
+pub(crate) enum Row<E: Estimator<f64, N, L>, const N: usize, const L: usize> {
+    /// The step to a reading that was used.
+    Read(Taken<E, N, L>),
+    /// The state at a row without one, as the readings before it predict it.
+    Unread(Box<E::State>),
+}
+
+/// Where a filter is. Only a reading that is used moves it on: a row without one is a look ahead.
 #[derive(Clone)]
 pub(crate) struct Moment<S> {
+    /// Time of the last row, s.
     pub time_s: Option<f64>,
+    /// At the last reading that was used, and its time, s; a start that is known counts as one.
     pub state: Box<S>,
+    read_s: Option<f64>,
+    starts_known: bool,
+    /// What has been seen ahead of it since.
+    look: Option<Look<S>>,
     pub streak: Streak,
     repeats: Repeats<f64>,
     jumps: Jumps<f64>,
     pub seen: Seen,
+}
+
+/// A look ahead from the last reading.
+#[derive(Clone)]
+struct Look<S> {
+    /// Whole steps of the pause later, and the time since then.
+    passed: Box<S>,
+    pause: Pause<f64>,
+    /// At the last row.
+    now: Box<S>,
 }
 
 /// What a row's reading said.
@@ -59,15 +83,38 @@ impl Seen {
 }
 
 impl<S> Moment<S> {
-    /// Before the first row.
-    pub(crate) fn start(state: S) -> Self {
+    /// Before the first row; `starts_known` if the strain is known then.
+    pub(crate) fn start(state: S, starts_known: bool) -> Self {
         let seen = Seen { innovation: None, verdict: ReadingVerdict::Missing, startled: None };
         let (repeats, jumps) = (Repeats::none(), Jumps::none());
-        Self { time_s: None, state: Box::new(state), streak: Streak::default(), repeats, jumps, seen }
+        let (state, streak) = (Box::new(state), Streak::default());
+        Self { time_s: None, state, starts_known, read_s: None, look: None, streak, repeats, jumps, seen }
+    }
+
+    /// The state at the last row.
+    pub(crate) fn shown(&self) -> &S {
+        self.look.as_ref().map_or(&self.state, |look| &look.now)
+    }
+
+    /// A reading was used in a row that leads to a state.
+    fn moves_to(&mut self, time_s: f64) {
+        (self.read_s, self.look) = (Some(time_s), None);
     }
 
     fn seconds_until(&self, time_s: f64) -> f64 {
         time_s - self.time_s.unwrap_or(time_s)
+    }
+
+    /// A row has come: a start that is known is at the first.
+    fn begin(&mut self, time_s: f64) {
+        if self.time_s.is_none() && self.starts_known {
+            self.read_s = Some(time_s);
+        }
+    }
+
+    /// Since the last reading that was used; no time before the first.
+    fn seconds_since_reading(&self, time_s: f64) -> f64 {
+        time_s - self.read_s.unwrap_or(time_s)
     }
 }
 
@@ -101,58 +148,113 @@ impl<E: Estimator<f64, N, L>, const N: usize, const L: usize> Stepper<E, N, L> {
         }
     }
 
-    /// One step from `now`: where it leads, and what a smoother needs of it.
+    /// One row from `now`: where it leads, and what a smoother needs of it.
     pub(crate) fn advance(
         &mut self,
         now: &Moment<E::State>,
         time_s: f64,
         reading: Option<Reading<f64>>,
-    ) -> Result<(Moment<E::State>, Taken<E, N, L>), StepError> {
-        let (mut repeats, mut jumps, dt_s) = (now.repeats, now.jumps, now.seconds_until(time_s));
-        let (reading, decided) = self.sieved(&mut repeats, dt_s, reading);
-        let prepared = self.prepared.of(dt_s, |dt_s| self.estimator.prepare(dt_s))?;
-        let Guarded { advanced, from, used, verdict, streak } =
-            self.guard.advance(&self.estimator, &now.state, now.streak, prepared, reading)?;
-        let Advanced { state, innovation } = advanced;
-        let said = (innovation, decided.unwrap_or(verdict));
-        let seen = Seen::after(&mut jumps, said, reading, self.sieve.jump);
-        let next = Moment { time_s: Some(time_s), state: Box::new(state), streak, repeats, jumps, seen };
-        Ok((next, PastStep { from, prepared: *prepared, reading: used }))
+    ) -> Result<(Moment<E::State>, Row<E, N, L>), StepError> {
+        let mut next = now.clone();
+        let taken = self.take(&mut next, time_s, reading)?;
+        let row = match taken {
+            Some((from, prepared, used)) => Row::Read(PastStep { from, prepared, reading: used }),
+            None => Row::Unread(Box::new(next.shown().clone())),
+        };
+        Ok((next, row))
     }
 
-    /// One step that nobody goes back, so that nothing is kept of it; `now` changes only if it succeeds.
+    /// One row under guard; what led to its reading, if that was used. `now` changes only if it succeeds.
+    #[allow(clippy::type_complexity, reason = "a past step, in parts")]
+    fn take(
+        &mut self,
+        now: &mut Moment<E::State>,
+        time_s: f64,
+        reading: Option<Reading<f64>>,
+    ) -> Result<Option<(E::State, Repeated<E::Prepared, f64>, Option<Reading<f64>>)>, StepError> {
+        let (mut repeats, dt_s) = (now.repeats, now.seconds_until(time_s));
+        check(dt_s)?;
+        now.begin(time_s);
+        let (reading, decided) = self.sieved(&mut repeats, dt_s, reading);
+        let taken = if let Some(reading) = reading {
+            let prepared = self.prepared.of(now.seconds_since_reading(time_s), |dt_s| self.estimator.prepare(dt_s))?;
+            let guarded = self.guard.advance(&self.estimator, &now.state, now.streak, prepared, Some(reading))?;
+            Some((guarded, *prepared, reading))
+        } else {
+            None
+        };
+        match taken {
+            Some((guarded, prepared, reading)) if guarded.verdict.is_taken() => {
+                let Guarded { advanced: Advanced { state, innovation }, from, used, verdict, streak } = guarded;
+                now.seen = Seen::after(&mut now.jumps, (innovation, verdict), Some(reading), self.sieve.jump);
+                *now.state = state;
+                now.moves_to(time_s);
+                (now.time_s, now.repeats, now.streak) = (Some(time_s), repeats, streak);
+                Ok(Some((from, prepared, used)))
+            }
+            refused => {
+                self.look(now, time_s)?;
+                let said = refused.map(|(guarded, ..)| (guarded.advanced.innovation, guarded.verdict, guarded.streak));
+                let (innovation, verdict, streak) =
+                    said.unwrap_or((None, decided.unwrap_or(ReadingVerdict::Missing), now.streak));
+                now.seen = Seen { innovation, verdict, startled: None };
+                (now.time_s, now.repeats, now.streak) = (Some(time_s), repeats, streak);
+                Ok(None)
+            }
+        }
+    }
+
+    /// Looks ahead from the last reading to `time_s`.
+    fn look(&self, now: &mut Moment<E::State>, time_s: f64) -> Result<(), StepError> {
+        let (mut passed, pause, since_s) = match &now.look {
+            Some(look) => (look.passed.clone(), look.pause, now.time_s),
+            None => (now.state.clone(), self.estimator.pause(), now.read_s),
+        };
+        let since_s = now.read_s.and(since_s).unwrap_or(time_s);
+        let mut pause = pause.after(time_s - since_s);
+        self.estimator.pass_whole(&mut passed, &mut pause)?;
+        let prepared = self.estimator.prepare_over(pause);
+        let ahead = self.estimator.advance(&passed, &prepared, None)?.state;
+        now.look = Some(Look { passed, pause, now: Box::new(ahead) });
+        Ok(())
+    }
+
+    /// One row that nobody goes back to, so that nothing is kept of it; `now` changes only if it succeeds.
     pub(crate) fn advance_only(
         &mut self,
         now: &mut Moment<E::State>,
         time_s: f64,
         reading: Option<Reading<f64>>,
     ) -> Result<(), StepError> {
-        let (came, mut repeats, dt_s) = (reading, now.repeats, now.seconds_until(time_s));
-        let (reading, decided) = self.sieved(&mut repeats, dt_s, reading);
-        let prepared = self.prepared.of(dt_s, |dt_s| self.estimator.prepare(dt_s))?;
-        let next = self.next.get_or_insert_with(|| now.state.clone());
-        let (innovation, verdict) = match self.estimator.advance_into(&now.state, prepared, reading, next) {
-            Err(error) if reading.is_some() && error.is_of_the_reading() => {
-                (self.estimator.advance_into(&now.state, prepared, None, next)?, ReadingVerdict::Rejected)
-            }
-            taken => {
-                let verdict = if reading.is_some() { ReadingVerdict::Accepted } else { ReadingVerdict::Missing };
-                (taken?, decided.unwrap_or(verdict))
-            }
+        let (mut repeats, dt_s) = (now.repeats, now.seconds_until(time_s));
+        check(dt_s)?;
+        now.begin(time_s);
+        let (Some(sieved), _) = self.sieved(&mut repeats, dt_s, reading) else {
+            return self.take(now, time_s, reading).map(drop);
         };
-        if innovation.is_some_and(|innovation| !self.guard.takes_whole(innovation.nis)) {
-            (*now, _) = self.advance(now, time_s, came)?;
-            return Ok(());
+        let prepared = self.prepared.of(now.seconds_since_reading(time_s), |dt_s| self.estimator.prepare(dt_s))?;
+        let next = self.next.get_or_insert_with(|| now.state.clone());
+        match self.estimator.advance_into(&now.state, prepared, Some(sieved), next) {
+            Err(error) if error.is_of_the_reading() => return self.take(now, time_s, reading).map(drop),
+            Ok(Some(innovation)) if self.guard.takes_whole(innovation.nis) => {
+                let said = (Some(innovation), ReadingVerdict::Accepted);
+                now.seen = Seen::after(&mut now.jumps, said, Some(sieved), self.sieve.jump);
+            }
+            Ok(_) => return self.take(now, time_s, reading).map(drop),
+            Err(error) => return Err(error),
         }
-        now.repeats = repeats;
-        now.time_s = Some(time_s);
-        if reading.is_some() && verdict == ReadingVerdict::Accepted {
-            now.streak = Streak::default();
-        }
+        (now.repeats, now.time_s, now.streak) = (repeats, Some(time_s), Streak::default());
         std::mem::swap(&mut now.state, next);
-        now.seen = Seen::after(&mut now.jumps, (innovation, verdict), reading, self.sieve.jump);
+        now.moves_to(time_s);
         Ok(())
     }
+}
+
+fn check(dt_s: f64) -> Result<(), StepError> {
+    if !dt_s.is_finite() {
+        return Err(StepError::NonFiniteTimeStep);
+    }
+    if dt_s < 0.0 { Err(StepError::NegativeTimeStep) } else { Ok(()) }
 }
 
 /// Prepared steps, remembered by their length in nanoseconds: differences of decimal times repeat to rounding only.
@@ -172,12 +274,7 @@ impl<P> PreparedSteps<P> {
     }
 
     fn of(&mut self, dt_s: f64, prepare: impl FnOnce(f64) -> P) -> Result<&P, StepError> {
-        if !dt_s.is_finite() {
-            return Err(StepError::NonFiniteTimeStep);
-        }
-        if dt_s < 0.0 {
-            return Err(StepError::NegativeTimeStep);
-        }
+        check(dt_s)?;
         let nanoseconds = (dt_s * 1e9).round();
         let length = nanoseconds as u64;
         let place = match self.last {

@@ -3,8 +3,9 @@ use std::ops::Range;
 
 use ohmstrain_ekf::{Estimator, Reading, StepError};
 
+use crate::filter::backward::Backward;
 use crate::filter::running::Running;
-use crate::filter::stepper::{Moment, Seen, Taken};
+use crate::filter::stepper::{Moment, Row, Seen};
 use crate::filter::{Output, Rows, WayBack};
 
 /// Rows whose states are in memory at once while a recording is smoothed; the others are computed again. Of a recording of
@@ -17,10 +18,10 @@ pub(crate) struct Segments<'a, E: Estimator<f64, N, L>, const B: usize, const N:
     rows: Rows<'a>,
     /// Where the filter was before the first row of each segment that is not smoothed yet.
     starts: Vec<Moment<E::State>>,
-    /// The state after the last of their rows, from all readings.
-    smoothed: E::State,
+    /// The way back over those that are.
+    back: Backward<E::State>,
     /// The present segment.
-    steps: Vec<(Seen, Taken<E, N, L>)>,
+    steps: Vec<(Seen, Row<E, N, L>)>,
     /// Whether that is the last, whose steps are there already.
     is_last: bool,
 }
@@ -46,8 +47,8 @@ where
         }
         let mut steps = Vec::new();
         running.now = steps_of(running, now, rows, last..rows.len(), &mut steps)?;
-        let smoothed = (*running.now.state).clone();
-        Ok(Self { running, rows, starts, smoothed, steps, is_last: true })
+        let back = Backward::new((*running.now.state).clone());
+        Ok(Self { running, rows, starts, back, steps, is_last: true })
     }
 }
 
@@ -57,7 +58,7 @@ fn steps_of<E: Estimator<f64, N, L>, const B: usize, const N: usize, const L: us
     mut now: Moment<E::State>,
     rows: Rows<'_>,
     segment: Range<usize>,
-    steps: &mut Vec<(Seen, Taken<E, N, L>)>,
+    steps: &mut Vec<(Seen, Row<E, N, L>)>,
 ) -> Result<Moment<E::State>, (usize, StepError)> {
     steps.clear();
     steps.reserve_exact(segment.len());
@@ -84,16 +85,13 @@ where
             steps_of(self.running, start, self.rows, rows.clone(), &mut self.steps)?;
         }
         for (row, (seen, step)) in rows.clone().zip(&self.steps).rev() {
-            out.push(self.running.smoothed_output(&self.smoothed, *seen));
-            let estimator = &self.running.stepper.estimator;
-            let back = estimator.smooth_back(&step.from, &step.prepared, step.reading, &self.smoothed);
-            match back.map_err(|error| (row, error))? {
-                Some(earlier) => self.smoothed = earlier,
-                None => {
-                    out.clear();
-                    self.starts.clear();
-                    return Ok(None);
-                }
+            let (running, time_s) = (&*self.running, self.rows.get(row).0);
+            let show = |state: &E::State| out.push(running.smoothed_output(state, *seen));
+            let back = self.back.over(&running.stepper.estimator, time_s, step, true, show);
+            if !back.map_err(|error| (row, error))? {
+                out.clear();
+                self.starts.clear();
+                return Ok(None);
             }
         }
         out.reverse();

@@ -162,7 +162,8 @@ fn state(branches: usize, chip: &ChipFilter) -> usize {
         EstimatorKind::Hypotheses => filter.hypotheses * (gaussian + 3) + 1,
         _ => gaussian,
     };
-    // Readings and doubts: twenty-six words; of a correction four, low-passes and features. Strain, variance, rest reading.
+    // Readings and doubts: twenty-four words; of a correction four, low-passes and features. A pause; strain, rate, their variances;
+    // rest reading.
     let correction = filter.correction.as_ref().map_or(0, |_| 4 + TIME_CONSTANTS_S.len() + FEATURES);
-    FLOAT * (words + 26 + correction + 3)
+    FLOAT * (words + 24 + correction + 7)
 }

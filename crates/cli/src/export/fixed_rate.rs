@@ -3,7 +3,10 @@
 use ohmstrain_calib::{EstimatorKind, EstimatorParams, HISTORIES, HYPOTHESES, SensorParams};
 use ohmstrain_ekf::correction::FeatureScale;
 use ohmstrain_ekf::live::{DOUBT, Learned, LiveParts, may_be_unstretched};
-use ohmstrain_ekf::{Compact, Ekf, Estimator, Evidence, Hypotheses, Real, STEP_GRACE, SignSplit, SparseEkf, StepError};
+use ohmstrain_ekf::{
+    Compact, Ekf, Estimator, Evidence, Hypotheses, LONGEST_PAUSE_S, Pause, Real, STEP_GRACE, STEP_GROWTH, SignSplit, SparseEkf,
+    StepError,
+};
 use ohmstrain_model::{Motion, SensorLaw, StrainRange, SwitchedModel};
 
 use super::law::{PriorConstants, narrow_law, narrow_noise, narrow_range};
@@ -83,12 +86,14 @@ impl<'a, const B: usize, const N: usize> FixedRate<'a, B, N> {
             rest: filter.rest,
         };
         let longest_s = longest_step_s::<B, N, L>(&reference, &parts)? * STEP_GRACE;
-        let usual_s = f64::from(dt_s) / (f64::from(dt_s) / longest_s).ceil().max(1.0);
+        let count = (f64::from(dt_s) / longest_s).ceil().max(1.0);
+        let usual_s = f64::from(dt_s) / count;
         let kernel = |step_s| SparseEkf::<f64, Compact, B, N>::new(reference, step_s).map_err(parameter);
         let numbers = |step_s| exact_numbers(&reference, phases, step_s).map_err(parameter);
         let table = StepTable::new(usual_s, &kernel(usual_s)?.step_names(), numbers)?;
-        // Not longer than the table either.
-        parts.longest_step_s = (longest_s.min(table.range.1) / STEP_GRACE) as f32;
+        // A usual interval that has to be divided is divided evenly; no step is longer than the table.
+        let of_table_s = longest_s.min(table.range.1) / STEP_GRACE;
+        parts.longest_step_s = if count > 1.0 { usual_s } else { of_table_s } as f32;
         let rest_reading = params.rest_reading as f32;
         let rested = params.rested() as f32;
         Ok(Self { reference, model, hypotheses: filter.hypotheses, rest_reading, rested, parts, table })
@@ -124,26 +129,30 @@ impl<'a, const B: usize, const N: usize> FixedRate<'a, B, N> {
         may_be_unstretched(&self.parts.limits)
     }
 
-    /// The longest step, with the grace that rounding is given, s.
-    pub fn longest_s(&self) -> f32 {
-        self.parts.longest_step_s * STEP_GRACE as f32
+    /// Length of the last step that the usual time between readings is divided into, s.
+    pub fn usual_step_s(&self) -> f32 {
+        let mut pause = Pause::none(self.parts.longest_step_s).after(self.parts.dt_s);
+        while pause.whole_step().is_some() {}
+        pause.ahead_s()
     }
 
-    /// Length of the steps that the usual time between readings is divided into, s.
-    pub fn usual_step_s(&self) -> f32 {
-        let (dt_s, longest_s) = (self.parts.dt_s, self.longest_s());
-        let (mut count, mut covered) = (1.0, longest_s);
-        while covered < dt_s {
-            covered += longest_s;
-            count += 1.0;
-        }
-        dt_s / count
+    /// Lengths of the whole steps of a pause, s.
+    pub fn whole_steps_s(&self) -> Vec<f32> {
+        let growth = STEP_GROWTH as f32;
+        let lengths = std::iter::successors(Some(self.parts.longest_step_s), |length_s| Some(length_s * growth));
+        lengths.take_while(|length_s| f64::from(*length_s) < LONGEST_PAUSE_S).collect()
     }
 
     /// What depends on the length of a step, as the exported program has it.
     pub fn interpolated(&self) -> Numbers<'_, f32> {
-        let usual = self.usual_numbers();
-        Box::new(move |step_s| if step_s == self.usual_step_s() { usual.clone() } else { self.table.at(step_s) })
+        let known: Vec<(f32, Vec<f32>)> = std::iter::once(self.usual_step_s())
+            .chain(self.whole_steps_s())
+            .map(|step_s| (step_s, self.numbers_at(step_s)))
+            .collect();
+        Box::new(move |step_s| {
+            let known = known.iter().find(|(length_s, _)| *length_s == step_s);
+            known.map_or_else(|| self.table.at(step_s), |(_, numbers)| numbers.clone())
+        })
     }
 
     /// The same in double precision, as the law has it.
@@ -154,10 +163,10 @@ impl<'a, const B: usize, const N: usize> FixedRate<'a, B, N> {
         })
     }
 
-    /// What depends on the length of a step, for the usual one.
-    pub fn usual_numbers(&self) -> Vec<f32> {
-        let numbers = exact_numbers(&self.reference, self.parts.phases, self.usual_step_s().into());
-        numbers.map_or_else(|_| self.table.at(self.usual_step_s()), |all| all.iter().map(|x| *x as f32).collect())
+    /// What depends on the length of a step, s, rounded.
+    pub fn numbers_at(&self, step_s: f32) -> Vec<f32> {
+        let numbers = exact_numbers(&self.reference, self.parts.phases, step_s.into());
+        numbers.map_or_else(|_| self.table.at(step_s), |all| all.iter().map(|x| *x as f32).collect())
     }
 }
 

@@ -6,10 +6,9 @@ use super::{
 };
 use crate::clock::check_time_step;
 use crate::correction::{FeatureScale, ReadingFeatures, filter_inputs};
-use crate::substeps::Repeated;
+use crate::substeps::{Pause, Repeated};
 use crate::{
-    Belief, Estimator, Gaussian, Guard, Influence, Reading, ReadingVerdict, Real, Recordable, State, StepError, Streak,
-    Substeps,
+    Belief, Gaussian, Guard, Influence, Reading, ReadingVerdict, Real, Recordable, State, StepError, Streak, Substeps,
 };
 
 /// How far beyond the limits a strain may be that somebody knows, in spans.
@@ -60,7 +59,8 @@ pub struct LiveEstimate<T> {
 
 /// A sensor's filter with all that stands around it, in fixed memory.
 ///
-/// An error leaves it as it was.
+/// Only a reading that is used moves it on: a row without one is predicted from the last reading, so that a pause may be one step or
+/// many. An error leaves it as it was.
 pub struct LiveFilter<'a, T: Real, E: SensorEstimator<T, N, L>, const N: usize, const L: usize> {
     estimator: Substeps<E>,
     guard: Guard<T>,
@@ -72,15 +72,17 @@ pub struct LiveFilter<'a, T: Real, E: SensorEstimator<T, N, L>, const N: usize, 
     rest_reading: T,
     /// Before any reading.
     fresh: E::State,
-    /// A step, and its length, s.
-    prepared: (T, Repeated<E::Prepared>),
+    /// The way over a pause, prepared.
+    prepared: (Pause<T>, Repeated<E::Prepared, T>),
     now: Memory<T, E::State>,
 }
 
 /// What changes from step to step.
 #[derive(Clone, Copy)]
 struct Memory<T, S> {
+    /// At the last reading that was used, or whole steps of a pause after it; and the time since then.
     state: S,
+    pause: Pause<T>,
     repeats: Repeats<T>,
     jumps: Jumps<T>,
     /// What the correction sees of readings, if there is one.
@@ -93,7 +95,9 @@ struct Memory<T, S> {
 }
 
 /// What became of a reading.
-struct Heard<T> {
+struct Heard<T, S> {
+    /// The state at a row without a reading that was used; at one with it is the filter's.
+    look: Option<S>,
     verdict: ReadingVerdict,
     /// R/R₀ - 1, of R₀ as it is followed, if the filter has used it.
     used: Option<T>,
@@ -110,9 +114,11 @@ impl<'a, T: Real, E: SensorEstimator<T, N, L>, const N: usize, const L: usize> L
     pub fn new(estimator: E, parts: LiveParts<'a, T>) -> Self {
         let fresh = estimator.start(None);
         let estimator = Substeps(estimator);
+        let pause = estimator.pause();
+        let usual = pause.after(parts.dt_s);
         Self {
-            prepared: (parts.dt_s, estimator.prepare(parts.dt_s)),
-            now: Memory::new(&parts, Protections::ALL, fresh.clone()),
+            prepared: (usual, estimator.prepare_over(usual)),
+            now: Memory::new(&parts, Protections::ALL, (fresh.clone(), pause)),
             rest_reading: parts.rest_reading,
             guard: guard(Protections::ALL),
             protections: Protections::ALL,
@@ -126,7 +132,7 @@ impl<'a, T: Real, E: SensorEstimator<T, N, L>, const N: usize, const L: usize> L
     /// The same before any reading, with some protections turned off.
     #[must_use]
     pub fn protected_by(self, protections: Protections) -> Self {
-        let now = Memory::new(&self.parts, protections, self.fresh.clone());
+        let now = Memory::new(&self.parts, protections, (self.fresh.clone(), self.estimator.pause()));
         Self { guard: guard(protections), protections, sieve: self.parts.sieve.under(protections), now, ..self }
     }
 
@@ -135,7 +141,7 @@ impl<'a, T: Real, E: SensorEstimator<T, N, L>, const N: usize, const L: usize> L
         &self.estimator.0
     }
 
-    /// What the filter knows, uncorrected.
+    /// The estimate at the last reading that was used, uncorrected; in a long pause without one somewhat later.
     pub const fn state(&self) -> &E::State {
         &self.now.state
     }
@@ -189,7 +195,8 @@ impl<'a, T: Real, E: SensorEstimator<T, N, L>, const N: usize, const L: usize> L
     /// Begins again, at a strain that is known if there is one.
     pub fn start_at(&mut self, strain: Option<T>) {
         let known = strain.map(|mean| Gaussian { mean, variance: self.parts.known_variance });
-        self.now = Memory::new(&self.parts, self.protections, self.estimator.0.start(known));
+        let start = (self.estimator.0.start(known), self.estimator.pause());
+        self.now = Memory::new(&self.parts, self.protections, start);
         if let Some(strain) = strain {
             self.now.doubts =
                 self.now.doubts.of_known_strain(strain.abs() <= T::of(DOUBT.zero) * self.parts.limits.span());
@@ -206,17 +213,17 @@ impl<'a, T: Real, E: SensorEstimator<T, N, L>, const N: usize, const L: usize> L
     /// # Errors
     /// As [`Self::step`]; or if `dt_s` is no length of a step.
     pub fn step_after(&mut self, dt_s: T, reading: Option<Reading<T>>) -> Result<LiveEstimate<T>, StepError> {
-        self.prepare(dt_s)?;
+        check_time_step(dt_s)?;
         let heard = self.hear(dt_s, reading)?;
-        let moments = self.now.state.moments();
+        let moments = heard.look.as_ref().unwrap_or(&self.now.state).moments();
         let filtered = self.filtered(&moments);
         self.watch(dt_s, &heard, filtered);
-        let corrected = self.corrected(&moments, filtered);
+        let corrected = self.corrected(heard.look.as_ref().unwrap_or(&self.now.state), &moments, filtered);
         let now = &mut self.now;
         let taken = reading.filter(|_| heard.used.is_some()).map(|reading| (reading.value, heard.nis));
         if let (Some(follower), Some((reading, _))) = (&mut now.follower, taken) {
             heard.jumped.into_iter().for_each(|jump| follower.jumped(jump));
-            follower.see(dt_s, reading);
+            follower.see(now.doubts.unread_s + dt_s, reading);
         }
         let open = now.doubts.see(dt_s, taken, corrected);
         let (widened, doubts) = now.doubts.widened(moments.mean[1], open);
@@ -226,8 +233,8 @@ impl<'a, T: Real, E: SensorEstimator<T, N, L>, const N: usize, const L: usize> L
         Ok(LiveEstimate { strain, rate: Gaussian::marginal(&moments, 1), flags: Flags::of(heard.verdict).and(doubts) })
     }
 
-    /// Takes a reading, if it is one, and looks again where readings have jumped.
-    fn hear(&mut self, dt_s: T, reading: Option<Reading<T>>) -> Result<Heard<T>, StepError> {
+    /// Takes a reading, if it is one, and looks again where readings have jumped. A row without one is a look ahead from the last.
+    fn hear(&mut self, dt_s: T, reading: Option<Reading<T>>) -> Result<Heard<T, E::State>, StepError> {
         let mut repeats = self.now.repeats;
         repeats.pass(dt_s);
         let relative = reading.map(|reading| self.now.follower.map_or(reading, |follower| follower.relative(reading)));
@@ -236,32 +243,45 @@ impl<'a, T: Real, E: SensorEstimator<T, N, L>, const N: usize, const L: usize> L
             Ok(seen) => (seen, None),
             Err(verdict) => (None, Some(verdict)),
         };
+        let (mut pause, mut moved) = (self.now.pause.after(dt_s), None);
+        if seen.is_none() && pause.clone().whole_step().is_some() {
+            let state = moved.insert(self.now.state.clone());
+            self.estimator.pass_whole(state, &mut pause)?;
+        }
+        self.prepare(pause);
         let (now, streak) = (&mut self.now, Streak::default());
-        let guarded = self.guard.advance(&self.estimator, &now.state, streak, &self.prepared.1, seen)?;
-        (now.state, now.repeats) = (guarded.advanced.state, repeats);
+        let from = moved.as_ref().unwrap_or(&now.state);
+        let guarded = self.guard.advance(&self.estimator, from, streak, &self.prepared.1, seen)?;
         let verdict = turned_down.unwrap_or(guarded.verdict);
         let innovation = guarded.advanced.innovation.filter(|_| verdict.is_taken());
         let nis = innovation.map_or(T::zero(), |innovation| innovation.nis);
         let surprises = verdict == ReadingVerdict::Downweighted && nis > T::of(SURPRISING_NIS);
         let used = seen.filter(|_| verdict.is_taken()).map(|seen| seen.value);
         let jumped = used.and_then(|used| now.jumps.see(used, nis, self.sieve.jump)).filter(|_| surprises);
+        now.repeats = repeats;
+        let look = if used.is_some() {
+            (now.state, now.pause) = (guarded.advanced.state, self.estimator.pause());
+            None
+        } else {
+            now.pause = pause;
+            moved.into_iter().for_each(|moved| now.state = moved);
+            Some(guarded.advanced.state)
+        };
         if jumped.is_some() {
             now.state = now.state.beside(&self.fresh, T::of(BESIDE_SHARE));
         }
-        Ok(Heard { verdict, used, nis, surprises, jumped })
+        Ok(Heard { look, verdict, used, nis, surprises, jumped })
     }
 
-    /// Prepares steps of `dt_s` seconds, unless they are.
-    fn prepare(&mut self, dt_s: T) -> Result<(), StepError> {
-        if dt_s != self.prepared.0 {
-            check_time_step(dt_s)?;
-            self.prepared = (dt_s, self.estimator.prepare(dt_s));
+    /// Prepares the way over a pause, unless it is.
+    fn prepare(&mut self, pause: Pause<T>) {
+        if pause != self.prepared.0 {
+            self.prepared = (pause, self.estimator.prepare_over(pause));
         }
-        Ok(())
     }
 
     /// Lets the correction see a reading that the filter has used.
-    fn watch(&mut self, dt_s: T, heard: &Heard<T>, filtered: Gaussian<T>) {
+    fn watch(&mut self, dt_s: T, heard: &Heard<T, E::State>, filtered: Gaussian<T>) {
         if let Some(watched) = &mut self.now.watched {
             watched.step_unless(heard.surprises, dt_s, heard.used);
             if !watched.is_waiting() {
@@ -276,13 +296,13 @@ impl<'a, T: Real, E: SensorEstimator<T, N, L>, const N: usize, const L: usize> L
     }
 
     /// The filter's strain, corrected; where a reading is missing its variance grows by as much as the filter's has grown since.
-    fn corrected(&self, belief: &Belief<T, N, L>, filtered: Gaussian<T>) -> Gaussian<T> {
+    fn corrected(&self, state: &E::State, belief: &Belief<T, N, L>, filtered: Gaussian<T>) -> Gaussian<T> {
         let (Some((_, learned)), Some(watched)) = (&self.parts.learned, &self.now.watched) else { return filtered };
         let Some(features) = watched.now() else { return filtered };
         let (first, end) = (MOTION_STATES, MOTION_STATES + E::BRANCHES);
         let relaxation = (first..end).fold(T::zero(), |sum, i| sum + belief.mean[i]);
         let baseline = if N > end { belief.mean[end] } else { T::zero() };
-        let [extend, _, retract] = self.now.state.phases().unwrap_or([T::zero(); 3]);
+        let [extend, _, retract] = state.phases().unwrap_or([T::zero(); 3]);
         let outputs = [filtered.mean, belief.mean[1], relaxation, baseline, extend, retract];
         let strain = learned.correct(&filter_inputs(&outputs, &features), filtered, self.now.doubts.birge());
         let grown = (filtered.variance - self.now.known_variance).max(T::zero());
@@ -307,10 +327,11 @@ where
 }
 
 impl<T: Real, S> Memory<T, S> {
-    fn new(parts: &LiveParts<'_, T>, protections: Protections, state: S) -> Self {
+    fn new(parts: &LiveParts<'_, T>, protections: Protections, (state, pause): (S, Pause<T>)) -> Self {
         let doubts = Doubts::new(parts.doubt);
         Self {
             state,
+            pause,
             repeats: Repeats::none(),
             jumps: Jumps::none(),
             watched: parts.learned.as_ref().map(|(scale, _)| ReadingFeatures::new(*scale)),

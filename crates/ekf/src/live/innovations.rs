@@ -18,14 +18,9 @@ impl<T: Recordable> Innovations<T> {
         Self { mean: T::zero() }
     }
 
-    /// A row `dt_s` seconds after the one before, with a normalised innovation squared or without; [`Self::birge`] of the rows before
-    /// it, which is what a [`Correction`](crate::correction::Correction) wants.
-    pub fn step(&mut self, dt_s: T, nis: Option<T>) -> T {
-        let birge = self.birge();
-        if let Some(nis) = nis {
-            self.see((-dt_s / T::of(Self::LAST_S)).exp(), nis);
-        }
-        birge
+    /// Takes the normalised innovation squared of a reading, `dt_s` seconds after the reading before.
+    pub fn step(&mut self, dt_s: T, nis: T) {
+        self.see((-dt_s / T::of(Self::LAST_S)).exp(), nis);
     }
 
     /// Takes a normalised innovation squared, where `left` is the share of what was known before that is left.

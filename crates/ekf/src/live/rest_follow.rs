@@ -109,7 +109,7 @@ impl<T: Recordable> RestFollower<T> {
         Reading { value: (reading.value - self.off) / rest, extra_variance }
     }
 
-    /// Takes a reading R/R₀ - 1, of calibration's R₀, `dt_s` seconds after the row before. A number that comes again says
+    /// Takes a reading R/R₀ - 1, of calibration's R₀, `dt_s` seconds after the reading before. A number that comes again says
     /// nothing until another one comes: it may be stuck.
     ///
     /// ```

@@ -323,15 +323,15 @@ mod tests {
     fn doubts_are_written_down_for_all_their_ways() {
         let pauses = write_down(|writer| {
             let mut doubts = writer.state(Doubts::new(parts().to()));
-            let passed_s = doubts.pass(writer.input("dt_s"));
+            doubts.pass(writer.input("dt_s"));
             let stated = Gaussian { mean: writer.input("strain"), variance: writer.input("variance") };
-            let open = doubts.pause(passed_s, stated);
+            let open = doubts.open(stated);
             writer.keep(doubts);
             writer.give("open", open);
         });
         let reads = write_down(|writer| {
             let mut doubts = writer.state(Doubts::new(parts().to()));
-            doubts.read(writer.input("passed_s"), writer.input("rho"), writer.input("nis"));
+            doubts.read(writer.input("rho"), writer.input("nis"));
             writer.keep(doubts);
         });
         let widens = write_down(|writer| {
@@ -351,10 +351,10 @@ mod tests {
                 assert_same(&after, &Seen::of(doubts), row);
                 assert_eq!(given["open"], open, "row {row}");
             } else {
-                let passed_s = doubts.pass(0.1);
+                doubts.pass(0.1);
                 let before = Seen::of(doubts);
-                doubts.read(passed_s, rho, nis);
-                let [after, _] = done(&reads, &before, &[("passed_s", passed_s), ("rho", rho), ("nis", nis)]);
+                doubts.read(rho, nis);
+                let [after, _] = done(&reads, &before, &[("rho", rho), ("nis", nis)]);
                 assert_same(&after, &Seen::of(doubts), row);
             }
             let rate = if row % 5 == 0 { 0.4 } else { -0.05 };

@@ -196,13 +196,12 @@ impl Around<'_> {
     fn run(&self) -> Printed {
         Printed::new(
             "run",
-            "A step has come: the time since the one before, if there was one.",
+            "Time has passed since the step before, if there was one.",
             &["float dt_s"],
             |writer| {
                 let mut doubts = writer.state(self.doubts());
-                let passed_s = doubts.pass(writer.input("dt_s"));
+                doubts.pass(writer.input("dt_s"));
                 writer.keep(doubts);
-                writer.give(RETURNED, passed_s);
             },
         )
     }
@@ -210,11 +209,11 @@ impl Around<'_> {
     fn doubt_reading(&self) -> Printed {
         Printed::new(
             "doubt_reading",
-            "It has a reading that was used, and its squared innovation in variances.",
-            &["float passed_s", "float rho", "float nis"],
+            "Takes a reading that was used, and its squared innovation in variances.",
+            &["float rho", "float nis"],
             |writer| {
                 let mut doubts = writer.state(self.doubts());
-                doubts.read(writer.input("passed_s"), writer.input("rho"), writer.input("nis"));
+                doubts.read(writer.input("rho"), writer.input("nis"));
                 writer.keep(doubts);
             },
         )
@@ -223,14 +222,12 @@ impl Around<'_> {
     fn doubt_pause(&self) -> Printed {
         Printed::new(
             "doubt_pause",
-            "It has none: the strain's variance that this leaves open.",
-            &["float passed_s", "float strain", "float variance"],
+            "Variance of the strain that the time since the last reading leaves open.",
+            &["float strain", "float variance"],
             |writer| {
-                let mut doubts = writer.state(self.doubts());
+                let doubts = writer.state(self.doubts());
                 let stated = Gaussian { mean: writer.input("strain"), variance: writer.input("variance") };
-                let open = doubts.pause(writer.input("passed_s"), stated);
-                writer.keep(doubts);
-                writer.give(RETURNED, open);
+                writer.give(RETURNED, doubts.open(stated));
             },
         )
     }

@@ -2,7 +2,7 @@
 
 use ohmstrain_calib::{EstimatorKind, HISTORIES, HYPOTHESES};
 use ohmstrain_ekf::record::{MixtureNumbers, shared};
-use ohmstrain_ekf::{Compact, Gaussian, Hypotheses, SignSplit, SparseEkf};
+use ohmstrain_ekf::{Compact, Gaussian, Hypotheses, LONGEST_PAUSE_S, STEP_GRACE, STEP_GROWTH, SignSplit, SparseEkf};
 use serde::Serialize;
 
 use crate::export::fixed_rate::FixedRate;
@@ -15,7 +15,12 @@ pub struct StepConstants {
     names: Vec<String>,
     usual_s: Literal,
     longest_s: Literal,
+    grace: Literal,
+    growth: Literal,
+    longest_pause_s: Literal,
     usual: Vec<Literal>,
+    /// The numbers of the whole steps of a pause.
+    whole: Vec<Vec<Literal>>,
     lower_s: Literal,
     upper_s: Literal,
     nodes: Vec<Literal>,
@@ -52,8 +57,12 @@ impl StepConstants {
         Self {
             names: names.to_vec(),
             usual_s: Literal(sensor.usual_step_s()),
-            longest_s: Literal(sensor.longest_s()),
-            usual: literals(&sensor.usual_numbers()),
+            longest_s: Literal(sensor.parts.longest_step_s),
+            grace: Literal(STEP_GRACE as f32),
+            growth: Literal(STEP_GROWTH as f32),
+            longest_pause_s: Literal(LONGEST_PAUSE_S as f32),
+            usual: literals(&sensor.numbers_at(sensor.usual_step_s())),
+            whole: sensor.whole_steps_s().into_iter().map(|length_s| literals(&sensor.numbers_at(length_s))).collect(),
             lower_s: Literal(table.range.0 as f32),
             upper_s: Literal(table.range.1 as f32),
             nodes: narrow(&table.nodes),

@@ -125,12 +125,20 @@ enum {
     STEP = CHAIN + PHASES * PHASES
 };
 
-/* Length of the usual step, s, and the longest one: longer intervals are divided. */
-static const float USUAL_S = << steps.usual_s >>f, LONGEST_S = << steps.longest_s >>f;
-enum { MOST_STEPS = 128 };
+/* Length of the usual step, s, and the longest one: longer intervals are divided, in a long pause into whole steps that are
+ * GROWTH times as long, and so on. A step of the longest length is one, whatever rounding says. */
+static const float USUAL_S = << steps.usual_s >>f, LONGEST_S = << steps.longest_s >>f, GRACE = << steps.grace >>f, GROWTH = << steps.growth >>f;
+/* A longer pause leaves as little, s. */
+static const float LONGEST_PAUSE_S = << steps.longest_pause_s >>f;
 
-/* The numbers of the usual step. */
+/* The numbers of the usual step, and of whole steps of a pause. */
 static const float USUAL[STEP] = {<< steps.usual|join("f, ") >>f};
+enum { LENGTHS = << steps.whole|length >> };
+static const float WHOLE[LENGTHS][STEP] = {
+{% for row in steps.whole %}
+    {<< row|join("f, ") >>f},
+{% endfor %}
+};
 
 /* The numbers at lengths between the shortest and twice the usual one: between them they are a polynomial of the length. */
 enum { NODES = << steps.nodes|length >> };
@@ -353,46 +361,93 @@ static int step_on(ohmstrain_state *state, const interval *over, const float *rh
     return step_again(state, over, rho, extra_variance, most, residual);
 }
 
-/* A step without a reading. */
-static int pass(ohmstrain_state *state, const interval *over, ohmstrain_residual *residual)
+/* A step of this length; room for its numbers, where nobody has them. */
+static interval of_length(float step_s, float own[STEP])
 {
-    return step_on(state, over, (const float *)0, 0.0f, INFINITY, residual);
+    interval over;
+    float length_s = LONGEST_S;
+    int k;
+
+    over.step_s = step_s;
+    over.numbers = step_s == USUAL_S ? USUAL : (const float *)0;
+    for (k = 0; !over.numbers && k < LENGTHS; k++) {
+        over.numbers = step_s == length_s ? WHOLE[k] : (const float *)0;
+        length_s *= GROWTH;
+    }
+    if (!over.numbers) {
+        numbers_of(step_s, own);
+        over.numbers = own;
+    }
+    return over;
 }
 
-/* The last step of an interval. A reading that surprises has less weight; one that is too far away for the numbers is left out. */
+/* Length of the next step of a pause, in LONGEST_S: no more than an eighth of what has passed; 0 if only the last is left. Those that
+ * are not whole are parts of the one that would be next. */
+static float next_step(const ohmstrain_pause *pause, int whole)
+{
+    float times = 1.0f;
+
+    while (times * GROWTH <= pause->passed * 0.125f) {
+        times *= GROWTH;
+    }
+    while (!(pause->ahead_s > times * LONGEST_S * GRACE)) {
+        if (whole || !(times > 1.0f)) {
+            return 0.0f;
+        }
+        times *= 1.0f / GROWTH;
+    }
+    return times;
+}
+
+/* Predicts over the steps of a pause, whole ones or all but the last. */
+static int pass_steps(ohmstrain_state *state, ohmstrain_pause *pause, int whole)
+{
+    float own[STEP], times;
+    int status = OHMSTRAIN_OK;
+
+    while (status == OHMSTRAIN_OK && (times = next_step(pause, whole)) > 0.0f) {
+        const interval over = of_length(times * LONGEST_S, own);
+        ohmstrain_residual none;
+
+        pause->passed += times;
+        pause->ahead_s = pause->ahead_s - over.step_s;
+        status = step_on(state, &over, (const float *)0, 0.0f, INFINITY, &none);
+    }
+    return status;
+}
+
+/* The last step of an interval. A reading that surprises has less weight. */
 static int last_step(ohmstrain_state *state, const interval *over, const float *rho, float extra_variance, unsigned *flags,
                      ohmstrain_residual *residual)
 {
-    int status;
+    const int status = step_on(state, over, rho, extra_variance, INFLUENCE && rho ? SURPRISING : INFINITY, residual);
 
-    if (!rho) {
-        return pass(state, over, residual);
-    }
-    status = step_on(state, over, rho, extra_variance, INFLUENCE ? SURPRISING : INFINITY, residual);
     if (status == SURPRISED) {
         ohmstrain_residual again;
-        status = step_on(state, over, rho, weighted(extra_variance, residual->nis, residual->variance), INFINITY, &again);
-        *flags |= status == OHMSTRAIN_OK ? OHMSTRAIN_DOWNWEIGHTED : 0;
+        *flags |= OHMSTRAIN_DOWNWEIGHTED;
+        return step_on(state, over, rho, weighted(extra_variance, residual->nis, residual->variance), INFINITY, &again);
     }
-    if (status == OHMSTRAIN_OK) {
-        return status;
-    }
-    *flags |= OHMSTRAIN_REJECTED;
-    return pass(state, over, residual);
+    return status;
 }
 
-/* An interval in several steps, of which the last one gets the reading. */
-static int advance_by(ohmstrain_state *state, const interval *over, int count, const float *rho, float extra_variance,
-                      unsigned *flags, ohmstrain_residual *residual)
+/* Over all that is ahead of a pause, with a reading at its end or without. */
+static int advance(ohmstrain_state *state, ohmstrain_pause pause, const float *rho, float extra_variance, unsigned *flags,
+                   ohmstrain_residual *residual)
 {
-    ohmstrain_state next = *state;
-    int status = OHMSTRAIN_OK;
+    float own[STEP];
+    ohmstrain_state next;
+    interval over;
+    int status;
 
-    for (; count > 1 && status == OHMSTRAIN_OK; count--) {
-        status = pass(&next, over, residual);
+    if (!(next_step(&pause, 0) > 0.0f)) {
+        over = of_length(pause.ahead_s, own);
+        return last_step(state, &over, rho, extra_variance, flags, residual);
     }
+    next = *state;
+    status = pass_steps(&next, &pause, 0);
     if (status == OHMSTRAIN_OK) {
-        status = last_step(&next, over, rho, extra_variance, flags, residual);
+        over = of_length(pause.ahead_s, own);
+        status = last_step(&next, &over, rho, extra_variance, flags, residual);
     }
     if (status == OHMSTRAIN_OK) {
         *state = next;
@@ -400,42 +455,42 @@ static int advance_by(ohmstrain_state *state, const interval *over, int count, c
     return status;
 }
 
-/* `dt_s` seconds on. */
-static int advance(ohmstrain_state *state, float dt_s, const float *rho, float extra_variance, unsigned *flags,
-                   ohmstrain_residual *residual)
+/* Looks ahead to the end of a pause. The filter itself takes whole steps only. */
+static int look_ahead(ohmstrain_state *state, ohmstrain_pause pause, summary *all)
 {
-    float own[STEP], covered = LONGEST_S;
-    interval over;
-    int count = 1;
+    ohmstrain_state kept = *state, look;
+    ohmstrain_residual none;
+    unsigned flags = 0;
+    int status = pass_steps(&kept, &pause, 1);
 
-    for (; covered < dt_s && count < MOST_STEPS; count++) {
-        covered += LONGEST_S;
+    kept.pause = pause;
+    look = kept;
+    if (status == OHMSTRAIN_OK) {
+        status = advance(&look, pause, (const float *)0, 0.0f, &flags, &none);
     }
-    over.step_s = dt_s / (float)count;
-    over.numbers = USUAL;
-    if (over.step_s != USUAL_S) {
-        numbers_of(over.step_s, own);
-        over.numbers = own;
+    if (status == OHMSTRAIN_OK) {
+        summarise(&look, all);
+        *state = kept;
     }
-    return count > 1 ? advance_by(state, &over, count, rho, extra_variance, flags, residual)
-                     : last_step(state, &over, rho, extra_variance, flags, residual);
+    return status;
 }
-
-/* Flags of intervals that were passed without a reading. */
-enum { NO_READING = OHMSTRAIN_MISSING | OHMSTRAIN_IMPLAUSIBLE | OHMSTRAIN_STUCK | OHMSTRAIN_REJECTED };
 
 /* A step with a reading, relative, or without. */
 static ohmstrain_status step(ohmstrain_state *state, float dt_s, const float *rho, float extra_variance,
                              ohmstrain_residual *residual)
 {
+    static const ohmstrain_pause over = {0.0f, 0.0f};
+    ohmstrain_pause pause = state->pause;
     readings seen = state->readings;
     unsigned flags = rho ? 0 : OHMSTRAIN_MISSING;
     ohmstrain_residual of_step = {0.0f, 0.0f, 0.0f};
     summary all;
     const float *believed = rho;
-    float strain, variance, passed_s, shown = 0.0f, jump = 0.0f;
+    float strain, variance, shown = 0.0f, jump = 0.0f;
     int surprises, has_jumped;
 
+    pause.ahead_s += dt_s;
+    pause.ahead_s = pause.ahead_s > LONGEST_PAUSE_S ? LONGEST_PAUSE_S : pause.ahead_s;
     pass_time(&seen, dt_s);
     if (rho) {
         on_followed_rest(&seen, *rho, extra_variance, &shown, &extra_variance);
@@ -443,13 +498,19 @@ static ohmstrain_status step(ohmstrain_state *state, float dt_s, const float *rh
                       PLAUSIBILITY ? LONGEST_REPEAT_S : INFINITY, shown, extra_variance, &extra_variance);
         rho = flags ? (const float *)0 : &shown;
     }
-    if (advance(state, dt_s, rho, extra_variance, &flags, &of_step) != OHMSTRAIN_OK) {
+    if (rho && advance(state, pause, rho, extra_variance, &flags, &of_step) != OHMSTRAIN_OK) {
+        /* Too far away for the numbers. */
+        flags = OHMSTRAIN_REJECTED;
+        rho = (const float *)0;
+    }
+    if (rho) {
+        state->pause = over;
+    } else if (look_ahead(state, pause, &all) != OHMSTRAIN_OK) {
         return OHMSTRAIN_ERR_STATE;
     }
     if (residual) {
         *residual = of_step;
     }
-    rho = flags & NO_READING ? (const float *)0 : rho;
     believed = rho ? believed : rho;
     surprises = (flags & OHMSTRAIN_DOWNWEIGHTED) && of_step.nis > SURPRISING;
     has_jumped = rho && startles(&seen, *rho, of_step.nis, SECOND_LOOK ? JUMP : INFINITY, &jump) && surprises;
@@ -458,7 +519,9 @@ static ohmstrain_status step(ohmstrain_state *state, float dt_s, const float *rh
         look_again(state);
     }
 {% endif %}
-    summarise(state, &all);
+    if (rho) {
+        summarise(state, &all);
+    }
     strain = reported(all.mean[0], all.variance[0], &variance);
 {% if correction %}
     hear(&seen, dt_s, rho, surprises);
@@ -472,15 +535,17 @@ static ohmstrain_status step(ohmstrain_state *state, float dt_s, const float *rh
         if (has_jumped) {
             jumped(&seen, jump);
         }
-        follow(&seen, dt_s, *believed);
+        follow(&seen, seen.unread_s + dt_s, *believed);
     }
     state->strain = strain;
     state->variance = variance;
-    passed_s = run(&seen, dt_s);
+    state->rate = all.mean[1];
+    state->rate_variance = all.variance[1];
+    run(&seen, dt_s);
     if (believed) {
-        doubt_reading(&seen, passed_s, *believed, of_step.nis);
+        doubt_reading(&seen, *believed, of_step.nis);
     } else {
-        variance = doubt_pause(&seen, passed_s, strain, variance);
+        variance = doubt_pause(&seen, strain, variance);
     }
     if (DOUBTS) {
         flags |= doubted(&seen, all.mean[1], variance, &state->variance);
@@ -498,12 +563,16 @@ static ohmstrain_status start(ohmstrain_state *state, const float *strain, float
     summary all;
 
     start_mixture(state, strain);
+    state->pause.passed = 0.0f;
+    state->pause.ahead_s = 0.0f;
     state->readings = none;
     state->readings.follows = FOLLOWING;
     begin(&state->readings, strain != 0, strain && fabsf(*strain) <= << doubt.zero >>f);
     summarise(state, &all);
     state->strain = reported(all.mean[0], all.variance[0], &state->variance);
     state->variance += DOUBTS ? state->readings.fading : 0.0f;
+    state->rate = all.mean[1];
+    state->rate_variance = all.variance[1];
     state->rest_reading = rest_reading;
     return OHMSTRAIN_OK;
 }
@@ -602,18 +671,15 @@ ohmstrain_status ohmstrain_predict(ohmstrain_state *state)
 
 ohmstrain_status ohmstrain_get(const ohmstrain_state *state, ohmstrain_estimate *estimate)
 {
-    summary all;
-
     if (!state || !estimate) {
         return OHMSTRAIN_ERR_ARGUMENT;
     }
-    summarise(state, &all);
     estimate->strain = state->strain;
     estimate->strain_sd = sqrtf(state->variance);
     estimate->lo = state->strain - NORMAL_95 * estimate->strain_sd;
     estimate->hi = state->strain + NORMAL_95 * estimate->strain_sd;
-    estimate->rate = all.mean[1];
-    estimate->rate_sd = sqrtf(all.variance[1] > 0.0f ? all.variance[1] : 0.0f);
+    estimate->rate = state->rate;
+    estimate->rate_sd = sqrtf(state->rate_variance > 0.0f ? state->rate_variance : 0.0f);
     estimate->flags = state->readings.flags;
     return OHMSTRAIN_OK;
 }

@@ -123,7 +123,13 @@ typedef struct ohmstrain_mixture {
 } ohmstrain_mixture;
 
 {% endif %}
-/* What the filter knows; the caller owns it, one per sensor. */
+/* The time since the last reading that was used. */
+typedef struct ohmstrain_pause {
+    float passed;  /* in whole steps, which the filter has taken: in the longest step */
+    float ahead_s; /* since then */
+} ohmstrain_pause;
+
+/* What the filter knows; the caller owns it, one per sensor. Only a reading moves it on: intervals without one look ahead. */
 typedef struct ohmstrain_state {
 {% if estimator.hypotheses %}
     ohmstrain_mixture mixture;
@@ -133,10 +139,13 @@ typedef struct ohmstrain_state {
     /* Lower triangle of the covariance, row by row. */
     float covariance[OHMSTRAIN_ENTRIES];
 {% endif %}
+    ohmstrain_pause pause;
     ohmstrain_readings readings;
-    /* The strain as it is reported, and its variance. */
+    /* What is reported: the strain, its rate (1/s), and their variances. */
     float strain;
     float variance;
+    float rate;
+    float rate_variance;
     /* OHMSTRAIN_REST_READING, or that of another day: ohmstrain_rest sets it. */
     float rest_reading;
 } ohmstrain_state;
