@@ -47,7 +47,7 @@ fn seconds(cell: &str, last: Option<f64>) -> Result<f64, Fault> {
         return Err(Fault::in_column(NAME, "a time in seconds", quote(cell)));
     }
     match last {
-        Some(last) if now <= last => Err(Fault::in_column(NAME, format!("a time after {last} s"), quote(cell))),
+        Some(last) if now <= last => Err(Fault::in_column(NAME, format!("a time after {last} s"), quote(cell)).late()),
         _ => Ok(now),
     }
 }
@@ -59,7 +59,7 @@ fn microseconds(cell: &str, last: Option<Microseconds>) -> Result<Microseconds, 
     let wrong = |_| Fault::in_column(NAME, "a time in whole microseconds", quote(cell));
     let counter: u64 = cell.parse().map_err(wrong)?;
     let Some(last) = last else { return Ok(Microseconds { counter, unwrapped: counter }) };
-    let backwards = || Fault::in_column(NAME, format!("a time after {} µs", last.counter), quote(cell));
+    let backwards = || Fault::in_column(NAME, format!("a time after {} µs", last.counter), quote(cell)).late();
     let step = match counter.checked_sub(last.counter) {
         Some(step) => step,
         None if last.counter < WRAP_US => counter + WRAP_US - last.counter,

@@ -38,6 +38,8 @@ pub struct BadContent {
     pub found: String,
     /// Whether the file is written in another way altogether: no header of a trace, or no UTF-8 text.
     pub is_foreign: bool,
+    /// Whether nothing is wrong but the time, which is not after that of the row before.
+    pub is_late: bool,
 }
 
 impl fmt::Display for BadContent {
@@ -74,16 +76,23 @@ pub(crate) struct Fault {
     pub expected: String,
     pub found: String,
     pub is_foreign: bool,
+    pub is_late: bool,
 }
 
 impl Fault {
     pub(crate) fn new(expected: impl Into<String>, found: impl Into<String>) -> Self {
-        Self { column: None, expected: expected.into(), found: found.into(), is_foreign: false }
+        let (expected, found) = (expected.into(), found.into());
+        Self { column: None, expected, found, is_foreign: false, is_late: false }
     }
 
     /// What is there is no trace with a fault, but something else.
     pub(crate) fn foreign(self) -> Self {
         Self { is_foreign: true, ..self }
+    }
+
+    /// A time that is not after the one before.
+    pub(crate) fn late(self) -> Self {
+        Self { is_late: true, ..self }
     }
 
     pub(crate) fn in_column(column: &'static str, expected: impl Into<String>, found: impl Into<String>) -> Self {
@@ -98,6 +107,7 @@ impl Fault {
             expected: self.expected,
             found: self.found,
             is_foreign: self.is_foreign,
+            is_late: self.is_late,
         }
     }
 }

@@ -35,6 +35,7 @@ mod cell;
 mod clock;
 mod columns;
 mod counted;
+mod device_reader;
 mod error;
 pub mod faults;
 #[cfg(feature = "import")]
@@ -56,6 +57,7 @@ mod trace;
 mod writer;
 
 pub use counted::counted;
+pub use device_reader::{DeviceReader, DeviceRow};
 pub use error::{BadContent, SpecError, TraceError};
 pub use line_parser::{Line, LineParser};
 pub use metadata::{Metadata, ResistanceUnit, StrainUnit};

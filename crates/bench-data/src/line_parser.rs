@@ -26,13 +26,21 @@ const LONGEST_LINE: usize = 4096;
 pub struct LineParser {
     name: String,
     overrides: Metadata,
-    metadata: Metadata,
-    /// Whether a header has come since the metadata before it.
-    headed: bool,
-    parser: Option<(RowParser, Columns)>,
-    late: u32,
+    /// What stood there since the last header, if anything did.
+    before_header: Option<Metadata>,
+    stream: Option<Stream>,
     number: u64,
     record: StringRecord,
+}
+
+/// What has come since a header.
+struct Stream {
+    columns: Columns,
+    /// With the overrides.
+    metadata: Metadata,
+    parser: RowParser,
+    /// The clock that late rows go on from, and how many have.
+    late: Option<(RowParser, u32)>,
 }
 
 /// What a line was.
@@ -53,33 +61,32 @@ impl LineParser {
     /// Waits for a header. `name` is what errors call the source, `overrides` takes the place of the stream's metadata.
     #[must_use]
     pub fn new(name: &str, overrides: Metadata) -> Self {
-        let metadata = overrides.clone();
-        let (parser, record) = (None, StringRecord::new());
-        Self { name: name.into(), overrides, metadata, headed: false, parser, late: 0, number: 0, record }
+        let record = StringRecord::new();
+        Self { name: name.into(), overrides, before_header: None, stream: None, number: 0, record }
     }
 
     /// What the stream says of itself, with the overrides; units are those of rows.
     #[must_use]
     pub fn metadata(&self) -> Metadata {
-        self.metadata.in_own_units()
+        self.stream.as_ref().map_or(&self.overrides, |stream| &stream.metadata).in_own_units()
     }
 
     /// What the readings are; `None` before the header.
     #[must_use]
     pub fn reading_kind(&self) -> Option<ReadingKind> {
-        self.parser.as_ref().map(|(parser, _)| parser.reading_kind())
+        self.stream.as_ref().map(|stream| stream.parser.reading_kind())
     }
 
     /// Whether the readings are converter codes.
     #[must_use]
     pub fn has_codes(&self) -> bool {
-        self.parser.as_ref().is_some_and(|(parser, _)| parser.has_codes())
+        self.stream.as_ref().is_some_and(|stream| stream.parser.has_codes())
     }
 
     /// What the reference is, if there is one.
     #[must_use]
     pub fn reference_quantity(&self) -> Option<ReferenceQuantity> {
-        self.parser.as_ref().and_then(|(parser, _)| parser.reference_quantity())
+        self.stream.as_ref().and_then(|stream| stream.parser.reference_quantity())
     }
 
     /// Takes a line, with or without its end.
@@ -89,6 +96,12 @@ impl LineParser {
     pub fn take(&mut self, line: &[u8]) -> Result<Line, BadContent> {
         self.number += 1;
         self.of_line(line).map_err(|fault| fault.at(&self.name, self.number))
+    }
+
+    /// Takes the line with this number.
+    pub(crate) fn take_numbered(&mut self, line: &str, number: u64) -> Result<Line, Fault> {
+        self.number = number;
+        self.of_line(line.as_bytes())
     }
 
     fn of_line(&mut self, line: &[u8]) -> Result<Line, Fault> {
@@ -101,44 +114,58 @@ impl LineParser {
             return Ok(Line::Nothing);
         }
         if text.starts_with('#') {
-            if std::mem::take(&mut self.headed) {
-                self.metadata = Metadata::default();
-            }
-            return self.metadata.take_line(text).map(|()| Line::Nothing);
+            return self.before_header.get_or_insert_default().take_line(text).map(|()| Line::Nothing);
         }
         take_apart(text, &mut self.record)?;
-        if let Ok(columns) = Columns::of_header(&self.record) {
-            return self.begin(columns);
-        }
-        let Some((parser, columns)) = &mut self.parser else {
+        match (Columns::of_header(&self.record), &mut self.stream) {
+            (Ok(columns), _) => self.begin(columns),
+            (Err(_), Some(stream)) => stream.take(&self.record, self.number),
             // Says which columns a header has.
-            return Columns::of_header(&self.record).map(|_| Line::Nothing);
-        };
-        match parser.row(&self.record, self.number) {
-            Ok(row) => {
-                self.late = 0;
-                Ok(Line::Row(row))
-            }
-            Err(fault) if parser.is_late(&self.record) && self.late + 1 < LATE_LINES => {
-                self.late += 1;
-                Err(fault)
-            }
-            Err(fault) if parser.is_late(&self.record) => {
-                let mut fresh = RowParser::new(*columns, &self.metadata)?;
-                let row = fresh.row(&self.record, self.number).map_err(|_| fault)?;
-                (*parser, self.late) = (fresh, 0);
-                Ok(Line::Restarted(row))
-            }
-            Err(fault) => Err(fault),
+            (Err(fault), None) => Err(fault),
         }
     }
 
+    /// A header that nothing stands above has the metadata of the one before.
     fn begin(&mut self, columns: Columns) -> Result<Line, Fault> {
-        let mut metadata = self.metadata.clone();
+        let before = self.stream.as_ref().map(|stream| &stream.metadata);
+        let mut metadata = self.before_header.as_ref().or(before).cloned().unwrap_or_default();
         metadata.override_with(&self.overrides);
-        self.parser = Some((RowParser::new(columns, &metadata)?, columns));
-        (self.metadata, self.headed, self.late) = (metadata, true, 0);
+        let parser = RowParser::new(columns, &metadata)?;
+        self.stream = Some(Stream { columns, metadata, parser, late: None });
+        self.before_header = None;
         Ok(Line::Header)
+    }
+}
+
+impl Stream {
+    fn take(&mut self, record: &StringRecord, number: u64) -> Result<Line, Fault> {
+        let fault = match self.parser.row(record, number) {
+            Ok(row) => {
+                self.late = None;
+                return Ok(Line::Row(row));
+            }
+            Err(fault) => fault,
+        };
+        if !fault.is_late {
+            return Err(fault);
+        }
+        let (mut clock, mut count) = match self.late.take() {
+            Some(late) => late,
+            None => (RowParser::new(self.columns, &self.metadata)?, 0),
+        };
+        let mut row = clock.row(record, number);
+        if row.is_err() {
+            // Late by the late ones' clock, too.
+            (clock, count) = (RowParser::new(self.columns, &self.metadata)?, 0);
+            row = clock.row(record, number);
+        }
+        count += 1;
+        if count == LATE_LINES {
+            self.parser = clock;
+            return row.map(Line::Restarted);
+        }
+        self.late = Some((clock, count));
+        Err(fault)
     }
 }
 
@@ -166,6 +193,9 @@ mod tests {
         let lines = ["time_s,resistance_ohm", "90,1600", "1,1600", "91,1600", "0,1", "1,1", "2,1", "3,1"];
         let known = [None, Some(90.0), None, Some(91.0), None, None, Some(2.0), Some(3.0)];
         assert_eq!(times(&lines), known);
+        // Late ones that do not go on from each other are no clock.
+        let lines = ["time_s,resistance_ohm", "90,1600", "5,1600", "4,1600", "4,1600", "3,1600", "91,1600"];
+        assert_eq!(times(&lines), [None, Some(90.0), None, None, None, None, Some(91.0)]);
         let lines = ["time_s,resistance_ohm", "90,1600", "time_us,resistance_ohm", "5000000,1600"];
         assert_eq!(times(&lines), [None, Some(90.0), None, Some(5.0)]);
     }
@@ -179,5 +209,9 @@ mod tests {
         }
         assert!(parser.metadata().front_end.is_some());
         assert!(matches!(parser.take(b"5000,512"), Ok(Line::Row(row)) if row.reading.sd_ohm.is_some()));
+        // A remark is none of it, and a clock that starts again needs it.
+        assert!(parser.take(b"# warm now").is_ok() && parser.metadata().front_end.is_some());
+        let lines = [&b"1,512"[..], b"2,512", b"3,512"].map(|line| parser.take(line));
+        assert!(matches!(lines[2], Ok(Line::Restarted(row)) if row.reading.sd_ohm.is_some()), "{lines:?}");
     }
 }

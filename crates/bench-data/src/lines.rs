@@ -118,13 +118,6 @@ impl<R: Read> LineFeed<R> {
         Ok(Some(false))
     }
 
-    /// Takes the next line apart by itself, whatever became of the one before; `false` at the end of the source.
-    pub(crate) fn next_alone(&mut self, cells: &mut StringRecord) -> Result<bool, LineFault> {
-        let Some(line) = self.lines.next()? else { return Ok(false) };
-        take_apart(line, cells).map_err(LineFault::Content)?;
-        Ok(true)
-    }
-
     fn next_line(&mut self) -> Result<Option<()>, LineFault> {
         if self.record_has_line {
             let found = quote(&String::from_utf8_lossy(&self.pending));

@@ -1,9 +1,8 @@
 use std::io::Read;
-use std::vec;
 
 use crate::columns::Columns;
-use crate::error::{BadContent, Fault, TraceError};
-use crate::lines::{LineFault, LineFeed, Lines, is_plain, take_apart};
+use crate::error::{Fault, TraceError};
+use crate::lines::{LineFault, LineFeed, Lines, is_plain};
 use crate::metadata::Metadata;
 use crate::row::{ReadingKind, ReferenceQuantity, Row};
 use crate::row_parser::RowParser;
@@ -32,10 +31,6 @@ pub struct TraceReader<R> {
     record: StringRecord,
     /// Every line up to now was plain; after the first that was not, the csv crate reads them all.
     plain: bool,
-    /// What stood above the header and was none of a trace.
-    skipped: vec::IntoIter<BadContent>,
-    /// A bad row does not end the trace.
-    goes_on: bool,
     done: bool,
 }
 
@@ -56,26 +51,6 @@ impl<R: Read> TraceReader<R> {
         let (file, mut lines) = (called(name), Lines::new(source));
         let (metadata, header) = read_prelude(&mut lines).map_err(|fault| placed(fault, &file, lines.number()))?;
         Self::begin(file, lines, metadata, overrides, &header)
-    }
-
-    /// As [`with_overrides`](Self::with_overrides) and [`past_bad_lines`](Self::past_bad_lines), of a device that may say
-    /// something else first, a hundred lines at most: the iterator delivers their errors before the first row.
-    ///
-    /// ```
-    /// use ohmstrain_bench_data::{Metadata, TraceReader};
-    /// let file = "ets Jun  8 2016\nboot: 0x13\ntime_s,resistance_ohm\n0.0,1600\n";
-    /// let rows = TraceReader::past_preamble(file.as_bytes(), "-", &Metadata::default())?;
-    /// assert_eq!(rows.map(|row| row.is_ok()).collect::<Vec<_>>(), [false, false, true]);
-    /// # Ok::<(), ohmstrain_bench_data::TraceError>(())
-    /// ```
-    ///
-    /// # Errors
-    /// [`TraceError`] if the source fails, or no header comes.
-    pub fn past_preamble(source: R, name: &str, overrides: &Metadata) -> Result<Self, TraceError> {
-        let (file, mut lines) = (called(name), Lines::new(source));
-        let (metadata, header, skipped) = read_past_preamble(&mut lines, &file)?;
-        let begun = Self::begin(file, lines, metadata, overrides, &header)?;
-        Ok(Self { skipped: skipped.into_iter(), goes_on: true, ..begun })
     }
 
     /// A source that has no header, or is joined after it: `header` names the columns, and its first line is a row.
@@ -103,23 +78,7 @@ impl<R: Read> TraceReader<R> {
         let columns = Columns::of_header(&record).map_err(at_header)?;
         let parser = RowParser::new(columns, &metadata).map_err(at_header)?;
         let metadata = metadata.in_own_units();
-        let skipped = Vec::new().into_iter();
-        Ok(Self { file, metadata, parser, records, record, plain, skipped, goes_on: false, done: false })
-    }
-
-    /// Goes on after a line that is none of a trace: the iterator delivers its error, and then the rows after it. Whatever
-    /// the source itself fails with still ends it.
-    ///
-    /// ```
-    /// use ohmstrain_bench_data::TraceReader;
-    /// let file = "time_s,resistance_ohm\n0.0,1600\n0.1,16\"\u{0}0\n0.2,1601\n";
-    /// let rows = TraceReader::new(file.as_bytes(), "-")?.past_bad_lines();
-    /// assert_eq!(rows.filter(Result::is_ok).count(), 2);
-    /// # Ok::<(), ohmstrain_bench_data::TraceError>(())
-    /// ```
-    #[must_use]
-    pub fn past_bad_lines(self) -> Self {
-        Self { goes_on: true, ..self }
+        Ok(Self { file, metadata, parser, records, record, plain, done: false })
     }
 
     /// Name of the source, as messages call it.
@@ -176,10 +135,6 @@ impl<R: Read> TraceReader<R> {
     fn next_record(&mut self) -> Result<bool, TraceError> {
         let feed = self.records.get_mut();
         feed.begin_record();
-        if self.goes_on {
-            let taken = feed.next_alone(&mut self.record);
-            return taken.map_err(|fault| placed(fault, &self.file, self.records.get_ref().line()));
-        }
         if self.plain {
             let plain = feed.next_plain(&mut self.record);
             match plain.map_err(|fault| placed(fault, &self.file, self.records.get_ref().line()))? {
@@ -200,15 +155,8 @@ impl<R: Read> Iterator for TraceReader<R> {
         if self.done {
             return None;
         }
-        if let Some(skipped) = self.skipped.next() {
-            return Some(Err(skipped.into()));
-        }
         let row = self.next_row().transpose();
-        self.done = match &row {
-            Some(Ok(_)) => false,
-            Some(Err(TraceError::Content(_))) => !self.goes_on,
-            _ => true,
-        };
+        self.done = !matches!(row, Some(Ok(_)));
         row
     }
 }
@@ -216,37 +164,11 @@ impl<R: Read> Iterator for TraceReader<R> {
 impl<R: Read> std::iter::FusedIterator for TraceReader<R> {}
 
 /// What messages call a source.
-fn called(name: &str) -> String {
+pub(crate) fn called(name: &str) -> String {
     if name == "-" { "stdin" } else { name }.to_owned()
 }
 
-/// Lines that a device may say before its header: a boot loader's are some dozen.
-const LONGEST_PREAMBLE: usize = 100;
-
-/// Metadata lines, the header line, and what stood above it that was neither.
-fn read_past_preamble<R: Read>(
-    lines: &mut Lines<R>,
-    file: &str,
-) -> Result<(Metadata, String, Vec<BadContent>), TraceError> {
-    let (mut metadata, mut skipped, mut cells) = (Metadata::default(), Vec::new(), StringRecord::new());
-    while skipped.len() < LONGEST_PREAMBLE {
-        let taken = match lines.next() {
-            Ok(None) => break,
-            Ok(Some(line)) if line.starts_with('#') => metadata.take_line(line),
-            Ok(Some(line)) => match take_apart(line, &mut cells).and_then(|()| Columns::of_header(&cells)) {
-                Ok(_) => return Ok((metadata, line.to_owned(), skipped)),
-                Err(fault) => Err(fault),
-            },
-            Err(LineFault::Content(fault)) => Err(fault),
-            Err(failed) => return Err(placed(failed, file, lines.number())),
-        };
-        skipped.extend(taken.err().map(|fault| fault.at(file, lines.number())));
-    }
-    let nothing = || Fault::new(A_HEADER, "the end of the file").at(file, lines.number().max(1));
-    Err(skipped.into_iter().next().unwrap_or_else(nothing).into())
-}
-
-const A_HEADER: &str = "a header such as `time_s,resistance_ohm,strain`";
+pub(crate) const A_HEADER: &str = "a header such as `time_s,resistance_ohm,strain`";
 
 /// Metadata lines, and the header line.
 fn read_prelude<R: Read>(lines: &mut Lines<R>) -> Result<(Metadata, String), LineFault> {
@@ -268,7 +190,7 @@ fn feed_error<R: Read>(error: csv::Error, records: &mut csv::Reader<LineFeed<R>>
 }
 
 /// `line` was delivered last.
-fn placed(fault: LineFault, file: &str, line: u64) -> TraceError {
+pub(crate) fn placed(fault: LineFault, file: &str, line: u64) -> TraceError {
     match fault {
         // An empty file has no line at all; what is missing, is missing on its first.
         LineFault::Content(fault) => fault.at(file, line.max(1)).into(),

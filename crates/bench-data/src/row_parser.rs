@@ -48,12 +48,6 @@ impl RowParser {
         self.columns.temperature.is_some()
     }
 
-    /// Whether a line's time is one, though not after the last row's.
-    pub(crate) fn is_late(&self, record: &StringRecord) -> bool {
-        let mut fresh = Clock::new(self.columns.time.column);
-        record.len() == self.columns.width && fresh.read(self.columns.time.cell(record)).is_ok()
-    }
-
     /// The row of a line.
     pub(crate) fn row(&mut self, record: &StringRecord, line: u64) -> Result<Row, Fault> {
         if record.len() != self.columns.width {

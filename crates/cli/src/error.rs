@@ -1,3 +1,4 @@
+use std::borrow::Cow;
 use std::io::{self, Write};
 use std::path::Path;
 use std::process::ExitCode;
@@ -7,6 +8,7 @@ use ohmstrain_bench_data::TraceError;
 use ohmstrain_calib::CalibrationError;
 use thiserror::Error;
 
+use crate::printable::printable;
 use crate::verbosity::Verbosity;
 
 /// Why a command stopped; each kind has its exit code.
@@ -50,7 +52,7 @@ impl CliError {
     /// Says on stderr what went wrong.
     pub fn error(text: &str) {
         // `eprintln!` would panic if whoever read stderr has left.
-        let _ = writeln!(io::stderr(), "ohmstrain: {text}");
+        let _ = writeln!(io::stderr(), "ohmstrain: {}", printable(text));
     }
 
     /// Says on stderr what did not stop the command.
@@ -118,9 +120,20 @@ impl From<TraceError> for CliError {
     }
 }
 
-/// A word as a shell takes it; one that no shell takes as it is.
+/// A word as a shell takes it. What cannot be printed stands in octal, as bash, zsh and ksh have it.
 pub fn shell_word(word: &str) -> String {
-    shlex::try_quote(word).map_or_else(|_| word.to_owned(), Into::into)
+    match (printable(word), shlex::try_quote(word)) {
+        (Cow::Borrowed(_), Ok(quoted)) => quoted.into_owned(),
+        _ => format!("$'{}'", word.bytes().map(in_dollar_quotes).collect::<String>()),
+    }
+}
+
+fn in_dollar_quotes(byte: u8) -> String {
+    match byte {
+        b'\'' | b'\\' => format!("\\{}", char::from(byte)),
+        b' '..=b'~' => char::from(byte).into(),
+        _ => format!("\\{byte:03o}"),
+    }
 }
 
 /// Errors of writing to stdout.

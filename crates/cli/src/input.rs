@@ -5,9 +5,7 @@ use std::path::Path;
 
 use ohmstrain::number::significant;
 use ohmstrain::{JointParams, Quantity, Reading, ReadingUnit};
-use ohmstrain_bench_data::{
-    Metadata, ParquetText, Reading as TraceReading, ReadingKind, Trace, TraceError, TraceReader,
-};
+use ohmstrain_bench_data::{Metadata, ParquetText, Reading as TraceReading, ReadingKind, Trace, TraceReader};
 use ohmstrain_calib::Samples;
 use sha2::{Digest, Sha256};
 
@@ -31,83 +29,39 @@ pub struct TraceFile {
     pub trace: Trace,
 }
 
-/// How a recording begins.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub enum Beginning<'a> {
-    /// With metadata and a header.
-    Header,
-    /// With what a device says before its header.
-    Preamble,
-    /// With a row of these columns.
-    Row(&'a str),
-}
-
 /// Opens a recording for reading row by row; `-` is stdin.
 pub fn open(path: &Path, overrides: &Metadata) -> Result<TraceReader<Box<dyn Read>>, CliError> {
-    open_at(path, overrides, Beginning::Header)
+    let (text, metadata) = text_of(path, overrides)?;
+    Ok(TraceReader::with_overrides(text, &path.display().to_string(), &metadata)?)
 }
 
-/// Opens a recording, or a stream that may have been joined in its middle.
-pub fn open_at(
-    path: &Path,
-    overrides: &Metadata,
-    beginning: Beginning<'_>,
-) -> Result<TraceReader<Box<dyn Read>>, CliError> {
-    let source: Box<dyn Read> = if is_stdin(path) {
+/// The text of a recording, of a Parquet file the CSV that it stands for, and what is known of it besides.
+pub fn text_of(path: &Path, overrides: &Metadata) -> Result<(Box<dyn Read>, Metadata), CliError> {
+    if is_stdin(path) {
         let mut stdin = io::stdin().lock();
         // Waits for the first bytes, and leaves them where they are.
         if let Ok(first) = stdin.fill_buf() {
             refuse_parameters(path, first)?;
         }
-        Box::new(stdin)
-    } else {
-        let unreadable = |error| CliError::file("read", path, &error);
-        let mut file = BufReader::new(File::open(path).map_err(unreadable)?);
-        let first = file.fill_buf().map_err(unreadable)?;
-        if ParquetText::is_one(first) {
-            return open_parquet(path, overrides);
-        }
-        refuse_parameters(path, first)?;
-        Box::new(file)
-    };
-    let name = path.display().to_string();
-    match beginning {
-        Beginning::Header => Ok(TraceReader::with_overrides(source, &name, overrides)?),
-        Beginning::Preamble => Ok(TraceReader::past_preamble(source, &name, overrides).map_err(without_header)?),
-        Beginning::Row(header) => TraceReader::headless(source, &name, header, overrides).map_err(of_header_flag),
+        return Ok((Box::new(stdin), overrides.clone()));
     }
+    let unreadable = |error| CliError::file("read", path, &error);
+    let mut file = BufReader::new(File::open(path).map_err(unreadable)?);
+    let first = file.fill_buf().map_err(unreadable)?;
+    if ParquetText::is_one(first) {
+        return text_of_parquet(path, overrides);
+    }
+    refuse_parameters(path, first)?;
+    Ok((Box::new(file), overrides.clone()))
 }
 
-/// A stream whose header did not come.
-fn without_header(error: TraceError) -> CliError {
-    match error {
-        TraceError::Content(content) => {
-            let hint = "a stream without a header, or joined after it, needs --header time_s,resistance_ohm";
-            CliError::Input(format!("{content}; {hint}"))
-        }
-        error => error.into(),
-    }
-}
-
-/// `--header` has none of the columns.
-fn of_header_flag(error: TraceError) -> CliError {
-    match error {
-        TraceError::Content(content) => {
-            CliError::Arguments(format!("--header: expected {}, found {}", content.expected, content.found))
-        }
-        error => error.into(),
-    }
-}
-
-/// Opens a recording in a Parquet file, row by row as any other.
-fn open_parquet(path: &Path, overrides: &Metadata) -> Result<TraceReader<Box<dyn Read>>, CliError> {
+fn text_of_parquet(path: &Path, overrides: &Metadata) -> Result<(Box<dyn Read>, Metadata), CliError> {
     let unreadable = |error| CliError::Input(format!("{}: {error}", path.display()));
     let file = File::open(path).map_err(|error| CliError::file("read", path, &error))?;
     let text = ParquetText::new(file).map_err(unreadable)?;
     let mut metadata = text.metadata().clone();
     metadata.override_with(overrides);
-    let source: Box<dyn Read> = Box::new(text);
-    Ok(TraceReader::with_overrides(source, &path.display().to_string(), &metadata)?)
+    Ok((Box::new(text), metadata))
 }
 
 /// Whether a path means stdin.
@@ -131,14 +85,16 @@ pub fn read(path: &Path, overrides: &Metadata) -> Result<TraceFile, CliError> {
 pub fn parse(bytes: &[u8], path: &Path, overrides: &Metadata) -> Result<TraceFile, CliError> {
     refuse_parameters(path, bytes)?;
     let sha256 = hexadecimal(&Sha256::digest(bytes));
+    let name = path.display().to_string();
     if ParquetText::is_one(bytes) {
-        return collect(open_parquet(path, overrides)?, sha256);
+        let (text, metadata) = text_of_parquet(path, overrides)?;
+        return collect(TraceReader::with_overrides(text, &name, &metadata)?, sha256);
     }
-    collect(TraceReader::with_overrides(bytes, &path.display().to_string(), overrides)?, sha256)
+    collect(TraceReader::with_overrides(bytes, &name, overrides)?, sha256)
 }
 
 fn collect<R: Read>(rows: TraceReader<R>, sha256: String) -> Result<TraceFile, CliError> {
-    let (name, header) = (rows.file().to_string(), header(&rows));
+    let (name, header) = (rows.file().to_string(), header(rows.file(), rows.line()));
     Ok(TraceFile { name, header, sha256, first_row: 0, trace: Trace::collect(rows)? })
 }
 
@@ -171,8 +127,8 @@ fn refuse_parameters(path: &Path, bytes: &[u8]) -> Result<(), CliError> {
 }
 
 /// What messages call the header of a recording of which no row has been read yet.
-pub fn header<R: Read>(rows: &TraceReader<R>) -> String {
-    if rows.line() == 0 { rows.file().to_owned() } else { format!("{}:{}", rows.file(), rows.line()) }
+pub fn header(file: &str, line: u64) -> String {
+    if line == 0 { file.to_owned() } else { format!("{file}:{line}") }
 }
 
 impl TraceFile {

@@ -3,9 +3,9 @@ use std::path::{Path, PathBuf};
 
 use ohmstrain_bench_data::import::{ImportError, Plan, Recipe, Table, read_table};
 
-use crate::error::CliError;
+use crate::error::{CliError, shell_word};
 use crate::input::is_stdin;
-use crate::output::Kind;
+use crate::output::{Kind, is_of_a_hand};
 use crate::sensor_file;
 
 /// Bytes that tell what a file is.
@@ -14,13 +14,14 @@ const HEAD: u64 = 4096;
 /// Refuses what this program made of recordings, which looks like a table, too.
 pub fn refuse_results(path: &Path) -> Result<(), CliError> {
     let Some(head) = std::fs::File::open(path).ok().filter(|_| path.is_file()).and_then(head) else { return Ok(()) };
-    let what = if Kind::Prior.wrote(&head) {
+    let header = head.lines().next().unwrap_or_default();
+    let what = if Kind::Prior.wrote(&head, &[]) {
         "is a prior: give it to `calibrate --prior`"
     } else if sensor_file::is_hand(&head) {
         sensor_file::A_HAND
     } else if sensor_file::is_one(head.as_bytes()) {
         "is a sensor file: give it to --sensor of `filter`, `smooth`, `evaluate` or `live`"
-    } else if Kind::Estimates.wrote(&head) {
+    } else if Kind::Estimates.wrote(&head, &[]) || is_of_a_hand(header) {
         "has estimates, what `filter` or `smooth` made of a recording: give the recording itself"
     } else {
         return Ok(());
@@ -58,7 +59,7 @@ fn bytes(path: &Path) -> Result<Vec<u8>, CliError> {
 }
 
 /// The command that imports files as planned, ready for a shell.
-pub fn command(paths: &[PathBuf], tables: &[Table], plan: &Plan) -> Result<String, CliError> {
+pub fn command(paths: &[PathBuf], tables: &[Table], plan: &Plan) -> String {
     let mut words = vec!["ohmstrain".to_owned(), "import".to_owned()];
     for path in paths {
         let path = path.display().to_string();
@@ -69,7 +70,7 @@ pub fn command(paths: &[PathBuf], tables: &[Table], plan: &Plan) -> Result<Strin
     let is_taken = |name: &str| paths.iter().any(|path| path.file_name().is_some_and(|file| file == name));
     let output = ["trace.csv", "imported.csv", "imported-trace.csv"].into_iter().find(|name| !is_taken(name));
     words.extend(["-o".to_owned(), output.unwrap_or("imported-trace-1.csv").to_owned()]);
-    shlex::try_join(words.iter().map(String::as_str)).map_err(|error| CliError::Other(error.to_string()))
+    words.iter().map(|word| shell_word(word)).collect::<Vec<_>>().join(" ")
 }
 
 impl From<ImportError> for CliError {

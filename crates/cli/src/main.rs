@@ -15,20 +15,24 @@ mod lab_files;
 mod output;
 mod parquet_table;
 mod plausible;
+mod printable;
 mod progress;
 mod quiet;
 mod readings;
 mod report;
 mod run;
 mod sensor_file;
+mod stream;
 mod suits;
 mod verbosity;
 
+use std::borrow::Cow;
 use std::io::{self, Write};
 use std::process::ExitCode;
 
 use clap::Parser;
 use clap::error::ErrorKind;
+use printable::{printable, printable_lines};
 
 fn main() -> ExitCode {
     let args = match args::Args::try_parse() {
@@ -44,7 +48,13 @@ fn main() -> ExitCode {
 
 /// Says what is wrong with the arguments, with the command's example where something is missing; or prints help.
 fn refused(error: &clap::Error) -> ExitCode {
-    let _ = error.print();
+    let is_plain = std::env::args_os().all(|arg| matches!(printable(&arg.to_string_lossy()), Cow::Borrowed(_)));
+    // In colours, unless arguments that it quotes would colour it.
+    let _ = if is_plain || !error.use_stderr() {
+        error.print()
+    } else {
+        write!(io::stderr(), "{}", printable_lines(&error.to_string()))
+    };
     if error.kind() == ErrorKind::MissingRequiredArgument
         && let Some(example) = std::env::args().nth(1).and_then(|command| args::example(&command))
     {

@@ -6,6 +6,7 @@
 mod kind;
 mod place;
 mod rows;
+mod unfinished;
 mod wide;
 
 use std::fs;
@@ -14,12 +15,16 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-pub use kind::{IMPORT, Kind, SIMULATE};
-use place::{Identity, Place, Prepared};
+pub use kind::{IMPORT, Kind, MANUAL, SIMULATE, is_of_a_hand, is_this_program};
+use place::Identity;
+pub use place::Place;
 pub use rows::RowsOut;
+use unfinished::Unfinished;
+pub use unfinished::UnfinishedFolder;
 pub use wide::{COLUMNS, table, wrapped, wrapped_table};
 
 use crate::error::CliError;
+use crate::printable::{printable_json, printable_lines};
 use ohmstrain::MADE_BY;
 
 /// The files that a command writes.
@@ -40,10 +45,12 @@ struct Claimed {
     /// As the user calls it.
     path: PathBuf,
     kind: Kind,
+    /// Columns of a table.
+    columns: Vec<String>,
     place: Place,
     content: Option<Vec<u8>>,
     /// What was written bit by bit.
-    begun: Option<Prepared>,
+    begun: Option<Unfinished>,
 }
 
 impl Outputs {
@@ -55,7 +62,11 @@ impl Outputs {
     }
 
     /// Makes a folder and the folders above it; those that are new go again, unless something is published.
+    ///
+    /// # Errors
+    /// If that cannot be done.
     pub fn folder(&mut self, path: &Path) -> Result<(), CliError> {
+        refuse_stdout(path)?;
         let is_new = |folder: &&Path| !folder.as_os_str().is_empty() && !folder.exists();
         let mut new: Vec<PathBuf> = path.ancestors().take_while(is_new).map(Path::to_path_buf).collect();
         new.reverse();
@@ -68,6 +79,23 @@ impl Outputs {
     /// # Errors
     /// If it cannot be written, is an input or another output, or holds something that this program did not write.
     pub fn claim(&mut self, path: &Path, kind: Kind) -> Result<Claim, CliError> {
+        self.claim_table(path, kind, &[])
+    }
+
+    /// Claims a file, unless there is none, or `-` means stdout.
+    ///
+    /// # Errors
+    /// As [`Outputs::claim`].
+    pub fn claim_or_stdout(&mut self, path: Option<&Path>, kind: Kind) -> Result<Option<Claim>, CliError> {
+        path.filter(|path| !is_stdout(path)).map(|path| self.claim(path, kind)).transpose()
+    }
+
+    /// Claims a file for a table with these columns: another with the same ones is this program's.
+    ///
+    /// # Errors
+    /// As [`Outputs::claim`].
+    pub fn claim_table(&mut self, path: &Path, kind: Kind, columns: &[String]) -> Result<Claim, CliError> {
+        refuse_stdout(path)?;
         let place = Place::of(path).map_err(|error| match path.parent() {
             Some(folder) if !folder.as_os_str().is_empty() && !folder.exists() => {
                 CliError::Other(format!("cannot write {}: there is no folder {}", path.display(), folder.display()))
@@ -86,15 +114,16 @@ impl Outputs {
                 return Err(refused("the output", &other.path));
             }
         }
-        let claimed = Claimed { path: path.to_path_buf(), kind, place, content: None, begun: None };
+        let (path, columns) = (path.to_path_buf(), columns.to_vec());
+        let claimed = Claimed { path, kind, columns, place, content: None, begun: None };
         self.check_kind(&claimed)?;
         self.files.push(claimed);
         Ok(Claim(self.files.len() - 1))
     }
 
     fn check_kind(&self, file: &Claimed) -> Result<(), CliError> {
-        let foreign =
-            file.place.holds_other_than(file.kind).map_err(|error| CliError::file("read", &file.path, &error))?;
+        let foreign = file.place.holds_other_than(file.kind, &file.columns);
+        let foreign = foreign.map_err(|error| CliError::file("read", &file.path, &error))?;
         if foreign && !self.force {
             let (path, kind) = (file.path.display(), file.kind.name());
             return Err(CliError::Arguments(format!(
@@ -133,32 +162,27 @@ impl Outputs {
                 self.put(claim, content);
                 self.publish()
             }
-            None => print(|out| Ok(out.write_all(&content)?)),
+            None => print_data(&content),
         }
     }
 
     /// Writes all that was put: each file whole, and nothing before everything lies ready beside its place.
     pub fn publish(mut self) -> Result<(), CliError> {
-        let mut ready = Vec::new();
         for file in self.files.iter().filter(|file| file.content.is_some() || file.begun.is_some()) {
             self.check_kind(file)?;
         }
-        for file in &mut self.files {
-            let prepared = match (file.begun.take(), &file.content) {
-                (Some(begun), _) => begun,
-                (None, Some(content)) => {
-                    file.place.prepare(content).map_err(|error| CliError::file("write", &file.path, &error))?
-                }
-                (None, None) => continue,
-            };
-            ready.push((file.path.clone(), prepared));
-        }
+        let mut whole = Vec::new();
         // A device may still fail; taking a place hardly does.
-        ready.sort_by_key(|(_, prepared)| !prepared.may_fail());
-        for (path, prepared) in ready {
-            prepared.publish().map_err(|error| CliError::file("write", &path, &error))?;
-            self.published = true;
+        self.files.sort_by_key(|file| matches!(file.place, Place::Through(_)));
+        for file in &mut self.files {
+            if let Some(content) = file.content.take() {
+                let begun = file.place.fill(&content);
+                file.begun = begun.map_err(|error| CliError::file("write", &file.path, &error))?;
+            }
+            whole.extend(file.begun.take());
         }
+        unfinished::publish(whole).map_err(|(path, error)| CliError::file("write", &path, &error))?;
+        self.published = true;
         Ok(())
     }
 }
@@ -170,6 +194,20 @@ impl Drop for Outputs {
             self.folders.iter().rev().for_each(|folder| drop(fs::remove_dir(folder)));
         }
     }
+}
+
+/// Whether a path means stdout.
+pub fn is_stdout(path: &Path) -> bool {
+    path == Path::new("-")
+}
+
+/// Refuses `-` where a file or a folder is written.
+pub fn refuse_stdout(path: &Path) -> Result<(), CliError> {
+    if is_stdout(path) {
+        let what = "cannot write -: expected a file or a folder, found -, which means stdout; one of this name is ./-";
+        return Err(CliError::Arguments(what.into()));
+    }
+    Ok(())
 }
 
 /// Writes an object as JSON. `schema` is the version of what it has: names are added without another version; one that
@@ -184,13 +222,20 @@ pub fn json(out: &mut dyn Write, schema: u32, content: &impl Serialize) -> Resul
         content: &'a T,
     }
     let all = Versioned { schema, made_by: MADE_BY, content };
-    serde_json::to_writer_pretty(&mut *out, &all).map_err(io::Error::from)?;
-    Ok(writeln!(out)?)
+    let text = serde_json::to_string_pretty(&all).map_err(io::Error::from)?;
+    Ok(writeln!(out, "{}", printable_json(&text))?)
 }
 
-/// Writes to stdout.
+/// Writes text for people to stdout, as a terminal may show it.
 pub fn print(fill: impl FnOnce(&mut dyn Write) -> Result<(), CliError>) -> Result<(), CliError> {
-    let mut out = io::BufWriter::new(io::stdout().lock());
-    fill(&mut out)?;
+    let mut text = Vec::new();
+    fill(&mut text)?;
+    print_data(printable_lines(&String::from_utf8_lossy(&text)).as_bytes())
+}
+
+/// Writes data to stdout, as they are.
+pub fn print_data(data: &[u8]) -> Result<(), CliError> {
+    let mut out = io::stdout().lock();
+    out.write_all(data)?;
     Ok(out.flush()?)
 }

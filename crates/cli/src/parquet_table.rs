@@ -1,5 +1,6 @@
 //! Tables as Parquet: optional columns of numbers and of words, row by row.
 
+use std::fs::File;
 use std::io::{self, Write};
 use std::sync::Arc;
 
@@ -7,9 +8,11 @@ use parquet::basic::{Compression, LogicalType, Repetition, Type as PhysicalType}
 use parquet::data_type::{ByteArray, ByteArrayType, DoubleType};
 use parquet::errors::ParquetError;
 use parquet::file::properties::WriterProperties;
+use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
-use parquet::schema::types::Type;
+use parquet::schema::types::{Type, TypePtr};
 
+use crate::output::is_this_program;
 use ohmstrain::MADE_BY;
 
 /// Rows that are held until they are written.
@@ -114,6 +117,15 @@ impl Cells {
         }
         column.close()
     }
+}
+
+/// Names of the columns of a table that this program wrote; `None` of any other file.
+pub fn columns_of_ours(file: File) -> Option<Vec<String>> {
+    let reader = SerializedFileReader::new(file).ok()?;
+    let metadata = reader.metadata().file_metadata();
+    let is_ours = metadata.created_by().is_some_and(is_this_program);
+    let name = |field: &TypePtr| field.name().to_owned();
+    is_ours.then(|| metadata.schema().get_fields().iter().map(name).collect())
 }
 
 /// What the writer below says; a closed pipe stays one.

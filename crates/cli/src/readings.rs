@@ -2,7 +2,7 @@ use std::cell::RefCell;
 use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
 
 use ohmstrain::Reading;
-use ohmstrain_bench_data::TraceReader;
+use ohmstrain_bench_data::{TraceError, TraceReader};
 use tempfile::SpooledTempFile;
 
 use crate::error::CliError;
@@ -40,7 +40,8 @@ impl StoredReadings {
         let mut out = BufWriter::new(tempfile::spooled_tempfile(WAIT_IN_MEMORY));
         let mut len = 0;
         for row in rows.by_ref() {
-            let row = row?;
+            let row =
+                row.map_err(|error| late(error, "give each part a file of its own, or `filter --skip-bad` both"))?;
             let mut put = |number: f64| out.write_all(&number.to_le_bytes()).map_err(|error| temporary(&error));
             put(row.time_s)?;
             put(row.reading.value)?;
@@ -51,7 +52,7 @@ impl StoredReadings {
             len += 1;
         }
         if len == 0 {
-            return Err(no_row(&rows));
+            return Err(no_row(rows.file(), rows.line()));
         }
         let file = out.into_inner().map_err(|error| temporary(error.error()))?;
         let kept = Kept { file, first: 0, rows: Vec::new(), bytes: Vec::new(), failed: None };
@@ -114,10 +115,20 @@ pub fn temporary(error: &io::Error) -> CliError {
     CliError::Other(format!("cannot keep rows in a temporary file: {error}"))
 }
 
+/// An error of a row; of one that is too late with what helps if a clock has started again.
+pub fn late(error: TraceError, hint: &str) -> CliError {
+    match error {
+        TraceError::Content(fault) if fault.is_late => {
+            CliError::Input(format!("{fault}; if the clock has started again there, {hint}"))
+        }
+        error => error.into(),
+    }
+}
+
 /// A recording has ended before its first row.
-pub fn no_row<R: Read>(rows: &TraceReader<R>) -> CliError {
+pub fn no_row(file: &str, line: u64) -> CliError {
     let none = "expected at least one row of data, found the end of the file";
-    CliError::Input(format!("{}:{}: {none}", rows.file(), rows.line() + 1))
+    CliError::Input(format!("{file}:{}: {none}", line + 1))
 }
 
 #[cfg(test)]

@@ -6,15 +6,18 @@ use crate::input::TraceFile;
 
 /// A sensor's filter as the flags want it.
 pub fn builder<'a>(sensor: &'a Sensor, args: &'a EstimateArgs) -> FilterBuilder<'a> {
-    let mut builder = sensor.filter().known(&args.known);
+    let builder = builder_anew(sensor, args).known(&args.known);
+    args.initial_strain.map_or(builder, |strain| builder.initial_strain(strain))
+}
+
+/// The same for a device that has started again: what is known of its first row and of its first clock is not known of these.
+pub fn builder_anew<'a>(sensor: &'a Sensor, args: &'a EstimateArgs) -> FilterBuilder<'a> {
+    let mut builder = sensor.filter();
     if let Some(kind) = args.estimator.chosen() {
         builder = builder.estimator(kind.0);
     }
     if args.no_correction {
         builder = builder.without_correction();
-    }
-    if let Some(strain) = args.initial_strain {
-        builder = builder.initial_strain(strain);
     }
     if let Some(nis) = args.gate {
         builder = builder.gate(nis);

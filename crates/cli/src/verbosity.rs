@@ -1,7 +1,8 @@
 //! How much is said on stderr: chosen once, before anything is said.
 
-use std::io::{self, Write};
 use std::sync::OnceLock;
+
+use crate::error::CliError;
 
 /// How much is said on stderr besides errors.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -32,7 +33,7 @@ impl Verbosity {
     /// Says what is being done, where that is wanted.
     pub fn detail(text: &str) {
         if Self::chosen() == Self::Detailed {
-            let _ = writeln!(io::stderr(), "ohmstrain: {text}");
+            CliError::error(text);
         }
     }
 }

@@ -82,6 +82,21 @@ impl Column {
         self.name
     }
 
+    /// Whether these are the names of all columns of the estimates of some sensor, in order.
+    ///
+    /// ```
+    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+    /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
+    /// let columns = sensor.columns();
+    /// assert!(ohmstrain::Column::are_all(columns.iter().map(|column| column.name())));
+    /// assert!(!ohmstrain::Column::are_all(["time_s", "resistance_ohm", "strain"].into_iter()));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn are_all<'a>(names: impl Iterator<Item = &'a str> + Clone) -> bool {
+        Header::ALL.into_iter().any(|header| names.clone().eq(header.columns().map(|column| column.name)))
+    }
+
     /// Whether it is the column of the flags, the only one without numbers.
     ///
     /// ```
@@ -142,6 +157,22 @@ pub(crate) struct Header {
 impl Header {
     pub(crate) const OHM_STRAIN: Self =
         Self { reading: ReadingUnit::Ohm, quantity: Quantity::Strain, has_joint: false };
+
+    /// Of every sensor there may be: one that is calibrated on an angle has no joint besides.
+    const ALL: [Self; 6] = {
+        let strain = Self::OHM_STRAIN;
+        let angle = Self { quantity: Quantity::AngleDeg, ..strain };
+        let joint = Self { has_joint: true, ..strain };
+        let ratio = ReadingUnit::Ratio;
+        [
+            strain,
+            angle,
+            joint,
+            Self { reading: ratio, ..strain },
+            Self { reading: ratio, ..angle },
+            Self { reading: ratio, ..joint },
+        ]
+    };
 
     pub(crate) const fn of(params: &SensorParams) -> Self {
         Self { reading: params.reading, quantity: params.quantity, has_joint: params.joint.is_some() }

@@ -77,7 +77,7 @@ impl Format {
 /// How estimates are written, and where.
 #[derive(Debug, ClapArgs)]
 pub struct WrittenArgs {
-    /// File to write instead of stdout; a name that ends in .parquet is written as Parquet
+    /// File to write instead of stdout, which is - too; a name that ends in .parquet is written as Parquet
     #[arg(short, long, value_name = "estimates.csv")]
     pub output: Option<PathBuf>,
     /// Whether to replace
@@ -102,13 +102,14 @@ impl WrittenArgs {
 /// Flags of `filter`.
 #[derive(Debug, ClapArgs)]
 pub struct FilterArgs {
-    /// TraceFile, or - for stdin
+    /// Recording, or - for stdin
     #[arg(default_value = "-")]
     pub trace_file: PathBuf,
     /// Estimate every row from the readings up to S seconds after it, 0.5 for instance; rows come out that much later
     #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = positive)]
     pub lag_s: Option<f64>,
-    /// Go on after lines that are none of a trace, as serial lines bring, before the header too; they are counted on stderr
+    /// Go on after lines that are none of a trace, as serial lines bring, before the header too; they are counted on stderr.
+    /// Where the device starts again (another header, or three rows in order behind times before theirs) so does the filter
     #[arg(long)]
     pub skip_bad: bool,
     /// Names of the columns of a stream that has no header line, or was joined after it: time_us,adc for instance
@@ -125,7 +126,7 @@ pub struct FilterArgs {
 /// Flags of `smooth`.
 #[derive(Debug, ClapArgs)]
 pub struct SmoothArgs {
-    /// TraceFile, or - for stdin
+    /// Recording, or - for stdin
     pub trace_file: PathBuf,
     /// What to write
     #[command(flatten)]

@@ -10,7 +10,7 @@ use super::{Auto, Estimator, ReplaceArgs, RestResistance, TraceArgs, finite};
 #[derive(Debug, ClapArgs)]
 #[command(after_long_help = TRUST)]
 pub struct RefineArgs {
-    /// TraceFile; a reference in it is not used
+    /// Recording; a reference in it is not used
     pub trace_file: PathBuf,
     /// The sensor's parameters: its law stays, its noise and motion are where the search starts
     #[arg(long, value_name = "sensor.toml")]

@@ -3,6 +3,8 @@ use std::path::PathBuf;
 use clap::Args as ClapArgs;
 use clap_complete::Shell;
 
+use super::ReplaceArgs;
+
 /// Flags of `completions`.
 #[derive(Debug, ClapArgs)]
 pub struct CompletionsArgs {
@@ -13,14 +15,17 @@ pub struct CompletionsArgs {
 /// Flags of `man`.
 #[derive(Debug, ClapArgs)]
 pub struct ManArgs {
-    /// Folder to write one page per command to; files there of the same names are replaced
+    /// Folder to write one page per command to; pages there of the same names are replaced
     #[arg(short, long, value_name = "DIR")]
     pub output: PathBuf,
+    /// Whether to replace
+    #[command(flatten)]
+    pub replace: ReplaceArgs,
 }
 
 #[cfg(test)]
 mod tests {
-    use clap::{CommandFactory, Parser};
+    use clap::{Command, CommandFactory, Parser};
 
     use crate::args::{Args, example};
 
@@ -32,5 +37,23 @@ mod tests {
             let words = shown.strip_prefix("Example: ").unwrap().split(" > ").next().unwrap().split(' ');
             assert!(Args::try_parse_from(words).is_ok(), "{shown}");
         }
+    }
+
+    /// Names of types are of the source code.
+    #[test]
+    fn help_names_no_type() {
+        fn check(command: &mut Command) {
+            let help = [command.render_help(), command.render_long_help()].map(|help| help.to_string()).concat();
+            let is_type = |word: &&str| {
+                let letters: Vec<char> = word.chars().collect();
+                letters.windows(2).any(|pair| pair[0].is_lowercase() && pair[1].is_uppercase())
+            };
+            let types: Vec<&str> = help.split(|c: char| !c.is_alphanumeric()).filter(is_type).collect();
+            assert!(types.is_empty(), "{}: {types:?}", command.get_name());
+            command.get_subcommands_mut().for_each(check);
+        }
+        let mut all = Args::command();
+        all.build();
+        check(&mut all);
     }
 }

@@ -1,17 +1,19 @@
-use std::io::{self, Read};
+use std::io;
 
-use ohmstrain::{Error, Estimate, Filter, LaggedFilter, Reading, Sensor, ValidityWatch};
-use ohmstrain_bench_data::{BadContent, Row, TraceError, TraceReader};
+use ohmstrain::number::significant;
+use ohmstrain::{Error, Estimate, Filter, FilterBuilder, Known, LaggedFilter, Reading, Sensor, ValidityWatch};
+use ohmstrain_bench_data::{BadContent, DeviceRow, Row, TraceError};
 
-use crate::args::{FilterArgs, RestResistance, WrittenArgs};
+use crate::args::{FilterArgs, Format, RestResistance, WrittenArgs};
 use crate::error::CliError;
 use crate::estimates::{self, EstimateWriter};
-use crate::input::{self, Beginning, check_unit, is_stdin};
+use crate::input::{self, check_unit, is_stdin};
 use crate::output::RowsOut;
 use crate::quiet::QuietWatch;
-use crate::readings::no_row;
-use crate::run::{builder, rest_resistance};
+use crate::readings::{late, no_row};
+use crate::run::{builder, builder_anew, rest_resistance};
 use crate::sensor_file;
+use crate::stream::{self, Rows};
 use crate::suits::{self, FIRST_LIVE_READINGS, FIRST_READINGS};
 
 /// Turns readings into strain as they arrive. Memory does not grow with the recording.
@@ -21,39 +23,27 @@ pub fn run(args: &FilterArgs) -> Result<(), CliError> {
         return Err(Error::NoSmoother.into());
     }
     let WrittenArgs { output, replace, columns, .. } = &args.written;
-    let mut rows_out = RowsOut::claim(output.as_deref(), replace.force, [&args.trace_file, &args.estimate.sensor])?;
+    let inputs = [&args.trace_file, &args.estimate.sensor];
+    let mut rows_out = RowsOut::claim(output.as_deref(), columns, replace.force, inputs)?;
     let mut sensor = sensor_file::read(&args.estimate.sensor, kind)?;
     let mut filter = FilterRun::new(&sensor, args)?;
     suits::warn_of_start(args.estimate.initial_strain, &sensor);
-    let beginning = match &args.header {
-        Some(columns) => Beginning::Row(columns),
-        None if args.skip_bad => Beginning::Preamble,
-        None => Beginning::Header,
-    };
-    let rows = input::open_at(&args.trace_file, &args.estimate.trace.metadata(), beginning)?;
-    let header = input::header(&rows);
+    let rows = stream::open(args)?;
+    let header = input::header(rows.file(), rows.line());
     check_unit(&header, rows.reading_kind(), sensor.params().reading)?;
-    if let Some(joint) = input::joint(rows.metadata()) {
+    if let Some(joint) = input::joint(&rows.metadata()) {
         sensor = sensor.on_joint(joint)?;
         filter = FilterRun::new(&sensor, args)?;
     }
-    let columns = estimates::columns(&sensor, columns)?;
+    let (columns, format) = (estimates::columns(&sensor, columns)?, args.written.format());
     let live = is_stdin(&args.trace_file) || !args.trace_file.is_file();
-    let writer = EstimateWriter::new(rows_out.open(live)?, args.written.format(), columns)?;
-    let watch = ValidityWatch::new(&sensor, None);
-    let quiet = QuietWatch::new(&sensor, None, &args.estimate.known);
-    let sink = Sink {
-        writer,
-        watch,
-        quiet,
-        sensor: &sensor,
-        rest: None,
-        file: rows.file().into(),
-        header,
-        live,
-        early: vec![],
-    };
-    stream(args, filter, rows, sink)?;
+    // A Parquet file is one with its last row only.
+    let grows = live && format == Format::Csv;
+    let writer = EstimateWriter::new(rows_out.open(grows)?, format, columns)?;
+    let (watch, quiet) = (ValidityWatch::new(&sensor, None), QuietWatch::new(&sensor, None, &args.estimate.known));
+    let file = rows.file().into();
+    let sink = Sink { writer, watch, quiet, sensor, rest: None, file, header, live, early: vec![] };
+    Stream { args, filter, sink, times: None, restarted: false, skipped: Skipped::default() }.run(rows)?;
     rows_out.publish()
 }
 
@@ -70,7 +60,15 @@ enum Lag {
 
 impl FilterRun {
     fn new(sensor: &Sensor, args: &FilterArgs) -> Result<Self, Error> {
-        let builder = builder(sensor, &args.estimate);
+        Self::built(builder(sensor, &args.estimate), args)
+    }
+
+    /// For a device that has started again.
+    fn anew(sensor: &Sensor, args: &FilterArgs) -> Result<Self, Error> {
+        Self::built(builder_anew(sensor, &args.estimate), args)
+    }
+
+    fn built(builder: FilterBuilder, args: &FilterArgs) -> Result<Self, Error> {
         let filter = match args.lag_s {
             None => Lag::None(builder.build()?),
             Some(lag_s) => Lag::Some(builder.build_lagged(lag_s)?),
@@ -102,57 +100,109 @@ impl FilterRun {
     }
 }
 
-/// Filters row by row.
-fn stream<'a, W: io::Write + Send>(
+/// Rows on their way through a filter.
+struct Stream<'a, W: io::Write + Send> {
     args: &'a FilterArgs,
-    mut filter: FilterRun,
-    rows: TraceReader<Box<dyn Read>>,
-    mut sink: Sink<'a, W>,
-) -> Result<(), CliError> {
-    let wanted = args.estimate.rest_resistance;
-    // The rows that R₀ is taken from, at least one, are estimated too, once it is known.
-    let count = if let Some(RestResistance::First(count)) = wanted { count } else { 0 };
-    let mut rows = if args.skip_bad { rows.past_bad_lines() } else { rows };
-    let first = first_rows(&mut rows, args.skip_bad, count, if sink.live { count } else { count.max(FIRST_READINGS) })?;
-    if first.iter().all(Result::is_err) {
-        // What was skipped may be all there was; what stood above the header is not to blame for it.
-        let above = |error: &TraceError| matches!(error, TraceError::Content(fault) if fault.is_foreign);
-        let fault = first.into_iter().filter_map(Result::err).find(|error| !above(error));
-        return Err(fault.map_or_else(|| no_row(&rows), CliError::from));
-    }
-    let known = || first.iter().flatten().map(|row| row.reading.value);
-    let rest = rest_resistance(wanted, sink.sensor, known(), &sink.file)?;
-    rest.map_or(Ok(()), |measured| filter.rest_resistance(measured))?;
-    (sink.rest, sink.watch) = (rest, ValidityWatch::new(sink.sensor, rest));
-    sink.quiet = QuietWatch::new(sink.sensor, rest, &args.estimate.known);
-    if !sink.live {
-        suits::check_readings(&sink.header, sink.sensor, rest, known())?;
-    }
-    let mut times: Option<(f64, f64)> = None;
-    let mut take = |row: Row| -> Result<(), CliError> {
-        times = Some((times.map_or(row.time_s, |times| times.0), row.time_s));
-        let at = |error| CliError::Input(format!("{}:{}: {error}", sink.file, row.line));
-        sink.write(filter.step(row.time_s, input::reading(&row.reading)).map_err(at)?)
-    };
-    let mut skipped = Skipped::default();
-    let streamed = first.into_iter().chain(rows).try_for_each(|row| match row {
-        Err(TraceError::Content(fault)) if args.skip_bad => {
-            skipped.count(fault);
-            Ok(())
-        }
-        row => take(row?),
-    });
-    skipped.say();
-    if let (Ok(()), Some(times)) = (&streamed, times) {
-        suits::warn_of_unused(&args.estimate.known, times, &sink.file);
-    }
-    // The rows that still wait get their estimates, whatever stopped the stream, and what was estimated is still good.
-    let finished = match filter.finish() {
-        Ok(estimates) => sink.write(estimates),
-        Err(error) => Err(CliError::Input(format!("{}: {error}", sink.file))),
-    };
-    sink.writer.finish().and(streamed).and(finished)
+    filter: FilterRun,
+    sink: Sink<'a, W>,
+    /// First and last time, s, up to now or until the clock started again.
+    times: Option<(f64, f64)>,
+    restarted: bool,
+    skipped: Skipped,
 }
+
+impl<'a, W: io::Write + Send> Stream<'a, W> {
+    /// Filters row by row.
+    fn run(mut self, mut rows: Rows) -> Result<(), CliError> {
+        let wanted = self.args.estimate.rest_resistance;
+        // The rows that R₀ is taken from, at least one, are estimated too, once it is known.
+        let count = if let Some(RestResistance::First(count)) = wanted { count } else { 0 };
+        let enough = if self.sink.live { count } else { count.max(FIRST_READINGS) };
+        let first = first_rows(&mut rows, self.args.skip_bad, count, enough)?;
+        if first.iter().all(Result::is_err) {
+            // What was skipped may be all there was; what stood above the header is not to blame for it.
+            let above = |error: &TraceError| matches!(error, TraceError::Content(fault) if fault.is_foreign);
+            let fault = first.into_iter().filter_map(Result::err).find(|error| !above(error));
+            return Err(fault.map_or_else(|| no_row(rows.file(), rows.line()), CliError::from));
+        }
+        let known = || first.iter().flatten().map(|row| row.row.reading.value);
+        let rest = rest_resistance(wanted, &self.sink.sensor, known(), &self.sink.file)?;
+        self.sink.rest = rest;
+        self.begin(&self.args.estimate.known)?;
+        if !self.sink.live {
+            suits::check_readings(&self.sink.header, &self.sink.sensor, rest, known())?;
+        }
+        let mut first = first.into_iter();
+        let streamed = loop {
+            let Some(row) = first.next().or_else(|| rows.next()) else { break Ok(()) };
+            if let Err(error) = self.take(row, &rows) {
+                break Err(error);
+            }
+        };
+        self.skipped.say();
+        if let (Ok(()), Some(times)) = (&streamed, self.times) {
+            suits::warn_of_unused(&self.args.estimate.known, times, &self.sink.file);
+        }
+        // The rows that still wait get their estimates, whatever stopped the stream, and what was estimated is still good.
+        let finished = self.finish();
+        self.sink.writer.finish().and(streamed).and(finished)
+    }
+
+    /// Takes what has come; `rows` says what it is of.
+    fn take(&mut self, row: Result<DeviceRow, TraceError>, rows: &Rows) -> Result<(), CliError> {
+        let DeviceRow { row, restarted } = match row {
+            Err(TraceError::Content(fault)) if self.args.skip_bad => {
+                self.skipped.count(fault);
+                return Ok(());
+            }
+            row => row.map_err(|error| late(error, SKIPS))?,
+        };
+        if restarted {
+            self.restart(&row, rows)?;
+        }
+        if !self.restarted {
+            self.times = Some((self.times.map_or(row.time_s, |times| times.0), row.time_s));
+        }
+        let at = |error| CliError::Input(format!("{}:{}: {error}", self.sink.file, row.line));
+        self.sink.write(self.filter.step(row.time_s, input::reading(&row.reading)).map_err(at)?)
+    }
+
+    /// The clock has started again: so does the filter. Times stay those of the file.
+    fn restart(&mut self, row: &Row, rows: &Rows) -> Result<(), CliError> {
+        let at = format!("{}:{}", self.sink.file, row.line);
+        check_unit(&at, rows.reading_kind(), self.sink.sensor.params().reading)?;
+        self.finish()?;
+        let time_s = significant(row.time_s, 6);
+        CliError::warning(&format!("{at}: the clock has started again, at {time_s} s, and so has the filter"));
+        if let Some(joint) = input::joint(&rows.metadata()) {
+            self.sink.sensor = self.sink.sensor.clone().on_joint(joint)?;
+        }
+        self.filter = FilterRun::anew(&self.sink.sensor, self.args)?;
+        self.sink.early.clear();
+        self.restarted = true;
+        self.begin(&[])
+    }
+
+    /// Tells the filter what the rested sensor reads, and whoever watches it.
+    fn begin(&mut self, known: &'a [Known]) -> Result<(), CliError> {
+        let sink = &mut self.sink;
+        let rest = sink.rest;
+        rest.map_or(Ok(()), |measured| self.filter.rest_resistance(measured))?;
+        sink.watch = ValidityWatch::new(&sink.sensor, rest);
+        sink.quiet = QuietWatch::new(&sink.sensor, rest, known);
+        Ok(())
+    }
+
+    /// The rows that still wait.
+    fn finish(&mut self) -> Result<(), CliError> {
+        let named = |error| CliError::Input(format!("{}: {error}", self.sink.file));
+        let waiting = self.filter.finish().map_err(named)?;
+        self.sink.write(waiting)
+    }
+}
+
+/// What helps where a clock has started again.
+const SKIPS: &str = "--skip-bad goes on with another filter";
 
 /// Where estimates go.
 struct Sink<'a, W: io::Write + Send> {
@@ -160,7 +210,7 @@ struct Sink<'a, W: io::Write + Send> {
     /// Says when the calibration does not reach.
     watch: ValidityWatch,
     quiet: QuietWatch<'a>,
-    sensor: &'a Sensor,
+    sensor: Sensor,
     /// What the rested sensor reads, if not what it read in calibration.
     rest: Option<f64>,
     file: String,
@@ -226,17 +276,17 @@ const MOST_FIRST_ROWS: usize = 10 * FIRST_READINGS;
 
 /// The first rows: until `wanted` readings are known, or `enough` of them and many rows. An error ends them; it is returned
 /// if fewer readings than that are known.
-fn first_rows<R: Read>(
-    rows: &mut TraceReader<R>,
+fn first_rows(
+    rows: &mut Rows,
     skips_bad: bool,
     enough: usize,
     wanted: usize,
-) -> Result<Vec<Result<Row, TraceError>>, CliError> {
+) -> Result<Vec<Result<DeviceRow, TraceError>>, CliError> {
     let (mut first, mut known) = (Vec::new(), 0);
     for row in rows {
         let passed_over = skips_bad && matches!(row, Err(TraceError::Content(_)));
-        let row = if known < enough && !passed_over { Ok(row?) } else { row };
-        known += usize::from(row.as_ref().is_ok_and(|row| row.reading.value.is_finite()));
+        let row = if known < enough && !passed_over { Ok(row.map_err(|error| late(error, SKIPS))?) } else { row };
+        known += usize::from(row.as_ref().is_ok_and(|row| row.row.reading.value.is_finite()));
         let failed = row.is_err() && !passed_over;
         first.push(row);
         let is_enough = !passed_over && known >= wanted;

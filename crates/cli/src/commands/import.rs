@@ -9,7 +9,7 @@ use ohmstrain::MADE_BY;
 /// Makes a trace of a lab's files. What was taken for what, and what was left out, goes to stderr.
 pub fn run(args: &ImportArgs) -> Result<(), CliError> {
     let mut outputs = Outputs::new(args.replace.force, &args.files);
-    let output = args.output.as_deref().map(|path| outputs.claim(path, Kind::Import)).transpose()?;
+    let output = outputs.claim_or_stdout(args.output.as_deref(), Kind::Import)?;
     let recipe = args.known.recipe();
     let tables = lab_files::read(&args.files, &recipe)?;
     let plan = Plan::new(&tables, &recipe)?;

@@ -8,6 +8,7 @@ use crate::args::ReportArgs;
 use crate::error::CliError;
 use crate::input::TraceFile;
 use crate::output::{Claim, Kind, Outputs};
+use crate::printable::printable;
 use crate::report::{FigureFiles, Report, ReportInput, Sample, ScoreRow, Scored};
 use crate::run::estimate;
 use ohmstrain::MADE_BY;
@@ -93,7 +94,7 @@ impl Reporting<'_> {
         let name =
             Path::new(&recording.name).file_name().map_or_else(String::new, |name| name.to_string_lossy().into());
         let input = ReportInput {
-            title: &name,
+            title: &printable(&name),
             made_by: MADE_BY,
             time_s: &recording.trace.time_s,
             reading: &recording.trace.readings.values,

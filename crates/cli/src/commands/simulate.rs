@@ -9,7 +9,7 @@ use ohmstrain::MADE_BY;
 /// Simulates a recording and writes it.
 pub fn run(args: &SimulateArgs) -> Result<(), CliError> {
     let mut outputs = Outputs::new(args.replace.force, []);
-    let output = args.output.as_deref().map(|path| outputs.claim(path, Kind::Simulation)).transpose()?;
+    let output = outputs.claim_or_stdout(args.output.as_deref(), Kind::Simulation)?;
     let settings = SimulationSettings {
         elongation_mm: args.elongation_mm,
         speed_mm_s: args.speed_mm_s,

@@ -5,7 +5,7 @@ use tempfile::SpooledTempFile;
 
 use crate::args::{Format, SmoothArgs, WrittenArgs};
 use crate::error::CliError;
-use crate::estimates::{EstimateWriter, Packed, columns};
+use crate::estimates::{self, EstimateWriter, Packed};
 use crate::input::{self, check_unit};
 use crate::output::RowsOut;
 use crate::readings::{StoredReadings, WAIT_IN_MEMORY, temporary};
@@ -18,11 +18,12 @@ use crate::suits;
 /// files.
 pub fn run(args: &SmoothArgs) -> Result<(), CliError> {
     let wanted = args.estimate.estimator.chosen().map(|estimator| estimator.0);
-    let WrittenArgs { output, replace, .. } = &args.written;
-    let mut rows_out = RowsOut::claim(output.as_deref(), replace.force, [&args.trace_file, &args.estimate.sensor])?;
+    let WrittenArgs { output, replace, columns, .. } = &args.written;
+    let inputs = [&args.trace_file, &args.estimate.sensor];
+    let mut rows_out = RowsOut::claim(output.as_deref(), columns, replace.force, inputs)?;
     let mut sensor = sensor_file::read(&args.estimate.sensor, wanted)?;
     let rows = input::open(&args.trace_file, &args.estimate.trace.metadata())?;
-    let header = input::header(&rows);
+    let header = input::header(rows.file(), rows.line());
     check_unit(&header, rows.reading_kind(), sensor.params().reading)?;
     if let Some(joint) = input::joint(rows.metadata()) {
         sensor = sensor.on_joint(joint)?;
@@ -33,7 +34,7 @@ pub fn run(args: &SmoothArgs) -> Result<(), CliError> {
     suits::check_readings(&header, &sensor, rest, readings.values())?;
     let builder = builder(&sensor, &args.estimate);
     let builder = rest.map_or(builder, |measured| builder.rest_resistance(measured));
-    let columns = columns(&sensor, &args.written.columns)?;
+    let columns = estimates::columns(&sensor, columns)?;
     let segments = smooth_into(Packed::new(columns.clone()), builder, &readings);
     readings.whole()?;
     let segments = segments.map_err(|error| error.named(&name))?;

@@ -1,10 +1,12 @@
 use std::fs::{self, File, OpenOptions, Permissions};
-use std::io::{self, Read, Seek, SeekFrom, Write};
+use std::io::{self, BufReader, Read, Seek, Write};
 use std::path::{Path, PathBuf};
 
-use tempfile::{Builder, NamedTempFile};
+use serde_json::Value;
 
-use super::Kind;
+use super::kind::{Kind, is_this_program};
+use super::unfinished::{Unfinished, publish, sync_folder};
+use crate::parquet_table;
 
 /// A file as the system knows it, whatever it is called.
 #[derive(Debug, PartialEq, Eq)]
@@ -63,8 +65,8 @@ impl Place {
             return Ok(Self::Through(OpenOptions::new().append(true).open(path)?));
         }
         let path = without_links(path)?;
-        // The kind alone: the full text names the temporary neighbour, which nobody asked for. This one has no name.
-        tempfile::tempfile_in(folder(&path)).map_err(|error| io::Error::from(error.kind()))?;
+        // The kind alone: the full text names a temporary file, which nobody asked for.
+        tempfile::tempfile_in(folder_of(&path)).map_err(|error| io::Error::from(error.kind()))?;
         let permissions = match found {
             Some(found) => {
                 OpenOptions::new().write(true).open(&path)?;
@@ -75,7 +77,7 @@ impl Place {
         let name = path.file_name().ok_or(io::ErrorKind::InvalidFilename)?;
         let identity = match Identity::of(&path) {
             Some(identity) => identity,
-            None => Identity::Name(fs::canonicalize(folder(&path))?.join(name)),
+            None => Identity::Name(fs::canonicalize(folder_of(&path))?.join(name)),
         };
         Ok(Self::Whole { path, identity, permissions })
     }
@@ -88,42 +90,40 @@ impl Place {
         }
     }
 
-    /// Whether there is a file with content that is not a `kind` of this program.
-    pub fn holds_other_than(&self, kind: Kind) -> io::Result<bool> {
+    /// Whether there is a file with content that is not a `kind` of this program; `own` are the columns of the table that is to
+    /// take its place.
+    pub fn holds_other_than(&self, kind: Kind, own: &[String]) -> io::Result<bool> {
         let Self::Whole { path, .. } = self else { return Ok(false) };
-        let file = match File::open(path) {
+        let mut file = match File::open(path) {
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(false),
             opened => opened?,
         };
         let mut head = Vec::new();
         (&file).take(HEAD).read_to_end(&mut head)?;
         if head.starts_with(b"PAR1") {
-            // Parquet says at its end who wrote it.
-            (&file).seek(SeekFrom::Start(file.metadata()?.len().saturating_sub(HEAD)))?;
-            (&file).take(HEAD).read_to_end(&mut head)?;
+            return Ok(!parquet_table::columns_of_ours(file).is_some_and(|names| kind.has_columns(&names, own)));
         }
-        Ok(!head.is_empty() && !kind.wrote(&String::from_utf8_lossy(&head)))
+        if kind == Kind::Summary && head.starts_with(b"[") {
+            file.rewind()?;
+            return Ok(!is_rows_of_ours(BufReader::new(file), own));
+        }
+        Ok(!head.is_empty() && !kind.wrote(&String::from_utf8_lossy(&head), own))
     }
 
-    /// Writes `content` beside the place.
-    pub fn prepare(&self, content: &[u8]) -> io::Result<Prepared> {
-        match self {
-            Self::Through(file) => Ok(Prepared::Through(file.try_clone()?, content.to_vec())),
-            Self::Whole { path, permissions, .. } => {
-                let mut file = neighbour(path, permissions.as_ref())?;
-                file.write_all(content)?;
-                Ok(Prepared::Whole(file, path.clone()))
-            }
-        }
+    /// Writes content, and says what then puts it in its place; nothing where bytes go through.
+    pub fn fill(&self, content: &[u8]) -> io::Result<Option<Unfinished>> {
+        let (mut file, unfinished) = self.begin()?;
+        file.write_all(content)?;
+        Ok(unfinished)
     }
 
     /// A file to write bit by bit, and what then puts it in its place; nothing where bytes go through.
-    pub fn begin(&self) -> io::Result<(File, Option<Prepared>)> {
+    pub fn begin(&self) -> io::Result<(File, Option<Unfinished>)> {
         match self {
             Self::Through(file) => Ok((file.try_clone()?, None)),
             Self::Whole { path, permissions, .. } => {
-                let file = neighbour(path, permissions.as_ref())?;
-                Ok((file.as_file().try_clone()?, Some(Prepared::Whole(file, path.clone()))))
+                let unfinished = Unfinished::beside(path, permissions.as_ref())?;
+                Ok((unfinished.file().try_clone()?, Some(unfinished)))
             }
         }
     }
@@ -135,48 +135,34 @@ impl Place {
             Self::Whole { path, .. } => File::create(path),
         }
     }
-}
 
-/// An output that lies ready.
-pub enum Prepared {
-    Through(File, Vec<u8>),
-    Whole(NamedTempFile, PathBuf),
-}
-
-impl Prepared {
-    /// Whether publishing it is more than a change of name.
-    pub const fn may_fail(&self) -> bool {
-        matches!(self, Self::Through(..))
-    }
-
-    /// Puts it in its place.
-    pub fn publish(self) -> io::Result<()> {
-        match self {
-            Self::Through(mut file, content) => file.write_all(&content),
-            Self::Whole(file, path) => file.persist(path).map(drop).map_err(|error| error.error),
+    /// Puts a file that is whole in this place: by its name, or on another file system by a copy.
+    pub fn adopt(&self, draft: &Path) -> io::Result<()> {
+        if let Self::Whole { path, permissions, .. } = self {
+            permissions.as_ref().map_or(Ok(()), |permissions| fs::set_permissions(draft, permissions.clone()))?;
+            File::open(draft)?.sync_all()?;
+            match fs::rename(draft, path) {
+                Err(error) if error.kind() == io::ErrorKind::CrossesDevices => {}
+                renamed => {
+                    sync_folder(folder_of(path));
+                    return renamed;
+                }
+            }
         }
+        let (mut file, unfinished) = self.begin()?;
+        io::copy(&mut File::open(draft)?, &mut file)?;
+        publish(unfinished.into_iter().collect()).map_err(|(_, error)| error)
     }
 }
 
-/// A temporary file beside `path`, which is to take its place.
-fn neighbour(path: &Path, permissions: Option<&Permissions>) -> io::Result<NamedTempFile> {
-    let file = new_file(&mut Builder::new()).tempfile_in(folder(path)).map_err(|error| error.kind())?;
-    if let Some(permissions) = permissions {
-        file.as_file().set_permissions(permissions.clone())?;
-    }
-    Ok(file)
-}
-
-/// A temporary file is private; a result is as readable as the user's umask lets new files be.
-#[cfg(unix)]
-fn new_file<'a, 'b>(builder: &'a mut Builder<'b, 'b>) -> &'a mut Builder<'b, 'b> {
-    use std::os::unix::fs::PermissionsExt;
-    builder.permissions(Permissions::from_mode(0o666))
-}
-
-#[cfg(not(unix))]
-fn new_file<'a, 'b>(builder: &'a mut Builder<'b, 'b>) -> &'a mut Builder<'b, 'b> {
-    builder
+/// Whether this is JSON of this program: objects that have all these fields, and say so.
+fn is_rows_of_ours(json: impl Read, own: &[String]) -> bool {
+    let rows: Option<Vec<serde_json::Map<String, Value>>> = serde_json::from_reader(json).ok();
+    let is_ours = |row: &serde_json::Map<String, Value>| {
+        let made_by = row.get("made_by").and_then(Value::as_str);
+        row.len() == own.len() && own.iter().all(|name| row.contains_key(name)) && made_by.is_some_and(is_this_program)
+    };
+    rows.is_some_and(|rows| rows.iter().all(is_ours))
 }
 
 /// Whether a path names an open file of this process: a new file in its place would not reach whoever opened it.
@@ -185,7 +171,8 @@ fn is_descriptor(path: &Path) -> bool {
         || ["/dev/fd", "/proc/self/fd"].iter().any(|folder| path.starts_with(folder))
 }
 
-fn folder(path: &Path) -> &Path {
+/// The folder that a file lies in.
+pub fn folder_of(path: &Path) -> &Path {
     match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),
@@ -197,7 +184,7 @@ fn without_links(path: &Path) -> io::Result<PathBuf> {
     let mut path = path.to_path_buf();
     for _ in 0..MOST_LINKS {
         match fs::read_link(&path) {
-            Ok(target) => path = folder(&path).join(target),
+            Ok(target) => path = folder_of(&path).join(target),
             Err(_) => return Ok(path),
         }
     }

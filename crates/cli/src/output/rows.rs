@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use super::{Claim, Kind, Outputs};
+use super::{Claim, Kind, Outputs, is_stdout};
 use crate::error::CliError;
 
 /// Bytes that are written at once, unless somebody waits for them.
@@ -17,17 +17,19 @@ pub struct RowsOut {
 }
 
 impl RowsOut {
-    /// Stdout, or a file, which is claimed.
+    /// Stdout, or a file for a table with these columns, which is claimed.
     ///
     /// # Errors
     /// As [`Outputs::claim`].
     pub fn claim<'a>(
         output: Option<&Path>,
+        columns: &[String],
         force: bool,
         inputs: impl IntoIterator<Item = &'a PathBuf>,
     ) -> Result<Self, CliError> {
         let mut outputs = Outputs::new(force, inputs);
-        let claim = output.map(|path| outputs.claim(path, Kind::Estimates)).transpose()?;
+        let output = output.filter(|path| !is_stdout(path));
+        let claim = output.map(|path| outputs.claim_table(path, Kind::Estimates, columns)).transpose()?;
         Ok(Self { outputs, claim })
     }
 

@@ -209,7 +209,7 @@ impl<'a> Report<'a> {
     /// If the template cannot be filled; no input is known that does this.
     pub fn html(&self) -> Result<String, ReportError> {
         let mut environment = Environment::new();
-        environment.add_template("report.html", include_str!("report.html"))?;
+        environment.add_template("report.html", PAGE)?;
         Ok(environment.get_template("report.html")?.render(Serde(&self.page))?)
     }
 
@@ -225,6 +225,9 @@ impl<'a> Report<'a> {
         figures.map(|figure| files(&figure.chart, &figure.title, &figure.file, &made_by)).collect()
     }
 }
+
+/// The template of a report.
+pub const PAGE: &str = include_str!("report.html");
 
 /// A chart as files of its own, `name` with endings.
 ///

@@ -1,6 +1,6 @@
 use std::collections::HashMap;
 use std::fs::{self, File, OpenOptions};
-use std::io::Write;
+use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::scores::Figures;
 use crate::error::CliError;
 use crate::input::sha256_of;
+use crate::output::is_this_program;
 
 /// What became of a job: a line of the journal, a row of the summary.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
@@ -84,13 +85,28 @@ pub struct Journal {
 }
 
 /// Its name.
-const FILE: &str = "batch.jsonl";
+pub const JOURNAL: &str = "batch.jsonl";
 
 impl Journal {
-    /// Reads the journal of a folder, and begins one if there is none.
-    pub fn open(folder: &Path) -> Result<Self, CliError> {
-        let path = folder.join(FILE);
-        let text = fs::read_to_string(&path).unwrap_or_default();
+    /// Reads the journal of a folder, and begins one if there is none. A file of this name that somebody else wrote is replaced
+    /// with `force` only.
+    pub fn open(folder: &Path, force: bool) -> Result<Self, CliError> {
+        let path = folder.join(JOURNAL);
+        let bytes = match fs::read(&path) {
+            Err(error) if error.kind() == ErrorKind::NotFound => Vec::new(),
+            read => read.map_err(|error| CliError::file("read", &path, &error))?,
+        };
+        let mut text = String::from_utf8_lossy(&bytes).into_owned();
+        if !is_ours(&text) {
+            if !force {
+                return Err(CliError::Arguments(format!(
+                    "cannot write {}: no earlier run wrote what is there; choose another folder, or replace it with --force",
+                    path.display()
+                )));
+            }
+            fs::write(&path, "").map_err(|error| CliError::file("write", &path, &error))?;
+            text.clear();
+        }
         // A line that a killed run left unfinished, or another version wrote, says nothing.
         let entries = text.lines().filter_map(|line| serde_json::from_str::<Entry>(line).ok());
         let known = entries.map(|entry| (entry.output.clone(), entry)).collect();
@@ -119,8 +135,18 @@ impl Journal {
     pub fn note(&self, entry: &Entry) -> Result<(), CliError> {
         let mut line = serde_json::to_vec(entry).map_err(|error| CliError::Other(error.to_string()))?;
         line.push(b'\n');
-        let path = self.folder.join(FILE);
+        let path = self.folder.join(JOURNAL);
         let mut file = self.file.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-        file.write_all(&line).map_err(|error| CliError::file("write", &path, &error))
+        file.write_all(&line).and_then(|()| file.sync_data()).map_err(|error| CliError::file("write", &path, &error))
+    }
+}
+
+/// Whether a journal begins with a line of this program, or with as much of one as a killed run wrote.
+fn is_ours(text: &str) -> bool {
+    let (first, is_whole) = text.split_once('\n').map_or((text, false), |(first, _)| (first, true));
+    let made_by = |line: serde_json::Value| line.get("made_by")?.as_str().map(is_this_program);
+    match serde_json::from_str(first) {
+        Ok(line) => made_by(line) == Some(true),
+        Err(_) => first.is_empty() || (!is_whole && first.starts_with("{\"command\":\"")),
     }
 }

@@ -9,7 +9,6 @@ mod process;
 mod scores;
 mod summary;
 
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
@@ -21,6 +20,7 @@ use process::Workshop;
 
 use crate::args::{BatchArgs, SummaryForm};
 use crate::error::CliError;
+use crate::output::{Kind, Outputs};
 use crate::progress::Progress;
 use crate::verbosity::Verbosity;
 
@@ -28,8 +28,11 @@ use crate::verbosity::Verbosity;
 pub fn run(args: &BatchArgs) -> Result<(), CliError> {
     let jobs = plan::jobs(args)?;
     plan::check_sensor(&jobs, args)?;
-    fs::create_dir_all(&args.output).map_err(|error| CliError::file("make the folder", &args.output, &error))?;
-    let journal = Journal::open(&args.output)?;
+    let path = |form: SummaryForm| args.output.join(format!("{}.{}", summary::SUMMARY, form.name()));
+    let mut outputs = Outputs::new(args.force, jobs.iter().flat_map(Job::inputs));
+    outputs.folder(&args.output)?;
+    let claim = outputs.claim_table(&path(args.summary), Kind::Summary, &summary::columns())?;
+    let journal = Journal::open(&args.output, args.force)?;
     plan::check_outputs(&jobs, args, &journal)?;
     let workshop = Workshop::new(args)?;
     let bytes = jobs.iter().map(Job::bytes).sum();
@@ -37,8 +40,8 @@ pub fn run(args: &BatchArgs) -> Result<(), CliError> {
     let work = Work { args, jobs: &jobs, journal: &journal, workshop: &workshop, progress: &progress };
     let entries = work.all()?;
     drop(progress);
-    let path = |form: SummaryForm| args.output.join(format!("summary.{}", form.name()));
-    summary::write(&entries, args.summary, &path(args.summary))?;
+    outputs.put(claim, summary::text(&entries, args.summary)?);
+    outputs.publish()?;
     let others = SummaryForm::value_variants().iter().filter(|form| **form != args.summary);
     let stale: Vec<PathBuf> = others.map(|form| path(*form)).filter(|path| path.exists()).collect();
     closing(&entries, &path(args.summary), &stale)

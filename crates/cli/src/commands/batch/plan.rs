@@ -6,7 +6,8 @@ use clap::Parser;
 use csv::{Reader, StringRecord};
 use ohmstrain_calib::EstimatorKind;
 
-use super::journal::Journal;
+use super::journal::{JOURNAL, Journal};
+use super::summary::SUMMARY;
 use crate::args::{Args, BatchArgs, BatchCommand, Command, Estimators};
 use crate::error::CliError;
 use crate::sensor_file;
@@ -32,6 +33,11 @@ impl Job {
     /// Bytes of its recordings, as far as they can be read.
     pub fn bytes(&self) -> u64 {
         self.files.iter().filter_map(|file| fs::metadata(file).ok()).map(|found| found.len()).sum()
+    }
+
+    /// Files that it reads.
+    pub fn inputs(&self) -> impl Iterator<Item = &PathBuf> {
+        self.files.iter().chain(&self.sensor).chain(&self.prior)
     }
 
     /// What messages call it.
@@ -107,7 +113,8 @@ fn listed(manifest: &Path, args: &BatchArgs, plain: &dyn Fn(PathBuf) -> Job) -> 
     let folder = manifest.parent().unwrap_or(Path::new(""));
     let (mut jobs, mut made): (Vec<Job>, HashMap<PathBuf, usize>) = (Vec::new(), HashMap::new());
     for row in rows.records() {
-        let job = of_row(&header, &row.map_err(wrong)?, folder, args, plain);
+        let row = Row { manifest, header: &header, cells: row.map_err(wrong)? };
+        let job = row.job(folder, args, plain)?;
         let is_shared = args.command == BatchCommand::Calibrate && !job.output.as_os_str().is_empty();
         match made.get(&job.output).filter(|_| is_shared) {
             Some(first) => jobs[*first].files.extend(job.files),
@@ -120,29 +127,48 @@ fn listed(manifest: &Path, args: &BatchArgs, plain: &dyn Fn(PathBuf) -> Job) -> 
     Ok(jobs)
 }
 
-fn of_row(
-    header: &StringRecord,
-    row: &StringRecord,
-    folder: &Path,
-    args: &BatchArgs,
-    plain: &dyn Fn(PathBuf) -> Job,
-) -> Job {
-    let mut job = plain(PathBuf::new());
-    for (name, cell) in header.iter().map(str::trim).zip(row.iter().map(str::trim)) {
-        match name {
-            "file" => job.files = vec![folder.join(cell)],
-            _ if cell.is_empty() => {}
-            "sensor" if args.command == BatchCommand::Calibrate => job.output = PathBuf::from(cell),
-            "sensor" => job.sensor = Some(folder.join(cell)),
-            "output" => job.output = PathBuf::from(cell),
-            "prior" => job.flags.extend(["--prior".to_owned(), folder.join(cell).display().to_string()]),
-            _ => {
-                job.flags.push(format!("--{}", name.replace('_', "-")));
-                job.flags.extend((cell != "true").then(|| cell.to_owned()));
+/// A row of a manifest.
+struct Row<'a> {
+    manifest: &'a Path,
+    header: &'a StringRecord,
+    cells: StringRecord,
+}
+
+impl Row<'_> {
+    fn job(&self, folder: &Path, args: &BatchArgs, plain: &dyn Fn(PathBuf) -> Job) -> Result<Job, CliError> {
+        let mut job = plain(PathBuf::new());
+        for (name, cell) in self.header.iter().map(str::trim).zip(self.cells.iter().map(str::trim)) {
+            match name {
+                "file" => job.files = vec![folder.join(cell)],
+                _ if cell.is_empty() => {}
+                "sensor" if args.command == BatchCommand::Calibrate => job.output = self.below(name, cell)?,
+                "sensor" => job.sensor = Some(folder.join(cell)),
+                "output" => job.output = self.below(name, cell)?,
+                "report" | "figures" => {
+                    let path = args.output.join(self.below(name, cell)?);
+                    job.flags.extend([format!("--{name}"), path.display().to_string()]);
+                }
+                "prior" => job.flags.extend(["--prior".to_owned(), folder.join(cell).display().to_string()]),
+                _ => {
+                    job.flags.push(format!("--{}", name.replace('_', "-")));
+                    job.flags.extend((cell != "true").then(|| cell.to_owned()));
+                }
             }
         }
+        Ok(job)
     }
-    job
+
+    /// What is written lies below the folder of outputs.
+    fn below(&self, column: &str, cell: &str) -> Result<PathBuf, CliError> {
+        let parts = || Path::new(cell).components().filter(|part| *part != Component::CurDir);
+        if parts().next().is_some() && parts().all(|part| matches!(part, Component::Normal(_))) {
+            return Ok(parts().collect());
+        }
+        let (file, line) = (self.manifest.display(), self.cells.position().map_or(0, csv::Position::line));
+        Err(CliError::Input(format!(
+            "{file}:{line}: column `{column}`: expected a name below the folder of outputs (-o), found `{cell}`"
+        )))
+    }
 }
 
 /// Names outputs that nobody has named: as the recordings lie below the folder that all of them share.
@@ -190,31 +216,36 @@ fn check_arguments(job: &mut Job, args: &BatchArgs) -> Result<(), CliError> {
         let text = text.lines().map(str::trim).take_while(|line| !line.is_empty()).collect::<Vec<_>>().join(" ");
         CliError::Arguments(format!("{}: {}", job.name(), text.trim_start_matches("error: ")))
     })?;
-    let output = match parsed.command {
+    let written = match parsed.command {
         Command::Calibrate(calibrate) => {
             job.prior = calibrate.prior;
-            None
+            vec![calibrate.report.report, calibrate.report.figures]
         }
         Command::Filter(filter) => {
             job.estimator = filter.estimate.estimator.chosen().map(|estimator| estimator.0);
-            filter.written.output
+            vec![filter.written.output]
         }
         Command::Smooth(smooth) => {
             job.estimator = smooth.estimate.estimator.chosen().map(|estimator| estimator.0);
-            smooth.written.output
+            vec![smooth.written.output]
         }
         Command::Evaluate(evaluate) => {
             job.estimator = if let Estimators::One(kind) = evaluate.estimator { Some(kind) } else { None };
-            None
+            vec![evaluate.report.report, evaluate.report.figures]
         }
-        _ => None,
+        _ => vec![],
     };
-    match output {
-        None => Ok(()),
-        Some(_) => {
-            Err(CliError::Arguments("batch names the outputs itself, or as the manifest's `output` says".into()))
-        }
+    // What a manifest names lies in the folder of outputs; behind `--` one name would be written by each recording.
+    let named = |path: &PathBuf| path.starts_with(&args.output) && !args.flags.iter().any(|flag| is_output(flag));
+    if !written.iter().flatten().all(named) {
+        let what = "batch names the outputs itself, or as the manifest's columns `output`, `report` and `figures` say";
+        return Err(CliError::Arguments(what.into()));
     }
+    Ok(())
+}
+
+fn is_output(flag: &str) -> bool {
+    ["-o", "--output", "--report", "--figures"].contains(&flag.split('=').next().unwrap_or_default())
 }
 
 /// A sensor that recordings share is said to be none, or none for their estimator, before anything is done, and once.
@@ -226,7 +257,7 @@ pub fn check_sensor(jobs: &[Job], args: &BatchArgs) -> Result<(), CliError> {
 
 /// Refuses outputs that would replace each other, an input, or what no earlier run wrote.
 pub fn check_outputs(jobs: &[Job], args: &BatchArgs, journal: &Journal) -> Result<(), CliError> {
-    let inputs = jobs.iter().flat_map(|job| job.files.iter().chain(&job.sensor).chain(&job.prior));
+    let inputs = jobs.iter().flat_map(Job::inputs);
     let inputs: HashSet<PathBuf> = inputs.filter_map(|file| fs::canonicalize(file).ok()).collect();
     let mut outputs = HashSet::new();
     for job in jobs {
@@ -239,6 +270,11 @@ pub fn check_outputs(jobs: &[Job], args: &BatchArgs, journal: &Journal) -> Resul
         if !outputs.insert(&job.output) {
             return Err(refused(
                 "another recording's output has the same name; name them in a manifest's column `output`",
+            ));
+        }
+        if job.output == Path::new(JOURNAL) || job.output.with_extension("") == Path::new(SUMMARY) {
+            return Err(refused(
+                "it is the name of the summary or the journal; name it in a manifest's column `output`",
             ));
         }
         let Ok(found) = fs::canonicalize(&path) else { continue };

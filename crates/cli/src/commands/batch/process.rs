@@ -7,14 +7,13 @@ use std::sync::{Mutex, PoisonError};
 use std::thread;
 use std::time::Instant;
 
-use tempfile::TempDir;
-
 use super::journal::{Entry, Journal, State};
 use super::plan::Job;
 use super::scores::Figures;
 use crate::args::{BatchArgs, BatchCommand, Format};
 use crate::error::CliError;
 use crate::input::sha256_of;
+use crate::output::{Place, UnfinishedFolder};
 use ohmstrain::MADE_BY;
 
 /// Exit code of `evaluate --check` for estimates that are found wanting: there is an output all the same.
@@ -28,7 +27,7 @@ pub struct Workshop<'a> {
     program: PathBuf,
     places: usize,
     /// For outputs until they are whole; in the folder of outputs, so that taking their place is a change of name.
-    drafts: TempDir,
+    drafts: UnfinishedFolder,
     /// Hashes of sensors and priors: many recordings share one.
     shared: Mutex<HashMap<PathBuf, String>>,
 }
@@ -47,8 +46,8 @@ impl<'a> Workshop<'a> {
         let failed = |error: io::Error| CliError::Other(format!("cannot start this program anew: {error}"));
         let program = std::env::current_exe().map_err(failed)?;
         let places = args.jobs.or(thread::available_parallelism().ok()).map_or(1, usize::from);
-        let drafts = tempfile::Builder::new().prefix(".batch-").tempdir_in(&args.output);
-        let drafts = drafts.map_err(|error| CliError::file("write to", &args.output, &error))?;
+        let drafts =
+            UnfinishedFolder::inside(&args.output).map_err(|error| CliError::file("write to", &args.output, &error))?;
         Ok(Self { args, program, places, drafts, shared: Mutex::default() })
     }
 
@@ -122,7 +121,7 @@ impl Started<'_> {
         journal.note(&entry)?;
         if entry.output_sha256.is_some() {
             path.parent().map_or(Ok(()), fs::create_dir_all).map_err(|error| cannot_write(&error))?;
-            fs::rename(&draft, &path).map_err(|error| cannot_write(&error))?;
+            Place::of(&path).and_then(|place| place.adopt(&draft)).map_err(|error| cannot_write(&error))?;
         }
         for left in [said_beside(&draft), draft] {
             let _ = fs::remove_file(left);

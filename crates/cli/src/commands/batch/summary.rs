@@ -1,6 +1,5 @@
-use std::fs::{self, File};
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use serde_json::{Map, Value, json};
 
@@ -49,25 +48,31 @@ fn cells(entry: &Entry) -> Vec<(&'static str, Cell)> {
     ]
 }
 
-/// Writes a row per job, whole.
-pub fn write(entries: &[Entry], form: SummaryForm, path: &Path) -> Result<(), CliError> {
-    let draft = path.with_extension("part");
+/// What its name begins with.
+pub const SUMMARY: &str = "summary";
+
+/// Names of its columns.
+pub fn columns() -> Vec<String> {
+    cells(&Entry::default()).into_iter().map(|(name, _)| name.to_owned()).collect()
+}
+
+/// A row per job.
+pub fn text(entries: &[Entry], form: SummaryForm) -> Result<Vec<u8>, CliError> {
     let rows: Vec<_> = entries.iter().map(cells).collect();
-    let written = File::create(&draft).and_then(|file| match form {
-        SummaryForm::Csv => csv_of(file, &rows),
-        SummaryForm::Json => json_of(file, &rows),
-        SummaryForm::Parquet => parquet_of(file, &rows),
-    });
-    written.and_then(|()| fs::rename(&draft, path)).map_err(|error| CliError::file("write", path, &error))
+    let mut text = Vec::new();
+    match form {
+        SummaryForm::Csv => csv_of(&mut text, &rows),
+        SummaryForm::Json => json_of(&mut text, &rows),
+        SummaryForm::Parquet => parquet_of(&mut text, &rows),
+    }?;
+    Ok(text)
 }
 
 type Rows = [Vec<(&'static str, Cell)>];
 
-fn csv_of(file: File, rows: &Rows) -> io::Result<()> {
-    let mut out = csv::Writer::from_writer(file);
-    if let Some(first) = rows.first() {
-        out.write_record(first.iter().map(|(name, _)| name))?;
-    }
+fn csv_of(out: &mut Vec<u8>, rows: &Rows) -> io::Result<()> {
+    let mut out = csv::Writer::from_writer(out);
+    out.write_record(columns())?;
     for row in rows {
         out.write_record(row.iter().map(|(_, cell)| match cell {
             Cell::Number(number) => number.map(|number| number.to_string()).unwrap_or_default(),
@@ -77,7 +82,7 @@ fn csv_of(file: File, rows: &Rows) -> io::Result<()> {
     out.flush()
 }
 
-fn json_of(file: File, rows: &Rows) -> io::Result<()> {
+fn json_of(out: &mut Vec<u8>, rows: &Rows) -> io::Result<()> {
     let value = |cell: &Cell| match cell {
         // Counts are whole.
         Cell::Number(Some(number)) if number.fract() == 0.0 => json!(*number as i64),
@@ -87,12 +92,13 @@ fn json_of(file: File, rows: &Rows) -> io::Result<()> {
     let object = |row: &Vec<(&'static str, Cell)>| {
         row.iter().map(|(name, cell)| ((*name).to_owned(), value(cell))).collect::<Map<String, Value>>()
     };
-    Ok(serde_json::to_writer_pretty(file, &rows.iter().map(object).collect::<Vec<_>>())?)
+    Ok(serde_json::to_writer_pretty(out, &rows.iter().map(object).collect::<Vec<_>>())?)
 }
 
-fn parquet_of(file: File, rows: &Rows) -> io::Result<()> {
-    let names = rows.first().into_iter().flatten().map(|(name, cell)| (*name, matches!(cell, Cell::Number(_))));
-    let mut out = ParquetTable::new(file, names)?;
+fn parquet_of(out: &mut Vec<u8>, rows: &Rows) -> io::Result<()> {
+    let cells = cells(&Entry::default());
+    let names = cells.iter().map(|(name, cell)| (*name, matches!(cell, Cell::Number(_))));
+    let mut out = ParquetTable::new(out, names)?;
     for row in rows {
         for (_, cell) in row {
             match cell {

@@ -4,7 +4,7 @@ use ohmstrain_calib::closed_form::Estimated;
 
 use crate::args::TableFormat;
 use crate::error::CliError;
-use crate::output::{self, COLUMNS, print};
+use crate::output::{self, COLUMNS, print, print_data};
 use ohmstrain::number::{plain, with_error};
 
 /// A cell.
@@ -73,12 +73,11 @@ pub struct Rows {
 impl Rows {
     /// Prints it.
     pub fn print(&self, format: TableFormat) -> Result<(), CliError> {
-        let text = match format {
-            TableFormat::Text => self.text(),
-            TableFormat::Csv => self.csv(),
-            TableFormat::Latex => self.latex(),
-        };
-        print(|out| Ok(out.write_all(text.as_bytes())?))
+        match format {
+            TableFormat::Text => print(|out| Ok(out.write_all(self.text().as_bytes())?)),
+            TableFormat::Csv => print_data(self.csv().as_bytes()),
+            TableFormat::Latex => print_data(self.latex().as_bytes()),
+        }
     }
 
     fn text(&self) -> String {

@@ -84,4 +84,11 @@ impl Description {
         }
         Ok(found)
     }
+
+    /// Columns of the output.
+    pub fn columns(&self) -> Vec<String> {
+        let of_joint = |joint: &Joint| [format!("{}_deg", joint.name), format!("{}_sd_deg", joint.name)];
+        let angles = self.joints.iter().flat_map(of_joint);
+        std::iter::once("time_s".to_owned()).chain(angles).chain(["flags".to_owned()]).collect()
+    }
 }

@@ -8,7 +8,7 @@ mod description;
 use std::io::{self, BufRead, BufReader, Read, Write};
 use std::path::Path;
 
-use ohmstrain::{Estimate, Filter, Quantity, Sensor, UnitGuess};
+use ohmstrain::{Error, Estimate, Filter, Quantity, Sensor, UnitGuess};
 use ohmstrain_bench_data::{Line, LineParser, Metadata, Row, RowWriter, counted};
 
 use crate::args::HandArgs;
@@ -18,6 +18,9 @@ use crate::output::RowsOut;
 use crate::sensor_file;
 use crate::suits::FIRST_LIVE_READINGS;
 use description::{Description, Joint};
+
+/// What helps where a clock has started again.
+const LATE: &str = "; if the clock has started again there, --skip-bad goes on with other filters";
 
 /// Longer lines are no rows, however they go on.
 const LONGEST_LINE: u64 = 64 * 1024;
@@ -39,10 +42,11 @@ pub fn run(args: &HandArgs) -> Result<(), CliError> {
     }
     let sensors = channels.iter().map(|channel| folder.join(&channel.joint.sensor)).collect::<Vec<_>>();
     let inputs = [&args.trace_file, &args.hand].into_iter().chain(&sensors);
-    let mut rows_out = RowsOut::claim(args.output.as_deref(), args.replace.force, inputs)?;
+    let columns = description.columns();
+    let mut rows_out = RowsOut::claim(args.output.as_deref(), &columns, args.replace.force, inputs)?;
     let live = is_stdin(&args.trace_file) || !args.trace_file.is_file();
     let mut out = RowWriter::new(rows_out.open(live)?);
-    let streamed = stream(args, &name, source, &mut channels, &mut out, live);
+    let streamed = stream(args, &name, source, &mut channels, &columns, &mut out, live);
     out.flush()?;
     streamed?;
     rows_out.publish()
@@ -74,8 +78,7 @@ impl<'a> Channel<'a> {
                 joint.name
             )));
         }
-        let wanted = sensor.filter();
-        let filter = joint.rest_resistance.map_or(wanted, |measured| wanted.rest_resistance(measured)).build()?;
+        let filter = filter_of(joint, &sensor)?;
         let lines = LineParser::new(file, Metadata { front_end: joint.front_end, ..Metadata::default() });
         Ok(Self { joint, sensor, filter, lines, early: vec![] })
     }
@@ -102,6 +105,13 @@ impl<'a> Channel<'a> {
         Ok(header.split(',').map(cell).collect::<Vec<_>>().join(","))
     }
 
+    /// The clock has started again, and so does the filter.
+    fn restart(&mut self) -> Result<(), CliError> {
+        self.filter = filter_of(self.joint, &self.sensor)?;
+        self.early.clear();
+        Ok(())
+    }
+
     /// Doubts the unit of the readings once there are enough of them.
     fn doubt(&mut self, reading: f64) -> Option<String> {
         if !reading.is_finite() || self.early.len() >= FIRST_LIVE_READINGS {
@@ -120,21 +130,16 @@ impl<'a> Channel<'a> {
     }
 }
 
-/// A header that can be shown.
-fn quoted(header: &str) -> String {
-    const LONGEST: usize = 80;
-    let shown: String = header.chars().take(LONGEST).flat_map(char::escape_debug).collect();
-    if header.chars().count() > LONGEST { format!("`{shown}…`") } else { format!("`{shown}`") }
+fn filter_of(joint: &Joint, sensor: &Sensor) -> Result<Filter, Error> {
+    let wanted = sensor.filter();
+    joint.rest_resistance.map_or(wanted, |measured| wanted.rest_resistance(measured)).build()
 }
 
-fn header<W: Write>(channels: &[Channel], out: &mut RowWriter<W>) -> Result<(), CliError> {
-    out.text("time_s");
-    for channel in channels {
-        out.text(&format!("{}_deg", channel.joint.name));
-        out.text(&format!("{}_sd_deg", channel.joint.name));
-    }
-    out.text("flags");
-    Ok(out.end()?)
+/// A header that fits a message.
+fn quoted(header: &str) -> String {
+    const LONGEST: usize = 80;
+    let shown: String = header.chars().take(LONGEST).collect();
+    if shown.len() < header.len() { format!("`{shown}…`") } else { format!("`{shown}`") }
 }
 
 fn stream<W: Write>(
@@ -142,10 +147,11 @@ fn stream<W: Write>(
     file: &str,
     source: Box<dyn io::Read>,
     channels: &mut [Channel],
+    columns: &[String],
     out: &mut RowWriter<W>,
     live: bool,
 ) -> Result<(), CliError> {
-    let (mut has_header, mut skipped, mut number, mut line) = (false, 0_u64, 0_u64, Vec::new());
+    let (mut known_header, mut skipped, mut number, mut line) = (None, 0_u64, 0_u64, Vec::new());
     let mut is_empty = true;
     let mut source = BufReader::new(source);
     loop {
@@ -159,9 +165,9 @@ fn stream<W: Write>(
         }
         number += 1;
         let text = String::from_utf8_lossy(&line);
-        let is_header = !has_header && !text.starts_with('#') && !text.trim().is_empty();
-        let mut rows = Vec::new();
-        let mut refused = None;
+        let is_first = known_header.is_none() && !text.starts_with('#') && !text.trim().is_empty();
+        let is_header = is_first || (args.skip_bad && known_header.as_deref() == Some(text.trim()));
+        let (mut rows, mut refused, mut restarted) = (Vec::new(), None, is_header && !is_first);
         for channel in channels.iter_mut() {
             let taken = if is_header {
                 let own = channel.header(text.trim());
@@ -172,17 +178,29 @@ fn stream<W: Write>(
             };
             match taken {
                 Ok(Line::Row(row)) => rows.push(row),
-                Ok(Line::Restarted(_)) => refused = Some(format!("{file}: the clock has started again")),
+                Ok(Line::Restarted(row)) => {
+                    channel.restart()?;
+                    rows.push(row);
+                    restarted = true;
+                }
+                Ok(Line::Header) if !is_first => channel.restart()?,
                 Ok(_) => {}
-                Err(fault) => refused = Some(format!("joint `{}`: {fault}", channel.joint.name)),
+                Err(fault) => {
+                    let hint = if fault.is_late { LATE } else { "" };
+                    refused = Some(format!("joint `{}`: {fault}{hint}", channel.joint.name));
+                }
             }
         }
-        if is_header {
-            header(channels, out)?;
-            has_header = true;
+        if restarted {
+            CliError::warning(&format!("{file}:{number}: the clock has started again, and so has the filter"));
+        }
+        if is_first {
+            columns.iter().for_each(|name| out.text(name));
+            out.end()?;
+            known_header = Some(text.trim().to_owned());
         }
         if let Some(refused) = refused {
-            if is_header || !args.skip_bad {
+            if is_first || !args.skip_bad {
                 return Err(CliError::Input(refused));
             }
             skipped += 1;

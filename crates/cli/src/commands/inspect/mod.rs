@@ -41,12 +41,12 @@ pub fn run(args: &InspectArgs) -> Result<(), CliError> {
     let tables = lab_files::read(&args.files, &recipe)?;
     if args.suggest {
         let plan = proposed(&tables, &recipe)?.0;
-        let command = lab_files::command(&args.files, &tables, &plan)?;
+        let command = lab_files::command(&args.files, &tables, &plan);
         return print(|out| Ok(writeln!(out, "{command}")?));
     }
     let plan = match proposed(&tables, &recipe) {
         Ok((plan, imported, survey)) => {
-            let command = lab_files::command(&args.files, &tables, &plan)?;
+            let command = lab_files::command(&args.files, &tables, &plan);
             let next = next(&args.files, &imported.trace);
             Ok(Proposal { plan, command, remarks: imported.remarks, survey, next })
         }

@@ -7,6 +7,7 @@ use ohmstrain_bench_data::import::{ChannelSurvey, ClockSurvey, PhaseSurvey, Role
 use super::{Findings, Proposal};
 use crate::error::CliError;
 use crate::output;
+use crate::printable::printable;
 
 /// Characters of a cell that are shown.
 const WIDEST: usize = 24;
@@ -14,7 +15,7 @@ const WIDEST: usize = 24;
 /// Prints what was found, and the command or the question that follows from it.
 pub fn write(out: &mut dyn Write, findings: &Findings) -> Result<(), CliError> {
     for (index, table) in findings.tables.iter().enumerate() {
-        writeln!(out, "{}: {}", table.file, layout(table))?;
+        writeln!(out, "{}: {}", printable(&table.file), layout(table))?;
         writeln!(out, "{}\n", columns(findings, index))?;
     }
     match &findings.plan {
@@ -111,10 +112,11 @@ fn columns(findings: &Findings, index: usize) -> TextTable {
     text
 }
 
-/// Foreign text that fits a cell and cannot garble a terminal.
+/// Foreign text that fits a cell.
 fn short(text: &str) -> String {
-    let clean: String = text.chars().take(WIDEST).map(|c| if c.is_control() { '\u{fffd}' } else { c }).collect();
-    if text.chars().count() > WIDEST { clean + "…" } else { clean }
+    let shown = printable(text);
+    let cut: String = shown.chars().take(WIDEST).collect();
+    if cut.len() < shown.len() { cut + "…" } else { cut }
 }
 
 fn clock_line(clock: &ClockSurvey) -> String {

@@ -18,6 +18,7 @@ use ratatui::crossterm::event::{self, Event as Input, KeyCode, KeyEventKind, Key
 
 use crate::args::LiveArgs;
 use crate::error::CliError;
+use crate::output::refuse_stdout;
 use crate::sensor_file;
 use session::Session;
 pub use source::{Event, Source};
@@ -37,6 +38,7 @@ pub fn run(args: &LiveArgs) -> Result<(), CliError> {
                 .into(),
         ));
     }
+    refuse_stdout(&args.record)?;
     let kind = args.estimate.estimator.chosen().map(|estimator| estimator.0);
     let sensor = sensor_file::read(&args.estimate.sensor, kind)?;
     let mut session = Session::new(args, sensor)?;

@@ -12,7 +12,7 @@ use crate::args::{LiveArgs, RestResistance};
 use crate::error::CliError;
 use crate::input::{self, check_unit};
 use crate::quiet::QuietWatch;
-use crate::run::{builder, median};
+use crate::run::{builder, builder_anew, median};
 use crate::suits::{self, FIRST_LIVE_READINGS};
 
 /// Rows that are kept for the plot at most.
@@ -190,20 +190,22 @@ impl<'a> Session<'a> {
 
     /// A fresh filter.
     fn begin(&mut self) -> Result<(), Error> {
-        let wanted = builder(&self.sensor, &self.args.estimate);
+        let anew = self.counts.restarts > 0;
+        let wanted = if anew { builder_anew } else { builder }(&self.sensor, &self.args.estimate);
+        let known = if anew { &[] } else { self.args.estimate.known.as_slice() };
         self.filter = self.rest.map_or(wanted, |measured| wanted.rest_resistance(measured)).build()?;
         self.watch = ValidityWatch::new(&self.sensor, self.rest);
-        self.quiet = QuietWatch::new(&self.sensor, self.rest, &self.args.estimate.known);
+        self.quiet = QuietWatch::new(&self.sensor, self.rest, known);
         self.usual_step_s = None;
         Ok(())
     }
 
     /// The clock has started again: so does everything that has times.
     fn restart(&mut self) -> Result<(), CliError> {
+        self.counts.restarts += 1;
         self.begin()?;
         self.points.clear();
         self.marks.clear();
-        self.counts.restarts += 1;
         self.message = "the clock has started again, and so has the filter".into();
         if self.recorder.is_some() {
             self.toggle_record();

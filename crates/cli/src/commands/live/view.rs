@@ -12,6 +12,7 @@ use ratatui::widgets::{Axis, Block, Chart, Dataset, GraphType, Paragraph, Wrap};
 
 use super::session::Session;
 use crate::args::LiveArgs;
+use crate::printable::printable;
 
 /// Columns of the numbers, and the least that a plot needs beside them.
 const NUMBERS_WIDTH: u16 = 38;
@@ -34,8 +35,8 @@ pub fn draw(frame: &mut Frame, session: &Session, status: &str, args: &LiveArgs)
     let [title, middle, message, keys] = Layout::vertical(rows).areas(frame.area());
     let sensor = args.estimate.sensor.file_name().unwrap_or_default().to_string_lossy();
     let heading = format!("ohmstrain live · {} · {sensor} · {status}", args.port.display());
-    frame.render_widget(Paragraph::new(heading).bold(), title);
-    frame.render_widget(Paragraph::new(session.message.as_str()).wrap(Wrap { trim: true }), message);
+    frame.render_widget(Paragraph::new(printable(&heading)).bold(), title);
+    frame.render_widget(Paragraph::new(printable(&session.message)).wrap(Wrap { trim: true }), message);
     frame.render_widget(Paragraph::new("z zero at rest   r record   m mark   q quit").dim(), keys);
     let numbers = numbers(session);
     if middle.width >= NUMBERS_WIDTH + PLOT_WIDTH && middle.height >= PLOT_HEIGHT {

@@ -1,0 +1,157 @@
+use std::io::Read;
+use std::vec;
+
+use crate::error::{BadContent, Fault, TraceError, quote};
+use crate::line_parser::{Line, LineParser};
+use crate::lines::{LineFault, Lines};
+use crate::metadata::Metadata;
+use crate::reader::{A_HEADER, called, placed};
+use crate::row::{ReadingKind, Row};
+
+/// Lines that a device may say before its header: a boot loader's are some dozen.
+const LONGEST_PREAMBLE: usize = 100;
+
+/// Reads what a device sends, row by row: goes on after lines that are none of a trace, and where the device starts again.
+/// [`LineParser`] decides what a line is.
+///
+/// The iterator delivers the errors of lines, and the rows between them. Whatever the source itself fails with ends it.
+///
+/// ```
+/// use ohmstrain_bench_data::{DeviceReader, DeviceRow, Metadata};
+/// let said = "boot: 0x13\ntime_s,resistance_ohm\n90.0,1600\n90.1,16\"0\ntime_s,resistance_ohm\n0.0,1601\n0.1,1602\n";
+/// let rows: Vec<_> = DeviceReader::new(said.as_bytes(), "-", &Metadata::default())?.collect();
+/// assert_eq!(rows.iter().map(Result::is_ok).collect::<Vec<_>>(), [false, true, false, true, true]);
+/// assert!(matches!(rows[3], Ok(DeviceRow { row, restarted: true }) if row.time_s == 0.0 && row.line == 6));
+/// # Ok::<(), ohmstrain_bench_data::TraceError>(())
+/// ```
+pub struct DeviceReader<R> {
+    file: String,
+    lines: Lines<R>,
+    parser: LineParser,
+    /// What stood above the header and was none of a trace.
+    skipped: vec::IntoIter<BadContent>,
+    has_rows: bool,
+    /// A header has come behind rows.
+    restarted: bool,
+    done: bool,
+}
+
+/// A row of a device.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DeviceRow {
+    /// The row.
+    pub row: Row,
+    /// Whether the device has started again, so that the row's time is on another clock than that of the row before.
+    pub restarted: bool,
+}
+
+impl<R: Read> DeviceReader<R> {
+    /// Waits for a header, for a hundred other lines at most. `name` is what messages call the source, `overrides` takes the
+    /// place of what it says of itself.
+    ///
+    /// # Errors
+    /// [`TraceError`] if the source fails, or no header comes.
+    pub fn new(source: R, name: &str, overrides: &Metadata) -> Result<Self, TraceError> {
+        let mut reader = Self::before_header(source, name, overrides);
+        let mut skipped = Vec::new();
+        while reader.parser.reading_kind().is_none() {
+            match reader.next_line() {
+                Some(Err(TraceError::Content(fault))) if skipped.len() + 1 < LONGEST_PREAMBLE => skipped.push(fault),
+                Some(line) => drop(line?),
+                None => {
+                    let nothing = || Fault::new(A_HEADER, "the end of the file").at(&reader.file, reader.line().max(1));
+                    return Err(skipped.into_iter().next().unwrap_or_else(nothing).into());
+                }
+            }
+        }
+        Ok(Self { skipped: skipped.into_iter(), ..reader })
+    }
+
+    /// A source that has no header, or is joined after it: `header` names the columns, and its first line may be a row.
+    ///
+    /// # Errors
+    /// [`TraceError`] if these are no columns of a trace.
+    pub fn headless(source: R, name: &str, header: &str, overrides: &Metadata) -> Result<Self, TraceError> {
+        let mut reader = Self::before_header(source, name, overrides);
+        match reader.parser.take_numbered(header, 0) {
+            Ok(Line::Header) => Ok(reader),
+            Ok(_) => Err(Fault::new(A_HEADER, quote(header)).at(&reader.file, 0).into()),
+            Err(fault) => Err(fault.at(&reader.file, 0).into()),
+        }
+    }
+
+    fn before_header(source: R, name: &str, overrides: &Metadata) -> Self {
+        let (file, lines) = (called(name), Lines::new(source));
+        let parser = LineParser::new(&file, overrides.clone());
+        let skipped = Vec::new().into_iter();
+        Self { file, lines, parser, skipped, has_rows: false, restarted: false, done: false }
+    }
+
+    /// Name of the source, as messages call it.
+    #[must_use]
+    pub fn file(&self) -> &str {
+        &self.file
+    }
+
+    /// Physical line read last, counted from 1; 0 before the first.
+    #[must_use]
+    pub fn line(&self) -> u64 {
+        self.lines.number()
+    }
+
+    /// What the readings are since the last header.
+    #[must_use]
+    pub fn reading_kind(&self) -> ReadingKind {
+        self.parser.reading_kind().unwrap_or(ReadingKind::Ohm)
+    }
+
+    /// What the source, or who overrode it, said of itself above the last header.
+    #[must_use]
+    pub fn metadata(&self) -> Metadata {
+        self.parser.metadata()
+    }
+
+    /// The next line; `None` at the end of the source.
+    fn next_line(&mut self) -> Option<Result<Line, TraceError>> {
+        let line = match self.lines.next() {
+            Ok(line) => Ok(line?.to_owned()),
+            Err(fault) => Err(fault),
+        };
+        let number = self.lines.number();
+        let taken = line.and_then(|line| self.parser.take_numbered(&line, number).map_err(LineFault::Content));
+        Some(taken.map_err(|fault| placed(fault, &self.file, number)))
+    }
+
+    fn next_row(&mut self) -> Option<Result<DeviceRow, TraceError>> {
+        loop {
+            match self.next_line()? {
+                Ok(Line::Row(row)) => {
+                    return Some(Ok(DeviceRow { row, restarted: std::mem::take(&mut self.restarted) }));
+                }
+                Ok(Line::Restarted(row)) => return Some(Ok(DeviceRow { row, restarted: true })),
+                Ok(Line::Header) => self.restarted = self.has_rows,
+                Ok(Line::Nothing) => {}
+                Err(error) => return Some(Err(error)),
+            }
+        }
+    }
+}
+
+impl<R: Read> Iterator for DeviceReader<R> {
+    type Item = Result<DeviceRow, TraceError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        if self.done {
+            return None;
+        }
+        if let Some(skipped) = self.skipped.next() {
+            return Some(Err(skipped.into()));
+        }
+        let row = self.next_row();
+        self.has_rows |= matches!(row, Some(Ok(_)));
+        self.done = !matches!(row, Some(Ok(_) | Err(TraceError::Content(_))));
+        row
+    }
+}
+
+impl<R: Read> std::iter::FusedIterator for DeviceReader<R> {}

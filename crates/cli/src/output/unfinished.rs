@@ -1,0 +1,191 @@
+//! Outputs that are not whole yet: files and folders beside their places, under names of this program's own, each locked by
+//! who writes it.
+//!
+//! An interrupt (SIGINT) or a request to end (SIGTERM) removes them. What a killed process or a power cut has left behind is
+//! known by its name and by a lock that nobody holds: the next output in the same folder removes it.
+
+use std::fs::{self, File, Permissions};
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use tempfile::{Builder, NamedTempFile, TempDir};
+
+use super::place::folder_of;
+
+/// What their names begin with.
+const PREFIX: &str = ".ohmstrain-";
+/// What names of files end in, and those of folders.
+const FILE: &str = ".part";
+const FOLDER: &str = ".parts";
+/// The file in such a folder that is locked.
+const LOCK: &str = "lock";
+
+/// What this process has begun; names of what is finished stay, and are used by nobody again.
+static BEGUN: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
+fn begun() -> MutexGuard<'static, Vec<PathBuf>> {
+    BEGUN.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// A file that is to take a place.
+pub struct Unfinished {
+    file: NamedTempFile,
+    place: PathBuf,
+}
+
+impl Unfinished {
+    /// An empty file beside its place, with the permissions of what stands there.
+    pub fn beside(place: &Path, permissions: Option<&Permissions>) -> io::Result<Self> {
+        let folder = folder_of(place);
+        prepare(folder);
+        loop {
+            let mut begun = begun();
+            // The kind alone: the full text names the temporary file, which nobody asked for.
+            let named = new_file(Builder::new().prefix(PREFIX).suffix(FILE)).tempfile_in(folder);
+            let file = named.map_err(|error| io::Error::from(error.kind()))?;
+            begun.push(file.path().to_path_buf());
+            drop(begun);
+            if hold(file.as_file(), file.path()) {
+                permissions.map_or(Ok(()), |permissions| file.as_file().set_permissions(permissions.clone()))?;
+                return Ok(Self { file, place: place.to_path_buf() });
+            }
+        }
+    }
+
+    /// To write to.
+    pub fn file(&self) -> &File {
+        self.file.as_file()
+    }
+}
+
+/// Puts files in their places, all of them once all are on the disk; a signal comes before or after that.
+///
+/// # Errors
+/// The place that could not be taken, and why.
+pub fn publish(all: Vec<Unfinished>) -> Result<(), (PathBuf, io::Error)> {
+    for Unfinished { file, place } in &all {
+        file.as_file().sync_all().map_err(|error| (place.clone(), error))?;
+    }
+    let begun = begun();
+    for Unfinished { file, place } in all {
+        file.persist(&place).map_err(|error| (place.clone(), error.error))?;
+        sync_folder(folder_of(&place));
+    }
+    drop(begun);
+    Ok(())
+}
+
+/// Waits until the names in a folder are on the disk. Not every file system can be asked to.
+pub fn sync_folder(folder: &Path) {
+    if cfg!(unix) {
+        let _ = File::open(folder).and_then(|folder| folder.sync_all());
+    }
+}
+
+/// A folder for files that are not whole yet; it goes when it is dropped.
+pub struct UnfinishedFolder {
+    folder: TempDir,
+    _lock: File,
+}
+
+impl UnfinishedFolder {
+    /// An empty folder in another one.
+    pub fn inside(parent: &Path) -> io::Result<Self> {
+        prepare(parent);
+        loop {
+            let mut begun = begun();
+            let folder = Builder::new().prefix(PREFIX).suffix(FOLDER).tempdir_in(parent)?;
+            begun.push(folder.path().to_path_buf());
+            drop(begun);
+            match File::create(folder.path().join(LOCK)) {
+                Ok(lock) if hold(&lock, folder.path()) => return Ok(Self { folder, _lock: lock }),
+                Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
+                _ => {}
+            }
+        }
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        self.folder.path()
+    }
+}
+
+/// Locks what was just made; `false` if another process took it for a leftover first. Some file systems have no locks, and
+/// no leftovers are removed there.
+fn hold(lock: &File, path: &Path) -> bool {
+    lock.lock().is_err() || path.exists()
+}
+
+/// Before the first output in a folder: removes what nobody will finish.
+fn prepare(folder: &Path) {
+    heed_signals();
+    if begun().iter().any(|path| folder_of(path) == folder) {
+        return;
+    }
+    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+        let (name, path) = (entry.file_name(), entry.path());
+        let Some(rest) = name.to_str().and_then(|name| name.strip_prefix(PREFIX)) else { continue };
+        let is_dir = entry.file_type().is_ok_and(|kind| kind.is_dir());
+        let is_file = entry.file_type().is_ok_and(|kind| kind.is_file());
+        let lock = match rest {
+            _ if is_file && rest.ends_with(FILE) => File::open(&path),
+            _ if is_dir && rest.ends_with(FOLDER) => File::create(path.join(LOCK)),
+            _ => continue,
+        };
+        // The lock is held until it is gone.
+        if lock.as_ref().is_ok_and(|lock| lock.try_lock().is_ok()) {
+            let _ = if is_dir { fs::remove_dir_all(&path) } else { fs::remove_file(&path) };
+        }
+    }
+}
+
+/// Removes what was begun when the process is to end, and then ends as it would have ended.
+#[cfg(unix)]
+fn heed_signals() {
+    use std::sync::Once;
+
+    use signal_hook::consts::{SIGINT, SIGTERM};
+    use signal_hook::iterator::Signals;
+    use signal_hook::low_level::emulate_default_handler;
+
+    static HEEDED: Once = Once::new();
+    HEEDED.call_once(|| {
+        let ignored = ignored_signals();
+        let wanted = [SIGINT, SIGTERM].into_iter().filter(|signal| ignored >> (signal - 1) & 1 == 0);
+        let Ok(mut signals) = Signals::new(wanted) else { return };
+        std::thread::spawn(move || {
+            for signal in signals.forever() {
+                let begun = begun();
+                for path in begun.iter() {
+                    let _ = if path.is_dir() { fs::remove_dir_all(path) } else { fs::remove_file(path) };
+                }
+                let _ = emulate_default_handler(signal);
+            }
+        });
+    });
+}
+
+#[cfg(not(unix))]
+const fn heed_signals() {}
+
+/// Signals that whoever started this process wants it to ignore, a bit each, as far as the system says.
+#[cfg(unix)]
+fn ignored_signals() -> u64 {
+    let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).unwrap_or(0)
+}
+
+/// A temporary file is private; a result is as readable as the user's umask lets new files be.
+#[cfg(unix)]
+fn new_file<'a, 'b>(builder: &'a mut Builder<'b, 'b>) -> &'a mut Builder<'b, 'b> {
+    use std::os::unix::fs::PermissionsExt;
+    builder.permissions(Permissions::from_mode(0o666))
+}
+
+#[cfg(not(unix))]
+const fn new_file<'a, 'b>(builder: &'a mut Builder<'b, 'b>) -> &'a mut Builder<'b, 'b> {
+    builder
+}

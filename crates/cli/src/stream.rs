@@ -1,0 +1,100 @@
+//! Rows as they come: of a recording, or with `--skip-bad` of a device that says other things, too, and may start again.
+
+use std::io::Read;
+
+use ohmstrain_bench_data::{DeviceReader, DeviceRow, Metadata, ReadingKind, TraceError, TraceReader};
+
+use crate::args::FilterArgs;
+use crate::error::CliError;
+use crate::input;
+
+type Source = Box<dyn Read>;
+
+/// Rows of a recording or of a device.
+pub enum Rows {
+    Recording(TraceReader<Source>),
+    Device(Box<DeviceReader<Source>>),
+}
+
+/// Opens what is to be filtered.
+pub fn open(args: &FilterArgs) -> Result<Rows, CliError> {
+    let (text, metadata) = input::text_of(&args.trace_file, &args.estimate.trace.metadata())?;
+    let name = args.trace_file.display().to_string();
+    let device = |reader| Rows::Device(Box::new(reader));
+    match (&args.header, args.skip_bad) {
+        (None, false) => Ok(Rows::Recording(TraceReader::with_overrides(text, &name, &metadata)?)),
+        (None, true) => DeviceReader::new(text, &name, &metadata).map(device).map_err(without_header),
+        (Some(header), false) => {
+            TraceReader::headless(text, &name, header, &metadata).map(Rows::Recording).map_err(of_header_flag)
+        }
+        (Some(header), true) => {
+            DeviceReader::headless(text, &name, header, &metadata).map(device).map_err(of_header_flag)
+        }
+    }
+}
+
+/// A stream whose header did not come.
+fn without_header(error: TraceError) -> CliError {
+    match error {
+        TraceError::Content(content) => {
+            let hint = "a stream without a header, or joined after it, needs --header time_s,resistance_ohm";
+            CliError::Input(format!("{content}; {hint}"))
+        }
+        error => error.into(),
+    }
+}
+
+/// `--header` has none of the columns.
+fn of_header_flag(error: TraceError) -> CliError {
+    match error {
+        TraceError::Content(content) => {
+            CliError::Arguments(format!("--header: expected {}, found {}", content.expected, content.found))
+        }
+        error => error.into(),
+    }
+}
+
+impl Rows {
+    /// Name of the source, as messages call it.
+    pub fn file(&self) -> &str {
+        match self {
+            Self::Recording(rows) => rows.file(),
+            Self::Device(rows) => rows.file(),
+        }
+    }
+
+    /// Physical line read last, counted from 1.
+    pub fn line(&self) -> u64 {
+        match self {
+            Self::Recording(rows) => rows.line(),
+            Self::Device(rows) => rows.line(),
+        }
+    }
+
+    /// What the readings are.
+    pub fn reading_kind(&self) -> ReadingKind {
+        match self {
+            Self::Recording(rows) => rows.reading_kind(),
+            Self::Device(rows) => rows.reading_kind(),
+        }
+    }
+
+    /// What the source says of itself.
+    pub fn metadata(&self) -> Metadata {
+        match self {
+            Self::Recording(rows) => rows.metadata().clone(),
+            Self::Device(rows) => rows.metadata(),
+        }
+    }
+}
+
+impl Iterator for Rows {
+    type Item = Result<DeviceRow, TraceError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        match self {
+            Self::Recording(rows) => Some(rows.next()?.map(|row| DeviceRow { row, restarted: false })),
+            Self::Device(rows) => rows.next(),
+        }
+    }
+}
