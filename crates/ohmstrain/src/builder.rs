@@ -285,7 +285,11 @@ impl<'a> FilterBuilder<'a> {
         let is_told = self.rest_resistance.is_some();
         let follower = (!is_told).then(|| RestFollower::new(params.rest_bounds()));
         let (known, errors) = (in_order(self.known, &scale)?, KnownErrors::new(scale.limits()));
-        Ok(Kernel { filter, translator: Translator { scale, doubts, follower, seen_s: 0.0, read_s: 0.0, errors }, known })
+        Ok(Kernel {
+            filter,
+            translator: Translator { scale, doubts, follower, seen_s: 0.0, read_s: 0.0, errors },
+            known,
+        })
     }
 
     fn start_at(&self, strain: f64) -> Result<Start, Error> {

@@ -31,7 +31,8 @@ fn lagged(builder: FilterBuilder<'_>, rows: &[(f64, Option<f64>)]) -> Vec<Estima
 }
 
 fn smoothed(builder: FilterBuilder<'_>, rows: &[(f64, Option<f64>)]) -> Vec<Estimate> {
-    let (time_s, ohm): (Vec<f64>, Vec<f64>) = rows.iter().map(|(time_s, ohm)| (*time_s, ohm.unwrap_or(f64::NAN))).unzip();
+    let (time_s, ohm): (Vec<f64>, Vec<f64>) =
+        rows.iter().map(|(time_s, ohm)| (*time_s, ohm.unwrap_or(f64::NAN))).unzip();
     builder.smooth(&time_s, &ohm).unwrap()
 }
 

@@ -2,8 +2,8 @@ use std::collections::HashMap;
 
 use ohmstrain_ekf::live::{Jumps, Repeats, Sieve};
 use ohmstrain_ekf::{
-    Advanced, Estimator, Guard, Guarded, Innovation, PastStep, Pause, Reading, ReadingVerdict, Repeated, StepError, Streak,
-    Substeps,
+    Advanced, Estimator, Guard, Guarded, Innovation, PastStep, Pause, Reading, ReadingVerdict, Repeated, StepError,
+    Streak, Substeps,
 };
 
 /// An estimator under guard, and the steps it has prepared.

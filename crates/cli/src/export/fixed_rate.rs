@@ -4,8 +4,8 @@ use ohmstrain_calib::{EstimatorKind, EstimatorParams, HISTORIES, HYPOTHESES, Sen
 use ohmstrain_ekf::correction::FeatureScale;
 use ohmstrain_ekf::live::{DOUBT, Learned, LiveParts, may_be_unstretched};
 use ohmstrain_ekf::{
-    Compact, Ekf, Estimator, Evidence, Hypotheses, LONGEST_PAUSE_S, Pause, Real, STEP_GRACE, STEP_GROWTH, SignSplit, SparseEkf,
-    StepError,
+    Compact, Ekf, Estimator, Evidence, Hypotheses, LONGEST_PAUSE_S, Pause, Real, STEP_GRACE, STEP_GROWTH, SignSplit,
+    SparseEkf, StepError,
 };
 use ohmstrain_model::{Motion, SensorLaw, StrainRange, SwitchedModel};
 

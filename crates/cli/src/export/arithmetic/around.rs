@@ -194,16 +194,11 @@ impl Around<'_> {
     }
 
     fn run(&self) -> Printed {
-        Printed::new(
-            "run",
-            "Time has passed since the step before, if there was one.",
-            &["float dt_s"],
-            |writer| {
-                let mut doubts = writer.state(self.doubts());
-                doubts.pass(writer.input("dt_s"));
-                writer.keep(doubts);
-            },
-        )
+        Printed::new("run", "Time has passed since the step before, if there was one.", &["float dt_s"], |writer| {
+            let mut doubts = writer.state(self.doubts());
+            doubts.pass(writer.input("dt_s"));
+            writer.keep(doubts);
+        })
     }
 
     fn doubt_reading(&self) -> Printed {

@@ -381,13 +381,13 @@ static interval of_length(float step_s, float own[STEP])
     return over;
 }
 
-/* Length of the next step of a pause, in LONGEST_S: no more than an eighth of what has passed; 0 if only the last is left. Those that
+/* Length of the next step of a pause, in LONGEST_S: 1, or no more than 1/64 of what has passed; 0 if only the last is left. Those that
  * are not whole are parts of the one that would be next. */
 static float next_step(const ohmstrain_pause *pause, int whole)
 {
     float times = 1.0f;
 
-    while (times * GROWTH <= pause->passed * 0.125f) {
+    while (times * GROWTH <= pause->passed * 0.015625f) {
         times *= GROWTH;
     }
     while (!(pause->ahead_s > times * LONGEST_S * GRACE)) {
