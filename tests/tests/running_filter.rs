@@ -75,6 +75,7 @@ fn sensor() -> SensorParams {
         law: law(&[4.0, 32.0]),
         estimators: EstimatorKind::ALL.map(|kind| (kind, estimator)).into_iter().collect::<BTreeMap<_, _>>(),
         recordings: vec![],
+        findings: None,
         uncertainty: None,
         correction: Some(correction()),
     }

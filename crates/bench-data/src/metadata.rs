@@ -42,15 +42,18 @@ pub enum ResistanceUnit {
 }
 
 impl StrainUnit {
-    pub(crate) const fn name(self) -> &'static str {
+    /// As a file and a flag name it.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
         match self {
             Self::Fraction => "fraction",
             Self::Percent => "percent",
         }
     }
 
-    /// What a number in the file is multiplied with.
-    pub(crate) const fn factor(self) -> f64 {
+    /// Factor from a number in the file to a fraction, or to Ω.
+    #[must_use]
+    pub const fn factor(self) -> f64 {
         match self {
             Self::Fraction => 1.0,
             Self::Percent => 0.01,
@@ -59,15 +62,18 @@ impl StrainUnit {
 }
 
 impl ResistanceUnit {
-    pub(crate) const fn name(self) -> &'static str {
+    /// As a file and a flag name it.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
         match self {
             Self::Ohm => "ohm",
             Self::Kohm => "kohm",
         }
     }
 
-    /// What a number in the file is multiplied with.
-    pub(crate) const fn factor(self) -> f64 {
+    /// Factor from a number in the file to a fraction, or to Ω.
+    #[must_use]
+    pub const fn factor(self) -> f64 {
         match self {
             Self::Ohm => 1.0,
             Self::Kohm => 1000.0,

@@ -31,9 +31,8 @@ mod sd_scale;
 mod sizes;
 
 pub use baselines::{Baseline, Baselines, Features, Fir, LeakyBank, LowPassMode, PhaseRows, PublishedLaw, Regression};
-pub use calibrate::error_budget::{ErrorBudget, ErrorShares};
-pub use calibrate::findings::{Findings, Seen};
-pub use calibrate::scores::{ScoredRow, Scores};
+pub use calibrate::error_budget::ErrorShares;
+pub use calibrate::scores::ScoredRow;
 pub use calibrate::simulated_motions::SIMULATED_SEED;
 pub use calibrate::with_prior::calibrate_with_prior;
 pub use calibrate::{Calibration, Stage, calibrate};
@@ -57,6 +56,7 @@ pub use params::correction::{
 pub use params::estimator::{
     EstimatorKind, EstimatorParams, MotionParams, NoParameters, NoiseParams, PhaseParams, SettlingParams,
 };
+pub use params::findings::{ErrorBudget, Findings, Scores, Seen};
 pub use params::law::{BranchParams, GaugeParams, LawParameter, LawParams};
 pub use params::recipe::{Parts, RECIPE, Recipe};
 pub use params::static_cubic::StaticCubic;

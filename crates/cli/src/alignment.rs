@@ -1,5 +1,6 @@
 //! References that are early or late.
 
+use ohmstrain::LagDoubt;
 use ohmstrain_calib::aligned;
 
 use crate::error::CliError;
@@ -13,50 +14,24 @@ pub fn check(recording: &mut TraceFile, align: bool, explain: bool) -> Result<f6
     let samples = recording.samples()?;
     let known = ohmstrain::Recording::new(samples.time_s(), samples.reading(), samples.strain())?;
     let name = recording.name.clone();
-    let late = |lag_s: f64| format!("{:.2} s {}", lag_s.abs(), if lag_s < 0.0 { "early" } else { "late" });
-    let Some(lag) = known.reference_lag() else {
-        if let Some(lag_s) = known.lag_out_of_reach() {
-            CliError::warning(&format!(
-                "{name}: the reference seems to be {} or more, as far as lags are looked for; it was not moved: are both on one clock?",
-                late(lag_s)
-            ));
-        }
-        return Ok(0.0);
-    };
-    let own = if lag.own_s > 0.0 {
-        format!(", give or take {:.1} s that the sensor may lag itself", lag.own_s)
-    } else {
-        String::new()
-    };
-    let late = late(lag.lag_s) + &own;
-    if align {
-        CliError::warning(&format!("{name}: the reference is {late}; it was moved by that"));
+    let doubt = known.lag_doubt();
+    if let Some(lag) = doubt.as_ref().and_then(LagDoubt::lag).filter(|_| align) {
+        CliError::warning(&format!("{name}: the reference is {lag}; it was moved by that"));
         shift(recording, lag.lag_s)?;
         return Ok(lag.lag_s);
     }
-    if !lag.is_too_late() {
-        let text =
-            format!("{name}: the reference seems to be {late}, little of the {:.1} s of a movement", lag.movement_s);
-        if explain {
-            CliError::remark(&text)
-        } else {
-            Verbosity::detail(&text)
+    match doubt {
+        None => {}
+        Some(little @ LagDoubt::Little(_)) if explain => CliError::remark(&format!("{name}: {little}")),
+        Some(little @ LagDoubt::Little(_)) => Verbosity::detail(&format!("{name}: {little}")),
+        Some(far @ LagDoubt::OutOfReach { .. }) => CliError::warning(&format!("{name}: {far}")),
+        Some(certain @ LagDoubt::Certain(_)) => {
+            let answer = "--align moves it to where the readings say it belongs";
+            return Err(CliError::Input(format!("{name}: {certain}; {answer}")));
         }
-        return Ok(0.0);
+        Some(late) => CliError::warning(&format!("{name}: {late} --align moves it")),
     }
-    if !lag.is_certain {
-        CliError::warning(&format!(
-            "{name}: the reference seems to be {late}, where a movement takes {:.1} s; the readings do not tell for certain, and it \
-             was not moved: are both on one clock? --align moves it",
-            lag.movement_s
-        ));
-        return Ok(0.0);
-    }
-    Err(CliError::Input(format!(
-        "{name}: expected a reference on the clock of the readings, found one that seems to be {late}, where a movement takes \
-         {:.1} s; --align moves it to where the readings say it belongs",
-        lag.movement_s
-    )))
+    Ok(0.0)
 }
 
 /// Moves a reference that is late by `lag_s`.

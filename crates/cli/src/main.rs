@@ -17,7 +17,6 @@ mod parquet_table;
 mod plausible;
 mod printable;
 mod progress;
-mod quiet;
 mod readings;
 mod report;
 mod run;

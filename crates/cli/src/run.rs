@@ -46,10 +46,22 @@ pub fn rest_resistance(
 ) -> Result<Option<f64>, CliError> {
     match wanted {
         None => Ok(None),
-        Some(RestResistance::Value(value)) => Ok(Some(value)),
+        Some(RestResistance::Value(value)) => {
+            sensor.check_rest_resistance(value)?;
+            Ok(Some(value))
+        }
         Some(RestResistance::Calibrated) => Ok(Some(sensor.params().rested())),
-        Some(RestResistance::First(count)) => median_of_first(count, first, file).map(Some),
+        Some(RestResistance::First(count)) => {
+            let found = median_of_first(count, first, file)?;
+            sensor.check_rest_resistance(found).map_err(|refused| of_first(&refused, count, file))?;
+            Ok(Some(found))
+        }
     }
+}
+
+/// Refuses the R₀ that the first readings of a recording give.
+pub fn of_first(refused: &Error, count: usize, file: &str) -> CliError {
+    CliError::Input(format!("{file}: --rest-resistance first:{count}: {refused}"))
 }
 
 /// Median of the first `count` known readings.

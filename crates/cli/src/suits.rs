@@ -1,11 +1,9 @@
 //! What the command line says to doubts about what a sensor is given: which flag, or which line of a file, answers them.
 
-use ohmstrain::number::{plain, significant};
-use ohmstrain::{Known, Sensor, UnitDoubt, UnitGuess};
+use ohmstrain::{Known, Quiet, Sensor, UnitDoubt, UnitGuess, unused_known};
 
 use crate::error::CliError;
 use crate::input::TraceFile;
-use crate::quiet::Quiet;
 
 /// Readings at the start of a file that are looked at before it is filtered.
 pub const FIRST_READINGS: usize = 100;
@@ -18,11 +16,13 @@ pub fn answerable(doubt: &UnitDoubt) -> String {
         UnitGuess::KiloOhm => {
             "Then say so with `--resistance-unit kohm` or a line `# resistance_unit = kohm` above the header"
         }
-        UnitGuess::RestInKiloOhm => "Bring them to ohms",
-        UnitGuess::Percent => "The column is a ratio",
+        UnitGuess::CalibrationInKiloOhm => "Then calibrate again with `--resistance-unit kohm`",
+        UnitGuess::Percent => "The column is a ratio: 110 % is 1.1",
+        UnitGuess::Ohm => "Divide them by what the rested sensor reads",
+        UnitGuess::Ratio => "The sensor was calibrated in ohms",
         _ => "The column is in ohms",
     };
-    format!("{doubt} {answer}; if another sensor, or another day, is to explain it, give its R0 with --rest-resistance")
+    format!("{doubt} {answer}")
 }
 
 /// Refuses readings in another unit than the sensor's; `header` is what messages call the recording's header.
@@ -51,35 +51,20 @@ pub fn check_reference(recording: &TraceFile, sensor: &Sensor) -> Result<(), Cli
 
 /// Warns of a strain to start at that the sensor never reports.
 pub fn warn_of_start(start: Option<f64>, sensor: &Sensor) {
-    let (Some(start), limits) = (start, sensor.params().limits) else { return };
-    let (lower, upper) = (limits.lower, limits.upper);
-    if !(lower..=upper).contains(&start) {
-        CliError::warning(&format!(
-            "--initial-strain: {start} is outside of the sensor's limits, {} to {}; what is reported stops there",
-            plain(lower),
-            plain(upper)
-        ));
+    if let Some(Err(doubt)) = start.map(|start| sensor.check_start(start)) {
+        CliError::warning(&format!("--initial-strain: {doubt}"));
     }
 }
 
 /// Warns of known strains that no row came for in a recording from the first to the last time, s.
-pub fn warn_of_unused(known: &[Known], (first_s, last_s): (f64, f64), file: &str) {
-    let (first, last) = (significant(first_s, 6), significant(last_s, 6));
-    for Known { time_s, strain, .. } in known.iter().filter(|known| known.time_s > last_s) {
-        CliError::warning(&format!(
-            "{file}: --known {time_s}:{strain} was not used: the recording goes from {first} to {last} s"
-        ));
+pub fn warn_of_unused(known: &[Known], times: (f64, f64), file: &str) {
+    for doubt in unused_known(known, times) {
+        let Known { time_s, strain, .. } = doubt.known;
+        CliError::warning(&format!("{file}: --known {time_s}:{strain} {doubt}"));
     }
 }
 
 /// Asks whether a long hold was a rest, and says how to tell.
 pub fn of_rest(quiet: &Quiet) -> String {
-    let Quiet { from_s, now_s, strain } = *quiet;
-    format!(
-        "{} s of quiet from t = {} s that may be a rest, where the strain is said to be {}: if the body was at rest there, \
-         --known {now_s}:0 tells it",
-        significant(now_s - from_s, 2),
-        significant(from_s, 6),
-        significant(strain, 2),
-    )
+    format!("{quiet}, --known {}:0 tells it", quiet.now_s)
 }

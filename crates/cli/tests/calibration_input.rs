@@ -138,6 +138,21 @@ fn another_unit_is_asked_about_and_converted() {
     }
 }
 
+/// Readings and reference under each other's name.
+#[test]
+fn exchanged_columns_are_told() {
+    let bench = bench();
+    let exchanged = change_rows(&bench.read("trace.csv"), |_, cells| {
+        // A strain of none would be no resistance, and is refused as such.
+        let strain = cells[2].parse::<f64>().unwrap().max(1e-3);
+        (cells[1], cells[2]) = (strain.to_string(), cells[1].clone());
+    });
+    bench.write("exchanged.csv", exchanged);
+    let run = calibrate(&bench, "exchanged.csv", &[]);
+    assert_eq!(run.code, Some(4), "{}", run.stderr);
+    assert!(run.stderr.contains("`resistance_ohm` and `strain` seem to be exchanged"), "{}", run.stderr);
+}
+
 #[test]
 fn two_units_in_one_calibration_are_refused() {
     let bench = bench();
@@ -167,7 +182,7 @@ fn copies_and_other_sensors_are_mentioned() {
     bench.write("other.csv", in_unit(&bench, 1, 1.5, ""));
     let run = calibrate(&bench, "trace.csv", &["copy.csv", "other.csv"]);
     assert_eq!(run.code, Some(0), "{}", run.stderr);
-    assert!(run.warnings[0].contains("copy.csv has the same content as trace.csv"), "{:?}", run.warnings);
+    assert!(run.warnings[0].contains("copy.csv and trace.csv: the same rows: they count twice"), "{:?}", run.warnings);
     let rests = run.warnings.iter().find(|warning| warning.contains("R0 comes out as")).unwrap();
     assert!(rests.contains("50 % more: one sensor?"), "{rests}");
 }

@@ -334,10 +334,10 @@ fn the_rest_resistance_is_the_sensors_or_given_or_that_of_the_first_readings() {
     // The scale of the readings and of R₀ is the same thing twice.
     let scaled = change_rows(&trace, |_, cells| {
         if let Ok(ohm) = cells[1].parse::<f64>() {
-            cells[1] = (ohm * 1024.0).to_string();
+            cells[1] = (ohm * 2.0).to_string();
         }
     });
-    let rest = (1234.0 * 1024.0).to_string();
+    let rest = (1234.0 * 2.0).to_string();
     let columns = ["--columns", "strain,strain_sd,nis"];
     let one = ["filter", "--sensor", "sensor.toml", "--rest-resistance", "1234"];
     let other = ["filter", "--sensor", "sensor.toml", "--rest-resistance", &rest];

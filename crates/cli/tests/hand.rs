@@ -1,6 +1,6 @@
 //! A hand of five fingers, simulated and calibrated one by one, then all of them in one recording; and what `plan` says.
 
-use crate::common::{Bench, Csv};
+use crate::common::{Bench, Csv, Run, change_rows};
 
 const FINGERS: [&str; 5] = ["thumb", "index", "middle", "ring", "little"];
 /// A third of its length is what the simulated sensor is stretched by; that is 90° over 6.4 mm on 30 mm.
@@ -99,6 +99,56 @@ fn all_angles_of_a_hand() {
     bench.write("odd.toml", "format = 1\n[[joints]]\nname = \"a\"\ncolum = \"a\"\n");
     let refused = bench.run(&["hand", "odd.toml", "hand.csv"]);
     assert!(refused.code == Some(4) && refused.stderr.contains("odd.toml:4: unknown field"), "{}", refused.stderr);
+}
+
+/// A sensor that was calibrated on ratios, given ohms, or the reverse: by the column's name, the electronics, the line above the
+/// header, or the readings themselves, of however few rows. So is R0 of no such sensor.
+#[test]
+fn ohms_and_ratios_are_told_apart() {
+    let bench = Bench::calibrated();
+    let ratio = change_rows(&bench.read("trace.csv"), |_, cells| {
+        cells[1] = (cells[1].parse::<f64>().unwrap() / 1600.0).to_string();
+    });
+    bench.write("ratio.csv", ratio.replace("resistance_ohm", "resistance_ratio"));
+    bench.run(&["calibrate", "ratio.csv", "--until", "300", "-o", "ratio.toml", "--estimator", "ekf"]).ok();
+    let recording = |trace: &str, column: &str, rows: usize| {
+        let trace = Csv::new(&bench.read(trace));
+        let reading = trace.header.split(',').nth(1).unwrap().to_owned();
+        let row = |(time, reading): (&&str, &&str)| format!("{time},{reading}\n");
+        let rows: String = trace.cells("time_s").iter().zip(&trace.cells(&reading)).take(rows).map(row).collect();
+        format!("time_s,{column}\n{rows}")
+    };
+    let hand = |sensor: &str, column: &str, more: &str, recording: String| {
+        let joint = format!("name = \"a\"\ncolumn = \"{column}\"\nsensor = \"{sensor}\"\njoint = \"{JOINT}\"\n{more}");
+        bench.write("hand.toml", format!("format = 1\n[[joints]]\n{joint}"));
+        bench.write("hand.csv", recording);
+        bench.run(&["hand", "hand.toml", "hand.csv"])
+    };
+    let refused = |run: Run, said: &[&str]| {
+        assert_eq!(run.code, Some(4), "{}", run.stderr);
+        assert!(said.iter().all(|said| run.stderr.contains(said)), "{}", run.stderr);
+    };
+    let (ohm, all) = ("trace.csv", usize::MAX);
+    let named = ["hand.csv:1: column", "joint `a`", "expected `resistance_ratio` as in the sensor's calibration"];
+    refused(hand("ratio.toml", "thumb_ohm", "", recording(ohm, "thumb_ohm", all)), &named);
+    refused(hand("ratio.toml", "thumb_kohm", "", recording(ohm, "thumb_kohm", all)), &named);
+    let electronics = "front_end = \"divider reference_ohm=10000 side=low bits=12 noise_codes=0.5\"\n";
+    refused(hand("ratio.toml", "thumb", electronics, recording(ohm, "thumb", all)), &named);
+    let said = "# resistance_unit = ohm\n".to_owned() + &recording(ohm, "thumb", all);
+    refused(hand("ratio.toml", "thumb", "", said), &named[1..]);
+    let expected = ["joint `a`", "expected readings of", "are they in ohms?"];
+    refused(hand("ratio.toml", "thumb", "", recording(ohm, "thumb", all)), &expected);
+    refused(hand("ratio.toml", "thumb", "", recording(ohm, "thumb", 5)), &expected);
+    let named = ["joint `a`", "expected `resistance_ohm` as in the sensor's calibration, found `resistance_ratio`"];
+    refused(hand("sensor.toml", "thumb_ratio", "", recording("ratio.csv", "thumb_ratio", all)), &named);
+    // R0 of a ratio is near one.
+    let far = "rest_resistance = 1612.0\n";
+    let of_rest = ["joint `a`: rest_resistance: resistance at rest: expected 0.2", "found 1612"];
+    refused(hand("ratio.toml", "thumb_ratio", far, recording("ratio.csv", "thumb_ratio", all)), &of_rest);
+    let suits =
+        hand("ratio.toml", "thumb_ratio", "rest_resistance = 1.1\n", recording("ratio.csv", "thumb_ratio", all));
+    assert_eq!(suits.code, Some(0), "{}", suits.stderr);
+    assert_eq!(hand("ratio.toml", "thumb", "", recording("ratio.csv", "thumb", all)).code, Some(0));
 }
 
 #[test]

@@ -34,7 +34,7 @@ fn readings_in_another_unit_are_asked_about() {
     let header = 1 + bench.read("trace.csv").lines().position(|line| line.starts_with("time_s")).unwrap();
     let start = format!("other.csv:{header}: column `resistance_ohm`: expected readings of ");
     for (factor, question) in
-        [(1e-3, "in kilo-ohms?"), (1e-6, "in mega-ohms?"), (1e3, "is R0, or the calibration, in kilo-ohms?")]
+        [(1e-3, "in kilo-ohms?"), (1e-6, "in mega-ohms?"), (1e3, "is the calibration in kilo-ohms?")]
     {
         bench.write("other.csv", scaled(&bench, 1, factor));
         for command in [&["filter"][..], &["smooth"], &["evaluate"], &["refine", "-o", "new.toml"]] {
@@ -42,37 +42,55 @@ fn readings_in_another_unit_are_asked_about() {
         }
     }
     assert!(!bench.path("new.toml").exists());
-    // R0 in another unit than the readings is the same mistake.
-    let rest = (1e-3 * rest_reading(&bench)).to_string();
-    let start = start.replace("other", "trace");
-    asks(
-        &bench,
-        &["filter", "trace.csv", "--rest-resistance", &rest],
-        4,
-        &start,
-        "is R0, or the calibration, in kilo-ohms?",
-    );
+    // Ratios to some resistance at rest.
+    bench.write("other.csv", scaled(&bench, 1, 1.0 / rest_reading(&bench)));
+    asks(&bench, &["filter", "other.csv"], 4, &start, "are they in kilo-ohms?");
 }
 
-/// Everything is relative to R0: with it in the readings' unit, or with the readings' unit said, the estimates are those of
-/// the recording in ohms.
+/// R0 in another unit, or of another sensor, whoever says it.
 #[test]
-fn the_answer_is_the_unit_or_r0_in_it() {
+fn a_rest_resistance_of_no_such_sensor_is_refused() {
+    let bench = Bench::calibrated();
+    let rest = rest_reading(&bench);
+    bench.write("other.csv", scaled(&bench, 1, 9.0));
+    for factor in [1e-3, 0.2, 5.0, 9.0, 1e3] {
+        let given = (factor * rest).to_string();
+        for command in [&["filter"][..], &["smooth"], &["evaluate"], &["refine", "-o", "new.toml"]] {
+            let told = [command, &["trace.csv", "--rest-resistance", &given]].concat();
+            asks(
+                &bench,
+                &told,
+                2,
+                "--rest-resistance: resistance at rest: expected ",
+                "in the unit of the calibration's",
+            );
+        }
+    }
+    // So is what the first readings give.
+    for command in [&["filter"][..], &["smooth"], &["evaluate"], &["refine", "-o", "new.toml"]] {
+        let told = [command, &["other.csv", "--rest-resistance", "first:5"]].concat();
+        asks(&bench, &told, 4, "other.csv: --rest-resistance first:5: resistance at rest: expected ", "found 14");
+    }
+    assert!(!bench.path("new.toml").exists());
+    let quarter = (0.26 * rest).to_string();
+    let near = bench.run(&[&["filter", "trace.csv", "--rest-resistance", &quarter][..], &SENSOR].concat());
+    assert_eq!(near.code, Some(0), "{}", near.stderr);
+}
+
+/// With the readings' unit said, the estimates are those of the recording in ohms.
+#[test]
+fn the_answer_is_the_unit() {
     let bench = Bench::calibrated();
     bench.write("other.csv", scaled(&bench, 1, 1e-3));
-    let rest = (1e-3 * rest_reading(&bench)).to_string();
     for command in ["filter", "smooth"] {
         let strains = |arguments: &[&str]| {
             Csv::new(&bench.run(&[&[command], arguments, &SENSOR].concat()).ok()).numbers("strain")
         };
         let calibrated = ["--rest-resistance", "calibrated"];
         let in_ohm = strains(&[&["trace.csv"][..], &calibrated].concat());
-        let in_unit = [&calibrated[..], &["--resistance-unit", "kohm"]].concat();
-        for answer in [&["--rest-resistance", &rest][..], &in_unit] {
-            let in_kohm = strains(&[&["other.csv"][..], answer].concat());
-            // Rounding of the scaled readings, 1e-16, times what a filter makes of it.
-            assert!(in_ohm.iter().zip(&in_kohm).all(|(a, b)| (a - b).abs() < 1e-8), "{command} {answer:?}");
-        }
+        let in_kohm = strains(&[&["other.csv"][..], &calibrated, &["--resistance-unit", "kohm"]].concat());
+        // Rounding of the scaled readings, 1e-16, times what a filter makes of it.
+        assert!(in_ohm.iter().zip(&in_kohm).all(|(a, b)| (a - b).abs() < 1e-8), "{command}");
     }
 }
 

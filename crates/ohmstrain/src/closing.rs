@@ -22,7 +22,7 @@ const ONE_SPEED: f64 = 1.1;
 /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
 /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
 /// let closing = ohmstrain::Closing { file: Some("s.toml"), params: sensor.params(), findings: None, tested: None,
-///     calibration_s: 1.5, more: "advice" };
+///     calibration_s: Some(1.5), more: "advice" };
 /// assert!(closing.text().ends_with("Written      s.toml, estimator sign-split, a law of 3 branches; it took 1.5 s\n"));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -36,8 +36,8 @@ pub struct Closing<'a> {
     pub findings: Option<&'a Findings>,
     /// What it is worth on rows that it never saw; `None` if there were none.
     pub tested: Option<&'a Tested>,
-    /// Wall-clock time, s.
-    pub calibration_s: f64,
+    /// Wall-clock time, s, where somebody has looked at the clock.
+    pub calibration_s: Option<f64>,
     /// Where the advice stands that is not printed.
     pub more: &'a str,
 }
@@ -153,8 +153,8 @@ impl Closing<'_> {
         }
         let (estimator, branches) = (self.params.default_estimator.name(), self.params.law.branches.len());
         let law = if branches == 1 { "1 branch".into() } else { format!("{branches} branches") };
-        let seconds = fixed(self.calibration_s, i32::from(self.calibration_s < 9.95));
-        let made = format!("estimator {estimator}, a law of {law}; it took {seconds} s");
+        let took = self.calibration_s.map(|taken| format!("; it took {} s", fixed(taken, i32::from(taken < 9.95))));
+        let made = format!("estimator {estimator}, a law of {law}{}", took.unwrap_or_default());
         match self.file {
             Some(file) => lines.add("Written", &format!("{file}, {made}")),
             None => lines.add("Sensor", &made),

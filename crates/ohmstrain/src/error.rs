@@ -2,10 +2,11 @@ use std::fmt;
 
 use ohmstrain_calib::{CalibrationError, FieldError, Quantity, SamplesError};
 use ohmstrain_ekf::StepError;
+use ohmstrain_ekf::live::FARTHEST_REST;
 use ohmstrain_model::ParameterError;
 use thiserror::Error;
 
-use crate::number::plain;
+use crate::number::{plain, significant};
 use crate::{ReferenceDoubt, UnitDoubt};
 
 /// Why there is no sensor, no filter or no estimate.
@@ -51,6 +52,21 @@ pub enum Error {
     NotPositive {
         /// What it is.
         name: &'static str,
+        /// What was given.
+        found: f64,
+    },
+    /// A resistance at rest that is none of the sensor's: in another unit, or of another sensor.
+    #[error(
+        "resistance at rest: expected {} to {}, as the rested sensor read {} in calibration, found {}; give it in the unit of the \
+         calibration's readings, and for a sensor of another size calibrate again",
+        significant(*rested / FARTHEST_REST, 5),
+        significant(*rested * FARTHEST_REST, 5),
+        significant(*rested, 5),
+        significant(*found, 5)
+    )]
+    FarRest {
+        /// What the rested sensor read in calibration.
+        rested: f64,
         /// What was given.
         found: f64,
     },

@@ -1,5 +1,5 @@
 use ohmstrain_calib::{Output, Quantity, SensorParams};
-use ohmstrain_ekf::live::{KNOWN_BEYOND, SURPRISING_NIS};
+use ohmstrain_ekf::live::{FARTHEST_REST, KNOWN_BEYOND, SURPRISING_NIS};
 use ohmstrain_ekf::{Gaussian, ReadingVerdict};
 use ohmstrain_model::{Joint, StrainRange};
 use serde::ser::SerializeStruct;
@@ -136,10 +136,8 @@ impl Scale {
 
     /// Moves R₀ to where the rested sensor reads `measured`.
     pub(crate) fn rest_at(&mut self, measured: f64) -> Result<(), Error> {
-        if !(measured.is_finite() && measured > 0.0) {
-            return Err(Error::NotPositive { name: "resistance at rest", found: measured });
-        }
         let (rest_reading, rested) = self.calibrated;
+        check_rest(rested, measured)?;
         self.rest_reading = rest_reading * (measured / rested);
         Ok(())
     }
@@ -210,6 +208,18 @@ impl Scale {
             .with(Flag::RampBorder, output.estimate.near_ramp_border)
             .with(Flag::AtLimit, strain <= self.limits.0 || strain >= self.limits.1)
     }
+}
+
+/// Refuses an R₀ that is none of a sensor that read `rested` at rest in calibration.
+pub(crate) fn check_rest(rested: f64, measured: f64) -> Result<(), Error> {
+    if !(measured.is_finite() && measured > 0.0) {
+        return Err(Error::NotPositive { name: "resistance at rest", found: measured });
+    }
+    let moved = measured / rested;
+    if (FARTHEST_REST.recip()..=FARTHEST_REST).contains(&moved) {
+        return Ok(());
+    }
+    Err(Error::FarRest { rested, found: measured })
 }
 
 /// Whether the row's reading was weighed down for standing far from what was expected.

@@ -194,7 +194,8 @@ impl Filter {
     /// What the rested, unstretched sensor is found to read from now on, in place of what it read in calibration.
     ///
     /// # Errors
-    /// If it is not a positive number.
+    /// If it is not a positive number, or farther from the calibration's than by a factor of
+    /// [`FARTHEST_REST`](crate::FARTHEST_REST).
     ///
     /// ```
     /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
@@ -333,7 +334,8 @@ impl LaggedFilter {
     /// As [`Filter::rest_resistance`].
     ///
     /// # Errors
-    /// If it is not a positive number.
+    /// If it is not a positive number, or farther from the calibration's than by a factor of
+    /// [`FARTHEST_REST`](crate::FARTHEST_REST).
     ///
     /// ```
     /// # let text = std::fs::read_to_string("examples/sensor.toml")?;

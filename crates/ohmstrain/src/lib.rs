@@ -24,6 +24,7 @@
 
 mod builder;
 mod calibrate;
+mod calibration_doubt;
 mod closing;
 mod column;
 mod error;
@@ -31,9 +32,12 @@ mod estimate;
 mod explain;
 mod filter;
 mod known;
+mod known_doubt;
+mod lag_doubt;
 pub mod number;
 mod pauses;
 mod prior;
+mod quiet;
 mod reading;
 mod recording;
 mod reference_doubt;
@@ -47,6 +51,7 @@ pub mod wrap;
 
 pub use builder::FilterBuilder;
 pub use calibrate::{Calibrated, Calibration, calibrate};
+pub use calibration_doubt::{CalibrationDoubt, calibration_doubts};
 pub use closing::{Closing, Tested};
 pub use column::Column;
 pub use error::{Error, Place, TextCause, TextError};
@@ -54,7 +59,10 @@ pub use estimate::Estimate;
 pub use explain::{ReferenceLag, explain};
 pub use filter::{Filter, LaggedFilter};
 pub use known::Known;
+pub use known_doubt::{StartDoubt, UnusedKnown, unused_known};
+pub use lag_doubt::LagDoubt;
 pub use prior::Prior;
+pub use quiet::{Quiet, QuietWatch};
 pub use reading::Reading;
 pub use recording::{Evaluation, Recording};
 pub use reference_doubt::ReferenceDoubt;
@@ -67,7 +75,7 @@ pub use ohmstrain_calib::{
     CalibrationError, Distrusted, Doubt, EstimatorKind, FieldError, Findings, GaugeFamily, Identifiability,
     JointParams, Parts, Quantity, ReadingUnit, SamplesError, ScoredRow, Scores, SensorParams, Stage,
 };
-pub use ohmstrain_ekf::live::{Flag, Flags, KNOWN_BEYOND};
+pub use ohmstrain_ekf::live::{FARTHEST_REST, Flag, Flags, KNOWN_BEYOND};
 #[doc(no_inline)]
 pub use ohmstrain_ekf::{Influence, StepError};
 #[doc(no_inline)]

@@ -18,6 +18,8 @@ pub struct Recording<'a> {
     pub(crate) quantity: Quantity,
     pub(crate) joint: Option<JointParams>,
     pub(crate) file: Option<(&'a str, &'a str)>,
+    pub(crate) knows_strain_unit: bool,
+    pub(crate) knows_resistance_unit: bool,
 }
 
 impl<'a> Recording<'a> {
@@ -34,7 +36,15 @@ impl<'a> Recording<'a> {
     /// ```
     pub fn new(time_s: &'a [f64], resistance: &'a [f64], strain: &'a [f64]) -> Result<Self, Error> {
         let samples = Samples::new(time_s, resistance, strain)?;
-        Ok(Self { samples, reading: ReadingUnit::Ohm, quantity: Quantity::Strain, joint: None, file: None })
+        Ok(Self {
+            samples,
+            reading: ReadingUnit::Ohm,
+            quantity: Quantity::Strain,
+            joint: None,
+            file: None,
+            knows_strain_unit: false,
+            knows_resistance_unit: false,
+        })
     }
 
     /// The readings are ratios to some resistance at rest.
@@ -57,6 +67,30 @@ impl<'a> Recording<'a> {
     #[must_use]
     pub const fn of_angles_deg(self) -> Self {
         Self { quantity: Quantity::AngleDeg, ..self }
+    }
+
+    /// Somebody has said that the strains are fractions: [`calibration_doubts`](crate::calibration_doubts) does not ask.
+    ///
+    /// ```
+    /// let balloon = ohmstrain::Recording::new(&[0.0, 0.1], &[1600.0, 9000.0], &[0.0, 4.5])?.strain_unit_is_known();
+    /// assert!(ohmstrain::calibration_doubts(&[balloon]).is_empty());
+    /// # Ok::<(), ohmstrain::Error>(())
+    /// ```
+    #[must_use]
+    pub const fn strain_unit_is_known(self) -> Self {
+        Self { knows_strain_unit: true, ..self }
+    }
+
+    /// Somebody has said that the readings are in Ω, or electronics tell it.
+    ///
+    /// ```
+    /// let small = ohmstrain::Recording::new(&[0.0, 0.1], &[1.6, 1.7], &[0.0, 0.1])?.resistance_unit_is_known();
+    /// assert!(ohmstrain::calibration_doubts(&[small]).is_empty());
+    /// # Ok::<(), ohmstrain::Error>(())
+    /// ```
+    #[must_use]
+    pub const fn resistance_unit_is_known(self) -> Self {
+        Self { knows_resistance_unit: true, ..self }
     }
 
     /// The file that it was read from, by name and SHA-256 of its bytes, hexadecimal: the sensor then remembers it.

@@ -4,6 +4,7 @@ use ohmstrain_calib::{EstimatorKind, JointParams, Learned, Parts, Quantity, Sens
 use ohmstrain_model::Joint;
 
 use crate::column::Header;
+use crate::estimate::check_rest;
 use crate::text;
 use crate::{Column, Error, Estimate, FilterBuilder, UnitDoubt};
 
@@ -200,6 +201,24 @@ impl Sensor {
         }
         self.joint()?;
         Ok(self)
+    }
+
+    /// Asks whether the rested sensor can read `measured`.
+    ///
+    /// # Errors
+    /// If it is not positive, or farther from what the rested sensor read in calibration than by a factor of
+    /// [`FARTHEST_REST`](crate::FARTHEST_REST).
+    ///
+    /// ```
+    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+    /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
+    /// sensor.check_rest_resistance(1712.0)?;
+    /// let refused = sensor.check_rest_resistance(14_000.0).unwrap_err();
+    /// assert!(refused.to_string().starts_with("resistance at rest: expected "));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn check_rest_resistance(&self, measured: f64) -> Result<(), Error> {
+        check_rest(self.params.rested(), measured)
     }
 
     /// The joint that it sits on, if there is one.

@@ -2,11 +2,14 @@ use std::fmt;
 
 use ohmstrain_calib::{ReadingUnit, SensorParams};
 
+use crate::calibration_doubt::LEAST_OHM;
 use crate::number::significant;
 
 /// Readings may go this far beyond those of the calibration, and in another unit they would not: sensors of one kind differ
 /// by less, units by more.
 const READINGS_BEYOND: f64 = 2.0;
+/// More is read where no sensor is, Ω.
+const LARGEST_OHM: f64 = 1e6;
 
 /// Readings that seem to be in another unit than the calibration's; see [`Sensor::check_unit`](crate::Sensor::check_unit).
 ///
@@ -45,10 +48,14 @@ pub enum UnitGuess {
     KiloOhm,
     /// MΩ in place of Ω.
     MegaOhm,
-    /// R₀, or the calibration, is in kΩ.
-    RestInKiloOhm,
+    /// The calibration is in kΩ.
+    CalibrationInKiloOhm,
+    /// Ratios to some resistance at rest in place of Ω.
+    Ratio,
     /// Percent in place of ratios.
     Percent,
+    /// Ω in place of ratios.
+    Ohm,
 }
 
 impl UnitDoubt {
@@ -59,8 +66,15 @@ impl UnitDoubt {
         let (low, high) = (moved * params.validity.reading_lower, moved * params.validity.reading_upper);
         let suits = |reading: f64| (low / READINGS_BEYOND..=high * READINGS_BEYOND).contains(&reading);
         let guesses: &[(f64, UnitGuess)] = match params.reading {
-            ReadingUnit::Ohm => {
-                &[(1e3, UnitGuess::KiloOhm), (1e6, UnitGuess::MegaOhm), (1e-3, UnitGuess::RestInKiloOhm)]
+            ReadingUnit::Ohm => &[
+                (1e3, UnitGuess::KiloOhm),
+                (1e6, UnitGuess::MegaOhm),
+                (1e-3, UnitGuess::CalibrationInKiloOhm),
+                (rest, UnitGuess::Ratio),
+            ],
+            // Of ohms nobody knows how many are the sensor's at rest.
+            ReadingUnit::Ratio if (LEAST_OHM..=LARGEST_OHM).contains(&median) => {
+                &[(1e-2, UnitGuess::Percent), (rest / median, UnitGuess::Ohm)]
             }
             ReadingUnit::Ratio => &[(1e-2, UnitGuess::Percent)],
         };
@@ -88,8 +102,10 @@ impl fmt::Display for UnitGuess {
         out.write_str(match self {
             Self::KiloOhm => "a thousandth of that: are they in kilo-ohms?",
             Self::MegaOhm => "a millionth of that: are they in mega-ohms?",
-            Self::RestInKiloOhm => "a thousand times that: is R0, or the calibration, in kilo-ohms?",
+            Self::CalibrationInKiloOhm => "a thousand times that: is the calibration in kilo-ohms?",
+            Self::Ratio => "near one: are they ratios to some resistance at rest?",
             Self::Percent => "a hundred times that: are they in percent?",
+            Self::Ohm => "no such ratio: are they in ohms?",
         })
     }
 }

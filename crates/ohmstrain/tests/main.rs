@@ -1,6 +1,7 @@
 //! The library as its users see it. One test program; a module for each subject.
 
 mod another_day;
+mod calibration_doubts;
 mod doubts;
 mod empty_rows;
 mod known;

@@ -137,6 +137,38 @@ fn another_rest_resistance_scales_readings() {
     }
 }
 
+/// In kΩ, in MΩ, or of a sensor of another size: wherever it enters, and not where it is a factor of 4.
+#[test]
+fn a_rest_resistance_of_no_such_sensor_is_refused() {
+    let sensor = sensor();
+    let rested = sensor.params().rested();
+    let mut running = sensor.filter().build().unwrap();
+    running.step(0.0, rested).unwrap();
+    let mut lagged = sensor.filter().build_lagged(0.2).unwrap();
+    for factor in [1e-6, 1e-3, 0.24, 4.1, 9.0, 1e3] {
+        let far = factor * rested;
+        let refused = [
+            sensor.check_rest_resistance(far).unwrap_err(),
+            sensor.filter().rest_resistance(far).build().unwrap_err(),
+            sensor.filter().rest_resistance(far).build_lagged(0.2).unwrap_err(),
+            running.rest_resistance(far).unwrap_err(),
+            lagged.rest_resistance(far).unwrap_err(),
+        ];
+        for refused in refused {
+            assert!(matches!(refused, Error::FarRest { found, .. } if found == far), "{factor}: {refused}");
+            let text = refused.to_string();
+            assert!(text.starts_with("resistance at rest: expected ") && text.contains("found "), "{text}");
+        }
+    }
+    // The filter stays as it was.
+    let mut other = sensor.filter().build().unwrap();
+    other.step(0.0, rested).unwrap();
+    assert_eq!(running.step(0.1, 1.1 * rested).unwrap(), other.step(0.1, 1.1 * rested).unwrap());
+    for factor in [0.25, 1.0, 4.0] {
+        assert!(sensor.filter().rest_resistance(factor * rested).build().is_ok(), "{factor}");
+    }
+}
+
 #[test]
 fn options_that_make_no_sense_are_refused_by_name() {
     let sensor = sensor();

@@ -1,15 +1,16 @@
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
-use std::time::Instant;
 
-use ohmstrain::{Calibrated, Calibration, GaugeFamily, Prior, Quantity};
+use ohmstrain::{Calibrated, Calibration, Error, GaugeFamily, Prior, calibration_doubts};
 use ohmstrain_calib::{Samples, screen};
 use pyo3::prelude::*;
 use pyo3_arrow::PyTable;
 
-use crate::error::{Place, heed, of_library, raise};
+use crate::about::About;
+use crate::doubts::{called, heard, on_one_clock};
+use crate::error::{Place, Stopped, heed, of_library, raise};
 use crate::evaluation::{Scored, after_split};
 use crate::options::estimator;
-use crate::recording::{About, Recording};
+use crate::recording::Recording;
 use crate::sensor::Sensor;
 
 /// What is left to choose.
@@ -21,6 +22,8 @@ pub struct Choices {
     gauge: Option<String>,
     /// The text of a `prior.toml`.
     prior: Option<String>,
+    /// Whether a reference that is late is moved.
+    align: bool,
 }
 
 impl Choices {
@@ -55,11 +58,14 @@ impl Choices {
 /// The sensor behind recordings with a reference.
 #[pyfunction]
 pub fn calibrate(py: Python, tables: Vec<(PyTable, About)>, choices: Choices) -> PyResult<(Sensor, Vec<String>)> {
-    let recordings =
+    let mut recordings =
         tables.into_iter().map(|(table, about)| Recording::new(table, about)).collect::<PyResult<Vec<Recording>>>()?;
+    let mut warnings = py.detach(|| on_one_clock(&mut recordings, choices.align))?;
     let whole: Vec<usize> = recordings.iter().map(|recording| recording.time_s.len()).collect();
     let prior = choices.prior()?;
-    calibrated(py, &recordings, &whole, choices.calibration(prior.as_ref())?)
+    let (sensor, more) = calibrated(py, &recordings, &whole, choices.calibration(prior.as_ref())?)?;
+    warnings.extend(more);
+    Ok((sensor, warnings))
 }
 
 fn parsed(text: &str) -> PyResult<Prior> {
@@ -93,52 +99,45 @@ pub fn calibrated(
             return Err(raise(&place, "expected a reference (strain, displacement_mm or angle_deg), found none"));
         }
     }
-    let start = Instant::now();
     // Unwinding is the one way out of a calibration.
     let made = catch_unwind(AssertUnwindSafe(|| py.detach(|| run(recordings, rows, calibration))));
     let made = made.or_else(|stopped| match stopped.downcast::<PyErr>() {
         Ok(interrupt) => Err(*interrupt),
         Err(panicked) => resume_unwind(panicked),
     })?;
-    let (calibrated, left_out) = made.map_err(|error| {
-        let name = if let [one] = recordings { one.name.as_deref() } else { None };
-        of_library(&error, name)
+    let (calibrated, warnings) = made.map_err(|stopped| match stopped {
+        Stopped::Interrupted(raised) => raised,
+        Stopped::Refused(error) => {
+            let name = if let [one] = recordings { one.name.as_deref() } else { None };
+            of_library(&error, name)
+        }
     })?;
-    let warnings = left_out.iter().map(|one| {
-        let name = recordings.get(one.recording).and_then(|recording| recording.name.as_deref());
-        let name = name.map_or_else(|| format!("recording {}", one.recording + 1), str::to_owned);
-        format!("{name}: row {} ({} s): {}; left out of the calibration", one.row, one.time_s, one.doubt)
-    });
-    let warnings = warnings.collect();
-    let made = Some((calibrated.findings, start.elapsed().as_secs_f64()));
-    Ok((Sensor { sensor: calibrated.sensor, made }, warnings))
+    Ok((Sensor { sensor: calibrated.sensor }, warnings))
 }
 
-/// As the command line does it: rows that nobody can trust are left out first.
+/// As the command line does it: rows that nobody can trust are left out first, and doubts are answered.
 fn run(
     recordings: &[Recording],
     rows: &[usize],
     calibration: Calibration,
-) -> Result<(Calibrated, Vec<ohmstrain::Distrusted>), ohmstrain::Error> {
+) -> Result<(Calibrated, Vec<String>), Stopped> {
     let parts = recordings.iter().zip(rows).map(|(recording, rows)| recording.until(*rows));
     let parts: Vec<_> = parts.collect();
     let samples = parts.iter().map(|(time_s, reading, strain)| Samples::new(time_s, reading, strain.unwrap_or(&[])));
-    let samples = samples.collect::<Result<Vec<_>, _>>()?;
-    let screened = screen(&samples)?;
-    let mut known = Vec::new();
-    for (recording, samples) in recordings.iter().zip(screened.samples()) {
-        let mut one = ohmstrain::Recording::new(samples.time_s(), samples.reading(), samples.strain())?;
-        if recording.unit == ohmstrain::ReadingUnit::Ratio {
-            one = one.of_ratios();
-        }
-        if recording.reference.as_ref().is_some_and(|(quantity, _)| *quantity == Quantity::AngleDeg) {
-            one = one.of_angles_deg();
-        }
-        known.push(recording.joint.map_or(one, |joint| one.on_joint(joint)));
-    }
+    let samples = samples.collect::<Result<Vec<_>, _>>().map_err(Error::from)?;
+    let screened = screen(&samples).map_err(Error::from)?;
+    let known = recordings.iter().zip(screened.samples()).map(|(recording, samples)| recording.known(&samples));
+    let known = known.collect::<Result<Vec<_>, _>>()?;
+    let mut warnings = heard(recordings, &calibration_doubts(&known)).map_err(Stopped::Interrupted)?;
+    let left_out = screened.distrusted.iter().map(|one| {
+        let name = called(recordings, one.recording);
+        format!("{name}: row {} ({} s): {}; left out of the calibration", one.row, one.time_s, one.doubt)
+    });
+    warnings.extend(left_out);
     let interrupted = |error: PyErr| resume_unwind(Box::new(error));
     let calibrated = calibration.run_with(&known, |_| heed().unwrap_or_else(interrupted))?;
-    Ok((calibrated, screened.distrusted))
+    warnings.extend(heard(recordings, &calibrated.doubts()).map_err(Stopped::Interrupted)?);
+    Ok((calibrated, warnings))
 }
 
 /// Calibrates on the first rows of a recording and scores the rest; the sensor, and scores as JSON.

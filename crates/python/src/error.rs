@@ -3,6 +3,8 @@ use pyo3::create_exception;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
+use crate::doubts;
+
 create_exception!(
     ohmstrain,
     OhmstrainError,
@@ -47,7 +49,7 @@ pub fn raise(place: &Place, message: &str) -> PyErr {
 pub enum Stopped {
     /// The library refuses them.
     Refused(Error),
-    /// The user, or whoever sent a signal.
+    /// The user, or whoever sent a signal; or an exception that says why.
     Interrupted(PyErr),
 }
 
@@ -71,7 +73,9 @@ pub fn of_library(error: &Error, file: Option<&str>) -> PyErr {
             Some(file) => raise(&Place { file: None, ..place }, &error.in_file(file)),
             None => raise(&place, &error.to_string()),
         },
-        Error::Unit(doubt) => raise(&Place { column: Some(doubt.column), ..place }, &error.to_string()),
+        Error::Unit(doubt) => raise(&Place { column: Some(doubt.column), ..place }, &doubts::of_unit(doubt)),
+        Error::Reference(doubt) => raise(&Place { column: Some("strain"), ..place }, &doubts::of_reference(doubt)),
+        Error::FarRest { .. } => raise(&place, &format!("rest_resistance: {error}")),
         _ => raise(&place, &error.to_string()),
     }
 }

@@ -3,11 +3,14 @@
 //! Tables come and go through the Arrow C data interface. The interpreter's lock is released while anything is computed.
 //! What the arguments mean is documented where Python users look: in `ohmstrain/__init__.py` and `sensor.py`.
 
+mod about;
 mod calibration;
+mod doubts;
 mod error;
 mod evaluation;
 mod live;
 mod options;
+mod read;
 mod recording;
 mod sensor;
 mod table;
@@ -23,6 +26,8 @@ mod _core {
     use super::error::OhmstrainError;
     #[pymodule_export]
     use super::live::{LaggedFilter, LiveFilter};
+    #[pymodule_export]
+    use super::read::read;
     #[pymodule_export]
     use super::sensor::Sensor;
 

@@ -1,13 +1,14 @@
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use ohmstrain::{Column, Error, Estimate};
+use ohmstrain::{Column, Error, Estimate, Known};
 use pyo3::prelude::*;
 use pyo3::sync::MutexExt;
 use pyo3::types::PyDict;
 use pyo3_arrow::PyTable;
 
+use crate::about::About;
 use crate::error::of_library;
-use crate::recording::{About, Recording};
+use crate::recording::Recording;
 use crate::sensor::{Doubtful, Watch};
 use crate::table::Estimates;
 
@@ -17,6 +18,7 @@ pub struct LiveFilter {
     running: Mutex<Running>,
     sensor: ohmstrain::Sensor,
     columns: Vec<Column>,
+    known: Vec<Known>,
 }
 
 struct Running {
@@ -63,9 +65,10 @@ impl LiveFilter {
         sensor: ohmstrain::Sensor,
         columns: Vec<Column>,
         rest_resistance: Option<f64>,
+        known: Vec<Known>,
     ) -> Self {
-        let watch = Watch::new(&sensor, rest_resistance);
-        Self { running: Mutex::new(Running { filter, watch, rest_resistance }), sensor, columns }
+        let watch = Watch::new(&sensor, rest_resistance, &known);
+        Self { running: Mutex::new(Running { filter, watch, rest_resistance }), sensor, columns, known }
     }
 }
 
@@ -94,6 +97,7 @@ impl LiveFilter {
             recording.filtered(filter, |row, estimate| {
                 estimates.put(row, std::slice::from_ref(estimate));
                 watch.see(&recording, row, estimate.strain_rate);
+                watch.see_rest(&recording, estimate);
             })
         })?;
         Ok((estimates.into_batch()?, std::mem::take(&mut watch.warnings)))
@@ -103,7 +107,7 @@ impl LiveFilter {
         let mut running = locked(&self.running, py);
         running.filter.rest_resistance(measured).map_err(refused)?;
         running.rest_resistance = Some(measured);
-        running.watch = Watch::new(&self.sensor, Some(measured));
+        running.watch = Watch::new(&self.sensor, Some(measured), &self.known);
         Ok(())
     }
 }

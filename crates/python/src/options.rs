@@ -1,7 +1,7 @@
 use ohmstrain::{Column, EstimatorKind, FilterBuilder, Influence, Known, Sensor};
 use pyo3::prelude::*;
 
-use crate::error::{Place, raise};
+use crate::error::{Place, of_library, raise};
 
 /// How a filter is to be: the flags of `ohmstrain filter`.
 #[derive(Clone, Debug, Default, FromPyObject)]
@@ -9,9 +9,11 @@ use crate::error::{Place, raise};
 pub struct Options {
     estimator: Option<String>,
     correction: bool,
-    initial_strain: Option<f64>,
+    /// Strain at the first row, if it is known.
+    pub initial_strain: Option<f64>,
+    /// Strains that are known later.
     #[pyo3(from_py_with = known)]
-    known: Vec<Known>,
+    pub known: Vec<Known>,
     rest_resistance: Option<Rest>,
     gate: Option<f64>,
     influence: Option<String>,
@@ -30,7 +32,10 @@ impl Options {
     pub fn rest_resistance(&self, sensor: &Sensor) -> PyResult<Option<f64>> {
         match &self.rest_resistance {
             None => Ok(None),
-            Some(Rest::Reading(measured)) => Ok(Some(*measured)),
+            Some(Rest::Reading(measured)) => {
+                sensor.check_rest_resistance(*measured).map_err(|refused| of_library(&refused, None))?;
+                Ok(Some(*measured))
+            }
             Some(Rest::Named(name)) if name == "calibrated" => Ok(Some(sensor.params().rested())),
             Some(Rest::Named(name)) => {
                 let said = format!("rest_resistance: expected a positive number or calibrated, found `{name}`");

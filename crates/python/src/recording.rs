@@ -9,21 +9,12 @@ use arrow_array::{Array, RecordBatch};
 use arrow_cast::cast;
 use arrow_schema::{ArrowError, DataType, Schema};
 use ohmstrain::{Error, Estimate, Filter, FilterBuilder, JointParams, Quantity, Reading, ReadingUnit, Sensor};
-use ohmstrain_bench_data::{FrontEndSpec, JointSpec};
+use ohmstrain_calib::Samples;
 use pyo3::prelude::*;
 use pyo3_arrow::PyTable;
 
+use crate::about::About;
 use crate::error::{Place, Stopped, heed, of_library, raise};
-
-/// What a table leaves unsaid: the lines above a trace CSV's header.
-#[derive(Debug, Default, FromPyObject)]
-#[pyo3(from_item_all)]
-pub struct About {
-    name: Option<String>,
-    gauge_length_mm: Option<f64>,
-    front_end: Option<String>,
-    joint: Option<String>,
-}
 
 /// A recording as the library takes it. NaN stands for what is missing.
 #[derive(Debug)]
@@ -42,6 +33,10 @@ pub struct Recording {
     pub reference: Option<(Quantity, Vec<f64>)>,
     /// The joint that the sensor sits on.
     pub joint: Option<JointParams>,
+    /// Whether somebody has said what the strains are in.
+    knows_strain_unit: bool,
+    /// Whether somebody has said what the readings are in, or electronics tell it.
+    knows_resistance_unit: bool,
 }
 
 /// Rows after which an interrupt is heeded.
@@ -56,6 +51,7 @@ impl Recording {
     /// Takes a table apart.
     pub fn new(table: PyTable, about: About) -> PyResult<Self> {
         let (batches, schema) = table.into_inner();
+        let about = about.completed(&schema)?;
         let file = about.name.as_deref();
         let needed = |group: &[&'static str]| {
             one_of(&schema, group, file)?.ok_or_else(|| {
@@ -81,16 +77,57 @@ impl Recording {
         };
         let unit = if reading == "resistance_ratio" { ReadingUnit::Ratio } else { ReadingUnit::Ohm };
         let joint = about.joint()?;
+        let knows_strain_unit = about.strain_unit.is_some();
+        let knows_resistance_unit = about.resistance_unit.is_some() || converter.is_some();
         if time_s.is_empty() {
             return Err(raise(&Place { file, ..Place::default() }, "expected at least one row, found none"));
         }
-        Ok(Self { name: about.name, time_s, readings, converter, unit, reference, joint })
+        Ok(Self {
+            name: about.name,
+            time_s,
+            readings,
+            converter,
+            unit,
+            reference,
+            joint,
+            knows_strain_unit,
+            knows_resistance_unit,
+        })
+    }
+
+    /// Its name before a message.
+    pub fn before(&self) -> String {
+        self.name.as_deref().map_or_else(String::new, |name| format!("{name}: "))
+    }
+
+    /// First and last time, s.
+    pub fn times(&self) -> (f64, f64) {
+        let ends = (self.time_s.first(), self.time_s.last());
+        (ends.0.copied().unwrap_or(f64::NAN), ends.1.copied().unwrap_or(f64::NAN))
     }
 
     /// Rows from the first one up to one.
     pub fn until(&self, rows: usize) -> (&[f64], &[f64], Option<&[f64]>) {
         let reference = self.reference.as_ref().map(|(_, values)| &values[..rows]);
         (&self.time_s[..rows], &self.readings[..rows], reference)
+    }
+
+    /// Rows of it as the library calibrates on them.
+    pub fn known<'a>(&self, samples: &Samples<'a>) -> Result<ohmstrain::Recording<'a>, Error> {
+        let mut one = ohmstrain::Recording::new(samples.time_s(), samples.reading(), samples.strain())?;
+        if self.unit == ReadingUnit::Ratio {
+            one = one.of_ratios();
+        }
+        if self.reference.as_ref().is_some_and(|(quantity, _)| *quantity == Quantity::AngleDeg) {
+            one = one.of_angles_deg();
+        }
+        if self.knows_strain_unit {
+            one = one.strain_unit_is_known();
+        }
+        if self.knows_resistance_unit {
+            one = one.resistance_unit_is_known();
+        }
+        Ok(self.joint.map_or(one, |joint| one.on_joint(joint)))
     }
 
     /// Time, s, and reading of a row.
@@ -145,99 +182,6 @@ impl Recording {
         let checked = sensor.check_unit(self.readings.iter().copied(), rest_resistance);
         checked.map_err(|doubt| self.refused(&doubt.into()))
     }
-}
-
-impl About {
-    fn place(&self) -> Place<'_> {
-        Place { file: self.name.as_deref(), ..Place::default() }
-    }
-
-    fn joint_spec(&self) -> PyResult<Option<JointSpec>> {
-        parsed("joint", self.joint.as_deref(), self.name.as_deref())
-    }
-
-    /// The joint that the sensor sits on.
-    pub fn joint(&self) -> PyResult<Option<JointParams>> {
-        Ok(self.joint_spec()?.map(|joint| JointParams {
-            prestrain: joint.prestrain,
-            moment_arm_mm: joint.moment_arm_mm,
-            gauge_length_mm: joint.gauge_length_mm,
-        }))
-    }
-
-    #[expect(clippy::type_complexity, reason = "two columns of a recording")]
-    fn readings(&self, name: &'static str, values: Vec<f64>) -> PyResult<(Vec<f64>, Option<Vec<(f64, bool)>>)> {
-        let file = self.name.as_deref();
-        if name != "adc" {
-            let wrong = values.iter().position(|value| value.is_infinite() || *value <= 0.0);
-            return match wrong {
-                None => Ok((values, None)),
-                Some(row) => {
-                    let place = Place { file, row: Some(row), column: Some(name) };
-                    Err(raise(&place, &format!("expected a positive number, found {}", values[row])))
-                }
-            };
-        }
-        let Some(spec) = parsed::<FrontEndSpec>("front_end", self.front_end.as_deref(), file)? else {
-            let place = Place { column: Some(name), ..self.place() };
-            return Err(raise(&place, "expected `front_end` to be given, as in `# front_end = …` of a trace CSV"));
-        };
-        let front_end = spec.build().map_err(|error| raise(&self.place(), &format!("front_end: {error}")))?;
-        let (mut readings, mut converter) = (Vec::with_capacity(values.len()), Vec::with_capacity(values.len()));
-        for (row, value) in values.into_iter().enumerate() {
-            let code = (value >= 0.0 && value <= f64::from(u32::MAX) && value.fract() == 0.0).then_some(value as u32);
-            if code.is_none() && !value.is_nan() {
-                let place = Place { file, row: Some(row), column: Some(name) };
-                return Err(raise(&place, &format!("expected a converter's code, found {value}")));
-            }
-            let (ohm, sd, saturated) = match code.map(|code| front_end.read(code)) {
-                None => (f64::NAN, f64::NAN, false),
-                Some(ohmstrain_model::AdcCode::Saturated) => (f64::NAN, f64::NAN, true),
-                Some(ohmstrain_model::AdcCode::Reading(ohms)) => (ohms.resistance_ohm, ohms.sd_ohm, false),
-            };
-            readings.push(ohm);
-            converter.push((sd, saturated));
-        }
-        Ok((readings, Some(converter)))
-    }
-
-    fn reference(
-        &self,
-        name: &'static str,
-        mut values: Vec<f64>,
-        joint: Option<&JointSpec>,
-    ) -> PyResult<(Quantity, Vec<f64>)> {
-        let file = self.name.as_deref();
-        if let Some(row) = values.iter().position(|value| value.is_infinite()) {
-            let place = Place { file, row: Some(row), column: Some(name) };
-            return Err(raise(&place, &format!("expected a finite number, found {}", values[row])));
-        }
-        match (name, joint) {
-            ("displacement_mm", _) => {
-                let Some(length) = self.gauge_length_mm.filter(|length| length.is_finite() && *length > 0.0) else {
-                    let place = Place { column: Some(name), ..self.place() };
-                    return Err(raise(&place, "expected `gauge_length_mm` to be given, a positive number"));
-                };
-                values.iter_mut().for_each(|value| *value /= length);
-                Ok((Quantity::Strain, values))
-            }
-            ("angle_deg", None) => Ok((Quantity::AngleDeg, values)),
-            ("angle_deg", Some(joint)) => {
-                let joint = joint.build().map_err(|error| raise(&self.place(), &format!("joint: {error}")))?;
-                values.iter_mut().for_each(|value| *value = joint.strain(value.to_radians()));
-                Ok((Quantity::Strain, values))
-            }
-            _ => Ok((Quantity::Strain, values)),
-        }
-    }
-}
-
-fn parsed<T: std::str::FromStr>(key: &str, text: Option<&str>, file: Option<&str>) -> PyResult<Option<T>>
-where
-    T::Err: std::fmt::Display,
-{
-    let wrong = |error: T::Err| raise(&Place { file, ..Place::default() }, &format!("{key}: {error}"));
-    text.map(|text| text.parse().map_err(wrong)).transpose()
 }
 
 /// The one column of a group that a table has.

@@ -1,22 +1,22 @@
 use std::borrow::Cow;
 
-use ohmstrain::{Closing, EstimatorKind, Findings, JointParams, Quantity, ReadingUnit, ValidityWatch};
+use ohmstrain::{Closing, Estimate, EstimatorKind, JointParams, Known, Quantity, QuietWatch, ReadingUnit, ValidityWatch};
 use pyo3::prelude::*;
 use pyo3_arrow::{PyRecordBatch, PyTable};
 
+use crate::about::About;
+use crate::doubts::{of_known, of_rest};
 use crate::error::{Place, of_library, raise};
 use crate::evaluation::{self, Scored};
 use crate::live::{LaggedFilter, LiveFilter};
 use crate::options::Options;
-use crate::recording::{About, Recording};
+use crate::recording::Recording;
 use crate::table::Estimates;
 
 /// A calibrated sensor.
 #[pyclass(frozen, module = "ohmstrain._core")]
 pub struct Sensor {
     pub(crate) sensor: ohmstrain::Sensor,
-    /// What the calibration came to, and the seconds that it took, if it was made here.
-    pub(crate) made: Option<(Option<Findings>, f64)>,
 }
 
 /// Estimates and what casts doubt on them.
@@ -45,7 +45,7 @@ impl Sensor {
             Some(kind) => ohmstrain::Sensor::from_toml_for(text, kind),
             None => ohmstrain::Sensor::from_toml(text),
         };
-        Ok(Self { sensor: sensor.map_err(|error| of_library(&error, file))?, made: None })
+        Ok(Self { sensor: sensor.map_err(|error| of_library(&error, file))? })
     }
 
     fn to_toml(&self) -> PyResult<String> {
@@ -54,17 +54,14 @@ impl Sensor {
 
     /// What the calibration came to, in at most ten lines.
     fn closing(&self, file: Option<&str>) -> Option<String> {
-        let (findings, calibration_s) = self.made.as_ref()?;
-        let (findings, params) = (findings.as_ref(), self.sensor.params());
-        Some(Closing { file, params, findings, tested: None, calibration_s: *calibration_s, more: "findings" }.text())
+        let params = self.sensor.params();
+        let findings = Some(params.findings.as_ref()?);
+        Some(Closing { file, params, findings, tested: None, calibration_s: None, more: "findings" }.text())
     }
 
-    /// All numbers, and what the calibration came to, as JSON.
-    fn json(&self) -> PyResult<(String, Option<String>)> {
-        let failed = |error: serde_json::Error| raise(&Place::default(), &error.to_string());
-        let params = serde_json::to_string(self.sensor.params()).map_err(failed)?;
-        let findings = self.made.as_ref().and_then(|(findings, _)| findings.as_ref());
-        Ok((params, findings.map(serde_json::to_string).transpose().map_err(failed)?))
+    /// All numbers as JSON.
+    fn json(&self) -> PyResult<String> {
+        serde_json::to_string(self.sensor.params()).map_err(|error| raise(&Place::default(), &error.to_string()))
     }
 
     #[getter]
@@ -100,7 +97,7 @@ impl Sensor {
         let sensor = self.on_joint(about.joint()?, None)?;
         let filter = options.builder(&sensor)?.build().map_err(|error| of_library(&error, None))?;
         let (columns, rest) = (options.columns(&sensor)?, options.rest_resistance(&sensor)?);
-        Ok(LiveFilter::new(filter, sensor.into_owned(), columns, rest))
+        Ok(LiveFilter::new(filter, sensor.into_owned(), columns, rest, options.known.clone()))
     }
 
     fn lagged(&self, options: Options, lag_s: f64) -> PyResult<LaggedFilter> {
@@ -116,10 +113,12 @@ impl Sensor {
         let mut filter = options.builder(&sensor)?.build().map_err(|error| recording.refused(&error))?;
         let (estimates, warnings) = py.detach(|| {
             let mut estimates = Estimates::new(columns, recording.time_s.len());
-            let mut watch = Watch::new(&sensor, rest);
+            let mut watch = Watch::new(&sensor, rest, &options.known);
+            watch.warnings = of_known(&sensor, options.initial_strain, &options.known, recording.times());
             recording.filtered(&mut filter, |row, estimate| {
                 estimates.put(row, std::slice::from_ref(estimate));
                 watch.see(&recording, row, estimate.strain_rate);
+                watch.see_rest(&recording, estimate);
             })?;
             Ok::<_, PyErr>((estimates, watch.warnings))
         })?;
@@ -139,7 +138,8 @@ impl Sensor {
                 estimates.put(rows.start, segment);
                 rates[rows].iter_mut().zip(segment).for_each(|(rate, row)| *rate = row.strain_rate);
             })?;
-            let mut watch = Watch::new(&sensor, rest);
+            let mut watch = Watch::new(&sensor, rest, &options.known);
+            watch.warnings = of_known(&sensor, options.initial_strain, &options.known, recording.times());
             rates.iter().enumerate().for_each(|(row, rate)| watch.see(&recording, row, *rate));
             Ok::<_, PyErr>((estimates, watch.warnings))
         })?;
@@ -156,21 +156,28 @@ impl Sensor {
 /// Says when the calibration does not reach.
 pub struct Watch {
     watch: ValidityWatch,
+    quiet: QuietWatch,
     /// What it has said.
     pub warnings: Vec<String>,
 }
 
 impl Watch {
-    /// Of a sensor, and what it reads at rest, if that is said.
-    pub fn new(sensor: &ohmstrain::Sensor, rest_resistance: Option<f64>) -> Self {
-        Self { watch: ValidityWatch::new(sensor, rest_resistance), warnings: Vec::new() }
+    /// Of a sensor, what it reads at rest, if that is said, and strains that are known.
+    pub fn new(sensor: &ohmstrain::Sensor, rest_resistance: Option<f64>, known: &[Known]) -> Self {
+        let watch = ValidityWatch::new(sensor, rest_resistance);
+        Self { watch, quiet: QuietWatch::new(sensor, rest_resistance, known), warnings: Vec::new() }
     }
 
     /// Takes a row of a recording with its estimated rate.
     pub fn see(&mut self, recording: &Recording, row: usize, rate: f64) {
         let (time_s, reading) = recording.row(row);
-        let name = || recording.name.as_deref().map_or_else(String::new, |name| format!("{name}: "));
         let seen = self.watch.see(time_s, reading.value, rate, f64::NAN);
-        self.warnings.extend(seen.map(|warning| format!("{}{warning}", name())));
+        self.warnings.extend(seen.map(|warning| format!("{}{warning}", recording.before())));
+    }
+
+    /// Takes what a filter says of a row, and asks whether a long hold was a rest.
+    pub fn see_rest(&mut self, recording: &Recording, estimate: &Estimate) {
+        let quiet = self.quiet.see(estimate);
+        self.warnings.extend(quiet.map(|quiet| format!("{}{}", recording.before(), of_rest(&quiet))));
     }
 }

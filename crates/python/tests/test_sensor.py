@@ -19,6 +19,21 @@ def test_save_load_pickle(tmp_path, folder, sensor):
     assert "copy.toml" in repr(sensor) and sensor.estimator == "sign-split" and sensor.quantity == "strain"
 
 
+def test_a_loaded_sensor_says_what_it_said(tmp_path, trace):
+    made = oh.calibrate(trace, estimator="ekf", branches=1)
+    said, findings = repr(made).splitlines(), made.findings
+    made.save(tmp_path / "sensor.toml")
+    for kept in (oh.Sensor.load(tmp_path / "sensor.toml"), pickle.loads(pickle.dumps(made)), made):
+        assert kept == made and kept.findings == findings and findings["seen"]["rows"] == len(trace)
+        lines = repr(kept).splitlines()
+        assert lines[:-1] == said[:-1] and lines[-1].endswith("estimator ekf, a law of 1 branch")
+    matplotlib = pytest.importorskip("matplotlib")
+    matplotlib.use("Agg")
+    figures = [sensor.plot.calibration() for sensor in (made, oh.Sensor.load(tmp_path / "sensor.toml"))]
+    shown = [[[patch.get_height() for patch in axes.patches if hasattr(patch, "get_height")] for axes in f.axes] for f in figures]
+    assert len(figures[1].axes) == 3 and shown[0] == shown[1]
+
+
 def test_a_bad_file_is_named(tmp_path, folder):
     path = tmp_path / "bad.toml"
     path.write_text((folder / "sensor.toml").read_text().replace("rest_reading = ", "rest_reading = -", 1))
@@ -138,7 +153,9 @@ def test_plots(trace, sensor):
     lines = [oh.plot.strain(estimates, moved, gauge_length_mm=length).axes[0].lines for length in (None, 30)]
     assert [len(each) for each in lines] == [1, 2]
     np.testing.assert_allclose(lines[1][1].get_ydata(), 100 * trace["strain"].head(300))
-    assert len(sensor.plot.calibration().axes) == 1
+    # A file of an older version says less.
+    summary = sensor.to_toml().split("\n[findings")[0]
+    assert len(oh.Sensor.from_toml(summary).plot.calibration().axes) == 1
     made = oh.calibrate(trace, estimator="ekf")
     assert len(made.plot.calibration().axes) == 3
     # g(0) = 0, and the curve of the report at one strain, written out.

@@ -3,28 +3,10 @@ use serde::Serialize;
 use crate::law::fit::CrossFit;
 use crate::motion_stats::{REST_SHARE, moving_mean};
 use crate::order::{extent, median, sorted};
+use crate::params::findings::ErrorBudget;
 use crate::params::summary::Limit;
 use crate::samples::central_rate;
 use crate::samples::{Samples, filled_strain};
-
-/// What makes the error of a calibrated filter, from parts of the recordings that its law was not fitted to.
-///
-/// Law, drift and noise are what the law leaves of the readings where the true strain drives it, in percent of the readings'
-/// range: what is the same throughout a part is drift, what differs from row to row is noise, the rest is the law's. The
-/// direction is the filter's affair: the squared error of rows in which it takes stretching for releasing, or the reverse.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct ErrorBudget {
-    /// Of the law's form and parameters, percent of the readings' range.
-    pub law_percent: f64,
-    /// Offset of whole parts, percent of the readings' range.
-    pub drift_percent: f64,
-    /// White noise of single readings, percent of the readings' range.
-    pub noise_percent: f64,
-    /// Share of the moving rows, 0 to 1, in which the direction is wrong.
-    pub wrong_rows: f64,
-    /// Share of all squared error, 0 to 1, in those rows.
-    pub wrong_error: f64,
-}
 
 /// Parts of a filter's squared error, each 0 to 1; together they are 1.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]

@@ -3,14 +3,13 @@
 use std::collections::BTreeMap;
 
 use ohmstrain_ekf::live::Sieve;
-use serde::Serialize;
 
 use crate::CalibrationError;
 use crate::baselines::Baseline;
 use crate::calibrate::correction_fit::fit_correction;
-use crate::calibrate::error_budget::{Direction, ErrorBudget, WrongDirection};
+use crate::calibrate::error_budget::{Direction, WrongDirection};
 use crate::calibrate::left_out::relative_changes;
-use crate::calibrate::scores::{ScoredRow, Scores};
+use crate::calibrate::scores::ScoredRow;
 use crate::filter::build::{Setting, filter_from_parts};
 use crate::filter::corrected::Corrected;
 use crate::filter::learned::Learned;
@@ -21,53 +20,11 @@ use crate::law::structure::LawFit;
 use crate::motion_stats::MotionStats;
 use crate::params::RangeParams;
 use crate::params::estimator::{EstimatorKind, EstimatorParams, NoParameters};
+use crate::params::findings::{ErrorBudget, Findings, Scores, Seen, TENTHS};
 use crate::params::static_cubic::StaticCubic;
 use crate::params::summary::Summary;
 use crate::prior::CorrectionPrior;
 use crate::samples::Samples;
-
-/// Tenths of a range.
-const TENTHS: usize = 10;
-
-/// What a calibration is worth, and what it rests on.
-///
-/// Every quarter of the recordings is estimated by a law and a correction that were fitted to the other three, and scored;
-/// the static cubic likewise. Structure, ridge, noise and motion were chosen with all quarters in view, so that a
-/// recording of another day may be estimated somewhat worse.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Findings {
-    /// The default estimator's filter on the quarters left out.
-    pub filter: Scores,
-    /// Its smoother, which sees the whole recording; `None` if it has none.
-    pub smoother: Option<Scores>,
-    /// The static cubic.
-    pub static_cubic: Scores,
-    /// What makes the error.
-    pub budget: ErrorBudget,
-    /// What was seen.
-    pub seen: Seen,
-    /// What to record next, most important first; empty if nothing stands out.
-    pub advice: Vec<String>,
-}
-
-/// What the recordings of a calibration contain.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Seen {
-    /// Range of the reference.
-    pub range: RangeParams,
-    /// Share of the rows, 0 to 1, in each tenth of that range, lowest first.
-    pub tenths: [f64; TENTHS],
-    /// Speeds that a quarter of the moving rows is below, and above, per second.
-    pub quartile_speeds: (f64, f64),
-    /// 99th percentile of the speed, per second.
-    pub fastest_rate: f64,
-    /// Longest hold, s; zero if the body never rests.
-    pub longest_hold_s: f64,
-    /// Longest recording, s.
-    pub longest_s: f64,
-    /// Rows with reading and reference.
-    pub rows: usize,
-}
 
 impl Seen {
     pub(crate) fn new(recordings: &[Samples], range: RangeParams, stats: &MotionStats) -> Self {

@@ -18,7 +18,7 @@ use ohmstrain_ekf::live::Sieve;
 
 use crate::CalibrationError;
 use crate::calibrate::correction_fit::fit_correction;
-use crate::calibrate::findings::{Check, Findings, Seen};
+use crate::calibrate::findings::Check;
 use crate::calibrate::noise_fit::{
     NoiseProblem, REFINEMENT, SURVEY, Surveyed, best_of_each_size, survey, survey_evaluations,
 };
@@ -30,6 +30,7 @@ use crate::motion_stats::MotionStats;
 use crate::order::median;
 use crate::params::correction::CorrectionParams;
 use crate::params::estimator::{EstimatorKind, EstimatorParams};
+use crate::params::findings::{Findings, Seen};
 use crate::params::law::LawParams;
 use crate::params::recipe::RECIPE;
 use crate::params::static_cubic::StaticCubic;
@@ -111,6 +112,7 @@ impl Calibration {
             estimators: self.estimators,
             recordings: vec![],
             uncertainty: self.uncertainty,
+            findings: self.findings,
             correction: self.correction,
         }
     }

@@ -1,44 +1,7 @@
-use serde::Serialize;
 use statrs::distribution::{Continuous, ContinuousCDF, Normal};
 
 use crate::calibrate::left_out::REFERENCE_SD;
-
-/// How good estimates are against a known strain.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Scores {
-    /// Rows scored.
-    pub n: usize,
-    /// Root mean squared error, in the unit of strain.
-    pub rmse: f64,
-    /// The same in percent of full scale: the reference's range in the rows scored.
-    pub rmse_percent_fs: f64,
-    /// Mean absolute error, in the unit of strain.
-    pub mae: f64,
-    /// Mean error.
-    pub bias: f64,
-    /// Share of rows whose 50 % interval holds the truth; empty for estimates without a deviation.
-    pub coverage_50: Option<f64>,
-    /// The same for 90 %.
-    pub coverage_90: Option<f64>,
-    /// The same for 95 %.
-    pub coverage_95: Option<f64>,
-    /// Mean width of the 95 % interval, in the unit of strain: what the coverage was bought with.
-    pub width_95: Option<f64>,
-    /// The same in percent of full scale.
-    pub width_95_percent_fs: Option<f64>,
-    /// Mean continuous ranked probability score, in the unit of strain: of a normal distribution with the estimate as its
-    /// mean, as reported (within the limits), and its deviation. Less is better, whether an error is too large or an
-    /// interval too wide; without a deviation it is the absolute error, so that estimates with and without one compare.
-    ///
-    /// Source: Gneiting & Raftery, *J. Am. Stat. Assoc.* 102 (2007) 359, eq. 21.
-    pub crps: f64,
-    /// The same in percent of full scale.
-    pub crps_percent_fs: f64,
-    /// Mean log density of the truth, strain in units of full scale; a reference is given a deviation of 0.5 % of it.
-    pub log_score: Option<f64>,
-    /// Share of the time on the wrong branch: the error is above 20 % of full scale for 2 s or longer.
-    pub wrong_branch: f64,
-}
+use crate::params::findings::Scores;
 
 /// Errors above this share of full scale, for this long, s, are no inaccuracy: the estimate follows another solution.
 const WRONG_BRANCH: (f64, f64) = (0.2, 2.0);

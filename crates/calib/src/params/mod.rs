@@ -2,6 +2,7 @@
 
 pub(crate) mod correction;
 pub(crate) mod estimator;
+pub(crate) mod findings;
 pub(crate) mod law;
 mod live;
 pub(crate) mod recipe;
@@ -16,6 +17,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::params::correction::CorrectionParams;
 use crate::params::estimator::{EstimatorKind, EstimatorParams, NoParameters};
+use crate::params::findings::Findings;
 use crate::params::law::LawParams;
 use crate::params::static_cubic::StaticCubic;
 use crate::params::summary::{Summary, TestedSummary};
@@ -74,6 +76,10 @@ pub struct SensorParams {
     /// they do not tell is missing.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub uncertainty: Option<Uncertainty>,
+    /// What the calibration is worth on parts left out, what it has seen and what limits it; `None` if nothing could be scored, or of
+    /// an older version. Nothing computes with it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub findings: Option<Findings>,
     /// What was learned about the filter's error, if that was asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub correction: Option<CorrectionParams>,

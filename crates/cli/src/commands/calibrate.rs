@@ -1,7 +1,10 @@
 use std::path::Path;
 use std::time::Instant;
 
-use ohmstrain::{Calibrated, Calibration, Closing, Error, EstimatorKind, Quantity, ReadingUnit, Sensor, SensorParams};
+use ohmstrain::{
+    Calibrated, Calibration, Closing, Error, EstimatorKind, Quantity, ReadingUnit, Sensor, SensorParams,
+    calibration_doubts,
+};
 use ohmstrain_calib::{Samples, screen};
 
 use super::closing;
@@ -67,7 +70,7 @@ pub fn run(args: &CalibrateArgs) -> Result<(), CliError> {
         params,
         findings: findings.as_ref(),
         tested: tested.as_ref(),
-        calibration_s,
+        calibration_s: Some(calibration_s),
         more: "--explain",
     };
     if let Some(wanted) = wanted {
@@ -125,9 +128,6 @@ pub fn calibrate_recordings(
     let (quantity, reading) = common_units(recordings)?;
     let names: Vec<&str> = recordings.iter().map(|recording| recording.name.as_str()).collect();
     let screened = screen(&samples).map_err(|error| CliError::calibration(&names, &error))?;
-    plausible::warn_of_copies(recordings);
-    plausible::check(recordings, &screened)?;
-    plausible::warn_of_distrusted(recordings, &screened.distrusted);
     let (samples, files) = (screened.samples(), names.iter().map(|name| file_name(name)).collect::<Vec<_>>());
     let mut known = Vec::new();
     for ((recording, samples), file) in recordings.iter().zip(&samples).zip(&files) {
@@ -135,15 +135,20 @@ pub fn calibrate_recordings(
         one = one.of_file(file, &recording.sha256);
         one = if reading == ReadingUnit::Ratio { one.of_ratios() } else { one };
         one = if quantity == Quantity::AngleDeg { one.of_angles_deg() } else { one };
+        let trace = &recording.trace;
+        let knows_ohm = trace.metadata.resistance_unit.is_some() || trace.readings.converter.is_some();
+        one = if trace.metadata.strain_unit.is_some() { one.strain_unit_is_known() } else { one };
+        one = if knows_ohm { one.resistance_unit_is_known() } else { one };
         known.push(recording.joint().map_or(one, |joint| one.on_joint(joint)));
     }
+    plausible::heed(recordings, &calibration_doubts(&known))?;
+    plausible::warn_of_distrusted(recordings, &screened.distrusted);
     let calibrated =
         calibration.run_with(&known, |stage| progress.calibrating(stage)).map_err(|error| match error {
             Error::Calibration(error) => CliError::calibration(&names, &error),
             other => other.into(),
         })?;
-    plausible::warn_of_rests(recordings, calibrated.sensor.params());
-    plausible::warn_of_intervals(calibrated.sensor.params());
+    plausible::heed(recordings, &calibrated.doubts())?;
     Ok(calibrated)
 }
 

@@ -18,7 +18,7 @@ struct Json<'a> {
     estimator: &'static str,
     branches: usize,
     quantity: &'static str,
-    calibration_s: f64,
+    calibration_s: Option<f64>,
     /// Scores of parts that were left out in turn, what limits them, and what the recordings contain.
     left_out: Option<&'a Findings>,
     /// Scores of the rows that `--from` and `--until` kept from it.

@@ -59,7 +59,7 @@ pub fn run(args: &DemoArgs) -> Result<(), CliError> {
         params,
         findings: findings.as_ref(),
         tested: None,
-        calibration_s,
+        calibration_s: Some(calibration_s),
         more: "--explain",
     };
     let reporting = Reporting {

@@ -1,7 +1,9 @@
 use std::io;
 
 use ohmstrain::number::significant;
-use ohmstrain::{Error, Estimate, Filter, FilterBuilder, Known, LaggedFilter, Reading, Sensor, ValidityWatch};
+use ohmstrain::{
+    Error, Estimate, Filter, FilterBuilder, Known, LaggedFilter, QuietWatch, Reading, Sensor, ValidityWatch,
+};
 use ohmstrain_bench_data::{BadContent, DeviceRow, Row, TraceError};
 
 use crate::args::{FilterArgs, Format, RestResistance, WrittenArgs};
@@ -9,7 +11,6 @@ use crate::error::CliError;
 use crate::estimates::{self, EstimateWriter};
 use crate::input::{self, check_unit, is_stdin};
 use crate::output::RowsOut;
-use crate::quiet::QuietWatch;
 use crate::readings::{late, no_row};
 use crate::run::{builder, builder_anew, rest_resistance};
 use crate::sensor_file;
@@ -104,7 +105,7 @@ impl FilterRun {
 struct Stream<'a, W: io::Write + Send> {
     args: &'a FilterArgs,
     filter: FilterRun,
-    sink: Sink<'a, W>,
+    sink: Sink<W>,
     /// First and last time, s, up to now or until the clock started again.
     times: Option<(f64, f64)>,
     restarted: bool,
@@ -205,11 +206,11 @@ impl<'a, W: io::Write + Send> Stream<'a, W> {
 const SKIPS: &str = "--skip-bad goes on with another filter";
 
 /// Where estimates go.
-struct Sink<'a, W: io::Write + Send> {
+struct Sink<W: io::Write + Send> {
     writer: EstimateWriter<W>,
     /// Says when the calibration does not reach.
     watch: ValidityWatch,
-    quiet: QuietWatch<'a>,
+    quiet: QuietWatch,
     sensor: Sensor,
     /// What the rested sensor reads, if not what it read in calibration.
     rest: Option<f64>,
@@ -222,7 +223,7 @@ struct Sink<'a, W: io::Write + Send> {
     early: Vec<f64>,
 }
 
-impl<W: io::Write + Send> Sink<'_, W> {
+impl<W: io::Write + Send> Sink<W> {
     fn write(&mut self, estimates: &[Estimate]) -> Result<(), CliError> {
         for row in estimates {
             let reading = row.resistance.unwrap_or(f64::NAN);

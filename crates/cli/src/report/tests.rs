@@ -68,6 +68,7 @@ fn sensor() -> SensorParams {
         },
         estimators: BTreeMap::from([(EstimatorKind::Ekf, estimator)]),
         recordings: vec![],
+        findings: None,
         uncertainty: None,
         correction: None,
     }

@@ -23,7 +23,7 @@ pub use innovations::Innovations;
 pub use jumps::{BESIDE_AFTER, BESIDE_SHARE, Jumps, STARTLING_NIS, SURPRISING_NIS};
 pub use learned::Learned;
 pub use protections::Protections;
-pub use rest_follow::{FOLLOWING, Following, RestBounds, RestFollower};
+pub use rest_follow::{FARTHEST_REST, FOLLOWING, Following, RestBounds, RestFollower};
 pub use rest_watch::{RestSeen, RestWatch};
 pub use sieve::{MOST_REPEATS, Repeats, Sieve, news};
 pub use unread::{NEVER_READ_S, Unread};

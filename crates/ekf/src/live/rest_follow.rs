@@ -27,6 +27,14 @@ pub struct Following {
 pub const FOLLOWING: Following =
     Following { leaves_s: 40.0, settles_s: 10.0, returns_s: 1.0, longest_s: 2.0, fault_s: 30.0, farthest: 2.0 };
 
+/// Largest factor between R₀ as somebody gives it and what the rested sensor read in calibration, either way. Beyond it, it is in
+/// another unit, or of another sensor.
+///
+/// ```
+/// assert!(ohmstrain_ekf::live::FARTHEST_REST > ohmstrain_ekf::live::FOLLOWING.farthest);
+/// ```
+pub const FARTHEST_REST: f64 = 4.0;
+
 /// Between which readings, R/R₀ - 1, a sensor stays while R₀ is what it was in calibration: the strain is within its limits.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RestBounds<T> {

@@ -15,6 +15,7 @@ the strain is known, ``strain``, ``displacement_mm`` or ``angle_deg``. What is m
 from . import plot
 from ._core import MADE_BY, OhmstrainError
 from ._evaluation import Evaluation, Scores, evaluate
+from ._read import read
 from ._sensor import LaggedFilter, LiveFilter, OhmstrainWarning, Prior, Sensor, calibrate
 
 __version__ = MADE_BY.split()[-1]
@@ -31,4 +32,5 @@ __all__ = [
     "calibrate",
     "evaluate",
     "plot",
+    "read",
 ]

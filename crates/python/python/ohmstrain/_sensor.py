@@ -28,8 +28,17 @@ def _about(
     gauge_length_mm: float | None = None,
     front_end: str | None = None,
     joint: str | None = None,
+    strain_unit: str | None = None,
+    resistance_unit: str | None = None,
 ) -> dict[str, Any]:
-    return {"name": name, "gauge_length_mm": gauge_length_mm, "front_end": front_end, "joint": joint}
+    return {
+        "name": name,
+        "gauge_length_mm": gauge_length_mm,
+        "front_end": front_end,
+        "joint": joint,
+        "strain_unit": strain_unit,
+        "resistance_unit": resistance_unit,
+    }
 
 
 def _known(time_s: float, strain: float, sd: float | None = None) -> tuple[float, float, float | None]:
@@ -63,11 +72,12 @@ def _choices(
     branches: int | None = None,
     gauge: str = "auto",
     prior: Prior | str | os.PathLike[str] | None = None,
+    align: bool = False,
 ) -> dict[str, Any]:
     if prior is not None and not isinstance(prior, Prior):
         prior = Prior.load(prior)
     text = None if prior is None else prior.to_toml()
-    return {"estimator": estimator, "branches": branches, "gauge": gauge, "prior": text}
+    return {"estimator": estimator, "branches": branches, "gauge": gauge, "prior": text, "align": align}
 
 
 def _split(arguments: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -148,13 +158,12 @@ class Sensor:
     @property
     def params(self) -> dict[str, Any]:
         """All its numbers, as they stand in ``sensor.toml``."""
-        return json.loads(self._core.json()[0])
+        return json.loads(self._core.json())
 
     @property
     def findings(self) -> dict[str, Any] | None:
-        """What the calibration is worth on quarters left out, what limits it, what to record next; if it was made here."""
-        text = self._core.json()[1]
-        return None if text is None else json.loads(text)
+        """What the calibration is worth on quarters left out, what limits it, what to record next; if that could be told."""
+        return self.params.get("findings")
 
     @property
     def quantity(self) -> str:
@@ -204,8 +213,9 @@ class Sensor:
             ``student-t:DOF`` or ``none``, as they are.
         columns : list of str
             Columns of the estimates that are wanted, of :attr:`columns`; all by default.
-        name, gauge_length_mm, front_end, joint
-            What messages call the recording, and what stands above the header of a trace CSV.
+        name, gauge_length_mm, front_end, joint, strain_unit, resistance_unit
+            What messages call the recording, and what stands above the header of a trace CSV; units are ``fraction`` or
+            ``percent`` and ``ohm`` or ``kohm``. A table of :func:`ohmstrain.read` knows them.
 
         Returns
         -------
@@ -333,6 +343,7 @@ def calibrate(
     branches: int | None = None,
     gauge: str = "auto",
     prior: Prior | str | os.PathLike[str] | None = None,
+    align: bool = False,
     **about: Any,
 ) -> Sensor:
     """Calibrate a sensor on recordings with known strain.
@@ -350,8 +361,12 @@ def calibrate(
     prior : Prior
         What other sensors of the make have taught, or the path of a ``prior.toml``: a short motion is enough then. It brings
         the law's structure; ``branches`` and ``gauge`` do not count.
-    gauge_length_mm, front_end, joint
-        What stands above the header of a trace CSV.
+    align : bool
+        Move a reference that is late or early to where the readings say it belongs. Without it, one that is certainly too late is
+        an error, one that may be a warning.
+    gauge_length_mm, front_end, joint, strain_unit, resistance_unit
+        What stands above the header of a trace CSV. Units that are said, ``percent`` or ``fraction`` and ``kohm`` or ``ohm``, are not
+        asked about. A table of :func:`ohmstrain.read` knows them.
 
     Returns
     -------
@@ -370,6 +385,6 @@ def calibrate(
     else:
         named = [(None, recordings)]
     tables = [(_tables.to_arrow(table), _about(name=name, **about)) for name, table in named]
-    core, doubts = _core.calibrate(tables, _choices(estimator, branches, gauge, prior))
+    core, doubts = _core.calibrate(tables, _choices(estimator, branches, gauge, prior, align))
     _warn(doubts)
     return Sensor(core)

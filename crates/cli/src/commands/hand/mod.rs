@@ -8,7 +8,7 @@ mod description;
 use std::io::{self, BufRead, BufReader, Read, Write};
 use std::path::Path;
 
-use ohmstrain::{Error, Estimate, Filter, Quantity, Sensor, UnitGuess};
+use ohmstrain::{Error, Estimate, Filter, Quantity, ReadingUnit, Sensor, UnitGuess};
 use ohmstrain_bench_data::{Line, LineParser, Metadata, Row, RowWriter, counted};
 
 use crate::args::HandArgs;
@@ -78,6 +78,10 @@ impl<'a> Channel<'a> {
                 joint.name
             )));
         }
+        if let Some(measured) = joint.rest_resistance {
+            let refused = |error| CliError::Input(format!("joint `{}`: rest_resistance: {error}", joint.name));
+            sensor.check_rest_resistance(measured).map_err(refused)?;
+        }
         let filter = filter_of(joint, &sensor)?;
         let lines = LineParser::new(file, Metadata { front_end: joint.front_end, ..Metadata::default() });
         Ok(Self { joint, sensor, filter, lines, early: vec![] })
@@ -93,10 +97,17 @@ impl<'a> Channel<'a> {
             let Joint { name, column, .. } = self.joint;
             return Err(format!("joint `{name}`: expected a column `{column}`, found {}", quoted(header)));
         }
-        let own = match (self.joint.front_end, self.sensor.params().reading) {
-            (Some(_), _) => "adc",
-            (None, unit) => reading_column(unit),
-        };
+        let expected = self.sensor.params().reading;
+        if let Some(found) = self.said_unit().filter(|found| *found != expected) {
+            return Err(format!(
+                "column `{}`: joint `{}`: expected `{}` as in the sensor's calibration, found `{}`",
+                self.joint.column,
+                self.joint.name,
+                reading_column(expected),
+                reading_column(found)
+            ));
+        }
+        let own = if self.joint.front_end.is_some() { "adc" } else { reading_column(expected) };
         let cell = |name: &str| match name.trim() {
             name if name == self.joint.column => own.to_owned(),
             name @ ("time_s" | "time_us") => name.to_owned(),
@@ -112,21 +123,40 @@ impl<'a> Channel<'a> {
         Ok(())
     }
 
+    /// What the electronics, the lines above the header or the end of the column's name say that the readings are.
+    fn said_unit(&self) -> Option<ReadingUnit> {
+        if self.joint.front_end.is_some() || self.lines.metadata().resistance_unit.is_some() {
+            return Some(ReadingUnit::Ohm);
+        }
+        match self.joint.column.to_lowercase().rsplit('_').next()? {
+            "ohm" | "ohms" | "kohm" => Some(ReadingUnit::Ohm),
+            "ratio" => Some(ReadingUnit::Ratio),
+            _ => None,
+        }
+    }
+
     /// Doubts the unit of the readings once there are enough of them.
     fn doubt(&mut self, reading: f64) -> Option<String> {
         if !reading.is_finite() || self.early.len() >= FIRST_LIVE_READINGS {
             return None;
         }
         self.early.push(reading);
-        let early = self.early.iter().copied().filter(|_| self.early.len() == FIRST_LIVE_READINGS);
-        let doubt = self.sensor.check_unit(early, self.joint.rest_resistance).err()?;
-        let answer = if doubt.guess == UnitGuess::KiloOhm {
-            "Then say so with a line `# resistance_unit = kohm` above the header"
-        } else {
-            "Bring them to the sensor's unit"
+        if self.early.len() < FIRST_LIVE_READINGS { None } else { self.unit_doubt() }
+    }
+
+    /// Doubts it where the recording has ended before.
+    fn last_doubt(&self) -> Option<String> {
+        if self.early.len() < FIRST_LIVE_READINGS { self.unit_doubt() } else { None }
+    }
+
+    fn unit_doubt(&self) -> Option<String> {
+        let doubt = self.sensor.check_unit(self.early.iter().copied(), self.joint.rest_resistance).err()?;
+        let answer = match doubt.guess {
+            UnitGuess::KiloOhm => "Then say so with a line `# resistance_unit = kohm` above the header",
+            UnitGuess::CalibrationInKiloOhm => "Then calibrate again with `--resistance-unit kohm`",
+            _ => "Bring them to the sensor's unit",
         };
-        let other = "if another sensor, or another day, is to explain it, give its R0 as the joint's rest_resistance";
-        Some(format!("joint `{}`: {doubt} {answer}; {other}", self.joint.name))
+        Some(format!("joint `{}`: {doubt} {answer}", self.joint.name))
     }
 }
 
@@ -207,11 +237,7 @@ fn stream<W: Write>(
         } else if rows.len() == channels.len() && !rows.is_empty() {
             is_empty = false;
             for (channel, row) in channels.iter_mut().zip(&rows) {
-                match channel.doubt(row.reading.value) {
-                    Some(doubt) if live => CliError::warning(&format!("{file}: {doubt}")),
-                    Some(doubt) => return Err(CliError::Input(format!("{file}: {doubt}"))),
-                    None => {}
-                }
+                say(channel.doubt(row.reading.value), file, live)?;
             }
             write(channels, &rows, out)?;
             if live {
@@ -219,6 +245,7 @@ fn stream<W: Write>(
             }
         }
     }
+    channels.iter().try_for_each(|channel| say(channel.last_doubt(), file, live))?;
     if skipped > 0 {
         let were = if skipped == 1 { "was" } else { "were" };
         CliError::warning(&format!("{} {were} skipped", counted(skipped, "line")));
@@ -226,6 +253,16 @@ fn stream<W: Write>(
     if is_empty {
         let none = "expected at least one row of data, found the end of the file";
         return Err(CliError::Input(format!("{file}:{}: {none}", number + 1)));
+    }
+    Ok(())
+}
+
+/// Warns of a doubt where somebody waits for the rows, refuses the recording otherwise.
+fn say(doubt: Option<String>, file: &str, live: bool) -> Result<(), CliError> {
+    match doubt {
+        Some(doubt) if live => CliError::warning(&format!("{file}: {doubt}")),
+        Some(doubt) => return Err(CliError::Input(format!("{file}: {doubt}"))),
+        None => {}
     }
     Ok(())
 }

@@ -4,15 +4,14 @@ use std::collections::VecDeque;
 use std::time::Instant;
 
 use ohmstrain::number::significant;
-use ohmstrain::{Error, Estimate, Filter, Sensor, ValidityWatch};
+use ohmstrain::{Error, Estimate, Filter, QuietWatch, Sensor, ValidityWatch};
 use ohmstrain_bench_data::{Line, LineParser, Row, counted};
 
 use super::recorder::Recorder;
 use crate::args::{LiveArgs, RestResistance};
 use crate::error::CliError;
 use crate::input::{self, check_unit};
-use crate::quiet::QuietWatch;
-use crate::run::{builder, builder_anew, median};
+use crate::run::{builder, builder_anew, median, of_first};
 use crate::suits::{self, FIRST_LIVE_READINGS};
 
 /// Rows that are kept for the plot at most.
@@ -76,7 +75,7 @@ pub struct Session<'a> {
     lines: LineParser,
     filter: Filter,
     watch: ValidityWatch,
-    quiet: QuietWatch<'a>,
+    quiet: QuietWatch,
     /// What the rested sensor reads, if that is not what it read in calibration.
     rest: Option<f64>,
     /// The first known readings.
@@ -104,7 +103,10 @@ impl<'a> Session<'a> {
     /// If the flags contradict each other or the sensor.
     pub fn new(args: &'a LiveArgs, sensor: Sensor) -> Result<Self, CliError> {
         let rest = match args.estimate.rest_resistance {
-            Some(RestResistance::Value(value)) => Some(value),
+            Some(RestResistance::Value(value)) => {
+                sensor.check_rest_resistance(value)?;
+                Some(value)
+            }
             Some(RestResistance::Calibrated) => Some(sensor.params().rested()),
             _ => None,
         };
@@ -289,7 +291,8 @@ impl<'a> Session<'a> {
         self.early.push(reading);
         if self.early.len() == wanted {
             self.rest = median(self.early.clone());
-            self.rest.map_or(Ok(()), |measured| self.filter.rest_resistance(measured))?;
+            let told = self.rest.map_or(Ok(()), |measured| self.filter.rest_resistance(measured));
+            told.map_err(|refused| of_first(&refused, wanted, &self.args.port.display().to_string()))?;
             self.watch = ValidityWatch::new(&self.sensor, self.rest);
         }
         if self.early.len() == wanted.max(FIRST_LIVE_READINGS)
@@ -314,6 +317,10 @@ impl<'a> Session<'a> {
         }
         let count = readings.len();
         let Some(rest) = median(readings) else { return Ok(()) };
+        if let Err(refused) = self.sensor.check_rest_resistance(rest) {
+            self.message = format!("R0 stays as it was: {refused}");
+            return Ok(());
+        }
         self.rest = Some(rest);
         self.begin()?;
         // A sensor that is always stretched somewhat cannot start at zero.

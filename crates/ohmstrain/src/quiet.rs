@@ -1,4 +1,7 @@
-use ohmstrain::{Estimate, KNOWN_BEYOND, Known, Sensor};
+use std::fmt;
+
+use crate::number::significant;
+use crate::{Estimate, KNOWN_BEYOND, Known, Sensor};
 
 /// For how long readings must be quiet before somebody is asked, s.
 const QUIET_S: f64 = 30.0;
@@ -16,7 +19,18 @@ const PAUSE_S: f64 = 5.0;
 const MOST: usize = 3;
 
 /// Watches for long holds that may be rests: what the strain is then somebody may know.
-pub struct QuietWatch<'a> {
+///
+/// ```
+/// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+/// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
+/// let (mut filter, mut watch) = (sensor.filter().build()?, ohmstrain::QuietWatch::new(&sensor, None, &[]));
+/// for (time_s, ohm) in [(0.00, 1600.0), (0.05, 1632.0)] {
+///     assert_eq!(watch.see(&filter.step(time_s, ohm)?), None);
+/// }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct QuietWatch {
     /// What the rested sensor reads.
     rested: f64,
     /// Range of the calibration's readings.
@@ -27,7 +41,7 @@ pub struct QuietWatch<'a> {
     ends: (f64, f64),
     /// Least strain that is worth a question, none if the sensor never reports none.
     worth: Option<f64>,
-    known: &'a [Known],
+    known: Vec<Known>,
     hold: Option<Hold>,
     asked: usize,
     /// The reading that was asked of last, as long as readings stay near it.
@@ -35,7 +49,7 @@ pub struct QuietWatch<'a> {
 }
 
 /// Readings that have stayed within a band.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 struct Hold {
     from_s: f64,
     last_s: f64,
@@ -44,7 +58,12 @@ struct Hold {
     asked: bool,
 }
 
-/// A hold that may be a rest.
+/// A hold that may be a rest; a known strain of zero at [`Self::now_s`] tells that it is.
+///
+/// ```
+/// let quiet = ohmstrain::Quiet { from_s: 12.0, now_s: 42.1, strain: 0.031 };
+/// assert!(quiet.to_string().starts_with("30 s of quiet from t = 12 s that may be a rest"));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Quiet {
     /// When it began, s.
@@ -55,10 +74,31 @@ pub struct Quiet {
     pub strain: f64,
 }
 
-impl<'a> QuietWatch<'a> {
+impl fmt::Display for Quiet {
+    fn fmt(&self, out: &mut fmt::Formatter) -> fmt::Result {
+        let Self { from_s, now_s, strain } = *self;
+        write!(
+            out,
+            "{} s of quiet from t = {} s that may be a rest, where the strain is said to be {}: if the body was at rest there",
+            significant(now_s - from_s, 2),
+            significant(from_s, 6),
+            significant(strain, 2)
+        )
+    }
+}
+
+impl QuietWatch {
     /// For a sensor that reads `rest_resistance` at rest, if that is not what it read in calibration, and strains that are
     /// known anyway.
-    pub fn new(sensor: &Sensor, rest_resistance: Option<f64>, known: &'a [Known]) -> Self {
+    ///
+    /// ```
+    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+    /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
+    /// let today = ohmstrain::QuietWatch::new(&sensor, Some(1650.0), &[ohmstrain::Known::new(0.0, 0.0)]);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn new(sensor: &Sensor, rest_resistance: Option<f64>, known: &[Known]) -> Self {
         let (params, seen) = (sensor.params(), sensor.params().validity);
         let rested = rest_resistance.unwrap_or_else(|| params.rested());
         let moved = rested / params.rested();
@@ -69,10 +109,18 @@ impl<'a> QuietWatch<'a> {
         let strain_at = |reading| params.static_cubic.strain(reading);
         let sign = if strain_at(seen.reading_upper) > strain_at(seen.reading_lower) { 1.0 } else { -1.0 };
         let ends = (f64::INFINITY, f64::NEG_INFINITY);
-        Self { rested, range, sign, ends, worth, known, hold: None, asked: 0, asked_at: None }
+        Self { rested, range, sign, ends, worth, known: known.to_vec(), hold: None, asked: 0, asked_at: None }
     }
 
     /// Takes a row; what to ask of the hold that it belongs to, once.
+    ///
+    /// ```
+    /// fn ask(watch: &mut ohmstrain::QuietWatch, row: &ohmstrain::Estimate) {
+    ///     if let Some(quiet) = watch.see(row) {
+    ///         println!("{quiet}, known strains tell it");
+    ///     }
+    /// }
+    /// ```
     pub fn see(&mut self, row: &Estimate) -> Option<Quiet> {
         let (reading, time_s) = (row.resistance.filter(|reading| reading.is_finite())?, row.time_s);
         self.ends = (self.ends.0.min(self.sign * reading), self.ends.1.max(self.sign * reading));
@@ -113,7 +161,7 @@ mod tests {
     use super::*;
 
     fn sensor() -> Sensor {
-        Sensor::from_toml(include_str!("../../ohmstrain/examples/sensor.toml")).unwrap()
+        Sensor::from_toml(include_str!("../examples/sensor.toml")).unwrap()
     }
 
     /// What is asked of readings every 0.1 s, of which the strain is said to be `strain`.

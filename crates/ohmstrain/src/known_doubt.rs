@@ -1,0 +1,85 @@
+use std::fmt;
+
+use crate::number::{plain, significant};
+use crate::{Known, Sensor};
+
+/// A strain to start at that the sensor never reports; see [`Sensor::check_start`].
+///
+/// ```
+/// let doubt = ohmstrain::StartDoubt { found: 0.35, lower: 0.0, upper: 0.33 };
+/// assert!(doubt.to_string().starts_with("0.35 is outside of the sensor's limits, 0 to 0.33"));
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StartDoubt {
+    /// The strain.
+    pub found: f64,
+    /// Lower limit.
+    pub lower: f64,
+    /// Upper limit.
+    pub upper: f64,
+}
+
+impl fmt::Display for StartDoubt {
+    fn fmt(&self, out: &mut fmt::Formatter) -> fmt::Result {
+        let Self { found, lower, upper } = *self;
+        let (lower, upper) = (plain(lower), plain(upper));
+        write!(out, "{found} is outside of the sensor's limits, {lower} to {upper}; what is reported stops there")
+    }
+}
+
+impl std::error::Error for StartDoubt {}
+
+impl Sensor {
+    /// Asks whether the sensor ever reports a strain to start at. One a little beyond the limits is taken nevertheless.
+    ///
+    /// # Errors
+    /// If it is outside of the sensor's limits.
+    ///
+    /// ```
+    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+    /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
+    /// sensor.check_start(0.1)?;
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn check_start(&self, strain: f64) -> Result<(), StartDoubt> {
+        let (lower, upper) = (self.params().limits.lower, self.params().limits.upper);
+        if (lower..=upper).contains(&strain) { Ok(()) } else { Err(StartDoubt { found: strain, lower, upper }) }
+    }
+}
+
+/// A known strain that no row came for; see [`unused_known`].
+///
+/// ```
+/// let doubt = ohmstrain::UnusedKnown { known: ohmstrain::Known::new(70.0, 0.1), first_s: 0.0, last_s: 60.0 };
+/// assert_eq!(doubt.to_string(), "was not used: the recording goes from 0 to 60 s");
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct UnusedKnown {
+    /// The strain and its time.
+    pub known: Known,
+    /// First time of the recording, s.
+    pub first_s: f64,
+    /// Its last one, s.
+    pub last_s: f64,
+}
+
+impl fmt::Display for UnusedKnown {
+    fn fmt(&self, out: &mut fmt::Formatter) -> fmt::Result {
+        let (first, last) = (significant(self.first_s, 6), significant(self.last_s, 6));
+        write!(out, "was not used: the recording goes from {first} to {last} s")
+    }
+}
+
+/// Known strains after the end of a recording that goes from a first to a last time, s.
+///
+/// ```
+/// use ohmstrain::{Known, unused_known};
+///
+/// let known = [Known::new(5.0, 0.0), Known::new(70.0, 0.1)];
+/// assert_eq!(unused_known(&known, (0.0, 60.0)).len(), 1);
+/// ```
+#[must_use]
+pub fn unused_known(known: &[Known], (first_s, last_s): (f64, f64)) -> Vec<UnusedKnown> {
+    let unused = known.iter().filter(|known| known.time_s > last_s);
+    unused.map(|known| UnusedKnown { known: *known, first_s, last_s }).collect()
+}

@@ -1,0 +1,20 @@
+"""The first block of the documentation runs as it stands, where nothing but the wheel is installed."""
+
+import re
+import subprocess
+import sys
+
+import pytest
+from conftest import ROOT
+
+#: What `pip install` of the wheel alone does not bring.
+OTHERS = ("dask", "matplotlib", "pandas", "polars", "pyspark", "ray", "sklearn")
+
+
+@pytest.mark.parametrize("page", ["docs/python.md", "crates/python/README.md"])
+def test_first_block(page, tmp_path):
+    block = re.search(r"```python\n(.*?)```", (ROOT / page).read_text(encoding="utf-8"), re.DOTALL)[1]
+    text = f"import sys\nsys.modules.update(dict.fromkeys({OTHERS!r}))\n{block}"
+    done = subprocess.run([sys.executable, "-W", "error", "-c", text], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "Verdict" in done.stdout and (tmp_path / "sensor.toml").is_file()
