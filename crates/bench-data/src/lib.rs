@@ -69,4 +69,4 @@ pub use rows::RowWriter;
 pub use segment::{Segment, segment};
 pub use simulate::simulate;
 pub use spec::{FrontEndSpec, JointSpec};
-pub use trace::{ConverterReadings, Readings, Reference, Trace};
+pub use trace::{ConverterReadings, MOST_ROWS, Readings, Reference, Trace};

@@ -99,6 +99,9 @@ impl FromStr for ResistanceUnit {
     }
 }
 
+/// Keys that mean nothing here and are kept all the same: a bound on memory, and far above what people note.
+const MOST_OTHER: usize = 1000;
+
 impl Metadata {
     /// The keys that mean something.
     pub(crate) const KEYS: [&str; 6] =
@@ -143,6 +146,10 @@ impl Metadata {
             "joint" => once(&mut self.joint, key, value.parse()?),
             "strain_unit" => once(&mut self.strain_unit, key, value.parse()?),
             "resistance_unit" => once(&mut self.resistance_unit, key, value.parse()?),
+            _ if self.other.len() == MOST_OTHER => Err(Fault::new(
+                format!("at most {MOST_OTHER} lines `# key = value`, and then a header"),
+                "more of them",
+            )),
             _ => {
                 self.other.push((key.to_owned(), value.to_owned()));
                 Ok(())

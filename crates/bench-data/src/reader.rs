@@ -168,19 +168,25 @@ pub(crate) fn called(name: &str) -> String {
     if name == "-" { "stdin" } else { name }.to_owned()
 }
 
+/// Lines of remarks and metadata above a header, after which there is none.
+const MOST_REMARKS: usize = 10_000;
+
 pub(crate) const A_HEADER: &str = "a header such as `time_s,resistance_ohm,strain`";
 
 /// Metadata lines, and the header line.
 fn read_prelude<R: Read>(lines: &mut Lines<R>) -> Result<(Metadata, String), LineFault> {
     let mut metadata = Metadata::default();
-    while let Some(line) = lines.next()? {
+    for _ in 0..MOST_REMARKS {
+        let Some(line) = lines.next()? else {
+            let found = if lines.number() == 0 { "an empty file" } else { "the end of the file" };
+            return Err(LineFault::Content(Fault::new(A_HEADER, found)));
+        };
         if !line.starts_with('#') {
             return Ok((metadata, line.to_owned()));
         }
         metadata.take_line(line).map_err(LineFault::Content)?;
     }
-    let found = if lines.number() == 0 { "an empty file" } else { "the end of the file" };
-    Err(LineFault::Content(Fault::new(A_HEADER, found)))
+    Err(LineFault::Content(Fault::new(A_HEADER, format!("none below {MOST_REMARKS} lines that begin with `#`"))))
 }
 
 /// An error of the csv crate is one of the lines that it was fed with.

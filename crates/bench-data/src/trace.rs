@@ -6,6 +6,10 @@ use crate::metadata::Metadata;
 use crate::reader::TraceReader;
 use crate::row::{ReadingKind, ReferenceQuantity, Row};
 
+/// Rows that a recording in memory may have, and a file that is imported: nine hours at 1 kHz. What is read row by row has no
+/// such bound.
+pub const MOST_ROWS: usize = 1 << 25;
+
 /// The sensor's readings, one per row.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Readings {
@@ -68,7 +72,12 @@ impl Trace {
     pub fn collect<R: Read>(mut rows: TraceReader<R>) -> Result<Self, TraceError> {
         let mut trace = Self::empty(&rows);
         for row in rows.by_ref() {
-            trace.push(&row?);
+            let row = row?;
+            if trace.len() == MOST_ROWS {
+                let expected = format!("a recording of at most {MOST_ROWS} rows: make several files of it");
+                return Err(Fault::new(expected, "more").at(rows.file(), row.line).into());
+            }
+            trace.push(&row);
         }
         if trace.is_empty() {
             let fault = Fault::new("at least one row of data", "the end of the file");

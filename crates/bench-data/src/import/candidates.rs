@@ -26,6 +26,7 @@ pub struct Candidate {
 pub fn candidates(tables: &[Table]) -> Vec<Candidate> {
     let mut out = Vec::new();
     for (index, table) in tables.iter().enumerate() {
+        let mut found_here: Vec<(Candidate, Sureness)> = Vec::new();
         for (place, column) in table.columns.iter().enumerate() {
             let found = if column.heading == crate::import::header::MONITOR_CLOCK {
                 Some((Role::Time, Sureness::Weak))
@@ -35,9 +36,15 @@ pub fn candidates(tables: &[Table]) -> Vec<Candidate> {
                 names::role(&column.name, column.unit.as_deref())
             };
             if let Some((role, how)) = found.filter(|_| has_values(table, place)) {
-                out.push(Candidate { table: index, column: place, role, is_named: how == Sureness::Strong });
+                let is_named = how != Sureness::Weak;
+                found_here.push((Candidate { table: index, column: place, role, is_named }, how));
             }
         }
+        // `R_1` beside `R` is another thing.
+        let strong: Vec<Role> =
+            found_here.iter().filter(|(_, how)| *how == Sureness::Strong).map(|(of, _)| of.role).collect();
+        found_here.retain(|(of, how)| *how != Sureness::Indexed || !strong.contains(&of.role));
+        out.extend(found_here.into_iter().map(|(of, _)| of));
     }
     out
 }

@@ -1,6 +1,6 @@
 use std::borrow::Cow;
 
-use crate::import::number::{DecimalMark, Value, value};
+use crate::import::records::Records;
 use crate::import::stamp::is_stamp;
 
 /// What separates the cells of a line.
@@ -11,8 +11,6 @@ pub(crate) enum Separator {
     Comma,
     Pipe,
     Spaces,
-    /// Lines `label:value …`.
-    Labels,
 }
 
 impl Separator {
@@ -26,7 +24,6 @@ impl Separator {
             Self::Comma => "commas",
             Self::Pipe => "bars",
             Self::Spaces => "spaces",
-            Self::Labels => "labels (serial plotter)",
         }
     }
 
@@ -36,7 +33,7 @@ impl Separator {
             Self::Semicolon => Some(b';'),
             Self::Comma => Some(b','),
             Self::Pipe => Some(b'|'),
-            Self::Spaces | Self::Labels => None,
+            Self::Spaces => None,
         }
     }
 }
@@ -47,23 +44,25 @@ pub(crate) enum Grid<'a> {
     Text {
         lines: Vec<(u64, &'a str)>,
         separator: Separator,
-        labels: Vec<String>,
         monitor: bool,
         /// The last line has no end: it may have been cut.
         is_open: bool,
     },
     /// Cells of a sheet, with their rows in it.
     Sheet(Vec<(u64, Vec<String>)>),
+    /// Records `label: value`.
+    Records(Records<'a>),
 }
 
 /// What a serial monitor puts between its clock and the line.
-const ARROW: &str = " -> ";
+pub(crate) const ARROW: &str = " -> ";
 
 impl Grid<'_> {
     pub(crate) fn len(&self) -> usize {
         match self {
             Self::Text { lines, .. } => lines.len(),
             Self::Sheet(rows) => rows.len(),
+            Self::Records(records) => records.len(),
         }
     }
 
@@ -71,6 +70,7 @@ impl Grid<'_> {
         match self {
             Self::Text { lines, .. } => lines[row].0,
             Self::Sheet(rows) => rows[row].0,
+            Self::Records(records) => records.line(row),
         }
     }
 
@@ -78,16 +78,17 @@ impl Grid<'_> {
     pub(crate) fn cells(&self, row: usize) -> Vec<Cow<'_, str>> {
         match self {
             Self::Sheet(rows) => rows[row].1.iter().map(|cell| Cow::from(cell.trim())).collect(),
-            Self::Text { lines, separator, labels, monitor, .. } => {
+            Self::Records(records) => records.cells(row),
+            Self::Text { lines, separator, monitor, .. } => {
                 let line = lines[row].1;
                 match (monitor, line.split_once(ARROW)) {
                     (true, Some((clock, rest))) => {
                         let mut cells = vec![Cow::from(clock.trim())];
-                        cells.extend(split(rest, *separator, labels));
+                        cells.extend(split(rest, *separator));
                         cells
                     }
                     (true, None) => vec![Cow::from(line)],
-                    (false, _) => split(line, *separator, labels),
+                    (false, _) => split(line, *separator),
                 }
             }
         }
@@ -96,7 +97,7 @@ impl Grid<'_> {
     /// The text of a comment line, without its mark.
     pub(crate) fn comment(&self, row: usize) -> Option<&str> {
         match self {
-            Self::Sheet(_) => None,
+            Self::Sheet(_) | Self::Records(_) => None,
             Self::Text { lines, separator, .. } => {
                 let line = lines[row].1.trim_start();
                 let mark = ["//", "#", "%"].into_iter().find(|mark| line.starts_with(mark))?;
@@ -126,12 +127,7 @@ pub(crate) fn behind_arrow(line: &str) -> &str {
 }
 
 /// The cells of a line of text.
-pub(crate) fn split<'a>(line: &'a str, separator: Separator, labels: &[String]) -> Vec<Cow<'a, str>> {
-    if separator == Separator::Labels {
-        let found = labelled(line).unwrap_or_default();
-        let cell = |label: &String| found.iter().find(|(name, _)| name == label).map_or("", |(_, value)| value);
-        return labels.iter().map(|label| Cow::from(cell(label).to_owned())).collect();
-    }
+pub(crate) fn split(line: &str, separator: Separator) -> Vec<Cow<'_, str>> {
     let Some(byte) = separator.byte() else {
         return line.split([' ', '\u{a0}']).filter(|cell| !cell.is_empty()).map(|cell| unquoted(cell).into()).collect();
     };
@@ -156,19 +152,4 @@ fn quoted(line: &str, byte: u8) -> Option<Vec<Cow<'static, str>>> {
         .from_reader(line.as_bytes());
     let record = reader.records().next()?.ok()?;
     Some(record.iter().map(|cell| Cow::from(cell.trim().to_owned())).collect())
-}
-
-/// Labels and values of a line `R:1600.5,strain:0.1`; `None` if it is something else.
-pub(crate) fn labelled(line: &str) -> Option<Vec<(String, String)>> {
-    let mut found = Vec::new();
-    let line = line.replace(": ", ":").replace(" :", ":");
-    for part in line.split([',', '\t', ' ', ';']).filter(|part| !part.is_empty()) {
-        let (label, number) = part.split_once(':')?;
-        let is_label = label.starts_with(|c: char| c.is_alphabetic());
-        if !is_label || value(number, DecimalMark::Point, 0, &[]) == Value::Text {
-            return None;
-        }
-        found.push((label.trim().to_owned(), number.trim().to_owned()));
-    }
-    (!found.is_empty()).then_some(found)
 }

@@ -3,6 +3,7 @@ use crate::import::error::ImportError;
 use crate::import::grid::Grid;
 use crate::import::names::{self, Sureness};
 use crate::import::number::{DecimalMark, Value, ohms, value};
+use crate::import::records::Records;
 use crate::import::stamp::is_stamp;
 use crate::import::units;
 use crate::metadata::Metadata;
@@ -94,13 +95,12 @@ impl Header {
         Ok(header)
     }
 
-    /// A label line is its own header.
-    pub(crate) fn of_labels(labels: &[String], monitor: bool, skip: usize, first_row: usize) -> Self {
+    /// Labels are their own header.
+    pub(crate) fn of_records(records: &Records, monitor: bool, decimal: DecimalMark, skip: usize) -> Self {
         let clock = monitor.then(|| MONITOR_CLOCK.to_owned());
-        let headings: Vec<String> = clock.into_iter().chain(labels.iter().cloned()).collect();
-        let width = headings.len();
-        let shape = Shape { width, numbers: width, texts: 0 };
-        Self { shape, units: vec![None; width], headings, skip, first_row, ..Self::default() }
+        let headings: Vec<String> = clock.into_iter().chain(records.headings().map(str::to_owned)).collect();
+        let shape = Shape::of(&records.cells(records.fullest()), decimal);
+        Self { shape, units: vec![None; headings.len()], headings, skip, ..Self::default() }
     }
 
     /// They count wherever they stand above the data, in lines that are skipped too.
@@ -250,7 +250,7 @@ impl Data {
         let mut cells: Vec<String> = match (grid.comment(row), grid) {
             (Some(comment), Grid::Text { separator, .. }) if !comment.contains('=') => {
                 commented = comment;
-                crate::import::grid::split(commented, *separator, &[]).into_iter().map(Into::into).collect()
+                crate::import::grid::split(commented, *separator).into_iter().map(Into::into).collect()
             }
             (Some(_), _) => return None,
             (None, _) => cells(grid, row),

@@ -2,12 +2,15 @@ use std::borrow::Cow;
 
 use encoding_rs::{Encoding, UTF_8, UTF_16BE, UTF_16LE, WINDOWS_1252};
 
-use crate::import::grid::{Separator, behind_arrow, is_monitor, labelled, split};
+use crate::MOST_ROWS;
+use crate::error::Fault;
+use crate::import::bounds::LONGEST_LINE;
+use crate::import::grid::{Separator, behind_arrow, split};
 use crate::import::number::{DecimalMark, Value, ohms, value};
 use crate::import::stamp::is_stamp;
 
 /// Lines looked at to find out how a file is written.
-const SAMPLE: usize = 1000;
+pub(crate) const SAMPLE: usize = 1000;
 /// Text has fewer NUL bytes than one in so many.
 const MOST_NULS: usize = 50;
 
@@ -42,10 +45,24 @@ pub(crate) fn decode(bytes: &[u8]) -> Option<(Cow<'_, str>, &'static str)> {
 }
 
 /// Lines that are not blank, with their numbers, whatever ends them.
-pub(crate) fn lines(text: &str) -> Vec<(u64, &str)> {
+///
+/// # Errors
+/// The line that is too long, or one too many.
+pub(crate) fn lines(text: &str) -> Result<Vec<(u64, &str)>, (u64, Fault)> {
     let ends: &[char] = if text.contains('\n') { &['\n'] } else { &['\r', '\n'] };
     let numbered = text.split(ends).zip(1..).map(|(line, number)| (number, line.trim_end_matches('\r')));
-    numbered.filter(|(_, line)| !line.trim().is_empty()).collect()
+    let mut lines = Vec::new();
+    for (number, line) in numbered.filter(|(_, line)| !line.trim().is_empty()) {
+        if line.len() > LONGEST_LINE {
+            return Err((number, Fault::new(format!("a line of at most {LONGEST_LINE} bytes"), "a longer one")));
+        }
+        if lines.len() == MOST_ROWS {
+            let expected = format!("at most {MOST_ROWS} rows: make several files of it");
+            return Err((number, Fault::new(expected, "more")));
+        }
+        lines.push((number, line));
+    }
+    Ok(lines)
 }
 
 /// How text is written.
@@ -55,22 +72,14 @@ pub(crate) struct TextLayout {
     pub decimal: DecimalMark,
     /// Only cells like `1,234` speak for the mark.
     pub decimal_is_open: bool,
-    /// Labels of a serial plotter, in the order of their first appearance.
-    pub labels: Vec<String>,
-    /// Lines begin with the clock of a serial monitor.
-    pub monitor: bool,
 }
 
 /// Finds separator and decimal mark: those under which most cells are numbers and fewest are text.
-pub(crate) fn text_layout(lines: &[(u64, &str)], decimal: Option<DecimalMark>) -> TextLayout {
+///
+/// `monitor`: lines begin with the clock of a serial monitor.
+pub(crate) fn text_layout(lines: &[(u64, &str)], monitor: bool, decimal: Option<DecimalMark>) -> TextLayout {
     let sample = || lines.iter().take(SAMPLE).map(|(_, line)| *line);
-    let monitor = is_monitor(sample());
     let bodies: Vec<&str> = sample().map(|line| if monitor { behind_arrow(line) } else { line }).collect();
-    let labels = labels(&bodies);
-    if !labels.is_empty() {
-        let decimal = decimal.unwrap_or_default();
-        return TextLayout { separator: Separator::Labels, decimal, decimal_is_open: false, labels, monitor };
-    }
     let marks = decimal.map_or(vec![DecimalMark::Point, DecimalMark::Comma], |mark| vec![mark]);
     let mut best = (i64::MIN, Separator::Comma, marks[0]);
     for separator in Separator::CELLS {
@@ -83,29 +92,14 @@ pub(crate) fn text_layout(lines: &[(u64, &str)], decimal: Option<DecimalMark>) -
     }
     let (_, separator, mark) = best;
     let decimal_is_open = decimal.is_none() && mark_is_open(lines, separator, mark);
-    TextLayout { separator, decimal: mark, decimal_is_open, labels, monitor }
-}
-
-/// Labels of lines `label:value …`, if most are such lines.
-fn labels(lines: &[&str]) -> Vec<String> {
-    let found: Vec<_> = lines.iter().filter_map(|line| labelled(line)).collect();
-    if found.len() * 10 <= lines.len() * 8 {
-        return Vec::new();
-    }
-    let mut labels: Vec<String> = Vec::new();
-    for (label, _) in found.into_iter().flatten() {
-        if !labels.contains(&label) {
-            labels.push(label);
-        }
-    }
-    labels
+    TextLayout { separator, decimal: mark, decimal_is_open }
 }
 
 /// Numbers less texts, in lines of the best width. Numbers with marks of thousands count if `groups` says so.
 fn score(lines: &[&str], separator: Separator, mark: DecimalMark, groups: bool) -> i64 {
     let mut by_width: Vec<(usize, i64)> = Vec::new();
     for line in lines {
-        let cells = split(line, separator, &[]);
+        let cells = split(line, separator);
         let (numbers, texts) = cells.iter().fold((0, 0), |(numbers, texts), cell| match kind(cell, mark, groups) {
             Value::Number(_) => (numbers + 1, texts),
             Value::Text => (numbers, texts + 1),
@@ -150,7 +144,7 @@ fn mark_is_open(lines: &[(u64, &str)], separator: Separator, mark: DecimalMark) 
     }
     let mut some = false;
     for (_, line) in lines {
-        for cell in split(line, separator, &[]) {
+        for cell in split(line, separator) {
             if cell.contains(',') && matches!(amount(&cell, DecimalMark::Comma), Value::Number(_)) {
                 let grouped = matches!(amount(&cell, DecimalMark::Point), Value::Number(_));
                 if !grouped || cell.trim_start_matches(['-', '+']).starts_with('0') {

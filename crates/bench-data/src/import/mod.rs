@@ -12,13 +12,16 @@
 //! - A plan's own recipe leads to the same plan: `Plan::new(tables, &plan.recipe())` asks nothing.
 //! - Numbers are read as they are written: powers of ten between units move the decimal mark, so that nothing is rounded
 //!   twice. Cells that no instrument means as a number (`OVLD`, `N/A`, 9.9e37) are missing values, and are counted.
+//! - What a file is unpacked to, or repeats, is bounded (`bounds`), and counted before there is room made for it.
 //! - Nothing here opens files.
 
 mod align;
+mod bounds;
 mod build;
 mod candidates;
 mod channel;
 mod clock;
+mod compound;
 mod digits;
 mod error;
 mod grid;
@@ -27,6 +30,7 @@ mod layout;
 mod motion_fit;
 mod names;
 mod number;
+mod ods_size;
 mod parquet;
 mod plan;
 mod plan_clock;
@@ -34,16 +38,21 @@ mod plan_units;
 mod preset;
 mod questions;
 mod recipe;
+mod records;
 mod roles;
 mod series;
+mod sheet;
 mod source;
 mod stamp;
 mod survey;
 mod table;
 mod units;
 mod workbook;
+mod xls_size;
+mod zipped;
 
 pub use align::{Offset, OffsetError, motion_offset};
+pub use bounds::LARGEST_FILE;
 pub use build::Imported;
 pub use candidates::{Candidate, candidates};
 pub use error::ImportError;

@@ -26,6 +26,7 @@ pub(crate) fn take_apart(heading: &str) -> (String, Option<String>) {
         if let (Some(start), Some(end)) = (heading.rfind(open), heading.rfind(close))
             && start < end
             && (units::is_unit(&heading[start + 1..end]) || heading.ends_with(close))
+            && !is_index(heading[start + 1..end].trim())
         {
             let name = format!("{}{}", &heading[..start], &heading[end + close.len_utf8()..]);
             return (name.trim().to_owned(), Some(heading[start + open.len_utf8()..end].trim().to_owned()));
@@ -38,6 +39,7 @@ pub(crate) fn take_apart(heading: &str) -> (String, Option<String>) {
             && !WORDS.contains(&unit.trim().to_lowercase().as_str())
             && unit.len() > 1 - usize::from(matches!(mark, '/' | ',' | '_'))
             && !name.trim().is_empty()
+            && (matches!(mark, '/' | ',') || is_sure_unit(name, unit.trim()))
         {
             let name = name.trim().trim_end_matches([',', '/', '_']).trim();
             return (name.to_owned(), Some(unit.trim().to_owned()));
@@ -46,11 +48,55 @@ pub(crate) fn take_apart(heading: &str) -> (String, Option<String>) {
     (heading.to_owned(), None)
 }
 
+/// Whether a text counts columns of one kind: `strain_1`, `R (2)`.
+fn is_index(text: &str) -> bool {
+    !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit())
+}
+
+/// Units that are words of names, too: `R_min`, `strain_in`, and every letter.
+const SHORT_WORDS: [&str; 4] = ["min", "in", "grad", "day"];
+
+/// Whether the text behind a blank or an underscore is a unit, and neither an index nor a part of the name. What may be
+/// either is a unit if the name's quantity is measured in it: `t_s`, `time_min`, `temp_c`; and volts are nothing else.
+fn is_sure_unit(name: &str, unit: &str) -> bool {
+    let lower = unit.to_lowercase();
+    let is_letter = unit.len() == 1 && unit.starts_with(|c: char| c.is_ascii_alphabetic()) && lower != "v";
+    if is_index(unit) {
+        return false;
+    }
+    if !is_letter && !SHORT_WORDS.contains(&lower.as_str()) {
+        return true;
+    }
+    match by_name(name, |_| true).map(|(role, _)| role) {
+        // `R_k`: kiloohms, or one of several.
+        Some(Role::Resistance) => false,
+        // `T_C` is a temperature, and no time.
+        Some(Role::Time) if name.trim() == "T" => units::unit(Role::Temperature, unit).is_some(),
+        Some(role) => units::unit(role, unit).is_some(),
+        None => lower != "k",
+    }
+}
+
+/// The end of a name that may be a unit or a part of the name: `res_k`, `strain_p`, `time_m`.
+pub(crate) fn doubtful_unit(role: Role, heading: &str) -> Option<&str> {
+    const DOUBTFUL: [(Role, &[&str]); 4] = [
+        (Role::Time, &["m", "u", "µ", "n"]),
+        (Role::Resistance, &["k", "m", "g"]),
+        (Role::Ratio, &["p", "pc"]),
+        (Role::Strain, &["p", "pc", "m", "u", "µ"]),
+    ];
+    let (_, end) = heading.trim().rsplit_once(['_', ' ', '-', '.'])?;
+    let (_, ends) = DOUBTFUL.iter().find(|(of, _)| *of == role.quantity())?;
+    ends.contains(&end.to_lowercase().as_str()).then_some(end)
+}
+
 /// How sure a name is of a role.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Sureness {
     /// The unit alone says so, and could say so of something else too.
     Weak,
+    /// The name says so, but for an index or a short word behind it.
+    Indexed,
     /// The name says so.
     Strong,
 }
@@ -96,17 +142,41 @@ const PART: &[(Role, &[&str])] = &[
 
 /// The role that a column's name and unit give it, if any.
 pub(crate) fn role(name: &str, unit: Option<&str>) -> Option<(Role, Sureness)> {
-    let lower = name.trim().to_lowercase();
-    let letters: String = lower.chars().filter(|c| c.is_alphanumeric()).collect();
-    let spaced = lower.replace(['_', '-', '.'], " ");
-    let fits = |role: &Role| {
+    let fits = |role: Role| {
         // A unit of something else, `Position (V)`, takes the role away; no unit, or an unknown one, does not.
-        unit.is_none_or(|unit| units::unit(*role, unit).is_some() || !units::is_unit(unit))
+        unit.is_none_or(|unit| units::unit(role, unit).is_some() || !units::is_unit(unit))
     };
-    let whole = WHOLE.iter().find(|(role, names)| names.contains(&letters.as_str()) && fits(role));
-    let part = || PART.iter().find(|(role, parts)| parts.iter().any(|part| spaced.contains(part)) && fits(role));
-    let named = whole.or_else(part).map(|(role, _)| (*role, Sureness::Strong));
-    named.or_else(|| by_unit(unit?))
+    by_name(name, fits).or_else(|| by_unit(unit?))
+}
+
+/// The role that a name has among those that fit: a whole name, a part of one, or a whole one with an index or a short word
+/// behind it.
+fn by_name(name: &str, fits: impl Fn(Role) -> bool) -> Option<(Role, Sureness)> {
+    let lower = name.trim().to_lowercase();
+    let spaced = lower.replace(['_', '-', '.'], " ");
+    let whole = |name: &str| {
+        let letters: String = name.chars().filter(|c| c.is_alphanumeric()).collect();
+        WHOLE.iter().find(|(role, names)| names.contains(&letters.as_str()) && fits(*role))
+    };
+    let part = || PART.iter().find(|(role, parts)| parts.iter().any(|part| spaced.contains(part)) && fits(*role));
+    let strong = whole(&lower).or_else(part).map(|(role, _)| (*role, Sureness::Strong));
+    strong.or_else(|| whole(without_index(&lower)?).map(|(role, _)| (*role, Sureness::Indexed)))
+}
+
+/// A name without the index, or the short word, that tells it from others: `R_1`, `R2`, `eps_k`, `R_min`. `R0` is the
+/// resistance at rest; `u_1`, `p1`, `x1` may be anything.
+fn without_index(name: &str) -> Option<&str> {
+    let (bare, end, letters): (_, _, &[&str]) = match name.rsplit_once(['_', ' ', '-', '.']) {
+        Some((bare, end)) => (bare.trim_end_matches('('), end.trim_end_matches(')'), &["r", "t", "x", "d", "e"]),
+        None => {
+            let bare = name.trim_end_matches(|c: char| c.is_ascii_digit());
+            (bare, &name[bare.len()..], &["r", "t"])
+        }
+    };
+    let end = end.trim_start_matches('(');
+    let is_short = end.chars().count() == 1 || is_index(end) || SHORT_WORDS.contains(&end) || end == "max";
+    let is_known = bare.len() > 1 || letters.contains(&bare);
+    (is_short && is_known && (bare, end) != ("r", "0")).then_some(bare)
 }
 
 /// Ω is measured of the sensor alone; mm, degrees and seconds of many things.
@@ -138,6 +208,22 @@ mod tests {
             ("resistance_ratio", "resistance_ratio", None),
             ("Stage Strain", "Stage Strain", None),
             ("Sensor A", "Sensor A", None),
+            ("strain_1", "strain_1", None),
+            ("R (2)", "R (2)", None),
+            ("Dehnung/1", "Dehnung", Some("1")),
+            ("R_k", "R_k", None),
+            ("R/k", "R", Some("k")),
+            ("R_s", "R_s", None),
+            ("t_s", "t", Some("s")),
+            ("time_min", "time", Some("min")),
+            ("R_min", "R_min", None),
+            ("strain_c", "strain_c", None),
+            ("temp_c", "temp", Some("c")),
+            ("position_v", "position", Some("v")),
+            ("length_m", "length", Some("m")),
+            ("length_m1", "length_m1", None),
+            ("force_n", "force", Some("n")),
+            ("force_1", "force_1", None),
         ];
         for (heading, name, unit) in cases {
             assert_eq!(take_apart(heading), (name.to_owned(), unit.map(str::to_owned)), "{heading}");

@@ -1,5 +1,6 @@
 use std::collections::BTreeSet;
 
+use crate::error::Fault;
 use crate::import::candidates::{candidates, choose, find, refer};
 use crate::import::channel::{Channel, name};
 use crate::import::clock::Clock;
@@ -10,6 +11,7 @@ use crate::import::plan_units::channel;
 use crate::import::preset::Preset;
 use crate::import::questions::quoted;
 use crate::import::recipe::{Align, PerFile, Recipe};
+use crate::import::records::SEPARATOR;
 use crate::import::roles::Role;
 use crate::import::series::alternation;
 use crate::import::table::Table;
@@ -60,6 +62,7 @@ impl Plan {
         let mut said = BTreeSet::new();
         remarks.retain(|remark: &String| said.insert(remark.clone()));
         let plan = Self { recipe, given: given.clone(), readings, time, reference, temperature, remarks };
+        plan.channels().iter().try_for_each(|channel| check_records(&tables[channel.table], channel.column))?;
         plan.check(tables)?;
         Ok(plan)
     }
@@ -198,6 +201,19 @@ impl Plan {
         }
         Ok(())
     }
+}
+
+/// Refuses a label that is not in every other record of its file: what the records are has not been understood.
+fn check_records(table: &Table, column: usize) -> Result<(), ImportError> {
+    let cells = &table.columns[column].cells;
+    let missing = cells.iter().filter(|cell| cell.is_empty()).count();
+    if table.layout.separator != Some(SEPARATOR) || missing * 2 < table.len() {
+        return Ok(());
+    }
+    let first = cells.iter().position(str::is_empty).map_or(1, |row| table.lines[row]);
+    let expected = format!("{} in every record, which ends where one of its labels comes again", name(table, column));
+    let found = format!("none in {missing} of {}: print all values of a moment together", table.len());
+    Err(ImportError::content(&table.file, first, Fault::new(expected, found)))
 }
 
 /// What there is to say where no column is the reference, and nobody has said that none is.

@@ -1,6 +1,7 @@
 use crate::error::quote;
 use crate::import::channel::{Channel, name};
 use crate::import::error::ImportError;
+use crate::import::names::doubtful_unit;
 use crate::import::number::{number, ohms};
 use crate::import::questions::quoted;
 use crate::import::recipe::Recipe;
@@ -115,6 +116,10 @@ impl Asked<'_> {
     fn by_numbers(&self, remarks: &mut Vec<String>) -> Result<Unit, ImportError> {
         let known = |name| units::unit(self.role, name);
         let column = &self.table.columns[self.column];
+        if let Some(end) = doubtful_unit(self.role, &column.heading) {
+            let what = format!("{} ({}): `{end}` may be a unit or a part of the name", self.name(), self.role);
+            return Err(self.question(what, &self.numeric_units()));
+        }
         let numbers: Vec<f64> =
             column.cells.iter().filter_map(|cell| number(cell.trim(), self.table.layout.decimal, 0)).collect();
         let (unit, why) = match self.role {
@@ -149,12 +154,17 @@ impl Asked<'_> {
         };
         let Some(unit) = unit.and_then(known) else {
             let what = format!("{} ({}): its unit is not known", self.name(), self.role);
-            let mut names = units::names(self.role);
-            names.retain(|name| units::unit(self.role, name).is_some_and(|unit| unit.scale != Scale::Stamp));
-            return Err(self.question(what, &names));
+            return Err(self.question(what, &self.numeric_units()));
         };
         remarks.push(format!("{}: {} has no unit; {why}: taken for `{}`", self.table.file, self.name(), unit.name));
         Ok(unit)
+    }
+
+    /// Units of numbers.
+    fn numeric_units(&self) -> Vec<&'static str> {
+        let mut names = units::names(self.role);
+        names.retain(|name| units::unit(self.role, name).is_some_and(|unit| unit.scale != Scale::Stamp));
+        names
     }
 
     /// A cell with a unit of its own.

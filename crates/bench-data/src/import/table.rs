@@ -1,4 +1,6 @@
 use crate::Metadata;
+use crate::import::bounds::check_cells;
+use crate::import::error::ImportError;
 use crate::import::grid::Grid;
 use crate::import::header::{Header, Shape};
 use crate::import::names;
@@ -103,7 +105,11 @@ pub struct Table {
 
 impl Table {
     /// A table out of lines of cells.
-    pub(crate) fn of_grid(file: &str, grid: &Grid, header: Header, layout: Layout) -> Self {
+    ///
+    /// # Errors
+    /// If it has more cells than may be held.
+    pub(crate) fn of_grid(file: &str, grid: &Grid, header: Header, layout: Layout) -> Result<Self, ImportError> {
+        check_cells(file, grid.len(), header.shape.width)?;
         let mut layout =
             Layout { skip: header.skip, header_lines: header.header_lines, unit_line: header.unit_line, ..layout };
         let mut cells = vec![Cells::default(); header.shape.width];
@@ -135,7 +141,7 @@ impl Table {
             columns.pop();
         }
         layout.short_lines = widths.into_iter().filter(|width| *width < columns.len()).count();
-        Self { file: file.to_owned(), layout, metadata: header.metadata, columns, lines: numbers }
+        Ok(Self { file: file.to_owned(), layout, metadata: header.metadata, columns, lines: numbers })
     }
 
     /// Number of rows.

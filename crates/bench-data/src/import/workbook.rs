@@ -1,6 +1,6 @@
 use std::io::Cursor;
 
-use calamine::{Data, Reader, open_workbook_auto_from_rs};
+use calamine::{Data, DataRef, Ods, Range, Reader, Xls, Xlsb, Xlsx, XlsxError, open_workbook_from_rs};
 use chrono::{Duration, NaiveDate};
 
 use crate::import::error::ImportError;
@@ -9,25 +9,31 @@ use crate::import::header::Header;
 use crate::import::number::DecimalMark;
 use crate::import::questions::quoted;
 use crate::import::recipe::ReadOptions;
+use crate::import::sheet::{Budget, Sheet};
 use crate::import::table::{Layout, Table};
+use crate::import::zipped::{self, Kind};
+use crate::import::{ods_size, xls_size};
+
+/// What XLS begins with.
+pub(crate) const XLS: [u8; 4] = [0xd0, 0xcf, 0x11, 0xe0];
 
 /// Reads a sheet of a workbook: XLSX, XLSM, XLSB, XLS or ODS.
-pub(crate) fn read(bytes: Vec<u8>, name: &str, options: &ReadOptions) -> Result<Table, ImportError> {
-    let broken =
-        |error: &dyn std::fmt::Display| ImportError::unreadable(name, format!("cannot be read as a workbook: {error}"));
-    let mut workbook = open_workbook_auto_from_rs(Cursor::new(bytes)).map_err(|error| broken(&error))?;
+pub(crate) fn read(bytes: &[u8], name: &str, options: &ReadOptions) -> Result<Table, ImportError> {
+    let broken = |error: String| ImportError::unreadable(name, format!("cannot be read as a workbook: {error}"));
+    let mut workbook = Workbook::open(bytes).map_err(broken)?;
     let mut found: Vec<(String, Table)> = Vec::new();
     let mut last_error = None;
-    let sheets = workbook.sheet_names();
+    let (sheets, mut budget) = (workbook.sheet_names(), Budget::default());
     for sheet in sheets.iter().filter(|sheet| options.sheet.as_ref().is_none_or(|wanted| wanted == *sheet)) {
-        let range = workbook.worksheet_range(sheet).map_err(|error| broken(&error))?;
-        let first = range.start().map_or(0, |(row, _)| u64::from(row)) + 1;
-        let rows = range.rows().zip(first..).map(|(row, number)| (number, row.iter().map(cell).collect::<Vec<_>>()));
-        let grid = Grid::Sheet(rows.filter(|(_, row)| row.iter().any(|cell| !cell.is_empty())).collect());
+        let of_sheet = |error: String| broken(format!("sheet `{sheet}`: {error}"));
+        let cells = workbook.sheet(sheet, &mut budget).map_err(of_sheet)?;
+        let grid = Grid::Sheet(cells.rows(&mut budget).map_err(of_sheet)?);
         let decimal = options.decimal.unwrap_or(DecimalMark::Point);
         let layout = Layout { format: format!("workbook, sheet `{sheet}`"), decimal, ..Layout::default() };
-        match Header::find(name, &grid, decimal, options.skip.unwrap_or(0)) {
-            Ok(header) => found.push((sheet.clone(), Table::of_grid(name, &grid, header, layout))),
+        let table = Header::find(name, &grid, decimal, options.skip.unwrap_or(0))
+            .and_then(|header| Table::of_grid(name, &grid, header, layout));
+        match table {
+            Ok(table) => found.push((sheet.clone(), table)),
             Err(error) => last_error = Some(error),
         }
     }
@@ -43,6 +49,84 @@ pub(crate) fn read(bytes: Vec<u8>, name: &str, options: &ReadOptions) -> Result<
             Err(ImportError::question(name, "several sheets have rows of numbers", answers))
         }
     }
+}
+
+/// A workbook of which nothing is read before its size is known.
+enum Workbook<'a> {
+    Xls(Xls<Cursor<&'a [u8]>>),
+    Xlsx(Xlsx<Cursor<&'a [u8]>>),
+    Xlsb(Xlsb<Cursor<&'a [u8]>>),
+    Ods(Ods<Cursor<&'a [u8]>>),
+}
+
+impl<'a> Workbook<'a> {
+    fn open(bytes: &'a [u8]) -> Result<Self, String> {
+        let source = Cursor::new(bytes);
+        if bytes.starts_with(&XLS) {
+            xls_size::check(bytes)?;
+            return open_workbook_from_rs(source).map(Self::Xls).map_err(words);
+        }
+        match zipped::kind(bytes)? {
+            Kind::Xlsx => open_workbook_from_rs(source).map(Self::Xlsx).map_err(words),
+            Kind::Xlsb => open_workbook_from_rs(source).map(Self::Xlsb).map_err(words),
+            Kind::Ods => {
+                ods_size::check(bytes)?;
+                open_workbook_from_rs(source).map(Self::Ods).map_err(words)
+            }
+        }
+    }
+
+    fn sheet_names(&self) -> Vec<String> {
+        match self {
+            Self::Xls(book) => book.sheet_names(),
+            Self::Xlsx(book) => book.sheet_names(),
+            Self::Xlsb(book) => book.sheet_names(),
+            Self::Ods(book) => book.sheet_names(),
+        }
+    }
+
+    /// The cells of a sheet. A sheet of another kind, such as a chart, has none.
+    fn sheet(&mut self, name: &str, budget: &mut Budget) -> Result<Sheet, String> {
+        let mut sheet = Sheet::default();
+        match self {
+            Self::Xls(book) => fill(&mut sheet, &book.worksheet_range(name).map_err(words)?, budget)?,
+            Self::Ods(book) => fill(&mut sheet, &book.worksheet_range(name).map_err(words)?, budget)?,
+            Self::Xlsx(book) => {
+                let mut cells = match book.worksheet_cells_reader(name) {
+                    Err(XlsxError::NotAWorksheet(_)) => return Ok(sheet),
+                    cells => cells.map_err(words)?,
+                };
+                while let Some(cell) = cells.next_cell().map_err(words)? {
+                    push(&mut sheet, cell.get_position(), cell.get_value(), budget)?;
+                }
+            }
+            Self::Xlsb(book) => {
+                let mut cells = book.worksheet_cells_reader(name).map_err(words)?;
+                while let Some(cell) = cells.next_cell().map_err(words)? {
+                    push(&mut sheet, cell.get_position(), cell.get_value(), budget)?;
+                }
+            }
+        }
+        Ok(sheet)
+    }
+}
+
+fn words(error: impl std::fmt::Display) -> String {
+    error.to_string()
+}
+
+fn push(sheet: &mut Sheet, place: (u32, u32), value: &DataRef, budget: &mut Budget) -> Result<(), String> {
+    match value {
+        DataRef::Empty => Ok(()),
+        value => sheet.push(place, cell(&value.clone().into()), budget),
+    }
+}
+
+fn fill(sheet: &mut Sheet, range: &Range<Data>, budget: &mut Budget) -> Result<(), String> {
+    let (top, left) = range.start().unwrap_or_default();
+    range
+        .used_cells()
+        .try_for_each(|(row, column, value)| sheet.push((top + row as u32, left + column as u32), cell(value), budget))
 }
 
 /// A cell as text that reads back as the same number.
