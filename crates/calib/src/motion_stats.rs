@@ -24,6 +24,8 @@ pub(crate) struct MotionStats {
     /// 99th percentile of the speed.
     pub fastest_rate: f64,
     pub longest_s: f64,
+    /// Distances of all movements that stretch, and of all that release.
+    pub distances: [f64; 2],
 }
 
 /// Rows over which a rate is averaged, to each side: references are quantised and a difference of neighbours shows that
@@ -61,6 +63,7 @@ impl MotionStats {
             longest_hold_s: phases.holds.iter().copied().fold(0.0, f64::max),
             fastest_rate: speeds[(speeds.len() - 1) * 99 / 100],
             longest_s,
+            distances: phases.distances,
         }
     }
 }
@@ -75,6 +78,8 @@ struct PhaseDurations {
     holds: Vec<f64>,
     moves: Vec<f64>,
     speeds: Vec<f64>,
+    /// See [`MotionStats::distances`].
+    distances: [f64; 2],
 }
 
 /// Below this share of the fast rates (90th percentile) a body is at rest.
@@ -94,7 +99,12 @@ impl PhaseDurations {
             }
             if k - start >= FEWEST_PHASE_ROWS {
                 let duration = time_s[k.min(rate.len() - 1)] - time_s[start];
-                if phase(rate[start]) == 0 { self.holds.push(duration) } else { self.moves.push(duration) }
+                if phase(rate[start]) == 0 {
+                    self.holds.push(duration);
+                } else {
+                    self.moves.push(duration);
+                    self.distances[usize::from(rate[start] < 0.0)] += duration * mean(&rate[start..k]).abs();
+                }
             }
             start = k;
         }

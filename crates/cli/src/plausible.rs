@@ -41,6 +41,16 @@ fn text(recordings: &[TraceFile], doubt: &CalibrationDoubt) -> String {
         CalibrationDoubt::ReadingsApart { .. } => " Then put `# resistance_unit = kohm` above its header",
         CalibrationDoubt::ReferencesApart { .. } => " Then put `# strain_unit = percent` above its header",
         CalibrationDoubt::Exchanged { .. } => "; if they are, exchange their names in the header",
+        CalibrationDoubt::Frozen { .. } => {
+            "; leave that part out with `--from` and `--until`, or empty those cells of the reference"
+        }
+        CalibrationDoubt::Turned { .. } => {
+            "; if it has, change it, if not say so with `--strain-unit fraction` or a line `# strain_unit = fraction` above the header"
+        }
+        CalibrationDoubt::TurnedApart { .. } => " Change it",
+        CalibrationDoubt::Milliseconds { .. } => {
+            "; if they are, divide them by 1000, if not say so with a line `# time_unit = s` above the header"
+        }
         CalibrationDoubt::Widened { .. } => " (--explain)",
         _ => "",
     };

@@ -92,6 +92,42 @@ pub enum CalibrationDoubt {
         /// Their R₀.
         rests: [f64; 2],
     },
+    /// A reference that stands still while the readings go up and down.
+    Frozen {
+        /// The recording.
+        recording: usize,
+        /// When it begins, s.
+        from_s: f64,
+        /// When it ends, s.
+        to_s: f64,
+        /// What the reference says all that time.
+        reference: f64,
+        /// How far the readings go up and down meanwhile.
+        swing: f64,
+    },
+    /// Strains that are negative, of a sensor that stretches.
+    Turned {
+        /// The recording.
+        recording: usize,
+        /// 1st percentile of the reference.
+        lower: f64,
+        /// 99th percentile of the reference.
+        upper: f64,
+    },
+    /// Readings that follow the reference in one recording, and go against it in another.
+    TurnedApart {
+        /// The recordings, the one whose readings go against it first.
+        recordings: [usize; 2],
+    },
+    /// A clock in milliseconds.
+    Milliseconds {
+        /// The recording.
+        recording: usize,
+        /// Median step of the clock.
+        step: f64,
+        /// How long a stroke takes by it, s.
+        stroke_s: f64,
+    },
     /// Intervals that the law is too wrong for.
     Widened {
         /// Whose they are.
@@ -112,7 +148,11 @@ impl CalibrationDoubt {
             | Self::Percent { .. }
             | Self::KiloOhm { .. }
             | Self::ReadingsApart { .. }
-            | Self::ReferencesApart { .. } => true,
+            | Self::ReferencesApart { .. }
+            | Self::Frozen { .. }
+            | Self::Turned { .. }
+            | Self::TurnedApart { .. }
+            | Self::Milliseconds { .. } => true,
             Self::GaugesApart { .. } | Self::Copy { .. } | Self::RestsApart { .. } | Self::Widened { .. } => false,
         }
     }
@@ -125,12 +165,16 @@ impl CalibrationDoubt {
     #[must_use]
     pub fn recordings(&self) -> Vec<usize> {
         match self {
-            Self::Exchanged { recording, .. } | Self::Percent { recording, .. } | Self::KiloOhm { recording, .. } => {
-                vec![*recording]
-            }
+            Self::Exchanged { recording, .. }
+            | Self::Percent { recording, .. }
+            | Self::KiloOhm { recording, .. }
+            | Self::Frozen { recording, .. }
+            | Self::Turned { recording, .. }
+            | Self::Milliseconds { recording, .. } => vec![*recording],
             Self::ReadingsApart { recordings, .. }
             | Self::ReferencesApart { recordings, .. }
             | Self::GaugesApart { recordings, .. }
+            | Self::TurnedApart { recordings }
             | Self::Copy { recordings }
             | Self::RestsApart { recordings, .. } => recordings.to_vec(),
             Self::Widened { .. } => vec![],
@@ -171,6 +215,31 @@ impl fmt::Display for CalibrationDoubt {
             Self::GaugesApart { gauges: [least, most], .. } => write!(
                 out,
                 "the readings change by {least:.3} and {most:.3} of their median per unit of the reference: one sensor?"
+            ),
+            Self::Frozen { from_s, to_s, reference, swing, .. } => write!(
+                out,
+                "expected a reference that moves with the readings, found {} from {} to {} s, while they go up and down by {}: is it \
+                 frozen?",
+                plain(*reference),
+                plain(*from_s),
+                plain(*to_s),
+                significant(*swing, 2)
+            ),
+            Self::Turned { lower, upper, .. } => write!(
+                out,
+                "expected strains of a sensor that stretches, above zero, found {} to {}: has the reference the other sign?",
+                significant(*lower, 2),
+                significant(*upper, 2)
+            ),
+            Self::TurnedApart { .. } => out.write_str(
+                "the readings of the first go against its reference, those of the second with it; expected one sensor: has one of \
+                 the references the other sign?",
+            ),
+            Self::Milliseconds { step, stroke_s, .. } => write!(
+                out,
+                "column `time_s`: expected seconds, found whole numbers {} apart, by which a stroke takes {} s: are they milliseconds?",
+                plain(*step),
+                significant(*stroke_s, 2)
             ),
             Self::Copy { .. } => out.write_str("the same rows: they count twice"),
             Self::RestsApart { rests: [least, most], .. } => write!(

@@ -20,6 +20,7 @@ pub struct Recording<'a> {
     pub(crate) file: Option<(&'a str, &'a str)>,
     pub(crate) knows_strain_unit: bool,
     pub(crate) knows_resistance_unit: bool,
+    pub(crate) knows_clock: bool,
 }
 
 impl<'a> Recording<'a> {
@@ -44,6 +45,7 @@ impl<'a> Recording<'a> {
             file: None,
             knows_strain_unit: false,
             knows_resistance_unit: false,
+            knows_clock: false,
         })
     }
 
@@ -79,6 +81,18 @@ impl<'a> Recording<'a> {
     #[must_use]
     pub const fn strain_unit_is_known(self) -> Self {
         Self { knows_strain_unit: true, ..self }
+    }
+
+    /// Somebody has said that the clock counts seconds: [`motion_doubts`](crate::motion_doubts) does not ask.
+    ///
+    /// ```
+    /// let slow = ohmstrain::Recording::new(&[0.0, 60.0], &[1600.0, 1610.0], &[0.00, 0.01])?.clock_is_known();
+    /// assert!(ohmstrain::motion_doubts(&[slow]).is_empty());
+    /// # Ok::<(), ohmstrain::Error>(())
+    /// ```
+    #[must_use]
+    pub const fn clock_is_known(self) -> Self {
+        Self { knows_clock: true, ..self }
     }
 
     /// Somebody has said that the readings are in Ω, or electronics tell it.

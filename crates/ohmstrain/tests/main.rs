@@ -6,6 +6,7 @@ mod doubts;
 mod empty_rows;
 mod known;
 mod lag;
+mod motion_doubts;
 mod rows;
 mod surprises;
 mod threads;

@@ -1,6 +1,6 @@
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 
-use ohmstrain::{Calibrated, Calibration, Error, GaugeFamily, Prior, calibration_doubts};
+use ohmstrain::{Calibrated, Calibration, Error, GaugeFamily, Prior, calibration_doubts, motion_doubts};
 use ohmstrain_calib::{Samples, screen};
 use pyo3::prelude::*;
 use pyo3_arrow::PyTable;
@@ -125,10 +125,13 @@ fn run(
     let parts: Vec<_> = parts.collect();
     let samples = parts.iter().map(|(time_s, reading, strain)| Samples::new(time_s, reading, strain.unwrap_or(&[])));
     let samples = samples.collect::<Result<Vec<_>, _>>().map_err(Error::from)?;
+    let as_read = recordings.iter().zip(&samples).map(|(recording, samples)| recording.known(samples));
+    let as_read = as_read.collect::<Result<Vec<_>, _>>()?;
+    let mut warnings = heard(recordings, &motion_doubts(&as_read)).map_err(Stopped::Interrupted)?;
     let screened = screen(&samples).map_err(Error::from)?;
     let known = recordings.iter().zip(screened.samples()).map(|(recording, samples)| recording.known(&samples));
     let known = known.collect::<Result<Vec<_>, _>>()?;
-    let mut warnings = heard(recordings, &calibration_doubts(&known)).map_err(Stopped::Interrupted)?;
+    warnings.extend(heard(recordings, &calibration_doubts(&known)).map_err(Stopped::Interrupted)?);
     let left_out = screened.distrusted.iter().map(|one| {
         let name = called(recordings, one.recording);
         format!("{name}: row {} ({} s): {}; left out of the calibration", one.row, one.time_s, one.doubt)

@@ -39,6 +39,10 @@ const fn answer(doubt: &CalibrationDoubt) -> &'static str {
         CalibrationDoubt::ReadingsApart { .. } => " Then multiply its column by 1000",
         CalibrationDoubt::ReferencesApart { .. } => " Then divide its column by 100",
         CalibrationDoubt::Exchanged { .. } => "; if they are, exchange the names of the columns",
+        CalibrationDoubt::Frozen { .. } => "; leave that part out, or put NaN in its reference",
+        CalibrationDoubt::Turned { .. } => "; if it has, change it, if not say so with strain_unit=\"fraction\"",
+        CalibrationDoubt::TurnedApart { .. } => " Change it",
+        CalibrationDoubt::Milliseconds { .. } => "; divide them by 1000",
         _ => "",
     }
 }

@@ -1,3 +1,6 @@
+//! What to record next, as motions of a rig: what moves, how fast, how long. Speeds are said as the duration of a stroke over the
+//! whole range, so that they hold for strains and angles.
+
 use nalgebra::{Cholesky, DMatrix};
 
 use crate::likelihood::Bound;
@@ -11,6 +14,12 @@ const LEAST_SURE: f64 = 0.25;
 const ONE_SPEED: f64 = 1.15;
 /// The variance of a weight may be this many times what it were if its column stood alone; the usual rule.
 const LARGEST_INFLATION: f64 = 10.0;
+/// Releases that go back less than this share of the way told nothing of the law of release.
+const LEAST_BACK: f64 = 0.1;
+/// Fewer strokes over the whole range do not repeat, so that none can be left out.
+const FEWEST_STROKES: f64 = 6.0;
+/// Shorter recordings have no quarter of 15 s to be left out, s.
+const SHORTEST_S: f64 = 60.0;
 /// Strain not recorded between zero and the least strain, in spans, beyond which R₀ is an extrapolation.
 const FAR_FROM_REST: f64 = 0.1;
 
@@ -25,7 +34,7 @@ pub struct OnBound {
     pub bound: Bound,
 }
 
-/// What to record next, most important first.
+/// Motions to record next, most important first.
 pub(crate) fn advice(
     parameters: &Uncertainty,
     on_bound: &[OnBound],
@@ -33,75 +42,105 @@ pub(crate) fn advice(
     range: RangeParams,
     jacobian: &DMatrix<f64>,
 ) -> Vec<String> {
-    let mut out = Vec::new();
-    for (i, (name, &tau_s)) in parameters.names.iter().zip(&parameters.values).enumerate() {
-        if name.ends_with(".tau_s") {
-            let bound = on_bound.iter().find(|on| on.name == *name).map(|on| on.bound);
-            out.extend(about_time_constant(name, tau_s, parameters.standard_errors[i], bound, stats));
-        }
-    }
-    out.extend(about_speeds(parameters, stats, jacobian));
-    if range.lower.abs().min(range.upper.abs()) > FAR_FROM_REST * range.span() && range.lower * range.upper > 0.0 {
-        out.push(format!(
-            "rest_reading is extrapolated from strains of {} and more: record near zero strain too",
-            number(range.lower.abs().min(range.upper.abs()))
-        ));
-    }
-    out
+    let stroke_s = range.span() / stats.speed.max(f64::MIN_POSITIVE);
+    let slow = slow_relaxation(parameters, on_bound);
+    let is_fast = on_bound.iter().any(|on| on.bound == Bound::Lower);
+    let told = [
+        both_directions(stats, stroke_s),
+        enough_strokes(stats, range, stroke_s),
+        near_zero(range),
+        slow.and_then(|tau_s| long_holds(tau_s, stats)),
+        is_one_speed(parameters, stats, jacobian).then(|| another_speed(stroke_s)),
+        is_fast.then(|| faster(range, stats)),
+    ];
+    told.into_iter().flatten().collect()
 }
 
-fn about_time_constant(
-    name: &str,
-    tau_s: f64,
-    error_s: f64,
-    bound: Option<Bound>,
-    stats: &MotionStats,
-) -> Option<String> {
-    let (tau, hold_s) = (number(tau_s), stats.longest_hold_s);
-    if bound == Some(Bound::Lower) {
+/// The law of release is told by releases only.
+fn both_directions(stats: &MotionStats, stroke_s: f64) -> Option<String> {
+    let [stretched, released] = stats.distances;
+    let stroke = duration(stroke_s);
+    if released < LEAST_BACK * stretched {
+        return Some(format!("release as often as you stretch: back to the smallest strain, in {stroke} a stroke"));
+    }
+    (stretched < LEAST_BACK * released)
+        .then(|| format!("stretch as often as you release: up to the largest strain, in {stroke} a stroke"))
+}
+
+/// What is left out to test a law must be a motion, too.
+fn enough_strokes(stats: &MotionStats, range: RangeParams, stroke_s: f64) -> Option<String> {
+    let strokes = (stats.distances[0] + stats.distances[1]) / range.span().max(f64::MIN_POSITIVE);
+    if strokes < FEWEST_STROKES {
+        let [stroke, all] = [stroke_s, 2.0 * FEWEST_STROKES * stroke_s].map(duration);
+        let times = 2.0 * FEWEST_STROKES;
         return Some(format!(
-            "{name} = {tau} s, its lower bound, is too fast to tell from the dash-pot: move or sample faster, or fit a \
-             branch fewer"
+            "go to and fro over the whole range {times:.0} times, in {stroke} a stroke: {all} in all"
         ));
     }
-    if bound == Some(Bound::Upper) {
-        let hold = match hold_s {
-            _ if hold_s <= 0.0 => format!("; hold for {tau} s or more"),
-            _ if hold_s < tau_s => format!("; hold {} s longer than {} s", number(tau_s - hold_s), number(hold_s)),
-            _ => String::new(),
-        };
-        let longest = number(stats.longest_s);
-        return Some(format!(
-            "{name} = {tau} s, its upper bound, a quarter of the longest recording: record more than {longest} s{hold}"
-        ));
-    }
-    if error_s < LEAST_SURE * tau_s {
-        return None;
-    }
-    Some(if hold_s <= 0.0 {
-        format!("{name} = {tau} s cannot be told without a hold: hold for {tau} s or more")
-    } else if hold_s < tau_s {
-        let (hold, more) = (number(hold_s), number(tau_s - hold_s));
-        format!("{name} = {tau} s cannot be told by holds of at most {hold} s: hold {more} s longer")
-    } else {
-        format!("{name} = {tau} s is uncertain although holds are long enough: record more of them")
+    (stats.longest_s < SHORTEST_S).then(|| {
+        let [found, wanted] = [stats.longest_s, 2.0 * SHORTEST_S].map(duration);
+        format!("go on with the same motion for {wanted}; the longest recording has {found}")
     })
+}
+
+/// Otherwise R₀ is an extrapolation.
+fn near_zero(range: RangeParams) -> Option<String> {
+    let least = range.lower.abs().min(range.upper.abs());
+    (least > FAR_FROM_REST * range.span() && range.lower * range.upper > 0.0).then(|| {
+        let least = number(least);
+        format!(
+            "begin and end with 30 s at rest, unstretched: near zero strain, where nothing below {least} was recorded"
+        )
+    })
+}
+
+/// The longest time constant, s, that is not told well, or ends on the bound that the recording's length sets.
+fn slow_relaxation(parameters: &Uncertainty, on_bound: &[OnBound]) -> Option<f64> {
+    let all = parameters.names.iter().zip(&parameters.values).zip(&parameters.standard_errors);
+    let open = all.filter(|((name, tau_s), error_s)| {
+        let bound = on_bound.iter().find(|on| on.name == **name).map(|on| on.bound);
+        name.ends_with(".tau_s")
+            && bound != Some(Bound::Lower)
+            && (bound.is_some() || **error_s >= LEAST_SURE * **tau_s)
+    });
+    open.map(|((_, tau_s), _)| *tau_s).reduce(f64::max)
+}
+
+fn long_holds(tau_s: f64, stats: &MotionStats) -> Option<String> {
+    let (hold, relaxes) = (duration(2.0 * tau_s), duration(tau_s));
+    Some(match stats.longest_hold_s {
+        0.0 => format!(
+            "hold at the largest strain for {hold}, release, and rest for {hold}: what relaxes in {relaxes} shows in holds only"
+        ),
+        held if held < 2.0 * tau_s => {
+            let held = duration(held);
+            format!(
+                "hold at the largest strain for {hold}, release, and rest for {hold}: something relaxes in {relaxes}, holds were {held}"
+            )
+        }
+        _ => format!("hold for {hold} at two strains between, once from below and once from above"),
+    })
+}
+
+fn another_speed(stroke_s: f64) -> String {
+    let [stroke, faster] = [stroke_s, stroke_s / 3.0].map(duration);
+    format!("repeat the strokes at a second speed: in {faster} a stroke, not only in {stroke}")
+}
+
+fn faster(range: RangeParams, stats: &MotionStats) -> String {
+    let fastest_s = range.span() / stats.fastest_rate.max(f64::MIN_POSITIVE);
+    let [fastest, faster] = [fastest_s, fastest_s / 2.0].map(duration);
+    format!("add strokes in {faster}, with as many rows a stroke: the fastest so far would take {fastest}")
 }
 
 /// The dash-pot is a jump of the reading by an amount that depends on the speed. At one speed it is a constant of each
 /// direction, which R₀, the gauge and fast branches can take on.
-fn about_speeds(parameters: &Uncertainty, stats: &MotionStats, jacobian: &DMatrix<f64>) -> Option<String> {
+fn is_one_speed(parameters: &Uncertainty, stats: &MotionStats, jacobian: &DMatrix<f64>) -> bool {
     let (slow, fast) = stats.quartile_speeds;
-    let linear_before = jacobian.ncols().checked_sub(trailing_columns(parameters))?;
+    let Some(linear_before) = jacobian.ncols().checked_sub(trailing_columns(parameters)) else { return false };
     let inflation = variance_inflation(jacobian);
     let worst = inflation.iter().skip(linear_before).take(2).copied().fold(0.0, f64::max);
-    let one_speed = fast <= ONE_SPEED * slow;
-    (one_speed && worst > LARGEST_INFLATION).then(|| {
-        format!(
-            "the dash-pot and rest_reading cannot be told apart at one speed ({} per second): record a second speed",
-            number(stats.speed)
-        )
-    })
+    fast <= ONE_SPEED * slow && worst > LARGEST_INFLATION
 }
 
 /// Columns from the dash-pot on: two of it, four and a time constant of each branch, the gauge's nonlinear parameters.
@@ -127,6 +166,15 @@ fn variance_inflation(jacobian: &DMatrix<f64>) -> Vec<f64> {
         .map_or(vec![f64::INFINITY; size], |factor| factor.inverse().diagonal().iter().copied().collect())
 }
 
+/// A duration as people say it: two figures of seconds, minutes or hours.
+fn duration(seconds: f64) -> String {
+    match seconds {
+        s if s < 100.0 => format!("{} s", number(s)),
+        s if s < 6000.0 => format!("{:.0} min", s / 60.0),
+        s => format!("{:.0} h", s / 3600.0),
+    }
+}
+
 /// Two or three figures, as people read them.
 fn number(x: f64) -> String {
     let size = x.abs();
@@ -143,11 +191,8 @@ fn number(x: f64) -> String {
 mod tests {
     use super::*;
 
-    /// With a count of what else there is, it takes two of the ten lines that end a calibration: twice 87 columns, without the
-    /// count and a word that may not fit.
-    #[test]
-    fn advice_is_short() {
-        let stats = |longest_hold_s| MotionStats {
+    fn stats(hold_s: f64) -> MotionStats {
+        MotionStats {
             strain_mean: 0.1,
             strain_sd: 0.1,
             rate_sd: 0.1,
@@ -157,15 +202,41 @@ mod tests {
             reversal: 1.0,
             speed: 0.1,
             quartile_speeds: (0.1, 0.1),
-            longest_hold_s,
+            longest_hold_s: hold_s,
             fastest_rate: 0.1,
             longest_s: 12_345.0,
-        };
-        for hold_s in [0.0, 0.123, 5000.0] {
-            for bound in [None, Some(Bound::Lower), Some(Bound::Upper)] {
-                let advice = about_time_constant("branches[0].tau_s", 3086.4, 4000.0, bound, &stats(hold_s)).unwrap();
-                assert!(advice.chars().count() <= 140, "{advice}");
-            }
+            distances: [3.0, 3.0],
         }
+    }
+
+    const RANGE: RangeParams = RangeParams { lower: 0.0, upper: 0.3 };
+
+    /// Two pieces of advice and a count of what else there is take two of the ten lines that end a calibration.
+    #[test]
+    fn advice_is_short() {
+        let holds = [0.0, 0.123, 5000.0].map(|hold_s| long_holds(3086.4, &stats(hold_s)).unwrap());
+        let others = [
+            another_speed(12.3),
+            faster(RANGE, &stats(0.0)),
+            near_zero(RangeParams { lower: 0.1, upper: 0.3 }).unwrap(),
+        ];
+        for advice in holds.iter().chain(&others) {
+            assert!(advice.chars().count() <= 140, "{advice}");
+        }
+    }
+
+    /// What a recording lacks, and the motion that mends it.
+    #[test]
+    fn what_is_lacking_is_asked_for() {
+        let with = |distances, longest_s| MotionStats { distances, longest_s, ..stats(0.0) };
+        let one_way = both_directions(&with([0.6, 0.0], 20.0), 3.0).unwrap();
+        assert_eq!(one_way, "release as often as you stretch: back to the smallest strain, in 3.0 s a stroke");
+        assert!(both_directions(&with([0.0, 0.6], 20.0), 3.0).unwrap().starts_with("stretch as often as you release"));
+        assert_eq!(both_directions(&with([0.6, 0.5], 20.0), 3.0), None);
+        let few = enough_strokes(&with([0.6, 0.6], 20.0), RANGE, 3.0).unwrap();
+        assert_eq!(few, "go to and fro over the whole range 12 times, in 3.0 s a stroke: 36 s in all");
+        let short = enough_strokes(&with([3.0, 3.0], 20.0), RANGE, 3.0).unwrap();
+        assert_eq!(short, "go on with the same motion for 2 min; the longest recording has 20 s");
+        assert_eq!(enough_strokes(&with([3.0, 3.0], 200.0), RANGE, 3.0), None);
     }
 }

@@ -3,7 +3,7 @@ use std::time::Instant;
 
 use ohmstrain::{
     Calibrated, Calibration, Closing, Error, EstimatorKind, Quantity, ReadingUnit, Sensor, SensorParams,
-    calibration_doubts,
+    calibration_doubts, motion_doubts,
 };
 use ohmstrain_calib::{Samples, screen};
 
@@ -127,20 +127,11 @@ pub fn calibrate_recordings(
     let samples: Vec<Samples> = recordings.iter().map(TraceFile::samples).collect::<Result<_, _>>()?;
     let (quantity, reading) = common_units(recordings)?;
     let names: Vec<&str> = recordings.iter().map(|recording| recording.name.as_str()).collect();
+    let of = |samples: &[Samples]| known_recordings(recordings, samples, (quantity, reading));
+    plausible::heed(recordings, &motion_doubts(&of(&samples)?))?;
     let screened = screen(&samples).map_err(|error| CliError::calibration(&names, &error))?;
-    let (samples, files) = (screened.samples(), names.iter().map(|name| file_name(name)).collect::<Vec<_>>());
-    let mut known = Vec::new();
-    for ((recording, samples), file) in recordings.iter().zip(&samples).zip(&files) {
-        let mut one = ohmstrain::Recording::new(samples.time_s(), samples.reading(), samples.strain())?;
-        one = one.of_file(file, &recording.sha256);
-        one = if reading == ReadingUnit::Ratio { one.of_ratios() } else { one };
-        one = if quantity == Quantity::AngleDeg { one.of_angles_deg() } else { one };
-        let trace = &recording.trace;
-        let knows_ohm = trace.metadata.resistance_unit.is_some() || trace.readings.converter.is_some();
-        one = if trace.metadata.strain_unit.is_some() { one.strain_unit_is_known() } else { one };
-        one = if knows_ohm { one.resistance_unit_is_known() } else { one };
-        known.push(recording.joint().map_or(one, |joint| one.on_joint(joint)));
-    }
+    let samples = screened.samples();
+    let known = of(&samples)?;
     plausible::heed(recordings, &calibration_doubts(&known))?;
     plausible::warn_of_distrusted(recordings, &screened.distrusted);
     let calibrated =
@@ -152,9 +143,31 @@ pub fn calibrate_recordings(
     Ok(calibrated)
 }
 
+/// Samples of recordings, with what is known of each.
+fn known_recordings<'a>(
+    recordings: &'a [TraceFile],
+    samples: &[Samples<'a>],
+    (quantity, reading): (Quantity, ReadingUnit),
+) -> Result<Vec<ohmstrain::Recording<'a>>, CliError> {
+    let known = |(recording, samples): (&'a TraceFile, &Samples<'a>)| {
+        let (trace, metadata) = (&recording.trace, &recording.trace.metadata);
+        let mut one = ohmstrain::Recording::new(samples.time_s(), samples.reading(), samples.strain())?;
+        one = one.of_file(file_name(&recording.name), &recording.sha256);
+        one = if reading == ReadingUnit::Ratio { one.of_ratios() } else { one };
+        one = if quantity == Quantity::AngleDeg { one.of_angles_deg() } else { one };
+        let knows_ohm = metadata.resistance_unit.is_some() || trace.readings.converter.is_some();
+        one = if metadata.strain_unit.is_some() { one.strain_unit_is_known() } else { one };
+        one = if knows_ohm { one.resistance_unit_is_known() } else { one };
+        let is_clock = |(key, value): &(String, String)| key == "time_unit" && value == "s";
+        one = if metadata.other.iter().any(is_clock) { one.clock_is_known() } else { one };
+        Ok(recording.joint().map_or(one, |joint| one.on_joint(joint)))
+    };
+    recordings.iter().zip(samples).map(known).collect()
+}
+
 /// Paths are the machine's own business; the name says which recording it was.
-fn file_name(path: &str) -> String {
-    Path::new(path).file_name().map_or_else(|| path.to_string(), |name| name.to_string_lossy().into_owned())
+fn file_name(path: &str) -> &str {
+    Path::new(path).file_name().and_then(|name| name.to_str()).unwrap_or(path)
 }
 
 /// Quantity and unit that all recordings share.
