@@ -1,6 +1,6 @@
 //! What `export` writes, and that the C it writes computes what the program computes.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
 
@@ -26,25 +26,33 @@ pub fn compilers() -> Vec<&'static str> {
     found
 }
 
+/// As the README has it: strictly.
+const STRICT: [&str; 8] =
+    ["-std=c99", "-O2", "-ffp-contract=off", "-Wall", "-Wextra", "-Werror", "-pedantic", "-Isrc"];
+
+/// Compiles sources strictly into a program, or into an object file if its name ends so; where it is.
+#[track_caller]
+pub fn compile(compiler: &str, folder: &Path, sources: &[&str], name: &str) -> PathBuf {
+    let last: &[&str] = if name.ends_with(".o") { &["-c", "-o"] } else { &["-lm", "-o"] };
+    let arguments = [&STRICT[..], sources, last, &[name]].concat();
+    let compiled = Command::new(compiler).current_dir(folder).args(arguments).output().unwrap();
+    assert!(compiled.status.success(), "{compiler}: {}", String::from_utf8_lossy(&compiled.stderr));
+    folder.join(name)
+}
+
+/// Runs a program with this on stdin; what it prints.
+#[track_caller]
+pub fn run_program(program: &Path, stdin: &str, arguments: &[&str]) -> String {
+    let run = assert_cmd::Command::new(program).args(arguments).write_stdin(stdin).output().unwrap();
+    let printed = String::from_utf8(run.stdout).unwrap();
+    assert!(run.status.success(), "{}: {printed}", program.display());
+    printed
+}
+
 /// Compiles sources strictly and runs the program with this on stdin; what it prints.
 #[track_caller]
 pub fn compile_and_run(compiler: &str, folder: &Path, sources: &[&str], stdin: &str) -> String {
-    compile_and_run_with(compiler, folder, sources, stdin, &[])
-}
-
-/// The same with arguments.
-#[track_caller]
-fn compile_and_run_with(compiler: &str, folder: &Path, sources: &[&str], stdin: &str, arguments: &[&str]) -> String {
-    let program = folder.join("program.out");
-    let flags = ["-std=c99", "-O2", "-ffp-contract=off", "-Wall", "-Wextra", "-Werror", "-pedantic", "-Isrc"];
-    let compiled =
-        Command::new(compiler).current_dir(folder).args(flags).args(sources).args(["-lm", "-o"]).arg(&program).output();
-    let compiled = compiled.unwrap();
-    assert!(compiled.status.success(), "{compiler}: {}", String::from_utf8_lossy(&compiled.stderr));
-    let run = assert_cmd::Command::new(&program).args(arguments).write_stdin(stdin).output().unwrap();
-    let printed = String::from_utf8(run.stdout).unwrap();
-    assert!(run.status.success(), "{compiler}: {printed}");
-    printed
+    run_program(&compile(compiler, folder, sources, "program.out"), stdin, &[])
 }
 
 #[test]
@@ -125,22 +133,6 @@ pub fn every_filter() -> Bench {
 fn scored_export(bench: &Bench, estimator: &str) -> String {
     let export = ["export", "--force", "--dt-s", DT_S, "--target", "c", "-o", estimator, "--score", "trace.csv"];
     bench.run(&[&export[..], &["--sensor", &format!("{estimator}.toml")]].concat()).ok()
-}
-
-/// The same functions of the same numbers in the same order: only the exponentials of two libraries could differ, and both
-/// languages call the one of the host.
-#[test]
-fn the_self_test_of_every_filter_finds_no_difference() {
-    let bench = every_filter();
-    for estimator in ESTIMATORS {
-        scored_export(&bench, estimator);
-        for compiler in compilers() {
-            let sources = ["src/ohmstrain.c", "selftest/selftest.c"];
-            let printed = compile_and_run(compiler, &bench.path(estimator), &sources, "");
-            assert!(printed.contains("self-test passed"), "{estimator}: {printed}");
-            assert!(printed.starts_with("largest difference: 0 of "), "{estimator}: {printed}");
-        }
-    }
 }
 
 /// A ten-thousandth of the gains and the noise: in single precision some steps are refused, and taken again. Without that, C says
@@ -386,8 +378,8 @@ fn another_days_resistance_at_rest_can_be_told() {
         let sources = ["src/ohmstrain.c", "selftest/replay.c"];
         let replay = |factor: f64, told: &[&str]| {
             let recording = format!("time_s,resistance_ohm\n{}", rows(factor));
-            let printed = compile_and_run_with(compiler, &bench.path("corrected"), &sources, &recording, told);
-            Csv::new(&printed).numbers("strain")
+            let program = compile(compiler, &bench.path("corrected"), &sources, "program.out");
+            Csv::new(&run_program(&program, &recording, told)).numbers("strain")
         };
         let (expected, told, untold) = (replay(1.0, &[]), replay(1.15, &[&today.to_string()]), replay(1.15, &[]));
         let farthest = |strains: &[f64], expected: &[f64]| {

@@ -14,6 +14,8 @@ mod evaluate_split;
 mod explain;
 mod export;
 mod export_budget;
+mod export_parts;
+mod export_pauses;
 mod export_protections;
 mod figures;
 mod fit_law;

@@ -7,10 +7,11 @@ use crate::export::{DT_S, compilers};
 
 const PLOTTER: &str = "c/examples/ohmstrain_plotter/ohmstrain_plotter.ino";
 
-/// What the sketch of a calibrated sensor prints.
-fn printed(bench: &Bench) -> Option<String> {
+/// What the sketch of a calibrated sensor prints, once it has been changed.
+fn printed(bench: &Bench, change: impl Fn(&str) -> String) -> Option<String> {
     let arduino = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scripts/exported-c");
-    bench.run(&["export", "--sensor", "sensor.toml", "--dt-s", DT_S, "--target", "c", "-o", "c"]).ok();
+    bench.run(&["export", "--sensor", "sensor.toml", "--dt-s", DT_S, "--target", "c", "-o", "c", "--force"]).ok();
+    bench.write(PLOTTER, change(&bench.read(PLOTTER)));
     let compiler = compilers().first().map(|c| if *c == "gcc" { "g++" } else { "clang++" })?;
     let board = format!("{arduino}/board.cpp");
     let flags =
@@ -41,7 +42,7 @@ const CHECK: [&str; 7] = ["serial-check", "--sensor", "sensor.toml", "--port", "
 #[test]
 fn a_board_agrees_until_it_runs_something_else() {
     let bench = Bench::calibrated_by_default();
-    let Some(printed) = printed(&bench) else { return };
+    let Some(printed) = printed(&bench, str::to_owned) else { return };
     bench.write("board.txt", &printed);
     let said = bench.run(&CHECK).ok();
     let steps = printed.matches("step:").count();
@@ -57,6 +58,31 @@ fn a_board_agrees_until_it_runs_something_else() {
     wrong("times", &CHECK, "on the board; was it exported");
     bench.write("board.txt", with(&printed, "flags:", "0"));
     wrong("flags", &CHECK, &format!(" of {steps} steps: other flags on the board"));
+}
+
+/// A filter of which every tenth step is refused.
+const REFUSES: &str = r#"#include "ohmstrain.h"
+static ohmstrain_status now_and_then(ohmstrain_state *state, float dt_s, float reading, float sd, ohmstrain_residual *out) {
+  static int steps = 0;
+  return ++steps % 10 ? ohmstrain_step_after(state, dt_s, reading, sd, out) : OHMSTRAIN_ERR_STATE;
+}
+"#;
+
+/// The sketch says so and goes on: the next step takes the time of the one that was refused.
+#[test]
+fn a_sketch_goes_on_after_a_refused_step() {
+    let bench = Bench::calibrated();
+    let change = |sketch: &str| {
+        let sketch = sketch.replace("ohmstrain_step_after(&state", "now_and_then(&state");
+        assert!(sketch.contains("now_and_then(&state"));
+        sketch.replace("#include \"ohmstrain.h\"\n", REFUSES)
+    };
+    let Some(printed) = printed(&bench, change) else { return };
+    bench.write("board.txt", &printed);
+    let (steps, refused) = (printed.matches("step:").count(), printed.matches("ohmstrain_step_after: -4").count());
+    assert!(refused > 50 && (steps + 1) / 9 >= refused && steps / 10 < refused, "{steps} {refused}");
+    let said = bench.run(&CHECK).ok();
+    assert!(said.starts_with(&format!("{steps} steps, {} other lines\n", 1 + refused)), "{said}");
 }
 
 #[test]

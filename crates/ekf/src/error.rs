@@ -25,6 +25,9 @@ pub enum StepError {
     Directed,
     /// The estimator cannot look back.
     NoSmoother,
+    /// The rested sensor cannot read that: it is beyond [`FARTHEST_REST`](crate::live::FARTHEST_REST) times what it read in
+    /// calibration, or below one part in that.
+    ImplausibleRest,
 }
 
 impl StepError {
@@ -47,6 +50,7 @@ impl fmt::Display for StepError {
             Self::OtherGauge => "the gauge curve is of another family than the filter's",
             Self::Directed => "the law tells stretching from releasing, which the filter does not",
             Self::NoSmoother => "the estimator has no smoother",
+            Self::ImplausibleRest => "what the rested sensor reads is more than four times, or less than a quarter of, what it read in calibration",
         })
     }
 }

@@ -3,6 +3,7 @@
 mod correction;
 mod estimate;
 mod hostile;
+mod live;
 mod step;
 
 #[path = "../../../tests/modules.rs"]

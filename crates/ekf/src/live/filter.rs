@@ -1,8 +1,8 @@
 use ohmstrain_model::{MOTION_STATES, StrainRange};
 
 use super::{
-    BESIDE_SHARE, DOUBT, DoubtParts, Doubts, Flags, Jumps, Learned, Protections, Repeats, RestBounds, RestFollower,
-    SURPRISING_NIS, SensorEstimator, Sieve,
+    BESIDE_SHARE, DOUBT, DoubtParts, Doubts, FARTHEST_REST, Flags, Jumps, Learned, Protections, Repeats,
+    RestBounds, RestFollower, SURPRISING_NIS, SensorEstimator, Sieve,
 };
 use crate::clock::check_time_step;
 use crate::correction::{FeatureScale, ReadingFeatures, filter_inputs};
@@ -172,7 +172,7 @@ impl<'a, T: Real, E: SensorEstimator<T, N, L>, const N: usize, const L: usize> L
     /// What the rested, unstretched sensor is found to read from now on.
     ///
     /// # Errors
-    /// If it is not a positive number.
+    /// If it is not a positive number, or not within a factor of [`FARTHEST_REST`] of what it read in calibration.
     pub fn rest(&mut self, measured: T) -> Result<(), StepError> {
         self.rest_reading = self.rest_reading_at(measured)?;
         self.now.follower = None;
@@ -204,8 +204,12 @@ impl<'a, T: Real, E: SensorEstimator<T, N, L>, const N: usize, const L: usize> L
     }
 
     fn rest_reading_at(&self, measured: T) -> Result<T, StepError> {
-        let found = self.parts.rest_reading * (measured / self.parts.rested);
-        if found > T::zero() && found.is_finite() { Ok(found) } else { Err(StepError::NonFiniteReading) }
+        if !(measured > T::zero() && measured.is_finite()) {
+            return Err(StepError::NonFiniteReading);
+        }
+        let times = measured / self.parts.rested;
+        let is_plausible = times <= T::of(FARTHEST_REST) && times >= T::of(1.0 / FARTHEST_REST);
+        if is_plausible { Ok(self.parts.rest_reading * times) } else { Err(StepError::ImplausibleRest) }
     }
 
     /// `dt_s` seconds on, with a reading ([`Self::relative`]) or without.

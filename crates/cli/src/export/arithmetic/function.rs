@@ -71,12 +71,15 @@ impl Printed {
         }
         for parameter in self.parameters {
             let name = parameter.rsplit(' ').next().and_then(|name| name.split('[').next()).unwrap_or(parameter);
-            if !takes(&self.function, &body.uses, name) {
+            if !takes(&self.function, &body.uses, |input| is_own(input, name)) {
                 let _ = writeln!(body.lines, "    (void){name};");
             }
         }
         let returns = returned.map_or_else(String::new, |value| format!("    return {value};\n"));
         let has_state = inputs.iter().any(|name| matches!(name, Name::Field(_))) || changes;
+        if has_state && !changes && !takes(&self.function, &body.uses, |name| matches!(name, Name::Field(_))) {
+            body.lines.push_str("    (void)seen;\n");
+        }
         let seen = if changes { "readings *seen" } else { "const readings *seen" };
         let parameters: Vec<String> = has_state
             .then(|| seen.to_owned())
@@ -94,16 +97,19 @@ impl Printed {
     }
 }
 
-/// Whether a parameter of this name, or an entry of it, is used.
-fn takes(function: &Function, uses: &[usize], parameter: &str) -> bool {
-    let is_named = |input: &usize| match function.inputs.get(*input) {
-        Some(Name::Own(own)) => own.split('[').next() == Some(parameter),
-        _ => false,
-    };
+/// Whether an input is used that is of some kind.
+fn takes(function: &Function, uses: &[usize], is_of_kind: impl Fn(&Name) -> bool) -> bool {
     function.recorded.operations.iter().zip(uses).any(|(operation, uses)| match operation {
-        Operation::Input(input) | Operation::Flag(input) => *uses > 0 && is_named(input),
+        Operation::Input(input) | Operation::Flag(input) => {
+            *uses > 0 && function.inputs.get(*input).is_some_and(&is_of_kind)
+        }
         _ => false,
     })
+}
+
+/// Whether an input is a parameter of this name, or an entry of it.
+fn is_own(input: &Name, parameter: &str) -> bool {
+    matches!(input, Name::Own(own) if own.split('[').next() == Some(parameter))
 }
 
 fn in_c(name: &Name) -> String {

@@ -5,7 +5,7 @@ mod readings;
 
 use ohmstrain_calib::{EstimatorKind, PortableFilter, Quantity, ReadingUnit, SensorParams, with_sizes};
 use ohmstrain_ekf::Belief;
-use ohmstrain_ekf::live::{BESIDE_SHARE, KNOWN_BEYOND};
+use ohmstrain_ekf::live::{BESIDE_SHARE, FARTHEST_REST, KNOWN_BEYOND};
 use serde::Serialize;
 
 use super::arithmetic::Around;
@@ -37,8 +37,12 @@ pub struct Exported {
     dt_us: u64,
     dt_ms: f64,
     rest_reading: Literal,
-    /// What the rested sensor read in calibration, and whether zero is a strain that it can have.
+    /// What the rested sensor read in calibration, or by the law where it has not rested then (`has_rested`), and by what factor it
+    /// may read something else.
     rested: Literal,
+    has_rested: bool,
+    farthest_rest: Literal,
+    /// Whether zero is a strain that it can have.
     rests_at_zero: bool,
     lower: Literal,
     upper: Literal,
@@ -151,6 +155,8 @@ impl Exported {
             dt_ms: (dt_s * 1e6).round() / 1e3,
             rest_reading: Literal(sensor.rest_reading),
             rested: Literal(sensor.rested),
+            has_rested: params.measured_rest.is_some(),
+            farthest_rest: Literal(FARTHEST_REST as f32),
             rests_at_zero: sensor.rests_at_zero(),
             lower: Literal(limits.lower),
             upper: Literal(limits.upper),

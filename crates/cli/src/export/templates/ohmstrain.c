@@ -73,8 +73,8 @@ static const float START_VARIANCE[STATES] = {<< start_variance|join("f, ") >>f};
 
 /* Of a strain that is known at a start, and how far beyond the limits one can be known. */
 static const float KNOWN_VARIANCE = << known_variance >>f, KNOWN_BEYOND = << known_beyond >>f;
-/* What the rested, unstretched sensor read in calibration: of the day, where OHMSTRAIN_REST_READING is of the law. */
-static const float RESTED = << rested >>f;
+/* By what factor the rested sensor may read something else than OHMSTRAIN_RESTED. */
+static const float FARTHEST_REST = << farthest_rest >>f;
 
 /* Least and largest rho that can be a reading of this sensor: others are taken for missing. */
 static const float PLAUSIBLE_LOWER = << sieve.lower >>f;
@@ -590,21 +590,32 @@ ohmstrain_status ohmstrain_start_at(ohmstrain_state *state, float strain)
     return start(state, &strain, OHMSTRAIN_REST_READING);
 }
 
-/* R0 of the law where the rested sensor reads this. */
-static float rest_reading_at(float measured)
+/* R0 of the law where the rested sensor reads this, if it can be this sensor's. */
+static ohmstrain_status rest_reading_at(float measured, float *rest_reading)
 {
-    return OHMSTRAIN_REST_READING * (measured / RESTED);
+    const float times = measured / OHMSTRAIN_RESTED;
+
+    if (!usable(measured)) {
+        return OHMSTRAIN_ERR_NOT_FINITE;
+    }
+    if (!(times <= FARTHEST_REST && times >= 1.0f / FARTHEST_REST)) {
+        return OHMSTRAIN_ERR_REST;
+    }
+    *rest_reading = OHMSTRAIN_REST_READING * times;
+    return OHMSTRAIN_OK;
 }
 
 ohmstrain_status ohmstrain_rest(ohmstrain_state *state, float measured)
 {
+    ohmstrain_status status;
+
     if (!state) {
         return OHMSTRAIN_ERR_ARGUMENT;
     }
-    if (!usable(rest_reading_at(measured))) {
-        return OHMSTRAIN_ERR_NOT_FINITE;
+    status = rest_reading_at(measured, &state->rest_reading);
+    if (status != OHMSTRAIN_OK) {
+        return status;
     }
-    state->rest_reading = rest_reading_at(measured);
     state->readings.follows = 0;
     state->readings.off = 0.0f;
     tell_rest(&state->readings);
@@ -620,14 +631,17 @@ ohmstrain_status ohmstrain_rezero(ohmstrain_state *state, float measured)
     /* It is always stretched somewhat: nobody knows by how much. */
     const float *const strain = (const float *)0;
 {% endif %}
+    float rest_reading;
+    ohmstrain_status status;
 
     if (!state) {
         return OHMSTRAIN_ERR_ARGUMENT;
     }
-    if (!usable(rest_reading_at(measured))) {
-        return OHMSTRAIN_ERR_NOT_FINITE;
+    status = rest_reading_at(measured, &rest_reading);
+    if (status != OHMSTRAIN_OK) {
+        return status;
     }
-    start(state, strain, rest_reading_at(measured));
+    start(state, strain, rest_reading);
     state->readings.follows = 0;
     return OHMSTRAIN_OK;
 }

@@ -32,6 +32,12 @@ extern "C" {
 #define OHMSTRAIN_DT_S << dt_s >>f
 /* Reading at zero << quantity >> after everything has relaxed, << reading_unit >>: of the law, not what a rested sensor reads. */
 #define OHMSTRAIN_REST_READING << rest_reading >>f
+{% if has_rested %}
+/* What the rested, unstretched sensor read in calibration, << reading_unit >>. */
+{% else %}
+/* What the rested, unstretched sensor would read by the law, << reading_unit >>: in calibration it did not rest. */
+{% endif %}
+#define OHMSTRAIN_RESTED << rested >>f
 /* Smallest and largest << quantity >> that is reported<< quantity_unit >>. */
 #define OHMSTRAIN_LOWER << lower >>f
 #define OHMSTRAIN_UPPER << upper >>f
@@ -59,6 +65,9 @@ typedef enum ohmstrain_status {
     OHMSTRAIN_ERR_ARGUMENT = -1,
     /* The deviation of a reading is NaN or infinite, or what the rested sensor reads is not positive. */
     OHMSTRAIN_ERR_NOT_FINITE = -2,
+    /* What the rested sensor reads is more than << farthest_rest >> times, or less than one part in << farthest_rest >> of, OHMSTRAIN_RESTED: it is
+     * another sensor, in another unit, or not connected. */
+    OHMSTRAIN_ERR_REST = -3,
     /* The new state would not be finite. */
     OHMSTRAIN_ERR_STATE = -4
 } ohmstrain_status;
@@ -171,16 +180,22 @@ typedef struct ohmstrain_estimate {
 /* << estimator.title >>{% if correction %}, its strain corrected by what was learned in calibration{% endif %}.
  *
  * ohmstrain_start:   before any reading; ohmstrain_start_at: where the << quantity >> is known, at rest.
- * ohmstrain_rest:    the rested, unstretched sensor is found to read `measured`, in place of what it read in calibration: R0 of
- *                    today, from the next reading on.
+ * ohmstrain_rest:    the rested, unstretched sensor is found to read `measured`, in place of OHMSTRAIN_RESTED: R0 of today, from the
+ *                    next reading on.
+{% if rests_at_zero %}
  * ohmstrain_rezero:  the same, and the sensor rests now: the filter starts again, at zero. Until one of the two is called R0 follows
  *                    readings that stay beyond those of the calibration, within a minute or two: another day is not a fault.
+{% else %}
+ * ohmstrain_rezero:  the same, and the filter starts again, at a << quantity >> that it does not know: zero is far from the limits. Until one
+ *                    of the two is called R0 follows readings that stay beyond those of the calibration, within a minute or two: another
+ *                    day is not a fault.
+{% endif %}
  * ohmstrain_step:    one interval on, with a reading in << reading_unit >>. `reading_sd` is what the electronics add to its
  *                    noise, 0 for nothing beyond the calibration; `residual` may be null. A reading that no working sensor
  *                    gives is no error: it is taken for missing, and the estimate's flags say so.
  * ohmstrain_predict: one interval on, without a reading.
  * ohmstrain_step_after, ohmstrain_predict_for: the same `dt_s` seconds after the step before, however long that is: clocks
- *                    jitter, and readings get lost. Steps shorter than a sixteenth of the usual one are taken for that.
+ *                    jitter, readings get lost, and boards sleep. Steps shorter than a sixteenth of the usual one are taken for that.
  * ohmstrain_get:     the estimate after the last step.
  */
 ohmstrain_status ohmstrain_start(ohmstrain_state *state);

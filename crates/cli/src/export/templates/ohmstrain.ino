@@ -24,7 +24,8 @@ const float SUPPLY = 1023.0f;  // codes of a 10-bit converter whose reference is
 const uint32_t PERIOD_US = << dt_us >>UL;
 
 ohmstrain_state state;
-uint32_t last_us;  // when the last step was taken
+uint32_t last_us;   // when the last step was taken
+uint32_t tried_us;  // when one was tried last
 
 // Level at the pin, in the unit of SUPPLY.
 float level() {
@@ -50,6 +51,35 @@ float rested_ohm() {
   return sum / 64.0f;
 }
 
+{% if reading_unit == "ohm" %}
+// What the filter is given: it was calibrated in ohm.
+float reading_now() {
+  return sensor_ohm();
+}
+
+// The sensor rests, relaxed. Refused, and everything stays as it was, where it is not connected.
+ohmstrain_status rests_now() {
+  return ohmstrain_rezero(&state, rested_ohm());
+}
+{% else %}
+float rest_ohm = 1.0f;  // what the relaxed sensor read when it was last measured
+
+// What the filter is given: it was calibrated with ratios.
+float reading_now() {
+  return OHMSTRAIN_RESTED * (sensor_ohm() / rest_ohm);
+}
+
+// The sensor rests, relaxed. Refused, and everything stays as it was, where it is not connected.
+ohmstrain_status rests_now() {
+  const float ohm = rested_ohm();
+  if (!(ohm > 0.0f && ohm < 1e9f)) {
+    return OHMSTRAIN_ERR_NOT_FINITE;
+  }
+  rest_ohm = ohm;
+  return ohmstrain_rezero(&state, OHMSTRAIN_RESTED);
+}
+{% endif %}
+
 // Stops with a message: a filter that is not there must not look like one.
 void fail(const char *what, int status) {
   for (;;) {
@@ -67,31 +97,39 @@ void setup() {
   }
 {% if reading_unit == "ohm" %}
   // The resistance at rest drifts from day to day: if the sensor is always relaxed here, measure it.
-  // ohmstrain_rezero(&state, rested_ohm());
+  // rests_now();
 {% else %}
-  // The calibration is about ratios: the resistance at rest is measured now, with the sensor relaxed.
-  ohmstrain_rezero(&state, rested_ohm());
+  // The calibration is about ratios: the resistance at rest is measured now, with the sensor relaxed, or as soon as it is connected.
+  for (ohmstrain_status rested = rests_now(); rested != OHMSTRAIN_OK; rested = rests_now()) {
+    Serial.print("ohmstrain_rezero: ");
+    Serial.println(rested);
+    delay(1000);
+  }
 {% endif %}
-  last_us = micros();
+  last_us = tried_us = micros();
 }
 
 void loop() {
   const uint32_t now_us = micros();
   // Unsigned differences stay right when micros() wraps.
+  if (now_us - tried_us < PERIOD_US) {
+    return;
+  }
+  tried_us = now_us;
+  if (Serial.available() > 0 && Serial.read() == 'z') {
+    rests_now();
+  }
+  const float reading = reading_now();
   const uint32_t since_us = now_us - last_us;
-  if (since_us < PERIOD_US) {
+  const ohmstrain_status status =
+      ohmstrain_step_after(&state, 1e-6f * static_cast<float>(since_us), reading, 0.0f, nullptr);
+  if (status != OHMSTRAIN_OK) {
+    // Everything is as it was before: the next step takes the time of this one, too.
+    Serial.print("ohmstrain_step_after: ");
+    Serial.println(status);
     return;
   }
   last_us = now_us;
-  if (Serial.available() > 0 && Serial.read() == 'z') {
-    // Refused, and everything stays as it was, where the sensor is not connected.
-    ohmstrain_rezero(&state, rested_ohm());
-  }
-  const float ohm = sensor_ohm();
-  const ohmstrain_status status = ohmstrain_step_after(&state, 1e-6f * static_cast<float>(since_us), ohm, 0.0f, nullptr);
-  if (status != OHMSTRAIN_OK) {
-    fail("ohmstrain_step_after: ", status);
-  }
   ohmstrain_estimate estimate;
   ohmstrain_get(&state, &estimate);
 #if OHMSTRAIN_CHECK
@@ -101,7 +139,7 @@ void loop() {
   Serial.print(",us:");
   Serial.print(static_cast<unsigned long>(since_us));
   Serial.print(",ohm:");
-  Serial.print(ohm, 4);
+  Serial.print(reading, 4);
   Serial.print(",");
 #endif
   Serial.print("strain:");

@@ -45,6 +45,8 @@ static int wrong_rest(ohmstrain_state *state)
 
     failures += ohmstrain_rest(state, NAN) != OHMSTRAIN_ERR_NOT_FINITE;
     failures += ohmstrain_rest(state, INFINITY) != OHMSTRAIN_ERR_NOT_FINITE;
+    failures += ohmstrain_rest(state, 1e-3f * OHMSTRAIN_RESTED) != OHMSTRAIN_ERR_REST;
+    failures += ohmstrain_rezero(state, 1e3f * OHMSTRAIN_RESTED) != OHMSTRAIN_ERR_REST;
     failures += ohmstrain_start_at(state, NAN) != OHMSTRAIN_ERR_ARGUMENT;
     failures += ohmstrain_start_at(state, OHMSTRAIN_UPPER + (OHMSTRAIN_UPPER - OHMSTRAIN_LOWER)) != OHMSTRAIN_ERR_ARGUMENT;
     return failures + (state->rest_reading != rest_reading);

@@ -45,7 +45,11 @@ pub type Filter = LiveFilter<'static, f32, Estimator, STATES, ENTRIES>;
 pub const DT_S: f32 = << dt_s >>;
 /// Reading at zero << quantity >> after everything has relaxed, << reading_unit >>.
 pub const REST_READING: f32 = << rest_reading >>;
+{% if has_rested %}
 /// What the rested, unstretched sensor read in calibration: of the day, where [`REST_READING`] is of the law.
+{% else %}
+/// What the rested, unstretched sensor would read by the law: in calibration it did not rest.
+{% endif %}
 pub const RESTED: f32 = << rested >>;
 /// Range of the reported << quantity >>.
 pub const LIMITS: StrainRange<f32> = StrainRange { lower: << lower >>, upper: << upper >> };

@@ -1,0 +1,271 @@
+//! Exported C of sensors that have, or have not, each optional part: it compiles strictly, says of the sensor what is so, and passes
+//! its self-test without a difference.
+
+use std::process::Command;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use toml::{Table, Value};
+
+use crate::common::Bench;
+use crate::export::{compile, compilers, run_program};
+
+/// What a part is called, and the forms that it has.
+type Part = (&'static str, &'static [&'static str]);
+
+const PARTS: [Part; 12] = [
+    ("estimator", &["corrected sign-split", "corrected hypotheses", "sign-split", "hypotheses", "ekf"]),
+    ("rest", &["never", "at the lower end", "at the upper end", "between"]),
+    ("branches", &["2", "0", "1", "3", "4"]),
+    ("gauge", &["polynomial", "decaying-exponential", "tunnelling"]),
+    ("quantity", &["strain", "angle", "ratio", "joint"]),
+    ("hold", &["rests", "never rests"]),
+    ("baseline", &["wanders", "none"]),
+    ("directions", &["two", "one"]),
+    ("limits", &["from zero", "away from zero"]),
+    ("rate", &["any", "of a phase"]),
+    ("evidence", &["whole", "tempered"]),
+    ("readings", &["err apart", "err alike, never repeat"]),
+];
+
+/// One form of each part, by number.
+type Choice = [usize; PARTS.len()];
+
+/// Choices in which every two forms of two parts occur together: each takes up pairs that are left, the most that it can.
+fn all_pairs() -> Vec<Choice> {
+    let forms = |part: usize| 0..PARTS[part].1.len();
+    let mut left = Vec::new();
+    for a in 0..PARTS.len() {
+        for b in a + 1..PARTS.len() {
+            left.extend(forms(a).flat_map(|x| forms(b).map(move |y| ((a, x), (b, y)))));
+        }
+    }
+    let mut choices = Vec::new();
+    while let Some(&((a, x), (b, y))) = left.first() {
+        let mut chosen: [Option<usize>; PARTS.len()] = [None; PARTS.len()];
+        (chosen[a], chosen[b]) = (Some(x), Some(y));
+        for part in 0..PARTS.len() {
+            let taken = |form: usize, chosen: &[Option<usize>]| {
+                let is = |(at, of): (usize, usize)| chosen[at] == Some(of);
+                let pair = |&&(one, two): &&((usize, usize), (usize, usize))| {
+                    (one == (part, form) && is(two)) || (two == (part, form) && is(one))
+                };
+                left.iter().filter(pair).count()
+            };
+            if chosen[part].is_none() {
+                chosen[part] = forms(part).rev().max_by_key(|form| taken(*form, &chosen));
+            }
+        }
+        let choice: Choice = chosen.map(Option::unwrap);
+        left.retain(|&((a, x), (b, y))| !(choice[a] == x && choice[b] == y));
+        choices.push(choice);
+    }
+    choices
+}
+
+/// A sensor of a choice.
+struct Variant {
+    choice: Choice,
+    sensor: Table,
+}
+
+impl Variant {
+    /// Made of one that was calibrated, by other parameters.
+    fn new(choice: Choice) -> Self {
+        let text = include_str!("../../../tests/fixtures/representative.toml");
+        let mut variant = Self { choice, sensor: text.parse().unwrap() };
+        for of_calibration in ["summary", "uncertainty", "recordings"] {
+            variant.sensor.remove(of_calibration);
+        }
+        variant.change_estimators();
+        variant.change_law();
+        variant.change_rest();
+        variant.change_quantity();
+        variant
+    }
+
+    fn form(&self, part: &str) -> &'static str {
+        let place = PARTS.iter().position(|(name, _)| *name == part).unwrap();
+        PARTS[place].1[self.choice[place]]
+    }
+
+    fn is(&self, part: &str, form: &str) -> bool {
+        self.form(part) == form
+    }
+
+    fn estimator(&self) -> &'static str {
+        self.form("estimator").split(' ').next().unwrap()
+    }
+
+    fn change_estimators(&mut self) {
+        let (never_rests, tempered) = (self.is("hold", "never rests"), self.is("evidence", "tempered"));
+        let (of_phase, no_baseline) = (self.is("rate", "of a phase"), self.is("baseline", "none"));
+        let alike = self.is("readings", "err alike, never repeat");
+        if alike {
+            self.table("validity").insert("longest_repeat_s".into(), 0.0.into());
+        }
+        let corrects = self.form("estimator").split(' ').nth(1);
+        match corrects {
+            Some(corrects) => drop(self.table("correction").insert("corrects".into(), corrects.into())),
+            None => drop(self.sensor.remove("correction")),
+        }
+        self.sensor.insert("default_estimator".into(), self.estimator().into());
+        let estimators = self.table("estimators");
+        let histories = estimators["hypotheses"].clone();
+        estimators.insert("sign-split".into(), histories);
+        for (name, estimator) in estimators.iter_mut() {
+            let estimator = estimator.as_table_mut().unwrap();
+            let noise = estimator["noise"].as_table_mut().unwrap();
+            noise.insert("reading_time_s".into(), if alike { 2.4 } else { 0.0 }.into());
+            if no_baseline {
+                noise.insert("baseline_sd".into(), 0.0.into());
+            }
+            let Some(phases) = estimator.get_mut("phases").and_then(Value::as_table_mut) else { continue };
+            // A filter of phase histories follows holds, however short.
+            if never_rests {
+                phases.insert("reversal".into(), 1.0.into());
+            }
+            phases.insert("speed_per_s".into(), if of_phase { 0.05 } else { 0.0 }.into());
+            phases.insert("tempering".into(), if tempered { 0.5 } else { 1.0 }.into());
+            assert!(name != "ekf");
+        }
+    }
+
+    fn change_law(&mut self) {
+        let (branches, gauge) = (self.form("branches").parse().unwrap(), self.form("gauge"));
+        let one_direction = self.is("directions", "one");
+        let law = self.table("law");
+        let mut all = law["branches"].as_array().unwrap().clone();
+        for k in all.len()..branches {
+            let mut another = all[k - 2].clone();
+            another["tau_s"] = (7.0 * another["tau_s"].as_float().unwrap()).into();
+            all.push(another);
+        }
+        all.truncate(branches);
+        if one_direction {
+            law.insert("retract_viscosity_s".into(), law["extend_viscosity_s"].clone());
+            for branch in &mut all {
+                branch["retract_gain"] = branch["extend_gain"].clone();
+                branch["retract_gain_slope"] = branch["extend_gain_slope"].clone();
+            }
+        }
+        law.insert("branches".into(), all.into());
+        let curve = match gauge {
+            "decaying-exponential" => "family = 'decaying-exponential'\nslope = 3.0\ndecay_strain = 0.25",
+            "tunnelling" => "family = 'tunnelling'\ngap = 0.8\nbarrier = 1.2\npath_loss = -2.0",
+            _ => return,
+        };
+        law.insert("gauge".into(), Value::Table(curve.parse().unwrap()));
+    }
+
+    fn change_rest(&mut self) {
+        let rested = match self.form("rest") {
+            "at the lower end" => Some(3199.661),
+            "at the upper end" => Some(8000.0),
+            "between" => Some(5500.0),
+            _ => None,
+        };
+        self.sensor.remove("measured_rest");
+        if let Some(rested) = rested {
+            self.sensor.insert("measured_rest".into(), rested.into());
+        }
+        if self.is("limits", "away from zero") {
+            self.table("limits").insert("lower".into(), 0.1.into());
+        }
+    }
+
+    fn change_quantity(&mut self) {
+        match self.form("quantity") {
+            "angle" => drop(self.sensor.insert("quantity".into(), "angle_deg".into())),
+            "joint" => {
+                let joint = "prestrain = 0.02\nmoment_arm_mm = 10.0\ngauge_length_mm = 30.0";
+                self.sensor.insert("joint".into(), Value::Table(joint.parse().unwrap()));
+            }
+            "ratio" => self.divide_readings(3200.0),
+            _ => {}
+        }
+    }
+
+    fn divide_readings(&mut self, by: f64) {
+        self.sensor.insert("reading".into(), "ratio".into());
+        let divide = |table: &mut Table, names: &[&str]| {
+            for name in names {
+                if let Some(number) = table.get_mut(*name) {
+                    *number = (number.as_float().unwrap() / by).into();
+                }
+            }
+        };
+        divide(&mut self.sensor, &["rest_reading", "measured_rest"]);
+        divide(self.table("validity"), &["reading_lower", "reading_upper"]);
+        divide(self.table("static_cubic"), &["reading_centre", "reading_scale"]);
+    }
+
+    fn table(&mut self, name: &str) -> &mut Table {
+        self.sensor[name].as_table_mut().unwrap()
+    }
+
+    /// All forms, for a message.
+    fn name(&self) -> String {
+        PARTS.iter().map(|(part, _)| format!("{part} {}", self.form(part))).collect::<Vec<_>>().join(", ")
+    }
+
+    /// Exports it, compiles all of it and runs the self-test.
+    fn check(&self, bench: &Bench) {
+        let name = self.name();
+        bench.write("sensor.toml", toml::to_string(&self.sensor).unwrap());
+        let export = ["export", "--sensor", "sensor.toml", "--dt-s", "0.05", "--target", "c", "-o", "c", "--force"];
+        let run = bench.run(&export);
+        assert_eq!((run.code, run.stderr.as_str()), (Some(0), ""), "{name}");
+        self.check_words(bench);
+        for compiler in compilers() {
+            println!("{compiler}: {name}");
+            let folder = bench.path("c");
+            compile(compiler, &folder, &["src/ohmstrain.c"], "ohmstrain.o");
+            compile(compiler, &folder, &["ohmstrain.o", "selftest/replay.c"], "replay.out");
+            let self_test = compile(compiler, &folder, &["ohmstrain.o", "selftest/selftest.c"], "selftest.out");
+            let tested = run_program(&self_test, "", &[]);
+            assert!(tested.starts_with("largest difference: 0 of "), "{compiler}, {name}: {tested}");
+            let sketch = Command::new(if compiler == "gcc" { "g++" } else { "clang++" })
+                .current_dir(&folder)
+                .args(["-std=gnu++11", "-fsyntax-only", "-Wall", "-Wextra", "-Werror", "-I", ARDUINO, "-include"])
+                .args(["Arduino.h", "-Isrc", "-x", "c++", "examples/ohmstrain_plotter/ohmstrain_plotter.ino"])
+                .output()
+                .unwrap();
+            assert!(sketch.status.success(), "{name}: {}", String::from_utf8_lossy(&sketch.stderr));
+        }
+    }
+
+    /// Where it rested, and whether at zero.
+    fn check_words(&self, bench: &Bench) {
+        let (readme, header) = (bench.read("c/README.md"), bench.read("c/src/ohmstrain.h"));
+        let never = self.is("rest", "never");
+        assert_eq!(readme.contains("The sensor never rested in calibration"), never, "{}", self.name());
+        assert_eq!(readme.contains("The rested, unstretched sensor read"), !never, "{}", self.name());
+        assert_eq!(header.contains("in calibration it did not rest"), never, "{}", self.name());
+        let at_zero = self.is("limits", "from zero");
+        assert_eq!(readme.contains("starts the filter again, at zero"), at_zero, "{}", self.name());
+        assert_eq!(header.contains("the filter starts again, at zero"), at_zero, "{}", self.name());
+    }
+}
+
+/// An Arduino that is none.
+const ARDUINO: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scripts/exported-c");
+
+/// The same functions of the same numbers in the same order: only the exponentials of two libraries could differ, and both
+/// languages call the one of the host.
+#[test]
+fn exported_c_of_any_two_parts_together_compiles_strictly_and_is_the_rust_filter() {
+    let choices = all_pairs();
+    let forms: usize = PARTS.iter().map(|(_, forms)| forms.len()).max().unwrap();
+    assert!(choices.len() >= forms * forms && choices.len() < 2 * forms * forms, "{}", choices.len());
+    let next = AtomicUsize::new(0);
+    std::thread::scope(|scope| {
+        for _ in 0..std::thread::available_parallelism().map_or(1, usize::from) {
+            scope.spawn(|| {
+                let bench = Bench::new();
+                while let Some(choice) = choices.get(next.fetch_add(1, Ordering::Relaxed)) {
+                    Variant::new(*choice).check(&bench);
+                }
+            });
+        }
+    });
+}

@@ -1,0 +1,77 @@
+//! A pause of any length: exported C says of it, and after it, what `filter` says.
+
+use std::fmt::Write;
+
+use crate::common::{Bench, Csv};
+use crate::export::{compile, compilers, run_program};
+
+/// Lengths of the pause, s: from none to a month.
+const PAUSES_S: [f64; 8] = [0.0, 0.5, 7.0, 20.0, 60.0, 3600.0, 86_400.0, 2_592_000.0];
+const DT_S: f64 = 0.05;
+/// Rows before the pause of a filter that runs, and after it.
+const BEFORE: usize = 400;
+const AFTER: usize = 200;
+
+/// The fixture's sensor, with a filter by the sign of the rate beside its others.
+fn sensor() -> String {
+    let mut sensor: toml::Table = include_str!("../../../tests/fixtures/representative.toml").parse().unwrap();
+    let estimators = sensor["estimators"].as_table_mut().unwrap();
+    let histories = estimators["hypotheses"].clone();
+    estimators.insert("sign-split".into(), histories);
+    toml::to_string(&sensor).unwrap()
+}
+
+/// Readings of a slow motion, then a pause that ends without a reading, then readings again.
+fn recording(before: usize, pause_s: f64) -> String {
+    let reading = |row: usize| 4600.0 + 1100.0 * (0.6 * DT_S * row as f64).sin() + (row % 7) as f64;
+    // A chip's first step takes an interval, a recording's no time.
+    let mut text = format!("time_s,resistance_ohm\n{},\n", -DT_S);
+    for row in 0..before {
+        let _ = writeln!(text, "{},{}", DT_S * row as f64, reading(row));
+    }
+    let resumes_s = DT_S * before as f64 - DT_S + pause_s;
+    let _ = writeln!(text, "{resumes_s},");
+    for row in 1..=AFTER {
+        let _ = writeln!(text, "{},{}", resumes_s + DT_S * row as f64, reading(before + row));
+    }
+    text
+}
+
+/// Strain and deviation, from the pause's end on.
+fn since_the_pause(printed: &str, before: usize) -> Vec<(f64, f64)> {
+    let table = Csv::new(printed);
+    table.numbers("strain").into_iter().zip(table.numbers("strain_sd")).skip(1 + before).collect()
+}
+
+/// The direction of motion is a polynomial on a chip and an exponential on a computer: see the README.
+#[test]
+fn a_pause_of_any_length_is_answered_as_by_the_program() {
+    let bench = Bench::new();
+    bench.write("sensor.toml", sensor());
+    let mut worst = Vec::new();
+    for estimator in ["corrected", "sign-split", "hypotheses", "ekf"] {
+        let export = ["export", "--sensor", "sensor.toml", "--target", "c", "--force", "--estimator", estimator];
+        bench.run(&[&export[..], &["--dt-s", &DT_S.to_string(), "-o", "c"]].concat()).ok();
+        let sources = ["src/ohmstrain.c", "selftest/replay.c"];
+        let program = |compiler| compile(compiler, &bench.path("c"), &sources, &format!("{compiler}.out"));
+        let programs: Vec<_> = compilers().into_iter().map(program).collect();
+        for (before, pause_s) in [0, BEFORE].into_iter().flat_map(|before| PAUSES_S.map(|pause_s| (before, pause_s))) {
+            let recording = recording(before, pause_s);
+            bench.write("paused.csv", &recording);
+            let filter = ["--quiet", "filter", "paused.csv", "--sensor", "sensor.toml", "--estimator", estimator];
+            let expected = since_the_pause(&bench.run(&filter).ok(), before);
+            for program in &programs {
+                let said = since_the_pause(&run_program(program, &recording, &[]), before);
+                let off = |(said, expected): (&(f64, f64), &(f64, f64))| {
+                    ((said.0 - expected.0) / expected.1).abs().max((said.1 / expected.1 - 1.0).abs())
+                };
+                assert_eq!(said.len(), 1 + AFTER);
+                let offs: Vec<f64> = said.iter().zip(&expected).map(off).collect();
+                let after = offs[1..].iter().copied().fold(0.0, f64::max);
+                println!("{estimator}, {before} rows, {pause_s} s: {:.1e}, {after:.1e} after it", offs[0]);
+                worst.push((offs[0], after));
+            }
+        }
+    }
+    assert!(worst.iter().all(|(at_end, after)| *at_end < 0.02 && *after < 0.1), "{worst:?}");
+}

@@ -1,0 +1,114 @@
+//! A filter with all that stands around it, in single precision, as a microcontroller runs it.
+
+use ohmstrain_ekf::live::{
+    DoubtParts, FARTHEST_REST, Flag, LiveEstimate, LiveFilter, LiveParts, RestBounds, Sieve, Unread,
+};
+use ohmstrain_ekf::{Compact, Evidence, SignSplit, SparseEkf, StepError};
+use ohmstrain_model::{Branch, Gauge, ModelNoise, Motion, SensorLaw, StrainRange, SwitchedModel};
+
+const DT_S: f32 = 0.01;
+const LIMITS: StrainRange<f32> = StrainRange { lower: 0.0, upper: 0.33 };
+const REST_READING: f32 = 1600.0;
+/// What the rested sensor read in calibration.
+const RESTED: f32 = 1550.0;
+
+type Filter = LiveFilter<'static, f32, SignSplit<f32, 1, 4, 8, Compact>, 4, 10>;
+
+fn filter() -> Filter {
+    let branch = Branch {
+        tau_s: 20.0,
+        extend_gain: 0.6,
+        retract_gain: -0.4,
+        extend_gain_slope: 0.0,
+        retract_gain_slope: 0.0,
+    };
+    let law = SensorLaw {
+        gauge: Gauge::Polynomial { coefficients: [1.9, -2.8, 0.0] },
+        extend_viscosity_s: 0.02,
+        retract_viscosity_s: -0.01,
+        branches: [branch],
+        range: LIMITS,
+    };
+    let motion = Motion::ornstein_uhlenbeck(1.0, 0.1, 0.15, 0.1).unwrap();
+    let noise = ModelNoise { reading_sd: 2e-3, branch_sd: 5e-3, baseline_sd: 0.02, baseline_time_s: 30.0 };
+    let kernel = SparseEkf::new(SwitchedModel::new(law, motion, noise).unwrap(), DT_S).unwrap();
+    let estimator = SignSplit::around(kernel, None, Evidence { limits: LIMITS, tempering: 1.0 });
+    let unread = Unread::new(1.0, 0.1, LIMITS);
+    let doubt = DoubtParts {
+        low: 0.0,
+        high: 0.5,
+        fastest_per_s: 0.5,
+        longest_s: 600.0,
+        per_reading: 0.66,
+        start: 1e-3,
+        most: unread.anywhere,
+        unread,
+        rest: None,
+    };
+    let parts = LiveParts {
+        rest_reading: REST_READING,
+        rested: RESTED,
+        dt_s: DT_S,
+        limits: LIMITS,
+        strain_sd_scale: 1.0,
+        reading_variance: 4e-6,
+        known_variance: 1e-6,
+        sieve: Sieve { plausible: (-0.5, 1.5), longest_repeat_s: f32::INFINITY, jump: 0.05, error_time_s: 0.0 },
+        doubt,
+        rest: RestBounds { low: None, high: None },
+        learned: None,
+    };
+    LiveFilter::new(estimator, parts)
+}
+
+#[test]
+fn a_reading_at_rest_that_cannot_be_this_sensors_is_refused_and_changes_nothing() {
+    let farthest = FARTHEST_REST as f32;
+    let far = [1e-38, 1.0, 0.999 * RESTED / farthest, 1.001 * RESTED * farthest, 1.6e6, f32::MAX];
+    let none = [f32::NAN, f32::INFINITY, 0.0, -RESTED];
+    let refused = far.map(|measured| (measured, StepError::ImplausibleRest));
+    for (measured, error) in refused.into_iter().chain(none.map(|measured| (measured, StepError::NonFiniteReading))) {
+        let mut filter = filter();
+        filter.step(1700.0).unwrap();
+        assert_eq!((filter.rest(measured), filter.rezero(measured)), (Err(error), Err(error)), "{measured}");
+        let mut untold = self::filter();
+        untold.step(1700.0).unwrap();
+        assert_eq!(filter.step(1701.0), untold.step(1701.0), "{measured}");
+    }
+    for measured in [RESTED / farthest, 0.9 * RESTED, RESTED * farthest] {
+        let mut filter = filter();
+        assert_eq!((filter.rest(measured), filter.rezero(measured)), (Ok(()), Ok(())), "{measured}");
+        // The sensor rests.
+        let reading = filter.relative(measured, 0.0);
+        assert!((reading.value - (RESTED / REST_READING - 1.0)).abs() < 1e-6, "{measured}");
+    }
+}
+
+/// No pause is too long: from none to more seconds than single precision has squares of. The longer, the less is known, and after hours
+/// nothing but that the strain is within its limits.
+#[test]
+fn any_pause_is_passed() {
+    let pauses = [0.0, 0.5, 7.0, 60.0, 3600.0, 86_400.0, 2.592e6, 1e9, 1e20, f32::MAX];
+    for running in [false, true] {
+        let mut before: Option<LiveEstimate<f32>> = None;
+        for pause_s in pauses {
+            let mut filter = filter();
+            for k in 0..if running { 1000 } else { 0 } {
+                filter.step(REST_READING * (1.2 + 0.1 * (0.01 * k as f32).sin())).unwrap();
+            }
+            let passed = filter.step_after(pause_s, None).unwrap();
+            assert!(passed.flags.has(Flag::Missing) && passed.strain.mean.is_finite(), "{pause_s} s: {passed:?}");
+            assert!(before.is_none_or(|before| passed.strain.variance >= 0.999 * before.strain.variance), "{pause_s} s");
+            let nothing_known = LIMITS.variance_of_anywhere() + (passed.strain.mean - 0.165).powi(2);
+            assert!(pause_s < 3600.0 || (passed.strain.variance / nothing_known - 1.0).abs() < 0.01, "{pause_s} s");
+            // It goes on.
+            for k in 0..500 {
+                filter.step(REST_READING * (1.2 + 0.1 * (0.01 * k as f32).sin())).unwrap();
+            }
+            before = Some(passed);
+        }
+        let mut filter = filter();
+        assert_eq!(filter.step_after(f32::INFINITY, None), Err(StepError::NonFiniteTimeStep));
+        assert_eq!(filter.step_after(-1.0, None), Err(StepError::NegativeTimeStep));
+    }
+}
