@@ -27,8 +27,7 @@ pub fn compilers() -> Vec<&'static str> {
 }
 
 /// As the README has it: strictly.
-const STRICT: [&str; 8] =
-    ["-std=c99", "-O2", "-ffp-contract=off", "-Wall", "-Wextra", "-Werror", "-pedantic", "-Isrc"];
+const STRICT: [&str; 8] = ["-std=c99", "-O2", "-ffp-contract=off", "-Wall", "-Wextra", "-Werror", "-pedantic", "-Isrc"];
 
 /// Compiles sources strictly into a program, or into an object file if its name ends so; where it is.
 #[track_caller]

@@ -18,7 +18,7 @@ fn numbers(value: &Value, path: &str, found: &mut Vec<String>) {
             }
         }
         Value::Array(array) => {
-            let told = path.starts_with("uncertainty") || path.starts_with("correction");
+            let told = ["uncertainty", "correction", "findings"].iter().any(|table| path.starts_with(table));
             for (index, value) in array.iter().enumerate().take(if told { 1 } else { array.len() }) {
                 numbers(value, &format!("{path}[{index}]"), found);
             }

@@ -15,13 +15,8 @@ const RESTED: f32 = 1550.0;
 type Filter = LiveFilter<'static, f32, SignSplit<f32, 1, 4, 8, Compact>, 4, 10>;
 
 fn filter() -> Filter {
-    let branch = Branch {
-        tau_s: 20.0,
-        extend_gain: 0.6,
-        retract_gain: -0.4,
-        extend_gain_slope: 0.0,
-        retract_gain_slope: 0.0,
-    };
+    let branch =
+        Branch { tau_s: 20.0, extend_gain: 0.6, retract_gain: -0.4, extend_gain_slope: 0.0, retract_gain_slope: 0.0 };
     let law = SensorLaw {
         gauge: Gauge::Polynomial { coefficients: [1.9, -2.8, 0.0] },
         extend_viscosity_s: 0.02,
@@ -98,7 +93,10 @@ fn any_pause_is_passed() {
             }
             let passed = filter.step_after(pause_s, None).unwrap();
             assert!(passed.flags.has(Flag::Missing) && passed.strain.mean.is_finite(), "{pause_s} s: {passed:?}");
-            assert!(before.is_none_or(|before| passed.strain.variance >= 0.999 * before.strain.variance), "{pause_s} s");
+            assert!(
+                before.is_none_or(|before| passed.strain.variance >= 0.999 * before.strain.variance),
+                "{pause_s} s"
+            );
             let nothing_known = LIMITS.variance_of_anywhere() + (passed.strain.mean - 0.165).powi(2);
             assert!(pause_s < 3600.0 || (passed.strain.variance / nothing_known - 1.0).abs() < 0.01, "{pause_s} s");
             // It goes on.

@@ -2,8 +2,8 @@ use std::fmt;
 
 use ohmstrain_calib::{ReadingUnit, SensorParams};
 
-use crate::calibration_doubt::LEAST_OHM;
 use crate::number::significant;
+use crate::plausible::LEAST_OHM;
 
 /// Readings may go this far beyond those of the calibration, and in another unit they would not: sensors of one kind differ
 /// by less, units by more.

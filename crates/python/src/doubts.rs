@@ -91,8 +91,11 @@ pub fn of_unit(doubt: &UnitDoubt) -> String {
 
 /// A doubt about the unit of a reference, with what answers it.
 pub fn of_reference(doubt: &ReferenceDoubt) -> String {
-    let answer =
-        if doubt.is_of_calibration { "10 % is 0.1; calibrate again" } else { "Then say so with strain_unit=\"percent\"" };
+    let answer = if doubt.is_of_calibration {
+        "10 % is 0.1; calibrate again"
+    } else {
+        "Then say so with strain_unit=\"percent\""
+    };
     format!("{doubt} {answer}")
 }
 
@@ -102,12 +105,7 @@ pub fn of_rest(quiet: &Quiet) -> String {
 }
 
 /// Doubts about strains that are said to be known, in a recording from the first to the last time, s.
-pub fn of_known(
-    sensor: &ohmstrain::Sensor,
-    start: Option<f64>,
-    known: &[Known],
-    times: (f64, f64),
-) -> Vec<String> {
+pub fn of_known(sensor: &ohmstrain::Sensor, start: Option<f64>, known: &[Known], times: (f64, f64)) -> Vec<String> {
     let start = start.and_then(|start| sensor.check_start(start).err()).map(|doubt| format!("initial_strain: {doubt}"));
     let unused = ohmstrain::unused_known(known, times);
     let unused = unused.iter().map(|doubt| format!("known: ({}, {}) {doubt}", doubt.known.time_s, doubt.known.strain));

@@ -186,10 +186,8 @@ fn table(trace: &Trace, paths: &[String]) -> PyResult<PyRecordBatch> {
         resistance_unit: metadata.resistance_unit.map(|unit| unit.name().to_owned()),
     };
     let about = serde_json::to_string(&about).map_err(refused)?;
-    let (fields, arrays): (Vec<Field>, Vec<ArrayRef>) = columns
-        .into_iter()
-        .map(|(name, array)| (Field::new(name, array.data_type().clone(), true), array))
-        .unzip();
+    let (fields, arrays): (Vec<Field>, Vec<ArrayRef>) =
+        columns.into_iter().map(|(name, array)| (Field::new(name, array.data_type().clone(), true), array)).unzip();
     let schema = Schema::new_with_metadata(fields, HashMap::from([(ABOUT.to_owned(), about)]));
     Ok(RecordBatch::try_new(Arc::new(schema), arrays).map_err(failed)?.into())
 }

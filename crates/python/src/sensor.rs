@@ -1,6 +1,8 @@
 use std::borrow::Cow;
 
-use ohmstrain::{Closing, Estimate, EstimatorKind, JointParams, Known, Quantity, QuietWatch, ReadingUnit, ValidityWatch};
+use ohmstrain::{
+    Closing, Estimate, EstimatorKind, JointParams, Known, Quantity, QuietWatch, ReadingUnit, ValidityWatch,
+};
 use pyo3::prelude::*;
 use pyo3_arrow::{PyRecordBatch, PyTable};
 

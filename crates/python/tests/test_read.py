@@ -75,7 +75,7 @@ def test_a_labs_file_is_what_import_makes_of_it(trace, tmp_path, sensor):
         ("t (ms),R (kOhm),strain", r'units=\{"strain": "percent"\}', {"units": {"strain": "percent"}}),
         ("t (ms),R (kOhm),strain", r'units=\{"strain": "percent"\}', {"strain_unit": "percent"}),
         ("t (ms),alpha,strain (%)", r'columns=\{"resistance": "NAME"\}', {"columns": {"resistance": "alpha"}, "units": {"resistance": "kohm"}}),
-        ("t (ms),R (kOhm),way (mm)", "gauge_length_mm=MM", {"gauge_length_mm": 30}),
+        ("t (ms),R (kOhm),Displacement (mm)", "gauge_length_mm=MM", {"gauge_length_mm": 30}),
     ],
 )
 def test_questions_name_the_argument(trace, tmp_path, header, asks, answer):

@@ -127,11 +127,11 @@ pub fn calibrate_recordings(
     let samples: Vec<Samples> = recordings.iter().map(TraceFile::samples).collect::<Result<_, _>>()?;
     let (quantity, reading) = common_units(recordings)?;
     let names: Vec<&str> = recordings.iter().map(|recording| recording.name.as_str()).collect();
-    let of = |samples: &[Samples]| known_recordings(recordings, samples, (quantity, reading));
-    plausible::heed(recordings, &motion_doubts(&of(&samples)?))?;
+    let as_read = known_recordings(recordings, &samples, (quantity, reading))?;
+    plausible::heed(recordings, &motion_doubts(&as_read))?;
     let screened = screen(&samples).map_err(|error| CliError::calibration(&names, &error))?;
     let samples = screened.samples();
-    let known = of(&samples)?;
+    let known = known_recordings(recordings, &samples, (quantity, reading))?;
     plausible::heed(recordings, &calibration_doubts(&known))?;
     plausible::warn_of_distrusted(recordings, &screened.distrusted);
     let calibrated =

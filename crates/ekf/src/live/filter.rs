@@ -1,8 +1,8 @@
 use ohmstrain_model::{MOTION_STATES, StrainRange};
 
 use super::{
-    BESIDE_SHARE, DOUBT, DoubtParts, Doubts, FARTHEST_REST, Flags, Jumps, Learned, Protections, Repeats,
-    RestBounds, RestFollower, SURPRISING_NIS, SensorEstimator, Sieve,
+    BESIDE_SHARE, DOUBT, DoubtParts, Doubts, FARTHEST_REST, Flags, Jumps, Learned, Protections, Repeats, RestBounds,
+    RestFollower, SURPRISING_NIS, SensorEstimator, Sieve,
 };
 use crate::clock::check_time_step;
 use crate::correction::{FeatureScale, ReadingFeatures, filter_inputs};
