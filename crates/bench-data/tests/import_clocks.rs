@@ -103,3 +103,32 @@ fn a_survey_tells_what_a_recording_is_like() {
     assert!(lag.seconds.abs() < 3.0 * lag.sd_s + 0.05, "{lag:?}");
     assert!(survey.phases.unwrap().phases.iter().all(|(count, _)| *count > 0));
 }
+
+/// Two to five like bends, fifty rows a second, on two clocks: angles, and readings that follow them with some noise. Shifted by a
+/// bend they fit as well, but for the one that is lost.
+#[test]
+fn like_movements_are_not_shifted_by_one() {
+    let bend = |t: f64, k: i32| {
+        let (phase, height) = ((t - 1.0 - 1.8 * f64::from(k)) / 1.4, 85.0 + 4.0 * f64::from(k * 3 % 5));
+        if (0.0..1.0).contains(&phase) { 0.5 * height * (1.0 - (std::f64::consts::TAU * phase).cos()) } else { 0.0 }
+    };
+    let noise = |k: usize| (f64::from(u32::try_from(k * 7919 % 1000).unwrap()) / 1000.0 - 0.5) * 4.0;
+    let mut told = 0;
+    for (count, truth) in (2..=5).flat_map(|count| [0.0, -0.04, 0.3, -1.2, 20.0].map(|truth| (count, truth))) {
+        for sign in [1.0, -1.0] {
+            let lasts_s = 2.0 + 1.8 * f64::from(count);
+            let times: Vec<f64> = (0..(50.0 * lasts_s) as usize).map(|k| 0.02 * k as f64).collect();
+            let angle = |t: f64| (0..count).map(|k| bend(t, k)).sum::<f64>();
+            let angles: Vec<f64> = times.iter().map(|t| angle(*t)).collect();
+            let readings: Vec<f64> =
+                times.iter().enumerate().map(|(k, t)| 1000.0 + sign * 6.0 * angle(*t) + noise(k)).collect();
+            let clock: Vec<f64> = times.iter().map(|t| t + truth).collect();
+            let found = ohmstrain_bench_data::import::motion_offset((&clock, &readings), (&times, &angles), None);
+            if let Ok(offset) = found {
+                assert!((offset.seconds - truth).abs() < 3.0 * offset.sd_s + 0.05, "{count} bends: {offset:?} {truth}");
+                told += 1;
+            }
+        }
+    }
+    assert!(told > 0);
+}

@@ -51,7 +51,9 @@ pub enum OffsetError {
 /// At each offset within ± `within_s` (all that leave two fifths in common, if there is no limit), the readings are
 /// regressed on what the reference says of them there: its first three powers, and its movements, with and without their
 /// sign, through low-passes of one and eight times the time of a full stretch. Differences that are slower than two full
-/// stretches are larger than what an offset changes, and are taken out of both sides. The best offset is the minimum of the
+/// stretches are larger than what an offset changes, and are taken out of both sides. What an offset leaves without a
+/// counterpart, of the readings or of the reference, whichever is less, is unexplained, too: like movements fit when they are
+/// shifted by one, and the first of them is lost. The best offset is the minimum of the
 /// parabola through the least unexplained variances. A sensor that answers a movement late looks like a clock that is
 /// late: what a sensor has of a lag of its own is part of the answer.
 ///
@@ -69,8 +71,14 @@ pub fn motion_offset(
     let (first, last) = range(&motion, &pull, within_s);
     let count = ((last - first) / coarse).ceil() as usize;
     let offsets: Vec<f64> = (0..=count).map(|i| first + i as f64 * coarse).collect();
-    let shares: Vec<f64> = offsets.iter().map(|offset| pull.blocks(&motion, *offset, 1).unexplained(None)).collect();
-    let (best, least) = minimum(&shares).ok_or(OffsetError::Short)?;
+    let unexplained = |offset: f64| pull.blocks(&motion, offset, 1).unexplained(None);
+    let left = |offset: &f64| {
+        let (share, lost) = (unexplained(*offset), motion.left_out(&pull, *offset));
+        share + (1.0 - share) * lost
+    };
+    let shares: Vec<f64> = offsets.iter().map(left).collect();
+    let (best, _) = minimum(&shares).ok_or(OffsetError::Short)?;
+    let least = unexplained(offsets[best]);
     if least > MOST_UNEXPLAINED {
         return Err(OffsetError::Unseen(least));
     }

@@ -51,6 +51,24 @@ impl Motion {
         (self.start_s, self.start_s + self.step_s * (self.rows.len() - 1) as f64)
     }
 
+    /// Share of the variance that has no counterpart at an offset: of the readings beyond the reference, or of the reference beyond the
+    /// readings, whichever is less.
+    pub(crate) fn left_out(&self, pull: &Pull, offset_s: f64) -> f64 {
+        let ((first_s, last_s), (start_s, end_s)) = (self.span(), pull.span());
+        let share = |all: f64, inside: f64| if all > 0.0 { 1.0 - inside / all } else { 0.0 };
+        let is_known = |time_s: f64| (first_s..=last_s).contains(&(time_s - offset_s));
+        let squares = |is_inside: bool| -> f64 {
+            let rows = pull.rows.iter().filter(|(time_s, _)| !is_inside || is_known(*time_s));
+            rows.map(|(_, value)| value * value).sum()
+        };
+        let is_read = |i: usize| (start_s..=end_s).contains(&(self.start_s + self.step_s * i as f64 + offset_s));
+        let of_reference = |is_inside: bool| -> f64 {
+            let rows = self.rows.iter().enumerate().filter(|(i, _)| !is_inside || is_read(*i));
+            rows.map(|(_, row)| row[0] * row[0]).sum()
+        };
+        share(squares(false), squares(true)).min(share(of_reference(false), of_reference(true)))
+    }
+
     /// The regressors at a time of the reference's clock; `None` outside of it, or where its ends disturb them.
     fn at(&self, time_s: f64) -> Option<Regressors> {
         let place = (time_s - self.start_s) / self.step_s;
