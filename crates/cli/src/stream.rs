@@ -12,7 +12,7 @@ type Source = Box<dyn Read>;
 
 /// Rows of a recording or of a device.
 pub enum Rows {
-    Recording(TraceReader<Source>),
+    Recording(Box<TraceReader<Source>>),
     Device(Box<DeviceReader<Source>>),
 }
 
@@ -20,12 +20,13 @@ pub enum Rows {
 pub fn open(args: &FilterArgs) -> Result<Rows, CliError> {
     let (text, metadata) = input::text_of(&args.trace_file, &args.estimate.trace.metadata())?;
     let name = args.trace_file.display().to_string();
+    let recording = |reader| Rows::Recording(Box::new(reader));
     let device = |reader| Rows::Device(Box::new(reader));
     match (&args.header, args.skip_bad) {
-        (None, false) => Ok(Rows::Recording(TraceReader::with_overrides(text, &name, &metadata)?)),
+        (None, false) => Ok(recording(TraceReader::with_overrides(text, &name, &metadata)?)),
         (None, true) => DeviceReader::new(text, &name, &metadata).map(device).map_err(without_header),
         (Some(header), false) => {
-            TraceReader::headless(text, &name, header, &metadata).map(Rows::Recording).map_err(of_header_flag)
+            TraceReader::headless(text, &name, header, &metadata).map(recording).map_err(of_header_flag)
         }
         (Some(header), true) => {
             DeviceReader::headless(text, &name, header, &metadata).map(device).map_err(of_header_flag)

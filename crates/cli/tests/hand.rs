@@ -186,3 +186,28 @@ fn a_plan_says_what_recordings_tell_and_what_sampling_leaves() {
     let illustrative = bench.run(&["plan", "--material", "ecoflex-00-30"]).ok();
     assert!(illustrative.contains("an illustrative sensor (ecoflex-00-30)"), "{illustrative}");
 }
+
+/// A board that starts again, with its header or without, starts the filters of all joints again.
+#[test]
+fn filters_of_all_joints_start_again_with_the_clock() {
+    let bench = Bench::calibrated();
+    let joint = |name: &str| {
+        format!("[[joints]]\nname = \"{name}\"\ncolumn = \"{name}\"\nsensor = \"sensor.toml\"\njoint = \"{JOINT}\"\n")
+    };
+    bench.write("hand.toml", format!("format = 1\n{}{}", joint("a"), joint("b")));
+    let rows = |from: usize| -> String {
+        (from..50).map(|row| format!("{:.1},{},{}\n", 0.2 * row as f64, 1700 + 5 * row, 1800 - row)).collect()
+    };
+    let header = "time_s,a,b\n";
+    let hand = ["hand", "hand.toml", "--skip-bad"];
+    let alone = |rows: &str| bench.feed(&hand, format!("{header}{rows}")).ok();
+    // Two rows tell that the clock has started again, the third is the first that counts.
+    for (between, rest) in [("", rows(2)), (header, rows(0))] {
+        let run = bench.feed(&hand, format!("{header}{}{between}{}", rows(0), rows(0)));
+        assert!(run.warnings.concat().contains("the clock has started again"), "{:?}", run.warnings);
+        let second: Vec<String> = alone(&rest).lines().skip(1).map(|row| format!("{row}\n")).collect();
+        assert_eq!(run.ok(), alone(&rows(0)) + &second.concat());
+    }
+    let strict = bench.feed(&hand[..2], format!("{header}{}{}", rows(0), rows(0)));
+    assert!(strict.code == Some(4) && strict.stderr.contains("--skip-bad goes on"), "{}", strict.stderr);
+}

@@ -89,5 +89,7 @@ fn a_device_takes_the_rows() {
 fn batch_names_its_outputs_itself() {
     let bench = Bench::calibrated();
     let batch = ["batch", "filter", "trace.csv", "--sensor", "sensor.toml", "-o", "out", "--", "-o", "mine.csv"];
-    bench.run(&batch).fails(2, "batch names the outputs itself, or as the manifest's `output` says");
+    bench
+        .run(&batch)
+        .fails(2, "batch names the outputs itself, or as the manifest's columns `output`, `report` and `figures` say");
 }

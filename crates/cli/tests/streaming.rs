@@ -325,3 +325,87 @@ fn a_stream_may_begin_with_something_else_or_in_its_middle() {
     let odd = bench.feed(&[&FILTER[..], &["--header", "a,b"]].concat(), "1,2\n");
     odd.fails(2, "--header: expected a header with the column `time_s` or `time_us`, found `a,b`");
 }
+
+/// Rows of a clock that starts at zero, `count` of them, each 0.2 s after the one before.
+fn clock(count: usize) -> String {
+    (0..count).map(|row| format!("{:.1},{}\n", 0.2 * row as f64, 1600 + 5 * (row % 40))).collect()
+}
+
+/// The clock of a board that was reset begins anew, with its header or without, and so does the filter: at once, once.
+#[test]
+fn a_clock_that_starts_again_goes_on() {
+    let bench = Bench::calibrated();
+    let skipping = [&FILTER[..], &["--skip-bad"]].concat();
+    let header = "time_s,resistance_ohm\n";
+    let (first, second) = (clock(100), clock(50));
+    let alone = |rows: &str| bench.feed(&FILTER, format!("{header}{rows}")).ok();
+    // Without a header two rows are late before the third tells that the clock has started again.
+    let from_third = second.splitn(3, '\n').nth(2).unwrap();
+    let cases = [("", from_third, 104, 2), ("boot\ntime_s,resistance_ohm\n", &second, 104, 1)];
+    for (between, rest, line, skipped) in cases {
+        for lag in [&[][..], &["--lag-s", "0.5"]] {
+            let stream = format!("{header}{first}{between}{second}");
+            let run = bench.feed(&[&skipping[..], lag].concat(), stream.as_str());
+            let at = format!("ohmstrain: warning: stdin:{line}: the clock has started again, at ");
+            assert!(run.warnings.iter().any(|said| said.starts_with(&at)), "{:?}", run.warnings);
+            let lines =
+                if skipped == 1 { "1 line was skipped".to_owned() } else { format!("{skipped} lines were skipped") };
+            assert!(run.warnings.iter().any(|said| said.contains(&lines)), "{:?}", run.warnings);
+            let estimates = run.ok();
+            assert_eq!(Csv::new(&estimates).len(), 100 + rest.lines().count(), "{between:?} {lag:?}");
+            if lag.is_empty() {
+                let own: Vec<String> = alone(rest).lines().skip(1).map(str::to_owned).collect();
+                assert_eq!(estimates, alone(&first) + &own.join("\n") + "\n");
+            }
+        }
+    }
+    // One late row, late rows now and then, and late rows that do not go on from each other are bad lines and no clock.
+    let strays = first.replace("10.0,", "3.0,1600\n10.0,").replace("15.0,", "4.0,1\n3.9,1\n3.8,1\n3.7,1\n15.0,");
+    let run = bench.feed(&skipping, format!("{header}{strays}"));
+    assert!(run.warnings.concat().contains("5 lines were skipped") && run.warnings.len() == 1, "{:?}", run.warnings);
+    assert_eq!(run.ok(), alone(&first));
+}
+
+/// It is said while the stream goes on.
+#[test]
+fn a_clock_that_starts_again_is_said_at_once() {
+    let bench = Bench::calibrated();
+    let arguments = [&FILTER[..], &["--skip-bad"]].concat();
+    let mut child = start(&bench, &arguments);
+    let answers = lines_of(&mut child);
+    let mut said = BufReader::new(child.stderr.take().unwrap());
+    let mut stdin = child.stdin.take().unwrap();
+    write!(stdin, "time_s,resistance_ohm\n{}{}", clock(40), clock(3)).unwrap();
+    stdin.flush().unwrap();
+    let mut first = String::new();
+    said.read_line(&mut first).unwrap();
+    assert!(first.starts_with("ohmstrain: warning: stdin:44: the clock has started again, at 0.4 s"), "{first}");
+    let rows: Vec<String> = (0..42).map(|_| answers.recv_timeout(PATIENCE).unwrap()).collect();
+    assert!(rows[41].starts_with("0.4,1610,"), "{}", rows[41]);
+    drop(stdin);
+    assert!(child.wait().unwrap().success());
+}
+
+/// What is known of the first clock is not known of the second.
+#[test]
+fn a_second_clock_has_no_known_strains() {
+    let bench = Bench::calibrated();
+    let known = ["--skip-bad", "--known", "1:0.2", "--initial-strain", "0"];
+    let stream = format!("time_s,resistance_ohm\n{}time_s,resistance_ohm\n{}", clock(60), clock(50));
+    let run = bench.feed(&[&FILTER[..], &known].concat(), stream);
+    let second: Vec<String> = run.ok().lines().skip(61).map(str::to_owned).collect();
+    let alone = bench.feed(&FILTER, format!("time_s,resistance_ohm\n{}", clock(50))).ok();
+    assert_eq!(second, alone.lines().skip(1).collect::<Vec<_>>());
+}
+
+#[test]
+fn a_recording_whose_clock_starts_again_is_refused_with_a_way_out() {
+    let bench = Bench::calibrated();
+    bench.write("twice.csv", format!("time_s,resistance_ohm\n{}{}", clock(60), clock(60)));
+    let late = "twice.csv:62: column `time_s`: expected a time after 11.8 s, found `0.0`; if the clock has started again there, ";
+    let filter = bench.run(&["filter", "twice.csv", "--sensor", "sensor.toml"]);
+    filter.fails(4, &format!("{late}--skip-bad goes on with another filter"));
+    let smooth = bench.run(&["smooth", "twice.csv", "--sensor", "sensor.toml"]);
+    smooth.fails(4, &format!("{late}give each part a file of its own, or `filter --skip-bad` both"));
+    assert!(bench.run(&["filter", "twice.csv", "--sensor", "sensor.toml", "--skip-bad"]).code == Some(0));
+}

@@ -46,7 +46,8 @@ mod tests {
             let help = [command.render_help(), command.render_long_help()].map(|help| help.to_string()).concat();
             let is_type = |word: &&str| {
                 let letters: Vec<char> = word.chars().collect();
-                letters.windows(2).any(|pair| pair[0].is_lowercase() && pair[1].is_uppercase())
+                let is_second = |at: &[char]| at[0].is_lowercase() && at[1].is_uppercase() && at[2].is_lowercase();
+                letters.first().is_some_and(|first| first.is_uppercase()) && letters.windows(3).any(is_second)
             };
             let types: Vec<&str> = help.split(|c: char| !c.is_alphanumeric()).filter(is_type).collect();
             assert!(types.is_empty(), "{}: {types:?}", command.get_name());

@@ -216,28 +216,28 @@ fn check_arguments(job: &mut Job, args: &BatchArgs) -> Result<(), CliError> {
         let text = text.lines().map(str::trim).take_while(|line| !line.is_empty()).collect::<Vec<_>>().join(" ");
         CliError::Arguments(format!("{}: {}", job.name(), text.trim_start_matches("error: ")))
     })?;
-    let written = match parsed.command {
+    let (output, beside) = match parsed.command {
         Command::Calibrate(calibrate) => {
             job.prior = calibrate.prior;
-            vec![calibrate.report.report, calibrate.report.figures]
+            (None, vec![calibrate.report.report, calibrate.report.figures])
         }
         Command::Filter(filter) => {
             job.estimator = filter.estimate.estimator.chosen().map(|estimator| estimator.0);
-            vec![filter.written.output]
+            (filter.written.output, vec![])
         }
         Command::Smooth(smooth) => {
             job.estimator = smooth.estimate.estimator.chosen().map(|estimator| estimator.0);
-            vec![smooth.written.output]
+            (smooth.written.output, vec![])
         }
         Command::Evaluate(evaluate) => {
             job.estimator = if let Estimators::One(kind) = evaluate.estimator { Some(kind) } else { None };
-            vec![evaluate.report.report, evaluate.report.figures]
+            (None, vec![evaluate.report.report, evaluate.report.figures])
         }
-        _ => vec![],
+        _ => (None, vec![]),
     };
     // What a manifest names lies in the folder of outputs; behind `--` one name would be written by each recording.
     let named = |path: &PathBuf| path.starts_with(&args.output) && !args.flags.iter().any(|flag| is_output(flag));
-    if !written.iter().flatten().all(named) {
+    if output.is_some() || !beside.iter().flatten().all(named) {
         let what = "batch names the outputs itself, or as the manifest's columns `output`, `report` and `figures` say";
         return Err(CliError::Arguments(what.into()));
     }
@@ -245,7 +245,7 @@ fn check_arguments(job: &mut Job, args: &BatchArgs) -> Result<(), CliError> {
 }
 
 fn is_output(flag: &str) -> bool {
-    ["-o", "--output", "--report", "--figures"].contains(&flag.split('=').next().unwrap_or_default())
+    ["--report", "--figures"].contains(&flag.split('=').next().unwrap_or_default())
 }
 
 /// A sensor that recordings share is said to be none, or none for their estimator, before anything is done, and once.
