@@ -69,17 +69,8 @@ impl Printed {
         if !flags.is_empty() {
             returned = Some(flags.join(" |\n           "));
         }
-        for parameter in self.parameters {
-            let name = parameter.rsplit(' ').next().and_then(|name| name.split('[').next()).unwrap_or(parameter);
-            if !takes(&self.function, &body.uses, |input| is_own(input, name)) {
-                let _ = writeln!(body.lines, "    (void){name};");
-            }
-        }
         let returns = returned.map_or_else(String::new, |value| format!("    return {value};\n"));
         let has_state = inputs.iter().any(|name| matches!(name, Name::Field(_))) || changes;
-        if has_state && !changes && !takes(&self.function, &body.uses, |name| matches!(name, Name::Field(_))) {
-            body.lines.push_str("    (void)seen;\n");
-        }
         let seen = if changes { "readings *seen" } else { "const readings *seen" };
         let parameters: Vec<String> = has_state
             .then(|| seen.to_owned())
@@ -87,29 +78,22 @@ impl Printed {
             .chain(self.parameters.iter().map(|parameter| (*parameter).to_owned()))
             .chain(outputs)
             .collect();
-        format!(
-            "/* {} */\nstatic {kind} {}({})\n{{\n{}{written}{returns}}}\n",
-            self.comment,
-            self.name,
-            parameters.join(", "),
-            body.lines
-        )
+        let body = format!("{}{written}{returns}", body.lines);
+        defined(self.comment, &format!("{kind} {}", self.name), &parameters, &body)
     }
 }
 
-/// Whether an input is used that is of some kind.
-fn takes(function: &Function, uses: &[usize], is_of_kind: impl Fn(&Name) -> bool) -> bool {
-    function.recorded.operations.iter().zip(uses).any(|(operation, uses)| match operation {
-        Operation::Input(input) | Operation::Flag(input) => {
-            *uses > 0 && function.inputs.get(*input).is_some_and(&is_of_kind)
-        }
-        _ => false,
-    })
-}
-
-/// Whether an input is a parameter of this name, or an entry of it.
-fn is_own(input: &Name, parameter: &str) -> bool {
-    matches!(input, Name::Own(own) if own.split('[').next() == Some(parameter))
+/// A function of this kind and name. What it does not use of its parameters is said: compilers warn of it.
+pub fn defined(comment: &str, name: &str, parameters: &[String], body: &str) -> String {
+    let is_of_names = |c: char| c.is_alphanumeric() || c == '_';
+    let name_of = |parameter: &String| {
+        let declared = parameter.split('[').next().unwrap_or_default();
+        declared.rsplit(|c| !is_of_names(c)).next().unwrap_or_default().to_owned()
+    };
+    let is_unused = |name: &String| body.split(|c| !is_of_names(c)).all(|word| word != name);
+    let unused: String =
+        parameters.iter().map(name_of).filter(is_unused).map(|name| format!("    (void){name};\n")).collect();
+    format!("/* {comment} */\nstatic {name}({})\n{{\n{unused}{body}}}\n", parameters.join(", "))
 }
 
 fn in_c(name: &Name) -> String {

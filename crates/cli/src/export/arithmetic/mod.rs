@@ -12,6 +12,7 @@ use ohmstrain_model::Phase;
 
 pub use around::Around;
 use body::Body;
+use function::defined;
 
 /// A function to be printed.
 struct Function {
@@ -276,10 +277,10 @@ impl Function {
             let _ = writeln!(results, "    return {};", body.value(*place));
         }
         let kind = self.returns.kind();
-        format!("/* {} */\nstatic {kind} {}({parameters})\n{{\n{}{results}}}\n", self.comment, self.name, body.lines)
+        defined(self.comment, &format!("{kind} {}", self.name), &parameters, &format!("{}{results}", body.lines))
     }
 
-    fn parameters(&self, takes_step: bool) -> String {
+    fn parameters(&self, takes_step: bool) -> Vec<String> {
         let constant = if self.piece.changes_state() { "" } else { "const " };
         let mut all = Vec::new();
         if self.has_state {
@@ -295,7 +296,7 @@ impl Function {
         }
         all.extend(self.outputs.iter().map(|name| format!("float *{name}")));
         all.extend(takes_step.then(|| "const float s[STEP]".to_owned()));
-        all.join(", ")
+        all
     }
 
     /// What the inputs between state and step are called.
