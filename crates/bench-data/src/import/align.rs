@@ -14,6 +14,8 @@ const SLOW: f64 = 2.0;
 const OTHER_SLOW: [f64; 2] = [1.0, 4.0];
 /// Above this unexplained share of the readings' variance the motion does not show in them.
 const MOST_UNEXPLAINED: f64 = 0.6;
+/// Less than this unexplained share is as good.
+const EXPLAINED: f64 = 1e-3;
 /// Another offset is worse only if that shows in the blocks by this many standard errors.
 const SURE: f64 = 3.0;
 
@@ -51,10 +53,9 @@ pub enum OffsetError {
 /// At each offset within ± `within_s` (all that leave two fifths in common, if there is no limit), the readings are
 /// regressed on what the reference says of them there: its first three powers, and its movements, with and without their
 /// sign, through low-passes of one and eight times the time of a full stretch. Differences that are slower than two full
-/// stretches are larger than what an offset changes, and are taken out of both sides. What an offset leaves without a
-/// counterpart, of the readings or of the reference, whichever is less, is unexplained, too: like movements fit when they are
-/// shifted by one, and the first of them is lost. The best offset is the minimum of the
-/// parabola through the least unexplained variances. A sensor that answers a movement late looks like a clock that is
+/// stretches are larger than what an offset changes, and are taken out of both sides. The logarithm of what stays unexplained counts
+/// by the share of the motion that has a counterpart: like movements fit when they are shifted by one, but the first of them is lost.
+/// The best offset is the minimum of the parabola through the least unexplained variances. A sensor that answers a movement late looks like a clock that is
 /// late: what a sensor has of a lag of its own is part of the answer.
 ///
 /// # Errors
@@ -72,11 +73,8 @@ pub fn motion_offset(
     let count = ((last - first) / coarse).ceil() as usize;
     let offsets: Vec<f64> = (0..=count).map(|i| first + i as f64 * coarse).collect();
     let unexplained = |offset: f64| pull.blocks(&motion, offset, 1).unexplained(None);
-    let left = |offset: &f64| {
-        let (share, lost) = (unexplained(*offset), motion.left_out(&pull, *offset));
-        share + (1.0 - share) * lost
-    };
-    let shares: Vec<f64> = offsets.iter().map(left).collect();
+    let weighed = |offset: &f64| (1.0 - motion.left_out(&pull, *offset)) * unexplained(*offset).max(EXPLAINED).ln();
+    let shares: Vec<f64> = offsets.iter().map(weighed).collect();
     let (best, _) = minimum(&shares).ok_or(OffsetError::Short)?;
     let least = unexplained(offsets[best]);
     if least > MOST_UNEXPLAINED {
