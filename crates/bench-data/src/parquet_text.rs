@@ -16,6 +16,8 @@ use crate::rows::append_number;
 const MAGIC: &[u8; 4] = b"PAR1";
 /// Rows that become text at once.
 const ROWS_AT_ONCE: usize = 256;
+/// Bytes of a text as a cell, where only numbers have a meaning: more of it would be in no message.
+const LONGEST_TEXT: usize = 1024;
 
 /// A trace in a Parquet file, as the text of the trace CSV that it stands for: line 1 is the header, data row k line k + 1.
 ///
@@ -128,7 +130,8 @@ fn push_cell(cell: &Field, out: &mut Vec<u8>) {
 
 /// Text as a cell on one line, in quotation marks if it needs them.
 fn push_text(text: &str, out: &mut Vec<u8>) {
-    let text = text.trim().replace(char::is_control, " ");
+    let text = text.trim();
+    let text = text[..text.floor_char_boundary(LONGEST_TEXT)].replace(char::is_control, " ");
     if text.contains([',', '"']) {
         out.extend(format!("\"{}\"", text.replace('"', "\"\"")).bytes());
     } else {

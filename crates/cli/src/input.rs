@@ -69,28 +69,33 @@ pub fn is_stdin(path: &Path) -> bool {
     path == Path::new("-")
 }
 
-/// Reads a whole recording.
+/// Reads a whole recording, of as many rows as there may be.
 pub fn read(path: &Path, overrides: &Metadata) -> Result<TraceFile, CliError> {
-    let mut bytes = Vec::new();
     if is_stdin(path) {
-        io::stdin().lock().read_to_end(&mut bytes)
-    } else {
-        File::open(path).and_then(|mut file| file.read_to_end(&mut bytes))
+        return of_text(&mut io::stdin().lock(), path, overrides);
     }
-    .map_err(|error| CliError::file("read", path, &error))?;
-    parse(&bytes, path, overrides)
+    let unreadable = |error| CliError::file("read", path, &error);
+    let mut file = BufReader::new(File::open(path).map_err(unreadable)?);
+    if ParquetText::is_one(file.fill_buf().map_err(unreadable)?) {
+        let sha256 = sha256_of(path).map_err(unreadable)?;
+        let (text, metadata) = text_of_parquet(path, overrides)?;
+        return collect(TraceReader::with_overrides(text, &path.display().to_string(), &metadata)?, sha256);
+    }
+    of_text(&mut file, path, overrides)
 }
 
 /// A whole recording of these bytes.
-pub fn parse(bytes: &[u8], path: &Path, overrides: &Metadata) -> Result<TraceFile, CliError> {
-    refuse_parameters(path, bytes)?;
-    let sha256 = hexadecimal(&Sha256::digest(bytes));
-    let name = path.display().to_string();
-    if ParquetText::is_one(bytes) {
-        let (text, metadata) = text_of_parquet(path, overrides)?;
-        return collect(TraceReader::with_overrides(text, &name, &metadata)?, sha256);
-    }
-    collect(TraceReader::with_overrides(bytes, &name, overrides)?, sha256)
+pub fn parse(mut bytes: &[u8], path: &Path, overrides: &Metadata) -> Result<TraceFile, CliError> {
+    of_text(&mut bytes, path, overrides)
+}
+
+fn of_text<R: BufRead>(source: &mut R, path: &Path, overrides: &Metadata) -> Result<TraceFile, CliError> {
+    refuse_parameters(path, source.fill_buf().map_err(|error| CliError::file("read", path, &error))?)?;
+    let mut digest = Sha256::new();
+    let hashed = Hashed { source, digest: &mut digest };
+    let rows = TraceReader::with_overrides(hashed, &path.display().to_string(), overrides)?;
+    let file = collect(rows, String::new())?;
+    Ok(TraceFile { sha256: hexadecimal(&digest.finalize()), ..file })
 }
 
 fn collect<R: Read>(rows: TraceReader<R>, sha256: String) -> Result<TraceFile, CliError> {
@@ -98,12 +103,29 @@ fn collect<R: Read>(rows: TraceReader<R>, sha256: String) -> Result<TraceFile, C
     Ok(TraceFile { name, header, sha256, first_row: 0, trace: Trace::collect(rows)? })
 }
 
+/// A source whose bytes are hashed as they are read.
+struct Hashed<'a, R> {
+    source: &'a mut R,
+    digest: &'a mut Sha256,
+}
+
+impl<R: Read> Read for Hashed<'_, R> {
+    fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
+        let count = self.source.read(out)?;
+        self.digest.update(&out[..count]);
+        Ok(count)
+    }
+}
+
 fn hexadecimal(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// SHA-256 of a file's bytes, hexadecimal.
+/// SHA-256 of a file's bytes, hexadecimal. A device may have no end, and a pipe can be read once.
 pub fn sha256_of(path: &Path) -> io::Result<String> {
+    if !path.metadata()?.is_file() {
+        return Err(io::Error::other("expected a file, found a device, a pipe or a folder"));
+    }
     let (mut file, mut digest, mut bytes) = (File::open(path)?, Sha256::new(), vec![0; READ_AT_ONCE]);
     loop {
         match file.read(&mut bytes)? {

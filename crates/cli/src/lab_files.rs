@@ -7,6 +7,7 @@ use crate::error::{CliError, shell_word};
 use crate::input::is_stdin;
 use crate::output::{Kind, is_of_a_hand};
 use crate::sensor_file;
+use crate::whole_file;
 
 /// Bytes that tell what a file is.
 const HEAD: u64 = 4096;
@@ -43,19 +44,9 @@ pub fn read(paths: &[PathBuf], recipe: &Recipe) -> Result<Vec<Table>, CliError> 
     }
     let table = |(index, path): (usize, &PathBuf)| {
         let name = if is_stdin(path) { "stdin".to_owned() } else { path.display().to_string() };
-        Ok(read_table(bytes(path)?, &name, &recipe.read_options(index))?)
+        Ok(read_table(whole_file::bytes(path)?, &name, &recipe.read_options(index))?)
     };
     paths.iter().enumerate().map(table).collect()
-}
-
-fn bytes(path: &Path) -> Result<Vec<u8>, CliError> {
-    let mut bytes = Vec::new();
-    let read = if is_stdin(path) {
-        std::io::stdin().lock().read_to_end(&mut bytes).map(|_| bytes)
-    } else {
-        std::fs::read(path)
-    };
-    read.map_err(|error| CliError::file("read", path, &error))
 }
 
 /// The command that imports files as planned, ready for a shell.

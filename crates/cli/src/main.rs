@@ -24,6 +24,7 @@ mod sensor_file;
 mod stream;
 mod suits;
 mod verbosity;
+mod whole_file;
 
 use std::borrow::Cow;
 use std::io::{self, Write};

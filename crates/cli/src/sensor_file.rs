@@ -1,9 +1,9 @@
-use std::fs;
 use std::path::Path;
 
 use ohmstrain::{EstimatorKind, Sensor, SensorParams};
 
 use crate::error::CliError;
+use crate::whole_file;
 
 /// What a file is in which joints are described.
 pub const A_HAND: &str = "is the description of a hand, not of a sensor: give it to `ohmstrain hand`";
@@ -11,9 +11,7 @@ pub const A_HAND: &str = "is the description of a hand, not of a sensor: give it
 /// Reads a sensor and checks that the estimator (or the file's choice) can be made of it.
 pub fn read(path: &Path, estimator: Option<EstimatorKind>) -> Result<Sensor, CliError> {
     let name = path.display().to_string();
-    let bytes = fs::read(path).map_err(|error| CliError::file("read", path, &error))?;
-    let text = String::from_utf8(bytes)
-        .map_err(|_| CliError::Input(format!("{name}:1: expected a text file in UTF-8, found other bytes")))?;
+    let text = whole_file::text(path)?;
     if is_recording(&text) {
         return Err(CliError::Input(format!(
             "{name} is a recording, not a sensor file: give --sensor what `ohmstrain calibrate` wrote, and the recording by itself"

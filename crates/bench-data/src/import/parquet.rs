@@ -4,6 +4,7 @@ use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::record::Field;
 use parquet::schema::types::Type;
 
+use crate::import::bounds::{LARGEST_FILE, check_cells, mib};
 use crate::import::error::ImportError;
 use crate::import::names;
 use crate::import::table::{Cells, Column, Layout, Table};
@@ -15,11 +16,18 @@ pub(crate) fn read(bytes: Vec<u8>, name: &str) -> Result<Table, ImportError> {
     let reader = SerializedFileReader::new(Bytes::from(bytes)).map_err(broken)?;
     let fields = reader.metadata().file_metadata().schema().get_fields();
     let mut columns: Vec<Column> = fields.iter().map(|field| column(field)).collect();
-    let mut lines = Vec::new();
+    let (mut lines, mut left) = (Vec::new(), LARGEST_FILE as usize);
+    // A run of equal values takes no more room in the file than one of them.
     for row in reader.get_row_iter(None).map_err(broken)? {
         lines.push(lines.len() as u64 + 1);
+        check_cells(name, lines.len(), columns.len())?;
         for (column, (_, field)) in columns.iter_mut().zip(row.map_err(broken)?.get_column_iter()) {
-            column.cells.push(&cell(field));
+            let text = cell(field);
+            left = left.checked_sub(text.len()).ok_or_else(|| {
+                let most = mib(LARGEST_FILE);
+                ImportError::unreadable(name, format!("expected at most {most} MiB of text, found more: take a part of it"))
+            })?;
+            column.cells.push(&text);
         }
     }
     if lines.is_empty() {

@@ -275,6 +275,9 @@ impl Skipped {
 /// Rows without a reading among which a reading is looked for, where it is not needed.
 const MOST_FIRST_ROWS: usize = 10 * FIRST_READINGS;
 
+/// Rows among which readings are looked for that are needed: a bound on memory, and days at 10 Hz.
+const MOST_WAITING_ROWS: usize = 1 << 20;
+
 /// The first rows: until `wanted` readings are known, or `enough` of them and many rows. An error ends them; it is returned
 /// if fewer readings than that are known.
 fn first_rows(
@@ -284,7 +287,7 @@ fn first_rows(
     wanted: usize,
 ) -> Result<Vec<Result<DeviceRow, TraceError>>, CliError> {
     let (mut first, mut known) = (Vec::new(), 0);
-    for row in rows {
+    while let Some(row) = rows.next() {
         let passed_over = skips_bad && matches!(row, Err(TraceError::Content(_)));
         let row = if known < enough && !passed_over { Ok(row.map_err(|error| late(error, SKIPS))?) } else { row };
         known += usize::from(row.as_ref().is_ok_and(|row| row.row.reading.value.is_finite()));
@@ -293,6 +296,13 @@ fn first_rows(
         let is_enough = !passed_over && known >= wanted;
         if failed || is_enough || (known >= enough && first.len() >= MOST_FIRST_ROWS) {
             break;
+        }
+        if first.len() == MOST_WAITING_ROWS {
+            return Err(CliError::Input(format!(
+                "{}:{}: --rest-resistance: expected {enough} readings among the first {MOST_WAITING_ROWS} lines, found {known}",
+                rows.file(),
+                rows.line()
+            )));
         }
     }
     Ok(first)

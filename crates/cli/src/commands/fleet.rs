@@ -1,4 +1,3 @@
-use std::fs;
 use std::path::Path;
 
 use ohmstrain::{Prior, Sensor};
@@ -9,6 +8,7 @@ use crate::error::CliError;
 use crate::output::{Kind, Outputs, print};
 use crate::sensor_file;
 use crate::verbosity::Verbosity;
+use crate::whole_file;
 
 /// Learns from sensors of one make.
 pub fn run(args: &FleetArgs) -> Result<(), CliError> {
@@ -51,6 +51,6 @@ fn told(prior: &Prior, output: &Path) -> String {
 
 /// Reads what a fleet has taught.
 pub fn read(path: &Path) -> Result<Prior, CliError> {
-    let text = fs::read_to_string(path).map_err(|error| CliError::file("read", path, &error))?;
+    let text = whole_file::text(path)?;
     Prior::from_toml(&text).map_err(|error| CliError::Input(error.in_file(&path.display().to_string())))
 }

@@ -1,6 +1,6 @@
 use std::collections::HashMap;
 use std::fs::{self, File, OpenOptions};
-use std::io::{ErrorKind, Write};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
@@ -10,6 +10,7 @@ use super::scores::Figures;
 use crate::error::CliError;
 use crate::input::sha256_of;
 use crate::output::is_this_program;
+use crate::whole_file;
 
 /// What became of a job: a line of the journal, a row of the summary.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
@@ -92,10 +93,7 @@ impl Journal {
     /// with `force` only.
     pub fn open(folder: &Path, force: bool) -> Result<Self, CliError> {
         let path = folder.join(JOURNAL);
-        let bytes = match fs::read(&path) {
-            Err(error) if error.kind() == ErrorKind::NotFound => Vec::new(),
-            read => read.map_err(|error| CliError::file("read", &path, &error))?,
-        };
+        let bytes = if path.exists() { whole_file::bytes(&path)? } else { Vec::new() };
         let mut text = String::from_utf8_lossy(&bytes).into_owned();
         if !is_ours(&text) {
             if !force {

@@ -11,6 +11,7 @@ use super::summary::SUMMARY;
 use crate::args::{Args, BatchArgs, BatchCommand, Command, Estimators};
 use crate::error::CliError;
 use crate::sensor_file;
+use crate::whole_file;
 
 /// Recordings that are done together, and what comes of them.
 #[derive(Clone, Debug, Default)]
@@ -101,7 +102,8 @@ fn matching(pattern: &str) -> Result<Vec<PathBuf>, CliError> {
 /// The rows of a manifest. Of `calibrate`, those with the same sensor are one job.
 fn listed(manifest: &Path, args: &BatchArgs, plain: &dyn Fn(PathBuf) -> Job) -> Result<Vec<Job>, CliError> {
     let wrong = |error: csv::Error| CliError::Input(format!("{}: {error}", manifest.display()));
-    let mut rows = Reader::from_path(manifest).map_err(wrong)?;
+    let text = whole_file::text(manifest)?;
+    let mut rows = Reader::from_reader(text.as_bytes());
     let header = rows.headers().map_err(wrong)?.clone();
     if !header.iter().any(|name| name.trim() == "file") {
         let found = header.iter().collect::<Vec<_>>().join(",");

@@ -1,4 +1,3 @@
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
@@ -7,6 +6,7 @@ use serde::{Deserialize, Deserializer};
 
 use crate::error::CliError;
 use crate::sensor_file;
+use crate::whole_file;
 
 /// The version of the file that is read.
 const FORMAT: u32 = 1;
@@ -52,7 +52,7 @@ impl Description {
     /// If it cannot be read, or says something that nobody understands.
     pub fn read(path: &Path) -> Result<Self, CliError> {
         let name = path.display();
-        let text = fs::read_to_string(path).map_err(|error| CliError::file("read", path, &error))?;
+        let text = whole_file::text(path)?;
         if sensor_file::is_recording(&text) {
             return Err(CliError::Input(format!(
                 "{name} is a recording, not the description of a hand: give hand.toml first, and the recording after it"

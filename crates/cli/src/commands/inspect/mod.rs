@@ -8,7 +8,7 @@ use ohmstrain_bench_data::{Metadata, Trace};
 
 use crate::args::InspectArgs;
 use crate::error::{CliError, shell_word};
-use crate::input::{self, is_stdin};
+use crate::input;
 use crate::lab_files;
 use crate::output::print;
 
@@ -66,8 +66,9 @@ fn proposed(tables: &[Table], recipe: &Recipe) -> Result<(Plan, Imported, Survey
 
 /// The command that uses a file which reads as it would be imported.
 fn next(files: &[PathBuf], imported: &Trace) -> Option<String> {
+    // What stdin and pipes had in them has been read.
     let [file] = files else { return None };
-    let trace = input::read(file, &Metadata::default()).ok().filter(|_| !is_stdin(file))?.trace;
+    let trace = file.is_file().then(|| input::read(file, &Metadata::default()).ok())??.trace;
     let numbers = |trace: &Trace| -> Vec<u64> {
         let reference = trace.reference.iter().flat_map(|reference| &reference.values);
         trace.time_s.iter().chain(&trace.readings.values).chain(reference).map(|number| number.to_bits()).collect()

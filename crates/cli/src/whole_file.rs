@@ -1,0 +1,43 @@
+//! Files that are read as a whole: no more of them than there may be, so that a device that never ends is refused.
+
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::Path;
+
+use ohmstrain_bench_data::import::LARGEST_FILE;
+
+use crate::error::CliError;
+use crate::input::is_stdin;
+
+/// Bytes of a file of parameters, descriptions or a list of recordings: those of a hundred thousand recordings, and far above
+/// what this program writes.
+const LARGEST_TEXT: u64 = 16 << 20;
+
+/// A lab's file; `-` is stdin.
+pub fn bytes(path: &Path) -> Result<Vec<u8>, CliError> {
+    up_to(LARGEST_FILE, path, "take a part of it, or fewer columns")
+}
+
+/// A file of parameters, or another that people write.
+pub fn text(path: &Path) -> Result<String, CliError> {
+    let bytes = up_to(LARGEST_TEXT, path, "is it another file that was meant?")?;
+    String::from_utf8(bytes).map_err(|_| {
+        let name = path.display();
+        CliError::Input(format!("{name}:1: expected a text file in UTF-8, found other bytes"))
+    })
+}
+
+fn up_to(most: u64, path: &Path, hint: &str) -> Result<Vec<u8>, CliError> {
+    let mut bytes = Vec::new();
+    let read = if is_stdin(path) {
+        io::stdin().lock().take(most + 1).read_to_end(&mut bytes)
+    } else {
+        File::open(path).and_then(|file| file.take(most + 1).read_to_end(&mut bytes))
+    };
+    read.map_err(|error| CliError::file("read", path, &error))?;
+    if bytes.len() as u64 <= most {
+        return Ok(bytes);
+    }
+    let name = if is_stdin(path) { "stdin".into() } else { path.display().to_string() };
+    Err(CliError::Input(format!("{name}: expected a file of at most {} MiB, found a larger one; {hint}", most >> 20)))
+}
