@@ -112,7 +112,7 @@ impl Variant {
         let estimators = self.table("estimators");
         let histories = estimators["hypotheses"].clone();
         estimators.insert("sign-split".into(), histories);
-        for (name, estimator) in estimators.iter_mut() {
+        for (_, estimator) in estimators.iter_mut() {
             let estimator = estimator.as_table_mut().unwrap();
             let noise = estimator["noise"].as_table_mut().unwrap();
             noise.insert("reading_time_s".into(), if alike { 2.4 } else { 0.0 }.into());
@@ -120,13 +120,11 @@ impl Variant {
                 noise.insert("baseline_sd".into(), 0.0.into());
             }
             let Some(phases) = estimator.get_mut("phases").and_then(Value::as_table_mut) else { continue };
-            // A filter of phase histories follows holds, however short.
             if never_rests {
                 phases.insert("reversal".into(), 1.0.into());
             }
             phases.insert("speed_per_s".into(), if of_phase { 0.05 } else { 0.0 }.into());
             phases.insert("tempering".into(), if tempered { 0.5 } else { 1.0 }.into());
-            assert!(name != "ekf");
         }
     }
 

@@ -3,10 +3,10 @@
 use std::fmt::Write;
 
 use crate::common::{Bench, Csv};
-use crate::export::{compile, compilers, run_program};
+use crate::export::{compile, compile_and_run, compilers, run_program};
 
-/// Lengths of the pause, s: from none to a month.
-const PAUSES_S: [f64; 8] = [0.0, 0.5, 7.0, 20.0, 60.0, 3600.0, 86_400.0, 2_592_000.0];
+/// Lengths of the pause, s: from next to none to a month. The shortest is the shortest step of a chip.
+const PAUSES_S: [f64; 8] = [0.004, 0.5, 7.0, 20.0, 60.0, 3600.0, 86_400.0, 2_592_000.0];
 const DT_S: f64 = 0.05;
 /// Rows before the pause of a filter that runs, and after it.
 const BEFORE: usize = 400;
@@ -43,18 +43,60 @@ fn since_the_pause(printed: &str, before: usize) -> Vec<(f64, f64)> {
     table.numbers("strain").into_iter().zip(table.numbers("strain_sd")).skip(1 + before).collect()
 }
 
+/// From none to more than single precision has squares of, before any reading and after some: a pause, and one that ends with a reading.
+const ANY: &str = r#"
+#include "ohmstrain.h"
+#include <math.h>
+#include <stdio.h>
+static const float PAUSE_S[] = {0.0f, 1e-30f, 0.5f, 7.0f, 60.0f, 3600.0f, 86400.0f, 2.592e6f, 1e9f, 1e20f, 3.4e38f};
+static int move_on(ohmstrain_state *state, int steps)
+{
+    int k, refused = 0;
+    for (k = 0; k < steps; k++) {
+        refused += ohmstrain_step(state, OHMSTRAIN_REST_READING * (1.3f + 0.2f * sinf(0.03f * (float)k)), 0.0f, 0) != OHMSTRAIN_OK;
+    }
+    return refused;
+}
+int main(void)
+{
+    int k, refused = 0, unsaid = 0;
+    for (k = 0; k < 22; k++) {
+        const float pause_s = PAUSE_S[k / 2];
+        ohmstrain_state state;
+        ohmstrain_estimate estimate;
+        ohmstrain_start(&state);
+        refused += move_on(&state, k % 2 ? 300 : 0);
+        refused += ohmstrain_predict_for(&state, pause_s) != OHMSTRAIN_OK;
+        ohmstrain_get(&state, &estimate);
+        unsaid += !(estimate.strain_sd > 0.0f && isfinite(estimate.strain_sd));
+        refused += move_on(&state, 300);
+        refused += ohmstrain_step_after(&state, pause_s, 1.4f * OHMSTRAIN_REST_READING, 0.0f, 0) != OHMSTRAIN_OK;
+        ohmstrain_get(&state, &estimate);
+        unsaid += !(estimate.strain_sd > 0.0f && isfinite(estimate.strain_sd));
+        refused += move_on(&state, 300);
+    }
+    printf("%d refused, %d unsaid\n", refused, unsaid);
+    return 0;
+}
+"#;
+
 /// The direction of motion is a polynomial on a chip and an exponential on a computer: see the README.
 #[test]
 fn a_pause_of_any_length_is_answered_as_by_the_program() {
     let bench = Bench::new();
     bench.write("sensor.toml", sensor());
-    let mut worst = Vec::new();
+    let (mut worst, mut answers) = (Vec::new(), Vec::new());
     for estimator in ["corrected", "sign-split", "hypotheses", "ekf"] {
         let export = ["export", "--sensor", "sensor.toml", "--target", "c", "--force", "--estimator", estimator];
         bench.run(&[&export[..], &["--dt-s", &DT_S.to_string(), "-o", "c"]].concat()).ok();
         let sources = ["src/ohmstrain.c", "selftest/replay.c"];
         let program = |compiler| compile(compiler, &bench.path("c"), &sources, &format!("{compiler}.out"));
         let programs: Vec<_> = compilers().into_iter().map(program).collect();
+        bench.write("c/any.c", ANY);
+        for compiler in compilers() {
+            let said = compile_and_run(compiler, &bench.path("c"), &["src/ohmstrain.c", "any.c"], "");
+            answers.push(format!("{estimator}, {compiler}: {said}"));
+        }
         for (before, pause_s) in [0, BEFORE].into_iter().flat_map(|before| PAUSES_S.map(|pause_s| (before, pause_s))) {
             let recording = recording(before, pause_s);
             bench.write("paused.csv", &recording);
@@ -73,5 +115,6 @@ fn a_pause_of_any_length_is_answered_as_by_the_program() {
             }
         }
     }
+    assert!(answers.iter().all(|answer| answer.ends_with(": 0 refused, 0 unsaid\n")), "{answers:?}");
     assert!(worst.iter().all(|(at_end, after)| *at_end < 0.02 && *after < 0.1), "{worst:?}");
 }

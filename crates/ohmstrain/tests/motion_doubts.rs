@@ -62,8 +62,7 @@ fn a_reference_of_the_other_sign_is_asked_about() {
     assert_eq!(names(&[wrong.strain_unit_is_known()]), [""; 0]);
     assert_eq!(names(&[wrong.of_angles_deg()]), [""; 0]);
     // Around zero one recording does not tell, two do.
-    let [around, against]: [Vec<f64>; 2] =
-        [-0.15, 0.15].map(|by| strain.iter().map(|e| (e + by) * f64::signum(-by)).collect());
+    let [around, against] = [1.0, -1.0].map(|sign| strain.iter().map(|e| sign * (e - 0.15)).collect::<Vec<f64>>());
     let pair = [&around, &against].map(|strain| Recording::new(&time_s, &ohm, strain).unwrap());
     assert_eq!(names(&pair[..1]), [""; 0]);
     assert_eq!(names(&pair), ["TurnedApart"]);

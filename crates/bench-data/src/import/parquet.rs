@@ -25,7 +25,10 @@ pub(crate) fn read(bytes: Vec<u8>, name: &str) -> Result<Table, ImportError> {
             let text = cell(field);
             left = left.checked_sub(text.len()).ok_or_else(|| {
                 let most = mib(LARGEST_FILE);
-                ImportError::unreadable(name, format!("expected at most {most} MiB of text, found more: take a part of it"))
+                ImportError::unreadable(
+                    name,
+                    format!("expected at most {most} MiB of text, found more: take a part of it"),
+                )
             })?;
             column.cells.push(&text);
         }

@@ -6,7 +6,7 @@ use super::{
 };
 use crate::clock::check_time_step;
 use crate::correction::{FeatureScale, ReadingFeatures, filter_inputs};
-use crate::substeps::{Pause, Repeated};
+use crate::substeps::{LONGEST_PAUSE_S, Pause, Repeated};
 use crate::{
     Belief, Gaussian, Guard, Influence, Reading, ReadingVerdict, Real, Recordable, State, StepError, Streak, Substeps,
 };
@@ -218,6 +218,8 @@ impl<'a, T: Real, E: SensorEstimator<T, N, L>, const N: usize, const L: usize> L
     /// As [`Self::step`]; or if `dt_s` is no length of a step.
     pub fn step_after(&mut self, dt_s: T, reading: Option<Reading<T>>) -> Result<LiveEstimate<T>, StepError> {
         check_time_step(dt_s)?;
+        // Single precision has no square of much more.
+        let dt_s = dt_s.min(T::of(LONGEST_PAUSE_S));
         let heard = self.hear(dt_s, reading)?;
         let moments = heard.look.as_ref().unwrap_or(&self.now.state).moments();
         let filtered = self.filtered(&moments);

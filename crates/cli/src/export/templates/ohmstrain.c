@@ -489,6 +489,8 @@ static ohmstrain_status step(ohmstrain_state *state, float dt_s, const float *rh
     float strain, variance, shown = 0.0f, jump = 0.0f;
     int surprises, has_jumped;
 
+    /* Single precision has no square of much more. */
+    dt_s = dt_s < LONGEST_PAUSE_S ? dt_s : LONGEST_PAUSE_S;
     pause.ahead_s += dt_s;
     pause.ahead_s = pause.ahead_s > LONGEST_PAUSE_S ? LONGEST_PAUSE_S : pause.ahead_s;
     pass_time(&seen, dt_s);
