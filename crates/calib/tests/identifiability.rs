@@ -97,7 +97,10 @@ fn holds_shorter_than_a_time_constant_are_asked_to_be_longer() {
     };
     let short = examined(&law(60.0), legs(8.0, 6), 2e-2);
     let [line] = &about_holds(&short)[..] else { panic!("{short}") };
-    assert!(line.starts_with("hold at the largest strain for ") && line.contains("min, release, and rest"), "{short}");
+    assert!(
+        line.starts_with("hold at the largest strain for ") && line.contains(", release, and rest for "),
+        "{short}"
+    );
     let long = examined(&law(60.0), legs(150.0, 6), 1e-3);
     assert!(about_holds(&long).is_empty(), "{long}");
     let tau = long.parameters.names.iter().position(|name| name == "branches[0].tau_s").unwrap();

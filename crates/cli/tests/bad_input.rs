@@ -11,7 +11,7 @@ const ARGUMENTS: i32 = 2;
 const OTHER: i32 = 1;
 
 /// What was there before: a sensor file that may be replaced.
-const OLD: &str = "format = 8\nmade_by = \"ohmstrain 0.0.1\"\n";
+const OLD: &str = "format = 8\nmade_by = \"ohmstrain 0.0.1\"\nquantity = \"strain\"\n";
 
 /// The commands that read a recording, each with a file that it would write.
 const READERS: [&[&str]; 4] = [

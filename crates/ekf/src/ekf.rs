@@ -76,9 +76,14 @@ impl<M> Ekf<M> {
         let mut pause = Pause::none(self.model.longest_step_s()).after(dt_s);
         let mut before = None;
         while let Some(length_s) = pause.step_before_last() {
-            before = Some(self.predict_on(before, belief, length_s));
+            before = Some(self.predict_on(before, belief, &self.model.prepare(length_s)));
         }
-        let (transition, prior) = self.predict_on(before, belief, pause.ahead_s());
+        let (count, length_s) = pause.last_steps();
+        let last = self.model.prepare(length_s);
+        for _ in 1..count {
+            before = Some(self.predict_on(before, belief, &last));
+        }
+        let (transition, prior) = self.predict_on(before, belief, &last);
         self.finish(transition, prior, reading)
     }
 
@@ -105,14 +110,13 @@ impl<M> Ekf<M> {
         &self,
         before: Option<(Transition<T, N, L>, Belief<T, N, L>)>,
         belief: &Belief<T, N, L>,
-        dt_s: T,
+        prepared: &M::Prepared,
     ) -> (Transition<T, N, L>, Belief<T, N, L>)
     where
         M: Dynamics<T, N, L>,
     {
-        let prepared = self.model.prepare(dt_s);
-        let Some((transition, prior)) = before else { return self.predict(belief, &prepared) };
-        let (onward, prior) = self.predict(&prior, &prepared);
+        let Some((transition, prior)) = before else { return self.predict(belief, prepared) };
+        let (onward, prior) = self.predict(&prior, prepared);
         (followed_by(&transition, &onward), prior)
     }
 

@@ -106,6 +106,8 @@ pub use mixture::{Dwell, Evidence, Hypotheses, Imm, Mixture, MixtureResidual, Ph
 pub use particles::{Particle, ParticleCloud, ParticleStep, Particles};
 pub use residual::{LogLikelihood, Residual};
 pub use smooth::{PastStep, rts_step, smooth_back_through};
-pub use substeps::{GRACE as STEP_GRACE, GROWTH as STEP_GROWTH, LONGEST_PAUSE_S, Pause, Repeated, Substeps};
+pub use substeps::{
+    EVENLY as STEP_EVENLY, GRACE as STEP_GRACE, GROWTH as STEP_GROWTH, LONGEST_PAUSE_S, Pause, Repeated, Substeps,
+};
 pub use traits::{Channel, Dynamics, Reading};
 pub use unscented::{Ukf, Unscented};

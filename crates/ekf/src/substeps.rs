@@ -9,16 +9,19 @@ use crate::{Advanced, Estimator, Innovation, Reading, StepError};
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Substeps<E>(pub E);
 
-/// A prepared way over a pause: the steps before the last one, and the last one, prepared.
+/// A prepared way over a pause: whole steps, as many as `count`, and the last steps, which are alike.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Repeated<P, T> {
     before: Pause<T>,
     count: u32,
     last: P,
+    last_count: u8,
 }
 
 /// A step of the longest length shall be one step, whatever rounding says.
 pub const GRACE: f64 = 1.0005;
+/// Up to so many steps of the longest length a pause is divided evenly.
+pub const EVENLY: f64 = 4.0;
 /// A step that is not of the longest length is no longer than this share of the pause that has passed: steps of 2 s within the first
 /// minute left the branches' mean half a deviation off.
 const SHARE: f64 = 1.0 / 64.0;
@@ -67,26 +70,47 @@ impl<T: Scalar> Pause<T> {
     /// Passes a whole step: its length, s, or `None` where less than that is ahead.
     pub fn whole_step(&mut self) -> Option<T> {
         let times = self.times();
-        (self.ahead_s > times * self.longest_s * T::of(GRACE)).then(|| self.pass(times))
+        self.exceeds(times).then(|| self.pass(times))
     }
 
-    /// Passes a step, one of those that remain; its length, s, or `None` where only the last one is ahead.
+    /// Passes a step, one of those that remain; its length, s, or `None` where only the even ones are ahead.
     pub(crate) fn step_before_last(&mut self) -> Option<T> {
         let mut times = self.times();
-        while !(self.ahead_s > times * self.longest_s * T::of(GRACE)) {
+        while !self.exceeds(times) {
             if !(times > T::one()) {
                 return None;
             }
-            times = times * T::of(1.0 / GROWTH);
+            times *= T::of(1.0 / GROWTH);
         }
         Some(self.pass(times))
+    }
+
+    /// The even steps: how many, and their length, s.
+    #[must_use]
+    pub fn last_steps(&self) -> (u8, T) {
+        let (mut count, mut counted) = (1, T::one());
+        let more = self.longest_s * T::of(GRACE);
+        let mut covered = more;
+        // Counted twice, since a conversion would take double precision.
+        while covered < self.ahead_s && counted < T::of(EVENLY) {
+            covered += more;
+            count += 1;
+            counted += T::one();
+        }
+        (count, self.ahead_s / counted)
+    }
+
+    /// Whether more is ahead than such a step, or, of the longest length, than even steps.
+    fn exceeds(&self, times: T) -> bool {
+        let least = if times > T::one() { times } else { T::of(EVENLY) };
+        self.ahead_s > least * self.longest_s * T::of(GRACE)
     }
 
     /// Length of a whole step, in L.
     fn times(&self) -> T {
         let (mut times, growth) = (T::one(), T::of(GROWTH));
         while times * growth <= self.passed * T::of(SHARE) {
-            times = times * growth;
+            times *= growth;
         }
         times
     }
@@ -94,7 +118,7 @@ impl<T: Scalar> Pause<T> {
     fn pass(&mut self, times: T) -> T {
         let step_s = times * self.longest_s;
         self.passed += times;
-        self.ahead_s = self.ahead_s - step_s;
+        self.ahead_s -= step_s;
         step_s
     }
 }
@@ -119,7 +143,8 @@ impl<E> Substeps<E> {
         while end.step_before_last().is_some() {
             count += 1;
         }
-        Repeated { before: pause, count, last: self.0.prepare(end.ahead_s) }
+        let (last_count, length_s) = end.last_steps();
+        Repeated { before: pause, count, last: self.0.prepare(length_s), last_count }
     }
 
     /// Passes the whole steps of a pause.
@@ -173,7 +198,15 @@ impl<E> Substeps<E> {
         E: Estimator<T, N, L>,
     {
         if prepared.count == 0 {
-            return self.0.smooth_back(filtered, &prepared.last, reading, next);
+            if prepared.last_count <= 1 {
+                return self.0.smooth_back(filtered, &prepared.last, reading, next);
+            }
+            let half = prepared.last_count / 2;
+            let [sooner, later] =
+                [half, prepared.last_count - half].map(|last_count| Repeated { last_count, ..*prepared });
+            let middle = self.advance(filtered, &sooner, None)?.state;
+            let Some(between) = self.smooth_back_over(&middle, &later, reading, next)? else { return Ok(None) };
+            return self.smooth_back_over(filtered, &sooner, None, &between);
         }
         // Half of them forward, the rest backward, then the first half: few states at a time.
         let first = prepared.count.div_ceil(2);
@@ -184,9 +217,9 @@ impl<E> Substeps<E> {
             rest.step_before_last().inspect(|length_s| last_s = *length_s)
         });
         self.predict_over(&mut middle, lengths)?;
-        let later = Repeated { before: rest, count: prepared.count - first, last: prepared.last };
+        let later = Repeated { before: rest, count: prepared.count - first, ..*prepared };
         let Some(later) = self.smooth_back_over(&middle, &later, reading, next)? else { return Ok(None) };
-        let sooner = Repeated { count: first - 1, last: self.0.prepare(last_s), ..*prepared };
+        let sooner = Repeated { count: first - 1, last: self.0.prepare(last_s), last_count: 1, ..*prepared };
         self.smooth_back_over(filtered, &sooner, None, &later)
     }
 }
@@ -221,11 +254,14 @@ where
         reading: Option<Reading<T>>,
         next: &mut E::State,
     ) -> Result<Option<Innovation<T>>, StepError> {
-        if prepared.count == 0 {
+        if prepared.count == 0 && prepared.last_count <= 1 {
             return self.0.advance_into(state, &prepared.last, reading, next);
         }
         let (mut between, mut before) = (state.clone(), prepared.before);
         self.predict_over(&mut between, core::iter::from_fn(|| before.step_before_last()))?;
+        for _ in 1..prepared.last_count {
+            between = self.0.advance(&between, &prepared.last, None)?.state;
+        }
         self.0.advance_into(&between, &prepared.last, reading, next)
     }
 
@@ -250,7 +286,8 @@ mod tests {
     /// Lengths of all steps of a pause, in L, the last one included.
     fn lengths(mut pause: Pause<f64>) -> Vec<f64> {
         let mut all: Vec<f64> = core::iter::from_fn(|| pause.step_before_last()).collect();
-        all.push(pause.ahead_s);
+        let (count, length_s) = pause.last_steps();
+        all.extend((0..count).map(|_| length_s));
         all.into_iter().map(|length_s| length_s / pause.longest_s).collect()
     }
 
@@ -265,7 +302,7 @@ mod tests {
         }
         assert_eq!(lengths(Pause::none(f64::INFINITY).after(1e5)).len(), 1);
         // 256 whole lengths, 192 more of each, and at most three of each of what remains.
-        let most = |seconds: f64| 256.0 + 195.0 * (seconds / 0.1 / 256.0).log(GROWTH).ceil().max(0.0) + 1.0;
+        let most = |seconds: f64| 260.0 + 195.0 * (seconds / 0.1 / 256.0).log(GROWTH).ceil().max(0.0) + 1.0;
         for seconds in [60.0, 3600.0, 86_400.0, LONGEST_PAUSE_S] {
             let found = lengths(Pause::none(0.1).after(seconds));
             assert!(found.len() as f64 <= most(seconds), "{seconds} s: {}", found.len());

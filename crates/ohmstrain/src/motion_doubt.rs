@@ -82,6 +82,12 @@ impl Moves {
         };
         let part = still.filter(is_frozen).max_by(|a, b| a.len().cmp(&b.len()))?;
         let (first, last) = (part.first()?, part.last()?);
+        // Readings that have nothing to do with the reference elsewhere are another matter.
+        let elsewhere =
+            self.rows.iter().filter(|row| !(first[0]..=last[0]).contains(&row[0])).copied().collect::<Vec<_>>();
+        if !(correlation(&elsewhere).abs() > FOLLOWS) {
+            return None;
+        }
         Some(CalibrationDoubt::Frozen {
             recording,
             from_s: first[0],
@@ -112,17 +118,15 @@ impl Moves {
             .filter(|()| strokes >= FEWEST_STROKES && lasts_s / strokes > LONGEST_STROKE_S)
             .map(|()| CalibrationDoubt::Milliseconds { recording, step, stroke_s: lasts_s / strokes })
     }
+}
 
-    /// Correlation of readings and reference.
-    fn correlation(&self) -> f64 {
-        let count = self.rows.len() as f64;
-        let mean = |column: usize| self.rows.iter().map(|row| row[column]).sum::<f64>() / count;
-        let means = [mean(1), mean(2)];
-        let sum = |a: usize, b: usize| {
-            self.rows.iter().map(|row| (row[a] - means[a - 1]) * (row[b] - means[b - 1])).sum::<f64>()
-        };
-        sum(1, 2) / (sum(1, 1) * sum(2, 2)).sqrt()
-    }
+/// Correlation of readings and reference; NaN of one that does not move.
+fn correlation(rows: &[[f64; 3]]) -> f64 {
+    let mean = |column: usize| rows.iter().map(|row| row[column]).sum::<f64>() / rows.len() as f64;
+    let means = [mean(1), mean(2)];
+    let sum =
+        |a: usize, b: usize| rows.iter().map(|row| (row[a] - means[a - 1]) * (row[b] - means[b - 1])).sum::<f64>();
+    sum(1, 2) / (sum(1, 1) * sum(2, 2)).sqrt()
 }
 
 /// How far readings move both up and down, behind how a still part begins.
@@ -139,7 +143,7 @@ fn swing(part: &[[f64; 3]]) -> f64 {
 
 /// Two recordings whose readings follow the reference in opposite directions.
 fn turned_apart(moves: &[Moves]) -> Option<CalibrationDoubt> {
-    let place = |is: &dyn Fn(f64) -> bool| moves.iter().position(|moves| is(moves.correlation()));
+    let place = |is: &dyn Fn(f64) -> bool| moves.iter().position(|moves| is(correlation(&moves.rows)));
     let recordings = [place(&|r| r < -FOLLOWS)?, place(&|r| r > FOLLOWS)?];
     Some(CalibrationDoubt::TurnedApart { recordings })
 }

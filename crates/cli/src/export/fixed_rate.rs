@@ -86,14 +86,12 @@ impl<'a, const B: usize, const N: usize> FixedRate<'a, B, N> {
             rest: filter.rest,
         };
         let longest_s = longest_step_s::<B, N, L>(&reference, &parts)? * STEP_GRACE;
-        let count = (f64::from(dt_s) / longest_s).ceil().max(1.0);
-        let usual_s = f64::from(dt_s) / count;
+        let usual_s = f64::from(dt_s) / (f64::from(dt_s) / longest_s).ceil().max(1.0);
         let kernel = |step_s| SparseEkf::<f64, Compact, B, N>::new(reference, step_s).map_err(parameter);
         let numbers = |step_s| exact_numbers(&reference, phases, step_s).map_err(parameter);
         let table = StepTable::new(usual_s, &kernel(usual_s)?.step_names(), numbers)?;
-        // A usual interval that has to be divided is divided evenly; no step is longer than the table.
-        let of_table_s = longest_s.min(table.range.1) / STEP_GRACE;
-        parts.longest_step_s = if count > 1.0 { usual_s } else { of_table_s } as f32;
+        // Not longer than the table either.
+        parts.longest_step_s = (longest_s.min(table.range.1) / STEP_GRACE) as f32;
         let rest_reading = params.rest_reading as f32;
         let rested = params.rested() as f32;
         Ok(Self { reference, model, hypotheses: filter.hypotheses, rest_reading, rested, parts, table })
@@ -133,7 +131,7 @@ impl<'a, const B: usize, const N: usize> FixedRate<'a, B, N> {
     pub fn usual_step_s(&self) -> f32 {
         let mut pause = Pause::none(self.parts.longest_step_s).after(self.parts.dt_s);
         while pause.whole_step().is_some() {}
-        pause.ahead_s()
+        pause.last_steps().1
     }
 
     /// Lengths of the whole steps of a pause, s.

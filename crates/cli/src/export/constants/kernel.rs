@@ -2,7 +2,9 @@
 
 use ohmstrain_calib::{EstimatorKind, HISTORIES, HYPOTHESES};
 use ohmstrain_ekf::record::{MixtureNumbers, shared};
-use ohmstrain_ekf::{Compact, Gaussian, Hypotheses, LONGEST_PAUSE_S, STEP_GRACE, STEP_GROWTH, SignSplit, SparseEkf};
+use ohmstrain_ekf::{
+    Compact, Gaussian, Hypotheses, LONGEST_PAUSE_S, STEP_EVENLY, STEP_GRACE, STEP_GROWTH, SignSplit, SparseEkf,
+};
 use serde::Serialize;
 
 use crate::export::fixed_rate::FixedRate;
@@ -17,6 +19,7 @@ pub struct StepConstants {
     longest_s: Literal,
     grace: Literal,
     growth: Literal,
+    evenly: Literal,
     longest_pause_s: Literal,
     usual: Vec<Literal>,
     /// The numbers of the whole steps of a pause.
@@ -60,6 +63,7 @@ impl StepConstants {
             longest_s: Literal(sensor.parts.longest_step_s),
             grace: Literal(STEP_GRACE as f32),
             growth: Literal(STEP_GROWTH as f32),
+            evenly: Literal(STEP_EVENLY as f32),
             longest_pause_s: Literal(LONGEST_PAUSE_S as f32),
             usual: literals(&sensor.numbers_at(sensor.usual_step_s())),
             whole: sensor.whole_steps_s().into_iter().map(|length_s| literals(&sensor.numbers_at(length_s))).collect(),

@@ -128,6 +128,8 @@ enum {
 /* Length of the usual step, s, and the longest one: longer intervals are divided, in a long pause into whole steps that are
  * GROWTH times as long, and so on. A step of the longest length is one, whatever rounding says. */
 static const float USUAL_S = << steps.usual_s >>f, LONGEST_S = << steps.longest_s >>f, GRACE = << steps.grace >>f, GROWTH = << steps.growth >>f;
+/* Up to so many of the longest steps an interval is divided evenly. */
+static const float EVENLY = << steps.evenly >>f;
 /* A longer pause leaves as little, s. */
 static const float LONGEST_PAUSE_S = << steps.longest_pause_s >>f;
 
@@ -381,8 +383,8 @@ static interval of_length(float step_s, float own[STEP])
     return over;
 }
 
-/* Length of the next step of a pause, in LONGEST_S: 1, or no more than 1/64 of what has passed; 0 if only the last is left. Those that
- * are not whole are parts of the one that would be next. */
+/* Length of the next step of a pause, in LONGEST_S: 1, or no more than 1/64 of what has passed; 0 if only even steps are left. Those
+ * that are not whole are parts of the one that would be next. */
 static float next_step(const ohmstrain_pause *pause, int whole)
 {
     float times = 1.0f;
@@ -390,7 +392,7 @@ static float next_step(const ohmstrain_pause *pause, int whole)
     while (times * GROWTH <= pause->passed * 0.015625f) {
         times *= GROWTH;
     }
-    while (!(pause->ahead_s > times * LONGEST_S * GRACE)) {
+    while (!(pause->ahead_s > (times > 1.0f ? times : EVENLY) * LONGEST_S * GRACE)) {
         if (whole || !(times > 1.0f)) {
             return 0.0f;
         }
@@ -399,7 +401,20 @@ static float next_step(const ohmstrain_pause *pause, int whole)
     return times;
 }
 
-/* Predicts over the steps of a pause, whole ones or all but the last. */
+/* The even steps of what is left of a pause: their length, and how many. */
+static float even_steps(const ohmstrain_pause *pause, int *count)
+{
+    float covered = LONGEST_S * GRACE, counted = 1.0f;
+
+    while (covered < pause->ahead_s && counted < EVENLY) {
+        covered += LONGEST_S * GRACE;
+        counted += 1.0f;
+    }
+    *count = (int)counted;
+    return pause->ahead_s / counted;
+}
+
+/* Predicts over the steps of a pause, whole ones or all but the even ones. */
 static int pass_steps(ohmstrain_state *state, ohmstrain_pause *pause, int whole)
 {
     float own[STEP], times;
@@ -437,16 +452,19 @@ static int advance(ohmstrain_state *state, ohmstrain_pause pause, const float *r
     float own[STEP];
     ohmstrain_state next;
     interval over;
-    int status;
+    int status, count;
 
-    if (!(next_step(&pause, 0) > 0.0f)) {
-        over = of_length(pause.ahead_s, own);
+    over = of_length(even_steps(&pause, &count), own);
+    if (count <= 1 && !(next_step(&pause, 0) > 0.0f)) {
         return last_step(state, &over, rho, extra_variance, flags, residual);
     }
     next = *state;
     status = pass_steps(&next, &pause, 0);
+    over = of_length(even_steps(&pause, &count), own);
+    for (; count > 1 && status == OHMSTRAIN_OK; count--) {
+        status = step_on(&next, &over, (const float *)0, 0.0f, INFINITY, residual);
+    }
     if (status == OHMSTRAIN_OK) {
-        over = of_length(pause.ahead_s, own);
         status = last_step(&next, &over, rho, extra_variance, flags, residual);
     }
     if (status == OHMSTRAIN_OK) {
