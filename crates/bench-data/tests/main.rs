@@ -5,6 +5,8 @@ mod common;
 mod faults;
 mod findings;
 #[cfg(feature = "import")]
+mod import_bounds;
+#[cfg(feature = "import")]
 mod import_clocks;
 #[cfg(feature = "import")]
 mod import_containers;
