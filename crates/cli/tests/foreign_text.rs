@@ -19,7 +19,10 @@ fn what_is_said_of_files_can_be_printed() {
     let name = if cfg!(windows) { "evil.csv".to_owned() } else { format!("{EVIL}.csv") };
     let rows: String = (0..40).map(|row| format!("{}.5,{},{}\n", row, 1600 + row % 7, row % 5)).collect();
     bench.write(&name, format!("Time (s),R {EVIL} (Ohm),Displacement (mm)\n{rows}"));
-    bench.write("evil.toml", format!("format = 8\nmade_by = \"ohmstrain 0.1.0\"\nquantity = \"{EVIL}\"\n"));
+    // As TOML writes it: control characters themselves are no TOML.
+    let escape = |c: char| if c.is_ascii_graphic() { c.to_string() } else { format!("\\u{:04x}", u32::from(c)) };
+    let escaped: String = EVIL.chars().map(escape).collect();
+    bench.write("evil.toml", format!("format = 8\nmade_by = \"ohmstrain 0.1.0\"\nquantity = \"{escaped}\"\n"));
     bench.write("bad.csv", format!("time_s,resistance_ohm\n0,{EVIL}\n"));
     bench.write("meta.csv", format!("# strain_unit = {EVIL}\ntime_s,resistance_ohm,strain\n0,1600,0\n"));
     let columns = format!("strain,{EVIL}");

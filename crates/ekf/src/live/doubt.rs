@@ -248,6 +248,11 @@ impl<T: Recordable> Doubts<T> {
         stated.variance
     }
 
+    /// Whether there has been a reading that was used, or a strain that was known.
+    pub fn has_begun(&self) -> bool {
+        self.unread_s < T::of(NEVER_READ_S)
+    }
+
     /// Takes the time of a row, `dt_s` seconds after the one before.
     pub fn pass(&mut self, dt_s: T) {
         let passed_s = if self.runs { dt_s } else { T::zero() };
@@ -267,8 +272,7 @@ impl<T: Recordable> Doubts<T> {
     /// After a pause of t seconds the deviation of a start, times (1 - exp(-t/5 s))², is doubted: nothing after a reading that was
     /// lost, all of it after half a minute.
     pub fn read(&mut self, rho: T, nis: T) {
-        let is_first = self.unread_s >= T::of(NEVER_READ_S);
-        let passed_s = if is_first { T::zero() } else { self.unread_s };
+        let passed_s = if self.has_begun() { self.unread_s } else { T::zero() };
         self.unread_s = T::zero();
         let (surprising, left) = (T::of(SURPRISING_NIS), Left::after(passed_s));
         let forgotten = T::one() - left.soon;

@@ -27,7 +27,8 @@ impl Around<'_> {
         let of_rest = [self.on_followed_rest(), self.follow(), self.jumped()];
         let of_doubts =
             [self.begin(), self.tell_rest(), self.run(), self.doubt_reading(), self.doubt_pause(), self.doubted()];
-        let mut all: Vec<_> = of_readings.into_iter().chain(of_rest).chain(of_doubts).collect();
+        let mut all: Vec<_> =
+            of_readings.into_iter().chain(of_rest).chain(of_doubts).chain([self.has_begun()]).collect();
         if let Some(correction) = self.parts.correction {
             all.extend([self.birge(), watch(&correction.features)]);
             all.extend(correction::functions(&OwnedLearned::new(correction, self.parts.quadratics, self.parts.limits)));
@@ -199,6 +200,18 @@ impl Around<'_> {
             doubts.pass(writer.input("dt_s"));
             writer.keep(doubts);
         })
+    }
+
+    fn has_begun(&self) -> Printed {
+        Printed::new(
+            "has_begun",
+            "Whether there has been a reading that was used, or a strain that was known.",
+            &[],
+            |writer| {
+                let has_begun = writer.state(self.doubts()).has_begun();
+                writer.tell(RETURNED, has_begun);
+            },
+        )
     }
 
     fn doubt_reading(&self) -> Printed {

@@ -509,7 +509,8 @@ static ohmstrain_status step(ohmstrain_state *state, float dt_s, const float *rh
 
     /* Single precision has no square of much more. */
     dt_s = dt_s < LONGEST_PAUSE_S ? dt_s : LONGEST_PAUSE_S;
-    pause.ahead_s += dt_s;
+    /* Time before a start says nothing of it. */
+    pause.ahead_s += has_begun(&seen) ? dt_s : 0.0f;
     pause.ahead_s = pause.ahead_s > LONGEST_PAUSE_S ? LONGEST_PAUSE_S : pause.ahead_s;
     pass_time(&seen, dt_s);
     if (rho) {
