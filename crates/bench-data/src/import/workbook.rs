@@ -1,4 +1,5 @@
 use std::io::Cursor;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use calamine::{Data, DataRef, Ods, Range, Reader, Xls, Xlsb, Xlsx, XlsxError, open_workbook_from_rs};
 use chrono::{Duration, NaiveDate};
@@ -19,6 +20,15 @@ pub(crate) const XLS: [u8; 4] = [0xd0, 0xcf, 0x11, 0xe0];
 
 /// Reads a sheet of a workbook: XLSX, XLSM, XLSB, XLS or ODS.
 pub(crate) fn read(bytes: &[u8], name: &str, options: &ReadOptions) -> Result<Table, ImportError> {
+    // calamine panics at some records that are cut, and at places in a sheet that cannot be.
+    catch_unwind(AssertUnwindSafe(|| read_sheet(bytes, name, options))).unwrap_or_else(|_| {
+        let what = "cannot be read as a workbook: expected records and places in a sheet, found others: save the sheet with \
+                    the recording as CSV";
+        Err(ImportError::unreadable(name, what))
+    })
+}
+
+fn read_sheet(bytes: &[u8], name: &str, options: &ReadOptions) -> Result<Table, ImportError> {
     let broken = |error: String| ImportError::unreadable(name, format!("cannot be read as a workbook: {error}"));
     let mut workbook = Workbook::open(bytes).map_err(broken)?;
     let mut found: Vec<(String, Table)> = Vec::new();
