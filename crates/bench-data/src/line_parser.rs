@@ -65,10 +65,19 @@ impl LineParser {
         Self { name: name.into(), overrides, before_header: None, stream: None, number: 0, record }
     }
 
-    /// What the stream says of itself, with the overrides; units are those of rows.
+    /// What the stream says of itself above its last header, or above the first one that is still to come, with the overrides; units
+    /// are those of rows.
     #[must_use]
     pub fn metadata(&self) -> Metadata {
-        self.stream.as_ref().map_or(&self.overrides, |stream| &stream.metadata).in_own_units()
+        self.stream.as_ref().map_or_else(|| self.above(), |stream| stream.metadata.clone()).in_own_units()
+    }
+
+    /// What holds for a header that comes now: one that nothing stands above has the metadata of the one before.
+    fn above(&self) -> Metadata {
+        let before = self.stream.as_ref().map(|stream| &stream.metadata);
+        let mut metadata = self.before_header.as_ref().or(before).cloned().unwrap_or_default();
+        metadata.override_with(&self.overrides);
+        metadata
     }
 
     /// What the readings are; `None` before the header.
@@ -125,11 +134,8 @@ impl LineParser {
         }
     }
 
-    /// A header that nothing stands above has the metadata of the one before.
     fn begin(&mut self, columns: Columns) -> Result<Line, Fault> {
-        let before = self.stream.as_ref().map(|stream| &stream.metadata);
-        let mut metadata = self.before_header.as_ref().or(before).cloned().unwrap_or_default();
-        metadata.override_with(&self.overrides);
+        let metadata = self.above();
         let parser = RowParser::new(columns, &metadata)?;
         self.stream = Some(Stream { columns, metadata, parser, late: None });
         self.before_header = None;

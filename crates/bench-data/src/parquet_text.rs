@@ -131,7 +131,7 @@ fn push_cell(cell: &Field, out: &mut Vec<u8>) {
 /// Text as a cell on one line, in quotation marks if it needs them.
 fn push_text(text: &str, out: &mut Vec<u8>) {
     let text = text.trim();
-    let text = text[..text.floor_char_boundary(LONGEST_TEXT)].replace(char::is_control, " ");
+    let text = text.chars().take(LONGEST_TEXT).collect::<String>().replace(char::is_control, " ");
     if text.contains([',', '"']) {
         out.extend(format!("\"{}\"", text.replace('"', "\"\"")).bytes());
     } else {

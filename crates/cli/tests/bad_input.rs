@@ -143,7 +143,13 @@ fn a_recording_that_is_none_is_refused_alike_by_every_command() {
         // A stream may have started again.
         let is_back = message.contains("expected a time after");
         let anew = "; if the clock has started again there, --skip-bad goes on with another filter";
-        let of = |command: &[&str]| if is_back && command[0] == "filter" { anew } else { hint };
+        let in_parts =
+            "; if the clock has started again there, give each part a file of its own, or `filter --skip-bad` both";
+        let of = |command: &[&str]| match command[0] {
+            "filter" if is_back => anew,
+            "smooth" if is_back => in_parts,
+            _ => hint,
+        };
         for command in READERS {
             fails(&bench, command, CONTENT, &format!("bad.csv:{message}{}", of(command)));
         }

@@ -2,6 +2,9 @@
 
 use ohmstrain::{Estimate, EstimatorKind, FilterBuilder, Flag, Sensor};
 
+/// Times, s, and readings.
+type Rows = [(f64, Option<f64>)];
+
 fn sensor() -> Sensor {
     Sensor::from_toml(&std::fs::read_to_string("examples/sensor.toml").unwrap()).unwrap()
 }
@@ -17,12 +20,12 @@ fn losses() -> [fn(usize) -> bool; 3] {
     [|k| k * 61 % 100 == 0, |k| k % 2 == 1, |k| (400..900).contains(&k) || k % 50 > 45]
 }
 
-fn filtered(builder: FilterBuilder<'_>, rows: &[(f64, Option<f64>)]) -> Vec<Estimate> {
+fn filtered(builder: FilterBuilder<'_>, rows: &Rows) -> Vec<Estimate> {
     let mut filter = builder.build().unwrap();
     rows.iter().map(|&(time_s, ohm)| filter.step(time_s, ohm).unwrap()).collect()
 }
 
-fn lagged(builder: FilterBuilder<'_>, rows: &[(f64, Option<f64>)]) -> Vec<Estimate> {
+fn lagged(builder: FilterBuilder<'_>, rows: &Rows) -> Vec<Estimate> {
     let mut filter = builder.build_lagged(0.5).unwrap();
     let mut out = Vec::new();
     rows.iter().for_each(|&(time_s, ohm)| out.extend_from_slice(filter.step(time_s, ohm).unwrap()));
@@ -30,14 +33,14 @@ fn lagged(builder: FilterBuilder<'_>, rows: &[(f64, Option<f64>)]) -> Vec<Estima
     out
 }
 
-fn smoothed(builder: FilterBuilder<'_>, rows: &[(f64, Option<f64>)]) -> Vec<Estimate> {
+fn smoothed(builder: FilterBuilder<'_>, rows: &Rows) -> Vec<Estimate> {
     let (time_s, ohm): (Vec<f64>, Vec<f64>) =
         rows.iter().map(|(time_s, ohm)| (*time_s, ohm.unwrap_or(f64::NAN))).unzip();
     builder.smooth(&time_s, &ohm).unwrap()
 }
 
 /// Asserts that rows with a reading say the same, to the bit, with the others empty and with the others cut.
-fn assert_alike(kind: EstimatorKind, run: fn(FilterBuilder<'_>, &[(f64, Option<f64>)]) -> Vec<Estimate>) {
+fn assert_alike(kind: EstimatorKind, run: fn(FilterBuilder<'_>, &Rows) -> Vec<Estimate>) {
     let sensor = sensor();
     for (of, is_lost) in losses().into_iter().enumerate() {
         let rows = recording(is_lost);
@@ -70,7 +73,7 @@ fn smoothers_say_the_same_whether_empty_rows_are_there() {
 fn a_lost_reading_raises_no_doubt() {
     let sensor = sensor();
     let lost = recording(losses()[0]);
-    let said = |rows: &[(f64, Option<f64>)]| -> (f64, Vec<f64>) {
+    let said = |rows: &Rows| -> (f64, Vec<f64>) {
         let [doubted, stated] =
             [sensor.filter(), sensor.filter().without_doubts()].map(|builder| filtered(builder, rows));
         let read = || (0..rows.len()).filter(|k| lost[*k].1.is_some());

@@ -249,9 +249,13 @@ impl<'a, T: Real, E: SensorEstimator<T, N, L>, const N: usize, const L: usize> L
             Ok(seen) => (seen, None),
             Err(verdict) => (None, Some(verdict)),
         };
-        // Time before a start says nothing of it.
-        let has_begun = self.now.doubts.has_begun();
-        let (mut pause, mut moved) = (if has_begun { self.now.pause.after(dt_s) } else { self.now.pause }, None);
+        // Before the first reading there is no more to predict than the usual step.
+        let pause = if self.now.doubts.has_begun() {
+            self.now.pause.after(dt_s)
+        } else {
+            self.estimator.pause().after(dt_s.min(self.parts.dt_s))
+        };
+        let (mut pause, mut moved) = (pause, None);
         if seen.is_none() && pause.clone().whole_step().is_some() {
             let state = moved.insert(self.now.state.clone());
             self.estimator.pass_whole(state, &mut pause)?;

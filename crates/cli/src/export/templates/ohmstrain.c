@@ -509,9 +509,14 @@ static ohmstrain_status step(ohmstrain_state *state, float dt_s, const float *rh
 
     /* Single precision has no square of much more. */
     dt_s = dt_s < LONGEST_PAUSE_S ? dt_s : LONGEST_PAUSE_S;
-    /* Time before a start says nothing of it. */
-    pause.ahead_s += has_begun(&seen) ? dt_s : 0.0f;
-    pause.ahead_s = pause.ahead_s > LONGEST_PAUSE_S ? LONGEST_PAUSE_S : pause.ahead_s;
+    if (has_begun(&seen)) {
+        pause.ahead_s += dt_s;
+        pause.ahead_s = pause.ahead_s > LONGEST_PAUSE_S ? LONGEST_PAUSE_S : pause.ahead_s;
+    } else {
+        /* Before the first reading there is no more to predict than the usual step. */
+        pause = over;
+        pause.ahead_s = dt_s < OHMSTRAIN_DT_S ? dt_s : OHMSTRAIN_DT_S;
+    }
     pass_time(&seen, dt_s);
     if (rho) {
         on_followed_rest(&seen, *rho, extra_variance, &shown, &extra_variance);
