@@ -57,7 +57,7 @@ impl Kind {
             // `live` recorded cannot.
             Self::Simulation => is_made_by(head, SIMULATE),
             Self::Import => is_made_by(head, IMPORT) || is_made_by(head, SIMULATE),
-            Self::Sensor => is_format(line()) && is_made_by_toml(line()) && line().starts_with("quantity = "),
+            Self::Sensor => is_format(line()) && is_made_by_toml(line()) && !line().starts_with("sensors = "),
             Self::Prior => is_format(line()) && is_made_by_toml(line()) && line().starts_with("sensors = "),
             Self::Estimates | Self::Summary => self.has_columns(&names_in(line()), own),
             Self::Report => behind_mark(head, page_start()).is_some_and(|rest| rest.starts_with("\">")),
