@@ -72,6 +72,12 @@ impl ReadingVerdict {
     pub const fn is_taken(self) -> bool {
         matches!(self, Self::Accepted | Self::Downweighted | Self::Readmitted)
     }
+
+    /// Whether there was a reading that has told the filter nothing.
+    #[must_use]
+    pub const fn is_refused(self) -> bool {
+        !self.is_taken() && !matches!(self, Self::Missing)
+    }
 }
 
 /// Rejections in a row; the caller keeps it beside the state.

@@ -50,6 +50,9 @@ impl Translator {
         let mut flags = Flags::NONE;
         if let Some(doubts) = &mut self.doubts {
             let stated = output.estimate.strain;
+            if output.verdict.is_refused() {
+                doubts.refuse();
+            }
             let variance = doubts.see(dt_s, taken, stated);
             let (widened, of_doubts) = doubts.widened(output.estimate.rate.mean, variance);
             flags = of_doubts;

@@ -166,8 +166,9 @@ pub struct Doubts<T> {
     pub(crate) run_s: T,
     /// Variance of the strain that fades while readings are believed.
     pub(crate) fading: T,
-    /// Time since the last reading that was used, s.
+    /// Time since the last reading that was used, s, and whether one has been refused since.
     pub(crate) unread_s: T,
+    pub(crate) refused: bool,
     /// The last reading that was believed, R/R₀ - 1.
     pub(crate) believed: Option<T>,
     pub(crate) misfit: Misfit<T>,
@@ -188,6 +189,7 @@ impl<T: Recordable> Doubts<T> {
             run_s: T::zero(),
             fading: parts.start,
             unread_s: T::of(NEVER_READ_S),
+            refused: false,
             believed: None,
             misfit: Misfit { near: T::zero(), far: T::zero(), innovations: Innovations::none() },
             corrected: false,
@@ -215,7 +217,7 @@ impl<T: Recordable> Doubts<T> {
 
     /// The strain is known now: what was doubted of it is gone.
     pub fn settle(&mut self) {
-        (self.fading, self.starts, self.unread_s) = (T::zero(), false, T::zero());
+        (self.fading, self.starts, self.unread_s, self.refused) = (T::zero(), false, T::zero(), false);
     }
 
     /// R₀ of today has been told.
@@ -261,6 +263,11 @@ impl<T: Recordable> Doubts<T> {
         self.unread_s += passed_s;
     }
 
+    /// A reading has been refused: what it was a fault of may be over with the next one that is used, or not.
+    pub fn refuse(&mut self) {
+        self.refused = true;
+    }
+
     /// Variance of the strain that the time since the last reading leaves open.
     #[must_use]
     pub fn open(&self, stated: Gaussian<T>) -> T {
@@ -270,7 +277,7 @@ impl<T: Recordable> Doubts<T> {
     /// Takes a reading that was used. All that counts is the time since the reading before it, in however many rows.
     ///
     /// After a pause of t seconds the deviation of a start, times (1 - exp(-t/5 s))², is doubted: nothing after a reading that was
-    /// lost, all of it after half a minute.
+    /// lost, all of it after half a minute. After a fault it is as far as a body can have moved meanwhile.
     pub fn read(&mut self, rho: T, nis: T) {
         let passed_s = if self.has_begun() { self.unread_s } else { T::zero() };
         self.unread_s = T::zero();
@@ -288,6 +295,9 @@ impl<T: Recordable> Doubts<T> {
             self.believed = Some(rho);
         }
         self.raise(self.parts.start * (share * share));
+        if core::mem::replace(&mut self.refused, false) {
+            self.raise(self.parts.unread.variance(passed_s, self.parts.unread.centre, T::zero()));
+        }
         self.judge(&left, passed_s, rho, nis);
     }
 

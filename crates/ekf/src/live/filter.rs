@@ -231,6 +231,9 @@ impl<'a, T: Real, E: SensorEstimator<T, N, L>, const N: usize, const L: usize> L
             heard.jumped.into_iter().for_each(|jump| follower.jumped(jump));
             follower.see(now.doubts.unread_s + dt_s, reading);
         }
+        if heard.verdict.is_refused() {
+            now.doubts.refuse();
+        }
         let open = now.doubts.see(dt_s, taken, corrected);
         let (widened, doubts) = now.doubts.widened(moments.mean[1], open);
         let (variance, doubts) =

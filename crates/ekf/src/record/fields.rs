@@ -74,6 +74,7 @@ impl<T: Copy> Fields<T> for Doubts<T> {
         see.number("run_s", &mut self.run_s);
         see.number("fading", &mut self.fading);
         see.number("unread_s", &mut self.unread_s);
+        see.truth("refused", &mut self.refused);
         see.maybe_one("believed", &mut self.believed);
         see.number("near_off", &mut self.misfit.near);
         see.number("far_off", &mut self.misfit.far);

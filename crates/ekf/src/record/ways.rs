@@ -345,6 +345,10 @@ mod tests {
         for (row, rho, nis) in readings() {
             let before = Seen::of(doubts);
             if (270..300).contains(&row) {
+                if row == 280 {
+                    doubts.refuse();
+                }
+                let before = Seen::of(doubts);
                 let open = doubts.see(0.1, None, stated);
                 let own = [("dt_s", 0.1), ("strain", stated.mean), ("variance", stated.variance)];
                 let [after, given] = done(&pauses, &before, &own);

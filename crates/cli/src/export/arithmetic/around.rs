@@ -28,7 +28,7 @@ impl Around<'_> {
         let of_doubts =
             [self.begin(), self.tell_rest(), self.run(), self.doubt_reading(), self.doubt_pause(), self.doubted()];
         let mut all: Vec<_> =
-            of_readings.into_iter().chain(of_rest).chain(of_doubts).chain([self.has_begun()]).collect();
+            of_readings.into_iter().chain(of_rest).chain(of_doubts).chain([self.has_begun(), self.refuse()]).collect();
         if let Some(correction) = self.parts.correction {
             all.extend([self.birge(), watch(&correction.features)]);
             all.extend(correction::functions(&OwnedLearned::new(correction, self.parts.quadratics, self.parts.limits)));
@@ -198,6 +198,14 @@ impl Around<'_> {
         Printed::new("run", "Time has passed since the step before, if there was one.", &["float dt_s"], |writer| {
             let mut doubts = writer.state(self.doubts());
             doubts.pass(writer.input("dt_s"));
+            writer.keep(doubts);
+        })
+    }
+
+    fn refuse(&self) -> Printed {
+        Printed::new("refuse", "A reading has been refused.", &[], |writer| {
+            let mut doubts = writer.state(self.doubts());
+            doubts.refuse();
             writer.keep(doubts);
         })
     }
