@@ -343,7 +343,6 @@ mod tests {
         let (mut doubts, stated) = (Doubts::<f32>::new(parts().to()), Gaussian { mean: 0.1, variance: 1e-5 });
         let mut raised = HashMap::new();
         for (row, rho, nis) in readings() {
-            let before = Seen::of(doubts);
             if (270..300).contains(&row) {
                 if row == 280 {
                     doubts.refuse();
