@@ -73,10 +73,11 @@ impl ReadingVerdict {
         matches!(self, Self::Accepted | Self::Downweighted | Self::Readmitted)
     }
 
-    /// Whether there was a reading that has told the filter nothing.
+    /// Whether there was a reading that could be the sensor's and has told the filter nothing. One that no sensor gives is as good
+    /// as missing.
     #[must_use]
     pub const fn is_refused(self) -> bool {
-        !self.is_taken() && !matches!(self, Self::Missing)
+        matches!(self, Self::Rejected | Self::Stuck)
     }
 }
 

@@ -277,7 +277,7 @@ impl<T: Recordable> Doubts<T> {
     /// Takes a reading that was used. All that counts is the time since the reading before it, in however many rows.
     ///
     /// After a pause of t seconds the deviation of a start, times (1 - exp(-t/5 s))², is doubted: nothing after a reading that was
-    /// lost, all of it after half a minute. After a fault it is as far as a body can have moved meanwhile.
+    /// lost, all of it after half a minute. After readings that were turned down or stood still it is as far as a body can have moved meanwhile.
     pub fn read(&mut self, rho: T, nis: T) {
         let passed_s = if self.has_begun() { self.unread_s } else { T::zero() };
         self.unread_s = T::zero();

@@ -568,7 +568,7 @@ static ohmstrain_status step(ohmstrain_state *state, float dt_s, const float *rh
     state->rate = all.mean[1];
     state->rate_variance = all.variance[1];
     run(&seen, dt_s);
-    if (flags & (OHMSTRAIN_IMPLAUSIBLE | OHMSTRAIN_STUCK | OHMSTRAIN_REJECTED)) {
+    if (flags & (OHMSTRAIN_STUCK | OHMSTRAIN_REJECTED)) {
         refuse(&seen);
     }
     if (believed) {
