@@ -3,7 +3,7 @@ use ohmstrain_model::{Observation, Scalar, Symmetric, Transition};
 
 use crate::clock::check_time_step;
 use crate::smooth::rts_step;
-use crate::substeps::Pause;
+use crate::substeps::{Pause, is_one_step};
 use crate::{Advanced, Belief, Channel, Dynamics, Estimator, Innovation, Reading, State, StepError};
 
 /// Extended Kalman filter: one Gaussian, linearised at its mean.
@@ -70,21 +70,30 @@ impl<M> Ekf<M> {
         M: Dynamics<T, N, L> + Channel<T, N, L>,
     {
         check_time_step(dt_s)?;
-        if dt_s.is_zero() {
-            return self.finish(stand_still(belief), *belief, reading);
+        if !dt_s.is_zero() && is_one_step(dt_s, self.model.longest_step_s()) {
+            return self.step_prepared(belief, &self.model.prepare(dt_s), reading);
         }
-        let mut pause = Pause::none(self.model.longest_step_s()).after(dt_s);
-        let mut before = None;
-        while let Some(length_s) = pause.step_before_last() {
-            before = Some(self.predict_on(before, belief, &self.model.prepare(length_s)));
-        }
-        let (count, length_s) = pause.last_steps();
-        let last = self.model.prepare(length_s);
-        for _ in 1..count {
-            before = Some(self.predict_on(before, belief, &last));
-        }
-        let (transition, prior) = self.predict_on(before, belief, &last);
+        let (transition, prior) =
+            if dt_s.is_zero() { (stand_still(belief), *belief) } else { self.predict_over(belief, dt_s) };
         self.finish(transition, prior, reading)
+    }
+
+    /// The belief after a pause of several steps, and all of them as one transition.
+    #[cold]
+    #[inline(never)]
+    fn predict_over<T: Scalar, const N: usize, const L: usize>(
+        &self,
+        belief: &Belief<T, N, L>,
+        dt_s: T,
+    ) -> (Transition<T, N, L>, Belief<T, N, L>)
+    where
+        M: Dynamics<T, N, L>,
+    {
+        let from = (stand_still(belief), *belief);
+        Pause::none(self.model.longest_step_s()).after(dt_s).steps().fold(from, |(transition, prior), length_s| {
+            let (onward, prior) = self.predict(&prior, &self.model.prepare(length_s));
+            (followed_by(&transition, &onward), prior)
+        })
     }
 
     /// The same with a step that was prepared before, for sensors read at a fixed rate.
@@ -103,21 +112,6 @@ impl<M> Ekf<M> {
     {
         let (transition, prior) = self.predict(belief, prepared);
         self.finish(transition, prior, reading)
-    }
-
-    /// One step more, from where steps before it led to, or else from a belief; all of them as one transition.
-    fn predict_on<T: Scalar, const N: usize, const L: usize>(
-        &self,
-        before: Option<(Transition<T, N, L>, Belief<T, N, L>)>,
-        belief: &Belief<T, N, L>,
-        prepared: &M::Prepared,
-    ) -> (Transition<T, N, L>, Belief<T, N, L>)
-    where
-        M: Dynamics<T, N, L>,
-    {
-        let Some((transition, prior)) = before else { return self.predict(belief, prepared) };
-        let (onward, prior) = self.predict(&prior, prepared);
-        (followed_by(&transition, &onward), prior)
     }
 
     /// The belief a prepared step later, and how it got there.

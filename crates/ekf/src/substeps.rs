@@ -44,6 +44,11 @@ pub struct Pause<T> {
     ahead_s: T,
 }
 
+/// Whether a pause is one step.
+pub(crate) fn is_one_step<T: Scalar>(dt_s: T, longest_s: T) -> bool {
+    dt_s <= longest_s * T::of(GRACE)
+}
+
 impl<T: Scalar> Pause<T> {
     /// At a reading, of an estimator whose longest step is `longest_s`.
     #[must_use]
@@ -100,6 +105,21 @@ impl<T: Scalar> Pause<T> {
         (count, self.ahead_s / counted)
     }
 
+    /// Lengths of all steps that are ahead, s.
+    pub(crate) fn steps(mut self) -> impl Iterator<Item = T> {
+        let mut even = None;
+        core::iter::from_fn(move || {
+            if even.is_none()
+                && let Some(length_s) = self.step_before_last()
+            {
+                return Some(length_s);
+            }
+            let (left, length_s) = even.get_or_insert_with(|| self.last_steps());
+            *left = left.checked_sub(1)?;
+            Some(*length_s)
+        })
+    }
+
     /// Whether more is ahead than such a step, or, of the longest length, than even steps.
     fn exceeds(&self, times: T) -> bool {
         let least = if times > T::one() { times } else { T::of(EVENLY) };
@@ -139,6 +159,9 @@ impl<E> Substeps<E> {
         T: Scalar,
         E: Estimator<T, N, L>,
     {
+        if is_one_step(pause.ahead_s, pause.longest_s) {
+            return Repeated { before: pause, count: 0, last: self.0.prepare(pause.ahead_s), last_count: 1 };
+        }
         let (mut end, mut count) = (pause, 0);
         while end.step_before_last().is_some() {
             count += 1;
@@ -284,11 +307,8 @@ mod tests {
     use super::{GROWTH, LONGEST_PAUSE_S, Pause};
 
     /// Lengths of all steps of a pause, in L, the last one included.
-    fn lengths(mut pause: Pause<f64>) -> Vec<f64> {
-        let mut all: Vec<f64> = core::iter::from_fn(|| pause.step_before_last()).collect();
-        let (count, length_s) = pause.last_steps();
-        all.extend((0..count).map(|_| length_s));
-        all.into_iter().map(|length_s| length_s / pause.longest_s).collect()
+    fn lengths(pause: Pause<f64>) -> Vec<f64> {
+        pause.steps().map(|length_s| length_s / pause.longest_s).collect()
     }
 
     #[test]
