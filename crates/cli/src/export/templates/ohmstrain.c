@@ -445,50 +445,55 @@ static int last_step(ohmstrain_state *state, const interval *over, const float *
     return status;
 }
 
-/* Over all that is ahead of a pause, with a reading at its end or without. */
+/* Over all that is ahead of a pause, with a reading at its end or without. What is refused leaves the state on its way. */
+static int over_steps(ohmstrain_state *state, ohmstrain_pause pause, const float *rho, float extra_variance, unsigned *flags,
+                      ohmstrain_residual *residual)
+{
+    float own[STEP];
+    interval over;
+    int count, status = pass_steps(state, &pause, 0);
+
+    over = of_length(even_steps(&pause, &count), own);
+    for (; count > 1 && status == OHMSTRAIN_OK; count--) {
+        status = step_on(state, &over, (const float *)0, 0.0f, INFINITY, residual);
+    }
+    return status == OHMSTRAIN_OK ? last_step(state, &over, rho, extra_variance, flags, residual) : status;
+}
+
+/* The same to a reading. What is refused leaves the state alone: one step by itself, several on a copy. */
 static int advance(ohmstrain_state *state, ohmstrain_pause pause, const float *rho, float extra_variance, unsigned *flags,
                    ohmstrain_residual *residual)
 {
-    float own[STEP];
     ohmstrain_state next;
-    interval over;
-    int status, count;
+    int status;
 
-    over = of_length(even_steps(&pause, &count), own);
-    if (count <= 1 && !(next_step(&pause, 0) > 0.0f)) {
-        return last_step(state, &over, rho, extra_variance, flags, residual);
+    if (!(pause.ahead_s > LONGEST_S * GRACE)) {
+        return over_steps(state, pause, rho, extra_variance, flags, residual);
     }
     next = *state;
-    status = pass_steps(&next, &pause, 0);
-    over = of_length(even_steps(&pause, &count), own);
-    for (; count > 1 && status == OHMSTRAIN_OK; count--) {
-        status = step_on(&next, &over, (const float *)0, 0.0f, INFINITY, residual);
-    }
-    if (status == OHMSTRAIN_OK) {
-        status = last_step(&next, &over, rho, extra_variance, flags, residual);
-    }
+    status = over_steps(&next, pause, rho, extra_variance, flags, residual);
     if (status == OHMSTRAIN_OK) {
         *state = next;
     }
     return status;
 }
 
-/* Looks ahead to the end of a pause. The filter itself takes whole steps only. */
+/* Looks ahead to the end of a pause. The filter itself takes whole steps only, those that the look could take. */
 static int look_ahead(ohmstrain_state *state, ohmstrain_pause pause, summary *all)
 {
-    ohmstrain_state kept = *state, look;
+    ohmstrain_state look = *state;
+    ohmstrain_pause ahead = pause;
     ohmstrain_residual none;
     unsigned flags = 0;
-    int status = pass_steps(&kept, &pause, 1);
+    int status = pass_steps(&look, &ahead, 1);
 
-    kept.pause = pause;
-    look = kept;
     if (status == OHMSTRAIN_OK) {
-        status = advance(&look, pause, (const float *)0, 0.0f, &flags, &none);
+        status = over_steps(&look, ahead, (const float *)0, 0.0f, &flags, &none);
     }
     if (status == OHMSTRAIN_OK) {
         summarise(&look, all);
-        *state = kept;
+        status = pass_steps(state, &pause, 1);
+        state->pause = pause;
     }
     return status;
 }
