@@ -62,12 +62,6 @@ pub fn segment(time_s: &[f64], strain: &[f64]) -> Vec<Segment> {
     segments
 }
 
-/// The rate at which half the way is travelled, 1/s, as far as the noise lets it be seen.
-#[cfg(feature = "import")]
-pub(crate) fn typical_rate_of(time_s: &[f64], strain: &[f64]) -> f64 {
-    typical_rate(time_s, &Motion::estimate(time_s, strain).rate)
-}
-
 /// How the body moves, as far as the noise lets it be seen.
 struct Motion {
     rate: Vec<f64>,

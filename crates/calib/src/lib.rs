@@ -68,6 +68,6 @@ pub use params::{
 };
 pub use prior::{CorrectionPrior, EstimatorPrior, FEWEST_SENSORS, LawPrior, PRIOR_FORMAT, Prior};
 pub use recording::holds::{Hold, holds};
-pub use recording::lag::{Lag, aligned, lag_out_of_reach, reference_lag};
+pub use recording::lag::{Lag, LagError, aligned, clock_lag, reference_lag};
 pub use recording::screen::{Distrusted, Doubt, Screened, screen};
 pub use samples::{Samples, SamplesError};

@@ -24,7 +24,9 @@ pub fn check(recording: &mut TraceFile, align: bool, explain: bool) -> Result<f6
         None => {}
         Some(little @ LagDoubt::Little(_)) if explain => CliError::remark(&format!("{name}: {little}")),
         Some(little @ LagDoubt::Little(_)) => Verbosity::detail(&format!("{name}: {little}")),
-        Some(far @ LagDoubt::OutOfReach { .. }) => CliError::warning(&format!("{name}: {far}")),
+        Some(unknown @ (LagDoubt::OutOfReach { .. } | LagDoubt::Repeats { .. })) => {
+            CliError::warning(&format!("{name}: {unknown}"))
+        }
         Some(certain @ LagDoubt::Certain(_)) => {
             let answer = "--align moves it to where the readings say it belongs";
             return Err(CliError::Input(format!("{name}: {certain}; {answer}")));

@@ -1,92 +1,27 @@
-use ohmstrain_calib::{
-    CalibrationError, Identifiability, Lag, Samples, identifiability, lag_out_of_reach, reference_lag, screen,
-};
+use ohmstrain_calib::{Identifiability, Lag, LagError, Samples, identifiability, reference_lag, screen};
 
 use crate::{Error, Recording, Sensor};
 
-/// A lag of more than this share of a movement turns stretching into releasing for that share of the time.
-const LARGEST_SHARE: f64 = 0.1;
-
-/// How late a reference is, and whether that matters.
-///
-/// ```
-/// # let (time_s, ohm, strain) = ([0.0, 0.1], [1600.0, 1610.0], [0.00, 0.01]);
-/// let recording = ohmstrain::Recording::new(&time_s, &ohm, &strain)?;
-/// if let Some(late) = recording.reference_lag().filter(|late| late.is_too_late()) {
-///     println!("the reference is {:.1} s late", late.lag_s);
-/// }
-/// # Ok::<(), ohmstrain::Error>(())
-/// ```
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[non_exhaustive]
-pub struct ReferenceLag {
-    /// Positive if what the reading shows now stands in the reference later, s.
-    pub lag_s: f64,
-    /// Mean duration of a movement in one direction, s.
-    pub movement_s: f64,
-    /// By how much that may be off, s, where what the sensor lags itself cannot be told apart; 0 where it can.
-    pub own_s: f64,
-    /// Whether hardly any recording without a lag looks like that; if not, few do.
-    pub is_certain: bool,
-}
-
-impl ReferenceLag {
-    /// Whether it is more than a tenth of a movement: such a recording, if that [is certain](Self::is_certain), is not to be
-    /// calibrated on as it is.
-    ///
-    /// ```
-    /// # let (time_s, ohm, strain) = ([0.0, 0.1], [1600.0, 1610.0], [0.00, 0.01]);
-    /// let recording = ohmstrain::Recording::new(&time_s, &ohm, &strain)?;
-    /// assert!(!recording.reference_lag().is_some_and(|late| late.is_too_late()));
-    /// # Ok::<(), ohmstrain::Error>(())
-    /// ```
-    #[must_use]
-    pub fn is_too_late(&self) -> bool {
-        self.lag_s.abs() > LARGEST_SHARE * self.movement_s
-    }
-}
-
 impl Recording<'_> {
-    /// How late the reference is; `None` where that cannot be told for sure.
+    /// Lag of the reference behind the readings, with its uncertainty: the same that `ohmstrain inspect`, `import` and `calibrate`
+    /// tell. A recording whose lag [is too late](Lag::is_too_late) and [certain](Lag::is_certain) is not to be calibrated on as it is.
+    ///
+    /// # Errors
+    /// [`LagError`] where the motion does not tell.
     ///
     /// ```
-    /// let recording = ohmstrain::Recording::new(&[0.0, 0.1], &[1600.0, 1610.0], &[0.00, 0.01])?;
-    /// assert_eq!(recording.reference_lag(), None);
-    /// # Ok::<(), ohmstrain::Error>(())
-    /// ```
-    #[must_use]
-    pub fn reference_lag(&self) -> Option<ReferenceLag> {
-        let lag = self.screened(reference_lag).filter(Lag::is_sure)?;
-        Some(ReferenceLag {
-            lag_s: lag.lag_s,
-            movement_s: lag.movement_s,
-            own_s: lag.own_s,
-            is_certain: lag.is_certain(),
-        })
-    }
-
-    /// How far lags are looked for, s, with its sign, if the reference seems to be as late as that or later (negative: early);
-    /// [`Self::reference_lag`] is then `None`.
+    /// use ohmstrain::{LagError, Recording};
     ///
-    /// ```
-    /// let recording = ohmstrain::Recording::new(&[0.0, 0.1], &[1600.0, 1610.0], &[0.00, 0.01])?;
-    /// assert_eq!(recording.lag_out_of_reach(), None);
+    /// let recording = Recording::new(&[0.0, 0.1], &[1600.0, 1610.0], &[0.00, 0.01])?;
+    /// match recording.reference_lag() {
+    ///     Ok(lag) if lag.is_sure() && lag.is_too_late() => println!("{:.1} ± {:.1} s late", lag.lag_s, lag.sd_s),
+    ///     Ok(_) => {}
+    ///     Err(error) => assert_eq!(error, LagError::Short),
+    /// }
     /// # Ok::<(), ohmstrain::Error>(())
     /// ```
-    #[must_use]
-    pub fn lag_out_of_reach(&self) -> Option<f64> {
-        self.screened(lag_out_of_reach)
-    }
-
-    /// What the recording without distrusted rows says.
-    fn screened<T>(&self, said: impl Fn(&Samples) -> Option<T>) -> Option<T> {
-        match screen(&[self.samples]) {
-            Ok(screened) => screened.samples().first().and_then(said),
-            // Which may be a lag's own doing.
-            Err(CalibrationError::NothingExplained { .. }) => said(&self.samples),
-            // What cannot be screened is for the calibration to refuse.
-            Err(_) => None,
-        }
+    pub fn reference_lag(&self) -> Result<Lag, LagError> {
+        reference_lag(&self.samples)
     }
 }
 

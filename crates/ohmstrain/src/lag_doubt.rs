@@ -1,12 +1,14 @@
 use std::fmt;
 
-use crate::{Recording, ReferenceLag};
+use ohmstrain_calib::{Lag, LagError};
+
+use crate::Recording;
 
 /// A doubt about the clock of a reference; see [`Recording::lag_doubt`].
 ///
 /// ```
-/// let doubt = ohmstrain::LagDoubt::OutOfReach { lag_s: -20.0 };
-/// assert!(doubt.to_string().starts_with("the reference seems to be 20.00 s early or more"));
+/// let doubt = ohmstrain::LagDoubt::OutOfReach { lag_s: -12.0 };
+/// assert!(doubt.to_string().starts_with("the reference seems to be 12.00 s early or more"));
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
@@ -16,24 +18,29 @@ pub enum LagDoubt {
         /// How far lags are looked for, s; negative if the reference is early.
         lag_s: f64,
     },
+    /// Not on time, but two lags fit alike, since the motion repeats: it cannot be moved.
+    Repeats {
+        /// The two lags, s, the better one first.
+        lags_s: [f64; 2],
+    },
     /// Late, too little to matter.
-    Little(ReferenceLag),
+    Little(Lag),
     /// Late, but the readings do not tell for certain.
-    Uncertain(ReferenceLag),
+    Uncertain(Lag),
     /// Certainly too late to calibrate on.
-    Certain(ReferenceLag),
+    Certain(Lag),
 }
 
 impl LagDoubt {
     /// How late the reference is, where that is known.
     ///
     /// ```
-    /// assert_eq!(ohmstrain::LagDoubt::OutOfReach { lag_s: 20.0 }.lag(), None);
+    /// assert_eq!(ohmstrain::LagDoubt::OutOfReach { lag_s: 12.0 }.lag(), None);
     /// ```
     #[must_use]
-    pub const fn lag(&self) -> Option<&ReferenceLag> {
+    pub const fn lag(&self) -> Option<&Lag> {
         match self {
-            Self::OutOfReach { .. } => None,
+            Self::OutOfReach { .. } | Self::Repeats { .. } => None,
             Self::Little(lag) | Self::Uncertain(lag) | Self::Certain(lag) => Some(lag),
         }
     }
@@ -50,37 +57,41 @@ impl Recording<'_> {
     #[must_use]
     pub fn lag_doubt(&self) -> Option<LagDoubt> {
         match self.reference_lag() {
-            None => self.lag_out_of_reach().map(|lag_s| LagDoubt::OutOfReach { lag_s }),
-            Some(lag) if !lag.is_too_late() => Some(LagDoubt::Little(lag)),
-            Some(lag) if !lag.is_certain => Some(LagDoubt::Uncertain(lag)),
-            Some(lag) => Some(LagDoubt::Certain(lag)),
+            Err(LagError::AtEnd(lag_s)) => Some(LagDoubt::OutOfReach { lag_s }),
+            Err(LagError::Repeats(best_s, other_s)) => Some(LagDoubt::Repeats { lags_s: [best_s, other_s] }),
+            Err(_) => None,
+            Ok(lag) if !lag.is_sure() => None,
+            Ok(lag) if !lag.is_too_late() => Some(LagDoubt::Little(lag)),
+            Ok(lag) if !lag.is_certain() => Some(LagDoubt::Uncertain(lag)),
+            Ok(lag) => Some(LagDoubt::Certain(lag)),
         }
     }
 }
 
-/// `2.00 s late`, and by how much that may be off.
-impl fmt::Display for ReferenceLag {
+/// A time by which the reference is late, s.
+struct Late(f64);
+
+impl fmt::Display for Late {
     fn fmt(&self, out: &mut fmt::Formatter) -> fmt::Result {
-        late(self.lag_s, out)?;
-        if self.own_s > 0.0 {
-            write!(out, ", give or take {:.1} s that the sensor may lag itself", self.own_s)?;
-        }
-        Ok(())
+        write!(out, "{:.2} s {}", self.0.abs(), if self.0 < 0.0 { "early" } else { "late" })
     }
-}
-
-fn late(lag_s: f64, out: &mut fmt::Formatter) -> fmt::Result {
-    write!(out, "{:.2} s {}", lag_s.abs(), if lag_s < 0.0 { "early" } else { "late" })
 }
 
 impl fmt::Display for LagDoubt {
     fn fmt(&self, out: &mut fmt::Formatter) -> fmt::Result {
         match self {
-            Self::OutOfReach { lag_s } => {
-                out.write_str("the reference seems to be ")?;
-                late(*lag_s, out)?;
-                out.write_str(" or more, as far as lags are looked for; it was not moved: are both on one clock?")
-            }
+            Self::OutOfReach { lag_s } => write!(
+                out,
+                "the reference seems to be {} or more, as far as lags are looked for; it was not moved: are both on one clock?",
+                Late(*lag_s)
+            ),
+            Self::Repeats { lags_s: [best_s, other_s] } => write!(
+                out,
+                "the reference seems to be {} or {}, which fit alike since the motion repeats; it was not moved: are both on one \
+                 clock?",
+                Late(*best_s),
+                Late(*other_s)
+            ),
             Self::Little(lag) => {
                 write!(out, "the reference seems to be {lag}, little of the {:.1} s of a movement", lag.movement_s)
             }

@@ -58,7 +58,7 @@ pub use closing::{Closing, Tested};
 pub use column::Column;
 pub use error::{Error, Place, TextCause, TextError};
 pub use estimate::Estimate;
-pub use explain::{ReferenceLag, explain};
+pub use explain::explain;
 pub use filter::{Filter, LaggedFilter};
 pub use known::Known;
 pub use known_doubt::{StartDoubt, UnusedKnown, unused_known};
@@ -77,7 +77,7 @@ pub use validity::{Beyond, Extrapolation, ValidityWatch};
 #[doc(no_inline)]
 pub use ohmstrain_calib::{
     CalibrationError, Distrusted, Doubt, EstimatorKind, FieldError, Findings, GaugeFamily, Identifiability,
-    JointParams, Parts, Quantity, ReadingUnit, SamplesError, ScoredRow, Scores, SensorParams, Stage,
+    JointParams, Lag, LagError, Parts, Quantity, ReadingUnit, SamplesError, ScoredRow, Scores, SensorParams, Stage,
 };
 pub use ohmstrain_ekf::live::{FARTHEST_REST, Flag, Flags, KNOWN_BEYOND};
 #[doc(no_inline)]

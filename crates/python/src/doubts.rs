@@ -59,7 +59,7 @@ pub fn on_one_clock(recordings: &mut [Recording], align: bool) -> PyResult<Vec<S
         let samples = samples.map_err(|error| refused(error.into()))?;
         let Some(doubt) = recording.known(&samples).map_err(refused)?.lag_doubt() else { continue };
         match doubt {
-            LagDoubt::OutOfReach { .. } => warnings.push(format!("{name}: {doubt}")),
+            LagDoubt::OutOfReach { .. } | LagDoubt::Repeats { .. } => warnings.push(format!("{name}: {doubt}")),
             LagDoubt::Little(lag) | LagDoubt::Uncertain(lag) | LagDoubt::Certain(lag) if align => {
                 warnings.push(format!("{name}: the reference is {lag}; it was moved by that"));
                 let moved = aligned(&samples, lag.lag_s);

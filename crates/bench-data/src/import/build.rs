@@ -1,10 +1,11 @@
 use std::fmt::Write as _;
 
+use ohmstrain_calib::{Lag, LagError, clock_lag};
+
 use crate::Trace;
 use crate::columns::Column;
 use crate::counted::counted;
 use crate::error::{Fault, TraceError, quote};
-use crate::import::align::{Offset, motion_offset};
 use crate::import::channel::{Channel, Values, name};
 use crate::import::clock::Times;
 use crate::import::digits::{DIGITS, rounded, told_apart};
@@ -28,8 +29,8 @@ pub struct Imported {
     pub trace: Trace,
     /// What was left out, filled in or noticed, one line each.
     pub remarks: Vec<String>,
-    /// What was added to the reference's clock to get the readings', and how sure that is, where the motion told.
-    pub offset: Option<Offset>,
+    /// Lag of the reference's clock that was taken out, where the motion told.
+    pub lag: Option<Lag>,
     /// Rows left out because they had the time of the row before.
     pub duplicates: usize,
     /// By how much neighbouring readings alternated, relative to their size, if they did: the current's polarity flips.
@@ -47,7 +48,7 @@ impl Plan {
 }
 
 fn build(plan: &Plan, tables: &[Table]) -> Result<Imported, ImportError> {
-    let mut work = Work { plan, tables, remarks: plan.remarks.clone(), offset: None, duplicates: 0, alternation: None };
+    let mut work = Work { plan, tables, remarks: plan.remarks.clone(), lag: None, duplicates: 0, alternation: None };
     let (readings, zero) = work.readings()?;
     let reference = work.reference(&readings, zero.as_ref().map(|(zero, _)| *zero))?;
     let temperature = work.temperature(&readings)?;
@@ -55,15 +56,15 @@ fn build(plan: &Plan, tables: &[Table]) -> Result<Imported, ImportError> {
     work.mention_passed_over();
     let metadata = work.metadata(zero.map(|(_, text)| text));
     let trace = work.trace(&metadata, &readings, reference.as_deref(), temperature.as_deref())?;
-    let Work { remarks, offset, duplicates, alternation, .. } = work;
-    Ok(Imported { trace, remarks, offset, duplicates, alternation })
+    let Work { remarks, lag, duplicates, alternation, .. } = work;
+    Ok(Imported { trace, remarks, lag, duplicates, alternation })
 }
 
 struct Work<'a> {
     plan: &'a Plan,
     tables: &'a [Table],
     remarks: Vec<String>,
-    offset: Option<Offset>,
+    lag: Option<Lag>,
     duplicates: usize,
     alternation: Option<f64>,
 }
@@ -225,20 +226,19 @@ impl Work<'_> {
     }
 
     fn by_motion(&mut self, readings: &Series, reference: &Series) -> Result<f64, ImportError> {
-        let found = motion_offset((&readings.time, &readings.value), (&reference.time, &reference.value), None);
         let files: Vec<&str> = self.tables.iter().map(|table| table.file.as_str()).collect();
-        let offset = found.map_err(|error| {
-            ImportError::question(&files.join(", "), format!("--align motion: {error}"), ["--align SECONDS".to_owned()])
+        let files = files.join(", ");
+        let found = clock_lag((&readings.time, &readings.value), (&reference.time, &reference.value));
+        let lag = found.map_err(|error| {
+            let answers = ["--align SECONDS, what to add to the reference's clock".to_owned()];
+            ImportError::question(&files, format!("--align motion: {}", as_offset(error)), answers)
         })?;
         self.remarks.push(format!(
-            "{}: the reference's clock plus {:.3} ± {:.3} s is the readings', by the motion; a lag of the sensor \
-             itself is in it",
-            files.join(", "),
-            offset.seconds,
-            offset.sd_s
+            "{files}: the reference's clock plus {:.3} ± {:.3} s is the readings', by the motion; a lag of the sensor itself is in it",
+            -lag.lag_s, lag.sd_s
         ));
-        self.offset = Some(offset);
-        Ok(offset.seconds)
+        self.lag = Some(lag);
+        Ok(-lag.lag_s)
     }
 
     fn temperature(&mut self, readings: &Series) -> Result<Option<Vec<f64>>, ImportError> {
@@ -353,5 +353,14 @@ const fn column(role: Role) -> Column {
         Role::Displacement => Column::DisplacementMm,
         Role::Angle => Column::AngleDeg,
         Role::Temperature => Column::TemperatureC,
+    }
+}
+
+/// An error in terms of what is added to the reference's clock.
+fn as_offset(error: LagError) -> LagError {
+    match error {
+        LagError::Repeats(best, other) => LagError::Repeats(-best, -other),
+        LagError::AtEnd(end) => LagError::AtEnd(-end),
+        other => other,
     }
 }

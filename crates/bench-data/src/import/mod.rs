@@ -15,7 +15,6 @@
 //! - What a file is unpacked to, or repeats, is bounded (`bounds`), and counted before there is room made for it.
 //! - Nothing here opens files.
 
-mod align;
 mod bounds;
 mod build;
 mod candidates;
@@ -27,7 +26,6 @@ mod error;
 mod grid;
 mod header;
 mod layout;
-mod motion_fit;
 mod names;
 mod number;
 mod ods_size;
@@ -51,7 +49,6 @@ mod workbook;
 mod xls_size;
 mod zipped;
 
-pub use align::{Offset, OffsetError, motion_offset};
 pub use bounds::LARGEST_FILE;
 pub use build::Imported;
 pub use candidates::{Candidate, candidates};

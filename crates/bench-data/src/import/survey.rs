@@ -1,14 +1,12 @@
+use ohmstrain_calib::{Lag, LagError, Samples, reference_lag};
 use ohmstrain_model::Phase;
 
-use crate::import::align::{Offset, motion_offset};
 use crate::import::build::Imported;
 use crate::order::{extent, median, typical_step};
 use crate::segment::{Segment, noise_sd, segment};
 
 /// A step longer than so many typical ones is a gap.
 const GAP: f64 = 3.0;
-/// The lag of the reference is looked for this far, s.
-const FARTHEST_LAG_S: f64 = 10.0;
 /// The lowest part of the reference's range, in which drift is looked for.
 const LOWEST: f64 = 0.1;
 
@@ -77,7 +75,7 @@ pub struct Survey {
     /// By how much neighbouring readings alternate, relative to their size, if they do.
     pub alternation: Option<f64>,
     /// How far the reference lags behind the readings.
-    pub lag: Option<Offset>,
+    pub lag: Option<Lag>,
     /// Why that is not known.
     pub lag_unknown: Option<String>,
 }
@@ -94,9 +92,9 @@ impl Survey {
             Some(segments) => longest_hold(time_s, segments).unwrap_or(0..0),
             None => 0..time_s.len(),
         };
-        let found = reference.map(|reference| {
-            motion_offset((time_s, readings), (time_s, reference), Some(FARTHEST_LAG_S))
-                .map(|offset| Offset { seconds: -offset.seconds, ..offset })
+        let found = reference.map(|reference| match Samples::new(time_s, readings, reference) {
+            Ok(samples) => reference_lag(&samples),
+            Err(_) => Err(LagError::Short),
         });
         Self {
             clock: clock_survey(time_s, imported.duplicates),

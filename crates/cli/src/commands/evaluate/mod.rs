@@ -85,7 +85,7 @@ fn with_split(
     let training = [recording.rows(split.training(rows))];
     let (sensors, rivals) = calibrated(&training, args, progress)?;
     progress.doing("scoring");
-    let lag_s = reference_lag(&recording.samples()?).map(|lag| lag.lag_s);
+    let lag_s = reference_lag(&recording.samples()?).ok().map(|lag| lag.lag_s);
     let (scored, time_at) = (split.scored(rows), |row: usize| recording.trace.time_s.get(row).copied());
     let part = Part { from_s: time_at(scored.start), until_s: time_at(scored.end) };
     let Judged { mut scores, drawn, .. } = judge(args, recording, part, &sensors, &rivals)?;

@@ -72,7 +72,9 @@ fn columns(proposal: &Proposal, tables: &[Table]) -> Value {
 
 fn survey(survey: &Survey) -> Value {
     let clock = &survey.clock;
-    let lag = survey.lag.map(|lag| json!({ "seconds": lag.seconds, "sd_s": lag.sd_s, "unexplained": lag.unexplained }));
+    let lag = survey.lag.map(|lag| {
+        json!({ "seconds": lag.lag_s, "sd_s": lag.sd_s, "own_sd_s": lag.own_s, "unexplained": lag.unexplained, "is_sure": lag.is_sure() })
+    });
     let phases = survey.phases.as_ref().map(|phases| {
         let of = |i: usize| json!({ "count": phases.phases[i].0, "seconds": phases.phases[i].1 });
         json!({ "extend": of(0), "hold": of(1), "retract": of(2) })

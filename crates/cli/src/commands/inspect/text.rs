@@ -46,8 +46,14 @@ fn write_proposal(out: &mut dyn Write, proposal: &Proposal) -> Result<(), CliErr
     }
     match (lag, lag_unknown) {
         (Some(lag), _) => {
-            let (word, seconds) = if lag.seconds < 0.0 { ("leads", -lag.seconds) } else { ("lags", lag.seconds) };
-            writeln!(out, "lag         the reference {word} the readings by {seconds:.3} ± {:.3} s", lag.sd_s)?;
+            let (word, seconds) = if lag.lag_s < 0.0 { ("leads", -lag.lag_s) } else { ("lags", lag.lag_s) };
+            let doubt = if lag.is_sure() { "" } else { "; without a lag they are explained about as well" };
+            writeln!(
+                out,
+                "lag         the reference {word} the readings by {seconds:.3} ± {:.3} s, of which ± {:.3} s may be the sensor's own{doubt}",
+                lag.sd_s.hypot(lag.own_s),
+                lag.own_s
+            )?;
         }
         (None, Some(why)) => writeln!(out, "lag         not known: {why}")?,
         (None, None) => {}

@@ -1,3 +1,5 @@
+//! The lag by the law: where a recording is long enough for that.
+
 use nalgebra::DVector;
 
 use crate::law::design::BRANCH_COLUMNS;
@@ -6,6 +8,8 @@ use crate::law::robust_loss::preliminary;
 use crate::low_pass::LowPass;
 use crate::motion_stats::MotionStats;
 use crate::samples::{FEWEST_ROWS, Samples};
+
+use super::{FARTHEST_S, Lag, LagError, SURE, aligned};
 
 /// Where lags are looked for.
 #[derive(Clone, Copy)]
@@ -21,11 +25,9 @@ struct Search {
 }
 
 /// The first look, as far as a reference is late or early where clocks were started by hand.
-const FAR: Search = Search { around_s: 0.0, reach_s: 12.0, steps: 24, rows: 1500 };
+const FAR: Search = Search { around_s: 0.0, reach_s: FARTHEST_S, steps: 24, rows: 1500 };
 /// The second look, around what the first one has found.
 const NEAR: Search = Search { around_s: 0.0, reach_s: 1.0, steps: 20, rows: 6000 };
-/// The first look reaches no further than this share of the recording.
-const LARGEST_SHARE: f64 = 0.1;
 /// Movements that repeat look alike one period later: of lags about as good as the best one, in squared error, the
 /// smallest is taken.
 const AS_GOOD: f64 = 1.2;
@@ -37,10 +39,6 @@ const OF_GAUGE: f64 = 0.3;
 const OWN_SHARE: f64 = 0.1;
 /// Ridge of the law, in the middle of those that calibration tries.
 const RIDGE: f64 = 0.01;
-/// By this factor a lag has to lower the squared error to be believed far from zero. Public recordings as they are, of three
-/// materials, and their halves show gains of up to 1.9, for lags of seconds where one part of a sine looks like another; moved by
-/// 2 s, gains of 1.9 to 135, mostly above 3.
-const SURE: f64 = 2.5;
 /// From this gain on there hardly is a doubt. Of 1440 simulated recordings as they are, whole, halves and thirds, 43 show a lag of more
 /// than a tenth of a movement with a gain of [`SURE`] (in three movements between long holds up to 5.5, by a gauge up to 4.6), four with
 /// this one (halves with sines of a sensor with much hysteresis). Of public recordings, whole to quarters, none shows more than 3.2.
@@ -53,23 +51,10 @@ const DASH_POTS: usize = 2;
 /// Coefficients of the polynomial gauge.
 const GAUGE: usize = 3;
 
-/// How late a reference is.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Lag {
-    /// Positive if what the reading shows now stands in the reference later, s.
-    pub lag_s: f64,
-    /// Mean duration of a movement in one direction, s.
-    pub movement_s: f64,
-    /// Squared error of the law, or of the gauge alone, on blocks left out without the lag, over that with it, or over what is no error.
-    pub gain: f64,
-    /// By how much the lag may be off, s, where a gauge alone tells it, which cannot know what the sensor lags itself; 0 where not.
-    pub own_s: f64,
-}
-
-/// How far the reference lags behind the reading.
+/// Lag of a reference by the law.
 ///
-/// The lag, within ±12 s (or a tenth of the recording) if it is [sure](Lag::is_sure) and ±1 s if not, at which a law with
-/// two branches, a cubic gauge and no dash-pots explains the readings best, on blocks left out. Law and readings are compared through a high-pass as long as the lags
+/// The lag, within ±12 s if it is [sure](Lag::is_sure) and ±1 s if not, at which a law with two branches, a cubic gauge and no
+/// dash-pots explains the readings best, on blocks left out. Law and readings are compared through a high-pass as long as the lags
 /// reach: a lag shows where the movement changes, and slow errors of the law, which are larger, would move it by half a
 /// second and more. A dash-pot is left out because it looks like a lag: what a sensor has of one is part of the answer. A
 /// movement that repeats cannot tell a lag from one that is a period longer; the smaller one is given.
@@ -77,103 +62,71 @@ pub struct Lag {
 /// The gauge alone is asked besides, over ±12 s, where a body does not rest and the gauge explains most of the changes: it does not
 /// take a lag for relaxation, but cannot know what the sensor lags itself. A lag of the law that it contradicts is none. Its own, in
 /// the middle of what it leaves open, is believed from 0.15 movements on.
-///
-/// `None` if no lag within reach is best, or the recording is too short or too plain to tell.
-#[must_use]
-pub fn reference_lag(samples: &Samples) -> Option<Lag> {
-    let far = far(samples)?;
-    let errors = errors(samples, far)?;
-    let found = best_lag(&errors.law, far).and_then(|(around_s, _)| examined(samples, around_s, far.reach_s));
-    let by_law = found.filter(Lag::is_sure).or_else(|| examined(samples, 0.0, far.reach_s));
+pub(super) fn lag_by_law(samples: &Samples) -> Result<Lag, LagError> {
+    let errors = errors(samples, FAR).ok_or(LagError::Short)?;
+    match by_law_and_gauge(samples, &errors) {
+        Some(lag) if lag.is_sure() => Ok(lag),
+        unsure => out_of_reach(&errors.law)
+            .map_or_else(|| unsure.ok_or(LagError::Untold), |end_s| Err(LagError::AtEnd(end_s))),
+    }
+}
+
+fn by_law_and_gauge(samples: &Samples, errors: &Errors) -> Option<Lag> {
+    let found = best_lag(&errors.law, FAR).and_then(|(around_s, _)| examined(samples, around_s));
+    let by_law = found.filter(Lag::is_sure).or_else(|| examined(samples, 0.0));
     let motion = MotionStats::new(&[*samples]);
     if motion.hold_s.is_some() || least(&errors.gauge) >= OF_GAUGE {
         return by_law;
     }
-    match by_law.filter(|lag| !(lag.is_sure() && contradicts(&errors.gauge, far, lag))) {
+    match by_law.filter(|lag| !(lag.is_sure() && contradicts(&errors.gauge, lag))) {
         Some(lag) if lag.is_sure() => Some(lag),
-        unsure => of_gauge(&errors.gauge, far, motion.move_s).or(unsure),
+        unsure => of_gauge(&errors.gauge, motion.move_s).or(unsure),
     }
 }
 
 /// What the gauge alone says, where it is sure of more than the sensor's own lag.
-fn of_gauge(errors: &[f64], far: Search, movement_s: f64) -> Option<Lag> {
-    let (lag_s, error) = best_lag(errors, far)?;
+fn of_gauge(errors: &[f64], movement_s: f64) -> Option<Lag> {
+    let (lag_s, error) = best_lag(errors, FAR)?;
     let own_s = 0.5 * OWN_SHARE * movement_s;
-    let gain = errors.get(far.steps as usize)? / error.max(EXPLAINED);
-    let lag = Lag { lag_s: lag_s + own_s, movement_s, gain, own_s };
+    let gain = errors.get(FAR.steps as usize)? / error.max(EXPLAINED);
+    let lag = lag_of(lag_s + own_s, own_s, FAR, movement_s, gain, error);
     (lag.is_sure() && lag.lag_s.abs() > 3.0 * own_s).then_some(lag)
 }
 
 /// Whether the gauge's errors are much larger around this lag, and earlier by what may be the sensor's own, than elsewhere.
-fn contradicts(errors: &[f64], far: Search, lag: &Lag) -> bool {
+fn contradicts(errors: &[f64], lag: &Lag) -> bool {
     let (first_s, last_s) =
-        (lag.lag_s - OWN_SHARE * lag.movement_s - 1.5 * far.step_s(), lag.lag_s + 1.5 * far.step_s());
-    let near = (0..errors.len()).filter(|i| (first_s..=last_s).contains(&far.offset_s(*i))).map(|i| errors[i]);
+        (lag.lag_s - OWN_SHARE * lag.movement_s - 1.5 * FAR.step_s(), lag.lag_s + 1.5 * FAR.step_s());
+    let near = (0..errors.len()).filter(|i| (first_s..=last_s).contains(&FAR.offset_s(*i))).map(|i| errors[i]);
     near.fold(f64::INFINITY, f64::min) > SURE * least(errors).max(EXPLAINED)
 }
 
 /// The end of the lags that are looked for, s (negative: the reference is early), if the readings are explained best there, and
 /// surely better than without a lag: the clocks are further apart than that.
-#[must_use]
-pub fn lag_out_of_reach(samples: &Samples) -> Option<f64> {
-    let far = far(samples)?;
-    let errors = errors(samples, far)?.law;
-    let least = least(&errors);
-    let is_sure = *errors.get(far.steps as usize)? >= SURE * least.max(EXPLAINED);
+fn out_of_reach(errors: &[f64]) -> Option<f64> {
+    let least = least(errors);
+    let is_sure = *errors.get(FAR.steps as usize)? >= SURE * least.max(EXPLAINED);
     let is_least = |error: Option<&f64>| is_sure && error == Some(&least);
     match (is_least(errors.first()), is_least(errors.last())) {
-        (true, false) => Some(-far.reach_s),
-        (false, true) => Some(far.reach_s),
+        (true, false) => Some(-FAR.reach_s),
+        (false, true) => Some(FAR.reach_s),
         _ => None,
     }
 }
 
-/// The first look, in a recording of that length.
-fn far(samples: &Samples) -> Option<Search> {
-    let duration_s = samples.time_s.last()? - samples.time_s.first()?;
-    Some(Search { reach_s: FAR.reach_s.min(LARGEST_SHARE * duration_s), ..FAR })
-}
-
 /// The best lag near `around_s`.
-fn examined(samples: &Samples, around_s: f64, farthest_s: f64) -> Option<Lag> {
-    let search = Search { around_s, reach_s: NEAR.reach_s.min(farthest_s), ..NEAR };
+fn examined(samples: &Samples, around_s: f64) -> Option<Lag> {
+    let search = Search { around_s, ..NEAR };
     let (lag_s, least) = best_lag(&errors(samples, search)?.law, search)?;
     let [now, _] = left_out_errors(samples, 0.0, search)?;
-    Some(Lag { lag_s, movement_s: MotionStats::new(&[*samples]).move_s, gain: now / least.max(EXPLAINED), own_s: 0.0 })
+    let movement_s = MotionStats::new(&[*samples]).move_s;
+    Some(lag_of(lag_s, 0.0, search, movement_s, now / least.max(EXPLAINED), least))
 }
 
-impl Lag {
-    /// Whether the lag is believed wherever it is: the readings are explained so much better with it.
-    #[must_use]
-    pub fn is_sure(&self) -> bool {
-        self.gain >= SURE
-    }
-
-    /// Whether hardly any recording without a lag looks like that.
-    #[must_use]
-    pub fn is_certain(&self) -> bool {
-        self.gain >= CERTAIN
-    }
-}
-
-/// The reference of each row, moved by `-lag_s`: what it says that much later, interpolated; NaN beyond its ends.
-#[must_use]
-pub fn aligned(samples: &Samples, lag_s: f64) -> Vec<f64> {
-    let known: Vec<(f64, f64)> = samples
-        .time_s
-        .iter()
-        .zip(samples.strain)
-        .filter_map(|(&time_s, &strain)| strain.is_finite().then_some((time_s, strain)))
-        .collect();
-    let at = |time_s: f64| {
-        let after = known.partition_point(|(known_s, _)| *known_s < time_s);
-        match (after.checked_sub(1).and_then(|before| known.get(before)), known.get(after)) {
-            (_, Some((b_s, b))) if *b_s == time_s => *b,
-            (Some((a_s, a)), Some((b_s, b))) => a + (time_s - a_s) / (b_s - a_s) * (b - a),
-            _ => f64::NAN,
-        }
-    };
-    samples.time_s.iter().map(|time_s| at(time_s + lag_s)).collect()
+/// A lag between those tried: it is good to half a step.
+fn lag_of(lag_s: f64, own_s: f64, search: Search, movement_s: f64, gain: f64, unexplained: f64) -> Lag {
+    let sd_s = 0.5 * search.step_s();
+    Lag { lag_s, sd_s, own_s, movement_s, gain, unexplained, certain: gain >= CERTAIN }
 }
 
 fn least(errors: &[f64]) -> f64 {

@@ -1,7 +1,6 @@
 use nalgebra::{SMatrix, SVector};
 
-use crate::order::typical_step;
-use crate::segment::typical_rate_of;
+use crate::samples::usual_step_s;
 
 /// Regressors and a constant.
 const PARAMETERS: usize = 8;
@@ -13,12 +12,18 @@ const MOST_READINGS: f64 = 1500.0;
 const SLOW_SHARE: f64 = 1.0 / 6.0;
 /// Fewest rows that say something.
 const FEWEST: usize = 40;
+/// Blocks of neighbours that are left out in turn.
+pub(super) const BLOCKS: usize = 10;
+/// Ridge of the regression, relative to each regressor's square: a block left out may hold what others do not.
+const RIDGE: f64 = 1e-4;
+/// Rows to each side over which a speed is averaged: a reference's noise is larger than its steps.
+const SMOOTHED: usize = 2;
 
 type Regressors = SVector<f64, { PARAMETERS - 1 }>;
 type Row = SVector<f64, PARAMETERS>;
 
 /// What a reference says of readings, on a grid of its own clock, without what is slow.
-pub(crate) struct Motion {
+pub(super) struct Motion {
     start_s: f64,
     step_s: f64,
     rows: Vec<Regressors>,
@@ -29,44 +34,26 @@ pub(crate) struct Motion {
 
 impl Motion {
     /// What is slower than `slow` full stretches is taken out.
-    pub(crate) fn new((times, values): (&[f64], &[f64]), slow: f64) -> Option<Self> {
+    pub(super) fn new((times, values): (&[f64], &[f64]), slow: f64) -> Option<Self> {
         let (times, values) = known(times, values);
-        let step = typical_step(&times)?;
+        let step = step_s(&times)?;
         let (start_s, end_s) = (*times.first()?, *times.last()?);
         let (low, high) = values.iter().fold((f64::MAX, f64::MIN), |(low, high), v| (low.min(*v), high.max(*v)));
-        let stretch_s = (high - low) / typical_rate_of(&times, &values);
+        let step_s = step.max((end_s - start_s) / MOST_MOTION_ROWS);
+        let grid = on_grid(&times, &values, step_s);
+        let stretch_s = (high - low) / typical_rate(&grid, step_s);
         if times.len() < FEWEST || !(stretch_s > 0.0 && stretch_s.is_finite()) {
             return None;
         }
         let slow_s = (slow * stretch_s).min(SLOW_SHARE * (end_s - start_s));
-        let step_s = step.max((end_s - start_s) / MOST_MOTION_ROWS);
-        let grid = on_grid(&times, &values, step_s);
         let scaled: Vec<f64> = grid.iter().map(|value| 2.0 * (value - low) / (high - low) - 1.0).collect();
         let mut rows = regressors(&scaled, step_s, stretch_s);
         take_out_slow(&mut rows, (slow_s / step_s) as usize);
         Some(Self { start_s, step_s, rows, stretch_s, slow_s })
     }
 
-    pub(crate) fn span(&self) -> (f64, f64) {
+    pub(super) fn span(&self) -> (f64, f64) {
         (self.start_s, self.start_s + self.step_s * (self.rows.len() - 1) as f64)
-    }
-
-    /// Share of the variance that has no counterpart at an offset: of the readings beyond the reference, or of the reference beyond the
-    /// readings, whichever is less.
-    pub(crate) fn left_out(&self, pull: &Pull, offset_s: f64) -> f64 {
-        let ((first_s, last_s), (start_s, end_s)) = (self.span(), pull.span());
-        let share = |all: f64, inside: f64| if all > 0.0 { 1.0 - inside / all } else { 0.0 };
-        let is_known = |time_s: f64| (first_s..=last_s).contains(&(time_s - offset_s));
-        let squares = |is_inside: bool| -> f64 {
-            let rows = pull.rows.iter().filter(|(time_s, _)| !is_inside || is_known(*time_s));
-            rows.map(|(_, value)| value * value).sum()
-        };
-        let is_read = |i: usize| (start_s..=end_s).contains(&(self.start_s + self.step_s * i as f64 + offset_s));
-        let of_reference = |is_inside: bool| -> f64 {
-            let rows = self.rows.iter().enumerate().filter(|(i, _)| !is_inside || is_read(*i));
-            rows.map(|(_, row)| row[0] * row[0]).sum()
-        };
-        share(squares(false), squares(true)).min(share(of_reference(false), of_reference(true)))
     }
 
     /// The regressors at a time of the reference's clock; `None` outside of it, or where its ends disturb them.
@@ -113,15 +100,15 @@ fn take_out_slow<const N: usize>(rows: &mut [SVector<f64, N>], window: usize) {
 }
 
 /// Readings without what is slow.
-pub(crate) struct Pull {
+pub(super) struct Pull {
     rows: Vec<(f64, f64)>,
 }
 
 impl Pull {
-    pub(crate) fn new((times, values): (&[f64], &[f64]), motion: &Motion) -> Option<Self> {
+    pub(super) fn new((times, values): (&[f64], &[f64]), motion: &Motion) -> Option<Self> {
         let (times, values) = known(times, values);
         let (start_s, end_s) = (*times.first()?, *times.last()?);
-        let step_s = typical_step(&times)?.max((end_s - start_s) / MOST_MOTION_ROWS);
+        let step_s = self::step_s(&times)?.max((end_s - start_s) / MOST_MOTION_ROWS);
         let mut grid: Vec<SVector<f64, 1>> =
             on_grid(&times, &values, step_s).into_iter().map(|x| SVector::from([x])).collect();
         let window = (motion.slow_s / step_s) as usize;
@@ -133,25 +120,48 @@ impl Pull {
         (rows.len() >= FEWEST).then_some(Self { rows })
     }
 
-    pub(crate) fn span(&self) -> (f64, f64) {
+    pub(super) fn span(&self) -> (f64, f64) {
         (self.rows[0].0, self.rows[self.rows.len() - 1].0)
     }
 
-    /// Normal equations at an offset, in blocks of neighbours.
-    pub(crate) fn blocks(&self, motion: &Motion, offset_s: f64, blocks: usize) -> Blocks {
-        let mut out = vec![Sums::default(); blocks];
-        for (i, (time_s, value)) in self.rows.iter().enumerate() {
-            if let Some(regressors) = motion.at(time_s - offset_s) {
-                out[i * blocks / self.rows.len()].add(&regressors.push(1.0), *value);
-            }
+    /// The regression at a lag of the reference; `None` if there is too little in common.
+    pub(super) fn fit(&self, motion: &Motion, lag_s: f64) -> Option<Fit> {
+        let known = self.rows.iter().filter_map(|(time_s, value)| Some((motion.at(time_s + lag_s)?.push(1.0), *value)));
+        let rows: Vec<(Row, f64)> = known.collect();
+        if rows.len() < FEWEST {
+            return None;
         }
-        Blocks(out)
+        let mut blocks = vec![Sums::default(); BLOCKS];
+        rows.iter().enumerate().for_each(|(i, (row, value))| blocks[i * BLOCKS / rows.len()].add(row, *value));
+        let total = blocks.iter().fold(Sums::default(), |total, block| total.with(block, 1.0));
+        let square = total.square - total.sum * total.sum / total.count;
+        let error =
+            |block| Some(total.clone().with(block, -1.0).solve().map(|weights| block.residual(&weights))? / square);
+        let by_block: Vec<f64> = blocks.iter().map(error).collect::<Option<_>>()?;
+        let ((r0, r1), (s0, s1)) = (self.span(), motion.span());
+        let most = (self.rows.len() as f64).min((s1 - s0 - motion.slow_s) / (r1 - r0) * (self.rows.len() - 1) as f64);
+        Some(Fit { unexplained: by_block.iter().sum(), by_block, overlap: (rows.len() as f64 / most).min(1.0) })
     }
 }
 
-/// Normal equations of a regression, block by block.
-pub(crate) struct Blocks(Vec<Sums>);
+/// What a regression at one lag leaves.
+pub(super) struct Fit {
+    /// Squared error on blocks left out, as a share of the readings' variance.
+    pub unexplained: f64,
+    /// What each block has of it.
+    by_block: Vec<f64>,
+    /// Share of the rows that there could be at any lag.
+    pub overlap: f64,
+}
 
+impl Fit {
+    /// The unexplained share without a block.
+    pub(super) fn without(&self, left_out: Option<usize>) -> f64 {
+        self.unexplained - left_out.map_or(0.0, |block| self.by_block[block])
+    }
+}
+
+/// Normal equations of a regression.
 #[derive(Clone, Default)]
 struct Sums {
     count: f64,
@@ -170,48 +180,44 @@ impl Sums {
         self.square += value * value;
     }
 
-    fn join(mut self, other: &Self) -> Self {
-        self.count += other.count;
-        self.matrix += other.matrix;
-        self.vector += other.vector;
-        self.sum += other.sum;
-        self.square += other.square;
+    /// With the rows of another one, or without them (`sign` -1).
+    fn with(mut self, other: &Self, sign: f64) -> Self {
+        self.count += sign * other.count;
+        self.matrix += other.matrix * sign;
+        self.vector += other.vector * sign;
+        self.sum += sign * other.sum;
+        self.square += sign * other.square;
         self
     }
 
-    /// Coefficients of least squares, with a ridge that keeps regressors of no variance from dividing by zero.
     fn solve(&self) -> Option<Row> {
-        let ridge = SMatrix::from_diagonal_element(1e-9 * self.matrix.trace());
+        let least = 1e-9 * self.matrix.trace();
+        let ridge = SMatrix::from_diagonal(
+            &self.matrix.diagonal().map(|square| RIDGE * square.max(least) + 1e-12 * self.count),
+        );
         (self.count > 2.0 * PARAMETERS as f64)
             .then(|| (self.matrix + ridge).cholesky())?
             .map(|factor| factor.solve(&self.vector))
     }
 
     fn residual(&self, coefficients: &Row) -> f64 {
-        self.square - 2.0 * coefficients.dot(&self.vector) + coefficients.dot(&(self.matrix * coefficients))
+        let products = coefficients.dot(&(self.matrix * coefficients));
+        (self.square - 2.0 * coefficients.dot(&self.vector) + products).max(0.0)
     }
 }
 
-impl Blocks {
-    fn total(&self, left_out: Option<usize>) -> Sums {
-        let kept = self.0.iter().enumerate().filter(|(block, _)| Some(*block) != left_out);
-        kept.fold(Sums::default(), |total, (_, block)| total.join(block))
-    }
+/// The usual step of times.
+fn step_s(times: &[f64]) -> Option<f64> {
+    Some(usual_step_s([times].into_iter())).filter(|step| *step > 0.0)
+}
 
-    /// Share of the variance that stays unexplained; NaN if there is too little in common.
-    pub(crate) fn unexplained(&self, left_out: Option<usize>) -> f64 {
-        let total = self.total(left_out);
-        let Some(coefficients) = total.solve().filter(|_| total.count >= FEWEST as f64) else { return f64::NAN };
-        total.residual(&coefficients) / (total.square - total.sum * total.sum / total.count)
-    }
-
-    /// Mean square of what stays unexplained, relative to all of the variance, in each block.
-    pub(crate) fn by_block(&self) -> Vec<f64> {
-        let total = self.total(None);
-        let variance = total.square / total.count;
-        let Some(coefficients) = total.solve() else { return Vec::new() };
-        self.0.iter().map(|block| block.residual(&coefficients) / block.count / variance).collect()
-    }
+/// Mean speed along the way: holds do not count.
+fn typical_rate(grid: &[f64], step_s: f64) -> f64 {
+    let window = |i: usize| &grid[i.saturating_sub(SMOOTHED)..(i + SMOOTHED + 1).min(grid.len())];
+    let smooth: Vec<f64> = (0..grid.len()).map(|i| window(i).iter().sum::<f64>() / window(i).len() as f64).collect();
+    let ways = smooth.windows(2).map(|pair| (pair[1] - pair[0]).abs());
+    let (squares, sum) = ways.fold((0.0, 0.0), |(squares, sum), way| (squares + way * way, sum + way));
+    squares / sum / step_s
 }
 
 /// What is known of a series.
