@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Installs what crates/cli/tests/browser.rs and the figures' PDF need, where it is missing and this may: Chromium, and a font
+# Installs what crates/cli/tests/browser.rs needs, where it is missing and this may: Chromium, and a font
 # without serifs.
 set -euo pipefail
 

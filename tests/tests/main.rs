@@ -3,7 +3,6 @@
 mod adskalman_bridge;
 mod adskalman_vectors;
 mod another_day;
-mod bank;
 mod capacity;
 mod consistency;
 mod cramer_rao;

@@ -6,13 +6,13 @@
 //! [`Ekf`] (or, unscented, [`Ukf`]) keeps one Gaussian and has a smoother. [`Imm`], [`SignSplit`] and
 //! [`Hypotheses`] keep a [`Mixture`] of hypotheses about the phase, because stretching and releasing look alike.
 //! `Particles` (feature `particles`) samples the motion instead: slow, and the reference for all of them.
-//! [`correction`] makes a calibrated filter's strain better by what was learned in calibration. `Bank` (feature `simd`) steps many sensors at once, in vector registers.
+//! [`correction`] makes a calibrated filter's strain better by what was learned in calibration.
 //!
 //! Models are anything that implements [`Dynamics`] and [`Channel`];
 //! [`SwitchedModel`](ohmstrain_model::SwitchedModel) does.
 //!
 //! # Policy
-//! - `no_std`, no heap (the features `particles` and `simd` add the particle filter and a `Bank` of sensors), no unsafe
+//! - `no_std`, no heap (the feature `particles` adds the particle filter), no unsafe
 //!   code, no panic.
 //! - A missing reading is a prediction. A step of zero seconds is an update without a prediction. A NaN or infinite
 //!   reading, a negative step and a variance that is not positive are [`StepError`]s.
@@ -21,7 +21,7 @@
 //!   filters on the kernel, which say so.
 //!
 //! # Features
-//! `particles` (on by default) and `simd` are named above; `adskalman` hands linearised steps to that crate. Off by default and
+//! `particles` (on by default) is named above; `simd` steps four hypotheses at once where the processor has AVX2; `adskalman` hands linearised steps to that crate. Off by default and
 //! without std:
 //! - `serde`: [`Belief`], [`Estimate`], [`Gaussian`], readings, innovations, verdicts of readings and errors as plain data. A
 //!   belief that comes back is not checked; the step that it cannot take is refused. Mixtures, and what is made
@@ -59,8 +59,6 @@ extern crate std;
 
 #[cfg(feature = "adskalman")]
 mod adskalman_bridge;
-#[cfg(feature = "simd")]
-mod bank;
 mod belief;
 mod clock;
 pub mod correction;
@@ -87,8 +85,6 @@ mod unscented;
 
 #[cfg(feature = "adskalman")]
 pub use adskalman_bridge::LinearStep;
-#[cfg(feature = "simd")]
-pub use bank::{Bank, Lane, WrongLength};
 pub use belief::{Belief, BeliefOf, Gaussian, Start};
 pub use clock::seconds_between;
 pub use ekf::{Ekf, Step, Update};

@@ -64,7 +64,7 @@ pub struct ReportArgs {
     /// Also write a report of the first recording
     #[arg(long, value_name = "report.html")]
     pub report: Option<PathBuf>,
-    /// Also write every plot of that report as SVG and PDF, with what is drawn as CSV, to this folder
+    /// Also write every plot of that report as SVG, with what is drawn as CSV, to this folder
     #[arg(long, value_name = "DIR")]
     pub figures: Option<PathBuf>,
 }

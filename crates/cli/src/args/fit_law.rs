@@ -40,7 +40,7 @@ pub struct FitLawArgs {
     /// How tables are printed; CSV has all digits, and a column of standard errors for each parameter
     #[arg(long, value_enum, default_value_t = TableFormat::Text, conflicts_with = "json")]
     pub format: TableFormat,
-    /// Also write a plot of each fit as SVG and PDF, with what is drawn as CSV, to this folder
+    /// Also write a plot of each fit as SVG, with what is drawn as CSV, to this folder
     #[arg(long, value_name = "DIR")]
     pub figures: Option<PathBuf>,
     /// Whether to replace

@@ -63,15 +63,10 @@ impl<'a> Wanted<'a> {
 
 /// Puts figures into a folder.
 pub fn put_figures(folder: &Path, figures: Vec<FigureFiles>, outputs: &mut Outputs) -> Result<(), CliError> {
-    if figures.iter().any(|figure| figure.pdf.is_none()) {
-        CliError::warning("no font is installed, so that figures are written as SVG and not as PDF");
-    }
-    for FigureFiles { name, svg, pdf, csv } in figures {
-        let contents = [("svg", Some(svg.into_bytes())), ("pdf", pdf), ("csv", Some(csv.into_bytes()))];
-        for (ending, content) in contents {
-            let Some(content) = content else { continue };
+    for FigureFiles { name, svg, csv } in figures {
+        for (ending, content) in [("svg", svg), ("csv", csv)] {
             let claim = outputs.claim(&folder.join(format!("{name}.{ending}")), Kind::Figure)?;
-            outputs.put(claim, content);
+            outputs.put(claim, content.into_bytes());
         }
     }
     Ok(())

@@ -68,11 +68,13 @@ const SIGN_SPLIT: OfKind = OfKind {
     flash_branch: 7750.0,
     stack: [840.0, 191.0, 93.0, 56.0],
 };
+/// Counted of five sensors of one to four branches, with two to eight hypotheses: those of a curve with an exponential are merged
+/// sooner.
 const HISTORIES: OfKind = OfKind {
-    step: 200.0,
-    hypothesis: 1750.0,
-    branch: 740.0,
-    curve: 1050.0,
+    step: -7400.0,
+    hypothesis: 3030.0,
+    branch: 945.0,
+    curve: -440.0,
     flash: 15_600.0,
     flash_branch: 5000.0,
     stack: [1040.0, 154.0, 100.0, 49.0],

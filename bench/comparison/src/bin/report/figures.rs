@@ -21,7 +21,7 @@ impl Build {
     pub fn read(directory: &Path) -> Result<Self, Box<dyn Error>> {
         let level = directory.file_name().ok_or("a target directory has a name")?.to_string_lossy().into_owned();
         let mut nanoseconds = BTreeMap::new();
-        for group in ["step", "recording", "pass", "bank"] {
+        for group in ["step", "recording", "pass"] {
             // A group that was not run leaves "not measured" in the table.
             let Ok(functions) = std::fs::read_dir(directory.join("criterion").join(group)) else { continue };
             for function in functions {

@@ -27,7 +27,6 @@ fn main() -> Result<(), Box<dyn Error>> {
         .replace("{instructions}", &table::instructions(&instructions).ok_or("no figure of the sign-split filter")?)
         .replace("{beside}", &table::beside_constants(&builds))
         .replace("{steps}", &table::steps(&builds))
-        .replace("{banks}", &table::banks(&builds))
         .replace("{recordings}", &table::recordings(&builds))
         .replace("{memory}", &table::memory(&builds));
     Ok(std::fs::write(readme, text)?)

@@ -24,7 +24,7 @@ const fn ratio(words: &'static str, over: &'static str, under: &'static str, tar
     Ratio { words, over, under, target }
 }
 
-const TARGETS: [Ratio; 17] = [
+const TARGETS: [Ratio; 14] = [
     ratio("EKF ÷ kfilter, same step", "step/sparse_ekf_3", "step/nonlinear_kfilter_3", AtMost(0.6)),
     ratio("EKF ÷ adskalman, same step", "step/sparse_ekf_3", "step/nonlinear_adskalman_3", AtMost(0.6)),
     ratio("EKF ÷ typed-kalman, same step", "step/sparse_ekf_3", "step/nonlinear_typed_kalman_3", AtMost(0.6)),
@@ -57,9 +57,6 @@ const TARGETS: [Ratio; 17] = [
         "recording/sparse_smoother_3",
         AtLeast(1.0),
     ),
-    ratio("64 sensors one at a time ÷ bank, AVX2", "bank/one_at_a_time_3", "bank/bank_3_256_bits", AtLeast(5.0)),
-    ratio("the same, f32", "bank/one_at_a_time_3_f32", "bank/bank_3_f32_256_bits", AtLeast(9.0)),
-    ratio("64 sensors one at a time ÷ bank, AVX-512", "bank/one_at_a_time_3", "bank/bank_3", AtLeast(9.0)),
     ratio("IMM ÷ EKF, six states", "step/imm_6", "step/sparse_ekf_6", AtMost(4.0)),
     ratio("sign-split of 8 ÷ EKF, six states", "step/sign_split_6", "step/sparse_ekf_6", AtMost(14.0)),
 ];
@@ -152,23 +149,6 @@ pub fn steps(builds: &[Build]) -> String {
         if builds.iter().any(|build| build.ns(&name).is_some()) {
             row(&mut out, words, builds.iter().map(|build| cell(build.ns(&name), 1)));
         }
-    }
-    out
-}
-
-const BANKS: [(&str, &str); 5] = [
-    ("one at a time, without gate", "bank/one_at_a_time_3"),
-    ("bank, vectors of 256 bits (AVX2)", "bank/bank_3_256_bits"),
-    ("bank, the widest vectors there are", "bank/bank_3"),
-    ("one at a time, f32", "bank/one_at_a_time_3_f32"),
-    ("bank, f32, AVX2", "bank/bank_3_f32_256_bits"),
-];
-
-/// Nanoseconds for each of many sensors.
-pub fn banks(builds: &[Build]) -> String {
-    let mut out = header("one step of each of 64 sensors, ns per sensor", builds);
-    for (words, name) in BANKS {
-        row(&mut out, words, builds.iter().map(|build| cell(build.ns(name), 1)));
     }
     out
 }
