@@ -93,6 +93,16 @@ fn a_short_recording_tells_a_lag_of_several_movements() {
     }
 }
 
+/// One stroke of 10 s and a hold, or two strokes, of a sensor that relaxes: any lag would explain as much.
+#[test]
+fn a_stroke_or_two_tell_no_lag() {
+    let (stroke, hold) = (|t: f64| 0.3 * (t / 10.0).min(1.0), |t: f64| 0.3 * (t / 10.0).min(2.0 - t / 10.0).max(0.0));
+    for (time_s, reading, strain) in [of_relaxing(stroke, 60, 0.0), of_relaxing(hold, 20, 0.0)] {
+        let found = reference_lag(&Samples::new(&time_s, &reading, &strain).unwrap());
+        assert_eq!(found, Err(LagError::Short));
+    }
+}
+
 fn of_relaxing(strain_at: impl Fn(f64) -> f64, seconds: u32, lag_s: f64) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
     const TAU_S: [f64; 4] = [0.5, 3.0, 20.0, 120.0];
     const GAINS: [[f64; 2]; 4] = [[0.5, -0.2], [0.35, -0.3], [0.3, -0.15], [0.3, 0.1]];

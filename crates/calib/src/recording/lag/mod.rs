@@ -19,11 +19,11 @@ const FARTHEST_S: f64 = 12.0;
 /// In a recording of so many times that the law tells the lag: it knows relaxation, and asks for readings with a reference on both
 /// sides of all lags. In shorter ones it takes one movement for another, and the motion alone is asked.
 const LONG: f64 = 10.0;
-/// By this factor a lag has to lower the squared error to be said. Of 39 public recordings as they are, halves and minutes among
-/// them, ten show as much: a sensor that answers to the rate looks early.
+/// By this factor a lag has to lower the squared error to be said. Of 104 public recordings as they are, parts of 15 s and more among
+/// them, two show as much.
 const SURE: f64 = 2.5;
-/// From this gain on there hardly is a doubt, if the motion explains the readings and the lag is more than a sensor's own: four of
-/// those 39 show the gain, none of them all three …
+/// From this gain on there hardly is a doubt, if the motion explains the readings and the lag is more than a sensor's own: none of
+/// those 104, and of 311 simulated ones, shows all three …
 const CERTAIN: f64 = 6.0;
 /// … but for this share of their variance, at most.
 const WELL_EXPLAINED: f64 = 0.3;

@@ -10,6 +10,8 @@ const MOST_MOTION_ROWS: f64 = 20_000.0;
 const MOST_READINGS: f64 = 1500.0;
 /// What is slower than this share of the recording is taken out in any case.
 const SLOW_SHARE: f64 = 1.0 / 6.0;
+/// Smaller movements, as a share of the range, are no way.
+const LEAST_STROKE: f64 = 0.1;
 /// Fewest rows that say something.
 const FEWEST: usize = 40;
 /// Blocks of neighbours that are left out in turn.
@@ -27,6 +29,8 @@ pub(super) struct Motion {
     start_s: f64,
     step_s: f64,
     rows: Vec<Regressors>,
+    /// Way from the first row to each, in full strokes.
+    strokes: Vec<f64>,
     /// Time of a full stretch at the typical rate, s.
     pub stretch_s: f64,
     slow_s: f64,
@@ -49,11 +53,20 @@ impl Motion {
         let scaled: Vec<f64> = grid.iter().map(|value| 2.0 * (value - low) / (high - low) - 1.0).collect();
         let mut rows = regressors(&scaled, step_s, stretch_s);
         take_out_slow(&mut rows, (slow_s / step_s) as usize);
-        Some(Self { start_s, step_s, rows, stretch_s, slow_s })
+        Some(Self { start_s, step_s, rows, strokes: strokes(&scaled), stretch_s, slow_s })
     }
 
     pub(super) fn span(&self) -> (f64, f64) {
         (self.start_s, self.start_s + self.step_s * (self.rows.len() - 1) as f64)
+    }
+
+    /// The smallest and the largest lag that leave so many strokes to readings of the same time span, s; `None` if there are fewer.
+    pub(super) fn lags_with_strokes(&self, least: f64) -> Option<(f64, f64)> {
+        let all = *self.strokes.last()?;
+        let rows_before = |way: f64| self.strokes.partition_point(|strokes| *strokes < way);
+        let early = self.strokes.len().checked_sub(rows_before(least) + 1)?;
+        let late = self.strokes.partition_point(|strokes| *strokes <= all - least).checked_sub(1)?;
+        Some((-self.step_s * early as f64, self.step_s * late as f64))
     }
 
     /// The regressors at a time of the reference's clock; `None` outside of it, or where its ends disturb them.
@@ -67,6 +80,19 @@ impl Motion {
         let row = place as usize;
         Some(self.rows[row] * (1.0 - share) + self.rows[row + 1] * share)
     }
+}
+
+/// Way from the first row to each, in full strokes; what is smaller than a tenth of one is no way.
+fn strokes(scaled: &[f64]) -> Vec<f64> {
+    let (mut way, mut place) = (0.0, scaled.first().copied().unwrap_or(0.0));
+    let to = |x: &f64| {
+        let moved = 0.5 * (x - place).abs();
+        if moved > LEAST_STROKE {
+            (way, place) = (way + moved, *x);
+        }
+        way
+    };
+    scaled.iter().map(to).collect()
 }
 
 /// Powers of the reference, and its movements through two low-passes each, with and without their sign.

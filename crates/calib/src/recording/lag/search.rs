@@ -7,6 +7,8 @@ const COARSE_STEPS: f64 = 12.0;
 const FINE_STEPS: i32 = 8;
 /// Lags leave at least this share of the shorter recording in common with the longer one.
 const LEAST_OVERLAP: f64 = 0.4;
+/// … and, on one clock, strokes over the whole range: one or two of them are explained wherever they are.
+const LEAST_STROKES: f64 = 4.0;
 /// What is slower than so many full stretches is taken out …
 const SLOW: f64 = 2.0;
 /// … and, to see how much that matters, these.
@@ -40,7 +42,7 @@ impl Search {
         let pull = Pull::new(readings, &motion).ok_or(LagError::Short)?;
         let coarse_s =
             within_s.map_or(f64::INFINITY, |within| within / COARSE_STEPS).min(motion.stretch_s / COARSE_STEPS);
-        let (first, last) = range(&motion, &pull, within_s);
+        let (first, last) = range(&motion, &pull, within_s).ok_or(LagError::Short)?;
         // Zero is one of the lags.
         let lags: Vec<f64> = ((first / coarse_s).ceil() as i64..=(last / coarse_s).floor() as i64)
             .map(|step| step as f64 * coarse_s)
@@ -130,11 +132,13 @@ impl Search {
 }
 
 /// The lags to try, s.
-fn range(motion: &Motion, pull: &Pull, within_s: Option<f64>) -> (f64, f64) {
+fn range(motion: &Motion, pull: &Pull, within_s: Option<f64>) -> Option<(f64, f64)> {
     let ((r0, r1), (s0, s1)) = (pull.span(), motion.span());
     let common = LEAST_OVERLAP * (r1 - r0).min(s1 - s0);
     let (first, last) = (s0 - (r1 - common), s1 - (r0 + common));
-    within_s.map_or((first, last), |within| (first.max(-within), last.min(within)))
+    let Some(within_s) = within_s else { return Some((first, last)) };
+    let (earliest_s, latest_s) = motion.lags_with_strokes(LEAST_STROKES)?;
+    Some((first.max(-within_s).max(earliest_s), last.min(within_s).min(latest_s)))
 }
 
 /// The minimum near a lag, what it scatters by when blocks are left out, and what it leaves unexplained.
