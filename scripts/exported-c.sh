@@ -130,7 +130,7 @@ for kind in polynomial:2:corrected polynomial:0:ekf decaying-exponential:1:sign-
 done
 
 # The same sensors on smaller chips.
-for kind in polynomial-2-corrected:lean polynomial-2-corrected:flash=30000,ram=3000 tunnelling-3-hypotheses:ram=2600; do
+for kind in polynomial-2-corrected:lean polynomial-2-corrected:flash=36000,ram=3000 tunnelling-3-hypotheses:ram=2600; do
     IFS=: read -r name budget <<<"$kind"
     folder=$work/$name-${budget%%=*}
     "$ohmstrain" export --sensor "$work/$name.toml" --target c --dt-s 0.2 -o "$folder" --budget "$budget" >/dev/null
