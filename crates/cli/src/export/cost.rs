@@ -66,7 +66,7 @@ const SIGN_SPLIT: OfKind = OfKind {
     curve: 150.0,
     flash: 17_500.0,
     flash_branch: 7750.0,
-    stack: [840.0, 191.0, 93.0, 56.0],
+    stack: [960.0, 191.0, 82.0, 56.0],
 };
 /// Counted of five sensors of one to four branches, with two to eight hypotheses: those of a curve with an exponential are merged
 /// sooner.
