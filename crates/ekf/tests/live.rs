@@ -42,6 +42,7 @@ fn filter() -> Filter {
         rest_reading: REST_READING,
         rested: RESTED,
         dt_s: DT_S,
+        longest_step_s: f32::INFINITY,
         limits: LIMITS,
         strain_sd_scale: 1.0,
         reading_variance: 4e-6,

@@ -112,6 +112,7 @@ impl<'a, const B: usize, const N: usize> FixedRate<'a, B, N> {
             rest_reading: exactly(self.rest_reading),
             rested: exactly(self.rested),
             dt_s: exactly(parts.dt_s),
+            longest_step_s: exactly(parts.longest_step_s),
             limits: parts.limits_in(),
             strain_sd_scale: exactly(parts.strain_sd_scale),
             reading_variance: reading_sd * reading_sd,

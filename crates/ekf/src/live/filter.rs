@@ -28,6 +28,8 @@ pub struct LiveParts<'a, T> {
     pub rested: T,
     /// Usual time between readings, s.
     pub dt_s: T,
+    /// The longest step that a pause is divided into, s; the estimator's own, if that is shorter.
+    pub longest_step_s: T,
     /// Range of the reported strain.
     pub limits: StrainRange<T>,
     /// Factor on the standard deviation of the filter's strain.
@@ -44,6 +46,14 @@ pub struct LiveParts<'a, T> {
     pub rest: RestBounds<T>,
     /// The scale of the features that the correction sees, and the correction; `None` for the filter's own strain.
     pub learned: Option<(FeatureScale<T>, Learned<'a, T>)>,
+}
+
+/// No time since the last reading.
+fn at_reading<T: Real, E: SensorEstimator<T, N, L>, const N: usize, const L: usize>(
+    estimator: &Substeps<E>,
+    parts: &LiveParts<'_, T>,
+) -> Pause<T> {
+    Pause::none(estimator.0.longest_step_s().min(parts.longest_step_s))
 }
 
 /// What a row says.
@@ -114,7 +124,7 @@ impl<'a, T: Real, E: SensorEstimator<T, N, L>, const N: usize, const L: usize> L
     pub fn new(estimator: E, parts: LiveParts<'a, T>) -> Self {
         let fresh = estimator.start(None);
         let estimator = Substeps(estimator);
-        let pause = estimator.pause();
+        let pause = at_reading(&estimator, &parts);
         let usual = pause.after(parts.dt_s);
         Self {
             prepared: (usual, estimator.prepare_over(usual)),
@@ -132,7 +142,7 @@ impl<'a, T: Real, E: SensorEstimator<T, N, L>, const N: usize, const L: usize> L
     /// The same before any reading, with some protections turned off.
     #[must_use]
     pub fn protected_by(self, protections: Protections) -> Self {
-        let now = Memory::new(&self.parts, protections, (self.fresh.clone(), self.estimator.pause()));
+        let now = Memory::new(&self.parts, protections, (self.fresh.clone(), at_reading(&self.estimator, &self.parts)));
         Self { guard: guard(protections), protections, sieve: self.parts.sieve.under(protections), now, ..self }
     }
 
@@ -195,7 +205,7 @@ impl<'a, T: Real, E: SensorEstimator<T, N, L>, const N: usize, const L: usize> L
     /// Begins again, at a strain that is known if there is one.
     pub fn start_at(&mut self, strain: Option<T>) {
         let known = strain.map(|mean| Gaussian { mean, variance: self.parts.known_variance });
-        let start = (self.estimator.0.start(known), self.estimator.pause());
+        let start = (self.estimator.0.start(known), at_reading(&self.estimator, &self.parts));
         self.now = Memory::new(&self.parts, self.protections, start);
         if let Some(strain) = strain {
             self.now.doubts =
@@ -256,7 +266,7 @@ impl<'a, T: Real, E: SensorEstimator<T, N, L>, const N: usize, const L: usize> L
         let pause = if self.now.doubts.has_begun() {
             self.now.pause.after(dt_s)
         } else {
-            self.estimator.pause().after(dt_s.min(self.parts.dt_s))
+            at_reading(&self.estimator, &self.parts).after(dt_s.min(self.parts.dt_s))
         };
         let (mut pause, mut moved) = (pause, None);
         if seen.is_none() && pause.clone().whole_step().is_some() {
@@ -275,7 +285,7 @@ impl<'a, T: Real, E: SensorEstimator<T, N, L>, const N: usize, const L: usize> L
         let jumped = used.and_then(|used| now.jumps.see(used, nis, self.sieve.jump)).filter(|_| surprises);
         now.repeats = repeats;
         let look = if used.is_some() {
-            (now.state, now.pause) = (guarded.advanced.state, self.estimator.pause());
+            (now.state, now.pause) = (guarded.advanced.state, at_reading(&self.estimator, &self.parts));
             None
         } else {
             now.pause = pause;

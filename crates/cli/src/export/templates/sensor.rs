@@ -158,6 +158,7 @@ pub const PARTS: LiveParts<'static, f32> = LiveParts {
     rest_reading: REST_READING,
     rested: RESTED,
     dt_s: DT_S,
+    longest_step_s: << steps.longest_s >>,
     limits: LIMITS,
     strain_sd_scale: STRAIN_SD_SCALE,
     reading_variance: << reading_variance >>,
