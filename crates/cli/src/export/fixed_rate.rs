@@ -91,8 +91,8 @@ impl<'a, const B: usize, const N: usize> FixedRate<'a, B, N> {
         let numbers = |step_s| exact_numbers(&reference, phases, step_s).map_err(parameter);
         let table = StepTable::new(usual_s, &kernel(usual_s)?.step_names(), numbers)?;
         // Not longer than the table either.
-        // A little less than where the table ends, a multiple of the usual step: rounding does not choose how rows divide a pause.
-        parts.longest_step_s = (longest_s.min(table.range.1 / STEP_GRACE) / STEP_GRACE) as f32;
+        // Not longer than the table either.
+        parts.longest_step_s = (longest_s.min(table.range.1) / STEP_GRACE) as f32;
         let rest_reading = params.rest_reading as f32;
         let rested = params.rested() as f32;
         Ok(Self { reference, model, hypotheses: filter.hypotheses, rest_reading, rested, parts, table })
