@@ -73,8 +73,7 @@ impl ReadingVerdict {
         matches!(self, Self::Accepted | Self::Downweighted | Self::Readmitted)
     }
 
-    /// Whether there was a reading that could be the sensor's and has told the filter nothing. One that no sensor gives is as good
-    /// as missing.
+    /// True for a reading that the sensor could give and that was not used. One that no sensor gives is as good as missing.
     #[must_use]
     pub const fn is_refused(self) -> bool {
         matches!(self, Self::Rejected | Self::Stuck)

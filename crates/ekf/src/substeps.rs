@@ -44,7 +44,7 @@ pub struct Pause<T> {
     ahead_s: T,
 }
 
-/// Whether a pause is one step.
+/// True if a pause takes one step.
 pub(crate) fn is_one_step<T: Scalar>(dt_s: T, longest_s: T) -> bool {
     dt_s <= longest_s * T::of(GRACE)
 }

@@ -3,7 +3,7 @@ use ohmstrain_calib::{Identifiability, Lag, LagError, Samples, identifiability, 
 use crate::{Error, Recording, Sensor};
 
 impl Recording<'_> {
-    /// Lag of the reference behind the readings, with its uncertainty: the same that `ohmstrain inspect`, `import` and `calibrate`
+    /// Lag of the reference behind the readings, with its uncertainty: the same that `ohmstrain inspect`, `calibrate` and `evaluate`
     /// tell. A recording whose lag [is too late](Lag::is_too_late) and [certain](Lag::is_certain) is not to be calibrated on as it is.
     ///
     /// # Errors

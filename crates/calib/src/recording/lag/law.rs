@@ -13,7 +13,7 @@ use super::{FARTHEST_S, Lag, LagError, SURE, aligned};
 
 /// Where lags are looked for.
 #[derive(Clone, Copy)]
-struct Search {
+struct Lags {
     /// In the middle of the lags tried, s.
     around_s: f64,
     /// Lags tried reach this far to both sides, s.
@@ -25,9 +25,9 @@ struct Search {
 }
 
 /// The first look, as far as a reference is late or early where clocks were started by hand.
-const FAR: Search = Search { around_s: 0.0, reach_s: FARTHEST_S, steps: 24, rows: 1500 };
+const FAR: Lags = Lags { around_s: 0.0, reach_s: FARTHEST_S, steps: 24, rows: 1500 };
 /// The second look, around what the first one has found.
-const NEAR: Search = Search { around_s: 0.0, reach_s: 1.0, steps: 20, rows: 6000 };
+const NEAR: Lags = Lags { around_s: 0.0, reach_s: 1.0, steps: 20, rows: 6000 };
 /// Movements that repeat look alike one period later: of lags about as good as the best one, in squared error, the
 /// smallest is taken.
 const AS_GOOD: f64 = 1.2;
@@ -84,7 +84,7 @@ fn by_law_and_gauge(samples: &Samples, errors: &Errors) -> Option<Lag> {
     }
 }
 
-/// What the gauge alone says, where it is sure of more than the sensor's own lag.
+/// Lag by the gauge alone, where it is sure of more than the sensor's own.
 fn of_gauge(errors: &[f64], movement_s: f64) -> Option<Lag> {
     let (lag_s, error) = best_lag(errors, FAR)?;
     let own_s = 0.5 * OWN_SHARE * movement_s;
@@ -116,7 +116,7 @@ fn out_of_reach(errors: &[f64]) -> Option<f64> {
 
 /// The best lag near `around_s`.
 fn examined(samples: &Samples, around_s: f64) -> Option<Lag> {
-    let search = Search { around_s, ..NEAR };
+    let search = Lags { around_s, ..NEAR };
     let (lag_s, least) = best_lag(&errors(samples, search)?.law, search)?;
     let [now, _] = left_out_errors(samples, 0.0, search)?;
     let movement_s = MotionStats::new(&[*samples]).move_s;
@@ -124,7 +124,7 @@ fn examined(samples: &Samples, around_s: f64) -> Option<Lag> {
 }
 
 /// A lag between those tried: it is good to half a step.
-fn lag_of(lag_s: f64, own_s: f64, search: Search, movement_s: f64, gain: f64, unexplained: f64) -> Lag {
+fn lag_of(lag_s: f64, own_s: f64, search: Lags, movement_s: f64, gain: f64, unexplained: f64) -> Lag {
     let sd_s = 0.5 * search.step_s();
     Lag { lag_s, sd_s, own_s, movement_s, gain, unexplained, certain: gain >= CERTAIN }
 }
@@ -134,7 +134,7 @@ fn least(errors: &[f64]) -> f64 {
 }
 
 /// The best lag of a search, between those tried, and its error; `None` if it lies at an end.
-fn best_lag(errors: &[f64], search: Search) -> Option<(f64, f64)> {
+fn best_lag(errors: &[f64], search: Lags) -> Option<(f64, f64)> {
     let least = least(errors);
     let is_valley =
         |i: usize| i > 0 && i + 1 < errors.len() && errors[i] <= errors[i - 1] && errors[i] <= errors[i + 1];
@@ -158,7 +158,7 @@ struct Errors {
     gauge: Vec<f64>,
 }
 
-fn errors(samples: &Samples, search: Search) -> Option<Errors> {
+fn errors(samples: &Samples, search: Lags) -> Option<Errors> {
     let lags = 0..=2 * search.steps as usize;
     let at =
         |i| left_out_errors(samples, search.around_s + search.offset_s(i), search).map(|[law, gauge]| (law, gauge));
@@ -166,7 +166,7 @@ fn errors(samples: &Samples, search: Search) -> Option<Errors> {
     Some(Errors { law, gauge })
 }
 
-impl Search {
+impl Lags {
     fn step_s(&self) -> f64 {
         self.reach_s / f64::from(self.steps)
     }
@@ -179,7 +179,7 @@ impl Search {
 
 /// Squared error of the law, and of its gauge alone, on blocks left out, as a share of the readings' mean square, all behind the
 /// high-pass, if the reference is read `lag_s` later.
-fn left_out_errors(samples: &Samples, lag_s: f64, search: Search) -> Option<[f64; 2]> {
+fn left_out_errors(samples: &Samples, lag_s: f64, search: Lags) -> Option<[f64; 2]> {
     let strain = aligned(samples, lag_s);
     // Every lag is judged by the same rows: those that have a reference within reach on both sides.
     let reach_s = search.around_s.abs() + search.reach_s;
@@ -217,7 +217,7 @@ fn left_out_errors(samples: &Samples, lag_s: f64, search: Search) -> Option<[f64
     Some([error(&with_branches)?, error(&with_branches[..=GAUGE])?])
 }
 
-/// What of a column is faster than `tau_s`.
+/// High-pass of a column with time constant `tau_s`.
 fn high_pass(time_s: &[f64], column: &DVector<f64>, tau_s: f64) -> DVector<f64> {
     let mut low_pass = LowPass::new(tau_s);
     DVector::from_iterator(

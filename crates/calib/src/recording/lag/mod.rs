@@ -51,24 +51,24 @@ pub struct Lag {
     pub gain: f64,
     /// Share of the readings' variance that stays unexplained at this lag.
     pub unexplained: f64,
-    /// Whether hardly any recording without a lag looks like that.
+    /// True if hardly any recording that is on time looks like that.
     pub(crate) certain: bool,
 }
 
 impl Lag {
-    /// Whether the readings are explained so much better with the lag that it is worth saying.
+    /// True if the readings are explained so much better with the lag that it is worth saying.
     #[must_use]
     pub fn is_sure(&self) -> bool {
         self.gain >= SURE
     }
 
-    /// Whether hardly any recording without a lag looks like that.
+    /// True if hardly any recording that is on time looks like that.
     #[must_use]
     pub const fn is_certain(&self) -> bool {
         self.certain
     }
 
-    /// Whether it is more than a tenth of a movement: such a recording, if that [is certain](Self::is_certain), is not to be
+    /// True if the lag is more than a tenth of a movement: such a recording, if that [is certain](Self::is_certain), is not to be
     /// calibrated on as it is.
     #[must_use]
     pub fn is_too_late(&self) -> bool {

@@ -8,7 +8,7 @@ const PARAMETERS: usize = 8;
 const MOST_MOTION_ROWS: f64 = 20_000.0;
 /// Most readings that take part.
 const MOST_READINGS: f64 = 1500.0;
-/// What is slower than this share of the recording is taken out in any case.
+/// Longest window of the high-pass, as a share of the recording.
 const SLOW_SHARE: f64 = 1.0 / 6.0;
 /// Smaller movements, as a share of the range, are no way.
 const LEAST_STROKE: f64 = 0.1;
@@ -24,7 +24,7 @@ const SMOOTHED: usize = 2;
 type Regressors = SVector<f64, { PARAMETERS - 1 }>;
 type Row = SVector<f64, PARAMETERS>;
 
-/// What a reference says of readings, on a grid of its own clock, without what is slow.
+/// Regressors of a reference behind a high-pass, on a grid of its own clock.
 pub(super) struct Motion {
     start_s: f64,
     step_s: f64,
@@ -37,7 +37,7 @@ pub(super) struct Motion {
 }
 
 impl Motion {
-    /// What is slower than `slow` full stretches is taken out.
+    /// Regressors of a reference; the window of the high-pass is `slow` full stretches.
     pub(super) fn new((times, values): (&[f64], &[f64]), slow: f64) -> Option<Self> {
         let (times, values) = known(times, values);
         let step = step_s(&times)?;
@@ -170,11 +170,11 @@ impl Pull {
     }
 }
 
-/// What a regression at one lag leaves.
+/// Residual of the regression at one lag.
 pub(super) struct Fit {
     /// Squared error on blocks left out, as a share of the readings' variance.
     pub unexplained: f64,
-    /// What each block has of it.
+    /// Residual of each block.
     by_block: Vec<f64>,
     /// Share of the rows that there could be at any lag.
     pub overlap: f64,
@@ -246,7 +246,7 @@ fn typical_rate(grid: &[f64], step_s: f64) -> f64 {
     squares / sum / step_s
 }
 
-/// What is known of a series.
+/// Known values of a series.
 fn known(times: &[f64], values: &[f64]) -> (Vec<f64>, Vec<f64>) {
     times.iter().zip(values).filter(|(_, value)| value.is_finite()).map(|(time, value)| (*time, *value)).unzip()
 }

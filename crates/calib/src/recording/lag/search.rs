@@ -9,7 +9,7 @@ const FINE_STEPS: i32 = 8;
 const LEAST_OVERLAP: f64 = 0.4;
 /// … and, on one clock, strokes over the whole range: one or two of them are explained wherever they are.
 const LEAST_STROKES: f64 = 4.0;
-/// What is slower than so many full stretches is taken out …
+/// Slower changes than over so many full stretches are taken out …
 const SLOW: f64 = 2.0;
 /// … and, to see how much that matters, these.
 const OTHER_SLOW: [f64; 2] = [1.0, 4.0];

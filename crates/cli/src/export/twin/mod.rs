@@ -80,7 +80,6 @@ impl<T: Real, const B: usize, const N: usize, const K: usize> StepNumbers<T> for
 pub struct Twin<'a, T, F> {
     filter: F,
     numbers: Numbers<'a, T>,
-    longest_step_s: T,
     /// How many hypotheses have been moved on, with a reading and without.
     work: [Cell<usize>; 2],
 }
@@ -108,7 +107,7 @@ where
     }
 
     fn longest_step_s(&self) -> T {
-        self.longest_step_s
+        self.filter.longest_step_s()
     }
 
     fn advance(
@@ -200,8 +199,7 @@ impl<T: Real, J: Task<T>, const B: usize, const S: usize> Of<'_, '_, T, J, B, S>
         let parts = &sensor.parts;
         let learned =
             parts.correction.map(|correction| OwnedLearned::new(correction, parts.quadratics, parts.limits_in()));
-        let longest_step_s = number(parts.longest_step_s.into());
-        let twin = Twin { filter, numbers, longest_step_s, work: [const { Cell::new(0) }; 2] };
+        let twin = Twin { filter, numbers, work: [const { Cell::new(0) }; 2] };
         task.run(LiveFilter::new(twin, sensor.live_parts(learned.as_ref().map(OwnedLearned::learned))))
     }
 }
