@@ -82,7 +82,7 @@ on_target() {
 # near FOLDER WHAT FOUND PROMISED: fails unless what was promised is within a tenth of what was found.
 near() {
     awk -v found="$3" -v promised="$4" 'BEGIN { exit !(promised > 0.9 * found && promised < 1.1 * found) }' || {
-        echo "$1: $2 are $3, the header says about $4: adjust crates/cli/src/export/cost.rs" >&2
+        echo "$1: $2 are $3, the header says about $4: adjust crates/export/src/cost.rs" >&2
         return 1
     }
 }

@@ -3,7 +3,7 @@
 use std::error::Error;
 use std::io;
 
-use ohmstrain_ekf::live::{LiveFilter, SensorEstimator};
+use ohmstrain_ekf::live::{Learned, LiveFilter, SensorEstimator};
 
 /// In the order of `ohmstrain_flag`.
 const FLAGS: [&str; 10] = [
@@ -22,7 +22,7 @@ const FLAGS: [&str; 10] = [
 include!("modules.rs");
 
 fn replay<E: SensorEstimator<f32, N, L>, const N: usize, const L: usize>(
-    mut filter: LiveFilter<'_, f32, E, N, L>,
+    mut filter: LiveFilter<f32, E, Learned<'static, f32>, N, L>,
     dt_s: f32,
 ) -> Result<(), Box<dyn Error>> {
     println!("time_s,strain,strain_sd,flags");

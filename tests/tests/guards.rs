@@ -89,7 +89,7 @@ fn readmission_takes_no_more_confidence_than_it_needs() {
         for k in 0..50 {
             let reading = Some(Reading::from(if k < 30 { 0.1 } else { jump }));
             let step: Guarded<Kalman, f64> = guard.advance(&ekf, &state, streak, &prepared, reading).unwrap();
-            let factor = step.from.covariance[(0, 0)] / state.covariance[(0, 0)];
+            let factor = step.inflation;
             if step.verdict == ReadingVerdict::Readmitted {
                 let nis = step.advanced.innovation.unwrap().nis;
                 let expected = if factors.len() < 3 { (nis / gate).min(10.0) } else { 1.0 };

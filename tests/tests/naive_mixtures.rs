@@ -4,8 +4,8 @@ mod naive;
 
 use nalgebra::{SMatrix, SVector};
 use ohmstrain_ekf::{
-    Belief, Dwell, Estimator, Evidence, Hypotheses, Imm, Innovation, Mixture, PhaseMixture, Reading, Real, SignSplit,
-    State, StepError,
+    Belief, Dwell, Estimator, Evidence, Hypotheses, Imm, Innovation, Logistic, Mixture, PhaseMixture, Reading, Real,
+    SignSplit, SparseEkf, State, StepError,
 };
 use ohmstrain_model::{Phase, StrainRange, SwitchedModel};
 use ohmstrain_tests::sensor;
@@ -141,6 +141,16 @@ fn each<const N: usize, const L: usize, const K: usize>(
     state.shares().iter().zip(state.phases()).map(|(share, phase)| (share.weight, *phase, share.belief)).collect()
 }
 
+/// Whose switch in a pause is the dense filter's, to rounding.
+fn signs<const B: usize, const N: usize, const K: usize>(
+    model: SwitchedModel<f64, B, N>,
+    dt_s: f64,
+    hold: Option<Dwell<f64>>,
+    evidence: Evidence<f64>,
+) -> SignSplit<f64, B, N, K, Logistic> {
+    SignSplit::around(SparseEkf::new(model, dt_s).unwrap(), hold, evidence)
+}
+
 fn split<const B: usize, const N: usize, const L: usize, const K: usize>(
     (phase_rate, hold): (f64, Option<Dwell<f64>>),
     tempering: f64,
@@ -148,7 +158,7 @@ fn split<const B: usize, const N: usize, const L: usize, const K: usize>(
     let (model, evidence) = (model::<B, N>(phase_rate), evidence(tempering));
     let start = Mixture::<f64, N, L, K>::single(Belief::initial(&model), Phase::Extend);
     let naive = Naive { model, rule: Rule::Signs(hold), evidence, room: K };
-    differences(&SignSplit::<f64, B, N, K>::new(model, DT_S, hold, evidence).unwrap(), start, &naive, each)
+    differences(&signs::<B, N, K>(model, DT_S, hold, evidence), start, &naive, each)
 }
 
 fn histories<const B: usize, const N: usize, const L: usize, const K: usize>(phase_rate: f64, tempering: f64) -> Apart {
@@ -244,9 +254,9 @@ fn smoothers_agree_with_naive_ones() {
     let imm = Imm::<f64, 1, 4>::new(model, SLOW_DT_S, dwell(), evidence).unwrap();
     let phases = PhaseMixture::single(start, Phase::Hold);
     let of_imm = smoothed_apart(&imm, phases, &naive(Rule::Imm(dwell()), 3), each_mode);
-    let split = SignSplit::<f64, 1, 4, 3>::new(model, SLOW_DT_S, None, evidence).unwrap();
+    let split = signs::<1, 4, 3>(model, SLOW_DT_S, None, evidence);
     let of_signs = smoothed_apart(&split, Mixture::single(start, Phase::Extend), &naive(Rule::Signs(None), 3), each);
-    let split = SignSplit::<f64, 1, 4, 6>::new(model, SLOW_DT_S, Some(dwell()), evidence).unwrap();
+    let split = signs::<1, 4, 6>(model, SLOW_DT_S, Some(dwell()), evidence);
     let rule = Rule::Signs(Some(dwell()));
     let with_holds = smoothed_apart(&split, Mixture::single(start, Phase::Extend), &naive(rule, 6), each);
     let histories = Hypotheses::<f64, 1, 4, 8>::new(model, SLOW_DT_S, dwell(), evidence).unwrap();

@@ -38,11 +38,13 @@ pub use calibrate::with_prior::calibrate_with_prior;
 pub use calibrate::{Calibration, Stage, calibrate};
 pub use correction::owned::{OwnedCorrection, OwnedProcess, OwnedRows, OwnedSimulated, OwnedTriangle};
 pub use error::CalibrationError;
-pub use filter::build::{HISTORIES, HYPOTHESES, PARTICLE_SEED, build_filter, build_filter_with};
+pub use filter::build::{
+    HISTORIES, HYPOTHESES, Options, PARTICLE_SEED, build_filter, build_filter_with, build_smoother_with,
+};
 pub use filter::known::{KnownErrors, KnownStrain, MOST_KNOWN};
 pub use filter::learned::Learned;
 pub use filter::portable::{PortableCorrection, PortableFilter};
-pub use filter::{Filter, Output, Rows, Start, WayBack};
+pub use filter::{Filter, Output, Rows, Smoother, Start, WayBack};
 pub use law::advice::OnBound;
 pub use law::bootstrap::{Bootstrap, bootstrap_law};
 pub use law::compare::{StructureScore, compare_structures};

@@ -6,6 +6,7 @@ use std::process::ExitCode;
 use ohmstrain::{Error as LibraryError, Quantity};
 use ohmstrain_bench_data::TraceError;
 use ohmstrain_calib::CalibrationError;
+use ohmstrain_export::ExportError;
 use thiserror::Error;
 
 use crate::printable::printable;
@@ -92,6 +93,18 @@ impl CliError {
 }
 
 /// What the library refuses: options are arguments, rows count from one.
+impl CliError {
+    /// Why there is no source code of the sensor file `name`.
+    pub fn export(error: &ExportError, name: &str) -> Self {
+        match error {
+            ExportError::Unsupported { .. } | ExportError::Parameter(_) => Self::Input(format!("{name}: {error}")),
+            ExportError::Interval(_) => Self::Arguments(format!("--dt-s: {error}")),
+            ExportError::Budget(_) => Self::Arguments(format!("--budget: {error}")),
+            ExportError::Template(_) => Self::Other(error.to_string()),
+        }
+    }
+}
+
 impl From<LibraryError> for CliError {
     fn from(error: LibraryError) -> Self {
         match error {

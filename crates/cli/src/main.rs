@@ -9,7 +9,6 @@ mod args;
 mod commands;
 mod error;
 mod estimates;
-mod export;
 mod input;
 mod lab_files;
 mod output;

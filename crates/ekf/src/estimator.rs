@@ -22,6 +22,11 @@ pub trait Estimator<T: Scalar, const N: usize, const L: usize> {
         T::one() / T::zero()
     }
 
+    /// Length, s, of the step that is prepared for one of `dt_s`: that itself, unless steps that differ by rounding are one.
+    fn length_s(&self, dt_s: T) -> T {
+        dt_s
+    }
+
     /// Predicts over a prepared step, then takes the reading; without one it is a prediction.
     ///
     /// # Errors

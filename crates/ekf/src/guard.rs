@@ -91,8 +91,9 @@ pub struct Streak(u32);
 pub struct Guarded<S, T> {
     /// The step that was taken; its innovation is that of the reading as it came, `None` if that was too far away to have one.
     pub advanced: Advanced<S, T>,
-    /// The state from which the step was taken, for a smoother: the caller's, or that one inflated.
-    pub from: S,
+    /// Factor on the covariance of the state from which the step was taken ([`State::inflated`]), for a smoother; 1 but at a
+    /// readmission.
+    pub inflation: T,
     /// The reading as it was used.
     pub used: Option<Reading<T>>,
     /// What became of the reading.
@@ -164,12 +165,12 @@ impl<T: Scalar> Guard<T> {
         prepared: &E::Prepared,
         reading: Option<Reading<T>>,
     ) -> Result<Guarded<E::State, T>, StepError> {
-        let guarded = |advanced, from, used, verdict, streak| {
-            Ok(Guarded { advanced, from, used, verdict, streak: Streak(streak) })
+        let guarded = |advanced, used, verdict, streak| {
+            Ok(Guarded { advanced, inflation: T::one(), used, verdict, streak: Streak(streak) })
         };
         let Some(reading) = reading else {
             let advanced = estimator.advance(state, prepared, None)?;
-            return guarded(advanced, state.clone(), None, ReadingVerdict::Missing, streak.0);
+            return guarded(advanced, None, ReadingVerdict::Missing, streak.0);
         };
         let seen = taken_as(estimator, state, prepared, reading)?;
         let innovation = seen.as_ref().map(|(_, innovation)| *innovation);
@@ -177,7 +178,7 @@ impl<T: Scalar> Guard<T> {
         let rejected = || {
             let advanced = estimator.advance(state, prepared, None)?;
             let streak = streak.0.saturating_add(1);
-            guarded(as_it_came(advanced), state.clone(), None, ReadingVerdict::Rejected, streak)
+            guarded(as_it_came(advanced), None, ReadingVerdict::Rejected, streak)
         };
         let Some((plain, innovation)) = seen else { return rejected() };
         let nis = innovation.nis;
@@ -185,24 +186,25 @@ impl<T: Scalar> Guard<T> {
         if nis >= T::zero() && nis <= self.gate {
             let weight = self.influence.weight(nis);
             if weight >= T::one() {
-                return guarded(plain, state.clone(), Some(reading), ReadingVerdict::Accepted, 0);
+                return guarded(plain, Some(reading), ReadingVerdict::Accepted, 0);
             }
             let used = reading.weighted(weight, innovation.variance);
             let Some((advanced, _)) = taken_as(estimator, state, prepared, used)? else { return rejected() };
-            return guarded(as_it_came(advanced), state.clone(), Some(used), ReadingVerdict::Downweighted, 0);
+            return guarded(as_it_came(advanced), Some(used), ReadingVerdict::Downweighted, 0);
         }
         if streak.0 < self.patience || !(nis >= T::zero() && nis.is_finite()) {
             return rejected();
         }
         let inflates = streak.0 - self.patience < MOST_INFLATIONS;
-        let factor = if inflates { (nis / self.gate).min(T::of(MOST_INFLATION)) } else { T::one() };
-        let from = state.inflated(factor);
+        let inflation = if inflates { (nis / self.gate).min(T::of(MOST_INFLATION)) } else { T::one() };
+        let from = state.inflated(inflation);
         let Some((_, wider)) = taken_as(estimator, &from, prepared, reading)? else { return rejected() };
         let weight = (self.gate / wider.nis).sqrt().min(T::one());
         let used = reading.weighted(weight, wider.variance);
         let advanced = estimator.advance(&from, prepared, Some(used))?;
         let streak = streak.0.saturating_add(1);
-        guarded(as_it_came(advanced), from, Some(used), ReadingVerdict::Readmitted, streak)
+        let readmitted = guarded(as_it_came(advanced), Some(used), ReadingVerdict::Readmitted, streak)?;
+        Ok(Guarded { inflation, ..readmitted })
     }
 }
 

@@ -153,12 +153,23 @@ impl<E> Substeps<E> {
         Pause::none(self.0.longest_step_s())
     }
 
+    /// A pause without whole steps as the estimator tells it apart from others ([`Estimator::length_s`]).
+    pub fn told_apart<T, const N: usize, const L: usize>(&self, pause: Pause<T>) -> Pause<T>
+    where
+        T: Scalar,
+        E: Estimator<T, N, L>,
+    {
+        let has_whole = !pause.passed.is_zero() || pause.exceeds(T::one());
+        if has_whole { pause } else { Pause { ahead_s: self.0.length_s(pause.ahead_s), ..pause } }
+    }
+
     /// Prepares the way over what is ahead of a pause.
     pub fn prepare_over<T, const N: usize, const L: usize>(&self, pause: Pause<T>) -> Repeated<E::Prepared, T>
     where
         T: Scalar,
         E: Estimator<T, N, L>,
     {
+        let pause = self.told_apart(pause);
         if is_one_step(pause.ahead_s, pause.longest_s) {
             return Repeated { before: pause, count: 0, last: self.0.prepare(pause.ahead_s), last_count: 1 };
         }
@@ -168,6 +179,20 @@ impl<E> Substeps<E> {
         }
         let (last_count, length_s) = end.last_steps();
         Repeated { before: pause, count, last: self.0.prepare(length_s), last_count }
+    }
+
+    /// Prepares the way over the whole steps of a pause, for a smoother; `None` where there is none.
+    pub fn prepare_whole<T, const N: usize, const L: usize>(&self, pause: Pause<T>) -> Option<Repeated<E::Prepared, T>>
+    where
+        T: Scalar,
+        E: Estimator<T, N, L>,
+    {
+        let (mut end, mut count, mut last_s) = (pause, 0, None);
+        while let Some(length_s) = end.whole_step() {
+            (last_s, count) = (Some(length_s), count + 1);
+        }
+        let last = self.0.prepare(last_s?);
+        Some(Repeated { before: pause, count: count - 1, last, last_count: 1 })
     }
 
     /// Passes the whole steps of a pause.

@@ -1,6 +1,6 @@
 //! A filter with all that stands around it, in single precision, as a microcontroller runs it.
 
-use ohmstrain_ekf::live::{DoubtParts, FARTHEST_REST, LiveFilter, LiveParts, RestBounds, Sieve, Unread};
+use ohmstrain_ekf::live::{DoubtParts, FARTHEST_REST, Learned, LiveFilter, LiveParts, RestBounds, Sieve, Unread};
 use ohmstrain_ekf::{Compact, Evidence, Gaussian, SignSplit, SparseEkf, StepError};
 use ohmstrain_model::{Branch, Gauge, ModelNoise, Motion, SensorLaw, StrainRange, SwitchedModel};
 
@@ -10,7 +10,7 @@ const REST_READING: f32 = 1600.0;
 /// What the rested sensor read in calibration.
 const RESTED: f32 = 1550.0;
 
-type Filter = LiveFilter<'static, f32, SignSplit<f32, 1, 4, 8, Compact>, 4, 10>;
+type Filter = LiveFilter<f32, SignSplit<f32, 1, 4, 8, Compact>, Learned<'static, f32>, 4, 10>;
 
 fn filter() -> Filter {
     let branch =

@@ -1,9 +1,9 @@
-use ohmstrain_calib::{CalibrationError, EstimatorKind, KnownErrors, Start};
-use ohmstrain_ekf::live::{DOUBT, Doubts, KNOWN_BEYOND, Protections, RestFollower};
+use ohmstrain_calib::{CalibrationError, EstimatorKind, KnownErrors, Options, Start};
+use ohmstrain_ekf::live::{DOUBT, Doubts, KNOWN_BEYOND, Protections};
 use ohmstrain_ekf::{Guard, Influence};
 
 use crate::estimate::Scale;
-use crate::filter::{Kernel, Translator};
+use crate::filter::{Kernel, Rows};
 use crate::known::in_order;
 use crate::{Error, Filter, Known, LaggedFilter, Sensor};
 
@@ -224,7 +224,7 @@ impl<'a> FilterBuilder<'a> {
     /// ```
     pub fn build(self) -> Result<Filter, Error> {
         let kind = self.kind();
-        Ok(Filter::new(self.forward(kind)?))
+        Ok(Filter::new(self.kernel(kind)?))
     }
 
     /// A filter that estimates each row from the readings up to `lag_s` seconds after it.
@@ -249,7 +249,7 @@ impl<'a> FilterBuilder<'a> {
         if kind.smoother() != kind {
             return Err(Error::NoSmoother);
         }
-        Ok(LaggedFilter::new(self.forward(kind)?, lag_s))
+        Ok(LaggedFilter::new(self.kernel(kind)?, lag_s))
     }
 
     /// The estimator that was chosen.
@@ -258,38 +258,37 @@ impl<'a> FilterBuilder<'a> {
         if self.corrects { kind } else { self.sensor.params().filter_of(kind) }
     }
 
-    /// What runs forward. Its correction, if it has one, counts how large innovations have been: a doubt less.
-    fn forward(self, kind: EstimatorKind) -> Result<Kernel, Error> {
-        let mut kernel = self.kernel(kind)?;
-        if kind == EstimatorKind::Corrected {
-            let doubts = &mut kernel.translator.doubts;
-            *doubts = doubts.take().map(Doubts::of_corrected);
+    /// What runs forward.
+    fn kernel(self, kind: EstimatorKind) -> Result<Kernel, Error> {
+        let mut filter = self.sensor.build(kind, &self.options()?)?;
+        let scale = self.scale()?;
+        if let Some(measured) = self.rest_resistance {
+            filter.rest(measured).map_err(Error::Step)?;
         }
-        Ok(kernel)
+        let (known, errors) = (in_order(self.known, &scale)?, KnownErrors::new(scale.limits()));
+        Ok(Kernel { filter, rows: Rows { scale, errors }, known })
     }
 
-    pub(crate) fn kernel(self, kind: EstimatorKind) -> Result<Kernel, Error> {
-        let params = self.sensor.params();
-        let start = self.initial_strain.map_or(Ok(Start::Unknown), |strain| self.start_at(strain))?;
-        let mut filter = self.sensor.build(Some(kind), start)?;
-        filter.guard(self.guard()?);
-        filter.sieve(params.sieve().under(self.protections));
+    /// What leads to the rows, with R₀ as it is told.
+    pub(crate) fn scale(self) -> Result<Scale, Error> {
         let mut scale = Scale::new(self.sensor)?;
         self.rest_resistance.map_or(Ok(()), |measured| scale.rest_at(measured))?;
+        Ok(scale)
+    }
+
+    /// How filter or smoother are to run.
+    pub(crate) fn options(self) -> Result<Options, Error> {
+        let start = self.initial_strain.map_or(Ok(Start::Unknown), |strain| self.start_at(strain))?;
+        Ok(Options { start, guard: self.guard()?, protections: self.protections })
+    }
+
+    /// What a smoother doubts.
+    pub(crate) fn smoothers_doubts(self, kind: EstimatorKind) -> Result<Option<Doubts<f64>>, Error> {
+        let params = self.sensor.params();
         let motion = &params.estimator(params.filter_of(kind)).map_err(CalibrationError::from)?.motion;
         let is_none = |strain: f64| strain.abs() <= DOUBT.zero * params.limits.span();
-        let doubts = self.protections.doubts.then(|| {
-            let doubts = Doubts::new(params.doubt_parts(motion));
-            self.initial_strain.map_or(doubts, |strain| doubts.of_known_strain(is_none(strain)))
-        });
-        let is_told = self.rest_resistance.is_some();
-        let follower = (!is_told).then(|| RestFollower::new(params.rest_bounds()));
-        let (known, errors) = (in_order(self.known, &scale)?, KnownErrors::new(scale.limits()));
-        Ok(Kernel {
-            filter,
-            translator: Translator { scale, doubts, follower, seen_s: 0.0, read_s: 0.0, errors },
-            known,
-        })
+        let doubts = self.protections.doubts.then(|| Doubts::new(params.doubt_parts(motion)));
+        Ok(doubts.map(|doubts| self.initial_strain.map_or(doubts, |strain| doubts.of_known_strain(is_none(strain)))))
     }
 
     fn start_at(&self, strain: f64) -> Result<Start, Error> {

@@ -164,13 +164,13 @@ impl Scale {
         Ok(Gaussian { mean: strain, variance: sd * sd })
     }
 
-    /// The row of a reading and what the kernel says of it, of an R₀ that is off by a share.
-    pub(crate) fn row(&self, time_s: f64, reading: Reading, off: f64, output: &Output) -> Estimate {
-        let rest_reading = self.rest_reading * (1.0 + off);
+    /// The row of a reading and what the filter says of it.
+    pub(crate) fn row(&self, time_s: f64, reading: Reading, output: &Output) -> Estimate {
+        let rest_reading = self.rest_reading * (1.0 + output.rest_off);
         let estimate = &output.estimate;
         let strain = (estimate.strain.mean, estimate.strain.sd());
         let angle = self.joint.map(|joint| joint.angle_rad(strain.0, strain.1));
-        let settled = settled(reading.relative(rest_reading), output);
+        let settled = settled(output);
         Estimate {
             time_s,
             resistance: Some(reading.value).filter(|value| !value.is_nan()),
@@ -207,6 +207,7 @@ impl Scale {
             .with(Flag::Readmitted, verdict == ReadingVerdict::Readmitted)
             .with(Flag::RampBorder, output.estimate.near_ramp_border)
             .with(Flag::AtLimit, strain <= self.limits.0 || strain >= self.limits.1)
+            .and(output.doubts)
     }
 }
 
@@ -229,10 +230,10 @@ fn surprises(output: &Output) -> bool {
 
 /// R/R₀ - 1 after a hold. What is read knows better than the law where relaxation starts from; one reading that surprises may
 /// be wrong, and then the law is right.
-fn settled(reading: Option<ohmstrain_ekf::Reading<f64>>, output: &Output) -> Gaussian<f64> {
+fn settled(output: &Output) -> Gaussian<f64> {
     let estimate = &output.estimate;
     let falls = estimate.still_relaxes;
-    let Some(reading) = reading.filter(|_| output.verdict.is_taken()) else { return estimate.settled() };
+    let Some(reading) = output.reading.filter(|_| output.verdict.is_taken()) else { return estimate.settled() };
     let surprise = if surprises(output) { reading.value - estimate.held.mean } else { 0.0 };
     let variance = falls.variance.max(surprise * surprise) + reading.extra_variance;
     Gaussian { mean: reading.value - falls.mean, variance }

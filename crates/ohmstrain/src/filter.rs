@@ -1,121 +1,58 @@
 use std::collections::VecDeque;
-use std::{fmt, mem};
+use std::fmt;
 
 use ohmstrain_calib::{KnownErrors, KnownStrain, Output};
 use ohmstrain_ekf::Gaussian;
-use ohmstrain_ekf::live::{Doubts, Flags, RestFollower};
 
 use crate::estimate::Scale;
 use crate::known::next_until;
 use crate::{Error, Estimate, Reading};
 
-/// A filter for the sizes of the sensor's law, and the way to it from readings and from it to rows.
+/// A live filter, and the way to it from readings and from it to rows.
 pub(crate) struct Kernel {
     pub filter: Box<dyn ohmstrain_calib::Filter>,
-    pub translator: Translator,
+    pub rows: Rows,
     /// Strains that will be known, in order of time.
     pub known: VecDeque<(f64, Gaussian<f64>)>,
 }
 
-/// From readings to what the filter sees, and from what it says to rows.
-pub(crate) struct Translator {
+/// From what a filter says to rows.
+pub(crate) struct Rows {
     pub scale: Scale,
-    /// None if intervals are to be as the filter states them.
-    pub doubts: Option<Doubts<f64>>,
-    /// None where R₀ is told.
-    pub follower: Option<RestFollower<f64>>,
-    /// Times of the last row, and of the last one whose reading was used, s.
-    pub seen_s: f64,
-    pub read_s: f64,
     /// What known strains say of other rows.
     pub errors: KnownErrors,
 }
 
-impl Translator {
-    /// A reading as the filter is to see it.
-    fn relative(&self, reading: Reading) -> Option<ohmstrain_ekf::Reading<f64>> {
-        followed(self.follower.as_ref(), reading.relative(self.scale.rest_reading))
-    }
-
-    /// The row of a reading and what the filter says of it, in doubt. Doubts are of readings as calibration would have had
-    /// them.
-    fn row(&mut self, (time_s, reading): (f64, Reading), output: &mut Output) -> Estimate {
-        let dt_s = time_s - mem::replace(&mut self.seen_s, time_s);
-        let (taken, off) = (taken(&self.scale, reading, output), self.off());
-        if let (Some(follower), Some((relative, _))) = (&mut self.follower, taken) {
-            output.startled.into_iter().for_each(|jump| follower.jumped(jump));
-            follower.see(time_s - self.read_s, relative);
-        }
-        self.read_s = if taken.is_some() { time_s } else { self.read_s };
-        let mut flags = Flags::NONE;
-        if let Some(doubts) = &mut self.doubts {
-            let stated = output.estimate.strain;
-            if output.verdict.is_refused() {
-                doubts.refuse();
-            }
-            let variance = doubts.see(dt_s, taken, stated);
-            let (widened, of_doubts) = doubts.widened(output.estimate.rate.mean, variance);
-            flags = of_doubts;
-            doubt(&mut output.estimate, doubts, widened);
-        }
-        self.errors.restate(time_s, output.estimate.strain);
-        let mut row = self.known_row((time_s, reading), off, output);
-        row.flags = row.flags.and(flags);
-        row
+impl Rows {
+    /// The row of a reading and what the filter says of it.
+    fn row(&mut self, row: (f64, Reading), output: &Output) -> Estimate {
+        self.errors.restate(row.0, output.estimate.strain);
+        self.known_row(row, output)
     }
 
     /// The row of what is said, with what is known of its error.
-    fn known_row(&self, (time_s, reading): (f64, Reading), off: f64, said: &Output) -> Estimate {
+    fn known_row(&self, (time_s, reading): (f64, Reading), said: &Output) -> Estimate {
         let mut output = *said;
         output.estimate.strain = self.errors.correct(time_s, said.estimate.strain);
-        self.scale.row(time_s, reading, off, &output)
+        self.scale.row(time_s, reading, &output)
     }
+}
 
-    /// By what share R₀ has been followed.
-    pub fn off(&self) -> f64 {
-        self.follower.map_or(0.0, |follower| follower.off())
-    }
-
+impl Kernel {
     /// R₀ is told: nothing follows any more.
     fn rest_resistance(&mut self, measured: f64) -> Result<(), Error> {
-        self.scale.rest_at(measured)?;
+        self.rows.scale.rest_at(measured)?;
+        self.filter.rest(measured).map_err(Error::Step)?;
         // What errors were known of were those of another R₀.
-        self.errors = KnownErrors::new(self.scale.limits());
-        self.follower = None;
-        self.doubts.iter_mut().for_each(Doubts::told_rest);
+        self.rows.errors = KnownErrors::new(self.rows.scale.limits());
         Ok(())
     }
 
-    /// The strain of a row is known, of which something was said; the row as it is now.
-    fn told(&mut self, (time_s, reading, output): (f64, Reading, &Output), known: Gaussian<f64>) -> Estimate {
-        self.know(KnownStrain { time_s, known, said: output.estimate.strain });
-        self.known_row((time_s, reading), self.off(), output)
-    }
-
+    /// A strain is known, of which something was said.
     fn know(&mut self, strain: KnownStrain) {
-        self.errors.tell(strain);
-        self.doubts.iter_mut().for_each(Doubts::settle);
+        self.rows.errors.tell(strain);
+        self.filter.settle();
     }
-}
-
-/// Widens what is said of the strain to a variance, and by as much, on the mean slope, what is said of the reading after a hold.
-pub(crate) fn doubt(estimate: &mut ohmstrain_ekf::Estimate<f64>, doubts: &Doubts<f64>, widened: f64) {
-    estimate.still_relaxes.variance += doubts.of_reading(widened - estimate.strain.variance).max(0.0);
-    estimate.strain.variance = widened;
-}
-
-/// A reading relative to R₀ as it is followed.
-pub(crate) fn followed(
-    follower: Option<&RestFollower<f64>>,
-    reading: Option<ohmstrain_ekf::Reading<f64>>,
-) -> Option<ohmstrain_ekf::Reading<f64>> {
-    reading.map(|reading| follower.map_or(reading, |follower| follower.relative(reading)))
-}
-
-/// A reading R/R₀ - 1 that has told the filter something, and its normalised innovation squared.
-pub(crate) fn taken(scale: &Scale, reading: Reading, output: &Output) -> Option<(f64, f64)> {
-    let relative = reading.relative(scale.rest_reading).filter(|_| output.verdict.is_taken());
-    relative.map(|relative| (relative.value, output.nis.unwrap_or(0.0)))
 }
 
 /// A running filter: readings in, estimates out. It can be sent to another thread, and owned by an asynchronous task.
@@ -157,12 +94,13 @@ impl Filter {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn step(&mut self, time_s: f64, reading: impl Into<Reading>) -> Result<Estimate, Error> {
-        let (Kernel { filter, translator, known }, reading) = (&mut self.kernel, reading.into());
-        filter.step(time_s, translator.relative(reading))?;
-        let mut said = filter.output();
-        let mut row = translator.row((time_s, reading), &mut said);
-        while let Some(known) = next_until(known, time_s) {
-            row = translator.told((time_s, reading, &said), known);
+        let (kernel, reading) = (&mut self.kernel, reading.into());
+        kernel.filter.step(time_s, reading.relative(kernel.rows.scale.rest_reading))?;
+        let said = kernel.filter.output();
+        let mut row = kernel.rows.row((time_s, reading), &said);
+        while let Some(known) = next_until(&mut kernel.known, time_s) {
+            kernel.know(KnownStrain { time_s, known, said: said.estimate.strain });
+            row = kernel.rows.known_row((time_s, reading), &said);
         }
         self.last = Some((time_s, reading, said));
         Ok(row)
@@ -185,13 +123,14 @@ impl Filter {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn know(&mut self, strain: f64, sd: f64) -> Result<Estimate, Error> {
-        let Kernel { filter, translator, known } = &mut self.kernel;
-        let strain = translator.scale.known(strain, sd)?;
-        let Some((time_s, reading, said)) = &self.last else {
-            known.push_front((f64::NEG_INFINITY, strain));
-            return Ok(translator.scale.row(f64::NAN, Reading::MISSING, 0.0, &filter.output()));
+        let kernel = &mut self.kernel;
+        let known = kernel.rows.scale.known(strain, sd)?;
+        let Some((time_s, reading, said)) = self.last else {
+            kernel.known.push_front((f64::NEG_INFINITY, known));
+            return Ok(kernel.rows.scale.row(f64::NAN, Reading::MISSING, &kernel.filter.output()));
         };
-        Ok(translator.told((*time_s, *reading, said), strain))
+        kernel.know(KnownStrain { time_s, known, said: said.estimate.strain });
+        Ok(kernel.rows.known_row((time_s, reading), &said))
     }
 
     /// What the rested, unstretched sensor is found to read from now on, in place of what it read in calibration.
@@ -209,7 +148,7 @@ impl Filter {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn rest_resistance(&mut self, measured: f64) -> Result<(), Error> {
-        self.kernel.translator.rest_resistance(measured)
+        self.kernel.rest_resistance(measured)
     }
 }
 
@@ -264,10 +203,10 @@ impl LaggedFilter {
         self.forget_handed_out();
         self.take_known();
         self.waiting.push_back((time_s, reading));
-        let Kernel { filter, translator, .. } = &mut self.kernel;
-        let relative = translator.relative(reading);
+        let Kernel { filter, rows, .. } = &mut self.kernel;
+        let relative = reading.relative(rows.scale.rest_reading);
         let (waiting, due) = (&mut self.waiting, &mut self.due);
-        let mut out = |mut output| due.extend(waiting.pop_front().map(|row| translator.row(row, &mut output)));
+        let mut out = |output| due.extend(waiting.pop_front().map(|row| rows.row(row, &output)));
         let taken = filter.step_lagged(time_s, relative, lag_s, &mut out);
         if taken.is_err() {
             self.waiting.pop_back();
@@ -294,9 +233,9 @@ impl LaggedFilter {
     pub fn finish(&mut self) -> Result<&[Estimate], Error> {
         self.forget_handed_out();
         self.take_known();
-        let Kernel { filter, translator, .. } = &mut self.kernel;
+        let Kernel { filter, rows, .. } = &mut self.kernel;
         let (waiting, due) = (&mut self.waiting, &mut self.due);
-        let mut out = |mut output| due.extend(waiting.pop_front().map(|row| translator.row(row, &mut output)));
+        let mut out = |output| due.extend(waiting.pop_front().map(|row| rows.row(row, &output)));
         filter.flush_lagged(&mut out)?;
         self.are_out = true;
         Ok(&self.due)
@@ -317,7 +256,7 @@ impl LaggedFilter {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn know(&mut self, strain: f64, sd: f64) -> Result<(), Error> {
-        let strain = self.kernel.translator.scale.known(strain, sd)?;
+        let strain = self.kernel.rows.scale.known(strain, sd)?;
         self.kernel.known.push_front((f64::NEG_INFINITY, strain));
         if self.last_s.is_some() {
             self.take_known();
@@ -327,10 +266,10 @@ impl LaggedFilter {
 
     /// Takes in what is known by the last row. Rows are handed out as soon as they are due: it is after them.
     fn take_known(&mut self) {
-        let Kernel { filter, translator, known } = &mut self.kernel;
         let Some(time_s) = self.last_s else { return };
-        while let Some(known) = next_until(known, time_s) {
-            translator.know(KnownStrain { time_s, known, said: filter.strain() });
+        while let Some(known) = next_until(&mut self.kernel.known, time_s) {
+            let said = self.kernel.filter.strain();
+            self.kernel.know(KnownStrain { time_s, known, said });
         }
     }
 
@@ -348,7 +287,7 @@ impl LaggedFilter {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn rest_resistance(&mut self, measured: f64) -> Result<(), Error> {
-        self.kernel.translator.rest_resistance(measured)
+        self.kernel.rest_resistance(measured)
     }
 
     fn forget_handed_out(&mut self) {
@@ -361,13 +300,13 @@ impl LaggedFilter {
 
 impl fmt::Debug for Filter {
     fn fmt(&self, out: &mut fmt::Formatter) -> fmt::Result {
-        out.debug_struct("Filter").field("scale", &self.kernel.translator.scale).finish_non_exhaustive()
+        out.debug_struct("Filter").field("scale", &self.kernel.rows.scale).finish_non_exhaustive()
     }
 }
 
 impl fmt::Debug for LaggedFilter {
     fn fmt(&self, out: &mut fmt::Formatter) -> fmt::Result {
-        let (scale, lag_s, waiting) = (&self.kernel.translator.scale, &self.lag_s, &self.waiting.len());
+        let (scale, lag_s, waiting) = (&self.kernel.rows.scale, &self.lag_s, &self.waiting.len());
         let mut out = out.debug_struct("LaggedFilter");
         out.field("scale", scale).field("lag_s", lag_s).field("waiting", waiting).finish_non_exhaustive()
     }

@@ -37,7 +37,7 @@ impl Reading {
             return None;
         }
         let sd = if self.sd.is_finite() { self.sd / rest_reading } else { 0.0 };
-        Some(ohmstrain_ekf::Reading { value: self.value / rest_reading - 1.0, extra_variance: sd * sd })
+        Some(ohmstrain_ekf::Reading { value: (self.value - rest_reading) / rest_reading, extra_variance: sd * sd })
     }
 }
 

@@ -1,6 +1,9 @@
 use std::sync::Arc;
 
-use ohmstrain_calib::{EstimatorKind, JointParams, Learned, Parts, Quantity, SensorParams, Start, build_filter_with};
+use ohmstrain_calib::{
+    EstimatorKind, JointParams, Learned, Options, Parts, Quantity, SensorParams, Smoother, build_filter_with,
+    build_smoother_with,
+};
 use ohmstrain_model::Joint;
 
 use crate::column::Header;
@@ -85,7 +88,7 @@ impl Sensor {
 
     fn for_estimator(params: SensorParams, kind: Option<EstimatorKind>) -> Result<Self, Error> {
         let sensor = Self { learned: Learned::of(&params), params };
-        sensor.build(kind, Start::Unknown)?;
+        sensor.build(kind.unwrap_or(sensor.params.default_estimator), &Options::plain())?;
         Ok(sensor)
     }
 
@@ -108,10 +111,15 @@ impl Sensor {
     /// A filter that shares what the others have learned.
     pub(crate) fn build(
         &self,
-        kind: Option<EstimatorKind>,
-        start: Start,
+        kind: EstimatorKind,
+        options: &Options,
     ) -> Result<Box<dyn ohmstrain_calib::Filter>, Error> {
-        Ok(build_filter_with(&self.params, self.learned.as_ref(), kind, start)?)
+        Ok(build_filter_with(&self.params, self.learned.as_ref(), Some(kind), options)?)
+    }
+
+    /// A smoother that does.
+    pub(crate) fn build_smoother(&self, kind: EstimatorKind, options: &Options) -> Result<Box<dyn Smoother>, Error> {
+        Ok(build_smoother_with(&self.params, self.learned.as_ref(), Some(kind), options)?)
     }
 
     /// That the correction of a smoother can be learned.

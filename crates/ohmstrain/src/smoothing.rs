@@ -1,11 +1,10 @@
 use std::ops::Range;
 
 use ohmstrain_calib::{EstimatorKind, KnownStrain, Rows};
-use ohmstrain_ekf::live::Flags;
+use ohmstrain_ekf::live::RestFollower;
 use ohmstrain_ekf::{Gaussian, StepError};
 
 use crate::estimate::Scale;
-use crate::filter::{Kernel, Translator, doubt, followed, taken};
 use crate::known::{KnownOfAll, in_order, next_until};
 use crate::pauses::Pauses;
 use crate::{Error, Estimate, FilterBuilder, Reading};
@@ -107,20 +106,21 @@ impl FilterBuilder<'_> {
         if kind == EstimatorKind::Corrected {
             self.sensor.check_smoother()?;
         }
-        let Kernel { mut filter, translator, .. } = self.kernel(kind)?;
-        let Translator { scale, mut doubts, follower, .. } = translator;
+        let mut smoother = self.sensor.build_smoother(kind, &self.options()?)?;
+        let (scale, mut doubts) = (self.scale()?, self.smoothers_doubts(kind)?);
         let failed = |(row, source): (usize, StepError)| Error::Row { row, source };
         let calibrated = |k: usize| {
             let (time_s, reading) = row(k);
             (time_s, reading.relative(scale.rest_reading))
         };
+        let follower = self.rest_resistance.is_none().then(|| RestFollower::new(self.sensor.params().rest_bounds()));
         let follower = follower.map(|follower| follower.settled(len, calibrated));
         let off = follower.map_or(0.0, |follower| follower.off());
         let relative = |k| {
             let (time_s, reading) = calibrated(k);
-            (time_s, followed(follower.as_ref(), reading))
+            (time_s, reading.map(|reading| follower.map_or(reading, |follower| follower.relative(reading))))
         };
-        let mut back = filter.way_back(Rows::new(len, &relative)).map_err(failed)?;
+        let mut back = smoother.way_back(Rows::new(len, &relative)).map_err(failed)?;
         let (mut outputs, mut estimates, mut first) = (Vec::new(), Vec::new(), len);
         let start_s = if len > 0 { row(0).0 } else { 0.0 };
         // Time of the reading after the row.
@@ -132,20 +132,20 @@ impl FilterBuilder<'_> {
             estimates.clear();
             estimates.extend(rows.clone().zip(&mut outputs).rev().map(|(k, output)| {
                 let (time_s, reading) = row(k);
-                let mut flags = Flags::NONE;
+                output.rest_off = off;
                 if let Some(doubts) = doubts.as_mut().filter(|_| k > 0 || !starts_known) {
                     let estimate = &output.estimate;
-                    let taken = taken(&scale, reading, output);
+                    // Doubts are of readings as calibration would have had them.
+                    let taken = output.verdict.is_taken().then(|| (calibrated(k).1, output.nis));
+                    let taken = taken.and_then(|(reading, nis)| Some((reading?.value, nis.unwrap_or(0.0))));
                     doubts.see_back(time_s - start_s, next_s - time_s, taken);
                     next_s = if taken.is_some() { time_s } else { next_s };
-                    let (widened, of_doubts) = doubts.widened(estimate.rate.mean, estimate.strain.variance);
-                    flags = of_doubts;
-                    doubt(&mut output.estimate, doubts, widened);
+                    let (widened, flags) = doubts.widened(estimate.rate.mean, estimate.strain.variance);
+                    output.widen(doubts, output.estimate.strain, widened);
+                    output.doubts = flags;
                 }
                 output.estimate.strain = known(k, time_s, output.estimate.strain);
-                let mut estimate = scale.row(time_s, reading, off, output);
-                estimate.flags = estimate.flags.and(flags);
-                estimate
+                scale.row(time_s, reading, output)
             }));
             estimates.reverse();
             take(rows, &estimates)?;

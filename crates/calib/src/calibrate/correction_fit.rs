@@ -5,7 +5,7 @@ use crate::CalibrationError;
 use crate::calibrate::correction_scale::{each_row, reading_scale};
 use crate::calibrate::simulated_motions::simulated_rows;
 use crate::correction::Examples;
-use crate::filter::Filter;
+use crate::filter::build::Recipe;
 use crate::filter::corrected::{future_features, outputs};
 use crate::law::structure::LawFit;
 use crate::motion_stats::MotionStats;
@@ -24,17 +24,14 @@ const ROWS: usize = 200;
 /// over again.
 const BY_WAY: f64 = 0.8;
 
-/// Makes a filter.
-type Build<'a> = dyn Fn() -> Result<Box<dyn Filter>, CalibrationError> + 'a;
-
-/// Learns the correction of a filter from the recordings that it was calibrated on, whose law is `fit`; `build`
-/// makes the filter, `corrects` names it. With a prior of that filter the rows of other sensors come first, and half as many
+/// Learns the correction of a filter from the recordings that it was calibrated on, whose law is `fit`; `recipe`
+/// says what the filter is made of, `corrects` names it. With a prior of that filter the rows of other sensors come first, and half as many
 /// of their own follow. None if nothing can be learned from them.
 pub(crate) fn fit_correction(
     recordings: &[Samples],
     fit: &LawFit,
     limits: RangeParams,
-    (corrects, build): (EstimatorKind, &Build),
+    (corrects, recipe): (EstimatorKind, Recipe<'_>),
     of_make: Option<&CorrectionPrior>,
 ) -> Result<Option<CorrectionParams>, CalibrationError> {
     let of_make = of_make.filter(|prior| prior.corrects == corrects);
@@ -49,7 +46,7 @@ pub(crate) fn fit_correction(
     let mut candidates = Vec::new();
     let mut start_s = rows.last().map_or(0.0, |row| row.time_s + PAUSE_S);
     for (samples, readings) in recordings.iter().zip(&readings) {
-        let Some(rows) = candidate_rows(samples, readings, &scale, start_s, build)? else { return Ok(None) };
+        let Some(rows) = candidate_rows(samples, readings, &scale, start_s, recipe)? else { return Ok(None) };
         start_s = rows.last().map_or(start_s, |row: &TrainingRow| row.time_s + PAUSE_S);
         candidates.extend(rows);
     }
@@ -84,16 +81,17 @@ fn candidate_rows(
     readings: &[Option<Reading<f64>>],
     scale: &CorrectionScale,
     start_s: f64,
-    build: &Build,
+    recipe: Recipe<'_>,
 ) -> Result<Option<Vec<TrainingRow>>, CalibrationError> {
     let failed = |row: usize, source| CalibrationError::Filter { time_s: samples.time_s[row], source };
-    let mut filter = build()?;
+    let mut filter = recipe.filter(None)?;
     let mut filtered = Vec::with_capacity(readings.len());
     for (row, (&time_s, &reading)) in samples.time_s.iter().zip(readings).enumerate() {
         filter.step(time_s, reading).map_err(|error| failed(row, error))?;
         filtered.push(outputs(&filter.output()));
     }
-    let smoothed = build()?.smooth(samples.time_s, readings).map_err(|(row, error)| failed(row, error))?;
+    let smoothed =
+        recipe.smoother(None)?.smooth(samples.time_s, readings).map_err(|(row, error)| failed(row, error))?;
     let Some(smoothed) = smoothed else { return Ok(None) };
     let mut past = Vec::with_capacity(readings.len());
     each_row(samples.time_s, readings, scale.past(), |_, _, now| past.push(now));

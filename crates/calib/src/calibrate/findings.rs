@@ -1,8 +1,7 @@
 //! What a calibration is worth on parts of the recordings that it was not fitted to, what it has seen, and what limits it.
 
 use std::collections::BTreeMap;
-
-use ohmstrain_ekf::live::Sieve;
+use std::sync::Arc;
 
 use crate::CalibrationError;
 use crate::baselines::Baseline;
@@ -10,10 +9,8 @@ use crate::calibrate::correction_fit::fit_correction;
 use crate::calibrate::error_budget::{Direction, WrongDirection};
 use crate::calibrate::left_out::relative_changes;
 use crate::calibrate::scores::ScoredRow;
-use crate::filter::build::{Setting, filter_from_parts};
-use crate::filter::corrected::Corrected;
+use crate::filter::build::Recipe;
 use crate::filter::learned::Learned;
-use crate::filter::{Filter, Start};
 use crate::law::fit::CrossFit;
 use crate::law::identifiability::Identifiability;
 use crate::law::structure::LawFit;
@@ -116,8 +113,9 @@ impl Check<'_> {
             let rows = self.fit.blocks[r][block].clone();
             let readings = relative_changes(samples.reading, law.rest_readings[r]);
             let failed = |row: usize, source| CalibrationError::Filter { time_s: samples.time_s[row], source };
-            let mut filter = estimator(false)?;
-            let smoothed = estimator(true)?.smooth(samples.time_s, &readings).map_err(|(row, e)| failed(row, e))?;
+            let mut filter = estimator.filter.filter(estimator.learned.as_ref())?;
+            let mut smoother = estimator.smoother.smoother(estimator.learned.as_ref())?;
+            let smoothed = smoother.smooth(samples.time_s, &readings).map_err(|(row, e)| failed(row, e))?;
             let mut baseline = cubic.start();
             for k in 0..rows.end {
                 filter.step(samples.time_s[k], readings[k]).map_err(|error| failed(k, error))?;
@@ -149,30 +147,29 @@ impl Check<'_> {
         strain
     }
 
-    /// Makes filter, or smoother, with a law and a correction that know the strains of `training` alone.
-    fn estimator_without<'b>(
-        &'b self,
-        law: &'b LawFit,
-        training: &[Samples],
-    ) -> Result<impl Fn(bool) -> Result<Box<dyn Filter>, CalibrationError> + 'b, CalibrationError> {
+    /// What filter, or smoother, with a law and a correction that know the strains of `training` alone are made of.
+    fn estimator_without<'b>(&self, law: &'b LawFit, training: &[Samples]) -> Result<Trained<'b>, CalibrationError> {
         let limits = self.fit.law.law.range;
-        let setting = Setting { limits, start: Start::Unknown, sieve: Sieve::open() };
-        let bare = move |smooths: bool| {
-            let kind = if smooths { self.filter.smoother() } else { self.filter };
+        let recipe = |kind: EstimatorKind| {
             let params = self.estimators.get(&kind).ok_or(NoParameters { kind })?;
-            filter_from_parts(kind, &law.law, params, setting)
+            Ok::<_, CalibrationError>(Recipe::of_law(kind, &law.law, *params, limits))
         };
+        let filter = recipe(self.filter)?;
         let correction = if self.kind == EstimatorKind::Corrected {
-            fit_correction(training, law, limits, (self.filter, &|| bare(false)), self.of_make)?
+            fit_correction(training, law, limits, (self.filter, filter), self.of_make)?
         } else {
             None
         };
         let learned = correction.map(|correction| Learned::new(correction, limits));
-        Ok(move |smooths: bool| match &learned {
-            Some(learned) => Ok(Box::new(Corrected::new(bare(smooths)?, learned)?) as Box<dyn Filter>),
-            None => bare(smooths),
-        })
+        Ok(Trained { filter, smoother: recipe(self.filter.smoother())?, learned })
     }
+}
+
+/// What filter and smoother are made of, and what their correction has learned.
+struct Trained<'a> {
+    filter: Recipe<'a>,
+    smoother: Recipe<'a>,
+    learned: Option<Arc<Learned>>,
 }
 
 impl From<&Findings> for Summary {

@@ -2,8 +2,7 @@ use std::ops::Range;
 
 use ohmstrain_ekf::{Gaussian, Reading};
 
-use crate::CalibrationError;
-use crate::filter::Filter;
+use crate::filter::build::Recipe;
 use crate::law::fit::CrossFit;
 use crate::params::RangeParams;
 use crate::params::law::LawParams;
@@ -22,8 +21,8 @@ pub(crate) struct LeftOut<'a> {
     limits: RangeParams,
 }
 
-/// Makes a filter for a law that was fitted without a block.
-pub(crate) type Build<'a> = dyn Fn(Fold) -> Result<Box<dyn Filter>, CalibrationError> + 'a;
+/// What a filter for a law that was fitted without a block is made of.
+pub(crate) type Build<'a> = dyn Fn(Fold<'_>) -> Recipe<'_> + 'a;
 
 /// A law that was fitted without a block.
 #[derive(Clone, Copy)]
@@ -102,8 +101,8 @@ impl<'a> LeftOut<'a> {
     /// The same for the smoother of whole recordings; `None` if the estimator has none.
     pub(crate) fn smoothed_deviations(&self, build: &Build) -> Option<Vec<Vec<f64>>> {
         let of_run = |run: &Run| {
-            let mut filter = build(run.fold).ok()?;
-            let smoothed = filter.smooth(&run.time_s, &run.reading).ok()??;
+            let mut smoother = build(run.fold).smoother(None).ok()?;
+            let smoothed = smoother.smooth(&run.time_s, &run.reading).ok()??;
             let known = run.block.clone().filter(|&k| run.strain[k].is_finite());
             Some(
                 known
@@ -122,7 +121,7 @@ impl<'a> LeftOut<'a> {
     pub(crate) fn falls(&self, build: &Build, rows: &[Vec<usize>]) -> Option<Vec<SaidFall>> {
         let mut falls = Vec::new();
         for run in &self.runs {
-            let mut filter = build(run.fold).ok()?;
+            let mut filter = build(run.fold).filter(None).ok()?;
             for k in 0..run.block.end {
                 filter.step(run.time_s[k], run.reading[k]).ok()?;
                 if k >= run.block.start && rows[run.recording].binary_search(&k).is_ok() {
@@ -143,7 +142,7 @@ impl<'a> LeftOut<'a> {
     /// of the block. `None` if it fails.
     fn each_row(&self, build: &Build, mut visit: impl FnMut(usize, Gaussian<f64>, f64)) -> Option<()> {
         for (index, run) in self.runs.iter().enumerate() {
-            let mut filter = build(run.fold).ok()?;
+            let mut filter = build(run.fold).filter(None).ok()?;
             for k in 0..run.block.end {
                 filter.step(run.time_s[k], run.reading[k]).ok()?;
                 if k >= run.block.start && run.strain[k].is_finite() {

@@ -14,16 +14,13 @@ pub(crate) mod with_prior;
 
 use std::collections::BTreeMap;
 
-use ohmstrain_ekf::live::Sieve;
-
 use crate::CalibrationError;
 use crate::calibrate::correction_fit::fit_correction;
 use crate::calibrate::findings::Check;
 use crate::calibrate::noise_fit::{
     NoiseProblem, REFINEMENT, SURVEY, Surveyed, best_of_each_size, survey, survey_evaluations,
 };
-use crate::filter::Start;
-use crate::filter::build::{Setting, filter_from_parts};
+use crate::filter::build::Recipe;
 use crate::law::fit::{CrossFit, LawOptions, fit_laws};
 use crate::law::identifiability::identifiability;
 use crate::motion_stats::MotionStats;
@@ -273,9 +270,8 @@ fn correction(
 ) -> Result<Option<CorrectionParams>, CalibrationError> {
     let limits = fit.law.law.range;
     let Some(params) = estimators.get(&kind) else { return Ok(None) };
-    let setting = Setting { limits, start: Start::Unknown, sieve: Sieve::open() };
-    let build = || filter_from_parts(kind, &fit.law.law, params, setting);
-    fit_correction(recordings, &fit.law, limits, (kind, &build), of_make)
+    let recipe = Recipe::of_law(kind, &fit.law.law, *params, limits);
+    fit_correction(recordings, &fit.law, limits, (kind, recipe), of_make)
 }
 
 /// Counts evaluations of the score.

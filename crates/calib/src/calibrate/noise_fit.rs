@@ -1,12 +1,11 @@
 use std::collections::BTreeMap;
 
-use ohmstrain_ekf::live::{Sieve, news};
+use ohmstrain_ekf::live::news;
 
 use crate::CalibrationError;
 use crate::calibrate::left_out::{Fold, LeftOut};
 use crate::calibrate::settling::LongHolds;
-use crate::filter::build::{Setting, filter_from_parts};
-use crate::filter::{Filter, Start};
+use crate::filter::build::Recipe;
 use crate::law::fit::CrossFit;
 use crate::motion_stats::{MotionStats, root_mean_square};
 use crate::optimise;
@@ -157,7 +156,7 @@ impl<'a> NoiseProblem<'a> {
         let mut cost = |point: &[f64]| {
             evaluated();
             let params = self.params(point);
-            left_out.score(&|fold| self.build(self.kind.tuned_as(), fold, &params)) + self.pull(point)
+            left_out.score(&|fold| self.recipe(self.kind.tuned_as(), fold, params)) + self.pull(point)
         };
         let from = from.map_or(&self.untuned, |tuned| &tuned.point);
         let point = optimise::polish(&mut cost, from, search.side, search.steps)?;
@@ -178,7 +177,7 @@ impl<'a> NoiseProblem<'a> {
         let as_made = self.of_make.map(|_| self.params(&refined));
         let mut best = (f64::INFINITY, self.params(&refined));
         for params in alike.chain(as_made).chain([self.params(&self.untuned)]) {
-            let score = every_row.score(&|fold| self.build(self.kind, fold, &params));
+            let score = every_row.score(&|fold| self.recipe(self.kind, fold, params));
             if score < best.0 {
                 best = (score, params);
             }
@@ -196,11 +195,11 @@ impl<'a> NoiseProblem<'a> {
 
     /// The parameters with their score, and the factors that make their intervals cover the blocks left out.
     fn finish(&self, left_out: &LeftOut, params: EstimatorParams, score: f64) -> EstimatorParams {
-        let build = |fold: Fold| self.build(self.kind, fold, &params);
         // A short motion shows less of what may go wrong.
         let of_make = self.of_make.map_or(1.0, |prior| prior.strain_sd_scale);
-        let filtered = left_out.filtered_deviations(&build);
-        let smoothed = self.left_out(self.stride(SMOOTHED_ROWS)).smoothed_deviations(&build);
+        let filtered = left_out.filtered_deviations(&|fold| self.recipe(self.kind, fold, params));
+        let smoothed =
+            self.left_out(self.stride(SMOOTHED_ROWS)).smoothed_deviations(&|fold| self.recipe(self.kind, fold, params));
         EstimatorParams {
             score,
             strain_sd_scale: filtered.map_or(1.0, |deviations| sd_scale(&deviations)).max(of_make),
@@ -214,17 +213,11 @@ impl<'a> NoiseProblem<'a> {
     fn settling(&self, left_out: &LeftOut, params: EstimatorParams) -> Option<SettlingParams> {
         let holds = LongHolds::new(self.samples, self.limits.span())?;
         let params = EstimatorParams { settling: Some(holds.law()), ..params };
-        holds.settling(left_out, &|fold| self.build(self.kind, fold, &params))
+        holds.settling(left_out, &|fold| self.recipe(self.kind, fold, params))
     }
 
-    fn build(
-        &self,
-        kind: EstimatorKind,
-        fold: Fold,
-        params: &EstimatorParams,
-    ) -> Result<Box<dyn Filter>, CalibrationError> {
-        let setting = Setting { limits: self.limits, start: Start::Unknown, sieve: Sieve::open() };
-        filter_from_parts(kind, fold.law, params, setting)
+    fn recipe<'f>(&self, kind: EstimatorKind, fold: Fold<'f>, params: EstimatorParams) -> Recipe<'f> {
+        Recipe::of_law(kind, fold.law, params, self.limits)
     }
 
     fn left_out(&self, stride: usize) -> LeftOut<'a> {

@@ -1,24 +1,35 @@
 use std::mem;
 
-use ohmstrain_ekf::{Estimator, Reading, StepError, Substeps};
+use ohmstrain_ekf::{Estimator, PastStep, Reading, Repeated, StepError, Substeps};
 
-use crate::filter::stepper::Row;
+/// A step, as a smoother needs it.
+pub(crate) type Taken<E, const N: usize, const L: usize> =
+    PastStep<<E as Estimator<f64, N, L>>::State, Repeated<<E as Estimator<f64, N, L>>::Prepared, f64>, f64>;
+
+/// A row on the way forward, as a smoother needs it.
+pub(crate) enum Row<E: Estimator<f64, N, L>, const N: usize, const L: usize> {
+    /// The step to a reading that was used.
+    Read(Taken<E, N, L>),
+    /// A row without one: the state that the readings before it predict, and the whole steps of the pause that the filter has
+    /// taken there.
+    Unread { predicted: Box<E::State>, whole: Option<Box<Taken<E, N, L>>> },
+}
 
 /// The way back over rows, newest first. It leads from reading to reading; a row without one branches off from the reading after it.
 pub(crate) struct Backward<S> {
-    /// At the last reading before the rows that have been gone over, given all readings.
+    /// At the last reading before the rows that have been gone over, or whole steps after it, given all readings.
     smoothed: S,
     /// The reading after that: its time, s, as it was used, and the state there.
     ahead: Option<(f64, Option<Reading<f64>>, S)>,
 }
 
 impl<S: Clone> Backward<S> {
-    /// From the state at the last reading.
+    /// From where the filter is after the last row.
     pub(crate) fn new(last: S) -> Self {
         Self { smoothed: last, ahead: None }
     }
 
-    /// Goes over a row and shows its state, given all readings; to the reading before it only if `is_to_go_on`. Returns whether the
+    /// Goes over a row and shows its state, given all readings; to the row before it only if `is_to_go_on`. Returns whether the
     /// estimator has a smoother.
     pub(crate) fn over<E, const N: usize, const L: usize>(
         &mut self,
@@ -31,26 +42,36 @@ impl<S: Clone> Backward<S> {
     where
         E: Estimator<f64, N, L, State = S>,
     {
+        let earlier =
+            |step: &Taken<E, N, L>, later: &S| estimator.smooth_back(&step.from, &step.prepared, step.reading, later);
         match row {
             Row::Read(step) => {
                 show(&self.smoothed);
                 if is_to_go_on {
-                    let earlier = estimator.smooth_back(&step.from, &step.prepared, step.reading, &self.smoothed)?;
-                    let Some(earlier) = earlier else { return Ok(false) };
+                    let Some(earlier) = earlier(step, &self.smoothed)? else { return Ok(false) };
                     let smoothed = mem::replace(&mut self.smoothed, earlier);
                     self.ahead = Some((time_s, step.reading, smoothed));
                 }
             }
-            Row::Unread(predicted) => match &self.ahead {
-                None => show(predicted),
-                Some((ahead_s, reading, smoothed)) => {
-                    let prepared = estimator.prepare(ahead_s - time_s);
-                    let Some(between) = estimator.smooth_back(predicted, &prepared, *reading, smoothed)? else {
-                        return Ok(false);
-                    };
-                    show(&between);
+            Row::Unread { predicted, whole } => {
+                match &self.ahead {
+                    None => show(predicted),
+                    Some((ahead_s, reading, smoothed)) => {
+                        let prepared = estimator.prepare(ahead_s - time_s);
+                        let Some(between) = estimator.smooth_back(predicted, &prepared, *reading, smoothed)? else {
+                            return Ok(false);
+                        };
+                        show(&between);
+                    }
                 }
-            },
+                if let Some(step) = whole.as_ref().filter(|_| is_to_go_on) {
+                    // No reading after them tells more of the state before them.
+                    let before =
+                        if self.ahead.is_some() { earlier(step, &self.smoothed)? } else { Some(step.from.clone()) };
+                    let Some(before) = before else { return Ok(false) };
+                    self.smoothed = before;
+                }
+            }
         }
         Ok(true)
     }

@@ -2,26 +2,43 @@ use std::sync::Arc;
 
 #[cfg(feature = "particles")]
 use ohmstrain_ekf::Particles;
-use ohmstrain_ekf::live::Sieve;
+use ohmstrain_ekf::live::{DoubtParts, LiveParts, Protections, RestBounds, SensorEstimator, Sieve, Unread};
 use ohmstrain_ekf::{
-    AnyCurve, Belief, Compact, Dwell, Evidence, Hypotheses, Imm, Mixture, PhaseMixture, Settling, SigmaPoints,
-    SignSplit, SparseEkf,
+    AnyCurve, Compact, Dwell, Evidence, Guard, Hypotheses, Imm, Settling, SigmaPoints, SignSplit, SparseEkf, State,
 };
-use ohmstrain_model::{Phase, SwitchedModel};
+use ohmstrain_model::{StrainRange, SwitchedModel};
 
-use crate::filter::corrected::Corrected;
 use crate::filter::learned::Learned;
-use crate::filter::running::{Interval, Running};
-use crate::filter::{Filter, Start};
+use crate::filter::running::{Reports, Running, SharedCorrection};
+use crate::filter::{Filter, Smoother, Start};
 use crate::params::estimator::{EstimatorKind, EstimatorParams, NoParameters, SettlingParams};
 use crate::params::law::LawParams;
 use crate::params::{RangeParams, SensorParams};
 use crate::{CalibrationError, with_sizes};
 
 /// Share of the limits' span to which a given initial strain is believed.
-pub(crate) const START_SD: f64 = 1e-3;
+const START_SD: f64 = 1e-3;
 
-/// Builds a filter for a sensor.
+/// How a filter is to run.
+#[derive(Clone, Copy, Debug)]
+pub struct Options {
+    /// Where it starts.
+    pub start: Start,
+    /// What it does with outliers.
+    pub guard: Guard<f64>,
+    /// What protects it from what no calibration has seen, but for the guard.
+    pub protections: Protections,
+}
+
+impl Options {
+    /// From an unknown strain, unprotected.
+    #[must_use]
+    pub fn plain() -> Self {
+        Self { start: Start::Unknown, guard: Guard::none(), protections: Protections::NONE }
+    }
+}
+
+/// A filter for a sensor that knows what is no reading of it, and is not protected otherwise.
 ///
 /// # Errors
 /// If a number is out of its range, the sensor has no parameters for the estimator, or it has a number of branches that no
@@ -31,10 +48,12 @@ pub fn build_filter(
     kind: Option<EstimatorKind>,
     start: Start,
 ) -> Result<Box<dyn Filter>, CalibrationError> {
-    build_filter_with(params, Learned::of(params).as_ref(), kind, start)
+    let options =
+        Options { start, protections: Protections { plausibility: true, ..Protections::NONE }, ..Options::plain() };
+    build_filter_with(params, Learned::of(params).as_ref(), kind, &options)
 }
 
-/// The same with what the sensor's correction has learned already, or learns now: [`Learned::of`] these parameters.
+/// A filter with what the sensor's correction has learned already, or learns now: [`Learned::of`] these parameters.
 ///
 /// # Errors
 /// As [`build_filter`].
@@ -42,38 +61,163 @@ pub fn build_filter_with(
     params: &SensorParams,
     learned: Option<&Arc<Learned>>,
     kind: Option<EstimatorKind>,
-    start: Start,
+    options: &Options,
 ) -> Result<Box<dyn Filter>, CalibrationError> {
-    params.validate()?;
     let kind = kind.unwrap_or(params.default_estimator);
-    let setting = Setting { limits: params.limits, start, sieve: params.sieve() };
-    let of = params.filter_of(kind);
-    let filter = filter_from_parts(of, &params.law, params.estimator(of)?, setting)?;
+    let recipe = Recipe::of(params, kind, *options)?;
+    recipe.filter(needed(learned, kind)?)
+}
+
+/// A smoother, with what its correction has learned. Of the options R₀ that is followed, second looks and doubts are not for it.
+///
+/// # Errors
+/// As [`build_filter`].
+pub fn build_smoother_with(
+    params: &SensorParams,
+    learned: Option<&Arc<Learned>>,
+    kind: Option<EstimatorKind>,
+    options: &Options,
+) -> Result<Box<dyn Smoother>, CalibrationError> {
+    let kind = kind.unwrap_or(params.default_estimator);
+    let recipe = Recipe::of(params, kind, *options)?;
+    recipe.smoother(needed(learned, kind)?)
+}
+
+/// What has been learned, where the estimator needs it.
+fn needed(learned: Option<&Arc<Learned>>, kind: EstimatorKind) -> Result<Option<&Arc<Learned>>, CalibrationError> {
     if kind != EstimatorKind::Corrected {
-        return Ok(filter);
+        return Ok(None);
     }
-    let learned = learned.ok_or(NoParameters { kind })?;
-    Ok(Box::new(Corrected::new(filter, learned)?))
+    Ok(Some(learned.ok_or(NoParameters { kind })?))
 }
 
-/// What a filter needs besides law, noise and motion.
+/// All that a filter is made of but its correction.
 #[derive(Clone, Copy)]
-pub(crate) struct Setting {
-    pub limits: RangeParams,
-    pub start: Start,
-    pub sieve: Sieve<f64>,
+pub(crate) struct Recipe<'a> {
+    /// Never [`EstimatorKind::Corrected`].
+    kind: EstimatorKind,
+    law: &'a LawParams,
+    estimator: EstimatorParams,
+    parts: LiveParts<f64, ()>,
+    options: Options,
 }
 
-pub(crate) fn filter_from_parts(
-    kind: EstimatorKind,
-    law: &LawParams,
-    estimator: &EstimatorParams,
-    setting: Setting,
-) -> Result<Box<dyn Filter>, CalibrationError> {
-    let branches = law.branches.len();
-    with_sizes!(branches, B, N, L => of_size::<B, N, L>(kind, law, estimator, setting))
-        .unwrap_or_else(|| Err(CalibrationError::branches(branches)))
+impl<'a> Recipe<'a> {
+    /// Of a calibrated sensor.
+    fn of(params: &'a SensorParams, kind: EstimatorKind, options: Options) -> Result<Self, CalibrationError> {
+        params.validate()?;
+        let kind = params.filter_of(kind);
+        let estimator = *params.estimator(kind)?;
+        Ok(Self { kind, law: &params.law, estimator, parts: params.live_parts(&estimator), options })
+    }
+
+    /// Of a law that is being calibrated: nothing is known of how the sensor is read.
+    pub(crate) fn of_law(
+        kind: EstimatorKind,
+        law: &'a LawParams,
+        estimator: EstimatorParams,
+        limits: RangeParams,
+    ) -> Self {
+        Self { kind, law, estimator, parts: bare_parts(&estimator, limits), options: Options::plain() }
+    }
+
+    /// The same with other options.
+    #[cfg(test)]
+    pub(crate) fn with(self, options: Options) -> Self {
+        Self { options, ..self }
+    }
+
+    /// Its filter, corrected by what has been learned, if anything.
+    pub(crate) fn filter(self, learned: Option<&Arc<Learned>>) -> Result<Box<dyn Filter>, CalibrationError> {
+        let learned = learned.map(|learned| Ok::<_, CalibrationError>((learned.past_scale(), learned.for_filter()?)));
+        let learned = learned.transpose()?.map(|(scale, learned)| (scale, SharedCorrection(learned)));
+        Ok(self.running(self.parts.with_correction(learned), None)?)
+    }
+
+    /// Its smoother, the same way.
+    pub(crate) fn smoother(self, learned: Option<&Arc<Learned>>) -> Result<Box<dyn Smoother>, CalibrationError> {
+        let given = self.options.protections;
+        let protections = Protections { second_look: false, following: false, doubts: false, ..given };
+        let of_smoother = Self { options: Options { protections, ..self.options }, ..self };
+        Ok(of_smoother.running(self.parts.with_correction(None), learned.cloned())?)
+    }
+
+    fn running(
+        self,
+        parts: LiveParts<f64, SharedCorrection>,
+        learned: Option<Arc<Learned>>,
+    ) -> Result<Box<dyn Both>, CalibrationError> {
+        let branches = self.law.branches.len();
+        with_sizes!(branches, B, N, L => self.of_size::<B, N, L>(parts, learned))
+            .unwrap_or_else(|| Err(CalibrationError::branches(branches)))
+    }
+
+    /// Any filter of a model of known size.
+    fn of_size<const B: usize, const N: usize, const L: usize>(
+        self,
+        parts: LiveParts<f64, SharedCorrection>,
+        learned: Option<Arc<Learned>>,
+    ) -> Result<Box<dyn Both>, CalibrationError> {
+        let Self { kind, law, ref estimator, options, .. } = self;
+        let model = switched::<B, N>(law, estimator)?;
+        let refused = CalibrationError::NoFilter;
+        let reports = reports(estimator, model, &parts.limits, &options);
+        let limits = parts.limits;
+        let with = With { parts, reports, learned, options };
+        Ok(match kind {
+            EstimatorKind::Ekf => with.run::<_, L>(SparseEkf::<_, Compact, B, N>::at_a_moment(model).map_err(refused)?),
+            EstimatorKind::Ukf => {
+                let filter = SparseEkf::<_, Compact, B, N, SigmaPoints<AnyCurve<f64>>>::at_a_moment(model);
+                with.run::<_, L>(filter.map_err(refused)?)
+            }
+            EstimatorKind::Corrected => return Err(NoParameters { kind }.into()),
+            EstimatorKind::Imm => {
+                let PhaseFilter { dwell, evidence, .. } = PhaseFilter::new(kind, estimator, limits)?;
+                with.run::<_, L>(Imm::<_, B, N>::new(model, NO_STEP_S, dwell, evidence).map_err(refused)?)
+            }
+            EstimatorKind::SignSplit => {
+                let PhaseFilter { hold, evidence, .. } = PhaseFilter::new(kind, estimator, limits)?;
+                let filter = SignSplit::<_, B, N, HYPOTHESES>::new(model, NO_STEP_S, hold, evidence);
+                with.run::<_, L>(filter.map_err(refused)?)
+            }
+            #[cfg(not(feature = "particles"))]
+            EstimatorKind::Particles => {
+                return Err(CalibrationError::Unsupported("`particles` without the feature of that name".into()));
+            }
+            #[cfg(feature = "particles")]
+            EstimatorKind::Particles => {
+                let PhaseFilter { hold, evidence, .. } = PhaseFilter::new(kind, estimator, limits)?;
+                with.run::<_, L>(Particles::new(model, hold, evidence, PARTICLES, PARTICLE_SEED))
+            }
+            EstimatorKind::Hypotheses => {
+                let PhaseFilter { dwell, evidence, .. } = PhaseFilter::new(kind, estimator, limits)?;
+                let filter = Hypotheses::<_, B, N, HISTORIES>::new(model, NO_STEP_S, dwell, evidence);
+                with.run::<_, L>(filter.map_err(refused)?)
+            }
+        })
+    }
 }
+
+/// What every estimator runs with.
+struct With<const B: usize, const N: usize> {
+    parts: LiveParts<f64, SharedCorrection>,
+    reports: Reports<B, N>,
+    learned: Option<Arc<Learned>>,
+    options: Options,
+}
+
+impl<const B: usize, const N: usize> With<B, N> {
+    fn run<E, const L: usize>(self, estimator: E) -> Box<dyn Both>
+    where
+        E: SensorEstimator<f64, N, L, State: State<f64, N, L> + Send, Prepared: Send> + Send + 'static,
+    {
+        Box::new(Running::new(estimator, self.parts, self.reports, self.learned, &self.options))
+    }
+}
+
+/// Filter and smoother of one estimator.
+trait Both: Filter + Smoother {}
+impl<R: Filter + Smoother> Both for R {}
 
 /// The model of a law.
 fn switched<const B: usize, const N: usize>(
@@ -88,60 +232,6 @@ fn switched<const B: usize, const N: usize>(
     Ok(SwitchedModel::new(law, motion, estimator.noise.to_model())?)
 }
 
-/// Any filter of a model of known size.
-fn of_size<const B: usize, const N: usize, const L: usize>(
-    kind: EstimatorKind,
-    law: &LawParams,
-    estimator: &EstimatorParams,
-    setting: Setting,
-) -> Result<Box<dyn Filter>, CalibrationError> {
-    let model = switched::<B, N>(law, estimator)?;
-    let beliefs: [Belief<f64, N, L>; 2] = [initial_belief(&model, setting), Belief::initial(&model)];
-    let interval = interval(estimator, setting, B);
-    match kind {
-        EstimatorKind::Ekf => {
-            let filter = SparseEkf::<_, Compact, B, N>::at_a_moment(model).map_err(CalibrationError::NoFilter)?;
-            return Ok(Box::new(Running::new(filter, beliefs, model, interval)));
-        }
-        EstimatorKind::Ukf => {
-            let filter = SparseEkf::<_, Compact, B, N, SigmaPoints<AnyCurve<f64>>>::at_a_moment(model);
-            return Ok(Box::new(Running::new(filter.map_err(CalibrationError::NoFilter)?, beliefs, model, interval)));
-        }
-        EstimatorKind::Corrected => return Err(NoParameters { kind }.into()),
-        _ => {}
-    }
-    let PhaseFilter { dwell, hold, evidence } = PhaseFilter::new(kind, estimator, setting.limits)?;
-    Ok(match kind {
-        EstimatorKind::Imm => {
-            let start = beliefs.map(|belief| PhaseMixture::single(belief, Phase::Hold));
-            let filter = Imm::<_, B, N>::new(model, NO_STEP_S, dwell, evidence).map_err(CalibrationError::NoFilter)?;
-            Box::new(Running::new(filter, start, model, interval))
-        }
-        EstimatorKind::SignSplit => {
-            let start = beliefs.map(|belief| Mixture::single(belief, Phase::Extend));
-            let filter = SignSplit::<_, B, N, HYPOTHESES>::new(model, NO_STEP_S, hold, evidence)
-                .map_err(CalibrationError::NoFilter)?;
-            Box::new(Running::new(filter, start, model, interval))
-        }
-        #[cfg(not(feature = "particles"))]
-        EstimatorKind::Particles => {
-            return Err(CalibrationError::Unsupported("`particles` without the feature of that name".into()));
-        }
-        #[cfg(feature = "particles")]
-        EstimatorKind::Particles => {
-            let filter = Particles::new(model, hold, evidence, PARTICLES, PARTICLE_SEED);
-            let start = beliefs.map(|belief| filter.start(&belief, Phase::Extend));
-            Box::new(Running::new(filter, start, model, interval))
-        }
-        _ => {
-            let start = beliefs.map(|belief| Mixture::single(belief, Phase::Hold));
-            let filter = Hypotheses::<_, B, N, HISTORIES>::new(model, NO_STEP_S, dwell, evidence)
-                .map_err(CalibrationError::NoFilter)?;
-            Box::new(Running::new(filter, start, model, interval))
-        }
-    })
-}
-
 /// What filters of phases need besides a model.
 struct PhaseFilter {
     dwell: Dwell<f64>,
@@ -151,25 +241,80 @@ struct PhaseFilter {
 }
 
 impl PhaseFilter {
-    fn new(kind: EstimatorKind, estimator: &EstimatorParams, limits: RangeParams) -> Result<Self, CalibrationError> {
+    fn new(
+        kind: EstimatorKind,
+        estimator: &EstimatorParams,
+        limits: StrainRange<f64>,
+    ) -> Result<Self, CalibrationError> {
         let phases = estimator.phases.ok_or_else(|| {
             CalibrationError::Unsupported(format!("`{}` needs `phases` in its parameters", kind.name()))
         })?;
         let dwell = phases.dwell()?;
         let hold = phases.rests().then_some(dwell);
-        Ok(Self { dwell, hold, evidence: Evidence::new(limits.to_model(), phases.tempering)? })
+        Ok(Self { dwell, hold, evidence: Evidence::new(limits, phases.tempering)? })
     }
 }
 
-fn interval(estimator: &EstimatorParams, setting: Setting, branches: usize) -> Interval {
-    let unseen = || Settling::unseen(&estimator.noise.to_model(), branches);
-    Interval {
+/// How states are reported.
+fn reports<const B: usize, const N: usize>(
+    estimator: &EstimatorParams,
+    model: SwitchedModel<f64, B, N>,
+    limits: &StrainRange<f64>,
+    options: &Options,
+) -> Reports<B, N> {
+    let unseen = || Settling::unseen(&estimator.noise.to_model(), B);
+    Reports {
+        model,
+        limits: *limits,
         settling: estimator.settling.map_or_else(unseen, SettlingParams::to_model),
-        limits: setting.limits.to_model(),
         filtered_scale: estimator.strain_sd_scale,
         smoothed_scale: estimator.smoothed_sd_scale.unwrap_or(1.0),
-        sieve: setting.sieve.with_error_time(estimator.noise.reading_time_s),
-        starts_known: matches!(setting.start, Start::Strain(_)),
+        doubts: options.protections.doubts,
+    }
+}
+
+/// What surrounds a filter of readings R/R₀ of which nothing is known but the limits of the strain.
+fn bare_parts(estimator: &EstimatorParams, limits: RangeParams) -> LiveParts<f64, ()> {
+    let EstimatorParams { motion, noise, .. } = estimator;
+    let unread = Unread::new(motion.rate_time_s, motion.rate_sd_per_s, limits.to_model());
+    let doubt = DoubtParts {
+        low: 0.0,
+        high: 0.0,
+        fastest_per_s: f64::INFINITY,
+        longest_s: f64::INFINITY,
+        per_reading: 0.0,
+        start: 0.0,
+        most: unread.anywhere,
+        unread,
+        rest: None,
+    };
+    LiveParts {
+        rest_reading: 1.0,
+        rested: 1.0,
+        dt_s: 0.0,
+        longest_step_s: f64::INFINITY,
+        limits: limits.to_model(),
+        strain_sd_scale: estimator.strain_sd_scale,
+        reading_variance: noise.reading_sd * noise.reading_sd,
+        known_variance: (START_SD * limits.span()).powi(2),
+        sieve: Sieve::open().with_error_time(noise.reading_time_s),
+        doubt,
+        rest: RestBounds { low: None, high: None },
+        learned: None,
+    }
+}
+
+impl SensorParams {
+    /// What surrounds the filter with that estimator, but for a correction.
+    pub(crate) fn live_parts(&self, estimator: &EstimatorParams) -> LiveParts<f64, ()> {
+        LiveParts {
+            rest_reading: self.rest_reading,
+            rested: self.rested(),
+            sieve: self.sieve().with_error_time(estimator.noise.reading_time_s),
+            doubt: self.doubt_parts(&estimator.motion),
+            rest: self.rest_bounds(),
+            ..bare_parts(estimator, self.limits)
+        }
     }
 }
 
@@ -185,13 +330,3 @@ pub const HISTORIES: usize = 8;
 const PARTICLES: usize = 4000;
 /// Seed of the particles' paths: the same readings give the same estimates.
 pub const PARTICLE_SEED: u64 = 1;
-
-fn initial_belief<const B: usize, const N: usize, const L: usize>(
-    model: &SwitchedModel<f64, B, N>,
-    setting: Setting,
-) -> Belief<f64, N, L> {
-    let Start::Strain(strain) = setting.start else { return Belief::initial(model) };
-    let (mut mean, mut variance) = model.initial_distribution();
-    (mean[0], variance[0]) = (strain, (START_SD * setting.limits.span()).powi(2));
-    Belief::independent(mean, &variance)
-}

@@ -1,6 +1,6 @@
 use std::sync::{Arc, OnceLock};
 
-use ohmstrain_ekf::correction::FILTER_INPUTS;
+use ohmstrain_ekf::correction::{FILTER_INPUTS, FeatureScale};
 
 use crate::CalibrationError;
 use crate::correction::owned::OwnedCorrection;
@@ -52,6 +52,11 @@ impl Learned {
     /// If nothing can be learned from the rows.
     pub fn check_smoother(&self) -> Result<(), CalibrationError> {
         self.for_smoother().map(|_| ())
+    }
+
+    /// The scale of the features that a filter's correction sees.
+    pub(crate) fn past_scale(&self) -> FeatureScale<f64> {
+        self.params.readings.past()
     }
 
     pub(crate) fn for_filter(&self) -> Result<Arc<OfFilter>, CalibrationError> {

@@ -1,40 +1,43 @@
 //! Any filter behind one trait: what the kernels of `ohmstrain-ekf` become once a sensor says which of them it needs.
 
-pub(crate) mod backward;
+mod backward;
 pub(crate) mod build;
+mod clock;
 pub(crate) mod corrected;
 pub(crate) mod known;
 pub(crate) mod learned;
 pub(crate) mod portable;
-pub(crate) mod running;
-pub(crate) mod stepper;
-pub(crate) mod way_back;
+mod remembering;
+mod running;
+mod way_back;
 
 use std::ops::Range;
 
-use ohmstrain_ekf::live::Sieve;
-use ohmstrain_ekf::{Estimate, Gaussian, Guard, Reading, ReadingVerdict, StepError};
+use ohmstrain_ekf::live::{Doubts, Flags};
+use ohmstrain_ekf::{Estimate, Gaussian, Reading, ReadingVerdict, StepError};
 
-/// A filter for a sensor whose number of branches and kind of motion are known at run time only. Threads and tasks can own it.
+/// The live filter of a sensor whose number of branches and estimator are known at run time only. Threads and tasks can own it.
 pub trait Filter: Send {
-    /// Takes the reading `R/R₀ - 1` at `time_s`; `None` if it is missing. The first call is an update without a
-    /// prediction.
+    /// What the rested, unstretched sensor is found to read from now on.
+    ///
+    /// # Errors
+    /// As [`LiveFilter::rest`](ohmstrain_ekf::live::LiveFilter::rest).
+    fn rest(&mut self, measured: f64) -> Result<(), StepError>;
+
+    /// The strain is known now: what was doubted of it is gone.
+    fn settle(&mut self);
+
+    /// Takes the reading `R/R₀ - 1` at `time_s`; `None` if it is missing. The first row takes no time.
     ///
     /// # Errors
     /// See [`StepError`]. The filter stays as it was: the next good row goes on from the last good one.
     fn step(&mut self, time_s: f64, reading: Option<Reading<f64>>) -> Result<(), StepError>;
 
-    /// Strain within the limits.
+    /// Strain at the last row, within the limits.
     fn strain(&self) -> Gaussian<f64>;
 
-    /// Everything that is reported.
+    /// Everything that is reported of the last row.
     fn output(&self) -> Output;
-
-    /// Protects the filter from outliers from now on.
-    fn guard(&mut self, guard: Guard<f64>);
-
-    /// What a reading must be from now on; for how long errors are alike stays as it was calibrated.
-    fn sieve(&mut self, sieve: Sieve<f64>);
 
     /// Like [`Self::step`], but every row is estimated from the readings up to `lag_s` seconds after it; `out` gets the
     /// rows that have become due, in order. The cost of a step grows with the rows within the lag, not with time.
@@ -54,15 +57,18 @@ pub trait Filter: Send {
     /// # Errors
     /// See [`StepError`].
     fn flush_lagged(&mut self, out: &mut dyn FnMut(Output)) -> Result<(), StepError>;
+}
 
-    /// Filters a recording, from the state the filter is in, and goes back through it segment by segment: the way to smooth
-    /// recordings that are too long to hold their states, or their estimates, in memory.
+/// Smooths whole recordings with the steps of the live filter.
+pub trait Smoother: Send {
+    /// Filters a recording and goes back through it segment by segment: the way to smooth recordings that are too long to hold
+    /// their states, or their estimates, in memory.
     ///
     /// # Errors
-    /// The row at which a step failed, and why; the filter stays as it was.
+    /// The row at which a step failed, and why.
     fn way_back<'a>(&'a mut self, rows: Rows<'a>) -> Result<Box<dyn WayBack + 'a>, (usize, StepError)>;
 
-    /// Smooths a whole recording, from the state the filter is in; `None` if the estimator has no smoother.
+    /// Smooths a whole recording; `None` if the estimator has no smoother.
     ///
     /// # Errors
     /// The row at which a step failed, and why.
@@ -139,9 +145,21 @@ pub struct Output {
     pub verdict: ReadingVerdict,
     /// Probabilities of extend, hold and retract; `None` if the estimator has no phases.
     pub phases: Option<[f64; 3]>,
-    /// How far readings have jumped, where a filter looks again: at the second in a row that startles
-    /// ([`STARTLING_NIS`](ohmstrain_ekf::live::STARTLING_NIS)), 8 % of calibration's range away from the last that did not surprise.
-    pub startled: Option<f64>,
+    /// The reading, R/R₀ - 1 of R₀ as it is followed; `None` if it was missing.
+    pub reading: Option<Reading<f64>>,
+    /// What there is to doubt.
+    pub doubts: Flags,
+    /// By what share R₀ has been followed.
+    pub rest_off: f64,
+}
+
+impl Output {
+    /// Widens what is said of the strain, `stated` before doubts, to a variance, and by as much, on the mean slope, what is said of
+    /// the reading after a hold.
+    pub fn widen(&mut self, doubts: &Doubts<f64>, stated: Gaussian<f64>, variance: f64) {
+        self.estimate.still_relaxes.variance += doubts.of_reading(variance - stated.variance).max(0.0);
+        self.estimate.strain = Gaussian { variance, ..stated };
+    }
 }
 
 /// Where a filter starts.
@@ -151,4 +169,15 @@ pub enum Start {
     Unknown,
     /// A strain that is known to the limits' resolution, at rest.
     Strain(f64),
+}
+
+impl Start {
+    /// The strain, if it is known.
+    #[must_use]
+    pub const fn strain(self) -> Option<f64> {
+        match self {
+            Self::Unknown => None,
+            Self::Strain(strain) => Some(strain),
+        }
+    }
 }

@@ -3,11 +3,11 @@
 use std::sync::Arc;
 
 use ohmstrain_ekf::correction::{FILTER_INPUTS, FeatureScale};
-use ohmstrain_ekf::live::{DoubtParts, RestBounds, Sieve};
+use ohmstrain_ekf::live::LiveParts;
 
 use crate::CalibrationError;
 use crate::correction::owned::OwnedCorrection;
-use crate::filter::build::{HISTORIES, HYPOTHESES, START_SD};
+use crate::filter::build::{HISTORIES, HYPOTHESES};
 use crate::filter::learned::Learned;
 use crate::params::SensorParams;
 use crate::params::estimator::{EstimatorKind, EstimatorParams};
@@ -21,16 +21,10 @@ pub struct PortableFilter {
     pub hypotheses: usize,
     /// Its noise, motion and phases.
     pub estimator: EstimatorParams,
-    /// What a reading must be for it to see it.
-    pub sieve: Sieve<f64>,
-    /// When its interval is wider than it says.
-    pub doubt: DoubtParts<f64>,
-    /// Between which readings R₀ stays.
-    pub rest: RestBounds<f64>,
+    /// What surrounds it.
+    pub parts: LiveParts<f64, ()>,
     /// What corrects its strain.
     pub correction: Option<PortableCorrection>,
-    /// Deviation of a strain that is known when it starts.
-    pub known_sd: f64,
 }
 
 /// The learned correction of a filter's strain.
@@ -63,17 +57,7 @@ impl PortableFilter {
             EstimatorKind::Imm => 3,
             _ => 1,
         };
-        let sieve = params.sieve().with_error_time(estimator.noise.reading_time_s);
-        let known_sd = START_SD * params.limits.span();
-        Ok(Self {
-            kind,
-            hypotheses,
-            estimator,
-            sieve,
-            doubt: params.doubt_parts(&estimator.motion),
-            rest: params.rest_bounds(),
-            correction: correction.transpose()?,
-            known_sd,
-        })
+        let parts = params.live_parts(&estimator);
+        Ok(Self { kind, hypotheses, estimator, parts, correction: correction.transpose()? })
     }
 }

@@ -3,7 +3,25 @@ use std::path::PathBuf;
 use clap::Args as ClapArgs;
 
 use super::{Auto, Estimator, positive};
-use crate::export::{Budget, ExportTarget, Prefix};
+use ohmstrain_export::{Budget, ExportTarget, Prefix};
+
+/// A language that sensors are exported to.
+#[derive(Clone, Copy, Debug, clap::ValueEnum)]
+pub enum Target {
+    /// C99 with an Arduino sketch and a self-test.
+    C,
+    /// A module of constants for a `no_std` crate.
+    Rust,
+}
+
+impl From<Target> for ExportTarget {
+    fn from(target: Target) -> Self {
+        match target {
+            Target::C => Self::C,
+            Target::Rust => Self::Rust,
+        }
+    }
+}
 
 /// Flags of `export`.
 #[derive(Debug, ClapArgs)]
@@ -13,7 +31,7 @@ pub struct ExportArgs {
     pub sensor: PathBuf,
     /// Language to export to
     #[arg(long)]
-    pub target: ExportTarget,
+    pub target: Target,
     /// Folder to write into; files of an earlier export are replaced
     #[arg(short, long, value_name = "DIR")]
     pub output: PathBuf,

@@ -3,7 +3,7 @@ use std::path::PathBuf;
 use clap::Args as ClapArgs;
 
 use super::{Auto, Estimator, positive};
-use crate::export::Budget;
+use ohmstrain_export::Budget;
 
 /// Flags of `serial-check`.
 #[derive(Debug, ClapArgs)]

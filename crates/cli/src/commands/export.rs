@@ -4,10 +4,10 @@ use crate::args::ExportArgs;
 use crate::commands::export_choice;
 use crate::commands::export_score::{OnRecording, Promise};
 use crate::error::CliError;
-use crate::export::{self, ExportError};
 use crate::input;
 use crate::output::{Kind, Outputs};
 use crate::sensor_file;
+use ohmstrain_export::{self as export, ExportError};
 
 /// Writes a sensor's filter as source code.
 pub fn run(args: &ExportArgs) -> Result<(), CliError> {
@@ -26,9 +26,10 @@ pub fn run(args: &ExportArgs) -> Result<(), CliError> {
         None => None,
     };
     let plan = export_choice::plan(args, params, recording.as_ref())?;
-    let refused = |error: ExportError| error.into_cli(&args.sensor.display().to_string());
+    let refused = |error: ExportError| CliError::export(&error, &args.sensor.display().to_string());
     let promise = Promise::new(args, params, &plan, recording.as_ref())?;
-    let files = export::files(params, &plan, args.target, args.dt_s, &args.prefix, &promise.lines).map_err(refused)?;
+    let files =
+        export::files(params, &plan, args.target.into(), args.dt_s, &args.prefix, &promise.lines).map_err(refused)?;
     let mut outputs = Outputs::new(args.force, std::iter::once(&args.sensor).chain(&args.score));
     for file in files {
         let path = args.output.join(&file.path);

@@ -5,7 +5,7 @@ use ohmstrain_calib::SensorParams;
 use crate::args::ExportArgs;
 use crate::commands::export_score::OnRecording;
 use crate::error::CliError;
-use crate::export::{self, Budget, Plan};
+use ohmstrain_export::{self as export, Budget, Plan};
 
 /// The sensor's filter, or what is best of it within a budget: by its score on a recording, else by a table.
 pub fn plan(args: &ExportArgs, params: &SensorParams, recording: Option<&OnRecording>) -> Result<Plan, CliError> {
@@ -21,7 +21,7 @@ fn within(
     recording: Option<&OnRecording>,
 ) -> Result<Plan, CliError> {
     let name = args.sensor.display().to_string();
-    let fitting = export::fitting(params, budget, args.dt_s).map_err(|error| error.into_cli(&name))?;
+    let fitting = export::fitting(params, budget, args.dt_s).map_err(|error| CliError::export(&error, &name))?;
     let mut best: Option<(f64, Plan)> = None;
     for plan in &fitting {
         // Without a recording all are alike, and the first is the best by the table.

@@ -6,9 +6,9 @@ use ohmstrain_calib::{Baseline, ScoredRow, Scores, SensorParams};
 use crate::args::ExportArgs;
 use crate::commands::score_table::covered;
 use crate::error::CliError;
-use crate::export::{self, ChipFilter, ExportTarget, Plan, ReplayedRow};
 use crate::input::TraceFile;
 use crate::output::{self, print};
+use ohmstrain_export::{self as export, ChipFilter, ExportTarget, Plan, ReplayedRow};
 
 /// A recording with a reference, and what this computer and a static cubic make of it, as they would live.
 pub struct OnRecording {
@@ -56,7 +56,7 @@ impl OnRecording {
     /// What the exported code makes of it.
     fn exported(&self, params: &SensorParams, plan: &Plan, args: &ExportArgs) -> Result<Scores, CliError> {
         let replayed = export::replay(params, plan, args.dt_s, &self.rows)
-            .map_err(|error| error.into_cli(&args.sensor.display().to_string()))?;
+            .map_err(|error| CliError::export(&error, &args.sensor.display().to_string()))?;
         let of = |(row, said): (&ScoredRow, &export::Said)| ScoredRow {
             strain: said.strain.into(),
             sd: Some(said.sd.into()),
@@ -89,8 +89,8 @@ impl Promise {
         recording: Option<&OnRecording>,
     ) -> Result<Self, CliError> {
         let name = args.sensor.display().to_string();
-        let chip = ChipFilter::new(params, plan).map_err(|error| error.into_cli(&name))?;
-        let cost = export::cost(params, plan, args.dt_s).map_err(|error| error.into_cli(&name))?;
+        let chip = ChipFilter::new(params, plan).map_err(|error| CliError::export(&error, &name))?;
+        let cost = export::cost(params, plan, args.dt_s).map_err(|error| CliError::export(&error, &name))?;
         let mut table =
             output::table(["estimate", "%FS", "50/90/95 %", "instructions", "flash, B", "RAM, B", "of it stack, B"]);
         let mut worse_on = None;
@@ -137,7 +137,7 @@ impl Promise {
                 writeln!(out, "{line}")?;
             }
             // Rust was counted once, by scripts/exported-c.sh, for docs/chip.md.
-            let of = match args.target {
+            let of = match args.target.into() {
                 ExportTarget::C => "",
                 ExportTarget::Rust => " of the same in C",
             };

@@ -7,10 +7,10 @@ use ohmstrain_calib::SensorParams;
 use crate::args::SerialCheckArgs;
 use crate::commands::live::{Event, Source};
 use crate::error::CliError;
-use crate::export::{self, Plan, ReplayedRow, Said};
 use crate::input::is_stdin;
 use crate::output::print;
 use crate::sensor_file;
+use ohmstrain_export::{self as export, Plan, ReplayedRow, Said};
 
 /// Steps of a port, which never ends.
 const STEPS_OF_A_PORT: usize = 600;
@@ -32,12 +32,13 @@ pub fn run(args: &SerialCheckArgs) -> Result<(), CliError> {
     let plan = match &args.budget {
         None => Plan { kind: asked, ..Plan::default() },
         Some(budget) => {
-            let fitting = export::fitting(params, budget, args.dt_s).map_err(|error| error.into_cli(&name))?;
+            let fitting =
+                export::fitting(params, budget, args.dt_s).map_err(|error| CliError::export(&error, &name))?;
             fitting.into_iter().next().unwrap_or_default()
         }
     };
     let heard = listen(args)?;
-    let said = replayed(params, &plan, args.dt_s, &heard.steps).map_err(|error| error.into_cli(&name))?;
+    let said = replayed(params, &plan, args.dt_s, &heard.steps).map_err(|error| CliError::export(&error, &name))?;
     let farthest = compared(&heard.steps, &said)?;
     print(|out| {
         writeln!(out, "{} steps, {} other lines", heard.steps.len(), heard.others)?;

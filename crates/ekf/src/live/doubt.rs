@@ -255,6 +255,11 @@ impl<T: Recordable> Doubts<T> {
         self.unread_s < T::of(NEVER_READ_S)
     }
 
+    /// Whether there has been a row.
+    pub const fn runs(&self) -> bool {
+        self.runs
+    }
+
     /// Takes the time of a row, `dt_s` seconds after the one before.
     pub fn pass(&mut self, dt_s: T) {
         let passed_s = if self.runs { dt_s } else { T::zero() };

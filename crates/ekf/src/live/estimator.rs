@@ -1,6 +1,8 @@
 use ohmstrain_model::{Phase, SwitchedModel};
 
-use crate::{Belief, Curve, Estimator, Gaussian, Hypotheses, Mixture, Real, SignSplit, SparseEkf, Switch};
+use crate::{
+    Belief, Curve, Estimator, Gaussian, Hypotheses, Imm, Mixture, PhaseMixture, Real, SignSplit, SparseEkf, Switch,
+};
 
 /// An estimator of the sensor's own model, which a [`LiveFilter`](super::LiveFilter) runs.
 pub trait SensorEstimator<T: Real, const N: usize, const L: usize>: Estimator<T, N, L> {
@@ -61,5 +63,31 @@ where
 
     fn start(&self, strain: Option<Gaussian<T>>) -> Mixture<T, N, L, K> {
         Mixture::single(belief(self.model(), strain), Phase::Hold)
+    }
+}
+
+impl<T, S, G, const B: usize, const N: usize, const L: usize> SensorEstimator<T, N, L> for Imm<T, B, N, S, G>
+where
+    T: Real,
+    S: Switch<T>,
+    G: Curve<T>,
+{
+    const BRANCHES: usize = B;
+
+    fn start(&self, strain: Option<Gaussian<T>>) -> PhaseMixture<T, N, L> {
+        PhaseMixture::single(belief(self.model(), strain), Phase::Hold)
+    }
+}
+
+#[cfg(feature = "particles")]
+impl<T, const B: usize, const N: usize, const L: usize> SensorEstimator<T, N, L>
+    for crate::Particles<T, SwitchedModel<T, B, N>>
+where
+    T: Real,
+{
+    const BRANCHES: usize = B;
+
+    fn start(&self, strain: Option<Gaussian<T>>) -> crate::ParticleCloud<T, N, L> {
+        self.start(&belief(self.model(), strain), Phase::Extend)
     }
 }

@@ -1,14 +1,15 @@
 use ohmstrain_model::{MOTION_STATES, StrainRange};
 
 use super::{
-    BESIDE_SHARE, DOUBT, DoubtParts, Doubts, FARTHEST_REST, Flags, Jumps, Learned, Protections, Repeats, RestBounds,
+    BESIDE_SHARE, Correct, DOUBT, DoubtParts, Doubts, FARTHEST_REST, Flags, Jumps, Protections, Repeats, RestBounds,
     RestFollower, SURPRISING_NIS, SensorEstimator, Sieve,
 };
 use crate::clock::check_time_step;
 use crate::correction::{FeatureScale, ReadingFeatures, filter_inputs};
 use crate::substeps::{LONGEST_PAUSE_S, Pause, Repeated};
 use crate::{
-    Belief, Gaussian, Guard, Influence, Reading, ReadingVerdict, Real, Recordable, State, StepError, Streak, Substeps,
+    Belief, Gaussian, Guard, Influence, PastStep, Reading, ReadingVerdict, Real, Recordable, State, StepError, Streak,
+    Substeps,
 };
 
 /// How far beyond the limits a strain may be that somebody knows, in spans.
@@ -21,7 +22,7 @@ pub const KNOWN_BEYOND: f64 = 0.1;
 
 /// What a [`LiveFilter`] is made of beside its estimator: all that a calibration says of the sensor.
 #[derive(Clone, Copy, Debug)]
-pub struct LiveParts<'a, T> {
+pub struct LiveParts<T, C> {
     /// R₀ of the law, in the unit of the readings.
     pub rest_reading: T,
     /// What the rested, unstretched sensor read in calibration: of the day, where R₀ is of the law.
@@ -45,18 +46,62 @@ pub struct LiveParts<'a, T> {
     /// Between which readings R₀ stays.
     pub rest: RestBounds<T>,
     /// The scale of the features that the correction sees, and the correction; `None` for the filter's own strain.
-    pub learned: Option<(FeatureScale<T>, Learned<'a, T>)>,
+    pub learned: Option<(FeatureScale<T>, C)>,
+}
+
+impl<T, C> LiveParts<T, C> {
+    /// The same with a correction, or without.
+    #[must_use]
+    pub fn with_correction<D>(self, learned: Option<(FeatureScale<T>, D)>) -> LiveParts<T, D> {
+        let Self { rest_reading, rested, dt_s, longest_step_s, limits, strain_sd_scale, .. } = self;
+        let Self { reading_variance, known_variance, sieve, doubt, rest, .. } = self;
+        LiveParts {
+            rest_reading,
+            rested,
+            dt_s,
+            longest_step_s,
+            limits,
+            strain_sd_scale,
+            reading_variance,
+            known_variance,
+            sieve,
+            doubt,
+            rest,
+            learned,
+        }
+    }
+}
+
+impl<C> LiveParts<f64, C> {
+    /// The same in another precision, without a correction.
+    #[must_use]
+    pub fn to<T: Recordable>(&self) -> LiveParts<T, ()> {
+        LiveParts {
+            rest_reading: T::of(self.rest_reading),
+            rested: T::of(self.rested),
+            dt_s: T::of(self.dt_s),
+            longest_step_s: T::of(self.longest_step_s),
+            limits: StrainRange { lower: T::of(self.limits.lower), upper: T::of(self.limits.upper) },
+            strain_sd_scale: T::of(self.strain_sd_scale),
+            reading_variance: T::of(self.reading_variance),
+            known_variance: T::of(self.known_variance),
+            sieve: self.sieve.to(),
+            doubt: self.doubt.to(),
+            rest: self.rest.to(),
+            learned: None,
+        }
+    }
 }
 
 /// No time since the last reading.
-fn at_reading<T: Real, E: SensorEstimator<T, N, L>, const N: usize, const L: usize>(
+fn at_reading<T: Real, E: SensorEstimator<T, N, L>, C, const N: usize, const L: usize>(
     estimator: &Substeps<E>,
-    parts: &LiveParts<'_, T>,
+    parts: &LiveParts<T, C>,
 ) -> Pause<T> {
     Pause::none(estimator.0.longest_step_s().min(parts.longest_step_s))
 }
 
-/// What a row says.
+/// Estimate of a row.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LiveEstimate<T> {
     /// Strain, within the limits.
@@ -67,14 +112,64 @@ pub struct LiveEstimate<T> {
     pub flags: Flags,
 }
 
+/// A row: its estimate, and what a smoother or a fixed lag needs besides.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LiveRow<T, S> {
+    /// The estimate.
+    pub estimate: LiveEstimate<T>,
+    /// The strain before doubts.
+    pub stated: Gaussian<T>,
+    /// The flags that doubts raise.
+    pub doubts: Flags,
+    /// What the row's reading told the filter.
+    pub heard: Heard<T>,
+    /// The state predicted at a row whose reading was not used; at one whose reading was, the state is the filter's
+    /// ([`LiveFilter::state`]).
+    pub look: Option<S>,
+    /// The pause up to this row, before whole steps of it were passed.
+    pub pause: Pause<T>,
+}
+
+/// What a reading told the filter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Heard<T> {
+    /// What became of it.
+    pub verdict: ReadingVerdict,
+    /// The reading, R/R₀ - 1 of R₀ as it is followed; `None` if there was none.
+    pub reading: Option<Reading<T>>,
+    /// The reading with the noise that the filter gave it; `None` if it was not used.
+    pub used: Option<Reading<T>>,
+    /// Normalised innovation squared of the reading as it came; `None` if it was not compared.
+    pub nis: Option<T>,
+    /// How far readings have jumped, where the filter has looked again: at the second in a row that startles
+    /// ([`STARTLING_NIS`](super::STARTLING_NIS)), [`Sieve::jump`] away from the last that did not surprise.
+    pub jumped: Option<T>,
+    /// Factor on the covariance of the state before the step, at a readmission ([`Guard`]).
+    inflation: T,
+}
+
+impl<T: Real> Heard<T> {
+    /// There was no reading.
+    #[must_use]
+    pub fn nothing() -> Self {
+        let verdict = ReadingVerdict::Missing;
+        Self { verdict, reading: None, used: None, nis: None, jumped: None, inflation: T::one() }
+    }
+
+    /// True for a reading that was weighed down for standing far from what was expected.
+    pub fn surprises(&self) -> bool {
+        self.verdict == ReadingVerdict::Downweighted && self.nis.is_none_or(|nis| nis > T::of(SURPRISING_NIS))
+    }
+}
+
 /// A sensor's filter with all that stands around it, in fixed memory.
 ///
 /// Only a reading that is used moves it on: a row without one is predicted from the last reading, so that a pause may be one step or
-/// many. An error leaves it as it was.
-pub struct LiveFilter<'a, T: Real, E: SensorEstimator<T, N, L>, const N: usize, const L: usize> {
+/// many. The first row takes no time. An error leaves it as it was.
+pub struct LiveFilter<T: Real, E: SensorEstimator<T, N, L>, C, const N: usize, const L: usize> {
     estimator: Substeps<E>,
     guard: Guard<T>,
-    parts: LiveParts<'a, T>,
+    parts: LiveParts<T, C>,
     protections: Protections,
     /// What a reading must be, under them.
     sieve: Sieve<T>,
@@ -87,12 +182,13 @@ pub struct LiveFilter<'a, T: Real, E: SensorEstimator<T, N, L>, const N: usize, 
     now: Memory<T, E::State>,
 }
 
-/// What changes from step to step.
+/// What changes from step to step of a [`LiveFilter`].
 #[derive(Clone, Copy)]
-struct Memory<T, S> {
+pub struct Memory<T, S> {
     /// At the last reading that was used, or whole steps of a pause after it; and the time since then.
     state: S,
     pause: Pause<T>,
+    streak: Streak,
     repeats: Repeats<T>,
     jumps: Jumps<T>,
     /// What the correction sees of readings, if there is one.
@@ -104,24 +200,15 @@ struct Memory<T, S> {
     follower: Option<RestFollower<T>>,
 }
 
-/// What became of a reading.
-struct Heard<T, S> {
-    /// The state at a row without a reading that was used; at one with it is the filter's.
-    look: Option<S>,
-    verdict: ReadingVerdict,
-    /// R/R₀ - 1, of R₀ as it is followed, if the filter has used it.
-    used: Option<T>,
-    /// Its normalised innovation squared, as it came.
-    nis: T,
-    surprises: bool,
-    /// How far readings have jumped, where the filter has looked again.
-    jumped: Option<T>,
-}
-
-impl<'a, T: Real, E: SensorEstimator<T, N, L>, const N: usize, const L: usize> LiveFilter<'a, T, E, N, L> {
+impl<T, E, C, const N: usize, const L: usize> LiveFilter<T, E, C, N, L>
+where
+    T: Real,
+    E: SensorEstimator<T, N, L>,
+    C: Correct<T>,
+{
     /// Before any reading.
     #[must_use]
-    pub fn new(estimator: E, parts: LiveParts<'a, T>) -> Self {
+    pub fn new(estimator: E, parts: LiveParts<T, C>) -> Self {
         let fresh = estimator.start(None);
         let estimator = Substeps(estimator);
         let pause = at_reading(&estimator, &parts);
@@ -146,6 +233,12 @@ impl<'a, T: Real, E: SensorEstimator<T, N, L>, const N: usize, const L: usize> L
         Self { guard: guard(protections), protections, sieve: self.parts.sieve.under(protections), now, ..self }
     }
 
+    /// The same with another guard against outliers.
+    #[must_use]
+    pub fn guarded_by(self, guard: Guard<T>) -> Self {
+        Self { guard, ..self }
+    }
+
     /// The estimator.
     pub const fn estimator(&self) -> &E {
         &self.estimator.0
@@ -154,6 +247,41 @@ impl<'a, T: Real, E: SensorEstimator<T, N, L>, const N: usize, const L: usize> L
     /// The estimate at the last reading that was used, uncorrected; in a long pause without one somewhat later.
     pub const fn state(&self) -> &E::State {
         &self.now.state
+    }
+
+    /// What a smoother is to take steps back with.
+    pub const fn substeps(&self) -> &Substeps<E> {
+        &self.estimator
+    }
+
+    /// What changes from step to step: to go on from here later ([`Self::return_to`]).
+    pub fn memory(&self) -> Memory<T, E::State> {
+        self.now.clone()
+    }
+
+    /// Goes on from where this filter was.
+    pub fn return_to(&mut self, memory: &Memory<T, E::State>) {
+        self.now = memory.clone();
+    }
+
+    /// Whether its strain is corrected.
+    pub const fn is_corrected(&self) -> bool {
+        self.parts.learned.is_some()
+    }
+
+    /// The doubts after the last row.
+    pub const fn doubts(&self) -> &Doubts<T> {
+        &self.now.doubts
+    }
+
+    /// R₀ as it is followed, minus the one that was calibrated or told, as a share of that.
+    pub fn rest_off(&self) -> T {
+        self.now.follower.map_or(T::zero(), |follower| follower.off())
+    }
+
+    /// The strain is known now: what was doubted of it is gone.
+    pub fn settle(&mut self) {
+        self.now.doubts.settle();
     }
 
     /// The usual time on, with a reading in the unit of the calibration.
@@ -222,21 +350,31 @@ impl<'a, T: Real, E: SensorEstimator<T, N, L>, const N: usize, const L: usize> L
         if is_plausible { Ok(self.parts.rest_reading * times) } else { Err(StepError::ImplausibleRest) }
     }
 
-    /// `dt_s` seconds on, with a reading ([`Self::relative`]) or without.
+    /// `dt_s` seconds on, with a reading ([`Self::relative`]) or without; the first row takes no time.
     ///
     /// # Errors
     /// As [`Self::step`]; or if `dt_s` is no length of a step.
     pub fn step_after(&mut self, dt_s: T, reading: Option<Reading<T>>) -> Result<LiveEstimate<T>, StepError> {
+        self.row_after(dt_s, reading).map(|row| row.estimate)
+    }
+
+    /// The same, with all that a row says.
+    ///
+    /// # Errors
+    /// As [`Self::step_after`].
+    #[inline]
+    pub fn row_after(&mut self, dt_s: T, reading: Option<Reading<T>>) -> Result<LiveRow<T, E::State>, StepError> {
         check_time_step(dt_s)?;
         // Single precision has no square of much more.
-        let dt_s = dt_s.min(T::of(LONGEST_PAUSE_S));
-        let heard = self.hear(dt_s, reading)?;
-        let moments = heard.look.as_ref().unwrap_or(&self.now.state).moments();
+        let dt_s = if self.now.doubts.runs() { dt_s.min(T::of(LONGEST_PAUSE_S)) } else { T::zero() };
+        let (heard, look, pause) = self.hear(dt_s, reading)?;
+        let moments = look.as_ref().unwrap_or(&self.now.state).moments();
         let filtered = self.filtered(&moments);
         self.watch(dt_s, &heard, filtered);
-        let corrected = self.corrected(heard.look.as_ref().unwrap_or(&self.now.state), &moments, filtered);
+        let stated = self.corrected(look.as_ref().unwrap_or(&self.now.state), &moments, filtered);
         let now = &mut self.now;
-        let taken = reading.filter(|_| heard.used.is_some()).map(|reading| (reading.value, heard.nis));
+        let nis = heard.nis.unwrap_or(T::zero());
+        let taken = reading.filter(|_| heard.used.is_some()).map(|reading| (reading.value, nis));
         if let (Some(follower), Some((reading, _))) = (&mut now.follower, taken) {
             heard.jumped.into_iter().for_each(|jump| follower.jumped(jump));
             follower.see(now.doubts.unread_s + dt_s, reading);
@@ -244,47 +382,60 @@ impl<'a, T: Real, E: SensorEstimator<T, N, L>, const N: usize, const L: usize> L
         if heard.verdict.is_refused() {
             now.doubts.refuse();
         }
-        let open = now.doubts.see(dt_s, taken, corrected);
+        let open = now.doubts.see(dt_s, taken, stated);
         let (widened, doubts) = now.doubts.widened(moments.mean[1], open);
         let (variance, doubts) =
-            if self.protections.doubts { (widened, doubts) } else { (corrected.variance, Flags::NONE) };
-        let strain = Gaussian { variance, ..corrected };
-        Ok(LiveEstimate { strain, rate: Gaussian::marginal(&moments, 1), flags: Flags::of(heard.verdict).and(doubts) })
+            if self.protections.doubts { (widened, doubts) } else { (stated.variance, Flags::NONE) };
+        let strain = Gaussian { variance, ..stated };
+        let flags = Flags::of(heard.verdict).and(doubts);
+        let estimate = LiveEstimate { strain, rate: Gaussian::marginal(&moments, 1), flags };
+        Ok(LiveRow { estimate, stated, doubts, heard, look, pause })
     }
 
-    /// Takes a reading, if it is one, and looks again where readings have jumped. A row without one is a look ahead from the last.
-    fn hear(&mut self, dt_s: T, reading: Option<Reading<T>>) -> Result<Heard<T, E::State>, StepError> {
+    /// The step that the last row took from `before`, the state then, if its reading was used ([`LiveRow::heard`]).
+    pub fn past_step(&self, before: &E::State, heard: &Heard<T>) -> PastStep<E::State, Repeated<E::Prepared, T>, T> {
+        let from = if heard.inflation > T::one() { before.inflated(heard.inflation) } else { before.clone() };
+        PastStep { from, prepared: self.prepared.1, reading: heard.used }
+    }
+
+    /// Takes a reading, if it is one, and looks again where readings have jumped. A row without one is a look ahead from the last:
+    /// the state there comes back, and the pause up to it.
+    #[allow(clippy::type_complexity, reason = "parts of a row")]
+    fn hear(
+        &mut self,
+        dt_s: T,
+        reading: Option<Reading<T>>,
+    ) -> Result<(Heard<T>, Option<E::State>, Pause<T>), StepError> {
         let mut repeats = self.now.repeats;
         repeats.pass(dt_s);
-        let relative = reading.map(|reading| self.now.follower.map_or(reading, |follower| follower.relative(reading)));
-        let sieved = relative.map(|relative| repeats.sieved(&self.sieve, relative, self.parts.reading_variance));
+        let reading = reading.map(|reading| self.now.follower.map_or(reading, |follower| follower.relative(reading)));
+        let sieved = reading.map(|reading| repeats.sieved(&self.sieve, reading, self.parts.reading_variance));
         let (seen, turned_down) = match sieved.transpose() {
             Ok(seen) => (seen, None),
             Err(verdict) => (None, Some(verdict)),
         };
-        // Before the first reading there is no more to predict than the usual step.
-        let pause = if self.now.doubts.has_begun() {
-            self.now.pause.after(dt_s)
-        } else {
-            at_reading(&self.estimator, &self.parts).after(dt_s.min(self.parts.dt_s))
-        };
-        let (mut pause, mut moved) = (pause, None);
+        // Before the first reading there is nothing to predict from.
+        let since = if self.now.doubts.has_begun() { self.now.pause.after(dt_s) } else { self.now.pause };
+        let (mut pause, mut moved) = (since, None);
         if seen.is_none() && pause.clone().whole_step().is_some() {
             let state = moved.insert(self.now.state.clone());
             self.estimator.pass_whole(state, &mut pause)?;
         }
         self.prepare(pause);
-        let (now, streak) = (&mut self.now, Streak::default());
+        let now = &mut self.now;
         let from = moved.as_ref().unwrap_or(&now.state);
-        let guarded = self.guard.advance(&self.estimator, from, streak, &self.prepared.1, seen)?;
+        let guarded = self.guard.advance(&self.estimator, from, now.streak, &self.prepared.1, seen)?;
         let verdict = turned_down.unwrap_or(guarded.verdict);
-        let innovation = guarded.advanced.innovation.filter(|_| verdict.is_taken());
-        let nis = innovation.map_or(T::zero(), |innovation| innovation.nis);
-        let surprises = verdict == ReadingVerdict::Downweighted && nis > T::of(SURPRISING_NIS);
-        let used = seen.filter(|_| verdict.is_taken()).map(|seen| seen.value);
-        let jumped = used.and_then(|used| now.jumps.see(used, nis, self.sieve.jump)).filter(|_| surprises);
-        now.repeats = repeats;
-        let look = if used.is_some() {
+        let nis = guarded.advanced.innovation.map(|innovation| innovation.nis);
+        let (used, inflation) = (guarded.used.filter(|_| verdict.is_taken()), guarded.inflation);
+        let mut heard = Heard { verdict, reading, used, nis, jumped: None, inflation };
+        let jumped = seen.filter(|_| heard.used.is_some() && verdict != ReadingVerdict::Readmitted).and_then(|seen| {
+            let nis = nis.unwrap_or(T::zero());
+            now.jumps.see(seen.value, nis, self.sieve.jump)
+        });
+        heard.jumped = jumped.filter(|_| heard.surprises());
+        (now.repeats, now.streak) = (repeats, guarded.streak);
+        let look = if heard.used.is_some() {
             (now.state, now.pause) = (guarded.advanced.state, at_reading(&self.estimator, &self.parts));
             None
         } else {
@@ -292,23 +443,24 @@ impl<'a, T: Real, E: SensorEstimator<T, N, L>, const N: usize, const L: usize> L
             moved.into_iter().for_each(|moved| now.state = moved);
             Some(guarded.advanced.state)
         };
-        if jumped.is_some() {
+        if heard.jumped.is_some() {
             now.state = now.state.beside(&self.fresh, T::of(BESIDE_SHARE));
         }
-        Ok(Heard { look, verdict, used, nis, surprises, jumped })
+        Ok((heard, look, since))
     }
 
     /// Prepares the way over a pause, unless it is.
     fn prepare(&mut self, pause: Pause<T>) {
+        let pause = self.estimator.told_apart(pause);
         if pause != self.prepared.0 {
             self.prepared = (pause, self.estimator.prepare_over(pause));
         }
     }
 
     /// Lets the correction see a reading that the filter has used.
-    fn watch(&mut self, dt_s: T, heard: &Heard<T, E::State>, filtered: Gaussian<T>) {
+    fn watch(&mut self, dt_s: T, heard: &Heard<T>, filtered: Gaussian<T>) {
         if let Some(watched) = &mut self.now.watched {
-            watched.step_unless(heard.surprises, dt_s, heard.used);
+            watched.step_unless(heard.surprises(), dt_s, heard.used.map(|used| used.value));
             if !watched.is_waiting() {
                 self.now.known_variance = filtered.variance;
             }
@@ -335,28 +487,33 @@ impl<'a, T: Real, E: SensorEstimator<T, N, L>, const N: usize, const L: usize> L
     }
 }
 
-impl<T: Real, E: SensorEstimator<T, N, L> + Clone, const N: usize, const L: usize> Clone
-    for LiveFilter<'_, T, E, N, L>
+impl<T, E, C, const N: usize, const L: usize> Clone for LiveFilter<T, E, C, N, L>
+where
+    T: Real,
+    E: SensorEstimator<T, N, L> + Clone,
+    C: Clone,
 {
     fn clone(&self) -> Self {
         let (estimator, fresh, now) = (self.estimator.clone(), self.fresh.clone(), self.now.clone());
-        Self { estimator, fresh, now, ..*self }
+        Self { estimator, fresh, now, parts: self.parts.clone(), ..*self }
     }
 }
 
-impl<T, E, const N: usize, const L: usize> Copy for LiveFilter<'_, T, E, N, L>
+impl<T, E, C, const N: usize, const L: usize> Copy for LiveFilter<T, E, C, N, L>
 where
     T: Real,
     E: SensorEstimator<T, N, L, State: Copy> + Copy,
+    C: Copy,
 {
 }
 
 impl<T: Real, S> Memory<T, S> {
-    fn new(parts: &LiveParts<'_, T>, protections: Protections, (state, pause): (S, Pause<T>)) -> Self {
+    fn new<C>(parts: &LiveParts<T, C>, protections: Protections, (state, pause): (S, Pause<T>)) -> Self {
         let doubts = Doubts::new(parts.doubt);
         Self {
             state,
             pause,
+            streak: Streak::default(),
             repeats: Repeats::none(),
             jumps: Jumps::none(),
             watched: parts.learned.as_ref().map(|(scale, _)| ReadingFeatures::new(*scale)),

@@ -10,10 +10,14 @@ pub struct Learned<'a, T> {
     pub quadratics: Option<[Quadratic<'a, T>; 2]>,
 }
 
-impl<T: Real> Learned<'_, T> {
+/// Corrects a filter's strain.
+pub trait Correct<T> {
     /// The strain of a filter, corrected; arguments as of [`Correction::correct`].
-    #[must_use]
-    pub fn correct(&self, inputs: &[T; FILTER_INPUTS], filtered: Gaussian<T>, birge: T) -> Gaussian<T> {
+    fn correct(&self, inputs: &[T; FILTER_INPUTS], filtered: Gaussian<T>, birge: T) -> Gaussian<T>;
+}
+
+impl<T: Real> Correct<T> for Learned<'_, T> {
+    fn correct(&self, inputs: &[T; FILTER_INPUTS], filtered: Gaussian<T>, birge: T) -> Gaussian<T> {
         let Some([of_direct, of_residual]) = &self.quadratics else {
             return self.correction.correct(inputs, filtered, birge).strain;
         };

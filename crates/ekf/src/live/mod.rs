@@ -17,11 +17,13 @@ mod unread;
 
 pub use doubt::{DOUBT, DoubtNumbers, DoubtParts, Doubts};
 pub use estimator::SensorEstimator;
-pub use filter::{KNOWN_BEYOND, LiveEstimate, LiveFilter, LiveParts, may_be_unstretched, reported};
+pub use filter::{
+    Heard, KNOWN_BEYOND, LiveEstimate, LiveFilter, LiveParts, LiveRow, Memory, may_be_unstretched, reported,
+};
 pub use flags::{Flag, Flags};
 pub use innovations::Innovations;
 pub use jumps::{BESIDE_AFTER, BESIDE_SHARE, Jumps, STARTLING_NIS, SURPRISING_NIS};
-pub use learned::Learned;
+pub use learned::{Correct, Learned};
 pub use protections::Protections;
 pub use rest_follow::{FARTHEST_REST, FOLLOWING, Following, RestBounds, RestFollower};
 pub use rest_watch::{RestSeen, RestWatch};

@@ -14,6 +14,9 @@ pub struct Protections {
 }
 
 impl Protections {
+    /// Everything is off.
+    pub const NONE: Self =
+        Self { plausibility: false, influence: false, second_look: false, following: false, doubts: false };
     /// Everything is on.
     pub const ALL: Self =
         Self { plausibility: true, influence: true, second_look: true, following: true, doubts: true };

@@ -19,7 +19,7 @@ use crate::mixture::pause::Pause;
 use crate::mixture::state::Mixture;
 use crate::mixture::switching::{forgets_direction_s, fresh_rate, longest_cut_s};
 use crate::{
-    AnyCurve, Curve, Dwell, Evidence, Gaussian, Logistic, MixtureResidual, Reading, SparseEkf, StepError, Switch,
+    AnyCurve, Compact, Curve, Dwell, Evidence, Gaussian, MixtureResidual, Reading, SparseEkf, StepError, Switch,
 };
 
 /// At most `K` Gaussian hypotheses split by the sign of the rate.
@@ -35,7 +35,7 @@ use crate::{
 ///
 /// A truncated Gaussian-sum split. `G` as for [`SparseEkf`].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SignSplit<T, const B: usize, const N: usize, const K: usize, S = Logistic, G = AnyCurve<T>> {
+pub struct SignSplit<T, const B: usize, const N: usize, const K: usize, S = Compact, G = AnyCurve<T>> {
     pub(crate) kernel: SparseEkf<T, S, B, N, G>,
     hold: Option<Dwell<T>>,
     /// Probabilities of a change of phase over a step, `[from][to]`; `None` for a body that never rests.

@@ -1,11 +1,13 @@
 use std::ops::Range;
+use std::sync::Arc;
 
 use ohmstrain_ekf::correction::{FEATURES, FeatureScale, OUTPUTS, ReadingFeatures, Starts, filter_inputs, mixture};
-use ohmstrain_ekf::live::Sieve;
+use ohmstrain_ekf::live::{Flags, Protections};
 use ohmstrain_ekf::{Estimate, Gaussian, Guard, Reading, ReadingVerdict, StepError};
 
-use super::{Corrected, Learned, future_features, outputs};
+use super::{CorrectedWayBack, Learned, future_features, outputs};
 use crate::EstimatorKind;
+use crate::filter::build::{Options, Recipe};
 use crate::filter::way_back::SEGMENT;
 use crate::filter::{Filter, Output, Rows, WayBack};
 use crate::params::RangeParams;
@@ -14,21 +16,13 @@ use crate::params::correction::{
     CorrectionParams, CorrectionScale, CorrectorParams, FUTURE_FEATURES, SimulatedParams, SimulatedRow, TrainingRow,
     smoother_inputs,
 };
+use crate::params::estimator::{EstimatorParams, MotionParams, NoiseParams};
+use crate::params::law::{GaugeParams, LawParams};
 use crate::params::recipe::Parts;
 
 const LIMITS: RangeParams = RangeParams { lower: 0.0, upper: 0.4 };
 
 /// Says of every row what its time says, less surely the longer no reading has come.
-#[derive(Clone, Copy, Default)]
-struct Fake {
-    time_s: f64,
-    gap: f64,
-    missing: bool,
-    guarded: bool,
-    waiting: usize,
-    nis: Option<f64>,
-}
-
 fn says(time_s: f64, gap: f64, verdict: ReadingVerdict) -> Output {
     let known = |mean: f64| Gaussian { mean, variance: 1e-4 };
     let strain = Gaussian { mean: 0.2 + 0.15 * (0.3 * time_s).sin(), variance: 1e-4 * (1.0 + gap) };
@@ -46,83 +40,10 @@ fn says(time_s: f64, gap: f64, verdict: ReadingVerdict) -> Output {
         nis: Some(1.0),
         verdict,
         phases: Some([0.7, 0.1, 0.2]),
-        startled: None,
+        reading: None,
+        doubts: Flags::NONE,
+        rest_off: 0.0,
     }
-}
-
-impl Fake {
-    fn verdict(&self) -> ReadingVerdict {
-        match (self.guarded, self.missing) {
-            (true, _) => ReadingVerdict::Rejected,
-            (_, true) => ReadingVerdict::Missing,
-            _ => ReadingVerdict::Accepted,
-        }
-    }
-}
-
-impl Filter for Fake {
-    fn step(&mut self, time_s: f64, reading: Option<Reading<f64>>) -> Result<(), StepError> {
-        self.gap = if reading.is_some() { 0.0 } else { self.gap + time_s - self.time_s };
-        self.missing = reading.is_none();
-        self.time_s = time_s;
-        Ok(())
-    }
-
-    fn strain(&self) -> Gaussian<f64> {
-        self.output().estimate.strain
-    }
-
-    fn output(&self) -> Output {
-        let said = says(self.time_s, self.gap, self.verdict());
-        Output { nis: self.nis.or(said.nis), ..said }
-    }
-
-    fn guard(&mut self, guard: Guard<f64>) {
-        self.guarded = !guard.is_none();
-    }
-
-    fn sieve(&mut self, _: Sieve<f64>) {}
-
-    /// Hands every row out two rows later, as if it had said 0.3 of all.
-    fn step_lagged(
-        &mut self,
-        time_s: f64,
-        reading: Option<Reading<f64>>,
-        _: f64,
-        out: &mut dyn FnMut(Output),
-    ) -> Result<(), StepError> {
-        if time_s < self.time_s {
-            return Err(StepError::NegativeTimeStep);
-        }
-        self.step(time_s, reading)?;
-        self.waiting += 1;
-        if self.waiting > 2 {
-            self.waiting -= 1;
-            out(lagged());
-        }
-        Ok(())
-    }
-
-    fn flush_lagged(&mut self, out: &mut dyn FnMut(Output)) -> Result<(), StepError> {
-        (0..self.waiting).for_each(|_| out(lagged()));
-        Ok(())
-    }
-
-    fn way_back<'a>(&'a mut self, rows: Rows<'a>) -> Result<Box<dyn WayBack + 'a>, (usize, StepError)> {
-        let mut said = Vec::new();
-        for row in 0..rows.len() {
-            let (time_s, reading) = rows.get(row);
-            self.step(time_s, reading).map_err(|error| (row, error))?;
-            said.push(self.output());
-        }
-        Ok(Box::new(FakeBack(said)))
-    }
-}
-
-fn lagged() -> Output {
-    let mut output = says(0.0, 0.0, ReadingVerdict::Accepted);
-    output.estimate.strain = Gaussian { mean: 0.3, variance: 4e-4 };
-    output
 }
 
 struct FakeBack(Vec<Output>);
@@ -201,10 +122,6 @@ fn params() -> CorrectionParams {
     }
 }
 
-fn corrected() -> Corrected {
-    Corrected::new(Box::new(Fake::default()), &Learned::new(params(), LIMITS)).unwrap()
-}
-
 /// Two whole segments and a short one. Readings are missing now and then, among others around a border of segments, at
 /// the start and at the end.
 fn recording() -> (Vec<f64>, Vec<Option<Reading<f64>>>) {
@@ -219,13 +136,26 @@ fn recording() -> (Vec<f64>, Vec<Option<Reading<f64>>>) {
 fn segments_say_what_the_whole_recording_says() {
     let (time_s, readings) = recording();
     let (past, future) = both_ways(&time_s, &readings);
-    let smoothed = corrected().smooth(&time_s, &readings).unwrap().unwrap();
-    let correction = Learned::new(params(), LIMITS).for_smoother().unwrap();
+    let mut gap = 0.0;
+    let plain: Vec<Output> = (0..time_s.len())
+        .map(|k| {
+            gap = if k > 0 && readings[k].is_none() { gap + time_s[k] - time_s[k - 1] } else { 0.0 };
+            let verdict = if readings[k].is_none() { ReadingVerdict::Missing } else { ReadingVerdict::Accepted };
+            says(time_s[k], gap, verdict)
+        })
+        .collect();
+    let row = |k: usize| (time_s[k], readings[k]);
+    let learned = Learned::new(params(), LIMITS);
+    let back = Box::new(FakeBack(plain.clone()));
+    let mut back = CorrectedWayBack::new(back, &learned, Rows::new(time_s.len(), &row)).unwrap();
+    let (mut smoothed, mut segment) = (Vec::new(), Vec::new());
+    while back.next_segment(&mut segment).unwrap().is_some() {
+        smoothed.splice(0..0, segment.iter().copied());
+    }
+    let correction = learned.for_smoother().unwrap();
     assert_eq!(smoothed.len(), time_s.len());
-    let mut plain = Fake::default();
     for k in 0..time_s.len() {
-        plain.step(time_s[k], readings[k]).unwrap();
-        let said = plain.output();
+        let said = plain[k];
         let mut expected = said.estimate.strain;
         if let Some(past) = past[k] {
             let future = future[k].map_or([0.0; FEATURES - 1], future_features);
@@ -241,83 +171,123 @@ fn segments_say_what_the_whole_recording_says() {
     }
 }
 
-#[test]
-fn a_missing_reading_is_held_and_the_variance_grows_with_the_filters() {
-    let mut filter = corrected();
-    // Before the first reading: what the filter says.
-    filter.step(0.0, None).unwrap();
-    assert_eq!(filter.strain(), says(0.0, 0.0, ReadingVerdict::Missing).estimate.strain);
-    (1..200).for_each(|k| filter.step(0.1 * f64::from(k), Some(reading(0.1 * f64::from(k)))).unwrap());
-    let now = filter.readings.features.now();
-    let known = filter.strain();
-    filter.step(0.1 * 199.0, None).unwrap();
-    assert_eq!(filter.readings.features.now(), now);
-    assert_eq!(filter.strain(), known);
-    for k in 1..5 {
-        let time_s = 19.9 + f64::from(k);
-        filter.step(time_s, None).unwrap();
-        let inputs = filter_inputs(&outputs(&says(time_s, 0.0, ReadingVerdict::Accepted)), &now.unwrap());
-        let filtered = says(time_s, f64::from(k), ReadingVerdict::Missing).estimate.strain;
-        let expected = filter.of_filter.correction().correct(&inputs, filtered, 1.0).strain;
-        let strain = filter.strain();
-        assert_eq!(strain.mean, expected.mean);
-        // The filter's variance has grown by 1e-4 a second.
-        assert!((strain.variance - expected.variance - 1e-4 * f64::from(k)).abs() < 1e-15);
-        assert!(strain.variance > known.variance, "{k}");
-    }
+/// A law without branches, and an extended Kalman filter for it.
+fn law_and_estimator() -> (LawParams, EstimatorParams) {
+    let law = LawParams {
+        gauge: GaugeParams::Polynomial { coefficients: [1.4, -0.3, 0.0] },
+        extend_viscosity_s: 0.01,
+        retract_viscosity_s: -0.01,
+        branches: Vec::new(),
+        range: LIMITS,
+    };
+    let estimator = EstimatorParams {
+        score: 0.0,
+        strain_sd_scale: 1.3,
+        smoothed_sd_scale: Some(1.1),
+        motion: MotionParams { rate_sd_per_s: 0.05, rate_time_s: 2.0, strain_mean: 0.2, strain_sd: 0.1 },
+        noise: NoiseParams {
+            baseline_sd: 0.02,
+            baseline_time_s: 100.0,
+            reading_sd: 4e-3,
+            reading_time_s: 0.0,
+            branch_sd: 0.01,
+        },
+        phases: None,
+        settling: None,
+    };
+    (law, estimator)
 }
 
-/// The mean of normalised innovations squared of rows before, fading with 20 s, in the naive sum.
-#[test]
-fn what_has_learned_from_a_surprised_filter_is_less_sure() {
-    let fake = Fake { nis: Some(9.0), ..Fake::default() };
-    let mut filter = Corrected::new(Box::new(fake), &Learned::new(params(), LIMITS)).unwrap();
-    for k in 0..400 {
-        let time_s = 0.1 * f64::from(k);
-        filter.step(time_s, Some(reading(time_s))).unwrap();
-        // The first row has no interval before it, and a row does not know of its own innovation.
-        let weight = |row: i32| (1.0 - (-0.1_f64 / 20.0).exp()) * (-0.1 * f64::from(k - 1 - row) / 20.0).exp();
-        let mean: f64 = (1..k).map(|row| 9.0 * weight(row)).sum();
-        let (inputs, said) = (filter.readings.features.now().unwrap(), filter.filter.output());
-        let inputs = filter_inputs(&outputs(&said), &inputs);
-        let learned = filter.of_filter.correction().correct(&inputs, said.estimate.strain, mean.max(1.0)).strain;
-        let strain = filter.strain();
-        assert!((strain.mean - learned.mean).abs() < 1e-12 && (strain.variance / learned.variance - 1.0).abs() < 1e-9);
-    }
+/// That filter, corrected or not, with or without a gate.
+fn live(learned: Option<&Arc<Learned>>, gate: Option<f64>) -> Box<dyn Filter> {
+    let (law, estimator) = law_and_estimator();
+    let guard = gate.map_or_else(Guard::none, |gate| Guard::none().with_gate(gate, 5).unwrap());
+    let options = Options { guard, protections: Protections::NONE, ..Options::plain() };
+    Recipe::of_law(EstimatorKind::Ekf, &law, estimator, LIMITS).with(options).filter(learned).unwrap()
 }
 
+/// Rows at 8 Hz, whose times no clock rounds. They begin without a reading; later readings are missing one by one
+/// and for seconds; two are outliers.
+fn broken_recording() -> Vec<(f64, Option<Reading<f64>>)> {
+    let row = |k: u32| {
+        let time_s = 0.125 * f64::from(k);
+        let is_lost = k < 2 || k % 11 == 3 || (200..260).contains(&k);
+        let value = if k == 100 || k == 400 { Reading::from(5.0) } else { reading(time_s) };
+        (time_s, (!is_lost).then_some(value))
+    };
+    (0..600).map(row).collect()
+}
+
+/// What is expected of a corrected filter from the bare one beside it: where a reading is missing, or turned down, the features stay
+/// and the variance grows with the filter's; innovations of rows before, fading with 20 s, widen it, in the naive sum.
 #[test]
-fn what_a_guard_rejects_is_not_seen() {
-    let mut filter = corrected();
-    (0..100).for_each(|k| filter.step(0.1 * f64::from(k), Some(reading(0.1 * f64::from(k)))).unwrap());
-    let now = filter.readings.features.now();
-    filter.guard(Guard::none().with_gate(9.0, 5).unwrap());
-    filter.step(10.0, Some(Reading::from(100.0))).unwrap();
-    assert_eq!(filter.readings.features.now(), now);
-    filter.guard(Guard::none());
-    filter.step(10.1, Some(reading(10.1))).unwrap();
-    assert_ne!(filter.readings.features.now(), now);
+fn a_corrected_filter_says_what_the_bare_one_beside_it_and_its_readings_say() {
+    let learned = Learned::new(params(), LIMITS);
+    let correction = learned.for_filter().unwrap();
+    let (mut bare, mut corrected) = (live(None, Some(30.0)), live(Some(&learned), Some(30.0)));
+    let mut features = ReadingFeatures::new(SCALE.past());
+    let (mut last_s, mut known, mut innovations) = (0.0, None, Vec::<(f64, f64)>::new());
+    let mut rejected = 0;
+    for (time_s, reading) in broken_recording() {
+        bare.step(time_s, reading).unwrap();
+        corrected.step(time_s, reading).unwrap();
+        let said = bare.output();
+        let seen = reading.filter(|_| said.verdict.is_taken());
+        rejected += usize::from(said.verdict == ReadingVerdict::Rejected);
+        let past = features.step(time_s - last_s, seen.map(|reading| reading.value)).or(features.now());
+        last_s = time_s;
+        let filtered = said.estimate.strain;
+        if seen.is_some() {
+            known = Some(filtered.variance);
+        }
+        // The first innovation has no interval before it, and a row does not know of its own.
+        let share = |k: usize| 1.0 - (-(innovations[k].0 - innovations[k - 1].0) / 20.0).exp();
+        let last = innovations.last().map_or(0.0, |last| last.0);
+        let fading = |k: usize| (-(last - innovations[k].0) / 20.0).exp();
+        let mean: f64 = (1..innovations.len()).map(|k| innovations[k].1.min(30.0) * share(k) * fading(k)).sum();
+        let expected = past.map_or(filtered, |past| {
+            let inputs = filter_inputs(&outputs(&said), &past);
+            let strain = correction.correction().correct(&inputs, filtered, mean.max(1.0)).strain;
+            let grown = if seen.is_none() { filtered.variance - known.unwrap() } else { 0.0 };
+            Gaussian { variance: strain.variance + grown.max(0.0), ..strain }
+        });
+        let strain = corrected.strain();
+        let off = (strain.mean - expected.mean).abs().max((strain.variance / expected.variance - 1.0).abs());
+        assert!(off < 1e-9, "{time_s} s: {strain:?} {expected:?}");
+        let bare_but_strain = Estimate { strain, ..said.estimate };
+        assert_eq!(corrected.output(), Output { estimate: bare_but_strain, ..said });
+        if let (Some(nis), true) = (said.nis, seen.is_some()) {
+            innovations.push((time_s, nis));
+        }
+    }
+    assert_eq!(rejected, 2);
 }
 
 /// With a fixed lag every row comes out once and in order, mixed with what was said of it when it came, whatever rows were
 /// refused in between.
 #[test]
 fn a_lagged_row_is_mixed_with_what_was_said_of_it() {
-    let mut live = corrected();
-    let mut lagging = corrected();
-    let (mut said, mut out) = (Vec::new(), Vec::new());
+    let learned = Learned::new(params(), LIMITS);
+    let [mut now, mut lagging] = [0; 2].map(|_| live(Some(&learned), None));
+    let mut bare = live(None, None);
+    let (mut said, mut out, mut plain) = (Vec::new(), Vec::new(), Vec::new());
     for k in 0..50 {
         let time_s = 0.1 * f64::from(k);
-        live.step(time_s, Some(reading(time_s))).unwrap();
-        said.push(live.strain());
-        lagging.step_lagged(time_s, Some(reading(time_s)), 0.2, &mut |output| out.push(output)).unwrap();
+        let reading = Some(reading(time_s));
+        now.step(time_s, reading).unwrap();
+        said.push(now.strain());
+        lagging.step_lagged(time_s, reading, 0.2, &mut |output| out.push(output)).unwrap();
+        bare.step_lagged(time_s, reading, 0.2, &mut |output| plain.push(output)).unwrap();
         if k == 20 {
             assert!(lagging.step_lagged(-1.0, None, 0.2, &mut |output| out.push(output)).is_err());
         }
     }
     assert_eq!(out.len(), 48);
     lagging.flush_lagged(&mut |output| out.push(output)).unwrap();
-    let expected: Vec<Gaussian<f64>> = said.iter().map(|said| mixture([*said, lagged().estimate.strain])).collect();
+    bare.flush_lagged(&mut |output| plain.push(output)).unwrap();
+    // The readings are the law's own: innovations are no larger than stated.
+    let expected: Vec<Gaussian<f64>> =
+        said.iter().zip(&plain).map(|(said, plain)| mixture([*said, plain.estimate.strain])).collect();
     assert_eq!(out.iter().map(|output| output.estimate.strain).collect::<Vec<_>>(), expected);
 }
 

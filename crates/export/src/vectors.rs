@@ -1,6 +1,6 @@
 //! What the Rust filters make of a short motion: what the exported filter must make of it too.
 
-use ohmstrain_ekf::live::{LiveFilter, SensorEstimator};
+use ohmstrain_ekf::live::SensorEstimator;
 use ohmstrain_ekf::{Reading, Real, StepError};
 use serde::Serialize;
 
@@ -8,7 +8,7 @@ use super::ExportError;
 use super::fixed_rate::FixedRate;
 use super::literal::Literal;
 use super::motion;
-use super::twin::{StepNumbers, Task, Twin, with_twin};
+use super::twin::{StepNumbers, Task, TwinFilter, with_twin};
 
 /// Readings and results, and how far other results may be off.
 #[derive(Debug, Serialize)]
@@ -62,7 +62,7 @@ impl Vectors {
             with_twin::<_, B, N, L, _>(sensor, sensor.model, sensor.interpolated(), motion())?;
         let (exact, _): (Vec<(f64, f64)>, f64) =
             with_twin::<_, B, N, L, _>(sensor, sensor.reference, sensor.exact(), motion())?;
-        let limits = sensor.parts.limits;
+        let limits = sensor.narrow().limits;
         let largest = limits.lower.abs().max(limits.upper.abs());
         let ulp = largest.next_up() - largest;
         let off = |((strain, sd), exact): (&(f32, f32), &(f64, f64))| {
@@ -99,13 +99,13 @@ pub fn work<const B: usize, const N: usize, const L: usize>(sensor: &FixedRate<'
 
 /// The readings of the motion, in the sensor's unit.
 fn readings<const B: usize, const N: usize>(sensor: &FixedRate<'_, B, N>) -> Vec<Input> {
-    let rest = f64::from(sensor.rest_reading);
+    let rest = sensor.parts.live.rest_reading;
     let input = |row: motion::Row| Input {
         reading: row.rho.map(|rho| (rest * (1.0 + rho)) as f32),
         reading_sd: (rest * row.extra_sd) as f32,
     };
     let reading_sd = f64::from(sensor.model.noise().reading_sd);
-    let dt_s = f64::from(sensor.parts.dt_s);
+    let dt_s = sensor.parts.live.dt_s;
     let mut inputs: Vec<Input> =
         motion::rows(sensor.reference.law(), dt_s, reading_sd).into_iter().map(input).collect();
     // It wanders, so that no number comes twice.
@@ -117,11 +117,11 @@ fn readings<const B: usize, const N: usize>(sensor: &FixedRate<'_, B, N>) -> Vec
 
 /// What the rested sensor reads on another day.
 fn rested_elsewhere<const B: usize, const N: usize>(sensor: &FixedRate<'_, B, N>) -> f32 {
-    sensor.rested * ANOTHER_DAY
+    sensor.narrow().rested * ANOTHER_DAY
 }
 
 /// A row relative to R₀, computed as on the microcontroller.
-pub fn relative<T: Real>(rest_reading: f32, input: &Input) -> Option<Reading<T>> {
+fn relative<T: Real>(rest_reading: f32, input: &Input) -> Option<Reading<T>> {
     let (sd, exactly) = (input.reading_sd / rest_reading, |x: f32| T::of(x.into()));
     let value = |reading: f32| exactly((reading - rest_reading) / rest_reading);
     input.reading.map(|reading| Reading { value: value(reading), extra_variance: exactly(sd * sd) })
@@ -138,14 +138,14 @@ impl<T: Real, const B: usize, const S: usize> Task<T> for Motion<'_, B, S> {
 
     fn run<F, const N: usize, const L: usize>(
         self,
-        mut live: LiveFilter<'_, T, Twin<'_, T, F>, N, L>,
+        mut live: TwinFilter<'_, T, F, N, L>,
     ) -> Result<Self::Said, StepError>
     where
         F: SensorEstimator<T, N, L, Prepared = F> + StepNumbers<T>,
     {
         let Self { sensor, inputs } = self;
         let exactly = |x: f32| T::of(x.into());
-        let mut rest_reading = sensor.rest_reading;
+        let mut rest_reading = sensor.narrow().rest_reading;
         let mut estimates = Vec::with_capacity(inputs.len());
         for (row, input) in inputs.iter().enumerate() {
             if row + RESTED == inputs.len() {
@@ -153,7 +153,7 @@ impl<T: Real, const B: usize, const S: usize> Task<T> for Motion<'_, B, S> {
                 live.rezero(exactly(rested_elsewhere(sensor)))?;
             }
             let reading = relative(rest_reading, input);
-            let strain = live.step_after(exactly(sensor.parts.dt_s), reading)?.strain;
+            let strain = live.step_after(T::of(sensor.parts.live.dt_s), reading)?.strain;
             estimates.push((strain.mean, strain.sd()));
         }
         let [updated, predicted] = live.estimator().work().map(|count| count as f64 / inputs.len() as f64);

@@ -1,13 +1,12 @@
 //! A recording through the exported program's twin.
 
 use ohmstrain_calib::{SensorParams, with_sizes};
-use ohmstrain_ekf::live::{LiveEstimate, LiveFilter, Protections, SensorEstimator};
+use ohmstrain_ekf::live::{LiveEstimate, Protections, SensorEstimator};
 use ohmstrain_ekf::{Real, StepError};
 
 use super::fixed_rate::FixedRate;
 use super::plan::{ChipFilter, Plan};
-use super::twin::{StepNumbers, Task, Twin, bits, with_twin};
-use super::vectors::{Input, relative};
+use super::twin::{StepNumbers, Task, TwinFilter, bits, with_twin};
 use super::{ExportError, too_many_branches};
 
 /// A row of a recording; a missing reading is NaN.
@@ -48,12 +47,11 @@ fn of<const B: usize, const N: usize, const L: usize>(
     rows: &[ReplayedRow],
 ) -> Result<Vec<Said>, ExportError> {
     let sensor = FixedRate::<B, N>::new::<L>(params, filter, dt_s as f32)?;
-    let replay = Replay { rest_reading: sensor.rest_reading, rows, protections: Protections::ALL };
+    let replay = Replay { rows, protections: Protections::ALL };
     with_twin::<_, B, N, L, _>(&sensor, sensor.model, sensor.interpolated(), replay)
 }
 
 struct Replay<'a> {
-    rest_reading: f32,
     rows: &'a [ReplayedRow],
     protections: Protections,
 }
@@ -61,17 +59,14 @@ struct Replay<'a> {
 impl<T: Real> Task<T> for Replay<'_> {
     type Said = Vec<Said<T>>;
 
-    fn run<F, const N: usize, const L: usize>(
-        self,
-        live: LiveFilter<'_, T, Twin<'_, T, F>, N, L>,
-    ) -> Result<Vec<Said<T>>, StepError>
+    fn run<F, const N: usize, const L: usize>(self, live: TwinFilter<'_, T, F, N, L>) -> Result<Vec<Said<T>>, StepError>
     where
         F: SensorEstimator<T, N, L, Prepared = F> + StepNumbers<T>,
     {
         let mut live = live.protected_by(self.protections);
         let said = |row: &ReplayedRow| {
-            let reading = (!row.reading.is_nan()).then_some(row.reading as f32);
-            let reading = relative(self.rest_reading, &Input { reading, reading_sd: row.reading_sd as f32 });
+            let [reading, sd] = [row.reading, row.reading_sd].map(|number| T::of(f64::from(number as f32)));
+            let reading = (!row.reading.is_nan()).then(|| live.relative(reading, sd));
             let LiveEstimate { strain, flags, .. } = live.step_after(T::of(row.since_s.into()), reading)?;
             Ok(Said { strain: strain.mean, sd: strain.sd(), flags: bits(flags) })
         };

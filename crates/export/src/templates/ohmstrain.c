@@ -512,15 +512,12 @@ static ohmstrain_status step(ohmstrain_state *state, float dt_s, const float *rh
     float strain, variance, shown = 0.0f, jump = 0.0f;
     int surprises, has_jumped;
 
-    /* Single precision has no square of much more. */
-    dt_s = dt_s < LONGEST_PAUSE_S ? dt_s : LONGEST_PAUSE_S;
+    /* The first row takes no time. Single precision has no square of much more than the longest pause. */
+    dt_s = !seen.runs ? 0.0f : dt_s < LONGEST_PAUSE_S ? dt_s : LONGEST_PAUSE_S;
+    /* Before the first reading there is nothing to predict from. */
     if (has_begun(&seen)) {
         pause.ahead_s += dt_s;
         pause.ahead_s = pause.ahead_s > LONGEST_PAUSE_S ? LONGEST_PAUSE_S : pause.ahead_s;
-    } else {
-        /* Before the first reading there is no more to predict than the usual step. */
-        pause = over;
-        pause.ahead_s = dt_s < OHMSTRAIN_DT_S ? dt_s : OHMSTRAIN_DT_S;
     }
     pass_time(&seen, dt_s);
     if (rho) {

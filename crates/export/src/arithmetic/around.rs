@@ -2,22 +2,20 @@
 //! The library's own code is run on expressions, once for every way that it may go.
 
 use ohmstrain_ekf::correction::{Decay, FeatureScale, ReadingFeatures, TIME_CONSTANTS_S};
-use ohmstrain_ekf::live::{Doubts, Flag, Jumps, Repeats, RestFollower, SURPRISING_NIS, Sieve, reported};
+use ohmstrain_ekf::live::{Doubts, Flag, Jumps, LiveParts, Repeats, RestFollower, SURPRISING_NIS, Sieve, reported};
 use ohmstrain_ekf::record::{Expression, Fields, See, Writer};
 use ohmstrain_ekf::{Gaussian, Influence, Reading, ReadingVerdict};
-use ohmstrain_model::{Number, StrainRange};
+use ohmstrain_model::Number;
 
 use super::correction;
 use super::function::{Printed, RETURNED};
-use crate::export::twin::{OwnedLearned, Parts};
+use crate::twin::{OwnedLearned, Parts};
 
 const LOW_PASSES: usize = TIME_CONSTANTS_S.len();
 
 /// What stands around the filter of a sensor.
 pub struct Around<'a> {
     pub parts: &'a Parts<'a>,
-    /// Variance of the model's own noise of a reading, relative.
-    pub reading_variance: f32,
 }
 
 impl Around<'_> {
@@ -31,7 +29,11 @@ impl Around<'_> {
             of_readings.into_iter().chain(of_rest).chain(of_doubts).chain([self.has_begun(), self.refuse()]).collect();
         if let Some(correction) = self.parts.correction {
             all.extend([self.birge(), watch(&correction.features)]);
-            all.extend(correction::functions(&OwnedLearned::new(correction, self.parts.quadratics, self.parts.limits)));
+            all.extend(correction::functions(&OwnedLearned::new(
+                correction,
+                self.parts.quadratics,
+                self.parts.limits_in::<f32>(),
+            )));
         }
         all.iter().map(Printed::text).collect::<Vec<_>>().join("\n")
     }
@@ -49,13 +51,17 @@ impl Around<'_> {
         fields.numbers.into_iter().chain(fields.truths).collect()
     }
 
+    fn live<'t>(&self) -> LiveParts<Expression<'t>, ()> {
+        self.parts.live.to()
+    }
+
     fn doubts<'t>(&self) -> Doubts<Expression<'t>> {
-        let doubts = Doubts::new(self.parts.doubt.to());
+        let doubts = Doubts::new(self.live().doubt);
         if self.parts.correction.is_some() { doubts.of_corrected() } else { doubts }
     }
 
     fn follower<'t>(&self) -> RestFollower<Expression<'t>> {
-        RestFollower::new(self.parts.rest.to())
+        RestFollower::new(self.live().rest)
     }
 }
 
@@ -78,10 +84,10 @@ impl Around<'_> {
                 let sieve = Sieve {
                     plausible: (writer.input("lower"), writer.input("upper")),
                     longest_repeat_s: writer.input("longest_repeat_s"),
-                    ..self.parts.sieve.to()
+                    ..self.live().sieve
                 };
                 let reading = of_reading(writer);
-                let sieved = repeats.sieved(&sieve, reading, number(self.reading_variance));
+                let sieved = repeats.sieved(&sieve, reading, self.live().reading_variance);
                 writer.keep(repeats);
                 writer.give("sieved_variance", sieved.map_or(reading.extra_variance, |seen| seen.extra_variance));
                 writer.tell("OHMSTRAIN_IMPLAUSIBLE", sieved.err() == Some(ReadingVerdict::Implausible));
@@ -97,7 +103,7 @@ impl Around<'_> {
             &["float rho", "float extra_variance"],
             |writer| {
                 let reading = of_reading(writer);
-                let coarser = reading.coarser(number(self.reading_variance), number(f32::EPSILON));
+                let coarser = reading.coarser(self.live().reading_variance, number(f32::EPSILON));
                 writer.give("more_variance", coarser.unwrap_or(reading).extra_variance);
                 writer.tell(RETURNED, coarser.is_some());
             },
@@ -111,8 +117,8 @@ impl Around<'_> {
             &["float mean", "float variance"],
             |writer| {
                 let strain = Gaussian { mean: writer.input("mean"), variance: writer.input("variance") };
-                let [lower, upper] = [self.parts.limits.lower, self.parts.limits.upper].map(number);
-                let reported = reported(strain, number(self.parts.strain_sd_scale), &StrainRange { lower, upper });
+                let LiveParts { limits, strain_sd_scale, .. } = self.live();
+                let reported = reported(strain, strain_sd_scale, &limits);
                 writer.give("reported_variance", reported.variance);
                 writer.give(RETURNED, reported.mean);
             },

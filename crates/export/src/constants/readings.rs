@@ -3,7 +3,7 @@
 use ohmstrain_ekf::live::{DoubtParts, RestBounds, Sieve};
 use serde::Serialize;
 
-use crate::export::literal::Literal;
+use crate::literal::Literal;
 
 /// What a reading must be.
 #[derive(Debug, Serialize)]
@@ -60,29 +60,28 @@ struct RestConstants {
 
 impl DoubtConstants {
     /// Of a sensor; a strain below `zero` is none.
-    pub fn new(seen: &DoubtParts<f64>, zero: Literal) -> Self {
-        let narrow = |number: f64| Literal(number as f32);
+    pub fn new(seen: &DoubtParts<f32>, zero: Literal) -> Self {
         Self {
-            low: narrow(seen.low),
-            high: narrow(seen.high),
-            fastest_per_s: narrow(seen.fastest_per_s),
-            longest_s: narrow(seen.longest_s),
-            per_reading: narrow(seen.per_reading),
-            start: narrow(seen.start),
-            most: narrow(seen.most),
-            sign: narrow(seen.rest.map_or(0.0, |rest| rest.sign)),
+            low: Literal(seen.low),
+            high: Literal(seen.high),
+            fastest_per_s: Literal(seen.fastest_per_s),
+            longest_s: Literal(seen.longest_s),
+            per_reading: Literal(seen.per_reading),
+            start: Literal(seen.start),
+            most: Literal(seen.most),
+            sign: Literal(seen.rest.map_or(0.0, |rest| rest.sign)),
             zero,
             unread: UnreadConstants {
-                rate_time_s: narrow(seen.unread.rate_time_s),
-                path_variance: narrow(seen.unread.path_variance),
-                centre: narrow(seen.unread.centre),
-                anywhere: narrow(seen.unread.anywhere),
+                rate_time_s: Literal(seen.unread.rate_time_s),
+                path_variance: Literal(seen.unread.path_variance),
+                centre: Literal(seen.unread.centre),
+                anywhere: Literal(seen.unread.anywhere),
             },
             rest: seen.rest.map(|rest| RestConstants {
-                rested: narrow(rest.rested),
-                tolerance: narrow(rest.tolerance),
-                lasts_s: narrow(rest.lasts_s),
-                end: narrow(rest.end),
+                rested: Literal(rest.rested),
+                tolerance: Literal(rest.tolerance),
+                lasts_s: Literal(rest.lasts_s),
+                end: Literal(rest.end),
             }),
         }
     }
@@ -90,22 +89,21 @@ impl DoubtConstants {
 
 impl FollowConstants {
     /// Of a sensor.
-    pub fn new(bounds: RestBounds<f64>) -> Self {
-        let narrow = |number: f64| Literal(number as f32);
-        Self { low: bounds.low.map(narrow), high: bounds.high.map(narrow) }
+    pub fn new(bounds: RestBounds<f32>) -> Self {
+        Self { low: bounds.low.map(Literal), high: bounds.high.map(Literal) }
     }
 }
 
 impl SieveConstants {
     /// Of a filter.
-    pub fn new(sieve: &Sieve<f64>) -> Self {
+    pub fn new(sieve: &Sieve<f32>) -> Self {
         let finite = |number: f32| number.is_finite().then_some(Literal(number));
         Self {
-            lower: Literal(sieve.plausible.0 as f32),
-            upper: Literal(sieve.plausible.1 as f32),
-            longest_repeat_s: finite(sieve.longest_repeat_s as f32),
-            jump: Literal(sieve.jump as f32),
-            error_time_s: Some(Literal(sieve.error_time_s as f32)).filter(|time_s| time_s.0 > 0.0),
+            lower: Literal(sieve.plausible.0),
+            upper: Literal(sieve.plausible.1),
+            longest_repeat_s: finite(sieve.longest_repeat_s),
+            jump: Literal(sieve.jump),
+            error_time_s: Some(Literal(sieve.error_time_s)).filter(|time_s| time_s.0 > 0.0),
         }
     }
 }

@@ -7,9 +7,9 @@ use ohmstrain_ekf::{
 };
 use serde::Serialize;
 
-use crate::export::fixed_rate::FixedRate;
-use crate::export::literal::{Literal, literals};
-use crate::export::{ExportError, arithmetic, parameter};
+use crate::fixed_rate::FixedRate;
+use crate::literal::{Literal, literals};
+use crate::{ExportError, arithmetic, parameter};
 
 /// What depends on the length of a step.
 #[derive(Debug, Serialize)]
@@ -60,7 +60,7 @@ impl StepConstants {
         Self {
             names: names.to_vec(),
             usual_s: Literal(sensor.usual_step_s()),
-            longest_s: Literal(sensor.parts.longest_step_s),
+            longest_s: Literal(sensor.narrow().longest_step_s),
             grace: Literal(STEP_GRACE as f32),
             growth: Literal(STEP_GROWTH as f32),
             evenly: Literal(STEP_EVENLY as f32),
@@ -105,7 +105,7 @@ impl Recorded {
         let Some(phases) = sensor.parts.phases else {
             return Ok(Self { arithmetic: arithmetic::of_ekf(carried, &names, record), numbers: none, names });
         };
-        let (dwell, evidence) = phases.filter_parts(sensor.parts.limits).map_err(parameter)?;
+        let (dwell, evidence) = phases.filter_parts(sensor.narrow().limits).map_err(parameter)?;
         let splits = sensor.parts.kind == EstimatorKind::SignSplit;
         let numbers = if splits {
             SignSplit::<_, B, N, HYPOTHESES, _>::around(kernel, phases.rests.then_some(dwell), evidence).numbers()

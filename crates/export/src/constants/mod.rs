@@ -5,7 +5,7 @@ mod readings;
 
 use ohmstrain_calib::{EstimatorKind, PortableFilter, Quantity, ReadingUnit, SensorParams, with_sizes};
 use ohmstrain_ekf::Belief;
-use ohmstrain_ekf::live::{BESIDE_SHARE, FARTHEST_REST, KNOWN_BEYOND};
+use ohmstrain_ekf::live::{BESIDE_SHARE, DOUBT, FARTHEST_REST, KNOWN_BEYOND, LiveParts};
 use serde::Serialize;
 
 use super::arithmetic::Around;
@@ -15,7 +15,6 @@ use super::fixed_rate::FixedRate;
 use super::law::{LawConstants, NoiseConstants, PhaseConstants, PriorConstants};
 use super::literal::{Literal, literals};
 use super::plan::{ChipFilter, Plan};
-use super::twin::Parts;
 use super::vectors::Vectors;
 use super::{ExportError, too_many_branches};
 use kernel::{Recorded, SharedConstants, StepConstants};
@@ -133,12 +132,12 @@ impl Exported {
     ) -> Result<Self, ExportError> {
         let sensor = FixedRate::<B, N>::new::<L>(params, chip, dt_s as f32)?;
         let filter = &chip.filter;
-        let Parts { strain_sd_scale, limits, .. } = sensor.parts;
+        let live = sensor.narrow();
+        let LiveParts { strain_sd_scale, limits, reading_variance, .. } = live;
         let Recorded { arithmetic, numbers, names } = Recorded::new(&sensor)?;
         let model = &sensor.model;
         let start: Belief<f32, N, L> = Belief::initial(model);
-        let reading_sd = model.noise().reading_sd;
-        let around = Around { parts: &sensor.parts, reading_variance: reading_sd * reading_sd };
+        let around = Around { parts: &sensor.parts };
         let finite = |number: f32| number.is_finite().then_some(Literal(number));
         let vectors = Vectors::new::<B, N, L>(&sensor)?;
         let exported = Self {
@@ -150,11 +149,11 @@ impl Exported {
             reading_unit: if params.reading == ReadingUnit::Ohm { "ohm" } else { "a ratio" },
             reading_column: if params.reading == ReadingUnit::Ohm { "resistance_ohm" } else { "resistance_ratio" },
             joint: params.joint.is_some(),
-            dt_s: Literal(sensor.parts.dt_s),
+            dt_s: Literal(live.dt_s),
             dt_us: (dt_s * 1e6).round() as u64,
             dt_ms: (dt_s * 1e6).round() / 1e3,
-            rest_reading: Literal(sensor.rest_reading),
-            rested: Literal(sensor.rested),
+            rest_reading: Literal(live.rest_reading),
+            rested: Literal(live.rested),
             has_rested: params.measured_rest.is_some(),
             farthest_rest: Literal(FARTHEST_REST as f32),
             rests_at_zero: sensor.rests_at_zero(),
@@ -168,13 +167,13 @@ impl Exported {
             rests: filter.estimator.phases.is_some_and(|phases| phases.rests()),
             start_mean: literals(start.mean.iter()),
             start_variance: (0..N).map(|i| Literal(start.covariance[(i, i)])).collect(),
-            known_variance: Literal(sensor.parts.start_variance),
+            known_variance: Literal(live.known_variance),
             known_beyond: Literal((KNOWN_BEYOND * params.limits.span()) as f32),
-            reading_variance: Literal(reading_sd * reading_sd),
+            reading_variance: Literal(reading_variance),
             beside_share: Literal(BESIDE_SHARE as f32),
-            sieve: SieveConstants::new(&filter.sieve),
-            follow: FollowConstants::new(sensor.parts.rest),
-            doubt: DoubtConstants::new(&sensor.parts.doubt, Literal(sensor.parts.zero)),
+            sieve: SieveConstants::new(&live.sieve),
+            follow: FollowConstants::new(live.rest),
+            doubt: DoubtConstants::new(&live.doubt, Literal((DOUBT.zero * params.limits.span()) as f32)),
             steps: StepConstants::new(&sensor, &names),
             fresh_mean: numbers.fresh.iter().map(|rate| Literal(rate.mean)).collect(),
             fresh_variance: numbers.fresh.iter().map(|rate| Literal(rate.variance)).collect(),

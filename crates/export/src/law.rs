@@ -116,8 +116,8 @@ impl PriorConstants {
     }
 
     /// Correlation time of the rate, its deviation, mean and deviation of strain.
-    pub fn numbers(&self) -> [f64; 4] {
-        [self.rate_time_s, self.rate_sd_per_s, self.strain_mean, self.strain_sd].map(|literal| f64::from(literal.0))
+    pub fn numbers(&self) -> [f32; 4] {
+        [self.rate_time_s, self.rate_sd_per_s, self.strain_mean, self.strain_sd].map(|literal| literal.0)
     }
 }
 
@@ -156,7 +156,7 @@ pub fn narrow_law<const B: usize>(law: &SensorLaw<f64, B>) -> SensorLaw<f32, B> 
     }
 }
 
-pub fn narrow_range(range: StrainRange<f64>) -> StrainRange<f32> {
+fn narrow_range(range: StrainRange<f64>) -> StrainRange<f32> {
     StrainRange { lower: range.lower as f32, upper: range.upper as f32 }
 }
 

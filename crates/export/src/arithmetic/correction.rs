@@ -4,7 +4,7 @@ use ohmstrain_ekf::live::Learned;
 use ohmstrain_ekf::record::{write_mixture, write_scaled};
 
 use super::function::Printed;
-use crate::export::twin::OwnedLearned;
+use crate::twin::OwnedLearned;
 
 /// All of them.
 pub fn functions(learned: &OwnedLearned<f32>) -> Vec<Printed> {

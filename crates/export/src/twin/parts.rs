@@ -1,11 +1,11 @@
 //! What an exported program is made of.
 
 use ohmstrain_calib::{EstimatorKind, PortableCorrection};
-use ohmstrain_ekf::live::{DoubtParts, Flag, Flags, RestBounds, Sieve};
+use ohmstrain_ekf::live::{Flag, Flags, LiveParts};
 use ohmstrain_ekf::{Dwell, Evidence, Real, StepError};
 use ohmstrain_model::StrainRange;
 
-use crate::export::quadratic::OwnedQuadratic;
+use crate::quadratic::OwnedQuadratic;
 
 /// Flags as `ohmstrain_flag` in C has them.
 const BITS: [(Flag, u32); 10] = [
@@ -30,24 +30,13 @@ pub fn bits(flags: Flags) -> u32 {
 #[derive(Clone, Copy)]
 pub struct Parts<'a> {
     pub kind: EstimatorKind,
-    /// Usual time between readings, s, and the longest step, as [`Estimator`](ohmstrain_ekf::Estimator) has it: longer times are
-    /// divided.
-    pub dt_s: f32,
-    pub longest_step_s: f32,
     /// How long phases last, and whether the body rests; `None` for a filter without phases.
     pub phases: Option<PhaseParts>,
-    pub limits: StrainRange<f32>,
-    pub strain_sd_scale: f32,
-    pub sieve: Sieve<f64>,
-    /// Variance of a strain that is known at a start.
-    pub start_variance: f32,
-    /// A strain that is less is none.
-    pub zero: f32,
+    /// What surrounds the filter. The lengths of its steps are those of single precision.
+    pub live: LiveParts<f64, ()>,
     pub correction: Option<&'a PortableCorrection>,
     /// What stands for rows of the correction that were left out.
     pub quadratics: Option<&'a [OwnedQuadratic; 2]>,
-    pub doubt: DoubtParts<f64>,
-    pub rest: RestBounds<f64>,
 }
 
 /// Phases, as a file has them.
@@ -68,7 +57,7 @@ pub fn number<T: Real>(value: f64) -> T {
 impl Parts<'_> {
     /// The limits, in any precision.
     pub fn limits_in<T: Real>(&self) -> StrainRange<T> {
-        StrainRange { lower: number(self.limits.lower.into()), upper: number(self.limits.upper.into()) }
+        self.live.to().limits
     }
 }
 

@@ -25,7 +25,6 @@ use minijinja::syntax::SyntaxConfig;
 use minijinja::value::Serde;
 use ohmstrain_calib::{EstimatorKind, SensorParams};
 
-use crate::error::CliError;
 pub use budget::{Budget, fitting};
 use constants::Exported;
 pub use cost::{Cost, cost};
@@ -35,7 +34,7 @@ pub use prefix::Prefix;
 pub use replay::{ReplayedRow, Said, replay};
 
 /// A language that sensors are exported to.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ExportTarget {
     /// C99 with an Arduino sketch and a self-test.
     C,
@@ -70,28 +69,17 @@ pub enum ExportError {
     #[error("{0}")]
     Parameter(String),
     /// The interval does not go with the sensor.
-    #[error("--dt-s: {0}")]
+    #[error("{0}")]
     Interval(String),
     /// Nothing is small enough.
     #[error(
-        "--budget: nothing fits; the smallest filter of this sensor takes about {} instructions a step, {} B of flash and {} B of RAM",
+        "nothing fits; the smallest filter of this sensor takes about {} instructions a step, {} B of flash and {} B of RAM",
         .0.instructions, .0.flash, .0.ram()
     )]
     Budget(Cost),
     /// The template failed.
     #[error("cannot fill the template of an exported file: {0}")]
     Template(#[from] minijinja::Error),
-}
-
-impl ExportError {
-    /// As the program reports it, about the sensor file `name`.
-    pub fn into_cli(self, name: &str) -> CliError {
-        match self {
-            Self::Unsupported { .. } | Self::Parameter(_) => CliError::Input(format!("{name}: {self}")),
-            Self::Interval(_) | Self::Budget(_) => CliError::Arguments(self.to_string()),
-            Self::Template(_) => CliError::Other(self.to_string()),
-        }
-    }
 }
 
 /// A number that the filter cannot work with.

@@ -7,7 +7,7 @@ use ohmstrain_ekf::live::Learned;
 use ohmstrain_model::StrainRange;
 
 use super::number;
-use crate::export::quadratic::OwnedQuadratic;
+use crate::quadratic::OwnedQuadratic;
 
 /// A correction, and what stands for rows that were left out.
 pub struct OwnedLearned<T: Real> {

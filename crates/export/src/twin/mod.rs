@@ -7,7 +7,7 @@ mod parts;
 use std::cell::Cell;
 
 use ohmstrain_calib::EstimatorKind;
-use ohmstrain_ekf::live::{LiveFilter, SensorEstimator};
+use ohmstrain_ekf::live::{Learned, LiveFilter, SensorEstimator};
 use ohmstrain_ekf::{
     Advanced, Compact, Estimator, Gaussian, Hypotheses, Reading, Real, SignSplit, SparseEkf, State, StepError,
 };
@@ -19,8 +19,13 @@ use super::vectors::refused;
 pub use learned::OwnedLearned;
 pub use parts::{Parts, PhaseParts, bits, number};
 
-/// What depends on the length of a step: the kernel's numbers, then nine probabilities of the chain.
-pub type Numbers<'a, T> = Box<dyn Fn(T) -> Vec<T> + 'a>;
+/// What depends on the length of a step.
+pub struct Numbers<'a, T> {
+    /// The kernel's numbers, then nine probabilities of the chain, for a length, s.
+    pub of: Box<dyn Fn(T) -> Vec<T> + 'a>,
+    /// The length that is prepared for a step, s.
+    pub length_s: fn(T) -> T,
+}
 
 /// Runs code with a constant number of hypotheses: those that a filter on a chip may keep.
 macro_rules! with_hypotheses {
@@ -100,10 +105,14 @@ where
     type Prepared = F;
 
     fn prepare(&self, dt_s: T) -> F {
-        let (all, mut filter) = ((self.numbers)(dt_s), self.filter);
+        let (all, mut filter) = ((self.numbers.of)(dt_s), self.filter);
         let (numbers, chain) = all.split_at(all.len() - CHAIN);
         filter.set_numbers(dt_s, numbers, [0, 1, 2].map(|from| [0, 1, 2].map(|to| chain[3 * from + to])));
         filter
+    }
+
+    fn length_s(&self, dt_s: T) -> T {
+        (self.numbers.length_s)(dt_s)
     }
 
     fn longest_step_s(&self) -> T {
@@ -134,6 +143,9 @@ where
     }
 }
 
+/// A twin with all that stands around it.
+pub type TwinFilter<'a, T, F, const N: usize, const L: usize> = LiveFilter<T, Twin<'a, T, F>, Learned<'a, T>, N, L>;
+
 /// What is done with a sensor's twin.
 pub trait Task<T: Real> {
     /// What comes of it.
@@ -143,10 +155,7 @@ pub trait Task<T: Real> {
     ///
     /// # Errors
     /// If the filter refuses a step.
-    fn run<F, const N: usize, const L: usize>(
-        self,
-        live: LiveFilter<'_, T, Twin<'_, T, F>, N, L>,
-    ) -> Result<Self::Said, StepError>
+    fn run<F, const N: usize, const L: usize>(self, live: TwinFilter<'_, T, F, N, L>) -> Result<Self::Said, StepError>
     where
         F: SensorEstimator<T, N, L, Prepared = F> + StepNumbers<T>;
 }
@@ -162,7 +171,7 @@ pub fn with_twin<T: Real, const B: usize, const N: usize, const L: usize, J: Tas
     task: J,
 ) -> Result<J::Said, ExportError> {
     let parts = &sensor.parts;
-    let kernel = SparseEkf::<T, Compact, B, N>::new(model, number(parts.dt_s.into())).map_err(refused)?;
+    let kernel = SparseEkf::<T, Compact, B, N>::new(model, number(parts.live.dt_s)).map_err(refused)?;
     let of = Of { sensor, numbers, task };
     let said = match (parts.kind, parts.phases) {
         (EstimatorKind::SignSplit, Some(phases)) => {
@@ -200,6 +209,7 @@ impl<T: Real, J: Task<T>, const B: usize, const S: usize> Of<'_, '_, T, J, B, S>
         let learned =
             parts.correction.map(|correction| OwnedLearned::new(correction, parts.quadratics, parts.limits_in()));
         let twin = Twin { filter, numbers, work: [const { Cell::new(0) }; 2] };
-        task.run(LiveFilter::new(twin, sensor.live_parts(learned.as_ref().map(OwnedLearned::learned))))
+        let parts = parts.live.to().with_correction(learned.as_ref().map(OwnedLearned::learned));
+        task.run(LiveFilter::new(twin, parts))
     }
 }

@@ -9,7 +9,7 @@
 use ohmstrain_ekf::correction::{Correction, FILTER_INPUTS, FeatureScale, InputScale, Process{% if correction.quadratics %}, Quadratic{% endif %}, RowBlock, Rows{% if correction.simulated %}, Simulated{% endif %}, Triangle};
 use ohmstrain_ekf::live::{DoubtParts, Learned, LiveFilter, LiveParts, RestBounds, {% if doubt.rest %}RestSeen, {% endif %}Sieve, Unread};
 {% else %}
-use ohmstrain_ekf::live::{DoubtParts, LiveFilter, LiveParts, RestBounds, {% if doubt.rest %}RestSeen, {% endif %}Sieve, Unread};
+use ohmstrain_ekf::live::{DoubtParts, Learned, LiveFilter, LiveParts, RestBounds, {% if doubt.rest %}RestSeen, {% endif %}Sieve, Unread};
 {% endif %}
 {% if splits %}
 use ohmstrain_ekf::{Compact, {% if rests %}Dwell, {% endif %}Evidence, SignSplit, SparseEkf, StepError};
@@ -39,7 +39,7 @@ pub type Estimator = << "SignSplit" if splits else "Hypotheses" >><f32, BRANCHES
 pub type Estimator = SparseEkf<f32, Compact, BRANCHES, STATES>;
 {% endif %}
 /// Its filter, with all that stands around it.
-pub type Filter = LiveFilter<'static, f32, Estimator, STATES, ENTRIES>;
+pub type Filter = LiveFilter<f32, Estimator, Learned<'static, f32>, STATES, ENTRIES>;
 
 /// Time between two steps, s.
 pub const DT_S: f32 = << dt_s >>;
@@ -154,7 +154,7 @@ pub const REST: RestBounds<f32> = RestBounds {
 };
 
 /// Everything of the filter but the estimator.
-pub const PARTS: LiveParts<'static, f32> = LiveParts {
+pub const PARTS: LiveParts<f32, Learned<'static, f32>> = LiveParts {
     rest_reading: REST_READING,
     rested: RESTED,
     dt_s: DT_S,

@@ -6,7 +6,7 @@ use std::fmt::Write;
 
 use ohmstrain_ekf::record::{Operation, Place, Recorded};
 
-use crate::export::literal::Literal;
+use crate::literal::Literal;
 use scopes::Scopes;
 
 /// The lines of a function; what is used once stands where it is used, and what only one way of a choice needs is done on that way.

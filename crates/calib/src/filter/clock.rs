@@ -1,0 +1,32 @@
+use ohmstrain_ekf::StepError;
+
+/// Times of rows.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct Clock {
+    last_s: Option<f64>,
+}
+
+impl Clock {
+    /// The clock at the next row, and the time since the one before, s. None has passed at the first row. Differences of times that
+    /// follow each other are exact, and so are their sums: a pause is the same in one row or in many.
+    ///
+    /// # Errors
+    /// If time is no number or goes backwards.
+    pub(crate) fn at(self, time_s: f64) -> Result<(Self, f64), StepError> {
+        let dt_s = time_s - self.last_s.unwrap_or(time_s);
+        if !dt_s.is_finite() {
+            return Err(StepError::NonFiniteTimeStep);
+        }
+        if dt_s < 0.0 {
+            return Err(StepError::NegativeTimeStep);
+        }
+        Ok((Self { last_s: Some(time_s) }, dt_s))
+    }
+}
+
+/// A length of which multiples are subtracted from such sums without rounding, s: shorter by a nanosecond at most.
+pub(crate) fn floored(length_s: f64) -> f64 {
+    const PARTS: f64 = 1_073_741_824.0;
+    let floored = (length_s * PARTS).floor() / PARTS;
+    if floored > 0.0 { floored } else { length_s }
+}

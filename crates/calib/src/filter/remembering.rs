@@ -1,0 +1,133 @@
+use std::cell::RefCell;
+use std::collections::HashMap;
+
+use ohmstrain_ekf::live::SensorEstimator;
+use ohmstrain_ekf::{Advanced, Estimator, Gaussian, Innovation, Reading, StepError};
+
+/// An estimator that prepares a step once for each length. Recordings repeat a few hundred lengths, to a nanosecond: differences of
+/// decimal times repeat to rounding only.
+pub(crate) struct Remembering<E, P> {
+    estimator: E,
+    prepared: RefCell<Prepared<P>>,
+}
+
+/// Prepared steps by the bits of their length.
+struct Prepared<P> {
+    steps: HashMap<u64, P>,
+    /// The step used last: at a fixed rate it is the next one, too.
+    last: Option<(u64, P)>,
+}
+
+/// A stream whose steps never repeat must not fill the memory.
+const MOST_PREPARED: usize = 4096;
+
+impl<E, P> Remembering<E, P> {
+    pub(crate) fn new(estimator: E) -> Self {
+        Self { estimator, prepared: RefCell::new(Prepared { steps: HashMap::new(), last: None }) }
+    }
+}
+
+impl<P: Copy> Prepared<P> {
+    fn of(&mut self, dt_s: f64, prepare: impl FnOnce(f64) -> P) -> P {
+        let length = dt_s.to_bits();
+        if let Some((last, step)) = self.last
+            && last == length
+        {
+            return step;
+        }
+        if self.steps.len() >= MOST_PREPARED && !self.steps.contains_key(&length) {
+            self.steps.clear();
+        }
+        let step = *self.steps.entry(length).or_insert_with(|| prepare(dt_s));
+        self.last = Some((length, step));
+        step
+    }
+}
+
+impl<E, const N: usize, const L: usize> Estimator<f64, N, L> for Remembering<E, E::Prepared>
+where
+    E: Estimator<f64, N, L>,
+{
+    type State = E::State;
+    type Prepared = E::Prepared;
+
+    fn prepare(&self, dt_s: f64) -> E::Prepared {
+        self.prepared.borrow_mut().of(dt_s, |dt_s| self.estimator.prepare(dt_s))
+    }
+
+    fn length_s(&self, dt_s: f64) -> f64 {
+        (dt_s * 1e9).round() * 1e-9
+    }
+
+    fn longest_step_s(&self) -> f64 {
+        self.estimator.longest_step_s()
+    }
+
+    fn advance(
+        &self,
+        state: &E::State,
+        prepared: &E::Prepared,
+        reading: Option<Reading<f64>>,
+    ) -> Result<Advanced<E::State, f64>, StepError> {
+        self.estimator.advance(state, prepared, reading)
+    }
+
+    fn advance_into(
+        &self,
+        state: &E::State,
+        prepared: &E::Prepared,
+        reading: Option<Reading<f64>>,
+        next: &mut E::State,
+    ) -> Result<Option<Innovation<f64>>, StepError> {
+        self.estimator.advance_into(state, prepared, reading, next)
+    }
+
+    fn smooth_back(
+        &self,
+        filtered: &E::State,
+        prepared: &E::Prepared,
+        reading: Option<Reading<f64>>,
+        next: &E::State,
+    ) -> Result<Option<E::State>, StepError> {
+        self.estimator.smooth_back(filtered, prepared, reading, next)
+    }
+}
+
+impl<E, const N: usize, const L: usize> SensorEstimator<f64, N, L> for Remembering<E, E::Prepared>
+where
+    E: SensorEstimator<f64, N, L>,
+{
+    const BRANCHES: usize = E::BRANCHES;
+
+    fn start(&self, strain: Option<Gaussian<f64>>) -> E::State {
+        self.estimator.start(strain)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::HashMap;
+
+    use super::{MOST_PREPARED, Prepared};
+
+    #[test]
+    fn a_length_is_prepared_once_until_there_are_too_many() {
+        let mut prepared = Prepared { steps: HashMap::new(), last: None };
+        let mut calls = 0;
+        let mut of = |dt_s: f64| {
+            let prepare = |dt_s| {
+                calls += 1;
+                dt_s
+            };
+            let step: f64 = prepared.of(dt_s, prepare);
+            assert_eq!(step, dt_s);
+            calls
+        };
+        assert_eq!([0.1, 0.2, 0.1, 0.1, 0.2, 0.0].map(&mut of), [1, 2, 2, 2, 2, 3]);
+        for k in 0..2 * MOST_PREPARED {
+            of(1.0 + k as f64 * 1e-6);
+        }
+        assert_eq!(of(0.1), 3 + 2 * MOST_PREPARED + 1);
+        assert!(prepared.steps.len() <= MOST_PREPARED);
+    }
+}
