@@ -111,7 +111,8 @@ impl<'a, const B: usize, const N: usize> FixedRate<'a, B, N> {
 
     /// What depends on the length of a step, as the exported program has it.
     pub fn interpolated(&self) -> Numbers<'_, f32> {
-        let known: Vec<(f32, Vec<f32>)> = std::iter::once(self.usual_step_s())
+        let known: Vec<(f32, Vec<f32>)> = [self.usual_step_s(), 0.0]
+            .into_iter()
             .chain(self.whole_steps_s())
             .map(|step_s| (step_s, self.numbers_at(step_s)))
             .collect();

@@ -1,6 +1,6 @@
 //! A calibrated sensor's filter as source code for a microcontroller: C99 with a self-test, or constants in Rust.
 //!
-//! What is exported computes in `f32`, at a fixed rate, operation by operation as the Rust filter does ([`twin`]); the same sensor and interval give the same files.
+//! What is exported computes in `f32`, at a fixed rate, operation by operation as the Rust filter does (`twin`); the same sensor and interval give the same files.
 
 mod arithmetic;
 mod budget;

@@ -87,7 +87,7 @@ impl<'a> FilterBuilder<'a> {
 
     /// What the rested, unstretched sensor reads now, in place of what it read in calibration: another day, or another
     /// sensor of the same make; by no more than a factor of [`FARTHEST_REST`](crate::FARTHEST_REST). Where it is not told, R₀ follows readings that stay outside of the calibration's
-    /// ([`RestFollower`]).
+    /// ([`RestFollower`](ohmstrain_ekf::live::RestFollower)).
     ///
     /// ```
     /// # let text = std::fs::read_to_string("examples/sensor.toml")?;

@@ -22,6 +22,8 @@ pub struct StepConstants {
     evenly: Literal,
     longest_pause_s: Literal,
     usual: Vec<Literal>,
+    /// The numbers of a step without length; `None` is infinite.
+    instant: Vec<Option<Literal>>,
     /// The numbers of the whole steps of a pause.
     whole: Vec<Vec<Literal>>,
     lower_s: Literal,
@@ -57,6 +59,7 @@ impl StepConstants {
     pub fn new<const B: usize, const N: usize>(sensor: &FixedRate<'_, B, N>, names: &[String]) -> Self {
         let table = &sensor.table;
         let narrow = |numbers: &[f64]| numbers.iter().map(|x| Literal(*x as f32)).collect();
+        let finite = |number: f32| number.is_finite().then_some(Literal(number));
         Self {
             names: names.to_vec(),
             usual_s: Literal(sensor.usual_step_s()),
@@ -66,6 +69,7 @@ impl StepConstants {
             evenly: Literal(STEP_EVENLY as f32),
             longest_pause_s: Literal(LONGEST_PAUSE_S as f32),
             usual: literals(&sensor.numbers_at(sensor.usual_step_s())),
+            instant: sensor.numbers_at(0.0).into_iter().map(finite).collect(),
             whole: sensor.whole_steps_s().into_iter().map(|length_s| literals(&sensor.numbers_at(length_s))).collect(),
             lower_s: Literal(table.range.0 as f32),
             upper_s: Literal(table.range.1 as f32),

@@ -133,8 +133,9 @@ static const float EVENLY = << steps.evenly >>f;
 /* A longer pause leaves as little, s. */
 static const float LONGEST_PAUSE_S = << steps.longest_pause_s >>f;
 
-/* The numbers of the usual step, and of whole steps of a pause. */
+/* The numbers of the usual step, of one without length, as the first row is, and of whole steps of a pause. */
 static const float USUAL[STEP] = {<< steps.usual|join("f, ") >>f};
+static const float INSTANT[STEP] = {{% for number in steps.instant %}{% if number is none %}INFINITY{% else %}<< number >>f{% endif %}{% if not loop.last %}, {% endif %}{% endfor %}};
 enum { LENGTHS = << steps.whole|length >> };
 static const float WHOLE[LENGTHS][STEP] = {
 {% for row in steps.whole %}
@@ -371,7 +372,7 @@ static interval of_length(float step_s, float own[STEP])
     int k;
 
     over.step_s = step_s;
-    over.numbers = step_s == USUAL_S ? USUAL : (const float *)0;
+    over.numbers = step_s == USUAL_S ? USUAL : step_s == 0.0f ? INSTANT : (const float *)0;
     for (k = 0; !over.numbers && k < LENGTHS; k++) {
         over.numbers = step_s == length_s ? WHOLE[k] : (const float *)0;
         length_s *= GROWTH;
