@@ -141,18 +141,6 @@ impl<T: Scalar> Guard<T> {
         Ok(Self { influence, ..self })
     }
 
-    /// Whether everything passes as it is.
-    #[must_use]
-    pub fn is_none(&self) -> bool {
-        !self.gate.is_finite() && self.influence == Influence::Full
-    }
-
-    /// Whether a reading with this normalised innovation squared is taken as it is.
-    #[must_use]
-    pub fn takes_whole(&self, nis: T) -> bool {
-        nis >= T::zero() && nis <= self.gate && self.influence.weight(nis) >= T::one()
-    }
-
     /// A step of `estimator` under guard.
     ///
     /// # Errors

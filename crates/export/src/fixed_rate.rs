@@ -78,7 +78,7 @@ impl<'a, const B: usize, const N: usize> FixedRate<'a, B, N> {
         Ok(Self { reference, model, hypotheses: filter.hypotheses, parts, table })
     }
 
-    /// What surrounds it in single precision.
+    /// Its surroundings in single precision.
     pub fn narrow(&self) -> LiveParts<f32, ()> {
         self.parts.live.to()
     }

@@ -3,7 +3,7 @@ use ohmstrain_ekf::live::{DOUBT, Doubts, KNOWN_BEYOND, Protections};
 use ohmstrain_ekf::{Guard, Influence};
 
 use crate::estimate::Scale;
-use crate::filter::{Kernel, Rows};
+use crate::filter::{Kernel, RowWriter};
 use crate::known::in_order;
 use crate::{Error, Filter, Known, LaggedFilter, Sensor};
 
@@ -258,7 +258,7 @@ impl<'a> FilterBuilder<'a> {
         if self.corrects { kind } else { self.sensor.params().filter_of(kind) }
     }
 
-    /// What runs forward.
+    /// The filter that runs forward, with its reports.
     fn kernel(self, kind: EstimatorKind) -> Result<Kernel, Error> {
         let mut filter = self.sensor.build(kind, &self.options()?)?;
         let scale = self.scale()?;
@@ -266,23 +266,23 @@ impl<'a> FilterBuilder<'a> {
             filter.rest(measured).map_err(Error::Step)?;
         }
         let (known, errors) = (in_order(self.known, &scale)?, KnownErrors::new(scale.limits()));
-        Ok(Kernel { filter, rows: Rows { scale, errors }, known })
+        Ok(Kernel { filter, rows: RowWriter { scale, errors }, known })
     }
 
-    /// What leads to the rows, with R₀ as it is told.
+    /// The scale of the rows, with R₀ as it is told.
     pub(crate) fn scale(self) -> Result<Scale, Error> {
         let mut scale = Scale::new(self.sensor)?;
         self.rest_resistance.map_or(Ok(()), |measured| scale.rest_at(measured))?;
         Ok(scale)
     }
 
-    /// How filter or smoother are to run.
+    /// Options of filter and smoother.
     pub(crate) fn options(self) -> Result<Options, Error> {
         let start = self.initial_strain.map_or(Ok(Start::Unknown), |strain| self.start_at(strain))?;
         Ok(Options { start, guard: self.guard()?, protections: self.protections })
     }
 
-    /// What a smoother doubts.
+    /// Doubts of a smoother; `None` if they are turned off.
     pub(crate) fn smoothers_doubts(self, kind: EstimatorKind) -> Result<Option<Doubts<f64>>, Error> {
         let params = self.sensor.params();
         let motion = &params.estimator(params.filter_of(kind)).map_err(CalibrationError::from)?.motion;

@@ -11,19 +11,19 @@ use crate::{Error, Estimate, Reading};
 /// A live filter, and the way to it from readings and from it to rows.
 pub(crate) struct Kernel {
     pub filter: Box<dyn ohmstrain_calib::Filter>,
-    pub rows: Rows,
+    pub rows: RowWriter,
     /// Strains that will be known, in order of time.
     pub known: VecDeque<(f64, Gaussian<f64>)>,
 }
 
 /// From what a filter says to rows.
-pub(crate) struct Rows {
+pub(crate) struct RowWriter {
     pub scale: Scale,
     /// What known strains say of other rows.
     pub errors: KnownErrors,
 }
 
-impl Rows {
+impl RowWriter {
     /// The row of a reading and what the filter says of it.
     fn row(&mut self, row: (f64, Reading), output: &Output) -> Estimate {
         self.errors.restate(row.0, output.estimate.strain);
@@ -172,7 +172,7 @@ pub struct LaggedFilter {
     lag_s: f64,
     /// Time of the last row, s.
     last_s: Option<f64>,
-    /// Rows whose estimates wait for later readings.
+    /// RowWriter whose estimates wait for later readings.
     waiting: VecDeque<(f64, Reading)>,
     /// Estimates that have become due.
     due: Vec<Estimate>,
@@ -188,7 +188,7 @@ impl LaggedFilter {
     /// Takes the reading at `time_s`, as [`Filter::step`] does, and hands out the rows that have become due, in order.
     ///
     /// # Errors
-    /// As [`Filter::step`]. Rows that have become due meanwhile are handed out with the next step.
+    /// As [`Filter::step`]. RowWriter that have become due meanwhile are handed out with the next step.
     ///
     /// ```
     /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
@@ -264,7 +264,7 @@ impl LaggedFilter {
         Ok(())
     }
 
-    /// Takes in what is known by the last row. Rows are handed out as soon as they are due: it is after them.
+    /// Takes in what is known by the last row. RowWriter are handed out as soon as they are due: it is after them.
     fn take_known(&mut self) {
         let Some(time_s) = self.last_s else { return };
         while let Some(known) = next_until(&mut self.kernel.known, time_s) {

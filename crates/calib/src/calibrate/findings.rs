@@ -147,7 +147,7 @@ impl Check<'_> {
         strain
     }
 
-    /// What filter, or smoother, with a law and a correction that know the strains of `training` alone are made of.
+    /// Recipes of filter and smoother, and their correction, from the strains of `training` alone.
     fn estimator_without<'b>(&self, law: &'b LawFit, training: &[Samples]) -> Result<Trained<'b>, CalibrationError> {
         let limits = self.fit.law.law.range;
         let recipe = |kind: EstimatorKind| {
@@ -165,7 +165,7 @@ impl Check<'_> {
     }
 }
 
-/// What filter and smoother are made of, and what their correction has learned.
+/// Recipes of filter and smoother, and their learned correction.
 struct Trained<'a> {
     filter: Recipe<'a>,
     smoother: Recipe<'a>,

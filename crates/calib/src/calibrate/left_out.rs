@@ -21,7 +21,7 @@ pub(crate) struct LeftOut<'a> {
     limits: RangeParams,
 }
 
-/// What a filter for a law that was fitted without a block is made of.
+/// Recipe of a filter for a law that was fitted without a block.
 pub(crate) type Build<'a> = dyn Fn(Fold<'_>) -> Recipe<'_> + 'a;
 
 /// A law that was fitted without a block.

@@ -19,14 +19,14 @@ use crate::{CalibrationError, with_sizes};
 /// Share of the limits' span to which a given initial strain is believed.
 const START_SD: f64 = 1e-3;
 
-/// How a filter is to run.
+/// Start, guard and protections of a filter.
 #[derive(Clone, Copy, Debug)]
 pub struct Options {
-    /// Where it starts.
+    /// The start.
     pub start: Start,
-    /// What it does with outliers.
+    /// Treatment of outliers.
     pub guard: Guard<f64>,
-    /// What protects it from what no calibration has seen, but for the guard.
+    /// Protections from what no calibration has seen; of outliers the guard decides.
     pub protections: Protections,
 }
 
@@ -83,7 +83,7 @@ pub fn build_smoother_with(
     recipe.smoother(needed(learned, kind)?)
 }
 
-/// What has been learned, where the estimator needs it.
+/// The learned correction, if the estimator needs one.
 fn needed(learned: Option<&Arc<Learned>>, kind: EstimatorKind) -> Result<Option<&Arc<Learned>>, CalibrationError> {
     if kind != EstimatorKind::Corrected {
         return Ok(None);
@@ -198,7 +198,7 @@ impl<'a> Recipe<'a> {
     }
 }
 
-/// What every estimator runs with.
+/// Surroundings of an estimator.
 struct With<const B: usize, const N: usize> {
     parts: LiveParts<f64, SharedCorrection>,
     reports: Reports<B, N>,
@@ -255,7 +255,7 @@ impl PhaseFilter {
     }
 }
 
-/// How states are reported.
+/// Scales, limits and settling of the reports.
 fn reports<const B: usize, const N: usize>(
     estimator: &EstimatorParams,
     model: SwitchedModel<f64, B, N>,
@@ -273,7 +273,7 @@ fn reports<const B: usize, const N: usize>(
     }
 }
 
-/// What surrounds a filter of readings R/R₀ of which nothing is known but the limits of the strain.
+/// Surroundings of a filter of readings R/R₀ of which nothing is known but the limits of the strain.
 fn bare_parts(estimator: &EstimatorParams, limits: RangeParams) -> LiveParts<f64, ()> {
     let EstimatorParams { motion, noise, .. } = estimator;
     let unread = Unread::new(motion.rate_time_s, motion.rate_sd_per_s, limits.to_model());
@@ -305,7 +305,7 @@ fn bare_parts(estimator: &EstimatorParams, limits: RangeParams) -> LiveParts<f64
 }
 
 impl SensorParams {
-    /// What surrounds the filter with that estimator, but for a correction.
+    /// Surroundings of the filter with that estimator, without a correction.
     pub(crate) fn live_parts(&self, estimator: &EstimatorParams) -> LiveParts<f64, ()> {
         LiveParts {
             rest_reading: self.rest_reading,

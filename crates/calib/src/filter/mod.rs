@@ -147,7 +147,7 @@ pub struct Output {
     pub phases: Option<[f64; 3]>,
     /// The reading, R/R₀ - 1 of R₀ as it is followed; `None` if it was missing.
     pub reading: Option<Reading<f64>>,
-    /// What there is to doubt.
+    /// Flags that doubts raise.
     pub doubts: Flags,
     /// By what share R₀ has been followed.
     pub rest_off: f64,

@@ -21,7 +21,7 @@ pub struct PortableFilter {
     pub hypotheses: usize,
     /// Its noise, motion and phases.
     pub estimator: EstimatorParams,
-    /// What surrounds it.
+    /// Its surroundings.
     pub parts: LiveParts<f64, ()>,
     /// What corrects its strain.
     pub correction: Option<PortableCorrection>,

@@ -27,7 +27,7 @@ pub(crate) type LiveStep<E, const N: usize, const L: usize> =
 pub(crate) type KeptRow<E, const N: usize, const L: usize> =
     (LiveRow<f64, <E as Estimator<f64, N, L>>::State>, LiveStep<E, N, L>);
 
-/// What filters of one sensor have learned, once for all of them.
+/// The learned correction of a sensor, shared by its filters.
 #[derive(Clone)]
 pub(crate) struct SharedCorrection(pub Arc<OfFilter>);
 
@@ -42,7 +42,7 @@ pub(crate) struct Running<E: SensorEstimator<f64, N, L>, const B: usize, const N
     pub live: Live<E, N, L>,
     pub clock: Clock,
     reports: Reports<B, N>,
-    /// What corrects a smoother.
+    /// The smoother's correction.
     learned: Option<Arc<Learned>>,
     /// The last row.
     last: Option<LiveRow<f64, E::State>>,
@@ -60,12 +60,12 @@ pub(crate) struct Reports<const B: usize, const N: usize> {
     /// Factors on the strain's standard deviation.
     pub filtered_scale: f64,
     pub smoothed_scale: f64,
-    /// Whether doubts widen intervals.
+    /// True if doubts widen intervals.
     pub doubts: bool,
 }
 
 impl<const B: usize, const N: usize> Reports<B, N> {
-    /// What a state says of a row, before any correction.
+    /// The report of a state, before any correction.
     pub(crate) fn row<S: State<f64, N, L>, const L: usize>(
         &self,
         state: &S,
@@ -91,7 +91,7 @@ struct Pending<E: SensorEstimator<f64, N, L>, const N: usize, const L: usize> {
     row: LiveStep<E, N, L>,
 }
 
-/// What was said of a row when it came.
+/// A row as it was reported when it came.
 #[derive(Clone, Copy)]
 struct Said {
     heard: Heard<f64>,
@@ -172,7 +172,7 @@ where
         }
     }
 
-    /// What is said of a row given later readings: mixed with what was said when it came where that is corrected, and in the
+    /// The report of a row given later readings: mixed with what was said when it came where that is corrected, and in the
     /// doubts of then.
     fn lagged_row(&self, state: &E::State, said: &Said) -> Output {
         let scale = self.reports.filtered_scale.max(self.reports.smoothed_scale);

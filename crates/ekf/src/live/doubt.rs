@@ -255,7 +255,7 @@ impl<T: Recordable> Doubts<T> {
         self.unread_s < T::of(NEVER_READ_S)
     }
 
-    /// Whether there has been a row.
+    /// True after the first row.
     pub const fn runs(&self) -> bool {
         self.runs
     }

@@ -1,11 +1,11 @@
 use ohmstrain_model::{MOTION_STATES, StrainRange};
 
 use super::{
-    BESIDE_SHARE, Correct, DOUBT, DoubtParts, Doubts, FARTHEST_REST, Flags, Jumps, Protections, Repeats, RestBounds,
-    RestFollower, SURPRISING_NIS, SensorEstimator, Sieve,
+    BESIDE_SHARE, Correct, DOUBT, Doubts, FARTHEST_REST, Flags, Jumps, LiveParts, Protections, Repeats, RestFollower,
+    SURPRISING_NIS, SensorEstimator, Sieve,
 };
 use crate::clock::check_time_step;
-use crate::correction::{FeatureScale, ReadingFeatures, filter_inputs};
+use crate::correction::{ReadingFeatures, filter_inputs};
 use crate::substeps::{LONGEST_PAUSE_S, Pause, Repeated};
 use crate::{
     Belief, Gaussian, Guard, Influence, PastStep, Reading, ReadingVerdict, Real, Recordable, State, StepError, Streak,
@@ -19,79 +19,6 @@ use crate::{
 /// assert!((0.3 * (1.0 + ohmstrain_ekf::live::KNOWN_BEYOND) - 0.33_f64).abs() < 1e-12);
 /// ```
 pub const KNOWN_BEYOND: f64 = 0.1;
-
-/// What a [`LiveFilter`] is made of beside its estimator: all that a calibration says of the sensor.
-#[derive(Clone, Copy, Debug)]
-pub struct LiveParts<T, C> {
-    /// R₀ of the law, in the unit of the readings.
-    pub rest_reading: T,
-    /// What the rested, unstretched sensor read in calibration: of the day, where R₀ is of the law.
-    pub rested: T,
-    /// Usual time between readings, s.
-    pub dt_s: T,
-    /// The longest step that a pause is divided into, s; the estimator's own, if that is shorter.
-    pub longest_step_s: T,
-    /// Range of the reported strain.
-    pub limits: StrainRange<T>,
-    /// Factor on the standard deviation of the filter's strain.
-    pub strain_sd_scale: T,
-    /// Variance of the model's own noise of R/R₀.
-    pub reading_variance: T,
-    /// Variance of a strain that is known at a start.
-    pub known_variance: T,
-    /// What a reading must be.
-    pub sieve: Sieve<T>,
-    /// When the interval is wider than the filter says.
-    pub doubt: DoubtParts<T>,
-    /// Between which readings R₀ stays.
-    pub rest: RestBounds<T>,
-    /// The scale of the features that the correction sees, and the correction; `None` for the filter's own strain.
-    pub learned: Option<(FeatureScale<T>, C)>,
-}
-
-impl<T, C> LiveParts<T, C> {
-    /// The same with a correction, or without.
-    #[must_use]
-    pub fn with_correction<D>(self, learned: Option<(FeatureScale<T>, D)>) -> LiveParts<T, D> {
-        let Self { rest_reading, rested, dt_s, longest_step_s, limits, strain_sd_scale, .. } = self;
-        let Self { reading_variance, known_variance, sieve, doubt, rest, .. } = self;
-        LiveParts {
-            rest_reading,
-            rested,
-            dt_s,
-            longest_step_s,
-            limits,
-            strain_sd_scale,
-            reading_variance,
-            known_variance,
-            sieve,
-            doubt,
-            rest,
-            learned,
-        }
-    }
-}
-
-impl<C> LiveParts<f64, C> {
-    /// The same in another precision, without a correction.
-    #[must_use]
-    pub fn to<T: Recordable>(&self) -> LiveParts<T, ()> {
-        LiveParts {
-            rest_reading: T::of(self.rest_reading),
-            rested: T::of(self.rested),
-            dt_s: T::of(self.dt_s),
-            longest_step_s: T::of(self.longest_step_s),
-            limits: StrainRange { lower: T::of(self.limits.lower), upper: T::of(self.limits.upper) },
-            strain_sd_scale: T::of(self.strain_sd_scale),
-            reading_variance: T::of(self.reading_variance),
-            known_variance: T::of(self.known_variance),
-            sieve: self.sieve.to(),
-            doubt: self.doubt.to(),
-            rest: self.rest.to(),
-            learned: None,
-        }
-    }
-}
 
 /// No time since the last reading.
 fn at_reading<T: Real, E: SensorEstimator<T, N, L>, C, const N: usize, const L: usize>(
@@ -121,7 +48,7 @@ pub struct LiveRow<T, S> {
     pub stated: Gaussian<T>,
     /// The flags that doubts raise.
     pub doubts: Flags,
-    /// What the row's reading told the filter.
+    /// The row's reading and its use.
     pub heard: Heard<T>,
     /// The state predicted at a row whose reading was not used; at one whose reading was, the state is the filter's
     /// ([`LiveFilter::state`]).
@@ -130,10 +57,10 @@ pub struct LiveRow<T, S> {
     pub pause: Pause<T>,
 }
 
-/// What a reading told the filter.
+/// A reading and its use.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Heard<T> {
-    /// What became of it.
+    /// The verdict on it.
     pub verdict: ReadingVerdict,
     /// The reading, R/R₀ - 1 of R₀ as it is followed; `None` if there was none.
     pub reading: Option<Reading<T>>,
@@ -182,7 +109,7 @@ pub struct LiveFilter<T: Real, E: SensorEstimator<T, N, L>, C, const N: usize, c
     now: Memory<T, E::State>,
 }
 
-/// What changes from step to step of a [`LiveFilter`].
+/// State of a [`LiveFilter`] between steps.
 #[derive(Clone, Copy)]
 pub struct Memory<T, S> {
     /// At the last reading that was used, or whole steps of a pause after it; and the time since then.
@@ -249,12 +176,12 @@ where
         &self.now.state
     }
 
-    /// What a smoother is to take steps back with.
+    /// The estimator with long steps divided, for steps back.
     pub const fn substeps(&self) -> &Substeps<E> {
         &self.estimator
     }
 
-    /// What changes from step to step: to go on from here later ([`Self::return_to`]).
+    /// The state between steps, for [`Self::return_to`].
     pub fn memory(&self) -> Memory<T, E::State> {
         self.now.clone()
     }
@@ -264,7 +191,7 @@ where
         self.now = memory.clone();
     }
 
-    /// Whether its strain is corrected.
+    /// True if the strain is corrected.
     pub const fn is_corrected(&self) -> bool {
         self.parts.learned.is_some()
     }

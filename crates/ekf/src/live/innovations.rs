@@ -7,8 +7,6 @@ pub struct Innovations<T> {
 }
 
 impl<T: Recordable> Innovations<T> {
-    /// For how long they count, s: after so long 37 % of the mean are left.
-    pub const LAST_S: f64 = 20.0;
     /// As much as a normalised innovation squared counts: one alone is an outlier, not a law that does not fit.
     pub const MOST: f64 = 30.0;
 
@@ -16,11 +14,6 @@ impl<T: Recordable> Innovations<T> {
     #[must_use]
     pub fn none() -> Self {
         Self { mean: T::zero() }
-    }
-
-    /// Takes the normalised innovation squared of a reading, `dt_s` seconds after the reading before.
-    pub fn step(&mut self, dt_s: T, nis: T) {
-        self.see((-dt_s / T::of(Self::LAST_S)).exp(), nis);
     }
 
     /// Takes a normalised innovation squared, where `left` is the share of what was known before that is left.

@@ -9,6 +9,7 @@ mod flags;
 mod innovations;
 mod jumps;
 mod learned;
+mod parts;
 mod protections;
 mod rest_follow;
 mod rest_watch;
@@ -17,13 +18,12 @@ mod unread;
 
 pub use doubt::{DOUBT, DoubtNumbers, DoubtParts, Doubts};
 pub use estimator::SensorEstimator;
-pub use filter::{
-    Heard, KNOWN_BEYOND, LiveEstimate, LiveFilter, LiveParts, LiveRow, Memory, may_be_unstretched, reported,
-};
+pub use filter::{Heard, KNOWN_BEYOND, LiveEstimate, LiveFilter, LiveRow, Memory, may_be_unstretched, reported};
 pub use flags::{Flag, Flags};
 pub use innovations::Innovations;
 pub use jumps::{BESIDE_AFTER, BESIDE_SHARE, Jumps, STARTLING_NIS, SURPRISING_NIS};
 pub use learned::{Correct, Learned};
+pub use parts::LiveParts;
 pub use protections::Protections;
 pub use rest_follow::{FARTHEST_REST, FOLLOWING, Following, RestBounds, RestFollower};
 pub use rest_watch::{RestSeen, RestWatch};

@@ -43,7 +43,7 @@ fn rows(params: &SensorParams) -> Vec<Row> {
     (0..3000).map(row).collect()
 }
 
-/// What the twin in double precision says of every row.
+/// Estimates of the twin in double precision, row by row.
 fn twin(sensor: &Sensor, kind: EstimatorKind, rows: &[Row], protections: Protections) -> Vec<Gaussian<f64>> {
     let params = sensor.params();
     let parts = ChipFilter::new(params, &Plan { kind: Some(kind), ..Plan::default() }).unwrap();
@@ -85,7 +85,7 @@ impl Task<f64> for Replayed<'_> {
     }
 }
 
-/// What the library's filter says of every row.
+/// Estimates of the library's filter, row by row.
 fn library(filter: &mut Filter, rows: &[Row]) -> Vec<(f64, f64)> {
     let row = |row: &Row| {
         let estimate = filter.step(row.time_s, row.reading).unwrap();

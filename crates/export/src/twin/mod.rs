@@ -19,7 +19,7 @@ use super::vectors::refused;
 pub use learned::OwnedLearned;
 pub use parts::{Parts, PhaseParts, bits, number};
 
-/// What depends on the length of a step.
+/// Numbers that depend on the length of a step.
 pub struct Numbers<'a, T> {
     /// The kernel's numbers, then nine probabilities of the chain, for a length, s.
     pub of: Box<dyn Fn(T) -> Vec<T> + 'a>,

@@ -32,7 +32,7 @@ pub struct Parts<'a> {
     pub kind: EstimatorKind,
     /// How long phases last, and whether the body rests; `None` for a filter without phases.
     pub phases: Option<PhaseParts>,
-    /// What surrounds the filter. The lengths of its steps are those of single precision.
+    /// Surroundings of the filter. The lengths of its steps are those of single precision.
     pub live: LiveParts<f64, ()>,
     pub correction: Option<&'a PortableCorrection>,
     /// What stands for rows of the correction that were left out.

@@ -1,0 +1,78 @@
+use ohmstrain_model::StrainRange;
+
+use super::{DoubtParts, RestBounds, Sieve};
+use crate::Recordable;
+use crate::correction::FeatureScale;
+
+/// Surroundings of the estimator in a [`LiveFilter`](super::LiveFilter): all that a calibration says of the sensor.
+#[derive(Clone, Copy, Debug)]
+pub struct LiveParts<T, C> {
+    /// R₀ of the law, in the unit of the readings.
+    pub rest_reading: T,
+    /// What the rested, unstretched sensor read in calibration: of the day, where R₀ is of the law.
+    pub rested: T,
+    /// Usual time between readings, s.
+    pub dt_s: T,
+    /// The longest step that a pause is divided into, s; the estimator's own, if that is shorter.
+    pub longest_step_s: T,
+    /// Range of the reported strain.
+    pub limits: StrainRange<T>,
+    /// Factor on the standard deviation of the filter's strain.
+    pub strain_sd_scale: T,
+    /// Variance of the model's own noise of R/R₀.
+    pub reading_variance: T,
+    /// Variance of a strain that is known at a start.
+    pub known_variance: T,
+    /// What a reading must be.
+    pub sieve: Sieve<T>,
+    /// When the interval is wider than the filter says.
+    pub doubt: DoubtParts<T>,
+    /// Between which readings R₀ stays.
+    pub rest: RestBounds<T>,
+    /// The scale of the features that the correction sees, and the correction; `None` for the filter's own strain.
+    pub learned: Option<(FeatureScale<T>, C)>,
+}
+
+impl<T, C> LiveParts<T, C> {
+    /// The same with a correction, or without.
+    #[must_use]
+    pub fn with_correction<D>(self, learned: Option<(FeatureScale<T>, D)>) -> LiveParts<T, D> {
+        let Self { rest_reading, rested, dt_s, longest_step_s, limits, strain_sd_scale, .. } = self;
+        let Self { reading_variance, known_variance, sieve, doubt, rest, .. } = self;
+        LiveParts {
+            rest_reading,
+            rested,
+            dt_s,
+            longest_step_s,
+            limits,
+            strain_sd_scale,
+            reading_variance,
+            known_variance,
+            sieve,
+            doubt,
+            rest,
+            learned,
+        }
+    }
+}
+
+impl<C> LiveParts<f64, C> {
+    /// The same in another precision, without a correction.
+    #[must_use]
+    pub fn to<T: Recordable>(&self) -> LiveParts<T, ()> {
+        LiveParts {
+            rest_reading: T::of(self.rest_reading),
+            rested: T::of(self.rested),
+            dt_s: T::of(self.dt_s),
+            longest_step_s: T::of(self.longest_step_s),
+            limits: StrainRange { lower: T::of(self.limits.lower), upper: T::of(self.limits.upper) },
+            strain_sd_scale: T::of(self.strain_sd_scale),
+            reading_variance: T::of(self.reading_variance),
+            known_variance: T::of(self.known_variance),
+            sieve: self.sieve.to(),
+            doubt: self.doubt.to(),
+            rest: self.rest.to(),
+            learned: None,
+        }
+    }
+}
