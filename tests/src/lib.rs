@@ -5,6 +5,7 @@ mod draws;
 pub mod faults;
 mod flow;
 pub mod own_law;
+pub mod particles;
 pub mod sweep;
 
 pub use draws::{Draws, square_root};

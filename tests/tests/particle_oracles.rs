@@ -2,8 +2,9 @@
 //! root of the number of particles.
 
 use nalgebra::{SMatrix, SVector};
-use ohmstrain_ekf::{Belief, Dwell, Evidence, ParticleCloud, Particles, Reading};
+use ohmstrain_ekf::{Belief, Dwell, Evidence, Reading};
 use ohmstrain_model::{Branch, Gauge, ModelNoise, Motion, Phase, SensorLaw, StrainRange, SwitchedModel};
+use ohmstrain_tests::particles::{ParticleCloud, Particles};
 use rand_chacha::ChaCha12Rng;
 use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};

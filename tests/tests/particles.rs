@@ -1,11 +1,9 @@
 //! The particle filter beyond linear models: on data from its own process it is calibrated, also after long holds; where
 //! directions matter it agrees with Gaussians cut by direction; stops stop; and bad input is refused.
 
-use ohmstrain_ekf::{
-    Belief, Dwell, Estimate, Evidence, Mixture, ParticleCloud, Particles, Reading, Settling, SignSplit, State,
-    StepError,
-};
+use ohmstrain_ekf::{Belief, Dwell, Estimate, Evidence, Mixture, Reading, Settling, SignSplit, State, StepError};
 use ohmstrain_model::{Phase, Scalar, StrainRange};
+use ohmstrain_tests::particles::{ParticleCloud, Particles};
 use ohmstrain_tests::sensor;
 use rand_chacha::ChaCha12Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
@@ -267,26 +265,4 @@ fn tempering_takes_weight_from_readings() {
     // A hundred weights of 1/100 add up to one within a hundred roundings.
     assert!((step.effective_count - 100.0).abs() < 1e-11 && step.log_likelihood.abs() < 1e-13);
     assert!(step.posterior.moments().mean[4] > 0.0 && cloud.moments().mean[4] == 0.0);
-}
-
-/// In `f32` the same particles are drawn, but roundings soon resample them otherwise: two runs of 2000 particles.
-#[test]
-fn single_precision_is_enough() {
-    fn run<T: Scalar>() -> (f64, f64) {
-        let of = |x: T| nalgebra::try_convert::<T, f64>(x).unwrap();
-        let model = sensor::<T, 2, 5>();
-        let prepared = model.prepare(T::of(DT_S));
-        let filter = Particles::new(model, None, within(-0.1, 0.45), 2000, 1);
-        let mut cloud: ParticleCloud<T, 5, 15> = filter.start(&Belief::initial(&model), Phase::Extend);
-        let mut process = Process::new(None, 11);
-        for _ in 0..100 {
-            let reading = Some(Reading::from(T::of(process.step())));
-            cloud = filter.step_prepared(&cloud, &prepared, T::of(DT_S), reading).unwrap().posterior;
-        }
-        let moments = cloud.moments();
-        (of(moments.mean[0]), of(moments.covariance[(0, 0)].sqrt()))
-    }
-    let (double, single) = (run::<f64>(), run::<f32>());
-    // Means of N particles scatter by σ √(C/N), C = 150 as on the linear model: 0.27 σ each, 0.39 σ their difference.
-    assert!((double.0 - single.0).abs() < 4.0 * 0.39 * double.1, "{double:?} {single:?}");
 }

@@ -74,7 +74,6 @@ impl Filter for Corrected {
             limits: StrainRange { lower: -9.0, upper: 9.0 },
             strain_variance: 0.7,
             variance_factor: 1.1,
-            consensus: true,
         };
         let inputs = std::array::from_fn(|i| reading * (1.0 + 0.1 * i as f64));
         self.strain = correction.correct(&inputs, Gaussian { mean: inputs[0], variance: 0.1 }, 1.0).strain.mean;

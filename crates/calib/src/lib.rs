@@ -38,9 +38,7 @@ pub use calibrate::with_prior::calibrate_with_prior;
 pub use calibrate::{Calibration, Stage, calibrate};
 pub use correction::owned::{OwnedCorrection, OwnedProcess, OwnedRows, OwnedSimulated, OwnedTriangle};
 pub use error::CalibrationError;
-pub use filter::build::{
-    HISTORIES, HYPOTHESES, Options, PARTICLE_SEED, build_filter, build_filter_with, build_smoother_with,
-};
+pub use filter::build::{HISTORIES, HYPOTHESES, Options, build_filter, build_filter_with, build_smoother_with};
 pub use filter::known::{KnownErrors, KnownStrain, MOST_KNOWN};
 pub use filter::learned::Learned;
 pub use filter::portable::{PortableCorrection, PortableFilter};
@@ -60,7 +58,7 @@ pub use params::estimator::{
 };
 pub use params::findings::{ErrorBudget, Findings, Scores, Seen};
 pub use params::law::{BranchParams, GaugeParams, LawParameter, LawParams};
-pub use params::recipe::{Parts, RECIPE, Recipe};
+pub use params::recipe::{RECIPE, Recipe};
 pub use params::static_cubic::StaticCubic;
 pub use params::summary::{Limit, Summary, TestedSummary};
 pub use params::validate::FieldError;

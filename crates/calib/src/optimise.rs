@@ -1,52 +1,120 @@
-use std::cell::RefCell;
-
-use argmin::core::{CostFunction, Executor, State};
-use argmin::solver::neldermead::NelderMead;
-
-use crate::CalibrationError;
-
-/// Nelder-Mead from `start` with a first simplex of side `step` in every direction, at most `iterations` steps; the best
-/// point.
-///
-/// A cost that is not finite counts as very bad.
-pub(crate) fn polish(
-    cost: impl FnMut(&[f64]) -> f64,
-    start: &[f64],
-    step: f64,
-    iterations: u64,
-) -> Result<Vec<f64>, CalibrationError> {
-    let mut simplex = vec![start.to_vec()];
-    for i in 0..start.len() {
-        let mut corner = start.to_vec();
-        corner[i] += step;
-        simplex.push(corner);
-    }
-    let failed = |error: argmin::core::Error| CalibrationError::Optimiser(error.to_string());
-    let solver = NelderMead::new(simplex).with_sd_tolerance(1e-7).map_err(failed)?;
-    let result = Executor::new(Problem { cost: RefCell::new(cost) }, solver)
-        .configure(|state| state.max_iters(iterations))
-        .run()
-        .map_err(failed)?;
-    Ok(result.state().get_best_param().cloned().unwrap_or_else(|| start.to_vec()))
-}
+//! Minimisation without derivatives.
+//!
+//! Source: J. A. Nelder, R. Mead, A simplex method for function minimization, *The Computer Journal* 7 (1965) 308–313.
 
 /// Stands for a cost that cannot be computed.
 const VERY_BAD: f64 = 1e9;
+/// The search ends where the costs of the corners have a smaller standard deviation.
+const SETTLED: f64 = 1e-7;
+/// Factors by which a corner is moved, from the centroid of the others.
+const REFLECTION: f64 = -1.0;
+const EXPANSION: f64 = 2.0;
+const CONTRACTION: f64 = 0.5;
+const SHRINKAGE: f64 = 0.5;
 
-fn finite(cost: f64) -> f64 {
-    if cost.is_finite() { cost } else { VERY_BAD }
+/// The best point that Nelder-Mead finds from `start` with a first simplex of side `step` in every direction, in at most
+/// `iterations` iterations. A cost that is not finite counts as very bad.
+pub(crate) fn nelder_mead(mut cost: impl FnMut(&[f64]) -> f64, start: &[f64], step: f64, iterations: u64) -> Vec<f64> {
+    let mut corner = |point: Vec<f64>| {
+        let cost = cost(&point);
+        Corner { point, cost: if cost.is_finite() { cost } else { VERY_BAD } }
+    };
+    let moved = (0..start.len()).map(|i| {
+        let mut point = start.to_vec();
+        point[i] += step;
+        point
+    });
+    let mut simplex: Vec<Corner> = std::iter::once(start.to_vec()).chain(moved).map(&mut corner).collect();
+    sort(&mut simplex);
+    for _ in 0..iterations {
+        if spread(&simplex) < SETTLED {
+            break;
+        }
+        if let Some(better) = improved(&simplex, &mut corner) {
+            simplex.pop();
+            simplex.push(better);
+        } else {
+            let best = simplex[0].point.clone();
+            for other in &mut simplex[1..] {
+                *other = corner(from(&best, &other.point, SHRINKAGE));
+            }
+        }
+        sort(&mut simplex);
+    }
+    simplex.swap_remove(0).point
 }
 
-/// The optimiser wants `&self`; a cost may count its calls.
-struct Problem<F> {
-    cost: RefCell<F>,
+/// A point with its cost.
+struct Corner {
+    point: Vec<f64>,
+    cost: f64,
 }
 
-impl<F: FnMut(&[f64]) -> f64> CostFunction for Problem<F> {
-    type Param = Vec<f64>;
-    type Output = f64;
+/// Best corner first; ties keep their order.
+fn sort(simplex: &mut [Corner]) {
+    simplex.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+}
 
-    fn cost(&self, point: &Vec<f64>) -> Result<f64, argmin::core::Error> {
-        Ok(finite((self.cost.borrow_mut())(point)))
+/// `factor` times the way from `origin` to `point`.
+fn from(origin: &[f64], point: &[f64], factor: f64) -> Vec<f64> {
+    origin.iter().zip(point).map(|(origin, point)| origin + (point - origin) * factor).collect()
+}
+
+/// The corner that takes the place of the worst one; `None` where the simplex has to shrink.
+fn improved(simplex: &[Corner], mut corner: impl FnMut(Vec<f64>) -> Corner) -> Option<Corner> {
+    let [best, .., worst] = simplex else { return None };
+    let second_worst = &simplex[simplex.len() - 2];
+    let centroid = centroid(&simplex[..simplex.len() - 1]);
+    let reflected = corner(from(&centroid, &worst.point, REFLECTION));
+    if reflected.cost < best.cost {
+        let expanded = corner(from(&centroid, &reflected.point, EXPANSION));
+        return Some(if expanded.cost < reflected.cost { expanded } else { reflected });
+    }
+    if reflected.cost < second_worst.cost {
+        return Some(reflected);
+    }
+    if reflected.cost < worst.cost {
+        let outside = corner(from(&centroid, &reflected.point, CONTRACTION));
+        return Some(outside).filter(|outside| outside.cost <= reflected.cost);
+    }
+    let inside = corner(from(&centroid, &worst.point, CONTRACTION));
+    Some(inside).filter(|inside| inside.cost < worst.cost)
+}
+
+fn centroid(corners: &[Corner]) -> Vec<f64> {
+    let mut sum = corners[0].point.clone();
+    for corner in &corners[1..] {
+        sum.iter_mut().zip(&corner.point).for_each(|(sum, x)| *sum += x);
+    }
+    let share = 1.0 / corners.len() as f64;
+    sum.into_iter().map(|sum| sum * share).collect()
+}
+
+/// Standard deviation of the costs.
+fn spread(simplex: &[Corner]) -> f64 {
+    let n = simplex.len() as f64;
+    let mean = simplex.iter().map(|corner| corner.cost).sum::<f64>() / n;
+    let squares = simplex.iter().map(|corner| (corner.cost - mean).powi(2)).sum::<f64>();
+    (1.0 / (n - 1.0) * squares).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::nelder_mead;
+
+    /// The minimum at (1, 1) lies at the end of a bent valley.
+    #[test]
+    fn the_minimum_of_rosenbrocks_function_is_found() {
+        let cost = |x: &[f64]| (1.0 - x[0]).powi(2) + 100.0 * (x[1] - x[0] * x[0]).powi(2);
+        let best = nelder_mead(cost, &[-1.2, 1.0], 0.5, 500);
+        // Costs that differ by 1e-7 are points apart by its root over that of the least curvature, about 0.4.
+        assert!(best.iter().all(|x| (x - 1.0).abs() < 1e-3), "{best:?}");
+    }
+
+    #[test]
+    fn a_cost_that_cannot_be_computed_is_avoided() {
+        let cost = |x: &[f64]| if x[0] < 0.0 { f64::NAN } else { (x[0] - 0.5).powi(2) };
+        let best = nelder_mead(cost, &[0.1], -0.3, 200);
+        assert!((best[0] - 0.5).abs() < 1e-3, "{best:?}");
     }
 }

@@ -108,7 +108,6 @@ impl CliError {
 impl From<LibraryError> for CliError {
     fn from(error: LibraryError) -> Self {
         match error {
-            LibraryError::NoSmoother => Self::Arguments("--estimator: this one has no smoother".into()),
             LibraryError::KnownStrain { quantity, name, .. } => {
                 let flag = if name == "known strain" { "--known" } else { "--initial-strain" };
                 let refused = error.to_string().replacen(name, flag, 1);

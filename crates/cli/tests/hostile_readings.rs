@@ -80,12 +80,3 @@ fn a_stuck_reading_is_flagged_and_not_believed() {
         assert!(covered as f64 > 0.9 * frozen.len() as f64, "{command}: {covered} of {}", frozen.len());
     }
 }
-
-#[test]
-fn particles_do_not_look_back() {
-    let bench = Bench::calibrated();
-    let run =
-        bench.run(&["filter", "trace.csv", "--sensor", "sensor.toml", "--estimator", "particles", "--lag-s", "1"]);
-    assert_eq!((run.code, run.stdout.as_str()), (Some(2), ""), "{}", run.stderr);
-    assert!(run.stderr.contains("no smoother"), "{}", run.stderr);
-}

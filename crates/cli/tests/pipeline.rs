@@ -97,7 +97,7 @@ fn the_json_of_evaluate_has_the_fields_that_scripts_rely_on() {
     let json: Value = serde_json::from_str(&printed).unwrap();
     let sensor: toml::Table = toml::from_str(&bench.read("sensor.toml")).unwrap();
     let fields = |value: &Value| value.as_object().unwrap().keys().cloned().collect::<Vec<_>>();
-    let names = ["commit", "made_by", "particle_seed", "recordings", "schema", "simulated_seed", "summary"];
+    let names = ["commit", "made_by", "recordings", "schema", "simulated_seed", "summary"];
     assert_eq!(fields(&json), names);
     assert_eq!(json["recordings"].as_array().unwrap().len(), 2);
     // In the order of the alphabet, as the parsed object has them.

@@ -99,6 +99,12 @@ pub trait State<T: Scalar, const N: usize, const L: usize>: Clone {
     fn beside(&self, _other: &Self, _share: T) -> Self {
         self.clone()
     }
+
+    /// The same state, of which steps keep at most so many hypotheses; what is no mixture stays as it is.
+    #[must_use]
+    fn keeping(self, _most: usize) -> Self {
+        self
+    }
 }
 
 /// What one step of any estimator says.

@@ -5,15 +5,13 @@
 //!
 //! [`Ekf`] (or, unscented, [`Ukf`]) keeps one Gaussian and has a smoother. [`Imm`], [`SignSplit`] and
 //! [`Hypotheses`] keep a [`Mixture`] of hypotheses about the phase, because stretching and releasing look alike.
-//! `Particles` (feature `particles`) samples the motion instead: slow, and the reference for all of them.
 //! [`correction`] makes a calibrated filter's strain better by what was learned in calibration.
 //!
 //! Models are anything that implements [`Dynamics`] and [`Channel`];
 //! [`SwitchedModel`](ohmstrain_model::SwitchedModel) does.
 //!
 //! # Policy
-//! - `no_std`, no heap (the feature `particles` adds the particle filter), no unsafe
-//!   code, no panic.
+//! - `no_std`, no heap, no unsafe code, no panic.
 //! - A missing reading is a prediction. A step of zero seconds is an update without a prediction. A NaN or infinite
 //!   reading, a negative step and a variance that is not positive are [`StepError`]s.
 //! - Everything computed is returned: prior, innovation, its variance, log-likelihood, gain.
@@ -21,7 +19,7 @@
 //!   filters on the kernel, which say so.
 //!
 //! # Features
-//! `particles` (on by default) is named above; `simd` steps four hypotheses at once where the processor has AVX2; `adskalman` hands linearised steps to that crate. Off by default and
+//! `simd` steps four hypotheses at once where the processor has AVX2; `adskalman` hands linearised steps to that crate. Off by default and
 //! without std:
 //! - `serde`: [`Belief`], [`Estimate`], [`Gaussian`], readings, innovations, verdicts of readings and errors as plain data. A
 //!   belief that comes back is not checked; the step that it cannot take is refused. Mixtures, and what is made
@@ -71,8 +69,6 @@ mod kernel;
 mod linear;
 pub mod live;
 mod mixture;
-#[cfg(feature = "particles")]
-mod particles;
 #[cfg(feature = "record")]
 pub mod record;
 mod residual;
@@ -98,8 +94,6 @@ pub use kernel::{
 };
 pub use linear::{Frozen, LinearFilter};
 pub use mixture::{Dwell, Evidence, Hypotheses, Imm, Mixture, MixtureResidual, PhaseMixture, Share, SignSplit};
-#[cfg(feature = "particles")]
-pub use particles::{Particle, ParticleCloud, ParticleStep, Particles};
 pub use residual::{LogLikelihood, Residual};
 pub use smooth::{PastStep, rts_step, smooth_back_through};
 pub use substeps::{

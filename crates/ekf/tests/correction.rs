@@ -137,7 +137,6 @@ macro_rules! correction {
             limits: StrainRange { lower: -2.0, upper: 2.0 },
             strain_variance: 0.7,
             variance_factor: 0.6,
-            consensus: true,
         };
     };
 }

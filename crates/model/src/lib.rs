@@ -30,7 +30,6 @@ mod joint;
 mod law;
 mod motion;
 mod noise;
-mod path;
 mod phase;
 mod response;
 mod reversal;

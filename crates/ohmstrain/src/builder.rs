@@ -246,9 +246,6 @@ impl<'a> FilterBuilder<'a> {
             return Err(Error::NotPositive { name: "lag", found: lag_s });
         }
         let kind = self.kind();
-        if kind.smoother() != kind {
-            return Err(Error::NoSmoother);
-        }
         Ok(LaggedFilter::new(self.kernel(kind)?, lag_s))
     }
 

@@ -109,9 +109,6 @@ pub enum Error {
         /// What is wrong with it.
         source: StepError,
     },
-    /// The estimator cannot look back.
-    #[error("the estimator has no smoother")]
-    NoSmoother,
 }
 
 impl Error {

@@ -77,7 +77,7 @@ pub use validity::{Beyond, Extrapolation, ValidityWatch};
 #[doc(no_inline)]
 pub use ohmstrain_calib::{
     CalibrationError, Distrusted, Doubt, EstimatorKind, FieldError, Findings, GaugeFamily, Identifiability,
-    JointParams, Lag, LagError, Parts, Quantity, ReadingUnit, SamplesError, ScoredRow, Scores, SensorParams, Stage,
+    JointParams, Lag, LagError, Quantity, ReadingUnit, SamplesError, ScoredRow, Scores, SensorParams, Stage,
 };
 pub use ohmstrain_ekf::live::{FARTHEST_REST, Flag, Flags, KNOWN_BEYOND};
 #[doc(no_inline)]

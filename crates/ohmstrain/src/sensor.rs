@@ -1,7 +1,7 @@
 use std::sync::Arc;
 
 use ohmstrain_calib::{
-    EstimatorKind, JointParams, Learned, Options, Parts, Quantity, SensorParams, Smoother, build_filter_with,
+    EstimatorKind, JointParams, Learned, Options, Quantity, SensorParams, Smoother, build_filter_with,
     build_smoother_with,
 };
 use ohmstrain_model::Joint;
@@ -90,22 +90,6 @@ impl Sensor {
         let sensor = Self { learned: Learned::of(&params), params };
         sensor.build(kind.unwrap_or(sensor.params.default_estimator), &Options::plain())?;
         Ok(sensor)
-    }
-
-    /// The same sensor with some parts of its learned correction only, to see what the others bring. Nothing is calibrated again but
-    /// the factor on the interval.
-    ///
-    /// ```
-    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
-    /// use ohmstrain::{Parts, Sensor};
-    ///
-    /// let sensor = Sensor::from_toml(&text)?;
-    /// assert_eq!(sensor.with_parts(Parts { simulated: false, ..Parts::ALL }), sensor);
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
-    #[must_use]
-    pub fn with_parts(&self, parts: Parts) -> Self {
-        Self { learned: Learned::of_parts(&self.params, parts), params: self.params.clone() }
     }
 
     /// A filter that shares what the others have learned.

@@ -102,7 +102,7 @@ impl FilterBuilder<'_> {
         mut take: impl FnMut(Range<usize>, &[Estimate]) -> Result<(), E>,
     ) -> Result<(), E> {
         let starts_known = self.initial_strain.is_some();
-        let kind = self.kind().smoother();
+        let kind = self.kind();
         if kind == EstimatorKind::Corrected {
             self.sensor.check_smoother()?;
         }
@@ -150,6 +150,6 @@ impl FilterBuilder<'_> {
             estimates.reverse();
             take(rows, &estimates)?;
         }
-        if first == 0 { Ok(()) } else { Err(Error::NoSmoother.into()) }
+        if first == 0 { Ok(()) } else { Err(Error::Step(StepError::NoSmoother).into()) }
     }
 }

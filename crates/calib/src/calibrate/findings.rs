@@ -161,7 +161,7 @@ impl Check<'_> {
             None
         };
         let learned = correction.map(|correction| Learned::new(correction, limits));
-        Ok(Trained { filter, smoother: recipe(self.filter.smoother())?, learned })
+        Ok(Trained { filter, smoother: recipe(self.filter)?, learned })
     }
 }
 

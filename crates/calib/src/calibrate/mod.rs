@@ -132,7 +132,7 @@ fn handicap(kind: EstimatorKind) -> f64 {
 /// stand far from their neighbours, or from the law, take no part ([`screen`]).
 ///
 /// Estimators are tried with a law for each of `structures` and each strength of ridge; the pair with the best score on
-/// blocks that the law has not seen gives the law. To that law every one of them, what smooths in its place, and the extended
+/// blocks that the law has not seen gives the law. To that law every one of them and the extended
 /// Kalman filter in any case, is then fitted, and the best of `kinds` becomes
 /// the default. Near ties go to the one that keeps hypotheses. [`EstimatorKind::Corrected`] is the default where it is asked
 /// for; what it corrects is learned last, from the same rows.
@@ -174,9 +174,8 @@ pub(crate) fn calibrate_once(
     let corrected = cheapest(surveyed.iter().filter(|one| asked.candidates.contains(&one.kind))).map(|one| one.kind);
     // One filter is corrected: no other one needs to be refined.
     let wanted = EstimatorKind::distinct(corrected.into_iter().chain(asked.named.iter().copied()));
-    let smoothers = wanted.iter().map(|kind| kind.smoother());
     let mut estimators = BTreeMap::new();
-    for kind in EstimatorKind::distinct(wanted.iter().copied().chain(smoothers).chain([EstimatorKind::Ekf])) {
+    for kind in EstimatorKind::distinct(wanted.iter().copied().chain([EstimatorKind::Ekf])) {
         let known = surveyed.iter().find(|one| one.kind == kind && std::ptr::eq(one.law, fit));
         let params = refined(recordings, (fit, stats), (kind, prior), known, &mut || steps.evaluated())?;
         estimators.insert(kind, params);

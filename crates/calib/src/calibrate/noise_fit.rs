@@ -156,10 +156,10 @@ impl<'a> NoiseProblem<'a> {
         let mut cost = |point: &[f64]| {
             evaluated();
             let params = self.params(point);
-            left_out.score(&|fold| self.recipe(self.kind.tuned_as(), fold, params)) + self.pull(point)
+            left_out.score(&|fold| self.recipe(self.kind, fold, params)) + self.pull(point)
         };
         let from = from.map_or(&self.untuned, |tuned| &tuned.point);
-        let point = optimise::polish(&mut cost, from, search.side, search.steps)?;
+        let point = optimise::nelder_mead(&mut cost, from, search.side, search.steps);
         Ok(Tuned { cost: cost(&point), point })
     }
 
@@ -241,7 +241,7 @@ impl<'a> NoiseProblem<'a> {
         let fine = SHARE_OF_RESIDUAL * root_mean_square(&known).max(1e-9);
         let stats = &self.stats;
         let mut start = vec![root_mean_square(&left_out).max(1e-9), BASELINE_TIME_S, fine, fine];
-        start.extend(match self.kind.tuned_as() {
+        start.extend(match self.kind {
             EstimatorKind::Imm | EstimatorKind::Hypotheses => {
                 [0.5 * stats.speed, stats.rate_time_s, 3.0 * stats.strain_sd]
             }
@@ -256,7 +256,7 @@ impl<'a> NoiseProblem<'a> {
     fn params(&self, point: &[f64]) -> EstimatorParams {
         let p: Vec<f64> = point.iter().map(|x| x.clamp(-25.0, 15.0).exp()).collect();
         let strain_mean = self.of_make.map_or(self.stats.strain_mean, |prior| prior.strain_mean);
-        let kind = self.kind.tuned_as();
+        let kind = self.kind;
         let motion = MotionParams { rate_sd_per_s: p[4], rate_time_s: p[5], strain_mean, strain_sd: p[6] };
         let phases = kind.has_phases().then(|| PhaseParams {
             hold_time_s: p[7],

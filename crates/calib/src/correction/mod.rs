@@ -15,7 +15,6 @@ use owned::{OwnedCorrection, OwnedProcess};
 use crate::order::extent;
 use crate::params::RangeParams;
 use crate::params::correction::{CorrectorParams, ProcessParams, SIDES, SMOOTHER_INPUTS, SimulatedParams};
-use crate::params::recipe::Parts;
 use crate::sd_scale::{joint_scale_of, sd_scale_up_to};
 use criterion::Criterion;
 use gaussian_process::{GaussianProcess, LeftOutRow, Lessons, inducing_rows, relevance};
@@ -29,8 +28,6 @@ const LEAST_DIRECT: f64 = 0.5;
 const LEAST_RESIDUAL: f64 = 0.07;
 /// Widest factor on a process' deviation: block left out of recordings that hold still for long are worlds of their own.
 const WIDEST_PROCESS: f64 = 3.0;
-/// Factor on the variance of a process that is switched off: its weight is nothing beside any other.
-const SILENT: f64 = 1e30;
 
 /// What a correction learns from: inputs with the filter's outputs first, the true strain, and times, s, row by row.
 #[derive(Clone, Copy)]
@@ -88,16 +85,6 @@ impl Which {
             Which::Residual => LEAST_RESIDUAL,
             _ => LEAST_DIRECT,
         }
-    }
-
-    /// A factor on its variance, by whether it is heard.
-    const fn quiet(self, parts: Parts) -> f64 {
-        let is_heard = match self {
-            Which::Direct => parts.direct,
-            Which::Past | Which::Future => parts.one_sided,
-            Which::Residual => parts.residual,
-        };
-        if is_heard { 1.0 } else { SILENT }
     }
 
     fn params(self, of: &CorrectorParams) -> Option<&ProcessParams> {
@@ -200,40 +187,18 @@ impl CorrectorParams {
         let (direct, residual) = (chosen(Which::Direct)?, chosen(Which::Residual)?);
         let one_sided = ONE_SIDED[..S].iter().map(|side| chosen(*side)).collect::<Option<_>>()?;
         let of = Self { sd_scale: 1.0, direct, residual, one_sided };
-        Some(Self { sd_scale: of.scale_of::<_, S>(prepared, last, Parts::ALL)?, ..of })
+        Some(Self { sd_scale: of.scale_of::<_, S>(prepared, last)?, ..of })
     }
 
-    /// The factor on the deviation of what some of its parts say together.
-    fn scale_of<const D: usize, const S: usize>(
-        &self,
-        prepared: &Prepared<D>,
-        last: &[Gaussian<f64>],
-        parts: Parts,
-    ) -> Option<f64> {
-        let said = |which: Which| {
-            let mut said = prepared.left_out(which, which.params(self)?)?;
-            said.iter_mut().for_each(|said| said.variance *= which.quiet(parts));
-            Some(said)
-        };
+    /// The factor on the deviation of what its processes say together.
+    fn scale_of<const D: usize, const S: usize>(&self, prepared: &Prepared<D>, last: &[Gaussian<f64>]) -> Option<f64> {
+        let said = |which: Which| prepared.left_out(which, which.params(self)?);
         let (direct, residual) = (said(Which::Direct)?, said(Which::Residual)?);
         let sides: Vec<_> = ONE_SIDED[..S].iter().map(|side| said(*side)).collect::<Option<_>>()?;
         let one_sided = |k: usize| std::array::from_fn::<_, S, _>(|side| sides[side][k]);
-        let together = |k: usize| parts_together(parts, direct[k], residual[k], one_sided(k));
+        let together = |k: usize| consensus(direct[k], residual[k], one_sided(k));
         let said: Vec<Gaussian<f64>> = (0..prepared.rows.len()).map(together).collect();
-        Some(scale_beside(&said, if parts.simulated { last } else { &[] }, prepared.examples.strain))
-    }
-}
-
-fn parts_together<const S: usize>(
-    parts: Parts,
-    direct: Gaussian<f64>,
-    residual: Gaussian<f64>,
-    one_sided: [Gaussian<f64>; S],
-) -> Gaussian<f64> {
-    if parts.consensus {
-        consensus(direct, residual, one_sided)
-    } else {
-        mixture([direct, residual].into_iter().chain(one_sided))
+        Some(scale_beside(&said, last, prepared.examples.strain))
     }
 }
 
@@ -262,42 +227,6 @@ pub(crate) fn learned_with_simulated(
 ) -> Option<OwnedCorrection<f64, FILTER_INPUTS>> {
     let simulated = Prepared::new(examples).simulated(simulated)?;
     Some(OwnedCorrection { simulated: Some(simulated), ..learned(params, examples)? })
-}
-
-impl OwnedCorrection<f64, FILTER_INPUTS> {
-    /// The same of some of its parts, with the factor that their interval then needs.
-    pub(crate) fn of_parts(
-        self,
-        parts: Parts,
-        params: &CorrectorParams,
-        examples: Examples<FILTER_INPUTS>,
-    ) -> Option<Self> {
-        let prepared = Prepared::new(examples);
-        let heard = self.simulated.as_ref().map_or_else(Vec::new, |of| prepared.heard(of));
-        let simulated = self.simulated.clone().filter(|_| parts.simulated);
-        Some(Self { simulated, ..self.quietened(parts, params.scale_of::<_, 0>(&prepared, &heard, parts)?) })
-    }
-}
-
-impl OwnedCorrection<f64, SMOOTHER_INPUTS, SIDES> {
-    /// The same of some of its parts, with the factor that their interval then needs.
-    pub(crate) fn of_parts(
-        self,
-        parts: Parts,
-        params: &CorrectorParams,
-        examples: Examples<SMOOTHER_INPUTS>,
-    ) -> Option<Self> {
-        Some(self.quietened(parts, params.scale_of::<_, SIDES>(&Prepared::new(examples), &[], parts)?))
-    }
-}
-
-impl<const D: usize, const S: usize> OwnedCorrection<f64, D, S> {
-    fn quietened(mut self, parts: Parts, sd_scale: f64) -> Self {
-        self.direct.numbers.widening *= Which::Direct.quiet(parts);
-        self.residual.numbers.widening *= Which::Residual.quiet(parts);
-        self.one_sided.iter_mut().for_each(|side| side.numbers.widening *= Which::Past.quiet(parts));
-        Self { variance_factor: sd_scale.powi(2), consensus: parts.consensus, ..self }
-    }
 }
 
 /// Makes weights of examples; none if the covariances are not positive definite.
@@ -343,7 +272,6 @@ pub(crate) fn learned<const D: usize, const S: usize>(
         limits: examples.limits.to_model(),
         strain_variance: prepared.strain_variance,
         variance_factor: params.sd_scale.powi(2),
-        consensus: true,
     })
 }
 

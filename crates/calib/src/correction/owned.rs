@@ -65,8 +65,6 @@ pub struct OwnedCorrection<T: 'static, const D: usize, const S: usize = 0> {
     pub strain_variance: T,
     /// Factor on the mixture's variance.
     pub variance_factor: T,
-    /// Whether a process that contradicts all others is less sure.
-    pub consensus: bool,
 }
 
 /// A [`Simulated`] with everything that it borrows.
@@ -145,7 +143,6 @@ impl<T: Real + 'static, const D: usize, const S: usize> OwnedCorrection<T, D, S>
             limits: self.limits,
             strain_variance: self.strain_variance,
             variance_factor: self.variance_factor,
-            consensus: self.consensus,
         }
     }
 
@@ -161,7 +158,6 @@ impl<T: Real + 'static, const D: usize, const S: usize> OwnedCorrection<T, D, S>
             limits: StrainRange { lower: number(self.limits.lower), upper: number(self.limits.upper) },
             strain_variance: number(self.strain_variance),
             variance_factor: number(self.variance_factor),
-            consensus: self.consensus,
         }
     }
 }

@@ -1,7 +1,5 @@
 use std::sync::Arc;
 
-#[cfg(feature = "particles")]
-use ohmstrain_ekf::Particles;
 use ohmstrain_ekf::live::{DoubtParts, LiveParts, Protections, RestBounds, SensorEstimator, Sieve, Unread};
 use ohmstrain_ekf::{
     AnyCurve, Compact, Dwell, Evidence, Guard, Hypotheses, Imm, Settling, SigmaPoints, SignSplit, SparseEkf, State,
@@ -180,15 +178,6 @@ impl<'a> Recipe<'a> {
                 let filter = SignSplit::<_, B, N, HYPOTHESES>::new(model, NO_STEP_S, hold, evidence);
                 with.run::<_, L>(filter.map_err(refused)?)
             }
-            #[cfg(not(feature = "particles"))]
-            EstimatorKind::Particles => {
-                return Err(CalibrationError::Unsupported("`particles` without the feature of that name".into()));
-            }
-            #[cfg(feature = "particles")]
-            EstimatorKind::Particles => {
-                let PhaseFilter { hold, evidence, .. } = PhaseFilter::new(kind, estimator, limits)?;
-                with.run::<_, L>(Particles::new(model, hold, evidence, PARTICLES, PARTICLE_SEED))
-            }
             EstimatorKind::Hypotheses => {
                 let PhaseFilter { dwell, evidence, .. } = PhaseFilter::new(kind, estimator, limits)?;
                 let filter = Hypotheses::<_, B, N, HISTORIES>::new(model, NO_STEP_S, dwell, evidence);
@@ -325,8 +314,3 @@ const NO_STEP_S: f64 = 0.0;
 pub const HYPOTHESES: usize = 8;
 /// Capacity of the filter of phase histories.
 pub const HISTORIES: usize = 8;
-/// Particles.
-#[cfg(feature = "particles")]
-const PARTICLES: usize = 4000;
-/// Seed of the particles' paths: the same readings give the same estimates.
-pub const PARTICLE_SEED: u64 = 1;

@@ -6,7 +6,6 @@ use crate::CalibrationError;
 use crate::correction::owned::OwnedCorrection;
 use crate::correction::{self, Examples};
 use crate::params::correction::{CorrectionParams, SIDES, SMOOTHER_INPUTS, TrainingRow};
-use crate::params::recipe::{Parts, RECIPE};
 use crate::params::{RangeParams, SensorParams};
 
 /// What corrects the strain of a sensor's filters and smoothers. Either is learned when it is first asked for, and then
@@ -15,7 +14,6 @@ use crate::params::{RangeParams, SensorParams};
 pub struct Learned {
     pub(crate) params: CorrectionParams,
     limits: RangeParams,
-    parts: Parts,
     of_filter: OnceLock<Option<Arc<OfFilter>>>,
     of_smoother: OnceLock<Option<Arc<OfSmoother>>>,
 }
@@ -29,21 +27,11 @@ impl Learned {
     /// Of a sensor's correction; `None` if it has none.
     #[must_use]
     pub fn of(params: &SensorParams) -> Option<Arc<Self>> {
-        Self::of_parts(params, RECIPE.parts)
-    }
-
-    /// The same of some of its parts only, to see what the others bring.
-    #[must_use]
-    pub fn of_parts(params: &SensorParams, parts: Parts) -> Option<Arc<Self>> {
-        params.correction.clone().map(|correction| Self::with_parts(correction, params.limits, parts))
+        params.correction.clone().map(|correction| Self::new(correction, params.limits))
     }
 
     pub(crate) fn new(params: CorrectionParams, limits: RangeParams) -> Arc<Self> {
-        Self::with_parts(params, limits, RECIPE.parts)
-    }
-
-    pub(crate) fn with_parts(params: CorrectionParams, limits: RangeParams, parts: Parts) -> Arc<Self> {
-        Arc::new(Self { params, limits, parts, of_filter: OnceLock::new(), of_smoother: OnceLock::new() })
+        Arc::new(Self { params, limits, of_filter: OnceLock::new(), of_smoother: OnceLock::new() })
     }
 
     /// Learns now what a smoother needs, and says whether it can be learned.
@@ -63,8 +51,7 @@ impl Learned {
         let CorrectionParams { filter, simulated, .. } = &self.params;
         let learn = || {
             self.of_examples(TrainingRow::filter_inputs, |rows| {
-                let whole = correction::learned_with_simulated(filter, rows, simulated)?;
-                if self.parts == Parts::ALL { Some(whole) } else { whole.of_parts(self.parts, filter, rows) }
+                correction::learned_with_simulated(filter, rows, simulated)
             })
         };
         self.of_filter.get_or_init(learn).clone().ok_or_else(|| nothing("filter"))
@@ -72,12 +59,7 @@ impl Learned {
 
     pub(crate) fn for_smoother(&self) -> Result<Arc<OfSmoother>, CalibrationError> {
         let params = &self.params.smoother;
-        let learn = || {
-            self.of_examples(TrainingRow::smoother_inputs, |rows| {
-                let whole: OfSmoother = correction::learned(params, rows)?;
-                if self.parts == Parts::ALL { Some(whole) } else { whole.of_parts(self.parts, params, rows) }
-            })
-        };
+        let learn = || self.of_examples(TrainingRow::smoother_inputs, |rows| correction::learned(params, rows));
         self.of_smoother.get_or_init(learn).clone().ok_or_else(|| nothing("smoother"))
     }
 

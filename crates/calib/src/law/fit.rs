@@ -30,7 +30,7 @@ impl LawOptions {
     pub const fn candidates(kind: EstimatorKind) -> &'static [Self] {
         const TWO: LawOptions = LawOptions::with_branches(DEFAULT_BRANCHES);
         const ANY: [LawOptions; 3] = [LawOptions::with_branches(1), TWO, LawOptions::with_branches(3)];
-        match kind.tuned_as() {
+        match kind {
             EstimatorKind::Ekf | EstimatorKind::SignSplit => &ANY,
             _ => &[TWO],
         }
@@ -207,7 +207,7 @@ fn polish(
         regression.solve(&design, ridge, None).map(|solution| solution.cross_validated.ln())
     };
     let cost = |nonlinear: &[f64]| score(nonlinear).unwrap_or(f64::INFINITY);
-    let point = if start.is_empty() { start } else { optimise::polish(cost, &start, POLISH_SIDE, POLISH_STEPS)? };
+    let point = if start.is_empty() { start } else { optimise::nelder_mead(cost, &start, POLISH_SIDE, POLISH_STEPS) };
     Ok(structure(&point))
 }
 

@@ -5,7 +5,7 @@ use super::{
     ReadingSeries, ReadingsLikelihood,
 };
 use crate::CalibrationError;
-use crate::optimise::polish;
+use crate::optimise::nelder_mead;
 use crate::params::law::LawParams;
 
 /// The likelihood of readings `R/R₀ - 1` under the extended Kalman filter of a known law, as a function of the parameters
@@ -100,7 +100,7 @@ fn across_jumps<F: ModelFamily<N, L>, const N: usize, const L: usize>(
     };
     let cost = |ln: &[f64]| likelihood.log_likelihood(&inside(ln)).map_or(f64::INFINITY, |found| -found.value);
     let from: Vec<f64> = from.parameters.iter().map(|parameter| parameter.value.ln()).collect();
-    let values = inside(&polish(cost, &from, SIMPLEX.0, SIMPLEX.1)?);
+    let values = inside(&nelder_mead(cost, &from, SIMPLEX.0, SIMPLEX.1));
     Ok(likelihood.parameters.iter().zip(values).map(|(parameter, start)| Parameter { start, ..*parameter }).collect())
 }
 

@@ -18,8 +18,6 @@ pub enum EstimatorKind {
     SignSplit,
     /// Best phase histories.
     Hypotheses,
-    /// Particles: the reference that shows whether the law or the estimator limits.
-    Particles,
     /// One of the filters of [`RECIPE`](crate::RECIPE) with the learned correction of its strain.
     Corrected,
 }
@@ -34,8 +32,7 @@ pub struct NoParameters {
 
 impl EstimatorKind {
     /// All estimators.
-    pub const ALL: [Self; 7] =
-        [Self::Ekf, Self::Ukf, Self::Imm, Self::SignSplit, Self::Hypotheses, Self::Particles, Self::Corrected];
+    pub const ALL: [Self; 6] = [Self::Ekf, Self::Ukf, Self::Imm, Self::SignSplit, Self::Hypotheses, Self::Corrected];
 
     /// Each of them once, in the order in which they first come.
     #[must_use]
@@ -55,25 +52,6 @@ impl EstimatorKind {
         !matches!(self, Self::Ekf | Self::Ukf)
     }
 
-    /// The estimator whose noise and motion this one runs with. Particles take those of the sign-split filter, so that
-    /// what they do better is the estimator's doing and not the parameters'.
-    #[must_use]
-    pub const fn tuned_as(self) -> Self {
-        match self {
-            Self::Particles => Self::SignSplit,
-            own => own,
-        }
-    }
-
-    /// The estimator that smooths in its place: itself, where it has a smoother.
-    #[must_use]
-    pub const fn smoother(self) -> Self {
-        match self {
-            Self::Corrected => self,
-            own => own.tuned_as(),
-        }
-    }
-
     /// Its name on the command line and in files.
     #[must_use]
     pub const fn name(self) -> &'static str {
@@ -83,7 +61,6 @@ impl EstimatorKind {
             Self::Imm => "imm",
             Self::SignSplit => "sign-split",
             Self::Hypotheses => "hypotheses",
-            Self::Particles => "particles",
             Self::Corrected => "corrected",
         }
     }

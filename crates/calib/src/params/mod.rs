@@ -237,7 +237,7 @@ impl SensorParams {
         let of = |kind: EstimatorKind| self.estimators.get(&self.filter_of(kind));
         let kind = self.default_estimator;
         let filter = of(kind).map(|params| params.strain_sd_scale);
-        let smoother = of(kind.smoother()).and_then(|params| params.smoothed_sd_scale);
+        let smoother = of(kind).and_then(|params| params.smoothed_sd_scale);
         let widened = [("filter", filter), ("smoother", smoother)];
         let at_most = |scale: Option<f64>| scale.is_some_and(|scale| scale >= LARGEST_SD_SCALE);
         widened.into_iter().filter(|(_, scale)| at_most(*scale)).map(|(name, _)| name).collect()

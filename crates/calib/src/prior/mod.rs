@@ -54,9 +54,9 @@ pub struct Prior {
 }
 
 impl Prior {
-    /// The prior of an estimator's noise and motion; particles take those of the sign-split filter.
+    /// The prior of an estimator's noise and motion.
     pub(crate) fn estimator(&self, kind: EstimatorKind) -> Option<&EstimatorPrior> {
-        self.estimators.get(&kind.tuned_as())
+        self.estimators.get(&kind)
     }
 
     /// What a calibration on a sensor with this R₀ has seen, together with what the others have.

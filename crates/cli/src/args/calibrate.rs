@@ -25,8 +25,8 @@ pub struct CalibrateArgs {
     /// Family of the gauge curve: auto (polynomial), polynomial, decaying-exponential or tunnelling
     #[arg(long, default_value = "auto")]
     pub gauge: Auto<Gauge>,
-    /// Estimator to calibrate and to make the default: auto (corrected: sign-split and what is learned about its error), corrected, ekf, ukf, imm, sign-split,
-    /// hypotheses or particles; ekf is calibrated in any case
+    /// Estimator to calibrate and to make the default: auto (corrected: sign-split and what is learned about its error), corrected, ekf, ukf, imm, sign-split
+    /// or hypotheses; ekf is calibrated in any case
     #[arg(long, default_value = "auto")]
     pub estimator: Auto<Estimator>,
     /// What other sensors of the make have taught (`fleet fit`): a short motion is enough then

@@ -13,8 +13,8 @@ pub struct EstimateArgs {
     /// The sensor's parameters
     #[arg(long, value_name = "sensor.toml")]
     pub sensor: PathBuf,
-    /// Estimator: auto (the sensor file's choice), corrected, ekf, ukf, imm, sign-split, hypotheses or
-    /// particles, which smooth with sign-split
+    /// Estimator: auto (the sensor file's choice), corrected, ekf, ukf, imm, sign-split or
+    /// hypotheses
     #[arg(long, default_value = "auto")]
     pub estimator: Auto<Estimator>,
     /// Do without the learned correction of the strain, to compare

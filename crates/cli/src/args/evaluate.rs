@@ -19,17 +19,12 @@ pub struct EvaluateArgs {
     #[arg(long, value_name = "TRACE", requires = "train", conflicts_with_all = ["sensor", "split"])]
     pub test: Vec<PathBuf>,
     /// Estimator: auto (the sensor file's choice, or the one that calibrate would choose), corrected, ekf, ukf, imm,
-    /// sign-split, hypotheses, particles, or all
+    /// sign-split, hypotheses, or all
     #[arg(long, default_value = "auto")]
     pub estimator: Estimators,
     /// Do without the learned correction of the strain. Without this flag, calibrations are scored with and without it
     #[arg(long)]
     pub no_correction: bool,
-    /// What each part of the learned correction brings: scores without the direct process, without the residual one, without
-    /// simulated motions, and of the smoother without its one-sided processes and without their consensus. Nothing is
-    /// calibrated again
-    #[arg(long, conflicts_with = "no_correction")]
-    pub parts: bool,
     /// Score rows with time_s >= T only; the filter still starts at the first row
     #[arg(long, value_name = "T", allow_negative_numbers = true, value_parser = finite, conflicts_with = "split")]
     pub from: Option<f64>,

@@ -20,9 +20,6 @@ use crate::suits::{self, FIRST_LIVE_READINGS, FIRST_READINGS};
 /// Turns readings into strain as they arrive. Memory does not grow with the recording.
 pub fn run(args: &FilterArgs) -> Result<(), CliError> {
     let kind = args.estimate.estimator.chosen().map(|estimator| estimator.0);
-    if args.lag_s.is_some() && kind.is_some_and(|kind| kind.smoother() != kind) {
-        return Err(Error::NoSmoother.into());
-    }
     let WrittenArgs { output, replace, columns, .. } = &args.written;
     let inputs = [&args.trace_file, &args.estimate.sensor];
     let mut rows_out = RowsOut::claim(output.as_deref(), columns, replace.force, inputs)?;

@@ -105,8 +105,6 @@ pub struct Correction<'a, T, const D: usize, const S: usize = 0> {
     pub strain_variance: T,
     /// Factor on the mixture's variance, from training rows left out.
     pub variance_factor: T,
-    /// Whether the voices say their [`consensus`], or what they are mixed to as they are: the same of two.
-    pub consensus: bool,
 }
 
 /// A process that sees features alone, of readings that a law gave in simulated motions. Its variance is its noise.
@@ -258,12 +256,7 @@ impl<T: Real, const D: usize, const S: usize> Work<T> for Correcting<'_, T, D, S
         let one_sided = sides.map(|kernels| of_sides.next().map_or(direct, |process| of_readings(kernels, process)));
         let said = residual.said(like, &of_residual, strain);
         let (residual, novelty) = of.of_residual(said, of.residual.distance(&outside, 0), filtered.mean);
-        let mixed = if of.consensus {
-            consensus(direct, residual, one_sided)
-        } else {
-            mixture([direct, residual].into_iter().chain(one_sided))
-        };
-        let learned = of.learned(mixed, novelty, birge);
+        let learned = of.learned(consensus(direct, residual, one_sided), novelty, birge);
         let simulated = of.simulated.map(|simulated| of.of_simulated(like, inputs, &simulated));
         let strain = simulated.map_or(learned, |simulated| mixture([learned, simulated]));
         Corrected { strain, direct, one_sided, residual, simulated, novelty }
@@ -367,7 +360,6 @@ mod tests {
             limits: StrainRange { lower: -9.0, upper: 9.0 },
             strain_variance: 0.7,
             variance_factor: 1.1,
-            consensus: true,
         };
         for trial in 0..100 {
             let inputs = core::array::from_fn(|i| number(1000 + 31 * trial + i));

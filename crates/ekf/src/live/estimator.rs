@@ -78,16 +78,3 @@ where
         PhaseMixture::single(belief(self.model(), strain), Phase::Hold)
     }
 }
-
-#[cfg(feature = "particles")]
-impl<T, const B: usize, const N: usize, const L: usize> SensorEstimator<T, N, L>
-    for crate::Particles<T, SwitchedModel<T, B, N>>
-where
-    T: Real,
-{
-    const BRANCHES: usize = B;
-
-    fn start(&self, strain: Option<Gaussian<T>>) -> crate::ParticleCloud<T, N, L> {
-        self.start(&belief(self.model(), strain), Phase::Extend)
-    }
-}

@@ -128,7 +128,7 @@ impl<F: Breeds<T, B, N>, T: Real, const B: usize, const N: usize, const L: usize
     #[inline(always)]
     fn one_by_one<R: Recorder<T, B>>(self, recorder: &mut R) -> Said<T> {
         let Self { filter, state, reading, next, open, .. } = self;
-        let (mut children, mut predicted) = (Children::new(next), Predicted::new());
+        let (mut children, mut predicted) = (Children::new(next, state.room()), Predicted::new());
         for (place, (share, from)) in state.shares().iter().zip(state.phases()).enumerate() {
             let comes = Phase::ALL.map(|phase| *from == phase);
             let turning = |before| filter.turning::<T, F::Switch>(&comes, &before, state.pause().open);
@@ -189,7 +189,7 @@ impl<F: Breeds<T, B, N>, T: Real, const B: usize, const N: usize, const L: usize
             value: like.with(value),
             extra_variance: like.with(extra_variance),
         });
-        let (mut children, mut predicted) = (Children::new(next), Predicted::new());
+        let (mut children, mut predicted) = (Children::new(next, state.room()), Predicted::new());
         let mut place = 0;
         while let Some(first) = state.at(place) {
             // Lanes that are left have the first one's numbers.

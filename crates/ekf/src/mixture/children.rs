@@ -20,10 +20,10 @@ pub(crate) struct Children<'a, T, const N: usize, const L: usize, const K: usize
 }
 
 impl<'a, T: Real, const N: usize, const L: usize, const K: usize> Children<'a, T, N, L, K> {
-    /// In the place of what `kept` has been.
+    /// In the place of what `kept` has been, `room` at most.
     #[inline(always)]
-    pub(crate) fn new(kept: &'a mut Mixture<T, N, L, K>) -> Self {
-        kept.clear();
+    pub(crate) fn new(kept: &'a mut Mixture<T, N, L, K>, room: usize) -> Self {
+        kept.clear(room);
         Self { kept, exponent: T::zero(), density: T::zero() }
     }
 
@@ -50,7 +50,7 @@ impl<'a, T: Real, const N: usize, const L: usize, const K: usize> Children<'a, T
             V::parts(children, lane, |child| like.merge(child, weight, per_inside));
             return Added::To(place);
         }
-        let (added, place) = if self.kept.shares().len() < K {
+        let (added, place) = if self.kept.shares().len() < self.kept.room() {
             (Added::To(self.kept.shares().len()), self.kept.one_more())
         } else {
             let (at, lightest) = self.lightest();

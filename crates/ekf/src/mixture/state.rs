@@ -68,6 +68,9 @@ impl<T: Real, const N: usize, const L: usize> PhaseMixture<T, N, L> {
 
     /// A phase has one place.
     const fn take_beside(&mut self, _other: &Self, _share: T) {}
+
+    /// There are three phases.
+    const fn keep(&mut self, _most: usize) {}
 }
 
 /// At most `K` Gaussians, each stretching, holding or releasing: what [`SignSplit`](crate::SignSplit) and
@@ -77,6 +80,8 @@ pub struct Mixture<T, const N: usize, const L: usize, const K: usize> {
     shares: [Share<T, N, L>; K],
     phases: [Phase; K],
     len: usize,
+    /// Most hypotheses that steps keep, at most `K`.
+    room: usize,
     pause: Pause<T>,
 }
 
@@ -88,12 +93,12 @@ impl<T: Real, const N: usize, const L: usize, const K: usize> Mixture<T, N, L, K
     pub fn single(belief: Belief<T, N, L>, phase: Phase) -> Self {
         let () = Self::CAPACITY;
         let share = Share { weight: T::one(), belief, per_inside: T::one() };
-        Self { shares: [share; K], phases: [phase; K], len: 1, pause: Pause::over() }
+        Self { shares: [share; K], phases: [phase; K], len: 1, room: K, pause: Pause::over() }
     }
 
     #[inline(always)]
     pub(crate) fn empty() -> Self {
-        Self { shares: [Share::vacant(); K], phases: [Phase::Hold; K], len: 0, pause: Pause::over() }
+        Self { shares: [Share::vacant(); K], phases: [Phase::Hold; K], len: 0, room: K, pause: Pause::over() }
     }
 
     pub(crate) const fn pause(&self) -> &Pause<T> {
@@ -129,9 +134,14 @@ impl<T: Real, const N: usize, const L: usize, const K: usize> Mixture<T, N, L, K
         self.len = kept;
     }
 
-    /// Follows nothing.
-    pub(crate) fn clear(&mut self) {
-        (self.len, self.pause) = (0, Pause::over());
+    /// Follows nothing, with room for so many.
+    pub(crate) fn clear(&mut self, room: usize) {
+        (self.len, self.room, self.pause) = (0, room.min(K), Pause::over());
+    }
+
+    /// Most hypotheses that steps keep.
+    pub(crate) const fn room(&self) -> usize {
+        self.room
     }
 
     /// The Gaussians with their phases.
@@ -171,12 +181,17 @@ impl<T: Real, const N: usize, const L: usize, const K: usize> Mixture<T, N, L, K
         self.shares.get_mut(..self.len).unwrap_or(&mut [])
     }
 
+    /// Keeps no more from the next step on.
+    fn keep(&mut self, most: usize) {
+        self.room = most.clamp(1, K);
+    }
+
     /// Follows the first Gaussian of another mixture, too, in place of the lightest if there is no other.
     fn take_beside(&mut self, other: &Self, share: T) {
         let Some((beside, phase)) = other.at(0) else { return };
         let weights = self.shares().iter().map(|share| share.weight).enumerate();
         let lightest = weights.reduce(|a, b| if b.1 < a.1 { b } else { a }).map_or(0, |(place, _)| place);
-        let place = if self.len < K { self.len } else { lightest };
+        let place = if self.len < self.room { self.len } else { lightest };
         if let (Some(to), Some(of)) = (self.shares.get_mut(place), self.phases.get_mut(place)) {
             (*to, *of) = (Share { weight: T::zero(), ..*beside }, phase);
         }
@@ -226,6 +241,11 @@ macro_rules! mixture_state {
                 let mut both = *self;
                 both.take_beside(other, share);
                 both
+            }
+
+            fn keeping(mut self, most: usize) -> Self {
+                self.keep(most);
+                self
             }
         }
     };

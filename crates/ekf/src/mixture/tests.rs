@@ -65,7 +65,7 @@ proptest! {
     ) {
         let mut all = std::vec![first, apart];
         let mut mixture = Mixture::<f64, 3, 6, 2>::empty();
-        let mut children = Children::new(&mut mixture);
+        let mut children = Children::new(&mut mixture, usize::MAX);
         add(&mut children, &first, Phase::Extend);
         add(&mut children, &apart, Phase::Hold);
         for (weight, mut close) in others {
@@ -113,7 +113,7 @@ fn no_single_weight_need_be_a_number() {
     for shift in [0.0, -2000.0, 2000.0] {
         for order in [[0, 1, 2], [2, 1, 0], [1, 2, 0]] {
             let mut mixture = Mixture::<f64, 3, 6, 3>::empty();
-            let mut children = Children::new(&mut mixture);
+            let mut children = Children::new(&mut mixture, usize::MAX);
             for k in order {
                 let belief: Belief<f64, 3, 6> = Belief::independent(vector![k as f64, 0.0, 0.0], &[1e-6; 3]);
                 let weighed = weighed(parts[k].0, parts[k].1 + shift);
@@ -134,7 +134,7 @@ fn no_single_weight_need_be_a_number() {
 #[test]
 fn the_lightest_makes_room() {
     let mut mixture = Mixture::<f64, 3, 6, 2>::empty();
-    let mut children = Children::new(&mut mixture);
+    let mut children = Children::new(&mut mixture, usize::MAX);
     for (strain, log_weight) in [(0.1, -1.0_f64), (0.2, -3.0), (0.3, -2.0), (0.4, -4.0)] {
         let belief = Belief::independent(vector![strain, 0.0, 0.0], &[1e-6; 3]);
         add(&mut children, &(log_weight.exp(), belief), Phase::Extend);
@@ -150,7 +150,7 @@ fn the_lightest_makes_room() {
 fn exactly_known_states_are_alike_only_if_they_are_equal() {
     for unit in [1e-9, 1.0, 1e9] {
         let mut mixture = Mixture::<f64, 3, 6, 8>::empty();
-        let mut children = Children::new(&mut mixture);
+        let mut children = Children::new(&mut mixture, usize::MAX);
         for strain in [0.1, 0.1, 0.2] {
             let belief = Belief::independent(vector![strain * unit, 0.0, 0.0], &[0.0; 3]);
             add(&mut children, &(1.0, belief), Phase::Hold);
@@ -173,7 +173,7 @@ fn what_limits_took_is_given_back_after_merging() {
         (parts, more_inside, per_inside)
     };
     let mut mixture = Mixture::<f64, 3, 6, 2>::empty();
-    let mut children = Children::new(&mut mixture);
+    let mut children = Children::new(&mut mixture, usize::MAX);
     let mut taken = 0.0;
     for (strain, weight) in [(0.0, 0.3), (-0.06, 0.7)] {
         let (parts, more_inside, per_inside) = at(strain, 1e-2, 1.0);
@@ -340,7 +340,7 @@ fn vectors_give_the_bits_of_numbers() {
 fn what_is_followed_too_has_its_share_and_the_others_keep_theirs() {
     let belief = |strain: f64| Belief::<f64, 3, 6>::independent(vector![strain, 0.0, 0.0], &[1e-4; 3]);
     let mut mixture = Mixture::<f64, 3, 6, 2>::empty();
-    let mut children = Children::new(&mut mixture);
+    let mut children = Children::new(&mut mixture, usize::MAX);
     for (weight, strain) in [(0.25, 0.1), (1.0, 0.9)] {
         add(&mut children, &(weight, belief(strain)), Phase::Extend);
     }

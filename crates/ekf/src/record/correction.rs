@@ -116,7 +116,6 @@ impl Correction<'_, f32, FILTER_INPUTS> {
             limits: StrainRange { lower, upper },
             strain_variance: constant(self.strain_variance),
             variance_factor: constant(self.variance_factor),
-            consensus: self.consensus,
         }
     }
 }

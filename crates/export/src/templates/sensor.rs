@@ -269,7 +269,6 @@ pub const CORRECTION: Correction<'static, f32, FILTER_INPUTS> = Correction {
     limits: LIMITS,
     strain_variance: << correction.strain_variance >>,
     variance_factor: << correction.variance_factor >>,
-    consensus: false,
 };
 
 static SCALES: [InputScale<f32>; FILTER_INPUTS] = [

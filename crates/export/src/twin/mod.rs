@@ -6,7 +6,7 @@ mod parts;
 
 use std::cell::Cell;
 
-use ohmstrain_calib::EstimatorKind;
+use ohmstrain_calib::{EstimatorKind, HISTORIES, HYPOTHESES};
 use ohmstrain_ekf::live::{Learned, LiveFilter, SensorEstimator};
 use ohmstrain_ekf::{
     Advanced, Compact, Estimator, Gaussian, Hypotheses, Reading, Real, SignSplit, SparseEkf, State, StepError,
@@ -26,33 +26,6 @@ pub struct Numbers<'a, T> {
     /// The length that is prepared for a step, s.
     pub length_s: fn(T) -> T,
 }
-
-/// Runs code with a constant number of hypotheses: those that a filter on a chip may keep.
-macro_rules! with_hypotheses {
-    ($most:expr, $K:ident => $run:expr) => {
-        match $most {
-            1 | 2 => {
-                const $K: usize = 2;
-                $run
-            }
-            3 => {
-                const $K: usize = 3;
-                $run
-            }
-            4 => {
-                const $K: usize = 4;
-                $run
-            }
-            _ => {
-                const $K: usize = ohmstrain_calib::HYPOTHESES;
-                $run
-            }
-        }
-    };
-}
-
-/// The last arm above is for both filters of a computer.
-const _: () = assert!(ohmstrain_calib::HYPOTHESES == ohmstrain_calib::HISTORIES);
 
 /// Numbers of the chain.
 const CHAIN: usize = 9;
@@ -84,6 +57,8 @@ impl<T: Real, const B: usize, const N: usize, const K: usize> StepNumbers<T> for
 /// A filter as it is exported.
 pub struct Twin<'a, T, F> {
     filter: F,
+    /// Most hypotheses that it keeps.
+    hypotheses: usize,
     numbers: Numbers<'a, T>,
     /// How many hypotheses have been moved on, with a reading and without.
     work: [Cell<usize>; 2],
@@ -139,7 +114,7 @@ where
     const BRANCHES: usize = F::BRANCHES;
 
     fn start(&self, strain: Option<Gaussian<T>>) -> F::State {
-        self.filter.start(strain)
+        self.filter.start(strain).keeping(self.hypotheses)
     }
 }
 
@@ -177,15 +152,11 @@ pub fn with_twin<T: Real, const B: usize, const N: usize, const L: usize, J: Tas
         (EstimatorKind::SignSplit, Some(phases)) => {
             let (dwell, evidence) = phases.filter_parts(parts.limits_in()).map_err(refused)?;
             let hold = phases.rests.then_some(dwell);
-            with_hypotheses!(sensor.hypotheses, K => {
-                of.run::<_, N, L>(SignSplit::<T, B, N, K, Compact>::around(kernel, hold, evidence))
-            })
+            of.run::<_, N, L>(SignSplit::<T, B, N, HYPOTHESES, Compact>::around(kernel, hold, evidence))
         }
         (EstimatorKind::Hypotheses, Some(phases)) => {
             let (dwell, evidence) = phases.filter_parts(parts.limits_in()).map_err(refused)?;
-            with_hypotheses!(sensor.hypotheses, K => {
-                of.run::<_, N, L>(Hypotheses::<T, B, N, K, Compact>::around(kernel, dwell, evidence))
-            })
+            of.run::<_, N, L>(Hypotheses::<T, B, N, HISTORIES, Compact>::around(kernel, dwell, evidence))
         }
         _ => of.run::<_, N, L>(kernel),
     };
@@ -208,7 +179,7 @@ impl<T: Real, J: Task<T>, const B: usize, const S: usize> Of<'_, '_, T, J, B, S>
         let parts = &sensor.parts;
         let learned =
             parts.correction.map(|correction| OwnedLearned::new(correction, parts.quadratics, parts.limits_in()));
-        let twin = Twin { filter, numbers, work: [const { Cell::new(0) }; 2] };
+        let twin = Twin { filter, hypotheses: sensor.hypotheses, numbers, work: [const { Cell::new(0) }; 2] };
         let parts = parts.live.to().with_correction(learned.as_ref().map(OwnedLearned::learned));
         task.run(LiveFilter::new(twin, parts))
     }

@@ -18,7 +18,6 @@ use crate::params::correction::{
 };
 use crate::params::estimator::{EstimatorParams, MotionParams, NoiseParams};
 use crate::params::law::{GaugeParams, LawParams};
-use crate::params::recipe::Parts;
 
 const LIMITS: RangeParams = RangeParams { lower: 0.0, upper: 0.4 };
 
@@ -289,32 +288,4 @@ fn a_lagged_row_is_mixed_with_what_was_said_of_it() {
     let expected: Vec<Gaussian<f64>> =
         said.iter().zip(&plain).map(|(said, plain)| mixture([*said, plain.estimate.strain])).collect();
     assert_eq!(out.iter().map(|output| output.estimate.strain).collect::<Vec<_>>(), expected);
-}
-
-/// What is left is what the others say by themselves; the factor on the interval is found anew.
-#[test]
-fn parts_that_are_switched_off_say_nothing() {
-    let with = |parts| Learned::with_parts(params(), LIMITS, parts);
-    let row = params().rows[7];
-    let filtered = Gaussian { mean: row.filtered[0], variance: 1e-4 };
-    let filter = |parts| with(parts).for_filter().unwrap().correction().correct(&row.filter_inputs(), filtered, 1.0);
-    let smoother =
-        |parts| with(parts).for_smoother().unwrap().correction().correct(&row.smoother_inputs(), filtered, 1.0);
-    let all = filter(Parts::ALL);
-    let alone = Parts { simulated: false, ..Parts::ALL };
-    for (off, left) in
-        [(Parts { direct: false, ..alone }, all.residual), (Parts { residual: false, ..alone }, all.direct)]
-    {
-        let said = filter(off);
-        assert!((said.strain.mean - left.mean).abs() < 1e-9, "{said:?} {left:?}");
-        assert!(said.simulated.is_none() && said.strain.variance < 1.0);
-    }
-    assert!(all.simulated.is_some() && filter(alone).strain.mean != all.strain.mean);
-    let all = smoother(Parts::ALL);
-    let [past, future] = all.one_sided;
-    let voices = [all.direct, all.residual, past, future];
-    let mixed = smoother(Parts { consensus: false, ..Parts::ALL }).strain.mean;
-    assert!((mixed - mixture(voices).mean).abs() < 1e-12, "{mixed} {all:?}");
-    let two = smoother(Parts { one_sided: false, consensus: false, ..Parts::ALL }).strain.mean;
-    assert!((two - mixture(voices[..2].iter().copied()).mean).abs() < 1e-9, "{two} {all:?}");
 }

@@ -1,6 +1,6 @@
 use std::io::Write;
 
-use ohmstrain_calib::{PARTICLE_SEED, SIMULATED_SEED};
+use ohmstrain_calib::SIMULATED_SEED;
 use serde::Serialize;
 
 use super::scores::{PUBLISHED, RecordingScores};
@@ -11,7 +11,7 @@ use crate::error::CliError;
 use crate::output;
 
 /// Version of what `--json` prints.
-const SCHEMA: u32 = 2;
+const SCHEMA: u32 = 3;
 
 /// All scores, recording by recording.
 #[derive(Default)]
@@ -26,8 +26,7 @@ pub struct Evaluation {
 struct Json<'a> {
     /// The commit that the program was built from, where it was said.
     commit: Option<&'static str>,
-    /// Seed of the particles, and of the motions that calibration simulates; nothing else draws.
-    particle_seed: u64,
+    /// Seed of the motions that calibration simulates; nothing else draws.
     simulated_seed: u64,
     /// All cases summed up, estimate by estimate.
     summary: Vec<Summary>,
@@ -55,7 +54,6 @@ impl Evaluation {
         if json {
             let json = Json {
                 commit: option_env!("OHMSTRAIN_COMMIT").filter(|commit| !commit.is_empty()),
-                particle_seed: PARTICLE_SEED,
                 simulated_seed: SIMULATED_SEED,
                 summary: self.summaries(),
                 recordings: self.recordings().collect(),

@@ -3,7 +3,7 @@ use std::time::Instant;
 
 use ohmstrain::{Calibrated, Calibration, ValidityWatch};
 use ohmstrain_bench_data::segment;
-use ohmstrain_calib::{Baselines, EstimatorKind, Parts, PhaseRows, PublishedLaw, RECIPE, StaticCubic};
+use ohmstrain_calib::{Baselines, EstimatorKind, PhaseRows, PublishedLaw, RECIPE, StaticCubic};
 
 use super::scores::{BaselineScores, LearnedScores, RecordingScores};
 use super::settled::SettledScores;
@@ -98,21 +98,6 @@ impl Sensor {
         let sensors = calibrated.into_iter().flatten().flatten();
         // A part that was asked for by itself is not shown twice.
         Ok(sensors.filter(|sensor| !(sensor.is_part && wanted.contains(&sensor.kind))).collect())
-    }
-
-    /// Each corrected one followed by the same without single parts of its correction.
-    pub fn and_parts(sensors: Vec<Self>) -> Vec<Self> {
-        let with_parts = |whole: Self| {
-            let is_corrected = whole.kind == EstimatorKind::Corrected;
-            let without = Parts::ALL_BUT_ONE.map(|(name, parts)| whole.with_parts(name, parts));
-            std::iter::once(whole).chain(without.into_iter().filter(move |_| is_corrected))
-        };
-        sensors.into_iter().flat_map(with_parts).collect()
-    }
-
-    fn with_parts(&self, name: &'static str, parts: Parts) -> Self {
-        let sensor = self.sensor.with_parts(parts);
-        Self { sensor, kind: self.kind, calibration_s: self.calibration_s, is_part: true, name }
     }
 
     /// Whether it is shown to say what another one is made of.

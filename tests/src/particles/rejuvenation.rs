@@ -1,10 +1,6 @@
-use std::vec::Vec;
-
-use nalgebra::SVector;
 use ohmstrain_model::{Phase, Scalar};
 
-use crate::belief::psd::SemiDefinite;
-use crate::particles::cloud::{Chance, Particle, weighted_moments};
+use crate::particles::cloud::{Chance, Particle, root_columns, weighted_moments};
 
 /// How far the kernel reaches, in deviations of the cloud; its shrinkage a = √(1 - h²) is 0.995, which is Liu and West's
 /// discount factor (3δ - 1)/(2δ) at δ = 0.99.
@@ -47,8 +43,7 @@ fn spread<T: Scalar, const N: usize, const L: usize>(group: &mut [&mut Particle<
     }
     let weight = T::one() / T::of(group.len() as f64);
     let (mean, covariance) = weighted_moments::<T, N, L>(group.iter().map(|p| (weight, &p.state)));
-    let root = SemiDefinite::factor(&covariance);
-    let columns: [SVector<T, N>; N] = core::array::from_fn(|i| root.column(i));
+    let columns = root_columns(&covariance);
     let reach = T::of(REACH);
     let kept = (T::one() - reach * reach).sqrt();
     for particle in group {

@@ -1,23 +1,25 @@
+//! A particle filter: the oracle that the mixtures of Gaussians are compared with.
+
 mod cloud;
+mod path;
 mod rejuvenation;
 
 pub use cloud::{Particle, ParticleCloud};
 
 use nalgebra::SVector;
+use ohmstrain_ekf::{Advanced, Belief, Dwell, Estimator, Evidence, Innovation, Reading, StepError};
 use ohmstrain_model::{Direction, MOTION_STATES, Phase, Scalar, SwitchedModel, SwitchedStep, Symmetric};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 
-use crate::belief::psd::SemiDefinite;
-use crate::ekf::update;
-use crate::particles::cloud::Chance;
+use crate::particles::cloud::{Chance, root_columns};
+use crate::particles::path::{along_path, path_noise};
 use crate::particles::rejuvenation::rejuvenate;
-use crate::{Advanced, Belief, Dwell, Estimator, Evidence, Innovation, Reading, StepError};
 
 /// Rao-Blackwellised particle filter: paths of motion and phase are sampled, branches and baseline are not.
 ///
-/// The slow reference for a desktop. Its only approximation besides the model's own is a finite number of paths (and, in
-/// holds, the kernel that keeps them apart), so where it is no better than [`SignSplit`](crate::SignSplit), the law
+/// The slow reference. Its only approximation besides the model's own is a finite number of paths (and, in
+/// holds, the kernel that keeps them apart), so where it is no better than [`SignSplit`](ohmstrain_ekf::SignSplit), the law
 /// limits and not the estimator.
 ///
 /// A particle is a strain, a rate and a phase. Given their path, branches and baseline are linear and Gaussian:
@@ -30,7 +32,7 @@ use crate::{Advanced, Belief, Dwell, Estimator, Evidence, Innovation, Reading, S
 /// are stops: a path that runs into one ends its step there, at rest. That is a property of the motion and no evidence,
 /// so a rest on a limit does not weigh the same evidence again at every step.
 ///
-/// Needs the feature `std`: it allocates. Same seed and same readings, same result, on every machine.
+/// Same seed and same readings, same result, on every machine.
 ///
 /// Source: Doucet, de Freitas, Murphy & Russell, *Proc. UAI* (2000) 176.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -84,8 +86,7 @@ impl<T: Scalar, const B: usize, const N: usize> Particles<T, SwitchedModel<T, B,
         let mut chance = Chance(ChaCha8Rng::seed_from_u64(self.seed));
         // With the motion first, the columns of the motion carry the regression of the rest on it, and the remaining
         // columns are the covariance of the rest given the motion.
-        let root = SemiDefinite::factor(&belief.covariance);
-        let columns: [SVector<T, N>; N] = core::array::from_fn(|i| root.column(i));
+        let columns = root_columns(&belief.covariance);
         let (motion, rest) = columns.split_at(MOTION_STATES);
         let mut covariance = Symmetric::zeros();
         for column in rest {
@@ -138,8 +139,7 @@ impl<T: Scalar, const B: usize, const N: usize> Particles<T, SwitchedModel<T, B,
 
     /// Leads every path a step on.
     fn predict<const L: usize>(&self, cloud: &mut ParticleCloud<T, N, L>, prepared: &SwitchedStep<T, B>, dt_s: T) {
-        let root = SemiDefinite::factor(&self.model.path_noise::<L>(prepared));
-        let columns: [SVector<T, N>; N] = core::array::from_fn(|i| root.column(i));
+        let columns = root_columns(&path_noise::<T, B, N, L>(prepared));
         let (moved, _) = columns.split_at(MOTION_STATES + B);
         let chain = self.hold.map(|dwell| dwell.probabilities(dt_s));
         for particle in &mut cloud.particles {
@@ -152,7 +152,7 @@ impl<T: Scalar, const B: usize, const N: usize> Particles<T, SwitchedModel<T, B,
             };
             let limits = &self.evidence.limits;
             (particle.state, particle.phase) =
-                self.model.along_path(prepared, &particle.state, particle.phase, &chance, limits);
+                along_path(&self.model, prepared, &particle.state, particle.phase, &chance, limits);
         }
         let rest = self.model.transition(prepared, &SVector::zeros(), Direction::Known(Phase::Hold));
         cloud.covariance = self.model.propagate(&cloud.covariance, &rest);
@@ -190,17 +190,24 @@ impl<T: Scalar, const B: usize, const N: usize> Particles<T, SwitchedModel<T, B,
         cloud: &mut ParticleCloud<T, N, L>,
         reading: Reading<T>,
     ) -> Result<Innovation<T>, StepError> {
+        if !(reading.value.is_finite() && reading.extra_variance.is_finite()) {
+            return Err(StepError::NonFiniteReading);
+        }
+        if reading.extra_variance < T::zero() {
+            return Err(StepError::NegativeVariance);
+        }
         // Gain and covariance do not depend on the path: any state stands for all.
-        let any = Belief { mean: SVector::zeros(), covariance: cloud.covariance };
-        let gradient = self.model.observe(&any.mean, Direction::Known(Phase::Hold));
-        let (posterior, shared) = update(&any, gradient, reading)?;
-        let (half, variance) = (T::of(0.5), shared.innovation_variance);
+        let observed = self.model.observe(&SVector::zeros(), Direction::Known(Phase::Hold));
+        let projected = cloud.covariance.mul(&observed.gradient);
+        let variance = observed.gradient.dot(&projected) + observed.variance + reading.extra_variance;
+        let gain = projected / variance;
+        let half = T::of(0.5);
         let (mut first, mut second) = (T::zero(), T::zero());
         let mut most = -T::one() / T::zero();
         for particle in &mut cloud.particles {
             let expected = self.model.observe(&particle.state, Direction::Known(particle.phase)).value;
             let innovation = reading.value - expected;
-            particle.state += shared.gain * innovation;
+            particle.state += gain * innovation;
             first += particle.weight * innovation;
             second += particle.weight * innovation * innovation;
             let exponent = -half * innovation * innovation / variance;
@@ -218,7 +225,7 @@ impl<T: Scalar, const B: usize, const N: usize> Particles<T, SwitchedModel<T, B,
         for particle in &mut cloud.particles {
             particle.weight /= sum;
         }
-        cloud.covariance = posterior.covariance;
+        cloud.covariance.add_outer(&gain, -variance);
         let height = -half * (variance.ln() + T::two_pi().ln());
         let log_likelihood = most + sum.ln() + self.evidence.tempering * height;
         let spread = (second - first * first).max(T::zero());

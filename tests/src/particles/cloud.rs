@@ -1,11 +1,8 @@
-use std::vec::Vec;
-
 use nalgebra::SVector;
+use ohmstrain_ekf::{Belief, State};
 use ohmstrain_model::{Phase, Scalar, Symmetric};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal, StandardUniform};
-
-use crate::{Belief, State};
 
 /// One path of the motion, as far as it has come.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -152,4 +149,27 @@ impl Chance {
     pub(crate) fn combine<T: Scalar, const N: usize>(&mut self, columns: &[SVector<T, N>]) -> SVector<T, N> {
         columns.iter().fold(SVector::zeros(), |sum, column| sum + column * self.normal::<T>())
     }
+}
+
+/// Columns of a square root `L √D` of a positive semi-definite matrix, `L D Lᵀ` with unit lower triangular L; what rounding
+/// leaves of a zero pivot counts as zero.
+pub(crate) fn root_columns<T: Scalar, const N: usize, const L: usize>(
+    matrix: &Symmetric<T, N, L>,
+) -> [SVector<T, N>; N] {
+    let negligible = T::default_epsilon() * T::of(N as f64);
+    let mut columns = [SVector::zeros(); N];
+    for j in 0..N {
+        let left = |i: usize, columns: &[SVector<T, N>; N]| {
+            (0..j).fold(matrix[(i, j)], |left, k| left - columns[k][i] * columns[k][j])
+        };
+        let pivot = left(j, &columns);
+        if pivot <= matrix[(j, j)].abs() * negligible {
+            continue;
+        }
+        let root = pivot.sqrt();
+        for i in j..N {
+            columns[j][i] = left(i, &columns) / root;
+        }
+    }
+    columns
 }
