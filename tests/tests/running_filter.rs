@@ -71,6 +71,7 @@ fn sensor() -> SensorParams {
             duration_s: 100.0,
             longest_repeat_s: 0.0,
         },
+        sessions: None,
         static_cubic: StaticCubic { reading_centre: 1.0, reading_scale: 1.0, coefficients: [0.0; 4], range: limits },
         joint: None,
         law: law(&[4.0, 32.0]),

@@ -63,7 +63,7 @@ pub use params::static_cubic::StaticCubic;
 pub use params::summary::{Limit, Summary, TestedSummary};
 pub use params::validate::FieldError;
 pub use params::{
-    FORMAT, JointParams, LARGEST_SD_SCALE, Quantity, RangeParams, ReadingUnit, RecordingInfo, SensorParams,
+    FORMAT, JointParams, LARGEST_SD_SCALE, Quantity, RangeParams, ReadingUnit, RecordingInfo, SensorParams, Sessions,
     Uncertainty, Validity,
 };
 pub use prior::{CorrectionPrior, EstimatorPrior, FEWEST_SENSORS, LawPrior, PRIOR_FORMAT, Prior};

@@ -35,6 +35,7 @@ fn filter() -> Filter {
         per_reading: 0.66,
         start: 1e-3,
         most: unread.anywhere,
+        session: 0.0,
         unread,
         rest: None,
     };
@@ -49,7 +50,7 @@ fn filter() -> Filter {
         known_variance: 1e-6,
         sieve: Sieve { plausible: (-0.5, 1.5), longest_repeat_s: f32::INFINITY, jump: 0.05, error_time_s: 0.0 },
         doubt,
-        rest: RestBounds { low: None, high: None },
+        rest: RestBounds { low: None, high: None, start: None },
         learned: None,
     };
     LiveFilter::new(estimator, parts)

@@ -135,9 +135,10 @@ impl FilterBuilder<'_> {
                 output.rest_off = off;
                 if let Some(doubts) = doubts.as_mut().filter(|_| k > 0 || !starts_known) {
                     let estimate = &output.estimate;
-                    // Doubts are of readings as calibration would have had them.
+                    // Doubts are of readings as calibration would have had them, but for the session's R₀.
                     let taken = output.verdict.is_taken().then(|| (calibrated(k).1, output.nis));
-                    let taken = taken.and_then(|(reading, nis)| Some((reading?.value, nis.unwrap_or(0.0))));
+                    let of_session = |reading| follower.map_or(reading, |follower| follower.of_session(reading));
+                    let taken = taken.and_then(|(reading, nis)| Some((of_session(reading?.value), nis.unwrap_or(0.0))));
                     doubts.see_back(time_s - start_s, next_s - time_s, taken);
                     next_s = if taken.is_some() { time_s } else { next_s };
                     let (widened, flags) = doubts.widened(estimate.rate.mean, estimate.strain.variance);

@@ -1,5 +1,7 @@
 //! R₀ of another day.
 
+use ohmstrain::{Estimate, Sensor};
+use ohmstrain_calib::Sessions;
 use ohmstrain_ekf::live::{RestBounds, RestFollower};
 
 /// The same in resistances: R₀ goes to where the reading is an end of the range, in a step that is implicit in time.
@@ -38,7 +40,8 @@ fn r0_follows_as_a_play_with_a_lag() {
         })
         .collect();
     let expected = followed((0.95, 2.2), rows.iter().copied());
-    let mut follower = RestFollower::<f64>::new(RestBounds { low: Some(0.95 - 1.0), high: Some(2.2 - 1.0) });
+    let mut follower =
+        RestFollower::<f64>::new(RestBounds { low: Some(0.95 - 1.0), high: Some(2.2 - 1.0), start: None });
     let mut farthest = (0.0_f64, 0.0_f64);
     for ((dt_s, resistance), expected) in rows.into_iter().zip(expected) {
         follower.see(dt_s, resistance - 1.0);
@@ -47,4 +50,66 @@ fn r0_follows_as_a_play_with_a_lag() {
     }
     // It went both ways.
     assert!(farthest.0 < -0.1 && farthest.1 > 0.1, "{farthest:?}");
+}
+
+/// The example's sensor, as if it had been calibrated on several sessions.
+fn of_sessions(rest_sd: f64, start_sd: f64) -> Sensor {
+    let text = std::fs::read_to_string("examples/sensor.toml").unwrap();
+    let mut params = Sensor::from_toml(&text).unwrap().params().clone();
+    params.sessions = Some(Sessions { rest_sd, start_sd });
+    Sensor::from_params(params).unwrap()
+}
+
+/// Readings of a session whose resistances are `times` those of the calibration: from rest up and down within its readings.
+fn session(sensor: &Sensor, times: f64) -> Vec<(f64, f64)> {
+    let (rested, highest) = (sensor.params().rested(), sensor.params().validity.reading_upper);
+    let of = |k: i32| {
+        let time_s = 0.05 * f64::from(k);
+        (time_s, times * (rested + 0.9 * (highest - rested) * (0.3 * time_s).sin().powi(2)))
+    };
+    (0..400).map(of).collect()
+}
+
+fn filtered(sensor: &Sensor, rows: &[(f64, f64)]) -> Vec<Estimate> {
+    let mut filter = sensor.filter().build().unwrap();
+    rows.iter().map(|&(time_s, reading)| filter.step(time_s, reading).unwrap()).collect()
+}
+
+/// With starts that differ by nothing the first reading tells R₀: all is as in the calibration's own session, from the first row.
+#[test]
+fn where_sessions_begin_at_rest_the_first_reading_tells_r0() {
+    let sensor = of_sessions(0.2, 1e-9);
+    let own = session(&sensor, 1.0);
+    let smoothed = |rows: &[(f64, f64)]| {
+        let (time_s, readings): (Vec<f64>, Vec<f64>) = rows.iter().copied().unzip();
+        sensor.filter().smooth(&time_s, &readings).unwrap()
+    };
+    for times in [0.8, 1.3] {
+        let other = session(&sensor, times);
+        let pairs = filtered(&sensor, &own).into_iter().zip(filtered(&sensor, &other));
+        for (own, other) in pairs.chain(smoothed(&own).into_iter().zip(smoothed(&other))) {
+            // Readings that are equal but for rounding, 1e-16 of them, and a filter that amplifies it over 400 rows.
+            assert!((own.strain - other.strain).abs() < 1e-6 * own.strain_sd, "{times}: {own:?} {other:?}");
+            assert!((own.strain_sd / other.strain_sd - 1.0).abs() < 1e-6, "{times}: {own:?} {other:?}");
+            assert_eq!(own.flags, other.flags);
+        }
+    }
+}
+
+/// Half of the way where both differ alike; none without sessions. The interval knows what is left open.
+#[test]
+fn the_first_reading_counts_by_how_starts_differ() {
+    let sensor = of_sessions(0.15, 0.15);
+    let (own, other) = (session(&sensor, 1.0), session(&sensor, 1.2));
+    let mut params = sensor.params().clone();
+    params.sessions = None;
+    let alone = Sensor::from_params(params).unwrap();
+    let (with, without) = (filtered(&sensor, &other), filtered(&alone, &other));
+    let of_own = filtered(&alone, &own);
+    let error = |estimates: &[Estimate]| -> f64 {
+        estimates.iter().zip(&of_own).map(|(estimate, own)| (estimate.strain - own.strain).powi(2)).sum()
+    };
+    assert!(error(&with) < error(&without), "{} {}", error(&with), error(&without));
+    let wider = filtered(&sensor, &own);
+    assert!(wider.iter().zip(&of_own).all(|(wider, own)| wider.strain_sd > own.strain_sd));
 }

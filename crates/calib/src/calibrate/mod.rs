@@ -32,11 +32,12 @@ use crate::params::law::LawParams;
 use crate::params::recipe::RECIPE;
 use crate::params::static_cubic::StaticCubic;
 use crate::params::summary::Summary;
-use crate::params::{FORMAT, Quantity, RangeParams, ReadingUnit, SensorParams, Uncertainty, Validity};
+use crate::params::{FORMAT, Quantity, RangeParams, ReadingUnit, SensorParams, Sessions, Uncertainty, Validity};
 use crate::prior::{CorrectionPrior, Prior};
 use crate::recording::repeats::longest_repeat_s;
 use crate::recording::rest::rest_share;
 use crate::recording::screen::{Distrusted, screen};
+use crate::recording::sessions::sessions;
 use crate::samples::{Samples, reading_range};
 
 /// What calibration is doing, for a progress bar.
@@ -79,6 +80,8 @@ pub struct Calibration {
     pub limits: RangeParams,
     /// What was seen.
     pub validity: Validity,
+    /// How recordings differ, if there are several that begin at rest.
+    pub sessions: Option<Sessions>,
     /// The static inverse fitted to the same rows.
     pub static_cubic: StaticCubic,
     /// What it is worth on parts that it was not fitted to; `None` if they cannot be estimated.
@@ -103,6 +106,7 @@ impl Calibration {
             tested: None,
             limits: self.limits,
             validity: self.validity,
+            sessions: self.sessions,
             static_cubic: self.static_cubic,
             joint: None,
             law: self.law,
@@ -194,7 +198,7 @@ pub(crate) fn calibrate_once(
     let seen = Seen::new(recordings, limits, &stats);
     let findings = Check { recordings, fit, kind: default_estimator, filter, estimators: &estimators, of_make }
         .findings(seen, &identifiability);
-    let own = validity(recordings, limits, &stats);
+    let own = validity(recordings, &fit.law.rest_readings, limits, &stats);
     Ok(Calibration {
         distrusted: screened.distrusted.clone(),
         default_estimator,
@@ -206,6 +210,7 @@ pub(crate) fn calibrate_once(
         limits,
         uncertainty: identifiability.map(|found| found.told()),
         rest_share: rest_share(recordings, &fit.law.rest_readings, limits.span()),
+        sessions: sessions(recordings, &fit.law.rest_readings, limits.span()),
         rest_readings: fit.law.rest_readings.clone(),
         law: fit.law.law.clone(),
     })
@@ -246,9 +251,17 @@ fn cheapest<'s, 'a: 's>(surveyed: impl Iterator<Item = &'s Surveyed<'a>>) -> Opt
     surveyed.min_by(|a, b| cost(a).total_cmp(&cost(b)))
 }
 
-/// What was seen.
-fn validity(recordings: &[Samples], limits: RangeParams, stats: &MotionStats) -> Validity {
-    let (reading_lower, reading_upper) = reading_range(recordings);
+/// What was seen. Readings count relative to R₀ of their recording: in ohms another session's would hide how far a strain leads.
+fn validity(recordings: &[Samples], rest_readings: &[f64], limits: RangeParams, stats: &MotionStats) -> Validity {
+    let rest = median_rest(rest_readings);
+    let of_sensor = |of: f64, samples: &Samples| {
+        let (low, high) = reading_range(std::slice::from_ref(samples));
+        // One recording keeps its readings to the last digit.
+        if of == rest { (low, high) } else { (low / of * rest, high / of * rest) }
+    };
+    let ranges = recordings.iter().zip(rest_readings).map(|(samples, of)| of_sensor(*of, samples));
+    let joined = |(low, high): (f64, f64), next: (f64, f64)| (low.min(next.0), high.max(next.1));
+    let (reading_lower, reading_upper) = ranges.fold((f64::INFINITY, f64::NEG_INFINITY), joined);
     Validity {
         lower: limits.lower,
         upper: limits.upper,

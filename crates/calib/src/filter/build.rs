@@ -274,6 +274,7 @@ fn bare_parts(estimator: &EstimatorParams, limits: RangeParams) -> LiveParts<f64
         per_reading: 0.0,
         start: 0.0,
         most: unread.anywhere,
+        session: 0.0,
         unread,
         rest: None,
     };
@@ -288,7 +289,7 @@ fn bare_parts(estimator: &EstimatorParams, limits: RangeParams) -> LiveParts<f64
         known_variance: (START_SD * limits.span()).powi(2),
         sieve: Sieve::open().with_error_time(noise.reading_time_s),
         doubt,
-        rest: RestBounds { low: None, high: None },
+        rest: RestBounds { low: None, high: None, start: None },
         learned: None,
     }
 }

@@ -1,9 +1,9 @@
 //! What a filter that runs for days knows of the calibration of its sensor.
 
-use ohmstrain_ekf::live::{DOUBT, DoubtParts, RestBounds, RestSeen, Sieve, Unread};
+use ohmstrain_ekf::live::{DOUBT, DoubtParts, RestBounds, RestSeen, SessionStart, Sieve, Unread};
 
-use crate::params::SensorParams;
 use crate::params::estimator::MotionParams;
+use crate::params::{SensorParams, Sessions};
 
 /// By what factor a reading may lie outside of the calibration's, and by how many ranges of them above: another day, drift
 /// and strains that were not calibrated for do not double a resistance; a bad contact or a meter's overload does. No limit is set
@@ -76,11 +76,25 @@ impl SensorParams {
         let sign = if grows { 1.0 } else { -1.0 };
         let rest = self.rest_seen().filter(|rest| rest.sign == sign);
         let near = rest.map(|rest| rest.end - sign * rest.tolerance);
+        let start = self.session_start();
         if grows {
-            RestBounds { low: near, high: Some(high + margin) }
+            RestBounds { low: near, high: Some(high + margin), start }
         } else {
-            RestBounds { low: Some(low - margin), high: near }
+            RestBounds { low: Some(low - margin), high: near, start }
         }
+    }
+
+    /// What the first reading of a session says of R₀; `None` where it was calibrated on one session, or none begins at rest.
+    fn session_start(&self) -> Option<SessionStart<f64>> {
+        let (sessions, measured) = (self.sessions?, self.measured_rest?);
+        Some(SessionStart { reading: self.relative(measured), weight: sessions.weight() })
+    }
+
+    /// Variance of the strain from what a session's first reading leaves open of R₀, by the mean slope and at the mean of the readings.
+    fn session_variance(&self, per_reading: f64) -> f64 {
+        let (low, high) = self.relative_readings();
+        let of = |sessions: Sessions| (sessions.left_sd() * (1.0 + 0.5 * (low + high)) * per_reading).powi(2);
+        self.sessions.map_or(0.0, of)
     }
 
     /// What is to be doubted of a filter that runs with that motion.
@@ -89,14 +103,16 @@ impl SensorParams {
         let (seen, span) = (&self.validity, self.limits.span());
         let (low, high) = self.relative_readings();
         let unread = Unread::new(motion.rate_time_s, motion.rate_sd_per_s, self.limits.to_model());
+        let per_reading = if high > low { span / (high - low) } else { 0.0 };
         DoubtParts {
             low,
             high,
             fastest_per_s: seen.fastest_rate_per_s,
             longest_s: seen.duration_s,
-            per_reading: if high > low { span / (high - low) } else { 0.0 },
+            per_reading,
             start: (START * span).powi(2),
             most: unread.anywhere,
+            session: self.session_variance(per_reading),
             unread,
             rest: self.rest_seen(),
         }

@@ -60,6 +60,9 @@ pub struct SensorParams {
     pub limits: RangeParams,
     /// What calibration has seen.
     pub validity: Validity,
+    /// How sessions differ, where it was calibrated on several.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sessions: Option<Sessions>,
     /// The static inverse to compare with.
     pub static_cubic: StaticCubic,
     /// A sensor glued across a joint, if it is one.
@@ -158,6 +161,31 @@ pub struct Validity {
     pub duration_s: f64,
     /// Longest time for which a reading was repeated to the last digit, s.
     pub longest_repeat_s: f64,
+}
+
+/// How recordings differ from each other: each is a session, with an R₀ of its own.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Sessions {
+    /// Standard deviation of ln R₀ between sessions.
+    pub rest_sd: f64,
+    /// Standard deviation, between sessions that begin at rest, of the logarithm of what is read then over R₀.
+    pub start_sd: f64,
+}
+
+impl Sessions {
+    /// Weight of a session's first reading in the best linear estimate of ln R₀.
+    #[must_use]
+    pub fn weight(&self) -> f64 {
+        let (rest, start) = (self.rest_sd.powi(2), self.start_sd.powi(2));
+        rest / (rest + start)
+    }
+
+    /// Standard deviation of ln R₀ that the first reading leaves.
+    #[must_use]
+    pub fn left_sd(&self) -> f64 {
+        self.start_sd * self.weight().sqrt()
+    }
 }
 
 /// Geometry of a joint: `ε = prestrain + moment_arm θ / gauge_length`.

@@ -16,7 +16,7 @@ use crate::params::estimator::{EstimatorParams, MotionParams, NoiseParams, Phase
 use crate::params::law::{GaugeParams, LawParams};
 use crate::params::static_cubic::StaticCubic;
 use crate::params::summary::{Summary, TestedSummary};
-use crate::params::{JointParams, RangeParams, RecordingInfo, SensorParams, Uncertainty, Validity};
+use crate::params::{JointParams, RangeParams, RecordingInfo, SensorParams, Sessions, Uncertainty, Validity};
 
 /// Shortest range of strains, relative to its larger end.
 const SHORTEST_RANGE: f64 = 1e-9;
@@ -43,6 +43,7 @@ impl SensorParams {
         self.limits.validate(&root.table("limits"))?;
         self.validity.validate(&root.table("validity"))?;
         self.check_rest(&root)?;
+        self.sessions.map_or(Ok(()), |sessions| sessions.validate(&root.table("sessions")))?;
         self.static_cubic.validate(&root.table("static_cubic"))?;
         if let Some(joint) = &self.joint {
             joint.validate(&root.table("joint"))?;
@@ -99,6 +100,13 @@ impl TestedSummary {
         table.number("filter_percent_fs", self.filter_percent_fs, TOLD_AMOUNT)?;
         table.number("static_cubic_percent_fs", self.static_cubic_percent_fs, TOLD_AMOUNT)?;
         table.number("coverage_95_percent", self.coverage_95_percent, TOLD_AMOUNT)
+    }
+}
+
+impl Sessions {
+    fn validate(self, table: &Table) -> Result<(), FieldError> {
+        table.number("rest_sd", self.rest_sd, POSITIVE)?;
+        table.number("start_sd", self.start_sd, POSITIVE)
     }
 }
 

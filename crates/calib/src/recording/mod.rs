@@ -5,3 +5,4 @@ pub(crate) mod lag;
 pub(crate) mod repeats;
 pub(crate) mod rest;
 pub(crate) mod screen;
+pub(crate) mod sessions;

@@ -16,7 +16,7 @@ pub(crate) fn rest_share(recordings: &[Samples], rest_readings: &[f64], span: f6
 }
 
 /// Median reading of the first rows, those at zero strain before the first one that is not.
-fn reading_before_moving(samples: &Samples, span: f64) -> Option<f64> {
+pub(crate) fn reading_before_moving(samples: &Samples, span: f64) -> Option<f64> {
     let at_zero = samples.complete_rows().take_while(|&k| samples.strain[k].abs() <= ZERO * span);
     median(at_zero.map(|k| samples.reading[k]))
 }

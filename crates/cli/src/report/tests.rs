@@ -52,6 +52,7 @@ fn sensor() -> SensorParams {
             duration_s: 100.0,
             longest_repeat_s: 0.0,
         },
+        sessions: None,
         static_cubic: StaticCubic {
             reading_centre: 1200.0,
             reading_scale: 200.0,

@@ -54,6 +54,8 @@ pub struct DoubtParts<T> {
     pub start: T,
     /// Variance of a strain that may be anywhere in the limits: there is no more to doubt.
     pub most: T,
+    /// Variance of the strain from what a session leaves open of R₀; zero where calibration knows one session only.
+    pub session: T,
     /// What is known without a reading.
     pub unread: Unread<T>,
     /// What the sensor read at rest, if that is known.
@@ -72,6 +74,7 @@ impl DoubtParts<f64> {
             per_reading: T::of(self.per_reading),
             start: T::of(self.start),
             most: T::of(self.most),
+            session: T::of(self.session),
             unread: self.unread.to(),
             rest: self.rest.map(|rest| rest.to()),
         }
@@ -148,6 +151,7 @@ impl<T: Recordable> Misfit<T> {
 ///     per_reading: 0.3,
 ///     start: 0.03 * 0.03,
 ///     most: unread.anywhere,
+///     session: 0.0,
 ///     unread,
 ///     rest: None,
 /// };
@@ -338,7 +342,7 @@ impl<T: Recordable> Doubts<T> {
         let outside = self.misfit.outside(&self.parts);
         let rest_off = self.rest.map_or(T::zero(), |rest| rest.off());
         let elsewhere = rest_off * per_reading;
-        let more = (self.fading + outside + elsewhere * elsewhere).min(most);
+        let more = (self.fading + outside + elsewhere * elsewhere + self.parts.session).min(most);
         let is_beyond = is_fast || outside > worth * variance || birge > T::one() + worth;
         let flags = Flags::NONE
             .with(Flag::StartUp, self.starts && self.fading > worth * self.parts.start)
@@ -380,6 +384,7 @@ mod tests {
             per_reading,
             start,
             most,
+            session: 0.0,
             unread,
             rest: Some(rest),
         }

@@ -306,10 +306,12 @@ where
             heard.jumped.into_iter().for_each(|jump| follower.jumped(jump));
             follower.see(now.doubts.unread_s + dt_s, reading);
         }
+        let of_session = |reading| now.follower.map_or(reading, |follower| follower.of_session(reading));
+        let doubted = taken.map(|(reading, nis)| (of_session(reading), nis));
         if heard.verdict.is_refused() {
             now.doubts.refuse();
         }
-        let open = now.doubts.see(dt_s, taken, stated);
+        let open = now.doubts.see(dt_s, doubted, stated);
         let (widened, doubts) = now.doubts.widened(moments.mean[1], open);
         let (variance, doubts) =
             if self.protections.doubts { (widened, doubts) } else { (stated.variance, Flags::NONE) };

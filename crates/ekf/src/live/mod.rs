@@ -25,7 +25,7 @@ pub use jumps::{BESIDE_AFTER, BESIDE_SHARE, Jumps, STARTLING_NIS, SURPRISING_NIS
 pub use learned::{Correct, Learned};
 pub use parts::LiveParts;
 pub use protections::Protections;
-pub use rest_follow::{FARTHEST_REST, FOLLOWING, Following, RestBounds, RestFollower};
+pub use rest_follow::{FARTHEST_REST, FOLLOWING, Following, RestBounds, RestFollower, SessionStart};
 pub use rest_watch::{RestSeen, RestWatch};
 pub use sieve::{MOST_REPEATS, Repeats, Sieve, news};
 pub use unread::{NEVER_READ_S, Unread};

@@ -42,25 +42,45 @@ pub struct RestBounds<T> {
     pub low: Option<T>,
     /// The largest.
     pub high: Option<T>,
+    /// What the first reading of a session says of R₀; `None` where recordings of the calibration do not tell.
+    pub start: Option<SessionStart<T>>,
+}
+
+/// What the first reading of a session says of R₀, by how recordings of the calibration differ.
+///
+/// R₀ is drawn anew for each session: `ln R₀` has the standard deviation s between sessions. A session begins at rest, with a
+/// reading whose logarithm is `ln R₀` plus a constant, to the standard deviation f. The best linear estimate of `ln R₀` from the first
+/// reading is `s²/(s² + f²)` of the way from calibration's R₀ to the one that the reading alone suggests.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SessionStart<T> {
+    /// The usual first reading, R/R₀ - 1.
+    pub reading: T,
+    /// Weight of the first reading, `s²/(s² + f²)`, 0 to 1.
+    pub weight: T,
 }
 
 impl RestBounds<f64> {
     /// The same in another precision.
     #[must_use]
     pub fn to<T: Recordable>(&self) -> RestBounds<T> {
-        RestBounds { low: self.low.map(T::of), high: self.high.map(T::of) }
+        RestBounds {
+            low: self.low.map(T::of),
+            high: self.high.map(T::of),
+            start: self.start.map(|start| SessionStart { reading: T::of(start.reading), weight: T::of(start.weight) }),
+        }
     }
 }
 
 /// R₀ that follows the readings: it is calibration's as long as they stay where they were then; one that lies beyond them
 /// slowly draws it after itself, and one beyond the other end soon draws it back (a play as wide as calibration's readings,
-/// with a lag). That is right where the sensor moves between the same strains as in calibration, on another day. Where it is stretched
+/// with a lag). Where sessions are known to begin at rest, it begins at what the first reading says ([`SessionStart`]), and that
+/// stands for calibration's. Following is right where the sensor moves between the same strains as in calibration, on another day. Where it is stretched
 /// farther, the strain is at its limit in any case.
 ///
 /// ```
 /// use ohmstrain_ekf::live::{RestBounds, RestFollower};
 ///
-/// let mut follower = RestFollower::<f64>::new(RestBounds { low: Some(-0.05), high: Some(1.5) });
+/// let mut follower = RestFollower::<f64>::new(RestBounds { low: Some(-0.05), high: Some(1.5), start: None });
 /// for k in 0..6000 {
 ///     follower.see(0.05, 2.0 - 1e-9 * f64::from(k % 2));
 /// }
@@ -73,6 +93,8 @@ pub struct RestFollower<T> {
     bounds: RestBounds<T>,
     /// By what share of calibration's R₀ it is another.
     pub(crate) off: T,
+    /// By what share it was another when the session began.
+    pub(crate) home: T,
     /// The last reading, none before the first one, and the time since it came, s.
     pub(crate) last: Option<T>,
     pub(crate) since_s: T,
@@ -84,18 +106,18 @@ impl<T: Recordable> RestFollower<T> {
     /// Before any reading, R₀ is calibration's.
     ///
     /// ```
-    /// let bounds = ohmstrain_ekf::live::RestBounds { low: None, high: Some(1.5) };
+    /// let bounds = ohmstrain_ekf::live::RestBounds { low: None, high: Some(1.5), start: None };
     /// assert_eq!(ohmstrain_ekf::live::RestFollower::<f64>::new(bounds).off(), 0.0);
     /// ```
     #[must_use]
     pub fn new(bounds: RestBounds<T>) -> Self {
-        Self { bounds, off: T::zero(), last: None, since_s: T::zero(), jumped: None }
+        Self { bounds, off: T::zero(), home: T::zero(), last: None, since_s: T::zero(), jumped: None }
     }
 
     /// By what share of calibration's R₀ it is another.
     ///
     /// ```
-    /// let mut follower = ohmstrain_ekf::live::RestFollower::<f64>::new(ohmstrain_ekf::live::RestBounds { low: None, high: None });
+    /// let mut follower = ohmstrain_ekf::live::RestFollower::<f64>::new(ohmstrain_ekf::live::RestBounds { low: None, high: None, start: None });
     /// follower.see(1.0, 2.0);
     /// assert_eq!(follower.off(), 0.0);
     /// ```
@@ -107,21 +129,44 @@ impl<T: Recordable> RestFollower<T> {
     /// A reading relative to R₀ as it is, from one relative to calibration's.
     ///
     /// ```
-    /// let follower = ohmstrain_ekf::live::RestFollower::<f64>::new(ohmstrain_ekf::live::RestBounds { low: None, high: None });
+    /// let follower = ohmstrain_ekf::live::RestFollower::<f64>::new(ohmstrain_ekf::live::RestBounds { low: None, high: None, start: None });
     /// assert_eq!(follower.relative(0.5.into()).value, 0.5);
     /// ```
     #[must_use]
     pub fn relative(&self, reading: Reading<T>) -> Reading<T> {
-        let rest = T::one() + self.off;
+        let off = if self.last.is_none() { self.start(reading.value) } else { self.off };
+        let rest = T::one() + off;
         let extra_variance = reading.extra_variance / (rest * rest);
-        Reading { value: (reading.value - self.off) / rest, extra_variance }
+        Reading { value: (reading.value - off) / rest, extra_variance }
+    }
+
+    /// A reading relative to R₀ as it was when the session began: what doubts are of.
+    ///
+    /// ```
+    /// let start = Some(ohmstrain_ekf::live::SessionStart { reading: 0.0, weight: 0.5 });
+    /// let bounds = ohmstrain_ekf::live::RestBounds { low: None, high: None, start };
+    /// let mut follower = ohmstrain_ekf::live::RestFollower::<f64>::new(bounds);
+    /// follower.see(0.0, 0.2);
+    /// assert!((follower.of_session(0.65) - 0.5).abs() < 1e-12);
+    /// ```
+    #[must_use]
+    pub fn of_session(&self, reading: T) -> T {
+        let home = if self.last.is_none() { self.start(reading) } else { self.home };
+        (reading - home) / (T::one() + home)
+    }
+
+    /// By what share R₀ is another in a session that begins with this reading.
+    fn start(&self, reading: T) -> T {
+        let Some(start) = self.bounds.start else { return self.off };
+        let off = start.weight * (reading - start.reading) / (T::one() + start.reading);
+        off.max(T::of(1.0 / FOLLOWING.farthest - 1.0)).min(T::of(FOLLOWING.farthest - 1.0))
     }
 
     /// Takes a reading R/R₀ - 1, of calibration's R₀, `dt_s` seconds after the reading before. A number that comes again says
     /// nothing until another one comes: it may be stuck.
     ///
     /// ```
-    /// let bounds = ohmstrain_ekf::live::RestBounds { low: None, high: Some(1.5) };
+    /// let bounds = ohmstrain_ekf::live::RestBounds { low: None, high: Some(1.5), start: None };
     /// let mut follower = ohmstrain_ekf::live::RestFollower::<f64>::new(bounds);
     /// [1.4, 2.0, 2.0].into_iter().for_each(|reading| follower.see(2.0, reading));
     /// // 0.2, by 2 s of 40.
@@ -129,6 +174,7 @@ impl<T: Recordable> RestFollower<T> {
     /// ```
     pub fn see(&mut self, dt_s: T, reading: T) {
         self.jumped.iter_mut().for_each(|[_, ago_s]| *ago_s += dt_s);
+        self.begin(reading);
         self.draw(T::of(FOLLOWING.leaves_s), dt_s, reading);
     }
 
@@ -136,7 +182,7 @@ impl<T: Recordable> RestFollower<T> {
     /// fault: R₀ is what it was before.
     ///
     /// ```
-    /// let bounds = ohmstrain_ekf::live::RestBounds { low: Some(-0.05), high: Some(1.5) };
+    /// let bounds = ohmstrain_ekf::live::RestBounds { low: Some(-0.05), high: Some(1.5), start: None };
     /// let mut follower = ohmstrain_ekf::live::RestFollower::<f64>::new(bounds);
     /// [1.4, 2.0, 2.1].into_iter().for_each(|reading| follower.see(2.0, reading));
     /// let before = follower.off();
@@ -154,6 +200,14 @@ impl<T: Recordable> RestFollower<T> {
         }
     }
 
+    /// Takes the first reading of a session.
+    fn begin(&mut self, reading: T) {
+        if self.last.is_none() {
+            let off = self.start(reading);
+            (self.off, self.home) = (off, off);
+        }
+    }
+
     fn draw(&mut self, leaves_s: T, dt_s: T, reading: T) {
         let last = self.last.replace(reading);
         self.since_s = if last.is_none() { T::zero() } else { self.since_s + dt_s };
@@ -166,7 +220,8 @@ impl<T: Recordable> RestFollower<T> {
         let (low, high) = (self.bounds.low.map(wanted), self.bounds.high.map(wanted));
         let Some(wanted) = high.filter(|&high| high > self.off).or(low.filter(|&low| low < self.off)) else { return };
         if T::of(1.0 / FOLLOWING.farthest - 1.0) < wanted && wanted < T::of(FOLLOWING.farthest - 1.0) {
-            let time_s = if wanted.abs() > self.off.abs() { leaves_s } else { T::of(FOLLOWING.returns_s) };
+            let is_leaving = (wanted - self.home).abs() > (self.off - self.home).abs();
+            let time_s = if is_leaving { leaves_s } else { T::of(FOLLOWING.returns_s) };
             self.off += passed_s / (time_s + passed_s) * (wanted - self.off);
         }
     }
@@ -176,6 +231,8 @@ impl RestFollower<f64> {
     /// The one R₀ of a recording: what is left when it has been gone through, and once more with that.
     #[must_use]
     pub fn settled(mut self, len: usize, row: impl Fn(usize) -> (f64, Option<Reading<f64>>)) -> Self {
+        let first = (0..len).find_map(|k| row(k).1);
+        first.into_iter().for_each(|reading| self.begin(reading.value));
         for _ in 0..2 {
             let mut last_s = f64::NAN;
             self.last = None;
@@ -186,7 +243,7 @@ impl RestFollower<f64> {
                     last_s = time_s;
                 }
             }
-            if self.off == 0.0 {
+            if self.off == self.home {
                 break;
             }
         }

@@ -61,6 +61,7 @@ fields! {
     }
     RestFollower {
         number "off" off,
+        number "home" home,
         maybe_one "drawn_by" last,
         number "undrawn_s" since_s,
         maybe "jumped" jumped,

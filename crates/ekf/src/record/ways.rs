@@ -198,7 +198,9 @@ mod tests {
 
     use super::{Function, Name, write_down};
     use crate::correction::{FeatureScale, ReadingFeatures};
-    use crate::live::{DoubtParts, Doubts, Flag, Jumps, Repeats, RestBounds, RestFollower, RestSeen, Sieve, Unread};
+    use crate::live::{
+        DoubtParts, Doubts, Flag, Jumps, Repeats, RestBounds, RestFollower, RestSeen, SessionStart, Sieve, Unread,
+    };
     use crate::record::tests::run;
     use crate::record::{Fields, See};
     use crate::{Gaussian, Reading};
@@ -287,6 +289,7 @@ mod tests {
             per_reading: 0.3,
             start: 1e-4,
             most: unread.anywhere,
+            session: 1e-4,
             unread,
             rest: Some(RestSeen { rested: 0.1, tolerance: 0.02, lasts_s: 2.0, sign: 1.0, end: 0.1 }),
         }
@@ -376,7 +379,8 @@ mod tests {
 
     #[test]
     fn an_r0_that_follows_jumps_and_features_are_written_down_for_all_their_ways() {
-        let bounds = RestBounds { low: Some(0.1), high: Some(0.9) };
+        let bounds =
+            RestBounds { low: Some(0.1), high: Some(0.9), start: Some(SessionStart { reading: 0.2, weight: 0.7 }) };
         let rates = [0.03, 0.02];
         let scale = FeatureScale { centre: 0.5, half_range: 0.5, rates, starts: [[0.1, 0.8]; 6] };
         let follows = write_down(|writer| {

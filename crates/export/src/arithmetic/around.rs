@@ -22,7 +22,7 @@ impl Around<'_> {
     /// All functions.
     pub fn text(&self) -> String {
         let of_readings = [Self::pass_time(), self.sieve(), startles(), self.coarser(), weighted(), self.reported()];
-        let of_rest = [self.on_followed_rest(), self.follow(), self.jumped()];
+        let of_rest = [self.on_followed_rest(), self.of_session(), self.follow(), self.jumped()];
         let of_doubts =
             [self.begin(), self.tell_rest(), self.run(), self.doubt_reading(), self.doubt_pause(), self.doubted()];
         let mut all: Vec<_> =
@@ -134,6 +134,18 @@ impl Around<'_> {
                 let shown = writer.state(self.follower()).relative(of_reading(writer));
                 writer.give("shown", shown.value);
                 writer.give("shown_variance", shown.extra_variance);
+            },
+        )
+    }
+
+    fn of_session(&self) -> Printed {
+        Printed::new(
+            "of_session",
+            "A reading relative to R0 as it was when the session began, from one relative to calibration's.",
+            &["float rho"],
+            |writer| {
+                let of_session = writer.state(self.follower()).of_session(writer.input("rho"));
+                writer.give(RETURNED, of_session);
             },
         )
     }

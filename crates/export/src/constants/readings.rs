@@ -26,6 +26,8 @@ pub struct DoubtConstants {
     /// Variances.
     start: Literal,
     most: Literal,
+    /// Variance of the strain from what a session leaves open of R0.
+    session: Literal,
     /// 1 where readings grow from rest on, -1 where they fall, 0 where it is not known.
     sign: Literal,
     zero: Literal,
@@ -38,6 +40,8 @@ pub struct DoubtConstants {
 pub struct FollowConstants {
     low: Option<Literal>,
     high: Option<Literal>,
+    /// The usual first reading of a session, and its weight.
+    start: Option<[Literal; 2]>,
 }
 
 /// What is known without a reading.
@@ -69,6 +73,7 @@ impl DoubtConstants {
             per_reading: Literal(seen.per_reading),
             start: Literal(seen.start),
             most: Literal(seen.most),
+            session: Literal(seen.session),
             sign: Literal(seen.rest.map_or(0.0, |rest| rest.sign)),
             zero,
             unread: UnreadConstants {
@@ -90,7 +95,8 @@ impl DoubtConstants {
 impl FollowConstants {
     /// Of a sensor.
     pub fn new(bounds: RestBounds<f32>) -> Self {
-        Self { low: bounds.low.map(Literal), high: bounds.high.map(Literal) }
+        let start = bounds.start.map(|start| [Literal(start.reading), Literal(start.weight)]);
+        Self { low: bounds.low.map(Literal), high: bounds.high.map(Literal), start }
     }
 }
 

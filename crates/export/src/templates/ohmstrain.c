@@ -522,7 +522,10 @@ static ohmstrain_status step(ohmstrain_state *state, float dt_s, const float *rh
     }
     pass_time(&seen, dt_s);
     if (rho) {
-        on_followed_rest(&seen, *rho, extra_variance, &shown, &extra_variance);
+        shown = *rho;
+        if (seen.follows) {
+            on_followed_rest(&seen, *rho, extra_variance, &shown, &extra_variance);
+        }
         flags = sieve(&seen, PLAUSIBILITY ? PLAUSIBLE_LOWER : -INFINITY, PLAUSIBILITY ? PLAUSIBLE_UPPER : INFINITY,
                       PLAUSIBILITY ? LONGEST_REPEAT_S : INFINITY, shown, extra_variance, &extra_variance);
         rho = flags ? (const float *)0 : &shown;
@@ -575,7 +578,7 @@ static ohmstrain_status step(ohmstrain_state *state, float dt_s, const float *rh
         refuse(&seen);
     }
     if (believed) {
-        doubt_reading(&seen, *believed, of_step.nis);
+        doubt_reading(&seen, seen.follows ? of_session(&seen, *believed) : *believed, of_step.nis);
     } else {
         variance = doubt_pause(&seen, strain, variance);
     }

@@ -7,9 +7,9 @@
 
 {% if correction %}
 use ohmstrain_ekf::correction::{Correction, FILTER_INPUTS, FeatureScale, InputScale, Process{% if correction.quadratics %}, Quadratic{% endif %}, RowBlock, Rows{% if correction.simulated %}, Simulated{% endif %}, Triangle};
-use ohmstrain_ekf::live::{DoubtParts, Learned, LiveFilter, LiveParts, RestBounds, {% if doubt.rest %}RestSeen, {% endif %}Sieve, Unread};
+use ohmstrain_ekf::live::{DoubtParts, Learned, LiveFilter, LiveParts, RestBounds, {% if doubt.rest %}RestSeen, {% endif %}{% if follow.start is not none %}SessionStart, {% endif %}Sieve, Unread};
 {% else %}
-use ohmstrain_ekf::live::{DoubtParts, Learned, LiveFilter, LiveParts, RestBounds, {% if doubt.rest %}RestSeen, {% endif %}Sieve, Unread};
+use ohmstrain_ekf::live::{DoubtParts, Learned, LiveFilter, LiveParts, RestBounds, {% if doubt.rest %}RestSeen, {% endif %}{% if follow.start is not none %}SessionStart, {% endif %}Sieve, Unread};
 {% endif %}
 {% if splits %}
 use ohmstrain_ekf::{Compact, {% if rests %}Dwell, {% endif %}Evidence, SignSplit, SparseEkf, StepError};
@@ -128,6 +128,7 @@ pub const DOUBT: DoubtParts<f32> = DoubtParts {
     per_reading: << doubt.per_reading >>,
     start: << doubt.start >>,
     most: << doubt.most >>,
+    session: << doubt.session >>,
     unread: Unread {
         rate_time_s: << doubt.unread.rate_time_s >>,
         path_variance: << doubt.unread.path_variance >>,
@@ -151,6 +152,7 @@ pub const DOUBT: DoubtParts<f32> = DoubtParts {
 pub const REST: RestBounds<f32> = RestBounds {
     low: {% if follow.low is none %}None{% else %}Some(<< follow.low >>){% endif %},
     high: {% if follow.high is none %}None{% else %}Some(<< follow.high >>){% endif %},
+    start: {% if follow.start is none %}None{% else %}Some(SessionStart { reading: << follow.start[0] >>, weight: << follow.start[1] >> }){% endif %},
 };
 
 /// Everything of the filter but the estimator.
