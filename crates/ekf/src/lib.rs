@@ -68,7 +68,6 @@ mod estimate;
 mod estimator;
 mod guard;
 mod kernel;
-mod linear;
 pub mod live;
 mod mixture;
 #[cfg(feature = "particles")]
@@ -78,7 +77,6 @@ pub mod record;
 mod residual;
 mod smooth;
 mod sparse;
-mod sparse_series;
 mod substeps;
 mod traits;
 mod unscented;
@@ -93,14 +91,13 @@ pub use estimate::{Estimate, Settling};
 pub use estimator::{Advanced, Estimator, Innovation, State};
 pub use guard::{Guard, Guarded, Influence, ReadingVerdict, Streak};
 pub use kernel::{
-    AnyCurve, Compact, CompactWidth, Cubic, Curve, CurveLine, Lanes, Line, Logistic, Real, Recordable, SigmaPoints,
-    SparseEkf, Switch, Undirected,
+    AnyCurve, Compact, CompactWidth, Cubic, Curve, CurveLine, Lanes, Logistic, Real, Recordable, SigmaPoints,
+    SparseEkf, Switch,
 };
-pub use linear::{Frozen, LinearFilter};
 pub use mixture::{Dwell, Evidence, Hypotheses, Imm, Mixture, MixtureResidual, PhaseMixture, Share, SignSplit};
 #[cfg(feature = "particles")]
 pub use particles::{Particle, ParticleCloud, ParticleStep, Particles};
-pub use residual::{LogLikelihood, Residual};
+pub use residual::Residual;
 pub use smooth::{PastStep, rts_step, smooth_back_through};
 pub use substeps::{
     EVENLY as STEP_EVENLY, GRACE as STEP_GRACE, GROWTH as STEP_GROWTH, LONGEST_PAUSE_S, Pause, Repeated, Substeps,
