@@ -10,7 +10,6 @@ mod direction;
 mod faults;
 mod guards;
 mod linear_oracles;
-mod linear_sensor;
 mod long_run;
 mod mixture_smoother;
 mod mixtures;

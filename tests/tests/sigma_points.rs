@@ -2,7 +2,7 @@
 
 use nalgebra::{SMatrix, SVector};
 use ohmstrain_ekf::{AnyCurve, Cubic};
-use ohmstrain_ekf::{Belief, Compact, Curve, Reading, SigmaPoints, SparseEkf, Undirected};
+use ohmstrain_ekf::{Belief, Compact, Curve, Reading, SigmaPoints, SparseEkf};
 use ohmstrain_model::{Gauge, ModelNoise, Motion, SensorLaw, StrainRange, SwitchedModel, Symmetric};
 
 /// Strains far beyond any that are looked at here.
@@ -68,7 +68,7 @@ fn an_update_is_that_of_the_moments() {
     let motion = Motion::ornstein_uhlenbeck(1.0, 0.3, 0.15, 0.2).unwrap();
     let noise = ModelNoise { reading_sd: 5e-3, branch_sd: 0.0, baseline_sd: 0.05, baseline_time_s: 5.0 };
     let model = SwitchedModel::<f64, 0, 3>::new(law, motion, noise).unwrap();
-    let filter = SparseEkf::<f64, Undirected, 0, 3, SigmaPoints<Cubic<f64>>>::new(model, 0.05).unwrap();
+    let filter = SparseEkf::<f64, Compact, 0, 3, SigmaPoints<Cubic<f64>>>::new(model, 0.05).unwrap();
     let mut belief = Belief {
         mean: SVector::from([0.2, -0.1, 0.01]),
         covariance: Symmetric::<f64, 3, 6>::from_packed([0.04, 0.01, 0.09, -0.003, 0.001, 0.0025]),
@@ -117,7 +117,7 @@ fn near_a_peak_sigma_points_cover_where_tangents_do_not() {
         });
         errors.sum::<f64>() / 21.0
     };
-    let sigma = SparseEkf::<f64, Undirected, 0, 2, SigmaPoints<Cubic<f64>>>::new(model, 1e-6).unwrap();
+    let sigma = SparseEkf::<f64, Compact, 0, 2, SigmaPoints<Cubic<f64>>>::new(model, 1e-6).unwrap();
     let tangents = SparseEkf::<f64, Compact, 0, 2>::new(model, 1e-6).unwrap();
     let mut off_peak = start;
     off_peak.mean[0] = 0.17;

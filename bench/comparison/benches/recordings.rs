@@ -1,4 +1,4 @@
-//! Whole recordings: smoothing, log-likelihood, one pass of a calibration.
+//! Whole recordings: smoothing, one pass of a calibration.
 #![allow(missing_docs, reason = "criterion's macro makes a public function without docs")]
 
 use std::hint::black_box;
@@ -6,39 +6,21 @@ use std::hint::black_box;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use nalgebra::SVector;
 use ohmstrain_bench_comparison::{RecordingPass, adskalman_smoother, simulated_recording, typed_kalman_smoother};
-use ohmstrain_bench_filters::{
-    DT_S, linear_sensor, linearised, log_likelihood, readings, sensor, smoother, sparse_smooth,
-};
-use ohmstrain_ekf::{Belief, Compact, Cubic, LinearFilter, Reading, SparseEkf};
+use ohmstrain_bench_filters::{linearised, readings, sensor, smoother};
 
 const ROWS: usize = 10_000;
 
 fn recordings(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("recording");
     group.throughput(Throughput::Elements(ROWS as u64));
-    let (rows, model) = (readings::<1>(ROWS), sensor::<1, 3>());
+    let rows = readings::<1>(ROWS);
     let vectors: Vec<SVector<f64, 1>> = rows.iter().map(|y| SVector::from([*y])).collect();
     let theirs = adskalman_smoother(&linearised());
     group.bench_function("adskalman_smoother_3", |bencher| bencher.iter(|| theirs(black_box(&vectors))));
     let theirs = typed_kalman_smoother(&linearised());
     group.bench_function("typed_kalman_smoother_3", |bencher| bencher.iter(|| theirs(black_box(&rows))));
-    let ours = smoother(model);
+    let ours = smoother(sensor::<1, 3>());
     group.bench_function("smoother_3", |bencher| bencher.iter(|| ours.in_place(black_box(&rows))));
-    let ekf = SparseEkf::<_, Compact, 1, 3, Cubic<f64>>::new(model, DT_S).expect("the gauge is cubic");
-    let start = Belief::initial(&model);
-    let taken: Vec<_> = rows.iter().map(|y| Some(Reading::from(*y))).collect();
-    group.bench_function("sparse_smoother_3", |bencher| {
-        bencher.iter(|| sparse_smooth(black_box(&ekf), &start, black_box(&taken)));
-    });
-    let (linear, linear_model) =
-        (LinearFilter::new(linear_sensor(), DT_S).expect("the sensor is linear"), linear_sensor());
-    let start_of_linear = Belief::initial(&linear_model);
-    group.bench_function("linear_smoother_3", |bencher| {
-        bencher.iter(|| sparse_smooth(black_box(&linear), &start_of_linear, black_box(&taken)));
-    });
-    group.bench_function("log_likelihood_3", |bencher| {
-        bencher.iter(|| log_likelihood(black_box(&ekf), &start, black_box(&rows)));
-    });
     group.finish();
 }
 

@@ -6,8 +6,8 @@ use ohmstrain_model::{Phase, SwitchedModel};
 
 use crate::mixtures::GatedMixture;
 use crate::{
-    DT_S, Filter, FrozenLinear, GatedLinear, GatedSparse, GatedUnscented, NonlinearReference, PackedReference, RANGE,
-    Visitor, linear_sensor, linearised, phased_sensor, readings, sensor,
+    DT_S, Filter, GatedSparse, GatedUnscented, NonlinearReference, PackedReference, RANGE, Visitor, linearised,
+    phased_sensor, readings, sensor,
 };
 
 /// Two periods of the readings, so that they can be repeated.
@@ -67,7 +67,7 @@ pub fn ekf<const B: usize, const N: usize, const L: usize>(
     Gated::new(Ekf::new(model), Belief::initial(&model))
 }
 
-/// Shows every filter with a thousand readings of the sensor it is for; all but the linear ones are for a [`sensor`].
+/// Shows every filter with a thousand readings of the sensor it is for; all but `reference_3` are for a [`sensor`].
 ///
 /// # Panics
 /// Never: the parameters are valid.
@@ -76,8 +76,6 @@ pub fn every_filter(visitor: &mut impl Visitor) {
     let three = sensor::<1, 3>();
     visitor.visit("reference_3", &readings, PackedReference::new(&linearised()));
     visitor.visit("nonlinear_reference_3", &readings, NonlinearReference::new());
-    visitor.visit("linear_3", &readings, GatedLinear::<1, 3, 6>::new(linear_sensor()));
-    visitor.visit("frozen_3", &readings, FrozenLinear::new(linear_sensor()));
     visitor.visit("sparse_ekf_3", &readings, GatedSparse::<1, 3, 6, Compact>::new(three));
     visitor.visit("sparse_ekf_4", &readings, GatedSparse::<1, 4, 10, Compact>::new(sensor()));
     visitor.visit("sparse_ukf_3", &readings, GatedUnscented::<1, 3, 6>::new(three));

@@ -15,10 +15,10 @@ pub use correction::Corrected;
 pub use estimators::{Gated, STEPS, ekf, every_filter};
 pub use nonlinear::{Ahead, Expected, NonlinearModel};
 pub use readings::{readings, strain_at};
-pub use recordings::{Smoother, log_likelihood, smoother, sparse_smooth};
+pub use recordings::{Smoother, smoother};
 pub use reference::{NonlinearReference, PackedReference};
 pub use sensor::{DT_S, LinearModel, RANGE, linear_sensor, linearised, phased_sensor, sensor, sensor_of};
-pub use sparse::{FrozenLinear, GatedLinear, GatedSparse, GatedUnscented};
+pub use sparse::{GatedSparse, GatedUnscented};
 
 /// A filter with its state.
 pub trait Filter {

@@ -1,6 +1,6 @@
 //! What is done with a whole recording at a fixed rate.
 
-use ohmstrain_ekf::{Belief, Compact, Cubic, Curve, Dynamics, Ekf, Estimator, Reading, SparseEkf, Switch};
+use ohmstrain_ekf::{Belief, Dynamics, Ekf, Estimator, Reading};
 use ohmstrain_model::{SwitchedModel, SwitchedStep};
 
 use crate::DT_S;
@@ -41,30 +41,4 @@ impl Smoother {
         }
         beliefs
     }
-}
-
-/// Filter and smoother without multiplications by zero, in place.
-///
-/// # Panics
-/// If a step fails.
-#[must_use]
-pub fn sparse_smooth<S: Switch<f64>, G: Curve<f64>>(
-    ekf: &SparseEkf<f64, S, 1, 3, G>,
-    start: &Belief<f64, 3, 6>,
-    readings: &[Option<Reading<f64>>],
-) -> Vec<Belief<f64, 3, 6>> {
-    let mut beliefs = vec![*start; readings.len()];
-    ekf.filter(start, readings.iter().copied(), &mut beliefs).expect("the readings are finite");
-    ekf.smooth(readings, &mut beliefs).expect("the filtered beliefs are sound");
-    beliefs
-}
-
-/// The log-likelihood of a recording under the EKF of three states; NaN if a step fails.
-#[must_use]
-pub fn log_likelihood(
-    ekf: &SparseEkf<f64, Compact, 1, 3, Cubic<f64>>,
-    start: &Belief<f64, 3, 6>,
-    readings: &[f64],
-) -> f64 {
-    ekf.log_likelihood(start, readings.iter().map(|y| Some(Reading::from(*y)))).unwrap_or(f64::NAN)
 }

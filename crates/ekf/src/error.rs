@@ -21,8 +21,6 @@ pub enum StepError {
     NonFiniteState,
     /// The model's gauge curve is not of the family that the filter was made for.
     OtherGauge,
-    /// The model tells stretching from releasing, or its gains grow with strain; the filter is for one that does not.
-    Directed,
     /// The estimator cannot look back.
     NoSmoother,
     /// The rested sensor cannot read that: it is beyond [`FARTHEST_REST`](crate::live::FARTHEST_REST) times what it read in
@@ -48,7 +46,6 @@ impl fmt::Display for StepError {
             Self::NonPositiveInnovationVariance => "the innovation's variance is not positive",
             Self::NonFiniteState => "the new state is not finite",
             Self::OtherGauge => "the gauge curve is of another family than the filter's",
-            Self::Directed => "the law tells stretching from releasing, which the filter does not",
             Self::NoSmoother => "the estimator has no smoother",
             Self::ImplausibleRest => "what the rested sensor reads is more than four times, or less than a quarter of, what it read in calibration",
         })

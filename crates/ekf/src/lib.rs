@@ -66,7 +66,6 @@ mod estimate;
 mod estimator;
 mod guard;
 mod kernel;
-mod linear;
 pub mod live;
 mod mixture;
 #[cfg(feature = "record")]
@@ -74,7 +73,6 @@ pub mod record;
 mod residual;
 mod smooth;
 mod sparse;
-mod sparse_series;
 mod substeps;
 mod traits;
 mod unscented;
@@ -89,12 +87,11 @@ pub use estimate::{Estimate, Settling};
 pub use estimator::{Advanced, Estimator, Innovation, State};
 pub use guard::{Guard, Guarded, Influence, ReadingVerdict, Streak};
 pub use kernel::{
-    AnyCurve, Compact, CompactWidth, Cubic, Curve, CurveLine, Lanes, Line, Logistic, Real, Recordable, SigmaPoints,
-    SparseEkf, Switch, Undirected,
+    AnyCurve, Compact, CompactWidth, Cubic, Curve, CurveLine, Lanes, Logistic, Real, Recordable, SigmaPoints,
+    SparseEkf, Switch,
 };
-pub use linear::{Frozen, LinearFilter};
 pub use mixture::{Dwell, Evidence, Hypotheses, Imm, Mixture, MixtureResidual, PhaseMixture, Share, SignSplit};
-pub use residual::{LogLikelihood, Residual};
+pub use residual::Residual;
 pub use smooth::{PastStep, rts_step, smooth_back_through};
 pub use substeps::{
     EVENLY as STEP_EVENLY, GRACE as STEP_GRACE, GROWTH as STEP_GROWTH, LONGEST_PAUSE_S, Pause, Repeated, Substeps,

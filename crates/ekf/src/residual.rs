@@ -30,63 +30,6 @@ impl<T: Scalar> Residual<T> {
     }
 }
 
-/// The log-likelihood of many readings with a logarithm now and then: variances are multiplied, and the logarithm of the
-/// product is taken before it leaves the range of `f32`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LogLikelihood<T> {
-    settled: T,
-    nis: T,
-    product: T,
-    readings: u32,
-}
-
-/// The product is kept between one over this and this: one more variance in that range cannot leave the numbers, which end at
-/// 10±³⁸ in `f32` and at 10±³⁰⁸ in `f64`.
-#[inline(always)]
-fn largest<T: Scalar>() -> T {
-    T::of(if T::default_epsilon() < T::of(1e-12) { 1e150 } else { 1e16 })
-}
-
-impl<T: Scalar> LogLikelihood<T> {
-    /// Of no reading.
-    #[must_use]
-    pub fn new() -> Self {
-        Self { settled: T::zero(), nis: T::zero(), product: T::one(), readings: 0 }
-    }
-
-    /// One reading more.
-    #[inline]
-    pub fn add(&mut self, residual: &Residual<T>) {
-        self.nis += residual.nis;
-        self.product *= residual.variance;
-        self.readings += 1;
-        if !(self.product > T::one() / largest() && self.product < largest()) {
-            self.settle();
-        }
-    }
-
-    #[cold]
-    #[inline(never)]
-    fn settle(&mut self) {
-        self.settled -= T::of(0.5) * self.product.ln();
-        self.product = T::one();
-    }
-
-    /// The sum of the log densities, constants included.
-    #[must_use]
-    pub fn value(&self) -> T {
-        // Counted in `f32` steps: exact up to 2²⁴ readings, and without double precision on a microcontroller.
-        let readings: T = nalgebra::convert(self.readings as f32);
-        self.settled - T::of(0.5) * (self.nis + self.product.ln() + readings * T::two_pi().ln())
-    }
-}
-
-impl<T: Scalar> Default for LogLikelihood<T> {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::Residual;

@@ -3,8 +3,7 @@
 use core::hint::black_box;
 
 use ohmstrain_ekf::{
-    Belief, Cubic, Dwell, Ekf, Evidence, Imm, LogLikelihood, Mixture, PhaseMixture, Reading, Real, SignSplit,
-    SparseEkf, State, Switch,
+    Belief, Cubic, Dwell, Ekf, Evidence, Imm, Mixture, PhaseMixture, Reading, Real, SignSplit, SparseEkf, State, Switch,
 };
 use ohmstrain_model::{ParameterError, Phase, Problem, Scalar, SwitchedModel, SwitchedStep};
 
@@ -191,11 +190,10 @@ fast_filter!(
     |mixture| mixture.marginal(0).mean
 );
 
-/// The same with three states, asked for its step length at every reading, and with the log-likelihood of all readings.
+/// The EKF of three states that leaves out the zeros, asked for its step length at every reading.
 #[derive(Clone, Copy)]
 pub struct VaryingFast3<T: Scalar> {
     fast: Fast3<T>,
-    readings: LogLikelihood<T>,
     dt_s: T,
 }
 
@@ -204,23 +202,12 @@ where
     OnFpu: Switch<T>,
 {
     fn start() -> Result<Self, ParameterError> {
-        Ok(Self { fast: Fast3::start()?, readings: LogLikelihood::new(), dt_s: T::of(DT_S) })
+        Ok(Self { fast: Fast3::start()?, dt_s: T::of(DT_S) })
     }
 
     fn step(&mut self, reading: Reading<T>) -> bool {
-        let Self { fast: Fast { filter, state }, readings, dt_s } = self;
-        if filter.retime(black_box(*dt_s)).is_err() {
-            return false;
-        }
-        match filter.step(state, Some(reading)) {
-            Ok(residual) => {
-                if let Some(residual) = residual {
-                    readings.add(&residual);
-                }
-                true
-            }
-            Err(_) => false,
-        }
+        let Self { fast: Fast { filter, state }, dt_s } = self;
+        filter.retime(black_box(*dt_s)).is_ok() && filter.step(state, Some(reading)).is_ok()
     }
 
     fn strain(&self) -> T {
@@ -228,6 +215,6 @@ where
     }
 
     fn state_bytes() -> usize {
-        size_of::<Belief<T, 3, 6>>() + size_of::<LogLikelihood<T>>()
+        size_of::<Belief<T, 3, 6>>()
     }
 }

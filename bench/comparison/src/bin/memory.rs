@@ -2,8 +2,7 @@
 
 use nalgebra::SVector;
 use ohmstrain_bench_comparison::{adskalman_smoother, typed_kalman_smoother};
-use ohmstrain_bench_filters::{DT_S, linear_sensor, linearised, readings, sensor, smoother, sparse_smooth};
-use ohmstrain_ekf::{Belief, Compact, LinearFilter, Reading, SparseEkf};
+use ohmstrain_bench_filters::{linearised, readings, sensor, smoother};
 use peak_alloc::PeakAlloc;
 
 #[global_allocator]
@@ -16,12 +15,6 @@ fn main() {
     let vectors: Vec<SVector<f64, 1>> = rows.iter().map(|y| SVector::from([*y])).collect();
     let ours = smoother(sensor::<1, 3>());
     peak("smoother_3", || ours.in_place(&rows));
-    let model = sensor::<1, 3>();
-    let ekf = SparseEkf::<_, Compact, 1, 3>::new(model, DT_S).expect("the step's length is positive");
-    let taken: Vec<_> = rows.iter().map(|y| Some(Reading::from(*y))).collect();
-    peak("sparse_smoother_3", || sparse_smooth(&ekf, &Belief::initial(&model), &taken));
-    let (linear, filter) = (linear_sensor(), LinearFilter::new(linear_sensor(), DT_S).expect("the sensor is linear"));
-    peak("linear_smoother_3", || sparse_smooth(&filter, &Belief::initial(&linear), &taken));
     let theirs = adskalman_smoother(&linearised());
     peak("adskalman_smoother_3", || theirs(&vectors));
     let theirs = typed_kalman_smoother(&linearised());

@@ -194,12 +194,6 @@ impl<V: Lanes, const B: usize> GainsAt<'_, V, B> {
         }
     }
 
-    /// The gain of a branch that has one only.
-    #[inline(always)]
-    pub(super) fn only(&self) -> V {
-        self.strain_sum.with(self.regions.within[self.i].extend.at_zero)
-    }
-
     #[inline(always)]
     pub(super) fn retract(&self) -> Gain<V> {
         match self.common {

@@ -146,26 +146,6 @@ impl<T: Scalar, G: Curve<T>> Curve<T> for SigmaPoints<G> {
     }
 }
 
-/// A gauge that is a line: its slope is the same everywhere.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Line<T> {
-    slope: T,
-}
-
-impl<T: Scalar> Curve<T> for Line<T> {
-    fn new(gauge: &Gauge<T>, _: &StrainRange<T>) -> Option<Self> {
-        match *gauge {
-            Gauge::Polynomial { coefficients: [slope, a2, a3] } if a2.is_zero() && a3.is_zero() => Some(Self { slope }),
-            _ => None,
-        }
-    }
-
-    #[inline(always)]
-    fn value_and_slope<V: Lanes<Number = T>>(&self, strain: V) -> (V, V) {
-        (strain.scale(self.slope), strain.with(self.slope))
-    }
-}
-
 /// What holds below, within and above a range: outside of it a law goes on with numbers of its own, not by clamping.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Regions<T, V> {

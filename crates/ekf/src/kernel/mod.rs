@@ -24,18 +24,18 @@ mod update;
 
 pub(crate) use constants::{Gains, StepConstants};
 pub(crate) use curve::Regions;
-pub use curve::{AnyCurve, Cubic, Curve, CurveLine, Line, SigmaPoints};
+pub use curve::{AnyCurve, Cubic, Curve, CurveLine, SigmaPoints};
 pub(crate) use falls::Falls;
 pub use lanes::Lanes;
 #[cfg(feature = "simd")]
 pub(crate) use lanes::Vector;
 pub(crate) use parts::{Part, Parts};
-pub(crate) use predict::{Course, Driven};
+pub(crate) use predict::Course;
 pub(crate) use rate::side_of;
 pub(crate) use several::{InVectors, MOST_LANES, Several, Work};
 pub(crate) use sparse::MOST_TRIES;
 pub use sparse::SparseEkf;
 pub(crate) use switch::RateSpread;
-pub use switch::{Compact, CompactWidth, Logistic, Switch, Undirected};
+pub use switch::{Compact, CompactWidth, Logistic, Switch};
 pub use tail::{Real, Recordable};
-pub(crate) use update::{Compared, ReadingLaw, refusal};
+pub(crate) use update::{ReadingLaw, refusal};

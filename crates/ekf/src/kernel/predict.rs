@@ -8,7 +8,7 @@ use super::{Lanes, Part, Parts, RateSpread, SparseEkf, Switch};
 /// What a step does to one branch. The gain grows with the sum of old and new strain: the old one's share is in `row`, the
 /// new one's is added when its covariances are known.
 #[derive(Clone, Copy)]
-pub(crate) struct Driven<V> {
+pub(super) struct Driven<V> {
     change: V,
     gain: V,
     /// Growth of the change with old or new strain.
@@ -109,20 +109,10 @@ impl<T: Scalar, S, const B: usize, const N: usize, G> SparseEkf<T, S, B, N, G> {
             self.hold(parts);
             return RateSpread::new(parts.rate);
         }
-        self.move_on(parts, course).0
-    }
-
-    /// The prediction of a step that moves, and what it did to the branches.
-    #[inline(always)]
-    pub(crate) fn move_on<V: Lanes<Number = T>, X: Switch<V>>(
-        &self,
-        parts: &mut Parts<V, B>,
-        course: Course<V>,
-    ) -> (RateSpread<V, X>, [Driven<V>; B]) {
         let Parts { strain_variance, strain_rate, rate_variance, .. } = *parts;
         let driving = self.drive::<V, X>(parts, course);
-        let driven = self.spread_on::<V, X>(parts, &driving, [strain_variance, strain_rate, rate_variance]);
-        (RateSpread::new(parts.rate_variance), driven)
+        self.spread_on(parts, &driving, [strain_variance, strain_rate, rate_variance]);
+        RateSpread::new(parts.rate_variance)
     }
 
     /// Moves strain and rate, means and covariances of theirs, and says how the branches are driven meanwhile.
@@ -158,10 +148,6 @@ impl<T: Scalar, S, const B: usize, const N: usize, G> SparseEkf<T, S, B, N, G> {
             let push = course.input(strain, branch.input, branch.phase_input);
             let unit = sum(push, before, pair(strain, branch.drive));
             drives[i] = match course {
-                _ if !X::DIRECTED => {
-                    let gain = gains.of(i).only();
-                    Drive { change: gain * unit, gain, ..nothing }
-                }
                 Course::Uncertain => split(branch, gains.of(i), unit, &mut spread),
                 Course::Known(phase) => known(gains.of(i), unit, phase),
                 Course::Within(phase, turning) => within(branch, gains.of(i), unit, (phase, &turning)),
@@ -170,7 +156,7 @@ impl<T: Scalar, S, const B: usize, const N: usize, G> SparseEkf<T, S, B, N, G> {
         // All branches are driven by about the same rate: what its direction leaves open is taken from the first.
         let mut unexplained = if B > 0 { drives[0].left } else { zero };
         let opens = zero.less(unexplained);
-        if X::DIRECTED && matches!(course, Course::Uncertain) && !V::none(opens) {
+        if matches!(course, Course::Uncertain) && !V::none(opens) {
             let [with_strain, together] = [dot(with_strain, b), dot(with_rate, b)];
             let fresh = sum(strain.with(step.noise[2]), [with_strain, together], pair(strain, step.rate_change));
             let steps = correlated_steps(parts.rate_variance, together, fresh);
@@ -179,9 +165,9 @@ impl<T: Scalar, S, const B: usize, const N: usize, G> SparseEkf<T, S, B, N, G> {
         Driving { drives, unexplained }
     }
 
-    /// Moves the branches and the baseline, after the motion, whose covariances were the last.
+    /// Moves the branches and the baseline, after the motion, whose covariances were the last; what it did to the branches.
     #[inline(always)]
-    pub(super) fn spread_on<V: Lanes<Number = T>, X: Switch<V>>(
+    pub(super) fn spread_on<V: Lanes<Number = T>>(
         &self,
         parts: &mut Parts<V, B>,
         Driving { drives, unexplained }: &Driving<V, B>,
@@ -204,18 +190,17 @@ impl<T: Scalar, S, const B: usize, const N: usize, G> SparseEkf<T, S, B, N, G> {
             let (branch, part, Drive { change, gain, pull, jump, .. }) =
                 (&step.branches[i], &parts.branches[i], drives[i]);
             let [from_strain, from_rate] = branch.drive;
-            let grown = if X::DIRECTED { gain.scale_add(from_strain, pull) } else { gain.scale(from_strain) };
-            let row = [grown, gain.scale(from_rate)];
+            let row = [gain.scale_add(from_strain, pull), gain.scale(from_rate)];
             let kept = [part.with_strain.scale(branch.decay), part.with_rate.scale(branch.decay)];
             let carried = [sum(kept[0], row, with_strain), sum(kept[1], row, with_rate)];
             driven[i] = Driven { change, gain, pull, row, kept, carried, jump };
         }
-        predict_branches::<V, X, B>(step, parts, &driven, [a, b]);
-        if X::DIRECTED && !V::none(zero.less(*unexplained)) {
+        predict_branches(step, parts, &driven, [a, b]);
+        if !V::none(zero.less(*unexplained)) {
             leave_open(parts, &driven, *unexplained);
         }
         if Self::HAS_BASELINE {
-            predict_baseline::<V, X, B>(step, &mut parts.baseline, &driven, [a, b]);
+            predict_baseline(step, &mut parts.baseline, &driven, [a, b]);
         }
         driven
     }
@@ -334,12 +319,6 @@ fn split<V: Lanes, S: Switch<V>, const B: usize>(
     }
 }
 
-/// `pull · factor + term`: without a direction no gain grows, and nothing is pulled.
-#[inline(always)]
-fn pulled<V: Lanes, X: Switch<V>>(pull: V, factor: V, term: V) -> V {
-    if X::DIRECTED { pull.mul_add(factor, term) } else { term }
-}
-
 /// Adds what the direction leaves open: one number for all branches.
 #[inline(always)]
 fn leave_open<V: Lanes, const B: usize>(parts: &mut Parts<V, B>, driven: &[Driven<V>; B], unexplained: V) {
@@ -355,7 +334,7 @@ fn leave_open<V: Lanes, const B: usize>(parts: &mut Parts<V, B>, driven: &[Drive
 
 /// The branches' covariances with the new motion, which is in `parts` already, and with each other.
 #[inline(always)]
-fn predict_branches<V: Lanes, X: Switch<V>, const B: usize>(
+fn predict_branches<V: Lanes, const B: usize>(
     step: &StepConstants<V::Number, B>,
     parts: &mut Parts<V, B>,
     driven: &[Driven<V>; B],
@@ -366,29 +345,29 @@ fn predict_branches<V: Lanes, X: Switch<V>, const B: usize>(
         // Without the new strain's share in the gain.
         let strain = sum(gain.scale(branch.cross_noise[0]), carried, a);
         let rate = sum(gain.scale(branch.cross_noise[1]), carried, b);
-        let with_strain = pulled::<V, X>(pull, parts.strain_variance, strain);
+        let with_strain = pull.mul_add(parts.strain_variance, strain);
         for k in 0..i {
             let (other, others_strain) = (&driven[k], parts.branches[k].with_strain);
             let with = &mut parts.branches[i].with[k];
             let from_motion = sum(other.gain * gain.scale(branch.noise[k]), other.row, carried);
             let from_both = sum(from_motion, row, other.kept);
             let own = with.scale_add(branch.decays[k], from_both);
-            *with = pulled::<V, X>(pull, others_strain, pulled::<V, X>(other.pull, strain, own));
+            *with = pull.mul_add(others_strain, other.pull.mul_add(strain, own));
         }
         let part = &mut parts.branches[i];
         let noise = gain.mul_add(gain.scale(branch.noise[i]), gain.with(branch.variance));
         let from_motion = sum(noise, row, [carried[0] + kept[0], carried[1] + kept[1]]);
         let own = part.variance.scale_add(branch.decays[i], from_motion);
-        part.variance = pulled::<V, X>(pull, strain + with_strain, own);
+        part.variance = pull.mul_add(strain + with_strain, own);
         part.mean = part.mean.scale_add(branch.decay, change);
         part.with_strain = with_strain;
-        part.with_rate = pulled::<V, X>(pull, parts.strain_rate, rate);
+        part.with_rate = pull.mul_add(parts.strain_rate, rate);
     }
 }
 
 /// The baseline's covariances, from its own old ones.
 #[inline(always)]
-fn predict_baseline<V: Lanes, X: Switch<V>, const B: usize>(
+fn predict_baseline<V: Lanes, const B: usize>(
     step: &StepConstants<V::Number, B>,
     part: &mut Part<V, B>,
     driven: &[Driven<V>; B],
@@ -401,7 +380,7 @@ fn predict_baseline<V: Lanes, X: Switch<V>, const B: usize>(
     for i in 0..B {
         let Driven { pull, row, .. } = driven[i];
         let own = part.with[i].scale_add(step.baseline_decays[i], dot(row, kept));
-        part.with[i] = pulled::<V, X>(pull, part.with_strain, own);
+        part.with[i] = pull.mul_add(part.with_strain, own);
     }
     part.mean = part.mean.scale(decay);
     part.variance = part.variance.scale_add(step.baseline_square, part.mean.with(step.baseline_variance));

@@ -13,7 +13,7 @@
 
 use core::marker::PhantomData;
 
-use ohmstrain_model::{Scalar, SensorLaw, SwitchedModel};
+use ohmstrain_model::{Scalar, SwitchedModel};
 
 use super::{AnyCurve, Course, Curve, Gains, Parts, RateSpread, ReadingLaw, Regions, StepConstants, Switch};
 use crate::clock::check_time_step;
@@ -22,9 +22,7 @@ use crate::{Belief, Reading, Residual, StepError};
 /// The EKF of a [`SwitchedModel`] with Ornstein-Uhlenbeck motion, for steps of one length.
 ///
 /// `S` is [`Compact`](crate::Compact) or, to agree with [`Ekf`](crate::Ekf) to rounding, [`Logistic`](crate::Logistic). `G`
-/// is the family of the gauge: [`Cubic`](crate::Cubic) saves the code of the others. A sensor to which stretching and releasing
-/// are alike has [`Undirected`](crate::Undirected), and with a straight gauge [`Line`](crate::Line): its filter is a
-/// [`LinearFilter`](crate::LinearFilter).
+/// is the family of the gauge: [`Cubic`](crate::Cubic) saves the code of the others.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SparseEkf<T, S, const B: usize, const N: usize, G = AnyCurve<T>> {
     pub(crate) step: StepConstants<T, B>,
@@ -49,7 +47,7 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
     /// [prepares](crate::Estimator::prepare).
     ///
     /// # Errors
-    /// If the model's law is of another family than the filter.
+    /// If the model's gauge is of another family than `G`.
     pub fn at_a_moment(model: SwitchedModel<T, B, N>) -> Result<Self, StepError> {
         Self::of_any_length(model, T::zero())
     }
@@ -57,9 +55,6 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
     /// A filter for steps of `dt_s` seconds, or of no length.
     pub(crate) fn of_any_length(model: SwitchedModel<T, B, N>, dt_s: T) -> Result<Self, StepError> {
         check_time_step(dt_s)?;
-        if !S::DIRECTED && is_directed(model.law()) {
-            return Err(StepError::Directed);
-        }
         Ok(Self {
             step: StepConstants::new(&model, dt_s, RateSpread::<T, S>::clear()),
             gains: Gains::by_region(model.law()),
@@ -142,13 +137,18 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
 
     /// Never inlined: beside a second try a compiler would compute in advance, and store, what both have in common.
     #[inline(never)]
-    pub(crate) fn step_once<const L: usize>(
+    fn step_once<const L: usize>(
         &self,
         belief: &mut Belief<T, N, L>,
         reading: Option<Reading<T>>,
     ) -> Result<Option<Residual<T>>, StepError> {
         let mut parts = Parts::of(belief);
-        let residual = self.advance(&mut parts, reading)?;
+        let spread = self.predict(&mut parts, Course::Uncertain);
+        let residual = match reading {
+            Some(reading) => Some(self.update(&mut parts, reading, None, spread, None)?),
+            None if parts.is_sound::<N>(parts.variances::<N>()) => None,
+            None => return Err(StepError::NonFiniteState),
+        };
         parts.put_into(belief);
         Ok(residual)
     }
@@ -186,7 +186,7 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
     /// A step that was `refused`, with more and more noise in its reading.
     #[cold]
     #[inline(never)]
-    pub(crate) fn step_again<const L: usize>(
+    fn step_again<const L: usize>(
         &self,
         belief: &mut Belief<T, N, L>,
         mut reading: Option<Reading<T>>,
@@ -204,21 +204,6 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
         }
     }
 
-    /// A step of a belief taken apart; after an error `parts` means nothing.
-    #[inline(always)]
-    pub(crate) fn advance(
-        &self,
-        parts: &mut Parts<T, B>,
-        reading: Option<Reading<T>>,
-    ) -> Result<Option<Residual<T>>, StepError> {
-        let spread = self.predict(parts, Course::Uncertain);
-        match reading {
-            Some(reading) => self.update(parts, reading, None, spread, None).map(Some),
-            None if parts.is_sound::<N>(parts.variances::<N>()) => Ok(None),
-            None => Err(StepError::NonFiniteState),
-        }
-    }
-
     /// A refused reading with more noise; the refusal where noise is of no use.
     #[cold]
     #[inline(never)]
@@ -233,14 +218,6 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
         };
         reading.coarser(self.reading.variance, T::default_epsilon()).ok_or(refused)
     }
-}
-
-fn is_directed<T: Scalar, const B: usize>(law: &SensorLaw<T, B>) -> bool {
-    law.extend_viscosity_s != law.retract_viscosity_s
-        || law.branches.iter().any(|branch| {
-            branch.extend_gain != branch.retract_gain
-                || !(branch.extend_gain_slope.is_zero() && branch.retract_gain_slope.is_zero())
-        })
 }
 
 /// The most tries of a step after the first.

@@ -7,9 +7,6 @@ pub trait Switch<V: Lanes>: Copy {
     /// A rate of at least that many standard deviations has one direction; nothing is computed for it.
     const CLEAR: f64;
 
-    /// Whether gains and viscosities tell stretching from releasing, or grow with strain. Where they do not, nothing is split.
-    const DIRECTED: bool = true;
-
     /// What the splits of one step share.
     type Width: Copy;
 
@@ -43,28 +40,6 @@ impl<T: Scalar> Switch<T> for Logistic {
 
     fn blend(rate: T, rate_sd: T) -> SplitRate<T> {
         Direction::Uncertain { rate_sd, persistence: T::one() }.split(rate)
-    }
-}
-
-/// For a sensor to which stretching and releasing are alike: a rate has one direction, whatever its sign.
-/// [`SparseEkf`](crate::SparseEkf) refuses another one.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Undirected;
-
-impl<V: Lanes> Switch<V> for Undirected {
-    const CLEAR: f64 = 0.0;
-
-    const DIRECTED: bool = false;
-
-    type Width = ();
-
-    #[inline(always)]
-    fn width(_: V) {}
-
-    #[inline(always)]
-    fn blend(rate: V, (): ()) -> SplitRate<V> {
-        let (none, all) = (rate.nothing(), rate.literal(1.0));
-        SplitRate { extend: rate, retract: none, extend_probability: all, retract_probability: none, variance: none }
     }
 }
 

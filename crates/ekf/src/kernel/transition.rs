@@ -3,7 +3,8 @@
 use nalgebra::SMatrix;
 use ohmstrain_model::{Scalar, Transition};
 
-use super::{Course, Driven, Parts, SparseEkf, Switch};
+use super::predict::Driven;
+use super::{Course, Parts, SparseEkf, Switch};
 use crate::Belief;
 
 impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G> SparseEkf<T, S, B, N, G> {
@@ -12,11 +13,11 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G> SparseEkf<T, S,
         let mut parts = Parts::of(from);
         let Parts { strain_variance, strain_rate, rate_variance, .. } = parts;
         let driving = self.drive::<T, S>(&mut parts, Course::Uncertain);
-        let driven = self.spread_on::<T, S>(&mut parts, &driving, [strain_variance, strain_rate, rate_variance]);
+        let driven = self.spread_on(&mut parts, &driving, [strain_variance, strain_rate, rate_variance]);
         // The same from a state that is known is the noise alone.
         let [strain_variance, strain_rate, rate_variance] = self.step.noise;
         let mut noise = Parts { strain_variance, strain_rate, rate_variance, ..Parts::certain(T::zero()) };
-        self.spread_on::<T, S>(&mut noise, &driving, [T::zero(); 3]);
+        self.spread_on(&mut noise, &driving, [T::zero(); 3]);
         let (prior, noise): (Belief<T, N, L>, Belief<T, N, L>) = (parts.together(), noise.together());
         let jacobian = self.jacobian(&driven);
         (Transition { mean: prior.mean, jacobian, noise: noise.covariance }, prior)

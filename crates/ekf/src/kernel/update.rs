@@ -10,9 +10,6 @@ use crate::{Reading, Residual, StepError};
 /// A reading beside its prediction.
 #[derive(Clone, Copy)]
 pub(crate) struct Compared<V, const B: usize> {
-    /// Derivatives of the reading by strain and rate; those by branches and baseline are one.
-    pub slope: V,
-    pub viscosity: V,
     /// Covariances of the state with the reading.
     pub strain: V,
     pub rate: V,
@@ -69,7 +66,6 @@ impl<T: Scalar, G: Curve<T>> ReadingLaw<T, G> {
             Some(Phase::Hold) => return still,
             Some(Phase::Extend) => return still.moving(extend, rate),
             Some(Phase::Retract) => return still.moving(retract, rate),
-            None if !S::DIRECTED => return still.moving(extend, rate),
             None => {}
         }
         let uncertain = (rate * rate).less(spread.variance.scale(RateSpread::<V, S>::clear()));
@@ -218,7 +214,7 @@ impl<T: Scalar, S, const B: usize, const N: usize, G: Curve<T>> SparseEkf<T, S, 
         }
 
         let innovation = reading.value - expected;
-        Compared { slope, viscosity, strain, rate, branches, baseline, variance, innovation }
+        Compared { strain, rate, branches, baseline, variance, innovation }
     }
 
     /// Takes the readings where they are `present`; their NIS.
@@ -228,7 +224,7 @@ impl<T: Scalar, S, const B: usize, const N: usize, G: Curve<T>> SparseEkf<T, S, 
         compared: &Compared<V, B>,
         present: V::Mask,
     ) -> V {
-        let Compared { strain, rate, branches, baseline, variance, innovation, .. } = *compared;
+        let Compared { strain, rate, branches, baseline, variance, innovation } = *compared;
         let zero = variance.nothing();
         let per_variance = V::pick(present, variance.recip(), zero);
         let scaled = V::pick(present, innovation * per_variance, zero);

@@ -1,7 +1,6 @@
 //! Looking back: smoothers.
 
 mod back;
-mod in_place;
 mod rts;
 
 pub use back::{PastStep, smooth_back_through};

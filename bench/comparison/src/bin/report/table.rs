@@ -24,49 +24,22 @@ const fn ratio(words: &'static str, over: &'static str, under: &'static str, tar
     Ratio { words, over, under, target }
 }
 
-const TARGETS: [Ratio; 14] = [
+const TARGETS: [Ratio; 8] = [
     ratio("EKF ÷ kfilter, same step", "step/sparse_ekf_3", "step/nonlinear_kfilter_3", AtMost(0.6)),
     ratio("EKF ÷ adskalman, same step", "step/sparse_ekf_3", "step/nonlinear_adskalman_3", AtMost(0.6)),
     ratio("EKF ÷ typed-kalman, same step", "step/sparse_ekf_3", "step/nonlinear_typed_kalman_3", AtMost(0.6)),
     ratio("EKF ÷ hand-written, same step", "step/sparse_ekf_3", "step/nonlinear_reference_3", AtMost(1.15)),
-    ratio("EKF of a linear sensor ÷ kfilter with constants", "step/linear_3", "step/kfilter_3", AtMost(0.85)),
-    ratio(
-        "the same ÷ the fastest of all others, nalgebra without checks",
-        "step/linear_3",
-        "step/nalgebra_3",
-        AtMost(1.0),
-    ),
-    ratio("frozen covariance of a linear sensor ÷ kfilter", "step/frozen_3", "step/kfilter_3", AtMost(0.4)),
     ratio("EKF of six states ÷ of three", "step/sparse_ekf_6", "step/sparse_ekf_3", AtMost(1.8)),
     ratio("UKF ÷ kfilter's with constants", "step/sparse_ukf_3", "step/kfilter_ukf_3", AtMost(0.6)),
-    ratio(
-        "linear sensor: rows a second of the smoother ÷ typed-kalman's",
-        "recording/typed_kalman_smoother_3",
-        "recording/linear_smoother_3",
-        AtLeast(1.2),
-    ),
-    ratio(
-        "linear sensor: rows a second of the smoother ÷ adskalman's",
-        "recording/adskalman_smoother_3",
-        "recording/linear_smoother_3",
-        AtLeast(2.5),
-    ),
-    ratio(
-        "the same where our sensor is not linear, theirs is",
-        "recording/typed_kalman_smoother_3",
-        "recording/sparse_smoother_3",
-        AtLeast(1.0),
-    ),
     ratio("IMM ÷ EKF, six states", "step/imm_6", "step/sparse_ekf_6", AtMost(4.0)),
     ratio("sign-split of 8 ÷ EKF, six states", "step/sign_split_6", "step/sparse_ekf_6", AtMost(14.0)),
 ];
 
-const BESIDE: [Ratio; 6] = [
+const BESIDE: [Ratio; 5] = [
     ratio("hand-written reference ÷ adskalman", "step/reference_3", "step/adskalman_3", AtMost(0.45)),
     ratio("EKF ÷ adskalman", "step/sparse_ekf_3", "step/adskalman_3", AtMost(0.6)),
     ratio("EKF ÷ typed-kalman", "step/sparse_ekf_3", "step/typed_kalman_3", AtMost(0.6)),
     ratio("EKF ÷ kfilter", "step/sparse_ekf_3", "step/kfilter_3", AtMost(0.6)),
-    ratio("row of a log-likelihood ÷ EKF", "recording/log_likelihood_3", "step/sparse_ekf_3", AtMost(1.1)),
     ratio("generic EKF ÷ sparse EKF", "step/ekf_3", "step/sparse_ekf_3", AtLeast(1.0)),
 ];
 
@@ -112,12 +85,10 @@ fn ratios(ratios: &[Ratio], builds: &[Build]) -> String {
     out
 }
 
-const STEPS: [(&str, &str); 26] = [
+const STEPS: [(&str, &str); 24] = [
     ("hand-written reference, linear, without checks", "reference_3"),
     ("hand-written reference, without checks", "nonlinear_reference_3"),
     ("**EKF, sparse**", "sparse_ekf_3"),
-    ("Kalman filter of the linear sensor", "linear_3"),
-    ("the same with a frozen covariance", "frozen_3"),
     ("EKF, sparse, four states", "sparse_ekf_4"),
     ("EKF, sparse, six states", "sparse_ekf_6"),
     ("EKF, generic", "ekf_3"),
@@ -153,10 +124,8 @@ pub fn steps(builds: &[Build]) -> String {
     out
 }
 
-const SMOOTHERS: [(&str, &str); 5] = [
+const SMOOTHERS: [(&str, &str); 3] = [
     ("smoother, in place", "smoother_3"),
-    ("smoother, sparse", "sparse_smoother_3"),
-    ("smoother, sparse, of the linear sensor", "linear_smoother_3"),
     ("adskalman 0.18's", "adskalman_smoother_3"),
     ("typed-kalman 0.1's", "typed_kalman_smoother_3"),
 ];
@@ -165,7 +134,7 @@ const SMOOTHERS: [(&str, &str); 5] = [
 pub fn recordings(builds: &[Build]) -> String {
     let mut out = header("filter and smoother over 10 000 rows, million rows a second", builds);
     let per_second = |build: &Build, name: &str, scale: f64| build.ns(name).map(|ns| 1e9 / ns / scale);
-    for (words, name) in SMOOTHERS.into_iter().chain([("log-likelihood alone", "log_likelihood_3")]) {
+    for (words, name) in SMOOTHERS {
         let name = format!("recording/{name}");
         if builds.iter().any(|build| build.ns(&name).is_some()) {
             row(&mut out, words, builds.iter().map(|build| cell(per_second(build, &name, 1e6), 2)));

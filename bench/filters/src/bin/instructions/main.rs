@@ -15,11 +15,7 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use budget::{Budget, Counts};
-use ohmstrain_bench_filters::{
-    Corrected, DT_S, Filter, STEPS, Visitor, every_filter, linear_sensor, log_likelihood, readings, sensor, smoother,
-    sparse_smooth,
-};
-use ohmstrain_ekf::{Belief, Compact, Cubic, LinearFilter, Reading, SparseEkf};
+use ohmstrain_bench_filters::{Corrected, Filter, STEPS, Visitor, every_filter, readings, sensor, smoother};
 
 fn main() -> Result<ExitCode, Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -67,24 +63,9 @@ fn each(see: &mut dyn FnMut(&'static str, &mut dyn FnMut())) {
     every_filter(&mut Stepper(see));
     let recording = readings::<1>(STEPS);
     Stepper(see).visit("correction", &recording, Corrected::new());
-    let model = sensor::<1, 3>();
-    let smoother = smoother(model);
+    let smoother = smoother(sensor::<1, 3>());
     see("smoother_3", &mut || {
         black_box(counted(|| smoother.in_place(black_box(&recording))));
-    });
-    let ekf = SparseEkf::<_, Compact, 1, 3, Cubic<f64>>::new(model, DT_S).expect("the gauge is cubic");
-    let start = Belief::initial(&model);
-    let taken: Vec<_> = recording.iter().map(|y| Some(Reading::from(*y))).collect();
-    see("sparse_smoother_3", &mut || {
-        black_box(counted(|| sparse_smooth(black_box(&ekf), &start, black_box(&taken))));
-    });
-    let linear = linear_sensor();
-    let (filter, start_of_linear) = (LinearFilter::new(linear, DT_S).expect("it is linear"), Belief::initial(&linear));
-    see("linear_smoother_3", &mut || {
-        black_box(counted(|| sparse_smooth(black_box(&filter), &start_of_linear, black_box(&taken))));
-    });
-    see("log_likelihood_3", &mut || {
-        black_box(counted(|| log_likelihood(black_box(&ekf), &start, black_box(&recording))));
     });
 }
 
