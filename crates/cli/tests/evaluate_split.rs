@@ -153,8 +153,8 @@ fn parts_are_switched_off_one_by_one() {
     // What has no correction has no parts.
     let plain = evaluate(&bench, &["--split", "0.3", "--parts", "--estimator", "ekf", "1.csv"]);
     assert_eq!(plain.len(), 1);
-    let refused = bench.run(&["evaluate", "--split", "0.3", "--parts", "--no-correction", "1.csv"]);
-    assert!(refused.code == Some(2) && refused.stderr.contains("--no-correction"), "{}", refused.stderr);
+    let refused = bench.run(&["evaluate", "--split", "0.3", "--parts", "--without", "correction", "1.csv"]);
+    assert!(refused.code == Some(2) && refused.stderr.contains("--without"), "{}", refused.stderr);
 }
 
 #[test]
