@@ -22,7 +22,7 @@ use clap::{CommandFactory, Parser, Subcommand};
 pub use batch::{BatchArgs, BatchCommand, SummaryForm};
 pub use calibrate::{CalibrateArgs, ReportArgs};
 pub use choice::{Auto, Branches, Estimator, Gauge};
-pub use estimate::{EstimateArgs, FilterArgs, Format, RestResistance, SmoothArgs, WrittenArgs};
+pub use estimate::{EstimateArgs, FilterArgs, Format, RestResistance, SmoothArgs, Without, WrittenArgs};
 pub use evaluate::{Estimators, EvaluateArgs};
 pub use export::ExportArgs;
 pub use files::{ImportArgs, InspectArgs};
@@ -36,7 +36,7 @@ pub use serial_check::SerialCheckArgs;
 pub use shell::{CompletionsArgs, ManArgs};
 pub use simulate::{DemoArgs, DemoMaterial, SimulateArgs};
 pub use split::Split;
-pub use trace::{ReplaceArgs, SetupArgs, TraceArgs};
+pub use trace::{ReplaceArgs, SetupArgs, UnitArgs};
 
 use crate::verbosity::Verbosity;
 

@@ -17,6 +17,7 @@ mod plausible;
 mod printable;
 mod progress;
 mod readings;
+mod renamed;
 mod report;
 mod run;
 mod sensor_file;
@@ -30,13 +31,13 @@ use std::io::{self, Write};
 use std::process::ExitCode;
 
 use clap::Parser;
-use clap::error::ErrorKind;
+use clap::error::{ContextKind, ContextValue, ErrorKind};
 use printable::{printable, printable_lines};
 
 fn main() -> ExitCode {
     let args = match args::Args::try_parse() {
         Ok(args) => args,
-        Err(error) => return refused(&error),
+        Err(error) => return refused(error),
     };
     args.verbosity().choose();
     match commands::dispatch(&args.command) {
@@ -46,7 +47,13 @@ fn main() -> ExitCode {
 }
 
 /// Says what is wrong with the arguments, with the command's example where something is missing; or prints help.
-fn refused(error: &clap::Error) -> ExitCode {
+fn refused(mut error: clap::Error) -> ExitCode {
+    let mut words = std::env::args_os().skip(1).map(|word| word.to_string_lossy().into_owned());
+    let command = words.find(|word| !word.starts_with('-'));
+    if let Some(answer) = command.and_then(|command| renamed::answer(&error, &command)) {
+        error.remove(ContextKind::SuggestedArg);
+        error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![answer.into()]));
+    }
     let is_plain = std::env::args_os().all(|arg| matches!(printable(&arg.to_string_lossy()), Cow::Borrowed(_)));
     // In colours, unless arguments that it quotes would colour it.
     let _ = if is_plain || !error.use_stderr() {

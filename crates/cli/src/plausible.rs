@@ -31,11 +31,11 @@ fn text(recordings: &[TraceFile], doubt: &CalibrationDoubt) -> String {
     };
     let answer = match doubt {
         CalibrationDoubt::Percent { .. } => {
-            "; if they are in percent, say so with `--strain-unit percent` or a line `# strain_unit = percent` above the header, \
+            "; if they are in percent, say so with `--unit strain=percent` or a line `# strain_unit = percent` above the header, \
              if not with `fraction`"
         }
         CalibrationDoubt::KiloOhm { .. } => {
-            "; if they are in kilo-ohms, say so with `--resistance-unit kohm` or a line `# resistance_unit = kohm` above the \
+            "; if they are in kilo-ohms, say so with `--unit resistance=kohm` or a line `# resistance_unit = kohm` above the \
              header, if not with `ohm`"
         }
         CalibrationDoubt::ReadingsApart { .. } => " Then put `# resistance_unit = kohm` above its header",
@@ -45,7 +45,7 @@ fn text(recordings: &[TraceFile], doubt: &CalibrationDoubt) -> String {
             "; leave that part out with `--from` and `--until`, or empty those cells of the reference"
         }
         CalibrationDoubt::Turned { .. } => {
-            "; if it has, change it, if not say so with `--strain-unit fraction` or a line `# strain_unit = fraction` above the header"
+            "; if it has, change it, if not say so with `--unit strain=fraction` or a line `# strain_unit = fraction` above the header"
         }
         CalibrationDoubt::TurnedApart { .. } => " Change it",
         CalibrationDoubt::Milliseconds { .. } => {

@@ -1,6 +1,6 @@
 use ohmstrain::{Error, Estimate, EstimatorKind, FilterBuilder, Known, Sensor};
 
-use crate::args::{EstimateArgs, RestResistance};
+use crate::args::{EstimateArgs, RestResistance, Without};
 use crate::error::CliError;
 use crate::input::TraceFile;
 
@@ -16,19 +16,19 @@ pub fn builder_anew<'a>(sensor: &'a Sensor, args: &'a EstimateArgs) -> FilterBui
     if let Some(kind) = args.estimator.chosen() {
         builder = builder.estimator(kind.0);
     }
-    if args.no_correction {
+    if args.is_without(Without::Correction) {
         builder = builder.without_correction();
     }
     if let Some(nis) = args.gate {
         builder = builder.gate(nis);
     }
-    if args.no_plausibility {
+    if args.is_without(Without::Plausibility) {
         builder = builder.without_plausibility();
     }
-    if args.no_second_look {
+    if args.is_without(Without::SecondLook) {
         builder = builder.without_second_look();
     }
-    if args.no_doubts {
+    if args.is_without(Without::Doubts) {
         builder = builder.without_doubts();
     }
     if let Some(influence) = args.influence {

@@ -18,7 +18,7 @@ pub enum Rows {
 
 /// Opens what is to be filtered.
 pub fn open(args: &FilterArgs) -> Result<Rows, CliError> {
-    let (text, metadata) = input::text_of(&args.trace_file, &args.estimate.trace.metadata())?;
+    let (text, metadata) = input::text_of(&args.trace_file, &args.setup.metadata(&args.estimate.units))?;
     let name = args.trace_file.display().to_string();
     let recording = |reader| Rows::Recording(Box::new(reader));
     let device = |reader| Rows::Device(Box::new(reader));

@@ -14,9 +14,9 @@ pub const FIRST_LIVE_READINGS: usize = 20;
 pub fn answerable(doubt: &UnitDoubt) -> String {
     let answer = match doubt.guess {
         UnitGuess::KiloOhm => {
-            "Then say so with `--resistance-unit kohm` or a line `# resistance_unit = kohm` above the header"
+            "Then say so with `--unit resistance=kohm` or a line `# resistance_unit = kohm` above the header"
         }
-        UnitGuess::CalibrationInKiloOhm => "Then calibrate again with `--resistance-unit kohm`",
+        UnitGuess::CalibrationInKiloOhm => "Then calibrate again with `--unit resistance=kohm`",
         UnitGuess::Percent => "The column is a ratio: 110 % is 1.1",
         UnitGuess::Ohm => "Divide them by what the rested sensor reads",
         UnitGuess::Ratio => "The sensor was calibrated in ohms",
@@ -43,7 +43,7 @@ pub fn check_reference(recording: &TraceFile, sensor: &Sensor) -> Result<(), Cli
         let answer = if doubt.is_of_calibration {
             "10 % is 0.1; calibrate again"
         } else {
-            "Then say so with `--strain-unit percent` or a line `# strain_unit = percent` above the header"
+            "Then say so with `--unit strain=percent` or a line `# strain_unit = percent` above the header"
         };
         CliError::Input(format!("{}: {doubt} {answer}", recording.header))
     })

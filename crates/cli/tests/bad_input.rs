@@ -363,6 +363,10 @@ fn an_argument_that_cannot_be_is_named() {
         (&filter, &["--joint", "prestrain=0"], "'prestrain=0' for '--joint"),
         (&filter, &["--gauge-length-mm", "NaN"], "'NaN' for '--gauge-length-mm"),
         (&filter, &["--gauge-length-mm", "0"], "'0' for '--gauge-length-mm"),
+        (&filter, &["--unit", "strain=kohm"], "'strain=kohm' for '--unit"),
+        (&filter, &["--unit", "resistance=megohm"], "'resistance=megohm' for '--unit"),
+        (&filter, &["--without", "strain"], "'strain' for '--without"),
+        (&evaluate, &["--without", "doubts"], "'doubts' for '--without"),
         (&filter, &["--columns", "strain,colour"], "--columns: expected some of time_s,resistance_ohm,"),
         (&filter, &["--columns", ""], "--columns: expected some of time_s,resistance_ohm,"),
         (&filter, &["--colour"], "'--colour'"),
@@ -393,4 +397,31 @@ fn an_argument_that_cannot_be_is_named() {
     }
     let run = bench.run(&[&filter[..], &["--columns", "strain,colour"]].concat());
     assert!(run.stderr.lines().count() == 1 && run.stderr.ends_with("found `colour`\n"), "{}", run.stderr);
+}
+
+/// The name of a flag that is gone leads to what does the same now, in commands that had it.
+#[test]
+fn a_flag_that_is_gone_leads_to_another() {
+    let bench = Bench::calibrated();
+    let front_end = "`# front_end = …` above the header says it, which `ohmstrain import --front-end` writes";
+    let cases: &[(&[&str], &str)] = &[
+        (&["filter", "--no-correction"], "it is `--without correction` now"),
+        (&["evaluate", "--no-correction"], "it is `--without correction` now"),
+        (&["live", "--no-plausibility"], "it is `--without plausibility` now"),
+        (&["-q", "smooth", "--no-second-look"], "it is `--without second-look` now"),
+        (&["filter", "--no-doubts"], "it is `--without doubts` now"),
+        (&["calibrate", "--strain-unit", "percent"], "it is `--unit strain=UNIT` now"),
+        (&["live", "--resistance-unit=kohm"], "it is `--unit resistance=UNIT` now"),
+        (&["smooth", "--front-end", "divider"], front_end),
+        (&["evaluate", "--gauge-length-mm", "30"], "`ohmstrain import --gauge-length-mm` writes"),
+        (&["fit-law", "--joint", "prestrain=0"], "`ohmstrain import --joint` writes"),
+    ];
+    for (arguments, answer) in cases {
+        let run = bench.run(arguments);
+        assert_eq!((run.code, run.stdout.as_str()), (Some(ARGUMENTS), ""), "{}", run.command);
+        assert!(run.stderr.contains(answer), "{}: {}", run.command, run.stderr);
+        assert_eq!(run.stderr.matches("tip: ").count(), 1, "{}: {}", run.command, run.stderr);
+    }
+    let never_there = bench.run(&["export", "--no-doubts"]);
+    assert!(!never_there.stderr.contains("--without"), "{}", never_there.stderr);
 }

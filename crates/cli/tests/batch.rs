@@ -77,16 +77,16 @@ fn what_is_done_is_done_once() {
     fs::remove_file(bench.path("out/day 2/a.csv")).unwrap();
     assert_eq!(states(&smooth), "kept kept done");
     // Other flags, another sensor, and because somebody says so.
-    assert_eq!(states(&[&smooth[..], &["--", "--no-correction"]].concat()), "done done done");
+    assert_eq!(states(&[&smooth[..], &["--", "--without", "correction"]].concat()), "done done done");
     bench.write("sensor.toml", bench.read("sensor.toml") + "\n");
-    assert_eq!(states(&[&smooth[..], &["--", "--no-correction"]].concat()), "done done done");
-    assert_eq!(states(&[&smooth[..], &["--again", "--", "--no-correction"]].concat()), "done done done");
+    assert_eq!(states(&[&smooth[..], &["--", "--without", "correction"]].concat()), "done done done");
+    assert_eq!(states(&[&smooth[..], &["--again", "--", "--without", "correction"]].concat()), "done done done");
     // A line that a killed run left unfinished.
     let journal = bench.read("out/batch.jsonl");
     let lines: Vec<&str> = journal.lines().collect();
     let [.., first, second, third] = lines[..] else { panic!("{journal}") };
     bench.write("out/batch.jsonl", format!("{first}\n{second}\n{}", &third[..third.len() - 20]));
-    let last = states(&[&smooth[..], &["--force", "--", "--no-correction"]].concat());
+    let last = states(&[&smooth[..], &["--force", "--", "--without", "correction"]].concat());
     assert_eq!((last.matches("done").count(), last.matches("kept").count()), (1, 2), "{last}");
 }
 
@@ -149,6 +149,8 @@ fn inputs_and_other_peoples_files_stay() {
     bench.run(&[&smooth[..], &["in/note.csv", "-o", "out", "--force"]].concat()).ok();
     refused(&[&smooth[..], &["in/a.csv", "in/a.csv", "-o", "other"]].concat(), "same name");
     refused(&[&smooth[..], &["in/a.csv", "-o", "other", "--", "--gate", "x"]].concat(), "expected a positive number");
+    let gone = "unexpected argument '--no-doubts' found: it is `--without doubts` now";
+    refused(&[&smooth[..], &["in/a.csv", "-o", "other", "--", "--no-doubts"]].concat(), gone);
     refused(&["-q", "batch", "filter", "in/a.csv", "-o", "other"], "--sensor");
     refused(&[&smooth[..], &["-", "-o", "other"]].concat(), "batch reads files");
 }
@@ -157,12 +159,12 @@ fn inputs_and_other_peoples_files_stay() {
 fn a_manifest_has_sensors_names_and_flags() {
     let bench = folder();
     fs::copy(bench.path("sensor.toml"), bench.path("in/mine.toml")).unwrap();
-    let manifest =
-        "file,sensor,output,initial-strain,no_correction\na.csv,mine.toml,first,0,true\nb.csv,,day/second.csv,,\n";
+    let manifest = "file,sensor,output,initial-strain,without\na.csv,mine.toml,first,0,\"correction,doubts\"\nb.csv,,day/second.csv,,\n";
     bench.write("in/manifest.csv", manifest);
     let batch = ["-q", "batch", "filter", "--manifest", "in/manifest.csv", "--sensor", "sensor.toml", "-o", "out"];
     bench.run(&batch).ok();
-    let a = ["filter", "in/a.csv", "--sensor", "sensor.toml", "--initial-strain", "0", "--no-correction"];
+    let a =
+        ["filter", "in/a.csv", "--sensor", "sensor.toml", "--initial-strain", "0", "--without", "correction,doubts"];
     assert_eq!(bench.read("out/first.csv"), bench.run(&a).ok());
     let b = ["filter", "in/b.csv", "--sensor", "sensor.toml"];
     assert_eq!(bench.read("out/day/second.csv"), bench.run(&b).ok());

@@ -119,19 +119,19 @@ fn another_unit_is_asked_about_and_converted() {
     calibrate(&bench, "trace.csv", &[]).ok();
     let plain = error_on_the_rest(&bench);
     let cases = [
-        (2, 100.0, "--strain-unit", "percent", "# strain_unit = percent\n"),
-        (1, 0.001, "--resistance-unit", "kohm", "# resistance_unit = kohm\n"),
+        (2, 100.0, "strain=percent", "# strain_unit = percent\n"),
+        (1, 0.001, "resistance=kohm", "# resistance_unit = kohm\n"),
     ];
-    for (column, factor, flag, unit, line) in cases {
+    for (column, factor, unit, line) in cases {
         bench.write("other.csv", in_unit(&bench, column, factor, ""));
         let asked = calibrate(&bench, "other.csv", &[]);
         assert_eq!(asked.code, Some(4), "{}", asked.stderr);
-        assert!(asked.stderr.contains(&format!("{flag} {unit}")), "{}", asked.stderr);
+        assert!(asked.stderr.contains(&format!("--unit {unit}")), "{}", asked.stderr);
         assert!(asked.stderr.contains(line.trim_end()), "{}", asked.stderr);
         // A thousand roundings in the last place lead the search to within its own resolution.
         let same = |bench: &Bench| (error_on_the_rest(bench) / plain - 1.0).abs() < 1e-3;
-        calibrate(&bench, "other.csv", &[flag, unit]).ok();
-        assert!(same(&bench), "{flag}");
+        calibrate(&bench, "other.csv", &["--unit", unit]).ok();
+        assert!(same(&bench), "{unit}");
         bench.write("said.csv", in_unit(&bench, column, factor, line));
         calibrate(&bench, "said.csv", &[]).ok();
         assert!(same(&bench), "{line}");

@@ -36,7 +36,7 @@ fn sd_scale(bench: &Bench, field: &str) -> f64 {
 fn smoother_and_filter_share_header_and_last_row_and_nothing_in_between() {
     let bench = Bench::calibrated();
     // R₀ that follows the readings does so at their end only in the filter.
-    let told = ["--sensor", "sensor.toml", "--no-doubts", "--rest-resistance", "calibrated"];
+    let told = ["--sensor", "sensor.toml", "--without", "doubts", "--rest-resistance", "calibrated"];
     let estimates = |command| Csv::new(&bench.run(&[&[command, "trace.csv"][..], &told].concat()).ok());
     let (filtered, smoothed) = (estimates("filter"), estimates("smooth"));
     assert_eq!(filtered.header, ESTIMATES_HEADER);
@@ -138,11 +138,12 @@ fn a_joint_appends_its_angle() {
     let with_joint = format!("# joint = {JOINT}\n{}", bench.read("trace.csv"));
     // Known to the sensor since its calibration.
     assert_angles(&estimates_of(&bench, &with_joint), 0.02, 0.2);
-    // Told by the recording, or by a flag, which overrides it.
-    for command in ["filter", "smooth"] {
+    // Told by the recording, or by a flag of `filter` and of `import`, which overrides it.
+    let flag = ["--joint", "prestrain=0 moment_arm_mm=-3 gauge_length_mm=30"];
+    bench.run(&[&["-q", "import", "other.csv", "-o", "imported.csv"], &flag[..]].concat()).ok();
+    for (command, recording, told) in [("filter", "other.csv", &flag[..]), ("smooth", "imported.csv", &[])] {
         assert_angles(&Csv::new(&bench.run(&[command, "other.csv", "--sensor", "sensor.toml"]).ok()), 0.02, 0.2);
-        let flag = ["--joint", "prestrain=0 moment_arm_mm=-3 gauge_length_mm=30"];
-        let run = bench.run(&[&[command, "other.csv", "--sensor", "other.toml"], &flag[..]].concat());
+        let run = bench.run(&[&[command, recording, "--sensor", "other.toml"], told].concat());
         assert_angles(&Csv::new(&run.ok()), 0.0, -0.1);
     }
 }
@@ -185,8 +186,18 @@ fn converter_codes_become_ohms_and_saturated_ones_are_flagged() {
     let code: f64 = Csv::new(&trace).numbers("adc")[100];
     let ohm: f64 = estimates.cells("resistance_ohm")[100].parse().unwrap();
     assert!((ohm / (4000.0 * code / (4095.0 - code)) - 1.0).abs() < 2e-3, "{ohm} for code {code}");
-    let smoothed = Csv::new(&bench.run(&["smooth", "other.csv", "--sensor", "other.toml"]).ok());
-    assert_eq!(smoothed.cells("flags")[7].split('|').next(), Some("saturated"));
+    let sensor = ["--sensor", "other.toml"];
+    let [filtered, smoothed] =
+        ["filter", "smooth"].map(|command| bench.run(&[&[command, "other.csv"], &sensor[..]].concat()).ok());
+    assert_eq!(Csv::new(&smoothed).cells("flags")[7].split('|').next(), Some("saturated"));
+    // A recording that does not know its electronics is told once, by `import`; `filter` takes them from a flag, too.
+    let rows: Vec<&str> = trace.lines().filter(|line| !line.starts_with("# front_end")).collect();
+    bench.write("bare.csv", rows.join("\n") + "\n");
+    let refused = bench.run(&[&["smooth", "bare.csv"], &sensor[..]].concat());
+    assert!(refused.code == Some(4) && refused.stderr.contains("# front_end = "), "{}", refused.stderr);
+    bench.run(&[&["-q", "import", "bare.csv", "-o", "imported.csv"], &front_end[..]].concat()).ok();
+    assert_eq!(bench.run(&[&["smooth", "imported.csv"], &sensor[..]].concat()).ok(), smoothed);
+    assert_eq!(bench.run(&[&["filter", "bare.csv"], &sensor[..], &front_end].concat()).ok(), filtered);
 }
 
 #[test]

@@ -5,11 +5,11 @@ use crate::export::{compile_and_run, compilers};
 
 /// What turns a protection off in C, and in the program.
 const SWITCHES: [(&str, &[&str]); 5] = [
-    ("-DOHMSTRAIN_WITHOUT_PLAUSIBILITY", &["--no-plausibility"]),
+    ("-DOHMSTRAIN_WITHOUT_PLAUSIBILITY", &["--without", "plausibility"]),
     ("-DOHMSTRAIN_WITHOUT_INFLUENCE", &["--influence", "none"]),
-    ("-DOHMSTRAIN_WITHOUT_SECOND_LOOK", &["--no-second-look"]),
+    ("-DOHMSTRAIN_WITHOUT_SECOND_LOOK", &["--without", "second-look"]),
     ("-DOHMSTRAIN_WITHOUT_FOLLOWING", &["--rest-resistance", "calibrated"]),
-    ("-DOHMSTRAIN_WITHOUT_DOUBTS", &["--no-doubts"]),
+    ("-DOHMSTRAIN_WITHOUT_DOUBTS", &["--without", "doubts"]),
 ];
 
 /// What needs each of them: an unplugging, spikes, a bad contact, a number that is stuck, another day.

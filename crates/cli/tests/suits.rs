@@ -88,7 +88,7 @@ fn the_answer_is_the_unit() {
         };
         let calibrated = ["--rest-resistance", "calibrated"];
         let in_ohm = strains(&[&["trace.csv"][..], &calibrated].concat());
-        let in_kohm = strains(&[&["other.csv"][..], &calibrated, &["--resistance-unit", "kohm"]].concat());
+        let in_kohm = strains(&[&["other.csv"][..], &calibrated, &["--unit", "resistance=kohm"]].concat());
         // Rounding of the scaled readings, 1e-16, times what a filter makes of it.
         assert!(in_ohm.iter().zip(&in_kohm).all(|(a, b)| (a - b).abs() < 1e-8), "{command}");
     }

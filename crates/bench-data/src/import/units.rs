@@ -1,4 +1,5 @@
 use crate::import::roles::Role;
+use crate::metadata::{ResistanceUnit, StrainUnit};
 
 /// How numbers in a unit become numbers of the trace.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -77,6 +78,30 @@ pub(crate) fn unit(role: Role, text: &str) -> Option<Unit> {
         *name == lower || spellings.iter().any(spelled)
     });
     found.next().map(|(_, name, scale, _)| Unit { name, scale: *scale })
+}
+
+impl StrainUnit {
+    /// The unit that a text spells as in a lab's file: `percent`, `%`, `fraction`, `mm/mm`. `None` of every other unit.
+    #[must_use]
+    pub fn spelled(text: &str) -> Option<Self> {
+        match unit(Role::Strain, text)?.name {
+            "1" => Some(Self::Fraction),
+            "percent" => Some(Self::Percent),
+            _ => None,
+        }
+    }
+}
+
+impl ResistanceUnit {
+    /// The unit that a text spells as in a lab's file: `ohm`, `kΩ`, `kOhm`. `None` of every other unit.
+    #[must_use]
+    pub fn spelled(text: &str) -> Option<Self> {
+        match unit(Role::Resistance, text)?.name {
+            "ohm" => Some(Self::Ohm),
+            "kohm" => Some(Self::Kohm),
+            _ => None,
+        }
+    }
 }
 
 /// The name of units that have none.

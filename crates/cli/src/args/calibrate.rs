@@ -2,7 +2,7 @@ use std::path::PathBuf;
 
 use clap::Args as ClapArgs;
 
-use super::{Auto, Branches, Estimator, Gauge, ReplaceArgs, TraceArgs, finite};
+use super::{Auto, Branches, Estimator, Gauge, ReplaceArgs, UnitArgs, finite};
 
 /// Flags of `calibrate`.
 #[derive(Debug, ClapArgs)]
@@ -53,9 +53,9 @@ pub struct CalibrateArgs {
     /// Whether to replace
     #[command(flatten)]
     pub replace: ReplaceArgs,
-    /// Overrides of the recordings' metadata
+    /// Units of the recordings' columns
     #[command(flatten)]
-    pub trace: TraceArgs,
+    pub units: UnitArgs,
 }
 
 /// Pictures of a recording and its estimates.

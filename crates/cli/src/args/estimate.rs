@@ -5,7 +5,7 @@ use clap::{Args as ClapArgs, ValueEnum};
 use ohmstrain::Known;
 use ohmstrain_ekf::Influence;
 
-use super::{Auto, Estimator, ReplaceArgs, TraceArgs, finite, positive};
+use super::{Auto, Estimator, ReplaceArgs, SetupArgs, UnitArgs, finite, positive};
 
 /// Flags that `filter`, `smooth` and `live` share.
 #[derive(Debug, ClapArgs)]
@@ -17,9 +17,6 @@ pub struct EstimateArgs {
     /// hypotheses
     #[arg(long, default_value = "auto")]
     pub estimator: Auto<Estimator>,
-    /// Do without the learned correction of the strain, to compare
-    #[arg(long)]
-    pub no_correction: bool,
     /// Strain (or angle) at the first row, if it is known; the body is at rest there
     #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = finite)]
     pub initial_strain: Option<f64>,
@@ -41,18 +38,32 @@ pub struct EstimateArgs {
     /// student-t:DOF, or none, as they are [default: redescending:3]
     #[arg(long, value_name = "redescending:K|huber:K|student-t:DOF|none")]
     pub influence: Option<BoundedInfluence>,
-    /// Take every finite reading for one, however far from those of the calibration, and however often it comes again
-    #[arg(long)]
-    pub no_plausibility: bool,
-    /// Where readings jump, do not follow what was known before any reading again (smoothers never do)
-    #[arg(long)]
-    pub no_second_look: bool,
-    /// Leave intervals as the filter states them: not wider at a start, after a fault, or outside of the calibration
-    #[arg(long)]
-    pub no_doubts: bool,
-    /// Overrides of the recording's metadata
+    /// What to do without, separated by commas, to compare; may be given several times
+    #[arg(long, value_enum, value_name = "WHAT", value_delimiter = ',')]
+    pub without: Vec<Without>,
+    /// Units of the recording's columns
     #[command(flatten)]
-    pub trace: TraceArgs,
+    pub units: UnitArgs,
+}
+
+impl EstimateArgs {
+    /// Whether this is to be done without.
+    pub fn is_without(&self, what: Without) -> bool {
+        self.without.contains(&what)
+    }
+}
+
+/// What an estimate can do without.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Without {
+    /// The learned correction of the strain
+    Correction,
+    /// Turning down readings that are far from those of the calibration, or come again and again
+    Plausibility,
+    /// Where readings jump, following what was known before any reading again (smoothers never do)
+    SecondLook,
+    /// Wider intervals at a start, after a fault, and outside of the calibration
+    Doubts,
 }
 
 /// Form of a table of rows.
@@ -121,6 +132,9 @@ pub struct FilterArgs {
     /// How to estimate
     #[command(flatten)]
     pub estimate: EstimateArgs,
+    /// What was measured with
+    #[command(flatten)]
+    pub setup: SetupArgs,
 }
 
 /// Flags of `smooth`.

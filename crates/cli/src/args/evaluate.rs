@@ -1,10 +1,10 @@
 use std::path::PathBuf;
 use std::str::FromStr;
 
-use clap::Args as ClapArgs;
+use clap::{Args as ClapArgs, ValueEnum};
 use ohmstrain_calib::EstimatorKind;
 
-use super::{Estimator, ReplaceArgs, ReportArgs, RestResistance, Split, TraceArgs, finite, positive};
+use super::{Estimator, ReplaceArgs, ReportArgs, RestResistance, Split, UnitArgs, finite, positive};
 
 /// Flags of `evaluate`.
 #[derive(Debug, ClapArgs)]
@@ -23,8 +23,8 @@ pub struct EvaluateArgs {
     #[arg(long, default_value = "auto")]
     pub estimator: Estimators,
     /// Do without the learned correction of the strain. Without this flag, calibrations are scored with and without it
-    #[arg(long)]
-    pub no_correction: bool,
+    #[arg(long, value_enum, value_name = "WHAT")]
+    pub without: Option<ScoredWithout>,
     /// Score rows with time_s >= T only; the filter still starts at the first row
     #[arg(long, value_name = "T", allow_negative_numbers = true, value_parser = finite, conflicts_with = "split")]
     pub from: Option<f64>,
@@ -50,12 +50,24 @@ pub struct EvaluateArgs {
     /// Print JSON
     #[arg(long)]
     pub json: bool,
-    /// Overrides of the recordings' metadata
+    /// Units of the recordings' columns
     #[command(flatten)]
-    pub trace: TraceArgs,
+    pub units: UnitArgs,
+}
+
+/// What a score can do without.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum ScoredWithout {
+    /// The learned correction of the strain
+    Correction,
 }
 
 impl EvaluateArgs {
+    /// Whether estimates have the learned correction.
+    pub fn with_correction(&self) -> bool {
+        self.without != Some(ScoredWithout::Correction)
+    }
+
     /// Whether this recording is to be drawn: the first one, if anything is.
     pub fn draws(&self, name: &str) -> bool {
         let first = self.traces.first().or(self.test.first());

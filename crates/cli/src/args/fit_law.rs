@@ -6,7 +6,7 @@ use clap::{Args as ClapArgs, ValueEnum};
 use ohmstrain_calib::closed_form::{ClosedForm, ModulusShape};
 use ohmstrain_model::Phase;
 
-use super::{ReplaceArgs, RestResistance, TraceArgs};
+use super::{ReplaceArgs, RestResistance, UnitArgs};
 
 /// Flags of `fit-law`.
 #[derive(Clone, Debug, ClapArgs)]
@@ -49,9 +49,9 @@ pub struct FitLawArgs {
     /// Print one row per material, speed and phase over all recordings
     #[arg(long, conflicts_with_all = ["json", "pool"])]
     pub table: bool,
-    /// Overrides of the recordings' metadata
+    /// Units of the recordings' columns
     #[command(flatten)]
-    pub trace: TraceArgs,
+    pub units: UnitArgs,
 }
 
 /// A form of tables.

@@ -2,7 +2,7 @@ use std::path::PathBuf;
 
 use clap::Args as ClapArgs;
 
-use super::{EstimateArgs, positive};
+use super::{EstimateArgs, SetupArgs, positive};
 
 /// Flags of `live`.
 #[derive(Debug, ClapArgs)]
@@ -30,6 +30,9 @@ pub struct LiveArgs {
     /// How to estimate
     #[command(flatten)]
     pub estimate: EstimateArgs,
+    /// What was measured with
+    #[command(flatten)]
+    pub setup: SetupArgs,
 }
 
 /// What the long help says after the flags.

@@ -4,7 +4,7 @@ use std::str::FromStr;
 use clap::Args as ClapArgs;
 use ohmstrain_calib::likelihood::NoiseParameter;
 
-use super::{Auto, Estimator, ReplaceArgs, RestResistance, TraceArgs, finite};
+use super::{Auto, Estimator, ReplaceArgs, RestResistance, UnitArgs, finite};
 
 /// Flags of `refine`.
 #[derive(Debug, ClapArgs)]
@@ -38,9 +38,9 @@ pub struct RefineArgs {
     /// the recording's first N readings; it is not written
     #[arg(long, value_name = "OHM|first:N", allow_negative_numbers = true)]
     pub rest_resistance: Option<RestResistance>,
-    /// Overrides of the recording's metadata
+    /// Units of the recording's columns
     #[command(flatten)]
-    pub trace: TraceArgs,
+    pub units: UnitArgs,
 }
 
 /// A parameter to move.

@@ -29,7 +29,7 @@ pub fn run(args: &CalibrateArgs) -> Result<(), CliError> {
     let mut outputs = Outputs::new(args.replace.force, args.traces.iter().chain(&args.prior));
     let sensor_output = outputs.claim(&args.output, Kind::Sensor)?;
     let wanted = Wanted::claim(&args.report, &mut outputs)?;
-    let overrides = args.trace.metadata();
+    let overrides = args.units.metadata();
     let (mut recordings, mut kept) = (Vec::new(), Vec::new());
     for path in &args.traces {
         let recording = input::read(path, &overrides)?;

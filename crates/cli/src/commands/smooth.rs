@@ -22,7 +22,7 @@ pub fn run(args: &SmoothArgs) -> Result<(), CliError> {
     let inputs = [&args.trace_file, &args.estimate.sensor];
     let mut rows_out = RowsOut::claim(output.as_deref(), columns, replace.force, inputs)?;
     let mut sensor = sensor_file::read(&args.estimate.sensor, wanted)?;
-    let rows = input::open(&args.trace_file, &args.estimate.trace.metadata())?;
+    let rows = input::open(&args.trace_file, &args.estimate.units.metadata())?;
     let header = input::header(rows.file(), rows.line());
     check_unit(&header, rows.reading_kind(), sensor.params().reading)?;
     if let Some(joint) = input::joint(rows.metadata()) {

@@ -10,6 +10,7 @@ use super::journal::{JOURNAL, Journal};
 use super::summary::SUMMARY;
 use crate::args::{Args, BatchArgs, BatchCommand, Command, Estimators};
 use crate::error::CliError;
+use crate::renamed;
 use crate::sensor_file;
 use crate::whole_file;
 
@@ -216,7 +217,8 @@ fn check_arguments(job: &mut Job, args: &BatchArgs) -> Result<(), CliError> {
     let parsed = Args::try_parse_from(words).map_err(|error| {
         let text = error.to_string();
         let text = text.lines().map(str::trim).take_while(|line| !line.is_empty()).collect::<Vec<_>>().join(" ");
-        CliError::Arguments(format!("{}: {}", job.name(), text.trim_start_matches("error: ")))
+        let answer = renamed::answer(&error, args.command.name()).map_or(String::new(), |answer| format!(": {answer}"));
+        CliError::Arguments(format!("{}: {}{answer}", job.name(), text.trim_start_matches("error: ")))
     })?;
     let (output, beside) = match parsed.command {
         Command::Calibrate(calibrate) => {

@@ -54,7 +54,7 @@ pub fn run(args: &EvaluateArgs) -> Result<(), CliError> {
 
 /// Every recording with the parameters of a file.
 fn with_sensor_file(args: &EvaluateArgs, path: &Path, evaluation: &mut Evaluation) -> Result<(), CliError> {
-    let sensors = Sensor::from_file(path, args.estimator, !args.no_correction)?;
+    let sensors = Sensor::from_file(path, args.estimator, args.with_correction())?;
     let rivals = Rivals { static_cubic: sensors[0].sensor.params().static_cubic, learned: None, published: None };
     let judged = |path: &PathBuf| judge(args, &read(args, path)?, Part::since(args.from), &sensors, &rivals);
     add_until_error(evaluation, args.traces.par_iter().map(judged).collect())
@@ -121,7 +121,7 @@ fn add_until_error(evaluation: &mut Evaluation, judged: Vec<Result<Judged, CliEr
 }
 
 fn read(args: &EvaluateArgs, path: &Path) -> Result<TraceFile, CliError> {
-    input::read(path, &args.trace.metadata())
+    input::read(path, &args.units.metadata())
 }
 
 /// One sensor per estimator, and the baselines, from the same rows.
@@ -130,7 +130,7 @@ fn calibrated(
     args: &EvaluateArgs,
     progress: &Progress,
 ) -> Result<(Vec<Sensor>, Rivals), CliError> {
-    let sensors = Sensor::calibrated(training, args.estimator, !args.no_correction, progress)?;
+    let sensors = Sensor::calibrated(training, args.estimator, args.with_correction(), progress)?;
     let samples: Vec<Samples> = training.iter().map(TraceFile::samples).collect::<Result<_, _>>()?;
     let names: Vec<&str> = training.iter().map(|recording| recording.name.as_str()).collect();
     let failed = |error| CliError::calibration(&names, &error);

@@ -48,7 +48,7 @@ pub fn run(args: &FitLawArgs) -> Result<(), CliError> {
     if args.modulus.is_some() && !args.law.has_modulus() {
         return Err(CliError::Arguments(format!("--modulus is for eq8, eq9 and eq8+eq9, not for {}", args.law)));
     }
-    let overrides = args.trace.metadata();
+    let overrides = args.units.metadata();
     let read = |path: &std::path::PathBuf| input::read(path, &overrides);
     let recordings: Vec<TraceFile> = args.traces.iter().map(read).collect::<Result<_, _>>()?;
     if !args.compare.is_empty() {

@@ -153,7 +153,7 @@ impl<'a> Channel<'a> {
         let doubt = self.sensor.check_unit(self.early.iter().copied(), self.joint.rest_resistance).err()?;
         let answer = match doubt.guess {
             UnitGuess::KiloOhm => "Then say so with a line `# resistance_unit = kohm` above the header",
-            UnitGuess::CalibrationInKiloOhm => "Then calibrate again with `--resistance-unit kohm`",
+            UnitGuess::CalibrationInKiloOhm => "Then calibrate again with `--unit resistance=kohm`",
             _ => "Bring them to the sensor's unit",
         };
         Some(format!("joint `{}`: {doubt} {answer}", self.joint.name))

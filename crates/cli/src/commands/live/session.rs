@@ -111,7 +111,7 @@ impl<'a> Session<'a> {
             _ => None,
         };
         let name = args.port.display().to_string();
-        let lines = LineParser::new(&name, args.estimate.trace.metadata());
+        let lines = LineParser::new(&name, args.setup.metadata(&args.estimate.units));
         let (filter, watch) = (builder(&sensor, &args.estimate).build()?, ValidityWatch::new(&sensor, rest));
         let quiet = QuietWatch::new(&sensor, rest, &args.estimate.known);
         let mut session = Self {

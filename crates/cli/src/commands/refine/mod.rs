@@ -31,7 +31,7 @@ pub fn run(args: &RefineArgs) -> Result<(), CliError> {
     let mut outputs = Outputs::new(args.replace.force, [&args.trace_file, &args.sensor]);
     let output = outputs.claim(&args.output, Kind::Sensor)?;
     let sensor = sensor_file::read(&args.sensor, Some(EstimatorKind::Ekf))?;
-    let recording = input::read(&args.trace_file, &args.trace.metadata())?;
+    let recording = input::read(&args.trace_file, &args.units.metadata())?;
     check_unit(&recording.header, recording.trace.readings.kind, sensor.params().reading)?;
     let readings = || recording.trace.readings.values.iter().copied();
     let rest = rest_resistance(args.rest_resistance, &sensor, readings(), &recording.name)?;
