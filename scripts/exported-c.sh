@@ -105,6 +105,10 @@ for kind in polynomial:2:corrected polynomial:0:ekf decaying-exponential:1:sign-
     name=$gauge-$branches-$estimator
     "$ohmstrain" --quiet calibrate "$work/trace.csv" --until 120 --estimator "$estimator" --gauge "$gauge" \
         --branches "$branches" -o "$work/$name.toml"
+    if [ "$estimator" = sign-split ]; then
+        # As if it had been calibrated on several sessions.
+        printf '\n[sessions]\nrest_sd = 0.15\nstart_sd = 0.07\n' >>"$work/$name.toml"
+    fi
     folder=$work/$name
     "$ohmstrain" export --sensor "$work/$name.toml" --target c --dt-s 0.2 -o "$folder"
     "$ohmstrain" export --sensor "$work/$name.toml" --target rust --dt-s 0.2 -o "$folder/rust"

@@ -1,5 +1,5 @@
 use ohmstrain::{Filter, FilterBuilder, Influence, Sensor};
-use ohmstrain_calib::{EstimatorKind, SensorParams};
+use ohmstrain_calib::{EstimatorKind, SensorParams, Sessions};
 use ohmstrain_ekf::live::SensorEstimator;
 use ohmstrain_ekf::{Gaussian, StepError};
 
@@ -13,13 +13,14 @@ fn sensor() -> Sensor {
     Sensor::from_toml(SENSOR).unwrap()
 }
 
-/// The same with hypotheses about the sign of the rate in their place.
+/// The same with hypotheses about the sign of the rate in their place, and sessions that differ.
 fn sign_split_sensor() -> Sensor {
     let mut params = sensor().params().clone();
     let mut estimator = params.estimators[&EstimatorKind::Hypotheses];
     estimator.phases.iter_mut().for_each(|phases| phases.speed_per_s = 0.0);
     params.estimators = [(EstimatorKind::SignSplit, estimator)].into();
     params.correction.iter_mut().for_each(|correction| correction.corrects = EstimatorKind::SignSplit);
+    params.sessions = Some(Sessions { rest_sd: 0.15, start_sd: 0.07 });
     Sensor::from_params(params).unwrap()
 }
 
