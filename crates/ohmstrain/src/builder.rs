@@ -283,9 +283,14 @@ impl<'a> FilterBuilder<'a> {
     pub(crate) fn smoothers_doubts(self, kind: EstimatorKind) -> Result<Option<Doubts<f64>>, Error> {
         let params = self.sensor.params();
         let motion = &params.estimator(params.filter_of(kind)).map_err(CalibrationError::from)?.motion;
-        let is_none = |strain: f64| strain.abs() <= DOUBT.zero * params.limits.span();
         let doubts = self.protections.doubts.then(|| Doubts::new(params.doubt_parts(motion)));
-        Ok(doubts.map(|doubts| self.initial_strain.map_or(doubts, |strain| doubts.of_known_strain(is_none(strain)))))
+        let of_known = |doubts: Doubts<f64>, strain| doubts.of_known_strain(self.is_at_rest(strain));
+        Ok(doubts.map(|doubts| self.initial_strain.map_or(doubts, |strain| of_known(doubts, strain))))
+    }
+
+    /// True for a strain of zero, but for rounding.
+    pub(crate) fn is_at_rest(&self, strain: f64) -> bool {
+        strain.abs() <= DOUBT.zero * self.sensor.params().limits.span()
     }
 
     fn start_at(&self, strain: f64) -> Result<Start, Error> {

@@ -114,6 +114,8 @@ impl FilterBuilder<'_> {
             (time_s, reading.relative(scale.rest_reading))
         };
         let follower = self.rest_resistance.is_none().then(|| RestFollower::new(self.sensor.params().rest_bounds()));
+        let begins_stretched = self.initial_strain.is_some_and(|strain| !self.is_at_rest(strain));
+        let follower = follower.map(|follower| if begins_stretched { follower.stretched() } else { follower });
         let follower = follower.map(|follower| follower.settled(len, calibrated));
         let off = follower.map_or(0.0, |follower| follower.off());
         let relative = |k| {

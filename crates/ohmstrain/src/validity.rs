@@ -1,6 +1,7 @@
 use std::fmt;
 
-use ohmstrain_calib::{Quantity, Validity};
+use ohmstrain_calib::{Quantity, SensorParams, Validity};
+use ohmstrain_ekf::live::RestFollower;
 
 use crate::Sensor;
 use crate::column::reading_column;
@@ -30,6 +31,8 @@ pub struct ValidityWatch {
     /// Readings that calibration has seen, moved to the R₀ that is told, and whether none is.
     readings: (f64, f64),
     follows: bool,
+    /// `None` where calibration knows one session only, or R₀ is told.
+    session: Option<Session>,
     start_s: Option<f64>,
     long: bool,
     fast: Outside,
@@ -114,6 +117,28 @@ const FOUND_S: f64 = 10.0;
 /// A recording is as long as the calibration up to this many times its length.
 const LONGER: f64 = 1.05;
 
+/// R₀ of a session, where calibration knows several.
+#[derive(Clone, Debug)]
+struct Session {
+    follower: RestFollower<f64>,
+    rest_reading: f64,
+}
+
+impl Session {
+    fn new(params: &SensorParams) -> Self {
+        Self { follower: RestFollower::new(params.rest_bounds()), rest_reading: params.rest_reading }
+    }
+
+    /// The reading that the sensor would have given with calibration's R₀; NaN where it is missing.
+    fn as_calibrated(&mut self, reading: f64) -> f64 {
+        let relative = reading / self.rest_reading - 1.0;
+        if relative.is_finite() {
+            self.follower.see(0.0, relative);
+        }
+        self.rest_reading * (1.0 + self.follower.of_session(relative))
+    }
+}
+
 impl Outside {
     /// Whether it is time to say so.
     fn see(&mut self, outside: bool, chance: (usize, f64)) -> bool {
@@ -146,6 +171,7 @@ impl ValidityWatch {
             reading: reading_column(params.reading),
             readings: (moved * seen.reading_lower, moved * seen.reading_upper),
             follows: rest_resistance.is_none(),
+            session: params.sessions.filter(|_| rest_resistance.is_none()).map(|_| Session::new(params)),
             start_s: None,
             long: false,
             fast: Outside::default(),
@@ -177,6 +203,7 @@ impl ValidityWatch {
         let is_long = !self.long && lasted_s > LONGER * longest_s;
         self.long |= is_long;
         let is_fast = lasted_s >= FOUND_S && self.fast.see(rate.abs() > FASTER * fastest_per_s, FAST_BY_CHANCE);
+        let reading = self.session.as_mut().map_or(reading, |session| session.as_calibrated(reading));
         let is_other = reading.is_finite() && self.beyond_readings.see(!(least..=most).contains(&reading), CHANCE);
         let is_beyond = truth.is_finite() && self.beyond_strains.see(!(lower..=upper).contains(&truth), CHANCE);
         let follows = self.follows;

@@ -1,6 +1,6 @@
 //! R₀ of another day.
 
-use ohmstrain::{Estimate, Sensor};
+use ohmstrain::{Estimate, Sensor, ValidityWatch};
 use ohmstrain_calib::Sessions;
 use ohmstrain_ekf::live::{RestBounds, RestFollower};
 
@@ -112,4 +112,42 @@ fn the_first_reading_counts_by_how_starts_differ() {
     assert!(error(&with) < error(&without), "{} {}", error(&with), error(&without));
     let wider = filtered(&sensor, &own);
     assert!(wider.iter().zip(&of_own).all(|(wider, own)| wider.strain_sd > own.strain_sd));
+}
+
+/// A strain that is known at the start and is not zero: the first reading is of that strain, and R₀ stays calibration's.
+#[test]
+fn a_session_that_begins_stretched_tells_nothing_of_r0() {
+    let sensor = of_sessions(0.2, 1e-9);
+    let mut params = sensor.params().clone();
+    params.sessions = None;
+    let alone = Sensor::from_params(params).unwrap();
+    // Readings within calibration's throughout: nothing draws R₀.
+    let rows = &session(&sensor, 1.0)[100..];
+    let (time_s, readings): (Vec<f64>, Vec<f64>) = rows.iter().copied().unzip();
+    let strain = 0.5 * sensor.params().limits.upper;
+    let estimates = |sensor: &Sensor| {
+        let mut filter = sensor.filter().initial_strain(strain).build().unwrap();
+        let mut means: Vec<f64> = rows.iter().map(|&(time_s, r)| filter.step(time_s, r).unwrap().strain).collect();
+        let smoothed = sensor.filter().initial_strain(strain).smooth(&time_s, &readings).unwrap();
+        means.extend(smoothed.iter().map(|estimate| estimate.strain));
+        means
+    };
+    assert_eq!(estimates(&sensor), estimates(&alone));
+    // Without that knowledge it is taken for a session at rest.
+    assert_ne!(filtered(&sensor, rows)[0].strain, filtered(&alone, rows)[0].strain);
+}
+
+/// Readings of another session are outside of calibration's as far as they are relative to its own R₀.
+#[test]
+fn another_session_is_no_extrapolation() {
+    let sensor = of_sessions(0.2, 1e-9);
+    let mut params = sensor.params().clone();
+    params.sessions = None;
+    let alone = Sensor::from_params(params).unwrap();
+    let said = |sensor: &Sensor| {
+        let mut watch = ValidityWatch::new(sensor, None);
+        let rows = session(sensor, 1.3);
+        rows.into_iter().flat_map(|(time_s, reading)| watch.see(time_s, reading, 0.0, f64::NAN)).count()
+    };
+    assert_eq!((said(&sensor), said(&alone)), (0, 1));
 }

@@ -80,7 +80,7 @@ pub struct Calibration {
     pub limits: RangeParams,
     /// What was seen.
     pub validity: Validity,
-    /// How recordings differ, if there are several that begin at rest.
+    /// Differences between recordings; `None` unless several begin at rest.
     pub sessions: Option<Sessions>,
     /// The static inverse fitted to the same rows.
     pub static_cubic: StaticCubic,
@@ -136,9 +136,8 @@ fn handicap(kind: EstimatorKind) -> f64 {
 /// stand far from their neighbours, or from the law, take no part ([`screen`]).
 ///
 /// Estimators are tried with a law for each of `structures` and each strength of ridge; the pair with the best score on
-/// blocks that the law has not seen gives the law. To that law every one of them and the extended
-/// Kalman filter in any case, is then fitted, and the best of `kinds` becomes
-/// the default. Near ties go to the one that keeps hypotheses. [`EstimatorKind::Corrected`] is the default where it is asked
+/// blocks that the law has not seen gives the law. Every one of them, and the extended Kalman filter in any case, is then
+/// fitted to that law, and the best of `kinds` becomes the default. Near ties go to the one that keeps hypotheses. [`EstimatorKind::Corrected`] is the default where it is asked
 /// for; what it corrects is learned last, from the same rows.
 ///
 /// # Errors
@@ -251,7 +250,7 @@ fn cheapest<'s, 'a: 's>(surveyed: impl Iterator<Item = &'s Surveyed<'a>>) -> Opt
     surveyed.min_by(|a, b| cost(a).total_cmp(&cost(b)))
 }
 
-/// What was seen. Readings count relative to R₀ of their recording: in ohms another session's would hide how far a strain leads.
+/// Ranges seen in calibration. Readings count relative to R₀ of their recording: in ohms another session's would hide how far a strain leads.
 fn validity(recordings: &[Samples], rest_readings: &[f64], limits: RangeParams, stats: &MotionStats) -> Validity {
     let rest = median_rest(rest_readings);
     let of_sensor = |of: f64, samples: &Samples| {

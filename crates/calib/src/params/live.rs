@@ -84,7 +84,7 @@ impl SensorParams {
         }
     }
 
-    /// What the first reading of a session says of R₀; `None` where it was calibrated on one session, or none begins at rest.
+    /// Estimate of R₀ from the first reading of a session; `None` for a calibration on one session, or on none that begins at rest.
     fn session_start(&self) -> Option<SessionStart<f64>> {
         let (sessions, measured) = (self.sessions?, self.measured_rest?);
         Some(SessionStart { reading: self.relative(measured), weight: sessions.weight() })

@@ -60,7 +60,7 @@ pub struct SensorParams {
     pub limits: RangeParams,
     /// What calibration has seen.
     pub validity: Validity,
-    /// How sessions differ, where it was calibrated on several.
+    /// Differences between sessions; `None` for a calibration on one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sessions: Option<Sessions>,
     /// The static inverse to compare with.
@@ -163,7 +163,7 @@ pub struct Validity {
     pub longest_repeat_s: f64,
 }
 
-/// How recordings differ from each other: each is a session, with an R₀ of its own.
+/// Differences between recordings: each is a session, with an R₀ of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Sessions {

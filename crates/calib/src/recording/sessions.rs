@@ -1,4 +1,4 @@
-//! How recordings differ from each other: random effects of R₀.
+//! Random effects of R₀: differences between recordings.
 
 use crate::params::Sessions;
 use crate::recording::rest::reading_before_moving;
@@ -8,7 +8,7 @@ use crate::samples::Samples;
 /// nine days. It counts as one degree of freedom.
 const EXPECTED_SD: f64 = 0.15;
 
-/// What several recordings tell of sessions; `None` if fewer than two, or fewer than half of them, begin at rest.
+/// Standard deviations between recordings; `None` if fewer than two, or fewer than half of them, begin at rest.
 pub(crate) fn sessions(recordings: &[Samples], rest_readings: &[f64], span: f64) -> Option<Sessions> {
     let share = |(samples, rest): (&Samples, &f64)| Some(reading_before_moving(samples, span)? / rest);
     let starts: Vec<f64> = recordings.iter().zip(rest_readings).filter_map(share).collect();

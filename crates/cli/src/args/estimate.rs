@@ -27,7 +27,8 @@ pub struct EstimateArgs {
     pub known: Vec<Known>,
     /// What the rested, unstretched sensor reads now: a number in the readings' unit, first:N for the median of the first
     /// N readings, or calibrated for what it read in calibration. Without this flag R₀ is that too, but follows readings
-    /// that stay beyond those of the calibration
+    /// that stay beyond those of the calibration; of a sensor that was calibrated on several recordings it begins at what
+    /// the first reading suggests
     #[arg(long, value_name = "OHM|first:N|calibrated", allow_negative_numbers = true)]
     pub rest_resistance: Option<RestResistance>,
     /// Turn down readings whose normalised innovation squared (column nis) is above X, two in a row at most; 10.8

@@ -263,8 +263,11 @@ where
         let start = (self.estimator.0.start(known), at_reading(&self.estimator, &self.parts));
         self.now = Memory::new(&self.parts, self.protections, start);
         if let Some(strain) = strain {
-            self.now.doubts =
-                self.now.doubts.of_known_strain(strain.abs() <= T::of(DOUBT.zero) * self.parts.limits.span());
+            let is_at_rest = strain.abs() <= T::of(DOUBT.zero) * self.parts.limits.span();
+            self.now.doubts = self.now.doubts.of_known_strain(is_at_rest);
+            if !is_at_rest {
+                self.now.follower = self.now.follower.map(RestFollower::stretched);
+            }
         }
     }
 

@@ -42,11 +42,11 @@ pub struct RestBounds<T> {
     pub low: Option<T>,
     /// The largest.
     pub high: Option<T>,
-    /// What the first reading of a session says of R₀; `None` where recordings of the calibration do not tell.
+    /// Estimate of R₀ from the first reading of a session; `None` for a calibration on one recording.
     pub start: Option<SessionStart<T>>,
 }
 
-/// What the first reading of a session says of R₀, by how recordings of the calibration differ.
+/// Estimate of R₀ from the first reading of a session, by the differences between recordings of the calibration.
 ///
 /// R₀ is drawn anew for each session: `ln R₀` has the standard deviation s between sessions. A session begins at rest, with a
 /// reading whose logarithm is `ln R₀` plus a constant, to the standard deviation f. The best linear estimate of `ln R₀` from the first
@@ -93,8 +93,10 @@ pub struct RestFollower<T> {
     bounds: RestBounds<T>,
     /// By what share of calibration's R₀ it is another.
     pub(crate) off: T,
-    /// By what share it was another when the session began.
+    /// The same when the session began.
     pub(crate) home: T,
+    /// True once R₀ of the session has its start.
+    pub(crate) has_begun: bool,
     /// The last reading, none before the first one, and the time since it came, s.
     pub(crate) last: Option<T>,
     pub(crate) since_s: T,
@@ -111,7 +113,21 @@ impl<T: Recordable> RestFollower<T> {
     /// ```
     #[must_use]
     pub fn new(bounds: RestBounds<T>) -> Self {
-        Self { bounds, off: T::zero(), home: T::zero(), last: None, since_s: T::zero(), jumped: None }
+        Self { bounds, off: T::zero(), home: T::zero(), has_begun: false, last: None, since_s: T::zero(), jumped: None }
+    }
+
+    /// The same for a session that begins stretched: its first reading tells nothing of R₀.
+    ///
+    /// ```
+    /// let start = Some(ohmstrain_ekf::live::SessionStart { reading: 0.0, weight: 0.5 });
+    /// let bounds = ohmstrain_ekf::live::RestBounds { low: None, high: None, start };
+    /// let mut follower = ohmstrain_ekf::live::RestFollower::<f64>::new(bounds).stretched();
+    /// follower.see(0.0, 0.2);
+    /// assert_eq!(follower.off(), 0.0);
+    /// ```
+    #[must_use]
+    pub fn stretched(self) -> Self {
+        Self { has_begun: true, ..self }
     }
 
     /// By what share of calibration's R₀ it is another.
@@ -134,13 +150,13 @@ impl<T: Recordable> RestFollower<T> {
     /// ```
     #[must_use]
     pub fn relative(&self, reading: Reading<T>) -> Reading<T> {
-        let off = if self.last.is_none() { self.start(reading.value) } else { self.off };
+        let off = if self.has_begun { self.off } else { self.start(reading.value) };
         let rest = T::one() + off;
         let extra_variance = reading.extra_variance / (rest * rest);
         Reading { value: (reading.value - off) / rest, extra_variance }
     }
 
-    /// A reading relative to R₀ as it was when the session began: what doubts are of.
+    /// A reading relative to R₀ as it was when the session began: the input of doubts.
     ///
     /// ```
     /// let start = Some(ohmstrain_ekf::live::SessionStart { reading: 0.0, weight: 0.5 });
@@ -151,11 +167,11 @@ impl<T: Recordable> RestFollower<T> {
     /// ```
     #[must_use]
     pub fn of_session(&self, reading: T) -> T {
-        let home = if self.last.is_none() { self.start(reading) } else { self.home };
+        let home = if self.has_begun { self.home } else { self.start(reading) };
         (reading - home) / (T::one() + home)
     }
 
-    /// By what share R₀ is another in a session that begins with this reading.
+    /// Relative difference of R₀ from calibration's in a session that begins with this reading.
     fn start(&self, reading: T) -> T {
         let Some(start) = self.bounds.start else { return self.off };
         let off = start.weight * (reading - start.reading) / (T::one() + start.reading);
@@ -202,9 +218,9 @@ impl<T: Recordable> RestFollower<T> {
 
     /// Takes the first reading of a session.
     fn begin(&mut self, reading: T) {
-        if self.last.is_none() {
+        if !self.has_begun {
             let off = self.start(reading);
-            (self.off, self.home) = (off, off);
+            (self.off, self.home, self.has_begun) = (off, off, true);
         }
     }
 

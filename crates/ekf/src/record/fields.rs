@@ -62,6 +62,7 @@ fields! {
     RestFollower {
         number "off" off,
         number "home" home,
+        truth "session_begun" has_begun,
         maybe_one "drawn_by" last,
         number "undrawn_s" since_s,
         maybe "jumped" jumped,

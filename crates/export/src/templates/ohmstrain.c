@@ -603,6 +603,8 @@ static ohmstrain_status start(ohmstrain_state *state, const float *strain, float
     state->readings = none;
     state->readings.follows = FOLLOWING;
     begin(&state->readings, strain != 0, strain && fabsf(*strain) <= << doubt.zero >>f);
+    /* The first reading of a session that begins stretched tells nothing of R0. */
+    state->readings.session_begun = strain && !(fabsf(*strain) <= << doubt.zero >>f);
     summarise(state, &all);
     state->strain = reported(all.mean[0], all.variance[0], &state->variance);
     state->variance += DOUBTS ? state->readings.fading : 0.0f;
