@@ -33,7 +33,15 @@ fn is_unfinished(name: &str) -> bool {
 fn stop(child: &mut Child, signal: &str) -> std::process::ExitStatus {
     let sent = Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap();
     assert!(sent.success());
-    child.wait().unwrap()
+    let started = Instant::now();
+    loop {
+        if let Some(status) = child.try_wait().unwrap() {
+            return status;
+        }
+        // A shell that starts these tests in the background has them ignore interrupts, and the program with them.
+        assert!(started.elapsed() < PATIENCE, "{signal} was ignored");
+        std::thread::sleep(Duration::from_millis(20));
+    }
 }
 
 fn bench() -> Bench {
