@@ -4,13 +4,13 @@
 use std::collections::BTreeMap;
 
 use ohmstrain::Sensor;
-use ohmstrain_calib::{
-    BranchParams, CorrectionParams, CorrectionScale, CorrectorParams, EstimatorKind, EstimatorParams, FORMAT, Filter,
-    GaugeParams, LawParams, Learned, MotionParams, NoiseParams, Options, PhaseParams, ProcessParams, Quantity,
-    RangeParams, ReadingUnit, Rows, SensorParams, SimulatedParams, SimulatedRow, Smoother, Start, StaticCubic,
-    TrainingRow, Validity, build_filter, build_filter_with, build_smoother_with,
-};
 use ohmstrain_ekf::{Guard, Reading, StepError};
+use ohmstrain_sensor::{
+    BranchParams, CorrectionParams, CorrectionScale, CorrectorParams, EstimatorKind, EstimatorParams, FORMAT, Filter,
+    GaugeParams, InputScales, LawParams, Learned, MotionParams, NoiseParams, Options, PhaseParams, ProcessParams,
+    Quantity, RangeParams, ReadingUnit, Rows, SensorParams, SimulatedParams, Smoother, Start, StaticCubic, TrainingRow,
+    Validity, build_filter, build_filter_with, build_smoother_with,
+};
 use proptest::prelude::*;
 
 /// A sensor with parameters for every estimator.
@@ -85,10 +85,28 @@ fn sensor() -> SensorParams {
 
 /// A correction that has learned something from rows that no two are alike.
 fn correction() -> CorrectionParams {
-    let process =
-        |inputs: usize| ProcessParams { lengths: vec![4.0; inputs], noise: 0.1, noise_time_s: 2.0, sd_scale: 1.1 };
+    let weights = |rows: usize| (0..rows).map(|k| 0.02 * (1.7 * k as f64).cos()).collect();
+    let process = |inputs: usize| ProcessParams {
+        sd_scale: 1.1,
+        mean: 0.02,
+        sd: 0.1,
+        least_sd: 0.05,
+        noise_sd: 0.01,
+        lengths: vec![4.0; inputs],
+        weights: weights(40),
+        explained: vec![0.4, -0.1, 0.05, 0.3, 0.1, 0.2],
+    };
+    let column = |value: f64, inputs: usize| vec![value; inputs];
     let corrector = |future: usize, one_sided| CorrectorParams {
         sd_scale: 0.9,
+        strain_sd: 0.09,
+        order: (0..40).map(|k| (7 * k) % 40).collect(),
+        inputs: InputScales {
+            mean: column(0.1, 13 + future),
+            sd: column(0.6, 13 + future),
+            lower: column(-1.0, 13 + future),
+            upper: column(1.0, 13 + future),
+        },
         direct: process(7 + future),
         residual: process(13 + future),
         one_sided,
@@ -102,14 +120,19 @@ fn correction() -> CorrectionParams {
         filtered: std::array::from_fn(|i| 0.2 + 0.1 * wave(k, 20 + i)),
         smoothed: std::array::from_fn(|i| 0.2 + 0.1 * wave(k, 30 + i)),
     };
-    let simulated = |k: usize| SimulatedRow { past: row(k).past, strain: row(k).strain };
     CorrectionParams {
         corrects: EstimatorKind::SignSplit,
         readings: CorrectionScale { centre: 0.2, half_range: 0.25, rates: [0.02, 0.05], starts: [[0.1, 0.6]; 6] },
         filter: corrector(0, vec![]),
         smoother: corrector(6, vec![process(7), process(7)]),
         rows: (0..40).map(row).collect(),
-        simulated: SimulatedParams { sd: 0.03, rows: (40..60).map(simulated).collect() },
+        simulated: SimulatedParams {
+            mean: 0.15,
+            sd: 0.03,
+            length: 4.0,
+            weights: weights(20),
+            rows: (40..60).map(|k| row(k).past).collect(),
+        },
     }
 }
 
@@ -249,10 +272,9 @@ fn no_row_is_smoothed_to_nothing() {
     assert_eq!(smoother(&sensor(), kind, Guard::none()).smooth(&[], &[]), Ok(Some(vec![])));
 }
 
-/// Corrections are learned once for all filters of a sensor: what comes of it depends neither on the number of calls nor on
-/// who asked first.
+/// Filters of a sensor share its correction: what a smoother says depends neither on the number of calls nor on who asked first.
 #[test]
-fn what_was_learned_is_shared() {
+fn a_correction_is_shared() {
     let params = SensorParams { default_estimator: EstimatorKind::Corrected, ..sensor() };
     let time_s: Vec<f64> = (0..50).map(|k| 0.1 * f64::from(k)).collect();
     let readings: Vec<f64> = time_s.iter().map(|time_s| 1.2 + 0.1 * time_s.sin()).collect();
@@ -264,17 +286,4 @@ fn what_was_learned_is_shared() {
         assert_eq!(smoothed(sensor), expected);
     }
     assert_eq!(used, fresh());
-}
-
-/// A column that changes by less than its square can hold: only smoothers have it.
-#[test]
-fn a_smoother_that_cannot_learn_says_so() {
-    let mut params = SensorParams { default_estimator: EstimatorKind::Corrected, ..sensor() };
-    params.correction.iter_mut().flat_map(|correction| &mut correction.rows).enumerate().for_each(|(k, row)| {
-        row.future[0] = 1e-200 * k as f64;
-    });
-    let sensor = Sensor::from_params(params).unwrap();
-    assert!(sensor.filter().build().unwrap().step(0.0, 1.2).is_ok());
-    let said = sensor.smooth(&[0.0, 0.1], &[1.2, 1.21]).unwrap_err().to_string();
-    assert_eq!(said, "`correction.smoother`: nothing can be learned from its rows");
 }

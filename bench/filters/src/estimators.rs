@@ -5,6 +5,7 @@ use ohmstrain_ekf::{
 use ohmstrain_model::{Phase, SwitchedModel};
 
 use crate::mixtures::GatedMixture;
+use crate::readings::GATE;
 use crate::{
     DT_S, Filter, GatedSparse, GatedUnscented, NonlinearReference, PackedReference, RANGE, Visitor, linearised,
     phased_sensor, readings, sensor,
@@ -12,9 +13,6 @@ use crate::{
 
 /// Two periods of the readings, so that they can be repeated.
 pub const STEPS: usize = 1000;
-
-/// Readings with a larger normalised innovation squared are turned down: one in a thousand if the model is right.
-pub(crate) const GATE: f64 = 10.8;
 
 /// Any estimator with a gate on the normalised innovation squared and a log-likelihood.
 #[derive(Clone, Copy, Debug)]

@@ -1,7 +1,7 @@
 use ohmstrain_ekf::{Hypotheses, Imm, Mixture, MixtureResidual, PhaseMixture, Reading, SignSplit, State, StepError};
 
 use crate::Filter;
-use crate::estimators::GATE;
+use crate::readings::GATE;
 
 /// A filter of hypotheses that steps from one state into another that is there already.
 pub(crate) trait StepsInto {

@@ -3,6 +3,9 @@
 use crate::DT_S;
 use crate::sensor::{READING_SD, law};
 
+/// Readings with a larger normalised innovation squared are turned down: one in a thousand if the model is right.
+pub(crate) const GATE: f64 = 10.8;
+
 /// Readings after which they repeat.
 const PERIOD: usize = 500;
 

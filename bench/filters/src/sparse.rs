@@ -1,7 +1,7 @@
 use ohmstrain_ekf::{Belief, Compact, Cubic, Curve, Reading, SigmaPoints, SparseEkf, Switch};
 use ohmstrain_model::SwitchedModel;
 
-use crate::estimators::GATE;
+use crate::readings::GATE;
 use crate::{DT_S, Filter};
 
 /// The EKF without multiplications by zero, with a gate on the normalised innovation squared and a log-likelihood.

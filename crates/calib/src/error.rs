@@ -1,9 +1,7 @@
-use crate::params::estimator::NoParameters;
-use crate::params::law::MOST_BRANCHES;
-use crate::params::validate::FieldError;
 use crate::samples::SamplesError;
 use ohmstrain_ekf::StepError;
 use ohmstrain_model::ParameterError;
+use ohmstrain_sensor::SensorError;
 use thiserror::Error;
 
 /// Why a calibration was not made.
@@ -65,25 +63,13 @@ pub enum CalibrationError {
         /// What it said.
         source: StepError,
     },
-    /// No filter can be made of the parameters.
-    #[error("{0}")]
-    NoFilter(#[source] StepError),
     /// The optimiser failed.
     #[error("optimiser: {0}")]
     Optimiser(String),
-    /// A parameter file holds a number that no sensor can have.
-    #[error("{0}")]
-    Field(#[from] FieldError),
-    /// A parameter file has none for an estimator.
-    #[error("{0}")]
-    NoParameters(#[from] NoParameters),
-    /// A parameter file asks for what this version does not have.
+    /// No filter can be made of the parameters.
+    #[error(transparent)]
+    Sensor(#[from] SensorError),
+    /// What this version cannot do.
     #[error("{0}")]
     Unsupported(String),
-}
-
-impl CalibrationError {
-    pub(crate) fn branches(found: usize) -> Self {
-        Self::Unsupported(format!("a law with {found} branches; at most {MOST_BRANCHES} are supported"))
-    }
 }

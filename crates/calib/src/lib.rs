@@ -2,7 +2,7 @@
 //!
 //! [`calibrate`] fits a law per strength of ridge, and to each of them noise and motion so that the filter's own posterior
 //! is right on the known strain; the law with which the filter does best is taken. [`fit_law`] fits a law by itself.
-//! [`SensorParams`] is what is written down; [`build_filter`] makes a running filter of it.
+//! [`SensorParams`](ohmstrain_sensor::SensorParams) is what is written down, and what a filter runs from.
 //!
 //! # Policy
 //! - Knows samples ([`Samples`]), not files.
@@ -16,56 +16,35 @@ mod correction;
 mod digits;
 mod enough;
 mod error;
-mod filter;
+mod format_8;
 mod law;
 pub mod likelihood;
 mod low_pass;
 mod motion_stats;
 mod optimise;
 mod order;
-mod params;
 mod prior;
 mod recording;
 mod samples;
 mod sd_scale;
-mod sizes;
 
-pub use baselines::{Baseline, Baselines, Features, Fir, LeakyBank, LowPassMode, PhaseRows, PublishedLaw, Regression};
-pub use calibrate::error_budget::ErrorShares;
-pub use calibrate::scores::ScoredRow;
+pub use baselines::{
+    Baseline, Baselines, Features, Fir, LeakyBank, LowPassMode, PhaseRows, PublishedLaw, Regression, fit_static_cubic,
+    running_cubic,
+};
+pub use calibrate::recipe::{RECIPE, Recipe};
+pub use calibrate::scores::{ScoredRow, score};
 pub use calibrate::simulated_motions::SIMULATED_SEED;
 pub use calibrate::with_prior::calibrate_with_prior;
 pub use calibrate::{Calibration, Stage, calibrate};
-pub use correction::owned::{OwnedCorrection, OwnedProcess, OwnedRows, OwnedSimulated, OwnedTriangle};
 pub use error::CalibrationError;
-pub use filter::build::{HISTORIES, HYPOTHESES, Options, build_filter, build_filter_with, build_smoother_with};
-pub use filter::known::{KnownErrors, KnownStrain, MOST_KNOWN};
-pub use filter::learned::Learned;
-pub use filter::portable::{PortableCorrection, PortableFilter};
-pub use filter::{Filter, Output, Rows, Smoother, Start, WayBack};
+pub use format_8::CorrectionOfFormat8;
 pub use law::advice::OnBound;
 pub use law::bootstrap::{Bootstrap, bootstrap_law};
 pub use law::compare::{StructureScore, compare_structures};
 pub use law::fit::{CrossFit, LawOptions, fit_law};
 pub use law::identifiability::{Identifiability, identifiability};
 pub use law::structure::{GaugeFamily, LawFit};
-pub use params::correction::{
-    CorrectionParams, CorrectionScale, CorrectorParams, FUTURE_FEATURES, ProcessParams, SimulatedParams, SimulatedRow,
-    TrainingRow,
-};
-pub use params::estimator::{
-    EstimatorKind, EstimatorParams, MotionParams, NoParameters, NoiseParams, PhaseParams, SettlingParams,
-};
-pub use params::findings::{ErrorBudget, Findings, Scores, Seen};
-pub use params::law::{BranchParams, GaugeParams, LawParameter, LawParams};
-pub use params::recipe::{RECIPE, Recipe};
-pub use params::static_cubic::StaticCubic;
-pub use params::summary::{Limit, Summary, TestedSummary};
-pub use params::validate::FieldError;
-pub use params::{
-    FORMAT, JointParams, LARGEST_SD_SCALE, Quantity, RangeParams, ReadingUnit, RecordingInfo, SensorParams, Sessions,
-    Uncertainty, Validity,
-};
 pub use prior::{CorrectionPrior, EstimatorPrior, FEWEST_SENSORS, LawPrior, PRIOR_FORMAT, Prior};
 pub use recording::holds::{Hold, holds};
 pub use recording::lag::{Lag, LagError, aligned, clock_lag, reference_lag};

@@ -1,5 +1,5 @@
 use crate::order::sorted;
-use crate::params::LARGEST_SD_SCALE;
+use ohmstrain_sensor::LARGEST_SD_SCALE;
 
 /// No narrowing: an easy recording is no promise for the next one.
 const SCALES: std::ops::RangeInclusive<f64> = 1.0..=LARGEST_SD_SCALE;

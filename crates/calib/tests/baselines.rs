@@ -278,7 +278,7 @@ fn what_a_baseline_says_is_held_and_clipped() {
             assert!((lower..=upper).contains(&baseline.strain(3.0, reading)));
         }
     };
-    check(Box::new(baselines.static_cubic.start()));
+    check(Box::new(ohmstrain_calib::running_cubic(baselines.static_cubic)));
     check(Box::new(baselines.fir.start()));
     check(Box::new(baselines.low_pass_mode.start()));
     check(Box::new(baselines.leaky_bank.start()));

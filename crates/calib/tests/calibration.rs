@@ -3,11 +3,13 @@
 use std::f64::consts::TAU;
 
 use ohmstrain_calib::{
-    Calibration, CalibrationError, EstimatorKind, GaugeFamily, LARGEST_SD_SCALE, LawFit, LawOptions, Quantity,
-    RangeParams, ReadingUnit, Samples, ScoredRow, Scores, SensorParams, Stage, Start, StaticCubic, build_filter,
-    calibrate, fit_law, identifiability,
+    Calibration, CalibrationError, GaugeFamily, LawFit, LawOptions, Samples, ScoredRow, Stage, calibrate, fit_law,
+    identifiability,
 };
 use ohmstrain_ekf::Reading;
+use ohmstrain_sensor::{
+    EstimatorKind, LARGEST_SD_SCALE, Quantity, RangeParams, ReadingUnit, SensorError, SensorParams, Start, build_filter,
+};
 
 use super::bench::Bench;
 
@@ -139,7 +141,7 @@ fn calibration_makes_a_filter_that_beats_the_static_inverse_and_knows_how_far() 
             cubic.push(ScoredRow { time_s: bench.time_s[k], truth: bench.strain[k], strain, sd: None });
         }
     }
-    let (filtered, cubic) = (Scores::new(&filtered).unwrap(), Scores::new(&cubic).unwrap());
+    let (filtered, cubic) = (ohmstrain_calib::score(&filtered).unwrap(), ohmstrain_calib::score(&cubic).unwrap());
     assert!(filtered.rmse < 0.5 * cubic.rmse, "{filtered:?} {cubic:?}");
     assert!(filtered.coverage_95.unwrap() > 0.85, "{filtered:?}");
     // The file format holds everything, to the last bit.
@@ -214,7 +216,7 @@ fn a_refused_row_changes_nothing() {
     let calibration =
         calibrate(&[bench.samples().head(700)], &[LawOptions::default()], &[EstimatorKind::Ekf], |_| ()).unwrap();
     let text = format!(
-        "format = 8\nmade_by = 'test'\nquantity = 'strain'\nreading = 'ohm'\nrest_reading = {}\ndefault_estimator = 'ekf'\n",
+        "format = 9\nmade_by = 'test'\nquantity = 'strain'\nreading = 'ohm'\nrest_reading = {}\ndefault_estimator = 'ekf'\n",
         calibration.rest_readings[0]
     );
     assert!(toml::from_str::<SensorParams>(&text).is_err(), "a file without a law must be refused");
@@ -244,7 +246,7 @@ fn what_cannot_be_calibrated_is_refused() {
     let unknown = Bench { strain: vec![f64::NAN; bench.strain.len()], ..bench.clone() };
     assert!(matches!(refuse(unknown.samples(), LawOptions::default()), CalibrationError::TooFewRows { .. }));
     let many = LawOptions { branches: 5, ..LawOptions::default() };
-    assert!(matches!(refuse(bench.samples(), many), CalibrationError::Unsupported(_)));
+    assert!(matches!(refuse(bench.samples(), many), CalibrationError::Sensor(SensorError::Branches { found: 5 })));
     assert_eq!(fit_law(&[], LawOptions::default()).unwrap_err(), CalibrationError::NoRecording);
 }
 
@@ -272,7 +274,7 @@ fn a_static_cubic_is_a_cubic() {
     let strain: Vec<f64> = reading.iter().map(|r| 1e-4 * (r - 1000.0) + 2e-10 * (r - 1000.0_f64).powi(3)).collect();
     let time_s: Vec<f64> = (0..50).map(f64::from).collect();
     let samples = Samples::new(&time_s, &reading, &strain).unwrap();
-    let cubic = StaticCubic::fit(&[samples], RangeParams { lower: 0.0, upper: 0.2 }).unwrap();
+    let cubic = ohmstrain_calib::fit_static_cubic(&[samples], RangeParams { lower: 0.0, upper: 0.2 }).unwrap();
     for (r, s) in reading.iter().zip(&strain) {
         assert!((cubic.strain(*r) - s.min(0.2)).abs() < 1e-12);
     }
@@ -284,7 +286,7 @@ fn scores_are_what_their_names_say() {
     let row = |truth: f64, strain: f64| ScoredRow { time_s: 0.0, truth, strain, sd: Some(0.1) };
     // Errors of 0, 0.1, -0.15 and 0.3 with a deviation of 0.1: 50 % intervals reach 0.067, 90 % 0.164, 95 % 0.196.
     let rows = [row(0.0, 0.0), row(1.0, 1.1), row(2.0, 1.85), row(2.0, 2.3), row(f64::NAN, 5.0)];
-    let scores = Scores::new(&rows).unwrap();
+    let scores = ohmstrain_calib::score(&rows).unwrap();
     assert_eq!(scores.n, 4);
     assert!((scores.rmse - ((0.01 + 0.0225 + 0.09) / 4.0_f64).sqrt()).abs() < 1e-12);
     assert!((scores.rmse_percent_fs - 50.0 * scores.rmse).abs() < 1e-12);
@@ -295,8 +297,11 @@ fn scores_are_what_their_names_say() {
     let squares = (0.0 + 0.05_f64.powi(2) + 0.075_f64.powi(2) + 0.15_f64.powi(2)) / 4.0;
     let expected = -0.5 * (squares / variance + (TAU * variance).ln());
     assert!((scores.log_score.unwrap() - expected).abs() < 1e-12);
-    assert!(Scores::new(&[]).is_none());
+    assert!(ohmstrain_calib::score(&[]).is_none());
     assert!(
-        Scores::new(&[ScoredRow { time_s: 0.0, truth: 1.0, strain: 1.0, sd: None }]).unwrap().coverage_95.is_none()
+        ohmstrain_calib::score(&[ScoredRow { time_s: 0.0, truth: 1.0, strain: 1.0, sd: None }])
+            .unwrap()
+            .coverage_95
+            .is_none()
     );
 }

@@ -1,6 +1,6 @@
 //! The ranked probability score against its definition.
 
-use ohmstrain_calib::{ScoredRow, Scores};
+use ohmstrain_calib::ScoredRow;
 
 /// Normal distribution function by Simpson's rule over the density, from the mean on.
 fn distribution(z: f64) -> f64 {
@@ -28,7 +28,7 @@ fn by_definition(mean: f64, sd: f64, truth: f64) -> f64 {
 fn the_ranked_probability_score_is_its_integral() {
     for (mean, sd, truth) in [(0.1, 0.02, 0.1), (0.1, 0.02, 0.13), (0.2, 0.05, -0.1), (3.0, 1.5, 2.0)] {
         let rows = [ScoredRow { time_s: 0.0, truth, strain: mean, sd: Some(sd) }];
-        let scores = Scores::new(&rows).unwrap();
+        let scores = ohmstrain_calib::score(&rows).unwrap();
         let expected = by_definition(mean, sd, truth);
         // The midpoint rule's error is width² / 24 · |f'| at the ends of each part, at most (0.012 sd)² / 24 · 0.4/sd.
         assert!((scores.crps - expected).abs() < 3e-6 * sd, "{} is not {expected}", scores.crps);
@@ -39,7 +39,7 @@ fn the_ranked_probability_score_is_its_integral() {
 #[test]
 fn without_a_deviation_it_is_the_absolute_error() {
     let row = |truth: f64, strain: f64| ScoredRow { time_s: 0.0, truth, strain, sd: None };
-    let scores = Scores::new(&[row(0.0, 0.1), row(2.0, 1.7)]).unwrap();
+    let scores = ohmstrain_calib::score(&[row(0.0, 0.1), row(2.0, 1.7)]).unwrap();
     assert!((scores.crps - 0.2).abs() < 1e-12 && (scores.crps_percent_fs - 10.0).abs() < 1e-10);
     assert_eq!((scores.width_95, scores.width_95_percent_fs), (None, None));
 }
@@ -55,7 +55,7 @@ fn neither_wide_nor_narrow_pays() {
             strain: f64::from(k) + if k.is_multiple_of(2) { 0.1 } else { -0.1 },
             sd: Some(sd),
         };
-        Scores::new(&(0..10).map(row).collect::<Vec<_>>()).unwrap().crps
+        ohmstrain_calib::score(&(0..10).map(row).collect::<Vec<_>>()).unwrap().crps
     };
     assert!(score(0.1) < score(0.01) && score(0.1) < score(1.0));
 }

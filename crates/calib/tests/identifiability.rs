@@ -1,10 +1,8 @@
 //! Advice where the right advice is known, the table of structures, and the block bootstrap.
 
 use ohmstrain_calib::likelihood::Bound;
-use ohmstrain_calib::{
-    BranchParams, GaugeFamily, GaugeParams, Identifiability, LawOptions, LawParams, RangeParams, bootstrap_law,
-    compare_structures, identifiability,
-};
+use ohmstrain_calib::{GaugeFamily, Identifiability, LawOptions, bootstrap_law, compare_structures, identifiability};
+use ohmstrain_sensor::{BranchParams, GaugeParams, LawParams, RangeParams};
 use rand_chacha::ChaCha12Rng;
 use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};

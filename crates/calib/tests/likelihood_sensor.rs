@@ -1,11 +1,12 @@
 //! Noise and motion of a sensor from its readings alone.
 
+use ohmstrain_calib::CalibrationError;
 use ohmstrain_calib::likelihood::{
     Likelihood, LikelihoodProblem, ModelFamily, NoiseFit, NoiseParameter, NoiseStart, Parameter, ReadingSeries,
 };
-use ohmstrain_calib::{BranchParams, CalibrationError, GaugeParams, LawParams, MotionParams, NoiseParams, RangeParams};
 use ohmstrain_ekf::{Belief, StepError, Unscented};
 use ohmstrain_model::{Direction, ModelNoise, Motion, ParameterError, Phase, Scalar, SwitchedModel, Transition};
+use ohmstrain_sensor::{BranchParams, GaugeParams, LawParams, MotionParams, NoiseParams, RangeParams};
 use rand_chacha::ChaCha12Rng;
 use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};

@@ -5,10 +5,8 @@
 
 use std::f64::consts::TAU;
 
-use ohmstrain_calib::{
-    BranchParams, GaugeFamily, GaugeParams, LawOptions, LawParams, RangeParams, Samples, Uncertainty, fit_law,
-    identifiability,
-};
+use ohmstrain_calib::{GaugeFamily, LawOptions, Samples, fit_law, identifiability};
+use ohmstrain_sensor::{BranchParams, GaugeParams, LawParams, RangeParams, Uncertainty};
 use rand_chacha::ChaCha12Rng;
 use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};

@@ -5,7 +5,6 @@ use ohmstrain_calib::aligned;
 
 use crate::error::CliError;
 use crate::input::TraceFile;
-use crate::verbosity::Verbosity;
 
 /// Says how late the reference of a recording is; moves it if that is wanted, refuses one that is certainly too late to be used
 /// otherwise, and warns of one that probably is; says how late it is where that does not matter if `explain`. By how much it was
@@ -23,7 +22,7 @@ pub fn check(recording: &mut TraceFile, align: bool, explain: bool) -> Result<f6
     match doubt {
         None => {}
         Some(little @ LagDoubt::Little(_)) if explain => CliError::remark(&format!("{name}: {little}")),
-        Some(little @ LagDoubt::Little(_)) => Verbosity::detail(&format!("{name}: {little}")),
+        Some(little @ LagDoubt::Little(_)) => CliError::detail(&format!("{name}: {little}")),
         Some(unknown @ (LagDoubt::OutOfReach { .. } | LagDoubt::Repeats { .. })) => {
             CliError::warning(&format!("{name}: {unknown}"))
         }

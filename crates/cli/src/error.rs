@@ -64,6 +64,13 @@ impl CliError {
         Self::error(text);
     }
 
+    /// Says on stderr what is being done, where that is wanted.
+    pub fn detail(text: &str) {
+        if Verbosity::chosen() == Verbosity::Detailed {
+            Self::error(text);
+        }
+    }
+
     /// Says on stderr what casts doubt on a result.
     pub fn warning(text: &str) {
         Self::remark(&format!("warning: {text}"));

@@ -11,6 +11,7 @@ use sha2::{Digest, Sha256};
 
 use crate::error::CliError;
 use crate::sensor_file;
+use crate::whole_file::is_stdin;
 
 /// Bytes of a file that is not kept in memory as a whole.
 const READ_AT_ONCE: usize = 1 << 16;
@@ -62,11 +63,6 @@ fn text_of_parquet(path: &Path, overrides: &Metadata) -> Result<(Box<dyn Read>, 
     let mut metadata = text.metadata().clone();
     metadata.override_with(overrides);
     Ok((Box::new(text), metadata))
-}
-
-/// Whether a path means stdin.
-pub fn is_stdin(path: &Path) -> bool {
-    path == Path::new("-")
 }
 
 /// Reads a whole recording, of as many rows as there may be.

@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 use ohmstrain_bench_data::import::{ImportError, Plan, Recipe, Table, read_table};
 
 use crate::error::{CliError, shell_word};
-use crate::input::is_stdin;
 use crate::output::{Kind, is_of_a_hand};
 use crate::sensor_file;
 use crate::whole_file;
+use crate::whole_file::is_stdin;
 
 /// Bytes that tell what a file is.
 const HEAD: u64 = 4096;

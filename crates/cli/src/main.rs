@@ -18,7 +18,6 @@ mod printable;
 mod progress;
 mod readings;
 mod renamed;
-mod report;
 mod run;
 mod sensor_file;
 mod stream;

@@ -3,6 +3,7 @@ use std::time::Instant;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use ohmstrain_calib::Stage;
 
+use crate::error::CliError;
 use crate::verbosity::Verbosity;
 
 /// A progress bar on stderr; silent unless stderr is a terminal.
@@ -57,7 +58,7 @@ impl Progress {
     }
 
     fn detail(&self, what: &str) {
-        Verbosity::detail(&format!("{:.1} s: {what}", self.start.elapsed().as_secs_f64()));
+        CliError::detail(&format!("{:.1} s: {what}", self.start.elapsed().as_secs_f64()));
     }
 
     /// Shows where a calibration is.

@@ -2,8 +2,6 @@
 
 use std::sync::OnceLock;
 
-use crate::error::CliError;
-
 /// How much is said on stderr besides errors.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Verbosity {
@@ -28,12 +26,5 @@ impl Verbosity {
     /// What was chosen.
     pub fn chosen() -> Self {
         CHOSEN.get().copied().unwrap_or_default()
-    }
-
-    /// Says what is being done, where that is wanted.
-    pub fn detail(text: &str) {
-        if Self::chosen() == Self::Detailed {
-            CliError::error(text);
-        }
     }
 }

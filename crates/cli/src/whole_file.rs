@@ -7,11 +7,15 @@ use std::path::Path;
 use ohmstrain_bench_data::import::LARGEST_FILE;
 
 use crate::error::CliError;
-use crate::input::is_stdin;
 
 /// Bytes of a file of parameters, descriptions or a list of recordings: those of a hundred thousand recordings, and far above
 /// what this program writes.
 const LARGEST_TEXT: u64 = 16 << 20;
+
+/// Whether a path means stdin.
+pub fn is_stdin(path: &Path) -> bool {
+    path == Path::new("-")
+}
 
 /// A lab's file; `-` is stdin.
 pub fn bytes(path: &Path) -> Result<Vec<u8>, CliError> {

@@ -11,7 +11,7 @@ const ARGUMENTS: i32 = 2;
 const OTHER: i32 = 1;
 
 /// What was there before: a sensor file that may be replaced.
-const OLD: &str = "format = 8\nmade_by = \"ohmstrain 0.0.1\"\nquantity = \"strain\"\n";
+const OLD: &str = "format = 9\nmade_by = \"ohmstrain 0.0.1\"\nquantity = \"strain\"\n";
 
 /// The commands that read a recording, each with a file that it would write.
 const READERS: [&[&str]; 4] = [
@@ -245,7 +245,7 @@ fn a_sensor_file_that_is_none_is_refused_alike_by_every_command() {
     }
     let unknown = swap(&sensor, "made_by = ", "colour = \"black\"");
     let in_table = swap(&sensor, "tau_s = ", "tau_min = 3.0");
-    let newer = swap(&swap(&sensor, "format = ", "format = 9").0, "made_by = ", "colour = \"black\"");
+    let newer = swap(&swap(&sensor, "format = ", "format = 10").0, "made_by = ", "colour = \"black\"");
     let word = swap(&sensor, "rest_reading = ", "rest_reading = \"high\"");
     let negative = swap(&sensor, "rest_reading = ", "rest_reading = -1600.0");
     let nan = swap(&sensor, "rest_reading = ", "rest_reading = nan");
@@ -258,7 +258,7 @@ fn a_sensor_file_that_is_none_is_refused_alike_by_every_command() {
         (unknown.0.into(), format!(":{}: column 1: unknown field `colour`, expected one of `format`, ", unknown.1)),
         (in_table.0.into(), format!(":{}: column 1: unknown field `tau_min`, expected one of `tau_s`, ", in_table.1)),
         // What a newer version has is not unknown but newer.
-        (newer.0.into(), ":1: field `format`: expected version 8, found 9".into()),
+        (newer.0.into(), ":1: field `format`: expected version 9, found 10".into()),
         (word.0.into(), format!(":{}: column 16: invalid type: string \"high\", expected f64", word.1)),
         (
             negative.0.into(),
@@ -285,7 +285,7 @@ fn a_sensor_file_that_is_none_is_refused_alike_by_every_command() {
         ("hello there\n".into(), ":1: column 7: key with no value, expected `=`".into()),
         ("format = 1\n[law\n".into(), ":2: column 5: unclosed table, expected `]`".into()),
         (Vec::new(), ":1: column 1: missing field `format`".into()),
-        (b"format = 8\n".to_vec(), ":1: column 1: missing field `made_by`".into()),
+        (b"format = 9\n".to_vec(), ":1: column 1: missing field `made_by`".into()),
         (utf_16("format = 1", [0xff, 0xfe], u16::to_le_bytes), ":1: expected a text file in UTF-8, found ".into()),
     ];
     for (content, message) in cases {

@@ -24,7 +24,7 @@ fn what_is_said_of_files_can_be_printed() {
     // As TOML writes it: control characters themselves are no TOML.
     let escape = |c: char| if c.is_ascii_graphic() { c.to_string() } else { format!("\\u{:04x}", u32::from(c)) };
     let escaped: String = EVIL.chars().map(escape).collect();
-    bench.write("evil.toml", format!("format = 8\nmade_by = \"ohmstrain 0.1.0\"\nquantity = \"{escaped}\"\n"));
+    bench.write("evil.toml", format!("format = 9\nmade_by = \"ohmstrain 0.1.0\"\nquantity = \"{escaped}\"\n"));
     bench.write("bad.csv", format!("time_s,resistance_ohm\n0,{EVIL}\n"));
     bench.write("meta.csv", format!("# strain_unit = {EVIL}\ntime_s,resistance_ohm,strain\n0,1600,0\n"));
     let columns = format!("strain,{EVIL}");

@@ -4,10 +4,10 @@ use std::fmt::Write;
 
 use crate::common::{Bench, Run};
 use ohmstrain_bench_data::simulate::{Disturbances, Material, Protocol, SimulationSettings, simulate};
-use ohmstrain_calib::{
+use ohmstrain_model::{Direction, Motion, Phase, SwitchedModel, Transition};
+use ohmstrain_sensor::{
     BranchParams, EstimatorKind, GaugeParams, LawParams, MotionParams, NoiseParams, RangeParams, SensorParams,
 };
-use ohmstrain_model::{Direction, Motion, Phase, SwitchedModel, Transition};
 use rand_chacha::ChaCha12Rng;
 use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
@@ -306,7 +306,7 @@ fn what_cannot_be_refined_is_refused_and_nothing_is_written() {
              itself",
         ),
     ];
-    let old = "format = 8\nmade_by = \"ohmstrain 0.0.1\"\n";
+    let old = "format = 9\nmade_by = \"ohmstrain 0.0.1\"\n";
     bench.write("old.toml", old);
     let before = bench.files();
     for (flags, code, message) in cases {

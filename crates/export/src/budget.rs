@@ -2,11 +2,12 @@
 
 use std::str::FromStr;
 
-use ohmstrain_calib::{EstimatorKind, SensorParams};
+use ohmstrain_sensor::{EstimatorKind, SensorParams};
 
 use super::ExportError;
 use super::cost::{Cost, cost};
-use super::plan::{Plan, Rows};
+use super::plan::Plan;
+use super::reduced::Rows;
 
 /// What a filter may cost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,7 +1,8 @@
 //! The learned correction as the templates have it.
 
-use ohmstrain_calib::{OwnedProcess, OwnedRows, OwnedSimulated, PortableCorrection};
 use ohmstrain_ekf::correction::{Decay, FILTER_INPUTS, TIME_CONSTANTS_S};
+use ohmstrain_sensor::PortableCorrection;
+use ohmstrain_sensor::correction::{OwnedProcess, OwnedRows, OwnedSimulated};
 use serde::Serialize;
 
 use super::literal::Literal;

@@ -5,8 +5,8 @@
 //! of all kinds (arm-none-eabi-gcc 12.2, -O2 -fno-math-errno), which checks in turn that no estimate is further than a
 //! tenth from what it counts.
 
-use ohmstrain_calib::{EstimatorKind, GaugeParams, LawParams, PortableCorrection, SensorParams, with_sizes};
 use ohmstrain_ekf::correction::{BLOCK, FEATURES, OUTPUTS, TIME_CONSTANTS_S};
+use ohmstrain_sensor::{EstimatorKind, GaugeParams, LawParams, PortableCorrection, SensorParams, with_sizes};
 use serde::Serialize;
 
 use super::fixed_rate::FixedRate;

@@ -1,17 +1,17 @@
 //! A sensor's filter at a fixed rate, in single and in double precision.
 
-use ohmstrain_calib::{EstimatorKind, EstimatorParams, HISTORIES, HYPOTHESES, SensorParams};
 use ohmstrain_ekf::live::{LiveParts, may_be_unstretched};
 use ohmstrain_ekf::{
     Compact, Ekf, Estimator, Evidence, Hypotheses, LONGEST_PAUSE_S, Pause, STEP_GRACE, STEP_GROWTH, SignSplit,
     SparseEkf, StepError,
 };
 use ohmstrain_model::{Motion, SensorLaw, StrainRange, SwitchedModel};
+use ohmstrain_sensor::{EstimatorKind, EstimatorParams, HISTORIES, HYPOTHESES, PhaseParams, SensorParams};
 
 use super::law::{PriorConstants, narrow_law, narrow_noise};
 use super::plan::ChipFilter;
 use super::steps::StepTable;
-use super::twin::{Numbers, Parts, PhaseParts};
+use super::twin::parts::{Numbers, Parts, filter_parts};
 use super::{ExportError, parameter};
 
 /// A filter in single precision, with what the numbers of states in its type are made for.
@@ -57,13 +57,6 @@ impl<'a, const B: usize, const N: usize> FixedRate<'a, B, N> {
             .and_then(|motion| motion.with_phase_rate(speed as f32))
             .and_then(|motion| SwitchedModel::new(narrow_law(&law), motion, narrow_noise(noise.to_model())))
             .map_err(parameter)?;
-        let phases = phases.map(|phases| PhaseParts {
-            hold_time_s: phases.hold_time_s,
-            move_time_s: phases.move_time_s,
-            reversal: phases.reversal,
-            tempering: phases.tempering,
-            rests: phases.rests(),
-        });
         let phases = phases.filter(|_| filter.kind != EstimatorKind::Ekf);
         let live = LiveParts { dt_s: f64::from(dt_s), ..filter.parts };
         let (correction, quadratics) = (filter.correction.as_ref(), quadratics.as_ref());
@@ -142,7 +135,7 @@ impl<'a, const B: usize, const N: usize> FixedRate<'a, B, N> {
 /// Numbers of the kernel, and of the chain, for steps of a length.
 fn exact_numbers<const B: usize, const N: usize>(
     model: &SwitchedModel<f64, B, N>,
-    phases: Option<PhaseParts>,
+    phases: Option<PhaseParams>,
     step_s: f64,
 ) -> Result<Vec<f64>, StepError> {
     let kernel = SparseEkf::<f64, Compact, B, N>::at_a_moment(*model)?;
@@ -150,7 +143,7 @@ fn exact_numbers<const B: usize, const N: usize>(
     let mut numbers = kernel.step_numbers();
     let limits = StrainRange { lower: 0.0, upper: 1.0 };
     let chain = match phases {
-        Some(phases) => phases.filter_parts::<f64>(limits)?.0.probabilities(step_s),
+        Some(phases) => filter_parts::<f64>(&phases, limits)?.0.probabilities(step_s),
         None => [[0.0; 3]; 3],
     };
     numbers.extend(chain.as_flattened());
@@ -165,8 +158,8 @@ pub(super) fn longest_step_s<const B: usize, const N: usize, const L: usize>(
     let longest_s = match parts.phases {
         None => longest::<N, L>(&Ekf::new(*model)),
         Some(phases) => {
-            let (dwell, evidence): (_, Evidence<f64>) = phases.filter_parts(parts.limits_in()).map_err(parameter)?;
-            let hold = phases.rests.then_some(dwell);
+            let (dwell, evidence): (_, Evidence<f64>) = filter_parts(&phases, parts.limits_in()).map_err(parameter)?;
+            let hold = phases.rests().then_some(dwell);
             if parts.kind == EstimatorKind::SignSplit {
                 let filter = SignSplit::<_, B, N, HYPOTHESES>::new(*model, 0.0, hold, evidence);
                 longest::<N, L>(&filter.map_err(parameter)?)

@@ -1,7 +1,7 @@
 //! Law, noise and motion as they were calibrated, in single precision.
 
-use ohmstrain_calib::{MotionParams, PhaseParams};
 use ohmstrain_model::{Branch, Gauge, ModelNoise, SensorLaw, StrainRange};
+use ohmstrain_sensor::{MotionParams, PhaseParams};
 use serde::Serialize;
 
 use super::literal::Literal;

@@ -23,7 +23,7 @@ mod vectors;
 use minijinja::Environment;
 use minijinja::syntax::SyntaxConfig;
 use minijinja::value::Serde;
-use ohmstrain_calib::{EstimatorKind, SensorParams};
+use ohmstrain_sensor::{EstimatorKind, SensorParams};
 
 pub use budget::{Budget, fitting};
 use constants::Exported;

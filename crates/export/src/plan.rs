@@ -1,9 +1,9 @@
 //! What of a sensor's filter is exported: all of it, or less for a small chip.
 
-use ohmstrain_calib::{EstimatorKind, HYPOTHESES, PortableFilter, SensorParams};
+use ohmstrain_sensor::{EstimatorKind, HYPOTHESES, PortableFilter, SensorParams};
 
 use super::quadratic::OwnedQuadratic;
-use super::reduced::reduced;
+use super::reduced::{Rows, reduced};
 use super::{ExportError, parameter};
 
 /// What of a filter is exported.
@@ -15,15 +15,6 @@ pub struct Plan {
     pub hypotheses: Option<usize>,
     /// How much of the correction; all of it if `None`.
     pub rows: Option<Rows>,
-}
-
-/// How many rows of a correction are left.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Rows {
-    /// For its means, beside a quadratic function.
-    pub mean: usize,
-    /// For its variances.
-    pub variance: usize,
 }
 
 /// A filter as it goes onto a chip.

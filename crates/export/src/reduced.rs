@@ -7,10 +7,9 @@
 //! rows say is left out.
 
 use nalgebra::{DMatrix, DVector};
-use ohmstrain_calib::{OwnedCorrection, OwnedProcess, OwnedTriangle};
 use ohmstrain_ekf::correction::{self, FILTER_INPUTS, OUTPUTS, kernel};
+use ohmstrain_sensor::correction::{OwnedCorrection, OwnedProcess, OwnedTriangle};
 
-use super::plan::Rows;
 use super::quadratic::{Fit, OwnedQuadratic};
 
 type Row = [f64; FILTER_INPUTS];
@@ -51,6 +50,15 @@ impl Which {
             Self::Residual => 0,
         }
     }
+}
+
+/// How many rows of a correction are left.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Rows {
+    /// For its means, beside a quadratic function.
+    pub mean: usize,
+    /// For its variances.
+    pub variance: usize,
 }
 
 /// The correction with no more than these rows, and what stands for the others; none if kernels are singular.

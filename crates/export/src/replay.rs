@@ -1,8 +1,8 @@
 //! A recording through the exported program's twin.
 
-use ohmstrain_calib::{SensorParams, with_sizes};
 use ohmstrain_ekf::live::{LiveEstimate, Protections, SensorEstimator};
 use ohmstrain_ekf::{Real, StepError};
+use ohmstrain_sensor::{SensorParams, with_sizes};
 
 use super::fixed_rate::FixedRate;
 use super::plan::{ChipFilter, Plan};

@@ -171,7 +171,3 @@ impl<T: Real, const B: usize, const S: usize> Task<T> for Motion<'_, B, S> {
         Ok((estimates, updated + PREDICTION * predicted))
     }
 }
-
-pub fn refused(error: StepError) -> ExportError {
-    ExportError::Parameter(format!("the filter refuses the law's own readings: {error}"))
-}

@@ -1,6 +1,6 @@
-use ohmstrain_calib::{CalibrationError, EstimatorKind, KnownErrors, Options, Start};
 use ohmstrain_ekf::live::{DOUBT, Doubts, KNOWN_BEYOND, Protections};
 use ohmstrain_ekf::{Guard, Influence};
+use ohmstrain_sensor::{EstimatorKind, KnownErrors, Options, SensorError, Start};
 
 use crate::estimate::Scale;
 use crate::filter::{Kernel, RowWriter};
@@ -282,7 +282,7 @@ impl<'a> FilterBuilder<'a> {
     /// Doubts of a smoother; `None` if they are turned off.
     pub(crate) fn smoothers_doubts(self, kind: EstimatorKind) -> Result<Option<Doubts<f64>>, Error> {
         let params = self.sensor.params();
-        let motion = &params.estimator(params.filter_of(kind)).map_err(CalibrationError::from)?.motion;
+        let motion = &params.estimator(params.filter_of(kind)).map_err(SensorError::from)?.motion;
         let doubts = self.protections.doubts.then(|| Doubts::new(params.doubt_parts(motion)));
         let of_known = |doubts: Doubts<f64>, strain| doubts.of_known_strain(self.is_at_rest(strain));
         Ok(doubts.map(|doubts| self.initial_strain.map_or(doubts, |strain| of_known(doubts, strain))))

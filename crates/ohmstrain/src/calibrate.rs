@@ -1,9 +1,9 @@
 use std::mem;
 
 use ohmstrain_calib::{
-    CalibrationError, Distrusted, EstimatorKind, Findings, GaugeFamily, LawOptions, RECIPE, RecordingInfo, Samples,
-    SensorParams, Stage, calibrate_with_prior,
+    CalibrationError, Distrusted, GaugeFamily, LawOptions, RECIPE, Samples, Stage, calibrate_with_prior,
 };
+use ohmstrain_sensor::{EstimatorKind, Findings, RecordingInfo, SensorParams};
 
 use crate::{Error, MADE_BY, Prior, Recording, Sensor};
 

@@ -1,6 +1,6 @@
 use std::fmt;
 
-use ohmstrain_calib::LARGEST_SD_SCALE;
+use ohmstrain_sensor::LARGEST_SD_SCALE;
 
 use crate::number::{plain, significant};
 

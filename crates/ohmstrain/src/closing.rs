@@ -1,6 +1,6 @@
 //! What a calibration came to, in words.
 
-use ohmstrain_calib::{Findings, Limit, Quantity, Scores, Seen, SensorParams, TestedSummary};
+use ohmstrain_sensor::{Findings, Limit, Quantity, Scores, Seen, SensorParams, TestedSummary};
 use serde::Serialize;
 
 use crate::number::{fixed, significant};
@@ -269,7 +269,7 @@ fn advice(advice: &[String], elsewhere: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use ohmstrain_calib::RangeParams;
+    use ohmstrain_sensor::RangeParams;
 
     use super::*;
 

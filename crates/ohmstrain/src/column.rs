@@ -1,4 +1,4 @@
-use ohmstrain_calib::{Quantity, ReadingUnit, SensorParams};
+use ohmstrain_sensor::{Quantity, ReadingUnit, SensorParams};
 
 use crate::Estimate;
 

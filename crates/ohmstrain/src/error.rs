@@ -1,9 +1,11 @@
 use std::fmt;
 
-use ohmstrain_calib::{CalibrationError, FieldError, Quantity, SamplesError};
+#[cfg(feature = "calibrate")]
+use ohmstrain_calib::{CalibrationError, SamplesError};
 use ohmstrain_ekf::StepError;
 use ohmstrain_ekf::live::FARTHEST_REST;
 use ohmstrain_model::ParameterError;
+use ohmstrain_sensor::{FieldError, Quantity, SensorError};
 use thiserror::Error;
 
 use crate::number::{plain, significant};
@@ -13,7 +15,7 @@ use crate::{ReferenceDoubt, UnitDoubt};
 ///
 /// ```
 /// let error = ohmstrain::Sensor::from_toml("format = 3").unwrap_err();
-/// assert_eq!(error.to_string(), "line 1: field `format`: expected version 8, found 3");
+/// assert_eq!(error.to_string(), "line 1: field `format`: expected version 9, found 3");
 /// ```
 #[derive(Debug, Error)]
 #[non_exhaustive]
@@ -21,7 +23,11 @@ pub enum Error {
     /// The text is no sensor.
     #[error(transparent)]
     Text(#[from] TextError),
-    /// The sensor has no parameters for the estimator, or they make no filter; or a calibration was not made.
+    /// The sensor has no parameters for the estimator, or they make no filter.
+    #[error(transparent)]
+    Sensor(#[from] SensorError),
+    /// A calibration was not made.
+    #[cfg(feature = "calibrate")]
     #[error(transparent)]
     Calibration(#[from] CalibrationError),
     /// The sensor cannot be written as TOML.
@@ -90,6 +96,7 @@ pub enum Error {
         readings: usize,
     },
     /// Slices that are no recording.
+    #[cfg(feature = "calibrate")]
     #[error(transparent)]
     Samples(#[from] SamplesError),
     /// Readings that seem to be in another unit than the calibration's.
@@ -116,7 +123,7 @@ impl Error {
     ///
     /// ```
     /// let error = ohmstrain::Sensor::from_toml("format = 3").unwrap_err();
-    /// assert_eq!(error.in_file("s.toml"), "s.toml:1: field `format`: expected version 8, found 3");
+    /// assert_eq!(error.in_file("s.toml"), "s.toml:1: field `format`: expected version 9, found 3");
     /// ```
     #[must_use]
     pub fn in_file(&self, name: &str) -> String {
@@ -136,7 +143,7 @@ impl Error {
 /// use ohmstrain::{Error, Sensor, TextCause};
 ///
 /// let Err(Error::Text(error)) = Sensor::from_toml("format = 4") else { panic!() };
-/// assert!(matches!(error.cause, TextCause::Format { expected: 8, found: 4 }));
+/// assert!(matches!(error.cause, TextCause::Format { expected: 9, found: 4 }));
 /// assert_eq!(error.place.unwrap().line, 1);
 /// ```
 #[derive(Debug)]
@@ -167,7 +174,7 @@ impl std::error::Error for TextError {
 /// ```
 /// use std::error::Error;
 ///
-/// let error = ohmstrain::Sensor::from_toml("format = 8\nrange").unwrap_err();
+/// let error = ohmstrain::Sensor::from_toml("format = 9\nrange").unwrap_err();
 /// let text = error.source().and_then(|text| text.source()).unwrap_or(&error);
 /// assert!(!text.to_string().is_empty());
 /// ```

@@ -1,7 +1,7 @@
-use ohmstrain_calib::{Output, Quantity, SensorParams};
 use ohmstrain_ekf::live::{FARTHEST_REST, KNOWN_BEYOND, SURPRISING_NIS};
 use ohmstrain_ekf::{Gaussian, ReadingVerdict};
 use ohmstrain_model::{Joint, StrainRange};
+use ohmstrain_sensor::{Output, Quantity, SensorParams};
 use serde::ser::SerializeStruct;
 use serde::{Serialize, Serializer};
 

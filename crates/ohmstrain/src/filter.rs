@@ -1,8 +1,8 @@
 use std::collections::VecDeque;
 use std::fmt;
 
-use ohmstrain_calib::{KnownErrors, KnownStrain, Output};
 use ohmstrain_ekf::Gaussian;
+use ohmstrain_sensor::{KnownErrors, KnownStrain, Output};
 
 use crate::estimate::Scale;
 use crate::known::next_until;
@@ -10,7 +10,7 @@ use crate::{Error, Estimate, Reading};
 
 /// A live filter, and the way to it from readings and from it to rows.
 pub(crate) struct Kernel {
-    pub filter: Box<dyn ohmstrain_calib::Filter>,
+    pub filter: Box<dyn ohmstrain_sensor::Filter>,
     pub rows: RowWriter,
     /// Strains that will be known, in order of time.
     pub known: VecDeque<(f64, Gaussian<f64>)>,

@@ -1,8 +1,8 @@
 use std::collections::VecDeque;
 
-use ohmstrain_calib::{KnownErrors, KnownStrain, MOST_KNOWN};
 use ohmstrain_ekf::Gaussian;
 use ohmstrain_model::StrainRange;
+use ohmstrain_sensor::{KnownErrors, KnownStrain, MOST_KNOWN};
 
 use crate::Error;
 use crate::estimate::Scale;

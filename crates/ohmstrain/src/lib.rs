@@ -23,24 +23,32 @@
 //! - Deterministic: nothing is random but with a seed, no clock is read.
 
 mod builder;
+#[cfg(feature = "calibrate")]
 mod calibrate;
+#[cfg(feature = "calibrate")]
 mod calibration_doubt;
 mod closing;
 mod column;
 mod error;
 mod estimate;
+#[cfg(feature = "calibrate")]
 mod explain;
 mod filter;
 mod known;
 mod known_doubt;
+#[cfg(feature = "calibrate")]
 mod lag_doubt;
+#[cfg(feature = "calibrate")]
 mod motion_doubt;
 pub mod number;
 mod pauses;
+#[cfg(feature = "calibrate")]
 mod plausible;
+#[cfg(feature = "calibrate")]
 mod prior;
 mod quiet;
 mod reading;
+#[cfg(feature = "calibrate")]
 mod recording;
 mod reference_doubt;
 mod sensor;
@@ -52,38 +60,51 @@ pub mod verdict;
 pub mod wrap;
 
 pub use builder::FilterBuilder;
+#[cfg(feature = "calibrate")]
 pub use calibrate::{Calibrated, Calibration, calibrate};
+#[cfg(feature = "calibrate")]
 pub use calibration_doubt::CalibrationDoubt;
 pub use closing::{Closing, Tested};
 pub use column::Column;
 pub use error::{Error, Place, TextCause, TextError};
 pub use estimate::Estimate;
+#[cfg(feature = "calibrate")]
 pub use explain::explain;
 pub use filter::{Filter, LaggedFilter};
 pub use known::Known;
 pub use known_doubt::{StartDoubt, UnusedKnown, unused_known};
+#[cfg(feature = "calibrate")]
 pub use lag_doubt::LagDoubt;
+#[cfg(feature = "calibrate")]
 pub use motion_doubt::motion_doubts;
+#[cfg(feature = "calibrate")]
 pub use plausible::calibration_doubts;
+#[cfg(feature = "calibrate")]
 pub use prior::Prior;
 pub use quiet::{Quiet, QuietWatch};
 pub use reading::Reading;
+#[cfg(feature = "calibrate")]
 pub use recording::{Evaluation, Recording};
 pub use reference_doubt::ReferenceDoubt;
 pub use sensor::Sensor;
 pub use unit_doubt::{UnitDoubt, UnitGuess};
 pub use validity::{Beyond, Extrapolation, ValidityWatch};
 
+#[cfg(feature = "calibrate")]
 #[doc(no_inline)]
 pub use ohmstrain_calib::{
-    CalibrationError, Distrusted, Doubt, EstimatorKind, FieldError, Findings, GaugeFamily, Identifiability,
-    JointParams, Lag, LagError, Quantity, ReadingUnit, SamplesError, ScoredRow, Scores, SensorParams, Stage,
+    CalibrationError, Distrusted, Doubt, GaugeFamily, Identifiability, Lag, LagError, SamplesError, ScoredRow, Stage,
+    score,
 };
 pub use ohmstrain_ekf::live::{FARTHEST_REST, Flag, Flags, KNOWN_BEYOND};
 #[doc(no_inline)]
 pub use ohmstrain_ekf::{Influence, StepError};
 #[doc(no_inline)]
 pub use ohmstrain_model::ParameterError;
+#[doc(no_inline)]
+pub use ohmstrain_sensor::{
+    EstimatorKind, FieldError, Findings, JointParams, Quantity, ReadingUnit, Scores, SensorError, SensorParams,
+};
 
 /// Program and version, as written into files.
 ///

@@ -1,7 +1,7 @@
 //! Doubts about how a reference moves: it stands still while the readings move, it has the other sign, or its clock counts
 //! milliseconds.
 
-use ohmstrain_calib::Quantity;
+use ohmstrain_sensor::Quantity;
 
 use crate::calibration_doubt::CalibrationDoubt;
 use crate::recording::Recording;

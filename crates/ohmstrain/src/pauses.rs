@@ -1,7 +1,7 @@
 use std::ops::Range;
 
-use ohmstrain_calib::Output;
 use ohmstrain_ekf::live::{NEVER_READ_S, Unread};
+use ohmstrain_sensor::Output;
 
 /// Pauses of the readings in a recording that is smoothed, from its end to its beginning.
 pub(crate) struct Pauses {

@@ -1,13 +1,7 @@
-use ohmstrain_calib::{Quantity, ReadingUnit, SensorParams};
+use ohmstrain_sensor::{Quantity, ReadingUnit, SensorParams};
 
+use crate::unit_doubt::LEAST_OHM;
 use crate::{Calibrated, CalibrationDoubt, Recording};
-
-/// Strains beyond this are taken for percent until somebody says that they are none: four times its own length.
-const LARGEST_STRAIN: f64 = 3.0;
-/// Above a strain of one, readings that change by less than this per strain are taken for it, too.
-const LEAST_GAUGE: f64 = 0.05;
-/// Median readings below this, Ω, are taken for kΩ until somebody says that they are none.
-pub(crate) const LEAST_OHM: f64 = 20.0;
 /// A resistance never falls below this share of its largest value; a strain does at rest.
 const LEAST_OF_LARGEST: f64 = 0.2;
 /// Joints turn by less than this, degrees.
@@ -18,6 +12,11 @@ const UNIT_RATIO: f64 = 20.0;
 /// readings' change per strain depends on how it is led.
 const REST_RATIO: f64 = 1.3;
 const GAUGE_RATIO: f64 = 3.0;
+
+/// Strains beyond this are taken for percent until somebody says that they are none: four times its own length.
+const LARGEST_STRAIN: f64 = 3.0;
+/// Above a strain of one, readings that change by less than this per strain are taken for it, too.
+const LEAST_GAUGE: f64 = 0.05;
 
 /// What the recordings of one calibration say about their units, and about being of one sensor: what is to be answered first,
 /// then what is to be known. Units that [are known](Recording::strain_unit_is_known) are not asked about.

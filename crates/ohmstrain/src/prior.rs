@@ -1,4 +1,5 @@
-use ohmstrain_calib::{Prior as Params, SensorParams};
+use ohmstrain_calib::Prior as Params;
+use ohmstrain_sensor::SensorParams;
 
 use crate::{Error, MADE_BY, Sensor, text};
 
@@ -64,7 +65,7 @@ impl Prior {
     /// }
     /// ```
     pub fn to_toml(&self) -> Result<String, Error> {
-        self.params.validate().map_err(ohmstrain_calib::CalibrationError::from)?;
+        self.params.validate().map_err(ohmstrain_sensor::SensorError::from)?;
         Ok(toml::to_string(&self.params)?)
     }
 

@@ -1,4 +1,5 @@
-use ohmstrain_calib::{JointParams, Quantity, ReadingUnit, Samples, ScoredRow, Scores};
+use ohmstrain_calib::{Samples, ScoredRow};
+use ohmstrain_sensor::{JointParams, Quantity, ReadingUnit, Scores};
 
 use crate::{Error, Sensor};
 
@@ -181,7 +182,7 @@ impl Sensor {
         let (time_s, readings) = (samples.time_s(), samples.reading());
         let smoothed = self.smooth(time_s, readings)?;
         let mut filter = self.filter().build()?;
-        let mut cubic = params.static_cubic.start();
+        let mut cubic = ohmstrain_calib::running_cubic(params.static_cubic);
         let (mut filter_rows, mut smoother_rows, mut cubic_rows) = (Vec::new(), Vec::new(), Vec::new());
         for (row, smoothed) in smoothed.iter().enumerate() {
             let (time_s, reading, truth) = (time_s[row], readings[row], samples.strain()[row]);
@@ -191,7 +192,11 @@ impl Sensor {
             smoother_rows.push(scored(smoothed.strain, Some(smoothed.strain_sd)));
             cubic_rows.push(scored(ohmstrain_calib::Baseline::strain(&mut cubic, time_s, reading), None));
         }
-        let scores = (Scores::new(&filter_rows), Scores::new(&smoother_rows), Scores::new(&cubic_rows));
+        let scores = (
+            ohmstrain_calib::score(&filter_rows),
+            ohmstrain_calib::score(&smoother_rows),
+            ohmstrain_calib::score(&cubic_rows),
+        );
         let (Some(filter), Some(smoother), Some(static_cubic)) = scores else { return Ok(None) };
         Ok(Some(Evaluation { filter, smoother, static_cubic }))
     }

@@ -1,7 +1,7 @@
 use std::fmt;
 use std::ops::RangeInclusive;
 
-use ohmstrain_calib::Quantity;
+use ohmstrain_sensor::Quantity;
 
 use crate::Sensor;
 use crate::number::plain;

@@ -1,10 +1,10 @@
 use std::sync::Arc;
 
-use ohmstrain_calib::{
+use ohmstrain_model::Joint;
+use ohmstrain_sensor::{
     EstimatorKind, JointParams, Learned, Options, Quantity, SensorParams, Smoother, build_filter_with,
     build_smoother_with,
 };
-use ohmstrain_model::Joint;
 
 use crate::column::Header;
 use crate::estimate::check_rest;
@@ -97,18 +97,13 @@ impl Sensor {
         &self,
         kind: EstimatorKind,
         options: &Options,
-    ) -> Result<Box<dyn ohmstrain_calib::Filter>, Error> {
+    ) -> Result<Box<dyn ohmstrain_sensor::Filter>, Error> {
         Ok(build_filter_with(&self.params, self.learned.as_ref(), Some(kind), options)?)
     }
 
     /// A smoother that does.
     pub(crate) fn build_smoother(&self, kind: EstimatorKind, options: &Options) -> Result<Box<dyn Smoother>, Error> {
         Ok(build_smoother_with(&self.params, self.learned.as_ref(), Some(kind), options)?)
-    }
-
-    /// That the correction of a smoother can be learned.
-    pub(crate) fn check_smoother(&self) -> Result<(), Error> {
-        Ok(self.learned.as_ref().map_or(Ok(()), |learned| learned.check_smoother())?)
     }
 
     /// The text of its `sensor.toml`: what [`Self::from_toml`] reads.
@@ -125,7 +120,7 @@ impl Sensor {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn to_toml(&self) -> Result<String, Error> {
-        self.params.validate().map_err(ohmstrain_calib::CalibrationError::from)?;
+        self.params.validate().map_err(ohmstrain_sensor::SensorError::from)?;
         Ok(toml::to_string(&self.params)?)
     }
 

@@ -1,8 +1,8 @@
 use std::ops::Range;
 
-use ohmstrain_calib::{EstimatorKind, KnownStrain, Rows};
 use ohmstrain_ekf::live::RestFollower;
 use ohmstrain_ekf::{Gaussian, StepError};
+use ohmstrain_sensor::{KnownStrain, Rows};
 
 use crate::estimate::Scale;
 use crate::known::{KnownOfAll, in_order, next_until};
@@ -103,9 +103,6 @@ impl FilterBuilder<'_> {
     ) -> Result<(), E> {
         let starts_known = self.initial_strain.is_some();
         let kind = self.kind();
-        if kind == EstimatorKind::Corrected {
-            self.sensor.check_smoother()?;
-        }
         let mut smoother = self.sensor.build_smoother(kind, &self.options()?)?;
         let (scale, mut doubts) = (self.scale()?, self.smoothers_doubts(kind)?);
         let failed = |(row, source): (usize, StepError)| Error::Row { row, source };

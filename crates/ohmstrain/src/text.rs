@@ -1,6 +1,8 @@
 //! `sensor.toml` and `prior.toml` as text: in, with the place of what is wrong.
 
-use ohmstrain_calib::{FORMAT, FieldError, PRIOR_FORMAT, Prior, SensorParams};
+#[cfg(feature = "calibrate")]
+use ohmstrain_calib::{CorrectionOfFormat8, PRIOR_FORMAT, Prior};
+use ohmstrain_sensor::{FORMAT, FieldError, SensorParams};
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use toml::de::{DeArray, DeTable};
@@ -20,6 +22,11 @@ pub(crate) trait Document: DeserializeOwned {
 
     /// Names the first number that is out of its range.
     fn check(&self) -> Result<(), FieldError>;
+
+    /// From a text of an older version; `None` for one that cannot be converted.
+    fn converted(_text: &str, _format: u32) -> Option<Result<Self, toml::de::Error>> {
+        None
+    }
 }
 
 impl Document for SensorParams {
@@ -28,8 +35,28 @@ impl Document for SensorParams {
     fn check(&self) -> Result<(), FieldError> {
         self.validate()
     }
+
+    #[cfg(feature = "calibrate")]
+    fn converted(text: &str, format: u32) -> Option<Result<Self, toml::de::Error>> {
+        (format == 8).then(|| of_format_8(text))
+    }
 }
 
+/// Of a text of format 8, which has no weights of the correction: they are learned now.
+#[cfg(feature = "calibrate")]
+fn of_format_8(text: &str) -> Result<SensorParams, toml::de::Error> {
+    let mut table: toml::Table = toml::from_str(text)?;
+    let correction: Option<CorrectionOfFormat8> = table.remove("correction").map(toml::Value::try_into).transpose()?;
+    table.insert("format".into(), FORMAT.into());
+    let mut params: SensorParams = table.try_into()?;
+    if let Some(correction) = correction {
+        let nothing = || serde::de::Error::custom("`correction`: nothing can be learned from its rows");
+        params.correction = Some(correction.learned(params.limits).ok_or_else(nothing)?);
+    }
+    Ok(params)
+}
+
+#[cfg(feature = "calibrate")]
 impl Document for Prior {
     const FORMAT: u32 = PRIOR_FORMAT;
 
@@ -45,12 +72,13 @@ pub(crate) fn parse<D: Document>(text: &str) -> Result<D, TextError> {
         cause: TextCause::Toml(error),
     };
     let Version { format } = toml::from_str(text).map_err(no_toml)?;
-    if format != D::FORMAT {
+    let converted = if format == D::FORMAT { None } else { D::converted(text, format) };
+    if format != D::FORMAT && converted.is_none() {
         let line = text.lines().position(|line| line.trim_start().starts_with("format")).map_or(1, |line| line + 1);
         let place = Some(Place { line, column: None });
         return Err(TextError { place, cause: TextCause::Format { expected: D::FORMAT, found: format } });
     }
-    let params: D = toml::from_str(text).map_err(no_toml)?;
+    let params: D = converted.unwrap_or_else(|| toml::from_str(text)).map_err(no_toml)?;
     match params.check() {
         Ok(()) => Ok(params),
         Err(error) => Err(TextError { place: place_of(text, &error.field), cause: TextCause::Field(error) }),

@@ -1,9 +1,11 @@
 use std::fmt;
 
-use ohmstrain_calib::{ReadingUnit, SensorParams};
+use ohmstrain_sensor::{ReadingUnit, SensorParams};
 
 use crate::number::significant;
-use crate::plausible::LEAST_OHM;
+
+/// Median readings below this, Ω, are taken for kΩ until somebody says that they are none.
+pub(crate) const LEAST_OHM: f64 = 20.0;
 
 /// Readings may go this far beyond those of the calibration, and in another unit they would not: sensors of one kind differ
 /// by less, units by more.

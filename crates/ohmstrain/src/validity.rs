@@ -1,7 +1,7 @@
 use std::fmt;
 
-use ohmstrain_calib::{Quantity, SensorParams, Validity};
 use ohmstrain_ekf::live::RestFollower;
+use ohmstrain_sensor::{Quantity, SensorParams, Validity};
 
 use crate::Sensor;
 use crate::column::reading_column;

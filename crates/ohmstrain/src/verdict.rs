@@ -1,6 +1,6 @@
 //! Scores in words.
 
-use ohmstrain_calib::{Scores, Summary};
+use ohmstrain_sensor::{Scores, Summary};
 
 use crate::number::fixed;
 
@@ -45,7 +45,7 @@ impl Known {
     ///     let truth = f64::from(k) / 100.0;
     ///     ScoredRow { time_s: f64::from(k), truth, strain: truth + error, sd: Some(0.02) }
     /// };
-    /// let scores = |error: f64| Scores::new(&(0..100).map(|k| row(k, error)).collect::<Vec<_>>());
+    /// let scores = |error: f64| ohmstrain::score(&(0..100).map(|k| row(k, error)).collect::<Vec<_>>());
     /// let known = scores(0.01).map(|ours| Known::new(&ours, scores(0.1).as_ref()));
     /// assert_eq!(known.and_then(|known| is_better(&[known])), Some(true));
     /// ```
@@ -119,9 +119,10 @@ pub fn percent(value: f64) -> String {
     fixed(value, i32::from(value.abs() < 9.95)) + " %"
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "calibrate"))]
 mod tests {
-    use ohmstrain_calib::{ScoredRow, Scores};
+    use ohmstrain_calib::ScoredRow;
+    use ohmstrain_sensor::Scores;
 
     use super::{Known, is_better, percent, verdict};
 
@@ -131,7 +132,7 @@ mod tests {
             let sign = if k.is_multiple_of(2) { 1.0 } else { -1.0 };
             ScoredRow { time_s: f64::from(k), truth, strain: truth + sign * error, sd: Some(sd) }
         };
-        Scores::new(&(0..110).map(row).collect::<Vec<_>>()).unwrap()
+        ohmstrain_calib::score(&(0..110).map(row).collect::<Vec<_>>()).unwrap()
     }
 
     #[test]

@@ -1,8 +1,8 @@
 //! R₀ of another day.
 
 use ohmstrain::{Estimate, Sensor, ValidityWatch};
-use ohmstrain_calib::Sessions;
 use ohmstrain_ekf::live::{RestBounds, RestFollower};
+use ohmstrain_sensor::Sessions;
 
 /// The same in resistances: R₀ goes to where the reading is an end of the range, in a step that is implicit in time.
 fn followed(bounds: (f64, f64), rows: impl Iterator<Item = (f64, f64)>) -> Vec<f64> {

@@ -7,6 +7,7 @@ mod empty_rows;
 mod known;
 mod lag;
 mod motion_doubts;
+mod older_formats;
 mod rows;
 mod surprises;
 mod threads;

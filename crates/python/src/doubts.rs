@@ -1,6 +1,6 @@
 //! Doubts of the library in Python's words: which argument answers them; refusals are raised, the rest are warnings.
 
-use ohmstrain::{CalibrationDoubt, Known, LagDoubt, Quiet, ReferenceDoubt, UnitDoubt, UnitGuess};
+use ohmstrain::{CalibrationDoubt, Known, LagDoubt, Quiet};
 use ohmstrain_calib::{Samples, aligned};
 use pyo3::prelude::*;
 
@@ -74,29 +74,6 @@ pub fn on_one_clock(recordings: &mut [Recording], align: bool) -> PyResult<Vec<S
         }
     }
     Ok(warnings)
-}
-
-/// A doubt about the unit of readings, with what answers it.
-pub fn of_unit(doubt: &UnitDoubt) -> String {
-    let answer = match doubt.guess {
-        UnitGuess::KiloOhm => "Then say so with resistance_unit=\"kohm\"",
-        UnitGuess::CalibrationInKiloOhm => "Then calibrate again with resistance_unit=\"kohm\"",
-        UnitGuess::Percent => "The column is a ratio: 110 % is 1.1",
-        UnitGuess::Ohm => "Divide them by what the rested sensor reads",
-        UnitGuess::Ratio => "The sensor was calibrated in ohms",
-        _ => "The column is in ohms",
-    };
-    format!("{doubt} {answer}")
-}
-
-/// A doubt about the unit of a reference, with what answers it.
-pub fn of_reference(doubt: &ReferenceDoubt) -> String {
-    let answer = if doubt.is_of_calibration {
-        "10 % is 0.1; calibrate again"
-    } else {
-        "Then say so with strain_unit=\"percent\""
-    };
-    format!("{doubt} {answer}")
 }
 
 /// A long hold that may be a rest, and what tells it.

@@ -1,9 +1,7 @@
-use ohmstrain::{Error, TextError};
+use ohmstrain::{Error, ReferenceDoubt, TextError, UnitDoubt, UnitGuess};
 use pyo3::create_exception;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-
-use crate::doubts;
 
 create_exception!(
     ohmstrain,
@@ -73,9 +71,32 @@ pub fn of_library(error: &Error, file: Option<&str>) -> PyErr {
             Some(file) => raise(&Place { file: None, ..place }, &error.in_file(file)),
             None => raise(&place, &error.to_string()),
         },
-        Error::Unit(doubt) => raise(&Place { column: Some(doubt.column), ..place }, &doubts::of_unit(doubt)),
-        Error::Reference(doubt) => raise(&Place { column: Some("strain"), ..place }, &doubts::of_reference(doubt)),
+        Error::Unit(doubt) => raise(&Place { column: Some(doubt.column), ..place }, &of_unit(doubt)),
+        Error::Reference(doubt) => raise(&Place { column: Some("strain"), ..place }, &of_reference(doubt)),
         Error::FarRest { .. } => raise(&place, &format!("rest_resistance: {error}")),
         _ => raise(&place, &error.to_string()),
     }
+}
+
+/// A doubt about the unit of readings, with what answers it.
+fn of_unit(doubt: &UnitDoubt) -> String {
+    let answer = match doubt.guess {
+        UnitGuess::KiloOhm => "Then say so with resistance_unit=\"kohm\"",
+        UnitGuess::CalibrationInKiloOhm => "Then calibrate again with resistance_unit=\"kohm\"",
+        UnitGuess::Percent => "The column is a ratio: 110 % is 1.1",
+        UnitGuess::Ohm => "Divide them by what the rested sensor reads",
+        UnitGuess::Ratio => "The sensor was calibrated in ohms",
+        _ => "The column is in ohms",
+    };
+    format!("{doubt} {answer}")
+}
+
+/// A doubt about the unit of a reference, with what answers it.
+fn of_reference(doubt: &ReferenceDoubt) -> String {
+    let answer = if doubt.is_of_calibration {
+        "10 % is 0.1; calibrate again"
+    } else {
+        "Then say so with strain_unit=\"percent\""
+    };
+    format!("{doubt} {answer}")
 }

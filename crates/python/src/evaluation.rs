@@ -31,7 +31,7 @@ pub fn with_sensor(
     let part = Part { recording, truth, first: recording.time_s.partition_point(|time_s| *time_s < from_s) };
     let scores = py.detach(|| {
         let mut scores = part.of_estimates(sensor, options)?;
-        scores.push(("static_cubic", part.of_baseline(params.static_cubic.start(), moved)));
+        scores.push(("static_cubic", part.of_baseline(ohmstrain_calib::running_cubic(params.static_cubic), moved)));
         Ok::<_, PyErr>(scores)
     })?;
     named(scores, file)
@@ -46,7 +46,7 @@ pub fn after_split(py: Python, recording: &Recording, rows: usize, sensor: &Sens
         let corrected = Options::default().with_correction();
         let mut scores = part.of_estimates(sensor, &corrected)?;
         let baselines = fitted(recording, rows).map_err(|error| of_library(&error.into(), file))?;
-        scores.push(("static_cubic", part.of_baseline(baselines.static_cubic.start(), 1.0)));
+        scores.push(("static_cubic", part.of_baseline(ohmstrain_calib::running_cubic(baselines.static_cubic), 1.0)));
         scores.push(("fir_20s", part.of_baseline(baselines.fir.start(), 1.0)));
         scores.push(("low_pass_mode", part.of_baseline(baselines.low_pass_mode.start(), 1.0)));
         scores.push(("leaky_bank", part.of_baseline(baselines.leaky_bank.start(), 1.0)));
@@ -106,7 +106,7 @@ impl Part<'_> {
             let (strain, sd) = estimate(row);
             ScoredRow { time_s: self.recording.time_s[row], truth: self.truth[row], strain, sd }
         };
-        Scores::new(&(self.first..self.truth.len()).map(row).collect::<Vec<_>>())
+        ohmstrain_calib::score(&(self.first..self.truth.len()).map(row).collect::<Vec<_>>())
     }
 
     fn of_baseline(&self, mut baseline: impl Baseline, moved: f64) -> Option<Scores> {

@@ -14,6 +14,7 @@ mod read;
 mod recording;
 mod sensor;
 mod table;
+mod watch;
 
 use pyo3::prelude::*;
 

@@ -9,8 +9,8 @@ use pyo3_arrow::PyTable;
 use crate::about::About;
 use crate::error::of_library;
 use crate::recording::Recording;
-use crate::sensor::{Doubtful, Watch};
 use crate::table::Estimates;
+use crate::watch::{Doubtful, Watch};
 
 /// A running filter.
 #[pyclass(frozen, module = "ohmstrain._core")]

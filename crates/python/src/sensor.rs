@@ -1,28 +1,24 @@
 use std::borrow::Cow;
 
-use ohmstrain::{
-    Closing, Estimate, EstimatorKind, JointParams, Known, Quantity, QuietWatch, ReadingUnit, ValidityWatch,
-};
+use ohmstrain::{Closing, EstimatorKind, JointParams, Quantity, ReadingUnit};
 use pyo3::prelude::*;
-use pyo3_arrow::{PyRecordBatch, PyTable};
+use pyo3_arrow::PyTable;
 
 use crate::about::About;
-use crate::doubts::{of_known, of_rest};
+use crate::doubts::of_known;
 use crate::error::{Place, of_library, raise};
 use crate::evaluation::{self, Scored};
 use crate::live::{LaggedFilter, LiveFilter};
 use crate::options::Options;
 use crate::recording::Recording;
 use crate::table::Estimates;
+use crate::watch::{Doubtful, Watch};
 
 /// A calibrated sensor.
 #[pyclass(frozen, module = "ohmstrain._core")]
 pub struct Sensor {
     pub(crate) sensor: ohmstrain::Sensor,
 }
-
-/// Estimates and what casts doubt on them.
-pub type Doubtful = (PyRecordBatch, Vec<String>);
 
 impl Sensor {
     /// On the joint of a recording, if it has one; with its readings checked.
@@ -152,34 +148,5 @@ impl Sensor {
         let recording = Recording::new(table, about)?;
         let sensor = self.for_recording(&recording, &options)?;
         evaluation::with_sensor(py, &recording, &sensor, &options, from_s)
-    }
-}
-
-/// Says when the calibration does not reach.
-pub struct Watch {
-    watch: ValidityWatch,
-    quiet: QuietWatch,
-    /// What it has said.
-    pub warnings: Vec<String>,
-}
-
-impl Watch {
-    /// Of a sensor, what it reads at rest, if that is said, and strains that are known.
-    pub fn new(sensor: &ohmstrain::Sensor, rest_resistance: Option<f64>, known: &[Known]) -> Self {
-        let watch = ValidityWatch::new(sensor, rest_resistance);
-        Self { watch, quiet: QuietWatch::new(sensor, rest_resistance, known), warnings: Vec::new() }
-    }
-
-    /// Takes a row of a recording with its estimated rate.
-    pub fn see(&mut self, recording: &Recording, row: usize, rate: f64) {
-        let (time_s, reading) = recording.row(row);
-        let seen = self.watch.see(time_s, reading.value, rate, f64::NAN);
-        self.warnings.extend(seen.map(|warning| format!("{}{warning}", recording.before())));
-    }
-
-    /// Takes what a filter says of a row, and asks whether a long hold was a rest.
-    pub fn see_rest(&mut self, recording: &Recording, estimate: &Estimate) {
-        let quiet = self.quiet.see(estimate);
-        self.warnings.extend(quiet.map(|quiet| format!("{}{}", recording.before(), of_rest(&quiet))));
     }
 }

@@ -17,13 +17,13 @@ pub use leaky_bank::LeakyBank;
 pub use low_pass_mode::LowPassMode;
 pub use published::{PhaseRows, PublishedLaw};
 pub use regression::{Features, Regression};
+pub use static_cubic::{fit_static_cubic, running_cubic};
 
 use crate::CalibrationError;
 use crate::enough::check;
 use crate::order::median;
-use crate::params::RangeParams;
-use crate::params::static_cubic::StaticCubic;
 use crate::samples::Samples;
+use ohmstrain_sensor::{RangeParams, StaticCubic};
 
 /// An inverse at work on one recording.
 pub trait Baseline {
@@ -53,7 +53,7 @@ impl Baselines {
     pub fn fit(recordings: &[Samples]) -> Result<Self, CalibrationError> {
         let (lower, upper) = check(recordings)?;
         Ok(Self {
-            static_cubic: StaticCubic::fit(recordings, RangeParams { lower, upper })?,
+            static_cubic: fit_static_cubic(recordings, RangeParams { lower, upper })?,
             fir: Fir::fit(recordings)?,
             low_pass_mode: LowPassMode::fit(recordings)?,
             leaky_bank: LeakyBank::fit(recordings)?,

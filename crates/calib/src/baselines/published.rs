@@ -6,8 +6,8 @@ use ohmstrain_model::Phase;
 use super::{Baseline, Held};
 use crate::CalibrationError;
 use crate::enough::check;
-use crate::params::RangeParams;
 use crate::samples::{Samples, filled_strain};
+use ohmstrain_sensor::RangeParams;
 
 /// Time constants tried for one direction.
 const TIME_CONSTANTS: usize = 80;

@@ -6,8 +6,8 @@ use crate::CalibrationError;
 use crate::enough::check;
 use crate::law::blocked_normal::BlockedNormal;
 use crate::law::regression::VALIDATION_BLOCKS;
-use crate::params::RangeParams;
 use crate::samples::Samples;
+use ohmstrain_sensor::RangeParams;
 
 /// What a linear regression of strain sees of the readings up to now.
 pub trait Features: Clone {

@@ -1,23 +1,24 @@
 use ohmstrain_ekf::Reading;
-use ohmstrain_ekf::correction::FEATURES;
+use ohmstrain_ekf::correction::{FEATURES, FILTER_INPUTS};
 
 use crate::CalibrationError;
 use crate::calibrate::correction_scale::{each_row, reading_scale};
 use crate::calibrate::simulated_motions::simulated_rows;
-use crate::correction::Examples;
-use crate::filter::build::Recipe;
-use crate::filter::corrected::{future_features, outputs};
+use crate::correction::simulated::{Distilled, SimulatedRow};
+use crate::correction::{Examples, Prepared, filter_corrector, smoother_corrector};
+use crate::digits::digits;
 use crate::law::structure::LawFit;
 use crate::motion_stats::MotionStats;
 use crate::order::median;
-use crate::params::RangeParams;
-use crate::params::correction::{
-    CorrectionParams, CorrectionScale, CorrectorParams, PAUSE_S, SimulatedParams, SimulatedRow, TrainingRow,
-};
-use crate::params::estimator::EstimatorKind;
 use crate::prior::{self, CorrectionPrior};
 use crate::samples::Samples;
+use ohmstrain_sensor::correction::SMOOTHER_INPUTS;
+use ohmstrain_sensor::{
+    CorrectionParams, CorrectionScale, EstimatorKind, FilterParts, RangeParams, TrainingRow, future_features, outputs,
+};
 
+/// Pause between recordings, s: noise that lasts for seconds is not shared by them.
+pub(crate) const PAUSE_S: f64 = 1000.0;
 /// Rows that a correction learns from at most. With a hundred errors are a tenth larger, with four hundred no smaller.
 const ROWS: usize = 200;
 /// How much of the choice of rows follows the way that the features go, rather than time: long holds are one row over and
@@ -31,7 +32,7 @@ pub(crate) fn fit_correction(
     recordings: &[Samples],
     fit: &LawFit,
     limits: RangeParams,
-    (corrects, recipe): (EstimatorKind, Recipe<'_>),
+    (corrects, recipe): (EstimatorKind, FilterParts<'_>),
     of_make: Option<&CorrectionPrior>,
 ) -> Result<Option<CorrectionParams>, CalibrationError> {
     let of_make = of_make.filter(|prior| prior.corrects == corrects);
@@ -51,7 +52,7 @@ pub(crate) fn fit_correction(
         candidates.extend(rows);
     }
     let most = if rows.is_empty() { ROWS } else { prior::ROWS };
-    rows.extend(chosen(&candidates, most).into_iter().map(TrainingRow::rounded));
+    rows.extend(chosen(&candidates, most).iter().map(rounded));
     let steps_s = recordings.iter().flat_map(|of| of.time_s.windows(2).map(|pair| pair[1] - pair[0]));
     let simulated = simulated_rows(fit, &MotionStats::new(recordings), &scale, median(steps_s).unwrap_or(0.0));
     Ok(learn(corrects, scale, rows, &simulated, limits))
@@ -64,14 +65,51 @@ fn learn(
     simulated: &[SimulatedRow],
     limits: RangeParams,
 ) -> Option<CorrectionParams> {
-    let (strain, time_s): (Vec<f64>, Vec<f64>) = rows.iter().map(|row| (row.strain, row.time_s)).unzip();
-    let (strain, time_s) = (strain.as_slice(), time_s.as_slice());
-    let of_filter: Vec<_> = rows.iter().map(TrainingRow::filter_inputs).collect();
-    let of_smoother: Vec<_> = rows.iter().map(TrainingRow::smoother_inputs).collect();
-    let simulated = SimulatedParams::fit(simulated, &rows, limits)?;
-    let filter = CorrectorParams::of_filter(Examples { inputs: &of_filter, strain, time_s, limits }, &simulated)?;
-    let smoother = CorrectorParams::of_smoother(Examples { inputs: &of_smoother, strain, time_s, limits })?;
-    Some(CorrectionParams { corrects, readings, filter, smoother, rows, simulated })
+    let distilled = Distilled::fit(simulated, &rows, limits)?;
+    let inputs = CorrectorInputs::new(&rows);
+    let simulated = Prepared::new(inputs.of_filter(limits)).simulated(&distilled)?;
+    let filter = filter_corrector(inputs.of_filter(limits), &simulated)?;
+    let smoother = smoother_corrector(inputs.of_smoother(limits))?;
+    Some(CorrectionParams { corrects, readings, filter, smoother, simulated, rows })
+}
+
+/// Training rows by what filter and smoother see of them.
+pub(crate) struct CorrectorInputs {
+    filter: Vec<[f64; FILTER_INPUTS]>,
+    smoother: Vec<[f64; SMOOTHER_INPUTS]>,
+    strain: Vec<f64>,
+    time_s: Vec<f64>,
+}
+
+impl CorrectorInputs {
+    pub(crate) fn new(rows: &[TrainingRow]) -> Self {
+        Self {
+            filter: rows.iter().map(TrainingRow::filter_inputs).collect(),
+            smoother: rows.iter().map(TrainingRow::smoother_inputs).collect(),
+            strain: rows.iter().map(|row| row.strain).collect(),
+            time_s: rows.iter().map(|row| row.time_s).collect(),
+        }
+    }
+
+    pub(crate) fn of_filter(&self, limits: RangeParams) -> Examples<'_, FILTER_INPUTS> {
+        Examples { inputs: &self.filter, strain: &self.strain, time_s: &self.time_s, limits }
+    }
+
+    pub(crate) fn of_smoother(&self, limits: RangeParams) -> Examples<'_, SMOOTHER_INPUTS> {
+        Examples { inputs: &self.smoother, strain: &self.strain, time_s: &self.time_s, limits }
+    }
+}
+
+/// A row with the digits that are kept.
+pub(crate) fn rounded(row: &TrainingRow) -> TrainingRow {
+    TrainingRow {
+        time_s: digits(row.time_s),
+        strain: digits(row.strain),
+        past: row.past.map(digits),
+        future: row.future.map(digits),
+        filtered: row.filtered.map(digits),
+        smoothed: row.smoothed.map(digits),
+    }
 }
 
 /// All rows of a recording with reading and strain, as the calibrated filter and smoother see them; none if the estimator
@@ -81,7 +119,7 @@ fn candidate_rows(
     readings: &[Option<Reading<f64>>],
     scale: &CorrectionScale,
     start_s: f64,
-    recipe: Recipe<'_>,
+    recipe: FilterParts<'_>,
 ) -> Result<Option<Vec<TrainingRow>>, CalibrationError> {
     let failed = |row: usize, source| CalibrationError::Filter { time_s: samples.time_s[row], source };
     let mut filter = recipe.filter(None)?;

@@ -3,8 +3,9 @@
 use ohmstrain_ekf::Reading;
 use ohmstrain_ekf::correction::{FEATURES, FeatureScale, ReadingFeatures, TIME_CONSTANTS_S, settled};
 
-use crate::params::correction::{CorrectionScale, digits};
+use crate::digits::digits;
 use crate::samples::Samples;
+use ohmstrain_sensor::CorrectionScale;
 
 /// Time constants after which a low-pass has forgotten where it started.
 const FORGOTTEN: f64 = 2.0;

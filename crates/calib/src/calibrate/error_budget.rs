@@ -1,87 +1,37 @@
-use serde::Serialize;
-
 use crate::law::fit::CrossFit;
 use crate::motion_stats::{REST_SHARE, moving_mean};
 use crate::order::{extent, median, sorted};
-use crate::params::findings::ErrorBudget;
-use crate::params::summary::Limit;
 use crate::samples::central_rate;
 use crate::samples::{Samples, filled_strain};
+use ohmstrain_sensor::ErrorBudget;
 
-/// Parts of a filter's squared error, each 0 to 1; together they are 1.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct ErrorShares {
-    /// Of the law's form and parameters.
-    pub law: f64,
-    /// Of rows in which the direction is wrong.
-    pub direction: f64,
-    /// Of slow changes.
-    pub drift: f64,
-    /// Of single readings' noise.
-    pub noise: f64,
-}
-
-impl ErrorShares {
-    /// With their names, the largest first.
-    #[must_use]
-    pub fn sorted(&self) -> [(Limit, f64); 4] {
-        let mut parts = [
-            (Limit::Law, self.law),
-            (Limit::Direction, self.direction),
-            (Limit::Drift, self.drift),
-            (Limit::Noise, self.noise),
-        ];
-        parts.sort_by(|a, b| b.1.total_cmp(&a.1));
-        parts
-    }
-}
-
-impl ErrorBudget {
-    /// Where the squared error of the strain lies: in rows where the direction is wrong; and of the other rows as law, drift
-    /// and noise share the square of what the law leaves of the readings.
-    #[must_use]
-    pub fn shares(&self) -> ErrorShares {
-        let squares = [self.law_percent, self.drift_percent, self.noise_percent].map(|percent| percent * percent);
-        let sum: f64 = squares.iter().sum();
-        // Where the law leaves nothing, what there is of error is not told apart, and counted as the law's.
-        let [law, drift, noise] = if sum > 0.0 { squares.map(|square| square / sum) } else { [1.0, 0.0, 0.0] };
-        let others = 1.0 - self.wrong_error;
-        ErrorShares { law: others * law, direction: self.wrong_error, drift: others * drift, noise: others * noise }
-    }
-
-    /// What makes most of the error: the largest of [`ErrorBudget::shares`].
-    #[must_use]
-    pub fn limit(&self) -> Limit {
-        self.shares().sorted()[0].0
-    }
-
-    pub(crate) fn new(recordings: &[Samples], fit: &CrossFit, wrong: &WrongDirection) -> Self {
-        let (mut law, mut drift, mut noise, mut count) = (0.0, 0.0, 0.0, 0.0);
-        for (block, without) in fit.without_block.iter().enumerate() {
-            for (r, (residuals, samples)) in without.residuals.iter().zip(recordings).enumerate() {
-                let rows = fit.blocks[r][block].clone();
-                let percent = 100.0 * without.rest_readings[r] / range(samples);
-                let known: Vec<f64> = residuals[rows].iter().filter(|x| x.is_finite()).map(|x| x * percent).collect();
-                let n = known.len() as f64;
-                if known.len() < 3 || !percent.is_finite() {
-                    continue;
-                }
-                let mean = known.iter().sum::<f64>() / n;
-                let variance = known.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / n;
-                let white = white_variance(&known).min(variance);
-                (law, drift, noise) = (law + n * (variance - white), drift + n * mean * mean, noise + n * white);
-                count += n;
+/// Shares of the error of what was left out.
+pub(crate) fn error_budget(recordings: &[Samples], fit: &CrossFit, wrong: &WrongDirection) -> ErrorBudget {
+    let (mut law, mut drift, mut noise, mut count) = (0.0, 0.0, 0.0, 0.0);
+    for (block, without) in fit.without_block.iter().enumerate() {
+        for (r, (residuals, samples)) in without.residuals.iter().zip(recordings).enumerate() {
+            let rows = fit.blocks[r][block].clone();
+            let percent = 100.0 * without.rest_readings[r] / range(samples);
+            let known: Vec<f64> = residuals[rows].iter().filter(|x| x.is_finite()).map(|x| x * percent).collect();
+            let n = known.len() as f64;
+            if known.len() < 3 || !percent.is_finite() {
+                continue;
             }
+            let mean = known.iter().sum::<f64>() / n;
+            let variance = known.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / n;
+            let white = white_variance(&known).min(variance);
+            (law, drift, noise) = (law + n * (variance - white), drift + n * mean * mean, noise + n * white);
+            count += n;
         }
-        let size = |sum: f64| (sum / f64::max(count, 1.0)).sqrt();
-        let share = |part: f64, whole: f64| if whole > 0.0 { part / whole } else { 0.0 };
-        Self {
-            law_percent: size(law),
-            drift_percent: size(drift),
-            noise_percent: size(noise),
-            wrong_rows: share(wrong.rows, wrong.moving_rows),
-            wrong_error: share(wrong.squared_error, wrong.all_squared_error),
-        }
+    }
+    let size = |sum: f64| (sum / f64::max(count, 1.0)).sqrt();
+    let share = |part: f64, whole: f64| if whole > 0.0 { part / whole } else { 0.0 };
+    ErrorBudget {
+        law_percent: size(law),
+        drift_percent: size(drift),
+        noise_percent: size(noise),
+        wrong_rows: share(wrong.rows, wrong.moving_rows),
+        wrong_error: share(wrong.squared_error, wrong.all_squared_error),
     }
 }
 
@@ -140,7 +90,9 @@ impl WrongDirection {
 
 #[cfg(test)]
 mod tests {
-    use super::{ErrorBudget, Limit, white_variance};
+    use ohmstrain_sensor::{ErrorBudget, Limit};
+
+    use super::white_variance;
 
     /// Second differences of white noise with deviation 0.3 on a steep line. The median of n = 20 000 squares, neighbours
     /// correlated, is known to a few percent.

@@ -4,44 +4,40 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use crate::CalibrationError;
-use crate::baselines::Baseline;
+use crate::baselines::{Baseline, fit_static_cubic, running_cubic};
 use crate::calibrate::correction_fit::fit_correction;
-use crate::calibrate::error_budget::{Direction, WrongDirection};
+use crate::calibrate::error_budget::{Direction, WrongDirection, error_budget};
 use crate::calibrate::left_out::relative_changes;
-use crate::calibrate::scores::ScoredRow;
-use crate::filter::build::Recipe;
-use crate::filter::learned::Learned;
+use crate::calibrate::scores::{ScoredRow, score_of_full_scale};
 use crate::law::fit::CrossFit;
 use crate::law::identifiability::Identifiability;
 use crate::law::structure::LawFit;
 use crate::motion_stats::MotionStats;
-use crate::params::RangeParams;
-use crate::params::estimator::{EstimatorKind, EstimatorParams, NoParameters};
-use crate::params::findings::{ErrorBudget, Findings, Scores, Seen, TENTHS};
-use crate::params::static_cubic::StaticCubic;
-use crate::params::summary::Summary;
 use crate::prior::CorrectionPrior;
 use crate::samples::Samples;
+use ohmstrain_sensor::{
+    EstimatorKind, EstimatorParams, FilterParts, Findings, Learned, NoParameters, RangeParams, Seen, SensorError,
+    TENTHS,
+};
 
-impl Seen {
-    pub(crate) fn new(recordings: &[Samples], range: RangeParams, stats: &MotionStats) -> Self {
-        let mut counts = [0_usize; TENTHS];
-        for samples in recordings {
-            for k in samples.complete_rows() {
-                let share = (samples.strain[k] - range.lower) / range.span();
-                counts[((share * TENTHS as f64) as usize).min(TENTHS - 1)] += 1;
-            }
+/// What the recordings of a calibration contain.
+pub(crate) fn seen(recordings: &[Samples], range: RangeParams, stats: &MotionStats) -> Seen {
+    let mut counts = [0_usize; TENTHS];
+    for samples in recordings {
+        for k in samples.complete_rows() {
+            let share = (samples.strain[k] - range.lower) / range.span();
+            counts[((share * TENTHS as f64) as usize).min(TENTHS - 1)] += 1;
         }
-        let rows: usize = counts.iter().sum();
-        Self {
-            range,
-            tenths: counts.map(|count| count as f64 / rows.max(1) as f64),
-            quartile_speeds: stats.quartile_speeds,
-            fastest_rate: stats.fastest_rate,
-            longest_hold_s: stats.longest_hold_s,
-            longest_s: stats.longest_s,
-            rows,
-        }
+    }
+    let rows: usize = counts.iter().sum();
+    Seen {
+        range,
+        tenths: counts.map(|count| count as f64 / rows.max(1) as f64),
+        quartile_speeds: stats.quartile_speeds,
+        fastest_rate: stats.fastest_rate,
+        longest_hold_s: stats.longest_hold_s,
+        longest_s: stats.longest_s,
+        rows,
     }
 }
 
@@ -72,10 +68,10 @@ impl Check<'_> {
     pub(crate) fn findings(&self, seen: Seen, told: &Option<Identifiability>) -> Option<Findings> {
         let scored = self.scored().ok()?;
         Some(Findings {
-            filter: Scores::of_full_scale(&scored.filter)?,
-            smoother: Scores::of_full_scale(&scored.smoother),
-            static_cubic: Scores::of_full_scale(&scored.static_cubic)?,
-            budget: ErrorBudget::new(self.recordings, self.fit, &scored.wrong),
+            filter: score_of_full_scale(&scored.filter)?,
+            smoother: score_of_full_scale(&scored.smoother),
+            static_cubic: score_of_full_scale(&scored.static_cubic)?,
+            budget: error_budget(self.recordings, self.fit, &scored.wrong),
             seen,
             advice: told.as_ref().map_or_else(Vec::new, |told| told.advice.clone()),
         })
@@ -107,7 +103,7 @@ impl Check<'_> {
             .zip(&masked)
             .map(|(samples, strain)| Samples { strain: strain.as_slice(), ..*samples })
             .collect();
-        let cubic = StaticCubic::fit(&training, limits)?;
+        let cubic = fit_static_cubic(&training, limits)?;
         let estimator = self.estimator_without(law, &training)?;
         for (r, samples) in self.recordings.iter().enumerate() {
             let rows = self.fit.blocks[r][block].clone();
@@ -116,7 +112,7 @@ impl Check<'_> {
             let mut filter = estimator.filter.filter(estimator.learned.as_ref())?;
             let mut smoother = estimator.smoother.smoother(estimator.learned.as_ref())?;
             let smoothed = smoother.smooth(samples.time_s, &readings).map_err(|(row, e)| failed(row, e))?;
-            let mut baseline = cubic.start();
+            let mut baseline = running_cubic(cubic);
             for k in 0..rows.end {
                 filter.step(samples.time_s[k], readings[k]).map_err(|error| failed(k, error))?;
                 let on_cubic = baseline.strain(samples.time_s[k], samples.reading[k]);
@@ -151,8 +147,8 @@ impl Check<'_> {
     fn estimator_without<'b>(&self, law: &'b LawFit, training: &[Samples]) -> Result<Trained<'b>, CalibrationError> {
         let limits = self.fit.law.law.range;
         let recipe = |kind: EstimatorKind| {
-            let params = self.estimators.get(&kind).ok_or(NoParameters { kind })?;
-            Ok::<_, CalibrationError>(Recipe::of_law(kind, &law.law, *params, limits))
+            let params = self.estimators.get(&kind).ok_or(SensorError::from(NoParameters { kind }))?;
+            Ok::<_, CalibrationError>(FilterParts::of_law(kind, &law.law, *params, limits))
         };
         let filter = recipe(self.filter)?;
         let correction = if self.kind == EstimatorKind::Corrected {
@@ -160,27 +156,14 @@ impl Check<'_> {
         } else {
             None
         };
-        let learned = correction.map(|correction| Learned::new(correction, limits));
+        let learned = correction.map(|correction| Learned::new(&correction, limits));
         Ok(Trained { filter, smoother: recipe(self.filter)?, learned })
     }
 }
 
 /// Recipes of filter and smoother, and their learned correction.
 struct Trained<'a> {
-    filter: Recipe<'a>,
-    smoother: Recipe<'a>,
+    filter: FilterParts<'a>,
+    smoother: FilterParts<'a>,
     learned: Option<Arc<Learned>>,
-}
-
-impl From<&Findings> for Summary {
-    fn from(found: &Findings) -> Self {
-        Self {
-            left_out_percent_fs: found.filter.rmse_percent_fs,
-            smoothed_percent_fs: found.smoother.map(|scores| scores.rmse_percent_fs),
-            static_cubic_percent_fs: found.static_cubic.rmse_percent_fs,
-            coverage_95_percent: 100.0 * found.filter.coverage_95.unwrap_or(0.0),
-            width_95_percent_fs: found.filter.width_95_percent_fs.unwrap_or(0.0),
-            limited_by: found.budget.limit(),
-        }
-    }
 }

@@ -2,11 +2,9 @@ use std::ops::Range;
 
 use ohmstrain_ekf::{Gaussian, Reading};
 
-use crate::filter::build::Recipe;
 use crate::law::fit::CrossFit;
-use crate::params::RangeParams;
-use crate::params::law::LawParams;
 use crate::samples::Samples;
+use ohmstrain_sensor::{FilterParts, LawParams, RangeParams};
 
 /// Standard deviation that every reference has of its own, as a share of the strain's range: no score can be had from
 /// being more precise.
@@ -21,8 +19,8 @@ pub(crate) struct LeftOut<'a> {
     limits: RangeParams,
 }
 
-/// Recipe of a filter for a law that was fitted without a block.
-pub(crate) type Build<'a> = dyn Fn(Fold<'_>) -> Recipe<'_> + 'a;
+/// FilterParts of a filter for a law that was fitted without a block.
+pub(crate) type Build<'a> = dyn Fn(Fold<'_>) -> FilterParts<'_> + 'a;
 
 /// A law that was fitted without a block.
 #[derive(Clone, Copy)]

@@ -7,6 +7,7 @@ pub(crate) mod error_budget;
 pub(crate) mod findings;
 pub(crate) mod left_out;
 pub(crate) mod noise_fit;
+pub(crate) mod recipe;
 pub(crate) mod scores;
 pub(crate) mod settling;
 pub(crate) mod simulated_motions;
@@ -15,30 +16,27 @@ pub(crate) mod with_prior;
 use std::collections::BTreeMap;
 
 use crate::CalibrationError;
+use crate::baselines::fit_static_cubic;
 use crate::calibrate::correction_fit::fit_correction;
-use crate::calibrate::findings::Check;
+use crate::calibrate::findings::{Check, seen};
 use crate::calibrate::noise_fit::{
     NoiseProblem, REFINEMENT, SURVEY, Surveyed, best_of_each_size, survey, survey_evaluations,
 };
-use crate::filter::build::Recipe;
+use crate::calibrate::recipe::RECIPE;
 use crate::law::fit::{CrossFit, LawOptions, fit_laws};
 use crate::law::identifiability::identifiability;
 use crate::motion_stats::MotionStats;
 use crate::order::median;
-use crate::params::correction::CorrectionParams;
-use crate::params::estimator::{EstimatorKind, EstimatorParams};
-use crate::params::findings::{Findings, Seen};
-use crate::params::law::LawParams;
-use crate::params::recipe::RECIPE;
-use crate::params::static_cubic::StaticCubic;
-use crate::params::summary::Summary;
-use crate::params::{FORMAT, Quantity, RangeParams, ReadingUnit, SensorParams, Sessions, Uncertainty, Validity};
 use crate::prior::{CorrectionPrior, Prior};
 use crate::recording::repeats::longest_repeat_s;
 use crate::recording::rest::rest_share;
 use crate::recording::screen::{Distrusted, screen};
 use crate::recording::sessions::sessions;
 use crate::samples::{Samples, reading_range};
+use ohmstrain_sensor::{
+    CorrectionParams, EstimatorKind, EstimatorParams, FORMAT, FilterParts, Findings, LawParams, Quantity, RangeParams,
+    ReadingUnit, SensorParams, Sessions, StaticCubic, Summary, Uncertainty, Validity,
+};
 
 /// What calibration is doing, for a progress bar.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -194,7 +192,7 @@ pub(crate) fn calibrate_once(
     let limits = fit.law.law.range;
     (steps.progress)(Stage::LeftOut);
     let identifiability = identifiability(recordings, &fit.law.law).ok();
-    let seen = Seen::new(recordings, limits, &stats);
+    let seen = seen(recordings, limits, &stats);
     let findings = Check { recordings, fit, kind: default_estimator, filter, estimators: &estimators, of_make }
         .findings(seen, &identifiability);
     let own = validity(recordings, &fit.law.rest_readings, limits, &stats);
@@ -204,7 +202,7 @@ pub(crate) fn calibrate_once(
         findings,
         estimators,
         correction,
-        static_cubic: StaticCubic::fit(recordings, limits)?,
+        static_cubic: fit_static_cubic(recordings, limits)?,
         validity: prior.map_or(own, |prior| prior.joined(own, median_rest(&fit.law.rest_readings))),
         limits,
         uncertainty: identifiability.map(|found| found.told()),
@@ -281,7 +279,7 @@ fn correction(
 ) -> Result<Option<CorrectionParams>, CalibrationError> {
     let limits = fit.law.law.range;
     let Some(params) = estimators.get(&kind) else { return Ok(None) };
-    let recipe = Recipe::of_law(kind, &fit.law.law, *params, limits);
+    let recipe = FilterParts::of_law(kind, &fit.law.law, *params, limits);
     fit_correction(recordings, &fit.law, limits, (kind, recipe), of_make)
 }
 

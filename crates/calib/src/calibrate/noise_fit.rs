@@ -5,17 +5,15 @@ use ohmstrain_ekf::live::news;
 use crate::CalibrationError;
 use crate::calibrate::left_out::{Fold, LeftOut};
 use crate::calibrate::settling::LongHolds;
-use crate::filter::build::Recipe;
 use crate::law::fit::CrossFit;
 use crate::motion_stats::{MotionStats, root_mean_square};
 use crate::optimise;
-use crate::params::RangeParams;
-use crate::params::estimator::{
-    EstimatorKind, EstimatorParams, MotionParams, NoiseParams, PhaseParams, SettlingParams,
-};
 use crate::prior::EstimatorPrior;
 use crate::samples::{Samples, usual_step_s};
 use crate::sd_scale::sd_scale;
+use ohmstrain_sensor::{
+    EstimatorKind, EstimatorParams, FilterParts, MotionParams, NoiseParams, PhaseParams, RangeParams, SettlingParams,
+};
 
 /// Pull toward the starting values, per squared step of a log-parameter: a score from one recording must not run away.
 const REGULARISATION: f64 = 1e-2;
@@ -216,8 +214,8 @@ impl<'a> NoiseProblem<'a> {
         holds.settling(left_out, &|fold| self.recipe(self.kind, fold, params))
     }
 
-    fn recipe<'f>(&self, kind: EstimatorKind, fold: Fold<'f>, params: EstimatorParams) -> Recipe<'f> {
-        Recipe::of_law(kind, fold.law, params, self.limits)
+    fn recipe<'f>(&self, kind: EstimatorKind, fold: Fold<'f>, params: EstimatorParams) -> FilterParts<'f> {
+        FilterParts::of_law(kind, fold.law, params, self.limits)
     }
 
     fn left_out(&self, stride: usize) -> LeftOut<'a> {

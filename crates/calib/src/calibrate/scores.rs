@@ -1,7 +1,7 @@
 use statrs::distribution::{Continuous, ContinuousCDF, Normal};
 
 use crate::calibrate::left_out::REFERENCE_SD;
-use crate::params::findings::Scores;
+use ohmstrain_sensor::Scores;
 
 /// Errors above this share of full scale, for this long, s, are no inaccuracy: the estimate follows another solution.
 const WRONG_BRANCH: (f64, f64) = (0.2, 2.0);
@@ -19,50 +19,46 @@ pub struct ScoredRow {
     pub sd: Option<f64>,
 }
 
-impl Scores {
-    /// Scores rows; `None` if there is none. Rows with an unknown truth are passed over.
-    #[must_use]
-    pub fn new(rows: &[ScoredRow]) -> Option<Self> {
-        let rows: Vec<&ScoredRow> = rows.iter().filter(|row| row.truth.is_finite()).collect();
-        let n = rows.len();
-        let count = n as f64;
-        let mean = |of: &dyn Fn(&ScoredRow) -> f64| rows.iter().map(|row| of(row)).sum::<f64>() / count;
-        let full_scale = rows
-            .iter()
-            .fold(None, |range, row| {
-                let (low, high) = range.unwrap_or((row.truth, row.truth));
-                Some((row.truth.min(low), row.truth.max(high)))
-            })
-            .map(|(low, high)| high - low)?;
-        let rmse = mean(&|row| (row.strain - row.truth).powi(2)).sqrt();
-        let has_sd = rows.iter().all(|row| row.sd.is_some());
-        let covered = |level: f64| has_sd.then(|| mean(&|row| f64::from(u8::from(row.is_covered(level)))));
-        let width_95 = has_sd.then(|| mean(&|row| 2.0 * row.half_width(0.95)));
-        let crps = mean(&ScoredRow::crps);
-        Some(Self {
-            n,
-            rmse,
-            rmse_percent_fs: 100.0 * rmse / full_scale,
-            mae: mean(&|row| (row.strain - row.truth).abs()),
-            bias: mean(&|row| row.strain - row.truth),
-            coverage_50: covered(0.5),
-            coverage_90: covered(0.9),
-            coverage_95: covered(0.95),
-            width_95,
-            width_95_percent_fs: width_95.map(|width| 100.0 * width / full_scale),
-            crps,
-            crps_percent_fs: 100.0 * crps / full_scale,
-            log_score: has_sd.then(|| mean(&|row| row.log_density(full_scale))),
-            wrong_branch: wrong_branch(&rows, full_scale),
+/// Scores rows; `None` if there is none. Rows with an unknown truth are passed over.
+#[must_use]
+pub fn score(rows: &[ScoredRow]) -> Option<Scores> {
+    let rows: Vec<&ScoredRow> = rows.iter().filter(|row| row.truth.is_finite()).collect();
+    let n = rows.len();
+    let count = n as f64;
+    let mean = |of: &dyn Fn(&ScoredRow) -> f64| rows.iter().map(|row| of(row)).sum::<f64>() / count;
+    let full_scale = rows
+        .iter()
+        .fold(None, |range, row| {
+            let (low, high) = range.unwrap_or((row.truth, row.truth));
+            Some((row.truth.min(low), row.truth.max(high)))
         })
-    }
+        .map(|(low, high)| high - low)?;
+    let rmse = mean(&|row| (row.strain - row.truth).powi(2)).sqrt();
+    let has_sd = rows.iter().all(|row| row.sd.is_some());
+    let covered = |level: f64| has_sd.then(|| mean(&|row| f64::from(u8::from(row.is_covered(level)))));
+    let width_95 = has_sd.then(|| mean(&|row| 2.0 * row.half_width(0.95)));
+    let crps = mean(&ScoredRow::crps);
+    Some(Scores {
+        n,
+        rmse,
+        rmse_percent_fs: 100.0 * rmse / full_scale,
+        mae: mean(&|row| (row.strain - row.truth).abs()),
+        bias: mean(&|row| row.strain - row.truth),
+        coverage_50: covered(0.5),
+        coverage_90: covered(0.9),
+        coverage_95: covered(0.95),
+        width_95,
+        width_95_percent_fs: width_95.map(|width| 100.0 * width / full_scale),
+        crps,
+        crps_percent_fs: 100.0 * crps / full_scale,
+        log_score: has_sd.then(|| mean(&|row| row.log_density(full_scale))),
+        wrong_branch: wrong_branch(&rows, full_scale),
+    })
 }
 
-impl Scores {
-    /// The same where errors can be told in percent of full scale; `None` if the truth is constant or an estimate is no number.
-    pub(crate) fn of_full_scale(rows: &[ScoredRow]) -> Option<Self> {
-        Self::new(rows).filter(|scores| scores.rmse_percent_fs.is_finite())
-    }
+/// The same where errors can be told in percent of full scale; `None` if the truth is constant or an estimate is no number.
+pub(crate) fn score_of_full_scale(rows: &[ScoredRow]) -> Option<Scores> {
+    score(rows).filter(|scores| scores.rmse_percent_fs.is_finite())
 }
 
 /// Share of the time between the first and the last row.
@@ -109,7 +105,7 @@ impl ScoredRow {
 
 #[cfg(test)]
 mod tests {
-    use super::{ScoredRow, Scores};
+    use super::{ScoredRow, score, score_of_full_scale};
 
     #[test]
     fn short_excursions_are_no_wrong_branch() {
@@ -124,7 +120,7 @@ mod tests {
             ScoredRow { time_s: f64::from(k), truth, strain: truth + error, sd: None }
         };
         let rows: Vec<ScoredRow> = (0..=40).map(row).collect();
-        assert_eq!(Scores::new(&rows).unwrap().wrong_branch, 2.0 / 40.0);
+        assert_eq!(score(&rows).unwrap().wrong_branch, 2.0 / 40.0);
     }
 
     /// Zero error over zero full scale is no number, and neither is what an estimate that is none leaves.
@@ -135,7 +131,7 @@ mod tests {
         let lost: Vec<ScoredRow> = (0..9).map(|k| row(k, f64::from(k), f64::NAN)).collect();
         let known: Vec<ScoredRow> = (0..9).map(|k| row(k, f64::from(k), 1.0)).collect();
         for (rows, is_known) in [(constant, false), (lost, false), (known, true)] {
-            assert_eq!(Scores::of_full_scale(&rows).is_some(), is_known);
+            assert_eq!(score_of_full_scale(&rows).is_some(), is_known);
         }
     }
 }

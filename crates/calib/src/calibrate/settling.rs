@@ -3,10 +3,10 @@
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use crate::calibrate::left_out::{Build, LeftOut, SaidFall};
-use crate::params::estimator::SettlingParams;
 use crate::recording::holds::{Hold, LEAST_HOLD_S, holds};
 use crate::samples::Samples;
 use crate::sd_scale::Z_95;
+use ohmstrain_sensor::SettlingParams;
 
 /// Holds shorter than this share of the longest are left out: they end before the others.
 const LEAST_SHARE: f64 = 1.0 / 3.0;

@@ -8,10 +8,10 @@ use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal, Uniform};
 
 use crate::calibrate::correction_scale::each_row;
+use crate::correction::simulated::SimulatedRow;
 use crate::law::structure::LawFit;
 use crate::motion_stats::MotionStats;
-use crate::params::RangeParams;
-use crate::params::correction::{CorrectionScale, SimulatedRow};
+use ohmstrain_sensor::{CorrectionScale, RangeParams};
 
 /// How many motions are simulated, for how long, and how much of each is left out, while low-passes forget its beginning.
 const MOTIONS: usize = 24;
@@ -146,8 +146,9 @@ fn readings(fit: &LawFit, strain: &[f64], step_s: f64, rng: &mut ChaCha12Rng) ->
 
 #[cfg(test)]
 mod tests {
+    use ohmstrain_sensor::{BranchParams, GaugeParams, LawParams};
+
     use super::*;
-    use crate::params::law::{BranchParams, GaugeParams, LawParams};
 
     const RANGE: RangeParams = RangeParams { lower: 0.05, upper: 0.35 };
 

@@ -1,9 +1,9 @@
 use super::{Calibration, Stage, calibrate_once};
 use crate::CalibrationError;
 use crate::law::fit::LawOptions;
-use crate::params::estimator::EstimatorKind;
 use crate::prior::Prior;
 use crate::samples::Samples;
+use ohmstrain_sensor::EstimatorKind;
 
 /// Share of the length of the other sensors' recordings from which on a recording may do without them.
 const ALONE: f64 = 1.0 / 3.0;

@@ -1,7 +1,6 @@
-use super::owned::OwnedTriangle;
-use crate::params::correction::ProcessParams;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use ohmstrain_ekf::correction::kernel;
+use ohmstrain_sensor::correction::relevance;
 
 /// White noise beside the noise that is correlated in time, as a share of its variance.
 const WHITE: f64 = 0.09;
@@ -9,6 +8,17 @@ const WHITE: f64 = 0.09;
 const JITTER: f64 = 1e-6;
 /// A pivot of the inducing rows below this share of the prior variance says nothing new.
 const SMALLEST_PIVOT: f64 = 1e-6;
+
+/// What a Gaussian process is before it has seen rows.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Settings {
+    /// Length scale of each input, in standard deviations of the input.
+    pub lengths: Vec<f64>,
+    /// Standard deviation of the noise that is correlated in time, relative to that of the targets.
+    pub noise: f64,
+    /// Correlation time of the noise, s.
+    pub noise_time_s: f64,
+}
 
 /// Rows to learn from: standardised inputs, targets, times.
 #[derive(Clone, Copy)]
@@ -66,19 +76,14 @@ impl Lessons<'_> {
     }
 }
 
-/// What an input counts in the kernel, 1/2ℓ².
-pub(crate) fn relevance(length: f64) -> f64 {
-    0.5 / (length * length)
-}
-
 impl GaussianProcess {
     /// Conditions a process on rows; none if its covariance is not positive definite.
-    pub(crate) fn new(lessons: Lessons, params: &ProcessParams) -> Option<Self> {
+    pub(crate) fn new(lessons: Lessons, params: &Settings) -> Option<Self> {
         Self::with_sums(lessons, &lessons.half_squares(&params.lengths), params)
     }
 
     /// The same, of sums by [`Lessons::half_squares`].
-    pub(super) fn with_sums(lessons: Lessons, sums: &DMatrix<f64>, params: &ProcessParams) -> Option<Self> {
+    pub(super) fn with_sums(lessons: Lessons, sums: &DMatrix<f64>, params: &Settings) -> Option<Self> {
         let Lessons { inputs, targets, time_s } = lessons;
         let n = targets.len();
         let centre = targets.iter().sum::<f64>() / n as f64;
@@ -156,21 +161,21 @@ impl GaussianProcess {
         Some(left_out)
     }
 
-    /// The upper triangle W: |W k|² is the share of the prior variance that all rows explain where their
+    /// Rows of the upper triangle W, one after the other: |W k|² is the share of the prior variance that all rows explain where their
     /// kernels are projected onto those of these inducing rows, k (Nyström).
-    pub(crate) fn explained(&self, inducing: &[usize]) -> Option<OwnedTriangle<f64>> {
+    pub(crate) fn explained(&self, inducing: &[usize]) -> Option<Vec<f64>> {
         let m = inducing.len();
         let with_inducing = self.kernel.select_columns(inducing);
         let among = with_inducing.select_rows(inducing) + DMatrix::identity(m, m) * JITTER * 1e-2;
         // Kernels of all rows as weighted sums of those of the inducing rows.
         let projection = among.cholesky()?.solve(&with_inducing.transpose()).transpose();
         let triangle = self.covariance.l_dirty().solve_lower_triangular(&projection)?.qr().r();
-        Some(OwnedTriangle::new(m, |i, j| triangle[(i, j)]))
+        Some((0..m).flat_map(|i| (i..m).map(move |j| (i, j))).map(|place| triangle[place]).collect())
     }
 }
 
 /// Covariance of the noise, in variances of the targets.
-fn noise_covariance(time_s: &[f64], params: &ProcessParams) -> DMatrix<f64> {
+fn noise_covariance(time_s: &[f64], params: &Settings) -> DMatrix<f64> {
     let variance = params.noise.powi(2);
     symmetric(time_s.len(), |i, j| {
         let white = if i == j { WHITE * variance + JITTER } else { 0.0 };

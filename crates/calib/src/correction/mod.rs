@@ -1,23 +1,20 @@
-//! The learned correction: choosing its processes, and making of a sensor's rows what `ohmstrain_ekf::correction` runs.
+//! The learned correction: choosing its processes, and conditioning them on rows.
 
 mod criterion;
-mod gaussian_process;
-pub(crate) mod owned;
+pub(crate) mod gaussian_process;
 mod settings;
 pub(crate) mod simulated;
 
 use ohmstrain_ekf::Gaussian;
-use ohmstrain_ekf::correction::{
-    FEATURES, FILTER_INPUTS, INDUCING, InputScale, OUTPUTS, Process, Triangle, consensus, mixture,
-};
-use owned::{OwnedCorrection, OwnedProcess};
+use ohmstrain_ekf::correction::{FILTER_INPUTS, INDUCING, InputScale, consensus, mixture};
+use ohmstrain_sensor::correction::{ONE_SIDED, ProcessKind, SIDES, SMOOTHER_INPUTS, standardised};
+use ohmstrain_sensor::{CorrectorParams, InputScales, ProcessParams, RangeParams, SimulatedParams};
 
+use crate::digits::significant;
 use crate::order::extent;
-use crate::params::RangeParams;
-use crate::params::correction::{CorrectorParams, ProcessParams, SIDES, SMOOTHER_INPUTS, SimulatedParams};
 use crate::sd_scale::{joint_scale_of, sd_scale_up_to};
 use criterion::Criterion;
-use gaussian_process::{GaussianProcess, LeftOutRow, Lessons, inducing_rows, relevance};
+use gaussian_process::{GaussianProcess, LeftOutRow, Lessons, Settings, inducing_rows};
 
 /// Blocks of rows that are left out in turn.
 const BLOCKS: usize = 5;
@@ -26,6 +23,10 @@ const BLOCKS: usize = 5;
 /// promise too much for other motions.
 const LEAST_DIRECT: f64 = 0.5;
 const LEAST_RESIDUAL: f64 = 0.07;
+/// Significant digits of weights: kernels of a few hundred rows have conditions up to 1e6, and what they say is to have six digits.
+const WEIGHT_DIGITS: usize = 12;
+/// Significant digits of what inducing rows explain, a share of the variance.
+const EXPLAINED_DIGITS: usize = 9;
 /// Widest factor on a process' deviation: block left out of recordings that hold still for long are worlds of their own.
 const WIDEST_PROCESS: f64 = 3.0;
 
@@ -38,13 +39,33 @@ pub(crate) struct Examples<'a, const D: usize> {
     pub limits: RangeParams,
 }
 
-/// A process of a correction.
-#[derive(Clone, Copy, PartialEq)]
-enum Which {
-    Direct,
-    Past,
-    Future,
-    Residual,
+/// A process, before it has seen rows.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Chosen {
+    pub settings: Settings,
+    /// Factor on its standard deviation, from blocks left out.
+    pub sd_scale: f64,
+}
+
+/// The processes of a corrector.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Choices {
+    /// Factor on the standard deviation of what they say together.
+    pub sd_scale: f64,
+    pub direct: Chosen,
+    pub residual: Chosen,
+    pub one_sided: Vec<Chosen>,
+}
+
+impl Choices {
+    fn of(&self, kind: ProcessKind) -> Option<&Chosen> {
+        match kind {
+            ProcessKind::Direct => Some(&self.direct),
+            ProcessKind::Residual => Some(&self.residual),
+            ProcessKind::Past => self.one_sided.first(),
+            ProcessKind::Future => self.one_sided.get(1),
+        }
+    }
 }
 
 /// How the processes of a corrector are chosen.
@@ -66,39 +87,16 @@ impl Choosing {
     }
 }
 
-/// Direct processes that see one side of time, in order.
-const ONE_SIDED: [Which; SIDES] = [Which::Past, Which::Future];
-
-impl Which {
-    /// Which of so many inputs it sees.
-    fn places(self, inputs: usize) -> Vec<usize> {
-        match self {
-            Which::Direct => (OUTPUTS..inputs).collect(),
-            Which::Past => (OUTPUTS..OUTPUTS + FEATURES).collect(),
-            Which::Future => std::iter::once(OUTPUTS).chain(OUTPUTS + FEATURES..inputs).collect(),
-            Which::Residual => (0..inputs).collect(),
-        }
-    }
-
-    const fn least_variance(self) -> f64 {
-        match self {
-            Which::Residual => LEAST_RESIDUAL,
-            _ => LEAST_DIRECT,
-        }
-    }
-
-    fn params(self, of: &CorrectorParams) -> Option<&ProcessParams> {
-        match self {
-            Which::Direct => Some(&of.direct),
-            Which::Past => of.one_sided.first(),
-            Which::Future => of.one_sided.get(1),
-            Which::Residual => Some(&of.residual),
-        }
+/// Least prior variance of a process, in variances of the strain.
+const fn least_variance(kind: ProcessKind) -> f64 {
+    match kind {
+        ProcessKind::Residual => LEAST_RESIDUAL,
+        _ => LEAST_DIRECT,
     }
 }
 
 /// Examples on the scale that their inputs have.
-struct Prepared<'a, const D: usize> {
+pub(crate) struct Prepared<'a, const D: usize> {
     examples: Examples<'a, D>,
     rows: Vec<[f64; D]>,
     scales: [InputScale<f64>; D],
@@ -106,54 +104,51 @@ struct Prepared<'a, const D: usize> {
 }
 
 impl<'a, const D: usize> Prepared<'a, D> {
-    fn new(examples: Examples<'a, D>) -> Self {
+    pub(crate) fn new(examples: Examples<'a, D>) -> Self {
         let scales: [InputScale<f64>; D] = std::array::from_fn(|i| scale(examples.inputs.iter().map(|row| row[i])));
         let strain_variance = scale(examples.strain.iter().copied()).sd.powi(2);
-        let prepared = Self { examples, rows: vec![], scales, strain_variance };
-        Self { rows: examples.inputs.iter().map(|row| prepared.on_scale(row)).collect(), ..prepared }
-    }
-
-    fn on_scale(&self, row: &[f64; D]) -> [f64; D] {
-        std::array::from_fn(|i| (row[i] - self.scales[i].mean) / self.scales[i].sd)
+        let rows = examples.inputs.iter().map(|row| standardised(&scales, row)).collect();
+        Self { examples, rows, scales, strain_variance }
     }
 
     /// What a process adds its mean to.
-    fn base(&self, which: Which, row: usize) -> f64 {
-        if which == Which::Residual { self.examples.inputs[row][0] } else { 0.0 }
+    fn base(&self, kind: ProcessKind, row: usize) -> f64 {
+        if kind == ProcessKind::Residual { self.examples.inputs[row][0] } else { 0.0 }
     }
 
-    fn least_variance(&self, which: Which) -> f64 {
-        self.strain_variance * which.least_variance()
+    fn least_variance(&self, kind: ProcessKind) -> f64 {
+        self.strain_variance * least_variance(kind)
     }
 
     /// Lets `learn` see the examples of a process.
-    fn taught<X>(&self, which: Which, learn: impl Fn(Lessons) -> Option<X>) -> Option<X> {
-        let places = which.places(D);
+    fn taught<X>(&self, kind: ProcessKind, learn: impl Fn(Lessons) -> Option<X>) -> Option<X> {
+        let places = kind.places(D);
         let seen = |row: &[f64; D]| places.iter().map(|&i| row[i]).collect();
         let inputs: Vec<Vec<f64>> = self.rows.iter().map(seen).collect();
         let inputs: Vec<&[f64]> = inputs.iter().map(Vec::as_slice).collect();
-        let target = |(row, strain): (usize, &f64)| strain - self.base(which, row);
+        let target = |(row, strain): (usize, &f64)| strain - self.base(kind, row);
         let targets: Vec<f64> = self.examples.strain.iter().enumerate().map(target).collect();
         learn(Lessons { inputs: &inputs, targets: &targets, time_s: self.examples.time_s })
     }
 
     /// Chooses a process.
-    fn chosen(&self, which: Which, by: Choosing) -> Option<ProcessParams> {
-        let settings = self.taught(which, |lessons| lessons.best_settings(by.criterion))?;
-        let blocks = deviations(&self.left_out(which, &settings)?, self.examples.strain);
+    fn chosen(&self, kind: ProcessKind, by: Choosing) -> Option<Chosen> {
+        let settings = self.taught(kind, |lessons| lessons.best_settings(by.criterion))?;
+        let chosen = Chosen { settings, sd_scale: 1.0 };
+        let blocks = deviations(&self.left_out(kind, &chosen)?, self.examples.strain);
         let blocks = if by.covers_worst { blocks } else { vec![blocks.concat()] };
-        Some(ProcessParams { sd_scale: sd_scale_up_to(&blocks, WIDEST_PROCESS), ..settings })
+        Some(Chosen { sd_scale: sd_scale_up_to(&blocks, WIDEST_PROCESS), ..chosen })
     }
 
     /// What a process says of every row from the blocks that the row is not in.
-    fn left_out(&self, which: Which, settings: &ProcessParams) -> Option<Vec<Gaussian<f64>>> {
-        self.taught(which, |lessons| {
-            let process = GaussianProcess::new(lessons, settings)?;
-            let (limits, least) = (self.examples.limits, self.least_variance(which));
+    fn left_out(&self, kind: ProcessKind, chosen: &Chosen) -> Option<Vec<Gaussian<f64>>> {
+        self.taught(kind, |lessons| {
+            let process = GaussianProcess::new(lessons, &chosen.settings)?;
+            let (limits, least) = (self.examples.limits, self.least_variance(kind));
             let said = |(k, row): (usize, LeftOutRow)| {
                 let variance = row.unknown * row.prior.max(least) + process.noise * process.variance();
-                let mean = (self.base(which, k) + row.mean).clamp(limits.lower, limits.upper);
-                Gaussian { mean, variance: variance * settings.sd_scale.powi(2) }
+                let mean = (self.base(kind, k) + row.mean).clamp(limits.lower, limits.upper);
+                Gaussian { mean, variance: variance * chosen.sd_scale.powi(2) }
             };
             Some(process.left_out(BLOCKS)?.into_iter().enumerate().map(said).collect())
         })
@@ -169,22 +164,26 @@ fn scale(values: impl Iterator<Item = f64> + Clone) -> InputScale<f64> {
     InputScale { mean, sd: if upper > lower { sd } else { f64::INFINITY }, lower, upper }
 }
 
-impl CorrectorParams {
-    /// What corrects a filter, from examples, beside what simulated rows say; none if there is nothing to learn from them.
-    pub(crate) fn of_filter(examples: Examples<FILTER_INPUTS>, simulated: &SimulatedParams) -> Option<Self> {
-        let prepared = Prepared::new(examples);
-        Self::fit::<_, 0>(&prepared, &prepared.heard(&prepared.simulated(simulated)?))
-    }
+/// What corrects a filter, from examples, beside what simulated rows say; none if there is nothing to learn from them.
+pub(crate) fn filter_corrector(
+    examples: Examples<FILTER_INPUTS>,
+    simulated: &SimulatedParams,
+) -> Option<CorrectorParams> {
+    let prepared = Prepared::new(examples);
+    Choices::fit::<_, 0>(&prepared, &prepared.heard(simulated))?.learned::<_, 0>(&prepared)
+}
 
-    /// The same of a smoother, with its one-sided processes.
-    pub(crate) fn of_smoother(examples: Examples<SMOOTHER_INPUTS>) -> Option<Self> {
-        Self::fit::<_, SIDES>(&Prepared::new(examples), &[])
-    }
+/// The same of a smoother, with its one-sided processes.
+pub(crate) fn smoother_corrector(examples: Examples<SMOOTHER_INPUTS>) -> Option<CorrectorParams> {
+    let prepared = Prepared::new(examples);
+    Choices::fit::<_, SIDES>(&prepared, &[])?.learned::<_, SIDES>(&prepared)
+}
 
+impl Choices {
     /// With S one-sided processes; `last` is what is mixed in last of every row, if anything is.
-    fn fit<const D: usize, const S: usize>(prepared: &Prepared<D>, last: &[Gaussian<f64>]) -> Option<Self> {
-        let chosen = |which: Which| prepared.chosen(which, Choosing::of_sides(S));
-        let (direct, residual) = (chosen(Which::Direct)?, chosen(Which::Residual)?);
+    pub(crate) fn fit<const D: usize, const S: usize>(prepared: &Prepared<D>, last: &[Gaussian<f64>]) -> Option<Self> {
+        let chosen = |kind: ProcessKind| prepared.chosen(kind, Choosing::of_sides(S));
+        let (direct, residual) = (chosen(ProcessKind::Direct)?, chosen(ProcessKind::Residual)?);
         let one_sided = ONE_SIDED[..S].iter().map(|side| chosen(*side)).collect::<Option<_>>()?;
         let of = Self { sd_scale: 1.0, direct, residual, one_sided };
         Some(Self { sd_scale: of.scale_of::<_, S>(prepared, last)?, ..of })
@@ -192,13 +191,68 @@ impl CorrectorParams {
 
     /// The factor on the deviation of what its processes say together.
     fn scale_of<const D: usize, const S: usize>(&self, prepared: &Prepared<D>, last: &[Gaussian<f64>]) -> Option<f64> {
-        let said = |which: Which| prepared.left_out(which, which.params(self)?);
-        let (direct, residual) = (said(Which::Direct)?, said(Which::Residual)?);
+        let said = |kind: ProcessKind| prepared.left_out(kind, self.of(kind)?);
+        let (direct, residual) = (said(ProcessKind::Direct)?, said(ProcessKind::Residual)?);
         let sides: Vec<_> = ONE_SIDED[..S].iter().map(|side| said(*side)).collect::<Option<_>>()?;
         let one_sided = |k: usize| std::array::from_fn::<_, S, _>(|side| sides[side][k]);
         let together = |k: usize| consensus(direct[k], residual[k], one_sided(k));
         let said: Vec<Gaussian<f64>> = (0..prepared.rows.len()).map(together).collect();
         Some(scale_beside(&said, last, prepared.examples.strain))
+    }
+
+    /// Conditions the processes on the examples; none if a covariance is not positive definite.
+    pub(crate) fn learned<const D: usize, const S: usize>(&self, prepared: &Prepared<D>) -> Option<CorrectorParams> {
+        let made = |kind: ProcessKind| {
+            prepared.taught(kind, |lessons| GaussianProcess::new(lessons, &self.of(kind)?.settings))
+        };
+        let (direct, residual) = (made(ProcessKind::Direct)?, made(ProcessKind::Residual)?);
+        let sides: Vec<_> = ONE_SIDED[..S].iter().map(|side| made(*side)).collect::<Option<_>>()?;
+        let kernels = sides.iter().fold(direct.kernel() + residual.kernel(), |sum, side| sum + side.kernel());
+        let inducing = inducing_rows(&kernels, INDUCING);
+        let order = inducing_first(&inducing, prepared.rows.len());
+        let params = |kind: ProcessKind, process: &GaussianProcess| {
+            let Chosen { settings, sd_scale } = self.of(kind)?;
+            let weights: Vec<f64> = process.weights().collect();
+            Some(ProcessParams {
+                sd_scale: *sd_scale,
+                mean: process.centre,
+                sd: process.variance().sqrt(),
+                least_sd: prepared.least_variance(kind).sqrt(),
+                noise_sd: (process.noise * process.variance()).sqrt(),
+                lengths: settings.lengths.clone(),
+                weights: order.iter().map(|&row| weight(weights[row])).collect(),
+                explained: process
+                    .explained(&inducing)?
+                    .into_iter()
+                    .map(|x| significant(x, EXPLAINED_DIGITS))
+                    .collect(),
+            })
+        };
+        let one_sided = ONE_SIDED.iter().zip(&sides).map(|(kind, side)| params(*kind, side));
+        Some(CorrectorParams {
+            sd_scale: self.sd_scale,
+            strain_sd: prepared.strain_variance.sqrt(),
+            inputs: input_scales(&prepared.scales),
+            direct: params(ProcessKind::Direct, &direct)?,
+            residual: params(ProcessKind::Residual, &residual)?,
+            one_sided: one_sided.collect::<Option<_>>()?,
+            order,
+        })
+    }
+}
+
+/// A weight with the digits that are kept.
+fn weight(value: f64) -> f64 {
+    significant(value, WEIGHT_DIGITS)
+}
+
+fn input_scales<const D: usize>(scales: &[InputScale<f64>; D]) -> InputScales {
+    let column = |of: fn(&InputScale<f64>) -> f64| scales.iter().map(of).collect();
+    InputScales {
+        mean: column(|scale| scale.mean),
+        sd: column(|scale| if scale.sd.is_finite() { scale.sd } else { 0.0 }),
+        lower: column(|scale| scale.lower),
+        upper: column(|scale| scale.upper),
     }
 }
 
@@ -217,62 +271,6 @@ fn deviations(said: &[Gaussian<f64>], strain: &[f64]) -> Vec<Vec<f64>> {
     let n = said.len();
     let of_row = |k: usize| (said[k].mean - strain[k]).abs() / said[k].sd();
     (0..BLOCKS).map(|block| (block * n / BLOCKS..(block + 1) * n / BLOCKS).map(of_row).collect()).collect()
-}
-
-/// [`learned`] for the filter, beside what simulated rows say.
-pub(crate) fn learned_with_simulated(
-    params: &CorrectorParams,
-    examples: Examples<FILTER_INPUTS>,
-    simulated: &SimulatedParams,
-) -> Option<OwnedCorrection<f64, FILTER_INPUTS>> {
-    let simulated = Prepared::new(examples).simulated(simulated)?;
-    Some(OwnedCorrection { simulated: Some(simulated), ..learned(params, examples)? })
-}
-
-/// Makes weights of examples; none if the covariances are not positive definite.
-pub(crate) fn learned<const D: usize, const S: usize>(
-    params: &CorrectorParams,
-    examples: Examples<D>,
-) -> Option<OwnedCorrection<f64, D, S>> {
-    let prepared = Prepared::new(examples);
-    let made = |which: Which| prepared.taught(which, |lessons| GaussianProcess::new(lessons, which.params(params)?));
-    let (direct, residual) = (made(Which::Direct)?, made(Which::Residual)?);
-    let sides: Vec<_> = ONE_SIDED[..S].iter().map(|side| made(*side)).collect::<Option<_>>()?;
-    let kernels = sides.iter().fold(direct.kernel() + residual.kernel(), |sum, side| sum + side.kernel());
-    let inducing = inducing_rows(&kernels, INDUCING);
-    let order = inducing_first(&inducing, prepared.rows.len());
-    let owned = |which: Which, process: &GaussianProcess| {
-        let settings = which.params(params)?;
-        let weights: Vec<f64> = process.weights().collect();
-        let mut of_inputs = [0.0; D];
-        for (place, length) in which.places(D).into_iter().zip(&settings.lengths) {
-            of_inputs[place] = relevance(*length);
-        }
-        let numbers = Process {
-            relevance: of_inputs,
-            mean: process.centre,
-            weights: &[],
-            explained: Triangle::NONE,
-            variance: process.variance(),
-            noise: process.noise * process.variance(),
-            widening: settings.sd_scale.powi(2),
-            least_variance: prepared.least_variance(which),
-        };
-        let weights = order.iter().map(|&row| weights[row]).collect();
-        Some(OwnedProcess { weights, explained: process.explained(&inducing)?, numbers })
-    };
-    let one_sided = ONE_SIDED.iter().zip(&sides).map(|(which, side)| owned(*which, side));
-    Some(OwnedCorrection {
-        rows: order.iter().map(|&row| prepared.rows[row]).collect(),
-        scales: prepared.scales,
-        direct: owned(Which::Direct, &direct)?,
-        one_sided: one_sided.collect::<Option<Vec<_>>>()?.try_into().ok()?,
-        residual: owned(Which::Residual, &residual)?,
-        simulated: None,
-        limits: examples.limits.to_model(),
-        strain_variance: prepared.strain_variance,
-        variance_factor: params.sd_scale.powi(2),
-    })
 }
 
 /// All rows, these first.

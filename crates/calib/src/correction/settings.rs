@@ -3,8 +3,9 @@
 use nalgebra::DMatrix;
 
 use super::criterion::Criterion;
-use super::gaussian_process::{GaussianProcess, Lessons, relevance, symmetric};
-use crate::params::correction::ProcessParams;
+use ohmstrain_sensor::correction::relevance;
+
+use super::gaussian_process::{GaussianProcess, Lessons, Settings, symmetric};
 
 /// Length scales, of all inputs alike, noises and correlation times tried: coarse, since a few hundred rows whose errors hang
 /// together tell no more.
@@ -23,21 +24,21 @@ const MOST_STRETCH: f64 = 8.0;
 impl Lessons<'_> {
     /// The settings that are best by a criterion times the prior of the length scales; none if no covariance is positive
     /// definite.
-    pub(crate) fn best_settings(self, criterion: Criterion) -> Option<ProcessParams> {
+    pub(crate) fn best_settings(self, criterion: Criterion) -> Option<Settings> {
         self.alike(criterion).map(|(cost, params)| self.with_relevance(criterion, cost, params))
     }
 
     /// With one length scale of all inputs.
-    fn alike(self, criterion: Criterion) -> Option<(f64, ProcessParams)> {
+    fn alike(self, criterion: Criterion) -> Option<(f64, Settings)> {
         let inputs = self.inputs.first()?.len();
         let squares = self.half_squares(&vec![1.0; inputs]);
-        let mut best: Option<(f64, ProcessParams)> = None;
+        let mut best: Option<(f64, Settings)> = None;
         for length in LENGTHS {
             let sums = &squares / (length * length);
             for noise in NOISES {
                 for noise_time_s in NOISE_TIMES_S {
                     let lengths = vec![length; inputs];
-                    let params = ProcessParams { lengths, noise, noise_time_s, sd_scale: 1.0 };
+                    let params = Settings { lengths, noise, noise_time_s };
                     let Some(cost) = self.cost(criterion, &sums, &params) else { continue };
                     if best.as_ref().is_none_or(|(least, _)| cost < *least) {
                         best = Some((cost, params));
@@ -50,7 +51,7 @@ impl Lessons<'_> {
 
     /// Automatic relevance determination (Neal, *Bayesian Learning for Neural Networks*, 1996): inputs that tell little get long
     /// length scales. Coordinates in turn, since a step of one is all that a few hundred rows can tell.
-    fn with_relevance(self, criterion: Criterion, cost: f64, params: ProcessParams) -> ProcessParams {
+    fn with_relevance(self, criterion: Criterion, cost: f64, params: Settings) -> Settings {
         let inputs = params.lengths.len();
         let mut search =
             RelevanceSearch { lessons: self, criterion, sums: self.half_squares(&params.lengths), params, cost };
@@ -62,7 +63,7 @@ impl Lessons<'_> {
         search.params
     }
 
-    fn cost(self, criterion: Criterion, sums: &DMatrix<f64>, params: &ProcessParams) -> Option<f64> {
+    fn cost(self, criterion: Criterion, sums: &DMatrix<f64>, params: &Settings) -> Option<f64> {
         criterion.cost(&GaussianProcess::with_sums(self, sums, params)?)
     }
 
@@ -78,7 +79,7 @@ impl Lessons<'_> {
 struct RelevanceSearch<'a> {
     lessons: Lessons<'a>,
     criterion: Criterion,
-    params: ProcessParams,
+    params: Settings,
     /// `Σ (xᵢ - xᵢ')²/2ℓᵢ²` for all pairs of rows.
     sums: DMatrix<f64>,
     /// Negative logarithm of criterion and prior.

@@ -3,14 +3,13 @@
 
 use nalgebra::{DMatrix, DVector};
 use ohmstrain_ekf::Gaussian;
-use ohmstrain_ekf::correction::{FEATURES, FILTER_INPUTS, OUTPUTS, Process, Triangle, filter_inputs, kernel};
+use ohmstrain_ekf::correction::{FEATURES, FILTER_INPUTS, OUTPUTS, filter_inputs, kernel};
+use ohmstrain_sensor::correction::{relevance, standardised};
+use ohmstrain_sensor::{RangeParams, SimulatedParams, TrainingRow};
+use serde::Deserialize;
 
-use super::gaussian_process::relevance;
-use super::owned::{OwnedProcess, OwnedSimulated, OwnedTriangle};
-use super::{BLOCKS, Prepared, scale};
-use crate::order::extent;
-use crate::params::RangeParams;
-use crate::params::correction::{SimulatedParams, SimulatedRow, TrainingRow, digits};
+use super::{BLOCKS, Prepared, scale, weight};
+use crate::digits::digits;
 
 /// Rows that stand for all others. Two hundred say no more.
 const ROWS: usize = 64;
@@ -22,7 +21,27 @@ const JITTER: f64 = 1e-4;
 const TURNS: usize = 4;
 const FIRST_NOISE: f64 = 0.1;
 
-impl SimulatedParams {
+/// A row of a simulated motion.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct SimulatedRow {
+    /// Features of the readings up to this row.
+    pub past: [f64; FEATURES],
+    /// The strain, or what is said of it.
+    pub strain: f64,
+}
+
+/// A few rows that stand for all.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Distilled {
+    /// Standard deviation of the strain that they leave.
+    pub sd: f64,
+    /// The rows.
+    pub rows: Vec<SimulatedRow>,
+}
+
+impl Distilled {
     /// Learns from simulated rows; `real` are those whose inputs' scales count. None if equations are singular.
     pub(crate) fn fit(simulated: &[SimulatedRow], real: &[TrainingRow], limits: RangeParams) -> Option<Self> {
         let scales: [_; FEATURES] = std::array::from_fn(|i| scale(real.iter().map(|row| row.past[i])));
@@ -80,48 +99,38 @@ fn kernels(a: &[&[f64]], b: &[&[f64]]) -> DMatrix<f64> {
 impl Prepared<'_, FILTER_INPUTS> {
     /// The process of simulated rows. What it says errs as it did in simulation, where the law is right, and, since it is not, as
     /// it does in the worst block of the calibration's own rows.
-    pub(super) fn simulated(&self, of: &SimulatedParams) -> Option<OwnedSimulated<f64, FILTER_INPUTS>> {
-        let inputs: Vec<_> = of.rows.iter().map(|row| filter_inputs(&[0.0; OUTPUTS], &row.past)).collect();
-        let rows: Vec<_> = inputs.iter().map(|row| self.on_scale(row)).collect();
-        let own = features(&rows);
+    pub(crate) fn simulated(&self, of: &Distilled) -> Option<SimulatedParams> {
+        let rows: Vec<[f64; FEATURES]> = of.rows.iter().map(|row| row.past).collect();
+        let standardised = self.simulated_rows(&rows);
+        let own = features(&standardised);
         let strain: Vec<f64> = of.rows.iter().map(|row| row.strain).collect();
-        let centre = centre(self.examples.limits);
+        let mean = centre(self.examples.limits);
         let regular = kernels(&own, &own) + DMatrix::identity(own.len(), own.len()) * JITTER;
-        let weights: Vec<f64> = regular.cholesky()?.solve(&from_centre(&strain, centre)).iter().copied().collect();
+        let weights = regular.cholesky()?.solve(&from_centre(&strain, mean));
+        let weights: Vec<f64> = weights.iter().map(|x| weight(*x)).collect();
         let said = self.said(&rows, &weights);
         let squares: Vec<f64> = said.zip(self.examples.strain).map(|(said, strain)| (said - strain).powi(2)).collect();
         let blocks = squares.chunks(squares.len().div_ceil(BLOCKS));
         let worst = blocks.map(|block| block.iter().sum::<f64>() / block.len() as f64).fold(0.0, f64::max);
-        let mut scales = self.scales;
-        for (i, scale) in scales.iter_mut().enumerate().skip(OUTPUTS) {
-            let (lower, upper) = extent(inputs.iter().map(|row| row[i]));
-            (scale.lower, scale.upper) = (scale.lower.min(lower), scale.upper.max(upper));
-        }
-        let numbers = Process {
-            relevance: std::array::from_fn(|i| if i < OUTPUTS { 0.0 } else { relevance(LENGTH) }),
-            mean: centre,
-            weights: &[],
-            explained: Triangle::NONE,
-            variance: 0.0,
-            noise: of.sd.powi(2) + worst,
-            widening: 1.0,
-            least_variance: 0.0,
-        };
-        let process = OwnedProcess { weights, explained: OwnedTriangle::default(), numbers };
-        Some(OwnedSimulated { rows: rows.into_iter().collect(), scales, process })
+        Some(SimulatedParams { mean, sd: (of.sd.powi(2) + worst).sqrt(), length: LENGTH, weights, rows })
     }
 
     /// What the simulated rows say of each of the calibration's.
-    pub(super) fn heard(&self, of: &OwnedSimulated<f64, FILTER_INPUTS>) -> Vec<Gaussian<f64>> {
-        let variance = of.process.numbers.noise;
-        self.said(&of.rows, &of.process.weights).map(|mean| Gaussian { mean, variance }).collect()
+    pub(super) fn heard(&self, of: &SimulatedParams) -> Vec<Gaussian<f64>> {
+        let variance = of.sd.powi(2);
+        self.said(&of.rows, &of.weights).map(|mean| Gaussian { mean, variance }).collect()
     }
 
-    fn said(&self, rows: &[[f64; FILTER_INPUTS]], weights: &[f64]) -> impl Iterator<Item = f64> {
+    fn said(&self, rows: &[[f64; FEATURES]], weights: &[f64]) -> impl Iterator<Item = f64> {
         let limits = self.examples.limits;
-        let said = kernels(&features(&self.rows), &features(rows)) * DVector::from_column_slice(weights);
+        let rows = self.simulated_rows(rows);
+        let said = kernels(&features(&self.rows), &features(&rows)) * DVector::from_column_slice(weights);
         let centre = centre(limits);
         (0..self.rows.len()).map(move |k| (centre + said[k]).clamp(limits.lower, limits.upper))
+    }
+
+    fn simulated_rows(&self, rows: &[[f64; FEATURES]]) -> Vec<[f64; FILTER_INPUTS]> {
+        rows.iter().map(|past| standardised(&self.scales, &filter_inputs(&[0.0; OUTPUTS], past))).collect()
     }
 }
 
@@ -133,8 +142,8 @@ fn features(rows: &[[f64; FILTER_INPUTS]]) -> Vec<&[f64]> {
 mod tests {
     use super::*;
     use crate::correction::Examples;
-    use crate::params::correction::FUTURE_FEATURES;
     use ohmstrain_ekf::correction::InputScale;
+    use ohmstrain_sensor::FUTURE_FEATURES;
 
     /// Strain is a smooth function of two features; the others are noise.
     fn rows(count: usize, seed: usize) -> (Vec<[f64; D]>, Vec<f64>) {
@@ -171,29 +180,29 @@ mod tests {
                 smoothed: [0.0; OUTPUTS],
             };
             let training: Vec<TrainingRow> = real.iter().map(as_training).collect();
-            let params = SimulatedParams::fit(&simulated, &training, LIMITS).unwrap();
-            let (of, sd) = (prepared.simulated(&params).unwrap(), params.sd);
-            (of, sd, prepared.scales)
+            let distilled = Distilled::fit(&simulated, &training, LIMITS).unwrap();
+            let of = prepared.simulated(&distilled).unwrap();
+            (of, distilled.sd, prepared.scales)
         };
         let (of, sd, scales): (_, _, [InputScale<f64>; D]) = said_of(&known);
         // Of a strain whose deviation is 0.5: sixty-four rows in seven dimensions, most of which tell nothing.
         assert!(sd < 0.05, "{sd}");
         let (others, strain) = rows(500, 900_000);
-        let numbers = &of.process.numbers;
         let on_scale = |row: &[f64; D], i: usize| (row[i] - scales[i].mean) / scales[i].sd;
         let error = |(row, strain): (&[f64; D], &f64)| {
-            let kernel = |other: &[f64; D]| {
-                let square: f64 = (6..D).map(|i| (on_scale(row, i) - other[i]).powi(2)).sum();
-                (-square / 32.0).exp() + 0.09 * (1.0 + on_scale(row, 6) * other[6])
+            let kernel = |other: &[f64; FEATURES]| {
+                let square: f64 = (6..D).map(|i| ((row[i] - other[i - 6]) / scales[i].sd).powi(2)).sum();
+                let other = (other[0] - scales[6].mean) / scales[6].sd;
+                (-square / 32.0).exp() + 0.09 * (1.0 + on_scale(row, 6) * other)
             };
-            let weighted = of.rows.iter().zip(&of.process.weights).map(|(other, weight)| weight * kernel(other));
-            (numbers.mean + weighted.sum::<f64>() - strain).powi(2)
+            let weighted = of.rows.iter().zip(&of.weights).map(|(other, weight)| weight * kernel(other));
+            (of.mean + weighted.sum::<f64>() - strain).powi(2)
         };
         let left = (others.iter().zip(&strain).map(error).sum::<f64>() / 500.0).sqrt();
-        assert!(left < 1.5 * numbers.noise.sqrt() && numbers.noise.sqrt() < 0.1, "{left} {}", numbers.noise.sqrt());
+        assert!(left < 1.5 * of.sd && of.sd < 0.1, "{left} {}", of.sd);
         let off: Vec<f64> = known.iter().enumerate().map(|(k, x)| if k < 20 { x + 0.5 } else { *x }).collect();
         let (of, sd, _) = said_of(&off);
         // Errors of 0.015 in twenty rows: 0.003 is one deviation of the cross term.
-        assert!((of.process.numbers.noise - sd * sd - 0.25).abs() < 0.01, "{}", of.process.numbers.noise);
+        assert!((of.sd * of.sd - sd * sd - 0.25).abs() < 0.01, "{}", of.sd);
     }
 }

@@ -2,11 +2,10 @@ use nalgebra::{DMatrix, DVector};
 use ohmstrain_ekf::Gaussian;
 
 use super::criterion::Criterion;
-use super::owned::OwnedCorrection;
-use super::{Choosing, Examples, Prepared, Which, learned};
-use crate::correction::gaussian_process::{GaussianProcess, Lessons};
-use crate::params::RangeParams;
-use crate::params::correction::{CorrectorParams, ProcessParams};
+use super::{Choices, Choosing, Chosen, Examples, Prepared};
+use crate::correction::gaussian_process::{GaussianProcess, Lessons, Settings};
+use ohmstrain_sensor::RangeParams;
+use ohmstrain_sensor::correction::{OwnedCorrection, ProcessKind};
 
 const D: usize = 8;
 const LIMITS: RangeParams = RangeParams { lower: -10.0, upper: 10.0 };
@@ -43,7 +42,7 @@ fn standardised(rows: &[Vec<f64>], row: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-fn textbook(rows: &[Vec<f64>], targets: &[f64], time_s: &[f64], settings: &ProcessParams, at: &[f64]) -> Textbook {
+fn textbook(rows: &[Vec<f64>], targets: &[f64], time_s: &[f64], settings: &Settings, at: &[f64]) -> Textbook {
     let n = rows.len();
     let x: Vec<Vec<f64>> = rows.iter().map(|row| standardised(rows, row)).collect();
     let at = standardised(rows, at);
@@ -71,6 +70,12 @@ fn textbook(rows: &[Vec<f64>], targets: &[f64], time_s: &[f64], settings: &Proce
     }
 }
 
+/// What the processes learn from examples, as it runs.
+fn learned<const D: usize, const S: usize>(choices: &Choices, examples: Examples<D>) -> OwnedCorrection<f64, D, S> {
+    let params = choices.learned::<D, S>(&Prepared::new(examples)).unwrap();
+    OwnedCorrection::new(&params, examples.inputs, examples.limits)
+}
+
 /// Around one length, no two alike.
 fn lengths(around: f64, inputs: usize) -> Vec<f64> {
     (0..inputs).map(|i| around * (1.0 + 0.3 * (i as f64).sin())).collect()
@@ -81,11 +86,15 @@ fn a_correction_says_what_the_textbook_says() {
     // As many rows as may be inducing: nothing is left out of the variance.
     let (inputs, strain, time_s) = examples(40, 1.7);
     let examples = Examples { inputs: &inputs, strain: &strain, time_s: &time_s, limits: LIMITS };
-    let direct = ProcessParams { lengths: vec![2.0, 3.0], noise: 0.1, noise_time_s: 2.0, sd_scale: 1.5 };
-    let residual = ProcessParams { lengths: lengths(4.0, D), noise: 0.3, noise_time_s: 10.0, sd_scale: 1.0 };
-    let params =
-        CorrectorParams { sd_scale: 0.8, direct: direct.clone(), residual: residual.clone(), one_sided: Vec::new() };
-    let correction: OwnedCorrection<f64, D> = learned(&params, examples).unwrap();
+    let direct = Settings { lengths: vec![2.0, 3.0], noise: 0.1, noise_time_s: 2.0 };
+    let residual = Settings { lengths: lengths(4.0, D), noise: 0.3, noise_time_s: 10.0 };
+    let choices = Choices {
+        sd_scale: 0.8,
+        direct: Chosen { settings: direct.clone(), sd_scale: 1.5 },
+        residual: Chosen { settings: residual.clone(), sd_scale: 1.0 },
+        one_sided: Vec::new(),
+    };
+    let correction: OwnedCorrection<f64, D> = learned(&choices, examples);
     let all: Vec<Vec<f64>> = inputs.iter().map(|row| row.to_vec()).collect();
     let features: Vec<Vec<f64>> = inputs.iter().map(|row| row[6..].to_vec()).collect();
     let residuals: Vec<f64> = inputs.iter().zip(&strain).map(|(row, strain)| strain - row[0]).collect();
@@ -118,10 +127,11 @@ fn one_sided_processes_see_their_side_alone() {
     let examples = Examples { inputs: &inputs, strain: &strain, time_s: &time_s, limits: LIMITS };
     let [direct, residual, past, future] =
         [(4.0, 10, 0.1), (4.0, BOTH, 0.3), (2.0, 7, 0.1), (8.0, 4, 0.03)].map(|(length, inputs, noise)| {
-            ProcessParams { lengths: lengths(length, inputs), noise, noise_time_s: 2.0, sd_scale: 1.0 }
+            let settings = Settings { lengths: lengths(length, inputs), noise, noise_time_s: 2.0 };
+            Chosen { settings, sd_scale: 1.0 }
         });
-    let params = CorrectorParams { sd_scale: 1.0, direct, residual, one_sided: vec![past.clone(), future.clone()] };
-    let correction: OwnedCorrection<f64, BOTH, 2> = learned(&params, examples).unwrap();
+    let choices = Choices { sd_scale: 1.0, direct, residual, one_sided: vec![past.clone(), future.clone()] };
+    let correction: OwnedCorrection<f64, BOTH, 2> = learned(&choices, examples);
     // Six outputs, the reading, six features of the past, three of the future.
     let of_past = |row: &[f64; BOTH]| row[6..13].to_vec();
     let of_future = |row: &[f64; BOTH]| [&row[6..7], &row[13..]].concat();
@@ -131,8 +141,8 @@ fn one_sided_processes_see_their_side_alone() {
         let input: [f64; BOTH] = std::array::from_fn(|i| 0.5 * (inputs[k][i] + inputs[k + 1][i]));
         let said = correction.correction().correct(&input, Gaussian { mean: input[0], variance: 0.0 }, 1.0);
         let books = [
-            textbook(&pasts, &strain, &time_s, &past, &of_past(&input)),
-            textbook(&futures, &strain, &time_s, &future, &of_future(&input)),
+            textbook(&pasts, &strain, &time_s, &past.settings, &of_past(&input)),
+            textbook(&futures, &strain, &time_s, &future.settings, &of_future(&input)),
         ];
         for (said, book) in said.one_sided.iter().zip(books) {
             assert!((said.mean - book.mean).abs() < 1e-6, "{k}: {} {}", said.mean, book.mean);
@@ -145,11 +155,12 @@ fn one_sided_processes_see_their_side_alone() {
 fn inducing_rows_cost_no_certainty_that_is_not_there() {
     let (inputs, strain, time_s) = examples(200, 1.7);
     let examples = Examples { inputs: &inputs, strain: &strain, time_s: &time_s, limits: LIMITS };
-    let settings =
-        |inputs: usize| ProcessParams { lengths: vec![4.0; inputs], noise: 0.1, noise_time_s: 2.0, sd_scale: 1.0 };
+    let settings = |inputs: usize| Settings { lengths: vec![4.0; inputs], noise: 0.1, noise_time_s: 2.0 };
     let (direct, settings) = (settings(D - 6), settings(D));
-    let params = CorrectorParams { sd_scale: 1.0, direct, residual: settings.clone(), one_sided: Vec::new() };
-    let correction: OwnedCorrection<f64, D> = learned(&params, examples).unwrap();
+    let chosen = |settings: &Settings| Chosen { settings: settings.clone(), sd_scale: 1.0 };
+    let choices =
+        Choices { sd_scale: 1.0, direct: chosen(&direct), residual: chosen(&settings), one_sided: Vec::new() };
+    let correction: OwnedCorrection<f64, D> = learned(&choices, examples);
     let all: Vec<Vec<f64>> = inputs.iter().map(|row| row.to_vec()).collect();
     let residuals: Vec<f64> = inputs.iter().zip(&strain).map(|(row, strain)| strain - row[0]).collect();
     for k in (0..199).step_by(7) {
@@ -165,8 +176,7 @@ fn inducing_rows_cost_no_certainty_that_is_not_there() {
 /// the shortest length scale, and rows that were not learned from are explained better than with any one length scale of all.
 #[test]
 fn inputs_that_tell_nothing_get_long_length_scales() {
-    const SETTINGS: ProcessParams =
-        ProcessParams { lengths: Vec::new(), noise: 0.03, noise_time_s: 2.0, sd_scale: 1.0 };
+    const SETTINGS: Settings = Settings { lengths: Vec::new(), noise: 0.03, noise_time_s: 2.0 };
     let number = |seed: usize| ((seed as f64 * 12.9898).sin() * 43758.5453).rem_euclid(1.0);
     let all: Vec<Vec<f64>> = (0..160).map(|k| (0..D).map(|i| number(17 * k + i + 1)).collect()).collect();
     let rows: Vec<Vec<f64>> = all.iter().map(|row| standardised(&all, row)).collect();
@@ -176,11 +186,11 @@ fn inputs_that_tell_nothing_get_long_length_scales() {
     let inputs: Vec<&[f64]> = rows[learned.clone()].iter().map(Vec::as_slice).collect();
     let (targets, times) = (&target[learned.clone()], &time_s[learned.clone()]);
     let lessons = Lessons { inputs: &inputs, targets, time_s: times };
-    let error = |settings: ProcessParams| -> f64 {
+    let error = |settings: Settings| -> f64 {
         let of = |k: usize| textbook(&rows[learned.clone()], targets, times, &settings, &rows[k]).mean - target[k];
         others.clone().map(|k| of(k).powi(2)).sum()
     };
-    let alike = |length: f64| error(ProcessParams { lengths: vec![length; D], ..SETTINGS });
+    let alike = |length: f64| error(Settings { lengths: vec![length; D], ..SETTINGS });
     let best_alike = [1.0, 2.0, 4.0, 8.0].map(alike).into_iter().fold(f64::INFINITY, f64::min);
     for criterion in [Criterion::LeftOutAndEvidence, Criterion::LeftOut] {
         let found = lessons.best_settings(criterion).unwrap();
@@ -196,7 +206,7 @@ fn inputs_that_tell_nothing_get_long_length_scales() {
 fn blocks_left_out_are_predicted_from_the_others() {
     let (inputs, strain, time_s) = examples::<D>(50, 1.7);
     let rows: Vec<&[f64]> = inputs.iter().map(|row| row.as_slice()).collect();
-    let settings = ProcessParams { lengths: vec![4.0; D], noise: 0.1, noise_time_s: 2.0, sd_scale: 1.0 };
+    let settings = Settings { lengths: vec![4.0; D], noise: 0.1, noise_time_s: 2.0 };
     let process =
         GaussianProcess::new(Lessons { inputs: &rows, targets: &strain, time_s: &time_s }, &settings).unwrap();
     let left_out = process.left_out(5).unwrap();
@@ -253,7 +263,7 @@ fn settings_are_judged_by_evidence_and_by_what_was_left_out() {
     let mean = strain.iter().sum::<f64>() / ROWS as f64;
     let sd = (strain.iter().map(|y| (y - mean).powi(2)).sum::<f64>() / ROWS as f64).sqrt();
     let y = DVector::from_iterator(ROWS, strain.iter().map(|y| (y - mean) / sd));
-    let naive = |settings: &ProcessParams| -> [f64; 2] {
+    let naive = |settings: &Settings| -> [f64; 2] {
         let covariance = DMatrix::from_fn(ROWS, ROWS, |i, j| {
             let square: f64 = (0..D).map(|k| ((inputs[i][k] - inputs[j][k]) / settings.lengths[k]).powi(2)).sum();
             let correlated = (-(time_s[i] - time_s[j]).abs() / settings.noise_time_s).exp();
@@ -284,15 +294,14 @@ fn settings_are_judged_by_evidence_and_by_what_was_left_out() {
         let left_out = least(rows);
         [(evidence + least(blocks) + left_out) / 3.0, left_out]
     };
-    let settings = [(4.0, 0.1, 2.0), (3.0, 0.3, 10.0)].map(|(around, noise, noise_time_s)| ProcessParams {
+    let settings = [(4.0, 0.1, 2.0), (3.0, 0.3, 10.0)].map(|(around, noise, noise_time_s)| Settings {
         lengths: lengths(around, D),
         noise,
         noise_time_s,
-        sd_scale: 1.0,
     });
     let expected = settings.each_ref().map(naive);
     for (place, criterion) in [Criterion::LeftOutAndEvidence, Criterion::LeftOut].into_iter().enumerate() {
-        let cost = |of: &ProcessParams| criterion.cost(&GaussianProcess::new(lessons, of).unwrap()).unwrap();
+        let cost = |of: &Settings| criterion.cost(&GaussianProcess::new(lessons, of).unwrap()).unwrap();
         let differ = cost(&settings[0]) - cost(&settings[1]);
         // Matrices of condition 1e5, and a minimum that is found where a function is flat to the last digit.
         assert!(
@@ -312,8 +321,8 @@ fn a_factor_covers_the_worst_block_or_all_together() {
     let prepared = Prepared::new(Examples { inputs: &inputs, strain: &strain, time_s: &time_s, limits: LIMITS });
     let covered = |covers_worst: bool| {
         let by = Choosing { criterion: Criterion::LeftOut, covers_worst };
-        let params = prepared.chosen(Which::Residual, by).unwrap();
-        let said = prepared.left_out(Which::Residual, &params).unwrap();
+        let params = prepared.chosen(ProcessKind::Residual, by).unwrap();
+        let said = prepared.left_out(ProcessKind::Residual, &params).unwrap();
         // Neither of the factor's limits.
         assert!(params.sd_scale > 1.01 && params.sd_scale < 2.99, "{}", params.sd_scale);
         let is_covered = |k: &usize| (said[*k].mean - strain[*k]).abs() <= 1.959964 * said[*k].sd();
@@ -335,8 +344,8 @@ fn learning_helps_near_and_leaves_far_alone() {
     let seen: Vec<[f64; D]> = (0..160).filter(even).map(|k| inputs[k]).collect();
     let (known, times) = (pick(&strain), pick(&time_s));
     let examples = Examples { inputs: &seen, strain: &known, time_s: &times, limits: LIMITS };
-    let params = CorrectorParams::fit::<D, 0>(&Prepared::new(examples), &[]).unwrap();
-    let correction: OwnedCorrection<f64, D> = learned(&params, examples).unwrap();
+    let choices = Choices::fit::<D, 0>(&Prepared::new(examples), &[]).unwrap();
+    let correction: OwnedCorrection<f64, D> = learned(&choices, examples);
     let (mut before, mut after, mut covered) = (0.0, 0.0, 0);
     for k in (1..160).step_by(2) {
         let filtered = Gaussian { mean: inputs[k][0], variance: 0.01 };

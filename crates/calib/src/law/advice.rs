@@ -5,7 +5,7 @@ use nalgebra::{Cholesky, DMatrix};
 
 use crate::likelihood::Bound;
 use crate::motion_stats::MotionStats;
-use crate::params::{RangeParams, Uncertainty};
+use ohmstrain_sensor::{RangeParams, Uncertainty};
 
 /// A time constant with a larger standard error than this, relative to itself, is not identified: a 95 % interval from
 /// half to twice the value is about 0.35.

@@ -4,10 +4,11 @@ use rand_chacha::rand_core::{Rng, SeedableRng};
 use crate::CalibrationError;
 use crate::law::least_squares::{settle, without_ridge};
 use crate::law::regression::LawRegression;
+use crate::law::robust_loss::robust;
 use crate::law::uncertainty::Linearised;
 use crate::order::sorted;
-use crate::params::law::LawParams;
 use crate::samples::Samples;
+use ohmstrain_sensor::LawParams;
 
 /// Percentile intervals of a law's parameters from recordings whose blocks were drawn anew.
 #[derive(Clone, Debug, PartialEq)]
@@ -41,7 +42,7 @@ pub fn bootstrap_law(
     replicates: usize,
     seed: u64,
 ) -> Result<Bootstrap, CalibrationError> {
-    let mut regression = LawRegression::new(recordings)?;
+    let mut regression = robust(LawRegression::new(recordings)?);
     let structure = without_ridge(law, &regression)?;
     let (names, values): (Vec<String>, Vec<f64>) =
         Linearised::new(&structure, &regression)?.named().into_iter().unzip();

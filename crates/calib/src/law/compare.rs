@@ -1,6 +1,7 @@
 use crate::CalibrationError;
 use crate::law::fit::{LawOptions, fit_structure};
 use crate::law::regression::LawRegression;
+use crate::law::robust_loss::robust;
 use crate::law::structure::GaugeFamily;
 use crate::law::structure::LawStructure;
 use crate::samples::Samples;
@@ -35,7 +36,7 @@ const MOST_BRANCHES: usize = 3;
 /// # Errors
 /// If the recordings are too short, the strain is constant or no structure fits.
 pub fn compare_structures(recordings: &[Samples]) -> Result<Vec<StructureScore>, CalibrationError> {
-    let regression = LawRegression::new(recordings)?;
+    let regression = robust(LawRegression::new(recordings)?);
     let mut fitted = Vec::new();
     for gauge in GaugeFamily::ALL {
         for branches in 0..=MOST_BRANCHES {

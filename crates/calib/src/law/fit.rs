@@ -2,11 +2,11 @@ use crate::CalibrationError;
 use crate::law::blocked_normal::BlockedNormal;
 use crate::law::design::BRANCH_COLUMNS;
 use crate::law::regression::{LawRegression, VALIDATION_BLOCKS};
+use crate::law::robust_loss::robust;
 use crate::law::structure::{GaugeFamily, LawFit, LawStructure};
 use crate::optimise;
-use crate::params::estimator::EstimatorKind;
-use crate::params::law::MOST_BRANCHES;
 use crate::samples::Samples;
+use ohmstrain_sensor::{EstimatorKind, MOST_BRANCHES};
 
 /// What the fit of the law may choose from.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -104,9 +104,9 @@ pub(crate) fn fit_laws(recordings: &[Samples], structures: &[LawOptions]) -> Res
 /// The best law for each ridge, strongest ridge first; at least one.
 fn fit_ridges(recordings: &[Samples], options: LawOptions) -> Result<Vec<CrossFit>, CalibrationError> {
     if options.branches > MOST_BRANCHES {
-        return Err(CalibrationError::branches(options.branches));
+        return Err(ohmstrain_sensor::SensorError::Branches { found: options.branches }.into());
     }
-    let regression = LawRegression::new(recordings)?;
+    let regression = robust(LawRegression::new(recordings)?);
     let grid = TauGrid::new(&regression, options.branches);
     let fits = LAW_RIDGES.map(|ridge| cross_fit(&regression, &grid, options.gauge, ridge));
     if fits.iter().all(Result::is_err) {

@@ -6,12 +6,12 @@ use crate::CalibrationError;
 use crate::law::advice::{OnBound, advice, scaled_normal};
 use crate::law::least_squares::without_ridge;
 use crate::law::regression::LawRegression;
+use crate::law::robust_loss::robust;
 use crate::law::uncertainty::Linearised;
 use crate::likelihood::Bound;
 use crate::motion_stats::MotionStats;
-use crate::params::Uncertainty;
-use crate::params::law::LawParams;
 use crate::samples::Samples;
+use ohmstrain_sensor::{LawParams, Uncertainty};
 
 /// What recordings say about the parameters of a law, and what to record so that they say more.
 #[derive(Clone, Debug, PartialEq)]
@@ -41,7 +41,7 @@ const STRONGEST: usize = 5;
 /// # Errors
 /// If the recordings are too short, the strain is constant or the equations are singular.
 pub fn identifiability(recordings: &[Samples], law: &LawParams) -> Result<Identifiability, CalibrationError> {
-    let regression = LawRegression::new(recordings)?;
+    let regression = robust(LawRegression::new(recordings)?);
     let structure = without_ridge(law, &regression)?;
     let fit = Linearised::new(&structure, &regression)?;
     let parameters = fit.jackknifed()?;

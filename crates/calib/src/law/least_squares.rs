@@ -4,7 +4,7 @@ use crate::CalibrationError;
 use crate::law::regression::LawRegression;
 use crate::law::structure::LawStructure;
 use crate::law::uncertainty::Linearised;
-use crate::params::law::LawParams;
+use ohmstrain_sensor::LawParams;
 
 /// Keeps columns that cannot be told apart from making the equations singular, and does nothing else: a parameter with a
 /// standard error below a thousandth of the response's spread moves by less than a thousandth of it.

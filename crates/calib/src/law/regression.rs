@@ -6,11 +6,10 @@ use crate::CalibrationError;
 use crate::enough::check;
 use crate::law::blocked_normal::BlockedNormal;
 use crate::law::design::{Regressors, StrainScale};
-use crate::law::robust_loss;
 use crate::motion_stats::MotionStats;
 use crate::order::median;
-use crate::params::RangeParams;
 use crate::samples::Samples;
+use ohmstrain_sensor::RangeParams;
 
 /// Contiguous blocks of each recording that are left out in turn.
 pub(crate) const VALIDATION_BLOCKS: usize = 4;
@@ -60,6 +59,7 @@ pub(crate) struct Solution {
 }
 
 impl LawRegression {
+    /// Rows of equal weight: see [`robust`](crate::law::robust_loss::robust).
     pub(crate) fn new(samples: &[Samples]) -> Result<Self, CalibrationError> {
         let (lower, upper) = check(samples)?;
         let scale = StrainScale { centre: 0.5 * (lower + upper), span: upper - lower };
@@ -97,9 +97,7 @@ impl LawRegression {
             start += rows;
         }
         let tau_bounds = tau_bounds(samples);
-        let mut regression = Self { recordings, blocks, scale, range, tau_bounds };
-        robust_loss::weigh(&mut regression);
-        regression
+        Self { recordings, blocks, scale, range, tau_bounds }
     }
 
     /// Sets the weights of the complete rows, in their order.

@@ -35,19 +35,20 @@ fn residuals(regression: &LawRegression, design: &Design) -> Option<(DVector<f64
     Some((residual, solution.rest_readings))
 }
 
-/// Huber's weights, from the residuals of a preliminary law of two branches: the same for whatever is fitted to the
+/// The regression with Huber's weights, from the residuals of a preliminary law of two branches: the same for whatever is fitted to the
 /// recordings then, so that fits can be compared.
 ///
 /// Source: Huber, *Ann. Math. Statist.* 35 (1964) 73.
-pub(crate) fn weigh(regression: &mut LawRegression) {
-    let design = preliminary(regression).design(regression);
+pub(crate) fn robust(mut regression: LawRegression) -> LawRegression {
+    let design = preliminary(&regression).design(&regression);
     for _ in 0..PASSES {
         // Without a preliminary law every row counts the same; whether there is a law at all is for others to say.
-        let Some((residual, _)) = residuals(regression, &design) else { return };
+        let Some((residual, _)) = residuals(&regression, &design) else { return regression };
         let most = HUBER * PER_MEDIAN * median(residual.iter().map(|r| r.abs())).unwrap_or(0.0);
         if !(most > 0.0) {
-            return;
+            return regression;
         }
         regression.set_weights(residual.iter().map(|r| if r.abs() > most { most / r.abs() } else { 1.0 }));
     }
+    regression
 }

@@ -3,7 +3,7 @@ use nalgebra::DVector;
 use crate::CalibrationError;
 use crate::law::design::{BRANCH_COLUMNS, StrainScale};
 use crate::law::regression::{Design, LawRegression};
-use crate::params::law::{BranchParams, GaugeParams, LawParams};
+use ohmstrain_sensor::{BranchParams, GaugeParams, LawParams};
 
 /// Families of gauge curves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

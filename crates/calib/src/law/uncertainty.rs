@@ -3,8 +3,7 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 use crate::CalibrationError;
 use crate::law::regression::{LawRegression, Solution};
 use crate::law::structure::LawStructure;
-use crate::params::Uncertainty;
-use crate::params::law::{LawParameter, LawParams};
+use ohmstrain_sensor::{LawParameter, LawParams, Uncertainty};
 
 /// Contiguous blocks over which residuals may be correlated as they like.
 const JACKKNIFE_BLOCKS: usize = 40;

@@ -6,7 +6,7 @@ use super::{
 };
 use crate::CalibrationError;
 use crate::optimise::nelder_mead;
-use crate::params::law::LawParams;
+use ohmstrain_sensor::LawParams;
 
 /// The likelihood of readings `R/R₀ - 1` under the extended Kalman filter of a known law, as a function of the parameters
 /// in `free`, each from a thousandth to a thousand times where it starts.
@@ -28,12 +28,12 @@ pub struct LikelihoodProblem<'a> {
 macro_rules! asked {
     ($problem:expr, $likelihood:ident => $answer:expr) => {{
         let (parameters, branches) = ($problem.parameters(), $problem.law.branches.len());
-        $crate::with_sizes!(branches, B, N, L => {
+        ohmstrain_sensor::with_sizes!(branches, B, N, L => {
             let family = &$problem.family::<B>()?;
             let $likelihood = Likelihood::<_, N, L> { family, parameters: &parameters, recordings: $problem.recordings };
             $answer
         })
-        .unwrap_or_else(|| Err(CalibrationError::branches(branches)))
+        .unwrap_or_else(|| Err(ohmstrain_sensor::SensorError::Branches { found: branches }.into()))
     }};
 }
 

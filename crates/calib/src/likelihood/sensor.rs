@@ -1,6 +1,6 @@
 use super::{LikelihoodFit, NoiseParameter};
-use crate::params::estimator::{EstimatorParams, MotionParams, NoiseParams};
 use crate::samples::usual_step_s;
+use ohmstrain_sensor::{EstimatorParams, MotionParams, NoiseParams};
 
 /// Noise and motion to start from; what is not moved stays as it is here.
 #[derive(Clone, Copy, Debug, PartialEq)]

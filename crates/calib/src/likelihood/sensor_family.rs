@@ -4,7 +4,7 @@ use ohmstrain_model::{
 };
 
 use super::ModelFamily;
-use crate::params::estimator::{MotionParams, NoiseParams};
+use ohmstrain_sensor::{MotionParams, NoiseParams};
 
 /// A parameter of noise or motion that readings alone may tell something about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -6,9 +6,10 @@ use crate::CalibrationError;
 use crate::law::design::StrainScale;
 use crate::law::fit::CrossFit;
 use crate::law::regression::{Design, LawRegression, VALIDATION_BLOCKS};
+use crate::law::robust_loss::robust;
 use crate::law::structure::{LawFit, LawStructure};
-use crate::params::RangeParams;
 use crate::samples::{Samples, usual_step_s};
+use ohmstrain_sensor::RangeParams;
 
 /// The law of one more sensor of the make: a cubic gauge and branches whose time constants are the make's.
 ///
@@ -42,7 +43,7 @@ impl LawPrior {
     /// # Errors
     /// If the recordings are too short, or the equations are singular.
     pub(crate) fn posterior(&self, recordings: &[Samples]) -> Result<CrossFit, CalibrationError> {
-        let regression = LawRegression::on_scale(recordings, self.scale(), self.range)?;
+        let regression = robust(LawRegression::on_scale(recordings, self.scale(), self.range)?);
         let problem = Posterior::new(self, &regression, row_step_s(recordings, &regression))?;
         let without_block = (0..VALIDATION_BLOCKS).map(|block| problem.fit(Some(block))).collect::<Result<_, _>>()?;
         Ok(CrossFit { law: problem.fit(None)?, without_block, blocks: regression.block_rows() })

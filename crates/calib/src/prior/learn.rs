@@ -9,10 +9,9 @@ use super::probe::Probe;
 use super::rows::CorrectionPrior;
 use super::{FEWEST_SENSORS, PRIOR_FORMAT, Prior, median};
 use crate::CalibrationError;
-use crate::params::correction::CorrectionParams;
-use crate::params::estimator::{EstimatorKind, EstimatorParams};
-use crate::params::law::LawParams;
-use crate::params::{RangeParams, SensorParams, Validity};
+use ohmstrain_sensor::{
+    CorrectionParams, EstimatorKind, EstimatorParams, LawParams, RangeParams, SensorParams, Validity,
+};
 
 /// No two sensors are made more alike than this, relative to the mean; and a variance that keeps a covariance regular,
 /// relative to R₀.

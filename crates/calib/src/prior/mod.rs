@@ -22,8 +22,7 @@ pub use noise::EstimatorPrior;
 pub use rows::CorrectionPrior;
 pub(crate) use rows::ROWS;
 
-use crate::params::estimator::EstimatorKind;
-use crate::params::{Quantity, Validity};
+use ohmstrain_sensor::{EstimatorKind, Quantity, Validity};
 
 /// Version of the file that a prior is written to.
 pub const PRIOR_FORMAT: u32 = 2;

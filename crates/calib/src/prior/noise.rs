@@ -3,7 +3,7 @@ use serde::{Deserialize, Serialize};
 
 use super::median;
 use super::population::Population;
-use crate::params::estimator::{EstimatorParams, MotionParams};
+use ohmstrain_sensor::{EstimatorParams, MotionParams};
 
 /// Noise and motion of one more sensor of the make under one estimator: logarithms, normal and independent.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -2,11 +2,11 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use crate::CalibrationError;
 use crate::law::regression::LawRegression;
+use crate::law::robust_loss::robust;
 use crate::law::structure::GaugeFamily;
 use crate::law::structure::LawStructure;
-use crate::params::law::{LawParameter, LawParams};
-use crate::params::{RangeParams, Uncertainty};
 use crate::samples::Samples;
+use ohmstrain_sensor::{LawParameter, LawParams, RangeParams, Uncertainty};
 
 /// A motion over the whole range at three speeds, with holds and smaller loops: laws that say the same of it are the same.
 ///
@@ -37,7 +37,7 @@ impl Probe {
         // What is read does not matter, but that it changes.
         let reading: Vec<f64> = strain.iter().map(|strain| 1.0 + (strain - range.lower) / range.span()).collect();
         let samples = Samples::new(&time_s, &reading, &strain)?;
-        let regression = LawRegression::new(&[samples])?;
+        let regression = robust(LawRegression::new(&[samples])?);
         let structure = common(tau_s);
         let design = structure.design(&regression);
         let columns = DMatrix::from_columns(&design.columns[design.free..]);

@@ -2,8 +2,8 @@ use ohmstrain_ekf::correction::{FEATURES, RATE_GAIN};
 use serde::{Deserialize, Serialize};
 
 use super::median;
-use crate::params::correction::{CorrectionParams, CorrectionScale, FUTURE_FEATURES, PAUSE_S, TrainingRow};
-use crate::params::estimator::EstimatorKind;
+use crate::calibrate::correction_fit::{PAUSE_S, rounded};
+use ohmstrain_sensor::{CorrectionParams, CorrectionScale, EstimatorKind, FUTURE_FEATURES, TrainingRow};
 
 /// Rows of other sensors that a correction learns from beside the new sensor's own: as many as its own at most.
 pub(crate) const ROWS: usize = 100;
@@ -27,7 +27,7 @@ impl CorrectionPrior {
     pub(super) fn learn(sensors: &[&CorrectionParams]) -> Option<Self> {
         let first = sensors.first()?;
         let scales: Vec<CorrectionScale> = sensors.iter().map(|one| one.readings).collect();
-        let of_make = CorrectionScale::median(&scales);
+        let of_make = median_scale(&scales);
         let mut rows: Vec<TrainingRow> = Vec::new();
         let mut start_s = 0.0;
         for (k, sensor) in sensors.iter().enumerate() {
@@ -37,7 +37,7 @@ impl CorrectionPrior {
             for i in 0..wanted.min(sensor.rows.len()) {
                 let place = (i * sensors.len() + k) * sensor.rows.len() / (wanted * sensors.len());
                 let row = moved(&sensor.rows[place], &sensor.readings, &of_make);
-                rows.push(TrainingRow { time_s: start_s + row.time_s - first_s, ..row }.rounded());
+                rows.push(rounded(&TrainingRow { time_s: start_s + row.time_s - first_s, ..row }));
             }
             start_s = rows.last().map_or(0.0, |row| row.time_s + PAUSE_S);
         }
@@ -45,24 +45,22 @@ impl CorrectionPrior {
     }
 }
 
-impl CorrectionScale {
-    /// The median of each number, of starts where they are on the median scale.
-    fn median(scales: &[Self]) -> Self {
-        let of = |number: &dyn Fn(&Self) -> f64| median(scales.iter().map(number));
-        let (centre, half_range) = (of(&|scale| scale.centre), of(&|scale| scale.half_range));
-        let start = |i: usize, part: usize| of(&|scale| scale.start_on(scale.starts[i], centre, half_range)[part]);
-        Self {
-            centre,
-            half_range,
-            rates: [0, 1].map(|i| of(&|scale| scale.rates[i])),
-            starts: std::array::from_fn(|i| [start(i, 0), start(i, 1)]),
-        }
+/// The median of each number, of starts where they are on the median scale.
+fn median_scale(scales: &[CorrectionScale]) -> CorrectionScale {
+    let of = |number: &dyn Fn(&CorrectionScale) -> f64| median(scales.iter().map(number));
+    let (centre, half_range) = (of(&|scale| scale.centre), of(&|scale| scale.half_range));
+    let start = |i: usize, part: usize| of(&|scale| start_on(scale, scale.starts[i], (centre, half_range))[part]);
+    CorrectionScale {
+        centre,
+        half_range,
+        rates: [0, 1].map(|i| of(&|scale| scale.rates[i])),
+        starts: std::array::from_fn(|i| [start(i, 0), start(i, 1)]),
     }
+}
 
-    /// Where a low-pass starts, told on another scale.
-    fn start_on(&self, [a, b]: [f64; 2], centre: f64, half_range: f64) -> [f64; 2] {
-        [(a * self.half_range + (b - 1.0) * (centre - self.centre)) / half_range, b]
-    }
+/// Where a low-pass starts, told on a scale of another centre and half range.
+fn start_on(scale: &CorrectionScale, [a, b]: [f64; 2], (centre, half_range): (f64, f64)) -> [f64; 2] {
+    [(a * scale.half_range + (b - 1.0) * (centre - scale.centre)) / half_range, b]
 }
 
 /// A row as it would have been seen on another scale.
@@ -120,7 +118,7 @@ mod tests {
             centre + half_range * (a + b * (reading - centre) / half_range)
         };
         for reading in [0.1, 0.35, 0.8] {
-            let moved = low_pass(0.2, 0.4, scale.start_on(start, 0.2, 0.4), reading);
+            let moved = low_pass(0.2, 0.4, start_on(&scale, start, (0.2, 0.4)), reading);
             assert!((moved - low_pass(centre, half_range, start, reading)).abs() < 1e-15, "{reading}");
         }
     }

@@ -1,7 +1,6 @@
 use super::*;
-use crate::params::law::{GaugeParams, LawParams};
-use crate::params::{RangeParams, SensorParams};
 use crate::samples::Samples;
+use ohmstrain_sensor::{GaugeParams, LawParams, RangeParams, SensorParams};
 
 const SENSOR: &str = include_str!("../../../../tests/fixtures/representative.toml");
 const REST_OHM: f64 = 1700.0;

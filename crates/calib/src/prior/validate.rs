@@ -1,7 +1,6 @@
-use crate::params::estimator::EstimatorKind;
-use crate::params::law::MOST_BRANCHES;
-use crate::params::validate::table::{AMOUNT, Allowed, FACTOR, FieldError, GAIN, POSITIVE, SHARE, SIGNED, Table};
 use crate::prior::{CorrectionPrior, EstimatorPrior, FEWEST_SENSORS, LawPrior, Prior, is_covariance};
+use ohmstrain_sensor::ranges::{AMOUNT, Allowed, FACTOR, GAIN, POSITIVE, SHARE, SIGNED, Table};
+use ohmstrain_sensor::{EstimatorKind, FieldError, MOST_BRANCHES};
 
 /// Logarithms of what searches may find, and of what has no speed.
 const LOGARITHM: Allowed = Allowed { least: -30.0, most: 30.0 };

@@ -4,6 +4,7 @@ use crate::CalibrationError;
 use crate::digits::significant;
 use crate::law::regression::LawRegression;
 use crate::law::robust_loss;
+use crate::law::robust_loss::robust;
 use crate::order::{median, sorted};
 use crate::samples::Samples;
 
@@ -128,7 +129,7 @@ pub fn screen(recordings: &[Samples]) -> Result<Screened, CalibrationError> {
     screened.leave_out_misfits()?;
     screened.distrusted.sort_by_key(|one| (one.recording, one.row));
     let samples = screened.samples();
-    let unexplained = unexplained(&LawRegression::new(&samples)?).ok_or(CalibrationError::Singular)?;
+    let unexplained = unexplained(&robust(LawRegression::new(&samples)?)).ok_or(CalibrationError::Singular)?;
     if unexplained > MOST_UNEXPLAINED {
         return Err(CalibrationError::NothingExplained { unexplained });
     }
@@ -162,7 +163,7 @@ impl Screened {
 
 /// Rows whose reading and reference do not go together.
 fn misfits(samples: &[Samples]) -> Result<Vec<Distrusted>, CalibrationError> {
-    let regression = LawRegression::new(samples)?;
+    let regression = robust(LawRegression::new(samples)?);
     let weights: Vec<f64> = regression.root_weights().iter().map(|root| root * root).collect();
     if weights.iter().all(|weight| *weight >= LEAST_WEIGHT) {
         return Ok(Vec::new());

@@ -1,8 +1,8 @@
 //! Random effects of R₀: differences between recordings.
 
-use crate::params::Sessions;
 use crate::recording::rest::reading_before_moving;
 use crate::samples::Samples;
+use ohmstrain_sensor::Sessions;
 
 /// Standard deviation that both logarithms are expected to have between sessions: R₀ of one carbon-black sensor was 1117 to 1800 Ω on
 /// nine days. It counts as one degree of freedom.

@@ -1,6 +1,7 @@
 use std::str::FromStr;
 
-use ohmstrain_calib::{EstimatorKind, GaugeFamily};
+use ohmstrain_calib::GaugeFamily;
+use ohmstrain_sensor::EstimatorKind;
 
 /// `auto`, or a value.
 #[derive(Clone, Copy, Debug)]

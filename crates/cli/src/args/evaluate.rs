@@ -2,7 +2,7 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use clap::{Args as ClapArgs, ValueEnum};
-use ohmstrain_calib::EstimatorKind;
+use ohmstrain_sensor::EstimatorKind;
 
 use super::{Estimator, ReplaceArgs, ReportArgs, RestResistance, Split, UnitArgs, finite, positive};
 

@@ -20,9 +20,9 @@ use crate::input::{self, TraceFile, unit};
 use crate::output::{Kind, Outputs, print};
 use crate::plausible;
 use crate::progress::Progress;
-use crate::report::Sample;
 use crate::sensor_file;
 use crate::verbosity::Verbosity;
+use ohmstrain_report::Sample;
 
 /// Calibrates a sensor on recordings and writes its parameters.
 pub fn run(args: &CalibrateArgs) -> Result<(), CliError> {

@@ -3,7 +3,7 @@
 use std::io::Write;
 
 use ohmstrain::{Closing, Findings, Tested};
-use ohmstrain_calib::{ErrorShares, Limit};
+use ohmstrain_sensor::{ErrorShares, Limit};
 use serde::Serialize;
 
 use crate::error::CliError;

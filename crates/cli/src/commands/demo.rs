@@ -14,9 +14,9 @@ use crate::error::CliError;
 use crate::input;
 use crate::output::{Kind, Outputs, print};
 use crate::progress::Progress;
-use crate::report::Sample;
 use crate::run::estimate;
 use crate::sensor_file;
+use ohmstrain_report::Sample;
 
 /// Share of the recording that calibrates; the rest is the test.
 const CALIBRATION_SHARE: f64 = 0.5;
@@ -82,7 +82,10 @@ pub fn run(args: &DemoArgs) -> Result<(), CliError> {
     let scores = [
         ("filter", scoring::of_estimates(&recording, &estimated.filtered, part)),
         ("smoother", scoring::of_estimates(&recording, &estimated.smoothed, part)),
-        ("static cubic", scoring::of_baseline(&recording, params.static_cubic.start(), part, 1.0)),
+        (
+            "static cubic",
+            scoring::of_baseline(&recording, ohmstrain_calib::running_cubic(params.static_cubic), part, 1.0),
+        ),
     ];
     for (name, scores) in scores {
         if let Some(scores) = scores {

@@ -1,7 +1,8 @@
 use comfy_table::Table;
 use ohmstrain_calib::{
-    CalibrationError, LawParams, Samples, StructureScore, bootstrap_law, compare_structures, identifiability, screen,
+    CalibrationError, Samples, StructureScore, bootstrap_law, compare_structures, identifiability, screen,
 };
+use ohmstrain_sensor::LawParams;
 
 use crate::args::CalibrateArgs;
 use crate::error::CliError;

@@ -1,6 +1,6 @@
 //! Which of the filters that a chip has room for is exported.
 
-use ohmstrain_calib::SensorParams;
+use ohmstrain_sensor::SensorParams;
 
 use crate::args::ExportArgs;
 use crate::commands::export_score::OnRecording;

@@ -1,7 +1,8 @@
 //! What an exported filter is worth on a recording, beside what was promised and what this computer makes of it.
 
 use ohmstrain::Sensor;
-use ohmstrain_calib::{Baseline, ScoredRow, Scores, SensorParams};
+use ohmstrain_calib::{Baseline, ScoredRow};
+use ohmstrain_sensor::{Scores, SensorParams};
 
 use crate::args::ExportArgs;
 use crate::commands::score_table::covered;
@@ -28,7 +29,7 @@ impl OnRecording {
             builder = builder.estimator(estimator.0);
         }
         let mut filter = builder.build().map_err(|error| refused(&error))?;
-        let mut cubic = sensor.params().static_cubic.start();
+        let mut cubic = ohmstrain_calib::running_cubic(sensor.params().static_cubic);
         let mut rows = Vec::new();
         let [mut program, mut static_cubic] = [const { Vec::new() }; 2];
         let mut last_s = None;
@@ -48,7 +49,7 @@ impl OnRecording {
     /// Of the rows that are asked for.
     fn scores(&self, rows: &[ScoredRow]) -> Result<Scores, CliError> {
         let counted = |row: &&ScoredRow| row.truth.is_finite() && self.from_s.is_none_or(|from_s| row.time_s >= from_s);
-        Scores::new(&rows.iter().filter(counted).copied().collect::<Vec<_>>()).ok_or_else(|| {
+        ohmstrain_calib::score(&rows.iter().filter(counted).copied().collect::<Vec<_>>()).ok_or_else(|| {
             CliError::Input(format!("{}: expected rows with a reference to score, found none", self.name))
         })
     }

@@ -9,13 +9,14 @@ use ohmstrain_bench_data::{BadContent, DeviceRow, Row, TraceError};
 use crate::args::{FilterArgs, Format, RestResistance, WrittenArgs};
 use crate::error::CliError;
 use crate::estimates::{self, EstimateWriter};
-use crate::input::{self, check_unit, is_stdin};
+use crate::input::{self, check_unit};
 use crate::output::RowsOut;
 use crate::readings::{late, no_row};
 use crate::run::{builder, builder_anew, rest_resistance};
 use crate::sensor_file;
 use crate::stream::{self, Rows};
 use crate::suits::{self, FIRST_LIVE_READINGS, FIRST_READINGS};
+use crate::whole_file::is_stdin;
 
 /// Turns readings into strain as they arrive. Memory does not grow with the recording.
 pub fn run(args: &FilterArgs) -> Result<(), CliError> {

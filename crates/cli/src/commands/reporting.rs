@@ -9,9 +9,9 @@ use crate::error::CliError;
 use crate::input::TraceFile;
 use crate::output::{Claim, Kind, Outputs};
 use crate::printable::printable;
-use crate::report::{FigureFiles, Report, ReportInput, Sample, ScoreRow, Scored};
 use crate::run::estimate;
 use ohmstrain::MADE_BY;
+use ohmstrain_report::{FigureFiles, Report, ReportInput, Sample, ScoreRow, Scored};
 
 /// What a report is about.
 pub struct Reporting<'a> {
@@ -82,7 +82,7 @@ impl Reporting<'_> {
         let moved = params.rest_reading / rest_reading;
         let filter = scoring::of_estimates(recording, &estimated.filtered, part);
         let smoother = scoring::of_estimates(recording, &estimated.smoothed, part);
-        let cubic = scoring::of_baseline(recording, params.static_cubic.start(), part, moved);
+        let cubic = scoring::of_baseline(recording, ohmstrain_calib::running_cubic(params.static_cubic), part, moved);
         let rows = [("filter", filter), ("smoother", smoother), ("static cubic", cubic)];
         let scores: Vec<ScoreRow> =
             rows.into_iter().filter_map(|(name, scores)| scores.map(|scores| row(name, &scores))).collect();
@@ -105,7 +105,7 @@ impl Reporting<'_> {
             verdict: filter.map(|filter| self.verdict(&filter, cubic.as_ref())),
             facts: self.facts,
         };
-        let failed = |error: crate::report::ReportError| CliError::Other(error.to_string());
+        let failed = |error: ohmstrain_report::ReportError| CliError::Other(error.to_string());
         let report = Report::new(&input).map_err(failed)?;
         Ok(Drawn { html: report.html().map_err(failed)?, figures: report.figures().map_err(failed)? })
     }

@@ -1,5 +1,5 @@
 use comfy_table::Table;
-use ohmstrain_calib::Scores;
+use ohmstrain_sensor::Scores;
 
 use crate::output::table;
 

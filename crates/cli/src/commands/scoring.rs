@@ -1,5 +1,6 @@
 use ohmstrain::Estimate;
-use ohmstrain_calib::{Baseline, ScoredRow, Scores};
+use ohmstrain_calib::{Baseline, ScoredRow};
+use ohmstrain_sensor::Scores;
 
 use crate::input::TraceFile;
 
@@ -34,7 +35,7 @@ fn scores(recording: &TraceFile, part: Part, estimate: impl Fn(usize) -> (f64, O
             ScoredRow { time_s: times[k], truth: recording.truth(k), strain, sd }
         })
         .collect();
-    Scores::new(&rows)
+    ohmstrain_calib::score(&rows)
 }
 
 /// Scores of estimates; `None` without a reference.

@@ -2,14 +2,14 @@
 
 use std::path::Path;
 
-use ohmstrain_calib::SensorParams;
+use ohmstrain_sensor::SensorParams;
 
 use crate::args::SerialCheckArgs;
 use crate::commands::live::{Event, Source};
 use crate::error::CliError;
-use crate::input::is_stdin;
 use crate::output::print;
 use crate::sensor_file;
+use crate::whole_file::is_stdin;
 use ohmstrain_export::{self as export, Plan, ReplayedRow, Said};
 
 /// Steps of a port, which never ends.

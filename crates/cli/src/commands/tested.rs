@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use ohmstrain::{Sensor, Tested};
-use ohmstrain_calib::{Baseline, ScoredRow, Scores};
+use ohmstrain_calib::{Baseline, ScoredRow};
 
 use crate::input::TraceFile;
 
@@ -35,7 +35,7 @@ pub fn tested(recordings: &[Kept], sensor: &Sensor) -> Option<Tested> {
     if rows.filter.len() < FEWEST_ROWS {
         return None;
     }
-    let (filter, static_cubic) = (Scores::new(&rows.filter)?, Scores::new(&rows.static_cubic)?);
+    let (filter, static_cubic) = (ohmstrain_calib::score(&rows.filter)?, ohmstrain_calib::score(&rows.static_cubic)?);
     filter.rmse_percent_fs.is_finite().then_some(Tested { filter, static_cubic })
 }
 
@@ -43,7 +43,7 @@ impl Rows {
     /// Filter and cubic run over the whole recording, as they would live.
     fn add(&mut self, Kept { whole, seen }: &Kept, sensor: &Sensor) -> Option<()> {
         let mut filter = sensor.filter().build().ok()?;
-        let mut cubic = sensor.params().static_cubic.start();
+        let mut cubic = ohmstrain_calib::running_cubic(sensor.params().static_cubic);
         // Times go on from recording to recording, so that none goes back.
         let after = self.filter.last().map_or(0.0, |row| row.time_s);
         for row in 0..whole.trace.len() {

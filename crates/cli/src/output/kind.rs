@@ -3,7 +3,7 @@
 
 use ohmstrain::Column;
 
-use crate::report::{PAGE, Sample};
+use ohmstrain_report::{PAGE, Sample};
 
 /// What an output is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use serde_json::Value;
 
 use super::kind::{Kind, is_this_program};
-use super::unfinished::{Unfinished, publish, sync_folder};
+use super::unfinished::{Unfinished, folder_of, publish, sync_folder};
 use crate::parquet_table;
 
 /// A file as the system knows it, whatever it is called.
@@ -169,14 +169,6 @@ fn is_rows_of_ours(json: impl Read, own: &[String]) -> bool {
 fn is_descriptor(path: &Path) -> bool {
     ["/dev/stdout", "/dev/stderr"].iter().any(|name| path == Path::new(name))
         || ["/dev/fd", "/proc/self/fd"].iter().any(|folder| path.starts_with(folder))
-}
-
-/// The folder that a file lies in.
-pub fn folder_of(path: &Path) -> &Path {
-    match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder,
-        _ => Path::new("."),
-    }
 }
 
 /// What a chain of symbolic links points to, be it there or not.

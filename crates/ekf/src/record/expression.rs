@@ -3,7 +3,7 @@ use core::ops::{Add, AddAssign, Div, Mul, MulAssign, Neg, Sub, SubAssign};
 
 use ohmstrain_model::Number;
 
-use super::operation::{Operation, Place};
+use super::operation::{Operation, Place, Recorded};
 use super::tape::Tape;
 use crate::Recordable;
 use crate::kernel::tail::Tail;
@@ -32,6 +32,27 @@ pub(super) fn standing_for(input: usize) -> f32 {
 
 fn stood_for(number: f32) -> Option<usize> {
     number.is_nan().then_some((number.to_bits() & ROOM) as usize)
+}
+
+impl Tape {
+    pub(super) fn input(&self, number: usize) -> Expression<'_> {
+        self.put(Operation::Input(number))
+    }
+
+    /// The operation, where its place is.
+    pub(super) fn put(&self, operation: Operation) -> Expression<'_> {
+        Expression(Kind::On(self, self.place(operation)))
+    }
+
+    /// A truth.
+    pub(super) fn known(&self, truth: bool) -> Expression<'_> {
+        self.put(Operation::Known(truth))
+    }
+
+    pub(super) fn recorded<'a>(&'a self, results: impl IntoIterator<Item = Expression<'a>>) -> Recorded {
+        let results = results.into_iter().map(|result| result.place_on(self)).collect();
+        Recorded { operations: self.operations(), results }
+    }
 }
 
 impl<'a> Expression<'a> {

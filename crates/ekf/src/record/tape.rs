@@ -1,8 +1,7 @@
 use core::cell::RefCell;
 use std::vec::Vec;
 
-use super::expression::{Expression, Kind};
-use super::operation::{Operation, Place, Recorded};
+use super::operation::{Operation, Place};
 
 /// Operations as they come, and the ways that comparisons choose.
 #[derive(Default)]
@@ -14,15 +13,6 @@ pub(super) struct Tape {
 }
 
 impl Tape {
-    pub(super) fn input(&self, number: usize) -> Expression<'_> {
-        self.put(Operation::Input(number))
-    }
-
-    /// The operation, where its place is.
-    pub(super) fn put(&self, operation: Operation) -> Expression<'_> {
-        Expression(Kind::On(self, self.place(operation)))
-    }
-
     /// The place of an operation: of the same one, if it was done before.
     pub(super) fn place(&self, operation: Operation) -> Place {
         let mut operations = self.operations.borrow_mut();
@@ -31,16 +21,6 @@ impl Tape {
             operations.push(operation);
         }
         place
-    }
-
-    /// A truth.
-    pub(super) fn known(&self, truth: bool) -> Expression<'_> {
-        self.put(Operation::Known(truth))
-    }
-
-    pub(super) fn recorded<'a>(&'a self, results: impl IntoIterator<Item = Expression<'a>>) -> Recorded {
-        let results = results.into_iter().map(|result| result.place_on(self)).collect();
-        Recorded { operations: self.operations.borrow().clone(), results }
     }
 
     /// Which way to go: as answered before, and otherwise that of the truth.
@@ -66,6 +46,10 @@ impl Tape {
     /// What has been asked on this way.
     pub(super) fn asked(&self) -> Vec<Place> {
         self.asked.borrow().clone()
+    }
+
+    pub(super) fn operations(&self) -> Vec<Operation> {
+        self.operations.borrow().clone()
     }
 
     pub(super) fn operation(&self, place: Place) -> Operation {

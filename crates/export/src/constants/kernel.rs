@@ -1,14 +1,15 @@
 //! Numbers and arithmetic of the filter's step.
 
-use ohmstrain_calib::{EstimatorKind, HISTORIES, HYPOTHESES};
 use ohmstrain_ekf::record::{MixtureNumbers, shared};
 use ohmstrain_ekf::{
     Compact, Gaussian, Hypotheses, LONGEST_PAUSE_S, STEP_EVENLY, STEP_GRACE, STEP_GROWTH, SignSplit, SparseEkf,
 };
+use ohmstrain_sensor::{EstimatorKind, HISTORIES, HYPOTHESES};
 use serde::Serialize;
 
 use crate::fixed_rate::FixedRate;
 use crate::literal::{Literal, literals};
+use crate::twin::filter_parts;
 use crate::{ExportError, arithmetic, parameter};
 
 /// What depends on the length of a step.
@@ -109,10 +110,10 @@ impl Recorded {
         let Some(phases) = sensor.parts.phases else {
             return Ok(Self { arithmetic: arithmetic::of_ekf(carried, &names, record), numbers: none, names });
         };
-        let (dwell, evidence) = phases.filter_parts(sensor.narrow().limits).map_err(parameter)?;
+        let (dwell, evidence) = filter_parts(&phases, sensor.narrow().limits).map_err(parameter)?;
         let splits = sensor.parts.kind == EstimatorKind::SignSplit;
         let numbers = if splits {
-            SignSplit::<_, B, N, HYPOTHESES, _>::around(kernel, phases.rests.then_some(dwell), evidence).numbers()
+            SignSplit::<_, B, N, HYPOTHESES, _>::around(kernel, phases.rests().then_some(dwell), evidence).numbers()
         } else {
             Hypotheses::<_, B, N, HISTORIES, _>::around(kernel, dwell, evidence).numbers()
         };

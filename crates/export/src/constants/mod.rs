@@ -3,9 +3,9 @@
 mod kernel;
 mod readings;
 
-use ohmstrain_calib::{EstimatorKind, PortableFilter, Quantity, ReadingUnit, SensorParams, with_sizes};
 use ohmstrain_ekf::Belief;
 use ohmstrain_ekf::live::{BESIDE_SHARE, DOUBT, FARTHEST_REST, KNOWN_BEYOND, LiveParts};
+use ohmstrain_sensor::{EstimatorKind, PortableFilter, Quantity, ReadingUnit, SensorParams, with_sizes};
 use serde::Serialize;
 
 use super::arithmetic::Around;

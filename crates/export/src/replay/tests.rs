@@ -1,7 +1,7 @@
 use ohmstrain::{Filter, FilterBuilder, Influence, Sensor};
-use ohmstrain_calib::{EstimatorKind, SensorParams, Sessions};
 use ohmstrain_ekf::live::SensorEstimator;
 use ohmstrain_ekf::{Gaussian, StepError};
+use ohmstrain_sensor::{EstimatorKind, SensorParams, Sessions};
 
 use super::super::fixed_rate::longest_step_s;
 use super::{ChipFilter, FixedRate, Plan, Protections, StepNumbers, Task, TwinFilter, with_twin};

@@ -1,10 +1,11 @@
 //! The learned correction of the exported program, in any precision.
 
-use ohmstrain_calib::{OwnedCorrection, PortableCorrection};
 use ohmstrain_ekf::Real;
 use ohmstrain_ekf::correction::{FILTER_INPUTS, FeatureScale};
 use ohmstrain_ekf::live::Learned;
 use ohmstrain_model::StrainRange;
+use ohmstrain_sensor::PortableCorrection;
+use ohmstrain_sensor::correction::OwnedCorrection;
 
 use super::number;
 use crate::quadratic::OwnedQuadratic;

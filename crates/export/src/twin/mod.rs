@@ -2,30 +2,22 @@
 //! in C computes them from.
 
 mod learned;
-mod parts;
+pub mod parts;
 
 use std::cell::Cell;
 
-use ohmstrain_calib::{EstimatorKind, HISTORIES, HYPOTHESES};
 use ohmstrain_ekf::live::{Learned, LiveFilter, SensorEstimator};
 use ohmstrain_ekf::{
     Advanced, Compact, Estimator, Gaussian, Hypotheses, Reading, Real, SignSplit, SparseEkf, State, StepError,
 };
 use ohmstrain_model::SwitchedModel;
+use ohmstrain_sensor::{EstimatorKind, HISTORIES, HYPOTHESES};
 
 use super::ExportError;
 use super::fixed_rate::FixedRate;
-use super::vectors::refused;
 pub use learned::OwnedLearned;
-pub use parts::{Parts, PhaseParts, bits, number};
-
-/// Numbers that depend on the length of a step.
-pub struct Numbers<'a, T> {
-    /// The kernel's numbers, then nine probabilities of the chain, for a length, s.
-    pub of: Box<dyn Fn(T) -> Vec<T> + 'a>,
-    /// The length that is prepared for a step, s.
-    pub length_s: fn(T) -> T,
-}
+use parts::number;
+pub use parts::{Numbers, Parts, bits, filter_parts};
 
 /// Numbers of the chain.
 const CHAIN: usize = 9;
@@ -150,12 +142,12 @@ pub fn with_twin<T: Real, const B: usize, const N: usize, const L: usize, J: Tas
     let of = Of { sensor, numbers, task };
     let said = match (parts.kind, parts.phases) {
         (EstimatorKind::SignSplit, Some(phases)) => {
-            let (dwell, evidence) = phases.filter_parts(parts.limits_in()).map_err(refused)?;
-            let hold = phases.rests.then_some(dwell);
+            let (dwell, evidence) = filter_parts(&phases, parts.limits_in()).map_err(refused)?;
+            let hold = phases.rests().then_some(dwell);
             of.run::<_, N, L>(SignSplit::<T, B, N, HYPOTHESES, Compact>::around(kernel, hold, evidence))
         }
         (EstimatorKind::Hypotheses, Some(phases)) => {
-            let (dwell, evidence) = phases.filter_parts(parts.limits_in()).map_err(refused)?;
+            let (dwell, evidence) = filter_parts(&phases, parts.limits_in()).map_err(refused)?;
             of.run::<_, N, L>(Hypotheses::<T, B, N, HISTORIES, Compact>::around(kernel, dwell, evidence))
         }
         _ => of.run::<_, N, L>(kernel),
@@ -183,4 +175,9 @@ impl<T: Real, J: Task<T>, const B: usize, const S: usize> Of<'_, '_, T, J, B, S>
         let parts = parts.live.to().with_correction(learned.as_ref().map(OwnedLearned::learned));
         task.run(LiveFilter::new(twin, parts))
     }
+}
+
+/// Why a filter refuses a step of its own vectors.
+pub fn refused(error: StepError) -> ExportError {
+    ExportError::Parameter(format!("the filter refuses the law's own readings: {error}"))
 }

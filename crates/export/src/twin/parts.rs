@@ -1,9 +1,9 @@
 //! What an exported program is made of.
 
-use ohmstrain_calib::{EstimatorKind, PortableCorrection};
 use ohmstrain_ekf::live::{Flag, Flags, LiveParts};
 use ohmstrain_ekf::{Dwell, Evidence, Real, StepError};
 use ohmstrain_model::StrainRange;
+use ohmstrain_sensor::{EstimatorKind, PhaseParams, PortableCorrection};
 
 use crate::quadratic::OwnedQuadratic;
 
@@ -31,7 +31,7 @@ pub fn bits(flags: Flags) -> u32 {
 pub struct Parts<'a> {
     pub kind: EstimatorKind,
     /// How long phases last, and whether the body rests; `None` for a filter without phases.
-    pub phases: Option<PhaseParts>,
+    pub phases: Option<PhaseParams>,
     /// Surroundings of the filter. The lengths of its steps are those of single precision.
     pub live: LiveParts<f64, ()>,
     pub correction: Option<&'a PortableCorrection>,
@@ -39,14 +39,12 @@ pub struct Parts<'a> {
     pub quadratics: Option<&'a [OwnedQuadratic; 2]>,
 }
 
-/// Phases, as a file has them.
-#[derive(Clone, Copy)]
-pub struct PhaseParts {
-    pub hold_time_s: f64,
-    pub move_time_s: f64,
-    pub reversal: f64,
-    pub tempering: f64,
-    pub rests: bool,
+/// Numbers that depend on the length of a step.
+pub struct Numbers<'a, T> {
+    /// The kernel's numbers, then nine probabilities of the chain, for a length, s.
+    pub of: Box<dyn Fn(T) -> Vec<T> + 'a>,
+    /// The length that is prepared for a step, s.
+    pub length_s: fn(T) -> T,
 }
 
 /// A number of a file, as exactly as the precision can have it.
@@ -61,15 +59,16 @@ impl Parts<'_> {
     }
 }
 
-impl PhaseParts {
-    /// Dwell times, and what weighs hypotheses.
-    ///
-    /// # Errors
-    /// If single precision has no such numbers.
-    pub fn filter_parts<T: Real>(&self, limits: StrainRange<T>) -> Result<(Dwell<T>, Evidence<T>), StepError> {
-        let dwell = Dwell::new(number(self.hold_time_s), number(self.move_time_s), number(self.reversal));
-        let evidence = Evidence::new(limits, number(self.tempering));
-        // Checked when the file was read; single precision may still turn a number into zero.
-        dwell.and_then(|dwell| Ok((dwell, evidence?))).map_err(|_| StepError::NonFiniteState)
-    }
+/// Dwell times of phases, and what weighs hypotheses.
+///
+/// # Errors
+/// If single precision has no such numbers.
+pub fn filter_parts<T: Real>(
+    phases: &PhaseParams,
+    limits: StrainRange<T>,
+) -> Result<(Dwell<T>, Evidence<T>), StepError> {
+    let dwell = Dwell::new(number(phases.hold_time_s), number(phases.move_time_s), number(phases.reversal));
+    let evidence = Evidence::new(limits, number(phases.tempering));
+    // Checked when the file was read; single precision may still turn a number into zero.
+    dwell.and_then(|dwell| Ok((dwell, evidence?))).map_err(|_| StepError::NonFiniteState)
 }

@@ -4,7 +4,7 @@ use nalgebra::DVector;
 
 use crate::law::design::BRANCH_COLUMNS;
 use crate::law::regression::LawRegression;
-use crate::law::robust_loss::preliminary;
+use crate::law::robust_loss::{preliminary, robust};
 use crate::low_pass::LowPass;
 use crate::motion_stats::MotionStats;
 use crate::samples::{FEWEST_ROWS, Samples};
@@ -195,7 +195,7 @@ fn left_out_errors(samples: &Samples, lag_s: f64, search: Lags) -> Option<[f64; 
     let reading: Vec<f64> =
         rows.iter().map(|&k| if samples.strain[k].is_finite() { samples.reading[k] } else { f64::NAN }).collect();
     let shifted = Samples { time_s: &time_s, reading: &reading, strain: &strain };
-    let regression = LawRegression::new(&[shifted]).ok()?;
+    let regression = robust(LawRegression::new(&[shifted]).ok()?);
     let structure = preliminary(&regression);
     let mut design = structure.design(&regression);
     let times: Vec<f64> = regression.recordings[0].complete.iter().map(|&k| time_s[k]).collect();

@@ -4,7 +4,7 @@ use std::path::{Component, Path, PathBuf};
 
 use clap::Parser;
 use csv::{Reader, StringRecord};
-use ohmstrain_calib::EstimatorKind;
+use ohmstrain_sensor::EstimatorKind;
 
 use super::journal::{JOURNAL, Journal};
 use super::summary::SUMMARY;

@@ -21,9 +21,9 @@ use crate::error::CliError;
 use crate::input::{self, TraceFile, check_unit};
 use crate::output::{Outputs, print};
 use crate::progress::Progress;
-use crate::report::Sample;
 use crate::run::rest_resistance;
 use crate::suits;
+use ohmstrain_report::Sample;
 
 /// Smallest coverage of the 95 % interval that `--check` accepts.
 const LEAST_COVERAGE: f64 = 0.8;

@@ -1,8 +1,8 @@
-use ohmstrain_calib::{Quantity, Scores};
+use ohmstrain_sensor::{Quantity, Scores};
 use serde::Serialize;
 
 use super::settled::SettledScores;
-use crate::report::Sample;
+use ohmstrain_report::Sample;
 
 /// One recording and one estimator: the filter's scores, the smoother's, and those they are compared with.
 #[derive(Serialize)]

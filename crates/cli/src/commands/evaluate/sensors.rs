@@ -3,7 +3,8 @@ use std::time::Instant;
 
 use ohmstrain::{Calibrated, Calibration, ValidityWatch};
 use ohmstrain_bench_data::segment;
-use ohmstrain_calib::{Baselines, EstimatorKind, PhaseRows, PublishedLaw, RECIPE, StaticCubic};
+use ohmstrain_calib::{Baselines, PhaseRows, PublishedLaw, RECIPE};
+use ohmstrain_sensor::{EstimatorKind, StaticCubic};
 
 use super::scores::{BaselineScores, LearnedScores, RecordingScores};
 use super::settled::SettledScores;
@@ -14,9 +15,9 @@ use crate::commands::scoring::{self, Part};
 use crate::error::CliError;
 use crate::input::TraceFile;
 use crate::progress::Progress;
-use crate::report::Sample;
 use crate::run::estimate;
 use crate::sensor_file;
+use ohmstrain_report::Sample;
 
 /// A calibrated sensor and the estimator that it is judged with.
 pub struct Sensor {
@@ -163,7 +164,8 @@ impl Rivals {
                 relaxing_modulus: self.of_published(recording, part, moved),
             }),
         };
-        let static_cubic = scoring::of_baseline(recording, self.static_cubic.start(), part, moved)?;
+        let static_cubic =
+            scoring::of_baseline(recording, ohmstrain_calib::running_cubic(self.static_cubic), part, moved)?;
         Some(BaselineScores { static_cubic, learned })
     }
 

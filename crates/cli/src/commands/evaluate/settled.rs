@@ -1,7 +1,8 @@
 use std::fmt;
 
 use ohmstrain::Estimate;
-use ohmstrain_calib::{Hold, ScoredRow, Scores, holds};
+use ohmstrain_calib::{Hold, ScoredRow, holds};
+use ohmstrain_sensor::Scores;
 use serde::Serialize;
 
 use crate::commands::scoring::Part;
@@ -75,7 +76,7 @@ fn scores(rows: &[(f64, &Estimate)], said: impl Fn(&Estimate) -> Option<(f64, Op
         let (strain, sd) = said(row)?;
         Some(ScoredRow { time_s: row.time_s, truth: *truth, strain, sd })
     };
-    Scores::new(&rows.iter().filter_map(scored).collect::<Vec<_>>())
+    ohmstrain_calib::score(&rows.iter().filter_map(scored).collect::<Vec<_>>())
 }
 
 impl fmt::Display for SettledScores {

@@ -1,6 +1,6 @@
 use std::io::Write;
 
-use ohmstrain_calib::Scores;
+use ohmstrain_sensor::Scores;
 use serde::Serialize;
 
 use super::scores::RecordingScores;

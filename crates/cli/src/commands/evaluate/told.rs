@@ -1,5 +1,5 @@
 use ohmstrain::{KNOWN_BEYOND, Known};
-use ohmstrain_calib::RangeParams;
+use ohmstrain_sensor::RangeParams;
 
 use crate::commands::scoring::Part;
 use crate::input::TraceFile;

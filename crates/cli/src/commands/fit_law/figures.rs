@@ -6,8 +6,8 @@ use super::{Fits, Fitted};
 use crate::commands::reporting::put_figures;
 use crate::error::CliError;
 use crate::output::Outputs;
-use crate::report::{Axis, Chart, Ink, ReportError, WIDE, files, slug};
 use ohmstrain::MADE_BY;
+use ohmstrain_report::{Axis, Chart, Ink, ReportError, WIDE, files, slug};
 
 /// Figures of all fits into a folder.
 pub fn put(folder: &Path, recordings: &[Fits], force: bool) -> Result<(), CliError> {

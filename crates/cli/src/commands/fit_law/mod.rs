@@ -106,7 +106,7 @@ fn fit_recording(recording: &TraceFile, args: &FitLawArgs) -> Result<Fits, CliEr
         gauge_length_mm: trace.metadata.gauge_length_mm,
         reading_unit: if trace.readings.kind == ReadingKind::Ohm { "ohm" } else { "1" },
         strain_unit: match recording.quantity() {
-            Some(ohmstrain_calib::Quantity::AngleDeg) => "deg",
+            Some(ohmstrain_sensor::Quantity::AngleDeg) => "deg",
             _ => "1",
         },
         fits,

@@ -13,10 +13,11 @@ use ohmstrain_bench_data::{Line, LineParser, Metadata, Row, RowWriter, counted};
 
 use crate::args::HandArgs;
 use crate::error::CliError;
-use crate::input::{self, is_stdin, reading_column};
+use crate::input::{self, reading_column};
 use crate::output::RowsOut;
 use crate::sensor_file;
 use crate::suits::FIRST_LIVE_READINGS;
+use crate::whole_file::is_stdin;
 use description::{Description, Joint};
 
 /// What helps where a clock has started again.

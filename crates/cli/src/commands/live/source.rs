@@ -8,7 +8,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use crate::error::{CliError, shell_word};
-use crate::input::is_stdin;
+use crate::whole_file::is_stdin;
 
 /// Lines that wait at most; then the source waits.
 const WAITING: usize = 1 << 12;

@@ -3,8 +3,8 @@
 use nalgebra::DMatrix;
 use ohmstrain::{JointParams, Reading, ReadingUnit, Sensor};
 use ohmstrain_bench_data::FrontEndSpec;
-use ohmstrain_calib::{LawParams, NoiseParams};
 use ohmstrain_model::AdcCode;
+use ohmstrain_sensor::{LawParams, NoiseParams};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
@@ -12,7 +12,7 @@ use serde::Serialize;
 
 use super::motion::{Protocol, Protocols, RATE_HZ, at_rate};
 use crate::error::CliError;
-use crate::report::Law;
+use ohmstrain_report::Law;
 
 /// Readings per second that are tried.
 pub const RATES_HZ: [f64; 4] = [2.0, 5.0, 20.0, FASTEST_HZ];

@@ -3,8 +3,9 @@
 mod rows;
 mod table;
 
+use ohmstrain_calib::CalibrationError;
 use ohmstrain_calib::likelihood::{LikelihoodProblem, NoiseParameter, NoiseStart, ProfileInterval, ReadingSeries};
-use ohmstrain_calib::{CalibrationError, EstimatorKind, LawParams, SensorParams};
+use ohmstrain_sensor::{EstimatorKind, LawParams, SensorError, SensorParams};
 
 use crate::args::RefineArgs;
 use crate::error::CliError;
@@ -56,7 +57,7 @@ pub fn run(args: &RefineArgs) -> Result<(), CliError> {
 fn named(args: &RefineArgs, error: &CalibrationError) -> CliError {
     let of_sensor = matches!(
         error,
-        CalibrationError::Unsupported(_) | CalibrationError::NoParameters(_) | CalibrationError::Parameter(_)
+        CalibrationError::Unsupported(_) | CalibrationError::Sensor(_) | CalibrationError::Parameter(_)
     );
     let culprit = if of_sensor { &args.sensor } else { &args.trace_file };
     CliError::calibration(&[&culprit.display().to_string()], error)
@@ -86,7 +87,7 @@ fn start(
     params: &SensorParams,
     time_s: &[f64],
 ) -> Result<(NoiseStart, Vec<NoiseParameter>), CliError> {
-    let ekf = params.estimator(EstimatorKind::Ekf).map_err(|error| named(args, &error.into()))?;
+    let ekf = params.estimator(EstimatorKind::Ekf).map_err(|error| named(args, &SensorError::from(error).into()))?;
     let start = NoiseStart::new(ekf, time_s);
     let movable = movable(&params.law, &start);
     let wanted: Vec<NoiseParameter> = args.parameters.iter().map(|moved| moved.0).collect();

@@ -1,0 +1,70 @@
+//! The correction as files of format 8 have it: what it was learned from, without weights.
+
+use ohmstrain_sensor::{CorrectionParams, CorrectionScale, EstimatorKind, RangeParams, TrainingRow};
+use serde::Deserialize;
+
+use crate::calibrate::correction_fit::CorrectorInputs;
+use crate::correction::gaussian_process::Settings;
+use crate::correction::simulated::Distilled;
+use crate::correction::{Choices, Chosen, Prepared};
+use ohmstrain_sensor::correction::SIDES;
+
+/// Table `correction` of a file of format 8.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CorrectionOfFormat8 {
+    corrects: EstimatorKind,
+    readings: CorrectionScale,
+    filter: Corrector,
+    smoother: Corrector,
+    rows: Vec<TrainingRow>,
+    simulated: Distilled,
+}
+
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Corrector {
+    sd_scale: f64,
+    direct: Process,
+    residual: Process,
+    #[serde(default)]
+    one_sided: Vec<Process>,
+}
+
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Process {
+    lengths: Vec<f64>,
+    noise: f64,
+    noise_time_s: f64,
+    sd_scale: f64,
+}
+
+impl CorrectionOfFormat8 {
+    /// The same correction with its weights; `None` if nothing can be learned from the rows.
+    #[must_use]
+    pub fn learned(self, limits: RangeParams) -> Option<CorrectionParams> {
+        let Self { corrects, readings, filter, smoother, rows, simulated } = self;
+        let inputs = CorrectorInputs::new(&rows);
+        let of_filter = Prepared::new(inputs.of_filter(limits));
+        let simulated = of_filter.simulated(&simulated)?;
+        let filter = filter.choices().learned::<_, 0>(&of_filter)?;
+        let smoother = smoother.choices().learned::<_, SIDES>(&Prepared::new(inputs.of_smoother(limits)))?;
+        Some(CorrectionParams { corrects, readings, filter, smoother, simulated, rows })
+    }
+}
+
+impl Corrector {
+    fn choices(self) -> Choices {
+        let chosen = |Process { lengths, noise, noise_time_s, sd_scale }| Chosen {
+            settings: Settings { lengths, noise, noise_time_s },
+            sd_scale,
+        };
+        Choices {
+            sd_scale: self.sd_scale,
+            direct: chosen(self.direct),
+            residual: chosen(self.residual),
+            one_sided: self.one_sided.into_iter().map(chosen).collect(),
+        }
+    }
+}

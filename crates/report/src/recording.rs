@@ -1,0 +1,186 @@
+//! A recording with what the plots derive from it.
+
+use ohmstrain::Estimate;
+use ohmstrain_sensor::{Quantity, ReadingUnit, SensorParams};
+
+use super::axis::extent;
+use super::law::{Driven, Law};
+use super::motion::{self, Hold, Motion};
+use super::{ReportInput, Scored};
+use ohmstrain::number::significant;
+
+/// Shortest hold whose relaxation is worth a plot, s.
+pub const SHORTEST_HOLD_S: f64 = 5.0;
+/// Holds that are plotted.
+const PLOTTED_HOLDS: usize = 4;
+/// Points of a gauge curve.
+const CURVE_POINTS: u32 = 200;
+
+/// The report's input and what follows from it.
+pub struct PlottedRecording<'a> {
+    /// Times, s.
+    pub time_s: &'a [f64],
+    /// Readings; NaN where missing.
+    pub reading: &'a [f64],
+    /// Reference, if it is known anywhere.
+    pub truth: Option<&'a [f64]>,
+    /// The filter's estimates.
+    pub filtered: &'a [Estimate],
+    /// The smoother's estimates.
+    pub smoothed: &'a [Estimate],
+    /// The sensor.
+    pub params: &'a SensorParams,
+    /// R₀.
+    pub rest_reading: f64,
+    /// The part that is scored.
+    pub scored: Scored,
+    /// The sensor's law.
+    pub law: Law<'a>,
+    /// What the strain does, row by row.
+    pub motions: Vec<Motion>,
+    /// The law driven by the reference.
+    pub driven: Option<Driven>,
+    strain: Vec<f64>,
+    held: Vec<Hold>,
+    held_driven: Driven,
+}
+
+impl<'a> PlottedRecording<'a> {
+    /// Everything that more than one plot needs.
+    pub fn new(input: &ReportInput<'a>) -> Self {
+        let truth = input.truth.filter(|truth| truth.iter().any(|x| x.is_finite()));
+        let estimates = if input.smoothed.is_empty() { input.filtered } else { input.smoothed };
+        let strain = truth.map_or_else(|| estimates.iter().map(|row| row.strain).collect(), <[f64]>::to_vec);
+        let law = Law::new(input.params, input.rest_reading);
+        let mut held = motion::holds(input.time_s, &strain, SHORTEST_HOLD_S);
+        if truth.is_none() {
+            held.retain(|hold| is_free(hold.strain, input.params));
+        }
+        let held = motion::levels_first(held);
+        let starts: Vec<usize> = held.iter().take(PLOTTED_HOLDS).map(|hold| hold.first).collect();
+        let driven = law.driven(input.time_s, &strain, &starts);
+        let (driven, held_driven) = if truth.is_some() {
+            let memories = driven.memories.clone();
+            (Some(driven), Driven { reading: vec![], memories })
+        } else {
+            (None, driven)
+        };
+        Self {
+            time_s: input.time_s,
+            reading: input.reading,
+            truth,
+            filtered: input.filtered,
+            smoothed: input.smoothed,
+            params: input.params,
+            rest_reading: input.rest_reading,
+            scored: input.scored,
+            motions: motion::motions(input.time_s, &strain, &held),
+            law,
+            driven,
+            strain,
+            held,
+            held_driven,
+        }
+    }
+
+    /// The reference, or the estimate where there is none.
+    pub fn known_strain(&self) -> &[f64] {
+        &self.strain
+    }
+
+    /// The holds that are plotted, at most four: the longest of each level, then the longest others.
+    pub fn longest_holds(&self) -> &[Hold] {
+        self.held.get(..PLOTTED_HOLDS).unwrap_or(&self.held)
+    }
+
+    /// All holds: the longest of each level, then the others, longest first.
+    pub fn holds(&self) -> &[Hold] {
+        &self.held
+    }
+
+    /// What the law remembers at the start of one of the longest holds.
+    pub fn memory_at(&self, row: usize) -> Option<&[f64]> {
+        self.held_driven.memories.get(&row).map(Vec::as_slice)
+    }
+
+    /// Points (strain, g) of the gauge curve over a range.
+    pub fn gauge_curve(&self, range: Option<(f64, f64)>) -> Vec<(f64, f64)> {
+        let Some((low, high)) = range else { return vec![] };
+        let at = |i: u32| low + f64::from(i) / f64::from(CURVE_POINTS) * (high - low);
+        (0..=CURVE_POINTS).map(|i| (at(i), self.law.gauge(at(i)))).collect()
+    }
+
+    /// Points (strain, reading) of the static calibration over the readings.
+    pub fn static_curve(&self) -> Vec<(f64, f64)> {
+        let Some((low, high)) = extent(self.reading.iter().copied()) else { return vec![] };
+        let at = |i: u32| low + f64::from(i) / f64::from(CURVE_POINTS) * (high - low);
+        (0..=CURVE_POINTS).map(|i| (self.params.static_cubic.strain(at(i)), at(i))).collect()
+    }
+
+    /// Axis label of the readings.
+    pub fn reading_label(&self) -> &'static str {
+        match self.params.reading {
+            ReadingUnit::Ohm => "Resistance, Ω",
+            ReadingUnit::Ratio => "Resistance ratio",
+        }
+    }
+
+    /// The estimated quantity.
+    pub fn quantity_name(&self) -> &'static str {
+        match self.params.quantity {
+            Quantity::Strain => "Strain",
+            Quantity::AngleDeg => "Angle",
+        }
+    }
+
+    /// A value of the estimated quantity as people read it: strain in percent.
+    pub fn shown(&self, value: f64) -> f64 {
+        match self.params.quantity {
+            Quantity::Strain => 100.0 * value,
+            Quantity::AngleDeg => value,
+        }
+    }
+
+    /// Axis label of the estimated quantity.
+    pub fn quantity_label(&self) -> &'static str {
+        match self.params.quantity {
+            Quantity::Strain => "Strain, %",
+            Quantity::AngleDeg => "Angle, °",
+        }
+    }
+
+    /// Axis label of the reference, or of the estimate that stands for it.
+    pub fn known_strain_label(&self) -> String {
+        let source = if self.truth.is_some() { "reference" } else { "estimated" };
+        format!("{} ({source})", self.quantity_label())
+    }
+
+    /// A value of the estimated quantity.
+    pub fn with_unit(&self, value: f64) -> String {
+        match self.params.quantity {
+            Quantity::Strain => format!("strain {} %", significant(100.0 * value, 3)),
+            Quantity::AngleDeg => format!("{}°", significant(value, 3)),
+        }
+    }
+
+    /// The 95 % interval of an estimate, within the limits of the output.
+    pub fn interval(&self, row: &Estimate) -> (f64, f64) {
+        let (limits, half) = (self.params.limits, Z_95 * row.strain_sd);
+        // A limit that is not a number bounds nothing.
+        let within = |x: f64| if x.is_nan() { x } else { x.max(limits.lower).min(limits.upper) };
+        (within(row.strain - half), within(row.strain + half))
+    }
+}
+
+/// Half-width of the 95 % interval of a standard normal.
+pub const Z_95: f64 = 1.96;
+
+/// Share of the limits' span within which an estimate leans on them.
+const AT_LIMIT: f64 = 0.02;
+
+/// Whether an estimated strain is away from the limits: one that they hold back does not mean that the body stands
+/// still.
+fn is_free(strain: f64, params: &SensorParams) -> bool {
+    let (limits, margin) = (params.limits, AT_LIMIT * params.limits.span());
+    strain > limits.lower + margin && strain < limits.upper - margin
+}

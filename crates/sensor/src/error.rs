@@ -1,0 +1,37 @@
+use ohmstrain_ekf::StepError;
+use ohmstrain_model::ParameterError;
+use thiserror::Error;
+
+use crate::params::estimator::{EstimatorKind, NoParameters};
+use crate::params::law::MOST_BRANCHES;
+use crate::params::validate::FieldError;
+
+/// Why no filter can be made of a sensor's parameters.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum SensorError {
+    /// A number that no sensor can have.
+    #[error("{0}")]
+    Field(#[from] FieldError),
+    /// None for the estimator that is asked for.
+    #[error("{0}")]
+    NoParameters(#[from] NoParameters),
+    /// A parameter that the model refuses.
+    #[error("parameter: {0}")]
+    Model(#[from] ParameterError),
+    /// Parameters whose filter refuses to start.
+    #[error("{0}")]
+    Start(#[source] StepError),
+    /// More branches than filters are built for.
+    #[error("a law with {found} branches; at most {MOST_BRANCHES} are supported")]
+    Branches {
+        /// How many.
+        found: usize,
+    },
+    /// An estimator of phases without their durations.
+    #[error("`{}` needs `phases` in its parameters", kind.name())]
+    NoPhases {
+        /// Which.
+        kind: EstimatorKind,
+    },
+}

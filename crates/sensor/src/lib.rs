@@ -1,0 +1,43 @@
+//! A calibrated soft strain sensor: its parameters, and the filters and smoothers that run from them.
+//!
+//! [`SensorParams`] is the content of `sensor.toml`; [`SensorParams::validate`] checks the range of every number.
+//! [`build_filter`] makes a live filter of it, [`build_smoother_with`] a smoother of whole recordings. [`PortableFilter`] is the same
+//! filter as plain numbers, for programs that write it in another language.
+//!
+//! # Policy
+//! - Knows nothing of calibration: nothing is fitted or learned here.
+//! - Reads no file and no clock. The same parameters and rows give the same estimates.
+//! - A filter that cannot be made is a [`SensorError`]; nothing panics on parameters or readings.
+
+pub mod correction;
+mod error;
+mod params;
+mod run;
+mod sizes;
+
+pub use error::SensorError;
+pub use params::correction::{
+    CorrectionParams, CorrectionScale, CorrectorParams, FUTURE_FEATURES, InputScales, ProcessParams, SimulatedParams,
+    TrainingRow,
+};
+pub use params::estimator::{
+    EstimatorKind, EstimatorParams, MotionParams, NoParameters, NoiseParams, PhaseParams, SettlingParams,
+};
+pub use params::findings::{ErrorBudget, ErrorShares, Findings, Scores, Seen, TENTHS};
+pub use params::law::{BranchParams, GaugeParams, LawParameter, LawParams, MOST_BRANCHES};
+pub use params::range::RangeParams;
+pub use params::static_cubic::StaticCubic;
+pub use params::summary::{Limit, Summary, TestedSummary};
+pub use params::validate::FieldError;
+pub use params::validate::table as ranges;
+pub use params::{
+    FORMAT, JointParams, LARGEST_SD_SCALE, Quantity, ReadingUnit, RecordingInfo, SensorParams, Sessions, Uncertainty,
+    Validity,
+};
+pub use run::build::{FilterParts, HISTORIES, HYPOTHESES, build_filter, build_filter_with, build_smoother_with};
+pub use run::corrected::{future_features, outputs};
+pub use run::known::{KnownErrors, KnownStrain, MOST_KNOWN};
+pub use run::learned::Learned;
+pub use run::options::Options;
+pub use run::portable::{PortableCorrection, PortableFilter};
+pub use run::{Filter, Output, Rows, Smoother, Start, WayBack};

@@ -1,0 +1,269 @@
+//! What `sensor.toml` says, and the range that each of its numbers has. It knows nothing of the calibration that makes it.
+
+pub(crate) mod correction;
+pub(crate) mod estimator;
+pub(crate) mod findings;
+pub(crate) mod law;
+mod live;
+pub(crate) mod range;
+pub(crate) mod static_cubic;
+pub(crate) mod summary;
+pub(crate) mod validate;
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use crate::params::correction::CorrectionParams;
+use crate::params::estimator::{EstimatorKind, EstimatorParams, NoParameters};
+use crate::params::findings::Findings;
+use crate::params::law::LawParams;
+use crate::params::range::RangeParams;
+use crate::params::static_cubic::StaticCubic;
+use crate::params::summary::{Summary, TestedSummary};
+
+/// Largest factor on the deviations of a calibrated filter. One beyond it says that something else is wrong: calibrations say so
+/// where they reach it.
+pub const LARGEST_SD_SCALE: f64 = 5.0;
+/// Version of the parameter file this code reads and writes.
+pub const FORMAT: u32 = 9;
+
+/// Everything a filter needs to know of a sensor: the content of `sensor.toml`.
+///
+/// Strains stand for the reference quantity; with [`Quantity::AngleDeg`] they are degrees.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SensorParams {
+    /// Version of the format, [`FORMAT`].
+    pub format: u32,
+    /// Program and version that made it.
+    pub made_by: String,
+    /// What is estimated.
+    pub quantity: Quantity,
+    /// What the readings are.
+    pub reading: ReadingUnit,
+    /// R₀ of the law, which everything is relative to; Ω, or a ratio. A fitted number: see `measured_rest`.
+    pub rest_reading: f64,
+    /// What the rested sensor read in calibration, before it first moved, in the same unit; `None` if no recording begins
+    /// at rest. A resistance measured at rest is compared with this one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub measured_rest: Option<f64>,
+    /// The estimator to use unless another is asked for.
+    pub default_estimator: EstimatorKind,
+    /// What the calibration came to; `None` if nothing could be scored on parts left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub summary: Option<Summary>,
+    /// What it is worth on rows that were kept from the calibration; `None` if there were none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tested: Option<TestedSummary>,
+    /// Range of the output: the reference's range in calibration, or a joint's stops.
+    pub limits: RangeParams,
+    /// What calibration has seen.
+    pub validity: Validity,
+    /// Differences between sessions; `None` for a calibration on one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sessions: Option<Sessions>,
+    /// The static inverse to compare with.
+    pub static_cubic: StaticCubic,
+    /// A sensor glued across a joint, if it is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub joint: Option<JointParams>,
+    /// The sensor's law.
+    pub law: LawParams,
+    /// Noise and motion, per estimator.
+    pub estimators: BTreeMap<EstimatorKind, EstimatorParams>,
+    /// The recordings it was calibrated on.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub recordings: Vec<RecordingInfo>,
+    /// What the recordings tell of the law's parameters by themselves, without the ridge that the filter's law has. What
+    /// they do not tell is missing.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub uncertainty: Option<Uncertainty>,
+    /// What the calibration is worth on parts left out, what it has seen and what limits it; `None` if nothing could be scored, or of
+    /// an older version. Nothing computes with it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub findings: Option<Findings>,
+    /// What was learned about the filter's error, if that was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub correction: Option<CorrectionParams>,
+}
+
+/// The quantity that the reference measures and the filter estimates.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Quantity {
+    /// Engineering strain.
+    Strain,
+    /// An angle in degrees, without a joint's geometry.
+    AngleDeg,
+}
+
+impl Quantity {
+    /// Its name in messages and columns.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Strain => "strain",
+            Self::AngleDeg => "angle_deg",
+        }
+    }
+}
+
+/// Unit of the readings.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ReadingUnit {
+    /// Ω.
+    Ohm,
+    /// A ratio to some resistance at rest.
+    Ratio,
+}
+
+/// What calibration has seen; outside of it results are extrapolations.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Validity {
+    /// Smallest strain.
+    pub lower: f64,
+    /// Largest strain.
+    pub upper: f64,
+    /// Smallest reading.
+    pub reading_lower: f64,
+    /// Largest reading.
+    pub reading_upper: f64,
+    /// Fastest rate (99th percentile), per second.
+    pub fastest_rate_per_s: f64,
+    /// Longest recording, s.
+    pub duration_s: f64,
+    /// Longest time for which a reading was repeated to the last digit, s.
+    pub longest_repeat_s: f64,
+}
+
+/// Differences between recordings: each is a session, with an R₀ of its own.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Sessions {
+    /// Standard deviation of ln R₀ between sessions.
+    pub rest_sd: f64,
+    /// Standard deviation, between sessions that begin at rest, of the logarithm of what is read then over R₀.
+    pub start_sd: f64,
+}
+
+impl Sessions {
+    /// Weight of a session's first reading in the best linear estimate of ln R₀.
+    #[must_use]
+    pub fn weight(&self) -> f64 {
+        let (rest, start) = (self.rest_sd.powi(2), self.start_sd.powi(2));
+        rest / (rest + start)
+    }
+
+    /// Standard deviation of ln R₀ that the first reading leaves.
+    #[must_use]
+    pub fn left_sd(&self) -> f64 {
+        self.start_sd * self.weight().sqrt()
+    }
+}
+
+/// Geometry of a joint: `ε = prestrain + moment_arm θ / gauge_length`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct JointParams {
+    /// Strain at angle zero.
+    pub prestrain: f64,
+    /// Distance of the sensor from the axis, mm.
+    pub moment_arm_mm: f64,
+    /// Length of the unstretched sensor, mm.
+    pub gauge_length_mm: f64,
+}
+
+/// A recording that went into the calibration.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RecordingInfo {
+    /// Its name.
+    pub file: String,
+    /// SHA-256 of its bytes, hexadecimal.
+    pub sha256: String,
+    /// Rows used, and the times of the first and the last of them, s.
+    pub rows: usize,
+    /// See [`Self::rows`].
+    pub first_s: f64,
+    /// See [`Self::rows`].
+    pub last_s: f64,
+    /// R₀ of this recording.
+    pub rest_reading: f64,
+}
+
+/// Uncertainty of the law's parameters, robust against residuals that are neither white nor even.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Uncertainty {
+    /// Names of the parameters.
+    pub names: Vec<String>,
+    /// Their values.
+    pub values: Vec<f64>,
+    /// Their standard errors.
+    pub standard_errors: Vec<f64>,
+    /// Their covariance, row by row.
+    pub covariance: Vec<Vec<f64>>,
+}
+
+impl Uncertainty {
+    /// Correlations of the parameters, row by row; zero where a parameter has no variance.
+    #[must_use]
+    pub fn correlation(&self) -> Vec<Vec<f64>> {
+        let errors = &self.standard_errors;
+        let entry = |i: usize, j: usize| {
+            if i == j {
+                return 1.0;
+            }
+            let scale = errors[i] * errors[j];
+            if scale > 0.0 { self.covariance[i][j] / scale } else { 0.0 }
+        };
+        (0..errors.len()).map(|i| (0..errors.len()).map(|j| entry(i, j)).collect()).collect()
+    }
+}
+
+impl SensorParams {
+    /// The filter that runs for an estimator: itself, or the one whose strain is corrected.
+    #[must_use]
+    pub fn filter_of(&self, kind: EstimatorKind) -> EstimatorKind {
+        match &self.correction {
+            Some(correction) if kind == EstimatorKind::Corrected => correction.corrects,
+            _ => kind,
+        }
+    }
+
+    /// Whose intervals were widened as far as they ever are, [`LARGEST_SD_SCALE`](crate::LARGEST_SD_SCALE), when the blocks
+    /// left out may ask for more: the default estimator's, or those of the filter that it corrects, `filter` or `smoother`.
+    #[must_use]
+    pub fn widened_most(&self) -> Vec<&'static str> {
+        let of = |kind: EstimatorKind| self.estimators.get(&self.filter_of(kind));
+        let kind = self.default_estimator;
+        let filter = of(kind).map(|params| params.strain_sd_scale);
+        let smoother = of(kind).and_then(|params| params.smoothed_sd_scale);
+        let widened = [("filter", filter), ("smoother", smoother)];
+        let at_most = |scale: Option<f64>| scale.is_some_and(|scale| scale >= LARGEST_SD_SCALE);
+        widened.into_iter().filter(|(_, scale)| at_most(*scale)).map(|(name, _)| name).collect()
+    }
+
+    /// What the rested sensor read in calibration, in its unit: R₀ of the law where nothing was read at rest.
+    #[must_use]
+    pub fn rested(&self) -> f64 {
+        self.measured_rest.unwrap_or(self.rest_reading)
+    }
+
+    /// R₀ of the law on a day on which the rested sensor reads `measured`, in its unit.
+    #[must_use]
+    pub fn rest_reading_of(&self, measured: f64) -> f64 {
+        self.rest_reading * (measured / self.rested())
+    }
+
+    /// The parameters of an estimator.
+    ///
+    /// # Errors
+    /// If the file has none for it.
+    pub fn estimator(&self, kind: EstimatorKind) -> Result<&EstimatorParams, NoParameters> {
+        self.estimators.get(&kind).ok_or(NoParameters { kind })
+    }
+}

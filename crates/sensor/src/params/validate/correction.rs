@@ -1,0 +1,135 @@
+use ohmstrain_ekf::correction::{FILTER_INPUTS, INDUCING};
+
+use super::table::{AMOUNT, FACTOR, FieldError, POSITIVE, SIGNED, Table, WEIGHT};
+use crate::correction::{ONE_SIDED, ProcessKind, side_of};
+use crate::params::correction::{
+    CorrectionParams, CorrectionScale, CorrectorParams, InputScales, ProcessParams, SIDES, SMOOTHER_INPUTS,
+    SimulatedParams, TrainingRow,
+};
+use crate::params::estimator::EstimatorKind;
+
+/// Training rows that a file may have.
+const ROWS: std::ops::RangeInclusive<usize> = 2..=1000;
+
+impl CorrectionParams {
+    pub(crate) fn validate(&self, table: &Table) -> Result<(), FieldError> {
+        if self.corrects == EstimatorKind::Corrected {
+            return Err(table.wrong("corrects", "a filter", self.corrects.name()));
+        }
+        self.readings.validate(&table.table("readings"))?;
+        let rows = self.rows.len();
+        self.filter.validate(&table.table("filter"), FILTER_INPUTS, rows)?;
+        self.smoother.validate(&table.table("smoother"), SMOOTHER_INPUTS, rows)?;
+        count(table, rows)?;
+        self.rows.iter().enumerate().try_for_each(|(index, row)| row.validate(&table.entry("rows", index)))?;
+        self.simulated.validate(&table.table("simulated"))
+    }
+}
+
+fn count(table: &Table, rows: usize) -> Result<(), FieldError> {
+    let expected = || format!("{} to {} entries", ROWS.start(), ROWS.end());
+    if ROWS.contains(&rows) { Ok(()) } else { Err(table.wrong("rows", expected(), rows)) }
+}
+
+impl SimulatedParams {
+    fn validate(&self, table: &Table) -> Result<(), FieldError> {
+        table.number("mean", self.mean, SIGNED)?;
+        table.number("sd", self.sd, POSITIVE)?;
+        table.number("length", self.length, FACTOR)?;
+        count(table, self.rows.len())?;
+        table.length("weights", self.rows.len(), self.weights.len())?;
+        table.numbers("weights", &self.weights, WEIGHT)?;
+        self.rows.iter().enumerate().try_for_each(|(index, row)| table.numbers(&format!("rows[{index}]"), row, SIGNED))
+    }
+}
+
+impl CorrectionScale {
+    /// Checks every number.
+    ///
+    /// # Errors
+    /// Names the first that is outside of its range.
+    pub fn validate(&self, table: &Table) -> Result<(), FieldError> {
+        table.number("centre", self.centre, SIGNED)?;
+        table.number("half_range", self.half_range, POSITIVE)?;
+        table.numbers("rates", &self.rates, POSITIVE)?;
+        table.numbers("starts", self.starts.as_flattened(), SIGNED)
+    }
+}
+
+impl CorrectorParams {
+    /// Of a corrector with so many inputs.
+    fn validate(&self, table: &Table, inputs: usize, rows: usize) -> Result<(), FieldError> {
+        table.number("sd_scale", self.sd_scale, FACTOR)?;
+        table.number("strain_sd", self.strain_sd, POSITIVE)?;
+        table.length("order", rows, self.order.len())?;
+        let mut missing = vec![true; rows];
+        for (index, row) in self.order.iter().enumerate() {
+            let is_new = missing.get_mut(*row).is_some_and(std::mem::take);
+            if !is_new {
+                return Err(table.wrong(&format!("order[{index}]"), format!("each of 0 to {} once", rows - 1), row));
+            }
+        }
+        self.inputs.validate(&table.table("inputs"), inputs)?;
+        let process = |kind: ProcessKind, process: &ProcessParams, table: &Table| {
+            process.validate(table, kind.places(inputs).len(), rows)
+        };
+        process(ProcessKind::Direct, &self.direct, &table.table("direct"))?;
+        process(ProcessKind::Residual, &self.residual, &table.table("residual"))?;
+        let sides = if inputs == SMOOTHER_INPUTS { SIDES } else { 0 };
+        if self.one_sided.len() != sides {
+            return Err(table.wrong("one_sided", format!("{sides} entries"), self.one_sided.len()));
+        }
+        let mut one_sided = self.one_sided.iter().zip(ONE_SIDED).enumerate();
+        one_sided.try_for_each(|(index, (side, kind))| process(kind, side, &table.entry("one_sided", index)))
+    }
+}
+
+impl InputScales {
+    fn validate(&self, table: &Table, inputs: usize) -> Result<(), FieldError> {
+        let columns = [
+            ("mean", &self.mean, SIGNED),
+            ("sd", &self.sd, AMOUNT),
+            ("lower", &self.lower, SIGNED),
+            ("upper", &self.upper, SIGNED),
+        ];
+        columns.into_iter().try_for_each(|(name, values, allowed)| {
+            table.length(name, inputs, values.len())?;
+            table.numbers(name, values, allowed)
+        })
+    }
+}
+
+impl ProcessParams {
+    fn validate(&self, table: &Table, inputs: usize, rows: usize) -> Result<(), FieldError> {
+        table.number("sd_scale", self.sd_scale, FACTOR)?;
+        table.number("mean", self.mean, SIGNED)?;
+        table.number("sd", self.sd, AMOUNT)?;
+        table.number("least_sd", self.least_sd, AMOUNT)?;
+        table.number("noise_sd", self.noise_sd, AMOUNT)?;
+        table.length("lengths", inputs, self.lengths.len())?;
+        table.numbers("lengths", &self.lengths, FACTOR)?;
+        table.length("weights", rows, self.weights.len())?;
+        table.numbers("weights", &self.weights, WEIGHT)?;
+        let side = side_of(self.explained.len());
+        if side * (side + 1) / 2 != self.explained.len() || side > INDUCING.min(rows) {
+            let expected = format!("m (m + 1)/2 entries, m up to {}", INDUCING.min(rows));
+            return Err(table.wrong("explained", expected, self.explained.len()));
+        }
+        table.numbers("explained", &self.explained, WEIGHT)
+    }
+}
+
+impl TrainingRow {
+    /// Checks every number.
+    ///
+    /// # Errors
+    /// Names the first that is outside of its range.
+    pub fn validate(&self, table: &Table) -> Result<(), FieldError> {
+        table.number("time_s", self.time_s, SIGNED)?;
+        table.number("strain", self.strain, SIGNED)?;
+        table.numbers("past", &self.past, SIGNED)?;
+        table.numbers("future", &self.future, SIGNED)?;
+        table.numbers("filtered", &self.filtered, SIGNED)?;
+        table.numbers("smoothed", &self.smoothed, SIGNED)
+    }
+}

@@ -1,0 +1,147 @@
+//! Ranges of numbers in parameter files, and the names of what is outside of its range.
+
+use thiserror::Error;
+
+/// A number in a sensor's parameters that no sensor can have.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("field `{field}`: expected {expected}, found {found}")]
+pub struct FieldError {
+    /// Where it stands: names of tables and index in an array, `law.branches[0].tau_s`.
+    pub field: String,
+    /// What it may be.
+    pub expected: String,
+    /// What it is.
+    pub found: String,
+}
+
+/// What a number may be, ends included.
+#[derive(Clone, Copy)]
+pub struct Allowed {
+    /// Smallest value.
+    pub least: f64,
+    /// Largest value.
+    pub most: f64,
+}
+
+impl Allowed {
+    fn contains(self, value: f64) -> bool {
+        (self.least..=self.most).contains(&value)
+    }
+}
+
+/// Strains, degrees, coefficients: far beyond what sensors have, and near enough for squares and products of some
+/// of them to be numbers.
+pub const SIGNED: Allowed = Allowed { least: -1e9, most: 1e9 };
+/// What a branch may gain or lose per strain, relative to R₀.
+pub const GAIN: Allowed = Allowed { least: -LARGEST_CHANGE, most: LARGEST_CHANGE };
+/// Resistances, times, rates, lengths. The search for noise and motion ends between `e^-25` and `e^15`.
+pub const POSITIVE: Allowed = Allowed { least: 1e-12, most: 1e12 };
+/// Rates, 1/s: squares of what is faster leave no digits to a belief, and the search ends far below.
+pub const RATE: Allowed = Allowed { least: 1e-12, most: 1e8 };
+/// Deviations of the strain, likewise.
+pub const SPREAD: Allowed = Allowed { least: 1e-12, most: 1e6 };
+/// Deviations of what may be exact.
+pub const AMOUNT: Allowed = Allowed { least: 0.0, most: 1e6 };
+/// Probabilities and powers.
+pub const SHARE: Allowed = Allowed { least: 0.0, most: 1.0 };
+/// Factors on standard deviations: what calibration finds lies between 1 and 5.
+pub const FACTOR: Allowed = Allowed { least: 1e-3, most: 1e3 };
+/// Weights of training rows, and entries of matrices made of them.
+pub const WEIGHT: Allowed = Allowed { least: -1e15, most: 1e15 };
+/// What is told and not used: a score, or a variance of what was not determined.
+pub const TOLD: Allowed = Allowed { least: -f64::INFINITY, most: f64::INFINITY };
+/// The same for what is no less than zero.
+pub const TOLD_AMOUNT: Allowed = Allowed { least: 0.0, most: f64::INFINITY };
+
+/// Largest change of resistance, relative to R₀, that a gauge curve may tell within the law's range.
+pub const LARGEST_CHANGE: f64 = 1e6;
+
+/// A table of the file by the path that leads to it.
+pub struct Table(String);
+
+impl Table {
+    /// The whole file.
+    #[must_use]
+    pub const fn root() -> Self {
+        Self(String::new())
+    }
+
+    /// A table in it.
+    #[must_use]
+    pub fn table(&self, name: &str) -> Self {
+        Self(self.path(name))
+    }
+
+    /// A table in an array of tables.
+    #[must_use]
+    pub fn entry(&self, name: &str, index: usize) -> Self {
+        Self(format!("{}[{index}]", self.path(name)))
+    }
+
+    /// The path of a field.
+    #[must_use]
+    pub fn path(&self, name: &str) -> String {
+        if self.0.is_empty() { name.to_string() } else { format!("{}.{name}", self.0) }
+    }
+
+    /// The error of a field.
+    #[must_use]
+    pub fn wrong(&self, name: &str, expected: impl Into<String>, found: impl ToString) -> FieldError {
+        FieldError { field: self.path(name), expected: expected.into(), found: found.to_string() }
+    }
+
+    /// What its numbers make together.
+    pub fn wrong_itself(&self, expected: String, found: String) -> FieldError {
+        FieldError { field: self.0.clone(), expected, found }
+    }
+
+    /// That a number is allowed.
+    ///
+    /// # Errors
+    /// Names the field, if not.
+    pub fn number(&self, name: &str, value: f64, allowed: Allowed) -> Result<(), FieldError> {
+        if allowed.contains(value) {
+            return Ok(());
+        }
+        let Allowed { least, most } = allowed;
+        Err(self.wrong(name, format!("{} to {}", short(least), short(most)), short(value)))
+    }
+
+    /// That all numbers are.
+    ///
+    /// # Errors
+    /// Names the field, if not.
+    pub fn numbers(&self, name: &str, values: &[f64], allowed: Allowed) -> Result<(), FieldError> {
+        // A filter's thousands of numbers are checked whenever one is built: they get names only where one is wrong.
+        let wrong = values.iter().enumerate().find(|(_, value)| !allowed.contains(**value));
+        wrong.map_or(Ok(()), |(index, value)| self.number(&format!("{name}[{index}]"), *value, allowed))
+    }
+
+    /// That an array has the expected length.
+    ///
+    /// # Errors
+    /// Names the field, if not.
+    pub fn length(&self, name: &str, expected: usize, found: usize) -> Result<(), FieldError> {
+        if found == expected { Ok(()) } else { Err(self.wrong(name, format!("{expected} entries"), found)) }
+    }
+}
+
+/// A number in few characters.
+pub fn short(value: f64) -> String {
+    let plain = value == 0.0 || !value.is_finite() || (1e-4..1e6).contains(&value.abs());
+    if plain { value.to_string() } else { format!("{value:e}") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Allowed, Table};
+
+    #[test]
+    fn the_first_wrong_number_of_several_is_named() {
+        let share = Allowed { least: 0.0, most: 1.0 };
+        let rows = Table::root().entry("rows", 3);
+        assert_eq!(rows.numbers("past", &[0.0, 0.5, 1.0], share), Ok(()));
+        let refused = rows.numbers("past", &[0.5, f64::NAN, 2.0], share).unwrap_err();
+        assert_eq!(refused.to_string(), "field `rows[3].past[1]`: expected 0 to 1, found NaN");
+    }
+}

@@ -1,0 +1,293 @@
+use std::sync::Arc;
+
+use ohmstrain_ekf::live::{DoubtParts, LiveParts, Protections, RestBounds, SensorEstimator, Sieve, Unread};
+use ohmstrain_ekf::{
+    AnyCurve, Compact, Dwell, Evidence, Hypotheses, Imm, Settling, SigmaPoints, SignSplit, SparseEkf, State,
+};
+use ohmstrain_model::{StrainRange, SwitchedModel};
+
+use crate::params::SensorParams;
+use crate::params::estimator::{EstimatorKind, EstimatorParams, NoParameters, SettlingParams};
+use crate::params::law::LawParams;
+use crate::params::range::RangeParams;
+use crate::run::learned::Learned;
+use crate::run::options::Options;
+use crate::run::running::{Reports, Running, SharedCorrection};
+use crate::run::{Filter, Smoother, Start};
+use crate::{SensorError, with_sizes};
+
+/// Share of the limits' span to which a given initial strain is believed.
+const START_SD: f64 = 1e-3;
+
+/// A filter for a sensor that knows what is no reading of it, and is not protected otherwise.
+///
+/// # Errors
+/// If a number is out of its range, the sensor has no parameters for the estimator, or it has a number of branches that no
+/// filter is built for.
+pub fn build_filter(
+    params: &SensorParams,
+    kind: Option<EstimatorKind>,
+    start: Start,
+) -> Result<Box<dyn Filter>, SensorError> {
+    let options =
+        Options { start, protections: Protections { plausibility: true, ..Protections::NONE }, ..Options::plain() };
+    build_filter_with(params, Learned::of(params).as_ref(), kind, &options)
+}
+
+/// A filter that shares a sensor's correction, [`Learned::of`] these parameters, with others.
+///
+/// # Errors
+/// As [`build_filter`].
+pub fn build_filter_with(
+    params: &SensorParams,
+    learned: Option<&Arc<Learned>>,
+    kind: Option<EstimatorKind>,
+    options: &Options,
+) -> Result<Box<dyn Filter>, SensorError> {
+    let kind = kind.unwrap_or(params.default_estimator);
+    let recipe = FilterParts::of(params, kind, *options)?;
+    recipe.filter(needed(learned, kind)?)
+}
+
+/// A smoother, with what its correction has learned. Of the options R₀ that is followed, second looks and doubts are not for it.
+///
+/// # Errors
+/// As [`build_filter`].
+pub fn build_smoother_with(
+    params: &SensorParams,
+    learned: Option<&Arc<Learned>>,
+    kind: Option<EstimatorKind>,
+    options: &Options,
+) -> Result<Box<dyn Smoother>, SensorError> {
+    let kind = kind.unwrap_or(params.default_estimator);
+    let recipe = FilterParts::of(params, kind, *options)?;
+    recipe.smoother(needed(learned, kind)?)
+}
+
+/// The learned correction, if the estimator needs one.
+fn needed(learned: Option<&Arc<Learned>>, kind: EstimatorKind) -> Result<Option<&Arc<Learned>>, SensorError> {
+    if kind != EstimatorKind::Corrected {
+        return Ok(None);
+    }
+    Ok(Some(learned.ok_or(NoParameters { kind })?))
+}
+
+/// All that a filter is made of but its correction.
+#[derive(Clone, Copy)]
+pub struct FilterParts<'a> {
+    /// Never [`EstimatorKind::Corrected`].
+    kind: EstimatorKind,
+    law: &'a LawParams,
+    estimator: EstimatorParams,
+    parts: LiveParts<f64, ()>,
+    options: Options,
+}
+
+impl<'a> FilterParts<'a> {
+    /// Of a calibrated sensor.
+    fn of(params: &'a SensorParams, kind: EstimatorKind, options: Options) -> Result<Self, SensorError> {
+        params.validate()?;
+        let kind = params.filter_of(kind);
+        let estimator = *params.estimator(kind)?;
+        Ok(Self { kind, law: &params.law, estimator, parts: params.live_parts(&estimator), options })
+    }
+
+    /// Of a law that is being calibrated: nothing is known of how the sensor is read.
+    pub fn of_law(kind: EstimatorKind, law: &'a LawParams, estimator: EstimatorParams, limits: RangeParams) -> Self {
+        Self { kind, law, estimator, parts: bare_parts(&estimator, limits), options: Options::plain() }
+    }
+
+    /// The same with other options.
+    #[cfg(test)]
+    pub(crate) fn with(self, options: Options) -> Self {
+        Self { options, ..self }
+    }
+
+    /// Its filter, corrected by what has been learned, if anything.
+    pub fn filter(self, learned: Option<&Arc<Learned>>) -> Result<Box<dyn Filter>, SensorError> {
+        let shared = |learned: &Arc<Learned>| (learned.past_scale(), SharedCorrection(Arc::clone(&learned.filter)));
+        let learned = learned.map(shared);
+        Ok(self.running(self.parts.with_correction(learned), None)?)
+    }
+
+    /// Its smoother, the same way.
+    pub fn smoother(self, learned: Option<&Arc<Learned>>) -> Result<Box<dyn Smoother>, SensorError> {
+        let given = self.options.protections;
+        let protections = Protections { second_look: false, following: false, doubts: false, ..given };
+        let of_smoother = Self { options: Options { protections, ..self.options }, ..self };
+        Ok(of_smoother.running(self.parts.with_correction(None), learned.cloned())?)
+    }
+
+    fn running(
+        self,
+        parts: LiveParts<f64, SharedCorrection>,
+        learned: Option<Arc<Learned>>,
+    ) -> Result<Box<dyn Both>, SensorError> {
+        let branches = self.law.branches.len();
+        #[cfg(not(test))]
+        let built = with_sizes!(branches, B, N, L => self.of_size::<B, N, L>(parts, learned));
+        // Laws of unit tests have no branches: a fifth of the instances.
+        #[cfg(test)]
+        let built = with_sizes!(@ branches, B, N, L, self.of_size::<B, N, L>(parts, learned), 0);
+        built.unwrap_or_else(|| Err(SensorError::Branches { found: branches }))
+    }
+
+    /// Any filter of a model of known size.
+    fn of_size<const B: usize, const N: usize, const L: usize>(
+        self,
+        parts: LiveParts<f64, SharedCorrection>,
+        learned: Option<Arc<Learned>>,
+    ) -> Result<Box<dyn Both>, SensorError> {
+        let Self { kind, law, ref estimator, options, .. } = self;
+        let model = switched::<B, N>(law, estimator)?;
+        let refused = SensorError::Start;
+        let reports = reports(estimator, model, &parts.limits, &options);
+        let limits = parts.limits;
+        let with = With { parts, reports, learned, options };
+        Ok(match kind {
+            EstimatorKind::Ekf => with.run::<_, L>(SparseEkf::<_, Compact, B, N>::at_a_moment(model).map_err(refused)?),
+            EstimatorKind::Ukf => {
+                let filter = SparseEkf::<_, Compact, B, N, SigmaPoints<AnyCurve<f64>>>::at_a_moment(model);
+                with.run::<_, L>(filter.map_err(refused)?)
+            }
+            EstimatorKind::Corrected => return Err(NoParameters { kind }.into()),
+            EstimatorKind::Imm => {
+                let PhaseFilter { dwell, evidence, .. } = PhaseFilter::new(kind, estimator, limits)?;
+                with.run::<_, L>(Imm::<_, B, N>::new(model, NO_STEP_S, dwell, evidence).map_err(refused)?)
+            }
+            EstimatorKind::SignSplit => {
+                let PhaseFilter { hold, evidence, .. } = PhaseFilter::new(kind, estimator, limits)?;
+                let filter = SignSplit::<_, B, N, HYPOTHESES>::new(model, NO_STEP_S, hold, evidence);
+                with.run::<_, L>(filter.map_err(refused)?)
+            }
+            EstimatorKind::Hypotheses => {
+                let PhaseFilter { dwell, evidence, .. } = PhaseFilter::new(kind, estimator, limits)?;
+                let filter = Hypotheses::<_, B, N, HISTORIES>::new(model, NO_STEP_S, dwell, evidence);
+                with.run::<_, L>(filter.map_err(refused)?)
+            }
+        })
+    }
+}
+
+/// Surroundings of an estimator.
+struct With<const B: usize, const N: usize> {
+    parts: LiveParts<f64, SharedCorrection>,
+    reports: Reports<B, N>,
+    learned: Option<Arc<Learned>>,
+    options: Options,
+}
+
+impl<const B: usize, const N: usize> With<B, N> {
+    fn run<E, const L: usize>(self, estimator: E) -> Box<dyn Both>
+    where
+        E: SensorEstimator<f64, N, L, State: State<f64, N, L> + Send, Prepared: Send> + Send + 'static,
+    {
+        Box::new(Running::new(estimator, self.parts, self.reports, self.learned, &self.options))
+    }
+}
+
+/// Filter and smoother of one estimator.
+trait Both: Filter + Smoother {}
+impl<R: Filter + Smoother> Both for R {}
+
+/// The model of a law.
+fn switched<const B: usize, const N: usize>(
+    law: &LawParams,
+    estimator: &EstimatorParams,
+) -> Result<SwitchedModel<f64, B, N>, SensorError> {
+    let law = law.to_model().ok_or_else(|| SensorError::Branches { found: law.branches.len() })?;
+    let mut motion = estimator.motion.to_model()?;
+    if let Some(phases) = estimator.phases {
+        motion = motion.with_phase_rate(phases.speed_per_s)?;
+    }
+    Ok(SwitchedModel::new(law, motion, estimator.noise.to_model())?)
+}
+
+/// What filters of phases need besides a model.
+struct PhaseFilter {
+    dwell: Dwell<f64>,
+    /// The same for a body that rests at times.
+    hold: Option<Dwell<f64>>,
+    evidence: Evidence<f64>,
+}
+
+impl PhaseFilter {
+    fn new(kind: EstimatorKind, estimator: &EstimatorParams, limits: StrainRange<f64>) -> Result<Self, SensorError> {
+        let phases = estimator.phases.ok_or(SensorError::NoPhases { kind })?;
+        let dwell = phases.dwell()?;
+        let hold = phases.rests().then_some(dwell);
+        Ok(Self { dwell, hold, evidence: Evidence::new(limits, phases.tempering)? })
+    }
+}
+
+/// Scales, limits and settling of the reports.
+fn reports<const B: usize, const N: usize>(
+    estimator: &EstimatorParams,
+    model: SwitchedModel<f64, B, N>,
+    limits: &StrainRange<f64>,
+    options: &Options,
+) -> Reports<B, N> {
+    let unseen = || Settling::unseen(&estimator.noise.to_model(), B);
+    Reports {
+        model,
+        limits: *limits,
+        settling: estimator.settling.map_or_else(unseen, SettlingParams::to_model),
+        filtered_scale: estimator.strain_sd_scale,
+        smoothed_scale: estimator.smoothed_sd_scale.unwrap_or(1.0),
+        doubts: options.protections.doubts,
+    }
+}
+
+/// Surroundings of a filter of readings R/R₀ of which nothing is known but the limits of the strain.
+fn bare_parts(estimator: &EstimatorParams, limits: RangeParams) -> LiveParts<f64, ()> {
+    let EstimatorParams { motion, noise, .. } = estimator;
+    let unread = Unread::new(motion.rate_time_s, motion.rate_sd_per_s, limits.to_model());
+    let doubt = DoubtParts {
+        low: 0.0,
+        high: 0.0,
+        fastest_per_s: f64::INFINITY,
+        longest_s: f64::INFINITY,
+        per_reading: 0.0,
+        start: 0.0,
+        most: unread.anywhere,
+        session: 0.0,
+        unread,
+        rest: None,
+    };
+    LiveParts {
+        rest_reading: 1.0,
+        rested: 1.0,
+        dt_s: 0.0,
+        longest_step_s: f64::INFINITY,
+        limits: limits.to_model(),
+        strain_sd_scale: estimator.strain_sd_scale,
+        reading_variance: noise.reading_sd * noise.reading_sd,
+        known_variance: (START_SD * limits.span()).powi(2),
+        sieve: Sieve::open().with_error_time(noise.reading_time_s),
+        doubt,
+        rest: RestBounds { low: None, high: None, start: None },
+        learned: None,
+    }
+}
+
+impl SensorParams {
+    /// Surroundings of the filter with that estimator, without a correction.
+    pub(crate) fn live_parts(&self, estimator: &EstimatorParams) -> LiveParts<f64, ()> {
+        LiveParts {
+            rest_reading: self.rest_reading,
+            rested: self.rested(),
+            sieve: self.sieve().with_error_time(estimator.noise.reading_time_s),
+            doubt: self.doubt_parts(&estimator.motion),
+            rest: self.rest_bounds(),
+            ..bare_parts(estimator, self.limits)
+        }
+    }
+}
+
+/// What filters are made for before they know the length of a step.
+const NO_STEP_S: f64 = 0.0;
+
+/// Capacity of the sign-split filter.
+pub const HYPOTHESES: usize = 8;
+/// Capacity of the filter of phase histories.
+pub const HISTORIES: usize = 8;

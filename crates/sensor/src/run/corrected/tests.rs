@@ -1,0 +1,313 @@
+use std::ops::Range;
+use std::sync::Arc;
+
+use ohmstrain_ekf::correction::{
+    FEATURES, FILTER_INPUTS, FeatureScale, OUTPUTS, ReadingFeatures, Starts, filter_inputs, mixture,
+};
+use ohmstrain_ekf::live::{Flags, Protections};
+use ohmstrain_ekf::{Estimate, Gaussian, Guard, Reading, ReadingVerdict, StepError};
+
+use super::{CorrectedWayBack, Learned, future_features, outputs};
+use crate::EstimatorKind;
+use crate::params::correction::ProcessParams;
+use crate::params::correction::{
+    CorrectionParams, CorrectionScale, CorrectorParams, FUTURE_FEATURES, InputScales, SimulatedParams, TrainingRow,
+    smoother_inputs,
+};
+use crate::params::estimator::{EstimatorParams, MotionParams, NoiseParams};
+use crate::params::law::{GaugeParams, LawParams};
+use crate::params::range::RangeParams;
+use crate::run::build::FilterParts;
+use crate::run::options::Options;
+use crate::run::{Filter, Output, Rows, SEGMENT, WayBack};
+
+const LIMITS: RangeParams = RangeParams { lower: 0.0, upper: 0.4 };
+
+/// Says of every row what its time says, less surely the longer no reading has come.
+fn says(time_s: f64, gap: f64, verdict: ReadingVerdict) -> Output {
+    let known = |mean: f64| Gaussian { mean, variance: 1e-4 };
+    let strain = Gaussian { mean: 0.2 + 0.15 * (0.3 * time_s).sin(), variance: 1e-4 * (1.0 + gap) };
+    Output {
+        estimate: Estimate {
+            strain,
+            rate: known(0.045 * (0.3 * time_s).cos()),
+            relaxation: known(0.01 * (0.11 * time_s).sin()),
+            baseline: 0.02 * (0.07 * time_s).cos(),
+            held: known(0.3),
+            still_relaxes: known(0.01),
+            beyond_border: 0.0,
+            near_ramp_border: false,
+        },
+        nis: Some(1.0),
+        verdict,
+        phases: Some([0.7, 0.1, 0.2]),
+        reading: None,
+        doubts: Flags::NONE,
+        rest_off: 0.0,
+    }
+}
+
+struct FakeBack(Vec<Output>);
+
+impl WayBack for FakeBack {
+    fn next_segment(&mut self, out: &mut Vec<Output>) -> Result<Option<Range<usize>>, (usize, StepError)> {
+        let rows = (self.0.len().saturating_sub(1) / SEGMENT * SEGMENT)..self.0.len();
+        *out = self.0.split_off(rows.start);
+        Ok(if rows.is_empty() { None } else { Some(rows) })
+    }
+}
+
+/// Low-passes start a third of the way to the middle.
+const STARTS: Starts<f64> = [[0.0, 0.67]; 6];
+const SCALE: CorrectionScale = CorrectionScale { centre: 0.25, half_range: 0.3, rates: [0.02, 0.05], starts: STARTS };
+
+fn reading(time_s: f64) -> Reading<f64> {
+    Reading::from(0.25 + 0.28 * (0.3 * time_s + 0.2).sin() + 0.02 * (2.1 * time_s).sin())
+}
+
+/// What has been seen up to a row.
+type Seen = Option<[f64; FEATURES]>;
+
+/// Features of the past, or of the future of times in falling order.
+fn features(time_s: &[f64], readings: &[Option<Reading<f64>>], scale: FeatureScale<f64>) -> Vec<Seen> {
+    let mut features = ReadingFeatures::new(scale);
+    let mut before_s = time_s[0];
+    let mut step = |time_s: f64, reading: Option<Reading<f64>>| {
+        let dt_s = (time_s - before_s).abs();
+        before_s = time_s;
+        features.step(dt_s, reading.map(|reading| reading.value))
+    };
+    time_s.iter().zip(readings).map(|(time_s, reading)| step(*time_s, *reading)).collect()
+}
+
+fn both_ways(time_s: &[f64], readings: &[Option<Reading<f64>>]) -> (Vec<Seen>, Vec<Seen>) {
+    let back: (Vec<f64>, Vec<Option<Reading<f64>>>) =
+        (time_s.iter().rev().copied().collect(), readings.iter().rev().copied().collect());
+    let mut future = features(&back.0, &back.1, SCALE.future());
+    future.reverse();
+    (features(time_s, readings, SCALE.past()), future)
+}
+
+fn params() -> CorrectionParams {
+    let time_s: Vec<f64> = (0..600).map(|k| 0.1 * f64::from(k)).collect();
+    let readings: Vec<_> = time_s.iter().map(|time_s| Some(reading(*time_s))).collect();
+    let (past, future) = both_ways(&time_s, &readings);
+    let row = |k: usize| TrainingRow {
+        time_s: time_s[k],
+        strain: 0.2 + 0.14 * (0.3 * time_s[k] + 0.05).sin(),
+        past: past[k].unwrap(),
+        future: future_features(future[k].unwrap()),
+        filtered: outputs(&says(time_s[k], 0.0, ReadingVerdict::Accepted)),
+        smoothed: outputs(&says(time_s[k], 0.0, ReadingVerdict::Accepted)),
+    };
+    // Weights that nobody has learned: what is said of a row is a smooth function of all its inputs.
+    let weights = |rows: usize| (0..rows).map(|k| 0.01 * (1.3 * k as f64).sin()).collect();
+    let process = |length: f64, inputs: usize| ProcessParams {
+        sd_scale: 1.2,
+        mean: 0.03,
+        sd: 0.2,
+        least_sd: 0.1,
+        noise_sd: 0.02,
+        lengths: vec![length; inputs],
+        weights: weights(60),
+        explained: (0..6).map(|k| 0.3 * (0.7 * f64::from(k)).cos()).collect(),
+    };
+    let column = |value: f64, inputs: usize| vec![value; inputs];
+    let corrector = |future: usize, one_sided| CorrectorParams {
+        sd_scale: 0.9,
+        strain_sd: 0.1,
+        order: (0..60).rev().collect(),
+        inputs: InputScales {
+            mean: column(0.1, FILTER_INPUTS + future),
+            sd: column(0.5, FILTER_INPUTS + future),
+            lower: column(-0.9, FILTER_INPUTS + future),
+            upper: column(0.9, FILTER_INPUTS + future),
+        },
+        direct: process(2.0, FEATURES + future),
+        residual: process(4.0, OUTPUTS + FEATURES + future),
+        one_sided,
+    };
+    CorrectionParams {
+        corrects: EstimatorKind::SignSplit,
+        readings: SCALE,
+        filter: corrector(0, Vec::new()),
+        smoother: corrector(FUTURE_FEATURES, vec![process(2.0, FEATURES), process(4.0, 1 + FUTURE_FEATURES)]),
+        rows: (0..600).step_by(10).map(row).collect(),
+        simulated: SimulatedParams {
+            mean: 0.2,
+            sd: 0.2,
+            length: 4.0,
+            weights: weights(15),
+            rows: (3..600).step_by(40).map(|k| row(k).past).collect(),
+        },
+    }
+}
+
+/// Two whole segments and a short one. Readings are missing now and then, among others around a border of segments, at
+/// the start and at the end.
+fn recording() -> (Vec<f64>, Vec<Option<Reading<f64>>>) {
+    let rows = 2 * SEGMENT + 500;
+    let missing = |k: usize| k % 11 == 3 || k < 2 || k + 4 > rows || k.abs_diff(SEGMENT) < 6;
+    let time_s: Vec<f64> = (0..rows).map(|k| 0.05 * k as f64).collect();
+    let readings = time_s.iter().enumerate().map(|(k, time_s)| (!missing(k)).then(|| reading(*time_s))).collect();
+    (time_s, readings)
+}
+
+#[test]
+fn segments_say_what_the_whole_recording_says() {
+    let (time_s, readings) = recording();
+    let (past, future) = both_ways(&time_s, &readings);
+    let mut gap = 0.0;
+    let plain: Vec<Output> = (0..time_s.len())
+        .map(|k| {
+            gap = if k > 0 && readings[k].is_none() { gap + time_s[k] - time_s[k - 1] } else { 0.0 };
+            let verdict = if readings[k].is_none() { ReadingVerdict::Missing } else { ReadingVerdict::Accepted };
+            says(time_s[k], gap, verdict)
+        })
+        .collect();
+    let row = |k: usize| (time_s[k], readings[k]);
+    let learned = Learned::new(&params(), LIMITS);
+    let back = Box::new(FakeBack(plain.clone()));
+    let mut back = CorrectedWayBack::new(back, &learned, Rows::new(time_s.len(), &row));
+    let (mut smoothed, mut segment) = (Vec::new(), Vec::new());
+    while back.next_segment(&mut segment).unwrap().is_some() {
+        smoothed.splice(0..0, segment.iter().copied());
+    }
+    let correction = Arc::clone(&learned.smoother);
+    assert_eq!(smoothed.len(), time_s.len());
+    for k in 0..time_s.len() {
+        let said = plain[k];
+        let mut expected = said.estimate.strain;
+        if let Some(past) = past[k] {
+            let future = future[k].map_or([0.0; FEATURES - 1], future_features);
+            let inputs = smoother_inputs(&outputs(&said), &past, &future);
+            expected = correction.correction().correct(&inputs, expected, 1.0).strain;
+            // At readings the filter's variance is 1e-4, whatever the side.
+            expected.variance += said.estimate.strain.variance - 1e-4;
+        }
+        let strain = smoothed[k].estimate.strain;
+        // The low-passes of thousands of rows begin anew from what was kept: to the last bit, but for the growth.
+        assert!(strain.mean == expected.mean && (strain.variance - expected.variance).abs() < 1e-15, "{k}");
+        assert_eq!((smoothed[k].nis, smoothed[k].phases), (said.nis, said.phases));
+    }
+}
+
+/// A law without branches, and an extended Kalman filter for it.
+fn law_and_estimator() -> (LawParams, EstimatorParams) {
+    let law = LawParams {
+        gauge: GaugeParams::Polynomial { coefficients: [1.4, -0.3, 0.0] },
+        extend_viscosity_s: 0.01,
+        retract_viscosity_s: -0.01,
+        branches: Vec::new(),
+        range: LIMITS,
+    };
+    let estimator = EstimatorParams {
+        score: 0.0,
+        strain_sd_scale: 1.3,
+        smoothed_sd_scale: Some(1.1),
+        motion: MotionParams { rate_sd_per_s: 0.05, rate_time_s: 2.0, strain_mean: 0.2, strain_sd: 0.1 },
+        noise: NoiseParams {
+            baseline_sd: 0.02,
+            baseline_time_s: 100.0,
+            reading_sd: 4e-3,
+            reading_time_s: 0.0,
+            branch_sd: 0.01,
+        },
+        phases: None,
+        settling: None,
+    };
+    (law, estimator)
+}
+
+/// That filter, corrected or not, with or without a gate.
+fn live(learned: Option<&Arc<Learned>>, gate: Option<f64>) -> Box<dyn Filter> {
+    let (law, estimator) = law_and_estimator();
+    let guard = gate.map_or_else(Guard::none, |gate| Guard::none().with_gate(gate, 5).unwrap());
+    let options = Options { guard, protections: Protections::NONE, ..Options::plain() };
+    FilterParts::of_law(EstimatorKind::Ekf, &law, estimator, LIMITS).with(options).filter(learned).unwrap()
+}
+
+/// Rows at 8 Hz, whose times no clock rounds. They begin without a reading; later readings are missing one by one
+/// and for seconds; two are outliers.
+fn broken_recording() -> Vec<(f64, Option<Reading<f64>>)> {
+    let row = |k: u32| {
+        let time_s = 0.125 * f64::from(k);
+        let is_lost = k < 2 || k % 11 == 3 || (200..260).contains(&k);
+        let value = if k == 100 || k == 400 { Reading::from(5.0) } else { reading(time_s) };
+        (time_s, (!is_lost).then_some(value))
+    };
+    (0..600).map(row).collect()
+}
+
+/// What is expected of a corrected filter from the bare one beside it: where a reading is missing, or turned down, the features stay
+/// and the variance grows with the filter's; innovations of rows before, fading with 20 s, widen it, in the naive sum.
+#[test]
+fn a_corrected_filter_says_what_the_bare_one_beside_it_and_its_readings_say() {
+    let learned = Learned::new(&params(), LIMITS);
+    let correction = Arc::clone(&learned.filter);
+    let (mut bare, mut corrected) = (live(None, Some(30.0)), live(Some(&learned), Some(30.0)));
+    let mut features = ReadingFeatures::new(SCALE.past());
+    let (mut last_s, mut known, mut innovations) = (0.0, None, Vec::<(f64, f64)>::new());
+    let mut rejected = 0;
+    for (time_s, reading) in broken_recording() {
+        bare.step(time_s, reading).unwrap();
+        corrected.step(time_s, reading).unwrap();
+        let said = bare.output();
+        let seen = reading.filter(|_| said.verdict.is_taken());
+        rejected += usize::from(said.verdict == ReadingVerdict::Rejected);
+        let past = features.step(time_s - last_s, seen.map(|reading| reading.value)).or(features.now());
+        last_s = time_s;
+        let filtered = said.estimate.strain;
+        if seen.is_some() {
+            known = Some(filtered.variance);
+        }
+        // The first innovation has no interval before it, and a row does not know of its own.
+        let share = |k: usize| 1.0 - (-(innovations[k].0 - innovations[k - 1].0) / 20.0).exp();
+        let last = innovations.last().map_or(0.0, |last| last.0);
+        let fading = |k: usize| (-(last - innovations[k].0) / 20.0).exp();
+        let mean: f64 = (1..innovations.len()).map(|k| innovations[k].1.min(30.0) * share(k) * fading(k)).sum();
+        let expected = past.map_or(filtered, |past| {
+            let inputs = filter_inputs(&outputs(&said), &past);
+            let strain = correction.correction().correct(&inputs, filtered, mean.max(1.0)).strain;
+            let grown = if seen.is_none() { filtered.variance - known.unwrap() } else { 0.0 };
+            Gaussian { variance: strain.variance + grown.max(0.0), ..strain }
+        });
+        let strain = corrected.strain();
+        let off = (strain.mean - expected.mean).abs().max((strain.variance / expected.variance - 1.0).abs());
+        assert!(off < 1e-9, "{time_s} s: {strain:?} {expected:?}");
+        let bare_but_strain = Estimate { strain, ..said.estimate };
+        assert_eq!(corrected.output(), Output { estimate: bare_but_strain, ..said });
+        if let (Some(nis), true) = (said.nis, seen.is_some()) {
+            innovations.push((time_s, nis));
+        }
+    }
+    assert_eq!(rejected, 2);
+}
+
+/// With a fixed lag every row comes out once and in order, mixed with what was said of it when it came, whatever rows were
+/// refused in between.
+#[test]
+fn a_lagged_row_is_mixed_with_what_was_said_of_it() {
+    let learned = Learned::new(&params(), LIMITS);
+    let [mut now, mut lagging] = [0; 2].map(|_| live(Some(&learned), None));
+    let mut bare = live(None, None);
+    let (mut said, mut out, mut plain) = (Vec::new(), Vec::new(), Vec::new());
+    for k in 0..50 {
+        let time_s = 0.1 * f64::from(k);
+        let reading = Some(reading(time_s));
+        now.step(time_s, reading).unwrap();
+        said.push(now.strain());
+        lagging.step_lagged(time_s, reading, 0.2, &mut |output| out.push(output)).unwrap();
+        bare.step_lagged(time_s, reading, 0.2, &mut |output| plain.push(output)).unwrap();
+        if k == 20 {
+            assert!(lagging.step_lagged(-1.0, None, 0.2, &mut |output| out.push(output)).is_err());
+        }
+    }
+    assert_eq!(out.len(), 48);
+    lagging.flush_lagged(&mut |output| out.push(output)).unwrap();
+    bare.flush_lagged(&mut |output| plain.push(output)).unwrap();
+    // The readings are the law's own: innovations are no larger than stated.
+    let expected: Vec<Gaussian<f64>> =
+        said.iter().zip(&plain).map(|(said, plain)| mixture([*said, plain.estimate.strain])).collect();
+    assert_eq!(out.iter().map(|output| output.estimate.strain).collect::<Vec<_>>(), expected);
+}

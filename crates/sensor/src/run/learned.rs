@@ -1,0 +1,50 @@
+use std::sync::Arc;
+
+use ohmstrain_ekf::correction::{FILTER_INPUTS, FeatureScale};
+
+use crate::correction::{OwnedCorrection, OwnedSimulated};
+use crate::params::SensorParams;
+use crate::params::correction::{CorrectionParams, CorrectionScale, SIDES, SMOOTHER_INPUTS, TrainingRow};
+use crate::params::range::RangeParams;
+
+/// The learned correction of a sensor, shared by its filters and smoothers.
+#[derive(Debug)]
+pub struct Learned {
+    readings: CorrectionScale,
+    pub(crate) filter: Arc<OfFilter>,
+    pub(crate) smoother: Arc<OfSmoother>,
+}
+
+/// What corrects a filter's strain.
+pub(crate) type OfFilter = OwnedCorrection<f64, FILTER_INPUTS>;
+/// What corrects a smoother's.
+pub(crate) type OfSmoother = OwnedCorrection<f64, SMOOTHER_INPUTS, SIDES>;
+
+impl Learned {
+    /// Of a sensor's correction; `None` if it has none.
+    #[must_use]
+    pub fn of(params: &SensorParams) -> Option<Arc<Self>> {
+        params.correction.as_ref().map(|correction| Self::new(correction, params.limits))
+    }
+
+    /// Of parameters, and the limits of the strain.
+    #[must_use]
+    pub fn new(params: &CorrectionParams, limits: RangeParams) -> Arc<Self> {
+        let of_filter: Vec<_> = params.rows.iter().map(TrainingRow::filter_inputs).collect();
+        let of_smoother: Vec<_> = params.rows.iter().map(TrainingRow::smoother_inputs).collect();
+        let mut filter = OfFilter::new(&params.filter, &of_filter, limits);
+        filter.simulated = Some(OwnedSimulated::new(&params.simulated, &filter.scales));
+        let smoother = OfSmoother::new(&params.smoother, &of_smoother, limits);
+        Arc::new(Self { readings: params.readings, filter: Arc::new(filter), smoother: Arc::new(smoother) })
+    }
+
+    /// The scale of the features that a filter's correction sees.
+    pub(crate) fn past_scale(&self) -> FeatureScale<f64> {
+        self.readings.past()
+    }
+
+    /// The scale of the features of the future.
+    pub(crate) fn future_scale(&self) -> FeatureScale<f64> {
+        self.readings.future()
+    }
+}

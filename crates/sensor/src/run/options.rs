@@ -1,0 +1,23 @@
+use ohmstrain_ekf::Guard;
+use ohmstrain_ekf::live::Protections;
+
+use crate::run::Start;
+
+/// Start, guard and protections of a filter.
+#[derive(Clone, Copy, Debug)]
+pub struct Options {
+    /// The start.
+    pub start: Start,
+    /// Treatment of outliers.
+    pub guard: Guard<f64>,
+    /// Protections from what no calibration has seen; of outliers the guard decides.
+    pub protections: Protections,
+}
+
+impl Options {
+    /// From an unknown strain, unprotected.
+    #[must_use]
+    pub fn plain() -> Self {
+        Self { start: Start::Unknown, guard: Guard::none(), protections: Protections::NONE }
+    }
+}

@@ -1,0 +1,61 @@
+//! What a filter is made of as plain numbers: for programs that write it in another language.
+
+use ohmstrain_ekf::correction::{FILTER_INPUTS, FeatureScale};
+use ohmstrain_ekf::live::LiveParts;
+
+use crate::SensorError;
+use crate::correction::OwnedCorrection;
+use crate::params::SensorParams;
+use crate::params::estimator::{EstimatorKind, EstimatorParams};
+use crate::run::build::{HISTORIES, HYPOTHESES};
+use crate::run::learned::Learned;
+
+/// A sensor's filter, with what stands around it.
+#[derive(Clone, Debug)]
+pub struct PortableFilter {
+    /// Which filter moves the state: never [`EstimatorKind::Corrected`].
+    pub kind: EstimatorKind,
+    /// How many hypotheses it keeps: 1 if it keeps none.
+    pub hypotheses: usize,
+    /// Its noise, motion and phases.
+    pub estimator: EstimatorParams,
+    /// Its surroundings.
+    pub parts: LiveParts<f64, ()>,
+    /// What corrects its strain.
+    pub correction: Option<PortableCorrection>,
+}
+
+/// The learned correction of a filter's strain.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PortableCorrection {
+    /// The scale of the features.
+    pub features: FeatureScale<f64>,
+    /// As it runs.
+    pub learned: OwnedCorrection<f64, FILTER_INPUTS>,
+}
+
+impl PortableFilter {
+    /// Of the sensor's default estimator, or of another one.
+    ///
+    /// # Errors
+    /// If a number is out of its range, or the sensor has no parameters for the estimator.
+    pub fn new(params: &SensorParams, kind: Option<EstimatorKind>) -> Result<Self, SensorError> {
+        params.validate()?;
+        let asked = kind.unwrap_or(params.default_estimator);
+        let kind = params.filter_of(asked);
+        let estimator = *params.estimator(kind)?;
+        let learned = Learned::of(params).filter(|_| asked == EstimatorKind::Corrected);
+        let correction = learned.map(|learned| {
+            let (features, learned) = (learned.past_scale(), learned.filter.as_ref().clone());
+            PortableCorrection { features, learned }
+        });
+        let hypotheses = match kind {
+            EstimatorKind::SignSplit => HYPOTHESES,
+            EstimatorKind::Hypotheses => HISTORIES,
+            EstimatorKind::Imm => 3,
+            _ => 1,
+        };
+        let parts = params.live_parts(&estimator);
+        Ok(Self { kind, hypotheses, estimator, parts, correction })
+    }
+}

@@ -1,0 +1,286 @@
+use std::collections::VecDeque;
+use std::mem;
+use std::sync::Arc;
+
+use ohmstrain_ekf::correction::{FILTER_INPUTS, mixture};
+use ohmstrain_ekf::live::{Correct, Doubts, Flags, Heard, LiveFilter, LiveParts, LiveRow, SensorEstimator};
+use ohmstrain_ekf::{Estimate, Estimator, Gaussian, PastStep, Reading, Settling, State, StepError};
+use ohmstrain_model::{StrainRange, SwitchedModel};
+
+use crate::run::backward::{Backward, Row};
+use crate::run::clock::{Clock, floored};
+use crate::run::learned::{Learned, OfFilter};
+use crate::run::options::Options;
+use crate::run::remembering::Remembering;
+use crate::run::{Filter, Output};
+
+/// The live filter on a computer.
+pub(crate) type Live<E, const N: usize, const L: usize> =
+    LiveFilter<f64, Remembering<E, <E as Estimator<f64, N, L>>::Prepared>, SharedCorrection, N, L>;
+/// A row of it on the way forward.
+pub(crate) type LiveStep<E, const N: usize, const L: usize> =
+    Row<Remembering<E, <E as Estimator<f64, N, L>>::Prepared>, N, L>;
+
+/// A row, and the step that a smoother needs of it.
+pub(crate) type KeptRow<E, const N: usize, const L: usize> =
+    (LiveRow<f64, <E as Estimator<f64, N, L>>::State>, LiveStep<E, N, L>);
+
+/// The learned correction of a sensor, shared by its filters.
+#[derive(Clone)]
+pub(crate) struct SharedCorrection(pub Arc<OfFilter>);
+
+impl Correct<f64> for SharedCorrection {
+    fn correct(&self, inputs: &[f64; FILTER_INPUTS], filtered: Gaussian<f64>, birge: f64) -> Gaussian<f64> {
+        self.0.correction().correct(inputs, filtered, birge).strain
+    }
+}
+
+/// A live filter with rows that wait for later readings.
+pub(crate) struct Running<E: SensorEstimator<f64, N, L>, const B: usize, const N: usize, const L: usize> {
+    pub live: Live<E, N, L>,
+    pub clock: Clock,
+    reports: Reports<B, N>,
+    /// The smoother's correction.
+    pub learned: Option<Arc<Learned>>,
+    /// The last row.
+    last: Option<LiveRow<f64, E::State>>,
+    pending: VecDeque<Pending<E, N, L>>,
+    /// Estimates on their way out, newest first.
+    due: Vec<Output>,
+}
+
+/// From states to what is reported.
+#[derive(Clone, Copy)]
+pub(crate) struct Reports<const B: usize, const N: usize> {
+    pub model: SwitchedModel<f64, B, N>,
+    pub limits: StrainRange<f64>,
+    pub settling: Settling<f64>,
+    /// Factors on the strain's standard deviation.
+    pub filtered_scale: f64,
+    pub smoothed_scale: f64,
+    /// True if doubts widen intervals.
+    pub doubts: bool,
+}
+
+impl<const B: usize, const N: usize> Reports<B, N> {
+    /// The report of a state, before any correction.
+    pub(crate) fn row<S: State<f64, N, L>, const L: usize>(
+        &self,
+        state: &S,
+        heard: &Heard<f64>,
+        sd_scale: f64,
+    ) -> Output {
+        Output {
+            estimate: Estimate::new(&self.model, state, &self.limits, sd_scale, &self.settling),
+            nis: heard.nis,
+            verdict: heard.verdict,
+            phases: state.phases(),
+            reading: heard.reading,
+            doubts: Flags::NONE,
+            rest_off: 0.0,
+        }
+    }
+}
+
+/// A row whose estimate waits for later readings.
+struct Pending<E: SensorEstimator<f64, N, L>, const N: usize, const L: usize> {
+    time_s: f64,
+    said: Said,
+    row: LiveStep<E, N, L>,
+}
+
+/// A row as it was reported when it came.
+#[derive(Clone, Copy)]
+struct Said {
+    heard: Heard<f64>,
+    /// The corrected strain before doubts, and how much larger innovations had been than stated; `None` without a correction.
+    corrected: Option<(Gaussian<f64>, f64)>,
+    doubts: Doubts<f64>,
+    rest_off: f64,
+}
+
+impl<E, const B: usize, const N: usize, const L: usize> Running<E, B, N, L>
+where
+    E: SensorEstimator<f64, N, L>,
+{
+    /// Before any row.
+    pub(crate) fn new(
+        estimator: E,
+        parts: LiveParts<f64, SharedCorrection>,
+        reports: Reports<B, N>,
+        learned: Option<Arc<Learned>>,
+        options: &Options,
+    ) -> Self {
+        let longest_step_s = floored(estimator.longest_step_s().min(parts.longest_step_s));
+        let live = LiveFilter::new(Remembering::new(estimator), LiveParts { longest_step_s, ..parts });
+        let mut live = live.protected_by(options.protections).guarded_by(options.guard);
+        if let Some(strain) = options.start.strain() {
+            live.start_at(Some(strain));
+        }
+        let (pending, due) = (VecDeque::new(), Vec::new());
+        Self { live, clock: Clock::default(), reports, learned, last: None, pending, due }
+    }
+
+    /// The next row.
+    pub(crate) fn row(
+        &mut self,
+        time_s: f64,
+        reading: Option<Reading<f64>>,
+    ) -> Result<LiveRow<f64, E::State>, StepError> {
+        if reading.is_some_and(|reading| !reading.value.is_finite()) {
+            return Err(StepError::NonFiniteReading);
+        }
+        let (clock, dt_s) = self.clock.at(time_s)?;
+        let row = self.live.row_after(dt_s, reading)?;
+        self.clock = clock;
+        Ok(row)
+    }
+
+    /// The next row, and what a smoother needs of it.
+    pub(crate) fn kept_row(
+        &mut self,
+        time_s: f64,
+        reading: Option<Reading<f64>>,
+    ) -> Result<KeptRow<E, N, L>, StepError> {
+        let before = self.live.state().clone();
+        let row = self.row(time_s, reading)?;
+        let step = match &row.look {
+            None => Row::Read(self.live.past_step(&before, &row.heard)),
+            Some(look) => {
+                let whole = self.live.substeps().prepare_whole(row.pause);
+                let whole = whole.map(|prepared| Box::new(PastStep { from: before, prepared, reading: None }));
+                Row::Unread { predicted: Box::new(look.clone()), whole }
+            }
+        };
+        Ok((row, step))
+    }
+
+    /// What a smoother says at a row.
+    pub(crate) fn smoothed_row(&self, state: &E::State, heard: &Heard<f64>) -> Output {
+        self.reports.row(state, heard, self.reports.smoothed_scale)
+    }
+
+    /// Says the strain in doubt, unless nothing is to be doubted.
+    fn widen(&self, output: &mut Output, doubts: &Doubts<f64>, stated: Gaussian<f64>, (variance, flags): (f64, Flags)) {
+        if self.reports.doubts {
+            output.widen(doubts, stated, variance);
+            output.doubts = flags;
+        } else {
+            output.estimate.strain = stated;
+        }
+    }
+
+    /// The report of a row given later readings: mixed with what was said when it came where that is corrected, and in the
+    /// doubts of then.
+    fn lagged_row(&self, state: &E::State, said: &Said) -> Output {
+        let scale = self.reports.filtered_scale.max(self.reports.smoothed_scale);
+        let mut output = self.reports.row(state, &said.heard, scale);
+        output.rest_off = said.rest_off;
+        let lagged = output.estimate.strain;
+        let stated = said.corrected.map_or(lagged, |(corrected, birge)| {
+            mixture([corrected, Gaussian { variance: lagged.variance * birge, ..lagged }])
+        });
+        let open = if said.heard.used.is_some() { stated.variance } else { said.doubts.open(stated) };
+        let widened = said.doubts.widened(output.estimate.rate.mean, open);
+        self.widen(&mut output, &said.doubts, stated, widened);
+        output
+    }
+
+    /// Hands out the first `count` of the rows that wait, given everything up to the state `last`.
+    fn emit(&mut self, count: usize, last: E::State, out: &mut dyn FnMut(Output)) -> Result<(), StepError> {
+        let mut due = mem::take(&mut self.due);
+        let mut back = Backward::new(last);
+        let mut smoothed = Ok(true);
+        for (place, Pending { time_s, said, row }) in self.pending.iter().enumerate().rev().take_while(|_| count > 0) {
+            let show = |state: &E::State| {
+                if place < count {
+                    due.push(self.lagged_row(state, said));
+                }
+            };
+            smoothed = back.over(self.live.substeps(), *time_s, row, place > 0, show);
+            if smoothed != Ok(true) {
+                break;
+            }
+        }
+        if smoothed == Ok(true) {
+            due.iter().rev().for_each(|output| out(*output));
+            self.pending.drain(..count);
+        }
+        due.clear();
+        self.due = due;
+        if smoothed? { Ok(()) } else { Err(StepError::NoSmoother) }
+    }
+
+    /// The state after a row, before the filter looked again: nothing leads back over a hypothesis that comes from nowhere.
+    fn state_after(&self, heard: &Heard<f64>, row: &LiveStep<E, N, L>) -> Result<E::State, StepError> {
+        match row {
+            Row::Read(step) if heard.jumped.is_some() => {
+                let taken = self.live.substeps().advance(&step.from, &step.prepared, step.reading)?;
+                Ok(taken.state)
+            }
+            _ => Ok(self.live.state().clone()),
+        }
+    }
+}
+
+impl<E, const B: usize, const N: usize, const L: usize> Filter for Running<E, B, N, L>
+where
+    E: SensorEstimator<f64, N, L, State: Send, Prepared: Send> + Send,
+{
+    fn rest(&mut self, measured: f64) -> Result<(), StepError> {
+        self.live.rest(measured)
+    }
+
+    fn settle(&mut self) {
+        self.live.settle();
+        self.pending.iter_mut().for_each(|row| row.said.doubts.settle());
+    }
+
+    fn step(&mut self, time_s: f64, reading: Option<Reading<f64>>) -> Result<(), StepError> {
+        self.last = Some(self.row(time_s, reading)?);
+        Ok(())
+    }
+
+    fn strain(&self) -> Gaussian<f64> {
+        self.last.as_ref().map_or_else(|| self.output().estimate.strain, |row| row.estimate.strain)
+    }
+
+    fn output(&self) -> Output {
+        let scale = self.reports.filtered_scale;
+        let Some(row) = &self.last else { return self.reports.row(self.live.state(), &Heard::nothing(), scale) };
+        let state = row.look.as_ref().unwrap_or_else(|| self.live.state());
+        let mut output = self.reports.row(state, &row.heard, scale);
+        output.rest_off = self.live.rest_off();
+        self.widen(&mut output, self.live.doubts(), row.stated, (row.estimate.strain.variance, row.doubts));
+        output
+    }
+
+    fn step_lagged(
+        &mut self,
+        time_s: f64,
+        reading: Option<Reading<f64>>,
+        lag_s: f64,
+        out: &mut dyn FnMut(Output),
+    ) -> Result<(), StepError> {
+        // Rows that fall due before this reading was taken do not get to see it.
+        let overdue = self.pending.partition_point(|row| row.time_s + lag_s < time_s);
+        let now = self.live.state().clone();
+        self.emit(overdue, now, out)?;
+        let birge = self.live.doubts().birge();
+        let (row, step) = self.kept_row(time_s, reading)?;
+        let state = self.state_after(&row.heard, &step)?;
+        let corrected = self.live.is_corrected().then_some((row.stated, birge));
+        let said = Said { heard: row.heard, corrected, doubts: *self.live.doubts(), rest_off: self.live.rest_off() };
+        self.pending.push_back(Pending { time_s, said, row: step });
+        // No row waits for what comes after a jump.
+        let jumped = row.heard.jumped.is_some();
+        let due = self.pending.partition_point(|row| jumped || row.time_s + lag_s <= time_s);
+        self.last = Some(row);
+        self.emit(due, state, out)
+    }
+
+    fn flush_lagged(&mut self, out: &mut dyn FnMut(Output)) -> Result<(), StepError> {
+        let now = self.live.state().clone();
+        self.emit(self.pending.len(), now, out)
+    }
+}

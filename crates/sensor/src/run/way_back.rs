@@ -1,0 +1,111 @@
+use std::mem;
+use std::ops::Range;
+
+use ohmstrain_ekf::StepError;
+use ohmstrain_ekf::live::{Heard, Memory, SensorEstimator};
+
+use crate::run::backward::Backward;
+use crate::run::clock::Clock;
+use crate::run::corrected::CorrectedWayBack;
+use crate::run::running::{LiveStep, Running};
+use crate::run::{Output, Rows, SEGMENT, Smoother, WayBack};
+
+/// The way back through a recording: segments but the last are filtered once more, from the state before their first rows.
+pub(crate) struct Segments<'a, E: SensorEstimator<f64, N, L>, const B: usize, const N: usize, const L: usize> {
+    running: &'a mut Running<E, B, N, L>,
+    rows: Rows<'a>,
+    /// Where the filter was before the first row of each segment that is not smoothed yet.
+    starts: Vec<(Clock, Memory<f64, E::State>)>,
+    /// The way back over those that are.
+    back: Backward<E::State>,
+    /// The present segment.
+    steps: Vec<(Heard<f64>, LiveStep<E, N, L>)>,
+    /// Whether that is the last, whose steps are there already.
+    is_last: bool,
+}
+
+impl<'a, E, const B: usize, const N: usize, const L: usize> Segments<'a, E, B, N, L>
+where
+    E: SensorEstimator<f64, N, L>,
+{
+    /// Filters the recording.
+    pub(crate) fn new(running: &'a mut Running<E, B, N, L>, rows: Rows<'a>) -> Result<Self, (usize, StepError)> {
+        let mut starts = Vec::with_capacity(rows.len() / SEGMENT + 1);
+        let last = rows.len().saturating_sub(1) / SEGMENT * SEGMENT;
+        for row in 0..last {
+            if row % SEGMENT == 0 {
+                starts.push((running.clock, running.live.memory()));
+            }
+            let (time_s, reading) = rows.get(row);
+            running.row(time_s, reading).map_err(|error| (row, error))?;
+        }
+        if last < rows.len() {
+            starts.push((running.clock, running.live.memory()));
+        }
+        let mut steps = Vec::new();
+        steps_of(running, rows, last..rows.len(), &mut steps)?;
+        let back = Backward::new(running.live.state().clone());
+        Ok(Self { running, rows, starts, back, steps, is_last: true })
+    }
+}
+
+/// Filters a segment from where the filter is, and keeps its steps.
+fn steps_of<E: SensorEstimator<f64, N, L>, const B: usize, const N: usize, const L: usize>(
+    running: &mut Running<E, B, N, L>,
+    rows: Rows<'_>,
+    segment: Range<usize>,
+    steps: &mut Vec<(Heard<f64>, LiveStep<E, N, L>)>,
+) -> Result<(), (usize, StepError)> {
+    steps.clear();
+    steps.reserve_exact(segment.len());
+    for row in segment {
+        let (time_s, reading) = rows.get(row);
+        let (taken, step) = running.kept_row(time_s, reading).map_err(|error| (row, error))?;
+        steps.push((taken.heard, step));
+    }
+    Ok(())
+}
+
+impl<E, const B: usize, const N: usize, const L: usize> WayBack for Segments<'_, E, B, N, L>
+where
+    E: SensorEstimator<f64, N, L>,
+{
+    fn next_segment(&mut self, out: &mut Vec<Output>) -> Result<Option<Range<usize>>, (usize, StepError)> {
+        out.clear();
+        let Some((clock, memory)) = self.starts.pop() else { return Ok(None) };
+        let first = self.starts.len() * SEGMENT;
+        let rows = first..self.rows.len().min(first + SEGMENT);
+        out.reserve_exact(rows.len());
+        if !mem::take(&mut self.is_last) {
+            self.running.clock = clock;
+            self.running.live.return_to(&memory);
+            steps_of(self.running, self.rows, rows.clone(), &mut self.steps)?;
+        }
+        for (row, (heard, step)) in rows.clone().zip(&self.steps).rev() {
+            let (running, time_s) = (&*self.running, self.rows.get(row).0);
+            let show = |state: &E::State| out.push(running.smoothed_row(state, heard));
+            let back = self.back.over(running.live.substeps(), time_s, step, true, show);
+            if !back.map_err(|error| (row, error))? {
+                out.clear();
+                self.starts.clear();
+                return Ok(None);
+            }
+        }
+        out.reverse();
+        Ok(Some(rows))
+    }
+}
+
+impl<E, const B: usize, const N: usize, const L: usize> Smoother for Running<E, B, N, L>
+where
+    E: SensorEstimator<f64, N, L, State: Send, Prepared: Send> + Send,
+{
+    fn way_back<'a>(&'a mut self, rows: Rows<'a>) -> Result<Box<dyn WayBack + 'a>, (usize, StepError)> {
+        let learned = self.learned.clone();
+        let back = Box::new(Segments::new(self, rows)?);
+        match learned {
+            Some(learned) => Ok(Box::new(CorrectedWayBack::new(back, &learned, rows))),
+            None => Ok(back),
+        }
+    }
+}
