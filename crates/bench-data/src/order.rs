@@ -1,8 +1,8 @@
 /// The middle one of known values, the upper one of two; `None` without any.
 pub(crate) fn median(mut values: Vec<f64>) -> Option<f64> {
     values.retain(|value| !value.is_nan());
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied()
+    let middle = values.len() / 2;
+    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
 /// The least and the largest of known values; without any the least is the larger one.

@@ -74,6 +74,13 @@ fn a_workbook_with_its_data_on_one_sheet() {
     has_the_numbers(&import(workbook(true), &Recipe::default()), 1.5e-6);
 }
 
+/// Numbers in a workbook have no decimal mark: the one of its texts is none of theirs.
+#[test]
+fn a_decimal_comma_is_for_texts_of_a_workbook() {
+    let known = Recipe { decimal: vec![",".parse().unwrap()], ..Recipe::default() };
+    has_the_numbers(&import(workbook(false), &known), 0.0);
+}
+
 #[test]
 fn two_sheets_of_numbers_are_a_question() {
     let mut workbook = Workbook::new();

@@ -40,3 +40,12 @@ impl ImportError {
         Self::Question { file: file.to_owned(), what: what.into(), answers: answers.into_iter().collect() }
     }
 }
+
+/// A word as a POSIX shell takes it.
+pub(crate) fn quoted(word: &str) -> String {
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "_-+=./:,@%".contains(c);
+    if !word.is_empty() && word.chars().all(is_plain) {
+        return word.to_owned();
+    }
+    format!("'{}'", word.replace('\'', "'\\''"))
+}

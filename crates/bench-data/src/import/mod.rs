@@ -1,9 +1,11 @@
 //! From a lab's files to a trace: what stands in them, which questions that leaves, and the import itself.
 //!
 //! ```text
-//! bytes ──► read_table ──► Table (cells as text) ──► Plan::new(tables, Recipe) ──► Plan::import ──► Imported (Trace)
-//!                                                          │ all that the recipe leaves open is decided here, or asked
-//!                                                          └──► Plan::recipe: the same, with nothing left open
+//! bytes ──► table ──► roles ──► series ──► trace        each uses those before it and, but for bytes, `words`
+//!
+//! read_table: bytes ──► Table ──► Plan::new(tables, Recipe) ──► Plan::import ──► Imported (Trace)
+//!                                     │ all that the recipe leaves open is decided by one function, or asked
+//!                                     └──► Plan::recipe: the same, with nothing left open
 //! ```
 //!
 //! # Policy
@@ -15,49 +17,18 @@
 //! - What a file is unpacked to, or repeats, is bounded (`bounds`), and counted before there is room made for it.
 //! - Nothing here opens files.
 
-mod bounds;
-mod build;
-mod candidates;
-mod channel;
-mod clock;
-mod compound;
-mod digits;
+mod bytes;
 mod error;
-mod grid;
-mod header;
-mod layout;
-mod names;
-mod number;
-mod ods_size;
-mod parquet;
-mod plan;
-mod plan_clock;
-mod plan_units;
-mod preset;
-mod questions;
-mod recipe;
-mod records;
 mod roles;
 mod series;
-mod sheet;
-mod source;
-mod stamp;
-mod survey;
 mod table;
-mod units;
-mod workbook;
-mod xls_size;
-mod zipped;
+mod trace;
+mod words;
 
-pub use bounds::LARGEST_FILE;
-pub use build::Imported;
-pub use candidates::{Candidate, candidates};
+pub use bytes::Cells;
+pub use bytes::bounds::LARGEST_FILE;
 pub use error::ImportError;
-pub use number::DecimalMark;
-pub use plan::Plan;
-pub use preset::Preset;
-pub use recipe::{Align, ColumnName, PerFile, ReadOptions, Recipe, RecipeError};
-pub use roles::Role;
-pub use source::read_table;
-pub use survey::{Allan, ChannelSurvey, ClockSurvey, PhaseSurvey, Survey};
-pub use table::{Cells, Column, Layout, Table};
+pub use roles::{Align, Candidate, ColumnName, PerFile, Preset, Recipe, RecipeError, candidates};
+pub use table::{Column, Layout, ReadOptions, Table, read_table};
+pub use trace::{Allan, ChannelSurvey, ClockSurvey, Imported, PhaseSurvey, Plan, Survey};
+pub use words::{DecimalMark, Role};

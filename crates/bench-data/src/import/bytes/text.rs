@@ -1,0 +1,60 @@
+use encoding_rs::{Encoding, UTF_8, UTF_16BE, UTF_16LE, WINDOWS_1252};
+
+use crate::MOST_ROWS;
+use crate::error::Fault;
+use crate::import::bytes::bounds::LONGEST_LINE;
+
+/// Text has fewer NUL bytes than one in so many.
+const MOST_NULS: usize = 50;
+
+/// Text out of bytes, and what it was encoded in.
+///
+/// A byte-order mark decides; without one, NUL bytes in every other place mean UTF-16, and what is not UTF-8 is taken for
+/// Windows-1252, which has Latin-1 in it and gives every byte a character. `None` for what is no text.
+pub(crate) fn decode(bytes: Vec<u8>) -> Option<(String, &'static str)> {
+    let decoded = |encoding: &'static Encoding, bytes| encoding.decode_without_bom_handling(bytes).0.into_owned();
+    if let Some((encoding, mark)) = Encoding::for_bom(&bytes) {
+        let name = if encoding == UTF_8 { "UTF-8 with a byte-order mark" } else { encoding.name() };
+        return Some((decoded(encoding, &bytes[mark..]), name));
+    }
+    let head = &bytes[..bytes.len().min(2000)];
+    if head.contains(&0) {
+        let nuls = |odd: usize| head.iter().skip(odd).step_by(2).filter(|byte| **byte == 0).count();
+        let encoding = match (nuls(0), nuls(1)) {
+            (0, odd) if odd * 4 > head.len() => Some(UTF_16LE),
+            (even, 0) if even * 4 > head.len() => Some(UTF_16BE),
+            // A few are what a serial line brings when it is opened.
+            (even, odd) if (even + odd) * MOST_NULS < head.len() => None,
+            _ => return None,
+        };
+        if let Some(encoding) = encoding {
+            return Some((decoded(encoding, &bytes), encoding.name()));
+        }
+    }
+    Some(match String::from_utf8(bytes) {
+        Ok(text) if text.is_ascii() => (text, "ASCII"),
+        Ok(text) => (text, "UTF-8"),
+        Err(error) => (decoded(WINDOWS_1252, error.as_bytes()), "Latin-1 (Windows-1252)"),
+    })
+}
+
+/// Lines that are not blank, with their numbers, whatever ends them.
+///
+/// # Errors
+/// The line that is too long, or one too many.
+pub(crate) fn lines(text: &str) -> Result<Vec<(u64, &str)>, (u64, Fault)> {
+    let ends: &[char] = if text.contains('\n') { &['\n'] } else { &['\r', '\n'] };
+    let numbered = text.split(ends).zip(1..).map(|(line, number)| (number, line.trim_end_matches('\r')));
+    let mut lines = Vec::new();
+    for (number, line) in numbered.filter(|(_, line)| !line.trim().is_empty()) {
+        if line.len() > LONGEST_LINE {
+            return Err((number, Fault::new(format!("a line of at most {LONGEST_LINE} bytes"), "a longer one")));
+        }
+        if lines.len() == MOST_ROWS {
+            let expected = format!("at most {MOST_ROWS} rows: make several files of it");
+            return Err((number, Fault::new(expected, "more")));
+        }
+        lines.push((number, line));
+    }
+    Ok(lines)
+}

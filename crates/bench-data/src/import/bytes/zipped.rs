@@ -1,0 +1,142 @@
+//! Looks into a zip container before anything in it is read: which kind of workbook it is, and how much it unpacks to. Rows
+//! and cells of ODS are repeated as often as a number says, and are counted.
+
+use std::io::{BufRead, BufReader, Cursor, Read, copy, sink};
+
+use quick_xml::Reader;
+use quick_xml::events::{BytesStart, Event};
+use zip::ZipArchive;
+
+use crate::import::bytes::bounds::{LARGEST_WORKBOOK, mib};
+use crate::import::bytes::sheet::{Budget, TooMuch, check_size};
+
+/// A kind of workbook.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Kind {
+    Xlsx,
+    Xlsb,
+    Ods,
+}
+
+/// The kind of a workbook that unpacks to no more than it may.
+pub(crate) fn kind(bytes: &[u8]) -> Result<Kind, String> {
+    let mut archive = ZipArchive::new(Cursor::new(bytes)).map_err(|error| error.to_string())?;
+    let mut left = LARGEST_WORKBOOK;
+    for index in 0..archive.len() {
+        // What the container says of sizes need not be true.
+        let file = archive.by_index(index).map_err(|error| error.to_string())?;
+        let size = copy(&mut file.take(left + 1), &mut sink()).map_err(|error| error.to_string())?;
+        left = left.checked_sub(size).ok_or_else(|| {
+            let most = mib(LARGEST_WORKBOOK);
+            format!("expected at most {most} MiB when unpacked, found more: save the sheet with the recording as CSV")
+        })?;
+    }
+    let has = |name: &str| archive.file_names().flatten().any(|file| file.eq_ignore_ascii_case(name));
+    Ok(match (has("content.xml"), has("xl/workbook.bin")) {
+        (true, _) => Kind::Ods,
+        (_, true) => Kind::Xlsb,
+        _ => Kind::Xlsx,
+    })
+}
+
+/// Refuses a workbook whose sheets have more cells than may be held, from the first to the last one that is not empty.
+pub(crate) fn check_ods(bytes: &[u8]) -> Result<(), TooMuch> {
+    let mut archive = ZipArchive::new(Cursor::new(bytes)).map_err(|error| error.to_string())?;
+    let content = archive.by_name("content.xml").map_err(|error| error.to_string())?;
+    count(BufReader::new(content))
+}
+
+/// Rows and columns of a sheet up to its last cell that is not empty, and the text in it.
+#[derive(Default)]
+struct Size {
+    /// Rows so far, and those up to the last that is not empty.
+    rows: usize,
+    height: usize,
+    width: usize,
+    bytes: u64,
+    /// Where a cell stands in the last column.
+    last: (u32, u32),
+}
+
+/// A row that has begun.
+#[derive(Default)]
+struct Row {
+    repeats: usize,
+    columns: usize,
+    /// Columns up to the last cell that is not empty.
+    width: usize,
+    bytes: u64,
+    /// How often the cell is repeated that has begun.
+    cell: usize,
+}
+
+fn count(source: impl BufRead) -> Result<(), TooMuch> {
+    let mut reader = Reader::from_reader(source);
+    reader.config_mut().check_end_names = false;
+    reader.config_mut().expand_empty_elements = true;
+    let (mut size, mut row, mut budget, mut buffer) = (Size::default(), Row::default(), Budget::default(), Vec::new());
+    loop {
+        match reader.read_event_into(&mut buffer).map_err(|error| error.to_string())? {
+            Event::Start(tag) => match tag.name().as_ref() {
+                "table:table-row" => {
+                    row = Row { repeats: repeats(&tag, "table:number-rows-repeated"), ..Row::default() };
+                }
+                "table:table-cell" | "table:covered-table-cell" => {
+                    row.cell = repeats(&tag, "table:number-columns-repeated");
+                    row.columns = row.columns.saturating_add(row.cell);
+                    let value = attribute(&tag, "office:string-value").map_or(0, |text| text.len());
+                    if ["office:value-type", "table:formula"].iter().any(|name| attribute(&tag, name).is_some()) {
+                        row.fill(value);
+                    }
+                }
+                _ => {}
+            },
+            Event::Text(text) if row.cell > 0 => row.fill(text.len()),
+            Event::GeneralRef(_) if row.cell > 0 => row.fill(1),
+            Event::End(tag) => match tag.name().as_ref() {
+                "table:table-cell" | "table:covered-table-cell" => row.cell = 0,
+                "table:table-row" => size.add(&row)?,
+                "table:table" => std::mem::take(&mut size).charge(&mut budget)?,
+                _ => {}
+            },
+            Event::Eof => return size.charge(&mut budget),
+            _ => {}
+        }
+        buffer.clear();
+    }
+}
+
+impl Row {
+    fn fill(&mut self, bytes: usize) {
+        self.width = self.columns;
+        self.bytes = self.bytes.saturating_add((bytes as u64).saturating_mul(self.cell as u64));
+    }
+}
+
+impl Size {
+    fn add(&mut self, row: &Row) -> Result<(), TooMuch> {
+        self.rows = self.rows.saturating_add(row.repeats);
+        if row.width == 0 {
+            return Ok(());
+        }
+        self.height = self.rows;
+        self.bytes = self.bytes.saturating_add(row.bytes.saturating_mul(row.repeats as u64));
+        if row.width > self.width {
+            let place = |count: usize| u32::try_from(count - 1).unwrap_or(u32::MAX);
+            (self.width, self.last) = (row.width, (place(self.rows), place(row.width)));
+        }
+        check_size(self.last, self.height, self.width)
+    }
+
+    fn charge(self, budget: &mut Budget) -> Result<(), TooMuch> {
+        budget.take(self.width.saturating_mul(self.height), self.bytes)
+    }
+}
+
+fn repeats(tag: &BytesStart, name: &str) -> usize {
+    attribute(tag, name).and_then(|text| text.trim().parse().ok()).unwrap_or(1)
+}
+
+fn attribute(tag: &BytesStart, name: &str) -> Option<String> {
+    tag.try_get_attribute(name).ok().flatten().map(|found| found.value.into_owned())
+}

@@ -1,0 +1,172 @@
+use std::collections::BTreeSet;
+
+use crate::error::Fault;
+use crate::import::error::{ImportError, quoted};
+use crate::import::roles::clock::{clock, no_readings};
+use crate::import::roles::decision::{Channel, Decision, Place, Taken, Timed};
+use crate::import::roles::facts::Found;
+use crate::import::roles::find::{choose, find, refer};
+use crate::import::roles::recipe::Recipe;
+use crate::import::roles::unit::channel;
+use crate::import::table::{SEPARATOR, Table, all_files};
+use crate::import::words::units::scale_of_a_reference;
+use crate::import::words::{Role, names};
+
+/// Decides what files are imported as, by names, units and numbers, where the answers leave it open. The same findings and
+/// answers lead to the same decision.
+pub(crate) fn decide(found: &Found, answers: &Recipe) -> Decision {
+    let mut remarks = Vec::new();
+    let mut questions: Vec<ImportError> = open_decimal(found.tables).into_iter().collect();
+    let readings = choose(found, answers, &Role::READINGS, "the readings")
+        .and_then(|taken| taken.ok_or_else(|| no_readings(found)))
+        .and_then(|taken| timed(found, answers, taken, Role::Time, &mut remarks));
+    let readings = known(readings, &mut questions);
+    let reference = choose(found, answers, &Role::REFERENCES, "the reference").and_then(|taken| {
+        taken.map(|taken| timed(found, answers, taken, Role::ReferenceTime, &mut remarks)).transpose()
+    });
+    if matches!(reference, Ok(None)) {
+        remarks.extend(no_reference(found, answers));
+    }
+    let reference = known(reference, &mut questions).flatten();
+    let temperature = readings.and_then(|readings| {
+        let found = temperature(found, answers, readings.values.place.file, &mut remarks);
+        known(found, &mut questions).flatten()
+    });
+    // What two columns, or two roles of one, share is said once.
+    let mut said = BTreeSet::new();
+    remarks.retain(|remark: &String| said.insert(remark.clone()));
+    let readings = readings.into_iter().collect();
+    let mut decision = Decision { readings, reference, temperature, remarks, questions };
+    let missing = missing_answers(found, answers, &decision);
+    decision.questions.extend(missing);
+    decision
+}
+
+/// What is decided; what is not becomes a question, asked once.
+fn known<T>(decided: Result<T, ImportError>, questions: &mut Vec<ImportError>) -> Option<T> {
+    let question = match decided {
+        Ok(known) => return Some(known),
+        Err(question) => question,
+    };
+    if !questions.contains(&question) {
+        questions.push(question);
+    }
+    None
+}
+
+/// A column of values with the clock of its rows, which may stand in another column for the reference.
+fn timed(
+    found: &Found,
+    answers: &Recipe,
+    taken: Taken,
+    time: Role,
+    remarks: &mut Vec<String>,
+) -> Result<Timed, ImportError> {
+    let clock = clock(found, answers, time, taken.place, remarks)?;
+    Ok(Timed { values: channel(found, answers, taken, remarks)?, clock })
+}
+
+/// Questions about what the columns that were taken need besides.
+fn missing_answers(found: &Found, answers: &Recipe, decision: &Decision) -> Vec<ImportError> {
+    let mut questions: Vec<ImportError> =
+        decision.channels().iter().filter_map(|channel| incomplete_records(found, channel.place)).collect();
+    if let (Some(reference), Some(readings)) = (&decision.reference, decision.readings.first())
+        && reference.clock.file() != readings.clock.file()
+        && answers.align.is_none()
+    {
+        let align = ["motion", "none", "SECONDS"].map(|align| format!("--align {align}"));
+        questions.push(ImportError::question(&all_files(found.tables), "two files with two clocks", align));
+    }
+    for channel in decision.reference.iter().chain(&decision.readings).map(|timed| timed.values) {
+        let table = found.table(channel.place);
+        match channel.role {
+            Role::Displacement if answers.gauge_length_mm.or(table.metadata.gauge_length_mm).is_none() => {
+                let what = "a displacement becomes strain by the length of the unstretched sensor";
+                questions.push(ImportError::question(&table.file, what, ["--gauge-length-mm MM".to_owned()]));
+            }
+            Role::Adc if answers.front_end.or(table.metadata.front_end).is_none() => {
+                let spec = quoted("divider reference_ohm=10000 side=low bits=12 noise_codes=0.5");
+                let answer = format!("--front-end {spec} (or what is there)");
+                let what = "converter codes become ohms by the electronics";
+                questions.push(ImportError::question(&table.file, what, [answer]));
+            }
+            _ => {}
+        }
+    }
+    questions
+}
+
+/// Refuses a label that is not in every other record of its file: what the records are has not been understood.
+fn incomplete_records(found: &Found, place: Place) -> Option<ImportError> {
+    let table = found.table(place);
+    let is_record = table.layout.separator == Some(SEPARATOR);
+    let (missing, first) =
+        is_record.then(|| found.facts(place).empty).filter(|(missing, _)| missing * 2 >= table.len())?;
+    let name = found.name(place);
+    let expected = format!("{name} in every record, which ends where one of its labels comes again");
+    let what = format!("none in {missing} of {}: print all values of a moment together", table.len());
+    Some(ImportError::content(&table.file, first, Fault::new(expected, what)))
+}
+
+/// What there is to say where no column is the reference, and nobody has said that none is.
+fn no_reference(found: &Found, answers: &Recipe) -> Option<String> {
+    if Role::REFERENCES.iter().any(|role| answers.column(*role).is_some()) {
+        return None;
+    }
+    let weak = found.candidates.iter().find(|one| Role::REFERENCES.contains(&one.role));
+    let weak = weak.map(|one| (Taken { role: one.role, place: one.place() }, None));
+    let answer = match weak.or_else(|| in_another_unit(found)) {
+        None => "strain=NAME".to_owned(),
+        Some((Taken { role, place }, scale)) => {
+            let scale = scale.map_or_else(String::new, |scale| format!(" --unit {role}={scale} with its scale"));
+            quoted(&format!("{role}={}", refer(found.tables, place))) + &scale
+        }
+    };
+    let files = all_files(found.tables);
+    Some(format!(
+        "{files}: no column is taken for strain, displacement or angle, without which nothing can be calibrated; if one is, \
+         say --column {answer}"
+    ))
+}
+
+/// A column that is called as a reference is, but has the unit of something else: `Position (V)`.
+fn in_another_unit(found: &Found) -> Option<(Taken, Option<&'static str>)> {
+    found.places().find_map(|place| {
+        let column = found.column(place);
+        let (role, _) = names::role(&column.name, None).filter(|_| column.unit.is_some())?;
+        scale_of_a_reference(role).map(|scale| (Taken { role, place }, Some(scale)))
+    })
+}
+
+/// Point or comma?
+fn open_decimal(tables: &[Table]) -> Option<ImportError> {
+    let (index, table) = tables.iter().enumerate().find(|(_, table)| table.layout.decimal_is_open)?;
+    let file = if tables.len() > 1 { format!("{}:", index + 1) } else { String::new() };
+    let what = "commas may be decimal marks or group thousands";
+    Some(ImportError::question(&table.file, what, [",", "."].map(|mark| format!("--decimal {file}{mark}"))))
+}
+
+/// A temperature counts if it stands in the readings' file.
+fn temperature(
+    found: &Found,
+    answers: &Recipe,
+    file: usize,
+    remarks: &mut Vec<String>,
+) -> Result<Option<Channel>, ImportError> {
+    let role = Role::Temperature;
+    let place = match answers.column(role) {
+        Some(None) => None,
+        Some(Some(wanted)) => Some(find(found, role, wanted)?),
+        None => {
+            let mut named = found.candidates.iter().filter(|one| one.role == role && one.table == file && one.is_named);
+            let only = named.next().filter(|_| named.next().is_none()).map(|one| one.place());
+            only.filter(|place| found.column(*place).unit.is_some())
+        }
+    };
+    let Some(place) = place else { return Ok(None) };
+    if place.file != file {
+        let what = "a temperature is taken from the file of the readings";
+        return Err(ImportError::question(&found.table(place).file, what, ["--column temperature=none".to_owned()]));
+    }
+    channel(found, answers, Taken { role, place }, remarks).map(Some)
+}

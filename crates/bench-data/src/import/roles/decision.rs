@@ -1,0 +1,103 @@
+use crate::import::error::ImportError;
+use crate::import::words::{Role, Unit};
+
+/// Where a column stands: the file and the column in it, counted from 0.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Place {
+    pub file: usize,
+    pub column: usize,
+}
+
+/// A column and what it is taken for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Taken {
+    pub role: Role,
+    pub place: Place,
+}
+
+/// A column that numbers are taken from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Channel {
+    pub role: Role,
+    pub place: Place,
+    pub unit: Unit,
+}
+
+/// Where times come from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Clock {
+    Column(Channel),
+    /// Rows of a file follow each other at a rate, 1/s.
+    Rate {
+        file: usize,
+        hz: f64,
+    },
+}
+
+impl Clock {
+    pub(crate) const fn file(&self) -> usize {
+        match self {
+            Self::Column(channel) => channel.place.file,
+            Self::Rate { file, .. } => *file,
+        }
+    }
+
+    pub(crate) const fn column(&self) -> Option<Channel> {
+        match self {
+            Self::Column(channel) => Some(*channel),
+            Self::Rate { .. } => None,
+        }
+    }
+
+    /// Whether both are the same column or rate, whatever its role and unit.
+    fn is(&self, other: &Self) -> bool {
+        match (self.column(), other.column()) {
+            (Some(one), Some(other)) => one.place == other.place,
+            _ => self == other,
+        }
+    }
+}
+
+/// Values and the clock of their rows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Timed {
+    pub values: Channel,
+    pub clock: Clock,
+}
+
+/// What files are imported as, and what is still open.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Decision {
+    /// Channels of readings; a trace is made of the first. Another sensor or another recording is another entry.
+    pub readings: Vec<Timed>,
+    pub reference: Option<Timed>,
+    pub temperature: Option<Channel>,
+    /// What follows from names or numbers, and is not said by an answer.
+    pub remarks: Vec<String>,
+    /// What nothing decides, the most important one first; without any, there are readings.
+    pub questions: Vec<ImportError>,
+}
+
+impl Decision {
+    /// Whether readings and reference stand in the same rows with the same times.
+    pub(crate) fn is_one_clock(&self) -> bool {
+        let Some(reference) = &self.reference else { return true };
+        self.readings.iter().all(|readings| reference.clock.is(&readings.clock))
+    }
+
+    /// The columns that something is taken from.
+    pub(crate) fn channels(&self) -> Vec<Channel> {
+        let mut all = Vec::new();
+        for readings in &self.readings {
+            all.extend(readings.clock.column());
+            all.push(readings.values);
+        }
+        if let Some(Timed { values, clock }) = &self.reference {
+            let own = clock.column().filter(|_| !self.is_one_clock());
+            all.extend(own.map(|own| Channel { role: Role::ReferenceTime, ..own }));
+            all.push(*values);
+        }
+        all.extend(self.temperature);
+        all
+    }
+}

@@ -1,0 +1,205 @@
+use std::cell::OnceCell;
+
+use crate::error::quote;
+use crate::import::bytes::Cell;
+use crate::import::roles::decision::Place;
+use crate::import::roles::preset::Preset;
+use crate::import::table::number_of;
+use crate::import::table::{Column, MONITOR_CLOCK, Table};
+use crate::import::words::names::{self, Sureness};
+use crate::import::words::stamp::{Order, Stamp, has_points, orders, stamp};
+use crate::import::words::{Role, is_missing, is_stamp, ohms};
+use crate::order::median;
+
+/// What a column may be, by its name and unit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Candidate {
+    /// The file, counted from 0.
+    pub table: usize,
+    /// The column, counted from 0.
+    pub column: usize,
+    /// What it may be.
+    pub role: Role,
+    /// Whether the name says so, not the unit alone.
+    pub is_named: bool,
+}
+
+impl Candidate {
+    pub(crate) const fn place(&self) -> Place {
+        Place { file: self.table, column: self.column }
+    }
+}
+
+/// What was found in files.
+#[derive(Clone, Debug)]
+pub(crate) struct Found<'a> {
+    /// Headings, units, layouts and metadata.
+    pub tables: &'a [Table],
+    /// What is known of each column of each file, found out when it is first asked for.
+    pub facts: Vec<Vec<OnceCell<Facts>>>,
+    /// What the columns may be.
+    pub candidates: Vec<Candidate>,
+    /// A known layout that one of the files has.
+    pub preset: Option<Preset>,
+}
+
+/// What was found in the cells of a column.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Facts {
+    pub dates: Dates,
+    pub numbers: Numbers,
+    /// The first cell that has a unit of its own.
+    pub prefixed: Option<String>,
+    /// Empty cells, and the line of the first.
+    pub empty: (usize, u64),
+}
+
+impl Facts {
+    fn of(table: &Table, place: usize) -> Self {
+        let cells = &table.columns[place].cells;
+        let empty: Vec<usize> = (0..cells.len()).filter(|row| cells.get(*row).is_empty()).collect();
+        Self {
+            dates: Dates::of(table, place),
+            numbers: Numbers::of(table, place),
+            prefixed: cells.iter().find(|cell| ohms(cell.trim(), table.layout.decimal).is_some()).map(quote),
+            empty: (empty.len(), empty.first().map_or(1, |row| table.lines[*row])),
+        }
+    }
+}
+
+/// Whether all cells are dates or times of day.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) enum Dates {
+    #[default]
+    None,
+    In(Order),
+    /// Day and month cannot be told apart.
+    Open,
+}
+
+/// What the numbers of a column are like; medians of none are NaN.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Numbers {
+    /// Median step from row to row.
+    pub step: f64,
+    pub has_fractions: bool,
+    pub median: f64,
+    /// Median and largest of the sizes, without signs.
+    pub size: f64,
+    pub largest: f64,
+    /// They increase from row to row, all but a few.
+    pub rise: bool,
+}
+
+impl Numbers {
+    fn of(table: &Table, column: usize) -> Self {
+        let decimal = table.layout.decimal;
+        let known: Vec<f64> =
+            table.columns[column].cells.cells().filter_map(|cell| number_of(&cell, decimal)).collect();
+        let middle = |values: Vec<f64>| median(values).unwrap_or(f64::NAN);
+        let steps: Vec<f64> = known.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        Self {
+            has_fractions: known.iter().any(|number| number.fract() != 0.0),
+            size: middle(known.iter().map(|number| number.abs()).collect()),
+            largest: known.iter().fold(0.0, |largest: f64, number| largest.max(number.abs())),
+            step: middle(steps),
+            median: middle(known),
+            rise: table.increases(column),
+        }
+    }
+}
+
+impl Dates {
+    fn of(table: &Table, column: usize) -> Self {
+        let cells = &table.columns[column].cells;
+        let filled = || cells.iter().filter(|cell| !is_missing(cell, &[]));
+        let day = |cell: &str| cell.trim().split(['T', ' ']).next().map(str::to_owned);
+        match orders(filled())[..] {
+            [] => Self::None,
+            [order @ Order::Iso, ..] | [order] => Self::In(order),
+            _ if filled().all(has_points) => Self::In(Order::Dmy),
+            // On one day it does not matter which number is the month.
+            _ if filled().all(|cell| day(cell) == filled().next().and_then(day)) => Self::In(Order::Dmy),
+            _ => Self::Open,
+        }
+    }
+}
+
+impl<'a> Found<'a> {
+    /// Looks at files.
+    pub(crate) fn of(tables: &'a [Table]) -> Self {
+        let facts = |table: &Table| vec![OnceCell::new(); table.columns.len()];
+        Self {
+            tables,
+            facts: tables.iter().map(facts).collect(),
+            candidates: candidates(tables),
+            preset: tables.iter().find_map(Preset::that_fits),
+        }
+    }
+
+    pub(crate) fn table(&self, place: Place) -> &'a Table {
+        &self.tables[place.file]
+    }
+
+    pub(crate) fn column(&self, place: Place) -> &'a Column {
+        &self.tables[place.file].columns[place.column]
+    }
+
+    pub(crate) fn facts(&self, place: Place) -> &Facts {
+        self.facts[place.file][place.column].get_or_init(|| Facts::of(self.table(place), place.column))
+    }
+
+    /// How messages call a column.
+    pub(crate) fn name(&self, place: Place) -> String {
+        self.table(place).name(place.column)
+    }
+
+    /// All columns of all files.
+    pub(crate) fn places(&self) -> impl Iterator<Item = Place> {
+        let files = self.tables.iter().enumerate();
+        files.flat_map(|(file, table)| (0..table.columns.len()).map(move |column| Place { file, column }))
+    }
+
+    /// Columns of a file whose numbers increase from row to row.
+    pub(crate) fn rising(&self, file: usize) -> Vec<usize> {
+        let rises = |column: &usize| self.facts(Place { file, column: *column }).numbers.rise;
+        (0..self.facts[file].len()).filter(rises).collect()
+    }
+}
+
+/// What the columns of files may be.
+#[must_use]
+pub fn candidates(tables: &[Table]) -> Vec<Candidate> {
+    let says = |table: &Table| (0..table.columns.len()).map(|column| says(table, column)).collect::<Vec<_>>();
+    tables.iter().enumerate().flat_map(|(file, table)| among(file, &says(table))).collect()
+}
+
+/// The candidates in a file, by what its columns say. `R_1` beside `R` is another thing.
+pub(crate) fn among(table: usize, says: &[Option<(Role, Sureness)>]) -> Vec<Candidate> {
+    let is_strong = |role: Role| says.contains(&Some((role, Sureness::Strong)));
+    let said = says.iter().enumerate().filter_map(|(column, said)| said.map(|(role, how)| (column, role, how)));
+    said.filter(|(_, role, how)| *how != Sureness::Indexed || !is_strong(*role))
+        .map(|(column, role, how)| Candidate { table, column, role, is_named: how != Sureness::Weak })
+        .collect()
+}
+
+/// What a column's name and unit say, if it has a number or a date at all; a column of dates beside one of times of day is
+/// nothing.
+fn says(table: &Table, place: usize) -> Option<(Role, Sureness)> {
+    let column = &table.columns[place];
+    let said = if column.heading == MONITOR_CLOCK {
+        Some((Role::Time, Sureness::Weak))
+    } else {
+        let mut filled = column.cells.iter().filter(|cell| !cell.is_empty()).take(5).peekable();
+        let is_bare = |read: Option<Stamp>| read.is_some_and(|read| !read.has_time);
+        let is_date = |cell: &str| Order::ALL.iter().any(|order| is_bare(stamp(cell, *order)));
+        let are_dates = filled.peek().is_some() && filled.all(is_date);
+        names::role(&column.name, column.unit.as_deref()).filter(|_| !are_dates)
+    };
+    let decimal = table.layout.decimal;
+    let is_value = |cell: Cell| {
+        number_of(&cell, decimal).is_some()
+            || matches!(cell, Cell::Text(text) if is_stamp(&text) || ohms(&text, decimal).is_some())
+    };
+    said.filter(|_| column.cells.cells().any(is_value))
+}

@@ -1,0 +1,87 @@
+use crate::import::error::{ImportError, quoted};
+use crate::import::roles::decision::{Place, Taken};
+use crate::import::roles::facts::Found;
+use crate::import::roles::recipe::{ColumnName, NO_COLUMN, Recipe};
+use crate::import::table::Table;
+use crate::import::words::Role;
+
+/// The column that an answer names.
+pub(crate) fn find(found: &Found, role: Role, wanted: &ColumnName) -> Result<Place, ImportError> {
+    let all = || found.places().filter(|place| wanted.file.is_none_or(|file| file == place.file + 1));
+    let text = wanted.column.trim();
+    let lower = text.to_lowercase();
+    let number = text.parse::<usize>().ok();
+    let fits = |way: usize, place: Place| {
+        let column = found.column(place);
+        match way {
+            0 => column.heading == text,
+            1 => column.name == text,
+            2 => column.heading.to_lowercase() == lower || column.name.to_lowercase() == lower,
+            _ => number == Some(place.column + 1),
+        }
+    };
+    // A name before a number, so that a column may be called `3`.
+    for way in 0..4 {
+        let fitting: Vec<Taken> =
+            all().filter(|place| !text.is_empty() && fits(way, *place)).map(|place| Taken { role, place }).collect();
+        match fitting[..] {
+            [] => {}
+            [taken] => return Ok(taken.place),
+            _ => return Err(several(found, &format!("the {role}"), &fitting)),
+        }
+    }
+    let file = wanted.file.and_then(|file| found.tables.get(file - 1)).or(found.tables.first());
+    let (file, names) = file.map_or((String::new(), String::new()), |table| (table.file.clone(), table.list()));
+    let expected = format!("--column {role}={}: there is no such column among {names}", quoted(&wanted.to_string()));
+    Err(ImportError::question(&file, expected, [format!("--column {role}=NAME with one of them")]))
+}
+
+/// Several columns might be what they are named.
+pub(crate) fn several(found: &Found, what: &str, taken: &[Taken]) -> ImportError {
+    let names: Vec<String> = taken.iter().map(|taken| found.name(taken.place)).collect();
+    let answer =
+        |taken: &Taken| format!("--column {}", quoted(&format!("{}={}", taken.role, refer(found.tables, taken.place))));
+    let mut files: Vec<&str> = taken.iter().map(|taken| found.table(taken.place).file.as_str()).collect();
+    files.dedup();
+    ImportError::question(&files.join(", "), format!("{} may be {what}", names.join(" and ")), taken.iter().map(answer))
+}
+
+/// The shortest sure way to name a column: its heading if that is the only one and can be typed, its number otherwise.
+pub(crate) fn refer(tables: &[Table], place: Place) -> ColumnName {
+    let columns = &tables[place.file].columns;
+    let heading = &columns[place.column].heading;
+    let is_sure = !heading.is_empty()
+        && columns.iter().filter(|other| other.heading == *heading || other.name == *heading).count() == 1
+        && heading.trim() == heading
+        && heading != NO_COLUMN
+        && !heading.contains(char::is_control)
+        && !heading.starts_with(|c: char| c.is_ascii_digit());
+    let file = (tables.len() > 1).then_some(place.file + 1);
+    ColumnName { file, column: if is_sure { heading.clone() } else { (place.column + 1).to_string() } }
+}
+
+/// The column that an answer, or else a name, gives to one of several roles.
+pub(crate) fn choose(
+    found: &Found,
+    answers: &Recipe,
+    roles: &[Role],
+    what: &str,
+) -> Result<Option<Taken>, ImportError> {
+    let named = roles.iter().find_map(|role| answers.column(*role).flatten().map(|wanted| (*role, wanted)));
+    if let Some((role, wanted)) = named {
+        return find(found, role, wanted).map(|place| Some(Taken { role, place }));
+    }
+    let is_taken = |taken: &Taken| {
+        let mut names = answers.columns.iter().map(|(_, name)| name);
+        names.any(|name| find(found, taken.role, name).is_ok_and(|place| place == taken.place))
+    };
+    let is_wanted = |role: Role| roles.contains(&role) && answers.column(role).is_none();
+    let fitting = found.candidates.iter().filter(|one| one.is_named && is_wanted(one.role));
+    let fitting: Vec<Taken> =
+        fitting.map(|one| Taken { role: one.role, place: one.place() }).filter(|taken| !is_taken(taken)).collect();
+    match fitting[..] {
+        [] => Ok(None),
+        [one] => Ok(Some(one)),
+        _ => Err(several(found, what, &fitting)),
+    }
+}

@@ -1,0 +1,20 @@
+//! Which column is what: what was found in the files and what the user answered become a decision.
+
+mod clock;
+mod decide;
+mod decision;
+mod facts;
+mod find;
+mod preset;
+mod recipe;
+#[cfg(test)]
+mod tests;
+mod unit;
+
+pub(crate) use decide::decide;
+pub(crate) use decision::{Channel, Clock, Decision, Place, Timed};
+pub(crate) use facts::Found;
+pub use facts::{Candidate, candidates};
+pub(crate) use find::refer;
+pub use preset::Preset;
+pub use recipe::{Align, ColumnName, PerFile, Recipe, RecipeError};

@@ -1,0 +1,129 @@
+use crate::Metadata;
+use crate::error::quote;
+use crate::import::bytes::Cells;
+use crate::import::table::value::number_of;
+use crate::import::words::{DecimalMark, names};
+
+/// A column as the file has it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Column {
+    /// Its name without the unit; empty if it has none.
+    pub name: String,
+    /// Its name as it stands in the header.
+    pub heading: String,
+    /// Its unit as the file writes it, from the heading or a line of units.
+    pub unit: Option<String>,
+    /// Its cells.
+    pub cells: Cells,
+}
+
+impl Column {
+    /// A column by its heading, and the unit that something else gives it.
+    pub(crate) fn new(heading: String, unit: Option<String>, cells: Cells) -> Self {
+        let (name, own) = names::take_apart(&heading);
+        Self { name, heading, unit: unit.or(own), cells }
+    }
+}
+
+/// What is known of a file before it is read; what is not is found out.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ReadOptions {
+    /// The decimal mark.
+    pub decimal: Option<DecimalMark>,
+    /// Lines above header and data.
+    pub skip: Option<usize>,
+    /// The sheet of a workbook.
+    pub sheet: Option<String>,
+}
+
+/// How a file is written.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Layout {
+    /// What kind of file, in words: `text`, `XLSX, sheet `…``, `Parquet`, after `gzip, ` if it was compressed.
+    pub format: String,
+    /// Encoding of text.
+    pub encoding: Option<&'static str>,
+    /// What separates the cells of text, in words.
+    pub separator: Option<&'static str>,
+    /// The decimal mark.
+    pub decimal: DecimalMark,
+    /// The file decides between point and comma by thousands only: `1,234`.
+    pub decimal_is_open: bool,
+    /// Marks group thousands somewhere.
+    pub has_groups: bool,
+    /// Lines passed over above header and data.
+    pub skip: usize,
+    /// Header lines.
+    pub header_lines: usize,
+    /// Whether a line of units follows the header.
+    pub unit_line: bool,
+    /// Lines of text among or behind the data, and a last one that was cut, which are passed over.
+    pub text_lines: usize,
+    /// The first of them, counted from 1.
+    pub first_text_line: Option<u64>,
+    /// Rows with fewer cells than there are columns.
+    pub short_lines: usize,
+}
+
+/// A file's cells by column, and how they were written.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Table {
+    /// What messages call the file.
+    pub file: String,
+    /// How it is written.
+    pub layout: Layout,
+    /// What `# key = value` lines above the header say.
+    pub metadata: Metadata,
+    /// The columns.
+    pub columns: Vec<Column>,
+    /// The physical line (or row) of each row, counted from 1.
+    pub lines: Vec<u64>,
+}
+
+impl Table {
+    /// Number of rows.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.lines.len()
+    }
+
+    /// Whether there is no row.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.lines.is_empty()
+    }
+
+    /// How messages call a column.
+    pub(crate) fn name(&self, column: usize) -> String {
+        match self.columns.get(column) {
+            Some(column) if !column.heading.is_empty() => quote(&column.heading),
+            _ => (column + 1).to_string(),
+        }
+    }
+
+    /// The columns, for messages.
+    pub(crate) fn list(&self) -> String {
+        let names: Vec<String> = (0..self.columns.len()).take(12).map(|column| self.name(column)).collect();
+        names.join(", ") + if self.columns.len() > 12 { " …" } else { "" }
+    }
+
+    /// Whether the numbers of a column increase from row to row, all but a few.
+    pub(crate) fn increases(&self, column: usize) -> bool {
+        let cells = self.columns[column].cells.cells();
+        let known: Vec<f64> = cells.filter_map(|cell| number_of(&cell, self.layout.decimal)).collect();
+        let steps = known.len().saturating_sub(1);
+        let upward = known.windows(2).filter(|pair| pair[1] > pair[0]).count();
+        known.len() * 10 > self.len() * 9 && steps > 0 && upward * 100 >= steps * 98
+    }
+
+    /// Whether any column has a name.
+    #[must_use]
+    pub fn has_names(&self) -> bool {
+        self.columns.iter().any(|column| !column.heading.is_empty())
+    }
+}
+
+/// The names of all files, for messages.
+pub(crate) fn all_files(tables: &[Table]) -> String {
+    tables.iter().map(|table| table.file.as_str()).collect::<Vec<_>>().join(", ")
+}

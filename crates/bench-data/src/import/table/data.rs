@@ -1,0 +1,148 @@
+use crate::import::bytes::Cell;
+use crate::import::table::grid::{Grid, SAMPLE, split};
+use crate::import::table::value::{is_number, value_of};
+use crate::import::words::{DecimalMark, Value, is_stamp, names, ohms};
+
+/// What a line is made of.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Shape {
+    /// Cells.
+    pub width: usize,
+    /// Cells that are numbers, dates or times of day.
+    pub numbers: usize,
+    /// Cells that are neither, nor a missing value.
+    pub texts: usize,
+}
+
+impl Shape {
+    pub(crate) fn of(cells: &[Cell], decimal: DecimalMark) -> Self {
+        let mut shape = Self { width: cells.len(), ..Self::default() };
+        let mut prefixed = 0;
+        for cell in cells {
+            if is_number(cell, decimal) {
+                shape.numbers += 1;
+            } else if value_of(cell, decimal, 0, &[]) == Value::Text {
+                shape.texts += 1;
+                prefixed += usize::from(matches!(cell, Cell::Text(text) if ohms(text, decimal).is_some()));
+            }
+        }
+        // `time,10k,22k` are names of columns.
+        if shape.numbers > 0 {
+            (shape.numbers, shape.texts) = (shape.numbers + prefixed, shape.texts - prefixed);
+        }
+        shape
+    }
+
+    /// Whether words stand where data has numbers: `Date;13.5.2024`, `Maximum;1600`.
+    pub(crate) const fn is_worded(self, data: Self) -> bool {
+        self.numbers < data.numbers && self.texts > data.texts
+    }
+}
+
+/// What the lines of data have in common.
+pub(crate) struct Data {
+    pub shape: Shape,
+    /// Their last cells are empty: a separator at the end.
+    ends_empty: bool,
+    /// Their first cells count them.
+    is_numbered: bool,
+}
+
+impl Data {
+    /// The commonest number of cells in lines with a number, and the commonest shape of that width.
+    pub(crate) fn find(grid: &Grid, decimal: DecimalMark, first: usize) -> Self {
+        let rows =
+            || (first..grid.len()).filter(|row| grid.comment(*row).is_none()).take(SAMPLE).map(|row| grid.cells(row));
+        let shapes: Vec<Shape> =
+            rows().map(|cells| Shape::of(&cells, decimal)).filter(|shape| shape.numbers > 0).collect();
+        let commonest = |among: &dyn Fn(&Shape) -> Option<(usize, usize)>| {
+            let mut counts: Vec<((usize, usize), usize)> = Vec::new();
+            for of in shapes.iter().filter_map(among) {
+                match counts.iter_mut().find(|(known, _)| *known == of) {
+                    Some((_, count)) => *count += 1,
+                    None => counts.push((of, 1)),
+                }
+            }
+            counts.into_iter().max_by_key(|(of, count)| (*count, *of)).map(|(of, _)| of)
+        };
+        let width = commonest(&|shape| Some((shape.width, 0))).map_or(1, |(width, _)| width);
+        let of_width = |shape: &Shape| (shape.width == width).then_some((shape.numbers, shape.texts));
+        let (numbers, texts) = commonest(&of_width).unwrap_or((1, 0));
+        let shape = Shape { width, numbers, texts };
+        let data = || rows().filter(|cells| Shape::of(cells, decimal) == shape);
+        let ends_empty = data().all(|cells| cells.last().is_none_or(Cell::is_empty));
+        let counts: Vec<i64> = data().map_while(|cells| cells.first()?.to_string().parse().ok()).collect();
+        let is_numbered = counts.len() > 2
+            && counts.len() == data().count()
+            && counts.windows(2).all(|pair| pair[1] > pair[0])
+            && matches!(counts[0], 0 | 1);
+        Self { shape, ends_empty, is_numbered }
+    }
+
+    /// The first line of data at or below `first`.
+    pub(crate) fn first_row(&self, grid: &Grid, decimal: DecimalMark, first: usize) -> Option<usize> {
+        let is_comment = |row: usize| grid.comment(row).is_some();
+        let shape = |row: usize| Shape::of(&grid.cells(row), decimal);
+        let is_data = |row: &usize| {
+            let shape = shape(*row);
+            !is_comment(*row) && shape.width == self.shape.width && shape.numbers > 0 && shape.numbers >= shape.texts
+        };
+        let found = (first..grid.len()).find(is_data)?;
+        // `Date;13.5.2024` above the names has a number, too.
+        let sure = (found..grid.len()).find(|row| is_data(row) && !shape(*row).is_worded(self.shape)).unwrap_or(found);
+        let found = if (found..sure).any(|row| !is_comment(row) && shape(row).numbers == 0) { sure } else { found };
+        // Below the names a row may lack its last cells.
+        let is_short = |row: &usize| {
+            let shape = shape(*row);
+            !is_comment(*row) && (2..self.shape.width).contains(&shape.width) && shape.texts == 0 && shape.numbers > 1
+        };
+        let short = (first..found).rev().take_while(is_short).last();
+        let is_below_names = |row: &usize| *row > first && self.heading_cells(grid, *row - 1).is_some();
+        Some(short.filter(is_below_names).unwrap_or(found))
+    }
+
+    /// The cells of a line of names or units, as many as the data has columns; `None` if it is no such line.
+    pub(crate) fn heading_cells(&self, grid: &Grid, row: usize) -> Option<Vec<String>> {
+        let width = self.shape.width;
+        let mut cells: Vec<String> = match (grid.comment(row), grid) {
+            (Some(comment), Grid::Text { separator, .. }) if !comment.contains('=') => {
+                split(comment, *separator).into_iter().map(Into::into).collect()
+            }
+            (Some(_), _) => return None,
+            (None, _) => grid.cells(row).iter().map(Cell::to_string).collect(),
+        };
+        if cells.len() != width {
+            cells = joined_brackets(cells);
+        }
+        while cells.len() > width && cells.last().is_some_and(String::is_empty) {
+            cells.pop();
+        }
+        // A name for remarks, of which there are none.
+        if cells.len() == width + 1 && width > 1 && cells.last().is_some_and(|last| names::role(last, None).is_none()) {
+            cells.pop();
+        }
+        if cells.len() + 1 == width && self.is_numbered && !self.ends_empty {
+            cells.insert(0, String::new());
+        }
+        let texts = cells.iter().filter(|cell| !cell.is_empty()).count();
+        let is_heading = |cell: &String| cell.is_empty() || cell.parse::<f64>().is_err() && !is_stamp(cell);
+        let fits = cells.len() == width || (cells.len() + 1 == width && width > 2);
+        if !fits || !cells.iter().all(is_heading) || texts == 0 || (texts == 1 && width > 1) {
+            return None;
+        }
+        cells.resize(width, String::new());
+        Some(cells)
+    }
+}
+
+/// `Time`, `(s)` → `Time (s)`, where blanks separate the names too.
+fn joined_brackets(cells: Vec<String>) -> Vec<String> {
+    let mut out: Vec<String> = Vec::new();
+    for cell in cells {
+        match out.last_mut() {
+            Some(last) if cell.starts_with(['(', '[']) => *last = format!("{last} {cell}"),
+            _ => out.push(cell),
+        }
+    }
+    out
+}

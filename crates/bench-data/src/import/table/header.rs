@@ -1,0 +1,169 @@
+use crate::error::{Fault, quote};
+use crate::import::bytes::Cell;
+use crate::import::error::ImportError;
+use crate::import::table::data::{Data, Shape};
+use crate::import::table::grid::{Grid, Separator};
+use crate::import::table::records::Records;
+use crate::import::words::names::{self, Sureness};
+use crate::import::words::{DecimalMark, units};
+use crate::metadata::Metadata;
+
+/// Lines above the data that may belong to its header: two of names, one of units.
+const MOST_HEADER_LINES: usize = 3;
+
+/// What stands above the data.
+#[derive(Debug, Default)]
+pub(crate) struct Header {
+    /// The first line of data, as an index of the grid.
+    pub first_row: usize,
+    /// What most lines of data are.
+    pub shape: Shape,
+    /// Heading of each column; empty where there is none.
+    pub headings: Vec<String>,
+    /// Unit of each column, where a line of units has one.
+    pub units: Vec<Option<String>>,
+    /// Physical lines above the header, or above the data if there is none.
+    pub skip: usize,
+    /// Lines of names.
+    pub header_lines: usize,
+    /// Whether there is a line of units.
+    pub unit_line: bool,
+    /// What `# key = value` lines say.
+    pub metadata: Metadata,
+}
+
+impl Header {
+    /// Looks above the first line that is data, below `skip` physical lines.
+    pub(crate) fn find(file: &str, grid: &Grid, decimal: DecimalMark, skip: usize) -> Result<Self, ImportError> {
+        let first = (0..grid.len()).find(|row| grid.line(*row) > skip as u64).unwrap_or(grid.len());
+        let data = Data::find(grid, decimal, first);
+        let Some(first_row) = data.first_row(grid, decimal, first) else {
+            let last = grid.len().checked_sub(1);
+            let cell = last.and_then(|last| grid.cells(last).first().map(Cell::to_string)).unwrap_or_default();
+            let found = if cell.starts_with(|c: char| c.is_ascii_digit()) {
+                format!("cells like {}: take units and other words out of them", quote(&cell))
+            } else {
+                "none".to_owned()
+            };
+            let line = last.map_or(1, |last| grid.line(last));
+            return Err(ImportError::content(file, line, Fault::new("rows of numbers", found)));
+        };
+        let width = data.shape.width;
+        let mut header = Self { first_row, shape: data.shape, headings: vec![String::new(); width], ..Self::default() };
+        header.units = vec![None; width];
+        header.read_metadata(file, grid)?;
+        let top = header.read_names(file, grid, first, &data)?;
+        header.skip = (grid.line(top) - 1) as usize;
+        Ok(header)
+    }
+
+    /// Labels are their own header.
+    pub(crate) fn of_records(records: &Records, decimal: DecimalMark, skip: usize) -> Self {
+        let headings = records.headings.clone();
+        let shape = records.rows.get(records.fullest).map_or_else(Shape::default, |row| Shape::of(&row.1, decimal));
+        Self { shape, units: vec![None; headings.len()], headings, skip, ..Self::default() }
+    }
+
+    /// They count wherever they stand above the data, in lines that are skipped too.
+    fn read_metadata(&mut self, file: &str, grid: &Grid) -> Result<(), ImportError> {
+        for row in 0..self.first_row {
+            if let Some(comment) = grid.comment(row).filter(|comment| comment.contains('=')) {
+                let taken = self.metadata.take_line(&format!("# {comment}"));
+                taken.map_err(|fault| ImportError::content(file, grid.line(row), fault))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Takes names and units from the lines above the data; the topmost line taken, or the first of data.
+    fn read_names(&mut self, file: &str, grid: &Grid, first: usize, data: &Data) -> Result<usize, ImportError> {
+        let mut lines: Vec<(usize, Vec<String>)> = Vec::new();
+        for row in (first..self.first_row).rev() {
+            match data.heading_cells(grid, row) {
+                Some(cells) if lines.len() < MOST_HEADER_LINES => lines.push((row, cells)),
+                _ => break,
+            }
+        }
+        if lines.is_empty() {
+            self.refuse_commas_for_both(file, grid, first)?;
+            return Ok(self.first_row);
+        }
+        let has_units = lines.len() > 1 && is_unit_line(&lines[0].1) || is_bracketed(&lines[0].1);
+        if has_units {
+            self.unit_line = true;
+            self.units = lines[0].1.iter().map(|cell| Some(cell.clone()).filter(|cell| !cell.is_empty())).collect();
+        }
+        let names: Vec<&(usize, Vec<String>)> = lines.iter().skip(usize::from(has_units)).collect();
+        let Some((row, nearest)) = names.first() else { return Ok(lines[0].0) };
+        self.headings.clone_from(nearest);
+        self.header_lines = 1;
+        let mut top = *row;
+        if let Some((row, above)) = names.get(1) {
+            if has_twins(nearest) {
+                // A line of groups above, `Sensor,Sensor,Stage,Stage`, tells columns of the same name apart.
+                let join = |(group, name): (&String, &String)| format!("{group} {name}").trim().to_owned();
+                self.headings = filled_to_the_right(above).iter().zip(nearest).map(join).collect();
+                (self.header_lines, top) = (2, *row);
+            } else if !has_twins(above) {
+                // `Time,Resistance` above `Channel 1,DMM`: each column has the name that says what is measured.
+                for (heading, above) in self.headings.iter_mut().zip(above) {
+                    if is_quantity(above) && !is_quantity(heading) {
+                        heading.clone_from(above);
+                        (self.header_lines, top) = (2, *row);
+                    }
+                }
+            }
+        }
+        Ok(top)
+    }
+
+    /// `0,05,1600,1` under two names: commas that separate and commas that are decimal marks cannot be told apart.
+    fn refuse_commas_for_both(&self, file: &str, grid: &Grid, first: usize) -> Result<(), ImportError> {
+        let Some(above) = self.first_row.checked_sub(1).filter(|row| *row >= first) else { return Ok(()) };
+        let names = grid.cells(above).len();
+        let is_text = matches!(grid, Grid::Text { separator: Separator::Comma, .. });
+        if is_text && names > 1 && self.shape.width == 2 * names {
+            let expected = format!("{names} cells, as in the header");
+            let found = format!("{}: commas that separate and decimal commas cannot be told apart", self.shape.width);
+            return Err(ImportError::content(file, grid.line(self.first_row), Fault::new(expected, found)));
+        }
+        Ok(())
+    }
+}
+
+/// Whether all cells are units, empty ones aside, or short words beside at least one unit.
+fn is_unit_line(cells: &[String]) -> bool {
+    let filled = || cells.iter().filter(|cell| !cell.is_empty());
+    let units = filled().filter(|cell| units::is_unit(cell)).count();
+    units > 0 && filled().all(|cell| cell.chars().count() <= 12) && 2 * units >= filled().count() && {
+        // `t`, `R`, `x` are names first: a line of units has none that names a quantity and is no unit.
+        filled().all(|cell| units::is_unit(cell) || names::role(cell, None).is_none())
+    }
+}
+
+fn is_bracketed(cells: &[String]) -> bool {
+    let mut filled = cells.iter().filter(|cell| !cell.is_empty()).peekable();
+    filled.peek().is_some() && filled.all(|cell| cell.starts_with(['(', '[']) && cell.ends_with([')', ']']))
+}
+
+/// Whether a name says what is measured.
+fn is_quantity(heading: &str) -> bool {
+    let (name, unit) = names::take_apart(heading);
+    matches!(names::role(&name, unit.as_deref()), Some((_, Sureness::Strong)))
+}
+
+fn has_twins(names: &[String]) -> bool {
+    names.iter().enumerate().any(|(i, name)| names[..i].contains(name))
+}
+
+/// Groups of merged cells have their name in the first of them.
+fn filled_to_the_right(groups: &[String]) -> Vec<String> {
+    let mut last = String::new();
+    let filled = groups.iter().map(|group| {
+        if !group.is_empty() {
+            last.clone_from(group);
+        }
+        last.clone()
+    });
+    filled.collect()
+}

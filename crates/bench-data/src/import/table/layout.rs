@@ -1,0 +1,81 @@
+use crate::import::table::grid::{SAMPLE, Separator, behind_arrow, split};
+use crate::import::words::{DecimalMark, Value, amount, is_stamp};
+
+/// Finds separator and decimal mark, those under which most cells are numbers and fewest are text; and whether only cells
+/// like `1,234` speak for the mark.
+///
+/// `monitor`: lines begin with the clock of a serial monitor.
+pub(crate) fn text_layout(
+    lines: &[(u64, &str)],
+    monitor: bool,
+    decimal: Option<DecimalMark>,
+) -> (Separator, DecimalMark, bool) {
+    let sample = || lines.iter().take(SAMPLE).map(|(_, line)| *line);
+    let bodies: Vec<&str> = sample().map(|line| if monitor { behind_arrow(line) } else { line }).collect();
+    let marks = decimal.map_or(vec![DecimalMark::Point, DecimalMark::Comma], |mark| vec![mark]);
+    let mut best = (i64::MIN, Separator::Comma, marks[0]);
+    for separator in Separator::CELLS {
+        for &mark in &marks {
+            let score = score(&bodies, separator, mark, decimal.is_some());
+            if score > best.0 {
+                best = (score, separator, mark);
+            }
+        }
+    }
+    let (_, separator, mark) = best;
+    (separator, mark, decimal.is_none() && mark_is_open(lines, separator, mark))
+}
+
+/// Numbers less texts, in lines of the best width. Numbers with marks of thousands count if `groups` says so.
+fn score(lines: &[&str], separator: Separator, mark: DecimalMark, groups: bool) -> i64 {
+    let mut by_width: Vec<(usize, i64)> = Vec::new();
+    for line in lines {
+        let cells = split(line, separator);
+        let (numbers, texts) = cells.iter().fold((0, 0), |(numbers, texts), cell| match kind(cell, mark, groups) {
+            Value::Number(_) => (numbers + 1, texts),
+            Value::Text => (numbers, texts + 1),
+            Value::Missing => (numbers, texts),
+        });
+        if numbers == 0 {
+            continue;
+        }
+        match by_width.iter_mut().find(|(width, _)| *width == cells.len()) {
+            Some((_, score)) => *score += numbers - texts,
+            None => by_width.push((cells.len(), numbers - texts)),
+        }
+    }
+    by_width.into_iter().map(|(_, score)| score).max().unwrap_or(0)
+}
+
+fn kind(cell: &str, mark: DecimalMark, groups: bool) -> Value {
+    let (own, other) = if mark == DecimalMark::Point { ('.', ',') } else { (',', '.') };
+    if is_stamp(cell) {
+        return Value::Number(0.0);
+    }
+    match amount(cell, mark) {
+        // Unless the mark is known, the other one is taken for the mark, not for thousands.
+        Value::Number(_) if !groups && cell.contains(other) && !cell.contains(own) => Value::Text,
+        kind => kind,
+    }
+}
+
+/// Whether every cell with a mark is as good with the other one: `1,234`, one to three digits before, three behind.
+fn mark_is_open(lines: &[(u64, &str)], separator: Separator, mark: DecimalMark) -> bool {
+    if mark == DecimalMark::Point {
+        // `1.234`: points group thousands in files with decimal commas only, and then some cell would have a comma.
+        return false;
+    }
+    let mut some = false;
+    for (_, line) in lines {
+        for cell in split(line, separator) {
+            if cell.contains(',') && matches!(amount(&cell, DecimalMark::Comma), Value::Number(_)) {
+                let grouped = matches!(amount(&cell, DecimalMark::Point), Value::Number(_));
+                if !grouped || cell.trim_start_matches(['-', '+']).starts_with('0') {
+                    return false;
+                }
+                some = true;
+            }
+        }
+    }
+    some
+}

@@ -1,0 +1,128 @@
+use crate::import::bytes::bounds::check_cells;
+use crate::import::bytes::text::lines;
+use crate::import::bytes::{Cell, Cells, Contents, NamedSheets, RawColumn, open};
+use crate::import::error::{ImportError, quoted};
+use crate::import::table::columns::{Column, Layout, ReadOptions, Table};
+use crate::import::table::data::Shape;
+use crate::import::table::grid::{Grid, SAMPLE, is_monitor};
+use crate::import::table::header::Header;
+use crate::import::table::layout::text_layout;
+use crate::import::table::records::{self, Records};
+use crate::import::words::{DecimalMark, has_groups};
+
+/// Reads a file of any kind: text, XLSX and its relatives, Parquet, each of them in gzip too. `name` is what messages call
+/// it.
+///
+/// # Errors
+/// [`ImportError`] if it is nothing of that kind, has no rows of numbers, or holds more than may be held.
+pub fn read_table(bytes: Vec<u8>, name: &str, options: &ReadOptions) -> Result<Table, ImportError> {
+    let (contents, wrappings) = open(bytes, name, options.sheet.as_deref())?;
+    let mut table = match contents {
+        Contents::Text(text, encoding) => of_text(&text, encoding, name, options)?,
+        Contents::Sheets(sheets) => of_sheets(sheets, name, options)?,
+        Contents::Columns(columns) => of_columns(columns, name),
+    };
+    table.layout.format.insert_str(0, &"gzip, ".repeat(wrappings));
+    Ok(table)
+}
+
+fn of_text(text: &str, encoding: &'static str, name: &str, options: &ReadOptions) -> Result<Table, ImportError> {
+    let lines = lines(text).map_err(|(line, fault)| ImportError::content(name, line, fault))?;
+    let skip = options.skip.unwrap_or(0);
+    let below = &lines[lines.partition_point(|(number, _)| *number <= skip as u64)..];
+    let monitor = is_monitor(below.iter().take(SAMPLE).map(|(_, line)| *line));
+    let layout = Layout { format: "text".to_owned(), encoding: Some(encoding), ..Layout::default() };
+    if let Some(records) = Records::find(below, monitor) {
+        let (decimal, decimal_is_open) = options.decimal.map_or(records.decimal, |mark| (mark, false));
+        let layout = Layout { separator: Some(records::SEPARATOR), decimal, decimal_is_open, ..layout };
+        let header = Header::of_records(&records, decimal, skip);
+        return of_grid(name, &Grid::Rows(records.rows), header, layout);
+    }
+    let (separator, decimal, decimal_is_open) = text_layout(below, monitor, options.decimal);
+    let layout = Layout { separator: Some(separator.words()), decimal, decimal_is_open, ..layout };
+    let is_open = !text.ends_with(['\n', '\r']);
+    let grid = Grid::Text { lines, separator, monitor, is_open };
+    let header = Header::find(name, &grid, decimal, skip)?;
+    of_grid(name, &grid, header, layout)
+}
+
+/// The only sheet with rows of numbers.
+fn of_sheets(sheets: NamedSheets, name: &str, options: &ReadOptions) -> Result<Table, ImportError> {
+    let decimal = options.decimal.unwrap_or(DecimalMark::Point);
+    let (mut found, mut answers, mut last_error) = (Vec::new(), Vec::new(), None);
+    for (sheet, rows) in sheets {
+        let grid = Grid::Rows(rows);
+        let layout = Layout { format: format!("workbook, sheet `{sheet}`"), decimal, ..Layout::default() };
+        let header = Header::find(name, &grid, decimal, options.skip.unwrap_or(0));
+        match header.and_then(|header| of_grid(name, &grid, header, layout)) {
+            Ok(table) => {
+                found.push(table);
+                answers.push(format!("--sheet {}", quoted(&sheet)));
+            }
+            Err(error) => last_error = Some(error),
+        }
+    }
+    match (found.pop(), last_error) {
+        (Some(table), _) if found.is_empty() => Ok(table),
+        (None, Some(error)) => Err(error),
+        _ => Err(ImportError::question(name, "several sheets have rows of numbers", answers)),
+    }
+}
+
+fn of_columns(columns: Vec<RawColumn>, name: &str) -> Table {
+    let rows = columns.first().map_or(0, |column| column.cells.len() as u64);
+    let columns = columns.into_iter().map(|raw| Column::new(raw.heading, raw.unit, raw.cells)).collect();
+    let layout = Layout { format: "Parquet".to_owned(), ..Layout::default() };
+    Table { file: name.to_owned(), layout, columns, lines: (1..=rows).collect(), ..Table::default() }
+}
+
+/// A table out of lines of cells.
+///
+/// # Errors
+/// If it has more cells than may be held.
+fn of_grid(file: &str, grid: &Grid, header: Header, layout: Layout) -> Result<Table, ImportError> {
+    check_cells(file, grid.len(), header.shape.width)?;
+    let mut layout =
+        Layout { skip: header.skip, header_lines: header.header_lines, unit_line: header.unit_line, ..layout };
+    let mut cells = vec![Cells::default(); header.shape.width];
+    let (mut numbers, mut widths) = (Vec::new(), Vec::new());
+    let end = end_of_data(grid, &header, layout.decimal);
+    for row in header.first_row..grid.len() {
+        let line = grid.cells(row);
+        if row >= end || grid.comment(row).is_some() || Shape::of(&line, layout.decimal).numbers == 0 {
+            layout.text_lines += 1;
+            layout.first_text_line.get_or_insert(grid.line(row));
+            continue;
+        }
+        widths.push(line.len());
+        if !layout.has_groups {
+            let has_groups = |cell: &Cell| matches!(cell, Cell::Text(text) if has_groups(text, layout.decimal));
+            layout.has_groups = line.iter().any(has_groups);
+        }
+        numbers.push(grid.line(row));
+        for (column, cells) in cells.iter_mut().enumerate() {
+            cells.push_cell(line.get(column).unwrap_or(&Cell::Empty));
+        }
+    }
+    let named = header.headings.into_iter().zip(header.units).zip(cells);
+    let mut columns: Vec<Column> = named.map(|((heading, unit), cells)| Column::new(heading, unit, cells)).collect();
+    // A separator at the end of each line makes a column of nothing.
+    while columns.last().is_some_and(|last| last.heading.is_empty() && last.cells.iter().all(str::is_empty)) {
+        columns.pop();
+    }
+    layout.short_lines = widths.into_iter().filter(|width| *width < columns.len()).count();
+    Ok(Table { file: file.to_owned(), layout, metadata: header.metadata, columns, lines: numbers })
+}
+
+/// Where the lines begin that stand behind the data: text, sums with a word before them, and a line that was cut.
+fn end_of_data(grid: &Grid, header: &Header, decimal: DecimalMark) -> usize {
+    let is_behind = |row: &usize| {
+        let shape = Shape::of(&grid.cells(*row), decimal);
+        let is_cut = *row + 1 == grid.len()
+            && matches!(grid, Grid::Text { is_open: true, .. })
+            && shape.width < header.shape.width
+            && shape.numbers < header.shape.numbers;
+        grid.comment(*row).is_some() || shape.numbers == 0 || shape.is_worded(header.shape) || is_cut
+    };
+    (header.first_row..grid.len()).rev().take_while(is_behind).last().unwrap_or(grid.len())
+}

@@ -1,0 +1,9 @@
+//! A plan, the trace that it makes of files, and what the trace is like.
+
+mod build;
+mod plan;
+mod survey;
+
+pub use build::Imported;
+pub use plan::Plan;
+pub use survey::{Allan, ChannelSurvey, ClockSurvey, PhaseSurvey, Survey};

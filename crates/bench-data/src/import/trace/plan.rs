@@ -1,0 +1,123 @@
+use crate::import::error::ImportError;
+use crate::import::roles::{Align, Channel, Decision, Found, PerFile, Place, Recipe, decide, refer};
+use crate::import::series::{Values, alternation};
+use crate::import::table::Table;
+use crate::import::words::units::SCALED;
+use crate::import::words::{DecimalMark, Role};
+
+/// Signs are arbitrary where a larger share of the readings than this is negative.
+const FEW_SIGNS: f64 = 0.1;
+
+/// An import with nothing left open.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Plan {
+    /// What was answered.
+    given: Recipe,
+    /// The answers with those of the preset.
+    pub(crate) recipe: Recipe,
+    pub(crate) decision: Decision,
+    /// What follows from names or numbers, and is not said by a flag.
+    pub remarks: Vec<String>,
+}
+
+impl Plan {
+    /// Decides all that the recipe leaves open, by names, units and numbers.
+    ///
+    /// # Errors
+    /// [`ImportError::Question`] for the first thing that nothing decides.
+    pub fn new(tables: &[Table], given: &Recipe) -> Result<Self, ImportError> {
+        Self::of(&Found::of(tables), given.clone())
+    }
+
+    fn of(found: &Found, given: Recipe) -> Result<Self, ImportError> {
+        let recipe = given.completed();
+        let decision = decide(found, &recipe);
+        match decision.questions.first() {
+            Some(question) => Err(question.clone()),
+            None => Ok(Self { given, recipe, remarks: decision.remarks.clone(), decision }),
+        }
+    }
+
+    /// The plan for what `inspect` proposes: beside what [`new`](Self::new) decides, a preset that fits, signs that are
+    /// arbitrary, polarity that flips, and clocks of two files that the motion brings together.
+    ///
+    /// # Errors
+    /// [`ImportError::Question`] for the first thing that nothing decides.
+    pub fn propose(tables: &[Table], given: &Recipe) -> Result<Self, ImportError> {
+        let found = Found::of(tables);
+        let fits = found.preset.filter(|_| tables.len() == 1 && given.columns.is_empty());
+        if let Some(preset) = given.preset.or(fits) {
+            return Self::of(&found, Recipe { preset: Some(preset), ..given.clone() });
+        }
+        let align = given.align.or((tables.len() > 1).then_some(Align::Motion));
+        let plan = Self::of(&found, Recipe { align, ..given.clone() })?;
+        let values = Values::read(tables, plan.readings(), &given.missing)?.values;
+        let recipe = with_signs(plan.recipe, plan.decision.readings[0].values.role, &values);
+        Ok(Self { given: recipe.clone(), recipe, ..plan })
+    }
+
+    /// The readings that the trace has.
+    pub(crate) fn readings(&self) -> &Channel {
+        &self.decision.readings[0].values
+    }
+
+    /// The recipe that says all of this plan by flags.
+    #[must_use]
+    pub fn recipe(&self, tables: &[Table]) -> Recipe {
+        if self.given.preset.is_some() {
+            return self.given.clone();
+        }
+        let mut out = Recipe { columns: Vec::new(), units: Vec::new(), ..self.given.clone() };
+        for channel in &self.decision.channels() {
+            out.columns.push((channel.role, refer(tables, channel.place)));
+            out.units.push((channel.role, self.unit_text(channel).to_owned()));
+        }
+        // What is to be left out stays so.
+        out.columns.extend(self.given.columns.iter().filter(|(_, name)| name.is_none()).cloned());
+        for (index, table) in tables.iter().enumerate() {
+            let file = (tables.len() > 1).then_some(index + 1);
+            let (layout, options) = (&table.layout, self.given.read_options(index));
+            let says_mark = layout.decimal != DecimalMark::Point || layout.has_groups;
+            if options.decimal.is_none() && says_mark {
+                out.decimal.push(PerFile { file, value: layout.decimal });
+            }
+            if options.skip.is_none() && layout.skip > 0 {
+                out.skip.push(PerFile { file, value: layout.skip });
+            }
+        }
+        out
+    }
+
+    /// The column that a role was given, as messages call it, with its file and unit.
+    #[must_use]
+    pub fn columns(&self, tables: &[Table]) -> Vec<(Role, usize, usize, String, &str)> {
+        let describe = |channel: &Channel| {
+            let Place { file, column } = channel.place;
+            (channel.role, file, column, tables[file].name(column), self.unit_text(channel))
+        };
+        self.decision.channels().iter().map(describe).collect()
+    }
+
+    /// The unit as flags have it.
+    fn unit_text(&self, channel: &Channel) -> &str {
+        match channel.unit.name {
+            SCALED => self.recipe.unit(channel.role).unwrap_or(SCALED),
+            name => name,
+        }
+    }
+}
+
+/// A recipe that says which signs mean nothing: those of many readings, and those that flip from one to the next.
+fn with_signs(recipe: Recipe, role: Role, readings: &[f64]) -> Recipe {
+    let known = readings.iter().filter(|value| !value.is_nan()).count();
+    let negative = readings.iter().filter(|value| **value < 0.0).count();
+    // A few, such as -999, mean something else: a question.
+    let are_arbitrary = role == Role::Resistance && negative as f64 > FEW_SIGNS * known as f64;
+    let is_new = are_arbitrary && !recipe.magnitude.contains(&role);
+    let sizes: Vec<f64> = readings.iter().map(|value| value.abs()).collect();
+    Recipe {
+        magnitude: recipe.magnitude.iter().copied().chain(is_new.then_some(role)).collect(),
+        fold_polarity: recipe.fold_polarity || alternation(&sizes).is_some(),
+        ..recipe
+    }
+}

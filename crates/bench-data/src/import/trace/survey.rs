@@ -1,0 +1,210 @@
+use ohmstrain_calib::{Lag, LagError, Samples, reference_lag};
+use ohmstrain_model::Phase;
+
+use crate::import::trace::build::Imported;
+use crate::order::{extent, median, typical_step};
+use crate::segment::{Segment, noise_sd, segment};
+
+/// A step longer than so many typical ones is a gap.
+const GAP: f64 = 3.0;
+/// The lowest part of the reference's range, in which drift is looked for.
+const LOWEST: f64 = 0.1;
+
+/// How a clock runs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ClockSurvey {
+    /// Typical step, s.
+    pub step_s: f64,
+    /// A twentieth of the steps is shorter, a twentieth longer, s.
+    pub step_range_s: (f64, f64),
+    /// First and last time, s.
+    pub span_s: (f64, f64),
+    /// Steps longer than three typical ones, and the longest step, s.
+    pub gaps: (usize, f64),
+    /// Rows left out because they had the time of the one before.
+    pub duplicates: usize,
+}
+
+/// Least scatter of means over a time: what averaging can reach before drift begins.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Allan {
+    /// Averaging time, s.
+    pub tau_s: f64,
+    /// Allan deviation.
+    pub deviation: f64,
+}
+
+/// What stands in a channel.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ChannelSurvey {
+    /// Known and missing values.
+    pub counts: (usize, usize),
+    /// Smallest and largest.
+    pub range: (f64, f64),
+    /// Values in runs at the smallest and at the largest one, if they stand there longer than elsewhere.
+    pub clipped: (usize, usize),
+    /// Standard deviation of what is not motion, from how far values lie off the line between their neighbours.
+    pub noise: f64,
+    /// Allan deviations over averaging times that double, in the longest hold; in all rows of a recording without a
+    /// reference; none if the body never holds still.
+    pub allan: Vec<Allan>,
+}
+
+/// What the body does.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PhaseSurvey {
+    /// Number of phases and their time, s: extend, hold, retract.
+    pub phases: [(usize, f64); 3],
+    /// The segments.
+    pub segments: Vec<Segment>,
+}
+
+/// What there is to know of a recording before it is used.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Survey {
+    /// The readings' clock.
+    pub clock: ClockSurvey,
+    /// The readings.
+    pub readings: ChannelSurvey,
+    /// The reference.
+    pub reference: Option<ChannelSurvey>,
+    /// Phases of the reference.
+    pub phases: Option<PhaseSurvey>,
+    /// Change of the readings from the first to the last time at rest (at all, without a reference), relative.
+    pub drift: Option<f64>,
+    /// By how much neighbouring readings alternate, relative to their size, if they do.
+    pub alternation: Option<f64>,
+    /// How far the reference lags behind the readings.
+    pub lag: Option<Lag>,
+    /// Why that is not known.
+    pub lag_unknown: Option<String>,
+}
+
+impl Survey {
+    /// Looks at a recording.
+    #[must_use]
+    pub fn new(imported: &Imported) -> Self {
+        let trace = &imported.trace;
+        let (time_s, readings) = (&trace.time_s, &trace.readings.values);
+        let reference = trace.reference.as_ref().map(|reference| reference.values.as_slice());
+        let segments = reference.map(|reference| segment(time_s, reference));
+        let quiet = match &segments {
+            Some(segments) => longest_hold(time_s, segments).unwrap_or(0..0),
+            None => 0..time_s.len(),
+        };
+        let found = reference.map(|reference| match Samples::new(time_s, readings, reference) {
+            Ok(samples) => reference_lag(&samples),
+            Err(_) => Err(LagError::Short),
+        });
+        Self {
+            clock: clock_survey(time_s, imported.duplicates),
+            readings: channel_survey(time_s, readings, &quiet),
+            reference: reference.map(|reference| channel_survey(time_s, reference, &quiet)),
+            phases: segments.map(|segments| phase_survey(time_s, segments)),
+            alternation: imported.alternation,
+            drift: drift(readings, reference),
+            lag: found.and_then(Result::ok),
+            lag_unknown: found.and_then(Result::err).map(|error| error.to_string()),
+        }
+    }
+}
+
+/// How a clock runs; `duplicates` were left out of it.
+fn clock_survey(time_s: &[f64], duplicates: usize) -> ClockSurvey {
+    let mut steps: Vec<f64> = time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    steps.sort_by(f64::total_cmp);
+    let at = |share: f64| steps.get((share * steps.len() as f64) as usize).copied().unwrap_or(f64::NAN);
+    let step_s = typical_step(time_s).unwrap_or(f64::NAN);
+    let gaps = steps.iter().filter(|step| **step > GAP * step_s).count();
+    ClockSurvey {
+        step_s,
+        step_range_s: (at(0.05), at(0.95)),
+        span_s: (time_s.first().copied().unwrap_or(f64::NAN), time_s.last().copied().unwrap_or(f64::NAN)),
+        gaps: (gaps, steps.last().copied().unwrap_or(f64::NAN)),
+        duplicates,
+    }
+}
+
+fn channel_survey(time_s: &[f64], values: &[f64], quiet: &std::ops::Range<usize>) -> ChannelSurvey {
+    let known: Vec<usize> = (0..values.len()).filter(|row| !values[*row].is_nan()).collect();
+    let (times, numbers): (Vec<f64>, Vec<f64>) = known.iter().map(|row| (time_s[*row], values[*row])).unzip();
+    let (low, high) = extent(numbers.iter().copied());
+    ChannelSurvey {
+        counts: (known.len(), values.len() - known.len()),
+        range: (low, high),
+        clipped: (clipped(&numbers, low), clipped(&numbers, high)),
+        noise: noise_sd(&times, &numbers),
+        allan: allan(&time_s[quiet.clone()], &values[quiet.clone()]),
+    }
+}
+
+/// Values at an end of the range that stand there in runs, while elsewhere hardly two neighbours are alike.
+fn clipped(values: &[f64], end: f64) -> usize {
+    const SHORTEST_RUN: usize = 3;
+    let alike = values.windows(2).filter(|pair| pair[0] == pair[1] && pair[0] != end).count();
+    if alike * 20 > values.len() {
+        return 0;
+    }
+    let runs = values.chunk_by(|a, b| a == b).filter(|run| run[0] == end && run.len() >= SHORTEST_RUN);
+    runs.map(<[f64]>::len).sum()
+}
+
+/// Allan deviations of values at hardly uneven steps; gaps are passed over.
+fn allan(time_s: &[f64], values: &[f64]) -> Vec<Allan> {
+    let Some(step_s) = typical_step(time_s) else { return Vec::new() };
+    let known: Vec<f64> = values.iter().copied().filter(|value| !value.is_nan()).collect();
+    let mut sums = vec![0.0];
+    for value in &known {
+        // Relative to the first, so that sums keep their digits.
+        sums.push(sums[sums.len() - 1] + (value - known[0]));
+    }
+    let mut out = Vec::new();
+    let mut width = 1;
+    // At least eight pairs of means.
+    while known.len() >= 9 * width {
+        let pairs = known.len() + 1 - 2 * width;
+        let difference = |i: usize| (sums[i + 2 * width] - 2.0 * sums[i + width] + sums[i]) / width as f64;
+        let square = (0..pairs).map(|i| difference(i).powi(2)).sum::<f64>() / pairs as f64;
+        out.push(Allan { tau_s: width as f64 * step_s, deviation: (0.5 * square).sqrt() });
+        width *= 2;
+    }
+    out
+}
+
+fn phase_survey(time_s: &[f64], segments: Vec<Segment>) -> PhaseSurvey {
+    let mut out = PhaseSurvey::default();
+    for segment in &segments {
+        let phase = &mut out.phases[match segment.phase {
+            Phase::Extend => 0,
+            Phase::Hold => 1,
+            Phase::Retract => 2,
+        }];
+        phase.0 += 1;
+        phase.1 += duration(time_s, segment);
+    }
+    PhaseSurvey { segments, ..out }
+}
+
+fn duration(time_s: &[f64], segment: &Segment) -> f64 {
+    time_s[segment.rows.end.min(time_s.len() - 1)] - time_s[segment.rows.start]
+}
+
+fn longest_hold(time_s: &[f64], segments: &[Segment]) -> Option<std::ops::Range<usize>> {
+    let holds = segments.iter().filter(|segment| segment.phase == Phase::Hold && segment.rows.len() >= 20);
+    holds.max_by(|a, b| duration(time_s, a).total_cmp(&duration(time_s, b))).map(|hold| hold.rows.clone())
+}
+
+/// From the first tenth of the readings at the least strain to the last.
+fn drift(readings: &[f64], reference: Option<&[f64]>) -> Option<f64> {
+    let known = reference.map(|reference| reference.iter().copied().filter(|value| !value.is_nan()));
+    let range = known.map(extent);
+    let is_low = |row: usize| match (reference, range) {
+        (Some(reference), Some((low, high))) => reference[row] <= low + LOWEST * (high - low),
+        _ => true,
+    };
+    let at_rest: Vec<f64> =
+        (0..readings.len()).filter(|row| !readings[*row].is_nan() && is_low(*row)).map(|row| readings[row]).collect();
+    let tenth = at_rest.len() / 10;
+    let first = median(at_rest.get(..tenth)?.to_vec())?;
+    Some(median(at_rest[at_rest.len() - tenth..].to_vec())? / first - 1.0)
+}

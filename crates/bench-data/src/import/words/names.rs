@@ -1,0 +1,220 @@
+use crate::import::words::role::Role;
+use crate::import::words::units;
+
+/// Units that are part of the name behind a blank or an underscore: `resistance_ratio`, `Stage Strain`.
+const WORDS: &str = "strain,ratio,fraction,frac,none,code,codes,count,counts,timestamp,datetime,day,days,tage";
+
+/// A heading taken apart: the bare name, and the unit if it has one.
+pub(crate) fn take_apart(heading: &str) -> (String, Option<String>) {
+    let heading = heading.trim();
+    for (open, close) in [('(', ')'), ('[', ']'), ('{', '}'), ('<', '>')] {
+        if let (Some(start), Some(end)) = (heading.rfind(open), heading.rfind(close))
+            && start < end
+            && (units::is_unit(&heading[start + 1..end]) || heading.ends_with(close))
+            && !is_index(heading[start + 1..end].trim())
+        {
+            let name = format!("{}{}", &heading[..start], &heading[end + close.len_utf8()..]);
+            return (name.trim().to_owned(), Some(heading[start + open.len_utf8()..end].trim().to_owned()));
+        }
+    }
+    // `time_ms`, `R kOhm`, `Time / s`, `Weg, mm`: a unit behind the last mark. `R/R0` is a name.
+    for mark in ['/', ',', '_', ' '] {
+        if let Some((name, unit)) = heading.rsplit_once(mark)
+            && units::is_unit(unit)
+            && !is_among(WORDS, &unit.trim().to_lowercase())
+            && unit.len() > 1 - usize::from(matches!(mark, '/' | ',' | '_'))
+            && !name.trim().is_empty()
+            && (matches!(mark, '/' | ',') || is_sure_unit(name, unit.trim()))
+        {
+            let name = name.trim().trim_end_matches([',', '/', '_']).trim();
+            return (name.to_owned(), Some(unit.trim().to_owned()));
+        }
+    }
+    (heading.to_owned(), None)
+}
+
+/// Whether a word is one of a list with commas between.
+fn is_among(list: &str, word: &str) -> bool {
+    list.split(',').any(|known| known == word)
+}
+
+/// Whether a text counts columns of one kind: `strain_1`, `R (2)`.
+fn is_index(text: &str) -> bool {
+    !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit())
+}
+
+/// Units that are words of names, too: `R_min`, `strain_in`, and every letter.
+const SHORT_WORDS: [&str; 4] = ["min", "in", "grad", "day"];
+
+/// Whether the text behind a blank or an underscore is a unit, and neither an index nor a part of the name. What may be
+/// either is a unit if the name's quantity is measured in it: `t_s`, `time_min`, `temp_c`; and volts are nothing else.
+fn is_sure_unit(name: &str, unit: &str) -> bool {
+    let lower = unit.to_lowercase();
+    let is_letter = unit.len() == 1 && unit.starts_with(|c: char| c.is_ascii_alphabetic()) && lower != "v";
+    if is_index(unit) {
+        return false;
+    }
+    if !is_letter && !SHORT_WORDS.contains(&lower.as_str()) {
+        return true;
+    }
+    match by_name(name, |_| true).map(|(role, _)| role) {
+        // `R_k`: kiloohms, or one of several.
+        Some(Role::Resistance) => false,
+        // `T_C` is a temperature, and no time.
+        Some(Role::Time) if name.trim() == "T" => units::unit(Role::Temperature, unit).is_some(),
+        Some(role) => units::unit(role, unit).is_some(),
+        None => lower != "k",
+    }
+}
+
+/// The end of a name that may be a unit or a part of the name: `res_k`, `strain_p`, `time_m`.
+pub(crate) fn doubtful_unit(role: Role, heading: &str) -> Option<&str> {
+    const DOUBTFUL: [(Role, &[&str]); 4] = [
+        (Role::Time, &["m", "u", "µ", "n"]),
+        (Role::Resistance, &["k", "m", "g"]),
+        (Role::Ratio, &["p", "pc"]),
+        (Role::Strain, &["p", "pc", "m", "u", "µ"]),
+    ];
+    let (_, end) = heading.trim().rsplit_once(['_', ' ', '-', '.'])?;
+    let (_, ends) = DOUBTFUL.iter().find(|(of, _)| *of == role.quantity())?;
+    ends.contains(&end.to_lowercase().as_str()).then_some(end)
+}
+
+/// How sure a name is of a role.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Sureness {
+    /// The unit alone says so, and could say so of something else too.
+    Weak,
+    /// The name says so, but for an index or a short word behind it.
+    Indexed,
+    /// The name says so.
+    Strong,
+}
+
+/// Whole names, in lower case, letters and digits only.
+const WHOLE: &[(Role, &str)] = &[
+    (Role::Time, "t,zeit,temps,micros,millis,seconds,sec,ms,us,clock,tr,ts,xvalue"),
+    (Role::Resistance, "r,rs,rx,rsensor,res,ohm,ohms,kohm,widerstand,sensor1r"),
+    (Role::Ratio, "rr0,rrel,relr,normalizedr,rnorm,drr0,drr,δrr0,deltarr0"),
+    (Role::Adc, "adc,adccode,adccounts,adcvalue,counts"),
+    (Role::Strain, "e,eps,ε,epsilon,dehnung,straintrue"),
+    (Role::Displacement, "p,x,d,pos,disp,displ,ext,weg,dl,δl,u"),
+    (Role::Angle, "angle,theta,θ,winkel,phi,flexion"),
+    (Role::Temperature, "temp,tempc,temperatur,tamb"),
+];
+
+/// Parts of names.
+const PART: &[(Role, &str)] = &[
+    (Role::Time, "time,timestamp,zeit,elapsed,datum,date"),
+    (Role::Ratio, "resistance ratio,relative resistance,normalized resistance,normalised resistance,relative change"),
+    (Role::Resistance, "resist,widerstand"),
+    (Role::Adc, "adc"),
+    (Role::Strain, "strain,dehnung"),
+    (Role::Displacement, "displacement,position,extension,elongation,travel,crosshead,stroke,verschiebung"),
+    (Role::Angle, "angle,winkel"),
+    (Role::Temperature, "temperature,temperatur"),
+];
+
+/// The role that a column's name and unit give it, if any.
+pub(crate) fn role(name: &str, unit: Option<&str>) -> Option<(Role, Sureness)> {
+    let fits = |role: Role| {
+        // A unit of something else, `Position (V)`, takes the role away; no unit, or an unknown one, does not.
+        unit.is_none_or(|unit| units::unit(role, unit).is_some() || !units::is_unit(unit))
+    };
+    by_name(name, fits).or_else(|| by_unit(unit?))
+}
+
+/// The role that a name has among those that fit: a whole name, a part of one, or a whole one with an index or a short word
+/// behind it.
+fn by_name(name: &str, fits: impl Fn(Role) -> bool) -> Option<(Role, Sureness)> {
+    let lower = name.trim().to_lowercase();
+    let spaced = lower.replace(['_', '-', '.'], " ");
+    let whole = |name: &str| {
+        let letters: String = name.chars().filter(|c| c.is_alphanumeric()).collect();
+        WHOLE.iter().find(|(role, names)| is_among(names, &letters) && fits(*role))
+    };
+    let part = || PART.iter().find(|(role, parts)| parts.split(',').any(|part| spaced.contains(part)) && fits(*role));
+    let strong = whole(&lower).or_else(part).map(|(role, _)| (*role, Sureness::Strong));
+    strong.or_else(|| whole(without_index(&lower)?).map(|(role, _)| (*role, Sureness::Indexed)))
+}
+
+/// A name without the index, or the short word, that tells it from others: `R_1`, `R2`, `eps_k`, `R_min`. `R0` is the
+/// resistance at rest; `u_1`, `p1`, `x1` may be anything.
+fn without_index(name: &str) -> Option<&str> {
+    let (bare, end, letters): (_, _, &[&str]) = match name.rsplit_once(['_', ' ', '-', '.']) {
+        Some((bare, end)) => (bare.trim_end_matches('('), end.trim_end_matches(')'), &["r", "t", "x", "d", "e"]),
+        None => {
+            let bare = name.trim_end_matches(|c: char| c.is_ascii_digit());
+            (bare, &name[bare.len()..], &["r", "t"])
+        }
+    };
+    let end = end.trim_start_matches('(');
+    let is_short = end.chars().count() == 1 || is_index(end) || SHORT_WORDS.contains(&end) || end == "max";
+    let is_known = bare.len() > 1 || letters.contains(&bare);
+    (is_short && is_known && (bare, end) != ("r", "0")).then_some(bare)
+}
+
+/// Ω is measured of the sensor alone; mm, degrees and seconds of many things.
+fn by_unit(unit: &str) -> Option<(Role, Sureness)> {
+    let roles = units::quantities(unit);
+    match roles[..] {
+        [Role::Resistance] => Some((Role::Resistance, Sureness::Strong)),
+        [role @ (Role::Displacement | Role::Angle | Role::Time)] => Some((role, Sureness::Weak)),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn headings_come_apart() {
+        let cases = [
+            ("Time (s)", "Time", Some("s")),
+            ("Displacement [mm]", "Displacement", Some("mm")),
+            ("R (kOhm)", "R", Some("kOhm")),
+            ("time_ms", "time", Some("ms")),
+            ("resistance_ohm", "resistance", Some("ohm")),
+            ("Weg, mm", "Weg", Some("mm")),
+            ("t/s", "t", Some("s")),
+            ("Zeit", "Zeit", None),
+            ("R/R0", "R/R0", None),
+            ("resistance_ratio", "resistance_ratio", None),
+            ("Stage Strain", "Stage Strain", None),
+            ("Sensor A", "Sensor A", None),
+            ("strain_1", "strain_1", None),
+            ("R (2)", "R (2)", None),
+            ("Dehnung/1", "Dehnung", Some("1")),
+            ("R_k", "R_k", None),
+            ("R/k", "R", Some("k")),
+            ("R_s", "R_s", None),
+            ("t_s", "t", Some("s")),
+            ("time_min", "time", Some("min")),
+            ("R_min", "R_min", None),
+            ("strain_c", "strain_c", None),
+            ("temp_c", "temp", Some("c")),
+            ("position_v", "position", Some("v")),
+            ("length_m", "length", Some("m")),
+            ("length_m1", "length_m1", None),
+            ("force_n", "force", Some("n")),
+            ("force_1", "force_1", None),
+        ];
+        for (heading, name, unit) in cases {
+            assert_eq!(take_apart(heading), (name.to_owned(), unit.map(str::to_owned)), "{heading}");
+        }
+    }
+
+    #[test]
+    fn names_have_roles_unless_their_unit_is_another_s() {
+        let strong = |name, unit| role(name, unit).filter(|(_, how)| *how == Sureness::Strong).map(|(role, _)| role);
+        assert_eq!(strong("Time", Some("s")), Some(Role::Time));
+        assert_eq!(strong("R/R0", None), Some(Role::Ratio));
+        assert_eq!(strong("resistance_ratio", None), Some(Role::Ratio));
+        assert_eq!(strong("Sensor A", Some("kΩ")), Some(Role::Resistance));
+        assert_eq!(strong("Strain", Some("%")), Some(Role::Strain));
+        assert_eq!(strong("Position", Some("V")), None);
+        assert_eq!(strong("Force", Some("N")), None);
+        assert_eq!(role("Length", Some("mm")), Some((Role::Displacement, Sureness::Weak)));
+    }
+}

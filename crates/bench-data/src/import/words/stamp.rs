@@ -1,0 +1,213 @@
+use chrono::{Datelike, NaiveDate};
+
+const SECOND: i128 = 1_000_000_000;
+pub(crate) const DAY: i128 = 86_400 * SECOND;
+
+/// How the parts of a date follow each other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) enum Order {
+    /// `2024-05-01`.
+    Iso,
+    /// `01.05.2024`: the first of May.
+    Dmy,
+    /// `05/01/2024`: the first of May.
+    Mdy,
+}
+
+impl Order {
+    pub(crate) const ALL: [Self; 3] = [Self::Iso, Self::Dmy, Self::Mdy];
+
+    /// The name of such dates among units of time.
+    pub(crate) const fn unit(self) -> &'static str {
+        match self {
+            Self::Iso => "iso",
+            Self::Dmy => "dmy",
+            Self::Mdy => "mdy",
+        }
+    }
+}
+
+/// A text with a date, a time of day or both.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Stamp {
+    /// Nanoseconds since a fixed day, or since midnight if there is no date; UTC where the text has an offset.
+    pub nanoseconds: i128,
+    pub has_date: bool,
+    pub has_time: bool,
+}
+
+/// Reads a date, a time of day or both. No month is a word here, so that no language is meant.
+pub(crate) fn stamp(text: &str, order: Order) -> Option<Stamp> {
+    let text = text.trim();
+    if !text.starts_with(|c: char| c.is_ascii_digit()) || !text.contains([':', '-', '/', '.']) {
+        return None;
+    }
+    let (date, time) = match text.split_once(['T', ' ']) {
+        Some((date, time)) if !date.contains(':') => (Some(date), Some(time)),
+        _ if text.contains(':') => (None, Some(text)),
+        _ => (Some(text), None),
+    };
+    let days = match date {
+        Some(date) => i128::from(days(date.trim_end_matches(','), order)?),
+        None => 0,
+    };
+    let seconds = match time {
+        Some(time) => time_of_day(time.trim())?,
+        None => 0,
+    };
+    Some(Stamp { nanoseconds: days * DAY + seconds, has_date: date.is_some(), has_time: time.is_some() })
+}
+
+fn parts(date: &str) -> Option<[u32; 3]> {
+    let mut parts = date.split(['-', '/', '.']);
+    let mut next = || parts.next().filter(|part| part.len() <= 4)?.parse().ok();
+    let out = [next()?, next()?, next()?];
+    parts.next().is_none().then_some(out)
+}
+
+fn days(date: &str, order: Order) -> Option<i32> {
+    let [a, b, c] = parts(date)?;
+    let (year, month, day) = match order {
+        Order::Iso => (a, b, c),
+        Order::Dmy => (c, b, a),
+        Order::Mdy => (c, a, b),
+    };
+    (year >= 1000).then(|| NaiveDate::from_ymd_opt(year as i32, month, day))?.map(|date| date.num_days_from_ce())
+}
+
+/// `12:30:01.25`, `12:30:01:250`, `12:30`, `1:30:01 PM`, `12:30:01+02:00`, `12:30:01Z`; nanoseconds since midnight UTC.
+/// `01:30.5` is what spreadsheets write of minutes and seconds.
+fn time_of_day(time: &str) -> Option<i128> {
+    let (time, zone) = match time.find(['Z', '+', '-']) {
+        Some(at) => (&time[..at], zone(&time[at..])?),
+        None => (time, 0),
+    };
+    let lower = time.trim().to_ascii_lowercase();
+    let (clock, half) = match (lower.strip_suffix("am"), lower.strip_suffix("pm")) {
+        (Some(clock), _) => (clock.trim(), Some(0)),
+        (_, Some(clock)) => (clock.trim(), Some(12)),
+        _ => (lower.as_str(), None),
+    };
+    let (hours, minutes, seconds, thousandths) = match clock.split(':').collect::<Vec<_>>()[..] {
+        [minutes, seconds] if seconds.contains(['.', ',']) => ("0", minutes, seconds, ""),
+        [hours, minutes] => (hours, minutes, "0", ""),
+        [hours, minutes, seconds] => (hours, minutes, seconds, ""),
+        [hours, minutes, seconds, part] if part.len() == 3 && seconds.len() == 2 => (hours, minutes, seconds, part),
+        _ => return None,
+    };
+    let mut hours: i128 = hours.parse().ok()?;
+    let minutes: i128 = Some(minutes).filter(|part| part.len() <= 2)?.parse().ok()?;
+    let thousandths: i128 = if thousandths.is_empty() { 0 } else { thousandths.parse().ok()? };
+    let nanoseconds = nanoseconds(seconds)? + thousandths * SECOND / 1000;
+    if hours > 24 || minutes > 59 || nanoseconds >= 61 * SECOND {
+        return None;
+    }
+    if let Some(half) = half {
+        hours = hours % 12 + half;
+    }
+    Some((hours * 60 + minutes - zone) * 60 * SECOND + nanoseconds)
+}
+
+/// Minutes east of Greenwich.
+fn zone(text: &str) -> Option<i128> {
+    if text == "Z" {
+        return Some(0);
+    }
+    let digits: String = text[1..].chars().filter(|c| *c != ':').collect();
+    let minutes = match digits.len() {
+        2 => digits.parse::<i128>().ok()? * 60,
+        4 => digits.get(..2)?.parse::<i128>().ok()? * 60 + digits.get(2..)?.parse::<i128>().ok()?,
+        _ => return None,
+    };
+    Some(if text.starts_with('-') { -minutes } else { minutes })
+}
+
+fn nanoseconds(seconds: &str) -> Option<i128> {
+    let (whole, fraction) = seconds.split_once(['.', ',']).unwrap_or((seconds, ""));
+    let is_digits = |part: &str| part.bytes().all(|byte| byte.is_ascii_digit());
+    if whole.is_empty() || whole.len() > 2 || !is_digits(whole) || !is_digits(fraction) {
+        return None;
+    }
+    let fraction: String = fraction.chars().chain("000000000".chars()).take(9).collect();
+    Some(whole.parse::<i128>().ok()? * SECOND + fraction.parse::<i128>().ok()?)
+}
+
+/// Whether a cell is a date or a time of day in some order.
+pub(crate) fn is_stamp(text: &str) -> bool {
+    Order::ALL.into_iter().any(|order| stamp(text, order).is_some())
+}
+
+/// The orders in which all cells are dates or times of day; none if some are not.
+pub(crate) fn orders<'a>(cells: impl Iterator<Item = &'a str> + Clone) -> Vec<Order> {
+    let all = |order: &Order| {
+        let mut filled = cells.clone().filter(|cell| !cell.trim().is_empty()).peekable();
+        filled.peek().is_some() && filled.all(|cell| stamp(cell, *order).is_some())
+    };
+    Order::ALL.into_iter().filter(all).collect()
+}
+
+/// Whether the parts of dates stand apart by points, as in countries where the day comes first.
+pub(crate) fn has_points(text: &str) -> bool {
+    text.trim().split(['T', ' ']).next().is_some_and(|date| date.matches('.').count() == 2)
+}
+
+/// Times of day that pass midnight go on.
+pub(crate) fn past_midnight(stamps: &mut [Option<i128>]) {
+    let (mut days, mut last) = (0, None);
+    for stamp in stamps.iter_mut().flatten() {
+        let bare = *stamp;
+        if last.is_some_and(|last: i128| last - bare > DAY / 2) {
+            days += DAY;
+        }
+        last = Some(bare);
+        *stamp += days;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn seconds(text: &str, order: Order) -> Option<f64> {
+        stamp(text, order).map(|stamp| stamp.nanoseconds as f64 / 1e9)
+    }
+
+    #[test]
+    fn the_same_moment_in_several_spellings() {
+        let moment = seconds("2024-05-01T10:30:01.5Z", Order::Iso);
+        assert!(moment.is_some());
+        for text in ["2024-05-01 10:30:01,5", "2024/05/01 10:30:01.500", "2024-05-01T12:30:01.5+02:00"] {
+            assert_eq!(seconds(text, Order::Iso), moment, "{text}");
+        }
+        assert_eq!(seconds("1.5.2024 10:30:01.5", Order::Dmy), moment);
+        assert_eq!(seconds("05/01/2024 10:30:01.5 AM", Order::Mdy), moment);
+        assert_eq!(seconds("05/01/2024 10:30:01:500", Order::Mdy), moment);
+        assert_eq!(seconds("01:30.5", Order::Iso), Some(90.5));
+        assert_eq!(seconds("01:30", Order::Iso), Some(5400.0));
+    }
+
+    #[test]
+    fn times_of_day_pass_midnight() {
+        let mut stamps: Vec<Option<i128>> = ["23:59:59.5", "0:00:00.5"]
+            .iter()
+            .map(|text| stamp(text, Order::Iso).map(|stamp| stamp.nanoseconds))
+            .collect();
+        past_midnight(&mut stamps);
+        assert_eq!(stamps[1].unwrap() - stamps[0].unwrap(), SECOND);
+    }
+
+    #[test]
+    fn numbers_and_words_are_no_stamps() {
+        for text in ["1.5", "1600", "-5", "12:30:99", "2024-13-01", "a:b", "1:2:3:4", "12.5.1", "12:30:01+0é1"] {
+            assert!(!is_stamp(text), "{text}");
+        }
+    }
+
+    #[test]
+    fn the_order_of_day_and_month_may_stay_open() {
+        let open = ["05/01/2024 10:00", "06/01/2024 10:00"];
+        assert_eq!(orders(open.into_iter()), [Order::Dmy, Order::Mdy]);
+        let told = ["05/01/2024 10:00", "05/13/2024 10:00"];
+        assert_eq!(orders(told.into_iter()), [Order::Mdy]);
+    }
+}
