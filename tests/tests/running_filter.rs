@@ -86,13 +86,14 @@ fn sensor() -> SensorParams {
 /// A correction that has learned something from rows that no two are alike.
 fn correction() -> CorrectionParams {
     let weights = |rows: usize| (0..rows).map(|k| 0.02 * (1.7 * k as f64).cos()).collect();
-    let process = |inputs: usize| ProcessParams {
+    let process = |inputs: Vec<usize>| ProcessParams {
         sd_scale: 1.1,
         mean: 0.02,
         sd: 0.1,
         least_sd: 0.05,
         noise_sd: 0.01,
-        lengths: vec![4.0; inputs],
+        lengths: vec![4.0; inputs.len()],
+        inputs,
         weights: weights(40),
         explained: vec![0.4, -0.1, 0.05, 0.3, 0.1, 0.2],
     };
@@ -107,8 +108,8 @@ fn correction() -> CorrectionParams {
             lower: column(-1.0, 13 + future),
             upper: column(1.0, 13 + future),
         },
-        direct: process(7 + future),
-        residual: process(13 + future),
+        direct: process((6..13 + future).collect()),
+        residual: process((0..13 + future).collect()),
         one_sided,
     };
     let wave = |k: usize, i: usize| ((0.3 + 0.11 * i as f64) * k as f64 + i as f64).sin();
@@ -124,7 +125,7 @@ fn correction() -> CorrectionParams {
         corrects: EstimatorKind::SignSplit,
         readings: CorrectionScale { centre: 0.2, half_range: 0.25, rates: [0.02, 0.05], starts: [[0.1, 0.6]; 6] },
         filter: corrector(0, vec![]),
-        smoother: corrector(6, vec![process(7), process(7)]),
+        smoother: corrector(6, vec![process((6..13).collect()), process((13..19).collect())]),
         rows: (0..40).map(row).collect(),
         simulated: SimulatedParams {
             mean: 0.15,

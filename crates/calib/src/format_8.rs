@@ -7,7 +7,8 @@ use crate::calibrate::correction_fit::CorrectorInputs;
 use crate::correction::gaussian_process::Settings;
 use crate::correction::simulated::Distilled;
 use crate::correction::{Choices, Chosen, Prepared};
-use ohmstrain_sensor::correction::SIDES;
+use ohmstrain_ekf::correction::{FEATURES, FILTER_INPUTS, OUTPUTS};
+use ohmstrain_sensor::correction::{ProcessKind, SIDES, SMOOTHER_INPUTS};
 
 /// Table `correction` of a file of format 8.
 #[derive(Clone, Debug, Deserialize)]
@@ -48,23 +49,28 @@ impl CorrectionOfFormat8 {
         let inputs = CorrectorInputs::new(&rows);
         let of_filter = Prepared::new(inputs.of_filter(limits));
         let simulated = of_filter.simulated(&simulated)?;
-        let filter = filter.choices().learned::<_, 0>(&of_filter)?;
-        let smoother = smoother.choices().learned::<_, SIDES>(&Prepared::new(inputs.of_smoother(limits)))?;
+        let filter = filter.choices(FILTER_INPUTS).learned::<_, 0>(&of_filter)?;
+        let smoother =
+            smoother.choices(SMOOTHER_INPUTS).learned::<_, SIDES>(&Prepared::new(inputs.of_smoother(limits)))?;
         Some(CorrectionParams { corrects, readings, filter, smoother, simulated, rows })
     }
 }
 
 impl Corrector {
-    fn choices(self) -> Choices {
-        let chosen = |Process { lengths, noise, noise_time_s, sd_scale }| Chosen {
+    fn choices(self, inputs: usize) -> Choices {
+        let chosen = |inputs, Process { lengths, noise, noise_time_s, sd_scale }| Chosen {
+            inputs,
             settings: Settings { lengths, noise, noise_time_s },
             sd_scale,
         };
+        // That of the future saw the reading, too.
+        let future = std::iter::once(OUTPUTS).chain(OUTPUTS + FEATURES..inputs).collect();
+        let one_sided = self.one_sided.into_iter().zip([ProcessKind::Past.places(inputs), future]);
         Choices {
             sd_scale: self.sd_scale,
-            direct: chosen(self.direct),
-            residual: chosen(self.residual),
-            one_sided: self.one_sided.into_iter().map(chosen).collect(),
+            direct: chosen(ProcessKind::Direct.places(inputs), self.direct),
+            residual: chosen(ProcessKind::Residual.places(inputs), self.residual),
+            one_sided: one_sided.map(|(side, inputs)| chosen(inputs, side)).collect(),
         }
     }
 }

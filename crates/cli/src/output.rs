@@ -21,7 +21,7 @@ pub use place::Place;
 pub use rows::RowsOut;
 use unfinished::Unfinished;
 pub use unfinished::UnfinishedFolder;
-pub use wide::{COLUMNS, table, wrapped, wrapped_table};
+pub use wide::{COLUMNS, named, table, wrapped, wrapped_table};
 
 use crate::error::CliError;
 use crate::printable::{printable_json, printable_lines};

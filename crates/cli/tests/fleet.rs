@@ -129,7 +129,7 @@ fn what_is_no_fleet_is_refused() {
     refused(&["fleet", "fit", "sensor.toml", "two.toml", "-o", "out.toml"], 4, "2 sensors; a fleet has at least 3");
     refused(&["fleet", "fit", "trace.csv", "-o", "out.toml"], 4, "is a recording");
     let calibrate = ["calibrate", "trace.csv", "-o", "out.toml", "--prior"];
-    refused(&[&calibrate[..], &["sensor.toml"]].concat(), 4, "field `format`: expected version 2, found 8");
+    refused(&[&calibrate[..], &["sensor.toml"]].concat(), 4, "field `format`: expected version 2, found 9");
     refused(&[&calibrate[..], &["missing.toml"]].concat(), 1, "cannot read");
     refused(&[&calibrate[..], &["sensor.toml", "--branches", "1"]].concat(), 2, "--branches");
     let three = ["fleet", "fit", "sensor.toml", "two.toml", "sensor.toml", "-o"];

@@ -2,7 +2,7 @@
 
 use ohmstrain_ekf::Gaussian;
 use ohmstrain_ekf::correction::{
-    BLOCK, Correction, FEATURES, FeatureScale, InputScale, LowPass, Process, ReadingFeatures, RowBlock, Rows,
+    BLOCK, Correction, FEATURES, FeatureScale, InputScale, LowPass, OneSided, Process, ReadingFeatures, RowBlock, Rows,
     Simulated, Triangle, block_of, consensus, mixture, settled, stripes,
 };
 use ohmstrain_model::StrainRange;
@@ -18,13 +18,13 @@ fn number(seed: usize) -> f64 {
     2.0 * (x - x.floor()) - 1.0
 }
 
-/// Direct, residual, past and future: where their inputs are.
+/// Direct, residual, past and future: where their inputs are, the one of the linear part first.
 fn sees(p: usize) -> Vec<usize> {
     match p {
         0 => (6..D).collect(),
         1 => (0..D).collect(),
         2 => (6..13).collect(),
-        _ => [6, 13, 14].to_vec(),
+        _ => [14, 13].to_vec(),
     }
 }
 
@@ -131,7 +131,7 @@ macro_rules! correction {
             rows: Rows::new(&$rows, ROWS),
             scales: &$scales,
             direct: process(0),
-            one_sided: $sides.map(process),
+            one_sided: $sides.map(|p: usize| OneSided { process: process(p), first: sees(p)[0] }),
             residual: process(1),
             simulated: None,
             limits: StrainRange { lower: -2.0, upper: 2.0 },

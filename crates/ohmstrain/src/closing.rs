@@ -5,10 +5,7 @@ use serde::Serialize;
 
 use crate::number::{fixed, significant};
 use crate::verdict::{Known, is_better, percent, verdict};
-use crate::wrap::wrapped;
 
-/// Columns of the words before the lines.
-const HEAD: usize = 13;
 /// Advice that is printed; the rest is counted.
 const PRINTED_ADVICE: usize = 1;
 /// A tenth of the range with a smaller share of the rows than this is named.
@@ -23,7 +20,8 @@ const ONE_SPEED: f64 = 1.1;
 /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
 /// let closing = ohmstrain::Closing { file: Some("s.toml"), params: sensor.params(), findings: None, tested: None,
 ///     calibration_s: Some(1.5), more: "advice" };
-/// assert!(closing.text().ends_with("Written      s.toml, estimator sign-split, a law of 3 branches; it took 1.5 s\n"));
+/// let written = "s.toml, estimator sign-split, a law of 3 branches; it took 1.5 s".to_owned();
+/// assert_eq!(closing.lines().last(), Some(&("Written", written)));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Copy, Debug)]
@@ -126,52 +124,35 @@ impl Closing<'_> {
         [("Left out", error_and_coverage(found))].into_iter().chain(tested).chain(facts).collect()
     }
 
-    /// At most ten lines of a hundred columns.
+    /// What a program prints at the end: names and sentences, seven at most.
     ///
     /// ```
     /// fn print(closing: &ohmstrain::Closing) {
-    ///     print!("{}", closing.text());
+    ///     closing.lines().iter().for_each(|(name, text)| println!("{name:13}{text}"));
     /// }
     /// ```
     #[must_use]
-    pub fn text(&self) -> String {
-        let mut lines = Lines::default();
-        if let Some(verdict) = self.verdict() {
-            lines.add("Verdict", &verdict);
-        }
-        match self.findings {
-            None => lines.add("Left out", "nothing could be scored on parts of the recordings left out"),
-            Some(found) => lines.add("Left out", &error_and_coverage(found)),
-        }
-        if let Some(tested) = self.tested {
-            lines.add("Tested", &error_in_test(tested));
-        }
+    pub fn lines(&self) -> Vec<(&'static str, String)> {
+        let mut lines = Vec::from_iter(self.verdict().map(|verdict| ("Verdict", verdict)));
+        lines.push(match self.findings {
+            None => ("Left out", "nothing could be scored on parts of the recordings left out".to_owned()),
+            Some(found) => ("Left out", error_and_coverage(found)),
+        });
+        lines.extend(self.tested.map(|tested| ("Tested", error_in_test(tested))));
         if let Some(found) = self.findings {
-            lines.add("Seen", &seen(&found.seen, self.params.quantity));
-            lines.add("Limited by", &limited_by(found));
-            lines.add("Record next", &advice(&found.advice, self.more));
+            lines.push(("Seen", seen(&found.seen, self.params.quantity)));
+            lines.push(("Limited by", limited_by(found)));
+            lines.push(("Record next", advice(&found.advice, self.more)));
         }
         let (estimator, branches) = (self.params.default_estimator.name(), self.params.law.branches.len());
         let law = if branches == 1 { "1 branch".into() } else { format!("{branches} branches") };
         let took = self.calibration_s.map(|taken| format!("; it took {} s", fixed(taken, i32::from(taken < 9.95))));
         let made = format!("estimator {estimator}, a law of {law}{}", took.unwrap_or_default());
-        match self.file {
-            Some(file) => lines.add("Written", &format!("{file}, {made}")),
-            None => lines.add("Sensor", &made),
-        }
-        lines.text
-    }
-}
-
-/// Lines with a word before them, wrapped.
-#[derive(Default)]
-struct Lines {
-    text: String,
-}
-
-impl Lines {
-    fn add(&mut self, head: &str, body: &str) {
-        self.text += &wrapped(body, &format!("{head:HEAD$}"), &" ".repeat(HEAD));
+        lines.push(match self.file {
+            Some(file) => ("Written", format!("{file}, {made}")),
+            None => ("Sensor", made),
+        });
+        lines
     }
 }
 

@@ -57,7 +57,6 @@ mod text;
 mod unit_doubt;
 mod validity;
 pub mod verdict;
-pub mod wrap;
 
 pub use builder::FilterBuilder;
 #[cfg(feature = "calibrate")]

@@ -50,11 +50,11 @@ impl Sensor {
         self.sensor.to_toml().map_err(|error| of_library(&error, None))
     }
 
-    /// What the calibration came to, in at most ten lines.
-    fn closing(&self, file: Option<&str>) -> Option<String> {
+    /// What the calibration came to: names and sentences.
+    fn closing(&self, file: Option<&str>) -> Option<Vec<(&'static str, String)>> {
         let params = self.sensor.params();
         let findings = Some(params.findings.as_ref()?);
-        Some(Closing { file, params, findings, tested: None, calibration_s: None, more: "findings" }.text())
+        Some(Closing { file, params, findings, tested: None, calibration_s: None, more: "findings" }.lines())
     }
 
     /// All numbers as JSON.

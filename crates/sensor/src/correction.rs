@@ -4,8 +4,8 @@ use std::ops::Deref;
 
 use ohmstrain_ekf::Real;
 use ohmstrain_ekf::correction::{
-    BLOCK, Correction, FEATURES, FILTER_INPUTS, InputScale, OUTPUTS, Process, RowBlock, Rows, Simulated, Triangle,
-    block_of, filter_inputs, stripe_places, stripes,
+    BLOCK, Correction, FEATURES, FILTER_INPUTS, InputScale, OUTPUTS, OneSided, Process, RowBlock, Rows, Simulated,
+    Triangle, block_of, filter_inputs, stripe_places, stripes,
 };
 use ohmstrain_model::StrainRange;
 
@@ -20,7 +20,8 @@ pub enum ProcessKind {
     Direct,
     /// Features of the past.
     Past,
-    /// The reading and features of the future.
+    /// Features of the future: distances of the reading from its low-passes, and rates, but not the reading itself. An error of R₀ moves
+    /// the reading, and changes these in proportion only.
     Future,
     /// Outputs of the filter, and features.
     Residual,
@@ -29,26 +30,21 @@ pub enum ProcessKind {
 /// Direct processes that see one side of time, in the order of parameters.
 pub const ONE_SIDED: [ProcessKind; SIDES] = [ProcessKind::Past, ProcessKind::Future];
 
+/// The distance of a reading from the slowest low-pass of the future.
+const SLOWEST_OF_FUTURE: usize = OUTPUTS + FEATURES + 3;
+
 impl ProcessKind {
-    /// Places, among so many inputs of a correction, of those that it sees.
+    /// Places, among so many inputs of a correction, of those that it sees; the linear part of its kernel takes the first.
     #[must_use]
     pub fn places(self, inputs: usize) -> Vec<usize> {
         match self {
             Self::Direct => (OUTPUTS..inputs).collect(),
             Self::Past => (OUTPUTS..OUTPUTS + FEATURES).collect(),
-            Self::Future => std::iter::once(OUTPUTS).chain(OUTPUTS + FEATURES..inputs).collect(),
+            Self::Future => {
+                let others = (OUTPUTS + FEATURES..inputs).filter(|place| *place != SLOWEST_OF_FUTURE);
+                std::iter::once(SLOWEST_OF_FUTURE).chain(others).collect()
+            }
             Self::Residual => (0..inputs).collect(),
-        }
-    }
-
-    /// Its parameters; `None` for a side of time that a filter's correction does not have.
-    #[must_use]
-    pub fn params(self, of: &CorrectorParams) -> Option<&ProcessParams> {
-        match self {
-            Self::Direct => Some(&of.direct),
-            Self::Past => of.one_sided.first(),
-            Self::Future => of.one_sided.get(1),
-            Self::Residual => Some(&of.residual),
         }
     }
 }
@@ -107,7 +103,7 @@ pub struct OwnedCorrection<T: 'static, const D: usize, const S: usize = 0> {
     /// Strain from the features.
     pub direct: OwnedProcess<T, D>,
     /// Strain from the features of one side of time.
-    pub one_sided: [OwnedProcess<T, D>; S],
+    pub one_sided: [OwnedOneSided<T, D>; S],
     /// What the filter's strain lacks, from all inputs.
     pub residual: OwnedProcess<T, D>,
     /// Strain from the features, by rows of simulated motions.
@@ -179,6 +175,27 @@ impl<T: Real> OwnedTriangle<T> {
     }
 }
 
+/// A [`OneSided`] with everything that it borrows.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OwnedOneSided<T: 'static, const D: usize> {
+    /// What it says.
+    pub process: OwnedProcess<T, D>,
+    /// The input that the linear part of its kernel takes.
+    pub first: usize,
+}
+
+impl<const D: usize> OwnedOneSided<f64, D> {
+    fn new(params: &ProcessParams) -> Self {
+        Self { process: OwnedProcess::new(params), first: params.inputs.first().copied().unwrap_or(OUTPUTS) }
+    }
+}
+
+impl<T: Real + 'static, const D: usize> OwnedOneSided<T, D> {
+    fn one_sided(&self) -> OneSided<'_, T, D> {
+        OneSided { process: self.process.process(), first: self.first }
+    }
+}
+
 /// Rows of a triangle with so many entries, n (n + 1)/2.
 pub(crate) fn side_of(entries: usize) -> usize {
     (0..).take_while(|side| side * (side + 1) / 2 <= entries).last().unwrap_or(0)
@@ -202,7 +219,7 @@ impl<T: Real + 'static, const D: usize, const S: usize> OwnedCorrection<T, D, S>
             rows: self.rows.as_rows(),
             scales: &self.scales,
             direct: self.direct.process(),
-            one_sided: self.one_sided.each_ref().map(OwnedProcess::process),
+            one_sided: self.one_sided.each_ref().map(OwnedOneSided::one_sided),
             residual: self.residual.process(),
             simulated: self.simulated.as_ref().map(OwnedSimulated::simulated),
             limits: self.limits,
@@ -217,7 +234,10 @@ impl<T: Real + 'static, const D: usize, const S: usize> OwnedCorrection<T, D, S>
             rows: self.rows.map(number),
             scales: in_precision(&self.scales, number),
             direct: self.direct.map(number),
-            one_sided: self.one_sided.each_ref().map(|side| side.map(number)),
+            one_sided: self
+                .one_sided
+                .each_ref()
+                .map(|side| OwnedOneSided { process: side.process.map(number), first: side.first }),
             residual: self.residual.map(number),
             simulated: self.simulated.as_ref().map(|simulated| simulated.map(number)),
             limits: StrainRange { lower: number(self.limits.lower), upper: number(self.limits.upper) },
@@ -251,14 +271,14 @@ impl<const D: usize, const S: usize> OwnedCorrection<f64, D, S> {
     #[must_use]
     pub fn new(params: &CorrectorParams, inputs: &[[f64; D]], limits: RangeParams) -> Self {
         let scales = params.inputs.to_core();
-        let process = |kind: ProcessKind| OwnedProcess::new(kind, kind.params(params).unwrap_or(&params.direct));
+        let one_sided = |side: usize| params.one_sided.get(side).unwrap_or(&params.direct);
         let rows = params.order.iter().filter_map(|row| inputs.get(*row));
         Self {
             rows: rows.map(|row| standardised(&scales, row)).collect(),
             scales,
-            direct: process(ProcessKind::Direct),
-            one_sided: std::array::from_fn(|side| process(*ONE_SIDED.get(side).unwrap_or(&ProcessKind::Direct))),
-            residual: process(ProcessKind::Residual),
+            direct: OwnedProcess::new(&params.direct),
+            one_sided: std::array::from_fn(|side| OwnedOneSided::new(one_sided(side))),
+            residual: OwnedProcess::new(&params.residual),
             simulated: None,
             limits: limits.to_model(),
             strain_variance: params.strain_sd.powi(2),
@@ -268,10 +288,12 @@ impl<const D: usize, const S: usize> OwnedCorrection<f64, D, S> {
 }
 
 impl<const D: usize> OwnedProcess<f64, D> {
-    fn new(kind: ProcessKind, params: &ProcessParams) -> Self {
+    fn new(params: &ProcessParams) -> Self {
         let mut by_input = [0.0; D];
-        for (place, length) in kind.places(D).into_iter().zip(&params.lengths) {
-            by_input[place] = relevance(*length);
+        for (place, length) in params.inputs.iter().zip(&params.lengths) {
+            if let Some(of_input) = by_input.get_mut(*place) {
+                *of_input = relevance(*length);
+            }
         }
         Self {
             weights: params.weights.clone(),

@@ -1,3 +1,5 @@
+use std::ops::Range;
+
 use ohmstrain_ekf::Reading;
 use ohmstrain_ekf::correction::{FEATURES, FILTER_INPUTS};
 
@@ -5,7 +7,7 @@ use crate::CalibrationError;
 use crate::calibrate::correction_scale::{each_row, reading_scale};
 use crate::calibrate::simulated_motions::simulated_rows;
 use crate::correction::simulated::{Distilled, SimulatedRow};
-use crate::correction::{Examples, Prepared, filter_corrector, smoother_corrector};
+use crate::correction::{AllRows, Examples, Prepared, filter_corrector, smoother_corrector};
 use crate::digits::digits;
 use crate::law::structure::LawFit;
 use crate::motion_stats::MotionStats;
@@ -21,6 +23,8 @@ use ohmstrain_sensor::{
 pub(crate) const PAUSE_S: f64 = 1000.0;
 /// Rows that a correction learns from at most. With a hundred errors are a tenth larger, with four hundred no smaller.
 const ROWS: usize = 200;
+/// Rows of several recordings that teach what these say, at most. With twice as many errors are no smaller.
+const ALL_ROWS: usize = 3000;
 /// How much of the choice of rows follows the way that the features go, rather than time: long holds are one row over and
 /// over again.
 const BY_WAY: f64 = 0.8;
@@ -44,59 +48,106 @@ pub(crate) fn fit_correction(
     let own_scale = || reading_scale(recordings, &readings);
     let Some(scale) = of_make.map_or_else(own_scale, |prior| Some(prior.readings)) else { return Ok(None) };
     let mut rows: Vec<TrainingRow> = of_make.map_or_else(Vec::new, |prior| prior.rows.clone());
-    let mut candidates = Vec::new();
+    let (mut candidates, mut of_recordings) = (Vec::new(), Vec::new());
     let mut start_s = rows.last().map_or(0.0, |row| row.time_s + PAUSE_S);
     for (samples, readings) in recordings.iter().zip(&readings) {
         let Some(rows) = candidate_rows(samples, readings, &scale, start_s, recipe)? else { return Ok(None) };
         start_s = rows.last().map_or(start_s, |row: &TrainingRow| row.time_s + PAUSE_S);
+        of_recordings.push(candidates.len()..candidates.len() + rows.len());
         candidates.extend(rows);
     }
+    let all = if of_make.is_some() { None } else { AllOf::several(&candidates, &of_recordings) };
     let most = if rows.is_empty() { ROWS } else { prior::ROWS };
     rows.extend(chosen(&candidates, most).iter().map(rounded));
     let steps_s = recordings.iter().flat_map(|of| of.time_s.windows(2).map(|pair| pair[1] - pair[0]));
     let simulated = simulated_rows(fit, &MotionStats::new(recordings), &scale, median(steps_s).unwrap_or(0.0));
-    Ok(learn(corrects, scale, rows, &simulated, limits))
+    Ok(learn((corrects, scale), rows, all, &simulated, limits))
 }
 
 fn learn(
-    corrects: EstimatorKind,
-    readings: CorrectionScale,
+    (corrects, readings): (EstimatorKind, CorrectionScale),
     rows: Vec<TrainingRow>,
+    all: Option<AllOf>,
     simulated: &[SimulatedRow],
     limits: RangeParams,
 ) -> Option<CorrectionParams> {
     let distilled = Distilled::fit(simulated, &rows, limits)?;
-    let inputs = CorrectorInputs::new(&rows);
+    let inputs = CorrectorInputs { all, ..CorrectorInputs::new(&rows) };
     let simulated = Prepared::new(inputs.of_filter(limits)).simulated(&distilled)?;
     let filter = filter_corrector(inputs.of_filter(limits), &simulated)?;
     let smoother = smoother_corrector(inputs.of_smoother(limits))?;
     Some(CorrectionParams { corrects, readings, filter, smoother, simulated, rows })
 }
 
-/// Training rows by what filter and smoother see of them.
+/// Training rows by what filter and smoother see of them, and all rows that they stand for.
 pub(crate) struct CorrectorInputs {
+    few: Columns,
+    all: Option<AllOf>,
+}
+
+/// Rows of several recordings.
+struct AllOf {
+    columns: Columns,
+    recordings: Vec<Range<usize>>,
+    step_s: f64,
+}
+
+struct Columns {
     filter: Vec<[f64; FILTER_INPUTS]>,
     smoother: Vec<[f64; SMOOTHER_INPUTS]>,
     strain: Vec<f64>,
     time_s: Vec<f64>,
 }
 
-impl CorrectorInputs {
-    pub(crate) fn new(rows: &[TrainingRow]) -> Self {
+impl Columns {
+    fn new<'a>(rows: impl Iterator<Item = &'a TrainingRow> + Clone) -> Self {
         Self {
-            filter: rows.iter().map(TrainingRow::filter_inputs).collect(),
-            smoother: rows.iter().map(TrainingRow::smoother_inputs).collect(),
-            strain: rows.iter().map(|row| row.strain).collect(),
-            time_s: rows.iter().map(|row| row.time_s).collect(),
+            filter: rows.clone().map(TrainingRow::filter_inputs).collect(),
+            smoother: rows.clone().map(TrainingRow::smoother_inputs).collect(),
+            strain: rows.clone().map(|row| row.strain).collect(),
+            time_s: rows.map(|row| row.time_s).collect(),
         }
+    }
+}
+
+impl AllOf {
+    /// Every so many rows of each recording; `None` of fewer than two.
+    fn several(candidates: &[TrainingRow], recordings: &[Range<usize>]) -> Option<Self> {
+        let stride = candidates.len().div_ceil(ALL_ROWS).max(1);
+        let thinned = |rows: &Range<usize>| candidates[rows.clone()].iter().step_by(stride).collect::<Vec<_>>();
+        let parts: Vec<Vec<&TrainingRow>> = recordings.iter().map(thinned).filter(|rows| rows.len() > 1).collect();
+        let steps_s = parts.iter().flat_map(|rows| rows.windows(2).map(|pair| pair[1].time_s - pair[0].time_s));
+        let step_s = median(steps_s)?;
+        let ends = parts.iter().scan(0, |end, rows| {
+            *end += rows.len();
+            Some(*end)
+        });
+        let recordings: Vec<Range<usize>> = ends.zip(&parts).map(|(end, rows)| end - rows.len()..end).collect();
+        let columns = Columns::new(parts.iter().flatten().copied());
+        (recordings.len() > 1).then_some(Self { columns, recordings, step_s })
+    }
+
+    fn rows<'a, const D: usize>(&'a self, inputs: &'a [[f64; D]]) -> AllRows<'a, D> {
+        AllRows { inputs, strain: &self.columns.strain, recordings: &self.recordings, step_s: self.step_s }
+    }
+}
+
+impl CorrectorInputs {
+    /// Of rows that stand for no others.
+    pub(crate) fn new(rows: &[TrainingRow]) -> Self {
+        Self { few: Columns::new(rows.iter()), all: None }
     }
 
     pub(crate) fn of_filter(&self, limits: RangeParams) -> Examples<'_, FILTER_INPUTS> {
-        Examples { inputs: &self.filter, strain: &self.strain, time_s: &self.time_s, limits }
+        let Columns { filter: inputs, strain, time_s, .. } = &self.few;
+        let all = self.all.as_ref().map(|all| all.rows(&all.columns.filter));
+        Examples { inputs, strain, time_s, limits, all }
     }
 
     pub(crate) fn of_smoother(&self, limits: RangeParams) -> Examples<'_, SMOOTHER_INPUTS> {
-        Examples { inputs: &self.smoother, strain: &self.strain, time_s: &self.time_s, limits }
+        let Columns { smoother: inputs, strain, time_s, .. } = &self.few;
+        let all = self.all.as_ref().map(|all| all.rows(&all.columns.smoother));
+        Examples { inputs, strain, time_s, limits, all }
     }
 }
 

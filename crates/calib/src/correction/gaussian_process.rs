@@ -3,7 +3,7 @@ use ohmstrain_ekf::correction::kernel;
 use ohmstrain_sensor::correction::relevance;
 
 /// White noise beside the noise that is correlated in time, as a share of its variance.
-const WHITE: f64 = 0.09;
+pub(super) const WHITE: f64 = 0.09;
 /// Variance that keeps the equations regular, in variances of the targets.
 const JITTER: f64 = 1e-6;
 /// A pivot of the inducing rows below this share of the prior variance says nothing new.
@@ -114,11 +114,6 @@ impl GaussianProcess {
         self.scale * self.size * self.size
     }
 
-    /// Kernels of the rows with each other.
-    pub(crate) fn kernel(&self) -> &DMatrix<f64> {
-        &self.kernel
-    }
-
     /// What the process says of every row without the row's block, in closed form from the inverse covariance (Rasmussen &
     /// Williams, *Gaussian Processes for Machine Learning*, 2006, eq. 5.12, for blocks). Blocks are of rows in order.
     pub(crate) fn left_out(&self, blocks: usize) -> Option<Vec<LeftOutRow>> {
@@ -172,6 +167,13 @@ impl GaussianProcess {
         let triangle = self.covariance.l_dirty().solve_lower_triangular(&projection)?.qr().r();
         Some((0..m).flat_map(|i| (i..m).map(move |j| (i, j))).map(|place| triangle[place]).collect())
     }
+}
+
+/// Kernels of rows with each other.
+pub(super) fn kernel_of(rows: &[Vec<f64>], settings: &Settings) -> DMatrix<f64> {
+    let inputs: Vec<&[f64]> = rows.iter().map(Vec::as_slice).collect();
+    let sums = Lessons { inputs: &inputs, targets: &[], time_s: &[] }.half_squares(&settings.lengths);
+    symmetric(rows.len(), |i, j| kernel(sums[(i, j)], rows[i][0] * rows[j][0]))
 }
 
 /// Covariance of the noise, in variances of the targets.

@@ -1,6 +1,8 @@
 //! What the law says of motions that the sensor was not seen in: strain from features of simulated readings, by a few rows that
 //! stand for thousands.
 
+use std::ops::Range;
+
 use nalgebra::{DMatrix, DVector};
 use ohmstrain_ekf::Gaussian;
 use ohmstrain_ekf::correction::{FEATURES, FILTER_INPUTS, OUTPUTS, filter_inputs, kernel};
@@ -8,7 +10,7 @@ use ohmstrain_sensor::correction::{relevance, standardised};
 use ohmstrain_sensor::{RangeParams, SimulatedParams, TrainingRow};
 use serde::Deserialize;
 
-use super::{BLOCKS, Prepared, scale, weight};
+use super::{Prepared, scale, weight};
 use crate::digits::digits;
 
 /// Rows that stand for all others. Two hundred say no more.
@@ -98,7 +100,7 @@ fn kernels(a: &[&[f64]], b: &[&[f64]]) -> DMatrix<f64> {
 
 impl Prepared<'_, FILTER_INPUTS> {
     /// The process of simulated rows. What it says errs as it did in simulation, where the law is right, and, since it is not, as
-    /// it does in the worst block of the calibration's own rows.
+    /// it does in the worst block of the rows that it is judged on.
     pub(crate) fn simulated(&self, of: &Distilled) -> Option<SimulatedParams> {
         let rows: Vec<[f64; FEATURES]> = of.rows.iter().map(|row| row.past).collect();
         let standardised = self.simulated_rows(&rows);
@@ -109,13 +111,13 @@ impl Prepared<'_, FILTER_INPUTS> {
         let weights = regular.cholesky()?.solve(&from_centre(&strain, mean));
         let weights: Vec<f64> = weights.iter().map(|x| weight(*x)).collect();
         let said = self.said(&rows, &weights);
-        let squares: Vec<f64> = said.zip(self.examples.strain).map(|(said, strain)| (said - strain).powi(2)).collect();
-        let blocks = squares.chunks(squares.len().div_ceil(BLOCKS));
-        let worst = blocks.map(|block| block.iter().sum::<f64>() / block.len() as f64).fold(0.0, f64::max);
+        let squares: Vec<f64> = said.zip(self.judged.strain).map(|(said, strain)| (said - strain).powi(2)).collect();
+        let of_block = |block: &Range<usize>| squares[block.clone()].iter().sum::<f64>() / block.len() as f64;
+        let worst = self.judged.blocks.iter().map(of_block).fold(0.0, f64::max);
         Some(SimulatedParams { mean, sd: (of.sd.powi(2) + worst).sqrt(), length: LENGTH, weights, rows })
     }
 
-    /// What the simulated rows say of each of the calibration's.
+    /// What the simulated rows say of each judged row.
     pub(super) fn heard(&self, of: &SimulatedParams) -> Vec<Gaussian<f64>> {
         let variance = of.sd.powi(2);
         self.said(&of.rows, &of.weights).map(|mean| Gaussian { mean, variance }).collect()
@@ -124,9 +126,9 @@ impl Prepared<'_, FILTER_INPUTS> {
     fn said(&self, rows: &[[f64; FEATURES]], weights: &[f64]) -> impl Iterator<Item = f64> {
         let limits = self.examples.limits;
         let rows = self.simulated_rows(rows);
-        let said = kernels(&features(&self.rows), &features(&rows)) * DVector::from_column_slice(weights);
+        let said = kernels(&features(&self.judged.rows), &features(&rows)) * DVector::from_column_slice(weights);
         let centre = centre(limits);
-        (0..self.rows.len()).map(move |k| (centre + said[k]).clamp(limits.lower, limits.upper))
+        (0..self.judged.rows.len()).map(move |k| (centre + said[k]).clamp(limits.lower, limits.upper))
     }
 
     fn simulated_rows(&self, rows: &[[f64; FEATURES]]) -> Vec<[f64; FILTER_INPUTS]> {
@@ -163,7 +165,7 @@ mod tests {
         let (real, known) = rows(100, 7);
         let time_s: Vec<f64> = (0..100).map(f64::from).collect();
         let said_of = |known: &[f64]| {
-            let examples = Examples { inputs: &real, strain: known, time_s: &time_s, limits: LIMITS };
+            let examples = Examples { inputs: &real, strain: known, time_s: &time_s, limits: LIMITS, all: None };
             let prepared = Prepared::new(examples);
             let (all, strain) = rows(4000, 100_000);
             let row = |(row, strain): (&[f64; D], &f64)| SimulatedRow {

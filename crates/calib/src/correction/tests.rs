@@ -2,7 +2,7 @@ use nalgebra::{DMatrix, DVector};
 use ohmstrain_ekf::Gaussian;
 
 use super::criterion::Criterion;
-use super::{Choices, Choosing, Chosen, Examples, Prepared};
+use super::{AllRows, Choices, Choosing, Chosen, Examples, Prepared, scale};
 use crate::correction::gaussian_process::{GaussianProcess, Lessons, Settings};
 use ohmstrain_sensor::RangeParams;
 use ohmstrain_sensor::correction::{OwnedCorrection, ProcessKind};
@@ -85,13 +85,13 @@ fn lengths(around: f64, inputs: usize) -> Vec<f64> {
 fn a_correction_says_what_the_textbook_says() {
     // As many rows as may be inducing: nothing is left out of the variance.
     let (inputs, strain, time_s) = examples(40, 1.7);
-    let examples = Examples { inputs: &inputs, strain: &strain, time_s: &time_s, limits: LIMITS };
+    let examples = Examples { inputs: &inputs, strain: &strain, time_s: &time_s, limits: LIMITS, all: None };
     let direct = Settings { lengths: vec![2.0, 3.0], noise: 0.1, noise_time_s: 2.0 };
     let residual = Settings { lengths: lengths(4.0, D), noise: 0.3, noise_time_s: 10.0 };
     let choices = Choices {
         sd_scale: 0.8,
-        direct: Chosen { settings: direct.clone(), sd_scale: 1.5 },
-        residual: Chosen { settings: residual.clone(), sd_scale: 1.0 },
+        direct: Chosen { inputs: vec![6, 7], settings: direct.clone(), sd_scale: 1.5 },
+        residual: Chosen { inputs: (0..D).collect(), settings: residual.clone(), sd_scale: 1.0 },
         one_sided: Vec::new(),
     };
     let correction: OwnedCorrection<f64, D> = learned(&choices, examples);
@@ -122,19 +122,25 @@ fn a_correction_says_what_the_textbook_says() {
 /// A process of one side of time says what the textbook says of rows that have nothing but that side.
 #[test]
 fn one_sided_processes_see_their_side_alone() {
-    const BOTH: usize = 16;
+    const BOTH: usize = 17;
     let (inputs, strain, time_s) = examples::<BOTH>(40, 1.7);
-    let examples = Examples { inputs: &inputs, strain: &strain, time_s: &time_s, limits: LIMITS };
-    let [direct, residual, past, future] =
-        [(4.0, 10, 0.1), (4.0, BOTH, 0.3), (2.0, 7, 0.1), (8.0, 4, 0.03)].map(|(length, inputs, noise)| {
-            let settings = Settings { lengths: lengths(length, inputs), noise, noise_time_s: 2.0 };
-            Chosen { settings, sd_scale: 1.0 }
-        });
+    let examples = Examples { inputs: &inputs, strain: &strain, time_s: &time_s, limits: LIMITS, all: None };
+    let [direct, residual, past, future] = [
+        (ProcessKind::Direct, 4.0, 0.1),
+        (ProcessKind::Residual, 4.0, 0.3),
+        (ProcessKind::Past, 2.0, 0.1),
+        (ProcessKind::Future, 8.0, 0.03),
+    ]
+    .map(|(kind, length, noise)| {
+        let inputs = kind.places(BOTH);
+        let settings = Settings { lengths: lengths(length, inputs.len()), noise, noise_time_s: 2.0 };
+        Chosen { inputs, settings, sd_scale: 1.0 }
+    });
     let choices = Choices { sd_scale: 1.0, direct, residual, one_sided: vec![past.clone(), future.clone()] };
     let correction: OwnedCorrection<f64, BOTH, 2> = learned(&choices, examples);
-    // Six outputs, the reading, six features of the past, three of the future.
+    // Six outputs, the reading, six features of the past, four of the future, of which the last is the slowest.
     let of_past = |row: &[f64; BOTH]| row[6..13].to_vec();
-    let of_future = |row: &[f64; BOTH]| [&row[6..7], &row[13..]].concat();
+    let of_future = |row: &[f64; BOTH]| vec![row[16], row[13], row[14], row[15]];
     let pasts: Vec<Vec<f64>> = inputs.iter().map(of_past).collect();
     let futures: Vec<Vec<f64>> = inputs.iter().map(of_future).collect();
     for k in 0..39 {
@@ -154,12 +160,15 @@ fn one_sided_processes_see_their_side_alone() {
 #[test]
 fn inducing_rows_cost_no_certainty_that_is_not_there() {
     let (inputs, strain, time_s) = examples(200, 1.7);
-    let examples = Examples { inputs: &inputs, strain: &strain, time_s: &time_s, limits: LIMITS };
-    let settings = |inputs: usize| Settings { lengths: vec![4.0; inputs], noise: 0.1, noise_time_s: 2.0 };
-    let (direct, settings) = (settings(D - 6), settings(D));
-    let chosen = |settings: &Settings| Chosen { settings: settings.clone(), sd_scale: 1.0 };
-    let choices =
-        Choices { sd_scale: 1.0, direct: chosen(&direct), residual: chosen(&settings), one_sided: Vec::new() };
+    let examples = Examples { inputs: &inputs, strain: &strain, time_s: &time_s, limits: LIMITS, all: None };
+    let chosen = |kind: ProcessKind| {
+        let inputs = kind.places(D);
+        let settings = Settings { lengths: vec![4.0; inputs.len()], noise: 0.1, noise_time_s: 2.0 };
+        Chosen { inputs, settings, sd_scale: 1.0 }
+    };
+    let (direct, residual) = (chosen(ProcessKind::Direct), chosen(ProcessKind::Residual));
+    let settings = residual.settings.clone();
+    let choices = Choices { sd_scale: 1.0, direct, residual, one_sided: Vec::new() };
     let correction: OwnedCorrection<f64, D> = learned(&choices, examples);
     let all: Vec<Vec<f64>> = inputs.iter().map(|row| row.to_vec()).collect();
     let residuals: Vec<f64> = inputs.iter().zip(&strain).map(|(row, strain)| strain - row[0]).collect();
@@ -318,7 +327,8 @@ fn a_factor_covers_the_worst_block_or_all_together() {
     let (inputs, strain, time_s) = examples::<D>(160, 0.5);
     let off = |k: usize| if k >= 128 && k % 8 < 3 { 0.5 + 0.01 * k as f64 } else { 0.0 };
     let strain: Vec<f64> = strain.iter().enumerate().map(|(k, y)| y + off(k)).collect();
-    let prepared = Prepared::new(Examples { inputs: &inputs, strain: &strain, time_s: &time_s, limits: LIMITS });
+    let prepared =
+        Prepared::new(Examples { inputs: &inputs, strain: &strain, time_s: &time_s, limits: LIMITS, all: None });
     let covered = |covers_worst: bool| {
         let by = Choosing { criterion: Criterion::LeftOut, covers_worst };
         let params = prepared.chosen(ProcessKind::Residual, by).unwrap();
@@ -343,7 +353,7 @@ fn learning_helps_near_and_leaves_far_alone() {
     let pick = |values: &[f64]| (0..160).filter(even).map(|k| values[k]).collect::<Vec<f64>>();
     let seen: Vec<[f64; D]> = (0..160).filter(even).map(|k| inputs[k]).collect();
     let (known, times) = (pick(&strain), pick(&time_s));
-    let examples = Examples { inputs: &seen, strain: &known, time_s: &times, limits: LIMITS };
+    let examples = Examples { inputs: &seen, strain: &known, time_s: &times, limits: LIMITS, all: None };
     let choices = Choices::fit::<D, 0>(&Prepared::new(examples), &[]).unwrap();
     let correction: OwnedCorrection<f64, D> = learned(&choices, examples);
     let (mut before, mut after, mut covered) = (0.0, 0.0, 0);
@@ -363,4 +373,93 @@ fn learning_helps_near_and_leaves_far_alone() {
     assert!(said.novelty > 0.99);
     // The strain has a deviation of 0.7; six per cent of its variance are allowed for at the least.
     assert!(said.strain.sd() > 0.17, "{}", said.strain.sd());
+}
+
+/// Three recordings of the same function, each with an offset of its own; `few` of their rows stand for all.
+fn recordings(few: usize) -> (Vec<[f64; D]>, Vec<f64>, [std::ops::Range<usize>; 3], Vec<[f64; D]>) {
+    let number = |seed: usize| 2.0 * ((seed as f64 * 12.9898).sin() * 43758.5453).rem_euclid(1.0) - 1.0;
+    let inputs: Vec<[f64; D]> = (0..90).map(|k| std::array::from_fn(|i| 1.7 * number(31 * k + i))).collect();
+    let strain =
+        (0..90).map(|k| (0.8 * inputs[k][6]).tanh() + 0.3 * inputs[k][7] + [0.2, -0.1, 0.05][k / 30]).collect();
+    let chosen = (0..few).map(|k| inputs[k * 90 / few]).collect();
+    (inputs, strain, [0..30, 30..60, 60..90], chosen)
+}
+
+/// A row of normal equations written out: Bayesian regression on kernels of the few rows and an indicator of each recording, weights
+/// a priori as the inverse kernels, offsets with a deviation of a quarter of the targets'. Rows half a second apart whose errors last for
+/// four seconds count for a sixteenth each.
+#[test]
+fn a_few_rows_learn_what_all_recordings_say() {
+    let (inputs, strain, recordings, few) = recordings(12);
+    let scales: [_; D] = std::array::from_fn(|i| scale(few.iter().map(|row| row[i])));
+    let z = |row: &[f64; D]| [6, 7].map(|i| (row[i] - scales[i].mean) / scales[i].sd);
+    let lengths = [2.0, 3.0];
+    let kernel = |a: [f64; 2], b: [f64; 2]| {
+        let square: f64 = (0..2).map(|i| ((a[i] - b[i]) / lengths[i]).powi(2)).sum();
+        (-0.5 * square).exp() + 0.09 * (1.0 + a[0] * b[0])
+    };
+    let mean = strain.iter().sum::<f64>() / 90.0;
+    let size = (strain.iter().map(|y| (y - mean).powi(2)).sum::<f64>() / 90.0).sqrt();
+    let (noise, share) = (0.3, 1.0 / 16.0);
+    let white = 1.09 * noise * noise;
+    let regular = DMatrix::from_fn(15, 15, |i, j| match (i < 12, j < 12) {
+        (true, true) => kernel(z(&few[i]), z(&few[j])) + if i == j { 1e-6 } else { 0.0 },
+        _ => {
+            if i == j {
+                16.0
+            } else {
+                0.0
+            }
+        }
+    });
+    // Rows of some recordings; posterior mean and covariance of weights and offsets, the noise's variance being 1.
+    let posterior = |of: &[usize]| {
+        let rows: Vec<usize> = of.iter().flat_map(|g| recordings[*g].clone()).collect();
+        let design = DMatrix::from_fn(rows.len(), 15, |k, j| {
+            if j < 12 { kernel(z(&inputs[rows[k]]), z(&few[j])) } else { f64::from(u8::from(rows[k] / 30 == j - 12)) }
+        });
+        let y = DVector::from_iterator(rows.len(), rows.iter().map(|k| (strain[*k] - mean) / size));
+        let precision = design.transpose() * &design * (share / white) + &regular;
+        let covariance = precision.try_inverse().unwrap();
+        (&covariance * design.transpose() * y * (share / white), covariance)
+    };
+    let examples = Examples {
+        inputs: &few,
+        strain: &strain[..12],
+        time_s: &[0.0; 12],
+        limits: LIMITS,
+        all: Some(AllRows { inputs: &inputs, strain: &strain, recordings: &recordings, step_s: 0.5 }),
+    };
+    let prepared = Prepared::new(examples);
+    let settings = Settings { lengths: lengths.to_vec(), noise, noise_time_s: 4.0 };
+    let chosen = Chosen { inputs: vec![6, 7], settings, sd_scale: 1.0 };
+    let direct = prepared.conditioned(ProcessKind::Direct, &chosen).unwrap();
+    let (weights, _) = posterior(&[0, 1, 2]);
+    for row in &inputs {
+        let kernels = DVector::from_fn(12, |j, _| kernel(z(row), z(&few[j])));
+        let found: f64 = kernels.iter().zip(&direct.weights).map(|(kernel, weight)| kernel * weight).sum();
+        let expected = size * kernels.dot(&weights.rows(0, 12));
+        // Of weights of kernels that are nearly alike only the sum is known; the equations are kept regular by 1e-9.
+        assert!((found - expected).abs() < 1e-5, "{found} {expected}");
+    }
+    let said = prepared.left_out(ProcessKind::Direct, &chosen).unwrap();
+    for (g, others) in [[1, 2], [0, 2], [0, 1]].iter().enumerate() {
+        let (weights, covariance) = posterior(others);
+        for k in recordings[g].clone() {
+            let of_row = DVector::from_fn(15, |j, _| if j < 12 { kernel(z(&inputs[k]), z(&few[j])) } else { 0.0 });
+            let expected = mean + size * of_row.dot(&weights);
+            assert!((said[k].mean - expected).abs() < 1e-5, "{k}: {} {expected}", said[k].mean);
+            // A row far from the few is not known because these are: what no kernel explains is added.
+            let kernels = of_row.rows(0, 12).into_owned();
+            let among = regular.view((0, 0), (12, 12)).into_owned().try_inverse().unwrap();
+            let prior = kernel(z(&inputs[k]), z(&inputs[k]));
+            let latent = prior - kernels.dot(&(among * &kernels)) + of_row.dot(&(&covariance * &of_row));
+            let unknown = (latent / prior).clamp(0.0, 1.0);
+            let least = 0.5
+                * (strain[..12].iter().map(|x| x * x).sum::<f64>() / 12.0
+                    - (strain[..12].iter().sum::<f64>() / 12.0).powi(2));
+            let expected = unknown * (prior * direct.variance).max(least) + direct.noise;
+            assert!((said[k].variance - expected).abs() < 1e-5, "{k}: {} {expected}", said[k].variance);
+        }
+    }
 }

@@ -17,7 +17,7 @@ use crate::alignment;
 use crate::args::CalibrateArgs;
 use crate::error::CliError;
 use crate::input::{self, TraceFile, unit};
-use crate::output::{Kind, Outputs, print};
+use crate::output::{Kind, Outputs, named, print};
 use crate::plausible;
 use crate::progress::Progress;
 use crate::sensor_file;
@@ -101,7 +101,7 @@ pub fn run(args: &CalibrateArgs) -> Result<(), CliError> {
         match Verbosity::chosen() {
             _ if args.json => closing::json(out, &closing, &file),
             Verbosity::Quiet => Ok(()),
-            _ => Ok(out.write_all(closing.text().as_bytes())?),
+            _ => Ok(out.write_all(named(&closing.lines()).as_bytes())?),
         }
     })
 }

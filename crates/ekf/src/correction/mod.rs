@@ -93,8 +93,8 @@ pub struct Correction<'a, T, const D: usize, const S: usize = 0> {
     pub scales: &'a [InputScale<T>; D],
     /// Strain from all features; outputs of the filter are not seen, whatever their relevance.
     pub direct: Process<'a, T, D>,
-    /// Strain from the features of the past, and strain from the reading and the features of the future. Neither sees outputs.
-    pub one_sided: [Process<'a, T, D>; S],
+    /// Strain from features of the past, and strain from features of the future. Neither sees outputs.
+    pub one_sided: [OneSided<'a, T, D>; S],
     /// Strain minus the filter's strain, from all inputs.
     pub residual: Process<'a, T, D>,
     /// Strain from the features, as the law has it where the sensor has not been.
@@ -105,6 +105,15 @@ pub struct Correction<'a, T, const D: usize, const S: usize = 0> {
     pub strain_variance: T,
     /// Factor on the mixture's variance, from training rows left out.
     pub variance_factor: T,
+}
+
+/// A process that sees features of one side of time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OneSided<'a, T, const D: usize> {
+    /// What it says.
+    pub process: Process<'a, T, D>,
+    /// The input that the linear part of its kernel takes.
+    pub first: usize,
 }
 
 /// A process that sees features alone, of readings that a law gave in simulated motions. Its variance is its noise.
@@ -163,7 +172,7 @@ impl<T: Real, const D: usize, const S: usize> Correction<'_, T, D, S> {
     #[inline(always)]
     fn of_simulated<V: Several<Number = T>>(&self, like: V, inputs: &[T; D], of: &Simulated<'_, T, D>) -> Gaussian<T> {
         let Standardised { inputs: x, outside } = standardised(of.scales, inputs);
-        let reading = x.get(OUTPUTS).copied().unwrap_or(T::zero());
+        let reading = at(&x, OUTPUTS);
         let mut kernels = Kernels::new(&of.process);
         of.rows.side_by_side(like, |rows| {
             let mut squares = [like.nothing(); D];
@@ -213,6 +222,11 @@ fn standardised<T: Recordable, const D: usize>(scales: &[InputScale<T>; D], inpu
     Standardised { inputs: x, outside }
 }
 
+/// An input; zero where there is none.
+fn at<T: Recordable, const D: usize>(inputs: &[T; D], place: usize) -> T {
+    inputs.get(place).copied().unwrap_or(T::zero())
+}
+
 /// The correction of one strain; training rows stand in lanes.
 #[derive(Clone, Copy)]
 struct Correcting<'a, T, const D: usize, const S: usize> {
@@ -230,9 +244,9 @@ impl<T: Real, const D: usize, const S: usize> Work<T> for Correcting<'_, T, D, S
         let Self { correction: of, inputs, filtered, birge } = self;
         let Standardised { inputs: x, outside } = standardised(of.scales, inputs);
         let (mut direct, mut residual) = (Kernels::new(&of.direct), Kernels::new(&of.residual));
-        let mut sides = of.one_sided.each_ref().map(Kernels::new);
+        let mut sides = of.one_sided.each_ref().map(|side| Kernels::new(&side.process));
         let of_residual = of.residual_beside(filtered);
-        let (reading, strain) = (x.get(OUTPUTS).copied().unwrap_or(T::zero()), x[0]);
+        let (reading, strain) = (at(&x, OUTPUTS), x[0]);
         of.rows.side_by_side(like, |rows| {
             let mut squares = [like.nothing(); D];
             for i in 0..D {
@@ -241,19 +255,21 @@ impl<T: Real, const D: usize, const S: usize> Work<T> for Correcting<'_, T, D, S
             let readings = rows.column(OUTPUTS).scale(reading);
             direct.add(&of.direct, of.direct.kernels(&squares, OUTPUTS, readings), rows.count);
             for k in 0..S {
-                let side = &of.one_sided[k];
-                sides[k].add(side, side.kernels(&squares, OUTPUTS, readings), rows.count);
+                let OneSided { process, first } = &of.one_sided[k];
+                let linear = rows.column(*first).scale(at(&x, *first));
+                sides[k].add(process, process.kernels(&squares, OUTPUTS, linear), rows.count);
             }
             let kernel = of.residual.kernels(&squares, 0, rows.column(0).scale(strain));
             residual.add(&of.residual, kernel, rows.count);
         });
-        let of_readings = |kernels: Kernels<T>, process| {
-            let said = kernels.said(like, process, reading);
-            of.widened(said, process, process.distance(&outside, OUTPUTS), T::zero())
+        let of_readings = |kernels: Kernels<T>, process, first| {
+            let said = kernels.said(like, process, at(&x, first));
+            of.widened(said, process, process.distance(&outside, first), T::zero())
         };
-        let direct = of_readings(direct, &of.direct);
+        let direct = of_readings(direct, &of.direct, OUTPUTS);
         let mut of_sides = of.one_sided.iter();
-        let one_sided = sides.map(|kernels| of_sides.next().map_or(direct, |process| of_readings(kernels, process)));
+        let one_sided =
+            sides.map(|kernels| of_sides.next().map_or(direct, |side| of_readings(kernels, &side.process, side.first)));
         let said = residual.said(like, &of_residual, strain);
         let (residual, novelty) = of.of_residual(said, of.residual.distance(&outside, 0), filtered.mean);
         let learned = of.learned(consensus(direct, residual, one_sided), novelty, birge);
@@ -316,8 +332,8 @@ mod tests {
     #![allow(clippy::unwrap_used, reason = "tests")]
 
     use super::{
-        BLOCK, Correcting, Correction, FEATURES, INDUCING, InputScale, OUTPUTS, Process, RowBlock, Rows, Simulated,
-        StrainRange, Triangle, block_of, stripes,
+        BLOCK, Correcting, Correction, FEATURES, INDUCING, InputScale, OUTPUTS, OneSided, Process, RowBlock, Rows,
+        Simulated, StrainRange, Triangle, block_of, stripes,
     };
     use crate::Gaussian;
     use crate::kernel::Work;
@@ -350,7 +366,8 @@ mod tests {
             rows: Rows::new(&rows, ROWS),
             scales: &scales,
             direct: process(2.0),
-            one_sided: [process(1.5), process(0.7)],
+            one_sided: [(process(1.5), OUTPUTS), (process(0.7), OUTPUTS + FEATURES + 1)]
+                .map(|(process, first)| OneSided { process, first }),
             residual: process(3.0),
             simulated: Some(Simulated {
                 rows: Rows::new(&rows[3..], ROWS - 3 * BLOCK),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import tempfile
+import textwrap
 import warnings
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -270,7 +271,9 @@ class Sensor:
     def __repr__(self) -> str:
         closing = self._core.closing(self._file)
         if closing is not None:
-            return closing.rstrip("\n")
+            indent = " " * 13
+            lines = (textwrap.fill(text, 100, initial_indent=f"{name:13}", subsequent_indent=indent) for name, text in closing)
+            return "\n".join(lines)
         params = self.params
         lower, upper = params["limits"]["lower"], params["limits"]["upper"]
         branches = len(params["law"]["branches"])

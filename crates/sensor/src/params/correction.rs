@@ -168,7 +168,9 @@ pub struct ProcessParams {
     pub least_sd: f64,
     /// Standard deviation of the noise.
     pub noise_sd: f64,
-    /// Length scale of each input that the process sees, in standard deviations of the input: the longer, the less it counts.
+    /// Places of the inputs that the process sees, among the corrector's. The linear part of the kernel takes the first.
+    pub inputs: Vec<usize>,
+    /// Length scale of each, in standard deviations of the input: the longer, the less it counts.
     pub lengths: Vec<f64>,
     /// Weight of each row, in the corrector's order.
     pub weights: Vec<f64>,

@@ -1,7 +1,9 @@
-use ohmstrain_ekf::correction::{FILTER_INPUTS, INDUCING};
+use std::ops::Range;
+
+use ohmstrain_ekf::correction::{FILTER_INPUTS, INDUCING, OUTPUTS};
 
 use super::table::{AMOUNT, FACTOR, FieldError, POSITIVE, SIGNED, Table, WEIGHT};
-use crate::correction::{ONE_SIDED, ProcessKind, side_of};
+use crate::correction::side_of;
 use crate::params::correction::{
     CorrectionParams, CorrectionScale, CorrectorParams, InputScales, ProcessParams, SIDES, SMOOTHER_INPUTS,
     SimulatedParams, TrainingRow,
@@ -70,17 +72,15 @@ impl CorrectorParams {
             }
         }
         self.inputs.validate(&table.table("inputs"), inputs)?;
-        let process = |kind: ProcessKind, process: &ProcessParams, table: &Table| {
-            process.validate(table, kind.places(inputs).len(), rows)
-        };
-        process(ProcessKind::Direct, &self.direct, &table.table("direct"))?;
-        process(ProcessKind::Residual, &self.residual, &table.table("residual"))?;
+        self.direct.validate(&table.table("direct"), (OUTPUTS..inputs, Some(OUTPUTS)), rows)?;
+        self.residual.validate(&table.table("residual"), (0..inputs, Some(0)), rows)?;
         let sides = if inputs == SMOOTHER_INPUTS { SIDES } else { 0 };
         if self.one_sided.len() != sides {
             return Err(table.wrong("one_sided", format!("{sides} entries"), self.one_sided.len()));
         }
-        let mut one_sided = self.one_sided.iter().zip(ONE_SIDED).enumerate();
-        one_sided.try_for_each(|(index, (side, kind))| process(kind, side, &table.entry("one_sided", index)))
+        self.one_sided.iter().enumerate().try_for_each(|(index, side)| {
+            side.validate(&table.entry("one_sided", index), (OUTPUTS..inputs, None), rows)
+        })
     }
 }
 
@@ -100,13 +100,30 @@ impl InputScales {
 }
 
 impl ProcessParams {
-    fn validate(&self, table: &Table, inputs: usize, rows: usize) -> Result<(), FieldError> {
+    /// Of a process that may see these inputs, and has to see one of them first.
+    fn validate(
+        &self,
+        table: &Table,
+        (inputs, first): (Range<usize>, Option<usize>),
+        rows: usize,
+    ) -> Result<(), FieldError> {
         table.number("sd_scale", self.sd_scale, FACTOR)?;
         table.number("mean", self.mean, SIGNED)?;
         table.number("sd", self.sd, AMOUNT)?;
         table.number("least_sd", self.least_sd, AMOUNT)?;
         table.number("noise_sd", self.noise_sd, AMOUNT)?;
-        table.length("lengths", inputs, self.lengths.len())?;
+        let mut missing = vec![true; inputs.end];
+        for (index, input) in self.inputs.iter().enumerate() {
+            let is_new = inputs.contains(input) && missing.get_mut(*input).is_some_and(std::mem::take);
+            if !is_new || (index == 0 && first.is_some_and(|first| first != *input)) {
+                let expected = format!("each of {} to {} once at most, in order", inputs.start, inputs.end - 1);
+                return Err(table.wrong(&format!("inputs[{index}]"), expected, input));
+            }
+        }
+        if self.inputs.is_empty() {
+            return Err(table.wrong("inputs", "1 entry or more", 0));
+        }
+        table.length("lengths", self.inputs.len(), self.lengths.len())?;
         table.numbers("lengths", &self.lengths, FACTOR)?;
         table.length("weights", rows, self.weights.len())?;
         table.numbers("weights", &self.weights, WEIGHT)?;

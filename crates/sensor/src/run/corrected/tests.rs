@@ -9,6 +9,7 @@ use ohmstrain_ekf::{Estimate, Gaussian, Guard, Reading, ReadingVerdict, StepErro
 
 use super::{CorrectedWayBack, Learned, future_features, outputs};
 use crate::EstimatorKind;
+use crate::correction::{ONE_SIDED, ProcessKind, SMOOTHER_INPUTS};
 use crate::params::correction::ProcessParams;
 use crate::params::correction::{
     CorrectionParams, CorrectionScale, CorrectorParams, FUTURE_FEATURES, InputScales, SimulatedParams, TrainingRow,
@@ -102,13 +103,14 @@ fn params() -> CorrectionParams {
     };
     // Weights that nobody has learned: what is said of a row is a smooth function of all its inputs.
     let weights = |rows: usize| (0..rows).map(|k| 0.01 * (1.3 * k as f64).sin()).collect();
-    let process = |length: f64, inputs: usize| ProcessParams {
+    let process = |length: f64, inputs: Vec<usize>| ProcessParams {
         sd_scale: 1.2,
         mean: 0.03,
         sd: 0.2,
         least_sd: 0.1,
         noise_sd: 0.02,
-        lengths: vec![length; inputs],
+        lengths: vec![length; inputs.len()],
+        inputs,
         weights: weights(60),
         explained: (0..6).map(|k| 0.3 * (0.7 * f64::from(k)).cos()).collect(),
     };
@@ -123,15 +125,15 @@ fn params() -> CorrectionParams {
             lower: column(-0.9, FILTER_INPUTS + future),
             upper: column(0.9, FILTER_INPUTS + future),
         },
-        direct: process(2.0, FEATURES + future),
-        residual: process(4.0, OUTPUTS + FEATURES + future),
+        direct: process(2.0, ProcessKind::Direct.places(FILTER_INPUTS + future)),
+        residual: process(4.0, ProcessKind::Residual.places(FILTER_INPUTS + future)),
         one_sided,
     };
     CorrectionParams {
         corrects: EstimatorKind::SignSplit,
         readings: SCALE,
         filter: corrector(0, Vec::new()),
-        smoother: corrector(FUTURE_FEATURES, vec![process(2.0, FEATURES), process(4.0, 1 + FUTURE_FEATURES)]),
+        smoother: corrector(FUTURE_FEATURES, ONE_SIDED.map(|side| process(3.0, side.places(SMOOTHER_INPUTS))).to_vec()),
         rows: (0..600).step_by(10).map(row).collect(),
         simulated: SimulatedParams {
             mean: 0.2,

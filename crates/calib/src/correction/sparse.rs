@@ -1,0 +1,216 @@
+//! Weights of a few rows from all rows of several recordings.
+//!
+//! The process is `Σ αⱼ k(x, uⱼ)` over the few rows u, a priori with the covariance `K⁻¹` (deterministic training conditional:
+//! Quiñonero-Candela & Rasmussen, *J. Mach. Learn. Res.* 6 (2005) 1939). Each recording has an offset of its own besides, since its R₀
+//! and the state that it began in are its own. Settings and factors are judged by recordings left out: within one recording
+//! neighbours share what another day does not have.
+
+use std::ops::Range;
+
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use ohmstrain_ekf::correction::{LINEAR, kernel};
+use ohmstrain_sensor::correction::relevance;
+
+use super::gaussian_process::{LeftOutRow, WHITE};
+
+/// Standard deviation of a recording's offset, in those of the targets.
+const OFFSET: f64 = 0.25;
+/// For how long errors are alike, s: rows that are closer count for less. Whitening them as an Ornstein-Uhlenbeck process makes other
+/// recordings worse (docs/learned-correction.md).
+const ERROR_TIME_S: f64 = 4.0;
+/// Keeps the kernels of the few rows apart, and the equations regular.
+const JITTER: f64 = 1e-6;
+const LEAST: f64 = 1e-9;
+
+/// All rows of several recordings, one recording after the other, and the few that get weights.
+#[derive(Clone, Copy)]
+pub(super) struct Population<'a> {
+    pub few: &'a [&'a [f64]],
+    pub inputs: &'a [&'a [f64]],
+    pub targets: &'a [f64],
+    pub recordings: &'a [Range<usize>],
+    /// Usual time between rows, s.
+    pub step_s: f64,
+}
+
+/// Sums over a population, for given length scales: what any noise is fitted with.
+pub(super) struct Sums {
+    /// Mean and standard deviation of the targets.
+    pub centre: f64,
+    pub size: f64,
+    targets: DVector<f64>,
+    /// Kernels of all rows with the few.
+    kernels: DMatrix<f64>,
+    /// Kernels of all rows with themselves.
+    priors: Vec<f64>,
+    /// Kernels of the few rows with each other.
+    few: DMatrix<f64>,
+    /// The inverse of the prior covariance of weights and offsets.
+    regular: DMatrix<f64>,
+    /// Normal equations of each recording, and of all.
+    own: Vec<Normal>,
+    all: Normal,
+    recordings: Vec<Range<usize>>,
+    /// Share of a row that no neighbour has told.
+    share: f64,
+}
+
+/// Normal equations of weights, then offsets: matrix, right-hand side, and square of the targets.
+#[derive(Clone)]
+struct Normal {
+    matrix: DMatrix<f64>,
+    right: DVector<f64>,
+    square: f64,
+}
+
+impl Sums {
+    pub(super) fn new(population: Population, lengths: &[f64]) -> Self {
+        let Population { few, inputs, targets, recordings, step_s } = population;
+        let n = targets.len() as f64;
+        let centre = targets.iter().sum::<f64>() / n;
+        let size = (targets.iter().map(|y| (y - centre).powi(2)).sum::<f64>() / n).sqrt().max(f64::MIN_POSITIVE);
+        let targets = DVector::from_iterator(targets.len(), targets.iter().map(|y| (y - centre) / size));
+        let relevance: Vec<f64> = lengths.iter().map(|length| relevance(*length)).collect();
+        let of_rows = |a: &[f64], b: &[f64]| {
+            let apart = a.iter().zip(b).zip(&relevance).map(|((a, b), by)| (a - b).powi(2) * by);
+            kernel(apart.sum(), a[0] * b[0])
+        };
+        let kernels = DMatrix::from_fn(inputs.len(), few.len(), |i, j| of_rows(inputs[i], few[j]));
+        let among =
+            DMatrix::from_fn(few.len(), few.len(), |i, j| of_rows(few[i], few[j]) + if i == j { JITTER } else { 0.0 });
+        let (m, all) = (few.len(), few.len() + recordings.len());
+        let mut regular = DMatrix::identity(all, all) / OFFSET.powi(2);
+        regular.view_mut((0, 0), (m, m)).copy_from(&among);
+        let share = (0.5 * step_s / ERROR_TIME_S).min(1.0);
+        let own: Vec<Normal> = recordings
+            .iter()
+            .enumerate()
+            .map(|(g, rows)| Normal::of_recording((&kernels, &targets), rows, (m + g, all), share))
+            .collect();
+        let all = own.iter().skip(1).fold(own[0].clone(), |sum, own| Normal {
+            matrix: sum.matrix + &own.matrix,
+            right: sum.right + &own.right,
+            square: sum.square + own.square,
+        });
+        let priors = inputs.iter().map(|x| 1.0 + LINEAR * (1.0 + x[0] * x[0])).collect();
+        Self {
+            centre,
+            size,
+            targets,
+            kernels,
+            priors,
+            few: among,
+            regular,
+            own,
+            all,
+            recordings: recordings.to_vec(),
+            share,
+        }
+    }
+
+    /// Variance of the noise, of every row by itself, in variances of the prior.
+    fn white(noise: f64) -> f64 {
+        (1.0 + WHITE) * noise * noise
+    }
+
+    /// Normal equations with the prior; without one recording, if so asked.
+    fn factor(&self, noise: f64, without: Option<&Normal>) -> Option<Cholesky<f64, Dyn>> {
+        let mut matrix = &self.regular * Self::white(noise) + &self.all.matrix;
+        if let Some(own) = without {
+            matrix -= &own.matrix;
+        }
+        for i in 0..matrix.nrows() {
+            matrix[(i, i)] += LEAST;
+        }
+        matrix.cholesky()
+    }
+
+    /// Weights of the few rows, in the unit of the targets, and the prior variance where the kernel is 1, in its square.
+    pub(super) fn weights(&self, noise: f64) -> Option<(Vec<f64>, f64)> {
+        let solution = self.factor(noise, None)?.solve(&self.all.right);
+        let rows = self.targets.len() as f64 * self.share;
+        let scale = (self.all.square - self.all.right.dot(&solution)) / (Self::white(noise) * rows.max(1.0));
+        let weights = solution.iter().take(self.few.nrows()).map(|weight| weight * self.size).collect();
+        Some((weights, scale.max(0.0) * self.size * self.size))
+    }
+
+    /// Variance of what is not predicted, noise and a recording's offset, in variances of the prior.
+    pub(super) fn unpredicted(noise: f64) -> f64 {
+        Self::white(noise) + OFFSET * OFFSET
+    }
+
+    /// What is said of every row without its recording; the prior of a variance of 1.
+    pub(super) fn left_out(&self, noise: f64) -> Option<Vec<LeftOutRow>> {
+        let m = self.few.nrows();
+        let among = self.few.clone().cholesky()?.inverse();
+        let mut said = Vec::with_capacity(self.targets.len());
+        for (own, rows) in self.own.iter().zip(&self.recordings) {
+            let factor = self.factor(noise, Some(own))?;
+            let weights = factor.solve(&(&self.all.right - &own.right));
+            let known = &among - factor.inverse().view((0, 0), (m, m)) * Self::white(noise);
+            let kernels = self.kernels.rows(rows.start, rows.len());
+            let (means, weighted) = (kernels * weights.rows(0, m), kernels * known);
+            said.extend(rows.clone().enumerate().map(|(k, row)| {
+                let explained = weighted.row(k).dot(&kernels.row(k));
+                let prior = self.priors[row];
+                let unknown = ((prior - explained) / prior).clamp(0.0, 1.0);
+                LeftOutRow { mean: self.centre + self.size * means[k], unknown, prior }
+            }));
+        }
+        Some(said)
+    }
+
+    /// The negative logarithm of the density of a row without its recording, with the prior variance that makes it least, up to a
+    /// constant.
+    pub(super) fn cost(&self, noise: f64) -> Option<f64> {
+        let rows = self.left_out(noise)?;
+        let count = rows.len() as f64;
+        let (mut squares, mut logarithms) = (0.0, 0.0);
+        for (row, target) in rows.iter().zip(self.targets.iter()) {
+            let variance = row.unknown * row.prior + Self::unpredicted(noise);
+            squares += ((row.mean - self.centre) / self.size - target).powi(2) / variance;
+            logarithms += variance.ln();
+        }
+        Some(0.5 * ((squares / count).ln() + logarithms / count))
+    }
+
+    /// Rows of the upper triangle W, one after the other: |W k|² is the share of the prior variance that all rows explain through
+    /// these of the few, whose kernels are k.
+    pub(super) fn explained(&self, noise: f64, inducing: &[usize]) -> Option<Vec<f64>> {
+        let m = inducing.len();
+        let among = self.few.select_rows(inducing).select_columns(inducing).cholesky()?.inverse();
+        let kept: Vec<usize> = inducing.iter().copied().chain(self.few.nrows()..self.regular.nrows()).collect();
+        let matrix = &self.regular * Self::white(noise) + &self.all.matrix;
+        let matrix =
+            matrix.select_rows(&kept).select_columns(&kept) + DMatrix::identity(kept.len(), kept.len()) * LEAST;
+        let left = matrix.cholesky()?.inverse();
+        let known = among - left.view((0, 0), (m, m)) * Self::white(noise);
+        let parts = (0.5 * (&known + known.transpose())).symmetric_eigen();
+        let roots = parts.eigenvalues.map(|value| value.max(0.0).sqrt());
+        let triangle = (DMatrix::from_diagonal(&roots) * parts.eigenvectors.transpose()).qr().r();
+        Some((0..m).flat_map(|i| (i..m).map(move |j| (i, j))).map(|place| triangle[place]).collect())
+    }
+}
+
+impl Normal {
+    /// Of the rows of a recording, whose offset stands at a place among so many unknowns.
+    fn of_recording(
+        (kernels, targets): (&DMatrix<f64>, &DVector<f64>),
+        rows: &Range<usize>,
+        (offset, all): (usize, usize),
+        share: f64,
+    ) -> Self {
+        let m = kernels.ncols();
+        let (own, targets) = (kernels.rows(rows.start, rows.len()), targets.rows(rows.start, rows.len()));
+        let mut matrix = DMatrix::zeros(all, all);
+        matrix.view_mut((0, 0), (m, m)).copy_from(&(own.transpose() * own * share));
+        let sums = own.row_sum() * share;
+        matrix.view_mut((offset, 0), (1, m)).copy_from(&sums);
+        matrix.view_mut((0, offset), (m, 1)).copy_from(&sums.transpose());
+        matrix[(offset, offset)] = rows.len() as f64 * share;
+        let mut right = DVector::zeros(all);
+        right.rows_mut(0, m).copy_from(&(own.transpose() * targets * share));
+        right[offset] = targets.sum() * share;
+        Self { matrix, right, square: targets.norm_squared() * share }
+    }
+}
