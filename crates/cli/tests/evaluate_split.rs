@@ -123,6 +123,8 @@ fn several_splits_are_summed_up() {
     let mean = |name: &str| cases.iter().map(|case| number(case, name)).sum::<f64>() / 3.0;
     let filter = of("ekf");
     assert!((number(&filter, "ratio") - ratios.iter().product::<f64>().cbrt()).abs() < 1e-12);
+    let percent: f64 = cases.iter().map(|case| number(case, "rmse_percent_fs")).product();
+    assert!((number(&filter, "percent_fs") - percent.cbrt()).abs() < 1e-12);
     // A number read back from JSON may be off by its last bit.
     let worst = ratios.iter().copied().fold(0.0, f64::max);
     assert!((number(&filter, "worst_ratio") - worst).abs() < 1e-12);
@@ -174,6 +176,18 @@ fn some_recordings_train_and_others_test() {
     let later = evaluate(&bench, &[&train[..], &["--test", "3.csv", "--from", "200"]].concat());
     let by_hand = evaluate(&bench, &["3.csv", "--sensor", "sensor.toml", "--from", "200"]);
     assert_same_scores(&later[0], &by_hand[0]);
+}
+
+/// Each recording is scored as with the two others given to --train; of one there are no others.
+#[test]
+fn each_recording_is_left_out_in_turn() {
+    let bench = simulated(&["1", "2", "3"]);
+    let all = evaluate(&bench, &["--leave-one-out", "--estimator", "ekf", "1.csv", "2.csv", "3.csv"]);
+    assert_eq!(all.iter().map(|scores| &scores["file"]).collect::<Vec<_>>(), ["1.csv", "2.csv", "3.csv"]);
+    let by_hand = evaluate(&bench, &["--train", "1.csv", "--train", "3.csv", "--test", "2.csv", "--estimator", "ekf"]);
+    assert_eq!(all[1]["split"], "left out");
+    assert_same_scores(&all[1], &by_hand[0]);
+    bench.run(&["evaluate", "--leave-one-out", "1.csv"]).fails(2, "expected two recordings or more, found one");
 }
 
 #[test]

@@ -2,7 +2,7 @@
 //! plots tell the values under the pointer and can be zoomed.
 //!
 //! Any input gives a report: missing readings and references break lines, what cannot be drawn is said in words. Its
-//! size does not grow with the recording's length (see [`thin`]). The same input gives the same bytes.
+//! size does not grow with the recording's length (`thin.rs`). The same input gives the same bytes.
 
 mod axis;
 mod chart;

@@ -91,6 +91,9 @@ pub struct CalibrationSource {
     /// Calibrate on this recording; may be given several times
     #[arg(long, value_name = "TRACE", requires = "test")]
     pub train: Vec<PathBuf>,
+    /// Score each recording with what was calibrated on all others, and sum up: what another day's recording may bring
+    #[arg(long)]
+    pub leave_one_out: bool,
 }
 
 /// The estimators to evaluate.

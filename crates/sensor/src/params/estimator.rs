@@ -18,7 +18,7 @@ pub enum EstimatorKind {
     SignSplit,
     /// Best phase histories.
     Hypotheses,
-    /// One of the filters of [`RECIPE`](crate::RECIPE) with the learned correction of its strain.
+    /// A filter with the learned correction of its strain.
     Corrected,
 }
 

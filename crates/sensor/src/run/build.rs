@@ -195,7 +195,7 @@ fn switched<const B: usize, const N: usize>(
     law: &LawParams,
     estimator: &EstimatorParams,
 ) -> Result<SwitchedModel<f64, B, N>, SensorError> {
-    let law = law.to_model().ok_or_else(|| SensorError::Branches { found: law.branches.len() })?;
+    let law = law.to_model().ok_or(SensorError::Branches { found: law.branches.len() })?;
     let mut motion = estimator.motion.to_model()?;
     if let Some(phases) = estimator.phases {
         motion = motion.with_phase_rate(phases.speed_per_s)?;

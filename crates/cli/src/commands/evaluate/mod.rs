@@ -35,10 +35,11 @@ pub fn run(args: &EvaluateArgs) -> Result<(), CliError> {
     let inputs = args.traces.iter().chain(&args.test).chain(&source.train).chain(&source.sensor);
     let mut outputs = Outputs::new(args.replace.force, inputs);
     let wanted = Wanted::claim(&args.report, &mut outputs)?;
-    let judged = match (&source.sensor, source.split.is_empty()) {
-        (Some(sensor), _) => with_sensor_file(args, sensor, &mut evaluation),
-        (None, false) => with_splits(args, &mut evaluation),
-        (None, true) => with_training(args, &mut evaluation),
+    let judged = match &source.sensor {
+        Some(sensor) => with_sensor_file(args, sensor, &mut evaluation),
+        None if !source.split.is_empty() => with_splits(args, &mut evaluation),
+        None if source.leave_one_out => with_each_left_out(args, &mut evaluation),
+        None => with_training(args, &mut evaluation),
     };
     // Calibrations take long: what was scored before an error is still good.
     if judged.is_ok() || !evaluation.is_empty() {
@@ -106,6 +107,26 @@ fn with_training(args: &EvaluateArgs, evaluation: &mut Evaluation) -> Result<(),
     progress.doing("scoring");
     let judged = |recording: &TraceFile| judge(args, recording, Part::since(args.from), &sensors, &rivals);
     add_until_error(evaluation, tests.par_iter().map(judged).collect())
+}
+
+/// Every recording with parameters from all others.
+fn with_each_left_out(args: &EvaluateArgs, evaluation: &mut Evaluation) -> Result<(), CliError> {
+    let mut recordings: Vec<TraceFile> = args.traces.iter().map(|path| read(args, path)).collect::<Result<_, _>>()?;
+    if recordings.len() < 2 {
+        return Err(CliError::Arguments("--leave-one-out: expected two recordings or more, found one".into()));
+    }
+    let progress = Progress::new("calibrating");
+    for place in 0..recordings.len() {
+        let left_out = recordings.remove(place);
+        progress.doing("calibrating");
+        let (sensors, rivals) = calibrated(&recordings, args, &progress)?;
+        progress.doing("scoring");
+        let mut judged = judge(args, &left_out, Part::since(args.from), &sensors, &rivals)?;
+        judged.scores.iter_mut().for_each(|scores| scores.split = Some("left out".to_owned()));
+        add_until_error(evaluation, vec![Ok(judged)])?;
+        recordings.insert(place, left_out);
+    }
+    Ok(())
 }
 
 /// Adds scores in the order of the recordings, whichever was done first, up to the first that has none. Warnings wait

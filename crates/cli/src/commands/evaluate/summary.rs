@@ -17,6 +17,8 @@ pub struct Summary {
     cases: usize,
     /// Geometric mean of the error over the static cubic's on the same rows.
     ratio: f64,
+    /// Geometric mean of the error, %FS.
+    percent_fs: f64,
     /// The largest such ratio.
     worst_ratio: f64,
     /// The case that it belongs to.
@@ -79,10 +81,13 @@ fn summary(estimate: &str, cases: Vec<&Case>) -> Option<Summary> {
         known.map(|known| known.iter().sum::<f64>() / count)
     };
     let worst = cases.iter().max_by(|a, b| ratio(a).total_cmp(&ratio(b)))?;
+    let geometric_mean =
+        |of: &dyn Fn(&Case) -> f64| (cases.iter().map(|case| of(case).ln()).sum::<f64>() / count).exp();
     Some(Summary {
         estimate: estimate.into(),
         cases: cases.len(),
-        ratio: (cases.iter().map(|case| ratio(case).ln()).sum::<f64>() / count).exp(),
+        ratio: geometric_mean(&ratio),
+        percent_fs: geometric_mean(&|case| case.scores.rmse_percent_fs),
         worst_ratio: ratio(worst),
         worst_case: worst.name.clone(),
         crps_percent_fs: mean(&|scores| scores.crps_percent_fs),
@@ -96,11 +101,13 @@ fn summary(estimate: &str, cases: Vec<&Case>) -> Option<Summary> {
 
 /// A table, one estimate per row.
 pub fn write(summaries: &[Summary], out: &mut dyn Write) -> Result<(), CliError> {
-    let mut table = table(["all cases", "cases", "/ cubic", "worst", "50/90/95 %", "least 95 %", "width", "CRPS"]);
+    let mut table =
+        table(["all cases", "cases", "%FS", "/ cubic", "worst", "50/90/95 %", "least 95 %", "width", "CRPS"]);
     for summary in summaries {
         table.add_row([
             summary.estimate.clone(),
             summary.cases.to_string(),
+            format!("{:.2}", summary.percent_fs),
             format!("{:.3}", summary.ratio),
             format!("{:.2}", summary.worst_ratio),
             covered([summary.coverage_50, summary.coverage_90, summary.coverage_95]),
@@ -112,7 +119,7 @@ pub fn write(summaries: &[Summary], out: &mut dyn Write) -> Result<(), CliError>
     writeln!(out, "{table}")?;
     writeln!(
         out,
-        "/ cubic: geometric mean of the RMSE over the static cubic's; worst: the largest of these ratios, in"
+        "%FS, / cubic: geometric means of the RMSE and of its ratio to the static cubic's; worst: the largest ratio, in"
     )?;
     for summary in summaries.iter().filter(|summary| summary.width_95_percent_fs.is_some()) {
         writeln!(out, "  {}: {}", summary.estimate, summary.worst_case)?;

@@ -2,7 +2,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use ohmstrain_ekf::correction::{
-    FEATURES, FILTER_INPUTS, FeatureScale, OUTPUTS, ReadingFeatures, Starts, filter_inputs, mixture,
+    FEATURES, FILTER_INPUTS, FeatureScale, ReadingFeatures, Starts, filter_inputs, mixture,
 };
 use ohmstrain_ekf::live::{Flags, Protections};
 use ohmstrain_ekf::{Estimate, Gaussian, Guard, Reading, ReadingVerdict, StepError};
