@@ -187,7 +187,9 @@ fn each_recording_is_left_out_in_turn() {
     let by_hand = evaluate(&bench, &["--train", "1.csv", "--train", "3.csv", "--test", "2.csv", "--estimator", "ekf"]);
     assert_eq!(all[1]["split"], "left out");
     assert_same_scores(&all[1], &by_hand[0]);
-    bench.run(&["evaluate", "--leave-one-out", "1.csv"]).fails(2, "expected two recordings or more, found one");
+    bench
+        .run(&["evaluate", "--leave-one-out", "1.csv"])
+        .fails(2, "--leave-one-out: expected two recordings or more, found one");
 }
 
 #[test]

@@ -74,8 +74,11 @@ fn learn(
     let distilled = Distilled::fit(simulated, &rows, limits)?;
     let inputs = CorrectorInputs { all, ..CorrectorInputs::new(&rows) };
     let simulated = Prepared::new(inputs.of_filter(limits)).simulated(&distilled)?;
-    let filter = filter_corrector(inputs.of_filter(limits), &simulated)?;
-    let smoother = smoother_corrector(inputs.of_smoother(limits))?;
+    let (filter, smoother) = rayon::join(
+        || filter_corrector(inputs.of_filter(limits), &simulated),
+        || smoother_corrector(inputs.of_smoother(limits)),
+    );
+    let (filter, smoother) = (filter?, smoother?);
     Some(CorrectionParams { corrects, readings, filter, smoother, simulated, rows })
 }
 

@@ -19,6 +19,7 @@ use ohmstrain_sensor::{
     EstimatorKind, EstimatorParams, FilterParts, Findings, Learned, NoParameters, RangeParams, Seen, SensorError,
     TENTHS,
 };
+use rayon::prelude::*;
 
 /// What the recordings of a calibration contain.
 pub(crate) fn seen(recordings: &[Samples], range: RangeParams, stats: &MotionStats) -> Seen {
@@ -60,7 +61,26 @@ struct Scored {
     filter: Vec<ScoredRow>,
     smoother: Vec<ScoredRow>,
     static_cubic: Vec<ScoredRow>,
-    wrong: WrongDirection,
+    /// Which way the body moves, what the filter says of the rate, and the error of its strain, row by row of the filter's.
+    directions: Vec<(Direction, f64, f64)>,
+}
+
+impl Scored {
+    /// Adds rows at the times after these.
+    fn append(&mut self, next: Self) {
+        let offset_s = self.filter.last().map_or(0.0, |row| row.time_s);
+        let later = |row: ScoredRow| ScoredRow { time_s: offset_s + row.time_s, ..row };
+        self.filter.extend(next.filter.into_iter().map(later));
+        self.smoother.extend(next.smoother.into_iter().map(later));
+        self.static_cubic.extend(next.static_cubic.into_iter().map(later));
+        self.directions.extend(next.directions);
+    }
+
+    fn wrong_direction(&self) -> WrongDirection {
+        let mut wrong = WrongDirection::default();
+        self.directions.iter().for_each(|(direction, rate, error)| wrong.see(*direction, *rate, *error));
+        wrong
+    }
 }
 
 impl Check<'_> {
@@ -71,30 +91,26 @@ impl Check<'_> {
             filter: score_of_full_scale(&scored.filter)?,
             smoother: score_of_full_scale(&scored.smoother),
             static_cubic: score_of_full_scale(&scored.static_cubic)?,
-            budget: error_budget(self.recordings, self.fit, &scored.wrong),
+            budget: error_budget(self.recordings, self.fit, &scored.wrong_direction()),
             seen,
             advice: told.as_ref().map_or_else(Vec::new, |told| told.advice.clone()),
         })
     }
 
     fn scored(&self) -> Result<Scored, CalibrationError> {
-        let mut scored = Scored::default();
-        // Times of one recording after the other, so that none goes back.
-        let mut offset_s = 0.0;
         let directions: Vec<Vec<Direction>> = self.recordings.iter().map(Direction::of_rows).collect();
-        for block in 0..self.fit.without_block.len() {
-            self.score_block(block, &directions, &mut offset_s, &mut scored)?;
+        let blocks: Vec<Result<Scored, CalibrationError>> = (0..self.fit.without_block.len())
+            .into_par_iter()
+            .map(|block| self.scored_block(block, &directions))
+            .collect();
+        let mut scored = Scored::default();
+        for block in blocks {
+            scored.append(block?);
         }
         Ok(scored)
     }
 
-    fn score_block(
-        &self,
-        block: usize,
-        directions: &[Vec<Direction>],
-        offset_s: &mut f64,
-        scored: &mut Scored,
-    ) -> Result<(), CalibrationError> {
+    fn scored_block(&self, block: usize, directions: &[Vec<Direction>]) -> Result<Scored, CalibrationError> {
         let (law, limits) = (&self.fit.without_block[block], self.fit.law.law.range);
         let masked: Vec<Vec<f64>> = self.recordings.iter().enumerate().map(|(r, s)| self.masked(r, s, block)).collect();
         let training: Vec<Samples> = self
@@ -105,6 +121,7 @@ impl Check<'_> {
             .collect();
         let cubic = fit_static_cubic(&training, limits)?;
         let estimator = self.estimator_without(law, &training)?;
+        let mut scored = Scored::default();
         for (r, samples) in self.recordings.iter().enumerate() {
             let rows = self.fit.blocks[r][block].clone();
             let readings = relative_changes(samples.reading, law.rest_readings[r]);
@@ -113,6 +130,7 @@ impl Check<'_> {
             let mut smoother = estimator.smoother.smoother(estimator.learned.as_ref())?;
             let smoothed = smoother.smooth(samples.time_s, &readings).map_err(|(row, e)| failed(row, e))?;
             let mut baseline = running_cubic(cubic);
+            let mut of_recording = Scored::default();
             for k in 0..rows.end {
                 filter.step(samples.time_s[k], readings[k]).map_err(|error| failed(k, error))?;
                 let on_cubic = baseline.strain(samples.time_s[k], samples.reading[k]);
@@ -120,20 +138,20 @@ impl Check<'_> {
                 if k < rows.start || !truth.is_finite() {
                     continue;
                 }
-                let time_s = *offset_s + samples.time_s[k] - samples.time_s[rows.start];
+                let time_s = samples.time_s[k] - samples.time_s[rows.start];
                 let row = |strain: f64, sd: Option<f64>| ScoredRow { time_s, truth, strain, sd };
                 let estimate = filter.output().estimate;
-                scored.filter.push(row(estimate.strain.mean, Some(estimate.strain.sd())));
-                scored.wrong.see(directions[r][k], estimate.rate.mean, estimate.strain.mean - truth);
+                of_recording.filter.push(row(estimate.strain.mean, Some(estimate.strain.sd())));
+                of_recording.directions.push((directions[r][k], estimate.rate.mean, estimate.strain.mean - truth));
                 if let Some(smoothed) = &smoothed {
                     let strain = smoothed[k].estimate.strain;
-                    scored.smoother.push(row(strain.mean, Some(strain.sd())));
+                    of_recording.smoother.push(row(strain.mean, Some(strain.sd())));
                 }
-                scored.static_cubic.push(row(on_cubic, None));
+                of_recording.static_cubic.push(row(on_cubic, None));
             }
-            *offset_s = scored.filter.last().map_or(*offset_s, |row| row.time_s);
+            scored.append(of_recording);
         }
-        Ok(())
+        Ok(scored)
     }
 
     /// The strain of a recording, unknown in a block.

@@ -1,6 +1,7 @@
 use std::ops::Range;
 
 use ohmstrain_ekf::{Gaussian, Reading};
+use rayon::prelude::*;
 
 use crate::law::fit::CrossFit;
 use crate::samples::Samples;
@@ -20,7 +21,7 @@ pub(crate) struct LeftOut<'a> {
 }
 
 /// FilterParts of a filter for a law that was fitted without a block.
-pub(crate) type Build<'a> = dyn Fn(Fold<'_>) -> FilterParts<'_> + 'a;
+pub(crate) type Build<'a> = dyn Fn(Fold<'_>) -> FilterParts<'_> + Sync + 'a;
 
 /// A law that was fitted without a block.
 #[derive(Clone, Copy)]
@@ -77,23 +78,19 @@ impl<'a> LeftOut<'a> {
     /// filter fails.
     pub(crate) fn score(&self, build: &Build) -> f64 {
         let span = self.limits.span();
-        let (mut sum, mut count) = (0.0, 0_usize);
-        let finished = self.each_row(build, |_, strain, truth| {
+        let terms = self.of_rows(build, |strain, truth| {
             let variance = strain.variance / (span * span) + REFERENCE_SD * REFERENCE_SD;
             let error = (strain.mean - truth) / span;
-            sum += 0.5 * (error * error / variance + variance.ln());
-            count += 1;
+            0.5 * (error * error / variance + variance.ln())
         });
-        if finished.is_some() { sum / count.max(1) as f64 } else { f64::INFINITY }
+        let Some(terms) = terms else { return f64::INFINITY };
+        let (sum, count) = terms.iter().flatten().fold((0.0, 0_usize), |(sum, count), term| (sum + term, count + 1));
+        sum / count.max(1) as f64
     }
 
     /// Errors of the filter in units of its deviation, block by block; `None` if it fails.
     pub(crate) fn filtered_deviations(&self, build: &Build) -> Option<Vec<Vec<f64>>> {
-        let mut deviations = vec![Vec::new(); self.runs.len()];
-        self.each_row(build, |run, strain, truth| {
-            deviations[run].push((strain.mean - truth).abs() / strain.sd());
-        })?;
-        Some(deviations)
+        self.of_rows(build, |strain, truth| (strain.mean - truth).abs() / strain.sd())
     }
 
     /// The same for the smoother of whole recordings; `None` if the estimator has none.
@@ -111,7 +108,7 @@ impl<'a> LeftOut<'a> {
                     .collect(),
             )
         };
-        self.runs.iter().map(of_run).collect()
+        self.runs.par_iter().map(of_run).collect()
     }
 
     /// What a filter says in `rows` of each recording, in order, by how much readings will fall; `None` if it fails. Only where no
@@ -136,19 +133,21 @@ impl<'a> LeftOut<'a> {
         Some(falls)
     }
 
-    /// Visits run, estimate and true strain in every row of every block: the filter runs from the first row to the end
+    /// What estimate and true strain of every row of every block come to, block by block: the filter runs from the first row to the end
     /// of the block. `None` if it fails.
-    fn each_row(&self, build: &Build, mut visit: impl FnMut(usize, Gaussian<f64>, f64)) -> Option<()> {
-        for (index, run) in self.runs.iter().enumerate() {
+    fn of_rows(&self, build: &Build, of: impl Fn(Gaussian<f64>, f64) -> f64 + Sync) -> Option<Vec<Vec<f64>>> {
+        let of_run = |run: &Run| {
             let mut filter = build(run.fold).filter(None).ok()?;
+            let mut rows = Vec::with_capacity(run.block.len());
             for k in 0..run.block.end {
                 filter.step(run.time_s[k], run.reading[k]).ok()?;
                 if k >= run.block.start && run.strain[k].is_finite() {
-                    visit(index, filter.strain(), run.strain[k]);
+                    rows.push(of(filter.strain(), run.strain[k]));
                 }
             }
-        }
-        Some(())
+            Some(rows)
+        };
+        self.runs.par_iter().map(of_run).collect()
     }
 }
 

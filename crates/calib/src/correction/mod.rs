@@ -13,6 +13,8 @@ use ohmstrain_ekf::correction::{FILTER_INPUTS, INDUCING, InputScale, consensus, 
 use ohmstrain_sensor::correction::{ONE_SIDED, ProcessKind, SIDES, SMOOTHER_INPUTS, standardised};
 use ohmstrain_sensor::{CorrectorParams, InputScales, ProcessParams, RangeParams, SimulatedParams};
 
+use rayon::prelude::*;
+
 use crate::digits::significant;
 use crate::order::extent;
 use crate::sd_scale::{joint_scale_of, sd_scale_up_to};
@@ -342,8 +344,10 @@ impl Choices {
     /// With S one-sided processes; `last` is what is mixed in last of every row, if anything is.
     pub(crate) fn fit<const D: usize, const S: usize>(prepared: &Prepared<D>, last: &[Gaussian<f64>]) -> Option<Self> {
         let chosen = |kind: ProcessKind| prepared.chosen(kind, Choosing::of_sides(S));
-        let (direct, residual) = (chosen(ProcessKind::Direct)?, chosen(ProcessKind::Residual)?);
-        let one_sided = ONE_SIDED[..S].iter().map(|side| chosen(*side)).collect::<Option<_>>()?;
+        let both = || rayon::join(|| chosen(ProcessKind::Direct), || chosen(ProcessKind::Residual));
+        let sides = || ONE_SIDED[..S].par_iter().map(|side| chosen(*side)).collect::<Option<_>>();
+        let ((direct, residual), one_sided) = rayon::join(both, sides);
+        let (direct, residual, one_sided) = (direct?, residual?, one_sided?);
         let of = Self { sd_scale: 1.0, direct, residual, one_sided };
         Some(Self { sd_scale: of.scale_of::<_, S>(prepared, last)?, ..of })
     }

@@ -119,7 +119,7 @@ pub fn write(summaries: &[Summary], out: &mut dyn Write) -> Result<(), CliError>
     writeln!(out, "{table}")?;
     writeln!(
         out,
-        "%FS, / cubic: geometric means of the RMSE and of its ratio to the static cubic's; worst: the largest ratio, in"
+        "%FS: geometric mean of the RMSE, / cubic: of its ratio to the static cubic's; worst: the largest, in"
     )?;
     for summary in summaries.iter().filter(|summary| summary.width_95_percent_fs.is_some()) {
         writeln!(out, "  {}: {}", summary.estimate, summary.worst_case)?;
