@@ -98,26 +98,46 @@ fn two_sheets_of_numbers_are_a_question() {
     assert!(read_table(bytes, "lab.xlsx", &known.read_options(0)).is_ok());
 }
 
+/// Time in microseconds, kΩ and strain.
+fn parquet(compression: Compression) -> Vec<u8> {
+    let schema = "message lab { REQUIRED INT64 time (TIMESTAMP(MICROS, true)); OPTIONAL DOUBLE R_kohm; OPTIONAL DOUBLE strain; }";
+    let schema = Arc::new(parse_message_type(schema).unwrap());
+    let properties = Arc::new(WriterProperties::builder().set_compression(compression).build());
+    let mut writer = SerializedFileWriter::new(Vec::new(), schema, properties).unwrap();
+    let mut group = writer.next_row_group().unwrap();
+    let micros: Vec<i64> = (0..ROWS as i64).map(|row| 50_000 * row).collect();
+    let mut column = group.next_column().unwrap().unwrap();
+    column.typed::<Int64Type>().write_batch(&micros, None, None).unwrap();
+    column.close().unwrap();
+    for of in [kiloohm, strain] {
+        let values: Vec<f64> = (0..ROWS).map(of).collect();
+        let mut column = group.next_column().unwrap().unwrap();
+        column.typed::<DoubleType>().write_batch(&values, Some(&[1; ROWS]), None).unwrap();
+        column.close().unwrap();
+    }
+    group.close().unwrap();
+    writer.into_inner().unwrap()
+}
+
 #[test]
 fn parquet_as_most_programs_write_it() {
-    let schema = "message lab { REQUIRED INT64 time (TIMESTAMP(MICROS, true)); OPTIONAL DOUBLE R_kohm; OPTIONAL DOUBLE strain; }";
     for compression in [Compression::UNCOMPRESSED, Compression::SNAPPY, Compression::GZIP(Default::default())] {
-        let schema = Arc::new(parse_message_type(schema).unwrap());
-        let properties = Arc::new(WriterProperties::builder().set_compression(compression).build());
-        let mut writer = SerializedFileWriter::new(Vec::new(), schema, properties).unwrap();
-        let mut group = writer.next_row_group().unwrap();
-        let micros: Vec<i64> = (0..ROWS as i64).map(|row| 50_000 * row).collect();
-        let mut column = group.next_column().unwrap().unwrap();
-        column.typed::<Int64Type>().write_batch(&micros, None, None).unwrap();
-        column.close().unwrap();
-        for of in [kiloohm, strain] {
-            let values: Vec<f64> = (0..ROWS).map(of).collect();
-            let mut column = group.next_column().unwrap().unwrap();
-            column.typed::<DoubleType>().write_batch(&values, Some(&[1; ROWS]), None).unwrap();
-            column.close().unwrap();
+        has_the_numbers(&import(parquet(compression), &Recipe::default()), 0.0);
+    }
+}
+
+/// Whatever byte is wrong, a table comes out or one line that says what is wrong.
+#[test]
+fn a_damaged_parquet_file_is_no_panic() {
+    let whole = parquet(Compression::SNAPPY);
+    let places = (4..whole.len()).step_by(whole.len() / 200);
+    for (place, value) in places.flat_map(|place| [0, 0x7f, 0xff].map(|value| (place, value))) {
+        let mut bytes = whole.clone();
+        bytes[place] = value;
+        if let Err(error) = read_table(bytes, "lab.parquet", &Recipe::default().read_options(0)) {
+            let error = error.to_string();
+            assert!(error.starts_with("lab.parquet") && error.lines().count() == 1, "{place}: {error}");
         }
-        group.close().unwrap();
-        has_the_numbers(&import(writer.into_inner().unwrap(), &Recipe::default()), 0.0);
     }
 }
 
