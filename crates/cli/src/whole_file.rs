@@ -12,7 +12,7 @@ use crate::error::CliError;
 /// what this program writes.
 const LARGEST_TEXT: u64 = 16 << 20;
 
-/// Whether a path means stdin.
+/// True if a path means stdin.
 pub fn is_stdin(path: &Path) -> bool {
     path == Path::new("-")
 }

@@ -21,7 +21,7 @@ use ohmstrain_sensor::{
 };
 use rayon::prelude::*;
 
-/// What the recordings of a calibration contain.
+/// Contents of the recordings of a calibration.
 pub(crate) fn seen(recordings: &[Samples], range: RangeParams, stats: &MotionStats) -> Seen {
     let mut counts = [0_usize; TENTHS];
     for samples in recordings {

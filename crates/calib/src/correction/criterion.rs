@@ -1,7 +1,6 @@
 //! By what the settings of a process are chosen.
 
-use super::BLOCKS;
-use super::gaussian_process::{BlockLeftOut, GaussianProcess};
+use super::gaussian_process::{BLOCKS, BlockLeftOut, GaussianProcess};
 
 /// What good settings make large. Rows lie closer together in time than their errors hang together, so that marginal likelihood
 /// alone takes what neighbours share for what the inputs say: little noise, short length scales. A block that was left out has

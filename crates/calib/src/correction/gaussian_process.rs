@@ -2,6 +2,8 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use ohmstrain_ekf::correction::kernel;
 use ohmstrain_sensor::correction::relevance;
 
+/// Blocks of rows that are left out in turn.
+pub(super) const BLOCKS: usize = 5;
 /// White noise beside the noise that is correlated in time, as a share of its variance.
 pub(super) const WHITE: f64 = 0.09;
 /// Variance that keeps the equations regular, in variances of the targets.
@@ -9,7 +11,7 @@ const JITTER: f64 = 1e-6;
 /// A pivot of the inducing rows below this share of the prior variance says nothing new.
 const SMALLEST_PIVOT: f64 = 1e-6;
 
-/// What a Gaussian process is before it has seen rows.
+/// Hyper-parameters of a Gaussian process.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Settings {
     /// Length scale of each input, in standard deviations of the input.

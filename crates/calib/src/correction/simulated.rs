@@ -10,7 +10,8 @@ use ohmstrain_sensor::correction::{relevance, standardised};
 use ohmstrain_sensor::{RangeParams, SimulatedParams, TrainingRow};
 use serde::Deserialize;
 
-use super::{Prepared, scale, weight};
+use super::prepared::{Prepared, scale};
+use super::weight;
 use crate::digits::digits;
 
 /// Rows that stand for all others. Two hundred say no more.

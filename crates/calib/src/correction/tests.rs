@@ -2,7 +2,8 @@ use nalgebra::{DMatrix, DVector};
 use ohmstrain_ekf::Gaussian;
 
 use super::criterion::Criterion;
-use super::{AllRows, Choices, Choosing, Chosen, Examples, Prepared, scale};
+use super::prepared::{Choosing, scale};
+use super::{AllRows, Choices, Chosen, Examples, Prepared};
 use crate::correction::gaussian_process::{GaussianProcess, Lessons, Settings};
 use ohmstrain_sensor::RangeParams;
 use ohmstrain_sensor::correction::{OwnedCorrection, ProcessKind};
@@ -70,7 +71,7 @@ fn textbook(rows: &[Vec<f64>], targets: &[f64], time_s: &[f64], settings: &Setti
     }
 }
 
-/// What the processes learn from examples, as it runs.
+/// The correction that processes learn from examples, as it runs.
 fn learned<const D: usize, const S: usize>(choices: &Choices, examples: Examples<D>) -> OwnedCorrection<f64, D, S> {
     let params = choices.learned::<D, S>(&Prepared::new(examples)).unwrap();
     OwnedCorrection::new(&params, examples.inputs, examples.limits)

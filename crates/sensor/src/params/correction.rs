@@ -24,7 +24,7 @@ pub struct CorrectionParams {
     pub rows: Vec<TrainingRow>,
 }
 
-/// What a law says of motions that were simulated: a process of the features, by a few rows that stand for all.
+/// The law in simulated motions: a process of the features, by a few rows that stand for all.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SimulatedParams {
@@ -75,7 +75,7 @@ pub struct CorrectorParams {
     pub one_sided: Vec<ProcessParams>,
 }
 
-/// Where each input of a corrector lies: the filter's outputs, features of the past, features of the future.
+/// Location and range of each input of a corrector: the filter's outputs, features of the past, features of the future.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct InputScales {

@@ -15,9 +15,9 @@ pub struct Learned {
     pub(crate) smoother: Arc<OfSmoother>,
 }
 
-/// What corrects a filter's strain.
+/// The correction of a filter's strain.
 pub(crate) type OfFilter = OwnedCorrection<f64, FILTER_INPUTS>;
-/// What corrects a smoother's.
+/// The correction of a smoother's.
 pub(crate) type OfSmoother = OwnedCorrection<f64, SMOOTHER_INPUTS, SIDES>;
 
 impl Learned {

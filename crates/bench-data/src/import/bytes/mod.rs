@@ -1,4 +1,4 @@
-//! What stands in a file's bytes: gzip unpacked, containers opened, text decoded. Nothing here asks what a cell means.
+//! Contents of a file: gzip unpacked, containers opened, text decoded. Nothing here asks for the meaning of a cell.
 
 pub(crate) mod bounds;
 mod cell;
@@ -22,7 +22,7 @@ pub(crate) use cell::{Cell, Rows};
 pub(crate) use parquet::RawColumn;
 pub(crate) use sheet::NamedSheets;
 
-/// What a file holds.
+/// Contents of a file.
 pub(crate) enum Contents {
     /// Text and its encoding.
     Text(String, &'static str),
@@ -62,7 +62,7 @@ fn guarded<T>(name: &str, expected: &str, read: impl FnOnce() -> Result<T, Impor
     catch_unwind(AssertUnwindSafe(read)).unwrap_or_else(|_| Err(ImportError::unreadable(name, expected)))
 }
 
-/// What is packed in gzip data.
+/// Contents of gzip data.
 fn unpacked(bytes: &[u8], name: &str) -> Result<Vec<u8>, ImportError> {
     let mut inner = Vec::new();
     let read = flate2::read::MultiGzDecoder::new(bytes).take(LARGEST_FILE + 1).read_to_end(&mut inner);

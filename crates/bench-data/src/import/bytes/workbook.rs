@@ -8,7 +8,7 @@ use crate::import::bytes::xls_size;
 use crate::import::bytes::zipped::{self, Kind};
 use crate::import::error::ImportError;
 
-/// What XLS begins with.
+/// First bytes of XLS.
 pub(crate) const XLS: [u8; 4] = [0xd0, 0xcf, 0x11, 0xe0];
 
 /// Reads all sheets of a workbook, or the one that is wanted: XLSX, XLSM, XLSB, XLS or ODS.

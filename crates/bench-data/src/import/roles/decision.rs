@@ -1,7 +1,7 @@
 use crate::import::error::ImportError;
 use crate::import::words::{Role, Unit};
 
-/// Where a column stands: the file and the column in it, counted from 0.
+/// Place of a column: the file and the column in it, counted from 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Place {
     pub file: usize,
@@ -23,7 +23,7 @@ pub(crate) struct Channel {
     pub unit: Unit,
 }
 
-/// Where times come from.
+/// Source of times.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Clock {
     Column(Channel),
@@ -49,7 +49,7 @@ impl Clock {
         }
     }
 
-    /// Whether both are the same column or rate, whatever its role and unit.
+    /// True if both are the same column or rate, whatever its role and unit.
     fn is(&self, other: &Self) -> bool {
         match (self.column(), other.column()) {
             (Some(one), Some(other)) => one.place == other.place,
@@ -65,7 +65,7 @@ pub(crate) struct Timed {
     pub clock: Clock,
 }
 
-/// What files are imported as, and what is still open.
+/// Columns as they are imported, and open questions.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Decision {
     /// Channels of readings; a trace is made of the first. Another sensor or another recording is another entry.
@@ -79,7 +79,7 @@ pub(crate) struct Decision {
 }
 
 impl Decision {
-    /// Whether readings and reference stand in the same rows with the same times.
+    /// True if readings and reference stand in the same rows with the same times.
     pub(crate) fn is_one_clock(&self) -> bool {
         let Some(reference) = &self.reference else { return true };
         self.readings.iter().all(|readings| reference.clock.is(&readings.clock))

@@ -20,7 +20,7 @@ pub struct Candidate {
     pub column: usize,
     /// What it may be.
     pub role: Role,
-    /// Whether the name says so, not the unit alone.
+    /// True if the name says so, not the unit alone.
     pub is_named: bool,
 }
 
@@ -30,7 +30,7 @@ impl Candidate {
     }
 }
 
-/// What was found in files.
+/// Findings in files.
 #[derive(Clone, Debug)]
 pub(crate) struct Found<'a> {
     /// Headings, units, layouts and metadata.
@@ -43,7 +43,7 @@ pub(crate) struct Found<'a> {
     pub preset: Option<Preset>,
 }
 
-/// What was found in the cells of a column.
+/// Findings in the cells of a column.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Facts {
     pub dates: Dates,
@@ -67,7 +67,7 @@ impl Facts {
     }
 }
 
-/// Whether all cells are dates or times of day.
+/// True if all cells are dates or times of day.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) enum Dates {
     #[default]
@@ -77,7 +77,7 @@ pub(crate) enum Dates {
     Open,
 }
 
-/// What the numbers of a column are like; medians of none are NaN.
+/// Statistics of the numbers of a column; medians of none are NaN.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Numbers {
     /// Median step from row to row.
@@ -167,7 +167,7 @@ impl<'a> Found<'a> {
     }
 }
 
-/// What the columns of files may be.
+/// Possible roles of the columns of files.
 #[must_use]
 pub fn candidates(tables: &[Table]) -> Vec<Candidate> {
     let says = |table: &Table| (0..table.columns.len()).map(|column| says(table, column)).collect::<Vec<_>>();

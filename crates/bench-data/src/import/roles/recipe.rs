@@ -21,7 +21,7 @@ pub struct ColumnName {
 }
 
 impl ColumnName {
-    /// Whether no column is to be taken.
+    /// True if no column is to be taken.
     #[must_use]
     pub fn is_none(&self) -> bool {
         self.file.is_none() && self.column == NO_COLUMN

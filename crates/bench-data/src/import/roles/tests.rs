@@ -1,4 +1,4 @@
-//! What is decided, as a table.
+//! A table of findings, answers and decisions.
 
 use std::cell::OnceCell;
 

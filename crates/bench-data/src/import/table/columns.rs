@@ -55,7 +55,7 @@ pub struct Layout {
     pub skip: usize,
     /// Header lines.
     pub header_lines: usize,
-    /// Whether a line of units follows the header.
+    /// True if a line of units follows the header.
     pub unit_line: bool,
     /// Lines of text among or behind the data, and a last one that was cut, which are passed over.
     pub text_lines: usize,
@@ -87,7 +87,7 @@ impl Table {
         self.lines.len()
     }
 
-    /// Whether there is no row.
+    /// True if there is no row.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.lines.is_empty()
@@ -107,7 +107,7 @@ impl Table {
         names.join(", ") + if self.columns.len() > 12 { " …" } else { "" }
     }
 
-    /// Whether the numbers of a column increase from row to row, all but a few.
+    /// True if the numbers of a column increase from row to row, all but a few.
     pub(crate) fn increases(&self, column: usize) -> bool {
         let cells = self.columns[column].cells.cells();
         let known: Vec<f64> = cells.filter_map(|cell| number_of(&cell, self.layout.decimal)).collect();
@@ -116,7 +116,7 @@ impl Table {
         known.len() * 10 > self.len() * 9 && steps > 0 && upward * 100 >= steps * 98
     }
 
-    /// Whether any column has a name.
+    /// True if any column has a name.
     #[must_use]
     pub fn has_names(&self) -> bool {
         self.columns.iter().any(|column| !column.heading.is_empty())

@@ -3,7 +3,7 @@ use crate::import::table::grid::{Grid, SAMPLE, split};
 use crate::import::table::value::{is_number, value_of};
 use crate::import::words::{DecimalMark, Value, is_stamp, names, ohms};
 
-/// What a line is made of.
+/// Parts of a line.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Shape {
     /// Cells.
@@ -33,7 +33,7 @@ impl Shape {
         shape
     }
 
-    /// Whether words stand where data has numbers: `Date;13.5.2024`, `Maximum;1600`.
+    /// True if words stand where data has numbers: `Date;13.5.2024`, `Maximum;1600`.
     pub(crate) const fn is_worded(self, data: Self) -> bool {
         self.numbers < data.numbers && self.texts > data.texts
     }

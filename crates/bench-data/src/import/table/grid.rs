@@ -8,7 +8,7 @@ use crate::import::words::is_stamp;
 /// Lines looked at to find out how a file is written.
 pub(crate) const SAMPLE: usize = 1000;
 
-/// What a serial monitor puts between its clock and the line.
+/// Text that a serial monitor puts between its clock and the line.
 pub(crate) const ARROW: &str = " -> ";
 
 /// The name of the clock that a serial monitor writes.
@@ -49,7 +49,7 @@ impl Separator {
     }
 }
 
-/// Whether most of some lines begin with a time of day and an arrow.
+/// True if most of some lines begin with a time of day and an arrow.
 pub(crate) fn is_monitor<'a>(lines: impl Iterator<Item = &'a str>) -> bool {
     let (mut all, mut arrows) = (0_usize, 0_usize);
     for line in lines {

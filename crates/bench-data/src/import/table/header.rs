@@ -11,7 +11,7 @@ use crate::metadata::Metadata;
 /// Lines above the data that may belong to its header: two of names, one of units.
 const MOST_HEADER_LINES: usize = 3;
 
-/// What stands above the data.
+/// Lines above the data.
 #[derive(Debug, Default)]
 pub(crate) struct Header {
     /// The first line of data, as an index of the grid.
@@ -26,7 +26,7 @@ pub(crate) struct Header {
     pub skip: usize,
     /// Lines of names.
     pub header_lines: usize,
-    /// Whether there is a line of units.
+    /// True if there is a line of units.
     pub unit_line: bool,
     /// What `# key = value` lines say.
     pub metadata: Metadata,
@@ -131,7 +131,7 @@ impl Header {
     }
 }
 
-/// Whether all cells are units, empty ones aside, or short words beside at least one unit.
+/// True if all cells are units, empty ones aside, or short words beside at least one unit.
 fn is_unit_line(cells: &[String]) -> bool {
     let filled = || cells.iter().filter(|cell| !cell.is_empty());
     let units = filled().filter(|cell| units::is_unit(cell)).count();
@@ -146,7 +146,7 @@ fn is_bracketed(cells: &[String]) -> bool {
     filled.peek().is_some() && filled.all(|cell| cell.starts_with(['(', '[']) && cell.ends_with([')', ']']))
 }
 
-/// Whether a name says what is measured.
+/// True if a name says what is measured.
 fn is_quantity(heading: &str) -> bool {
     let (name, unit) = names::take_apart(heading);
     matches!(names::role(&name, unit.as_deref()), Some((_, Sureness::Strong)))

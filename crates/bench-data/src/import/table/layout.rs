@@ -59,7 +59,7 @@ fn kind(cell: &str, mark: DecimalMark, groups: bool) -> Value {
     }
 }
 
-/// Whether every cell with a mark is as good with the other one: `1,234`, one to three digits before, three behind.
+/// True if every cell with a mark is as good with the other one: `1,234`, one to three digits before, three behind.
 fn mark_is_open(lines: &[(u64, &str)], separator: Separator, mark: DecimalMark) -> bool {
     if mark == DecimalMark::Point {
         // `1.234`: points group thousands in files with decimal commas only, and then some cell would have a comma.

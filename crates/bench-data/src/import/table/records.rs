@@ -164,7 +164,7 @@ impl<'a> Labels<'a> {
     }
 }
 
-/// Whether four lines in five have labels that come again, one of them with numbers.
+/// True if four lines in five have labels that come again, one of them with numbers.
 fn are_records<'a>(lines: impl Iterator<Item = &'a str>) -> bool {
     let (mut labels, mut all) = (Labels::default(), Vec::new());
     for line in lines.filter(|line| !is_rule(line)) {
@@ -182,7 +182,7 @@ fn are_records<'a>(lines: impl Iterator<Item = &'a str>) -> bool {
     fitting * 10 > all.len() * 8 && known.iter().any(|(count, is_number)| *count > 1 && *is_number)
 }
 
-/// Whether a text has a number in it, perhaps with a unit, or is a time.
+/// True if a text has a number in it, perhaps with a unit, or is a time.
 fn is_amount(text: &str) -> bool {
     let is_number = |mark: &DecimalMark| amount(text, *mark) != Value::Text;
     [DecimalMark::Point, DecimalMark::Comma].iter().any(is_number) || is_stamp(text) || unit_behind(text).is_some()
@@ -195,7 +195,7 @@ fn unit_behind(text: &str) -> Option<&str> {
     (is_number.is_some() && units::is_unit(unit)).then_some(unit)
 }
 
-/// Whether a line separates records.
+/// True if a line separates records.
 fn is_rule(line: &str) -> bool {
     let line = line.trim();
     line.len() > 1 && line.bytes().all(|byte| matches!(byte, b'-' | b'=' | b'*' | b'_' | b'#'))
@@ -272,7 +272,7 @@ fn units_of_all<'a>(labels: usize, rows: &[Record<'a>]) -> Vec<Option<Option<&'a
     units
 }
 
-/// Whether a text is no missing value, which would have no unit.
+/// True if a text is no missing value, which would have no unit.
 fn value_is_there(text: &str) -> bool {
     value(text, DecimalMark::Point, 0, &[]) != Value::Missing
 }

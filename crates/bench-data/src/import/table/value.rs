@@ -21,7 +21,7 @@ pub(crate) fn number_of(cell: &Cell, mark: DecimalMark) -> Option<f64> {
     }
 }
 
-/// Whether a cell is a number, a date or a time of day.
+/// True if a cell is a number, a date or a time of day.
 pub(crate) fn is_number(cell: &Cell, mark: DecimalMark) -> bool {
     matches!(cell, Cell::Date(_))
         || matches!(cell, Cell::Text(text) if is_stamp(text))

@@ -1,4 +1,4 @@
-//! What words mean, whatever table they stand in: numbers, dates, units, and quantities by name.
+//! Meanings of words, whatever table they stand in: numbers, dates, units, and quantities by name.
 
 pub(crate) mod names;
 mod number;

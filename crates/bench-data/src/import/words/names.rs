@@ -33,12 +33,12 @@ pub(crate) fn take_apart(heading: &str) -> (String, Option<String>) {
     (heading.to_owned(), None)
 }
 
-/// Whether a word is one of a list with commas between.
+/// True if a word is one of a list with commas between.
 fn is_among(list: &str, word: &str) -> bool {
     list.split(',').any(|known| known == word)
 }
 
-/// Whether a text counts columns of one kind: `strain_1`, `R (2)`.
+/// True if a text counts columns of one kind: `strain_1`, `R (2)`.
 fn is_index(text: &str) -> bool {
     !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit())
 }
@@ -46,7 +46,7 @@ fn is_index(text: &str) -> bool {
 /// Units that are words of names, too: `R_min`, `strain_in`, and every letter.
 const SHORT_WORDS: [&str; 4] = ["min", "in", "grad", "day"];
 
-/// Whether the text behind a blank or an underscore is a unit, and neither an index nor a part of the name. What may be
+/// True if the text behind a blank or an underscore is a unit, and neither an index nor a part of the name. What may be
 /// either is a unit if the name's quantity is measured in it: `t_s`, `time_min`, `temp_c`; and volts are nothing else.
 fn is_sure_unit(name: &str, unit: &str) -> bool {
     let lower = unit.to_lowercase();

@@ -53,7 +53,7 @@ const MISSING: &str = "nan na n/a #n/a null none nil missing ovld ovl ol 0l over
 /// SCPI instruments answer ±9.9e37 for an overload and 9.91e37 for no number.
 pub(crate) const SCPI_OVERLOAD: f64 = 9.9e37;
 
-/// Whether a text means that there is no value. `own` are texts that the user calls so.
+/// True if a text means that there is no value. `own` are texts that the user calls so.
 pub(crate) fn is_missing(text: &str, own: &[String]) -> bool {
     let text = text.trim();
     if text.is_empty() || own.iter().any(|own| own == text) {
@@ -138,7 +138,7 @@ fn ungrouped(whole: &str, mark: DecimalMark) -> Option<String> {
     parts.try_fold(first.to_owned(), |whole, part| (part.len() == 3 && is_digits(part)).then(|| whole + part))
 }
 
-/// Whether a number has marks that group thousands if `mark` is the decimal mark.
+/// True if a number has marks that group thousands if `mark` is the decimal mark.
 pub(crate) fn has_groups(text: &str, mark: DecimalMark) -> bool {
     let other = if mark == DecimalMark::Point { ',' } else { '.' };
     text.contains(other) && number(text, mark, 0).is_some()

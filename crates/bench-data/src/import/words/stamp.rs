@@ -132,7 +132,7 @@ fn nanoseconds(seconds: &str) -> Option<i128> {
     Some(whole.parse::<i128>().ok()? * SECOND + fraction.parse::<i128>().ok()?)
 }
 
-/// Whether a cell is a date or a time of day in some order.
+/// True if a cell is a date or a time of day in some order.
 pub(crate) fn is_stamp(text: &str) -> bool {
     Order::ALL.into_iter().any(|order| stamp(text, order).is_some())
 }
@@ -146,7 +146,7 @@ pub(crate) fn orders<'a>(cells: impl Iterator<Item = &'a str> + Clone) -> Vec<Or
     Order::ALL.into_iter().filter(all).collect()
 }
 
-/// Whether the parts of dates stand apart by points, as in countries where the day comes first.
+/// True if the parts of dates stand apart by points, as in countries where the day comes first.
 pub(crate) fn has_points(text: &str) -> bool {
     text.trim().split(['T', ' ']).next().is_some_and(|date| date.matches('.').count() == 2)
 }

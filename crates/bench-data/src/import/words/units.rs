@@ -184,7 +184,7 @@ pub(crate) fn quantities(text: &str) -> Vec<Role> {
     roles
 }
 
-/// Whether a text is a unit of anything that a lab measures.
+/// True if a text is a unit of anything that a lab measures.
 pub(crate) fn is_unit(text: &str) -> bool {
     const OTHER: [&str; 26] = [
         "n", "kn", "mn", "g", "kg", "v", "mv", "µv", "uv", "a", "ma", "µa", "ua", "na", "w", "hz", "khz", "pa", "kpa",
