@@ -39,6 +39,13 @@ impl Plan {
     /// # Errors
     /// [`ImportError`] for cells that are no numbers, times that go back, and motion that does not tell the clocks apart.
     pub fn import(&self, tables: &[Table]) -> Result<Imported, ImportError> {
+        match self.recipe.recording {
+            Some(number) => self.import_all(&self.recording(tables, number)?),
+            None => self.import_all(tables),
+        }
+    }
+
+    fn import_all(&self, tables: &[Table]) -> Result<Imported, ImportError> {
         let Decision { reference, temperature, .. } = &self.decision;
         let first = self.decision.readings[0];
         let mut work = Work { tables, plan: self, remarks: self.remarks.clone(), lag: None, duplicates: 0 };
@@ -220,6 +227,13 @@ impl Work<'_> {
     fn mention_passed_over(&mut self) {
         for (index, table) in self.tables.iter().enumerate() {
             let layout = &table.layout;
+            if layout.is_exchanged {
+                self.remark(index, "rows and columns seem to be exchanged: each line is taken for a column");
+            }
+            if let Some(given) = layout.given_names {
+                let (names, columns) = (counted(given, "name"), counted(table.columns.len(), "column"));
+                self.remark(index, format!("{names} above {columns}: taken for those of the first columns"));
+            }
             if let Some(line) = layout.first_text_line {
                 let lines = counted(layout.text_lines, "line");
                 let which = if layout.text_lines > 1 { "of which the first is" } else { "which is" };

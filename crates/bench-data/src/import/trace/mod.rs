@@ -2,6 +2,7 @@
 
 mod build;
 mod plan;
+mod recordings;
 mod survey;
 
 pub use build::Imported;
