@@ -32,6 +32,7 @@ pub use baselines::{
     Baseline, Baselines, Features, Fir, LeakyBank, LowPassMode, PhaseRows, PublishedLaw, Regression, fit_static_cubic,
     running_cubic,
 };
+pub use calibrate::findings::LeftOutRow;
 pub use calibrate::recipe::{RECIPE, Recipe};
 pub use calibrate::scores::{ScoredRow, score};
 pub use calibrate::simulated_motions::SIMULATED_SEED;

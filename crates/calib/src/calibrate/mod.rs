@@ -18,7 +18,7 @@ use std::collections::BTreeMap;
 use crate::CalibrationError;
 use crate::baselines::fit_static_cubic;
 use crate::calibrate::correction_fit::fit_correction;
-use crate::calibrate::findings::{Check, seen};
+use crate::calibrate::findings::{Check, LeftOutRow, seen};
 use crate::calibrate::noise_fit::{
     NoiseProblem, REFINEMENT, SURVEY, Surveyed, best_of_each_size, survey, survey_evaluations,
 };
@@ -87,6 +87,8 @@ pub struct Calibration {
     pub static_cubic: StaticCubic,
     /// What it is worth on parts that it was not fitted to; `None` if they cannot be estimated.
     pub findings: Option<Findings>,
+    /// The rows of those parts; none if they cannot be estimated.
+    pub left_out: Vec<LeftOutRow>,
 }
 
 impl Calibration {
@@ -199,11 +201,13 @@ pub(crate) fn calibrate_once(
     let seen = seen(recordings, limits, &stats);
     let findings = Check { recordings, fit, kind: default_estimator, filter, estimators: &estimators, of_make }
         .findings(seen, &identifiability);
+    let (findings, left_out) = findings.map_or((None, vec![]), |(findings, rows)| (Some(findings), rows));
     let own = validity(recordings, &fit.law, limits, &stats);
     Ok(Calibration {
         distrusted: screened.distrusted.clone(),
         default_estimator,
         findings,
+        left_out,
         estimators,
         correction,
         static_cubic: fit_static_cubic(recordings, limits)?,
