@@ -6,7 +6,7 @@ use crate::import_files::{decimal, file, is_imported, truth};
 
 fn object(ms: i64, ohm: i64, strain: i64) -> String {
     format!(
-        "{{\"time_ms\": {ms}, \"sensor\": {{\"R_ohm\": {}}}, \"strain_pct\": {}}}",
+        "{{\"time_ms\": {ms}, \"sensor\": {{\"r\": {}}}, \"strain_pct\": {}}}",
         decimal(ohm, 1, '.'),
         decimal(strain, 2, '.')
     )

@@ -65,6 +65,8 @@ pub struct Layout {
     pub rate: Option<(f64, u64)>,
     /// Rows and columns are exchanged: each line of the file is a column.
     pub is_exchanged: bool,
+    /// Each line is a value, of several quantities in turn.
+    pub values_in_turn: bool,
     /// Names in the header, where they are more than the columns, or fewer: they are those of the first columns.
     pub given_names: Option<usize>,
     /// Lines of text among or behind the data, and a last one that was cut, which are passed over.

@@ -114,9 +114,20 @@ fn records(values: Vec<(u64, Option<Json>)>) -> Option<Rows<'static>> {
         rows.iter_mut().filter(|(_, cells)| cells.len() > 1).for_each(|(_, cells)| cells.resize(width, Cell::Empty));
         let first = rows.iter().position(|(_, cells)| cells.len() == width).unwrap_or(0);
         let line = rows.get(first).map_or(1, |(line, _)| *line);
-        rows.insert(first, (line, names.into_iter().map(|name| Cell::Text(name.into())).collect()));
+        rows.insert(first, (line, shortened(&names).into_iter().map(|name| Cell::Text(name.into())).collect()));
     }
     Some(rows)
+}
+
+/// Names without what stands above them, where the last word alone is a name, and the only one of its kind.
+fn shortened(names: &[String]) -> Vec<String> {
+    let last = |name: &String| name.rsplit('.').next().unwrap_or_default().to_owned();
+    let short = |name: &String| {
+        let is_only = names.iter().filter(|other| last(other) == last(name)).count() == 1;
+        let is_name = last(name).starts_with(char::is_alphabetic);
+        if is_only && is_name { last(name) } else { name.clone() }
+    };
+    names.iter().map(short).collect()
 }
 
 /// The cells in a value, named by what stands above them: `stamp.sec`, `position.0`.

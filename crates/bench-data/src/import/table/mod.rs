@@ -5,6 +5,7 @@ mod data;
 mod fractions;
 mod grid;
 mod header;
+mod interleaved;
 mod json;
 mod labview;
 mod layout;

@@ -3,8 +3,8 @@
 use crate::import::table::grid::Grid;
 use crate::import::words::{DecimalMark, number};
 
-/// What such a line has before the number.
-const WORDS: [&str; 14] = [
+/// What such a line has before the number …
+const WORDS: [&str; 12] = [
     "sampling rate",
     "sample rate",
     "samplerate",
@@ -12,14 +12,14 @@ const WORDS: [&str; 14] = [
     "sample frequency",
     "frame rate",
     "framerate",
-    "frames per second",
-    "fps",
+    "capture rate",
     "scan rate",
     "acquisition rate",
     "data rate",
-    "frequency",
     "abtastrate",
 ];
+/// … or begins with: a frequency further on is that of a current, or of the motion.
+const FIRST_WORDS: [&str; 4] = ["frequency", "rate", "fps", "fs"];
 
 /// The rate of the last line above the data that has one, Hz, and the number of the line.
 pub(crate) fn rate(grid: &Grid, decimal: DecimalMark, data: usize) -> Option<(f64, u64)> {
@@ -32,7 +32,10 @@ pub(crate) fn rate(grid: &Grid, decimal: DecimalMark, data: usize) -> Option<(f6
 
 fn rate_of(line: &str, decimal: DecimalMark) -> Option<f64> {
     let lower = line.to_lowercase();
-    let behind = WORDS.iter().find_map(|word| lower.split_once(word)).map(|(_, behind)| behind)?;
+    let within = WORDS.iter().find_map(|word| lower.split_once(word)).map(|(_, behind)| behind);
+    let bare = lower.trim_start_matches(['#', '%', '/', ' ']);
+    let ends_word = |behind: &&str| !behind.starts_with(char::is_alphanumeric);
+    let behind = within.or_else(|| FIRST_WORDS.iter().find_map(|word| bare.strip_prefix(word)).filter(ends_word))?;
     let start = behind.find(|c: char| c.is_ascii_digit())?;
     let end = behind[start..]
         .find(|c: char| !(c.is_ascii_digit() || matches!(c, '.' | ',')))
@@ -55,6 +58,8 @@ mod tests {
             ("# sample rate (kHz) = 1.5", Some(1500.0)),
             ("FREQUENCY 100", Some(100.0)),
             ("Capture Frame Rate 120.000000 Export", Some(120.0)),
+            ("# rate_hz = 50", Some(50.0)),
+            ("Test frequency: 1 kHz", None),
             ("30 fps", None),
             ("Rate of interest", None),
         ] {

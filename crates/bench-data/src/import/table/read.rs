@@ -12,7 +12,7 @@ use crate::import::table::rate::rate;
 use crate::import::table::records::{self, Records};
 use crate::import::table::transposed::exchanged;
 use crate::import::table::unit_column;
-use crate::import::table::{json, labview};
+use crate::import::table::{interleaved, json, labview};
 use crate::import::words::{DecimalMark, has_groups};
 
 /// Reads a file of any kind: text, XLSX and its relatives, Parquet, each of them in gzip too. `name` is what messages call
@@ -56,6 +56,10 @@ fn of_text(text: &str, encoding: &'static str, name: &str, options: &ReadOptions
     }
     let (separator, decimal, decimal_is_open) = text_layout(below, monitor, options.decimal);
     let layout = Layout { separator: Some(separator.words()), decimal, decimal_is_open, ..layout };
+    if let Some(rows) = interleaved::rows(below, decimal).filter(|_| !monitor) {
+        let layout = Layout { values_in_turn: true, ..layout };
+        return of_lines(name, &Grid::Rows(rows), layout, skip);
+    }
     let is_open = !text.ends_with(['\n', '\r']);
     let grid = Grid::Text { lines, separator, monitor, is_open };
     of_lines(name, &grid, layout, skip)
