@@ -5,18 +5,19 @@ use ohmstrain_calib::Distrusted;
 
 use crate::error::CliError;
 use crate::input::TraceFile;
+use crate::messages::Messages;
 
 /// Rows named one by one.
 const NAMED_ROWS: usize = 5;
 
 /// Refuses what has to be answered, warns of the rest.
-pub fn heed(recordings: &[TraceFile], doubts: &[CalibrationDoubt]) -> Result<(), CliError> {
+pub fn heed(recordings: &[TraceFile], doubts: &[CalibrationDoubt], messages: &Messages) -> Result<(), CliError> {
     for doubt in doubts {
         let text = text(recordings, doubt);
         if doubt.is_refusal() {
             return Err(CliError::Input(text));
         }
-        CliError::warning(&text);
+        messages.warning(&text);
     }
     Ok(())
 }
@@ -68,10 +69,10 @@ pub fn distrusted(recordings: &[TraceFile], distrusted: &[Distrusted]) -> Vec<St
 }
 
 /// The same on stderr, the first ones.
-pub fn warn_of_distrusted(recordings: &[TraceFile], rows: &[Distrusted]) {
+pub fn warn_of_distrusted(recordings: &[TraceFile], rows: &[Distrusted], messages: &Messages) {
     let lines = distrusted(recordings, rows);
-    lines.iter().take(NAMED_ROWS).for_each(|line| CliError::warning(line));
+    lines.iter().take(NAMED_ROWS).for_each(|line| messages.warning(line));
     if lines.len() > NAMED_ROWS {
-        CliError::warning(&format!("{} more rows are left out; --explain names all", lines.len() - NAMED_ROWS));
+        messages.warning(&format!("{} more rows are left out; --explain names all", lines.len() - NAMED_ROWS));
     }
 }

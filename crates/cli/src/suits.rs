@@ -4,6 +4,7 @@ use ohmstrain::{Known, Quiet, Sensor, UnitDoubt, UnitGuess, unused_known};
 
 use crate::error::CliError;
 use crate::input::TraceFile;
+use crate::messages::Messages;
 
 /// Readings at the start of a file that are looked at before it is filtered.
 pub const FIRST_READINGS: usize = 100;
@@ -50,17 +51,17 @@ pub fn check_reference(recording: &TraceFile, sensor: &Sensor) -> Result<(), Cli
 }
 
 /// Warns of a strain to start at that the sensor never reports.
-pub fn warn_of_start(start: Option<f64>, sensor: &Sensor) {
+pub fn warn_of_start(start: Option<f64>, sensor: &Sensor, messages: &Messages) {
     if let Some(Err(doubt)) = start.map(|start| sensor.check_start(start)) {
-        CliError::warning(&format!("--initial-strain: {doubt}"));
+        messages.warning(&format!("--initial-strain: {doubt}"));
     }
 }
 
 /// Warns of known strains that no row came for in a recording from the first to the last time, s.
-pub fn warn_of_unused(known: &[Known], times: (f64, f64), file: &str) {
+pub fn warn_of_unused(known: &[Known], times: (f64, f64), file: &str, messages: &Messages) {
     for doubt in unused_known(known, times) {
         let Known { time_s, strain, .. } = doubt.known;
-        CliError::warning(&format!("{file}: --known {time_s}:{strain} {doubt}"));
+        messages.warning(&format!("{file}: --known {time_s}:{strain} {doubt}"));
     }
 }
 

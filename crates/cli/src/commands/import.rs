@@ -3,11 +3,12 @@ use ohmstrain_bench_data::import::{Plan, Table};
 use crate::args::ImportArgs;
 use crate::error::CliError;
 use crate::lab_files;
+use crate::messages::Messages;
 use crate::output::{IMPORT, Kind, Outputs};
 use ohmstrain::MADE_BY;
 
 /// Makes a trace of a lab's files. What was taken for what, and what was left out, goes to stderr.
-pub fn run(args: &ImportArgs) -> Result<(), CliError> {
+pub fn run(args: &ImportArgs, messages: &Messages) -> Result<(), CliError> {
     let mut outputs = Outputs::new(args.replace.force, &args.files);
     let output = outputs.claim_or_stdout(args.output.as_deref(), Kind::Import)?;
     let recipe = args.known.recipe();
@@ -17,8 +18,8 @@ pub fn run(args: &ImportArgs) -> Result<(), CliError> {
     let other = &mut imported.trace.metadata.other;
     other.retain(|(key, _)| key != "made_by");
     other.push(("made_by".into(), format!("{MADE_BY} {IMPORT}")));
-    CliError::remark(&columns(&plan, &tables));
-    imported.remarks.iter().for_each(|remark| CliError::remark(remark));
+    messages.remark(&columns(&plan, &tables));
+    imported.remarks.iter().for_each(|remark| messages.remark(remark));
     let mut bytes = Vec::new();
     imported.trace.write(&mut bytes)?;
     outputs.publish_or_print(output, bytes)
