@@ -1,6 +1,6 @@
 //! References that are early or late.
 
-use ohmstrain::LagDoubt;
+use ohmstrain::{Interface, LagAnswer};
 use ohmstrain_calib::aligned;
 
 use crate::error::CliError;
@@ -14,24 +14,17 @@ pub fn check(recording: &mut TraceFile, align: bool, explain: bool, messages: &M
     let samples = recording.samples()?;
     let known = ohmstrain::Recording::new(samples.time_s(), samples.reading(), samples.strain())?;
     let name = recording.name.clone();
-    let doubt = known.lag_doubt();
-    if let Some(lag) = doubt.as_ref().and_then(LagDoubt::lag).filter(|_| align) {
-        messages.warning(&format!("{name}: the reference is {lag}; it was moved by that"));
-        shift(recording, lag.lag_s)?;
-        return Ok(lag.lag_s);
-    }
-    match doubt {
-        None => {}
-        Some(little @ LagDoubt::Little(_)) if explain => messages.remark(&format!("{name}: {little}")),
-        Some(little @ LagDoubt::Little(_)) => messages.detail(&format!("{name}: {little}")),
-        Some(unknown @ (LagDoubt::OutOfReach { .. } | LagDoubt::Repeats { .. })) => {
-            messages.warning(&format!("{name}: {unknown}"))
+    let Some(doubt) = known.lag_doubt() else { return Ok(0.0) };
+    match doubt.answer(align, Interface::CommandLine) {
+        LagAnswer::Move(lag, text) => {
+            messages.warning(&format!("{name}: {text}"));
+            shift(recording, lag.lag_s)?;
+            return Ok(lag.lag_s);
         }
-        Some(certain @ LagDoubt::Certain(_)) => {
-            let answer = "--align moves it to where the readings say it belongs";
-            return Err(CliError::Input(format!("{name}: {certain}; {answer}")));
-        }
-        Some(late) => messages.warning(&format!("{name}: {late} --align moves it")),
+        LagAnswer::Refuse(text) => return Err(CliError::Input(format!("{name}: {text}"))),
+        LagAnswer::Warn(text) => messages.warning(&format!("{name}: {text}")),
+        LagAnswer::Remark(text) if explain => messages.remark(&format!("{name}: {text}")),
+        LagAnswer::Remark(text) => messages.detail(&format!("{name}: {text}")),
     }
     Ok(0.0)
 }

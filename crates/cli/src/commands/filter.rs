@@ -1,5 +1,6 @@
 use std::io;
 
+use ohmstrain::Interface::CommandLine;
 use ohmstrain::number::significant;
 use ohmstrain::{
     Error, Estimate, Filter, FilterBuilder, Known, LaggedFilter, QuietWatch, Reading, Sensor, ValidityWatch,
@@ -238,7 +239,7 @@ impl<W: io::Write + Send> Sink<'_, W> {
                 self.messages.warning(&format!("{}: {warning}", self.file));
             }
             if let Some(quiet) = self.quiet.see(row) {
-                self.messages.warning(&format!("{}: {}", self.file, suits::of_rest(&quiet)));
+                self.messages.warning(&format!("{}: {}", self.file, quiet.text(CommandLine)));
             }
             self.writer.write(row)?;
         }
@@ -250,7 +251,7 @@ impl<W: io::Write + Send> Sink<'_, W> {
         if self.early.len() == FIRST_LIVE_READINGS
             && let Err(doubt) = self.sensor.check_unit(self.early.iter().copied(), self.rest)
         {
-            self.messages.warning(&format!("{}: {}", self.header, suits::answerable(&doubt)));
+            self.messages.warning(&format!("{}: {}", self.header, doubt.text(CommandLine)));
         }
     }
 }

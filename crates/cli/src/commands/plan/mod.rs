@@ -4,7 +4,7 @@ mod motion;
 mod worth;
 
 use comfy_table::ColumnConstraint;
-use ohmstrain::{Calibration, EstimatorKind, JointParams, Quantity, Sensor};
+use ohmstrain::{Calibration, EstimatorKind, JointParams, Sensor};
 use ohmstrain_bench_data::Metadata;
 use ohmstrain_bench_data::simulate::{Protocol, SimulationSettings};
 use serde::Serialize;
@@ -19,7 +19,7 @@ use crate::output::{self, print, wrapped};
 use crate::progress::Progress;
 use crate::sensor_file;
 use motion::Protocols;
-use ohmstrain::number::{fixed, significant};
+use ohmstrain::number::{self, fixed, significant};
 use worth::{Sampling, Told, Worth};
 
 /// Version of what `--json` prints.
@@ -87,10 +87,7 @@ fn illustrative(args: &PlanArgs, messages: &Messages) -> Result<Sensor, CliError
 
 fn text(sensor: &Sensor, name: &str, protocols: &Protocols, told: &[Told], worth: &Sampling) -> String {
     let params = sensor.params();
-    let (factor, unit) = match params.quantity {
-        Quantity::Strain => (100.0, " %"),
-        Quantity::AngleDeg => (1.0, "°"),
-    };
+    let (factor, unit) = number::shown(params.quantity);
     let shown = |x: f64| format!("{}{unit}", significant(factor * x, 3));
     let speeds: Vec<String> = protocols.speeds.iter().map(|speed| format!("{}/s", shown(*speed))).collect();
     let (low, high) = (params.law.range.lower, params.law.range.upper);
