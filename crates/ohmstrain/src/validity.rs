@@ -1,11 +1,8 @@
-use std::fmt;
-
 use ohmstrain_ekf::live::RestFollower;
 use ohmstrain_sensor::{Quantity, SensorParams, Validity};
 
 use crate::Sensor;
 use crate::column::reading_column;
-use crate::number::significant;
 
 /// Says, once for each, that a sensor is used outside of what its calibration has seen.
 ///
@@ -215,30 +212,5 @@ impl ValidityWatch {
         // Mostly there is nothing to say.
         let said = (is_long || is_fast || is_other || is_beyond).then_some(all);
         said.into_iter().flatten().filter_map(move |(now, beyond)| now.then_some(Extrapolation { time_s, beyond }))
-    }
-}
-
-impl fmt::Display for Extrapolation {
-    fn fmt(&self, out: &mut fmt::Formatter) -> fmt::Result {
-        write!(out, "at {} s: ", significant(self.time_s, 6))?;
-        match self.beyond {
-            Beyond::Duration { longest_s } => {
-                write!(out, "longer than the {longest_s:.1} s of the calibration, in which readings drifted")
-            }
-            Beyond::Rate { quantity, fastest_per_s } => {
-                let quantity = quantity.name();
-                write!(out, "{quantity} changes faster than the calibration's {fastest_per_s:.4} per second")
-            }
-            Beyond::Readings { column, least, most, follows } => {
-                let (least, most) = (significant(least, 5), significant(most, 5));
-                let rest = if follows { "; R0 follows until today's resistance at rest is told" } else { "" };
-                write!(out, "{column} is outside of the calibration's {least} to {most}{rest}")
-            }
-            Beyond::Strain { quantity, least, most } => {
-                let quantity = quantity.name();
-                write!(out, "{quantity} is outside of the calibration's {least:.4} to {most:.4}")
-            }
-        }?;
-        out.write_str("; estimates are extrapolations")
     }
 }
