@@ -28,7 +28,7 @@ impl Sieve<f64> {
 }
 
 /// How often a number must have come again to be stuck.
-pub const MOST_REPEATS: u32 = 10;
+const MOST_REPEATS: u32 = 10;
 
 impl<T: Recordable> Sieve<T> {
     /// Lets everything pass.
