@@ -1,8 +1,10 @@
 #!/usr/bin/env bash
-# Build no_std crates for a Cortex-M4F/M7 (thumbv7em-none-eabihf).
+# Build crates for a target that this machine's toolchain may not have: no_std crates for a Cortex-M4F/M7
+# (thumbv7em-none-eabihf), unless another target is wanted.
 #
 #   bare-metal.sh [arguments for `cargo build`...]
 #   e.g. bare-metal.sh --release --locked -p my-model -p my-ekf
+#   bare-metal.sh --tools-only    makes a route ready and builds nothing
 #
 # Run it inside the workspace. Name the no_std crates with -p: `--workspace`
 # would also pull in the host-only crates and unify their std features.
@@ -17,6 +19,8 @@
 # to stderr. Running it again installs and rebuilds nothing.
 #
 # Environment:
+#   BARE_METAL_TARGET      another target, e.g. wasm32-unknown-unknown
+#   BARE_METAL_STD         the crates of std that the debian route builds (core); e.g. std,panic_abort
 #   BARE_METAL_ROUTE       auto (default), rustup or debian: forces one route
 #   BARE_METAL_TIMEOUT     seconds allowed to `rustup target add` (60)
 #   BARE_METAL_TARGET_DIR  where the artefacts go; default: bare-<route> in the
@@ -24,7 +28,7 @@
 #   BARE_METAL_VERBOSE     1: say which route and compiler are used
 set -euo pipefail
 
-readonly target=thumbv7em-none-eabihf
+readonly target=${BARE_METAL_TARGET:-thumbv7em-none-eabihf}
 readonly msrv=1.89.0 # rust-version of the workspace
 readonly packages=(rustc-web rust-web-src)
 readonly debian_rustc=/usr/bin/rustc
@@ -82,6 +86,7 @@ rustup_ready() {
 }
 
 build_with_rustup() {
+    [[ ${1:-} != --tools-only ]] || return 0
     local dir
     dir=$(target_dir rustup)
     say "route rustup, $(rustc -V), into $dir"
@@ -125,6 +130,7 @@ build_with_debian() {
     # Debian's compiler comes without cargo; any cargo of about its age will do.
     command -v cargo >/dev/null || die "no cargo in PATH (apt-get install cargo-web)"
     install_debian
+    [[ ${1:-} != --tools-only ]] || return 0
     local sources dir
     sources=$("$debian_rustc" --print sysroot)/lib/rustlib/src/rust/library
     [[ -f $sources/Cargo.lock ]] || die "no standard library sources in $sources"
@@ -132,9 +138,9 @@ build_with_debian() {
     say "route debian, $("$debian_rustc" -V), into $dir"
     # RUSTC_BOOTSTRAP=1 lets a stable cargo and rustc accept -Zbuild-std.
     # The dependencies of the whole of std are fetched once (registry access),
-    # although only core and compiler_builtins are compiled.
+    # although only what is named is compiled.
     env -u RUSTC_WRAPPER RUSTC="$debian_rustc" RUSTC_BOOTSTRAP=1 CARGO_TARGET_DIR="$dir" \
-        cargo build --quiet -Zbuild-std=core --target "$target" "$@"
+        cargo build --quiet -Zbuild-std="${BARE_METAL_STD:-core}" --target "$target" "$@"
 }
 
 # --- choice ------------------------------------------------------------------

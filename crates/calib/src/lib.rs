@@ -31,6 +31,7 @@ mod sd_scale;
 pub use baselines::{
     Baseline, Baselines, Features, Fir, LeakyBank, LowPassMode, PhaseRows, PublishedLaw, Regression, running_cubic,
 };
+pub use calibrate::findings::LeftOutRow;
 pub use calibrate::recipe::{RECIPE, Recipe};
 pub use calibrate::scores::{ScoredRow, score};
 pub use calibrate::simulated_motions::SIMULATED_SEED;

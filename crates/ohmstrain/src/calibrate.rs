@@ -1,7 +1,7 @@
 use std::mem;
 
 use ohmstrain_calib::{
-    CalibrationError, Distrusted, GaugeFamily, LawOptions, RECIPE, Samples, Stage, calibrate_with_prior,
+    CalibrationError, Distrusted, GaugeFamily, LawOptions, LeftOutRow, RECIPE, Samples, Stage, calibrate_with_prior,
 };
 use ohmstrain_sensor::{EstimatorKind, Findings, RecordingInfo, SensorParams};
 
@@ -69,6 +69,8 @@ pub struct Calibrated {
     pub rest_readings: Vec<f64>,
     /// Rows that were left out.
     pub distrusted: Vec<Distrusted>,
+    /// What was estimated in each quarter by what was fitted to the others, quarter by quarter; none if that could not be done.
+    pub left_out: Vec<LeftOutRow>,
 }
 
 impl<'a> Calibration<'a> {
@@ -177,6 +179,7 @@ impl<'a> Calibration<'a> {
             calibrate_with_prior(&samples, &self.structures(estimator), &[estimator], prior, progress)?;
         let (distrusted, findings) = (mem::take(&mut calibration.distrusted), calibration.findings.clone());
         let rest_readings = calibration.rest_readings.clone();
+        let left_out = mem::take(&mut calibration.left_out);
         let info = |(recording, rest_reading): (&Recording, &f64)| {
             let (file, sha256) = recording.file.map(|(file, sha256)| (file.to_string(), sha256.to_string()))?;
             let (rows, time_s) = (recording.samples.len(), recording.samples.time_s());
@@ -187,7 +190,7 @@ impl<'a> Calibration<'a> {
         let joint = recordings.iter().find_map(|recording| recording.joint);
         let params = calibration.into_sensor(MADE_BY, quantity, reading);
         let sensor = Sensor::from_params(SensorParams { joint, recordings: infos, ..params })?;
-        Ok(Calibrated { sensor, findings, rest_readings, distrusted })
+        Ok(Calibrated { sensor, findings, rest_readings, distrusted, left_out })
     }
 
     /// Structures of the law to choose from.

@@ -92,8 +92,8 @@ pub use validity::{Beyond, Extrapolation, ValidityWatch};
 #[cfg(feature = "calibrate")]
 #[doc(no_inline)]
 pub use ohmstrain_calib::{
-    CalibrationError, Distrusted, Doubt, GaugeFamily, Identifiability, Lag, LagError, SamplesError, ScoredRow, Stage,
-    score,
+    CalibrationError, Distrusted, Doubt, GaugeFamily, Identifiability, Lag, LagError, LeftOutRow, SamplesError,
+    ScoredRow, Stage, score,
 };
 pub use ohmstrain_ekf::live::{FARTHEST_REST, Flag, Flags, KNOWN_BEYOND};
 #[doc(no_inline)]

@@ -55,9 +55,27 @@ pub(crate) struct Check<'a> {
     pub of_make: Option<&'a CorrectionPrior>,
 }
 
+/// What was estimated in a row of a quarter by what was fitted to the others.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LeftOutRow {
+    /// The recording, counted from 0.
+    pub recording: usize,
+    /// The row of that recording, counted from 0.
+    pub row: usize,
+    /// True strain.
+    pub truth: f64,
+    /// The filter's strain.
+    pub strain: f64,
+    /// Its standard deviation.
+    pub strain_sd: f64,
+    /// The static cubic's strain.
+    pub static_cubic: f64,
+}
+
 /// Rows of all recordings that were scored, in a row.
 #[derive(Default)]
 struct Scored {
+    rows: Vec<LeftOutRow>,
     filter: Vec<ScoredRow>,
     smoother: Vec<ScoredRow>,
     static_cubic: Vec<ScoredRow>,
@@ -70,6 +88,7 @@ impl Scored {
     fn append(&mut self, next: Self) {
         let offset_s = self.filter.last().map_or(0.0, |row| row.time_s);
         let later = |row: ScoredRow| ScoredRow { time_s: offset_s + row.time_s, ..row };
+        self.rows.extend(next.rows);
         self.filter.extend(next.filter.into_iter().map(later));
         self.smoother.extend(next.smoother.into_iter().map(later));
         self.static_cubic.extend(next.static_cubic.into_iter().map(later));
@@ -84,17 +103,18 @@ impl Scored {
 }
 
 impl Check<'_> {
-    /// Scores every quarter with what was fitted to the others; `None` if they cannot be estimated.
-    pub(crate) fn findings(&self, seen: Seen, told: &Option<Identifiability>) -> Option<Findings> {
+    /// Scores every quarter with what was fitted to the others, and the rows of it; `None` if they cannot be estimated.
+    pub(crate) fn findings(&self, seen: Seen, told: &Option<Identifiability>) -> Option<(Findings, Vec<LeftOutRow>)> {
         let scored = self.scored().ok()?;
-        Some(Findings {
+        let findings = Findings {
             filter: score_of_full_scale(&scored.filter)?,
             smoother: score_of_full_scale(&scored.smoother),
             static_cubic: score_of_full_scale(&scored.static_cubic)?,
             budget: error_budget(self.recordings, self.fit, &scored.wrong_direction()),
             seen,
             advice: told.as_ref().map_or_else(Vec::new, |told| told.advice.clone()),
-        })
+        };
+        Some((findings, scored.rows))
     }
 
     fn scored(&self) -> Result<Scored, CalibrationError> {
@@ -141,8 +161,11 @@ impl Check<'_> {
                 let time_s = samples.time_s[k] - samples.time_s[rows.start];
                 let row = |strain: f64, sd: Option<f64>| ScoredRow { time_s, truth, strain, sd };
                 let estimate = filter.output().estimate;
-                of_recording.filter.push(row(estimate.strain.mean, Some(estimate.strain.sd())));
-                of_recording.directions.push((directions[r][k], estimate.rate.mean, estimate.strain.mean - truth));
+                let (strain, strain_sd) = (estimate.strain.mean, estimate.strain.sd());
+                let left_out = LeftOutRow { recording: r, row: k, truth, strain, strain_sd, static_cubic: on_cubic };
+                of_recording.rows.push(left_out);
+                of_recording.filter.push(row(strain, Some(strain_sd)));
+                of_recording.directions.push((directions[r][k], estimate.rate.mean, strain - truth));
                 if let Some(smoothed) = &smoothed {
                     let strain = smoothed[k].estimate.strain;
                     of_recording.smoother.push(row(strain.mean, Some(strain.sd())));

@@ -72,7 +72,9 @@ impl fmt::Display for Extrapolation {
     fn fmt(&self, out: &mut fmt::Formatter) -> fmt::Result {
         write!(out, "at {} s: ", significant(self.time_s, 6))?;
         match self.beyond {
-            Beyond::Duration { longest_s } => write!(out, "longer than the {longest_s:.1} s of the calibration"),
+            Beyond::Duration { longest_s } => {
+                write!(out, "longer than the {longest_s:.1} s of the calibration, in which readings drifted")
+            }
             Beyond::Rate { quantity, fastest_per_s } => {
                 let quantity = quantity.name();
                 write!(out, "{quantity} changes faster than the calibration's {fastest_per_s:.4} per second")
