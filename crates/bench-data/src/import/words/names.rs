@@ -163,6 +163,26 @@ const PART: &[(Role, &str)] = &[
     (Role::Temperature, "temperature,temperatur,温度,溫度,온도"),
 ];
 
+/// Words of a name that say neither what is measured nor in what: `thumb` of `Thumb angle (deg)`, `2` of `R2`.
+pub(crate) fn stem(name: &str) -> Vec<String> {
+    let folded = folded(name);
+    let mut words: Vec<String> = Vec::new();
+    let mut before = None;
+    for c in folded.chars() {
+        let is_new =
+            before.is_none_or(|before: char| !before.is_alphanumeric() || before.is_numeric() != c.is_numeric());
+        match words.last_mut() {
+            _ if !c.is_alphanumeric() => {}
+            Some(last) if !is_new => last.push(c),
+            _ => words.push(c.to_string()),
+        }
+        before = Some(c);
+    }
+    words.retain(|word| by_name(word, |_| true).is_none() && !units::is_unit(word) || is_index(word));
+    words.sort_unstable();
+    words
+}
+
 /// The role that a column's name and unit give it, if any.
 pub(crate) fn role(name: &str, unit: Option<&str>) -> Option<(Role, Sureness)> {
     let fits = |role: Role| {
@@ -258,6 +278,15 @@ mod tests {
         for (heading, name, unit) in cases {
             assert_eq!(take_apart(heading), (name.to_owned(), unit.map(str::to_owned)), "{heading}");
         }
+    }
+
+    #[test]
+    fn a_stem_is_what_is_left_of_a_name() {
+        for (one, other) in [("Thumb", "thumb angle"), ("R2", "Angle 2"), ("res_left-index", "left_index_strain")] {
+            assert!(!stem(one).is_empty() && stem(one) == stem(other), "{one}: {:?} {:?}", stem(one), stem(other));
+        }
+        assert_ne!(stem("R1"), stem("angle2"));
+        assert!(stem("Resistance").is_empty());
     }
 
     #[test]
