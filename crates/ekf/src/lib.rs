@@ -7,6 +7,8 @@
 //! [`Hypotheses`] keep a [`Mixture`] of hypotheses about the phase, because stretching and releasing look alike.
 //! [`correction`] makes a calibrated filter's strain better by what was learned in calibration.
 //!
+//! For a model of your own, [`kalman`] has linear, extended and unscented filters, smoothers and maximum likelihood.
+//!
 //! Models are anything that implements [`Dynamics`] and [`Channel`];
 //! [`SwitchedModel`](ohmstrain_model::SwitchedModel) does.
 //!
@@ -19,7 +21,7 @@
 //!   filters on the kernel, which say so.
 //!
 //! # Features
-//! `simd` steps four hypotheses at once where the processor has AVX2; `adskalman` hands linearised steps to that crate. Off by default and
+//! `dual` finds Jacobians of a model in [`kalman`]; `simd` steps four hypotheses at once where the processor has AVX2; `adskalman` hands linearised steps to that crate. Off by default and
 //! without std:
 //! - `serde`: [`Belief`], [`Estimate`], [`Gaussian`], readings, innovations, verdicts of readings and errors as plain data. A
 //!   belief that comes back is not checked; the step that it cannot take is refused. Mixtures, and what is made
@@ -65,6 +67,7 @@ mod error;
 mod estimate;
 mod estimator;
 mod guard;
+pub mod kalman;
 mod kernel;
 pub mod live;
 mod mixture;
