@@ -14,7 +14,7 @@ type Rows = Vec<Row<N, M>>;
 const ROUNDING: f64 = 1e-9;
 
 fn entries<const R: usize, const C: usize>(size: f64) -> impl Strategy<Value = SMatrix<f64, R, C>> {
-    prop::collection::vec(-size..size, R * C).prop_map(|x| SMatrix::from_iterator(x))
+    prop::collection::vec(-size..size, R * C).prop_map(SMatrix::from_iterator)
 }
 
 /// Another model in every row; process noise of rank two, correlated reading noise, each reading missing now and then.
