@@ -3,7 +3,7 @@
 //! Configuration and state are apart: an estimator ([`Ekf`]) holds the model, a [`Belief`] goes in and a [`Step`] with
 //! a new belief comes out. An error leaves the caller's belief as it was, and one estimator serves many sensors.
 //!
-//! [`Ekf`] (or, unscented, [`Ukf`]) keeps one Gaussian and has a smoother. [`Imm`], [`SignSplit`] and
+//! [`Ekf`] keeps one Gaussian and has a smoother. [`Imm`], [`SignSplit`] and
 //! [`Hypotheses`] keep a [`Mixture`] of hypotheses about the phase, because stretching and releasing look alike.
 //! [`correction`] makes a calibrated filter's strain better by what was learned in calibration.
 //!
@@ -78,7 +78,6 @@ mod smooth;
 mod sparse;
 mod substeps;
 mod traits;
-mod unscented;
 
 #[cfg(feature = "adskalman")]
 pub use adskalman_bridge::LinearStep;
@@ -100,4 +99,3 @@ pub use substeps::{
     EVENLY as STEP_EVENLY, GRACE as STEP_GRACE, GROWTH as STEP_GROWTH, LONGEST_PAUSE_S, Pause, Repeated, Substeps,
 };
 pub use traits::{Channel, Dynamics, Reading};
-pub use unscented::{Ukf, Unscented};
