@@ -9,7 +9,7 @@ use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
 use nalgebra::SVector;
 use ohmstrain_ekf::{
     Belief, Channel, Compact, Dwell, Dynamics, Ekf, Estimator, Evidence, Imm, LinearStep, Mixture, PhaseMixture,
-    Reading, SignSplit, SparseEkf, State, Step, Unscented,
+    Reading, SignSplit, SparseEkf, State, Step,
 };
 use ohmstrain_model::{Phase, StrainRange, SwitchedModel};
 use ohmstrain_tests::{rts_smooth, sensor};
@@ -89,8 +89,6 @@ fn benchmarks(criterion: &mut Criterion) {
     sparse::<3, 6, 21>(criterion, "sparse EKF, n = 6");
     estimator::<_, 3, 6>(criterion, "EKF, n = 3", &Belief::initial(&three), Ekf::new(three));
     estimator::<_, 6, 21>(criterion, "EKF, n = 6", &Belief::initial(&six), Ekf::new(six));
-    let ukf = Ekf::new(Unscented::new(three));
-    estimator::<_, 3, 6>(criterion, "UKF, n = 3", &Belief::initial(&three), ukf);
     let Ok(dwell) = Dwell::new(5.0, 1.0, 0.3) else { return };
     let evidence = Evidence { limits: StrainRange { lower: -0.02, upper: 0.35 }, tempering: 1.0 };
     let belief = Belief::initial(&six);

@@ -5,7 +5,7 @@
 //! ```
 
 use comfy_table::{Table, presets};
-use ohmstrain_ekf::{Belief, Ekf, Estimator, Hypotheses, Imm, Mixture, PhaseMixture, SignSplit, Ukf, Unscented};
+use ohmstrain_ekf::{Belief, Ekf, Estimator, Hypotheses, Imm, Mixture, PhaseMixture, SignSplit};
 use ohmstrain_model::{Phase, SwitchedModel};
 use ohmstrain_tests::own_law::{EVIDENCE, Moves, dwell, honesty, sensor};
 
@@ -36,7 +36,6 @@ fn of(table: &mut Table, model: SwitchedModel<f64, 2, 5>, moves: Moves) {
     let rests = moves == Moves::OuAndHolds;
     if !rests {
         row::<_, 5, 15>(table, "EKF", Ekf::new(model), &start, moves);
-        row::<_, 5, 15>(table, "UKF", Ukf::new(Unscented::new(model)), &start, moves);
     }
     let split =
         SignSplit::<_, 2, 5, 8>::new(model, 0.0, rests.then(|| dwell(moves)), EVIDENCE).expect("no step is refused");

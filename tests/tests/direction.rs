@@ -1,11 +1,8 @@
 //! What the direction of motion leaves open: its mean and variance against simulations of the continuous law, written out
 //! here or in `own_law`, and the coverage of intervals at any sampling rate.
 
-use ohmstrain_ekf::{Belief, Channel, Ekf, Estimator, Hypotheses, Mixture, SignSplit, State, Substeps, Ukf, Unscented};
-use ohmstrain_model::{
-    Gauge, ModelNoise, Motion, Observation, Phase, RateChange, SensorLaw, StrainRange, SwitchedModel, Turning,
-    unexplained,
-};
+use ohmstrain_ekf::{Belief, Ekf, Estimator, Hypotheses, Mixture, SignSplit, State, Substeps};
+use ohmstrain_model::{Phase, RateChange, Turning, unexplained};
 use ohmstrain_tests::Draws;
 use ohmstrain_tests::own_law::{EVIDENCE, Honesty, Moves, after_rows, dwell, honesty, sensor, simulate, spread_after};
 use statrs::distribution::{Continuous, ContinuousCDF, Normal};
@@ -253,27 +250,6 @@ fn a_pause_forgets_the_direction_and_a_smoother_comes_back_through_it() {
     }
 }
 
-/// E|v| of a standard normal rate is 0.798; the logistic distribution in its place makes 0.8145 of it. Sigma points around a
-/// mean that is averaged already would make it 1.165.
-#[test]
-fn the_unscented_reading_counts_the_spread_of_the_rate_once() {
-    let law = SensorLaw {
-        gauge: Gauge::Polynomial { coefficients: [0.0; 3] },
-        extend_viscosity_s: 1.0,
-        retract_viscosity_s: -1.0,
-        branches: [],
-        range: StrainRange { lower: -1.0, upper: 1.0 },
-    };
-    let motion = Motion::ornstein_uhlenbeck(1.0, 1.0, 0.0, 1.0).unwrap();
-    let noise = ModelNoise { reading_sd: 1e-3, branch_sd: 0.0, baseline_sd: 0.0, baseline_time_s: 1.0 };
-    let model = SwitchedModel::<f64, 0, 2>::new(law, motion, noise).unwrap();
-    let belief: Belief<f64, 2, 3> = Belief::initial(&model);
-    let observed: Observation<f64, 2> = Channel::<f64, 2, 3>::observe(&Unscented::new(model), &belief, None);
-    assert!((observed.value - 0.797_885).abs() < 0.021 * 0.797_885, "{}", observed.value);
-    // Var|v| = 1 - 2/π, of which no line explains anything.
-    assert!((observed.variance - (1.0 - 2.0 / std::f64::consts::PI)).abs() < 1e-3, "{}", observed.variance);
-}
-
 /// Before, the linearised switch dropped its variance, and took the rate of the step's end for that of the step: coverage fell to
 /// 3 % at 0.2 s, and errors were those beside the steps here (the same recordings); sign-split's at 0.2 and 0.5 s are between
 /// those with steps of a twelfth of the rate's time and those with a third, 0.0055 and 0.0119.
@@ -295,8 +271,6 @@ fn intervals_hold_on_the_own_law_at_any_rate_and_errors_are_smaller_than_they_we
     {
         let scenario = (Moves::Ou, dt_s, false);
         check("ekf", dt_s, one, ekf_before, honesty(Ekf::new(model), &start, scenario, 0..16));
-        let ukf = Ukf::new(Unscented::new(model));
-        check("ukf", dt_s, one, ekf_before, honesty(ukf, &start, scenario, 0..16));
         let split = SignSplit::<_, 2, 5, 8>::new(model, 0.0, None, EVIDENCE).unwrap();
         let mixture = Mixture::single(start, Phase::Extend);
         // Named exception: at 0.5 s, in four steps, 99.6 % are covered. Errors are less than half of what they were in one step

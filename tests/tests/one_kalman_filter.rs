@@ -6,7 +6,7 @@
 
 use adskalman::{KalmanFilterNoControl, StateAndCovariance};
 use nalgebra::{Const, SMatrix, SVector};
-use ohmstrain_ekf::{Belief, Channel, Dynamics, Ekf, LinearStep, Reading, Step, Ukf, Unscented};
+use ohmstrain_ekf::{Belief, Channel, Dynamics, Ekf, LinearStep, Reading, Step};
 use ohmstrain_model::{Observation, Phase, Symmetric, Transition};
 use ohmstrain_tests::{Draws, Linear, rts_smooth};
 
@@ -128,7 +128,6 @@ impl<const N: usize, const L: usize> Case<N, L> {
 fn check_filters_of_one_gaussian<const N: usize, const L: usize>(seed: u64) {
     let case = Case::<N, L>::new(seed, SVector::zeros());
     let steps = case.check_one_gaussian("ekf", &Ekf::new(case.model));
-    case.check_one_gaussian("ukf", &Ukf::new(Unscented::new(case.model)));
     check_adskalman(&case, &steps);
 }
 

@@ -4,7 +4,7 @@
 use nalgebra::{DMatrix, SVector};
 use ohmstrain_ekf::{
     Belief, Channel, Dwell, Dynamics, Ekf, Estimator, Evidence, Hypotheses, Imm, Mixture, PhaseMixture, Reading,
-    SignSplit, State as _, Step, Ukf, Unscented,
+    SignSplit, State as _, Step,
 };
 use ohmstrain_model::{Branch, Gauge, ModelNoise, Motion, Phase, SensorLaw, StrainRange, SwitchedModel};
 use ohmstrain_tests::{KnownPhase, rts_smooth};
@@ -183,8 +183,6 @@ proptest! {
             for reading in [1.0, 1.0 / 1_073_741_824.0, 1024.0] {
                 let units = Units { strain, reading };
                 prop_assert_eq!(one_gaussian(Ekf::new, units, &rows), one_gaussian(Ekf::new, PLAIN, &rows));
-                let ukf = |sensor| Ukf::new(Unscented::new(sensor));
-                prop_assert_eq!(one_gaussian(ukf, units, &rows), one_gaussian(ukf, PLAIN, &rows));
             }
         }
     }
@@ -216,20 +214,18 @@ proptest! {
         }
     }
 
-    /// Without readings sigma points are not drawn, and the future has nothing to say about the past; rounding as in
+    /// Without readings the future has nothing to say about the past; rounding as in
     /// `check_split`.
     #[test]
     fn missing_everywhere_is_prediction(rows in wild()) {
         let sensor = PLAIN.sensor();
         let missing = |_: Option<f64>| None;
         let steps = run(&Ekf::new(sensor), Belief::initial(&sensor), &rows, missing);
-        let unscented = run(&Ukf::new(Unscented::new(sensor)), Belief::initial(&sensor), &rows, missing);
         let mut belief: State = Belief::initial(&sensor);
-        for ((step, unscented), (dt_s, _)) in steps.iter().zip(&unscented).zip(&rows) {
+        for (step, (dt_s, _)) in steps.iter().zip(&rows) {
             let transition = Dynamics::transition(&sensor, &sensor.prepare(*dt_s), &belief, None);
             belief = Belief { mean: transition.mean, covariance: sensor.propagate(&belief.covariance, &transition) };
             prop_assert_eq!(step.posterior, belief);
-            prop_assert_eq!(unscented.posterior, belief);
         }
         let least = steps.iter().map(|step| least_share(&step.prior)).fold(1.0, f64::min);
         let tolerance = (rows.len() * 25) as f64 * f64::EPSILON / least;

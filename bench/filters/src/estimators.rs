@@ -1,6 +1,5 @@
 use ohmstrain_ekf::{
-    Belief, Compact, Dwell, Ekf, Estimator, Evidence, Hypotheses, Imm, Mixture, PhaseMixture, Reading, SignSplit,
-    State, Unscented,
+    Belief, Compact, Dwell, Ekf, Estimator, Evidence, Hypotheses, Imm, Mixture, PhaseMixture, Reading, SignSplit, State,
 };
 use ohmstrain_model::{Phase, SwitchedModel};
 
@@ -79,8 +78,6 @@ pub fn every_filter(visitor: &mut impl Visitor) {
     visitor.visit("sparse_ukf_3", &readings, GatedUnscented::<1, 3, 6>::new(three));
     visitor.visit("ekf_3", &readings, ekf::<1, 3, 6>(three));
     visitor.visit("ekf_4", &readings, ekf::<1, 4, 10>(sensor()));
-    let ukf = Ekf::new(Unscented::new(three));
-    visitor.visit("ukf_3", &readings, Gated::<_, 3, 6>::new(ukf, Belief::initial(&three)));
     every_large_filter(visitor);
 }
 

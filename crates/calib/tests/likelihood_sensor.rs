@@ -4,7 +4,7 @@ use ohmstrain_calib::CalibrationError;
 use ohmstrain_calib::likelihood::{
     Likelihood, LikelihoodProblem, ModelFamily, NoiseFit, NoiseParameter, NoiseStart, Parameter, ReadingSeries,
 };
-use ohmstrain_ekf::{Belief, StepError, Unscented};
+use ohmstrain_ekf::{Belief, StepError};
 use ohmstrain_model::{Direction, ModelNoise, Motion, ParameterError, Phase, Scalar, SwitchedModel, Transition};
 use ohmstrain_sensor::{BranchParams, GaugeParams, LawParams, MotionParams, NoiseParams, RangeParams};
 use rand_chacha::ChaCha12Rng;
@@ -191,19 +191,6 @@ impl ModelFamily<4, 10> for Switched {
     }
 }
 
-/// The same through an unscented channel.
-struct UnscentedSwitched;
-
-impl ModelFamily<4, 10> for UnscentedSwitched {
-    type Model<T: Scalar> = Unscented<SwitchedModel<T, 1, 4>>;
-    fn model<T: Scalar>(&self, parameters: &[T]) -> Result<Self::Model<T>, ParameterError> {
-        switched(parameters).map(Unscented::new)
-    }
-    fn start<T: Scalar>(&self, model: &Self::Model<T>) -> Belief<T, 4, 10> {
-        Belief::initial(model.inner())
-    }
-}
-
 const POINT: [f64; 5] = [3e-3, 0.25, 0.4, 0.015, 2.0];
 
 /// Exact derivatives against central differences of the log-likelihood, in the logarithms.
@@ -241,7 +228,6 @@ fn check_derivatives<F: ModelFamily<4, 10>>(family: &F) {
 #[test]
 fn derivatives_are_exact() {
     check_derivatives(&Switched);
-    check_derivatives(&UnscentedSwitched);
 }
 
 #[test]

@@ -3,9 +3,11 @@
 //! Configuration and state are apart: an estimator ([`Ekf`]) holds the model, a [`Belief`] goes in and a [`Step`] with
 //! a new belief comes out. An error leaves the caller's belief as it was, and one estimator serves many sensors.
 //!
-//! [`Ekf`] (or, unscented, [`Ukf`]) keeps one Gaussian and has a smoother. [`Imm`], [`SignSplit`] and
+//! [`Ekf`] keeps one Gaussian and has a smoother. [`Imm`], [`SignSplit`] and
 //! [`Hypotheses`] keep a [`Mixture`] of hypotheses about the phase, because stretching and releasing look alike.
 //! [`correction`] makes a calibrated filter's strain better by what was learned in calibration.
+//!
+//! For a model of your own, [`kalman`] has linear, extended and unscented filters, smoothers and maximum likelihood.
 //!
 //! Models are anything that implements [`Dynamics`] and [`Channel`];
 //! [`SwitchedModel`](ohmstrain_model::SwitchedModel) does.
@@ -19,7 +21,7 @@
 //!   filters on the kernel, which say so.
 //!
 //! # Features
-//! `simd` steps four hypotheses at once where the processor has AVX2; `adskalman` hands linearised steps to that crate. Off by default and
+//! `dual` finds Jacobians of a model in [`kalman`]; `simd` steps four hypotheses at once where the processor has AVX2; `adskalman` hands linearised steps to that crate. Off by default and
 //! without std:
 //! - `serde`: [`Belief`], [`Estimate`], [`Gaussian`], readings, innovations, verdicts of readings and errors as plain data. A
 //!   belief that comes back is not checked; the step that it cannot take is refused. Mixtures, and what is made
@@ -65,6 +67,7 @@ mod error;
 mod estimate;
 mod estimator;
 mod guard;
+pub mod kalman;
 mod kernel;
 pub mod live;
 mod mixture;
@@ -75,7 +78,6 @@ mod smooth;
 mod sparse;
 mod substeps;
 mod traits;
-mod unscented;
 
 #[cfg(feature = "adskalman")]
 pub use adskalman_bridge::LinearStep;
@@ -97,4 +99,3 @@ pub use substeps::{
     EVENLY as STEP_EVENLY, GRACE as STEP_GRACE, GROWTH as STEP_GROWTH, LONGEST_PAUSE_S, Pause, Repeated, Substeps,
 };
 pub use traits::{Channel, Dynamics, Reading};
-pub use unscented::{Ukf, Unscented};

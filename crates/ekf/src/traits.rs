@@ -1,4 +1,3 @@
-use nalgebra::SVector;
 use ohmstrain_model::{
     Direction, Number, Observation, Phase, Scalar, SwitchedModel, SwitchedStep, Symmetric, Transition,
 };
@@ -34,12 +33,6 @@ pub trait Channel<T: Scalar, const N: usize, const L: usize> {
     /// The reading expected at the belief's mean, its gradient and the variance of its noise; `phase` as for
     /// [`Dynamics::transition`].
     fn observe(&self, at: &Belief<T, N, L>, phase: Option<Phase>) -> Observation<T, N>;
-
-    /// The reading expected at a sigma point of the belief. What [`Self::observe`] averages over the belief already is
-    /// linear here: an average is not to be averaged again.
-    fn value_at(&self, point: &SVector<T, N>, belief: &Belief<T, N, L>, phase: Option<Phase>) -> T {
-        self.observe(&Belief { mean: *point, ..*belief }, phase).value
-    }
 }
 
 impl<T: Scalar, const B: usize, const N: usize, const L: usize> Dynamics<T, N, L> for SwitchedModel<T, B, N> {
@@ -78,15 +71,6 @@ impl<T: Scalar, const B: usize, const N: usize, const L: usize> Channel<T, N, L>
             None => at_reading(at.covariance[(1, 1)]),
         };
         self.observe(&at.mean, direction)
-    }
-
-    fn value_at(&self, point: &SVector<T, N>, belief: &Belief<T, N, L>, phase: Option<Phase>) -> T {
-        // Of the reading's parts only the gauge is curved and not averaged yet.
-        let at: Observation<T, N> = Channel::observe(self, belief, phase);
-        let ((curve, _), (mean_curve, mean_slope)) =
-            (self.law().gauge_value_and_slope(point[0]), self.law().gauge_value_and_slope(belief.mean[0]));
-        let off = point - belief.mean;
-        at.value + at.gradient.dot(&off) + curve - mean_curve - mean_slope * off[0]
     }
 }
 

@@ -3,6 +3,7 @@
 mod correction;
 mod estimate;
 mod hostile;
+mod kalman;
 mod live;
 mod step;
 

@@ -11,7 +11,7 @@ use ohmstrain_model::{
 use proptest::prelude::*;
 
 /// A sensor whose strains are counted in units of `1/unit` and whose readings are relative to R₀.
-fn sensor<T: Scalar>(unit: f64) -> SwitchedModel<T, 2, 5> {
+pub fn sensor<T: Scalar>(unit: f64) -> SwitchedModel<T, 2, 5> {
     let of = |x: f64| T::of(x);
     let branch = |tau_s: f64| Branch {
         tau_s: of(tau_s),

@@ -3,7 +3,7 @@ use ohmstrain_model::{ParameterError, Scalar};
 
 /// Models that differ in a few positive parameters. `L = N (N + 1) / 2`.
 pub trait ModelFamily<const N: usize, const L: usize> {
-    /// A model with numbers of type `T`; `Unscented` models make the likelihood the one of the unscented filter.
+    /// A model with numbers of type `T`.
     type Model<T: Scalar>: Dynamics<T, N, L> + Channel<T, N, L>;
 
     /// The model with these parameters, on their natural scale.

@@ -12,10 +12,6 @@ pub(crate) struct SemiDefinite<T, const N: usize> {
 }
 
 impl<T: Scalar, const N: usize> SemiDefinite<T, N> {
-    pub(crate) fn factor<const L: usize>(matrix: &Symmetric<T, N, L>) -> Self {
-        Self::factor_without(matrix, T::default_epsilon() * T::of(N as f64))
-    }
-
     /// The factor without the pivots that are no larger than `negligible` times their diagonal entry.
     pub(crate) fn factor_without<const L: usize>(matrix: &Symmetric<T, N, L>, negligible: T) -> Self {
         let mut lower = SMatrix::<T, N, N>::identity();
@@ -38,11 +34,6 @@ impl<T: Scalar, const N: usize> SemiDefinite<T, N> {
             }
         }
         Self { lower, pivots }
-    }
-
-    /// Column `i` of a square root `L √D`.
-    pub(crate) fn column(&self, i: usize) -> SVector<T, N> {
-        self.lower.column(i) * self.pivots[i].sqrt()
     }
 
     /// A solution x of `P x = rhs` for a right-hand side in the range of P.

@@ -85,7 +85,7 @@ fn ratios(ratios: &[Ratio], builds: &[Build]) -> String {
     out
 }
 
-const STEPS: [(&str, &str); 24] = [
+const STEPS: [(&str, &str); 23] = [
     ("hand-written reference, linear, without checks", "reference_3"),
     ("hand-written reference, without checks", "nonlinear_reference_3"),
     ("**EKF, sparse**", "sparse_ekf_3"),
@@ -95,7 +95,6 @@ const STEPS: [(&str, &str); 24] = [
     ("EKF, generic, four states", "ekf_4"),
     ("EKF, generic, six states", "ekf_6"),
     ("UKF, sparse", "sparse_ukf_3"),
-    ("UKF, generic", "ukf_3"),
     ("IMM, six states", "imm_6"),
     ("sign-split of 8, six states", "sign_split_6"),
     ("best 8 hypotheses, six states", "hypotheses_6"),

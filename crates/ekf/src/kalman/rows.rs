@@ -1,0 +1,182 @@
+//! Gaussian variables as rows over independent sources, and their elimination.
+//!
+//! Prediction, update and smoother are one operation: the joint distribution of two vectors is factored as L D Lᵀ with
+//! the given vector first, so that what remains of the second is its conditional distribution. The factor comes from
+//! modified Gram-Schmidt with the sources' variances as weights. Covariances are never subtracted: variances of very
+//! unlike size keep their digits.
+//!
+//! Source: Thornton & Bierman, *Proc. IEEE CDC* (1976) 1205; Bierman, *Factorization Methods* (1977), chapter VI.
+
+use nalgebra::{SMatrix, SVector};
+use ohmstrain_model::Scalar;
+
+use super::factor::Factor;
+
+/// A variable `Σ aᵢ sᵢ + Σ bⱼ nⱼ` of independent sources: N of the state and K of noise.
+#[derive(Clone, Copy)]
+pub(super) struct Row<T, const N: usize, const K: usize> {
+    state: Part<T, N>,
+    noise: Part<T, K>,
+}
+
+/// Coefficients, and the largest terms that each of them is a sum of: rounding errors are in proportion to these.
+#[derive(Clone, Copy)]
+struct Part<T, const N: usize> {
+    value: SVector<T, N>,
+    terms: SVector<T, N>,
+}
+
+/// Variances of the sources.
+#[derive(Clone, Copy)]
+pub(super) struct Sources<'a, T, const N: usize, const K: usize> {
+    pub(super) state: &'a SVector<T, N>,
+    pub(super) noise: &'a SVector<T, K>,
+}
+
+/// What rounding has left of a row.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Digits {
+    /// A row as good as any.
+    Kept,
+    /// Rounding errors weigh in its variance.
+    Few,
+    /// Nothing but rounding errors: the variable follows from those before it.
+    None,
+}
+
+/// Rounding errors of a coefficient, in ε of its terms, beyond which its row is held to be more than zero.
+const ZERO_ERRORS: f64 = 8.0;
+/// A row's standard deviation has to be that many times ε of its terms': half an ε is then 1/32 of it, a thousandth
+/// of the variance.
+const FEW_ERRORS: f64 = 16.0;
+
+impl<T: Scalar, const N: usize> Part<T, N> {
+    fn new(value: SVector<T, N>) -> Self {
+        Self { value, terms: value.abs() }
+    }
+
+    fn covariance(&self, other: &Self, variances: &SVector<T, N>) -> T {
+        (0..N).fold(T::zero(), |sum, i| sum + self.value[i] * variances[i] * other.value[i])
+    }
+
+    fn subtract(&mut self, factor: T, other: &Self) {
+        for i in 0..N {
+            let term = factor * other.value[i];
+            self.value[i] -= term;
+            self.terms[i] = self.terms[i].max(term.abs());
+        }
+    }
+
+    fn is_zero(&self, variances: &SVector<T, N>, errors: T) -> bool {
+        (0..N).all(|i| variances[i].is_zero() || self.value[i].abs() <= errors * self.terms[i])
+    }
+
+    fn variance_of_terms(&self, variances: &SVector<T, N>) -> T {
+        (0..N).fold(T::zero(), |sum, i| sum + self.terms[i] * self.terms[i] * variances[i])
+    }
+}
+
+impl<T: Scalar, const N: usize, const K: usize> Row<T, N, K> {
+    /// Source `i` of the state itself.
+    pub(super) fn source(i: usize) -> Self {
+        let value = SVector::from_fn(|j, _| if i == j { T::one() } else { T::zero() });
+        Self { state: Part::new(value), noise: Part::new(SVector::zeros()) }
+    }
+
+    /// Row `i` of `[A L | B]` for a slope A, the factor L of the state's covariance and that of a noise.
+    pub(super) fn of<const R: usize>(
+        slope: &SMatrix<T, R, N>,
+        lower: &SMatrix<T, N, N>,
+        noise: &SMatrix<T, R, K>,
+        i: usize,
+    ) -> Self {
+        let (mut state, mut terms) = (SVector::zeros(), SVector::zeros());
+        for j in 0..N {
+            for k in 0..N {
+                let term = slope[(i, k)] * lower[(k, j)];
+                state[j] += term;
+                terms[j] += term.abs();
+            }
+        }
+        Self { state: Part { value: state, terms }, noise: Part::new(SVector::from_fn(|j, _| noise[(i, j)])) }
+    }
+
+    pub(super) fn covariance(&self, other: &Self, sources: Sources<T, N, K>) -> T {
+        self.state.covariance(&other.state, sources.state) + self.noise.covariance(&other.noise, sources.noise)
+    }
+
+    fn subtract(&mut self, factor: T, other: &Self) {
+        self.state.subtract(factor, &other.state);
+        self.noise.subtract(factor, &other.noise);
+    }
+
+    fn digits(&self, variance: T, sources: Sources<T, N, K>) -> Digits {
+        let epsilon = T::default_epsilon();
+        let errors = T::of(ZERO_ERRORS * (N + K) as f64) * epsilon;
+        let terms = self.state.variance_of_terms(sources.state) + self.noise.variance_of_terms(sources.noise);
+        let few = T::of(FEW_ERRORS) * epsilon;
+        if self.state.is_zero(sources.state, errors) && self.noise.is_zero(sources.noise, errors) {
+            Digits::None
+        } else if variance <= few * few * terms {
+            Digits::Few
+        } else {
+            Digits::Kept
+        }
+    }
+}
+
+/// Makes rows independent of those before them: their covariance L D Lᵀ, and what rounding has left of each.
+///
+/// A row that is not `wanted` is left out, with a pivot of zero, as if it did not exist.
+pub(super) fn orthogonalise<T: Scalar, const R: usize, const N: usize, const K: usize>(
+    rows: &mut [Row<T, N, K>; R],
+    sources: Sources<T, N, K>,
+    wanted: [bool; R],
+) -> (Factor<T, R>, [Digits; R]) {
+    let mut factor = Factor::zero();
+    let mut digits = [Digits::None; R];
+    for j in (0..R).filter(|j| wanted[*j]) {
+        let pivot_row = rows[j];
+        let pivot = pivot_row.covariance(&pivot_row, sources);
+        digits[j] = pivot_row.digits(pivot, sources);
+        if digits[j] == Digits::None {
+            continue;
+        }
+        factor.variances[j] = pivot;
+        for i in (j + 1..R).filter(|i| wanted[*i]) {
+            factor.columns[(i, j)] = rows[i].covariance(&pivot_row, sources) / pivot;
+            rows[i].subtract(factor.columns[(i, j)], &pivot_row);
+        }
+    }
+    (factor, digits)
+}
+
+/// `A V Aᵀ + B W Bᵀ`, of sources of variances V and W, as L D Lᵀ.
+pub(super) fn sum<T: Scalar, const R: usize, const K: usize>(
+    first: &Factor<T, R>,
+    more: &SMatrix<T, R, K>,
+    variances: &SVector<T, K>,
+) -> Factor<T, R> {
+    let own = SMatrix::identity();
+    let mut rows: [Row<T, R, K>; R] = core::array::from_fn(|i| Row::of(&own, &first.columns, more, i));
+    orthogonalise(&mut rows, Sources { state: &first.variances, noise: variances }, [true; R]).0
+}
+
+/// Makes rows independent of orthogonal ones: the coefficients of the regression on these. A pivot of zero tells nothing.
+pub(super) fn regress<T: Scalar, const R: usize, const G: usize, const N: usize, const K: usize>(
+    rows: &mut [Row<T, N, K>; R],
+    given: &[Row<T, N, K>; G],
+    pivots: &SVector<T, G>,
+    sources: Sources<T, N, K>,
+) -> SMatrix<T, R, G> {
+    let mut coefficients = SMatrix::zeros();
+    for j in 0..G {
+        if pivots[j] > T::zero() {
+            for i in 0..R {
+                coefficients[(i, j)] = rows[i].covariance(&given[j], sources) / pivots[j];
+                rows[i].subtract(coefficients[(i, j)], &given[j]);
+            }
+        }
+    }
+    coefficients
+}
