@@ -49,7 +49,7 @@
 //! - **Fitting**: the sum of [`Step::log_likelihood`] is what [`maximise`] makes large, with standard errors.
 //! - **Late readings**: [`Rewind`].
 //!
-//! `examples/` has six programs of less than forty lines: `constant_velocity`, `pendulum`, `nile`, `two_rates`,
+//! `examples/` has six programs of forty lines at most: `constant_velocity`, `pendulum`, `nile`, `two_rates`,
 //! `late_reading` and `noise_of_a_model`; `docs/kalman.md` in the repository sets four of them beside other libraries.
 //!
 //! # Policy
