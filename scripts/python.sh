@@ -4,6 +4,7 @@
 #   python.sh                  the wheel and what its tests need
 #   python.sh --engines        with pyspark, ray, dask, and the Java that Spark needs (by apt, as root, where there is none)
 #   python.sh --engines-only   those alone, into an environment that has the wheel
+#   python.sh --examples-only  what the examples exchange data with (rosbags, pylsl, …), as wheels, into such an environment
 #   python.sh --tools-only     an environment that can build it, and no more
 #
 # Environment:
@@ -27,6 +28,10 @@ fi
 if [[ ${1:-} == --tools-only ]]; then exit 0; fi
 if [[ ${1:-} == --engines-only ]]; then
     "$venv/bin/python" -m pip install --quiet "$(echo "$venv"/wheels/ohmstrain-*.whl)[spark,ray,dask]"
+    exit
+fi
+if [[ ${1:-} == --examples-only ]]; then
+    "$venv/bin/python" -m pip install --quiet --only-binary :all: "$(echo "$venv"/wheels/ohmstrain-*.whl)[examples]"
     exit
 fi
 rm -rf "$venv/wheels"

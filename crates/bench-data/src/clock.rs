@@ -11,15 +11,44 @@ pub(crate) enum Clock {
 }
 
 /// A counter's last value as it stood in the file, and unwrapped.
-#[derive(Clone, Copy)]
-pub(crate) struct Microseconds {
-    counter: u64,
-    unwrapped: u64,
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Microseconds {
+    /// As it stood in the file.
+    pub counter: u64,
+    /// Without its wraps.
+    pub unwrapped: u64,
+}
+
+/// The last time of a stream, from which another one of the same device may go on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum LastTime {
+    /// Of a column in seconds.
+    Seconds(f64),
+    /// Of a counter.
+    Microseconds(Microseconds),
 }
 
 impl Clock {
     pub(crate) fn new(column: Column) -> Self {
         if column == Column::TimeUs { Self::Microseconds { last: None } } else { Self::Seconds { last: None } }
+    }
+
+    /// The last time, if there has been a row.
+    pub(crate) fn last(&self) -> Option<LastTime> {
+        match self {
+            Self::Seconds { last } => last.map(LastTime::Seconds),
+            Self::Microseconds { last } => last.map(LastTime::Microseconds),
+        }
+    }
+
+    /// Goes on from the last time of another stream; `false` if that counted in another unit.
+    pub(crate) fn go_on(&mut self, from: LastTime) -> bool {
+        match (self, from) {
+            (Self::Seconds { last }, LastTime::Seconds(time_s)) => *last = Some(time_s),
+            (Self::Microseconds { last }, LastTime::Microseconds(us)) => *last = Some(us),
+            _ => return false,
+        }
+        true
     }
 
     /// Time of a row on the file's clock, s.
@@ -95,6 +124,15 @@ mod tests {
         assert_eq!(times(Column::TimeUs, &["1000", "1000"])[1], None);
         assert_eq!(times(Column::TimeUs, &["5000000000", "4"])[1], None);
         assert_eq!(times(Column::TimeUs, &["5000000000", "5000000001"])[1], Some(5000.000001));
+    }
+
+    #[test]
+    fn a_counter_goes_on_where_another_stream_ended() {
+        let mut clock = Clock::new(Column::TimeUs);
+        let last = LastTime::Microseconds(Microseconds { counter: 4_294_967_290, unwrapped: 2 * WRAP_US - 6 });
+        assert!(clock.go_on(last) && clock.last() == Some(last));
+        assert_eq!(clock.read("4").ok(), Some((2 * WRAP_US + 4) as f64 / 1e6));
+        assert!(!clock.go_on(LastTime::Seconds(3.0)));
     }
 
     #[test]

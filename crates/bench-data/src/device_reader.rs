@@ -1,6 +1,7 @@
 use std::io::Read;
 use std::vec;
 
+use crate::clock::LastTime;
 use crate::error::{BadContent, Fault, TraceError, quote};
 use crate::line_parser::{Line, LineParser};
 use crate::lines::{LineFault, Lines};
@@ -109,6 +110,18 @@ impl<R: Read> DeviceReader<R> {
     #[must_use]
     pub fn metadata(&self) -> Metadata {
         self.parser.metadata()
+    }
+
+    /// Time of the last row, as it stood there.
+    #[must_use]
+    pub fn last_time(&self) -> Option<LastTime> {
+        self.parser.last_time()
+    }
+
+    /// Goes on from the last time of a stream before this one: the first row is after it, and a counter may have wrapped. `false` if
+    /// that stream counted in another unit.
+    pub fn go_on(&mut self, from: LastTime) -> bool {
+        self.parser.go_on(from)
     }
 
     /// The next line; `None` at the end of the source.

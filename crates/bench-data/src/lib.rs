@@ -60,6 +60,7 @@ mod spec;
 mod trace;
 mod writer;
 
+pub use clock::{LastTime, Microseconds};
 pub use counted::counted;
 pub use device_reader::{DeviceReader, DeviceRow};
 pub use error::{BadContent, SpecError, TraceError};

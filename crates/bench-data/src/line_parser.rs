@@ -1,5 +1,6 @@
 use csv::StringRecord;
 
+use crate::clock::LastTime;
 use crate::columns::Columns;
 use crate::error::{BadContent, Fault};
 use crate::lines::take_apart;
@@ -96,6 +97,17 @@ impl LineParser {
     #[must_use]
     pub fn reference_quantity(&self) -> Option<ReferenceQuantity> {
         self.stream.as_ref().and_then(|stream| stream.parser.reference_quantity())
+    }
+
+    /// Time of the last row, as it stood there.
+    pub(crate) fn last_time(&self) -> Option<LastTime> {
+        self.stream.as_ref().and_then(|stream| stream.parser.last_time())
+    }
+
+    /// Goes on from the last time of a stream before this one: the first row is after it, and a counter may have wrapped. `false` if
+    /// that stream counted in another unit.
+    pub(crate) fn go_on(&mut self, from: LastTime) -> bool {
+        self.stream.as_mut().is_some_and(|stream| stream.parser.clock().go_on(from))
     }
 
     /// Takes a line, with or without its end.

@@ -1,5 +1,6 @@
 use std::io::Read;
 
+use crate::clock::LastTime;
 use crate::columns::Columns;
 use crate::error::{Fault, TraceError};
 use crate::lines::{LineFault, LineFeed, Lines, is_plain};
@@ -121,6 +122,18 @@ impl<R: Read> TraceReader<R> {
     #[must_use]
     pub fn line(&self) -> u64 {
         self.records.get_ref().line()
+    }
+
+    /// Time of the last row, as it stood there.
+    #[must_use]
+    pub fn last_time(&self) -> Option<LastTime> {
+        self.parser.last_time()
+    }
+
+    /// Goes on from the last time of a stream before this one: the first row is after it, and a counter may have wrapped. `false` if
+    /// that stream counted in another unit.
+    pub fn go_on(&mut self, from: LastTime) -> bool {
+        self.parser.clock().go_on(from)
     }
 
     fn next_row(&mut self) -> Result<Option<Row>, TraceError> {

@@ -2,7 +2,7 @@ use csv::StringRecord;
 use ohmstrain_model::{AdcCode, FrontEnd, Joint};
 
 use crate::cell;
-use crate::clock::Clock;
+use crate::clock::{Clock, LastTime};
 use crate::columns::{Column, Columns, Place};
 use crate::error::Fault;
 use crate::metadata::{Metadata, ResistanceUnit, StrainUnit};
@@ -29,6 +29,14 @@ impl RowParser {
     pub(crate) fn new(columns: Columns, metadata: &Metadata) -> Result<Self, Fault> {
         let conversion = Conversion::new(&columns, metadata)?;
         Ok(Self { columns, conversion, clock: Clock::new(columns.time.column) })
+    }
+
+    pub(crate) const fn clock(&mut self) -> &mut Clock {
+        &mut self.clock
+    }
+
+    pub(crate) fn last_time(&self) -> Option<LastTime> {
+        self.clock.last()
     }
 
     pub(crate) fn reading_kind(&self) -> ReadingKind {

@@ -9,6 +9,7 @@ mod args;
 mod commands;
 mod error;
 mod estimates;
+mod filter_state;
 mod input;
 mod lab_files;
 mod messages;

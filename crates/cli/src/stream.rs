@@ -2,7 +2,7 @@
 
 use std::io::Read;
 
-use ohmstrain_bench_data::{DeviceReader, DeviceRow, Metadata, ReadingKind, TraceError, TraceReader};
+use ohmstrain_bench_data::{DeviceReader, DeviceRow, LastTime, Metadata, ReadingKind, TraceError, TraceReader};
 
 use crate::args::FilterArgs;
 use crate::error::CliError;
@@ -69,6 +69,22 @@ impl Rows {
         match self {
             Self::Recording(rows) => rows.line(),
             Self::Device(rows) => rows.line(),
+        }
+    }
+
+    /// Time of the last row, as it stood there.
+    pub fn last_time(&self) -> Option<LastTime> {
+        match self {
+            Self::Recording(rows) => rows.last_time(),
+            Self::Device(rows) => rows.last_time(),
+        }
+    }
+
+    /// Goes on from the last time of the stream before; `false` if that counted in another unit.
+    pub fn go_on(&mut self, from: LastTime) -> bool {
+        match self {
+            Self::Recording(rows) => rows.go_on(from),
+            Self::Device(rows) => rows.go_on(from),
         }
     }
 

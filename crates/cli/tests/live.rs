@@ -2,6 +2,7 @@
 #![cfg(unix)]
 
 use std::io::{Read, Write};
+use std::net::{TcpListener, UdpSocket};
 use std::num::NonZero;
 use std::os::unix::fs::symlink;
 use std::path::Path;
@@ -125,6 +126,51 @@ fn shown(estimates: &Csv, row: usize) -> String {
     let number = |column: &str| estimates.numbers(column)[row];
     // 1.96 standard deviations, in percent, as the terminal's two digits have them.
     format!("{:.2} ± {:.2} %", 100.0 * number("strain"), 100.0 * 1.96 * number("strain_sd"))
+}
+
+/// Rows at 5 Hz as a device sends them.
+fn sent(row: u32) -> String {
+    format!("{:.1},{}\n", 0.2 * f64::from(row), 1600 + row % 7)
+}
+
+#[test]
+fn lines_come_by_udp() {
+    let bench = Bench::calibrated();
+    let free = UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap().to_string();
+    let header = ["live", "--udp", &free, "--sensor", "sensor.toml", "--header", "time_s,resistance_ohm"];
+    let live = Terminal::new(&bench, cargo_bin!("ohmstrain"), &header);
+    live.wait_for(&format!("udp {free}"));
+    let device = UdpSocket::bind("127.0.0.1:0").unwrap();
+    // Two lines in a datagram, one without its end, and one that is none.
+    for text in [sent(0) + &sent(1), sent(2).trim().to_owned(), "garbage\n".to_owned(), sent(3)] {
+        device.send_to(text.as_bytes(), &free).unwrap();
+        thread::sleep(Duration::from_millis(5));
+    }
+    live.wait_for("1603");
+    let said = live.quit();
+    assert!(said.contains("4 rows, 0 readings missing") && said.contains("1 line skipped"), "{said}");
+}
+
+#[test]
+fn lines_come_by_tcp_from_one_device_after_the_other() {
+    let bench = Bench::calibrated();
+    let device = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = device.local_addr().unwrap().to_string();
+    let flags = ["live", "--tcp", &address, "--sensor", "sensor.toml", "--header", "time_s,resistance_ohm"];
+    let live = Terminal::new(&bench, cargo_bin!("ohmstrain"), &flags);
+    for part in [0..3, 3..6] {
+        let (mut stream, _) = device.accept().unwrap();
+        let text: String = part.clone().map(sent).collect();
+        stream.write_all(text.as_bytes()).unwrap();
+        live.wait_for(&(1600 + part.end - 1).to_string());
+        // It goes away, and another one comes.
+        drop(stream);
+    }
+    assert!(live.quit().contains("6 rows, 0 readings missing"));
+    let one_source = ["live", "--tcp", ":9000", "--udp", ":9000", "--sensor", "sensor.toml"];
+    assert!(bench.run(&one_source).stderr.contains("cannot be used with"));
+    let no_port = bench.run(&["live", "--udp", "localhost", "--sensor", "sensor.toml"]);
+    assert!(no_port.code == Some(2) && no_port.stderr.contains("expected :PORT or HOST:PORT"), "{}", no_port.stderr);
 }
 
 #[test]

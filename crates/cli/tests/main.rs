@@ -33,6 +33,7 @@ mod outputs;
 mod own_files;
 mod pipeline;
 mod refine;
+mod resumed;
 mod rows_out;
 mod sensor_numbers;
 mod serial_check;

@@ -23,10 +23,10 @@
 //! # Features
 //! `dual` finds Jacobians of a model in [`kalman`]; `simd` steps four hypotheses at once where the processor has AVX2; `adskalman` hands linearised steps to that crate. Off by default and
 //! without std:
-//! - `serde`: [`Belief`], [`Estimate`], [`Gaussian`], readings, innovations, verdicts of readings and errors as plain data. A
-//!   belief that comes back is not checked; the step that it cannot take is refused. Mixtures, and what is made
-//!   by constructors that check, are left out.
-//! - `defmt`: `Format` for the same. It takes no text from the target, only numbers.
+//! - `serde`: [`Belief`], mixtures, [`Estimate`], [`Gaussian`], readings, innovations, verdicts of readings and errors as plain data;
+//!   and [`live::Memory`], all that a running filter knows. A belief that comes back is not checked; the step that it cannot take is
+//!   refused. What is made by constructors that check is left out.
+//! - `defmt`: `Format` for beliefs and what goes with them, but not for mixtures. It takes no text from the target, only numbers.
 //!
 //! ```
 //! use ohmstrain_ekf::{Ekf, Reading, Start};

@@ -18,6 +18,13 @@ pub struct Repeated<P, T> {
     last_count: u8,
 }
 
+impl<P, T: Copy> Repeated<P, T> {
+    /// The pause that it leads over, as the estimator tells it apart.
+    pub const fn pause(&self) -> Pause<T> {
+        self.before
+    }
+}
+
 /// A step of the longest length shall be one step, whatever rounding says.
 pub const GRACE: f64 = 1.0005;
 /// Up to so many steps of the longest length a pause is divided evenly.
@@ -35,6 +42,7 @@ pub const LONGEST_PAUSE_S: f64 = 1_048_576.0;
 /// The division depends on that time alone: 256 steps of the longest length L, then 192 of 4 L, of 16 L and so on; what remains is divided into the same lengths, the longest first, and one that is not longer
 /// than L. So a pause may be one row, or many rows without a reading.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Pause<T> {
     /// L, s.
     longest_s: T,

@@ -1,3 +1,5 @@
+use std::sync::Arc;
+
 use ohmstrain_ekf::live::{DOUBT, Doubts, KNOWN_BEYOND, Protections};
 use ohmstrain_ekf::{Guard, Influence};
 use ohmstrain_sensor::{EstimatorKind, KnownErrors, Options, SensorError, Start};
@@ -5,7 +7,8 @@ use ohmstrain_sensor::{EstimatorKind, KnownErrors, Options, SensorError, Start};
 use crate::estimate::Scale;
 use crate::filter::{Kernel, RowWriter};
 use crate::known::in_order;
-use crate::{Error, Filter, Known, LaggedFilter, Sensor};
+use crate::stored::{MadeOf, StoredOptions};
+use crate::{Error, Filter, Known, LaggedFilter, Sensor, Stored, StoredError};
 
 /// How many readings in a row a gate turns down before it is the state that is doubted: outliers come alone, a body that sets off
 /// surprises until it is followed. With ten a knee that bent within half a second was missed.
@@ -249,6 +252,53 @@ impl<'a> FilterBuilder<'a> {
         Ok(LaggedFilter::new(self.kernel(kind)?, lag_s))
     }
 
+    /// A filter that goes on from where another one of the same sensor and options was stored, to the bit. R₀ and strains that were
+    /// known are those of then; what is told here counts from now on.
+    ///
+    /// # Errors
+    /// If the state is of another sensor, of other options or of another version, or an initial strain is given: the first row is over.
+    ///
+    /// ```
+    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+    /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
+    /// let stored = sensor.filter().build()?.store()?;
+    /// assert!(sensor.filter().resume(&stored).is_ok());
+    /// let refused = sensor.filter().gate(10.8).resume(&stored).unwrap_err();
+    /// assert!(refused.to_string().contains("gate"));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn resume(self, stored: &Stored) -> Result<Filter, Error> {
+        let mut filter = self.without_start()?.build()?;
+        filter.resume(stored)?;
+        self.rest_resistance.map_or(Ok(()), |measured| filter.rest_resistance(measured))?;
+        Ok(filter)
+    }
+
+    /// The same of a filter with a lag.
+    ///
+    /// # Errors
+    /// As [`Self::resume`].
+    ///
+    /// ```
+    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+    /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
+    /// let stored = sensor.filter().build_lagged(0.2)?.store()?;
+    /// assert!(sensor.filter().resume_lagged(0.2, &stored).is_ok());
+    /// assert!(sensor.filter().resume_lagged(0.3, &stored).is_err());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn resume_lagged(self, lag_s: f64, stored: &Stored) -> Result<LaggedFilter, Error> {
+        let mut filter = self.without_start()?.build_lagged(lag_s)?;
+        filter.resume(stored)?;
+        self.rest_resistance.map_or(Ok(()), |measured| filter.rest_resistance(measured))?;
+        Ok(filter)
+    }
+
+    /// Refuses a start of what has begun.
+    fn without_start(self) -> Result<Self, Error> {
+        if self.initial_strain.is_some() { Err(StoredError::Begun.into()) } else { Ok(self) }
+    }
+
     /// The estimator that was chosen.
     pub(crate) fn kind(&self) -> EstimatorKind {
         let kind = self.estimator.unwrap_or(self.sensor.params().default_estimator);
@@ -263,7 +313,11 @@ impl<'a> FilterBuilder<'a> {
             filter.rest(measured).map_err(Error::Step)?;
         }
         let (known, errors) = (in_order(self.known, &scale)?, KnownErrors::new(scale.limits()));
-        Ok(Kernel { filter, rows: RowWriter { scale, errors }, known })
+        let made_of = MadeOf {
+            params: Arc::clone(self.sensor.shared()),
+            options: StoredOptions::new(kind, self.gate, self.influence, self.protections),
+        };
+        Ok(Kernel { filter, rows: RowWriter { scale, errors }, known, made_of })
     }
 
     /// The scale of the rows, with R₀ as it is told.

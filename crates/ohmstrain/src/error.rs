@@ -9,7 +9,7 @@ use ohmstrain_sensor::{FieldError, Quantity, SensorError};
 use thiserror::Error;
 
 use crate::number::{plain, significant};
-use crate::{ReferenceDoubt, UnitDoubt};
+use crate::{ReferenceDoubt, StoredError, UnitDoubt};
 
 /// Why there is no sensor, no filter or no estimate.
 ///
@@ -105,6 +105,9 @@ pub enum Error {
     /// A reference that seems to be in percent.
     #[error(transparent)]
     Reference(#[from] ReferenceDoubt),
+    /// A stored filter that cannot go on here.
+    #[error(transparent)]
+    Stored(#[from] StoredError),
     /// The filter does not take a row. It stays as it was: the next good row goes on from the last good one.
     #[error(transparent)]
     Step(#[from] StepError),

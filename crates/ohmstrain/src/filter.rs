@@ -6,7 +6,8 @@ use ohmstrain_sensor::{KnownErrors, KnownStrain, Output};
 
 use crate::estimate::Scale;
 use crate::known::next_until;
-use crate::{Error, Estimate, Reading};
+use crate::stored::{Ahead, Last, MadeOf, StoredKernel, WaitingRow};
+use crate::{Error, Estimate, Reading, Stored, StoredError};
 
 /// A live filter, and the way to it from readings and from it to rows.
 pub(crate) struct Kernel {
@@ -14,6 +15,8 @@ pub(crate) struct Kernel {
     pub rows: RowWriter,
     /// Strains that will be known, in order of time.
     pub known: VecDeque<(f64, Gaussian<f64>)>,
+    /// What it was made of.
+    pub made_of: MadeOf,
 }
 
 /// From what a filter says to rows.
@@ -45,6 +48,26 @@ impl Kernel {
         self.filter.rest(measured).map_err(Error::Step)?;
         // What errors were known of were those of another R₀.
         self.rows.errors = KnownErrors::new(self.rows.scale.limits());
+        Ok(())
+    }
+
+    fn store(&self) -> Result<StoredKernel, Error> {
+        Ok(StoredKernel {
+            rest_reading: self.rows.scale.rest_reading,
+            known: self.known.iter().copied().map(Ahead::from).collect(),
+            told: self.rows.errors.strains().copied().collect(),
+            filter: self.filter.store()?,
+        })
+    }
+
+    /// Goes on from what was stored; strains that will be known are those of both.
+    fn resume(&mut self, stored: StoredKernel) -> Result<(), Error> {
+        let StoredKernel { rest_reading, known, told, filter } = stored;
+        self.filter.resume(filter).map_err(|error| StoredError::Content(Box::new(error)))?;
+        self.rows.scale.rest_reading = rest_reading;
+        self.rows.errors = KnownErrors::of(self.rows.scale.limits(), &told);
+        self.known.extend(known.into_iter().map(Ahead::strain));
+        self.known.make_contiguous().sort_by(|a, b| a.0.total_cmp(&b.0));
         Ok(())
     }
 
@@ -131,6 +154,35 @@ impl Filter {
         };
         kernel.know(KnownStrain { time_s, known, said: said.estimate.strain });
         Ok(kernel.rows.known_row((time_s, reading), &said))
+    }
+
+    /// All that the next row depends on: [`FilterBuilder::resume`](crate::FilterBuilder::resume) goes on from it, to the bit.
+    ///
+    /// # Errors
+    /// If TOML cannot hold it.
+    ///
+    /// ```
+    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+    /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
+    /// use ohmstrain::Stored;
+    ///
+    /// let mut filter = sensor.filter().build()?;
+    /// filter.step(0.0, 1600.0)?;
+    /// let text = filter.store()?.to_toml()?;
+    /// let mut resumed = sensor.filter().resume(&Stored::from_toml(&text)?)?;
+    /// assert_eq!(resumed.step(0.1, 1602.0)?, filter.step(0.1, 1602.0)?);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn store(&self) -> Result<Stored, Error> {
+        let last = self.last.map(|(time_s, reading, said)| Last { time_s, reading, said });
+        Ok(Stored::new(&self.kernel.made_of, None, last, Vec::new(), self.kernel.store()?))
+    }
+
+    pub(crate) fn resume(&mut self, stored: &Stored) -> Result<(), Error> {
+        stored.check(&self.kernel.made_of, None)?;
+        self.kernel.resume(stored.kernel.clone())?;
+        self.last = stored.last.map(|Last { time_s, reading, said }| (time_s, reading, said));
+        Ok(())
     }
 
     /// What the rested, unstretched sensor is found to read from now on, in place of what it read in calibration.
@@ -261,6 +313,39 @@ impl LaggedFilter {
         if self.last_s.is_some() {
             self.take_known();
         }
+        Ok(())
+    }
+
+    /// As [`Filter::store`], with the rows that wait: [`FilterBuilder::resume_lagged`](crate::FilterBuilder::resume_lagged) goes on
+    /// from it.
+    ///
+    /// # Errors
+    /// If TOML cannot hold it, or rows that have become due are still to be handed out, as after an error: take another row first.
+    ///
+    /// ```
+    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+    /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
+    /// let mut filter = sensor.filter().build_lagged(0.1)?;
+    /// filter.step(0.0, 1600.0)?;
+    /// let mut resumed = sensor.filter().resume_lagged(0.1, &filter.store()?)?;
+    /// assert_eq!(resumed.step(0.2, 1602.0)?, filter.step(0.2, 1602.0)?);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn store(&self) -> Result<Stored, Error> {
+        if !self.are_out && !self.due.is_empty() {
+            return Err(StoredError::RowsDue.into());
+        }
+        let rows = self.waiting.iter().map(|&(time_s, reading)| WaitingRow { time_s, reading }).collect();
+        let mut stored = Stored::new(&self.kernel.made_of, Some(self.lag_s), None, rows, self.kernel.store()?);
+        stored.last_s = self.last_s;
+        Ok(stored)
+    }
+
+    pub(crate) fn resume(&mut self, stored: &Stored) -> Result<(), Error> {
+        stored.check(&self.kernel.made_of, Some(self.lag_s))?;
+        self.kernel.resume(stored.kernel.clone())?;
+        self.waiting = stored.waiting.iter().map(|row| (row.time_s, row.reading)).collect();
+        self.last_s = stored.last_s;
         Ok(())
     }
 

@@ -56,6 +56,7 @@ mod reference_doubt;
 mod sensor;
 mod sentences;
 mod smoothing;
+mod stored;
 mod text;
 mod unit_doubt;
 mod validity;
@@ -81,7 +82,7 @@ pub use motion_doubt::motion_doubts;
 pub use plausible::calibration_doubts;
 #[cfg(feature = "calibrate")]
 pub use prior::Prior;
-pub use quiet::{Quiet, QuietWatch};
+pub use quiet::{Quiet, QuietSeen, QuietWatch};
 pub use reading::Reading;
 #[cfg(feature = "calibrate")]
 pub use recording::{Evaluation, Recording};
@@ -90,8 +91,9 @@ pub use sensor::Sensor;
 #[cfg(feature = "calibrate")]
 pub use sentences::LagAnswer;
 pub use sentences::{Closing, Interface, Tested, number, verdict};
+pub use stored::{Stored, StoredClock, StoredError};
 pub use unit_doubt::{UnitDoubt, UnitGuess};
-pub use validity::{Beyond, Extrapolation, ValidityWatch};
+pub use validity::{Beyond, Extrapolation, ValiditySeen, ValidityWatch};
 
 #[cfg(feature = "calibrate")]
 #[doc(no_inline)]

@@ -1,3 +1,5 @@
+use serde::{Deserialize, Serialize};
+
 use crate::{Estimate, KNOWN_BEYOND, Known, Sensor};
 
 /// For how long readings must be quiet before somebody is asked, s.
@@ -46,7 +48,7 @@ pub struct QuietWatch {
 }
 
 /// Readings that have stayed within a band.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 struct Hold {
     from_s: f64,
     last_s: f64,
@@ -71,7 +73,38 @@ pub struct Quiet {
     pub strain: f64,
 }
 
+/// What a [`QuietWatch`] has seen so far, to go on from.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct QuietSeen {
+    ends: (f64, f64),
+    hold: Option<Hold>,
+    asked: usize,
+    asked_at: Option<f64>,
+}
+
 impl QuietWatch {
+    /// What it has seen so far.
+    ///
+    /// ```
+    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+    /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
+    /// use ohmstrain::QuietWatch;
+    ///
+    /// let mut watch = QuietWatch::new(&sensor, None, &[]);
+    /// watch.go_on(QuietWatch::new(&sensor, None, &[]).seen());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub const fn seen(&self) -> QuietSeen {
+        QuietSeen { ends: self.ends, hold: self.hold, asked: self.asked, asked_at: self.asked_at }
+    }
+
+    /// Goes on from what another one of the same sensor has seen.
+    pub fn go_on(&mut self, seen: QuietSeen) {
+        (self.ends, self.hold, self.asked, self.asked_at) = (seen.ends, seen.hold, seen.asked, seen.asked_at);
+    }
+
     /// For a sensor that reads `rest_resistance` at rest, if that is not what it read in calibration, and strains that are
     /// known anyway.
     ///

@@ -7,7 +7,7 @@
 /// assert_eq!(Reading::from(1600.0), Reading { value: 1600.0, ..Reading::MISSING });
 /// assert!(Reading::from(None).value.is_nan());
 /// ```
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Reading {
     /// As recorded; NaN where it is missing.
     pub value: f64,

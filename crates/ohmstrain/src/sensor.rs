@@ -22,7 +22,8 @@ use crate::{Column, Error, Estimate, FilterBuilder, UnitDoubt};
 /// ```
 #[derive(Clone, Debug)]
 pub struct Sensor {
-    params: SensorParams,
+    /// Shared with its filters.
+    params: Arc<SensorParams>,
     /// For all its filters; `None` without a correction.
     learned: Option<Arc<Learned>>,
 }
@@ -87,7 +88,7 @@ impl Sensor {
     }
 
     fn for_estimator(params: SensorParams, kind: Option<EstimatorKind>) -> Result<Self, Error> {
-        let sensor = Self { learned: Learned::of(&params), params };
+        let sensor = Self { learned: Learned::of(&params), params: Arc::new(params) };
         sensor.build(kind.unwrap_or(sensor.params.default_estimator), &Options::plain())?;
         Ok(sensor)
     }
@@ -121,7 +122,7 @@ impl Sensor {
     /// ```
     pub fn to_toml(&self) -> Result<String, Error> {
         self.params.validate().map_err(ohmstrain_sensor::SensorError::from)?;
-        Ok(toml::to_string(&self.params)?)
+        Ok(toml::to_string(self.params())?)
     }
 
     /// All its numbers.
@@ -133,7 +134,11 @@ impl Sensor {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     #[must_use]
-    pub const fn params(&self) -> &SensorParams {
+    pub fn params(&self) -> &SensorParams {
+        &self.params
+    }
+
+    pub(crate) const fn shared(&self) -> &Arc<SensorParams> {
         &self.params
     }
 
@@ -149,7 +154,7 @@ impl Sensor {
     /// ```
     #[must_use]
     pub fn into_params(self) -> SensorParams {
-        self.params
+        Arc::unwrap_or_clone(self.params)
     }
 
     /// R₀ of the law, which everything is relative to, in the unit of the readings: the calibration's, or, if
@@ -184,7 +189,7 @@ impl Sensor {
     /// ```
     pub fn on_joint(mut self, joint: JointParams) -> Result<Self, Error> {
         if self.params.quantity == Quantity::Strain {
-            self.params.joint = Some(joint);
+            Arc::make_mut(&mut self.params).joint = Some(joint);
         }
         self.joint()?;
         Ok(self)

@@ -1,5 +1,6 @@
 use ohmstrain_ekf::live::RestFollower;
 use ohmstrain_sensor::{Quantity, SensorParams, Validity};
+use serde::{Deserialize, Serialize};
 
 use crate::Sensor;
 use crate::column::reading_column;
@@ -94,7 +95,7 @@ pub enum Beyond {
 }
 
 /// Rows outside of a range.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 struct Outside {
     rows: usize,
     outside: usize,
@@ -146,7 +147,46 @@ impl Outside {
     }
 }
 
+/// What a [`ValidityWatch`] has seen so far, to go on from.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ValiditySeen {
+    start_s: Option<f64>,
+    long: bool,
+    fast: Outside,
+    beyond_readings: Outside,
+    beyond_strains: Outside,
+    follower: Option<RestFollower<f64>>,
+}
+
 impl ValidityWatch {
+    /// What it has seen so far.
+    ///
+    /// ```
+    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+    /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
+    /// use ohmstrain::ValidityWatch;
+    ///
+    /// let mut watch = ValidityWatch::new(&sensor, None);
+    /// watch.go_on(ValidityWatch::new(&sensor, None).seen());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn seen(&self) -> ValiditySeen {
+        let Self { start_s, long, fast, beyond_readings, beyond_strains, .. } = *self;
+        let follower = self.session.as_ref().map(|session| session.follower);
+        ValiditySeen { start_s, long, fast, beyond_readings, beyond_strains, follower }
+    }
+
+    /// Goes on from what another one of the same sensor has seen.
+    pub fn go_on(&mut self, seen: ValiditySeen) {
+        (self.start_s, self.long, self.fast) = (seen.start_s, seen.long, seen.fast);
+        (self.beyond_readings, self.beyond_strains) = (seen.beyond_readings, seen.beyond_strains);
+        if let (Some(session), Some(follower)) = (&mut self.session, seen.follower) {
+            session.follower = follower;
+        }
+    }
+
     /// Watches the use of a sensor. `rest_resistance` is what the rested sensor reads now, if it is not what it read in
     /// calibration.
     ///

@@ -8,6 +8,7 @@ mod known;
 mod lag;
 mod motion_doubts;
 mod older_formats;
+mod resumed;
 mod rows;
 mod surprises;
 mod threads;

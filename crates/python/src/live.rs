@@ -1,6 +1,6 @@
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use ohmstrain::{Column, Error, Estimate, Known};
+use ohmstrain::{Column, Error, Estimate, Known, Stored};
 use pyo3::prelude::*;
 use pyo3::sync::MutexExt;
 use pyo3::types::PyDict;
@@ -19,6 +19,9 @@ pub struct LiveFilter {
     sensor: ohmstrain::Sensor,
     columns: Vec<Column>,
     known: Vec<Known>,
+    /// The moment that was 0 s in the state that it goes on from, ns since 1970.
+    #[pyo3(get)]
+    zero_ns: Option<i64>,
 }
 
 struct Running {
@@ -68,8 +71,42 @@ impl LiveFilter {
         known: Vec<Known>,
     ) -> Self {
         let watch = Watch::new(&sensor, rest_resistance, &known);
-        Self { running: Mutex::new(Running { filter, watch, rest_resistance }), sensor, columns, known }
+        Self::watched(filter, watch, sensor, columns, rest_resistance, known)
     }
+
+    /// One that goes on from a state.
+    pub(crate) fn resumed(
+        filter: ohmstrain::Filter,
+        sensor: ohmstrain::Sensor,
+        columns: Vec<Column>,
+        told: Option<f64>,
+        known: Vec<Known>,
+        stored: Stored,
+    ) -> Self {
+        let rest_resistance = told.or(stored.rest_resistance);
+        let (mut watch, zero_ns) = (Watch::new(&sensor, rest_resistance, &known), stored.zero_ns);
+        if told.is_none() {
+            watch.go_on(stored);
+        }
+        Self { zero_ns, ..Self::watched(filter, watch, sensor, columns, rest_resistance, known) }
+    }
+
+    fn watched(
+        filter: ohmstrain::Filter,
+        watch: Watch,
+        sensor: ohmstrain::Sensor,
+        columns: Vec<Column>,
+        rest_resistance: Option<f64>,
+        known: Vec<Known>,
+    ) -> Self {
+        let running = Mutex::new(Running { filter, watch, rest_resistance });
+        Self { running, sensor, columns, known, zero_ns: None }
+    }
+}
+
+/// The state in a text.
+pub fn stored(text: &str, file: Option<&str>) -> PyResult<Stored> {
+    Stored::from_toml(text).map_err(|error| of_library(&error, file))
 }
 
 impl LaggedFilter {
@@ -103,6 +140,17 @@ impl LiveFilter {
         Ok((estimates.into_batch()?, std::mem::take(&mut watch.warnings)))
     }
 
+    /// All that the next row depends on, as TOML, with the moment that is 0 s.
+    #[pyo3(signature = (zero_ns=None))]
+    fn store(&self, py: Python, zero_ns: Option<i64>) -> PyResult<String> {
+        let running = locked(&self.running, py);
+        let mut stored = running.filter.store().map_err(refused)?;
+        stored.zero_ns = zero_ns;
+        stored.rest_resistance = running.rest_resistance;
+        running.watch.store(&mut stored);
+        stored.to_toml().map_err(refused)
+    }
+
     fn rest_resistance(&self, py: Python, measured: f64) -> PyResult<()> {
         let mut running = locked(&self.running, py);
         running.filter.rest_resistance(measured).map_err(refused)?;
@@ -125,6 +173,11 @@ impl LaggedFilter {
         let mut filter = locked(&self.filter, py);
         let rows = filter.finish().map_err(refused)?;
         rows.iter().map(|estimate| row(py, &self.columns, estimate)).collect()
+    }
+
+    /// All that the next row depends on, as TOML.
+    fn store(&self, py: Python) -> PyResult<String> {
+        locked(&self.filter, py).store().and_then(|stored| stored.to_toml()).map_err(refused)
     }
 
     fn rest_resistance(&self, py: Python, measured: f64) -> PyResult<()> {

@@ -8,7 +8,7 @@ use crate::about::About;
 use crate::doubts::of_known;
 use crate::error::{Place, of_library, raise};
 use crate::evaluation::{self, Scored};
-use crate::live::{LaggedFilter, LiveFilter};
+use crate::live::{LaggedFilter, LiveFilter, stored};
 use crate::options::Options;
 use crate::recording::Recording;
 use crate::table::Estimates;
@@ -100,6 +100,23 @@ impl Sensor {
 
     fn lagged(&self, options: Options, lag_s: f64) -> PyResult<LaggedFilter> {
         let filter = options.builder(&self.sensor)?.build_lagged(lag_s).map_err(|error| of_library(&error, None))?;
+        Ok(LaggedFilter::new(filter, options.columns(&self.sensor)?))
+    }
+
+    /// A filter that goes on from a state.
+    #[pyo3(signature = (options, state, file=None))]
+    fn resume(&self, options: Options, state: &str, file: Option<&str>) -> PyResult<LiveFilter> {
+        let stored = stored(state, file)?;
+        let filter = options.builder(&self.sensor)?.resume(&stored).map_err(|error| of_library(&error, file))?;
+        let (columns, told) = (options.columns(&self.sensor)?, options.rest_resistance(&self.sensor)?);
+        Ok(LiveFilter::resumed(filter, self.sensor.clone(), columns, told, options.known.clone(), stored))
+    }
+
+    /// The same with a lag.
+    #[pyo3(signature = (options, lag_s, state, file=None))]
+    fn resume_lagged(&self, options: Options, lag_s: f64, state: &str, file: Option<&str>) -> PyResult<LaggedFilter> {
+        let filter = options.builder(&self.sensor)?.resume_lagged(lag_s, &stored(state, file)?);
+        let filter = filter.map_err(|error| of_library(&error, file))?;
         Ok(LaggedFilter::new(filter, options.columns(&self.sensor)?))
     }
 

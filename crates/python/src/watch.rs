@@ -1,4 +1,4 @@
-use ohmstrain::{Estimate, Interface, Known, QuietWatch, ValidityWatch};
+use ohmstrain::{Estimate, Interface, Known, QuietWatch, Stored, ValidityWatch};
 use pyo3_arrow::PyRecordBatch;
 
 use crate::recording::Recording;
@@ -19,6 +19,17 @@ impl Watch {
     pub fn new(sensor: &ohmstrain::Sensor, rest_resistance: Option<f64>, known: &[Known]) -> Self {
         let watch = ValidityWatch::new(sensor, rest_resistance);
         Self { watch, quiet: QuietWatch::new(sensor, rest_resistance, known), warnings: Vec::new() }
+    }
+
+    /// Puts what has been seen into a state.
+    pub fn store(&self, stored: &mut Stored) {
+        (stored.validity, stored.quiet) = (Some(self.watch.seen()), Some(self.quiet.seen()));
+    }
+
+    /// Goes on from what a state has seen.
+    pub fn go_on(&mut self, stored: Stored) {
+        stored.validity.into_iter().for_each(|seen| self.watch.go_on(seen));
+        stored.quiet.into_iter().for_each(|seen| self.quiet.go_on(seen));
     }
 
     /// Takes a row of a recording with its estimated rate.

@@ -127,6 +127,13 @@ pub struct FilterArgs {
     /// Names of the columns of a stream that has no header line, or was joined after it: time_us,adc for instance
     #[arg(long, value_name = "COLUMNS")]
     pub header: Option<String>,
+    /// Write the filter's state when the stream has ended, for --resume; rows that wait for --lag-s go there with it
+    #[arg(long, value_name = "state.toml")]
+    pub save_state: Option<PathBuf>,
+    /// Go on from the state that --save-state wrote, with the same sensor file and options: the same estimates, to the last
+    /// digit, as if the stream had not ended. It may be the file that --save-state writes
+    #[arg(long, value_name = "state.toml", conflicts_with = "initial_strain")]
+    pub resume: Option<PathBuf>,
     /// What to write
     #[command(flatten)]
     pub written: WrittenArgs,

@@ -1,18 +1,20 @@
 use std::io;
+use std::path::Path;
 
 use ohmstrain::Interface::CommandLine;
 use ohmstrain::number::significant;
 use ohmstrain::{
-    Error, Estimate, Filter, FilterBuilder, Known, LaggedFilter, QuietWatch, Reading, Sensor, ValidityWatch,
+    Error, Estimate, Filter, FilterBuilder, Known, LaggedFilter, QuietWatch, Reading, Sensor, Stored, ValidityWatch,
 };
 use ohmstrain_bench_data::{BadContent, DeviceRow, Row, TraceError};
 
 use crate::args::{FilterArgs, Format, RestResistance, WrittenArgs};
 use crate::error::CliError;
 use crate::estimates::{self, EstimateWriter};
+use crate::filter_state;
 use crate::input::{self, check_unit};
 use crate::messages::Messages;
-use crate::output::RowsOut;
+use crate::output::{Kind, RowsOut};
 use crate::readings::{late, no_row};
 use crate::run::{builder, builder_anew, rest_resistance};
 use crate::sensor_file;
@@ -26,15 +28,22 @@ pub fn run(args: &FilterArgs, messages: &Messages) -> Result<u64, CliError> {
     let WrittenArgs { output, replace, columns, .. } = &args.written;
     let inputs = [&args.trace_file, &args.estimate.sensor];
     let mut rows_out = RowsOut::claim(output.as_deref(), columns, replace.force, inputs)?;
+    let claim = args.save_state.as_deref().map(|path| rows_out.claim_beside(path, Kind::State)).transpose()?;
     let mut sensor = sensor_file::read(&args.estimate.sensor, kind)?;
+    let stored = args.resume.as_deref().map(filter_state::read).transpose()?;
+    // Built anew once the recording has said its joint, which a stored filter knows already.
     let mut filter = FilterRun::new(&sensor, args)?;
     suits::warn_of_start(args.estimate.initial_strain, &sensor, messages);
-    let rows = stream::open(args)?;
+    let mut rows = stream::open(args)?;
     let header = input::header(rows.file(), rows.line());
     check_unit(&header, rows.reading_kind(), sensor.params().reading)?;
     if let Some(joint) = input::joint(&rows.metadata()) {
         sensor = sensor.on_joint(joint)?;
         filter = FilterRun::new(&sensor, args)?;
+    }
+    if let Some(stored) = &stored {
+        filter = FilterRun::resumed(&sensor, args, stored)?;
+        filter_state::go_on(&mut rows, stored)?;
     }
     let (columns, format) = (estimates::columns(&sensor, columns)?, args.written.format());
     let live = is_stdin(&args.trace_file) || !args.trace_file.is_file();
@@ -44,8 +53,10 @@ pub fn run(args: &FilterArgs, messages: &Messages) -> Result<u64, CliError> {
     let (watch, quiet) = (ValidityWatch::new(&sensor, None), QuietWatch::new(&sensor, None, &args.estimate.known));
     let file = rows.file().into();
     let sink = Sink { messages, writer, watch, quiet, sensor, rest: None, file, header, live, early: vec![] };
-    let stream = Stream { args, filter, sink, times: None, restarted: false, skipped: Skipped::default() };
-    let written = stream.run(rows)?;
+    let skipped = Skipped::default();
+    let stream = Stream { args, filter, sink, stored, times: None, restarted: false, skipped };
+    let (written, state) = stream.run(rows)?;
+    claim.into_iter().zip(state).for_each(|(claim, state)| rows_out.put(claim, state));
     rows_out.publish()?;
     Ok(written)
 }
@@ -64,6 +75,25 @@ enum Lag {
 impl FilterRun {
     fn new(sensor: &Sensor, args: &FilterArgs) -> Result<Self, Error> {
         Self::built(builder(sensor, &args.estimate), args)
+    }
+
+    /// One that goes on.
+    fn resumed(sensor: &Sensor, args: &FilterArgs, stored: &Stored) -> Result<Self, CliError> {
+        let builder = builder(sensor, &args.estimate);
+        let filter = match args.lag_s {
+            None => builder.resume(stored).map(Lag::None),
+            Some(lag_s) => builder.resume_lagged(lag_s, stored).map(Lag::Some),
+        };
+        let path = args.resume.as_deref().unwrap_or(Path::new("")).display();
+        let filter = filter.map_err(|error| CliError::Input(format!("{path}: {error}")))?;
+        Ok(Self { filter, row: None })
+    }
+
+    fn store(&self) -> Result<Stored, Error> {
+        match &self.filter {
+            Lag::None(filter) => filter.store(),
+            Lag::Some(filter) => filter.store(),
+        }
     }
 
     /// For a device that has started again.
@@ -108,6 +138,8 @@ struct Stream<'a, W: io::Write + Send> {
     args: &'a FilterArgs,
     filter: FilterRun,
     sink: Sink<'a, W>,
+    /// What it goes on from.
+    stored: Option<Stored>,
     /// First and last time, s, up to now or until the clock started again.
     times: Option<(f64, f64)>,
     restarted: bool,
@@ -115,8 +147,8 @@ struct Stream<'a, W: io::Write + Send> {
 }
 
 impl<'a, W: io::Write + Send> Stream<'a, W> {
-    /// Filters row by row.
-    fn run(mut self, mut rows: Rows) -> Result<u64, CliError> {
+    /// Filters row by row; how many rows were written, and the state if it is to be saved.
+    fn run(mut self, mut rows: Rows) -> Result<(u64, Option<String>), CliError> {
         let wanted = self.args.estimate.rest_resistance;
         // The rows that R₀ is taken from, at least one, are estimated too, once it is known.
         let count = if let Some(RestResistance::First(count)) = wanted { count } else { 0 };
@@ -132,6 +164,7 @@ impl<'a, W: io::Write + Send> Stream<'a, W> {
         let rest = rest_resistance(wanted, &self.sink.sensor, known(), &self.sink.file)?;
         self.sink.rest = rest;
         self.begin(&self.args.estimate.known)?;
+        let rest = self.sink.rest;
         if !self.sink.live {
             suits::check_readings(&self.sink.header, &self.sink.sensor, rest, known())?;
         }
@@ -146,10 +179,22 @@ impl<'a, W: io::Write + Send> Stream<'a, W> {
         if let (Ok(()), Some(times)) = (&streamed, self.times) {
             suits::warn_of_unused(&self.args.estimate.known, times, &self.sink.file, self.sink.messages);
         }
+        let saves = self.args.save_state.is_some() && streamed.is_ok();
         // The rows that still wait get their estimates, whatever stopped the stream, and what was estimated is still good.
-        let finished = self.finish();
+        let finished = if saves { Ok(()) } else { self.finish() };
+        let state = saves.then(|| self.state(&rows)).transpose()?;
         let written = self.sink.writer.finish()?;
-        streamed.and(finished).map(|()| written)
+        streamed.and(finished).map(|()| (written, state))
+    }
+
+    /// All that goes on with the next row.
+    fn state(&self, rows: &Rows) -> Result<String, CliError> {
+        let mut stored = self.filter.store()?;
+        stored.rest_resistance = self.sink.rest;
+        stored.clock = rows.last_time().map(filter_state::of_last_time);
+        stored.validity = Some(self.sink.watch.seen());
+        stored.quiet = Some(self.sink.quiet.seen());
+        Ok(stored.to_toml()?)
     }
 
     /// Takes what has come; `rows` says what it is of.
@@ -190,10 +235,17 @@ impl<'a, W: io::Write + Send> Stream<'a, W> {
     /// Tells the filter what the rested sensor reads, and whoever watches it.
     fn begin(&mut self, known: &'a [Known]) -> Result<(), CliError> {
         let sink = &mut self.sink;
-        let rest = sink.rest;
-        rest.map_or(Ok(()), |measured| self.filter.rest_resistance(measured))?;
-        sink.watch = ValidityWatch::new(&sink.sensor, rest);
-        sink.quiet = QuietWatch::new(&sink.sensor, rest, known);
+        sink.rest.map_or(Ok(()), |measured| self.filter.rest_resistance(measured))?;
+        let told = sink.rest.is_some();
+        let stored = self.stored.take();
+        // A filter that goes on knows its R₀.
+        sink.rest = sink.rest.or(stored.as_ref().and_then(|stored| stored.rest_resistance));
+        sink.watch = ValidityWatch::new(&sink.sensor, sink.rest);
+        sink.quiet = QuietWatch::new(&sink.sensor, sink.rest, known);
+        if let Some(stored) = stored.filter(|_| !told) {
+            stored.validity.into_iter().for_each(|seen| sink.watch.go_on(seen));
+            stored.quiet.into_iter().for_each(|seen| sink.quiet.go_on(seen));
+        }
         Ok(())
     }
 

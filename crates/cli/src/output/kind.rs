@@ -16,6 +16,8 @@ pub enum Kind {
     Sensor,
     /// What a fleet has taught.
     Prior,
+    /// State of a running filter.
+    State,
     /// Estimates of a recording.
     Estimates,
     /// A row for each recording of a batch.
@@ -38,6 +40,7 @@ impl Kind {
             Self::Import => "an imported recording",
             Self::Sensor => "a sensor file",
             Self::Prior => "a prior",
+            Self::State => "the state of a filter",
             Self::Estimates => "estimates",
             Self::Summary => "a summary",
             Self::Report => "a report",
@@ -57,8 +60,12 @@ impl Kind {
             // `live` recorded cannot.
             Self::Simulation => is_made_by(head, SIMULATE),
             Self::Import => is_made_by(head, IMPORT) || is_made_by(head, SIMULATE),
-            Self::Sensor => is_format(line()) && is_made_by_toml(line()) && !line().starts_with("sensors = "),
+            Self::Sensor => {
+                let (is_own, third) = (is_format(line()) && is_made_by_toml(line()), line());
+                is_own && !third.starts_with("sensors = ") && !third.starts_with("sensor = ")
+            }
             Self::Prior => is_format(line()) && is_made_by_toml(line()) && line().starts_with("sensors = "),
+            Self::State => is_format(line()) && is_made_by_toml(line()) && line().starts_with("sensor = "),
             Self::Estimates | Self::Summary => self.has_columns(&names_in(line()), own),
             Self::Report => behind_mark(head, page_start()).is_some_and(|rest| rest.starts_with("\">")),
             Self::Figure => is_figure(head),

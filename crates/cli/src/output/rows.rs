@@ -48,6 +48,19 @@ impl RowsOut {
         })
     }
 
+    /// Claims a file that is written with the table.
+    ///
+    /// # Errors
+    /// As [`Outputs::claim`].
+    pub fn claim_beside(&mut self, path: &Path, kind: Kind) -> Result<Claim, CliError> {
+        self.outputs.claim(path, kind)
+    }
+
+    /// Keeps that file's content until all is published.
+    pub fn put(&mut self, claim: Claim, content: String) {
+        self.outputs.put(claim, content);
+    }
+
     /// Puts a file in its place.
     ///
     /// # Errors

@@ -22,6 +22,7 @@ const PASSED_OVER: f64 = 3.0;
 
 /// The scale on which readings `R/R₀ - 1` are seen.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FeatureScale<T> {
     /// The reading that counts as zero: the middle of the range in calibration.
     pub centre: T,
@@ -60,6 +61,7 @@ pub fn settled<T: Recordable>() -> Starts<T> {
 ///
 /// A missing reading leaves the features as they were; the next one is taken over the whole time since the last.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ReadingFeatures<T> {
     scale: FeatureScale<T>,
     pub(crate) low_passes: [T; TIME_CONSTANTS_S.len()],

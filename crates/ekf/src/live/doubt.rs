@@ -39,6 +39,7 @@ pub const DOUBT: DoubtNumbers = DoubtNumbers {
 
 /// What the doubts of a sensor depend on: what its calibration has seen.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct DoubtParts<T> {
     /// Range of the readings, R/R₀ - 1.
     pub low: T,
@@ -102,6 +103,7 @@ impl<T: Recordable> Left<T> {
 
 /// How ill the sensor's law has fitted lately.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Misfit<T> {
     /// How far readings have been outside of calibration's on the side of rest, and on the other one, R/R₀ - 1, fading.
     pub(crate) near: T,
@@ -162,6 +164,7 @@ impl<T: Recordable> Misfit<T> {
 /// assert!(variance > stated.variance && flags.has(Flag::StartUp));
 /// ```
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Doubts<T> {
     parts: DoubtParts<T>,
     pub(crate) runs: bool,

@@ -30,6 +30,7 @@ fn at_reading<T: Real, E: SensorEstimator<T, N, L>, C, const N: usize, const L: 
 
 /// Estimate of a row.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct LiveEstimate<T> {
     /// Strain, within the limits.
     pub strain: Gaussian<T>,
@@ -41,6 +42,7 @@ pub struct LiveEstimate<T> {
 
 /// A row: its estimate, and what a smoother or a fixed lag needs besides.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct LiveRow<T, S> {
     /// The estimate.
     pub estimate: LiveEstimate<T>,
@@ -59,6 +61,7 @@ pub struct LiveRow<T, S> {
 
 /// A reading and its use.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Heard<T> {
     /// The verdict on it.
     pub verdict: ReadingVerdict,
@@ -111,6 +114,7 @@ pub struct LiveFilter<T: Real, E: SensorEstimator<T, N, L>, C, const N: usize, c
 
 /// State of a [`LiveFilter`] between steps.
 #[derive(Clone, Copy)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Memory<T, S> {
     /// At the last reading that was used, or whole steps of a pause after it; and the time since then.
     state: S,

@@ -196,3 +196,26 @@ impl serde::Serialize for Flags {
         serializer.collect_str(self)
     }
 }
+
+#[cfg(feature = "serde")]
+impl<'de> serde::Deserialize<'de> for Flags {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Names;
+        impl serde::de::Visitor<'_> for Names {
+            type Value = Flags;
+
+            fn expecting(&self, out: &mut fmt::Formatter) -> fmt::Result {
+                out.write_str("names of flags with | between them")
+            }
+
+            fn visit_str<E: serde::de::Error>(self, text: &str) -> Result<Flags, E> {
+                text.split('|').filter(|name| !name.is_empty()).try_fold(Flags::NONE, |flags, name| {
+                    let flag = Flag::ALL.into_iter().find(|flag| flag.name() == name);
+                    let unknown = || E::invalid_value(serde::de::Unexpected::Str(name), &self);
+                    Ok(flags.with(flag.ok_or_else(unknown)?, true))
+                })
+            }
+        }
+        deserializer.deserialize_str(Names)
+    }
+}

@@ -2,6 +2,7 @@ use crate::Recordable;
 
 /// How much larger a filter's innovations have been of late than it states them: the mean of their normalised squares.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Innovations<T> {
     pub(crate) mean: T,
 }

@@ -12,6 +12,7 @@ pub const BESIDE_SHARE: f64 = 0.1;
 /// Whether readings have jumped, so that a filter is to look again. A law that is wrong, on another day say, surprises without a
 /// jump: a filter that looked again then would lose what it has learned since.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Jumps<T> {
     /// Readings in a row that startled; those that were kept from the filter do not count.
     pub(crate) startling: T,

@@ -32,6 +32,7 @@ pub const FARTHEST_REST: f64 = 4.0;
 
 /// Between which readings, R/R₀ - 1, a sensor stays while R₀ is what it was in calibration: the strain is within its limits.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RestBounds<T> {
     /// The least; none where nobody knows.
     pub low: Option<T>,
@@ -47,6 +48,7 @@ pub struct RestBounds<T> {
 /// reading whose logarithm is `ln R₀` plus a constant, to the standard deviation f. The best linear estimate of `ln R₀` from the first
 /// reading is `s²/(s² + f²)` of the way from calibration's R₀ to the one that the reading alone suggests.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct SessionStart<T> {
     /// The usual first reading, R/R₀ - 1.
     pub reading: T,
@@ -84,6 +86,7 @@ impl RestBounds<f64> {
 /// assert!((follower.relative(2.0.into()).value - 1.5).abs() < 3e-3);
 /// ```
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RestFollower<T> {
     bounds: RestBounds<T>,
     /// By what share of calibration's R₀ it is another.

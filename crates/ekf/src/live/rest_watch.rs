@@ -4,6 +4,7 @@ use crate::Recordable;
 
 /// What calibration has seen of the sensor at rest, as R/R₀ - 1: for programs that write a filter in another language.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RestSeen<T> {
     /// What the rested, unstretched sensor read.
     pub rested: T,
@@ -35,6 +36,7 @@ impl RestSeen<f64> {
 /// else, and readings that stay where no strain leads, beyond those at rest. An R₀ that has grown is not told from a strain that
 /// is held. A sensor that rests for a while where it rested in calibration ends it.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RestWatch<T> {
     seen: RestSeen<T>,
     /// Whether the next reading is one at rest.

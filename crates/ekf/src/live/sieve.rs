@@ -87,6 +87,7 @@ pub fn news<T: Recordable>(since_s: T, error_time_s: T) -> T {
 
 /// The last reading, how long ago it came, and how long the same number has been coming.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Repeats<T> {
     pub(crate) last: Option<T>,
     pub(crate) since_s: T,

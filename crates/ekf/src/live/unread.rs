@@ -13,6 +13,7 @@ use crate::Recordable;
 /// less than a tenth and does not cancel. In the end the strain may be anywhere in the limits, and no farther: its mean square
 /// distance from an estimate m is then span²/12 + (m - centre)².
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Unread<T> {
     /// How long a rate lasts, s.
     pub rate_time_s: T,

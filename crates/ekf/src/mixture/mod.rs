@@ -13,6 +13,8 @@ mod pause;
 mod predicted;
 pub(crate) mod sign_split;
 mod state;
+#[cfg(feature = "serde")]
+mod stored;
 mod switching;
 
 pub use evidence::{Evidence, MixtureResidual};

@@ -8,6 +8,7 @@ use crate::{Gaussian, Real};
 
 /// For how long there has been no reading.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Pause<T> {
     seconds: T,
     /// Whether the phase of what moves is where it came from, and its rate may have either sign by now.

@@ -1,4 +1,6 @@
 use nalgebra::SVector;
+#[cfg(feature = "serde")]
+use ohmstrain_model::Scalar;
 use ohmstrain_model::{Phase, Symmetric};
 
 use crate::Real;
@@ -8,6 +10,11 @@ use crate::{Belief, Gaussian, State};
 
 /// A Gaussian and its share of a mixture. Shares are probabilities, not logarithms: nothing is to be converted at a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    serde(bound(serialize = "T: Scalar + serde::Serialize", deserialize = "T: Scalar + serde::Deserialize<'de>"))
+)]
 pub struct Share<T, const N: usize, const L: usize> {
     /// Its probability; zero where nothing is followed.
     pub weight: T,
@@ -29,6 +36,11 @@ impl<T: Real, const N: usize, const L: usize> Share<T, N, L> {
 
 /// One Gaussian per phase: what [`Imm`](crate::Imm) carries from step to step.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    serde(bound(serialize = "T: Scalar + serde::Serialize", deserialize = "T: Scalar + serde::Deserialize<'de>"))
+)]
 pub struct PhaseMixture<T, const N: usize, const L: usize> {
     pub(crate) modes: [Share<T, N, L>; 3],
 }
@@ -137,6 +149,12 @@ impl<T: Real, const N: usize, const L: usize, const K: usize> Mixture<T, N, L, K
     /// Follows nothing, with room for so many.
     pub(crate) fn clear(&mut self, room: usize) {
         (self.len, self.room, self.pause) = (0, room.min(K), Pause::over());
+    }
+
+    /// Sets what a state that was stored had besides its hypotheses.
+    #[cfg(feature = "serde")]
+    pub(crate) fn restore(&mut self, room: usize, pause: Pause<T>) {
+        (self.room, self.pause) = (room, pause);
     }
 
     /// Most hypotheses that steps keep.

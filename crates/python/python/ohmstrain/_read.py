@@ -6,12 +6,13 @@ import json
 import os
 import re
 import shlex
+import tempfile
 from collections.abc import Iterable, Mapping
 from typing import Any
 
 import pyarrow as pa
 
-from . import _core, _tables
+from . import _containers, _core, _tables
 from ._sensor import _warn
 
 #: Arguments that take a value per role, and lists; the importer's messages name them as flags.
@@ -53,7 +54,9 @@ def read(
     Parameters
     ----------
     *paths
-        Files of one recording: text, XLSX, Parquet, each perhaps in gzip.
+        Files of one recording: text, XLSX, Parquet, each perhaps in gzip. MATLAB files are read by scipy, those of version 7.3 and other
+        HDF5 by h5py, ROS 1 and ROS 2 bags by rosbags, MCAP by mcap (of ROS 2 with mcap-ros2-support): where the package is missing the error
+        names it.
     columns : dict
         Columns by role, by name or number from 1: ``{"time": "Time (s)", "resistance": 3, "angle": None}``; in a second file
         ``"2:Position"``. Roles: time, reference-time, resistance, ratio, adc, strain, displacement, angle, temperature.
@@ -64,7 +67,7 @@ def read(
     skip : int or dict
         Lines above header and data.
     sheet : str
-        Sheet of a workbook, or file in a zip archive.
+        Sheet of a workbook, file in a zip archive, group of HDF5, struct of a MATLAB file, or topic of a bag.
     where : dict
         Rows in which a value stands in a column: ``{"trial": 2}``.
     recording : int
@@ -126,14 +129,42 @@ def read(
         "resistance_unit": resistance_unit,
     }
     names = [os.fspath(path) for path in paths]
+    with tempfile.TemporaryDirectory(prefix="ohmstrain-") as folder:
+        readable = [_readable(name, place, folder, said, columns) for place, name in enumerate(names)]
+
+        def in_names(text: str) -> str:
+            for given, read_from in zip(names, readable):
+                text = text.replace(read_from, given)
+            return text
+
+        try:
+            batch, remarks = _core.read(readable, said)
+        except _core.OhmstrainError as error:
+            named = _core.OhmstrainError(as_arguments(in_names(str(error))))
+            named.file, named.row, named.column = ", ".join(names), error.row, error.column
+            raise named from None
+    _warn(as_arguments(in_names(remark)) for remark in remarks)
+    table = _tables.from_core(batch)
+    metadata = {key: in_names(value.decode()).encode() for key, value in (table.schema.metadata or {}).items()}
+    return table.replace_schema_metadata(metadata) if readable != names else table
+
+
+def _readable(name: str, place: int, folder: str, said: dict[str, Any], columns: Mapping[str, Any] | None) -> str:
+    """The file itself; of a container a Parquet file of its columns."""
     try:
-        batch, remarks = _core.read(names, said)
+        found = _containers.table(name, columns, said["sheet"])
     except _core.OhmstrainError as error:
-        named = _core.OhmstrainError(as_arguments(str(error)))
-        named.file, named.row, named.column = ", ".join(names), error.row, error.column
-        raise named from None
-    _warn(as_arguments(remark) for remark in remarks)
-    return _tables.from_core(batch)
+        named = _core.OhmstrainError(f"{name}: {error}")
+        named.file, named.row, named.column = name, None, None
+        raise named from error.__cause__
+    if found is None:
+        return name
+    said["sheet"] = None
+    from pyarrow import parquet
+
+    path = os.path.join(folder, f"{place}.parquet")
+    parquet.write_table(found, path)
+    return path
 
 
 def _texts(given: str | Iterable[str]) -> list[str]:

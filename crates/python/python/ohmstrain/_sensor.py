@@ -186,15 +186,26 @@ class Sensor:
         """Columns of its estimates."""
         return self._core.columns(_about(), _options())
 
-    def filter(self, recording: Any = None, *, lag_s: float | None = None, **options: Any) -> Any:
+    def filter(
+        self,
+        recording: Any = None,
+        *,
+        lag_s: float | None = None,
+        resume: str | os.PathLike[str] | None = None,
+        **options: Any,
+    ) -> Any:
         """Estimates of a recording, each from the readings up to it; or, without one, a filter for readings as they come.
 
         Parameters
         ----------
         recording
-            A table. If there is none, a :class:`LiveFilter` is returned, or a :class:`LaggedFilter`.
+            A table. Times are ``time_s`` or ``time_us``, or dates and times (of the first row is 0 s) or durations, in a column or a
+            pandas index. If there is none, a :class:`LiveFilter` is returned, or a :class:`LaggedFilter`.
         lag_s
             Wait so many seconds for later readings; for live filters.
+        resume
+            Path of a state file, from which a live filter of the same sensor and options goes on: written by its ``save``, or by
+            ``ohmstrain filter --save-state``. It knows R₀ and known strains; what is said here counts from now on.
         estimator : str
             ``auto`` (the sensor's choice), ``corrected``, ``ekf``, ``ukf``, ``imm``, ``sign-split``, ``hypotheses``.
         correction : bool
@@ -228,12 +239,16 @@ class Sensor:
             Names row and column.
         """
         if recording is not None:
-            if lag_s is not None:
-                raise TypeError("lag_s is for live filters; smooth() estimates from all readings")
+            if lag_s is not None or resume is not None:
+                raise TypeError("lag_s and resume are for live filters; smooth() estimates from all readings")
             return self._estimate(self._core.filter, recording, options)
+        if "columns" in options and options["columns"] is not None:
+            options["columns"] = list(options["columns"])
+        if resume is not None:
+            return _resumed(self, options, lag_s, Path(resume).read_text(encoding="utf-8"), os.fspath(resume))
         if lag_s is None:
-            return LiveFilter(self._core.live(_options(**options)))
-        return LaggedFilter(self._core.lagged(_options(**options), lag_s))
+            return LiveFilter(self._core.live(_options(**options)), self, options)
+        return LaggedFilter(self._core.lagged(_options(**options), lag_s), self, options, lag_s)
 
     def smooth(self, recording: Any, **options: Any) -> Any:
         """Estimates of a recording, each from all readings.
@@ -300,18 +315,25 @@ class Sensor:
 
 
 class LiveFilter:
-    """A running filter: readings in, estimates out. See :meth:`Sensor.filter`."""
+    """A running filter: readings in, estimates out. See :meth:`Sensor.filter`.
 
-    def __init__(self, core: _core.LiveFilter) -> None:
+    ``pickle``, ``copy`` and :meth:`save` keep all that it knows: what goes on from there estimates, to the last digit, what it would have.
+    """
+
+    def __init__(self, core: _core.LiveFilter, sensor: Sensor, options: Mapping[str, Any]) -> None:
         self._core = core
+        self._sensor, self._options = sensor, _of_later(options)
+        self._origin = _tables.Origin()
 
     def step(self, time_s: float, reading: float | None = None) -> dict[str, Any]:
         """Take the reading at a time, s; a missing one is None or NaN. An error leaves the filter as it was."""
         return self._core.step(time_s, reading)
 
     def run(self, rows: Any, **about: Any) -> Any:
-        """Take the rows of a table, and go on from the last one with the next: a recording in pieces."""
-        table, doubts = self._core.run(_tables.to_arrow(rows), _about(**about))
+        """Take the rows of a table, and go on from the last one with the next: a recording in pieces. Of dates and times the first of
+        the first piece is 0 s.
+        """
+        table, doubts = self._core.run(_tables.to_arrow(rows, self._origin), _about(**about))
         _warn(doubts)
         return _tables.converter(rows)(_tables.from_core(table))
 
@@ -319,12 +341,26 @@ class LiveFilter:
         """What the rested, unstretched sensor is found to read from now on."""
         self._core.rest_resistance(measured)
 
+    def state(self) -> str:
+        """All that the next row depends on, as the text of a state file."""
+        return self._core.store(self._origin.first_ns)
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write a state file, whole or not at all: for ``sensor.filter(resume=path)`` and ``ohmstrain filter --resume``."""
+        _write(path, self.state())
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _resumed, (self._sensor, self._options, None, self.state())
+
 
 class LaggedFilter:
-    """A running filter that waits: each row is estimated from the readings up to a fixed lag after it."""
+    """A running filter that waits: each row is estimated from the readings up to a fixed lag after it. It is kept as a
+    :class:`LiveFilter` is, with the rows that wait.
+    """
 
-    def __init__(self, core: _core.LaggedFilter) -> None:
+    def __init__(self, core: _core.LaggedFilter, sensor: Sensor, options: Mapping[str, Any], lag_s: float) -> None:
         self._core = core
+        self._sensor, self._options, self._lag_s = sensor, _of_later(options), lag_s
 
     def step(self, time_s: float, reading: float | None = None) -> list[dict[str, Any]]:
         """Take a reading; the rows that have become due."""
@@ -337,6 +373,33 @@ class LaggedFilter:
     def rest_resistance(self, measured: float) -> None:
         """What the rested, unstretched sensor is found to read from now on."""
         self._core.rest_resistance(measured)
+
+    def state(self) -> str:
+        """All that the next row depends on, as the text of a state file."""
+        return self._core.store()
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write a state file, whole or not at all: for ``sensor.filter(lag_s=…, resume=path)`` and ``ohmstrain filter --resume``."""
+        _write(path, self.state())
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _resumed, (self._sensor, self._options, self._lag_s, self.state())
+
+
+def _of_later(options: Mapping[str, Any]) -> dict[str, Any]:
+    """Options without what a state knows: the start, R₀ and known strains."""
+    return {name: value for name, value in options.items() if name not in ("initial_strain", "rest_resistance", "known")}
+
+
+def _resumed(
+    sensor: Sensor, options: dict[str, Any], lag_s: float | None, state: str, file: str | None = None
+) -> LiveFilter | LaggedFilter:
+    if lag_s is not None:
+        core = sensor._core.resume_lagged(_options(**options), lag_s, state, file)
+        return LaggedFilter(core, sensor, options, lag_s)
+    live = LiveFilter(sensor._core.resume(_options(**options), state, file), sensor, options)
+    live._origin.first_ns = live._core.zero_ns
+    return live
 
 
 def calibrate(

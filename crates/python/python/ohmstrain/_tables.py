@@ -5,23 +5,41 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
+import numpy as np
 import pyarrow as pa
 
+from . import _core
+
+#: Columns of times.
+TIMES = ("time_s", "time_us")
 #: Columns of readings, and of a recording; others are not handed over.
 READINGS = ("time_s", "time_us", "resistance_ohm", "resistance_ratio", "adc")
 COLUMNS = (*READINGS, "strain", "displacement_mm", "angle_deg")
 
 
-def to_arrow(table: Any) -> pa.Table:
-    """The columns of a recording that a table has, without a copy where the table has them as Arrow has them."""
+class Origin:
+    """The moment that is 0 s: the first one of a column of dates and times."""
+
+    def __init__(self, first_ns: int | None = None) -> None:
+        self.first_ns = first_ns
+
+
+def to_arrow(table: Any, origin: Origin | None = None) -> pa.Table:
+    """The columns of a recording that a table has, without a copy where the table has them as Arrow has them.
+
+    Moments become seconds from the origin, or from the first row where there is none; durations become seconds.
+    """
     refused = TypeError(f"expected a table (pandas, polars, pyarrow) or a dict of arrays, found {type(table).__name__}")
     if isinstance(table, (pa.Table, pa.RecordBatch)):
         arrow = table
     elif isinstance(table, Mapping):
-        arrow = pa.table({name: _array(column) for name, column in table.items() if name in COLUMNS})
+        wanted = _wanted(list(table), lambda name: _is_time_kind(getattr(table[name], "dtype", None)))
+        arrow = pa.table({name: _array(table[name]) for name in wanted})
     elif _is_pandas(table):
-        known = table[[name for name in table.columns if name in COLUMNS]]
-        arrow = pa.Table.from_pandas(known, preserve_index=False)
+        wanted = _wanted(list(table.columns), lambda name: _is_time_kind(table.dtypes[name]))
+        arrow = pa.Table.from_pandas(table[wanted], preserve_index=False)
+        if not any(name in TIMES for name in wanted) and _is_time_kind(table.index.dtype):
+            arrow = arrow.append_column("time_s", pa.array(table.index))
     elif hasattr(table, "__arrow_c_stream__"):
         try:
             arrow = pa.table(table)
@@ -29,9 +47,62 @@ def to_arrow(table: Any) -> pa.Table:
             raise refused from error
     else:
         raise refused
-    known = [name for name in arrow.column_names if name in COLUMNS]
+    known = _wanted(arrow.column_names, lambda name: _is_time(arrow.schema.field(name).type))
     # Without a known column all names go on, for the message that says what is missing.
-    return arrow if known in ([], arrow.column_names) else arrow.select(known)
+    return _in_seconds(arrow if known in ([], arrow.column_names) else arrow.select(known), origin or Origin())
+
+
+def _wanted(names: list[str], is_time: Callable[[str], bool]) -> list[str]:
+    """Columns of a recording; where none of them is the time, the one that holds dates and times or durations."""
+    known = [name for name in names if name in COLUMNS]
+    if not any(name in TIMES for name in known):
+        times = [name for name in names if name not in COLUMNS and is_time(name)]
+        if len(times) > 1:
+            listed = "`, `".join(str(name) for name in times)
+            raise _core.OhmstrainError(f"expected one column of times, found `{listed}`; call the right one `time_s`")
+        known = times + known
+    return known
+
+
+def _is_time_kind(dtype: Any) -> bool:
+    """Whether a dtype of numpy or pandas is one of moments or durations."""
+    return getattr(dtype, "kind", None) in ("M", "m")
+
+
+def _is_time(kind: pa.DataType) -> bool:
+    return pa.types.is_timestamp(kind) or pa.types.is_duration(kind)
+
+
+def _in_seconds(arrow: pa.Table, origin: Origin) -> pa.Table:
+    for place, field in enumerate(arrow.schema):
+        if _is_time(field.type) and (field.name in TIMES or field.name not in COLUMNS):
+            column = arrow.column(place)
+            is_moment = pa.types.is_timestamp(field.type)
+            passed = pa.array(seconds(column, field, origin if is_moment else Origin(0)))
+            return pa.table(arrow).set_column(place, "time_s", passed)
+    return arrow
+
+
+def seconds(column: Any, field: pa.Field, origin: Origin) -> np.ndarray:
+    """Seconds from the origin, each the double that is nearest."""
+    column = column.combine_chunks() if isinstance(column, pa.ChunkedArray) else column
+    if column.null_count:
+        row = column.is_null().to_pylist().index(True)
+        error = _core.OhmstrainError(f"row {row}: column `{field.name}`: expected a time, found none")
+        error.file, error.row, error.column = None, row, field.name
+        raise error
+    ticks = column.cast(pa.int64()).to_numpy()
+    tick_ns = {"s": 10**9, "ms": 10**6, "us": 10**3, "ns": 1}[field.type.unit]
+    if origin.first_ns is None and len(ticks):
+        origin.first_ns = int(ticks[0]) * tick_ns
+    first_ns = origin.first_ns or 0
+    if first_ns % tick_ns:
+        ticks, tick_ns = ticks * tick_ns, 1
+    passed, per_second = ticks - first_ns // tick_ns, 10**9 // tick_ns
+    if not len(passed) or abs(passed).max() <= 2**53:
+        return passed / per_second
+    # Python divides whole numbers of any size without rounding them first.
+    return np.array([int(count) / per_second for count in passed])
 
 
 def from_core(batch: Any) -> pa.Table:

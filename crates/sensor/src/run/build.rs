@@ -5,6 +5,8 @@ use ohmstrain_ekf::{
     AnyCurve, Compact, Dwell, Evidence, Hypotheses, Imm, Settling, SigmaPoints, SignSplit, SparseEkf, State,
 };
 use ohmstrain_model::{StrainRange, SwitchedModel};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
 
 use crate::params::SensorParams;
 use crate::params::estimator::{EstimatorKind, EstimatorParams, NoParameters, SettlingParams};
@@ -180,7 +182,8 @@ struct With<const B: usize, const N: usize> {
 impl<const B: usize, const N: usize> With<B, N> {
     fn run<E, const L: usize>(self, estimator: E) -> Box<dyn Both>
     where
-        E: SensorEstimator<f64, N, L, State: State<f64, N, L> + Send, Prepared: Send> + Send + 'static,
+        E: SensorEstimator<f64, N, L, Prepared: Send> + Send + 'static,
+        E::State: State<f64, N, L> + Serialize + DeserializeOwned + Send,
     {
         Box::new(Running::new(estimator, self.parts, self.reports, self.learned, &self.options))
     }

@@ -1,7 +1,8 @@
 use ohmstrain_ekf::StepError;
+use serde::{Deserialize, Serialize};
 
 /// Times of rows.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy, Default, Serialize, Deserialize)]
 pub(crate) struct Clock {
     last_s: Option<f64>,
 }

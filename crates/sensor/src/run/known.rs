@@ -3,6 +3,7 @@ use std::collections::VecDeque;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use ohmstrain_ekf::Gaussian;
 use ohmstrain_model::StrainRange;
+use serde::{Deserialize, Serialize};
 
 /// Known strains that count for a row: the last ones of a filter, half before and half after a smoother's row.
 pub const MOST_KNOWN: usize = 16;
@@ -35,7 +36,7 @@ const SIZES: [Size; 4] = [
 ];
 
 /// A strain that was known at a moment, and what had been stated of it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct KnownStrain {
     /// When, s.
     pub time_s: f64,
@@ -123,6 +124,11 @@ impl KnownErrors {
         if is_new {
             self.condition();
         }
+    }
+
+    /// The strains that are known, oldest first.
+    pub fn strains(&self) -> impl Iterator<Item = &KnownStrain> {
+        self.strains.iter()
     }
 
     /// True if no strain is known.

@@ -10,12 +10,14 @@ pub(crate) mod options;
 pub(crate) mod portable;
 mod remembering;
 mod running;
+mod stored;
 mod way_back;
 
 use std::ops::Range;
 
 use ohmstrain_ekf::live::{Doubts, Flags};
 use ohmstrain_ekf::{Estimate, Gaussian, Reading, ReadingVerdict, StepError};
+use serde::{Deserialize, Serialize};
 
 /// The live filter of a sensor whose number of branches and estimator are known at run time only. Threads and tasks can own it.
 pub trait Filter: Send {
@@ -58,6 +60,18 @@ pub trait Filter: Send {
     /// # Errors
     /// See [`StepError`].
     fn flush_lagged(&mut self, out: &mut dyn FnMut(Output)) -> Result<(), StepError>;
+
+    /// All that the next row depends on but the parameters and options that the filter was made of.
+    ///
+    /// # Errors
+    /// If TOML cannot hold it.
+    fn store(&self) -> Result<toml::Table, toml::ser::Error>;
+
+    /// Goes on from what [`Self::store`] gave, of a filter made of the same parameters and options, to the bit.
+    ///
+    /// # Errors
+    /// If it is the state of a filter of another kind. The filter stays as it was.
+    fn resume(&mut self, stored: toml::Table) -> Result<(), toml::de::Error>;
 }
 
 /// Smooths whole recordings with the steps of the live filter.
@@ -140,7 +154,7 @@ pub trait WayBack {
 }
 
 /// Output of a filter or smoother at one row.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Output {
     /// The estimate.
     pub estimate: Estimate<f64>,

@@ -6,12 +6,15 @@ use ohmstrain_ekf::correction::{FILTER_INPUTS, mixture};
 use ohmstrain_ekf::live::{Correct, Doubts, Flags, Heard, LiveFilter, LiveParts, LiveRow, SensorEstimator};
 use ohmstrain_ekf::{Estimate, Estimator, Gaussian, PastStep, Reading, Settling, State, StepError};
 use ohmstrain_model::{StrainRange, SwitchedModel};
+use serde::Serialize;
+use serde::de::{DeserializeOwned, Error as _};
 
 use crate::run::backward::{Backward, Row};
 use crate::run::clock::{Clock, floored};
 use crate::run::learned::{Learned, OfFilter};
 use crate::run::options::Options;
 use crate::run::remembering::Remembering;
+use crate::run::stored::{Stored, Waiting, all_pending};
 use crate::run::{Filter, Output};
 
 /// The live filter on a computer.
@@ -83,20 +86,20 @@ impl<const B: usize, const N: usize> Reports<B, N> {
 }
 
 /// A row whose estimate waits for later readings.
-struct Pending<E: SensorEstimator<f64, N, L>, const N: usize, const L: usize> {
-    time_s: f64,
-    said: Said,
-    row: LiveStep<E, N, L>,
+pub(crate) struct Pending<E: SensorEstimator<f64, N, L>, const N: usize, const L: usize> {
+    pub time_s: f64,
+    pub said: Said,
+    pub row: LiveStep<E, N, L>,
 }
 
 /// A row as it was reported when it came.
 #[derive(Clone, Copy)]
-struct Said {
-    heard: Heard<f64>,
+pub(crate) struct Said {
+    pub heard: Heard<f64>,
     /// The corrected strain before doubts, and how much larger innovations had been than stated; `None` without a correction.
-    corrected: Option<(Gaussian<f64>, f64)>,
-    doubts: Doubts<f64>,
-    rest_off: f64,
+    pub corrected: Option<(Gaussian<f64>, f64)>,
+    pub doubts: Doubts<f64>,
+    pub rest_off: f64,
 }
 
 impl<E, const B: usize, const N: usize, const L: usize> Running<E, B, N, L>
@@ -225,7 +228,7 @@ where
 
 impl<E, const B: usize, const N: usize, const L: usize> Filter for Running<E, B, N, L>
 where
-    E: SensorEstimator<f64, N, L, State: Send, Prepared: Send> + Send,
+    E: SensorEstimator<f64, N, L, State: Send + Serialize + DeserializeOwned, Prepared: Send> + Send,
 {
     fn rest(&mut self, measured: f64) -> Result<(), StepError> {
         self.live.rest(measured)
@@ -282,5 +285,23 @@ where
     fn flush_lagged(&mut self, out: &mut dyn FnMut(Output)) -> Result<(), StepError> {
         let now = self.live.state().clone();
         self.emit(self.pending.len(), now, out)
+    }
+
+    fn store(&self) -> Result<toml::Table, toml::ser::Error> {
+        toml::Table::try_from(Stored {
+            clock: self.clock,
+            memory: self.live.memory(),
+            last: self.last.clone(),
+            waiting: self.pending.iter().map(Waiting::of).collect(),
+        })
+    }
+
+    fn resume(&mut self, stored: toml::Table) -> Result<(), toml::de::Error> {
+        let Stored { clock, memory, last, waiting } = stored.try_into::<Stored<E::State>>()?;
+        let neither = || toml::de::Error::custom("`waiting`: expected rows with `read` or `predicted`");
+        self.pending = all_pending(waiting, self.live.substeps()).ok_or_else(neither)?;
+        self.live.return_to(&memory);
+        (self.clock, self.last) = (clock, last);
+        Ok(())
     }
 }

@@ -3,9 +3,20 @@
 /// A container: its name, what it begins with and where, and how it is converted.
 type Container = (&'static str, usize, &'static [u8], &'static str);
 
-const HDF5: &str = "python3 -c \"import h5py, pandas; f = h5py.File('FILE'); pandas.DataFrame({k: f[k][()].ravel() for k in f}).to_csv('out.csv', index=False)\"";
-const MAT: &str = "python3 -c \"import scipy.io, pandas; f = scipy.io.loadmat('FILE'); pandas.DataFrame({k: v.ravel() for k, v in f.items() if k[0] != '_'}).to_csv('out.csv', index=False)\"";
-const BAG: &str = "rosbags-convert --src FILE --dst out, or `rostopic echo -b FILE -p /TOPIC > out.csv`";
+/// What the Python package reads, with the package that it needs for it.
+macro_rules! of_python {
+    ($package:literal) => {
+        concat!(
+            "python3 -c \"import ohmstrain, pyarrow.csv; pyarrow.csv.write_csv(ohmstrain.read('FILE'), 'out.csv')\", with the Python \
+             packages ohmstrain and ",
+            $package
+        )
+    };
+}
+const HDF5: &str = of_python!("h5py");
+const MAT: &str = of_python!("scipy");
+const BAG: &str = of_python!("rosbags");
+const MCAP: &str = of_python!("mcap-ros2-support");
 const PAGE: &str = "save the table in it as CSV";
 const PICTURE: &str = "export the numbers behind it as CSV";
 
@@ -21,17 +32,12 @@ const KNOWN: [Container; 34] = [
         "ncdump FILE, or `python3 -c \"import xarray; xarray.open_dataset('FILE').to_dataframe().to_csv('out.csv')\"`",
     ),
     ("a ROS 1 bag", 0, b"#ROSBAG V", BAG),
-    (
-        "MCAP",
-        0,
-        b"\x89MCAP0\r\n",
-        "`ros2 topic echo` of the topic while `ros2 bag play FILE` runs, or the Python package `mcap`",
-    ),
+    ("MCAP", 0, b"\x89MCAP0\r\n", MCAP),
     (
         "an SQLite database (ROS 2 bags are some)",
         0,
         b"SQLite format 3\0",
-        "sqlite3 -csv -header FILE 'select * from TABLE' > out.csv; of a ROS 2 bag `ros2 topic echo` while `ros2 bag play` runs",
+        "sqlite3 -csv -header FILE 'select * from TABLE' > out.csv; of a ROS 2 bag ohmstrain.read('FILE') in Python, with the package rosbags",
     ),
     (
         "a LabVIEW TDMS file",
@@ -103,6 +109,8 @@ mod tests {
     fn containers_are_named_with_a_way_out() {
         let said = |bytes: &[u8]| refusal(bytes, "run.bin").unwrap_or_default();
         assert!(said(b"#ROSBAG V2.0\n").contains("ROS 1 bag") && said(b"#ROSBAG V2.0\n").contains("run.bin"));
+        let line = "write_csv(ohmstrain.read('run.bin'), 'out.csv')\", with the Python packages ohmstrain and scipy";
+        assert!(said(b"MATLAB 5.0 MAT-file").ends_with(line));
         assert!(said(b"SQLite format 3\0...").contains("sqlite3 -csv -header run.bin"));
         assert!(said(b"%PDF-1.7").contains("numbers behind it"));
         assert_eq!(said(b"time_s,resistance_ohm\n"), "");

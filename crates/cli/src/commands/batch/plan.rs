@@ -225,6 +225,10 @@ fn check_arguments(job: &mut Job, args: &BatchArgs) -> Result<(), CliError> {
         }
         Command::Filter(filter) => {
             job.estimator = filter.estimate.estimator.chosen().map(|estimator| estimator.0);
+            if filter.save_state.is_some() || filter.resume.is_some() {
+                let what = "--save-state and --resume are of one stream: use `ohmstrain filter` without batch";
+                return Err(CliError::Arguments(what.into()));
+            }
             (filter.written.output, vec![])
         }
         Command::Smooth(smooth) => {

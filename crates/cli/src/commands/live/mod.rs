@@ -3,12 +3,14 @@
 //! A thread reads lines; this one filters them and draws. No line stops the view: what is none of a trace is counted, a
 //! port that goes away is waited for. Only a stream that is not of this sensor ends it, and the key q.
 
+mod network;
 mod recorder;
 mod session;
 mod source;
 mod view;
 
 use std::io::{self, IsTerminal};
+use std::path::Path;
 use std::sync::mpsc::TryRecvError;
 use std::time::{Duration, Instant};
 
@@ -43,7 +45,11 @@ pub fn run(args: &LiveArgs, messages: &Messages) -> Result<(), CliError> {
     let kind = args.estimate.estimator.chosen().map(|estimator| estimator.0);
     let sensor = sensor_file::read(&args.estimate.sensor, kind)?;
     let mut session = Session::new(args, sensor)?;
-    let source = Source::open(&args.port, args.baud)?;
+    let source = match (&args.udp, &args.tcp) {
+        (Some(address), _) => Source::listening(|send| network::listen_udp(address, send))?,
+        (None, Some(address)) => Source::listening(|send| network::read_tcp(address, send))?,
+        (None, None) => Source::open(args.port.as_deref().unwrap_or(Path::new("-")), args.baud)?,
+    };
     let pace = source.is_recording.then_some(Pace { speed: args.speed, started: None });
     let mut live = Live { source, pace, held: None, status: "waiting".into() };
     let mut terminal =

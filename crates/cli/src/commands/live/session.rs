@@ -111,7 +111,7 @@ impl<'a> Session<'a> {
             Some(RestResistance::Calibrated) => Some(sensor.params().rested()),
             _ => None,
         };
-        let name = args.port.display().to_string();
+        let name = args.source();
         let lines = LineParser::new(&name, args.setup.metadata(&args.estimate.units));
         let (filter, watch) = (builder(&sensor, &args.estimate).build()?, ValidityWatch::new(&sensor, rest));
         let quiet = QuietWatch::new(&sensor, rest, &args.estimate.known);
@@ -181,7 +181,7 @@ impl<'a> Session<'a> {
     /// A header has come: another stream begins.
     fn headed(&mut self) -> Result<(), CliError> {
         let kind = self.lines.reading_kind();
-        let header = self.args.port.display().to_string();
+        let header = self.args.source();
         kind.map_or(Ok(()), |kind| check_unit(&header, kind, self.sensor.params().reading))?;
         if let Some(joint) = input::joint(&self.lines.metadata()) {
             self.sensor = self.calibrated.clone().on_joint(joint)?;
@@ -293,7 +293,7 @@ impl<'a> Session<'a> {
         if self.early.len() == wanted {
             self.rest = median(self.early.clone());
             let told = self.rest.map_or(Ok(()), |measured| self.filter.rest_resistance(measured));
-            told.map_err(|refused| of_first(&refused, wanted, &self.args.port.display().to_string()))?;
+            told.map_err(|refused| of_first(&refused, wanted, &self.args.source()))?;
             self.watch = ValidityWatch::new(&self.sensor, self.rest);
         }
         if self.early.len() == wanted.max(FIRST_LIVE_READINGS)

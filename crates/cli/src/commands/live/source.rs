@@ -16,7 +16,7 @@ const WAITING: usize = 1 << 12;
 const LONGEST_LINE: usize = 1 << 13;
 /// How long a read of a port waits, and how long a port that is gone is left alone.
 const READ_TIMEOUT: Duration = Duration::from_millis(100);
-const RETRY: Duration = Duration::from_millis(300);
+pub(super) const RETRY: Duration = Duration::from_millis(300);
 
 /// What a source says.
 pub enum Event {
@@ -39,6 +39,16 @@ pub struct Source {
 }
 
 impl Source {
+    /// One that a thread fills, which `start` starts.
+    ///
+    /// # Errors
+    /// If that cannot be done.
+    pub fn listening(start: impl FnOnce(SyncSender<Event>) -> Result<(), CliError>) -> Result<Self, CliError> {
+        let (send, events) = sync_channel(WAITING);
+        start(send)?;
+        Ok(Self { events, is_recording: false })
+    }
+
     /// Starts to read.
     ///
     /// # Errors
@@ -91,7 +101,7 @@ fn is_pipe(_: &Path) -> bool {
 }
 
 /// Reads for as long as anybody listens.
-fn read_to_end(source: &mut dyn Read, send: &SyncSender<Event>) -> Result<(), SendError<Event>> {
+pub(super) fn read_to_end(source: &mut dyn Read, send: &SyncSender<Event>) -> Result<(), SendError<Event>> {
     let mut lines = Lines::default();
     send.send(Event::Connected)?;
     let failed = loop {
@@ -148,7 +158,7 @@ fn read_port(path: &Path, baud: u32, send: &SyncSender<Event>) {
 }
 
 /// Why reading stopped.
-enum Stop {
+pub(super) enum Stop {
     /// Nobody listens.
     Unheard,
     /// The source failed.
@@ -163,7 +173,7 @@ impl From<SendError<Event>> for Stop {
 
 /// Bytes as lines.
 #[derive(Default)]
-struct Lines {
+pub(super) struct Lines {
     begun: Vec<u8>,
     /// What comes until the end of the line is the rest of one that was cut.
     is_cut: bool,
@@ -171,7 +181,7 @@ struct Lines {
 
 impl Lines {
     /// Reads once and sends the lines that are complete; the number of bytes, 1 if none came in time.
-    fn read(&mut self, source: &mut dyn Read, send: &SyncSender<Event>) -> Result<usize, Stop> {
+    pub(super) fn read(&mut self, source: &mut dyn Read, send: &SyncSender<Event>) -> Result<usize, Stop> {
         let mut bytes = [0; 4096];
         let count = match source.read(&mut bytes) {
             Ok(count) => count,
@@ -199,7 +209,7 @@ impl Lines {
     }
 
     /// Sends what has no end.
-    fn finish(self, send: &SyncSender<Event>) -> Result<(), SendError<Event>> {
+    pub(super) fn finish(self, send: &SyncSender<Event>) -> Result<(), SendError<Event>> {
         if self.begun.is_empty() { Ok(()) } else { send.send(Event::Line(self.begun, Instant::now())) }
     }
 }

@@ -1,0 +1,42 @@
+//! The state of a filter between two streams.
+
+use std::path::Path;
+
+use ohmstrain::{Stored, StoredClock};
+use ohmstrain_bench_data::{LastTime, Microseconds};
+
+use crate::error::CliError;
+use crate::stream::Rows;
+use crate::whole_file;
+
+/// Reads what `--save-state` wrote.
+pub fn read(path: &Path) -> Result<Stored, CliError> {
+    let text = whole_file::text(path)?;
+    Stored::from_toml(&text).map_err(|error| CliError::Input(format!("{}: {error}", path.display())))
+}
+
+/// The clock of a stream, to be stored.
+pub const fn of_last_time(last: LastTime) -> StoredClock {
+    match last {
+        LastTime::Seconds(time_s) => StoredClock::TimeS(time_s),
+        LastTime::Microseconds(Microseconds { counter, unwrapped }) => StoredClock::TimeUs { counter, unwrapped },
+    }
+}
+
+/// Lets a stream go on from where the one before ended.
+pub fn go_on(rows: &mut Rows, stored: &Stored) -> Result<(), CliError> {
+    let (last, column) = match stored.clock {
+        None => return Ok(()),
+        Some(StoredClock::TimeS(time_s)) => (LastTime::Seconds(time_s), "time_s"),
+        Some(StoredClock::TimeUs { counter, unwrapped }) => {
+            (LastTime::Microseconds(Microseconds { counter, unwrapped }), "time_us")
+        }
+    };
+    if rows.go_on(last) {
+        return Ok(());
+    }
+    let (file, line) = (rows.file(), rows.line());
+    Err(CliError::Input(format!(
+        "{file}:{line}: expected the column `{column}`, as in the stream that --resume goes on from"
+    )))
+}
