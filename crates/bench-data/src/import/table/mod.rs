@@ -2,6 +2,7 @@
 
 mod columns;
 mod data;
+mod description;
 mod grid;
 mod header;
 mod layout;

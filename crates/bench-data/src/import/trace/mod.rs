@@ -3,6 +3,7 @@
 mod build;
 mod plan;
 mod survey;
+mod survey_lines;
 
 pub use build::Imported;
 pub use plan::Plan;
