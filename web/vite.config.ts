@@ -1,0 +1,29 @@
+import { readFileSync } from "node:fs";
+import { gzipSync } from "node:zlib";
+import { defineConfig } from "vitest/config";
+import type { Plugin } from "vite";
+import { viteSingleFile } from "vite-plugin-singlefile";
+
+/**
+ * The WebAssembly as text, gzip in Base64: the page is one file that works from a disk, and nothing is fetched. Compressed
+ * again on its way, it is hardly larger than the bytes would be.
+ */
+function wasmAsText(): Plugin {
+  const name = "virtual:wasm";
+  return {
+    name: "wasm-as-text",
+    resolveId: (id) => (id === name ? `\0${name}` : undefined),
+    load: (id) => {
+      if (id !== `\0${name}`) return undefined;
+      const bytes = readFileSync(new URL("pkg/ohmstrain_bg.wasm", import.meta.url));
+      return `export default "${gzipSync(bytes, { level: 9 }).toString("base64")}";`;
+    },
+  };
+}
+
+export default defineConfig({
+  plugins: [wasmAsText(), viteSingleFile({ removeViteModuleLoader: true })],
+  build: { target: "es2022", assetsInlineLimit: Number.MAX_SAFE_INTEGER, chunkSizeWarningLimit: 10_000 },
+  worker: { format: "iife" },
+  test: { include: ["tests/**/*.test.ts"], testTimeout: 240_000, hookTimeout: 120_000, fileParallelism: false },
+});
