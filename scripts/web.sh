@@ -36,6 +36,18 @@ tools() {
 
 # Runs a command with what scripts/bare-metal.sh is to know of the target.
 for_wasm() {
+    BARE_METAL_TARGET=wasm32-unknown-unknown BARE_METAL_STD=std,panic_abort BARE_METAL_TARGET_DIR=$target/web \
+        CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_LINKER=$(linker) "$@"
+}
+
+# rust-lld of the toolchain: Debian's compiler comes without a linker for WebAssembly.
+linker() {
+    local found
+    found=$(find "$(rustc --print sysroot)/lib/rustlib" -name rust-lld -type f 2>/dev/null | head -n 1)
+    echo "${found:-wasm-ld}"
+}
+
+wasm() {
     (
         cd crates/web
         for_wasm ../../scripts/bare-metal.sh --release --locked -p ohmstrain-web
@@ -43,8 +55,6 @@ for_wasm() {
     )
     rm -rf web/pkg
     "$target/web/debug/ohmstrain-web-bindgen" "$target/web/wasm32-unknown-unknown/release/ohmstrain_web.wasm" web/pkg
-    web/node_modules/.bin/wasm-opt -O3 --all-features -o web/pkg/smaller.wasm web/pkg/ohmstrain_bg.wasm
-    mv web/pkg/smaller.wasm web/pkg/ohmstrain_bg.wasm
 }
 
 page() {

@@ -21,8 +21,8 @@ const LONGEST_TEXT: usize = 1024;
 
 /// A trace in a Parquet file, as the text of the trace CSV that it stands for: line 1 is the header, data row k line k + 1.
 ///
-/// The file is read page by page, whatever its size: uncompressed, Snappy or gzip. Columns that no trace has are passed over
-/// unread. Numbers arrive unchanged.
+/// The file is read page by page, whatever its size and compression (Snappy, Zstandard, LZ4, gzip, brotli). Columns that no
+/// trace has are passed over unread. Numbers arrive unchanged.
 ///
 /// ```no_run
 /// use ohmstrain_bench_data::{ParquetText, TraceReader};
@@ -65,6 +65,7 @@ impl ParquetText {
         }
         let is_known =
             |field: &Type| field.is_primitive() && Column::ALL.iter().any(|known| known.name() == field.name());
+        let root = described.schema().name().to_owned();
         let fields = described.schema().get_fields();
         let is_read = fields.iter().map(|field| is_known(field)).collect();
         let wanted = fields.iter().filter(|field| is_known(field)).map(Arc::clone).collect();
@@ -74,7 +75,8 @@ impl ParquetText {
             header.push(b',');
         }
         end_line(&mut header);
-        let wanted = Type::group_type_builder("schema").with_fields(wanted).build().map_err(broken)?;
+        // The root of a schema has whatever name the program gave it that wrote the file.
+        let wanted = Type::group_type_builder(&root).with_fields(wanted).build().map_err(broken)?;
         let rows = RowIter::from_file_into(Box::new(reader)).project(Some(wanted)).map_err(broken)?;
         Ok(Self { rows, metadata, is_read, pending: Cursor::new(header) })
     }
@@ -148,5 +150,5 @@ fn end_line(out: &mut [u8]) {
 
 /// What is said of a file that is no Parquet, or another kind of it.
 pub(crate) fn broken(error: ParquetError) -> io::Error {
-    io::Error::other(format!("cannot be read as Parquet (uncompressed, Snappy or gzip): {error}"))
+    io::Error::other(format!("cannot be read as Parquet: {error}"))
 }

@@ -1,5 +1,6 @@
 //! Workbooks and Parquet files that the test writes with other people's libraries.
 
+use std::io::Write as _;
 use std::sync::Arc;
 
 use ohmstrain_bench_data::Trace;
@@ -121,7 +122,9 @@ fn parquet(compression: Compression) -> Vec<u8> {
 
 #[test]
 fn parquet_as_most_programs_write_it() {
-    for compression in [Compression::UNCOMPRESSED, Compression::SNAPPY, Compression::GZIP(Default::default())] {
+    let packed = [Compression::SNAPPY, Compression::LZ4_RAW, Compression::LZ4, Compression::ZSTD(Default::default())];
+    let slowly = [Compression::GZIP(Default::default()), Compression::BROTLI(Default::default())];
+    for compression in packed.into_iter().chain(slowly).chain([Compression::UNCOMPRESSED]) {
         has_the_numbers(&import(parquet(compression), &Recipe::default()), 0.0);
     }
 }
@@ -139,6 +142,59 @@ fn a_damaged_parquet_file_is_no_panic() {
             assert!(error.starts_with("lab.parquet") && error.lines().count() == 1, "{place}: {error}");
         }
     }
+}
+
+/// Files in a zip archive.
+fn zip(files: &[(&str, &[u8])]) -> Vec<u8> {
+    let mut writer = zip::ZipWriter::new(std::io::Cursor::new(Vec::new()));
+    for (name, content) in files {
+        writer.start_file(*name, zip::write::SimpleFileOptions::default()).unwrap();
+        writer.write_all(content).unwrap();
+    }
+    writer.finish().unwrap().into_inner()
+}
+
+fn csv() -> Vec<u8> {
+    let row = |row: usize| format!("{},{},{}\n", time_s(row), kiloohm(row), strain(row));
+    ("Time (s),R (kOhm),Strain\n".to_owned() + &(0..ROWS).map(row).collect::<String>()).into_bytes()
+}
+
+#[test]
+fn a_file_in_a_zip_archive() {
+    let one = zip(&[("run/trace.csv", &csv()), ("__MACOSX/run/._trace.csv", b"\0\x05\x16\x07")]);
+    has_the_numbers(&import(one, &Recipe::default()), 0.0);
+    let two = zip(&[("a.csv", b"notes\n"), ("b.csv", &csv())]);
+    let error = read_table(two.clone(), "lab.zip", &Recipe::default().read_options(0)).unwrap_err().to_string();
+    assert!(error.contains("--sheet a.csv or --sheet b.csv"), "{error}");
+    let known = Recipe { sheet: Some("b.csv".into()), ..Recipe::default() };
+    has_the_numbers(&import(two, &known), 0.0);
+}
+
+/// An array as NumPy writes it.
+fn numpy(shape: &str, numbers: impl Iterator<Item = f64>) -> Vec<u8> {
+    let header = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}\n");
+    let data: Vec<u8> = numbers.flat_map(f64::to_le_bytes).collect();
+    [b"\x93NUMPY\x01\0", &(header.len() as u16).to_le_bytes()[..], header.as_bytes(), &data].concat()
+}
+
+#[test]
+fn arrays_of_numpy() {
+    let shape = format!("({ROWS},)");
+    let arrays: [(&str, fn(usize) -> f64); 3] =
+        [("time_s.npy", time_s), ("R_kohm.npy", kiloohm), ("strain.npy", strain)];
+    let mut files: Vec<(&str, Vec<u8>)> =
+        arrays.iter().map(|(name, of)| (*name, numpy(&shape, (0..ROWS).map(of)))).collect();
+    files.push(("rate.npy", numpy("(1,)", [20.0].into_iter())));
+    let files: Vec<(&str, &[u8])> = files.iter().map(|(name, bytes)| (*name, bytes.as_slice())).collect();
+    has_the_numbers(&import(zip(&files), &Recipe::default()), 0.0);
+    let table = numpy(&format!("({ROWS}, 3)"), (0..ROWS).flat_map(|row| [time_s(row), kiloohm(row), strain(row)]));
+    let answers = [("time", "1", "s"), ("resistance", "2", "kohm"), ("strain", "3", "1")];
+    let known = Recipe {
+        columns: answers.map(|(role, column, _)| (role.parse().unwrap(), column.parse().unwrap())).to_vec(),
+        units: answers.map(|(role, _, unit)| (role.parse().unwrap(), unit.to_owned())).to_vec(),
+        ..Recipe::default()
+    };
+    has_the_numbers(&import(table, &known), 0.0);
 }
 
 #[test]

@@ -124,3 +124,59 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn a_conductance_is_one_over_a_resistance() {
+    let siemens = |tenths: i64, per_siemens: f64| per_siemens / (tenths as f64 / 10.0);
+    for (name, per_siemens) in
+        [("Conductance (uS)", 1e6), ("Leitwert [mS]", 1e3), ("conductance_us", 1e6), ("G (S)", 1.0)]
+    {
+        let names = format!("Time (s),{name},Strain (%)\n");
+        let text = with_ohms(&names, |tenths| siemens(tenths, per_siemens).to_string());
+        let (_, imported) =
+            proposed(&[("g.csv", text.into())], &Recipe::default()).unwrap_or_else(|error| panic!("{name}: {error}"));
+        // The quotient, the file's digits and the inverse are rounded once each.
+        let is_near = |(found, expected): (&f64, f64)| (found / expected - 1.0).abs() < 3.0 * f64::EPSILON;
+        assert!(imported.trace.readings.values.iter().zip(truth().ohm()).all(is_near), "{name}");
+    }
+    let bare = with_ohms("Time (s),Conductance,Strain (%)\n", |tenths| siemens(tenths, 1e6).to_string());
+    asks(&[("g.csv", &bare)], &Recipe::default(), &["R = 1/G", "--unit resistance=uS"]);
+    let open =
+        with_ohms(
+            "Time (s),Conductance (mS),Strain (%)\n",
+            |tenths| if tenths > 16_500 { "0".into() } else { "1".into() },
+        );
+    asks(&[("g.csv", &open)], &Recipe::default(), &["--drop-zeros resistance"]);
+}
+
+#[test]
+fn stretch_ratios_and_relative_changes() {
+    let row = |ms, ohm, strain| {
+        format!("{},{},{}", decimal(ms, 3, '.'), decimal(ohm, 1, '.'), decimal(10_000 + strain, 4, '.'))
+    };
+    let text = file("Time (s),R (Ohm),Stretch ratio\n", row);
+    let recipe = proposed(&[("lambda.csv", text.clone().into())], &Recipe::default()).unwrap();
+    assert!(recipe.0.arguments().windows(2).any(|flag| flag == ["--zero", "strain=1"]), "{:?}", recipe.0.arguments());
+    let strain = recipe.1.trace.reference.unwrap().values;
+    // What 1 has more of digits is lost.
+    assert!(strain.iter().zip(truth().strain()).all(|(found, expected)| (found - expected).abs() <= f64::EPSILON));
+    let asked = Plan::new(&tables(&[("lambda.csv", text.into())], &Recipe::default()).unwrap(), &Recipe::default());
+    assert!(asked.unwrap_err().to_string().contains("--zero strain=1"));
+    let row = |ms, ohm, strain| format!("{},{},{}", decimal(ms, 3, '.'), decimal(ohm, 4, '.'), decimal(strain, 2, '.'));
+    for name in ["ΔR/R₀ (%)", "∆R/R0 [%]", "(R-R0)/R0 (%)"] {
+        let (_, imported) =
+            proposed(&[("change.csv", file(&format!("Time (s),{name},Strain (%)\n"), row).into())], &Recipe::default())
+                .unwrap();
+        assert_eq!(imported.trace.readings.values[0], 1.016, "{name}");
+    }
+    let large = file("Time (s),R/R0 (%),Strain (%)\n", |ms, ohm, strain| row(ms, 1_000_000 + ohm, strain));
+    asks(&[("ratio.csv", &large)], &Recipe::default(), &["--unit ratio=percent or --unit ratio=change-percent"]);
+}
+
+#[test]
+fn units_stand_in_a_column_of_their_own() {
+    let row = |ms, ohm, strain| {
+        format!("{},{},kOhm,{},%", decimal(ms, 3, '.'), decimal(ohm, 4, '.'), decimal(strain, 2, '.'))
+    };
+    is_imported("meter.csv", file("Time (s),Reading,Unit,Strain,Unit\n", row), &Recipe::default());
+}

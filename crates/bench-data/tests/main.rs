@@ -15,11 +15,19 @@ mod import_files;
 #[cfg(feature = "import")]
 mod import_forms;
 #[cfg(feature = "import")]
+mod import_headers;
+#[cfg(feature = "import")]
+mod import_json;
+#[cfg(feature = "import")]
+mod import_recordings;
+#[cfg(feature = "import")]
 mod import_rig;
 #[cfg(feature = "import")]
 mod import_times;
 #[cfg(feature = "import")]
 mod import_units;
+#[cfg(feature = "import")]
+mod parquet_traces;
 mod reader;
 mod round_trip;
 mod segment;

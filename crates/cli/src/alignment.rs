@@ -1,36 +1,30 @@
 //! References that are early or late.
 
-use ohmstrain::LagDoubt;
+use ohmstrain::{Interface, LagAnswer};
 use ohmstrain_calib::aligned;
 
 use crate::error::CliError;
 use crate::input::TraceFile;
+use crate::messages::Messages;
 
 /// Says how late the reference of a recording is; moves it if that is wanted, refuses one that is certainly too late to be used
 /// otherwise, and warns of one that probably is; says how late it is where that does not matter if `explain`. By how much it was
 /// moved, s.
-pub fn check(recording: &mut TraceFile, align: bool, explain: bool) -> Result<f64, CliError> {
+pub fn check(recording: &mut TraceFile, align: bool, explain: bool, messages: &Messages) -> Result<f64, CliError> {
     let samples = recording.samples()?;
     let known = ohmstrain::Recording::new(samples.time_s(), samples.reading(), samples.strain())?;
     let name = recording.name.clone();
-    let doubt = known.lag_doubt();
-    if let Some(lag) = doubt.as_ref().and_then(LagDoubt::lag).filter(|_| align) {
-        CliError::warning(&format!("{name}: the reference is {lag}; it was moved by that"));
-        shift(recording, lag.lag_s)?;
-        return Ok(lag.lag_s);
-    }
-    match doubt {
-        None => {}
-        Some(little @ LagDoubt::Little(_)) if explain => CliError::remark(&format!("{name}: {little}")),
-        Some(little @ LagDoubt::Little(_)) => CliError::detail(&format!("{name}: {little}")),
-        Some(unknown @ (LagDoubt::OutOfReach { .. } | LagDoubt::Repeats { .. })) => {
-            CliError::warning(&format!("{name}: {unknown}"))
+    let Some(doubt) = known.lag_doubt() else { return Ok(0.0) };
+    match doubt.answer(align, Interface::CommandLine) {
+        LagAnswer::Move(lag, text) => {
+            messages.warning(&format!("{name}: {text}"));
+            shift(recording, lag.lag_s)?;
+            return Ok(lag.lag_s);
         }
-        Some(certain @ LagDoubt::Certain(_)) => {
-            let answer = "--align moves it to where the readings say it belongs";
-            return Err(CliError::Input(format!("{name}: {certain}; {answer}")));
-        }
-        Some(late) => CliError::warning(&format!("{name}: {late} --align moves it")),
+        LagAnswer::Refuse(text) => return Err(CliError::Input(format!("{name}: {text}"))),
+        LagAnswer::Warn(text) => messages.warning(&format!("{name}: {text}")),
+        LagAnswer::Remark(text) if explain => messages.remark(&format!("{name}: {text}")),
+        LagAnswer::Remark(text) => messages.detail(&format!("{name}: {text}")),
     }
     Ok(0.0)
 }

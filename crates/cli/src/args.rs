@@ -38,7 +38,7 @@ pub use simulate::{DemoArgs, DemoMaterial, SimulateArgs};
 pub use split::Split;
 pub use trace::{ReplaceArgs, SetupArgs, UnitArgs};
 
-use crate::verbosity::Verbosity;
+use crate::messages::Verbosity;
 
 /// From the resistance of a soft strain sensor to strain, with an honest error bar.
 #[derive(Debug, Parser)]

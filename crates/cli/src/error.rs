@@ -1,5 +1,5 @@
 use std::borrow::Cow;
-use std::io::{self, Write};
+use std::io;
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -9,8 +9,8 @@ use ohmstrain_calib::CalibrationError;
 use ohmstrain_export::ExportError;
 use thiserror::Error;
 
+use crate::messages::Messages;
 use crate::printable::printable;
-use crate::verbosity::Verbosity;
 
 /// Why a command stopped; each kind has its exit code.
 #[derive(Debug, Error)]
@@ -36,44 +36,24 @@ pub enum CliError {
 }
 
 impl CliError {
-    /// Says what happened on stderr, unless it is nobody's business.
-    pub fn report(&self) -> ExitCode {
-        let code = match self {
-            Self::ClosedPipe => return ExitCode::SUCCESS,
+    /// The program's exit code.
+    pub const fn code(&self) -> u8 {
+        match self {
+            Self::ClosedPipe => 0,
             Self::Other(_) => 1,
             Self::Arguments(_) => 2,
             Self::Check(_) => 3,
             Self::Input(_) => 4,
             Self::Batch(_) => 5,
-        };
-        Self::error(&self.to_string());
-        ExitCode::from(code)
-    }
-
-    /// Says on stderr what went wrong.
-    pub fn error(text: &str) {
-        // `eprintln!` would panic if whoever read stderr has left.
-        let _ = writeln!(io::stderr(), "ohmstrain: {}", printable(text));
-    }
-
-    /// Says on stderr what did not stop the command.
-    pub fn remark(text: &str) {
-        if Verbosity::chosen() == Verbosity::Quiet {
-            return;
-        }
-        Self::error(text);
-    }
-
-    /// Says on stderr what is being done, where that is wanted.
-    pub fn detail(text: &str) {
-        if Verbosity::chosen() == Verbosity::Detailed {
-            Self::error(text);
         }
     }
 
-    /// Says on stderr what casts doubt on a result.
-    pub fn warning(text: &str) {
-        Self::remark(&format!("warning: {text}"));
+    /// Says what happened on stderr, unless it is nobody's business.
+    pub fn report(&self) -> ExitCode {
+        if !matches!(self, Self::ClosedPipe) {
+            Messages::error(&self.to_string());
+        }
+        ExitCode::from(self.code())
     }
 
     /// Calibration failed on the contents of `files`.

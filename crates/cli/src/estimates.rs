@@ -11,6 +11,7 @@ use crate::parquet_table::ParquetTable;
 pub struct EstimateWriter<W: Write + Send> {
     rows: Rows<W>,
     columns: Vec<Column>,
+    count: u64,
 }
 
 enum Rows<W: Write + Send> {
@@ -33,12 +34,13 @@ impl<W: Write + Send> EstimateWriter<W> {
                 Rows::Parquet(Box::new(ParquetTable::new(out, named)?))
             }
         };
-        Ok(Self { rows, columns })
+        Ok(Self { rows, columns, count: 0 })
     }
 
     /// Writes one row.
     pub fn write(&mut self, row: &Estimate) -> Result<(), CliError> {
         let number = |column: &Column| column.number(row);
+        self.count += 1;
         write_row(&mut self.rows, &self.columns, number, row.flags)
     }
 
@@ -49,6 +51,7 @@ impl<W: Write + Send> EstimateWriter<W> {
         let bits = flags.iter().rev().fold(0, |bits, byte| bits << 8 | u16::from(*byte));
         let flags =
             Flag::ALL.into_iter().fold(Flags::NONE, |flags, flag| flags.with(flag, bits >> flag as u16 & 1 == 1));
+        self.count += 1;
         write_row(&mut self.rows, &self.columns, |_| numbers.next().unwrap_or(f64::NAN), flags)
     }
 
@@ -60,12 +63,13 @@ impl<W: Write + Send> EstimateWriter<W> {
         }
     }
 
-    /// Writes the end.
-    pub fn finish(self) -> Result<(), CliError> {
+    /// Writes the end; how many rows there are.
+    pub fn finish(self) -> Result<u64, CliError> {
         match self.rows {
-            Rows::Csv(mut rows) => Ok(rows.flush()?),
-            Rows::Parquet(rows) => Ok(rows.finish()?.flush()?),
+            Rows::Csv(mut rows) => rows.flush()?,
+            Rows::Parquet(rows) => rows.finish()?.flush()?,
         }
+        Ok(self.count)
     }
 }
 

@@ -11,6 +11,7 @@ mod error;
 mod estimates;
 mod input;
 mod lab_files;
+mod messages;
 mod output;
 mod parquet_table;
 mod plausible;
@@ -22,7 +23,6 @@ mod run;
 mod sensor_file;
 mod stream;
 mod suits;
-mod verbosity;
 mod whole_file;
 
 use std::borrow::Cow;
@@ -31,6 +31,7 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
+use messages::Messages;
 use printable::{printable, printable_lines};
 
 fn main() -> ExitCode {
@@ -38,8 +39,7 @@ fn main() -> ExitCode {
         Ok(args) => args,
         Err(error) => return refused(error),
     };
-    args.verbosity().choose();
-    match commands::dispatch(&args.command) {
+    match commands::dispatch(&args.command, &Messages::shown(args.verbosity())) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => error.report(),
     }

@@ -1,6 +1,6 @@
 //! Text of files, devices and file names as a terminal may show it.
 //!
-//! Everything for people passes here on its way out: messages in [`CliError::error`](crate::error::CliError::error), tables in
+//! Everything for people passes here on its way out: messages in [`Messages`](crate::messages::Messages), tables in
 //! [`print`](crate::output::print), the picture of `live`, titles of reports. Data (rows of CSV, JSON) does not.
 
 use std::borrow::Cow;

@@ -3,35 +3,33 @@ use std::time::Instant;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use ohmstrain_calib::Stage;
 
-use crate::error::CliError;
-use crate::verbosity::Verbosity;
+use crate::messages::Messages;
 
 /// A progress bar on stderr; silent unless stderr is a terminal.
-pub struct Progress {
+pub struct Progress<'a> {
+    messages: &'a Messages,
     bar: ProgressBar,
     start: Instant,
 }
 
-impl Progress {
+impl<'a> Progress<'a> {
     /// A bar with a heading.
-    pub fn new(heading: &'static str) -> Self {
-        let target = match Verbosity::chosen() {
-            Verbosity::Quiet => ProgressDrawTarget::hidden(),
-            _ => ProgressDrawTarget::stderr(),
-        };
+    pub fn new(heading: &'static str, messages: &'a Messages) -> Self {
+        let shown = messages.shows_progress();
+        let target = if shown { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
         let bar = ProgressBar::with_draw_target(Some(1), target);
         if let Ok(style) = ProgressStyle::with_template("{msg:32} {wide_bar} {percent:>3} %") {
             bar.set_style(style);
         }
         bar.set_message(heading);
-        let progress = Self { bar, start: Instant::now() };
+        let progress = Self { messages, bar, start: Instant::now() };
         progress.detail(heading);
         progress
     }
 
     /// A bar over so many bytes of recordings, with the time that is left.
-    pub fn over_bytes(heading: &'static str, bytes: u64) -> Self {
-        let progress = Self::new(heading);
+    pub fn over_bytes(heading: &'static str, bytes: u64, messages: &'a Messages) -> Self {
+        let progress = Self::new(heading, messages);
         if let Ok(style) = ProgressStyle::with_template("{msg:32} {wide_bar} {percent:>3} %, {eta} left") {
             progress.bar.set_style(style);
         }
@@ -46,6 +44,11 @@ impl Progress {
         self.bar.inc(bytes);
     }
 
+    /// Where what is said goes.
+    pub const fn messages(&self) -> &Messages {
+        self.messages
+    }
+
     /// Prints around the bar.
     pub fn around<T>(&self, print: impl FnOnce() -> T) -> T {
         self.bar.suspend(print)
@@ -58,7 +61,7 @@ impl Progress {
     }
 
     fn detail(&self, what: &str) {
-        CliError::detail(&format!("{:.1} s: {what}", self.start.elapsed().as_secs_f64()));
+        self.messages.detail(&format!("{:.1} s: {what}", self.start.elapsed().as_secs_f64()));
     }
 
     /// Shows where a calibration is.
@@ -77,7 +80,7 @@ impl Progress {
     }
 }
 
-impl Drop for Progress {
+impl Drop for Progress<'_> {
     fn drop(&mut self) {
         self.bar.finish_and_clear();
     }

@@ -181,3 +181,40 @@ fn remarks_name_every_missing_word_and_come_once() {
     let lines: Vec<&str> = said.lines().collect();
     assert!(lines.iter().enumerate().all(|(k, line)| !lines[..k].contains(line)), "{said}");
 }
+
+#[test]
+fn recordings_of_one_file_are_written_apart() {
+    let bench = Bench::new();
+    let run = |ohm: usize| (0..30).map(|row| format!("{};{};{}\n", 40 * row, ohm + row, row % 9)).collect::<String>();
+    bench.write("day.csv", format!("t_ms;R_ohm;angle_deg\n{}{}", run(500), run(700)));
+    let whole = bench.run(&["import", "day.csv", "-o", "out.csv"]);
+    assert_eq!(whole.code, Some(4));
+    assert!(whole.stderr.contains("day.csv:32") && whole.stderr.contains("--split-recordings"), "{}", whole.stderr);
+    let split = bench.run(&["import", "day.csv", "--split-recordings", "-o", "out.csv"]);
+    assert_eq!(split.code, Some(0), "{}", split.stderr);
+    assert!(split.stderr.contains("out-2.csv: recording 2, 30 rows, lines 32 to 61"), "{}", split.stderr);
+    assert_eq!(bench.files(), ["day.csv", "out-1.csv", "out-2.csv"]);
+    for (file, ohm) in [("out-1.csv", 500.0), ("out-2.csv", 700.0)] {
+        let trace = Csv::new(&bench.read(file));
+        assert_eq!((trace.numbers("time_s")[1], trace.numbers("resistance_ohm")[0]), (0.04, ohm));
+    }
+    // All of them, or none.
+    bench.write("other-2.csv", "my notes\n");
+    let refused = bench.run(&["import", "day.csv", "--split-recordings", "-o", "other.csv"]);
+    assert_eq!(refused.code, Some(2));
+    assert!(!bench.path("other-1.csv").exists());
+    let second = bench.run(&["import", "day.csv", "--recording", "2", "-o", "second.csv"]);
+    assert_eq!(second.code, Some(0), "{}", second.stderr);
+    assert_eq!(Csv::new(&bench.read("second.csv")).numbers("resistance_ohm")[0], 700.0);
+}
+
+#[test]
+fn a_table_of_many_columns_is_cut() {
+    let bench = Bench::new();
+    let names: Vec<String> = (0..80).map(|pad| format!("pad_{pad}")).collect();
+    let row = |row: usize| format!("{},{},{}\n", 20 * row, vec!["512"; 80].join(","), row % 5);
+    let rows: String = (0..40).map(row).collect();
+    bench.write("glove.csv", format!("time_ms,{},angle_deg\n{rows}", names.join(",")));
+    let text = bench.run(&["inspect", "glove.csv"]).ok();
+    assert!(text.lines().count() < 40 && text.contains("58 more") && text.contains("angle_deg"), "{text}");
+}

@@ -1,7 +1,9 @@
 //! Whatever one number of a sensor file is changed to: it is refused by its name, or every number that comes out is one.
 
-use crate::common::{Bench, Csv, change_rows};
+use ohmstrain::{Error, Estimate, Evaluation, Recording, Sensor};
 use toml::Value;
+
+use crate::common::{Bench, Csv};
 
 /// What a number is changed to.
 const HOSTILE: [f64; 9] = [f64::NAN, f64::INFINITY, -1.0, 0.0, 1e300, -1e300, 1e9, -1e9, 1e-12];
@@ -35,96 +37,98 @@ fn at<'a>(value: &'a mut Value, path: &str) -> &'a mut Value {
     })
 }
 
-/// Which cells of estimates are empty; all others are finite numbers or words.
+/// Which numbers of estimates are missing; all others are finite.
 #[track_caller]
-fn empty_cells(estimates: &str) -> Vec<bool> {
-    let csv = Csv::new(estimates);
-    let columns = csv.header.split(',').filter(|name| *name != "flags");
-    let cells = columns.flat_map(|name| csv.cells(name));
-    let is_empty = |cell: &str| {
-        assert!(cell.is_empty() || cell.parse::<f64>().is_ok_and(f64::is_finite), "{cell}");
-        cell.is_empty()
+fn missing(rows: &[Estimate]) -> Vec<bool> {
+    let is_missing = |number: Option<f64>| {
+        assert!(number.is_none_or(f64::is_finite), "{number:?}");
+        number.is_none()
     };
-    cells.map(is_empty).collect()
+    let known = |number: f64| Some(number).filter(|number| !number.is_nan());
+    let of_row = |row: &Estimate| {
+        let of_strain = [row.strain, row.strain_sd, row.strain_rate, row.strain_rate_sd].map(known);
+        let of_law = [row.relaxation, row.relaxation_sd, row.baseline, row.p_beyond_border].map(known);
+        let of_reading = [row.resistance, known(row.settled_resistance), known(row.settled_resistance_sd), row.nis];
+        let of_phases = [row.p_extend, row.p_hold, row.p_retract];
+        [&of_strain[..], &of_law, &of_reading, &of_phases].concat()
+    };
+    rows.iter().flat_map(of_row).map(is_missing).collect()
 }
 
-/// Runs all commands that read a sensor file on each of its changes.
+/// Filters, smooths and scores a short recording: numbers that are missing, and scores.
+fn used(sensor: &Sensor, recording: &Recording, [time_s, readings, _]: &[Vec<f64>; 3]) -> (Vec<bool>, Evaluation) {
+    let mut filter = sensor.filter().build().unwrap();
+    let filtered: Vec<Estimate> = time_s.iter().zip(readings).map(|(t, r)| filter.step(*t, *r).unwrap()).collect();
+    let smoothed = sensor.smooth(time_s, readings).unwrap();
+    (missing(&[filtered, smoothed].concat()), sensor.evaluate(recording).unwrap().unwrap())
+}
+
+/// Checks that a change is refused by the number's name and line: by itself, or by what it has to go together with, a number
+/// beside it or another table.
+fn is_refused_by_name(error: &Error, path: &str, text: &str) {
+    let message = error.in_file("changed.toml");
+    let field = message.split('`').nth(1).unwrap();
+    let table = |path: &str| path.rsplit_once('.').map(|(table, _)| table.to_string());
+    let mut quoted = message.split('`').skip(1).step_by(2);
+    let named = quoted.any(|name| path.starts_with(name)) || table(path) == table(field);
+    assert!(message.contains(": field `") && named, "{path}: {message}");
+    let line = message.strip_prefix("changed.toml:").unwrap().split(':').next().unwrap().parse::<usize>().unwrap();
+    let line = text.lines().nth(line - 1).unwrap();
+    let last = path.rsplit('.').next().unwrap().split('[').next().unwrap();
+    assert!(line.starts_with(last) || line.contains(field.rsplit('.').next().unwrap()), "{path}: {line}");
+}
+
+/// Changes each number of `sensor.toml`, and uses what is not refused.
 fn survives(bench: &Bench) {
-    let sensor: Value = toml::from_str(&bench.read("sensor.toml")).unwrap();
+    let file: Value = toml::from_str(&bench.read("sensor.toml")).unwrap();
     let mut paths = Vec::new();
-    numbers(&sensor, "", &mut paths);
+    numbers(&file, "", &mut paths);
     assert!(paths.len() > 40, "{paths:?}");
-    let run = |command: &[&str], file| bench.run(&[command, &["short.csv", "--sensor", file]].concat());
-    let estimates = [&["filter"][..], &["smooth"]];
-    let evaluate = ["evaluate", "--json"];
-    let empty = estimates.map(|command| empty_cells(&run(command, "sensor.toml").ok()));
-    let nulls = run(&evaluate, "sensor.toml").ok().matches("null").count();
+    let rows = short(bench);
+    let recording = Recording::new(&rows[0], &rows[1], &rows[2]).unwrap();
+    let (expected, _) = used(&Sensor::from_toml(&bench.read("sensor.toml")).unwrap(), &recording, &rows);
     let mut refused = 0;
     for path in &paths {
         for hostile in HOSTILE {
-            let mut changed = sensor.clone();
+            let mut changed = file.clone();
             *at(&mut changed, path) = Value::Float(hostile);
-            bench.write("changed.toml", toml::to_string(&changed).unwrap());
-            let first = run(estimates[0], "changed.toml");
-            if first.code == Some(4) {
-                refused += 1;
-                let field = first.stderr.split('`').nth(1).unwrap();
-                // By itself, or by what it has to go together with: a number beside it, or another table.
-                let table = |path: &str| path.rsplit_once('.').map(|(table, _)| table.to_string());
-                let mut quoted = first.stderr.split('`').skip(1).step_by(2);
-                let named = quoted.any(|name| path.starts_with(name)) || table(path) == table(field);
-                assert!(first.stderr.contains(": field `") && named, "{path}: {}", first.stderr);
-                assert!(first.stderr.starts_with("ohmstrain: changed.toml:") && first.stdout.is_empty());
-                let line = first.stderr.split(':').nth(2).unwrap().parse::<usize>().unwrap();
-                let text = bench.read("changed.toml");
-                let last = path.rsplit('.').next().unwrap().split('[').next().unwrap();
-                let table = field.rsplit('.').next().unwrap();
-                let line = text.lines().nth(line - 1).unwrap();
-                assert!(line.starts_with(last) || line.contains(table), "{path}: {line}");
-                continue;
+            let text = toml::to_string(&changed).unwrap();
+            match Sensor::from_toml(&text) {
+                Err(error) => {
+                    is_refused_by_name(&error, path, &text);
+                    refused += 1;
+                }
+                Ok(sensor) => {
+                    let (found, scores) = used(&sensor, &recording, &rows);
+                    assert_eq!(found, expected, "{path} = {hostile}");
+                    let errors = [scores.filter.rmse, scores.smoother.rmse, scores.static_cubic.rmse];
+                    assert!(errors.iter().all(|error| error.is_finite()), "{path} = {hostile}: {errors:?}");
+                }
             }
-            assert_eq!(empty_cells(&first.ok()), empty[0], "filter: {path} = {hostile}");
-            assert_eq!(empty_cells(&run(estimates[1], "changed.toml").ok()), empty[1], "smooth: {path} = {hostile}");
-            let scores = run(&evaluate, "changed.toml").ok();
-            assert_eq!(scores.matches("null").count(), nulls, "{path} = {hostile}: {scores}");
         }
     }
     // Of each number at least NaN; of most of them more.
     assert!(refused > 2 * paths.len(), "{refused} of {}", paths.len());
 }
 
-/// The first and every fifth row of a minute: holds and movements.
-fn short(bench: &Bench) {
-    let mut row = 0;
-    let kept = |line: &&str| {
-        let is_row = line.starts_with(|first: char| first.is_ascii_digit());
-        row += usize::from(is_row);
-        !is_row || (row % 5 == 1 && row < 300)
-    };
-    let trace = bench.read("trace.csv");
-    let short: String = trace.lines().filter(kept).map(|line| format!("{line}\n")).collect();
-    // A reading is missing now and then.
-    bench.write(
-        "short.csv",
-        change_rows(&short, |row, cells| {
-            if row % 7 == 6 {
-                cells[1].clear()
-            }
-        }),
-    );
+/// Time, reading and strain of the first and every fifth row of a minute, holds and movements; a reading is missing now and then.
+fn short(bench: &Bench) -> [Vec<f64>; 3] {
+    let trace = Csv::new(&bench.read("trace.csv"));
+    let rows = |name: &str| trace.numbers(name).into_iter().take(300).step_by(5).collect::<Vec<f64>>();
+    let mut readings = rows("resistance_ohm");
+    readings.iter_mut().skip(6).step_by(7).for_each(|reading| *reading = f64::NAN);
+    [rows("time_s"), readings, rows("strain")]
 }
 
 #[test]
 fn of_a_sensor_for_the_extended_kalman_filter() {
     let bench = Bench::calibrated();
-    short(&bench);
     survives(&bench);
 }
 
 #[test]
 fn of_a_sensor_for_phase_histories() {
     let bench = Bench::calibrated();
-    short(&bench);
     bench.run(&["calibrate", "trace.csv", "--until", "60", "--estimator", "hypotheses", "-o", "sensor.toml"]).ok();
     survives(&bench);
 }
@@ -132,7 +136,6 @@ fn of_a_sensor_for_phase_histories() {
 #[test]
 fn of_a_sensor_with_a_learned_correction() {
     let bench = Bench::calibrated();
-    short(&bench);
     bench.run(&["calibrate", "trace.csv", "--until", "60", "-o", "sensor.toml"]).ok();
     survives(&bench);
 }

@@ -34,15 +34,20 @@ fn the_calibration_itself_is_within_it() {
 }
 
 #[test]
-fn a_longer_recording_is_warned_of_once() {
+fn a_longer_recording_is_warned_of_once_where_readings_drifted() {
     let bench = calibrated();
-    for command in [&["filter"][..], &["smooth"], &["evaluate"], &["filter", "--lag-s", "1"]] {
-        let mut warnings = warned(&bench, &[command, &["trace.csv"]].concat());
-        warnings.retain(|line| line.contains("longer"));
-        // Five rows a second: the first after a twentieth more than the calibration's 299.8 s.
-        let expected = "ohmstrain: warning: trace.csv: at 314.8 s: longer than the 299.8 s of the calibration; estimates are \
-                        extrapolations\n";
-        assert_eq!(warnings, [expected]);
+    let sensor = bench.read("sensor.toml");
+    let with = |drifts: &str| sensor.replace("drifts = true", drifts).replace("drifts = false", drifts);
+    // Five rows a second: the first after a twentieth more than the calibration's 299.8 s.
+    let expected = "ohmstrain: warning: trace.csv: at 314.8 s: longer than the 299.8 s of the calibration, in which readings \
+                    drifted; estimates are extrapolations\n";
+    for (drifts, expected) in [("drifts = true", &[expected][..]), ("drifts = false", &[])] {
+        bench.write("sensor.toml", with(drifts));
+        for command in [&["filter"][..], &["smooth"], &["evaluate"], &["filter", "--lag-s", "1"]] {
+            let mut warnings = warned(&bench, &[command, &["trace.csv"]].concat());
+            warnings.retain(|line| line.contains("longer"));
+            assert_eq!(warnings, expected);
+        }
     }
 }
 

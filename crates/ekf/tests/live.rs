@@ -48,7 +48,7 @@ fn filter() -> Filter {
         strain_sd_scale: 1.0,
         reading_variance: 4e-6,
         known_variance: 1e-6,
-        sieve: Sieve { plausible: (-0.5, 1.5), longest_repeat_s: f32::INFINITY, jump: 0.05, error_time_s: 0.0 },
+        sieve: Sieve { plausible: (-0.5, 1.5), ..Sieve::open() },
         doubt,
         rest: RestBounds { low: None, high: None, start: None },
         learned: None,

@@ -1,9 +1,3 @@
-use std::fmt;
-
-use ohmstrain_sensor::LARGEST_SD_SCALE;
-
-use crate::number::{plain, significant};
-
 /// A doubt about the recordings of a calibration, or about its result; see [`calibration_doubts`](crate::calibration_doubts) and
 /// [`Calibrated::doubts`](crate::Calibrated::doubts).
 ///
@@ -161,82 +155,6 @@ impl CalibrationDoubt {
             | Self::Copy { recordings }
             | Self::RestsApart { recordings, .. } => recordings.to_vec(),
             Self::Widened { .. } => vec![],
-        }
-    }
-}
-
-impl fmt::Display for CalibrationDoubt {
-    fn fmt(&self, out: &mut fmt::Formatter) -> fmt::Result {
-        match self {
-            Self::Exchanged { readings, reference, .. } => write!(
-                out,
-                "the columns `{readings}` and `{reference}` seem to be exchanged: expected readings that stay well above zero \
-                 and a reference that does not, found the reverse"
-            ),
-            Self::Percent { largest, gauge, .. } => write!(
-                out,
-                "expected the reference as a fraction of the length, found strains of up to {}, over which the readings \
-                 change by {gauge:.3} of their median per strain",
-                plain(*largest)
-            ),
-            Self::KiloOhm { median, .. } => {
-                write!(out, "column `resistance_ohm`: expected ohms, found readings of about {}", plain(*median))
-            }
-            Self::ReadingsApart { medians: [least, most], .. } => write!(
-                out,
-                "readings of about {} and {}, {:.0} times as much; expected one sensor in one unit; is one of them in kilo-ohms?",
-                plain(*least),
-                plain(*most),
-                most / least
-            ),
-            Self::ReferencesApart { gauges: [least, most], .. } => write!(
-                out,
-                "the readings change by {least:.3} and {most:.3} of their median per unit of the reference, {:.0} times as \
-                 much; expected one sensor and one unit; is the reference of the first in percent?",
-                most / least
-            ),
-            Self::GaugesApart { gauges: [least, most], .. } => write!(
-                out,
-                "the readings change by {least:.3} and {most:.3} of their median per unit of the reference: one sensor?"
-            ),
-            Self::Frozen { from_s, to_s, reference, swing, .. } => write!(
-                out,
-                "expected a reference that moves with the readings, found {} from {} to {} s, while they go up and down by {}: is it \
-                 frozen?",
-                plain(*reference),
-                plain(*from_s),
-                plain(*to_s),
-                significant(*swing, 2)
-            ),
-            Self::Turned { lower, upper, .. } => write!(
-                out,
-                "expected strains of a sensor that stretches, above zero, found {} to {}: has the reference the other sign?",
-                significant(*lower, 2),
-                significant(*upper, 2)
-            ),
-            Self::TurnedApart { .. } => out.write_str(
-                "the readings of the first go against its reference, those of the second with it; expected one sensor: has one of \
-                 the references the other sign?",
-            ),
-            Self::Milliseconds { step, stroke_s, .. } => write!(
-                out,
-                "column `time_s`: expected seconds, found whole numbers {} apart, by which a stroke takes {} s: are they milliseconds?",
-                plain(*step),
-                significant(*stroke_s, 2)
-            ),
-            Self::Copy { .. } => out.write_str("the same rows: they count twice"),
-            Self::RestsApart { rests: [least, most], .. } => write!(
-                out,
-                "R0 comes out as {} and {}, {:.0} % more: one sensor?",
-                significant(*least, 5),
-                significant(*most, 5),
-                100.0 * (most / least - 1.0)
-            ),
-            Self::Widened { of } => write!(
-                out,
-                "the {of}'s intervals are widened by {LARGEST_SD_SCALE}, the most there is: on parts of the recordings that \
-                 it has not seen, the law is more wrong than they say; another recording, or other branches, may help"
-            ),
         }
     }
 }

@@ -1,6 +1,3 @@
-use std::fmt;
-
-use crate::number::{plain, significant};
 use crate::{Known, Sensor};
 
 /// A strain to start at that the sensor never reports; see [`Sensor::check_start`].
@@ -17,14 +14,6 @@ pub struct StartDoubt {
     pub lower: f64,
     /// Upper limit.
     pub upper: f64,
-}
-
-impl fmt::Display for StartDoubt {
-    fn fmt(&self, out: &mut fmt::Formatter) -> fmt::Result {
-        let Self { found, lower, upper } = *self;
-        let (lower, upper) = (plain(lower), plain(upper));
-        write!(out, "{found} is outside of the sensor's limits, {lower} to {upper}; what is reported stops there")
-    }
 }
 
 impl std::error::Error for StartDoubt {}
@@ -61,13 +50,6 @@ pub struct UnusedKnown {
     pub first_s: f64,
     /// Its last one, s.
     pub last_s: f64,
-}
-
-impl fmt::Display for UnusedKnown {
-    fn fmt(&self, out: &mut fmt::Formatter) -> fmt::Result {
-        let (first, last) = (significant(self.first_s, 6), significant(self.last_s, 6));
-        write!(out, "was not used: the recording goes from {first} to {last} s")
-    }
 }
 
 /// Known strains after the end of a recording that goes from a first to a last time, s.

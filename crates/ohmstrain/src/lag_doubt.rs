@@ -1,5 +1,3 @@
-use std::fmt;
-
 use ohmstrain_calib::{Lag, LagError};
 
 use crate::Recording;
@@ -64,48 +62,6 @@ impl Recording<'_> {
             Ok(lag) if !lag.is_too_late() => Some(LagDoubt::Little(lag)),
             Ok(lag) if !lag.is_certain() => Some(LagDoubt::Uncertain(lag)),
             Ok(lag) => Some(LagDoubt::Certain(lag)),
-        }
-    }
-}
-
-/// A time by which the reference is late, s.
-struct Late(f64);
-
-impl fmt::Display for Late {
-    fn fmt(&self, out: &mut fmt::Formatter) -> fmt::Result {
-        write!(out, "{:.2} s {}", self.0.abs(), if self.0 < 0.0 { "early" } else { "late" })
-    }
-}
-
-impl fmt::Display for LagDoubt {
-    fn fmt(&self, out: &mut fmt::Formatter) -> fmt::Result {
-        match self {
-            Self::OutOfReach { lag_s } => write!(
-                out,
-                "the reference seems to be {} or more, as far as lags are looked for; it was not moved: are both on one clock?",
-                Late(*lag_s)
-            ),
-            Self::Repeats { lags_s: [best_s, other_s] } => write!(
-                out,
-                "the reference seems to be {} or {}, which fit alike since the motion repeats; it was not moved: are both on one \
-                 clock?",
-                Late(*best_s),
-                Late(*other_s)
-            ),
-            Self::Little(lag) => {
-                write!(out, "the reference seems to be {lag}, little of the {:.1} s of a movement", lag.movement_s)
-            }
-            Self::Uncertain(lag) => write!(
-                out,
-                "the reference seems to be {lag}, where a movement takes {:.1} s; the readings do not tell for certain, and it was \
-                 not moved: are both on one clock?",
-                lag.movement_s
-            ),
-            Self::Certain(lag) => write!(
-                out,
-                "expected a reference on the clock of the readings, found one that seems to be {lag}, where a movement takes {:.1} s",
-                lag.movement_s
-            ),
         }
     }
 }

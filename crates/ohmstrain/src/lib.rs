@@ -27,7 +27,6 @@ mod builder;
 mod calibrate;
 #[cfg(feature = "calibrate")]
 mod calibration_doubt;
-mod closing;
 mod column;
 mod error;
 mod estimate;
@@ -40,7 +39,6 @@ mod known_doubt;
 mod lag_doubt;
 #[cfg(feature = "calibrate")]
 mod motion_doubt;
-pub mod number;
 mod pauses;
 #[cfg(feature = "calibrate")]
 mod plausible;
@@ -52,18 +50,17 @@ mod reading;
 mod recording;
 mod reference_doubt;
 mod sensor;
+mod sentences;
 mod smoothing;
 mod text;
 mod unit_doubt;
 mod validity;
-pub mod verdict;
 
 pub use builder::FilterBuilder;
 #[cfg(feature = "calibrate")]
 pub use calibrate::{Calibrated, Calibration, calibrate};
 #[cfg(feature = "calibrate")]
 pub use calibration_doubt::CalibrationDoubt;
-pub use closing::{Closing, Tested};
 pub use column::Column;
 pub use error::{Error, Place, TextCause, TextError};
 pub use estimate::Estimate;
@@ -86,6 +83,9 @@ pub use reading::Reading;
 pub use recording::{Evaluation, Recording};
 pub use reference_doubt::ReferenceDoubt;
 pub use sensor::Sensor;
+#[cfg(feature = "calibrate")]
+pub use sentences::LagAnswer;
+pub use sentences::{Closing, Interface, Tested, number, verdict};
 pub use unit_doubt::{UnitDoubt, UnitGuess};
 pub use validity::{Beyond, Extrapolation, ValidityWatch};
 

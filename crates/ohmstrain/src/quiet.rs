@@ -1,6 +1,3 @@
-use std::fmt;
-
-use crate::number::significant;
 use crate::{Estimate, KNOWN_BEYOND, Known, Sensor};
 
 /// For how long readings must be quiet before somebody is asked, s.
@@ -72,19 +69,6 @@ pub struct Quiet {
     pub now_s: f64,
     /// What the strain is said to be.
     pub strain: f64,
-}
-
-impl fmt::Display for Quiet {
-    fn fmt(&self, out: &mut fmt::Formatter) -> fmt::Result {
-        let Self { from_s, now_s, strain } = *self;
-        write!(
-            out,
-            "{} s of quiet from t = {} s that may be a rest, where the strain is said to be {}: if the body was at rest there",
-            significant(now_s - from_s, 2),
-            significant(from_s, 6),
-            significant(strain, 2)
-        )
-    }
 }
 
 impl QuietWatch {

@@ -1,10 +1,8 @@
-use std::fmt;
 use std::ops::RangeInclusive;
 
 use ohmstrain_sensor::Quantity;
 
 use crate::Sensor;
-use crate::number::plain;
 use crate::unit_doubt::quantile;
 
 /// References whose 95th percentile is this many times the largest strain of the calibration are a hundred times too large.
@@ -30,18 +28,6 @@ pub struct ReferenceDoubt {
     pub found: f64,
     /// Whether it is the calibration that seems to be in percent.
     pub is_of_calibration: bool,
-}
-
-impl fmt::Display for ReferenceDoubt {
-    fn fmt(&self, out: &mut fmt::Formatter) -> fmt::Result {
-        let Self { expected, found, is_of_calibration } = self;
-        let question = if *is_of_calibration { "was the calibration in percent?" } else { "are they in percent?" };
-        let (expected, found) = (plain(*expected), plain(*found));
-        write!(
-            out,
-            "column `strain`: expected strains of up to {expected}, as in the calibration, found {found}: {question}"
-        )
-    }
 }
 
 impl std::error::Error for ReferenceDoubt {}

@@ -1,8 +1,4 @@
-use std::fmt;
-
 use ohmstrain_sensor::{ReadingUnit, SensorParams};
-
-use crate::number::significant;
 
 /// Median readings below this, Ω, are taken for kΩ until somebody says that they are none.
 pub(crate) const LEAST_OHM: f64 = 20.0;
@@ -87,30 +83,7 @@ impl UnitDoubt {
     }
 }
 
-impl fmt::Display for UnitDoubt {
-    fn fmt(&self, out: &mut fmt::Formatter) -> fmt::Result {
-        let Self { column, expected: (low, high), median, guess, .. } = self;
-        let (low, high, median) = (significant(*low, 5), significant(*high, 5), significant(*median, 5));
-        write!(out, "column `{column}`: expected readings of {low} to {high}, as in the calibration")?;
-        self.rest_reading.map_or(Ok(()), |rest| write!(out, " with R0 = {}", significant(rest, 5)))?;
-        write!(out, ", found {median} at the median, {guess}")
-    }
-}
-
 impl std::error::Error for UnitDoubt {}
-
-impl fmt::Display for UnitGuess {
-    fn fmt(&self, out: &mut fmt::Formatter) -> fmt::Result {
-        out.write_str(match self {
-            Self::KiloOhm => "a thousandth of that: are they in kilo-ohms?",
-            Self::MegaOhm => "a millionth of that: are they in mega-ohms?",
-            Self::CalibrationInKiloOhm => "a thousand times that: is the calibration in kilo-ohms?",
-            Self::Ratio => "near one: are they ratios to some resistance at rest?",
-            Self::Percent => "a hundred times that: are they in percent?",
-            Self::Ohm => "no such ratio: are they in ohms?",
-        })
-    }
-}
 
 /// Known values that are looked at: of more, such as are evenly spread.
 const LOOKED_AT: usize = 1 << 17;

@@ -1,26 +1,21 @@
-use std::fmt;
-
 use ohmstrain_ekf::live::RestFollower;
 use ohmstrain_sensor::{Quantity, SensorParams, Validity};
 
 use crate::Sensor;
 use crate::column::reading_column;
-use crate::number::significant;
 
 /// Says, once for each, that a sensor is used outside of what its calibration has seen.
 ///
 /// ```
 /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
 /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
-/// use ohmstrain::ValidityWatch;
-///
-/// let (mut filter, mut watch) = (sensor.filter().build()?, ValidityWatch::new(&sensor, None));
-/// for (time_s, ohm) in [(0.0, 1600.0), (3600.0, 1600.0)] {
-///     let row = filter.step(time_s, ohm)?;
-///     for beyond in watch.see(row.time_s, ohm, row.strain_rate, f64::NAN) {
-///         assert_eq!(beyond.to_string(), "at 3600 s: longer than the 199.9 s of the calibration; estimates are extrapolations");
-///     }
-/// }
+/// let mut watch = ohmstrain::ValidityWatch::new(&sensor, None);
+/// let said: Vec<String> = (0..20)
+///     .flat_map(|second| watch.see(f64::from(second), 3900.0, 0.0, f64::NAN))
+///     .map(|beyond| beyond.to_string())
+///     .collect();
+/// let expected = "at 10 s: resistance_ohm is outside of the calibration's 1598.9 to 3703.1";
+/// assert!(said[0].starts_with(expected), "{}", said[0]);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug)]
@@ -46,7 +41,7 @@ pub struct ValidityWatch {
 /// use ohmstrain::{Beyond, Extrapolation};
 ///
 /// let warning = Extrapolation { time_s: 3.0, beyond: Beyond::Duration { longest_s: 2.0 } };
-/// assert_eq!(warning.to_string(), "at 3 s: longer than the 2.0 s of the calibration; estimates are extrapolations");
+/// assert_eq!(warning.to_string(), "at 3 s: longer than the 2.0 s of the calibration, in which readings drifted; estimates are extrapolations");
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Extrapolation {
@@ -197,10 +192,11 @@ impl ValidityWatch {
         rate: f64,
         truth: f64,
     ) -> impl Iterator<Item = Extrapolation> + use<> {
-        let Validity { lower, upper, fastest_rate_per_s: fastest_per_s, duration_s: longest_s, .. } = self.validity;
+        let Validity { lower, upper, fastest_rate_per_s: fastest_per_s, duration_s: longest_s, drifts, .. } =
+            self.validity;
         let (quantity, column, (least, most)) = (self.quantity, self.reading, self.readings);
         let lasted_s = time_s - *self.start_s.get_or_insert(time_s);
-        let is_long = !self.long && lasted_s > LONGER * longest_s;
+        let is_long = drifts && !self.long && lasted_s > LONGER * longest_s;
         self.long |= is_long;
         let is_fast = lasted_s >= FOUND_S && self.fast.see(rate.abs() > FASTER * fastest_per_s, FAST_BY_CHANCE);
         let reading = self.session.as_mut().map_or(reading, |session| session.as_calibrated(reading));
@@ -216,28 +212,5 @@ impl ValidityWatch {
         // Mostly there is nothing to say.
         let said = (is_long || is_fast || is_other || is_beyond).then_some(all);
         said.into_iter().flatten().filter_map(move |(now, beyond)| now.then_some(Extrapolation { time_s, beyond }))
-    }
-}
-
-impl fmt::Display for Extrapolation {
-    fn fmt(&self, out: &mut fmt::Formatter) -> fmt::Result {
-        write!(out, "at {} s: ", significant(self.time_s, 6))?;
-        match self.beyond {
-            Beyond::Duration { longest_s } => write!(out, "longer than the {longest_s:.1} s of the calibration"),
-            Beyond::Rate { quantity, fastest_per_s } => {
-                let quantity = quantity.name();
-                write!(out, "{quantity} changes faster than the calibration's {fastest_per_s:.4} per second")
-            }
-            Beyond::Readings { column, least, most, follows } => {
-                let (least, most) = (significant(least, 5), significant(most, 5));
-                let rest = if follows { "; R0 follows until today's resistance at rest is told" } else { "" };
-                write!(out, "{column} is outside of the calibration's {least} to {most}{rest}")
-            }
-            Beyond::Strain { quantity, least, most } => {
-                let quantity = quantity.name();
-                write!(out, "{quantity} is outside of the calibration's {least:.4} to {most:.4}")
-            }
-        }?;
-        out.write_str("; estimates are extrapolations")
     }
 }

@@ -1,10 +1,18 @@
 //! Where the interval is wider than the filter states, and the flags that say why.
 
-use ohmstrain::{Estimate, EstimatorKind, Filter, Flag, Sensor};
+use ohmstrain::{Estimate, EstimatorKind, Filter, Flag, Reading, Sensor};
 
 /// Calibrated on 200 s, with readings of 1599 to 3703 ohms.
 fn sensor() -> Sensor {
-    Sensor::from_toml(&std::fs::read_to_string("examples/sensor.toml").unwrap()).unwrap()
+    sensor_that_saw("")
+}
+
+/// The same, of whose calibration these lines say more.
+fn sensor_that_saw(more: &str) -> Sensor {
+    let text = std::fs::read_to_string("examples/sensor.toml").unwrap();
+    let line = "longest_repeat_s = 0.0\n";
+    assert!(text.contains(line));
+    Sensor::from_toml(&text.replace(line, &format!("{line}{more}"))).unwrap()
 }
 
 /// Twenty rows a second of a level with a noise of one ohm, from `from` on.
@@ -188,11 +196,34 @@ fn a_smoother_doubts_what_comes_before_readings_outside_of_calibration() {
 }
 
 #[test]
-fn a_long_run_is_flagged() {
-    let sensor = sensor();
-    let mut filter = sensor.filter().build().unwrap();
-    let long = |time_s: f64, filter: &mut Filter| filter.step(time_s, 2000.0).unwrap().flags.has(Flag::LongRun);
-    assert_eq!([10.0, 209.0, 211.0].map(|time_s| long(time_s, &mut filter)), [false, false, true]);
+fn a_long_run_is_flagged_where_readings_drifted() {
+    for (drifts, is_long) in [("drifts = true\n", true), ("", false)] {
+        let mut filter = sensor_that_saw(drifts).filter().build().unwrap();
+        let mut long = |time_s: f64| filter.step(time_s, 2000.0).unwrap().flags.has(Flag::LongRun);
+        assert_eq!([10.0, 209.0, 211.0].map(&mut long), [false, false, is_long]);
+    }
+}
+
+/// One number for a minute, twenty rows a second, with a converter's error. A meter of whole ohms with noise of a tenth of one gives it, and so does a
+/// converter whose step, 5 ohms, is sixteen times the noise; one of half an ohm does so for 300 rows by chance, and a fine
+/// meter not ten times.
+#[test]
+fn a_still_sensor_repeats_coarse_numbers() {
+    let (whole, fine) = ("step = 1.0\nnoise_sd = 0.1\n", "step = 0.001\nnoise_sd = 0.3\n");
+    let cases = [
+        (whole, 0.0, None),
+        (fine, 5.0 / 12.0_f64.sqrt(), None),
+        (fine, 0.5 / 12.0_f64.sqrt(), Some(300)),
+        (fine, 0.0, Some(10)),
+    ];
+    for (resolution, sd, first) in cases {
+        let mut filter = sensor_that_saw(&format!("\n[validity.resolution]\n{resolution}")).filter().build().unwrap();
+        let stuck = |k: i32| {
+            let row = filter.step(0.05 * f64::from(k), Reading { value: 1600.0, sd, saturated: false }).unwrap();
+            row.flags.has(Flag::Stuck)
+        };
+        assert_eq!((0..1200).map(stuck).position(|is_stuck| is_stuck), first, "{resolution} {sd}");
+    }
 }
 
 /// Calibrated where the rested sensor read 1599.83 ohms. Another day's reads a tenth more: 160 of calibration's 2104 ohms for

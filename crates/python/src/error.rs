@@ -1,4 +1,4 @@
-use ohmstrain::{Error, ReferenceDoubt, TextError, UnitDoubt, UnitGuess};
+use ohmstrain::{Error, Interface, TextError};
 use pyo3::create_exception;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -71,32 +71,9 @@ pub fn of_library(error: &Error, file: Option<&str>) -> PyErr {
             Some(file) => raise(&Place { file: None, ..place }, &error.in_file(file)),
             None => raise(&place, &error.to_string()),
         },
-        Error::Unit(doubt) => raise(&Place { column: Some(doubt.column), ..place }, &of_unit(doubt)),
-        Error::Reference(doubt) => raise(&Place { column: Some("strain"), ..place }, &of_reference(doubt)),
+        Error::Unit(doubt) => raise(&Place { column: Some(doubt.column), ..place }, &doubt.text(Interface::Python)),
+        Error::Reference(doubt) => raise(&Place { column: Some("strain"), ..place }, &doubt.text(Interface::Python)),
         Error::FarRest { .. } => raise(&place, &format!("rest_resistance: {error}")),
         _ => raise(&place, &error.to_string()),
     }
-}
-
-/// A doubt about the unit of readings, with what answers it.
-fn of_unit(doubt: &UnitDoubt) -> String {
-    let answer = match doubt.guess {
-        UnitGuess::KiloOhm => "Then say so with resistance_unit=\"kohm\"",
-        UnitGuess::CalibrationInKiloOhm => "Then calibrate again with resistance_unit=\"kohm\"",
-        UnitGuess::Percent => "The column is a ratio: 110 % is 1.1",
-        UnitGuess::Ohm => "Divide them by what the rested sensor reads",
-        UnitGuess::Ratio => "The sensor was calibrated in ohms",
-        _ => "The column is in ohms",
-    };
-    format!("{doubt} {answer}")
-}
-
-/// A doubt about the unit of a reference, with what answers it.
-fn of_reference(doubt: &ReferenceDoubt) -> String {
-    let answer = if doubt.is_of_calibration {
-        "10 % is 0.1; calibrate again"
-    } else {
-        "Then say so with strain_unit=\"percent\""
-    };
-    format!("{doubt} {answer}")
 }

@@ -1,7 +1,6 @@
-use ohmstrain::{Estimate, Known, QuietWatch, ValidityWatch};
+use ohmstrain::{Estimate, Interface, Known, QuietWatch, ValidityWatch};
 use pyo3_arrow::PyRecordBatch;
 
-use crate::doubts::of_rest;
 use crate::recording::Recording;
 
 /// Estimates and what casts doubt on them.
@@ -32,6 +31,6 @@ impl Watch {
     /// Takes what a filter says of a row, and asks whether a long hold was a rest.
     pub fn see_rest(&mut self, recording: &Recording, estimate: &Estimate) {
         let quiet = self.quiet.see(estimate);
-        self.warnings.extend(quiet.map(|quiet| format!("{}{}", recording.before(), of_rest(&quiet))));
+        self.warnings.extend(quiet.map(|quiet| format!("{}{}", recording.before(), quiet.text(Interface::Python))));
     }
 }

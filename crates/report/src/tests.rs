@@ -50,7 +50,9 @@ fn sensor() -> SensorParams {
             reading_upper: 1400.0,
             fastest_rate_per_s: 0.1,
             duration_s: 100.0,
+            drifts: false,
             longest_repeat_s: 0.0,
+            resolution: None,
         },
         sessions: None,
         static_cubic: StaticCubic {

@@ -31,8 +31,8 @@ pub use params::summary::{Limit, Summary, TestedSummary};
 pub use params::validate::FieldError;
 pub use params::validate::table as ranges;
 pub use params::{
-    FORMAT, JointParams, LARGEST_SD_SCALE, Quantity, ReadingUnit, RecordingInfo, SensorParams, Sessions, Uncertainty,
-    Validity,
+    FORMAT, JointParams, LARGEST_SD_SCALE, Quantity, ReadingUnit, RecordingInfo, Resolution, SensorParams, Sessions,
+    Uncertainty, Validity,
 };
 pub use run::build::{FilterParts, HISTORIES, HYPOTHESES, build_filter, build_filter_with, build_smoother_with};
 pub use run::corrected::{future_features, outputs};

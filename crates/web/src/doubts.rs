@@ -1,6 +1,6 @@
 //! Doubts of the library in the words of the command line: which flag answers them. Refusals are errors, the rest warnings.
 
-use ohmstrain::{CalibrationDoubt, Distrusted, LagDoubt, UnitDoubt, UnitGuess};
+use ohmstrain::{CalibrationDoubt, Distrusted, Interface, LagAnswer};
 use ohmstrain_calib::aligned;
 
 use crate::recording::Recording;
@@ -20,7 +20,7 @@ pub fn heed(recordings: &[Recording], doubts: &[CalibrationDoubt], warnings: &mu
     Ok(())
 }
 
-/// A doubt with the names of its recordings and what answers it.
+/// A doubt with the names of its recordings.
 fn text(recordings: &[Recording], doubt: &CalibrationDoubt) -> String {
     let places = doubt.recordings();
     let names = match places[..] {
@@ -28,35 +28,7 @@ fn text(recordings: &[Recording], doubt: &CalibrationDoubt) -> String {
         [one] => format!("{}: ", recordings[one].header),
         _ => places.iter().map(|place| recordings[*place].name.as_str()).collect::<Vec<_>>().join(" and ") + ": ",
     };
-    format!("{names}{doubt}{}", answer(doubt))
-}
-
-fn answer(doubt: &CalibrationDoubt) -> &'static str {
-    match doubt {
-        CalibrationDoubt::Percent { .. } => {
-            "; if they are in percent, say so with `--unit strain=percent` or a line `# strain_unit = percent` above the header, \
-             if not with `fraction`"
-        }
-        CalibrationDoubt::KiloOhm { .. } => {
-            "; if they are in kilo-ohms, say so with `--unit resistance=kohm` or a line `# resistance_unit = kohm` above the \
-             header, if not with `ohm`"
-        }
-        CalibrationDoubt::ReadingsApart { .. } => " Then put `# resistance_unit = kohm` above its header",
-        CalibrationDoubt::ReferencesApart { .. } => " Then put `# strain_unit = percent` above its header",
-        CalibrationDoubt::Exchanged { .. } => "; if they are, exchange their names in the header",
-        CalibrationDoubt::Frozen { .. } => {
-            "; leave that part out with `--from` and `--until`, or empty those cells of the reference"
-        }
-        CalibrationDoubt::Turned { .. } => {
-            "; if it has, change it, if not say so with `--unit strain=fraction` or a line `# strain_unit = fraction` above the header"
-        }
-        CalibrationDoubt::TurnedApart { .. } => " Change it",
-        CalibrationDoubt::Milliseconds { .. } => {
-            "; if they are, divide them by 1000, if not say so with a line `# time_unit = s` above the header"
-        }
-        CalibrationDoubt::Widened { .. } => " (--explain)",
-        _ => "",
-    }
+    names + &doubt.text(Interface::CommandLine)
 }
 
 /// Names the rows that took no part in a calibration, the first ones.
@@ -76,23 +48,17 @@ pub fn warn_of_distrusted(recordings: &[Recording], rows: &[Distrusted], warning
 pub fn on_one_clock(recording: &mut Recording, align: bool, warnings: &mut Vec<String>) -> Result<f64, String> {
     let samples = recording.samples()?;
     let known = ohmstrain::Recording::new(samples.time_s(), samples.reading(), samples.strain());
-    let doubt = known.map_err(|error| error.to_string())?.lag_doubt();
     let name = recording.name.clone();
-    if let Some(lag) = doubt.as_ref().and_then(LagDoubt::lag).filter(|_| align) {
-        warnings.push(format!("{name}: the reference is {lag}; it was moved by that"));
-        let lag_s = lag.lag_s;
-        shift(recording, lag_s)?;
-        return Ok(lag_s);
-    }
-    match doubt {
-        None | Some(LagDoubt::Little(_)) => {}
-        Some(unknown @ (LagDoubt::OutOfReach { .. } | LagDoubt::Repeats { .. })) => {
-            warnings.push(format!("{name}: {unknown}"));
+    let Some(doubt) = known.map_err(|error| error.to_string())?.lag_doubt() else { return Ok(0.0) };
+    match doubt.answer(align, Interface::CommandLine) {
+        LagAnswer::Move(lag, text) => {
+            warnings.push(format!("{name}: {text}"));
+            shift(recording, lag.lag_s)?;
+            return Ok(lag.lag_s);
         }
-        Some(certain @ LagDoubt::Certain(_)) => {
-            return Err(format!("{name}: {certain}; --align moves it to where the readings say it belongs"));
-        }
-        Some(late) => warnings.push(format!("{name}: {late} --align moves it")),
+        LagAnswer::Refuse(text) => return Err(format!("{name}: {text}")),
+        LagAnswer::Warn(text) => warnings.push(format!("{name}: {text}")),
+        LagAnswer::Remark(_) => {}
     }
     Ok(0.0)
 }
@@ -104,19 +70,4 @@ pub fn shift(recording: &mut Recording, lag_s: f64) -> Result<(), String> {
         reference.values = moved;
     }
     Ok(())
-}
-
-/// A doubt about the unit of readings, with what resolves it.
-pub fn answerable(doubt: &UnitDoubt) -> String {
-    let answer = match doubt.guess {
-        UnitGuess::KiloOhm => {
-            "Then say so with `--unit resistance=kohm` or a line `# resistance_unit = kohm` above the header"
-        }
-        UnitGuess::CalibrationInKiloOhm => "Then calibrate again with `--unit resistance=kohm`",
-        UnitGuess::Percent => "The column is a ratio: 110 % is 1.1",
-        UnitGuess::Ohm => "Divide them by what the rested sensor reads",
-        UnitGuess::Ratio => "The sensor was calibrated in ohms",
-        _ => "The column is in ohms",
-    };
-    format!("{doubt} {answer}")
 }

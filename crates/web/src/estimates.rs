@@ -2,11 +2,10 @@
 
 use std::io;
 
-use ohmstrain::{Column, Estimate, QuietWatch, Sensor, ValidityWatch};
+use ohmstrain::{Column, Estimate, Interface, QuietWatch, Sensor, ValidityWatch};
 use ohmstrain_bench_data::RowWriter;
 use wasm_bindgen::prelude::*;
 
-use crate::doubts::answerable;
 use crate::json::refused;
 use crate::recording::Recording;
 
@@ -81,7 +80,7 @@ pub fn filtered(sensor: &Sensor, recording: &Recording) -> Result<Estimates, Str
     }
     let mut estimates = made(&sensor, recording, rows);
     let rests = estimates.rows.iter().filter_map(|row| quiet.see(row));
-    let rests = rests.map(|rest| format!("{}: {rest}, --known {}:0 tells it", recording.name, rest.now_s));
+    let rests = rests.map(|rest| format!("{}: {}", recording.name, rest.text(Interface::CommandLine)));
     estimates.warnings.extend(rests);
     Ok(estimates)
 }
@@ -111,7 +110,9 @@ fn first_rows(recording: &Recording) -> usize {
 /// Refuses readings in another unit than the sensor's.
 fn check_readings(sensor: &Sensor, recording: &Recording, rows: usize) -> Result<(), String> {
     let first = recording.trace.readings.values.iter().take(rows).copied();
-    sensor.check_unit(first, None).map_err(|doubt| format!("{}: {}", recording.header, answerable(&doubt)))
+    sensor
+        .check_unit(first, None)
+        .map_err(|doubt| format!("{}: {}", recording.header, doubt.text(Interface::CommandLine)))
 }
 
 fn made(sensor: &Sensor, recording: &Recording, rows: Vec<Estimate>) -> Estimates {

@@ -40,6 +40,8 @@ fn say(recipe: &mut Recipe, flag: &str, value: &str) -> Result<(), String> {
         "--drop-zeros" => recipe.drop_zeros.push(parsed(value)?),
         "--zero" => recipe.zero.push(of_role(value, parsed)?),
         "--align" => recipe.align = Some(parsed(value)?),
+        "--where" => recipe.rows.push(parsed(value)?),
+        "--recording" => recipe.recording = Some(counted(value)?),
         "--rate-hz" => recipe.rate_hz = Some(positive(value)?),
         "--gauge-length-mm" => recipe.gauge_length_mm = Some(positive(value)?),
         "--front-end" => recipe.front_end = Some(parsed(value)?),
@@ -58,6 +60,11 @@ fn of_role<T>(text: &str, value: impl FnOnce(&str) -> Result<T, String>) -> Resu
 
 fn parsed<T: FromStr<Err: Display>>(text: &str) -> Result<T, String> {
     text.parse().map_err(|error: T::Err| format!("{error}, found `{text}`"))
+}
+
+/// A number of something that is counted from 1.
+fn counted(text: &str) -> Result<usize, String> {
+    text.parse().ok().filter(|number| *number > 0).ok_or_else(|| format!("expected a number from 1 on, found `{text}`"))
 }
 
 fn positive(text: &str) -> Result<f64, String> {

@@ -3,12 +3,11 @@
 use std::collections::VecDeque;
 
 use ohmstrain::number::significant;
-use ohmstrain::{MADE_BY, QuietWatch, Sensor, ValidityWatch};
+use ohmstrain::{Interface, MADE_BY, QuietWatch, Sensor, ValidityWatch};
 use ohmstrain_bench_data::{Line, LineParser, Metadata, Reading, ReadingKind, ReferenceQuantity, Row, RowWriter};
 use serde::Serialize;
 use wasm_bindgen::prelude::*;
 
-use crate::doubts::answerable;
 use crate::json::{json, refused};
 use crate::stream_lines::Lines;
 
@@ -182,7 +181,7 @@ impl Stream {
         if self.early.len() == FIRST_READINGS
             && let Err(doubt) = self.sensor.check_unit(self.early.iter().copied(), self.rest)
         {
-            self.message = answerable(&doubt);
+            self.message = doubt.text(Interface::CommandLine);
         }
     }
 

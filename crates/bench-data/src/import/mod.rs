@@ -29,6 +29,6 @@ pub use bytes::Cells;
 pub use bytes::bounds::LARGEST_FILE;
 pub use error::ImportError;
 pub use roles::{Align, Candidate, ColumnName, PerFile, Preset, Recipe, RecipeError, candidates};
-pub use table::{Column, Layout, ReadOptions, Table, read_table};
+pub use table::{Column, Layout, ReadOptions, RowFilter, Table, read_table};
 pub use trace::{Allan, ChannelSurvey, ClockSurvey, Imported, PhaseSurvey, Plan, Survey};
 pub use words::{DecimalMark, Role};

@@ -25,10 +25,13 @@ use crate::calibrate::noise_fit::{
 use crate::calibrate::recipe::RECIPE;
 use crate::law::fit::{CrossFit, LawOptions, fit_laws};
 use crate::law::identifiability::identifiability;
+use crate::law::structure::LawFit;
 use crate::motion_stats::MotionStats;
 use crate::order::median;
 use crate::prior::{CorrectionPrior, Prior};
+use crate::recording::drift::drifts;
 use crate::recording::repeats::longest_repeat_s;
+use crate::recording::resolution::resolution;
 use crate::recording::rest::rest_share;
 use crate::recording::screen::{Distrusted, screen};
 use crate::recording::sessions::sessions;
@@ -137,8 +140,9 @@ fn handicap(kind: EstimatorKind) -> f64 {
 ///
 /// Estimators are tried with a law for each of `structures` and each strength of ridge; the pair with the best score on
 /// blocks that the law has not seen gives the law. Every one of them, and the extended Kalman filter in any case, is then
-/// fitted to that law, and the best of `kinds` becomes the default. Near ties go to the one that keeps hypotheses. [`EstimatorKind::Corrected`] is the default where it is asked
-/// for; what it corrects is learned last, from the same rows.
+/// fitted to that law, and the best of `kinds` by every row of those blocks becomes the default. Near ties go to the one that keeps
+/// hypotheses. [`EstimatorKind::Corrected`] is the default where it is asked for; what it corrects is the best of its candidates, and
+/// is learned last, from the same rows.
 ///
 /// # Errors
 /// If the recordings are too short or too plain to learn a law from, if the law explains nothing, or `structures` or `kinds` is
@@ -174,21 +178,21 @@ pub(crate) fn calibrate_once(
     let Some(fit) = cheapest(surveyed.iter()).map(|best| best.law) else {
         return Err(CalibrationError::Unsupported("a calibration without an estimator".into()));
     };
-    let corrected = cheapest(surveyed.iter().filter(|one| asked.candidates.contains(&one.kind))).map(|one| one.kind);
-    // One filter is corrected: no other one needs to be refined.
-    let wanted = EstimatorKind::distinct(corrected.into_iter().chain(asked.named.iter().copied()));
+    let wanted = asked.all();
     let mut estimators = BTreeMap::new();
     for kind in EstimatorKind::distinct(wanted.iter().copied().chain([EstimatorKind::Ekf])) {
         let known = surveyed.iter().find(|one| one.kind == kind && std::ptr::eq(one.law, fit));
         let params = refined(recordings, (fit, stats), (kind, prior), known, &mut || steps.evaluated())?;
         estimators.insert(kind, params);
     }
+    let score =
+        |kind: &EstimatorKind| estimators.get(kind).map_or(f64::INFINITY, |params| params.score + handicap(*kind));
+    let best_of = |kinds: &[EstimatorKind]| kinds.iter().copied().min_by(|a, b| score(a).total_cmp(&score(b)));
+    let (corrected, best) = (best_of(asked.candidates), best_of(&wanted).unwrap_or(EstimatorKind::Ekf));
+    estimators.retain(|kind, _| Some(*kind) == corrected || *kind == EstimatorKind::Ekf || asked.named.contains(kind));
     let of_make = prior.and_then(|prior| prior.correction.as_ref());
     let correction =
         corrected.map(|kind| correction(recordings, fit, (kind, of_make), &estimators)).transpose()?.flatten();
-    let score =
-        |kind: &EstimatorKind| estimators.get(kind).map_or(f64::INFINITY, |params| params.score + handicap(*kind));
-    let best = wanted.iter().copied().min_by(|a, b| score(a).total_cmp(&score(b))).unwrap_or(EstimatorKind::Ekf);
     let (default_estimator, filter) =
         correction.as_ref().map_or((best, best), |correction| (EstimatorKind::Corrected, correction.corrects));
     let limits = fit.law.law.range;
@@ -198,7 +202,7 @@ pub(crate) fn calibrate_once(
     let findings = Check { recordings, fit, kind: default_estimator, filter, estimators: &estimators, of_make }
         .findings(seen, &identifiability);
     let (findings, left_out) = findings.map_or((None, vec![]), |(findings, rows)| (Some(findings), rows));
-    let own = validity(recordings, &fit.law.rest_readings, limits, &stats);
+    let own = validity(recordings, &fit.law, limits, &stats);
     Ok(Calibration {
         distrusted: screened.distrusted.clone(),
         default_estimator,
@@ -239,10 +243,10 @@ impl<'a> Asked<'a> {
         EstimatorKind::distinct(self.candidates.iter().chain(&self.named).copied())
     }
 
-    /// Near enough for a progress bar: surveys, and one refinement of the best filter and of the EKF.
+    /// Near enough for a progress bar: surveys, and a refinement of each filter and of the EKF.
     fn expected_evaluations(&self, laws: &[CrossFit]) -> u64 {
         let surveys = self.all().len() as u64 * survey_evaluations(laws.len());
-        surveys + SURVEY.evaluations() + 2 * REFINEMENT.evaluations()
+        surveys + SURVEY.evaluations() + (self.all().len() as u64 + 1) * REFINEMENT.evaluations()
     }
 }
 
@@ -253,7 +257,8 @@ fn cheapest<'s, 'a: 's>(surveyed: impl Iterator<Item = &'s Surveyed<'a>>) -> Opt
 }
 
 /// Ranges seen in calibration. Readings count relative to R₀ of their recording: in ohms another session's would hide how far a strain leads.
-fn validity(recordings: &[Samples], rest_readings: &[f64], limits: RangeParams, stats: &MotionStats) -> Validity {
+fn validity(recordings: &[Samples], fit: &LawFit, limits: RangeParams, stats: &MotionStats) -> Validity {
+    let rest_readings = &fit.rest_readings;
     let rest = median_rest(rest_readings);
     let of_sensor = |of: f64, samples: &Samples| {
         let (low, high) = reading_range(std::slice::from_ref(samples));
@@ -270,7 +275,9 @@ fn validity(recordings: &[Samples], rest_readings: &[f64], limits: RangeParams, 
         reading_upper,
         fastest_rate_per_s: stats.fastest_rate,
         duration_s: stats.longest_s,
+        drifts: drifts(recordings, fit),
         longest_repeat_s: longest_repeat_s(recordings),
+        resolution: resolution(recordings),
     }
 }
 

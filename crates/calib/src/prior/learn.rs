@@ -129,7 +129,9 @@ fn of_median(sensors: &[SensorParams]) -> Validity {
         reading_upper: of(|sensor| sensor.validity.reading_upper / sensor.rest_reading),
         fastest_rate_per_s: of(|sensor| sensor.validity.fastest_rate_per_s),
         duration_s: of(|sensor| sensor.validity.duration_s),
+        drifts: sensors.iter().any(|sensor| sensor.validity.drifts),
         longest_repeat_s: of(|sensor| sensor.validity.longest_repeat_s),
+        resolution: None,
     }
 }
 

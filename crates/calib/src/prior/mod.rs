@@ -68,7 +68,9 @@ impl Prior {
             reading_upper: own.reading_upper.max(of_make.reading_upper * rest_reading),
             fastest_rate_per_s: own.fastest_rate_per_s.max(of_make.fastest_rate_per_s),
             duration_s: own.duration_s.max(of_make.duration_s),
+            drifts: own.drifts || of_make.drifts,
             longest_repeat_s: own.longest_repeat_s.max(of_make.longest_repeat_s),
+            resolution: own.resolution,
         }
     }
 }

@@ -1,8 +1,10 @@
 //! What is asked of recordings before anything is fitted to them.
 
+pub(crate) mod drift;
 pub(crate) mod holds;
 pub(crate) mod lag;
 pub(crate) mod repeats;
+pub(crate) mod resolution;
 pub(crate) mod rest;
 pub(crate) mod screen;
 pub(crate) mod sessions;

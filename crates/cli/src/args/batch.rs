@@ -96,9 +96,8 @@ impl SummaryForm {
 
 /// What the long help says after the flags.
 const DETAILS: &str = "\
-Every recording is done by a process of its own, which prints and writes what COMMAND does: one that cannot be read, or \
-needs more memory than there is, is reported and leaves the others alone. Exit code 5 says that there were such. Outputs \
-lie in DIR as the recordings lie below the folder that all of them share.
+Of every recording comes what COMMAND prints and writes: one that cannot be read is reported and leaves the others alone. \
+Exit code 5 says that there were such. Outputs lie in DIR as the recordings lie below the folder that all of them share.
 
 DIR/summary.csv has a row per recording: state, messages and warnings, scores, SHA-256 of recording, \
 sensor, prior and output, flags and version. DIR/batch.jsonl grows by a line with each recording \

@@ -1,14 +1,14 @@
 use std::path::PathBuf;
 
 use clap::Args as ClapArgs;
-use ohmstrain_bench_data::import::{Align, ColumnName, DecimalMark, PerFile, Preset, Recipe, Role};
+use ohmstrain_bench_data::import::{Align, ColumnName, DecimalMark, PerFile, Preset, Recipe, Role, RowFilter};
 
 use super::{ReplaceArgs, SetupArgs, positive};
 
 /// Flags of `inspect`.
 #[derive(Debug, ClapArgs)]
 pub struct InspectArgs {
-    /// Files of one recording: text, XLSX, Parquet, each perhaps in gzip; - for stdin
+    /// Files of one recording: text, JSON, XLSX, Parquet, NumPy, each perhaps in gzip or zip; - for stdin
     #[arg(required = true)]
     pub files: Vec<PathBuf>,
     /// Print the command that imports them, and nothing else
@@ -26,12 +26,16 @@ pub struct InspectArgs {
 #[derive(Debug, ClapArgs)]
 #[command(after_help = "`ohmstrain inspect FILE…` prints the command for a file.")]
 pub struct ImportArgs {
-    /// Files of one recording: text, XLSX, Parquet, each perhaps in gzip; - for stdin
+    /// Files of one recording: text, JSON, XLSX, Parquet, NumPy, each perhaps in gzip or zip; - for stdin
     #[arg(required = true)]
     pub files: Vec<PathBuf>,
     /// File to write instead of stdout
     #[arg(short, long, value_name = "trace.csv")]
     pub output: Option<PathBuf>,
+    /// Write each recording of a file with several to a file of its own, trace-1.csv, trace-2.csv, …: where the clock begins
+    /// anew, or a column `trial`, `run` or so has another value
+    #[arg(long, requires = "output", conflicts_with = "recording")]
+    pub split_recordings: bool,
     /// Whether to replace
     #[command(flatten)]
     pub replace: ReplaceArgs,
@@ -47,7 +51,7 @@ pub struct FilesArgs {
     /// angle=none. Roles: time, reference-time, resistance, ratio, adc, strain, displacement, angle, temperature
     #[arg(long = "column", value_name = "ROLE=COLUMN", value_parser = column)]
     pub columns: Vec<(Role, ColumnName)>,
-    /// The unit of a column: time=ms, resistance=kohm, strain=percent, displacement=inch; of a reference in volts or counts
+    /// The unit of a column: time=ms, resistance=kohm (or uS), strain=percent, displacement=inch; of a reference in volts or counts
     /// its scale: displacement=4mm/V, angle=0.9deg/step
     #[arg(long = "unit", value_name = "ROLE=UNIT", value_parser = unit)]
     pub units: Vec<(Role, String)>,
@@ -57,9 +61,17 @@ pub struct FilesArgs {
     /// Pass over the first N lines
     #[arg(long, value_name = "[FILE:]N")]
     pub skip: Vec<PerFile<usize>>,
-    /// The sheet of a workbook
+    /// The sheet of a workbook, or the file in a zip archive
     #[arg(long, value_name = "NAME")]
     pub sheet: Option<String>,
+    /// The rows in which a value stands in a column: trial=2, 'Sensor=left hand'; repeatable, rows pass all (2:trial=1 in
+    /// the second file alone)
+    #[arg(long = "where", value_name = "[FILE:]COLUMN=VALUE")]
+    pub rows: Vec<PerFile<RowFilter>>,
+    /// Which recording of a file with several, counted from 1: where the clock begins anew, or a column `trial`, `run` or so
+    /// has another value
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub recording: Option<u32>,
     /// A text that stands for a missing value, besides the usual ones (OVLD, NaN, N/A, …)
     #[arg(long, value_name = "TEXT", allow_hyphen_values = true)]
     pub missing: Vec<String>,
@@ -100,6 +112,8 @@ impl FilesArgs {
             decimal: self.decimal.clone(),
             skip: self.skip.clone(),
             sheet: self.sheet.clone(),
+            rows: self.rows.clone(),
+            recording: self.recording.map(|number| number as usize),
             missing: self.missing.clone(),
             magnitude: self.magnitude.clone(),
             drop_zeros: self.drop_zeros.clone(),

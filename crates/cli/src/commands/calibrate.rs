@@ -2,8 +2,8 @@ use std::path::Path;
 use std::time::Instant;
 
 use ohmstrain::{
-    Calibrated, Calibration, Closing, Error, EstimatorKind, Quantity, ReadingUnit, Sensor, SensorParams,
-    calibration_doubts, motion_doubts,
+    Calibrated, Calibration, Closing, Error, EstimatorKind, Findings, Quantity, ReadingUnit, Sensor, SensorParams,
+    Tested, calibration_doubts, motion_doubts,
 };
 use ohmstrain_calib::{Samples, screen};
 
@@ -17,15 +17,56 @@ use crate::alignment;
 use crate::args::CalibrateArgs;
 use crate::error::CliError;
 use crate::input::{self, TraceFile, unit};
+use crate::messages::Messages;
 use crate::output::{Kind, Outputs, named, print};
 use crate::plausible;
 use crate::progress::Progress;
 use crate::sensor_file;
-use crate::verbosity::Verbosity;
 use ohmstrain_report::Sample;
 
+/// Calibrates a sensor on recordings, writes its parameters, and says what it came to.
+pub fn run(args: &CalibrateArgs, messages: &Messages) -> Result<(), CliError> {
+    let outcome = calibrate(args, messages)?;
+    let file = args.output.display().to_string();
+    let closing = outcome.closing(&file);
+    print(|out| {
+        out.write_all(outcome.explained.as_bytes())?;
+        if args.json {
+            closing::json(out, &closing, &file)
+        } else if messages.is_quiet() {
+            Ok(())
+        } else {
+            Ok(out.write_all(named(&closing.lines()).as_bytes())?)
+        }
+    })
+}
+
+/// What comes of a calibration, beside the sensor's file.
+pub struct Outcome {
+    sensor: Sensor,
+    /// On parts that were left out.
+    pub findings: Option<Findings>,
+    tested: Option<Tested>,
+    calibration_s: f64,
+    /// What `--explain` and `--bootstrap` print.
+    explained: String,
+}
+
+impl Outcome {
+    fn closing<'a>(&'a self, file: &'a str) -> Closing<'a> {
+        Closing {
+            file: Some(file),
+            params: self.sensor.params(),
+            findings: self.findings.as_ref(),
+            tested: self.tested.as_ref(),
+            calibration_s: Some(self.calibration_s),
+            more: "--explain",
+        }
+    }
+}
+
 /// Calibrates a sensor on recordings and writes its parameters.
-pub fn run(args: &CalibrateArgs) -> Result<(), CliError> {
+pub fn calibrate(args: &CalibrateArgs, messages: &Messages) -> Result<Outcome, CliError> {
     let mut outputs = Outputs::new(args.replace.force, args.traces.iter().chain(&args.prior));
     let sensor_output = outputs.claim(&args.output, Kind::Sensor)?;
     let wanted = Wanted::claim(&args.report, &mut outputs)?;
@@ -44,13 +85,13 @@ pub fn run(args: &CalibrateArgs) -> Result<(), CliError> {
             kept.push((recordings.len() - 1, Kept { whole: recording, seen: rows }));
         }
     }
-    let lags_s = recordings.iter_mut().map(|recording| alignment::check(recording, args.align, args.explain));
+    let lags_s = recordings.iter_mut().map(|recording| alignment::check(recording, args.align, args.explain, messages));
     let lags_s: Vec<f64> = lags_s.collect::<Result<_, _>>()?;
     let prior = args.prior.as_deref().map(fleet::read).transpose()?;
     let wished = calibration(args);
     let wished = prior.as_ref().map_or(wished, |prior| wished.prior(prior));
     let start = Instant::now();
-    let progress = Progress::new("calibrating");
+    let progress = Progress::new("calibrating", messages);
     let Calibrated { sensor, findings, .. } = calibrate_recordings(&recordings, wished, &progress)?;
     drop(progress);
     let calibration_s = start.elapsed().as_secs_f64();
@@ -62,26 +103,19 @@ pub fn run(args: &CalibrateArgs) -> Result<(), CliError> {
         Some(tested) => Sensor::from_params(SensorParams { tested: Some(tested.into()), ..sensor.into_params() })?,
         None => sensor,
     };
-    let params = sensor.params();
     outputs.put(sensor_output, sensor_file::text(&sensor)?);
+    let mut outcome = Outcome { sensor, findings, tested, calibration_s, explained: String::new() };
     let file = args.output.display().to_string();
-    let closing = Closing {
-        file: Some(&file),
-        params,
-        findings: findings.as_ref(),
-        tested: tested.as_ref(),
-        calibration_s: Some(calibration_s),
-        more: "--explain",
-    };
+    let closing = outcome.closing(&file);
     if let Some(wanted) = wanted {
         let reporting = Reporting {
             recording: &recordings[0],
-            sensor: &sensor,
+            sensor: &outcome.sensor,
             kind: None,
             rest_resistance: None,
             part: Part::default(),
             sample: Sample::In,
-            tested: tested.as_ref(),
+            tested: outcome.tested.as_ref(),
             facts: &closing.facts(),
         };
         wanted.put(reporting.drawn()?, &mut outputs)?;
@@ -89,21 +123,14 @@ pub fn run(args: &CalibrateArgs) -> Result<(), CliError> {
     if let Some(chosen) = args.estimator.chosen().filter(|chosen| chosen.0 != EstimatorKind::Corrected)
         && closing.is_better() == Some(false)
     {
-        CliError::warning(&format!(
+        messages.warning(&format!(
             "{file}: {} is no better than a static curve; without --estimator, calibrate tries others and a correction",
             chosen.0.name()
         ));
     }
-    let explained = explain::text(args, &recordings, &params.law)?;
+    outcome.explained = explain::text(args, &recordings, &outcome.sensor.params().law)?;
     outputs.publish()?;
-    print(|out| {
-        out.write_all(explained.as_bytes())?;
-        match Verbosity::chosen() {
-            _ if args.json => closing::json(out, &closing, &file),
-            Verbosity::Quiet => Ok(()),
-            _ => Ok(out.write_all(named(&closing.lines()).as_bytes())?),
-        }
-    })
+    Ok(outcome)
 }
 
 /// What the flags leave to choose from.
@@ -128,18 +155,18 @@ pub fn calibrate_recordings(
     let (quantity, reading) = common_units(recordings)?;
     let names: Vec<&str> = recordings.iter().map(|recording| recording.name.as_str()).collect();
     let as_read = known_recordings(recordings, &samples, (quantity, reading))?;
-    plausible::heed(recordings, &motion_doubts(&as_read))?;
+    plausible::heed(recordings, &motion_doubts(&as_read), progress.messages())?;
     let screened = screen(&samples).map_err(|error| CliError::calibration(&names, &error))?;
     let samples = screened.samples();
     let known = known_recordings(recordings, &samples, (quantity, reading))?;
-    plausible::heed(recordings, &calibration_doubts(&known))?;
-    plausible::warn_of_distrusted(recordings, &screened.distrusted);
+    plausible::heed(recordings, &calibration_doubts(&known), progress.messages())?;
+    plausible::warn_of_distrusted(recordings, &screened.distrusted, progress.messages());
     let calibrated =
         calibration.run_with(&known, |stage| progress.calibrating(stage)).map_err(|error| match error {
             Error::Calibration(error) => CliError::calibration(&names, &error),
             other => other.into(),
         })?;
-    plausible::heed(recordings, &calibrated.doubts())?;
+    plausible::heed(recordings, &calibrated.doubts(), progress.messages())?;
     Ok(calibrated)
 }
 

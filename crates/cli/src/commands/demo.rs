@@ -12,6 +12,7 @@ use super::smooth::write_estimates;
 use crate::args::{DemoArgs, DemoMaterial, ReportArgs};
 use crate::error::CliError;
 use crate::input;
+use crate::messages::Messages;
 use crate::output::{Kind, Outputs, print};
 use crate::progress::Progress;
 use crate::run::estimate;
@@ -22,7 +23,7 @@ use ohmstrain_report::Sample;
 const CALIBRATION_SHARE: f64 = 0.5;
 
 /// The whole chain on a simulated sensor that is not of the fitted model's family.
-pub fn run(args: &DemoArgs) -> Result<(), CliError> {
+pub fn run(args: &DemoArgs, messages: &Messages) -> Result<(), CliError> {
     let mut outputs = Outputs::new(args.replace.force, []);
     outputs.folder(&args.out)?;
     let mut claim = |name: &str, kind| outputs.claim(&args.out.join(name), kind);
@@ -33,7 +34,7 @@ pub fn run(args: &DemoArgs) -> Result<(), CliError> {
     let report = ReportArgs { report: Some(args.out.join("report.html")), figures: None };
     let wanted = Wanted::claim(&report, &mut outputs)?;
 
-    let progress = Progress::new("simulating a bench session");
+    let progress = Progress::new("simulating a bench session", messages);
     let trace = simulate::bytes(&settings(args.material, args.seed)).map_err(CliError::Other)?;
     let recording = input::parse(&trace, &args.out.join("trace.csv"), &Default::default())?;
     outputs.put(trace_output, trace);

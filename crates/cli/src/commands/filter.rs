@@ -1,5 +1,6 @@
 use std::io;
 
+use ohmstrain::Interface::CommandLine;
 use ohmstrain::number::significant;
 use ohmstrain::{
     Error, Estimate, Filter, FilterBuilder, Known, LaggedFilter, QuietWatch, Reading, Sensor, ValidityWatch,
@@ -10,6 +11,7 @@ use crate::args::{FilterArgs, Format, RestResistance, WrittenArgs};
 use crate::error::CliError;
 use crate::estimates::{self, EstimateWriter};
 use crate::input::{self, check_unit};
+use crate::messages::Messages;
 use crate::output::RowsOut;
 use crate::readings::{late, no_row};
 use crate::run::{builder, builder_anew, rest_resistance};
@@ -18,15 +20,15 @@ use crate::stream::{self, Rows};
 use crate::suits::{self, FIRST_LIVE_READINGS, FIRST_READINGS};
 use crate::whole_file::is_stdin;
 
-/// Turns readings into strain as they arrive. Memory does not grow with the recording.
-pub fn run(args: &FilterArgs) -> Result<(), CliError> {
+/// Turns readings into strain as they arrive; how many rows there are. Memory does not grow with the recording.
+pub fn run(args: &FilterArgs, messages: &Messages) -> Result<u64, CliError> {
     let kind = args.estimate.estimator.chosen().map(|estimator| estimator.0);
     let WrittenArgs { output, replace, columns, .. } = &args.written;
     let inputs = [&args.trace_file, &args.estimate.sensor];
     let mut rows_out = RowsOut::claim(output.as_deref(), columns, replace.force, inputs)?;
     let mut sensor = sensor_file::read(&args.estimate.sensor, kind)?;
     let mut filter = FilterRun::new(&sensor, args)?;
-    suits::warn_of_start(args.estimate.initial_strain, &sensor);
+    suits::warn_of_start(args.estimate.initial_strain, &sensor, messages);
     let rows = stream::open(args)?;
     let header = input::header(rows.file(), rows.line());
     check_unit(&header, rows.reading_kind(), sensor.params().reading)?;
@@ -41,9 +43,11 @@ pub fn run(args: &FilterArgs) -> Result<(), CliError> {
     let writer = EstimateWriter::new(rows_out.open(grows)?, format, columns)?;
     let (watch, quiet) = (ValidityWatch::new(&sensor, None), QuietWatch::new(&sensor, None, &args.estimate.known));
     let file = rows.file().into();
-    let sink = Sink { writer, watch, quiet, sensor, rest: None, file, header, live, early: vec![] };
-    Stream { args, filter, sink, times: None, restarted: false, skipped: Skipped::default() }.run(rows)?;
-    rows_out.publish()
+    let sink = Sink { messages, writer, watch, quiet, sensor, rest: None, file, header, live, early: vec![] };
+    let stream = Stream { args, filter, sink, times: None, restarted: false, skipped: Skipped::default() };
+    let written = stream.run(rows)?;
+    rows_out.publish()?;
+    Ok(written)
 }
 
 /// A filter with or without a lag, and the last row of one without.
@@ -103,7 +107,7 @@ impl FilterRun {
 struct Stream<'a, W: io::Write + Send> {
     args: &'a FilterArgs,
     filter: FilterRun,
-    sink: Sink<W>,
+    sink: Sink<'a, W>,
     /// First and last time, s, up to now or until the clock started again.
     times: Option<(f64, f64)>,
     restarted: bool,
@@ -112,7 +116,7 @@ struct Stream<'a, W: io::Write + Send> {
 
 impl<'a, W: io::Write + Send> Stream<'a, W> {
     /// Filters row by row.
-    fn run(mut self, mut rows: Rows) -> Result<(), CliError> {
+    fn run(mut self, mut rows: Rows) -> Result<u64, CliError> {
         let wanted = self.args.estimate.rest_resistance;
         // The rows that R₀ is taken from, at least one, are estimated too, once it is known.
         let count = if let Some(RestResistance::First(count)) = wanted { count } else { 0 };
@@ -138,13 +142,14 @@ impl<'a, W: io::Write + Send> Stream<'a, W> {
                 break Err(error);
             }
         };
-        self.skipped.say();
+        self.skipped.say(self.sink.messages);
         if let (Ok(()), Some(times)) = (&streamed, self.times) {
-            suits::warn_of_unused(&self.args.estimate.known, times, &self.sink.file);
+            suits::warn_of_unused(&self.args.estimate.known, times, &self.sink.file, self.sink.messages);
         }
         // The rows that still wait get their estimates, whatever stopped the stream, and what was estimated is still good.
         let finished = self.finish();
-        self.sink.writer.finish().and(streamed).and(finished)
+        let written = self.sink.writer.finish()?;
+        streamed.and(finished).map(|()| written)
     }
 
     /// Takes what has come; `rows` says what it is of.
@@ -172,7 +177,7 @@ impl<'a, W: io::Write + Send> Stream<'a, W> {
         check_unit(&at, rows.reading_kind(), self.sink.sensor.params().reading)?;
         self.finish()?;
         let time_s = significant(row.time_s, 6);
-        CliError::warning(&format!("{at}: the clock has started again, at {time_s} s, and so has the filter"));
+        self.sink.messages.warning(&format!("{at}: the clock has started again, at {time_s} s, and so has the filter"));
         if let Some(joint) = input::joint(&rows.metadata()) {
             self.sink.sensor = self.sink.sensor.clone().on_joint(joint)?;
         }
@@ -204,7 +209,8 @@ impl<'a, W: io::Write + Send> Stream<'a, W> {
 const SKIPS: &str = "--skip-bad goes on with another filter";
 
 /// Where estimates go.
-struct Sink<W: io::Write + Send> {
+struct Sink<'a, W: io::Write + Send> {
+    messages: &'a Messages,
     writer: EstimateWriter<W>,
     /// Says when the calibration does not reach.
     watch: ValidityWatch,
@@ -221,7 +227,7 @@ struct Sink<W: io::Write + Send> {
     early: Vec<f64>,
 }
 
-impl<W: io::Write + Send> Sink<W> {
+impl<W: io::Write + Send> Sink<'_, W> {
     fn write(&mut self, estimates: &[Estimate]) -> Result<(), CliError> {
         for row in estimates {
             let reading = row.resistance.unwrap_or(f64::NAN);
@@ -230,10 +236,10 @@ impl<W: io::Write + Send> Sink<W> {
                 self.doubt_early();
             }
             for warning in self.watch.see(row.time_s, reading, row.strain_rate, f64::NAN) {
-                CliError::warning(&format!("{}: {warning}", self.file));
+                self.messages.warning(&format!("{}: {warning}", self.file));
             }
             if let Some(quiet) = self.quiet.see(row) {
-                CliError::warning(&format!("{}: {}", self.file, suits::of_rest(&quiet)));
+                self.messages.warning(&format!("{}: {}", self.file, quiet.text(CommandLine)));
             }
             self.writer.write(row)?;
         }
@@ -245,7 +251,7 @@ impl<W: io::Write + Send> Sink<W> {
         if self.early.len() == FIRST_LIVE_READINGS
             && let Err(doubt) = self.sensor.check_unit(self.early.iter().copied(), self.rest)
         {
-            CliError::warning(&format!("{}: {}", self.header, suits::answerable(&doubt)));
+            self.messages.warning(&format!("{}: {}", self.header, doubt.text(CommandLine)));
         }
     }
 }
@@ -263,10 +269,10 @@ impl Skipped {
         self.count += 1;
     }
 
-    fn say(&self) {
+    fn say(&self, messages: &Messages) {
         let Some(first) = &self.first else { return };
         let lines = if self.count == 1 { "1 line was skipped" } else { &format!("{} lines were skipped", self.count) };
-        CliError::warning(&format!("{lines}; the first one: {first}"));
+        messages.warning(&format!("{lines}; the first one: {first}"));
     }
 }
 

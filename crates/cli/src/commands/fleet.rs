@@ -5,19 +5,19 @@ use ohmstrain_bench_data::counted;
 
 use crate::args::{FleetArgs, FleetCommand, FleetFitArgs};
 use crate::error::CliError;
+use crate::messages::Messages;
 use crate::output::{Kind, Outputs, print};
 use crate::sensor_file;
-use crate::verbosity::Verbosity;
 use crate::whole_file;
 
 /// Learns from sensors of one make.
-pub fn run(args: &FleetArgs) -> Result<(), CliError> {
+pub fn run(args: &FleetArgs, messages: &Messages) -> Result<(), CliError> {
     match &args.command {
-        FleetCommand::Fit(args) => fit(args),
+        FleetCommand::Fit(args) => fit(args, messages),
     }
 }
 
-fn fit(args: &FleetFitArgs) -> Result<(), CliError> {
+fn fit(args: &FleetFitArgs, messages: &Messages) -> Result<(), CliError> {
     let mut outputs = Outputs::new(args.replace.force, &args.sensors);
     let output = outputs.claim(&args.output, Kind::Prior)?;
     let sensors = args.sensors.iter().map(|path| sensor_file::read(path, None));
@@ -25,7 +25,7 @@ fn fit(args: &FleetFitArgs) -> Result<(), CliError> {
     let prior = Prior::learn(&sensors)?;
     outputs.put(output, prior.to_toml()?.into_bytes());
     outputs.publish()?;
-    if Verbosity::chosen() != Verbosity::Quiet {
+    if !messages.is_quiet() {
         print(|out| Ok(writeln!(out, "{}", told(&prior, &args.output))?))?;
     }
     Ok(())

@@ -1,27 +1,74 @@
+use std::path::{Path, PathBuf};
+
+use ohmstrain_bench_data::counted;
 use ohmstrain_bench_data::import::{Plan, Table};
 
 use crate::args::ImportArgs;
 use crate::error::CliError;
 use crate::lab_files;
+use crate::messages::Messages;
 use crate::output::{IMPORT, Kind, Outputs};
 use ohmstrain::MADE_BY;
 
-/// Makes a trace of a lab's files. What was taken for what, and what was left out, goes to stderr.
-pub fn run(args: &ImportArgs) -> Result<(), CliError> {
+/// Makes a trace of a lab's files, or of each recording in them. What was taken for what, and what was left out, goes to
+/// stderr.
+pub fn run(args: &ImportArgs, messages: &Messages) -> Result<(), CliError> {
     let mut outputs = Outputs::new(args.replace.force, &args.files);
-    let output = outputs.claim_or_stdout(args.output.as_deref(), Kind::Import)?;
     let recipe = args.known.recipe();
+    if let Some(path) = args.output.as_deref().filter(|_| args.split_recordings) {
+        let tables = lab_files::read(&args.files, &recipe)?;
+        return split(outputs, path, &tables, &Plan::new(&tables, &recipe)?, messages);
+    }
+    let output = outputs.claim_or_stdout(args.output.as_deref(), Kind::Import)?;
     let tables = lab_files::read(&args.files, &recipe)?;
     let plan = Plan::new(&tables, &recipe)?;
-    let mut imported = plan.import(&tables)?;
+    messages.remark(&columns(&plan, &tables));
+    let bytes = trace(&plan, &tables, messages)?;
+    outputs.publish_or_print(output, bytes)
+}
+
+/// Writes each recording to a file of its own, all of them or none, and says which.
+fn split(
+    mut outputs: Outputs,
+    path: &Path,
+    tables: &[Table],
+    plan: &Plan,
+    messages: &Messages,
+) -> Result<(), CliError> {
+    if path == Path::new("-") {
+        return Err(CliError::Arguments("--split-recordings: expected -o with the name of a file, found -".into()));
+    }
+    let recordings = plan.recordings(tables)?;
+    messages.remark(&columns(plan, tables));
+    for (number, recording) in (1..).zip(&recordings) {
+        let path = numbered(path, number);
+        let claim = outputs.claim(&path, Kind::Import)?;
+        let lines = &recording[0].lines;
+        let (first, last) = (lines.first().unwrap_or(&0), lines.last().unwrap_or(&0));
+        let rows = counted(recording[0].len(), "row");
+        messages.remark(&format!("{}: recording {number}, {rows}, lines {first} to {last}", path.display()));
+        outputs.put(claim, trace(plan, recording, messages)?);
+    }
+    outputs.publish()
+}
+
+/// `trace.csv` → `trace-2.csv`.
+fn numbered(path: &Path, number: usize) -> PathBuf {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let extension = path.extension().map_or(String::new(), |extension| format!(".{}", extension.to_string_lossy()));
+    path.with_file_name(format!("{stem}-{number}{extension}"))
+}
+
+/// The text of a trace.
+fn trace(plan: &Plan, tables: &[Table], messages: &Messages) -> Result<Vec<u8>, CliError> {
+    let mut imported = plan.import(tables)?;
     let other = &mut imported.trace.metadata.other;
     other.retain(|(key, _)| key != "made_by");
     other.push(("made_by".into(), format!("{MADE_BY} {IMPORT}")));
-    CliError::remark(&columns(&plan, &tables));
-    imported.remarks.iter().for_each(|remark| CliError::remark(remark));
+    imported.remarks.iter().for_each(|remark| messages.remark(remark));
     let mut bytes = Vec::new();
     imported.trace.write(&mut bytes)?;
-    outputs.publish_or_print(output, bytes)
+    Ok(bytes)
 }
 
 /// What is what, on one line.

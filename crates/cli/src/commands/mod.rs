@@ -29,25 +29,26 @@ mod tested;
 
 use crate::args::Command;
 use crate::error::CliError;
+use crate::messages::Messages;
 
 /// Runs a command.
-pub fn dispatch(command: &Command) -> Result<(), CliError> {
+pub fn dispatch(command: &Command, messages: &Messages) -> Result<(), CliError> {
     match command {
-        Command::Demo(args) => demo::run(args),
+        Command::Demo(args) => demo::run(args, messages),
         Command::Inspect(args) => inspect::run(args),
-        Command::Import(args) => import::run(args),
+        Command::Import(args) => import::run(args, messages),
         Command::Simulate(args) => simulate::run(args),
-        Command::Calibrate(args) => calibrate::run(args),
-        Command::Refine(args) => refine::run(args),
-        Command::FitLaw(args) => fit_law::run(args),
-        Command::Filter(args) => filter::run(args),
-        Command::Hand(args) => hand::run(args),
-        Command::Plan(args) => plan::run(args),
-        Command::Live(args) => live::run(args),
-        Command::Smooth(args) => smooth::run(args),
-        Command::Evaluate(args) => evaluate::run(args),
-        Command::Batch(args) => batch::run(args),
-        Command::Fleet(args) => fleet::run(args),
+        Command::Calibrate(args) => calibrate::run(args, messages),
+        Command::Refine(args) => refine::run(args, messages),
+        Command::FitLaw(args) => fit_law::run(args, messages),
+        Command::Filter(args) => filter::run(args, messages).map(drop),
+        Command::Hand(args) => hand::run(args, messages),
+        Command::Plan(args) => plan::run(args, messages),
+        Command::Live(args) => live::run(args, messages),
+        Command::Smooth(args) => smooth::run(args, messages).map(drop),
+        Command::Evaluate(args) => evaluate::run(args, messages),
+        Command::Batch(args) => batch::run(args, messages),
+        Command::Fleet(args) => fleet::run(args, messages),
         Command::Export(args) => export::run(args),
         Command::SerialCheck(args) => serial_check::run(args),
         Command::Completions(args) => shell::completions(args),

@@ -7,6 +7,7 @@ use crate::args::{Format, SmoothArgs, WrittenArgs};
 use crate::error::CliError;
 use crate::estimates::{self, EstimateWriter, Packed};
 use crate::input::{self, check_unit};
+use crate::messages::Messages;
 use crate::output::RowsOut;
 use crate::readings::{StoredReadings, WAIT_IN_MEMORY, temporary};
 use crate::run::{builder, rest_resistance};
@@ -15,8 +16,8 @@ use crate::suits;
 
 /// Smooths a recording and writes its estimates, all of them or none. Of a long one the states of a few thousand rows are in
 /// memory, and one state for as many others; readings, and estimates, which come out last segment first, wait in temporary
-/// files.
-pub fn run(args: &SmoothArgs) -> Result<(), CliError> {
+/// files. How many there are.
+pub fn run(args: &SmoothArgs, messages: &Messages) -> Result<u64, CliError> {
     let wanted = args.estimate.estimator.chosen().map(|estimator| estimator.0);
     let WrittenArgs { output, replace, columns, .. } = &args.written;
     let inputs = [&args.trace_file, &args.estimate.sensor];
@@ -38,22 +39,23 @@ pub fn run(args: &SmoothArgs) -> Result<(), CliError> {
     let segments = smooth_into(Packed::new(columns.clone()), builder, &readings);
     readings.whole()?;
     let segments = segments.map_err(|error| error.named(&name))?;
-    suits::warn_of_start(args.estimate.initial_strain, &sensor);
+    suits::warn_of_start(args.estimate.initial_strain, &sensor, messages);
     if let Some(last) = readings.len().checked_sub(1) {
-        suits::warn_of_unused(&args.estimate.known, (readings.row(0).0, readings.row(last).0), &name);
+        suits::warn_of_unused(&args.estimate.known, (readings.row(0).0, readings.row(last).0), &name, messages);
     }
     let mut watch = ValidityWatch::new(&sensor, rest);
     let see = |row: usize, rate: f32| {
         let (time_s, reading) = readings.row(row);
         for warning in watch.see(time_s, reading.value, rate.into(), f64::NAN) {
-            CliError::warning(&format!("{name}: {warning}"));
+            messages.warning(&format!("{name}: {warning}"));
         }
     };
     let mut writer = EstimateWriter::new(rows_out.open(false)?, args.written.format(), columns)?;
     segments.write_in_order(&mut writer, see)?;
     readings.whole()?;
-    writer.finish()?;
-    rows_out.publish()
+    let written = writer.finish()?;
+    rows_out.publish()?;
+    Ok(written)
 }
 
 fn smooth_into(packed: Packed, builder: FilterBuilder, readings: &StoredReadings) -> Result<Segments, CliError> {
@@ -113,7 +115,7 @@ impl Segments {
 const RATE_BYTES: usize = size_of::<f32>();
 
 /// Writes a whole recording's estimates.
-pub fn write_estimates(out: impl Write + Send, sensor: &Sensor, estimates: &[Estimate]) -> Result<(), CliError> {
+pub fn write_estimates(out: impl Write + Send, sensor: &Sensor, estimates: &[Estimate]) -> Result<u64, CliError> {
     let mut writer = EstimateWriter::new(out, Format::Csv, sensor.columns())?;
     estimates.iter().try_for_each(|row| writer.write(row))?;
     writer.finish()

@@ -27,5 +27,5 @@ pub use parts::LiveParts;
 pub use protections::Protections;
 pub use rest_follow::{FARTHEST_REST, FOLLOWING, Following, RestBounds, RestFollower, SessionStart};
 pub use rest_watch::{RestSeen, RestWatch};
-pub use sieve::{MOST_REPEATS, Repeats, Sieve, news};
+pub use sieve::{MOST_CODE_REPEATS, MOST_REPEATS, Repeats, Sieve, news};
 pub use unread::{NEVER_READ_S, Unread};

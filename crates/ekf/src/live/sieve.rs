@@ -8,6 +8,11 @@ pub struct Sieve<T> {
     pub plausible: (T, T),
     /// Longest time, s, for which a working sensor repeats one number; infinite if that is not known.
     pub longest_repeat_s: T,
+    /// How often a number must have come again to be stuck, [`MOST_REPEATS`] or more.
+    pub most_repeats: T,
+    /// Largest variance of a reading's own error, (R/R₀)², at which equal numbers are a fault: a coarser converter gives one code
+    /// for as long as the sensor is still.
+    pub fine_variance: T,
     /// How far a reading is from another one, R/R₀ - 1, where it has jumped.
     pub jump: T,
     /// Time, s, over which errors of the readings are alike.
@@ -21,21 +26,32 @@ impl Sieve<f64> {
         Sieve {
             plausible: (T::of(self.plausible.0), T::of(self.plausible.1)),
             longest_repeat_s: T::of(self.longest_repeat_s),
+            most_repeats: T::of(self.most_repeats),
+            fine_variance: T::of(self.fine_variance),
             jump: T::of(self.jump),
             error_time_s: T::of(self.error_time_s),
         }
     }
 }
 
-/// How often a number must have come again to be stuck.
+/// How often a number must have come again to be stuck, where readings are fine.
 pub const MOST_REPEATS: u32 = 10;
+/// The same where the step of the readings is as coarse as their noise allows: a still sensor gives one code as often.
+pub const MOST_CODE_REPEATS: u32 = 300;
 
 impl<T: Recordable> Sieve<T> {
     /// Lets everything pass.
     #[must_use]
     pub fn open() -> Self {
         let endless = T::one() / T::zero();
-        Self { plausible: (-endless, endless), longest_repeat_s: endless, jump: endless, error_time_s: T::zero() }
+        Self {
+            plausible: (-endless, endless),
+            longest_repeat_s: endless,
+            most_repeats: T::of(f64::from(MOST_REPEATS)),
+            fine_variance: T::one(),
+            jump: endless,
+            error_time_s: T::zero(),
+        }
     }
 
     /// What is left of it where some protections are turned off: no number is implausible, or stuck; readings never jump.
@@ -116,7 +132,7 @@ impl<T: Recordable> Repeats<T> {
             (self.count, self.repeated_s) = (T::zero(), T::zero());
         }
         (self.last, self.since_s) = (Some(value), T::zero());
-        if self.count >= T::of(f64::from(MOST_REPEATS)) && self.repeated_s > sieve.longest_repeat_s {
+        if self.is_stuck(sieve, reading.extra_variance) {
             return Err(ReadingVerdict::Stuck);
         }
         let variance = reading_variance + reading.extra_variance;
@@ -125,6 +141,14 @@ impl<T: Recordable> Repeats<T> {
             extra_variance += (T::one() / news(since_s, sieve.error_time_s) - T::one()) * reading_variance;
         }
         Ok(Reading { extra_variance, ..reading })
+    }
+
+    /// The same number for longer than a still sensor gives it. Of a converter whose step is not much smaller than the noise more
+    /// repetitions are taken for chance, and none is a fault where its step is larger.
+    fn is_stuck(&self, sieve: &Sieve<T>, extra_variance: T) -> bool {
+        let codes = T::of(f64::from(MOST_CODE_REPEATS));
+        let most = if extra_variance > T::zero() { codes } else { sieve.most_repeats };
+        self.count >= most && self.repeated_s > sieve.longest_repeat_s && extra_variance <= sieve.fine_variance
     }
 }
 

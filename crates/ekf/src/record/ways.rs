@@ -297,7 +297,14 @@ mod tests {
 
     #[test]
     fn what_becomes_of_a_reading_is_written_down_for_all_its_ways() {
-        let sieve = Sieve { plausible: (-0.5, 5.0), longest_repeat_s: 1.2, jump: 0.08, error_time_s: 2.0 };
+        let sieve = Sieve {
+            plausible: (-0.5, 5.0),
+            longest_repeat_s: 1.2,
+            most_repeats: 10.0,
+            fine_variance: 1e-4,
+            jump: 0.08,
+            error_time_s: 2.0,
+        };
         let function = write_down(|writer| {
             let mut repeats = writer.state(Repeats::none());
             repeats.pass(writer.input("dt_s"));
@@ -307,17 +314,19 @@ mod tests {
             writer.tell("is_seen", sieved.is_ok());
             writer.give("variance", sieved.map_or(reading.extra_variance, |seen| seen.extra_variance));
         });
-        let mut repeats = Repeats::<f32>::none();
         let mut verdicts = [0, 0];
-        for (row, value, _) in readings() {
-            let before = Seen::of(repeats);
-            repeats.pass(0.1);
-            let sieved = repeats.sieved(&sieve.to(), Reading { value, extra_variance: 1e-5 }, 1e-4);
-            let [after, given] = done(&function, &before, &[("dt_s", 0.1), ("rho", value), ("extra", 1e-5)]);
-            assert_same(&after, &Seen::of(repeats), row);
-            assert_eq!(given["is_seen"] == 1.0, sieved.is_ok(), "row {row}");
-            assert_eq!(given["variance"], sieved.map_or(1e-5, |seen| seen.extra_variance), "row {row}");
-            verdicts[usize::from(sieved.is_ok())] += 1;
+        for extra in [0.0, 1e-5] {
+            let mut repeats = Repeats::<f32>::none();
+            for (row, value, _) in readings() {
+                let before = Seen::of(repeats);
+                repeats.pass(0.1);
+                let sieved = repeats.sieved(&sieve.to(), Reading { value, extra_variance: extra }, 1e-4);
+                let [after, given] = done(&function, &before, &[("dt_s", 0.1), ("rho", value), ("extra", extra)]);
+                assert_same(&after, &Seen::of(repeats), row);
+                assert_eq!(given["is_seen"] == 1.0, sieved.is_ok(), "row {row}");
+                assert_eq!(given["variance"], sieved.map_or(extra, |seen| seen.extra_variance), "row {row}");
+                verdicts[usize::from(sieved.is_ok())] += 1;
+            }
         }
         assert!(verdicts[0] > 5 && verdicts[1] > 300, "{verdicts:?}");
     }

@@ -11,6 +11,8 @@ pub struct SieveConstants {
     lower: Literal,
     upper: Literal,
     longest_repeat_s: Option<Literal>,
+    most_repeats: Literal,
+    fine_variance: Literal,
     jump: Literal,
     error_time_s: Option<Literal>,
 }
@@ -108,6 +110,8 @@ impl SieveConstants {
             lower: Literal(sieve.plausible.0),
             upper: Literal(sieve.plausible.1),
             longest_repeat_s: finite(sieve.longest_repeat_s),
+            most_repeats: Literal(sieve.most_repeats),
+            fine_variance: Literal(sieve.fine_variance),
             jump: Literal(sieve.jump),
             error_time_s: Some(Literal(sieve.error_time_s)).filter(|time_s| time_s.0 > 0.0),
         }

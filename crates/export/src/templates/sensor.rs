@@ -115,6 +115,8 @@ pub const TEMPERING: f32 = << phases.tempering >>;
 pub const SIEVE: Sieve<f32> = Sieve {
     plausible: (<< sieve.lower >>, << sieve.upper >>),
     longest_repeat_s: {% if sieve.longest_repeat_s is none %}f32::INFINITY{% else %}<< sieve.longest_repeat_s >>{% endif %},
+    most_repeats: << sieve.most_repeats >>,
+    fine_variance: << sieve.fine_variance >>,
     jump: << sieve.jump >>,
     error_time_s: {% if sieve.error_time_s is none %}0.0{% else %}<< sieve.error_time_s >>{% endif %},
 };

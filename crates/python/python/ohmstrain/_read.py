@@ -15,12 +15,14 @@ from . import _core, _tables
 from ._sensor import _warn
 
 #: Arguments that take a value per role, and lists; the importer's messages name them as flags.
-_BY_ROLE = {"column": "columns", "unit": "units", "zero": "zero"}
+_BY_ROLE = {"column": "columns", "unit": "units", "zero": "zero", "where": "where"}
 _LISTS = ("magnitude", "drop_zeros", "missing")
 #: Values that stand for numbers in messages.
 _NUMBERS = ("HZ", "MM", "N", "S", "SECONDS")
 _FLAG = re.compile(r"--([a-z]+(?:-[a-z]+)*)(?: ((?:'[^']*'|\\'|[^\s'\\])+))?")
 _SWITCHES = ("fold-polarity",)
+#: Flags of the command line alone.
+_COMMANDS = {"split-recordings": "`ohmstrain import --split-recordings`"}
 
 
 def read(
@@ -30,6 +32,8 @@ def read(
     decimal: str | Mapping[int, str] | None = None,
     skip: int | Mapping[int, int] | None = None,
     sheet: str | None = None,
+    where: Mapping[str, Any] | None = None,
+    recording: int | None = None,
     missing: Iterable[str] = (),
     magnitude: Iterable[str] = (),
     drop_zeros: Iterable[str] = (),
@@ -60,7 +64,12 @@ def read(
     skip : int or dict
         Lines above header and data.
     sheet : str
-        Sheet of a workbook.
+        Sheet of a workbook, or file in a zip archive.
+    where : dict
+        Rows in which a value stands in a column: ``{"trial": 2}``.
+    recording : int
+        Which recording, counted from 1, of a file with several: where the clock begins anew, or a column ``trial``, ``run`` or so has
+        another value.
     missing : list of str
         Texts that stand for missing values, besides the usual ones.
     magnitude, drop_zeros : list of str
@@ -101,6 +110,8 @@ def read(
         "decimal": _per_file(decimal),
         "skip": _per_file(skip),
         "sheet": sheet,
+        "rows": [f"{column}={value}" for column, value in (where or {}).items()],
+        "recording": recording,
         "missing": _texts(missing),
         "magnitude": _texts(magnitude),
         "drop_zeros": _texts(drop_zeros),
@@ -163,6 +174,8 @@ def _argument(flag: re.Match[str]) -> tuple[str, str]:
     """A flag as an argument, and what stands behind its value."""
     name, word = flag[1], flag[2]
     key = name.replace("-", "_")
+    if name in _COMMANDS:
+        return _COMMANDS[name], "" if word is None else f" {word}"
     if word is None:
         return (f"{key}=True", "") if name in _SWITCHES else (key, "")
     if name in _SWITCHES:

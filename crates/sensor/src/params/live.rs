@@ -3,6 +3,7 @@
 use ohmstrain_ekf::live::{DOUBT, DoubtParts, RestBounds, RestSeen, SessionStart, Sieve, Unread};
 
 use crate::params::estimator::MotionParams;
+use crate::params::repeating::Repeating;
 use crate::params::{SensorParams, Sessions};
 
 /// By what factor a reading may lie outside of the calibration's, and by how many ranges of them above: another day, drift
@@ -43,9 +44,13 @@ impl SensorParams {
         let seen = &self.validity;
         let (low, high) = (seen.reading_lower, seen.reading_upper);
         let beyond = OUTSIDE * (high - low);
+        let repeating =
+            seen.resolution.map_or(Repeating::UNKNOWN, |resolution| Repeating::new(resolution, self.rest_reading));
         Sieve {
             plausible: (self.relative(low / OUTSIDE), self.relative((high + beyond).max(high * OUTSIDE))),
-            longest_repeat_s: LONGER * seen.longest_repeat_s,
+            longest_repeat_s: if repeating.is_endless { f64::INFINITY } else { LONGER * seen.longest_repeat_s },
+            most_repeats: repeating.most,
+            fine_variance: repeating.fine_variance,
             jump: JUMP * (self.relative(high) - self.relative(low)),
             error_time_s: 0.0,
         }
@@ -108,7 +113,7 @@ impl SensorParams {
             low,
             high,
             fastest_per_s: seen.fastest_rate_per_s,
-            longest_s: seen.duration_s,
+            longest_s: if seen.drifts { seen.duration_s } else { f64::from(f32::MAX) },
             per_reading,
             start: (START * span).powi(2),
             most: unread.anywhere,

@@ -6,6 +6,7 @@ pub(crate) mod findings;
 pub(crate) mod law;
 mod live;
 pub(crate) mod range;
+mod repeating;
 pub(crate) mod static_cubic;
 pub(crate) mod summary;
 pub(crate) mod validate;
@@ -135,8 +136,24 @@ pub struct Validity {
     pub fastest_rate_per_s: f64,
     /// Longest recording, s.
     pub duration_s: f64,
+    /// True if readings drifted while a recording lasted: a longer run drifts farther. False in files of earlier versions.
+    #[serde(default)]
+    pub drifts: bool,
     /// Longest time for which a reading was repeated to the last digit, s.
     pub longest_repeat_s: f64,
+    /// Resolution of the readings; `None` in files of earlier versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub resolution: Option<Resolution>,
+}
+
+/// Resolution of the calibration's readings, in their unit: how often a still sensor repeats a number follows from it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Resolution {
+    /// Distance between neighbouring values.
+    pub step: f64,
+    /// Standard deviation of the white noise.
+    pub noise_sd: f64,
 }
 
 /// Differences between recordings: each is a session, with an R₀ of its own.

@@ -17,7 +17,7 @@ use crate::params::law::{GaugeParams, LawParams};
 use crate::params::range::RangeParams;
 use crate::params::static_cubic::StaticCubic;
 use crate::params::summary::{Summary, TestedSummary};
-use crate::params::{JointParams, RecordingInfo, SensorParams, Sessions, Uncertainty, Validity};
+use crate::params::{JointParams, RecordingInfo, Resolution, SensorParams, Sessions, Uncertainty, Validity};
 
 /// Shortest range of strains, relative to its larger end.
 const SHORTEST_RANGE: f64 = 1e-9;
@@ -131,7 +131,15 @@ impl Validity {
         ends(table, ["reading_lower", "reading_upper"], self.reading_lower, self.reading_upper, POSITIVE)?;
         table.number("fastest_rate_per_s", self.fastest_rate_per_s, TOLD_AMOUNT)?;
         table.number("duration_s", self.duration_s, TOLD_AMOUNT)?;
-        table.number("longest_repeat_s", self.longest_repeat_s, TOLD_AMOUNT)
+        table.number("longest_repeat_s", self.longest_repeat_s, TOLD_AMOUNT)?;
+        self.resolution.map_or(Ok(()), |resolution| resolution.validate(&table.table("resolution")))
+    }
+}
+
+impl Resolution {
+    fn validate(self, table: &Table) -> Result<(), FieldError> {
+        table.number("step", self.step, TOLD_AMOUNT)?;
+        table.number("noise_sd", self.noise_sd, TOLD_AMOUNT)
     }
 }
 

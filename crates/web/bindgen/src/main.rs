@@ -10,5 +10,6 @@ fn main() -> Result<(), Box<dyn Error>> {
     let [input, folder] = &arguments[..] else { return Err("expected IN.wasm DIR".into()) };
     let mut bindgen = Bindgen::new();
     bindgen.input_path(input).out_name("ohmstrain").web(true)?.typescript(true).omit_default_module_path(true);
+    bindgen.remove_name_section(true).remove_producers_section(true);
     Ok(bindgen.generate(folder)?)
 }

@@ -113,6 +113,18 @@ impl Cells {
         &self.text[start..end]
     }
 
+    /// Some of the cells, in this order.
+    pub(crate) fn some(&self, rows: impl Iterator<Item = usize>) -> Self {
+        let mut out = Self::default();
+        for row in rows {
+            match self.numbers.get(row).copied().filter(|number| number.is_finite()) {
+                Some(number) => out.push_cell(&Cell::Number(number)),
+                None => out.push_cell(&Cell::Text(self.get(row).into())),
+            };
+        }
+        out
+    }
+
     /// The texts of all cells.
     pub fn iter(&self) -> impl Iterator<Item = &str> + Clone {
         (0..self.len()).map(|row| self.get(row))

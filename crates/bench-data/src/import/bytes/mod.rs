@@ -1,8 +1,12 @@
 //! Contents of a file: gzip unpacked, containers opened, text decoded. Nothing here asks for the meaning of a cell.
 
+mod archive;
 pub(crate) mod bounds;
 mod cell;
 mod compound;
+mod foreign;
+mod json;
+mod numpy;
 mod parquet;
 mod sheet;
 pub(crate) mod text;
@@ -19,6 +23,7 @@ use crate::import::error::ImportError;
 use bounds::{LARGEST_FILE, MOST_WRAPPINGS, mib};
 pub use cell::Cells;
 pub(crate) use cell::{Cell, Rows};
+pub(crate) use json::{Json, values as json_values};
 pub(crate) use parquet::RawColumn;
 pub(crate) use sheet::NamedSheets;
 
@@ -27,34 +32,67 @@ pub(crate) enum Contents {
     /// Text and its encoding.
     Text(String, &'static str),
     Sheets(NamedSheets),
-    /// Columns, all of them with as many rows.
-    Columns(Vec<RawColumn>),
+    /// Columns, all of them with as many rows, and what the container is called.
+    Columns(Vec<RawColumn>, &'static str),
 }
 
-/// The contents of a file of any kind, and how often it was packed in gzip. `sheet` is the one wanted of a workbook.
-pub(crate) fn open(mut bytes: Vec<u8>, name: &str, sheet: Option<&str>) -> Result<(Contents, usize), ImportError> {
-    let mut wrappings = 0;
-    while bytes.starts_with(&[0x1f, 0x8b]) {
-        wrappings += 1;
-        if wrappings > MOST_WRAPPINGS {
+/// The contents of a file of any kind, and what it was packed in, `gzip, `. `sheet` is the one wanted of a workbook, or the
+/// file wanted of an archive.
+pub(crate) fn open(mut bytes: Vec<u8>, name: &str, sheet: Option<&str>) -> Result<(Contents, String), ImportError> {
+    let mut wrappings = Vec::new();
+    loop {
+        if wrappings.len() > MOST_WRAPPINGS {
             let what = format!("expected gzip data in at most {MOST_WRAPPINGS} wrappings, found more: unpack it first");
             return Err(ImportError::unreadable(name, what));
         }
-        bytes = unpacked(&bytes, name)?;
+        if bytes.starts_with(&[0x1f, 0x8b]) {
+            bytes = unpacked(&bytes, name)?;
+            wrappings.push("gzip, ");
+        } else if bytes.starts_with(PK) && zipped::is_archive(&bytes) {
+            let broken = "cannot be read as a zip archive: expected files, found others";
+            // What is wanted of an archive is no sheet of what is in it.
+            let wanted = sheet.filter(|_| !wrappings.contains(&ZIP));
+            match guarded(name, broken, || archive::read(&bytes, name, wanted))? {
+                archive::Packed::File(file) => bytes = file,
+                archive::Packed::Arrays(columns) => {
+                    return Ok((Contents::Columns(columns, "NumPy"), wrappings.concat()));
+                }
+            }
+            wrappings.push(ZIP);
+        } else {
+            return Ok((contents(bytes, name, sheet)?, wrappings.concat()));
+        }
     }
-    let contents = if ParquetText::is_one(&bytes) {
+}
+
+/// What a file in a zip archive is packed in.
+const ZIP: &str = "zip, ";
+/// What a zip container begins with.
+const PK: &[u8] = b"PK\x03\x04";
+
+const NO_WORKBOOK: &str = "cannot be read as a workbook: expected records and places in a sheet, found others: save the sheet \
+                           with the recording as CSV";
+
+/// The contents of a file that is not packed.
+fn contents(bytes: Vec<u8>, name: &str, sheet: Option<&str>) -> Result<Contents, ImportError> {
+    if ParquetText::is_one(&bytes) {
         let expected = "cannot be read as Parquet: expected pages of values, found others";
-        Contents::Columns(guarded(name, expected, || parquet::read(bytes, name))?)
-    } else if bytes.starts_with(b"PK\x03\x04") || bytes.starts_with(&workbook::XLS) {
-        let expected = "cannot be read as a workbook: expected records and places in a sheet, found others: save the sheet \
-                        with the recording as CSV";
-        Contents::Sheets(guarded(name, expected, || workbook::read(&bytes, name, sheet))?)
-    } else {
-        let binary = "expected text, XLSX or Parquet, perhaps in gzip, found binary data";
-        let (text, encoding) = text::decode(bytes).ok_or_else(|| ImportError::unreadable(name, binary))?;
-        Contents::Text(text, encoding)
-    };
-    Ok((contents, wrappings))
+        let columns = guarded(name, expected, || parquet::read(bytes, name))?;
+        return Ok(Contents::Columns(columns, "Parquet"));
+    }
+    if bytes.starts_with(PK) || bytes.starts_with(&workbook::XLS) {
+        return guarded(name, NO_WORKBOOK, || workbook::read(&bytes, name, sheet)).map(Contents::Sheets);
+    }
+    if bytes.starts_with(numpy::MAGIC) {
+        let columns = numpy::columns(&bytes, "").map_err(|error| ImportError::unreadable(name, error))?;
+        return Ok(Contents::Columns(columns, "NumPy"));
+    }
+    if let Some(refusal) = foreign::refusal(&bytes, name) {
+        return Err(ImportError::unreadable(name, refusal));
+    }
+    let binary = "expected text, XLSX or Parquet, perhaps in gzip, found binary data";
+    let (text, encoding) = text::decode(bytes).ok_or_else(|| ImportError::unreadable(name, binary))?;
+    Ok(Contents::Text(text, encoding))
 }
 
 /// What a library reads of a container. They panic at some that are cut, and at places and sizes that cannot be.

@@ -17,7 +17,7 @@ pub(crate) struct RawColumn {
     pub cells: Cells,
 }
 
-/// Reads the flat columns of a Parquet file: uncompressed, Snappy or gzip, which is what most programs write.
+/// Reads the flat columns of a Parquet file, however its pages are compressed.
 pub(crate) fn read(bytes: Vec<u8>, name: &str) -> Result<Vec<RawColumn>, ImportError> {
     let broken = |error| ImportError::unreadable(name, broken(error).to_string());
     let reader = SerializedFileReader::new(Bytes::from(bytes)).map_err(broken)?;

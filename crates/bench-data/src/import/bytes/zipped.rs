@@ -18,8 +18,30 @@ pub(crate) enum Kind {
     Ods,
 }
 
+/// True if a container is no workbook, but files that somebody has packed together.
+pub(crate) fn is_archive(bytes: &[u8]) -> bool {
+    const OF_WORKBOOKS: [&str; 3] = ["content.xml", "xl/workbook.bin", "[Content_Types].xml"];
+    let Ok(archive) = ZipArchive::new(Cursor::new(bytes)) else { return false };
+    !archive.is_empty() && !OF_WORKBOOKS.iter().any(|name| has(&archive, name))
+}
+
+fn has(archive: &ZipArchive<Cursor<&[u8]>>, name: &str) -> bool {
+    archive.file_names().flatten().any(|file| file.eq_ignore_ascii_case(name))
+}
+
 /// The kind of a workbook that unpacks to no more than it may.
 pub(crate) fn kind(bytes: &[u8]) -> Result<Kind, String> {
+    check_unpacked(bytes, "save the sheet with the recording as CSV")?;
+    let archive = ZipArchive::new(Cursor::new(bytes)).map_err(|error| error.to_string())?;
+    Ok(match (has(&archive, "content.xml"), has(&archive, "xl/workbook.bin")) {
+        (true, _) => Kind::Ods,
+        (_, true) => Kind::Xlsb,
+        _ => Kind::Xlsx,
+    })
+}
+
+/// Refuses a container that unpacks to more than it may.
+pub(crate) fn check_unpacked(bytes: &[u8], way_out: &str) -> Result<(), String> {
     let mut archive = ZipArchive::new(Cursor::new(bytes)).map_err(|error| error.to_string())?;
     let mut left = LARGEST_WORKBOOK;
     for index in 0..archive.len() {
@@ -28,15 +50,10 @@ pub(crate) fn kind(bytes: &[u8]) -> Result<Kind, String> {
         let size = copy(&mut file.take(left + 1), &mut sink()).map_err(|error| error.to_string())?;
         left = left.checked_sub(size).ok_or_else(|| {
             let most = mib(LARGEST_WORKBOOK);
-            format!("expected at most {most} MiB when unpacked, found more: save the sheet with the recording as CSV")
+            format!("expected at most {most} MiB when unpacked, found more: {way_out}")
         })?;
     }
-    let has = |name: &str| archive.file_names().flatten().any(|file| file.eq_ignore_ascii_case(name));
-    Ok(match (has("content.xml"), has("xl/workbook.bin")) {
-        (true, _) => Kind::Ods,
-        (_, true) => Kind::Xlsb,
-        _ => Kind::Xlsx,
-    })
+    Ok(())
 }
 
 /// Refuses a workbook whose sheets have more cells than may be held, from the first to the last one that is not empty.

@@ -1,7 +1,7 @@
-use crate::import::error::ImportError;
+use crate::import::error::{ImportError, quoted};
 use crate::import::roles::decision::{Clock, Place, Taken};
 use crate::import::roles::facts::{Candidate, Found};
-use crate::import::roles::find::{find, several};
+use crate::import::roles::find::{find, refer, several};
 use crate::import::roles::recipe::Recipe;
 use crate::import::roles::unit::channel;
 use crate::import::table::{Table, all_files};
@@ -36,6 +36,7 @@ pub(crate) fn clock(
     let is_named = times.iter().any(|time| time.is_named);
     times.retain(|time| time.is_named || !is_named);
     let table = found.table(value);
+    remarks.extend(without_coarse(found, &mut times));
     let column = match times[..] {
         [] => return Err(no_time(found, value.file, role)),
         [one] => one.column,
@@ -45,6 +46,12 @@ pub(crate) fn clock(
         })?,
     };
     let name = table.name(column);
+    if found.is_coarse(Place { column, ..value }) {
+        let others: Vec<usize> = found.rising(value.file).into_iter().filter(|other| *other != column).collect();
+        if !others.is_empty() {
+            return Err(too_coarse(found, Place { column, ..value }, role, &others));
+        }
+    }
     if times.len() > 1 {
         let value = found.name(value);
         remarks.push(format!("{}: {name} is taken for the clock of {value}, beside which it stands", table.file));
@@ -55,6 +62,28 @@ pub(crate) fn clock(
     // Unless it is another column, the reference's clock is under the name that the readings' has.
     let role = if role == Role::ReferenceTime && times.len() == 1 { Role::Time } else { role };
     channel(found, answers, Taken { role, place: Place { column, ..value } }, remarks).map(Clock::Column)
+}
+
+/// Leaves out clocks that do not tell rows apart, if there are others; what is to be remarked of that.
+fn without_coarse(found: &Found, times: &mut Vec<&Candidate>) -> Option<String> {
+    let (coarse, fine): (Vec<&Candidate>, Vec<&Candidate>) =
+        times.iter().partition(|time| found.is_coarse(time.place()));
+    let first = *coarse.first().filter(|_| !fine.is_empty())?;
+    let (table, place) = (&found.tables[first.table], first.place());
+    let (name, rows) = (found.name(place), found.facts(place).repeated);
+    *times = fine;
+    Some(format!("{}: {name} is no clock: {rows} of {} rows have the time of the row before", table.file, table.len()))
+}
+
+/// The clock that the names lead to does not tell rows apart, and other columns increase.
+fn too_coarse(found: &Found, place: Place, role: Role, others: &[usize]) -> ImportError {
+    let (table, repeated) = (found.table(place), found.facts(place).repeated);
+    let mut answers = rising_answers(found, place.file, role, others);
+    answers.push("--rate-hz HZ if the rows are evenly spaced".to_owned());
+    let (name, rows) = (found.name(place), table.len());
+    let what =
+        format!("column {name}: {repeated} of {rows} rows have the time of the row before: the clock is too coarse");
+    ImportError::question(&table.file, what, answers)
 }
 
 /// The time column beside a value, where every value has one on the same side: `t1, v1, t2, v2` or `v1, t1, v2, t2`.
@@ -72,20 +101,33 @@ fn beside(columns: usize, times: &[&Candidate], column: usize) -> Option<usize> 
 /// Nothing says what the time is.
 fn no_time(found: &Found, file: usize, role: Role) -> ImportError {
     let (table, rising) = (&found.tables[file], found.rising(file));
-    let mut answers: Vec<String> = rising.iter().map(|column| format!("--column {role}={}", column + 1)).collect();
-    answers.push("--rate-hz HZ".to_owned());
-    let what = format!("which column is the time among {}{}", table.list(), rising_words(&rising));
+    let mut answers = rising_answers(found, file, role, &rising);
+    match &table.layout.rate {
+        Some((hz, line)) => answers.insert(0, format!("--rate-hz {hz} (as line {line} says)")),
+        None => answers.push("--rate-hz HZ".to_owned()),
+    }
+    let what = format!("which column is the time among {}{}", table.list(), rising_words(table, &rising));
     ImportError::question(&table.file, what, answers)
 }
 
-fn rising_words(rising: &[usize]) -> String {
-    match rising {
-        [] => ", none of which increases throughout".to_owned(),
-        [one] => format!(" (number {} increases)", one + 1),
-        _ => {
-            let numbers: Vec<String> = rising.iter().map(|column| (column + 1).to_string()).collect();
-            format!(" (numbers {} increase)", numbers.join(", "))
-        }
+/// Answers that name each of these columns.
+fn rising_answers(found: &Found, file: usize, role: Role, columns: &[usize]) -> Vec<String> {
+    let answer = |column: &usize| {
+        let column = refer(found.tables, Place { file, column: *column });
+        format!("--column {}", quoted(&format!("{role}={column}")))
+    };
+    columns.iter().map(answer).collect()
+}
+
+fn rising_words(table: &Table, rising: &[usize]) -> String {
+    let is_named = rising.iter().all(|column| !table.columns[*column].heading.is_empty());
+    let names: Vec<String> = rising.iter().map(|column| table.name(*column)).collect();
+    match (rising, is_named) {
+        ([], _) => ", none of which increases throughout".to_owned(),
+        ([_], true) => format!(" ({} increases)", names[0]),
+        ([_], false) => format!(" (number {} increases)", names[0]),
+        (_, true) => format!(" ({} increase)", names.join(", ")),
+        (_, false) => format!(" (numbers {} increase)", names.join(", ")),
     }
 }
 
@@ -104,7 +146,12 @@ pub(crate) fn no_readings(found: &Found) -> ImportError {
         let answers = Role::READINGS.map(|role| format!("--column {role}=NAME"));
         return ImportError::question(&files, format!("which column holds the readings among {lists}"), answers);
     }
-    let what = format!("no header; which column is what among {lists}{}", rising_words(&found.rising(0)));
-    let answer = "--column time=N --column resistance=N --column strain=N (ratio, adc; displacement, angle, none)";
-    ImportError::question(&files, what, [answer.to_owned()])
+    let time = found.candidates.iter().find(|one| one.table == 0 && one.role == Role::Time);
+    let (known, time) = match time {
+        Some(time) => (format!(" ({} is the time)", found.name(time.place())), ""),
+        None => (rising_words(table, &found.rising(0)), "--column time=N "),
+    };
+    let what = format!("no header; which column is what among {lists}{known}");
+    let answer = format!("{time}--column resistance=N --column strain=N (ratio, adc; displacement, angle, none)");
+    ImportError::question(&files, what, [answer])
 }

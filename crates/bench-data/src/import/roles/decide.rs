@@ -7,7 +7,7 @@ use crate::import::roles::decision::{Channel, Decision, Place, Taken, Timed};
 use crate::import::roles::facts::Found;
 use crate::import::roles::find::{choose, find, refer};
 use crate::import::roles::recipe::Recipe;
-use crate::import::roles::unit::channel;
+use crate::import::roles::unit::{channel, is_stretch_ratio};
 use crate::import::table::{SEPARATOR, Table, all_files};
 use crate::import::words::units::scale_of_a_reference;
 use crate::import::words::{Role, names};
@@ -77,6 +77,13 @@ fn missing_answers(found: &Found, answers: &Recipe, decision: &Decision) -> Vec<
         let align = ["motion", "none", "SECONDS"].map(|align| format!("--align {align}"));
         questions.push(ImportError::question(&all_files(found.tables), "two files with two clocks", align));
     }
+    if is_stretch_without_zero(found, answers, decision) {
+        let reference = decision.reference.map(|reference| reference.values.place);
+        let (file, name) =
+            reference.map_or_else(Default::default, |place| (found.table(place).file.clone(), found.name(place)));
+        let what = format!("column {name} is a stretch ratio, which is 1 where strain is 0");
+        questions.push(ImportError::question(&file, what, ["--zero strain=1".to_owned()]));
+    }
     for channel in decision.reference.iter().chain(&decision.readings).map(|timed| timed.values) {
         let table = found.table(channel.place);
         match channel.role {
@@ -94,6 +101,17 @@ fn missing_answers(found: &Found, answers: &Recipe, decision: &Decision) -> Vec<
         }
     }
     questions
+}
+
+/// True if the reference is a stretch ratio, and nobody has said what it is at rest.
+pub(crate) fn is_stretch_without_zero(found: &Found, answers: &Recipe, decision: &Decision) -> bool {
+    let is_stretch = |channel: &Channel| {
+        channel.role == Role::Strain
+            && channel.unit.name == "1"
+            && is_stretch_ratio(found.column(channel.place), found.facts(channel.place))
+    };
+    let is_answered = answers.zero.iter().any(|(role, _)| *role == Role::Strain);
+    !is_answered && decision.reference.iter().any(|reference| is_stretch(&reference.values))
 }
 
 /// Refuses a label that is not in every other record of its file: what the records are has not been understood.

@@ -7,9 +7,13 @@ use crate::import::roles::preset::Preset;
 use crate::import::table::number_of;
 use crate::import::table::{Column, MONITOR_CLOCK, Table};
 use crate::import::words::names::{self, Sureness};
-use crate::import::words::stamp::{Order, Stamp, has_points, orders, stamp};
-use crate::import::words::{Role, is_missing, is_stamp, ohms};
+use crate::import::words::stamp::{Order, Stamp, date_and_time, has_points, orders, stamp};
+use crate::import::words::units::epoch_unit;
+use crate::import::words::{Role, is_missing, is_stamp, nanoseconds, ohms};
 use crate::order::median;
+
+/// Cells that tell what a column without a name is.
+const FIRST_CELLS: usize = 5;
 
 /// What a column may be, by its name and unit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -52,6 +56,8 @@ pub(crate) struct Facts {
     pub prefixed: Option<String>,
     /// Empty cells, and the line of the first.
     pub empty: (usize, u64),
+    /// Rows in which the same stands as in the row before.
+    pub repeated: usize,
 }
 
 impl Facts {
@@ -63,6 +69,7 @@ impl Facts {
             numbers: Numbers::of(table, place),
             prefixed: cells.iter().find(|cell| ohms(cell.trim(), table.layout.decimal).is_some()).map(quote),
             empty: (empty.len(), empty.first().map_or(1, |row| table.lines[*row])),
+            repeated: (1..cells.len()).filter(|row| cells.get(*row) == cells.get(row - 1)).count(),
         }
     }
 }
@@ -87,6 +94,7 @@ pub(crate) struct Numbers {
     /// Median and largest of the sizes, without signs.
     pub size: f64,
     pub largest: f64,
+    pub least: f64,
     /// They increase from row to row, all but a few.
     pub rise: bool,
 }
@@ -102,6 +110,7 @@ impl Numbers {
             has_fractions: known.iter().any(|number| number.fract() != 0.0),
             size: middle(known.iter().map(|number| number.abs()).collect()),
             largest: known.iter().fold(0.0, |largest: f64, number| largest.max(number.abs())),
+            least: known.iter().copied().fold(f64::INFINITY, f64::min),
             step: middle(steps),
             median: middle(known),
             rise: table.increases(column),
@@ -113,7 +122,7 @@ impl Dates {
     fn of(table: &Table, column: usize) -> Self {
         let cells = &table.columns[column].cells;
         let filled = || cells.iter().filter(|cell| !is_missing(cell, &[]));
-        let day = |cell: &str| cell.trim().split(['T', ' ']).next().map(str::to_owned);
+        let day = |cell: &str| date_and_time(cell).0.map(str::to_owned);
         match orders(filled())[..] {
             [] => Self::None,
             [order @ Order::Iso, ..] | [order] => Self::In(order),
@@ -160,11 +169,21 @@ impl<'a> Found<'a> {
         files.flat_map(|(file, table)| (0..table.columns.len()).map(move |column| Place { file, column }))
     }
 
+    /// True if a column of times does not tell rows apart.
+    pub(crate) fn is_coarse(&self, place: Place) -> bool {
+        is_coarse(self.facts(place).repeated, self.table(place).len())
+    }
+
     /// Columns of a file whose numbers increase from row to row.
     pub(crate) fn rising(&self, file: usize) -> Vec<usize> {
         let rises = |column: &usize| self.facts(Place { file, column: *column }).numbers.rise;
         (0..self.facts[file].len()).filter(rises).collect()
     }
+}
+
+/// True if so many of all rows have the time of the row before that a clock does not tell rows apart.
+pub(crate) const fn is_coarse(repeated: usize, rows: usize) -> bool {
+    repeated * 5 > rows
 }
 
 /// Possible roles of the columns of files.
@@ -184,19 +203,26 @@ pub(crate) fn among(table: usize, says: &[Option<(Role, Sureness)>]) -> Vec<Cand
 }
 
 /// What a column's name and unit say, if it has a number or a date at all; a column of dates beside one of times of day is
-/// nothing.
+/// nothing. Without a name, times since 1970 and moments are the time.
 fn says(table: &Table, place: usize) -> Option<(Role, Sureness)> {
-    let column = &table.columns[place];
+    let (column, decimal) = (&table.columns[place], table.layout.decimal);
+    let mut filled = column.cells.iter().filter(|cell| !cell.is_empty()).take(FIRST_CELLS).peekable();
+    let is_filled = filled.peek().is_some();
+    let first: Vec<&str> = filled.collect();
+    let all = |is_kind: &dyn Fn(Stamp) -> bool| {
+        let is_kind = |cell: &&str| Order::ALL.iter().any(|order| stamp(cell, *order).is_some_and(is_kind));
+        is_filled && first.iter().all(is_kind)
+    };
+    let is_since_1970 =
+        |cell: &&str| nanoseconds(cell, decimal, 0).is_some_and(|count| epoch_unit(count as f64 / 1e9, 0.0).is_some());
     let said = if column.heading == MONITOR_CLOCK {
         Some((Role::Time, Sureness::Weak))
+    } else if !column.heading.is_empty() {
+        names::role(&column.name, column.unit.as_deref()).filter(|_| !all(&|stamp| !stamp.has_time))
     } else {
-        let mut filled = column.cells.iter().filter(|cell| !cell.is_empty()).take(5).peekable();
-        let is_bare = |read: Option<Stamp>| read.is_some_and(|read| !read.has_time);
-        let is_date = |cell: &str| Order::ALL.iter().any(|order| is_bare(stamp(cell, *order)));
-        let are_dates = filled.peek().is_some() && filled.all(is_date);
-        names::role(&column.name, column.unit.as_deref()).filter(|_| !are_dates)
+        let is_time = all(&|stamp| stamp.has_time) || (is_filled && first.iter().all(is_since_1970));
+        is_time.then_some((Role::Time, Sureness::Weak))
     };
-    let decimal = table.layout.decimal;
     let is_value = |cell: Cell| {
         number_of(&cell, decimal).is_some()
             || matches!(cell, Cell::Text(text) if is_stamp(&text) || ohms(&text, decimal).is_some())

@@ -5,12 +5,17 @@ use crate::import::roles::recipe::{ColumnName, NO_COLUMN, Recipe};
 use crate::import::table::Table;
 use crate::import::words::Role;
 
+/// Stands before a number that is no name, where there are columns called by numbers.
+const COUNTED: char = '#';
+/// Columns that a question names.
+const MOST_NAMED: usize = 6;
+
 /// The column that an answer names.
 pub(crate) fn find(found: &Found, role: Role, wanted: &ColumnName) -> Result<Place, ImportError> {
     let all = || found.places().filter(|place| wanted.file.is_none_or(|file| file == place.file + 1));
     let text = wanted.column.trim();
     let lower = text.to_lowercase();
-    let number = text.parse::<usize>().ok();
+    let number = text.strip_prefix(COUNTED).unwrap_or(text).parse::<usize>().ok();
     let fits = |way: usize, place: Place| {
         let column = found.column(place);
         match way {
@@ -38,26 +43,40 @@ pub(crate) fn find(found: &Found, role: Role, wanted: &ColumnName) -> Result<Pla
 
 /// Several columns might be what they are named.
 pub(crate) fn several(found: &Found, what: &str, taken: &[Taken]) -> ImportError {
-    let names: Vec<String> = taken.iter().map(|taken| found.name(taken.place)).collect();
+    let others = taken.len().saturating_sub(MOST_NAMED);
+    let named = &taken[..taken.len() - others];
+    let mut names: Vec<String> = named.iter().map(|taken| found.name(taken.place)).collect();
     let answer =
         |taken: &Taken| format!("--column {}", quoted(&format!("{}={}", taken.role, refer(found.tables, taken.place))));
+    let mut answers: Vec<String> = named.iter().map(answer).collect();
+    if others > 0 {
+        names.push(format!("{others} more"));
+        answers.push("another of them".to_owned());
+    }
     let mut files: Vec<&str> = taken.iter().map(|taken| found.table(taken.place).file.as_str()).collect();
     files.dedup();
-    ImportError::question(&files.join(", "), format!("{} may be {what}", names.join(" and ")), taken.iter().map(answer))
+    ImportError::question(&files.join(", "), format!("{} may be {what}", names.join(" and ")), answers)
 }
 
 /// The shortest sure way to name a column: its heading if that is the only one and can be typed, its number otherwise.
 pub(crate) fn refer(tables: &[Table], place: Place) -> ColumnName {
     let columns = &tables[place.file].columns;
     let heading = &columns[place.column].heading;
+    let are_called = |name: &str| columns.iter().filter(|column| column.heading == name || column.name == name).count();
     let is_sure = !heading.is_empty()
-        && columns.iter().filter(|other| other.heading == *heading || other.name == *heading).count() == 1
+        && are_called(heading) == 1
         && heading.trim() == heading
         && heading != NO_COLUMN
         && !heading.contains(char::is_control)
-        && !heading.starts_with(|c: char| c.is_ascii_digit());
+        && (!heading.starts_with(|c: char| c.is_ascii_digit()) || heading.parse::<f64>().is_ok());
     let file = (tables.len() > 1).then_some(place.file + 1);
-    ColumnName { file, column: if is_sure { heading.clone() } else { (place.column + 1).to_string() } }
+    let number = (place.column + 1).to_string();
+    let column = match are_called(&number) {
+        _ if is_sure => heading.clone(),
+        0 => number,
+        _ => format!("{COUNTED}{number}"),
+    };
+    ColumnName { file, column }
 }
 
 /// The column that an answer, or else a name, gives to one of several roles.

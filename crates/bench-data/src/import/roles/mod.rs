@@ -11,10 +11,10 @@ mod recipe;
 mod tests;
 mod unit;
 
-pub(crate) use decide::decide;
+pub(crate) use decide::{decide, is_stretch_without_zero};
 pub(crate) use decision::{Channel, Clock, Decision, Place, Timed};
-pub(crate) use facts::Found;
 pub use facts::{Candidate, candidates};
+pub(crate) use facts::{Found, is_coarse};
 pub(crate) use find::refer;
 pub use preset::Preset;
 pub use recipe::{Align, ColumnName, PerFile, Recipe, RecipeError};

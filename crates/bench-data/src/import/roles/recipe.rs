@@ -2,7 +2,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use crate::import::roles::preset::Preset;
-use crate::import::table::ReadOptions;
+use crate::import::table::{ReadOptions, RowFilter};
 use crate::import::words::{DecimalMark, Role};
 use crate::{FrontEndSpec, JointSpec};
 
@@ -72,6 +72,13 @@ pub struct PerFile<T> {
     pub value: T,
 }
 
+impl<T> PerFile<T> {
+    /// True if it is for a file, counted from 0.
+    fn is_for(&self, file: usize) -> bool {
+        self.file.is_none_or(|named| named == file + 1)
+    }
+}
+
 impl<T: FromStr> FromStr for PerFile<T>
 where
     T::Err: fmt::Display,
@@ -134,6 +141,10 @@ pub struct Recipe {
     pub skip: Vec<PerFile<usize>>,
     /// The sheet of a workbook.
     pub sheet: Option<String>,
+    /// Rows that are wanted: those that pass all of these.
+    pub rows: Vec<PerFile<RowFilter>>,
+    /// Which recording, counted from 1, of a file in which the clock begins anew.
+    pub recording: Option<usize>,
     /// Texts that stand for missing values.
     pub missing: Vec<String>,
     /// Roles whose sign is arbitrary.
@@ -164,6 +175,7 @@ impl Recipe {
             decimal: for_file(&self.decimal, file),
             skip: for_file(&self.skip, file),
             sheet: self.sheet.clone(),
+            rows: self.rows.iter().filter(|rows| rows.is_for(file)).map(|rows| rows.value.clone()).collect(),
         }
     }
 
@@ -210,6 +222,8 @@ impl Recipe {
         self.decimal.iter().for_each(|mark| flag("decimal", per_file(mark)));
         self.skip.iter().for_each(|skip| flag("skip", per_file(skip)));
         self.sheet.iter().for_each(|sheet| flag("sheet", sheet.clone()));
+        self.rows.iter().for_each(|rows| flag("where", per_file(rows)));
+        self.recording.iter().for_each(|number| flag("recording", number.to_string()));
         self.missing.iter().for_each(|text| flag("missing", text.clone()));
         self.magnitude.iter().for_each(|role| flag("magnitude", role.to_string()));
         self.drop_zeros.iter().for_each(|role| flag("drop-zeros", role.to_string()));
@@ -228,7 +242,7 @@ impl Recipe {
 
 /// What is said last of a file, counted from 0.
 fn for_file<T: Copy>(values: &[PerFile<T>], file: usize) -> Option<T> {
-    values.iter().rev().find(|value| value.file.is_none_or(|named| named == file + 1)).map(|value| value.value)
+    values.iter().rev().find(|value| value.is_for(file)).map(|value| value.value)
 }
 
 fn per_file<T: fmt::Display>(value: &PerFile<T>) -> String {

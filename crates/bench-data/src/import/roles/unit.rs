@@ -4,7 +4,7 @@ use crate::import::roles::facts::{Dates, Facts, Found};
 use crate::import::roles::recipe::Recipe;
 use crate::import::table::{Column, Table};
 use crate::import::words::Role;
-use crate::import::words::names::doubtful_unit;
+use crate::import::words::names::{self, doubtful_unit, is_change, is_conductance};
 use crate::import::words::stamp::Order;
 use crate::import::words::units::{self, Scale, Unit};
 
@@ -58,7 +58,8 @@ impl Asked<'_> {
         if let Some(unit) = self.by_metadata() {
             return Ok(unit);
         }
-        if let Some(text) = &self.column.unit {
+        if let Some(text) = self.column.unit.as_ref().filter(|unit| !self.is_pin(unit)) {
+            self.refuse_large_ratio(text)?;
             return units::unit(self.role, text).ok_or_else(|| {
                 if Role::READINGS.contains(&self.role) && matches!(text.to_lowercase().as_str(), "v" | "mv") {
                     let what = "volts are not read: make a column of ohms of them first (of a divider, with the sensor at \
@@ -71,6 +72,22 @@ impl Asked<'_> {
             });
         }
         self.by_numbers(remarks)
+    }
+
+    /// True if what stands in brackets behind the name of codes is where they come from: `analogRead(A0)`.
+    fn is_pin(&self, unit: &str) -> bool {
+        self.role == Role::Adc && !units::is_unit(unit)
+    }
+
+    /// `R/R0 (%)` of more than half the resistance at rest may be that itself, or by how much it is more.
+    fn refuse_large_ratio(&self, unit: &str) -> Result<(), ImportError> {
+        const LARGE: f64 = 50.0;
+        let is_percent = units::unit(self.role, unit).is_some_and(|unit| unit.name == "change-percent");
+        if self.role != Role::Ratio || !is_percent || self.is_change() || (self.facts)().numbers.median < LARGE {
+            return Ok(());
+        }
+        let what = format!("{}: percent of the resistance at rest, or of its change", self.name);
+        Err(self.question(what, &["percent", "change-percent"]))
     }
 
     fn question(&self, what: String, names: &[&str]) -> ImportError {
@@ -110,6 +127,10 @@ impl Asked<'_> {
             let what = format!("{} ({}): `{end}` may be a unit or a part of the name", self.name, self.role);
             return Err(self.question(what, &self.numeric_units()));
         }
+        if self.role == Role::Resistance && is_conductance(&self.column.name) {
+            let what = format!("{} ({}): its unit is not known, and R = 1/G", self.name, self.role);
+            return Err(self.question(what, &["S", "mS", "uS", "nS"]));
+        }
         let numbers = &(self.facts)().numbers;
         let (unit, why) = match self.role {
             Role::Time | Role::ReferenceTime => {
@@ -119,16 +140,22 @@ impl Asked<'_> {
                     return Ok(unit);
                 }
                 let seconds = numbers.has_fractions && (SHORTEST_STEP_S..=LONGEST_STEP_S).contains(&numbers.step);
-                (seconds.then_some("s"), format!("steps of {:.3}", numbers.step))
+                match units::epoch_unit(numbers.median, numbers.step).filter(|_| !seconds) {
+                    Some(unit) => (Some(unit), format!("about {:.0}, a time since 1970", numbers.median)),
+                    None => (seconds.then_some("s"), format!("steps of {:.3}", numbers.step)),
+                }
             }
             // What has a unit in each cell has it there.
             Role::Resistance if let Some(cell) = &(self.facts)().prefixed => {
                 (Some("ohm"), format!("cells such as {cell} have"))
             }
             Role::Resistance => ((numbers.size >= LEAST_OHM).then_some("ohm"), format!("about {:.0}", numbers.size)),
+            Role::Strain if self.is_stretch_ratio() => {
+                (Some("1"), format!("about {:.3}, a stretch ratio", numbers.median))
+            }
             Role::Strain => ((numbers.largest <= 1.0).then_some("1"), format!("up to {:.3}", numbers.largest)),
             Role::Ratio => {
-                let is_ratio = (0.5..20.0).contains(&numbers.median) && self.is_ratio();
+                let is_ratio = (0.5..20.0).contains(&numbers.median) && !self.is_change();
                 (is_ratio.then_some("1"), format!("about {:.3}", numbers.median))
             }
             Role::Adc => return known("1").ok_or_else(|| self.question(self.name.clone(), &["1"])),
@@ -150,8 +177,17 @@ impl Asked<'_> {
     }
 
     /// `R/R0` is a ratio; `dR/R0` is a change.
-    fn is_ratio(&self) -> bool {
-        let name = self.column.name.to_lowercase();
-        !name.starts_with(['d', 'δ']) && !name.contains("change")
+    fn is_change(&self) -> bool {
+        is_change(&self.column.name)
     }
+
+    fn is_stretch_ratio(&self) -> bool {
+        is_stretch_ratio(self.column, (self.facts)())
+    }
+}
+
+/// True if a column has lengths over that at rest: by its name, and numbers about one.
+pub(crate) fn is_stretch_ratio(column: &Column, facts: &Facts) -> bool {
+    const USUAL: std::ops::Range<f64> = 0.8..20.0;
+    names::is_stretch_ratio(&column.name) && USUAL.contains(&facts.numbers.median) && facts.numbers.least > 0.0
 }

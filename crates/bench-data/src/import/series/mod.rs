@@ -4,8 +4,8 @@ mod digits;
 mod times;
 mod values;
 
-use crate::error::Fault;
 use crate::import::error::ImportError;
+use crate::import::roles::is_coarse;
 use crate::import::table::Table;
 use crate::order::{median, typical_step};
 
@@ -16,6 +16,12 @@ pub(crate) use values::{Values, check_positive, converted};
 
 /// A gap of more typical steps is not bridged, unless the values on both sides are the same.
 const LONGEST_GAP: f64 = 10.0;
+
+/// Answers where the clock begins anew.
+const ANOTHER_RECORDING: [&str; 2] = [
+    "--split-recordings if another recording begins here, for a file of each",
+    "--recording 1 for the first of them alone",
+];
 
 /// Values over strictly increasing times.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -45,9 +51,9 @@ impl Series {
                 Some(&last) if time == last => repeated += 1,
                 Some(&last) if time < last => {
                     let (last, time) = told_apart(last, time);
-                    let found = format!("{time} s; if another recording begins here, make two files of them");
-                    let fault = Fault::new(format!("a time after {last} s"), found);
-                    return Err(ImportError::content(&table.file, table.lines[row], fault));
+                    let place = format!("{}:{}", table.file, table.lines[row]);
+                    let what = format!("expected a time after {last} s, found {time} s");
+                    return Err(ImportError::question(&place, what, ANOTHER_RECORDING.map(str::to_owned)));
                 }
                 _ => series.push(time, value, row),
             }
@@ -55,7 +61,7 @@ impl Series {
         if series.time.is_empty() {
             return Err(ImportError::unreadable(&table.file, "expected rows with a time, found none"));
         }
-        if repeated * 5 > table.len() {
+        if is_coarse(repeated, table.len()) {
             let rows = table.len();
             let what = format!("{repeated} of {rows} rows have the time of the row before: the clock is too coarse");
             let answer = "--rate-hz HZ if the rows are evenly spaced".to_owned();

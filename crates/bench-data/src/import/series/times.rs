@@ -4,7 +4,7 @@ use crate::import::roles::{Channel, Clock};
 use crate::import::series::values::Values;
 use crate::import::table::Table;
 use crate::import::words::stamp::{DAY, Order, past_midnight, stamp};
-use crate::import::words::{Scale, is_missing};
+use crate::import::words::{Scale, is_missing, nanoseconds};
 
 /// Times from here on, s, are no time since a recording began, but since 1970, or, in days, since the end of 1899.
 const DATES_FROM_S: f64 = 1e8;
@@ -41,11 +41,7 @@ impl Times {
 fn counts(tables: &[Table], channel: &Channel, own_missing: &[String]) -> Result<Times, ImportError> {
     let Values { values: mut seconds, .. } = Values::read(tables, channel, own_missing)?;
     if let Some(row) = seconds.iter().position(|time| !time.is_nan()).filter(|row| seconds[*row] >= DATES_FROM_S) {
-        let (first, day) = (seconds[row], if channel.unit.name == "days" { SHEET_DAY } else { UNIX_DAY });
-        let zero = day * DAY + (first * 1e9) as i128;
-        seconds.iter_mut().for_each(|time| *time -= first);
-        let text = tables[channel.place.file].columns[channel.place.column].cells.get(row).to_owned();
-        return Ok(Times { seconds, zero: Some((zero, text)), wraps: 0 });
+        return Ok(since_the_first(tables, channel, seconds, row));
     }
     let wrap_s = match channel.unit.name {
         "ms" => WRAP / 1e3,
@@ -70,6 +66,26 @@ fn counts(tables: &[Table], channel: &Channel, own_missing: &[String]) -> Result
         }
     }
     Ok(Times { seconds, wraps: wraps as usize, ..Times::default() })
+}
+
+/// Times since the first of them, in row `first`: to the digits that the file has, where its unit is a power of ten.
+fn since_the_first(tables: &[Table], channel: &Channel, mut seconds: Vec<f64>, first: usize) -> Times {
+    let table = &tables[channel.place.file];
+    let cells = &table.columns[channel.place.column].cells;
+    let exact = |row: usize| match channel.unit.scale {
+        Scale::Shift(shift) => nanoseconds(cells.get(row), table.layout.decimal, shift),
+        _ => None,
+    };
+    let day = if channel.unit.name == "days" { SHEET_DAY } else { UNIX_DAY };
+    let (origin, origin_s) = (exact(first), seconds[first]);
+    for (row, time) in seconds.iter_mut().enumerate().filter(|(_, time)| !time.is_nan()) {
+        *time = match (exact(row), origin) {
+            (Some(moment), Some(origin)) => (moment - origin) as f64 / 1e9,
+            _ => *time - origin_s,
+        };
+    }
+    let zero = day * DAY + origin.unwrap_or((origin_s * 1e9) as i128);
+    Times { seconds, zero: Some((zero, cells.get(first).to_owned())), wraps: 0 }
 }
 
 fn stamps(tables: &[Table], channel: &Channel) -> Result<Times, ImportError> {

@@ -49,6 +49,9 @@ fn in_trace_unit(number: f64, scale: Scale) -> f64 {
     match scale {
         Scale::Affine(factor, offset) => number * factor + offset,
         Scale::ChangeShift(_) => 1.0 + number,
+        // No conductance is no resistance that can be written, and is asked about as zeros are.
+        Scale::Inverse(_) if number == 0.0 => 0.0,
+        Scale::Inverse(_) => number.recip(),
         Scale::Shift(_) | Scale::Stamp => number,
     }
 }

@@ -1,6 +1,8 @@
 use crate::Metadata;
 use crate::error::quote;
 use crate::import::bytes::Cells;
+use crate::import::table::grid::MONITOR_CLOCK;
+use crate::import::table::select::RowFilter;
 use crate::import::table::value::number_of;
 use crate::import::words::{DecimalMark, names};
 
@@ -34,6 +36,8 @@ pub struct ReadOptions {
     pub skip: Option<usize>,
     /// The sheet of a workbook.
     pub sheet: Option<String>,
+    /// The rows that are wanted, those that pass all of these.
+    pub rows: Vec<RowFilter>,
 }
 
 /// How a file is written.
@@ -57,6 +61,14 @@ pub struct Layout {
     pub header_lines: usize,
     /// True if a line of units follows the header.
     pub unit_line: bool,
+    /// Rows per second that a line above the data speaks of, and that line.
+    pub rate: Option<(f64, u64)>,
+    /// Rows and columns are exchanged: each line of the file is a column.
+    pub is_exchanged: bool,
+    /// Each line is a value, of several quantities in turn.
+    pub values_in_turn: bool,
+    /// Names in the header, where they are more than the columns, or fewer: they are those of the first columns.
+    pub given_names: Option<usize>,
     /// Lines of text among or behind the data, and a last one that was cut, which are passed over.
     pub text_lines: usize,
     /// The first of them, counted from 1.
@@ -116,10 +128,10 @@ impl Table {
         known.len() * 10 > self.len() * 9 && steps > 0 && upward * 100 >= steps * 98
     }
 
-    /// True if any column has a name.
+    /// True if any column has a name, the clock of a serial monitor aside.
     #[must_use]
     pub fn has_names(&self) -> bool {
-        self.columns.iter().any(|column| !column.heading.is_empty())
+        self.columns.iter().any(|column| !column.heading.is_empty() && column.heading != MONITOR_CLOCK)
     }
 }
 

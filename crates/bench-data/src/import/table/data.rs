@@ -1,7 +1,7 @@
 use crate::import::bytes::Cell;
-use crate::import::table::grid::{Grid, SAMPLE, split};
+use crate::import::table::grid::{Grid, SAMPLE};
 use crate::import::table::value::{is_number, value_of};
-use crate::import::words::{DecimalMark, Value, is_stamp, names, ohms};
+use crate::import::words::{DecimalMark, Value, ohms};
 
 /// Parts of a line.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -43,9 +43,9 @@ impl Shape {
 pub(crate) struct Data {
     pub shape: Shape,
     /// Their last cells are empty: a separator at the end.
-    ends_empty: bool,
+    pub ends_empty: bool,
     /// Their first cells count them.
-    is_numbered: bool,
+    pub is_numbered: bool,
 }
 
 impl Data {
@@ -90,7 +90,15 @@ impl Data {
         let found = (first..grid.len()).find(is_data)?;
         // `Date;13.5.2024` above the names has a number, too.
         let sure = (found..grid.len()).find(|row| is_data(row) && !shape(*row).is_worded(self.shape)).unwrap_or(found);
-        let found = if (found..sure).any(|row| !is_comment(row) && shape(row).numbers == 0) { sure } else { found };
+        let clocks = usize::from(grid.has_monitor_clock());
+        let has_names = (found..sure).any(|row| !is_comment(row) && shape(row).numbers <= clocks);
+        let found = if has_names || (found < sure && self.numbers_as_names(grid, decimal, sure).is_some()) {
+            sure
+        } else if self.counted_names(grid, decimal, found + 1).is_some() {
+            found + 1
+        } else {
+            found
+        };
         // Below the names a row may lack its last cells.
         let is_short = |row: &usize| {
             let shape = shape(*row);
@@ -100,49 +108,4 @@ impl Data {
         let is_below_names = |row: &usize| *row > first && self.heading_cells(grid, *row - 1).is_some();
         Some(short.filter(is_below_names).unwrap_or(found))
     }
-
-    /// The cells of a line of names or units, as many as the data has columns; `None` if it is no such line.
-    pub(crate) fn heading_cells(&self, grid: &Grid, row: usize) -> Option<Vec<String>> {
-        let width = self.shape.width;
-        let mut cells: Vec<String> = match (grid.comment(row), grid) {
-            (Some(comment), Grid::Text { separator, .. }) if !comment.contains('=') => {
-                split(comment, *separator).into_iter().map(Into::into).collect()
-            }
-            (Some(_), _) => return None,
-            (None, _) => grid.cells(row).iter().map(Cell::to_string).collect(),
-        };
-        if cells.len() != width {
-            cells = joined_brackets(cells);
-        }
-        while cells.len() > width && cells.last().is_some_and(String::is_empty) {
-            cells.pop();
-        }
-        // A name for remarks, of which there are none.
-        if cells.len() == width + 1 && width > 1 && cells.last().is_some_and(|last| names::role(last, None).is_none()) {
-            cells.pop();
-        }
-        if cells.len() + 1 == width && self.is_numbered && !self.ends_empty {
-            cells.insert(0, String::new());
-        }
-        let texts = cells.iter().filter(|cell| !cell.is_empty()).count();
-        let is_heading = |cell: &String| cell.is_empty() || cell.parse::<f64>().is_err() && !is_stamp(cell);
-        let fits = cells.len() == width || (cells.len() + 1 == width && width > 2);
-        if !fits || !cells.iter().all(is_heading) || texts == 0 || (texts == 1 && width > 1) {
-            return None;
-        }
-        cells.resize(width, String::new());
-        Some(cells)
-    }
-}
-
-/// `Time`, `(s)` → `Time (s)`, where blanks separate the names too.
-fn joined_brackets(cells: Vec<String>) -> Vec<String> {
-    let mut out: Vec<String> = Vec::new();
-    for cell in cells {
-        match out.last_mut() {
-            Some(last) if cell.starts_with(['(', '[']) => *last = format!("{last} {cell}"),
-            _ => out.push(cell),
-        }
-    }
-    out
 }

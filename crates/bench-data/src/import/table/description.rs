@@ -12,6 +12,12 @@ impl Table {
         if layout.separator.is_some() {
             words.push(format!("decimal mark `{}`", layout.decimal));
         }
+        if layout.is_exchanged {
+            words.push("rows and columns seem to be exchanged".to_owned());
+        }
+        if layout.values_in_turn {
+            words.push("values in turn, a line each".to_owned());
+        }
         if layout.skip > 0 {
             words.push(format!("{} above the header", counted(layout.skip, "line")));
         }

@@ -114,6 +114,11 @@ impl Grid<'_> {
         }
     }
 
+    /// True if the first cell of each line is the clock of a serial monitor.
+    pub(crate) const fn has_monitor_clock(&self) -> bool {
+        matches!(self, Self::Text { monitor: true, .. })
+    }
+
     pub(crate) fn line(&self, row: usize) -> u64 {
         match self {
             Self::Text { lines, .. } => lines[row].0,

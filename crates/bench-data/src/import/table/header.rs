@@ -2,7 +2,7 @@ use crate::error::{Fault, quote};
 use crate::import::bytes::Cell;
 use crate::import::error::ImportError;
 use crate::import::table::data::{Data, Shape};
-use crate::import::table::grid::{Grid, Separator};
+use crate::import::table::grid::{Grid, MONITOR_CLOCK, Separator};
 use crate::import::table::records::Records;
 use crate::import::words::names::{self, Sureness};
 use crate::import::words::{DecimalMark, units};
@@ -28,6 +28,8 @@ pub(crate) struct Header {
     pub header_lines: usize,
     /// True if there is a line of units.
     pub unit_line: bool,
+    /// How many names there are, where that is another number than of columns.
+    pub given_names: Option<usize>,
     /// What `# key = value` lines say.
     pub metadata: Metadata,
 }
@@ -52,7 +54,7 @@ impl Header {
         let mut header = Self { first_row, shape: data.shape, headings: vec![String::new(); width], ..Self::default() };
         header.units = vec![None; width];
         header.read_metadata(file, grid)?;
-        let top = header.read_names(file, grid, first, &data)?;
+        let top = header.read_names(file, grid, decimal, first, &data)?;
         header.skip = (grid.line(top) - 1) as usize;
         Ok(header)
     }
@@ -76,13 +78,32 @@ impl Header {
     }
 
     /// Takes names and units from the lines above the data; the topmost line taken, or the first of data.
-    fn read_names(&mut self, file: &str, grid: &Grid, first: usize, data: &Data) -> Result<usize, ImportError> {
+    fn read_names(
+        &mut self,
+        file: &str,
+        grid: &Grid,
+        decimal: DecimalMark,
+        first: usize,
+        data: &Data,
+    ) -> Result<usize, ImportError> {
         let mut lines: Vec<(usize, Vec<String>)> = Vec::new();
-        for row in (first..self.first_row).rev() {
-            match data.heading_cells(grid, row) {
-                Some(cells) if lines.len() < MOST_HEADER_LINES => lines.push((row, cells)),
-                _ => break,
+        for row in (first..self.first_row).rev().take(MOST_HEADER_LINES) {
+            let cells = if row + 1 == self.first_row {
+                let names = data.names_above(grid, decimal, self.first_row);
+                self.given_names = names.as_ref().and_then(|names| names.given);
+                names.map(|names| names.cells)
+            } else {
+                data.heading_cells(grid, row)
+            };
+            let Some(cells) = cells else { break };
+            lines.push((row, cells));
+            // Names that are more than the columns, or fewer, leave open what those above them belong to.
+            if self.given_names.is_some() {
+                break;
             }
+        }
+        if let (true, Some(clock)) = (grid.has_monitor_clock(), self.headings.first_mut()) {
+            MONITOR_CLOCK.clone_into(clock);
         }
         if lines.is_empty() {
             self.refuse_commas_for_both(file, grid, first)?;

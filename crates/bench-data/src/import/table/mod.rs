@@ -3,11 +3,20 @@
 mod columns;
 mod data;
 mod description;
+mod fractions;
 mod grid;
 mod header;
+mod interleaved;
+mod json;
+mod labview;
 mod layout;
+mod names;
+mod rate;
 mod read;
 mod records;
+mod select;
+mod transposed;
+mod unit_column;
 mod value;
 
 pub(crate) use columns::all_files;
@@ -15,4 +24,5 @@ pub use columns::{Column, Layout, ReadOptions, Table};
 pub(crate) use grid::MONITOR_CLOCK;
 pub use read::read_table;
 pub(crate) use records::SEPARATOR;
+pub use select::RowFilter;
 pub(crate) use value::{number_of, value_of};

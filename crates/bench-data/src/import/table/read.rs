@@ -4,10 +4,15 @@ use crate::import::bytes::{Cell, Cells, Contents, NamedSheets, RawColumn, open};
 use crate::import::error::{ImportError, quoted};
 use crate::import::table::columns::{Column, Layout, ReadOptions, Table};
 use crate::import::table::data::Shape;
+use crate::import::table::fractions;
 use crate::import::table::grid::{Grid, SAMPLE, is_monitor};
 use crate::import::table::header::Header;
 use crate::import::table::layout::text_layout;
+use crate::import::table::rate::rate;
 use crate::import::table::records::{self, Records};
+use crate::import::table::transposed::exchanged;
+use crate::import::table::unit_column;
+use crate::import::table::{interleaved, json, labview};
 use crate::import::words::{DecimalMark, has_groups};
 
 /// Reads a file of any kind: text, XLSX and its relatives, Parquet, each of them in gzip too. `name` is what messages call
@@ -20,18 +25,29 @@ pub fn read_table(bytes: Vec<u8>, name: &str, options: &ReadOptions) -> Result<T
     let mut table = match contents {
         Contents::Text(text, encoding) => of_text(&text, encoding, name, options)?,
         Contents::Sheets(sheets) => of_sheets(sheets, name, options)?,
-        Contents::Columns(columns) => of_columns(columns, name),
+        Contents::Columns(columns, format) => of_columns(columns, name, format),
     };
-    table.layout.format.insert_str(0, &"gzip, ".repeat(wrappings));
+    fractions::join(&mut table);
+    unit_column::take(&mut table);
+    options.rows.iter().try_for_each(|filter| table.keep(filter))?;
+    table.layout.format.insert_str(0, &wrappings);
     Ok(table)
 }
 
 fn of_text(text: &str, encoding: &'static str, name: &str, options: &ReadOptions) -> Result<Table, ImportError> {
+    if let Some(rows) = json::rows(text) {
+        let layout = Layout { format: "JSON".to_owned(), encoding: Some(encoding), ..Layout::default() };
+        return of_lines(name, &Grid::Rows(rows), layout, 0);
+    }
     let lines = lines(text).map_err(|(line, fault)| ImportError::content(name, line, fault))?;
     let skip = options.skip.unwrap_or(0);
     let below = &lines[lines.partition_point(|(number, _)| *number <= skip as u64)..];
     let monitor = is_monitor(below.iter().take(SAMPLE).map(|(_, line)| *line));
     let layout = Layout { format: "text".to_owned(), encoding: Some(encoding), ..Layout::default() };
+    if let Some((rows, decimal)) = labview::rows(&lines) {
+        let layout = Layout { format: "LabVIEW measurement".to_owned(), decimal, ..layout };
+        return of_lines(name, &Grid::Rows(rows), layout, skip);
+    }
     if let Some(records) = Records::find(below, monitor) {
         let (decimal, decimal_is_open) = options.decimal.map_or(records.decimal, |mark| (mark, false));
         let layout = Layout { separator: Some(records::SEPARATOR), decimal, decimal_is_open, ..layout };
@@ -40,10 +56,25 @@ fn of_text(text: &str, encoding: &'static str, name: &str, options: &ReadOptions
     }
     let (separator, decimal, decimal_is_open) = text_layout(below, monitor, options.decimal);
     let layout = Layout { separator: Some(separator.words()), decimal, decimal_is_open, ..layout };
+    if let Some(rows) = interleaved::rows(below, decimal).filter(|_| !monitor) {
+        let layout = Layout { values_in_turn: true, ..layout };
+        return of_lines(name, &Grid::Rows(rows), layout, skip);
+    }
     let is_open = !text.ends_with(['\n', '\r']);
     let grid = Grid::Text { lines, separator, monitor, is_open };
-    let header = Header::find(name, &grid, decimal, skip)?;
-    of_grid(name, &grid, header, layout)
+    of_lines(name, &grid, layout, skip)
+}
+
+/// A table out of lines below `skip` others, under the header among them; lines may be columns.
+fn of_lines(name: &str, grid: &Grid, layout: Layout, skip: usize) -> Result<Table, ImportError> {
+    let decimal = layout.decimal;
+    if let Some(rows) = exchanged(grid, decimal).filter(|_| skip == 0) {
+        let grid = Grid::Rows(rows);
+        let header = Header::find(name, &grid, decimal, 0)?;
+        return of_grid(name, &grid, header, Layout { is_exchanged: true, ..layout });
+    }
+    let header = Header::find(name, grid, decimal, skip)?;
+    of_grid(name, grid, header, layout)
 }
 
 /// The only sheet with rows of numbers.
@@ -53,8 +84,7 @@ fn of_sheets(sheets: NamedSheets, name: &str, options: &ReadOptions) -> Result<T
     for (sheet, rows) in sheets {
         let grid = Grid::Rows(rows);
         let layout = Layout { format: format!("workbook, sheet `{sheet}`"), decimal, ..Layout::default() };
-        let header = Header::find(name, &grid, decimal, options.skip.unwrap_or(0));
-        match header.and_then(|header| of_grid(name, &grid, header, layout)) {
+        match of_lines(name, &grid, layout, options.skip.unwrap_or(0)) {
             Ok(table) => {
                 found.push(table);
                 answers.push(format!("--sheet {}", quoted(&sheet)));
@@ -69,10 +99,10 @@ fn of_sheets(sheets: NamedSheets, name: &str, options: &ReadOptions) -> Result<T
     }
 }
 
-fn of_columns(columns: Vec<RawColumn>, name: &str) -> Table {
+fn of_columns(columns: Vec<RawColumn>, name: &str, format: &str) -> Table {
     let rows = columns.first().map_or(0, |column| column.cells.len() as u64);
     let columns = columns.into_iter().map(|raw| Column::new(raw.heading, raw.unit, raw.cells)).collect();
-    let layout = Layout { format: "Parquet".to_owned(), ..Layout::default() };
+    let layout = Layout { format: format.to_owned(), ..Layout::default() };
     Table { file: name.to_owned(), layout, columns, lines: (1..=rows).collect(), ..Table::default() }
 }
 
@@ -82,8 +112,14 @@ fn of_columns(columns: Vec<RawColumn>, name: &str) -> Table {
 /// If it has more cells than may be held.
 fn of_grid(file: &str, grid: &Grid, header: Header, layout: Layout) -> Result<Table, ImportError> {
     check_cells(file, grid.len(), header.shape.width)?;
-    let mut layout =
-        Layout { skip: header.skip, header_lines: header.header_lines, unit_line: header.unit_line, ..layout };
+    let mut layout = Layout {
+        skip: header.skip,
+        header_lines: header.header_lines,
+        unit_line: header.unit_line,
+        given_names: header.given_names,
+        rate: rate(grid, layout.decimal, header.first_row),
+        ..layout
+    };
     let mut cells = vec![Cells::default(); header.shape.width];
     let (mut numbers, mut widths) = (Vec::new(), Vec::new());
     let end = end_of_data(grid, &header, layout.decimal);

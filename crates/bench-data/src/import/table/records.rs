@@ -7,6 +7,7 @@ use std::collections::HashMap;
 
 use crate::import::bytes::{Cell, Rows};
 use crate::import::table::grid::{ARROW, MONITOR_CLOCK, SAMPLE, behind_arrow};
+use crate::import::words::stamp::SPLIT_SECONDS;
 use crate::import::words::{DecimalMark, Value, amount, has_groups, is_stamp, number, units, value};
 
 /// What the layout calls the separator.
@@ -15,16 +16,6 @@ pub(crate) const SEPARATOR: &str = "labels (serial plotter)";
 const MOST_LABELS: usize = 1000;
 /// Bytes of a label; longer ones are sentences.
 const LONGEST_LABEL: usize = 60;
-/// Labels of whole and of fractional seconds, and the digits of the fraction.
-const SPLIT_SECONDS: [(&str, &str, usize); 6] = [
-    ("sec", "nanosec", 9),
-    ("sec", "nsec", 9),
-    ("secs", "nsecs", 9),
-    ("tv_sec", "tv_nsec", 9),
-    ("sec", "usec", 6),
-    ("tv_sec", "tv_usec", 6),
-];
-
 /// A file of records.
 pub(crate) struct Records<'a> {
     pub headings: Vec<String>,

@@ -39,6 +39,13 @@ impl Plan {
     /// # Errors
     /// [`ImportError`] for cells that are no numbers, times that go back, and motion that does not tell the clocks apart.
     pub fn import(&self, tables: &[Table]) -> Result<Imported, ImportError> {
+        match self.recipe.recording {
+            Some(number) => self.import_all(&self.recording(tables, number)?),
+            None => self.import_all(tables),
+        }
+    }
+
+    fn import_all(&self, tables: &[Table]) -> Result<Imported, ImportError> {
         let Decision { reference, temperature, .. } = &self.decision;
         let first = self.decision.readings[0];
         let mut work = Work { tables, plan: self, remarks: self.remarks.clone(), lag: None, duplicates: 0 };
@@ -67,9 +74,9 @@ impl Plan {
 }
 
 /// An import under way.
-struct Work<'a> {
-    plan: &'a Plan,
-    tables: &'a [Table],
+pub(crate) struct Work<'a> {
+    pub plan: &'a Plan,
+    pub tables: &'a [Table],
     remarks: Vec<String>,
     lag: Option<Lag>,
     duplicates: usize,
@@ -79,7 +86,7 @@ struct Work<'a> {
 type Zero = (i128, String);
 
 impl Work<'_> {
-    fn remark(&mut self, file: usize, text: impl Display) {
+    pub(crate) fn remark(&mut self, file: usize, text: impl Display) {
         self.remarks.push(format!("{}: {text}", self.tables[file].file));
     }
 
@@ -205,32 +212,6 @@ impl Work<'_> {
         ));
         self.lag = Some(lag);
         Ok(-lag.lag_s)
-    }
-
-    /// Files from which nothing is taken.
-    fn mention_unused(&mut self) {
-        let taken = self.plan.decision.readings.iter().chain(&self.plan.decision.reference);
-        let used: Vec<usize> = taken.map(|timed| timed.values.place.file).collect();
-        for table in (0..self.tables.len()).filter(|table| !used.contains(table)) {
-            self.remark(table, "nothing is taken from this file");
-        }
-    }
-
-    /// Lines that are no rows, and rows that lack cells.
-    fn mention_passed_over(&mut self) {
-        for (index, table) in self.tables.iter().enumerate() {
-            let layout = &table.layout;
-            if let Some(line) = layout.first_text_line {
-                let lines = counted(layout.text_lines, "line");
-                let which = if layout.text_lines > 1 { "of which the first is" } else { "which is" };
-                self.remark(index, format!("{lines} among or behind the data passed over, {which} line {line}"));
-            }
-            if layout.short_lines > 0 {
-                let rows = counted(layout.short_lines, "row");
-                let what = "with fewer cells than there are columns: the last ones are taken for missing";
-                self.remark(index, format!("{rows} {what}"));
-            }
-        }
     }
 
     fn metadata(&self, zero: Option<String>) -> Metadata {

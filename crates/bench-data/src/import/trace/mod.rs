@@ -1,7 +1,9 @@
 //! A plan, the trace that it makes of files, and what the trace is like.
 
 mod build;
+mod mentions;
 mod plan;
+mod recordings;
 mod survey;
 mod survey_lines;
 

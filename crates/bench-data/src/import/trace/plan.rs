@@ -1,5 +1,7 @@
 use crate::import::error::ImportError;
-use crate::import::roles::{Align, Channel, Decision, Found, PerFile, Place, Recipe, decide, refer};
+use crate::import::roles::{
+    Align, Channel, Decision, Found, PerFile, Place, Recipe, decide, is_stretch_without_zero, refer,
+};
 use crate::import::series::{Values, alternation};
 use crate::import::table::Table;
 use crate::import::words::units::SCALED;
@@ -39,7 +41,7 @@ impl Plan {
     }
 
     /// The plan for what `inspect` proposes: beside what [`new`](Self::new) decides, a preset that fits, signs that are
-    /// arbitrary, polarity that flips, and clocks of two files that the motion brings together.
+    /// arbitrary, polarity that flips, stretch ratios that are 1 at rest, and clocks of two files that the motion brings together.
     ///
     /// # Errors
     /// [`ImportError::Question`] for the first thing that nothing decides.
@@ -50,7 +52,11 @@ impl Plan {
             return Self::of(&found, Recipe { preset: Some(preset), ..given.clone() });
         }
         let align = given.align.or((tables.len() > 1).then_some(Align::Motion));
-        let plan = Self::of(&found, Recipe { align, ..given.clone() })?;
+        let mut given = Recipe { align, ..given.clone() };
+        if is_stretch_without_zero(&found, &given, &decide(&found, &given)) {
+            given.zero.push((Role::Strain, 1.0));
+        }
+        let plan = Self::of(&found, given.clone())?;
         let values = Values::read(tables, plan.readings(), &given.missing)?.values;
         let recipe = with_signs(plan.recipe, plan.decision.readings[0].values.role, &values);
         Ok(Self { given: recipe.clone(), recipe, ..plan })

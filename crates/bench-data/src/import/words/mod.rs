@@ -7,7 +7,7 @@ pub(crate) mod stamp;
 pub(crate) mod units;
 
 pub use number::DecimalMark;
-pub(crate) use number::{SCPI_OVERLOAD, Value, has_groups, is_missing, number, value};
+pub(crate) use number::{SCPI_OVERLOAD, Value, has_groups, is_missing, nanoseconds, number, value};
 pub use role::Role;
 pub(crate) use stamp::is_stamp;
 pub(crate) use units::{Scale, Unit, amount, ohms};

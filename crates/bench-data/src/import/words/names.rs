@@ -14,7 +14,7 @@ pub(crate) fn take_apart(heading: &str) -> (String, Option<String>) {
             && !is_index(heading[start + 1..end].trim())
         {
             let name = format!("{}{}", &heading[..start], &heading[end + close.len_utf8()..]);
-            return (name.trim().to_owned(), Some(heading[start + open.len_utf8()..end].trim().to_owned()));
+            return (name.trim().to_owned(), Some(cased(&name, heading[start + open.len_utf8()..end].trim())));
         }
     }
     // `time_ms`, `R kOhm`, `Time / s`, `Weg, mm`: a unit behind the last mark. `R/R0` is a name.
@@ -27,10 +27,51 @@ pub(crate) fn take_apart(heading: &str) -> (String, Option<String>) {
             && (matches!(mark, '/' | ',') || is_sure_unit(name, unit.trim()))
         {
             let name = name.trim().trim_end_matches([',', '/', '_']).trim();
-            return (name.to_owned(), Some(unit.trim().to_owned()));
+            return (name.to_owned(), Some(cased(name, unit.trim())));
         }
     }
     (heading.to_owned(), None)
+}
+
+/// A unit as it is written; of a conductance with the capital of siemens.
+fn cased(name: &str, unit: &str) -> String {
+    let is_siemens = is_conductance(name) && matches!(unit.trim_start_matches(['m', 'u', 'µ', 'μ', 'n']), "s" | "S");
+    if is_siemens { unit.replace('s', "S") } else { unit.to_owned() }
+}
+
+/// A name in lower case, without accents, with plain digits and one kind of delta. Umlauts stay: they are letters.
+fn folded(name: &str) -> String {
+    const PLAIN: [(&str, char); 9] = [
+        ("áàâã", 'a'),
+        ("éèêë", 'e'),
+        ("íìî", 'i'),
+        ("óòôõ", 'o'),
+        ("úùû", 'u'),
+        ("ç", 'c'),
+        ("ñ", 'n'),
+        ("∆", 'δ'),
+        ("₀", '0'),
+    ];
+    let plain = |c: char| PLAIN.iter().find(|(accented, _)| accented.contains(c)).map_or(c, |(_, plain)| *plain);
+    name.trim().to_lowercase().chars().map(plain).collect()
+}
+
+/// True if a name says that what stands in a column is the inverse of a resistance.
+pub(crate) fn is_conductance(name: &str) -> bool {
+    let folded = folded(name);
+    ["conductanc", "leitwert", "电导", "電導", "컨덕턴스"].iter().any(|part| folded.contains(part))
+}
+
+/// True if a name says that a strain is a stretch ratio: the length over that at rest.
+pub(crate) fn is_stretch_ratio(name: &str) -> bool {
+    let letters: String = folded(name).chars().filter(|c| c.is_alphanumeric()).collect();
+    is_among("λ,lambda,stretchratio,stretch", &letters) || letters.contains("stretchratio")
+}
+
+/// True if a name is that of a change relative to the resistance at rest, `dR/R0`, not of a ratio, `R/R0`.
+pub(crate) fn is_change(name: &str) -> bool {
+    let folded = folded(name);
+    folded.starts_with(['d', 'δ']) || folded.contains("change") || folded.contains("-r0")
 }
 
 /// True if a word is one of a list with commas between.
@@ -91,28 +132,35 @@ pub(crate) enum Sureness {
     Strong,
 }
 
-/// Whole names, in lower case, letters and digits only.
+/// Whole names, in lower case and without accents, letters and digits only.
 const WHOLE: &[(Role, &str)] = &[
-    (Role::Time, "t,zeit,temps,micros,millis,seconds,sec,ms,us,clock,tr,ts,xvalue"),
+    (Role::Time, "t,zeit,temps,tempo,micros,millis,seconds,sec,secs,ms,us,clock,tr,ts,xvalue"),
     (Role::Resistance, "r,rs,rx,rsensor,res,ohm,ohms,kohm,widerstand,sensor1r"),
-    (Role::Ratio, "rr0,rrel,relr,normalizedr,rnorm,drr0,drr,δrr0,deltarr0"),
-    (Role::Adc, "adc,adccode,adccounts,adcvalue,counts"),
-    (Role::Strain, "e,eps,ε,epsilon,dehnung,straintrue"),
-    (Role::Displacement, "p,x,d,pos,disp,displ,ext,weg,dl,δl,u"),
+    (Role::Ratio, "rr0,rrel,relr,normalizedr,rnorm,drr0,drr,δrr0,deltarr0,rr0r0"),
+    (Role::Adc, "adc,adccode,adccounts,adcvalue,counts,analogread,analogvalue,analogin,analog"),
+    (Role::Strain, "e,eps,ε,epsilon,dehnung,straintrue,λ,lambda,stretch"),
+    (Role::Displacement, "p,x,d,pos,disp,displ,ext,weg,dl,δl,u,stretch"),
     (Role::Angle, "angle,theta,θ,winkel,phi,flexion"),
     (Role::Temperature, "temp,tempc,temperatur,tamb"),
 ];
 
 /// Parts of names.
 const PART: &[(Role, &str)] = &[
-    (Role::Time, "time,timestamp,zeit,elapsed,datum,date"),
+    (Role::Time, "time,timestamp,zeit,elapsed,datum,date,tiempo,时间,時間,시간"),
     (Role::Ratio, "resistance ratio,relative resistance,normalized resistance,normalised resistance,relative change"),
-    (Role::Resistance, "resist,widerstand"),
-    (Role::Adc, "adc"),
-    (Role::Strain, "strain,dehnung"),
-    (Role::Displacement, "displacement,position,extension,elongation,travel,crosshead,stroke,verschiebung"),
-    (Role::Angle, "angle,winkel"),
-    (Role::Temperature, "temperature,temperatur"),
+    (Role::Resistance, "resist,widerstand,conductanc,leitwert,电阻,電阻,抵抗,저항,电导,電導,컨덕턴스"),
+    (Role::Adc, "adc,analogread"),
+    (
+        Role::Strain,
+        "strain,dehnung,deformacion,deformation,deformazione,deformacao,stretch ratio,应变,應變,ひずみ,변형률,변형율",
+    ),
+    (
+        Role::Displacement,
+        "displacement,position,extension,elongation,travel,crosshead,stroke,verschiebung,deformation,deformacion,\
+         desplazamiento,deplacement,allongement,位移,変位,변위",
+    ),
+    (Role::Angle, "angle,winkel,angulo,角度,각도"),
+    (Role::Temperature, "temperature,temperatur,温度,溫度,온도"),
 ];
 
 /// The role that a column's name and unit give it, if any.
@@ -121,13 +169,13 @@ pub(crate) fn role(name: &str, unit: Option<&str>) -> Option<(Role, Sureness)> {
         // A unit of something else, `Position (V)`, takes the role away; no unit, or an unknown one, does not.
         unit.is_none_or(|unit| units::unit(role, unit).is_some() || !units::is_unit(unit))
     };
-    by_name(name, fits).or_else(|| by_unit(unit?))
+    by_name(name, fits).or_else(|| by_unit(name, unit?))
 }
 
 /// The role that a name has among those that fit: a whole name, a part of one, or a whole one with an index or a short word
 /// behind it.
 fn by_name(name: &str, fits: impl Fn(Role) -> bool) -> Option<(Role, Sureness)> {
-    let lower = name.trim().to_lowercase();
+    let lower = folded(name);
     let spaced = lower.replace(['_', '-', '.'], " ");
     let whole = |name: &str| {
         let letters: String = name.chars().filter(|c| c.is_alphanumeric()).collect();
@@ -154,8 +202,11 @@ fn without_index(name: &str) -> Option<&str> {
     (is_short && is_known && (bare, end) != ("r", "0")).then_some(bare)
 }
 
-/// Ω is measured of the sensor alone; mm, degrees and seconds of many things.
-fn by_unit(unit: &str) -> Option<(Role, Sureness)> {
+/// Ω is measured of the sensor alone; mm, degrees and seconds of many things. `G (mS)` is a conductance.
+fn by_unit(name: &str, unit: &str) -> Option<(Role, Sureness)> {
+    if units::is_siemens(unit) && is_among("g,gs,gx,gsensor", &folded(name)) {
+        return Some((Role::Resistance, Sureness::Strong));
+    }
     let roles = units::quantities(unit);
     match roles[..] {
         [Role::Resistance] => Some((Role::Resistance, Sureness::Strong)),
@@ -199,6 +250,10 @@ mod tests {
             ("length_m1", "length_m1", None),
             ("force_n", "force", Some("n")),
             ("force_1", "force_1", None),
+            ("conductance_us", "conductance", Some("uS")),
+            ("Leitwert [mS]", "Leitwert", Some("mS")),
+            ("time_us", "time", Some("us")),
+            ("Déformation (%)", "Déformation", Some("%")),
         ];
         for (heading, name, unit) in cases {
             assert_eq!(take_apart(heading), (name.to_owned(), unit.map(str::to_owned)), "{heading}");
@@ -215,6 +270,24 @@ mod tests {
         assert_eq!(strong("Strain", Some("%")), Some(Role::Strain));
         assert_eq!(strong("Position", Some("V")), None);
         assert_eq!(strong("Force", Some("N")), None);
+        for (name, unit, expected) in [
+            ("Deformación", Some("%"), Role::Strain),
+            ("déformation", Some("%"), Role::Strain),
+            ("Deformation", Some("mm"), Role::Displacement),
+            ("应变", None, Role::Strain),
+            ("변형률", Some("%"), Role::Strain),
+            ("analogRead", None, Role::Adc),
+            ("电阻", Some("Ω"), Role::Resistance),
+            ("Conductance", Some("uS"), Role::Resistance),
+            ("G", Some("mS"), Role::Resistance),
+            ("∆R/R₀", Some("%"), Role::Ratio),
+            ("(R-R0)/R0", None, Role::Ratio),
+            ("λ", None, Role::Strain),
+            ("Temps", Some("s"), Role::Time),
+        ] {
+            assert_eq!(strong(name, unit), Some(expected), "{name}");
+        }
+        assert_eq!(strong("dt", Some("uS")), None);
         assert_eq!(role("Length", Some("mm")), Some((Role::Displacement, Sureness::Weak)));
     }
 }

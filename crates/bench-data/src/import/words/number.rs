@@ -96,6 +96,17 @@ pub(crate) fn number(text: &str, mark: DecimalMark, shift: i32) -> Option<f64> {
     format!("{mantissa}e{}", exponent.checked_add(shift)?).parse().ok()
 }
 
+/// A number times 10^`shift` as a whole number of nanoseconds, exactly; digits behind these are dropped. `None` if it is too
+/// large, or has an exponent.
+pub(crate) fn nanoseconds(text: &str, mark: DecimalMark, shift: i32) -> Option<i128> {
+    let plain = plain(text.trim(), mark)?;
+    let (sign, digits) = plain.strip_prefix('-').map_or((1, plain.trim_start_matches('+')), |digits| (-1, digits));
+    let (whole, fraction) = digits.split_once('.').unwrap_or((digits, ""));
+    let behind = usize::try_from(shift.checked_add(9)?).ok()?;
+    let fraction: String = fraction.chars().chain(std::iter::repeat('0')).take(behind).collect();
+    (whole.len() + behind < 36).then(|| format!("{whole}{fraction}").parse::<i128>().ok().map(|count| sign * count))?
+}
+
 /// A number as Rust writes it: a point, no thousands; `None` for what is no number.
 fn plain(text: &str, mark: DecimalMark) -> Option<std::borrow::Cow<'_, str>> {
     if !text.bytes().any(|byte| byte.is_ascii_digit()) {
@@ -163,6 +174,16 @@ mod tests {
         for text in ["1,60", "1;2", "12:30", "1.2.3", "abc", "", "-", "e5"] {
             assert_eq!(number(text, DecimalMark::Point, 0), None, "{text}");
         }
+    }
+
+    #[test]
+    fn nanoseconds_are_exact() {
+        let exact = |text, shift| nanoseconds(text, DecimalMark::Point, shift);
+        assert_eq!(exact("1700000000.004", 0), Some(1_700_000_000_004_000_000));
+        assert_eq!(exact("1700000000004", -3), Some(1_700_000_000_004_000_000));
+        assert_eq!(exact("-2.5", -9), Some(-2));
+        assert_eq!(exact("1.7e9", 0), None);
+        assert_eq!(exact("", 0), None);
     }
 
     #[test]

@@ -36,17 +36,26 @@ pub(crate) struct Stamp {
     pub has_time: bool,
 }
 
+/// Labels of whole and of fractional seconds, and the digits of the fraction.
+pub(crate) const SPLIT_SECONDS: [(&str, &str, usize); 9] = [
+    ("sec", "nanosec", 9),
+    ("sec", "nsec", 9),
+    ("secs", "nsecs", 9),
+    ("tv_sec", "tv_nsec", 9),
+    ("seconds", "nanoseconds", 9),
+    ("sec", "usec", 6),
+    ("secs", "usecs", 6),
+    ("tv_sec", "tv_usec", 6),
+    ("seconds", "microseconds", 6),
+];
+
 /// Reads a date, a time of day or both. No month is a word here, so that no language is meant.
 pub(crate) fn stamp(text: &str, order: Order) -> Option<Stamp> {
     let text = text.trim();
-    if !text.starts_with(|c: char| c.is_ascii_digit()) || !text.contains([':', '-', '/', '.']) {
+    if !text.starts_with(|c: char| c.is_ascii_digit()) || !text.contains([':', '-', '/', '.', '_', 'T']) {
         return None;
     }
-    let (date, time) = match text.split_once(['T', ' ']) {
-        Some((date, time)) if !date.contains(':') => (Some(date), Some(time)),
-        _ if text.contains(':') => (None, Some(text)),
-        _ => (Some(text), None),
-    };
+    let (date, time) = date_and_time(text);
     let days = match date {
         Some(date) => i128::from(days(date.trim_end_matches(','), order)?),
         None => 0,
@@ -58,6 +67,21 @@ pub(crate) fn stamp(text: &str, order: Order) -> Option<Stamp> {
     Some(Stamp { nanoseconds: days * DAY + seconds, has_date: date.is_some(), has_time: time.is_some() })
 }
 
+/// The date and the time of day of a text, of which one may be missing: `2024-05-01 10:30`, `2024/05/01/10:30`,
+/// `2024-05-01-10:30`, `2024-05-01_10-30-00`.
+pub(crate) fn date_and_time(text: &str) -> (Option<&str>, Option<&str>) {
+    match text.trim().split_once(['T', ' ', '_']) {
+        Some((date, time)) if !date.contains(':') => (Some(date), Some(time)),
+        _ => match text.find(':') {
+            Some(colon) => match text[..colon].rfind(['-', '/']) {
+                Some(end) => (Some(&text[..end]), Some(&text[end + 1..])),
+                None => (None, Some(text)),
+            },
+            None => (Some(text), None),
+        },
+    }
+}
+
 fn parts(date: &str) -> Option<[u32; 3]> {
     let mut parts = date.split(['-', '/', '.']);
     let mut next = || parts.next().filter(|part| part.len() <= 4)?.parse().ok();
@@ -66,7 +90,10 @@ fn parts(date: &str) -> Option<[u32; 3]> {
 }
 
 fn days(date: &str, order: Order) -> Option<i32> {
-    let [a, b, c] = parts(date)?;
+    // `20240501`.
+    let is_bare = date.len() == 8 && date.bytes().all(|byte| byte.is_ascii_digit()) && order == Order::Iso;
+    let bare = || Some([date[..4].parse().ok()?, date[4..6].parse().ok()?, date[6..].parse().ok()?]);
+    let [a, b, c] = if is_bare { bare() } else { parts(date) }?;
     let (year, month, day) = match order {
         Order::Iso => (a, b, c),
         Order::Dmy => (c, b, a),
@@ -77,7 +104,10 @@ fn days(date: &str, order: Order) -> Option<i32> {
 
 /// `12:30:01.25`, `12:30:01:250`, `12:30`, `1:30:01 PM`, `12:30:01+02:00`, `12:30:01Z`; nanoseconds since midnight UTC.
 /// `01:30.5` is what spreadsheets write of minutes and seconds.
+/// `12-30-01` and `123001` are what names of files have.
 fn time_of_day(time: &str) -> Option<i128> {
+    let as_in_names = in_a_name(time);
+    let time = as_in_names.as_deref().unwrap_or(time);
     let (time, zone) = match time.find(['Z', '+', '-']) {
         Some(at) => (&time[..at], zone(&time[at..])?),
         None => (time, 0),
@@ -106,6 +136,18 @@ fn time_of_day(time: &str) -> Option<i128> {
         hours = hours % 12 + half;
     }
     Some((hours * 60 + minutes - zone) * 60 * SECOND + nanoseconds)
+}
+
+/// A time of day without colons, with them.
+fn in_a_name(time: &str) -> Option<String> {
+    let (clock, fraction) = time.split_at(time.find('.').unwrap_or(time.len()));
+    let is_digits = |part: &&str| part.len() == 2 && part.bytes().all(|byte| byte.is_ascii_digit());
+    let parts: Vec<&str> = match clock.split('-').collect::<Vec<_>>()[..] {
+        [all] if all.len() == 6 && all.is_ascii() => vec![&all[..2], &all[2..4], &all[4..]],
+        [hours, minutes, seconds] => vec![hours, minutes, seconds],
+        _ => return None,
+    };
+    parts.iter().all(is_digits).then(|| parts.join(":") + fraction)
 }
 
 /// Minutes east of Greenwich.
@@ -148,7 +190,7 @@ pub(crate) fn orders<'a>(cells: impl Iterator<Item = &'a str> + Clone) -> Vec<Or
 
 /// True if the parts of dates stand apart by points, as in countries where the day comes first.
 pub(crate) fn has_points(text: &str) -> bool {
-    text.trim().split(['T', ' ']).next().is_some_and(|date| date.matches('.').count() == 2)
+    date_and_time(text).0.is_some_and(|date| date.matches('.').count() == 2)
 }
 
 /// Times of day that pass midnight go on.
@@ -176,7 +218,17 @@ mod tests {
     fn the_same_moment_in_several_spellings() {
         let moment = seconds("2024-05-01T10:30:01.5Z", Order::Iso);
         assert!(moment.is_some());
-        for text in ["2024-05-01 10:30:01,5", "2024/05/01 10:30:01.500", "2024-05-01T12:30:01.5+02:00"] {
+        for text in [
+            "2024-05-01 10:30:01,5",
+            "2024/05/01 10:30:01.500",
+            "2024-05-01T12:30:01.5+02:00",
+            "2024/05/01/10:30:01.5",
+            "2024-05-01-10:30:01.50",
+            "2024-05-01_10:30:01.5",
+            "2024-05-01_10-30-01.5",
+            "20240501_103001.5",
+            "20240501T10:30:01.5",
+        ] {
             assert_eq!(seconds(text, Order::Iso), moment, "{text}");
         }
         assert_eq!(seconds("1.5.2024 10:30:01.5", Order::Dmy), moment);
@@ -198,7 +250,21 @@ mod tests {
 
     #[test]
     fn numbers_and_words_are_no_stamps() {
-        for text in ["1.5", "1600", "-5", "12:30:99", "2024-13-01", "a:b", "1:2:3:4", "12.5.1", "12:30:01+0é1"] {
+        for text in [
+            "1.5",
+            "1600",
+            "-5",
+            "12:30:99",
+            "2024-13-01",
+            "a:b",
+            "1:2:3:4",
+            "12.5.1",
+            "12:30:01+0é1",
+            "1_5",
+            "12345678",
+            "7T",
+            "1-2-3-4:5",
+        ] {
             assert!(!is_stamp(text), "{text}");
         }
     }

@@ -9,6 +9,8 @@ pub(crate) enum Scale {
     Shift(i32),
     /// Times a factor, plus an offset.
     Affine(f64, f64),
+    /// As `Shift`, and one over that: a conductance.
+    Inverse(i32),
     /// As `Shift`, plus one: changes relative to the resistance at rest.
     ChangeShift(i32),
     /// Text that is a date or a time of day.
@@ -19,7 +21,7 @@ impl Scale {
     /// By how many digits the decimal mark moves.
     pub(crate) const fn shift(self) -> i32 {
         match self {
-            Self::Shift(shift) | Self::ChangeShift(shift) => shift,
+            Self::Shift(shift) | Self::ChangeShift(shift) | Self::Inverse(shift) => shift,
             Self::Affine(..) | Self::Stamp => 0,
         }
     }
@@ -35,7 +37,7 @@ pub(crate) struct Unit {
 type Entry = (Role, &'static str, Scale, &'static [&'static str]);
 
 /// Units by quantity: flag name, scale, spellings. Spellings are compared in lower case, except those of resistance that
-/// begin with `m` or `M`.
+/// begin with `m` or `M`, and those of conductance: `us` is a time.
 const UNITS: &[Entry] = &[
     (Role::Time, "s", Scale::Shift(0), &["sec", "secs", "second", "seconds", "sek", "sekunden", "secondes"]),
     (Role::Time, "ms", Scale::Shift(-3), &["msec", "msecs", "millis", "millisecond", "milliseconds"]),
@@ -51,6 +53,10 @@ const UNITS: &[Entry] = &[
     (Role::Resistance, "kohm", Scale::Shift(3), &["kω", "kΩ", "kohms", "kilohm", "kiloohm", "k"]),
     (Role::Resistance, "megohm", Scale::Shift(6), &["MΩ", "Mω", "MOhm", "Mohm", "MOHM", "MOhms", "Mohms"]),
     (Role::Resistance, "milliohm", Scale::Shift(-3), &["mΩ", "mω", "mOhm", "mohm", "mOhms", "mohms"]),
+    (Role::Resistance, "S", Scale::Inverse(0), &["siemens", "Siemens", "mho", "1/ohm", "1/Ohm", "1/Ω", "Ω⁻¹"]),
+    (Role::Resistance, "mS", Scale::Inverse(-3), &["millisiemens", "mmho"]),
+    (Role::Resistance, "uS", Scale::Inverse(-6), &["µS", "μS", "microsiemens", "umho", "µmho"]),
+    (Role::Resistance, "nS", Scale::Inverse(-9), &["nanosiemens"]),
     (Role::Ratio, "1", Scale::Shift(0), &["-", "–", "r/r0", "ratio", "none"]),
     (Role::Ratio, "percent", Scale::Shift(-2), &["% of r0"]),
     (Role::Ratio, "change", Scale::ChangeShift(0), &["dr/r0", "δr/r0", "dr/r"]),
@@ -82,11 +88,11 @@ pub(crate) fn unit(role: Role, text: &str) -> Option<Unit> {
     let text = bare(text).replace('\u{2126}', "Ω");
     let lower = text.to_lowercase();
     let of_role = UNITS.iter().filter(|(of, ..)| *of == role.quantity());
-    let mut found = of_role.filter(|(_, name, _, spellings)| {
+    let mut found = of_role.filter(|(_, name, scale, spellings)| {
         let is_mega_or_milli = role == Role::Resistance && lower.starts_with('m') && *name != lower;
-        let spelled =
-            |spelling: &&str| if is_mega_or_milli { **spelling == text } else { spelling.to_lowercase() == lower };
-        *name == lower || spellings.iter().any(spelled)
+        let is_exact = is_mega_or_milli || matches!(scale, Scale::Inverse(_));
+        let spelled = |spelling: &&str| if is_exact { **spelling == text } else { spelling.to_lowercase() == lower };
+        *name == text || (*name == lower && !is_exact) || spellings.iter().any(spelled)
     });
     found.next().map(|(_, name, scale, _)| Unit { name, scale: *scale })
 }
@@ -166,7 +172,7 @@ pub(crate) fn unit_or_scale(role: Role, text: &str) -> Option<Unit> {
         Scale::Shift(shift) => Scale::Affine(times * 10_f64.powi(shift), 0.0),
         Scale::ChangeShift(shift) => Scale::Affine(times * 10_f64.powi(shift), 1.0),
         Scale::Affine(factor, offset) => Scale::Affine(times * factor, offset),
-        Scale::Stamp => return None,
+        Scale::Stamp | Scale::Inverse(_) => return None,
     };
     Some(Unit { name: SCALED, scale })
 }
@@ -179,6 +185,11 @@ pub(crate) const fn scale_of_a_reference(role: Role) -> Option<&'static str> {
         Role::Angle => Some("36deg/V"),
         _ => None,
     }
+}
+
+/// True if a text is a unit of conductance, as it is written.
+pub(crate) fn is_siemens(text: &str) -> bool {
+    unit(Role::Resistance, text).is_some_and(|unit| matches!(unit.scale, Scale::Inverse(_)))
 }
 
 /// The quantities in which a text is a unit.
@@ -200,6 +211,17 @@ pub(crate) fn is_unit(text: &str) -> bool {
     ];
     let bare = bare(text);
     !quantities(bare).is_empty() || OTHER.contains(&bare.to_lowercase().as_str())
+}
+
+/// The unit in which a count is a time since 1970, of this century, and a step from row to row is none of minutes: `us` of
+/// 1.7e15. Counts since a device was started are smaller, or have larger steps.
+pub(crate) fn epoch_unit(count: f64, step: f64) -> Option<&'static str> {
+    const CENTURY_S: std::ops::Range<f64> = 9.46e8..4.1e9;
+    const LONGEST_STEP_S: f64 = 10.0;
+    let fits = |(_, per_second): &&(&str, f64)| {
+        CENTURY_S.contains(&(count / per_second)) && step / per_second <= LONGEST_STEP_S
+    };
+    [("s", 1.0), ("ms", 1e3), ("us", 1e6), ("ns", 1e9)].iter().find(fits).map(|(name, _)| *name)
 }
 
 /// Names of a quantity's units, for answers.

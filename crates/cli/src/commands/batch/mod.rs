@@ -1,13 +1,13 @@
 //! One command over many recordings.
 //!
-//! Every recording is done by this program, started anew with the command line that a person would type: what comes of it
-//! is the command's, to the byte, and whatever happens to one recording happens to no other.
+//! Every recording is done by the function that does the command itself, with the flags that a person would type: what comes of
+//! it is the command's, to the byte, and an error or a bug of one recording stays its own.
 
 mod journal;
 mod plan;
-mod process;
 mod scores;
 mod summary;
+mod workshop;
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -16,16 +16,17 @@ use std::thread;
 use clap::ValueEnum;
 use journal::{Entry, Journal, State};
 use plan::Job;
-use process::Workshop;
+use rayon::ThreadPoolBuilder;
+use workshop::Workshop;
 
 use crate::args::{BatchArgs, SummaryForm};
 use crate::error::CliError;
+use crate::messages::Messages;
 use crate::output::{Kind, Outputs};
 use crate::progress::Progress;
-use crate::verbosity::Verbosity;
 
 /// Does all recordings that are not done yet, and sums up.
-pub fn run(args: &BatchArgs) -> Result<(), CliError> {
+pub fn run(args: &BatchArgs, messages: &Messages) -> Result<(), CliError> {
     let jobs = plan::jobs(args)?;
     plan::check_sensor(&jobs, args)?;
     let path = |form: SummaryForm| args.output.join(format!("{}.{}", summary::SUMMARY, form.name()));
@@ -36,7 +37,7 @@ pub fn run(args: &BatchArgs) -> Result<(), CliError> {
     plan::check_outputs(&jobs, args, &journal)?;
     let workshop = Workshop::new(args)?;
     let bytes = jobs.iter().map(Job::bytes).sum();
-    let progress = Progress::over_bytes("recordings", bytes);
+    let progress = Progress::over_bytes("recordings", bytes, messages);
     let work = Work { args, jobs: &jobs, journal: &journal, workshop: &workshop, progress: &progress };
     let entries = work.all()?;
     drop(progress);
@@ -44,15 +45,18 @@ pub fn run(args: &BatchArgs) -> Result<(), CliError> {
     outputs.publish()?;
     let others = SummaryForm::value_variants().iter().filter(|form| **form != args.summary);
     let stale: Vec<PathBuf> = others.map(|form| path(*form)).filter(|path| path.exists()).collect();
-    closing(&entries, &path(args.summary), &stale)
+    closing(&entries, &path(args.summary), &stale, messages)
 }
+
+/// Bytes of a thread's stack, as many as those of the thread that does a single command.
+const STACK: usize = 8 << 20;
 
 struct Work<'a> {
     args: &'a BatchArgs,
     jobs: &'a [Job],
     journal: &'a Journal,
     workshop: &'a Workshop<'a>,
-    progress: &'a Progress,
+    progress: &'a Progress<'a>,
 }
 
 impl Work<'_> {
@@ -70,47 +74,43 @@ impl Work<'_> {
                 self.progress.advance(self.jobs[*job].bytes(), message);
                 entries.push((*job, entry));
             }
-            Ok(entries)
-        };
-        let mut entries = thread::scope(|scope| {
-            let workers: Vec<_> = (0..self.workshop.places()).map(|_| scope.spawn(worker)).collect();
-            let mut entries = Vec::new();
-            for worker in workers {
-                let done: Result<_, CliError> =
-                    worker.join().unwrap_or_else(|_| Err(CliError::Other("a worker panicked".into())));
-                entries.extend(done?);
-            }
             Ok::<_, CliError>(entries)
-        })?;
+        };
+        let places = self.args.jobs.or(thread::available_parallelism().ok()).map_or(1, usize::from);
+        // By itself a recording has all cores, which is what no threads stand for.
+        let threads = if places > 1 { places } else { 0 };
+        let pool = ThreadPoolBuilder::new().num_threads(threads).stack_size(STACK).build();
+        let pool = pool.map_err(|error| CliError::Other(format!("cannot start threads: {error}")))?;
+        // Recordings are no tasks of the pool's: a thread that waits for a part of one would begin another.
+        let workers = pool.broadcast(|thread| if thread.index() < places { worker() } else { Ok(Vec::new()) });
+        let mut entries = workers.into_iter().collect::<Result<Vec<_>, _>>()?.concat();
         entries.sort_by_key(|(job, _)| *job);
         Ok(entries.into_iter().map(|(_, entry)| entry).collect())
     }
 
     /// Does a job, unless that was done before.
     fn one(&self, job: &Job) -> Result<Entry, CliError> {
-        let started = self.workshop.start(job);
-        if !self.args.again
-            && let Some(done) = started.as_ref().ok().and_then(|started| self.journal.finished(&started.entry))
-        {
+        let mut entry = self.workshop.entry(job);
+        if let Err(message) = self.workshop.hash_inputs(job, &mut entry) {
+            entry.message = message;
+        } else if let Some(done) = self.journal.finished(&entry).filter(|_| !self.args.again) {
             return Ok(Entry { state: State::Kept, ..done });
+        } else {
+            self.workshop.finish(job, &mut entry, self.journal)?;
         }
-        let mut entry = match started {
-            Ok(started) => started.finish(self.journal)?,
-            Err(entry) => *entry,
-        };
         if entry.state == State::Failed {
             let output = self.args.output.join(&entry.output);
             if entry.output_sha256.is_none() && output.exists() {
                 entry.message = format!("{}; {} is from before this run", entry.message, output.display());
             }
-            self.progress.around(|| CliError::error(&entry.message));
+            self.progress.around(|| Messages::error(&entry.message));
         }
         Ok(entry)
     }
 }
 
 /// Says how many there are of each kind, and which summaries are not of this run.
-fn closing(entries: &[Entry], summary: &Path, stale: &[PathBuf]) -> Result<(), CliError> {
+fn closing(entries: &[Entry], summary: &Path, stale: &[PathBuf], messages: &Messages) -> Result<(), CliError> {
     let count = |state| entries.iter().filter(|entry| entry.state == state).count();
     let (done, kept, failed) = (count(State::Done), count(State::Kept), count(State::Failed));
     let warned = entries.iter().filter(|entry| !entry.warnings.is_empty()).count();
@@ -120,8 +120,6 @@ fn closing(entries: &[Entry], summary: &Path, stale: &[PathBuf]) -> Result<(), C
     if failed > 0 {
         return Err(CliError::Batch(text));
     }
-    if Verbosity::chosen() != Verbosity::Quiet {
-        CliError::remark(&text);
-    }
+    messages.remark(&text);
     Ok(())
 }

@@ -47,9 +47,12 @@ impl Job {
         self.files.iter().map(|file| file.display().to_string()).collect::<Vec<_>>().join(", ")
     }
 
-    /// The command line that does it, but for where a sensor is written to.
-    pub fn arguments(&self, args: &BatchArgs) -> Vec<String> {
-        let mut words = vec![args.command.name().to_owned()];
+    /// The command that does it, as a person would type it; where it writes to is not said yet.
+    pub fn parsed(&self, args: &BatchArgs) -> Result<Args, clap::Error> {
+        let mut words = vec!["ohmstrain".to_owned(), args.command.name().to_owned()];
+        if args.command == BatchCommand::Calibrate {
+            words.extend(["-o".to_owned(), "sensor.toml".to_owned()]);
+        }
         words.extend(self.flags.iter().cloned());
         if let Some(sensor) = &self.sensor {
             words.extend(["--sensor".into(), sensor.display().to_string()]);
@@ -62,7 +65,7 @@ impl Job {
         }
         words.push("--".to_owned());
         words.extend(self.files.iter().map(|file| file.display().to_string()));
-        words
+        Args::try_parse_from(words)
     }
 }
 
@@ -209,12 +212,7 @@ fn check_arguments(job: &mut Job, args: &BatchArgs) -> Result<(), CliError> {
     if job.files.iter().any(|file| file == Path::new("-")) {
         return Err(CliError::Arguments("batch reads files; for standard input there is the command itself".into()));
     }
-    let mut words = vec!["ohmstrain".to_owned()];
-    words.extend(job.arguments(args));
-    if args.command == BatchCommand::Calibrate {
-        words.splice(2..2, ["-o".to_owned(), "sensor.toml".to_owned()]);
-    }
-    let parsed = Args::try_parse_from(words).map_err(|error| {
+    let parsed = job.parsed(args).map_err(|error| {
         let text = error.to_string();
         let text = text.lines().map(str::trim).take_while(|line| !line.is_empty()).collect::<Vec<_>>().join(" ");
         let answer = renamed::answer(&error, args.command.name()).map_or(String::new(), |answer| format!(": {answer}"));

@@ -1,7 +1,7 @@
+use ohmstrain::{Findings, Scores};
 use serde::{Deserialize, Serialize};
-use serde_json::Value;
 
-use crate::args::BatchCommand;
+use crate::commands::evaluate::RecordingScores;
 
 /// What `evaluate` found of the first estimator, or `calibrate` on the parts that it left out: errors in %FS, coverage as
 /// a share.
@@ -22,23 +22,25 @@ pub struct Figures {
 }
 
 impl Figures {
-    /// What a command's JSON says; nothing where it does not.
-    pub fn of_json(text: &[u8], command: BatchCommand) -> Self {
-        let json: Value = serde_json::from_slice(text).unwrap_or_default();
-        let (filter, rest, cubic) = if command == BatchCommand::Evaluate {
-            let first = &json["recordings"][0];
-            (first, first, &first["baselines"]["static_cubic"])
-        } else {
-            let left_out = &json["left_out"];
-            (&left_out["filter"], left_out, &left_out["static_cubic"])
-        };
+    /// Of an estimator on a recording.
+    pub fn of_scores(scores: &RecordingScores) -> Self {
+        Self::new(&scores.filter, Some(&scores.smoother), &scores.baselines.static_cubic)
+    }
+
+    /// Of a calibration.
+    pub fn of_findings(findings: &Findings) -> Self {
+        Self::new(&findings.filter, findings.smoother.as_ref(), &findings.static_cubic)
+    }
+
+    fn new(filter: &Scores, smoother: Option<&Scores>, static_cubic: &Scores) -> Self {
+        let known = |number: f64| Some(number).filter(|number| number.is_finite());
         Self {
-            rows: filter["n"].as_u64(),
-            filter_percent_fs: filter["rmse_percent_fs"].as_f64(),
-            smoother_percent_fs: rest["smoother"]["rmse_percent_fs"].as_f64(),
-            static_cubic_percent_fs: cubic["rmse_percent_fs"].as_f64(),
-            coverage_95: filter["coverage_95"].as_f64(),
-            width_95_percent_fs: filter["width_95_percent_fs"].as_f64(),
+            rows: u64::try_from(filter.n).ok(),
+            filter_percent_fs: known(filter.rmse_percent_fs),
+            smoother_percent_fs: smoother.and_then(|smoother| known(smoother.rmse_percent_fs)),
+            static_cubic_percent_fs: known(static_cubic.rmse_percent_fs),
+            coverage_95: filter.coverage_95.and_then(known),
+            width_95_percent_fs: filter.width_95_percent_fs.and_then(known),
         }
     }
 }

@@ -7,10 +7,10 @@ mod told;
 
 use std::path::{Path, PathBuf};
 
-use evaluation::Evaluation;
+pub use evaluation::Evaluation;
 use ohmstrain_calib::{Baselines, PublishedLaw, Samples, reference_lag, screen};
 use rayon::prelude::*;
-use scores::RecordingScores;
+pub use scores::RecordingScores;
 use sensors::{Rivals, Sensor, phases};
 use told::Told;
 
@@ -19,6 +19,7 @@ use crate::commands::reporting::{Drawn, Reporting, Wanted, sample};
 use crate::commands::scoring::Part;
 use crate::error::CliError;
 use crate::input::{self, TraceFile, check_unit};
+use crate::messages::Messages;
 use crate::output::{Outputs, print};
 use crate::progress::Progress;
 use crate::run::rest_resistance;
@@ -29,41 +30,55 @@ use ohmstrain_report::Sample;
 const LEAST_COVERAGE: f64 = 0.8;
 
 /// Compares estimates with the reference of each recording.
-pub fn run(args: &EvaluateArgs) -> Result<(), CliError> {
-    let mut evaluation = Evaluation::default();
+pub fn run(args: &EvaluateArgs, messages: &Messages) -> Result<(), CliError> {
+    evaluate(args, messages, &mut Evaluation::default(), |evaluation| print(|out| evaluation.write(out, args.json)))
+}
+
+/// The same into an `evaluation`, which is shown once all that can be scored is.
+pub fn evaluate(
+    args: &EvaluateArgs,
+    messages: &Messages,
+    evaluation: &mut Evaluation,
+    show: impl FnOnce(&Evaluation) -> Result<(), CliError>,
+) -> Result<(), CliError> {
     let source = &args.calibration;
     let inputs = args.traces.iter().chain(&args.test).chain(&source.train).chain(&source.sensor);
     let mut outputs = Outputs::new(args.replace.force, inputs);
     let wanted = Wanted::claim(&args.report, &mut outputs)?;
     let judged = match &source.sensor {
-        Some(sensor) => with_sensor_file(args, sensor, &mut evaluation),
-        None if !source.split.is_empty() => with_splits(args, &mut evaluation),
-        None if source.leave_one_out => with_each_left_out(args, &mut evaluation),
-        None => with_training(args, &mut evaluation),
+        Some(sensor) => with_sensor_file(args, sensor, evaluation, messages),
+        None if !source.split.is_empty() => with_splits(args, evaluation, messages),
+        None if source.leave_one_out => with_each_left_out(args, evaluation, messages),
+        None => with_training(args, evaluation, messages),
     };
     // Calibrations take long: what was scored before an error is still good.
     if judged.is_ok() || !evaluation.is_empty() {
-        print(|out| evaluation.write(out, args.json))?;
+        show(evaluation)?;
     }
     judged?;
     if let Some((wanted, drawn)) = wanted.zip(evaluation.drawn.take()) {
         wanted.put(drawn, &mut outputs)?;
     }
     outputs.publish()?;
-    if args.check { check(&evaluation) } else { Ok(()) }
+    if args.check { check(evaluation) } else { Ok(()) }
 }
 
 /// Every recording with the parameters of a file.
-fn with_sensor_file(args: &EvaluateArgs, path: &Path, evaluation: &mut Evaluation) -> Result<(), CliError> {
+fn with_sensor_file(
+    args: &EvaluateArgs,
+    path: &Path,
+    evaluation: &mut Evaluation,
+    messages: &Messages,
+) -> Result<(), CliError> {
     let sensors = Sensor::from_file(path, args.estimator, args.with_correction())?;
     let rivals = Rivals { static_cubic: sensors[0].sensor.params().static_cubic, learned: None, published: None };
     let judged = |path: &PathBuf| judge(args, &read(args, path)?, Part::since(args.from), &sensors, &rivals);
-    add_until_error(evaluation, args.traces.par_iter().map(judged).collect())
+    add_until_error(evaluation, args.traces.par_iter().map(judged).collect(), messages)
 }
 
 /// Every recording with parameters from some of its rows, split by split.
-fn with_splits(args: &EvaluateArgs, evaluation: &mut Evaluation) -> Result<(), CliError> {
-    let progress = Progress::new("calibrating");
+fn with_splits(args: &EvaluateArgs, evaluation: &mut Evaluation, messages: &Messages) -> Result<(), CliError> {
+    let progress = Progress::new("calibrating", messages);
     for path in &args.traces {
         let recording = read(args, path)?;
         for &split in &args.calibration.split {
@@ -97,8 +112,8 @@ fn with_split(
 }
 
 /// Some recordings with parameters from others.
-fn with_training(args: &EvaluateArgs, evaluation: &mut Evaluation) -> Result<(), CliError> {
-    let progress = Progress::new("calibrating");
+fn with_training(args: &EvaluateArgs, evaluation: &mut Evaluation, messages: &Messages) -> Result<(), CliError> {
+    let progress = Progress::new("calibrating", messages);
     let read = |path| read(args, path);
     let training: Vec<TraceFile> = args.calibration.train.iter().map(|path| read(path)).collect::<Result<_, _>>()?;
     // All are read before anything is calibrated, so that a wrong name costs no time.
@@ -106,16 +121,16 @@ fn with_training(args: &EvaluateArgs, evaluation: &mut Evaluation) -> Result<(),
     let (sensors, rivals) = calibrated(&training, args, &progress)?;
     progress.doing("scoring");
     let judged = |recording: &TraceFile| judge(args, recording, Part::since(args.from), &sensors, &rivals);
-    add_until_error(evaluation, tests.par_iter().map(judged).collect())
+    add_until_error(evaluation, tests.par_iter().map(judged).collect(), messages)
 }
 
 /// Every recording with parameters from all others.
-fn with_each_left_out(args: &EvaluateArgs, evaluation: &mut Evaluation) -> Result<(), CliError> {
+fn with_each_left_out(args: &EvaluateArgs, evaluation: &mut Evaluation, messages: &Messages) -> Result<(), CliError> {
     let mut recordings: Vec<TraceFile> = args.traces.iter().map(|path| read(args, path)).collect::<Result<_, _>>()?;
     if recordings.len() < 2 {
         return Err(CliError::Arguments("--leave-one-out: expected two recordings or more, found one".into()));
     }
-    let progress = Progress::new("calibrating");
+    let progress = Progress::new("calibrating", messages);
     for place in 0..recordings.len() {
         let left_out = recordings.remove(place);
         progress.doing("calibrating");
@@ -123,7 +138,7 @@ fn with_each_left_out(args: &EvaluateArgs, evaluation: &mut Evaluation) -> Resul
         progress.doing("scoring");
         let mut judged = judge(args, &left_out, Part::since(args.from), &sensors, &rivals)?;
         judged.scores.iter_mut().for_each(|scores| scores.split = Some("left out".to_owned()));
-        add_until_error(evaluation, vec![Ok(judged)])?;
+        add_until_error(evaluation, vec![Ok(judged)], messages)?;
         recordings.insert(place, left_out);
     }
     Ok(())
@@ -131,10 +146,14 @@ fn with_each_left_out(args: &EvaluateArgs, evaluation: &mut Evaluation) -> Resul
 
 /// Adds scores in the order of the recordings, whichever was done first, up to the first that has none. Warnings wait
 /// until then, so that they come in order, too.
-fn add_until_error(evaluation: &mut Evaluation, judged: Vec<Result<Judged, CliError>>) -> Result<(), CliError> {
+fn add_until_error(
+    evaluation: &mut Evaluation,
+    judged: Vec<Result<Judged, CliError>>,
+    messages: &Messages,
+) -> Result<(), CliError> {
     for judged in judged {
         let Judged { scores, warnings, drawn } = judged?;
-        warnings.iter().for_each(|warning| CliError::warning(warning));
+        warnings.iter().for_each(|warning| messages.warning(warning));
         evaluation.add(scores);
         evaluation.drawn = evaluation.drawn.take().or(drawn);
     }

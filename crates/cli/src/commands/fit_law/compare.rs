@@ -7,6 +7,7 @@ use super::{Fits, Fitted, fit_recording, output};
 use crate::args::FitLawArgs;
 use crate::error::CliError;
 use crate::input::TraceFile;
+use crate::messages::Messages;
 use crate::output::{json, print};
 use ohmstrain::number::{fixed, significant};
 
@@ -38,15 +39,15 @@ struct Ranked {
 }
 
 /// One row per segment and law, the best of a segment first.
-pub fn compare(recordings: &[TraceFile], args: &FitLawArgs) -> Result<(), CliError> {
+pub fn compare(recordings: &[TraceFile], args: &FitLawArgs, messages: &Messages) -> Result<(), CliError> {
     let mut ranked = Vec::new();
     for recording in recordings {
         let mut tried: Vec<(String, Fits)> = Vec::new();
         for law in &args.compare {
             let own = FitLawArgs { law: *law, compare: vec![], ..args.clone() };
-            tried.push((law.to_string(), fit_recording(recording, &own)?));
+            tried.push((law.to_string(), fit_recording(recording, &own, messages)?));
         }
-        tried.iter().for_each(|(law, fits)| output::warn_of_law(fits, law));
+        tried.iter().for_each(|(law, fits)| output::warn_of_law(fits, law, messages));
         ranked.extend(rank(&tried)?);
     }
     if args.json {

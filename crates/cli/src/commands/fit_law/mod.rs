@@ -13,6 +13,7 @@ use ohmstrain_calib::closed_form::{ClosedForm, ClosedFormFit, ModulusShape, fit_
 use crate::args::{FitLawArgs, RestResistance, phase_name};
 use crate::error::CliError;
 use crate::input::{self, TraceFile};
+use crate::messages::Messages;
 use crate::run::median_of_first;
 use pieces::{Piece, pieces};
 
@@ -44,7 +45,7 @@ pub struct Fits {
 pub const SAME_SPEED: f64 = 0.1;
 
 /// Fits the law to the chosen segments of each recording.
-pub fn run(args: &FitLawArgs) -> Result<(), CliError> {
+pub fn run(args: &FitLawArgs, messages: &Messages) -> Result<(), CliError> {
     if args.modulus.is_some() && !args.law.has_modulus() {
         return Err(CliError::Arguments(format!("--modulus is for eq8, eq9 and eq8+eq9, not for {}", args.law)));
     }
@@ -52,13 +53,13 @@ pub fn run(args: &FitLawArgs) -> Result<(), CliError> {
     let read = |path: &std::path::PathBuf| input::read(path, &overrides);
     let recordings: Vec<TraceFile> = args.traces.iter().map(read).collect::<Result<_, _>>()?;
     if !args.compare.is_empty() {
-        return compare::compare(&recordings, args);
+        return compare::compare(&recordings, args, messages);
     }
     let fits: Vec<Fits> =
-        recordings.iter().map(|recording| fit_recording(recording, args)).collect::<Result<_, _>>()?;
-    output::warn(&fits);
+        recordings.iter().map(|recording| fit_recording(recording, args, messages)).collect::<Result<_, _>>()?;
+    output::warn(&fits, messages);
     if args.table {
-        published::warn(&fits);
+        published::warn(&fits, messages);
     }
     args.figures.as_deref().map_or(Ok(()), |folder| figures::put(folder, &fits, args.replace.force))?;
     if args.json {
@@ -70,7 +71,7 @@ pub fn run(args: &FitLawArgs) -> Result<(), CliError> {
     }
 }
 
-fn fit_recording(recording: &TraceFile, args: &FitLawArgs) -> Result<Fits, CliError> {
+fn fit_recording(recording: &TraceFile, args: &FitLawArgs, messages: &Messages) -> Result<Fits, CliError> {
     let trace = &recording.trace;
     let rest_reading = match args.rest_resistance {
         RestResistance::Value(value) => value,
@@ -98,7 +99,7 @@ fn fit_recording(recording: &TraceFile, args: &FitLawArgs) -> Result<Fits, CliEr
         return Err(CliError::Input(refused.swap_remove(0)));
     }
     for message in refused {
-        CliError::remark(&format!("{message}: not fitted"));
+        messages.remark(&format!("{message}: not fitted"));
     }
     Ok(Fits {
         name: recording.name.clone(),

@@ -7,6 +7,7 @@ use super::rows::{Cell, Rows};
 use super::{Fits, Fitted, phase_of};
 use crate::args::FitLawArgs;
 use crate::error::CliError;
+use crate::messages::Messages;
 use crate::output::{self, print};
 use ohmstrain::number::plain;
 
@@ -152,22 +153,22 @@ pub const POOR: f64 = 0.9;
 const MOST_WARNED: usize = 6;
 
 /// Warns of fits that are poor, did not converge, or end at a limit of the search.
-pub fn warn(recordings: &[Fits]) {
-    recordings.iter().for_each(|recording| warn_of(recording, ""));
+pub fn warn(recordings: &[Fits], messages: &Messages) {
+    recordings.iter().for_each(|recording| warn_of(recording, "", messages));
 }
 
 /// The same of one law of several.
-pub fn warn_of_law(recording: &Fits, law: &str) {
-    warn_of(recording, &format!("{law}: "));
+pub fn warn_of_law(recording: &Fits, law: &str, messages: &Messages) {
+    warn_of(recording, &format!("{law}: "), messages);
 }
 
-fn warn_of(recording: &Fits, law: &str) {
+fn warn_of(recording: &Fits, law: &str, messages: &Messages) {
     let name = &recording.name;
     let doubts: Vec<(&str, Vec<String>)> =
         recording.fits.iter().map(doubts).filter(|(_, doubts)| !doubts.is_empty()).collect();
     if doubts.len() <= MOST_WARNED {
         for (label, doubts) in doubts {
-            CliError::warning(&format!("{name}: {law}{label}: {}", doubts.join("; ")));
+            messages.warning(&format!("{name}: {law}{label}: {}", doubts.join("; ")));
         }
         return;
     }
@@ -176,18 +177,18 @@ fn warn_of(recording: &Fits, law: &str) {
     let poor: Vec<f64> = fits().map(|fit| fit.r_squared).filter(|r_squared| *r_squared < POOR).collect();
     if !poor.is_empty() {
         let (count, worst) = (poor.len(), poor.iter().fold(f64::INFINITY, |worst, found| worst.min(*found)));
-        CliError::warning(&format!(
+        messages.warning(&format!(
             "{name}: {law}R^2 is below {POOR} in {count} of {all} segments, {worst:.2} at worst: the law hardly describes them"
         ));
     }
     let unfinished = fits().filter(|fit| !fit.converged).count();
     if unfinished > 0 {
-        CliError::warning(&format!("{name}: {law}the search has not converged in {unfinished} of {all} segments"));
+        messages.warning(&format!("{name}: {law}the search has not converged in {unfinished} of {all} segments"));
     }
     for parameter in names(recording.fits.iter()) {
         let count = fits().filter(|fit| fit.get(&parameter).is_some_and(|found| found.at_limit)).count();
         if count > 0 {
-            CliError::warning(&format!(
+            messages.warning(&format!(
                 "{name}: {law}{parameter} at the limit of the search in {count} of {all} segments: their readings ask for more"
             ));
         }

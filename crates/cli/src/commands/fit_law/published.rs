@@ -3,7 +3,7 @@ use ohmstrain_model::Phase;
 
 use super::rows::{Cell, Rows};
 use super::{Fits, Fitted, SAME_SPEED, output};
-use crate::error::CliError;
+use crate::messages::Messages;
 use ohmstrain::number::{fixed, plain};
 
 /// What one phase of one fit contributes.
@@ -41,13 +41,13 @@ pub fn table(recordings: &[Fits]) -> Rows {
 }
 
 /// Says in which phase a law that describes both of its phases together does not describe one of them.
-pub fn warn(recordings: &[Fits]) {
+pub fn warn(recordings: &[Fits], messages: &Messages) {
     for recording in recordings {
         for entry in entries(recording, false) {
             let (together, alone) = (entry.fitted.fit.r_squared, entry.r_squared);
             if alone < output::POOR && together >= output::POOR {
                 let (name, label, phase) = (&recording.name, &entry.fitted.piece.label, entry.phase);
-                CliError::warning(&format!(
+                messages.warning(&format!(
                     "{name}: {label}: R^2 of the {phase} by itself is {alone:.2}: the law hardly describes it"
                 ));
             }

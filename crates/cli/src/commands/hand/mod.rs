@@ -14,6 +14,7 @@ use ohmstrain_bench_data::{Line, LineParser, Metadata, Row, RowWriter, counted};
 use crate::args::HandArgs;
 use crate::error::CliError;
 use crate::input::{self, reading_column};
+use crate::messages::Messages;
 use crate::output::RowsOut;
 use crate::sensor_file;
 use crate::suits::FIRST_LIVE_READINGS;
@@ -27,7 +28,7 @@ const LATE: &str = "; if the clock has started again there, --skip-bad goes on w
 const LONGEST_LINE: u64 = 64 * 1024;
 
 /// Turns readings of all joints into angles, row by row as they arrive.
-pub fn run(args: &HandArgs) -> Result<(), CliError> {
+pub fn run(args: &HandArgs, messages: &Messages) -> Result<(), CliError> {
     let description = Description::read(&args.hand)?;
     let folder = args.hand.parent().unwrap_or(Path::new(""));
     let (name, source) = if is_stdin(&args.trace_file) {
@@ -47,7 +48,7 @@ pub fn run(args: &HandArgs) -> Result<(), CliError> {
     let mut rows_out = RowsOut::claim(args.output.as_deref(), &columns, args.replace.force, inputs)?;
     let live = is_stdin(&args.trace_file) || !args.trace_file.is_file();
     let mut out = RowWriter::new(rows_out.open(live)?);
-    let streamed = stream(args, &name, source, &mut channels, &columns, &mut out, live);
+    let streamed = stream(args, &name, source, &mut channels, &columns, &mut out, live, messages);
     out.flush()?;
     streamed?;
     rows_out.publish()
@@ -181,6 +182,7 @@ fn stream<W: Write>(
     columns: &[String],
     out: &mut RowWriter<W>,
     live: bool,
+    messages: &Messages,
 ) -> Result<(), CliError> {
     let (mut known_header, mut skipped, mut number, mut line) = (None, 0_u64, 0_u64, Vec::new());
     let mut is_empty = true;
@@ -223,7 +225,7 @@ fn stream<W: Write>(
             }
         }
         if restarted {
-            CliError::warning(&format!("{file}:{number}: the clock has started again, and so has the filter"));
+            messages.warning(&format!("{file}:{number}: the clock has started again, and so has the filter"));
         }
         if is_first {
             columns.iter().for_each(|name| out.text(name));
@@ -238,7 +240,7 @@ fn stream<W: Write>(
         } else if rows.len() == channels.len() && !rows.is_empty() {
             is_empty = false;
             for (channel, row) in channels.iter_mut().zip(&rows) {
-                say(channel.doubt(row.reading.value), file, live)?;
+                say(channel.doubt(row.reading.value), file, live, messages)?;
             }
             write(channels, &rows, out)?;
             if live {
@@ -246,10 +248,10 @@ fn stream<W: Write>(
             }
         }
     }
-    channels.iter().try_for_each(|channel| say(channel.last_doubt(), file, live))?;
+    channels.iter().try_for_each(|channel| say(channel.last_doubt(), file, live, messages))?;
     if skipped > 0 {
         let were = if skipped == 1 { "was" } else { "were" };
-        CliError::warning(&format!("{} {were} skipped", counted(skipped, "line")));
+        messages.warning(&format!("{} {were} skipped", counted(skipped, "line")));
     }
     if is_empty {
         let none = "expected at least one row of data, found the end of the file";
@@ -259,9 +261,9 @@ fn stream<W: Write>(
 }
 
 /// Warns of a doubt where somebody waits for the rows, refuses the recording otherwise.
-fn say(doubt: Option<String>, file: &str, live: bool) -> Result<(), CliError> {
+fn say(doubt: Option<String>, file: &str, live: bool, messages: &Messages) -> Result<(), CliError> {
     match doubt {
-        Some(doubt) if live => CliError::warning(&format!("{file}: {doubt}")),
+        Some(doubt) if live => messages.warning(&format!("{file}: {doubt}")),
         Some(doubt) => return Err(CliError::Input(format!("{file}: {doubt}"))),
         None => {}
     }

@@ -10,6 +10,8 @@ use crate::printable::printable;
 
 /// Characters of a cell that are shown.
 const WIDEST: usize = 24;
+/// Columns of a file that are shown.
+const MOST_COLUMNS: usize = 24;
 
 /// Prints what was found, and the command or the question that follows from it.
 pub fn write(out: &mut dyn Write, findings: &Findings) -> Result<(), CliError> {
@@ -42,7 +44,17 @@ fn columns(findings: &Findings, index: usize) -> TextTable {
     let mut text = output::table(["#", "column", "unit", "taken for", "first", "last"]);
     let taken = findings.plan.as_ref().map(|proposal| proposal.plan.columns(&findings.tables)).unwrap_or_default();
     let found = candidates(&findings.tables);
-    for (place, column) in table.columns.iter().enumerate() {
+    let is_something = |place: usize| {
+        taken.iter().any(|(_, table, column, ..)| (*table, *column) == (index, place))
+            || found.iter().any(|it| (it.table, it.column) == (index, place))
+    };
+    let mut shown: Vec<usize> = (0..table.columns.len()).collect();
+    // The columns that are something first, if not all can be shown.
+    shown.sort_by_key(|place| (table.columns.len() > MOST_COLUMNS && !is_something(*place), *place));
+    shown.truncate(MOST_COLUMNS);
+    shown.sort_unstable();
+    for &place in &shown {
+        let column = &table.columns[place];
         let is_here =
             |(_, table, column, ..): &&(Role, usize, usize, String, &str)| (*table, *column) == (index, place);
         let role = match (taken.iter().find(is_here), found.iter().find(|it| (it.table, it.column) == (index, place))) {
@@ -58,6 +70,10 @@ fn columns(findings: &Findings, index: usize) -> TextTable {
             short(column.cells.get(0)),
             short(column.cells.get(column.cells.len().saturating_sub(1))),
         ]);
+    }
+    let others = table.columns.len() - shown.len();
+    if others > 0 {
+        text.add_row(["…".to_owned(), format!("{others} more")]);
     }
     text
 }

@@ -18,6 +18,7 @@ use ratatui::crossterm::event::{self, Event as Input, KeyCode, KeyEventKind, Key
 
 use crate::args::LiveArgs;
 use crate::error::CliError;
+use crate::messages::Messages;
 use crate::output::refuse_stdout;
 use crate::sensor_file;
 use session::Session;
@@ -31,7 +32,7 @@ const KEY_WAIT: Duration = Duration::from_millis(10);
 const FRAME: Duration = Duration::from_millis(50);
 
 /// Shows strain until the user has seen enough.
-pub fn run(args: &LiveArgs) -> Result<(), CliError> {
+pub fn run(args: &LiveArgs, messages: &Messages) -> Result<(), CliError> {
     if !io::stdout().is_terminal() {
         return Err(CliError::Arguments(
             "live draws on a terminal; for rows of numbers use `ohmstrain filter`, with --skip-bad on a serial line"
@@ -51,10 +52,10 @@ pub fn run(args: &LiveArgs) -> Result<(), CliError> {
     ratatui::restore();
     if session.recorder.is_some() {
         session.toggle_record();
-        CliError::remark(&session.message);
+        messages.remark(&session.message);
     }
     let counts = session.counts;
-    CliError::remark(&format!(
+    messages.remark(&format!(
         "{}, {} missing, {}, {} skipped, {} of the clock",
         counted(counts.rows, "row"),
         counted(counts.missing, "reading"),

@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 use std::time::Instant;
 
+use ohmstrain::Interface::CommandLine;
 use ohmstrain::number::significant;
 use ohmstrain::{Error, Estimate, Filter, QuietWatch, Sensor, ValidityWatch};
 use ohmstrain_bench_data::{Line, LineParser, Row, counted};
@@ -12,7 +13,7 @@ use crate::args::{LiveArgs, RestResistance};
 use crate::error::CliError;
 use crate::input::{self, check_unit};
 use crate::run::{builder, builder_anew, median, of_first};
-use crate::suits::{self, FIRST_LIVE_READINGS};
+use crate::suits::FIRST_LIVE_READINGS;
 
 /// Rows that are kept for the plot at most.
 const MOST_POINTS: usize = 1 << 16;
@@ -298,7 +299,7 @@ impl<'a> Session<'a> {
         if self.early.len() == wanted.max(FIRST_LIVE_READINGS)
             && let Err(doubt) = self.sensor.check_unit(self.early.iter().copied(), self.rest)
         {
-            self.message = suits::answerable(&doubt);
+            self.message = doubt.text(CommandLine);
         }
         Ok(())
     }

@@ -1,6 +1,6 @@
 //! The picture: a plot of the last seconds, and the numbers of now. Any size of terminal will do, as far as it goes.
 
-use ohmstrain::number::significant;
+use ohmstrain::number::{shown, significant};
 use ohmstrain::{Estimate, Quantity, ReadingUnit};
 use ohmstrain_bench_data::counted;
 use ratatui::Frame;
@@ -48,16 +48,8 @@ pub fn draw(frame: &mut Frame, session: &Session, status: &str, args: &LiveArgs)
     }
 }
 
-/// How the sensor's quantity is shown: a factor and a unit.
-fn scale(session: &Session) -> (f64, &'static str) {
-    match session.sensor().params().quantity {
-        Quantity::Strain => (100.0, " %"),
-        Quantity::AngleDeg => (1.0, "°"),
-    }
-}
-
 fn draw_plot(frame: &mut Frame, session: &Session, window_s: f64, area: Rect) {
-    let (factor, unit) = scale(session);
+    let (factor, unit) = shown(session.sensor().params().quantity);
     let limits = session.sensor().params().limits;
     let every = session.points.len().div_ceil(MOST_DRAWN).max(1);
     let line = |offset: f64| -> Vec<(f64, f64)> {
@@ -118,7 +110,7 @@ fn numbers(session: &Session) -> Vec<Line<'static>> {
 }
 
 fn of_estimate(session: &Session, row: &Estimate, line: &mut impl FnMut(&str, String)) {
-    let (factor, unit) = scale(session);
+    let (factor, unit) = shown(session.sensor().params().quantity);
     let name = if unit == "°" { "angle" } else { "strain" };
     line(name, format!("{:.2} ± {:.2}{unit}", factor * row.strain, factor * 1.96 * row.strain_sd));
     if let (Some(angle), Some(sd)) = (row.angle_deg, row.angle_sd) {

@@ -4,7 +4,7 @@ mod motion;
 mod worth;
 
 use comfy_table::ColumnConstraint;
-use ohmstrain::{Calibration, EstimatorKind, JointParams, Quantity, Sensor};
+use ohmstrain::{Calibration, EstimatorKind, JointParams, Sensor};
 use ohmstrain_bench_data::Metadata;
 use ohmstrain_bench_data::simulate::{Protocol, SimulationSettings};
 use serde::Serialize;
@@ -14,11 +14,12 @@ use super::simulate;
 use crate::args::PlanArgs;
 use crate::error::CliError;
 use crate::input;
+use crate::messages::Messages;
 use crate::output::{self, print, wrapped};
 use crate::progress::Progress;
 use crate::sensor_file;
 use motion::Protocols;
-use ohmstrain::number::{fixed, significant};
+use ohmstrain::number::{self, fixed, significant};
 use worth::{Sampling, Told, Worth};
 
 /// Version of what `--json` prints.
@@ -37,10 +38,10 @@ struct Json<'a> {
 }
 
 /// Plans a recording.
-pub fn run(args: &PlanArgs) -> Result<(), CliError> {
+pub fn run(args: &PlanArgs, messages: &Messages) -> Result<(), CliError> {
     let (sensor, name) = match &args.sensor {
         Some(path) => (sensor_file::read(path, None)?, path.display().to_string()),
-        None => (illustrative(args)?, format!("an illustrative sensor ({})", args.material)),
+        None => (illustrative(args, messages)?, format!("an illustrative sensor ({})", args.material)),
     };
     let joint = args.joint.map(|joint| JointParams {
         prestrain: joint.prestrain,
@@ -48,7 +49,7 @@ pub fn run(args: &PlanArgs) -> Result<(), CliError> {
         gauge_length_mm: joint.gauge_length_mm,
     });
     let sensor = joint.map_or(Ok(sensor.clone()), |joint| sensor.on_joint(joint))?;
-    let progress = Progress::new("planning");
+    let progress = Progress::new("planning", messages);
     let protocols = Protocols::new(sensor.params());
     let told: Vec<Told> = protocols.all().iter().map(|protocol| worth::told(&sensor, protocol)).collect();
     let worth = worth::sampling(&sensor, &protocols)?;
@@ -71,7 +72,7 @@ pub fn run(args: &PlanArgs) -> Result<(), CliError> {
 }
 
 /// A sensor calibrated on a simulated bench session, in which the law is as wrong as it is of real sensors.
-fn illustrative(args: &PlanArgs) -> Result<Sensor, CliError> {
+fn illustrative(args: &PlanArgs, messages: &Messages) -> Result<Sensor, CliError> {
     let settings = SimulationSettings {
         speed_mm_s: 5.0,
         sample_rate_hz: 5.0,
@@ -81,15 +82,12 @@ fn illustrative(args: &PlanArgs) -> Result<Sensor, CliError> {
     let bytes = simulate::bytes(&settings).map_err(CliError::Other)?;
     let recording = input::parse(&bytes, "simulated.csv".as_ref(), &Metadata::default())?;
     let calibration = Calibration::new().estimator(EstimatorKind::SignSplit);
-    Ok(calibrate_recordings(&[recording], calibration, &Progress::new("simulating"))?.sensor)
+    Ok(calibrate_recordings(&[recording], calibration, &Progress::new("simulating", messages))?.sensor)
 }
 
 fn text(sensor: &Sensor, name: &str, protocols: &Protocols, told: &[Told], worth: &Sampling) -> String {
     let params = sensor.params();
-    let (factor, unit) = match params.quantity {
-        Quantity::Strain => (100.0, " %"),
-        Quantity::AngleDeg => (1.0, "°"),
-    };
+    let (factor, unit) = number::shown(params.quantity);
     let shown = |x: f64| format!("{}{unit}", significant(factor * x, 3));
     let speeds: Vec<String> = protocols.speeds.iter().map(|speed| format!("{}/s", shown(*speed))).collect();
     let (low, high) = (params.law.range.lower, params.law.range.upper);

@@ -10,6 +10,7 @@ use ohmstrain_sensor::{EstimatorKind, LawParams, SensorError, SensorParams};
 use crate::args::RefineArgs;
 use crate::error::CliError;
 use crate::input::{self, TraceFile, check_unit, reading_column};
+use crate::messages::Messages;
 use crate::output::{Kind, Outputs, print};
 use crate::progress::Progress;
 use crate::run::rest_resistance;
@@ -23,7 +24,7 @@ const TRUST: &str = "the likelihood of readings trusts the law: where the law is
                      narrow; where a reference exists, use calibrate";
 
 /// Refines a sensor's noise on a recording and writes its parameters.
-pub fn run(args: &RefineArgs) -> Result<(), CliError> {
+pub fn run(args: &RefineArgs, messages: &Messages) -> Result<(), CliError> {
     if let Some(other) = args.estimator.chosen().map(|estimator| estimator.0).filter(|kind| *kind != EstimatorKind::Ekf)
     {
         let name = other.name();
@@ -40,16 +41,16 @@ pub fn run(args: &RefineArgs) -> Result<(), CliError> {
     let rows = RelativeRows::new(&recording, args.from, args.until, sensor.rest_reading(rest))?;
     let mut params = sensor.into_params();
     let (start, free) = start(args, &params, &rows.time_s)?;
-    let refinement = refine(&params.law, start, free, &rows).map_err(|error| named(args, &error))?;
-    remark_on_input(&recording, &rows, &params);
+    let refinement = refine(&params.law, start, free, &rows, messages).map_err(|error| named(args, &error))?;
+    remark_on_input(&recording, &rows, &params, messages);
     replace(&mut params, &refinement);
     outputs.put(output, sensor_file::text(&sensor_file::checked(params)?)?);
     outputs.publish()?;
     print(|out| table::write(out, &refinement))?;
     for warning in &refinement.found.warnings {
-        CliError::warning(&format!("{}: {warning}", recording.name));
+        messages.warning(&format!("{}: {warning}", recording.name));
     }
-    CliError::warning(TRUST);
+    messages.warning(TRUST);
     Ok(())
 }
 
@@ -69,10 +70,11 @@ fn refine(
     start: NoiseStart,
     free: Vec<NoiseParameter>,
     rows: &RelativeRows,
+    messages: &Messages,
 ) -> Result<Refinement, CalibrationError> {
     let recordings = [ReadingSeries { time_s: &rows.time_s, value: &rows.value, extra_sd: &rows.extra_sd }];
     let problem = LikelihoodProblem { recordings: &recordings, law, start: &start, free: &free };
-    let progress = Progress::new("maximising the likelihood");
+    let progress = Progress::new("maximising the likelihood", messages);
     let before = problem.log_likelihood()?;
     let found = problem.fit()?;
     progress.doing("profile intervals");
@@ -114,15 +116,15 @@ fn movable(law: &LawParams, start: &NoiseStart) -> Vec<NoiseParameter> {
 }
 
 /// Says what of the recording was left aside.
-fn remark_on_input(recording: &TraceFile, rows: &RelativeRows, params: &SensorParams) {
+fn remark_on_input(recording: &TraceFile, rows: &RelativeRows, params: &SensorParams, messages: &Messages) {
     if let Some(quantity) = recording.quantity() {
         let (header, name) = (&recording.header, quantity.name());
-        CliError::remark(&format!("{header}: the reference in `{name}` is not used; calibrate would use it"));
+        messages.remark(&format!("{header}: the reference in `{name}` is not used; calibrate would use it"));
     }
     if rows.stride > 1 {
         let (name, all, used) = (&recording.name, rows.all, rows.time_s.len());
         let column = reading_column(params.reading);
-        CliError::remark(&format!("{name}: column `{column}`: {used} of {all} rows are used, one in {}", rows.stride));
+        messages.remark(&format!("{name}: column `{column}`: {used} of {all} rows are used, one in {}", rows.stride));
     }
 }
 

@@ -1,5 +1,7 @@
 //! Numbers as people read them: as many digits as mean something, and a true minus sign.
 
+use ohmstrain_sensor::Quantity;
+
 /// Significant digits of a value whose uncertainty is not known.
 const DIGITS: i32 = 4;
 
@@ -55,6 +57,18 @@ pub fn with_error(value: f64, error: f64) -> String {
 /// ```
 pub fn percent(share: f64) -> String {
     if share.is_finite() { format!("{} %", fixed(100.0 * share, 1)) } else { plain(share) }
+}
+
+/// Factor and unit in which people read a quantity: strains in percent, angles in degrees.
+///
+/// ```
+/// assert_eq!(ohmstrain::number::shown(ohmstrain::Quantity::Strain), (100.0, " %"));
+/// ```
+pub const fn shown(quantity: Quantity) -> (f64, &'static str) {
+    match quantity {
+        Quantity::Strain => (100.0, " %"),
+        Quantity::AngleDeg => (1.0, "°"),
+    }
 }
 
 /// `value` with `decimals` digits after the point; a negative number of them rounds before the point.

@@ -2,7 +2,7 @@
 
 use ohmstrain_sensor::{Scores, Summary};
 
-use crate::number::fixed;
+use super::number::fixed;
 
 /// Below this share of the static cubic's error an estimate is clearly better, below this one better.
 const CLEARLY_BETTER: f64 = 0.5;

@@ -3,8 +3,8 @@
 use ohmstrain_sensor::{Findings, Limit, Quantity, Scores, Seen, SensorParams, TestedSummary};
 use serde::Serialize;
 
-use crate::number::{fixed, significant};
-use crate::verdict::{Known, is_better, percent, verdict};
+use super::number::{fixed, shown, significant};
+use super::verdict::{Known, is_better, percent, verdict};
 
 /// Advice that is printed; the rest is counted.
 const PRINTED_ADVICE: usize = 1;
@@ -182,10 +182,7 @@ fn error_in_test(tested: &Tested) -> String {
 
 /// Range, gaps in it, speeds and holds.
 fn seen(seen: &Seen, quantity: Quantity) -> String {
-    let (scale, unit) = match quantity {
-        Quantity::Strain => (100.0, " %"),
-        Quantity::AngleDeg => (1.0, "°"),
-    };
+    let (scale, unit) = shown(quantity);
     let number = |x: f64| significant(scale * x, 3).replace('−', "-");
     let (low, span) = (seen.range.lower, seen.range.span());
     let edge = |tenth: usize| number(low + tenth as f64 / seen.tenths.len() as f64 * span);

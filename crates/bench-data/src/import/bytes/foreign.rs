@@ -1,0 +1,116 @@
+//! Containers that are not read, by what they begin with, and the line that makes one of them readable.
+
+/// A container: its name, what it begins with and where, and how it is converted.
+type Container = (&'static str, usize, &'static [u8], &'static str);
+
+const HDF5: &str = "python3 -c \"import h5py, pandas; f = h5py.File('FILE'); pandas.DataFrame({k: f[k][()].ravel() for k in f}).to_csv('out.csv', index=False)\"";
+const MAT: &str = "python3 -c \"import scipy.io, pandas; f = scipy.io.loadmat('FILE'); pandas.DataFrame({k: v.ravel() for k, v in f.items() if k[0] != '_'}).to_csv('out.csv', index=False)\"";
+const BAG: &str = "rosbags-convert --src FILE --dst out, or `rostopic echo -b FILE -p /TOPIC > out.csv`";
+const PAGE: &str = "save the table in it as CSV";
+const PICTURE: &str = "export the numbers behind it as CSV";
+
+const KNOWN: [Container; 34] = [
+    ("a MATLAB file of version 7.3", 0, b"MATLAB 7.3", HDF5),
+    ("a MATLAB file", 0, b"MATLAB 5.0", MAT),
+    ("HDF5", 0, b"\x89HDF\r\n\x1a\n", HDF5),
+    ("HDF5", 512, b"\x89HDF\r\n\x1a\n", HDF5),
+    (
+        "netCDF",
+        0,
+        b"CDF\x01",
+        "ncdump FILE, or `python3 -c \"import xarray; xarray.open_dataset('FILE').to_dataframe().to_csv('out.csv')\"`",
+    ),
+    ("a ROS 1 bag", 0, b"#ROSBAG V", BAG),
+    (
+        "MCAP",
+        0,
+        b"\x89MCAP0\r\n",
+        "`ros2 topic echo` of the topic while `ros2 bag play FILE` runs, or the Python package `mcap`",
+    ),
+    (
+        "an SQLite database (ROS 2 bags are some)",
+        0,
+        b"SQLite format 3\0",
+        "sqlite3 -csv -header FILE 'select * from TABLE' > out.csv; of a ROS 2 bag `ros2 topic echo` while `ros2 bag play` runs",
+    ),
+    (
+        "a LabVIEW TDMS file",
+        0,
+        b"TDSm",
+        "python3 -c \"from nptdms import TdmsFile; TdmsFile('FILE').as_dataframe().to_csv('out.csv')\"",
+    ),
+    (
+        "an Arrow or Feather file",
+        0,
+        b"ARROW1",
+        "python3 -c \"import pandas; pandas.read_feather('FILE').to_csv('out.csv', index=False)\"",
+    ),
+    ("ORC", 0, b"ORC", "python3 -c \"import pandas; pandas.read_orc('FILE').to_csv('out.csv', index=False)\""),
+    ("Avro", 0, b"Obj\x01", "java -jar avro-tools.jar tojson FILE > out.jsonl"),
+    ("an R data file", 0, b"RDX", "Rscript -e 'load(\"FILE\"); write.csv(NAME, \"out.csv\")'"),
+    ("an R data file", 0, b"X\n\0\0", "Rscript -e 'write.csv(readRDS(\"FILE\"), \"out.csv\")'"),
+    ("a pickle of Python", 0, b"\x80\x02", PICKLE),
+    ("a pickle of Python", 0, b"\x80\x03", PICKLE),
+    ("a pickle of Python", 0, b"\x80\x04\x95", PICKLE),
+    ("a pickle of Python", 0, b"\x80\x05\x95", PICKLE),
+    (
+        "a Stata file",
+        0,
+        b"<stata_dta>",
+        "python3 -c \"import pandas; pandas.read_stata('FILE').to_csv('out.csv', index=False)\"",
+    ),
+    (
+        "an SPSS file",
+        0,
+        b"$FL2",
+        "python3 -c \"import pandas; pandas.read_spss('FILE').to_csv('out.csv', index=False)\"",
+    ),
+    ("a 7z archive", 0, b"7z\xbc\xaf\x27\x1c", "7z x FILE"),
+    ("a RAR archive", 0, b"Rar!\x1a", "unrar x FILE"),
+    ("a tar archive", 257, b"ustar", "tar xf FILE"),
+    ("bzip2", 0, b"BZh", "bunzip2 FILE"),
+    ("xz", 0, b"\xfd7zXZ\0", "unxz FILE"),
+    ("Zstandard", 0, b"\x28\xb5\x2f\xfd", "unzstd FILE"),
+    ("LZ4", 0, b"\x04\x22\x4d\x18", "unlz4 FILE"),
+    ("a PDF", 0, b"%PDF-", PICTURE),
+    ("a PNG picture", 0, b"\x89PNG\r\n", PICTURE),
+    ("a JPEG picture", 0, b"\xff\xd8\xff", PICTURE),
+    ("a sound or film", 0, b"RIFF", PICTURE),
+    ("a web page", 0, b"<!DOCTYPE html", PAGE),
+    ("a web page", 0, b"<html", PAGE),
+    ("a Git LFS pointer, not the file itself", 0, b"version https://git-lfs", "git lfs pull"),
+];
+const PICKLE: &str =
+    "python3 -c \"import pandas; pandas.DataFrame(pandas.read_pickle('FILE')).to_csv('out.csv', index=False)\"";
+
+/// What a file is that is not read, and how to make one of it that is.
+pub(crate) fn refusal(bytes: &[u8], file: &str) -> Option<String> {
+    let begins = |(_, place, magic, _): &&Container| bytes.get(*place..).is_some_and(|rest| rest.starts_with(magic));
+    let (name, _, _, way) = KNOWN.iter().find(begins)?;
+    let way = if [PAGE, PICTURE].contains(way) {
+        (*way).to_owned()
+    } else {
+        format!("convert it with {}", way.replace("FILE", file))
+    };
+    Some(format!("is {name}, which is not read here: {way}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn containers_are_named_with_a_way_out() {
+        let said = |bytes: &[u8]| refusal(bytes, "run.bin").unwrap_or_default();
+        assert!(said(b"#ROSBAG V2.0\n").contains("ROS 1 bag") && said(b"#ROSBAG V2.0\n").contains("run.bin"));
+        assert!(said(b"SQLite format 3\0...").contains("sqlite3 -csv -header run.bin"));
+        assert!(said(b"%PDF-1.7").contains("numbers behind it"));
+        assert_eq!(said(b"time_s,resistance_ohm\n"), "");
+        // No two messages take more than a line, and none is of a text that begins with a number.
+        assert!(
+            KNOWN
+                .iter()
+                .all(|(.., magic, way)| !way.contains('\n') && !magic[0].is_ascii_digit() || magic.starts_with(b"7z"))
+        );
+    }
+}

@@ -1,0 +1,143 @@
+//! Recordings as JSON: an object or a list for each row, one below the other or in a list, or a list for each column.
+
+use std::collections::HashMap;
+
+use crate::import::bytes::{Cell, Json, Rows, json_values};
+
+/// Columns of a recording; a file with more of them is something else.
+const MOST_COLUMNS: usize = 1000;
+
+/// The rows of a text that is JSON, under a line of names if there are any; `None` if it is none.
+pub(crate) fn rows(text: &str) -> Option<Rows<'static>> {
+    if !text.trim_start_matches(['\u{feff}', ' ', '\n', '\r', '\t']).starts_with(['{', '[']) {
+        return None;
+    }
+    let mut values = json_values(text);
+    let others = values.iter().filter(|(_, value)| value.is_none()).count();
+    if others * 5 > values.len() {
+        return None;
+    }
+    if let [(_, value)] = &mut values[..] {
+        return whole(value.take()?);
+    }
+    records(values)
+}
+
+/// A file that is one value.
+fn whole(value: Json) -> Option<Rows<'static>> {
+    match value {
+        Json::List(list) if list.iter().all(|item| !matches!(item, Json::Cell(_))) => {
+            records((1..).zip(list.into_iter().map(Some)).collect())
+        }
+        Json::Object(pairs) => of_object(pairs),
+        _ => None,
+    }
+}
+
+/// Columns by name, as lists or as objects by the number of the row; `columns` beside `data`; or something with these in it.
+fn of_object(pairs: Vec<(String, Json)>) -> Option<Rows<'static>> {
+    let named = |wanted: &str| pairs.iter().find(|(name, _)| name == wanted).map(|(_, value)| value);
+    if let (Some(Json::List(names)), Some(Json::List(data))) = (named("columns"), named("data")) {
+        let names = names.iter().map(|name| if let Json::Cell(name) = name { name.clone() } else { Cell::Empty });
+        let mut rows: Rows = vec![(1, names.collect())];
+        rows.extend((1..).zip(data).map(|(number, row)| (number, cells_of(row))));
+        return Some(rows);
+    }
+    let is_column = |value: &Json| !list_of_cells(value).is_empty();
+    let longest = pairs.iter().map(|(_, value)| list_of_cells(value).len()).max()?;
+    if longest > 1 {
+        let columns: Vec<(String, Vec<Cell<'static>>)> = pairs
+            .into_iter()
+            .filter(|(_, value)| is_column(value))
+            .map(|(name, value)| (name, list_of_cells(&value)))
+            .collect();
+        let columns: Vec<_> =
+            columns.into_iter().filter(|(_, cells)| cells.len() == longest).take(MOST_COLUMNS).collect();
+        let names = columns.iter().map(|(name, _)| Cell::Text(name.clone().into())).collect();
+        let row = |row: usize| (row as u64 + 1, columns.iter().map(|(_, cells)| cells[row].clone()).collect());
+        return Some([(1, names)].into_iter().chain((0..longest).map(row)).collect());
+    }
+    // Settings beside the recording.
+    pairs.into_iter().find_map(|(_, value)| whole(value))
+}
+
+/// The cells of a column; none if it is something else.
+fn list_of_cells(value: &Json) -> Vec<Cell<'static>> {
+    let cell = |value: &Json| if let Json::Cell(cell) = value { Some(cell.clone()) } else { None };
+    match value {
+        Json::List(list) => list.iter().map(cell).collect::<Option<_>>().unwrap_or_default(),
+        Json::Object(pairs) if pairs.iter().all(|(name, _)| name.bytes().all(|byte| byte.is_ascii_digit())) => {
+            pairs.iter().map(|(_, value)| cell(value)).collect::<Option<_>>().unwrap_or_default()
+        }
+        _ => Vec::new(),
+    }
+}
+
+fn cells_of(row: &Json) -> Vec<Cell<'static>> {
+    let mut out = Vec::new();
+    flatten(String::new(), row, &mut out);
+    out.into_iter().map(|(_, cell)| cell).collect()
+}
+
+/// Rows of objects, whose names are the columns, or of lists.
+fn records(values: Vec<(u64, Option<Json>)>) -> Option<Rows<'static>> {
+    let (mut names, mut places, mut rows) = (Vec::<String>::new(), HashMap::<String, usize>::new(), Rows::new());
+    for (line, value) in values {
+        let mut cells = Vec::new();
+        match value {
+            Some(value @ Json::Object(_)) => {
+                let mut pairs = Vec::new();
+                flatten(String::new(), &value, &mut pairs);
+                for (name, cell) in pairs {
+                    let place = *places.entry(name.clone()).or_insert_with(|| {
+                        names.push(name);
+                        names.len() - 1
+                    });
+                    if cells.len() <= place {
+                        cells.resize(place + 1, Cell::Empty);
+                    }
+                    cells[place] = cell;
+                }
+            }
+            Some(value) => cells = cells_of(&value),
+            // What is no JSON is a line of something else.
+            None => cells.push(Cell::Text("no JSON".into())),
+        }
+        if names.len() > MOST_COLUMNS {
+            return None;
+        }
+        rows.push((line, cells));
+    }
+    let width = names.len();
+    if width > 0 {
+        // A record may lack its last values.
+        rows.iter_mut().filter(|(_, cells)| cells.len() > 1).for_each(|(_, cells)| cells.resize(width, Cell::Empty));
+        let first = rows.iter().position(|(_, cells)| cells.len() == width).unwrap_or(0);
+        let line = rows.get(first).map_or(1, |(line, _)| *line);
+        rows.insert(first, (line, shortened(&names).into_iter().map(|name| Cell::Text(name.into())).collect()));
+    }
+    Some(rows)
+}
+
+/// Names without what stands above them, where the last word alone is a name, and the only one of its kind.
+fn shortened(names: &[String]) -> Vec<String> {
+    let last = |name: &String| name.rsplit('.').next().unwrap_or_default().to_owned();
+    let short = |name: &String| {
+        let is_only = names.iter().filter(|other| last(other) == last(name)).count() == 1;
+        let is_name = last(name).starts_with(char::is_alphabetic);
+        if is_only && is_name { last(name) } else { name.clone() }
+    };
+    names.iter().map(short).collect()
+}
+
+/// The cells in a value, named by what stands above them: `stamp.sec`, `position.0`.
+fn flatten(name: String, value: &Json, out: &mut Vec<(String, Cell<'static>)>) {
+    let below = |part: &str| if name.is_empty() { part.to_owned() } else { format!("{name}.{part}") };
+    match value {
+        Json::Cell(cell) => out.push((name, cell.clone())),
+        Json::List(list) => {
+            list.iter().enumerate().for_each(|(place, value)| flatten(below(&place.to_string()), value, out))
+        }
+        Json::Object(pairs) => pairs.iter().for_each(|(part, value)| flatten(below(part), value, out)),
+    }
+}

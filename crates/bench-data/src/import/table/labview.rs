@@ -1,0 +1,98 @@
+//! LabVIEW measurement files without a column of times: these follow from `X0` and `Delta_X` in the header of each segment.
+
+use crate::import::bytes::{Cell, Rows};
+use crate::import::words::{DecimalMark, number, units};
+
+/// What the first line begins with, what ends a header, and the key that a segment's header begins with.
+const MAGIC: &str = "LabVIEW Measurement";
+const END: &str = "***End_of_Header***";
+const SEGMENT: &str = "Channels";
+/// Decimals of a time whose step is written with an exponent.
+const MOST_DECIMALS: usize = 12;
+
+/// The names and rows of such a file, each row behind its time, and its decimal mark; `None` if it is none.
+pub(crate) fn rows<'a>(lines: &[(u64, &'a str)]) -> Option<(Rows<'a>, DecimalMark)> {
+    let first = lines.first()?.1.trim_start_matches('\u{feff}').trim_start();
+    let end = lines.iter().position(|(_, line)| line.starts_with(END)).filter(|_| first.starts_with(MAGIC))?;
+    let separator = if value(&lines[..end], "Separator") == Some("Comma") { ',' } else { '\t' };
+    let keys = |key| lines[..end].iter().find_map(|(_, line)| line.strip_prefix(key)?.strip_prefix(separator));
+    if keys("X_Columns")?.trim() != "No" {
+        return None;
+    }
+    let is_comma = keys("Decimal_Separator").is_some_and(|mark| mark.trim() == ",");
+    let decimal = if is_comma { DecimalMark::Comma } else { DecimalMark::Point };
+    let (mut out, mut segment) = (Rows::new(), Segment::default());
+    let (mut in_header, mut has_names) = (true, false);
+    for &(line, text) in &lines[end + 1..] {
+        let cells: Vec<&str> = text.split(separator).map(str::trim).collect();
+        if cells[0] == SEGMENT {
+            (in_header, segment) = (true, Segment::default());
+        }
+        if cells[0] == END {
+            (in_header, has_names) = (false, false);
+        } else if in_header {
+            segment.take(&cells);
+        } else if !has_names {
+            has_names = true;
+            // The names of later segments are those of the first.
+            if out.is_empty() {
+                out.push((line, segment.names(&cells)));
+            }
+        } else {
+            out.push((line, segment.row(&cells, decimal)?));
+        }
+    }
+    Some((out, decimal))
+}
+
+/// What the header of a segment says.
+#[derive(Default)]
+struct Segment<'a> {
+    /// The first time, and the step from row to row.
+    first: &'a str,
+    step: &'a str,
+    units: Vec<&'a str>,
+    rows: u32,
+}
+
+impl<'a> Segment<'a> {
+    fn take(&mut self, cells: &[&'a str]) {
+        match cells {
+            ["X0", first, ..] => self.first = first,
+            ["Delta_X", step, ..] => self.step = step,
+            ["Y_Unit_Label", units @ ..] => self.units = units.to_vec(),
+            _ => {}
+        }
+    }
+
+    /// The names of the columns, each with the unit that the header has for it.
+    fn names(&self, cells: &[&'a str]) -> Vec<Cell<'a>> {
+        let channel = |(place, name): (usize, &&'a str)| match self.units.get(place) {
+            Some(unit) if units::is_unit(unit) && !name.ends_with(')') => Cell::Text(format!("{name} ({unit})").into()),
+            _ => Cell::text(name),
+        };
+        [Cell::text("Time (s)")].into_iter().chain(cells[1..].iter().enumerate().map(channel)).collect()
+    }
+
+    /// The next row behind its time; `None` if the header does not say how rows follow each other.
+    fn row(&mut self, cells: &[&'a str], decimal: DecimalMark) -> Option<Vec<Cell<'a>>> {
+        let step = number(self.step, decimal, 0)?;
+        let first = number(self.first, decimal, 0).unwrap_or(0.0);
+        let decimals = |text: &str| match text.split_once(decimal.character()) {
+            _ if text.contains(['e', 'E']) => MOST_DECIMALS,
+            Some((_, fraction)) => fraction.len().min(MOST_DECIMALS),
+            None => 0,
+        };
+        let decimals = decimals(self.step).max(decimals(self.first));
+        let time = format!("{:.decimals$}", first + step * f64::from(self.rows));
+        self.rows += 1;
+        let time = Cell::Number(time.parse().ok()?);
+        Some([time].into_iter().chain(cells[1..].iter().map(|cell| Cell::text(cell))).collect())
+    }
+}
+
+/// What stands behind a key, whatever separates them.
+fn value<'a>(lines: &[(u64, &'a str)], key: &str) -> Option<&'a str> {
+    let behind = lines.iter().find_map(|(_, line)| line.strip_prefix(key))?;
+    behind.split(['\t', ',']).nth(1).map(str::trim)
+}

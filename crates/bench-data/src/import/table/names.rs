@@ -1,0 +1,162 @@
+//! Lines of names above the data.
+
+use std::borrow::Cow;
+
+use crate::import::bytes::Cell;
+use crate::import::table::data::{Data, Shape};
+use crate::import::table::grid::{Grid, MONITOR_CLOCK, Separator, split};
+use crate::import::table::value::{number_of, value_of};
+use crate::import::words::names::{self, Sureness};
+use crate::import::words::{DecimalMark, Value, is_stamp};
+
+/// Rows that a line of numbers is compared with.
+const ROWS_BELOW: usize = 20;
+
+/// A line of names, one for each column.
+pub(crate) struct Names {
+    pub cells: Vec<String>,
+    /// How many names there are, where that is another number than of columns.
+    pub given: Option<usize>,
+}
+
+impl Data {
+    /// The names in the line above the first of data.
+    pub(crate) fn names_above(&self, grid: &Grid, decimal: DecimalMark, data: usize) -> Option<Names> {
+        let whole = |cells| Names { cells, given: None };
+        self.heading_cells(grid, data.checked_sub(1)?)
+            .or_else(|| self.numbers_as_names(grid, decimal, data))
+            .or_else(|| self.counted_names(grid, decimal, data))
+            .map(whole)
+            .or_else(|| self.some_names(grid, data))
+    }
+
+    /// The cells of a line of names or units, as many as the data has columns; `None` if it is no such line.
+    pub(crate) fn heading_cells(&self, grid: &Grid, row: usize) -> Option<Vec<String>> {
+        let width = self.shape.width;
+        let mut cells = cells_above(grid, row)?;
+        if cells.len() != width {
+            cells = joined_brackets(cells);
+        }
+        while cells.len() > width && cells.last().is_some_and(String::is_empty) {
+            cells.pop();
+        }
+        // A name for remarks, of which there are none.
+        if cells.len() == width + 1 && width > 1 && cells.last().is_some_and(|last| names::role(last, None).is_none()) {
+            cells.pop();
+        }
+        if cells.len() + 1 == width && self.is_numbered && !self.ends_empty {
+            cells.insert(0, String::new());
+        }
+        let texts = cells.iter().filter(|cell| !cell.is_empty()).count();
+        let fits = cells.len() == width || (cells.len() + 1 == width && width > 2);
+        if !fits || !cells.iter().all(|cell| is_heading(cell)) || texts == 0 || (texts == 1 && width > 1) {
+            return None;
+        }
+        cells.resize(width, String::new());
+        Some(cells)
+    }
+
+    /// Names of which all but some are numbers, `length,1,2,3`: words stand where the data has numbers, and no two are alike.
+    pub(crate) fn numbers_as_names(&self, grid: &Grid, decimal: DecimalMark, data: usize) -> Option<Vec<String>> {
+        let above = data.checked_sub(1).filter(|above| grid.comment(*above).is_none())?;
+        let (cells, below) = (grid.cells(above), grid.cells(data));
+        let is_word = |cell: &Cell| matches!(cell, Cell::Text(text) if text.starts_with(char::is_alphabetic));
+        let is_text = |cell: &Cell| value_of(cell, decimal, 0, &[]) == Value::Text;
+        let is_above_a_number = |place: usize| below.get(place).is_some_and(|cell| number_of(cell, decimal).is_some());
+        let words: Vec<usize> =
+            (0..cells.len()).filter(|place| is_word(&cells[*place]) && is_text(&cells[*place])).collect();
+        let names: Vec<String> = cells.iter().map(Cell::to_string).collect();
+        let filled: Vec<&String> = names.iter().filter(|name| !name.is_empty()).collect();
+        let are_alike = filled.iter().enumerate().any(|(i, name)| filled[..i].contains(name));
+        let is_fit = cells.len() == self.shape.width
+            && Shape::of(&cells, decimal).is_worded(self.shape)
+            && words.first() == Some(&0)
+            && words.iter().all(|place| is_above_a_number(*place))
+            && !names.iter().any(|name| is_stamp(name))
+            && !are_alike;
+        is_fit.then_some(names)
+    }
+
+    /// Names that count the columns, from 0 or 1, of which one at least is far from all that stands below it.
+    pub(crate) fn counted_names(&self, grid: &Grid, decimal: DecimalMark, data: usize) -> Option<Vec<String>> {
+        let above = data.checked_sub(1).filter(|above| data < grid.len() && grid.comment(*above).is_none())?;
+        let cells = grid.cells(above);
+        let names: Vec<String> = cells.iter().map(Cell::to_string).collect();
+        let counts = &names[usize::from(names.first().is_some_and(String::is_empty))..];
+        let first = counts.first().and_then(|count| count.parse::<usize>().ok()).filter(|first| *first < 2)?;
+        let is_counted = counts.iter().zip(first..).all(|(count, expected)| *count == expected.to_string());
+        if cells.len() != self.shape.width || counts.len() < 3 || !is_counted {
+            return None;
+        }
+        let far = |place: usize| {
+            let name = names[place].parse::<f64>().ok()?;
+            let below = (data..grid.len())
+                .take(ROWS_BELOW)
+                .filter_map(|row| grid.cells(row).get(place).and_then(|cell| number_of(cell, decimal)).map(f64::abs));
+            Some(below.fold(f64::INFINITY, f64::min) > 2.0 * name.max(1.0))
+        };
+        (0..names.len()).any(|place| far(place) == Some(true)).then_some(names)
+    }
+
+    /// More names than there are columns, or fewer, of which one says what is measured: they are those of the first columns.
+    fn some_names(&self, grid: &Grid, data: usize) -> Option<Names> {
+        let (width, mut cells) = (self.shape.width, cells_above(grid, data.checked_sub(1)?)?);
+        while cells.last().is_some_and(String::is_empty) {
+            cells.pop();
+        }
+        let given = cells.len();
+        let separator = match grid {
+            Grid::Text { separator, .. } => Some(*separator),
+            Grid::Rows(_) => None,
+        };
+        // Names with blanks in them are more than there are.
+        let is_torn = given > width && separator == Some(Separator::Spaces);
+        // Commas may be decimal marks, too.
+        let is_open = 2 * given == width
+            && separator == Some(Separator::Comma)
+            && !grid.cells(data).iter().any(|cell| cell.to_string().contains('.'));
+        let is_quantity = |cell: &String| {
+            let (name, unit) = names::take_apart(cell);
+            matches!(names::role(&name, unit.as_deref()), Some((_, Sureness::Strong)))
+        };
+        let are_names =
+            given > 1 && cells.iter().all(|cell| is_heading(cell)) && cells.iter().take(width).any(is_quantity);
+        if !are_names || is_torn || is_open || 2 * given < width || given > 2 * width {
+            return None;
+        }
+        cells.resize(width, String::new());
+        Some(Names { cells, given: Some(given) })
+    }
+}
+
+/// The cells of a line above the data, of a comment too; the clock of a serial monitor has a name.
+fn cells_above(grid: &Grid, row: usize) -> Option<Vec<String>> {
+    let mut cells: Vec<String> = match (grid.comment(row), grid) {
+        (Some(comment), Grid::Text { separator, .. }) if !comment.contains('=') => {
+            split(comment, *separator).into_iter().map(Cow::into_owned).collect()
+        }
+        (Some(_), _) => return None,
+        (None, _) => grid.cells(row).iter().map(Cell::to_string).collect(),
+    };
+    if let (true, Some(clock)) = (grid.has_monitor_clock(), cells.first_mut()) {
+        MONITOR_CLOCK.clone_into(clock);
+    }
+    Some(cells)
+}
+
+/// True if a cell may be a name: it is no number and no date.
+fn is_heading(cell: &str) -> bool {
+    cell.is_empty() || cell.parse::<f64>().is_err() && !is_stamp(cell)
+}
+
+/// `Time`, `(s)` → `Time (s)`, where blanks separate the names too.
+fn joined_brackets(cells: Vec<String>) -> Vec<String> {
+    let mut out: Vec<String> = Vec::new();
+    for cell in cells {
+        match out.last_mut() {
+            Some(last) if cell.starts_with(['(', '[']) => *last = format!("{last} {cell}"),
+            _ => out.push(cell),
+        }
+    }
+    out
+}

@@ -1,0 +1,112 @@
+//! Rows of a table that are wanted: those with a value in a column, and those of one stretch.
+
+use std::fmt;
+use std::ops::Range;
+use std::str::FromStr;
+
+use crate::error::quote;
+use crate::import::bytes::Cells;
+use crate::import::error::ImportError;
+use crate::import::table::columns::{Column, Table};
+
+/// Values of a column that a message names.
+const MOST_VALUES: usize = 8;
+
+/// The rows in which a value stands in a column: `trial=2`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RowFilter {
+    /// Heading, name or number (from 1) of the column.
+    pub column: String,
+    /// What stands there.
+    pub value: String,
+}
+
+impl fmt::Display for RowFilter {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(out, "{}={}", self.column, self.value)
+    }
+}
+
+impl FromStr for RowFilter {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (column, value) = text.split_once('=').ok_or("expected COLUMN=VALUE")?;
+        Ok(Self { column: column.trim().to_owned(), value: value.trim().to_owned() })
+    }
+}
+
+impl Table {
+    /// The column that a text calls by its heading, its name or its number.
+    pub(crate) fn called(&self, text: &str) -> Option<usize> {
+        let place = |is_it: &dyn Fn(&Column) -> bool| self.columns.iter().position(is_it);
+        let lower = text.to_lowercase();
+        place(&|column| column.heading == text)
+            .or_else(|| place(&|column| column.name == text))
+            .or_else(|| place(&|column| column.heading.to_lowercase() == lower))
+            .or_else(|| text.parse::<usize>().ok()?.checked_sub(1).filter(|place| *place < self.columns.len()))
+    }
+
+    /// Keeps the rows that a filter wants.
+    ///
+    /// # Errors
+    /// If there is no such column, or no such row.
+    pub(crate) fn keep(&mut self, filter: &RowFilter) -> Result<(), ImportError> {
+        let Some(place) = self.called(&filter.column) else {
+            let what = format!("there is no column {} among {}", quote(&filter.column), self.list());
+            return Err(ImportError::question(&self.file, what, ["--where COLUMN=VALUE with one of them".to_owned()]));
+        };
+        let cells = &self.columns[place].cells;
+        let is_it = |cell: &str| cell.trim() == filter.value || is_same_number(cell, &filter.value);
+        let rows: Vec<usize> = (0..self.len()).filter(|row| is_it(cells.get(*row))).collect();
+        if rows.is_empty() {
+            let (name, value) = (self.name(place), quote(&filter.value));
+            let what = format!("column {name} has no {value}, but {}", listed(&self.values(place)));
+            return Err(ImportError::unreadable(&self.file, what));
+        }
+        *self = self.rows(rows.into_iter());
+        Ok(())
+    }
+
+    /// The table with some of its rows.
+    pub(crate) fn stretch(&self, rows: Range<usize>) -> Self {
+        self.rows(rows)
+    }
+
+    fn rows(&self, rows: impl Iterator<Item = usize> + Clone) -> Self {
+        let column = |column: &Column| Column { cells: column.cells.some(rows.clone()), ..without_cells(column) };
+        Self {
+            file: self.file.clone(),
+            layout: self.layout.clone(),
+            metadata: self.metadata.clone(),
+            columns: self.columns.iter().map(column).collect(),
+            lines: rows.clone().map(|row| self.lines[row]).collect(),
+        }
+    }
+
+    /// The values of a column, each once.
+    pub(crate) fn values(&self, place: usize) -> Vec<&str> {
+        let mut values: Vec<&str> = Vec::new();
+        for value in self.columns[place].cells.iter() {
+            if values.len() <= MOST_VALUES && !values.contains(&value) {
+                values.push(value);
+            }
+        }
+        values
+    }
+}
+
+fn without_cells(column: &Column) -> Column {
+    let Column { name, heading, unit, .. } = column;
+    Column { name: name.clone(), heading: heading.clone(), unit: unit.clone(), cells: Cells::default() }
+}
+
+fn is_same_number(cell: &str, value: &str) -> bool {
+    matches!((cell.trim().parse::<f64>(), value.parse::<f64>()), (Ok(cell), Ok(value)) if cell == value)
+}
+
+/// Values for a message.
+fn listed(values: &[&str]) -> String {
+    let shown: Vec<String> = values.iter().take(MOST_VALUES).map(|value| quote(value)).collect();
+    shown.join(", ") + if values.len() > MOST_VALUES { " …" } else { "" }
+}

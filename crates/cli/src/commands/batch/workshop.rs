@@ -1,0 +1,170 @@
+use std::any::Any;
+use std::collections::HashMap;
+use std::fs;
+use std::io;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+use std::time::Instant;
+
+use super::journal::{Entry, Journal, State};
+use super::plan::Job;
+use super::scores::Figures;
+use crate::args::{BatchArgs, Command};
+use crate::commands::evaluate::{self, Evaluation};
+use crate::commands::{calibrate, filter, smooth};
+use crate::error::CliError;
+use crate::input::sha256_of;
+use crate::messages::Messages;
+use crate::output::{Place, UnfinishedFolder};
+use crate::printable::printable;
+use ohmstrain::MADE_BY;
+
+/// Exit code of a program that has met a bug.
+const PANICKED: u8 = 101;
+
+/// Where jobs are done.
+pub struct Workshop<'a> {
+    args: &'a BatchArgs,
+    /// For outputs until they are whole; in the folder of outputs, so that taking their place is a change of name.
+    drafts: UnfinishedFolder,
+    /// Hashes of sensors and priors: many recordings share one.
+    shared: Mutex<HashMap<PathBuf, String>>,
+}
+
+impl<'a> Workshop<'a> {
+    /// In the folder of outputs.
+    pub fn new(args: &'a BatchArgs) -> Result<Self, CliError> {
+        let drafts =
+            UnfinishedFolder::inside(&args.output).map_err(|error| CliError::file("write to", &args.output, &error))?;
+        Ok(Self { args, drafts, shared: Mutex::default() })
+    }
+
+    /// What is known of a job before it begins.
+    pub fn entry(&self, job: &Job) -> Entry {
+        Entry {
+            command: self.args.command.name().to_owned(),
+            files: job.files.clone(),
+            sensor: job.sensor.clone(),
+            flags: job.flags.clone(),
+            made_by: MADE_BY.to_owned(),
+            output: job.output.clone(),
+            ..Entry::default()
+        }
+    }
+
+    /// Adds the hashes of all inputs.
+    ///
+    /// # Errors
+    /// Which one cannot be read.
+    pub fn hash_inputs(&self, job: &Job, entry: &mut Entry) -> Result<(), String> {
+        let unreadable = |file: &Path, error: &io::Error| format!("cannot read {}: {error}", file.display());
+        for file in &job.files {
+            entry.sha256.push(sha256_of(file).map_err(|error| unreadable(file, &error))?);
+        }
+        let shared = |file: &Option<PathBuf>| {
+            let hash = |file: &PathBuf| self.shared_hash(file).map_err(|error| unreadable(file, &error));
+            file.as_ref().map(hash).transpose()
+        };
+        entry.sensor_sha256 = shared(&job.sensor)?;
+        entry.prior_sha256 = shared(&job.prior)?;
+        Ok(())
+    }
+
+    fn shared_hash(&self, path: &Path) -> io::Result<String> {
+        let mut known = self.shared.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(hash) = known.get(path) {
+            return Ok(hash.clone());
+        }
+        let hash = sha256_of(path)?;
+        known.insert(path.to_path_buf(), hash.clone());
+        Ok(hash)
+    }
+
+    /// Does the job, and notes what became of it before its output takes its place.
+    ///
+    /// # Errors
+    /// If the folder of outputs cannot be written.
+    pub fn finish(&self, job: &Job, entry: &mut Entry, journal: &Journal) -> Result<(), CliError> {
+        let start = Instant::now();
+        let path = self.args.output.join(&job.output);
+        let cannot_write = |error: &io::Error| CliError::file("write", &path, error);
+        let draft = self.drafts.path().join(job.output.to_string_lossy().replace(['/', '\\'], "|"));
+        self.run(job, &draft, entry);
+        entry.seconds = start.elapsed().as_secs_f64();
+        // What is found wanting has an output all the same.
+        let wanting = CliError::Check(String::new()).code();
+        if entry.state == State::Done || entry.exit_code == Some(wanting.into()) {
+            entry.output_sha256 = Some(sha256_of(&draft).map_err(|error| cannot_write(&error))?);
+        }
+        journal.note(entry)?;
+        if entry.output_sha256.is_some() {
+            path.parent().map_or(Ok(()), fs::create_dir_all).map_err(|error| cannot_write(&error))?;
+            Place::of(&path).and_then(|place| place.adopt(&draft)).map_err(|error| cannot_write(&error))?;
+        }
+        let _ = fs::remove_file(draft);
+        Ok(())
+    }
+
+    /// Runs the command to its end; its output is in `draft`.
+    fn run(&self, job: &Job, draft: &Path, entry: &mut Entry) {
+        // What is said of a draft holds of what it becomes.
+        let (drafted, published) =
+            (draft.display().to_string(), self.args.output.join(&job.output).display().to_string());
+        let said = |text: &str| printable(text).replace(&drafted, &published);
+        let parsed = match job.parsed(self.args) {
+            Ok(parsed) => parsed,
+            Err(error) => return entry.message = said(&error.to_string()),
+        };
+        let messages = Messages::kept(parsed.verbosity());
+        let done = catch_unwind(AssertUnwindSafe(|| obey(parsed.command, draft, entry, &messages)));
+        entry.warnings = messages.into_warnings().iter().map(|warning| said(warning)).collect();
+        let (code, message) = match done {
+            Ok(Ok(())) => (0, String::new()),
+            Ok(Err(error)) => (error.code(), said(&error.to_string())),
+            Err(panic) => (PANICKED, said(&format!("{}: a bug: {}", job.name(), text_of(panic.as_ref())))),
+        };
+        (entry.exit_code, entry.message) = (Some(code.into()), message);
+        entry.state = if code == 0 { State::Done } else { State::Failed };
+    }
+}
+
+/// Does a command whose output goes to `draft`.
+fn obey(command: Command, draft: &Path, entry: &mut Entry, messages: &Messages) -> Result<(), CliError> {
+    match command {
+        Command::Filter(mut args) => {
+            args.written.output = Some(draft.to_path_buf());
+            entry.rows = Some(filter::run(&args, messages)?);
+        }
+        Command::Smooth(mut args) => {
+            args.written.output = Some(draft.to_path_buf());
+            entry.rows = Some(smooth::run(&args, messages)?);
+        }
+        Command::Evaluate(args) => {
+            let mut evaluation = Evaluation::default();
+            let judged = evaluate::evaluate(&args, messages, &mut evaluation, |evaluation| {
+                let mut text = Vec::new();
+                evaluation.write(&mut text, args.json)?;
+                fs::write(draft, text).map_err(|error| CliError::file("write", draft, &error))
+            });
+            entry.figures = evaluation.recordings().next().map(Figures::of_scores).unwrap_or_default();
+            if matches!(judged, Ok(()) | Err(CliError::Check(_))) {
+                entry.rows = entry.figures.rows;
+            }
+            judged?;
+        }
+        Command::Calibrate(mut args) => {
+            args.output = draft.to_path_buf();
+            let outcome = calibrate::calibrate(&args, messages)?;
+            entry.figures = outcome.findings.as_ref().map(Figures::of_findings).unwrap_or_default();
+        }
+        _ => return Err(CliError::Other("not a command for many recordings".into())),
+    }
+    Ok(())
+}
+
+/// What a panic says.
+fn text_of(panic: &(dyn Any + Send)) -> &str {
+    let text = panic.downcast_ref::<String>().map(String::as_str);
+    text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("it does not say which")
+}
