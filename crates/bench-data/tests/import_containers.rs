@@ -180,10 +180,8 @@ fn numpy(shape: &str, numbers: impl Iterator<Item = f64>) -> Vec<u8> {
 #[test]
 fn arrays_of_numpy() {
     let shape = format!("({ROWS},)");
-    let arrays: [(&str, fn(usize) -> f64); 3] =
-        [("time_s.npy", time_s), ("R_kohm.npy", kiloohm), ("strain.npy", strain)];
-    let mut files: Vec<(&str, Vec<u8>)> =
-        arrays.iter().map(|(name, of)| (*name, numpy(&shape, (0..ROWS).map(of)))).collect();
+    let array = |of: fn(usize) -> f64| numpy(&shape, (0..ROWS).map(of));
+    let mut files = vec![("time_s.npy", array(time_s)), ("R_kohm.npy", array(kiloohm)), ("strain.npy", array(strain))];
     files.push(("rate.npy", numpy("(1,)", [20.0].into_iter())));
     let files: Vec<(&str, &[u8])> = files.iter().map(|(name, bytes)| (*name, bytes.as_slice())).collect();
     has_the_numbers(&import(zip(&files), &Recipe::default()), 0.0);

@@ -1,4 +1,4 @@
-//! Whether recordings are enough to calibrate on.
+//! Least content of recordings that are calibrated on.
 
 use crate::samples::FEWEST_ROWS;
 use crate::{CalibrationError, Samples};
@@ -22,7 +22,7 @@ pub(crate) fn check(recordings: &[Samples]) -> Result<(f64, f64), CalibrationErr
     }
 }
 
-/// Whether the reading never changes.
+/// True if the reading never changes.
 fn is_frozen(samples: &Samples) -> bool {
     let mut readings = samples.complete_rows().map(|k| samples.reading[k]);
     let first = readings.next();

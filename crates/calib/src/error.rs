@@ -60,7 +60,7 @@ pub enum CalibrationError {
     Filter {
         /// Time of the failing row, s.
         time_s: f64,
-        /// What it said.
+        /// Its message.
         source: StepError,
     },
     /// The optimiser failed.
@@ -69,7 +69,7 @@ pub enum CalibrationError {
     /// No filter can be made of the parameters.
     #[error(transparent)]
     Sensor(#[from] SensorError),
-    /// What this version cannot do.
+    /// A request that this version has no form for.
     #[error("{0}")]
     Unsupported(String),
 }

@@ -29,8 +29,7 @@ mod samples;
 mod sd_scale;
 
 pub use baselines::{
-    Baseline, Baselines, Features, Fir, LeakyBank, LowPassMode, PhaseRows, PublishedLaw, Regression, fit_static_cubic,
-    running_cubic,
+    Baseline, Baselines, Features, Fir, LeakyBank, LowPassMode, PhaseRows, PublishedLaw, Regression, running_cubic,
 };
 pub use calibrate::findings::LeftOutRow;
 pub use calibrate::recipe::{RECIPE, Recipe};
@@ -46,7 +45,7 @@ pub use law::compare::{StructureScore, compare_structures};
 pub use law::fit::{CrossFit, LawOptions, fit_law};
 pub use law::identifiability::{Identifiability, identifiability};
 pub use law::structure::{GaugeFamily, LawFit};
-pub use prior::{CorrectionPrior, EstimatorPrior, FEWEST_SENSORS, LawPrior, PRIOR_FORMAT, Prior};
+pub use prior::{CorrectionPrior, EstimatorPrior, LawPrior, PRIOR_FORMAT, Prior};
 pub use recording::holds::{Hold, holds};
 pub use recording::lag::{Lag, LagError, aligned, clock_lag, reference_lag};
 pub use recording::screen::{Distrusted, Doubt, Screened, screen};

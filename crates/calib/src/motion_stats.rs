@@ -111,7 +111,7 @@ impl PhaseDurations {
         self.speeds.extend(rate.iter().filter(|v| phase(**v) != 0).map(|v| v.abs()));
     }
 
-    /// Whether the body rests, and not only for the moment in which it turns around.
+    /// True if the body rests, and not only for the moment in which it turns around.
     fn rests(&self) -> bool {
         let (at_rest, moving): (f64, f64) = (self.holds.iter().sum(), self.moves.iter().sum());
         !self.holds.is_empty() && at_rest >= LEAST_REST * (at_rest + moving)

@@ -131,7 +131,7 @@ impl<'a> Samples<'a> {
         self.time_s.len()
     }
 
-    /// Whether there is no row.
+    /// True if there is no row.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.time_s.is_empty()

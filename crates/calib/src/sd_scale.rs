@@ -3,7 +3,7 @@ use ohmstrain_sensor::LARGEST_SD_SCALE;
 
 /// No narrowing: an easy recording is no promise for the next one.
 const SCALES: std::ops::RangeInclusive<f64> = 1.0..=LARGEST_SD_SCALE;
-/// What has been widened to cover the worst block may be narrowed to cover all of them.
+/// Range of the joint scale: intervals that were widened to cover the worst block may be narrowed to cover all of them.
 const JOINT_SCALES: std::ops::RangeInclusive<f64> = 0.35..=3.0;
 /// Turns in which a factor is found.
 const TURNS: usize = 6;
@@ -12,7 +12,7 @@ const LEVELS: [(usize, f64); 3] = [(50, 0.674_489_750_196_081_7), (90, 1.644_853
 /// Half-width of the 95 % interval of a standard normal.
 pub(crate) const Z_95: f64 = 1.959_963_984_540_054;
 
-/// What the standard deviations are multiplied with so that 95 % of the errors of the worst block lie in the 95 %
+/// Factor on the standard deviations with which 95 % of the errors of the worst block lie in the 95 %
 /// interval, from the errors of each block in units of their deviations: split conformal prediction (Papadopoulos et
 /// al., *ECML* 2002) with the blocks left out.
 ///
@@ -28,7 +28,7 @@ pub(crate) fn sd_scale_up_to(blocks: &[Vec<f64>], widest: f64) -> f64 {
     worst.map_or(1.0, |deviation| (deviation / Z_95).clamp(*SCALES.start(), widest))
 }
 
-/// What the standard deviations are multiplied with so that the 50, 90 and 95 % intervals hold about these shares of all
+/// Factor on the standard deviations with which the 50, 90 and 95 % intervals hold about these shares of all
 /// errors, which are in units of their deviations: the geometric mean of the three factors.
 pub(crate) fn joint_scale(deviations: &[f64]) -> f64 {
     let factor = |(percent, z): (usize, f64)| Some((quantile(deviations, percent)? / z).ln());

@@ -8,7 +8,7 @@ use ohmstrain_calib::{
 };
 use ohmstrain_ekf::Reading;
 use ohmstrain_sensor::{
-    EstimatorKind, LARGEST_SD_SCALE, Quantity, RangeParams, ReadingUnit, SensorError, SensorParams, Start, build_filter,
+    EstimatorKind, LARGEST_SD_SCALE, Quantity, ReadingUnit, SensorError, SensorParams, Start, build_filter,
 };
 
 use super::bench::Bench;
@@ -266,19 +266,6 @@ fn gaps_do_not_bend_the_law() {
     assert!((a.law.rest_readings[0] / b.law.rest_readings[0] - 1.0).abs() < 0.01);
     assert!((a.law.cross_validated_error - b.law.cross_validated_error).abs() < 0.003);
     assert!(b.law.residuals[0][7].is_nan() && b.law.residuals[0][8].is_finite());
-}
-
-#[test]
-fn a_static_cubic_is_a_cubic() {
-    let reading: Vec<f64> = (0..50).map(|k| 1000.0 + 20.0 * f64::from(k)).collect();
-    let strain: Vec<f64> = reading.iter().map(|r| 1e-4 * (r - 1000.0) + 2e-10 * (r - 1000.0_f64).powi(3)).collect();
-    let time_s: Vec<f64> = (0..50).map(f64::from).collect();
-    let samples = Samples::new(&time_s, &reading, &strain).unwrap();
-    let cubic = ohmstrain_calib::fit_static_cubic(&[samples], RangeParams { lower: 0.0, upper: 0.2 }).unwrap();
-    for (r, s) in reading.iter().zip(&strain) {
-        assert!((cubic.strain(*r) - s.min(0.2)).abs() < 1e-12);
-    }
-    assert_eq!(cubic.strain(1e6), 0.2);
 }
 
 #[test]

@@ -1,12 +1,15 @@
 //! The closed forms against the formulas as they are printed, and their gradients against finite differences.
 
 use ohmstrain_calib::closed_form::{
-    Burgers, Datum, Exponentials, Hold, ModulusShape, Moment, Movement, Moving, MovingHold, SeparableLaw,
-    StretchedExponential, TunnellingCurve, value_and_gradient,
+    ClosedForm, Datum, ModulusShape, Moment, Movement, SeparableLaw, value_and_gradient,
 };
 
 const WITH_FLOOR: ModulusShape = ModulusShape { terms: 1, floor: true };
 const TWO_TERMS: ModulusShape = ModulusShape { terms: 2, floor: true };
+
+fn law(of: ClosedForm, modulus: ModulusShape, several_speeds: bool) -> Box<dyn SeparableLaw> {
+    of.law(modulus, several_speeds, 1600.0)
+}
 
 fn moving(elapsed_s: f64) -> Moment {
     Moment { elapsed_s, travel: 0.02 * elapsed_s, rate: 0.02, strain: 0.05 + 0.02 * elapsed_s, before: None }
@@ -33,80 +36,92 @@ fn cases() -> Vec<Case> {
     let start_two = 900.0 * two(|_, tau| (-7.0 / tau).exp()) * 0.14 + 1500.0;
     vec![
         (
-            Box::new(Exponentials::two_rates()),
+            law(ClosedForm::Eq1, ModulusShape::SINGLE, false),
             vec![1500.0, 80.0, 40.0],
             vec![0.9, 0.05],
             at,
             1500.0 + 80.0 * (-0.9 * t).exp() + 40.0 * (-0.05 * t).exp(),
         ),
         (
-            Box::new(Burgers { rest_reading: 1600.0 }),
+            law(ClosedForm::Eq2, ModulusShape::SINGLE, false),
             vec![0.1, 0.2, -1e-3],
             vec![6.0],
             at,
             1600.0 * (1.0 + 0.1 + 0.2 * e(6.0) - 1e-3 * t),
         ),
-        (Box::new(Exponentials::without_floor(2)), vec![70.0, 30.0], vec![2.0, 9.0], at, 70.0 * e(2.0) + 30.0 * e(9.0)),
-        (Box::new(Exponentials::floor_share()), vec![1400.0, 70.0], vec![2.0], at, 70.0 * (e(2.0) + 20.0)),
-        (Box::new(Exponentials::prony(1)), vec![1400.0, 70.0], vec![2.0], at, 1400.0 + 70.0 * e(2.0)),
         (
-            Box::new(StretchedExponential),
+            law(ClosedForm::Eq5 { terms: 2 }, ModulusShape::SINGLE, false),
+            vec![70.0, 30.0],
+            vec![2.0, 9.0],
+            at,
+            70.0 * e(2.0) + 30.0 * e(9.0),
+        ),
+        (law(ClosedForm::Eq6, ModulusShape::SINGLE, false), vec![1400.0, 70.0], vec![2.0], at, 70.0 * (e(2.0) + 20.0)),
+        (
+            law(ClosedForm::Eq7 { terms: 1 }, ModulusShape::SINGLE, false),
+            vec![1400.0, 70.0],
+            vec![2.0],
+            at,
+            1400.0 + 70.0 * e(2.0),
+        ),
+        (
+            law(ClosedForm::Kww, ModulusShape::SINGLE, false),
             vec![1400.0, 70.0],
             vec![2.0, 0.4],
             at,
             1400.0 + 70.0 * (-(t / 2.0).powf(0.4)).exp(),
         ),
         (
-            Box::new(TunnellingCurve),
+            law(ClosedForm::Tunnelling, ModulusShape::SINGLE, false),
             vec![1600.0],
             vec![3.0, 1.5, -4.0],
             at,
             1600.0 * (1.0 + 3.0 * at.strain) * (1.5 * at.strain - 4.0 * at.strain.powi(2)).exp(),
         ),
         (
-            Box::new(Moving { modulus: ModulusShape::SINGLE, several_speeds: true }),
+            law(ClosedForm::Eq8, ModulusShape::SINGLE, true),
             vec![900.0, 40.0, 1500.0],
             vec![5.0],
             at,
             900.0 * e(5.0) * travel + 0.02 * 40.0 + 1500.0,
         ),
         (
-            Box::new(Moving { modulus: TWO_TERMS, several_speeds: false }),
+            law(ClosedForm::Eq8, TWO_TERMS, false),
             vec![300.0, 200.0, 100.0, 1500.0],
             vec![2.0, 11.0],
             at,
             (300.0 * e(2.0) + 200.0 * e(11.0) + 100.0) * travel + 1500.0,
         ),
         (
-            Box::new(Hold { modulus: ModulusShape::SINGLE }),
+            law(ClosedForm::Eq9, ModulusShape::SINGLE, false),
             vec![1500.0, 150.0],
             vec![5.0],
             held,
             0.1 * 1500.0 * e(5.0) + 1500.0 * 0.9,
         ),
         (
-            Box::new(MovingHold { modulus: ModulusShape::SINGLE, several_speeds: false }),
+            law(ClosedForm::Eq8And9, ModulusShape::SINGLE, false),
             vec![900.0, 1500.0],
             vec![5.0, 0.1],
             held,
             start * (0.9 + 0.1 * e(5.0)),
         ),
         (
-            Box::new(MovingHold { modulus: WITH_FLOOR, several_speeds: true }),
+            law(ClosedForm::Eq8And9, WITH_FLOOR, true),
             vec![9000.0, 270.0, 40.0, 1500.0],
             vec![5.0, 0.07],
             held,
             start_floor * (0.9 + 0.1 * (0.3 + 0.7 * e(5.0))),
         ),
         (
-            Box::new(MovingHold { modulus: TWO_TERMS, several_speeds: false }),
+            law(ClosedForm::Eq8And9, TWO_TERMS, false),
             vec![9000.0, 180.0, 1500.0],
             vec![2.0, 11.0, 0.05, 0.03],
             held,
             start_two * (0.9 + 0.1 * (0.5 * e(2.0) + 0.3 * e(11.0) + 0.2)),
         ),
         (
-            Box::new(MovingHold { modulus: TWO_TERMS, several_speeds: false }),
+            law(ClosedForm::Eq8And9, TWO_TERMS, false),
             vec![9000.0, 180.0, 1500.0],
             vec![2.0, 11.0, 0.05, 0.03],
             at,
@@ -156,24 +171,12 @@ fn gradients_are_slopes() {
 fn derived_quantities_are_slopes_too() {
     let data = [moving(1.0), holding(2.0), holding(9.0)].map(|at| Datum { at, reading: 0.0 });
     let cases: Vec<(Box<dyn SeparableLaw>, Vec<f64>, usize)> = vec![
-        (Box::new(Exponentials::floor_share()), vec![1400.0, 70.0, 2.0], 2),
-        (
-            Box::new(Moving { modulus: TWO_TERMS, several_speeds: false }),
-            vec![300.0, 200.0, 100.0, 1500.0, 2.0, 11.0],
-            4,
-        ),
-        (Box::new(Hold { modulus: ModulusShape::SINGLE }), vec![1500.0, 150.0, 5.0], 2),
-        (Box::new(Hold { modulus: TWO_TERMS }), vec![1500.0, 150.0, 70.0, 5.0, 30.0], 3),
-        (
-            Box::new(MovingHold { modulus: ModulusShape::SINGLE, several_speeds: true }),
-            vec![900.0, 40.0, 1500.0, 5.0, 0.1],
-            3,
-        ),
-        (
-            Box::new(MovingHold { modulus: TWO_TERMS, several_speeds: true }),
-            vec![9000.0, 180.0, 40.0, 1500.0, 2.0, 11.0, 0.05, 0.03],
-            4,
-        ),
+        (law(ClosedForm::Eq6, ModulusShape::SINGLE, false), vec![1400.0, 70.0, 2.0], 2),
+        (law(ClosedForm::Eq8, TWO_TERMS, false), vec![300.0, 200.0, 100.0, 1500.0, 2.0, 11.0], 4),
+        (law(ClosedForm::Eq9, ModulusShape::SINGLE, false), vec![1500.0, 150.0, 5.0], 2),
+        (law(ClosedForm::Eq9, TWO_TERMS, false), vec![1500.0, 150.0, 70.0, 5.0, 30.0], 3),
+        (law(ClosedForm::Eq8And9, ModulusShape::SINGLE, true), vec![900.0, 40.0, 1500.0, 5.0, 0.1], 3),
+        (law(ClosedForm::Eq8And9, TWO_TERMS, true), vec![9000.0, 180.0, 40.0, 1500.0, 2.0, 11.0, 0.05, 0.03], 4),
     ];
     for (law, parameters, split) in cases {
         let derive = |parameters: &[f64]| law.derived(&parameters[..split], &parameters[split..], &data);
@@ -202,7 +205,7 @@ fn derived_quantities_are_slopes_too() {
 
 #[test]
 fn products_are_taken_apart() {
-    let law = MovingHold { modulus: TWO_TERMS, several_speeds: false };
+    let law = law(ClosedForm::Eq8And9, TWO_TERMS, false);
     let data = [Datum { at: holding(2.0), reading: 0.0 }];
     let derived = law.derived(&[9000.0, 180.0, 1500.0], &[2.0, 11.0, 0.05, 0.03], &data);
     let start = 900.0 * (0.5 * (-3.5_f64).exp() + 0.3 * (-7.0_f64 / 11.0).exp() + 0.2) * 0.14 + 1500.0;

@@ -9,7 +9,7 @@ use super::cost::{Cost, cost};
 use super::plan::Plan;
 use super::reduced::Rows;
 
-/// What a filter may cost.
+/// Largest cost of a filter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Budget {
     instructions: usize,
@@ -45,7 +45,7 @@ impl FromStr for Budget {
 }
 
 impl Budget {
-    /// Whether a filter costs no more.
+    /// True if a filter costs no more.
     const fn allows(&self, cost: &Cost) -> bool {
         cost.instructions <= self.instructions && cost.flash <= self.flash && cost.ram() <= self.ram
     }
@@ -86,7 +86,7 @@ const fn rows(mean: usize, variance: usize) -> Left {
     Left::Some(Rows { mean, variance })
 }
 
-/// What fits of a sensor's default, what is best by the table first.
+/// Plans of a sensor's default that fit, the best by the table first.
 ///
 /// # Errors
 /// If the sensor has no exported form, or nothing fits.
@@ -106,7 +106,7 @@ pub fn fitting(params: &SensorParams, budget: &Budget, dt_s: f64) -> Result<Vec<
     }
 }
 
-/// What there is of a sensor's default, the best first.
+/// Plans of a sensor's default, the best first.
 fn plans(params: &SensorParams) -> Vec<Plan> {
     let kind = params.filter_of(params.default_estimator);
     let is_corrected = params.default_estimator == EstimatorKind::Corrected;

@@ -17,7 +17,7 @@ pub struct CorrectionConstants {
     /// Offset and slope of each low-pass' start.
     starts: Vec<[Literal; 2]>,
     time_constants_s: Vec<Literal>,
-    /// What low-passes forget in the usual time between readings, and the mean over it.
+    /// Decay of the low-passes in the usual time between readings, and the mean over it.
     decays: Vec<Literal>,
     mean_decays: Vec<Literal>,
     rows: RowConstants,
@@ -68,7 +68,7 @@ struct ProcessConstants {
     explained: Vec<Vec<Literal>>,
 }
 
-/// What simulated rows say.
+/// The process of simulated rows.
 #[derive(Debug, Serialize)]
 struct SimulatedConstants {
     rows: RowConstants,

@@ -27,13 +27,13 @@ pub struct Cost {
 }
 
 impl Cost {
-    /// What memory a filter takes while it runs, bytes.
+    /// Memory that a filter takes while it runs, bytes.
     pub const fn ram(&self) -> usize {
         self.state + self.stack
     }
 }
 
-/// What a kind of filter costs without a correction.
+/// Cost of a kind of filter without a correction.
 struct OfKind {
     /// Instructions of a step; and for each hypothesis that is moved on, for each of its branches, for a curve with an
     /// exponential.
@@ -134,7 +134,7 @@ impl Cost {
     }
 }
 
-/// What a sensor's filter costs, its work counted over the motion of the self-test.
+/// Cost of a sensor's filter, its work counted over the motion of the self-test.
 ///
 /// # Errors
 /// If it has no exported form.

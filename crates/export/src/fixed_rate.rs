@@ -24,7 +24,7 @@ pub struct FixedRate<'a, const B: usize, const N: usize> {
     pub hypotheses: usize,
     /// Everything else.
     pub parts: Parts<'a>,
-    /// What depends on the length of a step.
+    /// Constants that depend on the length of a step.
     pub table: StepTable,
 }
 
@@ -82,7 +82,7 @@ impl<'a, const B: usize, const N: usize> FixedRate<'a, B, N> {
         rest_reading * (measured / rested)
     }
 
-    /// Whether a sensor that has just been rested may be unstretched.
+    /// True if a sensor that has just been rested may be unstretched.
     pub fn rests_at_zero(&self) -> bool {
         may_be_unstretched(&self.narrow().limits)
     }
@@ -102,7 +102,7 @@ impl<'a, const B: usize, const N: usize> FixedRate<'a, B, N> {
         lengths.take_while(|length_s| f64::from(*length_s) < LONGEST_PAUSE_S).collect()
     }
 
-    /// What depends on the length of a step, as the exported program has it.
+    /// Constants that depend on the length of a step, as the exported program has them.
     pub fn interpolated(&self) -> Numbers<'_, f32> {
         let known: Vec<(f32, Vec<f32>)> = [self.usual_step_s(), 0.0]
             .into_iter()
@@ -125,7 +125,7 @@ impl<'a, const B: usize, const N: usize> FixedRate<'a, B, N> {
         Numbers { of: Box::new(of), length_s: |dt_s| (dt_s * 1e9).round() * 1e-9 }
     }
 
-    /// What depends on the length of a step, s, rounded.
+    /// Constants that depend on the length of a step, s, rounded.
     pub fn numbers_at(&self, step_s: f32) -> Vec<f32> {
         let numbers = exact_numbers(&self.reference, self.parts.phases, step_s.into());
         numbers.map_or_else(|_| self.table.at(step_s), |all| all.iter().map(|x| *x as f32).collect())

@@ -1,6 +1,6 @@
 //! A calibrated sensor's filter as source code for a microcontroller: C99 with a self-test, or constants in Rust.
 //!
-//! What is exported computes in `f32`, at a fixed rate, operation by operation as the Rust filter does (`twin`); the same sensor and interval give the same files.
+//! Exported code computes in `f32`, at a fixed rate, operation by operation as the Rust filter does (`twin`); the same sensor and interval give the same files.
 
 mod arithmetic;
 mod budget;
@@ -60,7 +60,7 @@ pub enum ExportError {
     /// The sensor has something that the exported filter has no form for.
     #[error("{what}; {instead}")]
     Unsupported {
-        /// What it has.
+        /// The part of the sensor.
         what: String,
         /// How to get a sensor file without it.
         instead: &'static str,
@@ -113,7 +113,7 @@ const C: [Template; 10] = [
     ("README.md", include_str!("templates/readme_c.md")),
 ];
 
-/// What `ohmstrain.c` includes.
+/// Files that `ohmstrain.c` includes.
 const C_PARTS: [Template; 2] = [
     ("hypotheses.c", include_str!("templates/hypotheses.c")),
     ("correction.c", include_str!("templates/correction.c")),

@@ -1,4 +1,4 @@
-//! What of a sensor's filter is exported: all of it, or less for a small chip.
+//! Plan of an exported filter: all of the sensor's, or less for a small chip.
 
 use ohmstrain_sensor::{EstimatorKind, HYPOTHESES, PortableFilter, SensorParams};
 
@@ -6,7 +6,7 @@ use super::quadratic::OwnedQuadratic;
 use super::reduced::{Rows, reduced};
 use super::{ExportError, parameter};
 
-/// What of a filter is exported.
+/// Parts of a filter that are exported.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Plan {
     /// The estimator; the sensor's default if `None`.
@@ -21,12 +21,12 @@ pub struct Plan {
 pub struct ChipFilter {
     /// The filter, with as many hypotheses and rows as are left.
     pub filter: PortableFilter,
-    /// What stands for the other rows, of the direct and of the residual process.
+    /// Stand-in for the other rows, of the direct and of the residual process.
     pub quadratics: Option<[OwnedQuadratic; 2]>,
 }
 
 impl ChipFilter {
-    /// What is left of a sensor's filter.
+    /// A sensor's filter, as far as it is exported.
     ///
     /// # Errors
     /// If the sensor has no parameters for it, or its correction cannot do with fewer rows.
@@ -44,13 +44,13 @@ impl ChipFilter {
         Ok(Self { filter, quadratics })
     }
 
-    /// Whether it is less than what a computer runs.
+    /// True if it is less than what a computer runs.
     pub fn is_smaller(&self) -> bool {
         let has_fewer = self.filter.kind != EstimatorKind::Ekf && self.filter.hypotheses < HYPOTHESES;
         has_fewer || self.quadratics.is_some()
     }
 
-    /// What is left, in words.
+    /// The plan in words.
     pub fn words(&self) -> String {
         let name = self.filter.kind.name();
         let filter = match self.filter.hypotheses {

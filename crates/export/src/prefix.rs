@@ -1,10 +1,10 @@
 use std::str::FromStr;
 
-/// What the names in exported C code begin with: two sensors in one program have names of their own.
+/// Prefix of the names in exported C code: two sensors in one program have names of their own.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Prefix(String);
 
-/// What templates are written with.
+/// Prefix that the templates are written with.
 const WRITTEN: &str = "ohmstrain";
 
 impl Default for Prefix {

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 use ohmstrain_ekf::correction::Quadratic;
 
-/// What a [`Quadratic`] borrows.
+/// Owned numbers of a [`Quadratic`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct OwnedQuadratic<T = f64> {
     /// Of the inputs.

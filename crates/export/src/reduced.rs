@@ -103,7 +103,7 @@ fn kernels(of: &Process, which: Which, a: &[&Row], b: &[&Row]) -> DMatrix<f64> {
     })
 }
 
-/// What the first few of the inducing rows explain.
+/// Part of the variance that the first few inducing rows explain.
 fn explained(full: &Process, which: Which, rows: &[&Row], few: usize) -> Option<OwnedTriangle<f64>> {
     let inducing = full.explained.side();
     let triangle = DMatrix::from_row_iterator(inducing, inducing, full.explained.rows().into_iter().flatten());

@@ -1,4 +1,4 @@
-//! What depends on the time between two readings: tabulated, since clocks jitter and readings get lost.
+//! Constants of steps of several lengths: tabulated, since clocks jitter and readings get lost.
 
 use ohmstrain_ekf::Real;
 

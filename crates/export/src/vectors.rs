@@ -1,4 +1,4 @@
-//! What the Rust filters make of a short motion: what the exported filter must make of it too.
+//! Output of the Rust filters over a short motion, which the exported filter must have too.
 
 use ohmstrain_ekf::live::SensorEstimator;
 use ohmstrain_ekf::{Reading, Real, StepError};
@@ -41,7 +41,7 @@ pub struct Input {
     pub reading_sd: f32,
 }
 
-/// What a prediction takes of the instructions of a step with a reading.
+/// Share of the instructions of a step with a reading that a prediction takes.
 const PREDICTION: f64 = 0.75;
 
 /// Rows at the end for which the sensor rests, and what it reads then over what it read in calibration: another day.
@@ -126,7 +126,7 @@ fn readings<const B: usize, const N: usize>(sensor: &FixedRate<'_, B, N>) -> Vec
     inputs
 }
 
-/// What the rested sensor reads on another day.
+/// Resistance at rest on another day.
 fn rested_elsewhere<const B: usize, const N: usize>(sensor: &FixedRate<'_, B, N>) -> f32 {
     sensor.narrow().rested * ANOTHER_DAY
 }

@@ -104,7 +104,7 @@ pub struct OwnedCorrection<T: 'static, const D: usize, const S: usize = 0> {
     pub direct: OwnedProcess<T, D>,
     /// Strain from the features of one side of time.
     pub one_sided: [OwnedOneSided<T, D>; S],
-    /// What the filter's strain lacks, from all inputs.
+    /// Residual process: the error of the filter's strain, from all inputs.
     pub residual: OwnedProcess<T, D>,
     /// Strain from the features, by rows of simulated motions.
     pub simulated: Option<OwnedSimulated<T, D>>,
@@ -123,7 +123,7 @@ pub struct OwnedSimulated<T: 'static, const D: usize> {
     pub rows: OwnedRows<T, D>,
     /// Scales of the inputs.
     pub scales: [InputScale<T>; D],
-    /// What the rows say.
+    /// Process of the rows.
     pub process: OwnedProcess<T, D>,
 }
 
@@ -178,7 +178,7 @@ impl<T: Real> OwnedTriangle<T> {
 /// A [`OneSided`] with everything that it borrows.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OwnedOneSided<T: 'static, const D: usize> {
-    /// What it says.
+    /// The process.
     pub process: OwnedProcess<T, D>,
     /// The input that the linear part of its kernel takes.
     pub first: usize,
@@ -206,7 +206,7 @@ pub(crate) fn side_of(entries: usize) -> usize {
 pub struct OwnedProcess<T: 'static, const D: usize> {
     /// Weight of each training row.
     pub weights: Vec<T>,
-    /// What the inducing rows explain.
+    /// Part of the variance that the inducing rows explain.
     pub explained: OwnedTriangle<T>,
     /// Its other numbers.
     pub numbers: Process<'static, T, D>,

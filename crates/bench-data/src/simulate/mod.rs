@@ -34,4 +34,4 @@ pub use protocol::{Protocol, UnknownProtocol};
 pub use settings::{SettingsError, SimulationSettings};
 
 /// Length of the simulated sensor at rest, mm.
-pub const GAUGE_LENGTH_MM: f64 = 30.0;
+const GAUGE_LENGTH_MM: f64 = 30.0;

@@ -17,7 +17,8 @@ pub use leaky_bank::LeakyBank;
 pub use low_pass_mode::LowPassMode;
 pub use published::{PhaseRows, PublishedLaw};
 pub use regression::{Features, Regression};
-pub use static_cubic::{fit_static_cubic, running_cubic};
+pub(crate) use static_cubic::fit_static_cubic;
+pub use static_cubic::running_cubic;
 
 use crate::CalibrationError;
 use crate::enough::check;

@@ -9,7 +9,7 @@ use crate::law::regression::VALIDATION_BLOCKS;
 use crate::samples::Samples;
 use ohmstrain_sensor::RangeParams;
 
-/// What a linear regression of strain sees of the readings up to now.
+/// Features of the readings up to now, for a linear regression of strain.
 pub trait Features: Clone {
     /// The regressors at `time_s`, the constant 1 first. `reading` is known, and scaled to be within ±1 where the
     /// regression was fitted. Times increase.

@@ -40,3 +40,21 @@ impl Baseline for RunningCubic {
         self.held.next(reading.is_finite().then(|| self.cubic.strain(reading)))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_static_cubic_is_a_cubic() {
+        let reading: Vec<f64> = (0..50).map(|k| 1000.0 + 20.0 * f64::from(k)).collect();
+        let strain: Vec<f64> = reading.iter().map(|r| 1e-4 * (r - 1000.0) + 2e-10 * (r - 1000.0_f64).powi(3)).collect();
+        let time_s: Vec<f64> = (0..50).map(f64::from).collect();
+        let samples = Samples::new(&time_s, &reading, &strain).unwrap();
+        let cubic = fit_static_cubic(&[samples], RangeParams { lower: 0.0, upper: 0.2 }).unwrap();
+        for (r, s) in reading.iter().zip(&strain) {
+            assert!((cubic.strain(*r) - s.min(0.2)).abs() < 1e-12);
+        }
+        assert_eq!(cubic.strain(1e6), 0.2);
+    }
+}

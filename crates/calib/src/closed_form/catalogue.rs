@@ -15,31 +15,31 @@ const MOST_TERMS: usize = 4;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ClosedForm {
-    /// `eq1`: [`Exponentials::two_rates`].
+    /// `eq1`: `R∞ + r₁ exp(-λ₁ t) + r₂ exp(-λ₂ t)`; λ in 1/s, λ₁ > λ₂.
     Eq1,
-    /// `eq2`: [`Burgers`].
+    /// `eq2`, Burgers: `R/R₀ - 1 = a + b exp(-t/τ) + c t`, in units of the reading.
     Eq2,
-    /// `eq5:N`: [`Exponentials::without_floor`]; two terms if N is left out.
+    /// `eq5:N`: `Σ Aᵢ exp(-t/τᵢ)`, no floor; two terms if N is left out.
     Eq5 {
         /// Number of exponentials.
         terms: usize,
     },
-    /// `eq6`: [`Exponentials::floor_share`].
+    /// `eq6`: `s (exp(-t/τ) + E₀)`, with the scale s that turns a modulus into a reading.
     Eq6,
-    /// `eq7:N` and `prony:N`: [`Exponentials::prony`]; two terms if N is left out.
+    /// `eq7:N` and `prony:N`, a Prony series: `E∞ + Σ Eᵢ exp(-t/τᵢ)`, in units of the reading; two terms if N is left out.
     Eq7 {
         /// Number of exponentials.
         terms: usize,
     },
-    /// `eq8`: [`Moving`].
+    /// `eq8`, a movement: `R = r₀ E(t) v t + v η + r₁`, E the modulus relative to its start.
     Eq8,
-    /// `eq9`: [`Hold`].
+    /// `eq9`, a hold: `R′ = R₀ + Σ r₀′ R₀ Eᵢ (exp(-t/τᵢ) - 1)`, R₀ the reading at its start.
     Eq9,
-    /// `eq8+eq9`: [`MovingHold`].
+    /// `eq8+eq9`: a movement and the hold after it, which share the modulus.
     Eq8And9,
-    /// `kww`: [`StretchedExponential`].
+    /// `kww`, a stretched exponential (Kohlrausch-Williams-Watts): `R∞ + r exp(-(t/τ)^β)`.
     Kww,
-    /// `tunnelling`: [`TunnellingCurve`].
+    /// `tunnelling`: `R₀ (1 + C ε) exp(A ε + W ε²)`, C ≥ 0.
     Tunnelling,
 }
 
@@ -55,7 +55,7 @@ impl fmt::Display for ModulusShape {
 }
 
 impl ClosedForm {
-    /// Whether the law has a modulus that can be chosen.
+    /// True if the law has a modulus that can be chosen.
     #[must_use]
     pub const fn has_modulus(self) -> bool {
         matches!(self, Self::Eq8 | Self::Eq9 | Self::Eq8And9)

@@ -7,7 +7,7 @@ use super::search::{Extent, Search};
 pub struct ModulusShape {
     /// Number of exponentials, at least 1.
     pub terms: usize,
-    /// Whether it relaxes to a floor instead of to nothing; more than one term always has one.
+    /// True if it relaxes to a floor instead of to nothing; more than one term always has one.
     pub floor: bool,
 }
 

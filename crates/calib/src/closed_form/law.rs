@@ -87,7 +87,7 @@ pub trait SeparableLaw {
     /// Writes φⱼ to `values[j]` and ∂φⱼ/∂θₖ to `slopes[j * θ.len() + k]`. Both come filled with zeros.
     fn basis(&self, theta: &[f64], at: &Moment, values: &mut [f64], slopes: &mut [f64]);
 
-    /// What is known of the reading without any parameter.
+    /// Part of the reading that is known without any parameter.
     fn offset(&self) -> f64 {
         0.0
     }
@@ -95,7 +95,7 @@ pub trait SeparableLaw {
     /// Brings terms that may change places into their order, fastest first.
     fn order(&self, _weights: &mut [f64], _theta: &mut [f64]) {}
 
-    /// What follows from the parameters.
+    /// Parameters that are derived from the fitted ones.
     fn derived(&self, _weights: &[f64], _theta: &[f64], _data: &[Datum]) -> Vec<Derived> {
         Vec::new()
     }
@@ -104,10 +104,11 @@ pub trait SeparableLaw {
 /// Reading of a law and its gradient with respect to all parameters, the linear ones first.
 ///
 /// ```
-/// use ohmstrain_calib::closed_form::{Exponentials, Moment, value_and_gradient};
+/// use ohmstrain_calib::closed_form::{ClosedForm, ModulusShape, Moment, value_and_gradient};
 /// // R∞ = 1, r = 2, τ = 3 s at t = 3 s: 1 + 2/e.
 /// let at = Moment { elapsed_s: 3.0, ..Moment::default() };
-/// let (value, gradient) = value_and_gradient(&Exponentials::prony(1), &[1.0, 2.0], &[3.0], &at);
+/// let law = ClosedForm::Eq7 { terms: 1 }.law(ModulusShape::SINGLE, false, 1600.0);
+/// let (value, gradient) = value_and_gradient(law.as_ref(), &[1.0, 2.0], &[3.0], &at);
 /// assert!((value - 1.735_758_882).abs() < 1e-9);
 /// assert!((gradient[1] - 0.367_879_441).abs() < 1e-9);
 /// ```

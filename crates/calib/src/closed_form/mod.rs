@@ -25,13 +25,9 @@ mod tunnelling;
 
 pub use catalogue::ClosedForm;
 pub use datum::{Datum, Moment, Movement};
-pub use exponentials::{Burgers, Exponentials, ModulusShape};
+pub use exponentials::ModulusShape;
 pub use fit::fit_closed_form;
 pub use law::{ClosedFormError, Derived, Parameter, SeparableLaw, Unit, value_and_gradient};
-pub use moving::{Hold, Moving};
-pub use moving_hold::MovingHold;
 pub use pieces::{hold_data, moving_data, whole_data};
 pub use search::{Extent, Search};
 pub use statistics::{ClosedFormFit, Estimated};
-pub use stretched::StretchedExponential;
-pub use tunnelling::TunnellingCurve;

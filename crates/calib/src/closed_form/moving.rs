@@ -10,7 +10,7 @@ use super::search::{Extent, Search};
 pub struct Moving {
     /// The modulus E(t); the paper's own has one term and no floor.
     pub modulus: ModulusShape,
-    /// Whether the data have several speeds. At one speed `v η` and `r₁` cannot be told apart and are one parameter.
+    /// True if the data have several speeds. At one speed `v η` and `r₁` cannot be told apart and are one parameter.
     pub several_speeds: bool,
 }
 

@@ -15,7 +15,7 @@ use super::search::{Extent, Search};
 pub struct MovingHold {
     /// The modulus E(t), shared.
     pub modulus: ModulusShape,
-    /// Whether the data have several speeds; see [`super::Moving::several_speeds`].
+    /// True if the data have several speeds; see [`Moving`](super::moving::Moving).
     pub several_speeds: bool,
 }
 

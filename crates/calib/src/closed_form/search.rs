@@ -8,7 +8,7 @@ const SHORTEST_STEPS: f64 = 0.3;
 /// Longest time constant, in durations: the bend of the exponential is then 1/60 of its fall.
 const LONGEST_DURATIONS: f64 = 30.0;
 
-/// What the data span.
+/// Extent of the data.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Extent {
     /// Typical time between readings, s.
@@ -70,11 +70,11 @@ pub struct Search {
     pub low: f64,
     /// Largest value.
     pub high: f64,
-    /// Whether to step in its logarithm; the limits are then positive.
+    /// True if the search steps in its logarithm; the limits are then positive.
     pub logarithmic: bool,
     /// Values to start from, ascending.
     pub starts: Vec<f64>,
-    /// Whether it may change places with the parameter before, so that only starts above that one's are tried.
+    /// True if it may change places with the parameter before, so that only starts above that one's are tried.
     pub above_previous: bool,
 }
 
@@ -95,7 +95,7 @@ impl Search {
         if self.logarithmic { (coordinate.exp(), coordinate.exp()) } else { (coordinate, 1.0) }
     }
 
-    /// Whether a value stands at a limit, as far as the optimiser's steps resolve it.
+    /// True if a value stands at a limit, as far as the optimiser's steps resolve it.
     pub(super) fn at_limit(&self, value: f64) -> bool {
         let (low, high, x) = (self.coordinate(self.low), self.coordinate(self.high), self.coordinate(value));
         (x - low).min(high - x) <= 1e-6 * (high - low)

@@ -20,7 +20,7 @@ pub struct Estimated {
     pub value: f64,
     /// Its standard error; `None` if the data do not tell the parameter, or if it stands at a limit of its search.
     pub standard_error: Option<f64>,
-    /// Whether it stands at a limit of its search: the data ask for a value beyond.
+    /// True if it stands at a limit of its search: the data ask for a value beyond.
     pub at_limit: bool,
 }
 
@@ -29,7 +29,7 @@ pub struct Estimated {
 pub struct ClosedFormFit {
     /// The parameters, linear ones first.
     pub parameters: Vec<Estimated>,
-    /// What follows from them.
+    /// Derived parameters.
     pub derived: Vec<Estimated>,
     /// Covariance of the parameters, `σ² (JᵀJ)⁻¹`; NaN where a parameter has no standard error.
     pub covariance: DMatrix<f64>,
@@ -54,7 +54,7 @@ pub struct ClosedFormFit {
     pub residual_autocorrelation: f64,
     /// Condition of the Jacobian with columns of length one.
     pub condition: f64,
-    /// Whether the optimiser reported convergence.
+    /// True if the optimiser reported convergence.
     pub converged: bool,
 }
 

@@ -45,7 +45,7 @@ pub(crate) struct GaussianProcess {
     targets: DVector<f64>,
 }
 
-/// What is said of a row by the process without the row's block, in the unit of the target.
+/// Prediction of a row by the process without the row's block, in the unit of the target.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LeftOutRow {
     pub mean: f64,
@@ -116,7 +116,7 @@ impl GaussianProcess {
         self.scale * self.size * self.size
     }
 
-    /// What the process says of every row without the row's block, in closed form from the inverse covariance (Rasmussen &
+    /// Predicts every row without the row's block, in closed form from the inverse covariance (Rasmussen &
     /// Williams, *Gaussian Processes for Machine Learning*, 2006, eq. 5.12, for blocks). Blocks are of rows in order.
     pub(crate) fn left_out(&self, blocks: usize) -> Option<Vec<LeftOutRow>> {
         let n = self.targets.len();

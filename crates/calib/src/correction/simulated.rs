@@ -1,4 +1,4 @@
-//! What the law says of motions that the sensor was not seen in: strain from features of simulated readings, by a few rows that
+//! Strain from features of readings that the law gives in simulated motions, which the sensor was not seen in: by a few rows that
 //! stand for thousands.
 
 use std::ops::Range;
@@ -70,7 +70,7 @@ fn chosen(rows: usize) -> impl Iterator<Item = usize> {
     (0..count).map(move |k| k * rows / count)
 }
 
-/// What rows say where those that stand for them are, by a subset of regressors (Quiñonero-Candela & Rasmussen, *J. Mach. Learn.
+/// Values of the process at the rows that stand for all, by a subset of regressors (Quiñonero-Candela & Rasmussen, *J. Mach. Learn.
 /// Res.* 6 (2005) 1939), and the standard deviation of what that leaves.
 fn distilled(inputs: &[&[f64]], strain: &[f64], centre: f64) -> Option<(Vec<f64>, f64)> {
     let chosen: Vec<&[f64]> = chosen(inputs.len()).map(|k| inputs[k]).collect();
@@ -118,7 +118,7 @@ impl Prepared<'_, FILTER_INPUTS> {
         Some(SimulatedParams { mean, sd: (of.sd.powi(2) + worst).sqrt(), length: LENGTH, weights, rows })
     }
 
-    /// What the simulated rows say of each judged row.
+    /// Prediction of each judged row from the simulated ones.
     pub(super) fn heard(&self, of: &SimulatedParams) -> Vec<Gaussian<f64>> {
         let variance = of.sd.powi(2);
         self.said(&of.rows, &of.weights).map(|mean| Gaussian { mean, variance }).collect()

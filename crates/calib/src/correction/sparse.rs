@@ -139,7 +139,7 @@ impl Sums {
         Self::white(noise) + OFFSET * OFFSET
     }
 
-    /// What is said of every row without its recording; the prior of a variance of 1.
+    /// Predicts every row without its recording; the prior of a variance of 1.
     pub(super) fn left_out(&self, noise: f64) -> Option<Vec<LeftOutRow>> {
         let m = self.few.nrows();
         let among = self.few.clone().cholesky()?.inverse();

@@ -1,4 +1,4 @@
-//! What to record next, as motions of a rig: what moves, how fast, how long. Speeds are said as the duration of a stroke over the
+//! Advice on the next recording, as motions of a rig: what moves, how fast, how long. Speeds are said as the duration of a stroke over the
 //! whole range, so that they hold for strains and angles.
 
 use nalgebra::{Cholesky, DMatrix};
@@ -67,7 +67,7 @@ fn both_directions(stats: &MotionStats, stroke_s: f64) -> Option<String> {
         .then(|| format!("stretch as often as you release: up to the largest strain, in {stroke} a stroke"))
 }
 
-/// What is left out to test a law must be a motion, too.
+/// A block that is left out to test a law must be a motion, too.
 fn enough_strokes(stats: &MotionStats, range: RangeParams, stroke_s: f64) -> Option<String> {
     let strokes = (stats.distances[0] + stats.distances[1]) / range.span().max(f64::MIN_POSITIVE);
     if strokes < FEWEST_STROKES {
@@ -225,7 +225,7 @@ mod tests {
         }
     }
 
-    /// What a recording lacks, and the motion that mends it.
+    /// A lack of a recording, and the motion that mends it.
     #[test]
     fn what_is_lacking_is_asked_for() {
         let with = |distances, longest_s| MotionStats { distances, longest_s, ..stats(0.0) };

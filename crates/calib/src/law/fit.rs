@@ -8,7 +8,7 @@ use crate::optimise;
 use crate::samples::Samples;
 use ohmstrain_sensor::{EstimatorKind, MOST_BRANCHES};
 
-/// What the fit of the law may choose from.
+/// Structure of a law: gauge family and number of branches.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LawOptions {
     /// Number of branches, 0 to 4.
@@ -24,7 +24,7 @@ impl Default for LawOptions {
 }
 
 impl LawOptions {
-    /// What a calibration for this estimator chooses from unless somebody asks for one structure: one to three branches for
+    /// Structures that a calibration for this estimator chooses from unless somebody asks for one: one to three branches for
     /// those that were seen to gain from the choice, two for the others.
     #[must_use]
     pub const fn candidates(kind: EstimatorKind) -> &'static [Self] {

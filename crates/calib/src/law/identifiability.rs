@@ -13,7 +13,7 @@ use crate::motion_stats::MotionStats;
 use crate::samples::Samples;
 use ohmstrain_sensor::{LawParams, Uncertainty};
 
-/// What recordings say about the parameters of a law, and what to record so that they say more.
+/// Identifiability of a law's parameters from recordings, and what to record so that they tell more.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Identifiability {
     /// Parameters by least squares without a ridge, with standard errors by the block jackknife.
@@ -25,7 +25,7 @@ pub struct Identifiability {
     pub condition_number: f64,
     /// Time constants that end on a bound.
     pub on_bound: Vec<OnBound>,
-    /// What to record next, in words; empty if nothing stands out.
+    /// Advice on the next recording, in words; empty if nothing stands out.
     pub advice: Vec<String>,
 }
 

@@ -44,7 +44,7 @@ pub(crate) struct Design {
 }
 
 impl Design {
-    /// What the design makes of these weights.
+    /// Response of the design to these weights.
     pub(crate) fn fitted(&self, weights: &DVector<f64>) -> DVector<f64> {
         let weighted = self.columns.iter().zip(weights.iter());
         weighted.fold(self.offset.clone(), |sum, (column, weight)| sum + column * *weight)

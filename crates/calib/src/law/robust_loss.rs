@@ -22,13 +22,13 @@ pub(crate) fn preliminary(regression: &LawRegression) -> LawStructure {
     LawStructure { family: GaugeFamily::Polynomial, nonlinear, taus: 2, ridge: RIDGE }
 }
 
-/// What the preliminary law leaves, over the median reading of each recording; `None` if there is none.
+/// Residuals of the preliminary law over the median reading of each recording; `None` if there is none.
 pub(crate) fn misfits(regression: &LawRegression) -> Option<DVector<f64>> {
     let (residual, rest_readings) = residuals(regression, &preliminary(regression).design(regression))?;
     Some(regression.in_readings(&residual, &rest_readings))
 }
 
-/// What the preliminary law leaves, over R₀ of each recording, and those.
+/// Residuals of the preliminary law over R₀ of each recording, and those R₀.
 fn residuals(regression: &LawRegression, design: &Design) -> Option<(DVector<f64>, Vec<f64>)> {
     let solution = regression.solve(design, RIDGE, None)?;
     let residual = regression.response(&solution.rest_readings) - design.fitted(&solution.weights);

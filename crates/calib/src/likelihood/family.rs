@@ -12,7 +12,7 @@ pub trait ModelFamily<const N: usize, const L: usize> {
     /// Names the parameter that no model can have.
     fn model<T: Scalar>(&self, parameters: &[T]) -> Result<Self::Model<T>, ParameterError>;
 
-    /// What is known before the first reading, which is an update without a prediction.
+    /// Belief before the first reading, which is an update without a prediction.
     fn start<T: Scalar>(&self, model: &Self::Model<T>) -> Belief<T, N, L>;
 }
 

@@ -67,7 +67,7 @@ pub struct LikelihoodFit {
     pub ln_covariance: Option<DMatrix<f64>>,
     /// Steps tried.
     pub iterations: usize,
-    /// Whether the last step was shorter than 1e-8 standard errors, at a maximum.
+    /// True if the last step was shorter than 1e-8 standard errors, at a maximum.
     pub converged: bool,
 }
 

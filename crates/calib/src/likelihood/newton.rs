@@ -3,7 +3,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
 use super::Derivatives;
 use crate::CalibrationError;
 
-/// What is maximised, as a function of the logarithms of the parameters.
+/// Objective to be maximised, as a function of the logarithms of the parameters.
 pub(super) trait Objective {
     /// The value; not finite counts as impossible.
     fn value(&self, at: &[f64]) -> f64;
@@ -93,7 +93,7 @@ struct Step {
     direction: DVector<f64>,
     /// gᵀ |H|⁻¹ g: twice the gain expected, and the squared length of the step in standard errors.
     decrement: f64,
-    /// Whether all curvatures were those of a maximum.
+    /// True if all curvatures were those of a maximum.
     concave: bool,
 }
 

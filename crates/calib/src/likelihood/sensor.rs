@@ -31,7 +31,7 @@ pub struct NoiseFit {
     pub motion: MotionParams,
     /// How sure it is.
     pub fit: LikelihoodFit,
-    /// What to know before it is used, in words; empty if all went well.
+    /// Warnings in words; empty if all went well.
     pub warnings: Vec<String>,
 }
 

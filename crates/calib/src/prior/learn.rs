@@ -27,7 +27,7 @@ impl Prior {
     /// case.
     ///
     /// # Errors
-    /// If there are fewer than [`FEWEST_SENSORS`], they estimate different quantities, or their laws cannot be compared.
+    /// If there are fewer than three, they estimate different quantities, or their laws cannot be compared.
     pub fn learn(sensors: &[SensorParams], made_by: &str) -> Result<Self, CalibrationError> {
         let Some(first) = sensors.first().filter(|_| sensors.len() >= FEWEST_SENSORS) else {
             let message = format!("{} sensors; a fleet has at least {FEWEST_SENSORS}", sensors.len());
@@ -101,7 +101,7 @@ fn usual(mut errors: Vec<DMatrix<f64>>, members: &[DVector<f64>]) -> Option<DMat
     (!errors.is_empty()).then(|| errors.swap_remove(errors.len() / 2))
 }
 
-/// What the default filter takes for the error of its law: variance times twice the time over which it lasts, of the
+/// Spectral density of the law's error in the default filter, s: variance times twice its correlation time, of the
 /// baseline and of what wanders beside the branches.
 fn error_density_s(sensor: &SensorParams) -> Option<f64> {
     let noise = sensor.estimators.get(&sensor.filter_of(sensor.default_estimator))?.noise;
@@ -119,7 +119,7 @@ fn correction(sensors: &[SensorParams]) -> Option<CorrectionPrior> {
     (of_kind.len() >= FEWEST_SENSORS).then(|| CorrectionPrior::learn(&of_kind)).flatten()
 }
 
-/// What calibration has seen of the median sensor; readings over R₀.
+/// Calibrated range of the median sensor; readings over R₀.
 fn of_median(sensors: &[SensorParams]) -> Validity {
     let of = |number: fn(&SensorParams) -> f64| median(sensors.iter().map(number));
     Validity {
@@ -135,7 +135,7 @@ fn of_median(sensors: &[SensorParams]) -> Validity {
     }
 }
 
-/// Whether a covariance is positive definite.
+/// True if a covariance is positive definite.
 pub(crate) fn is_covariance(rows: &[Vec<f64>]) -> bool {
     let size = rows.len();
     rows.iter().all(|row| row.len() == size)

@@ -1,4 +1,4 @@
-//! What sensors of one make have in common, learned from calibrated ones: it makes a short motion enough for the next one.
+//! Prior of a make, learned from calibrated sensors: with it a short motion is enough for the next one.
 //!
 //! Empirical Bayes: mean and spread over the sensors stand for the prior of one more. The law's regression takes it as
 //! further rows, the search for noise and motion starts from it and is pulled toward it, and the correction learns from some
@@ -27,7 +27,7 @@ use ohmstrain_sensor::{EstimatorKind, Quantity, Validity};
 /// Version of the file that a prior is written to.
 pub const PRIOR_FORMAT: u32 = 2;
 /// Sensors that a spread can be told from.
-pub const FEWEST_SENSORS: usize = 3;
+pub(crate) const FEWEST_SENSORS: usize = 3;
 
 /// The content of `prior.toml`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -39,9 +39,9 @@ pub struct Prior {
     pub made_by: String,
     /// How many sensors it was learned from.
     pub sensors: usize,
-    /// What they estimate.
+    /// The estimated quantity.
     pub quantity: Quantity,
-    /// What calibration has seen of the median sensor; its readings over R₀.
+    /// Calibrated range of the median sensor; its readings over R₀.
     pub validity: Validity,
     /// The law.
     pub law: LawPrior,
@@ -58,7 +58,7 @@ impl Prior {
         self.estimators.get(&kind)
     }
 
-    /// What a calibration on a sensor with this R₀ has seen, together with what the others have.
+    /// Calibrated range of a sensor with this R₀, joined with that of the others.
     pub(crate) fn joined(&self, own: Validity, rest_reading: f64) -> Validity {
         let of_make = &self.validity;
         Validity {

@@ -26,7 +26,7 @@ pub struct EstimatorPrior {
 
 /// Smallest standard deviation of a logarithm: searches end where they end by about as much.
 const LEAST_SD: f64 = 0.1;
-/// What a speed of zero, of filters that have none, is written as.
+/// Stand-in for a speed of zero, of filters that have none.
 const NO_SPEED: f64 = 1e-12;
 
 impl EstimatorPrior {
@@ -48,7 +48,7 @@ impl EstimatorPrior {
         })
     }
 
-    /// What is added to a mean score per row for a step away from the mean: the negative log density of the prior over the
+    /// Penalty on the mean score per row for a step away from the mean: the negative log density of the prior over the
     /// number of errors in `duration_s` that do not hang together.
     pub(crate) fn pull(&self, point: &[f64], duration_s: f64) -> f64 {
         let lasts_s = self.ln_mean.get(1).map_or(1.0, |ln| ln.exp());

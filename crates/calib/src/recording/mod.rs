@@ -1,4 +1,4 @@
-//! What is asked of recordings before anything is fitted to them.
+//! Checks of recordings before anything is fitted to them.
 
 pub(crate) mod drift;
 pub(crate) mod holds;

@@ -4,7 +4,7 @@ use crate::samples::Samples;
 /// A strain within this share of the reference's span of zero is zero.
 const ZERO: f64 = 0.01;
 
-/// What somebody who measures the rested sensor reads, as a share of the R₀ of the law: the median over the recordings
+/// Measured resistance at rest as a share of the law's R₀: the median over the recordings
 /// that begin at rest, at zero strain; `None` if none does.
 ///
 /// R₀ of the law is a fitted constant, which the ridge moves: the law makes the difference good by gauge and branches where

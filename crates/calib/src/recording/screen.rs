@@ -17,7 +17,7 @@ pub struct Distrusted {
     pub row: usize,
     /// Its time, s.
     pub time_s: f64,
-    /// What is wrong with it.
+    /// Its fault.
     pub doubt: Doubt,
 }
 
@@ -27,14 +27,14 @@ pub struct Distrusted {
 pub enum Doubt {
     /// The reading stands far from its neighbours.
     Reading {
-        /// What was read.
+        /// The reading.
         found: f64,
         /// The median of the rows around.
         around: f64,
     },
     /// The reference stands far from its neighbours.
     Reference {
-        /// What it says.
+        /// The reference.
         found: f64,
         /// The median of the rows around.
         around: f64,
@@ -73,7 +73,7 @@ impl fmt::Display for Doubt {
 #[derive(Clone, Debug)]
 pub struct Screened {
     recordings: Vec<Columns>,
-    /// What was left out, recording by recording and row by row.
+    /// Rows that were left out, recording by recording.
     pub distrusted: Vec<Distrusted>,
 }
 
@@ -98,7 +98,7 @@ const LEAST_WEIGHT: f64 = 0.2;
 const LEAST_MISFIT: f64 = 0.1;
 /// More rows than this share are no outliers: it is the law that is wrong.
 const MOST_OUTLIERS: f64 = 0.05;
-/// What the law leaves of the readings' variance on blocks left out, at most. Those recordings leave 0.47 and less,
+/// Largest share of the readings' variance that the law may leave on blocks left out. Those recordings leave 0.47 and less,
 /// readings that have nothing to do with the reference 0.98 and more.
 const MOST_UNEXPLAINED: f64 = 0.9;
 /// Ridges tried for that: strong ones extrapolate least.
@@ -143,7 +143,7 @@ impl Columns {
 }
 
 impl Screened {
-    /// What is left of the recordings.
+    /// The recordings without those rows.
     #[must_use]
     pub fn samples(&self) -> Vec<Samples<'_>> {
         self.recordings.iter().map(Columns::samples).collect()
@@ -215,7 +215,7 @@ fn spikes(values: &[f64]) -> Vec<(usize, f64, f64)> {
     (0..known.len()).filter(|&i| is_spike(i)).map(|i| (known[i], values[known[i]], around[i].0)).collect()
 }
 
-/// What nearly all known values lie within; `None` without any.
+/// Range that holds nearly all known values; `None` without any.
 fn span(values: &[f64]) -> Option<f64> {
     let known = sorted(values.iter().copied().filter(|value| value.is_finite()));
     let last = known.len().checked_sub(1)?;

@@ -18,7 +18,7 @@ pub const FARTHEST: f64 = 3.0;
 
 /// How many readings in a row that surprise the filter are passed over: spikes. Where more do, the law is at fault, and what it is
 /// corrected by needs the readings most.
-pub const PASSED_OVER: f64 = 3.0;
+const PASSED_OVER: f64 = 3.0;
 
 /// The scale on which readings `R/R₀ - 1` are seen.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -65,7 +65,7 @@ pub struct ReadingFeatures<T> {
     pub(crate) low_passes: [T; TIME_CONSTANTS_S.len()],
     /// Time since the last reading.
     pub(crate) waited_s: T,
-    /// How many surprising readings have come in a row, [`PASSED_OVER`] at most.
+    /// How many surprising readings have come in a row, three at most.
     pub(crate) surprises: T,
     /// Whether the last row had no reading, or one that was passed over.
     pub(crate) waits: bool,
@@ -111,13 +111,13 @@ impl<T: Recordable> ReadingFeatures<T> {
         self.now
     }
 
-    /// The same; a reading that surprises the filter is missing here, unless the [`PASSED_OVER`] readings before it did, too.
+    /// The same; a reading that surprises the filter is missing here, unless the three readings before it did, too.
     pub fn step_unless(&mut self, surprises: bool, dt_s: T, reading: Option<T>) -> Option<[T; FEATURES]> {
         let reading = self.unless(surprises, reading);
         self.step(dt_s, reading)
     }
 
-    /// What of a reading is for [`Self::step`]: one that surprises the filter is missing there, unless the [`PASSED_OVER`] readings
+    /// What of a reading is for [`Self::step`]: one that surprises the filter is missing there, unless the three readings
     /// before it did, too.
     pub fn unless(&mut self, surprises: bool, reading: Option<T>) -> Option<T> {
         let (before, most) = (self.surprises, T::of(PASSED_OVER));

@@ -26,9 +26,7 @@ use ohmstrain_model::StrainRange;
 
 use crate::kernel::{Several, Work};
 use crate::{Gaussian, Real, Recordable};
-pub use features::{
-    FARTHEST, FEATURES, FeatureScale, PASSED_OVER, RATE_GAIN, ReadingFeatures, Starts, TIME_CONSTANTS_S, settled,
-};
+pub use features::{FARTHEST, FEATURES, FeatureScale, RATE_GAIN, ReadingFeatures, Starts, TIME_CONSTANTS_S, settled};
 pub use low_pass::{Decay, LowPass};
 use process::{Kernels, Said};
 pub use process::{LINEAR, Process, kernel};
@@ -54,11 +52,11 @@ pub const INDUCING: usize = 64;
 
 /// Variance per square of the inputs' distance from the training range, in variances of the strain; in this distance a standard
 /// deviation of the first input that a process sees counts as one, the others by their relevance.
-pub const FAR: f64 = 0.03;
+const FAR: f64 = 0.03;
 /// Variance of a result whose inputs are nothing like the training rows, in variances of the strain, on top of all else.
-pub const NOVEL: f64 = 0.06;
+const NOVEL: f64 = 0.06;
 /// The square of that distance beyond which inputs are new.
-pub const NEW: f64 = 5.0;
+const NEW: f64 = 5.0;
 
 /// Where an input lay in the training rows.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -69,7 +69,7 @@ pub struct Heard<T> {
     /// Normalised innovation squared of the reading as it came; `None` if it was not compared.
     pub nis: Option<T>,
     /// How far readings have jumped, where the filter has looked again: at the second in a row that startles
-    /// ([`STARTLING_NIS`](super::STARTLING_NIS)), [`Sieve::jump`] away from the last that did not surprise.
+    /// (by five standard deviations), [`Sieve::jump`] away from the last that did not surprise.
     pub jumped: Option<T>,
     /// Factor on the covariance of the state before the step, at a readmission ([`Guard`]).
     inflation: T,

@@ -2,10 +2,10 @@ use crate::Recordable;
 
 /// Normalised innovation squared above which a reading surprises: three standard deviations.
 pub const SURPRISING_NIS: f64 = 9.0;
-/// The same of one that startles: five standard deviations.
-pub const STARTLING_NIS: f64 = 25.0;
+/// Normalised innovation squared above which a reading startles: five standard deviations.
+const STARTLING_NIS: f64 = 25.0;
 /// After so many startling readings in a row a filter looks again.
-pub const BESIDE_AFTER: f64 = 2.0;
+const BESIDE_AFTER: f64 = 2.0;
 /// How much of the weight then has what it knew before any reading.
 pub const BESIDE_SHARE: f64 = 0.1;
 

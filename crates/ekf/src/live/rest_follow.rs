@@ -2,36 +2,31 @@
 
 use crate::{Reading, Recordable};
 
-/// The numbers behind an R₀ that follows the readings, also for programs that write a filter in another language.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Following {
+/// The numbers behind an R₀ that follows the readings.
+struct Following {
     /// Time constant with which R₀ leaves calibration's for where the readings want it, s.
-    pub leaves_s: f64,
+    leaves_s: f64,
     /// The same, where a whole recording is gone through for the one R₀ of all its rows.
-    pub settles_s: f64,
+    settles_s: f64,
     /// Time constant with which it comes back, s.
-    pub returns_s: f64,
+    returns_s: f64,
     /// A reading counts for no more than this time, s, however long nothing was read before.
-    pub longest_s: f64,
+    longest_s: f64,
     /// Readings that jump back within so long, s, were a fault in between, and not another day.
-    pub fault_s: f64,
+    fault_s: f64,
     /// By what factor a reading may want R₀ to be another: beyond it, it is no reading of this sensor.
-    pub farthest: f64,
+    farthest: f64,
 }
 
 /// `docs/another-day.md` has what these were chosen on. A faster start follows another day sooner, and a fault of 10 s farther.
-///
-/// ```
-/// assert!(ohmstrain_ekf::live::FOLLOWING.leaves_s > ohmstrain_ekf::live::FOLLOWING.returns_s);
-/// ```
-pub const FOLLOWING: Following =
+const FOLLOWING: Following =
     Following { leaves_s: 40.0, settles_s: 10.0, returns_s: 1.0, longest_s: 2.0, fault_s: 30.0, farthest: 2.0 };
 
 /// Largest factor between R₀ as somebody gives it and what the rested sensor read in calibration, either way. Beyond it, it is in
 /// another unit, or of another sensor.
 ///
 /// ```
-/// assert!(ohmstrain_ekf::live::FARTHEST_REST > ohmstrain_ekf::live::FOLLOWING.farthest);
+/// assert_eq!(ohmstrain_ekf::live::FARTHEST_REST, 4.0);
 /// ```
 pub const FARTHEST_REST: f64 = 4.0;
 

@@ -1,4 +1,4 @@
-//! What stands around a filter as functions in C: what becomes of a reading, what is doubted, what the correction sees of readings.
+//! Functions in C around a filter: what becomes of a reading, doubts, features of readings for the correction.
 //! The library's own code is run on expressions, once for every way that it may go.
 
 use ohmstrain_ekf::correction::{Decay, FeatureScale, ReadingFeatures, TIME_CONSTANTS_S};
@@ -13,7 +13,7 @@ use crate::twin::{OwnedLearned, Parts};
 
 const LOW_PASSES: usize = TIME_CONSTANTS_S.len();
 
-/// What stands around the filter of a sensor.
+/// Functions around the filter of a sensor.
 pub struct Around<'a> {
     pub parts: &'a Parts<'a>,
 }
@@ -38,7 +38,7 @@ impl Around<'_> {
         all.iter().map(Printed::text).collect::<Vec<_>>().join("\n")
     }
 
-    /// What they keep from step to step, as fields of a struct.
+    /// Their state from step to step, as fields of a struct.
     pub fn fields(&self) -> Vec<String> {
         let mut fields = Declared::default();
         Repeats::<Expression<'_>>::none().each(&mut fields);
@@ -321,7 +321,7 @@ fn startles() -> Printed {
     )
 }
 
-/// What the correction sees of the readings.
+/// Features of the readings for the correction.
 fn watch(scale: &FeatureScale<f64>) -> Printed {
     Printed::new(
         "watch",

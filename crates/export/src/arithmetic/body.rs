@@ -1,4 +1,4 @@
-//! What was recorded as lines of C.
+//! Recorded operations as lines of C.
 
 mod scopes;
 
@@ -149,7 +149,7 @@ impl<'a> Body<'a> {
         self.lines.push_str("    }\n");
     }
 
-    /// Whether a result is true or false, and no number.
+    /// True if a result is a truth value, and no number.
     pub fn is_truth(&self, place: Place) -> bool {
         match self.operations[place] {
             Operation::Pick(_, yes, _) => self.is_truth(yes),
@@ -201,7 +201,7 @@ impl<'a> Body<'a> {
     }
 }
 
-/// What the hazard of a tail is written to.
+/// Place that the hazard of a tail is written to.
 fn hazard(tail: Place) -> String {
     format!("hazard{tail}")
 }

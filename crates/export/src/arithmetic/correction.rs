@@ -1,4 +1,4 @@
-//! What surrounds a correction's sums over its rows, as functions in C.
+//! Functions in C around a correction's sums over its rows.
 
 use ohmstrain_ekf::live::Learned;
 use ohmstrain_ekf::record::{write_mixture, write_scaled};

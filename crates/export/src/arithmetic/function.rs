@@ -6,7 +6,7 @@ use ohmstrain_ekf::record::{Function, Name, Operation, Writer, write_down};
 
 use super::body::Body;
 
-/// What a result is called that the function returns.
+/// Name of a result that the function returns.
 pub const RETURNED: &str = "return";
 /// How results begin that are flags of what the function returns.
 const FLAG: &str = "OHMSTRAIN_";

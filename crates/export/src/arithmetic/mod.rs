@@ -22,9 +22,9 @@ struct Function {
     /// Parameters after the state, and what the results after the state's are written to.
     inputs: &'static [Input],
     outputs: &'static [&'static str],
-    /// Whether a state comes in.
+    /// True if a state comes in.
     has_state: bool,
-    /// What the last result is returned as.
+    /// Name under which the last result is returned.
     returns: Returns,
 }
 
@@ -69,7 +69,7 @@ const TAKES: Function = Function {
     ..MOVES
 };
 
-/// What is asked of rates on a side of zero.
+/// Functions of rates on a side of zero.
 const SIDE: Function = Function { inputs: &[Input::Number("side")], ..MOVES };
 
 /// A prediction and an update whose direction is left to the rate's distribution.
@@ -92,7 +92,7 @@ const SOUND: Function = Function {
     ..MOVES
 };
 
-/// What doubts, hypotheses and corrections need.
+/// Functions for doubts, hypotheses and corrections.
 const FALLING: Function = Function {
     name: "falling",
     comment: "e^x of x that is not above zero: 2^n e^r with |r| <= ln(2)/2, and Taylor's series. The same bits everywhere.",
@@ -103,7 +103,7 @@ const FALLING: Function = Function {
     ..MOVES
 };
 
-/// What a hypothesis of a phase needs.
+/// Functions for a hypothesis of a phase.
 const PHASES: [Function; 13] = [
     Function {
         name: "predict_extend",
@@ -186,7 +186,7 @@ const PHASES: [Function; 13] = [
     },
 ];
 
-/// What splitting by the rate's sign needs besides.
+/// Functions for splitting by the rate's sign.
 const SPLITS: [Function; 7] = [
     Function { name: "predict_open", comment: "One interval on; the direction is as uncertain as the rate.", ..MOVES },
     Function {
@@ -299,7 +299,7 @@ impl Function {
         all
     }
 
-    /// What the inputs between state and step are called.
+    /// Names of the inputs between state and step.
     fn names_of_inputs(&self, carried: Carried) -> Vec<String> {
         let state = carried.means + carried.covariances;
         let names = |input: &Input| match input {

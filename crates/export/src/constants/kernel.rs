@@ -12,7 +12,7 @@ use crate::literal::{Literal, literals};
 use crate::twin::filter_parts;
 use crate::{ExportError, arithmetic, parameter};
 
-/// What depends on the length of a step.
+/// Constants that depend on the length of a step.
 #[derive(Debug, Serialize)]
 pub struct StepConstants {
     names: Vec<String>,
@@ -32,11 +32,11 @@ pub struct StepConstants {
     nodes: Vec<Literal>,
     inverses: Vec<Literal>,
     rows: Vec<Vec<Literal>>,
-    /// What is one over what.
+    /// Reciprocals: name, and what it is one over.
     reciprocals: Vec<(String, String)>,
 }
 
-/// What is the same in all filters of hypotheses.
+/// Constants of all filters of hypotheses.
 #[derive(Debug, Serialize)]
 pub struct SharedConstants {
     least_weight: Literal,
@@ -82,7 +82,7 @@ impl StepConstants {
     }
 }
 
-/// What the filter in single precision says of itself.
+/// Constants that the filter in single precision computes itself.
 pub struct Recorded {
     /// Functions in C.
     pub arithmetic: String,

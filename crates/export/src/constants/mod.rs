@@ -1,4 +1,4 @@
-//! What the templates show: a sensor's filter in `f32`, for steps of one length.
+//! Values for the templates: a sensor's filter in `f32`, for steps of one length.
 
 mod kernel;
 mod readings;
@@ -36,12 +36,12 @@ pub struct Exported {
     dt_us: u64,
     dt_ms: f64,
     rest_reading: Literal,
-    /// What the rested sensor read in calibration, or by the law where it has not rested then (`has_rested`), and by what factor it
+    /// Resistance at rest in calibration, or by the law where it has not rested then (`has_rested`), and the factor by which it
     /// may read something else.
     rested: Literal,
     has_rested: bool,
     farthest_rest: Literal,
-    /// Whether zero is a strain that it can have.
+    /// True if zero is a strain that it can have.
     rests_at_zero: bool,
     lower: Literal,
     upper: Literal,
@@ -49,7 +49,7 @@ pub struct Exported {
     states: usize,
     branches: usize,
     estimator: EstimatorText,
-    /// Whether hypotheses are split by the sign of the rate, and whether the body rests.
+    /// True if hypotheses are split by the sign of the rate, and if the body rests.
     splits: bool,
     rests: bool,
     start_mean: Vec<Literal>,
@@ -66,7 +66,7 @@ pub struct Exported {
     steps: StepConstants,
     fresh_mean: Vec<Literal>,
     fresh_variance: Vec<Literal>,
-    /// What multiplies the exponent of a likelihood; `None` without tempering.
+    /// Factor on the exponent of a likelihood; `None` without tempering.
     tempering: Option<Literal>,
     /// `None` where the direction never is left open.
     forgets_s: Option<Literal>,
@@ -75,13 +75,13 @@ pub struct Exported {
     /// The kernel as functions in C, and what stands around it.
     arithmetic: String,
     around: String,
-    /// What that keeps from step to step, as C declares it.
+    /// State from step to step, as C declares it.
     fields: Vec<String>,
-    /// What is left of the filter, and about what it costs.
+    /// Plan of the filter in words, and about what it costs.
     words: String,
-    /// Whether it is less than what a computer runs.
+    /// True if it is less than what a computer runs.
     is_smaller: bool,
-    /// What was promised and scored, line by line.
+    /// Promises and scores, line by line.
     promise: Vec<String>,
     cost: Cost,
     law: LawConstants,

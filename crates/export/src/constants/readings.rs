@@ -1,11 +1,11 @@
-//! What a reading must be, and when an interval is wider than the filter says.
+//! Limits of plausible readings, and of what widens an interval.
 
 use ohmstrain_ekf::live::{DoubtParts, RestBounds, Sieve};
 use serde::Serialize;
 
 use crate::literal::Literal;
 
-/// What a reading must be.
+/// Limits of plausible readings.
 #[derive(Debug, Serialize)]
 pub struct SieveConstants {
     lower: Literal,
@@ -46,7 +46,7 @@ pub struct FollowConstants {
     start: Option<[Literal; 2]>,
 }
 
-/// What is known without a reading.
+/// Constants of rows without a reading.
 #[derive(Debug, Serialize)]
 struct UnreadConstants {
     rate_time_s: Literal,

@@ -113,9 +113,9 @@ where
 /// A twin with all that stands around it.
 pub type TwinFilter<'a, T, F, const N: usize, const L: usize> = LiveFilter<T, Twin<'a, T, F>, Learned<'a, T>, N, L>;
 
-/// What is done with a sensor's twin.
+/// A task for a sensor's twin.
 pub trait Task<T: Real> {
-    /// What comes of it.
+    /// Its result.
     type Said;
 
     /// Does it.

@@ -1,4 +1,4 @@
-//! What an exported program is made of.
+//! Parts of an exported program.
 
 use ohmstrain_ekf::live::{Flag, Flags, LiveParts};
 use ohmstrain_ekf::{Dwell, Evidence, Real, StepError};
@@ -26,7 +26,7 @@ pub fn bits(flags: Flags) -> u32 {
     BITS.into_iter().fold(0, |all, (flag, bit)| if flags.has(flag) { all | bit } else { all })
 }
 
-/// What a twin is made of, whatever its precision.
+/// Parts of a twin, whatever its precision.
 #[derive(Clone, Copy)]
 pub struct Parts<'a> {
     pub kind: EstimatorKind,
@@ -35,7 +35,7 @@ pub struct Parts<'a> {
     /// Surroundings of the filter. The lengths of its steps are those of single precision.
     pub live: LiveParts<f64, ()>,
     pub correction: Option<&'a PortableCorrection>,
-    /// What stands for rows of the correction that were left out.
+    /// Stand-in for rows of the correction that were left out.
     pub quadratics: Option<&'a [OwnedQuadratic; 2]>,
 }
 

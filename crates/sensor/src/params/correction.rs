@@ -18,7 +18,7 @@ pub struct CorrectionParams {
     pub filter: CorrectorParams,
     /// For the smoother.
     pub smoother: CorrectorParams,
-    /// What the law says of motions that the sensor was not seen in, for the filter.
+    /// Process of simulated motions, which the sensor was not seen in, for the filter.
     pub simulated: SimulatedParams,
     /// Rows of the calibration that both have weights for, in order of time.
     pub rows: Vec<TrainingRow>,
@@ -68,7 +68,7 @@ pub struct CorrectorParams {
     pub inputs: InputScales,
     /// Strain from the features of the readings.
     pub direct: ProcessParams,
-    /// What the filter's strain lacks, from its outputs and the features.
+    /// Residual process: the error of the filter's strain, from its outputs and the features.
     pub residual: ProcessParams,
     /// Strain from the features of the past alone, and from those of the future: a smoother's, none of a filter.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -101,9 +101,9 @@ pub struct TrainingRow {
     pub past: [f64; FEATURES],
     /// Features of the readings from this row on.
     pub future: [f64; FUTURE_FEATURES],
-    /// What the filter said: strain, rate, relaxation, baseline, probabilities of stretching and releasing.
+    /// Output of the filter: strain, rate, relaxation, baseline, probabilities of stretching and releasing.
     pub filtered: [f64; OUTPUTS],
-    /// What the smoother said.
+    /// Output of the smoother.
     pub smoothed: [f64; OUTPUTS],
 }
 

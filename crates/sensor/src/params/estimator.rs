@@ -46,7 +46,7 @@ impl EstimatorKind {
         seen
     }
 
-    /// Whether it keeps hypotheses about the phase; the others are one Gaussian.
+    /// True if it keeps hypotheses about the phase; the others are one Gaussian.
     #[must_use]
     pub const fn has_phases(self) -> bool {
         !matches!(self, Self::Ekf | Self::Ukf)
@@ -80,7 +80,7 @@ pub struct EstimatorParams {
     pub smoothed_sd_scale: Option<f64>,
     /// How the body moves.
     pub motion: MotionParams,
-    /// What the law does not explain.
+    /// Noise: what the law does not explain.
     pub noise: NoiseParams,
     /// How phases follow each other, for estimators that keep phase hypotheses.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -90,7 +90,7 @@ pub struct EstimatorParams {
     pub settling: Option<SettlingParams>,
 }
 
-/// What calibration has seen of holds: see [`Settling`].
+/// Settling, as calibration has seen it in holds: see [`Settling`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SettlingParams {
@@ -138,7 +138,7 @@ impl PhaseParams {
         Dwell::new(self.hold_time_s, self.move_time_s, self.reversal)
     }
 
-    /// Whether the body rests at times.
+    /// True if the body rests at times.
     #[must_use]
     pub fn rests(&self) -> bool {
         self.hold_time_s > 0.0 && self.reversal < 1.0

@@ -1,4 +1,4 @@
-//! What a calibration came to, kept with the sensor. Nothing computes with it.
+//! Findings of a calibration, kept with the sensor. Nothing computes with them.
 
 use serde::{Deserialize, Serialize};
 
@@ -8,7 +8,7 @@ use crate::params::summary::{Limit, Summary};
 /// Tenths of a range.
 pub const TENTHS: usize = 10;
 
-/// What a calibration is worth, and what it rests on.
+/// Scores of a calibration, and what it rests on.
 ///
 /// Every quarter of the recordings is estimated by a law and a correction that were fitted to the other three, and scored;
 /// the static cubic likewise. Structure, ridge, noise and motion were chosen with all quarters in view, so that a
@@ -22,15 +22,15 @@ pub struct Findings {
     pub smoother: Option<Scores>,
     /// The static cubic.
     pub static_cubic: Scores,
-    /// What makes the error.
+    /// Contributions to the error.
     pub budget: ErrorBudget,
-    /// What was seen.
+    /// Content of the recordings.
     pub seen: Seen,
-    /// What to record next, most important first; empty if nothing stands out.
+    /// Advice on the next recording, most important first; empty if nothing stands out.
     pub advice: Vec<String>,
 }
 
-/// What the recordings of a calibration contain.
+/// Content of the recordings of a calibration.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Seen {
@@ -50,7 +50,7 @@ pub struct Seen {
     pub rows: usize,
 }
 
-/// What makes the error of a calibrated filter, from parts of the recordings that its law was not fitted to.
+/// Contributions to the error of a calibrated filter, from parts of the recordings that its law was not fitted to.
 ///
 /// Law, drift and noise are what the law leaves of the readings where the true strain drives it, in percent of the readings'
 /// range: what is the same throughout a part is drift, what differs from row to row is noise, the rest is the law's. The
@@ -149,7 +149,7 @@ impl ErrorBudget {
         ErrorShares { law: others * law, direction: self.wrong_error, drift: others * drift, noise: others * noise }
     }
 
-    /// What makes most of the error: the largest of [`ErrorBudget::shares`].
+    /// Largest contribution to the error, of [`ErrorBudget::shares`].
     #[must_use]
     pub fn limit(&self) -> Limit {
         self.shares().sorted()[0].0

@@ -68,7 +68,7 @@ pub struct LawParameter<'a> {
     pub name: String,
     /// The number.
     pub value: &'a mut f64,
-    /// Whether it stands for readings over R₀, so that with twice the R₀ it is half as large.
+    /// True if it stands for readings over R₀, so that with twice the R₀ it is half as large.
     pub is_over_rest: bool,
 }
 

@@ -1,4 +1,4 @@
-//! What a filter that runs for days knows of the calibration of its sensor.
+//! Constants of a filter that runs for days, from the calibration of its sensor.
 
 use ohmstrain_ekf::live::{DOUBT, DoubtParts, RestBounds, RestSeen, SessionStart, Sieve, Unread};
 
@@ -20,7 +20,7 @@ const LONGER: f64 = 3.0;
 const TOLERANCE: f64 = 0.05;
 /// For how long readings must stay where they are to say something of R₀, s: twice as long as a doubt of a start lasts.
 const LASTS_S: f64 = 10.0;
-/// What a sensor reads at rest is an end of what it reads at all if it is no farther from it than this share of the range.
+/// Share of the range of readings within which the reading at rest counts as one of its ends.
 const AT_END: f64 = 0.25;
 
 /// Standard deviation of the strain, in spans, that a filter has at its start besides what it states. Started in motion, on six
@@ -38,7 +38,7 @@ impl SensorParams {
         (self.relative(self.validity.reading_lower), self.relative(self.validity.reading_upper))
     }
 
-    /// What a reading must be: what the calibration has seen, and far beyond it.
+    /// Plausible readings: those that the calibration has seen, and far beyond them.
     #[must_use]
     pub fn sieve(&self) -> Sieve<f64> {
         let seen = &self.validity;
@@ -56,7 +56,7 @@ impl SensorParams {
         }
     }
 
-    /// What the sensor read at rest; `None` where no recording of the calibration begins there.
+    /// Reading at rest; `None` where no recording of the calibration begins there.
     #[must_use]
     pub fn rest_seen(&self) -> Option<RestSeen<f64>> {
         let rested = self.relative(self.measured_rest?);
@@ -102,7 +102,7 @@ impl SensorParams {
         self.sessions.map_or(0.0, of)
     }
 
-    /// What is to be doubted of a filter that runs with that motion.
+    /// Doubts of a filter that runs with that motion.
     #[must_use]
     pub fn doubt_parts(&self, motion: &MotionParams) -> DoubtParts<f64> {
         let (seen, span) = (&self.validity, self.limits.span());

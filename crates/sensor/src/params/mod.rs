@@ -1,4 +1,4 @@
-//! What `sensor.toml` says, and the range that each of its numbers has. It knows nothing of the calibration that makes it.
+//! Content of `sensor.toml`, and the range of each of its numbers. It knows nothing of the calibration that makes it.
 
 pub(crate) mod correction;
 pub(crate) mod estimator;
@@ -39,27 +39,27 @@ pub struct SensorParams {
     pub format: u32,
     /// Program and version that made it.
     pub made_by: String,
-    /// What is estimated.
+    /// The estimated quantity.
     pub quantity: Quantity,
-    /// What the readings are.
+    /// Unit of the readings.
     pub reading: ReadingUnit,
     /// R₀ of the law, which everything is relative to; Ω, or a ratio. A fitted number: see `measured_rest`.
     pub rest_reading: f64,
-    /// What the rested sensor read in calibration, before it first moved, in the same unit; `None` if no recording begins
+    /// Measured resistance at rest in calibration, before the first movement, in the same unit; `None` if no recording begins
     /// at rest. A resistance measured at rest is compared with this one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub measured_rest: Option<f64>,
     /// The estimator to use unless another is asked for.
     pub default_estimator: EstimatorKind,
-    /// What the calibration came to; `None` if nothing could be scored on parts left out.
+    /// Summary of the calibration; `None` if nothing could be scored on parts left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub summary: Option<Summary>,
-    /// What it is worth on rows that were kept from the calibration; `None` if there were none.
+    /// Scores on rows that were kept from the calibration; `None` if there were none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tested: Option<TestedSummary>,
     /// Range of the output: the reference's range in calibration, or a joint's stops.
     pub limits: RangeParams,
-    /// What calibration has seen.
+    /// Calibrated range.
     pub validity: Validity,
     /// Differences between sessions; `None` for a calibration on one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -76,15 +76,15 @@ pub struct SensorParams {
     /// The recordings it was calibrated on.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub recordings: Vec<RecordingInfo>,
-    /// What the recordings tell of the law's parameters by themselves, without the ridge that the filter's law has. What
+    /// Standard errors of the law's parameters from the recordings by themselves, without the ridge that the filter's law has. What
     /// they do not tell is missing.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub uncertainty: Option<Uncertainty>,
-    /// What the calibration is worth on parts left out, what it has seen and what limits it; `None` if nothing could be scored, or of
+    /// Scores on parts left out, content of the recordings and contributions to the error; `None` if nothing could be scored, or of
     /// an older version. Nothing computes with it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub findings: Option<Findings>,
-    /// What was learned about the filter's error, if that was asked for.
+    /// Learned correction of the filter's error, if there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub correction: Option<CorrectionParams>,
 }
@@ -120,7 +120,7 @@ pub enum ReadingUnit {
     Ratio,
 }
 
-/// What calibration has seen; outside of it results are extrapolations.
+/// Calibrated range; outside of it results are extrapolations.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Validity {
@@ -264,7 +264,7 @@ impl SensorParams {
         widened.into_iter().filter(|(_, scale)| at_most(*scale)).map(|(name, _)| name).collect()
     }
 
-    /// What the rested sensor read in calibration, in its unit: R₀ of the law where nothing was read at rest.
+    /// Resistance at rest in calibration, in its unit: R₀ of the law where nothing was read at rest.
     #[must_use]
     pub fn rested(&self) -> f64 {
         self.measured_rest.unwrap_or(self.rest_reading)

@@ -2,7 +2,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::params::range::RangeParams;
 
-/// What people use today: strain as a cubic polynomial of the reading, clipped to the range it was fitted on.
+/// Strain as a cubic polynomial of the reading, clipped to the range it was fitted on: what people use today.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StaticCubic {

@@ -1,6 +1,6 @@
 use serde::{Deserialize, Serialize};
 
-/// What a calibration is worth in a few numbers, kept with the sensor: see [`Findings`](crate::Findings). Nothing computes with them.
+/// Scores of a calibration in a few numbers, kept with the sensor: see [`Findings`](crate::Findings). Nothing computes with them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Summary {
@@ -16,11 +16,11 @@ pub struct Summary {
     pub coverage_95_percent: f64,
     /// Mean width of that interval, percent of full scale.
     pub width_95_percent_fs: f64,
-    /// What makes most of the error.
+    /// Largest contribution to the error.
     pub limited_by: Limit,
 }
 
-/// What a sensor is worth on rows that its calibration never saw, percent. Nothing computes with it.
+/// Scores of a sensor on rows that its calibration never saw, percent. Nothing computes with them.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TestedSummary {
@@ -32,7 +32,7 @@ pub struct TestedSummary {
     pub coverage_95_percent: f64,
 }
 
-/// What limits a filter.
+/// Contribution that limits a filter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Limit {

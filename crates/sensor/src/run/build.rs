@@ -203,7 +203,7 @@ fn switched<const B: usize, const N: usize>(
     Ok(SwitchedModel::new(law, motion, estimator.noise.to_model())?)
 }
 
-/// What filters of phases need besides a model.
+/// Parameters of filters of phases besides the model.
 struct PhaseFilter {
     dwell: Dwell<f64>,
     /// The same for a body that rests at times.
@@ -284,7 +284,7 @@ impl SensorParams {
     }
 }
 
-/// What filters are made for before they know the length of a step.
+/// Step for which filters are made before they know its length.
 const NO_STEP_S: f64 = 0.0;
 
 /// Capacity of the sign-split filter.

@@ -17,14 +17,14 @@ pub(crate) struct CorrectedWayBack<'a> {
     back: Box<dyn WayBack + 'a>,
     correction: Arc<OfSmoother>,
     rows: Rows<'a>,
-    /// What had been seen of the past before each segment that is still to come. Readings that were kept from the filter
+    /// Features of the past before each segment that is still to come. Readings that were kept from the filter
     /// were seen here, as far as features go: within a segment they are not, and what was before it fades in seconds.
     starts: Vec<Watched>,
-    /// What has been seen of the future.
+    /// Features of the future.
     ahead: Watched,
 }
 
-/// What the correction has seen of the readings.
+/// Features of the readings, for the correction.
 #[derive(Clone, Copy)]
 struct Watched {
     features: ReadingFeatures<f64>,
@@ -45,17 +45,17 @@ impl Watched {
         self.features.step_unless(surprises, dt_s, reading)
     }
 
-    /// Whether the last row had no reading that is seen here.
+    /// True if the last row had no reading that is seen here.
     fn missing(&self) -> bool {
         self.features.is_waiting()
     }
 }
 
-/// What the correction is shown of a row.
+/// Input of the correction at a row.
 #[derive(Clone, Copy)]
 struct Seen {
     reading: Option<f64>,
-    /// Whether the filter would rather not have seen it.
+    /// True if the reading surprised the filter.
     surprises: bool,
 }
 
@@ -74,7 +74,7 @@ impl Seen {
     }
 }
 
-/// What a correction sees of a filter's output.
+/// Inputs of a correction from a filter's output.
 #[must_use]
 pub fn outputs(output: &Output) -> [f64; OUTPUTS] {
     let estimate = &output.estimate;

@@ -45,7 +45,7 @@ pub struct KnownStrain {
     pub said: Gaussian<f64>,
 }
 
-/// What strains that were known for a moment say of a filter's errors at other times.
+/// Errors of a filter at other times, from strains that were known for a moment.
 ///
 /// An error is a Gaussian process of the time: a part that lasts for seconds, in units of the deviation that is stated, an
 /// offset and an error of the gain that last for an hour, in units of what is stated on average where strains are known. How large
@@ -125,7 +125,7 @@ impl KnownErrors {
         }
     }
 
-    /// Whether no strain is known.
+    /// True if no strain is known.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.strains.is_empty()

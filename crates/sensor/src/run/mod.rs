@@ -19,7 +19,7 @@ use ohmstrain_ekf::{Estimate, Gaussian, Reading, ReadingVerdict, StepError};
 
 /// The live filter of a sensor whose number of branches and estimator are known at run time only. Threads and tasks can own it.
 pub trait Filter: Send {
-    /// What the rested, unstretched sensor is found to read from now on.
+    /// Sets the resistance at rest, unstretched, from now on.
     ///
     /// # Errors
     /// As [`LiveFilter::rest`](ohmstrain_ekf::live::LiveFilter::rest).
@@ -115,7 +115,7 @@ impl<'a> Rows<'a> {
         self.len
     }
 
-    /// Whether there is none.
+    /// True if there is none.
     #[must_use]
     pub const fn is_empty(&self) -> bool {
         self.len == 0
@@ -139,14 +139,14 @@ pub trait WayBack {
     fn next_segment(&mut self, out: &mut Vec<Output>) -> Result<Option<Range<usize>>, (usize, StepError)>;
 }
 
-/// What a filter or smoother says at one row.
+/// Output of a filter or smoother at one row.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Output {
     /// The estimate.
     pub estimate: Estimate<f64>,
     /// Normalised innovation squared of the row's reading; `None` if it was missing.
     pub nis: Option<f64>,
-    /// What became of the reading.
+    /// Verdict on the reading.
     pub verdict: ReadingVerdict,
     /// Probabilities of extend, hold and retract; `None` if the estimator has no phases.
     pub phases: Option<[f64; 3]>,

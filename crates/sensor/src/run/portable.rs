@@ -1,4 +1,4 @@
-//! What a filter is made of as plain numbers: for programs that write it in another language.
+//! A filter as plain numbers, for programs that write it in another language.
 
 use ohmstrain_ekf::correction::{FILTER_INPUTS, FeatureScale};
 use ohmstrain_ekf::live::LiveParts;
@@ -21,7 +21,7 @@ pub struct PortableFilter {
     pub estimator: EstimatorParams,
     /// Its surroundings.
     pub parts: LiveParts<f64, ()>,
-    /// What corrects its strain.
+    /// Correction of its strain.
     pub correction: Option<PortableCorrection>,
 }
 

@@ -155,7 +155,7 @@ where
         Ok((row, step))
     }
 
-    /// What a smoother says at a row.
+    /// Output of a smoother at a row.
     pub(crate) fn smoothed_row(&self, state: &E::State, heard: &Heard<f64>) -> Output {
         self.reports.row(state, heard, self.reports.smoothed_scale)
     }

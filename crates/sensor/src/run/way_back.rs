@@ -20,7 +20,7 @@ pub(crate) struct Segments<'a, E: SensorEstimator<f64, N, L>, const B: usize, co
     back: Backward<E::State>,
     /// The present segment.
     steps: Vec<(Heard<f64>, LiveStep<E, N, L>)>,
-    /// Whether that is the last, whose steps are there already.
+    /// True if that is the last segment, whose steps are there already.
     is_last: bool,
 }
 

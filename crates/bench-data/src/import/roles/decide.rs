@@ -17,13 +17,17 @@ use crate::import::words::{Role, names};
 pub(crate) fn decide(found: &Found, answers: &Recipe) -> Decision {
     let mut remarks = Vec::new();
     let mut questions: Vec<ImportError> = open_decimal(found.tables).into_iter().collect();
-    let readings = choose(found, answers, &Role::READINGS, "the readings")
+    let readings = choose(found, answers, &Role::READINGS, "the readings", None)
         .and_then(|taken| taken.ok_or_else(|| no_readings(found)))
         .and_then(|taken| timed(found, answers, taken, Role::Time, &mut remarks));
     let readings = known(readings, &mut questions);
-    let reference = choose(found, answers, &Role::REFERENCES, "the reference").and_then(|taken| {
+    let beside = readings.map(|readings| readings.values.place);
+    let reference = choose(found, answers, &Role::REFERENCES, "the reference", beside).and_then(|taken| {
         taken.map(|taken| timed(found, answers, taken, Role::ReferenceTime, &mut remarks)).transpose()
     });
+    if let (Ok(Some(reference)), Some(beside)) = (&reference, beside) {
+        remarks.extend(by_its_name(found, answers, reference.values.place, beside));
+    }
     if matches!(reference, Ok(None)) {
         remarks.extend(no_reference(found, answers));
     }
@@ -124,6 +128,15 @@ fn incomplete_records(found: &Found, place: Place) -> Option<ImportError> {
     let expected = format!("{name} in every record, which ends where one of its labels comes again");
     let what = format!("none in {missing} of {}: print all values of a moment together", table.len());
     Some(ImportError::content(&table.file, first, Fault::new(expected, what)))
+}
+
+/// What there is to say where one of several references is taken since its name is that of the readings.
+fn by_its_name(found: &Found, answers: &Recipe, reference: Place, readings: Place) -> Option<String> {
+    let is_answered = Role::REFERENCES.iter().any(|role| answers.column(*role).is_some());
+    let references = found.candidates.iter().filter(|one| one.is_named && Role::REFERENCES.contains(&one.role)).count();
+    let (file, name, beside) = (&found.table(reference).file, found.name(reference), found.name(readings));
+    let remark = format!("{file}: {name} is taken for the reference of {beside}, whose name it shares");
+    (references > 1 && !is_answered).then_some(remark)
 }
 
 /// What there is to say where no column is the reference, and nobody has said that none is.

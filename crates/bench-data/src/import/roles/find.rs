@@ -3,7 +3,7 @@ use crate::import::roles::decision::{Place, Taken};
 use crate::import::roles::facts::Found;
 use crate::import::roles::recipe::{ColumnName, NO_COLUMN, Recipe};
 use crate::import::table::Table;
-use crate::import::words::Role;
+use crate::import::words::{Role, names};
 
 /// Stands before a number that is no name, where there are columns called by numbers.
 const COUNTED: char = '#';
@@ -79,12 +79,21 @@ pub(crate) fn refer(tables: &[Table], place: Place) -> ColumnName {
     ColumnName { file, column }
 }
 
-/// The column that an answer, or else a name, gives to one of several roles.
+/// The one of several columns whose name has the same stem as another column's: `Thumb angle` beside `Thumb`.
+fn paired(found: &Found, taken: &[Taken], beside: Place) -> Option<Taken> {
+    let stem = |place: Place| names::stem(&found.column(place).name);
+    let wanted = stem(beside);
+    let mut fitting = taken.iter().filter(|taken| !wanted.is_empty() && stem(taken.place) == wanted);
+    fitting.next().copied().filter(|_| fitting.next().is_none())
+}
+
+/// The column that an answer, or else a name, gives to one of several roles; `beside` is one with which it may share its name.
 pub(crate) fn choose(
     found: &Found,
     answers: &Recipe,
     roles: &[Role],
     what: &str,
+    beside: Option<Place>,
 ) -> Result<Option<Taken>, ImportError> {
     let named = roles.iter().find_map(|role| answers.column(*role).flatten().map(|wanted| (*role, wanted)));
     if let Some((role, wanted)) = named {
@@ -101,6 +110,9 @@ pub(crate) fn choose(
     match fitting[..] {
         [] => Ok(None),
         [one] => Ok(Some(one)),
-        _ => Err(several(found, what, &fitting)),
+        _ => match beside.and_then(|beside| paired(found, &fitting, beside)) {
+            Some(pair) => Ok(Some(pair)),
+            None => Err(several(found, what, &fitting)),
+        },
     }
 }

@@ -20,6 +20,10 @@ Time (s) | R (Ohm) | Strain (%) | Temp (°C) ;; time 1 s, resistance 2 ohm, stra
 Time (s) | R (Ohm) | Strain (%) | R_1 (Ohm) ;; time 1 s, resistance 2 ohm, strain 3 percent
 Time (s) | R (Ohm) | Strain (%) | Sensor B (Ohm) ;; strain 3 percent ? f1: `R (Ohm)` and `Sensor B (Ohm)` may b
 Time (s) | R (Ohm) | Strain (%) | Sensor B (Ohm) ; column resistance=4 ; time 1 s, resistance 4 ohm, strain 3 percent
+Time (s) | Thumb (Ohm) | Index (Ohm) | Thumb angle (deg) | Index angle (deg) ; column resistance=3 ; time 1 s, resistance 3 ohm, angle 5 deg ! f1: `Index angle (deg)` is taken for the
+Time (s) | R1 (Ohm) | R2 (Ohm) | strain 1 (%) | strain 2 (%) ; column resistance=2 ; time 1 s, resistance 2 ohm, strain 4 percent ! f1: `strain 1 (%)` is taken for the refe
+Time (s) | R1 (Ohm) | Left (deg) | Right angle (deg) | Left angle (deg) ;; time 1 s, resistance 2 ohm ? f1: `Right angle (deg)` and `Left angle
+Time (s) | conductance (uS) | Strain (%) ;; time 1 s, resistance 2 uS, strain 3 percent
 Time (s) | R (Ohm) ;; time 1 s, resistance 2 ohm ! f1: no column is taken for strain, displ
 t {steps 0.05} | R {about 1600} | strain {about 0.3} ;; time 1 s, resistance 2 ohm, strain 3 1 ! f1: column `t` has no unit ! f1: column `R` has no unit ! f1: column `strain` has no unit
 t {whole 50} | R (Ohm) | Strain (%) ;; ? f1: column `t` (time): its unit is not k

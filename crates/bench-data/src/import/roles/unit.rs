@@ -4,7 +4,8 @@ use crate::import::roles::facts::{Dates, Facts, Found};
 use crate::import::roles::recipe::Recipe;
 use crate::import::table::{Column, Table};
 use crate::import::words::Role;
-use crate::import::words::names::{self, doubtful_unit, is_change, is_conductance};
+use crate::import::words::kinds::{self, is_change, is_conductance};
+use crate::import::words::names::doubtful_unit;
 use crate::import::words::stamp::Order;
 use crate::import::words::units::{self, Scale, Unit};
 
@@ -189,5 +190,5 @@ impl Asked<'_> {
 /// True if a column has lengths over that at rest: by its name, and numbers about one.
 pub(crate) fn is_stretch_ratio(column: &Column, facts: &Facts) -> bool {
     const USUAL: std::ops::Range<f64> = 0.8..20.0;
-    names::is_stretch_ratio(&column.name) && USUAL.contains(&facts.numbers.median) && facts.numbers.least > 0.0
+    kinds::is_stretch_ratio(&column.name) && USUAL.contains(&facts.numbers.median) && facts.numbers.least > 0.0
 }

@@ -1,5 +1,6 @@
 //! Meanings of words, whatever table they stand in: numbers, dates, units, and quantities by name.
 
+pub(crate) mod kinds;
 pub(crate) mod names;
 mod number;
 mod role;

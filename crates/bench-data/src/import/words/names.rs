@@ -1,3 +1,4 @@
+use crate::import::words::kinds::{folded, is_conductance};
 use crate::import::words::role::Role;
 use crate::import::words::units;
 
@@ -39,43 +40,8 @@ fn cased(name: &str, unit: &str) -> String {
     if is_siemens { unit.replace('s', "S") } else { unit.to_owned() }
 }
 
-/// A name in lower case, without accents, with plain digits and one kind of delta. Umlauts stay: they are letters.
-fn folded(name: &str) -> String {
-    const PLAIN: [(&str, char); 9] = [
-        ("áàâã", 'a'),
-        ("éèêë", 'e'),
-        ("íìî", 'i'),
-        ("óòôõ", 'o'),
-        ("úùû", 'u'),
-        ("ç", 'c'),
-        ("ñ", 'n'),
-        ("∆", 'δ'),
-        ("₀", '0'),
-    ];
-    let plain = |c: char| PLAIN.iter().find(|(accented, _)| accented.contains(c)).map_or(c, |(_, plain)| *plain);
-    name.trim().to_lowercase().chars().map(plain).collect()
-}
-
-/// True if a name says that what stands in a column is the inverse of a resistance.
-pub(crate) fn is_conductance(name: &str) -> bool {
-    let folded = folded(name);
-    ["conductanc", "leitwert", "电导", "電導", "컨덕턴스"].iter().any(|part| folded.contains(part))
-}
-
-/// True if a name says that a strain is a stretch ratio: the length over that at rest.
-pub(crate) fn is_stretch_ratio(name: &str) -> bool {
-    let letters: String = folded(name).chars().filter(|c| c.is_alphanumeric()).collect();
-    is_among("λ,lambda,stretchratio,stretch", &letters) || letters.contains("stretchratio")
-}
-
-/// True if a name is that of a change relative to the resistance at rest, `dR/R0`, not of a ratio, `R/R0`.
-pub(crate) fn is_change(name: &str) -> bool {
-    let folded = folded(name);
-    folded.starts_with(['d', 'δ']) || folded.contains("change") || folded.contains("-r0")
-}
-
 /// True if a word is one of a list with commas between.
-fn is_among(list: &str, word: &str) -> bool {
+pub(crate) fn is_among(list: &str, word: &str) -> bool {
     list.split(',').any(|known| known == word)
 }
 
@@ -162,6 +128,26 @@ const PART: &[(Role, &str)] = &[
     (Role::Angle, "angle,winkel,angulo,角度,각도"),
     (Role::Temperature, "temperature,temperatur,温度,溫度,온도"),
 ];
+
+/// Words of a name that say neither what is measured nor in what: `thumb` of `Thumb angle (deg)`, `2` of `R2`.
+pub(crate) fn stem(name: &str) -> Vec<String> {
+    let folded = folded(name);
+    let mut words: Vec<String> = Vec::new();
+    let mut before = None;
+    for c in folded.chars() {
+        let is_new =
+            before.is_none_or(|before: char| !before.is_alphanumeric() || before.is_numeric() != c.is_numeric());
+        match words.last_mut() {
+            _ if !c.is_alphanumeric() => {}
+            Some(last) if !is_new => last.push(c),
+            _ => words.push(c.to_string()),
+        }
+        before = Some(c);
+    }
+    words.retain(|word| by_name(word, |_| true).is_none() && !units::is_unit(word) || is_index(word));
+    words.sort_unstable();
+    words
+}
 
 /// The role that a column's name and unit give it, if any.
 pub(crate) fn role(name: &str, unit: Option<&str>) -> Option<(Role, Sureness)> {
@@ -258,6 +244,15 @@ mod tests {
         for (heading, name, unit) in cases {
             assert_eq!(take_apart(heading), (name.to_owned(), unit.map(str::to_owned)), "{heading}");
         }
+    }
+
+    #[test]
+    fn a_stem_is_what_is_left_of_a_name() {
+        for (one, other) in [("Thumb", "thumb angle"), ("R2", "Angle 2"), ("res_left-index", "left_index_strain")] {
+            assert!(!stem(one).is_empty() && stem(one) == stem(other), "{one}: {:?} {:?}", stem(one), stem(other));
+        }
+        assert_ne!(stem("R1"), stem("angle2"));
+        assert!(stem("Resistance").is_empty());
     }
 
     #[test]

@@ -43,7 +43,7 @@ const RIDGE: f64 = 0.01;
 /// than a tenth of a movement with a gain of [`SURE`] (in three movements between long holds up to 5.5, by a gauge up to 4.6), four with
 /// this one (halves with sines of a sensor with much hysteresis). Of public recordings, whole to quarters, none shows more than 3.2.
 const CERTAIN: f64 = 6.0;
-/// What a law with a ridge leaves of the readings' mean square even if it is the sensor's: less is as good. Half a period late one
+/// Share of the readings' mean square that a law with a ridge leaves even if it is the sensor's: less is as good. Half a period late one
 /// part of a sine is explained by another, and no worse. Public recordings leave 0.006 and more.
 const EXPLAINED: f64 = 1e-3;
 /// Dash-pots: the two columns between gauge and branches.
@@ -93,7 +93,7 @@ fn of_gauge(errors: &[f64], movement_s: f64) -> Option<Lag> {
     (lag.is_sure() && lag.lag_s.abs() > 3.0 * own_s).then_some(lag)
 }
 
-/// Whether the gauge's errors are much larger around this lag, and earlier by what may be the sensor's own, than elsewhere.
+/// True if the gauge's errors are much larger around this lag, and earlier by what may be the sensor's own, than elsewhere.
 fn contradicts(errors: &[f64], lag: &Lag) -> bool {
     let (first_s, last_s) =
         (lag.lag_s - OWN_SHARE * lag.movement_s - 1.5 * FAR.step_s(), lag.lag_s + 1.5 * FAR.step_s());

@@ -46,12 +46,16 @@ pub fn run(args: &HandArgs, messages: &Messages) -> Result<(), CliError> {
     let inputs = [&args.trace_file, &args.hand].into_iter().chain(&sensors);
     let columns = description.columns();
     let mut rows_out = RowsOut::claim(args.output.as_deref(), &columns, args.replace.force, inputs)?;
-    let live = is_stdin(&args.trace_file) || !args.trace_file.is_file();
-    let mut out = RowWriter::new(rows_out.open(live)?);
-    let streamed = stream(args, &name, source, &mut channels, &columns, &mut out, live, messages);
+    let mut out = RowWriter::new(rows_out.open(is_live(args))?);
+    let streamed = stream(args, &name, source, &mut channels, &columns, &mut out, messages);
     out.flush()?;
     streamed?;
     rows_out.publish()
+}
+
+/// True if somebody waits for each row.
+fn is_live(args: &HandArgs) -> bool {
+    is_stdin(&args.trace_file) || !args.trace_file.is_file()
 }
 
 /// A joint with its filter.
@@ -181,9 +185,9 @@ fn stream<W: Write>(
     channels: &mut [Channel],
     columns: &[String],
     out: &mut RowWriter<W>,
-    live: bool,
     messages: &Messages,
 ) -> Result<(), CliError> {
+    let live = is_live(args);
     let (mut known_header, mut skipped, mut number, mut line) = (None, 0_u64, 0_u64, Vec::new());
     let mut is_empty = true;
     let mut source = BufReader::new(source);

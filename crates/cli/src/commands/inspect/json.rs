@@ -54,6 +54,8 @@ fn file(findings: &Findings, index: usize) -> Value {
         "skipped_lines": layout.skip,
         "header_lines": layout.header_lines,
         "unit_line": layout.unit_line,
+        "exchanged": layout.is_exchanged,
+        "values_in_turn": layout.values_in_turn,
         "text_lines": layout.text_lines,
         "short_lines": layout.short_lines,
         "rows": table.len(),

@@ -2,7 +2,7 @@
 
 use ohmstrain_ekf::record::{Operation, Place};
 
-/// What a way must cost to be worth a branch; a sum or a product costs one.
+/// Least cost of a way that is worth a branch; a sum or a product costs one.
 const WORTH: usize = 10;
 
 /// The ways of choices, and on which of them each result is needed.
@@ -93,7 +93,7 @@ impl Scopes {
         a
     }
 
-    /// What is done in each scope and within it.
+    /// Operations of each scope and those within it.
     fn costs(&self, operations: &[Operation], uses: &[usize]) -> Vec<usize> {
         let mut costs = vec![0; self.around.len()];
         for (place, operation) in operations.iter().enumerate().filter(|(place, _)| uses[*place] > 0) {
@@ -110,7 +110,7 @@ impl Scopes {
         self.branch.get(choice).copied().flatten().and_then(|number| self.branches.get(number))
     }
 
-    /// What the ways of a branch take that is not theirs alone.
+    /// Operations that the ways of a branch take and that are not theirs alone.
     pub fn shared(&self, operations: &[Operation], uses: &[usize], branch: &Branch) -> Vec<Place> {
         let within = |place: Place| branch.arms.iter().any(|arm| self.both(self.of[place], *arm) == *arm);
         let last = branch.choices.iter().copied().max().unwrap_or(0);
@@ -124,7 +124,7 @@ impl Scopes {
     }
 }
 
-/// Whether a result is needed for another one.
+/// True if a result is needed for another one.
 fn takes(operations: &[Operation], result: Place, needed: Place) -> bool {
     result == needed
         || result > needed && operations[result].operands().any(|operand| takes(operations, operand, needed))

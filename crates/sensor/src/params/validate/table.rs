@@ -8,13 +8,13 @@ use thiserror::Error;
 pub struct FieldError {
     /// Where it stands: names of tables and index in an array, `law.branches[0].tau_s`.
     pub field: String,
-    /// What it may be.
+    /// Expected values.
     pub expected: String,
-    /// What it is.
+    /// The value.
     pub found: String,
 }
 
-/// What a number may be, ends included.
+/// Range of a number, ends included.
 #[derive(Clone, Copy)]
 pub struct Allowed {
     /// Smallest value.
@@ -32,7 +32,7 @@ impl Allowed {
 /// Strains, degrees, coefficients: far beyond what sensors have, and near enough for squares and products of some
 /// of them to be numbers.
 pub const SIGNED: Allowed = Allowed { least: -1e9, most: 1e9 };
-/// What a branch may gain or lose per strain, relative to R₀.
+/// Range of a branch's gain per strain, relative to R₀.
 pub const GAIN: Allowed = Allowed { least: -LARGEST_CHANGE, most: LARGEST_CHANGE };
 /// Resistances, times, rates, lengths. The search for noise and motion ends between `e^-25` and `e^15`.
 pub const POSITIVE: Allowed = Allowed { least: 1e-12, most: 1e12 };
@@ -48,7 +48,7 @@ pub const SHARE: Allowed = Allowed { least: 0.0, most: 1.0 };
 pub const FACTOR: Allowed = Allowed { least: 1e-3, most: 1e3 };
 /// Weights of training rows, and entries of matrices made of them.
 pub const WEIGHT: Allowed = Allowed { least: -1e15, most: 1e15 };
-/// What is told and not used: a score, or a variance of what was not determined.
+/// Number that is told and not used: a score, or a variance of what was not determined.
 pub const TOLD: Allowed = Allowed { least: -f64::INFINITY, most: f64::INFINITY };
 /// The same for what is no less than zero.
 pub const TOLD_AMOUNT: Allowed = Allowed { least: 0.0, most: f64::INFINITY };
@@ -90,7 +90,7 @@ impl Table {
         FieldError { field: self.path(name), expected: expected.into(), found: found.to_string() }
     }
 
-    /// What its numbers make together.
+    /// The error of several of its numbers together.
     pub fn wrong_itself(&self, expected: String, found: String) -> FieldError {
         FieldError { field: self.0.clone(), expected, found }
     }
