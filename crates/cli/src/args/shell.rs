@@ -49,7 +49,8 @@ mod tests {
                 let is_second = |at: &[char]| at[0].is_lowercase() && at[1].is_uppercase() && at[2].is_lowercase();
                 letters.first().is_some_and(|first| first.is_uppercase()) && letters.windows(3).any(is_second)
             };
-            let types: Vec<&str> = help.split(|c: char| !c.is_alphanumeric()).filter(is_type).collect();
+            let words = help.split(|c: char| !c.is_alphanumeric()).filter(|word| *word != "NumPy");
+            let types: Vec<&str> = words.filter(is_type).collect();
             assert!(types.is_empty(), "{}: {types:?}", command.get_name());
             command.get_subcommands_mut().for_each(check);
         }
