@@ -1,12 +1,11 @@
 import { readFileSync } from "node:fs";
-import { gzipSync } from "node:zlib";
 import { defineConfig } from "vitest/config";
 import type { Plugin } from "vite";
 import { viteSingleFile } from "vite-plugin-singlefile";
 
 /**
- * The WebAssembly as text, gzip in Base64: the page is one file that works from a disk, and nothing is fetched. Compressed
- * again on its way, it is hardly larger than the bytes would be.
+ * The WebAssembly as text, xz in Base64: the page is one file that works from a disk, and nothing is fetched. Compressed
+ * again on its way, it is hardly larger than the bytes would be; xz takes a third less than gzip.
  */
 function wasmAsText(): Plugin {
   const name = "virtual:wasm";
@@ -15,8 +14,8 @@ function wasmAsText(): Plugin {
     resolveId: (id) => (id === name ? `\0${name}` : undefined),
     load: (id) => {
       if (id !== `\0${name}`) return undefined;
-      const bytes = readFileSync(new URL("pkg/ohmstrain_bg.wasm", import.meta.url));
-      return `export default "${gzipSync(bytes, { level: 9 }).toString("base64")}";`;
+      const bytes = readFileSync(new URL("pkg/ohmstrain_bg.wasm.xz", import.meta.url));
+      return `export default "${bytes.toString("base64")}";`;
     },
   };
 }

@@ -1,6 +1,7 @@
 /** A worker and what it is asked. */
 
-import gzipInBase64 from "virtual:wasm";
+import xzInBase64 from "virtual:wasm";
+import { XzReadableStream } from "xz-decompress";
 import type { Methods } from "./worker";
 import ComputingWorker from "./worker?worker&inline";
 
@@ -9,8 +10,8 @@ let compiled: Promise<WebAssembly.Module> | undefined;
 /** The compiled WebAssembly, once for all workers. */
 function wasm(): Promise<WebAssembly.Module> {
   compiled ??= (async () => {
-    const bytes = Uint8Array.from(atob(gzipInBase64), (letter) => letter.charCodeAt(0));
-    const unpacked = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
+    const bytes = Uint8Array.from(atob(xzInBase64), (letter) => letter.charCodeAt(0));
+    const unpacked = new XzReadableStream(new Blob([bytes]).stream());
     return WebAssembly.compile(await new Response(unpacked).arrayBuffer());
   })();
   return compiled;

@@ -1,4 +1,4 @@
 declare module "virtual:wasm" {
-  const gzipInBase64: string;
-  export default gzipInBase64;
+  const xzInBase64: string;
+  export default xzInBase64;
 }
