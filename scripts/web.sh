@@ -37,7 +37,8 @@ tools() {
 # Runs a command with what scripts/bare-metal.sh is to know of the target.
 for_wasm() {
     BARE_METAL_TARGET=wasm32-unknown-unknown BARE_METAL_STD=std,panic_abort BARE_METAL_TARGET_DIR=$target/web \
-        CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_LINKER=$(linker) "$@"
+        CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_LINKER=$(linker) \
+        CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_RUSTFLAGS="-C target-feature=+simd128" "$@"
 }
 
 # rust-lld of the toolchain: Debian's compiler comes without a linker for WebAssembly.

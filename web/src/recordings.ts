@@ -74,6 +74,7 @@ export class Group {
       ...(described?.remarks.length ? [remarks(described.remarks)] : []),
       ...(described ? [this.columns(described)] : []),
       this.more(described),
+      ...(this.recording ? [h("button", { type: "button", click: () => void this.download() }, "Download trace.csv")] : []),
     );
     if (focused) this.element.querySelector<HTMLElement>(`[name="${focused}"]`)?.focus();
   }
@@ -168,8 +169,6 @@ export class Group {
       h("summary", {}, "More that can be said of it"),
       h("div", { class: "fields" }, length, rate, others),
       command !== "" && h("p", { class: "hint" }, "The same on the command line: ", h("code", {}, command)),
-      this.recording &&
-        h("button", { type: "button", click: () => void this.download() }, "Download trace.csv"),
     );
   }
 

@@ -19,7 +19,7 @@
 //!   filters on the kernel, which say so.
 //!
 //! # Features
-//! `simd` steps four hypotheses at once where the processor has AVX2; `adskalman` hands linearised steps to that crate. Off by default and
+//! `simd` steps four hypotheses at once where the processor has AVX2, or WebAssembly its vectors; `adskalman` hands linearised steps to that crate. Off by default and
 //! without std:
 //! - `serde`: [`Belief`], [`Estimate`], [`Gaussian`], readings, innovations, verdicts of readings and errors as plain data. A
 //!   belief that comes back is not checked; the step that it cannot take is refused. Mixtures, and what is made
