@@ -24,6 +24,7 @@ mod motion_stats;
 mod optimise;
 mod order;
 mod prior;
+mod product;
 mod recording;
 mod samples;
 mod sd_scale;

@@ -84,7 +84,8 @@ def test_pieces_are_the_whole(trace, sensor):
 
 
 def test_doubts_stand_in_a_column(trace, sensor):
-    rows = trace.head(250)[["resistance_ohm"]].assign(time_s=10 * trace["time_s"], sensor_id="left", recording_id=1)
+    readings = trace["resistance_ohm"] * np.where(trace.index < 200, 1.0, 3.0)
+    rows = trace.head(250)[["time_s"]].assign(resistance_ohm=readings, sensor_id="left", recording_id=1)
     with pytest.warns(oh.OhmstrainWarning) as said:
         sensor.filter(rows)
     table = pa.Table.from_pandas(rows, preserve_index=False)

@@ -74,9 +74,9 @@ def test_wrong_options_are_named(sensor):
 
 @pytest.mark.filterwarnings("ignore::ohmstrain.OhmstrainWarning")
 def test_warns_beyond_the_calibration(trace, sensor):
-    longer = trace.assign(time_s=trace["time_s"] * 3)
-    with pytest.warns(oh.OhmstrainWarning, match="longer than") as said:
-        sensor.filter(longer)
+    beyond = trace.assign(resistance_ohm=trace["resistance_ohm"] * 3)
+    with pytest.warns(oh.OhmstrainWarning, match="outside of the calibration") as said:
+        sensor.filter(beyond)
     assert all(one.filename == __file__ for one in said)
 
 

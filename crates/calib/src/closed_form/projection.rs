@@ -1,3 +1,4 @@
+use crate::product::product;
 use nalgebra::{DMatrix, DVector};
 
 use super::datum::Datum;
@@ -61,7 +62,7 @@ impl Projection {
     ///
     /// Source: Kaufman, *BIT* 15 (1975) 49; Golub & Pereyra, *Inverse Problems* 19 (2003) R1.
     pub fn jacobian(&self) -> DMatrix<f64> {
-        &self.range * self.range.tr_mul(&self.slopes) - &self.slopes
+        product(&self.range, &self.range.tr_mul(&self.slopes)) - &self.slopes
     }
 }
 
@@ -79,7 +80,7 @@ pub(super) fn least_squares(basis: &DMatrix<f64>, response: &DVector<f64>) -> Op
     let (left, right) = (svd.u?, svd.v_t?);
     let rank = svd.singular_values.iter().filter(|value| **value > RANK * svd.singular_values[0]).count();
     // Singular values come in descending order.
-    let range = q * left.columns(0, rank);
+    let range = product(&q, &left.columns(0, rank));
     let mut inner = range.tr_mul(response);
     for (value, singular) in inner.iter_mut().zip(svd.singular_values.iter()) {
         *value /= *singular;

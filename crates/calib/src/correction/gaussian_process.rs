@@ -1,3 +1,4 @@
+use crate::product::product;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use ohmstrain_ekf::correction::kernel;
 use ohmstrain_sensor::correction::relevance;
@@ -147,9 +148,9 @@ impl GaussianProcess {
             let (start, end) = (block * n / blocks, (block + 1) * n / blocks);
             let (len, later) = (end - start, n - end);
             let own = triangle.view((start, start), (len, len)).solve_lower_triangular(&DMatrix::identity(len, len))?;
-            let below = triangle.view((end, start), (later, len)) * -&own;
-            let below = inverse.view((end, end), (later, later)) * below;
-            let precision = (own.transpose() * &own + below.transpose() * &below).cholesky()?;
+            let below = product(&triangle.view((end, start), (later, len)), &-&own);
+            let below = product(&inverse.view((end, end), (later, later)), &below);
+            let precision = (own.tr_mul(&own) + below.tr_mul(&below)).cholesky()?;
             inverse.view_mut((start, start), (len, len)).copy_from(&own);
             inverse.view_mut((end, start), (later, len)).copy_from(&below);
             left_out.push(BlockLeftOut { start, errors: precision.solve(&self.weights.rows(start, len)), precision });

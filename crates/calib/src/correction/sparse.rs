@@ -5,6 +5,7 @@
 //! and the state that it began in are its own. Settings and factors are judged by recordings left out: within one recording
 //! neighbours share what another day does not have.
 
+use crate::product::product;
 use std::ops::Range;
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
@@ -149,7 +150,7 @@ impl Sums {
             let weights = factor.solve(&(&self.all.right - &own.right));
             let known = &among - factor.inverse().view((0, 0), (m, m)) * Self::white(noise);
             let kernels = self.kernels.rows(rows.start, rows.len());
-            let (means, weighted) = (kernels * weights.rows(0, m), kernels * known);
+            let (means, weighted) = (kernels * weights.rows(0, m), product(&kernels, &known));
             said.extend(rows.clone().enumerate().map(|(k, row)| {
                 let explained = weighted.row(k).dot(&kernels.row(k));
                 let prior = self.priors[row];
@@ -187,7 +188,7 @@ impl Sums {
         let known = among - left.view((0, 0), (m, m)) * Self::white(noise);
         let parts = (0.5 * (&known + known.transpose())).symmetric_eigen();
         let roots = parts.eigenvalues.map(|value| value.max(0.0).sqrt());
-        let triangle = (DMatrix::from_diagonal(&roots) * parts.eigenvectors.transpose()).qr().r();
+        let triangle = product(&DMatrix::from_diagonal(&roots), &parts.eigenvectors.transpose()).qr().r();
         Some((0..m).flat_map(|i| (i..m).map(move |j| (i, j))).map(|place| triangle[place]).collect())
     }
 }
@@ -203,13 +204,13 @@ impl Normal {
         let m = kernels.ncols();
         let (own, targets) = (kernels.rows(rows.start, rows.len()), targets.rows(rows.start, rows.len()));
         let mut matrix = DMatrix::zeros(all, all);
-        matrix.view_mut((0, 0), (m, m)).copy_from(&(own.transpose() * own * share));
+        matrix.view_mut((0, 0), (m, m)).copy_from(&(own.tr_mul(&own) * share));
         let sums = own.row_sum() * share;
         matrix.view_mut((offset, 0), (1, m)).copy_from(&sums);
         matrix.view_mut((0, offset), (m, 1)).copy_from(&sums.transpose());
         matrix[(offset, offset)] = rows.len() as f64 * share;
         let mut right = DVector::zeros(all);
-        right.rows_mut(0, m).copy_from(&(own.transpose() * targets * share));
+        right.rows_mut(0, m).copy_from(&(own.tr_mul(&targets) * share));
         right[offset] = targets.sum() * share;
         Self { matrix, right, square: targets.norm_squared() * share }
     }

@@ -3,6 +3,7 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 use crate::CalibrationError;
 use crate::law::regression::{LawRegression, Solution};
 use crate::law::structure::LawStructure;
+use crate::product::product;
 use ohmstrain_sensor::{LawParameter, LawParams, Uncertainty};
 
 /// Contiguous blocks over which residuals may be correlated as they like.
@@ -146,7 +147,7 @@ fn carry_over(
             slope[(i, j)] = (up.1 - down.1) / (2.0 * step);
         }
     }
-    let full = &slope * covariance * slope.transpose();
+    let full = product(&product(&slope, covariance), &slope.transpose());
     Uncertainty {
         names,
         standard_errors: (0..values.len()).map(|i| full[(i, i)].max(0.0).sqrt()).collect(),

@@ -1,3 +1,4 @@
+use crate::product::product;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 /// Share of the spread seen that sensors differ by at least, in every direction: what their own errors may take away is
@@ -71,12 +72,12 @@ fn without(seen: &DMatrix<f64>, errors: &DMatrix<f64>) -> DMatrix<f64> {
     if !(tiny > 0.0) {
         return seen.clone();
     }
-    let coloured = &whole.eigenvectors * DMatrix::from_diagonal(&roots);
-    let white = DMatrix::from_diagonal(&roots.map(|x| 1.0 / x)) * whole.eigenvectors.transpose();
-    let share = SymmetricEigen::new(&white * errors * white.transpose());
+    let coloured = product(&whole.eigenvectors, &DMatrix::from_diagonal(&roots));
+    let white = product(&DMatrix::from_diagonal(&roots.map(|x| 1.0 / x)), &whole.eigenvectors.transpose());
+    let share = SymmetricEigen::new(product(&product(&white, errors), &white.transpose()));
     let left = share.eigenvalues.map(|share| (1.0 - share).clamp(LEAST_SHARE, 1.0));
-    let axes = coloured * share.eigenvectors;
-    &axes * DMatrix::from_diagonal(&left) * axes.transpose()
+    let axes = product(&coloured, &share.eigenvectors);
+    product(&product(&axes, &DMatrix::from_diagonal(&left)), &axes.transpose())
 }
 
 #[cfg(test)]

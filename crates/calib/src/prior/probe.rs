@@ -5,6 +5,7 @@ use crate::law::regression::LawRegression;
 use crate::law::robust_loss::robust;
 use crate::law::structure::GaugeFamily;
 use crate::law::structure::LawStructure;
+use crate::product::product;
 use crate::samples::Samples;
 use ohmstrain_sensor::{LawParameter, LawParams, RangeParams, Uncertainty};
 
@@ -73,7 +74,7 @@ impl Probe {
         }
         let size = told.names.len();
         let covariance = DMatrix::from_fn(size, size, |i, j| told.covariance[i][j]);
-        &slopes * covariance * slopes.transpose()
+        product(&product(&slopes, &covariance), &slopes.transpose())
     }
 }
 
