@@ -59,7 +59,7 @@ export class Folder {
 /** A recording of the simulator, as its text. */
 export function simulated(folder: Folder, seed: number): string {
   return folder.run("simulate", "--material", "representative", "--protocol", "mixed", "--speed-mm-s", "5", "--mismatched",
-    "--sample-rate-hz", "10", "--seed", String(seed));
+    "--sample-rate-hz", "5", "--seed", String(seed));
 }
 
 /** The same as a lab with a German computer writes it: a preamble, semicolons, decimal commas, a row of units, kΩ and mm. */
