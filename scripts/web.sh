@@ -4,6 +4,7 @@
 #   web.sh               web/dist/index.html, and the npm package in web/dist-package
 #   web.sh --test        and everything that is tested about them, in Chromium and in Node; pictures in web/dist-pictures
 #   web.sh --picture     and the picture of the README
+#   web.sh --package DIR and the npm package, tried in a clean folder, as a file in DIR
 #   web.sh --tools-only  fails, and says why, where it cannot be built
 #
 # The WebAssembly is built as scripts/bare-metal.sh builds: with rustup's target, or with Debian's rustc-web and rust-web-src.
@@ -74,11 +75,12 @@ package() {
     cp web/package/{package.json,README.md,index.d.ts,node.js,browser.js} web/pkg/ohmstrain{.js,.d.ts,_bg.wasm} web/dist-package
 }
 
-# The package, installed into a clean folder and run.
+# The package, installed into a clean folder and run; a copy of it goes to a folder that is named.
 try_package() {
     local clean
     clean=$(mktemp -d)
     (cd web/dist-package && npm pack --silent --pack-destination "$clean" >/dev/null)
+    [[ -z ${1:-} ]] || cp "$clean"/ohmstrain-*.tgz "$1"
     cp web/package/try.mjs "$clean"
     (cd "$clean" && npm init --yes >/dev/null && npm install --silent --no-audit --no-fund --offline ./ohmstrain-*.tgz && node try.mjs)
     rm -rf "$clean"
@@ -107,4 +109,5 @@ if [[ ${1:-} == --test || ${1:-} == --picture ]]; then
     (cd web && npm test --silent)
     try_package
 fi
+[[ ${1:-} != --package ]] || try_package "$2"
 [[ ${1:-} != --picture ]] || cp web/dist-pictures/readme.png docs/page.png

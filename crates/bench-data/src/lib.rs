@@ -31,6 +31,10 @@
 //!
 #![doc = include_str!("../preset-findings.md")]
 
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 mod cell;
 mod clock;
 mod columns;

@@ -9,6 +9,10 @@
 //! - Deterministic: the same samples give the same parameters. Nothing is random, no clock is read.
 //! - A calibration that cannot be made is a [`CalibrationError`]; nothing panics on recorded data.
 
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 mod baselines;
 mod calibrate;
 pub mod closed_form;

@@ -22,6 +22,10 @@
 //! - An error leaves a filter as it was. A missing reading is none: NaN, `None`.
 //! - Deterministic: nothing is random but with a seed, no clock is read.
 
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 mod builder;
 #[cfg(feature = "calibrate")]
 mod calibrate;
