@@ -21,7 +21,8 @@
 //!   filters on the kernel, which say so.
 //!
 //! # Features
-//! `dual` finds Jacobians of a model in [`kalman`]; `simd` steps four hypotheses at once where the processor has AVX2; `adskalman` hands linearised steps to that crate. Off by default and
+//! `dual` finds Jacobians of a model in [`kalman`]; `simd` steps four hypotheses at once where the processor has AVX2, or WebAssembly
+//! its vectors; `adskalman` hands linearised steps to that crate. Off by default and
 //! without std:
 //! - `serde`: [`Belief`], mixtures, [`Estimate`], [`Gaussian`], readings, innovations, verdicts of readings and errors as plain data;
 //!   and [`live::Memory`], all that a running filter knows. A belief that comes back is not checked; the step that it cannot take is

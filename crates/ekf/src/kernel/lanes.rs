@@ -193,7 +193,10 @@ impl<T: Scalar> Lanes for T {
 
 /// A vector register, or as many as hold a row. It fuses products with sums unless it is to give the bits of a number.
 #[cfg(feature = "simd")]
-#[cfg_attr(not(target_arch = "x86_64"), expect(dead_code, reason = "other processors work on numbers"))]
+#[cfg_attr(
+    not(any(target_arch = "x86_64", target_feature = "simd128")),
+    expect(dead_code, reason = "other processors work on numbers")
+)]
 #[derive(Clone, Copy)]
 pub(crate) struct Vector<V, S, const FUSED: bool = true> {
     pub numbers: V,

@@ -190,7 +190,10 @@ impl<V: Lanes, const B: usize> Parts<V, B> {
     }
 }
 
-#[cfg_attr(not(all(feature = "simd", target_arch = "x86_64")), expect(dead_code, reason = "only vectors ask"))]
+#[cfg_attr(
+    not(all(feature = "simd", any(target_arch = "x86_64", target_feature = "simd128"))),
+    expect(dead_code, reason = "only vectors ask")
+)]
 impl<V: Several, const B: usize> Parts<V, B> {
     /// Of as many beliefs as there are lanes.
     #[inline(always)]

@@ -209,11 +209,15 @@ impl InVectors for f64 {
         Self::from_bits(self.to_bits() << Self::FALLING.mantissa)
     }
 
-    #[cfg(all(feature = "simd", target_arch = "x86_64"))]
+    #[cfg(all(feature = "simd", any(target_arch = "x86_64", target_feature = "simd128")))]
     #[inline(always)]
     fn in_vectors<W: Work<Self>>(work: W) -> Option<W::Said> {
         use fearless_simd::{Level, Simd, SimdBase, f64x4};
+        #[cfg(target_arch = "x86_64")]
         let simd = Level::new().as_avx2()?;
+        // Two registers of WebAssembly's.
+        #[cfg(target_feature = "simd128")]
+        let simd = Level::new().as_wasm_simd128()?;
         let like = super::Vector::<_, _, false> { numbers: f64x4::splat(simd, 0.0), simd };
         Some(simd.vectorize(
             #[inline(always)]
@@ -221,7 +225,7 @@ impl InVectors for f64 {
         ))
     }
 
-    #[cfg(not(all(feature = "simd", target_arch = "x86_64")))]
+    #[cfg(not(all(feature = "simd", any(target_arch = "x86_64", target_feature = "simd128"))))]
     #[inline(always)]
     fn in_vectors<W: Work<Self>>(_: W) -> Option<W::Said> {
         None

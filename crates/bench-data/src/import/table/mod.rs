@@ -2,6 +2,7 @@
 
 mod columns;
 mod data;
+mod description;
 mod fractions;
 mod grid;
 mod header;

@@ -5,6 +5,7 @@ mod mentions;
 mod plan;
 mod recordings;
 mod survey;
+mod survey_lines;
 
 pub use build::Imported;
 pub use plan::Plan;

@@ -97,6 +97,14 @@ pub(crate) fn unit(role: Role, text: &str) -> Option<Unit> {
     found.next().map(|(_, name, scale, _)| Unit { name, scale: *scale })
 }
 
+impl Role {
+    /// Names of its units, as flags have them; none of a role whose numbers have no unit.
+    #[must_use]
+    pub fn units(self) -> Vec<&'static str> {
+        names(self)
+    }
+}
+
 impl StrainUnit {
     /// The unit that a text spells as in a lab's file: `percent`, `%`, `fraction`, `mm/mm`. `None` of every other unit.
     #[must_use]

@@ -1,0 +1,293 @@
+//! Calibration, with its progress, as `ohmstrain calibrate` does it.
+
+use js_sys::{Date, Function, JSON};
+use ohmstrain::{
+    Calibration, Closing, EstimatorKind, GaugeFamily, LeftOutRow, Quantity, ReadingUnit, Stage, Tested,
+    calibration_doubts, motion_doubts,
+};
+use ohmstrain_calib::{Baseline, Samples, ScoredRow, screen};
+use serde::Deserialize;
+use wasm_bindgen::prelude::*;
+
+use crate::doubts::{heed, on_one_clock, shift, warn_of_distrusted};
+use crate::json::{json, refused};
+use crate::recording::Recording;
+use crate::sensor::Sensor;
+
+/// Fewer rows than this say nothing.
+const FEWEST_ROWS: usize = 10;
+
+/// What is left to choose; each has a default.
+#[derive(Debug, Default, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+struct Choices {
+    estimator: Option<String>,
+    branches: Option<usize>,
+    gauge: Option<String>,
+    /// Whether a reference that is late is moved.
+    align: bool,
+    from: Option<f64>,
+    until: Option<f64>,
+    /// What messages call the sensor's file.
+    file: Option<String>,
+}
+
+impl Choices {
+    fn of(value: &JsValue) -> Result<Self, String> {
+        if value.is_undefined() || value.is_null() {
+            return Ok(Self::default());
+        }
+        let text = JSON::stringify(value).map_err(|_| "expected choices as an object")?;
+        serde_json::from_str(&String::from(text)).map_err(|error| error.to_string())
+    }
+
+    fn calibration(&self) -> Result<Calibration<'static>, String> {
+        let mut calibration = Calibration::new();
+        if let Some(wanted) = self.estimator.as_deref().filter(|name| *name != "auto") {
+            calibration = calibration.estimator(estimator(wanted)?);
+        }
+        if let Some(branches) = self.branches {
+            if branches > 4 {
+                return Err(format!("branches: expected 0 to 4, found {branches}"));
+            }
+            calibration = calibration.branches(branches);
+        }
+        let Some(wanted) = self.gauge.as_deref().filter(|name| *name != "auto") else { return Ok(calibration) };
+        let family = GaugeFamily::ALL.into_iter().find(|family| family.name() == wanted).ok_or_else(|| {
+            format!("gauge: expected auto, polynomial, decaying-exponential or tunnelling, found `{wanted}`")
+        })?;
+        Ok(calibration.gauge(family))
+    }
+}
+
+/// An estimator by its name.
+pub fn estimator(name: &str) -> Result<EstimatorKind, String> {
+    EstimatorKind::ALL.into_iter().find(|kind| kind.name() == name).ok_or_else(|| {
+        let names = EstimatorKind::ALL.map(EstimatorKind::name).join(", ");
+        format!("estimator: expected auto or {names}, found `{name}`")
+    })
+}
+
+/// What comes of a calibration.
+#[wasm_bindgen]
+pub struct Calibrated {
+    sensor: ohmstrain::Sensor,
+    lines: Vec<(&'static str, String)>,
+    facts: Vec<(&'static str, String)>,
+    tested: Option<Tested>,
+    advice: Vec<String>,
+    warnings: Vec<String>,
+    is_better: Option<bool>,
+    left_out: Vec<LeftOutRow>,
+    times: Vec<Vec<f64>>,
+}
+
+/// Calibrates a sensor on recordings with known strain. `progress` is called with a stage in words and a share of it, 0 to 1.
+#[wasm_bindgen]
+pub fn calibrate(
+    recordings: Vec<Recording>,
+    #[wasm_bindgen(unchecked_param_type = "Choices | undefined")] choices: JsValue,
+    #[wasm_bindgen(unchecked_param_type = "((stage: string, share: number) => void) | undefined")] progress: JsValue,
+) -> Result<Calibrated, JsError> {
+    let choices = Choices::of(&choices).map_err(refused)?;
+    let progress = progress.dyn_into::<Function>().ok();
+    run(recordings, &choices, progress.as_ref()).map_err(refused)
+}
+
+fn run(wholes: Vec<Recording>, choices: &Choices, progress: Option<&Function>) -> Result<Calibrated, String> {
+    let mut recordings = Vec::new();
+    for whole in &wholes {
+        let part = whole.between(choices.from, choices.until);
+        if part.trace.is_empty() && !whole.trace.is_empty() {
+            return Err(no_rows(whole, choices));
+        }
+        recordings.push(part);
+    }
+    let mut warnings = Vec::new();
+    let lags_s = recordings.iter_mut().map(|one| on_one_clock(one, choices.align, &mut warnings));
+    let lags_s: Vec<f64> = lags_s.collect::<Result<_, _>>()?;
+    let start_ms = Date::now();
+    let calibrated = of_recordings(&recordings, choices.calibration()?, progress, &mut warnings)?;
+    let calibration_s = (Date::now() - start_ms) / 1e3;
+    let mut kept = Vec::new();
+    for ((whole, part), lag_s) in wholes.into_iter().zip(&recordings).zip(lags_s) {
+        if part.trace.len() < whole.trace.len() {
+            let mut whole = whole;
+            shift(&mut whole, lag_s)?;
+            kept.push((whole, part.first_row..part.first_row + part.trace.len()));
+        }
+    }
+    let tested = tested(&kept, &calibrated.sensor);
+    let mut params = calibrated.sensor.into_params();
+    params.tested = tested.as_ref().map(Into::into);
+    let sensor = ohmstrain::Sensor::from_params(params).map_err(|error| error.to_string())?;
+    let closing = Closing {
+        file: choices.file.as_deref(),
+        params: sensor.params(),
+        findings: calibrated.findings.as_ref(),
+        tested: tested.as_ref(),
+        calibration_s: Some(calibration_s),
+        more: "--explain",
+    };
+    let (lines, facts, is_better) = (closing.lines(), closing.facts(), closing.is_better());
+    let kind = choices.estimator.as_deref().filter(|name| !["auto", EstimatorKind::Corrected.name()].contains(name));
+    if let Some(kind) = kind.filter(|_| is_better == Some(false)) {
+        let file = choices.file.as_deref().unwrap_or("the sensor");
+        warnings.push(format!(
+            "{file}: {kind} is no better than a static curve; without --estimator, calibrate tries others and a correction"
+        ));
+    }
+    let advice = calibrated.findings.as_ref().map_or_else(Vec::new, |found| found.advice.clone());
+    let times = recordings.into_iter().map(|recording| recording.trace.time_s).collect();
+    Ok(Calibrated { lines, facts, is_better, advice, warnings, tested, times, left_out: calibrated.left_out, sensor })
+}
+
+fn no_rows(whole: &Recording, choices: &Choices) -> String {
+    let times = &whole.trace.time_s;
+    let (first, last) = (times.first().copied().unwrap_or(f64::NAN), times.last().copied().unwrap_or(f64::NAN));
+    let from = choices.from.map(|from_s| format!("--from {from_s}"));
+    let until = choices.until.map(|until_s| format!("--until {until_s}"));
+    let flags: Vec<String> = from.into_iter().chain(until).collect();
+    format!(
+        "{}: no row is left by {}; the recording goes from {} to {} s",
+        whole.name,
+        flags.join(" "),
+        ohmstrain::number::significant(first, 6),
+        ohmstrain::number::significant(last, 6)
+    )
+}
+
+/// The sensor behind recordings: rows that nobody can trust are left out first, and doubts are answered.
+fn of_recordings(
+    recordings: &[Recording],
+    calibration: Calibration,
+    progress: Option<&Function>,
+    warnings: &mut Vec<String>,
+) -> Result<ohmstrain::Calibrated, String> {
+    let samples: Vec<Samples> = recordings.iter().map(Recording::samples).collect::<Result<_, _>>()?;
+    let first = recordings.first().ok_or("expected a recording, found none")?;
+    let (quantity, unit) = (first.quantity().unwrap_or(Quantity::Strain), first.unit());
+    for recording in recordings {
+        recording.check_unit(unit)?;
+        recording.check_quantity(quantity)?;
+    }
+    let names: Vec<&str> = recordings.iter().map(|recording| recording.name.as_str()).collect();
+    let named = |error: &ohmstrain::CalibrationError| match error {
+        ohmstrain::CalibrationError::TooFewRows { recording, .. } => format!("{}: {error}", names[*recording]),
+        _ => format!("{}: {error}", names.join(", ")),
+    };
+    let as_read = known(recordings, &samples)?;
+    heed(recordings, &motion_doubts(&as_read), warnings)?;
+    let screened = screen(&samples).map_err(|error| named(&error))?;
+    let known = known(recordings, &screened.samples())?;
+    heed(recordings, &calibration_doubts(&known), warnings)?;
+    warn_of_distrusted(recordings, &screened.distrusted, warnings);
+    let calibrated = calibration.run_with(&known, |stage| tell(progress, stage)).map_err(|error| match &error {
+        ohmstrain::Error::Calibration(error) => named(error),
+        other => other.to_string(),
+    })?;
+    heed(recordings, &calibrated.doubts(), warnings)?;
+    Ok(calibrated)
+}
+
+/// Samples of recordings, with what is known of each.
+fn known<'a>(recordings: &'a [Recording], samples: &[Samples<'a>]) -> Result<Vec<ohmstrain::Recording<'a>>, String> {
+    let known = |(recording, samples): (&'a Recording, &Samples<'a>)| {
+        let (trace, metadata) = (&recording.trace, &recording.trace.metadata);
+        let mut one = ohmstrain::Recording::new(samples.time_s(), samples.reading(), samples.strain())
+            .map_err(|error| error.to_string())?;
+        one = one.of_file(&recording.name, &recording.sha256);
+        one = if recording.unit() == ReadingUnit::Ratio { one.of_ratios() } else { one };
+        one = if recording.quantity() == Some(Quantity::AngleDeg) { one.of_angles_deg() } else { one };
+        let knows_ohm = metadata.resistance_unit.is_some() || trace.readings.converter.is_some();
+        one = if metadata.strain_unit.is_some() { one.strain_unit_is_known() } else { one };
+        one = if knows_ohm { one.resistance_unit_is_known() } else { one };
+        let is_clock = |(key, value): &(String, String)| key == "time_unit" && value == "s";
+        one = if metadata.other.iter().any(is_clock) { one.clock_is_known() } else { one };
+        Ok(recording.joint().map_or(one, |joint| one.on_joint(joint)))
+    };
+    recordings.iter().zip(samples).map(known).collect()
+}
+
+/// Says where a calibration is.
+fn tell(progress: Option<&Function>, stage: Stage) {
+    let Some(progress) = progress else { return };
+    let (words, share) = match stage {
+        Stage::Law => ("fitting the law", 0.0),
+        Stage::Noise { done, expected } => ("fitting noise and motion", done as f64 / expected.max(done).max(1) as f64),
+        Stage::LeftOut => ("checking parts left out", 1.0),
+    };
+    // A listener that fails does not stop a calibration.
+    let _ = progress.call2(&JsValue::NULL, &words.into(), &share.into());
+}
+
+/// Scores the default estimator on rows that were kept from the calibration, as it would run live; `None` if there are few.
+fn tested(kept: &[(Recording, std::ops::Range<usize>)], sensor: &ohmstrain::Sensor) -> Option<Tested> {
+    let (mut ours, mut cubics): (Vec<ScoredRow>, Vec<ScoredRow>) = (vec![], vec![]);
+    for (whole, seen) in kept {
+        let mut filter = sensor.filter().build().ok()?;
+        let mut cubic = ohmstrain_calib::running_cubic(sensor.params().static_cubic);
+        // Times go on from recording to recording, so that none goes back.
+        let after = ours.last().map_or(0.0, |row| row.time_s);
+        for row in 0..whole.trace.len() {
+            let (time_s, reading) = whole.row(row);
+            let estimate = filter.step(time_s, reading).ok()?;
+            let on_cubic = cubic.strain(time_s, reading.value);
+            let truth = whole.truth(row);
+            if !seen.contains(&row) && truth.is_finite() {
+                let time_s = after + time_s - whole.trace.time_s[0];
+                ours.push(ScoredRow { time_s, truth, strain: estimate.strain, sd: Some(estimate.strain_sd) });
+                cubics.push(ScoredRow { time_s, truth, strain: on_cubic, sd: None });
+            }
+        }
+    }
+    if ours.len() < FEWEST_ROWS {
+        return None;
+    }
+    let (filter, static_cubic) = (ohmstrain_calib::score(&ours)?, ohmstrain_calib::score(&cubics)?);
+    filter.rmse_percent_fs.is_finite().then_some(Tested { filter, static_cubic })
+}
+
+#[wasm_bindgen]
+impl Calibrated {
+    /// The sensor.
+    pub fn sensor(&self) -> Sensor {
+        Sensor::new(self.sensor.clone(), self.facts.clone(), self.tested)
+    }
+
+    /// The verdict and what it rests on: names and sentences, as `ohmstrain calibrate` prints them.
+    #[wasm_bindgen(unchecked_return_type = "[string, string][]")]
+    pub fn lines(&self) -> Result<JsValue, JsError> {
+        json(&self.lines)
+    }
+
+    /// What to record next, the most important first.
+    pub fn advice(&self) -> Vec<String> {
+        self.advice.clone()
+    }
+
+    /// What casts doubt on it.
+    pub fn warnings(&self) -> Vec<String> {
+        self.warnings.clone()
+    }
+
+    /// Whether it is better than a static curve, by more than chance makes it; undefined if nobody knows.
+    #[wasm_bindgen(getter, js_name = isBetter)]
+    pub fn is_better(&self) -> Option<bool> {
+        self.is_better
+    }
+
+    /// Rows of quarters that were left out, in the order of recordings and times: six columns, one after the other, of recording,
+    /// time in s, reference, strain, its deviation, and the static cubic's strain.
+    #[wasm_bindgen(js_name = leftOut)]
+    pub fn left_out(&self) -> Vec<f64> {
+        let mut rows = self.left_out.clone();
+        rows.sort_by_key(|row| (row.recording, row.row));
+        let time = |row: &LeftOutRow| self.times[row.recording].get(row.row).copied().unwrap_or(f64::NAN);
+        let columns: [&dyn Fn(&LeftOutRow) -> f64; 6] =
+            [&|row| row.recording as f64, &time, &|row| row.truth, &|row| row.strain, &|row| row.strain_sd, &|row| {
+                row.static_cubic
+            }];
+        columns.iter().flat_map(|column| rows.iter().map(column)).collect()
+    }
+}

@@ -1,0 +1,24 @@
+//! A recording of the simulator.
+
+use ohmstrain::MADE_BY;
+use ohmstrain_bench_data::simulate::{Material, Protocol, SimulationSettings, simulate};
+use wasm_bindgen::prelude::*;
+
+use crate::json::refused;
+use crate::recording::Recording;
+
+/// A simulated bench session, that of `ohmstrain demo` with this seed.
+#[wasm_bindgen]
+pub fn example(seed: u32) -> Result<Recording, JsError> {
+    let settings = SimulationSettings {
+        speed_mm_s: 5.0,
+        mismatched: true,
+        seed: seed.into(),
+        ..SimulationSettings::new(Material::Representative, Protocol::MIXED)
+    };
+    let mut trace = simulate(&settings).map_err(refused)?;
+    trace.metadata.other.push(("made_by".into(), format!("{MADE_BY} simulate")));
+    let mut bytes = Vec::new();
+    trace.write(&mut bytes).map_err(refused)?;
+    Recording::of_trace("example.csv", bytes).map_err(refused)
+}

@@ -1,0 +1,114 @@
+//! A lab's files: bytes in, what stands in them out.
+
+use ohmstrain_bench_data::Trace;
+use ohmstrain_bench_data::import::{LARGEST_FILE, Table, read_table};
+use wasm_bindgen::prelude::*;
+
+use crate::inspection::{Inspection, Proposal, proposed};
+use crate::json::refused;
+use crate::recording::Recording;
+use crate::said;
+
+/// Files of one recording, as a lab wrote them: text, XLSX, Parquet, each perhaps in gzip.
+#[wasm_bindgen]
+#[derive(Default)]
+pub struct Files {
+    files: Vec<(String, Vec<u8>)>,
+}
+
+#[wasm_bindgen]
+impl Files {
+    /// No file yet.
+    #[wasm_bindgen(constructor)]
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Another file of the recording.
+    pub fn add(&mut self, name: String, bytes: Vec<u8>) -> Result<(), JsError> {
+        if bytes.len() as u64 > LARGEST_FILE {
+            let most = LARGEST_FILE >> 20;
+            let hint = "take a part of it, or fewer columns";
+            return Err(refused(format!("{name}: expected a file of at most {most} MiB, found a larger one; {hint}")));
+        }
+        self.files.push((name, bytes));
+        Ok(())
+    }
+
+    /// What stands in them, and the recording or the question that follows. `said` are flags of `ohmstrain import`, as a
+    /// shell takes them.
+    pub fn inspect(&self, said: &str) -> Result<Inspection, JsError> {
+        let recipe = said::recipe(said).map_err(refused)?;
+        for (name, bytes) in &self.files {
+            refuse_results(name, bytes).map_err(refused)?;
+        }
+        let table = |(index, (name, bytes)): (usize, &(String, Vec<u8>))| {
+            read_table(bytes.clone(), name, &recipe.read_options(index))
+        };
+        let tables: Vec<Table> = self.files.iter().enumerate().map(table).collect::<Result<_, _>>().map_err(refused)?;
+        let found = proposed(&tables, &recipe).and_then(|(plan, imported)| {
+            let as_is = if said.is_empty() { self.as_is(&imported.trace) } else { None };
+            let is_trace = as_is.is_some();
+            let recording = match as_is {
+                Some(recording) => recording,
+                None => self.imported(imported.trace.clone())?,
+            };
+            Ok(Proposal { plan, imported, recording, is_trace })
+        });
+        Ok(Inspection { tables, found })
+    }
+}
+
+impl Files {
+    /// The file itself, if it is a trace that reads as it would be imported.
+    fn as_is(&self, imported: &Trace) -> Option<Recording> {
+        let [(name, bytes)] = &self.files[..] else { return None };
+        if bytes.starts_with(b"PAR1") {
+            return None;
+        }
+        let recording = Recording::of_trace(name, bytes.clone()).ok()?;
+        let is_same =
+            recording.trace.readings.kind == imported.readings.kind && numbers(&recording.trace).eq(numbers(imported));
+        is_same.then_some(recording)
+    }
+
+    /// A trace as `ohmstrain import` writes it.
+    fn imported(&self, mut trace: Trace) -> Result<Recording, String> {
+        let other = &mut trace.metadata.other;
+        other.retain(|(key, _)| key != "made_by");
+        other.push(("made_by".into(), format!("{} import", ohmstrain::MADE_BY)));
+        let mut bytes = Vec::new();
+        trace.write(&mut bytes).map_err(|error| error.to_string())?;
+        Recording::of_trace(self.trace_name(), bytes).map_err(|error| error.to_string())
+    }
+
+    /// The name that the command line proposes.
+    pub(crate) fn trace_name(&self) -> &'static str {
+        let is_taken = |name: &&str| self.files.iter().any(|(file, _)| file == name);
+        let names = ["trace.csv", "imported.csv", "imported-trace.csv"];
+        names.into_iter().find(|name| !is_taken(name)).unwrap_or("imported-trace-1.csv")
+    }
+}
+
+/// The bits of all its numbers.
+fn numbers(trace: &Trace) -> impl Iterator<Item = u64> {
+    let reference = trace.reference.iter().flat_map(|reference| &reference.values);
+    trace.time_s.iter().chain(&trace.readings.values).chain(reference).map(|number| number.to_bits())
+}
+
+/// Bytes that tell what a file is.
+const HEAD: usize = 4096;
+
+/// Refuses what this program made of recordings, which looks like a table, too.
+fn refuse_results(name: &str, bytes: &[u8]) -> Result<(), String> {
+    let head = String::from_utf8_lossy(&bytes[..bytes.len().min(HEAD)]);
+    let header = head.lines().next().unwrap_or_default();
+    let what = if head.starts_with("format = ") {
+        "is a sensor file: use it as the sensor, and drop the recording here"
+    } else if ohmstrain::Column::are_all(header.split(',')) {
+        "has estimates, what `filter` or `smooth` made of a recording: give the recording itself"
+    } else {
+        return Ok(());
+    };
+    Err(format!("{name} {what}"))
+}

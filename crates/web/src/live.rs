@@ -1,0 +1,86 @@
+//! A running filter: readings in, estimates out.
+
+use js_sys::JSON;
+use ohmstrain::Column;
+use serde::Deserialize;
+use wasm_bindgen::prelude::*;
+
+use crate::calibration::estimator;
+use crate::json::{json, refused};
+
+/// How a filter is to be; each has a default.
+#[derive(Debug, Default, Deserialize)]
+#[serde(default, rename_all = "camelCase", deny_unknown_fields)]
+pub struct Wishes {
+    estimator: Option<String>,
+    rest_resistance: Option<f64>,
+    initial_strain: Option<f64>,
+    gate: Option<f64>,
+}
+
+impl Wishes {
+    /// Of an object, or of nothing.
+    pub fn of(value: &JsValue) -> Result<Self, String> {
+        if value.is_undefined() || value.is_null() {
+            return Ok(Self::default());
+        }
+        let text = JSON::stringify(value).map_err(|_| "expected wishes as an object")?;
+        serde_json::from_str(&String::from(text)).map_err(|error| error.to_string())
+    }
+}
+
+/// A running filter.
+#[wasm_bindgen]
+pub struct Filter {
+    filter: ohmstrain::Filter,
+    columns: Vec<Column>,
+}
+
+impl Filter {
+    pub(crate) fn new(sensor: &ohmstrain::Sensor, wishes: &Wishes) -> Result<Self, String> {
+        let mut builder = sensor.filter();
+        if let Some(name) = wishes.estimator.as_deref().filter(|name| *name != "auto") {
+            builder = builder.estimator(estimator(name)?);
+        }
+        if let Some(measured) = wishes.rest_resistance {
+            builder = builder.rest_resistance(measured);
+        }
+        if let Some(strain) = wishes.initial_strain {
+            builder = builder.initial_strain(strain);
+        }
+        if let Some(nis) = wishes.gate {
+            builder = builder.gate(nis);
+        }
+        let filter = builder.build().map_err(|error| error.to_string())?;
+        Ok(Self { filter, columns: sensor.columns() })
+    }
+}
+
+#[wasm_bindgen]
+impl Filter {
+    /// Takes a reading, in the sensor's unit, at a time, s; NaN stands for a missing one. The estimate has the names of
+    /// `estimates.csv`. An error leaves the filter as it was.
+    #[wasm_bindgen(unchecked_return_type = "Estimate")]
+    pub fn step(&mut self, time_s: f64, reading: f64) -> Result<JsValue, JsError> {
+        json(&self.filter.step(time_s, reading).map_err(refused)?)
+    }
+
+    /// Takes many readings at once; the columns of their estimates, one after the other, in the order of the sensor's columns.
+    #[wasm_bindgen(js_name = stepAll)]
+    pub fn step_all(&mut self, time_s: &[f64], reading: &[f64]) -> Result<Vec<f64>, JsError> {
+        let rows = time_s.iter().zip(reading).map(|(time_s, reading)| self.filter.step(*time_s, *reading));
+        let rows: Vec<_> = rows.collect::<Result<_, _>>().map_err(refused)?;
+        Ok(self.columns.iter().flat_map(|column| rows.iter().map(|row| column.number(row))).collect())
+    }
+
+    /// Tells a strain that is known now, and its standard deviation: 0 at rest.
+    pub fn know(&mut self, strain: f64, sd: f64) -> Result<(), JsError> {
+        self.filter.know(strain, sd).map(|_| ()).map_err(refused)
+    }
+
+    /// Tells what the rested sensor reads now.
+    #[wasm_bindgen(js_name = restResistance)]
+    pub fn rest_resistance(&mut self, measured: f64) -> Result<(), JsError> {
+        self.filter.rest_resistance(measured).map_err(refused)
+    }
+}

@@ -1,0 +1,128 @@
+//! The HTML report on a recording, and its figures.
+
+use ohmstrain::verdict::{Known, verdict};
+use ohmstrain::{MADE_BY, ScoredRow, Scores, Sensor, SensorParams, Tested};
+use ohmstrain_calib::Baseline;
+use ohmstrain_report::{FigureFiles, Report, ReportInput, Sample, ScoreRow, Scored};
+use wasm_bindgen::prelude::*;
+
+use crate::recording::Recording;
+
+/// A report and its figures.
+#[wasm_bindgen]
+pub struct Drawn {
+    html: String,
+    figures: Vec<FigureFiles>,
+}
+
+#[wasm_bindgen]
+impl Drawn {
+    /// The report, one page of HTML with nothing outside of it.
+    #[wasm_bindgen(getter)]
+    pub fn html(&self) -> String {
+        self.html.clone()
+    }
+
+    /// Names and contents of the figures' files, one after the other.
+    pub fn figures(&self) -> Vec<String> {
+        let files = |figure: &FigureFiles| {
+            let name = &figure.name;
+            [format!("{name}.svg"), figure.svg.clone(), format!("{name}.csv"), figure.csv.clone()]
+        };
+        self.figures.iter().flat_map(files).collect()
+    }
+}
+
+/// Filters, smooths, scores and draws.
+pub fn drawn(
+    sensor: &Sensor,
+    recording: &Recording,
+    facts: &[(&'static str, String)],
+    tested: Option<&Tested>,
+) -> Result<Drawn, String> {
+    let named = |error: ohmstrain::Error| format!("{}: {error}", recording.name);
+    let (params, trace) = (sensor.params(), &recording.trace);
+    let builder = sensor.filter().estimator(params.default_estimator);
+    let mut filter = builder.build().map_err(named)?;
+    let mut filtered = Vec::with_capacity(trace.len());
+    for row in 0..trace.len() {
+        let (time_s, reading) = recording.row(row);
+        filtered.push(filter.step(time_s, reading).map_err(named)?);
+    }
+    let mut smoothed = Vec::with_capacity(trace.len());
+    let keep = |_, segment: &[ohmstrain::Estimate]| {
+        smoothed.extend(segment.iter().rev());
+        Ok::<(), ohmstrain::Error>(())
+    };
+    builder.smooth_backward(trace.len(), |row| recording.row(row), keep).map_err(named)?;
+    smoothed.reverse();
+    let rest_reading = sensor.rest_reading(None);
+    let moved = params.rest_reading / rest_reading;
+    let of = |rows: &[ohmstrain::Estimate]| score(recording, |k| (rows[k].strain, Some(rows[k].strain_sd)));
+    let mut cubic = ohmstrain_calib::running_cubic(params.static_cubic);
+    let readings = trace.time_s.iter().zip(&trace.readings.values);
+    let cubics: Vec<f64> = readings.map(|(&time_s, &reading)| cubic.strain(time_s, moved * reading)).collect();
+    let filter = of(&filtered);
+    let static_cubic = score(recording, |k| (cubics[k], None));
+    let rows = [("filter", filter), ("smoother", of(&smoothed)), ("static cubic", static_cubic)];
+    let scores: Vec<ScoreRow> =
+        rows.into_iter().filter_map(|(name, scores)| scores.map(|scores| row(name, &scores))).collect();
+    let sample = sample(recording, params);
+    let left_out = params.summary.as_ref().filter(|_| sample != Sample::Out).map(Known::from);
+    let verdict = filter.map(|filter| {
+        let known = [Known::new(&filter, static_cubic.as_ref())].into_iter();
+        verdict(&known.chain(left_out).chain(tested.map(Known::from)).collect::<Vec<_>>())
+    });
+    let input = ReportInput {
+        title: &recording.name,
+        made_by: MADE_BY,
+        time_s: &trace.time_s,
+        reading: &trace.readings.values,
+        truth: trace.reference.as_ref().map(|reference| reference.values.as_slice()),
+        filtered: &filtered,
+        smoothed: &smoothed,
+        params,
+        rest_reading,
+        scored: Scored { from_s: None, until_s: None },
+        sample,
+        estimator: params.default_estimator,
+        scores: &scores,
+        verdict,
+        facts,
+    };
+    let failed = |error: ohmstrain_report::ReportError| error.to_string();
+    let report = Report::new(&input).map_err(failed)?;
+    Ok(Drawn { html: report.html().map_err(failed)?, figures: report.figures().map_err(failed)? })
+}
+
+/// Scores of all rows; `None` without a reference.
+fn score(recording: &Recording, estimate: impl Fn(usize) -> (f64, Option<f64>)) -> Option<Scores> {
+    let row = |k: usize| {
+        let (strain, sd) = estimate(k);
+        ScoredRow { time_s: recording.trace.time_s[k], truth: recording.truth(k), strain, sd }
+    };
+    ohmstrain_calib::score(&(0..recording.trace.len()).map(row).collect::<Vec<_>>())
+}
+
+/// Whether its rows were calibrated on, by the times that a sensor has of each recording.
+fn sample(recording: &Recording, params: &SensorParams) -> Sample {
+    let of_it = params.recordings.iter().filter(|info| info.sha256 == recording.sha256);
+    let seen = |time_s: &&f64| of_it.clone().any(|info| (info.first_s..=info.last_s).contains(*time_s));
+    let rows = recording.trace.time_s.iter();
+    match rows.clone().filter(seen).count() {
+        0 => Sample::Out,
+        all if all == rows.count() => Sample::In,
+        _ => Sample::Partly,
+    }
+}
+
+fn row<'a>(name: &'a str, scores: &Scores) -> ScoreRow<'a> {
+    ScoreRow {
+        name,
+        rmse: scores.rmse,
+        rmse_percent_fs: scores.rmse_percent_fs,
+        coverage_95: scores.coverage_95,
+        width_95_percent_fs: scores.width_95_percent_fs,
+        crps_percent_fs: scores.crps_percent_fs,
+    }
+}
