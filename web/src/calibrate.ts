@@ -7,7 +7,7 @@ import type { Group } from "./recordings";
 import { type SensorState, state } from "./state";
 
 const ESTIMATORS: [string, string][] = [
-  ["auto", "auto (up to a minute)"],
+  ["auto", "auto (a minute or two)"],
   ["ekf", "ekf (a second or two)"],
   ["sign-split", "sign-split"],
   ["hypotheses", "hypotheses"],
