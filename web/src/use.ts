@@ -11,8 +11,17 @@ import { type SensorState, state } from "./state";
 const BUDGETS: [string, string][] = [
   ["", "all of it, as on a computer"],
   ["lean", "lean: 15 000 instructions a step (Arduino Zero and larger)"],
-  ["flash=32768,ram=2048", "flash 32 KB, RAM 2 KB (Arduino Uno)"],
-  ["flash=131072,ram=16384", "flash 128 KB, RAM 16 KB (small STM32)"],
+  ["board=uno", "Arduino Uno"],
+  ["board=nano", "Arduino Nano"],
+  ["board=nano33", "Arduino Nano 33 IoT"],
+  ["board=nano33ble", "Arduino Nano 33 BLE"],
+  ["board=teensy40", "Teensy 4.0"],
+  ["board=esp32", "ESP32"],
+  ["board=esp32c3", "ESP32-C3"],
+  ["board=rp2040", "Raspberry Pi Pico (RP2040)"],
+  ["board=stm32f1", "Blue Pill (STM32F103C8)"],
+  ["board=stm32f4", "Black Pill (STM32F411CE)"],
+  ["board=stm32l4", "Nucleo-L432KC"],
 ];
 
 const chosen = { recording: "", target: "c", budget: "", step: "" };

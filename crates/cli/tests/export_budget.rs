@@ -68,6 +68,41 @@ fn what_does_not_fit_is_said() {
     assert!(!bench.path("none").exists());
 }
 
+/// A board has room for half of the time between two readings, and three quarters of its memory; costs are those of its processor.
+#[test]
+fn a_board_is_a_budget() {
+    let bench = every_filter();
+    let export = [
+        "export",
+        "--dt-s",
+        DT_S,
+        "--sensor",
+        "corrected.toml",
+        "--target",
+        "c",
+        "-o",
+        "boards",
+        "--force",
+        "--budget",
+    ];
+    let within = |budget: &str| bench.run(&[&export[..], &[budget]].concat());
+    let printed = within("board=stm32f4").ok();
+    // 100 MHz and 0.2 s; 512 KiB and 128 KiB.
+    assert!(printed.contains("Black Pill, STM32F411CE") && printed.contains("| room for it there"), "{printed}");
+    assert!(printed.contains("10000000") && printed.contains("393216") && printed.contains("98304"), "{printed}");
+    // A processor without floating point takes longer for the same filter.
+    let rp2040 = within("board=rp2040").ok();
+    let instructions = |printed: &str, row: &str| {
+        let row = printed.lines().find(|line| line.contains(row)).unwrap();
+        row.split('|').nth(INSTRUCTIONS).unwrap().trim().parse::<f64>().unwrap()
+    };
+    let times = instructions(&rp2040, "RP2040") / instructions(&rp2040, "exported");
+    assert!((48.0..49.0).contains(&times), "{rp2040}");
+    let unknown = within("board=duo");
+    assert_eq!(unknown.code, Some(2));
+    assert!(unknown.stderr.contains("no board is called duo; boards: uno, nano"), "{}", unknown.stderr);
+}
+
 /// A recording's reading with a fault.
 type Fault = (&'static str, fn(usize, f64) -> f64);
 

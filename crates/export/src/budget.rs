@@ -5,39 +5,59 @@ use std::str::FromStr;
 use ohmstrain_sensor::{EstimatorKind, SensorParams};
 
 use super::ExportError;
-use super::cost::{Cost, cost};
-use super::plan::Plan;
+use super::boards::Board;
+use super::cost::{Cost, Processor, cost_of};
+use super::plan::{ChipFilter, Plan};
 use super::reduced::Rows;
 
-/// Largest cost of a filter.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// Largest cost of a filter, on a Cortex-M4F or on a board.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Budget {
-    instructions: usize,
-    flash: usize,
-    ram: usize,
+    board: Option<&'static Board>,
+    instructions: Option<usize>,
+    flash: Option<usize>,
+    ram: Option<usize>,
+}
+
+/// Room for a filter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Room {
+    /// Instructions a step.
+    pub instructions: usize,
+    /// Flash, bytes.
+    pub flash: usize,
+    /// RAM, the stack included, bytes.
+    pub ram: usize,
 }
 
 /// Instructions a step of a `lean` filter: 100 steps a second are a tenth of a processor of 16 MHz.
 const LEAN: usize = 15_000;
 
-const EXPECTED: &str = "expected lean, or some of instructions=N,flash=BYTES,ram=BYTES";
+fn expected() -> String {
+    format!("expected lean, or some of board=NAME,instructions=N,flash=BYTES,ram=BYTES; boards: {}", Board::names())
+}
 
 impl FromStr for Budget {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let mut budget = Self { instructions: usize::MAX, flash: usize::MAX, ram: usize::MAX };
+        let mut budget = Self::default();
         if text == "lean" {
-            return Ok(Self { instructions: LEAN, ..budget });
+            return Ok(Self { instructions: Some(LEAN), ..budget });
         }
         for part in text.split(',') {
-            let (name, number) = part.split_once('=').ok_or(EXPECTED)?;
-            let number: usize = number.parse().map_err(|_| format!("{EXPECTED}; {number} is no whole number"))?;
+            let (name, value) = part.split_once('=').ok_or_else(expected)?;
+            if name == "board" {
+                let unknown = || format!("no board is called {value}; boards: {}", Board::names());
+                budget.board = Some(Board::named(value).ok_or_else(unknown)?);
+                continue;
+            }
+            let number = value.parse().map_err(|_| format!("{}; {value} is no whole number", expected()))?;
             match name {
-                "instructions" => budget.instructions = number,
-                "flash" => budget.flash = number,
-                "ram" => budget.ram = number,
-                _ => return Err(EXPECTED.to_owned()),
+                "instructions" => budget.instructions = Some(number),
+                "flash" => budget.flash = Some(number),
+                "ram" => budget.ram = Some(number),
+                _ => return Err(expected()),
             }
         }
         Ok(budget)
@@ -45,6 +65,42 @@ impl FromStr for Budget {
 }
 
 impl Budget {
+    /// The board, if it is one's.
+    pub const fn board(&self) -> Option<&'static Board> {
+        self.board
+    }
+
+    /// Processor on which costs are compared.
+    fn processor(&self) -> Processor {
+        self.board.map_or(Processor::Single, |board| board.processor)
+    }
+
+    /// Room for a filter whose readings come every `dt_s` seconds. A number that is given stands before the board's.
+    pub fn room(&self, dt_s: f64) -> Room {
+        let of_board = self.board.map(|board| Room {
+            instructions: board.instructions(dt_s),
+            flash: board.flash_for_filter(),
+            ram: board.ram_for_filter(),
+        });
+        let most = of_board.unwrap_or(Room { instructions: usize::MAX, flash: usize::MAX, ram: usize::MAX });
+        Room {
+            instructions: self.instructions.unwrap_or(most.instructions),
+            flash: self.flash.unwrap_or(most.flash),
+            ram: self.ram.unwrap_or(most.ram),
+        }
+    }
+
+    /// Cost of a plan where the budget is compared with it: on the board, or on a Cortex-M4F.
+    ///
+    /// # Errors
+    /// If the sensor has no exported form.
+    pub fn cost(&self, params: &SensorParams, plan: &Plan, dt_s: f64) -> Result<Cost, ExportError> {
+        let chip = ChipFilter::new(params, plan)?;
+        Ok(cost_of(params, &chip, dt_s)?.on(self.processor(), &chip))
+    }
+}
+
+impl Room {
     /// True if a filter costs no more.
     const fn allows(&self, cost: &Cost) -> bool {
         cost.instructions <= self.instructions && cost.flash <= self.flash && cost.ram() <= self.ram
@@ -93,9 +149,10 @@ const fn rows(mean: usize, variance: usize) -> Left {
 pub fn fitting(params: &SensorParams, budget: &Budget, dt_s: f64) -> Result<Vec<Plan>, ExportError> {
     let mut fitting = Vec::new();
     let mut smallest: Option<Cost> = None;
+    let room = budget.room(dt_s);
     for plan in plans(params) {
-        let cost = cost(params, &plan, dt_s)?;
-        if budget.allows(&cost) {
+        let cost = budget.cost(params, &plan, dt_s)?;
+        if room.allows(&cost) {
             fitting.push(plan);
         }
         smallest = smallest.filter(|least| least.instructions <= cost.instructions).or(Some(cost));
@@ -131,16 +188,36 @@ fn plans(params: &SensorParams) -> Vec<Plan> {
 
 #[cfg(test)]
 mod tests {
-    use super::{Budget, LEAN};
+    use super::{Board, Budget, LEAN, Room};
 
     #[test]
-    fn a_budget_is_lean_or_a_list_of_numbers() {
-        let most = usize::MAX;
-        let budget = |instructions, flash, ram| Ok(Budget { instructions, flash, ram });
-        assert_eq!("lean".parse(), budget(LEAN, most, most));
-        assert_eq!("flash=32768,ram=2048".parse(), budget(most, 32768, 2048));
-        for text in ["", "fat", "flash", "flash=1.5", "flash=-1", "speed=3", "ram=1,,"] {
+    fn a_budget_is_lean_or_a_list_of_numbers_and_a_board() {
+        let budget = |instructions, flash, ram| Ok(Budget { board: None, instructions, flash, ram });
+        assert_eq!("lean".parse(), budget(Some(LEAN), None, None));
+        assert_eq!("flash=32768,ram=2048".parse(), budget(None, Some(32768), Some(2048)));
+        let uno = Budget { board: Board::named("uno"), ..Budget::default() };
+        assert_eq!("board=uno".parse(), Ok(uno));
+        assert_eq!("board=uno,ram=900".parse(), Ok(Budget { ram: Some(900), ..uno }));
+        for text in ["", "fat", "flash", "flash=1.5", "flash=-1", "speed=3", "ram=1,,", "uno"] {
             assert!(text.parse::<Budget>().is_err(), "{text}");
         }
+    }
+
+    #[test]
+    fn a_board_and_an_interval_are_room_and_a_number_stands_before_it() {
+        let room = |text: &str| text.parse::<Budget>().unwrap().room(0.02);
+        assert_eq!(room("board=uno"), Room { instructions: 160_000, flash: 24_192, ram: 1536 });
+        assert_eq!(room("board=uno,flash=20000").flash, 20_000);
+        assert_eq!(room("lean"), Room { instructions: LEAN, flash: usize::MAX, ram: usize::MAX });
+    }
+
+    #[test]
+    fn an_unknown_board_is_answered_with_all_names() {
+        let error = "board=duo".parse::<Budget>().unwrap_err();
+        assert_eq!(
+            error,
+            "no board is called duo; boards: uno, nano, nano33, nano33ble, teensy40, esp32, esp32c3, rp2040, stm32f1, \
+             stm32f4, stm32l4"
+        );
     }
 }

@@ -3,6 +3,7 @@
 //! Exported code computes in `f32`, at a fixed rate, operation by operation as the Rust filter does (`twin`); the same sensor and interval give the same files.
 
 mod arithmetic;
+mod boards;
 mod budget;
 mod constants;
 mod correction;
@@ -25,9 +26,10 @@ use minijinja::syntax::SyntaxConfig;
 use minijinja::value::Serde;
 use ohmstrain_sensor::{EstimatorKind, SensorParams};
 
-pub use budget::{Budget, fitting};
+pub use boards::{BOARDS, Board};
+pub use budget::{Budget, Room, fitting};
 use constants::Exported;
-pub use cost::{Cost, cost};
+pub use cost::{Cost, Processor, cost};
 use ohmstrain::MADE_BY;
 pub use plan::{ChipFilter, Plan};
 pub use prefix::Prefix;

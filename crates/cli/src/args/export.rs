@@ -44,8 +44,10 @@ pub struct ExportArgs {
     /// Estimator to export: auto (the sensor's default), corrected, sign-split, hypotheses or ekf
     #[arg(long, default_value = "auto")]
     pub estimator: Auto<Estimator>,
-    /// The best that fits a chip, fewer hypotheses and rows of the correction if need be: lean (15 000 instructions a step on a
-    /// Cortex-M4F), or some of instructions=N,flash=BYTES,ram=BYTES. With --score the best on that recording, else by a table
+    /// The best that fits a chip, fewer hypotheses and rows of the correction if need be: board=NAME (uno, nano, nano33, nano33ble,
+    /// teensy40, esp32, esp32c3, rp2040, stm32f1, stm32f4, stm32l4: half of its time between two readings, three quarters of its
+    /// flash and RAM), lean (15 000 instructions a step on a Cortex-M4F), or some of instructions=N,flash=BYTES,ram=BYTES. With
+    /// --score the best on that recording, else by a table
     #[arg(long, value_name = "BUDGET", conflicts_with = "estimator")]
     pub budget: Option<Budget>,
     /// What names in C begin with: two sensors in one program need names of their own

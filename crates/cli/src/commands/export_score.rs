@@ -9,7 +9,7 @@ use crate::commands::score_table::covered;
 use crate::error::CliError;
 use crate::input::TraceFile;
 use crate::output::{self, print};
-use ohmstrain_export::{self as export, ChipFilter, ExportTarget, Plan, ReplayedRow};
+use ohmstrain_export::{self as export, ChipFilter, Cost, ExportTarget, Plan, ReplayedRow};
 
 /// A recording with a reference, and what this computer and a static cubic make of it, as they would live.
 pub struct OnRecording {
@@ -126,8 +126,18 @@ impl Promise {
             exported = of_all(&scores);
             worse_on = (scores.rmse > cubic.rmse).then(|| recording.name.clone());
         }
-        exported.extend([cost.instructions, cost.flash, cost.ram(), cost.stack].map(|number| number.to_string()));
+        let of_cost =
+            |cost: &Cost| [cost.instructions, cost.flash, cost.ram(), cost.stack].map(|number| number.to_string());
+        exported.extend(of_cost(&cost));
         add("exported", exported);
+        if let Some((budget, board)) = args.budget.as_ref().and_then(|budget| Some((budget, budget.board()?))) {
+            let nothing = || vec![String::new(); 2];
+            let cost = budget.cost(params, plan, args.dt_s).map_err(|error| CliError::export(&error, &name))?;
+            add(&format!("on {}", board.title), [nothing(), of_cost(&cost).to_vec()].concat());
+            let room = budget.room(args.dt_s);
+            let most = [room.instructions, room.flash, room.ram].map(|number| number.to_string());
+            add("room for it there", [nothing(), most.to_vec()].concat());
+        }
         Ok(Self { lines: table.lines().collect(), words: chip.words(), worse_on })
     }
 
