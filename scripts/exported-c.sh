@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
 # Compiles and runs what `ohmstrain export` writes: C on the host with GCC and Clang, for Cortex-M0+ and -M4F, and there
-# under QEMU; the sketch against a stand-in for Arduino, and for a Mega 2560 with Arduino's core; the Rust
-# module in a no_std crate for Cortex-M4F, and on the host through a recording, as exported C goes through it.
+# under QEMU; the sketch against a stand-in for Arduino, and for a Mega 2560 and an Uno with Arduino's core; small
+# filters for an ATmega328P under simavr; the Rust module in a no_std crate for Cortex-M4F, and on the host through a recording, as exported C goes through it.
 #
 #   exported-c.sh
 #
-# Installs gcc, clang, cmake, gcc-arm-none-eabi, libnewlib-arm-none-eabi, qemu-system-arm, gcc-avr, avr-libc and arduino-core-avr by
-# apt where they are missing and this is root. Prints the largest differences, sizes and instructions per step. Needs a minute.
+# Installs gcc, clang, cmake, gcc-arm-none-eabi, libnewlib-arm-none-eabi, qemu-system-arm, gcc-avr, avr-libc, simavr and arduino-core-avr
+# by apt where they are missing and this is root. Prints the largest differences, sizes and instructions per step. Needs a minute.
 #
 # Environment:
 #   OHMSTRAIN  the program; default: built by cargo
@@ -18,11 +18,11 @@ work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
 if ! command -v clang >/dev/null || ! command -v gcc >/dev/null || ! command -v qemu-system-arm >/dev/null ||
-    ! command -v cmake >/dev/null || ! command -v avr-gcc >/dev/null || [[ ! -d /usr/share/arduino/hardware/arduino/avr ]] || ! echo '#include <math.h>' | arm-none-eabi-gcc -E - >/dev/null 2>&1; then
+    ! command -v cmake >/dev/null || ! command -v avr-gcc >/dev/null || ! command -v simavr >/dev/null || [[ ! -d /usr/share/arduino/hardware/arduino/avr ]] || ! echo '#include <math.h>' | arm-none-eabi-gcc -E - >/dev/null 2>&1; then
     apt-get -q update >/dev/null
     DEBIAN_FRONTEND=noninteractive apt-get -q install -y --no-install-recommends \
         gcc g++ clang cmake make libc6-dev gcc-arm-none-eabi libnewlib-arm-none-eabi qemu-system-arm \
-        gcc-avr avr-libc arduino-core-avr >/dev/null
+        gcc-avr avr-libc simavr arduino-core-avr >/dev/null
 fi
 
 ohmstrain=${OHMSTRAIN:-}
@@ -143,7 +143,29 @@ for kind in polynomial-2-corrected:lean polynomial-2-corrected:instructions=2500
     on_target "$folder" cortex-m4f "${m4f[@]}"
     promised "$folder"
 done
-say "polynomial-2-corrected-lean, Arduino" "$("$here/arduino-avr.sh" "$work/polynomial-2-corrected-lean")"
+say "polynomial-2-corrected-lean, Mega" "$("$here/arduino-avr.sh" "$work/polynomial-2-corrected-lean" mega)"
+
+# Small filters for an Uno: the self-test there, in simavr, with what `export` promises of it; the sketch with Arduino's core.
+for kind in polynomial:0 polynomial:1 polynomial:2 tunnelling:2; do
+    IFS=: read -r gauge branches <<<"$kind"
+    name=$gauge-$branches-uno
+    folder=$work/$name
+    "$ohmstrain" --quiet calibrate "$work/trace.csv" --until 120 --estimator ekf --gauge "$gauge" --branches "$branches" -o "$folder.toml"
+    "$ohmstrain" export --sensor "$folder.toml" --target c --dt-s 0.2 -o "$folder" --budget board=uno >"$folder.txt"
+    on_host "$folder" gcc -O1 -DOHMSTRAIN_LISTED=1 -fsanitize=address,undefined -fno-sanitize-recover
+    "$here/uno.sh" "$folder" >"$folder.run"
+    while read -r line; do say "$name, simavr" "$line"; done <"$folder.run"
+    # shellcheck disable=SC2046  # five words
+    set -- $(grep -oE 'step: [0-9]+|state [0-9]+|stack [0-9]+' "$folder.run" | grep -oE '[0-9]+') $(awk -F'|' '/on Arduino Uno/ { print $5, $6, $7, $8 }' "$folder.txt")
+    avr-gcc -mmcu=atmega328p -Os -std=gnu11 -Wall -Wextra -Werror -c "$folder/src/ohmstrain.c" -o "$work/filter.o"
+    near "$name" "cycles a step" "$1" "$4"
+    near "$name" "bytes of code and constants" "$(avr-size "$work/filter.o" | awk 'NR == 2 { print $1 }')" "$5"
+    near "$name" "bytes of state and stack" "$(($2 + $3))" "$6"
+    near "$name" "bytes of stack" "$3" "$7"
+    "$here/arduino-avr.sh" "$folder" uno >"$work/size"
+    while read -r line; do say "$name, Uno" "$line"; done <"$work/size"
+    awk '{ if ($3 > 24 * 1024) { print "more than 24 KiB of flash: " $0; exit 1 } }' "$work/size" >&2
+done
 
 cmake -S "$folder" -B "$work/build" >/dev/null
 cmake --build "$work/build" >/dev/null

@@ -96,7 +96,7 @@ impl Budget {
     /// If the sensor has no exported form.
     pub fn cost(&self, params: &SensorParams, plan: &Plan, dt_s: f64) -> Result<Cost, ExportError> {
         let chip = ChipFilter::new(params, plan)?;
-        Ok(cost_of(params, &chip, dt_s)?.on(self.processor(), &chip))
+        Ok(cost_of(params, &chip, dt_s)?.on(self.processor(), &params.law, &chip))
     }
 }
 

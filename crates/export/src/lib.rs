@@ -116,7 +116,8 @@ const C: [Template; 10] = [
 ];
 
 /// Files that `ohmstrain.c` includes.
-const C_PARTS: [Template; 2] = [
+const C_PARTS: [Template; 3] = [
+    ("listed.c", include_str!("templates/listed.c")),
     ("hypotheses.c", include_str!("templates/hypotheses.c")),
     ("correction.c", include_str!("templates/correction.c")),
 ];

@@ -8,7 +8,8 @@ use ohmstrain_ekf::{Gaussian, Influence, Reading, ReadingVerdict};
 use ohmstrain_model::Number;
 
 use super::correction;
-use super::function::{Printed, RETURNED};
+use super::function::{Kept, Printed, RETURNED};
+use super::listed::Lists;
 use crate::twin::{OwnedLearned, Parts};
 
 const LOW_PASSES: usize = TIME_CONSTANTS_S.len();
@@ -19,8 +20,8 @@ pub struct Around<'a> {
 }
 
 impl Around<'_> {
-    /// All functions.
-    pub fn text(&self) -> String {
+    /// All functions, each as a list, too, if there are lists.
+    pub fn text(&self, lists: Option<&mut Lists>) -> String {
         let of_readings = [Self::pass_time(), self.sieve(), startles(), self.coarser(), weighted(), self.reported()];
         let of_rest = [self.on_followed_rest(), self.of_session(), self.follow(), self.jumped()];
         let of_doubts =
@@ -35,11 +36,28 @@ impl Around<'_> {
                 self.parts.limits_in::<f32>(),
             )));
         }
-        all.iter().map(Printed::text).collect::<Vec<_>>().join("\n")
+        let text: Vec<String> = match lists {
+            None => all.iter().map(Printed::text).collect(),
+            Some(lists) => {
+                let kept = self.kept();
+                all.iter().map(|printed| printed.either(&kept, lists)).collect()
+            }
+        };
+        text.join("\n")
     }
 
     /// Their state from step to step, as fields of a struct.
     pub fn fields(&self) -> Vec<String> {
+        let Declared { numbers, truths, .. } = self.declared();
+        numbers.into_iter().chain(truths).collect()
+    }
+
+    /// Names of these fields.
+    fn kept(&self) -> Kept {
+        self.declared().kept
+    }
+
+    fn declared(&self) -> Declared {
         let mut fields = Declared::default();
         Repeats::<Expression<'_>>::none().each(&mut fields);
         Jumps::<Expression<'_>>::none().each(&mut fields);
@@ -48,7 +66,7 @@ impl Around<'_> {
         if let Some(correction) = self.parts.correction {
             ReadingFeatures::<Expression<'_>>::new(correction.features.to()).each(&mut fields);
         }
-        fields.numbers.into_iter().chain(fields.truths).collect()
+        fields
     }
 
     fn live<'t>(&self) -> LiveParts<Expression<'t>, ()> {
@@ -359,23 +377,35 @@ fn number<'t>(number: f32) -> Expression<'t> {
 struct Declared {
     numbers: Vec<String>,
     truths: Vec<String>,
+    kept: Kept,
 }
 
 impl<T> See<T> for Declared {
     fn number(&mut self, name: &'static str, _: &mut T) {
         self.numbers.push(format!("float {name};"));
+        self.kept.numbers.push(name.to_owned());
     }
 
     fn truth(&mut self, name: &'static str, _: &mut bool) {
         self.truths.push(format!("unsigned char {name};"));
+        self.kept.truths.push(name.to_owned());
     }
 
     fn maybe<const K: usize>(&mut self, name: &'static str, _: &mut Option<[T; K]>) {
         self.truths.push(format!("unsigned char has_{name};"));
-        self.numbers.push(if K == 1 { format!("float {name};") } else { format!("float {name}[{K}];") });
+        self.kept.truths.push(format!("has_{name}"));
+        self.list::<K>(name);
     }
 
     fn numbers<const K: usize>(&mut self, name: &'static str, _: &mut [T; K]) {
-        self.numbers.push(format!("float {name}[{K}];"));
+        self.list::<K>(name);
+    }
+}
+
+impl Declared {
+    fn list<const K: usize>(&mut self, name: &str) {
+        self.numbers.push(if K == 1 { format!("float {name};") } else { format!("float {name}[{K}];") });
+        let entry = |k: usize| if K == 1 { name.to_owned() } else { format!("{name}[{k}]") };
+        self.kept.numbers.extend((0..K).map(entry));
     }
 }

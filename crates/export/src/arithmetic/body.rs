@@ -1,6 +1,6 @@
 //! Recorded operations as lines of C.
 
-mod scopes;
+pub mod scopes;
 
 use std::fmt::Write;
 
@@ -207,7 +207,7 @@ fn hazard(tail: Place) -> String {
 }
 
 /// How often each result is used by what leads to the results.
-fn uses_of_needed(operations: &[Operation], results: &[Place]) -> Vec<usize> {
+pub fn uses_of_needed(operations: &[Operation], results: &[Place]) -> Vec<usize> {
     let mut uses = vec![0; operations.len()];
     results.iter().for_each(|place| uses[*place] += 1);
     for place in (0..operations.len()).rev() {

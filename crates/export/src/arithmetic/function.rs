@@ -5,6 +5,7 @@ use std::fmt::Write;
 use ohmstrain_ekf::record::{Function, Name, Operation, Writer, write_down};
 
 use super::body::Body;
+use super::listed::{Lists, Slot, list};
 
 /// Name of a result that the function returns.
 pub const RETURNED: &str = "return";
@@ -71,15 +72,114 @@ impl Printed {
         }
         let returns = returned.map_or_else(String::new, |value| format!("    return {value};\n"));
         let has_state = inputs.iter().any(|name| matches!(name, Name::Field(_))) || changes;
-        let seen = if changes { "readings *seen" } else { "const readings *seen" };
-        let parameters: Vec<String> = has_state
-            .then(|| seen.to_owned())
-            .into_iter()
-            .chain(self.parameters.iter().map(|parameter| (*parameter).to_owned()))
-            .chain(outputs)
-            .collect();
+        let parameters = self.declared(has_state, changes, outputs);
         let body = format!("{}{written}{returns}", body.lines);
         defined(self.comment, &format!("{kind} {}", self.name), &parameters, &body)
+    }
+}
+
+/// A function as a list, and compiled.
+pub fn either(listed: &str, compiled: &str) -> String {
+    let listed = listed.replacen("\nstatic ", "\nAPART static ", 1);
+    format!("#if OHMSTRAIN_LISTED\n{listed}#else\n{compiled}#endif\n")
+}
+
+/// Fields that functions keep: numbers, and truths after them.
+#[derive(Debug, Default)]
+pub struct Kept {
+    pub numbers: Vec<String>,
+    pub truths: Vec<String>,
+}
+
+impl Printed {
+    /// The function as a list, if it is worth one, and compiled.
+    pub fn either(&self, fields: &Kept, lists: &mut Lists) -> String {
+        let compiled = self.text();
+        self.listed(fields, lists).map_or_else(|| compiled.clone(), |listed| either(&listed, &compiled))
+    }
+
+    fn listed(&self, fields: &Kept, lists: &mut Lists) -> Option<String> {
+        let Function { inputs, results, recorded } = &self.function;
+        let field = |name: &str| {
+            let number = fields.numbers.iter().position(|field| field == name).map(Slot::Number);
+            number.or_else(|| fields.truths.iter().position(|field| field == name).map(Slot::Truth))
+        };
+        let mut given = 0;
+        let mut slot = |name: &Name| match name {
+            Name::Field(name) => field(name),
+            Name::Own(_) => {
+                given += 1;
+                Some(Slot::Given(given - 1))
+            }
+        };
+        let slots: Vec<Slot> = inputs.iter().map(&mut slot).collect::<Option<_>>()?;
+        let ends: Vec<Slot> = results.iter().map(&mut slot).collect::<Option<_>>()?;
+        let is_as_it_was = |name: &Name, place: usize| match recorded.operations[place] {
+            Operation::Input(input) | Operation::Flag(input) => {
+                matches!(name, Name::Field(_)) && inputs[input] == *name
+            }
+            _ => false,
+        };
+        let mut kept = Vec::new();
+        for ((name, place), end) in results.iter().zip(&recorded.results).zip(&ends) {
+            if !is_as_it_was(name, *place) {
+                kept.push((*place, *end));
+            }
+        }
+        let lists_of = list(lists, recorded, &|input| slots[input], &kept)?;
+        let is_truth = |place: usize| Body::new(recorded, &|_| String::new()).is_truth(place);
+        let kind = |truth: bool| if truth { "truth" } else { "number" };
+        let mut body = format!("{lists_of}    cell given[{}];\n", given.max(1));
+        for (number, (name, slot)) in inputs.iter().zip(&slots).enumerate() {
+            if let (Name::Own(name), Slot::Given(at)) = (name, slot) {
+                let truth = recorded.operations.contains(&Operation::Flag(number));
+                let cast = if truth { "(unsigned char)" } else { "" };
+                let _ = writeln!(body, "    given[{at}].{} = {cast}{name};", kind(truth));
+            }
+        }
+        let changes = kept.iter().any(|(_, slot)| !matches!(slot, Slot::Given(_)));
+        let has_state = changes || inputs.iter().any(|name| matches!(name, Name::Field(_)));
+        let state = match (has_state, fields.numbers.first(), fields.truths.first()) {
+            (true, Some(number), Some(truth)) => {
+                format!("(float *)&seen->{number}, (unsigned char *)&seen->{truth}")
+            }
+            _ => "0, 0".to_owned(),
+        };
+        let _ = writeln!(body, "    run_list(OPERATIONS, CONSTANTS, {state}, 0, given);");
+        let (mut outputs, mut flags, mut returned, mut of_kind) = (Vec::new(), Vec::new(), None, "void");
+        for ((name, place), end) in results.iter().zip(&recorded.results).zip(&ends) {
+            let (Slot::Given(at), truth) = (end, is_truth(*place)) else { continue };
+            match name {
+                Name::Field(_) => {}
+                Name::Own(own) if own == RETURNED => {
+                    of_kind = if truth { "int" } else { "float" };
+                    returned = Some(format!("given[{at}].{}", kind(truth)));
+                }
+                Name::Own(own) if own.starts_with(FLAG) => {
+                    of_kind = "unsigned";
+                    flags.push(format!("(given[{at}].truth ? (unsigned){own} : 0u)"));
+                }
+                Name::Own(own) => {
+                    outputs.push(format!("{} *{own}", if truth { "int" } else { "float" }));
+                    let _ = writeln!(body, "    *{own} = given[{at}].{};", kind(truth));
+                }
+            }
+        }
+        if !flags.is_empty() {
+            returned = Some(flags.join(" |\n           "));
+        }
+        if let Some(returned) = returned {
+            let _ = writeln!(body, "    return {returned};");
+        }
+        let parameters = self.declared(has_state, changes, outputs);
+        Some(defined(self.comment, &format!("{of_kind} {}", self.name), &parameters, &body))
+    }
+
+    /// Parameters in C.
+    fn declared(&self, has_state: bool, changes: bool, outputs: Vec<String>) -> Vec<String> {
+        let seen = if changes { "readings *seen" } else { "const readings *seen" };
+        let own = self.parameters.iter().map(|parameter| (*parameter).to_owned());
+        has_state.then(|| seen.to_owned()).into_iter().chain(own).chain(outputs).collect()
     }
 }
 

@@ -4,15 +4,19 @@ mod around;
 mod body;
 mod correction;
 mod function;
+mod listed;
 
+use std::collections::BTreeSet;
 use std::fmt::Write;
 
 use ohmstrain_ekf::record::{Carried, Operation, Piece, Recorded};
 use ohmstrain_model::Phase;
 
 pub use around::Around;
-use body::Body;
-use function::defined;
+use body::{Body, uses_of_needed};
+use function::{defined, either};
+pub use listed::Lists;
+use listed::{Slot, list};
 
 /// A function to be printed.
 struct Function {
@@ -234,9 +238,33 @@ const SPLITS: [Function; 7] = [
     },
 ];
 
-/// The functions of an extended Kalman filter.
-pub fn of_ekf(carried: Carried, steps: &[String], record: impl Fn(Piece) -> Recorded) -> String {
-    printed(&[&OPEN], (carried, steps), record)
+/// The functions of an extended Kalman filter, each as a list, too, if there are lists.
+pub fn of_ekf(
+    lists: Option<&mut Lists>,
+    carried: Carried,
+    steps: &[String],
+    record: impl Fn(Piece) -> Recorded,
+) -> String {
+    let Some(lists) = lists else { return printed(&[&OPEN], (carried, steps), record) };
+    let kept = steps_of_ekf(carried, &record);
+    let functions = [FALLING].iter().chain(&OPEN);
+    let text = |function: &Function| function.either((carried, steps), &kept, &record(function.piece), lists);
+    functions.map(text).collect::<Vec<_>>().join("\n")
+}
+
+/// Numbers of a step that an extended Kalman filter needs, by their places among all.
+pub fn steps_of_ekf(carried: Carried, record: impl Fn(Piece) -> Recorded) -> Vec<usize> {
+    let mut needed = BTreeSet::new();
+    for function in &OPEN {
+        let recorded = record(function.piece);
+        let first = carried.means + carried.covariances + function.names_of_inputs(carried).len();
+        let uses = uses_of_needed(&recorded.operations, &recorded.results);
+        needed.extend(recorded.operations.iter().zip(uses).filter_map(|(operation, uses)| match operation {
+            Operation::Input(input) if uses > 0 => input.checked_sub(first),
+            _ => None,
+        }));
+    }
+    needed.into_iter().collect()
 }
 
 /// The functions of a filter of hypotheses; `splits` if by the sign of the rate.
@@ -250,6 +278,55 @@ fn printed(functions: &[&[Function]], state: (Carried, &[String]), record: impl 
 }
 
 impl Function {
+    /// The function as a list, and compiled.
+    fn either(&self, state: (Carried, &[String]), steps: &[usize], recorded: &Recorded, lists: &mut Lists) -> String {
+        let compiled = self.text(state, recorded);
+        self.listed(state.0, steps, recorded, lists)
+            .map_or_else(|| compiled.clone(), |listed| either(&listed, &compiled))
+    }
+
+    /// The same as a list, if it is worth one. Of the numbers of a step those at these places are there.
+    fn listed(&self, carried: Carried, steps: &[usize], recorded: &Recorded, lists: &mut Lists) -> Option<String> {
+        let state = if self.has_state { carried.means + carried.covariances } else { 0 };
+        let inputs = self.names_of_inputs(carried);
+        let slot_of = |input: usize| match input {
+            input if input < state => Slot::Number(input),
+            input if input < state + inputs.len() => Slot::Given(input - state),
+            input => Slot::Step(steps.binary_search(&(input - state - inputs.len())).unwrap_or(usize::MAX)),
+        };
+        let own = if self.piece.changes_state() { state } else { 0 };
+        let slots = (0..own).map(Slot::Number).chain((inputs.len()..).map(Slot::Given));
+        let is_new = |k: usize, place: usize| k >= own || recorded.operations[place] != Operation::Input(k);
+        let kept = recorded.results.iter().copied().zip(slots).enumerate();
+        let kept: Vec<_> = kept.filter(|(k, (place, _))| is_new(*k, *place)).map(|(_, result)| result).collect();
+        let lists_of = list(lists, recorded, &slot_of, &kept)?;
+        let takes_step = recorded
+            .operations
+            .iter()
+            .any(|operation| matches!(operation, Operation::Input(input) if *input >= state + inputs.len()));
+        let mut body = format!("{lists_of}    cell given[{}];\n", (recorded.results.len() - own + inputs.len()).max(1));
+        for (k, name) in inputs.iter().enumerate() {
+            let _ = writeln!(body, "    given[{k}].number = {name};");
+        }
+        if self.has_state {
+            body.push_str("    (void)p; /* which follows x */\n");
+        }
+        let x = if self.has_state { "(float *)x" } else { "0" };
+        let step = if takes_step { "s" } else { "0" };
+        let _ = writeln!(body, "    run_list(OPERATIONS, CONSTANTS, {x}, 0, {step}, given);");
+        for (k, name) in self.outputs.iter().enumerate() {
+            let _ = writeln!(body, "    *{name} = given[{}].number;", inputs.len() + k);
+        }
+        let last = inputs.len() + self.outputs.len();
+        match self.returns {
+            Returns::Nothing => {}
+            Returns::Truth => drop(writeln!(body, "    return given[{last}].truth;")),
+            Returns::Number => drop(writeln!(body, "    return given[{last}].number;")),
+        }
+        let name = format!("{} {}", self.returns.kind(), self.name);
+        Some(defined(self.comment, &name, &self.parameters(takes_step), &body))
+    }
+
     fn text(&self, (carried, steps): (Carried, &[String]), recorded: &Recorded) -> String {
         let (state, changes) = (carried.means + carried.covariances, self.piece.changes_state());
         let inputs = self.names_of_inputs(carried);

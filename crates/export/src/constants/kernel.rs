@@ -7,10 +7,11 @@ use ohmstrain_ekf::{
 use ohmstrain_sensor::{EstimatorKind, HISTORIES, HYPOTHESES};
 use serde::Serialize;
 
+use crate::arithmetic::{self, Lists};
 use crate::fixed_rate::FixedRate;
 use crate::literal::{Literal, literals};
 use crate::twin::filter_parts;
-use crate::{ExportError, arithmetic, parameter};
+use crate::{ExportError, parameter};
 
 /// Constants that depend on the length of a step.
 #[derive(Debug, Serialize)]
@@ -57,26 +58,31 @@ impl SharedConstants {
 
 impl StepConstants {
     /// Of a sensor, by the names that the kernel gives them.
-    pub fn new<const B: usize, const N: usize>(sensor: &FixedRate<'_, B, N>, names: &[String]) -> Self {
-        let table = &sensor.table;
+    /// What the filter does without is left out.
+    pub fn new<const B: usize, const N: usize>(sensor: &FixedRate<'_, B, N>, recorded: &Recorded) -> Self {
+        let (table, names) = (&sensor.table, &recorded.names);
+        let all: Vec<usize> = (0..table.rows[0].len()).collect();
+        let kept = recorded.steps.as_ref().unwrap_or(&all);
         let narrow = |numbers: &[f64]| numbers.iter().map(|x| Literal(*x as f32)).collect();
+        let of_kept = |numbers: &[f32]| literals(&kept.iter().map(|place| numbers[*place]).collect::<Vec<_>>());
+        let at = |step_s: f32| of_kept(&sensor.numbers_at(step_s));
         let finite = |number: f32| number.is_finite().then_some(Literal(number));
         Self {
-            names: names.to_vec(),
+            names: kept.iter().filter_map(|place| names.get(*place).cloned()).collect(),
             usual_s: Literal(sensor.usual_step_s()),
             longest_s: Literal(sensor.narrow().longest_step_s),
             grace: Literal(STEP_GRACE as f32),
             growth: Literal(STEP_GROWTH as f32),
             evenly: Literal(STEP_EVENLY as f32),
             longest_pause_s: Literal(LONGEST_PAUSE_S as f32),
-            usual: literals(&sensor.numbers_at(sensor.usual_step_s())),
-            instant: sensor.numbers_at(0.0).into_iter().map(finite).collect(),
-            whole: sensor.whole_steps_s().into_iter().map(|length_s| literals(&sensor.numbers_at(length_s))).collect(),
+            usual: at(sensor.usual_step_s()),
+            instant: kept.iter().map(|place| finite(sensor.numbers_at(0.0)[*place])).collect(),
+            whole: sensor.whole_steps_s().into_iter().map(at).collect(),
             lower_s: Literal(table.range.0 as f32),
             upper_s: Literal(table.range.1 as f32),
             nodes: narrow(&table.nodes),
             inverses: narrow(&table.inverses),
-            rows: table.rows.iter().map(|row| narrow(row)).collect(),
+            rows: table.rows.iter().map(|row| kept.iter().map(|place| Literal(row[*place] as f32)).collect()).collect(),
             reciprocals: table.reciprocals.iter().map(|(at, of)| (names[*at].clone(), names[*of].clone())).collect(),
         }
     }
@@ -89,6 +95,8 @@ pub struct Recorded {
     pub numbers: MixtureNumbers,
     /// Of what depends on the length of a step, as C has them.
     pub names: Vec<String>,
+    /// Places of those that the filter needs; `None` if it needs all, and the probabilities of a chain of phases after them.
+    pub steps: Option<Vec<usize>>,
 }
 
 impl Recorded {
@@ -96,7 +104,10 @@ impl Recorded {
     ///
     /// # Errors
     /// If the filter cannot work with its numbers.
-    pub fn new<const B: usize, const N: usize>(sensor: &FixedRate<'_, B, N>) -> Result<Self, ExportError> {
+    pub fn new<const B: usize, const N: usize>(
+        sensor: &FixedRate<'_, B, N>,
+        lists: Option<&mut Lists>,
+    ) -> Result<Self, ExportError> {
         let kernel: SparseEkf<f32, Compact, B, N> =
             SparseEkf::new(sensor.model, sensor.usual_step_s()).map_err(parameter)?;
         let names: Vec<String> = kernel.step_names().iter().map(|name| name.to_uppercase()).collect();
@@ -108,7 +119,9 @@ impl Recorded {
         };
         let record = |piece| kernel.record(piece);
         let Some(phases) = sensor.parts.phases else {
-            return Ok(Self { arithmetic: arithmetic::of_ekf(carried, &names, record), numbers: none, names });
+            let steps = Some(arithmetic::steps_of_ekf(carried, record));
+            let arithmetic = arithmetic::of_ekf(lists, carried, &names, record);
+            return Ok(Self { arithmetic, numbers: none, names, steps });
         };
         let (dwell, evidence) = filter_parts(&phases, sensor.narrow().limits).map_err(parameter)?;
         let splits = sensor.parts.kind == EstimatorKind::SignSplit;
@@ -117,6 +130,7 @@ impl Recorded {
         } else {
             Hypotheses::<_, B, N, HISTORIES, _>::around(kernel, dwell, evidence).numbers()
         };
-        Ok(Self { arithmetic: arithmetic::of_hypotheses(splits, carried, &names, record), numbers, names })
+        let arithmetic = arithmetic::of_hypotheses(splits, carried, &names, record);
+        Ok(Self { arithmetic, numbers, names, steps: None })
     }
 }

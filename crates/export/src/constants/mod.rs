@@ -8,7 +8,7 @@ use ohmstrain_ekf::live::{BESIDE_SHARE, DOUBT, FARTHEST_REST, KNOWN_BEYOND, Live
 use ohmstrain_sensor::{EstimatorKind, PortableFilter, Quantity, ReadingUnit, SensorParams, with_sizes};
 use serde::Serialize;
 
-use super::arithmetic::Around;
+use super::arithmetic::{Around, Lists};
 use super::correction::CorrectionConstants;
 use super::cost::Cost;
 use super::fixed_rate::FixedRate;
@@ -75,6 +75,8 @@ pub struct Exported {
     /// The kernel as functions in C, and what stands around it.
     arithmetic: String,
     around: String,
+    /// What the lists of operations take; `None` without lists.
+    lists: Option<ListConstants>,
     /// State from step to step, as C declares it.
     fields: Vec<String>,
     /// Plan of the filter in words, and about what it costs.
@@ -89,6 +91,20 @@ pub struct Exported {
     prior: PriorConstants,
     phases: Option<PhaseConstants>,
     vectors: Vectors,
+}
+
+/// Registers, names and cases of operations, for `templates/listed.c`.
+#[derive(Debug, Serialize)]
+struct ListConstants {
+    registers: usize,
+    names: Vec<&'static str>,
+    cases: Vec<String>,
+}
+
+impl ListConstants {
+    fn new(lists: &Lists) -> Self {
+        Self { registers: lists.registers(), names: lists.names(), cases: lists.cases() }
+    }
 }
 
 /// How the filter is called.
@@ -134,11 +150,17 @@ impl Exported {
         let filter = &chip.filter;
         let live = sensor.narrow();
         let LiveParts { strain_sd_scale, limits, reading_variance, .. } = live;
-        let Recorded { arithmetic, numbers, names } = Recorded::new(&sensor)?;
+        // Hypotheses and corrections are too large for a chip that has no room for compiled functions.
+        let is_small = filter.kind == EstimatorKind::Ekf && filter.correction.is_none();
+        let mut lists = Lists::default();
+        let recorded = Recorded::new(&sensor, is_small.then_some(&mut lists))?;
+        let steps = StepConstants::new(&sensor, &recorded);
+        let Recorded { arithmetic, numbers, .. } = recorded;
         let model = &sensor.model;
         let start: Belief<f32, N, L> = Belief::initial(model);
         let around = Around { parts: &sensor.parts };
         let finite = |number: f32| number.is_finite().then_some(Literal(number));
+        let around_filter = around.text(is_small.then_some(&mut lists));
         let vectors = Vectors::new::<B, N, L>(&sensor)?;
         let exported = Self {
             made_by: made_by.into(),
@@ -174,7 +196,7 @@ impl Exported {
             sieve: SieveConstants::new(&live.sieve),
             follow: FollowConstants::new(live.rest),
             doubt: DoubtConstants::new(&live.doubt, Literal((DOUBT.zero * params.limits.span()) as f32)),
-            steps: StepConstants::new(&sensor, &names),
+            steps,
             fresh_mean: numbers.fresh.iter().map(|rate| Literal(rate.mean)).collect(),
             fresh_variance: numbers.fresh.iter().map(|rate| Literal(rate.variance)).collect(),
             tempering: (numbers.tempering != 1.0).then_some(Literal(-0.5 * numbers.tempering)),
@@ -185,7 +207,8 @@ impl Exported {
                 .as_ref()
                 .map(|correction| CorrectionConstants::new(correction, chip.quadratics.as_ref(), dt_s as f32)),
             arithmetic,
-            around: around.text(),
+            around: around_filter,
+            lists: is_small.then(|| ListConstants::new(&lists)),
             fields: around.fields(),
             words: chip.words(),
             is_smaller: chip.is_smaller(),

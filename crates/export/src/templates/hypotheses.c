@@ -325,6 +325,19 @@ static int add_children(children *all, const hypothesis *parent, const float s[S
 }
 {% endif %}
 
+/* What the filter believes. */
+typedef ohmstrain_mixture belief;
+
+static void keep(const ohmstrain_state *state, belief *kept)
+{
+    *kept = state->mixture;
+}
+
+static void restore(ohmstrain_state *state, const belief *kept)
+{
+    state->mixture = *kept;
+}
+
 /* One interval on, with a reading or without. *state changes only if everything went well, and if the innovation's square is
  * no more than `most` times its variance, which SURPRISED says. */
 static int attempt(ohmstrain_state *state, const interval *over, const float *rho, float extra_variance, float most,

@@ -23,6 +23,20 @@
 #error "-ffast-math and -ffinite-math-only remove the checks for numbers that are not finite"
 #endif
 
+/* Where an AVR keeps constants that are read one by one; elsewhere flash is memory like any other. */
+#if defined(__AVR__) && defined(__FLASH)
+#define FLASH __flash
+#else
+#define FLASH
+#endif
+
+/* Functions that are not inlined on an AVR: their frames would be there all the time. */
+#ifdef __AVR__
+#define APART __attribute__((noinline))
+#else
+#define APART
+#endif
+
 /* Protections, unless somebody turns them off: see ohmstrain.h. */
 #ifdef OHMSTRAIN_WITHOUT_PLAUSIBILITY
 enum { PLAUSIBILITY = 0 };
@@ -68,8 +82,8 @@ enum { STATES = OHMSTRAIN_STATES, ENTRIES = OHMSTRAIN_ENTRIES, LAST = STATES - 1
 /* ---- The calibration ------------------------------------------------------------------------------------------- */
 
 /* Before any reading: means and variances. */
-static const float START_MEAN[STATES] = {<< start_mean|join("f, ") >>f};
-static const float START_VARIANCE[STATES] = {<< start_variance|join("f, ") >>f};
+static const FLASH float START_MEAN[STATES] = {<< start_mean|join("f, ") >>f};
+static const FLASH float START_VARIANCE[STATES] = {<< start_variance|join("f, ") >>f};
 
 /* Of a strain that is known at a start, and how far beyond the limits one can be known. */
 static const float KNOWN_VARIANCE = << known_variance >>f, KNOWN_BEYOND = << known_beyond >>f;
@@ -112,10 +126,7 @@ static const float LEAST_MASS = << limits.least_mass >>f;
 
 /* ---- What depends on the length of a step -------------------------------------------------------------------------- */
 
-{% if not estimator.hypotheses %}
-enum { PHASES = 3 };
-
-{% endif %}
+{% if estimator.hypotheses %}
 /* Places of the numbers in a list of them; the last are the probabilities that a phase is followed by another one. */
 enum {
 {% for name in steps.names %}
@@ -124,6 +135,15 @@ enum {
     CHAIN,
     STEP = CHAIN + PHASES * PHASES
 };
+{% else %}
+/* Places of the numbers in a list of them. */
+enum {
+{% for name in steps.names %}
+    << name >>,
+{% endfor %}
+    STEP
+};
+{% endif %}
 
 /* Length of the usual step, s, and the longest one: longer intervals are divided, in a long pause into whole steps that are
  * GROWTH times as long, and so on. A step of the longest length is one, whatever rounding says. */
@@ -134,10 +154,10 @@ static const float EVENLY = << steps.evenly >>f;
 static const float LONGEST_PAUSE_S = << steps.longest_pause_s >>f;
 
 /* The numbers of the usual step, of one without length, as the first row is, and of whole steps of a pause. */
-static const float USUAL[STEP] = {<< steps.usual|join("f, ") >>f};
-static const float INSTANT[STEP] = {{% for number in steps.instant %}{% if number is none %}INFINITY{% else %}<< number >>f{% endif %}{% if not loop.last %}, {% endif %}{% endfor %}};
+static const FLASH float USUAL[STEP] = {<< steps.usual|join("f, ") >>f};
+static const FLASH float INSTANT[STEP] = {{% for number in steps.instant %}{% if number is none %}INFINITY{% else %}<< number >>f{% endif %}{% if not loop.last %}, {% endif %}{% endfor %}};
 enum { LENGTHS = << steps.whole|length >> };
-static const float WHOLE[LENGTHS][STEP] = {
+static const FLASH float WHOLE[LENGTHS][STEP] = {
 {% for row in steps.whole %}
     {<< row|join("f, ") >>f},
 {% endfor %}
@@ -146,9 +166,9 @@ static const float WHOLE[LENGTHS][STEP] = {
 /* The numbers at lengths between the shortest and twice the usual one: between them they are a polynomial of the length. */
 enum { NODES = << steps.nodes|length >> };
 static const float SHORTEST_S = << steps.lower_s >>f, LAST_S = << steps.upper_s >>f;
-static const float NODE[NODES] = {<< steps.nodes|join("f, ") >>f};
-static const float INVERSE[NODES] = {<< steps.inverses|join("f, ") >>f};
-static const float AT_NODE[NODES][STEP] = {
+static const FLASH float NODE[NODES] = {<< steps.nodes|join("f, ") >>f};
+static const FLASH float INVERSE[NODES] = {<< steps.inverses|join("f, ") >>f};
+static const FLASH float AT_NODE[NODES][STEP] = {
 {% for row in steps.rows %}
     {<< row|join("f, ") >>f},
 {% endfor %}
@@ -160,8 +180,8 @@ typedef struct interval {
     const float *numbers;
 } interval;
 
-/* The numbers of a step of another length. */
-static void numbers_of(float step_s, float s[STEP])
+/* The numbers of a step of another length. Inlined by GCC 5.4 for an AVR its addresses are wrong. */
+APART static void numbers_of(float step_s, float s[STEP])
 {
     const float inside = step_s < SHORTEST_S ? SHORTEST_S : step_s;
     const float u = (inside + inside - (SHORTEST_S + LAST_S)) / (LAST_S - SHORTEST_S);
@@ -197,6 +217,9 @@ static float to_exponent(float x)
     return x;
 }
 
+{% if lists %}
+{% include "listed.c" %}
+{% endif %}
 /* ---- The sensor's step: arithmetic as the Rust crate's kernel does it, with the calibration's numbers in it -------- */
 
 << arithmetic >>
@@ -215,13 +238,32 @@ enum { SURPRISED = 1 };
 {% else %}
 /* ---- The extended Kalman filter -------------------------------------------------------------------------------- */
 
+/* What the filter believes: means, and the lower triangle of their covariance. */
+typedef struct belief {
+    float mean[STATES];
+    float covariance[ENTRIES];
+} belief;
+
+static void keep(const ohmstrain_state *state, belief *kept)
+{
+    memcpy(kept->mean, state->mean, sizeof kept->mean);
+    memcpy(kept->covariance, state->covariance, sizeof kept->covariance);
+}
+
+static void restore(ohmstrain_state *state, const belief *kept)
+{
+    memcpy(state->mean, kept->mean, sizeof kept->mean);
+    memcpy(state->covariance, kept->covariance, sizeof kept->covariance);
+}
+
 /* One interval on, with a reading or without. *state changes only if everything went well, and if the innovation's square is
  * no more than `most` times its variance, which SURPRISED says. */
 static int attempt(ohmstrain_state *state, const interval *over, const float *rho, float extra_variance, float most,
                    ohmstrain_residual *residual)
 {
-    ohmstrain_state next = *state;
+    belief next;
 
+    keep(state, &next);
     predict_open(next.mean, next.covariance, over->numbers);
     if (rho) {
         float innovation, variance, nis;
@@ -238,7 +280,7 @@ static int attempt(ohmstrain_state *state, const interval *over, const float *rh
     } else if (!is_sound(next.mean, next.covariance)) {
         return OHMSTRAIN_ERR_STATE;
     }
-    *state = next;
+    restore(state, &next);
     return OHMSTRAIN_OK;
 }
 
@@ -364,20 +406,38 @@ static int step_on(ohmstrain_state *state, const interval *over, const float *rh
     return step_again(state, over, rho, extra_variance, most, residual);
 }
 
+/* The numbers of a table; what is not memory like any other is copied. */
+static const float *tabulated(const FLASH float *numbers, float own[STEP])
+{
+#if defined(__AVR__) && defined(__FLASH)
+    int k;
+
+    for (k = 0; k < STEP; k++) {
+        own[k] = numbers[k];
+    }
+    return own;
+#else
+    (void)own;
+    return numbers;
+#endif
+}
+
 /* A step of this length; room for its numbers, where nobody has them. */
 static interval of_length(float step_s, float own[STEP])
 {
+    const FLASH float *numbers = step_s == USUAL_S ? USUAL : step_s == 0.0f ? INSTANT : 0;
     interval over;
     float length_s = LONGEST_S;
     int k;
 
     over.step_s = step_s;
-    over.numbers = step_s == USUAL_S ? USUAL : step_s == 0.0f ? INSTANT : (const float *)0;
-    for (k = 0; !over.numbers && k < LENGTHS; k++) {
-        over.numbers = step_s == length_s ? WHOLE[k] : (const float *)0;
+    for (k = 0; !numbers && k < LENGTHS; k++) {
+        numbers = step_s == length_s ? WHOLE[k] : 0;
         length_s *= GROWTH;
     }
-    if (!over.numbers) {
+    if (numbers) {
+        over.numbers = tabulated(numbers, own);
+    } else {
         numbers_of(step_s, own);
         over.numbers = own;
     }
@@ -416,9 +476,9 @@ static float even_steps(const ohmstrain_pause *pause, int *count)
 }
 
 /* Predicts over the steps of a pause, whole ones or all but the even ones. */
-static int pass_steps(ohmstrain_state *state, ohmstrain_pause *pause, int whole)
+static int pass_steps(ohmstrain_state *state, ohmstrain_pause *pause, int whole, float own[STEP])
 {
-    float own[STEP], times;
+    float times;
     int status = OHMSTRAIN_OK;
 
     while (status == OHMSTRAIN_OK && (times = next_step(pause, whole)) > 0.0f) {
@@ -448,11 +508,10 @@ static int last_step(ohmstrain_state *state, const interval *over, const float *
 
 /* Over all that is ahead of a pause, with a reading at its end or without. What is refused leaves the state on its way. */
 static int over_steps(ohmstrain_state *state, ohmstrain_pause pause, const float *rho, float extra_variance, unsigned *flags,
-                      ohmstrain_residual *residual)
+                      ohmstrain_residual *residual, float own[STEP])
 {
-    float own[STEP];
     interval over;
-    int count, status = pass_steps(state, &pause, 0);
+    int count, status = pass_steps(state, &pause, 0, own);
 
     over = of_length(even_steps(&pause, &count), own);
     for (; count > 1 && status == OHMSTRAIN_OK; count--) {
@@ -461,39 +520,43 @@ static int over_steps(ohmstrain_state *state, ohmstrain_pause pause, const float
     return status == OHMSTRAIN_OK ? last_step(state, &over, rho, extra_variance, flags, residual) : status;
 }
 
-/* The same to a reading. What is refused leaves the state alone: one step by itself, several on a copy. */
-static int advance(ohmstrain_state *state, ohmstrain_pause pause, const float *rho, float extra_variance, unsigned *flags,
-                   ohmstrain_residual *residual)
+/* The same to a reading. What is refused leaves the state alone: one step by itself, several by what was kept. */
+APART static int advance(ohmstrain_state *state, ohmstrain_pause pause, const float *rho, float extra_variance, unsigned *flags,
+                         ohmstrain_residual *residual)
 {
-    ohmstrain_state next;
+    float own[STEP];
+    belief before;
     int status;
 
-    if (!(pause.ahead_s > LONGEST_S * GRACE)) {
-        return over_steps(state, pause, rho, extra_variance, flags, residual);
-    }
-    next = *state;
-    status = over_steps(&next, pause, rho, extra_variance, flags, residual);
-    if (status == OHMSTRAIN_OK) {
-        *state = next;
+    keep(state, &before);
+    status = over_steps(state, pause, rho, extra_variance, flags, residual, own);
+    if (status != OHMSTRAIN_OK) {
+        restore(state, &before);
     }
     return status;
 }
 
 /* Looks ahead to the end of a pause. The filter itself takes whole steps only, those that the look could take. */
-static int look_ahead(ohmstrain_state *state, ohmstrain_pause pause, summary *all)
+APART static int look_ahead(ohmstrain_state *state, ohmstrain_pause pause, summary *all)
 {
-    ohmstrain_state look = *state;
+    float own[STEP];
+    belief before;
     ohmstrain_pause ahead = pause;
     ohmstrain_residual none;
     unsigned flags = 0;
-    int status = pass_steps(&look, &ahead, 1);
+    int status;
 
+    keep(state, &before);
+    status = pass_steps(state, &ahead, 1, own);
     if (status == OHMSTRAIN_OK) {
-        status = over_steps(&look, ahead, (const float *)0, 0.0f, &flags, &none);
+        status = over_steps(state, ahead, (const float *)0, 0.0f, &flags, &none, own);
     }
     if (status == OHMSTRAIN_OK) {
-        summarise(&look, all);
-        status = pass_steps(state, &pause, 1);
+        summarise(state, all);
+    }
+    restore(state, &before);
+    if (status == OHMSTRAIN_OK) {
+        status = pass_steps(state, &pause, 1, own);
         state->pause = pause;
     }
     return status;
@@ -593,14 +656,12 @@ static ohmstrain_status step(ohmstrain_state *state, float dt_s, const float *rh
 /* Before any reading; at a strain that is known if there is one. */
 static ohmstrain_status start(ohmstrain_state *state, const float *strain, float rest_reading)
 {
-    /* Zeros, in C and in C++; nobody writes to it. */
-    static readings none;
     summary all;
 
     start_mixture(state, strain);
     state->pause.passed = 0.0f;
     state->pause.ahead_s = 0.0f;
-    state->readings = none;
+    memset(&state->readings, 0, sizeof state->readings);
     state->readings.follows = FOLLOWING;
     begin(&state->readings, strain != 0, strain && fabsf(*strain) <= << doubt.zero >>f);
     /* The first reading of a session that begins stretched tells nothing of R0. */

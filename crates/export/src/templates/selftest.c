@@ -59,7 +59,7 @@ static int test_filter(float *largest)
     ohmstrain_estimate estimate;
     int k, failures = ohmstrain_start(&state) != OHMSTRAIN_OK;
     for (k = 0; k < VECTORS; k++) {
-        const vector *v = &VECTOR[k];
+        const vector at = vector_at(k), *v = &at;
         if (k == REZEROED) {
             failures += wrong_rest(&state) + (ohmstrain_rezero(&state, RESTED_READING) != OHMSTRAIN_OK);
         }

@@ -24,6 +24,13 @@
 #define VECTORS_TOLERANCE_ULP << vectors.tolerance_ulp >>
 #endif
 
+/* Where an AVR keeps what need not be in its RAM. */
+#if defined(__AVR__) && defined(__FLASH)
+#define VECTORS_FLASH __flash
+#else
+#define VECTORS_FLASH
+#endif
+
 typedef struct vector {
     float reading;    /* << reading_unit >>; NAN where missing */
     float reading_sd; /* << reading_unit >> */
@@ -37,10 +44,21 @@ enum { VECTORS = << vectors.rows|length >> };
 enum { REZEROED = << vectors.rezeroed >> };
 #define RESTED_READING << vectors.rested >>f
 
-static const vector VECTOR[VECTORS] = {
+static const VECTORS_FLASH vector VECTOR[VECTORS] = {
 {% for v in vectors.rows %}
     {{% if v.reading is none %}NAN{% else %}<< v.reading >>f{% endif %}, << v.reading_sd >>f, << v.strain >>f, << v.strain_sd >>f},
 {% endfor %}
 };
+
+/* One of them: read number by number, since compilers for AVR forget where a copied structure stands. */
+static vector vector_at(int k)
+{
+    vector v;
+    v.reading = VECTOR[k].reading;
+    v.reading_sd = VECTOR[k].reading_sd;
+    v.strain = VECTOR[k].strain;
+    v.strain_sd = VECTOR[k].strain_sd;
+    return v;
+}
 
 #endif
