@@ -86,7 +86,7 @@ impl CliError {
         match error {
             ExportError::Unsupported { .. } | ExportError::Parameter(_) => Self::Input(format!("{name}: {error}")),
             ExportError::Interval(_) => Self::Arguments(format!("--dt-s: {error}")),
-            ExportError::Budget(_) => Self::Arguments(format!("--budget: {error}")),
+            ExportError::Budget { .. } => Self::Arguments(format!("--budget: {error}")),
             ExportError::Template(_) => Self::Other(error.to_string()),
         }
     }

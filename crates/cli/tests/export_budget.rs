@@ -63,9 +63,32 @@ fn what_does_not_fit_is_said() {
         "{}",
         nothing.stderr
     );
+    assert!(nothing.stderr.contains(" instructions where 100 are free"), "{}", nothing.stderr);
     assert_eq!(c("lean", &["--target", "c", "--estimator", "ekf"]).code, Some(2));
     assert_eq!(c("fast", &["--target", "c"]).code, Some(2));
     assert!(!bench.path("none").exists());
+}
+
+/// All candidates with what they cost, and what the next better one takes too much of: by the order of the table, or by their errors.
+#[test]
+fn candidates_and_what_keeps_the_next_better_one_out_are_said() {
+    let bench = every_filter();
+    let export = ["export", "--dt-s", DT_S, "--sensor", "corrected.toml", "--target", "c", "-o", "asked", "--force"];
+    let printed = bench.run(&[&export[..], &["--budget", "flash=33000"]].concat()).ok();
+    let rows = |fits: &str| printed.lines().filter(|line| line.trim_end().ends_with(fits)).count();
+    assert!(rows("| yes  |") > 3 && rows("| no   |") > 3, "{printed}");
+    let next = printed.lines().find(|line| line.starts_with("the next better one, ")).unwrap();
+    assert!(next.ends_with(" B of flash where 33000 are free"), "{next}");
+    let scored = within(&bench, "corrected.toml", "lean", "trace.csv", "asked");
+    // What is exported has the least error of those that fit.
+    let error = |row: &str| row.split('|').nth(2).unwrap().trim().parse::<f64>().unwrap();
+    let fitting = scored.lines().filter(|line| line.trim_end().ends_with("| yes  |")).map(error);
+    assert!((fitting.fold(f64::MAX, f64::min) - exported(&scored, ERROR)).abs() < 0.006, "{scored}");
+    if let Some(next) = scored.lines().find(|line| line.starts_with("the next better one, ")) {
+        assert!(next.ends_with(" instructions where 15000 are free"), "{next}");
+    }
+    // Nothing to choose, nothing to say.
+    assert!(!bench.run(&export).ok().contains("candidate"));
 }
 
 /// A board has room for half of the time between two readings, and three quarters of its memory; costs are those of its processor.

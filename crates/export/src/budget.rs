@@ -101,10 +101,31 @@ impl Budget {
 }
 
 impl Room {
-    /// True if a filter costs no more.
-    const fn allows(&self, cost: &Cost) -> bool {
-        cost.instructions <= self.instructions && cost.flash <= self.flash && cost.ram() <= self.ram
+    /// What a filter takes too much of, in words; `None` if it fits.
+    fn lacks(&self, cost: &Cost) -> Option<String> {
+        let all = [
+            (cost.instructions, self.instructions, "instructions"),
+            (cost.flash, self.flash, "B of flash"),
+            (cost.ram(), self.ram, "B of RAM"),
+        ];
+        let lacking = all.iter().filter(|(takes, has, _)| takes > has);
+        let words: Vec<String> =
+            lacking.map(|(takes, has, what)| format!("{takes} {what} where {has} are free")).collect();
+        (!words.is_empty()).then(|| words.join(", "))
     }
+}
+
+/// A plan that was compared with a budget.
+#[derive(Clone, Debug)]
+pub struct Candidate {
+    /// The plan.
+    pub plan: Plan,
+    /// The plan in words.
+    pub words: String,
+    /// Cost on the budget's processor.
+    pub cost: Cost,
+    /// What it takes too much of; `None` if it fits.
+    pub lacks: Option<String>,
 }
 
 /// How much of the correction is left.
@@ -142,25 +163,34 @@ const fn rows(mean: usize, variance: usize) -> Left {
     Left::Some(Rows { mean, variance })
 }
 
-/// Plans of a sensor's default that fit, the best by the table first.
+/// Plans of a sensor's default, the best by the table first, and whether they fit.
+///
+/// # Errors
+/// If the sensor has no exported form, or nothing fits.
+pub fn candidates(params: &SensorParams, budget: &Budget, dt_s: f64) -> Result<Vec<Candidate>, ExportError> {
+    let room = budget.room(dt_s);
+    let mut all = Vec::new();
+    for plan in plans(params) {
+        let chip = ChipFilter::new(params, &plan)?;
+        let cost = cost_of(params, &chip, dt_s)?.on(budget.processor(), &params.law, &chip);
+        all.push(Candidate { plan, words: chip.words(), cost, lacks: room.lacks(&cost) });
+    }
+    let smallest = all.iter().min_by_key(|candidate| candidate.cost.instructions);
+    match smallest {
+        Some(Candidate { cost, lacks: Some(lacks), .. }) if all.iter().all(|candidate| candidate.lacks.is_some()) => {
+            Err(ExportError::Budget { least: *cost, lacks: lacks.clone() })
+        }
+        _ => Ok(all),
+    }
+}
+
+/// Plans that fit, the best by the table first.
 ///
 /// # Errors
 /// If the sensor has no exported form, or nothing fits.
 pub fn fitting(params: &SensorParams, budget: &Budget, dt_s: f64) -> Result<Vec<Plan>, ExportError> {
-    let mut fitting = Vec::new();
-    let mut smallest: Option<Cost> = None;
-    let room = budget.room(dt_s);
-    for plan in plans(params) {
-        let cost = budget.cost(params, &plan, dt_s)?;
-        if room.allows(&cost) {
-            fitting.push(plan);
-        }
-        smallest = smallest.filter(|least| least.instructions <= cost.instructions).or(Some(cost));
-    }
-    match smallest {
-        Some(least) if fitting.is_empty() => Err(ExportError::Budget(least)),
-        _ => Ok(fitting),
-    }
+    let candidates = candidates(params, budget, dt_s)?.into_iter();
+    Ok(candidates.filter(|candidate| candidate.lacks.is_none()).map(|candidate| candidate.plan).collect())
 }
 
 /// Plans of a sensor's default, the best first.
@@ -188,7 +218,7 @@ fn plans(params: &SensorParams) -> Vec<Plan> {
 
 #[cfg(test)]
 mod tests {
-    use super::{Board, Budget, LEAN, Room};
+    use super::{Board, Budget, Cost, LEAN, Room};
 
     #[test]
     fn a_budget_is_lean_or_a_list_of_numbers_and_a_board() {
@@ -209,6 +239,16 @@ mod tests {
         assert_eq!(room("board=uno"), Room { instructions: 160_000, flash: 24_192, ram: 1536 });
         assert_eq!(room("board=uno,flash=20000").flash, 20_000);
         assert_eq!(room("lean"), Room { instructions: LEAN, flash: usize::MAX, ram: usize::MAX });
+    }
+
+    #[test]
+    fn what_does_not_fit_says_what_there_is_too_little_of() {
+        let room = "board=uno".parse::<Budget>().unwrap().room(0.02);
+        let cost = |instructions, flash| Cost { instructions, flash, state: 200, stack: 1000 };
+        assert_eq!(room.lacks(&cost(160_000, 24_192)), None);
+        let lacks = room.lacks(&cost(160_001, 30_000));
+        let said = "160001 instructions where 160000 are free, 30000 B of flash where 24192 are free";
+        assert_eq!(lacks.as_deref(), Some(said));
     }
 
     #[test]

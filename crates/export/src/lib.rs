@@ -27,7 +27,7 @@ use minijinja::value::Serde;
 use ohmstrain_sensor::{EstimatorKind, SensorParams};
 
 pub use boards::{BOARDS, Board};
-pub use budget::{Budget, Room, fitting};
+pub use budget::{Budget, Candidate, Room, candidates, fitting};
 use constants::Exported;
 pub use cost::{Cost, Processor, cost};
 use ohmstrain::MADE_BY;
@@ -75,10 +75,15 @@ pub enum ExportError {
     Interval(String),
     /// Nothing is small enough.
     #[error(
-        "nothing fits; the smallest filter of this sensor takes about {} instructions a step, {} B of flash and {} B of RAM",
-        .0.instructions, .0.flash, .0.ram()
+        "nothing fits; the smallest filter of this sensor takes about {} instructions a step, {} B of flash and {} B of RAM: {lacks}",
+        least.instructions, least.flash, least.ram()
     )]
-    Budget(Cost),
+    Budget {
+        /// Cost of the smallest filter.
+        least: Cost,
+        /// What it takes too much of.
+        lacks: String,
+    },
     /// The template failed.
     #[error("cannot fill the template of an exported file: {0}")]
     Template(#[from] minijinja::Error),

@@ -89,7 +89,7 @@ fn named(error: &ExportError) -> String {
     match error {
         ExportError::Unsupported { .. } | ExportError::Parameter(_) => format!("sensor.toml: {error}"),
         ExportError::Interval(_) => format!("--dt-s: {error}"),
-        ExportError::Budget(_) => format!("--budget: {error}"),
+        ExportError::Budget { .. } => format!("--budget: {error}"),
         ExportError::Template(_) => error.to_string(),
     }
 }

@@ -1,7 +1,7 @@
 use ohmstrain_bench_data::Metadata;
 
 use crate::args::ExportArgs;
-use crate::commands::export_choice;
+use crate::commands::export_choice::{self, Choice};
 use crate::commands::export_score::{OnRecording, Promise};
 use crate::error::CliError;
 use crate::input;
@@ -25,7 +25,7 @@ pub fn run(args: &ExportArgs) -> Result<(), CliError> {
         Some(trace) => Some(OnRecording::new(args, &sensor, &input::read(trace, &Metadata::default())?)?),
         None => None,
     };
-    let plan = export_choice::plan(args, params, recording.as_ref())?;
+    let Choice { plan, lines } = export_choice::choose(args, params, args.dt_s, recording.as_ref())?;
     let refused = |error: ExportError| CliError::export(&error, &args.sensor.display().to_string());
     let promise = Promise::new(args, params, &plan, recording.as_ref())?;
     let files =
@@ -40,6 +40,6 @@ pub fn run(args: &ExportArgs) -> Result<(), CliError> {
         outputs.put(output, file.content);
     }
     // After the places are known to be there, before anything is written to them: it may refuse.
-    promise.print(args)?;
+    promise.print(args, &lines)?;
     outputs.publish()
 }

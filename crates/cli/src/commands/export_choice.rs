@@ -5,30 +5,75 @@ use ohmstrain_sensor::SensorParams;
 use crate::args::ExportArgs;
 use crate::commands::export_score::OnRecording;
 use crate::error::CliError;
-use ohmstrain_export::{self as export, Budget, Plan};
+use crate::output;
+use ohmstrain_export::{self as export, Budget, Candidate, Plan};
+
+/// What is exported, and what else there was.
+pub struct Choice {
+    pub plan: Plan,
+    /// A table of all candidates, and why the next better one does not fit; none without a budget.
+    pub lines: Vec<String>,
+}
 
 /// The sensor's filter, or what is best of it within a budget: by its score on a recording, else by a table.
-pub fn plan(args: &ExportArgs, params: &SensorParams, recording: Option<&OnRecording>) -> Result<Plan, CliError> {
+pub fn choose(
+    args: &ExportArgs,
+    params: &SensorParams,
+    dt_s: f64,
+    recording: Option<&OnRecording>,
+) -> Result<Choice, CliError> {
     let asked = args.estimator.chosen().map(|estimator| estimator.0);
-    let Some(budget) = &args.budget else { return Ok(Plan { kind: asked, ..Plan::default() }) };
-    within(args, params, budget, recording)
+    match &args.budget {
+        Some(budget) => within(args, params, dt_s, budget, recording),
+        None => Ok(Choice { plan: Plan { kind: asked, ..Plan::default() }, lines: Vec::new() }),
+    }
+}
+
+/// A candidate; its error, percent of full scale, or its place in the order of the table.
+struct Ranked {
+    candidate: Candidate,
+    rank: f64,
 }
 
 fn within(
     args: &ExportArgs,
     params: &SensorParams,
+    dt_s: f64,
     budget: &Budget,
     recording: Option<&OnRecording>,
-) -> Result<Plan, CliError> {
+) -> Result<Choice, CliError> {
     let name = args.sensor.display().to_string();
-    let fitting = export::fitting(params, budget, args.dt_s).map_err(|error| CliError::export(&error, &name))?;
-    let mut best: Option<(f64, Plan)> = None;
-    for plan in &fitting {
-        // Without a recording all are alike, and the first is the best by the table.
-        let error = recording.map_or(Ok(0.0), |recording| recording.error(params, plan, args))?;
-        if best.is_none_or(|(least, _)| error < least) {
-            best = Some((error, *plan));
-        }
+    let candidates =
+        export::candidates(params, budget, dt_s).map_err(|error| CliError::export(&error, &name))?.into_iter();
+    let ranked = candidates.enumerate().map(|(place, candidate)| {
+        let rank = match recording {
+            Some(recording) => recording.error(params, &candidate.plan, args)?,
+            None => place as f64,
+        };
+        Ok(Ranked { candidate, rank })
+    });
+    let ranked = ranked.collect::<Result<Vec<_>, CliError>>()?;
+    let fits = |one: &&Ranked| one.candidate.lacks.is_none();
+    let best = ranked.iter().filter(fits).min_by(|a, b| a.rank.total_cmp(&b.rank));
+    let best = best.ok_or_else(|| CliError::Arguments("--budget: nothing fits".into()))?;
+    let better = ranked.iter().filter(|one| !fits(one) && one.rank < best.rank);
+    let next = better.max_by(|a, b| a.rank.total_cmp(&b.rank));
+    let mut lines = table(&ranked, recording.is_some());
+    if let Some(Ranked { candidate: Candidate { words, lacks: Some(lacks), .. }, .. }) = next {
+        lines.push(format!("the next better one, {words}, does not fit: {lacks}"));
     }
-    best.map(|(_, plan)| plan).ok_or_else(|| CliError::Arguments("--budget: nothing fits".into()))
+    lines.push(String::new());
+    Ok(Choice { plan: best.candidate.plan, lines })
+}
+
+/// All candidates, the best by the table first.
+fn table(ranked: &[Ranked], is_scored: bool) -> Vec<String> {
+    let mut table = output::table(["candidate", "%FS", "instructions", "flash, B", "RAM, B", "fits"]);
+    for Ranked { candidate: Candidate { words, cost, lacks, .. }, rank } in ranked {
+        let error = if is_scored { format!("{rank:.2}") } else { String::new() };
+        let fits = if lacks.is_none() { "yes" } else { "no" };
+        let costs = [cost.instructions, cost.flash, cost.ram()].map(|number| number.to_string());
+        table.add_row([words.clone(), error].into_iter().chain(costs).chain([fits.to_owned()]));
+    }
+    table.lines().collect()
 }

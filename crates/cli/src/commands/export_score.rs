@@ -141,10 +141,10 @@ impl Promise {
         Ok(Self { lines: table.lines().collect(), words: chip.words(), worse_on })
     }
 
-    /// Prints it; refuses what is worse than a static cubic, unless it is forced.
-    pub fn print(&self, args: &ExportArgs) -> Result<(), CliError> {
+    /// Prints the candidates, and it; refuses what is worse than a static cubic, unless it is forced.
+    pub fn print(&self, args: &ExportArgs, candidates: &[String]) -> Result<(), CliError> {
         print(|out| {
-            for line in &self.lines {
+            for line in candidates.iter().chain(&self.lines) {
                 writeln!(out, "{line}")?;
             }
             // Rust was counted once, by scripts/exported-c.sh, for docs/chip.md.
