@@ -54,6 +54,27 @@ pub fn compile_and_run(compiler: &str, folder: &Path, sources: &[&str], stdin: &
     run_program(&compile(compiler, folder, sources, "program.out"), stdin, &[])
 }
 
+/// Without `--dt-s` readings come as often as in calibration.
+#[test]
+fn the_usual_time_between_readings_is_the_calibrations() {
+    let bench = Bench::calibrated();
+    let without = ["export", "--sensor", "sensor.toml", "--target", "c", "-o", "without"];
+    let printed = bench.run(&without).ok();
+    assert!(printed.contains("; a reading every 0.2 s; "), "{printed}");
+    export(&bench, "c", "with");
+    for file in ["src/ohmstrain.c", "src/ohmstrain.h"] {
+        assert_eq!(bench.read(&format!("without/{file}")), bench.read(&format!("with/{file}")), "{file}");
+    }
+    // A sensor of a file that names no recording.
+    let sensor = bench.read("sensor.toml");
+    let nameless: Vec<&str> = sensor.split("\n[[recordings]]\n").collect();
+    let after = nameless[1].split_once("\n[").map_or("", |(_, after)| after);
+    bench.write("nameless.toml", format!("{}\n[{after}", nameless[0]));
+    let refused = bench.run(&["export", "--sensor", "nameless.toml", "--target", "c", "-o", "none"]);
+    assert_eq!(refused.code, Some(2));
+    assert!(refused.stderr.contains("--dt-s: expected the usual time between two readings"), "{}", refused.stderr);
+}
+
 #[test]
 fn c_is_an_arduino_library_a_self_test_and_a_readme_and_the_same_every_time() {
     let bench = Bench::calibrated();

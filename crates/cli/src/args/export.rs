@@ -38,9 +38,9 @@ pub struct ExportArgs {
     /// Replace files that this program did not write, too, and export what scores worse than a static cubic
     #[arg(long)]
     pub force: bool,
-    /// Usual time between two readings on the microcontroller, s
+    /// Usual time between two readings on the microcontroller, s [default: that of the calibration's recordings]
     #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = positive)]
-    pub dt_s: f64,
+    pub dt_s: Option<f64>,
     /// Estimator to export: auto (the sensor's default), corrected, sign-split, hypotheses or ekf
     #[arg(long, default_value = "auto")]
     pub estimator: Auto<Estimator>,

@@ -12,9 +12,9 @@ pub struct SerialCheckArgs {
     /// The sensor whose filter was exported
     #[arg(long, value_name = "sensor.toml")]
     pub sensor: PathBuf,
-    /// Time between two readings that it was exported for, s
+    /// Time between two readings that it was exported for, s [default: that of the calibration's recordings]
     #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = positive)]
-    pub dt_s: f64,
+    pub dt_s: Option<f64>,
     /// Estimator that was exported
     #[arg(long, default_value = "auto")]
     pub estimator: Auto<Estimator>,

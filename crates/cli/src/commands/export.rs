@@ -18,18 +18,19 @@ pub fn run(args: &ExportArgs) -> Result<(), CliError> {
     }
     let sensor = sensor_file::read(&args.sensor, asked)?;
     let params = sensor.params();
+    let dt_s = export_choice::usual_step_s(args.dt_s, params)?;
     let recording = match &args.score {
         Some(_) if params.joint.is_some() => {
             return Err(CliError::Arguments("--score: expected a sensor of strain, found one across a joint".into()));
         }
-        Some(trace) => Some(OnRecording::new(args, &sensor, &input::read(trace, &Metadata::default())?)?),
+        Some(trace) => Some(OnRecording::new(args, dt_s, &sensor, &input::read(trace, &Metadata::default())?)?),
         None => None,
     };
-    let Choice { plan, lines } = export_choice::choose(args, params, args.dt_s, recording.as_ref())?;
+    let Choice { plan, lines } = export_choice::choose(args, params, dt_s, recording.as_ref())?;
     let refused = |error: ExportError| CliError::export(&error, &args.sensor.display().to_string());
-    let promise = Promise::new(args, params, &plan, recording.as_ref())?;
+    let promise = Promise::new(args, dt_s, params, &plan, recording.as_ref())?;
     let files =
-        export::files(params, &plan, args.target.into(), args.dt_s, &args.prefix, &promise.lines).map_err(refused)?;
+        export::files(params, &plan, args.target.into(), dt_s, &args.prefix, &promise.lines).map_err(refused)?;
     let mut outputs = Outputs::new(args.force, std::iter::once(&args.sensor).chain(&args.score));
     for file in files {
         let path = args.output.join(&file.path);

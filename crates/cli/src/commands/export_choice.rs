@@ -15,6 +15,15 @@ pub struct Choice {
     pub lines: Vec<String>,
 }
 
+/// Usual time between two readings, s: what is asked for, else that of the calibration's recordings.
+pub fn usual_step_s(asked: Option<f64>, params: &SensorParams) -> Result<f64, CliError> {
+    asked.or_else(|| export::usual_step_s(params)).ok_or_else(|| {
+        CliError::Arguments(
+            "--dt-s: expected the usual time between two readings; the sensor's file names no recording".into(),
+        )
+    })
+}
+
 /// The sensor's filter, or what is best of it within a budget: by its score on a recording, else by a table.
 pub fn choose(
     args: &ExportArgs,

@@ -15,6 +15,7 @@ use ohmstrain_export::{self as export, ChipFilter, Cost, ExportTarget, Plan, Rep
 pub struct OnRecording {
     name: String,
     from_s: Option<f64>,
+    dt_s: f64,
     rows: Vec<ReplayedRow>,
     program: Vec<ScoredRow>,
     static_cubic: Vec<ScoredRow>,
@@ -22,7 +23,7 @@ pub struct OnRecording {
 
 impl OnRecording {
     /// Runs both over the whole recording.
-    pub fn new(args: &ExportArgs, sensor: &Sensor, recording: &TraceFile) -> Result<Self, CliError> {
+    pub fn new(args: &ExportArgs, dt_s: f64, sensor: &Sensor, recording: &TraceFile) -> Result<Self, CliError> {
         let refused = |error: &dyn std::fmt::Display| CliError::Input(format!("{}: {error}", recording.name));
         let mut builder = sensor.filter();
         if let Some(estimator) = args.estimator.chosen() {
@@ -36,14 +37,14 @@ impl OnRecording {
         for row in 0..recording.trace.len() {
             let (time_s, reading) = recording.reading(row);
             // What is exported takes an interval for its first step.
-            let since_s = last_s.replace(time_s).map_or(args.dt_s, |last_s| time_s - last_s) as f32;
+            let since_s = last_s.replace(time_s).map_or(dt_s, |last_s| time_s - last_s) as f32;
             rows.push(ReplayedRow { since_s, reading: reading.value, reading_sd: reading.sd });
             let estimate = filter.step(time_s, reading).map_err(|error| refused(&error))?;
             let truth = recording.truth(row);
             program.push(ScoredRow { time_s, truth, strain: estimate.strain, sd: Some(estimate.strain_sd) });
             static_cubic.push(ScoredRow { time_s, truth, strain: cubic.strain(time_s, reading.value), sd: None });
         }
-        Ok(Self { name: recording.name.clone(), from_s: args.from, rows, program, static_cubic })
+        Ok(Self { name: recording.name.clone(), from_s: args.from, dt_s, rows, program, static_cubic })
     }
 
     /// Of the rows that are asked for.
@@ -56,7 +57,7 @@ impl OnRecording {
 
     /// What the exported code makes of it.
     fn exported(&self, params: &SensorParams, plan: &Plan, args: &ExportArgs) -> Result<Scores, CliError> {
-        let replayed = export::replay(params, plan, args.dt_s, &self.rows)
+        let replayed = export::replay(params, plan, self.dt_s, &self.rows)
             .map_err(|error| CliError::export(&error, &args.sensor.display().to_string()))?;
         let of = |(row, said): (&ScoredRow, &export::Said)| ScoredRow {
             strain: said.strain.into(),
@@ -85,13 +86,14 @@ impl Promise {
     /// Of a plan; scored if there is a recording.
     pub fn new(
         args: &ExportArgs,
+        dt_s: f64,
         params: &SensorParams,
         plan: &Plan,
         recording: Option<&OnRecording>,
     ) -> Result<Self, CliError> {
         let name = args.sensor.display().to_string();
         let chip = ChipFilter::new(params, plan).map_err(|error| CliError::export(&error, &name))?;
-        let cost = export::cost(params, plan, args.dt_s).map_err(|error| CliError::export(&error, &name))?;
+        let cost = export::cost(params, plan, dt_s).map_err(|error| CliError::export(&error, &name))?;
         let mut table =
             output::table(["estimate", "%FS", "50/90/95 %", "instructions", "flash, B", "RAM, B", "of it stack, B"]);
         let mut worse_on = None;
@@ -132,13 +134,14 @@ impl Promise {
         add("exported", exported);
         if let Some((budget, board)) = args.budget.as_ref().and_then(|budget| Some((budget, budget.board()?))) {
             let nothing = || vec![String::new(); 2];
-            let cost = budget.cost(params, plan, args.dt_s).map_err(|error| CliError::export(&error, &name))?;
+            let cost = budget.cost(params, plan, dt_s).map_err(|error| CliError::export(&error, &name))?;
             add(&format!("on {}", board.title), [nothing(), of_cost(&cost).to_vec()].concat());
-            let room = budget.room(args.dt_s);
+            let room = budget.room(dt_s);
             let most = [room.instructions, room.flash, room.ram].map(|number| number.to_string());
             add("room for it there", [nothing(), most.to_vec()].concat());
         }
-        Ok(Self { lines: table.lines().collect(), words: chip.words(), worse_on })
+        let words = format!("{}; a reading every {dt_s} s", chip.words());
+        Ok(Self { lines: table.lines().collect(), words, worse_on })
     }
 
     /// Prints the candidates, and it; refuses what is worse than a static cubic, unless it is forced.

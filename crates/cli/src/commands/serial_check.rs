@@ -5,6 +5,7 @@ use std::path::Path;
 use ohmstrain_sensor::SensorParams;
 
 use crate::args::SerialCheckArgs;
+use crate::commands::export_choice;
 use crate::commands::live::{Event, Source};
 use crate::error::CliError;
 use crate::output::print;
@@ -29,16 +30,16 @@ pub fn run(args: &SerialCheckArgs) -> Result<(), CliError> {
     let sensor = sensor_file::read(&args.sensor, asked)?;
     let name = args.sensor.display().to_string();
     let params = sensor.params();
+    let dt_s = export_choice::usual_step_s(args.dt_s, params)?;
     let plan = match &args.budget {
         None => Plan { kind: asked, ..Plan::default() },
         Some(budget) => {
-            let fitting =
-                export::fitting(params, budget, args.dt_s).map_err(|error| CliError::export(&error, &name))?;
+            let fitting = export::fitting(params, budget, dt_s).map_err(|error| CliError::export(&error, &name))?;
             fitting.into_iter().next().unwrap_or_default()
         }
     };
     let heard = listen(args)?;
-    let said = replayed(params, &plan, args.dt_s, &heard.steps).map_err(|error| CliError::export(&error, &name))?;
+    let said = replayed(params, &plan, dt_s, &heard.steps).map_err(|error| CliError::export(&error, &name))?;
     let farthest = compared(&heard.steps, &said)?;
     print(|out| {
         writeln!(out, "{} steps, {} other lines", heard.steps.len(), heard.others)?;
