@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Compiles and runs what `ohmstrain export` writes: C on the host with GCC and Clang, for Cortex-M0+ and -M4F, and there
-# under QEMU; the sketch against a stand-in for Arduino, and for a Mega 2560 and an Uno with Arduino's core; small
+# under QEMU; the sketches against a stand-in for Arduino, and for a Mega 2560 and an Uno with Arduino's core; small
 # filters for an ATmega328P under simavr; the Rust module in a no_std crate for Cortex-M4F, and on the host through a recording, as exported C goes through it.
 #
 #   exported-c.sh
@@ -13,7 +13,6 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 readonly here=$PWD/scripts/exported-c
-readonly plotter=examples/ohmstrain_plotter/ohmstrain_plotter.ino
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
@@ -127,10 +126,11 @@ for kind in polynomial:2:corrected polynomial:0:ekf decaying-exponential:1:sign-
             fi
         done
     done
-    g++ -std=gnu++11 -fsyntax-only -Wall -Wextra -Werror -I"$here" -include Arduino.h -I"$folder/src" \
-        -x c++ "$folder/$plotter"
-    g++ -std=gnu++11 -fsyntax-only -Wall -Wextra -Werror -DARDUINO_ARCH_ESP32 -I"$here" -include Arduino.h \
-        -I"$folder/src" -x c++ "$folder/$plotter"
+    for sketch in "$folder"/examples/*/*.ino; do
+        g++ -std=gnu++11 -fsyntax-only -Wall -Wextra -Werror -I"$here" -include Arduino.h -I"$folder/src" -x c++ "$sketch"
+        g++ -std=gnu++11 -fsyntax-only -Wall -Wextra -Werror -DARDUINO_ARCH_ESP32 -I"$here" -include Arduino.h \
+            -I"$folder/src" -x c++ "$sketch"
+    done
 done
 
 # The same sensors on smaller chips.

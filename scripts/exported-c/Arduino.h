@@ -8,6 +8,7 @@
 
 int analogRead(uint8_t pin);
 uint32_t analogReadMilliVolts(uint8_t pin);
+long map(long x, long in_least, long in_most, long out_least, long out_most);
 unsigned long micros(void);
 void delay(unsigned long milliseconds);
 
@@ -18,7 +19,10 @@ struct SerialPort {
   void print(const char *text);
   void print(unsigned long number);
   void print(double number, int digits);
+  void println(const char *text);
+  void println(double number, int digits);
   void println(int number);
+  void println(long number);
   void println(unsigned number);
 };
 extern SerialPort Serial;

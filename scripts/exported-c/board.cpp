@@ -12,8 +12,15 @@ int SerialPort::read() { return -1; }
 void SerialPort::print(const char *text) { std::printf("%s", text); }
 void SerialPort::print(unsigned long number) { std::printf("%lu", number); }
 void SerialPort::print(double number, int digits) { std::printf("%.*f", digits, number); }
+void SerialPort::println(const char *text) { std::printf("%s\r\n", text); }
+void SerialPort::println(double number, int digits) { std::printf("%.*f\r\n", digits, number); }
+void SerialPort::println(long number) { std::printf("%ld\r\n", number); }
 void SerialPort::println(int number) { std::printf("%d\r\n", number); }
 void SerialPort::println(unsigned number) { std::printf("%u\r\n", number); }
+
+long map(long x, long in_least, long in_most, long out_least, long out_most) {
+  return (x - in_least) * (out_most - out_least) / (in_most - in_least) + out_least;
+}
 
 /* About 50 ms from one look to the next, and soon beyond 32 bits. */
 unsigned long micros(void) {

@@ -104,6 +104,7 @@ fn c_is_an_arduino_library_a_self_test_and_a_readme_and_the_same_every_time() {
     for (folder, names) in [
         ("", &["CMakeLists.txt", "README.md", "examples", "library.json", "library.properties", "selftest", "src"][..]),
         ("/examples/ohmstrain_plotter", &["ohmstrain_plotter.ino"]),
+        ("/examples/recorder", &["recorder.ino"]),
         ("/src", &["ohmstrain.c", "ohmstrain.h"]),
         ("/selftest", &["replay.c", "selftest.c", "vectors.h"]),
     ] {

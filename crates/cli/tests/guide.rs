@@ -82,6 +82,31 @@ fn filter() {
     holds(&run("filter.md"), &["estimates.csv", "smoothed.csv", "angles.csv"]);
 }
 
+/// Both sketches compile: the new one with the library that the page exports.
+#[test]
+fn replace_map() {
+    let folder = run("replace-map.md");
+    holds(&folder, &["firmware"]);
+    let text = fs::read_to_string(chapters().join("replace-map.md")).unwrap();
+    let sketches: Vec<&str> = text.split("```cpp\n").skip(1).filter_map(|block| block.split("```").next()).collect();
+    assert_eq!(sketches.len(), 2);
+    let Some(compiler) = crate::export::compilers().first().map(|c| if *c == "gcc" { "g++" } else { "clang++" }) else {
+        return;
+    };
+    let arduino = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scripts/exported-c");
+    for sketch in sketches {
+        fs::write(folder.path().join("sketch.cpp"), sketch).unwrap();
+        let flags = ["-std=gnu++11", "-fsyntax-only", "-Wall", "-Werror", "-I", arduino, "-include", "Arduino.h"];
+        let compiled = Command::new(compiler)
+            .current_dir(folder.path())
+            .args(flags)
+            .args(["-I", "firmware/src", "sketch.cpp"])
+            .output();
+        let compiled = compiled.unwrap();
+        assert!(compiled.status.success(), "{}", String::from_utf8_lossy(&compiled.stderr));
+    }
+}
+
 #[test]
 fn chip() {
     holds(&run("chip.md"), &["firmware", "module"]);

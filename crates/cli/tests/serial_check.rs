@@ -9,14 +9,19 @@ const PLOTTER: &str = "c/examples/ohmstrain_plotter/ohmstrain_plotter.ino";
 
 /// What the sketch of a calibrated sensor prints, once it has been changed.
 fn printed(bench: &Bench, change: impl Fn(&str) -> String) -> Option<String> {
-    let arduino = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scripts/exported-c");
     bench.run(&["export", "--sensor", "sensor.toml", "--dt-s", DT_S, "--target", "c", "-o", "c", "--force"]).ok();
     bench.write(PLOTTER, change(&bench.read(PLOTTER)));
+    printed_by(bench, PLOTTER)
+}
+
+/// What a sketch of the exported folder prints on a computer.
+fn printed_by(bench: &Bench, sketch: &str) -> Option<String> {
+    let arduino = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scripts/exported-c");
     let compiler = compilers().first().map(|c| if *c == "gcc" { "g++" } else { "clang++" })?;
     let board = format!("{arduino}/board.cpp");
     let flags =
         ["-std=gnu++11", "-O2", "-ffp-contract=off", "-DOHMSTRAIN_CHECK=1", "-I", arduino, "-include", "Arduino.h"];
-    let sources = ["-I", "c/src", "-x", "c++", PLOTTER, "c/src/ohmstrain.c", &board];
+    let sources = ["-I", "c/src", "-x", "c++", sketch, "c/src/ohmstrain.c", &board];
     let compiled = Command::new(compiler)
         .current_dir(bench.path(""))
         .args(flags)
@@ -102,4 +107,23 @@ fn lines_that_are_lost_or_missing_are_said() {
         bench.write("board.txt", &lines);
         bench.run(&CHECK).fails(4, &format!("board.txt: {message}"));
     }
+}
+
+/// What the recorder prints is a trace of converter codes, which every command reads, and `import` too.
+#[test]
+fn what_the_recorder_prints_is_a_trace() {
+    let bench = Bench::calibrated();
+    bench.run(&["export", "--sensor", "sensor.toml", "--target", "c", "-o", "c", "--force"]).ok();
+    let Some(printed) = printed_by(&bench, "c/examples/recorder/recorder.ino") else { return };
+    // The board's own message when it starts is no part of it.
+    let (_, trace) = printed.split_once('\n').unwrap();
+    assert!(trace.starts_with("# front_end = divider reference_ohm=10000.0 side=low bits=10 noise_codes="), "{trace}");
+    assert!(trace.contains("\ntime_us,adc\r\n"), "{trace}");
+    bench.write("recorded.csv", trace);
+    let args = ["filter", "recorded.csv", "--sensor", "sensor.toml"];
+    let estimates = bench.run(&args).ok();
+    // A header, and a row for each reading.
+    assert_eq!(estimates.lines().count(), trace.lines().count() - 1);
+    assert_eq!(bench.run(&["import", "recorded.csv", "-o", "imported.csv"]).code, Some(0));
+    assert!(bench.read("imported.csv").contains("side=low"));
 }

@@ -109,10 +109,11 @@ type Template = (&'static str, &'static str);
 
 /// The layout of an Arduino library, which PlatformIO takes too: of it only `src` is compiled into a program, not the self-test
 /// with its `main`.
-const C: [Template; 10] = [
+const C: [Template; 11] = [
     ("src/ohmstrain.h", include_str!("templates/ohmstrain.h")),
     ("src/ohmstrain.c", include_str!("templates/ohmstrain.c")),
     ("examples/ohmstrain_plotter/ohmstrain_plotter.ino", include_str!("templates/ohmstrain.ino")),
+    ("examples/recorder/recorder.ino", include_str!("templates/recorder.ino")),
     ("library.properties", include_str!("templates/library.properties")),
     ("library.json", include_str!("templates/library.json")),
     ("selftest/vectors.h", include_str!("templates/vectors.h")),
