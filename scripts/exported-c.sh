@@ -3,7 +3,9 @@
 # under QEMU; the sketches against a stand-in for Arduino, and for a Mega 2560 and an Uno with Arduino's core; small
 # filters for an ATmega328P under simavr; the Rust module in a no_std crate for Cortex-M4F, and on the host through a recording, as exported C goes through it.
 #
-#   exported-c.sh
+#   exported-c.sh [--update]
+#
+# What each filter costs must be what docs/costs.md says, to a tenth; --update writes that table.
 #
 # Installs gcc, clang, cmake, gcc-arm-none-eabi, libnewlib-arm-none-eabi, qemu-system-arm, gcc-avr, avr-libc, simavr and arduino-core-avr
 # by apt where they are missing and this is root. Prints the largest differences, sizes and instructions per step. Needs a minute.
@@ -12,6 +14,8 @@
 #   OHMSTRAIN  the program; default: built by cargo
 set -euo pipefail
 cd "$(dirname "$0")/.."
+readonly update=${1:-}
+[[ $update == --update || $# -eq 0 ]] || { echo "usage: exported-c.sh [--update]" >&2; exit 2; }
 readonly here=$PWD/scripts/exported-c
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
@@ -76,6 +80,17 @@ on_target() {
     done
     code=$(arm-none-eabi-size "$work/filter.o" | awk 'NR == 2 { print $1 }')
     say "${folder##*/}, $name" "code and constants $code B"
+    # shellcheck disable=SC2046  # three words
+    costs "$folder" "$name" $(grep -oE 'step: [0-9]+' "$work/output" | grep -oE '[0-9]+') "$code" $(grep -oE 'state [0-9]+|stack [0-9]+' "$work/output" | grep -oE '[0-9]+')
+}
+
+# costs FOLDER PROCESSOR INSTRUCTIONS FLASH STATE STACK: a row of docs/costs.md.
+costs() {
+    local words branches curve
+    curve=$(sed -E 's/-[0-9].*//; s/-/ /g' <<<"${1##*/}")
+    words=$(sed -nE 's/^ \* (.*)\. On a Cortex-M4F about.*/\1/p' "$1/src/ohmstrain.h")
+    branches=$(awk '/^#define OHMSTRAIN_BRANCHES / { print $3 }' "$1/src/ohmstrain.h")
+    echo "| $words | $curve | $branches | $2 | $3 | $4 | $5 | $6 |" >>"$work/costs"
 }
 
 # near FOLDER WHAT FOUND PROMISED: fails unless what was promised is within a tenth of what was found.
@@ -114,9 +129,9 @@ for kind in polynomial:2:corrected polynomial:0:ekf decaying-exponential:1:sign-
     on_host "$folder" gcc -O2
     on_host "$folder" gcc -O1 -fsanitize=address,undefined -fno-sanitize-recover
     on_host "$folder" clang -O2
-    on_target "$folder" cortex-m4f "${m4f[@]}"
+    on_target "$folder" Cortex-M4F "${m4f[@]}"
     promised "$folder"
-    on_target "$folder" cortex-m0+ "${m0[@]}"
+    on_target "$folder" Cortex-M0+ "${m0[@]}"
     g++ -std=c++11 -fsyntax-only -Wall -Wextra -Werror -I"$folder/src" -x c++ "$folder/src/ohmstrain.c"
     for flag in -ffast-math -ffinite-math-only; do
         for compiler in gcc clang; do
@@ -140,7 +155,7 @@ for kind in polynomial-2-corrected:lean polynomial-2-corrected:instructions=2500
     "$ohmstrain" export --sensor "$work/$name.toml" --target c --dt-s 0.2 -o "$folder" --budget "$budget" >/dev/null
     "$ohmstrain" export --sensor "$work/$name.toml" --target rust --dt-s 0.2 -o "$folder/rust" --budget "$budget" >/dev/null
     on_host "$folder" gcc -O2
-    on_target "$folder" cortex-m4f "${m4f[@]}"
+    on_target "$folder" Cortex-M4F "${m4f[@]}"
     promised "$folder"
 done
 say "polynomial-2-corrected-lean, Mega" "$("$here/arduino-avr.sh" "$work/polynomial-2-corrected-lean" mega)"
@@ -155,15 +170,24 @@ for kind in polynomial:0 polynomial:1 polynomial:2 tunnelling:2; do
     on_host "$folder" gcc -O1 -DOHMSTRAIN_LISTED=1 -fsanitize=address,undefined -fno-sanitize-recover
     "$here/uno.sh" "$folder" >"$folder.run"
     while read -r line; do say "$name, simavr" "$line"; done <"$folder.run"
-    # shellcheck disable=SC2046  # five words
+    avr-gcc -mmcu=atmega328p -Os -std=gnu11 -Wall -Wextra -Werror -c "$folder/src/ohmstrain.c" -o "$work/avr.o"
+    on_target "$folder" Cortex-M4F "${m4f[@]}"
+    promised "$folder"
+    on_target "$folder" Cortex-M0+ "${m0[@]}"
+    # shellcheck disable=SC2046  # seven words
     set -- $(grep -oE 'step: [0-9]+|state [0-9]+|stack [0-9]+' "$folder.run" | grep -oE '[0-9]+') $(awk -F'|' '/on Arduino Uno/ { print $5, $6, $7, $8 }' "$folder.txt")
-    avr-gcc -mmcu=atmega328p -Os -std=gnu11 -Wall -Wextra -Werror -c "$folder/src/ohmstrain.c" -o "$work/filter.o"
     near "$name" "cycles a step" "$1" "$4"
-    near "$name" "bytes of code and constants" "$(avr-size "$work/filter.o" | awk 'NR == 2 { print $1 }')" "$5"
+    code=$(avr-size "$work/avr.o" | awk 'NR == 2 { print $1 }')
+    costs "$folder" "ATmega328P, cycles" "$1" "$code" "$2" "$3"
+    near "$name" "bytes of code and constants" "$code" "$5"
     near "$name" "bytes of state and stack" "$(($2 + $3))" "$6"
     near "$name" "bytes of stack" "$3" "$7"
     "$here/arduino-avr.sh" "$folder" uno >"$work/size"
     while read -r line; do say "$name, Uno" "$line"; done <"$work/size"
+    awk -v branches="$branches" -v curve="$gauge" -F'[ :,]+' '{
+        kind = $1 == "recorder" ? " | | | " : " | " curve " | " branches " | "
+        print "| " $1 kind $3 " | " $6 " |"
+    }' "$work/size" >>"$work/sketches"
     awk '{ if ($3 > 24 * 1024) { print "more than 24 KiB of flash: " $0; exit 1 } }' "$work/size" >&2
 done
 
@@ -235,6 +259,7 @@ od -An -v -tf4 -w4 -j12 "$work/counted.out" | paste -d' ' "$work/vectors" - | aw
 }
 # shellcheck disable=SC2046  # three words
 set -- $(od -An -v -tu4 -N12 "$work/counted.out")
+rust="In Rust the first of these filters takes $(($2 / $1)) instructions a step on a Cortex-M4F, $3 B of RAM beside the stack, and $(arm-none-eabi-size "$elf" | awk 'NR == 2 { print $1 }') B of flash with the rest of the program."
 say "polynomial_2_corrected, Rust" "$(($2 / $1)) instructions a step on Cortex-M4F, $3 B of RAM beside the stack, no panic in $(arm-none-eabi-size "$elf" | awk 'NR == 2 { print $1 }') B of the whole program"
 
 cp "$here/replayed.rs" "$work/crate/src/bin/replayed.rs"
@@ -289,3 +314,39 @@ for module in "${modules[@]}"; do
         -v own_flags="$own_flags" 'function most(least, own) { return least > 3 * own ? least : 3 * own }
         BEGIN { exit !(rows > 500 && mean < most(1e-3, own_mean) && worst < most(0.1, own_worst) && flags <= 3 * own_flags) }'
 done
+
+{
+    cat <<'MD'
+# What exported filters cost
+
+Generated by `scripts/exported-c.sh --update`; do not edit. The sensors are calibrated on 120 s of a simulated recording; instructions are means over the motion of the self-test,
+counted in QEMU (`arm-none-eabi-gcc -O2 -fno-math-errno`). Cycles are more than instructions; none have been measured on a Cortex-M board. On the ATmega328P simavr counts
+cycles (`avr-gcc -Os`; stack with `-flto`). Flash is code and constants of the filter, without the C library; the stack is that of a step.
+
+| filter | curve | branches | processor | instructions a step | flash, B | state, B | stack, B |
+|---|---|---|---|---|---|---|---|
+MD
+    awk '!printed[$0]++' "$work/costs"
+    printf '\n%s\n\n' "$rust"
+    cat <<'MD'
+Sketches of an exported folder on an Arduino Uno, the plotter with an extended Kalman filter, linked with Arduino's core and its flags:
+
+| sketch | curve | branches | flash, B | RAM beside the stack, B |
+|---|---|---|---|---|
+MD
+    awk '!printed[$0]++' "$work/sketches"
+} >"$work/costs.md"
+if [[ $update == --update ]]; then
+    cp "$work/costs.md" docs/costs.md
+fi
+# The same rows, and numbers that are no further than a tenth.
+paste -d'\n' docs/costs.md "$work/costs.md" | awk '
+    function numbers(line, all) { gsub(/[^0-9. ]/, " ", line); gsub(/\. /, " ", line); return split(line, all, " ") }
+    function words(line) { gsub(/[0-9]/, "", line); return line }
+    NR % 2 { said = $0; next }
+    {
+        n = numbers(said, a); m = numbers($0, b)
+        if (n != m || words(said) != words($0)) { bad = 1 }
+        for (k = 1; k <= n; k++) { if (b[k] + 0 > 1.1 * a[k] || b[k] + 0 < 0.9 * a[k]) { bad = 1 } }
+        if (bad) { print "docs/costs.md says " said ", found " $0 ": run with --update"; exit 1 }
+    }' >&2

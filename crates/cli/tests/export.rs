@@ -54,6 +54,30 @@ pub fn compile_and_run(compiler: &str, folder: &Path, sources: &[&str], stdin: &
     run_program(&compile(compiler, folder, sources, "program.out"), stdin, &[])
 }
 
+/// As an AVR has them: the self-test's bits, and those of a recording that is unplugged for a while.
+#[test]
+fn lists_of_operations_compute_what_compiled_functions_do() {
+    let bench = every_filter();
+    let export = ["export", "--sensor", "ekf.toml", "--dt-s", DT_S, "--target", "c", "-o", "lists"];
+    bench.run(&export).ok();
+    let folder = bench.path("lists");
+    let unplugged = |(k, line): (usize, &str)| match line.split_once(',') {
+        Some((time, _)) if (300..330).contains(&k) => format!("{time},,\n"),
+        _ => format!("{line}\n"),
+    };
+    let trace: String = bench.read("trace.csv").lines().enumerate().map(unplugged).collect();
+    for compiler in compilers() {
+        let run = |listed: &str, program: &str, stdin: &str| {
+            compile_and_run(compiler, &folder, &[listed, "src/ohmstrain.c", program], stdin)
+        };
+        let [listed, compiled] = ["-DOHMSTRAIN_LISTED=1", "-DOHMSTRAIN_LISTED=0"];
+        let tested = run(listed, "selftest/selftest.c", "");
+        assert!(tested.starts_with("largest difference: 0 of "), "{compiler}: {tested}");
+        let replayed = run(listed, "selftest/replay.c", &trace);
+        assert!(replayed.lines().count() > 300 && replayed == run(compiled, "selftest/replay.c", &trace), "{compiler}");
+    }
+}
+
 /// Without `--dt-s` readings come as often as in calibration.
 #[test]
 fn the_usual_time_between_readings_is_the_calibrations() {

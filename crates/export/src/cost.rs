@@ -123,14 +123,13 @@ struct Times {
 }
 
 impl Processor {
-    /// Counted of the filters of `scripts/exported-c.sh` at two branches: for Cortex-M0+ 70 639 instructions where the Cortex-M4F takes
-    /// 2251, 581 337 where it takes 15 208, 5 144 570 where it takes 106 269. What is compiled for an AVR took 236 403 cycles in simavr where
-    /// the Cortex-M4F took 1898 instructions, of an extended Kalman filter; others as much more as on a Cortex-M0+.
+    /// From docs/costs.md, the largest for each kind. What is compiled for an AVR took 236 403 cycles in simavr where the Cortex-M4F
+    /// took 1898 instructions, of an extended Kalman filter; others as much more as on a Cortex-M0+.
     const fn times(self) -> Times {
         match self {
             Self::Single => Times { instructions: [1.0; 3], flash: 1.0 },
-            Self::Software => Times { instructions: [31.4, 38.2, 48.4], flash: 1.22 },
-            Self::Avr => Times { instructions: [125.0, 152.0, 193.0], flash: 3.1 },
+            Self::Software => Times { instructions: [33.7, 39.3, 48.2], flash: 1.22 },
+            Self::Avr => Times { instructions: [125.0, 146.0, 179.0], flash: 3.1 },
         }
     }
 }
