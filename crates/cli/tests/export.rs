@@ -398,8 +398,8 @@ fn what_has_no_exported_form_is_refused_and_nothing_is_written() {
             longest.parse::<f64>().unwrap()
         ),
     );
-    for dt_s in [&[][..], &["--dt-s", "0"], &["--dt-s", "-1"], &["--dt-s", "inf"]] {
-        assert_eq!(c("sensor.toml", dt_s).code, Some(2), "{dt_s:?}");
+    for dt_s in ["0", "-1", "inf"] {
+        assert_eq!(c("sensor.toml", &["--dt-s", dt_s]).code, Some(2), "{dt_s:?}");
     }
     assert!(!bench.path("out").exists());
 }

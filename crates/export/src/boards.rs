@@ -11,13 +11,13 @@ pub struct Board {
     pub title: &'static str,
     /// Clock of the processor, Hz.
     pub clock_hz: u32,
-    /// Flash for a program, bytes: without the bootloader.
+    /// Flash for a program without the bootloader, bytes; as `upload.maximum_size` of the board's Arduino core.
     pub flash: usize,
     /// Static RAM, bytes.
     pub ram: usize,
     /// Arithmetic of the processor.
     pub processor: Processor,
-    /// Data sheet.
+    /// Data sheet of the chip or module.
     pub source: &'static str,
 }
 

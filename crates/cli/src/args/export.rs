@@ -3,7 +3,7 @@ use std::path::PathBuf;
 use clap::Args as ClapArgs;
 
 use super::{Auto, Estimator, positive};
-use ohmstrain_export::{Budget, ExportTarget, Prefix};
+use ohmstrain_export::{Board, Budget, ExportTarget, Prefix};
 
 /// A language that sensors are exported to.
 #[derive(Clone, Copy, Debug, clap::ValueEnum)]
@@ -44,11 +44,7 @@ pub struct ExportArgs {
     /// Estimator to export: auto (the sensor's default), corrected, sign-split, hypotheses or ekf
     #[arg(long, default_value = "auto")]
     pub estimator: Auto<Estimator>,
-    /// The best that fits a chip, fewer hypotheses and rows of the correction if need be: board=NAME (uno, nano, nano33, nano33ble,
-    /// teensy40, esp32, esp32c3, rp2040, stm32f1, stm32f4, stm32l4: half of its time between two readings, three quarters of its
-    /// flash and RAM), lean (15 000 instructions a step on a Cortex-M4F), or some of instructions=N,flash=BYTES,ram=BYTES. With
-    /// --score the best on that recording, else by a table
-    #[arg(long, value_name = "BUDGET", conflicts_with = "estimator")]
+    #[arg(long, value_name = "BUDGET", conflicts_with = "estimator", help = budget_help())]
     pub budget: Option<Budget>,
     /// What names in C begin with: two sensors in one program need names of their own
     #[arg(long, value_name = "NAME", default_value = "ohmstrain")]
@@ -60,4 +56,14 @@ pub struct ExportArgs {
     /// Score the rows from this time on only, s
     #[arg(long, value_name = "S", requires = "score")]
     pub from: Option<f64>,
+}
+
+/// Help text of `--budget`, with the names of all boards.
+fn budget_help() -> String {
+    format!(
+        "The best that fits a chip, fewer hypotheses and rows of the correction if need be: board=NAME ({}: half of its time between two \
+         readings, three quarters of its flash and RAM), lean (15 000 instructions a step on a Cortex-M4F), or some of \
+         instructions=N,flash=BYTES,ram=BYTES. With --score the best on that recording, else by a table",
+        Board::names()
+    )
 }
