@@ -113,6 +113,15 @@ fn chip() {
 }
 
 #[test]
+fn questions() {
+    holds(&run("which-motion.md"), &["one-speed.toml", "mixed.csv"]);
+    holds(&run("wide-interval.md"), &["estimates.csv", "undoubted.csv"]);
+    holds(&run("tau-and-gain.md"), &["sensor.toml", "report.html"]);
+    holds(&run("what-limits.md"), &["sensor.toml", "report.html"]);
+    holds(&run("which-estimator.md"), &["bench.csv"]);
+}
+
+#[test]
 fn the_summary_names_every_chapter() {
     let summary = fs::read_to_string(chapters().join("SUMMARY.md")).unwrap();
     for entry in fs::read_dir(chapters()).unwrap() {

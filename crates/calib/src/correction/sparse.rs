@@ -17,7 +17,7 @@ use super::gaussian_process::{LeftOutRow, WHITE};
 /// Standard deviation of a recording's offset, in those of the targets.
 const OFFSET: f64 = 0.25;
 /// For how long errors are alike, s: rows that are closer count for less. Whitening them as an Ornstein-Uhlenbeck process makes other
-/// recordings worse (docs/learned-correction.md).
+/// recordings worse (docs/notes/2026-11-26-correction-several-recordings.md).
 const ERROR_TIME_S: f64 = 4.0;
 /// Keeps the kernels of the few rows apart, and the equations regular.
 const JITTER: f64 = 1e-6;

@@ -18,7 +18,8 @@ struct Following {
     farthest: f64,
 }
 
-/// `docs/another-day.md` has what these were chosen on. A faster start follows another day sooner, and a fault of 10 s farther.
+/// `docs/notes/2026-11-23-following-r0-figures.md` has what these were chosen on. A faster start follows another day sooner,
+/// and a fault of 10 s farther.
 const FOLLOWING: Following =
     Following { leaves_s: 40.0, settles_s: 10.0, returns_s: 1.0, longest_s: 2.0, fault_s: 30.0, farthest: 2.0 };
 

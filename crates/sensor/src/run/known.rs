@@ -27,7 +27,7 @@ struct Size {
     slow: f64,
 }
 
-/// `docs/another-day.md` has what they were chosen on.
+/// `docs/notes/2026-11-24-known-strains-figures.md` has what they were chosen on.
 const SIZES: [Size; 4] = [
     Size { probability: 0.85, fast: 0.97, slow: 0.03 },
     Size { probability: 0.08, fast: 0.7, slow: 0.3 },
