@@ -1,3 +1,4 @@
+use crate::marks::MarksError;
 use crate::samples::SamplesError;
 use ohmstrain_ekf::StepError;
 use ohmstrain_model::ParameterError;
@@ -27,6 +28,14 @@ pub enum CalibrationError {
     /// Slices that are no recording.
     #[error(transparent)]
     Samples(#[from] SamplesError),
+    /// Marks that give no reference.
+    #[error("{}{source}", source.mark().map_or(String::new(), |mark| format!("mark {}: ", mark + 1)))]
+    Marks {
+        /// Index of the recording.
+        recording: usize,
+        /// Fault of the marks.
+        source: MarksError,
+    },
     /// The readings never change.
     #[error("the reading is constant: nothing can be learned from it")]
     ConstantReading,

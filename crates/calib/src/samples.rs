@@ -13,6 +13,8 @@ pub struct Samples<'a> {
     pub(crate) reading: &'a [f64],
     /// True strain; NaN where missing.
     pub(crate) strain: &'a [f64],
+    /// Standard deviations of the true strains; empty if they are exact.
+    pub(crate) strain_sd: &'a [f64],
 }
 
 /// Why slices are no recording. Rows count from zero.
@@ -63,6 +65,14 @@ pub enum SamplesError {
         /// Its strain.
         strain: f64,
     },
+    /// A known strain with a standard deviation that is NaN, infinite or negative.
+    #[error("row {row}: expected a standard deviation of zero or more, found {strain_sd}")]
+    StrainSd {
+        /// The row.
+        row: usize,
+        /// Its standard deviation.
+        strain_sd: f64,
+    },
 }
 
 impl<'a> Samples<'a> {
@@ -92,7 +102,30 @@ impl<'a> Samples<'a> {
             }
             before = Some(time_s);
         }
-        Ok(Self { time_s, reading, strain })
+        Ok(Self { time_s, reading, strain, strain_sd: &[] })
+    }
+
+    /// The same with standard deviations of the true strains: errors of an estimate count with them, so that intervals cover the
+    /// reference's error as well.
+    ///
+    /// # Errors
+    /// [`SamplesError::StrainSd`] for the first known strain whose standard deviation is not zero or positive, and
+    /// [`SamplesError::Lengths`].
+    pub fn with_strain_sd(self, strain_sd: &'a [f64]) -> Result<Self, SamplesError> {
+        let (times, strains) = (self.time_s.len(), strain_sd.len());
+        if strains != times {
+            return Err(SamplesError::Lengths { times, readings: times, strains });
+        }
+        let is_wrong = |row: &usize| self.strain[*row].is_finite() && !(0.0..f64::INFINITY).contains(&strain_sd[*row]);
+        match (0..times).find(is_wrong) {
+            Some(row) => Err(SamplesError::StrainSd { row, strain_sd: strain_sd[row] }),
+            None => Ok(Self { strain_sd, ..self }),
+        }
+    }
+
+    /// Standard deviation of the true strain in a row; zero where it is exact.
+    pub(crate) fn sd_of_strain(&self, row: usize) -> f64 {
+        self.strain_sd.get(row).copied().filter(|sd| sd.is_finite()).unwrap_or(0.0)
     }
 
     /// Times, s.
@@ -117,7 +150,8 @@ impl<'a> Samples<'a> {
     #[must_use]
     pub fn head(&self, rows: usize) -> Self {
         let rows = rows.min(self.time_s.len());
-        Self { time_s: &self.time_s[..rows], reading: &self.reading[..rows], strain: &self.strain[..rows] }
+        let strain_sd = self.strain_sd.get(..rows).unwrap_or_default();
+        Self { time_s: &self.time_s[..rows], reading: &self.reading[..rows], strain: &self.strain[..rows], strain_sd }
     }
 
     /// Time from the first row to the last, s.

@@ -61,18 +61,32 @@ pub(crate) fn fit_correction(
     rows.extend(chosen(&candidates, most).iter().map(rounded));
     let steps_s = recordings.iter().flat_map(|of| of.time_s.windows(2).map(|pair| pair[1] - pair[0]));
     let simulated = simulated_rows(fit, &MotionStats::new(recordings), &scale, median(steps_s).unwrap_or(0.0));
-    Ok(learn((corrects, scale), rows, all, &simulated, limits))
+    Ok(learn(
+        (corrects, scale),
+        rows,
+        CorrectorInputs { all, reference_sd: reference_sd(recordings), few: Columns::default() },
+        &simulated,
+        limits,
+    ))
+}
+
+/// Root mean square of the standard deviations that the recordings' references have.
+fn reference_sd(recordings: &[Samples]) -> f64 {
+    let variances =
+        recordings.iter().flat_map(|samples| samples.complete_rows().map(|k| samples.sd_of_strain(k).powi(2)));
+    let (sum, count) = variances.fold((0.0, 0.0), |(sum, count), variance| (sum + variance, count + 1.0));
+    (sum / f64::max(count, 1.0)).sqrt()
 }
 
 fn learn(
     (corrects, readings): (EstimatorKind, CorrectionScale),
     rows: Vec<TrainingRow>,
-    all: Option<AllOf>,
+    of_recordings: CorrectorInputs,
     simulated: &[SimulatedRow],
     limits: RangeParams,
 ) -> Option<CorrectionParams> {
     let distilled = Distilled::fit(simulated, &rows, limits)?;
-    let inputs = CorrectorInputs { all, ..CorrectorInputs::new(&rows) };
+    let inputs = CorrectorInputs { few: Columns::new(rows.iter()), ..of_recordings };
     let simulated = Prepared::new(inputs.of_filter(limits)).simulated(&distilled)?;
     let (filter, smoother) = rayon::join(
         || filter_corrector(inputs.of_filter(limits), &simulated),
@@ -86,6 +100,8 @@ fn learn(
 pub(crate) struct CorrectorInputs {
     few: Columns,
     all: Option<AllOf>,
+    /// Root mean square of the reference's standard deviations.
+    reference_sd: f64,
 }
 
 /// Rows of several recordings.
@@ -95,6 +111,7 @@ struct AllOf {
     step_s: f64,
 }
 
+#[derive(Default)]
 struct Columns {
     filter: Vec<[f64; FILTER_INPUTS]>,
     smoother: Vec<[f64; SMOOTHER_INPUTS]>,
@@ -138,19 +155,19 @@ impl AllOf {
 impl CorrectorInputs {
     /// Of rows that stand for no others.
     pub(crate) fn new(rows: &[TrainingRow]) -> Self {
-        Self { few: Columns::new(rows.iter()), all: None }
+        Self { few: Columns::new(rows.iter()), all: None, reference_sd: 0.0 }
     }
 
     pub(crate) fn of_filter(&self, limits: RangeParams) -> Examples<'_, FILTER_INPUTS> {
         let Columns { filter: inputs, strain, time_s, .. } = &self.few;
         let all = self.all.as_ref().map(|all| all.rows(&all.columns.filter));
-        Examples { inputs, strain, time_s, limits, all }
+        Examples { inputs, strain, time_s, limits, reference_sd: self.reference_sd, all }
     }
 
     pub(crate) fn of_smoother(&self, limits: RangeParams) -> Examples<'_, SMOOTHER_INPUTS> {
         let Columns { smoother: inputs, strain, time_s, .. } = &self.few;
         let all = self.all.as_ref().map(|all| all.rows(&all.columns.smoother));
-        Examples { inputs, strain, time_s, limits, all }
+        Examples { inputs, strain, time_s, limits, reference_sd: self.reference_sd, all }
     }
 }
 

@@ -49,7 +49,30 @@ struct Run<'a> {
     /// Relative to the R₀ of that law.
     reading: Vec<Option<Reading<f64>>>,
     strain: Vec<f64>,
+    /// Standard deviations of the true strains.
+    strain_sd: Vec<f64>,
     block: Range<usize>,
+}
+
+/// A true strain with its standard deviation.
+#[derive(Clone, Copy)]
+struct Truth {
+    strain: f64,
+    sd: f64,
+}
+
+impl Truth {
+    /// Error of an estimate in units of its standard deviation. The reference's error may have been learned with the strain: it counts as
+    /// one that the difference does not show.
+    fn deviation(self, strain: Gaussian<f64>) -> f64 {
+        (strain.mean - self.strain).hypot(self.sd) / strain.sd()
+    }
+}
+
+impl Run<'_> {
+    fn truth(&self, row: usize) -> Truth {
+        Truth { strain: self.strain[row], sd: self.strain_sd[row] }
+    }
 }
 
 impl<'a> LeftOut<'a> {
@@ -67,6 +90,7 @@ impl<'a> LeftOut<'a> {
                     time_s: pick(samples.time_s),
                     reading: relative_changes(&pick(samples.reading), fold.rest_reading),
                     strain: pick(samples.strain),
+                    strain_sd: (0..samples.len()).step_by(stride).map(|k| samples.sd_of_strain(k)).collect(),
                     block: rows.start.div_ceil(stride)..rows.end.div_ceil(stride),
                 });
             }
@@ -79,8 +103,8 @@ impl<'a> LeftOut<'a> {
     pub(crate) fn score(&self, build: &Build) -> f64 {
         let span = self.limits.span();
         let terms = self.of_rows(build, |strain, truth| {
-            let variance = strain.variance / (span * span) + REFERENCE_SD * REFERENCE_SD;
-            let error = (strain.mean - truth) / span;
+            let variance = (strain.variance + truth.sd * truth.sd) / (span * span) + REFERENCE_SD * REFERENCE_SD;
+            let error = (strain.mean - truth.strain) / span;
             0.5 * (error * error / variance + variance.ln())
         });
         let Some(terms) = terms else { return f64::INFINITY };
@@ -90,7 +114,7 @@ impl<'a> LeftOut<'a> {
 
     /// Errors of the filter in units of its deviation, block by block; `None` if it fails.
     pub(crate) fn filtered_deviations(&self, build: &Build) -> Option<Vec<Vec<f64>>> {
-        self.of_rows(build, |strain, truth| (strain.mean - truth).abs() / strain.sd())
+        self.of_rows(build, |strain, truth| truth.deviation(strain))
     }
 
     /// The same for the smoother of whole recordings; `None` if the estimator has none.
@@ -99,14 +123,7 @@ impl<'a> LeftOut<'a> {
             let mut smoother = build(run.fold).smoother(None).ok()?;
             let smoothed = smoother.smooth(&run.time_s, &run.reading).ok()??;
             let known = run.block.clone().filter(|&k| run.strain[k].is_finite());
-            Some(
-                known
-                    .map(|k| {
-                        let strain = smoothed[k].estimate.strain;
-                        (strain.mean - run.strain[k]).abs() / strain.sd()
-                    })
-                    .collect(),
-            )
+            Some(known.map(|k| run.truth(k).deviation(smoothed[k].estimate.strain)).collect())
         };
         self.runs.par_iter().map(of_run).collect()
     }
@@ -135,14 +152,14 @@ impl<'a> LeftOut<'a> {
 
     /// What estimate and true strain of every row of every block come to, block by block: the filter runs from the first row to the end
     /// of the block. `None` if it fails.
-    fn of_rows(&self, build: &Build, of: impl Fn(Gaussian<f64>, f64) -> f64 + Sync) -> Option<Vec<Vec<f64>>> {
+    fn of_rows(&self, build: &Build, of: impl Fn(Gaussian<f64>, Truth) -> f64 + Sync) -> Option<Vec<Vec<f64>>> {
         let of_run = |run: &Run| {
             let mut filter = build(run.fold).filter(None).ok()?;
             let mut rows = Vec::with_capacity(run.block.len());
             for k in 0..run.block.end {
                 filter.step(run.time_s[k], run.reading[k]).ok()?;
                 if k >= run.block.start && run.strain[k].is_finite() {
-                    rows.push(of(filter.strain(), run.strain[k]));
+                    rows.push(of(filter.strain(), run.truth(k)));
                 }
             }
             Some(rows)

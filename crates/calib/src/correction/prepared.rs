@@ -182,7 +182,7 @@ impl<'a, const D: usize> Prepared<'a, D> {
 
     /// Errors of what is said of judged rows, in units of their deviations, block by block.
     fn deviations(&self, said: &[Gaussian<f64>]) -> Vec<Vec<f64>> {
-        let of_row = |k: usize| (said[k].mean - self.judged.strain[k]).abs() / said[k].sd();
+        let of_row = |k: usize| (said[k].mean - self.judged.strain[k]).hypot(self.examples.reference_sd) / said[k].sd();
         self.judged.blocks.iter().map(|block| block.clone().map(of_row).collect()).collect()
     }
 

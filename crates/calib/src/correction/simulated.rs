@@ -166,7 +166,14 @@ mod tests {
         let (real, known) = rows(100, 7);
         let time_s: Vec<f64> = (0..100).map(f64::from).collect();
         let said_of = |known: &[f64]| {
-            let examples = Examples { inputs: &real, strain: known, time_s: &time_s, limits: LIMITS, all: None };
+            let examples = Examples {
+                inputs: &real,
+                strain: known,
+                time_s: &time_s,
+                limits: LIMITS,
+                reference_sd: 0.0,
+                all: None,
+            };
             let prepared = Prepared::new(examples);
             let (all, strain) = rows(4000, 100_000);
             let row = |(row, strain): (&[f64; D], &f64)| SimulatedRow {

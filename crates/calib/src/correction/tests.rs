@@ -86,7 +86,8 @@ fn lengths(around: f64, inputs: usize) -> Vec<f64> {
 fn a_correction_says_what_the_textbook_says() {
     // As many rows as may be inducing: nothing is left out of the variance.
     let (inputs, strain, time_s) = examples(40, 1.7);
-    let examples = Examples { inputs: &inputs, strain: &strain, time_s: &time_s, limits: LIMITS, all: None };
+    let examples =
+        Examples { inputs: &inputs, strain: &strain, time_s: &time_s, limits: LIMITS, reference_sd: 0.0, all: None };
     let direct = Settings { lengths: vec![2.0, 3.0], noise: 0.1, noise_time_s: 2.0 };
     let residual = Settings { lengths: lengths(4.0, D), noise: 0.3, noise_time_s: 10.0 };
     let choices = Choices {
@@ -125,7 +126,8 @@ fn a_correction_says_what_the_textbook_says() {
 fn one_sided_processes_see_their_side_alone() {
     const BOTH: usize = 17;
     let (inputs, strain, time_s) = examples::<BOTH>(40, 1.7);
-    let examples = Examples { inputs: &inputs, strain: &strain, time_s: &time_s, limits: LIMITS, all: None };
+    let examples =
+        Examples { inputs: &inputs, strain: &strain, time_s: &time_s, limits: LIMITS, reference_sd: 0.0, all: None };
     let [direct, residual, past, future] = [
         (ProcessKind::Direct, 4.0, 0.1),
         (ProcessKind::Residual, 4.0, 0.3),
@@ -161,7 +163,8 @@ fn one_sided_processes_see_their_side_alone() {
 #[test]
 fn inducing_rows_cost_no_certainty_that_is_not_there() {
     let (inputs, strain, time_s) = examples(200, 1.7);
-    let examples = Examples { inputs: &inputs, strain: &strain, time_s: &time_s, limits: LIMITS, all: None };
+    let examples =
+        Examples { inputs: &inputs, strain: &strain, time_s: &time_s, limits: LIMITS, reference_sd: 0.0, all: None };
     let chosen = |kind: ProcessKind| {
         let inputs = kind.places(D);
         let settings = Settings { lengths: vec![4.0; inputs.len()], noise: 0.1, noise_time_s: 2.0 };
@@ -328,8 +331,14 @@ fn a_factor_covers_the_worst_block_or_all_together() {
     let (inputs, strain, time_s) = examples::<D>(160, 0.5);
     let off = |k: usize| if k >= 128 && k % 8 < 3 { 0.5 + 0.01 * k as f64 } else { 0.0 };
     let strain: Vec<f64> = strain.iter().enumerate().map(|(k, y)| y + off(k)).collect();
-    let prepared =
-        Prepared::new(Examples { inputs: &inputs, strain: &strain, time_s: &time_s, limits: LIMITS, all: None });
+    let prepared = Prepared::new(Examples {
+        inputs: &inputs,
+        strain: &strain,
+        time_s: &time_s,
+        limits: LIMITS,
+        reference_sd: 0.0,
+        all: None,
+    });
     let covered = |covers_worst: bool| {
         let by = Choosing { criterion: Criterion::LeftOut, covers_worst };
         let params = prepared.chosen(ProcessKind::Residual, by).unwrap();
@@ -354,7 +363,8 @@ fn learning_helps_near_and_leaves_far_alone() {
     let pick = |values: &[f64]| (0..160).filter(even).map(|k| values[k]).collect::<Vec<f64>>();
     let seen: Vec<[f64; D]> = (0..160).filter(even).map(|k| inputs[k]).collect();
     let (known, times) = (pick(&strain), pick(&time_s));
-    let examples = Examples { inputs: &seen, strain: &known, time_s: &times, limits: LIMITS, all: None };
+    let examples =
+        Examples { inputs: &seen, strain: &known, time_s: &times, limits: LIMITS, reference_sd: 0.0, all: None };
     let choices = Choices::fit::<D, 0>(&Prepared::new(examples), &[]).unwrap();
     let correction: OwnedCorrection<f64, D> = learned(&choices, examples);
     let (mut before, mut after, mut covered) = (0.0, 0.0, 0);
@@ -430,6 +440,7 @@ fn a_few_rows_learn_what_all_recordings_say() {
         strain: &strain[..12],
         time_s: &[0.0; 12],
         limits: LIMITS,
+        reference_sd: 0.0,
         all: Some(AllRows { inputs: &inputs, strain: &strain, recordings: &recordings, step_s: 0.5 }),
     };
     let prepared = Prepared::new(examples);

@@ -128,6 +128,15 @@ fn cross_fit(
     Ok(CrossFit { law: structure.fit(regression, None)?, without_block, blocks: regression.block_rows() })
 }
 
+/// The structure on the grid of time constants that cross-validation chooses with this ridge.
+pub(crate) fn structure_on_grid(
+    regression: &LawRegression,
+    LawOptions { branches, gauge: family }: LawOptions,
+    ridge: f64,
+) -> Result<LawStructure, CalibrationError> {
+    Ok(LawStructure { family, nonlinear: TauGrid::new(regression, branches).best(ridge)?, taus: branches, ridge })
+}
+
 /// One structure with the least ridge.
 pub(crate) fn fit_structure(
     regression: &LawRegression,

@@ -82,6 +82,7 @@ struct Columns {
     time_s: Vec<f64>,
     reading: Vec<f64>,
     strain: Vec<f64>,
+    strain_sd: Vec<f64>,
 }
 
 /// Rows to each side that a row is compared with.
@@ -124,7 +125,12 @@ pub fn screen(recordings: &[Samples]) -> Result<Screened, CalibrationError> {
             screened.distrusted.push(Distrusted { recording, row, time_s: samples.time_s[row], doubt });
             strain[row] = f64::NAN;
         }
-        screened.recordings.push(Columns { time_s: samples.time_s.to_vec(), reading, strain });
+        screened.recordings.push(Columns {
+            time_s: samples.time_s.to_vec(),
+            reading,
+            strain,
+            strain_sd: samples.strain_sd.to_vec(),
+        });
     }
     screened.leave_out_misfits()?;
     screened.distrusted.sort_by_key(|one| (one.recording, one.row));
@@ -138,7 +144,7 @@ pub fn screen(recordings: &[Samples]) -> Result<Screened, CalibrationError> {
 
 impl Columns {
     fn samples(&self) -> Samples<'_> {
-        Samples { time_s: &self.time_s, reading: &self.reading, strain: &self.strain }
+        Samples { time_s: &self.time_s, reading: &self.reading, strain: &self.strain, strain_sd: &self.strain_sd }
     }
 }
 

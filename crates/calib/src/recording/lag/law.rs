@@ -194,7 +194,7 @@ fn left_out_errors(samples: &Samples, lag_s: f64, search: Lags) -> Option<[f64; 
     let (time_s, strain) = (pick(samples.time_s), pick(&strain));
     let reading: Vec<f64> =
         rows.iter().map(|&k| if samples.strain[k].is_finite() { samples.reading[k] } else { f64::NAN }).collect();
-    let shifted = Samples { time_s: &time_s, reading: &reading, strain: &strain };
+    let shifted = Samples { time_s: &time_s, reading: &reading, strain: &strain, strain_sd: &[] };
     let regression = robust(LawRegression::new(&[shifted]).ok()?);
     let structure = preliminary(&regression);
     let mut design = structure.design(&regression);

@@ -1,0 +1,314 @@
+//! Motion and law at once: the most probable motion under the readings, with its covariance.
+
+use nalgebra::{Cholesky, DMatrix, DVector};
+
+use crate::CalibrationError;
+use crate::law::design::StrainScale;
+use crate::law::fit::{LawOptions, structure_on_grid};
+use crate::law::regression::LawRegression;
+use crate::law::structure::LawStructure;
+use crate::marks::motion::Motion;
+use crate::order::median;
+use crate::samples::Samples;
+use ohmstrain_sensor::RangeParams;
+
+/// Rows that the fit uses at most.
+const MOST_ROWS: usize = 1000;
+/// A law's errors last as long as a move and come again with the next one like it: the rows of a move count as this many independent
+/// readings. With 1 to 4 of them the stated deviations held on six recordings, with 16 they were too small by half.
+const READINGS_OF_MOVE: f64 = 2.0;
+/// A move whose mean squared misfit is above this multiple of the median move's is irregular.
+const IRREGULAR: f64 = 4.0;
+/// Ridge of the law: no move has a regressor to itself.
+const RIDGE: f64 = 0.01;
+/// Steps of Gauss-Newton, and after how many of them time constants are fitted again.
+const STEPS: usize = 8;
+const TAUS_EVERY: usize = 4;
+/// Longest step of a parameter, in standard deviations of its prior, and the smallest fraction of a step that is tried.
+const LONGEST: f64 = 1.5;
+const LEAST_FRACTION: f64 = 0.02;
+/// Decrease of the cost that is none.
+const TOLERANCE: f64 = 0.05;
+/// Difference for derivatives, in the same unit.
+const DIFFERENCE: f64 = 1e-3;
+
+/// A motion that was fitted, with the covariance of its parameters.
+pub(crate) struct Fitted {
+    pub motion: Motion,
+    parameters: DVector<f64>,
+    covariance: DMatrix<f64>,
+}
+
+/// A recording whose motion is to be found.
+struct Problem<'a> {
+    time_s: &'a [f64],
+    reading: &'a [f64],
+    /// Marks' range of strain, which the law is scaled by.
+    range: RangeParams,
+    /// Readings over their median in the complete rows.
+    response: DVector<f64>,
+    /// The move of each complete row: with a reading, between the first mark and the last.
+    of_move: Vec<usize>,
+    /// Number of complete rows in each move.
+    rows_of_move: Vec<f64>,
+}
+
+/// Fits `motion`, and makes moves irregular that the law does not explain as regular ones.
+pub(crate) fn fit(samples: &Samples, mut motion: Motion, range: RangeParams) -> Result<Fitted, CalibrationError> {
+    let stride = samples.len().div_ceil(MOST_ROWS).max(1);
+    let thinned = |values: &[f64]| values.iter().copied().step_by(stride).collect::<Vec<f64>>();
+    let (time_s, reading) = (thinned(samples.time_s), thinned(samples.reading));
+    let problem = Problem::new(&time_s, &reading, &motion, range)?;
+    let none = DVector::zeros(motion.parameters());
+    let structure = problem.structure(&motion, &none)?;
+    let misfits = problem.misfits_of_moves(&problem.design(&structure, &motion, &none)?, structure.ridge)?;
+    let typical = typical(&misfits);
+    let irregular: Vec<usize> = (0..misfits.len()).filter(|&k| misfits[k] > IRREGULAR * typical).collect();
+    motion.make_irregular(&irregular, samples);
+    let (parameters, covariance) = problem.descend(&motion, structure, typical)?;
+    Ok(Fitted { motion, parameters, covariance })
+}
+
+impl Fitted {
+    /// Strains and their standard deviations at these times; NaN before the first mark and after the last.
+    pub(crate) fn strains(&self, time_s: &[f64]) -> (Vec<f64>, Vec<f64>) {
+        let strains = self.motion.strains(&self.parameters, time_s);
+        let mut variances: Vec<f64> = time_s.iter().map(|t| self.motion.shape_sd(*t).powi(2)).collect();
+        let slopes = slopes(&self.parameters, &strains, |z| self.motion.strains(z, time_s));
+        let spread = &slopes * &self.covariance;
+        for (k, variance) in variances.iter_mut().enumerate() {
+            *variance += spread.row(k).dot(&slopes.row(k)).max(0.0);
+        }
+        (strains, variances.into_iter().map(f64::sqrt).collect())
+    }
+}
+
+/// Derivatives of `of` by each parameter, by differences.
+fn slopes(parameters: &DVector<f64>, here: &[f64], of: impl Fn(&DVector<f64>) -> Vec<f64>) -> DMatrix<f64> {
+    let mut slopes = DMatrix::zeros(here.len(), parameters.len());
+    for j in 0..parameters.len() {
+        let mut moved = parameters.clone();
+        moved[j] += DIFFERENCE;
+        for (k, (there, here)) in of(&moved).iter().zip(here).enumerate() {
+            slopes[(k, j)] = (there - here) / DIFFERENCE;
+        }
+    }
+    slopes
+}
+
+/// Median of the moves' mean squared misfits.
+fn typical(misfits: &[f64]) -> f64 {
+    median(misfits.iter().copied().filter(|m| m.is_finite())).unwrap_or(f64::NAN)
+}
+
+impl<'a> Problem<'a> {
+    fn new(
+        time_s: &'a [f64],
+        reading: &'a [f64],
+        motion: &Motion,
+        range: RangeParams,
+    ) -> Result<Self, CalibrationError> {
+        let place = |k: usize| motion.move_at(time_s[k]).filter(|_| reading[k].is_finite()).map(|of_move| (k, of_move));
+        let (complete, of_move): (Vec<usize>, Vec<usize>) = (0..time_s.len()).filter_map(place).unzip();
+        let mut rows_of_move = vec![0.0; motion.moves()];
+        for &k in &of_move {
+            rows_of_move[k] += 1.0;
+        }
+        let Some(middle) = median(complete.iter().map(|&k| reading[k])) else {
+            return Err(CalibrationError::NoRecording);
+        };
+        let response = DVector::from_iterator(complete.len(), complete.iter().map(|&k| reading[k] / middle));
+        Ok(Self { time_s, reading, range, response, of_move, rows_of_move })
+    }
+
+    /// The samples with the motion's strains for a reference.
+    fn with_samples<T>(&self, motion: &Motion, z: &DVector<f64>, of: impl FnOnce(&Samples) -> T) -> T {
+        let strain = motion.strains(z, self.time_s);
+        of(&Samples { time_s: self.time_s, reading: self.reading, strain: &strain, strain_sd: &[] })
+    }
+
+    /// The law's structure: one that no single move has a regressor in to itself.
+    fn structure(&self, motion: &Motion, z: &DVector<f64>) -> Result<LawStructure, CalibrationError> {
+        structure_on_grid(&self.regression(motion, z)?, LawOptions::default(), RIDGE)
+    }
+
+    fn regression(&self, motion: &Motion, z: &DVector<f64>) -> Result<LawRegression, CalibrationError> {
+        let RangeParams { lower, upper } = self.range;
+        let scale = StrainScale { centre: 0.5 * (lower + upper), span: upper - lower };
+        self.with_samples(motion, z, |samples| LawRegression::on_scale(&[*samples], scale, self.range))
+    }
+
+    /// Columns of the law for a motion, in the complete rows.
+    fn design(
+        &self,
+        structure: &LawStructure,
+        motion: &Motion,
+        z: &DVector<f64>,
+    ) -> Result<DMatrix<f64>, CalibrationError> {
+        let RangeParams { lower, upper } = self.range;
+        let scale = StrainScale { centre: 0.5 * (lower + upper), span: upper - lower };
+        let regression =
+            self.with_samples(motion, z, |samples| LawRegression::on_scale(&[*samples], scale, self.range))?;
+        Ok(DMatrix::from_columns(&structure.design(&regression).columns))
+    }
+
+    /// Mean squared misfit of each move by a law that was fitted without it.
+    fn misfits_of_moves(&self, design: &DMatrix<f64>, ridge: f64) -> Result<Vec<f64>, CalibrationError> {
+        let without = |left_out: usize| {
+            let weight = |of_move: &usize| f64::from(u8::from(*of_move != left_out));
+            let weights = DVector::from_iterator(self.of_move.len(), self.of_move.iter().map(weight));
+            let law = Weighted::new(design, &weights, ridge).fit(&self.response).ok_or(CalibrationError::Singular)?;
+            Ok(self.means_of_moves(&(&self.response - design * law))[left_out])
+        };
+        (0..self.rows_of_move.len()).map(without).collect()
+    }
+
+    /// Mean square of the rows of each move; NaN for a move without a row.
+    fn means_of_moves(&self, residual: &DVector<f64>) -> Vec<f64> {
+        let mut sums = vec![0.0; self.rows_of_move.len()];
+        for (r, &k) in residual.iter().zip(&self.of_move) {
+            sums[k] += r * r;
+        }
+        sums.iter().zip(&self.rows_of_move).map(|(sum, rows)| sum / rows).collect()
+    }
+
+    /// Gauss-Newton from the marks as they are: parameters and their covariance, the law's uncertainty in it. `variance` is that of the
+    /// law's error.
+    fn descend(
+        &self,
+        motion: &Motion,
+        mut structure: LawStructure,
+        variance: f64,
+    ) -> Result<(DVector<f64>, DMatrix<f64>), CalibrationError> {
+        let weight = |k: &usize| READINGS_OF_MOVE / (variance * self.rows_of_move[*k]);
+        let weights = DVector::from_iterator(self.of_move.len(), self.of_move.iter().map(weight));
+        let mut z = DVector::zeros(motion.parameters());
+        let mut last = None;
+        for step in 0..STEPS {
+            if step > 0 && step % TAUS_EVERY == 0 {
+                structure = self.structure(motion, &z)?;
+            }
+            let here = Linear::new(self, (motion, &structure), &z, &weights)?;
+            let (direction, covariance) = here.step(&z).ok_or(CalibrationError::Singular)?;
+            last = Some(covariance);
+            let longest = direction.amax();
+            let mut fraction = if longest > LONGEST { LONGEST / longest } else { 1.0 };
+            let cost = |z: &DVector<f64>| self.cost((motion, &structure), z, &weights);
+            let before = cost(&z)?;
+            let mut next = &z + fraction * &direction;
+            let mut after = cost(&next)?;
+            while after > before && fraction > LEAST_FRACTION {
+                fraction *= 0.5;
+                next = &z + fraction * &direction;
+                after = cost(&next)?;
+            }
+            if after < before {
+                z = next;
+            }
+            if before - after < TOLERANCE {
+                break;
+            }
+        }
+        Ok((z, last.ok_or(CalibrationError::Singular)?))
+    }
+
+    /// Half the weighted squares, with the law that is best there.
+    fn cost(
+        &self,
+        (motion, structure): (&Motion, &LawStructure),
+        z: &DVector<f64>,
+        weights: &DVector<f64>,
+    ) -> Result<f64, CalibrationError> {
+        let design = self.design(structure, motion, z)?;
+        let weighted = Weighted::new(&design, weights, structure.ridge);
+        let law = weighted.fit(&self.response).ok_or(CalibrationError::Singular)?;
+        let residual = &self.response - &design * &law;
+        let squares = residual.component_mul(&residual).dot(weights);
+        Ok(0.5 * (squares + weighted.penalty.component_mul(&law).dot(&law) + z.norm_squared()))
+    }
+}
+
+/// Weighted ridge regression on the columns of a law; the constant, which comes first, is free.
+struct Weighted<'a> {
+    design: &'a DMatrix<f64>,
+    weights: &'a DVector<f64>,
+    penalty: DVector<f64>,
+}
+
+impl<'a> Weighted<'a> {
+    /// `ridge` is relative to the variance of each column.
+    fn new(design: &'a DMatrix<f64>, weights: &'a DVector<f64>, ridge: f64) -> Self {
+        let whole = weights.sum();
+        let of_column = |(k, column): (usize, nalgebra::DVectorView<f64>)| {
+            if k == 0 { 0.0 } else { ridge * whole * column.variance() }
+        };
+        let penalty = DVector::from_iterator(design.ncols(), design.column_iter().enumerate().map(of_column));
+        Self { design, weights, penalty }
+    }
+
+    fn fit(&self, response: &DVector<f64>) -> Option<DVector<f64>> {
+        let weighted = scaled_rows(self.design, self.weights);
+        let normal = self.design.tr_mul(&weighted) + DMatrix::from_diagonal(&self.penalty);
+        Some(Cholesky::new(normal)?.solve(&weighted.tr_mul(response)))
+    }
+}
+
+fn scaled_rows(matrix: &DMatrix<f64>, weights: &DVector<f64>) -> DMatrix<f64> {
+    let mut scaled = matrix.clone();
+    for mut column in scaled.column_iter_mut() {
+        column.component_mul_assign(weights);
+    }
+    scaled
+}
+
+/// Law and motion, linearised at once.
+struct Linear<'a> {
+    /// Derivatives by the law's weights, then by the motion's parameters.
+    jacobian: DMatrix<f64>,
+    residual: DVector<f64>,
+    weights: &'a DVector<f64>,
+    penalty: DVector<f64>,
+    law: DVector<f64>,
+}
+
+impl<'a> Linear<'a> {
+    fn new(
+        problem: &Problem,
+        (motion, structure): (&Motion, &LawStructure),
+        z: &DVector<f64>,
+        weights: &'a DVector<f64>,
+    ) -> Result<Self, CalibrationError> {
+        let design = problem.design(structure, motion, z)?;
+        let weighted = Weighted::new(&design, weights, structure.ridge);
+        let law = weighted.fit(&problem.response).ok_or(CalibrationError::Singular)?;
+        let penalty = weighted.penalty;
+        let fitted = &design * &law;
+        let residual = &problem.response - &fitted;
+        let (rows, of_law) = design.shape();
+        let mut jacobian = design.resize_horizontally(of_law + z.len(), 0.0);
+        for j in 0..z.len() {
+            let mut moved = z.clone();
+            moved[j] += DIFFERENCE;
+            let change = (problem.design(structure, motion, &moved)? * &law - &fitted) / DIFFERENCE;
+            jacobian.view_mut((0, of_law + j), (rows, 1)).copy_from(&change);
+        }
+        Ok(Self { jacobian, residual, weights, penalty, law })
+    }
+
+    /// The step of the motion's parameters, and their covariance.
+    fn step(&self, z: &DVector<f64>) -> Option<(DVector<f64>, DMatrix<f64>)> {
+        let of_law = self.law.len();
+        let weighted = scaled_rows(&self.jacobian, self.weights);
+        let mut normal = self.jacobian.tr_mul(&weighted);
+        let mut gradient = weighted.tr_mul(&self.residual);
+        for k in 0..normal.nrows() {
+            let (penalty, at) = if k < of_law { (self.penalty[k], self.law[k]) } else { (1.0, z[k - of_law]) };
+            normal[(k, k)] += penalty;
+            gradient[k] -= penalty * at;
+        }
+        let factor = Cholesky::new(normal)?;
+        let step = factor.solve(&gradient).rows(of_law, z.len()).into_owned();
+        let covariance = factor.inverse().view((of_law, of_law), (z.len(), z.len())).into_owned();
+        Some((step, covariance))
+    }
+}

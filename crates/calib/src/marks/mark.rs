@@ -1,0 +1,138 @@
+use thiserror::Error;
+
+/// A known strain: at a moment, or from one time to another while the body is held.
+///
+/// ```
+/// use ohmstrain_calib::Mark;
+///
+/// let held = Mark { until_s: Some(30.0), strain_sd: Some(0.002), ..Mark::new(20.0, 0.15) };
+/// assert_eq!(Mark::new(20.0, 0.15).until_s, None);
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Mark {
+    /// Time, or the beginning of the hold, s.
+    pub time_s: f64,
+    /// End of the hold, s; without it the readings say whether the body was held, and for how long.
+    pub until_s: Option<f64>,
+    /// The strain.
+    pub strain: f64,
+    /// Its standard deviation; without it 2 % of the span of all marks.
+    pub strain_sd: Option<f64>,
+}
+
+impl Mark {
+    /// A strain at a moment.
+    #[must_use]
+    pub const fn new(time_s: f64, strain: f64) -> Self {
+        Self { time_s, until_s: None, strain, strain_sd: None }
+    }
+
+    /// Last time of the mark, s.
+    pub(crate) fn end_s(&self) -> f64 {
+        self.until_s.unwrap_or(self.time_s)
+    }
+}
+
+/// Why marks give no reference. Marks count from zero.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum MarksError {
+    /// There are no two marks.
+    #[error("expected at least two marks of different strains, found {found}")]
+    TooFew {
+        /// Number of marks.
+        found: usize,
+    },
+    /// All marks have one strain.
+    #[error("expected at least two different strains, found {strain} in every mark")]
+    OneStrain {
+        /// The strain.
+        strain: f64,
+    },
+    /// A number that is NaN, infinite, or a standard deviation that is not positive.
+    #[error("expected finite numbers and a positive standard deviation, found {found}")]
+    Number {
+        /// The mark.
+        mark: usize,
+        /// The number.
+        found: f64,
+    },
+    /// A mark ends before it begins.
+    #[error("expected an end after {time_s} s, found {until_s} s")]
+    Reversed {
+        /// The mark.
+        mark: usize,
+        /// Its beginning, s.
+        time_s: f64,
+        /// Its end, s.
+        until_s: f64,
+    },
+    /// A mark begins before the one before it ends.
+    #[error(
+        "expected a time after {before_s} s, where the mark before it ends, found {time_s} s; a body has one strain at a time"
+    )]
+    Overlap {
+        /// The later mark.
+        mark: usize,
+        /// Its beginning, s.
+        time_s: f64,
+        /// End of the mark before it, s.
+        before_s: f64,
+    },
+    /// A mark lies outside of the recording.
+    #[error("expected a time between {first_s} and {last_s} s, as the recording has, found {time_s} s")]
+    Outside {
+        /// The mark.
+        mark: usize,
+        /// Its time, s.
+        time_s: f64,
+        /// First time of the recording, s.
+        first_s: f64,
+        /// Last time of the recording, s.
+        last_s: f64,
+    },
+}
+
+impl MarksError {
+    /// The mark to blame; `None` if it is all of them.
+    #[must_use]
+    pub const fn mark(&self) -> Option<usize> {
+        match self {
+            Self::TooFew { .. } | Self::OneStrain { .. } => None,
+            Self::Number { mark, .. }
+            | Self::Reversed { mark, .. }
+            | Self::Overlap { mark, .. }
+            | Self::Outside { mark, .. } => Some(*mark),
+        }
+    }
+}
+
+/// Checks that marks are in order, within the recording, and of two strains at least. Returns the least and the largest strain.
+pub(crate) fn check(marks: &[Mark], time_s: &[f64]) -> Result<(f64, f64), MarksError> {
+    let (first_s, last_s) = (time_s.first().copied().unwrap_or(f64::NAN), time_s.last().copied().unwrap_or(f64::NAN));
+    let mut before_s = f64::NEG_INFINITY;
+    for (k, mark) in marks.iter().enumerate() {
+        let sd = mark.strain_sd.unwrap_or(1.0);
+        let numbers = [mark.time_s, mark.end_s(), mark.strain, sd];
+        if let Some(&found) = numbers.iter().find(|x| !x.is_finite()).or((sd <= 0.0).then_some(&sd)) {
+            return Err(MarksError::Number { mark: k, found });
+        }
+        if mark.end_s() < mark.time_s {
+            return Err(MarksError::Reversed { mark: k, time_s: mark.time_s, until_s: mark.end_s() });
+        }
+        if mark.time_s <= before_s {
+            return Err(MarksError::Overlap { mark: k, time_s: mark.time_s, before_s });
+        }
+        let is_outside = |time_s: &f64| !(first_s..=last_s).contains(time_s);
+        if let Some(time_s) = [mark.time_s, mark.end_s()].into_iter().find(is_outside) {
+            return Err(MarksError::Outside { mark: k, time_s, first_s, last_s });
+        }
+        before_s = mark.end_s();
+    }
+    let (low, high) = crate::order::extent(marks.iter().map(|mark| mark.strain));
+    match marks {
+        [] | [_] => Err(MarksError::TooFew { found: marks.len() }),
+        _ if low == high => Err(MarksError::OneStrain { strain: low }),
+        _ => Ok((low, high)),
+    }
+}
