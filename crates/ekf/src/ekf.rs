@@ -24,11 +24,11 @@ pub struct Step<T, const N: usize, const L: usize> {
     pub prior: Belief<T, N, L>,
     /// The belief after it; the prior if the reading was missing.
     pub posterior: Belief<T, N, L>,
-    /// What the reading did; `None` if it was missing.
+    /// Effect of the reading; `None` if it was missing.
     pub update: Option<Update<T, N>>,
 }
 
-/// What a reading did to a belief.
+/// Effect of a reading on a belief.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Update<T, const N: usize> {
     /// The expected reading, its gradient H and noise variance R (the reading's own included).

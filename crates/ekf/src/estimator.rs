@@ -2,15 +2,15 @@ use ohmstrain_model::Scalar;
 
 use crate::{Belief, Gaussian, Reading, StepError};
 
-/// What every estimator has in common: a state that a prepared step turns into the next one.
+/// Common interface of all estimators: a state that a prepared step turns into the next one.
 ///
 /// The estimator is configuration, the state is the caller's; an error leaves it as it was. Outlier guards
 /// ([`Guard`](crate::Guard)) and smoothing of past steps ([`smooth_back_through`](crate::smooth_back_through)) work on any of
 /// them.
 pub trait Estimator<T: Scalar, const N: usize, const L: usize> {
-    /// What is carried from step to step.
+    /// State carried from step to step.
     type State: State<T, N, L>;
-    /// What depends on the length of a step only.
+    /// Values that depend on the length of a step only.
     type Prepared: Copy;
 
     /// Prepares steps of `dt_s ≥ 0` seconds.
@@ -71,7 +71,7 @@ pub trait Estimator<T: Scalar, const N: usize, const L: usize> {
     }
 }
 
-/// What an estimator carries from step to step.
+/// State that an estimator carries from step to step.
 pub trait State<T: Scalar, const N: usize, const L: usize>: Clone {
     /// The Gaussian with its mean and covariance.
     fn moments(&self) -> Belief<T, N, L>;
@@ -107,12 +107,12 @@ pub trait State<T: Scalar, const N: usize, const L: usize>: Clone {
     }
 }
 
-/// What one step of any estimator says.
+/// Result of one step of any estimator.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Advanced<S, T> {
     /// The state after the reading.
     pub state: S,
-    /// How the reading compares with its prediction; `None` if it was missing.
+    /// Comparison of the reading with its prediction; `None` if the reading was missing.
     pub innovation: Option<Innovation<T>>,
 }
 

@@ -31,7 +31,7 @@ pub trait Start {
     fn start(&self) -> Self::Belief;
 }
 
-/// What a filter of a model carries.
+/// Belief that a filter of a model carries.
 pub type BeliefOf<M> = <M as Start>::Belief;
 
 macro_rules! start {

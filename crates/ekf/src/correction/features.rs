@@ -16,8 +16,8 @@ pub const RATE_GAIN: f64 = 3.0;
 /// stay in the low-passes for minutes.
 pub const FARTHEST: f64 = 3.0;
 
-/// How many readings in a row that surprise the filter are passed over: spikes. Where more do, the law is at fault, and what it is
-/// corrected by needs the readings most.
+/// Most surprising readings in a row that are passed over as spikes. When more surprise, the law is at fault, and the
+/// features need the readings most.
 const PASSED_OVER: f64 = 3.0;
 
 /// The scale on which readings `R/R₀ - 1` are seen.
@@ -30,7 +30,7 @@ pub struct FeatureScale<T> {
     pub half_range: T,
     /// Usual size (standard deviation) of the two rates, in half ranges.
     pub rates: [T; 2],
-    /// Where low-passes start: a and b of a + b y at the first reading y.
+    /// Starting values of the low-passes: a and b of a + b y at the first reading y.
     pub starts: Starts<T>,
 }
 
@@ -56,7 +56,7 @@ pub fn settled<T: Recordable>() -> Starts<T> {
     [[T::zero(), T::one()]; TIME_CONSTANTS_S.len()]
 }
 
-/// What a correction sees of the readings up to now: the scaled reading, its distances from low-passes of 0.5, 2, 8 and
+/// Features that a correction computes from the readings up to now: the scaled reading, its distances from low-passes of 0.5, 2, 8 and
 /// 32 s, and two rates, bounded by a tanh.
 ///
 /// A missing reading leaves the features as they were; the next one is taken over the whole time since the last.
@@ -67,9 +67,9 @@ pub struct ReadingFeatures<T> {
     pub(crate) low_passes: [T; TIME_CONSTANTS_S.len()],
     /// Time since the last reading.
     pub(crate) waited_s: T,
-    /// How many surprising readings have come in a row, three at most.
+    /// Number of surprising readings in a row, three at most.
     pub(crate) surprises: T,
-    /// Whether the last row had no reading, or one that was passed over.
+    /// True if the last row had no reading, or one that was passed over.
     pub(crate) waits: bool,
     pub(crate) now: Option<[T; FEATURES]>,
 }
@@ -119,7 +119,7 @@ impl<T: Recordable> ReadingFeatures<T> {
         self.step(dt_s, reading)
     }
 
-    /// What of a reading is for [`Self::step`]: one that surprises the filter is missing there, unless the three readings
+    /// Returns the reading to pass to [`Self::step`]: `None` for one that surprises the filter, unless the three readings
     /// before it did, too.
     pub fn unless(&mut self, surprises: bool, reading: Option<T>) -> Option<T> {
         let (before, most) = (self.surprises, T::of(PASSED_OVER));
@@ -128,7 +128,7 @@ impl<T: Recordable> ReadingFeatures<T> {
         if surprises && before < most { None } else { Some(reading) }
     }
 
-    /// Whether the last row had no reading, or one that was passed over.
+    /// True if the last row had no reading, or one that was passed over.
     #[must_use]
     pub fn is_waiting(&self) -> bool {
         self.waits

@@ -1,6 +1,6 @@
 use crate::kernel::Several;
 
-/// How many rows stand side by side: the lanes of the vectors that [`Correction`](super::Correction) computes in.
+/// Number of rows side by side: the lanes of the vectors that [`Correction`](super::Correction) computes in.
 pub const BLOCK: usize = 4;
 
 /// Rows side by side: each of D inputs of [`BLOCK`] rows. A last block may have fewer; what is in their places does not count.

@@ -15,7 +15,7 @@ pub struct Maximum<const P: usize> {
     pub iterations: usize,
 }
 
-/// Why no maximum was found.
+/// Reason for finding no maximum.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum NoMaximum {

@@ -5,7 +5,7 @@ use ohmstrain_model::{LEAST_LEFT, Phase, Scalar, Turning};
 use super::constants::{BranchConstants, Gain, GainsAt, StepConstants};
 use super::{Lanes, Part, Parts, RateSpread, SparseEkf, Switch};
 
-/// What a step does to one branch. The gain grows with the sum of old and new strain: the old one's share is in `row`, the
+/// Effect of a step on one branch. The gain grows with the sum of old and new strain: the old one's share is in `row`, the
 /// new one's is added when its covariances are known.
 #[derive(Clone, Copy)]
 pub(super) struct Driven<V> {
@@ -15,14 +15,14 @@ pub(super) struct Driven<V> {
     pub pull: V,
     /// Answer to old strain and rate.
     pub row: [V; 2],
-    /// What is left of the covariances with old strain and rate, and these with what the motion adds.
+    /// Decayed covariances with old strain and rate, and these with what the motion adds.
     kept: [V; 2],
     carried: [V; 2],
-    /// What a unit of path in the other direction would have changed.
+    /// Change that a unit of path in the other direction would have caused.
     jump: V,
 }
 
-/// How a branch is driven: its change, gain and pull; its jump, and the variance of the rate's split, where that is open.
+/// Drive of a branch: its change, gain and pull; its jump, and the variance of the rate's split, if the direction is open.
 #[derive(Clone, Copy)]
 struct Drive<V> {
     change: V,
@@ -32,14 +32,14 @@ struct Drive<V> {
     left: V,
 }
 
-/// How all branches are driven.
+/// Drives of all branches.
 pub(super) struct Driving<V, const B: usize> {
     drives: [Drive<V>; B],
     /// Variance of the path whose direction stays open.
     unexplained: V,
 }
 
-/// What is known of the direction of a step that moves.
+/// Knowledge of the direction of a step that moves.
 #[derive(Clone, Copy)]
 pub(crate) enum Course<V> {
     /// Nothing but the rate's distribution.
@@ -234,7 +234,7 @@ fn relax<V: Lanes, const B: usize>(part: &mut Part<V, B>, decay: V::Number, deca
     }
 }
 
-/// As [`ohmstrain_model::correlated_steps`]; a rate that is known has nothing to persist.
+/// See [`ohmstrain_model::correlated_steps`]; a rate that is known has nothing to persist.
 #[inline(always)]
 fn correlated_steps<V: Lanes>(ahead: V, together: V, fresh: V) -> V {
     let (square, both) = (ahead * ahead, together * together);
@@ -243,14 +243,14 @@ fn correlated_steps<V: Lanes>(ahead: V, together: V, fresh: V) -> V {
     (square + both).over(V::pick(least.less(left), left, least))
 }
 
-/// Of a branch driven with a gain in a direction that is known.
+/// Returns the drive of a branch with a gain in a direction that is known.
 #[inline(always)]
 fn driven_by<V: Lanes>(gain: Gain<V>, strain_sum: V, unit: V) -> Drive<V> {
     let (here, zero) = (gain.at(strain_sum), unit.nothing());
     Drive { change: here * unit, gain: here, pull: gain.growth * unit, jump: zero, left: zero }
 }
 
-/// Of a branch whose direction is known.
+/// Returns the drive of a branch whose direction is known.
 #[inline(always)]
 fn known<V: Lanes, const B: usize>(gains: GainsAt<'_, V, B>, unit: V, phase: Phase) -> Drive<V> {
     let gain = if matches!(phase, Phase::Extend) { gains.extend() } else { gains.retract() };

@@ -75,7 +75,7 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
         self.dt_s
     }
 
-    /// Goes on with steps of another length. The length it has costs a comparison; another one as much as a new filter.
+    /// Changes the length of steps. The present length costs a comparison; another one costs as much as a new filter.
     ///
     /// # Errors
     /// If `dt_s` is not a positive number; the filter stays as it was.
@@ -153,7 +153,7 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
         Ok(residual)
     }
 
-    /// As [`Self::step_once`].
+    /// See [`Self::step_once`].
     #[inline(never)]
     fn gated_once<const L: usize>(
         &self,

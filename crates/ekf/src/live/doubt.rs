@@ -1,4 +1,4 @@
-//! When an interval is wider than the filter says, in any precision.
+//! Doubts that make an interval wider than the filter's own, in any precision.
 
 use super::{Flag, Flags, Innovations, NEVER_READ_S, RestSeen, RestWatch, SURPRISING_NIS, Unread};
 use crate::{Gaussian, Recordable};
@@ -6,19 +6,19 @@ use crate::{Gaussian, Recordable};
 /// The numbers behind the widened intervals, also for programs that write a filter in another language.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DoubtNumbers {
-    /// How long it takes until it has fallen to 37 % that readings were beyond those of the largest strains, s: a body comes there
-    /// from time to time. A third of it is that of the side of rest, and of the mean of normalised innovations squared; a twelfth
-    /// that of the doubt of a start or a fault.
+    /// Time constant, s, with which readings beyond those of the largest strains are forgotten: a body reaches such strains from time to
+    /// time. A third of it applies to readings beyond the side of rest, and to the mean of normalised innovations squared; a twelfth
+    /// to the doubt of a start or a fault.
     pub far_fades_s: f64,
-    /// How many times counts what readings are outside on the side of rest, where a sensor that has not moved for long begins and
-    /// soon has left it.
+    /// Factor on the distance of readings outside the calibrated range on the side of rest. A sensor that has not moved for long starts
+    /// there and soon leaves it.
     pub near_counts: f64,
     /// The same on the other side, where nothing leads but another R₀, another gain or a strain beyond calibration's: if all readings
     /// are off, only those at an end of their range show it, and not all of it.
     pub far_counts: f64,
     /// Share of calibration's range of readings by which they may lie outside for nothing.
     pub margin: f64,
-    /// How many times the fastest rate of calibration, which is its 99th percentile, is beyond it.
+    /// Factor on the fastest rate of calibration, its 99th percentile, above which a rate is flagged.
     pub faster: f64,
     /// Share of the filter's variance, or of the doubt at a start, from which on a doubt is worth a flag.
     pub worth: f64,
@@ -37,7 +37,7 @@ pub const DOUBT: DoubtNumbers = DoubtNumbers {
     zero: 0.01,
 };
 
-/// What the doubts of a sensor depend on: what its calibration has seen.
+/// Calibration values that the doubts of a sensor depend on.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct DoubtParts<T> {
@@ -57,9 +57,9 @@ pub struct DoubtParts<T> {
     pub most: T,
     /// Variance of the strain from what a session leaves open of R₀; zero where calibration knows one session only.
     pub session: T,
-    /// What is known without a reading.
+    /// Bounds on the strain without a reading.
     pub unread: Unread<T>,
-    /// What the sensor read at rest, if that is known.
+    /// Readings of the sensor at rest in calibration, if known.
     pub rest: Option<RestSeen<T>>,
 }
 
@@ -82,7 +82,7 @@ impl DoubtParts<f64> {
     }
 }
 
-/// What is left after a row of what was known before it, of three time constants: one exponential.
+/// Factors by which earlier doubts have decayed after a row, for three time constants; computed from one exponential.
 struct Left<T> {
     /// 60 s.
     far: T,
@@ -101,11 +101,11 @@ impl<T: Recordable> Left<T> {
     }
 }
 
-/// How ill the sensor's law has fitted lately.
+/// Recent misfit of the sensor's law.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Misfit<T> {
-    /// How far readings have been outside of calibration's on the side of rest, and on the other one, R/R₀ - 1, fading.
+    /// Distance of readings outside the calibrated range on the side of rest, and on the other side, R/R₀ - 1; it decays with time.
     pub(crate) near: T,
     pub(crate) far: T,
     pub(crate) innovations: Innovations<T>,
@@ -136,8 +136,8 @@ impl<T: Recordable> Misfit<T> {
     }
 }
 
-/// What no filter knows by itself: that it has only just begun, or begun again; that readings have jumped; that the sensor is
-/// used outside of what its calibration has seen, or that its law does not fit. It widens the strain's interval, and says why.
+/// Doubts that a filter does not have by itself: that it has just started, or restarted; that readings have jumped; that the sensor is
+/// used outside its calibrated range, or that its law does not fit. They widen the strain's interval and raise flags with the reason.
 ///
 /// ```
 /// use ohmstrain_ekf::Gaussian;
@@ -179,9 +179,9 @@ pub struct Doubts<T> {
     /// The last reading that was believed, R/R₀ - 1.
     pub(crate) believed: Option<T>,
     pub(crate) misfit: Misfit<T>,
-    /// Whether the strain's variance knows of innovations that are larger than stated.
+    /// True if the strain's variance already includes innovations that are larger than stated.
     corrected: bool,
-    /// Whether R₀ is calibration's; none where that one does not know what the sensor reads at rest.
+    /// Watch for another R₀ than calibration's; `None` if calibration does not know the rested sensor's reading.
     pub(crate) rest: Option<RestWatch<T>>,
 }
 
@@ -217,7 +217,7 @@ impl<T: Recordable> Doubts<T> {
         Self { corrected: true, ..self }
     }
 
-    /// How much larger innovations have been than stated, for the correction of the next row.
+    /// Returns the factor by which innovations have been larger than stated, for the correction of the next row.
     pub fn birge(&self) -> T {
         self.misfit.innovations.birge()
     }
@@ -232,7 +232,7 @@ impl<T: Recordable> Doubts<T> {
         self.rest.iter_mut().for_each(RestWatch::told);
     }
 
-    /// There is more to doubt than what is left of a start.
+    /// Raises the fading variance if this doubt exceeds what is left of a start.
     fn raise(&mut self, variance: T) {
         let variance = variance.min(self.parts.most);
         if variance > self.fading {
@@ -240,7 +240,7 @@ impl<T: Recordable> Doubts<T> {
         }
     }
 
-    /// What is known without readings, and for how long there have been none, s.
+    /// Returns the bounds on the strain without readings, and the time since the last reading, s.
     pub const fn unread(&self) -> (Unread<T>, T)
     where
         T: Copy,
@@ -257,7 +257,7 @@ impl<T: Recordable> Doubts<T> {
         stated.variance
     }
 
-    /// Whether there has been a reading that was used, or a strain that was known.
+    /// True once a reading was used or the strain was known.
     pub fn has_begun(&self) -> bool {
         self.unread_s < T::of(NEVER_READ_S)
     }
@@ -322,7 +322,7 @@ impl<T: Recordable> Doubts<T> {
         }
     }
 
-    /// What a reading says of the law and of R₀.
+    /// Updates the doubts of the law and of R₀ with a reading.
     fn judge(&mut self, left: &Left<T>, passed_s: T, rho: T, nis: T) {
         self.misfit.see(&self.parts, left, rho, nis);
         self.rest.iter_mut().for_each(|rest| {
@@ -393,7 +393,7 @@ mod tests {
         }
     }
 
-    /// What is said after rows every 0.1 s, of readings with normalised innovations squared.
+    /// Returns the variance and flags after rows every 0.1 s, of readings with normalised innovations squared.
     fn said(parts: DoubtParts<f64>, rows: impl IntoIterator<Item = (f64, f64)>) -> (f64, Flags) {
         let mut doubts = Doubts::new(parts).of_known_strain(false);
         rows.into_iter().for_each(|row| {

@@ -9,7 +9,7 @@ use crate::correction::FeatureScale;
 pub struct LiveParts<T, C> {
     /// R₀ of the law, in the unit of the readings.
     pub rest_reading: T,
-    /// What the rested, unstretched sensor read in calibration: of the day, where R₀ is of the law.
+    /// Reading of the rested, unstretched sensor in calibration, as measured that day; R₀ is fitted with the law.
     pub rested: T,
     /// Usual time between readings, s.
     pub dt_s: T,
@@ -23,9 +23,9 @@ pub struct LiveParts<T, C> {
     pub reading_variance: T,
     /// Variance of a strain that is known at a start.
     pub known_variance: T,
-    /// What a reading must be.
+    /// Plausibility limits on a reading.
     pub sieve: Sieve<T>,
-    /// When the interval is wider than the filter says.
+    /// Parts of the doubts that widen the interval.
     pub doubt: DoubtParts<T>,
     /// Between which readings R₀ stays.
     pub rest: RestBounds<T>,

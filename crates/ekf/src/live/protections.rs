@@ -1,11 +1,11 @@
-/// What protects a filter from what no calibration has seen. All of it is on unless somebody turns it off.
+/// Protections of a filter against conditions that no calibration has seen. All of them are on by default.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Protections {
     /// Readings that this sensor cannot give, and numbers that come again and again, are none.
     pub plausibility: bool,
     /// A reading beyond three standard deviations counts the less the farther it is.
     pub influence: bool,
-    /// Where readings jump, what was known before any reading is followed, too; not without `influence`.
+    /// Second look after a jump of the readings, which also follows the knowledge from before any reading; not without `influence`.
     pub second_look: bool,
     /// R₀ follows readings that stay beyond those of the calibration.
     pub following: bool,

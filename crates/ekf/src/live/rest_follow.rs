@@ -14,7 +14,7 @@ struct Following {
     longest_s: f64,
     /// Readings that jump back within so long, s, were a fault in between, and not another day.
     fault_s: f64,
-    /// By what factor a reading may want R₀ to be another: beyond it, it is no reading of this sensor.
+    /// Largest factor between another R₀ and calibration's; a reading that would need more is not of this sensor.
     farthest: f64,
 }
 
@@ -90,7 +90,7 @@ impl RestBounds<f64> {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RestFollower<T> {
     bounds: RestBounds<T>,
-    /// By what share of calibration's R₀ it is another.
+    /// Relative deviation of R₀ from calibration's.
     pub(crate) off: T,
     /// The same when the session began.
     pub(crate) home: T,
@@ -99,7 +99,7 @@ pub struct RestFollower<T> {
     /// The last reading, none before the first one, and the time since it came, s.
     pub(crate) last: Option<T>,
     pub(crate) since_s: T,
-    /// What `off` was where readings last jumped, and how long ago that was, s, in rows that were read.
+    /// Value of `off` when readings last jumped, and the time since, s, in rows that were read.
     pub(crate) jumped: Option<[T; 2]>,
 }
 
@@ -129,7 +129,7 @@ impl<T: Recordable> RestFollower<T> {
         Self { has_begun: true, ..self }
     }
 
-    /// By what share of calibration's R₀ it is another.
+    /// Returns the relative deviation of R₀ from calibration's.
     ///
     /// ```
     /// let mut follower = ohmstrain_ekf::live::RestFollower::<f64>::new(ohmstrain_ekf::live::RestBounds { low: None, high: None, start: None });

@@ -20,7 +20,7 @@ pub(crate) struct Children<'a, T, const N: usize, const L: usize, const K: usize
 }
 
 impl<'a, T: Real, const N: usize, const L: usize, const K: usize> Children<'a, T, N, L, K> {
-    /// In the place of what `kept` has been, `room` at most.
+    /// Starts collecting children in place of the hypotheses in `kept`, `room` at most.
     #[inline(always)]
     pub(crate) fn new(kept: &'a mut Mixture<T, N, L, K>, room: usize) -> Self {
         kept.clear(room);
@@ -68,7 +68,7 @@ impl<'a, T: Real, const N: usize, const L: usize, const K: usize> Children<'a, T
         added
     }
 
-    /// Where the lightest is, and its weight.
+    /// Returns the index and weight of the lightest hypothesis.
     fn lightest(&self) -> (usize, T) {
         let weights = self.kept.shares().iter().map(|share| share.weight).enumerate();
         let lighter = |a: (usize, T), b: (usize, T)| if b.1 < a.1 * T::of(1.0 - LIGHTER) { b } else { a };

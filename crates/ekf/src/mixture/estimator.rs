@@ -1,4 +1,4 @@
-//! What the filters of hypotheses have in common around a step: in place, into a state that is there already, backwards, and as
+//! Common steps of the filters of hypotheses: in place, into an existing state, backwards, and as
 //! [`Estimator`](crate::Estimator), whose prepared step is the filter itself, made for that length.
 
 /// Its length of a step, and the estimator, of a filter whose state is `$state`.
@@ -10,7 +10,7 @@ macro_rules! mixture_filter {
                 self.kernel.model()
             }
 
-            /// Goes on with steps of another length.
+            /// Changes the length of steps.
             ///
             /// # Errors
             /// If `dt_s` is negative or not finite; the filter stays as it was.
@@ -71,7 +71,7 @@ macro_rules! mixture_filter {
 }
 pub(crate) use mixture_filter;
 
-/// How a filter over a chain of all phases begins, and for steps of how many seconds it is.
+/// Constructor and time step of a filter over a chain of all phases.
 macro_rules! over_phases {
     ($filter:ident<$($size:ident),+>) => {
         impl<T: Real, $(const $size: usize),+> $filter<T, $($size),+> {

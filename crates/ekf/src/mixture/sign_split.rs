@@ -22,15 +22,15 @@ use crate::{
     AnyCurve, Compact, Curve, Dwell, Evidence, Gaussian, MixtureResidual, Reading, SparseEkf, StepError, Switch,
 };
 
-/// At most `K` Gaussian hypotheses split by the sign of the rate.
+/// Filter with at most `K` Gaussian hypotheses, split by the sign of the rate.
 ///
 /// Each predicted Gaussian is cut at rate zero. The masses of the halves are the probabilities of stretching and
 /// releasing, and each half drives the branches with its own gains. With a [`Dwell`] there is a hold phase besides,
 /// entered and left by the chain's probabilities; its moving phases turn around by crossing rate zero, not by the chain.
 ///
-/// In a pause of the readings nothing is cut any more once the rate has forgotten its direction: a Gaussian whose tail is cut off
-/// and merged with the other half at every row would forget it the sooner the more rows there are, and with it how far the body
-/// may have gone. Each hypothesis then moves on with an uncertain direction, as that of an [`Ekf`](crate::Ekf), and the next
+/// During a pause of the readings nothing is cut any more once the rate has forgotten its direction. A Gaussian whose tail is cut off
+/// and merged with the other half at every row would forget it sooner the more rows there are, and with it how far the body may have
+/// gone. Instead each hypothesis moves on with an uncertain direction, as that of an [`Ekf`](crate::Ekf) does, and the next
 /// reading splits it.
 ///
 /// A truncated Gaussian-sum split. `G` as for [`SparseEkf`].

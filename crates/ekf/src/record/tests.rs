@@ -1,4 +1,4 @@
-//! What is written down, done operation by operation, gives the bits of the kernel.
+//! Tests that recorded functions, run operation by operation, give the bits of the kernel.
 
 #![allow(clippy::unwrap_used, reason = "tests")]
 
@@ -151,7 +151,7 @@ fn what_is_written_down_is_what_the_kernel_does() {
     }
 }
 
-/// What hypotheses on a side of zero ask of a state.
+/// Compares the questions of hypotheses on a side of zero about a state.
 fn compare_side(filter: &Filter, state: &State, side: f32) {
     let (parts, clear) = (Parts::of(state), -2.0 * f32::EPSILON.ln());
     let truth = |truth: bool| f32::from(u8::from(truth));

@@ -7,24 +7,24 @@ use super::{Expression, Fields, Operation, Place, Recorded, See, Tape};
 /// A function that has been written down for all ways that it may go, with what it is given and what it gives by name.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Function {
-    /// What its inputs are called, by number.
+    /// Names of its inputs, by number.
     pub inputs: Vec<Name>,
-    /// What its results are called, in the order of what was recorded.
+    /// Names of its results, in the order of what was recorded.
     pub results: Vec<Name>,
-    /// What it does.
+    /// Recorded operations.
     pub recorded: Recorded,
 }
 
-/// What a number or a truth is called.
+/// Name of a number or a truth.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Name {
-    /// That of a state.
+    /// Name of a state's field.
     Field(String),
     /// One that is handed over, or given back.
     Own(String),
 }
 
-/// What a function is given and gives, while it is run for one of its ways.
+/// Writer of a function's inputs and results, while it is run for one of its ways.
 pub struct Writer<'t> {
     tape: &'t Tape,
     inputs: &'t core::cell::RefCell<Vec<Name>>,
@@ -48,7 +48,7 @@ impl<'t> Writer<'t> {
         self.tape.input(self.number_of(Name::Own(name.into())))
     }
 
-    /// As many numbers, handed over as a list.
+    /// Returns `K` input numbers, handed over as a list.
     #[must_use]
     pub fn inputs<const K: usize>(&self, name: &str) -> [Expression<'t>; K] {
         core::array::from_fn(|k| self.input(&format!("{name}[{k}]")))
@@ -67,7 +67,7 @@ impl<'t> Writer<'t> {
         state
     }
 
-    /// What has become of a state.
+    /// Writes the new state as results.
     pub fn keep<S: Fields<Expression<'t>>>(&mut self, mut state: S) {
         state.each(&mut Keep(self));
     }
@@ -83,7 +83,7 @@ impl<'t> Writer<'t> {
     }
 }
 
-/// What of numbers that may be missing says whether they are there.
+/// Name of the presence flag of an optional number.
 fn presence(name: &str) -> Name {
     Name::Field(format!("has_{name}"))
 }
@@ -257,7 +257,7 @@ mod tests {
         after
     }
 
-    /// Whether a state has these bits; what is missing may be anything.
+    /// Checks that a state has these bits; a missing number may be anything.
     fn assert_same(found: &HashMap<String, f32>, expected: &HashMap<String, f32>, row: usize) {
         for (name, number) in expected {
             assert_eq!(found[name].to_bits(), number.to_bits(), "row {row}, {name}: {} for {number}", found[name]);
