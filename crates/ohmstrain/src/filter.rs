@@ -15,14 +15,14 @@ pub(crate) struct Kernel {
     pub rows: RowWriter,
     /// Strains that will be known, in order of time.
     pub known: VecDeque<(f64, Gaussian<f64>)>,
-    /// What it was made of.
+    /// Sensor and options that it was made of.
     pub made_of: MadeOf,
 }
 
-/// From what a filter says to rows.
+/// Conversion of a filter's output to rows.
 pub(crate) struct RowWriter {
     pub scale: Scale,
-    /// What known strains say of other rows.
+    /// Errors at known strains, applied to other rows.
     pub errors: KnownErrors,
 }
 
@@ -60,7 +60,7 @@ impl Kernel {
         })
     }
 
-    /// Goes on from what was stored; strains that will be known are those of both.
+    /// Resumes from a stored state; known strains of both are kept.
     fn resume(&mut self, stored: StoredKernel) -> Result<(), Error> {
         let StoredKernel { rest_reading, known, told, filter } = stored;
         self.filter.resume(filter).map_err(|error| StoredError::Content(Box::new(error)))?;
@@ -185,7 +185,7 @@ impl Filter {
         Ok(())
     }
 
-    /// What the rested, unstretched sensor is found to read from now on, in place of what it read in calibration.
+    /// Sets the reading of the rested, unstretched sensor from now on, in place of that in calibration.
     ///
     /// # Errors
     /// If it is not a positive number, or farther from the calibration's than by a factor of
@@ -224,11 +224,11 @@ pub struct LaggedFilter {
     lag_s: f64,
     /// Time of the last row, s.
     last_s: Option<f64>,
-    /// RowWriter whose estimates wait for later readings.
+    /// Rows whose estimates wait for later readings.
     waiting: VecDeque<(f64, Reading)>,
     /// Estimates that have become due.
     due: Vec<Estimate>,
-    /// Whether they have been handed out.
+    /// True if they have been handed out.
     are_out: bool,
 }
 
@@ -240,7 +240,7 @@ impl LaggedFilter {
     /// Takes the reading at `time_s`, as [`Filter::step`] does, and hands out the rows that have become due, in order.
     ///
     /// # Errors
-    /// As [`Filter::step`]. RowWriter that have become due meanwhile are handed out with the next step.
+    /// As [`Filter::step`]. Rows that have become due meanwhile are handed out with the next step.
     ///
     /// ```
     /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
@@ -293,7 +293,7 @@ impl LaggedFilter {
         Ok(&self.due)
     }
 
-    /// As [`Filter::know`], for rows that are still to be handed out and those to come.
+    /// Sets the strain as [`Filter::know`] does, for rows that are still to be handed out and those to come.
     ///
     /// # Errors
     /// As [`Filter::know`].
@@ -316,8 +316,8 @@ impl LaggedFilter {
         Ok(())
     }
 
-    /// As [`Filter::store`], with the rows that wait: [`FilterBuilder::resume_lagged`](crate::FilterBuilder::resume_lagged) goes on
-    /// from it.
+    /// Stores the filter as [`Filter::store`] does, with the rows that wait. [`FilterBuilder::resume_lagged`](crate::FilterBuilder::resume_lagged)
+    /// resumes from it.
     ///
     /// # Errors
     /// If TOML cannot hold it, or rows that have become due are still to be handed out, as after an error: take another row first.
@@ -349,7 +349,7 @@ impl LaggedFilter {
         Ok(())
     }
 
-    /// Takes in what is known by the last row. RowWriter are handed out as soon as they are due: it is after them.
+    /// Takes in what is known by the last row. Rows are handed out as soon as they are due: it is after them.
     fn take_known(&mut self) {
         let Some(time_s) = self.last_s else { return };
         while let Some(known) = next_until(&mut self.kernel.known, time_s) {
@@ -358,7 +358,7 @@ impl LaggedFilter {
         }
     }
 
-    /// As [`Filter::rest_resistance`].
+    /// Sets the reading of the rested sensor, see [`Filter::rest_resistance`].
     ///
     /// # Errors
     /// If it is not a positive number, or farther from the calibration's than by a factor of

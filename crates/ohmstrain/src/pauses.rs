@@ -6,7 +6,7 @@ use ohmstrain_sensor::Output;
 /// Pauses of the readings in a recording that is smoothed, from its end to its beginning.
 pub(crate) struct Pauses {
     unread: Unread<f64>,
-    /// For how long there has been no reading before the first row, s.
+    /// Time without a reading before the first row, s.
     before_s: f64,
     /// Time of the row that was seen last, s, and how long after it the next reading comes.
     next: Option<(f64, f64)>,

@@ -135,7 +135,7 @@ impl<'a> Recording<'a> {
     }
 }
 
-/// How good a sensor's estimates are on a recording; see [`Sensor::evaluate`].
+/// Scores of a sensor's estimates on a recording; see [`Sensor::evaluate`].
 ///
 /// ```
 /// # let text = std::fs::read_to_string("examples/sensor.toml")?;

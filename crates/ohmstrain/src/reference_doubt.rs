@@ -26,7 +26,7 @@ pub struct ReferenceDoubt {
     pub expected: f64,
     /// 95th percentile of the reference's magnitude.
     pub found: f64,
-    /// Whether it is the calibration that seems to be in percent.
+    /// True if the calibration seems to be in percent, not the recording.
     pub is_of_calibration: bool,
 }
 

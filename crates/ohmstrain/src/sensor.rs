@@ -24,7 +24,7 @@ use crate::{Column, Error, Estimate, FilterBuilder, UnitDoubt};
 pub struct Sensor {
     /// Shared with its filters.
     params: Arc<SensorParams>,
-    /// For all its filters; `None` without a correction.
+    /// Learned correction, shared by all its filters; `None` without a correction.
     learned: Option<Arc<Learned>>,
 }
 

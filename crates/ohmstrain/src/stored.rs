@@ -26,15 +26,15 @@ pub struct Stored {
     sensor: String,
     options: StoredOptions,
     lag_s: Option<f64>,
-    /// What the rested sensor was said to read, for what stands around the filter.
+    /// Reading of the rested sensor as given by the user, for the program around the filter.
     pub rest_resistance: Option<f64>,
     /// The clock of the stream that was read, for what stands around the filter.
     pub clock: Option<StoredClock>,
     /// The moment that is 0 s, ns since 1970, of a table of dates and times.
     pub zero_ns: Option<i64>,
-    /// What has been seen of the calibration's reach.
+    /// State of the watch for use outside the calibrated range.
     pub validity: Option<ValiditySeen>,
-    /// What has been seen of long holds.
+    /// State of the watch for long holds.
     pub quiet: Option<QuietSeen>,
     /// Time of the last row of a filter with a lag, s.
     pub(crate) last_s: Option<f64>,
@@ -52,34 +52,34 @@ pub enum StoredClock {
     TimeS(f64),
     /// Microseconds.
     TimeUs {
-        /// As it came.
+        /// Counter as it came.
         counter: u64,
-        /// Without wraps.
+        /// Counter without wraps.
         unwrapped: u64,
     },
 }
 
-/// Why a stored filter cannot go on here.
+/// Reason why a stored filter cannot resume here.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum StoredError {
     /// The text is no state.
     #[error("expected the state of a filter, as `filter --save-state` or Python's `save` writes it: {}", .0.message())]
     Text(Box<toml::de::Error>),
-    /// Of another format or version of the program.
+    /// State of another format or version of the program.
     #[error(
         "expected the state of a filter of {expected}, found one of {found}; begin anew, or go on with that version"
     )]
     Version {
         /// This one.
         expected: String,
-        /// That one.
+        /// Format or version that was found.
         found: String,
     },
-    /// Of another sensor.
+    /// State of another sensor.
     #[error("the state belongs to another sensor: give the sensor.toml with which it was saved, or begin anew")]
     Sensor,
-    /// Of other options.
+    /// State of a filter with other options.
     #[error(
         "the state belongs to a filter with {name} {found}, this one has {expected}; give the same options, or begin anew"
     )]
@@ -102,7 +102,7 @@ pub enum StoredError {
     Content(Box<toml::de::Error>),
 }
 
-/// What a filter is made of.
+/// Sensor and options of a filter.
 #[derive(Clone, Debug)]
 pub(crate) struct MadeOf {
     pub params: Arc<SensorParams>,
@@ -242,7 +242,7 @@ impl Stored {
         struct Version {
             format: u32,
             made_by: String,
-            /// Of no other file that has the others.
+            /// Table that no other file with a format and a maker has.
             #[serde(rename = "kernel")]
             _kernel: IgnoredAny,
         }
@@ -269,7 +269,7 @@ impl Stored {
         Ok(toml::to_string(self)?)
     }
 
-    /// Whether a filter of these parts can go on from it.
+    /// Checks that a filter of these parts can resume from it.
     pub(crate) fn check(&self, made_of: &MadeOf, lag_s: Option<f64>) -> Result<(), StoredError> {
         if self.sensor != fingerprint(&made_of.params) {
             return Err(StoredError::Sensor);

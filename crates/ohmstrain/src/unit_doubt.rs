@@ -26,15 +26,15 @@ pub struct UnitDoubt {
     pub column: &'static str,
     /// Least and largest reading of the calibration, moved to the R₀ in use.
     pub expected: (f64, f64),
-    /// That R₀, where it is not the calibration's.
+    /// R₀ in use, if it is not the calibration's.
     pub rest_reading: Option<f64>,
     /// Median of the readings.
     pub median: f64,
-    /// What they may be.
+    /// Guess of their unit.
     pub guess: UnitGuess,
 }
 
-/// What readings may be that are in the wrong unit.
+/// Guess of the unit of readings that are in the wrong one.
 ///
 /// ```
 /// assert!(ohmstrain::UnitGuess::Percent.to_string().ends_with("are they in percent?"));
