@@ -20,7 +20,7 @@ pub struct FixedRate<'a, const B: usize, const N: usize> {
     pub reference: SwitchedModel<f64, B, N>,
     /// The model in single precision.
     pub model: SwitchedModel<f32, B, N>,
-    /// How many hypotheses it keeps; 1 if it keeps none.
+    /// Number of hypotheses that it keeps; 1 if it keeps none.
     pub hypotheses: usize,
     /// Everything else.
     pub parts: Parts<'a>,
@@ -29,7 +29,7 @@ pub struct FixedRate<'a, const B: usize, const N: usize> {
 }
 
 impl<'a, const B: usize, const N: usize> FixedRate<'a, B, N> {
-    /// Of a sensor, at `dt_s` seconds from reading to reading.
+    /// Prepares a sensor's filter for readings every `dt_s` seconds.
     ///
     /// # Errors
     /// See [`ExportError`].

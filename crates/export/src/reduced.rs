@@ -28,7 +28,7 @@ const APART: usize = 17;
 /// Keeps kernels of inducing rows regular; less than the processes' own jitter.
 const JITTER: f64 = 1e-8;
 
-/// Which of the two processes.
+/// Choice between the two processes.
 #[derive(Clone, Copy)]
 enum Which {
     Direct,
@@ -52,12 +52,12 @@ impl Which {
     }
 }
 
-/// How many rows of a correction are left.
+/// Number of rows of a correction that are left.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Rows {
-    /// For its means, beside a quadratic function.
+    /// Rows for its means, beside a quadratic function.
     pub mean: usize,
-    /// For its variances.
+    /// Rows for its variances.
     pub variance: usize,
 }
 
@@ -114,7 +114,7 @@ fn explained(full: &Process, which: Which, rows: &[&Row], few: usize) -> Option<
     Some(OwnedTriangle::new(few, |i, j| triangle[(i, j)]))
 }
 
-/// Where means are to be right, and how much it matters.
+/// Returns the points at which means are to be right, with their weights.
 fn points(rows: &[Row]) -> Vec<(Row, f64)> {
     let range: [(f64, f64); FILTER_INPUTS] = std::array::from_fn(|i| {
         let column = rows.iter().map(|row| row[i]);

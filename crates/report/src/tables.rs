@@ -120,7 +120,7 @@ impl Rows<'_> {
     }
 }
 
-/// What recordings tell of a parameter; an interval that holds zero does not tell it.
+/// Formats a parameter as the recordings determine it; one whose interval holds zero is not determined.
 fn told(known: &Uncertainty, place: Option<usize>) -> String {
     let at = |values: &[f64]| place.and_then(|place| values.get(place).copied());
     match (at(&known.values), at(&known.standard_errors)) {

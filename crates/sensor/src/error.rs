@@ -6,7 +6,7 @@ use crate::params::estimator::{EstimatorKind, NoParameters};
 use crate::params::law::MOST_BRANCHES;
 use crate::params::validate::FieldError;
 
-/// Why no filter can be made of a sensor's parameters.
+/// Reason for having no filter of a sensor's parameters.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum SensorError {
@@ -25,13 +25,13 @@ pub enum SensorError {
     /// More branches than filters are built for.
     #[error("a law with {found} branches; at most {MOST_BRANCHES} are supported")]
     Branches {
-        /// How many.
+        /// Number that was found.
         found: usize,
     },
     /// An estimator of phases without their durations.
     #[error("`{}` needs `phases` in its parameters", kind.name())]
     NoPhases {
-        /// Which.
+        /// Kind of estimator.
         kind: EstimatorKind,
     },
 }

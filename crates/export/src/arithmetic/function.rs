@@ -9,7 +9,7 @@ use super::listed::{Lists, Slot, list};
 
 /// Name of a result that the function returns.
 pub const RETURNED: &str = "return";
-/// How results begin that are flags of what the function returns.
+/// Prefix of results that are flags in the function's return value.
 const FLAG: &str = "OHMSTRAIN_";
 
 /// A function in C, of what is kept of the readings.
@@ -22,7 +22,7 @@ pub struct Printed {
 }
 
 impl Printed {
-    /// Of what is done with a writer.
+    /// Records a function by running `done` with a writer.
     pub fn new(
         name: &'static str,
         comment: &'static str,

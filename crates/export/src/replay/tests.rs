@@ -143,7 +143,7 @@ impl Task<f64> for ElsewhereAfter<'_> {
     }
 }
 
-/// Every filter that is exported, of both sensors.
+/// Returns every filter that is exported, of both sensors.
 fn filters() -> Vec<(Sensor, EstimatorKind)> {
     let of = |sensor: fn() -> Sensor, kinds: &[EstimatorKind]| {
         kinds.iter().map(|kind| (sensor(), *kind)).collect::<Vec<_>>()
@@ -198,7 +198,7 @@ fn faulty(mut rows: Vec<Row>) -> Vec<Row> {
     rows
 }
 
-/// With a protection turned off the twin is the library's filter without it, which is another one than with it.
+/// Compares twins with a protection turned off: the library's filter without it, which differs from the one with it.
 #[test]
 fn what_is_turned_off_is_off_in_both() {
     let sensor = sensor();

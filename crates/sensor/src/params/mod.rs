@@ -251,8 +251,8 @@ impl SensorParams {
         }
     }
 
-    /// Whose intervals were widened as far as they ever are, [`LARGEST_SD_SCALE`](crate::LARGEST_SD_SCALE), when the blocks
-    /// left out may ask for more: the default estimator's, or those of the filter that it corrects, `filter` or `smoother`.
+    /// Returns the names of those whose intervals were widened by the maximum, [`LARGEST_SD_SCALE`](crate::LARGEST_SD_SCALE), though the
+    /// held-out blocks may ask for more: of the default estimator, or of the filter that it corrects, `filter` or `smoother`.
     #[must_use]
     pub fn widened_most(&self) -> Vec<&'static str> {
         let of = |kind: EstimatorKind| self.estimators.get(&self.filter_of(kind));

@@ -86,7 +86,7 @@ pub struct FilterParts<'a> {
 }
 
 impl<'a> FilterParts<'a> {
-    /// Of a calibrated sensor.
+    /// Collects the parts of a calibrated sensor's filter.
     fn of(params: &'a SensorParams, kind: EstimatorKind, options: Options) -> Result<Self, SensorError> {
         params.validate()?;
         let kind = params.filter_of(kind);
@@ -94,7 +94,7 @@ impl<'a> FilterParts<'a> {
         Ok(Self { kind, law: &params.law, estimator, parts: params.live_parts(&estimator), options })
     }
 
-    /// Of a law that is being calibrated: nothing is known of how the sensor is read.
+    /// Collects the parts of a filter for a law that is being calibrated: nothing is known about the readings yet.
     pub fn of_law(kind: EstimatorKind, law: &'a LawParams, estimator: EstimatorParams, limits: RangeParams) -> Self {
         Self { kind, law, estimator, parts: bare_parts(&estimator, limits), options: Options::plain() }
     }

@@ -60,13 +60,13 @@ struct Seen {
 }
 
 impl Seen {
-    /// As it was read.
+    /// Returns the reading as it was read.
     fn plain(reading: Option<Reading<f64>>) -> Self {
         let finite = |reading: Reading<f64>| Some(reading.value).filter(|value| value.is_finite());
         Self { reading: reading.and_then(finite), surprises: false }
     }
 
-    /// As the filter has taken it: nothing, if it was kept from it.
+    /// Returns the reading as the filter has taken it: none if it was rejected.
     fn new(output: &Output, reading: Option<Reading<f64>>) -> Self {
         let is_weighed_down = output.verdict == ReadingVerdict::Downweighted;
         let surprises = is_weighed_down && output.nis.is_some_and(|nis| nis > SURPRISING_NIS);

@@ -67,7 +67,7 @@ pub trait Filter: Send {
     /// If TOML cannot hold it.
     fn store(&self) -> Result<toml::Table, toml::ser::Error>;
 
-    /// Goes on from what [`Self::store`] gave, of a filter made of the same parameters and options, to the bit.
+    /// Resumes, to the bit, from the result of [`Self::store`], of a filter made of the same parameters and options.
     ///
     /// # Errors
     /// If it is the state of a filter of another kind. The filter stays as it was.
@@ -123,7 +123,7 @@ impl<'a> Rows<'a> {
         Self { len, row }
     }
 
-    /// How many.
+    /// Returns the number of rows.
     #[must_use]
     pub const fn len(&self) -> usize {
         self.len
@@ -142,7 +142,7 @@ impl<'a> Rows<'a> {
     }
 }
 
-/// Goes back through a recording. What it holds in memory are the states of one segment, and a state for each of those
+/// Way back through a recording. It holds in memory the states of one segment, and a state for each of those
 /// before it.
 pub trait WayBack {
     /// Smooths the last segment that has not been smoothed yet. `out` then holds its estimates in order of time; what is
@@ -168,7 +168,7 @@ pub struct Output {
     pub reading: Option<Reading<f64>>,
     /// Flags that doubts raise.
     pub doubts: Flags,
-    /// By what share R₀ has been followed.
+    /// Relative deviation of R₀, as the filter follows it, from calibration's.
     pub rest_off: f64,
 }
 
@@ -181,7 +181,7 @@ impl Output {
     }
 }
 
-/// Where a filter starts.
+/// Starting strain of a filter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Start {
     /// The long-run distribution of the calibration.

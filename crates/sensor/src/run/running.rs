@@ -52,7 +52,7 @@ pub(crate) struct Running<E: SensorEstimator<f64, N, L>, const B: usize, const N
     due: Vec<Output>,
 }
 
-/// From states to what is reported.
+/// Conversion from states to reported estimates.
 #[derive(Clone, Copy)]
 pub(crate) struct Reports<const B: usize, const N: usize> {
     pub model: SwitchedModel<f64, B, N>,
@@ -163,7 +163,7 @@ where
         self.reports.row(state, heard, self.reports.smoothed_scale)
     }
 
-    /// Says the strain in doubt, unless nothing is to be doubted.
+    /// Widens the strain's interval by the doubts, if there are any.
     fn widen(&self, output: &mut Output, doubts: &Doubts<f64>, stated: Gaussian<f64>, (variance, flags): (f64, Flags)) {
         if self.reports.doubts {
             output.widen(doubts, stated, variance);

@@ -6,7 +6,7 @@ use thiserror::Error;
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error("field `{field}`: expected {expected}, found {found}")]
 pub struct FieldError {
-    /// Where it stands: names of tables and index in an array, `law.branches[0].tau_s`.
+    /// Path of the field: names of tables and index in an array, `law.branches[0].tau_s`.
     pub field: String,
     /// Expected values.
     pub expected: String,
@@ -95,7 +95,7 @@ impl Table {
         FieldError { field: self.0.clone(), expected, found }
     }
 
-    /// That a number is allowed.
+    /// Checks that a number is allowed.
     ///
     /// # Errors
     /// Names the field, if not.
@@ -107,7 +107,7 @@ impl Table {
         Err(self.wrong(name, format!("{} to {}", short(least), short(most)), short(value)))
     }
 
-    /// That all numbers are.
+    /// Checks that all numbers are allowed.
     ///
     /// # Errors
     /// Names the field, if not.
@@ -117,7 +117,7 @@ impl Table {
         wrong.map_or(Ok(()), |(index, value)| self.number(&format!("{name}[{index}]"), *value, allowed))
     }
 
-    /// That an array has the expected length.
+    /// Checks that an array has the expected length.
     ///
     /// # Errors
     /// Names the field, if not.
