@@ -4,7 +4,7 @@ use ohmstrain_model::ParameterError;
 use ohmstrain_sensor::SensorError;
 use thiserror::Error;
 
-/// Why a calibration was not made.
+/// Reason for making no calibration.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum CalibrationError {

@@ -78,7 +78,7 @@ impl PublishedLaw {
         Ok(Self { extend, retract, range: RangeParams { lower, upper } })
     }
 
-    /// At work on a recording whose phases begin at these times, s, and whose first strain is known.
+    /// Starts on a recording whose phases begin at these times, s, and whose first strain is known.
     #[must_use]
     pub fn start(&self, phases: Vec<(f64, Phase)>, strain: f64) -> impl Baseline + use<> {
         let mut held = Held::new(self.range);

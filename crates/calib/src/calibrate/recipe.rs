@@ -1,6 +1,6 @@
 use ohmstrain_sensor::EstimatorKind;
 
-/// What the default estimator is made of.
+/// Components of the default estimator.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Recipe {
     /// The filters to choose from, by how well each does on every row of blocks that the law has not seen. The first one is tried

@@ -1,4 +1,4 @@
-//! By what the settings of a process are chosen.
+//! Criterion by which the settings of a process are chosen.
 
 use super::gaussian_process::{BLOCKS, BlockLeftOut, GaussianProcess};
 
@@ -47,7 +47,7 @@ impl LeftOutCosts {
 #[derive(Clone, Copy, Default)]
 struct NormalSum {
     count: usize,
-    /// Of errors over the root of their covariance.
+    /// Sum of squared errors over the root of their covariance.
     squares: f64,
     half_log_determinants: f64,
 }

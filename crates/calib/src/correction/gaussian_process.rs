@@ -100,7 +100,7 @@ impl GaussianProcess {
         Some(Self { centre, size, scale, noise, kernel, covariance, weights, targets })
     }
 
-    /// Up to a constant, with the scale that makes it least.
+    /// Returns the negative log evidence up to a constant, with the scale that minimises it.
     pub(super) fn negative_log_evidence(&self) -> f64 {
         let n = self.targets.len() as f64;
         let half_log_determinant: f64 = self.covariance.l_dirty().diagonal().iter().map(|pivot| pivot.ln()).sum();

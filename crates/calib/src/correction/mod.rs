@@ -62,7 +62,7 @@ pub(crate) fn smoother_corrector(examples: Examples<SMOOTHER_INPUTS>) -> Option<
 }
 
 impl Choices {
-    /// With S one-sided processes; `last` is what is mixed in last of every row, if anything is.
+    /// Chooses the processes, S one-sided ones among them; `last` is mixed in last in every row, if given.
     pub(crate) fn fit<const D: usize, const S: usize>(prepared: &Prepared<D>, last: &[Gaussian<f64>]) -> Option<Self> {
         let chosen = |kind: ProcessKind| prepared.chosen(kind, Choosing::of_sides(S));
         let both = || rayon::join(|| chosen(ProcessKind::Direct), || chosen(ProcessKind::Residual));

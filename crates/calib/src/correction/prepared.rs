@@ -13,9 +13,9 @@ use super::sparse::{Population, Sums};
 use crate::order::extent;
 use crate::sd_scale::{joint_scale_of, sd_scale_up_to};
 
-/// Where nothing is known, the variance of the strain that the direct process leaves, and of the filter's error that the
-/// residual process leaves, in variances of the strain. The targets' own variances, of a filter that has seen the rows,
-/// promise too much for other motions.
+/// Least prior variance of the strain after the direct process, and of the filter's error after the residual process, in
+/// variances of the strain. The targets' own variances, of a filter that has seen the rows, promise too much for other
+/// motions.
 const LEAST_DIRECT: f64 = 0.5;
 const LEAST_RESIDUAL: f64 = 0.07;
 /// Multiples of all length scales, and noises in deviations of the targets, that are tried on recordings left out.
@@ -34,7 +34,7 @@ pub(crate) struct Chosen {
     pub sd_scale: f64,
 }
 
-/// How the processes of a corrector are chosen.
+/// Options for choosing the processes of a corrector.
 #[derive(Clone, Copy)]
 pub(super) struct Choosing {
     pub(super) criterion: Criterion,

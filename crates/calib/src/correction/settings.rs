@@ -28,7 +28,7 @@ impl Lessons<'_> {
         self.alike(criterion).map(|(cost, params)| self.with_relevance(criterion, cost, params))
     }
 
-    /// With one length scale of all inputs.
+    /// Chooses the settings with one length scale for all inputs.
     fn alike(self, criterion: Criterion) -> Option<(f64, Settings)> {
         let inputs = self.inputs.first()?.len();
         let squares = self.half_squares(&vec![1.0; inputs]);

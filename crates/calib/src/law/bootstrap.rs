@@ -64,7 +64,7 @@ pub fn bootstrap_law(
     Ok(Bootstrap { lower: percentile(0.025), upper: percentile(0.975), replicates: drawn.len(), names, values })
 }
 
-/// As many rows as there are, block by block.
+/// Draws as many rows as there are, block by block.
 fn draw(rows: &[usize], rng: &mut ChaCha12Rng) -> Vec<usize> {
     let mut out = Vec::with_capacity(rows.len() + rows.len() / BOOTSTRAP_BLOCKS);
     while out.len() < rows.len() {

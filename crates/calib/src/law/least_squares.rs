@@ -92,7 +92,8 @@ fn keep_within_bounds(structure: &mut LawStructure, regression: &LawRegression) 
     }
 }
 
-/// In the unit of the readings. Relative to an R₀ that is fitted as well, a fit could shrink its error by raising R₀.
+/// Returns the squared error in the unit of the readings. Relative to an R₀ that is fitted as well, a fit could shrink its error by
+/// raising R₀.
 fn squared_error(structure: &LawStructure, regression: &LawRegression) -> Option<f64> {
     let design = structure.design(regression);
     let solution = regression.solve(&design, structure.ridge, None)?;

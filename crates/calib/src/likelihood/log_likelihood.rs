@@ -30,7 +30,7 @@ impl ReadingSeries<'_> {
 /// Log density of readings under a model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ReadingsLikelihood<T> {
-    /// Every constant counted.
+    /// Log-likelihood with all constants.
     pub value: T,
     /// Readings that were not missing.
     pub readings: usize,

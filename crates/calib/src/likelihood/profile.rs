@@ -39,8 +39,8 @@ impl<F: ModelFamily<N, L>, const N: usize, const L: usize> Likelihood<'_, F, N, 
     }
 }
 
-/// On the way from the maximum to an end, where the likelihood has fallen to its target and the gradient of the others is
-/// zero. Logarithms.
+/// Walk from the maximum to an end of the interval, where the likelihood has fallen to its target and the gradient of the other
+/// parameters is zero. In logarithms.
 struct Walk<'a, F, const N: usize, const L: usize> {
     likelihood: &'a Likelihood<'a, F, N, L>,
     /// Parameters that move, and which of them the interval is about.

@@ -29,7 +29,7 @@ pub struct NoiseFit {
     pub noise: NoiseParams,
     /// The motion found.
     pub motion: MotionParams,
-    /// How sure it is.
+    /// Uncertainty of the parameters.
     pub fit: LikelihoodFit,
     /// Warnings in words; empty if all went well.
     pub warnings: Vec<String>,

@@ -37,7 +37,7 @@ pub struct Prior {
     pub format: u32,
     /// Program and version that made it.
     pub made_by: String,
-    /// How many sensors it was learned from.
+    /// Number of sensors that it was learned from.
     pub sensors: usize,
     /// The estimated quantity.
     pub quantity: Quantity,

@@ -24,7 +24,7 @@ const STATIONS: [f64; 11] = [0.0, 1.0, 1.0, 0.0, 0.0, 0.5, 1.0, 0.5, 0.5, 0.2, 0
 const SPEEDS: [f64; 3] = [1.0, 0.3, 0.1];
 /// Rows from one station to the next.
 const LEG_ROWS: usize = 60;
-/// How long a hold lasts, in movements over the whole range.
+/// Duration of a hold, in movements over the whole range.
 const HOLD: f64 = 2.0;
 /// Keeps columns that look alike from making the equations singular; relative to their variance.
 const RIDGE: f64 = 1e-6;
@@ -32,7 +32,7 @@ const RIDGE: f64 = 1e-6;
 const STEP: f64 = 1e-4;
 
 impl Probe {
-    /// For laws with these time constants; `fastest` is in 1/s.
+    /// Creates the probe for laws with these time constants; `fastest` is in 1/s.
     pub(super) fn new(range: RangeParams, fastest: f64, tau_s: &[f64]) -> Result<Self, CalibrationError> {
         let (time_s, strain) = motion(range, fastest);
         // What is read does not matter, but that it changes.

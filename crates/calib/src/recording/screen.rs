@@ -11,9 +11,9 @@ use crate::samples::Samples;
 /// A row that calibration does not believe.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Distrusted {
-    /// Which recording, from zero.
+    /// Index of the recording, from zero.
     pub recording: usize,
-    /// Which row of it, from zero.
+    /// Index of its row, from zero.
     pub row: usize,
     /// Its time, s.
     pub time_s: f64,
@@ -21,7 +21,7 @@ pub struct Distrusted {
     pub doubt: Doubt,
 }
 
-/// Why a row is not believed.
+/// Reason for not believing a row.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Doubt {

@@ -11,10 +11,10 @@ use crate::samples::{FEWEST_ROWS, Samples};
 
 use super::{FARTHEST_S, Lag, LagError, SURE, aligned};
 
-/// Where lags are looked for.
+/// Grid of the lags to try.
 #[derive(Clone, Copy)]
 struct Lags {
-    /// In the middle of the lags tried, s.
+    /// Middle of the lags tried, s.
     around_s: f64,
     /// Lags tried reach this far to both sides, s.
     reach_s: f64,
@@ -39,7 +39,7 @@ const OF_GAUGE: f64 = 0.3;
 const OWN_SHARE: f64 = 0.1;
 /// Ridge of the law, in the middle of those that calibration tries.
 const RIDGE: f64 = 0.01;
-/// From this gain on there hardly is a doubt. Of 1440 simulated recordings as they are, whole, halves and thirds, 43 show a lag of more
+/// Gain from which on there is hardly a doubt. Of 1440 simulated recordings as they are, whole, halves and thirds, 43 show a lag of more
 /// than a tenth of a movement with a gain of [`SURE`] (in three movements between long holds up to 5.5, by a gauge up to 4.6), four with
 /// this one (halves with sines of a sensor with much hysteresis). Of public recordings, whole to quarters, none shows more than 3.2.
 const CERTAIN: f64 = 6.0;
@@ -152,9 +152,9 @@ fn best_lag(errors: &[f64], search: Lags) -> Option<(f64, f64)> {
 
 /// Errors at every lag of a search.
 struct Errors {
-    /// Of the law.
+    /// Errors of the law.
     law: Vec<f64>,
-    /// Of the gauge alone.
+    /// Errors of the gauge alone.
     gauge: Vec<f64>,
 }
 
@@ -171,7 +171,7 @@ impl Lags {
         self.reach_s / f64::from(self.steps)
     }
 
-    /// How far the i-th lag is from the middle, s.
+    /// Returns the distance of the i-th lag from the middle, s.
     fn offset_s(&self, i: usize) -> f64 {
         (i as f64 - f64::from(self.steps)) * self.step_s()
     }

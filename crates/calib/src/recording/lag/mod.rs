@@ -16,13 +16,13 @@ use search::Search;
 
 /// Lags of a reference on the readings' clock are looked for this far, s: as far as devices started by hand are apart.
 const FARTHEST_S: f64 = 12.0;
-/// In a recording of so many times that the law tells the lag: it knows relaxation, and asks for readings with a reference on both
-/// sides of all lags. In shorter ones it takes one movement for another, and the motion alone is asked.
+/// Length of a recording, in multiples of the farthest lag, from which on the law tells the lag: it knows relaxation, and needs
+/// readings with a reference on both sides of all lags. In shorter ones it takes one movement for another, and only the motion is used.
 const LONG: f64 = 10.0;
-/// By this factor a lag has to lower the squared error to be said. Of 104 public recordings as they are, parts of 15 s and more among
-/// them, two show as much.
+/// Factor by which a lag has to lower the squared error to be reported. Of 104 public recordings as they are, parts of 15 s and more
+/// among them, two show as much.
 const SURE: f64 = 2.5;
-/// From this gain on there hardly is a doubt, if the motion explains the readings and the lag is more than a sensor's own: none of
+/// Gain from which on there is hardly a doubt, if the motion explains the readings and the lag is more than a sensor's own: none of
 /// those 104, and of 311 simulated ones, shows all three …
 const CERTAIN: f64 = 6.0;
 /// … but for this share of their variance, at most.
@@ -84,7 +84,7 @@ impl fmt::Display for Lag {
     }
 }
 
-/// Why the motion does not tell a lag.
+/// Reason why the motion does not tell a lag.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum LagError {

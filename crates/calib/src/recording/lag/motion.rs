@@ -206,7 +206,7 @@ impl Sums {
         self.square += value * value;
     }
 
-    /// With the rows of another one, or without them (`sign` -1).
+    /// Adds the rows of another sum, or removes them (`sign` -1).
     fn with(mut self, other: &Self, sign: f64) -> Self {
         self.count += sign * other.count;
         self.matrix += other.matrix * sign;
