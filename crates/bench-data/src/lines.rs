@@ -7,7 +7,7 @@ use crate::error::{Fault, quote};
 /// Longest line that is taken for text: a bound on memory, and far above what a trace needs.
 const LONGEST_LINE: u64 = 64 * 1024;
 
-/// Why no line could be delivered.
+/// Reason why no line could be delivered.
 pub(crate) enum LineFault {
     Io(io::Error),
     Content(Fault),
@@ -129,7 +129,7 @@ impl<R: Read> LineFeed<R> {
         Ok(Some(()))
     }
 
-    /// What made `read` fail.
+    /// Takes the error that made `read` fail.
     pub(crate) const fn take_fault(&mut self) -> Option<LineFault> {
         self.fault.take()
     }
@@ -151,7 +151,7 @@ pub(crate) fn take_apart(line: &str, cells: &mut StringRecord) -> Result<(), Fau
     Ok(())
 }
 
-/// Whether a line is one record whose cells are what stands between its commas: no quotation mark, no end of line.
+/// True if a line is one record that splits at its commas: no quotation mark, no end of line.
 pub(crate) fn is_plain(line: &str) -> bool {
     !line.bytes().any(|byte| byte == b'"' || byte == b'\r')
 }

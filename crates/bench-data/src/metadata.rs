@@ -4,7 +4,7 @@ use std::str::FromStr;
 use crate::error::{Fault, SpecError, quote};
 use crate::spec::{FrontEndSpec, JointSpec};
 
-/// What a trace says about itself, one `# key = value` line each, above the header.
+/// Metadata of a trace, one `# key = value` line each, above the header.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Metadata {
     /// `material`: what the sensor is made of.
@@ -19,7 +19,7 @@ pub struct Metadata {
     pub strain_unit: Option<StrainUnit>,
     /// `resistance_unit`: what the column `resistance_ohm` is in; Ω unless it says otherwise.
     pub resistance_unit: Option<ResistanceUnit>,
-    /// Every other key and its value, in the file's order.
+    /// All other keys and their values, in the file's order.
     pub other: Vec<(String, String)>,
 }
 
@@ -42,7 +42,7 @@ pub enum ResistanceUnit {
 }
 
 impl StrainUnit {
-    /// As a file and a flag name it.
+    /// Returns its name in files and flags.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -62,7 +62,7 @@ impl StrainUnit {
 }
 
 impl ResistanceUnit {
-    /// As a file and a flag name it.
+    /// Returns its name in files and flags.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {

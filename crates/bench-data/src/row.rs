@@ -1,4 +1,4 @@
-/// What the readings of a trace are.
+/// Kind of a trace's readings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum ReadingKind {
     /// Resistance, Ω.
@@ -7,7 +7,7 @@ pub enum ReadingKind {
     Ratio,
 }
 
-/// What the reference of a trace is.
+/// Quantity of a trace's reference.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum ReferenceQuantity {
     /// Engineering strain.

@@ -64,7 +64,7 @@ fn check_sheet(sheet: &[u8], budget: &mut Budget) -> Result<(), TooMuch> {
     budget.take(height * width, 0)
 }
 
-/// What a sheet says of its rows and columns is made room for before any cell is read.
+/// Checks the stated extent of a sheet, for which memory is allocated before any cell is read.
 fn check_extent(record: &Record) -> Result<(), TooMuch> {
     let long = (record.long(0), record.long(4), record.short(8), record.short(10));
     let short = (record.short(0), record.short(2), record.short(4), record.short(6));

@@ -71,7 +71,7 @@ struct Size {
     height: usize,
     width: usize,
     bytes: u64,
-    /// Where a cell stands in the last column.
+    /// Place of a cell in the last column.
     last: (u32, u32),
 }
 
@@ -83,7 +83,7 @@ struct Row {
     /// Columns up to the last cell that is not empty.
     width: usize,
     bytes: u64,
-    /// How often the cell is repeated that has begun.
+    /// Repetitions of the cell that has begun.
     cell: usize,
 }
 

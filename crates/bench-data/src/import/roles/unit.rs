@@ -35,7 +35,7 @@ struct Asked<'a> {
     column: &'a Column,
     facts: &'a dyn Fn() -> &'a Facts,
     role: Role,
-    /// How messages call it.
+    /// Name in messages.
     name: String,
 }
 
@@ -98,7 +98,7 @@ impl Asked<'_> {
         ImportError::question(&self.table.file, what, of_scale.into_iter().chain(answers))
     }
 
-    /// What a line `# strain_unit = …` or `# resistance_unit = …` says, whatever the column is called.
+    /// Returns the unit of a line `# strain_unit = …` or `# resistance_unit = …`, whatever the column's name.
     fn by_metadata(&self) -> Option<Unit> {
         let metadata = &self.table.metadata;
         let name = match self.role {

@@ -14,7 +14,7 @@ pub(crate) const ARROW: &str = " -> ";
 /// The name of the clock that a serial monitor writes.
 pub(crate) const MONITOR_CLOCK: &str = "monitor clock";
 
-/// What separates the cells of a line.
+/// Separator of the cells of a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Separator {
     Tab,

@@ -16,7 +16,7 @@ const MOST_HEADER_LINES: usize = 3;
 pub(crate) struct Header {
     /// The first line of data, as an index of the grid.
     pub first_row: usize,
-    /// What most lines of data are.
+    /// Shape of most lines of data.
     pub shape: Shape,
     /// Heading of each column; empty where there is none.
     pub headings: Vec<String>,
@@ -28,9 +28,9 @@ pub(crate) struct Header {
     pub header_lines: usize,
     /// True if there is a line of units.
     pub unit_line: bool,
-    /// How many names there are, where that is another number than of columns.
+    /// Number of names, if it differs from that of columns.
     pub given_names: Option<usize>,
-    /// What `# key = value` lines say.
+    /// Metadata of the `# key = value` lines.
     pub metadata: Metadata,
 }
 

@@ -15,7 +15,7 @@ const ROWS_BELOW: usize = 20;
 /// A line of names, one for each column.
 pub(crate) struct Names {
     pub cells: Vec<String>,
-    /// How many names there are, where that is another number than of columns.
+    /// Number of names, if it differs from that of columns.
     pub given: Option<usize>,
 }
 

@@ -13,12 +13,12 @@ const FEW_SIGNS: f64 = 0.1;
 /// An import with nothing left open.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
-    /// What was answered.
+    /// Answers that were given.
     given: Recipe,
     /// The answers with those of the preset.
     pub(crate) recipe: Recipe,
     pub(crate) decision: Decision,
-    /// What follows from names or numbers, and is not said by a flag.
+    /// Conclusions from names or numbers that no flag stated.
     pub remarks: Vec<String>,
 }
 

@@ -87,7 +87,7 @@ pub(crate) fn doubtful_unit(role: Role, heading: &str) -> Option<&str> {
     ends.contains(&end.to_lowercase().as_str()).then_some(end)
 }
 
-/// How sure a name is of a role.
+/// Certainty that a name means a role.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Sureness {
     /// The unit alone says so, and could say so of something else too.
