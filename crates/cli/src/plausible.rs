@@ -33,7 +33,7 @@ fn text(recordings: &[TraceFile], doubt: &CalibrationDoubt) -> String {
     names + &doubt.text(Interface::CommandLine)
 }
 
-/// Says which rows took no part in a calibration; the first ones, or all of them.
+/// Lists the rows that took no part in a calibration; the first ones, or all of them.
 pub fn distrusted(recordings: &[TraceFile], distrusted: &[Distrusted]) -> Vec<String> {
     let line = |one: &Distrusted| {
         let recording = &recordings[one.recording];

@@ -13,7 +13,7 @@ pub const WAIT_IN_MEMORY: usize = 16 << 20;
 /// The readings of a recording that may be longer than memory, and nothing else of it: what exceeds 16 MB waits in a temporary
 /// file, and rows are taken out of it by the thousand.
 pub struct StoredReadings {
-    /// Of a row: time, value and, for those of a converter, deviation and a byte that says whether it was saturated.
+    /// True if a row has, besides time and value, the deviation of a converter's reading and a byte for saturation.
     has_codes: bool,
     len: usize,
     kept: RefCell<Kept>,
@@ -25,7 +25,7 @@ struct Kept {
     first: usize,
     rows: Vec<(f64, Reading)>,
     bytes: Vec<u8>,
-    /// Why rows cannot be taken out again.
+    /// Error that keeps rows from being taken out again.
     failed: Option<io::Error>,
 }
 
@@ -80,7 +80,7 @@ impl StoredReadings {
         known.unwrap_or((f64::NAN, Reading { value: f64::NAN, sd: 0.0, saturated: false }))
     }
 
-    /// Whether all rows that were asked for could be taken out.
+    /// Fails unless all rows that were asked for could be taken out.
     pub fn whole(&self) -> Result<(), CliError> {
         self.kept.borrow().failed.as_ref().map_or(Ok(()), |error| Err(temporary(error)))
     }

@@ -37,7 +37,7 @@ pub fn builder_anew<'a>(sensor: &'a Sensor, args: &'a EstimateArgs) -> FilterBui
     builder
 }
 
-/// What the rested sensor reads in a recording whose first readings are `first`; `None` if nobody says, so that R₀ follows.
+/// Returns the reading of the rested sensor for a recording whose first readings are `first`; `None` if it was not given, so that R₀ follows.
 pub fn rest_resistance(
     wanted: Option<RestResistance>,
     sensor: &Sensor,

@@ -50,7 +50,7 @@ pub struct CalibrateArgs {
     /// Report and figures, of the first recording
     #[command(flatten)]
     pub report: ReportArgs,
-    /// Whether to replace
+    /// Permission to replace files
     #[command(flatten)]
     pub replace: ReplaceArgs,
     /// Units of the recordings' columns

@@ -48,13 +48,13 @@ pub struct EstimateArgs {
 }
 
 impl EstimateArgs {
-    /// Whether this is to be done without.
+    /// True if this is to be left out.
     pub fn is_without(&self, what: Without) -> bool {
         self.without.contains(&what)
     }
 }
 
-/// What an estimate can do without.
+/// Part that an estimate can leave out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Without {
     /// The learned correction of the strain
@@ -86,13 +86,13 @@ impl Format {
     }
 }
 
-/// How estimates are written, and where.
+/// Form and file of the estimates.
 #[derive(Debug, ClapArgs)]
 pub struct WrittenArgs {
     /// File to write instead of stdout, which is - too; a name that ends in .parquet is written as Parquet
     #[arg(short, long, value_name = "estimates.csv")]
     pub output: Option<PathBuf>,
-    /// Whether to replace
+    /// Permission to replace files
     #[command(flatten)]
     pub replace: ReplaceArgs,
     /// Form of the estimates
@@ -134,13 +134,13 @@ pub struct FilterArgs {
     /// digit, as if the stream had not ended. It may be the file that --save-state writes
     #[arg(long, value_name = "state.toml", conflicts_with = "initial_strain")]
     pub resume: Option<PathBuf>,
-    /// What to write
+    /// Output
     #[command(flatten)]
     pub written: WrittenArgs,
-    /// How to estimate
+    /// Estimation
     #[command(flatten)]
     pub estimate: EstimateArgs,
-    /// What was measured with
+    /// Setup of the measurement
     #[command(flatten)]
     pub setup: SetupArgs,
 }
@@ -150,15 +150,15 @@ pub struct FilterArgs {
 pub struct SmoothArgs {
     /// Recording, or - for stdin
     pub trace_file: PathBuf,
-    /// What to write
+    /// Output
     #[command(flatten)]
     pub written: WrittenArgs,
-    /// How to estimate
+    /// Estimation
     #[command(flatten)]
     pub estimate: EstimateArgs,
 }
 
-/// How the influence of a surprising reading is bounded.
+/// Bound on the influence of a surprising reading.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BoundedInfluence(pub Influence<f64>);
 
@@ -195,14 +195,14 @@ fn known(text: &str) -> Result<Known, String> {
     }
 }
 
-/// Where R₀ comes from.
+/// Source of R₀.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum RestResistance {
     /// Given.
     Value(f64),
     /// Median of the first readings.
     First(usize),
-    /// What it was in calibration, whatever is read.
+    /// R₀ of the calibration, whatever is read.
     Calibrated,
 }
 

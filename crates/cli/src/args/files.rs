@@ -17,7 +17,7 @@ pub struct InspectArgs {
     /// Print JSON
     #[arg(long)]
     pub json: bool,
-    /// What is known of the files
+    /// Known properties of the files
     #[command(flatten)]
     pub known: FilesArgs,
 }
@@ -36,15 +36,15 @@ pub struct ImportArgs {
     /// anew, or a column `trial`, `run` or so has another value
     #[arg(long, requires = "output", conflicts_with = "recording")]
     pub split_recordings: bool,
-    /// Whether to replace
+    /// Permission to replace files
     #[command(flatten)]
     pub replace: ReplaceArgs,
-    /// What is known of the files
+    /// Known properties of the files
     #[command(flatten)]
     pub known: FilesArgs,
 }
 
-/// What is known of a lab's files.
+/// Known properties of a lab's files.
 #[derive(Debug, ClapArgs)]
 pub struct FilesArgs {
     /// What a column is, by name or number: time='Time (s)', resistance=3, displacement=2:Position in the second file,
@@ -94,7 +94,7 @@ pub struct FilesArgs {
     /// Rows per second, where no column is a time
     #[arg(long, value_name = "HZ", allow_negative_numbers = true, value_parser = positive)]
     pub rate_hz: Option<f64>,
-    /// What was measured with
+    /// Setup of the measurement
     #[command(flatten)]
     pub setup: SetupArgs,
     /// A known layout: electromech-stretcher (no header; Ro, Ri, tR, P, tP, F, tF)
@@ -103,7 +103,7 @@ pub struct FilesArgs {
 }
 
 impl FilesArgs {
-    /// As the library has it.
+    /// Converts the flags to the library's recipe.
     pub fn recipe(&self) -> Recipe {
         Recipe {
             preset: self.preset,

@@ -43,7 +43,7 @@ pub struct FitLawArgs {
     /// Also write a plot of each fit as SVG, with what is drawn as CSV, to this folder
     #[arg(long, value_name = "DIR")]
     pub figures: Option<PathBuf>,
-    /// Whether to replace
+    /// Permission to replace files
     #[command(flatten)]
     pub replace: ReplaceArgs,
     /// Print one row per material, speed and phase over all recordings
@@ -65,7 +65,7 @@ pub enum TableFormat {
     Latex,
 }
 
-/// What the long help says after the flags.
+/// Text of the long help after the flags.
 const LAWS: &str = "\
 Laws, t the time since the segment began:
   of a hold
@@ -92,7 +92,7 @@ With two or more, ± is the standard error from their scatter. A movement withou
 is fitted by eq8 alone. R^2 is that of the phase, the smallest of the row's segments. `rest` is a \
 hold after a release.";
 
-/// Which segments to fit.
+/// Choice of segments to fit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SegmentChoice {
     /// The recording without a cut.

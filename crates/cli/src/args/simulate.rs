@@ -18,7 +18,7 @@ pub struct DemoArgs {
     /// Seed of the simulated bench
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
-    /// Whether to replace
+    /// Permission to replace files
     #[command(flatten)]
     pub replace: ReplaceArgs,
 }
@@ -65,7 +65,7 @@ pub struct SimulateArgs {
     /// File to write instead of stdout
     #[arg(short, long)]
     pub output: Option<PathBuf>,
-    /// Whether to replace
+    /// Permission to replace files
     #[command(flatten)]
     pub replace: ReplaceArgs,
 }

@@ -41,14 +41,14 @@ pub fn run(args: &CalibrateArgs, messages: &Messages) -> Result<(), CliError> {
     })
 }
 
-/// What comes of a calibration, beside the sensor's file.
+/// Result of a calibration, beside the sensor's file.
 pub struct Outcome {
     sensor: Sensor,
-    /// On parts that were left out.
+    /// Findings on held-out parts.
     pub findings: Option<Findings>,
     tested: Option<Tested>,
     calibration_s: f64,
-    /// What `--explain` and `--bootstrap` print.
+    /// Text that `--explain` and `--bootstrap` print.
     explained: String,
 }
 
@@ -133,7 +133,7 @@ pub fn calibrate(args: &CalibrateArgs, messages: &Messages) -> Result<Outcome, C
     Ok(outcome)
 }
 
-/// What the flags leave to choose from.
+/// Returns the calibration with the choices that the flags have made.
 fn calibration(args: &CalibrateArgs) -> Calibration<'static> {
     let mut calibration = Calibration::new();
     if let Some(estimator) = args.estimator.chosen() {

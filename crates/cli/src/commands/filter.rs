@@ -96,7 +96,7 @@ impl FilterRun {
         }
     }
 
-    /// For a device that has started again.
+    /// Starts again for a device that has restarted.
     fn anew(sensor: &Sensor, args: &FilterArgs) -> Result<Self, Error> {
         Self::built(builder_anew(sensor, &args.estimate), args)
     }
@@ -138,7 +138,7 @@ struct Stream<'a, W: io::Write + Send> {
     args: &'a FilterArgs,
     filter: FilterRun,
     sink: Sink<'a, W>,
-    /// What it goes on from.
+    /// State to resume from.
     stored: Option<Stored>,
     /// First and last time, s, up to now or until the clock started again.
     times: Option<(f64, f64)>,
@@ -257,21 +257,21 @@ impl<'a, W: io::Write + Send> Stream<'a, W> {
     }
 }
 
-/// What helps where a clock has started again.
+/// Advice for a clock that has restarted.
 const SKIPS: &str = "--skip-bad goes on with another filter";
 
-/// Where estimates go.
+/// Destination of the estimates.
 struct Sink<'a, W: io::Write + Send> {
     messages: &'a Messages,
     writer: EstimateWriter<W>,
-    /// Says when the calibration does not reach.
+    /// Watch for use outside the calibrated range.
     watch: ValidityWatch,
     quiet: QuietWatch,
     sensor: Sensor,
-    /// What the rested sensor reads, if not what it read in calibration.
+    /// Reading of the rested sensor, if it differs from that in calibration.
     rest: Option<f64>,
     file: String,
-    /// What messages call the recording's header.
+    /// Name of the recording's header in messages.
     header: String,
     /// Not a file but standard input or a pipe: somebody waits for each row.
     live: bool,

@@ -1,4 +1,4 @@
-//! What a calibration is worth on the rows that `--from` and `--until` kept from it.
+//! Scores of a calibration on the rows that `--from` and `--until` kept from it.
 
 use std::ops::Range;
 

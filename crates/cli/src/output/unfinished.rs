@@ -11,15 +11,15 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use tempfile::{Builder, NamedTempFile, TempDir};
 
-/// What their names begin with.
+/// Prefix of their names.
 const PREFIX: &str = ".ohmstrain-";
-/// What names of files end in, and those of folders.
+/// Suffix of names of files, and below of those of folders.
 const FILE: &str = ".part";
 const FOLDER: &str = ".parts";
 /// The file in such a folder that is locked.
 const LOCK: &str = "lock";
 
-/// What this process has begun; names of what is finished stay, and are used by nobody again.
+/// Unfinished files of this process; names of finished ones stay, and are not used again.
 static BEGUN: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
 fn begun() -> MutexGuard<'static, Vec<PathBuf>> {
@@ -51,7 +51,7 @@ impl Unfinished {
         }
     }
 
-    /// To write to.
+    /// Returns the file to write to.
     pub fn file(&self) -> &File {
         self.file.as_file()
     }
@@ -104,7 +104,7 @@ impl UnfinishedFolder {
         }
     }
 
-    /// Where it is.
+    /// Returns its path.
     pub fn path(&self) -> &Path {
         self.folder.path()
     }

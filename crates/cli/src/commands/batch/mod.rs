@@ -109,7 +109,7 @@ impl Work<'_> {
     }
 }
 
-/// Says how many there are of each kind, and which summaries are not of this run.
+/// Prints the number of jobs of each kind, and names the summaries that are not of this run.
 fn closing(entries: &[Entry], summary: &Path, stale: &[PathBuf], messages: &Messages) -> Result<(), CliError> {
     let count = |state| entries.iter().filter(|entry| entry.state == state).count();
     let (done, kept, failed) = (count(State::Done), count(State::Kept), count(State::Failed));

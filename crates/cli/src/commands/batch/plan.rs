@@ -21,9 +21,9 @@ pub struct Job {
     pub files: Vec<PathBuf>,
     /// The sensor's parameters, if the command is given some.
     pub sensor: Option<PathBuf>,
-    /// What `--prior` among the flags names.
+    /// File that `--prior` among the flags names.
     pub prior: Option<PathBuf>,
-    /// What `--estimator` among the flags names.
+    /// Estimator that `--estimator` among the flags names.
     estimator: Option<EstimatorKind>,
     /// Flags besides.
     pub flags: Vec<String>,
@@ -42,7 +42,7 @@ impl Job {
         self.files.iter().chain(&self.sensor).chain(&self.prior)
     }
 
-    /// What messages call it.
+    /// Returns its name in messages.
     pub fn name(&self) -> String {
         self.files.iter().map(|file| file.display().to_string()).collect::<Vec<_>>().join(", ")
     }
@@ -164,7 +164,7 @@ impl Row<'_> {
         Ok(job)
     }
 
-    /// What is written lies below the folder of outputs.
+    /// Returns the path of an output; fails unless it lies below the folder of outputs.
     fn below(&self, column: &str, cell: &str) -> Result<PathBuf, CliError> {
         let parts = || Path::new(cell).components().filter(|part| *part != Component::CurDir);
         if parts().next().is_some() && parts().all(|part| matches!(part, Component::Normal(_))) {
@@ -207,7 +207,7 @@ fn name_outputs(jobs: &mut [Job], args: &BatchArgs) {
     }
 }
 
-/// What the command would say to its arguments is said before anything is done.
+/// Checks the arguments of the command before anything is done.
 fn check_arguments(job: &mut Job, args: &BatchArgs) -> Result<(), CliError> {
     if job.files.iter().any(|file| file == Path::new("-")) {
         return Err(CliError::Arguments("batch reads files; for standard input there is the command itself".into()));

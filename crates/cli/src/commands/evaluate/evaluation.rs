@@ -21,7 +21,7 @@ pub struct Evaluation {
     recordings: Vec<Vec<RecordingScores>>,
 }
 
-/// What `--json` prints.
+/// Content of the output of `--json`.
 #[derive(Serialize)]
 struct Json<'a> {
     /// The commit that the program was built from, where it was said.
@@ -39,7 +39,7 @@ impl Evaluation {
         self.recordings.push(scores);
     }
 
-    /// Whether nothing was scored.
+    /// True if nothing was scored.
     pub fn is_empty(&self) -> bool {
         self.recordings.is_empty()
     }

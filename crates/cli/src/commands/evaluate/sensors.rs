@@ -27,13 +27,13 @@ pub struct Sensor {
     pub kind: EstimatorKind,
     /// Wall-clock time of the calibration, s; `None` if it was read from a file.
     calibration_s: Option<f64>,
-    /// Whether it is shown to say what another one is made of.
+    /// True if it is shown as a part of another one.
     is_part: bool,
-    /// What the scores are called: the estimator's name, or what it does without.
+    /// Name of the scores: the estimator's name, or that of the part left out.
     name: &'static str,
 }
 
-/// What the sensor is compared with.
+/// Estimators that the sensor is compared with.
 pub struct Rivals {
     pub static_cubic: StaticCubic,
     /// The others, where there are rows to fit them to.
@@ -42,7 +42,7 @@ pub struct Rivals {
     pub published: Option<PublishedLaw>,
 }
 
-/// What the body does, by the reference.
+/// Returns the phases of the body's motion, by the reference.
 pub fn phases(time_s: &[f64], strain: &[f64]) -> Vec<PhaseRows> {
     segment(time_s, strain).into_iter().map(|segment| (segment.phase, segment.rows)).collect()
 }
@@ -101,7 +101,7 @@ impl Sensor {
         Ok(sensors.filter(|sensor| !(sensor.is_part && wanted.contains(&sensor.kind))).collect())
     }
 
-    /// Whether it is shown to say what another one is made of.
+    /// True if it is shown as a part of another one.
     pub const fn is_part(&self) -> bool {
         self.is_part
     }

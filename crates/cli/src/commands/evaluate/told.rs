@@ -4,12 +4,12 @@ use ohmstrain_sensor::RangeParams;
 use crate::commands::scoring::Part;
 use crate::input::TraceFile;
 
-/// How near an end of the reference's range a strain is one at that end, in ranges.
+/// Largest distance from an end of the reference's range at which a strain counts as one at that end, in ranges.
 const NEAR_END: f64 = 0.1;
 
 /// Strains that the reference tells an estimator before it is scored with it.
 pub struct Told {
-    /// What tables call them; none if there is none.
+    /// Name in tables; `None` if there are no known strains.
     pub name: Option<String>,
     /// The strains.
     pub known: Vec<Known>,

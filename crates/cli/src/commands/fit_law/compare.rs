@@ -14,13 +14,13 @@ use ohmstrain::number::{fixed, significant};
 /// Version of what `--json` prints.
 const SCHEMA: u32 = 1;
 
-/// What `--json` prints.
+/// Content of the output of `--json`.
 #[derive(Serialize)]
 struct Json<'a> {
     ranked: &'a [Ranked],
 }
 
-/// What the criteria say of a law on a segment.
+/// Criteria of a law on a segment.
 #[derive(Serialize)]
 struct Ranked {
     recording: String,

@@ -21,7 +21,7 @@ use crate::suits::FIRST_LIVE_READINGS;
 use crate::whole_file::is_stdin;
 use description::{Description, Joint};
 
-/// What helps where a clock has started again.
+/// Advice for a clock that has restarted.
 const LATE: &str = "; if the clock has started again there, --skip-bad goes on with other filters";
 
 /// Longer lines are no rows, however they go on.
@@ -129,7 +129,7 @@ impl<'a> Channel<'a> {
         Ok(())
     }
 
-    /// What the electronics, the lines above the header or the end of the column's name say that the readings are.
+    /// Returns the unit of the readings by the electronics, the lines above the header or the end of the column's name.
     fn said_unit(&self) -> Option<ReadingUnit> {
         if self.joint.front_end.is_some() || self.lines.metadata().resistance_unit.is_some() {
             return Some(ReadingUnit::Ohm);
