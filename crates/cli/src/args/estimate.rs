@@ -25,21 +25,21 @@ pub struct EstimateArgs {
     /// offset or another gain for an hour
     #[arg(long, value_name = "T:X[:SD]", allow_negative_numbers = true, value_parser = known)]
     pub known: Vec<Known>,
-    /// What the rested, unstretched sensor reads now: a number in the readings' unit, first:N for the median of the first
-    /// N readings, or calibrated for what it read in calibration. Without this flag R₀ is that too, but follows readings
-    /// that stay beyond those of the calibration; of a sensor that was calibrated on several recordings it begins at what
-    /// the first reading suggests
+    /// Reading of the rested, unstretched sensor now: a number in the readings' unit, first:N for the median of the
+    /// first N readings, or calibrated for its reading in calibration. Without this flag R₀ starts there too, but
+    /// follows readings that stay beyond those of the calibration; for a sensor that was calibrated on several
+    /// recordings it starts at the value that the first reading suggests
     #[arg(long, value_name = "OHM|first:N|calibrated", allow_negative_numbers = true)]
     pub rest_resistance: Option<RestResistance>,
     /// Turn down readings whose normalised innovation squared (column nis) is above X, two in a row at most; 10.8
     /// is one in a thousand by chance
     #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = positive)]
     pub gate: Option<f64>,
-    /// How surprising readings are taken: redescending:K, the less the farther beyond K standard deviations, huber:K,
+    /// Influence of surprising readings: redescending:K, the less the farther beyond K standard deviations, huber:K,
     /// student-t:DOF, or none, as they are [default: redescending:3]
     #[arg(long, value_name = "redescending:K|huber:K|student-t:DOF|none")]
     pub influence: Option<BoundedInfluence>,
-    /// What to do without, separated by commas, to compare; may be given several times
+    /// Parts to leave out, separated by commas, to compare; may be given several times
     #[arg(long, value_enum, value_name = "WHAT", value_delimiter = ',')]
     pub without: Vec<Without>,
     /// Units of the recording's columns
@@ -61,7 +61,8 @@ pub enum Without {
     Correction,
     /// Turning down readings that are far from those of the calibration, or come again and again
     Plausibility,
-    /// Where readings jump, following what was known before any reading again (smoothers never do)
+    /// The second look after a jump of the readings, which also follows the knowledge from before any reading
+    /// (smoothers never do)
     SecondLook,
     /// Wider intervals at a start, after a fault, and outside of the calibration
     Doubts,

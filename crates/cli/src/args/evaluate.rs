@@ -28,8 +28,8 @@ pub struct EvaluateArgs {
     /// Score rows with time_s >= T only; the filter still starts at the first row
     #[arg(long, value_name = "T", allow_negative_numbers = true, value_parser = finite, conflicts_with = "split")]
     pub from: Option<f64>,
-    /// What the rested, unstretched sensor reads: a number in the readings' unit, first:N for the median of each recording's
-    /// first N readings, or calibrated; what the estimates are compared with has its readings scaled alike. Without this flag
+    /// Reading of the rested, unstretched sensor: a number in the readings' unit, first:N for the median of each
+    /// recording's first N readings, or calibrated; the baselines have their readings scaled alike. Without this flag
     /// R₀ follows the readings, as in filter
     #[arg(long, value_name = "OHM|first:N|calibrated", allow_negative_numbers = true)]
     pub rest_resistance: Option<RestResistance>,

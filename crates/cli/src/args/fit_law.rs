@@ -37,7 +37,7 @@ pub struct FitLawArgs {
     /// Print JSON
     #[arg(long)]
     pub json: bool,
-    /// How tables are printed; CSV has all digits, and a column of standard errors for each parameter
+    /// Form of tables; CSV has all digits, and a column of standard errors for each parameter
     #[arg(long, value_enum, default_value_t = TableFormat::Text, conflicts_with = "json")]
     pub format: TableFormat,
     /// Also write a plot of each fit as SVG, with what is drawn as CSV, to this folder

@@ -26,7 +26,7 @@ pub struct FleetFitArgs {
     /// Calibrated sensors of one make, at least three
     #[arg(required = true, value_name = "sensor.toml")]
     pub sensors: Vec<PathBuf>,
-    /// Where to write what they have in common
+    /// File to write the prior to
     #[arg(short, long, value_name = "prior.toml")]
     pub output: PathBuf,
     /// Permission to replace files

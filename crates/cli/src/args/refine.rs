@@ -15,7 +15,7 @@ pub struct RefineArgs {
     /// The sensor's parameters: its law stays, its noise and motion are where the search starts
     #[arg(long, value_name = "sensor.toml")]
     pub sensor: PathBuf,
-    /// Where to write the refined parameters
+    /// File to write the refined parameters to
     #[arg(short, long, value_name = "refined.toml")]
     pub output: PathBuf,
     /// Permission to replace files

@@ -38,7 +38,7 @@ pub struct SimulateArgs {
     /// Illustrative material: ecoflex-00-30, ecoflex-00-50, vytaflex-10 or representative
     #[arg(long, default_value = "ecoflex-00-30")]
     pub material: Material,
-    /// What the bench does: extend-retract, extend-hold, load-steps, long-holds or mixed
+    /// Movements of the bench: extend-retract, extend-hold, load-steps, long-holds or mixed
     #[arg(long, default_value = "extend-hold")]
     pub protocol: Protocol,
     /// Largest elongation of the 30 mm sensor, mm
