@@ -27,7 +27,7 @@ pub struct LiveFilter {
 struct Running {
     filter: ohmstrain::Filter,
     watch: Watch,
-    /// What the rested sensor reads, if not what it read in calibration.
+    /// Reading of the rested sensor, if it differs from that in calibration.
     rest_resistance: Option<f64>,
 }
 

@@ -8,7 +8,7 @@ use wasm_bindgen::prelude::*;
 use crate::calibration::estimator;
 use crate::json::{json, refused};
 
-/// How a filter is to be; each has a default.
+/// Options of a filter; each has a default.
 #[derive(Debug, Default, Deserialize)]
 #[serde(default, rename_all = "camelCase", deny_unknown_fields)]
 pub struct Wishes {
@@ -19,7 +19,7 @@ pub struct Wishes {
 }
 
 impl Wishes {
-    /// Of an object, or of nothing.
+    /// Parses the options from an object, or from nothing.
     pub fn of(value: &JsValue) -> Result<Self, String> {
         if value.is_undefined() || value.is_null() {
             return Ok(Self::default());

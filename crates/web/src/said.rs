@@ -1,4 +1,4 @@
-//! What is said of files: the flags of `ohmstrain import`, as a shell takes them.
+//! Answers about files: the flags of `ohmstrain import`, as a shell takes them.
 
 use std::fmt::Display;
 use std::str::FromStr;

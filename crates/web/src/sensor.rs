@@ -18,7 +18,7 @@ use crate::stream::Stream;
 #[derive(Clone)]
 pub struct Sensor {
     sensor: ohmstrain::Sensor,
-    /// What its calibration said, if it was made here.
+    /// Facts about its calibration, if it was made here.
     facts: Vec<(&'static str, String)>,
     tested: Option<Tested>,
 }
@@ -56,7 +56,7 @@ impl Sensor {
         self.sensor.to_toml().map_err(|error| refused(format!("cannot write parameters: {error}")))
     }
 
-    /// What it estimates and reads, and how.
+    /// Describes its quantity, its readings and its estimators.
     #[wasm_bindgen(unchecked_return_type = "SensorDescription")]
     pub fn described(&self) -> Result<JsValue, JsError> {
         let params = self.sensor.params();

@@ -5,9 +5,9 @@ use ohmstrain_bench_data::{BadContent, Line, LineParser};
 /// Between lines that arrive at once, s: two digits above what is written.
 const LEAST_STEP_S: f64 = 1e-4;
 
-/// Where the times of lines come from.
+/// Source of the lines' times.
 enum Clock {
-    /// From the lines.
+    /// Times in the lines themselves.
     Own,
     /// A cell of the lines counts milliseconds.
     Milliseconds(usize),
