@@ -1,4 +1,4 @@
-//! How well can it be done at all? No estimator has a smaller mean squared error than the posterior Cramér-Rao bound
+//! Comparison with the least possible error. No estimator has a smaller mean squared error than the posterior Cramér-Rao bound
 //! (Tichavský, Muravchik, Nehorai, *IEEE Trans. Signal Process.* 46 (1998) 1386). With the phase known, constant gains
 //! and no limits the sensor's state moves linearly, and the bound's recursion is exact:
 //! `J' = (Q + F J⁻¹ Fᵀ)⁻¹ + E[H Hᵀ]/R`, in the form that also takes a singular Q. The gauge curve bends, but its slope

@@ -1,4 +1,4 @@
-//! What the direction of motion leaves open: its mean and variance against simulations of the continuous law, written out
+//! Path that the direction of motion leaves open: its mean and variance against simulations of the continuous law, written out
 //! here or in `own_law`, and the coverage of intervals at any sampling rate.
 
 use ohmstrain_ekf::{Belief, Ekf, Estimator, Hypotheses, Mixture, SignSplit, State, Substeps};
@@ -216,8 +216,8 @@ fn after_a_short_pause_hypotheses_are_as_wide_as_motions_make_them() {
     }
 }
 
-/// What a body does while nothing is read is as likely one way as the other, and says nothing of what it did before: a
-/// smoother comes back to where the pause began with what was known there, but for what merging hypotheses blurs (5 %).
+/// A body's motion during a pause is as likely one way as the other, and carries no information on the motion before: a
+/// smoother returns to the beginning of the pause with the knowledge there, except for the blur of merged hypotheses (5 %).
 #[test]
 fn a_pause_forgets_the_direction_and_a_smoother_comes_back_through_it() {
     let model = sensor(Moves::Ou);

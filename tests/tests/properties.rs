@@ -1,4 +1,4 @@
-//! What every estimator keeps, whatever the recording: units are arbitrary, a missing reading is a prediction, and a step
+//! Properties of every estimator, whatever the recording: units are arbitrary, a missing reading is a prediction, and a step
 //! is as good as two halves.
 
 use nalgebra::{DMatrix, SVector};
@@ -44,7 +44,7 @@ struct Units {
 const PLAIN: Units = Units { strain: 1.0, reading: 1.0 };
 
 impl Units {
-    /// What a state is multiplied with: strain, rate, two branches, baseline.
+    /// Returns the factors on a state: strain, rate, two branches, baseline.
     fn of_state(self) -> SVector<f64, 5> {
         SVector::from([self.strain, self.strain, self.reading, self.reading, self.reading])
     }
@@ -161,7 +161,7 @@ fn mixtures(units: Units, rows: &[Row]) -> Vec<(State, [f64; 3])> {
     all
 }
 
-/// Whether two beliefs agree within a share of the standard deviations.
+/// True if two beliefs agree within a share of the standard deviations.
 fn alike<const N: usize, const L: usize>(a: &Belief<f64, N, L>, b: &Belief<f64, N, L>, tolerance: f64) -> bool {
     let sd = |i: usize| b.covariance[(i, i)].sqrt();
     (0..N).all(|i| {

@@ -1,4 +1,4 @@
-//! What `calibrate` says at its end.
+//! Summary at the end of `calibrate`.
 
 use crate::common::{Bench, CALIBRATED_UNTIL, Csv, SIMULATE, change_rows};
 use serde_json::Value;

@@ -1,4 +1,4 @@
-//! What sensors of one make teach the next one.
+//! Priors from sensors of one make for the next one.
 
 use crate::common::Bench;
 use serde_json::Value;
