@@ -50,7 +50,7 @@ pub enum State {
     Done,
     /// The output was there before.
     Kept,
-    /// There is no output, or `evaluate --check` found it wanting.
+    /// No output, or one that `evaluate --check` found wanting.
     #[default]
     Failed,
 }
