@@ -56,7 +56,7 @@ impl<M> Ekf<M> {
         &self.model
     }
 
-    /// Predicts `dt_s ≥ 0` seconds ahead, in as many steps as the model asks for, then takes the reading.
+    /// Predicts `dt_s ≥ 0` seconds ahead, in as many steps as the model needs, then takes the reading.
     ///
     /// # Errors
     /// See [`StepError`]; the belief passed in is untouched.

@@ -47,7 +47,7 @@ pub struct Settling<T> {
     pub sd: T,
 }
 
-/// Hold, s, of a sensor whose holds nobody has seen.
+/// Hold, s, of a sensor without holds in its calibration.
 const UNSEEN_HORIZON_S: f64 = 60.0;
 
 impl<T: Real> Settling<T> {

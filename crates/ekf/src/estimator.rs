@@ -17,7 +17,7 @@ pub trait Estimator<T: Scalar, const N: usize, const L: usize> {
     fn prepare(&self, dt_s: T) -> Self::Prepared;
 
     /// The longest step, s, over which a prediction is as good as many short ones; [`Substeps`](crate::Substeps) divides longer
-    /// ones. Infinite unless the estimator says otherwise.
+    /// ones. Infinite by default.
     fn longest_step_s(&self) -> T {
         T::one() / T::zero()
     }

@@ -62,7 +62,7 @@ pub enum ReadingVerdict {
     Readmitted,
     /// Nothing that this sensor can read: no reading at all, however often it comes.
     Implausible,
-    /// The same number for longer than a working sensor repeats itself; it says nothing new.
+    /// The same number for longer than a working sensor repeats itself; it carries no new information.
     Stuck,
 }
 

@@ -25,8 +25,8 @@
 //! its vectors; `adskalman` hands linearised steps to that crate. Off by default and
 //! without std:
 //! - `serde`: [`Belief`], mixtures, [`Estimate`], [`Gaussian`], readings, innovations, verdicts of readings and errors as plain data;
-//!   and [`live::Memory`], all that a running filter knows. A belief that comes back is not checked; the step that it cannot take is
-//!   refused. What is made by constructors that check is left out.
+//!   and [`live::Memory`], the whole state of a running filter. A belief that comes back is not checked; a step that it cannot take is
+//!   refused. Values made by constructors that check are left out.
 //! - `defmt`: `Format` for beliefs and what goes with them, but not for mixtures. It takes no text from the target, only numbers.
 //!
 //! ```

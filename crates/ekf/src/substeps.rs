@@ -4,7 +4,7 @@ use crate::{Advanced, Estimator, Innovation, Reading, StepError};
 
 /// An estimator that takes a long step as several short ones.
 ///
-/// How long a step may be is for the estimator to say ([`Estimator::longest_step_s`]); the steps of a long pause grow with it
+/// The estimator determines the longest step ([`Estimator::longest_step_s`]); the steps of a long pause grow with it
 /// ([`Pause`]).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Substeps<E>(pub E);
@@ -25,7 +25,7 @@ impl<P, T: Copy> Repeated<P, T> {
     }
 }
 
-/// A step of the longest length shall be one step, whatever rounding says.
+/// Tolerance of rounding, so that a step of the longest length is one step.
 pub const GRACE: f64 = 1.0005;
 /// Largest number of steps of the longest length up to which a pause is divided evenly.
 pub const EVENLY: f64 = 4.0;

@@ -12,8 +12,8 @@ pub trait Dynamics<T: Scalar, const N: usize, const L: usize> {
     /// Prepares steps of `dt_s ≥ 0` seconds.
     fn prepare(&self, dt_s: T) -> Self::Prepared;
 
-    /// The longest step, s, over which [`Self::transition`] is as good as many short ones; infinite unless the model says
-    /// otherwise.
+    /// The longest step, s, over which [`Self::transition`] is as good as many short ones; infinite by
+    /// default.
     fn longest_step_s(&self) -> T {
         T::one() / T::zero()
     }

@@ -253,8 +253,8 @@ impl<'a> FilterBuilder<'a> {
         Ok(LaggedFilter::new(self.kernel(kind)?, lag_s))
     }
 
-    /// A filter that goes on from where another one of the same sensor and options was stored, to the bit. R₀ and strains that were
-    /// known are those of then; what is told here counts from now on.
+    /// Builds a filter that resumes where another one of the same sensor and options was stored, to the bit. R₀ and known strains
+    /// are those of the state; those given here count from now on.
     ///
     /// # Errors
     /// If the state is of another sensor, of other options or of another version, or an initial strain is given: the first row is over.
@@ -321,7 +321,7 @@ impl<'a> FilterBuilder<'a> {
         Ok(Kernel { filter, rows: RowWriter { scale, errors }, known, made_of })
     }
 
-    /// The scale of the rows, with R₀ as it is told.
+    /// Returns the scale of the rows, with R₀ as given.
     pub(crate) fn scale(self) -> Result<Scale, Error> {
         let mut scale = Scale::new(self.sensor)?;
         self.rest_resistance.map_or(Ok(()), |measured| scale.rest_at(measured))?;

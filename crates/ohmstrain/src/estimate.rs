@@ -164,7 +164,7 @@ impl Scale {
         Ok(Gaussian { mean: strain, variance: sd * sd })
     }
 
-    /// The row of a reading and what the filter says of it.
+    /// Returns the row of a reading and the filter's output.
     pub(crate) fn row(&self, time_s: f64, reading: Reading, output: &Output) -> Estimate {
         let rest_reading = self.rest_reading * (1.0 + output.rest_off);
         let estimate = &output.estimate;

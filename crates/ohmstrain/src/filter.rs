@@ -27,13 +27,13 @@ pub(crate) struct RowWriter {
 }
 
 impl RowWriter {
-    /// The row of a reading and what the filter says of it.
+    /// Returns the row of a reading and the filter's output.
     fn row(&mut self, row: (f64, Reading), output: &Output) -> Estimate {
         self.errors.restate(row.0, output.estimate.strain);
         self.known_row(row, output)
     }
 
-    /// The row of what is said, with what is known of its error.
+    /// Returns the row of an output, corrected by known errors.
     fn known_row(&self, (time_s, reading): (f64, Reading), said: &Output) -> Estimate {
         let mut output = *said;
         output.estimate.strain = self.errors.correct(time_s, said.estimate.strain);
@@ -42,7 +42,7 @@ impl RowWriter {
 }
 
 impl Kernel {
-    /// R₀ is told: nothing follows any more.
+    /// Sets R₀, which no longer follows the readings.
     fn rest_resistance(&mut self, measured: f64) -> Result<(), Error> {
         self.rows.scale.rest_at(measured)?;
         self.filter.rest(measured).map_err(Error::Step)?;
@@ -71,7 +71,7 @@ impl Kernel {
         Ok(())
     }
 
-    /// A strain is known, of which something was said.
+    /// Takes a known strain, with the estimate at that time.
     fn know(&mut self, strain: KnownStrain) {
         self.rows.errors.tell(strain);
         self.filter.settle();
@@ -90,7 +90,7 @@ impl Kernel {
 /// ```
 pub struct Filter {
     kernel: Kernel,
-    /// Time and reading of the last row, and what was said of it before known strains.
+    /// Time and reading of the last row, and its output before known strains.
     last: Option<(f64, Reading, Output)>,
 }
 
@@ -129,9 +129,9 @@ impl Filter {
         Ok(row)
     }
 
-    /// Takes in that the strain (or angle) is known now, to `sd`: the estimate of the last row, or of the first one if there is
-    /// none yet, and those after it follow. What the error was then counts for seconds, and for an hour as far as more than one known
-    /// strain, or one that is far from what was said, show an offset or another gain.
+    /// Takes a known strain (or angle), as of now, to `sd`: the estimate of the last row, or of the first one if there is
+    /// none yet, and those after it follow. The error at that time counts for seconds, and for an hour as far as more than one known
+    /// strain, or one that is far from the estimate, shows an offset or another gain.
     ///
     /// # Errors
     /// If the strain lies beyond the limits by more than a tenth of them, or `sd` is not positive. The filter stays as it was.

@@ -45,7 +45,7 @@ impl LagDoubt {
 }
 
 impl Recording<'_> {
-    /// Asks whether the reference is on the clock of the readings; `None` if it is, as far as the readings tell.
+    /// Checks that the reference is on the clock of the readings; returns `None` if it is, as far as the readings tell.
     ///
     /// ```
     /// let recording = ohmstrain::Recording::new(&[0.0, 0.1], &[1600.0, 1610.0], &[0.00, 0.01])?;

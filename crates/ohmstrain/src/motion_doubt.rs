@@ -7,7 +7,7 @@ use crate::calibration_doubt::CalibrationDoubt;
 use crate::recording::Recording;
 use crate::unit_doubt::quantile;
 
-/// A reference that says one number for so long, s, in so many rows, may be frozen.
+/// Time, s, and number of rows after which a constant reference may be frozen.
 const FROZEN_S: f64 = 5.0;
 const FROZEN_ROWS: usize = 40;
 /// Readings of a body at rest relax in one direction, but for how they begin: this share of a still part is passed over.

@@ -17,8 +17,8 @@ impl Pauses {
         Self { unread, before_s, next: None }
     }
 
-    /// Widens what a segment of the rows says where it has no readings: the strain moves from the last one and to the next
-    /// one. How long before the segment the last one was is not known, but only at its beginning.
+    /// Widens the estimates of a segment in rows without readings: the strain moves from the last one and to the next
+    /// one. The time since the last reading before the segment is unknown, but only at its beginning.
     pub(crate) fn widen(&mut self, rows: Range<usize>, time_s: impl Fn(usize) -> f64, outputs: &mut [Output]) {
         let mut until_s = vec![0.0; outputs.len()];
         for (k, (until_s, output)) in rows.clone().zip(until_s.iter_mut().zip(outputs.iter())).rev() {

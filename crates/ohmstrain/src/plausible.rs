@@ -13,7 +13,7 @@ const UNIT_RATIO: f64 = 20.0;
 const REST_RATIO: f64 = 1.3;
 const GAUGE_RATIO: f64 = 3.0;
 
-/// Strains beyond this are taken for percent until somebody says that they are none: four times its own length.
+/// Largest strain that is not taken for percent, unless the unit is known: four times the sensor's own length.
 const LARGEST_STRAIN: f64 = 3.0;
 /// Above a strain of one, readings that change by less than this per strain are taken for it, too.
 const LEAST_GAUGE: f64 = 0.05;

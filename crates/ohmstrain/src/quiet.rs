@@ -17,7 +17,7 @@ const PAUSE_S: f64 = 5.0;
 /// Questions in a run, at most.
 const MOST: usize = 3;
 
-/// Watches for long holds that may be rests: what the strain is then somebody may know.
+/// Watch for long holds that may be rests, whose strain the user may know.
 ///
 /// ```
 /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
@@ -67,7 +67,7 @@ struct Hold {
 pub struct Quiet {
     /// Start of the hold, s.
     pub from_s: f64,
-    /// The row at which somebody is asked, s.
+    /// Time of the row at which the question is asked, s.
     pub now_s: f64,
     /// Estimated strain.
     pub strain: f64,

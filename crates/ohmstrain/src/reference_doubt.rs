@@ -33,7 +33,7 @@ pub struct ReferenceDoubt {
 impl std::error::Error for ReferenceDoubt {}
 
 impl Sensor {
-    /// Asks whether a reference is in the calibration's unit: fractions, not percent. Angles are not asked about.
+    /// Checks that a reference is in the calibration's unit: fractions, not percent. Angles are not checked.
     ///
     /// # Errors
     /// If it is a hundred times too large, or too small.

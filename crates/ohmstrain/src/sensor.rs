@@ -195,7 +195,7 @@ impl Sensor {
         Ok(self)
     }
 
-    /// Asks whether the rested sensor can read `measured`.
+    /// Checks that the rested sensor can read `measured`.
     ///
     /// # Errors
     /// If it is not positive, or farther from what the rested sensor read in calibration than by a factor of
@@ -268,8 +268,8 @@ impl Sensor {
         Header::of(&self.params).columns().collect()
     }
 
-    /// Asks whether readings are in the calibration's unit, by their median. `rest_resistance` is what the rested sensor
-    /// reads now, if it is not what it read in calibration.
+    /// Checks that readings are in the calibration's unit, by their median. `rest_resistance` is the present reading of the rested
+    /// sensor, if it differs from that in calibration.
     ///
     /// # Errors
     /// If they are far from those of the calibration, and would not be in another unit.

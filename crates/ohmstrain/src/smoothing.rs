@@ -93,7 +93,7 @@ impl FilterBuilder<'_> {
         Ok(KnownOfAll::new(scale.limits(), known.into_iter().map(|known| known.1).collect()))
     }
 
-    /// Smooths; `known` is shown row, time, s, and what is said of its strain, and says what is known of that.
+    /// Smooths; `known` gets row, time, s, and estimated strain, and returns the strain corrected by known ones.
     fn smooth_with<E: From<Error>>(
         self,
         len: usize,

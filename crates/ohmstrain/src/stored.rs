@@ -16,7 +16,7 @@ const FORMAT: u32 = 1;
 
 /// A running filter between two rows: the content of a state file. [`Filter::store`](crate::Filter::store) makes it.
 ///
-/// It says of which sensor, options and version it is, and goes on with those alone.
+/// It names its sensor, options and version, and resumes with those alone.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Stored {
@@ -109,7 +109,7 @@ pub(crate) struct MadeOf {
     pub options: StoredOptions,
 }
 
-/// Options of a filter, as flags say them.
+/// Options of a filter, in the form of flags.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct StoredOptions {
@@ -283,7 +283,7 @@ impl Stored {
     }
 }
 
-/// FNV-1a of the parameters' text: tells sensors apart that were exchanged, not those that somebody forged.
+/// Returns the FNV-1a hash of the parameters' text: it detects exchanged sensors, not forged ones.
 fn fingerprint(params: &SensorParams) -> String {
     let text = toml::to_string(params).unwrap_or_default();
     let step = |hash: u64, byte: u8| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);

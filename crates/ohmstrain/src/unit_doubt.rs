@@ -1,6 +1,6 @@
 use ohmstrain_sensor::{ReadingUnit, SensorParams};
 
-/// Median readings below this, Ω, are taken for kΩ until somebody says that they are none.
+/// Least median reading, Ω, that is not taken for kΩ, unless the unit is known.
 pub(crate) const LEAST_OHM: f64 = 20.0;
 
 /// Readings may go this far beyond those of the calibration, and in another unit they would not: sensors of one kind differ

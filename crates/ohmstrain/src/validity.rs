@@ -24,10 +24,10 @@ pub struct ValidityWatch {
     validity: Validity,
     quantity: Quantity,
     reading: &'static str,
-    /// Readings that calibration has seen, moved to the R₀ that is told, and whether none is.
+    /// Calibrated range of readings, moved to the given R₀; and true if none is given.
     readings: (f64, f64),
     follows: bool,
-    /// `None` where calibration knows one session only, or R₀ is told.
+    /// Session; `None` if calibration knows one session only, or R₀ is given.
     session: Option<Session>,
     start_s: Option<f64>,
     long: bool,
@@ -215,8 +215,8 @@ impl ValidityWatch {
         }
     }
 
-    /// Takes a row and says what there is to say: the reading as recorded, the estimated rate, and the true strain; NaN for
-    /// what is missing. An uncertain rate is estimated near zero, so that a high one means something.
+    /// Takes a row and returns new warnings: the reading as recorded, the estimated rate, and the true strain; NaN for
+    /// missing values. An uncertain rate is estimated near zero, so that a high one means something.
     ///
     /// ```
     /// # let text = std::fs::read_to_string("examples/sensor.toml")?;

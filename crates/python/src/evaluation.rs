@@ -64,7 +64,7 @@ fn fitted(recording: &Recording, rows: usize) -> Result<Baselines, CalibrationEr
     Baselines::fit(&screen(&samples)?.samples())
 }
 
-/// The published law, fitted to the rows before `rows` and told the phases.
+/// Fits the published law to the rows before `rows`, and gives it the phases.
 fn published(recording: &Recording, rows: usize, truth: &[f64]) -> Option<impl Baseline> {
     let (time_s, reading, strain) = recording.until(rows);
     let samples = [Samples::new(time_s, reading, strain.unwrap_or(&[])).ok()?];

@@ -100,7 +100,7 @@ struct Rows<'a> {
 }
 
 impl Rows<'_> {
-    /// The value that the filter runs with, and what is told of it under its `path` in the sensor's file.
+    /// Adds the value that the filter runs with, and its uncertainty under its `path` in the sensor's file.
     fn fitted(&mut self, name: &str, path: &str, value: f64, unit: &str) {
         let place = self.uncertainty.and_then(|known| known.names.iter().position(|name| name == path));
         self.found.extend(place);

@@ -157,7 +157,7 @@ fn no_rows(whole: &Recording, choices: &Choices) -> String {
     )
 }
 
-/// The sensor behind recordings: rows that nobody can trust are left out first, and doubts are answered.
+/// Calibrates a sensor on recordings: untrustworthy rows are left out first, and doubts are answered.
 fn of_recordings(
     recordings: &[Recording],
     calibration: Calibration,

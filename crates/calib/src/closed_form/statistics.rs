@@ -5,8 +5,8 @@ use super::law::{Parameter, SeparableLaw};
 use super::projection::Projection;
 use super::search::Search;
 
-/// Directions whose singular value is below this share of the largest are not told by the data: the square root of the
-/// rounding error, beyond which the variance itself is rounding.
+/// Threshold on a singular value, as a share of the largest, below which the data do not determine its direction: the square root of
+/// the rounding error, beyond which the variance itself is rounding.
 const TOLD: f64 = 1.5e-8;
 /// A parameter has no standard error if its share of an untold direction is above this.
 const INVOLVED: f64 = 1e-3;

@@ -52,7 +52,7 @@ pub(super) struct Sums {
     own: Vec<Normal>,
     all: Normal,
     recordings: Vec<Range<usize>>,
-    /// Share of a row that no neighbour has told.
+    /// Share of a row's information that its neighbours do not have.
     share: f64,
 }
 

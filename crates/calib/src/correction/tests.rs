@@ -262,8 +262,8 @@ fn surprise(error: &DVector<f64>, covariance: &DMatrix<f64>) -> f64 {
     0.5 * (error.dot(&(inverse * error)) + logs)
 }
 
-/// Costs of two settings differ as negative logarithms of densities do that are summed over blocks which a process that was never
-/// told of them predicts, each with the prior variance that makes the sum least.
+/// Costs of two settings differ by the negative logarithms of densities, summed over held-out blocks. A process that never had these
+/// blocks predicts them, each with the prior variance that minimises the sum.
 #[test]
 fn settings_are_judged_by_evidence_and_by_what_was_left_out() {
     const ROWS: usize = 23;

@@ -10,7 +10,7 @@ use crate::order::sorted;
 use crate::samples::Samples;
 use ohmstrain_sensor::LawParams;
 
-/// Percentile intervals of a law's parameters from recordings whose blocks were drawn anew.
+/// Percentile intervals of a law's parameters from recordings whose blocks were resampled.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Bootstrap {
     /// Names of the parameters.

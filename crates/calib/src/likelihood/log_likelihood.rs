@@ -36,7 +36,7 @@ pub struct ReadingsLikelihood<T> {
     pub readings: usize,
 }
 
-/// The log-likelihood of recordings that start anew each. Parameters are on their natural scale.
+/// Returns the log-likelihood of recordings; the filter restarts for each. Parameters are on their natural scale.
 pub(super) fn log_likelihood<T, F, const N: usize, const L: usize>(
     family: &F,
     parameters: &[T],

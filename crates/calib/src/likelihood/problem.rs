@@ -14,7 +14,7 @@ use ohmstrain_sensor::LawParams;
 /// The strain is not needed. In exchange the law is trusted: its error goes into whatever noise fits it best.
 #[derive(Clone, Copy, Debug)]
 pub struct LikelihoodProblem<'a> {
-    /// Recordings; each starts anew.
+    /// Recordings; the filter restarts for each.
     pub recordings: &'a [ReadingSeries<'a>],
     /// The law; at most four branches.
     pub law: &'a LawParams,

@@ -150,7 +150,7 @@ impl<'a, F: ModelFamily<N, L>, const N: usize, const L: usize> Walk<'a, F, N, L>
         }
     }
 
-    /// Computes the Hessian anew where the updates have led astray.
+    /// Computes the Hessian again where the updates have led astray.
     fn exact_hessian(&mut self) -> Option<()> {
         let here = derivatives(self.likelihood.family, &self.point, self.likelihood.recordings).ok()?;
         self.hessian = sub_matrix(&here.hessian, &self.free);

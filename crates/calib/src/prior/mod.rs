@@ -26,7 +26,7 @@ use ohmstrain_sensor::{EstimatorKind, Quantity, Validity};
 
 /// Version of the file that a prior is written to.
 pub const PRIOR_FORMAT: u32 = 2;
-/// Sensors that a spread can be told from.
+/// Least number of sensors from which a spread can be estimated.
 pub(crate) const FEWEST_SENSORS: usize = 3;
 
 /// The content of `prior.toml`.

@@ -57,7 +57,7 @@ impl Probe {
         self.normal.solve(&self.columns.tr_mul(&said))
     }
 
-    /// Covariance of those weights from that of the law's parameters; parameters that are not told are taken for known.
+    /// Returns the covariance of those weights from that of the law's parameters; undetermined parameters are taken for known.
     pub(super) fn errors(&self, law: &LawParams, told: &Uncertainty) -> DMatrix<f64> {
         let mut slopes = DMatrix::zeros(self.columns.ncols(), told.names.len());
         for (j, name) in told.names.iter().enumerate() {

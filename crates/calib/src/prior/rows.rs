@@ -109,7 +109,7 @@ mod tests {
         }
     }
 
-    /// The same low-pass at the same reading, whatever scale it is told on.
+    /// Tests that a low-pass at one reading is the same on any scale.
     #[test]
     fn starts_are_moved_with_the_scale() {
         let (centre, half_range, start) = (0.3, 0.25, [0.3, 0.4]);

@@ -39,7 +39,7 @@ pub enum Doubt {
         /// The median of the rows around.
         around: f64,
     },
-    /// Reading and reference do not go together: which of them is wrong cannot be told.
+    /// Reading and reference that do not go together: it is unknown which of them is wrong.
     Law {
         /// Distance from the preliminary law in robust deviations.
         deviations: f64,

@@ -273,7 +273,7 @@ struct Sink<'a, W: io::Write + Send> {
     file: String,
     /// Name of the recording's header in messages.
     header: String,
-    /// Not a file but standard input or a pipe: somebody waits for each row.
+    /// True for standard input or a pipe, where a reader waits for each row.
     live: bool,
     /// The first known readings of a live stream.
     early: Vec<f64>,

@@ -94,7 +94,7 @@ struct Heard {
     others: usize,
 }
 
-/// Listens until there are steps enough, from a board's first one on.
+/// Reads until there are steps enough, from a board's first one on.
 fn listen(args: &SerialCheckArgs) -> Result<Heard, CliError> {
     let name = args.port.display().to_string();
     let ends = is_stdin(&args.port) || args.port.is_file();

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use super::{Claim, Kind, Outputs, is_stdout};
 use crate::error::CliError;
 
-/// Bytes that are written at once, unless somebody waits for them.
+/// Bytes that are written at once, unless a reader waits for them.
 const WRITTEN_AT_ONCE: usize = 1 << 16;
 
 /// Destination of estimates.

@@ -1,8 +1,8 @@
 //! Outputs that are not whole yet: files and folders beside their places, under names of this program's own, each locked by
 //! who writes it.
 //!
-//! An interrupt (SIGINT) or a request to end (SIGTERM) removes them. What a killed process or a power cut has left behind is
-//! known by its name and by a lock that nobody holds: the next output in the same folder removes it.
+//! An interrupt (SIGINT) or a request to end (SIGTERM) removes them. Remains of a killed process or a power cut are
+//! recognised by their name and by a lock without a holder: the next output in the same folder removes them.
 
 use std::fs::{self, File, Permissions};
 use std::io;
@@ -116,7 +116,7 @@ fn hold(lock: &File, path: &Path) -> bool {
     lock.lock().is_err() || path.exists()
 }
 
-/// Before the first output in a folder: removes what nobody will finish.
+/// Prepares the first output in a folder: removes the remains of processes that have ended.
 fn prepare(folder: &Path) {
     heed_signals();
     if begun().iter().any(|path| folder_of(path) == folder) {

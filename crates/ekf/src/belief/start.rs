@@ -2,7 +2,7 @@ use ohmstrain_model::{Scalar, SwitchedModel};
 
 use super::Belief;
 
-/// A sensor's model as something that knows what a filter carries: `N` and `L` follow from the model, and need not be said.
+/// Model of a sensor that determines a filter's state: `N` and `L` follow from the model, and need not be given.
 ///
 /// For up to four branches, with a baseline ([`WithBaseline`](ohmstrain_model::WithBaseline)) and without.
 ///

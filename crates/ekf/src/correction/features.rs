@@ -88,7 +88,7 @@ impl<T: Recordable> ReadingFeatures<T> {
         self.step_with(dt_s, reading, |waited_s| TIME_CONSTANTS_S.map(|tau_s| Decay::over(waited_s, T::of(tau_s))))
     }
 
-    /// The same, where `decays` says what low-passes forget over a time, s.
+    /// Takes a step as [`Self::step`] does, with the `decays` of the low-passes over a time, s.
     pub fn step_with(
         &mut self,
         dt_s: T,

@@ -1,7 +1,7 @@
 use crate::Recordable;
 
 /// Exponential low-pass, τ L′ = y − L, exact for readings that move linearly from one known reading to the next, however
-/// long the step. It starts settled on the first reading, unless it is told where.
+/// long the step. By default it starts settled on the first reading.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LowPass<T> {
     tau_s: T,

@@ -1,12 +1,12 @@
 //! The learned correction: strain from a filter's outputs and the readings' recent past, by two Gaussian processes.
 //!
-//! The law's error is systematic, and what it leaves of the strain can be learned from the rows that a sensor was
-//! calibrated on. A *direct* process says strain from features of the readings alone; a *residual* process says what the
-//! filter's strain lacks, from what the filter says and the same features. A smoother has two more direct processes, one
+//! The law's error is systematic, and the strain's error that it causes can be learned from the rows that a sensor was
+//! calibrated on. A *direct* process predicts strain from features of the readings alone; a *residual* process predicts the error
+//! of the filter's strain, from the filter's outputs and the same features. A smoother has two more direct processes, one
 //! of the readings' past and one of their future: neither is as easily led astray by a motion that begins as a known one
-//! and ends as none. They say their [`consensus`]. Far from the training rows the residual process says what the
-//! filter says, its variance is no smaller than the filter's, and the mixture's grows; so that a last process is heard there, which
-//! has learned what the law says of motions that the sensor was not seen in. It cannot lose its way as a filter can.
+//! and ends as another. Their predictions are combined by [`consensus`]. Far from the training rows the residual process returns the
+//! filter's strain, its variance is no smaller than the filter's, and the mixture's grows. There a last process counts, which
+//! has learned the law's answer to motions that the sensor was not seen in. It cannot lose its way as a filter can.
 //!
 //! # Policy
 //! - Configuration, borrowed as slices that may lie in flash, is apart from state ([`ReadingFeatures`]); no heap, no panic.

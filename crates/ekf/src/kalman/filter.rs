@@ -117,7 +117,7 @@ pub trait Filter<T: Scalar, const N: usize, const M: usize> {
         condition(prior, &self.reading_line(prior)?, reading)
     }
 
-    /// The same with the reading's line found anew, `iterations` times, around what the last one gave: the iterated
+    /// Updates with the reading's line found again, `iterations` times, around the last result: the iterated
     /// Kalman filter, Gauss and Newton's method for the most probable state. `update` is one iteration.
     ///
     /// # Errors

@@ -10,7 +10,7 @@ pub trait Curve<T: Scalar>: Copy {
     /// g(ε) and g′(ε).
     fn value_and_slope<V: Lanes<Number = T>>(&self, strain: V) -> (V, V);
 
-    /// The line that stands for g where strain has a variance: without a say in it, the tangent at the mean.
+    /// Returns the line that stands for g where strain has a variance; by default the tangent at the mean.
     #[inline(always)]
     fn line<V: Lanes<Number = T>>(&self, strain: V, _variance: V) -> CurveLine<V> {
         let (value, slope) = self.value_and_slope(strain);

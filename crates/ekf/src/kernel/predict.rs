@@ -98,7 +98,7 @@ impl<T: Scalar, S, const B: usize, const N: usize, G> SparseEkf<T, S, B, N, G> {
         self.predict_as(parts, course)
     }
 
-    /// The same with a switch of the caller's, which only an uncertain course asks: that of the filter may not know these lanes.
+    /// Predicts with a switch of the caller's, used by an uncertain course only: that of the filter may not work on these lanes.
     #[inline(always)]
     pub(crate) fn predict_as<V: Lanes<Number = T>, X: Switch<V>>(
         &self,
@@ -115,7 +115,7 @@ impl<T: Scalar, S, const B: usize, const N: usize, G> SparseEkf<T, S, B, N, G> {
         RateSpread::new(parts.rate_variance)
     }
 
-    /// Moves strain and rate, means and covariances of theirs, and says how the branches are driven meanwhile.
+    /// Moves strain and rate, with their means and covariances, and returns the drive of the branches meanwhile.
     #[inline(always)]
     pub(super) fn drive<V: Lanes<Number = T>, X: Switch<V>>(
         &self,

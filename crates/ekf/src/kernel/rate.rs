@@ -105,7 +105,7 @@ impl<T: Scalar> Gaussian<T> {
 }
 
 impl<V: Lanes, const B: usize> Parts<V, B> {
-    /// Draws the rate anew where a phase `begins`, independent of everything else.
+    /// Replaces the rate by a new one where a phase `begins`, independent of everything else.
     #[inline(always)]
     pub(crate) fn renew_rate(&mut self, fresh: Gaussian<V>, begins: V::Mask) {
         let zero = self.rate.nothing();

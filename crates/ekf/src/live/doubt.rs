@@ -22,7 +22,7 @@ pub struct DoubtNumbers {
     pub faster: f64,
     /// Share of the filter's variance, or of the doubt at a start, from which on a doubt is worth a flag.
     pub worth: f64,
-    /// Share of the span that a strain of none may have.
+    /// Tolerance around zero strain, as a fraction of the span.
     pub zero: f64,
 }
 
@@ -227,7 +227,7 @@ impl<T: Recordable> Doubts<T> {
         (self.fading, self.starts, self.unread_s, self.refused) = (T::zero(), false, T::zero(), false);
     }
 
-    /// R₀ of today has been told.
+    /// Restarts the watch: R₀ of the day is now given.
     pub fn told_rest(&mut self) {
         self.rest.iter_mut().for_each(RestWatch::told);
     }
@@ -330,10 +330,10 @@ impl<T: Recordable> Doubts<T> {
         });
     }
 
-    /// The strain's variance with all doubts, and flags that say so. Readings outside of calibration's are off in strain by some
-    /// multiple of what the mean slope says. Innovations that are larger than stated widen the interval as they would a weighted mean's (Birge,
-    /// *Phys. Rev.* 40 (1932) 207), unless a correction has counted them, and so does a rate beyond calibration's; to no more than is left open
-    /// without readings.
+    /// Returns the strain's variance with all doubts, and their flags. Readings outside the calibrated range widen it by a
+    /// multiple of their distance times the mean slope. Innovations that are larger than stated widen the interval as they would a weighted
+    /// mean's (Birge, *Phys. Rev.* 40 (1932) 207), unless a correction has counted them. So does a rate beyond calibration's. The variance
+    /// stays below that without readings.
     pub fn widened(&self, rate: T, variance: T) -> (T, Flags) {
         let (worth, most, per_reading) = (T::of(DOUBT.worth), self.parts.most, self.parts.per_reading);
         let faster = rate.abs() / self.parts.fastest_per_s;
@@ -372,7 +372,7 @@ mod tests {
 
     const STATED: Gaussian<f64> = Gaussian { mean: 0.1, variance: 1e-6 };
 
-    /// Readings of 0 to 1 for strains of 0 to 0.3, and a rest at the end that `sign` says.
+    /// Returns doubts for readings of 0 to 1 and strains of 0 to 0.3, with rest at the end given by `sign`.
     fn parts(sign: f64) -> DoubtParts<f64> {
         let anywhere = 0.3 * 0.3 / 12.0;
         let unread = Unread { rate_time_s: 1.0, path_variance: 1e-3, centre: 0.15, anywhere };

@@ -103,7 +103,7 @@ pub struct LiveFilter<T: Real, E: SensorEstimator<T, N, L>, C, const N: usize, c
     protections: Protections,
     /// Plausibility limits on a reading, under these protections.
     sieve: Sieve<T>,
-    /// R₀ of the law as it has been told.
+    /// R₀ of the law, moved by the measured reading at rest if one was given.
     rest_reading: T,
     /// Before any reading.
     fresh: E::State,
@@ -127,7 +127,7 @@ pub struct Memory<T, S> {
     /// The filter's variance at the last reading that it saw.
     known_variance: T,
     doubts: Doubts<T>,
-    /// `None` where R₀ is told, or does not follow.
+    /// Follower of R₀; `None` if R₀ is given, or does not follow.
     follower: Option<RestFollower<T>>,
 }
 
@@ -205,7 +205,7 @@ where
         &self.now.doubts
     }
 
-    /// R₀ as it is followed, minus the one that was calibrated or told, as a share of that.
+    /// Relative deviation of the followed R₀ from the calibrated or given one.
     pub fn rest_off(&self) -> T {
         self.now.follower.map_or(T::zero(), |follower| follower.off())
     }
@@ -231,8 +231,8 @@ where
         self.step_after(self.parts.dt_s, None)
     }
 
-    /// A reading in the unit of the calibration, with the standard deviation that its electronics add, as R/R₀ - 1 of the R₀ that
-    /// was calibrated, or told since.
+    /// Converts a reading in the unit of the calibration, with the standard deviation that its electronics add, to R/R₀ - 1 of the R₀ that
+    /// was calibrated, or given since.
     pub fn relative(&self, reading: T, reading_sd: T) -> Reading<T> {
         let sd = reading_sd / self.rest_reading;
         Reading { value: (reading - self.rest_reading) / self.rest_reading, extra_variance: sd * sd }
@@ -292,7 +292,7 @@ where
         self.row_after(dt_s, reading).map(|row| row.estimate)
     }
 
-    /// The same, with all that a row says.
+    /// Takes a row, and returns all of its results.
     ///
     /// # Errors
     /// As [`Self::step_after`].

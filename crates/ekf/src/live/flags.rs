@@ -40,7 +40,7 @@ pub enum Flag {
     RampBorder,
     /// The strain stands at a limit.
     AtLimit,
-    /// The filter has only just begun, where nobody said at which strain.
+    /// The filter has only just begun, at an unknown strain.
     StartUp,
     /// Readings have jumped, or come again after there were none to be believed: the estimate finds its way back.
     Recovering,
@@ -102,7 +102,7 @@ impl Flag {
 }
 
 impl Flags {
-    /// Nothing to say.
+    /// No flags.
     ///
     /// ```
     /// assert_eq!(ohmstrain_ekf::live::Flags::NONE.to_string(), "");

@@ -4,7 +4,7 @@ use super::{DoubtParts, RestBounds, Sieve};
 use crate::Recordable;
 use crate::correction::FeatureScale;
 
-/// Surroundings of the estimator in a [`LiveFilter`](super::LiveFilter): all that a calibration says of the sensor.
+/// Surroundings of the estimator in a [`LiveFilter`](super::LiveFilter): all of a sensor's calibration.
 #[derive(Clone, Copy, Debug)]
 pub struct LiveParts<T, C> {
     /// R₀ of the law, in the unit of the readings.

@@ -32,8 +32,8 @@ impl RestSeen<f64> {
     }
 }
 
-/// Watches readings for an R₀ that is not calibration's. Two things say so: a sensor that is known to rest and reads something
-/// else, and readings that stay where no strain leads, beyond those at rest. An R₀ that has grown is not told from a strain that
+/// Watch for an R₀ that is not calibration's. There are two signs: a sensor that is known to rest and reads something
+/// else, and readings that stay where no strain leads, beyond those at rest. An R₀ that has grown cannot be told from a strain that
 /// is held. A sensor that rests for a while where it rested in calibration ends it.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -101,7 +101,7 @@ impl<T: Recordable> RestWatch<T> {
         self.off
     }
 
-    /// R₀ of today has been told: what spoke against calibration's is gone.
+    /// Restarts the watch, since R₀ of the day is given.
     ///
     /// ```
     /// use ohmstrain_ekf::live::{RestSeen, RestWatch};

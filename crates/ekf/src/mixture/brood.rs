@@ -31,13 +31,13 @@ pub(crate) struct Parents<V: Lanes> {
 
 /// Sees children on their way to the reading.
 pub(crate) trait Trail<V: Lanes, const B: usize> {
-    /// Records the starts: the parents' beliefs, the rate drawn anew where a phase `begins`.
+    /// Records the starts: the parents' beliefs, with a new rate where a phase `begins`.
     fn starts(&mut self, _from: &Parts<V, B>, _begins: V::Mask, _course: &Course<V>) {}
     /// The prediction before it is cut.
     fn ahead(&mut self, _predicted: &Parts<V, B>) {}
 }
 
-/// Nobody looks.
+/// Trail that records nothing.
 impl<V: Lanes, const B: usize> Trail<V, B> for () {}
 
 /// Data of a child that a recorder receives.

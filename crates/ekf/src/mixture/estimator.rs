@@ -104,7 +104,8 @@ macro_rules! over_phases {
                 }
             }
 
-            /// A phase changes at the beginning of a step: steps are short against phases, and against what the model asks for.
+            /// Returns the longest step, s. A phase changes at the beginning of a step: steps are short against
+            /// phases, and no longer than the model's.
             fn longest_s(&self) -> T {
                 self.model().longest_step_s().min(self.dwell.longest_step_s())
             }

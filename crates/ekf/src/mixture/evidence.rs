@@ -165,7 +165,7 @@ impl<T: Real> Weighing<T> {
 pub(crate) struct Weighed<T> {
     /// Its prior probability times the likelihood of the reading.
     pub weight: Weight<T>,
-    /// Its probability of the limits over its parent's, which weighs it too but says nothing of the reading.
+    /// Its probability of the limits over its parent's, which weighs it too but carries no information on the reading.
     pub more_inside: T,
     /// One over the probability itself.
     pub per_inside: T,

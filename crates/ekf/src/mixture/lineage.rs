@@ -31,7 +31,7 @@ pub(crate) struct Birth<'a, T, const B: usize> {
     /// Index of the parent hypothesis.
     pub parent: usize,
     pub phase: Phase,
-    /// Starting point: the parent's belief, the rate drawn anew if a phase began.
+    /// Starting point: the parent's belief, with a new rate if a phase began.
     pub from: &'a Parts<T, B>,
     /// True if a phase began.
     pub begins: bool,
@@ -61,15 +61,15 @@ pub(crate) struct Descent<T, const N: usize, const L: usize> {
     pub heir: usize,
 }
 
-/// Listens to a step of a sensor's filter: its linearisations are those of the model.
+/// Recorder of a step of a sensor's filter: its linearisations are those of the model.
 pub(crate) struct Following<'a, T: Real, const B: usize, const N: usize, const L: usize, const K: usize> {
     pub lineage: Lineage<T, N, L, K>,
     model: &'a SwitchedModel<T, B, N>,
     step: SwitchedStep<T, B>,
 }
 
-/// Variances, and squared distances of means, that are this many times what the filter states are none that later readings
-/// can have told. What is known of a merged hypothesis is known of its children but roughly, and where a state decays
+/// Limits on smoothed variances, and squared distances of means, over the filter's own: later readings cannot cause larger
+/// ratios. A merged hypothesis represents its children only roughly, and where a state decays
 /// without noise the way back makes an excess grow with every step, e-fold in each time constant: in a gap without bound.
 const ASTRAY: [f64; 2] = [4.0, 400.0];
 
@@ -135,7 +135,7 @@ fn whole<T: Real, const B: usize, const N: usize, const L: usize>(parts: &Parts<
     belief
 }
 
-/// The transition from before a phase began: the rate that is drawn anew does not depend on what it was, and its spread is
+/// Returns the transition from before a phase began: the new rate does not depend on the old one, and its spread is
 /// process noise.
 pub(crate) fn through_renewal<T: Real, const N: usize, const L: usize>(
     transition: Transition<T, N, L>,

@@ -97,8 +97,8 @@ impl<T: Scalar, const B: usize> Parts<T, B> {
         }
     }
 
-    /// Puts the rate of a moving phase into a mixture: the phase's own with the share `kept`, with the rest one that is
-    /// drawn anew, independent of everything else.
+    /// Puts the rate of a moving phase into a mixture: the phase's own with the share `kept`, with the rest a new one,
+    /// independent of everything else.
     #[inline(always)]
     pub(crate) fn mix_rate<const N: usize, const L: usize>(
         &mut self,

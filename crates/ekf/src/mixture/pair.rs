@@ -1,4 +1,4 @@
-//! Two hypotheses: whether they say the same, and what they say together.
+//! Comparison of two hypotheses, and their merging.
 
 use crate::kernel::{Lanes, Parts};
 use crate::mixture::ALIKE;

@@ -194,8 +194,8 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
 /// A cut that leaves less than this of a prediction is not followed: its moments would be those of a far tail.
 pub(crate) const LEAST_MASS: f64 = 1e-3;
 
-/// Probabilities of the phases that follow `phase`, in the order of [`Phase::ALL`]. Whether a moving body stretches or
-/// releases is for the cut to say.
+/// Returns the probabilities of the phases that follow `phase`, in the order of [`Phase::ALL`]. The cut at rate zero decides
+/// between stretching and releasing.
 fn follows<T: Real>(chain: Option<&[[T; 3]; 3]>, phase: Phase) -> [T; 3] {
     match (chain, phase) {
         (None, _) => [T::one(), T::zero(), T::one()],

@@ -57,8 +57,8 @@ fn kept(mixture: &Mixture<f64, 3, 6, 2>) -> Vec<One> {
 const ROUNDING: f64 = 1e-13;
 
 proptest! {
-    /// Hypotheses of which each is like the first: however many are added, one of that phase is left, and what the
-    /// mixture says of the state and of the phases is the same.
+    /// Merging of hypotheses that are like the first: however many are added, one of that phase is left, and the
+    /// mixture's moments and phase probabilities stay.
     #[test]
     fn merging_preserves_weight_mean_and_covariance(
         first in one(), others in prop::collection::vec(one(), 1..6), apart in one(),
@@ -224,7 +224,7 @@ fn weights(state: &State) -> Vec<f64> {
 }
 
 /// Two hypotheses whose weights differ by less than the margin within which none is the lighter one: the children that came
-/// first are kept, those of the heavier are merged with the nearest. The strain is then told to be that of the first, so it
+/// first are kept, those of the heavier are merged with the nearest. The strain is then set to that of the first, so it
 /// was that before.
 #[test]
 fn a_smoother_goes_back_along_what_ran_forward_at_a_tie() {
@@ -270,7 +270,7 @@ fn what_was_merged_is_followed() {
     }
 }
 
-/// Listens, so that every child is stepped by itself.
+/// Recorder that makes the filter step every child by itself.
 struct Listener;
 
 impl super::lineage::Recorder<f64, 2> for Listener {}

@@ -142,7 +142,7 @@ pub fn write_mixture() -> Function {
     })
 }
 
-/// Scales that nobody asks for.
+/// Scales that are not used.
 const UNSCALED: [InputScale<Expression<'static>>; FILTER_INPUTS] = {
     let none = Expression::ZERO;
     [InputScale { mean: none, sd: none, lower: none, upper: none }; FILTER_INPUTS]

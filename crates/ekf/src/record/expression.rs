@@ -111,7 +111,7 @@ impl<'a> Expression<'a> {
         }
     }
 
-    /// The other one where a mask says so; of literals what is `done`.
+    /// Chooses the other one where a mask is set; for literals the result is `done`.
     fn either_of(self, other: Self, done: fn(f32, f32) -> f32, mask: Self) -> Self {
         match (self.0, other.0) {
             (Kind::Literal(a), Kind::Literal(b)) => Self(Kind::Literal(done(a, b))),

@@ -29,7 +29,7 @@ pub enum Piece {
     Take(Option<Phase>),
     /// Check that a state is sound. The state stays.
     Sound,
-    /// The rate drawn anew, of a mean (input) and a variance (input): out comes the state.
+    /// New rate, of a mean (input) and a variance (input): out comes the state.
     Renew,
     /// Path beyond the net move that a rate on a side (input) may add by turning around: the excess, and its variance.
     Turns,

@@ -205,7 +205,7 @@ mod tests {
     use crate::record::{Fields, See};
     use crate::{Gaussian, Reading};
 
-    /// Fields of a state in numbers: what is missing is told by none, truths are 1 and 0.
+    /// Fields of a state in numbers: a missing value has no entry, truths are 1 and 0.
     #[derive(Default)]
     struct Seen(HashMap<String, f32>);
 

@@ -95,7 +95,7 @@ fn library(filter: &mut Filter, rows: &[Row]) -> Vec<(f64, f64)> {
     rows.iter().map(row).collect()
 }
 
-/// Rested on another day, with another R₀: what the filter that is told so says, started at zero.
+/// Compares a twin that rested on another day, with another R₀, with the filter that is given that R₀ and starts at zero.
 #[test]
 fn a_twin_that_starts_again_at_zero_is_the_librarys_filter_that_starts_there() {
     let (sensor, another_day) = (sensor(), 1.08);

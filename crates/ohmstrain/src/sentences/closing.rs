@@ -34,7 +34,7 @@ pub struct Closing<'a> {
     pub findings: Option<&'a Findings>,
     /// Quality on held-out rows; `None` if there were none.
     pub tested: Option<&'a Tested>,
-    /// Wall-clock time, s, where somebody has looked at the clock.
+    /// Wall-clock time, s, if it was measured.
     pub calibration_s: Option<f64>,
     /// Name of the place where the full advice is.
     pub more: &'a str,

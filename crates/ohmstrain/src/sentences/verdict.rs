@@ -9,8 +9,8 @@ const CLEARLY_BETTER: f64 = 0.5;
 const BETTER: f64 = 0.9;
 /// Coverages of 95 % intervals that are taken for right.
 const COVERED: f64 = 0.9;
-/// Mean width of 95 % intervals, in percent of full scale, that says little: the standard deviation of a constant guess in
-/// the middle of an evenly used range gives 113.
+/// Mean width of 95 % intervals, in percent of full scale, above which they carry little information: the standard deviation of a
+/// constant guess in the middle of an evenly used range gives 113.
 const WIDE: f64 = 60.0;
 
 /// Scores of an estimate on some rows; errors in percent of full scale. For a calibrated sensor they come from its summary.

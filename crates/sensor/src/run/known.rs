@@ -115,7 +115,7 @@ impl KnownErrors {
         self.condition();
     }
 
-    /// Something else is stated of the strain at a time than when it was told, as after a lag.
+    /// Restates the estimate of the strain at a known time, which has changed since, for example after a lag.
     pub fn restate(&mut self, time_s: f64, said: Gaussian<f64>) {
         let mut is_new = false;
         for strain in self.strains.iter_mut().filter(|strain| strain.time_s == time_s) {

@@ -18,7 +18,7 @@ pub(crate) enum Kind {
     Ods,
 }
 
-/// True if a container is no workbook, but files that somebody has packed together.
+/// True if a container is no workbook, but an archive of files.
 pub(crate) fn is_archive(bytes: &[u8]) -> bool {
     const OF_WORKBOOKS: [&str; 3] = ["content.xml", "xl/workbook.bin", "[Content_Types].xml"];
     let Ok(archive) = ZipArchive::new(Cursor::new(bytes)) else { return false };

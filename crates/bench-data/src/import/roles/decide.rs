@@ -107,7 +107,7 @@ fn missing_answers(found: &Found, answers: &Recipe, decision: &Decision) -> Vec<
     questions
 }
 
-/// True if the reference is a stretch ratio, and nobody has said what it is at rest.
+/// True if the reference is a stretch ratio, and its value at rest is unknown.
 pub(crate) fn is_stretch_without_zero(found: &Found, answers: &Recipe, decision: &Decision) -> bool {
     let is_stretch = |channel: &Channel| {
         channel.role == Role::Strain

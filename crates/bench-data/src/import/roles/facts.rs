@@ -84,7 +84,7 @@ pub(crate) enum Dates {
     Open,
 }
 
-/// Statistics of the numbers of a column; medians of none are NaN.
+/// Statistics of the numbers of a column; medians of an empty column are NaN.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Numbers {
     /// Median step from row to row.

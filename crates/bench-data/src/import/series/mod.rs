@@ -17,7 +17,7 @@ pub(crate) use values::{Values, check_positive, converted};
 /// A gap of more typical steps is not bridged, unless the values on both sides are the same.
 const LONGEST_GAP: f64 = 10.0;
 
-/// Answers where the clock begins anew.
+/// Answers for a clock that restarts.
 const ANOTHER_RECORDING: [&str; 2] = [
     "--split-recordings if another recording begins here, for a file of each",
     "--recording 1 for the first of them alone",

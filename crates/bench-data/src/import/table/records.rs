@@ -1,7 +1,7 @@
 //! Records of `label: value`, as boards and command-line tools print them: on one line or over several.
 //!
-//! A record ends where one of its labels comes again, or at a line of `---`. Labels below an indented one, as YAML has them,
-//! are told apart by what stands above them.
+//! A record ends where one of its labels is repeated, or at a line of `---`. Labels below an indented one, as in YAML,
+//! are told apart by the labels above them.
 
 use std::collections::HashMap;
 

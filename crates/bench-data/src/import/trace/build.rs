@@ -25,7 +25,7 @@ pub struct Imported {
     pub trace: Trace,
     /// Remarks on what was left out, filled in or noticed, one line each.
     pub remarks: Vec<String>,
-    /// Lag of the reference's clock that was taken out, where the motion told.
+    /// Lag of the reference's clock that was taken out, if it was found by the motion.
     pub lag: Option<Lag>,
     /// Rows left out because they had the time of the row before.
     pub duplicates: usize,

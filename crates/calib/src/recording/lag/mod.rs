@@ -43,7 +43,7 @@ pub struct Lag {
     /// Standard deviation, s: from leaving out a tenth of the rows at a time and from what counts as slow, or of the lags that were
     /// tried.
     pub sd_s: f64,
-    /// Standard deviation of the lag that the sensor itself may have and that is not told apart, s.
+    /// Standard deviation of the lag that the sensor itself may have, which cannot be told apart from the reference's, s.
     pub own_s: f64,
     /// Duration of a movement, s.
     pub movement_s: f64,

@@ -89,7 +89,7 @@ pub struct Journal {
 pub const JOURNAL: &str = "batch.jsonl";
 
 impl Journal {
-    /// Reads the journal of a folder, and begins one if there is none. A file of this name that somebody else wrote is replaced
+    /// Reads the journal of a folder, and begins one if there is none. A file of this name from another program is replaced
     /// with `force` only.
     pub fn open(folder: &Path, force: bool) -> Result<Self, CliError> {
         let path = folder.join(JOURNAL);

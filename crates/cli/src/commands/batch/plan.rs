@@ -177,7 +177,7 @@ impl Row<'_> {
     }
 }
 
-/// Names outputs that nobody has named: as the recordings lie below the folder that all of them share.
+/// Names the outputs without a name after the recordings' paths below the folder that all of them share.
 fn name_outputs(jobs: &mut [Job], args: &BatchArgs) {
     let ending = match args.command {
         BatchCommand::Filter | BatchCommand::Smooth => args.format.name(),

@@ -31,7 +31,7 @@ pub struct RecordingScores {
     pub settled: Option<SettledScores>,
     /// Wall-clock time of the calibration, s; `None` if it was read from a file.
     pub calibration_s: Option<f64>,
-    /// Lag of the reference, where it was looked for; `None` inside if it cannot be told.
+    /// Lag of the reference, where it was looked for; `None` inside if it is unknown.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lag_s: Option<Option<f64>>,
     pub baselines: BaselineScores,

@@ -16,8 +16,8 @@ pub struct Told {
 }
 
 impl Told {
-    /// None, and, if a time between them is given, s, one after every such time, and the first ones near the ends of the range;
-    /// all of them in the part that is scored, and within what an estimator can be told.
+    /// Returns the cases: no known strain; if a time between them is given, s, one known strain after every such time, and the first ones
+    /// near the ends of the range. All of them lie in the part that is scored, and in the range that an estimator accepts.
     pub fn cases(recording: &TraceFile, part: Part, limits: RangeParams, every_s: Option<f64>) -> Vec<Self> {
         let mut cases = vec![Self { name: None, known: Vec::new() }];
         if let Some(every_s) = every_s {

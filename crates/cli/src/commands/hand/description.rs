@@ -49,7 +49,7 @@ impl Description {
     /// Reads the file.
     ///
     /// # Errors
-    /// If it cannot be read, or says something that nobody understands.
+    /// If it cannot be read, or has an unknown field.
     pub fn read(path: &Path) -> Result<Self, CliError> {
         let name = path.display();
         let text = whole_file::text(path)?;

@@ -53,7 +53,7 @@ pub fn run(args: &HandArgs, messages: &Messages) -> Result<(), CliError> {
     rows_out.publish()
 }
 
-/// True if somebody waits for each row.
+/// True if a reader waits for each row.
 fn is_live(args: &HandArgs) -> bool {
     is_stdin(&args.trace_file) || !args.trace_file.is_file()
 }
@@ -264,7 +264,7 @@ fn stream<W: Write>(
     Ok(())
 }
 
-/// Warns of a doubt where somebody waits for the rows, refuses the recording otherwise.
+/// Warns of a doubt if a reader waits for the rows, and refuses the recording otherwise.
 fn say(doubt: Option<String>, file: &str, live: bool, messages: &Messages) -> Result<(), CliError> {
     match doubt {
         Some(doubt) if live => messages.warning(&format!("{file}: {doubt}")),

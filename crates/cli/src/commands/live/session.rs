@@ -19,7 +19,7 @@ use crate::suits::FIRST_LIVE_READINGS;
 const MOST_POINTS: usize = 1 << 16;
 /// A step this many times as long as steps usually are is a gap.
 const GAP: f64 = 5.0;
-/// Shorter pauses are not told, s.
+/// Shortest pause that is reported, s.
 const SILENCE_S: f64 = 2.0;
 /// Between lines that arrive at once, s: two digits above what is written.
 const LEAST_STEP_S: f64 = 1e-4;

@@ -100,7 +100,7 @@ fn is_pipe(_: &Path) -> bool {
     false
 }
 
-/// Reads for as long as anybody listens.
+/// Reads as long as there is a receiver.
 pub(super) fn read_to_end(source: &mut dyn Read, send: &SyncSender<Event>) -> Result<(), SendError<Event>> {
     let mut lines = Lines::default();
     send.send(Event::Connected)?;
@@ -131,7 +131,7 @@ fn read_pipe(path: &Path, send: &SyncSender<Event>) {
     }
 }
 
-/// Reads a serial port for as long as anybody listens, and opens it again when it comes back.
+/// Reads a serial port as long as there is a receiver, and opens it again when it comes back.
 fn read_port(path: &Path, baud: u32, send: &SyncSender<Event>) {
     let name = path.to_string_lossy();
     loop {
@@ -159,7 +159,7 @@ fn read_port(path: &Path, baud: u32, send: &SyncSender<Event>) {
 
 /// Reason why reading stopped.
 pub(super) enum Stop {
-    /// Nobody listens.
+    /// No receiver any more.
     Unheard,
     /// The source failed.
     Failed(io::Error),

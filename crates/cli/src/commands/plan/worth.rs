@@ -23,7 +23,7 @@ const FINEST_HZ: f64 = 100.0;
 pub const BITS: [u32; 4] = [0, 12, 10, 8];
 /// Draws of noise and drift; the median of their errors is stated. One that leads the filter astray says little about sampling.
 const DRAWS: u64 = 5;
-/// A parameter is told if its standard error is less than this share of it.
+/// Largest standard error of a parameter that counts as determined, as a share of it.
 const TOLD: f64 = 0.25;
 /// An error is hardly larger than another one up to this factor.
 const HARDLY: f64 = 1.1;
@@ -43,11 +43,11 @@ pub struct Told {
     pub parameters: usize,
     /// Those with a standard error of less than a quarter of them.
     pub told: usize,
-    /// The largest standard error of those that are told, percent.
+    /// Largest standard error of the determined parameters, percent.
     pub worst_percent: Option<f64>,
     /// Condition number of the Fisher information, its diagonal scaled to one.
     pub condition: f64,
-    /// The parameter that is told least, if any is not.
+    /// Parameter with the least information, if any is undetermined.
     pub left_open: String,
 }
 

@@ -48,7 +48,7 @@ pub const SHARE: Allowed = Allowed { least: 0.0, most: 1.0 };
 pub const FACTOR: Allowed = Allowed { least: 1e-3, most: 1e3 };
 /// Weights of training rows, and entries of matrices made of them.
 pub const WEIGHT: Allowed = Allowed { least: -1e15, most: 1e15 };
-/// Number that is told and not used: a score, or a variance of what was not determined.
+/// Number for information only: a score, or a variance of undetermined parameters.
 pub const TOLD: Allowed = Allowed { least: -f64::INFINITY, most: f64::INFINITY };
 /// The same for what is no less than zero.
 pub const TOLD_AMOUNT: Allowed = Allowed { least: 0.0, most: f64::INFINITY };
