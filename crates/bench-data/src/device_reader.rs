@@ -9,7 +9,7 @@ use crate::metadata::Metadata;
 use crate::reader::{A_HEADER, called, placed};
 use crate::row::{ReadingKind, Row};
 
-/// Lines that a device may say before its header: a boot loader's are some dozen.
+/// Largest number of lines that a device may print before its header: a boot loader's are some dozen.
 const LONGEST_PREAMBLE: usize = 100;
 
 /// Reads what a device sends, row by row: goes on after lines that are none of a trace, and where the device starts again.
@@ -47,8 +47,8 @@ pub struct DeviceRow {
 }
 
 impl<R: Read> DeviceReader<R> {
-    /// Waits for a header, for a hundred other lines at most. `name` is what messages call the source, `overrides` takes the
-    /// place of what it says of itself.
+    /// Waits for a header, for a hundred other lines at most. `name` is the source's name in messages, `overrides` replaces its
+    /// metadata.
     ///
     /// # Errors
     /// [`TraceError`] if the source fails, or no header comes.

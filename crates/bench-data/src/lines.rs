@@ -98,14 +98,14 @@ impl<R: Read> LineFeed<R> {
         self.lines.number()
     }
 
-    /// Allows one more line to be taken. A record that asks for a second one has an open quotation mark, and would
+    /// Allows one more line to be taken. A record that needs a second one has an open quotation mark, and would
     /// swallow the rest of the source.
     pub(crate) const fn begin_record(&mut self) {
         self.record_has_line = false;
     }
 
     /// Takes the next line apart at its commas, which is all that most traces need; `None` at the end of the source. A
-    /// line that needs more is left for `read`, and `false` says so; so is whatever comes after it.
+    /// line that needs more is left for `read`, and `false` is returned; so is every line after it.
     pub(crate) fn next_plain(&mut self, cells: &mut StringRecord) -> Result<Option<bool>, LineFault> {
         let Some(line) = self.lines.next()? else { return Ok(None) };
         if is_plain(line) {

@@ -15,9 +15,9 @@ pub struct Metadata {
     pub front_end: Option<FrontEndSpec>,
     /// `joint`: the joint that the sensor spans.
     pub joint: Option<JointSpec>,
-    /// `strain_unit`: what the column `strain` is in; a fraction unless it says otherwise.
+    /// `strain_unit`: unit of the column `strain`; a fraction by default.
     pub strain_unit: Option<StrainUnit>,
-    /// `resistance_unit`: what the column `resistance_ohm` is in; Ω unless it says otherwise.
+    /// `resistance_unit`: unit of the column `resistance_ohm`; Ω by default.
     pub resistance_unit: Option<ResistanceUnit>,
     /// All other keys and their values, in the file's order.
     pub other: Vec<(String, String)>,
@@ -107,7 +107,7 @@ impl Metadata {
     pub(crate) const KEYS: [&str; 6] =
         ["material", "gauge_length_mm", "front_end", "joint", "strain_unit", "resistance_unit"];
 
-    /// The units that numbers are in once they have been read: where a file names one, this says so.
+    /// Returns the metadata with the units that numbers have once they have been read, if a file names a unit.
     pub(crate) fn in_own_units(&self) -> Self {
         Self {
             strain_unit: self.strain_unit.map(|_| StrainUnit::Fraction),

@@ -51,7 +51,7 @@ impl ParquetText {
     /// Reads schema and metadata of a file.
     ///
     /// # Errors
-    /// If it is no Parquet file, or what it says about the recording makes no sense.
+    /// If it is no Parquet file, or its metadata on the recording make no sense.
     pub fn new(file: File) -> io::Result<Self> {
         let reader = SerializedFileReader::new(file).map_err(broken)?;
         let described = reader.metadata().file_metadata();

@@ -62,7 +62,7 @@ impl<W: Write> RowWriter<W> {
     /// Ends the row.
     ///
     /// # Errors
-    /// What `out` says.
+    /// The error of `out`.
     pub fn end(&mut self) -> io::Result<()> {
         if self.row == b"," {
             // A row of one empty cell would be a blank line, which readers pass over.
@@ -79,7 +79,7 @@ impl<W: Write> RowWriter<W> {
     /// Hands everything written so far on.
     ///
     /// # Errors
-    /// What the writer says.
+    /// The error of the writer.
     pub fn flush(&mut self) -> io::Result<()> {
         self.out.flush()
     }

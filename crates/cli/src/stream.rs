@@ -1,4 +1,4 @@
-//! Rows as they come: of a recording, or with `--skip-bad` of a device that says other things, too, and may start again.
+//! Rows as they come: of a recording, or with `--skip-bad` of a device that prints other lines, too, and may restart.
 
 use std::io::Read;
 

@@ -1,4 +1,4 @@
-//! A quadratic function of a correction's inputs: most of what a smooth Gaussian process says, at little cost.
+//! Quadratic function of a correction's inputs: most of a smooth Gaussian process, at little cost.
 
 use nalgebra::{DMatrix, DVector};
 use ohmstrain_ekf::correction::Quadratic;

@@ -1,10 +1,10 @@
 //! A learned correction with fewer rows: from the sensor's file alone, nothing is learned again.
 //!
 //! The mean of a process with a long length scale is nearly quadratic within the range of its rows. So the means become a
-//! quadratic function and kernels of the rows that say most (the first ones: a correction lists its inducing rows first, in
+//! quadratic function and kernels of the most informative rows (the first ones: a correction lists its inducing rows first, in
 //! the order of a pivoted Cholesky decomposition), fitted to the processes' own means. Variances take the kernels of
-//! fewer inducing rows, onto which those of the others are projected, as the others are projected already (Nyström). What simulated
-//! rows say is left out.
+//! fewer inducing rows, onto which those of the others are projected, as the others are projected already (Nyström). The process of
+//! simulated rows is left out.
 
 use nalgebra::{DMatrix, DVector};
 use ohmstrain_ekf::correction::{self, FILTER_INPUTS, OUTPUTS, kernel};

@@ -1,4 +1,4 @@
-//! A table's readings and reference in their units, by what is said of it or by what it says itself.
+//! A table's readings and reference in their units, by the caller's answers or by the table's own metadata.
 
 use arrow_schema::Schema;
 use ohmstrain::{JointParams, Quantity};

@@ -86,7 +86,7 @@ pub fn check_prior(text: &str, file: Option<&str>) -> PyResult<()> {
     Prior::from_toml(text).map(|_| ()).map_err(|error| of_library(&error, file))
 }
 
-/// The sensor behind the first rows of recordings, as many as `rows` says of each; and what is to be said of it.
+/// Calibrates a sensor on the first `rows` of each recording; returns it with the warnings.
 pub fn calibrated(
     py: Python,
     recordings: &[Recording],

@@ -47,7 +47,7 @@ pub fn raise(place: &Place, message: &str) -> PyErr {
 pub enum Stopped {
     /// The library refuses them.
     Refused(Error),
-    /// The user, or whoever sent a signal; or an exception that says why.
+    /// Interruption by the user or another sender of a signal; or an exception with its reason.
     Interrupted(PyErr),
 }
 

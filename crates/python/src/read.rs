@@ -161,7 +161,7 @@ fn imported(paths: &[String], recipe: &Recipe) -> PyResult<(Trace, Vec<String>)>
     Ok((imported.trace, imported.remarks))
 }
 
-/// Its columns, in the units that they have inside, and what else it says in the schema's metadata.
+/// Returns its columns, in the units that they have inside, and its other metadata in the schema's.
 fn table(trace: &Trace, paths: &[String]) -> PyResult<PyRecordBatch> {
     let failed = |error: ArrowError| refused(error);
     let numbers = |values: &[f64]| -> ArrayRef {

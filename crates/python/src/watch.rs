@@ -39,7 +39,7 @@ impl Watch {
         self.warnings.extend(seen.map(|warning| format!("{}{warning}", recording.before())));
     }
 
-    /// Takes what a filter says of a row, and asks whether a long hold was a rest.
+    /// Takes a filter's estimate of a row, and asks if a long hold was a rest.
     pub fn see_rest(&mut self, recording: &Recording, estimate: &Estimate) {
         let quiet = self.quiet.see(estimate);
         self.warnings.extend(quiet.map(|quiet| format!("{}{}", recording.before(), quiet.text(Interface::Python))));

@@ -11,7 +11,7 @@ use ohmstrain::number;
 
 /// Largest magnitude on an axis: the difference of two such numbers is still finite.
 const LARGEST: f64 = 1e300;
-/// Shortest range, relative to the numbers in it, below which neighbouring ticks could not be told apart.
+/// Shortest range, relative to the numbers in it; below it neighbouring ticks would look the same.
 const SHORTEST: f64 = 1e-9;
 /// Space left free at both ends, as a share of the range.
 const MARGIN: f64 = 0.04;

@@ -103,7 +103,7 @@ impl Chart {
         }
     }
 
-    /// Single points, one for all that could not be told apart.
+    /// Adds single points, one for all that would look the same.
     pub fn dots(&mut self, ink: Ink, name: &str, points: impl IntoIterator<Item = Point>) {
         let (width, height) = self.area_px();
         let mut visited = HashSet::new();

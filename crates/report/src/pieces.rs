@@ -16,7 +16,7 @@ const HEIGHT_PX: f64 = 220.0;
 /// Least width of a movement of usual length, as a share of the plot's.
 const VISIBLE: f64 = 1.0 / 40.0;
 
-/// The strain in pieces of equal numbers of rows, and what is to be said of them; none if one plot shows all movements.
+/// Draws the strain in pieces of equal numbers of rows, with a sentence on them; no figure if one plot shows all movements.
 pub fn strain(recording: &PlottedRecording) -> Result<(Vec<Figure>, String), ReportError> {
     let wanted = count(&recording.motions, recording.time_s);
     let pieces = wanted.min(MOST_PIECES);

@@ -13,7 +13,7 @@ pub enum SensorError {
     /// A number that no sensor can have.
     #[error("{0}")]
     Field(#[from] FieldError),
-    /// None for the estimator that is asked for.
+    /// No parameters for the requested estimator.
     #[error("{0}")]
     NoParameters(#[from] NoParameters),
     /// A parameter that the model refuses.

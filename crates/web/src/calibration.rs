@@ -14,7 +14,7 @@ use crate::json::{json, refused};
 use crate::recording::Recording;
 use crate::sensor::Sensor;
 
-/// Fewer rows than this say nothing.
+/// Least number of rows for a score.
 const FEWEST_ROWS: usize = 10;
 
 /// Choices of a calibration; each has a default.

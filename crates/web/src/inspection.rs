@@ -58,7 +58,7 @@ struct Described<'a> {
     files: Vec<DescribedFile<'a>>,
     question: Option<&'a Asked>,
     remarks: &'a [String],
-    /// Flags that say all of the plan.
+    /// Flags for all of the plan.
     flags: String,
     is_trace: bool,
     roles: Vec<DescribedRole>,

@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 use ohmstrain_bench_data::import::{Recipe, Role};
 
-/// The recipe that flags say.
+/// Parses the recipe from flags.
 pub fn recipe(flags: &str) -> Result<Recipe, String> {
     let words = shlex::split(flags).ok_or("expected flags with closing quotes, found an open one")?;
     let mut recipe = Recipe::default();

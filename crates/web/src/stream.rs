@@ -268,7 +268,7 @@ impl Stream {
         Ok(())
     }
 
-    /// Rows of a trace CSV since this was asked last.
+    /// Returns the rows of a trace CSV since the last call.
     pub fn recorded(&mut self) -> String {
         String::from_utf8(std::mem::take(&mut self.record)).unwrap_or_default()
     }

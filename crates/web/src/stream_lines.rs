@@ -22,7 +22,7 @@ pub struct Lines {
 }
 
 impl Lines {
-    /// Waits for a header unless it is said.
+    /// Waits for a header unless one is given.
     pub fn new(mut parser: LineParser, header: Option<&str>) -> Result<Self, String> {
         let Some(header) = header else { return Ok(Self { parser, clock: Clock::Own }) };
         let names: Vec<&str> = header.split(',').map(str::trim).collect();

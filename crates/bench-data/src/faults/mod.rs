@@ -1,5 +1,5 @@
 //! Recordings of sensors, wires, converters and clocks that fail: a fault is put into a recording from a time on, and the
-//! reference says what the strain was all the same.
+//! reference keeps the true strain.
 //!
 //! A fault is a kind with its severity; an [`Episode`] adds when it begins, when it ends, and a seed. Readings are changed in
 //! place; an episode of a clock changes times, or adds or moves rows together with their reference.

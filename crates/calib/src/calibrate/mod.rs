@@ -135,13 +135,13 @@ fn handicap(kind: EstimatorKind) -> f64 {
     if kind.has_phases() { 0.0 } else { LOCK_IN }
 }
 
-/// Calibrates law, noise and motion on recordings with known strain. Deterministic: same samples, same result. Rows that
-/// stand far from their neighbours, or from the law, take no part ([`screen`]).
+/// Calibrates law, noise and motion on recordings with known strain. Deterministic: same samples, same result. Outliers, and rows
+/// far from the law, take no part ([`screen`]).
 ///
 /// Estimators are tried with a law for each of `structures` and each strength of ridge; the pair with the best score on
 /// blocks that the law has not seen gives the law. Every one of them, and the extended Kalman filter in any case, is then
 /// fitted to that law, and the best of `kinds` by every row of those blocks becomes the default. Near ties go to the one that keeps
-/// hypotheses. [`EstimatorKind::Corrected`] is the default where it is asked for; what it corrects is the best of its candidates, and
+/// hypotheses. [`EstimatorKind::Corrected`] is the default if it is requested; it corrects the best of its candidates, and
 /// is learned last, from the same rows.
 ///
 /// # Errors

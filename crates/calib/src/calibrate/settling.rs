@@ -10,7 +10,7 @@ use ohmstrain_sensor::SettlingParams;
 
 /// Holds shorter than this share of the longest are left out: they end before the others.
 const LEAST_SHARE: f64 = 1.0 / 3.0;
-/// One hold says nothing of the next one.
+/// Least number of holds: one hold carries no information on the next one.
 const FEWEST_HOLDS: usize = 2;
 /// Rows of a hold are looked at from its first seconds to these before its end, in equal steps of the logarithm of time.
 const FIRST_S: f64 = 2.0;
@@ -118,7 +118,7 @@ fn widened(count: usize) -> f64 {
 mod tests {
     use super::{Fall, likeliest, widened};
 
-    /// Two of three of what is said comes true, with errors of 10 % of it in turn, and of 0.001 where nothing is said.
+    /// Tests a share of two thirds of the predicted fall, with errors of 10 % of it in turn, and of 0.001 where no fall is predicted.
     #[test]
     fn share_and_deviations_are_found() {
         let fall = |k: u32| {

@@ -49,7 +49,7 @@ pub struct ClosedFormFit {
     pub aicc: f64,
     /// Bayesian criterion, with `k ln n` in place of `2 k`.
     pub bic: f64,
-    /// Correlation of neighbouring residuals. Near 0, standard errors are what they say; near 1 they are too small, by
+    /// Correlation of neighbouring residuals. Near 0, standard errors are right; near 1 they are too small, by
     /// about `√((1 + ρ) / (1 - ρ))`.
     pub residual_autocorrelation: f64,
     /// Condition of the Jacobian with columns of length one.

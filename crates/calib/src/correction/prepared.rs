@@ -180,13 +180,13 @@ impl<'a, const D: usize> Prepared<'a, D> {
         Some(rows.into_iter().enumerate().map(said).collect())
     }
 
-    /// Errors of what is said of judged rows, in units of their deviations, block by block.
+    /// Returns the errors of the predictions of judged rows, in units of their deviations, block by block.
     fn deviations(&self, said: &[Gaussian<f64>]) -> Vec<Vec<f64>> {
         let of_row = |k: usize| (said[k].mean - self.judged.strain[k]).abs() / said[k].sd();
         self.judged.blocks.iter().map(|block| block.clone().map(of_row).collect()).collect()
     }
 
-    /// The factor on the deviation of what is said of judged rows that makes intervals right, beside what is mixed in last.
+    /// Returns the factor on the deviation of the predictions of judged rows that makes intervals right, beside the voice mixed in last.
     pub(super) fn scale_beside(&self, said: &[Gaussian<f64>], last: &[Gaussian<f64>]) -> f64 {
         joint_scale_of(|scale| {
             let scaled = |said: &Gaussian<f64>| Gaussian { variance: said.variance * scale.powi(2), ..*said };

@@ -114,7 +114,7 @@ impl Sums {
         (1.0 + WHITE) * noise * noise
     }
 
-    /// Normal equations with the prior; without one recording, if so asked.
+    /// Factors the normal equations with the prior; without one recording, if given.
     fn factor(&self, noise: f64, without: Option<&Normal>) -> Option<Cholesky<f64, Dyn>> {
         let mut matrix = &self.regular * Self::white(noise) + &self.all.matrix;
         if let Some(own) = without {

@@ -120,7 +120,7 @@ fn a_correction_says_what_the_textbook_says() {
     }
 }
 
-/// A process of one side of time says what the textbook says of rows that have nothing but that side.
+/// Compares a process of one side of time with the textbook's, on rows that have nothing but that side.
 #[test]
 fn one_sided_processes_see_their_side_alone() {
     const BOTH: usize = 17;

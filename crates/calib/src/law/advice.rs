@@ -1,4 +1,4 @@
-//! Advice on the next recording, as motions of a rig: what moves, how fast, how long. Speeds are said as the duration of a stroke over the
+//! Advice on the next recording, as motions of a rig: what moves, how fast, how long. Speeds are given as the duration of a stroke over the
 //! whole range, so that they hold for strains and angles.
 
 use nalgebra::{Cholesky, DMatrix};
@@ -166,7 +166,7 @@ fn variance_inflation(jacobian: &DMatrix<f64>) -> Vec<f64> {
         .map_or(vec![f64::INFINITY; size], |factor| factor.inverse().diagonal().iter().copied().collect())
 }
 
-/// A duration as people say it: two figures of seconds, minutes or hours.
+/// Formats a duration for people: two figures of seconds, minutes or hours.
 fn duration(seconds: f64) -> String {
     match seconds {
         s if s < 100.0 => format!("{} s", number(s)),

@@ -61,7 +61,7 @@ const DEFAULT_GAUGE: GaugeFamily = GaugeFamily::Polynomial;
 /// Time constants tried.
 const GRID: usize = 12;
 /// Ridges tried, relative to the variance of each column. The least one explains most and often makes a filter lock onto
-/// the wrong direction; which one an estimator stands is for its own score to say.
+/// the wrong direction; each estimator's own score chooses among them.
 const LAW_RIDGES: [f64; 5] = [0.1, 0.03, 0.01, 0.003, 0.001];
 /// Steps of the polish of the time constants, and the side of its first simplex in ln τ.
 const POLISH_STEPS: u64 = 40;

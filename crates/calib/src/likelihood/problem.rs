@@ -24,7 +24,7 @@ pub struct LikelihoodProblem<'a> {
     pub free: &'a [NoiseParameter],
 }
 
-/// Makes the likelihood of the size that a problem's law has and asks it.
+/// Makes the likelihood of the size of a problem's law, and evaluates an expression on it.
 macro_rules! asked {
     ($problem:expr, $likelihood:ident => $answer:expr) => {{
         let (parameters, branches) = ($problem.parameters(), $problem.law.branches.len());

@@ -12,7 +12,8 @@ const MOST_STEPS: usize = 30;
 const TOLERANCE: f64 = 1e-6;
 /// Longest step, in the logarithm of a parameter.
 const LONGEST: f64 = 2.0;
-/// A change of gradient nearer than this share to what the Hessian says teaches nothing but rounding.
+/// Least cosine between the unexplained change of gradient and the step for a rank-one update of the Hessian: a smaller one
+/// is rounding.
 const TEACHES: f64 = 1e-8;
 
 /// A 95 % interval from the profile likelihood: the values for which the other parameters can make the readings likely

@@ -35,8 +35,8 @@ pub struct NoiseFit {
     pub warnings: Vec<String>,
 }
 
-/// A logarithm known no better than this is a parameter about which the readings say next to nothing: a 95 % interval
-/// from a fiftieth to fifty times the value.
+/// Largest standard error of a logarithm before a warning: with it the readings carry next to no information on the parameter, a
+/// 95 % interval from a fiftieth to fifty times the value.
 const LEAST_SURE: f64 = 2.0;
 
 pub(super) fn found(start: &NoiseStart, free: &[NoiseParameter], fit: &LikelihoodFit) -> (NoiseParams, MotionParams) {

@@ -9,9 +9,9 @@ use crate::product::product;
 use crate::samples::Samples;
 use ohmstrain_sensor::{LawParameter, LawParams, RangeParams, Uncertainty};
 
-/// A motion over the whole range at three speeds, with holds and smaller loops: laws that say the same of it are the same.
+/// Motion over the whole range at three speeds, with holds and smaller loops: laws with the same readings for it are the same.
 ///
-/// Laws of other structures, and with other time constants, are expressed in one structure by what they say there.
+/// Laws of other structures, and with other time constants, are expressed in one structure by their readings for it.
 pub(super) struct Probe {
     regression: LawRegression,
     columns: DMatrix<f64>,
@@ -50,7 +50,7 @@ impl Probe {
         Ok(Self { regression, columns, normal })
     }
 
-    /// The weights of the common structure that say most nearly what this law says.
+    /// Returns the weights of the common structure whose readings are nearest to those of this law.
     pub(super) fn weights(&self, law: &LawParams) -> DVector<f64> {
         let structure = LawStructure::of_law(law, self.regression.scale.span, 0.0);
         let said = structure.design(&self.regression).fitted(&structure.weights(law, self.regression.scale));

@@ -13,7 +13,7 @@ pub struct Hold {
     pub last_reading: f64,
 }
 
-/// Holds shorter than this, s, say nothing of where a reading settles.
+/// Shortest hold, s, that shows where a reading settles.
 pub(crate) const LEAST_HOLD_S: f64 = 20.0;
 /// Share of the strain's range within which a held strain stays, to each side of its middle.
 const STILL: f64 = 0.005;

@@ -104,9 +104,9 @@ const MOST_UNEXPLAINED: f64 = 0.9;
 /// Ridges tried for that: strong ones extrapolate least.
 const SCREENING_RIDGES: [f64; 3] = [0.1, 0.01, 0.001];
 
-/// Looks for values that stand far from their neighbours, then for rows whose reading and reference do not go together,
-/// and asks whether the readings have anything to do with the reference at all. Screening what has been screened finds
-/// nothing more but what the first screening uncovered.
+/// Looks for outliers, then for rows whose reading and reference do not go together,
+/// and checks that the readings follow the reference at all. Screening the result again finds only rows that the first
+/// screening uncovered.
 ///
 /// # Errors
 /// If the recordings are too short or too plain to learn a law from, or the best law explains nothing of them.

@@ -41,7 +41,7 @@ pub struct ReplaceArgs {
     pub force: bool,
 }
 
-/// Units that a trace's metadata lines leave unsaid, or say wrongly.
+/// Units that a trace's metadata lines omit, or state wrongly.
 #[derive(Clone, Debug, Default, ClapArgs)]
 pub struct UnitArgs {
     /// Unit of a column: strain=percent or strain=fraction, resistance=kohm or resistance=ohm; repeatable, the last one of a

@@ -24,7 +24,7 @@ use crate::progress::Progress;
 use crate::sensor_file;
 use ohmstrain_report::Sample;
 
-/// Calibrates a sensor on recordings, writes its parameters, and says what it came to.
+/// Calibrates a sensor on recordings, writes its parameters, and prints a summary.
 pub fn run(args: &CalibrateArgs, messages: &Messages) -> Result<(), CliError> {
     let outcome = calibrate(args, messages)?;
     let file = args.output.display().to_string();
@@ -192,7 +192,7 @@ fn known_recordings<'a>(
     recordings.iter().zip(samples).map(known).collect()
 }
 
-/// Paths are the machine's own business; the name says which recording it was.
+/// Returns the name of a file without its path, which is the machine's own business.
 fn file_name(path: &str) -> &str {
     Path::new(path).file_name().and_then(|name| name.to_str()).unwrap_or(path)
 }

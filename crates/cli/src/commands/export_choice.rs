@@ -15,7 +15,7 @@ pub struct Choice {
     pub lines: Vec<String>,
 }
 
-/// Usual time between two readings, s: what is asked for, else that of the calibration's recordings.
+/// Returns the usual time between two readings, s: the requested one, else that of the calibration's recordings.
 pub fn usual_step_s(asked: Option<f64>, params: &SensorParams) -> Result<f64, CliError> {
     asked.or_else(|| export::usual_step_s(params)).ok_or_else(|| {
         CliError::Arguments(

@@ -47,7 +47,7 @@ impl OnRecording {
         Ok(Self { name: recording.name.clone(), from_s: args.from, dt_s, rows, program, static_cubic })
     }
 
-    /// Returns the scores of the rows that are asked for.
+    /// Returns the scores of the requested rows.
     fn scores(&self, rows: &[ScoredRow]) -> Result<Scores, CliError> {
         let counted = |row: &&ScoredRow| row.truth.is_finite() && self.from_s.is_none_or(|from_s| row.time_s >= from_s);
         ohmstrain_calib::score(&rows.iter().filter(counted).copied().collect::<Vec<_>>()).ok_or_else(|| {

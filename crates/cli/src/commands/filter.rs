@@ -197,7 +197,7 @@ impl<'a, W: io::Write + Send> Stream<'a, W> {
         Ok(stored.to_toml()?)
     }
 
-    /// Takes what has come; `rows` says what it is of.
+    /// Takes a row or an error; `rows` is its source.
     fn take(&mut self, row: Result<DeviceRow, TraceError>, rows: &Rows) -> Result<(), CliError> {
         let DeviceRow { row, restarted } = match row {
             Err(TraceError::Content(fault)) if self.args.skip_bad => {
@@ -298,7 +298,7 @@ impl<W: io::Write + Send> Sink<'_, W> {
         if self.live { self.writer.flush() } else { Ok(()) }
     }
 
-    /// Asks about the unit of a live stream's readings, once there are enough.
+    /// Checks the unit of a live stream's readings, once there are enough.
     fn doubt_early(&self) {
         if self.early.len() == FIRST_LIVE_READINGS
             && let Err(doubt) = self.sensor.check_unit(self.early.iter().copied(), self.rest)

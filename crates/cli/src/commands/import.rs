@@ -27,7 +27,7 @@ pub fn run(args: &ImportArgs, messages: &Messages) -> Result<(), CliError> {
     outputs.publish_or_print(output, bytes)
 }
 
-/// Writes each recording to a file of its own, all of them or none, and says which.
+/// Writes each recording to a file of its own, all of them or none, and prints their names.
 fn split(
     mut outputs: Outputs,
     path: &Path,

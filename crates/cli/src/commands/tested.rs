@@ -7,7 +7,7 @@ use ohmstrain_calib::{Baseline, ScoredRow};
 
 use crate::input::TraceFile;
 
-/// Fewer rows than this say nothing.
+/// Least number of rows for a score.
 const FEWEST_ROWS: usize = 10;
 
 /// A recording of which only some rows were calibrated on.

@@ -110,7 +110,7 @@ impl Place {
         Ok(!head.is_empty() && !kind.wrote(&String::from_utf8_lossy(&head), own))
     }
 
-    /// Writes content, and says what then puts it in its place; nothing where bytes go through.
+    /// Writes content, and returns the unfinished file that then takes its place; `None` where bytes go through.
     pub fn fill(&self, content: &[u8]) -> io::Result<Option<Unfinished>> {
         let (mut file, unfinished) = self.begin()?;
         file.write_all(content)?;

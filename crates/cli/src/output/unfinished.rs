@@ -74,7 +74,7 @@ pub fn publish(all: Vec<Unfinished>) -> Result<(), (PathBuf, io::Error)> {
     Ok(())
 }
 
-/// Waits until the names in a folder are on the disk. Not every file system can be asked to.
+/// Waits until the names in a folder are on the disk. Not every file system supports it.
 pub fn sync_folder(folder: &Path) {
     if cfg!(unix) {
         let _ = File::open(folder).and_then(|folder| folder.sync_all());
@@ -168,7 +168,7 @@ fn heed_signals() {
 #[cfg(not(unix))]
 const fn heed_signals() {}
 
-/// Signals that whoever started this process wants it to ignore, a bit each, as far as the system says.
+/// Returns the signals that the parent of this process wants it to ignore, a bit each, if the system lists them.
 #[cfg(unix)]
 fn ignored_signals() -> u64 {
     let status = fs::read_to_string("/proc/self/status").unwrap_or_default();

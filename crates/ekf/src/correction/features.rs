@@ -9,7 +9,7 @@ pub const TIME_CONSTANTS_S: [f64; 6] = [0.25, 0.5, 1.0, 2.0, 8.0, 32.0];
 const FAR_FROM: [usize; 4] = [1, 3, 4, 5];
 /// The pairs among them whose differences are rates: of time constants τ/2 and τ.
 const RATES: [(usize, usize); 2] = [(0, 1), (2, 3)];
-/// A rate of a third of its usual size is still told apart well from twice that.
+/// Gain of the rates' tanh: a third of the usual rate is still well distinguished from twice that.
 pub const RATE_GAIN: f64 = 3.0;
 
 /// Readings farther away than this, in half ranges of the calibration's, are taken for this far: one gross error does not

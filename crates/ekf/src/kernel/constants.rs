@@ -161,7 +161,7 @@ impl<T: Scalar> Gain<T> {
     }
 }
 
-/// The gains of a branch at a sum of strains: what is not asked for is not computed.
+/// Gains of a branch at a sum of strains: each is computed when it is used.
 #[derive(Clone, Copy)]
 pub(super) struct GainsAt<'a, V: Lanes, const B: usize> {
     regions: &'a Regions<V::Number, [Gains<V::Number>; B]>,

@@ -71,7 +71,7 @@ pub(crate) trait Breeds<T: Real, const B: usize, const N: usize> {
 
     fn weighing(&self) -> &Weighing<T>;
 
-    /// Probabilities of the phases that follow one; `open` if its direction is not asked.
+    /// Probabilities of the phases that follow one; `open` if its direction is not used.
     fn follows(&self, from: Phase, open: bool) -> [T; 3];
 
     /// Returns the open path of hypotheses whose rates may turn around, for those `from` each phase; `was_open` if their directions were

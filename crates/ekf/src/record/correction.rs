@@ -171,7 +171,7 @@ fn value<'t>(of: &Quadratic<'_, f32>, x: &[Expression<'t>]) -> Expression<'t> {
     Quadratic { linear: &linear, square: &square }.value(x)
 }
 
-/// Inputs from a first one on, handed over as a list; those before it are not asked for.
+/// Returns inputs from a first one on, handed over as a list; those before it are not used.
 fn inputs_from<'t>(writer: &Writer<'t>, first: usize, name: &str) -> [Expression<'t>; FILTER_INPUTS] {
     core::array::from_fn(|i| {
         i.checked_sub(first).map_or(Expression::ZERO, |place| writer.input(&format!("{name}[{place}]")))

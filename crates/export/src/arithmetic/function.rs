@@ -183,7 +183,7 @@ impl Printed {
     }
 }
 
-/// A function of this kind and name. What it does not use of its parameters is said: compilers warn of it.
+/// Returns a function of this kind and name. Unused parameters are marked: compilers warn of them.
 pub fn defined(comment: &str, name: &str, parameters: &[String], body: &str) -> String {
     let is_of_names = |c: char| c.is_alphanumeric() || c == '_';
     let name_of = |parameter: &String| {

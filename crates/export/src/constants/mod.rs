@@ -121,7 +121,7 @@ struct EstimatorText {
 }
 
 impl Exported {
-    /// Checks that the sensor has an exported form and computes all of it. `plan` says what of its filter.
+    /// Checks that the sensor has an exported form and computes all of it. `plan` selects the filter and its parts.
     ///
     /// # Errors
     /// See [`ExportError`].

@@ -23,8 +23,8 @@ use crate::params::range::RangeParams;
 use crate::params::static_cubic::StaticCubic;
 use crate::params::summary::{Summary, TestedSummary};
 
-/// Largest factor on the deviations of a calibrated filter. One beyond it says that something else is wrong: calibrations say so
-/// where they reach it.
+/// Largest factor on the deviations of a calibrated filter. A larger one is a sign of another error: calibrations report when
+/// they reach it.
 pub const LARGEST_SD_SCALE: f64 = 5.0;
 /// Version of the parameter file this code reads and writes.
 pub const FORMAT: u32 = 9;
@@ -49,7 +49,7 @@ pub struct SensorParams {
     /// at rest. A resistance measured at rest is compared with this one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub measured_rest: Option<f64>,
-    /// The estimator to use unless another is asked for.
+    /// Default estimator.
     pub default_estimator: EstimatorKind,
     /// Summary of the calibration; `None` if nothing could be scored on parts left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]

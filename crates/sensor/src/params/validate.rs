@@ -1,7 +1,7 @@
 //! The range of every number in a sensor's parameters, in one place.
 //!
-//! A file that is edited by hand, or was damaged, is refused with the name of the number; it never becomes a filter that
-//! says something else than what it means.
+//! A file that is edited by hand, or was damaged, is refused with the name of the number; it never becomes a filter with
+//! wrong estimates.
 
 mod correction;
 pub mod table;

@@ -42,7 +42,7 @@ pub struct KnownStrain {
     pub time_s: f64,
     /// The strain, and how well it is known.
     pub known: Gaussian<f64>,
-    /// The statement, without what earlier known strains say of it.
+    /// Estimate of the strain, without the effect of earlier known strains.
     pub said: Gaussian<f64>,
 }
 

@@ -1,4 +1,4 @@
-//! Any filter behind one trait: what the kernels of `ohmstrain-ekf` become once a sensor says which of them it needs.
+//! Filters behind one trait: the kernels of `ohmstrain-ekf` in the instances that a sensor needs.
 
 mod backward;
 pub(crate) mod build;
@@ -173,7 +173,7 @@ pub struct Output {
 }
 
 impl Output {
-    /// Widens what is said of the strain, `stated` before doubts, to a variance, and by as much, on the mean slope, what is said of
+    /// Widens the estimate of the strain, `stated` before doubts, to a variance, and by as much, on the mean slope, the prediction of
     /// the reading after a hold.
     pub fn widen(&mut self, doubts: &Doubts<f64>, stated: Gaussian<f64>, variance: f64) {
         self.estimate.still_relaxes.variance += doubts.of_reading(variance - stated.variance).max(0.0);

@@ -173,8 +173,8 @@ where
         }
     }
 
-    /// The report of a row given later readings: mixed with what was said when it came where that is corrected, and in the
-    /// doubts of then.
+    /// Returns the output of a row given later readings: mixed with its first estimate if there is a correction, and with the
+    /// doubts of that time.
     fn lagged_row(&self, state: &E::State, said: &Said) -> Output {
         let scale = self.reports.filtered_scale.max(self.reports.smoothed_scale);
         let mut output = self.reports.row(state, &said.heard, scale);

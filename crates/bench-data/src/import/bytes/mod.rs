@@ -1,4 +1,4 @@
-//! Contents of a file: gzip unpacked, containers opened, text decoded. Nothing here asks for the meaning of a cell.
+//! Contents of a file: gzip unpacked, containers opened, text decoded. The meaning of cells is not considered here.
 
 mod archive;
 pub(crate) mod bounds;

@@ -15,7 +15,7 @@ const SEVERAL: u16 = 0x00bd;
 const ROWS: u32 = 1 << 16;
 const COLUMNS: u32 = 1 << 8;
 
-/// Refuses a workbook whose sheets are larger than may be held, or say so.
+/// Refuses a workbook whose sheets are, or claim to be, too large.
 pub(crate) fn check(bytes: &[u8]) -> Result<(), TooMuch> {
     let Some(stream) = compound::stream(bytes, &["Workbook", "Book"])? else {
         return Err(

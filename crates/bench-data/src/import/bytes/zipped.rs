@@ -1,5 +1,5 @@
-//! Looks into a zip container before anything in it is read: which kind of workbook it is, and how much it unpacks to. Rows
-//! and cells of ODS are repeated as often as a number says, and are counted.
+//! Inspection of a zip container before anything in it is read: the kind of workbook, and its unpacked size. Rows
+//! and cells of ODS with repetition counts are counted that many times.
 
 use std::io::{BufRead, BufReader, Cursor, Read, copy, sink};
 

@@ -24,7 +24,7 @@ pub struct Candidate {
     pub column: usize,
     /// Possible role.
     pub role: Role,
-    /// True if the name says so, not the unit alone.
+    /// True if the role follows from the name, not from the unit alone.
     pub is_named: bool,
 }
 
@@ -80,7 +80,7 @@ pub(crate) enum Dates {
     #[default]
     None,
     In(Order),
-    /// Day and month cannot be told apart.
+    /// A date whose day and month are ambiguous.
     Open,
 }
 
@@ -193,7 +193,7 @@ pub fn candidates(tables: &[Table]) -> Vec<Candidate> {
     tables.iter().enumerate().flat_map(|(file, table)| among(file, &says(table))).collect()
 }
 
-/// The candidates in a file, by what its columns say. `R_1` beside `R` is another thing.
+/// Returns the candidates in a file, by its columns' names and units. `R_1` beside `R` is another thing.
 pub(crate) fn among(table: usize, says: &[Option<(Role, Sureness)>]) -> Vec<Candidate> {
     let is_strong = |role: Role| says.contains(&Some((role, Sureness::Strong)));
     let said = says.iter().enumerate().filter_map(|(column, said)| said.map(|(role, how)| (column, role, how)));

@@ -179,7 +179,7 @@ impl Recipe {
         }
     }
 
-    /// The recipe with what its preset knows where it says nothing.
+    /// Returns the recipe completed by its preset.
     pub(crate) fn completed(&self) -> Self {
         let mut out = self.clone();
         let Some(preset) = self.preset else { return out };
@@ -199,7 +199,7 @@ impl Recipe {
         out
     }
 
-    /// The column that is said to have a role; `Some(None)` if there is to be none.
+    /// Returns the column that was given for a role; `Some(None)` if there is to be none.
     pub(crate) fn column(&self, role: Role) -> Option<Option<&ColumnName>> {
         let (_, name) = self.columns.iter().rev().find(|(of, _)| *of == role)?;
         Some(Some(name).filter(|name| !name.is_none()))
@@ -209,7 +209,7 @@ impl Recipe {
         self.units.iter().rev().find(|(of, _)| *of == role).map(|(_, unit)| unit.as_str())
     }
 
-    /// The flags that say it, each as one word of a command line, unquoted.
+    /// Returns the flags for it, each as one word of a command line, unquoted.
     #[must_use]
     pub fn arguments(&self) -> Vec<String> {
         let mut out = Vec::new();

@@ -16,7 +16,7 @@ const SHORTEST_STEP_S: f64 = 1e-5;
 /// A resistance without a unit is taken for ohms from this on.
 const LEAST_OHM: f64 = 10.0;
 
-/// The channel of a column, its unit found or asked. What follows from the numbers is remarked.
+/// Finds the channel of a column; its unit is found, or becomes a question. Conclusions from the numbers become remarks.
 pub(crate) fn channel(
     found: &Found,
     answers: &Recipe,
@@ -29,7 +29,7 @@ pub(crate) fn channel(
     Ok(Channel { role, place, unit })
 }
 
-/// A column whose unit is asked.
+/// Column whose unit is in question.
 struct Asked<'a> {
     table: &'a Table,
     column: &'a Column,

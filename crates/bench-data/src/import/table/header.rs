@@ -138,7 +138,7 @@ impl Header {
         Ok(top)
     }
 
-    /// `0,05,1600,1` under two names: commas that separate and commas that are decimal marks cannot be told apart.
+    /// Refuses `0,05,1600,1` under two names: separating commas and decimal commas are ambiguous.
     fn refuse_commas_for_both(&self, file: &str, grid: &Grid, first: usize) -> Result<(), ImportError> {
         let Some(above) = self.first_row.checked_sub(1).filter(|row| *row >= first) else { return Ok(()) };
         let names = grid.cells(above).len();
@@ -167,7 +167,7 @@ fn is_bracketed(cells: &[String]) -> bool {
     filled.peek().is_some() && filled.all(|cell| cell.starts_with(['(', '[']) && cell.ends_with([')', ']']))
 }
 
-/// True if a name says what is measured.
+/// True if a name is that of a measured quantity.
 fn is_quantity(heading: &str) -> bool {
     let (name, unit) = names::take_apart(heading);
     matches!(names::role(&name, unit.as_deref()), Some((_, Sureness::Strong)))

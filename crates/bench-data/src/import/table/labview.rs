@@ -74,7 +74,7 @@ impl<'a> Segment<'a> {
         [Cell::text("Time (s)")].into_iter().chain(cells[1..].iter().enumerate().map(channel)).collect()
     }
 
-    /// The next row behind its time; `None` if the header does not say how rows follow each other.
+    /// Returns the next row behind its time; `None` if the header has no step between rows.
     fn row(&mut self, cells: &[&'a str], decimal: DecimalMark) -> Option<Vec<Cell<'a>>> {
         let step = number(self.step, decimal, 0)?;
         let first = number(self.first, decimal, 0).unwrap_or(0.0);

@@ -105,14 +105,14 @@ pub enum LagError {
     Repeats(f64, f64),
 }
 
-/// Lag of a reference on the readings' clock, within ±12 s.
+/// Finds the lag of a reference on the readings' clock, within ±12 s.
 ///
-/// In recordings of two minutes and more at which lag a law with two branches explains the readings best, on blocks left out. In
-/// shorter ones, at each lag the readings are regressed on what the reference says of them there: its first three powers, and its movements,
-/// with and without their sign, through low-passes of one and eight times the time of a full stretch. What is slower than two
-/// full stretches is taken out of both sides. A lag is judged by readings that are left out of the regression, and rows that it
-/// leaves without a reference count as unexplained. Where the readings do not speak against a reference on time, that is
-/// the lag that is given. Rows that calibration does not believe take no part.
+/// In recordings of two minutes and more it is the lag at which a law with two branches explains the readings best, on held-out blocks. In
+/// shorter ones, at each lag the readings are regressed on the reference there: its first three powers, and its movements,
+/// with and without their sign, through low-passes of one and eight times the time of a full stretch. Changes slower than two
+/// full stretches are taken out of both sides. A lag is judged by readings that are left out of the regression, and rows that it
+/// leaves without a reference count as unexplained. Zero is returned unless the readings speak against a reference
+/// on time. Rows that calibration does not believe take no part.
 ///
 /// # Errors
 /// [`LagError`] if the motion does not tell.
@@ -171,7 +171,7 @@ pub fn clock_lag(readings: (&[f64], &[f64]), reference: (&[f64], &[f64])) -> Res
     search.lag(best, readings, reference)
 }
 
-/// The reference of each row, moved by `-lag_s`: what it says that much later, interpolated; NaN beyond its ends.
+/// Returns the reference of each row, moved by `-lag_s`: its value that much later, interpolated; NaN beyond its ends.
 #[must_use]
 pub fn aligned(samples: &Samples, lag_s: f64) -> Vec<f64> {
     let known: Vec<(f64, f64)> = samples

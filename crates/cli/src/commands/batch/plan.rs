@@ -47,7 +47,7 @@ impl Job {
         self.files.iter().map(|file| file.display().to_string()).collect::<Vec<_>>().join(", ")
     }
 
-    /// The command that does it, as a person would type it; where it writes to is not said yet.
+    /// Parses the command that does it, as a person would type it; its output is not given yet.
     pub fn parsed(&self, args: &BatchArgs) -> Result<Args, clap::Error> {
         let mut words = vec!["ohmstrain".to_owned(), args.command.name().to_owned()];
         if args.command == BatchCommand::Calibrate {
@@ -254,7 +254,7 @@ fn is_output(flag: &str) -> bool {
     ["--report", "--figures"].contains(&flag.split('=').next().unwrap_or_default())
 }
 
-/// A sensor that recordings share is said to be none, or none for their estimator, before anything is done, and once.
+/// Refuses a shared sensor file that is none, or none for the jobs' estimator, before anything is done, and once.
 pub fn check_sensor(jobs: &[Job], args: &BatchArgs) -> Result<(), CliError> {
     let shared = jobs.iter().filter_map(|job| job.sensor.as_ref().map(|sensor| (sensor, job.estimator)));
     let shared: HashSet<_> = shared.filter(|(sensor, _)| args.sensor.as_ref() == Some(*sensor)).collect();

@@ -48,7 +48,7 @@ pub fn phases(time_s: &[f64], strain: &[f64]) -> Vec<PhaseRows> {
 }
 
 impl Sensor {
-    /// One per estimator asked for, with the parameters of a file; at least one.
+    /// Reads a sensor for each requested estimator, with the parameters of a file; at least one.
     pub fn from_file(path: &Path, estimators: Estimators, corrects: bool) -> Result<Vec<Self>, CliError> {
         let wanted = if let Estimators::One(kind) = estimators { Some(kind) } else { None };
         let sensor = sensor_file::read(path, wanted)?;
@@ -67,8 +67,8 @@ impl Sensor {
         Ok(kinds.into_iter().map(judged).collect())
     }
 
-    /// One per estimator asked for, each calibrated as `calibrate --estimator` does; at least one. What a correction
-    /// corrects comes after it, as a part.
+    /// Calibrates a sensor for each requested estimator, as `calibrate --estimator` does; at least one. After a correction comes the
+    /// filter that it corrects, as a part.
     pub fn calibrated(
         training: &[TraceFile],
         estimators: Estimators,

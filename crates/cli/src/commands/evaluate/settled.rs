@@ -70,7 +70,7 @@ impl SettledScores {
     }
 }
 
-/// Scores of what is said of rows, and its deviation, against the last reading of their hold.
+/// Scores predictions of rows, with their deviations, against the last reading of their hold.
 fn scores(rows: &[(f64, &Estimate)], said: impl Fn(&Estimate) -> Option<(f64, Option<f64>)>) -> Option<Scores> {
     let scored = |(truth, row): &(f64, &Estimate)| {
         let (strain, sd) = said(row)?;

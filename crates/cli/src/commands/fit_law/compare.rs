@@ -1,4 +1,4 @@
-//! Several laws on the same segments, by what Akaike's and the Bayesian criterion say of them.
+//! Comparison of several laws on the same segments, by Akaike's and the Bayesian criterion.
 
 use serde::Serialize;
 

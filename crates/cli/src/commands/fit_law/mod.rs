@@ -31,7 +31,7 @@ pub struct Fits {
     pub name: String,
     /// Material by its metadata.
     pub material: Option<String>,
-    /// Length of the unstretched sensor, mm, where the metadata say it.
+    /// Length of the unstretched sensor, mm, if the metadata have it.
     pub gauge_length_mm: Option<f64>,
     /// Unit of the readings, `1` for a ratio.
     pub reading_unit: &'static str,

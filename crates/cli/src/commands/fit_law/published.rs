@@ -96,7 +96,7 @@ fn entries(recording: &Fits, in_mm: bool) -> Vec<Entry<'_>> {
     out
 }
 
-/// A recording that does not say its material stands for itself.
+/// Returns the file's name, for a recording without a material, which stands for itself.
 fn file_name(path: &str) -> &str {
     path.rsplit(['/', '\\']).next().unwrap_or(path)
 }

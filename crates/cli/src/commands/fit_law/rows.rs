@@ -64,7 +64,7 @@ impl From<String> for Cell {
 
 /// A table.
 pub struct Rows {
-    /// Leading columns that say what a row is about.
+    /// Number of leading columns that identify a row.
     pub keys: usize,
     pub header: Vec<String>,
     pub rows: Vec<Vec<Cell>>,

@@ -93,7 +93,7 @@ pub struct Session<'a> {
     taken: Option<Instant>,
     pub counts: Counts,
     pub recorder: Option<Recorder>,
-    /// The last thing that there was to say.
+    /// Last message.
     pub message: String,
 }
 

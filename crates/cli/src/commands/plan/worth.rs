@@ -21,7 +21,7 @@ pub const FASTEST_HZ: f64 = 50.0;
 const FINEST_HZ: f64 = 100.0;
 /// Bits of a converter; 0 for readings as good as the sensor.
 pub const BITS: [u32; 4] = [0, 12, 10, 8];
-/// Draws of noise and drift; the median of their errors is stated. One that leads the filter astray says little about sampling.
+/// Draws of noise and drift; the median of their errors is stated. One that leads the filter astray is no measure of sampling.
 const DRAWS: u64 = 5;
 /// Largest standard error of a parameter that counts as determined, as a share of it.
 const TOLD: f64 = 0.25;
