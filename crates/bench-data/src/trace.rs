@@ -140,7 +140,7 @@ impl Trace {
         self.rows(self.time_s.partition_point(|time| *time < start_s)..self.len())
     }
 
-    /// Some of the rows; what lies beyond the last row is passed over.
+    /// Returns some of the rows; rows beyond the last one are passed over.
     #[must_use]
     pub fn rows(&self, range: Range<usize>) -> Self {
         fn cut<T: Clone>(values: &[T], range: &Range<usize>) -> Vec<T> {

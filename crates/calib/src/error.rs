@@ -8,7 +8,7 @@ use thiserror::Error;
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum CalibrationError {
-    /// Nothing to calibrate on.
+    /// No recording to calibrate on.
     #[error("no recording with a known strain was given")]
     NoRecording,
     /// A recording is too short.

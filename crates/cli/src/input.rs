@@ -150,7 +150,7 @@ pub fn header(file: &str, line: u64) -> String {
 }
 
 impl TraceFile {
-    /// Some of its rows, under the same name.
+    /// Returns some of its rows, under the same name.
     pub fn rows(&self, rows: Range<usize>) -> Self {
         let (name, header, sha256) = (self.name.clone(), self.header.clone(), self.sha256.clone());
         Self { name, header, sha256, first_row: self.first_row + rows.start, trace: self.trace.rows(rows) }

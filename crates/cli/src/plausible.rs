@@ -43,7 +43,7 @@ pub fn distrusted(recordings: &[TraceFile], distrusted: &[Distrusted]) -> Vec<St
     distrusted.iter().map(line).collect()
 }
 
-/// The same on stderr, the first ones.
+/// Prints the first of them on stderr.
 pub fn warn_of_distrusted(recordings: &[TraceFile], rows: &[Distrusted], messages: &Messages) {
     let lines = distrusted(recordings, rows);
     lines.iter().take(NAMED_ROWS).for_each(|line| messages.warning(line));

@@ -15,7 +15,7 @@ pub struct Ekf<M> {
     model: M,
 }
 
-/// Everything one step computed.
+/// Results of one step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Step<T, const N: usize, const L: usize> {
     /// The transition from the old belief, as a smoother needs it.
@@ -96,7 +96,7 @@ impl<M> Ekf<M> {
         })
     }
 
-    /// The same with a step that was prepared before, for sensors read at a fixed rate.
+    /// Steps with a step that was prepared before, for sensors read at a fixed rate.
     ///
     /// # Errors
     /// See [`StepError`]; the belief passed in is untouched.

@@ -89,18 +89,18 @@ pub trait State<T: Scalar, const N: usize, const L: usize>: Clone {
     /// has no phases.
     fn phases(&self) -> Option<[T; 3]>;
 
-    /// The same state with less confidence: covariances times `factor`.
+    /// Returns the same state with less confidence: covariances times `factor`.
     #[must_use]
     fn inflated(&self, factor: T) -> Self;
 
-    /// The same state with another one beside it that has `share` of the weight, 0 to 1, from which a filter that has lost its
-    /// way may find it. Hypotheses give it a free place or that of the lightest; what has no room for another stays as it is.
+    /// Returns the state with another one beside it that has `share` of the weight, 0 to 1, from which a filter that has lost its
+    /// way may find it. In a filter of hypotheses it gets a free place or that of the lightest; a state without room for another stays as it is.
     #[must_use]
     fn beside(&self, _other: &Self, _share: T) -> Self {
         self.clone()
     }
 
-    /// The same state, of which steps keep at most so many hypotheses; what is no mixture stays as it is.
+    /// Returns the state, of which steps keep at most that many hypotheses; a state that is no mixture stays as it is.
     #[must_use]
     fn keeping(self, _most: usize) -> Self {
         self

@@ -57,7 +57,7 @@ const EKF: OfKind = OfKind {
     flash_branch: 2800.0,
     stack: [695.0, 185.0, 0.0, 0.0],
 };
-/// The same on an AVR, as lists of operations (`arithmetic/listed.rs`): cycles in simavr and avr-gcc's -Os, by `scripts/exported-c.sh`.
+/// Cost of the EKF on an AVR, as lists of operations (`arithmetic/listed.rs`): cycles in simavr and avr-gcc's -Os, by `scripts/exported-c.sh`.
 const EKF_ON_AVR: OfKind = OfKind {
     step: 179_000.0,
     hypothesis: 0.0,

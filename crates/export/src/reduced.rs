@@ -20,7 +20,7 @@ type Process = OwnedProcess<f64, FILTER_INPUTS>;
 const BETWEEN: [usize; 4] = [1, 2, 4, 8];
 const BEYOND: [usize; 2] = [2, 5];
 const AS_FAR: f64 = 0.7;
-/// And in rows whose inputs are other rows', with this weight: within the range of the rows, like nothing that was seen.
+/// Weight of rows whose inputs are mixed from other rows': within the range of the rows, unlike any row that was seen.
 const MIXED_WEIGHT: f64 = 0.03;
 const MIXED: [usize; 2] = [1, 2];
 /// A prime: other inputs come from far apart rows.

@@ -141,7 +141,7 @@ pub struct TurningNumbers {
     pub reach: f64,
     /// Path beyond the net move's of an even change, over the product of the change and its probability.
     pub even_excess: f64,
-    /// The same of a Brownian one, and its variance.
+    /// Excess of a Brownian rate, and its variance.
     pub brownian: (f64, f64),
     /// 1/√(2π).
     pub normal_density: f64,

@@ -275,7 +275,7 @@ impl<'a> FilterBuilder<'a> {
         Ok(filter)
     }
 
-    /// The same of a filter with a lag.
+    /// Resumes a filter with a lag.
     ///
     /// # Errors
     /// As [`Self::resume`].

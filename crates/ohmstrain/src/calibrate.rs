@@ -150,7 +150,7 @@ impl<'a> Calibration<'a> {
         self.run_with(recordings, |_| {})
     }
 
-    /// The same, telling `progress` what it is about.
+    /// Calibrates, calling `progress` with each stage.
     ///
     /// # Errors
     /// As [`calibrate`].

@@ -111,7 +111,7 @@ pub enum Error {
     /// The filter does not take a row. It stays as it was: the next good row goes on from the last good one.
     #[error(transparent)]
     Step(#[from] StepError),
-    /// The same, of a row of a recording, counted from zero.
+    /// Refused step at a row of a recording, counted from zero.
     #[error("row {row}: {source}")]
     Row {
         /// The row.

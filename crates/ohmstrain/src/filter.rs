@@ -156,7 +156,7 @@ impl Filter {
         Ok(kernel.rows.known_row((time_s, reading), &said))
     }
 
-    /// All that the next row depends on: [`FilterBuilder::resume`](crate::FilterBuilder::resume) goes on from it, to the bit.
+    /// Stores all that the next row depends on: [`FilterBuilder::resume`](crate::FilterBuilder::resume) resumes from it, to the bit.
     ///
     /// # Errors
     /// If TOML cannot hold it.

@@ -153,7 +153,7 @@ pub struct Evaluation {
     pub filter: Scores,
     /// The smoother's.
     pub smoother: Scores,
-    /// Those of strain as a cubic polynomial of the reading.
+    /// Scores of strain as a cubic polynomial of the reading.
     pub static_cubic: Scores,
 }
 

@@ -52,7 +52,7 @@ impl Sensor {
         Self::from_params(text::parse(text)?)
     }
 
-    /// The same for use with one estimator, whatever the text's default is.
+    /// Reads a sensor for use with one estimator, whatever the text's default is.
     ///
     /// # Errors
     /// As [`Self::from_toml`], for that estimator.
@@ -142,7 +142,7 @@ impl Sensor {
         &self.params
     }
 
-    /// The same, given away.
+    /// Returns the parameters, and consumes the sensor.
     ///
     /// ```
     /// # let text = std::fs::read_to_string("examples/sensor.toml")?;

@@ -71,7 +71,7 @@ pub enum StoredError {
         "expected the state of a filter of {expected}, found one of {found}; begin anew, or go on with that version"
     )]
     Version {
-        /// This one.
+        /// Format or version of this program.
         expected: String,
         /// Format or version that was found.
         found: String,

@@ -112,7 +112,7 @@ impl Sensor {
         Ok(LiveFilter::resumed(filter, self.sensor.clone(), columns, told, options.known.clone(), stored))
     }
 
-    /// The same with a lag.
+    /// Resumes a filter with a lag.
     #[pyo3(signature = (options, lag_s, state, file=None))]
     fn resume_lagged(&self, options: Options, lag_s: f64, state: &str, file: Option<&str>) -> PyResult<LaggedFilter> {
         let filter = options.builder(&self.sensor)?.resume_lagged(lag_s, &stored(state, file)?);

@@ -85,7 +85,7 @@ pub struct Scored {
 pub enum Sample {
     /// All of them.
     In,
-    /// Some of them.
+    /// Partly in the sample.
     Partly,
     /// None.
     Out,
@@ -109,7 +109,7 @@ pub struct ScoreRow<'a> {
     pub name: &'a str,
     /// Root mean squared error, in the quantity's unit.
     pub rmse: f64,
-    /// The same in percent of full scale.
+    /// Root mean squared error in percent of full scale.
     pub rmse_percent_fs: f64,
     /// Share of rows, 0 to 1, whose 95 % interval holds the reference; `None` for an estimator without intervals.
     pub coverage_95: Option<f64>,

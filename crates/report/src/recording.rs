@@ -46,7 +46,7 @@ pub struct PlottedRecording<'a> {
 }
 
 impl<'a> PlottedRecording<'a> {
-    /// Everything that more than one plot needs.
+    /// Prepares the data that more than one plot needs.
     pub fn new(input: &ReportInput<'a>) -> Self {
         let truth = input.truth.filter(|truth| truth.iter().any(|x| x.is_finite()));
         let estimates = if input.smoothed.is_empty() { input.filtered } else { input.smoothed };

@@ -78,7 +78,7 @@ pub fn scores(rows: &[ScoreRow], quantity: Quantity, sample: Sample) -> Table {
     )
 }
 
-/// Everything in the sensor's file.
+/// Lists all parameters in the sensor's file.
 pub fn parameters(params: &SensorParams, rest_reading: f64) -> Vec<Table> {
     let mut tables = vec![law(params, rest_reading)];
     tables.extend(estimator(params));

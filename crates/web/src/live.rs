@@ -73,12 +73,12 @@ impl Filter {
         Ok(self.columns.iter().flat_map(|column| rows.iter().map(|row| column.number(row))).collect())
     }
 
-    /// Tells a strain that is known now, and its standard deviation: 0 at rest.
+    /// Takes a known strain, and its standard deviation: 0 at rest.
     pub fn know(&mut self, strain: f64, sd: f64) -> Result<(), JsError> {
         self.filter.know(strain, sd).map(|_| ()).map_err(refused)
     }
 
-    /// Tells what the rested sensor reads now.
+    /// Sets the present reading of the rested sensor.
     #[wasm_bindgen(js_name = restResistance)]
     pub fn rest_resistance(&mut self, measured: f64) -> Result<(), JsError> {
         self.filter.rest_resistance(measured).map_err(refused)

@@ -119,7 +119,7 @@ impl Recording {
         }
     }
 
-    /// Some of its rows, by their times.
+    /// Returns some of its rows, by their times.
     pub(crate) fn between(&self, from_s: Option<f64>, until_s: Option<f64>) -> Self {
         let row_at = |time_s: f64| self.trace.time_s.partition_point(|earlier_s| *earlier_s < time_s);
         let end = until_s.map_or(self.trace.len(), row_at);

@@ -115,7 +115,7 @@ impl Sensor {
         firmware::of(self.sensor.params(), target, dt_s, budget.as_deref(), prefix.as_deref()).map_err(refused)
     }
 
-    /// The same sensor with another default estimator.
+    /// Returns the sensor with another default estimator.
     #[wasm_bindgen(js_name = withEstimator)]
     pub fn with_estimator(&self, name: &str) -> Result<Sensor, JsError> {
         let kind = estimator(name).map_err(refused)?;

@@ -26,7 +26,7 @@ pub enum Material {
 }
 
 impl Material {
-    /// Those that are made after published findings.
+    /// Materials after published findings.
     pub const ALL: [Self; 3] = [Self::Ecoflex0030, Self::Ecoflex0050, Self::Vytaflex10];
 
     /// The name used in files and flags.

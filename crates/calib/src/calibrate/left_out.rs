@@ -93,7 +93,7 @@ impl<'a> LeftOut<'a> {
         self.of_rows(build, |strain, truth| (strain.mean - truth).abs() / strain.sd())
     }
 
-    /// The same for the smoother of whole recordings; `None` if the estimator has none.
+    /// Returns the same for the smoother of whole recordings; `None` if the estimator has none.
     pub(crate) fn smoothed_deviations(&self, build: &Build) -> Option<Vec<Vec<f64>>> {
         let of_run = |run: &Run| {
             let mut smoother = build(run.fold).smoother(None).ok()?;

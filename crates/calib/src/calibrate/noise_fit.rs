@@ -128,7 +128,7 @@ impl<'a> NoiseProblem<'a> {
         problem
     }
 
-    /// The same with a prior of noise and motion.
+    /// Adds a prior of noise and motion.
     pub(crate) fn with_prior(self, of_make: Option<&'a EstimatorPrior>) -> Self {
         let same_size = of_make.filter(|prior| prior.ln_mean.len() == self.untuned.len());
         match same_size {

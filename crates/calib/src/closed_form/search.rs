@@ -50,7 +50,7 @@ impl Extent {
         (0..count).map(|i| Search { above_previous: i > 0, ..search.clone() }).collect()
     }
 
-    /// The same as rates, 1/s.
+    /// Returns the search ranges of `count` rates, 1/s.
     #[must_use]
     pub fn rates(&self, count: usize) -> Vec<Search> {
         let inverse = |search: Search| Search {

@@ -45,7 +45,7 @@ pub struct ClosedFormFit {
     pub r_squared: f64,
     /// Akaike's criterion `n (ln(2π sum/n) + 1) + 2 k`, k = p + 1 with the variance.
     pub aic: f64,
-    /// The same corrected for short records, `+ 2 k (k + 1) / (n - k - 1)`; infinite where that is not positive.
+    /// Akaike's criterion corrected for short records, `+ 2 k (k + 1) / (n - k - 1)`; infinite where that is not positive.
     pub aicc: f64,
     /// Bayesian criterion, with `k ln n` in place of `2 k`.
     pub bic: f64,

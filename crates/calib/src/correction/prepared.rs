@@ -110,7 +110,7 @@ impl<'a, const D: usize> Prepared<'a, D> {
         self.strain_variance * least_variance(kind)
     }
 
-    /// Lets `learn` see the examples of a process.
+    /// Calls `learn` with the examples of a process.
     fn taught<X>(&self, (kind, places): (ProcessKind, &[usize]), learn: impl Fn(Lessons) -> Option<X>) -> Option<X> {
         let (inputs, targets) = (seen(places, &self.rows), targets(kind, self.examples.inputs, self.examples.strain));
         learn(Lessons { inputs: &as_slices(&inputs), targets: &targets, time_s: self.examples.time_s })

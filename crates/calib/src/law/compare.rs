@@ -15,7 +15,7 @@ pub struct StructureScore {
     pub parameters: usize,
     /// Root mean squared residual, relative to R₀.
     pub error: f64,
-    /// The same on blocks left out.
+    /// Root mean squared residual on held-out blocks, relative to R₀.
     pub cross_validated_error: f64,
     /// Akaike's criterion; smaller is better.
     pub aic: f64,

@@ -12,7 +12,7 @@ pub struct NoiseStart {
 }
 
 impl NoiseStart {
-    /// Those of an estimator. The likelihood takes errors of readings for white: it starts with what they amount to at the
+    /// Takes the start from an estimator. The likelihood takes errors of readings for white: it starts with their size at the
     /// usual step of the rows.
     #[must_use]
     pub fn new(estimator: &EstimatorParams, time_s: &[f64]) -> Self {

@@ -103,7 +103,7 @@ pub enum Estimators {
     Auto,
     /// All estimators; for a sensor file, all that it has parameters for.
     All,
-    /// This one.
+    /// A given estimator.
     One(EstimatorKind),
 }
 

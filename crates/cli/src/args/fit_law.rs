@@ -97,7 +97,7 @@ hold after a release.";
 pub enum SegmentChoice {
     /// The recording without a cut.
     Whole,
-    /// Those of a phase, or the one with a number, from 1.
+    /// Segments of a phase, or the one with a number, from 1.
     Phase(Phase, Option<usize>),
 }
 

@@ -187,7 +187,7 @@ impl<'a, W: io::Write + Send> Stream<'a, W> {
         streamed.and(finished).map(|()| (written, state))
     }
 
-    /// All that goes on with the next row.
+    /// Returns the state from which the next row can go on.
     fn state(&self, rows: &Rows) -> Result<String, CliError> {
         let mut stored = self.filter.store()?;
         stored.rest_resistance = self.sink.rest;
@@ -232,7 +232,7 @@ impl<'a, W: io::Write + Send> Stream<'a, W> {
         self.begin(&[])
     }
 
-    /// Tells the filter what the rested sensor reads, and whoever watches it.
+    /// Passes the reading of the rested sensor to the filter, and to the watches.
     fn begin(&mut self, known: &'a [Known]) -> Result<(), CliError> {
         let sink = &mut self.sink;
         sink.rest.map_or(Ok(()), |measured| self.filter.rest_resistance(measured))?;

@@ -55,7 +55,7 @@ const MOST_LINKS: usize = 40;
 const HEAD: u64 = 4096;
 
 impl Place {
-    /// Looks whether `path` can be written, and leaves it as it is.
+    /// Checks that `path` can be written, and leaves it as it is.
     pub fn of(path: &Path) -> io::Result<Self> {
         let found = fs::metadata(path).ok();
         if let Some(found) = found.as_ref().filter(|found| !found.is_file() || is_descriptor(path)) {

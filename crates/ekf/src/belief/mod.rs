@@ -30,7 +30,7 @@ impl<T: Scalar, const N: usize, const L: usize> Belief<T, N, L> {
         Self { mean, covariance: Symmetric::from_diagonal(variance) }
     }
 
-    /// Before any reading: the model's long-run distribution.
+    /// Returns the belief before any reading: the model's long-run distribution.
     #[must_use]
     pub fn initial<const B: usize>(model: &SwitchedModel<T, B, N>) -> Self {
         let (mean, variance) = model.initial_distribution();

@@ -26,7 +26,7 @@ pub trait Start {
     /// The belief of its state.
     type Belief;
 
-    /// Before any reading: [`Belief::initial`].
+    /// Returns the belief before any reading: [`Belief::initial`].
     #[must_use]
     fn start(&self) -> Self::Belief;
 }

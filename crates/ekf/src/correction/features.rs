@@ -35,7 +35,7 @@ pub struct FeatureScale<T> {
 }
 
 impl FeatureScale<f64> {
-    /// The same in another precision.
+    /// Converts it to another precision.
     #[must_use]
     pub fn to<T: Recordable>(&self) -> FeatureScale<T> {
         FeatureScale {
@@ -75,7 +75,7 @@ pub struct ReadingFeatures<T> {
 }
 
 impl<T: Recordable> ReadingFeatures<T> {
-    /// Before the first reading.
+    /// Starts before the first reading.
     #[must_use]
     pub fn new(scale: FeatureScale<T>) -> Self {
         let low_passes = [T::zero(); TIME_CONSTANTS_S.len()];
@@ -113,7 +113,7 @@ impl<T: Recordable> ReadingFeatures<T> {
         self.now
     }
 
-    /// The same; a reading that surprises the filter is missing here, unless the three readings before it did, too.
+    /// Takes a step as [`Self::step`] does; a reading that surprises the filter counts as missing, unless the three readings before it did, too.
     pub fn step_unless(&mut self, surprises: bool, dt_s: T, reading: Option<T>) -> Option<[T; FEATURES]> {
         let reading = self.unless(surprises, reading);
         self.step(dt_s, reading)

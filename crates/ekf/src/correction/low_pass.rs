@@ -10,7 +10,7 @@ pub struct LowPass<T> {
 }
 
 impl<T: Recordable> LowPass<T> {
-    /// Before the first reading; the time constant, s, is positive.
+    /// Creates a low-pass before the first reading; the time constant, s, is positive.
     #[must_use]
     pub fn new(tau_s: T) -> Self {
         Self { tau_s, last: None, value: T::zero() }

@@ -20,7 +20,7 @@ impl<'a, T, const D: usize> Rows<'a, T, D> {
         Self { blocks, count }
     }
 
-    /// Looks at the rows, as many at a time as there are lanes.
+    /// Calls `see` with the rows, as many at a time as there are lanes.
     #[inline(always)]
     pub(super) fn side_by_side<V: Several<Number = T>>(self, like: V, mut see: impl FnMut(SideBySide<'a, V, D>)) {
         let mut left = self.count;

@@ -61,7 +61,7 @@ pub struct Prediction<T, const N: usize> {
     pub prior: Normal<T, N>,
 }
 
-/// Everything that one step computed. What stands for a missing entry of the reading is zero.
+/// Results of one step. For a missing entry of the reading they are zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Step<T, const N: usize, const M: usize> {
     /// The transition; that of an update alone stands still.

@@ -165,14 +165,14 @@ impl<T: Scalar> Gain<T> {
 #[derive(Clone, Copy)]
 pub(super) struct GainsAt<'a, V: Lanes, const B: usize> {
     regions: &'a Regions<V::Number, [Gains<V::Number>; B]>,
-    /// Those of all lanes, if they are in one region.
+    /// Gains of all lanes, if they are in one region.
     common: Option<&'a [Gains<V::Number>; B]>,
     pub strain_sum: V,
     i: usize,
 }
 
 impl<T: Scalar, const B: usize> Regions<T, [Gains<T>; B]> {
-    /// Those of the first branch; see [`GainsAt::of`].
+    /// Returns the gains of the first branch; see [`GainsAt::of`].
     #[inline(always)]
     pub(super) fn gains<V: Lanes<Number = T>>(&self, strain_sum: V) -> GainsAt<'_, V, B> {
         GainsAt { regions: self, common: self.common(strain_sum), strain_sum, i: 0 }
@@ -180,7 +180,7 @@ impl<T: Scalar, const B: usize> Regions<T, [Gains<T>; B]> {
 }
 
 impl<V: Lanes, const B: usize> GainsAt<'_, V, B> {
-    /// Those of another branch.
+    /// Returns the gains of another branch.
     #[inline(always)]
     pub(super) fn of(self, i: usize) -> Self {
         Self { i, ..self }

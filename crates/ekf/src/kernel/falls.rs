@@ -103,7 +103,7 @@ mod tests {
         assert!(f64::NAN.falling().is_nan());
     }
 
-    /// The same in single precision, against double.
+    /// Compares the exponentials in single precision with those in double.
     #[test]
     fn exponentials_in_single_precision() {
         for k in 0..87_000 {

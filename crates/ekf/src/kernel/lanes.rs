@@ -21,7 +21,7 @@ pub trait Lanes:
     /// Number of lanes.
     const WIDTH: usize;
 
-    /// The same number in all lanes, of which there are as many as here.
+    /// Returns the same number in all lanes, of which there are as many as here.
     #[must_use]
     fn with(self, number: Self::Number) -> Self;
     /// `self · factor + term`, in one rounding where the processor does that for vectors.
@@ -168,7 +168,7 @@ impl<T: Scalar> Lanes for T {
         if mask { yes } else { no }
     }
 
-    /// Never inlined: what a compiler knows to be an exponential it may compute for gauges that have none.
+    /// Computes the exponential, never inlined: a compiler that knows it may compute it for gauges that have none.
     #[inline(never)]
     fn exponential(self) -> T {
         self.exp()

@@ -94,7 +94,7 @@ fn put<'a, V: Lanes + 'a>(places: &mut impl Iterator<Item = &'a mut V>, number: 
 }
 
 impl<V: Lanes, const B: usize> Parts<V, B> {
-    /// Everything known to be `nothing`.
+    /// Returns parts that are all known to be `nothing`.
     pub(crate) const fn certain(nothing: V) -> Self {
         Self {
             strain: nothing,

@@ -79,7 +79,7 @@ pub(super) fn sum<V: Lanes>(start: V, [a0, a1]: [V; 2], [b0, b1]: [V; 2]) -> V {
     a1.mul_add(b1, a0.mul_add(b0, start))
 }
 
-/// The same number twice in all lanes.
+/// Returns the same two numbers in all lanes.
 #[inline(always)]
 fn pair<V: Lanes>(like: V, [a, b]: [V::Number; 2]) -> [V; 2] {
     [like.with(a), like.with(b)]
@@ -257,7 +257,7 @@ fn known<V: Lanes, const B: usize>(gains: GainsAt<'_, V, B>, unit: V, phase: Pha
     driven_by(gain, gains.strain_sum, unit)
 }
 
-/// The same where the rate may have turned around on the way.
+/// Returns the drive of a branch if the rate may have turned around on the way.
 #[inline(always)]
 fn within<V: Lanes, const B: usize>(
     branch: &BranchConstants<V::Number, B>,
@@ -282,7 +282,7 @@ fn within<V: Lanes, const B: usize>(
     }
 }
 
-/// The same where the rate's distribution decides.
+/// Returns the drive of a branch if the rate's distribution decides the direction.
 #[inline(always)]
 fn split<V: Lanes, S: Switch<V>, const B: usize>(
     branch: &BranchConstants<V::Number, B>,

@@ -97,7 +97,7 @@ fn answered<V: Lanes, const B: usize>(by: [V::Number; 2], (mean, variance): (V, 
 }
 
 impl<T: Scalar> Gaussian<T> {
-    /// The same in all lanes, of which there are as many as here.
+    /// Returns the same Gaussian in all lanes, of which there are as many as here.
     #[inline(always)]
     pub(crate) fn in_lanes<V: Lanes<Number = T>>(self, like: V) -> Gaussian<V> {
         Gaussian { mean: like.with(self.mean), variance: like.with(self.variance) }
@@ -145,7 +145,7 @@ impl<V: Falls, const B: usize> Parts<V, B> {
         V::pick(cut, self.cut_off::<X, N>(side, cut), certain)
     }
 
-    /// The same where there is something to `cut` off.
+    /// Restricts the rate in the lanes that need a `cut`.
     #[inline(always)]
     pub(crate) fn cut_off<X: Switch<V>, const N: usize>(&mut self, side: V, cut: V::Mask) -> V {
         let (zero, gone) = (side.nothing(), side.literal(-1.0));

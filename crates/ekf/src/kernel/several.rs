@@ -157,7 +157,7 @@ pub(crate) trait Work<T> {
     /// Result of the work.
     type Said;
 
-    /// Does it with lanes as these.
+    /// Does the work with lanes like these.
     fn with_lanes<V: Several<Number = T>>(self, like: V) -> Self::Said;
 }
 

@@ -135,7 +135,7 @@ fn scaled<V: Lanes>(x: V, square: V) -> V {
     if V::none(is_far) { middle } else { V::pick(is_far, far(x, square), middle) }
 }
 
-/// The same beyond 4.
+/// Returns `exp(x²) erfc(x)` beyond 4.
 #[inline(always)]
 fn far<V: Lanes>(x: V, square: V) -> V {
     let c = <V::Number as Scalar>::of;

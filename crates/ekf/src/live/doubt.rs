@@ -13,10 +13,10 @@ pub struct DoubtNumbers {
     /// Factor on the distance of readings outside the calibrated range on the side of rest. A sensor that has not moved for long starts
     /// there and soon leaves it.
     pub near_counts: f64,
-    /// The same on the other side, where nothing leads but another R₀, another gain or a strain beyond calibration's: if all readings
-    /// are off, only those at an end of their range show it, and not all of it.
+    /// Factor on the distance of readings outside on the other side, reached only with another R₀, another gain or a strain beyond
+    /// calibration's: if all readings are off, only those at an end of their range show it, and not all of it.
     pub far_counts: f64,
-    /// Share of calibration's range of readings by which they may lie outside for nothing.
+    /// Tolerance of readings outside the calibrated range, as a share of it.
     pub margin: f64,
     /// Factor on the fastest rate of calibration, its 99th percentile, above which a rate is flagged.
     pub faster: f64,
@@ -64,7 +64,7 @@ pub struct DoubtParts<T> {
 }
 
 impl DoubtParts<f64> {
-    /// The same in another precision.
+    /// Converts it to another precision.
     #[must_use]
     pub fn to<T: Recordable>(&self) -> DoubtParts<T> {
         DoubtParts {
@@ -186,7 +186,7 @@ pub struct Doubts<T> {
 }
 
 impl<T: Recordable> Doubts<T> {
-    /// Before the first row.
+    /// Starts before the first row.
     #[must_use]
     pub fn new(parts: DoubtParts<T>) -> Self {
         Self {
@@ -204,14 +204,14 @@ impl<T: Recordable> Doubts<T> {
         }
     }
 
-    /// The same where the strain is known at the start, and whether it is none.
+    /// States that the strain is known at the start; `rests` if it is zero.
     #[must_use]
     pub fn of_known_strain(self, rests: bool) -> Self {
         let rest = self.parts.rest.map(|seen| RestWatch::new(seen, rests));
         Self { starts: false, fading: T::zero(), unread_s: T::zero(), rest, ..self }
     }
 
-    /// The same for a filter whose correction counts how large innovations have been.
+    /// States that the filter's correction includes the size of innovations.
     #[must_use]
     pub fn of_corrected(self) -> Self {
         Self { corrected: true, ..self }

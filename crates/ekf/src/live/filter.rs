@@ -105,7 +105,7 @@ pub struct LiveFilter<T: Real, E: SensorEstimator<T, N, L>, C, const N: usize, c
     sieve: Sieve<T>,
     /// R₀ of the law, moved by the measured reading at rest if one was given.
     rest_reading: T,
-    /// Before any reading.
+    /// State before any reading.
     fresh: E::State,
     /// The way over a pause, prepared.
     prepared: (Pause<T>, Repeated<E::Prepared, T>),
@@ -137,7 +137,7 @@ where
     E: SensorEstimator<T, N, L>,
     C: Correct<T>,
 {
-    /// Before any reading.
+    /// Creates a filter before any reading.
     #[must_use]
     pub fn new(estimator: E, parts: LiveParts<T, C>) -> Self {
         let fresh = estimator.start(None);
@@ -157,14 +157,14 @@ where
         }
     }
 
-    /// The same before any reading, with some protections turned off.
+    /// Turns off some protections, before any reading.
     #[must_use]
     pub fn protected_by(self, protections: Protections) -> Self {
         let now = Memory::new(&self.parts, protections, (self.fresh.clone(), at_reading(&self.estimator, &self.parts)));
         Self { guard: guard(protections), protections, sieve: self.parts.sieve.under(protections), now, ..self }
     }
 
-    /// The same with another guard against outliers.
+    /// Sets another guard against outliers.
     #[must_use]
     pub fn guarded_by(self, guard: Guard<T>) -> Self {
         Self { guard, ..self }
@@ -393,7 +393,7 @@ where
         }
     }
 
-    /// Lets the correction see a reading that the filter has used.
+    /// Passes a reading that the filter has used to the correction.
     fn watch(&mut self, dt_s: T, heard: &Heard<T>, filtered: Gaussian<T>) {
         if let Some(watched) = &mut self.now.watched {
             watched.step_unless(heard.surprises(), dt_s, heard.used.map(|used| used.value));

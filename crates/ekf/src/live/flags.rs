@@ -142,7 +142,7 @@ impl Flags {
         Self(self.0 | (raised as u16) << flag as u16)
     }
 
-    /// Those of either.
+    /// Returns the flags raised in either.
     ///
     /// ```
     /// use ohmstrain_ekf::live::{Flag, Flags};

@@ -11,7 +11,7 @@ impl<T: Recordable> Innovations<T> {
     /// Cap on a normalised innovation squared: a single outlier is not a law that does not fit.
     pub const MOST: f64 = 30.0;
 
-    /// Before any.
+    /// Starts before any innovation.
     #[must_use]
     pub fn none() -> Self {
         Self { mean: T::zero() }

@@ -4,7 +4,7 @@ use crate::Recordable;
 pub const SURPRISING_NIS: f64 = 9.0;
 /// Normalised innovation squared above which a reading startles: five standard deviations.
 const STARTLING_NIS: f64 = 25.0;
-/// After so many startling readings in a row a filter looks again.
+/// Number of startling readings in a row after which a filter looks again.
 const BESIDE_AFTER: f64 = 2.0;
 /// Weight that the knowledge from before any reading then gets.
 pub const BESIDE_SHARE: f64 = 0.1;
@@ -21,7 +21,7 @@ pub struct Jumps<T> {
 }
 
 impl<T: Recordable> Jumps<T> {
-    /// Before any reading.
+    /// Starts before any reading.
     #[must_use]
     pub fn none() -> Self {
         Self { startling: T::zero(), calm: None }

@@ -34,7 +34,7 @@ pub struct LiveParts<T, C> {
 }
 
 impl<T, C> LiveParts<T, C> {
-    /// The same with a correction, or without.
+    /// Sets the correction, or none.
     #[must_use]
     pub fn with_correction<D>(self, learned: Option<(FeatureScale<T>, D)>) -> LiveParts<T, D> {
         let Self { rest_reading, rested, dt_s, longest_step_s, limits, strain_sd_scale, .. } = self;
@@ -57,7 +57,7 @@ impl<T, C> LiveParts<T, C> {
 }
 
 impl<C> LiveParts<f64, C> {
-    /// The same in another precision, without a correction.
+    /// Converts it to another precision, without a correction.
     #[must_use]
     pub fn to<T: Recordable>(&self) -> LiveParts<T, ()> {
         LiveParts {

@@ -6,7 +6,7 @@ use crate::{Reading, Recordable};
 struct Following {
     /// Time constant with which R₀ leaves calibration's for where the readings want it, s.
     leaves_s: f64,
-    /// The same, where a whole recording is gone through for the one R₀ of all its rows.
+    /// Time constant where a whole recording is processed for the one R₀ of all its rows, s.
     settles_s: f64,
     /// Time constant with which it comes back, s.
     returns_s: f64,
@@ -58,7 +58,7 @@ pub struct SessionStart<T> {
 }
 
 impl RestBounds<f64> {
-    /// The same in another precision.
+    /// Converts it to another precision.
     #[must_use]
     pub fn to<T: Recordable>(&self) -> RestBounds<T> {
         RestBounds {
@@ -92,7 +92,7 @@ pub struct RestFollower<T> {
     bounds: RestBounds<T>,
     /// Relative deviation of R₀ from calibration's.
     pub(crate) off: T,
-    /// The same when the session began.
+    /// Relative deviation of R₀ when the session began.
     pub(crate) home: T,
     /// True once R₀ of the session has its start.
     pub(crate) has_begun: bool,
@@ -104,7 +104,7 @@ pub struct RestFollower<T> {
 }
 
 impl<T: Recordable> RestFollower<T> {
-    /// Before any reading, R₀ is calibration's.
+    /// Starts before any reading, with calibration's R₀.
     ///
     /// ```
     /// let bounds = ohmstrain_ekf::live::RestBounds { low: None, high: Some(1.5), start: None };
@@ -115,7 +115,7 @@ impl<T: Recordable> RestFollower<T> {
         Self { bounds, off: T::zero(), home: T::zero(), has_begun: false, last: None, since_s: T::zero(), jumped: None }
     }
 
-    /// The same for a session that begins stretched: its first reading tells nothing of R₀.
+    /// Starts a session that begins stretched: its first reading carries no information on R₀.
     ///
     /// ```
     /// let start = Some(ohmstrain_ekf::live::SessionStart { reading: 0.0, weight: 0.5 });

@@ -19,7 +19,7 @@ pub struct RestSeen<T> {
 }
 
 impl RestSeen<f64> {
-    /// The same in another precision.
+    /// Converts it to another precision.
     #[must_use]
     pub fn to<T: Recordable>(&self) -> RestSeen<T> {
         RestSeen {
@@ -51,7 +51,7 @@ pub struct RestWatch<T> {
 }
 
 impl<T: Recordable> RestWatch<T> {
-    /// Before any reading; `rests` if the sensor is known to rest then.
+    /// Starts before any reading; `rests` if the sensor is known to rest then.
     ///
     /// ```
     /// use ohmstrain_ekf::live::{RestSeen, RestWatch};

@@ -20,7 +20,7 @@ pub struct Sieve<T> {
 }
 
 impl Sieve<f64> {
-    /// The same in another precision.
+    /// Converts it to another precision.
     #[must_use]
     pub fn to<T: Recordable>(&self) -> Sieve<T> {
         Sieve {
@@ -36,11 +36,11 @@ impl Sieve<f64> {
 
 /// Number of repeats from which on a number is stuck, for readings with fine resolution.
 pub const MOST_REPEATS: u32 = 10;
-/// The same where the step of the readings is as coarse as their noise allows: a still sensor gives one code as often.
+/// Number of repeats for readings whose step is as coarse as their noise allows: a still sensor gives one code as often.
 pub const MOST_CODE_REPEATS: u32 = 300;
 
 impl<T: Recordable> Sieve<T> {
-    /// Lets everything pass.
+    /// Returns the sieve that lets everything pass.
     #[must_use]
     pub fn open() -> Self {
         let endless = T::one() / T::zero();
@@ -97,7 +97,7 @@ pub struct Repeats<T> {
 }
 
 impl<T: Recordable> Repeats<T> {
-    /// Before any reading.
+    /// Starts before any reading.
     #[must_use]
     pub fn none() -> Self {
         Self { last: None, since_s: T::zero(), repeated_s: T::zero(), count: T::zero() }
@@ -144,8 +144,8 @@ impl<T: Recordable> Repeats<T> {
         Ok(Reading { extra_variance, ..reading })
     }
 
-    /// The same number for longer than a still sensor gives it. Of a converter whose step is not much smaller than the noise more
-    /// repetitions are taken for chance, and none is a fault where its step is larger.
+    /// True if the number has repeated for longer than a still sensor gives it. For a converter whose step is not much smaller than the
+    /// noise more repetitions are taken for chance; if its step is larger, none is a fault.
     fn is_stuck(&self, sieve: &Sieve<T>, extra_variance: T) -> bool {
         let codes = T::of(f64::from(MOST_CODE_REPEATS));
         let most = if extra_variance > T::zero() { codes } else { sieve.most_repeats };

@@ -62,7 +62,7 @@ impl<T: Recordable> Unread<T> {
 }
 
 impl Unread<f64> {
-    /// The same in another precision.
+    /// Converts it to another precision.
     #[must_use]
     pub fn to<T: Recordable>(&self) -> Unread<T> {
         Unread {

@@ -29,7 +29,7 @@ pub(crate) struct Parents<V: Lanes> {
     pub turning: Option<Turning<V>>,
 }
 
-/// Sees children on their way to the reading.
+/// Recorder of children on their way to the reading.
 pub(crate) trait Trail<V: Lanes, const B: usize> {
     /// Records the starts: the parents' beliefs, with a new rate where a phase `begins`.
     fn starts(&mut self, _from: &Parts<V, B>, _begins: V::Mask, _course: &Course<V>) {}

@@ -110,7 +110,7 @@ macro_rules! over_phases {
                 self.model().longest_step_s().min(self.dwell.longest_step_s())
             }
 
-            /// The same filter for steps of another length.
+            /// Returns the filter for steps of another length.
             fn every(&self, dt_s: T) -> Self {
                 let mut other = *self;
                 other.kernel.set_length(dt_s);
@@ -153,7 +153,7 @@ macro_rules! mixture_steps {
             }
         }
 
-        /// Never inlined: a program has it once, for the first try and for all others.
+        /// Steps once, never inlined: a program has it once, for the first try and for all others.
         #[inline(never)]
         fn step_once<const L: usize>(
             &self,

@@ -259,7 +259,7 @@ impl<T: Scalar> MixtureResidual<T> {
         self.factor.ln() + self.exponent - T::of(0.5) * self.tempering * T::two_pi().ln()
     }
 
-    /// The same for [`Estimator`](crate::Estimator).
+    /// Converts it for [`Estimator`](crate::Estimator).
     pub(crate) fn innovation(&self) -> Result<Innovation<T>, StepError> {
         self.residual.with_log_likelihood(self.log_likelihood())
     }

@@ -20,7 +20,7 @@ impl<T: Scalar> Pause<T> {
         Self { seconds: T::zero(), open: false }
     }
 
-    /// After a step of `dt_s` more seconds without a reading; the direction stays open from `longest_s` on.
+    /// Adds a step of `dt_s` seconds without a reading; the direction stays open from `longest_s` on.
     pub(crate) fn goes_on(self, dt_s: T, longest_s: T) -> Self {
         let seconds = self.seconds + dt_s;
         Self { seconds, open: seconds > longest_s * T::of(GRACE) }

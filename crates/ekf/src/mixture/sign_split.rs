@@ -82,7 +82,7 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
         longest_cut_s(self.model())
     }
 
-    /// The same filter for steps of another length.
+    /// Returns the filter for steps of another length.
     fn every(&self, dt_s: T) -> Self {
         let mut other = *self;
         other.kernel.set_length(dt_s);
@@ -204,7 +204,7 @@ fn follows<T: Real>(chain: Option<&[[T; 3]; 3]>, phase: Phase) -> [T; 3] {
     }
 }
 
-/// The same where the direction stays open: a movement goes on as one, until a reading splits it.
+/// Returns the probabilities if the direction stays open: a movement goes on as one, until a reading splits it.
 fn goes_on<T: Real>(chain: Option<&[[T; 3]; 3]>, phase: Phase) -> [T; 3] {
     let (stops, zero) = (chain.map_or(T::zero(), |chain| chain[0][1]), T::zero());
     match (chain, phase) {

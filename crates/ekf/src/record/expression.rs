@@ -66,7 +66,7 @@ impl<'a> Expression<'a> {
         }
     }
 
-    /// The same; of a constant it is written down as well.
+    /// Records the operation; that of a constant, too.
     fn noted(self, operation: impl Fn(Place) -> Operation) -> Self {
         self.then(|_| f32::NAN, operation)
     }

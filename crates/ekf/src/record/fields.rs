@@ -7,7 +7,7 @@ pub trait Fields<T> {
     fn each(&mut self, see: &mut impl See<T>);
 }
 
-/// Looks at the fields of a state, and may change them.
+/// Visitor of the fields of a state, which may change them.
 pub trait See<T> {
     /// A number.
     fn number(&mut self, name: &'static str, number: &mut T);

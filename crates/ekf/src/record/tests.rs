@@ -15,7 +15,7 @@ use crate::{Belief, Compact, Evidence, Gaussian, Reading, SparseEkf};
 type Filter = SparseEkf<f32, Compact, 2, 5>;
 type State = Belief<f32, 5, 15>;
 
-/// Does what is written down: truths as 1 and 0.
+/// Runs the recorded operations: truths as 1 and 0.
 pub(super) fn run(recorded: &Recorded, inputs: &[f32]) -> Vec<f32> {
     let truth = |truth: bool| f32::from(u8::from(truth));
     let mut values: Vec<f32> = Vec::new();

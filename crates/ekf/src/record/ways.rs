@@ -240,7 +240,7 @@ mod tests {
         }
     }
 
-    /// Does what is written down with a state and inputs; the state after it, and what is given.
+    /// Runs a recorded function with a state and inputs; returns the new state, and the results.
     fn done(function: &Function, state: &HashMap<String, f32>, own: &[(&str, f32)]) -> [HashMap<String, f32>; 2] {
         let of = |name: &Name| match name {
             Name::Field(field) => state.get(field).copied().unwrap_or(f32::NAN),

@@ -46,7 +46,7 @@ pub struct SharedConstants {
 }
 
 impl SharedConstants {
-    /// The same for every sensor.
+    /// Returns the constants that are the same for every sensor.
     pub fn new() -> Self {
         Self {
             least_weight: Literal(shared::LEAST_WEIGHT_KEPT),

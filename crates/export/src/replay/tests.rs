@@ -51,7 +51,7 @@ fn twin(sensor: &Sensor, kind: EstimatorKind, rows: &[Row], protections: Protect
     of_computer(params, &parts, Replayed { rows, protections })
 }
 
-/// Does something with the twin in double precision, whose steps are those of a computer: lengths to a nanosecond, and pauses divided
+/// Runs a task with the twin in double precision, whose steps are those of a computer: lengths to a nanosecond, and pauses divided
 /// as where no table ends.
 fn of_computer<J: Task<f64>>(params: &SensorParams, parts: &ChipFilter, task: J) -> J::Said {
     let mut fixed = FixedRate::<2, 5>::new::<15>(params, parts, 0.05).unwrap();

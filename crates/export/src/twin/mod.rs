@@ -118,7 +118,7 @@ pub trait Task<T: Real> {
     /// Its result.
     type Said;
 
-    /// Does it.
+    /// Runs the task.
     ///
     /// # Errors
     /// If the filter refuses a step.
@@ -127,7 +127,7 @@ pub trait Task<T: Real> {
         F: SensorEstimator<T, N, L, Prepared = F> + StepNumbers<T>;
 }
 
-/// Does something with the twin of a sensor, in the precision of a model.
+/// Runs a task with the twin of a sensor, in the precision of a model.
 ///
 /// # Errors
 /// If the filter cannot work with its numbers, or refuses a step.

@@ -75,7 +75,7 @@ pub struct EstimatorParams {
     /// Factor on the filter's standard deviation of strain, from how its 95 % interval covered the calibration, every
     /// block with the law that had not seen it.
     pub strain_sd_scale: f64,
-    /// The same for the smoother, where there is one.
+    /// Factor for the smoother, if there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub smoothed_sd_scale: Option<f64>,
     /// Parameters of the body's motion.

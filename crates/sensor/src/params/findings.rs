@@ -78,7 +78,7 @@ pub struct Scores {
     pub n: usize,
     /// Root mean squared error, in the unit of strain.
     pub rmse: f64,
-    /// The same in percent of full scale: the reference's range in the rows scored.
+    /// Root mean squared error in percent of full scale: the reference's range in the rows scored.
     pub rmse_percent_fs: f64,
     /// Mean absolute error, in the unit of strain.
     pub mae: f64,
@@ -86,13 +86,13 @@ pub struct Scores {
     pub bias: f64,
     /// Share of rows whose 50 % interval holds the truth; empty for estimates without a deviation.
     pub coverage_50: Option<f64>,
-    /// The same for 90 %.
+    /// Share of rows whose 90 % interval holds the truth.
     pub coverage_90: Option<f64>,
-    /// The same for 95 %.
+    /// Share of rows whose 95 % interval holds the truth.
     pub coverage_95: Option<f64>,
     /// Mean width of the 95 % interval, in the unit of strain: what the coverage was bought with.
     pub width_95: Option<f64>,
-    /// The same in percent of full scale.
+    /// Mean width of the 95 % interval in percent of full scale.
     pub width_95_percent_fs: Option<f64>,
     /// Mean continuous ranked probability score, in the unit of strain: of a normal distribution with the estimate as its
     /// mean, as reported (within the limits), and its deviation. Less is better, whether an error is too large or an
@@ -100,7 +100,7 @@ pub struct Scores {
     ///
     /// Source: Gneiting & Raftery, *J. Am. Stat. Assoc.* 102 (2007) 359, eq. 21.
     pub crps: f64,
-    /// The same in percent of full scale.
+    /// Mean continuous ranked probability score in percent of full scale.
     pub crps_percent_fs: f64,
     /// Mean log density of the truth, strain in units of full scale; a reference is given a deviation of 0.5 % of it.
     pub log_score: Option<f64>,

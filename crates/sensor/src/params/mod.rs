@@ -29,7 +29,7 @@ pub const LARGEST_SD_SCALE: f64 = 5.0;
 /// Version of the parameter file this code reads and writes.
 pub const FORMAT: u32 = 9;
 
-/// Everything a filter needs to know of a sensor: the content of `sensor.toml`.
+/// Parameters of a sensor, all that a filter needs: the content of `sensor.toml`.
 ///
 /// Strains stand for the reference quantity; with [`Quantity::AngleDeg`] they are degrees.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

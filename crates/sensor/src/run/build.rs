@@ -74,10 +74,10 @@ fn needed(learned: Option<&Arc<Learned>>, kind: EstimatorKind) -> Result<Option<
     Ok(Some(learned.ok_or(NoParameters { kind })?))
 }
 
-/// All that a filter is made of but its correction.
+/// Parts of a filter without its correction.
 #[derive(Clone, Copy)]
 pub struct FilterParts<'a> {
-    /// Never [`EstimatorKind::Corrected`].
+    /// Kind of filter, never [`EstimatorKind::Corrected`].
     kind: EstimatorKind,
     law: &'a LawParams,
     estimator: EstimatorParams,
@@ -99,7 +99,7 @@ impl<'a> FilterParts<'a> {
         Self { kind, law, estimator, parts: bare_parts(&estimator, limits), options: Options::plain() }
     }
 
-    /// The same with other options.
+    /// Sets other options.
     #[cfg(test)]
     pub(crate) fn with(self, options: Options) -> Self {
         Self { options, ..self }

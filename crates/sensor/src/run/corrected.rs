@@ -98,7 +98,7 @@ impl<'a> CorrectedWayBack<'a> {
         Self { back, correction, rows, starts, ahead: Watched::new(learned.future_scale()) }
     }
 
-    /// After the last reading the future is as at the last reading: settled.
+    /// Corrects a smoothed row; after the last reading the future is as at the last reading: settled.
     fn correct(&self, output: &Output, past: &[f64; FEATURES], future: Option<[f64; FEATURES]>) -> Gaussian<f64> {
         let future = future.map_or([0.0; FUTURE_FEATURES], future_features);
         let inputs = smoother_inputs(&outputs(output), past, &future);

@@ -91,7 +91,7 @@ impl Size {
 }
 
 impl KnownErrors {
-    /// Before any strain is known.
+    /// Starts before any strain is known.
     #[must_use]
     pub const fn new(limits: StrainRange<f64>) -> Self {
         Self { limits, strains: VecDeque::new(), usual: 0.0, voices: Vec::new() }

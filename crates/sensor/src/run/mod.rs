@@ -39,7 +39,7 @@ pub trait Filter: Send {
     /// Strain at the last row, within the limits.
     fn strain(&self) -> Gaussian<f64>;
 
-    /// Everything that is reported of the last row.
+    /// Returns all that is reported about the last row.
     fn output(&self) -> Output;
 
     /// Like [`Self::step`], but every row is estimated from the readings up to `lag_s` seconds after it; `out` gets the
@@ -61,7 +61,7 @@ pub trait Filter: Send {
     /// See [`StepError`].
     fn flush_lagged(&mut self, out: &mut dyn FnMut(Output)) -> Result<(), StepError>;
 
-    /// All that the next row depends on but the parameters and options that the filter was made of.
+    /// Stores all that the next row depends on, except the parameters and options that the filter was made of.
     ///
     /// # Errors
     /// If TOML cannot hold it.

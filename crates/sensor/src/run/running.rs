@@ -106,7 +106,7 @@ impl<E, const B: usize, const N: usize, const L: usize> Running<E, B, N, L>
 where
     E: SensorEstimator<f64, N, L>,
 {
-    /// Before any row.
+    /// Starts before any row.
     pub(crate) fn new(
         estimator: E,
         parts: LiveParts<f64, SharedCorrection>,

@@ -135,7 +135,7 @@ impl Dates {
 }
 
 impl<'a> Found<'a> {
-    /// Looks at files.
+    /// Collects the facts about files.
     pub(crate) fn of(tables: &'a [Table]) -> Self {
         let facts = |table: &Table| vec![OnceCell::new(); table.columns.len()];
         Self {

@@ -25,7 +25,7 @@ pub(crate) enum Separator {
 }
 
 impl Separator {
-    /// Those between cells; where two explain a file alike, the first.
+    /// Separators between cells; if two explain a file alike, the first counts.
     pub(crate) const CELLS: [Self; 5] = [Self::Tab, Self::Semicolon, Self::Comma, Self::Pipe, Self::Spaces];
 
     pub(crate) const fn words(self) -> &'static str {

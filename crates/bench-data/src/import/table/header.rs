@@ -35,7 +35,7 @@ pub(crate) struct Header {
 }
 
 impl Header {
-    /// Looks above the first line that is data, below `skip` physical lines.
+    /// Finds the header above the first line that is data, below `skip` physical lines.
     pub(crate) fn find(file: &str, grid: &Grid, decimal: DecimalMark, skip: usize) -> Result<Self, ImportError> {
         let first = (0..grid.len()).find(|row| grid.line(*row) > skip as u64).unwrap_or(grid.len());
         let data = Data::find(grid, decimal, first);

@@ -81,7 +81,7 @@ pub struct Survey {
 }
 
 impl Survey {
-    /// Looks at a recording.
+    /// Surveys a recording.
     #[must_use]
     pub fn new(imported: &Imported) -> Self {
         let trace = &imported.trace;

@@ -81,7 +81,7 @@ impl<'a> Workshop<'a> {
         Ok(hash)
     }
 
-    /// Does the job, and notes what became of it before its output takes its place.
+    /// Runs the job, and records its result before its output takes its place.
     ///
     /// # Errors
     /// If the folder of outputs cannot be written.
@@ -129,7 +129,7 @@ impl<'a> Workshop<'a> {
     }
 }
 
-/// Does a command whose output goes to `draft`.
+/// Runs a command whose output goes to `draft`.
 fn obey(command: Command, draft: &Path, entry: &mut Entry, messages: &Messages) -> Result<(), CliError> {
     match command {
         Command::Filter(mut args) => {

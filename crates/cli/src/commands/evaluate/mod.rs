@@ -34,7 +34,7 @@ pub fn run(args: &EvaluateArgs, messages: &Messages) -> Result<(), CliError> {
     evaluate(args, messages, &mut Evaluation::default(), |evaluation| print(|out| evaluation.write(out, args.json)))
 }
 
-/// The same into an `evaluation`, which is shown once all that can be scored is.
+/// Evaluates into an `evaluation`, which is shown once all that can be scored is.
 pub fn evaluate(
     args: &EvaluateArgs,
     messages: &Messages,
@@ -111,7 +111,7 @@ fn with_split(
     Ok((scores, drawn))
 }
 
-/// Some recordings with parameters from others.
+/// Evaluates some recordings with parameters from others.
 fn with_training(args: &EvaluateArgs, evaluation: &mut Evaluation, messages: &Messages) -> Result<(), CliError> {
     let progress = Progress::new("calibrating", messages);
     let read = |path| read(args, path);

@@ -26,7 +26,7 @@ pub struct SettledScores {
     n: usize,
     /// Share of them whose 95 % interval holds the last reading.
     coverage_95: f64,
-    /// The same of rows of the first half minute.
+    /// Coverage of rows of the first half minute.
     early_coverage_95: f64,
     rmse: f64,
     width_95: f64,

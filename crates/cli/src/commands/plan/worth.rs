@@ -41,7 +41,7 @@ pub struct Told {
     pub minutes: f64,
     /// Parameters of the law.
     pub parameters: usize,
-    /// Those with a standard error of less than a quarter of them.
+    /// Number of parameters with a standard error of less than a quarter of them.
     pub told: usize,
     /// Largest standard error of the determined parameters, percent.
     pub worst_percent: Option<f64>,
@@ -70,9 +70,9 @@ pub struct Sampling {
     pub cases: Vec<Worth>,
     /// Error at [`FASTEST_HZ`] of readings that drift and have no noise otherwise, percent of the sensor's range.
     pub drift_alone_percent: f64,
-    /// And of such that have noise and do not drift.
+    /// Error of readings that have noise and do not drift.
     pub noise_alone_percent: f64,
-    /// And of such that have neither.
+    /// Error of readings that have neither.
     pub neither_percent: f64,
 }
 

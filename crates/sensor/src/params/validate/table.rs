@@ -50,7 +50,7 @@ pub const FACTOR: Allowed = Allowed { least: 1e-3, most: 1e3 };
 pub const WEIGHT: Allowed = Allowed { least: -1e15, most: 1e15 };
 /// Number for information only: a score, or a variance of undetermined parameters.
 pub const TOLD: Allowed = Allowed { least: -f64::INFINITY, most: f64::INFINITY };
-/// The same for what is no less than zero.
+/// Number for information only, zero or more.
 pub const TOLD_AMOUNT: Allowed = Allowed { least: 0.0, most: f64::INFINITY };
 
 /// Largest change of resistance, relative to R₀, that a gauge curve may tell within the law's range.
