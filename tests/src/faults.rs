@@ -97,7 +97,7 @@ fn is_flagged(row: &Estimate) -> bool {
 pub struct Answer {
     /// Settled rows before it.
     pub before: Score,
-    /// While it lasts.
+    /// Rows during it.
     pub during: Score,
     /// The first five seconds after it.
     pub soon: Score,

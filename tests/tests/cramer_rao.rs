@@ -194,7 +194,7 @@ fn a_filter_that_linearises_once_does_not() {
     }
 }
 
-/// On a straight gauge curve the bound is the Kalman filter's own variance, which a dense joint Gaussian confirms
+/// The bound on a straight gauge curve is the Kalman filter's own variance, which a dense joint Gaussian confirms
 /// elsewhere: the recursion of this test is right.
 #[test]
 fn on_a_straight_gauge_curve_the_bound_is_the_kalman_filter_s_variance() {

@@ -89,7 +89,7 @@ fn between_known_rates_the_way_varies_as_stated() {
     assert!((variance / simulated - 1.0).abs() < 0.1, "{variance} vs {simulated}");
 }
 
-/// Without a reading for 10 and 60 s the sum of the branches spreads as it does in many simulated motions, in one step or in
+/// The sum of the branches, without a reading for 10 and 60 s, spreads as it does in many simulated motions, in one step or in
 /// many. The logistic distribution makes E|v| 2.1 % larger than the normal one does; a mean of 1200 motions is off by four
 /// standard errors at most. The deviation is stated within 20 %, of which 8 % may be chance (four standard errors).
 #[test]

@@ -214,7 +214,7 @@ proptest! {
         }
     }
 
-    /// Without readings the future has nothing to say about the past; rounding as in
+    /// The future carries no information on the past without readings; rounding as in
     /// `check_split`.
     #[test]
     fn missing_everywhere_is_prediction(rows in wild()) {
@@ -235,7 +235,7 @@ proptest! {
         }
     }
 
-    /// With the phase known and constant gains, a row without a reading in the middle of a step changes nothing, before
+    /// A row without a reading in the middle of a step changes nothing, with the phase known and constant gains, before
     /// or after smoothing.
     #[test]
     fn splitting_a_step_changes_nothing(rows in tame(), share in 0.01..0.99_f64) {

@@ -121,7 +121,7 @@ fn the_report_is_complete_without_scripts() {
     }
 }
 
-/// On paper the figures share pages, and what is folded is left out.
+/// The printed report's figures share pages, and folded parts are left out.
 #[test]
 fn the_report_prints_on_few_pages() {
     let Some(browser) = browser() else { return };

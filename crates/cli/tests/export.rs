@@ -78,7 +78,7 @@ fn lists_of_operations_compute_what_compiled_functions_do() {
     }
 }
 
-/// Without `--dt-s` readings come as often as in calibration.
+/// Readings come as often as in calibration unless `--dt-s` is given.
 #[test]
 fn the_usual_time_between_readings_is_the_calibrations() {
     let bench = Bench::calibrated();

@@ -193,7 +193,7 @@ mod on_unix {
         refused(&bench, &[&CALIBRATE[..], &["full", "--report", "new.html"]].concat(), OTHER, "cannot write full: ");
     }
 
-    /// There or not yet there, what the link points to is written.
+    /// A symbolic link stays, and its target is written, whether it exists or not.
     #[test]
     fn a_symbolic_link_stays() {
         let bench = Bench::calibrated();

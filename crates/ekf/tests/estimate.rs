@@ -114,7 +114,7 @@ fn an_unseen_hold_may_relax_by_any_share() {
     assert!((falls.variance - relaxes * relaxes / 12.0 - wander).abs() < 1e-15);
 }
 
-/// On a ramp dρ/dε = 1.9 - 5.6 ε + k - c/(τ v), which is zero at one strain.
+/// The ramp border is at the one strain where dρ/dε = 1.9 - 5.6 ε + k - c/(τ v) is zero.
 #[test]
 fn the_ramp_border_is_where_the_reading_stops_changing() {
     let model = model([1.9, -2.8, 0.0], [-0.5, -0.2]);

@@ -72,7 +72,7 @@ proptest! {
         }
     }
 
-    /// Without readings a step is the model's transition and nothing else, and steps of zero seconds do nothing.
+    /// A step without a reading is the model's transition and nothing else, and steps of zero seconds do nothing.
     #[test]
     fn missing_readings_are_predictions(rows in readings()) {
         let model = sensor::<f64>(1.0);

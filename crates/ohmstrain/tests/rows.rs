@@ -193,8 +193,8 @@ fn after_a_while(last: Reading) -> Estimate {
     filter.step(10.0, last).unwrap()
 }
 
-/// In a hold a reading settles no farther from itself than by all of the relaxation, whatever strain the filter believes in.
-/// Where readings end, what the filter expects to read takes their place, and is less and less certain.
+/// A reading in a hold settles no farther from itself than by all of the relaxation, whatever the filter's strain.
+/// After the last reading the filter's expected reading takes its place, and is less and less certain.
 #[test]
 fn settling_starts_from_the_reading() {
     let mut filter = sensor().filter().build().unwrap();

@@ -11,7 +11,7 @@ use crate::run::{Output, Rows, SEGMENT, WayBack};
 
 /// A smoother on its way back, corrected segment by segment. Everything but the strain is the smoother's.
 ///
-/// Where a reading is missing the correction holds what it has seen last, and its variance grows by as much as the smoother's
+/// At a missing reading the correction keeps its last features, and its variance grows by as much as the smoother's
 /// has grown since.
 pub(crate) struct CorrectedWayBack<'a> {
     back: Box<dyn WayBack + 'a>,

@@ -56,7 +56,7 @@ impl<'a> Workshop<'a> {
     /// Adds the hashes of all inputs.
     ///
     /// # Errors
-    /// Which one cannot be read.
+    /// The input that cannot be read.
     pub fn hash_inputs(&self, job: &Job, entry: &mut Entry) -> Result<(), String> {
         let unreadable = |file: &Path, error: &io::Error| format!("cannot read {}: {error}", file.display());
         for file in &job.files {
